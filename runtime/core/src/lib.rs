@@ -1,0 +1,24 @@
+//! What both sides of Straightline stand on: scalars ([`Real`], [`Dd`]), spatial algebra, the robot [`model`], and the
+//! dynamics [`algorithms`], written once and generic over the scalar.
+//!
+//! With `f64` the algorithms are the generic numeric runtime; with the compiler's tracing scalar they are its equations;
+//! with double-double [`Dd`] they are an oracle. The feature `reference` adds a second author: the handbook chapter's
+//! own formulation, which shares nothing with the algorithms but the scalars.
+#![no_std]
+#![forbid(unsafe_code)]
+#[cfg(feature = "alloc")]
+extern crate alloc;
+
+#[cfg(feature = "alloc")]
+pub mod algorithms;
+pub mod dd;
+#[cfg(feature = "alloc")]
+pub mod model;
+pub mod real;
+#[cfg(feature = "reference")]
+pub mod reference;
+pub mod spatial;
+pub mod trig;
+
+pub use dd::Dd;
+pub use real::Real;

@@ -1,0 +1,171 @@
+//! The robot as the algorithms see it: a constant tree of rigid bodies in canonical joint frames.
+//!
+//! **Canonical joint frame.** The frame of body j sits in its joint j: origin on the joint axis, z along it. It is fixed
+//! to the body, and at q = 0 it coincides with the joint frame that is fixed to the parent. So every revolute joint turns
+//! about its own z, every linear joint slides along it, and what a link frame of the robot file looks like is left to
+//! [`Body::link_frame`]. A floating base keeps the root link's own frame.
+
+use crate::dd::Dd;
+use crate::real::Real;
+use crate::spatial::{SpatialInertia, Transform, Vec3};
+use alloc::string::String;
+use alloc::vec::Vec;
+
+/// Index of a body in [`Model::bodies`].
+pub type BodyId = usize;
+
+/// How a body moves against its parent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointKind {
+    /// Turns about z by q \[rad\]; also a continuous joint.
+    Revolute,
+    /// Slides along z by q \[m\].
+    #[doc(alias = "linear")]
+    Prismatic,
+    /// The root body, free in the world. q = (x, y, z, qx, qy, qz, qw): position and orientation (a unit quaternion) of
+    /// the root link in the world; qd = (v, ω): velocity of the root link's origin and angular velocity, in root-link
+    /// axes; qdd the componentwise derivative of qd; tau the force and the moment about that origin, in root-link axes.
+    Floating,
+}
+
+impl JointKind {
+    /// Number of configuration coordinates.
+    pub const fn nq(self) -> usize {
+        match self {
+            JointKind::Revolute | JointKind::Prismatic => 1,
+            JointKind::Floating => 7,
+        }
+    }
+
+    /// Number of velocity coordinates.
+    pub const fn nv(self) -> usize {
+        match self {
+            JointKind::Revolute | JointKind::Prismatic => 1,
+            JointKind::Floating => 6,
+        }
+    }
+}
+
+/// Range of a joint's coordinate and what its drive can do; infinite where the file says nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Least q \[rad or m\].
+    pub lower: f64,
+    /// Greatest q \[rad or m\].
+    pub upper: f64,
+    /// Greatest |q̇| \[rad/s or m/s\].
+    pub velocity: f64,
+    /// Greatest |τ| \[N·m or N\].
+    pub effort: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits { lower: f64::NEG_INFINITY, upper: f64::INFINITY, velocity: f64::INFINITY, effort: f64::INFINITY }
+    }
+}
+
+/// A joint and its place in the coordinate vectors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// The robot file's name of the joint.
+    pub name: String,
+    /// How it moves.
+    pub kind: JointKind,
+    /// First index into q.
+    pub iq: usize,
+    /// First index into qd, qdd and tau.
+    pub iv: usize,
+    /// Ranges.
+    pub limits: Limits,
+}
+
+/// A moving body with the joint that carries it. Links that are fixed to it are merged in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body<T> {
+    /// The robot file's name of the link that the joint moves.
+    pub name: String,
+    /// The body it moves against; `None`: the world.
+    pub parent: Option<BodyId>,
+    /// The joint.
+    pub joint: Joint,
+    /// Pose of the joint frame (q = 0) in the parent's canonical frame, or in the world.
+    pub placement: Transform<T>,
+    /// Inertia in the canonical frame.
+    pub inertia: SpatialInertia<T>,
+    /// Pose of the link's own frame, as the robot file has it, in the canonical frame.
+    pub link_frame: Transform<T>,
+}
+
+/// A named frame that outputs may be asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame<T> {
+    /// Its name.
+    pub name: String,
+    /// The body that carries it; `None`: the world.
+    pub body: Option<BodyId>,
+    /// Its pose in the body's canonical frame, or in the world.
+    pub placement: Transform<T>,
+}
+
+/// A robot: bodies in topological order (parents first), gravity, named frames.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model<T> {
+    /// The robot's name.
+    pub name: String,
+    /// The moving bodies; a parent stands before its children.
+    pub bodies: Vec<Body<T>>,
+    /// Acceleration due to gravity in the world \[m/s²\].
+    pub gravity: Vec3<T>,
+    /// All frames of the robot: one per link of the file, and what was added.
+    pub frames: Vec<Frame<T>>,
+}
+
+impl<T: Real> Model<T> {
+    /// Number of configuration coordinates.
+    pub fn nq(&self) -> usize {
+        self.bodies.iter().map(|b| b.joint.kind.nq()).sum()
+    }
+
+    /// Number of velocity coordinates.
+    pub fn nv(&self) -> usize {
+        self.bodies.iter().map(|b| b.joint.kind.nv()).sum()
+    }
+
+    /// The frame of that name.
+    pub fn frame(&self, name: &str) -> Option<&Frame<T>> {
+        self.frames.iter().find(|f| f.name == name)
+    }
+
+    /// The same robot over another scalar: every number through `f`.
+    pub fn map<U: Real>(&self, mut f: impl FnMut(T) -> U) -> Model<U> {
+        Model {
+            name: self.name.clone(),
+            bodies: self
+                .bodies
+                .iter()
+                .map(|b| Body {
+                    name: b.name.clone(),
+                    parent: b.parent,
+                    joint: b.joint.clone(),
+                    placement: b.placement.map(&mut f),
+                    inertia: b.inertia.map(&mut f),
+                    link_frame: b.link_frame.map(&mut f),
+                })
+                .collect(),
+            gravity: self.gravity.map(&mut f),
+            frames: self
+                .frames
+                .iter()
+                .map(|x| Frame { name: x.name.clone(), body: x.body, placement: x.placement.map(&mut f) })
+                .collect(),
+        }
+    }
+}
+
+impl Model<Dd> {
+    /// The same robot with every number rounded once to another scalar.
+    pub fn cast<U: Real>(&self) -> Model<U> {
+        self.map(U::constant)
+    }
+}

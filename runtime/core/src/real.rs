@@ -1,0 +1,88 @@
+//! The scalar: the one trait with many implementors.
+//!
+//! The algorithms are written over [`Real`], which has no comparisons: whatever runs over it is straight-line for a given
+//! model, so the same source computes with numbers and writes down equations.
+
+use crate::dd::Dd;
+use core::fmt::Debug;
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A scalar without comparisons.
+pub trait Real:
+    Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
+    /// The constant, rounded once to this scalar's format.
+    fn constant(value: Dd) -> Self;
+
+    /// `(sin x, cos x)` of an angle in radians.
+    fn sin_cos(self) -> (Self, Self);
+
+    /// Square root; NaN below zero.
+    fn sqrt(self) -> Self;
+
+    /// Zero.
+    fn zero() -> Self {
+        Self::constant(Dd::ZERO)
+    }
+
+    /// One.
+    fn one() -> Self {
+        Self::constant(Dd::ONE)
+    }
+
+    /// Gives the value a readable name, such as `omega`, body 3, component `"x"`: for scalars that write equations down.
+    /// Numbers ignore it.
+    #[must_use]
+    #[inline(always)]
+    fn named(self, _name: &'static str, _index: usize, _component: &'static str) -> Self {
+        self
+    }
+
+    /// Says that what follows belongs to one phase of an algorithm and, where there is one, to one body: for scalars
+    /// that write equations down. Numbers ignore it.
+    #[inline(always)]
+    fn section(_phase: &'static str, _body: Option<usize>) {}
+}
+
+impl Real for f64 {
+    #[inline]
+    fn constant(value: Dd) -> Self {
+        value.to_f64()
+    }
+    #[inline]
+    fn sin_cos(self) -> (Self, Self) {
+        crate::trig::sin_cos_f64(self)
+    }
+    #[inline]
+    fn sqrt(self) -> Self {
+        crate::trig::sqrt_f64(self)
+    }
+}
+
+impl Real for f32 {
+    #[inline]
+    fn constant(value: Dd) -> Self {
+        value.to_f32()
+    }
+    #[inline]
+    fn sin_cos(self) -> (Self, Self) {
+        crate::trig::sin_cos_f32(self)
+    }
+    #[inline]
+    fn sqrt(self) -> Self {
+        crate::trig::sqrt_f32(self)
+    }
+}
+
+impl Real for Dd {
+    #[inline]
+    fn constant(value: Dd) -> Self {
+        value
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        Dd::sin_cos(self)
+    }
+    fn sqrt(self) -> Self {
+        Dd::sqrt(self)
+    }
+}

@@ -1,0 +1,95 @@
+//! 3-vectors.
+
+use crate::real::Real;
+use core::ops::{Add, Neg, Sub};
+
+/// A 3-vector; the frame it is expressed in stands in the name of the variable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vec3<T> {
+    /// Component along x.
+    pub x: T,
+    /// Component along y.
+    pub y: T,
+    /// Component along z.
+    pub z: T,
+}
+
+impl<T> Vec3<T> {
+    /// A vector from its components.
+    pub const fn new(x: T, y: T, z: T) -> Self {
+        Vec3 { x, y, z }
+    }
+}
+
+impl<T: Real> Vec3<T> {
+    /// The null vector.
+    pub fn zero() -> Self {
+        Vec3::new(T::zero(), T::zero(), T::zero())
+    }
+
+    /// The unit vector along z.
+    pub fn unit_z() -> Self {
+        Vec3::new(T::zero(), T::zero(), T::one())
+    }
+
+    /// Every component through `f`.
+    pub fn map<U>(self, mut f: impl FnMut(T) -> U) -> Vec3<U> {
+        Vec3::new(f(self.x), f(self.y), f(self.z))
+    }
+
+    /// `self · other`.
+    pub fn dot(self, other: Self) -> T {
+        self.x * other.x + self.y * other.y + self.z * other.z
+    }
+
+    /// `self × other`.
+    #[must_use]
+    pub fn cross(self, b: Self) -> Self {
+        let a = self;
+        Vec3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+    }
+
+    /// `self` times a number.
+    #[must_use]
+    pub fn scale(self, k: T) -> Self {
+        Vec3::new(self.x * k, self.y * k, self.z * k)
+    }
+
+    /// The components as an array.
+    pub fn to_array(self) -> [T; 3] {
+        [self.x, self.y, self.z]
+    }
+
+    /// See [`Real::named`].
+    #[must_use]
+    pub fn named(self, name: &'static str, index: usize) -> Self {
+        Vec3::new(self.x.named(name, index, "x"), self.y.named(name, index, "y"), self.z.named(name, index, "z"))
+    }
+}
+
+impl<T> From<[T; 3]> for Vec3<T> {
+    fn from([x, y, z]: [T; 3]) -> Self {
+        Vec3 { x, y, z }
+    }
+}
+
+impl<T: Real> Add for Vec3<T> {
+    type Output = Self;
+    fn add(self, b: Self) -> Self {
+        Vec3::new(self.x + b.x, self.y + b.y, self.z + b.z)
+    }
+}
+
+impl<T: Real> Sub for Vec3<T> {
+    type Output = Self;
+    fn sub(self, b: Self) -> Self {
+        Vec3::new(self.x - b.x, self.y - b.y, self.z - b.z)
+    }
+}
+
+impl<T: Real> Neg for Vec3<T> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Vec3::new(-self.x, -self.y, -self.z)
+    }
+}
