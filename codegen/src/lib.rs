@@ -1,1 +1,4 @@
 //! The compiler.
+
+pub mod description;
+pub mod diagnostic;

@@ -1,0 +1,320 @@
+//! The robot file as written, every value with its place.
+//!
+//! Three notations are read: URDF (`urdf`), and in TOML joint frames (`toml`) and the mass-centre notation of
+//! the chapter (`chapter`). Nothing is computed here: angles stay in the unit they are written in, axes keep their
+//! length. What can be judged value by value (a number that is none, an unknown key) is judged by the readers; what needs
+//! the whole robot (tree, inertias, angles) by `crate::model`.
+
+use crate::diagnostic::Place;
+use straightline_core::spatial::Sym3;
+
+/// A value with its place in the file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Value<T> {
+    /// The value.
+    pub value: T,
+    /// Where it stands; for a value that was left out, where it would stand.
+    pub place: Place,
+}
+
+impl<T> Value<T> {
+    /// A value with its place.
+    pub fn new(value: T, place: Place) -> Value<T> {
+        Value { value, place }
+    }
+
+    /// A value that no file holds.
+    pub fn assumed(value: T) -> Value<T> {
+        Value { value, place: Place::none() }
+    }
+}
+
+/// The notation of a robot file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Unified Robot Description Format (XML).
+    Urdf,
+    /// Joint frames in TOML, see `SCHEMA.md`.
+    JointFrameToml,
+    /// Mass centres, joint axes and joint vectors in TOML, as in the chapter.
+    MassCentreToml,
+}
+
+/// How the robot stands in the world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BaseKind {
+    /// The root link is the world.
+    Fixed,
+    /// The root link moves freely.
+    Floating,
+}
+
+/// A robot file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Description {
+    /// Its notation.
+    pub format: Format,
+    /// The robot's name.
+    pub name: Value<String>,
+    /// Acceleration due to gravity in the world \[m/s²\], where the file states it.
+    pub gravity: Option<Value<[f64; 3]>>,
+    /// The base, where the file states it.
+    pub base: Option<Value<BaseKind>>,
+    /// The bodies.
+    pub notation: Notation,
+    /// What the file holds and the dynamics do not need.
+    pub ignored: Vec<Ignored>,
+}
+
+/// The two ways of describing bodies.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Notation {
+    /// Links and joints with frames: URDF, and TOML with joint frames.
+    JointFrames(JointFrameNotation),
+    /// Mass centres, axes and vectors to the joints: the chapter's.
+    MassCentres(MassCentreNotation),
+}
+
+/// A kind of element that was skipped.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ignored {
+    /// Its name, such as `visual`.
+    pub what: String,
+    /// How often it occurs.
+    pub count: usize,
+    /// Its first place.
+    pub place: Place,
+}
+
+/// Links and joints with frames.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct JointFrameNotation {
+    /// The links, in the file's order.
+    pub links: Vec<Link>,
+    /// The joints, in the file's order.
+    pub joints: Vec<Joint>,
+    /// Further named frames.
+    pub frames: Vec<NamedFrame>,
+    /// A link or a joint could not be read, so that the tree has holes that were complained of already.
+    pub has_holes: bool,
+}
+
+/// A link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Link {
+    /// Its name.
+    pub name: Value<String>,
+    /// Mass, mass centre and inertia, where the file gives them.
+    pub inertial: Option<Inertial>,
+}
+
+/// Mass, mass centre and inertia of a link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inertial {
+    /// Mass \[kg\].
+    pub mass: Value<f64>,
+    /// Mass centre in the link frame \[m\].
+    pub com: Value<[f64; 3]>,
+    /// Rotation of the axes of `inertia` against the link's.
+    pub rotation: Rotation,
+    /// Inertia tensor about the mass centre, in axes turned by `rotation` \[kg·m²\].
+    pub inertia: Value<Sym3<f64>>,
+}
+
+/// The unit in which an angle is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AngleUnit {
+    /// Radians.
+    Radian,
+    /// Degrees.
+    Degree,
+    /// Multiples of π/2.
+    QuarterTurn,
+    /// Multiples of 2π.
+    Turn,
+}
+
+/// An angle as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Angle {
+    /// The number.
+    pub value: f64,
+    /// Its unit.
+    pub unit: AngleUnit,
+    /// How it is written; empty if it is left out.
+    pub text: String,
+    /// Where.
+    pub place: Place,
+}
+
+impl Angle {
+    /// No angle, where the file says nothing.
+    pub fn zero(place: Place) -> Angle {
+        Angle { value: 0.0, unit: AngleUnit::Radian, text: String::new(), place }
+    }
+}
+
+/// A rotation as written: roll, pitch and yaw, R = Rz(yaw) Ry(pitch) Rx(roll).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rotation {
+    /// Roll (about x), pitch (about y), yaw (about z).
+    pub rpy: [Angle; 3],
+}
+
+impl Rotation {
+    /// No rotation, where the file says nothing.
+    pub fn identity(place: Place) -> Rotation {
+        Rotation { rpy: [Angle::zero(place.clone()), Angle::zero(place.clone()), Angle::zero(place)] }
+    }
+}
+
+/// A pose as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pose {
+    /// Position \[m\].
+    pub xyz: Value<[f64; 3]>,
+    /// Orientation.
+    pub rotation: Rotation,
+}
+
+impl Pose {
+    /// Frames that coincide, where the file says nothing.
+    pub fn identity(place: Place) -> Pose {
+        Pose { xyz: Value::new([0.0; 3], place.clone()), rotation: Rotation::identity(place) }
+    }
+}
+
+/// How a joint of a file moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointKind {
+    /// Turns, within limits.
+    Revolute,
+    /// Turns, without limits.
+    Continuous,
+    /// Slides.
+    #[doc(alias = "linear")]
+    Prismatic,
+    /// Does not move.
+    Fixed,
+    /// Moves freely.
+    Floating,
+}
+
+impl JointKind {
+    /// Whether it turns or slides.
+    pub fn moves(self) -> bool {
+        !matches!(self, JointKind::Fixed)
+    }
+}
+
+/// A joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Its name.
+    pub name: Value<String>,
+    /// How it moves.
+    pub kind: Value<JointKind>,
+    /// The link that carries it.
+    pub parent: Value<String>,
+    /// The link that it moves.
+    pub child: Value<String>,
+    /// Pose of the joint frame, which is the child's link frame at q = 0, in the parent's link frame.
+    pub origin: Pose,
+    /// Axis in the joint frame, as long as it is written; \[1, 0, 0\] where a URDF says nothing.
+    pub axis: Value<[f64; 3]>,
+    /// Ranges.
+    pub limits: JointLimits,
+    /// What its drive adds.
+    pub drive: JointDrive,
+}
+
+/// Ranges of a joint, where the file gives them.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct JointLimits {
+    /// Least coordinate \[rad or m\].
+    pub lower: Option<Value<f64>>,
+    /// Greatest coordinate \[rad or m\].
+    pub upper: Option<Value<f64>>,
+    /// Greatest speed \[rad/s or m/s\].
+    pub velocity: Option<Value<f64>>,
+    /// Greatest torque or force \[N·m or N\].
+    pub effort: Option<Value<f64>>,
+}
+
+/// What the drive of a joint adds to its dynamics, where the file gives it.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct JointDrive {
+    /// Viscous friction \[N·m·s/rad or N·s/m\].
+    pub damping: Option<Value<f64>>,
+    /// Dry friction \[N·m or N\].
+    pub friction: Option<Value<f64>>,
+    /// Moment of inertia of the rotor about its axis \[kg·m²\].
+    pub rotor_inertia: Option<Value<f64>>,
+    /// Rotor speed over joint speed.
+    pub gear_ratio: Option<Value<f64>>,
+    /// Inertia added on the joint's own coordinate \[kg·m² or kg\].
+    pub armature: Option<Value<f64>>,
+    /// Spring: stiffness \[N·m/rad or N/m\].
+    pub spring_stiffness: Option<Value<f64>>,
+    /// Spring: coordinate without force \[rad or m\].
+    pub spring_rest: Option<Value<f64>>,
+}
+
+/// A named frame on a link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedFrame {
+    /// Its name.
+    pub name: Value<String>,
+    /// The link that carries it.
+    pub link: Value<String>,
+    /// Its pose in the link frame.
+    pub pose: Pose,
+}
+
+/// An open chain in the chapter's notation. Frame j is fixed to link j, its origin is the link's mass centre C_j; the
+/// origin of frame 0, the world's, is C_0. All vectors are as written, in the frame named with each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MassCentreNotation {
+    /// The base, link 0.
+    pub base: MassCentreEnd,
+    /// The links 1 … n.
+    pub links: Vec<MassCentreLink>,
+}
+
+/// The upper end of link j: what it says of joint j+1, in frame j.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MassCentreEnd {
+    /// e_{j+1}, the axis of joint j+1; the last link has none.
+    pub e_next: Option<Value<[f64; 3]>>,
+    /// r_{j,j+1}, from S_{j+1} to C_j \[m\]; the last link's gives the tip, tip = C_n − r_{n,n+1}.
+    pub r_next: Option<Value<[f64; 3]>>,
+    /// r*_{j,j+1}, in a specificity: replaces r_{j,j+1} in (20.101).
+    pub r_next_star: Option<Value<[f64; 3]>>,
+}
+
+/// Link j with its joint S_j.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MassCentreLink {
+    /// Name of the link: `link1`, `link2`, … where the file says nothing.
+    pub name: Value<String>,
+    /// Name of the joint: `joint1`, `joint2`, … where the file says nothing.
+    pub joint_name: Value<String>,
+    /// s_j: whether the joint is linear. [`JointKind::Revolute`] or [`JointKind::Prismatic`].
+    pub kind: Value<JointKind>,
+    /// m_j \[kg\].
+    pub mass: Value<f64>,
+    /// J_j about C_j, in frame j \[kg·m²\].
+    pub inertia: Value<Sym3<f64>>,
+    /// e_j in frame j.
+    pub e: Value<[f64; 3]>,
+    /// r_{j,j} in frame j, from S_j to C_j \[m\].
+    pub r: Value<[f64; 3]>,
+    /// r*_{j,j} in frame j, in a specificity: replaces r_{j,j} in (20.101).
+    pub r_star: Option<Value<[f64; 3]>>,
+    /// α_j, the constant angle of a linear joint.
+    pub alpha: Option<Angle>,
+    /// The end towards joint j+1.
+    pub end: MassCentreEnd,
+    /// Ranges.
+    pub limits: JointLimits,
+}
