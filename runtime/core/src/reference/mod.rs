@@ -1,1 +1,39 @@
-//! The chapter.
+//! The chapter's own formulation of robot dynamics: the second author, who proves the first.
+//!
+//! Source: the handbook chapter *Robot Dynamics*, sections 20.1 and 20.2 and its appendix, equations (20.1)–(20.61) and
+//! (20.100)–(20.111); equation numbers in this module are the chapter's. Its misprints are corrected where they occur,
+//! and every correction says so. Link frames sit in the mass centres, all vectors of motion and force are expressed in
+//! the external immobile frame, rotations come from Rodrigues' formula, forces from D'Alembert's principle, and the
+//! equations of motion from the matrices Λ, Γ, Ξ, Δ. Nothing of [`crate::algorithms`] or [`crate::spatial`] is used:
+//! only the scalars and nalgebra's products.
+//!
+//! Two generalisations, both marked where they occur: the chain becomes a tree (the index j − 1 becomes the parent of j,
+//! a sum over k = j … n a sum over the links that joint j carries), and the first link may float ([`Joint::Free`]).
+//!
+//! The chapter calls *direct dynamics* what is called inverse dynamics today, and the reverse; names here are today's,
+//! and the chapter's are aliases for the search.
+//!
+//! Conventions of the outputs: `tau` = `H q̈ + h`; wrenches are about the joint point, in child-link axes; Jacobians and
+//! poses are in world axes, rows 1–3 linear; a free link has q = (x, y, z, qx, qy, qz, qw), q̇ = (v, ω) and τ = (F, M) in
+//! root-link axes at the root link's origin.
+
+mod dynamics;
+mod energy;
+mod frames;
+mod geometry;
+mod kinematics;
+mod scalar;
+mod solve;
+mod tree;
+
+pub use dynamics::{
+    bias_force, dalembert_inverse_dynamics, equations_of_motion, forward_dynamics, gravity_force, inverse_dynamics,
+    joint_loads, joint_wrenches, mass_matrix, natural_scale, velocity_force, EquationsOfMotion, JointLoad,
+};
+pub use energy::{centre_of_mass, kinetic_energy, momentum, potential_energy, Momentum};
+pub use frames::{frame_acceleration, frame_jacobian, frame_jacobian_bias, frame_pose, frame_velocity, FramePose};
+pub use geometry::{extended_joint, geometry, quaternion_rotation, rodrigues, skew, unit, LinkGeometry};
+pub use kinematics::{linear_forms, motion, LinearForms, LinkMotion};
+pub use scalar::Number;
+pub use solve::solve_symmetric;
+pub use tree::{ExtendedPosition, Joint, MassCentreFrame, MassCentreLink, MassCentreTree};

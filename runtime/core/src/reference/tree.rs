@@ -1,0 +1,190 @@
+//! The chapter's input: links described from their mass centres.
+//!
+//! Section 20.1.2: each link has a frame fixed to it, with its origin in the mass centre C and arbitrary axes. Names of
+//! this module: `e`, `r`, `r_star` are the projections on the link's own frame (tilde above, ẽ_j, r̃_{j,j}), `e_parent`,
+//! `r_parent`, `r_parent_star` those on the parent's frame (tilde below, e_j and r_{j−1,j}). The world is frame 0, with its
+//! origin C_0.
+
+use super::Number;
+use alloc::string::String;
+use alloc::vec::Vec;
+use nalgebra::{Matrix3, Vector3};
+
+/// How a link moves against its parent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Joint {
+    /// s_j = 0: turns about e_j by q_j \[rad\].
+    Revolute,
+    /// s_j = 1: slides along e_j by q_j \[m\].
+    #[doc(alias = "prismatic")]
+    Linear,
+    /// A root that is free in the world (not in the chapter). Seven coordinates: position of the root point and unit
+    /// quaternion (x, y, z, qx, qy, qz, qw) of the link's axes; six velocities (v, ω) of the root point and of the link,
+    /// in the link's axes; τ = (F, M) about the root point in the link's axes.
+    Free,
+}
+
+impl Joint {
+    /// The indicator s_j of (20.6): 0 for a revolute joint, 1 for a linear one.
+    ///
+    /// # Panics
+    /// For a free link, which has none.
+    #[doc(alias = "s_j")]
+    pub fn indicator<T: Number>(self) -> T {
+        match self {
+            Joint::Revolute => nalgebra::zero(),
+            Joint::Linear => nalgebra::one(),
+            Joint::Free => unreachable!("equations with s_j are for one-degree-of-freedom joints"),
+        }
+    }
+
+    /// Number of position coordinates.
+    pub const fn nq(self) -> usize {
+        match self {
+            Joint::Revolute | Joint::Linear => 1,
+            Joint::Free => 7,
+        }
+    }
+
+    /// Number of velocity coordinates.
+    pub const fn nv(self) -> usize {
+        match self {
+            Joint::Revolute | Joint::Linear => 1,
+            Joint::Free => 6,
+        }
+    }
+}
+
+/// What the relative orientation of a link is when its joint is extended, A⁰_{j−1,j}.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ExtendedPosition<T> {
+    /// By the chapter's definition of the coordinate, from the r vectors: equations (20.101)–(20.107).
+    #[doc(alias = "specificity")]
+    ByVectors {
+        /// r*_{j,j} in frame j, where r_{j,j} is parallel with e_j (or something else is wanted).
+        r_star: Option<Vector3<T>>,
+        /// r*_{j−1,j} in the parent's frame, where r_{j−1,j} is parallel with e_j (or something else is wanted).
+        r_parent_star: Option<Vector3<T>>,
+        /// α_j \[rad\]: the constant rotation of a linear joint from the fictive extended position. Unused by others.
+        alpha: T,
+    },
+    /// Given as it is: from frame j to the parent's frame at q_j = 0, for robots whose zero is defined otherwise.
+    Matrix(Matrix3<T>),
+}
+
+/// A link, described from its mass centre, with the joint that carries it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MassCentreLink<T> {
+    /// Its name.
+    pub name: String,
+    /// The link it moves against, an index into [`MassCentreTree::links`] that is less than its own; `None`: the base,
+    /// frame 0.
+    pub parent: Option<usize>,
+    /// How it moves.
+    pub joint: Joint,
+    /// First index into q.
+    pub iq: usize,
+    /// First index into q̇, q̈ and τ.
+    pub iv: usize,
+    /// m_j \[kg\].
+    pub mass: T,
+    /// J̃_j: tensor of inertia about the mass centre, link axes \[kg·m²\]; (20.15).
+    pub inertia: Matrix3<T>,
+    /// ẽ_j: unit vector of the joint axis in frame j; (20.2).
+    pub e: Vector3<T>,
+    /// e_j in the parent's frame, a unit vector; (20.5).
+    pub e_parent: Vector3<T>,
+    /// r̃_{j,j} \[m\]: from the joint S_j (of a linear joint, from S''_j) to C_j, in frame j; (20.3). Of a free link: from the
+    /// root point to C_j.
+    #[doc(alias = "r_jj")]
+    pub r: Vector3<T>,
+    /// r_{j−1,j} \[m\]: from the joint S_j (of a linear joint, from S'_j) to the parent's mass centre, in the parent's frame;
+    /// (20.4). Null for a free link.
+    pub r_parent: Vector3<T>,
+    /// The orientation at q_j = 0.
+    pub extended: ExtendedPosition<T>,
+}
+
+impl<T: Number> MassCentreLink<T> {
+    /// A link that is free in the world: q = (position of the root point, quaternion of the link's axes).
+    pub fn free(name: String, mass: T, inertia: Matrix3<T>, r: Vector3<T>) -> Self {
+        MassCentreLink {
+            name,
+            parent: None,
+            joint: Joint::Free,
+            iq: 0,
+            iv: 0,
+            mass,
+            inertia,
+            e: Vector3::zeros(),
+            e_parent: Vector3::zeros(),
+            r,
+            r_parent: Vector3::zeros(),
+            extended: ExtendedPosition::Matrix(Matrix3::identity()),
+        }
+    }
+}
+
+/// A frame that is fixed to a link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MassCentreFrame<T> {
+    /// Its name.
+    pub name: String,
+    /// The link that carries it; `None`: the world.
+    pub link: Option<usize>,
+    /// From C_j to the frame's origin, in frame j \[m\].
+    pub position: Vector3<T>,
+    /// Columns: the frame's axes in frame j.
+    pub rotation: Matrix3<T>,
+}
+
+/// A robot as the chapter describes it, generalised to a tree of links.
+#[derive(Clone, Debug, PartialEq)]
+#[doc(alias = "MassCentreChain")]
+pub struct MassCentreTree<T> {
+    /// Its name.
+    pub name: String,
+    /// g: acceleration due to gravity in frame 0 \[m/s²\].
+    pub gravity: Vector3<T>,
+    /// The links, parents before children.
+    pub links: Vec<MassCentreLink<T>>,
+    /// Frames that outputs may be asked for.
+    pub frames: Vec<MassCentreFrame<T>>,
+}
+
+impl<T: Number> MassCentreTree<T> {
+    /// Number of position coordinates.
+    pub fn nq(&self) -> usize {
+        self.links.iter().map(|link| link.joint.nq()).sum()
+    }
+
+    /// Number of velocity coordinates, n of the chapter.
+    pub fn nv(&self) -> usize {
+        self.links.iter().map(|link| link.joint.nv()).sum()
+    }
+
+    /// Gives the joints their places in q and q̇ in the order of the links.
+    pub fn number_coordinates(&mut self) {
+        let (mut iq, mut iv) = (0, 0);
+        for link in &mut self.links {
+            (link.iq, link.iv) = (iq, iv);
+            iq += link.joint.nq();
+            iv += link.joint.nv();
+        }
+    }
+
+    /// The frame of that name.
+    pub fn frame(&self, name: &str) -> Option<&MassCentreFrame<T>> {
+        self.frames.iter().find(|frame| frame.name == name)
+    }
+
+    /// The links from `k` down to the base: k, its parent, …
+    pub(super) fn path_down(&self, k: usize) -> impl Iterator<Item = usize> + '_ {
+        core::iter::successors(Some(k), |&p| self.links[p].parent)
+    }
+
+    /// Whether joint `j` carries link `k`; in a chain: k ≥ j.
+    pub(super) fn carries(&self, j: usize, k: usize) -> bool {
+        self.path_down(k).any(|p| p == j)
+    }
+}
