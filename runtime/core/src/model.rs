@@ -95,6 +95,10 @@ pub struct Body<T> {
     pub inertia: SpatialInertia<T>,
     /// Pose of the link's own frame, as the robot file has it, in the canonical frame.
     pub link_frame: Transform<T>,
+    /// The rotation of the placement has few zeros, so that it pays to multiply it out with the joint's. A property of
+    /// the robot, not of the scalar, so that numbers and equations take the same form: set it to
+    /// [`composing_pays`](crate::algorithms::composing_pays)`(parent, &placement.rotation)`.
+    pub dense: bool,
 }
 
 /// A named frame that outputs may be asked for.
@@ -151,6 +155,7 @@ impl<T: Real> Model<T> {
                     placement: b.placement.map(&mut f),
                     inertia: b.inertia.map(&mut f),
                     link_frame: b.link_frame.map(&mut f),
+                    dense: b.dense,
                 })
                 .collect(),
             gravity: self.gravity.map(&mut f),

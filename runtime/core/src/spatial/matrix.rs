@@ -45,6 +45,18 @@ impl<T: Real> Mat3<T> {
         Vec3::new(self.column(0).dot(v), self.column(1).dot(v), self.column(2).dot(v))
     }
 
+    /// R_z A R_zᵀ: turned about z by the angle with this sine and cosine. The upper left block splits into its trace and
+    /// its skew part, which stay, and a deviator, which one number e turns: 12 multiplications in all.
+    #[must_use]
+    pub fn turned(&self, sin: T, cos: T) -> Self {
+        let [[a, b, xz], [c, d, yz], [zx, zy, zz]] = self.rows;
+        let e = (a - d) * cos - (b + c) * sin;
+        let (along, across) = (e * cos, e * sin);
+        let column = Vec3::new(xz, yz, zz).turned(sin, cos);
+        let row = Vec3::new(zx, zy, zz).turned(sin, cos);
+        Mat3 { rows: [[d + along, b + across, column.x], [c + across, a - along, column.y], [row.x, row.y, zz]] }
+    }
+
     /// Every entry through `f`.
     pub fn map<U>(&self, mut f: impl FnMut(T) -> U) -> Mat3<U> {
         Mat3 { rows: self.rows.map(|r| r.map(&mut f)) }
@@ -94,6 +106,19 @@ impl<T: Real> Sym3<T> {
         Sym3 { xx: f(self.xx), xy: f(self.xy), xz: f(self.xz), yy: f(self.yy), yz: f(self.yz), zz: f(self.zz) }
     }
 
+    /// See [`Real::named`].
+    #[must_use]
+    pub fn named(self, name: &'static str, index: usize) -> Self {
+        Sym3 {
+            xx: self.xx.named(name, index, "xx"),
+            xy: self.xy.named(name, index, "xy"),
+            xz: self.xz.named(name, index, "xz"),
+            yy: self.yy.named(name, index, "yy"),
+            yz: self.yz.named(name, index, "yz"),
+            zz: self.zz.named(name, index, "zz"),
+        }
+    }
+
     /// The full matrix.
     pub fn to_matrix(self) -> Mat3<T> {
         Mat3 { rows: [[self.xx, self.xy, self.xz], [self.xy, self.yy, self.yz], [self.xz, self.yz, self.zz]] }
@@ -109,6 +134,16 @@ impl<T: Real> Sym3<T> {
     #[must_use]
     pub fn rotated(self, r_ab: &Mat3<T>) -> Self {
         Sym3::from_matrix(&(*r_ab * self.to_matrix() * r_ab.transpose()))
+    }
+
+    /// R_z self R_zᵀ: turned about z by the angle with this sine and cosine. The upper left block is its trace, which
+    /// stays, and a deviator, which one number e turns: 8 multiplications in all.
+    #[must_use]
+    pub fn turned(self, sin: T, cos: T) -> Self {
+        let e = (self.xx - self.yy) * cos - (self.xy + self.xy) * sin;
+        let along = e * cos;
+        let z = Vec3::new(self.xz, self.yz, self.zz).turned(sin, cos);
+        Sym3 { xx: self.yy + along, xy: self.xy + e * sin, xz: z.x, yy: self.xx - along, yz: z.y, zz: self.zz }
     }
 
     /// Second moment Σ = ½ tr(J) 1 − J of an inertia tensor J about the same point; Σ = ∫ x xᵀ dm.
@@ -143,6 +178,13 @@ impl<T: Real> Mul<Vec3<T>> for Sym3<T> {
     type Output = Vec3<T>;
     fn mul(self, v: Vec3<T>) -> Vec3<T> {
         self.to_matrix() * v
+    }
+}
+
+impl<T: Real> Add for Mat3<T> {
+    type Output = Self;
+    fn add(self, b: Self) -> Self {
+        Mat3::from_columns(self.column(0) + b.column(0), self.column(1) + b.column(1), self.column(2) + b.column(2))
     }
 }
 

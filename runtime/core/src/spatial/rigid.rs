@@ -2,6 +2,7 @@
 
 use super::{Mat3, Sym3, Vec3};
 use crate::real::Real;
+use core::ops::Add;
 
 /// The pose of a frame b in a frame a.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,6 +56,20 @@ pub struct ForceVector<T> {
     pub force: Vec3<T>,
 }
 
+impl<T: Real> ForceVector<T> {
+    /// No force, no moment.
+    pub fn zero() -> Self {
+        ForceVector { moment: Vec3::zero(), force: Vec3::zero() }
+    }
+}
+
+impl<T: Real> Add for ForceVector<T> {
+    type Output = Self;
+    fn add(self, b: Self) -> Self {
+        ForceVector { moment: self.moment + b.moment, force: self.force + b.force }
+    }
+}
+
 /// Mass, mass centre and inertia of a body, in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpatialInertia<T> {
@@ -64,6 +79,11 @@ pub struct SpatialInertia<T> {
     pub com: Vec3<T>,
     /// First moment m c \[kg·m\].
     pub first_moment: Vec3<T>,
+    /// Inertia tensor about the mass centre J_c \[kg·m²\].
+    pub inertia_com: Sym3<T>,
+    /// Differences of the diagonal of J_c, (J_zz − J_yy, J_xx − J_zz, J_yy − J_xx) \[kg·m²\]: what ω × J ω
+    /// takes of it.
+    pub anisotropy_com: Vec3<T>,
     /// Second moment about the mass centre Σ_c = ½ tr(J_c) 1 − J_c \[kg·m²\].
     pub second_moment_com: Sym3<T>,
     /// Second moment about the frame's origin Σ_o = Σ_c + m c cᵀ \[kg·m²\].
@@ -76,17 +96,21 @@ impl<T: Real> SpatialInertia<T> {
         let first_moment = com.scale(mass);
         let second_moment_com = inertia_com.inertia_to_second_moment();
         let second_moment = second_moment_com + outer(com, first_moment);
-        SpatialInertia { mass, com, first_moment, second_moment_com, second_moment }
+        let j = inertia_com;
+        SpatialInertia {
+            mass,
+            com,
+            first_moment,
+            inertia_com,
+            anisotropy_com: Vec3::new(j.zz - j.yy, j.xx - j.zz, j.yy - j.xx),
+            second_moment_com,
+            second_moment,
+        }
     }
 
     /// No mass.
     pub fn zero() -> Self {
         SpatialInertia::new(T::zero(), Vec3::zero(), Sym3::zero())
-    }
-
-    /// Inertia tensor about the mass centre \[kg·m²\].
-    pub fn inertia_com(&self) -> Sym3<T> {
-        self.second_moment_com.second_moment_to_inertia()
     }
 
     /// Every number through `f`.
@@ -95,6 +119,8 @@ impl<T: Real> SpatialInertia<T> {
             mass: f(self.mass),
             com: self.com.map(&mut f),
             first_moment: self.first_moment.map(&mut f),
+            inertia_com: self.inertia_com.map(&mut f),
+            anisotropy_com: self.anisotropy_com.map(&mut f),
             second_moment_com: self.second_moment_com.map(&mut f),
             second_moment: self.second_moment.map(f),
         }

@@ -1,0 +1,30 @@
+//! Kinetic and potential energy.
+
+use super::joint::JointPose;
+use super::momentum::{anchor, first_moments_in_world};
+use super::velocity::body_velocities;
+use crate::dd::Dd;
+use crate::model::Model;
+use crate::real::Real;
+
+/// T = ½ Σ (m v_c² + ω · J_c ω) \[J\], each body about its mass centre, so that every term is a square.
+pub fn kinetic_energy<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> T {
+    let poses = JointPose::all(&model.bodies, q);
+    let velocities = body_velocities(model, &poses, qd);
+    let mut twice = T::zero();
+    for (i, (body, velocity)) in model.bodies.iter().zip(&velocities).enumerate() {
+        T::section("energy", Some(i));
+        let (w, j) = (velocity.angular, &body.inertia.inertia_com);
+        let v_com = velocity.linear + w.cross(body.inertia.com);
+        let rotation = w.dot(*j * w);
+        twice = twice + v_com.dot(v_com) * body.inertia.mass + rotation;
+    }
+    twice * T::constant(Dd::HALF)
+}
+
+/// V = −Σ m g · p_c \[J\] over the moving bodies, p_c from the world's origin.
+pub fn potential_energy<T: Real>(model: &Model<T>, q: &[T]) -> T {
+    let poses = JointPose::all(&model.bodies, q);
+    let (mass, first_moment) = first_moments_in_world(model, &poses);
+    -model.gravity.dot(first_moment + anchor(&poses).scale(mass))
+}
