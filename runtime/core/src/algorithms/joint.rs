@@ -127,6 +127,12 @@ impl<T: Real> JointPose<T> {
         ForceVector { moment: self.to_parent(moment) + self.translation.cross(force), force }
     }
 
+    /// A wrench on the child that the joint has turned or slid back already, as a wrench on the parent.
+    pub fn placed_wrench(&self, w: &ForceVector<T>) -> ForceVector<T> {
+        let force = self.placement * w.force;
+        ForceVector { moment: self.placement * w.moment + self.translation.cross(force), force }
+    }
+
     /// E S Eᵀ of a symmetric matrix that has been turned by the joint already.
     pub fn placed(&self, s: Sym3<T>) -> Sym3<T> {
         if self.dense {

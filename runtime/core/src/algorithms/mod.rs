@@ -13,10 +13,15 @@
 //! | Jacobian and J̇q̇ | [`jacobian`](fn@jacobian), [`jacobian_bias`] |
 //! | tau of a motion | [`inverse_dynamics`], [`bias_force`], [`gravity_force`], [`velocity_force`] |
 //! | reactions in the joints | [`joint_wrenches`] |
+//! | H(q) | [`mass_matrix`] |
+//! | motion under a tau | [`forward_dynamics_aba`], [`forward_dynamics_ltdl`] |
 //! | energy | [`kinetic_energy`], [`potential_energy`] |
 //! | mass centre, momentum | [`momentum`](fn@momentum) |
 
+mod aba;
+mod crba;
 mod energy;
+mod factor;
 mod jacobian;
 mod joint;
 mod kinematics;
@@ -24,7 +29,10 @@ mod momentum;
 mod rnea;
 mod velocity;
 
+pub use aba::{forward_dynamics_aba, solve_articulated};
+pub use crba::mass_matrix;
 pub use energy::{kinetic_energy, potential_energy};
+pub use factor::{forward_dynamics_ltdl, Ltdl};
 pub use jacobian::{jacobian, jacobian_bias};
 pub use joint::composing_pays;
 pub use kinematics::{forward_kinematics, frame_acceleration, frame_velocity};

@@ -1,0 +1,107 @@
+//! Forward dynamics by factoring the mass matrix: H = Lᵀ D L without fill-in.
+//!
+//! Numbered from the base to the tips, H has a zero wherever two joints lie on different branches. Eliminated from the
+//! tips down, it keeps them all, so that a leg costs what a leg has (Featherstone 2008, section 6.3-6.5, tables 6.3-6.5).
+
+use super::crba::mass_matrix;
+use super::rnea::bias_force;
+use crate::model::Model;
+use crate::real::Real;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// H = Lᵀ D L of a mass matrix: L unit lower triangular over the joints from base to tips, D diagonal.
+#[derive(Clone, Debug)]
+pub struct Ltdl<T> {
+    /// Per row of L, from the base outwards: its velocity coordinate.
+    coordinates: Vec<usize>,
+    /// Per row: the next row towards the base whose joint carries this one.
+    parents: Vec<Option<usize>>,
+    /// L below the diagonal, by rows; entries outside a row's own branch are never touched.
+    lower: Vec<Vec<T>>,
+    /// 1 / D.
+    inverse_pivots: Vec<T>,
+}
+
+impl<T: Real> Ltdl<T> {
+    /// Factors H, nv × nv, row-major, the mass matrix of `model`.
+    ///
+    /// A pivot is the inertia that a joint feels when all joints outside it are free. It is positive as long as every
+    /// joint moves some mass or inertia; a joint that moves none has no forward dynamics, and what comes out is not
+    /// finite.
+    pub fn factor(model: &Model<T>, mass_matrix: &[T]) -> Self {
+        let nv = model.nv();
+        let (coordinates, parents) = branches(model);
+        // the triangle below the diagonal, in the order of the rows; it becomes L in place
+        let entry = |row: usize, column: usize| mass_matrix[coordinates[row] * nv + coordinates[column]];
+        let mut lower: Vec<Vec<T>> = (0..nv).map(|i| (0..=i).map(|j| entry(i, j)).collect()).collect();
+        let mut inverse_pivots = vec![T::zero(); nv];
+        for k in (0..nv).rev() {
+            T::section("factor", Some(coordinates[k]));
+            let inverse_pivot = (T::one() / lower[k][k]).named("inverse_pivot", coordinates[k], "");
+            inverse_pivots[k] = inverse_pivot;
+            for i in up(&parents, k) {
+                // H_ij −= (H_ki / H_kk) H_kj for all j from i down to the base, then L_ki = H_ki / H_kk
+                let factor = lower[k][i] * inverse_pivot;
+                for j in core::iter::once(i).chain(up(&parents, i)) {
+                    lower[i][j] = lower[i][j] - factor * lower[k][j];
+                }
+                lower[k][i] = factor;
+            }
+        }
+        Ltdl { coordinates, parents, lower, inverse_pivots }
+    }
+
+    /// x with H x = `right`, nv numbers by velocity coordinate.
+    pub fn solve(&self, right: &[T]) -> Vec<T> {
+        let n = self.coordinates.len();
+        let mut x: Vec<T> = self.coordinates.iter().map(|&i| right[i]).collect();
+        T::section("solve", None);
+        for i in (0..n).rev() {
+            // Lᵀ y = b
+            for j in up(&self.parents, i) {
+                x[j] = x[j] - self.lower[i][j] * x[i];
+            }
+        }
+        let mut solution = right.to_vec();
+        for i in 0..n {
+            // L x = D⁻¹ y
+            x[i] = x[i] * self.inverse_pivots[i];
+            for j in up(&self.parents, i) {
+                x[i] = x[i] - self.lower[i][j] * x[j];
+            }
+            solution[self.coordinates[i]] = x[i];
+        }
+        solution
+    }
+}
+
+/// q̈ \[rad/s² or m/s²\] that the generalized forces tau \[N·m or N\] cause: H q̈ = tau − h, with [`Ltdl`].
+#[doc(alias = "inverse dynamics of the chapter")]
+pub fn forward_dynamics_ltdl<T: Real>(model: &Model<T>, q: &[T], qd: &[T], tau: &[T]) -> Vec<T> {
+    let bias = bias_force(model, q, qd);
+    let drive: Vec<T> = tau.iter().zip(&bias).map(|(&t, &h)| t - h).collect();
+    Ltdl::factor(model, &mass_matrix(model, q)).solve(&drive)
+}
+
+/// The velocity coordinates from the base outwards, and for each the place of the next one towards the base
+/// (Featherstone 2008, section 6.4: the expanded parent array; a floating base is a chain of six).
+fn branches<T: Real>(model: &Model<T>) -> (Vec<usize>, Vec<Option<usize>>) {
+    let (mut coordinates, mut parents) = (Vec::new(), Vec::new());
+    let mut last_row_of_body: Vec<Option<usize>> = Vec::new();
+    for body in &model.bodies {
+        let mut parent = body.parent.and_then(|p| last_row_of_body[p]);
+        for k in 0..body.joint.kind.nv() {
+            coordinates.push(body.joint.iv + k);
+            parents.push(parent);
+            parent = Some(coordinates.len() - 1);
+        }
+        last_row_of_body.push(parent);
+    }
+    (coordinates, parents)
+}
+
+/// The rows on the way from `row` to the base, without `row`.
+fn up(parents: &[Option<usize>], row: usize) -> impl Iterator<Item = usize> + '_ {
+    core::iter::successors(parents[row], |&i| parents[i])
+}
