@@ -1,0 +1,162 @@
+//! The pipeline, as one function.
+
+use crate::emit::{self, Item, Provenance, Scalar};
+use crate::expr::{verify, Folding, Graph, Grade, RuleSet, Section};
+use crate::function::{ForwardDynamicsMethod, Function};
+use crate::pass::dead_code;
+use crate::report::{FunctionReport, Report};
+use crate::schedule::{schedule, Limits, Schedule};
+use std::collections::BTreeMap;
+use straightline_core::model::Model;
+use straightline_core::Dd;
+
+/// What to generate, and how.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The functions, without repetition.
+    pub functions: Vec<Function>,
+    /// The frames of the functions that answer per frame; none: the tips of the robot.
+    pub frames: Vec<String>,
+    /// The scalar type.
+    pub scalar: Scalar,
+    /// The weakest rules allowed: with [`Grade::Exact`] the output is the generic runtime bit for bit.
+    pub grade: Grade,
+    /// How forward dynamics is computed.
+    pub forward_dynamics: ForwardDynamicsMethod,
+    /// How long one function may be.
+    pub limits: Limits,
+    /// How the robot file is read.
+    pub model: crate::model::ModelOptions,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options {
+            functions: Function::all().collect(),
+            frames: Vec::new(),
+            scalar: Scalar::F64,
+            grade: Grade::Algebraic,
+            forward_dynamics: ForwardDynamicsMethod::default(),
+            limits: Limits::default(),
+            model: crate::model::ModelOptions::default(),
+        }
+    }
+}
+
+impl Options {
+    /// The rewrite rules that these options allow.
+    pub fn rules(&self) -> RuleSet {
+        match (self.grade, self.scalar) {
+            (Grade::Exact, Scalar::F64) => RuleSet::exact(Folding::F64),
+            (Grade::Exact, Scalar::F32) => RuleSet::exact(Folding::F32),
+            (Grade::Algebraic, _) => RuleSet::all(),
+        }
+    }
+}
+
+/// A program between tracing and text.
+#[derive(Clone, Debug)]
+pub struct Program {
+    /// What it computes.
+    pub function: Function,
+    /// Its operations.
+    pub graph: Graph,
+    /// Their order, and the cuts.
+    pub schedule: Schedule,
+}
+
+/// Traces and optimises one function of a robot.
+pub fn program(model: &Model<Dd>, frames: &[String], function: Function, options: &Options) -> Program {
+    let check = |graph: Graph| {
+        verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
+        graph
+    };
+    let traced = check(function.trace(model, frames, options.forward_dynamics, options.rules()));
+    let graph = check(dead_code(&traced));
+    let schedule = schedule(&graph, options.limits);
+    Program { function, graph, schedule }
+}
+
+/// What the compiler makes of a robot file.
+#[derive(Clone, Debug)]
+pub struct Generated {
+    /// The robot.
+    pub model: Model<Dd>,
+    /// The frames of the functions that answer per frame.
+    pub frames: Vec<String>,
+    /// The source: items without inner attributes, for `include!`, a module, or a file of its own.
+    pub text: String,
+    /// Its figures.
+    pub report: Report,
+    /// What was assumed on the way.
+    pub warnings: Diagnostics,
+}
+
+/// From the text of a robot file to the text of its dynamics.
+///
+/// # Errors
+/// Everything that is wrong with the file or the options, at once.
+pub fn compile(source: &Source, options: &Options) -> Result<Generated, Diagnostics> {
+    let (model, mut diagnostics) = model::load(source, &options.model);
+    let frames = model.as_ref().map(|m| choose_frames(m, &options.frames, &mut diagnostics)).unwrap_or_default();
+    let Some(model) = model.filter(|_| !diagnostics.has_errors()) else { return Err(diagnostics) };
+    Ok(generate(model, frames, diagnostics, options, source.path(), hash(source.text(), options)))
+}
+
+/// The rest of the pipeline, for a model that is sound and frames that it has.
+fn generate(
+    model: Model<Dd>,
+    frames: Vec<String>,
+    warnings: Diagnostics,
+    options: &Options,
+    path: &str,
+    hash: u64,
+) -> Generated {
+    let title = |section: Section| match section.body {
+        Some(i) => format!("{}, body {}: {}", section.phase, i + 1, model.bodies[i].name),
+        None => section.phase.to_string(),
+    };
+    let mut items = Vec::new();
+    let mut functions = BTreeMap::new();
+    for &function in &options.functions {
+        if function.is_per_frame() && frames.is_empty() {
+            continue;
+        }
+        let Program { graph, schedule, .. } = program(&model, &frames, function, options);
+        let text = emit::function(&graph, &schedule, function.name(), &function.doc(), options.scalar, &title);
+        let figures = FunctionReport::new(
+            graph.counts(),
+            schedule.max_live,
+            schedule.slots * options.scalar.bytes(),
+            schedule.parts.len(),
+            text.text.lines().count(),
+        );
+        functions.insert(function.name(), figures);
+        items.push(Item { function, text });
+    }
+    let report =
+        Report { robot: model.name.clone(), nq: model.nq(), nv: model.nv(), scalar: options.scalar.name(), functions };
+    let remarks = warnings.iter().map(|d| d.line()).collect();
+    let provenance = Provenance { source: path.to_string(), hash, remarks };
+    let text = emit::file(&model, &frames, &items, &report, &provenance, options.scalar);
+    Generated { model, frames, text, report, warnings }
+}
+
+/// The frames asked for, or the tips of the robot: the last link of every branch.
+fn choose_frames(model: &Model<Dd>, asked: &[String], diagnostics: &mut Diagnostics) -> Vec<String> {
+    if asked.is_empty() {
+        return model.tips.clone();
+    }
+    for name in asked.iter().filter(|name| model.frame(name).is_none()) {
+        diagnostics.push(messages::unknown_frame(name, model.frames.iter().map(|f| f.name.as_str())));
+    }
+    asked.to_vec()
+}
+
+/// FNV-1a over everything that the output depends on.
+fn hash(text: &str, options: &Options) -> u64 {
+    let settings = format!("{}\0{options:?}", crate::VERSION);
+    text.bytes().chain([0]).chain(settings.bytes()).fold(0xcbf2_9ce4_8422_2325, |h, b| {
+        (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}

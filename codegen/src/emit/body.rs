@@ -1,0 +1,348 @@
+//! One program as one public function, or as a public function over private parts.
+
+use super::{array_type, element, Names, Scalar};
+use crate::expr::{Constant, Graph, NodeId, Op, Port, Section};
+use crate::schedule::{Part, Schedule};
+use std::fmt::Write;
+
+/// How long an expression may grow before it gets a name of its own.
+const LINE: usize = 84;
+/// How many locals one declaration may hold.
+const DECLARATION: usize = 64;
+
+/// The source of a function.
+#[derive(Clone, Debug)]
+pub struct FunctionText {
+    /// The items: the function, and its parts if it has any.
+    pub text: String,
+    /// Whether it calls the sine-cosine kernel.
+    pub uses_sin_cos: bool,
+    /// Whether it calls the square root.
+    pub uses_sqrt: bool,
+}
+
+/// Writes `pub fn name(q: &[f64; 7], …, tau: &mut [f64; 7])`.
+///
+/// `doc` stands above it, line by line; `title` words the comment above a section's block.
+pub fn function(
+    graph: &Graph,
+    schedule: &Schedule,
+    name: &str,
+    doc: &str,
+    scalar: Scalar,
+    title: &dyn Fn(Section) -> String,
+) -> FunctionText {
+    let mut out = FunctionText { text: String::new(), uses_sin_cos: false, uses_sqrt: false };
+    for line in doc.lines() {
+        let _ = writeln!(out.text, "///{}{line}", if line.is_empty() { "" } else { " " });
+    }
+    let used_inputs = |nodes: &mut dyn Iterator<Item = NodeId>| {
+        let mut used = vec![false; graph.inputs.len()];
+        nodes.for_each(|id| {
+            for a in graph.op(id).operands().chain([id]) {
+                if let Op::Input(k) = graph.op(a) {
+                    used[port_of(&graph.inputs, k as usize).0] = true;
+                }
+            }
+        });
+        used
+    };
+    let all_used =
+        used_inputs(&mut schedule.parts.iter().flat_map(|p| p.nodes.iter().copied()).chain(graph.results.iter().copied()));
+    let parameters = |f: &mut dyn FnMut(&Port, bool, bool) -> String| {
+        let inputs = graph.inputs.iter().enumerate().map(|(i, p)| (p, all_used[i], false));
+        let outputs = graph.outputs.iter().map(|p| (p, true, true));
+        inputs.chain(outputs).map(|(p, used, out)| f(p, used, out)).collect::<Vec<_>>().join(", ")
+    };
+    let signature = parameters(&mut |p, used, out| {
+        let (underscore, reference) = (if used { "" } else { "_" }, if out { "&mut " } else { "&" });
+        format!("{underscore}{}: {reference}{}", p.name, array_type(p, scalar))
+    });
+    if let [part] = schedule.parts.as_slice() {
+        let _ = writeln!(out.text, "pub fn {name}({signature}) {{");
+        body(graph, part, scalar, title, &mut out);
+        out.text.push_str("}\n");
+        return out;
+    }
+
+    // in parts: the public function calls them one after the other
+    let slots = schedule.slots;
+    let _ = writeln!(out.text, "pub fn {name}({signature}) {{");
+    let _ = writeln!(out.text, "    let mut live = [0.0; {slots}];");
+    let mut parts = String::new();
+    for (k, part) in schedule.parts.iter().enumerate() {
+        let used = used_inputs(&mut part.nodes.iter().copied().chain(part.results.iter().map(|r| graph.results[*r])));
+        let mut writes = vec![false; graph.outputs.len()];
+        part.results.iter().for_each(|r| writes[port_of(&graph.outputs, *r).0] = true);
+        let mut arguments = Vec::new();
+        let mut types = Vec::new();
+        for (i, p) in graph.inputs.iter().enumerate().filter(|(i, _)| used[*i]) {
+            let _ = i;
+            arguments.push(p.name.to_string());
+            types.push(format!("{}: &{}", p.name, array_type(p, scalar)));
+        }
+        if !(part.loads.is_empty() && part.stores.is_empty()) {
+            let m = if part.stores.is_empty() { "" } else { "mut " };
+            arguments.push(format!("&{m}live"));
+            types.push(format!("live: &{m}[{}; {slots}]", scalar.name()));
+        }
+        for (i, p) in graph.outputs.iter().enumerate() {
+            if writes[i] {
+                arguments.push(p.name.to_string());
+                types.push(format!("{}: &mut {}", p.name, array_type(p, scalar)));
+            }
+        }
+        let _ = writeln!(out.text, "    {name}_part{}({});", k + 1, arguments.join(", "));
+        let mut text = FunctionText { text: String::new(), uses_sin_cos: false, uses_sqrt: false };
+        body(graph, part, scalar, title, &mut text);
+        let _ = writeln!(parts, "\n#[inline(never)]\nfn {name}_part{}({}) {{", k + 1, types.join(", "));
+        parts.push_str(&text.text);
+        parts.push_str("}\n");
+        out.uses_sin_cos |= text.uses_sin_cos;
+        out.uses_sqrt |= text.uses_sqrt;
+    }
+    out.text.push_str("}\n");
+    out.text.push_str(&parts);
+    out
+}
+
+/// The port that holds flat index `k`, and the index inside it.
+fn port_of(ports: &[Port], mut k: usize) -> (usize, usize) {
+    for (i, p) in ports.iter().enumerate() {
+        if k < p.len() {
+            return (i, k);
+        }
+        k -= p.len();
+    }
+    unreachable!("verified graphs have a port for every scalar")
+}
+
+/// How strongly an expression binds.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Binding {
+    Sum,
+    Product,
+    Sign,
+    Atom,
+}
+
+/// The statements of one part: expressions of single use are written where they are used.
+struct Body<'a> {
+    graph: &'a Graph,
+    scalar: Scalar,
+    /// What stands for each node: its name, its literal, or its expression.
+    text: Vec<Option<(String, Binding)>>,
+    names: Names,
+    /// Locals and statements of the block being written.
+    declared: Vec<String>,
+    statements: String,
+}
+
+fn body(graph: &Graph, part: &Part, scalar: Scalar, title: &dyn Fn(Section) -> String, out: &mut FunctionText) {
+    let taken = graph.inputs.iter().chain(&graph.outputs).map(|p| p.name).chain(["live", "trig"]);
+    let mut b = Body {
+        graph,
+        scalar,
+        text: vec![None; graph.ops.len()],
+        names: Names::with_taken(taken),
+        declared: Vec::new(),
+        statements: String::new(),
+    };
+    let mut uses = vec![0u32; graph.ops.len()];
+    for id in &part.nodes {
+        graph.op(*id).operands().for_each(|a| uses[a.index()] += 1);
+    }
+    let mut results_of: Vec<(NodeId, usize)> = part.results.iter().map(|r| (graph.results[*r], *r)).collect();
+    results_of.sort_unstable();
+    results_of.iter().for_each(|(id, _)| uses[id.index()] += 1);
+    let mut crosses = vec![false; graph.ops.len()];
+    part.stores.iter().for_each(|(id, _)| crosses[id.index()] = true);
+
+    if !part.loads.is_empty() {
+        for chunk in part.loads.chunks(DECLARATION) {
+            let names: Vec<String> = chunk.iter().map(|(id, _)| b.fresh_name(*id)).collect();
+            let slots: Vec<String> = chunk.iter().map(|(_, s)| format!("live[{s}]")).collect();
+            out.text.push_str(&wrapped("    let [", &names, &format!("]: [{}; {}] =", scalar.name(), names.len())));
+            out.text.push_str(&wrapped("        [", &slots, "];"));
+            for ((id, _), name) in chunk.iter().zip(names) {
+                b.text[id.index()] = Some((name, Binding::Atom));
+            }
+        }
+    }
+    let mut section = None;
+    for id in &part.nodes {
+        let op = graph.op(*id);
+        let here = graph.notes[id.index()].section;
+        if section != Some(here) {
+            b.close_block(out, section, title);
+            section = Some(here);
+        }
+        match op {
+            Op::SinCos(a) => {
+                out.uses_sin_cos = true;
+                b.sin_cos(*id, a, &uses, part);
+            }
+            Op::Sin(_) | Op::Cos(_) => {}
+            _ => {
+                out.uses_sqrt |= matches!(op, Op::Sqrt(_));
+                let (text, binding) = b.expression(op);
+                let named = graph.notes[id.index()].name.is_some();
+                let trivial = matches!(op, Op::Neg(_)) && binding == Binding::Sign && text.len() < 24;
+                let alone = uses[id.index()] <= 1 && !crosses[id.index()];
+                let result_only = alone && results_of.binary_search_by_key(id, |(r, _)| *r).is_ok();
+                if (trivial && !crosses[id.index()]) || result_only || (alone && !named && text.len() < LINE * 2 / 3) {
+                    b.text[id.index()] = Some((text, binding));
+                } else {
+                    let name = b.fresh_name(*id);
+                    let _ = writeln!(b.statements, "    {name} = {text};");
+                    b.declared.push(name.clone());
+                    b.text[id.index()] = Some((name, Binding::Atom));
+                }
+            }
+        }
+        let first = results_of.partition_point(|(r, _)| r < id);
+        for (_, k) in results_of[first..].iter().take_while(|(r, _)| r == id) {
+            b.store_result(*id, *k);
+        }
+        if let Ok(i) = part.stores.binary_search_by_key(id, |(s, _)| *s) {
+            let text = b.operand(*id).0;
+            let _ = writeln!(b.statements, "    live[{}] = {text};", part.stores[i].1);
+        }
+    }
+    b.close_block(out, section, title);
+    // results that are constants or inputs
+    let mut plain = String::new();
+    for (id, k) in &results_of {
+        if matches!(graph.op(*id), Op::Input(_) | Op::Constant(_)) {
+            b.store_result(*id, *k);
+        }
+    }
+    std::mem::swap(&mut plain, &mut b.statements);
+    out.text.push_str(&plain);
+}
+
+impl Body<'_> {
+    fn fresh_name(&mut self, id: NodeId) -> String {
+        match self.graph.notes[id.index()].name {
+            Some((quantity, index, component)) => self.names.named(quantity, index, component),
+            None => self.names.temporary(),
+        }
+    }
+
+    /// The text of a node as an operand.
+    fn operand(&self, id: NodeId) -> (String, Binding) {
+        match self.graph.op(id) {
+            Op::Input(k) => {
+                let (port, k) = port_of(&self.graph.inputs, k as usize);
+                (element(&self.graph.inputs[port], k), Binding::Atom)
+            }
+            Op::Constant(c) => {
+                (literal(c, self.scalar), if c.is_negative() { Binding::Sign } else { Binding::Atom })
+            }
+            _ => self.text[id.index()].clone().expect("operands stand before their users"),
+        }
+    }
+
+    /// The text of a node, in parentheses if it binds less than `at_least`.
+    fn bound(&self, id: NodeId, at_least: Binding) -> String {
+        let (text, binding) = self.operand(id);
+        if binding < at_least {
+            format!("({text})")
+        } else {
+            text
+        }
+    }
+
+    fn expression(&self, op: Op) -> (String, Binding) {
+        use Binding::{Atom, Product, Sign, Sum};
+        match op {
+            Op::Add(a, b) => (format!("{} + {}", self.bound(a, Sum), self.bound(b, Product)), Sum),
+            Op::Sub(a, b) => (format!("{} - {}", self.bound(a, Sum), self.bound(b, Product)), Sum),
+            Op::Mul(a, b) => (format!("{} * {}", self.bound(a, Product), self.bound(b, Sign)), Product),
+            Op::Div(a, b) => (format!("{} / {}", self.bound(a, Product), self.bound(b, Sign)), Product),
+            Op::Neg(a) => (format!("-{}", self.bound(a, Atom)), Sign),
+            Op::Sqrt(a) => (format!("trig::sqrt_{}({})", self.scalar.name(), self.operand(a).0), Atom),
+            Op::Input(_) | Op::Constant(_) | Op::SinCos(_) | Op::Sin(_) | Op::Cos(_) => {
+                unreachable!("written where they are used")
+            }
+        }
+    }
+
+    /// `(sin_q3, cos_q3) = trig::sin_cos_f64(q[2]);`
+    fn sin_cos(&mut self, pair: NodeId, angle: NodeId, uses: &[u32], part: &Part) {
+        let halves = [Op::Sin(pair), Op::Cos(pair)].map(|half| {
+            let id = (pair.0 + 1..pair.0 + 3).map(NodeId).find(|h| self.graph.ops.get(h.index()) == Some(&half))?;
+            let wanted = uses[id.index()] > 0 || part.stores.iter().any(|(s, _)| *s == id);
+            if !wanted {
+                return None;
+            }
+            let name = self.fresh_name(id);
+            self.declared.push(name.clone());
+            self.text[id.index()] = Some((name.clone(), Binding::Atom));
+            Some(name)
+        });
+        let [s, c] = halves.map(|h| h.unwrap_or_else(|| "_".to_string()));
+        let argument = self.operand(angle).0;
+        let _ = writeln!(self.statements, "    ({s}, {c}) = trig::sin_cos_{}({argument});", self.scalar.name());
+    }
+
+    fn store_result(&mut self, id: NodeId, k: usize) {
+        let (port, inner) = port_of(&self.graph.outputs, k);
+        let place = element(&self.graph.outputs[port], inner);
+        let _ = writeln!(self.statements, "    {place} = {};", self.operand(id).0);
+    }
+
+    /// Writes the block: its comment, its locals, its statements.
+    fn close_block(&mut self, out: &mut FunctionText, section: Option<u32>, title: &dyn Fn(Section) -> String) {
+        if self.statements.is_empty() {
+            return;
+        }
+        if let Some(s) = section {
+            let title = title(self.graph.sections[s as usize]);
+            if !title.is_empty() {
+                let _ = writeln!(out.text, "    // {title}");
+            }
+        }
+        for names in self.declared.chunks(DECLARATION) {
+            if let [name] = names {
+                let _ = writeln!(out.text, "    let {name}: {};", self.scalar.name());
+            } else {
+                let end = format!("]: [{}; {}];", self.scalar.name(), names.len());
+                out.text.push_str(&wrapped("    let [", names, &end));
+            }
+        }
+        self.declared.clear();
+        out.text.push_str(&std::mem::take(&mut self.statements));
+    }
+}
+
+/// `start`, the items with commas, `end`; lines of bounded length.
+fn wrapped(start: &str, items: &[String], end: &str) -> String {
+    let mut text = String::from(start);
+    let mut column = start.len();
+    for (i, item) in items.iter().enumerate() {
+        if i > 0 {
+            text.push(',');
+            if column + item.len() + 3 > 110 {
+                text.push_str("\n        ");
+                column = 8;
+            } else {
+                text.push(' ');
+                column += 2;
+            }
+        }
+        text.push_str(item);
+        column += item.len();
+    }
+    text.push_str(end);
+    text.push('\n');
+    text
+}
+
+/// The constant, rounded once to the scalar's format, as the shortest literal that reads back to it.
+fn literal(c: Constant, scalar: Scalar) -> String {
+    match scalar {
+        Scalar::F64 => format!("{:?}", c.value().to_f64()),
+        Scalar::F32 => format!("{:?}", c.value().to_f32()),
+    }
+}

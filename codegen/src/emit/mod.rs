@@ -1,0 +1,57 @@
+//! Text: from a schedule to Rust source that a person would defend in review.
+//!
+//! No algebra happens here. A program becomes one function, or a few when it is long; values get the names that the
+//! algorithm gave them; every section of the algorithm is a block under a comment.
+
+mod body;
+mod file;
+mod names;
+
+pub use body::{function, FunctionText};
+pub use file::{file, Item, Provenance};
+pub use names::Names;
+
+use crate::expr::Port;
+
+/// The scalar type of generated code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Scalar {
+    /// Double precision.
+    F64,
+    /// Single precision.
+    F32,
+}
+
+impl Scalar {
+    /// Its Rust name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Scalar::F64 => "f64",
+            Scalar::F32 => "f32",
+        }
+    }
+
+    /// Its size in bytes.
+    pub fn bytes(self) -> usize {
+        match self {
+            Scalar::F64 => 8,
+            Scalar::F32 => 4,
+        }
+    }
+}
+
+/// The array type of a port: `[f64; 7]`, `[[f64; 7]; 6]`.
+pub fn array_type(port: &Port, scalar: Scalar) -> String {
+    port.shape.iter().rev().fold(scalar.name().to_string(), |inner, n| format!("[{inner}; {n}]"))
+}
+
+/// The place of scalar `k` of a port: `h[2][3]`.
+fn element(port: &Port, k: usize) -> String {
+    let mut rest = k;
+    let mut indices = Vec::new();
+    for n in port.shape.iter().rev() {
+        indices.push(rest % n);
+        rest /= n;
+    }
+    indices.iter().rev().fold(port.name.to_string(), |text, i| format!("{text}[{i}]"))
+}

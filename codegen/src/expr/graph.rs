@@ -1,0 +1,259 @@
+//! Nodes, graphs, and how operations are counted.
+
+use straightline_core::Dd;
+
+/// Index of a node in its [`Graph`]; operands have smaller indices than their users.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct NodeId(pub u32);
+
+impl NodeId {
+    /// As an index.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// A constant in double-double, comparable by its bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Constant {
+    hi: u64,
+    lo: u64,
+}
+
+impl Constant {
+    /// The constant of that value; the sign of a zero is dropped.
+    pub fn new(value: Dd) -> Self {
+        let clear = |x: f64| if x == 0.0 { 0.0 } else { x };
+        Constant { hi: clear(value.hi()).to_bits(), lo: clear(value.lo()).to_bits() }
+    }
+
+    /// Its value.
+    pub fn value(self) -> Dd {
+        Dd::new(f64::from_bits(self.hi), f64::from_bits(self.lo))
+    }
+
+    /// Whether it is exactly this f64.
+    pub fn is(self, x: f64) -> bool {
+        self.lo == 0 && f64::from_bits(self.hi) == x
+    }
+
+    /// Whether it is below zero.
+    pub fn is_negative(self) -> bool {
+        f64::from_bits(self.hi) < 0.0
+    }
+}
+
+/// One scalar operation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Op {
+    /// The input of that flat index (groups one after the other).
+    Input(u32),
+    /// A constant.
+    Constant(Constant),
+    /// −a.
+    Neg(NodeId),
+    /// a + b.
+    Add(NodeId, NodeId),
+    /// a − b.
+    Sub(NodeId, NodeId),
+    /// a · b.
+    Mul(NodeId, NodeId),
+    /// a / b.
+    Div(NodeId, NodeId),
+    /// √a.
+    Sqrt(NodeId),
+    /// sin and cos of an angle, together; only [`Op::Sin`] and [`Op::Cos`] may use it.
+    SinCos(NodeId),
+    /// The sine of a [`Op::SinCos`].
+    Sin(NodeId),
+    /// The cosine of a [`Op::SinCos`].
+    Cos(NodeId),
+}
+
+impl Op {
+    /// The operands, in order.
+    pub fn operands(self) -> impl Iterator<Item = NodeId> {
+        let (a, b) = match self {
+            Op::Input(_) | Op::Constant(_) => (None, None),
+            Op::Neg(a) | Op::Sqrt(a) | Op::SinCos(a) | Op::Sin(a) | Op::Cos(a) => (Some(a), None),
+            Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) => (Some(a), Some(b)),
+        };
+        a.into_iter().chain(b)
+    }
+
+    /// The same operation on other operands.
+    #[must_use]
+    pub fn map(self, mut f: impl FnMut(NodeId) -> NodeId) -> Op {
+        match self {
+            Op::Input(_) | Op::Constant(_) => self,
+            Op::Neg(a) => Op::Neg(f(a)),
+            Op::Add(a, b) => Op::Add(f(a), f(b)),
+            Op::Sub(a, b) => Op::Sub(f(a), f(b)),
+            Op::Mul(a, b) => Op::Mul(f(a), f(b)),
+            Op::Div(a, b) => Op::Div(f(a), f(b)),
+            Op::Sqrt(a) => Op::Sqrt(f(a)),
+            Op::SinCos(a) => Op::SinCos(f(a)),
+            Op::Sin(a) => Op::Sin(f(a)),
+            Op::Cos(a) => Op::Cos(f(a)),
+        }
+    }
+}
+
+/// A named group of inputs or outputs with its array shape, such as `q` with `[7]` or `h` with `[7, 7]`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Port {
+    /// The name.
+    pub name: &'static str,
+    /// The extents, outermost first.
+    pub shape: Vec<usize>,
+}
+
+impl Port {
+    /// A port of that name and shape.
+    pub fn new(name: &'static str, shape: &[usize]) -> Self {
+        Port { name, shape: shape.to_vec() }
+    }
+
+    /// Number of scalars.
+    pub fn len(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// A stretch of an algorithm: its phase, and the body it is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Section {
+    /// Such as `forward`.
+    pub phase: &'static str,
+    /// Index of the body, where there is one.
+    pub body: Option<usize>,
+}
+
+/// What a reader wants to know of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Note {
+    /// Quantity, index of the body, component: `("omega", 3, "x")`.
+    pub name: Option<(&'static str, usize, &'static str)>,
+    /// Index into [`Graph::sections`].
+    pub section: u32,
+}
+
+/// A program of scalar operations.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Graph {
+    /// The operations.
+    pub ops: Vec<Op>,
+    /// One note per operation.
+    pub notes: Vec<Note>,
+    /// Stretches that the notes refer to.
+    pub sections: Vec<Section>,
+    /// Input groups; [`Op::Input`] counts through them.
+    pub inputs: Vec<Port>,
+    /// Output groups.
+    pub outputs: Vec<Port>,
+    /// The nodes that are put out, group after group.
+    pub results: Vec<NodeId>,
+}
+
+/// Operation counts. Sign flips are free; `sin_cos` counts angles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Multiplications.
+    pub mul: usize,
+    /// Additions and subtractions.
+    pub add: usize,
+    /// Instructions for `mul` and `add` when every a·b ± c is one.
+    pub fma: usize,
+    /// Divisions.
+    pub div: usize,
+    /// Square roots.
+    pub sqrt: usize,
+    /// Pairs of sine and cosine.
+    pub sin_cos: usize,
+}
+
+impl Counts {
+    /// All floating-point operations but sines and cosines.
+    pub fn flops(&self) -> usize {
+        self.mul + self.add + self.div + self.sqrt
+    }
+}
+
+impl Graph {
+    /// The operation of a node.
+    pub fn op(&self, id: NodeId) -> Op {
+        self.ops[id.index()]
+    }
+
+    /// All nodes, operands before users.
+    pub fn ids(&self) -> impl Iterator<Item = NodeId> {
+        (0..self.ops.len() as u32).map(NodeId)
+    }
+
+    /// How often each node is used, as an operand or as a result.
+    pub fn uses(&self) -> Vec<u32> {
+        let mut uses = vec![0; self.ops.len()];
+        for op in &self.ops {
+            op.operands().for_each(|a| uses[a.index()] += 1);
+        }
+        self.results.iter().for_each(|r| uses[r.index()] += 1);
+        uses
+    }
+
+    /// Which nodes the results need.
+    pub fn live(&self) -> Vec<bool> {
+        let mut live = vec![false; self.ops.len()];
+        self.results.iter().for_each(|r| live[r.index()] = true);
+        for (i, op) in self.ops.iter().enumerate().rev() {
+            if live[i] {
+                op.operands().for_each(|a| live[a.index()] = true);
+            }
+        }
+        live
+    }
+
+    /// Operation counts of what the results need.
+    pub fn counts(&self) -> Counts {
+        let live = self.live();
+        let mut uses = vec![0u32; self.ops.len()];
+        for (i, op) in self.ops.iter().enumerate() {
+            if live[i] {
+                op.operands().for_each(|a| uses[a.index()] += 1);
+            }
+        }
+        self.results.iter().for_each(|r| uses[r.index()] += 1);
+        // a product (seen through a sign) that only this sum uses
+        let product_of_one_user = |a: NodeId| {
+            let a = match self.op(a) {
+                Op::Neg(b) if uses[a.index()] == 1 => b,
+                _ => a,
+            };
+            matches!(self.op(a), Op::Mul(..)) && uses[a.index()] == 1
+        };
+        let mut counts = Counts::default();
+        let mut fused = 0;
+        for (i, op) in self.ops.iter().enumerate() {
+            if !live[i] {
+                continue;
+            }
+            match *op {
+                Op::Mul(..) => counts.mul += 1,
+                Op::Add(a, b) | Op::Sub(a, b) => {
+                    counts.add += 1;
+                    fused += usize::from(product_of_one_user(a) || product_of_one_user(b));
+                }
+                Op::Div(..) => counts.div += 1,
+                Op::Sqrt(_) => counts.sqrt += 1,
+                Op::SinCos(_) => counts.sin_cos += 1,
+                Op::Input(_) | Op::Constant(_) | Op::Neg(_) | Op::Sin(_) | Op::Cos(_) => {}
+            }
+        }
+        counts.fma = counts.mul + counts.add - fused;
+        counts
+    }
+}

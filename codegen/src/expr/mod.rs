@@ -1,0 +1,17 @@
+//! The expression graph: a hash-consed DAG of scalar operations. It knows nothing of robots.
+//!
+//! A [`Graph`] is a value: operations in an order in which operands stand before their users, grouped inputs, grouped
+//! outputs. A [`Builder`] is the only way to make one: it looks every operation up before adding it, so that equal
+//! operations are one node, and applies the [rules](rules) on the way in.
+
+mod builder;
+mod graph;
+mod interpret;
+pub mod rules;
+mod verify;
+
+pub use builder::Builder;
+pub use graph::{Constant, Counts, Graph, NodeId, Note, Op, Port, Section};
+pub use interpret::evaluate;
+pub use rules::{Folding, Grade, Rule, RuleSet};
+pub use verify::verify;

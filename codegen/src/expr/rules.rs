@@ -1,0 +1,311 @@
+//! The rewrite rules, a table: name, grade, equation.
+//!
+//! A rule sees one operation whose operands are already simple and answers with an equal node, or not at all. `Exact`
+//! rules give the same bits for all finite inputs, up to the sign of a zero; `Algebraic` ones are equal over the reals
+//! and move the rounding. With `Exact` rules alone the generated program is the generic runtime, bit for bit.
+
+use super::{Builder, NodeId, Op};
+use straightline_core::{Dd, Real};
+
+/// What a rule promises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Grade {
+    /// The same bits for all finite inputs, up to the sign of a zero.
+    Exact,
+    /// Equal over the reals; rounding moves.
+    Algebraic,
+}
+
+/// In which arithmetic constants are folded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Folding {
+    /// As the f64 runtime would: every constant and every result rounded to f64.
+    F64,
+    /// As the f32 runtime would.
+    F32,
+    /// In double-double; rounded once, at emission.
+    DoubleDouble,
+}
+
+impl Folding {
+    /// The value as this arithmetic holds it.
+    pub fn round(self, x: Dd) -> Dd {
+        match self {
+            Folding::F64 => Dd::from(x.to_f64()),
+            Folding::F32 => Dd::from(f64::from(x.to_f32())),
+            Folding::DoubleDouble => x,
+        }
+    }
+
+    /// The value of an operation on constants.
+    fn fold(self, wide: fn(Dd, Dd) -> Dd, f64_op: fn(f64, f64) -> f64, f32_op: fn(f32, f32) -> f32, a: Dd, b: Dd) -> Dd {
+        match self {
+            Folding::F64 => Dd::from(f64_op(a.to_f64(), b.to_f64())),
+            Folding::F32 => Dd::from(f64::from(f32_op(a.to_f32(), b.to_f32()))),
+            Folding::DoubleDouble => wide(a, b),
+        }
+    }
+
+    /// Sine and cosine of a constant angle, as this arithmetic computes them.
+    pub fn sin_cos(self, x: Dd) -> (Dd, Dd) {
+        match self {
+            Folding::F64 => {
+                let (s, c) = Real::sin_cos(x.to_f64());
+                (Dd::from(s), Dd::from(c))
+            }
+            Folding::F32 => {
+                let (s, c) = Real::sin_cos(x.to_f32());
+                (Dd::from(f64::from(s)), Dd::from(f64::from(c)))
+            }
+            Folding::DoubleDouble => x.sin_cos(),
+        }
+    }
+
+    fn sqrt(self, x: Dd) -> Dd {
+        match self {
+            Folding::F64 => Dd::from(Real::sqrt(x.to_f64())),
+            Folding::F32 => Dd::from(f64::from(Real::sqrt(x.to_f32()))),
+            Folding::DoubleDouble => x.sqrt(),
+        }
+    }
+}
+
+/// A rewrite rule.
+#[derive(Clone, Copy)]
+pub struct Rule {
+    /// Short name, as in reports.
+    pub name: &'static str,
+    /// What it promises.
+    pub grade: Grade,
+    /// The equation, for people.
+    pub equation: &'static str,
+    /// The equal node, if the rule fires on this operation.
+    pub apply: fn(&mut Builder, Op) -> Option<NodeId>,
+}
+
+impl std::fmt::Debug for Rule {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} ({:?}): {}", self.name, self.grade, self.equation)
+    }
+}
+
+/// The rules in force, and the arithmetic of constants.
+#[derive(Clone, Copy, Debug)]
+pub struct RuleSet {
+    rules: &'static [Rule],
+    folding: Folding,
+}
+
+impl RuleSet {
+    /// Only rules that keep every bit of the generic runtime in `folding`'s format.
+    pub fn exact(folding: Folding) -> Self {
+        RuleSet { rules: &RULES[..EXACT_RULES], folding }
+    }
+
+    /// All rules; constants in double-double.
+    pub fn all() -> Self {
+        RuleSet { rules: RULES, folding: Folding::DoubleDouble }
+    }
+
+    /// The rules, in the order in which they are tried.
+    pub fn rules(&self) -> &'static [Rule] {
+        self.rules
+    }
+
+    /// The arithmetic of constants.
+    pub fn folding(&self) -> Folding {
+        self.folding
+    }
+}
+
+/// How many rules at the head of the table are `Exact`.
+const EXACT_RULES: usize = 14;
+
+/// All rules: the exact ones first. `x`, `y` are any nodes, `c`, `d` constants, `k` a positive constant.
+pub const RULES: &[Rule] = &[
+    Rule { name: "fold", grade: Grade::Exact, equation: "c ∘ d = the number", apply: fold },
+    Rule { name: "add-zero", grade: Grade::Exact, equation: "x + 0 = x", apply: add_zero },
+    Rule { name: "sub-zero", grade: Grade::Exact, equation: "x − 0 = x; 0 − x = −x", apply: sub_zero },
+    Rule { name: "sub-self", grade: Grade::Exact, equation: "x − x = 0", apply: sub_self },
+    Rule { name: "mul-zero", grade: Grade::Exact, equation: "x · 0 = 0", apply: mul_zero },
+    Rule { name: "mul-one", grade: Grade::Exact, equation: "x · 1 = x; x · −1 = −x", apply: mul_one },
+    Rule { name: "div-one", grade: Grade::Exact, equation: "x / 1 = x; x / −1 = −x; 0 / x = 0", apply: div_one },
+    Rule { name: "neg-neg", grade: Grade::Exact, equation: "−(−x) = x", apply: neg_neg },
+    Rule { name: "add-neg", grade: Grade::Exact, equation: "x + (−y) = x − y; (−x) + (−y) = −(x + y); −y may be −k", apply: add_neg },
+    Rule { name: "sub-neg", grade: Grade::Exact, equation: "x − (−y) = x + y; (−x) − y = −(x + y); −y may be −k", apply: sub_neg },
+    Rule { name: "mul-neg", grade: Grade::Exact, equation: "(−x) · y = −(x · y); (−k) · y = −(k · y)", apply: mul_neg },
+    Rule { name: "div-neg", grade: Grade::Exact, equation: "(−x) / y = −(x / y); x / (−y) = −(x / y)", apply: div_neg },
+    Rule { name: "commute", grade: Grade::Exact, equation: "y ∘ x = x ∘ y for +, ·", apply: commute },
+    Rule { name: "sub-flip", grade: Grade::Exact, equation: "y − x = −(x − y), if x − y is there", apply: sub_flip },
+    Rule { name: "mul-mul", grade: Grade::Algebraic, equation: "c · (d · x) = (c d) · x", apply: mul_mul },
+];
+
+fn fold(b: &mut Builder, op: Op) -> Option<NodeId> {
+    let folding = b.rules().folding();
+    let value = |id: NodeId| b.as_constant(id).map(|c| c.value());
+    let folded = match op {
+        Op::Add(x, y) => folding.fold(|x, y| x + y, |x, y| x + y, |x, y| x + y, value(x)?, value(y)?),
+        Op::Sub(x, y) => folding.fold(|x, y| x - y, |x, y| x - y, |x, y| x - y, value(x)?, value(y)?),
+        Op::Mul(x, y) => folding.fold(|x, y| x * y, |x, y| x * y, |x, y| x * y, value(x)?, value(y)?),
+        Op::Div(x, y) => folding.fold(|x, y| x / y, |x, y| x / y, |x, y| x / y, value(x)?, value(y)?),
+        Op::Neg(x) => -value(x)?,
+        Op::Sqrt(x) => folding.sqrt(value(x)?),
+        _ => return None,
+    };
+    Some(b.constant(folded))
+}
+
+fn is(b: &Builder, id: NodeId, x: f64) -> bool {
+    b.as_constant(id).is_some_and(|c| c.is(x))
+}
+
+fn add_zero(b: &mut Builder, op: Op) -> Option<NodeId> {
+    match op {
+        Op::Add(x, y) if is(b, y, 0.0) => Some(x),
+        Op::Add(x, y) if is(b, x, 0.0) => Some(y),
+        _ => None,
+    }
+}
+
+fn sub_zero(b: &mut Builder, op: Op) -> Option<NodeId> {
+    match op {
+        Op::Sub(x, y) if is(b, y, 0.0) => Some(x),
+        Op::Sub(x, y) if is(b, x, 0.0) => Some(b.add(Op::Neg(y))),
+        _ => None,
+    }
+}
+
+fn sub_self(b: &mut Builder, op: Op) -> Option<NodeId> {
+    match op {
+        Op::Sub(x, y) if x == y => Some(b.constant(Dd::ZERO)),
+        _ => None,
+    }
+}
+
+fn mul_zero(b: &mut Builder, op: Op) -> Option<NodeId> {
+    match op {
+        Op::Mul(x, y) if is(b, x, 0.0) || is(b, y, 0.0) => Some(b.constant(Dd::ZERO)),
+        _ => None,
+    }
+}
+
+fn mul_one(b: &mut Builder, op: Op) -> Option<NodeId> {
+    match op {
+        Op::Mul(x, y) if is(b, y, 1.0) => Some(x),
+        Op::Mul(x, y) if is(b, x, 1.0) => Some(y),
+        Op::Mul(x, y) if is(b, y, -1.0) => Some(b.add(Op::Neg(x))),
+        Op::Mul(x, y) if is(b, x, -1.0) => Some(b.add(Op::Neg(y))),
+        _ => None,
+    }
+}
+
+fn div_one(b: &mut Builder, op: Op) -> Option<NodeId> {
+    match op {
+        Op::Div(x, y) if is(b, y, 1.0) => Some(x),
+        Op::Div(x, y) if is(b, y, -1.0) => Some(b.add(Op::Neg(x))),
+        Op::Div(x, _) if is(b, x, 0.0) => Some(x),
+        _ => None,
+    }
+}
+
+fn neg_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
+    match op {
+        Op::Neg(x) => match b.op(x) {
+            Op::Neg(y) => Some(y),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+fn add_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
+    let Op::Add(x, y) = op else { return None };
+    let ((u, s), (v, t)) = (without_sign(b, x), without_sign(b, y));
+    match (s, t) {
+        (true, true) => {
+            let sum = b.add(Op::Add(u, v));
+            Some(b.add(Op::Neg(sum)))
+        }
+        (true, false) => Some(b.add(Op::Sub(v, u))),
+        (false, true) => Some(b.add(Op::Sub(u, v))),
+        (false, false) => None,
+    }
+}
+
+fn sub_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
+    let Op::Sub(x, y) = op else { return None };
+    let ((u, s), (v, t)) = (without_sign(b, x), without_sign(b, y));
+    match (s, t) {
+        (true, true) => Some(b.add(Op::Sub(v, u))),
+        (true, false) => {
+            let sum = b.add(Op::Add(u, v));
+            Some(b.add(Op::Neg(sum)))
+        }
+        (false, true) => Some(b.add(Op::Add(u, v))),
+        (false, false) => None,
+    }
+}
+
+/// `x` without its sign, and whether it had one: a negation or a negative constant.
+fn without_sign(b: &mut Builder, x: NodeId) -> (NodeId, bool) {
+    match b.op(x) {
+        Op::Neg(y) => (y, true),
+        Op::Constant(c) if c.is_negative() => (b.constant(-c.value()), true),
+        _ => (x, false),
+    }
+}
+
+fn mul_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
+    let Op::Mul(x, y) = op else { return None };
+    let ((x, s), (y, t)) = (without_sign(b, x), without_sign(b, y));
+    if !(s || t) {
+        return None;
+    }
+    let product = b.add(Op::Mul(x, y));
+    Some(if s != t { b.add(Op::Neg(product)) } else { product })
+}
+
+fn div_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
+    let Op::Div(x, y) = op else { return None };
+    let ((x, s), (y, t)) = (without_sign(b, x), without_sign(b, y));
+    if !(s || t) {
+        return None;
+    }
+    let quotient = b.add(Op::Div(x, y));
+    Some(if s != t { b.add(Op::Neg(quotient)) } else { quotient })
+}
+
+fn commute(b: &mut Builder, op: Op) -> Option<NodeId> {
+    match op {
+        Op::Add(x, y) if y < x => Some(b.add(Op::Add(y, x))),
+        Op::Mul(x, y) if y < x => Some(b.add(Op::Mul(y, x))),
+        _ => None,
+    }
+}
+
+fn sub_flip(b: &mut Builder, op: Op) -> Option<NodeId> {
+    match op {
+        Op::Sub(x, y) => {
+            let flipped = b.find(Op::Sub(y, x))?;
+            Some(b.add(Op::Neg(flipped)))
+        }
+        _ => None,
+    }
+}
+
+fn mul_mul(b: &mut Builder, op: Op) -> Option<NodeId> {
+    let Op::Mul(x, y) = op else { return None };
+    let (c, inner) = match (b.as_constant(x), b.as_constant(y)) {
+        (Some(c), None) => (c, y),
+        (None, Some(c)) => (c, x),
+        _ => return None,
+    };
+    let Op::Mul(u, v) = b.op(inner) else { return None };
+    let (d, w) = match (b.as_constant(u), b.as_constant(v)) {
+        (Some(d), _) => (d, v),
+        (_, Some(d)) => (d, u),
+        _ => return None,
+    };
+    let k = b.constant(c.value() * d.value());
+    Some(b.add(Op::Mul(k, w)))
+}

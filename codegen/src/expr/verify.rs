@@ -1,0 +1,43 @@
+//! What every graph must be, checked between passes.
+
+use super::{Graph, Op};
+
+/// Checks that operands stand before users, that inputs and results exist, that only `Sin` and `Cos` use a `SinCos`,
+/// and that there is a result per output scalar and a note per node.
+///
+/// # Errors
+/// The first broken promise, in words.
+pub fn verify(graph: &Graph) -> Result<(), String> {
+    let n = graph.ops.len();
+    let inputs: usize = graph.inputs.iter().map(|p| p.len()).sum();
+    if graph.notes.len() != n {
+        return Err(format!("{} notes for {n} nodes", graph.notes.len()));
+    }
+    for (i, op) in graph.ops.iter().enumerate() {
+        for a in op.operands() {
+            if a.index() >= i {
+                return Err(format!("node {i} ({op:?}) uses a later node"));
+            }
+            let pair = matches!(graph.op(a), Op::SinCos(_));
+            if pair != matches!(op, Op::Sin(_) | Op::Cos(_)) {
+                return Err(format!("node {i} ({op:?}) mixes a sine-cosine pair and a number"));
+            }
+        }
+        if let Op::Input(k) = op {
+            if *k as usize >= inputs {
+                return Err(format!("node {i} reads input {k} of {inputs}"));
+            }
+        }
+        if graph.notes[i].section as usize >= graph.sections.len() {
+            return Err(format!("node {i} lies in a section that does not exist"));
+        }
+    }
+    let outputs: usize = graph.outputs.iter().map(|p| p.len()).sum();
+    if graph.results.len() != outputs {
+        return Err(format!("{} results for {outputs} output scalars", graph.results.len()));
+    }
+    match graph.results.iter().find(|r| r.index() >= n || matches!(graph.op(**r), Op::SinCos(_))) {
+        Some(r) => Err(format!("result {r:?} is not a number")),
+        None => Ok(()),
+    }
+}

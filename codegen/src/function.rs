@@ -1,0 +1,339 @@
+//! The functions that can be generated: a table of names, signatures and documentation, and the algorithm behind each.
+
+use crate::expr::{Graph, Port, RuleSet};
+use crate::trace::{trace, Expr};
+use straightline_core::algorithms as alg;
+use straightline_core::model::{Frame, Model};
+use straightline_core::spatial::{Transform, Vec3};
+use straightline_core::{Dd, Real};
+
+/// A function of the robot that can be generated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Function {
+    /// Poses of the frames.
+    ForwardKinematics,
+    /// Velocities of the frames.
+    FrameVelocity,
+    /// Accelerations of the frames.
+    FrameAcceleration,
+    /// Geometric Jacobians of the frames.
+    Jacobian,
+    /// J̇q̇ of the frames.
+    JacobianBias,
+    /// Motion to drives.
+    InverseDynamics,
+    /// The drives that hold the robot still.
+    GravityForce,
+    /// h of τ = H q̈ + h.
+    BiasForce,
+    /// The part of h that velocities make.
+    VelocityForce,
+    /// H of τ = H q̈ + h.
+    MassMatrix,
+    /// Drives to motion.
+    ForwardDynamics,
+    /// What the joints carry.
+    JointWrenches,
+    /// Kinetic and potential energy.
+    Energy,
+    /// The mass centre of the whole robot.
+    CentreOfMass,
+    /// Linear and angular momentum.
+    Momentum,
+}
+
+/// How forward dynamics is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ForwardDynamicsMethod {
+    /// Whichever takes fewer operations for this robot.
+    #[default]
+    Cheaper,
+    /// The bias force, then articulated bodies.
+    ArticulatedBody,
+    /// The bias force, the mass matrix, and its branch-sparse LᵀDL factor.
+    Factorisation,
+}
+
+/// What a function's text is made from.
+struct Entry {
+    function: Function,
+    name: &'static str,
+    summary: &'static str,
+    inputs: &'static [&'static str],
+    output: &'static str,
+    outputs: &'static str,
+}
+
+const TABLE: &[Entry] = &[
+    Entry {
+        function: Function::ForwardKinematics,
+        name: "forward_kinematics",
+        summary: "Poses of the frames in the world.",
+        inputs: &["q"],
+        output: "x",
+        outputs: "per frame of [`FRAME_NAMES`]: position p \\[m\\] (3), then orientation R by rows (9); R's columns are the frame's axes",
+    },
+    Entry {
+        function: Function::FrameVelocity,
+        name: "frame_velocity",
+        summary: "Velocities of the frames.",
+        inputs: &["q", "qd"],
+        output: "v",
+        outputs: "per frame: velocity of the origin \\[m/s\\] (3), angular velocity \\[rad/s\\] (3), world axes",
+    },
+    Entry {
+        function: Function::FrameAcceleration,
+        name: "frame_acceleration",
+        summary: "Accelerations of the frames, without gravity.",
+        inputs: &["q", "qd", "qdd"],
+        output: "a",
+        outputs: "per frame: acceleration of the origin \\[m/s²\\] (3), angular acceleration \\[rad/s²\\] (3), world axes",
+    },
+    Entry {
+        function: Function::Jacobian,
+        name: "jacobian",
+        summary: "Geometric Jacobians J of the frames: J q̇ is the frame's velocity.",
+        inputs: &["q"],
+        output: "j",
+        outputs: "per frame: 6 rows (3 linear at the frame's origin, 3 angular; world axes) of one column per velocity coordinate",
+    },
+    Entry {
+        function: Function::JacobianBias,
+        name: "jacobian_bias",
+        summary: "J̇ q̇ of the frames: their acceleration for q̈ = 0.",
+        inputs: &["q", "qd"],
+        output: "a",
+        outputs: "per frame: linear \\[m/s²\\] (3), angular \\[rad/s²\\] (3), world axes",
+    },
+    Entry {
+        function: Function::InverseDynamics,
+        name: "inverse_dynamics",
+        summary: "Inverse dynamics τ = H(q) q̈ + h(q, q̇): the drives that a motion takes.",
+        inputs: &["q", "qd", "qdd"],
+        output: "tau",
+        outputs: "generalized forces \\[N·m or N\\]",
+    },
+    Entry {
+        function: Function::GravityForce,
+        name: "gravity_force",
+        summary: "Gravity forces g(q): the drives that hold the robot still.",
+        inputs: &["q"],
+        output: "g",
+        outputs: "generalized forces \\[N·m or N\\]",
+    },
+    Entry {
+        function: Function::BiasForce,
+        name: "bias_force",
+        summary: "Bias forces h(q, q̇): Coriolis, centrifugal and gravity forces.",
+        inputs: &["q", "qd"],
+        output: "h",
+        outputs: "generalized forces \\[N·m or N\\]",
+    },
+    Entry {
+        function: Function::VelocityForce,
+        name: "velocity_force",
+        summary: "Velocity forces C(q, q̇) q̇: Coriolis and centrifugal forces, without gravity.",
+        inputs: &["q", "qd"],
+        output: "c",
+        outputs: "generalized forces \\[N·m or N\\]",
+    },
+    Entry {
+        function: Function::MassMatrix,
+        name: "mass_matrix",
+        summary: "The mass matrix H(q), symmetric.",
+        inputs: &["q"],
+        output: "h",
+        outputs: "rows of H, both triangles \\[kg·m², kg·m, kg\\]",
+    },
+    Entry {
+        function: Function::ForwardDynamics,
+        name: "forward_dynamics",
+        summary: "Forward dynamics q̈ = H(q)⁻¹ (τ − h(q, q̇)): the motion that drives make.",
+        inputs: &["q", "qd", "tau"],
+        output: "qdd",
+        outputs: "accelerations \\[rad/s² or m/s²\\]",
+    },
+    Entry {
+        function: Function::JointWrenches,
+        name: "joint_wrenches",
+        summary: "Forces and moments that each joint carries, drive included.",
+        inputs: &["q", "qd", "qdd"],
+        output: "w",
+        outputs: "per joint, in the order of qd: force \\[N\\] (3), moment about the joint's origin \\[N·m\\] (3), from parent to child, in the child link's axes",
+    },
+    Entry {
+        function: Function::Energy,
+        name: "energy",
+        summary: "Kinetic and potential energy of the moving bodies.",
+        inputs: &["q", "qd"],
+        output: "tv",
+        outputs: "kinetic energy T, potential energy V = −Σ m g·p \\[J\\]",
+    },
+    Entry {
+        function: Function::CentreOfMass,
+        name: "centre_of_mass",
+        summary: "Mass centre of the moving bodies.",
+        inputs: &["q"],
+        output: "p",
+        outputs: "its position in the world \\[m\\]",
+    },
+    Entry {
+        function: Function::Momentum,
+        name: "momentum",
+        summary: "Momentum of the moving bodies.",
+        inputs: &["q", "qd"],
+        output: "p",
+        outputs: "linear \\[kg·m/s\\] (3), angular about the mass centre \\[kg·m²/s\\] (3), world axes",
+    },
+];
+
+const INPUT_DOCS: &[(&str, &str)] = &[
+    ("q", "configuration \\[rad or m\\]"),
+    ("qd", "velocities \\[rad/s or m/s\\]"),
+    ("qdd", "accelerations \\[rad/s² or m/s²\\]"),
+    ("tau", "generalized forces \\[N·m or N\\]"),
+];
+
+impl Function {
+    /// All of them, in the order in which they stand in generated files.
+    pub fn all() -> impl Iterator<Item = Function> {
+        TABLE.iter().map(|e| e.function)
+    }
+
+    /// The function of that name.
+    pub fn from_name(name: &str) -> Option<Function> {
+        TABLE.iter().find(|e| e.name == name).map(|e| e.function)
+    }
+
+    fn entry(self) -> &'static Entry {
+        TABLE.iter().find(|e| e.function == self).expect("the table has every function")
+    }
+
+    /// Its name in generated code and on the command line.
+    pub fn name(self) -> &'static str {
+        self.entry().name
+    }
+
+    /// What it computes, in a sentence.
+    pub fn summary(self) -> &'static str {
+        self.entry().summary
+    }
+
+    /// Whether its outputs are asked for per frame.
+    pub fn is_per_frame(self) -> bool {
+        use Function::*;
+        matches!(self, ForwardKinematics | FrameVelocity | FrameAcceleration | Jacobian | JacobianBias)
+    }
+
+    /// Its inputs for a robot.
+    pub fn inputs<T: Real>(self, model: &Model<T>) -> Vec<Port> {
+        let len = |name: &str| if name == "q" { model.nq() } else { model.nv() };
+        self.entry().inputs.iter().map(|name| Port::new(name, &[len(name)])).collect()
+    }
+
+    /// Its output for a robot and so many frames.
+    pub fn output<T: Real>(self, model: &Model<T>, frames: usize) -> Port {
+        use Function::*;
+        let nv = model.nv();
+        let shape: &[usize] = match self {
+            ForwardKinematics => &[frames, 12],
+            FrameVelocity | FrameAcceleration | JacobianBias => &[frames, 6],
+            Jacobian => &[frames, 6, nv],
+            InverseDynamics | GravityForce | BiasForce | VelocityForce | ForwardDynamics => &[nv],
+            MassMatrix => &[nv, nv],
+            JointWrenches => &[model.bodies.len(), 6],
+            Energy => &[2],
+            CentreOfMass => &[3],
+            Momentum => &[6],
+        };
+        Port::new(self.entry().output, shape)
+    }
+
+    /// Its documentation in generated code.
+    pub fn doc(self) -> String {
+        let entry = self.entry();
+        let mut doc = format!("{}\n\n", entry.summary);
+        for name in entry.inputs {
+            let text = INPUT_DOCS.iter().find(|(n, _)| n == name).map_or("", |(_, text)| text);
+            doc.push_str(&format!("* `{name}`: {text}\n"));
+        }
+        doc.push_str(&format!("* `{}`: {}\n", entry.output, entry.outputs));
+        doc
+    }
+
+    /// Its value on the generic runtime: the output scalars in order, for inputs in the order of [`Function::inputs`].
+    pub fn evaluate<T: Real>(
+        self,
+        model: &Model<T>,
+        frames: &[&Frame<T>],
+        method: ForwardDynamicsMethod,
+        inputs: &[Vec<T>],
+    ) -> Vec<T> {
+        use Function::*;
+        let q = &inputs[0];
+        let arg = |i: usize| &inputs[i][..];
+        match self {
+            ForwardKinematics => alg::forward_kinematics(model, q, frames).iter().flat_map(pose).collect(),
+            FrameVelocity => frames.iter().flat_map(|f| motion(alg::frame_velocity(model, q, arg(1), f))).collect(),
+            FrameAcceleration => {
+                frames.iter().flat_map(|f| motion(alg::frame_acceleration(model, q, arg(1), arg(2), f))).collect()
+            }
+            Jacobian => frames.iter().flat_map(|f| alg::jacobian(model, q, f)).collect(),
+            JacobianBias => frames.iter().flat_map(|f| motion(alg::jacobian_bias(model, q, arg(1), f))).collect(),
+            InverseDynamics => alg::inverse_dynamics(model, q, arg(1), arg(2)),
+            GravityForce => alg::gravity_force(model, q),
+            BiasForce => alg::bias_force(model, q, arg(1)),
+            VelocityForce => alg::velocity_force(model, q, arg(1)),
+            MassMatrix => alg::mass_matrix(model, q),
+            ForwardDynamics => match method {
+                ForwardDynamicsMethod::Factorisation => alg::forward_dynamics_ltdl(model, q, arg(1), arg(2)),
+                _ => alg::forward_dynamics_aba(model, q, arg(1), arg(2)),
+            },
+            JointWrenches => alg::joint_wrenches(model, q, arg(1), arg(2))
+                .into_iter()
+                .flat_map(|w| w.force.to_array().into_iter().chain(w.moment.to_array()))
+                .collect(),
+            Energy => vec![alg::kinetic_energy(model, q, arg(1)), alg::potential_energy(model, q)],
+            CentreOfMass => alg::centre_of_mass(model, q).to_array().to_vec(),
+            Momentum => {
+                let (linear, angular) = alg::momentum(model, q, arg(1));
+                linear.to_array().into_iter().chain(angular.to_array()).collect()
+            }
+        }
+    }
+
+    /// Its equations for a robot. For [`ForwardDynamicsMethod::Cheaper`] both methods are traced and the one with fewer
+    /// operations is kept.
+    pub fn trace(self, model: &Model<Dd>, frames: &[String], method: ForwardDynamicsMethod, rules: RuleSet) -> Graph {
+        let trace_with = |method| {
+            trace(rules, self.inputs(model), vec![self.output(model, frames.len())], |inputs| {
+                let model: Model<Expr> = model.cast();
+                let frames: Vec<&Frame<Expr>> =
+                    frames.iter().map(|name| model.frame(name).expect("frames were checked against the model")).collect();
+                self.evaluate(&model, &frames, method, inputs)
+            })
+        };
+        match (self, method) {
+            (Function::ForwardDynamics, ForwardDynamicsMethod::Cheaper) => {
+                let articulated = trace_with(ForwardDynamicsMethod::ArticulatedBody);
+                let factorised = trace_with(ForwardDynamicsMethod::Factorisation);
+                if factorised.counts().fma < articulated.counts().fma {
+                    factorised
+                } else {
+                    articulated
+                }
+            }
+            _ => trace_with(method),
+        }
+    }
+}
+
+fn pose<T: Real>(x: &Transform<T>) -> Vec<T> {
+    x.translation.to_array().into_iter().chain(x.rotation.rows.into_iter().flatten()).collect()
+}
+
+/// Linear part first, as robot users expect it.
+fn motion<T: Real>(m: straightline_core::spatial::MotionVector<T>) -> Vec<T> {
+    let both: [Vec3<T>; 2] = [m.linear, m.angular];
+    both.into_iter().flat_map(Vec3::to_array).collect()
+}

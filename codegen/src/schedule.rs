@@ -1,0 +1,186 @@
+//! The order of the operations, and how a long program is cut into functions of bounded size.
+//!
+//! rustc and LLVM take more than linear time for one huge function, and small processors stall on one. So a program of
+//! more than [`Limits::operations`] is cut into parts, each at the place with the fewest values alive within reach of
+//! its size; values that cross a cut go through an array of reused slots.
+
+use crate::expr::{Graph, NodeId, Op};
+
+/// How long one function may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Operations (additions, multiplications, divisions, square roots; a sine-cosine pair counts as 60) in one part.
+    pub operations: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        // about the size at which warm speed is still full (L1 instruction cache) and compile time linear
+        Limits { operations: 2000 }
+    }
+}
+
+/// One function of a program.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Part {
+    /// What it computes, in order; neither inputs nor constants.
+    pub nodes: Vec<NodeId>,
+    /// Values it takes from slots.
+    pub loads: Vec<(NodeId, usize)>,
+    /// Values it leaves in slots for later parts.
+    pub stores: Vec<(NodeId, usize)>,
+    /// Which results (indices into [`Graph::results`]) it puts out.
+    pub results: Vec<usize>,
+}
+
+/// A program in its final order.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Schedule {
+    /// The functions, run one after the other.
+    pub parts: Vec<Part>,
+    /// How many slots carry values between them.
+    pub slots: usize,
+    /// Most values alive at once, inputs and constants not counted.
+    pub max_live: usize,
+}
+
+fn is_value(op: Op) -> bool {
+    !matches!(op, Op::Input(_) | Op::Constant(_))
+}
+
+fn weight(op: Op) -> usize {
+    match op {
+        Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Div(..) | Op::Sqrt(_) => 1,
+        Op::SinCos(_) => 60,
+        Op::Input(_) | Op::Constant(_) | Op::Neg(_) | Op::Sin(_) | Op::Cos(_) => 0,
+    }
+}
+
+/// Orders and cuts a graph. Operations keep the order in which the algorithm wrote them.
+pub fn schedule(graph: &Graph, limits: Limits) -> Schedule {
+    let order: Vec<NodeId> = graph.ids().filter(|id| is_value(graph.op(*id))).collect();
+    let position = {
+        let mut position = vec![usize::MAX; graph.ops.len()];
+        order.iter().enumerate().for_each(|(p, id)| position[id.index()] = p);
+        position
+    };
+    // last use of every value: by an operation, or as a result when it is computed
+    let mut last_use: Vec<usize> = position.clone();
+    for (p, id) in order.iter().enumerate() {
+        for a in graph.op(*id).operands() {
+            if position[a.index()] != usize::MAX {
+                last_use[a.index()] = p;
+            }
+        }
+    }
+    let live_after = {
+        let mut change = vec![0isize; order.len() + 1];
+        for id in &order {
+            change[position[id.index()]] += 1;
+            change[last_use[id.index()]] -= 1;
+        }
+        let mut alive = 0;
+        change.iter().map(|c| { alive += c; alive as usize }).collect::<Vec<_>>()
+    };
+    let max_live = live_after.iter().copied().max().unwrap_or(0);
+
+    let cuts = cuts(graph, &order, &live_after, limits);
+    let part_of = |p: usize| cuts.partition_point(|c| *c <= p);
+    let mut parts = vec![Part::default(); cuts.len() + 1];
+    for (p, id) in order.iter().enumerate() {
+        parts[part_of(p)].nodes.push(*id);
+    }
+    for (k, r) in graph.results.iter().enumerate() {
+        let p = position[r.index()];
+        let part = if p == usize::MAX { 0 } else { part_of(p) };
+        parts[part].results.push(k);
+    }
+    let slots = assign_slots(graph, &order, &position, &last_use, &part_of, &mut parts);
+    Schedule { parts, slots, max_live }
+}
+
+/// Positions before which a new part begins.
+fn cuts(graph: &Graph, order: &[NodeId], live_after: &[usize], limits: Limits) -> Vec<usize> {
+    let weights: Vec<usize> = order.iter().map(|id| weight(graph.op(*id))).collect();
+    let mut left: usize = weights.iter().sum();
+    let mut cuts = Vec::new();
+    let mut start = 0;
+    while left > limits.operations {
+        // as many parts as needed, of about equal size, cut where the fewest values cross
+        let parts = left.div_ceil(limits.operations);
+        let aim = left / parts;
+        let (low, high) = (aim - aim / 4, limits.operations.min(aim + aim / 4));
+        let mut size = 0;
+        let mut best = None;
+        for p in start..order.len() {
+            size += weights[p];
+            if size > high {
+                break;
+            }
+            let halves_follow = matches!(graph.op(order[p]), Op::SinCos(_))
+                || order.get(p + 1).is_some_and(|n| matches!(graph.op(*n), Op::Sin(_) | Op::Cos(_)));
+            if size >= low && !halves_follow && best.is_none_or(|(live, _, _)| live_after[p] < live) {
+                best = Some((live_after[p], p + 1, size));
+            }
+        }
+        let Some((_, cut, size)) = best else { break };
+        if cut >= order.len() {
+            break;
+        }
+        cuts.push(cut);
+        start = cut;
+        left -= size;
+    }
+    cuts
+}
+
+/// Gives every value that crosses a cut a slot, free again after the last part that reads it.
+fn assign_slots(
+    graph: &Graph,
+    order: &[NodeId],
+    position: &[usize],
+    last_use: &[usize],
+    part_of: &impl Fn(usize) -> usize,
+    parts: &mut [Part],
+) -> usize {
+    let mut slot_of = vec![usize::MAX; graph.ops.len()];
+    let mut free: Vec<usize> = Vec::new();
+    let mut slots = 0;
+    let mut busy_until: Vec<(usize, usize)> = Vec::new(); // (last part, slot)
+    for (k, part) in parts.iter_mut().enumerate() {
+        busy_until.retain(|(last, slot)| {
+            let done = *last < k;
+            if done {
+                free.push(*slot);
+            }
+            !done
+        });
+        let mut loaded: Vec<NodeId> = Vec::new();
+        for id in &part.nodes {
+            for a in graph.op(*id).operands() {
+                let p = position[a.index()];
+                if p != usize::MAX && part_of(p) < k {
+                    loaded.push(a);
+                }
+            }
+        }
+        loaded.sort_unstable();
+        loaded.dedup();
+        part.loads = loaded.into_iter().map(|id| (id, slot_of[id.index()])).collect();
+        for id in &part.nodes {
+            let last = part_of(last_use[id.index()]);
+            // a pair itself is never alive: its halves are
+            if last > k && !matches!(graph.op(*id), Op::SinCos(_)) {
+                let slot = free.pop().unwrap_or_else(|| {
+                    slots += 1;
+                    slots - 1
+                });
+                slot_of[id.index()] = slot;
+                busy_until.push((last, slot));
+                part.stores.push((*id, slot));
+            }
+        }
+    }
+    debug_assert!(order.iter().all(|id| position[id.index()] != usize::MAX));
+    slots
+}

@@ -1,0 +1,119 @@
+//! The tracing scalar: running an algorithm over [`Expr`] writes its equations down.
+//!
+//! The graph under construction belongs to the thread: operators have nowhere else to find it. [`trace`] opens one, and
+//! closes it again even when the algorithm panics.
+
+use crate::expr::{Builder, Graph, NodeId, Op, Port, RuleSet, Section};
+use std::cell::RefCell;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+use straightline_core::{Dd, Real};
+
+thread_local! {
+    static BUILDER: RefCell<Option<Builder>> = const { RefCell::new(None) };
+}
+
+/// A node of the graph that this thread is tracing.
+#[derive(Clone, Copy, Debug)]
+pub struct Expr(NodeId);
+
+fn with<R>(f: impl FnOnce(&mut Builder) -> R) -> R {
+    BUILDER.with_borrow_mut(|b| f(b.as_mut().expect("expressions are only made inside `trace`")))
+}
+
+/// Runs `algorithm` on symbolic inputs and returns its equations; one slice of expressions per input port, and the
+/// output scalars group after group.
+pub fn trace(
+    rules: RuleSet,
+    inputs: Vec<Port>,
+    outputs: Vec<Port>,
+    algorithm: impl FnOnce(&[Vec<Expr>]) -> Vec<Expr>,
+) -> Graph {
+    struct Close;
+    impl Drop for Close {
+        fn drop(&mut self) {
+            BUILDER.with_borrow_mut(|b| *b = None);
+        }
+    }
+    BUILDER.with_borrow_mut(|b| {
+        assert!(b.is_none(), "a trace is not nested in another");
+        *b = Some(Builder::new(rules, inputs.clone()));
+    });
+    let _close = Close;
+    let mut next = 0;
+    let arguments: Vec<Vec<Expr>> = inputs
+        .iter()
+        .map(|port| {
+            let group = (next..next + port.len() as u32).map(|k| Expr(with(|b| b.insert(Op::Input(k))))).collect();
+            next += port.len() as u32;
+            group
+        })
+        .collect();
+    let results: Vec<NodeId> = algorithm(&arguments).into_iter().map(|e| e.0).collect();
+    let builder = BUILDER.with_borrow_mut(Option::take).expect("the trace that was opened above");
+    builder.finish(outputs, results)
+}
+
+impl Add for Expr {
+    type Output = Expr;
+    fn add(self, b: Expr) -> Expr {
+        Expr(with(|g| g.add(Op::Add(self.0, b.0))))
+    }
+}
+
+impl Sub for Expr {
+    type Output = Expr;
+    fn sub(self, b: Expr) -> Expr {
+        Expr(with(|g| g.add(Op::Sub(self.0, b.0))))
+    }
+}
+
+impl Mul for Expr {
+    type Output = Expr;
+    fn mul(self, b: Expr) -> Expr {
+        Expr(with(|g| g.add(Op::Mul(self.0, b.0))))
+    }
+}
+
+impl Div for Expr {
+    type Output = Expr;
+    fn div(self, b: Expr) -> Expr {
+        Expr(with(|g| g.add(Op::Div(self.0, b.0))))
+    }
+}
+
+impl Neg for Expr {
+    type Output = Expr;
+    fn neg(self) -> Expr {
+        Expr(with(|g| g.add(Op::Neg(self.0))))
+    }
+}
+
+impl Real for Expr {
+    fn constant(value: Dd) -> Self {
+        Expr(with(|g| g.constant(value)))
+    }
+
+    fn sin_cos(self) -> (Self, Self) {
+        with(|g| {
+            if let Some(c) = g.as_constant(self.0) {
+                let (s, c) = g.rules().folding().sin_cos(c.value());
+                return (Expr(g.constant(s)), Expr(g.constant(c)));
+            }
+            let pair = g.add(Op::SinCos(self.0));
+            (Expr(g.add(Op::Sin(pair))), Expr(g.add(Op::Cos(pair))))
+        })
+    }
+
+    fn sqrt(self) -> Self {
+        Expr(with(|g| g.add(Op::Sqrt(self.0))))
+    }
+
+    fn named(self, name: &'static str, index: usize, component: &'static str) -> Self {
+        with(|g| g.name(self.0, (name, index, component)));
+        self
+    }
+
+    fn section(phase: &'static str, body: Option<usize>) {
+        with(|g| g.section(Section { phase, body }));
+    }
+}
