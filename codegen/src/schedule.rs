@@ -80,7 +80,13 @@ pub fn schedule(graph: &Graph, limits: Limits) -> Schedule {
             change[last_use[id.index()]] -= 1;
         }
         let mut alive = 0;
-        change.iter().map(|c| { alive += c; alive as usize }).collect::<Vec<_>>()
+        change
+            .iter()
+            .map(|c| {
+                alive += c;
+                alive as usize
+            })
+            .collect::<Vec<_>>()
     };
     let max_live = live_after.iter().copied().max().unwrap_or(0);
 

@@ -47,8 +47,9 @@ pub fn function(
         });
         used
     };
-    let all_used =
-        used_inputs(&mut schedule.parts.iter().flat_map(|p| p.nodes.iter().copied()).chain(graph.results.iter().copied()));
+    let all_used = used_inputs(
+        &mut schedule.parts.iter().flat_map(|p| p.nodes.iter().copied()).chain(graph.results.iter().copied()),
+    );
     let parameters = |f: &mut dyn FnMut(&Port, bool, bool) -> String| {
         let inputs = graph.inputs.iter().enumerate().map(|(i, p)| (p, all_used[i], false));
         let outputs = graph.outputs.iter().map(|p| (p, true, true));
@@ -236,9 +237,7 @@ impl Body<'_> {
                 let (port, k) = port_of(&self.graph.inputs, k as usize);
                 (element(&self.graph.inputs[port], k), Binding::Atom)
             }
-            Op::Constant(c) => {
-                (literal(c, self.scalar), if c.is_negative() { Binding::Sign } else { Binding::Atom })
-            }
+            Op::Constant(c) => (literal(c, self.scalar), if c.is_negative() { Binding::Sign } else { Binding::Atom }),
             _ => self.text[id.index()].clone().expect("operands stand before their users"),
         }
     }

@@ -73,7 +73,13 @@ fn header(out: &mut String, model: &Model<Dd>, report: &Report, provenance: &Pro
     let _ = writeln!(out, "// Inputs' hash: {:016x}", provenance.hash);
     let _ = writeln!(out, "//");
     let base = if floating { "floating base" } else { "fixed base" };
-    let _ = writeln!(out, "// {} moving bodies, {base}, {} coordinates, {} velocities:", model.bodies.len(), report.nq, report.nv);
+    let _ = writeln!(
+        out,
+        "// {} moving bodies, {base}, {} coordinates, {} velocities:",
+        model.bodies.len(),
+        report.nq,
+        report.nv
+    );
     for (i, b) in model.bodies.iter().enumerate() {
         let kind = match b.joint.kind {
             JointKind::Revolute => "revolute",
@@ -81,12 +87,27 @@ fn header(out: &mut String, model: &Model<Dd>, report: &Report, provenance: &Pro
             JointKind::Floating => "floating",
         };
         let parent = b.parent.map_or("world".to_string(), |p| format!("body {}", p + 1));
-        let _ = writeln!(out, "//   body {:<3} {} on {parent} by {kind} joint {}, qd[{}]", i + 1, b.name, b.joint.name, b.joint.iv);
+        let _ = writeln!(
+            out,
+            "//   body {:<3} {} on {parent} by {kind} joint {}, qd[{}]",
+            i + 1,
+            b.name,
+            b.joint.name,
+            b.joint.iv
+        );
     }
     let _ = writeln!(out, "//");
-    let _ = writeln!(out, "// {:<22} {:>6} {:>6} {:>6} {:>4} {:>6} {:>5}", "function", "mul", "add", "fma", "div", "sincos", "live");
+    let _ = writeln!(
+        out,
+        "// {:<22} {:>6} {:>6} {:>6} {:>4} {:>6} {:>5}",
+        "function", "mul", "add", "fma", "div", "sincos", "live"
+    );
     for (name, f) in &report.functions {
-        let _ = writeln!(out, "// {name:<22} {:>6} {:>6} {:>6} {:>4} {:>6} {:>5}", f.mul, f.add, f.fma, f.div, f.sincos, f.max_live);
+        let _ = writeln!(
+            out,
+            "// {name:<22} {:>6} {:>6} {:>6} {:>4} {:>6} {:>5}",
+            f.mul, f.add, f.fma, f.div, f.sincos, f.max_live
+        );
     }
     let _ = writeln!(out, "// fma: instructions for mul and add when every a * b + c is one.");
     if !provenance.remarks.is_empty() {
@@ -106,7 +127,12 @@ fn constants(out: &mut String, model: &Model<Dd>, frames: &[String], scalar: Sca
     let mut joints: Vec<_> = model.bodies.iter().map(|b| &b.joint).collect();
     joints.sort_by_key(|j| j.iv);
     let _ = writeln!(out, "/// Joints in the order of their coordinates.");
-    let _ = writeln!(out, "pub const JOINT_NAMES: [&str; {}] = {:?};", joints.len(), joints.iter().map(|j| &j.name).collect::<Vec<_>>());
+    let _ = writeln!(
+        out,
+        "pub const JOINT_NAMES: [&str; {}] = {:?};",
+        joints.len(),
+        joints.iter().map(|j| &j.name).collect::<Vec<_>>()
+    );
     let _ = writeln!(out, "/// Frames of the functions that answer per frame.");
     let _ = writeln!(out, "pub const FRAME_NAMES: [&str; {}] = {frames:?};", frames.len());
     let single: Vec<_> = joints.iter().filter(|j| j.kind != JointKind::Floating).collect();

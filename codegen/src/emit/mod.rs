@@ -4,11 +4,9 @@
 //! algorithm gave them; every section of the algorithm is a block under a comment.
 
 mod body;
-mod file;
 mod names;
 
 pub use body::{function, FunctionText};
-pub use file::{file, Item, Provenance};
 pub use names::Names;
 
 use crate::expr::Port;

@@ -38,7 +38,14 @@ impl Folding {
     }
 
     /// The value of an operation on constants.
-    fn fold(self, wide: fn(Dd, Dd) -> Dd, f64_op: fn(f64, f64) -> f64, f32_op: fn(f32, f32) -> f32, a: Dd, b: Dd) -> Dd {
+    fn fold(
+        self,
+        wide: fn(Dd, Dd) -> Dd,
+        f64_op: fn(f64, f64) -> f64,
+        f32_op: fn(f32, f32) -> f32,
+        a: Dd,
+        b: Dd,
+    ) -> Dd {
         match self {
             Folding::F64 => Dd::from(f64_op(a.to_f64(), b.to_f64())),
             Folding::F32 => Dd::from(f64::from(f32_op(a.to_f32(), b.to_f32()))),
@@ -131,12 +138,28 @@ pub const RULES: &[Rule] = &[
     Rule { name: "mul-one", grade: Grade::Exact, equation: "x · 1 = x; x · −1 = −x", apply: mul_one },
     Rule { name: "div-one", grade: Grade::Exact, equation: "x / 1 = x; x / −1 = −x; 0 / x = 0", apply: div_one },
     Rule { name: "neg-neg", grade: Grade::Exact, equation: "−(−x) = x", apply: neg_neg },
-    Rule { name: "add-neg", grade: Grade::Exact, equation: "x + (−y) = x − y; (−x) + (−y) = −(x + y); −y may be −k", apply: add_neg },
-    Rule { name: "sub-neg", grade: Grade::Exact, equation: "x − (−y) = x + y; (−x) − y = −(x + y); −y may be −k", apply: sub_neg },
-    Rule { name: "mul-neg", grade: Grade::Exact, equation: "(−x) · y = −(x · y); (−k) · y = −(k · y)", apply: mul_neg },
-    Rule { name: "div-neg", grade: Grade::Exact, equation: "(−x) / y = −(x / y); x / (−y) = −(x / y)", apply: div_neg },
+    Rule {
+        name: "add-neg",
+        grade: Grade::Exact,
+        equation: "x + (−y) = x − y; (−x) + (−y) = −(x + y); −y may be −k",
+        apply: add_neg,
+    },
+    Rule {
+        name: "sub-neg",
+        grade: Grade::Exact,
+        equation: "x − (−y) = x + y; (−x) − y = −(x + y); −y may be −k",
+        apply: sub_neg,
+    },
+    Rule {
+        name: "mul-neg", grade: Grade::Exact, equation: "(−x) · y = −(x · y); (−k) · y = −(k · y)", apply: mul_neg
+    },
+    Rule {
+        name: "div-neg", grade: Grade::Exact, equation: "(−x) / y = −(x / y); x / (−y) = −(x / y)", apply: div_neg
+    },
     Rule { name: "commute", grade: Grade::Exact, equation: "y ∘ x = x ∘ y for +, ·", apply: commute },
-    Rule { name: "sub-flip", grade: Grade::Exact, equation: "y − x = −(x − y), if x − y is there", apply: sub_flip },
+    Rule {
+        name: "sub-flip", grade: Grade::Exact, equation: "y − x = −(x − y), if x − y is there", apply: sub_flip
+    },
     Rule { name: "mul-mul", grade: Grade::Algebraic, equation: "c · (d · x) = (c d) · x", apply: mul_mul },
 ];
 

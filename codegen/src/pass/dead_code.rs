@@ -26,9 +26,10 @@ pub fn dead_code(graph: &Graph) -> Graph {
                 keep(id, &mut new_id);
                 for half in [Op::Sin(id), Op::Cos(id)] {
                     // the builder puts the halves right behind the pair
-                    if let Some(h) = (id.0 + 1..id.0 + 3).map(NodeId).find(|h| {
-                        graph.ops.get(h.index()) == Some(&half) && live[h.index()]
-                    }) {
+                    if let Some(h) = (id.0 + 1..id.0 + 3)
+                        .map(NodeId)
+                        .find(|h| graph.ops.get(h.index()) == Some(&half) && live[h.index()])
+                    {
                         keep(h, &mut new_id);
                     }
                 }
