@@ -6,6 +6,7 @@ pub mod diagnostic;
 pub mod emit;
 pub mod expr;
 pub mod pass;
+pub mod reference_input;
 pub mod schedule;
 pub mod trace;
 

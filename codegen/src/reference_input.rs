@@ -1,0 +1,346 @@
+//! The robot file in the reference's terms: from a [`Description`] to mass centres, joint axes and joint vectors.
+//!
+//! A second reading of the file, independent of `crate::model`, so that `verify` proves the way from the file to the
+//! equations and not only the equations. Everything is in double-double; the numbers of the file count as the nearest
+//! f64 of their text. The description is one that was checked: what cannot be a robot gives an error without a place.
+//!
+//! Joint-frame notation (URDF, TOML): frame j of the reference has the axes of the link frame and its origin in the mass
+//! centre; links on fixed joints are lumped into the link that carries them, their inertia combined about the common
+//! mass centre; the joint frame at q = 0 is given by the file, so A⁰ is given as a matrix. Mass-centre notation: as written.
+
+use crate::description::{
+    Angle, AngleUnit, BaseKind, Description, Inertial, Joint as FileJoint, JointFrameNotation, JointKind,
+    MassCentreNotation, Notation, Pose, Rotation,
+};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::HashMap;
+use straightline_core::model::Model;
+use straightline_core::reference::{unit, ExtendedPosition, Joint, MassCentreFrame, MassCentreLink, MassCentreTree};
+use straightline_core::spatial::Sym3;
+use straightline_core::Dd;
+
+/// What the file leaves to the reader.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading {
+    /// How an angle of the file is understood \[rad\]: [`literal_angle`], or with right angles recognised.
+    pub angle: fn(&Angle) -> Dd,
+    /// The base, where the file says nothing or something else is wanted.
+    pub base: Option<BaseKind>,
+    /// Acceleration due to gravity \[m/s²\], where the file says nothing.
+    pub gravity: [f64; 3],
+}
+
+impl Default for Reading {
+    /// Literal angles, the base of the file (fixed where it says nothing), 9.81 m/s² against z.
+    fn default() -> Self {
+        Reading { angle: literal_angle, base: None, gravity: [0.0, 0.0, -9.81] }
+    }
+}
+
+/// The angle as it is written, in radians.
+pub fn literal_angle(angle: &Angle) -> Dd {
+    let value = Dd::from(angle.value);
+    match angle.unit {
+        AngleUnit::Radian => value,
+        AngleUnit::Degree => value * Dd::PI / Dd::from(180.0),
+        AngleUnit::QuarterTurn => value * Dd::FRAC_PI_2,
+        AngleUnit::Turn => value * Dd::PI * Dd::from(2.0),
+    }
+}
+
+/// The robot of a description, for [`straightline_core::reference`]. Links and coordinates are in depth-first order of
+/// the file, frames are named as in the file: every link, named frames, the `tip` of a chapter robot.
+///
+/// # Errors
+/// If the description is no tree of links.
+pub fn mass_centre_tree(description: &Description, reading: &Reading) -> Result<MassCentreTree<Dd>, String> {
+    let gravity = description.gravity.as_ref().map_or(reading.gravity, |gravity| gravity.value);
+    let mut tree = MassCentreTree {
+        name: description.name.value.clone(),
+        gravity: vector(&gravity),
+        links: Vec::new(),
+        frames: Vec::new(),
+    };
+    let base = reading.base.or(description.base.as_ref().map(|base| base.value)).unwrap_or(BaseKind::Fixed);
+    match &description.notation {
+        Notation::JointFrames(notation) => add_joint_frames(&mut tree, notation, base, reading)?,
+        Notation::MassCentres(notation) => add_mass_centres(&mut tree, notation, reading)?,
+    }
+    tree.number_coordinates();
+    Ok(tree)
+}
+
+/// Gives the joints of the tree the places in q and q̇ that the model gives them; links are matched by name.
+///
+/// # Errors
+/// If a link is not a body of the model.
+pub fn number_like<T>(tree: &mut MassCentreTree<Dd>, model: &Model<T>) -> Result<(), String> {
+    for link in &mut tree.links {
+        let body = model.bodies.iter().find(|body| body.name == link.name);
+        let joint = &body.ok_or_else(|| format!("the model has no body `{}`", link.name))?.joint;
+        (link.iq, link.iv) = (joint.iq, joint.iv);
+    }
+    Ok(())
+}
+
+fn vector(v: &[f64; 3]) -> Vector3<Dd> {
+    Vector3::new(Dd::from(v[0]), Dd::from(v[1]), Dd::from(v[2]))
+}
+
+fn tensor(s: &Sym3<f64>) -> Matrix3<Dd> {
+    Matrix3::new(s.xx, s.xy, s.xz, s.xy, s.yy, s.yz, s.xz, s.yz, s.zz).map(Dd::from)
+}
+
+/// R = Rz(yaw) Ry(pitch) Rx(roll).
+fn rotation(rotation: &Rotation, reading: &Reading) -> Matrix3<Dd> {
+    let [roll, pitch, yaw] = [0, 1, 2].map(|i| (reading.angle)(&rotation.rpy[i]).sin_cos());
+    let (o, l) = (Dd::ZERO, Dd::ONE);
+    let (s, c) = roll;
+    let rx = Matrix3::new(l, o, o, o, c, -s, o, s, c);
+    let (s, c) = pitch;
+    let ry = Matrix3::new(c, o, s, o, l, o, -s, o, c);
+    let (s, c) = yaw;
+    let rz = Matrix3::new(c, -s, o, s, c, o, o, o, l);
+    rz * ry * rx
+}
+
+/// Where a frame is, in another one.
+#[derive(Clone, Copy)]
+struct Placed {
+    rotation: Matrix3<Dd>,
+    position: Vector3<Dd>,
+}
+
+impl Placed {
+    fn here() -> Placed {
+        Placed { rotation: Matrix3::identity(), position: Vector3::zeros() }
+    }
+
+    fn read(pose: &Pose, reading: &Reading) -> Placed {
+        Placed { rotation: rotation(&pose.rotation, reading), position: vector(&pose.xyz.value) }
+    }
+
+    /// Where a frame is that is placed in this one.
+    fn then(&self, inner: &Placed) -> Placed {
+        Placed { rotation: self.rotation * inner.rotation, position: self.position + self.rotation * inner.position }
+    }
+}
+
+/// A rigid part: mass, mass centre, inertia about the mass centre, in the axes of the link that carries it.
+struct Part {
+    mass: Dd,
+    centre: Vector3<Dd>,
+    inertia: Matrix3<Dd>,
+}
+
+impl Part {
+    fn read(inertial: &Inertial, link: &Placed, reading: &Reading) -> Part {
+        let axes = link.rotation * rotation(&inertial.rotation, reading);
+        Part {
+            mass: Dd::from(inertial.mass.value),
+            centre: link.position + link.rotation * vector(&inertial.com.value),
+            inertia: axes * tensor(&inertial.inertia.value) * axes.transpose(),
+        }
+    }
+
+    /// The parts as one: Steiner's theorem about the common mass centre. Without mass, that is the origin.
+    fn lump(parts: &[Part]) -> Part {
+        let mass = parts.iter().fold(Dd::ZERO, |sum, part| sum + part.mass);
+        let moment = parts.iter().fold(Vector3::zeros(), |sum, part| sum + part.centre * part.mass);
+        let centre = if mass == Dd::ZERO { Vector3::zeros() } else { moment.map(|x| x / mass) };
+        let about_centre = |part: &Part| {
+            let d = part.centre - centre;
+            part.inertia + (Matrix3::identity() * d.dot(&d) - d * d.transpose()) * part.mass
+        };
+        let inertia = parts.iter().fold(Matrix3::zeros(), |sum, part| sum + about_centre(part));
+        Part { mass, centre, inertia }
+    }
+}
+
+/// A moving link of the file, or the world, while the tree is read.
+struct Group {
+    /// The group it moves against, and the joint; `None` for the root group.
+    joint: Option<(usize, Placed, usize)>,
+    /// What is rigidly joined to it, in its link frame.
+    parts: Vec<Part>,
+}
+
+/// Frames fixed to a group: name, group, place in the group's link frame.
+type Frames = Vec<(String, usize, Placed)>;
+
+fn add_joint_frames(
+    tree: &mut MassCentreTree<Dd>,
+    notation: &JointFrameNotation,
+    base: BaseKind,
+    reading: &Reading,
+) -> Result<(), String> {
+    let (groups, frames) = rigid_groups(notation, reading)?;
+    let lumped: Vec<Part> = groups.iter().map(|group| Part::lump(&group.parts)).collect();
+    // the root group: the world, or the floating link
+    let floating = base == BaseKind::Floating;
+    let link_of = |group: usize| if floating { Some(group) } else { group.checked_sub(1) };
+    // from the link frame's origin to C; frame 0 has its origin in the world's
+    let centre_of = |group: usize| link_of(group).map_or_else(Vector3::zeros, |_| lumped[group].centre);
+    for (group, part) in groups.iter().zip(&lumped) {
+        let Part { mass, centre, inertia } = part;
+        let Some((parent, joint_place, joint)) = &group.joint else {
+            if floating {
+                let root = root_link(notation)?;
+                tree.links.push(MassCentreLink::free(root.to_string(), *mass, *inertia, *centre));
+            }
+            continue;
+        };
+        let joint = &notation.joints[*joint];
+        let e = unit(&vector(&joint.axis.value));
+        tree.links.push(MassCentreLink {
+            name: joint.child.value.clone(),
+            parent: link_of(*parent),
+            joint: reference_joint(joint)?,
+            iq: 0,
+            iv: 0,
+            mass: *mass,
+            inertia: *inertia,
+            e,
+            e_parent: joint_place.rotation * e,
+            r: *centre,
+            r_parent: centre_of(*parent) - joint_place.position,
+            extended: ExtendedPosition::Matrix(joint_place.rotation),
+        });
+    }
+    for (name, group, place) in frames {
+        tree.frames.push(MassCentreFrame {
+            name,
+            link: link_of(group),
+            position: place.position - centre_of(group),
+            rotation: place.rotation,
+        });
+    }
+    Ok(())
+}
+
+fn reference_joint(joint: &FileJoint) -> Result<Joint, String> {
+    match joint.kind.value {
+        JointKind::Revolute | JointKind::Continuous => Ok(Joint::Revolute),
+        JointKind::Prismatic => Ok(Joint::Linear),
+        JointKind::Fixed | JointKind::Floating => {
+            Err(format!("joint `{}` has not one degree of freedom", joint.name.value))
+        }
+    }
+}
+
+/// The link that no joint moves.
+fn root_link(notation: &JointFrameNotation) -> Result<&str, String> {
+    let is_child = |name: &str| notation.joints.iter().any(|joint| joint.child.value == name);
+    let mut roots = notation.links.iter().map(|link| link.name.value.as_str()).filter(|name| !is_child(name));
+    match (roots.next(), roots.next()) {
+        (Some(root), None) => Ok(root),
+        (None, _) => Err("no link is the root".to_string()),
+        (Some(a), Some(b)) => Err(format!("`{a}` and `{b}` are both roots")),
+    }
+}
+
+/// The rigid groups of links, depth first in the file's order, and the frames of links and named frames.
+fn rigid_groups(notation: &JointFrameNotation, reading: &Reading) -> Result<(Vec<Group>, Frames), String> {
+    let links: HashMap<&str, usize> =
+        notation.links.iter().enumerate().map(|(i, link)| (link.name.value.as_str(), i)).collect();
+    let mut joints_above: HashMap<&str, Vec<usize>> = HashMap::new();
+    for (i, joint) in notation.joints.iter().enumerate() {
+        joints_above.entry(joint.parent.value.as_str()).or_default().push(i);
+    }
+
+    let mut groups = vec![Group { joint: None, parts: Vec::new() }];
+    let mut places: HashMap<&str, (usize, Placed)> = HashMap::new();
+    let mut frames = Frames::new();
+    // a link to visit: its name, the joint that leads there, and where that joint's parent is
+    let mut open = vec![(root_link(notation)?, None, (0, Placed::here()))];
+    while let Some((name, joint, (parent_group, parent_place))) = open.pop() {
+        let (group, place) = match joint {
+            None => (0, Placed::here()),
+            Some(i) => {
+                let joint: &FileJoint = &notation.joints[i];
+                let joint_place = parent_place.then(&Placed::read(&joint.origin, reading));
+                if joint.kind.value.moves() {
+                    groups.push(Group { joint: Some((parent_group, joint_place, i)), parts: Vec::new() });
+                    (groups.len() - 1, Placed::here())
+                } else {
+                    (parent_group, joint_place)
+                }
+            }
+        };
+        if places.insert(name, (group, place)).is_some() {
+            return Err(format!("link `{name}` is moved by two joints"));
+        }
+        frames.push((name.to_string(), group, place));
+        let link = &notation.links[*links.get(name).ok_or_else(|| format!("there is no link `{name}`"))?];
+        if let Some(inertial) = &link.inertial {
+            groups[group].parts.push(Part::read(inertial, &place, reading));
+        }
+        // last in, first out: reversed, so that the first joint of the file is followed first
+        for &i in joints_above.get(name).into_iter().flatten().rev() {
+            open.push((notation.joints[i].child.value.as_str(), Some(i), (group, place)));
+        }
+    }
+    if places.len() != notation.links.len() {
+        return Err("some links hang on no root".to_string());
+    }
+    for frame in &notation.frames {
+        let link = frame.link.value.as_str();
+        let (group, place) = places.get(link).ok_or_else(|| format!("there is no link `{link}`"))?;
+        frames.push((frame.name.value.clone(), *group, place.then(&Placed::read(&frame.pose, reading))));
+    }
+    Ok((groups, frames))
+}
+
+fn add_mass_centres(
+    tree: &mut MassCentreTree<Dd>,
+    notation: &MassCentreNotation,
+    reading: &Reading,
+) -> Result<(), String> {
+    let mut below = &notation.base;
+    for (j, link) in notation.links.iter().enumerate() {
+        let missing = |what: &str| format!("the link below `{}` has no {what}", link.name.value);
+        let e_parent = below.e_next.as_ref().ok_or_else(|| missing("e_next"))?;
+        let r_parent = below.r_next.as_ref().ok_or_else(|| missing("r_next"))?;
+        let r = vector(&link.r.value);
+        tree.links.push(MassCentreLink {
+            name: link.name.value.clone(),
+            parent: j.checked_sub(1),
+            joint: match link.kind.value {
+                JointKind::Prismatic => Joint::Linear,
+                JointKind::Revolute => Joint::Revolute,
+                _ => return Err(format!("joint `{}` is neither revolute nor linear", link.joint_name.value)),
+            },
+            iq: 0,
+            iv: 0,
+            mass: Dd::from(link.mass.value),
+            inertia: tensor(&link.inertia.value),
+            e: unit(&vector(&link.e.value)),
+            e_parent: unit(&vector(&e_parent.value)),
+            r,
+            r_parent: vector(&r_parent.value),
+            extended: ExtendedPosition::ByVectors {
+                r_star: link.r_star.as_ref().map(|r| vector(&r.value)),
+                r_parent_star: below.r_next_star.as_ref().map(|r| vector(&r.value)),
+                alpha: link.alpha.as_ref().map_or(Dd::ZERO, reading.angle),
+            },
+        });
+        // the link's own frame: in the joint, with the link's axes
+        tree.frames.push(MassCentreFrame {
+            name: link.name.value.clone(),
+            link: Some(j),
+            position: -r,
+            rotation: Matrix3::identity(),
+        });
+        below = &link.end;
+    }
+    if let (Some(r), Some(last)) = (&below.r_next, notation.links.len().checked_sub(1)) {
+        // tip = r_{c,n} − r_{n,n+1}
+        tree.frames.push(MassCentreFrame {
+            name: "tip".to_string(),
+            link: Some(last),
+            position: -vector(&r.value),
+            rotation: Matrix3::identity(),
+        });
+    }
+    Ok(())
+}
