@@ -7,10 +7,10 @@ use serde_json::Value;
 use std::fs;
 use straightline_core::reference::{
     bias_force, centre_of_mass, dalembert_inverse_dynamics, equations_of_motion, extended_joint, forward_dynamics,
-    frame_jacobian, frame_jacobian_bias, frame_pose, frame_velocity, geometry, gravity_force, inverse_dynamics,
-    joint_loads, joint_wrenches, kinetic_energy, linear_forms, mass_matrix, momentum, motion, natural_scale,
-    potential_energy, rodrigues, skew, unit, velocity_force, ExtendedPosition, Joint, LinkGeometry, LinkMotion,
-    MassCentreFrame, MassCentreLink, MassCentreTree,
+    forward_natural_scale, frame_jacobian, frame_jacobian_bias, frame_pose, frame_velocity, geometry, gravity_force,
+    inverse_dynamics, joint_loads, joint_wrenches, kinetic_energy, linear_forms, mass_matrix, momentum, motion,
+    natural_scale, potential_energy, rodrigues, skew, unit, velocity_force, ExtendedPosition, Joint, LinkGeometry,
+    LinkMotion, MassCentreFrame, MassCentreLink, MassCentreTree,
 };
 use straightline_core::Dd;
 use support::{chapter_robot, inputs, numbers, random_position, random_robot, reference_folder, Random, RobotKind};
@@ -202,6 +202,8 @@ fn natural_scale_is_that_of_the_data() {
         state.check_group("scale of tau", natural_scale(tree, q, qd, qdd).as_slice(), &scale["tau"]);
         state.check_group("scale of h", natural_scale(tree, q, qd, &rest).as_slice(), &scale["h"]);
         state.check_group("scale of g", natural_scale(tree, q, &rest, &rest).as_slice(), &scale["g"]);
+        let forward = forward_natural_scale(tree, q, qd, &inputs(&data["fd_tau"]));
+        state.check("scale of fd", forward.as_slice(), &scale["fd"], &numbers(&scale["fd"]));
         let weightless = MassCentreTree { gravity: Vector3::zeros(), ..tree.clone() };
         state.check_group("scale of C", natural_scale(&weightless, q, qd, &rest).as_slice(), &scale["C"]);
     }

@@ -192,7 +192,16 @@ fn compare_all(disagreement: &mut Disagreement, random: &mut Random, kind: Robot
     let scale = reference::natural_scale(&weightless, &q, &qd, &rest);
     let expected = reference::velocity_force(&tree, &q, &qd);
     d.compare("C", &robot, &algorithms::velocity_force(&model, &q, &qd), expected.as_slice(), scale.as_slice());
-    let _ = tau;
+
+    let expected = reference::mass_matrix(&tree, &q);
+    let computed = algorithms::mass_matrix(&model, &q);
+    d.compare_group("H", &robot, &computed, expected.as_slice());
+    let scale = reference::forward_natural_scale(&tree, &q, &qd, &tau);
+    let expected = reference::forward_dynamics(&tree, &q, &qd, &tau);
+    let computed = algorithms::forward_dynamics_aba(&model, &q, &qd, &tau);
+    d.compare("qdd (ABA)", &robot, &computed, expected.as_slice(), scale.as_slice());
+    let computed = algorithms::forward_dynamics_ltdl(&model, &q, &qd, &tau);
+    d.compare("qdd (LTDL)", &robot, &computed, expected.as_slice(), scale.as_slice());
 
     // one wrench per joint, in the order of the velocity coordinates
     let mut order: Vec<usize> = (0..tree.links.len()).collect();

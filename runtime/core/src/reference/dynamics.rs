@@ -326,3 +326,19 @@ pub fn natural_scale<T: Number>(tree: &MassCentreTree<T>, q: &[T], qd: &[T], qdd
     }
     scale
 }
+
+/// For every component of q̈ = H⁻¹(τ − h) what rounding is judged against: |H⁻¹| (|τ| + scale of h + |H| |q̈|), with the
+/// moduli of all entries.
+pub fn forward_natural_scale<T: Number>(tree: &MassCentreTree<T>, q: &[T], qd: &[T], tau: &[T]) -> DVector<T> {
+    let n = tree.nv();
+    let modulus = |x: T| (x * x).sqrt();
+    let mass_matrix = mass_matrix(tree, q);
+    let qdd = forward_dynamics(tree, q, qd, tau).map(modulus);
+    let tau = DVector::from_column_slice(tau).map(modulus);
+    let sum = tau + natural_scale(tree, q, qd, &rest(tree)) + mass_matrix.map(modulus) * qdd;
+    // column k of H⁻¹ solves H x = unit vector k
+    let unit_vector = |k: usize| DVector::from_fn(n, |i, _| T::constant(if i == k { Dd::ONE } else { Dd::ZERO }));
+    (0..n).fold(DVector::zeros(n), |scale, k| {
+        scale + solve_symmetric(&mass_matrix, &unit_vector(k)).map(modulus) * sum[k]
+    })
+}

@@ -27,8 +27,9 @@ mod solve;
 mod tree;
 
 pub use dynamics::{
-    bias_force, dalembert_inverse_dynamics, equations_of_motion, forward_dynamics, gravity_force, inverse_dynamics,
-    joint_loads, joint_wrenches, mass_matrix, natural_scale, velocity_force, EquationsOfMotion, JointLoad,
+    bias_force, dalembert_inverse_dynamics, equations_of_motion, forward_dynamics, forward_natural_scale,
+    gravity_force, inverse_dynamics, joint_loads, joint_wrenches, mass_matrix, natural_scale, velocity_force,
+    EquationsOfMotion, JointLoad,
 };
 pub use energy::{centre_of_mass, kinetic_energy, momentum, potential_energy, Momentum};
 pub use frames::{frame_acceleration, frame_jacobian, frame_jacobian_bias, frame_pose, frame_velocity, FramePose};
