@@ -63,7 +63,7 @@ impl Source {
         let mut marks = Vec::with_capacity(bytes.len() / MARK + 1);
         let mut characters = 0;
         for (i, &byte) in bytes.iter().enumerate() {
-            if i % MARK == 0 {
+            if i.is_multiple_of(MARK) {
                 marks.push(characters);
             }
             if byte & 0xC0 != 0x80 {
@@ -73,7 +73,7 @@ impl Source {
                 line_starts.push(i + 1);
             }
         }
-        if bytes.len() % MARK == 0 {
+        if bytes.len().is_multiple_of(MARK) {
             marks.push(characters);
         }
         Source { inner: Arc::new(SourceInner { path: path.into(), text, invalid_utf8, line_starts, marks }) }
@@ -277,9 +277,14 @@ impl Diagnostic {
 pub struct Diagnostics {
     list: Vec<Diagnostic>,
     sources: Vec<Source>,
+    /// How often each code was pushed, in the order of their first complaints.
+    counts: Vec<(&'static str, usize)>,
 }
 
 impl Diagnostics {
+    /// Of complaints with the same code, so many are kept.
+    pub const SHOWN_PER_CODE: usize = 100;
+
     /// No complaints.
     pub fn new() -> Diagnostics {
         Diagnostics::default()
@@ -297,9 +302,17 @@ impl Diagnostics {
         self.sources.iter().find(|s| s.path() == path)
     }
 
-    /// Adds a complaint.
+    /// Adds a complaint. Of one code, [`Diagnostics::SHOWN_PER_CODE`] are kept and the others counted.
     pub fn push(&mut self, diagnostic: Diagnostic) {
-        self.list.push(diagnostic);
+        let code = diagnostic.code;
+        let index = self.counts.iter().position(|c| c.0 == code).unwrap_or_else(|| {
+            self.counts.push((code, 0));
+            self.counts.len() - 1
+        });
+        self.counts[index].1 += 1;
+        if self.counts[index].1 <= Self::SHOWN_PER_CODE {
+            self.list.push(diagnostic);
+        }
     }
 
     /// Adds all of `other`.
@@ -307,12 +320,19 @@ impl Diagnostics {
         for source in &other.sources {
             self.add_source(source);
         }
-        self.list.extend(other.list);
+        for diagnostic in other.list {
+            self.push(diagnostic);
+        }
     }
 
     /// All complaints, in the order of their places once [`Diagnostics::sort`] was called.
     pub fn iter(&self) -> impl Iterator<Item = &Diagnostic> {
         self.list.iter()
+    }
+
+    /// For every code of which complaints were dropped: the code, and how many.
+    pub fn dropped(&self) -> impl Iterator<Item = (&'static str, usize)> + '_ {
+        self.counts.iter().filter(|c| c.1 > Self::SHOWN_PER_CODE).map(|&(code, n)| (code, n - Self::SHOWN_PER_CODE))
     }
 
     /// Whether there is no complaint.
@@ -379,7 +399,7 @@ impl Diagnostics {
             group = self.show(group, place, AnnotationKind::Context, word);
         }
         if !diagnostic.detail.is_empty() {
-            group = group.element(Level::NOTE.no_name().message(plain(&diagnostic.detail)));
+            group = group.element(Level::NOTE.message(plain(&diagnostic.detail)));
         }
         if !diagnostic.help.is_empty() {
             group = group.element(Level::HELP.message(plain(&diagnostic.help)));

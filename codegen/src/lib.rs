@@ -5,6 +5,7 @@ pub mod description;
 pub mod diagnostic;
 pub mod emit;
 pub mod expr;
+pub mod model;
 pub mod pass;
 pub mod reference_input;
 pub mod schedule;

@@ -1,11 +1,18 @@
 //! The robot file as written, every value with its place.
 //!
-//! Three notations are read: URDF (`urdf`), and in TOML joint frames (`toml`) and the mass-centre notation of
-//! the chapter (`chapter`). Nothing is computed here: angles stay in the unit they are written in, axes keep their
+//! Three notations are read: URDF, and in TOML joint frames and the mass-centre notation of
+//! the chapter. Nothing is computed here: angles stay in the unit they are written in, axes keep their
 //! length. What can be judged value by value (a number that is none, an unknown key) is judged by the readers; what needs
 //! the whole robot (tree, inertias, angles) by `crate::model`.
 
-use crate::diagnostic::Place;
+mod chapter;
+pub mod messages;
+mod reader;
+mod table;
+mod toml;
+mod urdf;
+
+use crate::diagnostic::{Diagnostics, Place, Source};
 use straightline_core::spatial::Sym3;
 
 /// A value with its place in the file.
@@ -317,4 +324,33 @@ pub struct MassCentreLink {
     pub end: MassCentreEnd,
     /// Ranges.
     pub limits: JointLimits,
+}
+
+/// Reads a robot file; its notation is found from the text. Complaints go to `diagnostics`. After errors the description
+/// may hold placeholders, so that [`crate::model::build`] can find further complaints; `None` if nothing could be read.
+pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
+    diagnostics.add_source(source);
+    let text = source.text();
+    if let Some(at) = source.invalid_utf8() {
+        diagnostics.push(messages::not_utf8().at(&source.place(at..at)));
+        return None;
+    }
+    if text.len() > reader::LARGEST_FILE {
+        diagnostics.push(messages::file_too_large(text.len(), reader::LARGEST_FILE).at(&source.place(0..0)));
+        return None;
+    }
+    if text.trim().is_empty() {
+        diagnostics.push(messages::unknown_format().at(&source.place(0..0)));
+        return None;
+    }
+    let is_named = |extensions: &[&str]| {
+        let extension = source.path().rsplit('.').next().unwrap_or("").to_ascii_lowercase();
+        extensions.contains(&extension.as_str())
+    };
+    let is_xml = text.trim_start().starts_with('<') || is_named(&["urdf", "xml", "xacro"]);
+    if is_xml && !is_named(&["toml"]) || text.trim_start().starts_with('<') {
+        urdf::read(source, diagnostics)
+    } else {
+        toml::read(source, diagnostics)
+    }
 }

@@ -1,0 +1,517 @@
+//! Every text that a reader of robot files can say, one function per message.
+//!
+//! A message names the value, says what is wrong or what was assumed, and what to write instead. Its place is added with
+//! [`Diagnostic::at`]. The tests in `tests/messages` hold the exact text of each; [`CODES`] is the list that they cover.
+
+use crate::diagnostic::Diagnostic;
+
+/// The codes of all messages of this table.
+pub const CODES: &[&str] = &[
+    "not-utf8",
+    "file-too-large",
+    "unknown-format",
+    "more-complaints",
+    "xml-syntax",
+    "toml-syntax",
+    "too-complex",
+    "not-a-robot",
+    "xacro-left",
+    "missing-element",
+    "missing-attribute",
+    "repeated-element",
+    "misspelt-element",
+    "empty-name",
+    "not-a-number",
+    "not-finite",
+    "out-of-range",
+    "wrong-count",
+    "unknown-key",
+    "missing-key",
+    "wrong-type",
+    "unknown-word",
+    "written-twice",
+    "not-symmetric",
+    "not-supported-yet",
+    "floating-joint",
+    "friction-not-used",
+    "no-links",
+    "too-many-links",
+    "nothing-moves",
+    "duplicate-name",
+    "unknown-link",
+    "two-parents",
+    "two-roots",
+    "cycle",
+    "negative-mass",
+    "zero-axis",
+    "axis-length",
+    "limits-missing",
+    "limits-reversed",
+    "negative-limit",
+    "point-mass",
+    "inertia-without-mass",
+    "negative-moment",
+    "triangle-inequality",
+    "zero-mass",
+    "singular-joint",
+    "near-right-angle",
+    "floating-by-option",
+    "joint-order-unknown",
+    "joint-order-twice",
+    "joint-order-missing",
+    "bad-option",
+    "specificity",
+    "alpha-missing",
+    "alpha-on-revolute",
+    "e-next-on-last",
+];
+
+type D = Diagnostic;
+
+/// ` Did you mean …?`, if there is a candidate close to `word`.
+fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    closest(word, candidates).map(|c| format!("did you mean `{c}`?"))
+}
+
+/// The candidate with the least edit distance to `word`, if that is at most a third of its length.
+pub fn closest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    if word.chars().count() > 64 {
+        return None;
+    }
+    let best = candidates
+        .into_iter()
+        .filter(|c| c.chars().count() <= 64)
+        .take(1000)
+        .map(|c| (edit_distance(&word.to_lowercase(), &c.to_lowercase()), c))
+        .min_by_key(|&(d, _)| d)?;
+    (best.0 <= (best.1.chars().count() / 3).max(1)).then_some(best.1)
+}
+
+/// Levenshtein's distance.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, &y) in b.iter().enumerate() {
+            let next = (diagonal + usize::from(x != y)).min(row[j] + 1).min(row[j + 1] + 1);
+            diagonal = std::mem::replace(&mut row[j + 1], next);
+        }
+    }
+    row[b.len()]
+}
+
+/// A text of the file, cut where it is long.
+fn cut(text: &str) -> String {
+    if text.chars().count() <= 60 {
+        text.to_string()
+    } else {
+        text.chars().take(57).chain("...".chars()).collect()
+    }
+}
+
+/// A number with at most six digits.
+fn six_digits(x: f64) -> String {
+    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+    format!("{rounded:?}")
+}
+
+/// `a, b and c`, each in backquotes.
+fn list(words: &[&str]) -> String {
+    let quoted: Vec<String> = words.iter().take(12).map(|w| format!("`{}`", cut(w))).collect();
+    let more = words.len().saturating_sub(12);
+    match (quoted.split_last(), more) {
+        (None, _) => String::new(),
+        (Some(_), 1..) => format!("{} and {more} more", quoted.join(", ")),
+        (Some((last, [])), 0) => last.clone(),
+        (Some((last, rest)), 0) => format!("{} and {last}", rest.join(", ")),
+    }
+}
+
+// --- the file ---
+
+/// Bytes that are not UTF-8.
+pub fn not_utf8() -> D {
+    D::error("not-utf8", "the file is not UTF-8 text").help("save the file as UTF-8; is it a robot file at all?")
+}
+
+/// A file larger than the readers take.
+pub fn file_too_large(bytes: usize, limit: usize) -> D {
+    D::error("file-too-large", format!("the file is too large for a robot file: {bytes} bytes"))
+        .detail(format!("at most {limit} bytes are read"))
+}
+
+/// A text that is neither XML nor TOML of a robot.
+pub fn unknown_format() -> D {
+    D::error("unknown-format", "this is no robot file")
+        .detail("a robot file is a URDF (XML, `<robot ...>`), or TOML with `[[link]]` tables")
+}
+
+/// A run of complaints was cut.
+pub fn more_complaints(code: &str, more: usize) -> D {
+    D::note("more-complaints", format!("{more} more complaints `{code}` are not shown"))
+}
+
+/// XML that is not well-formed.
+pub fn xml_syntax(what: &str) -> D {
+    D::error("xml-syntax", format!("not well-formed XML: {}", cut(what)))
+}
+
+/// TOML that is none.
+pub fn toml_syntax(what: &str) -> D {
+    D::error("toml-syntax", format!("not valid TOML: {what}"))
+}
+
+/// More of something than any robot file has.
+pub fn too_complex(what: &str, limit: usize) -> D {
+    D::error("too-complex", format!("{what}: no robot file needs more than {limit}"))
+}
+
+/// XML, but not of a robot.
+pub fn not_a_robot(root: &str) -> D {
+    let d = D::error("not-a-robot", format!("the root element is `<{}>`, not `<robot>`", cut(root)));
+    match root {
+        "sdf" => d.help("SDF is not read; export the robot as URDF"),
+        "mujoco" => d.help("MJCF is not read; export the robot as URDF"),
+        _ => d.help("a URDF begins with `<robot name=\"...\">`"),
+    }
+}
+
+/// Xacro that was not expanded.
+pub fn xacro_left(what: &str, more: usize) -> D {
+    let d = D::error("xacro-left", format!("xacro is not expanded: `{}`", cut(what)));
+    let d = if more > 0 { d.detail(format!("and {more} more of the kind")) } else { d };
+    d.help("run `xacro FILE.xacro > FILE.urdf` first and read its output")
+}
+
+/// An element that must be there.
+pub fn missing_element(owner: &str, element: &str, example: &str) -> D {
+    D::error("missing-element", format!("{owner} has no `<{element}>`")).help(format!("write `{example}`"))
+}
+
+/// An attribute that must be there.
+pub fn missing_attribute(owner: &str, attribute: &str, example: &str) -> D {
+    D::error("missing-attribute", format!("{owner} has no attribute `{attribute}`")).help(format!("write `{example}`"))
+}
+
+/// An element that may be there once.
+pub fn repeated_element(owner: &str, element: &str) -> D {
+    D::error("repeated-element", format!("{owner} has a second `<{element}>`")).help("keep one of them")
+}
+
+/// An element that looks like a known one.
+pub fn misspelt_element(owner: &str, element: &str, known: &str) -> D {
+    D::warning("misspelt-element", format!("unknown element `<{}>` in {owner}, ignored", cut(element)))
+        .help(format!("did you mean `<{known}>`?"))
+}
+
+/// A name without characters.
+pub fn empty_name(what: &str) -> D {
+    D::error("empty-name", format!("the name of a {what} is empty")).help("give it a name")
+}
+
+// --- numbers, keys, words ---
+
+/// A number that is none.
+pub fn not_a_number(what: &str, text: &str) -> D {
+    let d = D::error("not-a-number", format!("{what}: `{}` is not a number", cut(text)));
+    if text.contains(',') {
+        d.help("numbers are separated by spaces and have a decimal point, as in `0.5 0 -1e-3`")
+    } else {
+        d.help("write a decimal number, as in `0.5` or `-1e-3`")
+    }
+}
+
+/// NaN, or a number beyond f64.
+pub fn not_finite(what: &str, text: &str) -> D {
+    D::error("not-finite", format!("{what}: `{}` is not a finite number", cut(text)))
+}
+
+/// A finite number beyond anything a robot has.
+pub fn out_of_range(what: &str, value: f64, limit: f64) -> D {
+    D::error("out-of-range", format!("{what}: {value:e} is beyond any robot"))
+        .detail(format!("magnitudes up to {limit:e} are computed with; all units are SI (m, kg, s, rad)"))
+}
+
+/// A triple that is none.
+pub fn wrong_count(what: &str, expected: &str, found: usize) -> D {
+    D::error("wrong-count", format!("{what}: {expected} expected, {found} found"))
+}
+
+/// A key that the schema does not have.
+pub fn unknown_key(owner: &str, key: &str, known: &[&str]) -> D {
+    let d = D::error("unknown-key", format!("{owner} has no key `{}`", cut(key)));
+    match did_you_mean(key, known.iter().copied()) {
+        Some(hint) => d.help(hint),
+        None => d.help(format!("known keys: {}", known.join(", "))),
+    }
+}
+
+/// A key that must be there.
+pub fn missing_key(owner: &str, key: &str, example: &str) -> D {
+    D::error("missing-key", format!("{owner} has no `{key}`")).help(format!("write `{example}`"))
+}
+
+/// A value of another type.
+pub fn wrong_type(what: &str, expected: &str, found: &str) -> D {
+    D::error("wrong-type", format!("{what}: {expected} expected, {found} found"))
+}
+
+/// A word that is none of those that are known.
+pub fn unknown_word(what: &str, word: &str, known: &[&str]) -> D {
+    let d = D::error("unknown-word", format!("{what}: `{}` is unknown", cut(word)));
+    let known_words = format!("known: {}", known.join(", "));
+    match did_you_mean(word, known.iter().copied()) {
+        Some(hint) => d.detail(known_words).help(hint),
+        None => d.help(known_words),
+    }
+}
+
+/// Two keys for the same thing.
+pub fn written_twice(owner: &str, a: &str, b: &str) -> D {
+    D::error("written-twice", format!("{owner} has both `{a}` and `{b}`")).help("keep one of them")
+}
+
+/// An inertia matrix that is not symmetric.
+pub fn not_symmetric(owner: &str, row: usize, column: usize, a: f64, b: f64) -> D {
+    D::error("not-symmetric", format!("the inertia matrix of {owner} is not symmetric"))
+        .detail(format!("entry ({row}, {column}) is {a:?}, entry ({column}, {row}) is {b:?}"))
+}
+
+/// Something that changes the dynamics and is not part of the equations.
+pub fn not_supported_yet(owner: &str, what: &str, why: &str, help: &str) -> D {
+    D::error("not-supported-yet", format!("{owner}: `{what}` is not supported yet")).detail(why).help(help)
+}
+
+/// A floating joint.
+pub fn floating_joint(joint: &str) -> D {
+    D::error("floating-joint", format!("joint `{joint}` is floating: only the root link can move freely"))
+        .help("remove the joint and its parent, and ask for a floating base: `--floating-base`, `floating_base` in the macro, `.floating_base(true)` in a build script, or `base = \"floating\"` in TOML")
+}
+
+/// Damping or friction of a joint.
+pub fn friction_not_used(joint: &str, what: &str, value: f64) -> D {
+    D::warning(
+        "friction-not-used",
+        format!("{what} {value:?} of joint `{joint}` is read, but not part of the dynamics yet"),
+    )
+    .detail("inverse dynamics gives the torque without it")
+}
+
+// --- the tree ---
+
+/// A robot without links.
+pub fn no_links(robot: &str) -> D {
+    D::error("no-links", format!("robot `{}` has no links", cut(robot)))
+}
+
+/// A robot with more links than can be compiled.
+pub fn too_many_links(links: usize, limit: usize) -> D {
+    D::error("too-many-links", format!("the robot has {links} links; at most {limit} are compiled"))
+}
+
+/// A robot that does not move.
+pub fn nothing_moves(robot: &str) -> D {
+    D::error("nothing-moves", format!("robot `{}` has no joint that moves, and its base is fixed", cut(robot))).help(
+        "ask for a floating base if the robot is one free body: `--floating-base`, or `base = \"floating\"` in TOML",
+    )
+}
+
+/// A name that is in use.
+pub fn duplicate_name(what: &str, name: &str) -> D {
+    D::error("duplicate-name", format!("a second {what} is named `{}`", cut(name))).help("give each its own name")
+}
+
+/// A link that is not there.
+pub fn unknown_link<'a>(owner: &str, link: &str, links: impl IntoIterator<Item = &'a str>) -> D {
+    let d = D::error("unknown-link", format!("{owner}: there is no link `{}`", cut(link)));
+    match did_you_mean(link, links) {
+        Some(hint) => d.help(hint),
+        None => d,
+    }
+}
+
+/// A link that is the child of two joints.
+pub fn two_parents(link: &str, first: &str, second: &str) -> D {
+    D::error("two-parents", format!("link `{link}` is the child of joint `{second}` and of joint `{first}`"))
+        .detail("the links of a robot form a tree: closed chains are not supported yet")
+}
+
+/// Several links without a parent.
+pub fn two_roots(roots: &[&str]) -> D {
+    D::error("two-roots", format!("the robot has {} root links: {}", roots.len(), list(roots)))
+        .detail("exactly one link is the child of no joint")
+        .help("connect the others with joints (`fixed` if they do not move), or remove them")
+}
+
+/// Links that carry each other.
+pub fn cycle(joints: &[&str]) -> D {
+    D::error("cycle", format!("joints form a cycle: {}", list(joints)))
+        .detail("the links of a robot form a tree with one root")
+}
+
+// --- masses, inertias, axes, limits, angles ---
+
+/// A mass below zero.
+pub fn negative_mass(link: &str, mass: f64) -> D {
+    D::error("negative-mass", format!("the mass of link `{link}` is negative: {mass:?} kg"))
+}
+
+/// An axis without direction.
+pub fn zero_axis(what: &str) -> D {
+    D::error("zero-axis", format!("{what} is zero: it has no direction"))
+        .help("write a vector along the axis, as in `0 0 1`")
+}
+
+/// An axis far from unit length.
+pub fn axis_length(what: &str, length: f64) -> D {
+    D::warning("axis-length", format!("{what} has length {length:.6}, not 1"))
+        .detail("taken as a direction: it is normalised, coordinate and limits are not scaled")
+}
+
+/// A revolute or prismatic joint without limits.
+pub fn limits_missing(joint: &str, kind: &str, help: &str) -> D {
+    D::warning("limits-missing", format!("{kind} joint `{joint}` has no limits"))
+        .detail("taken as unlimited")
+        .help(help)
+}
+
+/// Lower limit above the upper one.
+pub fn limits_reversed(joint: &str, lower: f64, upper: f64) -> D {
+    D::warning("limits-reversed", format!("the lower limit of joint `{joint}` is above the upper one"))
+        .detail(format!("{lower:?} > {upper:?}; both are kept as they are"))
+}
+
+/// A greatest speed or torque below zero.
+pub fn negative_limit(joint: &str, what: &str, value: f64) -> D {
+    D::warning("negative-limit", format!("the {what} limit of joint `{joint}` is negative: {value:?}"))
+        .detail("its magnitude is taken")
+}
+
+/// Mass without inertia.
+pub fn point_mass(link: &str) -> D {
+    D::warning("point-mass", format!("link `{link}` has a mass and no inertia"))
+        .detail("taken as a point mass in its mass centre")
+}
+
+/// Inertia without mass.
+pub fn inertia_without_mass(link: &str) -> D {
+    D::warning("inertia-without-mass", format!("link `{link}` has an inertia and no mass"))
+        .detail("taken as written: mass 0; no body is like that, some published models are")
+}
+
+/// A tensor with a negative principal moment.
+pub fn negative_moment(link: &str, moments: [f64; 3]) -> D {
+    let [a, b, c] = moments.map(six_digits);
+    D::warning("negative-moment", format!("the inertia of link `{link}` cannot belong to a rigid body"))
+        .detail(format!("its principal moments are {a}, {b}, {c}: one is negative; taken as written"))
+        .help("the mass matrix may become indefinite; check signs and order of the six numbers")
+}
+
+/// A tensor that violates the triangle inequality.
+pub fn triangle_inequality(link: &str, moments: [f64; 3]) -> D {
+    let [a, b, c] = moments.map(six_digits);
+    D::warning("triangle-inequality", format!("the inertia of link `{link}` cannot belong to a rigid body"))
+        .detail(format!("{c} > {a} + {b}: a principal moment exceeds the sum of the other two; taken as written"))
+        .help("moments are taken about the mass centre; is this one about the joint, or does it hold a rotor's?")
+}
+
+/// A moving link whose mass is written as zero.
+pub fn zero_mass(link: &str) -> D {
+    D::warning("zero-mass", format!("the mass of link `{link}` is zero, and it moves")).detail("taken as written")
+}
+
+/// A joint that moves nothing.
+pub fn singular_joint(joint: &str, what: &str) -> D {
+    D::warning("singular-joint", format!("joint `{joint}` moves no {what}"))
+        .detail("the mass matrix is singular: forward dynamics divides by zero; inverse dynamics is not affected")
+        .help("give the links that it moves their mass and inertia, or make the joint fixed")
+}
+
+/// An angle that may be meant as a right angle.
+pub fn near_right_angle(what: &str, text: &str, name: &str, deviation: f64) -> D {
+    D::warning("near-right-angle", format!("{what}: {text} is {name} only to {:.1e} rad", deviation.abs()))
+        .detail("taken literally: the frames are not at right angles, and the equations keep the small terms")
+        .help(format!(
+            "for {name} exactly: `--angle-tolerance {}`, `.angle_tolerance({})` in a build script, or quarter turns in TOML",
+            tolerance_above(deviation),
+            tolerance_above(deviation)
+        ))
+}
+
+/// The least power of ten above |x|.
+fn tolerance_above(x: f64) -> String {
+    let mut exponent = -16;
+    while exponent < 0 && x.abs() >= 10f64.powi(exponent) {
+        exponent += 1;
+    }
+    format!("1e{exponent}")
+}
+
+/// A floating base by option, a fixed one by file.
+pub fn floating_by_option() -> D {
+    D::warning("floating-by-option", "the file says that the base is fixed, an option that it floats")
+        .detail("the option was taken")
+}
+
+// --- options ---
+
+/// A joint order with a name that is none.
+pub fn joint_order_unknown<'a>(name: &str, joints: impl IntoIterator<Item = &'a str>) -> D {
+    let d = D::error("joint-order-unknown", format!("joint order: no moving joint is named `{}`", cut(name)));
+    match did_you_mean(name, joints) {
+        Some(hint) => d.help(hint),
+        None => d,
+    }
+}
+
+/// A joint order with a name that stands twice.
+pub fn joint_order_twice(name: &str) -> D {
+    D::error("joint-order-twice", format!("joint order: `{}` stands twice", cut(name)))
+}
+
+/// A joint order with joints left out.
+pub fn joint_order_missing(names: &[&str]) -> D {
+    D::error("joint-order-missing", format!("joint order: {} left out", list(names)))
+        .help("name every joint that moves once")
+}
+
+/// An option with a value that cannot be.
+pub fn bad_option(option: &str, value: &str, expected: &str) -> D {
+    D::error("bad-option", format!("{option}: `{}` is not {expected}", cut(value)))
+}
+
+// --- the chapter's notation ---
+
+/// A vector that is parallel with the joint axis and cannot define the zero of the coordinate.
+pub fn specificity(owner: &str, vector: &str, axis: &str, star: &str, has_star: bool) -> D {
+    let which = if has_star { star } else { vector };
+    let d = D::error("specificity", format!("{owner}: `{which}` is parallel with `{axis}`"))
+        .detail("it defines where the coordinate is zero, (20.101), and must have a part across the axis");
+    if has_star {
+        d.help(format!("choose `{star}` across the axis, best perpendicular to it"))
+    } else {
+        d.help(format!("this is a specificity: add `{star}`, a unit vector perpendicular to `{axis}`"))
+    }
+}
+
+/// A linear joint without its constant angle.
+pub fn alpha_missing(joint: &str) -> D {
+    D::warning("alpha-missing", format!("linear joint `{joint}` has no `alpha`"))
+        .detail("taken as 0: the link stands as in the extended position")
+        .help("write `alpha = 0.0`, or the angle by which the link is turned about the axis")
+}
+
+/// A revolute joint with a constant angle.
+pub fn alpha_on_revolute(joint: &str) -> D {
+    D::error("alpha-on-revolute", format!("revolute joint `{joint}` has an `alpha`"))
+        .detail("alpha is the constant angle of a linear joint; a revolute joint has q there")
+        .help("remove it, or write `type = \"linear\"`")
+}
+
+/// An axis beyond the last link.
+pub fn e_next_on_last(link: &str, key: &str) -> D {
+    D::warning("e-next-on-last", format!("`{key}` of the last link `{link}` is ignored"))
+        .detail("there is no further joint")
+}

@@ -1,0 +1,101 @@
+//! What the readers share: places, complaints, numbers.
+
+use super::{messages, Ignored, Value};
+use crate::diagnostic::{Diagnostic, Diagnostics, Place, Source};
+use std::collections::HashMap;
+use std::ops::Range;
+
+/// The largest file that is read \[bytes\].
+pub(super) const LARGEST_FILE: usize = 64 << 20;
+/// The greatest magnitude that is computed with: products of a few such numbers stay inside f64's range.
+const GREATEST: f64 = 1e60;
+
+/// A file that is being read.
+pub(super) struct Reader<'a> {
+    pub source: &'a Source,
+    pub diagnostics: &'a mut Diagnostics,
+    ignored: Vec<Ignored>,
+    ignored_index: HashMap<String, usize>,
+}
+
+/// Which numbers are taken.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Range64 {
+    /// What equations are made of.
+    Finite,
+    /// What a coordinate is compared with: infinite, too.
+    Limit,
+}
+
+impl<'a> Reader<'a> {
+    pub fn new(source: &'a Source, diagnostics: &'a mut Diagnostics) -> Reader<'a> {
+        Reader { source, diagnostics, ignored: Vec::new(), ignored_index: HashMap::new() }
+    }
+
+    pub fn place(&self, span: &Range<usize>) -> Place {
+        self.source.place(span.clone())
+    }
+
+    pub fn complain(&mut self, span: &Range<usize>, diagnostic: Diagnostic) {
+        let place = self.place(span);
+        self.diagnostics.push(diagnostic.at(&place));
+    }
+
+    pub fn value<T>(&self, value: T, span: &Range<usize>) -> Value<T> {
+        Value::new(value, self.place(span))
+    }
+
+    /// Remembers that an element was skipped.
+    pub fn ignore(&mut self, what: &str, span: &Range<usize>) {
+        if let Some(&index) = self.ignored_index.get(what) {
+            self.ignored[index].count += 1;
+        } else if self.ignored.len() < 1000 {
+            self.ignored_index.insert(what.to_string(), self.ignored.len());
+            let place = self.place(span);
+            self.ignored.push(Ignored { what: what.to_string(), count: 1, place });
+        }
+    }
+
+    pub fn into_ignored(self) -> Vec<Ignored> {
+        self.ignored
+    }
+
+    /// The number that `text` is, or a complaint.
+    pub fn number(&mut self, what: &str, text: &str, span: &Range<usize>, range: Range64) -> Option<f64> {
+        let is_word = text.trim_start_matches(['+', '-']).starts_with(|c: char| c.is_ascii_alphabetic());
+        let parsed = text.parse::<f64>();
+        if text.contains("${") || text.contains("$(") {
+            self.complain(span, messages::xacro_left(text, 0));
+            return None;
+        }
+        match parsed {
+            Ok(x) if x.is_infinite() && is_word && range == Range64::Limit => Some(x),
+            Ok(x) if !x.is_finite() => {
+                self.complain(span, messages::not_finite(what, text));
+                None
+            }
+            Ok(x) if x.abs() > GREATEST && range == Range64::Finite => {
+                self.complain(span, messages::out_of_range(what, x, GREATEST));
+                None
+            }
+            Ok(x) => Some(x),
+            Err(_) => {
+                self.complain(span, messages::not_a_number(what, text));
+                None
+            }
+        }
+    }
+
+    /// The name that `text` is, or a complaint.
+    pub fn name(&mut self, what: &str, text: &str, span: &Range<usize>) -> Option<Value<String>> {
+        if text.trim().is_empty() {
+            self.complain(span, messages::empty_name(what));
+            None
+        } else if text.contains("${") {
+            self.complain(span, messages::xacro_left(text, 0));
+            None
+        } else {
+            Some(self.value(text.to_string(), span))
+        }
+    }
+}

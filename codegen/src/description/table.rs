@@ -1,0 +1,359 @@
+//! Walking a TOML document with places, so that one run finds all complaints.
+
+use super::reader::{Range64, Reader};
+use super::{messages, Angle, AngleUnit, JointLimits, Pose, Rotation, Value};
+use crate::diagnostic::{Diagnostics, Source};
+use std::ops::Range;
+use straightline_core::spatial::Sym3;
+use toml::de::{DeTable, DeValue};
+use toml::Spanned;
+
+type Span = Range<usize>;
+
+/// Parts of a dotted key: the parser's tables nest as deep.
+const MOST_KEY_PARTS: usize = 64;
+
+/// A table and how complaints name it.
+pub(super) struct Table<'a, 'i> {
+    pub owner: String,
+    pub table: &'a DeTable<'i>,
+    pub span: Span,
+}
+
+/// The document, or complaints about its syntax.
+pub(super) fn parse<'i>(source: &'i Source, diagnostics: &mut Diagnostics) -> Option<Spanned<DeTable<'i>>> {
+    let mut reader = Reader::new(source, diagnostics);
+    if let Some(span) = overlong_key(source.text()) {
+        reader.complain(&span, messages::too_complex("parts of a dotted key", MOST_KEY_PARTS));
+        return None;
+    }
+    let (document, errors) = DeTable::parse_recoverable(source.text());
+    for error in &errors {
+        let span = error.span().unwrap_or(0..0);
+        let said = error.message().lines().next().unwrap_or("");
+        reader.complain(&span, messages::toml_syntax(said));
+    }
+    errors.is_empty().then_some(document)
+}
+
+/// A line whose key may have more than [`MOST_KEY_PARTS`] parts.
+fn overlong_key(text: &str) -> Option<Span> {
+    let mut start = 0;
+    for line in text.split_inclusive('\n') {
+        let mut parts = 0;
+        for byte in line.bytes() {
+            match byte {
+                b'.' => parts += 1,
+                b'=' | b',' | b'{' | b'#' | b'"' | b'\'' => parts = 0,
+                _ => {}
+            }
+            if parts > MOST_KEY_PARTS {
+                return Some(start..start + 1);
+            }
+        }
+        start += line.len();
+    }
+    None
+}
+
+impl<'a, 'i> Table<'a, 'i> {
+    /// Value and span of a key.
+    pub fn get(&self, key: &str) -> Option<(&'a DeValue<'i>, Span)> {
+        self.table.get(key).map(|value| (value.get_ref(), value.span()))
+    }
+
+    pub fn has(&self, key: &str) -> bool {
+        self.table.contains_key(key)
+    }
+
+    /// `com of link x`.
+    fn what(&self, key: &str) -> String {
+        format!("{key} of {}", self.owner)
+    }
+}
+
+/// How a value's type is called.
+fn type_name(value: &DeValue) -> String {
+    match value {
+        DeValue::Array(array) => format!("an array of {}", array.len()),
+        DeValue::String(_) => "a string".to_string(),
+        DeValue::Integer(_) | DeValue::Float(_) => "a number".to_string(),
+        DeValue::Boolean(_) => "a boolean".to_string(),
+        DeValue::Datetime(_) => "a date".to_string(),
+        DeValue::Table(_) => "a table".to_string(),
+    }
+}
+
+impl Reader<'_> {
+    /// Complains of every key that is not known.
+    pub fn check_keys(&mut self, table: &Table, known: &[&str]) {
+        for key in table.table.keys() {
+            if !known.contains(&key.get_ref().as_ref()) {
+                self.complain(&key.span(), messages::unknown_key(&table.owner, key.get_ref(), known));
+            }
+        }
+    }
+
+    /// Complains if a key is missing.
+    pub fn require(&mut self, table: &Table, key: &str, example: &str) {
+        if !table.has(key) {
+            self.complain(&table.span, messages::missing_key(&table.owner, key, example));
+        }
+    }
+
+    fn wrong_type(&mut self, what: &str, expected: &str, value: &DeValue, span: &Span) {
+        self.complain(span, messages::wrong_type(what, expected, &type_name(value)));
+    }
+
+    fn real(&mut self, what: &str, value: &DeValue, span: &Span, range: Range64) -> Option<f64> {
+        match value {
+            DeValue::Float(float) => self.number(what, float.as_str(), span, range),
+            DeValue::Integer(integer) if integer.radix() == 10 => self.number(what, integer.as_str(), span, range),
+            DeValue::Integer(integer) => match i64::from_str_radix(integer.as_str(), integer.radix()) {
+                Ok(integer) => Some(integer as f64),
+                Err(_) => {
+                    self.complain(span, messages::not_a_number(what, integer.as_str()));
+                    None
+                }
+            },
+            _ => {
+                self.wrong_type(what, "a number", value, span);
+                None
+            }
+        }
+    }
+
+    pub fn real_at(&mut self, table: &Table, key: &str, range: Range64) -> Option<Value<f64>> {
+        let (value, span) = table.get(key)?;
+        let value = self.real(&table.what(key), value, &span, range)?;
+        Some(self.value(value, &span))
+    }
+
+    pub fn string_at(&mut self, table: &Table, key: &str) -> Option<Value<String>> {
+        let (value, span) = table.get(key)?;
+        match value {
+            DeValue::String(text) => Some(self.value(text.to_string(), &span)),
+            _ => {
+                self.wrong_type(&table.what(key), "a string", value, &span);
+                None
+            }
+        }
+    }
+
+    pub fn name_at(&mut self, table: &Table, key: &str, what: &str) -> Option<Value<String>> {
+        let text = self.string_at(table, key)?;
+        self.name(what, &text.value, &text.place.span)
+    }
+
+    /// One of a few words.
+    pub fn word_at<T: Copy>(&mut self, table: &Table, key: &str, words: &[(&str, T)]) -> Option<Value<T>> {
+        let text = self.string_at(table, key)?;
+        match words.iter().find(|w| w.0 == text.value) {
+            Some(&(_, value)) => Some(Value::new(value, text.place)),
+            None => {
+                let known: Vec<&str> = words.iter().map(|w| w.0).collect();
+                let complaint = messages::unknown_word(&table.what(key), &text.value, &known);
+                self.diagnostics.push(complaint.at(&text.place));
+                None
+            }
+        }
+    }
+
+    fn triple(&mut self, what: &str, value: &DeValue, span: &Span) -> Option<[(f64, Span); 3]> {
+        let DeValue::Array(array) = value else {
+            self.wrong_type(what, "three numbers in an array", value, span);
+            return None;
+        };
+        if array.len() != 3 {
+            self.complain(span, messages::wrong_count(what, "three numbers", array.len()));
+            return None;
+        }
+        let numbers: Vec<_> = array
+            .iter()
+            .map(|item| self.real(what, item.get_ref(), &item.span(), Range64::Finite).map(|x| (x, item.span())))
+            .collect();
+        let mut numbers = numbers.into_iter().flatten();
+        Some([numbers.next()?, numbers.next()?, numbers.next()?])
+    }
+
+    pub fn vector_at(&mut self, table: &Table, key: &str) -> Option<Value<[f64; 3]>> {
+        let (value, span) = table.get(key)?;
+        let [x, y, z] = self.triple(&table.what(key), value, &span)?;
+        Some(self.value([x.0, y.0, z.0], &span))
+    }
+
+    /// A required vector; a placeholder after a complaint.
+    pub fn required_vector(&mut self, table: &Table, key: &str, example: &str) -> Value<[f64; 3]> {
+        self.require(table, key, example);
+        self.vector_at(table, key).unwrap_or_else(|| self.value([0.0, 0.0, 1.0], &table.span))
+    }
+
+    /// An inertia tensor: a table `{ xx, yy, zz, xy, xz, yz }`, three principal moments, or a 3×3 matrix.
+    pub fn tensor_at(&mut self, table: &Table, key: &str) -> Option<Value<Sym3<f64>>> {
+        const FORMS: &str = "`{ xx = …, yy = …, zz = …, xy = 0, xz = 0, yz = 0 }`, three moments or a 3×3 matrix";
+        let (value, span) = table.get(key)?;
+        let what = table.what(key);
+        let tensor = match value {
+            DeValue::Table(entries) => {
+                let entries = Table { owner: what, table: entries, span: span.clone() };
+                self.check_keys(&entries, &["xx", "yy", "zz", "xy", "xz", "yz"]);
+                for diagonal in ["xx", "yy", "zz"] {
+                    self.require(&entries, diagonal, "{ xx = 0.1, yy = 0.1, zz = 0.1 }");
+                }
+                let mut entry = |key: &str, default| match entries.has(key) {
+                    true => self.real_at(&entries, key, Range64::Finite).map(|v| v.value),
+                    false => default,
+                };
+                let (xx, yy, zz) = (entry("xx", None), entry("yy", None), entry("zz", None));
+                let (xy, xz, yz) = (entry("xy", Some(0.0)), entry("xz", Some(0.0)), entry("yz", Some(0.0)));
+                Sym3 { xx: xx?, yy: yy?, zz: zz?, xy: xy?, xz: xz?, yz: yz? }
+            }
+            DeValue::Array(rows) if rows.iter().any(|row| row.get_ref().is_array()) => {
+                if rows.len() != 3 {
+                    self.complain(&span, messages::wrong_count(&what, "three rows", rows.len()));
+                    return None;
+                }
+                let rows: Vec<_> = rows.iter().map(|row| self.triple(&what, row.get_ref(), &row.span())).collect();
+                let m: Vec<[f64; 3]> = rows.into_iter().flatten().map(|row| row.map(|entry| entry.0)).collect();
+                if m.len() != 3 {
+                    return None;
+                }
+                for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+                    if (m[i][j] - m[j][i]).abs() > 1e-9 * (m[i][j].abs() + m[j][i].abs()) {
+                        self.complain(&span, messages::not_symmetric(&table.owner, i + 1, j + 1, m[i][j], m[j][i]));
+                        return None;
+                    }
+                }
+                Sym3 { xx: m[0][0], xy: m[0][1], xz: m[0][2], yy: m[1][1], yz: m[1][2], zz: m[2][2] }
+            }
+            DeValue::Array(_) => {
+                let [xx, yy, zz] = self.triple(&what, value, &span)?.map(|entry| entry.0);
+                Sym3 { xx, yy, zz, xy: 0.0, xz: 0.0, yz: 0.0 }
+            }
+            _ => {
+                self.wrong_type(&what, FORMS, value, &span);
+                return None;
+            }
+        };
+        Some(self.value(tensor, &span))
+    }
+
+    /// The units in which an angle key may be written.
+    const UNITS: [(&'static str, AngleUnit); 5] = [
+        ("", AngleUnit::Radian),
+        ("_rad", AngleUnit::Radian),
+        ("_deg", AngleUnit::Degree),
+        ("_quarter_turns", AngleUnit::QuarterTurn),
+        ("_turns", AngleUnit::Turn),
+    ];
+
+    /// The key of an angle or a triple of angles, with its unit; a second spelling is complained of.
+    fn angle_key(&mut self, table: &Table, stem: &str) -> Option<(String, AngleUnit)> {
+        let mut found: Option<(String, AngleUnit)> = None;
+        for (suffix, unit) in Self::UNITS {
+            let key = format!("{stem}{suffix}");
+            if let Some((_, span)) = table.get(&key) {
+                match &found {
+                    Some((first, _)) => self.complain(&span, messages::written_twice(&table.owner, first, &key)),
+                    None => found = Some((key, unit)),
+                }
+            }
+        }
+        found
+    }
+
+    fn angle(&self, value: f64, unit: AngleUnit, span: &Span) -> Angle {
+        let text = self.source.text().get(span.clone()).unwrap_or("").to_string();
+        Angle { value, unit, text, place: self.place(span) }
+    }
+
+    /// An angle in any unit: `alpha`, `alpha_deg`, …
+    pub fn angle_at(&mut self, table: &Table, stem: &str) -> Option<Angle> {
+        let (key, unit) = self.angle_key(table, stem)?;
+        let value = self.real_at(table, &key, Range64::Finite)?;
+        Some(self.angle(value.value, unit, &value.place.span))
+    }
+
+    /// Roll, pitch and yaw in any unit: `rpy_deg`, …
+    pub fn rotation_at(&mut self, table: &Table, stem: &str) -> Rotation {
+        let none = Rotation::identity(self.place(&table.span));
+        let Some((key, unit)) = self.angle_key(table, stem) else { return none };
+        let Some((value, span)) = table.get(&key) else { return none };
+        match self.triple(&table.what(&key), value, &span) {
+            Some(angles) => Rotation { rpy: angles.map(|(value, span)| self.angle(value, unit, &span)) },
+            None => none,
+        }
+    }
+
+    /// Position `xyz` and roll, pitch and yaw.
+    pub fn pose_at(&mut self, table: &Table) -> Pose {
+        let xyz = self.vector_at(table, "xyz").unwrap_or_else(|| self.value([0.0; 3], &table.span));
+        Pose { xyz, rotation: self.rotation_at(table, "rpy") }
+    }
+
+    /// `[lower, upper]`, or `{ lower, upper, velocity, effort }`.
+    pub fn limits_at(&mut self, table: &Table, key: &str) -> JointLimits {
+        let Some((value, span)) = table.get(key) else { return JointLimits::default() };
+        let what = table.what(key);
+        match value {
+            DeValue::Array(pair) => {
+                if pair.len() != 2 {
+                    self.complain(&span, messages::wrong_count(&what, "two numbers", pair.len()));
+                    return JointLimits::default();
+                }
+                let mut read = |i: usize| {
+                    let item: &Spanned<DeValue> = &pair[i];
+                    let x = self.real(&what, item.get_ref(), &item.span(), Range64::Limit)?;
+                    Some(self.value(x, &item.span()))
+                };
+                JointLimits { lower: read(0), upper: read(1), ..JointLimits::default() }
+            }
+            DeValue::Table(entries) => {
+                let entries = Table { owner: what, table: entries, span };
+                self.check_keys(&entries, &["lower", "upper", "velocity", "effort"]);
+                let mut read = |key: &str| self.real_at(&entries, key, Range64::Limit);
+                JointLimits {
+                    lower: read("lower"),
+                    upper: read("upper"),
+                    velocity: read("velocity"),
+                    effort: read("effort"),
+                }
+            }
+            _ => {
+                self.wrong_type(&what, "`{ lower = …, upper = …, velocity = …, effort = … }`", value, &span);
+                JointLimits::default()
+            }
+        }
+    }
+
+    /// The table of that key.
+    pub fn table_at<'a, 'i>(&mut self, table: &Table<'a, 'i>, key: &str, owner: &str) -> Option<Table<'a, 'i>> {
+        let (value, span) = table.get(key)?;
+        match value {
+            DeValue::Table(inner) => Some(Table { owner: owner.to_string(), table: inner, span }),
+            _ => {
+                self.wrong_type(owner, "a table", value, &span);
+                None
+            }
+        }
+    }
+
+    /// The tables of an array `[[key]]`.
+    pub fn tables_at<'a, 'i>(&mut self, table: &Table<'a, 'i>, key: &str) -> Vec<Table<'a, 'i>> {
+        let Some((value, span)) = table.get(key) else { return Vec::new() };
+        let DeValue::Array(array) = value else {
+            self.wrong_type(key, &format!("`[[{key}]]` tables"), value, &span);
+            return Vec::new();
+        };
+        let mut tables = Vec::new();
+        for (i, item) in array.iter().enumerate() {
+            match item.get_ref() {
+                DeValue::Table(inner) => {
+                    tables.push(Table { owner: format!("{key} {}", i + 1), table: inner, span: item.span() });
+                }
+                other => self.wrong_type(&format!("{key} {}", i + 1), "a table", other, &item.span()),
+            }
+        }
+        tables
+    }
+}

@@ -1,0 +1,195 @@
+//! TOML with joint frames; the schema is in `SCHEMA.md`.
+
+use super::reader::{Range64, Reader};
+use super::table::{self, Table};
+use super::{
+    chapter, messages, BaseKind, Description, Format, Inertial, Joint, JointDrive, JointFrameNotation, JointKind, Link,
+    NamedFrame, Notation, Pose, Value,
+};
+use crate::diagnostic::{Diagnostics, Source};
+use straightline_core::spatial::Sym3;
+use toml::de::DeValue;
+
+const LINK: &[&str] = &[
+    "name",
+    "mass",
+    "com",
+    "inertia",
+    "inertia_rpy",
+    "inertia_rpy_rad",
+    "inertia_rpy_deg",
+    "inertia_rpy_quarter_turns",
+    "inertia_rpy_turns",
+];
+const JOINT: &[&str] = &[
+    "name",
+    "kind",
+    "parent",
+    "child",
+    "origin",
+    "axis",
+    "limits",
+    "damping",
+    "friction",
+    "rotor_inertia",
+    "gear_ratio",
+    "armature",
+    "spring",
+    "transmission",
+    "mimic",
+];
+const POSE: &[&str] = &["xyz", "rpy", "rpy_rad", "rpy_deg", "rpy_quarter_turns", "rpy_turns"];
+const FRAME: &[&str] = &["name", "link", "xyz", "rpy", "rpy_rad", "rpy_deg", "rpy_quarter_turns", "rpy_turns"];
+const KINDS: [(&str, JointKind); 5] = [
+    ("revolute", JointKind::Revolute),
+    ("continuous", JointKind::Continuous),
+    ("prismatic", JointKind::Prismatic),
+    ("fixed", JointKind::Fixed),
+    ("floating", JointKind::Floating),
+];
+const AXES: [(&str, [f64; 3]); 6] = [
+    ("x", [1.0, 0.0, 0.0]),
+    ("y", [0.0, 1.0, 0.0]),
+    ("z", [0.0, 0.0, 1.0]),
+    ("-x", [-1.0, 0.0, 0.0]),
+    ("-y", [0.0, -1.0, 0.0]),
+    ("-z", [0.0, 0.0, -1.0]),
+];
+
+/// Reads a robot in TOML, in either notation. Complaints go to `diagnostics`; `None` if it is no TOML.
+pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
+    let document = table::parse(source, diagnostics)?;
+    let top = Table { owner: "the file".to_string(), table: document.get_ref(), span: 0..0 };
+    let mut reader = Reader::new(source, diagnostics);
+    if chapter::is_mass_centre_notation(&top) {
+        return Some(chapter::read(&mut reader, &top));
+    }
+    if !["robot", "link", "joint"].iter().any(|key| top.has(key)) {
+        reader.complain(&(0..0), messages::unknown_format());
+        return None;
+    }
+    reader.check_keys(&top, &["robot", "link", "joint", "frame"]);
+    let mut description = Description {
+        format: Format::JointFrameToml,
+        name: Value::assumed("robot".to_string()),
+        gravity: None,
+        base: None,
+        notation: Notation::JointFrames(JointFrameNotation::default()),
+        ignored: Vec::new(),
+    };
+    reader.require(&top, "robot", "[robot]\\nname = \"...\"");
+    if let Some(robot) = reader.table_at(&top, "robot", "[robot]") {
+        reader.check_keys(&robot, &["name", "gravity", "base"]);
+        reader.require(&robot, "name", "name = \"...\"");
+        if let Some(name) = reader.name_at(&robot, "name", "robot") {
+            description.name = name;
+        }
+        description.gravity = reader.vector_at(&robot, "gravity");
+        description.base =
+            reader.word_at(&robot, "base", &[("fixed", BaseKind::Fixed), ("floating", BaseKind::Floating)]);
+    }
+    let mut bodies = JointFrameNotation::default();
+    for table in reader.tables_at(&top, "link") {
+        match read_link(&mut reader, table) {
+            Some(link) => bodies.links.push(link),
+            None => bodies.has_holes = true,
+        }
+    }
+    for table in reader.tables_at(&top, "joint") {
+        match read_joint(&mut reader, table) {
+            Some(joint) => bodies.joints.push(joint),
+            None => bodies.has_holes = true,
+        }
+    }
+    for table in reader.tables_at(&top, "frame") {
+        bodies.frames.extend(read_frame(&mut reader, table));
+    }
+    description.notation = Notation::JointFrames(bodies);
+    description.ignored = reader.into_ignored();
+    Some(description)
+}
+
+/// The name of a table, which from here on stands in complaints about it.
+fn named(reader: &mut Reader, table: &mut Table, what: &str) -> Option<Value<String>> {
+    reader.require(table, "name", "name = \"...\"");
+    let name = reader.name_at(table, "name", what)?;
+    table.owner = format!("{what} `{}`", name.value);
+    Some(name)
+}
+
+fn read_link(reader: &mut Reader, mut table: Table) -> Option<Link> {
+    let name = named(reader, &mut table, "link");
+    reader.check_keys(&table, LINK);
+    let has_inertial = LINK[1..].iter().any(|key| table.has(key));
+    let inertial = has_inertial.then(|| {
+        reader.require(&table, "mass", "mass = 1.0");
+        let zero = Sym3 { xx: 0.0, xy: 0.0, xz: 0.0, yy: 0.0, yz: 0.0, zz: 0.0 };
+        Inertial {
+            mass: reader.real_at(&table, "mass", Range64::Finite).unwrap_or_else(|| reader.value(0.0, &table.span)),
+            com: reader.vector_at(&table, "com").unwrap_or_else(|| reader.value([0.0; 3], &table.span)),
+            rotation: reader.rotation_at(&table, "inertia_rpy"),
+            inertia: reader.tensor_at(&table, "inertia").unwrap_or_else(|| reader.value(zero, &table.span)),
+        }
+    });
+    Some(Link { name: name?, inertial })
+}
+
+fn read_joint(reader: &mut Reader, mut table: Table) -> Option<Joint> {
+    let name = named(reader, &mut table, "joint");
+    reader.check_keys(&table, JOINT);
+    reader.require(&table, "kind", "kind = \"revolute\"");
+    let kind = reader.word_at(&table, "kind", &KINDS);
+    reader.require(&table, "parent", "parent = \"...\"");
+    let parent = reader.name_at(&table, "parent", "link");
+    reader.require(&table, "child", "child = \"...\"");
+    let child = reader.name_at(&table, "child", "link");
+    let origin = match reader.table_at(&table, "origin", &format!("origin of {}", table.owner)) {
+        Some(origin) => {
+            reader.check_keys(&origin, POSE);
+            reader.pose_at(&origin)
+        }
+        None => Pose::identity(reader.place(&table.span)),
+    };
+    let moves = kind.as_ref().is_some_and(|k| k.value.moves() && k.value != JointKind::Floating);
+    if moves {
+        reader.require(&table, "axis", "axis = \"z\"");
+    }
+    let axis = match table.get("axis") {
+        Some((DeValue::String(_), _)) => reader.word_at(&table, "axis", &AXES),
+        _ => reader.vector_at(&table, "axis"),
+    };
+    let axis = axis.unwrap_or_else(|| reader.value([0.0, 0.0, 1.0], &table.span));
+    let limits = reader.limits_at(&table, "limits");
+    let mut drive = JointDrive {
+        damping: reader.real_at(&table, "damping", Range64::Finite),
+        friction: reader.real_at(&table, "friction", Range64::Finite),
+        rotor_inertia: reader.real_at(&table, "rotor_inertia", Range64::Finite),
+        gear_ratio: reader.real_at(&table, "gear_ratio", Range64::Finite),
+        armature: reader.real_at(&table, "armature", Range64::Finite),
+        ..JointDrive::default()
+    };
+    if let Some(spring) = reader.table_at(&table, "spring", &format!("spring of {}", table.owner)) {
+        reader.check_keys(&spring, &["stiffness", "rest"]);
+        drive.spring_stiffness = reader.real_at(&spring, "stiffness", Range64::Finite);
+        drive.spring_rest = reader.real_at(&spring, "rest", Range64::Finite);
+    }
+    for (key, why) in [
+        ("transmission", "it would couple coordinates of drives and joints"),
+        ("mimic", "its coordinate would follow that of another joint"),
+    ] {
+        if let Some((_, span)) = table.get(key) {
+            let help = format!("remove `{key}`");
+            reader.complain(&span, messages::not_supported_yet(&table.owner, key, why, &help));
+        }
+    }
+    Some(Joint { name: name?, kind: kind?, parent: parent?, child: child?, origin, axis, limits, drive })
+}
+
+fn read_frame(reader: &mut Reader, mut table: Table) -> Option<NamedFrame> {
+    let name = named(reader, &mut table, "frame");
+    reader.check_keys(&table, FRAME);
+    reader.require(&table, "link", "link = \"...\"");
+    let link = reader.name_at(&table, "link", "link");
+    let pose = reader.pose_at(&table);
+    Some(NamedFrame { name: name?, link: link?, pose })
+}

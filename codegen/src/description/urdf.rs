@@ -1,0 +1,510 @@
+//! URDF, as found in the wild: <http://wiki.ros.org/urdf/XML>.
+//!
+//! Read are links with their inertials and joints with origin, axis, limits and dynamics, in any order. What shows the
+//! robot or serves a simulator is skipped and listed. Rather than refuse what other readers accept, comments may hold
+//! `--`, the XML declaration may come late, and prefixes need no declaration.
+
+use super::reader::{Range64, Reader};
+use super::{
+    messages, Angle, AngleUnit, Description, Format, Inertial, Joint, JointDrive, JointFrameNotation, JointKind,
+    JointLimits, Link, Notation, Pose, Rotation, Value,
+};
+use crate::diagnostic::{Diagnostics, Source};
+use roxmltree::{Attribute, Document, Node, ParsingOptions};
+use std::borrow::Cow;
+use std::ops::Range;
+use straightline_core::spatial::Sym3;
+
+/// Nodes of an XML file.
+const MOST_NODES: usize = 4_000_000;
+/// Attributes of an element: the XML parser compares each with all before it.
+const MOST_ATTRIBUTES: usize = 1000;
+/// Declarations of namespaces: the XML parser keeps those in force with every element that adds one.
+const MOST_NAMESPACES: usize = 1000;
+/// Prefixes that are used without a declaration.
+const MOST_PREFIXES: usize = 16;
+
+type Span = Range<usize>;
+
+/// Reads a URDF. Complaints go to `diagnostics`; `None` if nothing of the robot could be read.
+pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
+    let mut reader = Reader::new(source, diagnostics);
+    let mut text = tolerant_text(&mut reader)?;
+    for _ in 0..=MOST_PREFIXES {
+        let options = ParsingOptions { nodes_limit: MOST_NODES as u32, ..ParsingOptions::default() };
+        let error = match Document::parse_with_options(&text, options) {
+            Ok(document) => return read_document(reader, &document),
+            Err(error) => error,
+        };
+        match &error {
+            roxmltree::Error::UnknownNamespace(prefix, _) if prefix != "xacro" => {
+                let joined = join_prefix(&text, prefix);
+                text = Cow::Owned(joined);
+            }
+            _ => {
+                complain_of_xml(&mut reader, &error);
+                return None;
+            }
+        }
+    }
+    reader.complain(&(0..0), messages::too_complex("undeclared prefixes", MOST_PREFIXES));
+    None
+}
+
+fn complain_of_xml(reader: &mut Reader, error: &roxmltree::Error) {
+    use roxmltree::Error;
+    let text = reader.source.text();
+    let at = match error {
+        Error::NodesLimitReached | Error::AttributesLimitReached | Error::NamespacesLimitReached => {
+            reader.complain(&(0..0), messages::too_complex("nodes of the XML file", MOST_NODES));
+            return;
+        }
+        Error::UnexpectedEndOfStream | Error::UnclosedRootNode | Error::NoRootNode | Error::DtdDetected => text.len(),
+        _ => {
+            let at = error.pos();
+            let line_start: usize =
+                text.split_inclusive('\n').take((at.row as usize).saturating_sub(1)).map(str::len).sum();
+            let line = text.get(line_start..).unwrap_or("");
+            let in_line: usize = line.chars().take((at.col as usize).saturating_sub(1)).map(char::len_utf8).sum();
+            line_start + in_line
+        }
+    };
+    if let Error::UnknownNamespace(prefix, _) = error {
+        reader.complain(&(at..at + 1), messages::xacro_left(&format!("{prefix}:"), 0));
+        return;
+    }
+    let said = error.to_string();
+    let said = match said.rsplit_once(" at ") {
+        Some((said, place)) if place.chars().all(|c| c.is_ascii_digit() || c == ':') => said,
+        _ => &said,
+    };
+    let span = if matches!(error, Error::UnexpectedEndOfStream | Error::UnclosedRootNode) {
+        let end = text.trim_end().len();
+        end.saturating_sub(1)..end
+    } else {
+        at..at + 1
+    };
+    reader.complain(&span, messages::xml_syntax(said));
+}
+
+/// The text with comments blanked and a late XML declaration blanked, byte for byte as long; `None` after a complaint.
+fn tolerant_text<'a>(reader: &mut Reader<'a>) -> Option<Cow<'a, str>> {
+    let source = reader.source;
+    let text = source.text();
+    if text.matches("xmlns").take(MOST_NAMESPACES + 1).count() > MOST_NAMESPACES {
+        reader.complain(&(0..0), messages::too_complex("declarations of namespaces", MOST_NAMESPACES));
+        return None;
+    }
+    let mut out: Vec<u8> = Vec::new(); // stays empty as long as nothing is changed
+    let mut at = 0;
+    while let Some(found) = text[at..].find('<') {
+        let start = at + found;
+        let rest = &text[start..];
+        if let Some(comment) = rest.strip_prefix("<!--") {
+            let Some(length) = comment.find("-->").map(|n| n + 7) else {
+                reader.complain(&(start..start + 4), messages::xml_syntax("the comment is never closed"));
+                return None;
+            };
+            blank(text, &mut out, start..start + length);
+            at = start + length;
+        } else if rest.starts_with("<![CDATA[") {
+            at = rest.find("]]>").map_or(text.len(), |n| start + n + 3);
+        } else if rest.starts_with("<?xml") && start > 0 && text[..start].trim().is_empty() {
+            let length = rest.find("?>").map_or(0, |n| n + 2);
+            blank(text, &mut out, start..start + length);
+            at = start + length.max(1);
+        } else {
+            let mut attributes = 0;
+            let mut quote = None;
+            let mut end = text.len();
+            for (i, byte) in rest.bytes().enumerate() {
+                match (quote, byte) {
+                    (None, b'"' | b'\'') => quote = Some(byte),
+                    (None, b'=') => attributes += 1,
+                    (None, b'>') => {
+                        end = start + i;
+                        break;
+                    }
+                    (Some(q), b) if q == b => quote = None,
+                    _ => {}
+                }
+            }
+            if attributes > MOST_ATTRIBUTES {
+                reader
+                    .complain(&(start..start + 1), messages::too_complex("attributes of an element", MOST_ATTRIBUTES));
+                return None;
+            }
+            at = end.max(start + 1);
+        }
+    }
+    match String::from_utf8(out) {
+        Ok(blanked) if !blanked.is_empty() => Some(Cow::Owned(blanked)),
+        _ => Some(Cow::Borrowed(text)),
+    }
+}
+
+/// Replaces a range by spaces, keeping ends of lines.
+fn blank(text: &str, out: &mut Vec<u8>, range: Span) {
+    if out.is_empty() {
+        out.extend_from_slice(text.as_bytes());
+    }
+    for byte in &mut out[range] {
+        if *byte != b'\n' {
+            *byte = b' ';
+        }
+    }
+}
+
+/// `prefix:name` becomes `prefix_name` in names of elements and attributes.
+fn join_prefix(text: &str, prefix: &str) -> String {
+    let needle = format!("{prefix}:");
+    let mut out = String::with_capacity(text.len());
+    let mut last = 0;
+    for (at, _) in text.match_indices(&needle) {
+        let before = text.as_bytes()[..at].last().copied().unwrap_or(b' ');
+        if matches!(before, b'<' | b'/') || before.is_ascii_whitespace() {
+            out.push_str(&text[last..at]);
+            out.push_str(prefix);
+            out.push('_');
+            last = at + needle.len();
+        }
+    }
+    out.push_str(&text[last..]);
+    out
+}
+
+/// The start of an element's tag: `<name`.
+fn tag(node: Node) -> Span {
+    let start = node.range().start;
+    start..start + 1 + node.tag_name().name().len()
+}
+
+fn read_document(mut reader: Reader, document: &Document) -> Option<Description> {
+    let root = document.root_element();
+    if root.tag_name().name() != "robot" {
+        reader.complain(&tag(root), messages::not_a_robot(root.tag_name().name()));
+        return None;
+    }
+    let is_xacro = |n: &Node| n.is_element() && n.tag_name().namespace().is_some_and(|uri| uri.contains("xacro"));
+    let mut xacro = root.descendants().filter(is_xacro);
+    if let Some(first) = xacro.next() {
+        let name = format!("xacro:{}", first.tag_name().name());
+        let start = first.range().start;
+        reader.complain(&(start..start + 1 + name.len()), messages::xacro_left(&name, xacro.count()));
+        return None;
+    }
+    let name = match root.attribute("name") {
+        Some(name) => {
+            reader.value(name.to_string(), &root.attribute_node("name").map_or(tag(root), |a| a.range_value()))
+        }
+        None => reader.value("robot".to_string(), &tag(root)),
+    };
+    let mut bodies = JointFrameNotation::default();
+    for node in children(root) {
+        match local_name(root, node) {
+            Some("link") => match read_link(&mut reader, node) {
+                Some(link) => bodies.links.push(link),
+                None => bodies.has_holes = true,
+            },
+            Some("joint") => match read_joint(&mut reader, node) {
+                Some(joint) => bodies.joints.push(joint),
+                None => bodies.has_holes = true,
+            },
+            _ => skip(&mut reader, "the robot", node, &["link", "joint"]),
+        }
+    }
+    Some(Description {
+        format: Format::Urdf,
+        name,
+        gravity: None,
+        base: None,
+        notation: Notation::JointFrames(bodies),
+        ignored: reader.into_ignored(),
+    })
+}
+
+fn children<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
+    node.children().filter(Node::is_element)
+}
+
+/// The element's name, if it is of the same namespace as `owner`.
+fn local_name<'a>(owner: Node, node: Node<'a, '_>) -> Option<&'a str> {
+    (node.tag_name().namespace() == owner.tag_name().namespace()).then(|| node.tag_name().name())
+}
+
+/// Skips an element; one that looks like one of `known` gets a warning.
+fn skip(reader: &mut Reader, owner: &str, node: Node, known: &[&str]) {
+    const HARMLESS: &[&str] = &[
+        "visual",
+        "collision",
+        "material",
+        "gazebo",
+        "transmission",
+        "ros2_control",
+        "calibration",
+        "safety_controller",
+        "contact",
+        "sensor",
+        "self_collision_checking",
+        "loop_joint",
+        "group",
+        "disable_collisions",
+        "verbose",
+    ];
+    let name = node.tag_name().name();
+    if !HARMLESS.contains(&name) && node.tag_name().namespace().is_none() {
+        if let Some(known) = messages::closest(name, known.iter().copied()).filter(|k| k.len() > 3) {
+            reader.complain(&tag(node), messages::misspelt_element(owner, name, known));
+            return;
+        }
+    }
+    reader.ignore(name, &tag(node));
+}
+
+/// The children of `node` with the names `names`, each at most once; others are skipped.
+fn pick<'a, 'i, const N: usize>(
+    reader: &mut Reader,
+    owner: &str,
+    node: Node<'a, 'i>,
+    names: [&str; N],
+) -> [Option<Node<'a, 'i>>; N] {
+    let mut found = [None; N];
+    for child in children(node) {
+        let index = local_name(node, child).and_then(|name| names.iter().position(|&n| n == name));
+        match index {
+            Some(i) if found[i].is_some() => reader.complain(&tag(child), messages::repeated_element(owner, names[i])),
+            Some(i) => found[i] = Some(child),
+            None => skip(reader, owner, child, &names),
+        }
+    }
+    found
+}
+
+fn required<'a, 'i>(
+    reader: &mut Reader,
+    owner: &str,
+    node: Node<'a, 'i>,
+    name: &str,
+    example: &str,
+) -> Option<Attribute<'a, 'i>> {
+    let found = node.attribute_node(name);
+    if found.is_none() {
+        reader.complain(&tag(node), messages::missing_attribute(owner, name, example));
+    }
+    found
+}
+
+fn name_of(reader: &mut Reader, what: &str, node: Node, attribute: &str, example: &str) -> Option<Value<String>> {
+    let element = format!("<{}>", node.tag_name().name());
+    let found = required(reader, &element, node, attribute, example)?;
+    reader.name(what, found.value(), &found.range_value())
+}
+
+fn number(reader: &mut Reader, what: &str, attribute: Attribute, range: Range64) -> Option<Value<f64>> {
+    let span = attribute.range_value();
+    let value = reader.number(what, attribute.value().trim(), &span, range)?;
+    Some(reader.value(value, &span))
+}
+
+/// Three numbers, each with its text and span.
+fn triple<'a>(reader: &mut Reader, what: &str, attribute: Attribute<'a, '_>) -> Option<[(f64, &'a str, Span); 3]> {
+    let text = attribute.value();
+    let whole = attribute.range_value();
+    let is_raw = reader.source.text().get(whole.clone()) == Some(text);
+    let words: Vec<&str> = text.split_ascii_whitespace().collect();
+    if words.len() != 3 {
+        if text.contains("${") || text.contains("$(") {
+            reader.complain(&whole, messages::xacro_left(text, 0));
+        } else if text.contains(',') {
+            reader.complain(&whole, messages::not_a_number(what, text));
+        } else {
+            reader.complain(&whole, messages::wrong_count(what, "three numbers", words.len()));
+        }
+        return None;
+    }
+    let mut numbers = Vec::with_capacity(3);
+    for word in words {
+        let offset = word.as_ptr() as usize - text.as_ptr() as usize;
+        let span = if is_raw { whole.start + offset..whole.start + offset + word.len() } else { whole.clone() };
+        numbers.push(reader.number(what, word, &span, Range64::Finite).map(|x| (x, word, span)));
+    }
+    let mut numbers = numbers.into_iter().flatten();
+    Some([numbers.next()?, numbers.next()?, numbers.next()?])
+}
+
+fn vector(reader: &mut Reader, what: &str, attribute: Attribute) -> Option<Value<[f64; 3]>> {
+    let span = attribute.range_value();
+    let [x, y, z] = triple(reader, what, attribute)?;
+    Some(reader.value([x.0, y.0, z.0], &span))
+}
+
+fn read_pose(reader: &mut Reader, owner: &str, node: Option<Node>, default: Node) -> Pose {
+    let mut pose = Pose::identity(reader.place(&tag(node.unwrap_or(default))));
+    let Some(node) = node else { return pose };
+    if let Some(attribute) = node.attribute_node("xyz") {
+        if let Some(xyz) = vector(reader, &format!("{owner}, xyz"), attribute) {
+            pose.xyz = xyz;
+        }
+    }
+    if let Some(attribute) = node.attribute_node("rpy") {
+        if let Some(rpy) = triple(reader, &format!("{owner}, rpy"), attribute) {
+            pose.rotation = Rotation {
+                rpy: rpy.map(|(value, text, span)| Angle {
+                    value,
+                    unit: AngleUnit::Radian,
+                    text: text.to_string(),
+                    place: reader.place(&span),
+                }),
+            };
+        }
+    }
+    pose
+}
+
+fn read_link(reader: &mut Reader, node: Node) -> Option<Link> {
+    let name = name_of(reader, "link", node, "name", "<link name=\"...\">");
+    let owner = name.as_ref().map_or("a link".to_string(), |n| format!("link `{}`", n.value));
+    let inertial = inertial_of(reader, &owner, node).and_then(|inertial| read_inertial(reader, &owner, inertial));
+    Some(Link { name: name?, inertial })
+}
+
+/// The `<inertial>` of a link; what only shows the link is skipped.
+fn inertial_of<'a, 'i>(reader: &mut Reader, owner: &str, node: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
+    let mut found = None;
+    for child in children(node) {
+        match local_name(node, child) {
+            Some("inertial") if found.is_some() => {
+                reader.complain(&tag(child), messages::repeated_element(owner, "inertial"));
+            }
+            Some("inertial") => found = Some(child),
+            _ => skip(reader, owner, child, &["inertial", "visual", "collision"]),
+        }
+    }
+    found
+}
+
+fn read_inertial(reader: &mut Reader, owner: &str, node: Node) -> Option<Inertial> {
+    let [origin, mass, inertia] = pick(reader, owner, node, ["origin", "mass", "inertia"]);
+    let pose = read_pose(reader, &format!("{owner}, inertial origin"), origin, node);
+    let mass = match mass {
+        Some(mass) => required(reader, "<mass>", mass, "value", "<mass value=\"1.0\"/>")
+            .and_then(|value| number(reader, &format!("mass of {owner}"), value, Range64::Finite)),
+        None => {
+            let who = format!("the inertial of {owner}");
+            reader.complain(&tag(node), messages::missing_element(&who, "mass", "<mass value=\"1.0\"/>"));
+            None
+        }
+    };
+    let inertia = match inertia {
+        Some(inertia) => read_inertia(reader, owner, inertia),
+        None => Some(reader.value(Sym3 { xx: 0.0, xy: 0.0, xz: 0.0, yy: 0.0, yz: 0.0, zz: 0.0 }, &tag(node))),
+    };
+    Some(Inertial { mass: mass?, com: pose.xyz, rotation: pose.rotation, inertia: inertia? })
+}
+
+fn read_inertia(reader: &mut Reader, owner: &str, node: Node) -> Option<Value<Sym3<f64>>> {
+    let mut entry = |name: &str, is_diagonal: bool| match node.attribute_node(name) {
+        Some(attribute) => {
+            number(reader, &format!("{name} of {owner}"), attribute, Range64::Finite).map(|value| value.value)
+        }
+        None if is_diagonal => {
+            let example = "<inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/>";
+            reader.complain(&tag(node), messages::missing_attribute(&format!("the inertia of {owner}"), name, example));
+            None
+        }
+        None => Some(0.0),
+    };
+    let (xx, xy, xz) = (entry("ixx", true), entry("ixy", false), entry("ixz", false));
+    let (yy, yz, zz) = (entry("iyy", true), entry("iyz", false), entry("izz", true));
+    Some(reader.value(Sym3 { xx: xx?, xy: xy?, xz: xz?, yy: yy?, yz: yz?, zz: zz? }, &tag(node)))
+}
+
+fn read_joint(reader: &mut Reader, node: Node) -> Option<Joint> {
+    let name = name_of(reader, "joint", node, "name", "<joint name=\"...\" type=\"revolute\">");
+    let owner = name.as_ref().map_or("a joint".to_string(), |n| format!("joint `{}`", n.value));
+    let kind = required(reader, &owner, node, "type", "<joint name=\"...\" type=\"revolute\">")
+        .and_then(|attribute| read_kind(reader, &owner, attribute));
+    let [parent, child, origin, axis, limit, dynamics, mimic] =
+        pick(reader, &owner, node, ["parent", "child", "origin", "axis", "limit", "dynamics", "mimic"]);
+    let mut end = |element: Option<Node>, what: &str| match element {
+        Some(element) => name_of(reader, what, element, "link", &format!("<{what} link=\"...\"/>")),
+        None => {
+            let example = format!("<{what} link=\"...\"/>");
+            reader.complain(&tag(node), messages::missing_element(&owner, what, &example));
+            None
+        }
+    };
+    let (parent, child) = (end(parent, "parent"), end(child, "child"));
+    let origin = read_pose(reader, &format!("{owner}, origin"), origin, node);
+    let moves = kind.as_ref().is_none_or(|k| k.value.moves());
+    let default_axis = reader.value([1.0, 0.0, 0.0], &tag(axis.unwrap_or(node)));
+    let axis = match axis.filter(|_| moves) {
+        Some(element) => required(reader, &format!("axis of {owner}"), element, "xyz", "<axis xyz=\"0 0 1\"/>")
+            .and_then(|attribute| vector(reader, &format!("axis of {owner}"), attribute))
+            .unwrap_or(default_axis),
+        None => default_axis,
+    };
+    let limits = match limit.filter(|_| moves) {
+        Some(element) => read_limits(reader, &owner, element),
+        None => JointLimits::default(),
+    };
+    let mut drive = JointDrive::default();
+    if let Some(element) = dynamics.filter(|_| moves) {
+        let mut read = |name: &str| {
+            let attribute = element.attribute_node(name)?;
+            number(reader, &format!("{name} of {owner}"), attribute, Range64::Finite)
+        };
+        drive.damping = read("damping");
+        drive.friction = read("friction");
+    }
+    if let Some(element) = mimic.filter(|_| moves) {
+        let follows = match element.attribute("joint") {
+            Some(joint) => format!("its coordinate would follow that of joint `{joint}`"),
+            None => "its coordinate would follow that of another joint".to_string(),
+        };
+        let help = "make the joint fixed, or remove `<mimic>` to give it a coordinate of its own";
+        reader.complain(&tag(element), messages::not_supported_yet(&owner, "mimic", &follows, help));
+    }
+    Some(Joint { name: name?, kind: kind?, parent: parent?, child: child?, origin, axis, limits, drive })
+}
+
+fn read_kind(reader: &mut Reader, owner: &str, attribute: Attribute) -> Option<Value<JointKind>> {
+    let span = attribute.range_value();
+    let kind = match attribute.value().trim() {
+        "revolute" => JointKind::Revolute,
+        "continuous" => JointKind::Continuous,
+        "prismatic" => JointKind::Prismatic,
+        "fixed" => JointKind::Fixed,
+        "floating" => JointKind::Floating,
+        kind @ ("planar" | "spherical" | "ball") => {
+            let help = "write its motions as single joints, with links without inertia in between";
+            let why = "a joint has one coordinate";
+            reader.complain(&span, messages::not_supported_yet(owner, kind, why, help));
+            return None;
+        }
+        word => {
+            let known = ["revolute", "continuous", "prismatic", "fixed"];
+            reader.complain(&span, messages::unknown_word(&format!("type of {owner}"), word, &known));
+            return None;
+        }
+    };
+    Some(reader.value(kind, &span))
+}
+
+fn read_limits(reader: &mut Reader, owner: &str, node: Node) -> JointLimits {
+    let mut read = |name: &str| {
+        let attribute = node.attribute_node(name)?;
+        number(reader, &format!("{name} limit of {owner}"), attribute, Range64::Limit)
+    };
+    let (mut lower, mut upper) = (read("lower"), read("upper"));
+    let (velocity, effort) = (read("velocity"), read("effort"));
+    // URDF: a limit that is left out is 0; if both are, the file does not mean it.
+    let given = |name: &str| node.has_attribute(name);
+    if given("upper") && !given("lower") {
+        lower = Some(reader.value(0.0, &tag(node)));
+    }
+    if given("lower") && !given("upper") {
+        upper = Some(reader.value(0.0, &tag(node)));
+    }
+    JointLimits { lower, upper, velocity, effort }
+}

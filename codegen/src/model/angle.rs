@@ -1,0 +1,175 @@
+//! Angles: which are taken as multiples of a right angle, and rotations made of them.
+//!
+//! An angle in radians is a rounded number: `1.5707963267948966` is π/2 up to 6e-17, `1.5707` up to 1e-4. Within the
+//! tolerance (by default [`ROUNDING`]) of a multiple of π/4 or π/6 it is taken as that; otherwise literally.
+
+use super::geometry::snap_rotation;
+use crate::description::{Angle, AngleUnit, Rotation};
+use straightline_core::spatial::Mat3;
+use straightline_core::Dd;
+
+/// The default tolerance \[rad\]: what the nearest f64 of a few turns can be off.
+pub const ROUNDING: f64 = 1e-15;
+/// So near to a right angle \[rad\] an angle is doubtful.
+pub const DOUBTFUL: f64 = 1e-3;
+/// Greater angles \[rad\] are not computed with.
+pub const GREATEST_ANGLE: f64 = 1e6;
+
+/// How an angle was understood.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reading {
+    /// Sine and cosine of what it is taken as.
+    pub sin_cos: (Dd, Dd),
+    /// The multiple of π/12 that it is taken as.
+    pub special: Option<i64>,
+    /// The nearest multiple of π/2.
+    pub right_angles: i64,
+    /// Distance of the written angle from `special`, or else from `right_angles` \[rad\].
+    pub deviation: f64,
+}
+
+/// Twelfths of π in one unit, where that is a whole number.
+fn twelfths(angle: &Angle) -> Option<i64> {
+    // the remainder of a floating-point division is exact
+    let (full_turn, per_twelfth) = match angle.unit {
+        AngleUnit::Radian => return (angle.value == 0.0).then_some(0),
+        AngleUnit::Degree => (360.0, 1.0 / 15.0),
+        AngleUnit::QuarterTurn => (4.0, 6.0),
+        AngleUnit::Turn => (1.0, 24.0),
+    };
+    let rest = angle.value % full_turn;
+    let twelfths = match angle.unit {
+        AngleUnit::Degree => (rest % 15.0 == 0.0).then_some(rest / 15.0)?,
+        _ => rest * per_twelfth,
+    };
+    (twelfths.fract() == 0.0).then_some(twelfths as i64)
+}
+
+/// The angle in radians.
+pub(super) fn radians(angle: &Angle) -> Dd {
+    let x = Dd::from(angle.value);
+    match angle.unit {
+        AngleUnit::Radian => x,
+        AngleUnit::Degree => x * Dd::PI / Dd::from(180.0),
+        AngleUnit::QuarterTurn => x * Dd::FRAC_PI_2,
+        AngleUnit::Turn => x * (Dd::PI + Dd::PI),
+    }
+}
+
+/// Reads an angle.
+pub(super) fn read(angle: &Angle, tolerance: f64) -> Reading {
+    let x = radians(angle);
+    let is_special = |m: i64| m % 2 == 0 || m % 3 == 0;
+    let twelfth = Dd::PI / Dd::from(12.0);
+    let off = |m: i64| (x - twelfth * Dd::from(m as f64)).to_f64();
+    let right_angles = (x / Dd::FRAC_PI_2).to_f64().round() as i64;
+    if let Some(m) = twelfths(angle).filter(|&m| is_special(m)) {
+        return Reading { sin_cos: sin_cos_of_twelfths(m), special: Some(m), right_angles, deviation: 0.0 };
+    }
+    let nearest = (x / twelfth).to_f64().round() as i64;
+    if is_special(nearest) && off(nearest).abs() <= tolerance {
+        let sin_cos = sin_cos_of_twelfths(nearest);
+        return Reading { sin_cos, special: Some(nearest), right_angles, deviation: off(nearest) };
+    }
+    Reading { sin_cos: x.sin_cos(), special: None, right_angles, deviation: off(6 * right_angles) }
+}
+
+/// sin and cos of m π/12, m a multiple of 2 or 3.
+fn sin_cos_of_twelfths(m: i64) -> (Dd, Dd) {
+    fn sin(m: i64) -> Dd {
+        match m.rem_euclid(24) {
+            m @ 13..=23 => -sin(m - 12),
+            m @ 7..=12 => sin(12 - m),
+            0 => Dd::ZERO,
+            2 => Dd::HALF,
+            3 => Dd::HALF.sqrt(),
+            4 => Dd::from(0.75).sqrt(),
+            6 => Dd::ONE,
+            m => unreachable!("{m} twelfths of π are no special angle"),
+        }
+    }
+    (sin(m), sin(m + 6))
+}
+
+/// `m π/12` in words: `π/2`, `-3π/4`.
+pub(super) fn name_of_twelfths(m: i64) -> String {
+    if m == 0 {
+        return "0".to_string();
+    }
+    let divisor = [1, 2, 3, 4, 6].into_iter().find(|d| (m * d) % 12 == 0).unwrap_or(12);
+    let times = m * divisor / 12;
+    let sign = if times < 0 { "-" } else { "" };
+    let times = match times.abs() {
+        1 => String::new(),
+        n => n.to_string(),
+    };
+    let over = if divisor == 1 { String::new() } else { format!("/{divisor}") };
+    format!("{sign}{times}π{over}")
+}
+
+/// R = Rz(yaw) Ry(pitch) Rx(roll).
+pub(super) fn rotation(rotation: &Rotation, tolerance: f64) -> Mat3<Dd> {
+    let [(sr, cr), (sp, cp), (sy, cy)] = [0, 1, 2].map(|i| read(&rotation.rpy[i], tolerance).sin_cos);
+    snap_rotation(Mat3 {
+        rows: [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnostic::Place;
+
+    fn angle(value: f64, unit: AngleUnit) -> Angle {
+        Angle { value, unit, text: String::new(), place: Place::none() }
+    }
+
+    #[test]
+    fn special_angles_have_names() {
+        let names: Vec<String> = [0, 6, -6, 12, 24, 3, -9, 2, 4, 8, 10, 18, 36].map(name_of_twelfths).into();
+        let expected = ["0", "π/2", "-π/2", "π", "2π", "π/4", "-3π/4", "π/6", "π/3", "2π/3", "5π/6", "3π/2", "3π"];
+        assert_eq!(names, expected);
+    }
+
+    #[test]
+    fn table_of_special_angles_agrees_with_the_series() {
+        for m in (-48..=48).filter(|m| m % 2 == 0 || m % 3 == 0) {
+            let (s, c) = sin_cos_of_twelfths(m);
+            let (s2, c2) = (Dd::PI / Dd::from(12.0) * Dd::from(m as f64)).sin_cos();
+            assert!((s - s2).abs().to_f64() < 1e-30 && (c - c2).abs().to_f64() < 1e-30, "{m}");
+        }
+    }
+
+    #[test]
+    fn right_angles_are_exact_in_every_unit() {
+        for (value, unit) in [
+            (90.0, AngleUnit::Degree),
+            (-270.0, AngleUnit::Degree),
+            (1.0, AngleUnit::QuarterTurn),
+            (0.25, AngleUnit::Turn),
+            (std::f64::consts::FRAC_PI_2, AngleUnit::Radian),
+        ] {
+            assert_eq!(read(&angle(value, unit), ROUNDING).sin_cos, (Dd::ONE, Dd::ZERO), "{value} {unit:?}");
+        }
+    }
+
+    #[test]
+    fn tolerance_zero_takes_radians_literally() {
+        let reading = read(&angle(std::f64::consts::FRAC_PI_2, AngleUnit::Radian), 0.0);
+        assert_eq!(reading.special, None);
+        assert_eq!(reading.sin_cos.1.to_f64(), 6.123233995736766e-17);
+        assert_eq!(reading.sin_cos.0.to_f64(), 1.0);
+    }
+
+    #[test]
+    fn an_angle_beyond_the_tolerance_is_literal_and_within_it_exact() {
+        let x = angle("1.57079632679".parse().expect("a number"), AngleUnit::Radian);
+        assert_eq!(read(&x, ROUNDING).special, None);
+        assert!((read(&x, ROUNDING).deviation + 4.9e-12).abs() < 1e-13);
+        assert_eq!(read(&x, 1e-6).special, Some(6));
+    }
+}

@@ -1,0 +1,320 @@
+//! What needs the whole robot to be judged: tree, masses and inertias, axes, limits, angles.
+
+use super::geometry::principal_moments;
+use super::{angle, each_angle, Assembly, MOST_LINKS};
+use crate::description::{
+    messages, Description, Format, Joint, JointDrive, JointFrameNotation, JointKind, JointLimits, Value,
+};
+use crate::diagnostic::{Diagnostics, Place};
+use std::collections::HashMap;
+use straightline_core::model::{JointKind as ModelJointKind, Limits};
+use straightline_core::spatial::Sym3;
+
+/// A principal moment may exceed the sum of the others by so much, relatively: the digits of published tensors.
+const MOMENT_DIGITS: f64 = 1e-6;
+/// A length of an axis further from 1 is worth a warning.
+const AXIS_DIGITS: f64 = 1e-3;
+
+/// The tree of links: indices into the notation's links and joints.
+pub(super) struct Tree {
+    /// The root link.
+    pub root: usize,
+    /// For each link, the joints that it carries, in the file's order.
+    pub joints_of: Vec<Vec<usize>>,
+    /// For each joint, its parent link.
+    pub parent_of: Vec<usize>,
+    /// For each joint, its child link.
+    pub child_of: Vec<usize>,
+}
+
+/// The tree, or complaints why there is none.
+pub(super) fn tree(bodies: &JointFrameNotation, name: &Value<String>, diagnostics: &mut Diagnostics) -> Option<Tree> {
+    let links = &bodies.links;
+    if links.is_empty() {
+        if !bodies.has_holes {
+            diagnostics.push(messages::no_links(&name.value).at(&name.place));
+        }
+        return None;
+    }
+    if links.len() > MOST_LINKS {
+        diagnostics.push(messages::too_many_links(links.len(), MOST_LINKS).at(&name.place));
+        return None;
+    }
+    let mut has_holes = bodies.has_holes;
+    let link_index = unique("link", links.iter().map(|l| &l.name), diagnostics);
+    unique("joint", bodies.joints.iter().map(|j| &j.name), diagnostics);
+    let mut frame_names = unique("frame", bodies.frames.iter().map(|f| &f.name), diagnostics);
+    for link in links {
+        if let Some(frame) = frame_names.remove(link.name.value.as_str()) {
+            let frame = &bodies.frames[frame].name;
+            diagnostics.push(
+                messages::duplicate_name("frame or link", &frame.value)
+                    .at(&frame.place)
+                    .related(&link.name.place, "the link"),
+            );
+        }
+    }
+    let mut find = |owner: String, link: &Value<String>, diagnostics: &mut Diagnostics| {
+        let found = link_index.get(link.value.as_str()).copied();
+        if found.is_none() {
+            let known = links.iter().map(|l| l.name.value.as_str());
+            diagnostics.push(messages::unknown_link(&owner, &link.value, known).at(&link.place));
+            has_holes = true;
+        }
+        found
+    };
+    let mut joints_of = vec![Vec::new(); links.len()];
+    let mut child_of = vec![0; bodies.joints.len()];
+    let mut joint_above: Vec<Option<usize>> = vec![None; links.len()];
+    let mut parent_of = vec![0; bodies.joints.len()];
+    for (j, joint) in bodies.joints.iter().enumerate() {
+        let parent = find(format!("parent of joint `{}`", joint.name.value), &joint.parent, diagnostics);
+        let child = find(format!("child of joint `{}`", joint.name.value), &joint.child, diagnostics);
+        let (Some(parent), Some(child)) = (parent, child) else { continue };
+        if let Some(first) = joint_above[child] {
+            let first = &bodies.joints[first];
+            diagnostics.push(
+                messages::two_parents(&joint.child.value, &first.name.value, &joint.name.value)
+                    .at(&joint.child.place)
+                    .related(&first.child.place, "the other joint"),
+            );
+            continue;
+        }
+        joint_above[child] = Some(j);
+        parent_of[j] = parent;
+        child_of[j] = child;
+        joints_of[parent].push(j);
+    }
+    for frame in &bodies.frames {
+        find(format!("frame `{}`", frame.name.value), &frame.link, diagnostics);
+    }
+    let roots: Vec<usize> = (0..links.len()).filter(|&l| joint_above[l].is_none()).collect();
+    if roots.len() > 1 && !has_holes {
+        let names: Vec<&str> = roots.iter().map(|&l| links[l].name.value.as_str()).collect();
+        diagnostics.push(messages::two_roots(&names).at(&links[roots[1]].name.place));
+    }
+    // what no root carries, hangs on a cycle
+    let mut reached = vec![false; links.len()];
+    let mut open = roots.clone();
+    while let Some(link) = open.pop() {
+        reached[link] = true;
+        open.extend(joints_of[link].iter().map(|&j| child_of[j]));
+    }
+    for start in 0..links.len() {
+        if reached[start] {
+            continue;
+        }
+        let mut path: Vec<usize> = Vec::new();
+        let mut link = start;
+        while !reached[link] {
+            reached[link] = true;
+            let Some(joint) = joint_above[link] else { break };
+            path.push(joint);
+            link = parent_of[joint];
+        }
+        // the walk ends on the cycle itself, or on what an earlier walk has seen
+        let Some(first) = path.iter().position(|&j| child_of[j] == link) else { continue };
+        let mut names: Vec<&str> = path[first..].iter().map(|&j| bodies.joints[j].name.value.as_str()).collect();
+        names.reverse();
+        let place = path[first..].iter().map(|&j| &bodies.joints[j].name.place).min_by_key(|p| p.span.start);
+        diagnostics.push(messages::cycle(&names).at(place.unwrap_or(&name.place)));
+    }
+    let root = *roots.first()?;
+    Some(Tree { root, joints_of, parent_of, child_of })
+}
+
+/// The index of each name; names that are taken are complained of.
+pub(super) fn unique<'a>(
+    what: &str,
+    names: impl Iterator<Item = &'a Value<String>>,
+    diagnostics: &mut Diagnostics,
+) -> HashMap<&'a str, usize> {
+    let mut index: HashMap<&str, (usize, &Place)> = HashMap::new();
+    for (i, name) in names.enumerate() {
+        match index.get(name.value.as_str()) {
+            Some((_, first)) => {
+                let complaint = messages::duplicate_name(what, &name.value).at(&name.place);
+                diagnostics.push(complaint.related(first, "the first one"));
+            }
+            None => {
+                index.insert(&name.value, (i, &name.place));
+            }
+        }
+    }
+    index.into_iter().map(|(name, (i, _))| (name, i)).collect()
+}
+
+/// Mass and inertia of one link.
+pub(super) fn inertial(link: &str, mass: &Value<f64>, inertia: &Value<Sym3<f64>>, diagnostics: &mut Diagnostics) {
+    let j = inertia.value;
+    let is_zero = [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz].iter().all(|&x| x == 0.0);
+    if mass.value < 0.0 {
+        diagnostics.push(messages::negative_mass(link, mass.value).at(&mass.place));
+    } else if mass.value == 0.0 && !is_zero {
+        diagnostics.push(messages::inertia_without_mass(link).at(&mass.place));
+    } else if mass.value > 0.0 && is_zero {
+        diagnostics.push(messages::point_mass(link).at(&inertia.place));
+    }
+    let moments = principal_moments(j);
+    let [a, b, c] = moments;
+    let slack = MOMENT_DIGITS * c.abs().max(a.abs());
+    if a < -slack {
+        diagnostics.push(messages::negative_moment(link, moments).at(&inertia.place));
+    } else if c > a + b + slack {
+        diagnostics.push(messages::triangle_inequality(link, moments).at(&inertia.place));
+    }
+}
+
+/// The length of an axis.
+pub(super) fn axis_length(what: &str, axis: &Value<[f64; 3]>, diagnostics: &mut Diagnostics) {
+    let greatest = axis.value.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    if greatest < 1e-100 {
+        diagnostics.push(messages::zero_axis(what).at(&axis.place));
+        return;
+    }
+    let length = axis.value.iter().map(|x| (x / greatest).powi(2)).sum::<f64>().sqrt() * greatest;
+    if (length - 1.0).abs() > AXIS_DIGITS {
+        diagnostics.push(messages::axis_length(what, length).at(&axis.place));
+    }
+}
+
+/// One joint by itself.
+pub(super) fn joint(joint: &Joint, format: Format, diagnostics: &mut Diagnostics) {
+    let name = &joint.name.value;
+    match joint.kind.value {
+        JointKind::Fixed => return,
+        JointKind::Floating => {
+            diagnostics.push(messages::floating_joint(name).at(&joint.kind.place));
+            return;
+        }
+        JointKind::Revolute | JointKind::Continuous | JointKind::Prismatic => {}
+    }
+    axis_length(&format!("axis of joint `{name}`"), &joint.axis, diagnostics);
+    limits(&joint.name, joint.kind.value, &joint.limits, format, diagnostics);
+    drive(&joint.name, &joint.drive, diagnostics);
+}
+
+fn drive(joint: &Value<String>, drive: &JointDrive, diagnostics: &mut Diagnostics) {
+    for (what, value) in [("damping", &drive.damping), ("friction", &drive.friction)] {
+        if let Some(value) = value.as_ref().filter(|v| v.value != 0.0) {
+            diagnostics.push(messages::friction_not_used(&joint.value, what, value.value).at(&value.place));
+        }
+    }
+    let inertia = "it would add inertia to the joint";
+    for (what, value, why) in [
+        ("rotor_inertia", &drive.rotor_inertia, inertia),
+        ("gear_ratio", &drive.gear_ratio, "it would multiply the inertia of a rotor"),
+        ("armature", &drive.armature, inertia),
+        ("spring.stiffness", &drive.spring_stiffness, "it would add a torque to the joint"),
+        ("spring.rest", &drive.spring_rest, "it would add a torque to the joint"),
+    ] {
+        if let Some(value) = value {
+            let owner = format!("joint `{}`", joint.value);
+            let help = format!("remove `{what}` and add its effect outside");
+            diagnostics.push(messages::not_supported_yet(&owner, what, why, &help).at(&value.place));
+        }
+    }
+}
+
+/// The limits of a joint that moves.
+pub(super) fn limits(
+    joint: &Value<String>,
+    kind: JointKind,
+    limits: &JointLimits,
+    format: Format,
+    diagnostics: &mut Diagnostics,
+) {
+    let name = &joint.value;
+    if kind != JointKind::Continuous {
+        let word = match (kind, format) {
+            (JointKind::Revolute, _) => "revolute",
+            (_, Format::MassCentreToml) => "linear",
+            _ => "prismatic",
+        };
+        match (&limits.lower, &limits.upper) {
+            (None, None) => {
+                let help = match format {
+                    Format::Urdf => "write `<limit lower=\"...\" upper=\"...\" velocity=\"...\" effort=\"...\"/>`, or type `continuous`",
+                    Format::JointFrameToml => "write `limits = { lower = ..., upper = ... }`, or kind `continuous`",
+                    Format::MassCentreToml => "write `limits = [lower, upper]`",
+                };
+                diagnostics.push(messages::limits_missing(name, word, help).at(&joint.place));
+            }
+            (Some(lower), Some(upper)) if lower.value > upper.value => {
+                let complaint = messages::limits_reversed(name, lower.value, upper.value).at(&lower.place);
+                diagnostics.push(complaint);
+            }
+            _ => {}
+        }
+    }
+    for (what, limit) in [("velocity", &limits.velocity), ("effort", &limits.effort)] {
+        if let Some(limit) = limit.as_ref().filter(|l| l.value < 0.0) {
+            diagnostics.push(messages::negative_limit(name, what, limit.value).at(&limit.place));
+        }
+    }
+}
+
+/// The limits as the model has them.
+pub(super) fn model_limits(kind: JointKind, limits: &JointLimits) -> Limits {
+    let or = |limit: &Option<Value<f64>>, default: f64| limit.as_ref().map_or(default, |l| l.value);
+    let is_continuous = kind == JointKind::Continuous;
+    Limits {
+        lower: if is_continuous { f64::NEG_INFINITY } else { or(&limits.lower, f64::NEG_INFINITY) },
+        upper: if is_continuous { f64::INFINITY } else { or(&limits.upper, f64::INFINITY) },
+        velocity: or(&limits.velocity, f64::INFINITY).abs(),
+        effort: or(&limits.effort, f64::INFINITY).abs(),
+    }
+}
+
+/// Angles that are near a right angle and not taken as one, and angles of a million radians.
+pub(super) fn angles(description: &Description, tolerance: f64, diagnostics: &mut Diagnostics) {
+    each_angle(description, &mut |what, written| {
+        let greatest = angle::radians(written).to_f64();
+        if greatest.abs() > angle::GREATEST_ANGLE {
+            diagnostics.push(messages::out_of_range(&what(), greatest, angle::GREATEST_ANGLE).at(&written.place));
+            return;
+        }
+        let reading = angle::read(written, tolerance);
+        let is_near = reading.special.is_none() && reading.deviation.abs() <= angle::DOUBTFUL;
+        if is_near {
+            let name = angle::name_of_twelfths(6 * reading.right_angles);
+            let complaint = messages::near_right_angle(&what(), &written.text, &name, reading.deviation);
+            diagnostics.push(complaint.at(&written.place));
+        }
+    });
+}
+
+/// Whether something moves, and whether every joint moves something.
+pub(super) fn motion(assembly: &Assembly, description: &Description, diagnostics: &mut Diagnostics) {
+    let bodies = &assembly.bodies;
+    if bodies.is_empty() {
+        if !diagnostics.has_errors() {
+            diagnostics.push(messages::nothing_moves(&description.name.value).at(&description.name.place));
+        }
+        return;
+    }
+    let inertia_of = |id: usize| {
+        let s = bodies[id].inertia.second_moment_com;
+        [s.xx, s.yy, s.zz, s.xy, s.xz, s.yz].iter().any(|x| x.to_f64() != 0.0)
+    };
+    let mut has_mass: Vec<bool> = bodies.iter().map(|b| b.inertia.mass.to_f64() > 0.0).collect();
+    let mut has_inertia: Vec<bool> = (0..bodies.len()).map(inertia_of).collect();
+    let mut is_leaf = vec![true; bodies.len()];
+    for id in (0..bodies.len()).rev() {
+        if let Some(parent) = bodies[id].parent {
+            has_mass[parent] |= has_mass[id];
+            has_inertia[parent] |= has_inertia[id];
+            is_leaf[parent] = false;
+        }
+    }
+    for (id, body) in bodies.iter().enumerate() {
+        let about_axis = body.inertia.second_moment.xx + body.inertia.second_moment.yy;
+        let what = match body.joint.kind {
+            ModelJointKind::Prismatic | ModelJointKind::Floating if !has_mass[id] => "mass",
+            ModelJointKind::Revolute if !has_mass[id] && !has_inertia[id] => "mass",
+            ModelJointKind::Revolute if is_leaf[id] && about_axis.to_f64() == 0.0 => "inertia about its axis",
+            _ => continue,
+        };
+        diagnostics.push(messages::singular_joint(&body.joint.name, what).at(&assembly.joint_places[id]));
+    }
+}

@@ -1,0 +1,212 @@
+//! From links and joints with frames to bodies: fixed joints merged, canonical frames, depth first.
+
+use super::geometry::{canonical_rotation, compose, point, snap_tensor, snap_vector, turned, unit, vector};
+use super::{angle, check, transform, Assembly, ModelOptions};
+use crate::description::{messages, BaseKind, Description, Inertial, JointFrameNotation, JointKind};
+use crate::diagnostic::{Diagnostics, Place};
+use std::collections::BTreeMap;
+use straightline_core::model::{Body, BodyId, Frame, Joint, JointKind as ModelJointKind, Limits};
+use straightline_core::spatial::{SpatialInertia, Sym3, Transform, Vec3};
+use straightline_core::Dd;
+
+/// What a link adds to its body, in the body's canonical frame.
+struct Part {
+    mass: Dd,
+    com: Vec3<Dd>,
+    inertia_com: Sym3<Dd>,
+}
+
+pub(super) fn assemble(
+    notation: &JointFrameNotation,
+    description: &Description,
+    options: &ModelOptions,
+    tolerance: f64,
+    diagnostics: &mut Diagnostics,
+) -> Option<Assembly> {
+    for joint in &notation.joints {
+        check::joint(joint, description.format, diagnostics);
+    }
+    for link in &notation.links {
+        if let Some(Inertial { mass, inertia, .. }) = &link.inertial {
+            check::inertial(&link.name.value, mass, inertia, diagnostics);
+        }
+    }
+    let tree = check::tree(notation, &description.name, diagnostics)?;
+    if diagnostics.has_errors() {
+        return None;
+    }
+    let is_floating = floats(description, options, diagnostics);
+
+    let mut bodies: Vec<Body<Dd>> = Vec::new();
+    let mut joint_places: Vec<Place> = Vec::new();
+    let mut parts: Vec<Vec<Part>> = Vec::new();
+    let mut poses: Vec<(Option<BodyId>, Transform<Dd>)> = vec![(None, Transform::identity()); notation.links.len()];
+    if is_floating {
+        let root = &notation.links[tree.root].name;
+        let joint = Joint {
+            name: root_joint_name(notation),
+            kind: ModelJointKind::Floating,
+            iq: 0,
+            iv: 0,
+            limits: Limits::default(),
+        };
+        bodies.push(new_body(&root.value, None, joint, Transform::identity(), Transform::identity()));
+        joint_places.push(root.place.clone());
+        parts.push(Vec::new());
+        poses[tree.root].0 = Some(0);
+    }
+    let mut open: Vec<usize> = vec![tree.root];
+    // depth first, the joints of a link in the order of the file: a stack takes them in reverse
+    let mut above: Vec<Option<usize>> = vec![None; notation.links.len()];
+    while let Some(link_index) = open.pop() {
+        if let Some(j) = above[link_index] {
+            let joint = &notation.joints[j];
+            let parent = poses[tree.parent_of[j]];
+            let x_parent_joint = compose(&parent.1, &transform(&joint.origin, tolerance));
+            poses[link_index] = match joint.kind.value {
+                JointKind::Fixed | JointKind::Floating => (parent.0, x_parent_joint),
+                kind => {
+                    let r_joint_canonical = canonical_rotation(unit(vector(joint.axis.value))?);
+                    let placement = compose(&x_parent_joint, &turned(r_joint_canonical));
+                    let link_frame = turned(r_joint_canonical.transpose());
+                    let model_joint = Joint {
+                        name: joint.name.value.clone(),
+                        kind: match kind {
+                            JointKind::Prismatic => ModelJointKind::Prismatic,
+                            _ => ModelJointKind::Revolute,
+                        },
+                        iq: 0,
+                        iv: 0,
+                        limits: check::model_limits(kind, &joint.limits),
+                    };
+                    bodies.push(new_body(&joint.child.value, parent.0, model_joint, placement, link_frame));
+                    joint_places.push(joint.name.place.clone());
+                    parts.push(Vec::new());
+                    (Some(bodies.len() - 1), link_frame)
+                }
+            };
+        }
+        let (body, x_body_link) = poses[link_index];
+        if let (Some(body), Some(inertial)) = (body, &notation.links[link_index].inertial) {
+            parts[body].push(part(inertial, &x_body_link, tolerance));
+        }
+        for &j in tree.joints_of[link_index].iter().rev() {
+            above[tree.child_of[j]] = Some(j);
+            open.push(tree.child_of[j]);
+        }
+    }
+    for (body, parts) in bodies.iter_mut().zip(&parts) {
+        body.inertia = merge(parts);
+    }
+    zero_masses(notation, &bodies, &poses, diagnostics);
+
+    let mut links = BTreeMap::new();
+    let mut frames = Vec::new();
+    for (link, &(body, placement)) in notation.links.iter().zip(&poses) {
+        links.insert(link.name.value.clone(), (body, placement));
+        frames.push(Frame { name: link.name.value.clone(), body, placement });
+    }
+    for frame in &notation.frames {
+        let (body, x_body_link) = *links.get(&frame.link.value)?;
+        let placement = compose(&x_body_link, &transform(&frame.pose, tolerance));
+        frames.push(Frame { name: frame.name.value.clone(), body, placement });
+    }
+    Some(Assembly { bodies, joint_places, frames, links })
+}
+
+/// Whether the base floats, by file or option.
+fn floats(description: &Description, options: &ModelOptions, diagnostics: &mut Diagnostics) -> bool {
+    match &description.base {
+        Some(base) if base.value == BaseKind::Fixed && options.floating_base => {
+            diagnostics.push(messages::floating_by_option().at(&base.place));
+            true
+        }
+        Some(base) => base.value == BaseKind::Floating || options.floating_base,
+        None => options.floating_base,
+    }
+}
+
+/// `root_joint`, or with underscores before it where the file has a joint of that name.
+fn root_joint_name(notation: &JointFrameNotation) -> String {
+    let mut name = "root_joint".to_string();
+    while notation.joints.iter().any(|j| j.name.value == name) {
+        name.insert(0, '_');
+    }
+    name
+}
+
+fn new_body(
+    name: &str,
+    parent: Option<BodyId>,
+    joint: Joint,
+    placement: Transform<Dd>,
+    link_frame: Transform<Dd>,
+) -> Body<Dd> {
+    Body { name: name.to_string(), parent, joint, placement, inertia: SpatialInertia::zero(), link_frame }
+}
+
+fn part(inertial: &Inertial, x_body_link: &Transform<Dd>, tolerance: f64) -> Part {
+    let r_body_inertial = compose(x_body_link, &turned(angle::rotation(&inertial.rotation, tolerance))).rotation;
+    Part {
+        mass: Dd::from(inertial.mass.value),
+        com: point(x_body_link, vector(inertial.com.value)),
+        inertia_com: snap_tensor(inertial.inertia.value.map(Dd::from).rotated(&r_body_inertial)),
+    }
+}
+
+/// The inertia of parts that are fixed to each other: mass centres weighed, tensors by the parallel-axis theorem
+/// J = Σ J_i + m_i (d_i·d_i 1 − d_i d_iᵀ), d_i from the common mass centre to that of part i.
+fn merge(parts: &[Part]) -> SpatialInertia<Dd> {
+    let massive: Vec<&Part> = parts.iter().filter(|p| p.mass != Dd::ZERO).collect();
+    let mass = massive.iter().fold(Dd::ZERO, |sum, p| sum + p.mass);
+    let com = match massive[..] {
+        [] => parts.first().map_or(Vec3::zero(), |p| p.com),
+        [single] => single.com,
+        _ => {
+            let scale = massive.iter().map(|p| super::geometry::magnitude(p.com)).fold(0.0, f64::max);
+            let moment = massive.iter().fold(Vec3::zero(), |sum, p| sum + p.com.scale(p.mass));
+            snap_vector(moment.map(|x| x / mass), scale)
+        }
+    };
+    let mut inertia = parts.iter().fold(Sym3::zero(), |sum, p| sum + p.inertia_com);
+    if massive.len() > 1 {
+        for part in massive {
+            let d = part.com - com;
+            let m = part.mass;
+            inertia = inertia
+                + Sym3 {
+                    xx: m * (d.y * d.y + d.z * d.z),
+                    xy: -(m * d.x * d.y),
+                    xz: -(m * d.x * d.z),
+                    yy: m * (d.x * d.x + d.z * d.z),
+                    yz: -(m * d.y * d.z),
+                    zz: m * (d.x * d.x + d.y * d.y),
+                };
+        }
+    }
+    SpatialInertia::new(mass, com, snap_tensor(inertia))
+}
+
+/// Warns of links whose mass is written as zero while nothing of their body has any, but what they carry has.
+fn zero_masses(
+    notation: &JointFrameNotation,
+    bodies: &[Body<Dd>],
+    poses: &[(Option<BodyId>, Transform<Dd>)],
+    diagnostics: &mut Diagnostics,
+) {
+    let mut carries_mass = vec![false; bodies.len()];
+    for (id, body) in bodies.iter().enumerate().rev() {
+        if let Some(parent) = body.parent {
+            carries_mass[parent] |= carries_mass[id] || body.inertia.mass != Dd::ZERO;
+        }
+    }
+    for (link, (body, _)) in notation.links.iter().zip(poses) {
+        let (Some(body), Some(inertial)) = (*body, &link.inertial) else { continue };
+        let s = bodies[body].inertia.second_moment_com;
+        let has_inertia = [s.xx, s.yy, s.zz].iter().any(|x| *x != Dd::ZERO);
+        let is_link_of_joint = bodies[body].name == link.name.value;
+        if is_link_of_joint && bodies[body].inertia.mass == Dd::ZERO && !has_inertia && carries_mass[body] {
+            diagnostics.push(messages::zero_mass(&link.name.value).at(&inertial.mass.place));
+        }
+    }
+}

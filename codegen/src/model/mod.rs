@@ -1,0 +1,295 @@
+//! From a [`Description`] to a [`Model`]: the tree checked, fixed joints merged, everything in canonical joint frames.
+//!
+//! All numbers are computed in double-double from the nearest f64 of what is written, so that a constant of the generated
+//! code is rounded once. Entries of rotations that are 0 or ±1 are exactly that.
+//!
+//! ```
+//! use straightline_codegen::diagnostic::Source;
+//! use straightline_codegen::model::{load, ModelOptions};
+//! let pendulum = r#"
+//!     [robot]
+//!     name = "pendulum"
+//!     [[link]]
+//!     name = "world"
+//!     [[link]]
+//!     name = "bob"
+//!     mass = 1.5
+//!     com = [0.0, 0.0, -0.4]
+//!     inertia = [0.02, 0.02, 0.001]
+//!     [[joint]]
+//!     name = "pivot"
+//!     kind = "continuous"
+//!     parent = "world"
+//!     child = "bob"
+//!     axis = "y"
+//! "#;
+//! let (model, diagnostics) = load(&Source::new("pendulum.toml", pendulum), &ModelOptions::default());
+//! assert!(diagnostics.is_empty(), "{diagnostics}");
+//! assert_eq!(model.unwrap().bodies[0].joint.name, "pivot");
+//! ```
+
+mod angle;
+mod check;
+mod geometry;
+mod joint_frames;
+mod mass_centres;
+
+use crate::description::{self, messages, Angle, Description, Notation, Pose, Rotation, Value};
+use crate::diagnostic::{Diagnostics, Place, Source};
+use geometry::{compose, vector};
+use std::collections::{BTreeMap, HashMap};
+use straightline_core::model::{Body, BodyId, Frame, JointKind, Model};
+use straightline_core::spatial::Transform;
+use straightline_core::Dd;
+
+/// Links of a robot that is compiled.
+const MOST_LINKS: usize = 10_000;
+
+/// What is asked for beyond what the file says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelOptions {
+    /// The root link moves freely in the world; also if the file states it.
+    pub floating_base: bool,
+    /// Names of all joints that move, in the order in which they stand in q, qd and tau; `None`: depth first, in the
+    /// order of the file. The joint of a floating base may be left out and then comes first.
+    pub joint_order: Option<Vec<String>>,
+    /// So near to a multiple of π/4 or π/6 \[rad\] an angle is taken as that. The default, 1e-15, covers rounding only;
+    /// 0 takes every angle in radians literally.
+    pub angle_tolerance: f64,
+    /// Acceleration due to gravity in the world \[m/s²\]; `None`: the file's, or else (0, 0, −9.81).
+    pub gravity: Option<[f64; 3]>,
+    /// Further frames.
+    pub frames: Vec<FrameOption>,
+}
+
+impl Default for ModelOptions {
+    fn default() -> Self {
+        ModelOptions {
+            floating_base: false,
+            joint_order: None,
+            angle_tolerance: angle::ROUNDING,
+            gravity: None,
+            frames: Vec::new(),
+        }
+    }
+}
+
+/// A frame that is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameOption {
+    /// Its name.
+    pub name: String,
+    /// The link that carries it.
+    pub link: String,
+    /// Its position in the link frame \[m\].
+    pub xyz: [f64; 3],
+    /// Its roll, pitch and yaw \[rad\].
+    pub rpy: [f64; 3],
+}
+
+/// An angle that is taken as a multiple of π/4 or π/6 and is not written exactly so.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpecialAngle {
+    /// Where it stands.
+    pub place: Place,
+    /// Whose angle it is, such as ``roll of the origin of joint `elbow` ``.
+    pub what: String,
+    /// How it is written.
+    pub text: String,
+    /// As what it is taken, such as `π/2`.
+    pub taken_as: String,
+    /// What is written less what it is taken as \[rad\].
+    pub deviation: f64,
+}
+
+/// Reads a robot file and builds its model: [`description::read`], then [`build`].
+pub fn load(source: &Source, options: &ModelOptions) -> (Option<Model<Dd>>, Diagnostics) {
+    let mut diagnostics = Diagnostics::new();
+    let description = description::read(source, &mut diagnostics);
+    let model = description.and_then(|description| build(&description, options, &mut diagnostics));
+    finish(&mut diagnostics);
+    (model, diagnostics)
+}
+
+/// Orders the complaints and says how many were dropped.
+pub fn finish(diagnostics: &mut Diagnostics) {
+    diagnostics.sort();
+    let dropped: Vec<_> = diagnostics.dropped().filter(|d| d.0 != "more-complaints").collect();
+    for (code, more) in dropped {
+        diagnostics.push(messages::more_complaints(code, more));
+    }
+}
+
+/// Checks a description and builds the model. Complaints go to `diagnostics`; `None` if it holds an error, be it from here
+/// or from reading.
+pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mut Diagnostics) -> Option<Model<Dd>> {
+    check_options(options, diagnostics);
+    let tolerance = if options.angle_tolerance >= 0.0 { options.angle_tolerance } else { angle::ROUNDING };
+    check::angles(description, tolerance, diagnostics);
+    let assembly = match &description.notation {
+        Notation::JointFrames(bodies) => joint_frames::assemble(bodies, description, options, tolerance, diagnostics),
+        Notation::MassCentres(chain) => mass_centres::assemble(chain, description, options, tolerance, diagnostics),
+    };
+    let mut assembly = assembly?;
+    check::motion(&assembly, description, diagnostics);
+    add_frames(&mut assembly, options, tolerance, diagnostics);
+    order_joints(&mut assembly.bodies, options, diagnostics);
+    if diagnostics.has_errors() {
+        return None;
+    }
+    let gravity = options.gravity.or(description.gravity.as_ref().map(|g| g.value)).unwrap_or([0.0, 0.0, -9.81]);
+    Some(Model {
+        name: description.name.value.clone(),
+        bodies: assembly.bodies,
+        gravity: vector(gravity),
+        frames: assembly.frames,
+    })
+}
+
+/// The angles of a description that are taken as multiples of π/4 or π/6 and are not written exactly so.
+pub fn special_angles(description: &Description, options: &ModelOptions) -> Vec<SpecialAngle> {
+    let mut found = Vec::new();
+    each_angle(description, &mut |what, angle| {
+        let reading = angle::read(angle, options.angle_tolerance);
+        if let Some(m) = reading.special.filter(|_| reading.deviation != 0.0) {
+            found.push(SpecialAngle {
+                place: angle.place.clone(),
+                what: what(),
+                text: angle.text.clone(),
+                taken_as: angle::name_of_twelfths(m),
+                deviation: reading.deviation,
+            });
+        }
+    });
+    found
+}
+
+/// Every angle of a description, with a name for it.
+fn each_angle(description: &Description, visit: &mut dyn FnMut(&dyn Fn() -> String, &Angle)) {
+    let mut rotation = |owner: &dyn Fn() -> String, rotation: &Rotation| {
+        for (name, angle) in ["roll", "pitch", "yaw"].into_iter().zip(&rotation.rpy) {
+            visit(&|| format!("{name} of {}", owner()), angle);
+        }
+    };
+    match &description.notation {
+        Notation::JointFrames(bodies) => {
+            for link in &bodies.links {
+                if let Some(inertial) = &link.inertial {
+                    rotation(&|| format!("the inertia of link `{}`", link.name.value), &inertial.rotation);
+                }
+            }
+            for joint in &bodies.joints {
+                rotation(&|| format!("the origin of joint `{}`", joint.name.value), &joint.origin.rotation);
+            }
+            for frame in &bodies.frames {
+                rotation(&|| format!("frame `{}`", frame.name.value), &frame.pose.rotation);
+            }
+        }
+        Notation::MassCentres(chain) => {
+            for link in &chain.links {
+                if let Some(alpha) = &link.alpha {
+                    visit(&|| format!("alpha of link `{}`", link.name.value), alpha);
+                }
+            }
+        }
+    }
+}
+
+/// A pose in numbers.
+fn transform(pose: &Pose, tolerance: f64) -> Transform<Dd> {
+    Transform { rotation: angle::rotation(&pose.rotation, tolerance), translation: vector(pose.xyz.value) }
+}
+
+/// Bodies and frames before joints are ordered.
+struct Assembly {
+    bodies: Vec<Body<Dd>>,
+    /// For each body, where its joint is written.
+    joint_places: Vec<Place>,
+    frames: Vec<Frame<Dd>>,
+    /// Body and pose of every link.
+    links: BTreeMap<String, (Option<BodyId>, Transform<Dd>)>,
+}
+
+fn check_options(options: &ModelOptions, diagnostics: &mut Diagnostics) {
+    let tolerance = options.angle_tolerance;
+    if !(0.0..=0.1).contains(&tolerance) {
+        diagnostics.push(messages::bad_option("angle tolerance", &format!("{tolerance:?}"), "between 0 and 0.1 rad"));
+    }
+    let is_fit = |v: &[f64; 3]| v.iter().all(|x| x.abs() <= 1e6);
+    if let Some(gravity) = options.gravity.filter(|g| !is_fit(g)) {
+        diagnostics.push(messages::bad_option("gravity", &format!("{gravity:?}"), "three finite numbers in m/s²"));
+    }
+    for frame in &options.frames {
+        if !is_fit(&frame.xyz) || !is_fit(&frame.rpy) {
+            let value = format!("{:?} {:?}", frame.xyz, frame.rpy);
+            diagnostics.push(messages::bad_option(
+                &format!("frame {}", frame.name),
+                &value,
+                "a position and three angles",
+            ));
+        }
+    }
+}
+
+/// Adds the frames that are asked for.
+fn add_frames(assembly: &mut Assembly, options: &ModelOptions, tolerance: f64, diagnostics: &mut Diagnostics) {
+    for option in &options.frames {
+        if assembly.frames.iter().any(|f| f.name == option.name) {
+            diagnostics.push(messages::duplicate_name("frame", &option.name));
+            continue;
+        }
+        let Some((body, x_body_link)) = assembly.links.get(&option.link) else {
+            let owner = format!("frame `{}`", option.name);
+            diagnostics.push(messages::unknown_link(&owner, &option.link, assembly.links.keys().map(String::as_str)));
+            continue;
+        };
+        let zero = Angle::zero(Place::none());
+        let rpy = option.rpy.map(|value| Angle { value, ..zero.clone() });
+        let pose = Pose { xyz: Value::assumed(option.xyz), rotation: Rotation { rpy } };
+        let placement = compose(x_body_link, &transform(&pose, tolerance));
+        assembly.frames.push(Frame { name: option.name.clone(), body: *body, placement });
+    }
+}
+
+/// Gives every joint its place in the coordinate vectors.
+fn order_joints(bodies: &mut [Body<Dd>], options: &ModelOptions, diagnostics: &mut Diagnostics) {
+    let mut order: Vec<BodyId> = Vec::new();
+    match &options.joint_order {
+        None => order.extend(0..bodies.len()),
+        Some(names) => {
+            let index: HashMap<&str, BodyId> =
+                bodies.iter().enumerate().map(|(id, b)| (b.joint.name.as_str(), id)).collect();
+            let mut seen = vec![false; bodies.len()];
+            let root = bodies.iter().position(|b| b.joint.kind == JointKind::Floating);
+            if let Some(root) = root.filter(|&r| !names.contains(&bodies[r].joint.name)) {
+                seen[root] = true;
+                order.push(root);
+            }
+            for name in names {
+                match index.get(name.as_str()) {
+                    None => {
+                        let known = bodies.iter().map(|b| b.joint.name.as_str());
+                        diagnostics.push(messages::joint_order_unknown(name, known));
+                    }
+                    Some(&id) if seen[id] => diagnostics.push(messages::joint_order_twice(name)),
+                    Some(&id) => {
+                        seen[id] = true;
+                        order.push(id);
+                    }
+                }
+            }
+            let missing: Vec<&str> =
+                bodies.iter().zip(&seen).filter(|(_, seen)| !**seen).map(|(b, _)| b.joint.name.as_str()).collect();
+            if !missing.is_empty() {
+                diagnostics.push(messages::joint_order_missing(&missing));
+            }
+        }
+    }
+    let (mut iq, mut iv) = (0, 0);
+    for id in order {
+        let joint = &mut bodies[id].joint;
+        (joint.iq, joint.iv) = (iq, iv);
+        iq += joint.kind.nq();
+        iv += joint.kind.nv();
+    }
+}
