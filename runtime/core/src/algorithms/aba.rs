@@ -52,7 +52,7 @@ pub fn solve_articulated<T: Real>(model: &Model<T>, q: &[T], drive: &[T]) -> Vec
             let bias = biases[b]
                 + ForceVector { moment: joint.moment.scale(joint.rate), force: joint.force.scale(joint.rate) };
             biases[parent] = biases[parent] + pose.wrench_to_parent(&bias);
-            inertias[parent] = inertias[parent].plus(&freed.to_parent(pose));
+            inertias[parent] = inertias[parent].plus(&freed.in_parent(pose));
         }
         joints[b] = Some(joint);
     }
@@ -182,7 +182,7 @@ impl<T: Real> ArticulatedInertia<T> {
     }
 
     /// In the parent's axes, about the parent's origin.
-    fn to_parent(&self, pose: &JointPose<T>) -> Self {
+    fn in_parent(&self, pose: &JointPose<T>) -> Self {
         let moved = match (pose.turn, pose.slide) {
             (Some((s, c)), _) => {
                 ArticulatedInertia { j: self.j.turned(s, c), h: self.h.turned(s, c), m: self.m.turned(s, c) }
@@ -230,15 +230,16 @@ impl<T: Real> ArticulatedInertia<T> {
         let mut inverse_pivots = [T::zero(); 6];
         for k in 0..6 {
             inverse_pivots[k] = T::one() / a[k][k];
+            let column = a.map(|row| row[k]); // L D
             for r in k + 1..6 {
-                let factor = a[r][k] * inverse_pivots[k];
-                for c in k + 1..=r {
-                    a[r][c] = a[r][c] - factor * a[c][k];
+                let factor = column[r] * inverse_pivots[k];
+                for (entry, &below) in a[r][k + 1..=r].iter_mut().zip(&column[k + 1..]) {
+                    *entry = *entry - factor * below;
                 }
                 x[r] = x[r] - factor * x[k];
             }
         }
-        // a now holds L D below the diagonal
+        // a holds L D below the diagonal
         for k in (0..6).rev() {
             for r in k + 1..6 {
                 x[k] = x[k] - a[r][k] * x[r];
