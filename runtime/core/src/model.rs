@@ -25,6 +25,7 @@ pub enum JointKind {
     /// The root body, free in the world. q = (x, y, z, qx, qy, qz, qw): position and orientation (a unit quaternion) of
     /// the root link in the world; qd = (v, ω): velocity of the root link's origin and angular velocity, in root-link
     /// axes; qdd the componentwise derivative of qd; tau the force and the moment about that origin, in root-link axes.
+    /// It has no parent, and q says all about its pose: [`Body::placement`] and [`Body::link_frame`] are the identity.
     Floating,
 }
 

@@ -598,6 +598,21 @@ fn turning_the_whole_scene_changes_no_torque() {
 }
 
 #[test]
+fn far_from_the_origin_no_digit_is_lost() {
+    for case in cases().filter(|case| case.model.bodies[0].joint.kind == JointKind::Floating) {
+        let numbers = |x: &[Dd]| x.iter().map(|x| x.to_f64()).collect::<Vec<f64>>();
+        let (model, q, qd) = (case.model.cast::<f64>(), numbers(&case.q), numbers(&case.qd));
+        let (mut far, iq) = (q.clone(), model.bodies[0].joint.iq);
+        far[iq..iq + 3].fill(1e15);
+        let frame = &model.frames[0];
+        assert_eq!(jacobian(&model, &far, frame), jacobian(&model, &q, frame), "seed {}", case.seed);
+        assert_eq!(jacobian_bias(&model, &far, &qd, frame), jacobian_bias(&model, &q, &qd, frame));
+        assert_eq!(momentum(&model, &far, &qd).angular, momentum(&model, &q, &qd).angular);
+        assert_eq!(inverse_dynamics(&model, &far, &qd, &qd), inverse_dynamics(&model, &q, &qd, &qd));
+    }
+}
+
+#[test]
 fn the_form_of_a_rotation_changes_only_rounding() {
     for case in cases() {
         for dense in [false, true] {

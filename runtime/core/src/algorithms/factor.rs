@@ -5,7 +5,7 @@
 
 use super::crba::mass_matrix;
 use super::rnea::bias_force;
-use crate::model::Model;
+use crate::model::{BodyId, Model};
 use crate::real::Real;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -31,13 +31,13 @@ impl<T: Real> Ltdl<T> {
     /// finite.
     pub fn factor(model: &Model<T>, mass_matrix: &[T]) -> Self {
         let nv = model.nv();
-        let (coordinates, parents) = branches(model);
+        let Branches { coordinates, bodies, parents } = branches(model);
         // the triangle below the diagonal, in the order of the rows; it becomes L in place
         let entry = |row: usize, column: usize| mass_matrix[coordinates[row] * nv + coordinates[column]];
         let mut lower: Vec<Vec<T>> = (0..nv).map(|i| (0..=i).map(|j| entry(i, j)).collect()).collect();
         let mut inverse_pivots = vec![T::zero(); nv];
         for k in (0..nv).rev() {
-            T::section("factor", Some(coordinates[k]));
+            T::section("factor", Some(bodies[k]));
             let inverse_pivot = (T::one() / lower[k][k]).named("inverse_pivot", coordinates[k], "");
             inverse_pivots[k] = inverse_pivot;
             for i in up(&parents, k) {
@@ -77,28 +77,37 @@ impl<T: Real> Ltdl<T> {
 }
 
 /// q̈ \[rad/s² or m/s²\] that the generalized forces tau \[N·m or N\] cause: H q̈ = tau − h, with [`Ltdl`].
-#[doc(alias = "inverse dynamics of the chapter")]
 pub fn forward_dynamics_ltdl<T: Real>(model: &Model<T>, q: &[T], qd: &[T], tau: &[T]) -> Vec<T> {
     let bias = bias_force(model, q, qd);
     let drive: Vec<T> = tau.iter().zip(&bias).map(|(&t, &h)| t - h).collect();
     Ltdl::factor(model, &mass_matrix(model, q)).solve(&drive)
 }
 
-/// The velocity coordinates from the base outwards, and for each the place of the next one towards the base
-/// (Featherstone 2008, section 6.4: the expanded parent array; a floating base is a chain of six).
-fn branches<T: Real>(model: &Model<T>) -> (Vec<usize>, Vec<Option<usize>>) {
-    let (mut coordinates, mut parents) = (Vec::new(), Vec::new());
-    let mut last_row_of_body: Vec<Option<usize>> = Vec::new();
-    for body in &model.bodies {
-        let mut parent = body.parent.and_then(|p| last_row_of_body[p]);
+/// The velocity coordinates from the base outwards (Featherstone 2008, section 6.4: the expanded parent array).
+struct Branches {
+    /// Index into qd.
+    coordinates: Vec<usize>,
+    /// The body it moves.
+    bodies: Vec<BodyId>,
+    /// Place in this list of the next coordinate towards the base.
+    parents: Vec<Option<usize>>,
+}
+
+/// A floating base is a chain of six.
+fn branches<T: Real>(model: &Model<T>) -> Branches {
+    let mut list = Branches { coordinates: Vec::new(), bodies: Vec::new(), parents: Vec::new() };
+    let mut last_of_body: Vec<Option<usize>> = Vec::new();
+    for (b, body) in model.bodies.iter().enumerate() {
+        let mut parent = body.parent.and_then(|p| last_of_body[p]);
         for k in 0..body.joint.kind.nv() {
-            coordinates.push(body.joint.iv + k);
-            parents.push(parent);
-            parent = Some(coordinates.len() - 1);
+            list.coordinates.push(body.joint.iv + k);
+            list.bodies.push(b);
+            list.parents.push(parent);
+            parent = Some(list.coordinates.len() - 1);
         }
-        last_row_of_body.push(parent);
+        last_of_body.push(parent);
     }
-    (coordinates, parents)
+    list
 }
 
 /// The rows on the way from `row` to the base, without `row`.

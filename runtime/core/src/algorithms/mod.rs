@@ -7,6 +7,33 @@
 //! No scalar is compared and no zero is skipped, so that the same source runs with numbers and writes down equations;
 //! what a branch depends on is the structure of the robot alone.
 //!
+//! ```
+//! use straightline_core::algorithms::{bias_force, inverse_dynamics, mass_matrix};
+//! use straightline_core::model::{Body, Joint, JointKind, Limits, Model};
+//! use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
+//!
+//! // 2 kg at 0.5 m on a horizontal axis: z of the joint frame along y of the world, x along x
+//! let rotation = Mat3 { rows: [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]] };
+//! let pendulum = Model {
+//!     name: "pendulum".into(),
+//!     bodies: vec![Body {
+//!         name: "bob".into(),
+//!         parent: None,
+//!         joint: Joint { name: "hinge".into(), kind: JointKind::Revolute, iq: 0, iv: 0, limits: Limits::default() },
+//!         placement: Transform { rotation, translation: Vec3::zero() },
+//!         inertia: SpatialInertia::new(2.0, Vec3::new(0.5, 0.0, 0.0), Sym3::zero()),
+//!         link_frame: Transform::identity(),
+//!         dense: false,
+//!     }],
+//!     gravity: Vec3::new(0.0, 0.0, -10.0),
+//!     frames: vec![],
+//! };
+//! let (q, qd, qdd) = ([0.0], [3.0], [4.0]);
+//! assert_eq!(mass_matrix(&pendulum, &q), [0.5]); // m l²
+//! assert_eq!(bias_force(&pendulum, &q, &qd), [-10.0]); // the weight turns it by +y, the drive must hold by −y
+//! assert_eq!(inverse_dynamics(&pendulum, &q, &qd, &qdd), [0.5 * 4.0 - 10.0]);
+//! ```
+//!
 //! | wanted | function |
 //! |---|---|
 //! | pose, velocity, acceleration of a frame | [`forward_kinematics`], [`frame_velocity`], [`frame_acceleration`] |
