@@ -13,7 +13,8 @@ use straightline_core::reference::{
     LinkMotion, MassCentreFrame, MassCentreLink, MassCentreTree,
 };
 use straightline_core::Dd;
-use support::{chapter_robot, inputs, numbers, random_position, random_robot, reference_folder, Random, RobotKind};
+use support::data::{inputs, numbers, reference_folder};
+use support::robots::{chapter_robot, random_position, random_robot, Random, RobotKind};
 
 const CHAPTER_ROBOTS: [&str; 4] = ["chapter_cylindrical", "chapter_stanford", "chapter_6r", "chapter_oblique"];
 

@@ -10,7 +10,7 @@ use straightline_core::model::{self, Body, Frame, JointKind, Limits, Model};
 use straightline_core::reference::{self, unit, ExtendedPosition, Joint, MassCentreTree};
 use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::Dd;
-use support::{random_position, random_robot, Random, RobotKind};
+use support::robots::{random_position, random_robot, Random, RobotKind};
 
 /// Against the scale of each quantity. Double-double has 1.2e-32, the worst seen is 3e-30 (`--nocapture` prints it).
 const TOLERANCE: f64 = 2e-29;
