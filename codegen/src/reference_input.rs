@@ -19,32 +19,33 @@ use straightline_core::reference::{unit, ExtendedPosition, Joint, MassCentreFram
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
 
-/// What the file leaves to the reader.
-#[derive(Clone, Copy, Debug)]
+/// What is asked for beyond what the file says.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reading {
-    /// How an angle of the file is understood \[rad\]: [`literal_angle`], or with right angles recognised.
-    pub angle: fn(&Angle) -> Dd,
-    /// The base, where the file says nothing or something else is wanted.
-    pub base: Option<BaseKind>,
-    /// Acceleration due to gravity \[m/s²\], where the file says nothing.
-    pub gravity: [f64; 3],
+    /// The root link moves freely in the world; also if the file states it.
+    pub floating_base: bool,
+    /// Acceleration due to gravity \[m/s²\]; `None`: the file's, or else (0, 0, −9.81).
+    pub gravity: Option<[f64; 3]>,
+    /// So near to a multiple of π/4 or π/6 \[rad\] an angle is taken as that; 0: every angle literally.
+    pub angle_tolerance: f64,
 }
 
-impl Default for Reading {
-    /// Literal angles, the base of the file (fixed where it says nothing), 9.81 m/s² against z.
-    fn default() -> Self {
-        Reading { angle: literal_angle, base: None, gravity: [0.0, 0.0, -9.81] }
-    }
-}
-
-/// The angle as it is written, in radians.
-pub fn literal_angle(angle: &Angle) -> Dd {
-    let value = Dd::from(angle.value);
-    match angle.unit {
-        AngleUnit::Radian => value,
-        AngleUnit::Degree => value * Dd::PI / Dd::from(180.0),
-        AngleUnit::QuarterTurn => value * Dd::FRAC_PI_2,
-        AngleUnit::Turn => value * Dd::PI * Dd::from(2.0),
+impl Reading {
+    /// An angle in radians, as it is to be understood.
+    fn angle(&self, angle: &Angle) -> Dd {
+        let value = Dd::from(angle.value);
+        let literal = match angle.unit {
+            AngleUnit::Radian => value,
+            AngleUnit::Degree => value * Dd::PI / Dd::from(180.0),
+            AngleUnit::QuarterTurn => value * Dd::FRAC_PI_2,
+            AngleUnit::Turn => value * Dd::PI * Dd::from(2.0),
+        };
+        let near = |part: f64| {
+            let step = Dd::PI / Dd::from(part);
+            let special = step * Dd::from((literal / step).hi().round());
+            (self.angle_tolerance > 0.0 && (literal - special).abs().hi() <= self.angle_tolerance).then_some(special)
+        };
+        near(4.0).or(near(6.0)).unwrap_or(literal)
     }
 }
 
@@ -54,16 +55,18 @@ pub fn literal_angle(angle: &Angle) -> Dd {
 /// # Errors
 /// If the description is no tree of links.
 pub fn mass_centre_tree(description: &Description, reading: &Reading) -> Result<MassCentreTree<Dd>, String> {
-    let gravity = description.gravity.as_ref().map_or(reading.gravity, |gravity| gravity.value);
+    let stated = description.gravity.as_ref().map(|gravity| gravity.value);
+    let gravity = reading.gravity.or(stated).unwrap_or([0.0, 0.0, -9.81]);
     let mut tree = MassCentreTree {
         name: description.name.value.clone(),
         gravity: vector(&gravity),
         links: Vec::new(),
         frames: Vec::new(),
     };
-    let base = reading.base.or(description.base.as_ref().map(|base| base.value)).unwrap_or(BaseKind::Fixed);
+    let stated = description.base.as_ref().is_some_and(|base| base.value == BaseKind::Floating);
+    let floating = reading.floating_base || stated;
     match &description.notation {
-        Notation::JointFrames(notation) => add_joint_frames(&mut tree, notation, base, reading)?,
+        Notation::JointFrames(notation) => add_joint_frames(&mut tree, notation, floating, reading)?,
         Notation::MassCentres(notation) => add_mass_centres(&mut tree, notation, reading)?,
     }
     tree.number_coordinates();
@@ -93,7 +96,7 @@ fn tensor(s: &Sym3<f64>) -> Matrix3<Dd> {
 
 /// R = Rz(yaw) Ry(pitch) Rx(roll).
 fn rotation(rotation: &Rotation, reading: &Reading) -> Matrix3<Dd> {
-    let [roll, pitch, yaw] = [0, 1, 2].map(|i| (reading.angle)(&rotation.rpy[i]).sin_cos());
+    let [roll, pitch, yaw] = [0, 1, 2].map(|i| reading.angle(&rotation.rpy[i]).sin_cos());
     let (o, l) = (Dd::ZERO, Dd::ONE);
     let (s, c) = roll;
     let rx = Matrix3::new(l, o, o, o, c, -s, o, s, c);
@@ -171,13 +174,12 @@ type Frames = Vec<(String, usize, Placed)>;
 fn add_joint_frames(
     tree: &mut MassCentreTree<Dd>,
     notation: &JointFrameNotation,
-    base: BaseKind,
+    floating: bool,
     reading: &Reading,
 ) -> Result<(), String> {
     let (groups, frames) = rigid_groups(notation, reading)?;
     let lumped: Vec<Part> = groups.iter().map(|group| Part::lump(&group.parts)).collect();
     // the root group: the world, or the floating link
-    let floating = base == BaseKind::Floating;
     let link_of = |group: usize| if floating { Some(group) } else { group.checked_sub(1) };
     // from the link frame's origin to C; frame 0 has its origin in the world's
     let centre_of = |group: usize| link_of(group).map_or_else(Vector3::zeros, |_| lumped[group].centre);
@@ -321,7 +323,7 @@ fn add_mass_centres(
             extended: ExtendedPosition::ByVectors {
                 r_star: link.r_star.as_ref().map(|r| vector(&r.value)),
                 r_parent_star: below.r_next_star.as_ref().map(|r| vector(&r.value)),
-                alpha: link.alpha.as_ref().map_or(Dd::ZERO, reading.angle),
+                alpha: link.alpha.as_ref().map_or(Dd::ZERO, |alpha| reading.angle(alpha)),
             },
         });
         // the link's own frame: in the joint, with the link's axes

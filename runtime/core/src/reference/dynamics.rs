@@ -233,7 +233,7 @@ pub fn equations_of_motion<T: Number>(tree: &MassCentreTree<T>, q: &[T], qd: &[T
                     // H''_j = Σ_k e_jᵀ (A_k J̃_k A_k⁻¹ Λ^k + r̲_k^{(j)} m_k Ξ^k)
                     // h''_j = Σ_k e_jᵀ (A_k J̃_k A_k⁻¹ Γ^k + A_k ω̲̃_k J̃_k ω̃_k + r̲_k^{(j)} m_k (Δ^k − g))           (20.58)
                     let mut row = mass_matrix.row_mut(link.iv);
-                    row += e.transpose() * (couple_matrix + lever * force_matrix);
+                    row += e.transpose() * couple_matrix + (e.transpose() * lever) * force_matrix;
                     bias_force[link.iv] += e.dot(&(couple + lever * force));
                 }
                 Joint::Free => {

@@ -16,6 +16,32 @@
 //! Conventions of the outputs: `tau` = `H q̈ + h`; wrenches are about the joint point, in child-link axes; Jacobians and
 //! poses are in world axes, rows 1–3 linear; a free link has q = (x, y, z, qx, qy, qz, qw), q̇ = (v, ω) and τ = (F, M) in
 //! root-link axes at the root link's origin.
+//!
+//! ```
+//! use nalgebra::{Matrix3, Vector3};
+//! use straightline_core::reference::{inverse_dynamics, ExtendedPosition, Joint, MassCentreLink, MassCentreTree};
+//!
+//! // a pendulum about the world's z axis: 2 kg, its mass centre 0.5 m from the joint
+//! let link = MassCentreLink {
+//!     name: "rod".into(),
+//!     parent: None,
+//!     joint: Joint::Revolute,
+//!     iq: 0,
+//!     iv: 0,
+//!     mass: 2.0,
+//!     inertia: Matrix3::from_diagonal(&Vector3::new(0.0, 0.1, 0.1)),
+//!     e: Vector3::z(),
+//!     e_parent: Vector3::z(),
+//!     r: Vector3::new(0.5, 0.0, 0.0),
+//!     r_parent: Vector3::zeros(),
+//!     extended: ExtendedPosition::Matrix(Matrix3::identity()),
+//! };
+//! let gravity = Vector3::new(0.0, -10.0, 0.0);
+//! let pendulum = MassCentreTree { name: "pendulum".into(), gravity, links: vec![link], frames: vec![] };
+//! // τ = (J + m r²) q̈ + m g r cos q
+//! let tau = inverse_dynamics(&pendulum, &[0.0], &[0.0], &[5.0]);
+//! assert_eq!(tau[0], (0.1 + 2.0 * 0.25) * 5.0 + 2.0 * 10.0 * 0.5);
+//! ```
 
 mod dynamics;
 mod energy;
