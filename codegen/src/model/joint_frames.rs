@@ -5,6 +5,7 @@ use super::{angle, check, transform, Assembly, ModelOptions};
 use crate::description::{messages, BaseKind, Description, Inertial, JointFrameNotation, JointKind};
 use crate::diagnostic::{Diagnostics, Place};
 use std::collections::BTreeMap;
+use straightline_core::algorithms::composing_pays;
 use straightline_core::model::{Body, BodyId, Frame, Joint, JointKind as ModelJointKind, Limits};
 use straightline_core::spatial::{SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::Dd;
@@ -142,7 +143,8 @@ fn new_body(
     placement: Transform<Dd>,
     link_frame: Transform<Dd>,
 ) -> Body<Dd> {
-    Body { name: name.to_string(), parent, joint, placement, inertia: SpatialInertia::zero(), link_frame }
+    let dense = composing_pays(parent, &placement.rotation);
+    Body { name: name.to_string(), parent, joint, placement, inertia: SpatialInertia::zero(), link_frame, dense }
 }
 
 fn part(inertial: &Inertial, x_body_link: &Transform<Dd>, tolerance: f64) -> Part {

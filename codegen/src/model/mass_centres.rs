@@ -12,6 +12,7 @@ use super::{angle, check, Assembly, ModelOptions, MOST_LINKS};
 use crate::description::{messages, Description, JointKind, MassCentreEnd, MassCentreLink, MassCentreNotation, Value};
 use crate::diagnostic::Diagnostics;
 use std::collections::BTreeMap;
+use straightline_core::algorithms::composing_pays;
 use straightline_core::model::{Body, Frame, Joint, JointKind as ModelJointKind};
 use straightline_core::spatial::{Mat3, SpatialInertia, Transform, Vec3};
 use straightline_core::Dd;
@@ -70,9 +71,11 @@ pub(super) fn assemble(
         let com = snap_vector(r_canonical_link * r_jj, magnitude(r_jj));
         let inertia = link.inertia.value.map(Dd::from).rotated(&r_canonical_link);
         let x_canonical_link = Transform { rotation: r_canonical_link, translation: com };
+        let parent = index.checked_sub(1);
+        let placement = compose(&x_body_previous, &x_previous_joint);
         assembly.bodies.push(Body {
             name: link.name.value.clone(),
-            parent: index.checked_sub(1),
+            parent,
             joint: Joint {
                 name: link.joint_name.value.clone(),
                 kind: match link.kind.value {
@@ -83,7 +86,8 @@ pub(super) fn assemble(
                 iv: 0,
                 limits: check::model_limits(link.kind.value, &link.limits),
             },
-            placement: compose(&x_body_previous, &x_previous_joint),
+            placement,
+            dense: composing_pays(parent, &placement.rotation),
             inertia: SpatialInertia::new(Dd::from(link.mass.value), com, super::geometry::snap_tensor(inertia)),
             link_frame: x_canonical_link,
         });
