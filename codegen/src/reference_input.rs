@@ -12,41 +12,29 @@ use crate::description::{
     Angle, AngleUnit, BaseKind, Description, Inertial, Joint as FileJoint, JointFrameNotation, JointKind,
     MassCentreNotation, Notation, Pose, Rotation,
 };
+use crate::diagnostic::Place;
+use crate::model::{FrameOption, ModelOptions};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
-use straightline_core::model::Model;
 use straightline_core::reference::{unit, ExtendedPosition, Joint, MassCentreFrame, MassCentreLink, MassCentreTree};
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
 
-/// What is asked for beyond what the file says.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Reading {
-    /// The root link moves freely in the world; also if the file states it.
-    pub floating_base: bool,
-    /// Acceleration due to gravity \[m/s²\]; `None`: the file's, or else (0, 0, −9.81).
-    pub gravity: Option<[f64; 3]>,
-    /// So near to a multiple of π/4 or π/6 \[rad\] an angle is taken as that; 0: every angle literally.
-    pub angle_tolerance: f64,
-}
-
-impl Reading {
-    /// An angle in radians, as it is to be understood.
-    fn angle(&self, angle: &Angle) -> Dd {
-        let value = Dd::from(angle.value);
-        let literal = match angle.unit {
-            AngleUnit::Radian => value,
-            AngleUnit::Degree => value * Dd::PI / Dd::from(180.0),
-            AngleUnit::QuarterTurn => value * Dd::FRAC_PI_2,
-            AngleUnit::Turn => value * Dd::PI * Dd::from(2.0),
-        };
-        let near = |part: f64| {
-            let step = Dd::PI / Dd::from(part);
-            let special = step * Dd::from((literal / step).hi().round());
-            (self.angle_tolerance > 0.0 && (literal - special).abs().hi() <= self.angle_tolerance).then_some(special)
-        };
-        near(4.0).or(near(6.0)).unwrap_or(literal)
-    }
+/// An angle of the file in radians; within the tolerance, a multiple of π/4 or π/6.
+fn radians(angle: &Angle, options: &ModelOptions) -> Dd {
+    let value = Dd::from(angle.value);
+    let literal = match angle.unit {
+        AngleUnit::Radian => value,
+        AngleUnit::Degree => value * Dd::PI / Dd::from(180.0),
+        AngleUnit::QuarterTurn => value * Dd::FRAC_PI_2,
+        AngleUnit::Turn => value * Dd::PI * Dd::from(2.0),
+    };
+    let near = |part: f64| {
+        let step = Dd::PI / Dd::from(part);
+        let special = step * Dd::from((literal / step).hi().round());
+        (options.angle_tolerance > 0.0 && (literal - special).abs().hi() <= options.angle_tolerance).then_some(special)
+    };
+    near(4.0).or(near(6.0)).unwrap_or(literal)
 }
 
 /// The robot of a description, for [`straightline_core::reference`]. Links and coordinates are in depth-first order of
@@ -54,9 +42,9 @@ impl Reading {
 ///
 /// # Errors
 /// If the description is no tree of links.
-pub fn mass_centre_tree(description: &Description, reading: &Reading) -> Result<MassCentreTree<Dd>, String> {
+pub fn mass_centre_tree(description: &Description, options: &ModelOptions) -> Result<MassCentreTree<Dd>, String> {
     let stated = description.gravity.as_ref().map(|gravity| gravity.value);
-    let gravity = reading.gravity.or(stated).unwrap_or([0.0, 0.0, -9.81]);
+    let gravity = options.gravity.or(stated).unwrap_or([0.0, 0.0, -9.81]);
     let mut tree = MassCentreTree {
         name: description.name.value.clone(),
         gravity: vector(&gravity),
@@ -64,26 +52,49 @@ pub fn mass_centre_tree(description: &Description, reading: &Reading) -> Result<
         frames: Vec::new(),
     };
     let stated = description.base.as_ref().is_some_and(|base| base.value == BaseKind::Floating);
-    let floating = reading.floating_base || stated;
-    match &description.notation {
-        Notation::JointFrames(notation) => add_joint_frames(&mut tree, notation, floating, reading)?,
-        Notation::MassCentres(notation) => add_mass_centres(&mut tree, notation, reading)?,
-    }
-    tree.number_coordinates();
+    let floating = options.floating_base || stated;
+    let joint_names = match &description.notation {
+        Notation::JointFrames(notation) => add_joint_frames(&mut tree, notation, floating, options)?,
+        Notation::MassCentres(notation) => add_mass_centres(&mut tree, notation, options)?,
+    };
+    add_frames(&mut tree, options)?;
+    number_coordinates(&mut tree, &joint_names, options);
     Ok(tree)
 }
 
-/// Gives the joints of the tree the places in q and q̇ that the model gives them; links are matched by name.
-///
-/// # Errors
-/// If a link is not a body of the model.
-pub fn number_like<T>(tree: &mut MassCentreTree<Dd>, model: &Model<T>) -> Result<(), String> {
-    for link in &mut tree.links {
-        let body = model.bodies.iter().find(|body| body.name == link.name);
-        let joint = &body.ok_or_else(|| format!("the model has no body `{}`", link.name))?.joint;
-        (link.iq, link.iv) = (joint.iq, joint.iv);
+/// The frames that are asked for beyond the file's, each placed in the frame of a link.
+fn add_frames(tree: &mut MassCentreTree<Dd>, options: &ModelOptions) -> Result<(), String> {
+    for FrameOption { name, link, xyz, rpy } in &options.frames {
+        let carrier = tree.frame(link).ok_or_else(|| format!("there is no link `{link}`"))?;
+        let in_link = Placed { rotation: carrier.rotation, position: carrier.position };
+        let angle = |i: usize| Angle { value: rpy[i], ..Angle::zero(Place::none()) };
+        let turned = rotation(&Rotation { rpy: [angle(0), angle(1), angle(2)] }, options);
+        let place = in_link.then(&Placed { rotation: turned, position: vector(xyz) });
+        let link = carrier.link;
+        tree.frames.push(MassCentreFrame {
+            name: name.clone(),
+            link,
+            position: place.position,
+            rotation: place.rotation,
+        });
     }
     Ok(())
+}
+
+/// The joints' places in q and q̇: in the order that is asked for, or else in that of the links. A floating root that
+/// the order does not name comes first.
+fn number_coordinates(tree: &mut MassCentreTree<Dd>, joint_names: &[String], options: &ModelOptions) {
+    let mut order: Vec<usize> = (0..tree.links.len()).collect();
+    if let Some(names) = &options.joint_order {
+        order.sort_by_key(|&link| names.iter().position(|name| *name == joint_names[link]));
+    }
+    let (mut iq, mut iv) = (0, 0);
+    for link in order {
+        let link = &mut tree.links[link];
+        (link.iq, link.iv) = (iq, iv);
+        iq += link.joint.nq();
+        iv += link.joint.nv();
+    }
 }
 
 fn vector(v: &[f64; 3]) -> Vector3<Dd> {
@@ -95,8 +106,8 @@ fn tensor(s: &Sym3<f64>) -> Matrix3<Dd> {
 }
 
 /// R = Rz(yaw) Ry(pitch) Rx(roll).
-fn rotation(rotation: &Rotation, reading: &Reading) -> Matrix3<Dd> {
-    let [roll, pitch, yaw] = [0, 1, 2].map(|i| reading.angle(&rotation.rpy[i]).sin_cos());
+fn rotation(rotation: &Rotation, options: &ModelOptions) -> Matrix3<Dd> {
+    let [roll, pitch, yaw] = [0, 1, 2].map(|i| radians(&rotation.rpy[i], options).sin_cos());
     let (o, l) = (Dd::ZERO, Dd::ONE);
     let (s, c) = roll;
     let rx = Matrix3::new(l, o, o, o, c, -s, o, s, c);
@@ -119,8 +130,8 @@ impl Placed {
         Placed { rotation: Matrix3::identity(), position: Vector3::zeros() }
     }
 
-    fn read(pose: &Pose, reading: &Reading) -> Placed {
-        Placed { rotation: rotation(&pose.rotation, reading), position: vector(&pose.xyz.value) }
+    fn read(pose: &Pose, options: &ModelOptions) -> Placed {
+        Placed { rotation: rotation(&pose.rotation, options), position: vector(&pose.xyz.value) }
     }
 
     /// Where a frame is that is placed in this one.
@@ -137,8 +148,8 @@ struct Part {
 }
 
 impl Part {
-    fn read(inertial: &Inertial, link: &Placed, reading: &Reading) -> Part {
-        let axes = link.rotation * rotation(&inertial.rotation, reading);
+    fn read(inertial: &Inertial, link: &Placed, options: &ModelOptions) -> Part {
+        let axes = link.rotation * rotation(&inertial.rotation, options);
         Part {
             mass: Dd::from(inertial.mass.value),
             centre: link.position + link.rotation * vector(&inertial.com.value),
@@ -175,9 +186,10 @@ fn add_joint_frames(
     tree: &mut MassCentreTree<Dd>,
     notation: &JointFrameNotation,
     floating: bool,
-    reading: &Reading,
-) -> Result<(), String> {
-    let (groups, frames) = rigid_groups(notation, reading)?;
+    options: &ModelOptions,
+) -> Result<Vec<String>, String> {
+    let mut joint_names = Vec::new();
+    let (groups, frames) = rigid_groups(notation, options)?;
     let lumped: Vec<Part> = groups.iter().map(|group| Part::lump(&group.parts)).collect();
     // the root group: the world, or the floating link
     let link_of = |group: usize| if floating { Some(group) } else { group.checked_sub(1) };
@@ -188,11 +200,13 @@ fn add_joint_frames(
         let Some((parent, joint_place, joint)) = &group.joint else {
             if floating {
                 let root = root_link(notation)?;
+                joint_names.push(floating_root_joint(notation));
                 tree.links.push(MassCentreLink::free(root.to_string(), *mass, *inertia, *centre));
             }
             continue;
         };
         let joint = &notation.joints[*joint];
+        joint_names.push(joint.name.value.clone());
         let e = unit(&vector(&joint.axis.value));
         tree.links.push(MassCentreLink {
             name: joint.child.value.clone(),
@@ -217,7 +231,17 @@ fn add_joint_frames(
             rotation: place.rotation,
         });
     }
-    Ok(())
+    Ok(joint_names)
+}
+
+/// The name under which the joint of a floating root can be ordered: `root_joint`, with underscores before it where the
+/// file uses that name.
+fn floating_root_joint(notation: &JointFrameNotation) -> String {
+    let mut name = "root_joint".to_string();
+    while notation.joints.iter().any(|joint| joint.name.value == name) {
+        name.insert(0, '_');
+    }
+    name
 }
 
 fn reference_joint(joint: &FileJoint) -> Result<Joint, String> {
@@ -242,7 +266,7 @@ fn root_link(notation: &JointFrameNotation) -> Result<&str, String> {
 }
 
 /// The rigid groups of links, depth first in the file's order, and the frames of links and named frames.
-fn rigid_groups(notation: &JointFrameNotation, reading: &Reading) -> Result<(Vec<Group>, Frames), String> {
+fn rigid_groups(notation: &JointFrameNotation, options: &ModelOptions) -> Result<(Vec<Group>, Frames), String> {
     let links: HashMap<&str, usize> =
         notation.links.iter().enumerate().map(|(i, link)| (link.name.value.as_str(), i)).collect();
     let mut joints_above: HashMap<&str, Vec<usize>> = HashMap::new();
@@ -260,7 +284,7 @@ fn rigid_groups(notation: &JointFrameNotation, reading: &Reading) -> Result<(Vec
             None => (0, Placed::here()),
             Some(i) => {
                 let joint: &FileJoint = &notation.joints[i];
-                let joint_place = parent_place.then(&Placed::read(&joint.origin, reading));
+                let joint_place = parent_place.then(&Placed::read(&joint.origin, options));
                 if joint.kind.value.moves() {
                     groups.push(Group { joint: Some((parent_group, joint_place, i)), parts: Vec::new() });
                     (groups.len() - 1, Placed::here())
@@ -275,7 +299,7 @@ fn rigid_groups(notation: &JointFrameNotation, reading: &Reading) -> Result<(Vec
         frames.push((name.to_string(), group, place));
         let link = &notation.links[*links.get(name).ok_or_else(|| format!("there is no link `{name}`"))?];
         if let Some(inertial) = &link.inertial {
-            groups[group].parts.push(Part::read(inertial, &place, reading));
+            groups[group].parts.push(Part::read(inertial, &place, options));
         }
         // last in, first out: reversed, so that the first joint of the file is followed first
         for &i in joints_above.get(name).into_iter().flatten().rev() {
@@ -288,7 +312,7 @@ fn rigid_groups(notation: &JointFrameNotation, reading: &Reading) -> Result<(Vec
     for frame in &notation.frames {
         let link = frame.link.value.as_str();
         let (group, place) = places.get(link).ok_or_else(|| format!("there is no link `{link}`"))?;
-        frames.push((frame.name.value.clone(), *group, place.then(&Placed::read(&frame.pose, reading))));
+        frames.push((frame.name.value.clone(), *group, place.then(&Placed::read(&frame.pose, options))));
     }
     Ok((groups, frames))
 }
@@ -296,14 +320,13 @@ fn rigid_groups(notation: &JointFrameNotation, reading: &Reading) -> Result<(Vec
 fn add_mass_centres(
     tree: &mut MassCentreTree<Dd>,
     notation: &MassCentreNotation,
-    reading: &Reading,
-) -> Result<(), String> {
+    options: &ModelOptions,
+) -> Result<Vec<String>, String> {
     let mut below = &notation.base;
     for (j, link) in notation.links.iter().enumerate() {
         let missing = |what: &str| format!("the link below `{}` has no {what}", link.name.value);
         let e_parent = below.e_next.as_ref().ok_or_else(|| missing("e_next"))?;
         let r_parent = below.r_next.as_ref().ok_or_else(|| missing("r_next"))?;
-        let r = vector(&link.r.value);
         tree.links.push(MassCentreLink {
             name: link.name.value.clone(),
             parent: j.checked_sub(1),
@@ -318,19 +341,19 @@ fn add_mass_centres(
             inertia: tensor(&link.inertia.value),
             e: unit(&vector(&link.e.value)),
             e_parent: unit(&vector(&e_parent.value)),
-            r,
+            r: vector(&link.r.value),
             r_parent: vector(&r_parent.value),
             extended: ExtendedPosition::ByVectors {
                 r_star: link.r_star.as_ref().map(|r| vector(&r.value)),
                 r_parent_star: below.r_next_star.as_ref().map(|r| vector(&r.value)),
-                alpha: link.alpha.as_ref().map_or(Dd::ZERO, |alpha| reading.angle(alpha)),
+                alpha: link.alpha.as_ref().map_or(Dd::ZERO, |alpha| radians(alpha, options)),
             },
         });
-        // the link's own frame: in the joint, with the link's axes
+        // the link's own frame, in the mass centre
         tree.frames.push(MassCentreFrame {
             name: link.name.value.clone(),
             link: Some(j),
-            position: -r,
+            position: Vector3::zeros(),
             rotation: Matrix3::identity(),
         });
         below = &link.end;
@@ -344,5 +367,5 @@ fn add_mass_centres(
             rotation: Matrix3::identity(),
         });
     }
-    Ok(())
+    Ok(notation.links.iter().map(|link| link.joint_name.value.clone()).collect())
 }
