@@ -2,7 +2,10 @@
 
 use crate::emit::{self, Item, Provenance, Scalar};
 use crate::expr::{verify, Folding, Graph, Grade, RuleSet, Section};
-use crate::function::{ForwardDynamicsMethod, Function};
+use crate::description::messages;
+use crate::diagnostic::{Diagnostics, Source};
+use crate::function::{ForwardDynamicsMethod, Function, Robot};
+use crate::model;
 use crate::pass::dead_code;
 use crate::report::{FunctionReport, Report};
 use crate::schedule::{schedule, Limits, Schedule};
@@ -66,12 +69,12 @@ pub struct Program {
 }
 
 /// Traces and optimises one function of a robot.
-pub fn program(model: &Model<Dd>, frames: &[String], function: Function, options: &Options) -> Program {
+pub fn program(robot: &Robot, frames: &[String], function: Function, options: &Options) -> Program {
     let check = |graph: Graph| {
         verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
         graph
     };
-    let traced = check(function.trace(model, frames, options.forward_dynamics, options.rules()));
+    let traced = check(function.trace(robot, frames, options.forward_dynamics, options.rules()));
     let graph = check(dead_code(&traced));
     let schedule = schedule(&graph, options.limits);
     Program { function, graph, schedule }
@@ -112,6 +115,8 @@ fn generate(
     path: &str,
     hash: u64,
 ) -> Generated {
+    let robot = Robot::new(model);
+    let model = &robot.model;
     let title = |section: Section| match section.body {
         Some(i) => format!("{}, body {}: {}", section.phase, i + 1, model.bodies[i].name),
         None => section.phase.to_string(),
@@ -122,7 +127,7 @@ fn generate(
         if function.is_per_frame() && frames.is_empty() {
             continue;
         }
-        let Program { graph, schedule, .. } = program(&model, &frames, function, options);
+        let Program { graph, schedule, .. } = program(&robot, &frames, function, options);
         let text = emit::function(&graph, &schedule, function.name(), &function.doc(), options.scalar, &title);
         let figures = FunctionReport::new(
             graph.counts(),
@@ -138,14 +143,16 @@ fn generate(
         Report { robot: model.name.clone(), nq: model.nq(), nv: model.nv(), scalar: options.scalar.name(), functions };
     let remarks = warnings.iter().map(|d| d.line()).collect();
     let provenance = Provenance { source: path.to_string(), hash, remarks };
-    let text = emit::file(&model, &frames, &items, &report, &provenance, options.scalar);
-    Generated { model, frames, text, report, warnings }
+    let text = emit::file(model, &frames, &items, &report, &provenance, options.scalar);
+    Generated { model: robot.model, frames, text, report, warnings }
 }
 
-/// The frames asked for, or the tips of the robot: the last link of every branch.
+/// The frames asked for, or the tips of the robot: the last frame on every body that carries no other.
 fn choose_frames(model: &Model<Dd>, asked: &[String], diagnostics: &mut Diagnostics) -> Vec<String> {
     if asked.is_empty() {
-        return model.tips.clone();
+        let carries = |i: usize| model.bodies.iter().any(|b| b.parent == Some(i));
+        let last_on = |i: usize| model.frames.iter().rev().find(|f| f.body == Some(i)).map(|f| f.name.clone());
+        return (0..model.bodies.len()).filter(|i| !carries(*i)).filter_map(last_on).collect();
     }
     for name in asked.iter().filter(|name| model.frame(name).is_none()) {
         diagnostics.push(messages::unknown_frame(name, model.frames.iter().map(|f| f.name.as_str())));

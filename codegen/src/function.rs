@@ -1,9 +1,11 @@
 //! The functions that can be generated: a table of names, signatures and documentation, and the algorithm behind each.
 
-use crate::expr::{Graph, Port, RuleSet};
+use crate::expr::{Grade, Graph, Port, RuleSet};
+use crate::reduce::reduce;
 use crate::trace::{trace, Expr};
 use straightline_core::algorithms as alg;
 use straightline_core::model::{Frame, Model};
+use straightline_core::reduced::ReducedModel;
 use straightline_core::spatial::{Transform, Vec3};
 use straightline_core::{Dd, Real};
 
@@ -294,28 +296,71 @@ impl Function {
                 .flat_map(|w| w.force.to_array().into_iter().chain(w.moment.to_array()))
                 .collect(),
             Energy => vec![alg::kinetic_energy(model, q, arg(1)), alg::potential_energy(model, q)],
-            CentreOfMass => alg::centre_of_mass(model, q).to_array().to_vec(),
+            CentreOfMass => alg::momentum(model, q, &rest(model)).com.to_array().to_vec(),
             Momentum => {
-                let (linear, angular) = alg::momentum(model, q, arg(1));
-                linear.to_array().into_iter().chain(angular.to_array()).collect()
+                let m = alg::momentum(model, q, arg(1));
+                m.linear.to_array().into_iter().chain(m.angular.to_array()).collect()
             }
         }
     }
 
+    /// The same over the reals with fewer operations, for the functions that have such a form.
+    fn evaluate_reduced<T: Real>(
+        self,
+        model: &Model<T>,
+        reduced: &ReducedModel<T>,
+        method: ForwardDynamicsMethod,
+        inputs: &[Vec<T>],
+    ) -> Option<Vec<T>> {
+        use Function::*;
+        let q = &inputs[0];
+        let rest = rest(model);
+        let bias = || alg::reduced_inverse_dynamics(reduced, q, &inputs[1], &rest);
+        Some(match self {
+            InverseDynamics => alg::reduced_inverse_dynamics(reduced, q, &inputs[1], &inputs[2]),
+            GravityForce => alg::reduced_inverse_dynamics(reduced, q, &rest, &rest),
+            BiasForce => bias(),
+            VelocityForce => {
+                let weightless = ReducedModel { gravity: Vec3::zero(), ..reduced.clone() };
+                alg::reduced_inverse_dynamics(&weightless, q, &inputs[1], &rest)
+            }
+            ForwardDynamics => {
+                let drive: Vec<T> = inputs[2].iter().zip(bias()).map(|(tau, h)| *tau - h).collect();
+                match method {
+                    ForwardDynamicsMethod::Factorisation => {
+                        alg::Ltdl::factor(model, &alg::mass_matrix(model, q)).solve(&drive)
+                    }
+                    _ => alg::solve_articulated(model, q, &drive),
+                }
+            }
+            _ => return None,
+        })
+    }
+
     /// Its equations for a robot. For [`ForwardDynamicsMethod::Cheaper`] both methods are traced and the one with fewer
-    /// operations is kept.
-    pub fn trace(self, model: &Model<Dd>, frames: &[String], method: ForwardDynamicsMethod, rules: RuleSet) -> Graph {
+    /// operations is kept. Where the rules may move rounding, the reduced robot serves the functions that it can.
+    pub fn trace(self, robot: &Robot, frames: &[String], method: ForwardDynamicsMethod, rules: RuleSet) -> Graph {
+        let model = &robot.model;
         let trace_with = |method| {
             trace(rules, self.inputs(model), vec![self.output(model, frames.len())], |inputs| {
                 let model: Model<Expr> = model.cast();
-                let frames: Vec<&Frame<Expr>> =
-                    frames.iter().map(|name| model.frame(name).expect("frames were checked against the model")).collect();
-                self.evaluate(&model, &frames, method, inputs)
+                if rules.grade() == Grade::Algebraic {
+                    let reduced = robot.reduced.map(Expr::constant);
+                    if let Some(results) = self.evaluate_reduced(&model, &reduced, method, inputs) {
+                        return results;
+                    }
+                }
+                let frame = |name: &String| model.frame(name).expect("frames were checked against the model");
+                self.evaluate(&model, &frames.iter().map(frame).collect::<Vec<_>>(), method, inputs)
             })
         };
         match (self, method) {
             (Function::ForwardDynamics, ForwardDynamicsMethod::Cheaper) => {
                 let articulated = trace_with(ForwardDynamicsMethod::ArticulatedBody);
+                // an LᵀDL factor of n joints on one branch takes about n³/6 products more
+                if model.nv() > 40 {
+                    return articulated;
+                }
                 let factorised = trace_with(ForwardDynamicsMethod::Factorisation);
                 if factorised.counts().fma < articulated.counts().fma {
                     factorised
@@ -326,6 +371,28 @@ impl Function {
             _ => trace_with(method),
         }
     }
+}
+
+/// A robot in the two forms that are traced.
+#[derive(Clone, Debug)]
+pub struct Robot {
+    /// As the robot file has it, in canonical frames.
+    pub model: Model<Dd>,
+    /// For joint torques alone.
+    pub reduced: ReducedModel<Dd>,
+}
+
+impl Robot {
+    /// Both forms of a robot.
+    pub fn new(model: Model<Dd>) -> Self {
+        let reduced = reduce(&model);
+        Robot { model, reduced }
+    }
+}
+
+/// q̇ = 0 or q̈ = 0.
+fn rest<T: Real>(model: &Model<T>) -> Vec<T> {
+    vec![T::zero(); model.nv()]
 }
 
 fn pose<T: Real>(x: &Transform<T>) -> Vec<T> {

@@ -1,15 +1,27 @@
 //! The compiler of Straightline: from a robot file to straight-line `no_std` Rust.
+//!
+//! [`compile`] is the whole pipeline as one pure function; `ARCHITECTURE.md` draws it.
 #![forbid(unsafe_code)]
 
+pub mod compile;
 pub mod description;
 pub mod diagnostic;
 pub mod emit;
 pub mod expr;
+pub mod function;
 pub mod model;
 pub mod pass;
+pub mod reduce;
 pub mod reference_input;
+pub mod report;
 pub mod schedule;
 pub mod trace;
+
+pub use compile::{compile, Generated, Options};
+pub use diagnostic::{Diagnostics, Source};
+pub use emit::Scalar;
+pub use expr::Grade;
+pub use function::{ForwardDynamicsMethod, Function, Robot};
 
 /// Version of the generator, as it stands in generated files.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -4,9 +4,11 @@
 //! algorithm gave them; every section of the algorithm is a block under a comment.
 
 mod body;
+mod file;
 mod names;
 
 pub use body::{function, FunctionText};
+pub use file::{file, Item, Provenance};
 pub use names::Names;
 
 use crate::expr::Port;

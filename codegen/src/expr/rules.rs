@@ -119,6 +119,11 @@ impl RuleSet {
         self.rules
     }
 
+    /// The weakest grade among them.
+    pub fn grade(&self) -> Grade {
+        self.rules.iter().map(|r| r.grade).max().unwrap_or(Grade::Exact)
+    }
+
     /// The arithmetic of constants.
     pub fn folding(&self) -> Folding {
         self.folding

@@ -15,6 +15,8 @@ pub mod dd;
 #[cfg(feature = "alloc")]
 pub mod model;
 pub mod real;
+#[cfg(feature = "alloc")]
+pub mod reduced;
 #[cfg(feature = "reference")]
 pub mod reference;
 pub mod spatial;

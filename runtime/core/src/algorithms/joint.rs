@@ -161,7 +161,7 @@ fn turn_columns<T: Real>(a: &Mat3<T>, s: T, c: T) -> Mat3<T> {
 
 /// The rotation matrix (body to world) of a unit quaternion (x, y, z, w). Not normalised here: an error of the norm goes
 /// into the result to first order, and there is no root and no division.
-fn quaternion_to_rotation<T: Real>([x, y, z, w]: [T; 4]) -> Mat3<T> {
+pub(super) fn quaternion_to_rotation<T: Real>([x, y, z, w]: [T; 4]) -> Mat3<T> {
     let (x2, y2, z2) = (x + x, y + y, z + z);
     let (xx, yy, zz) = (x * x2, y * y2, z * z2);
     let (xy, xz, yz) = (x * y2, x * z2, y * z2);

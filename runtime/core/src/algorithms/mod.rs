@@ -53,6 +53,7 @@ mod jacobian;
 mod joint;
 mod kinematics;
 mod momentum;
+mod reduced_dynamics;
 mod rnea;
 mod velocity;
 
@@ -64,4 +65,5 @@ pub use jacobian::{jacobian, jacobian_bias};
 pub use joint::composing_pays;
 pub use kinematics::{forward_kinematics, frame_acceleration, frame_velocity};
 pub use momentum::{momentum, Momentum};
+pub use reduced_dynamics::reduced_inverse_dynamics;
 pub use rnea::{bias_force, gravity_force, inverse_dynamics, joint_wrenches, velocity_force};

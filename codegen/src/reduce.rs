@@ -1,0 +1,252 @@
+//! From the model to its reduced form: frames and inertial parameters that take the fewest operations.
+//!
+//! Both steps are exact over the reals and done in double-double, in closed form: a solution by least squares would let
+//! digits of heavy links leak into light ones.
+
+use straightline_core::model::{Body, BodyId, JointKind, Model};
+use straightline_core::reduced::{ReducedBody, ReducedModel};
+use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
+use straightline_core::Dd;
+
+/// Where rounding in double-double ends: smaller entries of rotations, or lengths against the robot's, are zero.
+const DUST: f64 = 1e-28;
+/// Below this sine two axes are taken as parallel when a frame is chosen; the transform itself stays exact.
+const NEARLY_PARALLEL: f64 = 1e-4;
+
+/// The reduced robot.
+pub fn reduce(model: &Model<Dd>) -> ReducedModel<Dd> {
+    let regauge = choose_frames(model);
+    let mut bodies: Vec<ReducedBody<Dd>> =
+        model.bodies.iter().enumerate().map(|(i, b)| in_new_frame(model, &regauge, i, b)).collect();
+    for i in (0..bodies.len()).rev() {
+        regroup(&mut bodies, i);
+    }
+    ReducedModel { bodies, gravity: model.gravity }
+}
+
+/// For each body the pose of its new frame in its canonical one: turned about z and shifted along it; for a prismatic
+/// joint the origin may be anywhere.
+///
+/// From the tips to the base: x along the common normal to the axis of the first child with the most descendants, the
+/// origin at the normal's foot.
+fn choose_frames(model: &Model<Dd>) -> Vec<Transform<Dd>> {
+    let n = model.bodies.len();
+    let mut size = vec![1usize; n];
+    for i in (0..n).rev() {
+        if let Some(p) = model.bodies[i].parent {
+            size[p] += size[i];
+        }
+    }
+    let primary = |i: BodyId| {
+        let children = (i + 1..n).filter(|c| model.bodies[*c].parent == Some(i));
+        children.max_by_key(|c| (size[*c], usize::MAX - c))
+    };
+    let mut chosen = vec![Transform::identity(); n];
+    for i in (0..n).rev() {
+        let body = &model.bodies[i];
+        if body.joint.kind == JointKind::Floating {
+            continue;
+        }
+        chosen[i] = match primary(i) {
+            Some(c) => along_common_normal(body, &model.bodies[c], &chosen[c]),
+            None => tip_frame(model, body),
+        };
+    }
+    chosen
+}
+
+/// The frame of `body` with x along the common normal of its axis and its child's, and the origin at the normal's foot.
+fn along_common_normal(body: &Body<Dd>, child: &Body<Dd>, child_frame: &Transform<Dd>) -> Transform<Dd> {
+    let to_child = child.placement.compose(child_frame);
+    let (u, p) = (to_child.rotation.column(2), to_child.translation);
+    let sine2 = u.x * u.x + u.y * u.y;
+    let slides = child.joint.kind == JointKind::Prismatic;
+    let (x_axis, height) = if sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL {
+        // z × u; the foot on z of the common normal of {h z} and {p + s u}; the line of a sliding joint may be anywhere
+        let height = if slides { p.z } else { (p.z - u.z * p.dot(u)) / sine2 };
+        (unit_xy(-u.y, u.x), height)
+    } else if (p.x * p.x + p.y * p.y).hi() > 1e-20 && !slides {
+        (unit_xy(p.x, p.y), p.z)
+    } else {
+        // on one line: as the child's, so that nothing turns
+        let x = to_child.rotation.column(0);
+        (unit_xy(x.x, x.y), p.z)
+    };
+    pose_about_z(body, x_axis, height, p)
+}
+
+/// A tip's frame: on the foot of the common normal with the axis before it, and turned so that no constant turn remains.
+fn tip_frame(model: &Model<Dd>, body: &Body<Dd>) -> Transform<Dd> {
+    let (r, p) = (body.placement.rotation, body.placement.translation);
+    let u = r.column(2);
+    let sine2 = u.x * u.x + u.y * u.y;
+    let free = Vec3::zero();
+    if body.parent.is_none_or(|p| model.bodies[p].joint.kind == JointKind::Floating) {
+        return Transform::identity();
+    }
+    if sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL {
+        // foot on {p + s u} of the common normal with the parent's z axis: (p + s u) · (u − u_z z) = 0
+        let s = -(p.dot(u) - p.z * u.z) / sine2;
+        // x so that it is the parent's common normal, z × u, in own axes
+        let x = r.transpose_mul(Vec3::new(-u.y, u.x, Dd::ZERO));
+        pose_about_z(body, unit_xy(x.x, x.y), s, free)
+    } else {
+        // parallel: in the plane of the parent's origin, axes as the parent's
+        let x = r.row(0);
+        pose_about_z(body, unit_xy(x.x, x.y), -(p.z * u.z), free)
+    }
+}
+
+fn pose_about_z(body: &Body<Dd>, (c, s): (Dd, Dd), height: Dd, child_origin: Vec3<Dd>) -> Transform<Dd> {
+    let z = Vec3::unit_z();
+    let x = Vec3::new(c, s, Dd::ZERO);
+    let rotation = Mat3::from_columns(x, z.cross(x), z);
+    let translation = match body.joint.kind {
+        // anywhere: where the child is, so that its arm vanishes
+        JointKind::Prismatic => child_origin,
+        _ => Vec3::new(Dd::ZERO, Dd::ZERO, height),
+    };
+    Transform { rotation, translation: dusted(translation) }
+}
+
+/// A direction in the x-y plane, of length one, special values exact.
+fn unit_xy(x: Dd, y: Dd) -> (Dd, Dd) {
+    let length = (x * x + y * y).sqrt();
+    (special(x / length), special(y / length))
+}
+
+/// An entry of a rotation: exactly 0 or ±1 where double-double cannot tell.
+fn special(x: Dd) -> Dd {
+    for exact in [Dd::ZERO, Dd::ONE, -Dd::ONE] {
+        if (x - exact).abs().hi() < DUST {
+            return exact;
+        }
+    }
+    x
+}
+
+fn dusted(v: Vec3<Dd>) -> Vec3<Dd> {
+    v.map(|x| if x.abs().hi() < DUST { Dd::ZERO } else { x })
+}
+
+/// A body with its inertia in its new frame, and its joint between new frames.
+fn in_new_frame(model: &Model<Dd>, frames: &[Transform<Dd>], i: BodyId, body: &Body<Dd>) -> ReducedBody<Dd> {
+    let own = &frames[i];
+    let from_parent = match body.parent {
+        Some(p) => frames[p].inverse(),
+        None => Transform::identity(),
+    };
+    let joint = from_parent.compose(&body.placement).compose(own);
+    let inertia = &body.inertia;
+    let r = own.rotation.transpose();
+    let com = own.rotation.transpose_mul(inertia.com - own.translation);
+    let moved = SpatialInertia::new(inertia.mass, com, inertia.inertia_com.rotated(&r));
+    let rotation = joint.rotation.map(special);
+    let (rotation, offset) = split_turn(&rotation);
+    let quarter_turns = rotation.rows.iter().flatten().all(|x| *x == Dd::ZERO || x.abs() == Dd::ONE);
+    let parent_turns = body.parent.is_some_and(|p| model.bodies[p].parent.is_some());
+    ReducedBody {
+        parent: body.parent,
+        kind: body.joint.kind,
+        iq: body.joint.iq,
+        iv: body.joint.iv,
+        rotation,
+        offset,
+        translation: dusted(joint.translation),
+        mass: moved.mass,
+        first_moment: moved.first_moment,
+        second_moment: moved.second_moment,
+        shares_axis_field: quarter_turns || !parent_turns,
+    }
+}
+
+/// R = E R_z(θ₀): the turn about z that leaves E with the fewest entries, E = R_z(a) R_x(α), if that is exact.
+fn split_turn(r: &Mat3<Dd>) -> (Mat3<Dd>, (Dd, Dd)) {
+    let z = r.column(2);
+    let sine = (z.x * z.x + z.y * z.y).sqrt();
+    let none = (Dd::ZERO, Dd::ONE);
+    if sine.hi() < DUST {
+        // E = 1 or a half turn about x
+        let flip = if z.z.hi() > 0.0 { Dd::ONE } else { -Dd::ONE };
+        let x = r.row(0);
+        let e = Mat3 {
+            rows: [[Dd::ONE, Dd::ZERO, Dd::ZERO], [Dd::ZERO, flip, Dd::ZERO], [Dd::ZERO, Dd::ZERO, flip]],
+        };
+        // first row of E R_z(θ₀): (cos, −sin, 0)
+        return (e, (special(-x.y), special(x.x)));
+    }
+    if sine.hi() < NEARLY_PARALLEL {
+        return (*r, none);
+    }
+    // third row of R: (sin α sin θ₀, sin α cos θ₀, cos α); the sign of sin α such that θ₀ is within a quarter turn
+    let row = r.row(2);
+    let sign = if row.y.hi() < -DUST || (row.y.hi().abs() <= DUST && row.x.hi() < 0.0) { -Dd::ONE } else { Dd::ONE };
+    let (s0, c0) = (special(row.x / (sine * sign)), special(row.y / (sine * sign)));
+    // E = R R_z(−θ₀)
+    let rz = Mat3 { rows: [[c0, s0, Dd::ZERO], [-s0, c0, Dd::ZERO], [Dd::ZERO, Dd::ZERO, Dd::ONE]] };
+    ((*r * rz).map(special), (s0, c0))
+}
+
+/// Moves what a joint's torque cannot tell from the parent's to the parent (Khalil and Dombre 2002, chapter 9, in second
+/// moments): what lies on a revolute axis; of a sliding body all of the second moment.
+fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize) {
+    let body = bodies[i].clone();
+    let zero = Dd::ZERO;
+    let (rotation, a, p) = (body.rotation, body.rotation.column(2), body.translation);
+    match body.kind {
+        JointKind::Floating => {}
+        JointKind::Revolute => {
+            let (m, mz, szz) = (body.mass, body.first_moment.z, body.second_moment.zz);
+            let own = &mut bodies[i];
+            own.mass = zero;
+            own.first_moment.z = zero;
+            own.second_moment.zz = zero;
+            match body.parent {
+                Some(parent) => {
+                    let parent = &mut bodies[parent];
+                    parent.mass = parent.mass + m;
+                    parent.first_moment = parent.first_moment + p.scale(m) + a.scale(mz);
+                    let cross = symmetric_product(p, a);
+                    let moved = scaled(symmetric_square(p), m) + scaled(cross, mz) + scaled(symmetric_square(a), szz);
+                    parent.second_moment = parent.second_moment + moved;
+                }
+                None => {
+                    // turns about a fixed axis: one moment of inertia
+                    let s = own.second_moment;
+                    own.second_moment = Sym3 { xx: s.xx + s.yy, ..Sym3::zero() };
+                }
+            }
+        }
+        JointKind::Prismatic => {
+            let (s0, c0) = body.offset;
+            let moved = body.second_moment.turned(s0, c0).rotated(&rotation);
+            let own = &mut bodies[i];
+            own.second_moment = Sym3::zero();
+            match body.parent {
+                Some(parent) => bodies[parent].second_moment = bodies[parent].second_moment + moved,
+                None => own.first_moment = Vec3::zero(),
+            }
+        }
+    }
+}
+
+fn scaled(s: Sym3<Dd>, k: Dd) -> Sym3<Dd> {
+    s.map(|x| x * k)
+}
+
+/// v vᵀ.
+fn symmetric_square(v: Vec3<Dd>) -> Sym3<Dd> {
+    Sym3 { xx: v.x * v.x, xy: v.x * v.y, xz: v.x * v.z, yy: v.y * v.y, yz: v.y * v.z, zz: v.z * v.z }
+}
+
+/// a bᵀ + b aᵀ.
+fn symmetric_product(a: Vec3<Dd>, b: Vec3<Dd>) -> Sym3<Dd> {
+    Sym3 {
+        xx: (a.x * b.x) * Dd::from(2.0),
+        xy: a.x * b.y + a.y * b.x,
+        xz: a.x * b.z + a.z * b.x,
+        yy: (a.y * b.y) * Dd::from(2.0),
+        yz: a.y * b.z + a.z * b.y,
+        zz: (a.z * b.z) * Dd::from(2.0),
+    }
+}

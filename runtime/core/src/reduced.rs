@@ -1,0 +1,76 @@
+//! The robot with the frames and the inertial parameters that take the fewest operations.
+//!
+//! Joint torques do not tell every distribution of mass apart. Mass on the axis of a revolute joint belongs to the link
+//! before the joint as well as to the link behind it, so its mass, first and second moment there can be moved to the
+//! parent; what is left are the *base inertial parameters* (Gautier and Khalil 1990), seven per revolute joint instead of
+//! ten. And frames are free to sit anywhere on their joint axis and to be turned about it: with x along the common normal to
+//! the next axis (modified Denavit-Hartenberg, Khalil and Kleinfinger 1986) a constant rotation has one angle.
+//!
+//! Only joint torques are computed on a reduced robot: a link's own velocity, reaction or pose is not a quantity of it.
+
+use crate::model::{BodyId, JointKind};
+use crate::real::Real;
+use crate::spatial::{Mat3, Sym3, Vec3};
+use alloc::vec::Vec;
+
+/// A body of a [`ReducedModel`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReducedBody<T> {
+    /// The body it moves against; `None`: the world.
+    pub parent: Option<BodyId>,
+    /// How it moves.
+    pub kind: JointKind,
+    /// First index into q.
+    pub iq: usize,
+    /// First index into qd, qdd and tau.
+    pub iv: usize,
+    /// E: from the joint frame to the parent's frame.
+    pub rotation: Mat3<T>,
+    /// (sin θ₀, cos θ₀) of a constant turn about z that follows E: the body's rotation is E R_z(θ₀) R_z(q).
+    pub offset: (T, T),
+    /// Origin of the joint frame in the parent's frame \[m\].
+    pub translation: Vec3<T>,
+    /// Mass \[kg\].
+    pub mass: T,
+    /// First moment about the frame's origin \[kg·m\].
+    pub first_moment: Vec3<T>,
+    /// Second moment about the frame's origin \[kg·m²\].
+    pub second_moment: Sym3<T>,
+    /// Take the acceleration along the joint axis from the parent, instead of turning the angular acceleration:
+    /// cheaper where E is a signed permutation.
+    pub shares_axis_field: bool,
+}
+
+/// A robot reduced to what its joint torques depend on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReducedModel<T> {
+    /// The moving bodies, numbered as in the full model.
+    pub bodies: Vec<ReducedBody<T>>,
+    /// Acceleration due to gravity in the world \[m/s²\].
+    pub gravity: Vec3<T>,
+}
+
+impl<T: Real> ReducedModel<T> {
+    /// Number of velocity coordinates.
+    pub fn nv(&self) -> usize {
+        self.bodies.iter().map(|b| b.kind.nv()).sum()
+    }
+
+    /// The same robot over another scalar: every number through `f`.
+    pub fn map<U: Real>(&self, mut f: impl FnMut(T) -> U) -> ReducedModel<U> {
+        let bodies = self.bodies.iter().map(|b| ReducedBody {
+            parent: b.parent,
+            kind: b.kind,
+            iq: b.iq,
+            iv: b.iv,
+            rotation: b.rotation.map(&mut f),
+            offset: (f(b.offset.0), f(b.offset.1)),
+            translation: b.translation.map(&mut f),
+            mass: f(b.mass),
+            first_moment: b.first_moment.map(&mut f),
+            second_moment: b.second_moment.map(&mut f),
+            shares_axis_field: b.shares_axis_field,
+        });
+        ReducedModel { bodies: bodies.collect(), gravity: self.gravity.map(f) }
+    }
+}
