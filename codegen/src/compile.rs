@@ -1,9 +1,9 @@
 //! The pipeline, as one function.
 
-use crate::emit::{self, Item, Provenance, Scalar};
-use crate::expr::{verify, Folding, Graph, Grade, RuleSet, Section};
 use crate::description::messages;
-use crate::diagnostic::{Diagnostics, Source};
+use crate::diagnostic::{Diagnostic, Diagnostics, Source};
+use crate::emit::{self, Item, Provenance, Scalar};
+use crate::expr::{verify, Folding, Grade, Graph, RuleSet, Section};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model;
 use crate::pass::dead_code;
@@ -141,8 +141,14 @@ fn generate(
     }
     let report =
         Report { robot: model.name.clone(), nq: model.nq(), nv: model.nv(), scalar: options.scalar.name(), functions };
-    let remarks = warnings.iter().map(|d| d.line()).collect();
-    let provenance = Provenance { source: path.to_string(), hash, remarks };
+    // the file's name, not its path: the same bytes on every machine
+    let name = path.rsplit(['/', '\\']).next().unwrap_or(path).to_string();
+    let remark = |d: &Diagnostic| match &d.place {
+        Some(place) => format!("{} (line {} of {name})", d.title, place.line),
+        None => d.title.clone(),
+    };
+    let remarks = warnings.iter().map(remark).collect();
+    let provenance = Provenance { source: name.clone(), hash, remarks };
     let text = emit::file(model, &frames, &items, &report, &provenance, options.scalar);
     Generated { model: robot.model, frames, text, report, warnings }
 }
@@ -163,7 +169,8 @@ fn choose_frames(model: &Model<Dd>, asked: &[String], diagnostics: &mut Diagnost
 /// FNV-1a over everything that the output depends on.
 fn hash(text: &str, options: &Options) -> u64 {
     let settings = format!("{}\0{options:?}", crate::VERSION);
-    text.bytes().chain([0]).chain(settings.bytes()).fold(0xcbf2_9ce4_8422_2325, |h, b| {
-        (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
+    text.bytes()
+        .chain([0])
+        .chain(settings.bytes())
+        .fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3))
 }

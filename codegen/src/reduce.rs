@@ -169,9 +169,7 @@ fn split_turn(r: &Mat3<Dd>) -> (Mat3<Dd>, (Dd, Dd)) {
         // E = 1 or a half turn about x
         let flip = if z.z.hi() > 0.0 { Dd::ONE } else { -Dd::ONE };
         let x = r.row(0);
-        let e = Mat3 {
-            rows: [[Dd::ONE, Dd::ZERO, Dd::ZERO], [Dd::ZERO, flip, Dd::ZERO], [Dd::ZERO, Dd::ZERO, flip]],
-        };
+        let e = Mat3 { rows: [[Dd::ONE, Dd::ZERO, Dd::ZERO], [Dd::ZERO, flip, Dd::ZERO], [Dd::ZERO, Dd::ZERO, flip]] };
         // first row of E R_z(θ₀): (cos, −sin, 0)
         return (e, (special(-x.y), special(x.x)));
     }

@@ -9,14 +9,14 @@ use crate::expr::{Graph, NodeId, Op};
 /// How long one function may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Operations (additions, multiplications, divisions, square roots; a sine-cosine pair counts as 60) in one part.
+    /// Operations (additions, multiplications, divisions, square roots; a sine-cosine pair counts as 40) in one part.
     pub operations: usize,
 }
 
 impl Default for Limits {
     fn default() -> Self {
         // about the size at which warm speed is still full (L1 instruction cache) and compile time linear
-        Limits { operations: 2000 }
+        Limits { operations: 2500 }
     }
 }
 
@@ -51,7 +51,7 @@ fn is_value(op: Op) -> bool {
 fn weight(op: Op) -> usize {
     match op {
         Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Div(..) | Op::Sqrt(_) => 1,
-        Op::SinCos(_) => 60,
+        Op::SinCos(_) => 40,
         Op::Input(_) | Op::Constant(_) | Op::Neg(_) | Op::Sin(_) | Op::Cos(_) => 0,
     }
 }

@@ -332,6 +332,15 @@ pub fn unknown_link<'a>(owner: &str, link: &str, links: impl IntoIterator<Item =
     }
 }
 
+/// A frame that is asked for and not there.
+pub fn unknown_frame<'a>(frame: &str, frames: impl IntoIterator<Item = &'a str>) -> D {
+    let d = D::error("unknown-frame", format!("the robot has no frame `{}`", cut(frame)));
+    match did_you_mean(frame, frames) {
+        Some(hint) => d.help(hint),
+        None => d,
+    }
+}
+
 /// A link that is the child of two joints.
 pub fn two_parents(link: &str, first: &str, second: &str) -> D {
     D::error("two-parents", format!("link `{link}` is the child of joint `{second}` and of joint `{first}`"))

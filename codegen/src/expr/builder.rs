@@ -92,19 +92,6 @@ impl Builder {
         }
     }
 
-    /// Copies the note of another graph's node, whose sections are the same as this one's.
-    pub(crate) fn note(&mut self, id: NodeId, note: Note) {
-        let own = &mut self.graph.notes[id.index()];
-        if own.name.is_none() {
-            *own = note;
-        }
-    }
-
-    /// Takes over the sections of another graph.
-    pub(crate) fn sections(&mut self, sections: &[Section]) {
-        self.graph.sections = sections.to_vec();
-    }
-
     /// The graph with these results.
     pub fn finish(mut self, outputs: Vec<Port>, results: Vec<NodeId>) -> Graph {
         assert_eq!(outputs.iter().map(Port::len).sum::<usize>(), results.len(), "one node per output scalar");

@@ -47,12 +47,13 @@ pub(super) struct JointPose<T> {
 }
 
 impl<T: Real> JointPose<T> {
-    pub fn new(body: &Body<T>, q: &[T]) -> Self {
+    pub fn new(i: BodyId, body: &Body<T>, q: &[T]) -> Self {
         let (iq, placement, translation) = (body.joint.iq, body.placement.rotation, body.placement.translation);
         let dense = body.dense;
         match body.joint.kind {
             JointKind::Revolute => {
                 let (s, c) = q[iq].sin_cos();
+                let (s, c) = (s.named("sin_q", i, ""), c.named("cos_q", i, ""));
                 let composed = dense.then(|| turn_columns(&placement, s, c));
                 JointPose { placement, translation, slide: None, turn: Some((s, c)), composed, dense }
             }
@@ -72,10 +73,8 @@ impl<T: Real> JointPose<T> {
 
     /// All poses of a model, by body.
     pub fn all(bodies: &[Body<T>], q: &[T]) -> Vec<Self> {
-        let pose = |(i, body)| {
-            T::section("joints", Some(i));
-            JointPose::new(body, q)
-        };
+        T::section("sines and cosines", None);
+        let pose = |(i, body)| JointPose::new(i, body, q);
         bodies.iter().enumerate().map(pose).collect()
     }
 

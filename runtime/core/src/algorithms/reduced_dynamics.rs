@@ -195,13 +195,7 @@ impl<T: Real> Link<T> {
         let sum = xx + zz;
         let difference = xx - zz;
         let u11 = u33 + difference;
-        let u = Mat3 {
-            rows: [
-                [u11, xy - alpha.z, u13],
-                [xy + alpha.z, -sum, u23],
-                [xz - alpha.y, yz + alpha.x, u33],
-            ],
-        };
+        let u = Mat3 { rows: [[u11, xy - alpha.z, u13], [xy + alpha.z, -sum, u23], [xz - alpha.y, yz + alpha.x, u33]] };
         let differences = Vec3::new(u33 + sum, difference, -(u11 + sum));
         Link { omega, alpha, u, differences, accel, arm: body.translation }
     }
