@@ -242,7 +242,8 @@ impl Dd {
         Dd { hi, lo }
     }
 
-    /// `(sin x, cos x)` for |x| ≤ 10⁷, relative errors below 10⁻³¹; NaN from 1.3·10⁷ = 2^23·π/2 on.
+    /// `(sin x, cos x)`, absolute errors below 10⁻³¹, relative ones too where x is an f64; NaN from |x| = 2^23·π/2, which is
+    /// 1.3·10⁷, on.
     ///
     /// Cody-Waite reduction by π/2 in three parts of 30 bits, so that their products with k are exact, and a
     /// double-double rest, 2^-203 in all; Taylor series on |r| ≤ π/4, whose terms below 2^-53 need only f64.
