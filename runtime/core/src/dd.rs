@@ -229,7 +229,7 @@ impl Dd {
             return self;
         }
         if self.hi < 1e-200 {
-            // s² has an exact error term only where that is not subnormal; also the way out for NaN and negative numbers
+            // the error term of s² is exact only where it is not subnormal; negative numbers leave here too
             return if self.hi > 0.0 {
                 self.scaled(power_of_two(600)).sqrt().scaled(power_of_two(-300))
             } else {
