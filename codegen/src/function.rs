@@ -318,7 +318,7 @@ impl Function {
         let bias = || alg::reduced_inverse_dynamics(reduced, q, &inputs[1], &rest);
         Some(match self {
             InverseDynamics => alg::reduced_inverse_dynamics(reduced, q, &inputs[1], &inputs[2]),
-            GravityForce => alg::reduced_inverse_dynamics(reduced, q, &rest, &rest),
+            GravityForce => alg::reduced_gravity_force(reduced, q),
             BiasForce => bias(),
             VelocityForce => {
                 let weightless = ReducedModel { gravity: Vec3::zero(), ..reduced.clone() };

@@ -54,6 +54,7 @@ mod joint;
 mod kinematics;
 mod momentum;
 mod reduced_dynamics;
+mod reduced_gravity;
 mod rnea;
 mod velocity;
 
@@ -66,4 +67,5 @@ pub use joint::composing_pays;
 pub use kinematics::{forward_kinematics, frame_acceleration, frame_velocity};
 pub use momentum::{momentum, Momentum};
 pub use reduced_dynamics::reduced_inverse_dynamics;
+pub use reduced_gravity::reduced_gravity_force;
 pub use rnea::{bias_force, gravity_force, inverse_dynamics, joint_wrenches, velocity_force};

@@ -1,0 +1,75 @@
+//! Gravity forces of a [`ReducedModel`]: first moments carried to the base, and nothing else.
+//!
+//! At rest a joint carries the weight of what lies beyond it: its moment about the joint is S × (−g), with the first moment
+//! S of everything that the joint moves, about the joint's origin. S goes from the tips to the base, S_i = m c + Σ (R S_c +
+//! M_c p), and is turned once per joint, where Newton-Euler would turn a force and a moment. Of S × (−g) only the part
+//! along the axis is wanted, and a turn about the axis does not change it: it is taken before the turn, where the vector
+//! −g of a joint near the base still has zeros.
+
+use super::joint::quaternion_to_rotation;
+use crate::model::JointKind;
+use crate::real::Real;
+use crate::reduced::ReducedModel;
+use crate::spatial::Vec3;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// Generalized forces \[N·m or N\] that hold the robot at rest: [`gravity_force`](super::gravity_force) of the full robot.
+pub fn reduced_gravity_force<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> {
+    let n = model.bodies.len();
+    // −g in body axes, and for each joint before its turn
+    let mut up: Vec<Vec3<T>> = Vec::with_capacity(n);
+    let mut up_at_joint: Vec<Vec3<T>> = Vec::with_capacity(n);
+    let mut turns: Vec<(T, T)> = Vec::with_capacity(n);
+    for (i, body) in model.bodies.iter().enumerate() {
+        T::section("forward", Some(i));
+        let before = body.parent.map_or(-model.gravity, |p| up[p]);
+        let (s0, c0) = body.offset;
+        let (s, c) = match body.kind {
+            JointKind::Revolute => {
+                let (s, c) = q[body.iq].sin_cos();
+                let (s, c) = (s.named("sin_q", i, ""), c.named("cos_q", i, ""));
+                (s * c0 + c * s0, c * c0 - s * s0)
+            }
+            JointKind::Prismatic | JointKind::Floating => (s0, c0),
+        };
+        let at_joint = match body.kind {
+            JointKind::Floating => {
+                let k = body.iq + 3;
+                quaternion_to_rotation([q[k], q[k + 1], q[k + 2], q[k + 3]]).transpose_mul(before)
+            }
+            _ => body.rotation.transpose_mul(before),
+        };
+        let own = if body.kind == JointKind::Floating { at_joint } else { at_joint.turned(-s, c) };
+        up.push(own.named("up", i));
+        up_at_joint.push(at_joint);
+        turns.push((s, c));
+    }
+
+    let mut forces = vec![T::zero(); model.nv()];
+    let mut mass: Vec<T> = model.bodies.iter().map(|b| b.mass).collect();
+    let mut first_moment: Vec<Vec3<T>> = model.bodies.iter().map(|b| b.first_moment).collect();
+    for (i, body) in model.bodies.iter().enumerate().rev() {
+        T::section("backward", Some(i));
+        let s = first_moment[i].named("first_moment", i);
+        let (sin, cos) = turns[i];
+        let (at_joint, g) = (s.turned(sin, cos), up_at_joint[i]);
+        match body.kind {
+            JointKind::Revolute => forces[body.iv] = at_joint.x * g.y - at_joint.y * g.x,
+            JointKind::Prismatic => forces[body.iv] = mass[i] * g.z,
+            JointKind::Floating => {
+                let both = g.scale(mass[i]).to_array().into_iter().chain(s.cross(g).to_array());
+                both.enumerate().for_each(|(k, f)| forces[body.iv + k] = f);
+            }
+        }
+        if let Some(p) = body.parent {
+            let arm = match body.kind {
+                JointKind::Prismatic => body.translation + body.rotation.column(2).scale(q[body.iq]),
+                _ => body.translation,
+            };
+            first_moment[p] = first_moment[p] + body.rotation * at_joint + arm.scale(mass[i]);
+            mass[p] = mass[p] + mass[i];
+        }
+    }
+    forces
+}
