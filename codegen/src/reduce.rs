@@ -202,7 +202,8 @@ fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize) {
             match body.parent {
                 Some(parent) => {
                     let parent = &mut bodies[parent];
-                    parent.mass = parent.mass + m;
+                    let mass = parent.mass + m;
+                    parent.mass = mass;
                     parent.first_moment = parent.first_moment + p.scale(m) + a.scale(mz);
                     let cross = symmetric_product(p, a);
                     let moved = scaled(symmetric_square(p), m) + scaled(cross, mz) + scaled(symmetric_square(a), szz);
