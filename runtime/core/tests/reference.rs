@@ -13,8 +13,9 @@ use straightline_core::reference::{
     LinkMotion, MassCentreFrame, MassCentreLink, MassCentreTree,
 };
 use straightline_core::Dd;
+use support::chapter::chapter_robot;
 use support::data::{inputs, numbers, reference_folder};
-use support::robots::{chapter_robot, random_position, random_robot, Random, RobotKind};
+use support::robots::{random_position, random_robot, Random, RobotKind};
 
 const CHAPTER_ROBOTS: [&str; 4] = ["chapter_cylindrical", "chapter_stanford", "chapter_6r", "chapter_oblique"];
 

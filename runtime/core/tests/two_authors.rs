@@ -4,16 +4,13 @@
 mod support;
 
 use nalgebra::{Matrix3, Vector3};
-use std::collections::BTreeMap;
 use straightline_core::algorithms;
 use straightline_core::model::{self, Body, Frame, JointKind, Limits, Model};
 use straightline_core::reference::{self, unit, ExtendedPosition, Joint, MassCentreTree};
 use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::Dd;
-use support::robots::{random_position, random_robot, Random, RobotKind};
-
-/// Against the scale of each quantity. Double-double has 1.2e-32, the worst seen is 3e-30 (`--nocapture` prints it).
-const TOLERANCE: f64 = 2e-29;
+use support::compare::{compare_authors, Disagreement};
+use support::robots::{random_robot, Random, RobotKind};
 
 fn vec3(v: &Vector3<Dd>) -> Vec3<Dd> {
     Vec3::new(v.x, v.y, v.z)
@@ -124,144 +121,20 @@ fn shuffle_coordinates(random: &mut Random, tree: &mut MassCentreTree<Dd>) {
     }
 }
 
-/// Worst disagreement of every quantity, and where.
-#[derive(Default)]
-struct Disagreement {
-    worst: BTreeMap<&'static str, (f64, String)>,
-}
-
-impl Disagreement {
-    /// `scale`: of every component, or one for all. A scale can itself be rounding noise, as where a linear joint on the
-    /// base moves uniformly and nothing else: it counts as a thousandth of the largest at least.
-    fn compare(&mut self, what: &'static str, robot: &str, a: &[Dd], b: &[Dd], scale: &[Dd]) {
-        assert_eq!(a.len(), b.len(), "{what} of {robot}");
-        let least = 1e-3 * scale.iter().fold(0.0, |m: f64, x| m.max(x.abs().hi()));
-        for i in 0..a.len() {
-            let scale = scale[i % scale.len()].abs().hi().max(least);
-            let error = (a[i] - b[i]).abs().hi();
-            let relative = if error == 0.0 { 0.0 } else { error / scale };
-            let worst = self.worst.entry(what).or_insert((0.0, String::new()));
-            if relative > worst.0 || relative.is_nan() {
-                *worst = (relative, robot.to_string());
-            }
-        }
-    }
-
-    /// The scale is the largest value, at least 1.
-    fn compare_group(&mut self, what: &'static str, robot: &str, a: &[Dd], b: &[Dd]) {
-        let largest = b.iter().fold(Dd::ONE, |m, x| if x.abs().hi() > m.hi() { x.abs() } else { m });
-        self.compare(what, robot, a, b, &[largest]);
-    }
-}
-
-fn array(v: &Vec3<Dd>) -> [Dd; 3] {
-    [v.x, v.y, v.z]
-}
-
-fn columns(m: &Mat3<Dd>) -> Vec<Dd> {
-    (0..3).flat_map(|k| array(&m.column(k))).collect()
-}
-
-fn compare_all(disagreement: &mut Disagreement, random: &mut Random, kind: RobotKind, seed: u64) {
-    let mut tree = random_robot(random, kind);
-    if random.below(3) == 0 {
-        shuffle_coordinates(random, &mut tree);
-    }
-    let tree = tree;
-    let model = canonical(random, &tree);
-    let robot = format!("{kind:?}, seed {seed}");
-    let n = tree.nv();
-    let q = random_position(random, &tree);
-    let (qd, qdd, tau) = (random.list(n, 2.0), random.list(n, 3.0), random.list(n, 10.0));
-    let rest = vec![Dd::ZERO; n];
-    let weightless = MassCentreTree { gravity: Vector3::zeros(), ..tree.clone() };
-    let d = disagreement;
-
-    let scale = reference::natural_scale(&tree, &q, &qd, &qdd);
-    let expected = reference::inverse_dynamics(&tree, &q, &qd, &qdd);
-    let computed = algorithms::inverse_dynamics(&model, &q, &qd, &qdd);
-    d.compare("tau", &robot, &computed, expected.as_slice(), scale.as_slice());
-    let expected = reference::dalembert_inverse_dynamics(&tree, &q, &qd, &qdd);
-    d.compare("tau by D'Alembert", &robot, &computed, expected.as_slice(), scale.as_slice());
-    let scale = reference::natural_scale(&tree, &q, &qd, &rest);
-    let expected = reference::bias_force(&tree, &q, &qd);
-    d.compare("h", &robot, &algorithms::bias_force(&model, &q, &qd), expected.as_slice(), scale.as_slice());
-    let scale = reference::natural_scale(&tree, &q, &rest, &rest);
-    let expected = reference::gravity_force(&tree, &q);
-    d.compare("g", &robot, &algorithms::gravity_force(&model, &q), expected.as_slice(), scale.as_slice());
-    let scale = reference::natural_scale(&weightless, &q, &qd, &rest);
-    let expected = reference::velocity_force(&tree, &q, &qd);
-    d.compare("C", &robot, &algorithms::velocity_force(&model, &q, &qd), expected.as_slice(), scale.as_slice());
-
-    let expected = reference::mass_matrix(&tree, &q);
-    let computed = algorithms::mass_matrix(&model, &q);
-    d.compare_group("H", &robot, &computed, expected.as_slice());
-    let scale = reference::forward_natural_scale(&tree, &q, &qd, &tau);
-    let expected = reference::forward_dynamics(&tree, &q, &qd, &tau);
-    let computed = algorithms::forward_dynamics_aba(&model, &q, &qd, &tau);
-    d.compare("qdd (ABA)", &robot, &computed, expected.as_slice(), scale.as_slice());
-    let computed = algorithms::forward_dynamics_ltdl(&model, &q, &qd, &tau);
-    d.compare("qdd (LTDL)", &robot, &computed, expected.as_slice(), scale.as_slice());
-
-    // one wrench per joint, in the order of the velocity coordinates
-    let mut order: Vec<usize> = (0..tree.links.len()).collect();
-    order.sort_by_key(|&j| tree.links[j].iv);
-    let wrenches = reference::joint_wrenches(&tree, &q, &qd, &qdd);
-    let expected: Vec<Dd> = order.iter().flat_map(|&j| wrenches[j]).collect();
-    let computed: Vec<Dd> = algorithms::joint_wrenches(&model, &q, &qd, &qdd)
-        .iter()
-        .flat_map(|wrench| [array(&wrench.force), array(&wrench.moment)].concat())
-        .collect();
-    d.compare_group("wrench", &robot, &computed, &expected);
-
-    let expected = [reference::kinetic_energy(&tree, &q, &qd), reference::potential_energy(&tree, &q)];
-    let computed = [algorithms::kinetic_energy(&model, &q, &qd), algorithms::potential_energy(&model, &q)];
-    d.compare_group("energy", &robot, &computed, &expected);
-
-    let expected = reference::momentum(&tree, &q, &qd);
-    let computed = algorithms::momentum(&model, &q, &qd);
-    let com = reference::centre_of_mass(&tree, &q);
-    d.compare_group("mass centre", &robot, &array(&computed.com), com.as_slice());
-    d.compare_group("linear momentum", &robot, &array(&computed.linear), expected.linear.as_slice());
-    let angular = expected.angular_about_mass_centre;
-    d.compare_group("angular momentum", &robot, &array(&computed.angular), angular.as_slice());
-
-    for (frame, same) in tree.frames.iter().zip(&model.frames) {
-        let expected = reference::frame_pose(&tree, frame, &q);
-        let computed = &algorithms::forward_kinematics(&model, &q, &[same])[0];
-        d.compare_group("p", &robot, &array(&computed.translation), expected.position.as_slice());
-        d.compare_group("R", &robot, &columns(&computed.rotation), expected.rotation.as_slice());
-        let expected = reference::frame_jacobian(&tree, frame, &q).transpose();
-        d.compare_group("J", &robot, &algorithms::jacobian(&model, &q, same), expected.as_slice());
-        let expected = reference::frame_jacobian_bias(&tree, frame, &q, &qd);
-        let computed = algorithms::jacobian_bias(&model, &q, &qd, same);
-        let computed = [array(&computed.linear), array(&computed.angular)].concat();
-        d.compare_group("Jdqd", &robot, &computed, expected.as_slice());
-        let expected = reference::frame_velocity(&tree, frame, &q, &qd);
-        let computed = algorithms::frame_velocity(&model, &q, &qd, same);
-        let computed = [array(&computed.linear), array(&computed.angular)].concat();
-        d.compare_group("frame velocity", &robot, &computed, expected.as_slice());
-        let expected = reference::frame_acceleration(&tree, frame, &q, &qd, &qdd);
-        let computed = algorithms::frame_acceleration(&model, &q, &qd, &qdd, same);
-        let computed = [array(&computed.linear), array(&computed.angular)].concat();
-        d.compare_group("frame acceleration", &robot, &computed, expected.as_slice());
-    }
-}
-
 /// `count` random robots of a kind, up to `links` links.
 fn compare_robots(branched: bool, floating: bool, count: u64, links: usize) {
     let mut disagreement = Disagreement::default();
     for seed in 0..count {
         let mut random = Random(seed);
         let kind = RobotKind { links: 1 + random.below(links), branched, floating };
-        compare_all(&mut disagreement, &mut random, kind, seed);
+        let mut tree = random_robot(&mut random, kind);
+        if random.below(3) == 0 {
+            shuffle_coordinates(&mut random, &mut tree);
+        }
+        let model = canonical(&mut random, &tree);
+        compare_authors(&mut disagreement, &format!("{kind:?}, seed {seed}"), &tree, &model, &mut random);
     }
-    for (what, (error, _)) in &disagreement.worst {
-        println!("{what:20} {error:.1e}");
-    }
-    for (what, (error, robot)) in &disagreement.worst {
-        assert!(*error <= TOLERANCE, "{what}: {error:e} of the scale, {robot}");
-    }
+    disagreement.judge();
 }
 
 #[test]

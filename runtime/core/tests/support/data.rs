@@ -41,7 +41,7 @@ pub fn decimal(text: &str) -> Dd {
     }
     let mut power = Dd::ONE;
     for _ in 0..(exponent - fraction).unsigned_abs() {
-        power = power * ten;
+        power *= ten;
     }
     let value = if exponent < fraction { value / power } else { value * power };
     if negative {
