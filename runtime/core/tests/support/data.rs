@@ -23,38 +23,10 @@ pub fn reference_folder() -> Option<PathBuf> {
     folder
 }
 
-/// A decimal number with up to 31 digits, to about 1e-31 relative.
-pub fn decimal(text: &str) -> Dd {
-    let (mantissa, exponent) = match text.split_once(['e', 'E']) {
-        Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().expect("a decimal exponent")),
-        None => (text, 0),
-    };
-    let (negative, digits) = match mantissa.strip_prefix('-') {
-        Some(digits) => (true, digits),
-        None => (false, mantissa),
-    };
-    let fraction = digits.split_once('.').map_or(0, |(_, fraction)| fraction.len() as i32);
-    let ten = Dd::from(10.0);
-    let mut value = Dd::ZERO;
-    for c in digits.chars().filter(|&c| c != '.') {
-        value = value * ten + Dd::from(f64::from(c.to_digit(10).expect("a decimal digit")));
-    }
-    let mut power = Dd::ONE;
-    for _ in 0..(exponent - fraction).unsigned_abs() {
-        power *= ten;
-    }
-    let value = if exponent < fraction { value / power } else { value * power };
-    if negative {
-        -value
-    } else {
-        value
-    }
-}
-
 /// All numbers in a JSON value, depth first, with 25 digits.
 pub fn numbers(value: &Value) -> Vec<Dd> {
     match value {
-        Value::String(text) => vec![decimal(text)],
+        Value::String(text) => vec![Dd::from_decimal(text).expect("a decimal number")],
         Value::Array(items) => items.iter().flat_map(numbers).collect(),
         other => panic!("numbers of the reference data are strings, not {other}"),
     }
