@@ -89,6 +89,12 @@ pub struct Generated {
     pub frames: Vec<String>,
     /// The source: items without inner attributes, for `include!`, a module, or a file of its own.
     pub text: String,
+    /// The functions of that source, one by one.
+    pub items: Vec<Item>,
+    /// The scalar type.
+    pub scalar: Scalar,
+    /// Where it came from.
+    pub provenance: Provenance,
     /// Its figures.
     pub report: Report,
     /// What was assumed on the way.
@@ -150,7 +156,7 @@ fn generate(
     let remarks = warnings.iter().map(remark).collect();
     let provenance = Provenance { source: name.clone(), hash, remarks };
     let text = emit::file(model, &frames, &items, &report, &provenance, options.scalar);
-    Generated { model: robot.model, frames, text, report, warnings }
+    Generated { model: robot.model, frames, text, items, scalar: options.scalar, provenance, report, warnings }
 }
 
 /// The frames asked for, or the tips of the robot: the last frame on every body that carries no other.

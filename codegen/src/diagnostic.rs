@@ -350,6 +350,13 @@ impl Diagnostics {
         self.list.iter().any(|d| d.severity == Severity::Error)
     }
 
+    /// The complaints of that severity or worse.
+    #[must_use]
+    pub fn at_least(&self, severity: Severity) -> Diagnostics {
+        let list = self.list.iter().filter(|d| d.severity <= severity).cloned().collect();
+        Diagnostics { list, ..self.clone() }
+    }
+
     /// Number of complaints of that severity.
     pub fn count(&self, severity: Severity) -> usize {
         self.list.iter().filter(|d| d.severity == severity).count()

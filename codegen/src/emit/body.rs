@@ -7,6 +7,8 @@ use std::fmt::Write;
 
 /// How long an expression may grow before it gets a name of its own.
 const LINE: usize = 84;
+/// What makes sense in code that a person writes: no numbers near π/4, no locals declared before their values.
+const ALLOW: &str = "#[allow(clippy::all)]";
 /// How many locals one declaration may hold.
 const DECLARATION: usize = 64;
 
@@ -19,6 +21,13 @@ pub struct FunctionText {
     pub uses_sin_cos: bool,
     /// Whether it calls the square root.
     pub uses_sqrt: bool,
+}
+
+impl FunctionText {
+    /// Whether it needs [`super::kernel`] as a module `trig`.
+    pub fn calls_kernel(&self) -> bool {
+        self.uses_sin_cos || self.uses_sqrt
+    }
 }
 
 /// Writes `pub fn name(q: &[f64; 7], …, tau: &mut [f64; 7])`.
@@ -60,7 +69,7 @@ pub fn function(
         format!("{underscore}{}: {reference}{}", p.name, array_type(p, scalar))
     });
     if let [part] = schedule.parts.as_slice() {
-        let _ = writeln!(out.text, "pub fn {name}({signature}) {{");
+        let _ = writeln!(out.text, "{ALLOW}\npub fn {name}({signature}) {{");
         body(graph, part, scalar, title, &mut out);
         out.text.push_str("}\n");
         return out;
@@ -68,7 +77,7 @@ pub fn function(
 
     // in parts: the public function calls them one after the other
     let slots = schedule.slots;
-    let _ = writeln!(out.text, "pub fn {name}({signature}) {{");
+    let _ = writeln!(out.text, "{ALLOW}\npub fn {name}({signature}) {{");
     let _ = writeln!(out.text, "    let mut live = [0.0; {slots}];");
     let mut parts = String::new();
     for (k, part) in schedule.parts.iter().enumerate() {
@@ -96,7 +105,7 @@ pub fn function(
         let _ = writeln!(out.text, "    {name}_part{}({});", k + 1, arguments.join(", "));
         let mut text = FunctionText { text: String::new(), uses_sin_cos: false, uses_sqrt: false };
         body(graph, part, scalar, title, &mut text);
-        let _ = writeln!(parts, "\n#[inline(never)]\nfn {name}_part{}({}) {{", k + 1, types.join(", "));
+        let _ = writeln!(parts, "\n{ALLOW}\n#[inline(never)]\nfn {name}_part{}({}) {{", k + 1, types.join(", "));
         parts.push_str(&text.text);
         parts.push_str("}\n");
         out.uses_sin_cos |= text.uses_sin_cos;

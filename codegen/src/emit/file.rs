@@ -39,24 +39,14 @@ pub fn file(
     provenance: &Provenance,
     scalar: Scalar,
 ) -> String {
-    let mut out = String::new();
-    header(&mut out, model, report, provenance);
-    constants(&mut out, model, frames, scalar);
+    let mut out = preamble(model, frames, report, provenance, scalar);
     for item in items {
-        let figures = &report.functions[item.function.name()];
-        let _ = writeln!(
-            out,
-            "\n/// What [`{}`] costs.\npub const {}_COST: Cost = {};",
-            item.function.name(),
-            item.function.name().to_uppercase(),
-            cost(figures)
-        );
         out.push('\n');
         out.push_str(&item.text.text);
     }
-    if items.iter().any(|i| i.text.uses_sin_cos || i.text.uses_sqrt) {
+    if items.iter().any(|i| i.text.calls_kernel()) {
         out.push_str("\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod trig {\n");
-        for line in TRIG.lines() {
+        for line in kernel().lines() {
             let line = if let Some(doc) = line.strip_prefix("//!") { format!("//{doc}") } else { line.to_string() };
             let indent = if line.is_empty() { "" } else { "    " };
             let _ = writeln!(out, "{indent}{line}");
@@ -64,6 +54,29 @@ pub fn file(
         out.push_str("}\n");
     }
     out
+}
+
+/// All that stands before the functions: header, the robot's constants, the functions' costs.
+pub fn preamble(
+    model: &Model<Dd>,
+    frames: &[String],
+    report: &Report,
+    provenance: &Provenance,
+    scalar: Scalar,
+) -> String {
+    let mut out = String::new();
+    header(&mut out, model, report, provenance);
+    constants(&mut out, model, frames, scalar);
+    for (name, figures) in &report.functions {
+        let _ = writeln!(out, "/// What [`{name}`] costs.");
+        let _ = writeln!(out, "pub const {}_COST: Cost = {};", name.to_uppercase(), cost(figures));
+    }
+    out
+}
+
+/// The source of the sine-cosine kernel, as a module of its own.
+pub fn kernel() -> &'static str {
+    TRIG
 }
 
 fn header(out: &mut String, model: &Model<Dd>, report: &Report, provenance: &Provenance) {

@@ -8,7 +8,7 @@ mod file;
 mod names;
 
 pub use body::{function, FunctionText};
-pub use file::{file, Item, Provenance};
+pub use file::{file, kernel, preamble, Item, Provenance};
 pub use names::Names;
 
 use crate::expr::Port;
@@ -46,7 +46,7 @@ pub fn array_type(port: &Port, scalar: Scalar) -> String {
 }
 
 /// The place of scalar `k` of a port: `h[2][3]`.
-fn element(port: &Port, k: usize) -> String {
+pub fn element(port: &Port, k: usize) -> String {
     let mut rest = k;
     let mut indices = Vec::new();
     for n in port.shape.iter().rev() {

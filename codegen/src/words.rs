@@ -1,0 +1,123 @@
+//! The words by which every front names what can be chosen: functions, scalars, rules, methods.
+
+use crate::emit::Scalar;
+use crate::expr::Grade;
+use crate::function::{ForwardDynamicsMethod, Function};
+use std::fmt;
+use std::str::FromStr;
+
+/// A choice that has words.
+pub trait Choice: Copy + PartialEq + Sized + 'static {
+    /// What is chosen, in messages.
+    const WHAT: &'static str;
+
+    /// Every word, its meaning in a sentence, and the choice it stands for.
+    fn words() -> Vec<(&'static str, &'static str, Self)>;
+
+    /// The choice behind a word.
+    ///
+    /// # Errors
+    /// The word is none of [`Choice::words`].
+    fn from_word(word: &str) -> Result<Self, UnknownWord> {
+        let words = Self::words();
+        match words.iter().find(|(w, _, _)| *w == word) {
+            Some((_, _, choice)) => Ok(*choice),
+            None => Err(UnknownWord {
+                what: Self::WHAT,
+                word: word.to_string(),
+                known: words.iter().map(|(w, _, _)| *w).collect(),
+            }),
+        }
+    }
+}
+
+/// A word that names nothing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownWord {
+    /// What it should have named.
+    pub what: &'static str,
+    /// The word.
+    pub word: String,
+    /// The words that there are.
+    pub known: Vec<&'static str>,
+}
+
+impl fmt::Display for UnknownWord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "there is no {} `{}`; one of: {}", self.what, self.word.escape_default(), self.known.join(", "))
+    }
+}
+
+impl std::error::Error for UnknownWord {}
+
+impl Choice for Function {
+    const WHAT: &'static str = "function";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        Function::all().map(|f| (f.name(), f.summary(), f)).collect()
+    }
+}
+
+impl Choice for Scalar {
+    const WHAT: &'static str = "scalar";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        vec![("f64", "double precision", Scalar::F64), ("f32", "single precision", Scalar::F32)]
+    }
+}
+
+impl Choice for Grade {
+    const WHAT: &'static str = "set of rules";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        vec![
+            ("all", "fewest operations; rounding may differ from the generic runtime", Grade::Algebraic),
+            ("exact", "the generic runtime, bit for bit", Grade::Exact),
+        ]
+    }
+}
+
+impl Choice for ForwardDynamicsMethod {
+    const WHAT: &'static str = "method of forward dynamics";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        vec![
+            ("cheaper", "whichever takes fewer operations for this robot", ForwardDynamicsMethod::Cheaper),
+            ("articulated-body", "articulated bodies", ForwardDynamicsMethod::ArticulatedBody),
+            ("factorisation", "mass matrix and its branch-sparse factor", ForwardDynamicsMethod::Factorisation),
+        ]
+    }
+}
+
+macro_rules! parse_words {
+    ($($choice:ty),*) => {$(
+        impl FromStr for $choice {
+            type Err = UnknownWord;
+            fn from_str(word: &str) -> Result<Self, UnknownWord> {
+                Self::from_word(word)
+            }
+        }
+    )*};
+}
+parse_words!(Function, Scalar, Grade, ForwardDynamicsMethod);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_word_means_what_it_says() {
+        fn all<C: Choice + fmt::Debug>() {
+            for (word, meaning, choice) in C::words() {
+                assert_eq!(C::from_word(word), Ok(choice));
+                assert!(!meaning.is_empty());
+            }
+        }
+        all::<Function>();
+        all::<Scalar>();
+        all::<Grade>();
+        all::<ForwardDynamicsMethod>();
+    }
+
+    #[test]
+    fn an_unknown_word_is_answered_with_the_known_ones() {
+        let error = "f16".parse::<Scalar>().unwrap_err();
+        assert_eq!(error.to_string(), "there is no scalar `f16`; one of: f64, f32");
+    }
+}
