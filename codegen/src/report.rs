@@ -2,11 +2,11 @@
 
 use crate::expr::Counts;
 use crate::function::Function;
-use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Figures of one generated function.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
 pub struct FunctionReport {
     /// Multiplications.
     pub mul: usize,
@@ -39,7 +39,8 @@ impl FunctionReport {
 }
 
 /// Figures of everything that was generated for a robot.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
 pub struct Report {
     /// The robot's name.
     pub robot: String,

@@ -1,0 +1,307 @@
+//! For build scripts: a robot file beside the manifest becomes a Rust file in `OUT_DIR`.
+//!
+//! In `build.rs`:
+//! ```no_run
+//! use straightline_codegen::{Builder, Function};
+//!
+//! fn main() -> Result<(), straightline_codegen::builder::Error> {
+//!     Builder::new("robots/panda.urdf")
+//!         .functions([Function::InverseDynamics, Function::MassMatrix])
+//!         .frames(["panda_hand_tcp"])
+//!         .build()?;
+//!     Ok(())
+//! }
+//! ```
+//! and where the dynamics are wanted:
+//! ```ignore
+//! pub mod panda {
+//!     include!(concat!(env!("OUT_DIR"), "/panda.rs"));
+//! }
+//! ```
+//! The build runs again when the robot file changes. Complaints name the file, the line and the column: errors end the
+//! build, warnings do not. Nothing is written outside `OUT_DIR`.
+
+use crate::compile::{compile, Generated, Options};
+use crate::diagnostic::{Diagnostics, Severity, Source};
+use crate::emit::Scalar;
+use crate::export::identifier;
+use crate::expr::Grade;
+use crate::function::{ForwardDynamicsMethod, Function};
+use crate::output::write_file;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Compiles a robot file as it is, with all functions, into `$OUT_DIR/<file stem>.rs`.
+///
+/// # Errors
+/// See [`Builder::build`].
+pub fn compile_robot(robot: impl Into<PathBuf>) -> Result<Generated, Error> {
+    Builder::new(robot).build()
+}
+
+/// What to make of a robot file; see the [module](self).
+#[derive(Clone, Debug)]
+#[must_use = "nothing happens before `build`"]
+pub struct Builder {
+    robot: PathBuf,
+    module: Option<String>,
+    out_dir: Option<PathBuf>,
+    options: Options,
+}
+
+impl Builder {
+    /// From a robot file (URDF or TOML), relative to the package's manifest; with all functions, in f64.
+    pub fn new(robot: impl Into<PathBuf>) -> Self {
+        Builder { robot: robot.into(), module: None, out_dir: None, options: Options::default() }
+    }
+
+    /// These functions only.
+    pub fn functions(mut self, functions: impl IntoIterator<Item = Function>) -> Self {
+        self.options.functions = functions.into_iter().collect();
+        self.options.functions.sort_unstable();
+        self.options.functions.dedup();
+        self
+    }
+
+    /// The frames (links) of the functions that answer per frame; otherwise the tips of the robot.
+    pub fn frames(mut self, frames: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.options.frames = frames.into_iter().map(Into::into).collect();
+        self
+    }
+
+    /// The scalar type; otherwise f64.
+    pub fn scalar(mut self, scalar: Scalar) -> Self {
+        self.options.scalar = scalar;
+        self
+    }
+
+    /// The weakest rewrite rules allowed; with [`Grade::Exact`] the code is the generic runtime, bit for bit.
+    pub fn rules(mut self, grade: Grade) -> Self {
+        self.options.grade = grade;
+        self
+    }
+
+    /// How forward dynamics is computed; otherwise the cheaper way for this robot.
+    pub fn forward_dynamics(mut self, method: ForwardDynamicsMethod) -> Self {
+        self.options.forward_dynamics = method;
+        self
+    }
+
+    /// Functions of more operations are cut into parts.
+    pub fn max_part_operations(mut self, operations: usize) -> Self {
+        self.options.limits.operations = operations;
+        self
+    }
+
+    /// Whether the root link moves freely in the world.
+    pub fn floating_base(mut self, floating: bool) -> Self {
+        self.options.model.floating_base = floating;
+        self
+    }
+
+    /// The joints in the order of their coordinates, all of them; otherwise depth first, as in the file.
+    pub fn joint_order(mut self, joints: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.options.model.joint_order = Some(joints.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// So near to a multiple of 30 or 45 degrees \[rad\] an angle is taken as that; 0: every angle as it is written.
+    pub fn angle_tolerance(mut self, tolerance: f64) -> Self {
+        self.options.model.angle_tolerance = tolerance;
+        self
+    }
+
+    /// Acceleration due to gravity in the world \[m/s²\]; otherwise the file's, or (0, 0, −9.81).
+    pub fn gravity(mut self, gravity: [f64; 3]) -> Self {
+        self.options.model.gravity = Some(gravity);
+        self
+    }
+
+    /// The name of the output, without `.rs`; otherwise the robot file's.
+    pub fn module(mut self, name: impl Into<String>) -> Self {
+        self.module = Some(name.into());
+        self
+    }
+
+    /// Where to write; otherwise cargo's `OUT_DIR`.
+    pub fn out_dir(mut self, directory: impl Into<PathBuf>) -> Self {
+        self.out_dir = Some(directory.into());
+        self
+    }
+
+    /// Compiles, writes the file, and tells cargo what there is to tell.
+    ///
+    /// # Errors
+    /// The robot file or the options are wrong (cargo shows each complaint with its place), or a file cannot be read
+    /// or written.
+    pub fn build(self) -> Result<Generated, Error> {
+        let variable = |name: &'static str| std::env::var_os(name).map(PathBuf::from);
+        // without cargo: relative to where we are
+        let manifest = variable("CARGO_MANIFEST_DIR").unwrap_or_default();
+        let out_dir = self.out_dir.clone().or_else(|| variable("OUT_DIR")).ok_or(Error::NoOutDir)?;
+        let Messages { cargo, person, result } = self.run(&manifest, &out_dir);
+        cargo.iter().for_each(|line| println!("{line}"));
+        eprint!("{person}");
+        result
+    }
+
+    fn run(&self, manifest: &Path, out_dir: &Path) -> Messages {
+        let robot = manifest.join(&self.robot);
+        let mut messages = Messages {
+            cargo: vec![format!("cargo::rerun-if-changed={}", robot.display())],
+            person: String::new(),
+            result: Err(Error::NoOutDir),
+        };
+        messages.result = self.compile(&robot, out_dir, &mut messages);
+        if let Err(error @ (Error::Read(..) | Error::Write(_))) = &messages.result {
+            messages.cargo.push(format!("cargo::error={error}"));
+        }
+        messages
+    }
+
+    fn compile(&self, robot: &Path, out_dir: &Path, messages: &mut Messages) -> Result<Generated, Error> {
+        let bytes = std::fs::read(robot).map_err(|e| Error::Read(robot.to_path_buf(), e))?;
+        let source = Source::from_bytes(&self.robot.display().to_string(), bytes);
+        let generated = compile(&source, &self.options).map_err(|diagnostics| {
+            messages.tell(&diagnostics);
+            Error::Robot { path: self.robot.clone(), errors: diagnostics.count(Severity::Error) }
+        })?;
+        messages.tell(&generated.warnings);
+        let stem = self.robot.file_stem().unwrap_or_default().to_string_lossy();
+        let module = self.module.clone().unwrap_or_else(|| identifier(&stem));
+        write_file(&out_dir.join(format!("{module}.rs")), &generated.text).map_err(Error::Write)?;
+        Ok(generated)
+    }
+}
+
+/// What goes where.
+struct Messages {
+    /// Lines on standard output, which cargo reads.
+    cargo: Vec<String>,
+    /// Text on standard error, which cargo shows when the build fails.
+    person: String,
+    result: Result<Generated, Error>,
+}
+
+impl Messages {
+    fn tell(&mut self, diagnostics: &Diagnostics) {
+        for diagnostic in diagnostics.iter() {
+            let kind = match diagnostic.severity {
+                Severity::Error => "error",
+                Severity::Warning => "warning",
+                Severity::Note => continue,
+            };
+            self.cargo.push(format!("cargo::{kind}={}", diagnostic.line()));
+        }
+        self.person.push_str(&diagnostics.at_least(Severity::Warning).render());
+    }
+}
+
+/// Why there is no output. Complaints about the robot file have been printed already.
+pub enum Error {
+    /// The robot file, or what was asked of it, is wrong.
+    Robot {
+        /// The file, as it was given.
+        path: PathBuf,
+        /// Number of errors.
+        errors: usize,
+    },
+    /// The robot file cannot be read.
+    Read(PathBuf, std::io::Error),
+    /// The output cannot be written.
+    Write(std::io::Error),
+    /// Neither cargo's `OUT_DIR` nor [`Builder::out_dir`] says where to write.
+    NoOutDir,
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Robot { path, errors: 1 } => write!(f, "{}: 1 error", path.display()),
+            Error::Robot { path, errors } => write!(f, "{}: {errors} errors", path.display()),
+            Error::Read(path, error) => write!(f, "{}: {error}", path.display()),
+            Error::Write(error) => write!(f, "{error}"),
+            Error::NoOutDir => f.write_str("OUT_DIR is not set: outside of a build script, say where with `out_dir`"),
+        }
+    }
+}
+
+/// As [`fmt::Display`]: this is what a build script prints whose `main` returns it.
+impl fmt::Debug for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Error::Read(_, error) | Error::Write(error) => Some(error),
+            Error::Robot { .. } | Error::NoOutDir => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    const PENDULUM: &str = r#"
+[robot]
+name = "pendulum"
+
+[[link]]
+name = "world"
+
+[[link]]
+name = "bob"
+mass = 1.5
+com = [0.0, 0.0, -0.4]
+inertia = [0.02, 0.02, 0.001]
+
+[[joint]]
+name = "pivot"
+kind = "continuous"
+parent = "world"
+child = "bob"
+axis = "y"
+"#;
+
+    fn scratch(name: &str, text: &str) -> PathBuf {
+        let path = std::env::temp_dir().join(format!("straightline-builder-{}-{name}", std::process::id()));
+        fs::create_dir_all(&path).unwrap();
+        fs::write(path.join("pen.toml"), text).unwrap();
+        path
+    }
+
+    #[test]
+    fn the_output_stands_in_out_dir_and_cargo_knows_what_it_depends_on() {
+        let here = scratch("good", PENDULUM);
+        let m = Builder::new("pen.toml").functions([Function::GravityForce]).run(&here, &here);
+        let generated = m.result.unwrap();
+        assert_eq!(fs::read_to_string(here.join("pen.rs")).unwrap(), generated.text);
+        assert_eq!(m.cargo, [format!("cargo::rerun-if-changed={}", here.join("pen.toml").display())]);
+        assert!(generated.text.contains("pub fn gravity_force(q: &[f64; 1], g: &mut [f64; 1])"));
+        assert!(!generated.text.contains("pub fn mass_matrix"));
+    }
+
+    #[test]
+    fn errors_reach_cargo_in_one_line_each_and_people_with_the_source_line() {
+        let here =
+            scratch("bad", &PENDULUM.replace("mass = 1.5", "mass = -1.5").replace("\"bob\"\naxis", "\"bib\"\naxis"));
+        let m = Builder::new("pen.toml").run(&here, &here);
+        assert_eq!(m.result.unwrap_err().to_string(), "pen.toml: 2 errors");
+        let errors: Vec<_> = m.cargo.iter().filter(|l| l.starts_with("cargo::error=pen.toml:")).collect();
+        assert_eq!(errors.len(), 2, "{:?}", m.cargo);
+        assert!(m.person.contains("--> pen.toml:10:8"), "{}", m.person);
+        assert!(!here.join("pen.rs").exists());
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let here = scratch("missing", PENDULUM);
+        let m = Builder::new("pan.toml").run(&here, &here);
+        assert!(m.cargo[1].starts_with("cargo::error=") && m.cargo[1].contains("pan.toml: "), "{:?}", m.cargo);
+    }
+}

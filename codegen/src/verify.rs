@@ -1,0 +1,459 @@
+//! The program against the second author, on random states.
+//!
+//! The program is run operation by operation in its own arithmetic, as rustc compiles it. The truth is the handbook
+//! chapter's formulation in double-double, from a second reading of the same robot file: it shares with the program the
+//! parsed file and nothing else.
+//!
+//! An error is divided by the natural scale of its output: a bound on the sum of the moduli of the terms that the output
+//! is made of. So 1e-16 is a rounding, whatever cancels, and a wrong formula is anything up to 1.
+
+use crate::compile::{program, Generated, Options, Program};
+use crate::description;
+use crate::diagnostic::{Diagnostics, Source};
+use crate::emit::{element, Scalar};
+use crate::expr::{evaluate, Graph};
+use crate::function::{Function, Robot};
+use crate::reference_input::mass_centre_tree;
+use std::collections::BTreeMap;
+use straightline_core::model::{JointKind, Model};
+use straightline_core::reference::{self, Joint, MassCentreFrame, MassCentreTree};
+use straightline_core::Dd;
+
+/// Worst error of a function.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+pub struct Worst {
+    /// The error, divided by the natural scale.
+    pub error: f64,
+    /// In which state, from 0.
+    pub state: u32,
+    /// In which output, such as `tau[3]`.
+    pub output: String,
+    /// The inputs of that state.
+    pub inputs: BTreeMap<&'static str, Vec<f64>>,
+}
+
+/// What came out.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+pub struct Verification {
+    /// The robot's name.
+    pub robot: String,
+    /// The scalar type of the program.
+    pub scalar: &'static str,
+    /// Number of states.
+    pub states: u32,
+    /// The seed that they were made from.
+    pub seed: u64,
+    /// The greatest error that passes.
+    pub bound: f64,
+    /// The worst error of every function.
+    pub functions: BTreeMap<&'static str, Worst>,
+}
+
+impl Verification {
+    /// Whether all errors are within the bound.
+    pub fn passes(&self) -> bool {
+        self.functions.values().all(|worst| worst.error <= self.bound)
+    }
+}
+
+/// The greatest scaled error that passes: 2^13 roundings. Trees of 40 bodies stay below a hundred; the smallest wrong
+/// term that matters is far above.
+pub fn bound(scalar: Scalar) -> f64 {
+    8192.0 * unit(scalar)
+}
+
+/// Half the distance from 1 to the next number.
+fn unit(scalar: Scalar) -> f64 {
+    match scalar {
+        Scalar::F64 => f64::EPSILON / 2.0,
+        Scalar::F32 => f64::from(f32::EPSILON) / 2.0,
+    }
+}
+
+/// Compares the programs of a robot with the reference, which reads `source` on its own. `tick` is called after every
+/// state.
+///
+/// # Errors
+/// The reference does not understand the file as the compiler did.
+pub fn verify(
+    source: &Source,
+    generated: &Generated,
+    options: &Options,
+    (states, seed): (u32, u64),
+    mut tick: impl FnMut(),
+) -> Result<Verification, String> {
+    let (model, frames) = (&generated.model, &generated.frames);
+    let tree = &second_reading(source, model, options)?;
+    let functions = options.functions.iter().filter(|f| !f.is_per_frame() || !frames.is_empty());
+    let robot = Robot::new(model.clone());
+    let programs: Vec<Program> = functions.map(|f| program(&robot, frames, *f, options)).collect();
+    let frame = |name: &String| tree.frame(name).ok_or_else(|| format!("the reference has no frame `{name}`"));
+    let frames: Vec<&MassCentreFrame<Dd>> = frames.iter().map(frame).collect::<Result<_, _>>()?;
+    let mut random = Random(seed);
+    let mut worst: BTreeMap<&'static str, Worst> = BTreeMap::new();
+    for state in 0..states {
+        let inputs = State::random(model, options.scalar, &mut random);
+        let truth = Truth { tree, frames: &frames, state: &inputs };
+        for Program { function, graph, .. } in &programs {
+            let values = run(graph, &inputs, options.scalar);
+            let (expected, scales) = truth.outputs(*function);
+            assert_eq!((values.len(), values.len()), (expected.len(), scales.len()), "{}", function.name());
+            let (k, error) = values
+                .iter()
+                .zip(&expected)
+                .zip(&scales)
+                .map(|((v, e), s)| scaled(*v, *e, *s))
+                .enumerate()
+                .max_by(|a, b| a.1.total_cmp(&b.1))
+                .unwrap_or((0, 0.0));
+            if worst.get(function.name()).is_none_or(|w| error > w.error) {
+                let output = element(&graph.outputs[0], k);
+                let inputs = graph.inputs.iter().map(|p| (p.name, inputs.get(p.name).to_vec())).collect();
+                worst.insert(function.name(), Worst { error, state, output, inputs });
+            }
+        }
+        tick();
+    }
+    let (robot, scalar) = (model.name.clone(), options.scalar);
+    Ok(Verification { robot, scalar: scalar.name(), states, seed, bound: bound(scalar), functions: worst })
+}
+
+/// The robot in the reference's terms, its coordinates numbered as the model's.
+fn second_reading(source: &Source, model: &Model<Dd>, options: &Options) -> Result<MassCentreTree<Dd>, String> {
+    let description = description::read(source, &mut Diagnostics::new()).ok_or("the file holds no robot")?;
+    let mut tree = mass_centre_tree(&description, &options.model)?;
+    for link in &mut tree.links {
+        let body = model.bodies.iter().find(|body| body.name == link.name);
+        let joint = &body.ok_or_else(|| format!("the model has no body `{}`", link.name))?.joint;
+        (link.iq, link.iv) = (joint.iq, joint.iv);
+    }
+    Ok(tree)
+}
+
+/// |value − expected| / scale; infinite where there is no sensible answer.
+fn scaled(value: f64, expected: Dd, scale: f64) -> f64 {
+    let error = (Dd::from(value) - expected).to_f64().abs();
+    if error == 0.0 {
+        return 0.0;
+    }
+    let scaled = error / scale;
+    if scaled.is_nan() {
+        f64::INFINITY
+    } else {
+        scaled
+    }
+}
+
+/// The program's outputs in its own arithmetic.
+fn run(graph: &Graph, state: &State, scalar: Scalar) -> Vec<f64> {
+    let inputs = graph.inputs.iter().flat_map(|port| state.get(port.name)).copied();
+    match scalar {
+        Scalar::F64 => evaluate::<f64>(graph, &inputs.collect::<Vec<_>>()),
+        Scalar::F32 => {
+            let inputs: Vec<f32> = inputs.map(|x| x as f32).collect();
+            evaluate::<f32>(graph, &inputs).into_iter().map(f64::from).collect()
+        }
+    }
+}
+
+/// Inputs of all functions.
+struct State {
+    q: Vec<f64>,
+    qd: Vec<f64>,
+    qdd: Vec<f64>,
+    tau: Vec<f64>,
+}
+
+impl State {
+    fn get(&self, name: &str) -> &[f64] {
+        match name {
+            "q" => &self.q,
+            "qd" => &self.qd,
+            "qdd" => &self.qdd,
+            "tau" => &self.tau,
+            _ => unreachable!("a function has no input `{name}`"),
+        }
+    }
+
+    /// Inside the limits; without them, angles within a turn, slides within a metre, moderate speeds and forces.
+    fn random(model: &Model<Dd>, scalar: Scalar, random: &mut Random) -> State {
+        let nv = model.nv();
+        let (mut q, mut qd) = (vec![0.0; model.nq()], vec![0.0; nv]);
+        let (mut qdd, mut tau) = (vec![0.0; nv], vec![0.0; nv]);
+        for joint in model.bodies.iter().map(|b| &b.joint) {
+            let limits = joint.limits;
+            let finite = |x: f64, otherwise: f64| if x.is_finite() { x } else { otherwise };
+            match joint.kind {
+                JointKind::Revolute | JointKind::Prismatic => {
+                    let wide = if joint.kind == JointKind::Revolute { std::f64::consts::PI } else { 1.0 };
+                    let lower = finite(limits.lower, finite(limits.upper, wide) - 2.0 * wide);
+                    let upper = finite(limits.upper, lower + 2.0 * wide);
+                    q[joint.iq] = lower + (upper - lower) * random.unit();
+                }
+                JointKind::Floating => {
+                    q[joint.iq..joint.iq + 3].fill_with(|| random.symmetric(2.0));
+                    q[joint.iq + 3..joint.iq + 7].copy_from_slice(&random.quaternion());
+                }
+            }
+            for i in joint.iv..joint.iv + joint.kind.nv() {
+                qd[i] = random.symmetric(finite(limits.velocity, 2.0).min(10.0));
+                qdd[i] = random.symmetric(5.0);
+                tau[i] = random.symmetric(finite(limits.effort, 20.0).min(100.0));
+            }
+        }
+        for x in q.iter_mut().chain(&mut qd).chain(&mut qdd).chain(&mut tau) {
+            if scalar == Scalar::F32 {
+                *x = f64::from(*x as f32);
+            }
+        }
+        State { q, qd, qdd, tau }
+    }
+}
+
+/// SplitMix64 (Steele, Lea and Flood 2014): the same states on every machine.
+struct Random(u64);
+
+impl Random {
+    /// In [0, 1).
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// In [−bound, bound).
+    fn symmetric(&mut self, bound: f64) -> f64 {
+        bound * (2.0 * self.unit() - 1.0)
+    }
+
+    /// A unit quaternion: a point of the ball, not too near its centre, divided by its length.
+    fn quaternion(&mut self) -> [f64; 4] {
+        loop {
+            let x: [f64; 4] = std::array::from_fn(|_| self.symmetric(1.0));
+            let square: f64 = x.iter().map(|x| x * x).sum();
+            if (0.01..=1.0).contains(&square) {
+                return x.map(|x| x / square.sqrt());
+            }
+        }
+    }
+}
+
+/// The reference at a state.
+struct Truth<'a> {
+    tree: &'a MassCentreTree<Dd>,
+    frames: &'a [&'a MassCentreFrame<Dd>],
+    state: &'a State,
+}
+
+/// How far and how fast a point of the robot can be said to be, when nothing cancels.
+#[derive(Clone, Copy, Default)]
+struct Reach {
+    /// Sum of the distances from the joint nearest the base to the point \[m\].
+    length: f64,
+    /// The same from the world's origin.
+    position: f64,
+    /// Sum of the angular speeds below it \[rad/s\].
+    turning: f64,
+    /// Sum of the linear speeds that they give it \[m/s\].
+    moving: f64,
+    /// The same of the accelerations in the joints \[rad/s², m/s²\].
+    turning_rate: f64,
+    moving_rate: f64,
+}
+
+impl Truth<'_> {
+    /// The outputs of a function and their natural scales.
+    fn outputs(&self, function: Function) -> (Vec<Dd>, Vec<f64>) {
+        use Function::*;
+        let tree = self.tree;
+        let wide = |x: &[f64]| x.iter().map(|x| Dd::from(*x)).collect::<Vec<Dd>>();
+        let (q, qd, qdd, tau) =
+            (&wide(&self.state.q), &wide(&self.state.qd), &wide(&self.state.qdd), &wide(&self.state.tau));
+        let rest = &vec![Dd::ZERO; qd.len()];
+        let narrow = |x: &[Dd]| x.iter().map(|x| x.to_f64().abs()).collect::<Vec<f64>>();
+        let force_scale = |qd: &[Dd], qdd: &[Dd]| narrow(reference::natural_scale(tree, q, qd, qdd).as_slice());
+        let per_frame = |values: &dyn Fn(&MassCentreFrame<Dd>) -> Vec<Dd>, scales: &dyn Fn(Reach) -> Vec<f64>| {
+            let reach = |f: &MassCentreFrame<Dd>| self.reach(f.link, length(f.position.as_slice()));
+            (
+                self.frames.iter().flat_map(|f| values(f)).collect(),
+                self.frames.iter().flat_map(|f| scales(reach(f))).collect(),
+            )
+        };
+        let motion = |linear: f64, angular: f64| [[linear; 3], [angular; 3]].concat();
+        match function {
+            ForwardKinematics => per_frame(
+                &|f| {
+                    let pose = reference::frame_pose(tree, f, q);
+                    [pose.position.as_slice(), pose.rotation.transpose().as_slice()].concat()
+                },
+                &|r| [&[r.position; 3][..], &[1.0; 9]].concat(),
+            ),
+            FrameVelocity => per_frame(&|f| reference::frame_velocity(tree, f, q, qd).as_slice().to_vec(), &|r| {
+                motion(r.moving, r.turning)
+            }),
+            FrameAcceleration => {
+                per_frame(&|f| reference::frame_acceleration(tree, f, q, qd, qdd).as_slice().to_vec(), &|r| {
+                    motion(r.moving_rate + 2.0 * r.turning * r.moving, r.turning_rate + r.turning * r.turning)
+                })
+            }
+            JacobianBias => per_frame(&|f| reference::frame_jacobian_bias(tree, f, q, qd).as_slice().to_vec(), &|r| {
+                motion(2.0 * r.turning * r.moving, r.turning * r.turning)
+            }),
+            Jacobian => per_frame(&|f| reference::frame_jacobian(tree, f, q).transpose().as_slice().to_vec(), &|r| {
+                [vec![r.length.max(1.0); 3 * qd.len()], vec![1.0; 3 * qd.len()]].concat()
+            }),
+            InverseDynamics => {
+                (reference::inverse_dynamics(tree, q, qd, qdd).as_slice().to_vec(), force_scale(qd, qdd))
+            }
+            GravityForce => (reference::gravity_force(tree, q).as_slice().to_vec(), force_scale(rest, rest)),
+            BiasForce => (reference::bias_force(tree, q, qd).as_slice().to_vec(), force_scale(qd, rest)),
+            VelocityForce => {
+                let mut weightless = tree.clone();
+                weightless.gravity.fill(Dd::ZERO);
+                let scale = reference::natural_scale(&weightless, q, qd, rest);
+                (reference::velocity_force(tree, q, qd).as_slice().to_vec(), narrow(scale.as_slice()))
+            }
+            MassMatrix => {
+                let h = reference::mass_matrix(tree, q);
+                let root: Vec<f64> = (0..h.nrows()).map(|i| h[(i, i)].to_f64().sqrt()).collect();
+                (h.as_slice().to_vec(), root.iter().flat_map(|a| root.iter().map(move |b| a * b)).collect())
+            }
+            ForwardDynamics => {
+                let value = reference::forward_dynamics(tree, q, qd, tau);
+                // |H⁻¹| (|τ| + scale of h + |H| |q̈|)
+                let h = reference::mass_matrix(tree, q);
+                let n = h.nrows();
+                let bias = force_scale(qd, rest);
+                let forces: Vec<f64> = (0..n)
+                    .map(|i| {
+                        let inertial: f64 = (0..n).map(|j| (h[(i, j)] * value[j]).to_f64().abs()).sum();
+                        tau[i].to_f64().abs() + bias[i] + inertial
+                    })
+                    .collect();
+                let mut scale = vec![0.0; n];
+                for (j, force) in forces.iter().enumerate() {
+                    let mut column = value.clone();
+                    column.fill(Dd::ZERO);
+                    column[j] = Dd::ONE;
+                    let column = reference::solve_symmetric(&h, &column);
+                    scale.iter_mut().zip(narrow(column.as_slice())).for_each(|(s, c)| *s += c * force);
+                }
+                (value.as_slice().to_vec(), scale)
+            }
+            JointWrenches => {
+                let wrenches = reference::joint_wrenches(tree, q, qd, qdd);
+                let scales = self.wrench_scales(q, qd, qdd);
+                let mut order: Vec<usize> = (0..tree.links.len()).collect();
+                order.sort_by_key(|j| tree.links[*j].iv);
+                (
+                    order.iter().flat_map(|j| wrenches[*j]).collect(),
+                    order.iter().flat_map(|j| motion(scales[*j].0, scales[*j].1)).collect(),
+                )
+            }
+            Energy => {
+                let values = vec![reference::kinetic_energy(tree, q, qd), reference::potential_energy(tree, q)];
+                let g = length(tree.gravity.as_slice());
+                let scales = self.over_links(|m, inertia, r| {
+                    [(m * r.moving * r.moving + inertia * r.turning * r.turning) / 2.0, m * g * r.position]
+                });
+                (values, scales.to_vec())
+            }
+            CentreOfMass => {
+                let [mass, moment] = self.over_links(|m, _, r| [m, m * r.position]);
+                (reference::centre_of_mass(tree, q).as_slice().to_vec(), vec![moment / mass; 3])
+            }
+            Momentum => {
+                let momentum = reference::momentum(tree, q, qd);
+                let values = [momentum.linear.as_slice(), momentum.angular_about_mass_centre.as_slice()].concat();
+                let [linear, angular] = self
+                    .over_links(|m, inertia, r| [m * r.moving, 2.0 * m * r.length * r.moving + inertia * r.turning]);
+                (values, motion(linear, angular))
+            }
+        }
+    }
+
+    /// The reach of a point of a link, `beyond` its mass centre.
+    fn reach(&self, link: Option<usize>, beyond: f64) -> Reach {
+        let mut r = Reach { length: beyond, ..Reach::default() };
+        let mut at = link;
+        let mut base = 0.0;
+        while let Some(k) = at {
+            let link = &self.tree.links[k];
+            let (q, v) = (&self.state.q[link.iq..], link.iv);
+            r.length += length(link.r.as_slice());
+            let joint = |rates: &[f64], turning: &mut f64, moving: &mut f64| match link.joint {
+                Joint::Revolute => {
+                    *turning += rates[v].abs();
+                    *moving += rates[v].abs() * r.length;
+                }
+                Joint::Linear => *moving += rates[v].abs(),
+                Joint::Free => {
+                    let angular = norm(&rates[v + 3..v + 6]);
+                    *turning += angular;
+                    *moving += norm(&rates[v..v + 3]) + angular * r.length;
+                }
+            };
+            joint(&self.state.qd, &mut r.turning, &mut r.moving);
+            joint(&self.state.qdd, &mut r.turning_rate, &mut r.moving_rate);
+            match link.joint {
+                Joint::Linear => r.length += q[0].abs(),
+                Joint::Free => base = norm(&q[..3]),
+                Joint::Revolute => {}
+            }
+            r.length += length(link.r_parent.as_slice());
+            at = link.parent;
+        }
+        r.position = r.length + base;
+        r
+    }
+
+    /// Sums over the links of what `f` makes of mass, inertia and reach.
+    fn over_links<const N: usize>(&self, f: impl Fn(f64, f64, Reach) -> [f64; N]) -> [f64; N] {
+        let mut sum = [0.0; N];
+        for (k, link) in self.tree.links.iter().enumerate() {
+            let terms = f(link.mass.to_f64().abs(), length(link.inertia.as_slice()), self.reach(Some(k), 0.0));
+            sum.iter_mut().zip(terms).for_each(|(s, t)| *s += t);
+        }
+        sum
+    }
+
+    /// Force and moment scales of every joint: m |w − g| of the links that it carries, with their levers, and their
+    /// couples.
+    fn wrench_scales(&self, q: &[Dd], qd: &[Dd], qdd: &[Dd]) -> Vec<(f64, f64)> {
+        let tree = self.tree;
+        let geometry = reference::geometry(tree, q);
+        let motions = reference::motion(tree, &geometry, qd, qdd);
+        let mut scales = vec![(0.0, 0.0); tree.links.len()];
+        for (k, link) in tree.links.iter().enumerate() {
+            let force = link.mass.to_f64() * length((motions[k].w - tree.gravity).as_slice());
+            let inertia = length(link.inertia.as_slice());
+            let (omega, epsilon) = (length(motions[k].omega.as_slice()), length(motions[k].epsilon.as_slice()));
+            let couple = inertia * (epsilon + omega * omega);
+            let mut lever = 0.0;
+            let mut at = Some(k);
+            while let Some(j) = at {
+                let joint = &tree.links[j];
+                lever += length(joint.r.as_slice());
+                scales[j].0 += force;
+                scales[j].1 += force * lever + couple;
+                if joint.joint == Joint::Linear {
+                    lever += self.state.q[joint.iq].abs();
+                }
+                lever += length(joint.r_parent.as_slice());
+                at = joint.parent;
+            }
+        }
+        scales
+    }
+}
+
+fn length(v: &[Dd]) -> f64 {
+    norm(&v.iter().map(|x| x.to_f64()).collect::<Vec<_>>())
+}
+
+fn norm(v: &[f64]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
