@@ -3,20 +3,28 @@
 //! [`compile`] is the whole pipeline as one pure function; `ARCHITECTURE.md` draws it.
 #![forbid(unsafe_code)]
 
+pub mod builder;
 pub mod compile;
 pub mod description;
 pub mod diagnostic;
 pub mod emit;
+pub mod export;
 pub mod expr;
 pub mod function;
 pub mod model;
+pub mod output;
 pub mod pass;
 pub mod reduce;
+#[cfg(feature = "verify")]
 pub mod reference_input;
 pub mod report;
 pub mod schedule;
 pub mod trace;
+#[cfg(feature = "verify")]
+pub mod verify;
+pub mod words;
 
+pub use builder::{compile_robot, Builder};
 pub use compile::{compile, Generated, Options};
 pub use diagnostic::{Diagnostics, Source};
 pub use emit::Scalar;

@@ -1,0 +1,314 @@
+//! The command line, and what it says in the library's terms.
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+use straightline_codegen::compile::Options;
+use straightline_codegen::emit::Scalar;
+use straightline_codegen::export::is_identifier;
+use straightline_codegen::expr::Grade;
+use straightline_codegen::model::ModelOptions;
+use straightline_codegen::schedule::Limits;
+use straightline_codegen::words::Choice;
+use straightline_codegen::{ForwardDynamicsMethod, Function};
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  done
+  1  the robot file is wrong, or a check failed
+  2  the command line is wrong
+  3  a file could not be read or written";
+
+/// Compiles robot dynamics: from a robot file (URDF or TOML) to straight-line, allocation-free, no_std Rust.
+#[derive(Debug, Parser)]
+#[command(name = "straightline", version, max_term_width = 110, after_help = format!("\
+Examples:
+  straightline check panda.urdf
+  straightline generate panda.urdf -o src/panda.rs
+  straightline report panda.urdf
+  straightline verify panda.urdf
+  straightline export panda.urdf -o panda-c --c-abi
+
+{EXIT_CODES}"))]
+pub struct CommandLine {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Write the dynamics of a robot as Rust source
+    #[command(after_help = format!("\
+Examples:
+  straightline generate panda.urdf -o src/panda.rs
+  straightline generate panda.urdf -o src/panda.rs --check     # in CI: is the committed file up to date?
+  straightline generate arm.urdf --scalar f32 --function inverse_dynamics --function gravity_force
+  straightline generate solo12.urdf --floating-base --frame FL_FOOT --frame FR_FOOT -o solo12.rs
+
+{EXIT_CODES}"))]
+    Generate(Generate),
+    /// Count the operations of every function
+    #[command(after_help = format!("\
+Examples:
+  straightline report panda.urdf
+  straightline report panda.urdf --json --function inverse_dynamics
+
+{EXIT_CODES}"))]
+    Report(Report),
+    /// Read robot files and say what is wrong, doubtful or worth knowing in them
+    #[command(after_help = format!("\
+Examples:
+  straightline check panda.urdf
+  straightline check robots/*.urdf --angle-tolerance 1e-4
+
+{EXIT_CODES}"))]
+    Check(Check),
+    /// Compare the generated program with an independent formulation of the dynamics, on random states
+    #[command(after_help = format!("\
+Runs the program as it is compiled, operation by operation in the scalar's arithmetic, and the dynamics of the
+handbook chapter, from mass centres, in double-double (32 digits); prints the worst error of every function,
+divided by its natural scale, the sum of the moduli of the terms that the value is made of.
+
+Examples:
+  straightline verify panda.urdf
+  straightline verify solo12.urdf --floating-base --states 1000 --seed 7 --json
+
+{EXIT_CODES}"))]
+    Verify(Verify),
+    /// Write a self-contained package for other languages
+    #[command(after_help = format!("\
+The directory becomes a Rust package without dependencies; `cargo build --release` in it gives a shared and a static
+library, and include/ holds the C header, usable from C and C++.
+
+Examples:
+  straightline export panda.urdf -o panda-c --c-abi && cargo build --release --manifest-path panda-c/Cargo.toml
+  straightline export hyq.urdf -o hyq-c --c-abi --floating-base --prefix hyq --frame lf_foot --frame rf_foot
+
+{EXIT_CODES}"))]
+    Export(Export),
+}
+
+#[derive(Debug, Args)]
+pub struct Generate {
+    /// The robot file: URDF or TOML
+    pub robot: PathBuf,
+    /// Where to write; without it, standard output
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Write nothing; exit with 1 if FILE is not what would be written
+    #[arg(long, requires = "output")]
+    pub check: bool,
+    #[command(flatten)]
+    pub program: ProgramArgs,
+    #[command(flatten)]
+    pub model: ModelArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct Report {
+    /// The robot file: URDF or TOML
+    pub robot: PathBuf,
+    /// As JSON: {"robot": …, "functions": {"inverse_dynamics": {"mul": …, "add": …, …}}}
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub program: ProgramArgs,
+    #[command(flatten)]
+    pub model: ModelArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct Check {
+    /// The robot files: URDF or TOML
+    #[arg(required = true, value_name = "ROBOT")]
+    pub robots: Vec<PathBuf>,
+    #[command(flatten)]
+    pub model: ModelArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct Verify {
+    /// The robot file: URDF or TOML
+    pub robot: PathBuf,
+    /// Number of random states: inside the limits, the base of a floating robot anywhere
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
+    pub states: u32,
+    /// Seed of the random states
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+    /// As JSON: {"robot": …, "bound": …, "functions": {"inverse_dynamics": {"error": …, "state": …}}}
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub program: ProgramArgs,
+    #[command(flatten)]
+    pub model: ModelArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct Export {
+    /// The robot file: URDF or TOML
+    pub robot: PathBuf,
+    /// The directory to write: new, empty, or an earlier export, which is replaced
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Functions with C's calling convention, and a header (the only kind of package so far)
+    #[arg(long, required = true)]
+    pub c_abi: bool,
+    /// How the C names begin [default: the robot's name]
+    #[arg(long, value_parser = |text: &str| {
+        is_identifier(text).then(|| text.to_string()).ok_or("letters, digits and _ only, and no digit in front")
+    })]
+    pub prefix: Option<String>,
+    #[command(flatten)]
+    pub program: ProgramArgs,
+    #[command(flatten)]
+    pub model: ModelArgs,
+}
+
+/// What is generated, and how.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What is generated")]
+pub struct ProgramArgs {
+    /// A function to generate; may be repeated [default: all]
+    #[arg(long = "function", value_name = "NAME", value_parser = words::<Function>(), hide_possible_values = true)]
+    functions: Vec<Function>,
+    /// A frame (link) that positions, velocities and Jacobians are asked for; may be repeated [default: the robot's tips]
+    #[arg(long = "frame", value_name = "NAME")]
+    frames: Vec<String>,
+    /// The scalar type
+    #[arg(long, default_value = "f64", value_parser = words::<Scalar>())]
+    scalar: Scalar,
+    /// Which rewrite rules may be used
+    #[arg(long, default_value = "all", value_parser = words::<Grade>())]
+    rules: Grade,
+    /// How forward dynamics is computed
+    #[arg(long, value_name = "METHOD", default_value = "cheaper", value_parser = words::<ForwardDynamicsMethod>())]
+    forward_dynamics: ForwardDynamicsMethod,
+    /// Longer functions are cut into parts of at most so many operations
+    #[arg(long, value_name = "N", default_value_t = Limits::default().operations, value_parser = part_size)]
+    max_part_operations: usize,
+}
+
+/// How the robot file is read.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "How the robot file is read")]
+pub struct ModelArgs {
+    /// The root link moves freely: q begins with its position and quaternion (x y z qx qy qz qw)
+    #[arg(long)]
+    floating_base: bool,
+    /// The joints in the order of their coordinates, all of them [default: depth first, as in the file]
+    #[arg(long, value_name = "A,B,C", value_delimiter = ',')]
+    joint_order: Vec<String>,
+    /// Angles this close to a multiple of 30 or 45 degrees are taken as that [default: 1e-15, rounding only]
+    #[arg(long, value_name = "RAD", value_parser = tolerance)]
+    angle_tolerance: Option<f64>,
+    /// Take every angle as the number that is written
+    #[arg(long, conflicts_with = "angle_tolerance")]
+    literal_angles: bool,
+    /// Acceleration due to gravity in the world [m/s²] [default: the file's, or 0,0,-9.81]
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector)]
+    gravity: Option<Vector>,
+}
+
+/// Three numbers; a type of its own because clap takes a list for a repeated argument.
+#[derive(Clone, Copy, Debug)]
+pub struct Vector([f64; 3]);
+
+fn words<C: Choice + Send + Sync>() -> impl TypedValueParser<Value = C> {
+    PossibleValuesParser::new(C::words().into_iter().map(|(word, meaning, _)| PossibleValue::new(word).help(meaning)))
+        .map(|word| C::from_word(&word).expect("clap passes possible values only"))
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(x) if (0.0..=0.1).contains(&x) => Ok(x),
+        _ => Err("an angle between 0 and 0.1 rad".to_string()),
+    }
+}
+
+fn part_size(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(n) if n >= 100 => Ok(n),
+        _ => Err("a number of operations, at least 100".to_string()),
+    }
+}
+
+fn vector(text: &str) -> Result<Vector, String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|t| t.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+    match numbers.as_deref() {
+        Some(&[x, y, z]) => Ok(Vector([x, y, z])),
+        _ => Err("three numbers with commas, such as 0,0,-9.81".to_string()),
+    }
+}
+
+impl ModelArgs {
+    pub fn options(&self) -> ModelOptions {
+        let defaults = ModelOptions::default();
+        ModelOptions {
+            floating_base: self.floating_base,
+            joint_order: (!self.joint_order.is_empty()).then(|| self.joint_order.clone()),
+            angle_tolerance: match (self.literal_angles, self.angle_tolerance) {
+                (true, _) => 0.0,
+                (false, tolerance) => tolerance.unwrap_or(defaults.angle_tolerance),
+            },
+            gravity: self.gravity.map(|Vector(xyz)| xyz),
+            ..defaults
+        }
+    }
+}
+
+impl ProgramArgs {
+    pub fn options(&self, model: &ModelArgs) -> Options {
+        let mut functions = self.functions.clone();
+        functions.sort_unstable();
+        functions.dedup();
+        if functions.is_empty() {
+            functions = Function::all().collect();
+        }
+        Options {
+            functions,
+            frames: self.frames.clone(),
+            scalar: self.scalar,
+            grade: self.rules,
+            forward_dynamics: self.forward_dynamics,
+            limits: Limits { operations: self.max_part_operations },
+            model: model.options(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        CommandLine::command().debug_assert();
+    }
+
+    #[test]
+    fn gravity_may_point_down() {
+        let line = CommandLine::parse_from(["straightline", "check", "a.urdf", "--gravity", "-1,0,-9.81"]);
+        let Command::Check(check) = line.command else { panic!("check was asked for") };
+        assert_eq!(check.model.gravity.unwrap().0, [-1.0, 0.0, -9.81]);
+    }
+
+    #[test]
+    fn wrong_values_are_refused_with_what_is_right() {
+        for (arguments, right) in [
+            (&["generate", "a", "--function", "inverse_dynamic"][..], "inverse_dynamics"),
+            (&["generate", "a", "--scalar", "f16"], "f64, f32"),
+            (&["generate", "a", "--gravity", "1,2"], "0,0,-9.81"),
+            (&["generate", "a", "--check"], "--output"),
+            (&["export", "a", "-o", "b"], "--c-abi"),
+            (&["export", "a", "-o", "b", "--c-abi", "--prefix", "a-b"], "no digit in front"),
+        ] {
+            let error = CommandLine::try_parse_from([&["straightline"], arguments].concat()).unwrap_err();
+            assert!(error.to_string().contains(right), "{error}");
+            assert_eq!(error.exit_code(), 2);
+        }
+    }
+}

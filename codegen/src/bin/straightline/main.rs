@@ -1,0 +1,146 @@
+//! The command `straightline`: a thin front over the library.
+//!
+//! Results go to standard output, diagnostics and progress to standard error, colours and progress to terminals only.
+#![forbid(unsafe_code)]
+
+mod arguments;
+mod print;
+
+use arguments::{Check, Command, CommandLine, Export, Generate, ModelArgs, ProgramArgs, Report, Verify};
+use clap::Parser;
+use std::io;
+use std::path::Path;
+use std::process::ExitCode;
+use straightline_codegen::compile::{compile, Generated, Options};
+use straightline_codegen::diagnostic::{Severity, Source};
+use straightline_codegen::{export, model, output, verify};
+
+/// Why a command ended early; what there is to say was said where it happened, except for [`Failure::Files`].
+enum Failure {
+    /// The robot file is wrong, or a check failed.
+    Input,
+    /// A file could not be read or written.
+    Files(io::Error),
+}
+
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Failure::Files(error)
+    }
+}
+
+fn main() -> ExitCode {
+    let done = match CommandLine::parse().command {
+        Command::Generate(a) => generate(&a),
+        Command::Report(a) => report(&a),
+        Command::Check(a) => check(&a),
+        Command::Verify(a) => verify(&a),
+        Command::Export(a) => export(&a),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::Input) => ExitCode::from(1),
+        // the reader of a pipe had enough: not a failure of ours
+        Err(Failure::Files(error)) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
+        Err(Failure::Files(error)) => {
+            print::error(&error.to_string());
+            ExitCode::from(3)
+        }
+    }
+}
+
+fn read(path: &Path) -> Result<Source, Failure> {
+    let shown = path.display().to_string();
+    let bytes = std::fs::read(path).map_err(|e| io::Error::new(e.kind(), format!("{shown}: {e}")))?;
+    Ok(Source::from_bytes(&shown, bytes))
+}
+
+/// Compiles, and prints errors and warnings; notes are for `check`.
+fn compiled(robot: &Path, program: &ProgramArgs, model: &ModelArgs) -> Result<(Generated, Options), Failure> {
+    let options = program.options(model);
+    let source = read(robot)?;
+    let progress = print::spinner(&format!("compiling {}", source.path()));
+    let result = compile(&source, &options);
+    progress.finish_and_clear();
+    match result {
+        Ok(generated) => {
+            print::diagnostics(&generated.warnings, Severity::Warning);
+            Ok((generated, options))
+        }
+        Err(diagnostics) => {
+            print::diagnostics(&diagnostics, Severity::Warning);
+            Err(Failure::Input)
+        }
+    }
+}
+
+fn generate(a: &Generate) -> Result<(), Failure> {
+    let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;
+    let Some(path) = &a.output else { return Ok(print::text(&generated.text)?) };
+    if !a.check {
+        output::write_file(path, &generated.text)?;
+        return Ok(());
+    }
+    let (file, robot) = (path.display(), a.robot.display());
+    match std::fs::read(path) {
+        Ok(old) if old == generated.text.as_bytes() => Ok(()),
+        Ok(_) => {
+            print::error(&format!("{file} is stale: it is not what {robot} and these options give"));
+            print::help("run the same command without --check and commit the file");
+            Err(Failure::Input)
+        }
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {
+            print::error(&format!("{file} does not exist"));
+            print::help("run the same command without --check and commit the file");
+            Err(Failure::Input)
+        }
+        Err(e) => Err(io::Error::new(e.kind(), format!("{file}: {e}")).into()),
+    }
+}
+
+fn report(a: &Report) -> Result<(), Failure> {
+    let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;
+    Ok(if a.json { print::json(&generated.report) } else { print::report(&generated.report) }?)
+}
+
+fn check(a: &Check) -> Result<(), Failure> {
+    let options = a.model.options();
+    let mut wrong = false;
+    for robot in &a.robots {
+        let (model, diagnostics) = model::load(&read(robot)?, &options);
+        print::diagnostics(&diagnostics, Severity::Note);
+        print::verdict(&robot.display().to_string(), model.as_ref(), &diagnostics)?;
+        wrong |= diagnostics.has_errors();
+    }
+    if wrong {
+        Err(Failure::Input)
+    } else {
+        Ok(())
+    }
+}
+
+fn verify(a: &Verify) -> Result<(), Failure> {
+    let (generated, options) = compiled(&a.robot, &a.program, &a.model)?;
+    let source = read(&a.robot)?;
+    let progress = print::bar("verifying", a.states.into());
+    let verified = verify::verify(&source, &generated, &options, (a.states, a.seed), || progress.inc(1));
+    progress.finish_and_clear();
+    let verification = verified.map_err(|what| {
+        print::error(&format!("{}: {what}", source.path()));
+        Failure::Input
+    })?;
+    if a.json { print::json(&verification) } else { print::verification(&verification) }?;
+    if verification.passes() {
+        Ok(())
+    } else {
+        print::error(&format!("an error exceeds the bound {:.1e}", verification.bound));
+        Err(Failure::Input)
+    }
+}
+
+fn export(a: &Export) -> Result<(), Failure> {
+    let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;
+    let prefix = a.prefix.clone().unwrap_or_else(|| export::identifier(&generated.model.name));
+    output::write_directory(&a.output, &export::c_package(&generated, &prefix))?;
+    Ok(())
+}

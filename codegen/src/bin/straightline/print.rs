@@ -1,0 +1,112 @@
+//! What the person sees.
+
+use anstream::{eprintln, stdout};
+use anstyle::{AnsiColor, Style};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use std::io::{self, IsTerminal, Write};
+use std::time::Duration;
+use straightline_codegen::diagnostic::{Diagnostics, Severity};
+use straightline_codegen::report::Report;
+use straightline_codegen::verify::Verification;
+use straightline_core::model::Model;
+use straightline_core::Dd;
+
+const ERROR: Style = AnsiColor::BrightRed.on_default().bold();
+const HELP: Style = AnsiColor::BrightCyan.on_default().bold();
+const GOOD: Style = AnsiColor::BrightGreen.on_default().bold();
+
+/// An error that no diagnostic says.
+pub fn error(text: &str) {
+    eprintln!("{ERROR}error{ERROR:#}: {text}");
+}
+
+/// A remedy.
+pub fn help(text: &str) {
+    eprintln!("{HELP}help{HELP:#}: {text}");
+}
+
+/// Diagnostics of at least that severity; the stream drops the colours where there is no terminal.
+pub fn diagnostics(all: &Diagnostics, least: Severity) {
+    let shown = all.at_least(least);
+    if !shown.is_empty() {
+        eprintln!("{}", shown.render_coloured().trim_end());
+        eprintln!();
+    }
+}
+
+/// Generated source.
+pub fn text(text: &str) -> io::Result<()> {
+    stdout().lock().write_all(text.as_bytes())
+}
+
+/// Anything, for programs.
+pub fn json(value: &impl Serialize) -> io::Result<()> {
+    let text = serde_json::to_string_pretty(value).map_err(io::Error::other)?;
+    writeln!(stdout().lock(), "{text}")
+}
+
+/// One line on a file that was checked.
+pub fn verdict(path: &str, model: Option<&Model<Dd>>, diagnostics: &Diagnostics) -> io::Result<()> {
+    let count = |severity, word: &str| {
+        let n = diagnostics.count(severity);
+        format!("{n} {word}{}", if n == 1 { "" } else { "s" })
+    };
+    let counts = format!("{}, {}", count(Severity::Warning, "warning"), count(Severity::Note, "note"));
+    let mut out = stdout().lock();
+    match model.filter(|_| !diagnostics.has_errors()) {
+        Some(m) => {
+            let (nq, nv, bodies) = (m.nq(), m.nv(), m.bodies.len());
+            let name = &m.name;
+            writeln!(out, "{path}: {GOOD}ok{GOOD:#}: {name}, {bodies} moving bodies, nq {nq}, nv {nv}; {counts}")
+        }
+        None => writeln!(out, "{path}: {ERROR}{}{ERROR:#}, {counts}", count(Severity::Error, "error")),
+    }
+}
+
+/// The operations of every function.
+pub fn report(report: &Report) -> io::Result<()> {
+    let mut out = stdout().lock();
+    let Report { robot, nq, nv, scalar, functions } = report;
+    writeln!(out, "{robot}: nq {nq}, nv {nv}, {scalar}\n")?;
+    writeln!(
+        out,
+        "{:<20}{:>8}{:>8}{:>8}{:>6}{:>6}{:>8}{:>6}{:>7}{:>8}",
+        "function", "mul", "add", "fma", "div", "sqrt", "sincos", "live", "parts", "lines"
+    )?;
+    for (name, f) in functions {
+        writeln!(
+            out,
+            "{name:<20}{:>8}{:>8}{:>8}{:>6}{:>6}{:>8}{:>6}{:>7}{:>8}",
+            f.mul, f.add, f.fma, f.div, f.sqrt, f.sincos, f.max_live, f.parts, f.lines
+        )?;
+    }
+    writeln!(out, "\nfma: instructions for mul and add when every a·b ± c is one; live: most values alive at once")
+}
+
+/// The worst error of every function.
+pub fn verification(v: &Verification) -> io::Result<()> {
+    let mut out = stdout().lock();
+    writeln!(out, "{}: {} against the reference, {} states, seed {}\n", v.robot, v.scalar, v.states, v.seed)?;
+    writeln!(out, "{:<20}{:>14}{:>8}   worst in", "function", "worst error", "state")?;
+    for (name, f) in &v.functions {
+        let (style, mark) = if f.error <= v.bound { (Style::new(), "") } else { (ERROR, "  exceeds the bound") };
+        writeln!(out, "{name:<20}{style}{:>14.2e}{style:#}{:>8}   {}{mark}", f.error, f.state, f.output)?;
+    }
+    writeln!(out, "\nerrors divided by natural scale; bound {:.1e}", v.bound)
+}
+
+/// Something is being done; shown on a terminal only.
+pub fn spinner(what: &str) -> ProgressBar {
+    let bar = ProgressBar::new_spinner().with_message(what.to_string());
+    if io::stderr().is_terminal() {
+        bar.enable_steady_tick(Duration::from_millis(100));
+    }
+    bar
+}
+
+/// So many things are being done; shown on a terminal only.
+pub fn bar(what: &'static str, count: u64) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}").expect("a template of indicatif");
+    ProgressBar::new(count).with_style(style).with_message(what)
+}
