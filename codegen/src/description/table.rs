@@ -7,11 +7,12 @@ use std::ops::Range;
 use straightline_core::spatial::Sym3;
 use toml::de::{DeTable, DeValue};
 use toml::Spanned;
+use toml_parser::lexer::TokenKind;
 
 type Span = Range<usize>;
 
-/// Parts of a dotted key: the parser's tables nest as deep.
-const MOST_KEY_PARTS: usize = 64;
+/// Parts of a dotted key, and brackets inside each other: the parser recurses as deep.
+const DEEPEST: usize = 16;
 
 /// A table and how complaints name it.
 pub(super) struct Table<'a, 'i> {
@@ -23,37 +24,68 @@ pub(super) struct Table<'a, 'i> {
 /// The document, or complaints about its syntax.
 pub(super) fn parse<'i>(source: &'i Source, diagnostics: &mut Diagnostics) -> Option<Spanned<DeTable<'i>>> {
     let mut reader = Reader::new(source, diagnostics);
-    if let Some(span) = overlong_key(source.text()) {
-        reader.complain(&span, messages::too_complex("parts of a dotted key", MOST_KEY_PARTS));
+    if !brackets_match(&mut reader) {
         return None;
     }
     let (document, errors) = DeTable::parse_recoverable(source.text());
+    let mut last_line = 0;
     for error in &errors {
         let span = error.span().unwrap_or(0..0);
+        // what follows on a line follows from its first error
+        let line = reader.place(&span).line;
+        if std::mem::replace(&mut last_line, line) == line {
+            continue;
+        }
         let said = error.message().lines().next().unwrap_or("");
         reader.complain(&span, messages::toml_syntax(said));
     }
     errors.is_empty().then_some(document)
 }
 
-/// A line whose key may have more than [`MOST_KEY_PARTS`] parts.
-fn overlong_key(text: &str) -> Option<Span> {
-    let mut start = 0;
-    for line in text.split_inclusive('\n') {
-        let mut parts = 0;
-        for byte in line.bytes() {
-            match byte {
-                b'.' => parts += 1,
-                b'=' | b',' | b'{' | b'#' | b'"' | b'\'' => parts = 0,
-                _ => {}
-            }
-            if parts > MOST_KEY_PARTS {
-                return Some(start..start + 1);
-            }
+/// Whether brackets match and neither they nor dotted keys nest deeply: what the parser's recursion relies on. Complains
+/// of the first that does not.
+fn brackets_match(reader: &mut Reader) -> bool {
+    let mut open: Vec<(TokenKind, Span)> = Vec::new();
+    let mut parts = 0;
+    for token in toml_parser::Source::new(reader.source.text()).lex() {
+        let span = token.span().start()..token.span().end();
+        parts = match token.kind() {
+            TokenKind::Dot => parts + 1,
+            TokenKind::Equals
+            | TokenKind::Comma
+            | TokenKind::Newline
+            | TokenKind::LeftCurlyBracket
+            | TokenKind::LeftSquareBracket => 0,
+            _ => parts,
+        };
+        if parts >= DEEPEST {
+            reader.complain(&span, messages::too_complex("parts of a dotted key", DEEPEST));
+            return false;
         }
-        start += line.len();
+        match token.kind() {
+            kind @ (TokenKind::LeftCurlyBracket | TokenKind::LeftSquareBracket) => open.push((kind, span.clone())),
+            TokenKind::RightCurlyBracket | TokenKind::RightSquareBracket => {
+                let closes = match token.kind() {
+                    TokenKind::RightCurlyBracket => TokenKind::LeftCurlyBracket,
+                    _ => TokenKind::LeftSquareBracket,
+                };
+                if open.pop().is_none_or(|(kind, _)| kind != closes) {
+                    reader.complain(&span, messages::toml_syntax("this bracket closes none"));
+                    return false;
+                }
+            }
+            _ => {}
+        }
+        if open.len() > DEEPEST {
+            reader.complain(&span, messages::too_complex("brackets inside each other", DEEPEST));
+            return false;
+        }
     }
-    None
+    if let Some((_, span)) = open.pop() {
+        reader.complain(&span, messages::toml_syntax("this bracket is never closed"));
+        return false;
+    }
+    true
 }
 
 impl<'a, 'i> Table<'a, 'i> {

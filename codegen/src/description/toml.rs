@@ -121,17 +121,21 @@ fn read_link(reader: &mut Reader, mut table: Table) -> Option<Link> {
     let name = named(reader, &mut table, "link");
     reader.check_keys(&table, LINK);
     let has_inertial = LINK[1..].iter().any(|key| table.has(key));
-    let inertial = has_inertial.then(|| {
-        reader.require(&table, "mass", "mass = 1.0");
-        let zero = Sym3 { xx: 0.0, xy: 0.0, xz: 0.0, yy: 0.0, yz: 0.0, zz: 0.0 };
-        Inertial {
-            mass: reader.real_at(&table, "mass", Range64::Finite).unwrap_or_else(|| reader.value(0.0, &table.span)),
-            com: reader.vector_at(&table, "com").unwrap_or_else(|| reader.value([0.0; 3], &table.span)),
-            rotation: reader.rotation_at(&table, "inertia_rpy"),
-            inertia: reader.tensor_at(&table, "inertia").unwrap_or_else(|| reader.value(zero, &table.span)),
-        }
-    });
+    let inertial = if has_inertial { read_inertial(reader, &table) } else { None };
     Some(Link { name: name?, inertial })
+}
+
+fn read_inertial(reader: &mut Reader, table: &Table) -> Option<Inertial> {
+    reader.require(table, "mass", "mass = 1.0");
+    let mass = reader.real_at(table, "mass", Range64::Finite);
+    let com = reader.vector_at(table, "com").unwrap_or_else(|| reader.value([0.0; 3], &table.span));
+    let rotation = reader.rotation_at(table, "inertia_rpy");
+    let zero = Sym3 { xx: 0.0, xy: 0.0, xz: 0.0, yy: 0.0, yz: 0.0, zz: 0.0 };
+    let inertia = match table.has("inertia") {
+        true => reader.tensor_at(table, "inertia"),
+        false => Some(reader.value(zero, &table.span)),
+    };
+    Some(Inertial { mass: mass?, com, rotation, inertia: inertia? })
 }
 
 fn read_joint(reader: &mut Reader, mut table: Table) -> Option<Joint> {

@@ -312,14 +312,15 @@ fn triple<'a>(reader: &mut Reader, what: &str, attribute: Attribute<'a, '_>) -> 
     let whole = attribute.range_value();
     let is_raw = reader.source.text().get(whole.clone()) == Some(text);
     let words: Vec<&str> = text.split_ascii_whitespace().collect();
-    if words.len() != 3 {
-        if text.contains("${") || text.contains("$(") {
-            reader.complain(&whole, messages::xacro_left(text, 0));
-        } else if text.contains(',') {
-            reader.complain(&whole, messages::not_a_number(what, text));
-        } else {
-            reader.complain(&whole, messages::wrong_count(what, "three numbers", words.len()));
-        }
+    let complaint = if text.contains("${") || text.contains("$(") {
+        Some(messages::xacro_left(text, 0))
+    } else if text.contains(',') {
+        Some(messages::not_a_number(what, text))
+    } else {
+        (words.len() != 3).then(|| messages::wrong_count(what, "three numbers", words.len()))
+    };
+    if let Some(complaint) = complaint {
+        reader.complain(&whole, complaint);
         return None;
     }
     let mut numbers = Vec::with_capacity(3);

@@ -42,6 +42,8 @@ pub(super) fn tree(bodies: &JointFrameNotation, name: &Value<String>, diagnostic
     }
     let mut has_holes = bodies.has_holes;
     let link_index = unique("link", links.iter().map(|l| &l.name), diagnostics);
+    // the second of two links with one name hangs nowhere
+    has_holes |= link_index.len() < links.len();
     unique("joint", bodies.joints.iter().map(|j| &j.name), diagnostics);
     let mut frame_names = unique("frame", bodies.frames.iter().map(|f| &f.name), diagnostics);
     for link in links {

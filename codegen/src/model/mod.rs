@@ -164,6 +164,14 @@ pub fn special_angles(description: &Description, options: &ModelOptions) -> Vec<
     found
 }
 
+/// What an angle of a file is taken as \[rad\].
+pub fn angle_in_radians(angle: &Angle, tolerance: f64) -> Dd {
+    match angle::read(angle, tolerance).special {
+        Some(m) => Dd::PI * Dd::from(m as f64) / Dd::from(12.0),
+        None => angle::radians(angle),
+    }
+}
+
 /// Every angle of a description, with a name for it.
 fn each_angle(description: &Description, visit: &mut dyn FnMut(&dyn Fn() -> String, &Angle)) {
     let mut rotation = |owner: &dyn Fn() -> String, rotation: &Rotation| {
