@@ -118,10 +118,11 @@ impl Source {
         self.inner.marks[mark] + rest.iter().filter(|&&b| b & 0xC0 != 0x80).count()
     }
 
+    /// The bytes of a line, without its end.
     fn line(&self, line: usize) -> Range<usize> {
         let start = self.inner.line_starts[line - 1];
         let end = self.inner.line_starts.get(line).map_or(self.inner.text.len(), |&next| next - 1);
-        start..end
+        start..start + self.inner.text[start..end].trim_end_matches('\r').len()
     }
 }
 

@@ -20,6 +20,7 @@ pub const CODES: &[&str] = &[
     "missing-attribute",
     "repeated-element",
     "misspelt-element",
+    "unknown-attribute",
     "empty-name",
     "not-a-number",
     "not-finite",
@@ -204,6 +205,18 @@ pub fn repeated_element(owner: &str, element: &str) -> D {
 pub fn misspelt_element(owner: &str, element: &str, known: &str) -> D {
     D::warning("misspelt-element", format!("unknown element `<{}>` in {owner}, ignored", cut(element)))
         .help(format!("did you mean `<{known}>`?"))
+}
+
+/// An attribute that the element does not have.
+pub fn unknown_attribute(owner: &str, element: &str, attribute: &str, known: &[&str]) -> D {
+    let d = D::warning(
+        "unknown-attribute",
+        format!("unknown attribute `{}` of `<{element}>` in {owner}, ignored", cut(attribute)),
+    );
+    match did_you_mean(attribute, known.iter().copied()) {
+        Some(hint) => d.help(hint),
+        None => d,
+    }
 }
 
 /// A name without characters.

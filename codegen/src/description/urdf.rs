@@ -59,7 +59,7 @@ fn complain_of_xml(reader: &mut Reader, error: &roxmltree::Error) {
             reader.complain(&(0..0), messages::too_complex("nodes of the XML file", MOST_NODES));
             return;
         }
-        Error::UnexpectedEndOfStream | Error::UnclosedRootNode | Error::NoRootNode | Error::DtdDetected => text.len(),
+        Error::UnexpectedEndOfStream | Error::UnclosedRootNode | Error::NoRootNode => text.len(),
         _ => {
             let at = error.pos();
             let line_start: usize =
@@ -109,6 +109,18 @@ fn tolerant_text<'a>(reader: &mut Reader<'a>) -> Option<Cow<'a, str>> {
             at = start + length;
         } else if rest.starts_with("<![CDATA[") {
             at = rest.find("]]>").map_or(text.len(), |n| start + n + 3);
+        } else if rest.starts_with("<!DOCTYPE") {
+            // a document type without declarations of its own says nothing; with them, entities could be anything
+            let length = rest.find('>').map_or(rest.len(), |n| n + 1);
+            if rest[..length].contains('[') {
+                reader.complain(
+                    &(start..start + 9),
+                    messages::xml_syntax("a document type with declarations is not read"),
+                );
+                return None;
+            }
+            blank(text, &mut out, start..start + length);
+            at = start + length;
         } else if rest.starts_with("<?xml") && start > 0 && text[..start].trim().is_empty() {
             let length = rest.find("?>").map_or(0, |n| n + 2);
             blank(text, &mut out, start..start + length);
@@ -280,6 +292,21 @@ fn pick<'a, 'i, const N: usize>(
     found
 }
 
+/// Complains of attributes that an element whose numbers matter does not have; a quaternion would turn the robot.
+fn check_attributes(reader: &mut Reader, owner: &str, node: Node, known: &[&str]) {
+    for attribute in node.attributes().filter(|a| a.namespace().is_none() && !known.contains(&a.name())) {
+        let span = attribute.range_qname();
+        let name = attribute.name();
+        if node.has_tag_name("origin") && name.starts_with("quat") {
+            let why = "the orientation would be a quaternion";
+            let help = "write the orientation as roll, pitch, yaw: `rpy=\"0 0 1.5707963267948966\"`";
+            reader.complain(&span, messages::not_supported_yet(owner, name, why, help));
+        } else {
+            reader.complain(&span, messages::unknown_attribute(owner, node.tag_name().name(), name, known));
+        }
+    }
+}
+
 fn required<'a, 'i>(
     reader: &mut Reader,
     owner: &str,
@@ -342,6 +369,7 @@ fn vector(reader: &mut Reader, what: &str, attribute: Attribute) -> Option<Value
 fn read_pose(reader: &mut Reader, owner: &str, node: Option<Node>, default: Node) -> Pose {
     let mut pose = Pose::identity(reader.place(&tag(node.unwrap_or(default))));
     let Some(node) = node else { return pose };
+    check_attributes(reader, owner, node, &["xyz", "rpy"]);
     if let Some(attribute) = node.attribute_node("xyz") {
         if let Some(xyz) = vector(reader, &format!("{owner}, xyz"), attribute) {
             pose.xyz = xyz;
@@ -387,6 +415,9 @@ fn inertial_of<'a, 'i>(reader: &mut Reader, owner: &str, node: Node<'a, 'i>) -> 
 fn read_inertial(reader: &mut Reader, owner: &str, node: Node) -> Option<Inertial> {
     let [origin, mass, inertia] = pick(reader, owner, node, ["origin", "mass", "inertia"]);
     let pose = read_pose(reader, &format!("{owner}, inertial origin"), origin, node);
+    if let Some(mass) = mass {
+        check_attributes(reader, owner, mass, &["value"]);
+    }
     let mass = match mass {
         Some(mass) => required(reader, "<mass>", mass, "value", "<mass value=\"1.0\"/>")
             .and_then(|value| number(reader, &format!("mass of {owner}"), value, Range64::Finite)),
@@ -404,6 +435,7 @@ fn read_inertial(reader: &mut Reader, owner: &str, node: Node) -> Option<Inertia
 }
 
 fn read_inertia(reader: &mut Reader, owner: &str, node: Node) -> Option<Value<Sym3<f64>>> {
+    check_attributes(reader, owner, node, &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]);
     let mut entry = |name: &str, is_diagonal: bool| match node.attribute_node(name) {
         Some(attribute) => {
             number(reader, &format!("{name} of {owner}"), attribute, Range64::Finite).map(|value| value.value)
@@ -438,6 +470,9 @@ fn read_joint(reader: &mut Reader, node: Node) -> Option<Joint> {
     let (parent, child) = (end(parent, "parent"), end(child, "child"));
     let origin = read_pose(reader, &format!("{owner}, origin"), origin, node);
     let moves = kind.as_ref().is_none_or(|k| k.value.moves());
+    if let Some(axis) = axis.filter(|_| moves) {
+        check_attributes(reader, &owner, axis, &["xyz"]);
+    }
     let default_axis = reader.value([1.0, 0.0, 0.0], &tag(axis.unwrap_or(node)));
     let axis = match axis.filter(|_| moves) {
         Some(element) => required(reader, &format!("axis of {owner}"), element, "xyz", "<axis xyz=\"0 0 1\"/>")
@@ -451,6 +486,7 @@ fn read_joint(reader: &mut Reader, node: Node) -> Option<Joint> {
     };
     let mut drive = JointDrive::default();
     if let Some(element) = dynamics.filter(|_| moves) {
+        check_attributes(reader, &owner, element, &["damping", "friction"]);
         let mut read = |name: &str| {
             let attribute = element.attribute_node(name)?;
             number(reader, &format!("{name} of {owner}"), attribute, Range64::Finite)
@@ -493,6 +529,8 @@ fn read_kind(reader: &mut Reader, owner: &str, attribute: Attribute) -> Option<V
 }
 
 fn read_limits(reader: &mut Reader, owner: &str, node: Node) -> JointLimits {
+    let known = ["lower", "upper", "velocity", "effort", "acceleration", "deceleration", "jerk"];
+    check_attributes(reader, owner, node, &known);
     let mut read = |name: &str| {
         let attribute = node.attribute_node(name)?;
         number(reader, &format!("{name} limit of {owner}"), attribute, Range64::Limit)
