@@ -315,9 +315,18 @@ impl Function {
         use Function::*;
         let q = &inputs[0];
         let rest = rest(model);
-        let bias = || alg::reduced_inverse_dynamics(reduced, q, &inputs[1], &rest);
+        let bias = || {
+            let rigid = alg::reduced_inverse_dynamics(reduced, q, &inputs[1], &rest);
+            let passive = alg::passive_force(model, q, &inputs[1]);
+            rigid.into_iter().zip(passive).map(|(f, p)| f + p).collect::<Vec<T>>()
+        };
         Some(match self {
-            InverseDynamics => alg::reduced_inverse_dynamics(reduced, q, &inputs[1], &inputs[2]),
+            InverseDynamics => {
+                let rigid = alg::reduced_inverse_dynamics(reduced, q, &inputs[1], &inputs[2]);
+                let passive = alg::passive_force(model, q, &inputs[1]);
+                let rotors = alg::rotor_inertias(model).into_iter().zip(&inputs[2]).map(|(i, qdd)| i * *qdd);
+                rigid.into_iter().zip(rotors.zip(passive)).map(|(f, (r, p))| f + (r + p)).collect()
+            }
             GravityForce => alg::reduced_gravity_force(reduced, q),
             BiasForce => bias(),
             VelocityForce => {

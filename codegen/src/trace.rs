@@ -108,6 +108,10 @@ impl Real for Expr {
         Expr(with(|g| g.add(Op::Sqrt(self.0))))
     }
 
+    fn sign(self) -> Self {
+        Expr(with(|g| g.add(Op::Sign(self.0))))
+    }
+
     fn named(self, name: &'static str, index: usize, component: &'static str) -> Self {
         with(|g| g.name(self.0, (name, index, component)));
         self

@@ -194,7 +194,7 @@ fn body(graph: &Graph, part: &Part, scalar: Scalar, title: &dyn Fn(Section) -> S
             }
             Op::Sin(_) | Op::Cos(_) => {}
             _ => {
-                out.uses_sqrt |= matches!(op, Op::Sqrt(_));
+                out.uses_sqrt |= matches!(op, Op::Sqrt(_) | Op::Sign(_));
                 let (text, binding) = b.expression(op);
                 let named = graph.notes[id.index()].name.is_some();
                 let trivial = matches!(op, Op::Neg(_)) && binding == Binding::Sign && text.len() < 24;
@@ -270,6 +270,7 @@ impl Body<'_> {
             Op::Div(a, b) => (format!("{} / {}", self.bound(a, Product), self.bound(b, Sign)), Product),
             Op::Neg(a) => (format!("-{}", self.bound(a, Atom)), Sign),
             Op::Sqrt(a) => (format!("trig::sqrt_{}({})", self.scalar.name(), self.operand(a).0), Atom),
+            Op::Sign(a) => (format!("trig::sign_{}({})", self.scalar.name(), self.operand(a).0), Atom),
             Op::Input(_) | Op::Constant(_) | Op::SinCos(_) | Op::Sin(_) | Op::Cos(_) => {
                 unreachable!("written where they are used")
             }

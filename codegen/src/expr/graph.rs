@@ -62,6 +62,8 @@ pub enum Op {
     Div(NodeId, NodeId),
     /// √a.
     Sqrt(NodeId),
+    /// −1, 0 or 1.
+    Sign(NodeId),
     /// sin and cos of an angle, together; only [`Op::Sin`] and [`Op::Cos`] may use it.
     SinCos(NodeId),
     /// The sine of a [`Op::SinCos`].
@@ -75,7 +77,7 @@ impl Op {
     pub fn operands(self) -> impl Iterator<Item = NodeId> {
         let (a, b) = match self {
             Op::Input(_) | Op::Constant(_) => (None, None),
-            Op::Neg(a) | Op::Sqrt(a) | Op::SinCos(a) | Op::Sin(a) | Op::Cos(a) => (Some(a), None),
+            Op::Neg(a) | Op::Sqrt(a) | Op::Sign(a) | Op::SinCos(a) | Op::Sin(a) | Op::Cos(a) => (Some(a), None),
             Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) => (Some(a), Some(b)),
         };
         a.into_iter().chain(b)
@@ -92,6 +94,7 @@ impl Op {
             Op::Mul(a, b) => Op::Mul(f(a), f(b)),
             Op::Div(a, b) => Op::Div(f(a), f(b)),
             Op::Sqrt(a) => Op::Sqrt(f(a)),
+            Op::Sign(a) => Op::Sign(f(a)),
             Op::SinCos(a) => Op::SinCos(f(a)),
             Op::Sin(a) => Op::Sin(f(a)),
             Op::Cos(a) => Op::Cos(f(a)),
@@ -160,7 +163,7 @@ pub struct Graph {
     pub results: Vec<NodeId>,
 }
 
-/// Operation counts. Sign flips are free; `sin_cos` counts angles.
+/// Operation counts. Sign flips and signs are free; `sin_cos` counts angles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Multiplications.
@@ -250,7 +253,7 @@ impl Graph {
                 Op::Div(..) => counts.div += 1,
                 Op::Sqrt(_) => counts.sqrt += 1,
                 Op::SinCos(_) => counts.sin_cos += 1,
-                Op::Input(_) | Op::Constant(_) | Op::Neg(_) | Op::Sin(_) | Op::Cos(_) => {}
+                Op::Input(_) | Op::Constant(_) | Op::Neg(_) | Op::Sign(_) | Op::Sin(_) | Op::Cos(_) => {}
             }
         }
         counts.fma = counts.mul + counts.add - fused;

@@ -25,6 +25,7 @@ pub fn evaluate<T: Real>(graph: &Graph, inputs: &[T]) -> Vec<T> {
             Op::Mul(a, b) => v(a) * v(b),
             Op::Div(a, b) => v(a) / v(b),
             Op::Sqrt(a) => v(a).sqrt(),
+            Op::Sign(a) => v(a).sign(),
             Op::SinCos(a) => {
                 let (s, c) = v(a).sin_cos();
                 cosine_of[i] = cosines.len() as u32;

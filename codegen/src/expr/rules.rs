@@ -178,6 +178,7 @@ fn fold(b: &mut Builder, op: Op) -> Option<NodeId> {
         Op::Div(x, y) => folding.fold(|x, y| x / y, |x, y| x / y, |x, y| x / y, value(x)?, value(y)?),
         Op::Neg(x) => -value(x)?,
         Op::Sqrt(x) => folding.sqrt(value(x)?),
+        Op::Sign(x) => value(x)?.sign(),
         _ => return None,
     };
     Some(b.constant(folded))

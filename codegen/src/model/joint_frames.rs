@@ -144,7 +144,17 @@ fn new_body(
     link_frame: Transform<Dd>,
 ) -> Body<Dd> {
     let dense = composing_pays(parent, &placement.rotation);
-    Body { name: name.to_string(), parent, joint, placement, inertia: SpatialInertia::zero(), link_frame, dense }
+    Body {
+        name: name.to_string(),
+        parent,
+        joint,
+        placement,
+        inertia: SpatialInertia::zero(),
+        link_frame,
+        dense,
+        effects: straightline_core::model::JointEffects::none(),
+        load: None,
+    }
 }
 
 fn part(inertial: &Inertial, x_body_link: &Transform<Dd>, tolerance: f64) -> Part {

@@ -88,6 +88,8 @@ pub(super) fn assemble(
             },
             placement,
             dense: composing_pays(parent, &placement.rotation),
+            effects: straightline_core::model::JointEffects::none(),
+            load: None,
             inertia: SpatialInertia::new(Dd::from(link.mass.value), com, super::geometry::snap_tensor(inertia)),
             link_frame: x_canonical_link,
         });

@@ -7,7 +7,7 @@
 
 use crate::dd::Dd;
 use crate::real::Real;
-use crate::spatial::{SpatialInertia, Transform, Vec3};
+use crate::spatial::{SpatialInertia, Sym3, Transform, Vec3};
 use alloc::string::String;
 use alloc::vec::Vec;
 
@@ -81,6 +81,85 @@ pub struct Joint {
     pub limits: Limits,
 }
 
+/// What a joint adds to the rigid bodies, on its own coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointEffects<T> {
+    /// Inertia of what turns with the joint and not with the links: rotor inertia times gear ratio squared
+    /// \[kg·m² or kg\]; `None` where there is none, which is a cheaper form of the equations.
+    #[doc(alias = "armature")]
+    pub rotor_inertia: Option<T>,
+    /// Viscous friction d, with force d q̇ \[N·m·s/rad or N·s/m\].
+    pub damping: T,
+    /// Coulomb friction.
+    pub coulomb: Coulomb<T>,
+    /// Spring stiffness k, with force k (q − q₀) \[N·m/rad or N/m\].
+    pub stiffness: T,
+    /// Coordinate q₀ at which the spring exerts no force \[rad or m\].
+    pub spring_rest: T,
+}
+
+/// Coulomb friction of a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Coulomb<T> {
+    /// None.
+    Off,
+    /// f sgn(q̇) \[N·m or N\]; zero at q̇ = 0.
+    Sign(T),
+    /// f q̇ / √(q̇² + w²), for equations that must be smooth.
+    Smooth {
+        /// f \[N·m or N\].
+        force: T,
+        /// w \[rad/s or m/s\], positive: at this speed friction has reached 1/√2 of f.
+        speed: T,
+    },
+}
+
+impl<T: Real> JointEffects<T> {
+    /// A joint that adds nothing.
+    pub fn none() -> Self {
+        let o = T::zero();
+        JointEffects { rotor_inertia: None, damping: o, coulomb: Coulomb::Off, stiffness: o, spring_rest: o }
+    }
+
+    /// Every number through `f`.
+    pub fn map<U>(&self, mut f: impl FnMut(T) -> U) -> JointEffects<U> {
+        JointEffects {
+            rotor_inertia: self.rotor_inertia.map(&mut f),
+            damping: f(self.damping),
+            coulomb: match self.coulomb {
+                Coulomb::Off => Coulomb::Off,
+                Coulomb::Sign(x) => Coulomb::Sign(f(x)),
+                Coulomb::Smooth { force, speed } => Coulomb::Smooth { force: f(force), speed: f(speed) },
+            },
+            stiffness: f(self.stiffness),
+            spring_rest: f(self.spring_rest),
+        }
+    }
+}
+
+/// Inertia by its ten linear parameters about the origin of the canonical frame: what a body carries besides its own, such
+/// as a payload known at run time only. Forces are linear in it, which they are not in a mass centre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Load<T> {
+    /// m \[kg\].
+    pub mass: T,
+    /// m c \[kg·m\].
+    pub first_moment: Vec3<T>,
+    /// Σ = ∫ r rᵀ dm about the origin \[kg·m²\].
+    pub second_moment: Sym3<T>,
+}
+
+impl<T: Real> Load<T> {
+    /// Every number through `f`.
+    pub fn map<U>(&self, mut f: impl FnMut(T) -> U) -> Load<U> {
+        Load {
+            mass: f(self.mass),
+            first_moment: self.first_moment.map(&mut f),
+            second_moment: self.second_moment.map(f),
+        }
+    }
+}
+
 /// A moving body with the joint that carries it. Links that are fixed to it are merged in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body<T> {
@@ -100,6 +179,26 @@ pub struct Body<T> {
     /// the robot, not of the scalar, so that numbers and equations take the same form: set it to
     /// [`composing_pays`](crate::algorithms::composing_pays)`(parent, &placement.rotation)`.
     pub dense: bool,
+    /// What the joint adds on its own coordinate.
+    pub effects: JointEffects<T>,
+    /// What the body carries besides its own inertia.
+    pub load: Option<Load<T>>,
+}
+
+impl<T: Real> Body<T> {
+    /// The ten linear parameters of all that the body is and carries, about the origin of the canonical frame.
+    pub fn total_about_origin(&self) -> Load<T> {
+        let i = &self.inertia;
+        let own = Load { mass: i.mass, first_moment: i.first_moment, second_moment: i.second_moment };
+        match self.load {
+            None => own,
+            Some(l) => Load {
+                mass: own.mass + l.mass,
+                first_moment: own.first_moment + l.first_moment,
+                second_moment: own.second_moment + l.second_moment,
+            },
+        }
+    }
 }
 
 /// A named frame that outputs may be asked for.
@@ -157,6 +256,8 @@ impl<T: Real> Model<T> {
                     inertia: b.inertia.map(&mut f),
                     link_frame: b.link_frame.map(&mut f),
                     dense: b.dense,
+                    effects: b.effects.map(&mut f),
+                    load: b.load.map(|l| l.map(&mut f)),
                 })
                 .collect(),
             gravity: self.gravity.map(&mut f),

@@ -20,6 +20,9 @@ pub trait Real:
     /// Square root; NaN below zero.
     fn sqrt(self) -> Self;
 
+    /// −1, 0 or 1 as the number is below, at or above zero; NaN for NaN.
+    fn sign(self) -> Self;
+
     /// Zero.
     fn zero() -> Self {
         Self::constant(Dd::ZERO)
@@ -57,6 +60,10 @@ impl Real for f64 {
     fn sqrt(self) -> Self {
         crate::trig::sqrt_f64(self)
     }
+    #[inline]
+    fn sign(self) -> Self {
+        crate::trig::sign_f64(self)
+    }
 }
 
 impl Real for f32 {
@@ -72,6 +79,10 @@ impl Real for f32 {
     fn sqrt(self) -> Self {
         crate::trig::sqrt_f32(self)
     }
+    #[inline]
+    fn sign(self) -> Self {
+        crate::trig::sign_f32(self)
+    }
 }
 
 impl Real for Dd {
@@ -84,5 +95,8 @@ impl Real for Dd {
     }
     fn sqrt(self) -> Self {
         Dd::sqrt(self)
+    }
+    fn sign(self) -> Self {
+        Dd::from(crate::trig::sign_f64(self.hi()))
     }
 }

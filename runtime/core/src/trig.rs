@@ -237,3 +237,29 @@ pub fn sqrt_f32(x: f32) -> f32 {
         x
     }
 }
+
+/// −1, 0 or 1 as x is below, at or above zero; NaN for NaN.
+#[inline]
+#[must_use]
+pub fn sign_f64(x: f64) -> f64 {
+    let above = f64::from(u8::from(x > 0.0));
+    let below = f64::from(u8::from(x < 0.0));
+    if x.is_nan() {
+        x
+    } else {
+        above - below
+    }
+}
+
+/// −1, 0 or 1 as x is below, at or above zero; NaN for NaN.
+#[inline]
+#[must_use]
+pub fn sign_f32(x: f32) -> f32 {
+    let above = f32::from(u8::from(x > 0.0));
+    let below = f32::from(u8::from(x < 0.0));
+    if x.is_nan() {
+        x
+    } else {
+        above - below
+    }
+}

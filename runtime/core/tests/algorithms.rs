@@ -70,6 +70,9 @@ impl<T: Real> Real for Dual<T> {
         let root = self.value.sqrt();
         Dual { value: root, rate: self.rate / (root + root) }
     }
+    fn sign(self) -> Self {
+        Dual { value: self.value.sign(), rate: T::zero() }
+    }
 }
 
 /// A double-double number with its time derivative.
@@ -179,7 +182,17 @@ fn random_robot(seed: u64) -> Model<Dd> {
         let joint = Joint { name: format!("joint{i}"), kind, iq: 0, iv: 0, limits: Limits::default() };
         let dense = composing_pays(parent, &placement.rotation);
         let inertia = random.inertia();
-        bodies.push(Body { name: format!("link{i}"), parent, joint, placement, inertia, link_frame, dense });
+        bodies.push(Body {
+            name: format!("link{i}"),
+            parent,
+            joint,
+            placement,
+            inertia,
+            link_frame,
+            dense,
+            effects: JointEffects::none(),
+            load: None,
+        });
     }
     for which in 0..2 {
         let mut next = 0;
@@ -687,6 +700,8 @@ fn a_pendulum_swings_as_in_the_textbook() {
         inertia: SpatialInertia::new(d(mass), Vec3::new(o, d(length), o), tensor),
         link_frame: Transform::identity(),
         dense: false,
+        effects: JointEffects::none(),
+        load: None,
     };
     let gravity = Vec3::new(0.0, 0.0, -g).map(d);
     let model = Model { name: "pendulum".into(), bodies: vec![body], gravity, frames: vec![] }.cast::<f64>();

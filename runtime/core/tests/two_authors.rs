@@ -63,6 +63,8 @@ fn canonical(random: &mut Random, tree: &MassCentreTree<Dd>) -> Model<Dd> {
             parent: link.parent,
             joint: model::Joint { name: link.name.clone(), kind, iq: link.iq, iv: link.iv, limits: Limits::default() },
             dense: algorithms::composing_pays(link.parent, &placement.rotation),
+            effects: model::JointEffects::none(),
+            load: None,
             placement,
             inertia: SpatialInertia::new(
                 link.mass,

@@ -45,8 +45,16 @@ pub fn solve_articulated<T: Real>(model: &Model<T>, q: &[T], drive: &[T]) -> Vec
                 x[iv..iv + 6].copy_from_slice(&root);
                 continue;
             }
-            JointKind::Revolute => inertias[b].free_turn(drive[iv] - biases[b].moment.z, b),
-            JointKind::Prismatic => inertias[b].free_slide(drive[iv] - biases[b].force.z, b),
+            kind => {
+                let slides = kind == JointKind::Prismatic;
+                let along = if slides { biases[b].force.z } else { biases[b].moment.z };
+                let u = drive[iv] - along;
+                match body.effects.rotor_inertia {
+                    Some(rotor) => inertias[b].free_with_rotor(slides, rotor, u, b),
+                    None if slides => inertias[b].free_slide(u, b),
+                    None => inertias[b].free_turn(u, b),
+                }
+            }
         };
         if let Some(parent) = body.parent {
             let bias = biases[b]
@@ -118,7 +126,7 @@ struct ArticulatedInertia<T> {
 impl<T: Real> ArticulatedInertia<T> {
     /// A rigid body: J about the origin, H = \[m c ×\], M = m 1.
     fn of_body(body: &Body<T>) -> Self {
-        let (i, o) = (&body.inertia, T::zero());
+        let (i, o) = (body.total_about_origin(), T::zero());
         ArticulatedInertia {
             j: i.second_moment.second_moment_to_inertia(),
             h: skew(i.first_moment),
@@ -147,6 +155,32 @@ impl<T: Real> ArticulatedInertia<T> {
                     Vec3::zero().to_array(),
                 ],
             },
+            m: *m - symmetric_product(f_d, f),
+        };
+        let joint = FreeJoint {
+            moment: n,
+            force: f,
+            moment_per_inertia: n_d,
+            force_per_inertia: f_d,
+            rate: (u * per_inertia).named("rate", b, ""),
+        };
+        (joint, freed)
+    }
+
+    /// The same for a joint whose rotor has inertia too: D = J_zz + I, or M_zz + I, and nothing vanishes.
+    fn free_with_rotor(&self, slides: bool, rotor: T, u: T, b: usize) -> (FreeJoint<T>, Self) {
+        let (j, h, m) = (&self.j, &self.h, &self.m);
+        let (n, f, own) = if slides {
+            (h.column(2), Vec3::new(m.xz, m.yz, m.zz), m.zz)
+        } else {
+            (Vec3::new(j.xz, j.yz, j.zz), h.row(2), j.zz)
+        };
+        let per_inertia = (T::one() / (own + rotor)).named("inverse_inertia", b, "");
+        let (n_d, f_d) = (n.scale(per_inertia), f.scale(per_inertia));
+        let row = |i: usize, n_d: T| (h.row(i) - f.scale(n_d)).to_array();
+        let freed = ArticulatedInertia {
+            j: *j - symmetric_product(n_d, n),
+            h: Mat3 { rows: [row(0, n_d.x), row(1, n_d.y), row(2, n_d.z)] },
             m: *m - symmetric_product(f_d, f),
         };
         let joint = FreeJoint {

@@ -38,7 +38,7 @@ pub fn mass_matrix<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
             }
             (JointKind::Prismatic, _) => {
                 // f = M z,  n = m c × z
-                set(iv, iv, composite.mass);
+                set(iv, iv, with_rotor(composite.mass, body));
                 let ms = composite.first_moment;
                 let force = Vec3::new(T::zero(), T::zero(), composite.mass);
                 let moment = Vec3::new(ms.y, -ms.x, T::zero());
@@ -47,7 +47,7 @@ pub fn mass_matrix<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
             (JointKind::Revolute, turn) => {
                 // f = z × m c,  n = J z = (−Σ_xz, −Σ_yz, Σ_xx + Σ_yy)
                 let inertia = composite.second_moment.xx + composite.second_moment.yy;
-                set(iv, iv, inertia);
+                set(iv, iv, with_rotor(inertia, body));
                 let moved = composite.turned(turn.expect("a revolute joint turns"));
                 let (ms, s) = (moved.first_moment, moved.second_moment);
                 let force = Vec3::new(-ms.y, ms.x, T::zero());
@@ -69,6 +69,11 @@ pub fn mass_matrix<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
         }
     }
     h
+}
+
+/// The inertia on a joint's own coordinate, rotor included.
+fn with_rotor<T: Real>(inertia: T, body: &Body<T>) -> T {
+    body.effects.rotor_inertia.map_or(inertia, |rotor| inertia + rotor)
 }
 
 /// What a wrench does along the joint of a body, by velocity coordinate.
@@ -96,8 +101,8 @@ struct Composite<T> {
 
 impl<T: Real> Composite<T> {
     fn of_body(body: &Body<T>) -> Self {
-        let i = &body.inertia;
-        Composite { mass: i.mass, first_moment: i.first_moment, second_moment: i.second_moment }
+        let total = body.total_about_origin();
+        Composite { mass: total.mass, first_moment: total.first_moment, second_moment: total.second_moment }
     }
 
     fn plus(&self, other: &Self) -> Self {

@@ -9,7 +9,7 @@
 //!
 //! ```
 //! use straightline_core::algorithms::{bias_force, inverse_dynamics, mass_matrix};
-//! use straightline_core::model::{Body, Joint, JointKind, Limits, Model};
+//! use straightline_core::model::{Body, Joint, JointEffects, JointKind, Limits, Model};
 //! use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
 //!
 //! // 2 kg at 0.5 m on a horizontal axis: z of the joint frame along y of the world, x along x
@@ -24,6 +24,8 @@
 //!         inertia: SpatialInertia::new(2.0, Vec3::new(0.5, 0.0, 0.0), Sym3::zero()),
 //!         link_frame: Transform::identity(),
 //!         dense: false,
+//!         effects: JointEffects::none(),
+//!         load: None,
 //!     }],
 //!     gravity: Vec3::new(0.0, 0.0, -10.0),
 //!     frames: vec![],
@@ -47,6 +49,7 @@
 
 mod aba;
 mod crba;
+mod effects;
 mod energy;
 mod factor;
 mod jacobian;
@@ -60,6 +63,7 @@ mod velocity;
 
 pub use aba::{forward_dynamics_aba, solve_articulated};
 pub use crba::mass_matrix;
+pub use effects::{passive_force, rotor_inertias};
 pub use energy::{kinetic_energy, potential_energy};
 pub use factor::{forward_dynamics_ltdl, Ltdl};
 pub use jacobian::{jacobian, jacobian_bias};

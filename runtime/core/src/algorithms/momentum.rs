@@ -42,7 +42,13 @@ pub fn momentum<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Momentum<T> {
         let (velocity, inertia) = (&velocities[i], &body.inertia);
         let linear = velocity.linear.scale(inertia.mass) + velocity.angular.cross(inertia.first_moment);
         let spin = inertia.inertia_com * velocity.angular;
-        let sum = momenta[i] + ForceVector { moment: spin + inertia.com.cross(linear), force: linear };
+        let mut sum = momenta[i] + ForceVector { moment: spin + inertia.com.cross(linear), force: linear };
+        if let Some(load) = &body.load {
+            let j = load.second_moment.second_moment_to_inertia();
+            let force = velocity.linear.scale(load.mass) + velocity.angular.cross(load.first_moment);
+            let moment = j * velocity.angular + load.first_moment.cross(velocity.linear);
+            sum = sum + ForceVector { moment, force };
+        }
         match body.parent {
             Some(parent) => momenta[parent] = momenta[parent] + poses[i].wrench_to_parent(&sum),
             None => total = total + poses[i].with_translation(from_anchor(&poses, i)).wrench_to_parent(&sum),
@@ -78,7 +84,7 @@ fn from_anchor<T: Real>(poses: &[JointPose<T>], i: usize) -> Vec3<T> {
 /// Mass \[kg\] of all bodies and first moment Σ m (p_c − anchor) \[kg·m\], in world axes.
 pub(super) fn first_moments_in_world<T: Real>(model: &Model<T>, poses: &[JointPose<T>]) -> (T, Vec3<T>) {
     let mut moments: Vec<(T, Vec3<T>)> =
-        model.bodies.iter().map(|b| (b.inertia.mass, b.inertia.first_moment)).collect();
+        model.bodies.iter().map(|b| b.total_about_origin()).map(|t| (t.mass, t.first_moment)).collect();
     let (mut mass, mut first_moment) = (T::zero(), Vec3::zero());
     for (i, body) in model.bodies.iter().enumerate().rev() {
         T::section("first moment", Some(i));

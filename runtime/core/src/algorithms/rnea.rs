@@ -9,28 +9,32 @@
 //! - Inertia is taken about the mass centre. About the joint's origin there are large terms that cancel: on the wrist of
 //!   a PUMA 560 they cost two digits.
 
+use super::effects::{passive_force, rotor_inertias};
 use super::joint::JointPose;
-use crate::model::{Body, JointKind, Model};
+use crate::model::{Body, JointKind, Load, Model};
 use crate::real::Real;
 use crate::spatial::{ForceVector, Mat3, SpatialInertia, Vec3};
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Generalized forces tau \[N·m or N\], `nv` of them, that make the robot move with q, qd, qdd.
+/// Generalized forces tau \[N·m or N\], `nv` of them, that make the robot move with q, qd, qdd: of the rigid bodies, and
+/// what rotors, friction and springs of the joints take.
 #[doc(alias = "direct dynamics")]
 #[doc(alias = "rnea")]
 pub fn inverse_dynamics<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T]) -> Vec<T> {
-    generalized_forces(model, &transmitted_wrenches(model, q, qd, qdd, model.gravity))
+    let rigid = rigid_body_forces(model, q, qd, qdd, model.gravity);
+    let effects = passive_force(model, q, qd).into_iter().zip(rotor_inertias(model)).zip(qdd);
+    rigid.into_iter().zip(effects).map(|(f, ((passive, rotor), qdd))| f + (rotor * *qdd + passive)).collect()
 }
 
 /// Generalized forces \[N·m or N\] that hold the robot at rest against gravity: g(q) = ∂V/∂q. For a floating base the
 /// force and the moment on the root link.
 pub fn gravity_force<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
     let rest = vec![T::zero(); model.nv()];
-    inverse_dynamics(model, q, &rest, &rest)
+    rigid_body_forces(model, q, &rest, &rest, model.gravity)
 }
 
-/// h(q, q̇) = C q̇ + g: generalized forces \[N·m or N\] of a motion without q̈, so that tau = H q̈ + h.
+/// h(q, q̇) = C q̇ + g + friction and springs: generalized forces \[N·m or N\] of a motion without q̈, so that tau = H q̈ + h.
 #[doc(alias = "nonlinear effects")]
 pub fn bias_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
     inverse_dynamics(model, q, qd, &vec![T::zero(); model.nv()])
@@ -39,7 +43,11 @@ pub fn bias_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
 /// C(q, q̇) q̇: generalized centrifugal and Coriolis forces \[N·m or N\]: the same recursion without gravity and q̈.
 pub fn velocity_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
     let no_acceleration = vec![T::zero(); model.nv()];
-    generalized_forces(model, &transmitted_wrenches(model, q, qd, &no_acceleration, Vec3::zero()))
+    rigid_body_forces(model, q, qd, &no_acceleration, Vec3::zero())
+}
+
+fn rigid_body_forces<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T], gravity: Vec3<T>) -> Vec<T> {
+    generalized_forces(model, &transmitted_wrenches(model, q, qd, qdd, gravity))
 }
 
 /// The wrench that each joint, its drive included, exerts on its child: force \[N\] and moment \[N·m\] about the origin of
@@ -128,6 +136,18 @@ impl<T: Real> AccelerationField<T> {
 }
 
 impl<T: Real> Motion<T> {
+    /// The wrench about the origin that this motion takes of a load: m a + U (m c), and vee(U Σ − (U Σ)ᵀ) + m c × a.
+    fn wrench_of(&self, load: &Load<T>) -> ForceVector<T> {
+        let (u, s) = (self.field.u, load.second_moment.to_matrix());
+        let us = u * s;
+        let spin =
+            Vec3::new(us.rows[2][1] - us.rows[1][2], us.rows[0][2] - us.rows[2][0], us.rows[1][0] - us.rows[0][1]);
+        ForceVector {
+            moment: spin + load.first_moment.cross(self.accel),
+            force: self.accel.scale(load.mass) + u * load.first_moment,
+        }
+    }
+
     /// The world, at rest but for gravity.
     fn of_world(gravity: Vec3<T>) -> Self {
         let (omega, alpha) = (Vec3::zero(), Vec3::zero());
@@ -196,7 +216,11 @@ fn transmitted_wrenches<T: Real>(
         let (motion, inertia) = (&motions[i], &model.bodies[i].inertia);
         let force = motion.accel.scale(inertia.mass) + motion.field.u * inertia.first_moment;
         let moment = motion.field.moment(motion.alpha, inertia) + inertia.com.cross(force);
-        ForceVector { moment, force }
+        let own = ForceVector { moment, force };
+        match &model.bodies[i].load {
+            None => own,
+            Some(load) => own + motion.wrench_of(load),
+        }
     };
     // F_S = Σ −(G + F_I),  M_S = Σ −(M_I + r × (G + F_I)), child by child   (20.47), (20.48)
     let mut from_children = vec![ForceVector::zero(); model.bodies.len()];

@@ -1,0 +1,155 @@
+//! What is wanted of a robot, and what is held constant: everything else is skipped.
+//!
+//! A scene changes no equation. It edits the robot before tracing ([`Scene::locked`], [`Scene::payloads`], effects), binds
+//! inputs to constants ([`Scene::zero`], gravity), makes constants inputs ([`Scene::parameters`]), and selects results
+//! ([`Scene::outputs`]); folding and dead code do the rest.
+
+use crate::function::Function;
+use std::collections::BTreeMap;
+
+/// A scene. The default asks for everything and holds nothing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scene {
+    /// What of each function is wanted; a function that is not named is wanted whole.
+    pub outputs: BTreeMap<Function, Selection>,
+    /// Gravity.
+    pub gravity: Gravity,
+    /// Joints that do not move, with their coordinates \[rad or m\]: their bodies become one.
+    pub locked: Vec<(String, f64)>,
+    /// Bodies welded to links.
+    pub payloads: Vec<Payload>,
+    /// What is known to be zero.
+    pub zero: Zero,
+    /// Which effects beside rigid bodies are in.
+    pub effects: Effects,
+    /// What stays an input of the generated functions.
+    pub parameters: Vec<Parameter>,
+    /// What a function may cost at most.
+    pub budgets: BTreeMap<Function, Budget>,
+}
+
+/// The part of a function's results that is wanted. Names that are empty lists mean all.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Selection {
+    /// Components of a vector over the joints, or columns of the mass matrix, by joint name.
+    pub joints: Vec<String>,
+    /// Frames, by name.
+    pub frames: Vec<String>,
+    /// Which part of each result.
+    pub part: Part,
+}
+
+/// A part of a result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Part {
+    /// All of it.
+    #[default]
+    Whole,
+    /// Of poses the positions, of velocities, accelerations and Jacobians the linear rows.
+    Linear,
+    /// Of poses the orientations, of velocities, accelerations and Jacobians the angular rows.
+    Angular,
+    /// Of the mass matrix the diagonal.
+    Diagonal,
+}
+
+/// Gravity of a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Gravity {
+    /// As the robot file or the model options say.
+    #[default]
+    OfRobot,
+    /// This vector in the world \[m/s²\]; zero for none.
+    Constant([f64; 3]),
+    /// An input `gravity` of every function that depends on it \[m/s²\].
+    Input,
+}
+
+/// A body welded to a frame of the robot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Payload {
+    /// Its name.
+    pub name: String,
+    /// The frame that carries it.
+    pub frame: String,
+    /// Mass \[kg\].
+    pub mass: f64,
+    /// Mass centre in the frame \[m\].
+    pub com: [f64; 3],
+    /// Inertia about its mass centre in the frame's axes: xx, xy, xz, yy, yz, zz \[kg·m²\].
+    pub inertia: [f64; 6],
+}
+
+/// Inputs that are known to be zero.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Zero {
+    /// q̇ = 0: the input is gone.
+    pub qd: bool,
+    /// q̈ = 0: the input is gone.
+    pub qdd: bool,
+    /// Joints with q̇ = q̈ = 0; their entries are not read.
+    pub joints_at_rest: Vec<String>,
+}
+
+/// Effects of the joints, with the numbers of the robot file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effects {
+    /// Rotor inertia, reflected to the joint: `rotor_inertia` · `gear_ratio`².
+    pub rotor_inertia: bool,
+    /// Viscous friction and dampers.
+    pub damping: bool,
+    /// Coulomb friction.
+    pub coulomb: Coulomb,
+    /// Joint springs.
+    pub springs: bool,
+}
+
+impl Default for Effects {
+    fn default() -> Self {
+        Effects { rotor_inertia: true, damping: true, coulomb: Coulomb::Sign, springs: true }
+    }
+}
+
+/// The form of Coulomb friction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Coulomb {
+    /// Left out.
+    Off,
+    /// f sgn(q̇), zero at rest.
+    #[default]
+    Sign,
+    /// f q̇ / √(q̇² + w²) with the speed w \[rad/s or m/s\] at which it has reached 71 %.
+    Smooth(f64),
+}
+
+/// Constants of the robot that stay inputs.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Parameter {
+    /// The ten inertial parameters of a payload in a frame.
+    Payload {
+        /// Name of the input.
+        name: String,
+        /// The frame that carries it.
+        frame: String,
+    },
+    /// The ten inertial parameters of a link, in place of the file's.
+    Link {
+        /// The link.
+        link: String,
+    },
+}
+
+/// What a function may cost; what is left out is free.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Budget {
+    /// Multiplications, additions, divisions and square roots.
+    pub max_flops: Option<usize>,
+    /// Pairs of sine and cosine.
+    pub max_sincos: Option<usize>,
+    /// Values alive at once.
+    pub max_live: Option<usize>,
+    /// Bytes of stack for values, as far as known before rustc: live values, and what is handed from part to part.
+    pub max_stack_bytes: Option<usize>,
+    /// Bytes of machine code, estimated.
+    pub max_code_bytes: Option<usize>,
+}
