@@ -190,7 +190,7 @@ fn random_robot(seed: u64) -> Model<Dd> {
             inertia,
             link_frame,
             dense,
-            effects: JointEffects::none(),
+            effects: straightline_core::model::JointEffects::none(),
             load: None,
         });
     }
@@ -700,7 +700,7 @@ fn a_pendulum_swings_as_in_the_textbook() {
         inertia: SpatialInertia::new(d(mass), Vec3::new(o, d(length), o), tensor),
         link_frame: Transform::identity(),
         dense: false,
-        effects: JointEffects::none(),
+        effects: straightline_core::model::JointEffects::none(),
         load: None,
     };
     let gravity = Vec3::new(0.0, 0.0, -g).map(d);
