@@ -8,6 +8,7 @@ pub mod compile;
 pub mod description;
 pub mod diagnostic;
 pub mod emit;
+pub mod expansion;
 pub mod export;
 pub mod expr;
 pub mod function;

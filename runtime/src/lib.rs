@@ -1,4 +1,73 @@
-//! Straightline: robot dynamics as straight-line code.
+//! Robot dynamics as straight-line, allocation-free, `no_std` Rust, generated at build time from a robot file.
+//!
+//! One attribute names the robot file (URDF or TOML); the type gets constants and functions:
+//! ```
+//! use straightline::Dynamics;
+//!
+//! #[derive(Dynamics)]
+//! #[robot("examples/arm.toml", functions(inverse_dynamics, gravity_force, forward_dynamics))]
+//! struct Arm;
+//!
+//! // hold the arm still, stretched out to the side
+//! let q = [0.0, std::f64::consts::FRAC_PI_2, 0.0];
+//! let mut tau = [0.0; Arm::NV];
+//! Arm::gravity_force(&q, &mut tau);
+//!
+//! // and it stays where it is
+//! let mut qdd = [0.0; Arm::NV];
+//! Arm::forward_dynamics(&q, &[0.0; 3], &tau, &mut qdd);
+//! assert!(qdd.iter().all(|a| a.abs() < 1e-12));
+//!
+//! assert_eq!(Arm::JOINT_NAMES, ["yaw", "shoulder", "elbow"]);
+//! assert_eq!(Arm::INVERSE_DYNAMICS_COST.div, 0);
+//! ```
+//! Arrays are by reference in and out, their sizes are the robot's; there is no allocation, no loop, no branch and no
+//! panic in what is generated, and it depends on `core` alone. SI units; conventions stand with every function.
+//!
+//! # Options
+//! After the file's name, in any order:
+//!
+//! | option | without it |
+//! |---|---|
+//! | `functions(inverse_dynamics, mass_matrix)` | all functions |
+//! | `frames("tool0")`: links that poses, velocities and Jacobians are asked for | the tips |
+//! | `scalar = "f32"` | `"f64"` |
+//! | `floating_base`: the root link moves freely | as the file says |
+//! | `joint_order("a", "b")`: all joints in the order of their coordinates | depth first, as in the file |
+//! | `gravity(0.0, 0.0, -9.81)` \[m/s²\] | the file's, or this |
+//! | `angle_tolerance = 1e-6`: so near to a multiple of 30 or 45 degrees \[rad\] an angle is taken as that | rounding only |
+//! | `rules = "exact"`: the same bits as the generic runtime | `"all"`: fewest operations |
+//! | `forward_dynamics = "articulated-body"` or `"factorisation"` | the cheaper one |
+//! | `max_part_operations = 1000`: longer functions are cut | 2000 |
+//!
+//! The path counts from the package's manifest, or else from the source file. The build runs again when the file changes;
+//! complaints about it come as compiler errors with the file's line.
+//!
+//! # A module
+//! [`dynamics!`] takes the same and makes a module:
+//! ```
+//! straightline::dynamics! {
+//!     /// A three-joint arm in single precision.
+//!     pub mod arm = "examples/arm.toml", scalar = "f32", functions(mass_matrix)
+//! }
+//!
+//! let mut h = [[0.0_f32; arm::NV]; arm::NV];
+//! arm::mass_matrix(&[0.1, 0.2, 0.3], &mut h);
+//! assert_eq!(h[0][1], h[1][0]);
+//! ```
+//!
+//! # Features
+//! * `derive` (default): the macros. They run the compiler of dynamics while your crate is built.
+//! * `runtime`: the generic numeric algorithms, for robots that are known only at run time; needs an allocator.
+//!
+//! Without features there is `core` only. Build scripts use `straightline_codegen::Builder`; source to commit, C libraries
+//! and reports come from the command `straightline`.
 #![no_std]
 #![forbid(unsafe_code)]
+
 pub use straightline_core::Real;
+#[cfg(feature = "derive")]
+pub use straightline_macros::{dynamics, Dynamics};
+
+#[cfg(feature = "runtime")]
+pub use straightline_core::{algorithms, model, spatial, Dd};

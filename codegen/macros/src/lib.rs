@@ -1,1 +1,75 @@
-//! The derive macro.
+//! The macros of Straightline: they read their arguments and leave the rest to `straightline-codegen`. Documentation for
+//! users is in the package `straightline`.
+#![forbid(unsafe_code)]
+
+mod arguments;
+
+use arguments::{Arguments, Module};
+use proc_macro::TokenStream;
+use proc_macro2::TokenStream as Tokens;
+use quote::quote;
+use std::path::{Path, PathBuf};
+use straightline_codegen::expansion::{associated_items, expand};
+use straightline_codegen::Generated;
+use syn::{parse_macro_input, DeriveInput, Error};
+
+/// Gives a type the dynamics of a robot as associated constants and functions; see the package `straightline`.
+#[proc_macro_derive(Dynamics, attributes(robot))]
+pub fn derive_dynamics(input: TokenStream) -> TokenStream {
+    let input = parse_macro_input!(input as DeriveInput);
+    let robots: Vec<_> = input.attrs.iter().filter(|a| a.path().is_ident("robot")).collect();
+    let [robot] = robots[..] else {
+        let text = "`#[derive(Dynamics)]` takes one `#[robot(\"path/to/file.urdf\")]`";
+        return Error::new_spanned(&input.ident, text).into_compile_error().into();
+    };
+    let arguments = match robot.parse_args::<Arguments>() {
+        Ok(arguments) => arguments,
+        Err(error) => return error.into_compile_error().into(),
+    };
+    let (ident, generics) = (&input.ident, &input.generics);
+    let (impl_generics, type_generics, where_clause) = generics.split_for_impl();
+    compiled(&arguments, |generated| {
+        let (items, associated) = (source(&generated.text), source(&associated_items(generated)));
+        quote! {
+            #[allow(dead_code)]
+            mod dynamics { #items }
+            #[allow(dead_code)]
+            impl #impl_generics #ident #type_generics #where_clause { #associated }
+        }
+    })
+    .map_or_else(Error::into_compile_error, |items| quote! { const _: () = { #items }; })
+    .into()
+}
+
+/// Makes a module of the dynamics of a robot; see the package `straightline`.
+#[proc_macro]
+pub fn dynamics(input: TokenStream) -> TokenStream {
+    let Module { attributes, visibility, name, arguments } = parse_macro_input!(input as Module);
+    compiled(&arguments, |generated| source(&generated.text))
+        .map_or_else(Error::into_compile_error, |items| quote! { #(#attributes)* #visibility mod #name { #items } })
+        .into()
+}
+
+/// The items made of the dynamics, or the complaints at the place of the file's name; both depend on the file.
+fn compiled(arguments: &Arguments, items: impl FnOnce(&Generated) -> Tokens) -> Result<Tokens, Error> {
+    let manifest = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
+    let source_file = proc_macro::Span::call_site().local_file();
+    let beside = source_file.as_deref().and_then(Path::parent);
+    let directories: Vec<&Path> = [manifest.as_path()].into_iter().chain(beside).collect();
+    let expansion = expand(&arguments.robot.value(), &directories, &arguments.options);
+    eprint!("{}", expansion.warnings); // a macro has no warnings of its own
+    let tracker = expansion.file.map(|file| {
+        let path = file.to_string_lossy();
+        quote! { const _: &[u8] = include_bytes!(#path); }
+    });
+    let items = match expansion.result {
+        Ok(generated) => items(&generated),
+        Err(message) => Error::new(arguments.robot.span(), message).into_compile_error(),
+    };
+    Ok(quote! { #items #tracker })
+}
+
+/// Generated source as tokens.
+fn source(text: &str) -> Tokens {
+    text.parse().expect("generated source is Rust")
+}

@@ -1,0 +1,112 @@
+//! `"panda.urdf", floating_base, scalar = "f32", functions(inverse_dynamics, mass_matrix), …`
+
+use std::str::FromStr;
+use straightline_codegen::{Function, Options};
+use syn::parse::{Parse, ParseStream};
+use syn::punctuated::Punctuated;
+use syn::{parenthesized, Attribute, Error, Ident, Lit, LitInt, LitStr, Result, Token, Visibility};
+
+/// The robot file and the options, as both macros take them.
+pub struct Arguments {
+    pub robot: LitStr,
+    pub options: Options,
+}
+
+/// `pub mod panda = "panda.urdf", …`
+pub struct Module {
+    pub attributes: Vec<Attribute>,
+    pub visibility: Visibility,
+    pub name: Ident,
+    pub arguments: Arguments,
+}
+
+impl Parse for Module {
+    fn parse(input: ParseStream) -> Result<Self> {
+        let attributes = input.call(Attribute::parse_outer)?;
+        let visibility = input.parse()?;
+        input.parse::<Token![mod]>()?;
+        let name = input.parse()?;
+        input.parse::<Token![=]>()?;
+        Ok(Module { attributes, visibility, name, arguments: input.parse()? })
+    }
+}
+
+impl Parse for Arguments {
+    fn parse(input: ParseStream) -> Result<Self> {
+        let mut arguments = Arguments { robot: input.parse()?, options: Options::default() };
+        while !input.is_empty() {
+            input.parse::<Token![,]>()?;
+            if !input.is_empty() {
+                option(input, &mut arguments.options)?;
+            }
+        }
+        Ok(arguments)
+    }
+}
+
+fn option(input: ParseStream, options: &mut Options) -> Result<()> {
+    let key: Ident = input.parse()?;
+    match key.to_string().as_str() {
+        "floating_base" => options.model.floating_base = true,
+        "scalar" => options.scalar = word(input)?,
+        "rules" => options.grade = word(input)?,
+        "forward_dynamics" => options.forward_dynamics = word(input)?,
+        "max_part_operations" => options.limits.operations = value::<LitInt>(input)?.base10_parse()?,
+        "angle_tolerance" => options.model.angle_tolerance = number(&value(input)?)?,
+        "functions" => {
+            let functions: Result<Vec<Function>> =
+                list::<Ident>(input)?.iter().map(|name| parsed(&name.to_string(), name)).collect();
+            options.functions = functions?;
+            options.functions.sort_unstable();
+            options.functions.dedup();
+        }
+        "frames" => options.frames = strings(input)?,
+        "joint_order" => options.model.joint_order = Some(strings(input)?),
+        "gravity" => {
+            let numbers = list::<Lit>(input)?.iter().map(number).collect::<Result<Vec<f64>>>()?;
+            let three = || Error::new(key.span(), "gravity takes three numbers: gravity(0.0, 0.0, -9.81)");
+            options.model.gravity = Some(numbers.try_into().map_err(|_| three())?);
+        }
+        other => {
+            let known = "floating_base, scalar, rules, forward_dynamics, max_part_operations, angle_tolerance, \
+                         functions, frames, joint_order, gravity";
+            return Err(Error::new(key.span(), format!("there is no option `{other}`; one of: {known}")));
+        }
+    }
+    Ok(())
+}
+
+/// ` = value`
+fn value<T: Parse>(input: ParseStream) -> Result<T> {
+    input.parse::<Token![=]>()?;
+    input.parse()
+}
+
+/// `(a, b, c)`
+fn list<T: Parse>(input: ParseStream) -> Result<Vec<T>> {
+    let inner;
+    parenthesized!(inner in input);
+    Ok(Punctuated::<T, Token![,]>::parse_terminated(&inner)?.into_iter().collect())
+}
+
+fn strings(input: ParseStream) -> Result<Vec<String>> {
+    Ok(list::<LitStr>(input)?.iter().map(LitStr::value).collect())
+}
+
+/// ` = "word"`
+fn word<T: FromStr<Err: std::fmt::Display>>(input: ParseStream) -> Result<T> {
+    let text: LitStr = value(input)?;
+    parsed(&text.value(), &text)
+}
+
+fn parsed<T: FromStr<Err: std::fmt::Display>>(text: &str, place: &dyn quote::ToTokens) -> Result<T> {
+    text.parse().map_err(|error: T::Err| Error::new_spanned(place, error))
+}
+
+fn number(literal: &Lit) -> Result<f64> {
+    match literal {
+        Lit::Float(x) => x.base10_parse(),
+        Lit::Int(x) => x.base10_parse(),
+        other => Err(Error::new_spanned(other, "a number is wanted")),
+    }
+}

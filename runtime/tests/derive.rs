@@ -1,0 +1,89 @@
+//! The macros as a user meets them. That the numbers are right is proven elsewhere, robot by robot.
+#![cfg(feature = "derive")]
+#![deny(warnings, missing_docs, clippy::all)]
+#![forbid(unsafe_code)]
+
+use straightline::Dynamics;
+
+/// All functions, in double precision.
+#[derive(Dynamics, Clone, Copy, Debug)]
+#[robot("examples/arm.toml")]
+pub struct Arm;
+
+/// Options of every kind; a type with fields of its own.
+#[derive(Dynamics, Clone, Debug)]
+#[robot(
+    "examples/arm.toml",
+    functions(gravity_force, forward_kinematics),
+    frames("upper_arm", "forearm"),
+    scalar = "f32",
+    joint_order("elbow", "shoulder", "yaw"),
+    gravity(0.0, -9.81, 0),
+    rules = "exact",
+    angle_tolerance = 1e-9,
+    max_part_operations = 500,
+    forward_dynamics = "factorisation"
+)]
+pub struct Controller<const N: usize> {
+    /// What it remembers.
+    pub last: [f32; N],
+}
+
+/// Floating in the world.
+#[derive(Dynamics)]
+#[robot("examples/arm.toml", floating_base, functions(mass_matrix))]
+struct Satellite;
+
+straightline::dynamics! {
+    /// The arm as a module, found from this file.
+    pub mod arm = "../examples/arm.toml", scalar = "f32", functions(inverse_dynamics,),
+}
+
+#[test]
+fn forward_dynamics_undoes_inverse_dynamics() {
+    let (q, qd, qdd) = ([0.3, -0.8, 1.1], [0.5, -1.2, 0.7], [2.0, -3.0, 1.5]);
+    let (mut tau, mut back) = ([0.0; Arm::NV], [0.0; Arm::NV]);
+    Arm::inverse_dynamics(&q, &qd, &qdd, &mut tau);
+    Arm::forward_dynamics(&q, &qd, &tau, &mut back);
+    for (a, b) in qdd.iter().zip(back) {
+        // a few roundings of numbers near 10, through a condition number near 10
+        assert!((a - b).abs() < 1e-13, "{qdd:?} {back:?}");
+    }
+}
+
+#[test]
+fn constants_describe_the_robot() {
+    assert_eq!((Arm::NQ, Arm::NV), (3, 3));
+    assert_eq!(Arm::JOINT_NAMES, ["yaw", "shoulder", "elbow"]);
+    assert_eq!(Arm::FRAME_NAMES, ["forearm"]);
+    assert_eq!(Arm::UPPER_LIMITS, [f64::INFINITY, 2.0, 2.5]);
+    assert_eq!(Arm::EFFORT_LIMITS[1..], [80.0, 40.0]);
+    const BUDGET: () = assert!(Arm::INVERSE_DYNAMICS_COST.fma < 200);
+    let () = BUDGET;
+}
+
+#[test]
+fn options_reach_the_compiler() {
+    type Two = Controller<2>;
+    assert_eq!(Two::JOINT_NAMES, ["elbow", "shoulder", "yaw"]);
+    assert_eq!(Two::FRAME_NAMES, ["upper_arm", "forearm"]);
+    let (mut g, mut x) = ([0.0_f32; 3], [[0.0_f32; 12]; 2]);
+    Two::gravity_force(&[0.0; 3], &mut g);
+    // gravity along −y now loads the vertical axis, which comes last
+    assert!(g[2].abs() > 0.5, "{g:?}");
+    Two::forward_kinematics(&[0.0; 3], &mut x);
+    assert_eq!(x[0][..3], [0.05, 0.1, 0.3]);
+    assert_eq!((Satellite::NQ, Satellite::NV), (10, 9));
+}
+
+#[test]
+fn the_module_holds_the_same_items() {
+    let mut tau = [0.0_f32; arm::NV];
+    arm::inverse_dynamics(&[0.3, -0.8, 1.1], &[0.5, -1.2, 0.7], &[2.0, -3.0, 1.5], &mut tau);
+    let mut wide = [0.0; 3];
+    Arm::inverse_dynamics(&[0.3, -0.8, 1.1], &[0.5, -1.2, 0.7], &[2.0, -3.0, 1.5], &mut wide);
+    for (narrow, wide) in tau.iter().zip(wide) {
+        // 2^-24 of torques near 10, a few roundings
+        assert!((f64::from(*narrow) - wide).abs() < 1e-5, "{tau:?} {wide:?}");
+    }
+}
