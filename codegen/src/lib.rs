@@ -1,6 +1,6 @@
 //! The compiler of Straightline: from a robot file to straight-line `no_std` Rust.
 //!
-//! [`compile`] is the whole pipeline as one pure function; `ARCHITECTURE.md` draws it.
+//! [`compile()`] is the whole pipeline as one pure function; `ARCHITECTURE.md` draws it.
 #![forbid(unsafe_code)]
 
 pub mod builder;

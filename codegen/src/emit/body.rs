@@ -8,7 +8,7 @@ use std::fmt::Write;
 /// How long an expression may grow before it gets a name of its own.
 const LINE: usize = 84;
 /// What makes sense in code that a person writes: no numbers near π/4, no locals declared before their values.
-const ALLOW: &str = "#[allow(clippy::all)]";
+pub(super) const ALLOW: &str = "#[allow(clippy::all)]";
 /// How many locals one declaration may hold.
 const DECLARATION: usize = 64;
 

@@ -1,5 +1,6 @@
 //! The generated file: header, constants of the robot, functions, and the sine-cosine kernel they call.
 
+use super::body::ALLOW;
 use super::{FunctionText, Scalar};
 use crate::function::Function;
 use crate::report::{FunctionReport, Report};
@@ -161,7 +162,7 @@ fn constants(out: &mut String, model: &Model<Dd>, frames: &[String], scalar: Sca
         ("EFFORT_LIMITS", "Greatest drive of every joint \\[N·m or N\\]", list(&|l| l.effort)),
     ] {
         let _ = writeln!(out, "/// {doc}{floating}; infinite where the robot file says nothing.");
-        let _ = writeln!(out, "pub const {name}: [{t}; {n}] = [{values}];");
+        let _ = writeln!(out, "{ALLOW}\npub const {name}: [{t}; {n}] = [{values}];");
     }
     out.push_str(
         "\n/// Operations of a generated function.\n\

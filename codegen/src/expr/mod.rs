@@ -2,7 +2,7 @@
 //!
 //! A [`Graph`] is a value: operations in an order in which operands stand before their users, grouped inputs, grouped
 //! outputs. A [`Builder`] is the only way to make one: it looks every operation up before adding it, so that equal
-//! operations are one node, and applies the [rules](rules) on the way in.
+//! operations are one node, and applies the [rules] on the way in.
 
 mod builder;
 mod graph;

@@ -1,0 +1,141 @@
+//! The command's contract: what it prints where, and with which code it ends.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/examples/arm.toml");
+
+struct Run {
+    code: i32,
+    out: String,
+    err: String,
+}
+
+fn straightline(arguments: &[&str]) -> Run {
+    let output = Command::new(env!("CARGO_BIN_EXE_straightline")).args(arguments).output().unwrap();
+    Run {
+        code: output.status.code().unwrap(),
+        out: String::from_utf8(output.stdout).unwrap(),
+        err: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+fn scratch(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("command_line").join(name);
+    let _ = fs::remove_dir_all(&path);
+    fs::create_dir_all(&path).unwrap();
+    path
+}
+
+fn names(path: &Path) -> Vec<String> {
+    fs::read_dir(path).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+}
+
+#[test]
+fn check_tells_a_fresh_file_from_a_stale_one() {
+    let directory = scratch("check");
+    let file = directory.join("arm.rs");
+    let file = file.to_str().unwrap();
+    let generate = ["generate", ARM, "-o", file];
+    let check = ["generate", ARM, "-o", file, "--check"];
+
+    let missing = straightline(&check);
+    assert_eq!((missing.code, missing.out.as_str()), (1, ""));
+    assert!(missing.err.contains("does not exist"), "{}", missing.err);
+    assert_eq!(straightline(&generate).code, 0);
+    assert_eq!(straightline(&check).code, 0);
+    assert_eq!(fs::read_to_string(file).unwrap(), straightline(&["generate", ARM]).out);
+
+    fs::write(file, "// edited").unwrap();
+    let stale = straightline(&check);
+    assert_eq!(stale.code, 1);
+    assert!(stale.err.contains("is stale") && stale.err.contains("help: run the same command"), "{}", stale.err);
+    assert_eq!(fs::read_to_string(file).unwrap(), "// edited");
+    assert_eq!(names(&directory), ["arm.rs"]);
+}
+
+#[test]
+fn a_wrong_robot_file_ends_with_1_and_writes_nothing() {
+    let directory = scratch("wrong");
+    let robot = directory.join("arm.toml");
+    fs::write(&robot, fs::read_to_string(ARM).unwrap().replace("mass = 2.5", "mass = -2.5")).unwrap();
+    let (robot, output) = (robot.to_str().unwrap(), directory.join("arm"));
+    let output = output.to_str().unwrap();
+    for arguments in [
+        &["generate", robot, "-o", output][..],
+        &["export", robot, "-o", output, "--c-abi"],
+        &["report", robot],
+        &["verify", robot],
+        &["check", robot],
+    ] {
+        let run = straightline(arguments);
+        assert_eq!(run.code, 1, "{arguments:?}");
+        assert!(run.err.contains("error[negative-mass]") && run.err.contains("| mass = -2.5"), "{}", run.err);
+        assert!(!run.err.contains('\x1b'), "no colours where there is no terminal");
+        assert_eq!(names(&directory), ["arm.toml"], "{arguments:?}");
+    }
+}
+
+#[test]
+fn an_unknown_frame_or_joint_is_an_error_of_the_input() {
+    let run = straightline(&["generate", ARM, "--frame", "fore_arm"]);
+    assert_eq!((run.code, run.out.as_str()), (1, ""));
+    assert!(run.err.contains("fore_arm") && run.err.contains("forearm"), "{}", run.err);
+    let run = straightline(&["report", ARM, "--joint-order", "yaw,shoulder"]);
+    assert_eq!((run.code, run.out.as_str()), (1, ""));
+    assert!(run.err.contains("elbow"), "{}", run.err);
+}
+
+#[test]
+fn usage_ends_with_2_and_files_with_3() {
+    assert_eq!(straightline(&["generate"]).code, 2);
+    assert_eq!(straightline(&["generate", ARM, "--scalar", "f16"]).code, 2);
+    assert_eq!(straightline(&["generate", "/nowhere/arm.toml"]).code, 3);
+    let run = straightline(&["generate", ARM, "-o", "/nowhere/arm.rs"]);
+    assert_eq!(run.code, 3);
+    assert!(run.err.starts_with("error: /nowhere/arm.rs: "), "{}", run.err);
+
+    let directory = scratch("theirs");
+    fs::write(directory.join("thesis.tex"), "").unwrap();
+    assert_eq!(straightline(&["export", ARM, "-o", directory.to_str().unwrap(), "--c-abi"]).code, 3);
+    assert_eq!(names(&directory), ["thesis.tex"]);
+}
+
+#[test]
+fn help_shows_examples_and_exit_codes() {
+    for arguments in [&["--help"][..], &["generate", "--help"], &["export", "--help"], &["verify", "--help"]] {
+        let run = straightline(arguments);
+        assert_eq!(run.code, 0);
+        assert!(run.out.contains("Examples:") && run.out.contains("Exit codes:"), "{}", run.out);
+    }
+}
+
+#[test]
+fn the_report_is_json_for_programs() {
+    let run = straightline(&["report", ARM, "--json", "--function", "inverse_dynamics"]);
+    let report: serde_json::Value = serde_json::from_str(&run.out).unwrap();
+    assert_eq!(report["robot"], "arm");
+    let functions = report["functions"].as_object().unwrap();
+    assert_eq!(functions.keys().collect::<Vec<_>>(), ["inverse_dynamics"]);
+    for key in ["mul", "add", "fma", "div", "sqrt", "sincos", "max_live", "lines"] {
+        assert!(functions["inverse_dynamics"][key].is_u64(), "{key}");
+    }
+    assert_eq!(functions["inverse_dynamics"]["sincos"], 2);
+}
+
+#[test]
+fn verify_finds_roundings_only() {
+    for options in [&[][..], &["--floating-base"], &["--scalar", "f32"], &["--rules", "exact"]] {
+        let run = straightline(&[&["verify", ARM, "--states", "20", "--seed", "7", "--json"], options].concat());
+        assert_eq!(run.code, 0, "{}", run.err);
+        let verification: serde_json::Value = serde_json::from_str(&run.out).unwrap();
+        let functions = verification["functions"].as_object().unwrap();
+        assert_eq!(functions.len(), 15);
+        let unit = if options.contains(&"f32") { 2f64.powi(-24) } else { 2f64.powi(-53) };
+        for (name, worst) in functions {
+            // three joints: a few dozen roundings
+            assert!(worst["error"].as_f64().unwrap() < 64.0 * unit, "{name}: {worst}");
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! The exported package as a stranger uses it: written by the command, built by cargo, called from C.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use straightline_codegen::model::{load, ModelOptions};
+use straightline_codegen::{ForwardDynamicsMethod, Function, Source};
+use straightline_core::model::Frame;
+use straightline_core::Dd;
+
+const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/examples/arm.toml");
+
+/// A state that nothing is special about.
+const STATE: [(&str, [f64; 10]); 4] = [
+    ("q", [0.3, -0.2, 0.5, 0.1, -0.5, 0.7, 0.5, 0.4, -1.1, 0.9]),
+    ("qd", [0.2, -0.4, 0.3, 1.1, -0.7, 0.6, 0.8, -1.3, 1.7, 0.0]),
+    ("qdd", [1.2, -2.4, 0.7, 3.1, -1.7, 2.6, -1.8, 2.3, -0.7, 0.0]),
+    ("tau", [5.2, -1.4, 3.7, 1.6, -2.7, 0.6, 7.8, -3.3, 1.7, 0.0]),
+];
+
+fn scratch(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::create_dir_all(&path).unwrap();
+    path
+}
+
+fn succeeds(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn is_there(program: &str) -> bool {
+    Command::new(program).arg("--version").output().is_ok()
+}
+
+#[test]
+fn c_calls_every_function_and_gets_what_the_generic_runtime_computes() {
+    let scratch = scratch("export");
+    let package = scratch.join("arm");
+    succeeds(
+        Command::new(env!("CARGO_BIN_EXE_straightline"))
+            .args(["export", ARM, "--c-abi", "--prefix", "Arm3", "--floating-base"])
+            .args(["--frame", "forearm", "--frame", "column", "-o"])
+            .arg(&package),
+    );
+    let built = package.join("target");
+    succeeds(
+        Command::new(env!("CARGO"))
+            .args(["build", "--release", "--offline", "--manifest-path"])
+            .arg(package.join("Cargo.toml"))
+            .env("CARGO_TARGET_DIR", &built)
+            // warnings of generated code are ours to prevent
+            .env("RUSTFLAGS", "-Dwarnings"),
+    );
+    if !is_there("cc") {
+        eprintln!("skipped: there is no C compiler");
+        return;
+    }
+
+    // truth: the generic algorithms in double-double
+    let options = ModelOptions { floating_base: true, ..ModelOptions::default() };
+    let (model, _) = load(&Source::new(ARM, fs::read_to_string(ARM).unwrap()), &options);
+    let model = model.unwrap();
+    let frames: Vec<&Frame<Dd>> = ["forearm", "column"].iter().map(|name| model.frame(name).unwrap()).collect();
+    let state = |name: &str| STATE.iter().find(|(n, _)| *n == name).unwrap().1;
+    let mut calls = String::new();
+    let mut truth = Vec::new();
+    for function in Function::all() {
+        let inputs = function.inputs(&model);
+        let numbers: Vec<Vec<Dd>> =
+            inputs.iter().map(|p| state(p.name)[..p.len()].iter().map(|x| Dd::from(*x)).collect()).collect();
+        let method = ForwardDynamicsMethod::Factorisation;
+        let outputs = function.evaluate(&model, &frames, method, &numbers);
+        let (name, n) = (function.name(), outputs.len());
+        let arguments: Vec<_> = inputs.iter().map(|p| p.name).chain(["out"]).collect();
+        calls.push_str(&format!(
+            "    {{ double out[{n}]; Arm3_{name}({}); show(\"{name}\", out, {n}); }}\n",
+            arguments.join(", ")
+        ));
+        truth.extend(outputs.into_iter().enumerate().map(|(k, x)| (format!("{name} {k}"), x)));
+    }
+    let arrays: String = STATE
+        .iter()
+        .map(|(name, x)| {
+            let numbers: Vec<String> = x.iter().map(|x| format!("{x:?}")).collect();
+            format!("    static const double {name}[] = {{{}}};\n", numbers.join(", "))
+        })
+        .collect();
+    let program = format!(
+        r#"#include "arm3_dynamics.h"
+#include <stdio.h>
+static void show(const char *name, const double *x, int n) {{
+    for (int k = 0; k < n; k++) printf("%s %d %.17g\n", name, k, x[k]);
+}}
+int main(void) {{
+{arrays}    if (Arm3_nq() != ARM3_NQ || Arm3_nv() != ARM3_NV) return 1;
+    if (Arm3_joint_count() != ARM3_JOINT_COUNT || Arm3_frame_count() != ARM3_FRAME_COUNT) return 2;
+    if (Arm3_joint_name(-1) || Arm3_frame_name(ARM3_FRAME_COUNT)) return 3;
+    printf("%s %s %s\n", Arm3_joint_name(3), Arm3_frame_name(0), Arm3_frame_name(1));
+{calls}    return 0;
+}}
+"#
+    );
+    fs::write(scratch.join("main.c"), program).unwrap();
+    let (include, release) = (package.join("include"), built.join("release"));
+    let strict = ["-Wall", "-Wextra", "-Werror", "-pedantic"];
+    succeeds(
+        Command::new("cc")
+            .args(strict)
+            .arg("-std=c99")
+            .arg(scratch.join("main.c"))
+            .arg("-I")
+            .arg(&include)
+            .arg("-L")
+            .arg(&release)
+            .args(["-larm3_dynamics", "-o"])
+            .arg(scratch.join("main"))
+            .arg(format!("-Wl,-rpath,{}", release.display())),
+    );
+    if is_there("c++") {
+        succeeds(
+            Command::new("c++").args(strict).args(["-fsyntax-only", "-x", "c++"]).arg(include.join("arm3_dynamics.h")),
+        );
+    }
+    let printed = succeeds(&mut Command::new(scratch.join("main")));
+    let mut lines = printed.lines();
+    assert_eq!(lines.next(), Some("elbow forearm column"));
+    assert_eq!(lines.clone().count(), truth.len());
+    for (line, (name, expected)) in lines.zip(truth) {
+        let (found, value) = line.rsplit_once(' ').unwrap();
+        assert_eq!(found, name);
+        let error = (Dd::from(value.parse::<f64>().unwrap()) - expected).to_f64().abs();
+        // values up to 100, condition number of H near 100: 1e-16 times both, and room for a few roundings
+        assert!(error < 1e-11, "{name}: {value}, off by {error:e}");
+    }
+}
