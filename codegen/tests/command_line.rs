@@ -88,6 +88,20 @@ fn an_unknown_frame_or_joint_is_an_error_of_the_input() {
 }
 
 #[test]
+fn check_says_which_angles_are_taken_as_exact() {
+    let directory = scratch("angles");
+    let robot = directory.join("arm.toml");
+    let text = fs::read_to_string(ARM).unwrap().replace("rpy_quarter_turns = [1.0", "rpy = [1.5707963267948966");
+    fs::write(&robot, text).unwrap();
+    let robot = robot.to_str().unwrap();
+    let run = straightline(&["check", ARM, robot]);
+    assert_eq!((run.code, run.err.as_str()), (0, ""));
+    assert!(run.out.contains("roll of the origin of joint `elbow`: 1.5707963267948966 as π/2, -6.1e-17 rad off"));
+    let literal = straightline(&["check", robot, "--literal-angles"]);
+    assert!(!literal.out.contains("taken as exact"), "{}", literal.out);
+}
+
+#[test]
 fn usage_ends_with_2_and_files_with_3() {
     assert_eq!(straightline(&["generate"]).code, 2);
     assert_eq!(straightline(&["generate", ARM, "--scalar", "f16"]).code, 2);

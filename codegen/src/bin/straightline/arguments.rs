@@ -171,7 +171,7 @@ pub struct Export {
 #[command(next_help_heading = "What is generated")]
 pub struct ProgramArgs {
     /// A function to generate; may be repeated [default: all]
-    #[arg(long = "function", value_name = "NAME", value_parser = words::<Function>(), hide_possible_values = true)]
+    #[arg(long = "function", value_name = "NAME", value_parser = words::<Function>())]
     functions: Vec<Function>,
     /// A frame (link) that positions, velocities and Jacobians are asked for; may be repeated [default: the robot's tips]
     #[arg(long = "frame", value_name = "NAME")]

@@ -12,8 +12,8 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 use straightline_codegen::compile::{compile, Generated, Options};
-use straightline_codegen::diagnostic::{Severity, Source};
-use straightline_codegen::{export, model, output, verify};
+use straightline_codegen::diagnostic::{Diagnostics, Severity, Source};
+use straightline_codegen::{description, export, model, output, verify};
 
 /// Why a command ended early; what there is to say was said where it happened, except for [`Failure::Files`].
 enum Failure {
@@ -107,9 +107,16 @@ fn check(a: &Check) -> Result<(), Failure> {
     let options = a.model.options();
     let mut wrong = false;
     for robot in &a.robots {
-        let (model, diagnostics) = model::load(&read(robot)?, &options);
+        let source = read(robot)?;
+        let mut diagnostics = Diagnostics::new();
+        let description = description::read(&source, &mut diagnostics);
+        let model = description.as_ref().and_then(|d| model::build(d, &options, &mut diagnostics));
+        model::finish(&mut diagnostics);
         print::diagnostics(&diagnostics, Severity::Note);
-        print::verdict(&robot.display().to_string(), model.as_ref(), &diagnostics)?;
+        print::verdict(source.path(), model.as_ref(), &diagnostics)?;
+        if let Some(description) = &description {
+            print::notes(description, &model::special_angles(description, &options))?;
+        }
         wrong |= diagnostics.has_errors();
     }
     if wrong {

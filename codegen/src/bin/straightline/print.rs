@@ -6,7 +6,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
+use straightline_codegen::description::{Description, Ignored};
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
+use straightline_codegen::model::SpecialAngle;
 use straightline_codegen::report::Report;
 use straightline_codegen::verify::Verification;
 use straightline_core::model::Model;
@@ -64,6 +66,24 @@ pub fn verdict(path: &str, model: Option<&Model<Dd>>, diagnostics: &Diagnostics)
     }
 }
 
+/// What the reading assumed without a doubt: angles that are multiples of 30 or 45 degrees but for rounding, elements
+/// that the dynamics do not need.
+pub fn notes(description: &Description, angles: &[SpecialAngle]) -> io::Result<()> {
+    let mut out = stdout().lock();
+    if !angles.is_empty() {
+        writeln!(out, "  angles taken as exact (--literal-angles takes them as written):")?;
+        for a in angles {
+            writeln!(out, "    {}: {}: {} as {}, {:.1e} rad off", a.place, a.what, a.text, a.taken_as, a.deviation)?;
+        }
+    }
+    if !description.ignored.is_empty() {
+        let each = |i: &Ignored| format!("{} ({}, first in line {})", i.what, i.count, i.place.line);
+        let list: Vec<String> = description.ignored.iter().map(each).collect();
+        writeln!(out, "  not needed for the dynamics: {}", list.join(", "))?;
+    }
+    Ok(())
+}
+
 /// The operations of every function.
 pub fn report(report: &Report) -> io::Result<()> {
     let mut out = stdout().lock();
@@ -92,6 +112,12 @@ pub fn verification(v: &Verification) -> io::Result<()> {
     for (name, f) in &v.functions {
         let (style, mark) = if f.error <= v.bound { (Style::new(), "") } else { (ERROR, "  exceeds the bound") };
         writeln!(out, "{name:<20}{style}{:>14.2e}{style:#}{:>8}   {}{mark}", f.error, f.state, f.output)?;
+    }
+    for (name, f) in v.functions.iter().filter(|(_, f)| f.error > v.bound) {
+        writeln!(out, "\n{name}, state {}:", f.state)?;
+        for (input, values) in &f.inputs {
+            writeln!(out, "let {input} = {values:?};")?;
+        }
     }
     writeln!(out, "\nerrors divided by natural scale; bound {:.1e}", v.bound)
 }
