@@ -3,12 +3,14 @@
 use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
 use crate::emit::{self, Item, Provenance, Scalar};
-use crate::expr::{verify, Folding, Grade, Graph, RuleSet, Section};
+use crate::expr::{verify, Folding, Grade, Graph, Port, RuleSet, Section};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model;
 use crate::pass::dead_code;
 use crate::report::{FunctionReport, Report};
+use crate::scene::{drop_unread_inputs, load_parameters, without_parameters, Scene, LOAD_SCALARS};
 use crate::schedule::{schedule, Limits, Schedule};
+use crate::trace::trace;
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
 use straightline_core::Dd;
@@ -30,6 +32,8 @@ pub struct Options {
     pub limits: Limits,
     /// How the robot file is read.
     pub model: crate::model::ModelOptions,
+    /// What is wanted and what is held.
+    pub scene: Scene,
 }
 
 impl Default for Options {
@@ -42,6 +46,7 @@ impl Default for Options {
             forward_dynamics: ForwardDynamicsMethod::default(),
             limits: Limits::default(),
             model: crate::model::ModelOptions::default(),
+            scene: Scene::default(),
         }
     }
 }
@@ -74,8 +79,8 @@ pub fn program(robot: &Robot, frames: &[String], function: Function, options: &O
         verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
         graph
     };
-    let traced = check(function.trace(robot, frames, options.forward_dynamics, options.rules()));
-    let graph = check(dead_code(&traced));
+    let traced = function.trace(robot, frames, options.forward_dynamics, options.rules(), &options.scene);
+    let graph = check(drop_unread_inputs(check(dead_code(&check(traced)))));
     let schedule = schedule(&graph, options.limits);
     Program { function, graph, schedule }
 }
@@ -89,6 +94,8 @@ pub struct Generated {
     pub frames: Vec<String>,
     /// The source: items without inner attributes, for `include!`, a module, or a file of its own.
     pub text: String,
+    /// The types of its run-time parameters.
+    pub types: String,
     /// The functions of that source, one by one.
     pub items: Vec<Item>,
     /// The scalar type.
@@ -121,7 +128,7 @@ fn generate(
     path: &str,
     hash: u64,
 ) -> Generated {
-    let robot = Robot::new(model);
+    let robot = Robot::new(without_parameters(model, &options.scene));
     let model = &robot.model;
     let title = |section: Section| match section.body {
         Some(i) => format!("{}, body {}: {}", section.phase, i + 1, model.bodies[i].name),
@@ -134,7 +141,8 @@ fn generate(
             continue;
         }
         let Program { graph, schedule, .. } = program(&robot, &frames, function, options);
-        let text = emit::function(&graph, &schedule, function.name(), &function.doc(), options.scalar, &title);
+        let doc = function.doc(&graph.inputs, &options.scene);
+        let text = emit::function(&graph, &schedule, function.name(), &doc, options.scalar, &title);
         let figures = FunctionReport::new(
             graph.counts(),
             schedule.max_live,
@@ -143,7 +151,7 @@ fn generate(
             text.text.lines().count(),
         );
         functions.insert(function.name(), figures);
-        items.push(Item { function, text });
+        items.push(Item { function, inputs: graph.inputs, outputs: graph.outputs, doc, text });
     }
     let report =
         Report { robot: model.name.clone(), nq: model.nq(), nv: model.nv(), scalar: options.scalar.name(), functions };
@@ -155,8 +163,29 @@ fn generate(
     };
     let remarks = warnings.iter().map(remark).collect();
     let provenance = Provenance { source: name.clone(), hash, remarks };
-    let text = emit::file(model, &frames, &items, &report, &provenance, options.scalar);
-    Generated { model: robot.model, frames, text, items, scalar: options.scalar, provenance, report, warnings }
+    let types = parameter_types(&robot, options);
+    let text = emit::file(model, &frames, &items, &report, &provenance, options.scalar, &types);
+    Generated { model: robot.model, frames, text, types, items, scalar: options.scalar, provenance, report, warnings }
+}
+
+/// The types of run-time parameters, with what they share.
+fn parameter_types(robot: &Robot, options: &Options) -> String {
+    let parameters = options.scene.parameters.iter().filter(|p| p.body(&robot.model).is_some());
+    let types = parameters.map(|p| {
+        let inputs = vec![Port::new("mass", &[1]), Port::new("com", &[3]), Port::new("inertia", &[6])];
+        let outputs = vec![Port::new("parameters", &[LOAD_SCALARS])];
+        let graph = dead_code(&trace(options.rules(), inputs, outputs, |x| load_parameters(robot, p, x)));
+        let (schedule, name) = (schedule(&graph, options.limits), p.input_name());
+        let doc = "The parameters about the origins, and in the axes, of the frames that the equations use.";
+        let constructor =
+            emit::function(&graph, &schedule, &format!("{name}_parameters"), doc, options.scalar, &|_| String::new());
+        emit::parameter::parameter(&name, &p.type_name(), p.frame(), LOAD_SCALARS, &constructor, options.scalar)
+    });
+    let types: String = types.collect();
+    if types.is_empty() {
+        return types;
+    }
+    emit::parameter::check(options.scalar) + &types
 }
 
 /// The frames asked for, or the tips of the robot: the last frame on every body that carries no other.

@@ -54,7 +54,7 @@ struct Package<'a> {
 
 /// A parameter of a C function.
 struct Parameter {
-    name: &'static str,
+    name: String,
     length: usize,
     array: String,
     is_output: bool,
@@ -102,7 +102,7 @@ overflow-checks = false
 
     fn dynamics(&self) -> String {
         let g = self.generated;
-        let mut out = emit::preamble(&g.model, &g.frames, &g.report, &g.provenance, g.scalar);
+        let mut out = emit::preamble(&g.model, &g.frames, &g.report, &g.provenance, g.scalar, &g.types);
         for item in &self.generated.items {
             let name = item.function.name();
             let _ = write!(out, "\nmod {name};\npub use self::{name}::{name};\n");
@@ -114,14 +114,15 @@ overflow-checks = false
     }
 
     fn parameters(&self, function: Function) -> Vec<Parameter> {
-        let inputs = function.inputs(&self.generated.model).into_iter().map(|p| (p, false));
-        let output = function.output(&self.generated.model, self.generated.frames.len());
+        let item = self.generated.items.iter().find(|i| i.function == function);
+        let item = item.expect("only generated functions are exported");
+        let inputs = item.inputs.iter().map(|p| (p, false));
         inputs
-            .chain([(output, true)])
+            .chain(item.outputs.iter().map(|p| (p, true)))
             .map(|(port, is_output)| Parameter {
-                name: port.name,
+                name: port.name.clone(),
                 length: port.len(),
-                array: emit::array_type(&port, self.scalar()),
+                array: emit::array_type(port, self.scalar()),
                 is_output,
             })
             .collect()
@@ -285,7 +286,7 @@ const char *{prefix}_frame_name(int i);
             Scalar::F32 => "float",
         };
         for item in &self.generated.items {
-            let doc = item.function.doc().replace("frame of [`FRAME_NAMES`]", "frame").replace(['`', '\\'], "");
+            let doc = item.doc.replace("frame of [`FRAME_NAMES`]", "frame").replace(['`', '\\'], "");
             out.push_str("\n/*");
             for (i, line) in doc.lines().filter(|l| !l.is_empty()).enumerate() {
                 let line = line.strip_prefix("* ").map_or(line.to_string(), |parameter| format!("  {parameter}"));

@@ -2,7 +2,8 @@
 
 use crate::expr::{Grade, Graph, Port, RuleSet};
 use crate::reduce::reduce;
-use crate::trace::{trace, Expr};
+use crate::scene::{Bound, Part, Scene};
+use crate::trace::trace;
 use straightline_core::algorithms as alg;
 use straightline_core::model::{Frame, Model};
 use straightline_core::reduced::ReducedModel;
@@ -194,6 +195,7 @@ const INPUT_DOCS: &[(&str, &str)] = &[
     ("qd", "velocities \\[rad/s or m/s\\]"),
     ("qdd", "accelerations \\[rad/s² or m/s²\\]"),
     ("tau", "generalized forces \\[N·m or N\\]"),
+    ("gravity", "acceleration due to gravity in the world \\[m/s²\\]"),
 ];
 
 impl Function {
@@ -251,15 +253,29 @@ impl Function {
         Port::new(self.entry().output, shape)
     }
 
-    /// Its documentation in generated code.
-    pub fn doc(self) -> String {
+    /// Its documentation in generated code, for the inputs that a scene leaves it.
+    pub fn doc(self, inputs: &[Port], scene: &Scene) -> String {
         let entry = self.entry();
         let mut doc = format!("{}\n\n", entry.summary);
-        for name in entry.inputs {
-            let text = INPUT_DOCS.iter().find(|(n, _)| n == name).map_or("", |(_, text)| text);
-            doc.push_str(&format!("* `{name}`: {text}\n"));
+        for port in inputs {
+            let known = INPUT_DOCS.iter().find(|(name, _)| *name == port.name);
+            let text = known.map_or("inertial parameters of a body that the robot carries", |(_, text)| text);
+            doc.push_str(&format!("* `{}`: {text}\n", port.name));
         }
         doc.push_str(&format!("* `{}`: {}\n", entry.output, entry.outputs));
+        if let Some(selection) = scene.outputs.get(&self) {
+            for (what, names) in [("joints", &selection.joints), ("frames", &selection.frames)] {
+                if !names.is_empty() {
+                    doc.push_str(&format!("\nOnly for the {what} {}.\n", names.join(", ")));
+                }
+            }
+            match selection.part {
+                Part::Whole => {}
+                Part::Linear => doc.push_str("\nOnly the linear part: positions, linear rows, forces.\n"),
+                Part::Angular => doc.push_str("\nOnly the angular part: orientations, angular rows, moments.\n"),
+                Part::Diagonal => doc.push_str("\nOnly the diagonal.\n"),
+            }
+        }
         doc
     }
 
@@ -346,28 +362,38 @@ impl Function {
         })
     }
 
-    /// Its equations for a robot. For [`ForwardDynamicsMethod::Cheaper`] both methods are traced and the one with fewer
-    /// operations is kept. Where the rules may move rounding, the reduced robot serves the functions that it can.
-    pub fn trace(self, robot: &Robot, frames: &[String], method: ForwardDynamicsMethod, rules: RuleSet) -> Graph {
-        let model = &robot.model;
+    /// Its equations for a robot in a scene. For [`ForwardDynamicsMethod::Cheaper`] both methods are traced and the one
+    /// with fewer operations is kept. Where the rules may move rounding, the reduced robot serves the functions that it
+    /// can.
+    pub fn trace(
+        self,
+        robot: &Robot,
+        frames: &[String],
+        method: ForwardDynamicsMethod,
+        rules: RuleSet,
+        scene: &Scene,
+    ) -> Graph {
+        let frames = scene.frames_of(self, frames);
+        let (wanted, output) = scene.select(self, &robot.model, frames.len());
         let trace_with = |method| {
-            trace(rules, self.inputs(model), vec![self.output(model, frames.len())], |inputs| {
-                let model: Model<Expr> = model.cast();
-                if rules.grade() == Grade::Algebraic {
-                    let reduced = robot.reduced.map(Expr::constant);
-                    if let Some(results) = self.evaluate_reduced(&model, &reduced, method, inputs) {
-                        return results;
-                    }
-                }
-                let frame = |name: &String| model.frame(name).expect("frames were checked against the model");
-                self.evaluate(&model, &frames.iter().map(frame).collect::<Vec<_>>(), method, inputs)
+            trace(rules, scene.ports(self, &robot.model), vec![output.clone()], |inputs| {
+                let Bound { model, reduced, arguments } = scene.bind(self, robot, inputs);
+                let by_reduced = match rules.grade() {
+                    Grade::Algebraic => self.evaluate_reduced(&model, &reduced, method, &arguments),
+                    Grade::Exact => None,
+                };
+                let results = by_reduced.unwrap_or_else(|| {
+                    let frame = |name: &String| model.frame(name).expect("frames were checked against the model");
+                    self.evaluate(&model, &frames.iter().map(frame).collect::<Vec<_>>(), method, &arguments)
+                });
+                wanted.iter().map(|k| results[*k]).collect()
             })
         };
         match (self, method) {
             (Function::ForwardDynamics, ForwardDynamicsMethod::Cheaper) => {
                 let articulated = trace_with(ForwardDynamicsMethod::ArticulatedBody);
                 // an LᵀDL factor of n joints on one branch takes about n³/6 products more
-                if model.nv() > 40 {
+                if robot.model.nv() > 40 {
                     return articulated;
                 }
                 let factorised = trace_with(ForwardDynamicsMethod::Factorisation);
@@ -389,13 +415,15 @@ pub struct Robot {
     pub model: Model<Dd>,
     /// For joint torques alone.
     pub reduced: ReducedModel<Dd>,
+    /// Pose of each body's frame of the reduced form in its canonical one.
+    pub reduced_frames: Vec<Transform<Dd>>,
 }
 
 impl Robot {
     /// Both forms of a robot.
     pub fn new(model: Model<Dd>) -> Self {
-        let reduced = reduce(&model);
-        Robot { model, reduced }
+        let (reduced, reduced_frames) = reduce(&model);
+        Robot { model, reduced, reduced_frames }
     }
 }
 

@@ -19,6 +19,7 @@ pub mod reduce;
 #[cfg(feature = "verify")]
 pub mod reference_input;
 pub mod report;
+pub mod scene;
 pub mod schedule;
 pub mod trace;
 #[cfg(feature = "verify")]

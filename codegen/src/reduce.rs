@@ -13,15 +13,15 @@ const DUST: f64 = 1e-28;
 /// Below this sine two axes are taken as parallel when a frame is chosen; the transform itself stays exact.
 const NEARLY_PARALLEL: f64 = 1e-4;
 
-/// The reduced robot.
-pub fn reduce(model: &Model<Dd>) -> ReducedModel<Dd> {
+/// The reduced robot, and the pose of each of its frames in the body's canonical frame.
+pub fn reduce(model: &Model<Dd>) -> (ReducedModel<Dd>, Vec<Transform<Dd>>) {
     let regauge = choose_frames(model);
     let mut bodies: Vec<ReducedBody<Dd>> =
         model.bodies.iter().enumerate().map(|(i, b)| in_new_frame(model, &regauge, i, b)).collect();
     for i in (0..bodies.len()).rev() {
         regroup(&mut bodies, i);
     }
-    ReducedModel { bodies, gravity: model.gravity }
+    (ReducedModel { bodies, gravity: model.gravity }, regauge)
 }
 
 /// For each body the pose of its new frame in its canonical one: turned about z and shifted along it; for a prismatic

@@ -30,7 +30,7 @@ pub struct Worst {
     /// In which output, such as `tau[3]`.
     pub output: String,
     /// The inputs of that state.
-    pub inputs: BTreeMap<&'static str, Vec<f64>>,
+    pub inputs: BTreeMap<String, Vec<f64>>,
 }
 
 /// What came out.
@@ -110,7 +110,7 @@ pub fn verify(
                 .unwrap_or((0, 0.0));
             if worst.get(function.name()).is_none_or(|w| error > w.error) {
                 let output = element(&graph.outputs[0], k);
-                let inputs = graph.inputs.iter().map(|p| (p.name, inputs.get(p.name).to_vec())).collect();
+                let inputs = graph.inputs.iter().map(|p| (p.name.clone(), inputs.get(&p.name).to_vec())).collect();
                 worst.insert(function.name(), Worst { error, state, output, inputs });
             }
         }
@@ -148,7 +148,7 @@ fn scaled(value: f64, expected: Dd, scale: f64) -> f64 {
 
 /// The program's outputs in its own arithmetic.
 fn run(graph: &Graph, state: &State, scalar: Scalar) -> Vec<f64> {
-    let inputs = graph.inputs.iter().flat_map(|port| state.get(port.name)).copied();
+    let inputs = graph.inputs.iter().flat_map(|port| state.get(&port.name)).copied();
     match scalar {
         Scalar::F64 => evaluate::<f64>(graph, &inputs.collect::<Vec<_>>()),
         Scalar::F32 => {

@@ -149,7 +149,7 @@ struct Body<'a> {
 }
 
 fn body(graph: &Graph, part: &Part, scalar: Scalar, title: &dyn Fn(Section) -> String, out: &mut FunctionText) {
-    let taken = graph.inputs.iter().chain(&graph.outputs).map(|p| p.name).chain(["live", "trig"]);
+    let taken = graph.inputs.iter().chain(&graph.outputs).map(|p| p.name.as_str()).chain(["live", "trig"]);
     let mut b = Body {
         graph,
         scalar,

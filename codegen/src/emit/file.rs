@@ -2,6 +2,7 @@
 
 use super::body::ALLOW;
 use super::{FunctionText, Scalar};
+use crate::expr::Port;
 use crate::function::Function;
 use crate::report::{FunctionReport, Report};
 use std::fmt::Write;
@@ -16,6 +17,12 @@ const TRIG: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime
 pub struct Item {
     /// Which one.
     pub function: Function,
+    /// What it takes.
+    pub inputs: Vec<Port>,
+    /// What it puts out.
+    pub outputs: Vec<Port>,
+    /// Its documentation.
+    pub doc: String,
     /// Its source.
     pub text: FunctionText,
 }
@@ -39,8 +46,9 @@ pub fn file(
     report: &Report,
     provenance: &Provenance,
     scalar: Scalar,
+    types: &str,
 ) -> String {
-    let mut out = preamble(model, frames, report, provenance, scalar);
+    let mut out = preamble(model, frames, report, provenance, scalar, types);
     for item in items {
         out.push('\n');
         out.push_str(&item.text.text);
@@ -57,13 +65,14 @@ pub fn file(
     out
 }
 
-/// All that stands before the functions: header, the robot's constants, the functions' costs.
+/// All that stands before the functions: header, the robot's constants, the functions' costs, the types of parameters.
 pub fn preamble(
     model: &Model<Dd>,
     frames: &[String],
     report: &Report,
     provenance: &Provenance,
     scalar: Scalar,
+    types: &str,
 ) -> String {
     let mut out = String::new();
     header(&mut out, model, report, provenance);
@@ -72,6 +81,7 @@ pub fn preamble(
         let _ = writeln!(out, "/// What [`{name}`] costs.");
         let _ = writeln!(out, "pub const {}_COST: Cost = {};", name.to_uppercase(), cost(figures));
     }
+    out.push_str(types);
     out
 }
 

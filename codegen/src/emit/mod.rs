@@ -6,10 +6,11 @@
 mod body;
 mod file;
 mod names;
+pub mod parameter;
 
 pub use body::{function, FunctionText};
 pub use file::{file, kernel, preamble, Item, Provenance};
-pub use names::Names;
+pub use names::{snake_case, upper_camel_case, Names};
 
 use crate::expr::Port;
 
@@ -42,6 +43,9 @@ impl Scalar {
 
 /// The array type of a port: `[f64; 7]`, `[[f64; 7]; 6]`.
 pub fn array_type(port: &Port, scalar: Scalar) -> String {
+    if let Some(wrapper) = &port.wrapper {
+        return wrapper.clone();
+    }
     port.shape.iter().rev().fold(scalar.name().to_string(), |inner, n| format!("[{inner}; {n}]"))
 }
 
@@ -53,5 +57,6 @@ pub fn element(port: &Port, k: usize) -> String {
         indices.push(rest % n);
         rest /= n;
     }
-    indices.iter().rev().fold(port.name.to_string(), |text, i| format!("{text}[{i}]"))
+    let name = if port.wrapper.is_some() { format!("{}.0", port.name) } else { port.name.clone() };
+    indices.iter().rev().fold(name, |text, i| format!("{text}[{i}]"))
 }

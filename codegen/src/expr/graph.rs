@@ -106,15 +106,22 @@ impl Op {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Port {
     /// The name.
-    pub name: &'static str,
+    pub name: String,
     /// The extents, outermost first.
     pub shape: Vec<usize>,
+    /// A struct around the array, if it is not a plain one.
+    pub wrapper: Option<String>,
 }
 
 impl Port {
     /// A port of that name and shape.
-    pub fn new(name: &'static str, shape: &[usize]) -> Self {
-        Port { name, shape: shape.to_vec() }
+    pub fn new(name: &str, shape: &[usize]) -> Self {
+        Port { name: name.to_string(), shape: shape.to_vec(), wrapper: None }
+    }
+
+    /// A port whose scalars lie in field 0 of a struct of that name.
+    pub fn wrapped(name: &str, shape: &[usize], wrapper: &str) -> Self {
+        Port { wrapper: Some(wrapper.to_string()), ..Port::new(name, shape) }
     }
 
     /// Number of scalars.

@@ -4,6 +4,10 @@
 //! inputs to constants ([`Scene::zero`], gravity), makes constants inputs ([`Scene::parameters`]), and selects results
 //! ([`Scene::outputs`]); folding and dead code do the rest.
 
+mod bind;
+
+pub use bind::{drop_unread_inputs, load_parameters, without_parameters, Bound, LOAD_SCALARS};
+
 use crate::function::Function;
 use std::collections::BTreeMap;
 

@@ -275,6 +275,7 @@ impl ProgramArgs {
             forward_dynamics: self.forward_dynamics,
             limits: Limits { operations: self.max_part_operations },
             model: model.options(),
+            ..Options::default()
         }
     }
 }

@@ -1,0 +1,267 @@
+//! A scene where it meets the equations: which inputs are left, what stands for the others, which results are wanted.
+
+use super::{Gravity, Parameter, Part, Scene, Selection};
+use crate::emit::{snake_case, upper_camel_case};
+use crate::expr::{Graph, Op, Port};
+use crate::function::{Function, Robot};
+use crate::trace::Expr;
+use straightline_core::model::{Load, Model};
+use straightline_core::reduced::ReducedModel;
+use straightline_core::spatial::{SpatialInertia, Sym3, Vec3};
+use straightline_core::{Dd, Real};
+
+/// Scalars of a run-time load: its ten parameters in the canonical frame, then in the reduced robot's frame.
+pub const LOAD_SCALARS: usize = 20;
+
+/// The bodies, as the trace sees them.
+pub struct Bound {
+    /// The robot over expressions.
+    pub model: Model<Expr>,
+    /// Its reduced form.
+    pub reduced: ReducedModel<Expr>,
+    /// The function's arguments, whole.
+    pub arguments: Vec<Vec<Expr>>,
+}
+
+impl Scene {
+    /// The input ports of a function: its own without those that are zero, then gravity and parameters where they are
+    /// inputs. Those of the latter that the function turns out not to need are dropped after tracing.
+    pub fn ports(&self, function: Function, model: &Model<Dd>) -> Vec<Port> {
+        let own = function.inputs(model).into_iter().filter(|p| !self.is_zero(&p.name));
+        let gravity = (self.gravity == Gravity::Input).then(|| Port::new("gravity", &[3]));
+        let parameters =
+            self.parameters.iter().map(|p| Port::wrapped(&p.input_name(), &[LOAD_SCALARS], &p.type_name()));
+        own.chain(gravity).chain(parameters).collect()
+    }
+
+    fn is_zero(&self, input: &str) -> bool {
+        (input == "qd" && self.zero.qd) || (input == "qdd" && self.zero.qdd)
+    }
+
+    /// What the trace starts from, given the expressions of [`Scene::ports`].
+    pub fn bind(&self, function: Function, robot: &Robot, inputs: &[Vec<Expr>]) -> Bound {
+        let mut model: Model<Expr> = robot.model.cast();
+        let mut reduced = robot.reduced.map(Expr::constant);
+        let mut given = inputs.iter();
+        let whole = function.inputs(&robot.model);
+        let arguments = whole.iter().map(|port| {
+            let mut values = match self.is_zero(&port.name) {
+                true => vec![Expr::zero(); port.len()],
+                false => given.next().expect("a port per input").clone(),
+            };
+            if port.name == "qd" || port.name == "qdd" {
+                for joint in robot.model.bodies.iter().map(|b| &b.joint) {
+                    if self.zero.joints_at_rest.contains(&joint.name) {
+                        values[joint.iv..joint.iv + joint.kind.nv()].fill(Expr::zero());
+                    }
+                }
+            }
+            values
+        });
+        let arguments: Vec<Vec<Expr>> = arguments.collect();
+        if self.gravity == Gravity::Input {
+            let g = given.next().expect("a port for gravity");
+            model.gravity = Vec3::new(g[0], g[1], g[2]);
+            reduced.gravity = model.gravity;
+        }
+        for parameter in &self.parameters {
+            let values = given.next().expect("a port per parameter");
+            let Some(body) = parameter.body(&robot.model) else { continue };
+            let (canonical, in_reduced) = (load(&values[..10]), load(&values[10..]));
+            model.bodies[body].load = Some(match model.bodies[body].load {
+                None => canonical,
+                Some(other) => sum(other, canonical),
+            });
+            let r = &mut reduced.bodies[body];
+            r.mass = r.mass + in_reduced.mass;
+            r.first_moment = r.first_moment + in_reduced.first_moment;
+            r.second_moment = r.second_moment + in_reduced.second_moment;
+        }
+        Bound { model, reduced, arguments }
+    }
+
+    /// The wanted results of a function, as indices into its whole output, and their shape.
+    pub fn select(&self, function: Function, model: &Model<Dd>, frames: usize) -> (Vec<usize>, Port) {
+        let whole = function.output(model, frames);
+        let all = Selection::default();
+        let selection = self.outputs.get(&function).unwrap_or(&all);
+        let coordinates = selection.coordinates(model);
+        let (rows, columns, name) = (whole.shape[0], whole.shape.get(1).copied().unwrap_or(1), &whole.name);
+        use Function::*;
+        let (indices, shape): (Vec<usize>, Vec<usize>) = match function {
+            InverseDynamics | GravityForce | BiasForce | VelocityForce | ForwardDynamics => {
+                (coordinates.clone(), vec![coordinates.len()])
+            }
+            MassMatrix if selection.part == Part::Diagonal => {
+                (coordinates.iter().map(|i| i * columns + i).collect(), vec![coordinates.len()])
+            }
+            MassMatrix => {
+                let entries = (0..rows).flat_map(|i| coordinates.iter().map(move |j| i * columns + j));
+                (entries.collect(), vec![rows, coordinates.len()])
+            }
+            JointWrenches => {
+                let mut joints: Vec<_> = model.bodies.iter().map(|b| &b.joint).collect();
+                joints.sort_by_key(|j| j.iv);
+                let wanted = (0..rows).filter(|i| selection.wants_joint(&joints[*i].name)).collect::<Vec<_>>();
+                let part = selection.part.of(0..6, 3);
+                let entries = wanted.iter().flat_map(|i| part.clone().map(move |k| i * 6 + k));
+                (entries.collect(), vec![wanted.len(), part.len()])
+            }
+            ForwardKinematics | FrameVelocity | FrameAcceleration | JacobianBias => {
+                let part = selection.part.of(0..columns, 3);
+                let entries = (0..rows).flat_map(|f| part.clone().map(move |k| f * columns + k));
+                (entries.collect(), vec![rows, part.len()])
+            }
+            Jacobian => {
+                let (part, nv) = (selection.part.of(0..6, 3), whole.shape[2]);
+                let row = |r: usize| coordinates.iter().map(move |j| r * nv + j);
+                let entries = (0..rows).flat_map(|f| part.clone().flat_map(move |k| row(f * 6 + k)));
+                (entries.collect(), vec![rows, part.len(), coordinates.len()])
+            }
+            Energy | CentreOfMass | Momentum => ((0..whole.len()).collect(), whole.shape.clone()),
+        };
+        (indices, Port::new(name, &shape))
+    }
+
+    /// The frames of a function: its own, or those of the whole program.
+    pub fn frames_of<'a>(&'a self, function: Function, all: &'a [String]) -> &'a [String] {
+        match self.outputs.get(&function) {
+            Some(selection) if !selection.frames.is_empty() => &selection.frames,
+            _ => all,
+        }
+    }
+}
+
+impl Selection {
+    fn wants_joint(&self, name: &String) -> bool {
+        self.joints.is_empty() || self.joints.contains(name)
+    }
+
+    /// Velocity coordinates of the wanted joints, in the order in which they are named, or all.
+    fn coordinates(&self, model: &Model<Dd>) -> Vec<usize> {
+        if self.joints.is_empty() {
+            return (0..model.nv()).collect();
+        }
+        let joint = |name: &String| model.bodies.iter().map(|b| &b.joint).find(|j| j.name == *name);
+        self.joints.iter().filter_map(joint).flat_map(|j| j.iv..j.iv + j.kind.nv()).collect()
+    }
+}
+
+impl Part {
+    /// The wanted indices of a quantity whose first `linear` entries are linear.
+    fn of(self, all: std::ops::Range<usize>, linear: usize) -> std::ops::Range<usize> {
+        match self {
+            Part::Whole | Part::Diagonal => all,
+            Part::Linear => all.start..linear,
+            Part::Angular => linear..all.end,
+        }
+    }
+}
+
+impl Parameter {
+    /// Name of the input.
+    pub fn input_name(&self) -> String {
+        match self {
+            Parameter::Payload { name, .. } => snake_case(name),
+            Parameter::Link { link } => snake_case(link),
+        }
+    }
+
+    /// Name of the input's type.
+    pub fn type_name(&self) -> String {
+        upper_camel_case(&self.input_name())
+    }
+
+    /// The frame in which the parameters are given.
+    pub fn frame(&self) -> &str {
+        match self {
+            Parameter::Payload { frame, .. } => frame,
+            Parameter::Link { link } => link,
+        }
+    }
+
+    /// The body that carries it; `None` if it stands on the world.
+    pub fn body(&self, model: &Model<Dd>) -> Option<usize> {
+        model.frame(self.frame()).and_then(|f| f.body)
+    }
+}
+
+/// The robot without the bodies whose inertia is an input: a link with all that is fixed to it.
+pub fn without_parameters(mut model: Model<Dd>, scene: &Scene) -> Model<Dd> {
+    for parameter in &scene.parameters {
+        if let (Parameter::Link { .. }, Some(body)) = (parameter, parameter.body(&model)) {
+            model.bodies[body].inertia = SpatialInertia::zero();
+        }
+    }
+    model
+}
+
+fn load(x: &[Expr]) -> Load<Expr> {
+    Load {
+        mass: x[0],
+        first_moment: Vec3::new(x[1], x[2], x[3]),
+        second_moment: Sym3 { xx: x[4], xy: x[5], xz: x[6], yy: x[7], yz: x[8], zz: x[9] },
+    }
+}
+
+fn sum(a: Load<Expr>, b: Load<Expr>) -> Load<Expr> {
+    Load {
+        mass: a.mass + b.mass,
+        first_moment: a.first_moment + b.first_moment,
+        second_moment: a.second_moment + b.second_moment,
+    }
+}
+
+/// The graph without the optional inputs (gravity, parameters) that nothing reads.
+pub fn drop_unread_inputs(mut graph: Graph) -> Graph {
+    let mut starts = Vec::new();
+    let mut next = 0;
+    for port in &graph.inputs {
+        starts.push(next..next + port.len());
+        next += port.len();
+    }
+    let read = |range: &std::ops::Range<usize>| {
+        graph.ops.iter().any(|op| matches!(op, Op::Input(k) if range.contains(&(*k as usize))))
+    };
+    let optional = |port: &Port| port.name == "gravity" || port.wrapper.is_some();
+    let keep: Vec<bool> = graph.inputs.iter().zip(&starts).map(|(p, r)| !optional(p) || read(r)).collect();
+    let mut shift = vec![0u32; next];
+    let mut removed = 0u32;
+    for (range, keep) in starts.iter().zip(&keep) {
+        range.clone().for_each(|k| shift[k] = removed);
+        if !keep {
+            removed += range.len() as u32;
+        }
+    }
+    for op in &mut graph.ops {
+        if let Op::Input(k) = op {
+            *k -= shift[*k as usize];
+        }
+    }
+    let mut keep = keep.into_iter();
+    graph.inputs.retain(|_| keep.next().expect("one flag per port"));
+    graph
+}
+
+/// The ten parameters of a body given by mass, mass centre and inertia in a frame, in the two frames that the algorithms
+/// use: the program of a parameter's constructor. Inputs: mass, com\[3\], inertia about it (xx, xy, xz, yy, yz, zz).
+pub fn load_parameters(robot: &Robot, parameter: &Parameter, inputs: &[Vec<Expr>]) -> Vec<Expr> {
+    let frame = robot.model.frame(parameter.frame()).expect("frames were checked against the model");
+    let body = frame.body.expect("parameters of the world were refused");
+    let regauge = robot.reduced_frames[body].inverse();
+    let (mass, com, inertia) = (inputs[0][0], &inputs[1], &inputs[2]);
+    let tensor =
+        Sym3 { xx: inertia[0], xy: inertia[1], xz: inertia[2], yy: inertia[3], yz: inertia[4], zz: inertia[5] };
+    let in_canonical = frame.placement;
+    let in_reduced = regauge.compose(&in_canonical);
+    [in_canonical, in_reduced]
+        .into_iter()
+        .flat_map(|pose| {
+            let pose = pose.map(Expr::constant);
+            let c = pose.translation + pose.rotation * Vec3::new(com[0], com[1], com[2]);
+            let i = SpatialInertia::new(mass, c, tensor.rotated(&pose.rotation));
+            let (f, s) = (i.first_moment, i.second_moment);
+            [i.mass, f.x, f.y, f.z, s.xx, s.xy, s.xz, s.yy, s.yz, s.zz]
+        })
+        .collect()
+}
