@@ -3,6 +3,7 @@
 use crate::compile::{compile, Generated, Options};
 use crate::diagnostic::{Severity, Source};
 use crate::emit::array_type;
+use crate::expr::Port;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use straightline_core::model::JointKind;
@@ -71,14 +72,16 @@ pub fn associated_items(generated: &Generated) -> String {
         constant(&format!("{}_COST", name.to_uppercase()), "dynamics::Cost", &format!("What [`Self::{name}`] costs."));
     }
     for item in &generated.items {
-        let (function, name) = (item.function, item.function.name());
-        let inputs = function.inputs(model);
-        let output = function.output(model, frames.len());
-        let parameters = inputs.iter().map(|p| (p, "&")).chain([(&output, "&mut ")]);
+        let name = item.function.name();
+        let parameters = item.inputs.iter().map(|p| (p, "&")).chain(item.outputs.iter().map(|p| (p, "&mut ")));
+        let array = |p: &Port| {
+            let module = if p.wrapper.is_some() { "dynamics::" } else { "" };
+            format!("{module}{}", array_type(p, *scalar))
+        };
         let signature: Vec<String> =
-            parameters.map(|(p, reference)| format!("{}: {reference}{}", p.name, array_type(p, *scalar))).collect();
-        let arguments: Vec<&str> = inputs.iter().chain([&output]).map(|p| p.name).collect();
-        for line in function.doc().replace("[`FRAME_NAMES`]", "[`Self::FRAME_NAMES`]").lines() {
+            parameters.clone().map(|(p, reference)| format!("{}: {reference}{}", p.name, array(p))).collect();
+        let arguments: Vec<&str> = parameters.map(|(p, _)| p.name.as_str()).collect();
+        for line in item.doc.replace("[`FRAME_NAMES`]", "[`Self::FRAME_NAMES`]").lines() {
             let _ = writeln!(out, "/// {line}");
         }
         let _ = writeln!(
