@@ -1,0 +1,110 @@
+//! Generates and compiles every function of every robot of the reference data, so that the tests run compiled code.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use straightline_codegen::compile::{compile, Generated, Options};
+use straightline_codegen::diagnostic::Source;
+use straightline_codegen::emit::Scalar;
+use straightline_codegen::expr::Grade;
+use straightline_codegen::model::ModelOptions;
+use straightline_codegen::Function;
+
+/// Robot, its file, whether it floats, its frames; as in `reference/robots.json`.
+const ROBOTS: [(&str, &str, bool, &[&str]); 11] = [
+    ("planar2r", "planar2r.urdf", false, &["tip"]),
+    ("chapter_cylindrical", "chapter_cylindrical.toml", false, &["tip"]),
+    ("chapter_stanford", "chapter_stanford.toml", false, &["tip"]),
+    ("chapter_6r", "chapter_6r.toml", false, &["tip"]),
+    ("chapter_oblique", "chapter_oblique.toml", false, &["tip"]),
+    ("puma560", "puma560.urdf", false, &["tool0"]),
+    ("ur5", "ur5.urdf", false, &["tool0"]),
+    ("panda", "panda.urdf", false, &["panda_hand_tcp"]),
+    ("solo12", "solo12.urdf", true, &["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"]),
+    ("hyq", "hyq.urdf", true, &["lf_foot", "lh_foot", "rf_foot", "rh_foot"]),
+    ("simple_humanoid", "simple_humanoid.urdf", true, &["r_ankle", "l_ankle", "r_wrist", "l_wrist"]),
+];
+
+/// Robots that are compiled under the exact rules too, and in single precision.
+const EXACT: [&str; 4] = ["chapter_stanford", "chapter_oblique", "panda", "solo12"];
+const SINGLE: [&str; 4] = ["planar2r", "chapter_oblique", "panda", "solo12"];
+
+fn main() {
+    let out = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions");
+    println!("cargo:rerun-if-changed=build.rs");
+    let mut modules = String::new();
+    let mut tables = [(Scalar::F64, String::new()), (Scalar::F32, String::new())];
+    for (robot, file, floating, frames) in ROBOTS {
+        let path = folder.join(file);
+        println!("cargo:rerun-if-changed={}", path.display());
+        let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        let source = Source::new(file, text);
+        for (scalar, grade) in variants(robot) {
+            let options = Options {
+                frames: frames.iter().map(|f| f.to_string()).collect(),
+                scalar,
+                grade,
+                model: ModelOptions { floating_base: floating, ..ModelOptions::default() },
+                ..Options::default()
+            };
+            let generated = compile(&source, &options).unwrap_or_else(|d| panic!("{}", d.render()));
+            let exact = if grade == Grade::Exact { "_exact" } else { "" };
+            let module = format!("{robot}_{}{exact}", scalar.name());
+            std::fs::write(out.join(format!("{module}.rs")), &generated.text).expect("OUT_DIR can be written");
+            let _ = writeln!(
+                modules,
+                "/// `{file}`, {}, {grade:?} rules.\n#[allow(clippy::all)]\npub mod {module} {{\n    \
+                 include!(concat!(env!(\"OUT_DIR\"), \"/{module}.rs\"));\n}}",
+                scalar.name(),
+            );
+            let table = &mut tables.iter_mut().find(|(s, _)| *s == scalar).expect("both scalars have a table").1;
+            let _ = writeln!(
+                table,
+                "    Compiled {{\n        robot: {robot:?},\n        exact: {},\n        functions: &[\n{}        ],\n    }},",
+                grade == Grade::Exact,
+                functions(&module, &generated)
+            );
+        }
+    }
+    for (scalar, table) in tables {
+        let (name, upper) = (scalar.name(), scalar.name().to_uppercase());
+        let _ = writeln!(
+            modules,
+            "/// Everything compiled for `{name}`.\npub const {upper}: &[Compiled<{name}>] = &[\n{table}];"
+        );
+    }
+    std::fs::write(out.join("compiled.rs"), modules).expect("OUT_DIR can be written");
+}
+
+fn variants(robot: &str) -> Vec<(Scalar, Grade)> {
+    let mut variants = vec![(Scalar::F64, Grade::Algebraic)];
+    if EXACT.contains(&robot) {
+        variants.push((Scalar::F64, Grade::Exact));
+    }
+    if SINGLE.contains(&robot) {
+        variants.push((Scalar::F32, Grade::Algebraic));
+    }
+    if SINGLE.contains(&robot) && EXACT.contains(&robot) {
+        variants.push((Scalar::F32, Grade::Exact));
+    }
+    variants
+}
+
+/// Table entries that call the functions of a module with inputs and outputs of any length.
+fn functions(module: &str, generated: &Generated) -> String {
+    let mut text = String::new();
+    for function in Function::all() {
+        let output = function.output(&generated.model, generated.frames.len());
+        let arguments: Vec<String> =
+            (0..function.inputs(&generated.model).len()).map(|i| format!("array(&x[{i}])")).collect();
+        let zero = output.shape.iter().rev().fold("0.0".to_string(), |inner, n| format!("[{inner}; {n}]"));
+        let name = function.name();
+        let _ = writeln!(
+            text,
+            "            ({name:?}, |x| {{\n                let mut y = {zero};\n                \
+             {module}::{name}({}, &mut y);\n                Flatten::flatten(&y)\n            }}),",
+            arguments.join(", ")
+        );
+    }
+    text
+}

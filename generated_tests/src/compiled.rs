@@ -1,0 +1,70 @@
+//! The compiled functions, callable by name.
+
+use straightline_codegen::Function;
+
+/// The functions of a robot as the build script compiled them.
+#[derive(Clone, Copy, Debug)]
+pub struct Compiled<T: 'static> {
+    /// The robot's name.
+    pub robot: &'static str,
+    /// Whether only the exact rules were used.
+    pub exact: bool,
+    /// Name and function: groups of inputs to the output's scalars.
+    pub functions: &'static [(&'static str, Call<T>)],
+}
+
+/// A compiled function over groups of inputs.
+pub type Call<T> = fn(&[Vec<T>]) -> Vec<T>;
+
+impl<T> Compiled<T> {
+    /// Runs a function.
+    pub fn call(&self, function: Function, inputs: &[Vec<T>]) -> Vec<T> {
+        let found = self.functions.iter().find(|(name, _)| *name == function.name());
+        let (_, call) = found.unwrap_or_else(|| panic!("{} of {} was not compiled", function.name(), self.robot));
+        call(inputs)
+    }
+}
+
+/// Everything that was compiled for f64 under all rules: one entry per robot of the data.
+pub fn all_rules() -> impl Iterator<Item = &'static Compiled<f64>> {
+    F64.iter().filter(|c| !c.exact)
+}
+
+/// The robot of that name, compiled for f64 under all rules.
+pub fn robot(name: &str) -> &'static Compiled<f64> {
+    all_rules().find(|c| c.robot == name).expect("every robot of the data is compiled")
+}
+
+/// Inputs as the array that a generated function takes.
+fn array<T, const N: usize>(x: &[T]) -> &[T; N] {
+    x.try_into().expect("as many inputs as the robot has coordinates")
+}
+
+/// Outputs as a list.
+trait Flatten<T> {
+    fn flatten(&self) -> Vec<T>;
+}
+
+macro_rules! flatten_scalar {
+    ($t:ty) => {
+        impl<const N: usize> Flatten<$t> for [$t; N] {
+            fn flatten(&self) -> Vec<$t> {
+                self.to_vec()
+            }
+        }
+        impl<const N: usize, const M: usize> Flatten<$t> for [[$t; N]; M] {
+            fn flatten(&self) -> Vec<$t> {
+                self.concat()
+            }
+        }
+        impl<const N: usize, const M: usize, const K: usize> Flatten<$t> for [[[$t; N]; M]; K] {
+            fn flatten(&self) -> Vec<$t> {
+                self.concat().concat()
+            }
+        }
+    };
+}
+flatten_scalar!(f32);
+flatten_scalar!(f64);
+
+include!(concat!(env!("OUT_DIR"), "/compiled.rs"));

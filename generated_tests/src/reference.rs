@@ -1,0 +1,315 @@
+//! The reference data of `reference/`: eleven robots, 40 states each, values with 25 digits.
+//!
+//! How an error is judged: `scaled = |computed − expected| / scale`, the worst over the components of an output.
+//!
+//! | output | scale of a component |
+//! |---|---|
+//! | tau, h, g, C, fd_qdd | the sum of the moduli of its terms, given with the data; the largest component where it is not |
+//! | H | √(H_ii H_jj), the Cauchy-Schwarz bound of the component |
+//! | T | T, a sum of squares |
+//! | V | the largest \|V\| of the robot's states: V itself passes through zero |
+//! | wrench | the largest of the six numbers of that joint |
+//! | p, R, J, Jdqd | the largest component of that quantity of that frame |
+//! | velocity and acceleration of a frame | Σ \|J\| \|q̇\|; Σ \|J\| \|q̈\| plus that of Jdqd |
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use straightline_codegen::Function;
+use straightline_core::Dd;
+
+/// The eleven robots of the data.
+pub const ROBOTS: [&str; 11] = [
+    "planar2r",
+    "chapter_cylindrical",
+    "chapter_stanford",
+    "chapter_6r",
+    "chapter_oblique",
+    "puma560",
+    "ur5",
+    "panda",
+    "solo12",
+    "hyq",
+    "simple_humanoid",
+];
+
+/// A robot with its states.
+#[derive(Debug)]
+pub struct Robot {
+    /// Its name.
+    pub name: String,
+    /// Its description.
+    pub file: PathBuf,
+    /// Whether its root link is free.
+    pub floating: bool,
+    /// The frames that are evaluated.
+    pub frames: Vec<String>,
+    /// Joints in the order of q, qd and tau.
+    pub joints: Vec<String>,
+    /// Number of velocity coordinates.
+    pub nv: usize,
+    /// Its states.
+    pub states: Vec<State>,
+    largest_potential_energy: f64,
+    baseline: Value,
+}
+
+/// A state with all that is expected in it.
+#[derive(Debug)]
+pub struct State {
+    /// Such as `panda/07`.
+    pub id: String,
+    /// Such as `random` or `at_limits_mixed`.
+    pub kind: String,
+    /// Configuration.
+    pub q: Vec<f64>,
+    /// Velocities.
+    pub qd: Vec<f64>,
+    /// Accelerations.
+    pub qdd: Vec<f64>,
+    /// Drives of the forward dynamics.
+    pub fd_tau: Vec<f64>,
+    /// Gravity, where it is not the robot's own.
+    pub gravity: Option<[f64; 3]>,
+    data: Value,
+}
+
+/// What an output should be, and against what an error is judged.
+#[derive(Clone, Debug)]
+pub struct Expected {
+    /// One value per component, with 25 digits.
+    pub values: Vec<Dd>,
+    /// One scale per component.
+    pub scales: Vec<f64>,
+}
+
+/// The folder of the reference data.
+pub fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("reference")
+}
+
+/// The description of a robot of [`ROBOTS`].
+pub fn description(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions");
+    let extension = if name.starts_with("chapter_") { "toml" } else { "urdf" };
+    folder.join(format!("{name}.{extension}"))
+}
+
+fn json(path: &Path) -> Value {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// All numbers in a JSON value, depth first.
+fn numbers(value: &Value) -> Vec<Dd> {
+    match value {
+        Value::String(text) => vec![Dd::from_decimal(text).expect("a decimal number")],
+        Value::Array(items) => items.iter().flat_map(numbers).collect(),
+        other => panic!("numbers of the reference data are strings, not {other}"),
+    }
+}
+
+/// Inputs, which are exact f64 values.
+fn inputs(value: &Value) -> Vec<f64> {
+    let parse = |x: &Value| x.as_str().expect("a decimal string").parse().expect("a number");
+    value.as_array().expect("a list").iter().map(parse).collect()
+}
+
+fn strings(value: &Value) -> Vec<String> {
+    value.as_array().expect("a list").iter().map(|x| x.as_str().expect("a string").to_string()).collect()
+}
+
+fn largest(values: &[Dd]) -> f64 {
+    values.iter().fold(0.0, |m: f64, x| m.max(x.to_f64().abs()))
+}
+
+impl Robot {
+    /// The robot of that name with all its states.
+    pub fn load(name: &str) -> Robot {
+        let file = json(&folder().join("states").join(format!("{name}.json")));
+        let list = json(&folder().join("robots.json"));
+        let entry = list.as_array().expect("a list").iter().find(|r| r["name"] == name).expect("a robot of the list");
+        let baseline = json(&folder().join("baseline_pinocchio.json"))["robots"][name].clone();
+        let states: Vec<State> = file["states"].as_array().expect("a list").iter().map(State::new).collect();
+        let potential_energy = |s: &State| largest(&numbers(&s.data["V"]));
+        Robot {
+            name: name.to_string(),
+            file: description(name),
+            floating: entry["floating"].as_bool().expect("true or false"),
+            frames: strings(&entry["frames"]),
+            joints: file["joints"]
+                .as_array()
+                .expect("a list")
+                .iter()
+                .map(|j| j["name"].as_str().expect("a name").to_string())
+                .collect(),
+            nv: states[0].qd.len(),
+            largest_potential_energy: states.iter().map(potential_energy).fold(0.0, f64::max),
+            states,
+            baseline,
+        }
+    }
+
+    /// The largest scaled error that a function may have: 20 times that of Pinocchio 4.1 on the same states, or 1e-14,
+    /// whichever is larger.
+    pub fn bound(&self, function: Function) -> f64 {
+        let key = match function {
+            Function::InverseDynamics => "id",
+            Function::BiasForce => "nle",
+            Function::GravityForce => "gravity",
+            Function::VelocityForce => "coriolis",
+            Function::MassMatrix => "crba",
+            Function::ForwardDynamics => "aba",
+            Function::Energy => "energy",
+            Function::JointWrenches => "wrench",
+            Function::ForwardKinematics => "fk",
+            Function::Jacobian => "jacobian",
+            Function::JacobianBias | Function::FrameVelocity | Function::FrameAcceleration => "jdqd",
+            Function::CentreOfMass | Function::Momentum => "energy",
+        };
+        let pinocchio = self.baseline[key]["scaled"].as_f64().expect("the baseline has every robot and function");
+        (20.0 * pinocchio).max(1e-14)
+    }
+
+    /// What a function gives in a state; `None` for what the data do not hold.
+    pub fn expected(&self, state: &State, function: Function) -> Option<Expected> {
+        let data = &state.data;
+        // a field that is left out stands there as null
+        let field = |what: &str| data.get(what).filter(|value| !value.is_null());
+        let scaled = |what: &str, scale: &str| {
+            let mut expected = Expected { values: vec![], scales: vec![] };
+            expected.append_uniform(numbers(field(what)?));
+            if let Some(scales) = field("scale").and_then(|s| s.get(scale)).filter(|s| !s.is_null()) {
+                expected.scales = numbers(scales).iter().map(|x| x.to_f64()).collect();
+            }
+            Some(expected)
+        };
+        let frames = || self.frames.iter().map(|name| field("frames")?.get(name)).collect::<Option<Vec<_>>>();
+        let per_frame = |parts: &[&str]| {
+            let mut expected = Expected { values: vec![], scales: vec![] };
+            for frame in frames()? {
+                for part in parts {
+                    expected.append_uniform(numbers(frame.get(part)?));
+                }
+            }
+            Some(expected)
+        };
+        match function {
+            Function::InverseDynamics => scaled("tau", "tau"),
+            Function::BiasForce => scaled("h", "h"),
+            Function::GravityForce => scaled("g", "g"),
+            Function::VelocityForce => scaled("C", "C"),
+            Function::ForwardDynamics => scaled("fd_qdd", "fd"),
+            Function::MassMatrix => {
+                let (values, n) = (numbers(field("H")?), self.nv);
+                let diagonal: Vec<f64> = (0..n).map(|i| values[i * n + i].to_f64()).collect();
+                let scales = (0..n * n).map(|k| (diagonal[k / n] * diagonal[k % n]).sqrt()).collect();
+                Some(Expected { values, scales })
+            }
+            Function::Energy => {
+                let values = vec![numbers(&data["T"])[0], numbers(&data["V"])[0]];
+                Some(Expected { scales: vec![values[0].to_f64(), self.largest_potential_energy], values })
+            }
+            Function::JointWrenches => {
+                let mut expected = Expected { values: vec![], scales: vec![] };
+                for joint in field("wrench")?.as_array().expect("one per joint") {
+                    expected.append_uniform(numbers(joint));
+                }
+                Some(expected)
+            }
+            Function::ForwardKinematics => per_frame(&["p", "R"]),
+            Function::Jacobian => per_frame(&["J"]),
+            Function::JacobianBias => per_frame(&["Jdqd"]),
+            Function::FrameVelocity | Function::FrameAcceleration => {
+                let (rate, mut expected) = match function {
+                    Function::FrameVelocity => (&state.qd, Expected { values: vec![], scales: vec![] }),
+                    _ => (&state.qdd, per_frame(&["Jdqd"])?),
+                };
+                let first = expected.values.is_empty();
+                let jacobians = frames()?.into_iter().map(|f| f.get("J")?.as_array()).collect::<Option<Vec<_>>>()?;
+                for (i, row) in jacobians.into_iter().flatten().enumerate() {
+                    let row = numbers(row);
+                    // J of the data has 25 digits, so has the product
+                    let value = row.iter().zip(rate).fold(Dd::ZERO, |sum, (j, x)| sum + *j * Dd::from(*x));
+                    let scale: f64 = row.iter().zip(rate).map(|(j, x)| (j.to_f64() * x).abs()).sum();
+                    if first {
+                        expected.values.push(value);
+                        expected.scales.push(scale);
+                    } else {
+                        expected.values[i] += value;
+                        expected.scales[i] += scale;
+                    }
+                }
+                // linear and angular rows of a frame: the largest of three
+                for three in expected.scales.chunks_mut(3) {
+                    let scale = three.iter().copied().fold(0.0, f64::max);
+                    three.fill(scale);
+                }
+                Some(expected)
+            }
+            Function::CentreOfMass | Function::Momentum => None,
+        }
+    }
+}
+
+impl State {
+    fn new(data: &Value) -> State {
+        let text = |key: &str| data[key].as_str().expect("a string").to_string();
+        let three = |v: Vec<f64>| <[f64; 3]>::try_from(v).expect("three components");
+        State {
+            id: text("id"),
+            kind: text("kind"),
+            q: inputs(&data["q"]),
+            qd: inputs(&data["qd"]),
+            qdd: inputs(&data["qdd"]),
+            fd_tau: inputs(&data["fd_tau"]),
+            gravity: data.get("gravity").map(|g| three(inputs(g))),
+            data: data.clone(),
+        }
+    }
+
+    /// The inputs of a function, in the order of its ports.
+    pub fn inputs(&self, function: Function) -> Vec<Vec<f64>> {
+        use Function::*;
+        let last = match function {
+            ForwardDynamics => Some(&self.fd_tau),
+            InverseDynamics | JointWrenches | FrameAcceleration => Some(&self.qdd),
+            _ => None,
+        };
+        let position_only = matches!(function, ForwardKinematics | Jacobian | GravityForce | MassMatrix | CentreOfMass);
+        let middle = (!position_only).then_some(&self.qd);
+        [Some(&self.q), middle, last].into_iter().flatten().cloned().collect()
+    }
+
+    /// The inputs as Rust, ready to paste into a test.
+    pub fn ready_to_paste(&self) -> String {
+        let gravity = self.gravity.map_or(String::new(), |g| format!("let gravity = {g:?};\n"));
+        format!(
+            "// {} ({})\nlet q = {:?};\nlet qd = {:?};\nlet qdd = {:?};\nlet fd_tau = {:?};\n{gravity}",
+            self.id, self.kind, self.q, self.qd, self.qdd, self.fd_tau
+        )
+    }
+}
+
+impl Expected {
+    /// Components that share the largest of them as their scale.
+    pub fn append_uniform(&mut self, values: Vec<Dd>) {
+        let scale = largest(&values);
+        self.scales.extend(values.iter().map(|_| scale));
+        self.values.extend(values);
+    }
+
+    /// The worst scaled error of these results, and its component. Infinite for what is no number.
+    pub fn worst<T: Into<Dd> + Copy>(&self, computed: &[T]) -> (f64, usize) {
+        assert_eq!(computed.len(), self.values.len(), "as many results as are expected");
+        let scaled = |i: usize| {
+            let computed: Dd = computed[i].into();
+            let error = (computed - self.values[i]).abs().to_f64();
+            match error {
+                0.0 => 0.0,
+                _ if error.is_finite() => error / self.scales[i],
+                _ => f64::INFINITY,
+            }
+        };
+        (0..computed.len()).map(|i| (scaled(i), i)).fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a })
+    }
+}

@@ -1,0 +1,43 @@
+//! The same input gives the same bytes: again, and on another thread.
+
+use straightline_codegen::compile::{compile, Options};
+use straightline_codegen::diagnostic::Source;
+use straightline_generated_tests::programs::{options, source};
+use straightline_generated_tests::random::{Kind, Random, RandomRobot};
+use straightline_generated_tests::reference::Robot;
+
+fn generate(source: &Source, options: &Options) -> String {
+    compile(source, options).unwrap_or_else(|d| panic!("{}", d.render())).text
+}
+
+#[test]
+fn the_same_robot_gives_the_same_bytes_on_any_thread() {
+    for name in ["panda", "chapter_oblique", "solo12"] {
+        let robot = Robot::load(name);
+        let (source, options) = (source(&robot), options(&robot));
+        let first = generate(&source, &options);
+        assert!(first == generate(&source, &options), "{name}: a second run differs");
+        let threads: Vec<_> = (0..3)
+            .map(|_| {
+                let (source, options) = (source.clone(), options.clone());
+                std::thread::spawn(move || generate(&source, &options))
+            })
+            .collect();
+        for thread in threads {
+            assert!(first == thread.join().expect("compilation does not panic"), "{name}: a thread differs");
+        }
+    }
+}
+
+#[test]
+fn what_was_compiled_before_leaves_no_trace() {
+    let kind = Kind { joints: 9, branched: true, floating: false, welded: 3, right_angled: false };
+    let file = |seed| Source::new("random.urdf", RandomRobot::new(&mut Random(seed), kind).urdf());
+    let options = Options::default();
+    let alone = std::thread::spawn({
+        let (file, options) = (file(5), options.clone());
+        move || generate(&file, &options)
+    });
+    generate(&file(6), &options);
+    assert!(generate(&file(5), &options) == alone.join().expect("compilation does not panic"));
+}
