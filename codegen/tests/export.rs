@@ -69,11 +69,11 @@ fn c_calls_every_function_and_gets_what_the_generic_runtime_computes() {
     for function in Function::all() {
         let inputs = function.inputs(&model);
         let numbers: Vec<Vec<Dd>> =
-            inputs.iter().map(|p| state(p.name)[..p.len()].iter().map(|x| Dd::from(*x)).collect()).collect();
+            inputs.iter().map(|p| state(&p.name)[..p.len()].iter().map(|x| Dd::from(*x)).collect()).collect();
         let method = ForwardDynamicsMethod::Factorisation;
         let outputs = function.evaluate(&model, &frames, method, &numbers);
         let (name, n) = (function.name(), outputs.len());
-        let arguments: Vec<_> = inputs.iter().map(|p| p.name).chain(["out"]).collect();
+        let arguments: Vec<_> = inputs.iter().map(|p| p.name.as_str()).chain(["out"]).collect();
         calls.push_str(&format!(
             "    {{ double out[{n}]; Arm3_{name}({}); show(\"{name}\", out, {n}); }}\n",
             arguments.join(", ")
@@ -133,5 +133,28 @@ int main(void) {{
         let error = (Dd::from(value.parse::<f64>().unwrap()) - expected).to_f64().abs();
         // values up to 100, condition number of H near 100: 1e-16 times both, and room for a few roundings
         assert!(error < 1e-11, "{name}: {value}, off by {error:e}");
+    }
+}
+
+#[test]
+fn names_from_the_robot_file_cannot_become_code() {
+    let scratch = scratch("names");
+    let (robot, package) = (scratch.join("arm.toml"), scratch.join("package"));
+    let text = fs::read_to_string(ARM).unwrap();
+    let text = text.replace("\"arm\"", r#""x*/\n#error ""#).replace("\"yaw\"", r#""y\"a\n}\u0000 #error\u2028\"w""#);
+    let text = text.replace("\"forearm\"", r#""fore\narm }""#);
+    fs::write(&robot, text).unwrap();
+    succeeds(
+        Command::new(env!("CARGO_BIN_EXE_straightline")).args(["export", "--c-abi", "-o"]).args([&package, &robot]),
+    );
+    succeeds(
+        Command::new(env!("CARGO"))
+            .args(["check", "--offline", "--manifest-path"])
+            .arg(package.join("Cargo.toml"))
+            .env("CARGO_TARGET_DIR", package.join("target")),
+    );
+    if is_there("cc") {
+        let header = fs::read_dir(package.join("include")).unwrap().next().unwrap().unwrap().path();
+        succeeds(Command::new("cc").args(["-fsyntax-only", "-x", "c"]).arg(header));
     }
 }

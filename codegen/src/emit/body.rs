@@ -1,6 +1,6 @@
 //! One program as one public function, or as a public function over private parts.
 
-use super::{array_type, element, Names, Scalar};
+use super::{array_type, element, one_line, Names, Scalar};
 use crate::expr::{Constant, Graph, NodeId, Op, Port, Section};
 use crate::schedule::{Part, Schedule};
 use std::fmt::Write;
@@ -309,7 +309,7 @@ impl Body<'_> {
         if let Some(s) = section {
             let title = title(self.graph.sections[s as usize]);
             if !title.is_empty() {
-                let _ = writeln!(out.text, "    // {title}");
+                let _ = writeln!(out.text, "    // {}", one_line(&title));
             }
         }
         for names in self.declared.chunks(DECLARATION) {

@@ -60,3 +60,19 @@ pub fn element(port: &Port, k: usize) -> String {
     let name = if port.wrapper.is_some() { format!("{}.0", port.name) } else { port.name.clone() };
     indices.iter().rev().fold(name, |text, i| format!("{text}[{i}]"))
 }
+
+/// A name from a robot file as part of a comment: it stays on its line, and in C does not end the comment.
+pub fn one_line(name: &str) -> String {
+    let is_break = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
+    name.chars().map(|c| if is_break(c) { ' ' } else { c }).collect::<String>().replace("*/", "* /")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_cannot_leave_the_comment_it_stands_in() {
+        assert_eq!(one_line("a*/\nint x;"), "a* / int x;");
+    }
+}
