@@ -6,10 +6,11 @@ use crate::emit::{self, Item, Provenance, Scalar};
 use crate::expr::{verify, Folding, Grade, Graph, Port, RuleSet, Section};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model;
-use crate::pass::dead_code;
+use crate::pass::{dead_code, unread_inputs};
 use crate::report::{FunctionReport, Report};
-use crate::scene::{drop_unread_inputs, load_parameters, without_parameters, Scene, LOAD_SCALARS};
+use crate::scene::{is_optional, load_parameters, without_parameters, Parameter, Scene, LOAD_SCALARS};
 use crate::schedule::{schedule, Limits, Schedule};
+use crate::staged::staged;
 use crate::trace::trace;
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
@@ -80,7 +81,7 @@ pub fn program(robot: &Robot, frames: &[String], function: Function, options: &O
         graph
     };
     let traced = function.trace(robot, frames, options.forward_dynamics, options.rules(), &options.scene);
-    let graph = check(drop_unread_inputs(check(dead_code(&check(traced)))));
+    let graph = check(unread_inputs(check(dead_code(&check(traced))), is_optional));
     let schedule = schedule(&graph, options.limits);
     Program { function, graph, schedule }
 }
@@ -153,8 +154,16 @@ fn generate(
         functions.insert(function.name(), figures);
         items.push(Item { function, inputs: graph.inputs, outputs: graph.outputs, doc, text });
     }
-    let report =
-        Report { robot: model.name.clone(), nq: model.nq(), nv: model.nv(), scalar: options.scalar.name(), functions };
+    let staged = options.scene.staged.then(|| staged(&robot, &frames, options, &title));
+    let (staged_text, staged_report) = staged.map_or((String::new(), None), |(text, report)| (text, Some(report)));
+    let report = Report {
+        robot: model.name.clone(),
+        nq: model.nq(),
+        nv: model.nv(),
+        scalar: options.scalar.name(),
+        functions,
+        staged: staged_report,
+    };
     // the file's name, not its path: the same bytes on every machine
     let name = path.rsplit(['/', '\\']).next().unwrap_or(path).to_string();
     let remark = |d: &Diagnostic| match &d.place {
@@ -163,18 +172,24 @@ fn generate(
     };
     let remarks = warnings.iter().map(remark).collect();
     let provenance = Provenance { source: name.clone(), hash, remarks };
-    let types = parameter_types(&robot, options);
+    let types = parameter_types(&robot, options) + &staged_text;
     let text = emit::file(model, &frames, &items, &report, &provenance, options.scalar, &types);
     Generated { model: robot.model, frames, text, types, items, scalar: options.scalar, provenance, report, warnings }
+}
+
+/// The program of a parameter's constructor: from mass \[kg\], mass centre \[m\] and inertia about it \[kg·m²\] (xx, xy, xz,
+/// yy, yz, zz) in the parameter's frame to the scalars that the functions take.
+pub fn parameter_program(robot: &Robot, parameter: &Parameter, options: &Options) -> Graph {
+    let inputs = vec![Port::new("mass", &[1]), Port::new("com", &[3]), Port::new("inertia", &[6])];
+    let outputs = vec![Port::new("parameters", &[LOAD_SCALARS])];
+    dead_code(&trace(options.rules(), inputs, outputs, |x| load_parameters(robot, parameter, x)))
 }
 
 /// The types of run-time parameters, with what they share.
 fn parameter_types(robot: &Robot, options: &Options) -> String {
     let parameters = options.scene.parameters.iter().filter(|p| p.body(&robot.model).is_some());
     let types = parameters.map(|p| {
-        let inputs = vec![Port::new("mass", &[1]), Port::new("com", &[3]), Port::new("inertia", &[6])];
-        let outputs = vec![Port::new("parameters", &[LOAD_SCALARS])];
-        let graph = dead_code(&trace(options.rules(), inputs, outputs, |x| load_parameters(robot, p, x)));
+        let graph = parameter_program(robot, p, options);
         let (schedule, name) = (schedule(&graph, options.limits), p.input_name());
         let doc = "The parameters about the origins, and in the axes, of the frames that the equations use.";
         let constructor =

@@ -3,7 +3,7 @@
 use crate::expr::{Grade, Graph, Port, RuleSet};
 use crate::reduce::reduce;
 use crate::scene::{Bound, Part, Scene};
-use crate::trace::trace;
+use crate::trace::{trace, Expr};
 use straightline_core::algorithms as alg;
 use straightline_core::model::{Frame, Model};
 use straightline_core::reduced::ReducedModel;
@@ -362,6 +362,27 @@ impl Function {
         })
     }
 
+    /// All its results over expressions, in a scene; inside a trace.
+    pub fn equations(
+        self,
+        robot: &Robot,
+        frames: &[String],
+        method: ForwardDynamicsMethod,
+        grade: Grade,
+        scene: &Scene,
+        inputs: &[Vec<Expr>],
+    ) -> Vec<Expr> {
+        let Bound { model, reduced, arguments } = scene.bind(self, robot, inputs);
+        let by_reduced = match grade {
+            Grade::Algebraic => self.evaluate_reduced(&model, &reduced, method, &arguments),
+            Grade::Exact => None,
+        };
+        by_reduced.unwrap_or_else(|| {
+            let frame = |name: &String| model.frame(name).expect("frames were checked against the model");
+            self.evaluate(&model, &frames.iter().map(frame).collect::<Vec<_>>(), method, &arguments)
+        })
+    }
+
     /// Its equations for a robot in a scene. For [`ForwardDynamicsMethod::Cheaper`] both methods are traced and the one
     /// with fewer operations is kept. Where the rules may move rounding, the reduced robot serves the functions that it
     /// can.
@@ -377,15 +398,7 @@ impl Function {
         let (wanted, output) = scene.select(self, &robot.model, frames.len());
         let trace_with = |method| {
             trace(rules, scene.ports(self, &robot.model), vec![output.clone()], |inputs| {
-                let Bound { model, reduced, arguments } = scene.bind(self, robot, inputs);
-                let by_reduced = match rules.grade() {
-                    Grade::Algebraic => self.evaluate_reduced(&model, &reduced, method, &arguments),
-                    Grade::Exact => None,
-                };
-                let results = by_reduced.unwrap_or_else(|| {
-                    let frame = |name: &String| model.frame(name).expect("frames were checked against the model");
-                    self.evaluate(&model, &frames.iter().map(frame).collect::<Vec<_>>(), method, &arguments)
-                });
+                let results = self.equations(robot, frames, method, rules.grade(), scene, inputs);
                 wanted.iter().map(|k| results[*k]).collect()
             })
         };

@@ -21,6 +21,8 @@ pub mod reference_input;
 pub mod report;
 pub mod scene;
 pub mod schedule;
+pub mod stage;
+pub mod staged;
 pub mod trace;
 #[cfg(feature = "verify")]
 pub mod verify;

@@ -2,6 +2,7 @@
 
 use crate::expr::Counts;
 use crate::function::Function;
+use crate::staged::StagedReport;
 use std::collections::BTreeMap;
 
 /// Figures of one generated function.
@@ -52,6 +53,9 @@ pub struct Report {
     pub scalar: &'static str,
     /// Name of each function and its figures.
     pub functions: BTreeMap<&'static str, FunctionReport>,
+    /// Figures of the staged form, if it was generated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub staged: Option<StagedReport>,
 }
 
 impl Report {

@@ -1,5 +1,7 @@
 //! Passes: each takes a graph and returns a graph that computes the same results.
 
 mod dead_code;
+mod unread_inputs;
 
 pub use dead_code::dead_code;
+pub use unread_inputs::unread_inputs;

@@ -2,7 +2,7 @@
 
 use super::{Gravity, Parameter, Part, Scene, Selection};
 use crate::emit::{snake_case, upper_camel_case};
-use crate::expr::{Graph, Op, Port};
+use crate::expr::Port;
 use crate::function::{Function, Robot};
 use crate::trace::Expr;
 use straightline_core::model::{Load, Model};
@@ -212,37 +212,6 @@ fn sum(a: Load<Expr>, b: Load<Expr>) -> Load<Expr> {
     }
 }
 
-/// The graph without the optional inputs (gravity, parameters) that nothing reads.
-pub fn drop_unread_inputs(mut graph: Graph) -> Graph {
-    let mut starts = Vec::new();
-    let mut next = 0;
-    for port in &graph.inputs {
-        starts.push(next..next + port.len());
-        next += port.len();
-    }
-    let read = |range: &std::ops::Range<usize>| {
-        graph.ops.iter().any(|op| matches!(op, Op::Input(k) if range.contains(&(*k as usize))))
-    };
-    let optional = |port: &Port| port.name == "gravity" || port.wrapper.is_some();
-    let keep: Vec<bool> = graph.inputs.iter().zip(&starts).map(|(p, r)| !optional(p) || read(r)).collect();
-    let mut shift = vec![0u32; next];
-    let mut removed = 0u32;
-    for (range, keep) in starts.iter().zip(&keep) {
-        range.clone().for_each(|k| shift[k] = removed);
-        if !keep {
-            removed += range.len() as u32;
-        }
-    }
-    for op in &mut graph.ops {
-        if let Op::Input(k) = op {
-            *k -= shift[*k as usize];
-        }
-    }
-    let mut keep = keep.into_iter();
-    graph.inputs.retain(|_| keep.next().expect("one flag per port"));
-    graph
-}
-
 /// The ten parameters of a body given by mass, mass centre and inertia in a frame, in the two frames that the algorithms
 /// use: the program of a parameter's constructor. Inputs: mass, com\[3\], inertia about it (xx, xy, xz, yy, yz, zz).
 pub fn load_parameters(robot: &Robot, parameter: &Parameter, inputs: &[Vec<Expr>]) -> Vec<Expr> {
@@ -264,4 +233,9 @@ pub fn load_parameters(robot: &Robot, parameter: &Parameter, inputs: &[Vec<Expr>
             [i.mass, f.x, f.y, f.z, s.xx, s.xy, s.xz, s.yy, s.yz, s.zz]
         })
         .collect()
+}
+
+/// Whether an input port goes when a function does not read it: gravity and parameters do, coordinates stay.
+pub fn is_optional(port: &Port) -> bool {
+    port.name == "gravity" || port.wrapper.is_some()
 }

@@ -6,7 +6,7 @@
 
 mod bind;
 
-pub use bind::{drop_unread_inputs, load_parameters, without_parameters, Bound, LOAD_SCALARS};
+pub use bind::{is_optional, load_parameters, without_parameters, Bound, LOAD_SCALARS};
 
 use crate::function::Function;
 use std::collections::BTreeMap;
@@ -28,6 +28,8 @@ pub struct Scene {
     pub effects: Effects,
     /// What stays an input of the generated functions.
     pub parameters: Vec<Parameter>,
+    /// Whether the staged form is generated beside the plain functions.
+    pub staged: bool,
     /// What a function may cost at most.
     pub budgets: BTreeMap<Function, Budget>,
 }

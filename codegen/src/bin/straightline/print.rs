@@ -87,7 +87,7 @@ pub fn notes(description: &Description, angles: &[SpecialAngle]) -> io::Result<(
 /// The operations of every function.
 pub fn report(report: &Report) -> io::Result<()> {
     let mut out = stdout().lock();
-    let Report { robot, nq, nv, scalar, functions } = report;
+    let Report { robot, nq, nv, scalar, functions, .. } = report;
     writeln!(out, "{robot}: nq {nq}, nv {nv}, {scalar}\n")?;
     writeln!(
         out,

@@ -1,0 +1,324 @@
+//! The staged form of a robot's functions: typed values for what depends on parameters, on q, on q and q̇.
+//!
+//! All functions are traced into one program, so that they share what they have in common, and the program is cut by
+//! [`crate::stage`]. Around each stage's stored values stands a struct; a later stage borrows the earlier one, so that a value
+//! of a stage cannot outlive a change of what it was computed from.
+
+use crate::compile::Options;
+use crate::emit::{self, array_type, Scalar};
+use crate::expr::{verify, Counts, Graph, Port, Section};
+use crate::function::{ForwardDynamicsMethod, Function, Robot};
+use crate::pass::dead_code;
+use crate::scene::is_optional;
+use crate::schedule::schedule;
+use crate::stage::{cut, Staged};
+use crate::trace::{trace, Expr};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use straightline_core::Real;
+
+/// Figures of one stage.
+#[derive(Clone, Debug, Serialize)]
+pub struct StageReport {
+    /// Its type's name.
+    pub name: &'static str,
+    /// Multiplications.
+    pub mul: usize,
+    /// Additions and subtractions.
+    pub add: usize,
+    /// Divisions.
+    pub div: usize,
+    /// Sine-cosine pairs.
+    pub sincos: usize,
+    /// Values that it stores.
+    pub stored: usize,
+}
+
+/// Figures of the staged form.
+#[derive(Clone, Debug, Serialize)]
+pub struct StagedReport {
+    /// The stages, the rarest first.
+    pub stages: Vec<StageReport>,
+    /// What is left of each function once its stages are there: multiplications, additions, divisions.
+    pub remaining: BTreeMap<&'static str, [usize; 3]>,
+}
+
+/// How inverse dynamics is written: the recursion, or H q̈ + h with both from earlier stages.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum InverseForm {
+    Recursion,
+    MassMatrix,
+}
+
+/// A stage and its type.
+#[derive(Clone, Copy)]
+struct Stage {
+    type_name: &'static str,
+    values: &'static str,
+    doc: &'static str,
+}
+
+const PARAMETERS: Stage =
+    Stage { type_name: "Parameters", values: "parameters", doc: "What depends on run-time parameters alone." };
+const CONFIGURATION: Stage = Stage {
+    type_name: "Configuration",
+    values: "configuration",
+    doc: "What depends on the configuration q: made once per q, it serves every function of q.",
+};
+const VELOCITY: Stage = Stage {
+    type_name: "Velocity",
+    values: "velocity",
+    doc: "What depends on q and q̇: made once per q̇, it serves inverse dynamics for many q̈ and forward dynamics for many tau.",
+};
+const CALL: Stage = Stage { type_name: "", values: "", doc: "" };
+
+/// The programs of a staged form.
+pub struct Programs {
+    /// The functions, in the order of their programs.
+    pub functions: Vec<Function>,
+    /// The stages and the functions.
+    pub staged: Staged,
+    stages: Vec<Stage>,
+}
+
+/// Traces and cuts: of the forms that inverse and forward dynamics have, those with the fewest operations per call, then
+/// with the fewest stored values.
+pub fn programs(robot: &Robot, frames: &[String], options: &Options) -> Programs {
+    let functions: Vec<Function> =
+        options.functions.iter().copied().filter(|f| !f.is_per_frame() || !frames.is_empty()).collect();
+    let forms = [InverseForm::MassMatrix, InverseForm::Recursion].into_iter().flat_map(|inverse| {
+        [ForwardDynamicsMethod::Factorisation, ForwardDynamicsMethod::ArticulatedBody].map(|forward| (inverse, forward))
+    });
+    let cost = |s: &Staged| {
+        let calls: usize = s.functions.iter().map(|(_, g)| g.counts().flops()).sum();
+        let stored: usize = s.stages.iter().map(|g| g.results.len()).sum();
+        (calls, stored)
+    };
+    let candidates = forms.map(|form| {
+        let (graph, stage_of, stages) = joint_program(robot, frames, options, &functions, form);
+        let names: Vec<&str> = stages.iter().map(|s| s.values).collect();
+        (cut(&graph, &stage_of, &names), stages)
+    });
+    let (staged, stages) = candidates.min_by_key(|(s, _)| cost(s)).expect("there are four forms");
+    for graph in staged.stages.iter().chain(staged.functions.iter().map(|(_, g)| g)) {
+        verify(graph).unwrap_or_else(|broken| panic!("a stage is broken: {broken}"));
+    }
+    Programs { functions, staged, stages }
+}
+
+/// The module `staged` as text, and its figures.
+pub fn staged(
+    robot: &Robot,
+    frames: &[String],
+    options: &Options,
+    title: &dyn Fn(Section) -> String,
+) -> (String, StagedReport) {
+    let Programs { functions, staged, stages } = programs(robot, frames, options);
+    (text(&functions, &staged, &stages, options, title), report(&functions, &staged, &stages))
+}
+
+/// All functions in one program; the stage of each of its input ports; the stages.
+fn joint_program(
+    robot: &Robot,
+    frames: &[String],
+    options: &Options,
+    functions: &[Function],
+    (inverse, forward): (InverseForm, ForwardDynamicsMethod),
+) -> (Graph, Vec<usize>, Vec<Stage>) {
+    let scene = &options.scene;
+    let mut ports: Vec<Port> = Vec::new();
+    for port in functions.iter().flat_map(|f| scene.ports(*f, &robot.model)) {
+        if !ports.contains(&port) {
+            ports.push(port);
+        }
+    }
+    let has_parameters = ports.iter().any(is_optional);
+    let stages: Vec<Stage> =
+        has_parameters.then_some(PARAMETERS).into_iter().chain([CONFIGURATION, VELOCITY, CALL]).collect();
+    let first = usize::from(has_parameters);
+    let stage_of = |port: &Port| match port.name.as_str() {
+        _ if is_optional(port) => 0,
+        "q" => first,
+        "qd" => first + 1,
+        _ => first + 2,
+    };
+    let stage_of = ports.iter().map(stage_of).collect();
+    let selected: Vec<(Vec<usize>, Port)> =
+        functions.iter().map(|f| scene.select(*f, &robot.model, scene.frames_of(*f, frames).len())).collect();
+    let outputs = selected.iter().map(|(_, port)| port.clone()).collect();
+    let names: Vec<String> = ports.iter().map(|p| p.name.clone()).collect();
+    let graph = trace(options.rules(), ports, outputs, |inputs| {
+        let argument =
+            |name: &String| inputs[names.iter().position(|n| n == name).expect("ports are the union")].clone();
+        let equations = |function: Function| {
+            let own: Vec<Vec<Expr>> = scene.ports(function, &robot.model).iter().map(|p| argument(&p.name)).collect();
+            let frames = scene.frames_of(function, frames);
+            function.equations(robot, frames, forward, options.grade, scene, &own)
+        };
+        let mut results = Vec::new();
+        for (function, (wanted, _)) in functions.iter().zip(&selected) {
+            let all = if *function == Function::InverseDynamics && inverse == InverseForm::MassMatrix {
+                let (h, bias) = (equations(Function::MassMatrix), equations(Function::BiasForce));
+                let nv = bias.len();
+                let qdd = if scene.zero.qdd { vec![Expr::zero(); nv] } else { argument(&"qdd".to_string()) };
+                Expr::section("inverse dynamics, H q̈ + h", None);
+                let row = |i: usize| (0..nv).fold(bias[i], |sum, j| sum + h[i * nv + j] * qdd[j]);
+                (0..nv).map(row).collect()
+            } else {
+                equations(*function)
+            };
+            results.extend(wanted.iter().map(|k| all[*k]));
+        }
+        results
+    });
+    (dead_code(&graph), stage_of, stages)
+}
+
+fn report(functions: &[Function], staged: &Staged, stages: &[Stage]) -> StagedReport {
+    let of = |stage: &Stage, graph: &Graph| {
+        let Counts { mul, add, div, sin_cos, .. } = graph.counts();
+        StageReport { name: stage.type_name, mul, add, div, sincos: sin_cos, stored: graph.results.len() }
+    };
+    let left = |graph: &Graph| {
+        let c = graph.counts();
+        [c.mul, c.add, c.div]
+    };
+    StagedReport {
+        stages: stages.iter().zip(&staged.stages).map(|(s, g)| of(s, g)).collect(),
+        remaining: functions.iter().zip(&staged.functions).map(|(f, (_, g))| (f.name(), left(g))).collect(),
+    }
+}
+
+fn text(
+    functions: &[Function],
+    staged: &Staged,
+    stages: &[Stage],
+    options: &Options,
+    title: &dyn Fn(Section) -> String,
+) -> String {
+    let scalar = options.scalar;
+    let mut items = String::new();
+    let mut kernel = false;
+    let mut private = |graph: &Graph, name: &str, doc: &str| {
+        let text = emit::function(graph, &schedule(graph, options.limits), name, doc, scalar, title);
+        kernel |= text.calls_kernel();
+        text.text.replacen("pub fn ", "fn ", 1)
+    };
+    let storing = stages.len() - 1;
+    for (s, stage) in stages[..storing].iter().enumerate() {
+        let graph = &staged.stages[s];
+        let methods: String = functions
+            .iter()
+            .zip(&staged.functions)
+            // what the last stage makes is called on the stage before it
+            .filter(|(_, (own, _))| (*own).min(storing - 1) == s)
+            .map(|(f, (_, g))| method(*f, g, stages, s, scalar))
+            .collect();
+        items.push_str(&stage_type(stages, s, graph, &methods, scalar));
+        items.push_str(&private(
+            graph,
+            &format!("{}_values", stage.values),
+            &format!("The values of a [`{}`].", stage.type_name),
+        ));
+    }
+    for (f, (_, graph)) in functions.iter().zip(&staged.functions) {
+        items.push('\n');
+        items.push_str(&private(graph, f.name(), f.summary()));
+    }
+    let mut out = String::from(
+        "\n/// The same functions in stages: what changes rarely is computed once.\n///\n\
+         /// A later stage borrows the earlier one: a value of a stage that is out of date does not compile.\n\
+         pub mod staged {\n",
+    );
+    let imports = if kernel { "    use super::trig;\n" } else { "" };
+    out.push_str(imports);
+    let wrappers: Vec<String> =
+        staged.stages.iter().flat_map(|g| &g.inputs).filter_map(|p| p.wrapper.clone()).collect();
+    if !wrappers.is_empty() {
+        let _ = writeln!(out, "    use super::{{{}}};", wrappers.join(", "));
+    }
+    for line in items.lines() {
+        let _ = writeln!(out, "{}{line}", if line.is_empty() { "" } else { "    " });
+    }
+    out.push_str("}\n");
+    out
+}
+
+/// The struct of a stage, its constructor, and the methods that it serves.
+fn stage_type(stages: &[Stage], s: usize, graph: &Graph, methods: &str, scalar: Scalar) -> String {
+    let stage = &stages[s];
+    let (name, t, stored) = (stage.type_name, scalar.name(), graph.results.len());
+    let lifetime = if s > 0 { "<'a>" } else { "" };
+    let earlier = (s > 0).then(|| &stages[s - 1]);
+    let field = earlier.map_or(String::new(), |e| {
+        let inner = if s > 1 { "<'a>" } else { "" };
+        format!("    {}: &'a {}{inner},\n", e.values, e.type_name)
+    });
+    let own: Vec<&Port> = graph.inputs.iter().filter(|p| !stages.iter().any(|e| e.values == p.name)).collect();
+    let parameters: Vec<String> = own.iter().map(|p| format!("{}: &{}", p.name, array_type(p, scalar))).collect();
+    let arguments: Vec<String> = graph.inputs.iter().map(|p| reach(stages, s, &p.name, "self")).collect();
+    let mut out = format!(
+        "\n/// {}\n#[derive(Clone, Debug)]\npub struct {name}{lifetime} {{\n{field}    values: [{t}; {stored}],\n}}\n",
+        stage.doc
+    );
+    let make = |receiver: &str| {
+        let arguments: Vec<String> = arguments.iter().map(|a| a.replace("self", receiver)).collect();
+        let arguments: String = arguments.iter().map(|a| format!("{a}, ")).collect();
+        format!("{}_values({arguments}&mut values);", stage.values)
+    };
+    let _ = write!(out, "\nimpl{lifetime} {name}{lifetime} {{\n");
+    match earlier {
+        None => {
+            let _ = write!(
+                out,
+                "    /// Computes the stage.\n    #[must_use]\n    pub fn new({}) -> {name} {{\n        let mut values = [0.0; {stored}];\n        {}\n        {name} {{ values }}\n    }}\n",
+                parameters.join(", "),
+                make("")
+            );
+        }
+        Some(e) => {
+            let inner = if s > 1 { "<'a>" } else { "" };
+            let _ = write!(
+                out,
+                "    /// Computes the stage on top of an earlier one.\n    #[must_use]\n    pub fn new({0}: &'a {1}{inner}, {2}) -> {name}<'a> {{\n        let mut values = [0.0; {stored}];\n        {3}\n        {name} {{ {0}, values }}\n    }}\n",
+                e.values,
+                e.type_name,
+                parameters.join(", "),
+                make(e.values)
+            );
+        }
+    }
+    out.push_str(methods);
+    out.push_str("}\n\n");
+    out
+}
+
+/// How stage `s`, as `receiver`, reaches the stored values or the input of that name. While stage `s` is being made its
+/// receiver is the stage before it.
+fn reach(stages: &[Stage], s: usize, name: &str, receiver: &str) -> String {
+    match stages.iter().position(|stage| stage.values == name && !name.is_empty()) {
+        // from the stage before `s` down to stage `k`
+        Some(k) => {
+            let path: String = (k..s - 1).rev().map(|i| format!(".{}", stages[i].values)).collect();
+            format!("&{receiver}{path}.values")
+        }
+        None => name.to_string(),
+    }
+}
+
+/// A method of stage `s` that calls the function's private program.
+fn method(function: Function, graph: &Graph, stages: &[Stage], s: usize, scalar: Scalar) -> String {
+    let own: Vec<&Port> = graph.inputs.iter().filter(|p| !stages.iter().any(|e| e.values == p.name)).collect();
+    let parameters: String = own.iter().map(|p| format!(", {}: &{}", p.name, array_type(p, scalar))).collect();
+    let output = &graph.outputs[0];
+    let arguments: Vec<String> = graph.inputs.iter().map(|p| reach(stages, s + 1, &p.name, "self")).collect();
+    let arguments: String = arguments.iter().map(|a| format!("{a}, ")).collect();
+    format!(
+        "\n    /// {}\n    pub fn {name}(&self{parameters}, {out}: &mut {}) {{\n        {name}({arguments}{out});\n    }}\n",
+        function.summary(),
+        array_type(output, scalar),
+        name = function.name(),
+        out = output.name,
+    )
+}
