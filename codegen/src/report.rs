@@ -54,7 +54,7 @@ pub struct Report {
     /// Name of each function and its figures.
     pub functions: BTreeMap<&'static str, FunctionReport>,
     /// Figures of the staged form, if it was generated.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "cli", serde(skip_serializing_if = "Option::is_none"))]
     pub staged: Option<StagedReport>,
 }
 

@@ -13,13 +13,13 @@ use crate::scene::is_optional;
 use crate::schedule::schedule;
 use crate::stage::{cut, Staged};
 use crate::trace::{trace, Expr};
-use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use straightline_core::Real;
 
 /// Figures of one stage.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
 pub struct StageReport {
     /// Its type's name.
     pub name: &'static str,
@@ -36,7 +36,8 @@ pub struct StageReport {
 }
 
 /// Figures of the staged form.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
 pub struct StagedReport {
     /// The stages, the rarest first.
     pub stages: Vec<StageReport>,
