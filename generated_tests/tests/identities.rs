@@ -74,13 +74,13 @@ impl State {
             let v = |k: usize| Dd::from(rate[joint.iv + k]) * Dd::from(t);
             let i = joint.iq;
             if joint.kind != JointKind::Floating {
-                q[i] = q[i] + v(0);
+                q[i] += v(0);
                 continue;
             }
             let [x, y, z, w] = [q[i + 3], q[i + 4], q[i + 5], q[i + 6]];
             // p' = R v
             let dp = quaternion_rotation([x, y, z, w]) * nalgebra::Vector3::new(v(0), v(1), v(2));
-            (0..3).for_each(|k| q[i + k] = q[i + k] + dp[k]);
+            (0..3).for_each(|k| q[i + k] += dp[k]);
             // quaternion' = ½ quaternion ∘ (ω, 0)
             let [a, b, c] = [v(3), v(4), v(5)].map(|x| x * Dd::HALF);
             let turned = [
