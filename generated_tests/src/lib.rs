@@ -1,7 +1,7 @@
 //! Truth x inputs x bound: what proves every generated function.
 //!
-//! This library holds the material of the tests: the [reference data](reference), the [compiled](compiled) functions of
-//! all robots, [programs](programs) as the compiler makes them, and [random robots](random) written for both authors.
+//! This library holds the material of the tests: the [reference data](mod@reference), the [`compiled`] functions of all
+//! robots, [`programs`] as the compiler makes them, and [random robots](random) written for both authors.
 //! The tests themselves are in `tests/`, one file per kind of claim.
 #![forbid(unsafe_code)]
 
