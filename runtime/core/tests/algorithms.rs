@@ -7,7 +7,7 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use straightline_core::algorithms::*;
-use straightline_core::model::{Body, Frame, Joint, JointKind, Limits, Model};
+use straightline_core::model::{Body, Coulomb, Frame, Joint, JointEffects, JointKind, Limits, Model};
 use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::{Dd, Real};
 
@@ -190,7 +190,7 @@ fn random_robot(seed: u64) -> Model<Dd> {
             inertia,
             link_frame,
             dense,
-            effects: straightline_core::model::JointEffects::none(),
+            effects: JointEffects::none(),
             load: None,
         });
     }
@@ -498,6 +498,117 @@ fn momentum_grows_by_the_wrench_on_the_roots() {
     }
 }
 
+// ------------------------------------------------------------------------------------------ rotors, friction, springs
+
+/// The case with an effect of every kind, and none, on its joints.
+fn with_effects(mut case: Case) -> Case {
+    let random = &mut Random(case.seed ^ 0x5eed);
+    for body in case.model.bodies.iter_mut().filter(|b| b.joint.kind != JointKind::Floating) {
+        let mut size = || random.symmetric().abs() + Dd::from(0.25);
+        body.effects = JointEffects {
+            rotor_inertia: Some(size()),
+            damping: size(),
+            coulomb: Coulomb::Sign(size()),
+            stiffness: size(),
+            spring_rest: size() - Dd::ONE,
+        };
+        match random.below(4) {
+            0 => body.effects = JointEffects::none(),
+            1 => body.effects.rotor_inertia = None,
+            2 => {
+                let speed = random.symmetric().abs() + Dd::from(0.125);
+                body.effects.coulomb = Coulomb::Smooth { force: Dd::from(0.7), speed };
+            }
+            _ => {}
+        }
+    }
+    case
+}
+
+/// Force of the dampers and of Coulomb friction on a coordinate, as the handbook writes it.
+fn losses(case: &Case) -> Vec<Dd> {
+    let mut forces = vec![Dd::ZERO; case.nv()];
+    for body in case.model.bodies.iter().filter(|b| b.joint.kind != JointKind::Floating) {
+        let qd = case.qd[body.joint.iv];
+        let magnitude = qd.abs();
+        let dry = match body.effects.coulomb {
+            Coulomb::Off => Dd::ZERO,
+            Coulomb::Sign(f) => f * (qd / magnitude),
+            Coulomb::Smooth { force, speed } => force * (qd / (magnitude * magnitude + speed * speed).sqrt()),
+        };
+        forces[body.joint.iv] = body.effects.damping * qd + dry;
+    }
+    forces
+}
+
+#[test]
+fn forward_dynamics_undoes_inverse_dynamics_with_rotors_friction_and_springs() {
+    for case in cases().map(with_effects) {
+        let (m, q, qd, tau) = (&case.model, &case.q, &case.qd, &case.inverse_dynamics());
+        case.agree(&forward_dynamics_aba(m, q, qd, tau), &case.qdd, DD_SOLVED);
+        case.agree(&forward_dynamics_ltdl(m, q, qd, tau), &case.qdd, DD_SOLVED);
+        let linear = product(&mass_matrix(m, q), &case.qdd);
+        case.agree(tau, &sum(&linear, &bias_force(m, q, qd)), DD);
+    }
+}
+
+#[test]
+fn energy_grows_by_the_power_of_the_drives_less_what_friction_takes() {
+    for case in cases().map(with_effects) {
+        let (model, q, qd) = case.moving();
+        let energy = kinetic_energy(&model, &q, &qd) + potential_energy(&model, &q);
+        let power = dot(&case.qd, &case.inverse_dynamics());
+        let lost = dot(&case.qd, &losses(&case));
+        assert!(lost.to_f64() >= 0.0, "seed {}", case.seed);
+        case.agree(&[energy.rate], &[power - lost], DD);
+    }
+}
+
+#[test]
+fn a_rotor_is_inertia_on_the_diagonal_of_the_mass_matrix_alone() {
+    for case in cases() {
+        let rigid = mass_matrix(&case.model, &case.q);
+        let case = with_effects(case);
+        let (n, mut expected) = (case.nv(), rigid);
+        for body in &case.model.bodies {
+            let iv = body.joint.iv;
+            expected[iv * n + iv] = expected[iv * n + iv] + body.effects.rotor_inertia.unwrap_or(Dd::ZERO);
+        }
+        case.agree(&mass_matrix(&case.model, &case.q), &expected, DD);
+        let h_qd = product(&expected, &case.qd);
+        case.agree(&[kinetic_energy(&case.model, &case.q, &case.qd)], &[dot(&case.qd, &h_qd) * Dd::HALF], DD);
+    }
+}
+
+#[test]
+fn smooth_coulomb_friction_becomes_the_sign_as_its_speed_vanishes() {
+    for case in cases().map(with_effects) {
+        let with_coulomb = |coulomb: fn(Dd) -> Coulomb<Dd>| {
+            let mut model = case.model.clone();
+            for body in model.bodies.iter_mut().filter(|b| b.joint.kind != JointKind::Floating) {
+                body.effects.coulomb = coulomb(Dd::from(0.7));
+            }
+            bias_force(&model, &case.q, &case.qd)
+        };
+        let sign = with_coulomb(Coulomb::Sign);
+        // 1 − |q̇|/√(q̇² + w²) ≈ ½ (w/q̇)²; the speeds of these cases are above 1e-4
+        case.agree(&with_coulomb(|force| Coulomb::Smooth { force, speed: Dd::from(1e-10) }), &sign, 1e-12);
+        case.agree(&with_coulomb(|force| Coulomb::Smooth { force, speed: Dd::from(1e-20) }), &sign, DD);
+    }
+}
+
+#[test]
+fn friction_is_zero_at_rest() {
+    for case in cases().map(with_effects) {
+        let at_rest = vec![Dd::ZERO; case.nv()];
+        let springs = passive_force(&case.model, &case.q, &at_rest);
+        for body in case.model.bodies.iter().filter(|b| b.joint.kind != JointKind::Floating) {
+            let spring = body.effects.stiffness * (case.q[body.joint.iq] - body.effects.spring_rest);
+            assert_eq!(springs[body.joint.iv], spring, "seed {}", case.seed);
+        }
+    }
+}
+
 // ---------------------------------------------------------------------------------------------------------- kinematics
 
 #[test]
@@ -700,7 +811,7 @@ fn a_pendulum_swings_as_in_the_textbook() {
         inertia: SpatialInertia::new(d(mass), Vec3::new(o, d(length), o), tensor),
         link_frame: Transform::identity(),
         dense: false,
-        effects: straightline_core::model::JointEffects::none(),
+        effects: JointEffects::none(),
         load: None,
     };
     let gravity = Vec3::new(0.0, 0.0, -g).map(d);
