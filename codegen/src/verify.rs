@@ -8,7 +8,7 @@
 //! is made of. So 1e-16 is a rounding, whatever cancels, and a wrong formula is anything up to 1.
 
 use crate::compile::{program, Generated, Options, Program};
-use crate::description;
+use crate::description::{self, Description, JointDrive, Notation, Value};
 use crate::diagnostic::{Diagnostics, Source};
 use crate::emit::{element, Scalar};
 use crate::expr::{evaluate, Graph};
@@ -85,7 +85,7 @@ pub fn verify(
     mut tick: impl FnMut(),
 ) -> Result<Verification, String> {
     let (model, frames) = (&generated.model, &generated.frames);
-    let tree = &second_reading(source, model, options)?;
+    let (tree, drives) = &second_reading(source, model, options)?;
     let functions = options.functions.iter().filter(|f| !f.is_per_frame() || !frames.is_empty());
     let robot = Robot::new(model.clone());
     let programs: Vec<Program> = functions.map(|f| program(&robot, frames, *f, options)).collect();
@@ -95,7 +95,7 @@ pub fn verify(
     let mut worst: BTreeMap<&'static str, Worst> = BTreeMap::new();
     for state in 0..states {
         let inputs = State::random(model, options.scalar, &mut random);
-        let truth = Truth { tree, frames: &frames, state: &inputs };
+        let truth = Truth { tree, drives, frames: &frames, state: &inputs };
         for Program { function, graph, .. } in &programs {
             let values = run(graph, &inputs, options.scalar);
             let (expected, scales) = truth.outputs(*function);
@@ -120,8 +120,12 @@ pub fn verify(
     Ok(Verification { robot, scalar: scalar.name(), states, seed, bound: bound(scalar), functions: worst })
 }
 
-/// The robot in the reference's terms, its coordinates numbered as the model's.
-fn second_reading(source: &Source, model: &Model<Dd>, options: &Options) -> Result<MassCentreTree<Dd>, String> {
+/// The robot in the reference's terms, its coordinates numbered as the model's, and what joints add to it.
+fn second_reading(
+    source: &Source,
+    model: &Model<Dd>,
+    options: &Options,
+) -> Result<(MassCentreTree<Dd>, Vec<Drive>), String> {
     let description = description::read(source, &mut Diagnostics::new()).ok_or("the file holds no robot")?;
     let mut tree = mass_centre_tree(&description, &options.model)?;
     for link in &mut tree.links {
@@ -129,7 +133,57 @@ fn second_reading(source: &Source, model: &Model<Dd>, options: &Options) -> Resu
         let joint = &body.ok_or_else(|| format!("the model has no body `{}`", link.name))?.joint;
         (link.iq, link.iv) = (joint.iq, joint.iv);
     }
-    Ok(tree)
+    let joints = model.bodies.iter().map(|body| &body.joint).filter(|joint| joint.kind != JointKind::Floating);
+    let drives = joints.map(|joint| Drive::read(&description, &joint.name, joint.iq, joint.iv)).collect();
+    Ok((tree, drives))
+}
+
+/// What a joint adds on its own coordinate, from the file: tau = … + I q̈ + d q̇ + f sgn(q̇) + k (q − q₀).
+struct Drive {
+    iq: usize,
+    iv: usize,
+    inertia: Dd,
+    damping: Dd,
+    friction: Dd,
+    stiffness: Dd,
+    rest: Dd,
+}
+
+impl Drive {
+    fn read(description: &Description, joint: &str, iq: usize, iv: usize) -> Drive {
+        let none = JointDrive::default();
+        let found = match &description.notation {
+            Notation::JointFrames(bodies) => bodies.joints.iter().find(|j| j.name.value == joint).map(|j| &j.drive),
+            Notation::MassCentres(chain) => {
+                chain.links.iter().find(|l| l.joint_name.value == joint).map(|link| &link.drive)
+            }
+        };
+        let drive = found.unwrap_or(&none);
+        let number = |x: &Option<Value<f64>>| x.as_ref().map_or(0.0, |x| x.value);
+        let gear = Dd::from(drive.gear_ratio.as_ref().map_or(1.0, |x| x.value));
+        Drive {
+            iq,
+            iv,
+            inertia: Dd::from(number(&drive.armature)) + gear * gear * Dd::from(number(&drive.rotor_inertia)),
+            damping: Dd::from(number(&drive.damping)),
+            friction: Dd::from(number(&drive.friction)),
+            stiffness: Dd::from(number(&drive.spring_stiffness)),
+            rest: Dd::from(number(&drive.spring_rest)),
+        }
+    }
+
+    /// What friction and spring take, and the sum of the moduli of its terms.
+    fn passive(&self, q: &[Dd], qd: &[Dd]) -> (Dd, f64) {
+        let (q, qd) = (q[self.iq], qd[self.iv]);
+        let dry = match qd.to_f64() {
+            v if v > 0.0 => self.friction,
+            v if v < 0.0 => -self.friction,
+            _ => Dd::ZERO,
+        };
+        let (viscous, spring) = (self.damping * qd, self.stiffness * (q - self.rest));
+        let moduli = (self.stiffness * q).abs() + (self.stiffness * self.rest).abs() + viscous.abs() + dry.abs();
+        (viscous + dry + spring, moduli.to_f64())
+    }
 }
 
 /// |value − expected| / scale; infinite where there is no sensible answer.
@@ -244,6 +298,7 @@ impl Random {
 /// The reference at a state.
 struct Truth<'a> {
     tree: &'a MassCentreTree<Dd>,
+    drives: &'a [Drive],
     frames: &'a [&'a MassCentreFrame<Dd>],
     state: &'a State,
 }
@@ -306,10 +361,23 @@ impl Truth<'_> {
                 [vec![r.length.max(1.0); 3 * qd.len()], vec![1.0; 3 * qd.len()]].concat()
             }),
             InverseDynamics => {
-                (reference::inverse_dynamics(tree, q, qd, qdd).as_slice().to_vec(), force_scale(qd, qdd))
+                let mut forces = reference::inverse_dynamics(tree, q, qd, qdd).as_slice().to_vec();
+                let mut scales = force_scale(qd, qdd);
+                self.add_passive(q, qd, &mut forces, &mut scales);
+                for drive in self.drives {
+                    let force = drive.inertia * qdd[drive.iv];
+                    forces[drive.iv] += force;
+                    scales[drive.iv] += force.to_f64().abs();
+                }
+                (forces, scales)
             }
             GravityForce => (reference::gravity_force(tree, q).as_slice().to_vec(), force_scale(rest, rest)),
-            BiasForce => (reference::bias_force(tree, q, qd).as_slice().to_vec(), force_scale(qd, rest)),
+            BiasForce => {
+                let mut forces = reference::bias_force(tree, q, qd).as_slice().to_vec();
+                let mut scales = force_scale(qd, rest);
+                self.add_passive(q, qd, &mut forces, &mut scales);
+                (forces, scales)
+            }
             VelocityForce => {
                 let mut weightless = tree.clone();
                 weightless.gravity.fill(Dd::ZERO);
@@ -317,16 +385,21 @@ impl Truth<'_> {
                 (reference::velocity_force(tree, q, qd).as_slice().to_vec(), narrow(scale.as_slice()))
             }
             MassMatrix => {
-                let h = reference::mass_matrix(tree, q);
+                let mut h = reference::mass_matrix(tree, q);
+                self.drives.iter().for_each(|drive| h[(drive.iv, drive.iv)] += drive.inertia);
                 let root: Vec<f64> = (0..h.nrows()).map(|i| h[(i, i)].to_f64().sqrt()).collect();
                 (h.as_slice().to_vec(), root.iter().flat_map(|a| root.iter().map(move |b| a * b)).collect())
             }
             ForwardDynamics => {
-                let value = reference::forward_dynamics(tree, q, qd, tau);
+                let mut h = reference::mass_matrix(tree, q);
+                self.drives.iter().for_each(|drive| h[(drive.iv, drive.iv)] += drive.inertia);
+                let mut value = reference::bias_force(tree, q, qd);
+                let mut bias = force_scale(qd, rest);
+                self.add_passive(q, qd, value.as_mut_slice(), &mut bias);
+                value.iter_mut().zip(tau).for_each(|(force, tau)| *force = *tau - *force);
+                let value = reference::solve_symmetric(&h, &value);
                 // |H⁻¹| (|τ| + scale of h + |H| |q̈|)
-                let h = reference::mass_matrix(tree, q);
                 let n = h.nrows();
-                let bias = force_scale(qd, rest);
                 let forces: Vec<f64> = (0..n)
                     .map(|i| {
                         let inertial: f64 = (0..n).map(|j| (h[(i, j)] * value[j]).to_f64().abs()).sum();
@@ -354,11 +427,20 @@ impl Truth<'_> {
                 )
             }
             Energy => {
-                let values = vec![reference::kinetic_energy(tree, q, qd), reference::potential_energy(tree, q)];
+                let mut values = vec![reference::kinetic_energy(tree, q, qd), reference::potential_energy(tree, q)];
                 let g = length(tree.gravity.as_slice());
-                let scales = self.over_links(|m, inertia, r| {
+                let mut scales = self.over_links(|m, inertia, r| {
                     [(m * r.moving * r.moving + inertia * r.turning * r.turning) / 2.0, m * g * r.position]
                 });
+                for drive in self.drives {
+                    let (rate, stretch) = (qd[drive.iv], q[drive.iq] - drive.rest);
+                    let energies =
+                        [drive.inertia * rate * rate * Dd::HALF, drive.stiffness * stretch * stretch * Dd::HALF];
+                    for (k, energy) in energies.into_iter().enumerate() {
+                        values[k] += energy;
+                        scales[k] += energy.to_f64();
+                    }
+                }
                 (values, scales.to_vec())
             }
             CentreOfMass => {
@@ -372,6 +454,15 @@ impl Truth<'_> {
                     .over_links(|m, inertia, r| [m * r.moving, 2.0 * m * r.length * r.moving + inertia * r.turning]);
                 (values, motion(linear, angular))
             }
+        }
+    }
+
+    /// Adds friction and springs to forces and to their scales.
+    fn add_passive(&self, q: &[Dd], qd: &[Dd], forces: &mut [Dd], scales: &mut [f64]) {
+        for drive in self.drives {
+            let (force, scale) = drive.passive(q, qd);
+            forces[drive.iv] += force;
+            scales[drive.iv] += scale;
         }
     }
 

@@ -25,6 +25,12 @@ const LINK: &[&str] = &[
     "r_next",
     "r_next_star",
     "limits",
+    "damping",
+    "friction",
+    "rotor_inertia",
+    "gear_ratio",
+    "armature",
+    "spring",
 ];
 const KINDS: [(&str, JointKind); 3] =
     [("revolute", JointKind::Revolute), ("linear", JointKind::Prismatic), ("prismatic", JointKind::Prismatic)];
@@ -109,5 +115,6 @@ fn read_link(reader: &mut Reader, mut table: Table, j: usize, count: usize) -> M
         alpha: reader.angle_at(&table, "alpha"),
         end: read_end(reader, &table, j == count),
         limits: reader.limits_at(&table, "limits"),
+        drive: reader.drive_at(&table),
     }
 }

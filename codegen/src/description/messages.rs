@@ -34,7 +34,9 @@ pub const CODES: &[&str] = &[
     "not-symmetric",
     "not-supported-yet",
     "floating-joint",
-    "friction-not-used",
+    "negative-effect",
+    "gear-ratio-zero",
+    "gear-ratio-alone",
     "no-links",
     "too-many-links",
     "nothing-moves",
@@ -303,13 +305,23 @@ pub fn floating_joint(joint: &str) -> D {
         .help("remove the joint and its parent, and ask for a floating base: `--floating-base`, `floating_base` in the macro, `.floating_base(true)` in a build script, or `base = \"floating\"` in TOML")
 }
 
-/// Damping or friction of a joint.
-pub fn friction_not_used(joint: &str, what: &str, value: f64) -> D {
-    D::warning(
-        "friction-not-used",
-        format!("{what} {value:?} of joint `{joint}` is read, but not part of the dynamics yet"),
-    )
-    .detail("inverse dynamics gives the torque without it")
+/// Friction, an inertia or a stiffness below zero.
+pub fn negative_effect(joint: &str, what: &str, value: f64) -> D {
+    D::error("negative-effect", format!("{what} of joint `{joint}` is negative: {value:?}"))
+        .detail("it would drive the motion instead of resisting it")
+        .help("write its magnitude: tau = I qdd + d qd + f sign(qd) + k (q - rest)")
+}
+
+/// A gear that stands still.
+pub fn gear_ratio_zero(joint: &str) -> D {
+    D::error("gear-ratio-zero", format!("the gear ratio of joint `{joint}` is zero"))
+        .help("write rotor speed over joint speed, such as 100.0")
+}
+
+/// A gear without a rotor.
+pub fn gear_ratio_alone(joint: &str) -> D {
+    D::warning("gear-ratio-alone", format!("joint `{joint}` has a `gear_ratio` and no `rotor_inertia`"))
+        .detail("taken as a rotor without inertia: the gear ratio changes nothing")
 }
 
 // --- the tree ---

@@ -253,13 +253,13 @@ pub struct JointLimits {
 pub struct JointDrive {
     /// Viscous friction \[N·m·s/rad or N·s/m\].
     pub damping: Option<Value<f64>>,
-    /// Dry friction \[N·m or N\].
+    /// Coulomb friction \[N·m or N\].
     pub friction: Option<Value<f64>>,
     /// Moment of inertia of the rotor about its axis \[kg·m²\].
     pub rotor_inertia: Option<Value<f64>>,
-    /// Rotor speed over joint speed.
+    /// Rotor speed over joint speed \[1 or rad/m\]; 1 where the file says nothing.
     pub gear_ratio: Option<Value<f64>>,
-    /// Inertia added on the joint's own coordinate \[kg·m² or kg\].
+    /// Inertia added on the joint's own coordinate \[kg·m² or kg\], in place of a rotor with its gear.
     pub armature: Option<Value<f64>>,
     /// Spring: stiffness \[N·m/rad or N/m\].
     pub spring_stiffness: Option<Value<f64>>,
@@ -324,6 +324,8 @@ pub struct MassCentreLink {
     pub end: MassCentreEnd,
     /// Ranges.
     pub limits: JointLimits,
+    /// What its drive adds.
+    pub drive: JointDrive,
 }
 
 /// Reads a robot file; its notation is found from the text. Complaints go to `diagnostics`. After errors the description

@@ -1,7 +1,7 @@
 //! Walking a TOML document with places, so that one run finds all complaints.
 
 use super::reader::{Range64, Reader};
-use super::{messages, Angle, AngleUnit, JointLimits, Pose, Rotation, Value};
+use super::{messages, Angle, AngleUnit, JointDrive, JointLimits, Pose, Rotation, Value};
 use crate::diagnostic::{Diagnostics, Source};
 use std::ops::Range;
 use straightline_core::spatial::Sym3;
@@ -356,6 +356,25 @@ impl Reader<'_> {
                 JointLimits::default()
             }
         }
+    }
+
+    /// Rotor, friction and spring of a joint, from keys of its table.
+    pub fn drive_at(&mut self, table: &Table) -> JointDrive {
+        let mut drive = JointDrive {
+            damping: self.real_at(table, "damping", Range64::Finite),
+            friction: self.real_at(table, "friction", Range64::Finite),
+            rotor_inertia: self.real_at(table, "rotor_inertia", Range64::Finite),
+            gear_ratio: self.real_at(table, "gear_ratio", Range64::Finite),
+            armature: self.real_at(table, "armature", Range64::Finite),
+            ..JointDrive::default()
+        };
+        if let Some(spring) = self.table_at(table, "spring", &format!("spring of {}", table.owner)) {
+            self.check_keys(&spring, &["stiffness", "rest"]);
+            self.require(&spring, "stiffness", "spring = { stiffness = 10.0, rest = 0.0 }");
+            drive.spring_stiffness = self.real_at(&spring, "stiffness", Range64::Finite);
+            drive.spring_rest = self.real_at(&spring, "rest", Range64::Finite);
+        }
+        drive
     }
 
     /// The table of that key.

@@ -3,8 +3,8 @@
 use super::reader::{Range64, Reader};
 use super::table::{self, Table};
 use super::{
-    chapter, messages, BaseKind, Description, Format, Inertial, Joint, JointDrive, JointFrameNotation, JointKind, Link,
-    NamedFrame, Notation, Pose, Value,
+    chapter, messages, BaseKind, Description, Format, Inertial, Joint, JointFrameNotation, JointKind, Link, NamedFrame,
+    Notation, Pose, Value,
 };
 use crate::diagnostic::{Diagnostics, Source};
 use straightline_core::spatial::Sym3;
@@ -164,19 +164,7 @@ fn read_joint(reader: &mut Reader, mut table: Table) -> Option<Joint> {
     };
     let axis = axis.unwrap_or_else(|| reader.value([0.0, 0.0, 1.0], &table.span));
     let limits = reader.limits_at(&table, "limits");
-    let mut drive = JointDrive {
-        damping: reader.real_at(&table, "damping", Range64::Finite),
-        friction: reader.real_at(&table, "friction", Range64::Finite),
-        rotor_inertia: reader.real_at(&table, "rotor_inertia", Range64::Finite),
-        gear_ratio: reader.real_at(&table, "gear_ratio", Range64::Finite),
-        armature: reader.real_at(&table, "armature", Range64::Finite),
-        ..JointDrive::default()
-    };
-    if let Some(spring) = reader.table_at(&table, "spring", &format!("spring of {}", table.owner)) {
-        reader.check_keys(&spring, &["stiffness", "rest"]);
-        drive.spring_stiffness = reader.real_at(&spring, "stiffness", Range64::Finite);
-        drive.spring_rest = reader.real_at(&spring, "rest", Range64::Finite);
-    }
+    let drive = reader.drive_at(&table);
     for (key, why) in [
         ("transmission", "it would couple coordinates of drives and joints"),
         ("mimic", "its coordinate would follow that of another joint"),

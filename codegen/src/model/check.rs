@@ -7,8 +7,9 @@ use crate::description::{
 };
 use crate::diagnostic::{Diagnostics, Place};
 use std::collections::HashMap;
-use straightline_core::model::{JointKind as ModelJointKind, Limits};
+use straightline_core::model::{Coulomb, JointEffects, JointKind as ModelJointKind, Limits};
 use straightline_core::spatial::Sym3;
+use straightline_core::Dd;
 
 /// A principal moment may exceed the sum of the others by so much, relatively: the digits of published tensors.
 const MOMENT_DIGITS: f64 = 1e-6;
@@ -196,25 +197,45 @@ pub(super) fn joint(joint: &Joint, format: Format, diagnostics: &mut Diagnostics
     drive(&joint.name, &joint.drive, diagnostics);
 }
 
-fn drive(joint: &Value<String>, drive: &JointDrive, diagnostics: &mut Diagnostics) {
-    for (what, value) in [("damping", &drive.damping), ("friction", &drive.friction)] {
-        if let Some(value) = value.as_ref().filter(|v| v.value != 0.0) {
-            diagnostics.push(messages::friction_not_used(&joint.value, what, value.value).at(&value.place));
+/// What the drive of a joint that moves adds.
+pub(super) fn drive(joint: &Value<String>, drive: &JointDrive, diagnostics: &mut Diagnostics) {
+    let name = &joint.value;
+    for (what, value) in [
+        ("damping", &drive.damping),
+        ("friction", &drive.friction),
+        ("rotor_inertia", &drive.rotor_inertia),
+        ("armature", &drive.armature),
+        ("the spring's stiffness", &drive.spring_stiffness),
+    ] {
+        if let Some(value) = value.as_ref().filter(|v| v.value < 0.0) {
+            diagnostics.push(messages::negative_effect(name, what, value.value).at(&value.place));
         }
     }
-    let inertia = "it would add inertia to the joint";
-    for (what, value, why) in [
-        ("rotor_inertia", &drive.rotor_inertia, inertia),
-        ("gear_ratio", &drive.gear_ratio, "it would multiply the inertia of a rotor"),
-        ("armature", &drive.armature, inertia),
-        ("spring.stiffness", &drive.spring_stiffness, "it would add a torque to the joint"),
-        ("spring.rest", &drive.spring_rest, "it would add a torque to the joint"),
-    ] {
-        if let Some(value) = value {
-            let owner = format!("joint `{}`", joint.value);
-            let help = format!("remove `{what}` and add its effect outside");
-            diagnostics.push(messages::not_supported_yet(&owner, what, why, &help).at(&value.place));
+    if let (Some(_), Some(armature)) = (&drive.rotor_inertia, &drive.armature) {
+        let owner = format!("joint `{name}`");
+        diagnostics.push(messages::written_twice(&owner, "rotor_inertia", "armature").at(&armature.place));
+    }
+    match (&drive.gear_ratio, &drive.rotor_inertia) {
+        (Some(ratio), _) if ratio.value == 0.0 => {
+            diagnostics.push(messages::gear_ratio_zero(name).at(&ratio.place));
         }
+        (Some(ratio), None) => diagnostics.push(messages::gear_ratio_alone(name).at(&ratio.place)),
+        _ => {}
+    }
+}
+
+/// The same as the model has it: a rotor of inertia J on a gear of ratio N has ½ J (N q̇)², as if J N² sat on the joint.
+pub(super) fn model_effects(drive: &JointDrive) -> JointEffects<Dd> {
+    let or_zero = |value: &Option<Value<f64>>| value.as_ref().map_or(Dd::ZERO, |v| Dd::from(v.value));
+    let ratio = drive.gear_ratio.as_ref().map_or(Dd::ONE, |v| Dd::from(v.value));
+    let rotor_inertia = or_zero(&drive.rotor_inertia) * ratio * ratio + or_zero(&drive.armature);
+    let friction = or_zero(&drive.friction);
+    JointEffects {
+        rotor_inertia: (rotor_inertia != Dd::ZERO).then_some(rotor_inertia),
+        damping: or_zero(&drive.damping),
+        coulomb: if friction == Dd::ZERO { Coulomb::Off } else { Coulomb::Sign(friction) },
+        stiffness: or_zero(&drive.spring_stiffness),
+        spring_rest: or_zero(&drive.spring_rest),
     }
 }
 
@@ -312,6 +333,7 @@ pub(super) fn motion(assembly: &Assembly, description: &Description, diagnostics
     for (id, body) in bodies.iter().enumerate() {
         let about_axis = body.inertia.second_moment.xx + body.inertia.second_moment.yy;
         let what = match body.joint.kind {
+            _ if body.effects.rotor_inertia.is_some() => continue,
             ModelJointKind::Prismatic | ModelJointKind::Floating if !has_mass[id] => "mass",
             ModelJointKind::Revolute if !has_mass[id] && !has_inertia[id] => "mass",
             ModelJointKind::Revolute if is_leaf[id] && about_axis.to_f64() == 0.0 => "inertia about its axis",

@@ -6,7 +6,7 @@ use crate::description::{messages, BaseKind, Description, Inertial, JointFrameNo
 use crate::diagnostic::{Diagnostics, Place};
 use std::collections::BTreeMap;
 use straightline_core::algorithms::composing_pays;
-use straightline_core::model::{Body, BodyId, Frame, Joint, JointKind as ModelJointKind, Limits};
+use straightline_core::model::{Body, BodyId, Frame, Joint, JointEffects, JointKind as ModelJointKind, Limits};
 use straightline_core::spatial::{SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::Dd;
 
@@ -80,7 +80,9 @@ pub(super) fn assemble(
                         iv: 0,
                         limits: check::model_limits(kind, &joint.limits),
                     };
-                    bodies.push(new_body(&joint.child.value, parent.0, model_joint, placement, link_frame));
+                    let effects = check::model_effects(&joint.drive);
+                    let body = new_body(&joint.child.value, parent.0, model_joint, placement, link_frame);
+                    bodies.push(Body { effects, ..body });
                     joint_places.push(joint.name.place.clone());
                     parts.push(Vec::new());
                     (Some(bodies.len() - 1), link_frame)
@@ -152,7 +154,7 @@ fn new_body(
         inertia: SpatialInertia::zero(),
         link_frame,
         dense,
-        effects: straightline_core::model::JointEffects::none(),
+        effects: JointEffects::none(),
         load: None,
     }
 }

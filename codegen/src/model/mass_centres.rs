@@ -88,7 +88,7 @@ pub(super) fn assemble(
             },
             placement,
             dense: composing_pays(parent, &placement.rotation),
-            effects: straightline_core::model::JointEffects::none(),
+            effects: check::model_effects(&link.drive),
             load: None,
             inertia: SpatialInertia::new(Dd::from(link.mass.value), com, super::geometry::snap_tensor(inertia)),
             link_frame: x_canonical_link,
@@ -129,6 +129,7 @@ fn check_link(link: &MassCentreLink, description: &Description, diagnostics: &mu
     let name = &link.name.value;
     check::inertial(name, &link.mass, &link.inertia, diagnostics);
     check::limits(&link.joint_name, link.kind.value, &link.limits, description.format, diagnostics);
+    check::drive(&link.joint_name, &link.drive, diagnostics);
     check::axis_length(&format!("`e` of link `{name}`"), &link.e, diagnostics);
     if let Some(e_next) = &link.end.e_next {
         check::axis_length(&format!("`e_next` of link `{name}`"), e_next, diagnostics);
