@@ -1,4 +1,4 @@
-//! Every text that a reader of robot files can say, one function per message.
+//! Every text that can be said of robot files (of scenes: `scene/messages.rs`), one function per message.
 //!
 //! A message names the value, says what is wrong or what was assumed, and what to write instead. Its place is added with
 //! [`Diagnostic::at`]. The tests in `tests/messages` hold the exact text of each; [`CODES`] is the list that they cover.
@@ -72,7 +72,7 @@ pub const CODES: &[&str] = &[
 type D = Diagnostic;
 
 /// ` Did you mean …?`, if there is a candidate close to `word`.
-fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
+pub(crate) fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
     closest(word, candidates).map(|c| format!("did you mean `{c}`?"))
 }
 
@@ -106,7 +106,7 @@ fn edit_distance(a: &str, b: &str) -> usize {
 }
 
 /// A text of the file, cut where it is long.
-fn cut(text: &str) -> String {
+pub(crate) fn cut(text: &str) -> String {
     if text.chars().count() <= 60 {
         text.to_string()
     } else {
@@ -115,13 +115,13 @@ fn cut(text: &str) -> String {
 }
 
 /// A number with at most six digits.
-fn six_digits(x: f64) -> String {
+pub(crate) fn six_digits(x: f64) -> String {
     let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
     format!("{rounded:?}")
 }
 
 /// `a, b and c`, each in backquotes.
-fn list(words: &[&str]) -> String {
+pub(crate) fn list(words: &[&str]) -> String {
     let quoted: Vec<String> = words.iter().take(12).map(|w| format!("`{}`", cut(w))).collect();
     let more = words.len().saturating_sub(12);
     match (quoted.split_last(), more) {
@@ -136,12 +136,12 @@ fn list(words: &[&str]) -> String {
 
 /// Bytes that are not UTF-8.
 pub fn not_utf8() -> D {
-    D::error("not-utf8", "the file is not UTF-8 text").help("save the file as UTF-8; is it a robot file at all?")
+    D::error("not-utf8", "the file is not UTF-8 text").help("save the file as UTF-8; is it TOML or URDF at all?")
 }
 
 /// A file larger than the readers take.
 pub fn file_too_large(bytes: usize, limit: usize) -> D {
-    D::error("file-too-large", format!("the file is too large for a robot file: {bytes} bytes"))
+    D::error("file-too-large", format!("the file is too large: {bytes} bytes"))
         .detail(format!("at most {limit} bytes are read"))
 }
 
@@ -168,7 +168,7 @@ pub fn toml_syntax(what: &str) -> D {
 
 /// More of something than any robot file has.
 pub fn too_complex(what: &str, limit: usize) -> D {
-    D::error("too-complex", format!("{what}: no robot file needs more than {limit}"))
+    D::error("too-complex", format!("{what}: no file needs more than {limit}"))
 }
 
 /// XML, but not of a robot.

@@ -7,8 +7,8 @@
 
 mod chapter;
 pub mod messages;
-mod reader;
-mod table;
+pub(crate) mod reader;
+pub(crate) mod table;
 mod toml;
 mod urdf;
 

@@ -6,12 +6,12 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 /// The largest file that is read \[bytes\].
-pub(super) const LARGEST_FILE: usize = 64 << 20;
+pub(crate) const LARGEST_FILE: usize = 64 << 20;
 /// The greatest magnitude that is computed with: products of a few such numbers stay inside f64's range.
 const GREATEST: f64 = 1e60;
 
 /// A file that is being read.
-pub(super) struct Reader<'a> {
+pub(crate) struct Reader<'a> {
     pub source: &'a Source,
     pub diagnostics: &'a mut Diagnostics,
     ignored: Vec<Ignored>,
@@ -20,7 +20,7 @@ pub(super) struct Reader<'a> {
 
 /// Which numbers are taken.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Range64 {
+pub(crate) enum Range64 {
     /// What equations are made of.
     Finite,
     /// What a coordinate is compared with: infinite, too.

@@ -15,14 +15,14 @@ type Span = Range<usize>;
 const DEEPEST: usize = 16;
 
 /// A table and how complaints name it.
-pub(super) struct Table<'a, 'i> {
+pub(crate) struct Table<'a, 'i> {
     pub owner: String,
     pub table: &'a DeTable<'i>,
     pub span: Span,
 }
 
 /// The document, or complaints about its syntax.
-pub(super) fn parse<'i>(source: &'i Source, diagnostics: &mut Diagnostics) -> Option<Spanned<DeTable<'i>>> {
+pub(crate) fn parse<'i>(source: &'i Source, diagnostics: &mut Diagnostics) -> Option<Spanned<DeTable<'i>>> {
     let mut reader = Reader::new(source, diagnostics);
     if !brackets_match(&mut reader) {
         return None;
@@ -99,7 +99,7 @@ impl<'a, 'i> Table<'a, 'i> {
     }
 
     /// `com of link x`.
-    fn what(&self, key: &str) -> String {
+    pub fn what(&self, key: &str) -> String {
         format!("{key} of {}", self.owner)
     }
 }
@@ -133,7 +133,8 @@ impl Reader<'_> {
         }
     }
 
-    fn wrong_type(&mut self, what: &str, expected: &str, value: &DeValue, span: &Span) {
+    /// Complains of a value of another type.
+    pub fn wrong_type(&mut self, what: &str, expected: &str, value: &DeValue, span: &Span) {
         self.complain(span, messages::wrong_type(what, expected, &type_name(value)));
     }
 
@@ -159,6 +160,55 @@ impl Reader<'_> {
         let (value, span) = table.get(key)?;
         let value = self.real(&table.what(key), value, &span, range)?;
         Some(self.value(value, &span))
+    }
+
+    /// `true` or `false`.
+    pub fn flag_at(&mut self, table: &Table, key: &str) -> Option<Value<bool>> {
+        let (value, span) = table.get(key)?;
+        match value {
+            DeValue::Boolean(flag) => Some(self.value(*flag, &span)),
+            _ => {
+                self.wrong_type(&table.what(key), "`true` or `false`", value, &span);
+                None
+            }
+        }
+    }
+
+    /// A whole number that is not negative.
+    pub fn count_at(&mut self, table: &Table, key: &str) -> Option<Value<usize>> {
+        let (value, span) = table.get(key)?;
+        let count = match value {
+            DeValue::Integer(integer) => usize::from_str_radix(integer.as_str(), integer.radix()).ok(),
+            _ => None,
+        };
+        if count.is_none() {
+            let found = match value {
+                DeValue::Integer(_) | DeValue::Float(_) => {
+                    self.source.text().get(span.clone()).unwrap_or("").to_string()
+                }
+                _ => type_name(value),
+            };
+            let what = table.what(key);
+            self.complain(&span, messages::wrong_type(&what, "a whole number from 0", &found));
+        }
+        count.map(|count| self.value(count, &span))
+    }
+
+    /// An array of names of something.
+    pub fn names_at(&mut self, table: &Table, key: &str, what: &str) -> Vec<Value<String>> {
+        let Some((value, span)) = table.get(key) else { return Vec::new() };
+        let DeValue::Array(array) = value else {
+            self.wrong_type(&table.what(key), "an array of names", value, &span);
+            return Vec::new();
+        };
+        let mut names = Vec::new();
+        for item in array.iter() {
+            match item.get_ref() {
+                DeValue::String(text) => names.extend(self.name(what, text, &item.span())),
+                other => self.wrong_type(&table.what(key), "a name", other, &item.span()),
+            }
+        }
+        names
     }
 
     pub fn string_at(&mut self, table: &Table, key: &str) -> Option<Value<String>> {

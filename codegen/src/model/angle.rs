@@ -17,7 +17,7 @@ pub const GREATEST_ANGLE: f64 = 1e6;
 
 /// How an angle was understood.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reading {
+pub(crate) struct Reading {
     /// Sine and cosine of what it is taken as.
     pub sin_cos: (Dd, Dd),
     /// The multiple of π/12 that it is taken as.
@@ -57,7 +57,7 @@ pub(super) fn radians(angle: &Angle) -> Dd {
 }
 
 /// Reads an angle.
-pub(super) fn read(angle: &Angle, tolerance: f64) -> Reading {
+pub(crate) fn read(angle: &Angle, tolerance: f64) -> Reading {
     let x = radians(angle);
     let is_special = |m: i64| m % 2 == 0 || m % 3 == 0;
     let twelfth = Dd::PI / Dd::from(12.0);

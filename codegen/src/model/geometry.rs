@@ -30,48 +30,48 @@ fn snap_sum(x: Dd, scale: f64) -> Dd {
     }
 }
 
-pub(super) fn snap_rotation(r: Mat3<Dd>) -> Mat3<Dd> {
+pub(crate) fn snap_rotation(r: Mat3<Dd>) -> Mat3<Dd> {
     r.map(snap_entry)
 }
 
-pub(super) fn snap_vector(v: Vec3<Dd>, scale: f64) -> Vec3<Dd> {
+pub(crate) fn snap_vector(v: Vec3<Dd>, scale: f64) -> Vec3<Dd> {
     v.map(|x| snap_sum(x, scale))
 }
 
-pub(super) fn snap_tensor(j: Sym3<Dd>) -> Sym3<Dd> {
+pub(crate) fn snap_tensor(j: Sym3<Dd>) -> Sym3<Dd> {
     let scale = [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz].iter().fold(0.0f64, |m, x| m.max(x.abs().to_f64()));
     j.map(|x| snap_sum(x, scale))
 }
 
 /// The greatest magnitude of a component.
-pub(super) fn magnitude(v: Vec3<Dd>) -> f64 {
+pub(crate) fn magnitude(v: Vec3<Dd>) -> f64 {
     v.to_array().iter().fold(0.0, |m, x| m.max(x.abs().to_f64()))
 }
 
-pub(super) fn vector(v: [f64; 3]) -> Vec3<Dd> {
+pub(crate) fn vector(v: [f64; 3]) -> Vec3<Dd> {
     Vec3::from(v.map(|x| Dd::from(x) + Dd::ZERO))
 }
 
 /// The pose of c in a, from that of b in a and that of c in b.
-pub(super) fn compose(x_ab: &Transform<Dd>, x_bc: &Transform<Dd>) -> Transform<Dd> {
+pub(crate) fn compose(x_ab: &Transform<Dd>, x_bc: &Transform<Dd>) -> Transform<Dd> {
     let x = x_ab.compose(x_bc);
     let scale = magnitude(x_ab.translation).max(magnitude(x_bc.translation));
     Transform { rotation: snap_rotation(x.rotation), translation: snap_vector(x.translation, scale) }
 }
 
 /// A point of frame b in frame a.
-pub(super) fn point(x_ab: &Transform<Dd>, p: Vec3<Dd>) -> Vec3<Dd> {
+pub(crate) fn point(x_ab: &Transform<Dd>, p: Vec3<Dd>) -> Vec3<Dd> {
     let scale = magnitude(x_ab.translation).max(magnitude(p));
     snap_vector(x_ab.translation + x_ab.rotation * p, scale)
 }
 
 /// A pure rotation.
-pub(super) fn turned(rotation: Mat3<Dd>) -> Transform<Dd> {
+pub(crate) fn turned(rotation: Mat3<Dd>) -> Transform<Dd> {
     Transform { rotation, translation: Vec3::zero() }
 }
 
 /// The unit vector along `v`; `None` for the null vector.
-pub(super) fn unit(v: Vec3<Dd>) -> Option<Vec3<Dd>> {
+pub(crate) fn unit(v: Vec3<Dd>) -> Option<Vec3<Dd>> {
     let greatest = magnitude(v);
     if greatest < 1e-100 {
         return None;
@@ -85,7 +85,7 @@ pub(super) fn unit(v: Vec3<Dd>) -> Option<Vec3<Dd>> {
 /// The canonical frame of a joint with unit axis `axis`, both in the joint frame of the file: columns are its axes, the
 /// third is `axis`. For a coordinate axis a permutation with signs, cyclic for a positive one; otherwise x stands
 /// perpendicular to the axis and to a coordinate axis, so that at least one entry is zero.
-pub(super) fn canonical_rotation(axis: Vec3<Dd>) -> Mat3<Dd> {
+pub(crate) fn canonical_rotation(axis: Vec3<Dd>) -> Mat3<Dd> {
     let (o, i) = (Dd::ZERO, Dd::ONE);
     let (x, y, z) = (Vec3::new(i, o, o), Vec3::new(o, i, o), Vec3::new(o, o, i));
     if axis == z {
@@ -118,7 +118,7 @@ pub(super) fn canonical_rotation(axis: Vec3<Dd>) -> Mat3<Dd> {
 }
 
 /// The rotation about the unit vector `e`: Rodrigues' formula, (20.108) with the dot product.
-pub(super) fn about(e: Vec3<Dd>, (sin, cos): (Dd, Dd)) -> Mat3<Dd> {
+pub(crate) fn about(e: Vec3<Dd>, (sin, cos): (Dd, Dd)) -> Mat3<Dd> {
     let turn = |v: Vec3<Dd>| v.scale(cos) + e.scale((Dd::ONE - cos) * e.dot(v)) + e.cross(v).scale(sin);
     let (o, i) = (Dd::ZERO, Dd::ONE);
     let columns = [Vec3::new(i, o, o), Vec3::new(o, i, o), Vec3::new(o, o, i)].map(turn);
@@ -126,7 +126,7 @@ pub(super) fn about(e: Vec3<Dd>, (sin, cos): (Dd, Dd)) -> Mat3<Dd> {
 }
 
 /// The principal moments of a tensor, ascending: cyclic Jacobi rotations, to 1e-14 of its greatest entry.
-pub(super) fn principal_moments(j: Sym3<f64>) -> [f64; 3] {
+pub(crate) fn principal_moments(j: Sym3<f64>) -> [f64; 3] {
     let mut a = [[j.xx, j.xy, j.xz], [j.xy, j.yy, j.yz], [j.xz, j.yz, j.zz]];
     let scale = a.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()));
     if scale == 0.0 {

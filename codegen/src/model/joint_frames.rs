@@ -1,21 +1,15 @@
 //! From links and joints with frames to bodies: fixed joints merged, canonical frames, depth first.
 
-use super::geometry::{canonical_rotation, compose, point, snap_tensor, snap_vector, turned, unit, vector};
+use super::geometry::{canonical_rotation, compose, point, snap_tensor, turned, unit, vector};
+use super::merge::{merge, Part};
 use super::{angle, check, transform, Assembly, ModelOptions};
 use crate::description::{messages, BaseKind, Description, Inertial, JointFrameNotation, JointKind};
 use crate::diagnostic::{Diagnostics, Place};
 use std::collections::BTreeMap;
 use straightline_core::algorithms::composing_pays;
 use straightline_core::model::{Body, BodyId, Frame, Joint, JointEffects, JointKind as ModelJointKind, Limits};
-use straightline_core::spatial::{SpatialInertia, Sym3, Transform, Vec3};
+use straightline_core::spatial::{SpatialInertia, Transform};
 use straightline_core::Dd;
-
-/// What a link adds to its body, in the body's canonical frame.
-struct Part {
-    mass: Dd,
-    com: Vec3<Dd>,
-    inertia_com: Sym3<Dd>,
-}
 
 pub(super) fn assemble(
     notation: &JointFrameNotation,
@@ -166,39 +160,6 @@ fn part(inertial: &Inertial, x_body_link: &Transform<Dd>, tolerance: f64) -> Par
         com: point(x_body_link, vector(inertial.com.value)),
         inertia_com: snap_tensor(inertial.inertia.value.map(Dd::from).rotated(&r_body_inertial)),
     }
-}
-
-/// The inertia of parts that are fixed to each other: mass centres weighed, tensors by the parallel-axis theorem
-/// J = Σ J_i + m_i (d_i·d_i 1 − d_i d_iᵀ), d_i from the common mass centre to that of part i.
-fn merge(parts: &[Part]) -> SpatialInertia<Dd> {
-    let massive: Vec<&Part> = parts.iter().filter(|p| p.mass != Dd::ZERO).collect();
-    let mass = massive.iter().fold(Dd::ZERO, |sum, p| sum + p.mass);
-    let com = match massive[..] {
-        [] => parts.first().map_or(Vec3::zero(), |p| p.com),
-        [single] => single.com,
-        _ => {
-            let scale = massive.iter().map(|p| super::geometry::magnitude(p.com)).fold(0.0, f64::max);
-            let moment = massive.iter().fold(Vec3::zero(), |sum, p| sum + p.com.scale(p.mass));
-            snap_vector(moment.map(|x| x / mass), scale)
-        }
-    };
-    let mut inertia = parts.iter().fold(Sym3::zero(), |sum, p| sum + p.inertia_com);
-    if massive.len() > 1 {
-        for part in massive {
-            let d = part.com - com;
-            let m = part.mass;
-            inertia = inertia
-                + Sym3 {
-                    xx: m * (d.y * d.y + d.z * d.z),
-                    xy: -(m * d.x * d.y),
-                    xz: -(m * d.x * d.z),
-                    yy: m * (d.x * d.x + d.z * d.z),
-                    yz: -(m * d.y * d.z),
-                    zz: m * (d.x * d.x + d.y * d.y),
-                };
-        }
-    }
-    SpatialInertia::new(mass, com, snap_tensor(inertia))
 }
 
 /// Warns of links whose mass is written as zero while nothing of their body has any, but what they carry has.

@@ -28,11 +28,12 @@
 //! assert_eq!(model.unwrap().bodies[0].joint.name, "pivot");
 //! ```
 
-mod angle;
+pub(crate) mod angle;
 mod check;
-mod geometry;
+pub(crate) mod geometry;
 mod joint_frames;
 mod mass_centres;
+pub(crate) mod merge;
 
 use crate::description::{self, messages, Angle, Description, Notation, Pose, Rotation, Value};
 use crate::diagnostic::{Diagnostics, Place, Source};

@@ -4,12 +4,23 @@
 //! inputs to constants ([`Scene::zero`], gravity), makes constants inputs ([`Scene::parameters`]), and selects results
 //! ([`Scene::outputs`]); folding and dead code do the rest.
 
+mod apply;
 mod bind;
+mod check;
+pub mod messages;
+mod places;
+mod read;
 
+pub use apply::apply;
 pub use bind::{is_optional, load_parameters, without_parameters, Bound, LOAD_SCALARS};
+pub use check::check_options;
+pub use places::Places;
+pub use read::{read, SceneFile};
 
 use crate::function::Function;
+use crate::model::ModelOptions;
 use std::collections::BTreeMap;
+use straightline_core::model::{JointKind, Model};
 
 /// A scene. The default asks for everything and holds nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -18,6 +29,8 @@ pub struct Scene {
     pub outputs: BTreeMap<Function, Selection>,
     /// Gravity.
     pub gravity: Gravity,
+    /// How the robot stands in the world.
+    pub base: Base,
     /// Joints that do not move, with their coordinates \[rad or m\]: their bodies become one.
     pub locked: Vec<(String, f64)>,
     /// Bodies welded to links.
@@ -32,6 +45,34 @@ pub struct Scene {
     pub staged: bool,
     /// What a function may cost at most.
     pub budgets: BTreeMap<Function, Budget>,
+    /// Where its values stand in a scene file; empty for a scene made in code.
+    pub places: Places,
+}
+
+impl Scene {
+    /// The options under which the robot file is read for this scene.
+    pub fn model_options(&self, options: &ModelOptions) -> ModelOptions {
+        let floats = matches!(self.base, Base::Floating | Base::Moving);
+        ModelOptions { floating_base: options.floating_base || floats, ..options.clone() }
+    }
+
+    /// The same scene with its outputs spelled out for a robot: where the base moves as it is told, of forces over the
+    /// joints those of the joints beside it.
+    pub fn resolved<T>(&self, model: &Model<T>) -> Scene {
+        let mut scene = self.clone();
+        if self.base == Base::Moving {
+            use Function::{BiasForce, GravityForce, InverseDynamics, VelocityForce};
+            let joints = model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind != JointKind::Floating);
+            let joints: Vec<String> = joints.map(|j| j.name.clone()).collect();
+            for function in [InverseDynamics, GravityForce, BiasForce, VelocityForce] {
+                let selection = scene.outputs.entry(function).or_default();
+                if selection.joints.is_empty() {
+                    selection.joints.clone_from(&joints);
+                }
+            }
+        }
+        scene
+    }
 }
 
 /// The part of a function's results that is wanted. Names that are empty lists mean all.
@@ -59,6 +100,17 @@ pub enum Part {
     Diagonal,
 }
 
+impl Part {
+    /// Every part with its word in scene files.
+    pub const WORDS: [(&str, Part); 4] =
+        [("whole", Part::Whole), ("linear", Part::Linear), ("angular", Part::Angular), ("diagonal", Part::Diagonal)];
+
+    /// Its word in scene files.
+    pub fn word(self) -> &'static str {
+        Part::WORDS.iter().find(|w| w.1 == self).map_or("", |w| w.0)
+    }
+}
+
 /// Gravity of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Gravity {
@@ -69,6 +121,21 @@ pub enum Gravity {
     Constant([f64; 3]),
     /// An input `gravity` of every function that depends on it \[m/s²\].
     Input,
+}
+
+/// How the robot of a scene stands in the world.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Base {
+    /// As the robot file or the model options say.
+    #[default]
+    OfRobot,
+    /// The root link is the world, also where the file lets it float.
+    Fixed,
+    /// The root link moves freely.
+    Floating,
+    /// The root link moves as q, q̇ and q̈ say, whatever drives it: a floating base of which only the joints' forces are
+    /// wanted.
+    Moving,
 }
 
 /// A body welded to a frame of the robot.
@@ -143,6 +210,16 @@ pub enum Parameter {
         /// The link.
         link: String,
     },
+}
+
+impl Parameter {
+    /// Its name as it is given: that of the payload, or of the link.
+    pub fn name(&self) -> &str {
+        match self {
+            Parameter::Payload { name, .. } => name,
+            Parameter::Link { link } => link,
+        }
+    }
 }
 
 /// What a function may cost; what is left out is free.

@@ -1,0 +1,156 @@
+//! A scene where it edits the robot: joints locked, payloads welded on, gravity and effects as they are wanted.
+//!
+//! Everything is in double-double, and zeros and ones of rotations stay exact, so that a robot with a locked joint has the
+//! same simple form as if its file had a fixed joint there.
+
+use super::{check, Base, Coulomb, Effects, Gravity, Scene};
+use crate::description::{Angle, AngleUnit};
+use crate::diagnostic::{Diagnostics, Place};
+use crate::model::angle;
+use crate::model::geometry::{about, compose, turned, vector};
+use crate::model::merge::{merge, Part};
+use straightline_core::algorithms::composing_pays;
+use straightline_core::model::{self, Body, BodyId, Frame, JointEffects, JointKind, Model};
+use straightline_core::spatial::{Mat3, Sym3, Transform, Vec3};
+use straightline_core::Dd;
+
+/// The robot of a scene, from the robot of the file as [`Scene::model_options`] reads it. All names of the scene are
+/// checked against it. Complaints go to `diagnostics`; `None` after errors.
+///
+/// What stays symbolic (parameters, gravity as an input) and what is selected or known to be zero is left to tracing.
+pub fn apply(model: Model<Dd>, scene: &Scene, diagnostics: &mut Diagnostics) -> Option<Model<Dd>> {
+    match scene.places.source() {
+        // a scene from a file was checked by itself when it was read
+        Some(source) => diagnostics.add_source(source),
+        None => check::alone(scene, diagnostics),
+    }
+    let held: Vec<Option<Held>> = model.bodies.iter().map(|body| held(body, scene)).collect();
+    check::against(&model, scene, &held.iter().map(Option::is_some).collect::<Vec<_>>(), diagnostics);
+    if diagnostics.has_errors() {
+        return None;
+    }
+    let mut model = lock(model, &held);
+    weld(&mut model, scene);
+    if let Gravity::Constant(gravity) = scene.gravity {
+        model.gravity = vector(gravity);
+    }
+    for body in &mut model.bodies {
+        body.effects = wanted_effects(&body.effects, &scene.effects);
+    }
+    Some(model)
+}
+
+/// Pose of a body whose joint does not move, in its joint frame of the parent.
+type Held = Transform<Dd>;
+
+/// How a scene holds a body against its parent; `None` if its joint moves.
+fn held(body: &Body<Dd>, scene: &Scene) -> Option<Held> {
+    if body.joint.kind == JointKind::Floating {
+        return (scene.base == Base::Fixed).then(Transform::identity);
+    }
+    let (_, q) = scene.locked.iter().find(|(name, _)| *name == body.joint.name)?;
+    let z = Vec3::unit_z();
+    Some(match body.joint.kind {
+        JointKind::Prismatic => Transform { rotation: Mat3::identity(), translation: z.scale(Dd::from(*q)) },
+        _ => {
+            // as in robot files: 1.5707963267948966 is a right angle
+            let q = Angle { value: *q, unit: AngleUnit::Radian, text: String::new(), place: Place::none() };
+            turned(about(z, angle::read(&q, angle::ROUNDING).sin_cos))
+        }
+    })
+}
+
+/// The robot with bodies merged whose joints do not move: the inertia of each goes to the nearest body below it that moves,
+/// or to the world, and so do its frames and the bodies that it carries. The other coordinates keep their order.
+fn lock(model: Model<Dd>, held: &[Option<Held>]) -> Model<Dd> {
+    if held.iter().all(Option::is_none) {
+        return model;
+    }
+    // for every old body, the new one that it is part of, and its pose there
+    let mut carriers: Vec<(Option<BodyId>, Transform<Dd>)> = Vec::new();
+    let mut parts: Vec<Vec<Part>> = Vec::new();
+    let mut bodies: Vec<Body<Dd>> = Vec::new();
+    for (body, held) in model.bodies.into_iter().zip(held) {
+        let (parent, x_carrier_parent) = body.parent.map_or((None, Transform::identity()), |p| carriers[p]);
+        let placement = compose(&x_carrier_parent, &body.placement);
+        match held {
+            Some(x_joint_body) => {
+                let x_carrier_body = compose(&placement, x_joint_body);
+                if let Some(parent) = parent {
+                    let i = &body.inertia;
+                    parts[parent].push(Part::placed(i.mass, i.com, i.inertia_com, &x_carrier_body));
+                }
+                carriers.push((parent, x_carrier_body));
+            }
+            None => {
+                carriers.push((Some(bodies.len()), Transform::identity()));
+                parts.push(vec![Part::of(&body.inertia)]);
+                let dense = composing_pays(parent, &placement.rotation);
+                bodies.push(Body { parent, placement, dense, ..body });
+            }
+        }
+    }
+    for (body, parts) in bodies.iter_mut().zip(&parts) {
+        if parts.len() > 1 {
+            body.inertia = merge(parts);
+        }
+    }
+    renumber(&mut bodies);
+    let frames = model.frames.into_iter().map(|frame| match frame.body {
+        Some(old) => {
+            let (body, x_carrier_body) = &carriers[old];
+            Frame { body: *body, placement: compose(x_carrier_body, &frame.placement), ..frame }
+        }
+        None => frame,
+    });
+    Model { frames: frames.collect(), bodies, ..model }
+}
+
+/// Gives the joints that are left their places in the coordinate vectors, in the order that they have.
+fn renumber(bodies: &mut [Body<Dd>]) {
+    let mut order: Vec<BodyId> = (0..bodies.len()).collect();
+    order.sort_by_key(|&id| bodies[id].joint.iv);
+    let (mut iq, mut iv) = (0, 0);
+    for id in order {
+        let joint = &mut bodies[id].joint;
+        (joint.iq, joint.iv) = (iq, iv);
+        iq += joint.kind.nq();
+        iv += joint.kind.nv();
+    }
+}
+
+/// Adds the payloads to the bodies that carry them.
+fn weld(model: &mut Model<Dd>, scene: &Scene) {
+    let mut parts: Vec<Vec<Part>> = model.bodies.iter().map(|body| vec![Part::of(&body.inertia)]).collect();
+    for payload in &scene.payloads {
+        let frame = model.frame(&payload.frame).expect("the frames of payloads were checked");
+        let Some(body) = frame.body else { continue };
+        let [xx, xy, xz, yy, yz, zz] = payload.inertia.map(Dd::from);
+        let inertia = Sym3 { xx, xy, xz, yy, yz, zz };
+        parts[body].push(Part::placed(Dd::from(payload.mass), vector(payload.com), inertia, &frame.placement));
+    }
+    for (body, parts) in model.bodies.iter_mut().zip(&parts) {
+        if parts.len() > 1 {
+            body.inertia = merge(parts);
+        }
+    }
+}
+
+/// Those of a joint's effects that the scene wants.
+fn wanted_effects(of_robot: &JointEffects<Dd>, wanted: &Effects) -> JointEffects<Dd> {
+    let force = match of_robot.coulomb {
+        model::Coulomb::Off => None,
+        model::Coulomb::Sign(force) | model::Coulomb::Smooth { force, .. } => Some(force),
+    };
+    JointEffects {
+        rotor_inertia: of_robot.rotor_inertia.filter(|_| wanted.rotor_inertia),
+        damping: if wanted.damping { of_robot.damping } else { Dd::ZERO },
+        coulomb: match (force, wanted.coulomb) {
+            (None, _) | (_, Coulomb::Off) => model::Coulomb::Off,
+            (Some(force), Coulomb::Sign) => model::Coulomb::Sign(force),
+            (Some(force), Coulomb::Smooth(speed)) => model::Coulomb::Smooth { force, speed: Dd::from(speed) },
+        },
+        stiffness: if wanted.springs { of_robot.stiffness } else { Dd::ZERO },
+        spring_rest: if wanted.springs { of_robot.spring_rest } else { Dd::ZERO },
+    }
+}

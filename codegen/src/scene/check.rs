@@ -1,0 +1,246 @@
+//! What can be wrong with a scene: by itself, beside the options, and with a robot.
+
+use super::messages::{self as say, unphysical_moments};
+use super::{Base, Coulomb, Gravity, Parameter, Part, Payload, Scene};
+use crate::compile::Options;
+use crate::diagnostic::Diagnostics;
+use crate::function::Function;
+use crate::model::geometry::principal_moments;
+use straightline_core::model::{JointKind, Model};
+use straightline_core::spatial::Sym3;
+use straightline_core::Dd;
+
+/// A principal moment may exceed the sum of the others by so much, relatively: the digits of published tensors.
+const MOMENT_DIGITS: f64 = 1e-6;
+/// Names of inputs that a parameter cannot have.
+const INPUTS: [&str; 5] = ["q", "qd", "qdd", "tau", "gravity"];
+
+/// What is wrong with a scene, whatever the robot.
+pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
+    let places = &scene.places;
+    for (&function, selection) in &scene.outputs {
+        let name = function.name();
+        let path = |key: &str| format!("outputs.{name}.{key}");
+        for (key, wanted, possible) in [
+            ("joints", &selection.joints, by_joints as fn(Function) -> bool),
+            ("frames", &selection.frames, Function::is_per_frame),
+        ] {
+            if !wanted.is_empty() && !possible(function) {
+                let others: Vec<&str> = Function::all().filter(|f| possible(*f)).map(Function::name).collect();
+                places.complain(&path(key), say::not_a_selection(name, key, &others), diagnostics);
+            }
+        }
+        let parts = parts_of(function);
+        if selection.part != Part::Whole && !parts.contains(&selection.part) {
+            let words: Vec<&str> = parts.iter().map(|p| p.word()).collect();
+            places.complain(&path("part"), say::no_such_part(name, selection.part.word(), &words), diagnostics);
+        }
+    }
+    for (i, (joint, value)) in scene.locked.iter().enumerate() {
+        let path = format!("hold.joints.{joint}");
+        if scene.locked[..i].iter().any(|(other, _)| other == joint) {
+            places.complain(&path, say::locked_twice(joint), diagnostics);
+        }
+        if !(value.abs() <= 1e6) {
+            let what = format!("the value of the locked joint `{joint}`");
+            places.complain(&path, say::not_in_range(&what, *value, "between -1e6 and 1e6"), diagnostics);
+        }
+    }
+    if let Gravity::Constant(gravity) = scene.gravity {
+        if let Some(x) = gravity.into_iter().find(|x| !(x.abs() <= 1e6)) {
+            places.complain("hold.gravity", say::not_in_range("gravity", x, "a number of m/s²"), diagnostics);
+        }
+    }
+    if let Coulomb::Smooth(speed) = scene.effects.coulomb {
+        // its square must not vanish beside one
+        if !(1e-9..=1e9).contains(&speed) {
+            let complaint = say::not_in_range("coulomb_speed", speed, "between 1e-9 and 1e9");
+            places.complain("effects.coulomb_speed", complaint, diagnostics);
+        }
+    }
+    for (i, payload) in scene.payloads.iter().enumerate() {
+        if scene.payloads[..i].iter().any(|other| other.name == payload.name) {
+            places.complain(&format!("payload.{i}.name"), say::payload_name_twice(&payload.name), diagnostics);
+        }
+        if let Some((key, why)) = unphysical(payload) {
+            places.complain(&format!("payload.{i}.{key}"), say::unphysical_body(&payload.name, &why), diagnostics);
+        }
+    }
+    for (i, parameter) in scene.parameters.iter().enumerate() {
+        let (name, input, path) = (parameter.name(), parameter.input_name(), format!("parameter.{i}"));
+        let earlier = &scene.parameters[..i];
+        let taken = match () {
+            () if INPUTS.contains(&input.as_str()) => Some("one of the robot's own"),
+            () if input.is_empty() || input == "unnamed" => Some("no name: it has no letter or digit"),
+            () if earlier.iter().any(|other| other.input_name() == input) => Some("that of another parameter"),
+            () => None,
+        };
+        match (parameter, taken) {
+            (Parameter::Link { link }, Some(_)) if earlier.contains(parameter) => {
+                places.complain(&format!("{path}.link"), say::link_given_twice(link), diagnostics);
+            }
+            (_, Some(taken)) => {
+                places.complain(&format!("{path}.name"), say::parameter_name(name, &input, taken), diagnostics);
+            }
+            (_, None) => {}
+        }
+    }
+}
+
+/// What a scene and the options beside it contradict each other in. Scenes from files are read into options by
+/// [`SceneFile::into_options`](super::SceneFile::into_options), which cannot contradict itself.
+pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
+    let scene = &options.scene;
+    if let Some(source) = scene.places.source() {
+        diagnostics.add_source(source);
+    }
+    if scene.gravity != Gravity::OfRobot && options.model.gravity.is_some() {
+        scene.places.complain("hold.gravity", say::said_twice("gravity"), diagnostics);
+    }
+    if scene.base == Base::Fixed && options.model.floating_base {
+        scene.places.complain("hold.base", say::said_twice("the base"), diagnostics);
+    }
+    if scene.base == Base::Moving && options.functions.contains(&Function::ForwardDynamics) {
+        scene.places.complain("hold.base", say::moving_base_forward(), diagnostics);
+    }
+    for function in scene.budgets.keys().filter(|f| !options.functions.contains(f)) {
+        let name = function.name();
+        scene.places.complain(&format!("budget.{name}"), say::budget_alone(name), diagnostics);
+    }
+}
+
+/// What is wrong with a scene for a robot; `held` says which of its bodies do not move against their parents.
+pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnostics: &mut Diagnostics) {
+    let places = &scene.places;
+    let joint_names = || model.bodies.iter().map(|b| b.joint.name.as_str());
+    let find = |name: &str| model.bodies.iter().position(|b| b.joint.name == name);
+    // joints that must have a coordinate
+    let mut wanted: Vec<(String, String, &str)> = Vec::new();
+    for (function, selection) in &scene.outputs {
+        for (i, joint) in selection.joints.iter().enumerate() {
+            let (owner, path) = (format!("outputs of `{}`", function.name()), function.name());
+            wanted.push((owner, format!("outputs.{path}.joints.{i}"), joint));
+        }
+    }
+    for (i, joint) in scene.zero.joints_at_rest.iter().enumerate() {
+        wanted.push(("joints at rest".to_string(), format!("zero.joints_at_rest.{i}"), joint));
+    }
+    for (owner, path, joint) in wanted {
+        match find(joint) {
+            None => places.complain(&path, say::unknown_joint(&owner, joint, joint_names()), diagnostics),
+            Some(body) if held[body] => {
+                places.complain(&path, say::locked_joint_wanted(&owner, joint), diagnostics);
+            }
+            Some(_) => {}
+        }
+    }
+    for (joint, value) in &scene.locked {
+        let path = format!("hold.joints.{joint}");
+        let Some(body) = find(joint) else {
+            places.complain(&path, say::unknown_joint("locked joints", joint, joint_names()), diagnostics);
+            continue;
+        };
+        let (kind, limits) = (model.bodies[body].joint.kind, model.bodies[body].joint.limits);
+        if kind == JointKind::Floating {
+            places.complain(&path, say::base_locked(joint), diagnostics);
+        } else if *value < limits.lower || *value > limits.upper {
+            let complaint = say::locked_beyond_limits(joint, *value, limits.lower, limits.upper);
+            places.complain(&path, complaint, diagnostics);
+        }
+    }
+    if !held.is_empty() && held.iter().all(|held| *held) {
+        places.complain("hold.joints", say::nothing_left(&model.name), diagnostics);
+    }
+    frames(model, scene, held, diagnostics);
+}
+
+/// The names of frames and links.
+fn frames(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnostics: &mut Diagnostics) {
+    let places = &scene.places;
+    let unknown =
+        |owner: &str, name: &str| say::unknown_frame(owner, name, model.frames.iter().map(|f| f.name.as_str()));
+    // the body that a frame moves with in this scene
+    let carrier = |name: &str| {
+        let mut body = model.frame(name)?.body;
+        while let Some(id) = body.filter(|id| held[*id]) {
+            body = model.bodies[id].parent;
+        }
+        body
+    };
+    for (function, selection) in &scene.outputs {
+        for (i, frame) in selection.frames.iter().enumerate().filter(|(_, f)| model.frame(f).is_none()) {
+            let path = format!("outputs.{}.frames.{i}", function.name());
+            places.complain(&path, unknown(&format!("outputs of `{}`", function.name()), frame), diagnostics);
+        }
+    }
+    for (i, Payload { name, frame, .. }) in scene.payloads.iter().enumerate() {
+        let path = format!("payload.{i}.frame");
+        if model.frame(frame).is_none() {
+            places.complain(&path, unknown(&format!("payload `{name}`"), frame), diagnostics);
+        } else if carrier(frame).is_none() {
+            places.complain(&path, say::payload_on_world(name, frame), diagnostics);
+        }
+    }
+    for (i, parameter) in scene.parameters.iter().enumerate() {
+        let owner = format!("parameter `{}`", parameter.name());
+        let (name, moves_with) = (parameter.frame(), carrier(parameter.frame()));
+        let is_known = model.frame(name).is_some();
+        let complaint = match (parameter, moves_with) {
+            (Parameter::Payload { .. }, _) if !is_known => unknown(&owner, name),
+            (_, None) if is_known => say::parameter_on_world(&owner, name),
+            (Parameter::Link { link }, _) if !is_link_of(model, held, link) => {
+                let links = model.bodies.iter().zip(held).filter(|(_, held)| !**held).map(|(b, _)| b.name.as_str());
+                let carrier = moves_with.map(|id| model.bodies[id].name.as_str());
+                say::unknown_moving_link(&owner, link, carrier, links)
+            }
+            _ => continue,
+        };
+        let key = if matches!(parameter, Parameter::Link { .. }) { "link" } else { "frame" };
+        places.complain(&format!("parameter.{i}.{key}"), complaint, diagnostics);
+    }
+}
+
+/// Whether a joint that moves carries the link of that name.
+fn is_link_of(model: &Model<Dd>, held: &[bool], link: &str) -> bool {
+    model.bodies.iter().zip(held).any(|(body, held)| body.name == link && !held)
+}
+
+/// Why a payload is no rigid body, with the key that says so.
+fn unphysical(payload: &Payload) -> Option<(&'static str, String)> {
+    let Payload { mass, com, inertia, .. } = payload;
+    let is_fit = |x: &f64| x.abs() <= 1e60;
+    if !is_fit(mass) || !com.iter().all(is_fit) || !inertia.iter().all(is_fit) {
+        return Some(("mass", "a number is not finite".to_string()));
+    }
+    if *mass < 0.0 {
+        return Some(("mass", format!("its mass is negative: {mass:?} kg")));
+    }
+    if *mass == 0.0 && inertia.iter().any(|x| *x != 0.0) {
+        return Some(("mass", "it has inertia and no mass".to_string()));
+    }
+    let [xx, xy, xz, yy, yz, zz] = *inertia;
+    let moments = principal_moments(Sym3 { xx, xy, xz, yy, yz, zz });
+    let slack = MOMENT_DIGITS * moments[2].abs().max(moments[0].abs());
+    unphysical_moments(moments, slack).map(|why| ("inertia", why))
+}
+
+/// Whether the results of a function, or its columns, belong to joints.
+fn by_joints(function: Function) -> bool {
+    use Function::*;
+    match function {
+        InverseDynamics | GravityForce | BiasForce | VelocityForce | ForwardDynamics => true,
+        MassMatrix | JointWrenches | Jacobian => true,
+        ForwardKinematics | FrameVelocity | FrameAcceleration | JacobianBias => false,
+        Energy | CentreOfMass | Momentum => false,
+    }
+}
+
+/// The parts that the results of a function have.
+fn parts_of(function: Function) -> &'static [Part] {
+    match function {
+        Function::MassMatrix => &[Part::Diagonal],
+        Function::JointWrenches => &[Part::Linear, Part::Angular],
+        f if f.is_per_frame() => &[Part::Linear, Part::Angular],
+        _ => &[],
+    }
+}

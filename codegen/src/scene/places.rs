@@ -1,0 +1,62 @@
+//! Where the values of a scene stand in its file.
+
+use crate::diagnostic::{Diagnostic, Diagnostics, Place, Source};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Places by the path of the value's keys, such as `hold.joints.elbow` or `payload.0.mass`. They say nothing of the scene
+/// itself: two scenes are equal wherever they stand, and print alike, so that output does not depend on a path.
+#[derive(Clone, Default)]
+pub struct Places {
+    source: Option<Source>,
+    places: BTreeMap<String, Place>,
+}
+
+impl Places {
+    /// Of values in that file.
+    pub fn new(source: &Source) -> Places {
+        Places { source: Some(source.clone()), places: BTreeMap::new() }
+    }
+
+    /// The file; `None` for a scene made in code.
+    pub fn source(&self) -> Option<&Source> {
+        self.source.as_ref()
+    }
+
+    /// Notes a value's place.
+    pub fn note(&mut self, path: impl Into<String>, place: &Place) {
+        self.places.insert(path.into(), place.clone());
+    }
+
+    /// The place of a value, or else of the table that it would stand in.
+    pub fn place(&self, path: &str) -> Option<&Place> {
+        let mut path = path;
+        loop {
+            match (self.places.get(path), path.rfind('.')) {
+                (Some(place), _) => return Some(place),
+                (None, Some(dot)) => path = &path[..dot],
+                (None, None) => return None,
+            }
+        }
+    }
+
+    /// Adds a complaint about the value of that path.
+    pub(super) fn complain(&self, path: &str, diagnostic: Diagnostic, diagnostics: &mut Diagnostics) {
+        diagnostics.push(match self.place(path) {
+            Some(place) => diagnostic.at(place),
+            None => diagnostic,
+        });
+    }
+}
+
+impl PartialEq for Places {
+    fn eq(&self, _: &Places) -> bool {
+        true
+    }
+}
+
+impl fmt::Debug for Places {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Places")
+    }
+}

@@ -1,0 +1,346 @@
+//! Scene files: TOML, documented in `SCENES.md`. Every complaint has its place, and all come in one run.
+
+use super::messages as say;
+use super::{check, Base, Budget, Coulomb, Gravity, Parameter, Part, Payload, Places, Scene, Selection};
+use crate::compile::Options;
+use crate::description::reader::{Range64, Reader, LARGEST_FILE};
+use crate::description::table::{parse, Table};
+use crate::description::{messages, Value};
+use crate::diagnostic::{Diagnostics, Source};
+use crate::emit::Scalar;
+use crate::function::Function;
+use crate::words::Choice;
+use toml::de::DeValue;
+
+const TOP: &[&str] = &["outputs", "hold", "payload", "zero", "effects", "parameter", "numbers", "budget"];
+const BUDGET: &[&str] = &["max_flops", "max_sincos", "max_live", "max_stack_bytes", "max_code_bytes"];
+const BASES: [(&str, Base); 3] = [("fixed", Base::Fixed), ("floating", Base::Floating), ("moving", Base::Moving)];
+/// A place in the list of effects: that its speed is still to be read.
+const SMOOTH: Coulomb = Coulomb::Smooth(0.0);
+const COULOMB: [(&str, Coulomb); 3] = [("off", Coulomb::Off), ("sign", Coulomb::Sign), ("smooth", SMOOTH)];
+
+/// What a scene file says: the scene, and options of the compiler.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SceneFile {
+    /// The scene.
+    pub scene: Scene,
+    /// The functions that are wanted; `None`: all.
+    pub functions: Option<Vec<Function>>,
+    /// The scalar type.
+    pub scalar: Option<Scalar>,
+    /// So near to a special angle \[rad\] an angle of the robot file is taken as that.
+    pub angle_tolerance: Option<f64>,
+}
+
+impl SceneFile {
+    /// These options with what the file says in their place, and with its scene.
+    pub fn into_options(self, mut options: Options) -> Options {
+        let moves_as_told = self.scene.base == Base::Moving;
+        let all = || Function::all().filter(|f| !moves_as_told || *f != Function::ForwardDynamics).collect();
+        options.functions = self.functions.unwrap_or_else(all);
+        options.scalar = self.scalar.unwrap_or(options.scalar);
+        options.model.angle_tolerance = self.angle_tolerance.unwrap_or(options.model.angle_tolerance);
+        options.scene = self.scene;
+        options
+    }
+}
+
+/// Reads a scene file. Complaints go to `diagnostics`; `None` after errors. Names are checked where the robot is known: by
+/// [`apply`](super::apply).
+///
+/// ```
+/// use straightline_codegen::diagnostic::{Diagnostics, Source};
+/// use straightline_codegen::scene::{read, Gravity};
+/// let text = "[hold]\ngravity = \"zero\"\njoints = { wrist = 0.5 }\n";
+/// let mut diagnostics = Diagnostics::new();
+/// let file = read(&Source::new("free_fall.toml", text), &mut diagnostics).unwrap();
+/// assert_eq!(file.scene.gravity, Gravity::Constant([0.0; 3]));
+/// assert_eq!(file.scene.locked, [("wrist".to_string(), 0.5)]);
+/// ```
+pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<SceneFile> {
+    let mut found = Diagnostics::new();
+    found.add_source(source);
+    let file = read_text(source, &mut found).filter(|_| !found.has_errors());
+    diagnostics.extend(found);
+    file
+}
+
+fn read_text(source: &Source, diagnostics: &mut Diagnostics) -> Option<SceneFile> {
+    if let Some(at) = source.invalid_utf8() {
+        diagnostics.push(messages::not_utf8().at(&source.place(at..at)));
+        return None;
+    }
+    if source.text().len() > LARGEST_FILE {
+        let size = source.text().len();
+        diagnostics.push(messages::file_too_large(size, LARGEST_FILE).at(&source.place(0..0)));
+        return None;
+    }
+    let document = parse(source, diagnostics)?;
+    let top = Table { owner: "a scene".to_string(), table: document.get_ref(), span: 0..0 };
+    let mut scene = SceneReader {
+        reader: Reader::new(source, diagnostics),
+        file: SceneFile { scene: Scene { places: Places::new(source), ..Scene::default() }, ..SceneFile::default() },
+    };
+    scene.read(&top);
+    let file = scene.file;
+    check::alone(&file.scene, diagnostics);
+    Some(file)
+}
+
+/// A scene file that is being read.
+struct SceneReader<'a> {
+    reader: Reader<'a>,
+    file: SceneFile,
+}
+
+impl SceneReader<'_> {
+    fn read(&mut self, top: &Table) {
+        self.reader.check_keys(top, TOP);
+        if let Some(table) = self.reader.table_at(top, "outputs", "[outputs]") {
+            self.outputs(&table);
+        }
+        if let Some(table) = self.reader.table_at(top, "hold", "[hold]") {
+            self.hold(&table);
+        }
+        for table in self.reader.tables_at(top, "payload") {
+            self.payload(table);
+        }
+        if let Some(table) = self.reader.table_at(top, "zero", "[zero]") {
+            self.zero(&table);
+        }
+        if let Some(table) = self.reader.table_at(top, "effects", "[effects]") {
+            self.effects(&table);
+        }
+        for table in self.reader.tables_at(top, "parameter") {
+            self.parameter(table);
+        }
+        if let Some(table) = self.reader.table_at(top, "numbers", "[numbers]") {
+            self.numbers(&table);
+        }
+        if let Some(table) = self.reader.table_at(top, "budget", "[budget]") {
+            self.budgets(&table);
+        }
+    }
+
+    /// The value, its place noted under that path.
+    fn noted<T>(&mut self, path: &str, value: Option<Value<T>>) -> Option<T> {
+        let value = value?;
+        self.file.scene.places.note(path, &value.place);
+        Some(value.value)
+    }
+
+    /// Names in an array, their places noted under that path.
+    fn names(&mut self, path: &str, table: &Table, key: &str, what: &str) -> Vec<String> {
+        let names = self.reader.names_at(table, key, what);
+        if let Some((_, span)) = table.get(key) {
+            let place = self.reader.place(&span);
+            self.file.scene.places.note(path, &place);
+        }
+        let note = |(i, name): (usize, Value<String>)| {
+            self.file.scene.places.note(format!("{path}.{i}"), &name.place);
+            name.value
+        };
+        names.into_iter().enumerate().map(note).collect()
+    }
+
+    fn outputs(&mut self, table: &Table) {
+        let names: Vec<&str> = Function::all().map(Function::name).collect();
+        self.reader.check_keys(table, &[&["functions"], &names[..]].concat());
+        let mut functions: Vec<Function> = Vec::new();
+        for name in self.reader.names_at(table, "functions", "function") {
+            match Function::from_name(&name.value) {
+                Some(function) => functions.push(function),
+                None => {
+                    let complaint = messages::unknown_word("functions of [outputs]", &name.value, &names);
+                    self.reader.diagnostics.push(complaint.at(&name.place));
+                }
+            }
+        }
+        for function in Function::all() {
+            let name = function.name();
+            let owner = format!("`{name}` of [outputs]");
+            let Some(wanted) = self.reader.table_at(table, name, &owner) else { continue };
+            self.reader.check_keys(&wanted, &["joints", "frames", "part"]);
+            let path = format!("outputs.{name}");
+            let place = self.reader.place(&wanted.span);
+            self.file.scene.places.note(&*path, &place);
+            let joints = self.names(&format!("{path}.joints"), &wanted, "joints", "joint");
+            let frames = self.names(&format!("{path}.frames"), &wanted, "frames", "frame");
+            let part = self.reader.word_at(&wanted, "part", &Part::WORDS);
+            let part = self.noted(&format!("{path}.part"), part).unwrap_or_default();
+            self.file.scene.outputs.insert(function, Selection { joints, frames, part });
+            functions.push(function);
+        }
+        functions.sort_unstable();
+        functions.dedup();
+        if table.has("functions") || !functions.is_empty() {
+            self.file.functions = Some(functions);
+        }
+    }
+
+    fn hold(&mut self, table: &Table) {
+        self.reader.check_keys(table, &["gravity", "base", "joints"]);
+        if let Some((value, span)) = table.get("gravity") {
+            let place = self.reader.place(&span);
+            self.file.scene.places.note("hold.gravity", &place);
+            let gravity = match value {
+                DeValue::String(_) => {
+                    let words = [("zero", Gravity::Constant([0.0; 3])), ("input", Gravity::Input)];
+                    self.reader.word_at(table, "gravity", &words).map(|g| g.value)
+                }
+                DeValue::Array(_) => self.reader.vector_at(table, "gravity").map(|g| Gravity::Constant(g.value)),
+                _ => {
+                    let forms = "`[0.0, 0.0, -9.81]`, `\"zero\"` or `\"input\"`";
+                    self.reader.wrong_type(&table.what("gravity"), forms, value, &span);
+                    None
+                }
+            };
+            self.file.scene.gravity = gravity.unwrap_or_default();
+        }
+        let base = self.reader.word_at(table, "base", &BASES);
+        self.file.scene.base = self.noted("hold.base", base).unwrap_or_default();
+        if let Some(joints) = self.reader.table_at(table, "joints", "joints of [hold]") {
+            let place = self.reader.place(&joints.span);
+            self.file.scene.places.note("hold.joints", &place);
+            // in the order of the file: keys of a table come sorted
+            let mut keys: Vec<_> = joints.table.keys().collect();
+            keys.sort_by_key(|key| key.span().start);
+            for key in keys {
+                let (joint, place) = (key.get_ref().to_string(), self.reader.place(&key.span()));
+                if let Some(value) = self.reader.real_at(&joints, &joint, Range64::Finite) {
+                    self.file.scene.places.note(format!("hold.joints.{joint}"), &place);
+                    self.file.scene.locked.push((joint, value.value));
+                }
+            }
+        }
+    }
+
+    fn payload(&mut self, mut table: Table) {
+        let i = self.file.scene.payloads.len();
+        let reader = &mut self.reader;
+        reader.require(&table, "name", "name = \"...\"");
+        let name = reader.name_at(&table, "name", "payload");
+        if let Some(name) = &name {
+            table.owner = format!("payload `{}`", name.value);
+        }
+        reader.check_keys(&table, &["name", "frame", "mass", "com", "inertia"]);
+        reader.require(&table, "frame", "frame = \"...\"");
+        let frame = reader.name_at(&table, "frame", "frame");
+        reader.require(&table, "mass", "mass = 1.0");
+        let mass = reader.real_at(&table, "mass", Range64::Finite);
+        let com = reader.vector_at(&table, "com");
+        let inertia = reader.tensor_at(&table, "inertia");
+        let place = reader.place(&table.span);
+        self.file.scene.places.note(format!("payload.{i}"), &place);
+        let name = self.noted(&format!("payload.{i}.name"), name);
+        let frame = self.noted(&format!("payload.{i}.frame"), frame);
+        let mass = self.noted(&format!("payload.{i}.mass"), mass);
+        let com = self.noted(&format!("payload.{i}.com"), com).unwrap_or_default();
+        let inertia = self.noted(&format!("payload.{i}.inertia"), inertia);
+        let inertia = inertia.map_or([0.0; 6], |j| [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz]);
+        if let (Some(name), Some(frame), Some(mass)) = (name, frame, mass) {
+            self.file.scene.payloads.push(Payload { name, frame, mass, com, inertia });
+        }
+    }
+
+    fn zero(&mut self, table: &Table) {
+        self.reader.check_keys(table, &["qd", "qdd", "joints_at_rest"]);
+        let mut flag = |key: &str| self.reader.flag_at(table, key).is_some_and(|flag| flag.value);
+        let (qd, qdd) = (flag("qd"), flag("qdd"));
+        let joints_at_rest = self.names("zero.joints_at_rest", table, "joints_at_rest", "joint");
+        self.file.scene.zero = super::Zero { qd, qdd, joints_at_rest };
+    }
+
+    fn effects(&mut self, table: &Table) {
+        self.reader.check_keys(table, &["rotor_inertia", "damping", "coulomb", "coulomb_speed", "springs"]);
+        let mut flag = |key: &str| self.reader.flag_at(table, key).is_none_or(|flag| flag.value);
+        let (rotor_inertia, damping, springs) = (flag("rotor_inertia"), flag("damping"), flag("springs"));
+        let form = self.reader.word_at(table, "coulomb", &COULOMB);
+        let speed = self.reader.real_at(table, "coulomb_speed", Range64::Finite);
+        let speed_place = speed.as_ref().map(|s| s.place.clone());
+        let form_place = form.as_ref().map(|f| f.place.clone());
+        let speed = self.noted("effects.coulomb_speed", speed);
+        let coulomb = match (form.map(|f| f.value).unwrap_or_default(), speed) {
+            (Coulomb::Smooth(_), Some(speed)) => Coulomb::Smooth(speed),
+            (Coulomb::Smooth(_), None) => {
+                // a speed that could not be read was complained of
+                if let Some(place) = form_place.filter(|_| !table.has("coulomb_speed")) {
+                    self.reader.diagnostics.push(say::coulomb_speed_missing().at(&place));
+                }
+                Coulomb::Sign
+            }
+            (form, Some(_)) => {
+                if let Some(place) = speed_place {
+                    self.reader.diagnostics.push(say::coulomb_speed_alone().at(&place));
+                }
+                form
+            }
+            (form, None) => form,
+        };
+        self.file.scene.effects = super::Effects { rotor_inertia, damping, coulomb, springs };
+    }
+
+    fn parameter(&mut self, table: Table) {
+        let i = self.file.scene.parameters.len();
+        let reader = &mut self.reader;
+        let place = reader.place(&table.span);
+        self.file.scene.places.note(format!("parameter.{i}"), &place);
+        reader.require(&table, "kind", "kind = \"payload\"");
+        let Some(kind) = reader.word_at(&table, "kind", &[("payload", true), ("link", false)]) else { return };
+        let parameter = if kind.value {
+            reader.check_keys(&table, &["kind", "name", "frame"]);
+            reader.require(&table, "name", "name = \"payload\"");
+            reader.require(&table, "frame", "frame = \"...\"");
+            let (name, frame) = (reader.name_at(&table, "name", "parameter"), reader.name_at(&table, "frame", "frame"));
+            let name = self.noted(&format!("parameter.{i}.name"), name);
+            let frame = self.noted(&format!("parameter.{i}.frame"), frame);
+            name.zip(frame).map(|(name, frame)| Parameter::Payload { name, frame })
+        } else {
+            reader.check_keys(&table, &["kind", "link"]);
+            reader.require(&table, "link", "link = \"...\"");
+            let link = reader.name_at(&table, "link", "link");
+            self.noted(&format!("parameter.{i}.link"), link).map(|link| Parameter::Link { link })
+        };
+        self.file.scene.parameters.extend(parameter);
+    }
+
+    fn numbers(&mut self, table: &Table) {
+        self.reader.check_keys(table, &["scalar", "angle_tolerance"]);
+        let scalars: Vec<(&str, Scalar)> = Scalar::words().into_iter().map(|(word, _, s)| (word, s)).collect();
+        self.file.scalar = self.reader.word_at(table, "scalar", &scalars).map(|s| s.value);
+        let tolerance = self.reader.real_at(table, "angle_tolerance", Range64::Finite);
+        if let Some(value) = tolerance.as_ref().filter(|t| !(0.0..=0.1).contains(&t.value)) {
+            let complaint = say::not_in_range("angle_tolerance", value.value, "between 0 and 0.1 rad");
+            self.reader.diagnostics.push(complaint.at(&value.place));
+        }
+        self.file.angle_tolerance = tolerance.map(|t| t.value);
+    }
+
+    fn budgets(&mut self, table: &Table) {
+        let names: Vec<&str> = Function::all().map(Function::name).collect();
+        self.reader.check_keys(table, &names);
+        for function in Function::all() {
+            let name = function.name();
+            let Some(limits) = self.reader.table_at(table, name, &format!("[budget.{name}]")) else { continue };
+            self.reader.check_keys(&limits, BUDGET);
+            let place = self.reader.place(&limits.span);
+            self.file.scene.places.note(format!("budget.{name}"), &place);
+            let mut limit = |key: &str| {
+                let count = self.reader.count_at(&limits, key)?;
+                self.file.scene.places.note(format!("budget.{name}.{key}"), &count.place);
+                Some(count.value)
+            };
+            let budget = Budget {
+                max_flops: limit("max_flops"),
+                max_sincos: limit("max_sincos"),
+                max_live: limit("max_live"),
+                max_stack_bytes: limit("max_stack_bytes"),
+                max_code_bytes: limit("max_code_bytes"),
+            };
+            self.file.scene.budgets.insert(function, budget);
+            if self.file.functions.as_ref().is_some_and(|functions| !functions.contains(&function)) {
+                self.reader.complain(&limits.span, say::budget_alone(name));
+            }
+        }
+    }
+}
