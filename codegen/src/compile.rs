@@ -8,7 +8,7 @@ use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model;
 use crate::pass::{dead_code, unread_inputs};
 use crate::report::{FunctionReport, Report};
-use crate::scene::{is_optional, load_parameters, without_parameters, Parameter, Scene, LOAD_SCALARS};
+use crate::scene::{self, is_optional, load_parameters, without_parameters, Parameter, Scene, LOAD_SCALARS};
 use crate::schedule::{schedule, Limits, Schedule};
 use crate::staged::staged;
 use crate::trace::trace;
@@ -114,9 +114,13 @@ pub struct Generated {
 /// # Errors
 /// Everything that is wrong with the file or the options, at once.
 pub fn compile(source: &Source, options: &Options) -> Result<Generated, Diagnostics> {
-    let (model, mut diagnostics) = model::load(source, &options.model);
+    let (model, mut diagnostics) = model::load(source, &options.scene.model_options(&options.model));
+    scene::check_options(options, &mut diagnostics);
+    let model = model.and_then(|model| scene::apply(model, &options.scene, &mut diagnostics));
     let frames = model.as_ref().map(|m| choose_frames(m, &options.frames, &mut diagnostics)).unwrap_or_default();
+    diagnostics.sort();
     let Some(model) = model.filter(|_| !diagnostics.has_errors()) else { return Err(diagnostics) };
+    let options = &Options { scene: options.scene.resolved(&model), ..options.clone() };
     Ok(generate(model, frames, diagnostics, options, source.path(), hash(source.text(), options)))
 }
 
@@ -165,9 +169,9 @@ fn generate(
         staged: staged_report,
     };
     // the file's name, not its path: the same bytes on every machine
-    let name = path.rsplit(['/', '\\']).next().unwrap_or(path).to_string();
+    let name = file_name(path).to_string();
     let remark = |d: &Diagnostic| match &d.place {
-        Some(place) => format!("{} (line {} of {name})", d.title, place.line),
+        Some(place) => format!("{} (line {} of {})", d.title, place.line, file_name(&place.file)),
         None => d.title.clone(),
     };
     let remarks = warnings.iter().map(remark).collect();
@@ -183,6 +187,11 @@ pub fn parameter_program(robot: &Robot, parameter: &Parameter, options: &Options
     let inputs = vec![Port::new("mass", &[1]), Port::new("com", &[3]), Port::new("inertia", &[6])];
     let outputs = vec![Port::new("parameters", &[LOAD_SCALARS])];
     dead_code(&trace(options.rules(), inputs, outputs, |x| load_parameters(robot, parameter, x)))
+}
+
+/// The last part of a path.
+fn file_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
 /// The types of run-time parameters, with what they share.

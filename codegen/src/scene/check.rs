@@ -48,7 +48,11 @@ pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
     }
     if let Gravity::Constant(gravity) = scene.gravity {
         if let Some(x) = gravity.into_iter().find(|x| !(x.abs() <= 1e6)) {
-            places.complain("hold.gravity", say::not_in_range("gravity", x, "a number of m/s²"), diagnostics);
+            places.complain(
+                "hold.gravity",
+                say::not_in_range("gravity", x, "an acceleration up to 1e6 m/s²"),
+                diagnostics,
+            );
         }
     }
     if let Coulomb::Smooth(speed) = scene.effects.coulomb {

@@ -61,6 +61,7 @@ pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<SceneFile>
     let mut found = Diagnostics::new();
     found.add_source(source);
     let file = read_text(source, &mut found).filter(|_| !found.has_errors());
+    found.sort();
     diagnostics.extend(found);
     file
 }
@@ -147,12 +148,14 @@ impl SceneReader<'_> {
         let names: Vec<&str> = Function::all().map(Function::name).collect();
         self.reader.check_keys(table, &[&["functions"], &names[..]].concat());
         let mut functions: Vec<Function> = Vec::new();
+        let mut all_are_known = true;
         for name in self.reader.names_at(table, "functions", "function") {
             match Function::from_name(&name.value) {
                 Some(function) => functions.push(function),
                 None => {
                     let complaint = messages::unknown_word("functions of [outputs]", &name.value, &names);
                     self.reader.diagnostics.push(complaint.at(&name.place));
+                    all_are_known = false;
                 }
             }
         }
@@ -173,7 +176,7 @@ impl SceneReader<'_> {
         }
         functions.sort_unstable();
         functions.dedup();
-        if table.has("functions") || !functions.is_empty() {
+        if all_are_known && (table.has("functions") || !functions.is_empty()) {
             self.file.functions = Some(functions);
         }
     }
