@@ -41,13 +41,13 @@ pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
         if scene.locked[..i].iter().any(|(other, _)| other == joint) {
             places.complain(&path, say::locked_twice(joint), diagnostics);
         }
-        if !(value.abs() <= 1e6) {
+        if !(-1e6..=1e6).contains(value) {
             let what = format!("the value of the locked joint `{joint}`");
             places.complain(&path, say::not_in_range(&what, *value, "between -1e6 and 1e6"), diagnostics);
         }
     }
     if let Gravity::Constant(gravity) = scene.gravity {
-        if let Some(x) = gravity.into_iter().find(|x| !(x.abs() <= 1e6)) {
+        if let Some(x) = gravity.into_iter().find(|x| !(-1e6..=1e6).contains(x)) {
             places.complain(
                 "hold.gravity",
                 say::not_in_range("gravity", x, "an acceleration up to 1e6 m/s²"),
