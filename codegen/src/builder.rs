@@ -28,6 +28,7 @@ use crate::export::identifier;
 use crate::expr::Grade;
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::output::write_file;
+use crate::scene::{self, Scene};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -44,6 +45,7 @@ pub fn compile_robot(robot: impl Into<PathBuf>) -> Result<Generated, Error> {
 #[must_use = "nothing happens before `build`"]
 pub struct Builder {
     robot: PathBuf,
+    scene_file: Option<PathBuf>,
     module: Option<String>,
     out_dir: Option<PathBuf>,
     options: Options,
@@ -52,7 +54,7 @@ pub struct Builder {
 impl Builder {
     /// From a robot file (URDF or TOML), relative to the package's manifest; with all functions, in f64.
     pub fn new(robot: impl Into<PathBuf>) -> Self {
-        Builder { robot: robot.into(), module: None, out_dir: None, options: Options::default() }
+        Builder { robot: robot.into(), scene_file: None, module: None, out_dir: None, options: Options::default() }
     }
 
     /// These functions only.
@@ -117,6 +119,19 @@ impl Builder {
         self
     }
 
+    /// A scene file (`SCENES.md`), relative to the package's manifest: what is wanted of the robot, and what is held. What it
+    /// says stands in place of what this builder says; the build runs again when it changes.
+    pub fn scene_file(mut self, scene: impl Into<PathBuf>) -> Self {
+        self.scene_file = Some(scene.into());
+        self
+    }
+
+    /// A scene made in code; a scene file takes its place.
+    pub fn scene(mut self, scene: Scene) -> Self {
+        self.options.scene = scene;
+        self
+    }
+
     /// The name of the output, without `.rs`; otherwise the robot file's.
     pub fn module(mut self, name: impl Into<String>) -> Self {
         self.module = Some(name.into());
@@ -147,22 +162,41 @@ impl Builder {
 
     fn run(&self, manifest: &Path, out_dir: &Path) -> Messages {
         let robot = manifest.join(&self.robot);
+        let scene = self.scene_file.as_ref().map(|scene| manifest.join(scene));
+        let files: Vec<&PathBuf> = [&robot].into_iter().chain(&scene).collect();
         let mut messages = Messages {
-            cargo: vec![format!("cargo::rerun-if-changed={}", robot.display())],
+            cargo: files.iter().map(|file| format!("cargo::rerun-if-changed={}", file.display())).collect(),
             person: String::new(),
             result: Err(Error::NoOutDir),
         };
-        messages.result = self.compile(&robot, out_dir, &mut messages);
+        messages.result = self.compile(&robot, scene.as_deref(), out_dir, &mut messages);
         if let Err(error @ (Error::Read(..) | Error::Write(_))) = &messages.result {
             messages.cargo.push(format!("cargo::error={error}"));
         }
         messages
     }
 
-    fn compile(&self, robot: &Path, out_dir: &Path, messages: &mut Messages) -> Result<Generated, Error> {
-        let bytes = std::fs::read(robot).map_err(|e| Error::Read(robot.to_path_buf(), e))?;
-        let source = Source::from_bytes(&self.robot.display().to_string(), bytes);
-        let generated = compile(&source, &self.options).map_err(|diagnostics| {
+    fn compile(
+        &self,
+        robot: &Path,
+        scene: Option<&Path>,
+        out_dir: &Path,
+        messages: &mut Messages,
+    ) -> Result<Generated, Error> {
+        let read = |file: &Path, shown: &Path| {
+            let bytes = std::fs::read(file).map_err(|e| Error::Read(file.to_path_buf(), e))?;
+            Ok(Source::from_bytes(&shown.display().to_string(), bytes))
+        };
+        let source = read(robot, &self.robot)?;
+        let mut options = self.options.clone();
+        if let (Some(file), Some(shown)) = (scene, &self.scene_file) {
+            let mut diagnostics = Diagnostics::new();
+            let scene = scene::read(&read(file, shown)?, &mut diagnostics);
+            messages.tell(&diagnostics);
+            let errors = diagnostics.count(Severity::Error);
+            options = scene.ok_or(Error::Robot { path: shown.clone(), errors })?.into_options(options);
+        }
+        let generated = compile(&source, &options).map_err(|diagnostics| {
             messages.tell(&diagnostics);
             Error::Robot { path: self.robot.clone(), errors: diagnostics.count(Severity::Error) }
         })?;
@@ -197,16 +231,16 @@ impl Messages {
     }
 }
 
-/// Why there is no output. Complaints about the robot file have been printed already.
+/// Why there is no output. Complaints about the robot file or the scene have been printed already.
 pub enum Error {
-    /// The robot file, or what was asked of it, is wrong.
+    /// The robot file, the scene, or what was asked of them, is wrong.
     Robot {
         /// The file, as it was given.
         path: PathBuf,
         /// Number of errors.
         errors: usize,
     },
-    /// The robot file cannot be read.
+    /// The robot file or the scene cannot be read.
     Read(PathBuf, std::io::Error),
     /// The output cannot be written.
     Write(std::io::Error),
@@ -296,6 +330,28 @@ axis = "y"
         assert_eq!(errors.len(), 2, "{:?}", m.cargo);
         assert!(m.person.contains("--> pen.toml:10:8"), "{}", m.person);
         assert!(!here.join("pen.rs").exists());
+    }
+
+    #[test]
+    fn a_scene_file_says_what_is_wanted_and_is_an_input_of_the_build() {
+        let here = scratch("scene", PENDULUM);
+        fs::write(here.join("still.toml"), "[outputs]\nfunctions = [\"inverse_dynamics\"]\n[zero]\nqd = true\n")
+            .unwrap();
+        let m = Builder::new("pen.toml").scene_file("still.toml").run(&here, &here);
+        let text = m.result.unwrap().text;
+        assert!(text.contains("pub fn inverse_dynamics(q: &[f64; 1], qdd: &[f64; 1], tau: &mut [f64; 1])"), "{text}");
+        assert!(!text.contains("pub fn gravity_force"));
+        assert_eq!(m.cargo[1], format!("cargo::rerun-if-changed={}", here.join("still.toml").display()));
+
+        fs::write(here.join("still.toml"), "[hold]\njoints = { pivt = 0.0 }\n").unwrap();
+        let m = Builder::new("pen.toml").scene_file("still.toml").run(&here, &here);
+        assert_eq!(m.result.unwrap_err().to_string(), "pen.toml: 1 error");
+        assert!(m.cargo[2].starts_with("cargo::error=still.toml:2:12: error: "), "{:?}", m.cargo);
+
+        fs::write(here.join("still.toml"), "[zero]\nqdot = true\n").unwrap();
+        let m = Builder::new("pen.toml").scene_file("still.toml").run(&here, &here);
+        assert_eq!(m.result.unwrap_err().to_string(), "still.toml: 1 error");
+        assert!(m.person.contains("--> still.toml:2:1"), "{}", m.person);
     }
 
     #[test]

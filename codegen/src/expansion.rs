@@ -1,48 +1,78 @@
 //! What the macros expand to, as text; `straightline-macros` is a shell over this.
 
 use crate::compile::{compile, Generated, Options};
-use crate::diagnostic::{Severity, Source};
+use crate::diagnostic::{Diagnostic, Diagnostics, Severity, Source};
 use crate::emit::array_type;
 use crate::expr::Port;
+use crate::scene;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use straightline_core::model::JointKind;
 
-/// What became of a robot file.
+/// What became of a robot file and its scene.
 #[derive(Debug)]
 pub struct Expansion {
-    /// The file that was read: the expansion depends on it, right or wrong.
-    pub file: Option<PathBuf>,
+    /// The files that were read: the expansion depends on them, right or wrong.
+    pub files: Vec<PathBuf>,
     /// The dynamics, or what to tell the person.
     pub result: Result<Generated, String>,
     /// What to tell the person besides.
     pub warnings: String,
 }
 
-/// Compiles the robot file that a macro names, looked for in these directories.
-pub fn expand(robot: &str, directories: &[&Path], options: &Options) -> Expansion {
-    let tried: Vec<PathBuf> = directories.iter().map(|d| d.join(robot)).collect();
-    let failed = |file, message| Expansion { file, result: Err(message), warnings: String::new() };
+/// Compiles the robot file that a macro names, in the scene that it names, both looked for in these directories. What the
+/// scene says stands in place of what the options say.
+pub fn expand(robot: &str, scene: Option<&str>, directories: &[&Path], options: &Options) -> Expansion {
+    let mut expansion = Expansion { files: Vec::new(), result: Err(String::new()), warnings: String::new() };
+    expansion.result =
+        compiled(robot, scene, directories, options, &mut expansion.files).map(|(warnings, generated)| {
+            expansion.warnings = warnings;
+            generated
+        });
+    expansion
+}
+
+/// Warnings and dynamics, or what is wrong; notes the files that were read.
+fn compiled(
+    robot: &str,
+    scene: Option<&str>,
+    directories: &[&Path],
+    options: &Options,
+    files: &mut Vec<PathBuf>,
+) -> Result<(String, Generated), String> {
+    let robot = found("robot", robot, directories, files);
+    let scene = scene.map(|scene| found("scene", scene, directories, files)).transpose();
+    let (robot, scene) = (robot?, scene?);
+    let mut diagnostics = Diagnostics::new();
+    let wrong = |what: &str, diagnostics: &Diagnostics| {
+        format!("the {what} is wrong\n{}", diagnostics.at_least(Severity::Warning).render().trim_end())
+    };
+    let options = match scene.map(|source| scene::read(&source, &mut diagnostics)) {
+        None => options.clone(),
+        Some(Some(file)) => file.into_options(options.clone()),
+        Some(None) => return Err(wrong("scene", &diagnostics)),
+    };
+    let generated = compile(&robot, &options).map_err(|diagnostics| {
+        let is_of_scene = |d: &Diagnostic| d.place.as_ref().is_some_and(|p| *p.file != *robot.path());
+        let mut errors = diagnostics.iter().filter(|d| d.severity == Severity::Error);
+        wrong(if errors.all(is_of_scene) && diagnostics.has_errors() { "scene" } else { "robot file" }, &diagnostics)
+    })?;
+    diagnostics.extend(generated.warnings.clone());
+    Ok((diagnostics.at_least(Severity::Warning).render(), generated))
+}
+
+/// The file of that name in the first directory that has it.
+fn found(what: &str, name: &str, directories: &[&Path], files: &mut Vec<PathBuf>) -> Result<Source, String> {
+    let tried: Vec<PathBuf> = directories.iter().map(|d| d.join(name)).collect();
     let Some(file) = tried.iter().find_map(|path| path.canonicalize().ok()) else {
-        let mut message = format!("there is no robot file `{}`; tried:", robot.escape_default());
+        let mut message = format!("there is no {what} file `{}`; tried:", name.escape_default());
         tried.iter().for_each(|path| message.push_str(&format!("\n  {}", path.display())));
         message.push_str("\nhelp: the path counts from the package's manifest, or else from the source file");
-        return failed(None, message);
+        return Err(message);
     };
-    let bytes = match std::fs::read(&file) {
-        Ok(bytes) => bytes,
-        Err(error) => return failed(None, format!("{}: {error}", file.display())),
-    };
-    match compile(&Source::from_bytes(robot, bytes), options) {
-        Ok(generated) => {
-            let warnings = generated.warnings.at_least(Severity::Warning).render();
-            Expansion { file: Some(file), result: Ok(generated), warnings }
-        }
-        Err(diagnostics) => {
-            let shown = diagnostics.at_least(Severity::Warning);
-            failed(Some(file), format!("the robot file is wrong\n{}", shown.render().trim_end()))
-        }
-    }
+    let bytes = std::fs::read(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+    files.push(file);
+    Ok(Source::from_bytes(name, bytes))
 }
 
 /// Constants and functions of the module `dynamics` as associated items of a type.
@@ -130,8 +160,8 @@ limits = { lower = -1.0, upper = 1.0, velocity = 2.0, effort = 50.0 }
     #[test]
     fn the_first_directory_that_has_the_file_counts() {
         let here = scratch("found", CART);
-        let expansion = expand("cart.toml", &[Path::new("/nowhere"), &here], &Options::default());
-        assert_eq!(expansion.file, Some(here.join("cart.toml")));
+        let expansion = expand("cart.toml", None, &[Path::new("/nowhere"), &here], &Options::default());
+        assert_eq!(expansion.files, [here.join("cart.toml")]);
         let items = associated_items(&expansion.result.unwrap());
         assert!(items.contains("pub const EFFORT_LIMITS: [f64; 1] = dynamics::EFFORT_LIMITS;"), "{items}");
         assert!(items.contains("pub fn mass_matrix(q: &[f64; 1], h: &mut [[f64; 1]; 1]) {"), "{items}");
@@ -140,8 +170,8 @@ limits = { lower = -1.0, upper = 1.0, velocity = 2.0, effort = 50.0 }
     #[test]
     fn a_missing_file_is_answered_with_every_path_that_was_tried() {
         let directories = [Path::new("/nowhere"), Path::new("/nowhere/src")];
-        let expansion = expand("cart.toml", &directories, &Options::default());
-        assert_eq!(expansion.file, None);
+        let expansion = expand("cart.toml", None, &directories, &Options::default());
+        assert!(expansion.files.is_empty());
         assert_eq!(
             expansion.result.unwrap_err(),
             "there is no robot file `cart.toml`; tried:\n  /nowhere/cart.toml\n  /nowhere/src/cart.toml\n\
@@ -152,10 +182,35 @@ limits = { lower = -1.0, upper = 1.0, velocity = 2.0, effort = 50.0 }
     #[test]
     fn a_wrong_file_is_shown_at_the_place_and_stays_an_input() {
         let here = scratch("wrong", &CART.replace("2.0", "-2.0"));
-        let expansion = expand("cart.toml", &[&here], &Options::default());
-        assert_eq!(expansion.file, Some(here.join("cart.toml")));
+        let expansion = expand("cart.toml", None, &[&here], &Options::default());
+        assert_eq!(expansion.files, [here.join("cart.toml")]);
         let message = expansion.result.unwrap_err();
         assert!(message.starts_with("the robot file is wrong\nerror[negative-mass]: "), "{message}");
         assert!(message.contains("--> cart.toml:10:8\n") && message.contains("| mass = -2.0"), "{message}");
+    }
+
+    #[test]
+    fn a_scene_is_an_input_too_and_its_complaints_have_their_place() {
+        let here = scratch("scene", CART);
+        let scene = |text: &str| {
+            std::fs::write(here.join("scene.toml"), text).unwrap();
+            expand("cart.toml", Some("scene.toml"), &[&here], &Options::default())
+        };
+        let expansion = scene("[outputs]\nmass_matrix = { part = \"diagonal\" }\n");
+        assert_eq!(expansion.files, [here.join("cart.toml"), here.join("scene.toml")]);
+        let items = associated_items(&expansion.result.unwrap());
+        assert!(items.contains("pub fn mass_matrix(q: &[f64; 1], h: &mut [f64; 1])"), "{items}");
+        assert!(!items.contains("pub fn inverse_dynamics"));
+
+        for (text, place) in
+            [("[zero]\nqdot = true\n", "scene.toml:2:1"), ("[hold]\njoints = { slid = 0 }\n", "scene.toml:2:12")]
+        {
+            let expansion = scene(text);
+            assert_eq!(expansion.files.len(), 2);
+            let message = expansion.result.unwrap_err();
+            assert!(message.starts_with("the scene is wrong\nerror[") && message.contains(place), "{message}");
+        }
+        let message = expand("cart.toml", Some("none.toml"), &[&here], &Options::default()).result.unwrap_err();
+        assert!(message.starts_with("there is no scene file `none.toml`"), "{message}");
     }
 }

@@ -39,6 +39,7 @@
 //! | `rules = "exact"`: the same bits as the generic runtime | `"all"`: fewest operations |
 //! | `forward_dynamics = "articulated-body"` or `"factorisation"` | the cheaper one |
 //! | `max_part_operations = 1000`: longer functions are cut | 2000 |
+//! | `scene = "scenes/still.toml"`: what is wanted and what is held; what it says wins over other options | everything |
 //!
 //! The path counts from the package's manifest, or else from the source file. The build runs again when the file changes;
 //! complaints about it come as compiler errors with the file's line.

@@ -6,9 +6,10 @@ use syn::parse::{Parse, ParseStream};
 use syn::punctuated::Punctuated;
 use syn::{parenthesized, Attribute, Error, Ident, Lit, LitInt, LitStr, Result, Token, Visibility};
 
-/// The robot file and the options, as both macros take them.
+/// The robot file, the scene and the options, as both macros take them.
 pub struct Arguments {
     pub robot: LitStr,
+    pub scene: Option<LitStr>,
     pub options: Options,
 }
 
@@ -33,20 +34,22 @@ impl Parse for Module {
 
 impl Parse for Arguments {
     fn parse(input: ParseStream) -> Result<Self> {
-        let mut arguments = Arguments { robot: input.parse()?, options: Options::default() };
+        let mut arguments = Arguments { robot: input.parse()?, scene: None, options: Options::default() };
         while !input.is_empty() {
             input.parse::<Token![,]>()?;
             if !input.is_empty() {
-                option(input, &mut arguments.options)?;
+                option(input, &mut arguments)?;
             }
         }
         Ok(arguments)
     }
 }
 
-fn option(input: ParseStream, options: &mut Options) -> Result<()> {
+fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
     let key: Ident = input.parse()?;
+    let options = &mut arguments.options;
     match key.to_string().as_str() {
+        "scene" => arguments.scene = Some(value(input)?),
         "floating_base" => options.model.floating_base = true,
         "scalar" => options.scalar = word(input)?,
         "rules" => options.grade = word(input)?,
@@ -69,7 +72,7 @@ fn option(input: ParseStream, options: &mut Options) -> Result<()> {
         }
         other => {
             let known = "floating_base, scalar, rules, forward_dynamics, max_part_operations, angle_tolerance, \
-                         functions, frames, joint_order, gravity";
+                         functions, frames, joint_order, gravity, scene";
             return Err(Error::new(key.span(), format!("there is no option `{other}`; one of: {known}")));
         }
     }

@@ -50,15 +50,16 @@ pub fn dynamics(input: TokenStream) -> TokenStream {
         .into()
 }
 
-/// The items made of the dynamics, or the complaints at the place of the file's name; both depend on the file.
+/// The items made of the dynamics, or the complaints at the place of the file's name; both depend on the files.
 fn compiled(arguments: &Arguments, items: impl FnOnce(&Generated) -> Tokens) -> Result<Tokens, Error> {
     let manifest = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
     let source_file = proc_macro::Span::call_site().local_file();
     let beside = source_file.as_deref().and_then(Path::parent);
     let directories: Vec<&Path> = [manifest.as_path()].into_iter().chain(beside).collect();
-    let expansion = expand(&arguments.robot.value(), &directories, &arguments.options);
+    let scene = arguments.scene.as_ref().map(|scene| scene.value());
+    let expansion = expand(&arguments.robot.value(), scene.as_deref(), &directories, &arguments.options);
     eprint!("{}", expansion.warnings); // a macro has no warnings of its own
-    let tracker = expansion.file.map(|file| {
+    let trackers = expansion.files.iter().map(|file| {
         let path = file.to_string_lossy();
         quote! { const _: &[u8] = include_bytes!(#path); }
     });
@@ -66,7 +67,7 @@ fn compiled(arguments: &Arguments, items: impl FnOnce(&Generated) -> Tokens) -> 
         Ok(generated) => items(&generated),
         Err(message) => Error::new(arguments.robot.span(), message).into_compile_error(),
     };
-    Ok(quote! { #items #tracker })
+    Ok(quote! { #items #(#trackers)* })
 }
 
 /// Generated source as tokens.

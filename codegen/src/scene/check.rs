@@ -107,7 +107,9 @@ pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
     if scene.base == Base::Moving && options.functions.contains(&Function::ForwardDynamics) {
         scene.places.complain("hold.base", say::moving_base_forward(), diagnostics);
     }
-    for function in scene.budgets.keys().filter(|f| !options.functions.contains(f)) {
+    // of a file this was said when it was read, whatever functions of it are asked for
+    let is_alone = |function: &&Function| scene.places.source().is_none() && !options.functions.contains(function);
+    for function in scene.budgets.keys().filter(is_alone) {
         let name = function.name();
         scene.places.complain(&format!("budget.{name}"), say::budget_alone(name), diagnostics);
     }

@@ -33,11 +33,14 @@ pub struct SceneFile {
 }
 
 impl SceneFile {
-    /// These options with what the file says in their place, and with its scene.
+    /// These options with what the file says in their place, and with its scene. Where neither names functions, a base that
+    /// moves as it is told has all but forward dynamics.
     pub fn into_options(self, mut options: Options) -> Options {
-        let moves_as_told = self.scene.base == Base::Moving;
-        let all = || Function::all().filter(|f| !moves_as_told || *f != Function::ForwardDynamics).collect();
-        options.functions = self.functions.unwrap_or_else(all);
+        if let Some(functions) = self.functions {
+            options.functions = functions;
+        } else if self.scene.base == Base::Moving && options.functions.iter().copied().eq(Function::all()) {
+            options.functions.retain(|f| *f != Function::ForwardDynamics);
+        }
         options.scalar = self.scalar.unwrap_or(options.scalar);
         options.model.angle_tolerance = self.angle_tolerance.unwrap_or(options.model.angle_tolerance);
         options.scene = self.scene;

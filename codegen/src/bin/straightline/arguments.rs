@@ -52,6 +52,7 @@ Examples:
 Examples:
   straightline report panda.urdf
   straightline report panda.urdf --json --function inverse_dynamics
+  straightline report panda.urdf --scene panda_gravity.toml
 
 {EXIT_CODES}"))]
     Report(Report),
@@ -176,9 +177,9 @@ pub struct ProgramArgs {
     /// A frame (link) that positions, velocities and Jacobians are asked for; may be repeated [default: the robot's tips]
     #[arg(long = "frame", value_name = "NAME")]
     frames: Vec<String>,
-    /// The scalar type
-    #[arg(long, default_value = "f64", value_parser = words::<Scalar>())]
-    scalar: Scalar,
+    /// The scalar type [default: f64]
+    #[arg(long, value_parser = words::<Scalar>())]
+    scalar: Option<Scalar>,
     /// Which rewrite rules may be used
     #[arg(long, default_value = "all", value_parser = words::<Grade>())]
     rules: Grade,
@@ -206,6 +207,9 @@ pub struct ModelArgs {
     /// Take every angle as the number that is written
     #[arg(long, conflicts_with = "angle_tolerance")]
     literal_angles: bool,
+    /// A scene (TOML): what is wanted of the robot, and what is held; everything else is skipped
+    #[arg(long, value_name = "FILE")]
+    pub scene: Option<PathBuf>,
     /// Acceleration due to gravity in the world [m/s²] [default: the file's, or 0,0,-9.81]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector)]
     gravity: Option<Vector>,
@@ -259,7 +263,26 @@ impl ModelArgs {
     }
 }
 
+impl ModelArgs {
+    /// What the command line says of options that a scene gives, too.
+    pub fn insist(&self, options: &mut Options) {
+        if self.literal_angles || self.angle_tolerance.is_some() {
+            options.model.angle_tolerance = self.options().angle_tolerance;
+        }
+    }
+}
+
 impl ProgramArgs {
+    /// What the command line says of options that a scene gives, too.
+    pub fn insist(&self, options: &mut Options) {
+        if !self.functions.is_empty() {
+            options.functions.clone_from(&self.functions);
+            options.functions.sort_unstable();
+            options.functions.dedup();
+        }
+        options.scalar = self.scalar.unwrap_or(options.scalar);
+    }
+
     pub fn options(&self, model: &ModelArgs) -> Options {
         let mut functions = self.functions.clone();
         functions.sort_unstable();
@@ -270,7 +293,7 @@ impl ProgramArgs {
         Options {
             functions,
             frames: self.frames.clone(),
-            scalar: self.scalar,
+            scalar: self.scalar.unwrap_or(Scalar::F64),
             grade: self.rules,
             forward_dynamics: self.forward_dynamics,
             limits: Limits { operations: self.max_part_operations },

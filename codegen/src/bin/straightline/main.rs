@@ -13,7 +13,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use straightline_codegen::compile::{compile, Generated, Options};
 use straightline_codegen::diagnostic::{Diagnostics, Severity, Source};
-use straightline_codegen::{description, export, model, output, verify};
+use straightline_codegen::{description, export, model, output, scene, verify};
 
 /// Why a command ended early; what there is to say was said where it happened, except for [`Failure::Files`].
 enum Failure {
@@ -55,9 +55,25 @@ fn read(path: &Path) -> Result<Source, Failure> {
     Ok(Source::from_bytes(&shown, bytes))
 }
 
+/// What the command line and the scene that it names say.
+fn options(program: Option<&ProgramArgs>, model: &ModelArgs) -> Result<Options, Failure> {
+    let plain = || Options { model: model.options(), ..Options::default() };
+    let options = program.map_or_else(plain, |program| program.options(model));
+    let Some(path) = &model.scene else { return Ok(options) };
+    let mut diagnostics = Diagnostics::new();
+    let file = scene::read(&read(path)?, &mut diagnostics);
+    print::diagnostics(&diagnostics, Severity::Warning);
+    let mut options = file.ok_or(Failure::Input)?.into_options(options);
+    model.insist(&mut options);
+    if let Some(program) = program {
+        program.insist(&mut options);
+    }
+    Ok(options)
+}
+
 /// Compiles, and prints errors and warnings; notes are for `check`.
 fn compiled(robot: &Path, program: &ProgramArgs, model: &ModelArgs) -> Result<(Generated, Options), Failure> {
-    let options = program.options(model);
+    let options = options(Some(program), model)?;
     let source = read(robot)?;
     let progress = print::spinner(&format!("compiling {}", source.path()));
     let result = compile(&source, &options);
@@ -104,18 +120,21 @@ fn report(a: &Report) -> Result<(), Failure> {
 }
 
 fn check(a: &Check) -> Result<(), Failure> {
-    let options = a.model.options();
+    let options = options(None, &a.model)?;
+    let model_options = options.scene.model_options(&options.model);
     let mut wrong = false;
     for robot in &a.robots {
         let source = read(robot)?;
         let mut diagnostics = Diagnostics::new();
         let description = description::read(&source, &mut diagnostics);
-        let model = description.as_ref().and_then(|d| model::build(d, &options, &mut diagnostics));
+        let model = description.as_ref().and_then(|d| model::build(d, &model_options, &mut diagnostics));
+        scene::check_options(&options, &mut diagnostics);
+        let model = model.and_then(|model| scene::apply(model, &options.scene, &mut diagnostics));
         model::finish(&mut diagnostics);
         print::diagnostics(&diagnostics, Severity::Note);
         print::verdict(source.path(), model.as_ref(), &diagnostics)?;
         if let Some(description) = &description {
-            print::notes(description, &model::special_angles(description, &options))?;
+            print::notes(description, &model::special_angles(description, &model_options))?;
         }
         wrong |= diagnostics.has_errors();
     }
