@@ -14,6 +14,7 @@ use crate::emit::{element, Scalar};
 use crate::expr::{evaluate, Graph};
 use crate::function::{Function, Robot};
 use crate::reference_input::mass_centre_tree;
+use crate::scene::Scene;
 use std::collections::BTreeMap;
 use straightline_core::model::{JointKind, Model};
 use straightline_core::reference::{self, Joint, MassCentreFrame, MassCentreTree};
@@ -76,7 +77,8 @@ fn unit(scalar: Scalar) -> f64 {
 /// state.
 ///
 /// # Errors
-/// The reference does not understand the file as the compiler did.
+/// The reference does not understand the file as the compiler did, or the scene of the options leaves something out: the
+/// reference computes whole robots.
 pub fn verify(
     source: &Source,
     generated: &Generated,
@@ -84,6 +86,12 @@ pub fn verify(
     (states, seed): (u32, u64),
     mut tick: impl FnMut(),
 ) -> Result<Verification, String> {
+    let budgets = options.scene.budgets.clone();
+    if options.scene != (Scene { budgets, ..Scene::default() }) {
+        return Err(
+            "the reference computes whole robots, and the scene changes this one: verify without it".to_string()
+        );
+    }
     let (model, frames) = (&generated.model, &generated.frames);
     let (tree, drives) = &second_reading(source, model, options)?;
     let functions = options.functions.iter().filter(|f| !f.is_per_frame() || !frames.is_empty());

@@ -153,3 +153,36 @@ fn verify_finds_roundings_only() {
         }
     }
 }
+
+#[test]
+fn a_scene_reaches_every_command_and_the_command_line_wins() {
+    let directory = scratch("scene");
+    let scene = directory.join("still.toml");
+    let scene = scene.to_str().unwrap();
+    let text =
+        "[outputs]\nfunctions = [\"inverse_dynamics\", \"energy\"]\n[zero]\nqd = true\n[numbers]\nscalar = \"f32\"\n";
+    fs::write(scene, text).unwrap();
+
+    let generated = straightline(&["generate", ARM, "--scene", scene]);
+    assert_eq!(generated.code, 0, "{}", generated.err);
+    assert!(generated.out.contains("pub fn inverse_dynamics(q: &[f32; 3], qdd: &[f32; 3], tau: &mut [f32; 3])"));
+    assert!(!generated.out.contains("pub fn mass_matrix"));
+    let wins = ["generate", ARM, "--scene", scene, "--function", "gravity_force", "--scalar", "f64"];
+    let generated = straightline(&wins);
+    assert!(generated.out.contains("pub fn gravity_force(q: &[f64; 3]") && !generated.out.contains("pub fn energy"));
+    assert_eq!(straightline(&["check", ARM, "--scene", scene]).code, 0);
+    let verified = straightline(&["verify", ARM, "--scene", scene]);
+    assert_eq!(verified.code, 1);
+    assert!(verified.err.contains("whole robots"), "{}", verified.err);
+
+    fs::write(scene, "[hold]\njoints = { elbo = 0.1 }\n").unwrap();
+    for command in ["generate", "report", "check"] {
+        let run = straightline(&[command, ARM, "--scene", scene]);
+        assert_eq!(run.code, 1);
+        assert!(run.err.contains("did you mean `elbow`?") && run.err.contains("still.toml:2:12"), "{}", run.err);
+    }
+    fs::write(scene, "[hold]\ngravity = \"input\"\n").unwrap();
+    let twice = straightline(&["report", ARM, "--scene", scene, "--gravity", "0,0,-1.62"]);
+    assert!(twice.code == 1 && twice.err.contains("gravity is given by the scene and by an option"), "{}", twice.err);
+    assert_eq!(straightline(&["report", ARM, "--scene", "nowhere.toml"]).code, 3);
+}

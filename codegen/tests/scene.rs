@@ -245,6 +245,32 @@ fn gravity_and_effects_are_as_the_scene_says() {
 }
 
 #[test]
+fn every_example_compiles_for_its_robot_without_a_word() {
+    let robots = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots");
+    let read = |path: &std::path::Path| {
+        let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("");
+        Source::from_bytes(name, std::fs::read(path).expect("the file can be read"))
+    };
+    let mut count = 0;
+    for entry in std::fs::read_dir(robots.join("scenes")).expect("the folder of scenes is there") {
+        let scene = read(&entry.expect("the folder can be read").path());
+        let robot = if scene.path().starts_with("panda") { "panda.urdf" } else { "solo12.urdf" };
+        let mut diagnostics = Diagnostics::new();
+        let file = scene::read(&scene, &mut diagnostics).unwrap_or_else(|| panic!("{diagnostics}"));
+        // of whole robots, one function is enough
+        let plain = Options { functions: vec![Function::InverseDynamics], ..Options::default() };
+        let options = file.into_options(plain);
+        let generated = compile(&read(&robots.join("descriptions").join(robot)), &options);
+        let generated = generated.unwrap_or_else(|diagnostics| panic!("{diagnostics}"));
+        diagnostics.extend(generated.warnings);
+        assert!(diagnostics.is_empty(), "{diagnostics}");
+        assert_eq!(generated.items.len(), options.functions.len(), "{}", scene.path());
+        count += 1;
+    }
+    assert!(count >= 8);
+}
+
+#[test]
 fn scenes_in_code_are_checked_as_those_in_files() {
     let robot = model_of(ROBOT, &options());
     let codes = |scene: &Scene| {
