@@ -149,7 +149,8 @@ impl SceneReader<'_> {
 
     fn outputs(&mut self, table: &Table) {
         let names: Vec<&str> = Function::all().map(Function::name).collect();
-        self.reader.check_keys(table, &[&["functions"], &names[..]].concat());
+        self.reader.check_keys(table, &[&["functions", "staged"], &names[..]].concat());
+        self.file.scene.staged = self.reader.flag_at(table, "staged").is_some_and(|flag| flag.value);
         let mut functions: Vec<Function> = Vec::new();
         let mut all_are_known = true;
         for name in self.reader.names_at(table, "functions", "function") {
