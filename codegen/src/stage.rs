@@ -61,15 +61,15 @@ pub fn cut(graph: &Graph, stage_of: &[usize], names: &[&str]) -> Staged {
 
     let values = |s: usize| Port::new(names[s], &[stored[s].len()]);
     let cutter = |own: usize, results: &[NodeId], outputs: Vec<Port>| {
-        let mut inputs: Vec<(Port, Vec<NodeId>)> = (0..own.min(last)).map(|s| (values(s), stored[s].clone())).collect();
+        let given = |s: usize| (values(s), stored[s].iter().map(|id| Some(*id)).collect());
+        let mut inputs: Vec<(Port, Vec<Option<NodeId>>)> = (0..own.min(last)).map(given).collect();
         let mut next = 0;
         for (port, s) in graph.inputs.iter().zip(stage_of) {
             let scalars: Vec<u32> = (next..next + port.len() as u32).collect();
             next += port.len() as u32;
             if *s == own {
                 let node = |k: u32| graph.ids().find(|id| graph.op(*id) == Op::Input(k));
-                let nodes = scalars.iter().map(|k| node(*k).expect("every input scalar has a node")).collect();
-                inputs.push((port.clone(), nodes));
+                inputs.push((port.clone(), scalars.iter().map(|k| node(*k)).collect()));
             }
         }
         extract(graph, inputs, results, outputs)
@@ -89,7 +89,9 @@ pub fn cut(graph: &Graph, stage_of: &[usize], names: &[&str]) -> Staged {
 }
 
 /// The part of a graph that makes `results` when the nodes of `inputs` are given.
-fn extract(graph: &Graph, inputs: Vec<(Port, Vec<NodeId>)>, results: &[NodeId], outputs: Vec<Port>) -> Graph {
+///
+/// A scalar of `inputs` without a node is one that nothing reads.
+fn extract(graph: &Graph, inputs: Vec<(Port, Vec<Option<NodeId>>)>, results: &[NodeId], outputs: Vec<Port>) -> Graph {
     const NONE: NodeId = NodeId(u32::MAX);
     let mut part = Graph { sections: graph.sections.clone(), outputs, ..Graph::default() };
     let mut new_id = vec![NONE; graph.ops.len()];
@@ -97,7 +99,7 @@ fn extract(graph: &Graph, inputs: Vec<(Port, Vec<NodeId>)>, results: &[NodeId], 
     for (port, nodes) in inputs {
         for id in nodes {
             // a node that two ports give comes from the first, its own scalar stays unread
-            if new_id[id.index()] == NONE {
+            if let Some(id) = id.filter(|id| new_id[id.index()] == NONE) {
                 new_id[id.index()] = NodeId(part.ops.len() as u32);
                 part.ops.push(Op::Input(k));
                 part.notes.push(crate::expr::Note { name: None, ..graph.notes[id.index()] });

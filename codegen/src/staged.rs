@@ -35,14 +35,26 @@ pub struct StageReport {
     pub stored: usize,
 }
 
+/// Operations of a function on top of its stages.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+pub struct Remaining {
+    /// Multiplications.
+    pub mul: usize,
+    /// Additions and subtractions.
+    pub add: usize,
+    /// Divisions.
+    pub div: usize,
+}
+
 /// Figures of the staged form.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "cli", derive(serde::Serialize))]
 pub struct StagedReport {
     /// The stages, the rarest first.
     pub stages: Vec<StageReport>,
-    /// What is left of each function once its stages are there: multiplications, additions, divisions.
-    pub remaining: BTreeMap<&'static str, [usize; 3]>,
+    /// What is left of each function once its stages are there.
+    pub remaining: BTreeMap<&'static str, Remaining>,
 }
 
 /// How inverse dynamics is written: the recursion, or H q̈ + h with both from earlier stages.
@@ -182,8 +194,8 @@ fn report(functions: &[Function], staged: &Staged, stages: &[Stage]) -> StagedRe
         StageReport { name: stage.type_name, mul, add, div, sincos: sin_cos, stored: graph.results.len() }
     };
     let left = |graph: &Graph| {
-        let c = graph.counts();
-        [c.mul, c.add, c.div]
+        let Counts { mul, add, div, .. } = graph.counts();
+        Remaining { mul, add, div }
     };
     StagedReport {
         stages: stages.iter().zip(&staged.stages).map(|(s, g)| of(s, g)).collect(),

@@ -4,7 +4,7 @@ use straightline_codegen::compile::{parameter_program, program};
 use straightline_codegen::expr::{evaluate, Graph};
 use straightline_codegen::scene::{Gravity, Parameter, Scene};
 use straightline_codegen::staged::programs;
-use straightline_codegen::{model, Function, Options, Robot, Source};
+use straightline_codegen::{compile, model, Function, Options, Robot, Source};
 
 const ROBOT: &str = r#"
 [robot]
@@ -140,4 +140,16 @@ fn a_second_call_costs_a_third_at_most_and_gravity_and_h_nothing() {
     assert!(left(Function::InverseDynamics).flops() * 100 <= full * 35);
     assert_eq!(left(Function::GravityForce).flops() + left(Function::MassMatrix).flops(), 0);
     assert_eq!(left(Function::ForwardDynamics).sin_cos, 0);
+}
+
+#[test]
+fn inputs_that_nothing_reads_are_left_alone() {
+    // the first joint's angle about the vertical is read by no function here
+    let functions = vec![Function::InverseDynamics, Function::GravityForce];
+    let upright = ROBOT
+        .replace("axis = [0.1, 0.2, 1.0]", "axis = \"z\"")
+        .replace("rpy = [0.1, 0.0, 0.3]", "rpy = [0.0, 0.0, 0.3]");
+    let options = Options { functions, scene: Scene { staged: true, ..Scene::default() }, ..Options::default() };
+    let generated = compile(&Source::new("crane.toml", upright), &options).unwrap_or_else(|d| panic!("{d}"));
+    assert!(generated.text.contains("pub mod staged"));
 }
