@@ -142,6 +142,8 @@ struct Body<'a> {
     scalar: Scalar,
     /// What stands for each node: its name, its literal, or its expression.
     text: Vec<Option<(String, Binding)>>,
+    /// Sine-cosine pairs that are written already.
+    paired: Vec<bool>,
     names: Names,
     /// Locals and statements of the block being written.
     declared: Vec<String>,
@@ -154,6 +156,7 @@ fn body(graph: &Graph, part: &Part, scalar: Scalar, title: &dyn Fn(Section) -> S
         graph,
         scalar,
         text: vec![None; graph.ops.len()],
+        paired: vec![false; graph.ops.len()],
         names: Names::with_taken(taken),
         declared: Vec::new(),
         statements: String::new(),
@@ -180,7 +183,7 @@ fn body(graph: &Graph, part: &Part, scalar: Scalar, title: &dyn Fn(Section) -> S
         }
     }
     let mut section = None;
-    for id in &part.nodes {
+    for (k, id) in part.nodes.iter().enumerate() {
         let op = graph.op(*id);
         let here = graph.notes[id.index()].section;
         if section != Some(here) {
@@ -188,9 +191,13 @@ fn body(graph: &Graph, part: &Part, scalar: Scalar, title: &dyn Fn(Section) -> S
             section = Some(here);
         }
         match op {
-            Op::SinCos(a) => {
+            Op::SinCos(_) => {
                 out.uses_sin_cos = true;
-                b.sin_cos(*id, a, &uses, part);
+                if !b.paired[id.index()] {
+                    let section_of = |n: &NodeId| graph.notes[n.index()].section;
+                    let block = part.nodes[k..].iter().take_while(|n| section_of(n) == here);
+                    b.sin_cos(block, &uses, part);
+                }
             }
             Op::Sin(_) | Op::Cos(_) => {}
             _ => {
@@ -277,22 +284,47 @@ impl Body<'_> {
         }
     }
 
-    /// `(sin_q3, cos_q3) = trig::sin_cos_f64(q[2]);`
-    fn sin_cos(&mut self, pair: NodeId, angle: NodeId, uses: &[u32], part: &Part) {
-        let halves = [Op::Sin(pair), Op::Cos(pair)].map(|half| {
-            let id = (pair.0 + 1..pair.0 + 3).map(NodeId).find(|h| self.graph.ops.get(h.index()) == Some(&half))?;
-            let wanted = uses[id.index()] > 0 || part.stores.iter().any(|(s, _)| *s == id);
-            if !wanted {
-                return None;
+    /// `(sin_q3, cos_q3) = trig::sin_cos_f64(q[2]);` for one angle; the angles of a block that are known already go
+    /// through one call in lanes, which the compiler turns into vector instructions.
+    fn sin_cos<'n>(&mut self, block: impl Iterator<Item = &'n NodeId>, uses: &[u32], part: &Part) {
+        let angles: Vec<(NodeId, String)> = block
+            .filter_map(|id| match self.graph.op(*id) {
+                Op::SinCos(a) if self.is_written(a) => Some((*id, self.operand(a).0)),
+                _ => None,
+            })
+            .collect();
+        let mut halves = [Vec::new(), Vec::new()];
+        for (pair, _) in &angles {
+            self.paired[pair.index()] = true;
+            for (half, names) in [Op::Sin(*pair), Op::Cos(*pair)].into_iter().zip(&mut halves) {
+                let id = (pair.0 + 1..pair.0 + 3).map(NodeId).find(|h| self.graph.ops.get(h.index()) == Some(&half));
+                let wanted = id.filter(|id| uses[id.index()] > 0 || part.stores.iter().any(|(s, _)| s == id));
+                names.push(match wanted {
+                    Some(id) => {
+                        let name = self.fresh_name(id);
+                        self.text[id.index()] = Some((name.clone(), Binding::Atom));
+                        name
+                    }
+                    None => "_".to_string(),
+                });
             }
-            let name = self.fresh_name(id);
-            self.declared.push(name.clone());
-            self.text[id.index()] = Some((name.clone(), Binding::Atom));
-            Some(name)
-        });
-        let [s, c] = halves.map(|h| h.unwrap_or_else(|| "_".to_string()));
-        let argument = self.operand(angle).0;
-        let _ = writeln!(self.statements, "    ({s}, {c}) = trig::sin_cos_{}({argument});", self.scalar.name());
+        }
+        let [sines, cosines] = halves;
+        let scalar = self.scalar.name();
+        if let [(_, angle)] = angles.as_slice() {
+            let (s, c) = (&sines[0], &cosines[0]);
+            let _ = writeln!(self.statements, "    let ({s}, {c}) = trig::sin_cos_{scalar}({angle});");
+        } else {
+            let arguments: Vec<String> = angles.into_iter().map(|(_, angle)| angle).collect();
+            self.statements.push_str(&wrapped("    let ([", &sines, "],"));
+            self.statements.push_str(&wrapped("        [", &cosines, "]) ="));
+            self.statements.push_str(&wrapped(&format!("        trig::sin_cos_lanes_{scalar}(["), &arguments, "]);"));
+        }
+    }
+
+    /// Whether a node can be used as an operand by now.
+    fn is_written(&self, id: NodeId) -> bool {
+        matches!(self.graph.op(id), Op::Input(_) | Op::Constant(_)) || self.text[id.index()].is_some()
     }
 
     fn store_result(&mut self, id: NodeId, k: usize) {

@@ -22,6 +22,28 @@ pub const DOMAIN_F64: f64 = 1_647_099.0;
 /// [`sin_cos_f32`] answers for |x| up to here, just under 2^13·π/2; beyond, NaN.
 pub const DOMAIN_F32: f32 = 12_867.0;
 
+/// [`sin_cos_f64`] of several angles: the same bits, by vector instructions where there are any.
+#[inline]
+#[must_use]
+pub fn sin_cos_lanes_f64<const N: usize>(x: [f64; N]) -> ([f64; N], [f64; N]) {
+    let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
+    for i in 0..N {
+        (sines[i], cosines[i]) = sin_cos_f64(x[i]);
+    }
+    (sines, cosines)
+}
+
+/// [`sin_cos_f32`] of several angles: the same bits, by vector instructions where there are any.
+#[inline]
+#[must_use]
+pub fn sin_cos_lanes_f32<const N: usize>(x: [f32; N]) -> ([f32; N], [f32; N]) {
+    let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
+    for i in 0..N {
+        (sines[i], cosines[i]) = sin_cos_f32(x[i]);
+    }
+    (sines, cosines)
+}
+
 /// `(sin x, cos x)`, x in radians, within 0.797 ulp for |x| ≤ [`DOMAIN_F64`]; NaN beyond, for infinities and for NaN.
 ///
 /// Odd in sin and even in cos to the bit, sin(−0) = −0, sin x = x for tiny x.
