@@ -8,7 +8,7 @@ use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model;
 use crate::pass::{dead_code, unread_inputs};
 use crate::report::{FunctionReport, Report};
-use crate::scene::{self, is_optional, load_parameters, without_parameters, Parameter, Scene, LOAD_SCALARS};
+use crate::scene::{self, is_optional, load_parameters, Parameter, Scene, LOAD_SCALARS};
 use crate::schedule::{schedule, Limits, Schedule};
 use crate::staged::staged;
 use crate::trace::trace;
@@ -133,7 +133,7 @@ fn generate(
     path: &str,
     hash: u64,
 ) -> Generated {
-    let robot = Robot::new(without_parameters(model, &options.scene));
+    let robot = Robot::new(model);
     let model = &robot.model;
     let title = |section: Section| match section.body {
         Some(i) => format!("{}, body {}: {}", section.phase, i + 1, model.bodies[i].name),

@@ -13,12 +13,17 @@ use crate::diagnostic::{Diagnostics, Source};
 use crate::emit::{element, Scalar};
 use crate::expr::{evaluate, Graph};
 use crate::function::{Function, Robot};
+use crate::model;
 use crate::reference_input::mass_centre_tree;
 use crate::scene::Scene;
 use std::collections::BTreeMap;
 use straightline_core::model::{JointKind, Model};
 use straightline_core::reference::{self, Joint, MassCentreFrame, MassCentreTree};
 use straightline_core::Dd;
+
+mod whole;
+
+use whole::Coordinates;
 
 /// Worst error of a function.
 #[derive(Clone, Debug)]
@@ -77,8 +82,7 @@ fn unit(scalar: Scalar) -> f64 {
 /// state.
 ///
 /// # Errors
-/// The reference does not understand the file as the compiler did, or the scene of the options leaves something out: the
-/// reference computes whole robots.
+/// The reference does not understand the file as the compiler did.
 pub fn verify(
     source: &Source,
     generated: &Generated,
@@ -86,27 +90,37 @@ pub fn verify(
     (states, seed): (u32, u64),
     mut tick: impl FnMut(),
 ) -> Result<Verification, String> {
-    let budgets = options.scene.budgets.clone();
-    if options.scene != (Scene { budgets, ..Scene::default() }) {
-        return Err(
-            "the reference computes whole robots, and the scene changes this one: verify without it".to_string()
-        );
-    }
     let (model, frames) = (&generated.model, &generated.frames);
-    let (tree, drives) = &second_reading(source, model, options)?;
+    let scene = &options.scene.resolved(model);
+    let options = &Options { scene: scene.clone(), model: scene.model_options(&options.model), ..options.clone() };
+    let whole = model::load(source, &options.model).0.ok_or("the file holds no robot")?;
+    let coordinates = &Coordinates::new(scene, model, &whole)?;
+    let (mut tree, mut drives) = second_reading(source, &whole, options)?;
+    whole::hold(scene, &whole, &mut tree, &mut drives)?;
     let functions = options.functions.iter().filter(|f| !f.is_per_frame() || !frames.is_empty());
     let robot = Robot::new(model.clone());
     let programs: Vec<Program> = functions.map(|f| program(&robot, frames, *f, options)).collect();
-    let frame = |name: &String| tree.frame(name).ok_or_else(|| format!("the reference has no frame `{name}`"));
-    let frames: Vec<&MassCentreFrame<Dd>> = frames.iter().map(frame).collect::<Result<_, _>>()?;
+    let parameters = whole::parameter_programs(&robot, options);
     let mut random = Random(seed);
     let mut worst: BTreeMap<&'static str, Worst> = BTreeMap::new();
     for state in 0..states {
-        let inputs = State::random(model, options.scalar, &mut random);
-        let truth = Truth { tree, drives, frames: &frames, state: &inputs };
+        let mut inputs = State::random(model, options.scalar, &mut random);
+        inputs.set_zeros(scene, model);
+        let tree = &mut tree.clone();
+        whole::random_inputs(scene, &parameters, options.scalar, (&mut inputs, tree), &mut random)?;
+        let (tree, whole_state) = (&*tree, &coordinates.expand(&inputs));
         for Program { function, graph, .. } in &programs {
             let values = run(graph, &inputs, options.scalar);
-            let (expected, scales) = truth.outputs(*function);
+            let names = scene.frames_of(*function, frames);
+            let frame = |name: &String| tree.frame(name).ok_or_else(|| format!("the reference has no frame `{name}`"));
+            let frames: Vec<&MassCentreFrame<Dd>> = names.iter().map(frame).collect::<Result<_, _>>()?;
+            let truth = Truth { tree, drives: &drives, frames: &frames, state: whole_state, moving: &coordinates.v };
+            let (mut expected, mut scales) = truth.outputs(*function);
+            let wanted = scene.select(*function, model, frames.len()).0;
+            for indices in coordinates.results(*function, frames.len()).into_iter().chain([wanted]) {
+                expected = indices.iter().map(|k| expected[*k]).collect();
+                scales = indices.iter().map(|k| scales[*k]).collect();
+            }
             assert_eq!((values.len(), values.len()), (expected.len(), scales.len()), "{}", function.name());
             let (k, error) = values
                 .iter()
@@ -155,6 +169,8 @@ struct Drive {
     friction: Dd,
     stiffness: Dd,
     rest: Dd,
+    /// The speed w of f q̇ / √(q̇² + w²) in place of f sgn(q̇).
+    smooth: Option<Dd>,
 }
 
 impl Drive {
@@ -177,15 +193,17 @@ impl Drive {
             friction: Dd::from(number(&drive.friction)),
             stiffness: Dd::from(number(&drive.spring_stiffness)),
             rest: Dd::from(number(&drive.spring_rest)),
+            smooth: None,
         }
     }
 
     /// What friction and spring take, and the sum of the moduli of its terms.
     fn passive(&self, q: &[Dd], qd: &[Dd]) -> (Dd, f64) {
         let (q, qd) = (q[self.iq], qd[self.iv]);
-        let dry = match qd.to_f64() {
-            v if v > 0.0 => self.friction,
-            v if v < 0.0 => -self.friction,
+        let dry = match (self.smooth, qd.to_f64()) {
+            (Some(speed), _) => self.friction * (qd / (qd * qd + speed * speed).sqrt()),
+            (None, v) if v > 0.0 => self.friction,
+            (None, v) if v < 0.0 => -self.friction,
             _ => Dd::ZERO,
         };
         let (viscous, spring) = (self.damping * qd, self.stiffness * (q - self.rest));
@@ -221,11 +239,14 @@ fn run(graph: &Graph, state: &State, scalar: Scalar) -> Vec<f64> {
 }
 
 /// Inputs of all functions.
+#[derive(Clone, Default)]
 struct State {
     q: Vec<f64>,
     qd: Vec<f64>,
     qdd: Vec<f64>,
     tau: Vec<f64>,
+    /// Inputs that a scene adds.
+    others: BTreeMap<String, Vec<f64>>,
 }
 
 impl State {
@@ -235,7 +256,21 @@ impl State {
             "qd" => &self.qd,
             "qdd" => &self.qdd,
             "tau" => &self.tau,
-            _ => unreachable!("a function has no input `{name}`"),
+            _ => self.others.get(name).expect("every input that a scene adds has a value"),
+        }
+    }
+
+    /// Zeros where the scene knows of them.
+    fn set_zeros(&mut self, scene: &Scene, model: &Model<Dd>) {
+        for (rates, is_zero) in [(&mut self.qd, scene.zero.qd), (&mut self.qdd, scene.zero.qdd)] {
+            if is_zero {
+                rates.fill(0.0);
+            }
+            for joint in model.bodies.iter().map(|b| &b.joint) {
+                if scene.zero.joints_at_rest.contains(&joint.name) {
+                    rates[joint.iv..joint.iv + joint.kind.nv()].fill(0.0);
+                }
+            }
         }
     }
 
@@ -270,7 +305,7 @@ impl State {
                 *x = f64::from(*x as f32);
             }
         }
-        State { q, qd, qdd, tau }
+        State { q, qd, qdd, tau, others: BTreeMap::new() }
     }
 }
 
@@ -309,6 +344,8 @@ struct Truth<'a> {
     drives: &'a [Drive],
     frames: &'a [&'a MassCentreFrame<Dd>],
     state: &'a State,
+    /// The velocity coordinates that move.
+    moving: &'a [usize],
 }
 
 /// How far and how fast a point of the robot can be said to be, when nothing cancels.
@@ -405,13 +442,17 @@ impl Truth<'_> {
                 let mut bias = force_scale(qd, rest);
                 self.add_passive(q, qd, value.as_mut_slice(), &mut bias);
                 value.iter_mut().zip(tau).for_each(|(force, tau)| *force = *tau - *force);
-                let value = reference::solve_symmetric(&h, &value);
+                // of the joints that move
+                let h = h.select_rows(self.moving).select_columns(self.moving);
+                let value = reference::solve_symmetric(&h, &value.select_rows(self.moving));
+                let pick = |x: &[f64]| self.moving.iter().map(|i| x[*i]).collect::<Vec<f64>>();
+                let (bias, tau) = (pick(&bias), pick(&self.state.tau));
                 // |H⁻¹| (|τ| + scale of h + |H| |q̈|)
                 let n = h.nrows();
                 let forces: Vec<f64> = (0..n)
                     .map(|i| {
                         let inertial: f64 = (0..n).map(|j| (h[(i, j)] * value[j]).to_f64().abs()).sum();
-                        tau[i].to_f64().abs() + bias[i] + inertial
+                        tau[i].abs() + bias[i] + inertial
                     })
                     .collect();
                 let mut scale = vec![0.0; n];

@@ -3,7 +3,7 @@
 //! Everything is in double-double, and zeros and ones of rotations stay exact, so that a robot with a locked joint has the
 //! same simple form as if its file had a fixed joint there.
 
-use super::{check, Base, Coulomb, Effects, Gravity, Scene};
+use super::{check, Base, Coulomb, Effects, Gravity, Parameter, Scene};
 use crate::description::{Angle, AngleUnit};
 use crate::diagnostic::{Diagnostics, Place};
 use crate::model::angle;
@@ -11,7 +11,7 @@ use crate::model::geometry::{about, compose, turned, vector};
 use crate::model::merge::{merge, Part};
 use straightline_core::algorithms::composing_pays;
 use straightline_core::model::{self, Body, BodyId, Frame, JointEffects, JointKind, Model};
-use straightline_core::spatial::{Mat3, Sym3, Transform, Vec3};
+use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::Dd;
 
 /// The robot of a scene, from the robot of the file as [`Scene::model_options`] reads it. All names of the scene are
@@ -29,7 +29,7 @@ pub fn apply(model: Model<Dd>, scene: &Scene, diagnostics: &mut Diagnostics) -> 
     if diagnostics.has_errors() {
         return None;
     }
-    let mut model = lock(model, &held);
+    let mut model = lock(without_parameters(model, scene), &held);
     weld(&mut model, scene);
     if let Gravity::Constant(gravity) = scene.gravity {
         model.gravity = vector(gravity);
@@ -38,6 +38,17 @@ pub fn apply(model: Model<Dd>, scene: &Scene, diagnostics: &mut Diagnostics) -> 
         body.effects = wanted_effects(&body.effects, &scene.effects);
     }
     Some(model)
+}
+
+/// The robot without the inertias that are inputs: each of a link with what is fixed to it in the file, not of what a lock or
+/// a payload adds.
+fn without_parameters(mut model: Model<Dd>, scene: &Scene) -> Model<Dd> {
+    for parameter in &scene.parameters {
+        if let Parameter::Link { link } = parameter {
+            model.bodies.iter_mut().filter(|b| b.name == *link).for_each(|b| b.inertia = SpatialInertia::zero());
+        }
+    }
+    model
 }
 
 /// Pose of a body whose joint does not move, in its joint frame of the parent.

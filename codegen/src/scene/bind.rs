@@ -186,16 +186,6 @@ impl Parameter {
     }
 }
 
-/// The robot without the bodies whose inertia is an input: a link with all that is fixed to it.
-pub fn without_parameters(mut model: Model<Dd>, scene: &Scene) -> Model<Dd> {
-    for parameter in &scene.parameters {
-        if let (Parameter::Link { .. }, Some(body)) = (parameter, parameter.body(&model)) {
-            model.bodies[body].inertia = SpatialInertia::zero();
-        }
-    }
-    model
-}
-
 fn load(x: &[Expr]) -> Load<Expr> {
     Load {
         mass: x[0],

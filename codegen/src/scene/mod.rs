@@ -12,7 +12,7 @@ mod places;
 mod read;
 
 pub use apply::apply;
-pub use bind::{is_optional, load_parameters, without_parameters, Bound, LOAD_SCALARS};
+pub use bind::{is_optional, load_parameters, Bound, LOAD_SCALARS};
 pub use check::check_options;
 pub use places::Places;
 pub use read::{read, SceneFile};

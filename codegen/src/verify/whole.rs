@@ -1,0 +1,220 @@
+//! A scene as the reference sees it: the whole robot of the file, held where the scene holds it.
+//!
+//! The compiler merges bodies and leaves coordinates out. Here nothing is merged or left out: locked joints are coordinates
+//! with constant values and without rates, payloads are lumped into links by Steiner's theorem, and of the whole robot's
+//! results those of the scene are picked.
+
+use super::{Drive, Random, State};
+use crate::compile::{parameter_program, Options};
+use crate::emit::Scalar;
+use crate::expr::{evaluate, Graph};
+use crate::function::{Function, Robot};
+use crate::scene::{Base, Coulomb, Gravity, Parameter, Scene};
+use nalgebra::{Matrix3, Vector3};
+use straightline_core::model::{JointKind, Model};
+use straightline_core::reference::{ExtendedPosition, MassCentreTree};
+use straightline_core::Dd;
+
+/// How the coordinates of a scene sit among those of the whole robot.
+pub(super) struct Coordinates {
+    /// For each configuration coordinate of the scene, that of the whole robot.
+    q: Vec<usize>,
+    /// The same of velocity coordinates.
+    pub v: Vec<usize>,
+    /// For each joint of the scene, in the order of its coordinates, the rank of that joint in the whole robot.
+    joints: Vec<usize>,
+    /// The whole robot's configuration where the scene holds it.
+    held: Vec<f64>,
+    /// Number of velocity coordinates of the whole robot.
+    nv: usize,
+}
+
+impl Coordinates {
+    pub fn new(scene: &Scene, model: &Model<Dd>, whole: &Model<Dd>) -> Result<Coordinates, String> {
+        let in_order = |model: &Model<Dd>| {
+            let mut joints: Vec<_> = model.bodies.iter().map(|body| body.joint.clone()).collect();
+            joints.sort_by_key(|joint| joint.iv);
+            joints
+        };
+        let (all, mut held) = (in_order(whole), vec![0.0; whole.nq()]);
+        let (mut q, mut v, mut joints) = (Vec::new(), Vec::new(), Vec::new());
+        for joint in in_order(model) {
+            let rank = all.iter().position(|j| j.name == joint.name);
+            let rank = rank.ok_or_else(|| format!("the whole robot has no joint `{}`", joint.name))?;
+            joints.push(rank);
+            q.extend(all[rank].iq..all[rank].iq + joint.kind.nq());
+            v.extend(all[rank].iv..all[rank].iv + joint.kind.nv());
+        }
+        for joint in &all {
+            match (joint.kind, scene.locked.iter().find(|(name, _)| *name == joint.name)) {
+                (JointKind::Floating, _) => held[joint.iq + 6] = 1.0,
+                (_, Some((_, value))) => held[joint.iq] = *value,
+                _ => {}
+            }
+        }
+        Ok(Coordinates { q, v, joints, held, nv: whole.nv() })
+    }
+
+    /// The whole robot's state.
+    pub fn expand(&self, state: &State) -> State {
+        let mut whole = State { q: self.held.clone(), ..State::default() };
+        for rates in [&mut whole.qd, &mut whole.qdd, &mut whole.tau] {
+            rates.resize(self.nv, 0.0);
+        }
+        self.q.iter().zip(&state.q).for_each(|(at, x)| whole.q[*at] = *x);
+        for (i, at) in self.v.iter().enumerate() {
+            (whole.qd[*at], whole.qdd[*at], whole.tau[*at]) = (state.qd[i], state.qdd[i], state.tau[i]);
+        }
+        whole
+    }
+
+    /// Of a function's results for the whole robot, those of the robot of the scene, as indices.
+    pub fn results(&self, function: Function, frames: usize) -> Option<Vec<usize>> {
+        use Function::*;
+        let (n, v) = (self.nv, &self.v);
+        Some(match function {
+            InverseDynamics | GravityForce | BiasForce | VelocityForce => v.clone(),
+            MassMatrix => v.iter().flat_map(|i| v.iter().map(move |j| i * n + j)).collect(),
+            Jacobian => (0..6 * frames).flat_map(|row| v.iter().map(move |j| row * n + j)).collect(),
+            JointWrenches => self.joints.iter().flat_map(|rank| 6 * rank..6 * rank + 6).collect(),
+            // its results depend on which joints move: solved for these
+            ForwardDynamics => return None,
+            ForwardKinematics | FrameVelocity | FrameAcceleration | JacobianBias => return None,
+            Energy | CentreOfMass | Momentum => return None,
+        })
+    }
+}
+
+/// Makes the whole robot what the scene holds constant. `model` is the robot of the file, `tree` its reference.
+pub(super) fn hold(
+    scene: &Scene,
+    model: &Model<Dd>,
+    tree: &mut MassCentreTree<Dd>,
+    drives: &mut Vec<Drive>,
+) -> Result<(), String> {
+    let is_locked = |name: &str| scene.locked.iter().any(|(joint, _)| joint == name);
+    let stands = |mut body: Option<usize>| {
+        while let Some(id) = body {
+            let joint = &model.bodies[id].joint;
+            if !is_locked(&joint.name) && !(joint.kind == JointKind::Floating && scene.base == Base::Fixed) {
+                return false;
+            }
+            body = model.bodies[id].parent;
+        }
+        true
+    };
+    for parameter in &scene.parameters {
+        if let Parameter::Link { link } = parameter {
+            let link = tree.links.iter_mut().find(|l| l.name == *link);
+            let link = link.ok_or_else(|| format!("the reference has no link `{}`", parameter.name()))?;
+            (link.mass, link.inertia) = (Dd::ZERO, Matrix3::zeros());
+        }
+    }
+    for payload in &scene.payloads {
+        let [xx, xy, xz, yy, yz, zz] = payload.inertia;
+        let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        weld(tree, &payload.frame, payload.mass, payload.com, inertia)?;
+    }
+    // what stands still does not count as moving: without mass
+    for (id, body) in model.bodies.iter().enumerate().filter(|(id, _)| stands(Some(*id))) {
+        let link = tree.links.iter_mut().find(|link| link.name == body.name);
+        let link = link.ok_or_else(|| format!("the reference has no link `{}`", model.bodies[id].name))?;
+        (link.mass, link.inertia) = (Dd::ZERO, Matrix3::zeros());
+    }
+    if let Gravity::Constant(gravity) = scene.gravity {
+        tree.gravity = Vector3::from(gravity.map(Dd::from));
+    }
+    let moves = |iv: usize| model.bodies.iter().any(|b| b.joint.iv == iv && !is_locked(&b.joint.name));
+    drives.retain(|drive| moves(drive.iv));
+    for drive in drives {
+        let wanted = |x: Dd, is_wanted: bool| if is_wanted { x } else { Dd::ZERO };
+        drive.inertia = wanted(drive.inertia, scene.effects.rotor_inertia);
+        drive.damping = wanted(drive.damping, scene.effects.damping);
+        drive.friction = wanted(drive.friction, scene.effects.coulomb != Coulomb::Off);
+        drive.stiffness = wanted(drive.stiffness, scene.effects.springs);
+        drive.smooth = match scene.effects.coulomb {
+            Coulomb::Smooth(speed) => Some(Dd::from(speed)),
+            Coulomb::Off | Coulomb::Sign => None,
+        };
+    }
+    Ok(())
+}
+
+/// Adds a body, given in a frame, to the link that carries the frame. Steiner's theorem about the common mass centre; the
+/// vectors that start or end in the mass centre follow it, and what they said of the zero of joints stays said.
+fn weld(
+    tree: &mut MassCentreTree<Dd>,
+    frame: &str,
+    mass: f64,
+    com: [f64; 3],
+    inertia: Matrix3<f64>,
+) -> Result<(), String> {
+    let frame = tree.frame(frame).ok_or_else(|| format!("the reference has no frame `{frame}`"))?.clone();
+    let Some(carrier) = frame.link else { return Ok(()) };
+    let (mass, com) = (Dd::from(mass), frame.position + frame.rotation * Vector3::from(com.map(Dd::from)));
+    let inertia = frame.rotation * inertia.map(Dd::from) * frame.rotation.transpose();
+    let link = &mut tree.links[carrier];
+    let total = link.mass + mass;
+    if total == Dd::ZERO {
+        return Ok(());
+    }
+    let shift = com.map(|x| x * mass / total);
+    let steiner = |mass: Dd, d: Vector3<Dd>| (Matrix3::identity() * d.dot(&d) - d * d.transpose()) * mass;
+    link.inertia = link.inertia + steiner(link.mass, shift) + inertia + steiner(mass, com - shift);
+    link.mass = total;
+    if let ExtendedPosition::ByVectors { r_star, .. } = &mut link.extended {
+        r_star.get_or_insert(link.r);
+    }
+    link.r += shift;
+    for child in tree.links.iter_mut().filter(|link| link.parent == Some(carrier)) {
+        if let ExtendedPosition::ByVectors { r_parent_star, .. } = &mut child.extended {
+            r_parent_star.get_or_insert(child.r_parent);
+        }
+        child.r_parent += shift;
+    }
+    tree.frames.iter_mut().filter(|f| f.link == Some(carrier)).for_each(|f| f.position -= shift);
+    Ok(())
+}
+
+/// Programs that make a scene's parameters from the numbers of a body.
+pub(super) fn parameter_programs(robot: &Robot, options: &Options) -> Vec<(Parameter, Graph)> {
+    let parameters = options.scene.parameters.iter();
+    parameters.map(|p| (p.clone(), parameter_program(robot, p, options))).collect()
+}
+
+/// Random values of what the scene has as inputs besides coordinates: into the state as the program takes them, into the
+/// tree as they are meant.
+pub(super) fn random_inputs(
+    scene: &Scene,
+    parameters: &[(Parameter, Graph)],
+    scalar: Scalar,
+    (state, tree): (&mut State, &mut MassCentreTree<Dd>),
+    random: &mut Random,
+) -> Result<(), String> {
+    let rounded = |x: f64| if scalar == Scalar::F32 { f64::from(x as f32) } else { x };
+    if scene.gravity == Gravity::Input {
+        let gravity: [f64; 3] = std::array::from_fn(|_| rounded(random.symmetric(10.0)));
+        tree.gravity = Vector3::from(gravity.map(Dd::from));
+        state.others.insert("gravity".to_string(), gravity.to_vec());
+    }
+    for (parameter, program) in parameters {
+        let mass = rounded(1.0 + random.symmetric(0.75));
+        let com: [f64; 3] = std::array::from_fn(|_| rounded(random.symmetric(0.2)));
+        // three points of equal mass: a body that can be
+        let points: [Vector3<f64>; 3] = std::array::from_fn(|_| Vector3::from_fn(|_, _| random.symmetric(0.1)));
+        let sum: Matrix3<f64> = points.iter().map(|x| Matrix3::identity() * x.dot(x) - x * x.transpose()).sum();
+        let j = (sum * (mass / 3.0)).map(rounded);
+        let six = [j[(0, 0)], j[(0, 1)], j[(0, 2)], j[(1, 1)], j[(1, 2)], j[(2, 2)]];
+        let inputs = [&[mass][..], &com, &six].concat();
+        let scalars = match scalar {
+            Scalar::F64 => evaluate::<f64>(program, &inputs),
+            Scalar::F32 => {
+                let inputs: Vec<f32> = inputs.iter().map(|x| *x as f32).collect();
+                evaluate::<f32>(program, &inputs).into_iter().map(f64::from).collect()
+            }
+        };
+        state.others.insert(parameter.input_name(), scalars);
+        weld(tree, parameter.frame(), mass, com, j)?;
+    }
+    Ok(())
+}
