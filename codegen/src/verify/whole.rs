@@ -96,7 +96,8 @@ pub(super) fn hold(
     let stands = |mut body: Option<usize>| {
         while let Some(id) = body {
             let joint = &model.bodies[id].joint;
-            if !is_locked(&joint.name) && !(joint.kind == JointKind::Floating && scene.base == Base::Fixed) {
+            let is_held = is_locked(&joint.name) || joint.kind == JointKind::Floating && scene.base == Base::Fixed;
+            if !is_held {
                 return false;
             }
             body = model.bodies[id].parent;
