@@ -29,16 +29,10 @@ fn matrix(m: &Mat3<Dd>) -> [[f64; 3]; 3] {
     m.rows.map(|row| row.map(Dd::to_f64))
 }
 
-/// Folders of files that are kept beside the repository; those that are missing are skipped with a word.
+/// The robot files of a folder of the workspace.
 fn files(folder: &str) -> Vec<PathBuf> {
-    let shared = match std::env::var_os("STRAIGHTLINE_REFERENCE") {
-        Some(reference) => PathBuf::from(reference).join(".."),
-        None => PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
-    };
-    let Ok(entries) = std::fs::read_dir(shared.join(folder)) else {
-        eprintln!("skipped: no folder {folder} (set STRAIGHTLINE_REFERENCE)");
-        return Vec::new();
-    };
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..").join(folder);
+    let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("the folder can be read").path()).collect();
     paths.retain(|p| p.extension().is_some_and(|e| e == "urdf" || e == "toml"));
     paths.sort();
@@ -47,7 +41,7 @@ fn files(folder: &str) -> Vec<PathBuf> {
 
 #[test]
 fn published_robots_load() {
-    for folder in ["reference/robots", "research/count_robots"] {
+    for folder in ["robots/descriptions", "generated_tests/count_robots"] {
         for path in files(folder) {
             let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("").to_string();
             let source = Source::from_bytes(&name, std::fs::read(&path).expect("the file can be read"));
@@ -77,7 +71,7 @@ fn published_robots_load() {
 
 #[test]
 fn published_puma_loads_with_warnings() {
-    let Some(path) = files("reference/robots").into_iter().find(|p| p.ends_with("puma560.urdf")) else { return };
+    let path = files("robots/descriptions").into_iter().find(|p| p.ends_with("puma560.urdf")).expect("it is there");
     let text = std::fs::read_to_string(path).expect("the file can be read");
     let (_, diagnostics) = model_of("puma560.urdf", &text, &ModelOptions::default());
     assert_eq!(codes(&diagnostics), ["inertia-without-mass", "triangle-inequality", "triangle-inequality"]);

@@ -14,7 +14,7 @@ use straightline_core::reference::{
 };
 use straightline_core::Dd;
 use support::chapter::chapter_robot;
-use support::data::{inputs, numbers, reference_folder};
+use support::data::{inputs, numbers, reference_file};
 use support::robots::{random_position, random_robot, Random, RobotKind};
 
 const CHAPTER_ROBOTS: [&str; 4] = ["chapter_cylindrical", "chapter_stanford", "chapter_6r", "chapter_oblique"];
@@ -34,16 +34,14 @@ struct State {
     data: Value,
 }
 
-fn read(path: &str) -> Option<String> {
-    Some(fs::read_to_string(reference_folder()?.join(path)).expect("a file of the reference data"))
+fn read(path: &str) -> String {
+    fs::read_to_string(reference_file(path)).expect("a file of the reference data")
 }
 
-/// All states of a chapter robot; none if the data are not there.
+/// All states of a chapter robot.
 fn states(robot: &str) -> Vec<State> {
-    let Some(description) = read(&format!("robots/{robot}.toml")) else { return Vec::new() };
-    let tree = chapter_robot(&description);
-    let file: Value = serde_json::from_str(&read(&format!("states/{robot}.json")).expect("the folder is there"))
-        .expect("the states are JSON");
+    let tree = chapter_robot(&read(&format!("robots/{robot}.toml")));
+    let file: Value = serde_json::from_str(&read(&format!("states/{robot}.json"))).expect("the states are JSON");
     let state = |data: &Value| {
         let mut tree = tree.clone();
         if let Some(gravity) = data.get("gravity") {
@@ -192,7 +190,7 @@ fn the_chapters_quantities_are_those_of_the_data() {
         let tip = tree.frame("tip").expect("chapter robots have a tip");
         state.check_group("tip", frame_pose(tree, tip, q).position.as_slice(), &expected["tip"]);
     }
-    assert!(reference_folder().is_none() || count > 20, "{count} states have the chapter's quantities");
+    assert!(count > 20, "{count} states have the chapter's quantities");
 }
 
 #[test]

@@ -5,22 +5,15 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use straightline_core::Dd;
 
-/// The folder of the reference data: `STRAIGHTLINE_REFERENCE`, or `shared/reference` beside the workspace.
-pub fn reference_folder() -> Option<PathBuf> {
-    let is_it = |folder: &PathBuf| folder.join("robots.json").is_file();
-    let folder = match std::env::var_os("STRAIGHTLINE_REFERENCE") {
-        Some(folder) => Some(PathBuf::from(folder)).filter(is_it),
-        None => {
-            let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-            here.ancestors().map(|above| above.join("shared/reference")).find(is_it)
-        }
-    };
-    if folder.is_none() {
-        println!(
-            "skipped: there are no reference data (STRAIGHTLINE_REFERENCE, or shared/reference beside the workspace)"
-        );
+/// A file of the reference data, `states/panda.json` or `robots/panda.urdf`, as it lies in the workspace.
+pub fn reference_file(path: &str) -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = here.ancestors().find(|above| above.join("generated_tests/reference").is_dir());
+    let root = root.expect("the workspace holds the reference data");
+    match path.strip_prefix("robots/") {
+        Some(robot) => root.join("robots/descriptions").join(robot),
+        None => root.join("generated_tests/reference").join(path),
     }
-    folder
 }
 
 /// All numbers in a JSON value, depth first, with 25 digits.
