@@ -142,7 +142,7 @@ fn generate(
     let mut items = Vec::new();
     let mut functions = BTreeMap::new();
     for &function in &options.functions {
-        if function.is_per_frame() && frames.is_empty() {
+        if function.is_per_frame() && options.scene.frames_of(function, &frames).is_empty() {
             continue;
         }
         let Program { graph, schedule, .. } = program(&robot, &frames, function, options);

@@ -99,7 +99,7 @@ pub struct Programs {
 /// with the fewest stored values.
 pub fn programs(robot: &Robot, frames: &[String], options: &Options) -> Programs {
     let functions: Vec<Function> =
-        options.functions.iter().copied().filter(|f| !f.is_per_frame() || !frames.is_empty()).collect();
+        options.functions.iter().copied().filter(|f| !f.is_per_frame() || !options.scene.frames_of(*f, frames).is_empty()).collect();
     let forms = [InverseForm::MassMatrix, InverseForm::Recursion].into_iter().flat_map(|inverse| {
         [ForwardDynamicsMethod::Factorisation, ForwardDynamicsMethod::ArticulatedBody].map(|forward| (inverse, forward))
     });
