@@ -98,8 +98,12 @@ pub struct Programs {
 /// Traces and cuts: of the forms that inverse and forward dynamics have, those with the fewest operations per call, then
 /// with the fewest stored values.
 pub fn programs(robot: &Robot, frames: &[String], options: &Options) -> Programs {
-    let functions: Vec<Function> =
-        options.functions.iter().copied().filter(|f| !f.is_per_frame() || !options.scene.frames_of(*f, frames).is_empty()).collect();
+    let functions: Vec<Function> = options
+        .functions
+        .iter()
+        .copied()
+        .filter(|f| !f.is_per_frame() || !options.scene.frames_of(*f, frames).is_empty())
+        .collect();
     let forms = [InverseForm::MassMatrix, InverseForm::Recursion].into_iter().flat_map(|inverse| {
         [ForwardDynamicsMethod::Factorisation, ForwardDynamicsMethod::ArticulatedBody].map(|forward| (inverse, forward))
     });

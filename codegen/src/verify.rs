@@ -97,7 +97,8 @@ pub fn verify(
     let coordinates = &Coordinates::new(scene, model, &whole)?;
     let (mut tree, mut drives) = second_reading(source, &whole, options)?;
     whole::hold(scene, &whole, &mut tree, &mut drives)?;
-    let functions = options.functions.iter().filter(|f| !f.is_per_frame() || !options.scene.frames_of(**f, frames).is_empty());
+    let functions =
+        options.functions.iter().filter(|f| !f.is_per_frame() || !options.scene.frames_of(**f, frames).is_empty());
     let robot = Robot::new(model.clone());
     let programs: Vec<Program> = functions.map(|f| program(&robot, frames, *f, options)).collect();
     let parameters = whole::parameter_programs(&robot, options);
