@@ -7,10 +7,12 @@ use crate::expr::{verify, Folding, Grade, Graph, Port, RuleSet, Section};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model;
 use crate::pass::{dead_code, unread_inputs};
+use crate::report::budget::{self, Measures};
+use crate::report::waterfall::{self, Waterfall};
 use crate::report::{FunctionReport, Report};
 use crate::scene::{self, is_optional, load_parameters, Parameter, Scene, LOAD_SCALARS};
 use crate::schedule::{schedule, Limits, Schedule};
-use crate::staged::staged;
+use crate::staged::{self, staged};
 use crate::trace::trace;
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
@@ -53,12 +55,58 @@ impl Default for Options {
 }
 
 impl Options {
+    /// The optimisations that these options allow.
+    pub fn optimisations(&self) -> Optimisations {
+        let algebraic = self.grade == Grade::Algebraic;
+        let cheaper = self.forward_dynamics == ForwardDynamicsMethod::Cheaper;
+        Optimisations { folding: algebraic, algebraic, reduced: algebraic, cheaper }
+    }
+
     /// The rewrite rules that these options allow.
     pub fn rules(&self) -> RuleSet {
-        match (self.grade, self.scalar) {
-            (Grade::Exact, Scalar::F64) => RuleSet::exact(Folding::F64),
-            (Grade::Exact, Scalar::F32) => RuleSet::exact(Folding::F32),
-            (Grade::Algebraic, _) => RuleSet::all(),
+        self.optimisations().rules(self.scalar)
+    }
+}
+
+/// What [`program`] does beyond writing the equations down, one by one, so that each can be weighed. Without any of them a
+/// program is the generic runtime unrolled: equal subexpressions once, no products with zero and one, nothing that no
+/// result needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Optimisations {
+    /// Constants are folded in double-double, so that what is zero or one is exactly that.
+    pub folding: bool,
+    /// Rules that are equal over the reals only.
+    pub algebraic: bool,
+    /// The reduced robot where it serves: frames along common normals, inertial parameters regrouped.
+    pub reduced: bool,
+    /// The cheaper of the two forms of forward dynamics.
+    pub cheaper: bool,
+}
+
+impl Optimisations {
+    /// From none of them to these, one more at each step, with its words.
+    pub fn steps(self) -> Vec<(&'static str, Optimisations)> {
+        let mut now = Optimisations::default();
+        let mut steps = Vec::new();
+        let mut step = |what, on: bool, switch: fn(&mut Optimisations)| {
+            if on {
+                switch(&mut now);
+                steps.push((what, now));
+            }
+        };
+        step("constants folded in double-double", self.folding, |o| o.folding = true);
+        step("algebraic rules", self.algebraic, |o| o.algebraic = true);
+        step("reduced robot: frames and inertial parameters", self.reduced, |o| o.reduced = true);
+        step("the cheaper form of forward dynamics", self.cheaper, |o| o.cheaper = true);
+        steps
+    }
+
+    fn rules(self, scalar: Scalar) -> RuleSet {
+        match (self.algebraic, self.folding, scalar) {
+            (true, _, _) => RuleSet::all(),
+            (false, true, _) => RuleSet::exact(Folding::DoubleDouble),
+            (false, false, Scalar::F64) => RuleSet::exact(Folding::F64),
+            (false, false, Scalar::F32) => RuleSet::exact(Folding::F32),
         }
     }
 }
@@ -76,14 +124,30 @@ pub struct Program {
 
 /// Traces and optimises one function of a robot.
 pub fn program(robot: &Robot, frames: &[String], function: Function, options: &Options) -> Program {
+    let graph = optimised(robot, frames, function, options, options.optimisations());
+    let schedule = schedule(&graph, options.limits);
+    Program { function, graph, schedule }
+}
+
+/// The operations of one function of a robot, with these optimisations only.
+pub fn optimised(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+    optimisations: Optimisations,
+) -> Graph {
     let check = |graph: Graph| {
         verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
         graph
     };
-    let traced = function.trace(robot, frames, options.forward_dynamics, options.rules(), &options.scene);
-    let graph = check(unread_inputs(check(dead_code(&check(traced))), is_optional));
-    let schedule = schedule(&graph, options.limits);
-    Program { function, graph, schedule }
+    let method = match options.forward_dynamics {
+        ForwardDynamicsMethod::Cheaper if !optimisations.cheaper => ForwardDynamicsMethod::ArticulatedBody,
+        method => method,
+    };
+    let rules = optimisations.rules(options.scalar);
+    let traced = function.trace(robot, frames, method, rules, optimisations.reduced, &options.scene);
+    check(unread_inputs(check(dead_code(&check(traced))), is_optional))
 }
 
 /// What the compiler makes of a robot file.
@@ -109,31 +173,75 @@ pub struct Generated {
     pub warnings: Diagnostics,
 }
 
-/// From the text of a robot file to the text of its dynamics.
+/// From the text of a robot file to the text of its dynamics. Where a scene skips something, the report says how much.
 ///
 /// # Errors
-/// Everything that is wrong with the file or the options, at once.
+/// Everything that is wrong with the file or the options, at once; or the budgets that are exceeded.
 pub fn compile(source: &Source, options: &Options) -> Result<Generated, Diagnostics> {
-    let (model, mut diagnostics) = model::load(source, &options.scene.model_options(&options.model));
-    scene::check_options(options, &mut diagnostics);
-    let model = model.and_then(|model| scene::apply(model, &options.scene, &mut diagnostics));
-    let frames = model.as_ref().map(|m| choose_frames(m, &options.frames, &mut diagnostics)).unwrap_or_default();
-    diagnostics.sort();
-    let Some(model) = model.filter(|_| !diagnostics.has_errors()) else { return Err(diagnostics) };
-    let options = &Options { scene: options.scene.resolved(&model), ..options.clone() };
-    Ok(generate(model, frames, diagnostics, options, source.path(), hash(source.text(), options)))
+    compile_and_explain(source, options, !options.scene.is_empty())
 }
 
-/// The rest of the pipeline, for a model that is sound and frames that it has.
+/// The same, with a report that says what every optimisation is worth, and with the figures of the staged form: for people
+/// and programs that ask for it, because every step is compiled.
+///
+/// # Errors
+/// As [`compile`].
+pub fn explain(source: &Source, options: &Options) -> Result<Generated, Diagnostics> {
+    let mut generated = compile_and_explain(source, options, true)?;
+    if generated.report.staged.is_none() && !generated.items.is_empty() {
+        let robot = Robot::new(generated.model.clone());
+        let options = Options { scene: options.scene.resolved(&robot.model), ..options.clone() };
+        generated.report.staged = Some(staged::figures(&robot, &generated.frames, &options));
+    }
+    Ok(generated)
+}
+
+fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
+    let (whole, mut diagnostics) = model::load(source, &options.scene.model_options(&options.model));
+    scene::check_options(options, &mut diagnostics);
+    let model = whole.clone().and_then(|whole| scene::apply(whole, &options.scene, &mut diagnostics));
+    let frames = model.as_ref().map(|m| choose_frames(m, &options.frames, &mut diagnostics)).unwrap_or_default();
+    diagnostics.sort();
+    let (Some(whole), Some(model)) = (whole, model) else { return Err(diagnostics) };
+    if diagnostics.has_errors() {
+        return Err(diagnostics);
+    }
+    let resolved = Options { scene: options.scene.resolved(&model), ..options.clone() };
+    let hash = hash(source.text(), &resolved);
+    let robot = Robot::new(model);
+    let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
+    let programs = resolved.functions.iter().filter(|f| !is_empty(f));
+    let programs: Vec<Program> = programs.map(|f| program(&robot, &frames, *f, &resolved)).collect();
+    let measures: Vec<(Function, Measures)> =
+        programs.iter().map(|p| (p.function, Measures::of(p, options.scalar))).collect();
+    budget::check(&whole, &frames, &measures, options, &mut diagnostics);
+    if diagnostics.has_errors() {
+        diagnostics.sort();
+        return Err(diagnostics);
+    }
+    let waterfalls = match explained {
+        true => {
+            let stops = waterfall::stops(&whole, &options.scene);
+            let of = |p: &Program| waterfall::waterfall(&stops, &frames, p.function, &resolved, p.graph.counts());
+            programs.iter().map(|p| Some(of(p))).collect()
+        }
+        false => vec![None; programs.len()],
+    };
+    Ok(generate(robot, frames, programs, waterfalls, diagnostics, &resolved, source.path(), hash))
+}
+
+/// The rest of the pipeline: from programs to text.
+#[allow(clippy::too_many_arguments)]
 fn generate(
-    model: Model<Dd>,
+    robot: Robot,
     frames: Vec<String>,
+    programs: Vec<Program>,
+    waterfalls: Vec<Option<Waterfall>>,
     warnings: Diagnostics,
     options: &Options,
     path: &str,
     hash: u64,
 ) -> Generated {
-    let robot = Robot::new(model);
     let model = &robot.model;
     let title = |section: Section| match section.body {
         Some(i) => format!("{}, body {}: {}", section.phase, i + 1, model.bodies[i].name),
@@ -141,21 +249,13 @@ fn generate(
     };
     let mut items = Vec::new();
     let mut functions = BTreeMap::new();
-    for &function in &options.functions {
-        if function.is_per_frame() && options.scene.frames_of(function, &frames).is_empty() {
-            continue;
-        }
-        let Program { graph, schedule, .. } = program(&robot, &frames, function, options);
+    for (program, waterfall) in programs.into_iter().zip(waterfalls) {
+        let Program { function, graph, schedule } = &program;
         let doc = function.doc(&graph.inputs, &options.scene);
-        let text = emit::function(&graph, &schedule, function.name(), &doc, options.scalar, &title);
-        let figures = FunctionReport::new(
-            graph.counts(),
-            schedule.max_live,
-            schedule.slots * options.scalar.bytes(),
-            schedule.parts.len(),
-            text.text.lines().count(),
-        );
-        functions.insert(function.name(), figures);
+        let text = emit::function(graph, schedule, function.name(), &doc, options.scalar, &title);
+        let figures = FunctionReport::new(&program, options.scalar, text.text.lines().count());
+        functions.insert(function.name(), FunctionReport { waterfall, ..figures });
+        let Program { function, graph, .. } = program;
         items.push(Item { function, inputs: graph.inputs, outputs: graph.outputs, doc, text });
     }
     let staged = options.scene.staged.then(|| staged(&robot, &frames, options, &title));
@@ -176,7 +276,12 @@ fn generate(
     };
     let remarks = warnings.iter().map(remark).collect();
     let provenance = Provenance { source: name.clone(), hash, remarks };
-    let types = parameter_types(&robot, options) + &staged_text;
+    let takes = |parameter: &Parameter| {
+        let name = parameter.type_name();
+        let ports = || items.iter().flat_map(|item| &item.inputs);
+        ports().any(|port| port.wrapper.as_ref() == Some(&name)) || staged_text.contains(&format!("&{name}"))
+    };
+    let types = parameter_types(&robot, options, &takes) + &staged_text;
     let text = emit::file(model, &frames, &items, &report, &provenance, options.scalar, &types);
     Generated { model: robot.model, frames, text, types, items, scalar: options.scalar, provenance, report, warnings }
 }
@@ -190,13 +295,13 @@ pub fn parameter_program(robot: &Robot, parameter: &Parameter, options: &Options
 }
 
 /// The last part of a path.
-fn file_name(path: &str) -> &str {
+pub(crate) fn file_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-/// The types of run-time parameters, with what they share.
-fn parameter_types(robot: &Robot, options: &Options) -> String {
-    let parameters = options.scene.parameters.iter().filter(|p| p.body(&robot.model).is_some());
+/// The types of those run-time parameters that something takes, with what they share.
+fn parameter_types(robot: &Robot, options: &Options, takes: &dyn Fn(&Parameter) -> bool) -> String {
+    let parameters = options.scene.parameters.iter().filter(|p| p.body(&robot.model).is_some() && takes(p));
     let types = parameters.map(|p| {
         let graph = parameter_program(robot, p, options);
         let (schedule, name) = (schedule(&graph, options.limits), p.input_name());

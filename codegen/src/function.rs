@@ -1,6 +1,6 @@
 //! The functions that can be generated: a table of names, signatures and documentation, and the algorithm behind each.
 
-use crate::expr::{Grade, Graph, Port, RuleSet};
+use crate::expr::{Graph, Port, RuleSet};
 use crate::reduce::reduce;
 use crate::scene::{Bound, Part, Scene};
 use crate::trace::{trace, Expr};
@@ -362,43 +362,41 @@ impl Function {
         })
     }
 
-    /// All its results over expressions, in a scene; inside a trace.
+    /// All its results over expressions, in a scene; inside a trace. `reduced`: by the reduced robot, where it serves.
     pub fn equations(
         self,
         robot: &Robot,
         frames: &[String],
         method: ForwardDynamicsMethod,
-        grade: Grade,
+        reduced: bool,
         scene: &Scene,
         inputs: &[Vec<Expr>],
     ) -> Vec<Expr> {
-        let Bound { model, reduced, arguments } = scene.bind(self, robot, inputs);
-        let by_reduced = match grade {
-            Grade::Algebraic => self.evaluate_reduced(&model, &reduced, method, &arguments),
-            Grade::Exact => None,
-        };
+        let bound = scene.bind(self, robot, inputs);
+        let Bound { model, arguments, .. } = &bound;
+        let by_reduced = reduced.then(|| self.evaluate_reduced(model, &bound.reduced, method, arguments)).flatten();
         by_reduced.unwrap_or_else(|| {
             let frame = |name: &String| model.frame(name).expect("frames were checked against the model");
-            self.evaluate(&model, &frames.iter().map(frame).collect::<Vec<_>>(), method, &arguments)
+            self.evaluate(model, &frames.iter().map(frame).collect::<Vec<_>>(), method, arguments)
         })
     }
 
     /// Its equations for a robot in a scene. For [`ForwardDynamicsMethod::Cheaper`] both methods are traced and the one
-    /// with fewer operations is kept. Where the rules may move rounding, the reduced robot serves the functions that it
-    /// can.
+    /// with fewer operations is kept. `reduced`: the reduced robot serves the functions that it can, and rounding moves.
     pub fn trace(
         self,
         robot: &Robot,
         frames: &[String],
         method: ForwardDynamicsMethod,
         rules: RuleSet,
+        reduced: bool,
         scene: &Scene,
     ) -> Graph {
         let frames = scene.frames_of(self, frames);
         let (wanted, output) = scene.select(self, &robot.model, frames.len());
         let trace_with = |method| {
             trace(rules, scene.ports(self, &robot.model), vec![output.clone()], |inputs| {
-                let results = self.equations(robot, frames, method, rules.grade(), scene, inputs);
+                let results = self.equations(robot, frames, method, reduced, scene, inputs);
                 wanted.iter().map(|k| results[*k]).collect()
             })
         };

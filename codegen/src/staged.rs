@@ -29,6 +29,8 @@ pub struct StageReport {
     pub add: usize,
     /// Divisions.
     pub div: usize,
+    /// Square roots.
+    pub sqrt: usize,
     /// Sine-cosine pairs.
     pub sincos: usize,
     /// Values that it stores.
@@ -45,6 +47,8 @@ pub struct Remaining {
     pub add: usize,
     /// Divisions.
     pub div: usize,
+    /// Square roots.
+    pub sqrt: usize,
 }
 
 /// Figures of the staged form.
@@ -135,6 +139,12 @@ pub fn staged(
     (text(&functions, &staged, &stages, options, title), report(&functions, &staged, &stages))
 }
 
+/// The figures of the staged form alone.
+pub fn figures(robot: &Robot, frames: &[String], options: &Options) -> StagedReport {
+    let Programs { functions, staged, stages } = programs(robot, frames, options);
+    report(&functions, &staged, &stages)
+}
+
 /// All functions in one program; the stage of each of its input ports; the stages.
 fn joint_program(
     robot: &Robot,
@@ -171,7 +181,7 @@ fn joint_program(
         let equations = |function: Function| {
             let own: Vec<Vec<Expr>> = scene.ports(function, &robot.model).iter().map(|p| argument(&p.name)).collect();
             let frames = scene.frames_of(function, frames);
-            function.equations(robot, frames, forward, options.grade, scene, &own)
+            function.equations(robot, frames, forward, options.optimisations().reduced, scene, &own)
         };
         let mut results = Vec::new();
         for (function, (wanted, _)) in functions.iter().zip(&selected) {
@@ -194,12 +204,12 @@ fn joint_program(
 
 fn report(functions: &[Function], staged: &Staged, stages: &[Stage]) -> StagedReport {
     let of = |stage: &Stage, graph: &Graph| {
-        let Counts { mul, add, div, sin_cos, .. } = graph.counts();
-        StageReport { name: stage.type_name, mul, add, div, sincos: sin_cos, stored: graph.results.len() }
+        let Counts { mul, add, div, sqrt, sin_cos, .. } = graph.counts();
+        StageReport { name: stage.type_name, mul, add, div, sqrt, sincos: sin_cos, stored: graph.results.len() }
     };
     let left = |graph: &Graph| {
-        let Counts { mul, add, div, .. } = graph.counts();
-        Remaining { mul, add, div }
+        let Counts { mul, add, div, sqrt, .. } = graph.counts();
+        Remaining { mul, add, div, sqrt }
     };
     StagedReport {
         stages: stages.iter().zip(&staged.stages).map(|(s, g)| of(s, g)).collect(),

@@ -139,6 +139,33 @@ fn the_report_is_json_for_programs() {
 }
 
 #[test]
+fn the_report_is_a_page_for_people() {
+    let directory = scratch("page");
+    let page = directory.join("arm.html");
+    let run = straightline(&["report", ARM, "--html", page.to_str().unwrap()]);
+    assert_eq!((run.code, run.out.as_str()), (0, ""), "{}", run.err);
+    assert!(fs::read_to_string(&page).unwrap().starts_with("<!DOCTYPE html>"));
+    assert_eq!(names(&directory), ["arm.html"]);
+    let nowhere = straightline(&["report", ARM, "--html", "/nowhere/arm.html"]);
+    assert_eq!(nowhere.code, 3, "{}", nowhere.err);
+    assert_eq!(straightline(&["report", ARM, "--html", "a.html", "--json"]).code, 2);
+}
+
+#[test]
+fn an_exceeded_budget_fails_and_writes_nothing() {
+    let directory = scratch("budget");
+    let scene = directory.join("scene.toml");
+    fs::write(&scene, "[budget.gravity_force]\nmax_flops = 3\n[budget.inverse_dynamics]\nmax_flops = 4\n").unwrap();
+    let output = directory.join("arm.rs");
+    let (scene, output) = (scene.to_str().unwrap(), output.to_str().unwrap());
+    let run = straightline(&["generate", ARM, "--scene", scene, "-o", output]);
+    assert_eq!((run.code, run.out.as_str()), (1, ""));
+    assert_eq!(run.err.matches("error[over-budget]").count(), 2, "{}", run.err);
+    assert!(run.err.contains("the budget is 3") && run.err.contains("what would save most"), "{}", run.err);
+    assert_eq!(names(&directory), ["scene.toml"]);
+}
+
+#[test]
 fn verify_finds_roundings_only() {
     for options in [&[][..], &["--floating-base"], &["--scalar", "f32"], &["--rules", "exact"]] {
         let run = straightline(&[&["verify", ARM, "--states", "20", "--seed", "7", "--json"], options].concat());

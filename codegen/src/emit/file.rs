@@ -4,6 +4,7 @@ use super::body::ALLOW;
 use super::{one_line, FunctionText, Scalar};
 use crate::expr::Port;
 use crate::function::Function;
+use crate::report::waterfall::signed;
 use crate::report::{FunctionReport, Report};
 use std::fmt::Write;
 use straightline_core::model::{JointKind, Model};
@@ -76,7 +77,7 @@ pub fn preamble(
 ) -> String {
     let mut out = String::new();
     header(&mut out, model, report, provenance);
-    constants(&mut out, model, frames, scalar);
+    constants(&mut out, model, frames, scalar, !report.functions.is_empty());
     for (name, figures) in &report.functions {
         let _ = writeln!(out, "/// What [`{name}`] costs.");
         let _ = writeln!(out, "pub const {}_COST: Cost = {};", name.to_uppercase(), cost(figures));
@@ -139,6 +140,7 @@ fn header(out: &mut String, model: &Model<Dd>, report: &Report, provenance: &Pro
         );
     }
     let _ = writeln!(out, "// fma: instructions for mul and add when every a * b + c is one.");
+    skipped(out, report);
     if !provenance.remarks.is_empty() {
         let _ = writeln!(out, "//");
         for line in provenance.remarks.iter().map(|r| one_line(r)) {
@@ -148,7 +150,32 @@ fn header(out: &mut String, model: &Model<Dd>, report: &Report, provenance: &Pro
     out.push('\n');
 }
 
-fn constants(out: &mut String, model: &Model<Dd>, frames: &[String], scalar: Scalar) {
+/// What the scene skips of the full program, and what each item saves.
+fn skipped(out: &mut String, report: &Report) {
+    let explained: Vec<_> =
+        report.functions.iter().filter_map(|(name, f)| Some((name, f, f.waterfall.as_ref()?))).collect();
+    if explained.is_empty() {
+        return;
+    }
+    let _ = writeln!(out, "//");
+    let _ = writeln!(
+        out,
+        "// What this scene skips, in operations (mul, add, div, sqrt) of the full program and of this one:"
+    );
+    for (name, f, waterfall) in explained {
+        let (full, here) = (waterfall.full.flops(), f.flops());
+        let _ = writeln!(out, "//   {name}: {full} in full, {here} here");
+        for saving in waterfall.of_scene() {
+            let pairs = match saving.sincos {
+                0 => String::new(),
+                n => format!(", sincos {}", signed(n)),
+            };
+            let _ = writeln!(out, "//     {:>6}  {}{pairs}", signed(saving.operations), one_line(&saving.what));
+        }
+    }
+}
+
+fn constants(out: &mut String, model: &Model<Dd>, frames: &[String], scalar: Scalar, with_costs: bool) {
     let (nq, nv) = (model.nq(), model.nv());
     let t = scalar.name();
     let _ = writeln!(out, "/// Number of configuration coordinates q.\npub const NQ: usize = {nq};");
@@ -178,6 +205,9 @@ fn constants(out: &mut String, model: &Model<Dd>, frames: &[String], scalar: Sca
     ] {
         let _ = writeln!(out, "/// {doc}{floating}; infinite where the robot file says nothing.");
         let _ = writeln!(out, "{ALLOW}\npub const {name}: [{t}; {n}] = [{values}];");
+    }
+    if !with_costs {
+        return;
     }
     out.push_str(
         "\n/// Operations of a generated function.\n\

@@ -172,6 +172,7 @@ pub struct Graph {
 
 /// Operation counts. Sign flips and signs are free; `sin_cos` counts angles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
 pub struct Counts {
     /// Multiplications.
     pub mul: usize,
@@ -184,6 +185,7 @@ pub struct Counts {
     /// Square roots.
     pub sqrt: usize,
     /// Pairs of sine and cosine.
+    #[cfg_attr(feature = "cli", serde(rename = "sincos"))]
     pub sin_cos: usize,
 }
 

@@ -26,6 +26,7 @@ pub const CODES: &[&str] = &[
     "coulomb-speed-missing",
     "coulomb-speed-alone",
     "budget-alone",
+    "over-budget",
     "moving-base-forward",
     "said-twice",
 ];
@@ -188,6 +189,25 @@ pub fn coulomb_speed_alone() -> D {
 pub fn budget_alone(function: &str) -> D {
     D::error("budget-alone", format!("a budget for `{function}`, which is not among the outputs"))
         .help(format!("add `{function}` to `functions` in [outputs], or remove its budget"))
+}
+
+/// A function that costs more than it may. `words` stand before the number, after one, and after any other; `savings` are what
+/// could be held, the greatest first.
+pub fn over_budget(
+    function: &str,
+    words: (&str, &str, &str),
+    (takes, most): (usize, usize),
+    key: &str,
+    savings: &[(usize, &str)],
+) -> D {
+    let (verb, one, many) = words;
+    let unit = if takes == 1 { one } else { many };
+    let d = D::error("over-budget", format!("`{function}` {verb} {takes} {unit}, the budget is {most}"));
+    let savings: Vec<String> = savings.iter().map(|(saved, what)| format!("{what} (−{saved})")).collect();
+    match savings.is_empty() {
+        true => d.help(format!("nothing that the scene could hold saves any; raise `{key}`")),
+        false => d.help(format!("what would save most: {}; or raise `{key}`", savings.join(", "))),
+    }
 }
 
 /// Forward dynamics where the base's motion is given.

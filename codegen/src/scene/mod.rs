@@ -50,6 +50,12 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Whether it asks for everything and holds nothing, so that it leaves every function as it is.
+    pub fn is_empty(&self) -> bool {
+        let Scene { budgets, staged, places, .. } = self;
+        *self == Scene { budgets: budgets.clone(), staged: *staged, places: places.clone(), ..Scene::default() }
+    }
+
     /// The options under which the robot file is read for this scene.
     pub fn model_options(&self, options: &ModelOptions) -> ModelOptions {
         let floats = matches!(self.base, Base::Floating | Base::Moving);

@@ -41,7 +41,7 @@ impl Places {
     }
 
     /// Adds a complaint about the value of that path.
-    pub(super) fn complain(&self, path: &str, diagnostic: Diagnostic, diagnostics: &mut Diagnostics) {
+    pub(crate) fn complain(&self, path: &str, diagnostic: Diagnostic, diagnostics: &mut Diagnostics) {
         diagnostics.push(match self.place(path) {
             Some(place) => diagnostic.at(place),
             None => diagnostic,

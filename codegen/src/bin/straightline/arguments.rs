@@ -47,12 +47,13 @@ Examples:
 
 {EXIT_CODES}"))]
     Generate(Generate),
-    /// Count the operations of every function
+    /// Count the operations of every function, and say what each optimisation and each item of a scene saves
     #[command(after_help = format!("\
 Examples:
   straightline report panda.urdf
   straightline report panda.urdf --json --function inverse_dynamics
   straightline report panda.urdf --scene panda_gravity.toml
+  straightline report panda.urdf --html panda.html
 
 {EXIT_CODES}"))]
     Report(Report),
@@ -109,9 +110,12 @@ pub struct Generate {
 pub struct Report {
     /// The robot file: URDF or TOML
     pub robot: PathBuf,
-    /// As JSON: {"robot": …, "functions": {"inverse_dynamics": {"mul": …, "add": …, …}}}
+    /// As JSON: {"robot": …, "functions": {"inverse_dynamics": {"mul": …, "plain": …, "full": …, "savings": […]}}}
     #[arg(long)]
     pub json: bool,
+    /// As a page for the browser, complete in one file
+    #[arg(long, value_name = "FILE", conflicts_with = "json")]
+    pub html: Option<PathBuf>,
     #[command(flatten)]
     pub program: ProgramArgs,
     #[command(flatten)]

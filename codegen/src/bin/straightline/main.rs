@@ -11,8 +11,9 @@ use clap::Parser;
 use std::io;
 use std::path::Path;
 use std::process::ExitCode;
-use straightline_codegen::compile::{compile, Generated, Options};
+use straightline_codegen::compile::{compile, explain, Generated, Options};
 use straightline_codegen::diagnostic::{Diagnostics, Severity, Source};
+use straightline_codegen::report::html;
 use straightline_codegen::{description, export, model, output, scene, verify};
 
 /// Why a command ended early; what there is to say was said where it happened, except for [`Failure::Files`].
@@ -73,6 +74,15 @@ fn options(program: Option<&ProgramArgs>, model: &ModelArgs) -> Result<Options, 
 
 /// Compiles, and prints errors and warnings; notes are for `check`.
 fn compiled(robot: &Path, program: &ProgramArgs, model: &ModelArgs) -> Result<(Generated, Options), Failure> {
+    compiled_by(compile, robot, program, model)
+}
+
+fn compiled_by(
+    compile: fn(&Source, &Options) -> Result<Generated, Diagnostics>,
+    robot: &Path,
+    program: &ProgramArgs,
+    model: &ModelArgs,
+) -> Result<(Generated, Options), Failure> {
     let options = options(Some(program), model)?;
     let source = read(robot)?;
     let progress = print::spinner(&format!("compiling {}", source.path()));
@@ -115,7 +125,11 @@ fn generate(a: &Generate) -> Result<(), Failure> {
 }
 
 fn report(a: &Report) -> Result<(), Failure> {
-    let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;
+    let (generated, options) = compiled_by(explain, &a.robot, &a.program, &a.model)?;
+    if let Some(path) = &a.html {
+        output::write_file(path, &html::page(&read(&a.robot)?, &options, &generated))?;
+        return Ok(());
+    }
     Ok(if a.json { print::json(&generated.report) } else { print::report(&generated.report) }?)
 }
 

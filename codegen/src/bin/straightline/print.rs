@@ -9,6 +9,7 @@ use std::time::Duration;
 use straightline_codegen::description::{Description, Ignored};
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
 use straightline_codegen::model::SpecialAngle;
+use straightline_codegen::report::waterfall::{signed, Waterfall};
 use straightline_codegen::report::Report;
 use straightline_codegen::verify::Verification;
 use straightline_core::model::Model;
@@ -101,7 +102,21 @@ pub fn report(report: &Report) -> io::Result<()> {
             f.mul, f.add, f.fma, f.div, f.sqrt, f.sincos, f.max_live, f.parts, f.lines
         )?;
     }
-    writeln!(out, "\nfma: instructions for mul and add when every a·b ± c is one; live: most values alive at once")
+    writeln!(out, "\nfma: instructions for mul and add when every a·b ± c is one; live: most values alive at once")?;
+    let explained = functions.iter().filter_map(|(name, f)| Some((name, f, f.waterfall.as_ref()?)));
+    for (name, f, waterfall) in explained {
+        let Waterfall { plain, full, savings } = waterfall;
+        let full = full.flops();
+        writeln!(out, "\n{name}: {} operations plain, {full} in full, {} here", plain.flops(), f.flops())?;
+        for s in savings {
+            let pairs = match s.sincos {
+                0 => String::new(),
+                n => format!(", sincos {}", signed(n)),
+            };
+            writeln!(out, "{:>8}  {}{pairs}", signed(s.operations), s.what)?;
+        }
+    }
+    Ok(())
 }
 
 /// The worst error of every function.

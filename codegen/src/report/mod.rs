@@ -1,9 +1,18 @@
 //! What was generated, in numbers.
 
+pub mod budget;
+pub mod html;
+mod tree;
+pub mod waterfall;
+
+use crate::compile::Program;
+use crate::emit::Scalar;
 use crate::expr::Counts;
 use crate::function::Function;
 use crate::staged::StagedReport;
+use budget::Measures;
 use std::collections::BTreeMap;
+use waterfall::Waterfall;
 
 /// Figures of one generated function.
 #[derive(Clone, Debug)]
@@ -29,13 +38,40 @@ pub struct FunctionReport {
     pub parts: usize,
     /// Lines of source.
     pub lines: usize,
+    /// Bytes of values on the stack, as far as known before rustc.
+    pub stack_bytes: usize,
+    /// Bytes of machine code, estimated for x86-64.
+    pub code_bytes: usize,
+    /// How it came to these counts: where it was asked for, and where a scene skips something.
+    #[cfg_attr(feature = "cli", serde(flatten, skip_serializing_if = "Option::is_none"))]
+    pub waterfall: Option<Waterfall>,
 }
 
 impl FunctionReport {
-    /// From a program's counts.
-    pub fn new(counts: Counts, max_live: usize, carried_bytes: usize, parts: usize, lines: usize) -> Self {
-        let Counts { mul, add, fma, div, sqrt, sin_cos } = counts;
-        FunctionReport { mul, add, fma, div, sqrt, sincos: sin_cos, max_live, carried_bytes, parts, lines }
+    /// From a program and its number of lines.
+    pub fn new(program: &Program, scalar: Scalar, lines: usize) -> Self {
+        let Counts { mul, add, fma, div, sqrt, sin_cos } = program.graph.counts();
+        let Measures { stack_bytes, code_bytes, live, .. } = Measures::of(program, scalar);
+        FunctionReport {
+            mul,
+            add,
+            fma,
+            div,
+            sqrt,
+            sincos: sin_cos,
+            max_live: live,
+            carried_bytes: program.schedule.slots * scalar.bytes(),
+            parts: program.schedule.parts.len(),
+            lines,
+            stack_bytes,
+            code_bytes,
+            waterfall: None,
+        }
+    }
+
+    /// Multiplications, additions, divisions and square roots.
+    pub fn flops(&self) -> usize {
+        self.mul + self.add + self.div + self.sqrt
     }
 }
 

@@ -1,0 +1,261 @@
+//! From plain unrolling to the final count: what each optimisation and each item of a scene is worth.
+//!
+//! Every figure is the difference of two programs that were really compiled: optimisations are switched on one after the
+//! other for the robot as its file has it, then the scene's items are added one after the other. What an item saves so
+//! depends on those before it; the sum does not.
+
+use crate::compile::{optimised, Optimisations, Options};
+use crate::diagnostic::Diagnostics;
+use crate::expr::Counts;
+use crate::function::{Function, Robot};
+use crate::scene::{apply, Base, Coulomb, Effects, Gravity, Parameter, Part, Scene};
+use straightline_core::model::Model;
+use straightline_core::Dd;
+
+/// How a function came to its operations.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+pub struct Waterfall {
+    /// Plain unrolling: the generic runtime with the robot's numbers, without what multiplies or adds zeros and what no
+    /// result needs, and equal subexpressions once.
+    pub plain: Counts,
+    /// All optimisations, for the whole robot, without a scene.
+    pub full: Counts,
+    /// The steps from `plain` to the final counts, those that change nothing left out.
+    pub savings: Vec<Saving>,
+}
+
+/// One step of a waterfall.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+pub struct Saving {
+    /// Such as `joints wrist_1, wrist_2 locked`.
+    pub what: String,
+    /// Whose it is.
+    pub by: By,
+    /// Change of multiplications, additions, divisions and square roots; negative for a saving.
+    pub operations: i64,
+    /// Change of sine-cosine pairs.
+    pub sincos: i64,
+    /// The counts after it.
+    pub after: Counts,
+}
+
+/// Who saves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize), serde(rename_all = "lowercase"))]
+pub enum By {
+    /// An optimisation of the compiler.
+    Compiler,
+    /// An item of the scene.
+    Scene,
+}
+
+impl Waterfall {
+    /// The steps that the scene makes.
+    pub fn of_scene(&self) -> impl Iterator<Item = &Saving> {
+        self.savings.iter().filter(|s| s.by == By::Scene)
+    }
+}
+
+/// A change with its sign: `−412`, `+37`.
+pub fn signed(change: i64) -> String {
+    match change {
+        0 => "0".to_string(),
+        1.. => format!("+{change}"),
+        _ => format!("−{}", change.unsigned_abs()),
+    }
+}
+
+/// A scene on the way from none to the whole one.
+#[derive(Debug)]
+pub struct Stop {
+    /// What was added last.
+    what: What,
+    scene: Scene,
+    robot: Robot,
+}
+
+/// What a scene's item says.
+#[derive(Clone, Debug)]
+enum What {
+    Text(String),
+    /// The results that are wanted, in the words of each function.
+    Selection,
+}
+
+/// The stops of a scene for a robot, `whole` as its file has it: first the empty scene, last the scene itself.
+pub fn stops(whole: &Model<Dd>, scene: &Scene) -> Vec<Stop> {
+    let mut now = Scene { places: scene.places.clone(), ..Scene::default() };
+    let mut stops: Vec<Stop> = robot_in(whole, &now)
+        .map(|(robot, scene)| Stop { what: What::Text(String::new()), scene, robot })
+        .into_iter()
+        .collect();
+    for (what, change) in items(whole, scene) {
+        change(&mut now, scene);
+        // a part of a sound scene is sound; if it were not, its step would count with the next
+        stops.extend(robot_in(whole, &now).map(|(robot, scene)| Stop { what, scene, robot }));
+    }
+    stops
+}
+
+/// The waterfall of a function. `frames` are those of the final program, `last` its counts.
+pub fn waterfall(stops: &[Stop], frames: &[String], function: Function, options: &Options, last: Counts) -> Waterfall {
+    // frames that only the scene names are those of every stop
+    let frames = if frames.is_empty() { options.scene.frames_of(function, frames) } else { frames };
+    let counts = |stop: &Stop, optimisations| {
+        let options = Options { scene: stop.scene.clone(), ..options.clone() };
+        optimised(&stop.robot, frames, function, &options, optimisations).counts()
+    };
+    let all = options.optimisations();
+    let plain = counts(&stops[0], Optimisations::default());
+    let mut now = plain;
+    let mut savings = Vec::new();
+    let mut step = |what: &str, by, after: Counts| {
+        if after != now {
+            let change = |f: fn(&Counts) -> usize| f(&after) as i64 - f(&now) as i64;
+            let (operations, sincos) = (change(Counts::flops), change(|c| c.sin_cos));
+            savings.push(Saving { what: what.to_string(), by, operations, sincos, after });
+            now = after;
+        }
+        after
+    };
+    let mut full = plain;
+    for (what, optimisations) in all.steps() {
+        full = step(what, By::Compiler, counts(&stops[0], optimisations));
+    }
+    for (i, stop) in stops.iter().enumerate().skip(1) {
+        let what = match &stop.what {
+            What::Text(text) => text.clone(),
+            What::Selection => selection(function, &stop.scene),
+        };
+        let after = if i + 1 == stops.len() { last } else { counts(stop, all) };
+        step(&what, By::Scene, after);
+    }
+    Waterfall { plain, full, savings }
+}
+
+/// The robot that a scene makes of the whole one, and the scene in its terms.
+pub(super) fn robot_in(whole: &Model<Dd>, scene: &Scene) -> Option<(Robot, Scene)> {
+    let model = apply(whole.clone(), scene, &mut Diagnostics::new())?;
+    let scene = scene.resolved(&model);
+    Some((Robot::new(model), scene))
+}
+
+/// The items of a scene in words, those of its selected outputs by function.
+pub(super) fn items_of(whole: &Model<Dd>, scene: &Scene) -> Vec<String> {
+    let words = |(what, _)| match what {
+        What::Text(text) => vec![text],
+        What::Selection => scene.outputs.keys().map(|f| format!("{}: {}", f.name(), selection(*f, scene))).collect(),
+    };
+    items(whole, scene).into_iter().flat_map(words).collect()
+}
+
+/// Takes an item of the second scene over to the first.
+type Change = Box<dyn Fn(&mut Scene, &Scene)>;
+
+/// The items of a scene in the order of the waterfall.
+fn items(whole: &Model<Dd>, scene: &Scene) -> Vec<(What, Change)> {
+    let mut items: Vec<(What, Change)> = Vec::new();
+    let mut item = |what: String, change: Change| items.push((What::Text(what), change));
+    match scene.base {
+        Base::Fixed => item("base fixed".to_string(), Box::new(|now, s| now.base = s.base)),
+        Base::Moving => item("base on a given motion".to_string(), Box::new(|now, s| now.base = s.base)),
+        Base::OfRobot | Base::Floating => {}
+    }
+    match scene.gravity {
+        Gravity::OfRobot => {}
+        Gravity::Constant([0.0, 0.0, 0.0]) => {
+            item("no gravity".to_string(), Box::new(|now, s| now.gravity = s.gravity))
+        }
+        Gravity::Constant(g) => {
+            item(format!("gravity held at {g:?}"), Box::new(|now, s| now.gravity = s.gravity));
+        }
+        Gravity::Input => item("gravity as an input".to_string(), Box::new(|now, s| now.gravity = s.gravity)),
+    }
+    for run in locked_runs(whole, scene) {
+        let what = format!("{} locked", joints(&run));
+        item(what, Box::new(move |now, s| now.locked.extend(s.locked.iter().filter(|l| run.contains(&l.0)).cloned())));
+    }
+    for (i, payload) in scene.payloads.iter().enumerate() {
+        let what = format!("payload {} on {}", payload.name, payload.frame);
+        item(what, Box::new(move |now, s| now.payloads.push(s.payloads[i].clone())));
+    }
+    if scene.zero.qd {
+        item("q̇ = 0".to_string(), Box::new(|now, _| now.zero.qd = true));
+    }
+    if scene.zero.qdd {
+        item("q̈ = 0".to_string(), Box::new(|now, _| now.zero.qdd = true));
+    }
+    if !scene.zero.joints_at_rest.is_empty() {
+        let what = format!("{} at rest", joints(&scene.zero.joints_at_rest));
+        item(what, Box::new(|now, s| now.zero.joints_at_rest.clone_from(&s.zero.joints_at_rest)));
+    }
+    let Effects { rotor_inertia, damping, coulomb, springs } = scene.effects;
+    if !rotor_inertia {
+        item("no rotor inertia".to_string(), Box::new(|now, _| now.effects.rotor_inertia = false));
+    }
+    if !damping {
+        item("no viscous friction".to_string(), Box::new(|now, _| now.effects.damping = false));
+    }
+    match coulomb {
+        Coulomb::Sign => {}
+        Coulomb::Off => {
+            item("no Coulomb friction".to_string(), Box::new(|now, s| now.effects.coulomb = s.effects.coulomb))
+        }
+        Coulomb::Smooth(_) => {
+            item("smooth Coulomb friction".to_string(), Box::new(|now, s| now.effects.coulomb = s.effects.coulomb));
+        }
+    }
+    if !springs {
+        item("no springs".to_string(), Box::new(|now, _| now.effects.springs = false));
+    }
+    for (i, parameter) in scene.parameters.iter().enumerate() {
+        let what = match parameter {
+            Parameter::Payload { name, frame } => format!("payload {name} on {frame} at run time"),
+            Parameter::Link { link } => format!("inertia of {link} at run time"),
+        };
+        item(what, Box::new(move |now, s| now.parameters.push(s.parameters[i].clone())));
+    }
+    if !scene.outputs.is_empty() {
+        items.push((What::Selection, Box::new(|now, s| now.outputs.clone_from(&s.outputs))));
+    }
+    items
+}
+
+/// The locked joints in runs of neighbours, in the order of their coordinates.
+fn locked_runs(whole: &Model<Dd>, scene: &Scene) -> Vec<Vec<String>> {
+    let mut order: Vec<_> = whole.bodies.iter().map(|b| &b.joint).collect();
+    order.sort_by_key(|j| j.iv);
+    let is_locked = |name: &str| scene.locked.iter().any(|(locked, _)| locked == name);
+    let runs = order.chunk_by(|a, b| is_locked(&a.name) == is_locked(&b.name));
+    runs.filter(|run| is_locked(&run[0].name)).map(|run| run.iter().map(|j| j.name.clone()).collect()).collect()
+}
+
+/// `joint a`, `joints a, b, c`, or of more `5 joints, a to e`.
+fn joints(names: &[String]) -> String {
+    match names {
+        [one] => format!("joint {one}"),
+        [.., last] if names.len() > 3 => format!("{} joints, {} to {last},", names.len(), names[0]),
+        _ => format!("joints {}", names.join(", ")),
+    }
+}
+
+/// What of a function is wanted.
+fn selection(function: Function, scene: &Scene) -> String {
+    let Some(selection) = scene.outputs.get(&function) else { return "the results asked for".to_string() };
+    let mut words = Vec::new();
+    if !selection.joints.is_empty() {
+        words.push(joints(&selection.joints).trim_end_matches(',').to_string());
+    }
+    if !selection.frames.is_empty() {
+        words.push(format!("frames {}", selection.frames.join(", ")));
+    }
+    match selection.part {
+        Part::Whole => {}
+        Part::Linear => words.push("the linear part".to_string()),
+        Part::Angular => words.push("the angular part".to_string()),
+        Part::Diagonal => words.push("the diagonal".to_string()),
+    }
+    format!("only {}", words.join(", "))
+}
