@@ -1,7 +1,7 @@
 //! The report as a page for the browser: one file that needs no network and no script, light and dark.
 //!
 //! The page is XHTML, so that an XML reader can check it. Names come from robot files, which anyone may have written:
-//! nothing from outside reaches the page but through [`escape`].
+//! nothing from outside reaches the page but through `escape`.
 
 use super::tree::{symbol, text_width, tree};
 use super::waterfall::{items_of, signed, By, Waterfall};
@@ -461,14 +461,21 @@ fn card(out: &mut String, name: &str, f: &FunctionReport, waterfall: &Waterfall)
             total(out, "whole robot, no scene", full);
         }
         let (low, high) = (before.flops().min(s.after.flops()), before.flops().max(s.after.flops()));
-        let class = if s.operations > 0 { "more" } else { "less" };
-        let pairs = match s.sincos {
-            0 => String::new(),
-            n => format!(" <span class=\"muted keep\">(sincos {})</span>", signed(n)),
+        let class = match s.operations {
+            1.. => "more",
+            0 => "same",
+            _ => "less",
+        };
+        let change = |f: fn(&Counts) -> usize| signed(f(&s.after) as i64 - f(&before) as i64);
+        let beside = match (s.sincos, s.operations) {
+            (0, 0) if s.after.mul == before.mul => format!(" <span class=\"muted\">(fma {})</span>", change(|c| c.fma)),
+            (0, 0) => format!(" <span class=\"muted\">(mul {}, add {})</span>", change(|c| c.mul), change(|c| c.add)),
+            (0, _) => String::new(),
+            (n, _) => format!(" <span class=\"muted keep\">(sincos {})</span>", signed(n)),
         };
         let _ = writeln!(
             out,
-            "<span class=\"what\">{}{pairs}</span><span class=\"track\"><span class=\"{class}\" style=\"margin-left:{:.2}%;width:{:.2}%\"></span></span>\
+            "<span class=\"what\">{}{beside}</span><span class=\"track\"><span class=\"{class}\" style=\"margin-left:{:.2}%;width:{:.2}%\"></span></span>\
              <span class=\"n t-{class}\">{}</span><span class=\"after\">{}</span>",
             escape(&s.what),
             percent(low).min(99.4),
