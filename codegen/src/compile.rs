@@ -1,12 +1,13 @@
 //! The pipeline, as one function.
 
+use crate::choose::choose;
 use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
 use crate::emit::{self, Item, Provenance, Scalar};
 use crate::expr::{verify, Folding, Grade, Graph, Port, RuleSet, Section};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model;
-use crate::pass::{dead_code, unread_inputs};
+use crate::pass::{dead_code, sums, unread_inputs};
 use crate::report::budget::{self, Measures};
 use crate::report::waterfall::{self, Waterfall};
 use crate::report::{FunctionReport, Report};
@@ -59,7 +60,7 @@ impl Options {
     pub fn optimisations(&self) -> Optimisations {
         let algebraic = self.grade == Grade::Algebraic;
         let cheaper = self.forward_dynamics == ForwardDynamicsMethod::Cheaper;
-        Optimisations { folding: algebraic, algebraic, reduced: algebraic, cheaper }
+        Optimisations { folding: algebraic, algebraic, reduced: algebraic, sums: algebraic, chosen: algebraic, cheaper }
     }
 
     /// The rewrite rules that these options allow.
@@ -79,6 +80,10 @@ pub struct Optimisations {
     pub algebraic: bool,
     /// The reduced robot where it serves: frames along common normals, inertial parameters regrouped.
     pub reduced: bool,
+    /// Sums with all their terms at once: [`sums`].
+    pub sums: bool,
+    /// Of the forms that the reduced robot has, those with the fewest operations: [`choose`].
+    pub chosen: bool,
     /// The cheaper of the two forms of forward dynamics.
     pub cheaper: bool,
 }
@@ -97,6 +102,8 @@ impl Optimisations {
         step("constants folded in double-double", self.folding, |o| o.folding = true);
         step("algebraic rules", self.algebraic, |o| o.algebraic = true);
         step("reduced robot: frames and inertial parameters", self.reduced, |o| o.reduced = true);
+        step("sums with all their terms at once", self.sums, |o| o.sums = true);
+        step("forms of the reduced robot chosen by counting", self.chosen, |o| o.chosen = true);
         step("the cheaper form of forward dynamics", self.cheaper, |o| o.cheaper = true);
         steps
     }
@@ -146,8 +153,15 @@ pub fn optimised(
         method => method,
     };
     let rules = optimisations.rules(options.scalar);
+    let chosen = (optimisations.chosen && optimisations.reduced)
+        .then(|| choose(robot, frames, function, options, Optimisations { chosen: false, ..optimisations }));
+    let robot = chosen.as_ref().unwrap_or(robot);
     let traced = function.trace(robot, frames, method, rules, optimisations.reduced, &options.scene);
-    check(unread_inputs(check(dead_code(&check(traced))), is_optional))
+    let graph = check(unread_inputs(check(dead_code(&check(traced))), is_optional));
+    match optimisations.sums {
+        true => check(dead_code(&check(sums(&graph)))),
+        false => graph,
+    }
 }
 
 /// What the compiler makes of a robot file.

@@ -1,7 +1,8 @@
 //! The functions that can be generated: a table of names, signatures and documentation, and the algorithm behind each.
 
+use crate::choose::Found;
 use crate::expr::{Graph, Port, RuleSet};
-use crate::reduce::reduce;
+use crate::reduce::{reduce, Choice};
 use crate::scene::{Bound, Part, Scene};
 use crate::trace::{trace, Expr};
 use straightline_core::algorithms as alg;
@@ -325,6 +326,7 @@ impl Function {
         self,
         model: &Model<T>,
         reduced: &ReducedModel<T>,
+        composite: &ReducedModel<T>,
         method: ForwardDynamicsMethod,
         inputs: &[Vec<T>],
     ) -> Option<Vec<T>> {
@@ -336,6 +338,14 @@ impl Function {
             let passive = alg::passive_force(model, q, &inputs[1]);
             rigid.into_iter().zip(passive).map(|(f, p)| f + p).collect::<Vec<T>>()
         };
+        let mass_matrix = || {
+            let mut h = alg::reduced_mass_matrix(composite, q);
+            let nv = model.nv();
+            for (i, rotor) in alg::rotor_inertias(model).into_iter().enumerate() {
+                h[i * nv + i] = h[i * nv + i] + rotor;
+            }
+            h
+        };
         Some(match self {
             InverseDynamics => {
                 let rigid = alg::reduced_inverse_dynamics(reduced, q, &inputs[1], &inputs[2]);
@@ -343,6 +353,7 @@ impl Function {
                 let rotors = alg::rotor_inertias(model).into_iter().zip(&inputs[2]).map(|(i, qdd)| i * *qdd);
                 rigid.into_iter().zip(rotors.zip(passive)).map(|(f, (r, p))| f + (r + p)).collect()
             }
+            MassMatrix => mass_matrix(),
             GravityForce => alg::reduced_gravity_force(reduced, q),
             BiasForce => bias(),
             VelocityForce => {
@@ -352,9 +363,7 @@ impl Function {
             ForwardDynamics => {
                 let drive: Vec<T> = inputs[2].iter().zip(bias()).map(|(tau, h)| *tau - h).collect();
                 match method {
-                    ForwardDynamicsMethod::Factorisation => {
-                        alg::Ltdl::factor(model, &alg::mass_matrix(model, q)).solve(&drive)
-                    }
+                    ForwardDynamicsMethod::Factorisation => alg::Ltdl::factor(model, &mass_matrix()).solve(&drive),
                     _ => alg::solve_articulated(model, q, &drive),
                 }
             }
@@ -373,8 +382,9 @@ impl Function {
         inputs: &[Vec<Expr>],
     ) -> Vec<Expr> {
         let bound = scene.bind(self, robot, inputs);
-        let Bound { model, arguments, .. } = &bound;
-        let by_reduced = reduced.then(|| self.evaluate_reduced(model, &bound.reduced, method, arguments)).flatten();
+        let Bound { model, reduced: for_torques, composite, arguments } = &bound;
+        let by_reduced =
+            reduced.then(|| self.evaluate_reduced(model, for_torques, composite, method, arguments)).flatten();
         by_reduced.unwrap_or_else(|| {
             let frame = |name: &String| model.frame(name).expect("frames were checked against the model");
             self.evaluate(model, &frames.iter().map(frame).collect::<Vec<_>>(), method, arguments)
@@ -419,22 +429,33 @@ impl Function {
     }
 }
 
-/// A robot in the two forms that are traced.
+/// A robot in the forms that are traced.
 #[derive(Clone, Debug)]
 pub struct Robot {
     /// As the robot file has it, in canonical frames.
     pub model: Model<Dd>,
     /// For joint torques alone.
     pub reduced: ReducedModel<Dd>,
-    /// Pose of each body's frame of the reduced form in its canonical one.
+    /// For the mass matrix alone.
+    pub composite: ReducedModel<Dd>,
+    /// Pose of each body's frame of the reduced forms in its canonical one.
     pub reduced_frames: Vec<Transform<Dd>>,
+    /// The choices of reduced forms that were found for it.
+    pub found: Found,
 }
 
 impl Robot {
-    /// Both forms of a robot.
+    /// All forms of a robot, the reduced ones as any robot takes them.
     pub fn new(model: Model<Dd>) -> Self {
-        let (reduced, reduced_frames) = reduce(&model);
-        Robot { model, reduced, reduced_frames }
+        let (reduced, reduced_frames) = reduce(&model, &Choice::plain(&model));
+        Robot { model, composite: reduced.clone(), reduced, reduced_frames, found: Found::default() }
+    }
+
+    /// The same robot in other reduced forms, for torques and for the mass matrix.
+    #[must_use]
+    pub fn reduced_by(&self, torques: &Choice, mass_matrix: &Choice) -> Self {
+        let (reduced, composite) = (reduce(&self.model, torques).0, reduce(&self.model, mass_matrix).0);
+        Robot { reduced, composite, ..self.clone() }
     }
 }
 

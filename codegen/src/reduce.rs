@@ -13,15 +13,94 @@ const DUST: f64 = 1e-28;
 /// Below this sine two axes are taken as parallel when a frame is chosen; the transform itself stays exact.
 const NEARLY_PARALLEL: f64 = 1e-4;
 
+/// What is free in a reduced form; torques depend on none of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// Bodies that are described in the axes before their joint's turn: [`ReducedBody::stays`].
+    pub stays: Vec<bool>,
+    /// Bodies whose moment is formed by ε_z: [`ReducedBody::by_axis_acceleration`].
+    pub by_axis_acceleration: Vec<bool>,
+    /// Bodies whose parameters are moved to the parent where the joint cannot tell.
+    pub regrouped: Vec<bool>,
+    /// [`ReducedBody::doubled`].
+    pub doubled: [Vec<bool>; 2],
+    /// Bodies of whose regrouped mass, axial first moment and axial second moment so much goes to the parent that there
+    /// m c_x, m c_y and Σ_yy vanish, instead of all of it.
+    pub vanish_at_parent: [Vec<bool>; 3],
+    /// The unit of length \[m\], for a robot that does not slide.
+    pub unit: Dd,
+}
+
+impl Choice {
+    /// Khalil and Dombre's parameters, metres, no frame before its turn.
+    pub fn plain(model: &Model<Dd>) -> Self {
+        let n = model.bodies.len();
+        let none = vec![false; n];
+        Choice {
+            stays: none.clone(),
+            by_axis_acceleration: none.clone(),
+            regrouped: vec![true; n],
+            doubled: [none.clone(), none.clone()],
+            vanish_at_parent: [none.clone(), none.clone(), none],
+            unit: Dd::ONE,
+        }
+    }
+}
+
+/// Least length \[m\], or sine, by which a parameter that vanishes may be divided.
+const WORTH: f64 = 0.02;
+
 /// The reduced robot, and the pose of each of its frames in the body's canonical frame.
-pub fn reduce(model: &Model<Dd>) -> (ReducedModel<Dd>, Vec<Transform<Dd>>) {
+pub fn reduce(model: &Model<Dd>, choice: &Choice) -> (ReducedModel<Dd>, Vec<Transform<Dd>>) {
     let regauge = choose_frames(model);
     let mut bodies: Vec<ReducedBody<Dd>> =
         model.bodies.iter().enumerate().map(|(i, b)| in_new_frame(model, &regauge, i, b)).collect();
-    for i in (0..bodies.len()).rev() {
-        regroup(&mut bodies, i);
+    for i in (0..bodies.len()).rev().filter(|i| choice.regrouped[*i]) {
+        regroup(&mut bodies, i, [0, 1, 2].map(|k| choice.vanish_at_parent[k][i]));
     }
-    (ReducedModel { bodies, gravity: model.gravity }, regauge)
+    let mut reduced = ReducedModel { bodies, gravity: model.gravity, per_unit: Dd::ONE };
+    for i in 0..reduced.bodies.len() {
+        reduced.bodies[i].stays = choice.stays[i] && reduced.may_stay(i);
+        let body = &mut reduced.bodies[i];
+        body.by_axis_acceleration = choice.by_axis_acceleration[i] && body.kind != JointKind::Prismatic;
+        let derived = body.kind == JointKind::Revolute && body.shares_axis_field && !body.stays;
+        body.doubled = [0, 1].map(|k| choice.doubled[k][i] && derived);
+    }
+    (in_unit(reduced, choice.unit), regauge)
+}
+
+/// The same robot with lengths in another unit: p / L, g / L, m c · L, M L². The second moment and all torques stay, as
+/// long as no joint slides.
+fn in_unit(mut reduced: ReducedModel<Dd>, unit: Dd) -> ReducedModel<Dd> {
+    if unit == Dd::ONE {
+        return reduced;
+    }
+    assert!(reduced.bodies.iter().all(|b| b.kind != JointKind::Prismatic), "a unit of length is for turning joints");
+    for body in &mut reduced.bodies {
+        body.translation = body.translation.map(|x| special(x / unit));
+        body.first_moment = body.first_moment.scale(unit);
+        let mass = body.mass * unit * unit;
+        body.mass = mass;
+    }
+    reduced.gravity = reduced.gravity.map(|x| x / unit);
+    reduced.per_unit = Dd::ONE / unit;
+    reduced
+}
+
+/// Lengths between joints, each once, the most frequent first: units that make them one.
+pub fn lengths(reduced: &ReducedModel<Dd>) -> Vec<Dd> {
+    let mut found: Vec<(Dd, usize)> = Vec::new();
+    if reduced.bodies.iter().any(|b| b.kind == JointKind::Prismatic) {
+        return Vec::new();
+    }
+    for x in reduced.bodies.iter().flat_map(|b| b.translation.to_array()).map(Dd::abs).filter(|x| *x != Dd::ZERO) {
+        match found.iter_mut().find(|(y, _)| (x - *y).abs().hi() < DUST * y.hi()) {
+            Some((_, times)) => *times += 1,
+            None => found.push((x, 1)),
+        }
+    }
+    found.sort_by_key(|(_, times)| std::cmp::Reverse(*times));
+    found.into_iter().map(|(x, _)| x).collect()
 }
 
 /// For each body the pose of its new frame in its canonical one: turned about z and shifted along it; for a prismatic
@@ -142,8 +221,13 @@ fn in_new_frame(model: &Model<Dd>, frames: &[Transform<Dd>], i: BodyId, body: &B
     let com = own.rotation.transpose_mul(inertia.com - own.translation);
     let moved = SpatialInertia::new(inertia.mass, com, inertia.inertia_com.rotated(&r));
     let rotation = joint.rotation.map(special);
-    let (rotation, offset) = split_turn(&rotation);
-    let quarter_turns = rotation.rows.iter().flatten().all(|x| *x == Dd::ZERO || x.abs() == Dd::ONE);
+    let (rotation, offset) = match body.joint.kind {
+        JointKind::Prismatic => (rotation, (Dd::ZERO, Dd::ONE)),
+        _ => split_turn(&rotation),
+    };
+    let permutes = rotation.rows.iter().flatten().all(|x| *x == Dd::ZERO || x.abs() == Dd::ONE);
+    let revolute = |b: &Body<Dd>| b.joint.kind == JointKind::Revolute;
+    let parallel = revolute(body) && body.parent.is_some_and(|p| revolute(&model.bodies[p]));
     let parent_turns = body.parent.is_some_and(|p| model.bodies[p].parent.is_some());
     ReducedBody {
         parent: body.parent,
@@ -156,7 +240,12 @@ fn in_new_frame(model: &Model<Dd>, frames: &[Transform<Dd>], i: BodyId, body: &B
         mass: moved.mass,
         first_moment: moved.first_moment,
         second_moment: moved.second_moment,
-        shares_axis_field: quarter_turns || !parent_turns,
+        shares_axis_field: permutes || !parent_turns,
+        permutes,
+        parallel: parallel && rotation == Mat3::identity(),
+        stays: false,
+        by_axis_acceleration: false,
+        doubled: [false; 2],
     }
 }
 
@@ -187,18 +276,34 @@ fn split_turn(r: &Mat3<Dd>) -> (Mat3<Dd>, (Dd, Dd)) {
 
 /// Moves what a joint's torque cannot tell from the parent's to the parent (Khalil and Dombre 2002, chapter 9, in second
 /// moments): what lies on a revolute axis; of a sliding body all of the second moment.
-fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize) {
+///
+/// Any part of it may stay: where `vanish` says so, as much is moved as makes m c_x, m c_y or Σ_yy of the parent vanish.
+fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, vanish: [bool; 3]) {
     let body = bodies[i].clone();
     let zero = Dd::ZERO;
     let (rotation, a, p) = (body.rotation, body.rotation.column(2), body.translation);
     match body.kind {
         JointKind::Floating => {}
         JointKind::Revolute => {
-            let (m, mz, szz) = (body.mass, body.first_moment.z, body.second_moment.zz);
+            let (mut m, mut mz, mut szz) = (body.mass, body.first_moment.z, body.second_moment.zz);
+            if let Some(before) = body.parent.map(|p| &bodies[p]) {
+                let (ms, s) = (before.first_moment, before.second_moment);
+                // never by a small divisor: that would make large parameters that cancel
+                if vanish[0] && p.x.abs().hi() > WORTH {
+                    m = -ms.x / p.x;
+                }
+                if vanish[1] && a.y.abs().hi() > WORTH {
+                    mz = -(ms.y + p.y * m) / a.y;
+                }
+                if vanish[2] && a.y.abs().hi() > WORTH {
+                    let two = Dd::from(2.0);
+                    szz = -(s.yy + p.y * p.y * m + two * p.y * a.y * mz) / (a.y * a.y);
+                }
+            }
             let own = &mut bodies[i];
-            own.mass = zero;
-            own.first_moment.z = zero;
-            own.second_moment.zz = zero;
+            own.mass = body.mass - m;
+            own.first_moment.z = body.first_moment.z - mz;
+            own.second_moment.zz = body.second_moment.zz - szz;
             match body.parent {
                 Some(parent) => {
                     let parent = &mut bodies[parent];
@@ -208,6 +313,11 @@ fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize) {
                     let cross = symmetric_product(p, a);
                     let moved = scaled(symmetric_square(p), m) + scaled(cross, mz) + scaled(symmetric_square(a), szz);
                     parent.second_moment = parent.second_moment + moved;
+                    // what vanishes does so exactly
+                    let dust = |x: Dd, scale: Dd| if x.abs().hi() <= DUST * scale.abs().hi() { zero } else { x };
+                    parent.first_moment.x = dust(parent.first_moment.x, p.x * m);
+                    parent.first_moment.y = dust(parent.first_moment.y, a.y * mz);
+                    parent.second_moment.yy = dust(parent.second_moment.yy, szz);
                 }
                 None => {
                     // turns about a fixed axis: one moment of inertia

@@ -1,7 +1,9 @@
 //! Passes: each takes a graph and returns a graph that computes the same results.
 
 mod dead_code;
+mod sums;
 mod unread_inputs;
 
 pub use dead_code::dead_code;
+pub use sums::sums;
 pub use unread_inputs::unread_inputs;

@@ -19,6 +19,8 @@ pub struct Bound {
     pub model: Model<Expr>,
     /// Its reduced form.
     pub reduced: ReducedModel<Expr>,
+    /// Its reduced form for the mass matrix.
+    pub composite: ReducedModel<Expr>,
     /// The function's arguments, whole.
     pub arguments: Vec<Vec<Expr>>,
 }
@@ -42,6 +44,7 @@ impl Scene {
     pub fn bind(&self, function: Function, robot: &Robot, inputs: &[Vec<Expr>]) -> Bound {
         let mut model: Model<Expr> = robot.model.cast();
         let mut reduced = robot.reduced.map(Expr::constant);
+        let mut composite = robot.composite.map(Expr::constant);
         let mut given = inputs.iter();
         let whole = function.inputs(&robot.model);
         let arguments = whole.iter().map(|port| {
@@ -72,12 +75,13 @@ impl Scene {
                 None => canonical,
                 Some(other) => sum(other, canonical),
             });
-            let r = &mut reduced.bodies[body];
-            r.mass = r.mass + in_reduced.mass;
-            r.first_moment = r.first_moment + in_reduced.first_moment;
-            r.second_moment = r.second_moment + in_reduced.second_moment;
+            for r in [&mut reduced.bodies[body], &mut composite.bodies[body]] {
+                r.mass = r.mass + in_reduced.mass;
+                r.first_moment = r.first_moment + in_reduced.first_moment;
+                r.second_moment = r.second_moment + in_reduced.second_moment;
+            }
         }
-        Bound { model, reduced, arguments }
+        Bound { model, reduced, composite, arguments }
     }
 
     /// The wanted results of a function, as indices into its whole output, and their shape.

@@ -39,6 +39,18 @@ pub struct ReducedBody<T> {
     /// Take the acceleration along the joint axis from the parent, instead of turning the angular acceleration:
     /// cheaper where E is a signed permutation.
     pub shares_axis_field: bool,
+    /// E is a signed permutation.
+    pub permutes: bool,
+    /// The joint is revolute and its axis parallel to that of its parent's revolute joint: E = 1.
+    pub parallel: bool,
+    /// Described in the axes that its joint, or the first of a chain of parallel joints that all stay, has before it
+    /// turns; for a body whose children, if any, are all [parallel](Self::parallel).
+    pub stays: bool,
+    /// Moment about the axis by ε_z (Σ_xx + Σ_yy) + ω_x ω_y (Σ_xx − Σ_yy) instead of U₂₁ Σ_xx − U₁₂ Σ_yy.
+    pub by_axis_acceleration: bool,
+    /// U₃₁ = (2 ω_z) ω_x − U₁₃ and U₃₂ = (2 ω_z) ω_y − U₂₃, in this order, instead of by ε_y and ε_x: cheaper where those
+    /// are not wanted themselves.
+    pub doubled: [bool; 2],
 }
 
 /// A robot reduced to what its joint torques depend on.
@@ -48,12 +60,20 @@ pub struct ReducedModel<T> {
     pub bodies: Vec<ReducedBody<T>>,
     /// Acceleration due to gravity in the world \[m/s²\].
     pub gravity: Vec3<T>,
+    /// 1 / L, with L the unit of length \[m\] in which positions, first moments, masses and gravity are given; not 1 only
+    /// where no joint slides. Coordinates and forces of a floating base are in metres all the same.
+    pub per_unit: T,
 }
 
 impl<T: Real> ReducedModel<T> {
     /// Number of velocity coordinates.
     pub fn nv(&self) -> usize {
         self.bodies.iter().map(|b| b.kind.nv()).sum()
+    }
+
+    /// Whether a body may [stay](ReducedBody::stays): it turns, and all that it carries turns about parallel axes.
+    pub fn may_stay(&self, i: BodyId) -> bool {
+        self.bodies[i].kind == JointKind::Revolute && self.bodies.iter().all(|b| b.parent != Some(i) || b.parallel)
     }
 
     /// The same robot over another scalar: every number through `f`.
@@ -70,7 +90,12 @@ impl<T: Real> ReducedModel<T> {
             first_moment: b.first_moment.map(&mut f),
             second_moment: b.second_moment.map(&mut f),
             shares_axis_field: b.shares_axis_field,
+            permutes: b.permutes,
+            parallel: b.parallel,
+            stays: b.stays,
+            by_axis_acceleration: b.by_axis_acceleration,
+            doubled: b.doubled,
         });
-        ReducedModel { bodies: bodies.collect(), gravity: self.gravity.map(f) }
+        ReducedModel { bodies: bodies.collect(), gravity: self.gravity.map(&mut f), per_unit: f(self.per_unit) }
     }
 }

@@ -58,6 +58,8 @@ mod kinematics;
 mod momentum;
 mod reduced_dynamics;
 mod reduced_gravity;
+mod reduced_mass_matrix;
+mod reduced_turn;
 mod rnea;
 mod velocity;
 
@@ -72,4 +74,5 @@ pub use kinematics::{forward_kinematics, frame_acceleration, frame_velocity};
 pub use momentum::{momentum, Momentum};
 pub use reduced_dynamics::reduced_inverse_dynamics;
 pub use reduced_gravity::reduced_gravity_force;
+pub use reduced_mass_matrix::reduced_mass_matrix;
 pub use rnea::{bias_force, gravity_force, inverse_dynamics, joint_wrenches, velocity_force};

@@ -1,11 +1,13 @@
 //! Inverse dynamics of a [`ReducedModel`]: Newton-Euler with base inertial parameters.
 //!
-//! The recursion of `rnea.rs`, about the joints' origins, with two savings. U z, the acceleration field along the joint
+//! The recursion of `rnea.rs`, about the joints' origins, with three savings. U z, the acceleration field along the joint
 //! axis, is the same for both links of a revolute joint, as points on the axis belong to both: so the parent's column is
-//! turned instead of the angular acceleration, and the terms with q̇ ω × z never appear. And U₃₃ + U₁₁ + U₂₂ = −2 ω² gives
-//! U₁₁ without ω_y². The second moment enters as in `rnea.rs`, with Σ_zz = 0 for revolute joints.
+//! turned instead of the angular acceleration, and the terms with q̇ ω × z never appear. U₃₃ + U₁₁ + U₂₂ = −2 ω² gives
+//! U₁₁ without ω_y². And a body that [stays](ReducedBody::stays) is described in the axes before its joint's turn: its U comes
+//! from that of its parent by three multiplications, and its constants are turned instead of vectors. The second moment
+//! enters as in `rnea.rs`, with Σ_zz = 0 for revolute joints.
 
-use super::joint::quaternion_to_rotation;
+use super::reduced_turn::Turn;
 use crate::model::JointKind;
 use crate::real::Real;
 use crate::reduced::{ReducedBody, ReducedModel};
@@ -17,32 +19,37 @@ use alloc::vec::Vec;
 pub fn reduced_inverse_dynamics<T: Real>(model: &ReducedModel<T>, q: &[T], qd: &[T], qdd: &[T]) -> Vec<T> {
     let mut links: Vec<Link<T>> = Vec::with_capacity(model.bodies.len());
     let world = Link::world(model.gravity);
-    T::section("sines and cosines", None);
-    let turns: Vec<Turn<T>> = model.bodies.iter().enumerate().map(|(i, b)| Turn::new(i, b, q)).collect();
+    let turns = Turn::all(model, q);
     for (i, body) in model.bodies.iter().enumerate() {
         T::section("forward", Some(i));
+        let arm = match body.parent {
+            Some(p) => turns[p].own_to_described(&model.bodies[p], body.translation),
+            None => body.translation,
+        };
         let parent = body.parent.map_or(&world, |p| &links[p]);
-        links.push(parent.child(i, body, &turns[i], [q, qd, qdd]));
+        links.push(parent.child(i, body, &turns[i], (arm, model.per_unit), [q, qd, qdd]));
     }
 
     let mut tau = vec![T::zero(); model.nv()];
     let mut carried = vec![ForceVector::zero(); model.bodies.len()];
     for (i, body) in model.bodies.iter().enumerate().rev() {
         T::section("backward", Some(i));
-        let own = links[i].wrench(body);
+        let own = links[i].wrench(body, &turns[i]);
         let moment = (own.moment + carried[i].moment).named("moment", i);
         let force = (own.force + carried[i].force).named("force", i);
         match body.kind {
             JointKind::Revolute => tau[body.iv] = moment.z,
             JointKind::Prismatic => tau[body.iv] = force.z,
             JointKind::Floating => {
+                let force = force.scale(model.per_unit);
                 for (k, x) in force.to_array().into_iter().chain(moment.to_array()).enumerate() {
                     tau[body.iv + k] = x;
                 }
             }
         }
         if let Some(p) = body.parent {
-            let (f, n) = (turns[i].to_parent(body, force), turns[i].to_parent(body, moment));
+            let to_parent = |v| turns[i].base_to_parent(body, turns[i].described_to_base(body, v));
+            let (f, n) = (to_parent(force), to_parent(moment));
             let arm = links[i].arm;
             carried[p].force = carried[p].force + f;
             carried[p].moment = carried[p].moment + n + arm.cross(f);
@@ -51,77 +58,37 @@ pub fn reduced_inverse_dynamics<T: Real>(model: &ReducedModel<T>, q: &[T], qd: &
     tau
 }
 
-/// Sine and cosine of the angle by which a body is turned, offset included; for a floating base its rotation.
-enum Turn<T> {
-    None,
-    Angle(T, T),
-    Free(Mat3<T>),
-}
-
-impl<T: Real> Turn<T> {
-    fn new(i: usize, body: &ReducedBody<T>, q: &[T]) -> Self {
-        let (s0, c0) = body.offset;
-        match body.kind {
-            JointKind::Revolute => {
-                let (s, c) = q[body.iq].sin_cos();
-                let (s, c) = (s.named("sin_q", i, ""), c.named("cos_q", i, ""));
-                Turn::Angle(s * c0 + c * s0, c * c0 - s * s0)
-            }
-            JointKind::Prismatic => Turn::None,
-            JointKind::Floating => {
-                let k = body.iq + 3;
-                Turn::Free(quaternion_to_rotation([q[k], q[k + 1], q[k + 2], q[k + 3]]))
-            }
-        }
-    }
-
-    /// Parent axes to body axes.
-    fn to_child(&self, body: &ReducedBody<T>, v: Vec3<T>) -> Vec3<T> {
-        match self {
-            Turn::None => {
-                let (s0, c0) = body.offset;
-                body.rotation.transpose_mul(v).turned(-s0, c0)
-            }
-            Turn::Angle(s, c) => body.rotation.transpose_mul(v).turned(-*s, *c),
-            Turn::Free(r) => r.transpose_mul(v),
-        }
-    }
-
-    /// Body axes to parent axes.
-    fn to_parent(&self, body: &ReducedBody<T>, v: Vec3<T>) -> Vec3<T> {
-        match self {
-            Turn::None => {
-                let (s0, c0) = body.offset;
-                body.rotation * v.turned(s0, c0)
-            }
-            Turn::Angle(s, c) => body.rotation * v.turned(*s, *c),
-            Turn::Free(r) => *r * v,
-        }
-    }
-}
-
-/// How a body moves, in its own axes.
-struct Link<T> {
+/// ω, ε and U of one rigid body, in some axes.
+#[derive(Clone, Copy)]
+struct Spin<T> {
     omega: Vec3<T>,
     alpha: Vec3<T>,
     /// U = \[ε×\] + \[ω×\]\[ω×\].
     u: Mat3<T>,
     /// U₃₃ − U₂₂, U₁₁ − U₃₃, U₂₂ − U₁₁.
     differences: Vec3<T>,
-    /// Acceleration of the origin less gravity.
-    accel: Vec3<T>,
-    /// From the parent's origin to this one, in the parent's axes.
-    arm: Vec3<T>,
+    /// ω_x ω_y.
+    xy: T,
 }
 
-impl<T: Real> Link<T> {
-    fn world(gravity: Vec3<T>) -> Self {
-        let o = Vec3::zero();
-        Link::moving(o, o, -gravity, o)
+/// How a body moves, in the axes in which it is described.
+struct Link<T> {
+    spin: Spin<T>,
+    /// Acceleration of the origin less gravity.
+    accel: Vec3<T>,
+    /// From the parent's origin to this one, in the axes of the parent's description.
+    arm: Vec3<T>,
+    /// The motion of the base axes, and the sum of the rates of the chain's joints and of the rates' rates.
+    base: (Spin<T>, T, T),
+}
+
+impl<T: Real> Spin<T> {
+    fn zero() -> Self {
+        Spin::new(Vec3::zero(), Vec3::zero())
     }
 
     /// U from ω and ε.
-    fn moving(omega: Vec3<T>, alpha: Vec3<T>, accel: Vec3<T>, arm: Vec3<T>) -> Self {
+    fn new(omega: Vec3<T>, alpha: Vec3<T>) -> Self {
         let w = omega;
         let (xx, yy, zz) = (w.x * w.x, w.y * w.y, w.z * w.z);
         let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);
@@ -132,60 +99,52 @@ impl<T: Real> Link<T> {
                 [xz - alpha.y, yz + alpha.x, -(xx + yy)],
             ],
         };
-        Link { omega, alpha, u, differences: Vec3::new(zz - yy, xx - zz, yy - xx), accel, arm }
+        Spin { omega, alpha, u, differences: Vec3::new(zz - yy, xx - zz, yy - xx), xy }
     }
 
-    fn child(&self, i: usize, body: &ReducedBody<T>, turn: &Turn<T>, [q, qd, qdd]: [&[T]; 3]) -> Self {
-        let iv = body.iv;
-        let arm = body.translation;
-        let w = turn.to_child(body, self.omega);
-        match body.kind {
-            JointKind::Revolute => {
-                let accel = turn.to_child(body, self.accel + self.u * arm).named("accel", i);
-                let omega = Vec3::new(w.x, w.y, w.z + qd[iv]).named("omega", i);
-                if body.shares_axis_field {
-                    let alpha_z = (body.rotation.column(2).dot(self.alpha) + qdd[iv]).named("alpha", i, "z");
-                    self.along_axis(i, body, turn, omega, alpha_z, accel)
-                } else {
-                    // ε_j = ε_{j−1} + q̈_j e_j + q̇_j ω_j × e_j   (20.24)
-                    let e = turn.to_child(body, self.alpha);
-                    let (qd, qdd) = (qd[iv], qdd[iv]);
-                    let alpha = Vec3::new(e.x + omega.y * qd, e.y - omega.x * qd, e.z + qdd).named("alpha", i);
-                    Link::moving(omega, alpha, accel, arm)
-                }
-            }
-            JointKind::Prismatic => {
-                let q = q[body.iq];
-                let at_joint = turn.to_child(body, self.accel + self.u * arm);
-                let moving = Link::moving(w, turn.to_child(body, self.alpha), at_joint, arm);
-                // then U z q + 2 q̇ ω × z + q̈ z
-                let field = moving.u.column(2).scale(q);
-                let twice_qd = qd[iv] + qd[iv];
-                let coriolis = Vec3::new(w.y * twice_qd, -(w.x * twice_qd), qdd[iv]);
-                let accel = (at_joint + field + coriolis).named("accel", i);
-                Link { accel, arm: arm + body.rotation.column(2).scale(q), ..moving }
-            }
-            JointKind::Floating => {
-                let triple = |x: &[T], k: usize| Vec3::new(x[iv + k], x[iv + k + 1], x[iv + k + 2]);
-                let (omega, alpha) = (triple(qd, 3), triple(qdd, 3));
-                // v̇ + ω × v − Rᵀ g
-                let accel = triple(qdd, 0) + omega.cross(triple(qd, 0)) + turn.to_child(body, self.accel);
-                Link::moving(omega, alpha, accel.named("accel", i), arm)
-            }
+    /// The same motion in other axes, e = E of these axes in the others.
+    fn in_axes(&self, e: &Mat3<T>, permutes: bool) -> Self {
+        let (omega, alpha) = (e.transpose_mul(self.omega), e.transpose_mul(self.alpha));
+        if !permutes {
+            return Spin::new(omega, alpha);
+        }
+        // E is a signed permutation: entries change places; an odd one turns the differences round
+        let [[a, b, c], [d, f, g], [h, k, l]] = e.rows.map(|row| row.map(|x| x * x));
+        let parity = a * (f * l - g * k) - b * (d * l - g * h) + c * (d * k - f * h);
+        let places = Mat3 { rows: [[a, b, c], [d, f, g], [h, k, l]] };
+        Spin {
+            omega,
+            alpha,
+            u: e.transpose() * self.u * *e,
+            differences: places.transpose_mul(self.differences).scale(parity),
+            xy: omega.x * omega.y,
         }
     }
 
-    /// U of a child from U z, which it shares with its parent, from ω and from ε_z.
-    fn along_axis(
-        &self,
-        i: usize,
-        body: &ReducedBody<T>,
-        turn: &Turn<T>,
-        omega: Vec3<T>,
-        alpha_z: T,
-        accel: Vec3<T>,
-    ) -> Self {
-        let shared = turn.to_child(body, self.u * body.rotation.column(2)).named("field", i);
+    /// What turns about z of these axes with rate W and its rate L, still in these axes:
+    /// U' = U + L \[z×\] + W (ω zᵀ + z ωᵀ − 2 ω_z 1 …), written out; U' z = U z.
+    fn turning(&self, rate: T, rate_rate: T, twice_rate: bool) -> Self {
+        let (w, e) = (self.omega, self.alpha);
+        let [[u11, u12, u13], [u21, u22, u23], [u31, u32, u33]] = self.u.rows;
+        let inward = rate * (w.z + w.z + rate);
+        let (x, y) = match twice_rate {
+            true => (w.x * (rate + rate), w.y * (rate + rate)),
+            false => ((w.x + w.x) * rate, (w.y + w.y) * rate),
+        };
+        let rows =
+            [[u11 - inward, u12 - rate_rate, u13], [u21 + rate_rate, u22 - inward, u23], [u31 + x, u32 + y, u33]];
+        let d = self.differences;
+        Spin {
+            omega: Vec3::new(w.x, w.y, w.z + rate),
+            alpha: Vec3::new(e.x + rate * w.y, e.y - rate * w.x, e.z + rate_rate),
+            u: Mat3 { rows },
+            differences: Vec3::new(d.x + inward, d.y - inward, d.z),
+            xy: self.xy,
+        }
+    }
+
+    /// From U z, which a body shares with its parent, from ω and from ε_z.
+    fn along_axis(shared: Vec3<T>, omega: Vec3<T>, alpha_z: T, doubled: [bool; 2]) -> Self {
         let (u13, u23, u33) = (shared.x, shared.y, shared.z);
         let w = omega;
         let (xz, yz, xy) = (w.x * w.z, w.y * w.z, w.x * w.y);
@@ -195,20 +154,102 @@ impl<T: Real> Link<T> {
         let sum = xx + zz;
         let difference = xx - zz;
         let u11 = u33 + difference;
-        let u = Mat3 { rows: [[u11, xy - alpha.z, u13], [xy + alpha.z, -sum, u23], [xz - alpha.y, yz + alpha.x, u33]] };
+        let twice_z = w.z + w.z;
+        let u31 = if doubled[0] { twice_z * w.x - u13 } else { xz - alpha.y };
+        let u32 = if doubled[1] { twice_z * w.y - u23 } else { yz + alpha.x };
+        let u = Mat3 { rows: [[u11, xy - alpha.z, u13], [xy + alpha.z, -sum, u23], [u31, u32, u33]] };
         let differences = Vec3::new(u33 + sum, difference, -(u11 + sum));
-        Link { omega, alpha, u, differences, accel, arm: body.translation }
+        Spin { omega, alpha, u, differences, xy }
+    }
+}
+
+impl<T: Real> Link<T> {
+    fn world(gravity: Vec3<T>) -> Self {
+        let rest = Spin::zero();
+        Link { spin: rest, accel: -gravity, arm: Vec3::zero(), base: (rest, T::zero(), T::zero()) }
+    }
+
+    fn child(
+        &self,
+        i: usize,
+        body: &ReducedBody<T>,
+        turn: &Turn<T>,
+        (arm, per_unit): (Vec3<T>, T),
+        [q, qd, qdd]: [&[T]; 3],
+    ) -> Self {
+        let iv = body.iv;
+        let at_rest = |spin, accel: Vec3<T>, arm| Link { spin, accel, arm, base: (spin, T::zero(), T::zero()) };
+        match body.kind {
+            JointKind::Revolute => {
+                let at_joint = turn.parent_to_base(body, self.accel + self.spin.u * arm);
+                let (base, rate, rate_rate) = match (turn.continues, self.base) {
+                    (true, (base, rate, rate_rate)) => (base, rate + qd[iv], rate_rate + qdd[iv]),
+                    (false, _) => (self.spin.in_axes(&body.rotation, body.permutes), qd[iv], qdd[iv]),
+                };
+                let accel = if body.stays { at_joint } else { turn.base_to_own(at_joint) }.named("accel", i);
+                let spin = if body.stays {
+                    base.turning(rate, rate_rate, !body.parallel)
+                } else {
+                    let w = turn.base_to_own(base.omega);
+                    let omega = Vec3::new(w.x, w.y, w.z + rate).named("omega", i);
+                    if body.shares_axis_field {
+                        let shared = match turn.continues {
+                            true => base.u.column(2),
+                            false => turn.parent_to_base(body, self.spin.u * body.rotation.column(2)),
+                        };
+                        let alpha_z = (base.alpha.z + rate_rate).named("alpha", i, "z");
+                        Spin::along_axis(turn.base_to_own(shared).named("field", i), omega, alpha_z, body.doubled)
+                    } else {
+                        // ε_j = ε_{j−1} + q̈_j e_j + q̇_j ω_j × e_j   (20.24)
+                        let e = turn.base_to_own(base.alpha);
+                        let alpha = Vec3::new(e.x + omega.y * rate, e.y - omega.x * rate, e.z + rate_rate);
+                        Spin::new(omega, alpha.named("alpha", i))
+                    }
+                };
+                Link { spin, accel, arm, base: (base, rate, rate_rate) }
+            }
+            JointKind::Prismatic => {
+                let q = q[body.iq];
+                let spin = self.spin.in_axes(&body.rotation, body.permutes);
+                let at_joint = turn.parent_to_base(body, self.accel + self.spin.u * arm);
+                // then U z q + 2 q̇ ω × z + q̈ z
+                let field = spin.u.column(2).scale(q);
+                let (w, twice_qd) = (spin.omega, qd[iv] + qd[iv]);
+                let coriolis = Vec3::new(w.y * twice_qd, -(w.x * twice_qd), qdd[iv]);
+                let accel = (at_joint + field + coriolis).named("accel", i);
+                at_rest(spin, accel, arm + body.rotation.column(2).scale(q))
+            }
+            JointKind::Floating => {
+                let triple = |x: &[T], k: usize| Vec3::new(x[iv + k], x[iv + k + 1], x[iv + k + 2]);
+                let (omega, alpha) = (triple(qd, 3), triple(qdd, 3));
+                // v̇ + ω × v − Rᵀ g
+                let moving = (triple(qdd, 0) + omega.cross(triple(qd, 0))).scale(per_unit);
+                let accel = moving + turn.parent_to_base(body, self.accel);
+                at_rest(Spin::new(omega, alpha), accel.named("accel", i), arm)
+            }
+        }
     }
 
     /// Force and moment about the origin that this motion takes of the body alone.
-    fn wrench(&self, body: &ReducedBody<T>) -> ForceVector<T> {
-        let (s, ms, d) = (&body.second_moment, body.first_moment, self.differences);
-        let [[_, u12, u13], [u21, _, u23], [u31, u32, _]] = self.u.rows;
+    fn wrench(&self, body: &ReducedBody<T>, turn: &Turn<T>) -> ForceVector<T> {
+        let ms = turn.own_to_described(body, body.first_moment);
+        let own = &body.second_moment;
+        let s = match turn.angle {
+            Some((sin, cos)) if body.stays => own.turned(sin, cos),
+            _ => *own,
+        };
+        let Spin { u, differences: d, alpha, xy, .. } = &self.spin;
+        let [[_, u12, u13], [u21, _, u23], [u31, u32, _]] = u.rows;
+        let about_axis = match body.by_axis_acceleration {
+            // no turn about z changes the trace
+            true => alpha.z * (own.xx + own.yy) + *xy * (s.xx - s.yy),
+            false => u21 * s.xx - u12 * s.yy,
+        };
         let moment = Vec3::new(
             u32 * s.yy - u23 * s.zz + u31 * s.xy - u21 * s.xz + d.x * s.yz,
             u13 * s.zz - u31 * s.xx + u12 * s.yz - u32 * s.xy + d.y * s.xz,
-            u21 * s.xx - u12 * s.yy + u23 * s.xz - u13 * s.yz + d.z * s.xy,
+            about_axis + u23 * s.xz - u13 * s.yz + d.z * s.xy,
         );
-        ForceVector { moment: moment + ms.cross(self.accel), force: self.accel.scale(body.mass) + self.u * ms }
+        ForceVector { moment: moment + ms.cross(self.accel), force: self.accel.scale(body.mass) + *u * ms }
     }
 }

@@ -58,7 +58,7 @@ pub fn reduced_gravity_force<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T
             JointKind::Revolute => forces[body.iv] = at_joint.x * g.y - at_joint.y * g.x,
             JointKind::Prismatic => forces[body.iv] = mass[i] * g.z,
             JointKind::Floating => {
-                let both = g.scale(mass[i]).to_array().into_iter().chain(s.cross(g).to_array());
+                let both = g.scale(mass[i]).scale(model.per_unit).to_array().into_iter().chain(s.cross(g).to_array());
                 both.enumerate().for_each(|(k, f)| forces[body.iv + k] = f);
             }
         }

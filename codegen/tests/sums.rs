@@ -1,0 +1,117 @@
+//! The steps of the pass over sums: the smallest graph where each fires, one where it must not, and the same results.
+
+use straightline_codegen::expr::{evaluate, verify, Builder, Counts, Graph, NodeId, Op, Port, RuleSet};
+use straightline_codegen::pass::{dead_code, sums};
+use straightline_core::Dd;
+
+/// The graph of these results over the inputs a, b, c, d, e.
+fn graph(build: impl FnOnce(&mut Builder, [NodeId; 5]) -> Vec<NodeId>) -> Graph {
+    let mut b = Builder::new(RuleSet::all(), vec![Port::new("x", &[5])]);
+    let inputs = std::array::from_fn(|k| b.insert(Op::Input(k as u32)));
+    let results = build(&mut b, inputs);
+    b.finish(vec![Port::new("y", &[results.len()])], results)
+}
+
+/// Counts before and after, the results being the same over the reals.
+fn before_and_after(graph: &Graph) -> (Counts, Counts) {
+    let after = dead_code(&sums(graph));
+    verify(&after).unwrap();
+    let inputs = [0.3, -1.7, 2.9, 0.45, -5.1].map(Dd::from);
+    for (got, expected) in evaluate(&after, &inputs).into_iter().zip(evaluate(graph, &inputs)) {
+        assert!((got - expected).abs().hi() < 1e-28, "{got:?} is not {expected:?}");
+    }
+    (graph.counts(), after.counts())
+}
+
+#[test]
+fn products_come_last_so_that_each_fuses() {
+    let g = graph(|g, [a, b, c, d, e]| {
+        let (ab, cd) = (g.add(Op::Mul(a, b)), g.add(Op::Mul(c, d)));
+        let products = g.add(Op::Add(ab, cd));
+        vec![g.add(Op::Add(e, products))]
+    });
+    let (before, after) = before_and_after(&g);
+    assert_eq!((before.fma, after.fma), (3, 2));
+    assert_eq!(before.flops(), after.flops());
+}
+
+#[test]
+fn a_common_factor_is_taken_out_of_products_without_another_user() {
+    let g = graph(|g, [a, b, c, ..]| {
+        let (ab, ac) = (g.add(Op::Mul(a, b)), g.add(Op::Mul(a, c)));
+        vec![g.add(Op::Sub(ab, ac))]
+    });
+    let (before, after) = before_and_after(&g);
+    assert_eq!((before.mul, after.mul), (2, 1));
+    assert_eq!(before.fma, after.fma);
+}
+
+#[test]
+fn a_product_with_another_user_keeps_its_factors() {
+    let g = graph(|g, [a, b, c, ..]| {
+        let (ab, ac) = (g.add(Op::Mul(a, b)), g.add(Op::Mul(a, c)));
+        vec![g.add(Op::Sub(ab, ac)), ab]
+    });
+    let (before, after) = before_and_after(&g);
+    assert_eq!(before, after);
+}
+
+#[test]
+fn a_pair_in_two_sums_is_added_once_whatever_its_sign() {
+    let g = graph(|g, [a, b, c, d, _]| {
+        let first = g.add(Op::Sub(a, c));
+        let first = g.add(Op::Sub(first, b));
+        let second = g.add(Op::Add(d, b));
+        vec![first, g.add(Op::Sub(second, a))]
+    });
+    let (before, after) = before_and_after(&g);
+    assert_eq!((before.add, after.add), (4, 3));
+}
+
+#[test]
+fn pairs_of_other_relative_sign_are_not_shared() {
+    let g = graph(|g, [a, b, c, d, _]| {
+        let first = g.add(Op::Add(a, c));
+        let first = g.add(Op::Add(first, b));
+        let second = g.add(Op::Sub(d, b));
+        vec![first, g.add(Op::Add(second, a))]
+    });
+    let (before, after) = before_and_after(&g);
+    assert_eq!(before, after);
+}
+
+#[test]
+fn opposites_in_a_sum_go() {
+    let g = graph(|g, [a, b, c, ..]| {
+        let sum = g.add(Op::Add(a, b));
+        let more = g.add(Op::Add(sum, c));
+        vec![g.add(Op::Sub(more, a))]
+    });
+    let (_, after) = before_and_after(&g);
+    assert_eq!(after.add, 1);
+}
+
+#[test]
+fn a_sum_of_negatives_costs_no_operation_more() {
+    let g = graph(|g, [a, b, c, d, e]| {
+        let ab = g.add(Op::Mul(a, b));
+        let n = g.add(Op::Neg(ab));
+        let sum = g.add(Op::Sub(n, c));
+        let de = g.add(Op::Mul(d, e));
+        vec![g.add(Op::Sub(sum, de)), g.add(Op::Div(sum, a))]
+    });
+    let (before, after) = before_and_after(&g);
+    assert!(after.flops() <= before.flops() && after.fma <= before.fma, "{before:?} {after:?}");
+}
+
+#[test]
+fn a_product_added_twice_is_one_product_that_fuses() {
+    let g = graph(|g, [a, b, c, ..]| {
+        let ab = g.add(Op::Mul(a, b));
+        let twice = g.add(Op::Add(ab, ab));
+        vec![g.add(Op::Sub(twice, c))]
+    });
+    let (before, after) = before_and_after(&g);
+    assert_eq!((before.fma, after.fma), (3, 2));
+    assert_eq!(before.flops(), after.flops());
+}

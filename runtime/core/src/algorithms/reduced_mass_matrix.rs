@@ -1,0 +1,199 @@
+//! The mass matrix of a [`ReducedModel`]: composite rigid bodies in second moments, as in `crba.rs`.
+//!
+//! H belongs to the torques, so it takes base inertial parameters as well as any other distribution of mass that moves the
+//! same. A composite of bodies that [stay](ReducedBody::stays) is put together in the base axes of their chain: there the
+//! constants turn, and no composite.
+
+use super::reduced_turn::Turn;
+use crate::model::JointKind;
+use crate::real::Real;
+use crate::reduced::{ReducedBody, ReducedModel};
+use crate::spatial::{ForceVector, Mat3, Sym3, Vec3};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// H(q), nv × nv, row-major, symmetric, without rotors: [`mass_matrix`](super::mass_matrix) of the full robot.
+pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> {
+    let turns = Turn::all(model, q);
+    let nv = model.nv();
+    let mut h = vec![T::zero(); nv * nv];
+    let mut set = |i: usize, j: usize, value: T| {
+        h[i * nv + j] = value;
+        h[j * nv + i] = value;
+    };
+    let mut composites: Vec<Composite<T>> =
+        model.bodies.iter().zip(&turns).map(|(body, turn)| Composite::of_body(body, turn)).collect();
+    for (b, body) in model.bodies.iter().enumerate().rev() {
+        T::section("composite", Some(b));
+        let (iv, composite, turn) = (body.iv, composites[b].named(b), &turns[b]);
+        // in base axes, which the joint has turned or slid from already
+        let (moved, column) = match body.kind {
+            JointKind::Floating => {
+                composite.fill_floating_block(iv, model.per_unit, &mut set);
+                continue;
+            }
+            JointKind::Prismatic => {
+                // f = M z,  n = m c × z
+                set(iv, iv, composite.mass);
+                let ms = composite.first_moment;
+                let force = Vec3::new(T::zero(), T::zero(), composite.mass);
+                let moment = Vec3::new(ms.y, -ms.x, T::zero());
+                (composite.slid(q[body.iq]), ForceVector { moment, force })
+            }
+            JointKind::Revolute => {
+                // f = z × m c,  n = J z = (−Σ_xz, −Σ_yz, Σ_xx + Σ_yy)
+                let inertia = composite.second_moment.xx + composite.second_moment.yy;
+                set(iv, iv, inertia);
+                let moved = match turn.angle {
+                    Some(angle) if !body.stays => composite.turned(angle),
+                    _ => composite,
+                };
+                let (ms, s) = (moved.first_moment, moved.second_moment);
+                let force = Vec3::new(-ms.y, ms.x, T::zero());
+                (moved, ForceVector { moment: Vec3::new(-s.xz, -s.yz, inertia), force })
+            }
+        };
+        let arm_of = |b: usize| {
+            let body = &model.bodies[b];
+            let own = body.parent.map(|p| turns[p].own_to_described(&model.bodies[p], body.translation));
+            own.unwrap_or(body.translation)
+        };
+        let Some(parent) = body.parent else { continue };
+        let placed = moved.placed(body, turn, arm_of(b));
+        composites[parent] = composites[parent].plus(&placed);
+
+        // to the base, projected on each joint that it passes
+        let (mut below, mut wrench) = (b, column);
+        while let Some(ancestor) = model.bodies[below].parent {
+            T::section("column", Some(b));
+            let (body, turn) = (&model.bodies[below], &turns[below]);
+            let force = turn.base_to_parent(body, wrench.force);
+            let moment = turn.base_to_parent(body, wrench.moment) + arm_of(below).cross(force);
+            let over = &model.bodies[ancestor];
+            match over.kind {
+                JointKind::Revolute => set(iv, over.iv, moment.z),
+                JointKind::Prismatic => set(iv, over.iv, force.z),
+                JointKind::Floating => {
+                    let both = force.scale(model.per_unit).to_array().into_iter().chain(moment.to_array());
+                    both.enumerate().for_each(|(k, x)| set(iv, over.iv + k, x));
+                }
+            }
+            let turned = |v| turns[ancestor].described_to_base(over, v);
+            let moment = match over.kind {
+                // q z × F
+                JointKind::Prismatic => {
+                    let slide = q[over.iq];
+                    moment + Vec3::new(-(slide * force.y), slide * force.x, T::zero())
+                }
+                _ => moment,
+            };
+            wrench = ForceVector { moment: turned(moment), force: turned(force) };
+            below = ancestor;
+        }
+    }
+    h
+}
+
+/// The bodies outside a joint as one rigid body, about the origin of the joint's frame.
+#[derive(Clone, Copy)]
+struct Composite<T> {
+    mass: T,
+    first_moment: Vec3<T>,
+    second_moment: Sym3<T>,
+}
+
+impl<T: Real> Composite<T> {
+    /// In the axes in which the body is described.
+    fn of_body(body: &ReducedBody<T>, turn: &Turn<T>) -> Self {
+        let own = Composite { mass: body.mass, first_moment: body.first_moment, second_moment: body.second_moment };
+        match turn.angle {
+            Some(angle) if body.stays => own.turned(angle),
+            _ => own,
+        }
+    }
+
+    fn plus(&self, other: &Self) -> Self {
+        Composite {
+            mass: self.mass + other.mass,
+            first_moment: self.first_moment + other.first_moment,
+            second_moment: self.second_moment + other.second_moment,
+        }
+    }
+
+    fn named(&self, b: usize) -> Self {
+        Composite {
+            mass: self.mass,
+            first_moment: self.first_moment.named("first_moment", b),
+            second_moment: self.second_moment.named("second_moment", b),
+        }
+    }
+
+    fn turned(&self, (s, c): (T, T)) -> Self {
+        Composite {
+            mass: self.mass,
+            first_moment: self.first_moment.turned(s, c),
+            second_moment: self.second_moment.turned(s, c),
+        }
+    }
+
+    /// Moved along z by q: Σ' = Σ + q (z (m c)'ᵀ + m c zᵀ).
+    fn slid(&self, q: T) -> Self {
+        let (ms, s) = (self.first_moment, self.second_moment);
+        let msz = ms.z + self.mass * q;
+        Composite {
+            mass: self.mass,
+            first_moment: Vec3 { z: msz, ..ms },
+            second_moment: Sym3 { xz: s.xz + q * ms.x, yz: s.yz + q * ms.y, zz: s.zz + q * (ms.z + msz), ..s },
+        }
+    }
+
+    /// From base axes to those of the parent's description, about the parent's origin, p = arm before it.
+    fn placed(&self, body: &ReducedBody<T>, turn: &Turn<T>, p: Vec3<T>) -> Self {
+        let ms = turn.base_to_parent(body, self.first_moment);
+        let s = match turn.continues {
+            true => self.second_moment,
+            false => rotated(&body.rotation, self.second_moment, body.permutes),
+        };
+        // m c' = m c + M p,  Σ' = Σ + p (m c')ᵀ + m c pᵀ
+        let ms_new = ms + p.scale(self.mass);
+        let shift = Sym3 {
+            xx: p.x * (ms.x + ms_new.x),
+            xy: p.x * ms_new.y + ms.x * p.y,
+            xz: p.x * ms_new.z + ms.x * p.z,
+            yy: p.y * (ms.y + ms_new.y),
+            yz: p.y * ms_new.z + ms.y * p.z,
+            zz: p.z * (ms.z + ms_new.z),
+        };
+        Composite { mass: self.mass, first_moment: ms_new, second_moment: s + shift }
+    }
+
+    /// The 6 × 6 block of a floating base, coordinates (v, ω): f = M v̇ + ε × m c,  n = m c × v̇ + J ε.
+    fn fill_floating_block(&self, iv: usize, per_unit: T, set: &mut impl FnMut(usize, usize, T)) {
+        let (mass, ms, s) = (self.mass * per_unit * per_unit, self.first_moment.scale(per_unit), self.second_moment);
+        let j = s.second_moment_to_inertia();
+        for k in 0..3 {
+            set(iv + k, iv + k, mass);
+        }
+        // row v_i, column ω_k: (e_k × m c)_i
+        set(iv, iv + 4, ms.z);
+        set(iv, iv + 5, -ms.y);
+        set(iv + 1, iv + 3, -ms.z);
+        set(iv + 1, iv + 5, ms.x);
+        set(iv + 2, iv + 3, ms.y);
+        set(iv + 2, iv + 4, -ms.x);
+        for (row, column, value) in [(0, 0, j.xx), (0, 1, j.xy), (0, 2, j.xz), (1, 1, j.yy), (1, 2, j.yz), (2, 2, j.zz)]
+        {
+            set(iv + 3 + row, iv + 3 + column, value);
+        }
+    }
+}
+
+/// E S Eᵀ. Where E is dense, E (S − S_zz 1) Eᵀ + S_zz 1, its last entry from the trace, which no rotation changes.
+fn rotated<T: Real>(e: &Mat3<T>, s: Sym3<T>, permutes: bool) -> Sym3<T> {
+    if permutes {
+        return s.rotated(e);
+    }
+    let (xx, yy) = (s.xx - s.zz, s.yy - s.zz);
+    let r = Sym3 { xx, yy, zz: T::zero(), ..s }.rotated(e);
+    Sym3 { xx: r.xx + s.zz, yy: r.yy + s.zz, zz: s.zz + (xx + yy - r.xx - r.yy), ..r }
+}

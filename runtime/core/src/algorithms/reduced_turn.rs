@@ -1,0 +1,98 @@
+//! How vectors cross the joints of a [`ReducedModel`], and by which angle.
+//!
+//! A chain of parallel joints turns about one direction. Its *base axes* are those that the first of them has before it
+//! turns; a body that [stays](ReducedBody::stays) is described in them, one that does not in its own axes, which the sum of
+//! the angles turns from the base axes. Sine and cosine of the sum come from those of its terms by the addition theorem:
+//! adding the angles would lose |q| ε, which is all of the fraction for angles of many turns.
+
+use super::joint::quaternion_to_rotation;
+use crate::model::JointKind;
+use crate::real::Real;
+use crate::reduced::{ReducedBody, ReducedModel};
+use crate::spatial::{Mat3, Vec3};
+use alloc::vec::Vec;
+
+/// From the axes in which a body is described to those in which its parent is.
+pub(super) struct Turn<T> {
+    /// Sine and cosine of the angle from the base axes to the body's own; none for joints that do not turn so.
+    pub angle: Option<(T, T)>,
+    /// Whether the base axes are those of the parent, which is described in them too.
+    pub continues: bool,
+    /// Rotation of a floating base.
+    free: Option<Mat3<T>>,
+}
+
+impl<T: Real> Turn<T> {
+    /// Of all bodies.
+    pub fn all(model: &ReducedModel<T>, q: &[T]) -> Vec<Self> {
+        T::section("sines and cosines", None);
+        let mut turns: Vec<Turn<T>> = Vec::with_capacity(model.bodies.len());
+        for (i, body) in model.bodies.iter().enumerate() {
+            let turn = match body.kind {
+                JointKind::Revolute => {
+                    let (s, c) = q[body.iq].sin_cos();
+                    let (s, c) = (s.named("sin_q", i, ""), c.named("cos_q", i, ""));
+                    let own = sum_of_angles((s, c), body.offset);
+                    let continued = body.parent.filter(|p| body.parallel && model.bodies[*p].stays);
+                    let angle = match continued.and_then(|p| turns[p].angle) {
+                        Some(before) => sum_of_angles(own, before),
+                        None => own,
+                    };
+                    Turn { angle: Some(angle), continues: continued.is_some(), free: None }
+                }
+                JointKind::Prismatic => Turn { angle: None, continues: false, free: None },
+                JointKind::Floating => {
+                    let k = body.iq + 3;
+                    let rotation = quaternion_to_rotation([q[k], q[k + 1], q[k + 2], q[k + 3]]);
+                    Turn { angle: None, continues: false, free: Some(rotation) }
+                }
+            };
+            turns.push(turn);
+        }
+        turns
+    }
+
+    /// From the axes of the parent's description to the base axes.
+    pub fn parent_to_base(&self, body: &ReducedBody<T>, v: Vec3<T>) -> Vec3<T> {
+        match (&self.free, self.continues) {
+            (Some(r), _) => r.transpose_mul(v),
+            (None, true) => v,
+            (None, false) => body.rotation.transpose_mul(v),
+        }
+    }
+
+    /// From the base axes to those of the parent's description.
+    pub fn base_to_parent(&self, body: &ReducedBody<T>, v: Vec3<T>) -> Vec3<T> {
+        match (&self.free, self.continues) {
+            (Some(r), _) => *r * v,
+            (None, true) => v,
+            (None, false) => body.rotation * v,
+        }
+    }
+
+    /// From the base axes to the body's own.
+    pub fn base_to_own(&self, v: Vec3<T>) -> Vec3<T> {
+        self.angle.map_or(v, |(s, c)| v.turned(-s, c))
+    }
+
+    /// From the axes in which the body is described to the base axes.
+    pub fn described_to_base(&self, body: &ReducedBody<T>, v: Vec3<T>) -> Vec3<T> {
+        match self.angle {
+            Some((s, c)) if !body.stays => v.turned(s, c),
+            _ => v,
+        }
+    }
+
+    /// A constant vector of the body, in the axes in which it is described.
+    pub fn own_to_described(&self, body: &ReducedBody<T>, v: Vec3<T>) -> Vec3<T> {
+        match self.angle {
+            Some((s, c)) if body.stays => v.turned(s, c),
+            _ => v,
+        }
+    }
+}
+
+/// Sine and cosine of α + β.
+fn sum_of_angles<T: Real>((sa, ca): (T, T), (sb, cb): (T, T)) -> (T, T) {
+    (sa * cb + ca * sb, ca * cb - sa * sb)
+}
