@@ -9,7 +9,7 @@
 use super::joint::quaternion_to_rotation;
 use crate::model::JointKind;
 use crate::real::Real;
-use crate::reduced::ReducedModel;
+use crate::reduced::{ReducedBody, ReducedModel};
 use crate::spatial::Vec3;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -20,19 +20,23 @@ pub fn reduced_gravity_force<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T
     // −g in body axes, and for each joint before its turn
     let mut up: Vec<Vec3<T>> = Vec::with_capacity(n);
     let mut up_at_joint: Vec<Vec3<T>> = Vec::with_capacity(n);
-    let mut turns: Vec<(T, T)> = Vec::with_capacity(n);
-    for (i, body) in model.bodies.iter().enumerate() {
-        T::section("forward", Some(i));
-        let before = body.parent.map_or(-model.gravity, |p| up[p]);
+    T::section("sines and cosines", None);
+    let turn = |(i, body): (usize, &ReducedBody<T>)| {
         let (s0, c0) = body.offset;
-        let (s, c) = match body.kind {
+        match body.kind {
             JointKind::Revolute => {
                 let (s, c) = q[body.iq].sin_cos();
                 let (s, c) = (s.named("sin_q", i, ""), c.named("cos_q", i, ""));
                 (s * c0 + c * s0, c * c0 - s * s0)
             }
             JointKind::Prismatic | JointKind::Floating => (s0, c0),
-        };
+        }
+    };
+    let turns: Vec<(T, T)> = model.bodies.iter().enumerate().map(turn).collect();
+    for (i, body) in model.bodies.iter().enumerate() {
+        T::section("forward", Some(i));
+        let before = body.parent.map_or(-model.gravity, |p| up[p]);
+        let (s, c) = turns[i];
         let at_joint = match body.kind {
             JointKind::Floating => {
                 let k = body.iq + 3;
@@ -43,7 +47,6 @@ pub fn reduced_gravity_force<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T
         let own = if body.kind == JointKind::Floating { at_joint } else { at_joint.turned(-s, c) };
         up.push(own.named("up", i));
         up_at_joint.push(at_joint);
-        turns.push((s, c));
     }
 
     let mut forces = vec![T::zero(); model.nv()];
