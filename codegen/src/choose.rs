@@ -10,8 +10,8 @@ use crate::scene::Gravity;
 use std::sync::{Arc, Mutex, PoisonError};
 use straightline_core::model::BodyId;
 
-/// From so many velocity coordinates on nothing is tried: it would take longer than the rest of the compiler.
-const LARGE: usize = 24;
+/// Beyond so many velocity coordinates nothing is tried: on a chain of 20 joints it takes seconds.
+const LARGE: usize = 18;
 /// Units of length that are tried, the most frequent ones.
 const UNITS: usize = 4;
 /// Rounds over all choices; a round without gain is the last.
