@@ -174,7 +174,9 @@ fn read_joint(reader: &mut Reader, mut table: Table) -> Option<Joint> {
             reader.complain(&span, messages::not_supported_yet(&table.owner, key, why, &help));
         }
     }
-    Some(Joint { name: name?, kind: kind?, parent: parent?, child: child?, origin, axis, limits, drive })
+    // a kind that was complained of stands for the one with an axis and no limits, so that the axis is judged in the same run
+    let kind = kind.unwrap_or_else(|| Value::new(JointKind::Continuous, axis.place.clone()));
+    Some(Joint { name: name?, kind, parent: parent?, child: child?, origin, axis, limits, drive })
 }
 
 fn read_frame(reader: &mut Reader, mut table: Table) -> Option<NamedFrame> {
