@@ -289,7 +289,8 @@ fn generate(
         None => d.title.clone(),
     };
     let remarks = warnings.iter().map(remark).collect();
-    let provenance = Provenance { source: name.clone(), hash, remarks };
+    let ranges = scene::ranges_in_words(&options.scene, model);
+    let provenance = Provenance { source: name.clone(), hash, remarks, ranges };
     let takes = |parameter: &Parameter| {
         let name = parameter.type_name();
         let ports = || items.iter().flat_map(|item| &item.inputs);

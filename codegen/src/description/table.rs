@@ -241,6 +241,29 @@ impl Reader<'_> {
         }
     }
 
+    /// So many numbers in an array; `form` says so in words.
+    pub fn reals_at<const N: usize>(
+        &mut self,
+        table: &Table,
+        key: &str,
+        form: &str,
+        range: Range64,
+    ) -> Option<[f64; N]> {
+        let (value, span) = table.get(key)?;
+        let what = table.what(key);
+        let DeValue::Array(array) = value else {
+            self.wrong_type(&what, form, value, &span);
+            return None;
+        };
+        if array.len() != N {
+            self.complain(&span, messages::wrong_count(&what, form, array.len()));
+            return None;
+        }
+        let numbers: Vec<_> = array.iter().map(|item| self.real(&what, item.get_ref(), &item.span(), range)).collect();
+        let numbers: Option<Vec<f64>> = numbers.into_iter().collect();
+        numbers?.try_into().ok()
+    }
+
     fn triple(&mut self, what: &str, value: &DeValue, span: &Span) -> Option<[(f64, Span); 3]> {
         let DeValue::Array(array) = value else {
             self.wrong_type(what, "three numbers in an array", value, span);

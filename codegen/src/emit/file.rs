@@ -37,6 +37,8 @@ pub struct Provenance {
     pub hash: u64,
     /// What the reader of the file should know: special angles taken as exact, warnings.
     pub remarks: Vec<String>,
+    /// The ranges of inputs that a scene states, a line each.
+    pub ranges: Vec<String>,
 }
 
 /// Writes the file's items; no inner attributes, so that it can be included anywhere.
@@ -141,6 +143,12 @@ fn header(out: &mut String, model: &Model<Dd>, report: &Report, provenance: &Pro
     }
     let _ = writeln!(out, "// fma: instructions for mul and add when every a * b + c is one.");
     skipped(out, report);
+    if !provenance.ranges.is_empty() {
+        let _ = writeln!(out, "//\n// Ranges of the inputs:");
+        for line in provenance.ranges.iter().map(|r| one_line(r)) {
+            let _ = writeln!(out, "//   {line}");
+        }
+    }
     if !provenance.remarks.is_empty() {
         let _ = writeln!(out, "//");
         for line in provenance.remarks.iter().map(|r| one_line(r)) {

@@ -1,7 +1,7 @@
 //! What can be wrong with a scene: by itself, beside the options, and with a robot.
 
 use super::messages::{self as say, unphysical_moments};
-use super::{Base, Coulomb, Gravity, Parameter, Part, Payload, Scene};
+use super::{Base, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Scene};
 use crate::compile::Options;
 use crate::diagnostic::Diagnostics;
 use crate::function::Function;
@@ -36,6 +36,7 @@ pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
             places.complain(&path("part"), say::no_such_part(name, selection.part.word(), &words), diagnostics);
         }
     }
+    ranges_alone(scene, diagnostics);
     for (i, (joint, value)) in scene.locked.iter().enumerate() {
         let path = format!("hold.joints.{joint}");
         if scene.locked[..i].iter().any(|(other, _)| other == joint) {
@@ -91,6 +92,34 @@ pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
     }
 }
 
+/// Ranges without a value, and of what is no input.
+fn ranges_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
+    let places = &scene.places;
+    let mut check = |path: String, what: String, range: Interval| {
+        if !range.is_sound() {
+            places.complain(&path, say::empty_range(&what, range.lower, range.upper), diagnostics);
+        }
+    };
+    for (input, ranges) in scene.ranges.over_joints() {
+        let path = format!("numbers.ranges.{input}");
+        match ranges {
+            JointRanges::Limits => {}
+            JointRanges::All(range) => check(path, format!("the range of `{input}`"), *range),
+            JointRanges::Joints(named) => {
+                for (joint, range) in named {
+                    check(format!("{path}.{joint}"), format!("the range of `{input}` of joint `{joint}`"), *range);
+                }
+            }
+        }
+    }
+    if let Some(range) = scene.ranges.gravity {
+        check("numbers.ranges.gravity".to_string(), "the range of `gravity`".to_string(), range);
+        if scene.gravity != Gravity::Input {
+            places.complain("numbers.ranges.gravity", say::range_alone("gravity"), diagnostics);
+        }
+    }
+}
+
 /// What a scene and the options beside it contradict each other in. Scenes from files are read into options by
 /// [`SceneFile::into_options`](super::SceneFile::into_options), which cannot contradict itself.
 pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
@@ -130,6 +159,12 @@ pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnosti
     }
     for (i, joint) in scene.zero.joints_at_rest.iter().enumerate() {
         wanted.push(("joints at rest".to_string(), format!("zero.joints_at_rest.{i}"), joint));
+    }
+    for (input, ranges) in scene.ranges.over_joints() {
+        let JointRanges::Joints(named) = ranges else { continue };
+        for (joint, _) in named {
+            wanted.push((format!("ranges of `{input}`"), format!("numbers.ranges.{input}.{joint}"), joint));
+        }
     }
     for (owner, path, joint) in wanted {
         match find(joint) {

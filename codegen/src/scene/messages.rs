@@ -29,6 +29,8 @@ pub const CODES: &[&str] = &[
     "over-budget",
     "moving-base-forward",
     "said-twice",
+    "empty-range",
+    "range-alone",
 ];
 
 type D = Diagnostic;
@@ -220,4 +222,19 @@ pub fn moving_base_forward() -> D {
 /// The scene and an option of the front say the same thing.
 pub fn said_twice(what: &str) -> D {
     D::error("said-twice", format!("{what} is given by the scene and by an option beside it")).help("keep one of them")
+}
+
+/// A range without a value.
+pub fn empty_range(what: &str, lower: f64, upper: f64) -> D {
+    let d = D::error("empty-range", format!("{what}: nothing lies between {lower:?} and {upper:?}"));
+    match lower > upper {
+        true => d.help(format!("write the smaller number first: [{upper:?}, {lower:?}]")),
+        false => d.help("write two numbers, the smaller first"),
+    }
+}
+
+/// A range of what is no input.
+pub fn range_alone(input: &str) -> D {
+    D::error("range-alone", format!("a range for `{input}`, which is no input in this scene"))
+        .help("remove it; gravity is one with `gravity = \"input\"` in [hold]")
 }

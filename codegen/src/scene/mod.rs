@@ -9,12 +9,14 @@ mod bind;
 mod check;
 pub mod messages;
 mod places;
+mod ranges;
 mod read;
 
 pub use apply::apply;
 pub use bind::{is_optional, load_parameters, Bound, LOAD_SCALARS};
 pub use check::check_options;
 pub use places::Places;
+pub use ranges::{ranges_in_words, Interval, JointRanges, Ranges};
 pub use read::{read, SceneFile};
 
 use crate::function::Function;
@@ -45,6 +47,8 @@ pub struct Scene {
     pub staged: bool,
     /// What a function may cost at most.
     pub budgets: BTreeMap<Function, Budget>,
+    /// The values that inputs can have.
+    pub ranges: Ranges,
     /// Where its values stand in a scene file; empty for a scene made in code.
     pub places: Places,
 }
@@ -52,8 +56,8 @@ pub struct Scene {
 impl Scene {
     /// Whether it asks for everything and holds nothing, so that it leaves every function as it is.
     pub fn is_empty(&self) -> bool {
-        let Scene { budgets, staged, places, .. } = self;
-        *self == Scene { budgets: budgets.clone(), staged: *staged, places: places.clone(), ..Scene::default() }
+        let (budgets, ranges, places) = (self.budgets.clone(), self.ranges.clone(), self.places.clone());
+        *self == Scene { budgets, staged: self.staged, ranges, places, ..Scene::default() }
     }
 
     /// The options under which the robot file is read for this scene.

@@ -1,7 +1,8 @@
 //! Scene files: TOML, documented in `SCENES.md`. Every complaint has its place, and all come in one run.
 
 use super::messages as say;
-use super::{check, Base, Budget, Coulomb, Gravity, Parameter, Part, Payload, Places, Scene, Selection};
+use super::{check, Base, Budget, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Places};
+use super::{Ranges, Scene, Selection};
 use crate::compile::Options;
 use crate::description::reader::{Range64, Reader, LARGEST_FILE};
 use crate::description::table::{parse, Table};
@@ -312,7 +313,7 @@ impl SceneReader<'_> {
     }
 
     fn numbers(&mut self, table: &Table) {
-        self.reader.check_keys(table, &["scalar", "angle_tolerance"]);
+        self.reader.check_keys(table, &["scalar", "angle_tolerance", "ranges"]);
         let scalars: Vec<(&str, Scalar)> = Scalar::words().into_iter().map(|(word, _, s)| (word, s)).collect();
         self.file.scalar = self.reader.word_at(table, "scalar", &scalars).map(|s| s.value);
         let tolerance = self.reader.real_at(table, "angle_tolerance", Range64::Finite);
@@ -321,6 +322,65 @@ impl SceneReader<'_> {
             self.reader.diagnostics.push(complaint.at(&value.place));
         }
         self.file.angle_tolerance = tolerance.map(|t| t.value);
+        if let Some(ranges) = self.reader.table_at(table, "ranges", "[numbers.ranges]") {
+            self.ranges(&ranges);
+        }
+    }
+
+    fn ranges(&mut self, table: &Table) {
+        self.reader.check_keys(table, &["q", "qd", "qdd", "tau", "gravity"]);
+        let place = self.reader.place(&table.span);
+        self.file.scene.places.note("numbers.ranges", &place);
+        let [q, qd, qdd, tau] = ["q", "qd", "qdd", "tau"].map(|input| self.joint_ranges(table, input));
+        let gravity = self.range(table, "gravity", "numbers.ranges.gravity");
+        self.file.scene.ranges = Ranges { q, qd, qdd, tau, gravity };
+    }
+
+    /// The range of an input: one for all joints, or a table by joint.
+    fn joint_ranges(&mut self, table: &Table, input: &str) -> JointRanges {
+        let path = format!("numbers.ranges.{input}");
+        let Some((DeValue::Table(_), span)) = table.get(input) else {
+            return self.range(table, input, &path).map_or(JointRanges::Limits, JointRanges::All);
+        };
+        let place = self.reader.place(&span);
+        self.file.scene.places.note(&*path, &place);
+        let owner = format!("the ranges of `{input}`");
+        let Some(joints) = self.reader.table_at(table, input, &owner) else { return JointRanges::Limits };
+        // in the order of the file: keys of a table come sorted
+        let mut keys: Vec<_> = joints.table.keys().collect();
+        keys.sort_by_key(|key| key.span().start);
+        let mut named = Vec::new();
+        for joint in keys.into_iter().map(|key| key.get_ref().to_string()) {
+            if let Some(range) = self.range(&joints, &joint, &format!("{path}.{joint}")) {
+                named.push((joint, range));
+            }
+        }
+        JointRanges::Joints(named)
+    }
+
+    /// `[lower, upper]`, one number for both sides of zero, or `"unlimited"`.
+    fn range(&mut self, table: &Table, key: &str, path: &str) -> Option<Interval> {
+        let (value, span) = table.get(key)?;
+        let place = self.reader.place(&span);
+        self.file.scene.places.note(path, &place);
+        match value {
+            DeValue::String(_) => {
+                self.reader.word_at(table, key, &[("unlimited", Interval::UNLIMITED)]).map(|word| word.value)
+            }
+            DeValue::Array(_) => {
+                let [lower, upper] =
+                    self.reader.reals_at(table, key, "two numbers, least and greatest", Range64::Limit)?;
+                Some(Interval { lower, upper })
+            }
+            DeValue::Integer(_) | DeValue::Float(_) => {
+                self.reader.real_at(table, key, Range64::Limit).map(|bound| Interval::within(bound.value))
+            }
+            _ => {
+                let forms = "`[-1.0, 2.0]`, `2.0` for both sides of zero, or `\"unlimited\"`";
+                self.reader.wrong_type(&table.what(key), forms, value, &span);
+                None
+            }
+        }
     }
 
     fn budgets(&mut self, table: &Table) {

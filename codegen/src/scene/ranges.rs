@@ -1,0 +1,169 @@
+//! The values that inputs can have: what bounds on rounding errors are computed for.
+//!
+//! Ranges change no equation. Where a scene says nothing they are the limits of the robot file; what neither limits is
+//! unlimited, and says so ([`Interval::is_bounded`]).
+
+use super::Scene;
+use crate::expr::Port;
+use straightline_core::model::{Joint, JointKind, Limits, Model};
+
+/// From `lower` to `upper`, both in it; infinite where there is no limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// The least value.
+    pub lower: f64,
+    /// The greatest value.
+    pub upper: f64,
+}
+
+impl Interval {
+    /// Every number.
+    pub const UNLIMITED: Interval = Interval { lower: f64::NEG_INFINITY, upper: f64::INFINITY };
+    /// Zero alone.
+    pub const ZERO: Interval = Interval { lower: 0.0, upper: 0.0 };
+
+    /// From −`bound` to `bound`.
+    pub fn within(bound: f64) -> Interval {
+        Interval { lower: -bound, upper: bound }
+    }
+
+    /// Whether both ends are finite.
+    pub fn is_bounded(self) -> bool {
+        self.lower.is_finite() && self.upper.is_finite()
+    }
+
+    /// Whether a number lies in it: no end is NaN, and the lower one is not above the other.
+    pub fn is_sound(self) -> bool {
+        self.lower <= self.upper && self.lower < f64::INFINITY && self.upper > f64::NEG_INFINITY
+    }
+}
+
+/// The ranges of one input over the joints.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum JointRanges {
+    /// Those of the robot file: q within the joint's limits, q̇ within its velocity, τ within its effort; q̈ unlimited.
+    #[default]
+    Limits,
+    /// The same for all joints.
+    All(Interval),
+    /// Of these joints, by name; of the others as [`JointRanges::Limits`].
+    Joints(Vec<(String, Interval)>),
+}
+
+/// The values that inputs can have. For a floating base the range of q is that of its position \[m\] (quaternions are unit
+/// quaternions), and that of q̇, q̈ and τ holds for all six of its coordinates.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Ranges {
+    /// Configuration \[rad or m\].
+    pub q: JointRanges,
+    /// Velocity \[rad/s or m/s\].
+    pub qd: JointRanges,
+    /// Acceleration \[rad/s² or m/s²\].
+    pub qdd: JointRanges,
+    /// Generalized forces \[N·m or N\].
+    pub tau: JointRanges,
+    /// Each component of gravity where it is an input \[m/s²\].
+    pub gravity: Option<Interval>,
+}
+
+impl Ranges {
+    /// The inputs over joints with their names and ranges.
+    pub fn over_joints(&self) -> [(&'static str, &JointRanges); 4] {
+        [("q", &self.q), ("qd", &self.qd), ("qdd", &self.qdd), ("tau", &self.tau)]
+    }
+}
+
+impl Scene {
+    /// The range of every scalar of an input port, in its order; [`Interval::UNLIMITED`] where nothing limits it.
+    ///
+    /// ```
+    /// use straightline_codegen::expr::Port;
+    /// use straightline_codegen::scene::{Interval, JointRanges, Scene};
+    /// use straightline_core::model::Model;
+    /// # use straightline_codegen::{compile, diagnostic::Source, Options};
+    /// # let text = "[robot]\nname = \"a\"\n[[link]]\nname = \"w\"\n[[link]]\nname = \"b\"\nmass = 1.0\n\
+    /// #     inertia = [1.0, 1.0, 1.0]\n[[joint]]\nname = \"j\"\nkind = \"revolute\"\nparent = \"w\"\nchild = \"b\"\n\
+    /// #     axis = \"z\"\nlimits = { lower = -1.0, upper = 2.0, velocity = 3.0, effort = 4.0 }\n";
+    /// # let model = compile(&Source::new("a.toml", text), &Options::default()).unwrap().model;
+    /// let mut scene = Scene::default();
+    /// scene.ranges.qdd = JointRanges::All(Interval::within(50.0));
+    /// assert_eq!(scene.input_ranges(&Port::new("q", &[1]), &model), [Interval { lower: -1.0, upper: 2.0 }]);
+    /// assert_eq!(scene.input_ranges(&Port::new("qdd", &[1]), &model), [Interval::within(50.0)]);
+    /// ```
+    pub fn input_ranges<T>(&self, port: &Port, model: &Model<T>) -> Vec<Interval> {
+        let mut all = vec![Interval::UNLIMITED; port.len()];
+        if port.name == "gravity" {
+            all.fill(self.ranges.gravity.unwrap_or(Interval::UNLIMITED));
+        }
+        let over_joints = self.ranges.over_joints();
+        let Some((name, ranges)) = over_joints.into_iter().find(|(name, _)| *name == port.name) else { return all };
+        for joint in model.bodies.iter().map(|b| &b.joint) {
+            let rests = matches!(name, "qd" | "qdd") && self.zero.joints_at_rest.contains(&joint.name);
+            let range = if rests { Interval::ZERO } else { range(name, ranges, joint) };
+            let (first, count) = match name {
+                "q" => (joint.iq, joint.kind.nq()),
+                _ => (joint.iv, joint.kind.nv()),
+            };
+            all[first..first + count].fill(range);
+            if name == "q" && joint.kind == JointKind::Floating {
+                all[first + 3..first + count].fill(Interval::within(1.0));
+            }
+        }
+        all
+    }
+}
+
+/// The ranges of a scene in words, a line per joint and input; nothing where it says none.
+pub fn ranges_in_words<T>(scene: &Scene, model: &Model<T>) -> Vec<String> {
+    let said = scene.ranges.over_joints().into_iter().filter(|(_, ranges)| **ranges != JointRanges::Limits);
+    let mut lines = Vec::new();
+    for (name, ranges) in said {
+        let mut joints: Vec<&Joint> = model.bodies.iter().map(|b| &b.joint).collect();
+        joints.sort_by_key(|joint| joint.iv);
+        for joint in joints {
+            let at = if name == "q" { joint.iq } else { joint.iv };
+            let words = in_words(range(name, ranges, joint), unit(name, joint.kind));
+            lines.push(format!("{name}[{at}] {}: {words}", joint.name));
+        }
+    }
+    let gravity = scene.ranges.gravity.map(|range| format!("gravity: {}", in_words(range, "m/s²")));
+    lines.extend(gravity);
+    lines
+}
+
+fn in_words(range: Interval, unit: &str) -> String {
+    match range {
+        Interval::UNLIMITED => "unlimited".to_string(),
+        Interval { lower, upper } => format!("{lower:?} to {upper:?} {unit}"),
+    }
+}
+
+/// The unit of an input; of the base's velocity and force, which have two, that of the linear part.
+fn unit(name: &str, kind: JointKind) -> &'static str {
+    match (name, kind) {
+        ("q", JointKind::Revolute) => "rad",
+        ("q", _) => "m",
+        ("qd", JointKind::Revolute) => "rad/s",
+        ("qd", _) => "m/s",
+        ("qdd", JointKind::Revolute) => "rad/s²",
+        ("qdd", _) => "m/s²",
+        (_, JointKind::Revolute) => "N·m",
+        _ => "N",
+    }
+}
+
+/// The range of a joint's coordinate of the input of that name.
+fn range(name: &str, ranges: &JointRanges, joint: &Joint) -> Interval {
+    let Limits { lower, upper, velocity, effort } = joint.limits;
+    let of_file = match name {
+        "q" => Interval { lower, upper },
+        "qd" => Interval::within(velocity),
+        "tau" => Interval::within(effort),
+        _ => Interval::UNLIMITED,
+    };
+    match ranges {
+        JointRanges::Limits => of_file,
+        JointRanges::All(range) => *range,
+        JointRanges::Joints(named) => named.iter().find(|(n, _)| *n == joint.name).map_or(of_file, |(_, range)| *range),
+    }
+}
