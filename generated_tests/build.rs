@@ -94,7 +94,8 @@ fn variants(robot: &str) -> Vec<(Scalar, Grade)> {
 fn functions(module: &str, generated: &Generated) -> String {
     let mut text = String::new();
     for function in Function::all() {
-        let output = function.output(&generated.model, generated.frames.len());
+        let outputs = function.outputs(&generated.model, generated.frames.len());
+        let output = outputs.first().expect("a function of rigid bodies has one block of results");
         let arguments: Vec<String> =
             (0..function.inputs(&generated.model).len()).map(|i| format!("array(&x[{i}])")).collect();
         let zero = output.shape.iter().rev().fold("0.0".to_string(), |inner, n| format!("[{inner}; {n}]"));

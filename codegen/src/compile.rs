@@ -220,7 +220,8 @@ fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> R
     if diagnostics.has_errors() {
         return Err(diagnostics);
     }
-    let resolved = Options { scene: options.scene.resolved(&model), ..options.clone() };
+    let functions = Function::wanted(&options.functions, &model);
+    let resolved = Options { scene: options.scene.resolved(&model), functions, ..options.clone() };
     let hash = hash(source.text(), &resolved);
     let robot = Robot::new(model);
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();

@@ -13,14 +13,14 @@ use crate::pass::{dead_code, unread_inputs};
 pub struct Staged {
     /// Per stage: inputs are the stored values of earlier stages and the stage's own ports; the output is what is stored.
     pub stages: Vec<Graph>,
-    /// Per output port of the whole program: the stage that it belongs to, and the program that makes it from stored
+    /// Per function: the stage that it belongs to, and the program that makes it from stored
     /// values and, for the last stage, the inputs of that stage.
     pub functions: Vec<(usize, Graph)>,
 }
 
-/// Cuts `graph`; `stage_of` gives the stage of each input port, `names` the name of each stage's stored values. The last
-/// stage stores nothing: its inputs belong to single calls.
-pub fn cut(graph: &Graph, stage_of: &[usize], names: &[&str]) -> Staged {
+/// Cuts `graph`; `stage_of` gives the stage of each input port, `names` the name of each stage's stored values, `blocks`
+/// how many output ports each function has. The last stage stores nothing: its inputs belong to single calls.
+pub fn cut(graph: &Graph, stage_of: &[usize], names: &[&str], blocks: &[usize]) -> Staged {
     let stages = names.len();
     let last = stages - 1;
     let mut stage_of_scalar = Vec::new();
@@ -77,13 +77,17 @@ pub fn cut(graph: &Graph, stage_of: &[usize], names: &[&str]) -> Staged {
     let programs = (0..last).map(|s| cutter(s, &stored[s], vec![values(s)])).collect();
     let mut functions = Vec::new();
     let mut first = 0;
-    for port in &graph.outputs {
-        let results = &graph.results[first..first + port.len()];
-        first += port.len();
+    let mut ports = &graph.outputs[..];
+    for count in blocks {
+        let (own_ports, rest) = ports.split_at(*count);
+        ports = rest;
+        let length: usize = own_ports.iter().map(Port::len).sum();
+        let results = &graph.results[first..first + length];
+        first += length;
         let own = results.iter().filter_map(|r| stage[r.index()]).max().unwrap_or(0);
         // a result of a storing stage is only copied: that is the work of the stage after it
         let reader = if own < last { own + 1 } else { own };
-        functions.push((own, unread_inputs(cutter(reader, results, vec![port.clone()]), |_| true)));
+        functions.push((own, unread_inputs(cutter(reader, results, own_ports.to_vec()), |_| true)));
     }
     Staged { stages: programs, functions }
 }

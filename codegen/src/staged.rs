@@ -119,7 +119,8 @@ pub fn programs(robot: &Robot, frames: &[String], options: &Options) -> Programs
     let candidates = forms.map(|form| {
         let (graph, stage_of, stages) = joint_program(robot, frames, options, &functions, form);
         let names: Vec<&str> = stages.iter().map(|s| s.values).collect();
-        (cut(&graph, &stage_of, &names), stages)
+        let blocks: Vec<usize> = functions.iter().map(|f| f.outputs(&robot.model, frames.len()).len()).collect();
+        (cut(&graph, &stage_of, &names, &blocks), stages)
     });
     let (staged, stages) = candidates.min_by_key(|(s, _)| cost(s)).expect("there are four forms");
     for graph in staged.stages.iter().chain(staged.functions.iter().map(|(_, g)| g)) {
@@ -171,9 +172,9 @@ fn joint_program(
         _ => first + 2,
     };
     let stage_of = ports.iter().map(stage_of).collect();
-    let selected: Vec<(Vec<usize>, Port)> =
+    let selected: Vec<(Vec<usize>, Vec<Port>)> =
         functions.iter().map(|f| scene.select(*f, &robot.model, scene.frames_of(*f, frames).len())).collect();
-    let outputs = selected.iter().map(|(_, port)| port.clone()).collect();
+    let outputs = selected.iter().flat_map(|(_, ports)| ports.clone()).collect();
     let names: Vec<String> = ports.iter().map(|p| p.name.clone()).collect();
     let graph = trace(options.rules(), ports, outputs, |inputs| {
         let argument =
@@ -338,14 +339,15 @@ fn reach(stages: &[Stage], s: usize, name: &str, receiver: &str) -> String {
 fn method(function: Function, graph: &Graph, stages: &[Stage], s: usize, scalar: Scalar) -> String {
     let own: Vec<&Port> = graph.inputs.iter().filter(|p| !stages.iter().any(|e| e.values == p.name)).collect();
     let parameters: String = own.iter().map(|p| format!(", {}: &{}", p.name, array_type(p, scalar))).collect();
-    let output = &graph.outputs[0];
+    let results: String =
+        graph.outputs.iter().map(|p| format!(", {}: &mut {}", p.name, array_type(p, scalar))).collect();
     let arguments: Vec<String> = graph.inputs.iter().map(|p| reach(stages, s + 1, &p.name, "self")).collect();
-    let arguments: String = arguments.iter().map(|a| format!("{a}, ")).collect();
+    let arguments: Vec<&str> =
+        arguments.iter().map(String::as_str).chain(graph.outputs.iter().map(|p| p.name.as_str())).collect();
     format!(
-        "\n    /// {}\n    pub fn {name}(&self{parameters}, {out}: &mut {}) {{\n        {name}({arguments}{out});\n    }}\n",
+        "\n    /// {}\n    pub fn {name}(&self{parameters}{results}) {{\n        {name}({});\n    }}\n",
         function.summary(),
-        array_type(output, scalar),
+        arguments.join(", "),
         name = function.name(),
-        out = output.name,
     )
 }

@@ -10,7 +10,7 @@
 use crate::compile::{program, Generated, Options, Program};
 use crate::description::{self, Description, JointDrive, Notation, Value};
 use crate::diagnostic::{Diagnostics, Source};
-use crate::emit::{element, Scalar};
+use crate::emit::{element_of, Scalar};
 use crate::expr::{evaluate, Graph};
 use crate::function::{Function, Robot};
 use crate::model;
@@ -97,8 +97,8 @@ pub fn verify(
     let coordinates = &Coordinates::new(scene, model, &whole)?;
     let (mut tree, mut drives) = second_reading(source, &whole, options)?;
     whole::hold(scene, &whole, &mut tree, &mut drives)?;
-    let functions =
-        options.functions.iter().filter(|f| !f.is_per_frame() || !options.scene.frames_of(**f, frames).is_empty());
+    let functions = Function::wanted(&options.functions, model);
+    let functions = functions.iter().filter(|f| !f.is_per_frame() || !options.scene.frames_of(**f, frames).is_empty());
     let robot = Robot::new(model.clone());
     let programs: Vec<Program> = functions.map(|f| program(&robot, frames, *f, options)).collect();
     let parameters = whole::parameter_programs(&robot, options);
@@ -132,7 +132,7 @@ pub fn verify(
                 .max_by(|a, b| a.1.total_cmp(&b.1))
                 .unwrap_or((0, 0.0));
             if worst.get(function.name()).is_none_or(|w| error > w.error) {
-                let output = element(&graph.outputs[0], k);
+                let output = element_of(&graph.outputs, k);
                 let inputs = graph.inputs.iter().map(|p| (p.name.clone(), inputs.get(&p.name).to_vec())).collect();
                 worst.insert(function.name(), Worst { error, state, output, inputs });
             }

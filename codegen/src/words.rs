@@ -53,7 +53,7 @@ impl std::error::Error for UnknownWord {}
 impl Choice for Function {
     const WHAT: &'static str = "function";
     fn words() -> Vec<(&'static str, &'static str, Self)> {
-        Function::all().map(|f| (f.name(), f.summary(), f)).collect()
+        Function::known().map(|f| (f.name(), f.summary(), f)).collect()
     }
 }
 

@@ -61,6 +61,17 @@ pub fn element(port: &Port, k: usize) -> String {
     indices.iter().rev().fold(name, |text, i| format!("{text}[{i}]"))
 }
 
+/// Element k of ports that stand one after the other.
+pub fn element_of(ports: &[Port], mut k: usize) -> String {
+    for port in ports {
+        if k < port.len() {
+            return element(port, k);
+        }
+        k -= port.len();
+    }
+    panic!("an element beyond the ports");
+}
+
 /// A name from a robot file as part of a comment: it stays on its line, and in C does not end the comment.
 pub fn one_line(name: &str) -> String {
     let is_break = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');

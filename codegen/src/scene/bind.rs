@@ -84,9 +84,10 @@ impl Scene {
         Bound { model, reduced, composite, arguments }
     }
 
-    /// The wanted results of a function, as indices into its whole output, and their shape.
-    pub fn select(&self, function: Function, model: &Model<Dd>, frames: usize) -> (Vec<usize>, Port) {
-        let whole = function.output(model, frames);
+    /// The wanted results of a function, as indices into the whole of its outputs, and the blocks that they form.
+    pub fn select(&self, function: Function, model: &Model<Dd>, frames: usize) -> (Vec<usize>, Vec<Port>) {
+        let blocks = function.outputs(model, frames);
+        let [whole] = &blocks[..] else { return ((0..blocks.iter().map(Port::len).sum()).collect(), blocks) };
         let all = Selection::default();
         let selection = self.outputs.get(&function).unwrap_or(&all);
         let coordinates = selection.coordinates(model);
@@ -124,7 +125,7 @@ impl Scene {
             }
             Energy | CentreOfMass | Momentum => ((0..whole.len()).collect(), whole.shape.clone()),
         };
-        (indices, Port::new(name, &shape))
+        (indices, vec![Port::new(name, &shape)])
     }
 
     /// The frames of a function: its own, or those of the whole program.

@@ -26,7 +26,7 @@ pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
             ("frames", &selection.frames, Function::is_per_frame),
         ] {
             if !wanted.is_empty() && !possible(function) {
-                let others: Vec<&str> = Function::all().filter(|f| possible(*f)).map(Function::name).collect();
+                let others: Vec<&str> = Function::known().filter(|f| possible(*f)).map(Function::name).collect();
                 places.complain(&path(key), say::not_a_selection(name, key, &others), diagnostics);
             }
         }

@@ -149,7 +149,7 @@ impl SceneReader<'_> {
     }
 
     fn outputs(&mut self, table: &Table) {
-        let names: Vec<&str> = Function::all().map(Function::name).collect();
+        let names: Vec<&str> = Function::known().map(Function::name).collect();
         self.reader.check_keys(table, &[&["functions", "staged"], &names[..]].concat());
         self.file.scene.staged = self.reader.flag_at(table, "staged").is_some_and(|flag| flag.value);
         let mut functions: Vec<Function> = Vec::new();
@@ -164,7 +164,7 @@ impl SceneReader<'_> {
                 }
             }
         }
-        for function in Function::all() {
+        for function in Function::known() {
             let name = function.name();
             let owner = format!("`{name}` of [outputs]");
             let Some(wanted) = self.reader.table_at(table, name, &owner) else { continue };
@@ -384,9 +384,9 @@ impl SceneReader<'_> {
     }
 
     fn budgets(&mut self, table: &Table) {
-        let names: Vec<&str> = Function::all().map(Function::name).collect();
+        let names: Vec<&str> = Function::known().map(Function::name).collect();
         self.reader.check_keys(table, &names);
-        for function in Function::all() {
+        for function in Function::known() {
             let name = function.name();
             let Some(limits) = self.reader.table_at(table, name, &format!("[budget.{name}]")) else { continue };
             self.reader.check_keys(&limits, BUDGET);

@@ -64,8 +64,8 @@ struct Entry {
     name: &'static str,
     summary: &'static str,
     inputs: &'static [&'static str],
-    output: &'static str,
-    outputs: &'static str,
+    /// Name and documentation of every block of results.
+    outputs: &'static [(&'static str, &'static str)],
 }
 
 const TABLE: &[Entry] = &[
@@ -74,120 +74,105 @@ const TABLE: &[Entry] = &[
         name: "forward_kinematics",
         summary: "Poses of the frames in the world.",
         inputs: &["q"],
-        output: "x",
-        outputs: "per frame of [`FRAME_NAMES`]: position p \\[m\\] (3), then orientation R by rows (9); R's columns are the frame's axes",
+        outputs: &[("x", "per frame of [`FRAME_NAMES`]: position p \\[m\\] (3), then orientation R by rows (9); R's columns are the frame's axes")],
     },
     Entry {
         function: Function::FrameVelocity,
         name: "frame_velocity",
         summary: "Velocities of the frames.",
         inputs: &["q", "qd"],
-        output: "v",
-        outputs: "per frame: velocity of the origin \\[m/s\\] (3), angular velocity \\[rad/s\\] (3), world axes",
+        outputs: &[("v", "per frame: velocity of the origin \\[m/s\\] (3), angular velocity \\[rad/s\\] (3), world axes")],
     },
     Entry {
         function: Function::FrameAcceleration,
         name: "frame_acceleration",
         summary: "Accelerations of the frames, without gravity.",
         inputs: &["q", "qd", "qdd"],
-        output: "a",
-        outputs: "per frame: acceleration of the origin \\[m/s²\\] (3), angular acceleration \\[rad/s²\\] (3), world axes",
+        outputs: &[("a", "per frame: acceleration of the origin \\[m/s²\\] (3), angular acceleration \\[rad/s²\\] (3), world axes")],
     },
     Entry {
         function: Function::Jacobian,
         name: "jacobian",
         summary: "Geometric Jacobians J of the frames: J q̇ is the frame's velocity.",
         inputs: &["q"],
-        output: "j",
-        outputs: "per frame: 6 rows (3 linear at the frame's origin, 3 angular; world axes) of one column per velocity coordinate",
+        outputs: &[("j", "per frame: 6 rows (3 linear at the frame's origin, 3 angular; world axes) of one column per velocity coordinate")],
     },
     Entry {
         function: Function::JacobianBias,
         name: "jacobian_bias",
         summary: "J̇ q̇ of the frames: their acceleration for q̈ = 0.",
         inputs: &["q", "qd"],
-        output: "a",
-        outputs: "per frame: linear \\[m/s²\\] (3), angular \\[rad/s²\\] (3), world axes",
+        outputs: &[("a", "per frame: linear \\[m/s²\\] (3), angular \\[rad/s²\\] (3), world axes")],
     },
     Entry {
         function: Function::InverseDynamics,
         name: "inverse_dynamics",
         summary: "Inverse dynamics τ = H(q) q̈ + h(q, q̇): the drives that a motion takes.",
         inputs: &["q", "qd", "qdd"],
-        output: "tau",
-        outputs: "generalized forces \\[N·m or N\\]",
+        outputs: &[("tau", "generalized forces \\[N·m or N\\]")],
     },
     Entry {
         function: Function::GravityForce,
         name: "gravity_force",
         summary: "Gravity forces g(q): the drives that hold the robot still.",
         inputs: &["q"],
-        output: "g",
-        outputs: "generalized forces \\[N·m or N\\]",
+        outputs: &[("g", "generalized forces \\[N·m or N\\]")],
     },
     Entry {
         function: Function::BiasForce,
         name: "bias_force",
         summary: "Bias forces h(q, q̇): Coriolis, centrifugal and gravity forces.",
         inputs: &["q", "qd"],
-        output: "h",
-        outputs: "generalized forces \\[N·m or N\\]",
+        outputs: &[("h", "generalized forces \\[N·m or N\\]")],
     },
     Entry {
         function: Function::VelocityForce,
         name: "velocity_force",
         summary: "Velocity forces C(q, q̇) q̇: Coriolis and centrifugal forces, without gravity.",
         inputs: &["q", "qd"],
-        output: "c",
-        outputs: "generalized forces \\[N·m or N\\]",
+        outputs: &[("c", "generalized forces \\[N·m or N\\]")],
     },
     Entry {
         function: Function::MassMatrix,
         name: "mass_matrix",
         summary: "The mass matrix H(q), symmetric.",
         inputs: &["q"],
-        output: "h",
-        outputs: "rows of H, both triangles \\[kg·m², kg·m, kg\\]",
+        outputs: &[("h", "rows of H, both triangles \\[kg·m², kg·m, kg\\]")],
     },
     Entry {
         function: Function::ForwardDynamics,
         name: "forward_dynamics",
         summary: "Forward dynamics q̈ = H(q)⁻¹ (τ − h(q, q̇)): the motion that drives make.",
         inputs: &["q", "qd", "tau"],
-        output: "qdd",
-        outputs: "accelerations \\[rad/s² or m/s²\\]",
+        outputs: &[("qdd", "accelerations \\[rad/s² or m/s²\\]")],
     },
     Entry {
         function: Function::JointWrenches,
         name: "joint_wrenches",
         summary: "Forces and moments that each joint carries, drive included.",
         inputs: &["q", "qd", "qdd"],
-        output: "w",
-        outputs: "per joint, in the order of qd: force \\[N\\] (3), moment about the joint's origin \\[N·m\\] (3), from parent to child, in the child link's axes",
+        outputs: &[("w", "per joint, in the order of qd: force \\[N\\] (3), moment about the joint's origin \\[N·m\\] (3), from parent to child, in the child link's axes")],
     },
     Entry {
         function: Function::Energy,
         name: "energy",
         summary: "Kinetic and potential energy of the moving bodies.",
         inputs: &["q", "qd"],
-        output: "tv",
-        outputs: "kinetic energy T, potential energy V = −Σ m g·p \\[J\\]",
+        outputs: &[("tv", "kinetic energy T, potential energy V = −Σ m g·p \\[J\\]")],
     },
     Entry {
         function: Function::CentreOfMass,
         name: "centre_of_mass",
         summary: "Mass centre of the moving bodies.",
         inputs: &["q"],
-        output: "p",
-        outputs: "its position in the world \\[m\\]",
+        outputs: &[("p", "its position in the world \\[m\\]")],
     },
     Entry {
         function: Function::Momentum,
         name: "momentum",
         summary: "Momentum of the moving bodies.",
         inputs: &["q", "qd"],
-        output: "p",
-        outputs: "linear \\[kg·m/s\\] (3), angular about the mass centre \\[kg·m²/s\\] (3), world axes",
+        outputs: &[("p", "linear \\[kg·m/s\\] (3), angular about the mass centre \\[kg·m²/s\\] (3), world axes")],
     },
 ];
 
@@ -199,19 +184,56 @@ const INPUT_DOCS: &[(&str, &str)] = &[
     ("gravity", "acceleration due to gravity in the world \\[m/s²\\]"),
 ];
 
+/// Number of scalars of an input.
+fn length<T: Real>(input: &str, model: &Model<T>) -> usize {
+    match input {
+        "q" => model.nq(),
+        "qd" | "qdd" | "tau" => model.nv(),
+        _ => panic!("the input `{input}` has no length"),
+    }
+}
+
+/// The rows of every family, in the order in which functions stand in generated files.
+fn table() -> impl Iterator<Item = &'static Entry> {
+    TABLE.iter()
+}
+
 impl Function {
-    /// All of them, in the order in which they stand in generated files.
+    /// Those that every robot has, in the order in which they stand in generated files.
     pub fn all() -> impl Iterator<Item = Function> {
         TABLE.iter().map(|e| e.function)
     }
 
+    /// All that there are, also those of robots and scenes with more than rigid bodies.
+    pub fn known() -> impl Iterator<Item = Function> {
+        table().map(|e| e.function)
+    }
+
+    /// All that a robot has.
+    pub fn of<T: Real>(model: &Model<T>) -> impl Iterator<Item = Function> + '_ {
+        Function::known().filter(|f| f.is_of(model))
+    }
+
+    /// Those that are meant by a list: [`Function::all`] stands for all that the robot has.
+    pub fn wanted<T: Real>(list: &[Function], model: &Model<T>) -> Vec<Function> {
+        match list.iter().copied().eq(Function::all()) {
+            true => Function::of(model).collect(),
+            false => list.to_vec(),
+        }
+    }
+
+    /// Whether a robot has what the function is about.
+    pub fn is_of<T: Real>(self, _model: &Model<T>) -> bool {
+        true
+    }
+
     /// The function of that name.
     pub fn from_name(name: &str) -> Option<Function> {
-        TABLE.iter().find(|e| e.name == name).map(|e| e.function)
+        table().find(|e| e.name == name).map(|e| e.function)
     }
 
     fn entry(self) -> &'static Entry {
-        TABLE.iter().find(|e| e.function == self).expect("the table has every function")
+        table().find(|e| e.function == self).expect("the table has every function")
     }
 
     /// Its name in generated code and on the command line.
@@ -232,12 +254,11 @@ impl Function {
 
     /// Its inputs for a robot.
     pub fn inputs<T: Real>(self, model: &Model<T>) -> Vec<Port> {
-        let len = |name: &str| if name == "q" { model.nq() } else { model.nv() };
-        self.entry().inputs.iter().map(|name| Port::new(name, &[len(name)])).collect()
+        self.entry().inputs.iter().map(|name| Port::new(name, &[length(name, model)])).collect()
     }
 
-    /// Its output for a robot and so many frames.
-    pub fn output<T: Real>(self, model: &Model<T>, frames: usize) -> Port {
+    /// Its blocks of results for a robot and so many frames.
+    pub fn outputs<T: Real>(self, model: &Model<T>, frames: usize) -> Vec<Port> {
         use Function::*;
         let nv = model.nv();
         let shape: &[usize] = match self {
@@ -251,7 +272,7 @@ impl Function {
             CentreOfMass => &[3],
             Momentum => &[6],
         };
-        Port::new(self.entry().output, shape)
+        vec![Port::new(self.entry().outputs[0].0, shape)]
     }
 
     /// Its documentation in generated code, for the inputs that a scene leaves it.
@@ -263,7 +284,9 @@ impl Function {
             let text = known.map_or("inertial parameters of a body that the robot carries", |(_, text)| text);
             doc.push_str(&format!("* `{}`: {text}\n", port.name));
         }
-        doc.push_str(&format!("* `{}`: {}\n", entry.output, entry.outputs));
+        for (name, text) in entry.outputs {
+            doc.push_str(&format!("* `{name}`: {text}\n"));
+        }
         if let Some(selection) = scene.outputs.get(&self) {
             for (what, names) in [("joints", &selection.joints), ("frames", &selection.frames)] {
                 if !names.is_empty() {
@@ -403,9 +426,9 @@ impl Function {
         scene: &Scene,
     ) -> Graph {
         let frames = scene.frames_of(self, frames);
-        let (wanted, output) = scene.select(self, &robot.model, frames.len());
+        let (wanted, outputs) = scene.select(self, &robot.model, frames.len());
         let trace_with = |method| {
-            trace(rules, scene.ports(self, &robot.model), vec![output.clone()], |inputs| {
+            trace(rules, scene.ports(self, &robot.model), outputs.clone(), |inputs| {
                 let results = self.equations(robot, frames, method, reduced, scene, inputs);
                 wanted.iter().map(|k| results[*k]).collect()
             })
