@@ -22,24 +22,63 @@ pub const DOMAIN_F64: f64 = 1_647_099.0;
 /// [`sin_cos_f32`] answers for |x| up to here, just under 2^13·π/2; beyond, NaN.
 pub const DOMAIN_F32: f32 = 12_867.0;
 
+/// How many f64 one vector instruction of the target takes: sets of angles are filled up to a multiple of that, because a
+/// vector that is stored in part and read in full waits until the store has left the pipeline.
+const LANES_F64: usize = if cfg!(target_feature = "avx512f") {
+    8
+} else if cfg!(target_feature = "avx") {
+    4
+} else if cfg!(any(target_feature = "sse2", target_feature = "neon", target_feature = "simd128")) {
+    2
+} else {
+    1
+};
+
+/// As [`LANES_F64`], of f32.
+const LANES_F32: usize = if LANES_F64 > 1 { 2 * LANES_F64 } else { 1 };
+
 /// [`sin_cos_f64`] of several angles: the same bits, by vector instructions where there are any.
-#[inline]
+///
+/// Inlined, so that sines and cosines stay in registers.
+#[inline(always)]
 #[must_use]
 pub fn sin_cos_lanes_f64<const N: usize>(x: [f64; N]) -> ([f64; N], [f64; N]) {
+    const BLOCK: usize = 8;
     let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
-    for i in 0..N {
-        (sines[i], cosines[i]) = sin_cos_f64(x[i]);
+    let mut first = 0;
+    while first < N {
+        let used = if N - first < BLOCK { N - first } else { BLOCK };
+        let (mut angle, mut sin, mut cos) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
+        angle[..used].copy_from_slice(&x[first..first + used]);
+        for i in 0..used.next_multiple_of(LANES_F64) {
+            (sin[i], cos[i]) = sin_cos_f64(angle[i]);
+        }
+        sines[first..first + used].copy_from_slice(&sin[..used]);
+        cosines[first..first + used].copy_from_slice(&cos[..used]);
+        first += BLOCK;
     }
     (sines, cosines)
 }
 
 /// [`sin_cos_f32`] of several angles: the same bits, by vector instructions where there are any.
-#[inline]
+///
+/// Inlined, so that sines and cosines stay in registers.
+#[inline(always)]
 #[must_use]
 pub fn sin_cos_lanes_f32<const N: usize>(x: [f32; N]) -> ([f32; N], [f32; N]) {
+    const BLOCK: usize = 16;
     let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
-    for i in 0..N {
-        (sines[i], cosines[i]) = sin_cos_f32(x[i]);
+    let mut first = 0;
+    while first < N {
+        let used = if N - first < BLOCK { N - first } else { BLOCK };
+        let (mut angle, mut sin, mut cos) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
+        angle[..used].copy_from_slice(&x[first..first + used]);
+        for i in 0..used.next_multiple_of(LANES_F32) {
+            (sin[i], cos[i]) = sin_cos_f32(angle[i]);
+        }
+        sines[first..first + used].copy_from_slice(&sin[..used]);
+        cosines[first..first + used].copy_from_slice(&cos[..used]);
+        first += BLOCK;
     }
     (sines, cosines)
 }
