@@ -5,6 +5,7 @@ use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
 use crate::emit::{self, Item, Provenance, Scalar};
 use crate::expr::{verify, Folding, Grade, Graph, Port, RuleSet, Section};
+use crate::forward_method::MethodChoice;
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model;
 use crate::pass::{dead_code, sums, unread_inputs};
@@ -13,6 +14,7 @@ use crate::report::waterfall::{self, Waterfall};
 use crate::report::{FunctionReport, Report};
 use crate::scene::{self, is_optional, load_parameters, Parameter, Scene, LOAD_SCALARS};
 use crate::schedule::{schedule, Limits, Schedule};
+use crate::singular::singular_joints;
 use crate::staged::{self, staged};
 use crate::trace::trace;
 use std::collections::BTreeMap;
@@ -127,13 +129,15 @@ pub struct Program {
     pub graph: Graph,
     /// Their order, and the cuts.
     pub schedule: Schedule,
+    /// Of forward dynamics whose method was left to the compiler: which, and why.
+    pub method: Option<MethodChoice>,
 }
 
 /// Traces and optimises one function of a robot.
 pub fn program(robot: &Robot, frames: &[String], function: Function, options: &Options) -> Program {
-    let graph = optimised(robot, frames, function, options, options.optimisations());
+    let (graph, method) = optimised_with(robot, frames, function, options, options.optimisations());
     let schedule = schedule(&graph, options.limits);
-    Program { function, graph, schedule }
+    Program { function, graph, schedule, method }
 }
 
 /// The operations of one function of a robot, with these optimisations only.
@@ -144,6 +148,17 @@ pub fn optimised(
     options: &Options,
     optimisations: Optimisations,
 ) -> Graph {
+    optimised_with(robot, frames, function, options, optimisations).0
+}
+
+/// The same, with the choice of the method where one was made.
+fn optimised_with(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+    optimisations: Optimisations,
+) -> (Graph, Option<MethodChoice>) {
     let check = |graph: Graph| {
         verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
         graph
@@ -156,12 +171,14 @@ pub fn optimised(
     let chosen = (optimisations.chosen && optimisations.reduced)
         .then(|| choose(robot, frames, function, options, Optimisations { chosen: false, ..optimisations }));
     let robot = chosen.as_ref().unwrap_or(robot);
-    let traced = function.trace(robot, frames, method, rules, optimisations.reduced, &options.scene);
+    let (traced, choice) =
+        function.trace(robot, frames, method, rules, options.scalar, optimisations.reduced, &options.scene);
     let graph = check(unread_inputs(check(dead_code(&check(traced))), is_optional));
-    match optimisations.sums {
+    let graph = match optimisations.sums {
         true => check(dead_code(&check(sums(&graph)))),
         false => graph,
-    }
+    };
+    (graph, choice)
 }
 
 /// What the compiler makes of a robot file.
@@ -222,6 +239,11 @@ fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> R
     }
     let functions = Function::wanted(&options.functions, &model);
     let resolved = Options { scene: options.scene.resolved(&model), functions, ..options.clone() };
+    demand_inertia(&model, &resolved, &mut diagnostics);
+    if diagnostics.has_errors() {
+        diagnostics.sort();
+        return Err(diagnostics);
+    }
     let hash = hash(source.text(), &resolved);
     let robot = Robot::new(model);
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
@@ -245,6 +267,24 @@ fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> R
     Ok(generate(robot, frames, programs, waterfalls, diagnostics, &resolved, source.path(), hash))
 }
 
+/// Forward dynamics divides by what every joint feels. What a run-time parameter will add is not known here.
+fn demand_inertia(model: &Model<Dd>, options: &Options, diagnostics: &mut Diagnostics) {
+    if !options.functions.contains(&Function::ForwardDynamics) || !options.scene.parameters.is_empty() {
+        return;
+    }
+    for id in singular_joints(model) {
+        let joint = &model.bodies[id].joint.name;
+        let complaint = messages::no_forward_dynamics(joint);
+        let named = format!("joint `{joint}`");
+        let warning = diagnostics.iter().find(|d| d.code == "singular-joint" && d.title.starts_with(&named));
+        let place = warning.and_then(|d| d.place.clone());
+        diagnostics.push(match place {
+            Some(place) => complaint.at(&place),
+            None => complaint,
+        });
+    }
+}
+
 /// The rest of the pipeline: from programs to text.
 #[allow(clippy::too_many_arguments)]
 fn generate(
@@ -265,8 +305,11 @@ fn generate(
     let mut items = Vec::new();
     let mut functions = BTreeMap::new();
     for (program, waterfall) in programs.into_iter().zip(waterfalls) {
-        let Program { function, graph, schedule } = &program;
-        let doc = function.doc(&graph.inputs, &options.scene);
+        let Program { function, graph, schedule, method } = &program;
+        let mut doc = function.doc(&graph.inputs, &options.scene);
+        if let Some(method) = method {
+            doc.push_str(&format!("\n{method}\n"));
+        }
         let text = emit::function(graph, schedule, function.name(), &doc, options.scalar, &title);
         let figures = FunctionReport::new(&program, options.scalar, text.text.lines().count());
         functions.insert(function.name(), FunctionReport { waterfall, ..figures });

@@ -47,7 +47,8 @@ fn said_of(code: &str) -> Diagnostics {
     let robot = Source::new("arm.toml", ARM);
     let found = compile(&robot, &options).map_or_else(|errors| errors, |generated| generated.warnings);
     // the robot's own warnings stand in another table
-    for diagnostic in found.iter().filter(|d| d.code != "floating-by-option" && d.code != "point-mass") {
+    let of_the_robot = ["floating-by-option", "point-mass", "singular-joint"];
+    for diagnostic in found.iter().filter(|d| !of_the_robot.contains(&d.code)) {
         diagnostics.push(diagnostic.clone());
     }
     if let Some(source) = options.scene.places.source() {

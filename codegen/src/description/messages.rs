@@ -456,11 +456,21 @@ pub fn zero_mass(link: &str) -> D {
     D::warning("zero-mass", format!("the mass of link `{link}` is zero, and it moves")).detail("taken as written")
 }
 
-/// A joint that moves nothing.
+/// A joint that feels no inertia.
 pub fn singular_joint(joint: &str, what: &str) -> D {
     D::warning("singular-joint", format!("joint `{joint}` moves no {what}"))
-        .detail("the mass matrix is singular: forward dynamics divides by zero; inverse dynamics is not affected")
-        .help("give the links that it moves their mass and inertia, or make the joint fixed")
+        .detail("the mass matrix is singular: there is no forward dynamics; inverse dynamics is not affected")
+        .help("give the links that it moves their mass and inertia or the joint a rotor inertia, or make the joint fixed")
+}
+
+/// Forward dynamics of a robot with a joint that feels no inertia.
+pub fn no_forward_dynamics(joint: &str) -> D {
+    D::error("no-forward-dynamics", format!("forward dynamics is asked for, and joint `{joint}` feels no inertia"))
+        .detail("with the joints beyond it free nothing resists its motion: the equations would divide by zero")
+        .help(
+            "give the joint a rotor inertia (TOML: `rotor_inertia` or `armature`) or its links their mass and inertia, make it \
+             fixed, or name the functions that are wanted without `forward_dynamics`",
+        )
 }
 
 /// An angle that may be meant as a right angle.

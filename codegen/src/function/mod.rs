@@ -1,7 +1,9 @@
 //! The functions that can be generated: a table of names, signatures and documentation, and the algorithm behind each.
 
 use crate::choose::Found;
+use crate::emit::Scalar;
 use crate::expr::{Graph, Port, RuleSet};
+use crate::forward_method::{self, MethodChoice};
 use crate::reduce::{reduce, Choice};
 use crate::scene::{Bound, Part, Scene};
 use crate::trace::{trace, Expr};
@@ -49,7 +51,7 @@ pub enum Function {
 /// How forward dynamics is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ForwardDynamicsMethod {
-    /// Whichever takes fewer operations for this robot.
+    /// Whichever takes fewer operations for this robot, unless it loses digits that the other keeps.
     #[default]
     Cheaper,
     /// The bias force, then articulated bodies.
@@ -414,17 +416,20 @@ impl Function {
         })
     }
 
-    /// Its equations for a robot in a scene. For [`ForwardDynamicsMethod::Cheaper`] both methods are traced and the one
-    /// with fewer operations is kept. `reduced`: the reduced robot serves the functions that it can, and rounding moves.
+    /// Its equations for a robot in a scene, and for [`ForwardDynamicsMethod::Cheaper`] which form of forward dynamics that
+    /// is and why: see [`forward_method`](crate::forward_method). `reduced`: the reduced robot serves the functions that it
+    /// can, and rounding moves.
+    #[allow(clippy::too_many_arguments)]
     pub fn trace(
         self,
         robot: &Robot,
         frames: &[String],
         method: ForwardDynamicsMethod,
         rules: RuleSet,
+        scalar: Scalar,
         reduced: bool,
         scene: &Scene,
-    ) -> Graph {
+    ) -> (Graph, Option<MethodChoice>) {
         let frames = scene.frames_of(self, frames);
         let (wanted, outputs) = scene.select(self, &robot.model, frames.len());
         let trace_with = |method| {
@@ -436,18 +441,16 @@ impl Function {
         match (self, method) {
             (Function::ForwardDynamics, ForwardDynamicsMethod::Cheaper) => {
                 let articulated = trace_with(ForwardDynamicsMethod::ArticulatedBody);
-                // an LᵀDL factor of n joints on one branch takes about n³/6 products more
-                if robot.model.nv() > 40 {
-                    return articulated;
-                }
-                let factorised = trace_with(ForwardDynamicsMethod::Factorisation);
-                if factorised.counts().fma < articulated.counts().fma {
-                    factorised
-                } else {
-                    articulated
-                }
+                let factorised = (robot.model.nv() <= forward_method::MOST_FOR_FACTORISATION)
+                    .then(|| trace_with(ForwardDynamicsMethod::Factorisation));
+                let choice = forward_method::choose(&robot.model, scalar, &articulated, factorised.as_ref());
+                let graph = match factorised {
+                    Some(factorised) if !choice.articulated_bodies => factorised,
+                    _ => articulated,
+                };
+                (graph, Some(choice))
             }
-            _ => trace_with(method),
+            _ => (trace_with(method), None),
         }
     }
 }

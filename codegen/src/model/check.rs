@@ -6,8 +6,9 @@ use crate::description::{
     messages, Description, Format, Joint, JointDrive, JointFrameNotation, JointKind, JointLimits, Value,
 };
 use crate::diagnostic::{Diagnostics, Place};
+use crate::singular::singular_joints;
 use std::collections::HashMap;
-use straightline_core::model::{Coulomb, JointEffects, JointKind as ModelJointKind, Limits};
+use straightline_core::model::{Coulomb, JointEffects, JointKind as ModelJointKind, Limits, Model};
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
 
@@ -307,7 +308,7 @@ pub(super) fn angles(description: &Description, tolerance: f64, diagnostics: &mu
     });
 }
 
-/// Whether something moves, and whether every joint moves something.
+/// Whether something moves.
 pub(super) fn motion(assembly: &Assembly, description: &Description, diagnostics: &mut Diagnostics) {
     let bodies = &assembly.bodies;
     if bodies.is_empty() {
@@ -316,29 +317,35 @@ pub(super) fn motion(assembly: &Assembly, description: &Description, diagnostics
         }
         return;
     }
-    let inertia_of = |id: usize| {
-        let s = bodies[id].inertia.second_moment_com;
-        [s.xx, s.yy, s.zz, s.xy, s.xz, s.yz].iter().any(|x| x.to_f64() != 0.0)
-    };
-    let mut has_mass: Vec<bool> = bodies.iter().map(|b| b.inertia.mass.to_f64() > 0.0).collect();
-    let mut has_inertia: Vec<bool> = (0..bodies.len()).map(inertia_of).collect();
-    let mut is_leaf = vec![true; bodies.len()];
-    for id in (0..bodies.len()).rev() {
-        if let Some(parent) = bodies[id].parent {
-            has_mass[parent] |= has_mass[id];
-            has_inertia[parent] |= has_inertia[id];
-            is_leaf[parent] = false;
-        }
+}
+
+/// Whether every joint feels some inertia.
+pub(super) fn singular(model: &Model<Dd>, joint_places: &[Place], diagnostics: &mut Diagnostics) {
+    for id in singular_joints(model) {
+        diagnostics.push(messages::singular_joint(&model.bodies[id].joint.name, what_is_missing(model, id)).at(&joint_places[id]));
     }
-    for (id, body) in bodies.iter().enumerate() {
-        let about_axis = body.inertia.second_moment.xx + body.inertia.second_moment.yy;
-        let what = match body.joint.kind {
-            _ if body.effects.rotor_inertia.is_some() => continue,
-            ModelJointKind::Prismatic | ModelJointKind::Floating if !has_mass[id] => "mass",
-            ModelJointKind::Revolute if !has_mass[id] && !has_inertia[id] => "mass",
-            ModelJointKind::Revolute if is_leaf[id] && about_axis.to_f64() == 0.0 => "inertia about its axis",
-            _ => continue,
-        };
-        diagnostics.push(messages::singular_joint(&body.joint.name, what).at(&assembly.joint_places[id]));
+}
+
+/// What the links that a joint moves lack, in words.
+fn what_is_missing(model: &Model<Dd>, id: usize) -> &'static str {
+    let bodies = &model.bodies;
+    let is_moved = |mut body: usize| loop {
+        match bodies[body].parent {
+            _ if body == id => break true,
+            Some(parent) => body = parent,
+            None => break false,
+        }
+    };
+    let moved = || (id..bodies.len()).filter(|b| is_moved(*b)).map(|b| &bodies[b]);
+    let has_mass = moved().any(|b| b.inertia.mass.to_f64() > 0.0);
+    let has_inertia = moved().any(|b| {
+        let s = b.inertia.second_moment_com;
+        [s.xx, s.yy, s.zz, s.xy, s.xz, s.yz].iter().any(|x| x.to_f64() != 0.0)
+    });
+    match bodies[id].joint.kind {
+        ModelJointKind::Prismatic | ModelJointKind::Floating if !has_mass => "mass",
+        ModelJointKind::Revolute if !has_mass && !has_inertia => "mass",
+        _ if moved().count() == 1 => "inertia about its axis",
+        _ => "inertia that is left where the joints beyond it are free",
     }
 }

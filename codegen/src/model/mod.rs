@@ -139,12 +139,14 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
         return None;
     }
     let gravity = options.gravity.or(description.gravity.as_ref().map(|g| g.value)).unwrap_or([0.0, 0.0, -9.81]);
-    Some(Model {
+    let model = Model {
         name: description.name.value.clone(),
         bodies: assembly.bodies,
         gravity: vector(gravity),
         frames: assembly.frames,
-    })
+    };
+    check::singular(&model, &assembly.joint_places, diagnostics);
+    Some(model)
 }
 
 /// The angles of a description that are taken as multiples of π/4 or π/6 and are not written exactly so.

@@ -361,6 +361,9 @@ fn functions(out: &mut String, report: &Report) {
         out.push_str("</tr>\n");
     }
     out.push_str("</tbody>\n</table>\n</div>\n");
+    for (name, method) in report.functions.iter().filter_map(|(name, f)| Some((name, f.method?))) {
+        let _ = writeln!(out, "<p><span class=\"mono\">{name}</span>. {method}</p>");
+    }
 }
 
 fn stages(out: &mut String, staged: &StagedReport, report: &Report) {

@@ -8,6 +8,7 @@ pub mod waterfall;
 use crate::compile::Program;
 use crate::emit::Scalar;
 use crate::expr::Counts;
+use crate::forward_method::MethodChoice;
 use crate::function::Function;
 use crate::staged::StagedReport;
 use budget::Measures;
@@ -42,6 +43,9 @@ pub struct FunctionReport {
     pub stack_bytes: usize,
     /// Bytes of machine code, estimated for x86-64.
     pub code_bytes: usize,
+    /// Of forward dynamics: which method was chosen, and why.
+    #[cfg_attr(feature = "cli", serde(skip_serializing_if = "Option::is_none"))]
+    pub method: Option<MethodChoice>,
     /// How it came to these counts: where it was asked for, and where a scene skips something.
     #[cfg_attr(feature = "cli", serde(flatten, skip_serializing_if = "Option::is_none"))]
     pub waterfall: Option<Waterfall>,
@@ -65,6 +69,7 @@ impl FunctionReport {
             lines,
             stack_bytes,
             code_bytes,
+            method: program.method,
             waterfall: None,
         }
     }

@@ -103,6 +103,9 @@ pub fn report(report: &Report) -> io::Result<()> {
         )?;
     }
     writeln!(out, "\nfma: instructions for mul and add when every a·b ± c is one; live: most values alive at once")?;
+    for (name, method) in functions.iter().filter_map(|(name, f)| Some((name, f.method?))) {
+        writeln!(out, "\n{name}. {method}")?;
+    }
     let explained = functions.iter().filter_map(|(name, f)| Some((name, f, f.waterfall.as_ref()?)));
     for (name, f, waterfall) in explained {
         let Waterfall { plain, full, savings } = waterfall;

@@ -1,0 +1,180 @@
+//! Which form of forward dynamics a robot gets: the one with fewer operations, unless it loses digits that the other keeps.
+//!
+//! Articulated bodies and the factorisation of H solve the same equations, but H of a stretched or long chain is
+//! ill-conditioned while the recursion is not: Ascher, Pai and Cloutier (1997) call it formulation stiffness. The condition
+//! number says little (light wrists have a large one and lose nothing), so both programs are run, in the scalar that they
+//! are generated for, against the same equations in double-double. Sines and all arithmetic are the same bits everywhere,
+//! so the choice is, too.
+
+use crate::emit::Scalar;
+use crate::expr::{evaluate, Graph};
+use crate::function::ForwardDynamicsMethod;
+use std::fmt;
+use straightline_core::model::{JointKind, Model};
+use straightline_core::{Dd, Real};
+
+/// The factorisation may lose so many times what articulated bodies lose: about half a decimal digit, which is how far two
+/// samples of the same quality come apart.
+pub const TOLERATED: f64 = 3.0;
+/// Beyond so many velocity coordinates the factorisation is not tried: it takes about n³/6 products more on one branch.
+pub const MOST_FOR_FACTORISATION: usize = 40;
+
+/// States of each kind: anywhere in the limits, nearly stretched, near right angles.
+const STATES: usize = 6;
+/// How near \[rad or m\].
+const NEAR: f64 = 0.02;
+/// A joint without limits is tried within ± so much.
+const RANGE: f64 = std::f64::consts::PI;
+
+/// A form of forward dynamics in figures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+pub struct Figures {
+    /// Instructions when every a·b ± c is one.
+    pub fma: usize,
+    /// The worst error of the states that were tried, over the greatest acceleration of the state; `None`: not tried, as the robot
+    /// has run-time parameters or too many joints.
+    pub error: Option<f64>,
+}
+
+/// What was chosen, and why.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+pub struct MethodChoice {
+    /// Whether articulated bodies were chosen.
+    pub articulated_bodies: bool,
+    /// The articulated bodies.
+    pub articulated: Figures,
+    /// The factorisation of H; `None`: too large to be tried.
+    pub factorisation: Option<Figures>,
+}
+
+impl MethodChoice {
+    /// The method.
+    pub fn method(&self) -> ForwardDynamicsMethod {
+        match self.articulated_bodies {
+            true => ForwardDynamicsMethod::ArticulatedBody,
+            false => ForwardDynamicsMethod::Factorisation,
+        }
+    }
+}
+
+impl fmt::Display for MethodChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (chosen, other) = match self.articulated_bodies {
+            true => ("articulated bodies", "the factorisation of H"),
+            false => ("the factorisation of H", "articulated bodies"),
+        };
+        let Some(factorisation) = self.factorisation else {
+            return write!(f, "By {chosen}: {other} is not tried on so many joints.");
+        };
+        let (mine, others) = match self.articulated_bodies {
+            true => (self.articulated, factorisation),
+            false => (factorisation, self.articulated),
+        };
+        write!(f, "By {chosen}: as traced {} instructions with fused multiply-add, by {other} {}", mine.fma, others.fma)?;
+        match (mine.error, others.error) {
+            (Some(a), Some(b)) => {
+                write!(f, "; worst relative error of {} states {a:.1e}, by {other} {b:.1e}.", 3 * STATES)
+            }
+            _ => write!(f, "."),
+        }
+    }
+}
+
+/// Chooses between two programs of the same function; with the factorisation only where there is one.
+pub fn choose(model: &Model<Dd>, scalar: Scalar, articulated: &Graph, factorised: Option<&Graph>) -> MethodChoice {
+    let figures = |graph: &Graph, error| Figures { fma: graph.counts().fma, error };
+    let Some(factorised) = factorised else {
+        return MethodChoice { articulated_bodies: true, articulated: figures(articulated, None), factorisation: None };
+    };
+    let cheaper = factorised.counts().fma < articulated.counts().fma;
+    let errors = errors(model, scalar, articulated, factorised);
+    let keeps_digits = errors.is_none_or(|[a, f]| f <= TOLERATED * a);
+    MethodChoice {
+        articulated_bodies: !(cheaper && keeps_digits),
+        articulated: figures(articulated, errors.map(|e| e[0])),
+        factorisation: Some(figures(factorised, errors.map(|e| e[1]))),
+    }
+}
+
+/// The worst errors of both programs; `None` where a run-time parameter is an input: there is no one robot to try.
+fn errors(model: &Model<Dd>, scalar: Scalar, articulated: &Graph, factorised: &Graph) -> Option<[f64; 2]> {
+    if articulated.inputs.iter().chain(&factorised.inputs).any(|port| port.wrapper.is_some()) {
+        return None;
+    }
+    Some(match scalar {
+        Scalar::F64 => errors_in::<f64>(model, articulated, factorised),
+        Scalar::F32 => errors_in::<f32>(model, articulated, factorised),
+    })
+}
+
+fn errors_in<T: Real + Into<f64>>(model: &Model<Dd>, articulated: &Graph, factorised: &Graph) -> [f64; 2] {
+    let mut worst = [0.0f64; 2];
+    let mut random = Uniform(0x9e37_79b9_7f4a_7c15);
+    for state in 0..3 * STATES {
+        // both were traced with the same ports
+        let inputs = &articulated.inputs;
+        let inputs: Vec<f64> =
+            inputs.iter().flat_map(|p| values(model, &p.name, p.len(), state % 3, &mut random)).collect();
+        let rounded: Vec<T> = inputs.into_iter().map(|x| T::constant(Dd::from(x))).collect();
+        let wide: Vec<Dd> = rounded.iter().map(|x| Dd::from((*x).into())).collect();
+        for (graph, worst) in [articulated, factorised].into_iter().zip(&mut worst) {
+            let exact = evaluate(graph, &wide);
+            let scale = exact.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
+            for (x, truth) in evaluate(graph, &rounded).into_iter().zip(exact) {
+                let error = (Dd::from(x.into()) - truth).to_f64().abs() / scale;
+                // what is no number, is as wrong as can be
+                *worst = if error.is_finite() { worst.max(error) } else { f64::INFINITY };
+            }
+        }
+    }
+    worst
+}
+
+/// Values of an input port; `kind` 0: anywhere, 1: nearly stretched, 2: near right angles.
+fn values(model: &Model<Dd>, port: &str, len: usize, kind: usize, random: &mut Uniform) -> Vec<f64> {
+    match port {
+        "q" if len == model.nq() => {
+            let mut q = vec![0.0; len];
+            for joint in model.bodies.iter().map(|b| &b.joint) {
+                if joint.kind == JointKind::Floating {
+                    let quaternion: Vec<f64> = (0..4).map(|_| random.within(1.0)).collect();
+                    let norm = quaternion.iter().map(|x| x * x).sum::<f64>();
+                    let norm = straightline_core::trig::sqrt_f64(norm);
+                    (0..3).for_each(|k| q[joint.iq + k] = random.within(1.0));
+                    (0..4).for_each(|k| q[joint.iq + 3 + k] = quaternion[k] / norm);
+                    continue;
+                }
+                let or = |limit: f64, other: f64| if limit.is_finite() { limit } else { other };
+                let (lower, upper) = (or(joint.limits.lower, -RANGE), or(joint.limits.upper, RANGE));
+                let anywhere = lower + (upper - lower) * (0.5 + random.within(0.5));
+                let quarter = std::f64::consts::FRAC_PI_2;
+                let near = random.within(NEAR);
+                q[joint.iq] = match kind {
+                    0 => anywhere,
+                    1 => near,
+                    _ => (anywhere / quarter).round() * quarter + near,
+                }
+                .clamp(lower.min(upper), upper.max(lower));
+            }
+            q
+        }
+        "gravity" => vec![0.3, -0.2, -9.81],
+        "qd" => (0..len).map(|_| random.within(1.0)).collect(),
+        // drives of the size of the weights
+        _ => (0..len).map(|_| random.within(10.0)).collect(),
+    }
+}
+
+/// Numbers that are the same everywhere (SplitMix64).
+struct Uniform(u64);
+
+impl Uniform {
+    fn within(&mut self, size: f64) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        size * (((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0)
+    }
+}

@@ -1,0 +1,122 @@
+//! What the compiler demands of a robot before it writes its forward dynamics, and which method it writes.
+
+use straightline_codegen::forward_method::{MethodChoice, TOLERATED};
+use straightline_codegen::model::{load, ModelOptions};
+use straightline_codegen::singular::singular_joints;
+use straightline_codegen::{compile, Function, Options, Scalar, Source};
+
+/// A chain of revolute joints in TOML: per link its joint's origin, its axis and its inertial lines.
+fn chain(links: &[([f64; 3], [f64; 3], &str)]) -> Source {
+    let mut text = String::from("[robot]\nname = \"chain\"\n[[link]]\nname = \"base\"\n");
+    for (i, (xyz, axis, inertial)) in links.iter().enumerate() {
+        let parent = if i == 0 { "base".to_string() } else { format!("link{i}") };
+        let child = i + 1;
+        text += &format!(
+            "[[link]]\nname = \"link{child}\"\n{inertial}\n[[joint]]\nname = \"joint{child}\"\nkind = \"continuous\"\n\
+             parent = \"{parent}\"\nchild = \"link{child}\"\norigin = {{ xyz = {xyz:?} }}\naxis = {axis:?}\n"
+        );
+    }
+    Source::new("chain.toml", text)
+}
+
+const BODY: &str = "mass = 1.0\ncom = [0.1, 0.02, -0.03]\ninertia = [0.02, 0.03, 0.025]";
+const MASSLESS: &str = "";
+const POINT_ON_AXIS: &str = "mass = 1.0\ncom = [0.0, 0.0, 0.3]\ninertia = [0.0, 0.0, 0.0]";
+const X: [f64; 3] = [1.0, 0.0, 0.0];
+const Y: [f64; 3] = [0.0, 1.0, 0.0];
+const Z: [f64; 3] = [0.0, 0.0, 1.0];
+const OFF: [f64; 3] = [0.3, 0.1, 0.0];
+const HERE: [f64; 3] = [0.0, 0.0, 0.0];
+
+/// The joints that cannot have forward dynamics, by name.
+fn singular(source: &Source) -> Vec<String> {
+    let (model, diagnostics) = load(source, &ModelOptions::default());
+    let model = model.unwrap_or_else(|| panic!("{diagnostics}"));
+    singular_joints(&model).into_iter().map(|b| model.bodies[b].joint.name.clone()).collect()
+}
+
+#[test]
+fn joints_that_feel_no_inertia_are_found() {
+    assert_eq!(singular(&chain(&[(OFF, Z, BODY), (OFF, Y, BODY)])), [""; 0]);
+    // nothing at the tip
+    assert_eq!(singular(&chain(&[(OFF, Z, BODY), (OFF, Y, MASSLESS)])), ["joint2"]);
+    // a point mass on the axis
+    assert_eq!(singular(&chain(&[(OFF, Y, BODY), (OFF, Z, POINT_ON_AXIS)])), ["joint2"]);
+    // a massless link in the middle is no fault where the next joint is elsewhere ...
+    assert_eq!(singular(&chain(&[(OFF, Z, BODY), (OFF, Y, MASSLESS), (OFF, Y, BODY)])), [""; 0]);
+    // ... and one where both turn about one axis
+    assert_eq!(singular(&chain(&[(OFF, Z, BODY), (OFF, Y, MASSLESS), (HERE, Y, BODY)])), ["joint2"]);
+    // a wrist of three axes about a point mass: whatever turns, it stays
+    let in_the_centre = "mass = 1.0\ncom = [0.0, 0.0, 0.0]\ninertia = [0.0, 0.0, 0.0]";
+    let wrist = [(OFF, Z, BODY), (OFF, X, MASSLESS), (HERE, Y, MASSLESS), (HERE, Z, in_the_centre)];
+    assert_eq!(singular(&chain(&wrist)), ["joint2", "joint3", "joint4"]);
+}
+
+#[test]
+fn tips_a_million_million_times_lighter_are_no_fault() {
+    let light = "mass = 1e-12\ncom = [0.1, 0.02, -0.03]\ninertia = [0.02e-12, 0.03e-12, 0.025e-12]";
+    assert_eq!(singular(&chain(&[(OFF, Z, BODY), (OFF, Y, light)])), [""; 0]);
+    assert_eq!(singular(&chain(&[(OFF, Z, light), (OFF, Y, BODY)])), [""; 0]);
+}
+
+#[test]
+fn forward_dynamics_of_a_joint_without_inertia_is_an_error_with_place_and_remedy() {
+    let source = chain(&[(OFF, Z, BODY), (OFF, Y, MASSLESS)]);
+    let errors = compile(&source, &Options::default()).expect_err("nothing resists the second joint");
+    let error = errors.iter().find(|d| d.code == "no-forward-dynamics").unwrap_or_else(|| panic!("{errors}"));
+    let line = error.place.as_ref().expect("a place").line;
+    let joint2 = source.text().lines().position(|l| l == "name = \"joint2\"").expect("it is there") + 1;
+    assert_eq!(line, joint2, "{errors}");
+    assert!(error.help.contains("rotor") && error.help.contains("forward_dynamics"), "{errors}");
+    // either remedy will do
+    let functions: Vec<Function> = Function::all().filter(|f| *f != Function::ForwardDynamics).collect();
+    assert!(compile(&source, &Options { functions, ..Options::default() }).is_ok());
+    let with_rotor = Source::new("chain.toml", format!("{}armature = 1e-4\n", source.text()));
+    assert!(compile(&with_rotor, &Options::default()).is_ok());
+}
+
+/// n rods in a plane: what stretches is ill-conditioned.
+fn planar(n: usize) -> Source {
+    let rod = "mass = 1.0\ncom = [0.25, 0.0, 0.0]\ninertia = [0.0009765625, 0.021, 0.021]";
+    chain(&vec![([0.5, 0.0, 0.0], Z, rod); n])
+}
+
+/// The method that a robot gets, and the text with its documentation.
+fn method(source: &Source, scalar: Scalar) -> (MethodChoice, String) {
+    let options = Options { functions: vec![Function::ForwardDynamics], scalar, ..Options::default() };
+    let generated = compile(source, &options).unwrap_or_else(|d| panic!("{d}"));
+    let method = generated.report.function(Function::ForwardDynamics).and_then(|f| f.method).expect("it was chosen");
+    (method, generated.text)
+}
+
+#[test]
+fn where_the_factorisation_would_lose_digits_articulated_bodies_are_chosen_and_it_is_said() {
+    for scalar in [Scalar::F32, Scalar::F64] {
+        let (method, text) = method(&planar(3), scalar);
+        let factorisation = method.factorisation.expect("three joints are few");
+        let errors = [method.articulated.error, factorisation.error].map(|e| e.expect("both were tried"));
+        assert!(factorisation.fma < method.articulated.fma, "it would be cheaper: {method}");
+        assert!(errors[1] > TOLERATED * errors[0], "and loses digits: {method}");
+        assert!(method.articulated_bodies, "{method}");
+        let said = format!("/// {method}");
+        assert!(text.contains(&said), "the function's documentation lacks: {said}\n{text}");
+    }
+}
+
+/// Ascher, Pai and Cloutier (1997): the error of the factorisation grows with the length of a stretched chain, that of
+/// articulated bodies hardly does.
+#[test]
+fn the_factorisation_of_a_stretched_chain_loses_a_digit_that_articulated_bodies_keep() {
+    let [short, long] = [3, 12].map(|n| method(&planar(n), Scalar::F64).0);
+    let articulated = [short, long].map(|m| m.articulated.error.expect("it was tried"));
+    let factorised = [short, long].map(|m| m.factorisation.and_then(|f| f.error).expect("it was tried"));
+    assert!(factorised[1] > 10.0 * factorised[0], "{short}\n{long}");
+    assert!(articulated[1] < 10.0 * articulated[0], "{short}\n{long}");
+}
+
+#[test]
+fn where_no_digits_are_lost_the_cheaper_method_is_chosen() {
+    let (method, _) = method(&chain(&[(OFF, Z, BODY), (OFF, Y, BODY), (OFF, X, BODY), (OFF, Z, BODY)]), Scalar::F64);
+    let factorisation = method.factorisation.expect("four joints are few");
+    assert!(factorisation.fma < method.articulated.fma && !method.articulated_bodies, "{method}");
+}
