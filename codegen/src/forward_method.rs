@@ -72,7 +72,11 @@ impl fmt::Display for MethodChoice {
             true => (self.articulated, factorisation),
             false => (factorisation, self.articulated),
         };
-        write!(f, "By {chosen}: as traced {} instructions with fused multiply-add, by {other} {}", mine.fma, others.fma)?;
+        write!(
+            f,
+            "By {chosen}: as traced {} instructions with fused multiply-add, by {other} {}",
+            mine.fma, others.fma
+        )?;
         match (mine.error, others.error) {
             (Some(a), Some(b)) => {
                 write!(f, "; worst relative error of {} states {a:.1e}, by {other} {b:.1e}.", 3 * STATES)

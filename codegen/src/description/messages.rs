@@ -460,7 +460,9 @@ pub fn zero_mass(link: &str) -> D {
 pub fn singular_joint(joint: &str, what: &str) -> D {
     D::warning("singular-joint", format!("joint `{joint}` moves no {what}"))
         .detail("the mass matrix is singular: there is no forward dynamics; inverse dynamics is not affected")
-        .help("give the links that it moves their mass and inertia or the joint a rotor inertia, or make the joint fixed")
+        .help(
+            "give the links that it moves their mass and inertia or the joint a rotor inertia, or make the joint fixed",
+        )
 }
 
 /// Forward dynamics of a robot with a joint that feels no inertia.

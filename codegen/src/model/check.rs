@@ -310,19 +310,17 @@ pub(super) fn angles(description: &Description, tolerance: f64, diagnostics: &mu
 
 /// Whether something moves.
 pub(super) fn motion(assembly: &Assembly, description: &Description, diagnostics: &mut Diagnostics) {
-    let bodies = &assembly.bodies;
-    if bodies.is_empty() {
-        if !diagnostics.has_errors() {
-            diagnostics.push(messages::nothing_moves(&description.name.value).at(&description.name.place));
-        }
-        return;
+    if assembly.bodies.is_empty() && !diagnostics.has_errors() {
+        diagnostics.push(messages::nothing_moves(&description.name.value).at(&description.name.place));
     }
 }
 
 /// Whether every joint feels some inertia.
 pub(super) fn singular(model: &Model<Dd>, joint_places: &[Place], diagnostics: &mut Diagnostics) {
     for id in singular_joints(model) {
-        diagnostics.push(messages::singular_joint(&model.bodies[id].joint.name, what_is_missing(model, id)).at(&joint_places[id]));
+        diagnostics.push(
+            messages::singular_joint(&model.bodies[id].joint.name, what_is_missing(model, id)).at(&joint_places[id]),
+        );
     }
 }
 
