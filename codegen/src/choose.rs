@@ -3,19 +3,21 @@
 //! Which description of a body is cheaper depends on what else needs the same products, so it is not decided by a rule
 //! but by counting the finished program. Bodies at the same depth of the tree (the thighs of a quadruped) choose alike.
 
-use crate::compile::{optimised, Optimisations, Options};
+use crate::compile::{candidate_counts, Optimisations, Options};
+use crate::expr::Counts;
 use crate::function::{Function, Robot};
 use crate::reduce::{lengths, reduce, Choice};
 use crate::scene::Gravity;
+use rustc_hash::{FxHashSet, FxHasher};
+use std::hash::{Hash, Hasher};
 use std::sync::{Arc, Mutex, PoisonError};
-use straightline_core::model::BodyId;
+use straightline_core::reduced::ReducedModel;
+use straightline_core::Dd;
 
-/// Beyond so many velocity coordinates nothing is tried: on a chain of 20 joints it takes seconds.
-const LARGE: usize = 18;
+/// After so many operations in all programs that were counted a search ends with the best so far: some tenths of a second.
+const ENOUGH: usize = 300_000;
 /// Units of length that are tried, the most frequent ones.
 const UNITS: usize = 4;
-/// Rounds over all choices; a round without gain is the last.
-const ROUNDS: usize = 2;
 
 /// What was found for a robot, by function and scene: searched once, used by every function that shares it.
 #[derive(Clone, Debug, Default)]
@@ -69,26 +71,70 @@ pub fn choose(
             let pairs =
                 [(&torques, &mass_matrix), (&torques, &torques), (&mass_matrix, &mass_matrix), (&plain, &plain)];
             let robots = pairs.map(|(t, h)| robot.reduced_by(t, h));
-            let cost = |r: &Robot| cost(r, frames, function, options, optimisations);
+            let cost = |r: &Robot| price(candidate_counts(r, frames, function, options, optimisations).0);
             robots.into_iter().min_by_key(cost).expect("there are four pairs")
         }
         _ => robot.clone(),
     }
 }
 
-/// Instructions with fused multiply-add, then operations.
-fn cost(
-    robot: &Robot,
-    frames: &[String],
-    function: Function,
-    options: &Options,
-    optimisations: Optimisations,
-) -> (usize, usize) {
-    let counts = optimised(robot, frames, function, options, optimisations).counts();
+/// What is least: instructions with fused multiply-add, then operations.
+type Price = (usize, usize);
+
+fn price(counts: Counts) -> Price {
     (counts.fma, counts.flops())
 }
 
-/// Greedy: every choice at every depth, kept where it saves.
+/// A search for one function: the best choice so far, and what was tried.
+struct Search<'a> {
+    /// Its reduced forms are those that were tried last.
+    robot: Robot,
+    frames: &'a [String],
+    function: Function,
+    options: &'a Options,
+    optimisations: Optimisations,
+    best: Choice,
+    least: Price,
+    /// Hashes of the reduced robots that were tried: many a choice changes nothing for this robot, or leads back.
+    tried: FxHashSet<u64>,
+    /// Operations that were counted.
+    work: usize,
+}
+
+impl Search<'_> {
+    /// Takes the choice if it saves.
+    fn attempt(&mut self, choice: Choice) {
+        let reduced = reduce(&self.robot.model, &choice).0;
+        if !self.tried.insert(fingerprint(&reduced)) {
+            return;
+        }
+        self.robot.composite.clone_from(&reduced);
+        self.robot.reduced = reduced;
+        let (counts, work) =
+            candidate_counts(&self.robot, self.frames, self.function, self.options, self.optimisations);
+        self.work += work;
+        let price = price(counts);
+        if price < self.least {
+            (self.best, self.least) = (choice, price);
+        }
+    }
+}
+
+/// A hash of all numbers and switches.
+fn fingerprint(reduced: &ReducedModel<Dd>) -> u64 {
+    let mut hasher = FxHasher::default();
+    for body in &reduced.bodies {
+        let switches = [body.stays, body.by_axis_acceleration, body.doubled[0], body.doubled[1]];
+        switches.hash(&mut hasher);
+    }
+    let _ = reduced.map(|x| {
+        (x.hi().to_bits(), x.lo().to_bits()).hash(&mut hasher);
+        x
+    });
+    hasher.finish()
+}
+
+/// Greedy: every choice at every depth, kept where it saves, until none does or enough was tried.
 fn improved(
     robot: &Robot,
     frames: &[String],
@@ -97,15 +143,22 @@ fn improved(
     optimisations: Optimisations,
 ) -> Choice {
     let (reduced, bodies) = (&robot.reduced, &robot.reduced.bodies);
-    let mut best = Choice::plain(&robot.model);
-    for i in 0..bodies.len() {
-        best.stays[i] = reduced.may_stay(i);
-    }
-    if robot.model.nv() > LARGE {
-        return best;
-    }
-    let price = |choice: &Choice| cost(&robot.reduced_by(choice, choice), frames, function, options, optimisations);
-    let mut least = price(&best);
+    let plain = Choice::plain(&robot.model);
+    let stays = (0..bodies.len()).map(|i| reduced.may_stay(i)).collect();
+    let first = Choice { stays, ..plain.clone() };
+    let mut search = Search {
+        robot: robot.clone(),
+        frames,
+        function,
+        options,
+        optimisations,
+        best: first.clone(),
+        least: (usize::MAX, usize::MAX),
+        tried: FxHashSet::default(),
+        work: 0,
+    };
+    search.attempt(first);
+    search.attempt(plain);
     let mut depth = vec![0; bodies.len()];
     for (i, body) in bodies.iter().enumerate() {
         depth[i] = body.parent.map_or(0, |p| depth[p] + 1);
@@ -126,33 +179,23 @@ fn improved(
     ];
     let of_motion: [Flags; 3] = [|c| &mut c.by_axis_acceleration, |c| &mut c.doubled[0], |c| &mut c.doubled[1]];
     let of_motion: &[Flags] = if function == Function::MassMatrix { &[] } else { &of_motion };
-    for _ in 0..ROUNDS {
-        let before = least;
-        let mut attempt = |choice: Choice| {
-            // many a choice changes nothing for this robot
-            if reduce(&robot.model, &choice).0 != reduce(&robot.model, &best).0 {
-                let price = price(&choice);
-                if price < least {
-                    (best, least) = (choice, price);
-                }
-            }
-            best.clone()
-        };
-        let mut current = attempt(Choice { ..Choice::plain(&robot.model) });
+    loop {
+        let before = search.least;
         for d in (0..=deepest).rev() {
-            let here: Vec<BodyId> = (0..bodies.len()).filter(|i| depth[*i] == d).collect();
             for flag in of_frames_and_parameters.iter().chain(of_motion) {
-                let mut turned = current.clone();
-                here.iter().for_each(|i| flag(&mut turned)[*i] ^= true);
-                current = attempt(turned);
+                let mut turned = search.best.clone();
+                (0..bodies.len()).filter(|i| depth[*i] == d).for_each(|i| flag(&mut turned)[i] ^= true);
+                search.attempt(turned);
+            }
+            if search.work > ENOUGH {
+                return search.best;
             }
         }
         for unit in &units {
-            current = attempt(Choice { unit: *unit, ..current });
+            search.attempt(Choice { unit: *unit, ..search.best.clone() });
         }
-        if least == before {
-            break;
+        if search.least == before {
+            return search.best;
         }
     }
-    best
 }

@@ -4,11 +4,11 @@ use crate::choose::choose;
 use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
 use crate::emit::{self, Item, Provenance, Scalar};
-use crate::expr::{verify, Folding, Grade, Graph, Port, RuleSet, Section};
+use crate::expr::{verify, Counts, Folding, Grade, Graph, Port, RuleSet, Section};
 use crate::forward_method::MethodChoice;
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model;
-use crate::pass::{dead_code, sums, unread_inputs};
+use crate::pass::{count_sums, dead_code, sums, unread_inputs};
 use crate::report::budget::{self, Measures};
 use crate::report::waterfall::{self, Waterfall};
 use crate::report::{FunctionReport, Report};
@@ -163,22 +163,46 @@ fn optimised_with(
         verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
         graph
     };
-    let method = match options.forward_dynamics {
-        ForwardDynamicsMethod::Cheaper if !optimisations.cheaper => ForwardDynamicsMethod::ArticulatedBody,
-        method => method,
-    };
-    let rules = optimisations.rules(options.scalar);
     let chosen = (optimisations.chosen && optimisations.reduced)
         .then(|| choose(robot, frames, function, options, Optimisations { chosen: false, ..optimisations }));
     let robot = chosen.as_ref().unwrap_or(robot);
-    let (traced, choice) =
-        function.trace(robot, frames, method, rules, options.scalar, optimisations.reduced, &options.scene);
+    let (traced, choice) = traced(robot, frames, function, options, optimisations);
     let graph = check(unread_inputs(check(dead_code(&check(traced))), is_optional));
     let graph = match optimisations.sums {
         true => check(dead_code(&check(sums(&graph)))),
         false => graph,
     };
     (graph, choice)
+}
+
+/// The equations of one function, by these optimisations of the form of the robot and of the rules.
+fn traced(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+    optimisations: Optimisations,
+) -> (Graph, Option<MethodChoice>) {
+    let method = match options.forward_dynamics {
+        ForwardDynamicsMethod::Cheaper if !optimisations.cheaper => ForwardDynamicsMethod::ArticulatedBody,
+        method => method,
+    };
+    let rules = optimisations.rules(options.scalar);
+    function.trace(robot, frames, method, rules, options.scalar, optimisations.reduced, &options.scene)
+}
+
+/// What [`optimised`] would take for a robot in the reduced forms that it is in, and how many operations it took to know
+/// that: without writing the graph, for a search over many forms.
+pub(crate) fn candidate_counts(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+    optimisations: Optimisations,
+) -> (Counts, usize) {
+    let (graph, _) = traced(robot, frames, function, options, optimisations);
+    let counts = if optimisations.sums { count_sums(&graph) } else { graph.counts() };
+    (counts, graph.ops.len())
 }
 
 /// What the compiler makes of a robot file.

@@ -5,5 +5,5 @@ mod sums;
 mod unread_inputs;
 
 pub use dead_code::dead_code;
-pub use sums::sums;
+pub use sums::{count_sums, sums};
 pub use unread_inputs::unread_inputs;

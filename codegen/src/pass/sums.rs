@@ -11,10 +11,12 @@
 //! Before: any graph that [`verify`](crate::expr::verify()) accepts. After: the same results over the reals, no operation
 //! more. Names and sections go with the values that survive.
 
-use crate::expr::{Builder, Constant, Graph, NodeId, Note, Op, RuleSet};
-use rustc_hash::FxHashMap;
+use crate::expr::{Builder, Constant, Counts, Graph, NodeId, Note, Op, RuleSet};
+use rustc_hash::{FxHashMap, FxHasher};
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::hash_map::Entry;
+use std::collections::BTreeSet;
+use std::hash::{Hash, Hasher};
 use straightline_core::Dd;
 
 /// More rounds have not been seen to help; this only bounds the time.
@@ -23,30 +25,37 @@ const ROUNDS: usize = 6;
 /// The graph with its sums taken apart and put together again.
 pub fn sums(graph: &Graph) -> Graph {
     let mut table = Table::read(graph);
-    for _ in 0..ROUNDS {
-        let before = table.clone();
-        table.flatten();
-        table.double();
-        table.factor();
-        table.flatten();
-        table.share();
-        if table.values == before.values {
-            break;
-        }
-    }
+    table.simplify();
     table.write(graph)
+}
+
+/// What [`sums`] would take: the same counts, without writing the graph. Only what it can change is counted: products and
+/// sums, and pairs of sine and cosine.
+pub fn count_sums(graph: &Graph) -> Counts {
+    let mut table = Table::read(graph);
+    table.simplify();
+    table.counts()
 }
 
 /// A value with a sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-struct Term {
-    value: usize,
-    negative: bool,
-}
+struct Term(u32);
 
 impl Term {
+    fn new(value: usize, negative: bool) -> Term {
+        Term((value as u32) << 1 | u32::from(negative))
+    }
+
+    fn value(self) -> usize {
+        (self.0 >> 1) as usize
+    }
+
+    fn is_negative(self) -> bool {
+        self.0 & 1 == 1
+    }
+
     fn signed(self, negative: bool) -> Term {
-        Term { value: self.value, negative: self.negative != negative }
+        Term(self.0 ^ u32::from(negative))
     }
 }
 
@@ -59,7 +68,7 @@ enum Value {
     /// The same as that one.
     Same(Term),
     /// Anything else: the operation, and its operands with their signs.
-    Other(Op, Vec<Term>),
+    Other(Op, [Term; 2]),
 }
 
 /// A graph as sums of many terms.
@@ -72,19 +81,22 @@ struct Table {
     /// For look-ups only.
     products: FxHashMap<(usize, usize), usize>,
     constants: FxHashMap<Constant, usize>,
+    /// Whether anything is not as it was.
+    changed: bool,
 }
 
 impl Table {
     fn read(graph: &Graph) -> Table {
         let mut table = Table {
-            values: Vec::new(),
+            values: Vec::with_capacity(graph.ops.len()),
             results: Vec::new(),
-            origin: Vec::new(),
+            origin: Vec::with_capacity(graph.ops.len()),
             products: FxHashMap::default(),
             constants: FxHashMap::default(),
+            changed: false,
         };
         let live = graph.live();
-        let mut term_of = vec![Term { value: usize::MAX, negative: false }; graph.ops.len()];
+        let mut term_of = vec![Term(u32::MAX); graph.ops.len()];
         for id in graph.ids().filter(|id| live[id.index()]) {
             let t = |a: NodeId| term_of[a.index()];
             let term = match graph.op(id) {
@@ -93,7 +105,11 @@ impl Table {
                 Op::Mul(a, b) => table.product(t(a), t(b), Some(id)),
                 Op::Add(a, b) => table.push(Value::Sum(vec![t(a), t(b)]), Some(id)),
                 Op::Sub(a, b) => table.push(Value::Sum(vec![t(a), t(b).signed(true)]), Some(id)),
-                op => table.push(Value::Other(op, op.operands().map(t).collect()), Some(id)),
+                op => {
+                    let mut operands = [Term(0); 2];
+                    op.operands().zip(&mut operands).for_each(|(a, place)| *place = t(a));
+                    table.push(Value::Other(op, operands), Some(id))
+                }
             };
             term_of[id.index()] = term;
         }
@@ -101,10 +117,27 @@ impl Table {
         table
     }
 
+    /// The steps, in rounds until none helps.
+    fn simplify(&mut self) {
+        for round in 0..ROUNDS {
+            self.changed = false;
+            self.flatten();
+            self.double();
+            if self.factor() {
+                self.flatten();
+            }
+            // what is as it was has been shared
+            if round > 0 && !self.changed {
+                break;
+            }
+            self.share();
+        }
+    }
+
     fn push(&mut self, value: Value, origin: Option<NodeId>) -> Term {
         self.values.push(value);
         self.origin.push(origin);
-        Term { value: self.values.len() - 1, negative: false }
+        Term::new(self.values.len() - 1, false)
     }
 
     fn constant(&mut self, c: Dd) -> Term {
@@ -112,120 +145,111 @@ impl Table {
         let key = Constant::new(if negative { -c } else { c });
         let value = match self.constants.get(&key) {
             Some(v) => *v,
-            None => self.push(Value::Constant(key), None).value,
+            None => self.push(Value::Constant(key), None).value(),
         };
         self.constants.insert(key, value);
-        Term { value, negative }
+        Term::new(value, negative)
     }
 
     fn product(&mut self, a: Term, b: Term, origin: Option<NodeId>) -> Term {
         let (a, b) = (self.resolved(a), self.resolved(b));
-        let key = (a.value.min(b.value), a.value.max(b.value));
+        let key = (a.value().min(b.value()), a.value().max(b.value()));
         let value = match self.products.get(&key) {
             Some(v) => *v,
-            None => self.push(Value::Product(key.0, key.1), origin).value,
+            None => self.push(Value::Product(key.0, key.1), origin).value(),
         };
         self.products.insert(key, value);
-        Term { value, negative: a.negative != b.negative }
+        Term::new(value, a.is_negative() != b.is_negative())
     }
 
     fn resolved(&self, mut term: Term) -> Term {
-        while let Value::Same(t) = self.values[term.value] {
-            term = t.signed(term.negative);
+        while let Value::Same(t) = self.values[term.value()] {
+            term = t.signed(term.is_negative());
         }
         term
     }
 
-    fn operands(&self, value: usize) -> Vec<Term> {
-        let plain = |value: usize| Term { value, negative: false };
-        let operands = match &self.values[value] {
-            Value::Constant(_) => vec![],
-            Value::Product(a, b) => vec![plain(*a), plain(*b)],
-            Value::Sum(terms) => terms.clone(),
-            Value::Same(t) => vec![*t],
-            Value::Other(_, operands) => operands.clone(),
+    /// Operand `k` of a value.
+    fn operand(&self, value: usize, k: usize) -> Option<Term> {
+        let term = match &self.values[value] {
+            Value::Constant(_) => None,
+            Value::Product(a, b) => [*a, *b].get(k).map(|v| Term::new(*v, false)),
+            Value::Sum(terms) => terms.get(k).copied(),
+            Value::Same(t) => (k == 0).then_some(*t),
+            Value::Other(op, operands) => operands[..op.operands().count()].get(k).copied(),
         };
-        operands.into_iter().map(|t| self.resolved(t)).collect()
+        term.map(|t| self.resolved(t))
+    }
+
+    /// Both factors of a product.
+    fn factors(&self, product: usize) -> [Term; 2] {
+        [0, 1].map(|k| self.operand(product, k).expect("a product has two factors"))
+    }
+
+    /// The terms of a sum.
+    fn terms(&self, sum: usize) -> Vec<Term> {
+        (0..).map_while(|k| self.operand(sum, k)).collect()
+    }
+
+    fn is_product(&self, t: Term) -> bool {
+        matches!(self.values[t.value()], Value::Product(..))
     }
 
     /// How often each value is used by what the results need, and those values, operands before users.
     fn uses(&self) -> (Vec<u32>, Vec<usize>) {
         let mut uses = vec![0; self.values.len()];
-        let mut order = Vec::new();
-        // (value, whether its operands are done)
-        let mut stack: Vec<(usize, bool)> = Vec::new();
+        let mut order = Vec::with_capacity(self.values.len());
+        // a value, and which of its operands is next
+        let mut stack: Vec<(usize, usize)> = Vec::new();
         for r in &self.results {
-            let r = self.resolved(*r).value;
-            uses[r] += 1;
-            if uses[r] == 1 {
-                stack.push((r, false));
-            }
-            while let Some((value, done)) = stack.pop() {
-                if done {
-                    order.push(value);
-                    continue;
-                }
-                stack.push((value, true));
-                for t in self.operands(value) {
-                    uses[t.value] += 1;
-                    if uses[t.value] == 1 {
-                        stack.push((t.value, false));
+            let mut next = Some(self.resolved(*r));
+            loop {
+                if let Some(t) = next {
+                    uses[t.value()] += 1;
+                    if uses[t.value()] == 1 {
+                        stack.push((t.value(), 0));
                     }
                 }
-            }
-        }
-        (uses, self.sorted(order))
-    }
-
-    /// Operands before users: a value first met by one user may be wanted by an earlier one.
-    fn sorted(&self, values: Vec<usize>) -> Vec<usize> {
-        let mut done = vec![false; self.values.len()];
-        let mut order = Vec::with_capacity(values.len());
-        for value in values {
-            let mut stack = vec![(value, false)];
-            while let Some((v, ready)) = stack.pop() {
-                if done[v] {
-                    continue;
-                }
-                if ready {
-                    done[v] = true;
-                    order.push(v);
-                } else {
-                    stack.push((v, true));
-                    stack.extend(self.operands(v).into_iter().filter(|t| !done[t.value]).map(|t| (t.value, false)));
+                let Some((value, k)) = stack.last_mut() else { break };
+                next = self.operand(*value, *k);
+                *k += 1;
+                if next.is_none() {
+                    order.push(*value);
+                    stack.pop();
                 }
             }
         }
-        order
+        (uses, order)
     }
 
     /// Sums without another user dissolve in the sum that uses them; constants of a sum become one, opposites go.
     fn flatten(&mut self) {
         let (uses, order) = self.uses();
+        let mut flat: Vec<Term> = Vec::new();
         for v in order {
             let Value::Sum(terms) = &self.values[v] else { continue };
-            let mut flat: Vec<Term> = Vec::new();
+            flat.clear();
             for t in terms.iter().map(|t| self.resolved(*t)) {
-                match &self.values[t.value] {
+                match &self.values[t.value()] {
                     // already flat itself: it stands before its user
-                    Value::Sum(inner) if uses[t.value] == 1 => {
-                        flat.extend(inner.iter().map(|u| self.resolved(*u).signed(t.negative)));
+                    Value::Sum(inner) if uses[t.value()] == 1 => {
+                        flat.extend(inner.iter().map(|u| self.resolved(*u).signed(t.is_negative())));
                     }
                     _ => flat.push(t),
                 }
             }
-            self.set_sum(v, flat);
+            self.set_sum(v, &flat);
         }
         self.unite();
     }
 
     /// Makes `v` the sum of these terms.
-    fn set_sum(&mut self, v: usize, terms: Vec<Term>) {
+    fn set_sum(&mut self, v: usize, terms: &[Term]) {
         let mut constant = Dd::ZERO;
-        let mut kept: Vec<Term> = Vec::new();
-        for t in terms {
-            if let Value::Constant(c) = self.values[t.value] {
-                constant = if t.negative { constant - c.value() } else { constant + c.value() };
+        let mut kept: Vec<Term> = Vec::with_capacity(terms.len());
+        for t in terms.iter().copied() {
+            if let Value::Constant(c) = self.values[t.value()] {
+                constant = if t.is_negative() { constant - c.value() } else { constant + c.value() };
             } else if let Some(opposite) = kept.iter().position(|u| *u == t.signed(true)) {
                 kept.remove(opposite);
             } else {
@@ -236,44 +260,64 @@ impl Table {
             let c = self.constant(constant);
             kept.push(c);
         }
-        self.values[v] = if kept.len() == 1 { Value::Same(kept[0]) } else { Value::Sum(kept) };
+        let value = if kept.len() == 1 { Value::Same(kept[0]) } else { Value::Sum(kept) };
+        self.set(v, value);
+    }
+
+    fn set(&mut self, v: usize, value: Value) {
+        if self.values[v] != value {
+            self.values[v] = value;
+            self.changed = true;
+        }
     }
 
     /// Equal products and equal sums become one: operands may have become equal.
     fn unite(&mut self) {
         let (_, order) = self.uses();
         self.products.clear();
-        let mut sums: FxHashMap<Vec<Term>, Term> = FxHashMap::default();
+        // sums by a hash of their terms; two that share one by chance stay apart
+        let mut sums: FxHashMap<u64, (usize, bool)> = FxHashMap::default();
+        let mut key: Vec<Term> = Vec::new();
+        let mut other: Vec<Term> = Vec::new();
         for v in order {
-            match self.values[v].clone() {
+            match &self.values[v] {
                 Value::Product(..) => {
-                    let operands = self.operands(v);
-                    let negative = operands[0].negative != operands[1].negative;
-                    let key = {
-                        let (a, b) = (operands[0].value, operands[1].value);
-                        (a.min(b), a.max(b))
-                    };
-                    match self.products.get(&key) {
-                        Some(&value) => self.values[v] = Value::Same(Term { value, negative }),
+                    let [a, b] = self.factors(v);
+                    let negative = a.is_negative() != b.is_negative();
+                    let (a, b) = (a.value().min(b.value()), a.value().max(b.value()));
+                    let value = match self.products.get(&(a, b)) {
+                        Some(&value) => Value::Same(Term::new(value, negative)),
                         None if negative => {
-                            let value = self.push(Value::Product(key.0, key.1), self.origin[v]).value;
-                            self.products.insert(key, value);
-                            self.values[v] = Value::Same(Term { value, negative });
+                            let value = self.push(Value::Product(a, b), self.origin[v]);
+                            self.products.insert((a, b), value.value());
+                            Value::Same(value.signed(true))
                         }
                         None => {
-                            self.values[v] = Value::Product(key.0, key.1);
-                            self.products.insert(key, v);
+                            self.products.insert((a, b), v);
+                            Value::Product(a, b)
                         }
-                    }
+                    };
+                    self.set(v, value);
                 }
                 Value::Sum(_) => {
-                    let operands = self.operands(v);
-                    let (key, negative) = canonical(&operands);
-                    match sums.get(&key) {
-                        Some(t) => self.values[v] = Value::Same(t.signed(negative)),
+                    let negative = self.canonical(v, &mut key);
+                    let mut hasher = FxHasher::default();
+                    key.hash(&mut hasher);
+                    let hash = hasher.finish();
+                    match sums.get(&hash) {
+                        Some(&(u, turned)) => {
+                            self.canonical(u, &mut other);
+                            if key == other {
+                                self.set(v, Value::Same(Term::new(u, turned != negative)));
+                            }
+                        }
                         None => {
-                            sums.insert(key, Term { value: v, negative });
-                            self.values[v] = Value::Sum(operands);
+                            sums.insert(hash, (v, negative));
+                            let Value::Sum(terms) = &self.values[v] else { unreachable!("seen above") };
+                            if terms.iter().any(|t| self.resolved(*t) != *t) {
+                                let terms = self.terms(v);
+                                self.set(v, Value::Sum(terms));
+                            }
                         }
                     }
                 }
@@ -282,84 +326,89 @@ impl Table {
         }
     }
 
+    /// The terms of a sum, sorted, the first positive; and whether all signs were turned for that.
+    fn canonical(&self, sum: usize, key: &mut Vec<Term>) -> bool {
+        key.clear();
+        key.extend((0..).map_while(|k| self.operand(sum, k)));
+        key.sort_unstable();
+        let negative = key[0].is_negative();
+        key.iter_mut().for_each(|t| *t = t.signed(negative));
+        negative
+    }
+
     /// a b + a b = a (b + b), where nothing else uses the product: then it fuses. Twice the factor that more values use,
     /// as it may be wanted doubled elsewhere.
     fn double(&mut self) {
         let (uses, order) = self.uses();
+        let used = |t: Term| uses.get(t.value()).copied().unwrap_or(0);
+        let mut doubled = false;
         for v in order {
             let Value::Sum(terms) = &self.values[v] else { continue };
-            let mut terms: Vec<Term> = terms.iter().map(|t| self.resolved(*t)).collect();
             let is_twice = |k: &usize| {
                 let t = terms[*k];
-                let product = matches!(self.values[t.value], Value::Product(..)) && uses.get(t.value) == Some(&2);
-                product && terms[*k + 1..].contains(&t)
+                used(t) == 2 && self.is_product(t) && terms[*k + 1..].contains(&t)
             };
             let Some(at) = (0..terms.len()).find(is_twice) else { continue };
             let twice = terms[at];
-            let operands = self.operands(twice.value);
-            let used = |t: &Term| uses.get(t.value).copied().unwrap_or(0);
-            let (once, doubled) = match used(&operands[0]) > used(&operands[1]) {
-                true => (operands[1], operands[0]),
-                false => (operands[0], operands[1]),
-            };
-            let sum = self.push(Value::Sum(vec![doubled, doubled]), None);
-            let product = self.push(Value::Product(once.value, sum.value), None);
-            terms.retain(|t| *t != twice);
-            terms.push(product.signed(twice.negative != once.negative));
-            self.set_sum(v, terms);
+            let mut terms: Vec<Term> = terms.iter().copied().filter(|t| *t != twice).collect();
+            let [a, b] = self.factors(twice.value());
+            let (once, twofold) = if used(a) > used(b) { (b, a) } else { (a, b) };
+            let sum = self.push(Value::Sum(vec![twofold, twofold]), None);
+            let product = self.push(Value::Product(once.value(), sum.value()), None);
+            terms.push(product.signed(twice.is_negative() != once.is_negative()));
+            self.set_sum(v, &terms);
+            doubled = true;
         }
-        self.unite();
+        if doubled {
+            self.unite();
+        }
     }
 
-    /// a b ± a c = a (b ± c), the factor of most terms first.
-    fn factor(&mut self) {
+    /// a b ± a c = a (b ± c), the factor of most terms first. Whether there was any.
+    fn factor(&mut self) -> bool {
+        // the factors of a sum's products, and at which terms
+        let mut members: Vec<(usize, usize)> = Vec::new();
+        let mut any = false;
         loop {
             let (uses, order) = self.uses();
-            let mut changed = false;
+            let mut factored = false;
             for v in order {
-                let Value::Sum(terms) = self.values[v].clone() else { continue };
-                let terms: Vec<Term> = terms.iter().map(|t| self.resolved(*t)).collect();
-                let mut members: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+                let Value::Sum(terms) = &self.values[v] else { continue };
+                members.clear();
                 for (k, t) in terms.iter().enumerate() {
-                    if let Value::Product(..) = self.values[t.value] {
-                        if uses.get(t.value) == Some(&1) {
-                            let operands = self.operands(t.value);
-                            members.entry(operands[0].value).or_default().push(k);
-                            if operands[1].value != operands[0].value {
-                                members.entry(operands[1].value).or_default().push(k);
-                            }
+                    if uses.get(t.value()) == Some(&1) && self.is_product(*t) {
+                        let [a, b] = self.factors(t.value());
+                        members.push((a.value(), k));
+                        if a.value() != b.value() {
+                            members.push((b.value(), k));
                         }
                     }
                 }
+                members.sort_unstable();
                 // the most terms; of those, the factor that was there first
-                let best = members.iter().filter(|(_, m)| m.len() > 1).max_by_key(|(f, m)| (m.len(), usize::MAX - *f));
-                let Some((&factor, members)) = best else { continue };
-                let members = members.clone();
-                let others: Vec<Term> = members
-                    .iter()
-                    .map(|k| {
-                        let operands = self.operands(terms[*k].value);
-                        let sign = terms[*k].negative;
-                        // operands of a product carry signs only through what they were replaced by
-                        let (first, second) = (operands[0], operands[1]);
-                        let other = if first.value == factor { second } else { first };
-                        let own = if first.value == factor { first } else { second };
-                        other.signed(sign != own.negative)
-                    })
-                    .collect();
-                let inner = self.push(Value::Sum(others.clone()), None);
-                self.set_sum(inner.value, others);
-                let product = self.push(Value::Product(factor, inner.value), None);
-                let mut rest: Vec<Term> =
-                    terms.iter().enumerate().filter(|(k, _)| !members.contains(k)).map(|(_, t)| *t).collect();
-                rest.push(product);
-                self.set_sum(v, rest);
-                changed = true;
+                let groups = members.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() > 1);
+                let Some(best) = groups.max_by_key(|group| (group.len(), Reverse(group[0].0))) else { continue };
+                let factor = best[0].0;
+                let other = |k: usize| {
+                    let [a, b] = self.factors(terms[k].value());
+                    // operands of a product carry signs only through what they were replaced by
+                    let (own, other) = if a.value() == factor { (a, b) } else { (b, a) };
+                    other.signed(terms[k].is_negative() != own.is_negative())
+                };
+                let others: Vec<Term> = best.iter().map(|(_, k)| other(*k)).collect();
+                let is_rest = |k: &usize| best.iter().all(|(_, member)| member != k);
+                let mut rest: Vec<Term> = (0..terms.len()).filter(is_rest).map(|k| terms[k]).collect();
+                let inner = self.push(Value::Sum(Vec::new()), None);
+                self.set_sum(inner.value(), &others);
+                rest.push(self.push(Value::Product(factor, inner.value()), None));
+                self.set_sum(v, &rest);
+                factored = true;
             }
+            if !factored {
+                return any;
+            }
+            any = true;
             self.unite();
-            if !changed {
-                return;
-            }
         }
     }
 
@@ -367,19 +416,21 @@ impl Table {
     fn share(&mut self) {
         let (_, order) = self.uses();
         let mut pairs = Pairs::default();
-        for v in order.into_iter().filter(|v| matches!(self.values[*v], Value::Sum(_))) {
-            pairs.insert(v, &self.operands(v));
+        for v in order {
+            if let Value::Sum(_) = self.values[v] {
+                pairs.insert(v, &self.terms(v));
+            }
         }
         while let Some((best, sums)) = pairs.most_frequent() {
             let (a, b, opposite) = best;
-            let (a, b) = (Term { value: a, negative: false }, Term { value: b, negative: opposite });
-            let exact = sums.iter().copied().find(|v| self.operands(*v).len() == 2);
+            let (a, b) = (Term::new(a, false), Term::new(b, opposite));
+            let exact = sums.iter().copied().find(|v| self.operand(*v, 2).is_none());
             let shared = match exact {
-                Some(v) => Term { value: v, negative: !self.operands(v).contains(&a) },
+                Some(v) => Term::new(v, !self.terms(v).contains(&a)),
                 None => self.push(Value::Sum(vec![a, b]), None),
             };
-            for v in sums.into_iter().filter(|v| *v != shared.value) {
-                let mut terms = self.operands(v);
+            for v in sums.into_iter().filter(|v| *v != shared.value()) {
+                let mut terms = self.terms(v);
                 pairs.remove(v, &terms);
                 for negative in [false, true] {
                     let (a, b) = (a.signed(negative), b.signed(negative));
@@ -394,16 +445,41 @@ impl Table {
                 }
                 if terms.len() == 1 {
                     // the very pair once more
-                    self.values[v] = Value::Same(terms[0]);
+                    self.set(v, Value::Same(terms[0]));
                 } else {
                     pairs.insert(v, &terms);
-                    self.values[v] = Value::Sum(terms);
+                    self.set(v, Value::Sum(terms));
                 }
             }
             if exact.is_none() {
-                pairs.insert(shared.value, &[a, b]);
+                pairs.insert(shared.value(), &[a, b]);
             }
         }
+    }
+
+    /// As [`Graph::counts`] of what [`Table::write`] makes: n products of one user and a rest are n fused instructions.
+    fn counts(&self) -> Counts {
+        let (uses, order) = self.uses();
+        let mut counts = Counts::default();
+        let mut fused = 0;
+        for v in order {
+            match &self.values[v] {
+                Value::Product(..) => counts.mul += 1,
+                Value::Sum(_) => {
+                    let terms = || (0..).map_while(|k| self.operand(v, k));
+                    let additions = terms().count() - 1;
+                    let products = terms().filter(|t| uses[t.value()] == 1 && self.is_product(*t)).count();
+                    counts.add += additions;
+                    fused += products.min(additions);
+                }
+                Value::Other(Op::Div(..), _) => counts.div += 1,
+                Value::Other(Op::Sqrt(_), _) => counts.sqrt += 1,
+                Value::Other(Op::SinCos(_), _) => counts.sin_cos += 1,
+                _ => {}
+            }
+        }
+        counts.fma = counts.mul + counts.add - fused;
+        counts
     }
 
     fn write(&self, graph: &Graph) -> Graph {
@@ -414,7 +490,7 @@ impl Table {
             .filter(|v| uses[**v] > 1 || !matches!(self.values[**v], Value::Product(..) | Value::Sum(_)))
             .filter_map(|v| self.origin[*v].map(|id| (id, *v)))
             .collect();
-        let results = graph.results.iter().zip(&self.results).map(|(id, t)| (*id, self.resolved(*t).value));
+        let results = graph.results.iter().zip(&self.results).map(|(id, t)| (*id, self.resolved(*t).value()));
         roots.extend(results);
         roots.sort_unstable();
         let mut writer = Writer {
@@ -439,58 +515,79 @@ type Pair = (usize, usize, bool);
 /// In which sums each pair of terms stands.
 #[derive(Default)]
 struct Pairs {
-    sums: BTreeMap<Pair, BTreeSet<usize>>,
-    /// How often each pair stands: the most frequent last; of those, the one that was there first.
+    /// For look-ups only: most pairs stand in one sum.
+    sums: FxHashMap<Pair, (usize, Vec<usize>)>,
+    /// How often each pair stands that is there more than once: the most frequent last; of those, the one that was there
+    /// first.
     ranks: BTreeSet<(usize, Reverse<Pair>)>,
+    scratch: Vec<Pair>,
 }
 
 impl Pairs {
     fn insert(&mut self, sum: usize, terms: &[Term]) {
-        for p in pairs_of(terms) {
-            let sums = self.sums.entry(p).or_default();
-            self.ranks.remove(&(sums.len(), Reverse(p)));
-            sums.insert(sum);
-            self.ranks.insert((sums.len(), Reverse(p)));
+        pairs_of(terms, &mut self.scratch);
+        for p in &self.scratch {
+            let p = *p;
+            match self.sums.entry(p) {
+                Entry::Vacant(place) => {
+                    place.insert((sum, Vec::new()));
+                }
+                Entry::Occupied(mut place) => {
+                    let more = &mut place.get_mut().1;
+                    self.ranks.remove(&(more.len() + 1, Reverse(p)));
+                    more.push(sum);
+                    self.ranks.insert((more.len() + 1, Reverse(p)));
+                }
+            }
         }
     }
 
     fn remove(&mut self, sum: usize, terms: &[Term]) {
-        for p in pairs_of(terms) {
-            let sums = self.sums.get_mut(&p).expect("a pair that was inserted");
-            self.ranks.remove(&(sums.len(), Reverse(p)));
-            sums.remove(&sum);
-            self.ranks.insert((sums.len(), Reverse(p)));
+        pairs_of(terms, &mut self.scratch);
+        for p in &self.scratch {
+            let p = *p;
+            let Entry::Occupied(mut place) = self.sums.entry(p) else { unreachable!("a pair that was inserted") };
+            let (first, more) = place.get_mut();
+            if more.is_empty() {
+                place.remove();
+                continue;
+            }
+            self.ranks.remove(&(more.len() + 1, Reverse(p)));
+            match more.iter().position(|s| *s == sum) {
+                Some(at) => {
+                    more.swap_remove(at);
+                }
+                None => *first = more.swap_remove(0),
+            }
+            if !more.is_empty() {
+                self.ranks.insert((more.len() + 1, Reverse(p)));
+            }
         }
     }
 
     fn most_frequent(&self) -> Option<(Pair, Vec<usize>)> {
-        let (times, Reverse(pair)) = self.ranks.last()?;
-        (*times > 1).then(|| (*pair, self.sums[pair].iter().copied().collect()))
+        let (_, Reverse(pair)) = self.ranks.last()?;
+        let (first, more) = &self.sums[pair];
+        let mut sums = more.clone();
+        sums.push(*first);
+        sums.sort_unstable();
+        Some((*pair, sums))
     }
 }
 
 /// The pairs among some terms, each once.
-fn pairs_of(terms: &[Term]) -> Vec<Pair> {
-    let mut pairs = Vec::with_capacity(terms.len() * terms.len() / 2);
+fn pairs_of(terms: &[Term], pairs: &mut Vec<Pair>) {
+    pairs.clear();
     for (i, a) in terms.iter().enumerate() {
         pairs.extend(terms[i + 1..].iter().map(|b| pair(*a, *b)));
     }
     pairs.sort_unstable();
     pairs.dedup();
-    pairs
 }
 
 /// The unordered pair up to a common sign: whether the signs differ.
 fn pair(a: Term, b: Term) -> Pair {
-    (a.value.min(b.value), a.value.max(b.value), a.negative != b.negative)
-}
-
-/// Sorted, the first positive; and whether all signs were turned for that.
-fn canonical(terms: &[Term]) -> (Vec<Term>, bool) {
-    let mut sorted = terms.to_vec();
-    sorted.sort_unstable();
-    let negative = sorted[0].negative;
-    (sorted.into_iter().map(|t| t.signed(negative)).collect(), negative)
+    (a.value().min(b.value()), a.value().max(b.value()), a.is_negative() != b.is_negative())
 }
 
 /// Back to a graph.
@@ -512,14 +609,14 @@ impl Writer<'_> {
         let written = match &self.table.values[value] {
             Value::Constant(c) => (self.builder.insert(Op::Constant(*c)), false),
             Value::Product(..) => {
-                let operands = self.table.operands(value);
-                let ((a, s), (b, t)) = (self.term(operands[0]), self.term(operands[1]));
+                let [a, b] = self.table.factors(value);
+                let ((a, s), (b, t)) = (self.term(a), self.term(b));
                 (self.builder.insert(Op::Mul(a.min(b), a.max(b))), s != t)
             }
-            Value::Sum(_) => self.sum(&self.table.operands(value)),
+            Value::Sum(_) => self.sum(&self.table.terms(value)),
             Value::Same(_) => unreachable!("terms are resolved"),
             Value::Other(op, operands) => {
-                let operands: Vec<NodeId> = operands.iter().map(|t| self.signed(*t)).collect();
+                let operands: Vec<NodeId> = operands[..op.operands().count()].iter().map(|t| self.signed(*t)).collect();
                 let mut given = operands.into_iter();
                 let op = op.map(|_| given.next().expect("as many operands as before"));
                 let node = self.builder.insert(op);
@@ -542,8 +639,8 @@ impl Writer<'_> {
 
     fn term(&mut self, term: Term) -> (NodeId, bool) {
         let term = self.table.resolved(term);
-        let (node, negative) = self.value(term.value);
-        (node, negative != term.negative)
+        let (node, negative) = self.value(term.value());
+        (node, negative != term.is_negative())
     }
 
     /// The node of a term, negated if need be.
@@ -556,7 +653,7 @@ impl Writer<'_> {
 
     /// Terms that are not fused first, then the products that are.
     fn sum(&mut self, terms: &[Term]) -> (NodeId, bool) {
-        let fuses = |t: &Term| matches!(self.table.values[t.value], Value::Product(..)) && self.uses[t.value] == 1;
+        let fuses = |t: &Term| self.table.is_product(*t) && self.uses[t.value()] == 1;
         let (products, rest): (Vec<Term>, Vec<Term>) = terms.iter().partition(|t| fuses(t));
         let rest: Vec<(NodeId, bool)> = rest.into_iter().map(|t| self.term(t)).collect();
         let mut left = rest;
