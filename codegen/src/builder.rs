@@ -77,6 +77,15 @@ impl Builder {
         self
     }
 
+    /// Several scalar types: the first as [`Builder::scalar`], for each of the others a module `single` or `double` with the
+    /// same items.
+    pub fn scalars(mut self, scalars: impl IntoIterator<Item = Scalar>) -> Self {
+        let mut scalars = scalars.into_iter();
+        self.options.scalar = scalars.next().unwrap_or(self.options.scalar);
+        self.options.also = scalars.collect();
+        self
+    }
+
     /// The weakest rewrite rules allowed; with [`Grade::Exact`] the code is the generic runtime, bit for bit.
     pub fn rules(mut self, grade: Grade) -> Self {
         self.options.grade = grade;

@@ -30,6 +30,8 @@ pub struct Options {
     pub frames: Vec<String>,
     /// The scalar type.
     pub scalar: Scalar,
+    /// Other scalar types: for each a module with the same items ([`Scalar::module`]).
+    pub also: Vec<Scalar>,
     /// The weakest rules allowed: with [`Grade::Exact`] the output is the generic runtime bit for bit.
     pub grade: Grade,
     /// How forward dynamics is computed.
@@ -48,6 +50,7 @@ impl Default for Options {
             functions: Function::all().collect(),
             frames: Vec::new(),
             scalar: Scalar::F64,
+            also: Vec::new(),
             grade: Grade::Algebraic,
             forward_dynamics: ForwardDynamicsMethod::default(),
             limits: Limits::default(),
@@ -220,6 +223,8 @@ pub struct Generated {
     pub items: Vec<Item>,
     /// The scalar type.
     pub scalar: Scalar,
+    /// The same in the other scalar types that were asked for; [`Generated::text`] has them as modules.
+    pub others: Vec<Generated>,
     /// Where it came from.
     pub provenance: Provenance,
     /// Its figures.
@@ -252,6 +257,17 @@ pub fn explain(source: &Source, options: &Options) -> Result<Generated, Diagnost
 }
 
 fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
+    let mut generated = compile_in_one_scalar(source, options, explained)?;
+    for &scalar in &options.also {
+        let options = Options { scalar, also: Vec::new(), ..options.clone() };
+        let other = compile_in_one_scalar(source, &options, explained)?;
+        generated.text.push_str(&emit::scalar_module(scalar, &other.text));
+        generated.others.push(other);
+    }
+    Ok(generated)
+}
+
+fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
     let (whole, mut diagnostics) = model::load(source, &options.scene.model_options(&options.model));
     scene::check_options(options, &mut diagnostics);
     let model = whole.clone().and_then(|whole| scene::apply(whole, &options.scene, &mut diagnostics));
@@ -366,7 +382,18 @@ fn generate(
     };
     let types = parameter_types(&robot, options, &takes) + &staged_text;
     let text = emit::file(model, &frames, &items, &report, &provenance, options.scalar, &types);
-    Generated { model: robot.model, frames, text, types, items, scalar: options.scalar, provenance, report, warnings }
+    Generated {
+        model: robot.model,
+        frames,
+        text,
+        types,
+        items,
+        scalar: options.scalar,
+        others: Vec::new(),
+        provenance,
+        report,
+        warnings,
+    }
 }
 
 /// The program of a parameter's constructor: from mass \[kg\], mass centre \[m\] and inertia about it \[kg·m²\] (xx, xy, xz,

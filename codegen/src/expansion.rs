@@ -75,6 +75,12 @@ fn found(what: &str, name: &str, directories: &[&Path], files: &mut Vec<PathBuf>
     Ok(Source::from_bytes(name, bytes))
 }
 
+/// Whether there is more than constants and functions of one scalar, which are all that a type can have associated: types of
+/// parameters and stages, or further scalars.
+pub fn needs_a_module(generated: &Generated) -> bool {
+    !generated.types.is_empty() || !generated.others.is_empty()
+}
+
 /// Constants and functions of the module `dynamics` as associated items of a type.
 pub fn associated_items(generated: &Generated) -> String {
     let Generated { model, frames, scalar, .. } = generated;

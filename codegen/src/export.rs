@@ -5,6 +5,7 @@
 
 use crate::compile::Generated;
 use crate::emit::{self, one_line, Scalar};
+use crate::expr::Port;
 use crate::function::Function;
 use crate::output::MARK;
 use std::fmt::Write;
@@ -37,8 +38,13 @@ pub fn c_package(generated: &Generated, prefix: &str) -> Vec<(String, String)> {
         ("src/dynamics/mod.rs".to_string(), package.dynamics()),
     ];
     for item in &generated.items {
-        let kernel = if item.text.calls_kernel() { "use super::trig;\n\n" } else { "" };
-        files.push((format!("src/dynamics/{}.rs", item.function.name()), format!("{kernel}{}", item.text.text)));
+        let mut uses: Vec<&str> = item.inputs.iter().filter_map(|port| port.wrapper.as_deref()).collect();
+        if item.text.calls_kernel() {
+            uses.push("trig");
+        }
+        let uses: String = uses.iter().map(|name| format!("use super::{name};\n")).collect();
+        let gap = if uses.is_empty() { "" } else { "\n" };
+        files.push((format!("src/dynamics/{}.rs", item.function.name()), format!("{uses}{gap}{}", item.text.text)));
     }
     if package.calls_kernel() {
         files.push(("src/dynamics/trig.rs".to_string(), emit::kernel().to_string()));
@@ -122,7 +128,10 @@ overflow-checks = false
             .map(|(port, is_output)| Parameter {
                 name: port.name.clone(),
                 length: port.len(),
-                array: emit::array_type(port, self.scalar()),
+                array: match &port.wrapper {
+                    Some(wrapper) => format!("dynamics::{wrapper}"),
+                    None => emit::array_type(port, self.scalar()),
+                },
                 is_output,
             })
             .collect()
@@ -189,6 +198,9 @@ fn name(names: &[&CStr], i: c_int) -> *const c_char {{
 "#,
             provenance = self.provenance(),
         );
+        for body in self.bodies() {
+            let _ = write!(out, "{}", self.constructor(&body));
+        }
         for item in &self.generated.items {
             let function = item.function;
             let parameters = self.parameters(function);
@@ -221,6 +233,56 @@ pub unsafe extern "C" fn {prefix}_{name}({signature}) {{
             );
         }
         out
+    }
+
+    /// The run-time parameters that functions take: name, type and number of scalars.
+    fn bodies(&self) -> Vec<Port> {
+        let mut bodies: Vec<Port> = Vec::new();
+        for port in self.generated.items.iter().flat_map(|item| &item.inputs) {
+            if port.wrapper.is_some() && !bodies.contains(port) {
+                bodies.push(port.clone());
+            }
+        }
+        bodies
+    }
+
+    /// The C function that makes a run-time parameter.
+    fn constructor(&self, body: &Port) -> String {
+        let (prefix, scalar, name, length) = (self.prefix, self.scalar().name(), &body.name, body.len());
+        let type_name = body.wrapper.as_deref().unwrap_or_default();
+        format!(
+            r#"
+/// A body as the functions take it in `{name}`, from mass, mass centre and inertia (xx, xy, xz, yy, yz, zz) about the mass
+/// centre. Zero, or why no body has these: 1 a number is not finite, 2 the mass is negative, 3 inertia without mass, 4 the
+/// inertia is impossible; `{name}` is untouched then.
+///
+/// # Safety
+/// The pointers lead to aligned arrays of {scalar}: `com` 3, `inertia` 6, `{name}` {length}; what is written overlaps nothing
+/// that is read.
+#[no_mangle]
+pub unsafe extern "C" fn {prefix}_{name}_new(
+    mass: {scalar},
+    com: *const {scalar},
+    inertia: *const {scalar},
+    {name}: *mut {scalar},
+) -> c_int {{
+    // SAFETY of all these: the caller's promise
+    let com = unsafe {{ *com.cast::<[{scalar}; 3]>() }};
+    let inertia = unsafe {{ *inertia.cast::<[{scalar}; 6]>() }};
+    let {name} = unsafe {{ &mut *{name}.cast::<dynamics::{type_name}>() }};
+    match dynamics::{type_name}::new(mass, com, inertia) {{
+        Ok(body) => {{
+            *{name} = body;
+            0
+        }}
+        Err(dynamics::Unphysical::NotFinite) => 1,
+        Err(dynamics::Unphysical::NegativeMass) => 2,
+        Err(dynamics::Unphysical::InertiaWithoutMass) => 3,
+        Err(dynamics::Unphysical::Inertia) => 4,
+    }}
+}}
+"#
+        )
     }
 
     /// The C header.
@@ -285,6 +347,17 @@ const char *{prefix}_frame_name(int i);
             Scalar::F64 => "double",
             Scalar::F32 => "float",
         };
+        for body in self.bodies() {
+            let (name, length) = (&body.name, body.len());
+            let _ = write!(
+                out,
+                "\n/* A body as the functions take it in {name}, made outside the control loop, of this mass [kg], with its mass\n \
+                 * centre [m] and its inertia about the mass centre xx, xy, xz, yy, yz, zz [kg m^2]. All zeros are no body.\n \
+                 * Returns 0, or why no body has these: 1 a number is not finite, 2 the mass is negative, 3 inertia without\n \
+                 * mass, 4 the inertia is impossible; {name} is untouched then. */\n\
+                 int {prefix}_{name}_new({c_type} mass, const {c_type} com[3], const {c_type} inertia[6], {c_type} {name}[{length}]);\n"
+            );
+        }
         for item in &self.generated.items {
             let doc = item.doc.replace("frame of [`FRAME_NAMES`]", "frame").replace(['`', '\\'], "");
             out.push_str("\n/*");

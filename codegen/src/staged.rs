@@ -4,11 +4,12 @@
 //! [`crate::stage`]. Around each stage's stored values stands a struct; a later stage borrows the earlier one, so that a value
 //! of a stage cannot outlive a change of what it was computed from.
 
-use crate::compile::Options;
+use crate::choose::choose;
+use crate::compile::{Optimisations, Options};
 use crate::emit::{self, array_type, Scalar};
 use crate::expr::{verify, Counts, Graph, Port, Section};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
-use crate::pass::dead_code;
+use crate::pass::{dead_code, sums};
 use crate::scene::is_optional;
 use crate::schedule::schedule;
 use crate::stage::{cut, Staged};
@@ -59,6 +60,10 @@ pub struct StagedReport {
     pub stages: Vec<StageReport>,
     /// What is left of each function once its stages are there.
     pub remaining: BTreeMap<&'static str, Remaining>,
+    /// What is stored for inverse dynamics, if it is among the functions: H and h, or what the recursion has in common.
+    pub inverse_dynamics: Option<&'static str>,
+    /// What is stored for forward dynamics, if it is among the functions: the factor of H, or articulated inertias.
+    pub forward_dynamics: Option<&'static str>,
 }
 
 /// How inverse dynamics is written: the recursion, or H q̈ + h with both from earlier stages.
@@ -97,10 +102,11 @@ pub struct Programs {
     /// The stages and the functions.
     pub staged: Staged,
     stages: Vec<Stage>,
+    form: (InverseForm, ForwardDynamicsMethod),
 }
 
-/// Traces and cuts: of the forms that inverse and forward dynamics have, those with the fewest operations per call, then
-/// with the fewest stored values.
+/// Traces and cuts: of the forms that inverse and forward dynamics and the reduced robot have, those with the fewest operations
+/// per call, then in the stages, then with the fewest stored values.
 pub fn programs(robot: &Robot, frames: &[String], options: &Options) -> Programs {
     let functions: Vec<Function> = options
         .functions
@@ -108,25 +114,56 @@ pub fn programs(robot: &Robot, frames: &[String], options: &Options) -> Programs
         .copied()
         .filter(|f| !f.is_per_frame() || !options.scene.frames_of(*f, frames).is_empty())
         .collect();
-    let forms = [InverseForm::MassMatrix, InverseForm::Recursion].into_iter().flat_map(|inverse| {
-        [ForwardDynamicsMethod::Factorisation, ForwardDynamicsMethod::ArticulatedBody].map(|forward| (inverse, forward))
-    });
+    let forms: Vec<_> = [InverseForm::MassMatrix, InverseForm::Recursion]
+        .into_iter()
+        .flat_map(|inverse| {
+            [ForwardDynamicsMethod::Factorisation, ForwardDynamicsMethod::ArticulatedBody]
+                .map(|forward| (inverse, forward))
+        })
+        .collect();
     let cost = |s: &Staged| {
-        let calls: usize = s.functions.iter().map(|(_, g)| g.counts().flops()).sum();
+        let flops = |graphs: &mut dyn Iterator<Item = &Graph>| graphs.map(|g| g.counts().flops()).sum::<usize>();
         let stored: usize = s.stages.iter().map(|g| g.results.len()).sum();
-        (calls, stored)
+        (flops(&mut s.functions.iter().map(|(_, g)| g)), flops(&mut s.stages.iter()), stored)
     };
-    let candidates = forms.map(|form| {
+    // the form first, then what else there is to choose in it: each by itself takes the time of a trace
+    let cuts = |robot: &Robot, form| {
         let (graph, stage_of, stages) = joint_program(robot, frames, options, &functions, form);
         let names: Vec<&str> = stages.iter().map(|s| s.values).collect();
         let blocks: Vec<usize> = functions.iter().map(|f| f.outputs(&robot.model, frames.len()).len()).collect();
-        (cut(&graph, &stage_of, &names, &blocks), stages)
-    });
-    let (staged, stages) = candidates.min_by_key(|(s, _)| cost(s)).expect("there are four forms");
+        let mut pieces = cut(&graph, &stage_of, &names, &blocks);
+        let mut found = Vec::new();
+        if options.optimisations().sums {
+            // before the cut, where all terms are in sight, or within its pieces, which keeps stages apart
+            found.push(cut(&dead_code(&sums(&graph)), &stage_of, &names, &blocks));
+            let regrouped = |graph: &mut Graph| *graph = dead_code(&sums(graph));
+            pieces.stages.iter_mut().chain(pieces.functions.iter_mut().map(|(_, g)| g)).for_each(regrouped);
+        }
+        found.push(pieces);
+        let best = found.into_iter().min_by_key(cost).expect("the pieces are there");
+        (best, stages, form)
+    };
+    let of_forms = forms.iter().map(|form| cuts(robot, *form));
+    let first = of_forms.min_by_key(|(s, _, _)| cost(s)).expect("there are four forms");
+    let of_robots = chosen_robots(robot, frames, options, &functions).into_iter().map(|robot| cuts(&robot, first.2));
+    let best = of_robots.min_by_key(|(s, _, _)| cost(s)).filter(|(s, _, _)| cost(s) < cost(&first.0));
+    let (staged, stages, form) = best.unwrap_or(first);
     for graph in staged.stages.iter().chain(staged.functions.iter().map(|(_, g)| g)) {
         verify(graph).unwrap_or_else(|broken| panic!("a stage is broken: {broken}"));
     }
-    Programs { functions, staged, stages }
+    Programs { functions, staged, stages, form }
+}
+
+/// The robot in the reduced forms that serve one of the functions best; none where nothing is to be chosen.
+fn chosen_robots(robot: &Robot, frames: &[String], options: &Options, functions: &[Function]) -> Vec<Robot> {
+    use Function::{BiasForce, ForwardDynamics, InverseDynamics, MassMatrix};
+    let optimisations = options.optimisations();
+    if !optimisations.chosen || !optimisations.reduced {
+        return Vec::new();
+    }
+    let optimisations = Optimisations { chosen: false, ..optimisations };
+    let of = [InverseDynamics, BiasForce, MassMatrix, ForwardDynamics].into_iter().filter(|f| functions.contains(f));
+    of.map(|f| choose(robot, frames, f, options, optimisations)).collect()
 }
 
 /// The module `staged` as text, and its figures.
@@ -136,14 +173,14 @@ pub fn staged(
     options: &Options,
     title: &dyn Fn(Section) -> String,
 ) -> (String, StagedReport) {
-    let Programs { functions, staged, stages } = programs(robot, frames, options);
-    (text(&functions, &staged, &stages, options, title), report(&functions, &staged, &stages))
+    let programs = programs(robot, frames, options);
+    let Programs { functions, staged, stages, .. } = &programs;
+    (text(functions, staged, stages, options, title), report(&programs))
 }
 
 /// The figures of the staged form alone.
 pub fn figures(robot: &Robot, frames: &[String], options: &Options) -> StagedReport {
-    let Programs { functions, staged, stages } = programs(robot, frames, options);
-    report(&functions, &staged, &stages)
+    report(&programs(robot, frames, options))
 }
 
 /// All functions in one program; the stage of each of its input ports; the stages.
@@ -203,7 +240,9 @@ fn joint_program(
     (dead_code(&graph), stage_of, stages)
 }
 
-fn report(functions: &[Function], staged: &Staged, stages: &[Stage]) -> StagedReport {
+fn report(programs: &Programs) -> StagedReport {
+    let Programs { functions, staged, stages, form } = programs;
+    let has = |function: Function| functions.contains(&function);
     let of = |stage: &Stage, graph: &Graph| {
         let Counts { mul, add, div, sqrt, sin_cos, .. } = graph.counts();
         StageReport { name: stage.type_name, mul, add, div, sqrt, sincos: sin_cos, stored: graph.results.len() }
@@ -215,6 +254,14 @@ fn report(functions: &[Function], staged: &Staged, stages: &[Stage]) -> StagedRe
     StagedReport {
         stages: stages.iter().zip(&staged.stages).map(|(s, g)| of(s, g)).collect(),
         remaining: functions.iter().zip(&staged.functions).map(|(f, (_, g))| (f.name(), left(g))).collect(),
+        inverse_dynamics: has(Function::InverseDynamics).then_some(match form.0 {
+            InverseForm::MassMatrix => "H and h",
+            InverseForm::Recursion => "what its recursion has in common",
+        }),
+        forward_dynamics: has(Function::ForwardDynamics).then_some(match form.1 {
+            ForwardDynamicsMethod::Factorisation => "the factor of H",
+            _ => "articulated inertias",
+        }),
     }
 }
 

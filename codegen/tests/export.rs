@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use straightline_codegen::model::{load, ModelOptions};
+use straightline_codegen::model::{load, FrameOption, ModelOptions};
 use straightline_codegen::{ForwardDynamicsMethod, Function, Source};
 use straightline_core::model::Frame;
 use straightline_core::Dd;
@@ -157,4 +157,71 @@ fn names_from_the_robot_file_cannot_become_code() {
         let header = fs::read_dir(package.join("include")).unwrap().next().unwrap().unwrap().path();
         succeeds(Command::new("cc").args(["-fsyntax-only", "-x", "c"]).arg(header));
     }
+}
+
+const TOOL: &str = "[outputs]\nfunctions = [\"gravity_force\"]\n\
+                    [[parameter]]\nkind = \"payload\"\nname = \"tool\"\nframe = \"forearm\"\n";
+
+#[test]
+fn c_makes_a_run_time_parameter_and_is_told_why_it_cannot_be() {
+    let scratch = scratch("parameter");
+    let (scene, package) = (scratch.join("tool.toml"), scratch.join("arm"));
+    fs::write(&scene, TOOL).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_straightline"));
+    succeeds(command.args(["export", ARM, "--c-abi", "--scene"]).arg(&scene).arg("-o").arg(&package));
+    let built = package.join("target");
+    succeeds(
+        Command::new(env!("CARGO"))
+            .args(["build", "--offline", "--manifest-path"])
+            .arg(package.join("Cargo.toml"))
+            .env("CARGO_TARGET_DIR", &built)
+            .env("RUSTFLAGS", "-Dwarnings"),
+    );
+    if !is_there("cc") {
+        eprintln!("skipped: there is no C compiler");
+        return;
+    }
+    let program = r#"#include "arm_dynamics.h"
+#include <stdio.h>
+int main(void) {
+    static const double q[3] = {0.3, -0.8, 1.1}, com[3] = {0.1, 0.02, -0.05};
+    static const double inertia[6] = {1e-3, 0, 0, 2e-3, 0, 1.5e-3}, impossible[6] = {1e-3, 0, 0, 1e-3, 0, 3e-3};
+    double tool[20] = {0}, g[3], loaded[3];
+    arm_gravity_force(q, tool, g);
+    if (arm_tool_new(-1.0, com, inertia, tool) != 2 || arm_tool_new(0.0, com, inertia, tool) != 3) return 1;
+    if (arm_tool_new(0.0 / 0.0, com, inertia, tool) != 1 || arm_tool_new(1.0, com, impossible, tool) != 4) return 2;
+    for (int i = 0; i < 20; i++) if (tool[i] != 0) return 3;
+    if (arm_tool_new(0.7, com, inertia, tool) != 0) return 4;
+    arm_gravity_force(q, tool, loaded);
+    for (int i = 0; i < 3; i++) printf("%.17g\n", loaded[i] - g[i]);
+    return 0;
+}
+"#;
+    fs::write(scratch.join("main.c"), program).unwrap();
+    succeeds(
+        Command::new("cc")
+            .args(["-Wall", "-Wextra", "-Werror", "-pedantic", "-std=c99"])
+            .arg(scratch.join("main.c"))
+            .arg("-I")
+            .arg(package.join("include"))
+            .arg(built.join("debug/libarm_dynamics.a"))
+            .args(["-lm", "-lpthread", "-ldl", "-o"])
+            .arg(scratch.join("main")),
+    );
+    let printed = succeeds(&mut Command::new(scratch.join("main")));
+    // truth: m g · ∂p/∂q of the tool's mass centre, which is a frame there, by the generic algorithms
+    let centre = FrameOption { name: "centre".into(), link: "forearm".into(), xyz: [0.1, 0.02, -0.05], rpy: [0.0; 3] };
+    let options = ModelOptions { frames: vec![centre], ..ModelOptions::default() };
+    let (model, _) = load(&Source::new(ARM, fs::read_to_string(ARM).unwrap()), &options);
+    let model = model.unwrap();
+    let q: Vec<Dd> = [0.3, -0.8, 1.1].map(Dd::from).to_vec();
+    let frames = [model.frame("centre").unwrap()];
+    let jacobian = Function::Jacobian.evaluate(&model, &frames, ForwardDynamicsMethod::Factorisation, &[q]);
+    for (i, line) in printed.lines().enumerate() {
+        let expected = (Dd::from(0.7 * 9.81) * jacobian[2 * 3 + i]).to_f64();
+        let found: f64 = line.parse().unwrap();
+        // differences of torques near 10
+        assert!((found - expected).abs() < 1e-13, "{i}: {found} is not {expected}");
+    }
+    assert_eq!(printed.lines().count(), 3);
 }

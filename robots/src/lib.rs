@@ -15,6 +15,8 @@
 //!
 //! What a function costs is a constant beside it (`INVERSE_DYNAMICS_COST`). The descriptions, each with the source of its
 //! numbers, are in `descriptions/`.
+//!
+//! What a scene makes of one robot is shown in `scenes/README.md`.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -157,3 +159,8 @@ pub mod solo12 {
         include!(concat!(env!("OUT_DIR"), "/solo12_single.rs"));
     }
 }
+
+/// The code of the page on scenes, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../scenes/README.md")]
+struct Scenes;

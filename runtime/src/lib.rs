@@ -31,7 +31,7 @@
 //! |---|---|
 //! | `functions(inverse_dynamics, mass_matrix)` | all functions |
 //! | `frames("tool0")`: links that poses, velocities and Jacobians are asked for | the tips |
-//! | `scalar = "f32"` | `"f64"` |
+//! | `scalar = "f32"`; `scalars("f64", "f32")`: for each further one a module `single` or `double` | `"f64"` |
 //! | `floating_base`: the root link moves freely | as the file says |
 //! | `joint_order("a", "b")`: all joints in the order of their coordinates | depth first, as in the file |
 //! | `gravity(0.0, 0.0, -9.81)` \[m/s²\] | the file's, or this |
@@ -40,6 +40,7 @@
 //! | `forward_dynamics = "articulated-body"` or `"factorisation"` | the cheaper one |
 //! | `max_part_operations = 1000`: longer functions are cut | 2000 |
 //! | `scene = "scenes/still.toml"`: what is wanted and what is held; what it says wins over other options | everything |
+//! | `module = "arm_dynamics"` (derive only): everything stands in that module, beside the type, too | where a scene has types of its own it is needed |
 //!
 //! The path counts from the package's manifest, or else from the source file. The build runs again when the file changes;
 //! complaints about it come as compiler errors with the file's line.

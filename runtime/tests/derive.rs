@@ -34,6 +34,11 @@ pub struct Controller<const N: usize> {
 #[robot("examples/arm.toml", floating_base, functions(mass_matrix))]
 struct Satellite;
 
+/// A scene with types of its own, which stand in a module that can be named.
+#[derive(Dynamics)]
+#[robot("examples/arm.toml", scene = "examples/payload_scene.toml", module = "loaded")]
+pub struct Loaded;
+
 straightline::dynamics! {
     /// The arm as a module, found from this file.
     pub mod arm = "../examples/arm.toml", scalar = "f32", functions(inverse_dynamics,),
@@ -86,4 +91,28 @@ fn the_module_holds_the_same_items() {
         // 2^-24 of torques near 10, a few roundings
         assert!((f64::from(*narrow) - wide).abs() < 1e-5, "{tau:?} {wide:?}");
     }
+}
+
+#[test]
+fn types_of_parameters_and_stages_and_further_scalars_are_reached_through_the_module() {
+    let (q, qd, qdd) = ([0.3, -0.8, 1.1], [0.5, -1.2, 0.7], [2.0, -3.0, 1.5]);
+    let tool = loaded::Tool::new(0.6, [0.05, 0.01, -0.02], [1e-3, 0.0, 0.0, 2e-3, 0.0, 1.5e-3]).unwrap();
+    assert_eq!(loaded::Tool::new(-0.6, [0.0; 3], [0.0; 6]), Err(loaded::Unphysical::NegativeMass));
+    let (mut empty, mut tau, mut staged, mut single) = ([0.0; 3], [0.0; 3], [0.0; 3], [0.0_f32; 3]);
+    Loaded::inverse_dynamics(&q, &qd, &qdd, &loaded::Tool::NONE, &mut empty);
+    Arm::inverse_dynamics(&q, &qd, &qdd, &mut tau);
+    let close = |a: &[f64; 3], b: &[f64; 3], bound: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() < bound);
+    // a few roundings of torques near 10
+    assert!(close(&empty, &tau, 1e-13), "{empty:?} {tau:?}");
+
+    Loaded::inverse_dynamics(&q, &qd, &qdd, &tool, &mut tau);
+    let parameters = loaded::staged::Parameters::new(&tool);
+    let configuration = loaded::staged::Configuration::new(&parameters, &q);
+    loaded::staged::Velocity::new(&configuration, &qd).inverse_dynamics(&qdd, &mut staged);
+    assert!(close(&staged, &tau, 1e-13) && !close(&empty, &tau, 0.1), "{staged:?} {tau:?} {empty:?}");
+
+    let narrow = |x: [f64; 3]| x.map(|x| x as f32);
+    let tool = loaded::single::Tool::new(0.6, [0.05, 0.01, -0.02], [1e-3, 0.0, 0.0, 2e-3, 0.0, 1.5e-3]).unwrap();
+    loaded::single::inverse_dynamics(&narrow(q), &narrow(qd), &narrow(qdd), &tool, &mut single);
+    assert!(close(&single.map(f64::from), &tau, 1e-5), "{single:?} {tau:?}");
 }

@@ -1,6 +1,7 @@
 //! `"panda.urdf", floating_base, scalar = "f32", functions(inverse_dynamics, mass_matrix), …`
 
 use std::str::FromStr;
+use straightline_codegen::emit::Scalar;
 use straightline_codegen::{Function, Options};
 use syn::parse::{Parse, ParseStream};
 use syn::punctuated::Punctuated;
@@ -10,6 +11,8 @@ use syn::{parenthesized, Attribute, Error, Ident, Lit, LitInt, LitStr, Result, T
 pub struct Arguments {
     pub robot: LitStr,
     pub scene: Option<LitStr>,
+    /// The module that the derive puts everything in, where the user can reach it.
+    pub module: Option<Ident>,
     pub options: Options,
 }
 
@@ -34,7 +37,7 @@ impl Parse for Module {
 
 impl Parse for Arguments {
     fn parse(input: ParseStream) -> Result<Self> {
-        let mut arguments = Arguments { robot: input.parse()?, scene: None, options: Options::default() };
+        let mut arguments = Arguments { robot: input.parse()?, scene: None, module: None, options: Options::default() };
         while !input.is_empty() {
             input.parse::<Token![,]>()?;
             if !input.is_empty() {
@@ -50,8 +53,16 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
     let options = &mut arguments.options;
     match key.to_string().as_str() {
         "scene" => arguments.scene = Some(value(input)?),
+        "module" => arguments.module = Some(value::<LitStr>(input)?.parse()?),
         "floating_base" => options.model.floating_base = true,
         "scalar" => options.scalar = word(input)?,
+        "scalars" => {
+            let scalars: Result<Vec<Scalar>> =
+                list::<LitStr>(input)?.iter().map(|name| parsed(&name.value(), name)).collect();
+            let mut scalars = scalars?.into_iter();
+            options.scalar = scalars.next().ok_or_else(|| Error::new(key.span(), "scalars(\"f64\", \"f32\")"))?;
+            options.also = scalars.collect();
+        }
         "rules" => options.grade = word(input)?,
         "forward_dynamics" => options.forward_dynamics = word(input)?,
         "max_part_operations" => options.limits.operations = value::<LitInt>(input)?.base10_parse()?,
@@ -71,8 +82,9 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
             options.model.gravity = Some(numbers.try_into().map_err(|_| three())?);
         }
         other => {
-            let known = "floating_base, scalar, rules, forward_dynamics, max_part_operations, angle_tolerance, \
-                         functions, frames, joint_order, gravity, scene";
+            let known =
+                "floating_base, scalar, scalars, rules, forward_dynamics, max_part_operations, angle_tolerance, \
+                         functions, frames, joint_order, gravity, scene, module";
             return Err(Error::new(key.span(), format!("there is no option `{other}`; one of: {known}")));
         }
     }

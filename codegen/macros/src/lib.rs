@@ -9,7 +9,7 @@ use proc_macro::TokenStream;
 use proc_macro2::TokenStream as Tokens;
 use quote::quote;
 use std::path::{Path, PathBuf};
-use straightline_codegen::expansion::{associated_items, expand};
+use straightline_codegen::expansion::{associated_items, expand, needs_a_module};
 use straightline_codegen::Generated;
 use syn::{parse_macro_input, DeriveInput, Error};
 
@@ -28,23 +28,41 @@ pub fn derive_dynamics(input: TokenStream) -> TokenStream {
     };
     let (ident, generics) = (&input.ident, &input.generics);
     let (impl_generics, type_generics, where_clause) = generics.split_for_impl();
+    let visibility = &input.vis;
     compiled(&arguments, |generated| {
         let (items, associated) = (source(&generated.text), source(&associated_items(generated)));
-        quote! {
-            #[allow(dead_code)]
-            mod dynamics { #items }
+        let associated = quote! {
             #[allow(dead_code)]
             impl #impl_generics #ident #type_generics #where_clause { #associated }
+        };
+        match &arguments.module {
+            Some(name) => {
+                let doc = format!("What `{ident}` is made of: its functions, and types of parameters and stages.");
+                quote! {
+                    #[doc = #doc]
+                    #[allow(dead_code)]
+                    #visibility mod #name { #items }
+                    const _: () = { use #name as dynamics; #associated };
+                }
+            }
+            None if needs_a_module(generated) => Error::new_spanned(robot, NEEDS_A_MODULE).into_compile_error(),
+            None => quote! { const _: () = { #[allow(dead_code)] mod dynamics { #items } #associated }; },
         }
     })
-    .map_or_else(Error::into_compile_error, |items| quote! { const _: () = { #items }; })
+    .unwrap_or_else(Error::into_compile_error)
     .into()
 }
+
+const NEEDS_A_MODULE: &str = "the scene has types or scalars of its own, which need a module to be reached in\n\
+                              help: name one, as in `module = \"arm_dynamics\"`";
 
 /// Makes a module of the dynamics of a robot; see the package `straightline`.
 #[proc_macro]
 pub fn dynamics(input: TokenStream) -> TokenStream {
     let Module { attributes, visibility, name, arguments } = parse_macro_input!(input as Module);
+    if let Some(module) = &arguments.module {
+        return Error::new(module.span(), "`module` is for the derive: this is a module").into_compile_error().into();
+    }
     compiled(&arguments, |generated| source(&generated.text))
         .map_or_else(Error::into_compile_error, |items| quote! { #(#attributes)* #visibility mod #name { #items } })
         .into()

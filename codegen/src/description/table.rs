@@ -230,15 +230,17 @@ impl Reader<'_> {
     /// One of a few words.
     pub fn word_at<T: Copy>(&mut self, table: &Table, key: &str, words: &[(&str, T)]) -> Option<Value<T>> {
         let text = self.string_at(table, key)?;
-        match words.iter().find(|w| w.0 == text.value) {
-            Some(&(_, value)) => Some(Value::new(value, text.place)),
-            None => {
-                let known: Vec<&str> = words.iter().map(|w| w.0).collect();
-                let complaint = messages::unknown_word(&table.what(key), &text.value, &known);
-                self.diagnostics.push(complaint.at(&text.place));
-                None
-            }
+        self.word(&table.what(key), &text, words).map(|value| Value::new(value, text.place))
+    }
+
+    /// What a word stands for, or a complaint.
+    pub fn word<T: Copy>(&mut self, what: &str, text: &Value<String>, words: &[(&str, T)]) -> Option<T> {
+        let known = words.iter().find(|w| w.0 == text.value);
+        if known.is_none() {
+            let known: Vec<&str> = words.iter().map(|w| w.0).collect();
+            self.diagnostics.push(messages::unknown_word(what, &text.value, &known).at(&text.place));
         }
+        known.map(|w| w.1)
     }
 
     /// So many numbers in an array; `form` says so in words.

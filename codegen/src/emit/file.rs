@@ -88,6 +88,17 @@ pub fn preamble(
     out
 }
 
+/// The items of a file in another scalar, as a module of that file; the header stands there already.
+pub fn scalar_module(scalar: Scalar, text: &str) -> String {
+    let is_header = |line: &&str| line.starts_with("//") && !line.starts_with("///");
+    let items = text.lines().skip_while(is_header).skip_while(|line| line.is_empty());
+    let mut out = format!("\n/// The same in [`{}`].\npub mod {} {{\n", scalar.name(), scalar.module());
+    for line in items {
+        let _ = writeln!(out, "{}{line}", if line.is_empty() { "" } else { "    " });
+    }
+    out + "}\n"
+}
+
 /// The source of the sine-cosine kernel, as a module of its own.
 pub fn kernel() -> &'static str {
     TRIG

@@ -9,7 +9,7 @@ mod names;
 pub mod parameter;
 
 pub use body::{function, FunctionText};
-pub use file::{file, kernel, preamble, Item, Provenance};
+pub use file::{file, kernel, preamble, scalar_module, Item, Provenance};
 pub use names::{snake_case, upper_camel_case, Names};
 
 use crate::expr::Port;
@@ -29,6 +29,14 @@ impl Scalar {
         match self {
             Scalar::F64 => "f64",
             Scalar::F32 => "f32",
+        }
+    }
+
+    /// The module of a generated file that has the same items in this scalar.
+    pub fn module(self) -> &'static str {
+        match self {
+            Scalar::F64 => "double",
+            Scalar::F32 => "single",
         }
     }
 

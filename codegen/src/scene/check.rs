@@ -127,6 +127,11 @@ pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
     if let Some(source) = scene.places.source() {
         diagnostics.add_source(source);
     }
+    for (i, scalar) in options.also.iter().enumerate() {
+        if *scalar == options.scalar || options.also[..i].contains(scalar) {
+            scene.places.complain("numbers.scalar", say::scalar_twice(scalar.name()), diagnostics);
+        }
+    }
     if scene.gravity != Gravity::OfRobot && options.model.gravity.is_some() {
         scene.places.complain("hold.gravity", say::said_twice("gravity"), diagnostics);
     }

@@ -29,6 +29,7 @@ pub const CODES: &[&str] = &[
     "over-budget",
     "moving-base-forward",
     "said-twice",
+    "scalar-twice",
     "empty-range",
     "range-alone",
 ];
@@ -222,6 +223,11 @@ pub fn moving_base_forward() -> D {
 /// The scene and an option of the front say the same thing.
 pub fn said_twice(what: &str) -> D {
     D::error("said-twice", format!("{what} is given by the scene and by an option beside it")).help("keep one of them")
+}
+
+/// A scalar type that is asked for twice.
+pub fn scalar_twice(scalar: &str) -> D {
+    D::error("scalar-twice", format!("the scalar type `{scalar}` is asked for twice")).help("name each once")
 }
 
 /// A range without a value.

@@ -27,8 +27,8 @@ pub struct SceneFile {
     pub scene: Scene,
     /// The functions that are wanted; `None`: all.
     pub functions: Option<Vec<Function>>,
-    /// The scalar type.
-    pub scalar: Option<Scalar>,
+    /// The scalar types, the first one that of the file's own items; none: as the options say.
+    pub scalars: Vec<Scalar>,
     /// So near to a special angle \[rad\] an angle of the robot file is taken as that.
     pub angle_tolerance: Option<f64>,
 }
@@ -42,7 +42,9 @@ impl SceneFile {
         } else if self.scene.base == Base::Moving && options.functions.iter().copied().eq(Function::all()) {
             options.functions.retain(|f| *f != Function::ForwardDynamics);
         }
-        options.scalar = self.scalar.unwrap_or(options.scalar);
+        if let [first, others @ ..] = &self.scalars[..] {
+            (options.scalar, options.also) = (*first, others.to_vec());
+        }
         options.model.angle_tolerance = self.angle_tolerance.unwrap_or(options.model.angle_tolerance);
         options.scene = self.scene;
         options
@@ -315,7 +317,15 @@ impl SceneReader<'_> {
     fn numbers(&mut self, table: &Table) {
         self.reader.check_keys(table, &["scalar", "angle_tolerance", "ranges"]);
         let scalars: Vec<(&str, Scalar)> = Scalar::words().into_iter().map(|(word, _, s)| (word, s)).collect();
-        self.file.scalar = self.reader.word_at(table, "scalar", &scalars).map(|s| s.value);
+        self.file.scalars = match table.get("scalar") {
+            Some((DeValue::Array(_), span)) => {
+                let place = self.reader.place(&span);
+                self.file.scene.places.note("numbers.scalar", &place);
+                let words = self.reader.names_at(table, "scalar", "scalar type");
+                words.iter().filter_map(|word| self.reader.word("scalar types", word, &scalars)).collect()
+            }
+            _ => self.reader.word_at(table, "scalar", &scalars).map(|s| s.value).into_iter().collect(),
+        };
         let tolerance = self.reader.real_at(table, "angle_tolerance", Range64::Finite);
         if let Some(value) = tolerance.as_ref().filter(|t| !(0.0..=0.1).contains(&t.value)) {
             let complaint = say::not_in_range("angle_tolerance", value.value, "between 0 and 0.1 rad");

@@ -181,9 +181,9 @@ pub struct ProgramArgs {
     /// A frame (link) that positions, velocities and Jacobians are asked for; may be repeated [default: the robot's tips]
     #[arg(long = "frame", value_name = "NAME")]
     frames: Vec<String>,
-    /// The scalar type [default: f64]
+    /// The scalar type; repeated, for each further one a module `single` or `double` [default: f64]
     #[arg(long, value_parser = words::<Scalar>())]
-    scalar: Option<Scalar>,
+    scalar: Vec<Scalar>,
     /// Which rewrite rules may be used
     #[arg(long, default_value = "all", value_parser = words::<Grade>())]
     rules: Grade,
@@ -284,7 +284,9 @@ impl ProgramArgs {
             options.functions.sort_unstable();
             options.functions.dedup();
         }
-        options.scalar = self.scalar.unwrap_or(options.scalar);
+        if let [first, others @ ..] = &self.scalar[..] {
+            (options.scalar, options.also) = (*first, others.to_vec());
+        }
     }
 
     pub fn options(&self, model: &ModelArgs) -> Options {
@@ -297,7 +299,8 @@ impl ProgramArgs {
         Options {
             functions,
             frames: self.frames.clone(),
-            scalar: self.scalar.unwrap_or(Scalar::F64),
+            scalar: self.scalar.first().copied().unwrap_or(Scalar::F64),
+            also: self.scalar.iter().skip(1).copied().collect(),
             grade: self.rules,
             forward_dynamics: self.forward_dynamics,
             limits: Limits { operations: self.max_part_operations },

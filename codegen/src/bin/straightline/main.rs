@@ -180,6 +180,11 @@ fn verify(a: &Verify) -> Result<(), Failure> {
 
 fn export(a: &Export) -> Result<(), Failure> {
     let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;
+    if !generated.others.is_empty() || generated.report.staged.is_some() {
+        print::error("a C package has one scalar type, and no stages: C could not tell a stage that is out of date");
+        print::help("say which with `--scalar`, and leave `staged` out of the scene");
+        return Err(Failure::Input);
+    }
     let prefix = a.prefix.clone().unwrap_or_else(|| export::identifier(&generated.model.name));
     output::write_directory(&a.output, &export::c_package(&generated, &prefix))?;
     Ok(())

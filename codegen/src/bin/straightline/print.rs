@@ -11,6 +11,7 @@ use straightline_codegen::diagnostic::{Diagnostics, Severity};
 use straightline_codegen::model::SpecialAngle;
 use straightline_codegen::report::waterfall::{signed, Waterfall};
 use straightline_codegen::report::Report;
+use straightline_codegen::staged::{Remaining, StageReport};
 use straightline_codegen::verify::Verification;
 use straightline_core::model::Model;
 use straightline_core::Dd;
@@ -101,6 +102,24 @@ pub fn report(report: &Report) -> io::Result<()> {
             "{name:<20}{:>8}{:>8}{:>8}{:>6}{:>6}{:>8}{:>6}{:>7}{:>8}",
             f.mul, f.add, f.fma, f.div, f.sqrt, f.sincos, f.max_live, f.parts, f.lines
         )?;
+    }
+    if let Some(staged) = &report.staged {
+        writeln!(out)?;
+        for s in &staged.stages {
+            let StageReport { name, mul, add, div, sqrt, sincos, stored } = s;
+            writeln!(
+                out,
+                "stage {name:<14}{mul:>8}{add:>8}{:>8}{div:>6}{sqrt:>6}{sincos:>8}, stores {stored} values",
+                ""
+            )?;
+        }
+        for (name, Remaining { mul, add, div, sqrt }) in &staged.remaining {
+            writeln!(out, "then {name:<15}{mul:>8}{add:>8}{:>8}{div:>6}{sqrt:>6}", "")?;
+        }
+        let stored = [("inverse", staged.inverse_dynamics), ("forward", staged.forward_dynamics)];
+        for (what, stored) in stored.into_iter().filter_map(|(what, stored)| Some((what, stored?))) {
+            writeln!(out, "stored for {what} dynamics: {stored}")?;
+        }
     }
     writeln!(out, "\nfma: instructions for mul and add when every a·b ± c is one; live: most values alive at once")?;
     for (name, method) in functions.iter().filter_map(|(name, f)| Some((name, f.method?))) {
