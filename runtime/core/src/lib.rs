@@ -11,7 +11,10 @@ extern crate alloc;
 
 #[cfg(feature = "alloc")]
 pub mod algorithms;
+#[cfg(feature = "alloc")]
+pub mod contact;
 pub mod dd;
+pub mod jet;
 #[cfg(feature = "alloc")]
 pub mod model;
 pub mod real;

@@ -54,18 +54,31 @@ impl<T: Real> Ltdl<T> {
 
     /// x with H x = `right`, nv numbers by velocity coordinate.
     pub fn solve(&self, right: &[T]) -> Vec<T> {
-        let n = self.coordinates.len();
-        let mut x: Vec<T> = self.coordinates.iter().map(|&i| right[i]).collect();
+        self.finish(self.half(right))
+    }
+
+    /// y with Lᵀ y = `right`, by rows from the base outwards: bᵀ H⁻¹ c is y_bᵀ D⁻¹ y_c.
+    pub(super) fn half(&self, right: &[T]) -> Vec<T> {
+        let mut y: Vec<T> = self.coordinates.iter().map(|&i| right[i]).collect();
         T::section("solve", None);
-        for i in (0..n).rev() {
-            // Lᵀ y = b
+        for i in (0..y.len()).rev() {
             for j in up(&self.parents, i) {
-                x[j] = x[j] - self.lower[i][j] * x[i];
+                y[j] = y[j] - self.lower[i][j] * y[i];
             }
         }
-        let mut solution = right.to_vec();
-        for i in 0..n {
-            // L x = D⁻¹ y
+        y
+    }
+
+    /// D⁻¹ y.
+    pub(super) fn scaled(&self, y: &[T]) -> Vec<T> {
+        y.iter().zip(&self.inverse_pivots).map(|(y, d)| *y * *d).collect()
+    }
+
+    /// x with L x = D⁻¹ y, nv numbers by velocity coordinate.
+    pub(super) fn finish(&self, y: Vec<T>) -> Vec<T> {
+        let mut x = y;
+        let mut solution = x.clone();
+        for i in 0..x.len() {
             x[i] = x[i] * self.inverse_pivots[i];
             for j in up(&self.parents, i) {
                 x[i] = x[i] - self.lower[i][j] * x[j];
@@ -73,6 +86,11 @@ impl<T: Real> Ltdl<T> {
             solution[self.coordinates[i]] = x[i];
         }
         solution
+    }
+
+    /// Σ 1/D: how easily the joints move, each with those outside it free.
+    pub(super) fn mobility(&self) -> T {
+        self.inverse_pivots.iter().fold(T::zero(), |sum, d| sum + *d)
     }
 }
 

@@ -46,12 +46,20 @@
 //! | motion under a tau | [`forward_dynamics_aba`], [`forward_dynamics_ltdl`] |
 //! | energy | [`kinetic_energy`], [`potential_energy`] |
 //! | mass centre, momentum | [`momentum`](fn@momentum) |
+//! | contact coordinates, (20.83)-(20.87) | [`relative_motion`], [`functional_coordinates`] |
+//! | motion and reactions in contact, (20.88)-(20.94) | [`constrained_forward_dynamics`], [`hybrid_inverse_dynamics`], [`Environment`] |
+//! | impact, (20.90)-(20.97) | [`impact`](fn@impact) |
 
 mod aba;
+mod constraint;
+mod contact_system;
 mod crba;
 mod effects;
 mod energy;
+mod environment;
 mod factor;
+mod functional;
+mod impact;
 mod jacobian;
 mod joint;
 mod kinematics;
@@ -64,10 +72,20 @@ mod rnea;
 mod velocity;
 
 pub use aba::{forward_dynamics_aba, solve_articulated};
+pub use constraint::{
+    applied_rows, baumgarte, constrained_forward_dynamics, hybrid_inverse_dynamics, projection, ConstrainedMotion,
+    Support,
+};
 pub use crba::mass_matrix;
 pub use effects::{passive_force, rotor_inertias};
 pub use energy::{kinetic_energy, potential_energy};
+pub use environment::{Environment, EnvironmentMotion, SpringDamper};
 pub use factor::{forward_dynamics_ltdl, Ltdl};
+pub use functional::{
+    constrained_coordinates, functional_coordinates, reduced_relative_motion, relative_motion, FunctionalCoordinates,
+    RelativeMotion,
+};
+pub use impact::{impact, Impact, Struck};
 pub use jacobian::{jacobian, jacobian_bias};
 pub use joint::composing_pays;
 pub use kinematics::{forward_kinematics, frame_acceleration, frame_velocity};

@@ -8,28 +8,16 @@
 //! enters as in `rnea.rs`, with Σ_zz = 0 for revolute joints.
 
 use super::reduced_turn::Turn;
-use crate::model::JointKind;
+use crate::model::{BodyId, JointKind};
 use crate::real::Real;
 use crate::reduced::{ReducedBody, ReducedModel};
-use crate::spatial::{ForceVector, Mat3, Vec3};
+use crate::spatial::{ForceVector, Mat3, Transform, Vec3};
 use alloc::vec;
 use alloc::vec::Vec;
 
 /// Generalized forces tau \[N·m or N\] of a motion: [`inverse_dynamics`](super::inverse_dynamics) of the full robot.
 pub fn reduced_inverse_dynamics<T: Real>(model: &ReducedModel<T>, q: &[T], qd: &[T], qdd: &[T]) -> Vec<T> {
-    let mut links: Vec<Link<T>> = Vec::with_capacity(model.bodies.len());
-    let world = Link::world(model.gravity);
-    let turns = Turn::all(model, q);
-    for (i, body) in model.bodies.iter().enumerate() {
-        T::section("forward", Some(i));
-        let arm = match body.parent {
-            Some(p) => turns[p].own_to_described(&model.bodies[p], body.translation),
-            None => body.translation,
-        };
-        let parent = body.parent.map_or(&world, |p| &links[p]);
-        links.push(parent.child(i, body, &turns[i], (arm, model.per_unit), [q, qd, qdd]));
-    }
-
+    let (turns, links) = motions(model, q, qd, qdd);
     let mut tau = vec![T::zero(); model.nv()];
     let mut carried = vec![ForceVector::zero(); model.bodies.len()];
     for (i, body) in model.bodies.iter().enumerate().rev() {
@@ -56,6 +44,137 @@ pub fn reduced_inverse_dynamics<T: Real>(model: &ReducedModel<T>, q: &[T], qd: &
         }
     }
     tau
+}
+
+/// How all bodies move: the sweep from the base to the tips.
+fn motions<T: Real>(model: &ReducedModel<T>, q: &[T], qd: &[T], qdd: &[T]) -> (Vec<Turn<T>>, Vec<Link<T>>) {
+    let mut links: Vec<Link<T>> = Vec::with_capacity(model.bodies.len());
+    let world = Link::world(model.gravity);
+    let turns = Turn::all(model, q);
+    for (i, body) in model.bodies.iter().enumerate() {
+        T::section("forward", Some(i));
+        let arm = match body.parent {
+            Some(p) => turns[p].own_to_described(&model.bodies[p], body.translation),
+            None => body.translation,
+        };
+        let parent = body.parent.map_or(&world, |p| &links[p]);
+        links.push(parent.child(i, body, &turns[i], (arm, model.per_unit), [q, qd, qdd]));
+    }
+    (turns, links)
+}
+
+/// How a point and the axes of a frame that a body carries move for q̈ = 0, in the axes in which the body is described.
+pub(super) struct CarriedMotion<T> {
+    /// ω \[rad/s\].
+    pub omega: Vec3<T>,
+    /// ε for q̈ = 0 \[rad/s²\].
+    pub alpha: Vec3<T>,
+    /// Columns: the frame's axes.
+    pub axes: Mat3<T>,
+    /// The frame's origin in the world \[m\].
+    pub position: Vec3<T>,
+    /// Acceleration of the frame's origin for q̈ = 0 less gravity, in the model's unit of length per s².
+    accel: Vec3<T>,
+    /// Gravity in the world, in that unit.
+    gravity: Vec3<T>,
+    /// Metres per unit of length.
+    unit: T,
+    /// The bodies from the root to this one, with their turns and the levers from their origins to the frame's, in the axes in
+    /// which they are described.
+    path: Vec<(ReducedBody<T>, Turn<T>, Vec3<T>)>,
+    nv: usize,
+}
+
+/// What a direction in the world is to the coordinates.
+pub(super) struct DirectionRow<T> {
+    /// The direction in the axes in which the frame's body is described.
+    pub at_tip: Vec3<T>,
+    /// Velocity of the frame's origin along it, per velocity coordinate.
+    pub linear: Vec<T>,
+    /// Angular velocity of the frame about it, per velocity coordinate.
+    pub angular: Vec<T>,
+    /// Acceleration of the frame's origin along it for q̈ = 0 \[m/s²\].
+    pub acceleration: T,
+}
+
+/// The motion of a frame; `placement` \[m\] in the frame of body `carrier`.
+pub(super) fn carried_motion<T: Real>(
+    model: &ReducedModel<T>,
+    q: &[T],
+    qd: &[T],
+    carrier: BodyId,
+    placement: Transform<T>,
+) -> CarriedMotion<T> {
+    let (turns, links) = motions(model, q, qd, &vec![T::zero(); model.nv()]);
+    T::section("contact frame", Some(carrier));
+    let unit = T::one() / model.per_unit;
+    let (body, turn, link) = (&model.bodies[carrier], &turns[carrier], &links[carrier]);
+    let described = |v| turn.own_to_described(body, v);
+    let tip_lever = described(placement.translation.scale(model.per_unit));
+    let mut path = Vec::new();
+    let (mut next, mut lever) = (Some(carrier), tip_lever);
+    let mut origin = Vec3::zero();
+    while let Some(i) = next {
+        let (body, turn) = (&model.bodies[i], &turns[i]);
+        path.push((body.clone(), turn.clone(), lever));
+        if body.kind == JointKind::Floating {
+            origin = Vec3::new(q[body.iq], q[body.iq + 1], q[body.iq + 2]);
+        }
+        lever = links[i].arm + turn.base_to_parent(body, turn.described_to_base(body, lever));
+        next = body.parent;
+    }
+    path.reverse();
+    let columns = [0, 1, 2].map(|k| described(placement.rotation.column(k)));
+    CarriedMotion {
+        omega: link.spin.omega,
+        alpha: link.spin.alpha,
+        axes: Mat3::from_columns(columns[0], columns[1], columns[2]),
+        position: origin + lever.scale(unit),
+        accel: link.accel + link.spin.u * tip_lever,
+        gravity: model.gravity,
+        unit,
+        path,
+        nv: model.nv(),
+    }
+}
+
+impl<T: Real> CarriedMotion<T> {
+    /// The rows of a direction in the world.
+    pub fn row(&self, direction: Vec3<T>) -> DirectionRow<T> {
+        T::section("contact direction", None);
+        // scaled by the unit of length, so that constants meet constants
+        let in_metres = direction.scale(self.unit);
+        let (mut n, mut f) = (direction, in_metres);
+        let (mut linear, mut angular) = (vec![T::zero(); self.nv], vec![T::zero(); self.nv]);
+        for (body, turn, r) in &self.path {
+            let down = |v| {
+                let base = turn.parent_to_base(body, v);
+                if body.stays {
+                    base
+                } else {
+                    turn.base_to_own(base)
+                }
+            };
+            (n, f) = (down(n), down(f));
+            let iv = body.iv;
+            match body.kind {
+                JointKind::Revolute => {
+                    linear[iv] = r.x * f.y - r.y * f.x; // (r × f) · z
+                    angular[iv] = n.z;
+                }
+                JointKind::Prismatic => linear[iv] = f.z,
+                JointKind::Floating => {
+                    let about = r.cross(f).to_array();
+                    for (k, (n, about)) in n.to_array().into_iter().zip(about).enumerate() {
+                        linear[iv + k] = n;
+                        linear[iv + 3 + k] = about;
+                        angular[iv + 3 + k] = n;
+                    }
+                }
+            }
+        }
+        DirectionRow { at_tip: n, linear, angular, acceleration: f.dot(self.accel) + in_metres.dot(self.gravity) }
+    }
 }
 
 /// ω, ε and U of one rigid body, in some axes.

@@ -13,6 +13,7 @@ use crate::spatial::{Mat3, Vec3};
 use alloc::vec::Vec;
 
 /// From the axes in which a body is described to those in which its parent is.
+#[derive(Clone)]
 pub(super) struct Turn<T> {
     /// Sine and cosine of the angle from the base axes to the body's own; none for joints that do not turn so.
     pub angle: Option<(T, T)>,

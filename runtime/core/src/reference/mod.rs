@@ -1,7 +1,7 @@
 //! The chapter's own formulation of robot dynamics: the second author, who proves the first.
 //!
-//! Source: the handbook chapter *Robot Dynamics*, sections 20.1 and 20.2 and its appendix, equations (20.1)–(20.61) and
-//! (20.100)–(20.111); equation numbers in this module are the chapter's. Its misprints are corrected where they occur,
+//! Source: the handbook chapter *Robot Dynamics*, sections 20.1, 20.2, 20.5.2 and 20.5.3 and its appendix, equations
+//! (20.1)–(20.61), (20.83)–(20.97) and (20.100)–(20.111); equation numbers in this module are the chapter's. Its misprints are corrected where they occur,
 //! and every correction says so. Link frames sit in the mass centres, all vectors of motion and force are expressed in
 //! the external immobile frame, rotations come from Rodrigues' formula, forces from D'Alembert's principle, and the
 //! equations of motion from the matrices Λ, Γ, Ξ, Δ. Nothing of [`crate::algorithms`] or [`crate::spatial`] is used:
@@ -43,6 +43,7 @@
 //! assert_eq!(tau[0], (0.1 + 2.0 * 0.25) * 5.0 + 2.0 * 10.0 * 0.5);
 //! ```
 
+mod contact;
 mod dynamics;
 mod energy;
 mod frames;
@@ -52,6 +53,10 @@ mod scalar;
 mod solve;
 mod tree;
 
+pub use contact::{
+    at_rest, constrained_motion, environment_impact, environment_motion, functional_coordinate, rigid_impact,
+    Component, ContactFrames, Derivatives,
+};
 pub use dynamics::{
     bias_force, dalembert_inverse_dynamics, equations_of_motion, forward_dynamics, forward_natural_scale,
     gravity_force, inverse_dynamics, joint_loads, joint_wrenches, mass_matrix, natural_scale, velocity_force,

@@ -1,0 +1,337 @@
+//! Contact, impact and environment on the generic runtime and in the chapter's formulation: both against data with 25 digits,
+//! and against each other on random robots with objects that move.
+
+use nalgebra::{Matrix3, Vector3};
+use straightline_codegen::function::Robot as Loaded;
+use straightline_core::algorithms as alg;
+use straightline_core::algorithms::{Environment, FunctionalCoordinates, Ltdl, SpringDamper, Struck, Support};
+use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion, Surface};
+use straightline_core::model::Model;
+use straightline_core::reference as chapter;
+use straightline_core::reference::{Component, ContactFrames, Derivatives, MassCentreTree};
+use straightline_core::spatial::{Mat3, MotionVector, Transform, Vec3};
+use straightline_core::{Dd, Real};
+use straightline_generated_tests::contact_cases::{cases, robot, Case};
+use straightline_generated_tests::random::{Kind, Random, RandomRobot};
+
+/// The data have 25 digits; H of the stretched robots of the data costs some of double-double's 31.
+const DIGITS: f64 = 1e-22;
+/// Two authors in double-double, whose unit is 1e-32: a random robot's H may be as bad as 1e4.
+const AUTHORS: f64 = 1e-24;
+/// What is asked of f64.
+const ROUNDED: f64 = 1e-12;
+const RIDGE: f64 = 1e-12;
+/// In double-double the ridge is so small that its square is not seen beside the data's digits.
+const WIDE_RIDGE: f64 = 1e-16;
+
+fn wide(values: &[f64]) -> Vec<Dd> {
+    values.iter().map(|x| Dd::from(*x)).collect()
+}
+
+/// All quantities of a case, by key of the data, on the generic runtime.
+fn runtime<T: Real>(
+    case: &Case,
+    model: &Model<T>,
+    contact: &Contact<T>,
+    file: &str,
+    ridge: f64,
+) -> Vec<(&'static str, Vec<T>)> {
+    let c = |x: f64| T::constant(Dd::from(x));
+    let input = |key: &str| case.input(key).into_iter().map(c).collect::<Vec<T>>();
+    let (q, qd, ridge) = (input("q"), input("qd"), c(ridge));
+    let s = alg::constrained_coordinates(model, contact, &q, &qd);
+    let factor = Ltdl::factor(model, &alg::mass_matrix(model, &q));
+    let drive = || {
+        let h = alg::bias_force(model, &q, &qd);
+        input("tau").into_iter().zip(h).map(|(t, h)| t - h).collect::<Vec<T>>()
+    };
+    match file {
+        "contact" => {
+            let supports = vec![Support::Rigid(T::zero()); s.len()];
+            let motion = alg::constrained_forward_dynamics(&factor, &drive(), &s, None, &supports, ridge);
+            vec![
+                ("s", s.value),
+                ("sd", s.rate),
+                ("J_c", s.jacobian.concat()),
+                ("A_c", s.bias),
+                ("qdd", motion.qdd),
+                ("F", motion.force),
+            ]
+        }
+        "impact" => {
+            let blow = alg::impact(&factor, &qd, &s, None, &vec![Struck::Rigid; s.len()], T::zero(), ridge);
+            let after = qd.iter().zip(&blow.dqd).map(|(a, b)| *a + *b).collect();
+            vec![
+                ("dqd", blow.dqd),
+                ("impulse", blow.impulse),
+                ("qd_after", after),
+                ("energy_loss", vec![blow.energy_loss]),
+            ]
+        }
+        "environment" => {
+            let [mass, stiffness, damping] = ["me", "k", "b"].map(|key| c(case.parameter(key)));
+            let object = Environment::Mass { mass, support: SpringDamper { stiffness, damping } };
+            let own = (T::zero(), T::zero());
+            let support = [object.support((s.value[0], s.rate[0]), own)];
+            let motion = alg::constrained_forward_dynamics(&factor, &drive(), &s, None, &support, ridge);
+            vec![
+                ("s", s.value),
+                ("sd", s.rate),
+                ("J_6", s.jacobian.concat()),
+                ("A_6", s.bias),
+                ("qdd", motion.qdd),
+                ("sdd", motion.sdd),
+                ("F", motion.force),
+            ]
+        }
+        _ => {
+            let struck = [Struck::Mass { mass: c(case.parameter("me")), velocity: c(case.parameter("sd_env_before")) }];
+            let blow = alg::impact(&factor, &qd, &s, None, &struck, T::zero(), ridge);
+            vec![("dqd", blow.dqd), ("dsd6", blow.dsd), ("impulse", blow.impulse), ("sd_after", blow.struck_velocity)]
+        }
+    }
+}
+
+/// The same by the second author.
+fn second_author(case: &Case, tree: &MassCentreTree<Dd>, file: &str) -> Vec<(&'static str, Vec<Dd>)> {
+    let (frames, components) = case.reference(tree);
+    let (q, qd) = (wide(&case.input("q")), wide(&case.input("qd")));
+    let s: Vec<Derivatives<Dd>> =
+        components.iter().map(|c| chapter::functional_coordinate(tree, &frames, &q, &qd, *c)).collect();
+    let list = |f: &dyn Fn(&Derivatives<Dd>) -> Dd| s.iter().map(f).collect::<Vec<Dd>>();
+    let rows = || s.iter().flat_map(|s| s.jacobian.iter().copied()).collect::<Vec<Dd>>();
+    let of = |v: nalgebra::DVector<Dd>| v.as_slice().to_vec();
+    match file {
+        "contact" => {
+            let (qdd, force) = chapter::constrained_motion(tree, &s, &q, &qd, &wide(&case.input("tau")));
+            vec![
+                ("s", list(&|s| s.s)),
+                ("sd", list(&|s| s.sd)),
+                ("J_c", rows()),
+                ("A_c", list(&|s| s.adjoint)),
+                ("qdd", of(qdd)),
+                ("F", of(force)),
+            ]
+        }
+        "impact" => {
+            let (dqd, impulse) = chapter::rigid_impact(tree, &s, &q, &qd, Dd::ZERO);
+            vec![("dqd", of(dqd)), ("impulse", of(impulse))]
+        }
+        "environment" => {
+            let parameters = ["me", "k", "b"].map(|key| Dd::from(case.parameter(key)));
+            let tau = wide(&case.input("tau"));
+            let (qdd, sdd, force) = chapter::environment_motion(tree, &s[0], parameters, &q, &qd, &tau);
+            vec![("qdd", of(qdd)), ("sdd", vec![sdd]), ("F", vec![force])]
+        }
+        _ => {
+            let [me, before] = ["me", "sd_env_before"].map(|key| Dd::from(case.parameter(key)));
+            let (dqd, dsd, impulse, after) = chapter::environment_impact(tree, &s[0], me, before, &q, &qd);
+            vec![("dqd", of(dqd)), ("dsd6", vec![dsd]), ("impulse", vec![impulse]), ("sd_after", vec![after])]
+        }
+    }
+}
+
+/// The largest error of a quantity against its largest component; of what may vanish, against what it is made of.
+fn worst_of(case: &Case, key: &str, computed: &[impl Into<Dd> + Copy]) -> f64 {
+    let expected = case.expected(key);
+    assert_eq!(computed.len(), expected.len(), "{key} of {}", case.id);
+    let own = expected.iter().fold(0.0f64, |m, x| m.max(x.abs().hi()));
+    let speed = case.input("qd").iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    let least = match key {
+        "s" | "J_c" | "J_6" => 1.0,
+        "sd" | "dsd6" | "sd_after" => speed,
+        "A_c" | "A_6" => speed * speed,
+        "F" | "qdd" | "sdd" if case.id.starts_with("environment/") => spring_scale(case, key),
+        _ => 0.0,
+    };
+    let error = computed.iter().zip(&expected).fold(0.0f64, |m, (x, y)| {
+        let error = ((*x).into() - *y).abs().hi();
+        if error.is_nan() {
+            f64::INFINITY
+        } else {
+            m.max(error)
+        }
+    });
+    if error == 0.0 {
+        0.0
+    } else {
+        error / own.max(least)
+    }
+}
+
+/// What a position or a velocity at its own scale (1 m, q̇) does through spring and damper: k · 1 m + b q̇ as a force, shared
+/// between the mass m_e and the robot, and what that force accelerates.
+fn spring_scale(case: &Case, key: &str) -> f64 {
+    let speed = case.input("qd").iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    let (tree, jacobian) = (robot(&case.robot).1, case.expected("J_6"));
+    let h = chapter::mass_matrix(&tree, &wide(&case.input("q")));
+    let moved = chapter::solve_symmetric(&h, &nalgebra::DVector::from_column_slice(&jacobian));
+    let inverse_mass = jacobian.iter().zip(moved.iter()).fold(Dd::ZERO, |sum, (j, x)| sum + *j * *x).hi();
+    let force = (case.parameter("k") + case.parameter("b") * speed) / (1.0 + case.parameter("me") * inverse_mass);
+    match key {
+        "F" => force,
+        "sdd" => inverse_mass * force,
+        _ => moved.iter().fold(0.0f64, |m, x| m.max(x.abs().hi())) * force,
+    }
+}
+
+#[test]
+fn both_authors_meet_every_case_of_the_data() {
+    for file in ["contact", "impact", "environment", "environment_impact"] {
+        let mut known: Option<(String, (Loaded, MassCentreTree<Dd>))> = None;
+        let (mut first, mut second, mut rounded) = (0.0f64, 0.0f64, 0.0f64);
+        for case in cases(file) {
+            if known.as_ref().is_none_or(|(name, _)| *name != case.robot) {
+                known = Some((case.robot.clone(), robot(&case.robot)));
+            }
+            let (loaded, tree) = &known.as_ref().expect("just read").1;
+            let contact = case.contact(loaded);
+            let ours = runtime(&case, &loaded.model, &contact, file, WIDE_RIDGE);
+            let theirs = second_author(&case, tree, file);
+            let narrow = runtime(&case, &loaded.model.cast::<f64>(), &contact.map(f64::constant), file, RIDGE);
+            for (key, value) in &ours {
+                let error = worst_of(&case, key, value);
+                assert!(error <= DIGITS, "{key} of {}: {error:.1e}", case.id);
+                first = first.max(error);
+            }
+            for (key, value) in &theirs {
+                let error = worst_of(&case, key, value);
+                assert!(error <= DIGITS, "{key} of {} by the second author: {error:.1e}", case.id);
+                second = second.max(error);
+            }
+            for (key, value) in &narrow {
+                let error = worst_of(&case, key, value);
+                assert!(error <= ROUNDED, "{key} of {} in f64: {error:.1e}", case.id);
+                rounded = rounded.max(error);
+            }
+        }
+        println!("{file}: {first:.1e} and {second:.1e} in double-double, {rounded:.1e} in f64");
+    }
+}
+
+fn narrow_to(v: Vector3<Dd>) -> Vec3<Dd> {
+    Vec3::new(v.x, v.y, v.z)
+}
+
+fn unit(random: &mut Random) -> Vector3<Dd> {
+    let v = Vector3::from(random.three(1.0).map(Dd::from)) + Vector3::new(Dd::from(0.1), Dd::ZERO, Dd::ZERO);
+    v / v.dot(&v).sqrt()
+}
+
+fn across(random: &mut Random, a: &Vector3<Dd>) -> Vector3<Dd> {
+    let b = unit(random).cross(a);
+    b / b.dot(&b).sqrt()
+}
+
+/// A contact of a random frame with an object that moves, for both authors.
+fn random_contact(
+    random: &mut Random,
+    robot: &Loaded,
+    tree: &MassCentreTree<Dd>,
+    frame: &str,
+) -> (Contact<Dd>, ContactFrames<Dd>) {
+    let vector = |random: &mut Random| Vector3::from(random.three(1.0).map(Dd::from));
+    let (a, x) = (unit(random), unit(random));
+    let (b, y) = (across(random, &a), across(random, &x));
+    let object = Matrix3::from_columns(&[x, y, x.cross(&y)]);
+    let motion = [(); 4].map(|()| vector(random));
+    let origin = vector(random);
+    let radius = Dd::from(random.between(0.1, 0.5));
+    let rotation = Mat3::from_columns(narrow_to(x), narrow_to(y), narrow_to(x.cross(&y)));
+    let [v, w, vd, wd] = motion.map(narrow_to);
+    let contact = Contact {
+        name: "random".into(),
+        frame: robot.model.frame(frame).expect("a frame of the robot").clone(),
+        axis: narrow_to(a),
+        second_axis: narrow_to(b),
+        object: Object::Moving(ObjectMotion {
+            pose: Transform { rotation, translation: narrow_to(origin) },
+            velocity: MotionVector { angular: w, linear: v },
+            acceleration: MotionVector { angular: wd, linear: vd },
+        }),
+        surface: Surface::Plane,
+        constrained: Coordinate::ALL.to_vec(),
+        free: vec![],
+        friction: None,
+    };
+    let frame = tree.frame(frame).expect("a frame of the robot").clone();
+    (contact, ContactFrames { frame, axes: [a, b], origin, object, motion, radius })
+}
+
+fn kinds() -> impl Iterator<Item = Kind> {
+    (0..12).map(|i| Kind {
+        joints: 2 + i,
+        welded: i % 3,
+        floating: i % 2 == 1,
+        branched: i % 4 > 1,
+        right_angled: i % 3 == 0,
+    })
+}
+
+fn compare(what: &str, seed: usize, found: &FunctionalCoordinates<Dd>, expected: &[Derivatives<Dd>], speed: f64) {
+    for (i, s) in expected.iter().enumerate() {
+        let row: Vec<Dd> = s.jacobian.iter().copied().collect();
+        let errors = [
+            (found.value[i] - s.s).abs().hi(),
+            (found.rate[i] - s.sd).abs().hi() / speed,
+            (found.bias[i] - s.adjoint).abs().hi() / (speed * speed),
+            found.jacobian[i].iter().zip(&row).fold(0.0, |m: f64, (a, b)| m.max((*a - *b).abs().hi())),
+        ];
+        assert!(errors.iter().all(|e| *e < AUTHORS), "{what} {i} of robot {seed}: s, ṡ, A, J differ by {errors:?}");
+    }
+}
+
+#[test]
+fn functional_coordinates_of_random_robots_are_those_of_the_second_author() {
+    for (seed, kind) in kinds().enumerate() {
+        let mut random = Random(100 + seed as u64);
+        let robot = RandomRobot::new(&mut random, kind);
+        let (loaded, tree) = (robot.load_literally(), robot.reference());
+        for frame in robot.frames() {
+            if loaded.model.frame(&frame).and_then(|f| f.body).is_none() {
+                continue;
+            }
+            let (contact, frames) = random_contact(&mut random, &loaded, &tree, &frame);
+            let mut q = wide(&random.configuration(loaded.model.nq(), kind.floating));
+            if kind.floating {
+                let norm = q[3..7].iter().fold(Dd::ZERO, |sum, x| sum + *x * *x).sqrt();
+                q[3..7].iter_mut().for_each(|x| *x = *x / norm);
+            }
+            let qd = wide(&random.list(loaded.model.nv(), 2.0));
+            let speed = 1.0 + qd.iter().fold(0.0, |sum, x| sum + x.abs().hi());
+            let coordinate = |c| chapter::functional_coordinate(&tree, &frames, &q, &qd, c);
+            let plane = [
+                Component::Position(0),
+                Component::Position(1),
+                Component::Position(2),
+                Component::Axis(0),
+                Component::Axis(1),
+                Component::SecondAxis(1),
+            ];
+            let expected: Vec<_> = plane.into_iter().map(coordinate).collect();
+            let motion = alg::relative_motion(&loaded.model, &contact, &q, &qd);
+            let found = alg::functional_coordinates(&contact, &motion, &Coordinate::ALL);
+            compare("coordinate", seed, &found, &expected, speed);
+            // along the path in the reduced robot
+            let body = contact.frame.body.expect("checked above");
+            let placement = loaded.reduced_frames[body].inverse().compose(&contact.frame.placement);
+            let reduced = alg::reduced_relative_motion(&loaded.reduced, &contact, (body, placement), &q, &qd);
+            let found = alg::functional_coordinates(
+                &contact,
+                &reduced.expect("the object is not on the robot"),
+                &Coordinate::ALL,
+            );
+            compare("reduced coordinate", seed, &found, &expected, speed);
+            // curved
+            let radius = frames.radius;
+            for (surface, component) in [
+                (Surface::Sphere { radius, hollow: false }, Component::Sphere),
+                (Surface::Cylinder { radius, hollow: false }, Component::Cylinder),
+            ] {
+                let curved = Contact { surface, ..contact.clone() };
+                let found = alg::functional_coordinates(&curved, &motion, &[Coordinate::Pz]);
+                compare("distance", seed, &found, &[coordinate(component)], speed * 10.0);
+            }
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! The small system of a contact: G = J H⁻¹ Jᵀ, the inverse mass that reactions feel, regularised and solved.
+//!
+//! With the branch-sparse factor H = Lᵀ D L, G is made of L⁻ᵀ Jᵀ (Featherstone 2008, section 8.4-8.6). For rigid contacts
+//! without friction it is symmetric and not negative.
+//!
+//! **Regularisation.** Rows may be redundant (a flat foot on four points) or vanish (a stretched arm): then G is singular.
+//! Each diagonal entry gets a ridge ε G_ii + ε² Σ 1/D: relative to its own row, so that lengths and angles may stand side by
+//! side, and never zero, as Σ 1/D of the joints is not. Solving twice, the second time for what is left, takes the error on
+//! regular rows from ε to ε². A pivot is never let below ε/2 of its diagonal, so that rounding cannot make a division by
+//! zero. What is returned says how far it went: the least pivot against its diagonal, 1 for rows that do not know of each
+//! other, about ε for redundant ones, and the violation that is left.
+
+use super::factor::Ltdl;
+use crate::dd::Dd;
+use crate::real::Real;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// What a row of the system stands for, with reactions F and the inverse mass G:
+/// `inertia` (G F)_i + (`compliance` + ridge) F_i = right side.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Row<T> {
+    /// (G F)_i is given.
+    Rigid,
+    /// F_i gives way: m (G F)_i + F_i is given, with m ≥ 0 \[kg\].
+    Yielding(T),
+}
+
+/// G and its factor.
+pub(super) struct ContactSystem<T> {
+    /// L⁻ᵀ of the directions in which reactions act.
+    half: Vec<Vec<T>>,
+    /// D⁻¹ L⁻ᵀ Jᵀ.
+    scaled: Vec<Vec<T>>,
+    inverse_mass: Vec<Vec<T>>,
+    /// The matrix of the system without ridges.
+    matrix: Vec<Vec<T>>,
+    solver: Solver<T>,
+    /// Least pivot against its diagonal entry.
+    pub pivot: T,
+}
+
+/// L U of a small matrix, no exchange of rows; for a symmetric one U = D Lᵀ.
+struct Solver<T> {
+    lower: Vec<Vec<T>>,
+    upper: Vec<Vec<T>>,
+    inverse_pivots: Vec<T>,
+}
+
+/// The greater of two, by a sign instead of a branch.
+fn greater<T: Real>(a: T, b: T) -> T {
+    let (sign, half) = ((a - b).sign(), T::constant(Dd::HALF));
+    (T::one() + sign) * half * a + (T::one() - sign) * half * b
+}
+
+fn lesser<T: Real>(a: T, b: T) -> T {
+    -greater(-a, -b)
+}
+
+fn dot<T: Real>(a: &[T], b: &[T]) -> T {
+    a.iter().zip(b).fold(T::zero(), |sum, (x, y)| sum + *x * *y)
+}
+
+impl<T: Real> ContactSystem<T> {
+    /// From the rows of J and those in which reactions act, where they are others; `ridge` is ε.
+    pub fn new(factor: &Ltdl<T>, jacobian: &[Vec<T>], applied: Option<&[Vec<T>]>, rows: &[Row<T>], ridge: T) -> Self {
+        T::section("inverse mass of the contact", None);
+        let m = jacobian.len();
+        let own: Vec<Vec<T>> = jacobian.iter().map(|row| factor.half(row)).collect();
+        let scaled: Vec<Vec<T>> = own.iter().map(|y| factor.scaled(y)).collect();
+        let half = applied.map_or(own, |rows| rows.iter().map(|row| factor.half(row)).collect());
+        let symmetric = applied.is_none() && rows.iter().all(|r| matches!(r, Row::Rigid));
+        let mut inverse_mass = vec![vec![T::zero(); m]; m];
+        for i in 0..m {
+            for j in 0..m {
+                let known = applied.is_none() && j < i;
+                inverse_mass[i][j] = if known { inverse_mass[j][i] } else { dot(&scaled[i], &half[j]) };
+            }
+        }
+        let mut matrix = inverse_mass.clone();
+        let mut ridged = inverse_mass.clone();
+        let floor = ridge * ridge * factor.mobility();
+        for (i, row) in rows.iter().enumerate() {
+            match row {
+                Row::Rigid => ridged[i][i] = matrix[i][i] + (ridge * matrix[i][i] + floor),
+                Row::Yielding(mass) => {
+                    matrix[i].iter_mut().for_each(|g| *g = *mass * *g);
+                    matrix[i][i] = matrix[i][i] + T::one();
+                    ridged[i].clone_from(&matrix[i]);
+                }
+            }
+        }
+        let (solver, pivot) = Solver::new(ridged, symmetric, ridge);
+        ContactSystem { half, scaled, inverse_mass, matrix, solver, pivot }
+    }
+
+    /// J H⁻¹ b, from L⁻ᵀ b.
+    pub fn response(&self, half_of_b: &[T]) -> Vec<T> {
+        self.scaled.iter().map(|row| dot(row, half_of_b)).collect()
+    }
+
+    /// G F.
+    pub fn response_to(&self, force: &[T]) -> Vec<T> {
+        self.inverse_mass.iter().map(|row| dot(row, force)).collect()
+    }
+
+    /// F for these right sides, refined once.
+    pub fn solve(&self, right: &[T]) -> Vec<T> {
+        T::section("reactions", None);
+        let first = self.solver.solve(right);
+        let left: Vec<T> = right.iter().zip(&self.matrix).map(|(b, row)| *b - dot(row, &first)).collect();
+        let second = self.solver.solve(&left);
+        first.into_iter().zip(second).enumerate().map(|(i, (x, d))| (x + d).named("reaction", i, "")).collect()
+    }
+
+    /// Adds the reactions to L⁻ᵀ b.
+    pub fn add_reactions(&self, half_of_b: Vec<T>, force: &[T]) -> Vec<T> {
+        self.half
+            .iter()
+            .zip(force)
+            .fold(half_of_b, |sum, (row, f)| sum.into_iter().zip(row).map(|(y, w)| y + *w * *f).collect())
+    }
+}
+
+impl<T: Real> Solver<T> {
+    fn new(mut a: Vec<Vec<T>>, symmetric: bool, ridge: T) -> (Self, T) {
+        let m = a.len();
+        let diagonal: Vec<T> = (0..m).map(|i| a[i][i]).collect();
+        let (mut inverse_pivots, mut least) = (Vec::with_capacity(m), T::one());
+        let mut lower = vec![vec![T::zero(); m]; m];
+        for k in 0..m {
+            // the first is the diagonal itself
+            let pivot = if k == 0 {
+                a[0][0]
+            } else {
+                let pivot = greater(a[k][k], diagonal[k] * ridge * T::constant(Dd::HALF));
+                least = lesser(least, pivot / diagonal[k]);
+                pivot
+            };
+            let inverse = T::one() / pivot;
+            inverse_pivots.push(inverse);
+            for i in k + 1..m {
+                lower[i][k] = a[i][k] * inverse;
+                for j in if symmetric { k + 1..i + 1 } else { k + 1..m } {
+                    let above = if symmetric { a[j][k] } else { a[k][j] };
+                    a[i][j] = a[i][j] - lower[i][k] * above;
+                }
+            }
+        }
+        // of a symmetric one D Lᵀ stands in the columns
+        let above = |k: usize, j: usize| if symmetric { a[j][k] } else { a[k][j] };
+        let upper = (0..m).map(|k| (0..m).map(|j| if j > k { above(k, j) } else { T::zero() }).collect()).collect();
+        (Solver { lower, upper, inverse_pivots }, least)
+    }
+
+    fn solve(&self, right: &[T]) -> Vec<T> {
+        let (m, mut x) = (right.len(), right.to_vec());
+        for i in 0..m {
+            for k in 0..i {
+                x[i] = x[i] - self.lower[i][k] * x[k];
+            }
+        }
+        for i in (0..m).rev() {
+            for k in i + 1..m {
+                x[i] = x[i] - self.upper[i][k] * x[k];
+            }
+            x[i] = x[i] * self.inverse_pivots[i];
+        }
+        x
+    }
+}
