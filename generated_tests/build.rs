@@ -7,7 +7,10 @@ use straightline_codegen::diagnostic::Source;
 use straightline_codegen::emit::Scalar;
 use straightline_codegen::expr::Grade;
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::scene::contact::{ContactItem, EnvironmentItem, EnvironmentKind, SurfaceItem};
+use straightline_codegen::scene::{ContactFunction, Contacts, Scene};
 use straightline_codegen::Function;
+use straightline_core::contact::Coordinate;
 
 /// Robot, its file, whether it floats, its frames; as in `reference/robots.json`.
 const ROBOTS: [(&str, &str, bool, &[&str]); 11] = [
@@ -74,6 +77,55 @@ fn main() {
         );
     }
     std::fs::write(out.join("compiled.rs"), modules).expect("OUT_DIR can be written");
+    for (robot, kinds) in CONTACTS {
+        let text = contacts(&folder, robot, kinds);
+        std::fs::write(out.join(format!("contact_{robot}.rs")), text).expect("OUT_DIR can be written");
+    }
+}
+
+/// Robots of the contact cases, and the contacts that they make there beside a surface.
+const CONTACTS: [(&str, &[&str]); 7] = [
+    ("planar2r", &[]),
+    ("chapter_cylindrical", &["two_surfaces", "point"]),
+    ("chapter_stanford", &["two_surfaces", "point", "peg_in_hole", "fixed_direction"]),
+    ("chapter_6r", &["two_surfaces", "point", "peg_in_hole", "fixed_direction"]),
+    ("puma560", &["two_surfaces", "point", "peg_in_hole", "fixed_direction"]),
+    ("ur5", &["two_surfaces", "point", "peg_in_hole", "fixed_direction"]),
+    ("panda", &["two_surfaces", "point", "peg_in_hole", "fixed_direction"]),
+];
+
+/// The module of a robot in contact: objects, tool axes and environments are inputs, so that one module serves all cases.
+fn contacts(folder: &Path, robot: &str, kinds: &[&str]) -> String {
+    use Coordinate::{Ax, Ay, Px, Py, Pz};
+    let (_, file, _, frames) = ROBOTS.into_iter().find(|r| r.0 == robot).expect("a robot of the data");
+    let contact = |kind: &str| ContactItem {
+        name: kind.to_string(),
+        frame: frames[0].to_string(),
+        axis: None,
+        object: None,
+        surface: SurfaceItem::Plane,
+        constrained: match kind {
+            "two_surfaces" => vec![Px, Py],
+            "point" => vec![Px, Py, Pz],
+            "peg_in_hole" => vec![Px, Py, Ax, Ay],
+            "fixed_direction" => vec![Ax, Ay],
+            _ => vec![Pz],
+        },
+        free: vec![],
+        friction: None,
+        environment: (kind == "elastic_base").then_some(EnvironmentItem { kind: EnvironmentKind::Mass, values: None }),
+    };
+    let functions =
+        vec![ContactFunction::ConstrainedCoordinates, ContactFunction::ForwardDynamics, ContactFunction::Impact];
+    let contacts = Contacts {
+        contacts: ["surface", "elastic_base"].into_iter().chain(kinds.iter().copied()).map(contact).collect(),
+        functions: Some(functions),
+        ..Contacts::default()
+    };
+    let text = std::fs::read_to_string(folder.join(file)).expect("a robot file can be read");
+    let scene = Scene { contacts, ..Scene::default() };
+    let options = Options { functions: vec![], scene, ..Options::default() };
+    compile(&Source::new(file, text), &options).unwrap_or_else(|d| panic!("{}", d.render())).text
 }
 
 fn variants(robot: &str) -> Vec<(Scalar, Grade)> {

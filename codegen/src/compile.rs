@@ -356,6 +356,7 @@ fn generate(
         let Program { function, graph, .. } = program;
         items.push(Item { function, inputs: graph.inputs, outputs: graph.outputs, doc, text });
     }
+    let (contact_text, contact) = crate::contact::module(&robot, options, &title);
     let staged = options.scene.staged.then(|| staged(&robot, &frames, options, &title));
     let (staged_text, staged_report) = staged.map_or((String::new(), None), |(text, report)| (text, Some(report)));
     let report = Report {
@@ -365,6 +366,7 @@ fn generate(
         scalar: options.scalar.name(),
         functions,
         staged: staged_report,
+        contact,
     };
     // the file's name, not its path: the same bytes on every machine
     let name = file_name(path).to_string();
@@ -378,9 +380,10 @@ fn generate(
     let takes = |parameter: &Parameter| {
         let name = parameter.type_name();
         let ports = || items.iter().flat_map(|item| &item.inputs);
-        ports().any(|port| port.wrapper.as_ref() == Some(&name)) || staged_text.contains(&format!("&{name}"))
+        ports().any(|port| port.wrapper.as_ref() == Some(&name))
+            || (staged_text.clone() + &contact_text).contains(&format!("&{name}"))
     };
-    let types = parameter_types(&robot, options, &takes) + &staged_text;
+    let types = parameter_types(&robot, options, &takes) + &staged_text + &contact_text;
     let text = emit::file(model, &frames, &items, &report, &provenance, options.scalar, &types);
     Generated {
         model: robot.model,

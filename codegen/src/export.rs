@@ -73,6 +73,7 @@ impl Package<'_> {
 
     fn calls_kernel(&self) -> bool {
         self.generated.items.iter().any(|i| i.text.calls_kernel())
+            || self.generated.types.contains("use super::super::trig;")
     }
 
     fn provenance(&self) -> String {

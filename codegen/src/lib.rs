@@ -6,6 +6,7 @@
 pub mod builder;
 pub mod choose;
 pub mod compile;
+pub mod contact;
 pub mod description;
 pub mod diagnostic;
 pub mod emit;

@@ -8,6 +8,7 @@ use straightline_codegen::function::Robot as Loaded;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::reference_input::mass_centre_tree;
 use straightline_core::contact::{Contact, Coordinate, Object, Surface};
+use straightline_core::reference as chapter;
 use straightline_core::reference::{at_rest, Component, ContactFrames, MassCentreTree};
 use straightline_core::spatial::{Mat3, Transform, Vec3};
 use straightline_core::Dd;
@@ -149,6 +150,50 @@ impl Case {
             radius: Dd::ZERO,
         };
         (frames, self.components.iter().map(component).collect())
+    }
+
+    /// The largest error of a quantity against its largest component; of what may vanish, against what it is made of.
+    pub fn scaled_error(&self, key: &str, computed: &[impl Into<Dd> + Copy]) -> f64 {
+        let expected = self.expected(key);
+        assert_eq!(computed.len(), expected.len(), "{key} of {}", self.id);
+        let own = expected.iter().fold(0.0f64, |m, x| m.max(x.abs().hi()));
+        let speed = self.input("qd").iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        let least = match key {
+            "s" | "J_c" | "J_6" => 1.0,
+            "sd" | "dsd6" | "sd_after" => speed,
+            "A_c" | "A_6" => speed * speed,
+            "F" | "qdd" | "sdd" if self.id.starts_with("environment/") => self.spring_scale(key),
+            _ => 0.0,
+        };
+        let error = computed.iter().zip(&expected).fold(0.0f64, |m, (x, y)| {
+            let error = ((*x).into() - *y).abs().hi();
+            if error.is_nan() {
+                f64::INFINITY
+            } else {
+                m.max(error)
+            }
+        });
+        if error == 0.0 {
+            0.0
+        } else {
+            error / own.max(least)
+        }
+    }
+
+    /// What a position or a velocity at its own scale (1 m, q̇) does through spring and damper: k · 1 m + b q̇ as a force, shared
+    /// between the mass m_e and the robot, and what that force accelerates.
+    fn spring_scale(&self, key: &str) -> f64 {
+        let speed = self.input("qd").iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        let (tree, jacobian) = (robot(&self.robot).1, self.expected("J_6"));
+        let h = chapter::mass_matrix(&tree, &self.input("q").into_iter().map(Dd::from).collect::<Vec<Dd>>());
+        let moved = chapter::solve_symmetric(&h, &nalgebra::DVector::from_column_slice(&jacobian));
+        let inverse_mass = jacobian.iter().zip(moved.iter()).fold(Dd::ZERO, |sum, (j, x)| sum + *j * *x).hi();
+        let force = (self.parameter("k") + self.parameter("b") * speed) / (1.0 + self.parameter("me") * inverse_mass);
+        match key {
+            "F" => force,
+            "sdd" => inverse_mass * force,
+            _ => moved.iter().fold(0.0f64, |m, x| m.max(x.abs().hi())) * force,
+        }
     }
 }
 

@@ -131,50 +131,6 @@ fn second_author(case: &Case, tree: &MassCentreTree<Dd>, file: &str) -> Vec<(&'s
     }
 }
 
-/// The largest error of a quantity against its largest component; of what may vanish, against what it is made of.
-fn worst_of(case: &Case, key: &str, computed: &[impl Into<Dd> + Copy]) -> f64 {
-    let expected = case.expected(key);
-    assert_eq!(computed.len(), expected.len(), "{key} of {}", case.id);
-    let own = expected.iter().fold(0.0f64, |m, x| m.max(x.abs().hi()));
-    let speed = case.input("qd").iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    let least = match key {
-        "s" | "J_c" | "J_6" => 1.0,
-        "sd" | "dsd6" | "sd_after" => speed,
-        "A_c" | "A_6" => speed * speed,
-        "F" | "qdd" | "sdd" if case.id.starts_with("environment/") => spring_scale(case, key),
-        _ => 0.0,
-    };
-    let error = computed.iter().zip(&expected).fold(0.0f64, |m, (x, y)| {
-        let error = ((*x).into() - *y).abs().hi();
-        if error.is_nan() {
-            f64::INFINITY
-        } else {
-            m.max(error)
-        }
-    });
-    if error == 0.0 {
-        0.0
-    } else {
-        error / own.max(least)
-    }
-}
-
-/// What a position or a velocity at its own scale (1 m, q̇) does through spring and damper: k · 1 m + b q̇ as a force, shared
-/// between the mass m_e and the robot, and what that force accelerates.
-fn spring_scale(case: &Case, key: &str) -> f64 {
-    let speed = case.input("qd").iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    let (tree, jacobian) = (robot(&case.robot).1, case.expected("J_6"));
-    let h = chapter::mass_matrix(&tree, &wide(&case.input("q")));
-    let moved = chapter::solve_symmetric(&h, &nalgebra::DVector::from_column_slice(&jacobian));
-    let inverse_mass = jacobian.iter().zip(moved.iter()).fold(Dd::ZERO, |sum, (j, x)| sum + *j * *x).hi();
-    let force = (case.parameter("k") + case.parameter("b") * speed) / (1.0 + case.parameter("me") * inverse_mass);
-    match key {
-        "F" => force,
-        "sdd" => inverse_mass * force,
-        _ => moved.iter().fold(0.0f64, |m, x| m.max(x.abs().hi())) * force,
-    }
-}
-
 #[test]
 fn both_authors_meet_every_case_of_the_data() {
     for file in ["contact", "impact", "environment", "environment_impact"] {
@@ -190,17 +146,17 @@ fn both_authors_meet_every_case_of_the_data() {
             let theirs = second_author(&case, tree, file);
             let narrow = runtime(&case, &loaded.model.cast::<f64>(), &contact.map(f64::constant), file, RIDGE);
             for (key, value) in &ours {
-                let error = worst_of(&case, key, value);
+                let error = case.scaled_error(key, value);
                 assert!(error <= DIGITS, "{key} of {}: {error:.1e}", case.id);
                 first = first.max(error);
             }
             for (key, value) in &theirs {
-                let error = worst_of(&case, key, value);
+                let error = case.scaled_error(key, value);
                 assert!(error <= DIGITS, "{key} of {} by the second author: {error:.1e}", case.id);
                 second = second.max(error);
             }
             for (key, value) in &narrow {
-                let error = worst_of(&case, key, value);
+                let error = case.scaled_error(key, value);
                 assert!(error <= ROUNDED, "{key} of {} in f64: {error:.1e}", case.id);
                 rounded = rounded.max(error);
             }

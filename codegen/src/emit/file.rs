@@ -56,7 +56,7 @@ pub fn file(
         out.push('\n');
         out.push_str(&item.text.text);
     }
-    if items.iter().any(|i| i.text.calls_kernel()) {
+    if items.iter().any(|i| i.text.calls_kernel()) || types.contains("use super::super::trig;") {
         out.push_str("\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod trig {\n");
         for line in kernel().lines() {
             let line = if let Some(doc) = line.strip_prefix("//!") { format!("//{doc}") } else { line.to_string() };

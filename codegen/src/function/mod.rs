@@ -347,7 +347,7 @@ impl Function {
     }
 
     /// The same over the reals with fewer operations, for the functions that have such a form.
-    fn evaluate_reduced<T: Real>(
+    pub(crate) fn evaluate_reduced<T: Real>(
         self,
         model: &Model<T>,
         reduced: &ReducedModel<T>,

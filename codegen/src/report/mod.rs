@@ -51,6 +51,26 @@ pub struct FunctionReport {
     pub waterfall: Option<Waterfall>,
 }
 
+/// Figures of one function of a contact mode.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+pub struct ContactReport {
+    /// The mode.
+    pub mode: String,
+    /// The function.
+    pub function: &'static str,
+    /// Its operations.
+    #[cfg_attr(feature = "cli", serde(flatten))]
+    pub counts: Counts,
+}
+
+impl ContactReport {
+    /// From the operations of a program.
+    pub fn new(mode: &str, function: &'static str, counts: Counts) -> Self {
+        ContactReport { mode: mode.to_string(), function, counts }
+    }
+}
+
 impl FunctionReport {
     /// From a program and its number of lines.
     pub fn new(program: &Program, scalar: Scalar, lines: usize) -> Self {
@@ -97,6 +117,9 @@ pub struct Report {
     /// Figures of the staged form, if it was generated.
     #[cfg_attr(feature = "cli", serde(skip_serializing_if = "Option::is_none"))]
     pub staged: Option<StagedReport>,
+    /// The functions of contact modes, in the order of the file.
+    #[cfg_attr(feature = "cli", serde(skip_serializing_if = "Vec::is_empty"))]
+    pub contact: Vec<ContactReport>,
 }
 
 impl Report {

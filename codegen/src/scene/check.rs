@@ -1,5 +1,6 @@
 //! What can be wrong with a scene: by itself, beside the options, and with a robot.
 
+use super::check_contact;
 use super::messages::{self as say, unphysical_moments};
 use super::{Base, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Scene};
 use crate::compile::Options;
@@ -17,6 +18,7 @@ const INPUTS: [&str; 5] = ["q", "qd", "qdd", "tau", "gravity"];
 
 /// What is wrong with a scene, whatever the robot.
 pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
+    check_contact::alone(scene, diagnostics);
     let places = &scene.places;
     for (&function, selection) in &scene.outputs {
         let name = function.name();
@@ -198,6 +200,7 @@ pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnosti
         places.complain("hold.joints", say::nothing_left(&model.name), diagnostics);
     }
     frames(model, scene, held, diagnostics);
+    check_contact::against(model, scene, held, diagnostics);
 }
 
 /// The names of frames and links.

@@ -32,6 +32,19 @@ pub const CODES: &[&str] = &[
     "scalar-twice",
     "empty-range",
     "range-alone",
+    "unknown-contact-function",
+    "contact-name",
+    "no-direction",
+    "no-coordinate",
+    "coordinate-twice",
+    "no-surface",
+    "nothing-slides",
+    "nothing-yields",
+    "unknown-contact",
+    "cannot-stick",
+    "empty-mode",
+    "contact-on-world",
+    "loop-on-one-body",
 ];
 
 type D = Diagnostic;
@@ -243,4 +256,92 @@ pub fn empty_range(what: &str, lower: f64, upper: f64) -> D {
 pub fn range_alone(input: &str) -> D {
     D::error("range-alone", format!("a range for `{input}`, which is no input in this scene"))
         .help("remove it; gravity is one with `gravity = \"input\"` in [hold]")
+}
+
+/// A function that contact modes do not have.
+pub fn unknown_contact_function(function: &str, known: &[&str]) -> D {
+    let d = D::error("unknown-contact-function", format!("contact of [outputs]: no function `{}`", cut(function)));
+    hinted(d, function, known.iter().copied())
+}
+
+/// A name of a contact, a loop or a mode that makes no identifier of its own.
+pub fn contact_name(kind: &str, name: &str, identifier: &str, twice: bool) -> D {
+    let why = match twice {
+        true => format!("another {kind} has the name `{identifier}` in generated code, too"),
+        false => format!("in generated code it would be `{identifier}`, which is taken"),
+    };
+    D::error("contact-name", format!("{kind} `{}`: its name is not free", cut(name)))
+        .detail(why)
+        .help("give it another name")
+}
+
+/// A vector that gives no direction.
+pub fn no_direction(what: &str, [x, y, z]: [f64; 3]) -> D {
+    D::error("no-direction", format!("{what} gives no direction: [{x:?}, {y:?}, {z:?}]"))
+        .help("write a vector that is not zero, and an x that is not parallel to z")
+}
+
+/// A contact or a loop that holds nothing.
+pub fn no_coordinate(owner: &str) -> D {
+    D::error("no-coordinate", format!("{owner} constrains no coordinate"))
+        .help("name some of `px`, `py`, `pz`, `ax`, `ay`, `az`, as in `constrained = [\"pz\"]`")
+}
+
+/// A coordinate named twice, or as constrained and as free.
+pub fn coordinate_twice(owner: &str, coordinate: &str) -> D {
+    D::error("coordinate-twice", format!("`{}`: coordinate `{coordinate}` is named twice", cut(owner)))
+        .detail("a coordinate is constrained or free")
+        .help("keep one of them")
+}
+
+/// A quadric without a gradient.
+pub fn no_surface(contact: &str) -> D {
+    D::error("no-surface", format!("contact `{}`: the quadric depends on no coordinate", cut(contact)))
+        .help("the surface is pᵀ A p + 2 b · p + c = 0 with `matrix` A, `linear` b and `constant` c; not all of A and b are zero")
+}
+
+/// Friction without a surface to slide on.
+pub fn nothing_slides(contact: &str) -> D {
+    D::error("nothing-slides", format!("contact `{}` has friction, but does not slide on a surface", cut(contact)))
+        .detail("friction acts along X and Y against a reaction along `pz`")
+        .help("constrain `pz`, but neither `px` nor `py`, or remove `friction`")
+}
+
+/// An environment without a distance.
+pub fn nothing_yields(contact: &str) -> D {
+    D::error("nothing-yields", format!("contact `{}` has an environment, but `pz` is not constrained", cut(contact)))
+        .detail("an object gives way along its normal")
+        .help("constrain `pz`, or remove `environment`")
+}
+
+/// A mode with a contact that is not there.
+pub fn unknown_contact<'a>(mode: &str, contact: &str, contacts: impl IntoIterator<Item = &'a str>) -> D {
+    let d = D::error("unknown-contact", format!("mode `{}`: no contact is named `{}`", cut(mode), cut(contact)));
+    hinted(d, contact, contacts)
+}
+
+/// A contact that cannot stick in a mode.
+pub fn cannot_stick(mode: &str, contact: &str) -> D {
+    D::error("cannot-stick", format!("mode `{}`: contact `{}` cannot stick", cut(mode), cut(contact)))
+        .detail("what sticks is one of the mode's contacts and has friction")
+        .help("name it in `contacts`, and give it `friction = { coefficient = 0.3 }`")
+}
+
+/// A mode in which nothing is closed.
+pub fn empty_mode(mode: &str) -> D {
+    D::error("empty-mode", format!("mode `{}` has no contact", cut(mode)))
+        .help("name one, as in `contacts = [\"pen\"]`; free motion needs no mode")
+}
+
+/// A contact of what does not move.
+pub fn contact_on_world(owner: &str, frame: &str) -> D {
+    D::error("contact-on-world", format!("{owner}: no joint that moves carries the frame `{}`", cut(frame)))
+        .help("name a frame that the robot moves")
+}
+
+/// A loop between parts of one body.
+pub fn loop_on_one_body(owner: &str) -> D {
+    D::error("loop-on-one-body", format!("{owner}: both frames belong to the same body"))
+        .detail("no joint between them can move")
+        .help("name frames of two bodies")
 }

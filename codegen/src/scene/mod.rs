@@ -7,6 +7,8 @@
 mod apply;
 mod bind;
 mod check;
+mod check_contact;
+pub mod contact;
 pub mod messages;
 mod places;
 mod ranges;
@@ -15,6 +17,7 @@ mod read;
 pub use apply::apply;
 pub use bind::{is_optional, load_parameters, Bound, LOAD_SCALARS};
 pub use check::check_options;
+pub use contact::{ContactFunction, Contacts};
 pub use places::Places;
 pub use ranges::{ranges_in_words, Interval, JointRanges, Ranges};
 pub use read::{read, SceneFile};
@@ -43,6 +46,8 @@ pub struct Scene {
     pub effects: Effects,
     /// What stays an input of the generated functions.
     pub parameters: Vec<Parameter>,
+    /// What the robot touches.
+    pub contacts: Contacts,
     /// Whether the staged form is generated beside the plain functions.
     pub staged: bool,
     /// What a function may cost at most.
@@ -57,7 +62,8 @@ impl Scene {
     /// Whether it asks for everything and holds nothing, so that it leaves every function as it is.
     pub fn is_empty(&self) -> bool {
         let (budgets, ranges, places) = (self.budgets.clone(), self.ranges.clone(), self.places.clone());
-        *self == Scene { budgets, staged: self.staged, ranges, places, ..Scene::default() }
+        let contacts = self.contacts.clone();
+        *self == Scene { budgets, staged: self.staged, ranges, contacts, places, ..Scene::default() }
     }
 
     /// The options under which the robot file is read for this scene.

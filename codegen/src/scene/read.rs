@@ -1,5 +1,7 @@
 //! Scene files: TOML, documented in `SCENES.md`. Every complaint has its place, and all come in one run.
 
+mod contact;
+
 use super::messages as say;
 use super::{check, Base, Budget, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Places};
 use super::{Ranges, Scene, Selection};
@@ -13,7 +15,20 @@ use crate::function::Function;
 use crate::words::Choice;
 use toml::de::DeValue;
 
-const TOP: &[&str] = &["outputs", "hold", "payload", "zero", "effects", "parameter", "numbers", "budget"];
+const TOP: &[&str] = &[
+    "contact",
+    "loop",
+    "mode",
+    "stabilisation",
+    "outputs",
+    "hold",
+    "payload",
+    "zero",
+    "effects",
+    "parameter",
+    "numbers",
+    "budget",
+];
 const BUDGET: &[&str] = &["max_flops", "max_sincos", "max_live", "max_stack_bytes", "max_code_bytes"];
 const BASES: [(&str, Base); 3] = [("fixed", Base::Fixed), ("floating", Base::Floating), ("moving", Base::Moving)];
 /// A place in the list of effects: that its speed is still to be read.
@@ -127,6 +142,7 @@ impl SceneReader<'_> {
         if let Some(table) = self.reader.table_at(top, "budget", "[budget]") {
             self.budgets(&table);
         }
+        self.contacts(top);
     }
 
     /// The value, its place noted under that path.
@@ -152,8 +168,9 @@ impl SceneReader<'_> {
 
     fn outputs(&mut self, table: &Table) {
         let names: Vec<&str> = Function::known().map(Function::name).collect();
-        self.reader.check_keys(table, &[&["functions", "staged"], &names[..]].concat());
+        self.reader.check_keys(table, &[&["functions", "staged", "contact"], &names[..]].concat());
         self.file.scene.staged = self.reader.flag_at(table, "staged").is_some_and(|flag| flag.value);
+        self.contact_functions(table);
         let mut functions: Vec<Function> = Vec::new();
         let mut all_are_known = true;
         for name in self.reader.names_at(table, "functions", "function") {

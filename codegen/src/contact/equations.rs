@@ -1,0 +1,294 @@
+//! The equations of a contact mode over expressions.
+
+use super::{ridge, Closed, Mode};
+use crate::compile::Options;
+use crate::function::{ForwardDynamicsMethod, Function, Robot};
+use crate::scene::contact::{EnvironmentItem, EnvironmentKind};
+use crate::scene::{Bound, ContactFunction};
+use crate::trace::Expr;
+use std::collections::BTreeMap;
+use straightline_core::algorithms as alg;
+use straightline_core::algorithms::{Environment, FunctionalCoordinates, Ltdl, RelativeMotion, SpringDamper};
+use straightline_core::algorithms::{Struck, Support};
+use straightline_core::contact::{Contact, Coordinate, Friction, Object, ObjectMotion, Surface};
+use straightline_core::spatial::{Mat3, MotionVector, Transform, Vec3};
+use straightline_core::{Dd, Real};
+
+/// Inputs beside the robot's own, by name.
+type Added = BTreeMap<String, Vec<Expr>>;
+
+/// A contact, how its frame moves, and what it constrains.
+struct Traced<'a> {
+    closed: Option<&'a Closed<'a>>,
+    contact: Contact<Expr>,
+    motion: RelativeMotion<Expr>,
+    constrained: FunctionalCoordinates<Expr>,
+    environment: Option<Environment<Expr>>,
+}
+
+/// The results of a function, one list per output.
+pub(super) fn equations(
+    robot: &Robot,
+    options: &Options,
+    mode: &Mode,
+    function: ContactFunction,
+    bound: &Bound,
+    added: &Added,
+) -> Vec<Vec<Expr>> {
+    let (q, qd) = (&bound.arguments[0], &bound.arguments[1]);
+    let reduced = options.optimisations().reduced;
+    let traced = contacts(robot, mode, bound, added, reduced);
+    let constrained = traced.iter().fold(FunctionalCoordinates::default(), |all, t| all.and(t.constrained.clone()));
+    let free = || {
+        let parts =
+            traced.iter().filter_map(|t| Some(alg::functional_coordinates(&t.contact, &t.motion, &t.closed?.free)));
+        parts.fold(FunctionalCoordinates::default(), FunctionalCoordinates::and)
+    };
+    let of_robot = |function: Function, arguments: &[Vec<Expr>]| {
+        let method = ForwardDynamicsMethod::Factorisation;
+        let Bound { model, reduced: for_torques, composite, .. } = bound;
+        let by_reduced =
+            reduced.then(|| function.evaluate_reduced(model, for_torques, composite, method, arguments)).flatten();
+        by_reduced.unwrap_or_else(|| function.evaluate(model, &[], method, arguments))
+    };
+    let factor = || Ltdl::factor(&bound.model, &of_robot(Function::MassMatrix, std::slice::from_ref(q)));
+    let epsilon = Expr::constant(Dd::from(ridge(options.scalar)));
+    let applied = || -> Option<Vec<Vec<Expr>>> {
+        let slides = traced.iter().any(|t| t.closed.is_some_and(|c| c.slides));
+        slides.then(|| traced.iter().flat_map(|t| alg::applied_rows(&t.contact, &t.motion, &t.constrained)).collect())
+    };
+    let list = |c: FunctionalCoordinates<Expr>| vec![c.value, c.rate, c.jacobian.concat(), c.bias];
+    match function {
+        ContactFunction::ConstrainedCoordinates => list(constrained),
+        ContactFunction::FreeCoordinates => list(free()),
+        ContactFunction::ForwardDynamics => {
+            let bias = of_robot(Function::BiasForce, &[q.clone(), qd.clone()]);
+            let drive: Vec<Expr> = bound.arguments[2].iter().zip(bias).map(|(tau, h)| *tau - h).collect();
+            let stabilised = match options.scene.contacts.stabilisation {
+                Some((frequency, damping)) => {
+                    let [frequency, damping] = [frequency, damping].map(|x| Expr::constant(Dd::from(x)));
+                    alg::baumgarte(&constrained, frequency, damping)
+                }
+                None => vec![Expr::zero(); constrained.len()],
+            };
+            let mut supports: Vec<Support<Expr>> = stabilised.into_iter().map(Support::Rigid).collect();
+            let mut own_rates = Vec::new();
+            let mut first = 0;
+            for t in &traced {
+                if let (Some(environment), Some(closed)) = (&t.environment, t.closed) {
+                    let k = distance_row(&closed.constrained);
+                    let s = (t.constrained.value[k], t.constrained.rate[k]);
+                    let own = match environment.has_own_coordinate() {
+                        true => {
+                            let own = &added[&format!("{}_own", closed.item.identifier())];
+                            let rates = environment.motion(s, (own[0], own[1]));
+                            own_rates.push(vec![rates.velocity, rates.acceleration]);
+                            (own[0], own[1])
+                        }
+                        false => (Expr::zero(), Expr::zero()),
+                    };
+                    supports[first + k] = environment.support(s, own);
+                }
+                first += t.constrained.len();
+            }
+            let applied = applied();
+            let motion = alg::constrained_forward_dynamics(
+                &factor(),
+                &drive,
+                &constrained,
+                applied.as_deref(),
+                &supports,
+                epsilon,
+            );
+            let results = vec![motion.qdd, motion.force, motion.sdd, motion.violation, vec![motion.pivot]];
+            [results, own_rates].concat()
+        }
+        ContactFunction::InverseDynamics => {
+            let qdd = &bound.arguments[2];
+            let inverse = of_robot(Function::InverseDynamics, &[q.clone(), qd.clone(), qdd.clone()]);
+            let wanted =
+                [vec![Expr::zero(); constrained.len()], added.get("sdd_free").cloned().unwrap_or_default()].concat();
+            let (tau, pivot) = alg::hybrid_inverse_dynamics(
+                &factor(),
+                &inverse,
+                qdd,
+                (&constrained, &free()),
+                &wanted,
+                &added["force"],
+                epsilon,
+            );
+            vec![tau, vec![pivot]]
+        }
+        ContactFunction::Impact => {
+            let mut struck = vec![Struck::Rigid; constrained.len()];
+            let mut places = Vec::new();
+            let mut first = 0;
+            for t in &traced {
+                if let (Some(environment), Some(closed)) = (&t.environment, t.closed) {
+                    let k = first + distance_row(&closed.constrained);
+                    let velocity = match closed.of_environment().1 {
+                        true => {
+                            places.push(k);
+                            added[&format!("{}_struck", closed.item.identifier())][0]
+                        }
+                        false => Expr::zero(),
+                    };
+                    struck[k] = Struck::Mass { mass: environment.struck_mass(), velocity };
+                }
+                first += t.constrained.len();
+            }
+            let applied = applied();
+            let blow =
+                alg::impact(&factor(), qd, &constrained, applied.as_deref(), &struck, added["restitution"][0], epsilon);
+            let after = places.iter().map(|k| vec![blow.struck_velocity[*k]]).collect();
+            let results = vec![blow.dqd, blow.impulse, blow.dsd, vec![blow.energy_loss], vec![blow.pivot]];
+            [results, after].concat()
+        }
+        ContactFunction::Projection => {
+            let correction = alg::projection(&factor(), &constrained, &constrained.value, epsilon);
+            vec![correction, constrained.value]
+        }
+    }
+}
+
+/// The row of the distance among the constrained coordinates of a contact.
+fn distance_row(constrained: &[Coordinate]) -> usize {
+    constrained.iter().position(|c| *c == Coordinate::Pz).expect("an object gives way along pz, as was checked")
+}
+
+/// Contacts and loops of a mode, traced.
+fn contacts<'a>(robot: &Robot, mode: &'a Mode, bound: &Bound, added: &Added, reduced: bool) -> Vec<Traced<'a>> {
+    let (q, qd) = (&bound.arguments[0], &bound.arguments[1]);
+    let frame = |name: &str| bound.model.frame(name).expect("the frames of contacts were checked").clone();
+    let mut all = Vec::new();
+    for closed in &mode.contacts {
+        let (item, name) = (closed.item, closed.item.identifier());
+        let input = |suffix: &str| &added[&format!("{name}_{suffix}")];
+        let triple = |x: &[Expr], k: usize| Vec3::new(x[3 * k], x[3 * k + 1], x[3 * k + 2]);
+        let (axis, second_axis) = match item.axis {
+            Some(axis) => tool_axes(axis),
+            None => (triple(input("axes"), 0), triple(input("axes"), 1)),
+        };
+        let object = match item.object {
+            Some(object) => Object::Fixed(Transform {
+                rotation: object_axes(object.z, object.x),
+                translation: constant(object.origin.map(Dd::from)),
+            }),
+            None => {
+                let (pose, velocity, acceleration) = (input("pose"), input("velocity"), input("acceleration"));
+                let motion = |x: &[Expr]| MotionVector { linear: triple(x, 0), angular: triple(x, 1) };
+                Object::Moving(ObjectMotion {
+                    pose: Transform {
+                        rotation: Mat3::from_columns(triple(pose, 1), triple(pose, 2), triple(pose, 3)),
+                        translation: triple(pose, 0),
+                    },
+                    velocity: motion(velocity),
+                    acceleration: motion(acceleration),
+                })
+            }
+        };
+        let number = |x: f64| Expr::constant(Dd::from(x));
+        let contact = Contact {
+            name: item.name.clone(),
+            frame: frame(&item.frame),
+            axis,
+            second_axis,
+            object,
+            surface: item.surface.traced(),
+            constrained: closed.constrained.clone(),
+            free: closed.free.clone(),
+            friction: item
+                .friction
+                .filter(|_| closed.slides)
+                .map(|(coefficient, speed)| Friction { coefficient: number(coefficient), speed: number(speed) }),
+        };
+        let placed = robot.model.frame(&item.frame).and_then(|f| {
+            let body = f.body?;
+            Some((body, robot.reduced_frames[body].inverse().compose(&f.placement).map(Expr::constant)))
+        });
+        let by_reduced = placed
+            .filter(|_| reduced)
+            .and_then(|placed| alg::reduced_relative_motion(&bound.reduced, &contact, placed, q, qd));
+        let motion = by_reduced.unwrap_or_else(|| alg::relative_motion(&bound.model, &contact, q, qd));
+        let constrained = alg::functional_coordinates(&contact, &motion, &contact.constrained);
+        let environment = item.environment.as_ref().map(|e| {
+            let values = match &e.values {
+                Some(values) => values.iter().map(|x| number(*x)).collect(),
+                None => input("environment").clone(),
+            };
+            environment(e, &values)
+        });
+        all.push(Traced { closed: Some(closed), contact, motion, constrained, environment });
+    }
+    for a_loop in mode.loops {
+        let (axis, second_axis) = tool_axes([0.0, 0.0, 1.0]);
+        let contact = Contact {
+            name: a_loop.name.clone(),
+            frame: frame(&a_loop.frame),
+            axis,
+            second_axis,
+            object: Object::OnRobot(frame(&a_loop.with)),
+            surface: Surface::Plane,
+            constrained: a_loop.constrained.clone(),
+            free: vec![],
+            friction: None,
+        };
+        let motion = alg::relative_motion(&bound.model, &contact, q, qd);
+        let constrained = alg::functional_coordinates(&contact, &motion, &contact.constrained);
+        all.push(Traced { closed: None, contact, motion, constrained, environment: None });
+    }
+    all
+}
+
+fn environment(item: &EnvironmentItem, values: &Vec<Expr>) -> Environment<Expr> {
+    let at = |key: &str| {
+        let k = item.kind.keys().iter().position(|k| *k == key);
+        values[k.expect("a key of this kind")]
+    };
+    let spring = |prefix: &str| SpringDamper {
+        stiffness: at(&format!("{prefix}stiffness")),
+        damping: at(&format!("{prefix}damping")),
+    };
+    match item.kind {
+        EnvironmentKind::Elastic => Environment::Elastic(spring("")),
+        EnvironmentKind::Mass => Environment::Mass { mass: at("mass"), support: spring("") },
+        EnvironmentKind::Cushioned => {
+            Environment::Cushioned { mass: at("mass"), support: spring(""), front: spring("front_") }
+        }
+        EnvironmentKind::TwoMasses => Environment::TwoMasses {
+            front_mass: at("front_mass"),
+            front: spring("front_"),
+            mass: at("mass"),
+            support: spring(""),
+        },
+        EnvironmentKind::BothSides => Environment::BothSides { tool: spring("tool_"), surface: spring("") },
+    }
+}
+
+fn constant(v: [Dd; 3]) -> Vec3<Expr> {
+    Vec3::from(v.map(Expr::constant))
+}
+
+fn unit(v: Vec3<Dd>) -> Vec3<Dd> {
+    let length = v.dot(v).sqrt();
+    v.map(|x| x / length)
+}
+
+/// Columns X, Y, Z: X = x made perpendicular to Z and normalised, Y = Z × X.
+fn object_axes(z: [f64; 3], x: [f64; 3]) -> Mat3<Expr> {
+    let (z, x) = (unit(Vec3::from(z.map(Dd::from))), Vec3::from(x.map(Dd::from)));
+    let x = unit(x - z.scale(x.dot(z)));
+    let y = z.cross(x);
+    Mat3::from_columns(constant(x.to_array()), constant(y.to_array()), constant(z.to_array()))
+}
+
+/// The tool axis, normalised, and across it the one of the frame's axes that is farthest from it, next in cyclic order of z.
+fn tool_axes(axis: [f64; 3]) -> (Vec3<Expr>, Vec3<Expr>) {
+    let a = unit(Vec3::from(axis.map(Dd::from)));
+    let least = (0..3).min_by(|i, j| axis[*i].abs().total_cmp(&axis[*j].abs())).unwrap_or(0);
+    let mut farthest = [Dd::ZERO; 3];
+    farthest[least] = Dd::ONE;
+    let farthest = Vec3::from(farthest);
+    let b = unit(farthest - a.scale(farthest.dot(a)));
+    (constant(a.to_array()), constant(b.to_array()))
+}

@@ -1,0 +1,245 @@
+//! The robot in contact: one module of functions per contact mode, and a mode enum.
+//!
+//! A mode lists the contacts that are closed together; which mode it is decides the caller, so that nothing in a function
+//! branches. Everything about one mode is traced into one program per function, with the reduced robot where it serves: the
+//! motion of a contact's frame shares the recursion of the bias force.
+
+mod equations;
+mod text;
+
+use crate::choose::choose;
+use crate::compile::{Optimisations, Options};
+use crate::emit::{snake_case, Scalar};
+use crate::expr::{verify, Graph, Port};
+use crate::function::{ForwardDynamicsMethod, Function, Robot};
+use crate::pass::{dead_code, sums, unread_inputs};
+use crate::scene::contact::{ContactItem, EnvironmentKind, LoopItem, ModeItem};
+use crate::scene::{is_optional, ContactFunction, Scene};
+use crate::trace::trace;
+use straightline_core::contact::Coordinate;
+use straightline_core::model::Model;
+use straightline_core::Dd;
+
+pub use text::module;
+
+/// A contact mode of a scene, its contacts looked up.
+#[derive(Clone, Debug)]
+pub struct Mode<'a> {
+    /// Its name in generated code.
+    pub identifier: String,
+    /// Its name in the scene.
+    pub name: String,
+    /// Its contacts, in order.
+    pub contacts: Vec<Closed<'a>>,
+    /// The loops of the robot, which every mode has.
+    pub loops: &'a [LoopItem],
+}
+
+/// A contact that is closed in a mode.
+#[derive(Clone, Debug)]
+pub struct Closed<'a> {
+    /// The contact.
+    pub item: &'a ContactItem,
+    /// What it constrains in this mode.
+    pub constrained: Vec<Coordinate>,
+    /// What it leaves.
+    pub free: Vec<Coordinate>,
+    /// Whether it slides with friction.
+    pub slides: bool,
+}
+
+impl<'a> Mode<'a> {
+    /// The modes of a scene.
+    ///
+    /// # Panics
+    /// If a mode has a contact that the scene has not: scenes are checked before.
+    pub fn all(scene: &'a Scene) -> Vec<Mode<'a>> {
+        let contacts = &scene.contacts;
+        let closed = |mode: &ModeItem, name: &String| {
+            let item = contacts.contacts.iter().find(|c| c.name == *name).expect("the contacts of modes were checked");
+            let sticks = mode.sticking.contains(name);
+            let also = |c: &Coordinate| sticks && matches!(c, Coordinate::Px | Coordinate::Py);
+            Closed {
+                item,
+                constrained: Coordinate::ALL.into_iter().filter(|c| item.constrained.contains(c) || also(c)).collect(),
+                free: item.free.iter().copied().filter(|c| !also(c)).collect(),
+                slides: item.friction.is_some() && !sticks,
+            }
+        };
+        let mode = |mode: ModeItem| Mode {
+            identifier: snake_case(&mode.name),
+            contacts: mode.contacts.iter().map(|name| closed(&mode, name)).collect(),
+            name: mode.name,
+            loops: &contacts.loops,
+        };
+        contacts.all_modes().into_iter().map(mode).collect()
+    }
+
+    /// Constrained coordinates as `contact.pz`.
+    pub fn constrained_names(&self) -> Vec<String> {
+        let of_contacts =
+            self.contacts.iter().flat_map(|c| c.constrained.iter().map(|k| format!("{}.{}", c.item.name, k.name())));
+        let of_loops = self.loops.iter().flat_map(|l| l.constrained.iter().map(|k| format!("{}.{}", l.name, k.name())));
+        of_contacts.chain(of_loops).collect()
+    }
+
+    /// Free coordinates likewise.
+    pub fn free_names(&self) -> Vec<String> {
+        self.contacts.iter().flat_map(|c| c.free.iter().map(|k| format!("{}.{}", c.item.name, k.name()))).collect()
+    }
+}
+
+impl Closed<'_> {
+    /// Whether its object has a coordinate of its own, and whether a mass is there to be struck.
+    fn of_environment(&self) -> (bool, bool) {
+        use EnvironmentKind::{BothSides, Cushioned, Mass, TwoMasses};
+        let kind = self.item.environment.as_ref().map(|e| e.kind);
+        (matches!(kind, Some(Cushioned | TwoMasses | BothSides)), matches!(kind, Some(Mass | TwoMasses)))
+    }
+}
+
+/// One function of one mode, between tracing and text.
+#[derive(Clone, Debug)]
+pub struct ModeProgram {
+    /// Which function.
+    pub function: ContactFunction,
+    /// Its operations.
+    pub graph: Graph,
+}
+
+/// All functions of a mode that its scene wants.
+pub fn programs(robot: &Robot, options: &Options, mode: &Mode) -> Vec<ModeProgram> {
+    let wanted = options.scene.contacts.wanted();
+    let has_free = !mode.free_names().is_empty();
+    let wanted = wanted.into_iter().filter(|f| has_free || *f != ContactFunction::FreeCoordinates);
+    wanted.map(|function| ModeProgram { function, graph: graph(robot, options, mode, function) }).collect()
+}
+
+/// The operations of one function of a mode.
+pub fn graph(robot: &Robot, options: &Options, mode: &Mode, function: ContactFunction) -> Graph {
+    let optimisations = options.optimisations();
+    let check = |graph: Graph| {
+        verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
+        graph
+    };
+    let factorised = Options { forward_dynamics: ForwardDynamicsMethod::Factorisation, ..options.clone() };
+    let chosen = (optimisations.chosen && optimisations.reduced).then(|| {
+        let optimisations = Optimisations { chosen: false, ..optimisations };
+        choose(robot, &[], Function::ForwardDynamics, &factorised, optimisations)
+    });
+    let robot = chosen.as_ref().unwrap_or(robot);
+    let base = base_function(function);
+    let own = options.scene.ports(base, &robot.model);
+    let added = added_ports(function, mode, &robot.model);
+    let names: Vec<String> = added.iter().map(|p| p.name.clone()).collect();
+    let inputs: Vec<Port> = own.iter().cloned().chain(added).collect();
+    let outputs = outputs(function, mode, &robot.model);
+    let lengths: Vec<usize> = outputs.iter().map(Port::len).collect();
+    let traced = trace(options.rules(), inputs, outputs, |inputs| {
+        let (given, added) = inputs.split_at(own.len());
+        let given = options.scene.bind(base, robot, given);
+        let added = names.iter().cloned().zip(added.iter().cloned()).collect();
+        let results = equations::equations(robot, options, mode, function, &given, &added);
+        assert!(results.iter().map(Vec::len).eq(lengths.iter().copied()), "results fit the outputs");
+        results.concat()
+    });
+    let unused = |port: &Port| is_optional(port) || port.name == "qd" || names.contains(&port.name);
+    let graph = check(unread_inputs(check(dead_code(&check(traced))), unused));
+    match optimisations.sums {
+        true => check(dead_code(&check(sums(&graph)))),
+        false => graph,
+    }
+}
+
+/// The function of the robot whose inputs a contact function has.
+fn base_function(function: ContactFunction) -> Function {
+    match function {
+        ContactFunction::ForwardDynamics => Function::ForwardDynamics,
+        ContactFunction::InverseDynamics => Function::InverseDynamics,
+        _ => Function::BiasForce,
+    }
+}
+
+/// What it takes beside.
+fn added_ports(function: ContactFunction, mode: &Mode, model: &Model<Dd>) -> Vec<Port> {
+    let mut ports = Vec::new();
+    for closed in &mode.contacts {
+        let (item, name) = (closed.item, closed.item.identifier());
+        if item.axis.is_none() {
+            ports.push(Port::new(&format!("{name}_axes"), &[2, 3]));
+        }
+        if item.object.is_none() {
+            ports.push(Port::new(&format!("{name}_pose"), &[4, 3]));
+            ports.push(Port::new(&format!("{name}_velocity"), &[2, 3]));
+            ports.push(Port::new(&format!("{name}_acceleration"), &[2, 3]));
+        }
+        if let Some(environment) = item.environment.as_ref().filter(|e| e.values.is_none()) {
+            ports.push(Port::new(&format!("{name}_environment"), &[environment.kind.keys().len()]));
+        }
+        let (own, struck) = closed.of_environment();
+        if own && function == ContactFunction::ForwardDynamics {
+            ports.push(Port::new(&format!("{name}_own"), &[2]));
+        }
+        if struck && function == ContactFunction::Impact {
+            ports.push(Port::new(&format!("{name}_struck"), &[1]));
+        }
+    }
+    match function {
+        ContactFunction::InverseDynamics => {
+            ports.push(Port::new("sdd_free", &[mode.free_names().len()]));
+            ports.push(Port::new("force", &[mode.constrained_names().len()]));
+        }
+        ContactFunction::Impact => ports.push(Port::new("restitution", &[1])),
+        _ => {}
+    }
+    debug_assert!(model.nv() > 0);
+    ports.retain(|p| !p.is_empty());
+    ports
+}
+
+/// What it puts out.
+fn outputs(function: ContactFunction, mode: &Mode, model: &Model<Dd>) -> Vec<Port> {
+    let (nv, m) = (model.nv(), mode.constrained_names().len());
+    let coordinates =
+        |m: usize| vec![Port::new("s", &[m]), Port::new("sd", &[m]), Port::new("j", &[m, nv]), Port::new("a", &[m])];
+    let per_contact = |suffix: &str, len: usize, wanted: fn((bool, bool)) -> bool| -> Vec<Port> {
+        let contacts = mode.contacts.iter().filter(move |c| wanted(c.of_environment()));
+        contacts.map(|c| Port::new(&format!("{}_{suffix}", c.item.identifier()), &[len])).collect()
+    };
+    match function {
+        ContactFunction::ConstrainedCoordinates => coordinates(m),
+        ContactFunction::FreeCoordinates => coordinates(mode.free_names().len()),
+        ContactFunction::ForwardDynamics => [
+            vec![
+                Port::new("qdd", &[nv]),
+                Port::new("force", &[m]),
+                Port::new("sdd", &[m]),
+                Port::new("violation", &[m]),
+                Port::new("pivot", &[1]),
+            ],
+            per_contact("own_rate", 2, |(own, _)| own),
+        ]
+        .concat(),
+        ContactFunction::InverseDynamics => vec![Port::new("tau", &[nv]), Port::new("pivot", &[1])],
+        ContactFunction::Impact => [
+            vec![
+                Port::new("dqd", &[nv]),
+                Port::new("impulse", &[m]),
+                Port::new("dsd", &[m]),
+                Port::new("energy_loss", &[1]),
+                Port::new("pivot", &[1]),
+            ],
+            per_contact("struck_after", 1, |(_, struck)| struck),
+        ]
+        .concat(),
+        ContactFunction::Projection => vec![Port::new("dq", &[nv]), Port::new("s", &[m])],
+    }
+}
+
+/// ε of the regularisation: what numbers of this format can bear.
+pub fn ridge(scalar: Scalar) -> f64 {
+    match scalar {
+        Scalar::F64 => 1e-12,
+        Scalar::F32 => 1e-6,
+    }
+}

@@ -1,0 +1,289 @@
+//! Contacts of a scene: what the robot touches, which coordinates are constrained there, and in which modes.
+
+use crate::emit::snake_case;
+use crate::trace::Expr;
+use std::fmt;
+use std::rc::Rc;
+use std::sync::Arc;
+use straightline_core::contact::{Coordinate, ImplicitSurface, Normal, Surface};
+use straightline_core::spatial::{Sym3, Vec3};
+use straightline_core::{Dd, Real};
+
+/// All contacts of a scene. The default has none, and nothing of a contact is generated.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Contacts {
+    /// Contacts with objects.
+    pub contacts: Vec<ContactItem>,
+    /// Loops: frames of the robot that are held together, in every mode.
+    pub loops: Vec<LoopItem>,
+    /// Modes; none: one per contact, or one of the loops alone.
+    pub modes: Vec<ModeItem>,
+    /// Baumgarte's stabilisation: frequency \[rad/s\] and damping ratio.
+    pub stabilisation: Option<(f64, f64)>,
+    /// The functions that are generated for each mode; `None`: all.
+    pub functions: Option<Vec<ContactFunction>>,
+}
+
+/// A function of a contact mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ContactFunction {
+    /// s^c, its rate, its Jacobian and its adjoint vector.
+    ConstrainedCoordinates,
+    /// The same of s^f.
+    FreeCoordinates,
+    /// Accelerations and reactions of a tau.
+    ForwardDynamics,
+    /// tau of a motion along s^f and of reactions.
+    InverseDynamics,
+    /// Changes of velocity and impulses when the contacts of the mode close.
+    Impact,
+    /// The correction that takes s^c away.
+    Projection,
+}
+
+impl ContactFunction {
+    /// All of them, with their names in generated code.
+    pub const WORDS: [(&'static str, ContactFunction); 6] = [
+        ("constrained_coordinates", ContactFunction::ConstrainedCoordinates),
+        ("free_coordinates", ContactFunction::FreeCoordinates),
+        ("forward_dynamics", ContactFunction::ForwardDynamics),
+        ("inverse_dynamics", ContactFunction::InverseDynamics),
+        ("impact", ContactFunction::Impact),
+        ("projection", ContactFunction::Projection),
+    ];
+
+    /// Its name in generated code.
+    pub fn name(self) -> &'static str {
+        Self::WORDS.iter().find(|w| w.1 == self).expect("every function has a name").0
+    }
+}
+
+/// A contact of a frame with an object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactItem {
+    /// Its name.
+    pub name: String,
+    /// The frame of the robot.
+    pub frame: String,
+    /// The tool axis in the frame; `None`: an input.
+    pub axis: Option<[f64; 3]>,
+    /// Pose of the object in the world; `None`: an input, with velocity and acceleration.
+    pub object: Option<ObjectPose>,
+    /// Its surface.
+    pub surface: SurfaceItem,
+    /// s^c.
+    pub constrained: Vec<Coordinate>,
+    /// s^f.
+    pub free: Vec<Coordinate>,
+    /// Coulomb friction while it slides: μ, and the speed w \[m/s\] at which it has reached 71 %.
+    pub friction: Option<(f64, f64)>,
+    /// How the object gives way; `None`: it is rigid.
+    pub environment: Option<EnvironmentItem>,
+}
+
+/// The pose of an object that does not move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObjectPose {
+    /// Origin in the world \[m\].
+    pub origin: [f64; 3],
+    /// Direction of Z, the normal of a plane, towards the robot.
+    pub z: [f64; 3],
+    /// Direction of X, as far as it is perpendicular to Z.
+    pub x: [f64; 3],
+}
+
+/// The form of a surface.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum SurfaceItem {
+    /// Z = 0.
+    #[default]
+    Plane,
+    /// About the origin.
+    Sphere {
+        /// Radius \[m\].
+        radius: f64,
+        /// The robot is inside.
+        hollow: bool,
+    },
+    /// About the X axis.
+    Cylinder {
+        /// Radius \[m\].
+        radius: f64,
+        /// The robot is inside.
+        hollow: bool,
+    },
+    /// pᵀ A p + 2 b · p + c = 0.
+    Quadric {
+        /// A: xx, xy, xz, yy, yz, zz.
+        matrix: [f64; 6],
+        /// b.
+        linear: [f64; 3],
+        /// c.
+        constant: f64,
+    },
+    /// A function made in code.
+    Implicit(UserSurface),
+}
+
+/// A user's surface, as the compiler traces it.
+#[derive(Clone)]
+pub struct UserSurface {
+    name: String,
+    value: Arc<Traced>,
+}
+
+type Traced = dyn Fn(Vec3<Normal<Expr>>) -> Normal<Expr> + Send + Sync;
+
+impl UserSurface {
+    /// From a function over any scalar. The name tells surfaces apart, in the hash of the output too.
+    pub fn new(name: impl Into<String>, surface: impl ImplicitSurface + Send + Sync + 'static) -> Self {
+        UserSurface { name: name.into(), value: Arc::new(move |p| surface.value(p)) }
+    }
+}
+
+impl PartialEq for UserSurface {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl fmt::Debug for UserSurface {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "UserSurface({:?})", self.name)
+    }
+}
+
+impl SurfaceItem {
+    /// The surface over expressions.
+    pub fn traced(&self) -> Surface<Expr> {
+        let c = |x: f64| Expr::constant(Dd::from(x));
+        match self {
+            SurfaceItem::Plane => Surface::Plane,
+            SurfaceItem::Sphere { radius, hollow } => Surface::Sphere { radius: c(*radius), hollow: *hollow },
+            SurfaceItem::Cylinder { radius, hollow } => Surface::Cylinder { radius: c(*radius), hollow: *hollow },
+            SurfaceItem::Quadric { matrix, linear, constant } => {
+                let [xx, xy, xz, yy, yz, zz] = matrix.map(c);
+                let linear = Vec3::from(linear.map(c));
+                Surface::Quadric { matrix: Sym3 { xx, xy, xz, yy, yz, zz }, linear, constant: c(*constant) }
+            }
+            SurfaceItem::Implicit(user) => {
+                let value = user.value.clone();
+                Surface::Implicit(Rc::new(move |p| value(p)))
+            }
+        }
+    }
+}
+
+/// How an object gives way along the distance, by the letters of the chapter's Figure 20.15.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnvironmentItem {
+    /// Which model.
+    pub kind: EnvironmentKind,
+    /// Its numbers in the order of [`EnvironmentKind::keys`]; `None`: an input.
+    pub values: Option<Vec<f64>>,
+}
+
+/// A model of an object that gives way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EnvironmentKind {
+    /// (b) Spring and damper without mass.
+    Elastic,
+    /// (c) A mass on them.
+    Mass,
+    /// (d) The same behind another spring and damper.
+    Cushioned,
+    /// (e) Two masses.
+    TwoMasses,
+    /// Tool and surface elastic, without mass.
+    BothSides,
+}
+
+impl EnvironmentKind {
+    /// All of them, with their words in scene files.
+    pub const WORDS: [(&'static str, EnvironmentKind); 5] = [
+        ("elastic", EnvironmentKind::Elastic),
+        ("mass", EnvironmentKind::Mass),
+        ("cushioned", EnvironmentKind::Cushioned),
+        ("two_masses", EnvironmentKind::TwoMasses),
+        ("both_sides", EnvironmentKind::BothSides),
+    ];
+
+    /// The keys of its numbers \[kg, N/m, N·s/m\].
+    pub fn keys(self) -> &'static [&'static str] {
+        match self {
+            EnvironmentKind::Elastic => &["stiffness", "damping"],
+            EnvironmentKind::Mass => &["mass", "stiffness", "damping"],
+            EnvironmentKind::Cushioned => &["mass", "stiffness", "damping", "front_stiffness", "front_damping"],
+            EnvironmentKind::TwoMasses => {
+                &["mass", "stiffness", "damping", "front_stiffness", "front_damping", "front_mass"]
+            }
+            EnvironmentKind::BothSides => &["stiffness", "damping", "tool_stiffness", "tool_damping"],
+        }
+    }
+
+    /// Those of them that must be positive, for a division by them.
+    pub fn positive(self) -> &'static [&'static str] {
+        match self {
+            EnvironmentKind::Elastic | EnvironmentKind::Mass => &[],
+            EnvironmentKind::Cushioned | EnvironmentKind::TwoMasses => &["mass"],
+            EnvironmentKind::BothSides => &["tool_damping"],
+        }
+    }
+}
+
+/// Two frames of the robot that are held together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoopItem {
+    /// Its name.
+    pub name: String,
+    /// A frame.
+    pub frame: String,
+    /// The frame that it is held to, whose axes count as the object's.
+    pub with: String,
+    /// Coordinates that are held.
+    pub constrained: Vec<Coordinate>,
+}
+
+/// Contacts that are closed together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModeItem {
+    /// Its name.
+    pub name: String,
+    /// Names of the contacts.
+    pub contacts: Vec<String>,
+    /// Those of them that stick: their positions along X and Y are constrained as well, and friction is what holds them.
+    pub sticking: Vec<String>,
+}
+
+impl Contacts {
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.contacts.is_empty() && self.loops.is_empty() && self.modes.is_empty()
+    }
+
+    /// The modes, those that go without saying too.
+    pub fn all_modes(&self) -> Vec<ModeItem> {
+        if !self.modes.is_empty() {
+            return self.modes.clone();
+        }
+        if self.contacts.is_empty() && !self.loops.is_empty() {
+            return vec![ModeItem { name: "closed".to_string(), contacts: vec![], sticking: vec![] }];
+        }
+        let alone =
+            |c: &ContactItem| ModeItem { name: c.name.clone(), contacts: vec![c.name.clone()], sticking: vec![] };
+        self.contacts.iter().map(alone).collect()
+    }
+
+    /// The functions that are wanted, in order.
+    pub fn wanted(&self) -> Vec<ContactFunction> {
+        let all = ContactFunction::WORDS.iter().map(|w| w.1);
+        all.filter(|f| self.functions.as_ref().is_none_or(|wanted| wanted.contains(f))).collect()
+    }
+}
+
+impl ContactItem {
+    /// Its name in identifiers.
+    pub fn identifier(&self) -> String {
+        snake_case(&self.name)
+    }
+}

@@ -1,0 +1,268 @@
+//! The tables `[[contact]]`, `[[loop]]`, `[[mode]]` and `[stabilisation]`.
+
+use super::SceneReader;
+use crate::description::reader::Range64;
+use crate::description::table::Table;
+use crate::description::Value;
+use crate::scene::contact::{
+    ContactItem, EnvironmentItem, EnvironmentKind, LoopItem, ModeItem, ObjectPose, SurfaceItem,
+};
+use crate::scene::messages as say;
+use straightline_core::contact::Coordinate;
+use toml::de::DeValue;
+
+/// The forms that a surface can have.
+#[derive(Clone, Copy)]
+enum Form {
+    Plane,
+    Sphere,
+    Cylinder,
+    Quadric,
+}
+
+const FORMS: [(&str, Form); 4] =
+    [("plane", Form::Plane), ("sphere", Form::Sphere), ("cylinder", Form::Cylinder), ("quadric", Form::Quadric)];
+
+/// Whether a key says `"input"`.
+fn is_input(table: &Table, key: &str) -> bool {
+    matches!(table.get(key), Some((DeValue::String(text), _)) if text.as_ref() == "input")
+}
+
+impl SceneReader<'_> {
+    pub(super) fn contacts(&mut self, top: &Table) {
+        for table in self.reader.tables_at(top, "contact") {
+            self.contact(table);
+        }
+        for table in self.reader.tables_at(top, "loop") {
+            self.a_loop(table);
+        }
+        for table in self.reader.tables_at(top, "mode") {
+            self.mode(table);
+        }
+        if let Some(table) = self.reader.table_at(top, "stabilisation", "[stabilisation]") {
+            self.reader.check_keys(&table, &["frequency", "damping"]);
+            self.reader.require(&table, "frequency", "frequency = 50.0");
+            let frequency = self.reader.real_at(&table, "frequency", Range64::Finite);
+            let frequency = self.noted("stabilisation.frequency", frequency);
+            let damping = self.reader.real_at(&table, "damping", Range64::Finite);
+            let damping = self.noted("stabilisation.damping", damping).unwrap_or(1.0);
+            self.file.scene.contacts.stabilisation = frequency.map(|f| (f, damping));
+        }
+    }
+
+    fn coordinates(&mut self, path: &str, table: &Table, key: &str) -> Vec<Coordinate> {
+        let known: Vec<&str> = Coordinate::ALL.iter().map(|c| c.name()).collect();
+        if let Some((_, span)) = table.get(key) {
+            let place = self.reader.place(&span);
+            self.file.scene.places.note(path, &place);
+        }
+        let mut found = Vec::new();
+        for name in self.reader.names_at(table, key, "coordinate") {
+            match Coordinate::ALL.into_iter().find(|c| c.name() == name.value) {
+                Some(coordinate) => found.push(coordinate),
+                None => {
+                    let complaint = crate::description::messages::unknown_word(&table.what(key), &name.value, &known);
+                    self.reader.diagnostics.push(complaint.at(&name.place));
+                }
+            }
+        }
+        found
+    }
+
+    /// Name, its place noted, and the table under it.
+    fn named_table(&mut self, path: &str, kind: &str, table: &mut Table) -> Option<String> {
+        self.reader.require(table, "name", "name = \"...\"");
+        let name = self.reader.name_at(table, "name", kind);
+        if let Some(name) = &name {
+            table.owner = format!("{kind} `{}`", name.value);
+        }
+        let place = self.reader.place(&table.span);
+        self.file.scene.places.note(path, &place);
+        self.noted(&format!("{path}.name"), name)
+    }
+
+    fn contact(&mut self, mut table: Table) {
+        let path = format!("contact.{}", self.file.scene.contacts.contacts.len());
+        let name = self.named_table(&path, "contact", &mut table);
+        const KEYS: &[&str] =
+            &["name", "frame", "axis", "object", "surface", "constrained", "free", "friction", "environment"];
+        self.reader.check_keys(&table, KEYS);
+        for (key, example) in [
+            ("frame", "frame = \"tool\""),
+            ("object", "object = { origin = [0.5, 0.0, 0.2], z = [0.0, 0.0, 1.0] }"),
+            ("constrained", "constrained = [\"pz\"]"),
+        ] {
+            self.reader.require(&table, key, example);
+        }
+        let frame = self.reader.name_at(&table, "frame", "frame");
+        let frame = self.noted(&format!("{path}.frame"), frame);
+        let axis = match is_input(&table, "axis") {
+            true => None,
+            false => {
+                let axis = self.reader.vector_at(&table, "axis");
+                Some(self.noted(&format!("{path}.axis"), axis).unwrap_or([0.0, 0.0, 1.0]))
+            }
+        };
+        let object = match is_input(&table, "object") {
+            true => None,
+            false => self.object(&path, &table),
+        };
+        let surface = self.surface(&path, &table);
+        let constrained = self.coordinates(&format!("{path}.constrained"), &table, "constrained");
+        let free = match table.has("free") {
+            true => self.coordinates(&format!("{path}.free"), &table, "free"),
+            false => Coordinate::ALL.into_iter().filter(|c| !constrained.contains(c)).collect(),
+        };
+        let friction = self.reader.table_at(&table, "friction", &table.what("friction")).and_then(|friction| {
+            self.reader.check_keys(&friction, &["coefficient", "speed"]);
+            self.reader.require(&friction, "coefficient", "coefficient = 0.3");
+            let coefficient = self.reader.real_at(&friction, "coefficient", Range64::Finite);
+            let coefficient = self.noted(&format!("{path}.friction.coefficient"), coefficient);
+            let speed = self.reader.real_at(&friction, "speed", Range64::Finite);
+            let speed = self.noted(&format!("{path}.friction.speed"), speed).unwrap_or(1e-3);
+            let place = self.reader.place(&friction.span);
+            self.file.scene.places.note(format!("{path}.friction"), &place);
+            coefficient.map(|c| (c, speed))
+        });
+        let environment = self.environment(&path, &table);
+        if let (Some(name), Some(frame)) = (name, frame) {
+            let item = ContactItem { name, frame, axis, object, surface, constrained, free, friction, environment };
+            self.file.scene.contacts.contacts.push(item);
+        }
+    }
+
+    fn object(&mut self, path: &str, table: &Table) -> Option<ObjectPose> {
+        let object = match table.get("object") {
+            Some((value @ DeValue::String(_), span)) => {
+                let forms = "`{ origin = [0.5, 0.0, 0.2], z = [0.0, 0.0, 1.0], x = [1.0, 0.0, 0.0] }` or `\"input\"`";
+                self.reader.wrong_type(&table.what("object"), forms, value, &span);
+                return None;
+            }
+            _ => self.reader.table_at(table, "object", &table.what("object"))?,
+        };
+        self.reader.check_keys(&object, &["origin", "z", "x"]);
+        let place = self.reader.place(&object.span);
+        self.file.scene.places.note(format!("{path}.object"), &place);
+        let mut vector = |key: &str| {
+            let vector = self.reader.vector_at(&object, key);
+            self.noted(&format!("{path}.object.{key}"), vector)
+        };
+        let (origin, z, x) = (vector("origin"), vector("z"), vector("x"));
+        let z = z.unwrap_or([0.0, 0.0, 1.0]);
+        // of the world's axes the one that is farthest from Z
+        let least = (0..3).min_by(|i, j| z[*i].abs().total_cmp(&z[*j].abs())).unwrap_or(0);
+        let mut farthest = [0.0; 3];
+        farthest[least] = 1.0;
+        Some(ObjectPose { origin: origin.unwrap_or_default(), z, x: x.unwrap_or(farthest) })
+    }
+
+    fn surface(&mut self, path: &str, table: &Table) -> SurfaceItem {
+        let Some(surface) = self.reader.table_at(table, "surface", &table.what("surface")) else {
+            return SurfaceItem::Plane;
+        };
+        self.reader.require(&surface, "kind", "kind = \"sphere\"");
+        let Some(Value { value: form, .. }) = self.reader.word_at(&surface, "kind", &FORMS) else {
+            return SurfaceItem::Plane;
+        };
+        let keys: &[&str] = match form {
+            Form::Plane => &["kind"],
+            Form::Sphere | Form::Cylinder => &["kind", "radius", "hollow"],
+            Form::Quadric => &["kind", "matrix", "linear", "constant"],
+        };
+        self.reader.check_keys(&surface, keys);
+        let place = self.reader.place(&surface.span);
+        self.file.scene.places.note(format!("{path}.surface"), &place);
+        match form {
+            Form::Plane => SurfaceItem::Plane,
+            Form::Sphere | Form::Cylinder => {
+                self.reader.require(&surface, "radius", "radius = 0.2");
+                let radius = self.reader.real_at(&surface, "radius", Range64::Finite);
+                let radius = self.noted(&format!("{path}.surface.radius"), radius).unwrap_or(1.0);
+                let hollow = self.reader.flag_at(&surface, "hollow").is_some_and(|f| f.value);
+                match form {
+                    Form::Sphere => SurfaceItem::Sphere { radius, hollow },
+                    _ => SurfaceItem::Cylinder { radius, hollow },
+                }
+            }
+            Form::Quadric => {
+                self.reader.require(&surface, "matrix", "matrix = { xx = 1.0, yy = 1.0, zz = 4.0 }");
+                let matrix = self.reader.tensor_at(&surface, "matrix");
+                let matrix = matrix.map(|m| m.value).map_or([0.0; 6], |m| [m.xx, m.xy, m.xz, m.yy, m.yz, m.zz]);
+                let linear = self.reader.vector_at(&surface, "linear").map_or([0.0; 3], |v| v.value);
+                let constant = self.reader.real_at(&surface, "constant", Range64::Finite).map_or(0.0, |v| v.value);
+                SurfaceItem::Quadric { matrix, linear, constant }
+            }
+        }
+    }
+
+    fn environment(&mut self, path: &str, table: &Table) -> Option<EnvironmentItem> {
+        let environment = self.reader.table_at(table, "environment", &table.what("environment"))?;
+        let place = self.reader.place(&environment.span);
+        self.file.scene.places.note(format!("{path}.environment"), &place);
+        self.reader.require(&environment, "kind", "kind = \"mass\"");
+        let kind = self.reader.word_at(&environment, "kind", &EnvironmentKind::WORDS)?.value;
+        if environment.has("parameters") {
+            self.reader.check_keys(&environment, &["kind", "parameters"]);
+            self.reader.word_at(&environment, "parameters", &[("input", ())])?;
+            return Some(EnvironmentItem { kind, values: None });
+        }
+        self.reader.check_keys(&environment, &[&["kind", "parameters"], kind.keys()].concat());
+        let mut values = Vec::new();
+        for key in kind.keys() {
+            self.reader.require(&environment, key, &format!("{key} = 1.0"));
+            let value = self.reader.real_at(&environment, key, Range64::Finite);
+            values.push(self.noted(&format!("{path}.environment.{key}"), value).unwrap_or(1.0));
+        }
+        Some(EnvironmentItem { kind, values: Some(values) })
+    }
+
+    fn a_loop(&mut self, mut table: Table) {
+        let path = format!("loop.{}", self.file.scene.contacts.loops.len());
+        let name = self.named_table(&path, "loop", &mut table);
+        self.reader.check_keys(&table, &["name", "frame", "with", "constrained"]);
+        let mut frame = |key: &str| {
+            self.reader.require(&table, key, &format!("{key} = \"...\""));
+            let frame = self.reader.name_at(&table, key, "frame");
+            self.noted(&format!("{path}.{key}"), frame)
+        };
+        let (frame, with) = (frame("frame"), frame("with"));
+        let constrained = match table.has("constrained") {
+            true => self.coordinates(&format!("{path}.constrained"), &table, "constrained"),
+            false => Coordinate::ALL.to_vec(),
+        };
+        if let (Some(name), Some(frame), Some(with)) = (name, frame, with) {
+            self.file.scene.contacts.loops.push(LoopItem { name, frame, with, constrained });
+        }
+    }
+
+    fn mode(&mut self, mut table: Table) {
+        let path = format!("mode.{}", self.file.scene.contacts.modes.len());
+        let name = self.named_table(&path, "mode", &mut table);
+        self.reader.check_keys(&table, &["name", "contacts", "sticking"]);
+        let contacts = self.names(&format!("{path}.contacts"), &table, "contacts", "contact");
+        let sticking = self.names(&format!("{path}.sticking"), &table, "sticking", "contact");
+        if let Some(name) = name {
+            self.file.scene.contacts.modes.push(ModeItem { name, contacts, sticking });
+        }
+    }
+
+    /// `contact` of `[outputs]`: functions of every mode.
+    pub(super) fn contact_functions(&mut self, table: &Table) {
+        if !table.has("contact") {
+            return;
+        }
+        let words = crate::scene::ContactFunction::WORDS;
+        let mut wanted = Vec::new();
+        for name in self.reader.names_at(table, "contact", "function") {
+            match words.iter().find(|w| w.0 == name.value) {
+                Some((_, function)) => wanted.push(*function),
+                None => {
+                    let known: Vec<&str> = words.iter().map(|w| w.0).collect();
+                    let complaint = say::unknown_contact_function(&name.value, &known);
+                    self.reader.diagnostics.push(complaint.at(&name.place));
+                }
+            }
+        }
+        self.file.scene.contacts.functions = Some(wanted);
+    }
+}

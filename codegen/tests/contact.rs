@@ -1,0 +1,163 @@
+//! Contact modes: what they cost, what they leave out, and the generic runtime against what is generated.
+
+use straightline_codegen::compile::{compile, Generated, Options};
+use straightline_codegen::contact::{graph, Mode};
+use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::expr::{self, Grade};
+use straightline_codegen::function::Robot;
+use straightline_codegen::model;
+use straightline_codegen::scene::contact::{SurfaceItem, UserSurface};
+use straightline_codegen::scene::{self, ContactFunction};
+use straightline_core::algorithms as alg;
+use straightline_core::algorithms::{Ltdl, Support};
+use straightline_core::contact::{Contact, Coordinate, ImplicitSurface, Object, Surface};
+use straightline_core::spatial::{Mat3, Transform, Vec3};
+use straightline_core::{Dd, Real};
+
+fn source(robot: &str) -> Source {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions").join(robot);
+    Source::new(robot, std::fs::read_to_string(path).expect("a robot file"))
+}
+
+fn options(scene: &str) -> Options {
+    let mut diagnostics = Diagnostics::new();
+    let file = scene::read(&Source::new("scene.toml", scene), &mut diagnostics);
+    file.unwrap_or_else(|| panic!("{}", diagnostics.render())).into_options(Options::default())
+}
+
+fn generated(robot: &str, scene: &str) -> Generated {
+    compile(&source(robot), &options(scene)).unwrap_or_else(|d| panic!("{}", d.render()))
+}
+
+fn loaded(robot: &str, options: &Options) -> Robot {
+    let (model, diagnostics) = model::load(&source(robot), &options.model);
+    Robot::new(model.unwrap_or_else(|| panic!("{}", diagnostics.render())))
+}
+
+fn surface(frame: &str) -> String {
+    format!(
+        "[outputs]\nfunctions = [\"forward_dynamics\"]\ncontact = [\"forward_dynamics\"]\n\n[[contact]]\nname = \"pen\"\n\
+         frame = \"{frame}\"\nobject = {{ origin = [0.5, 0.1, 0.2], z = [0.1, 0.2, 1.0] }}\nconstrained = [\"pz\"]\n"
+    )
+}
+
+#[test]
+fn a_surface_contact_costs_little_more_than_free_motion() {
+    for (robot, frame, most) in
+        [("panda.urdf", "panda_hand_tcp", 1.4), ("ur5.urdf", "tool0", 1.6), ("puma560.urdf", "tool0", 1.6)]
+    {
+        let report = generated(robot, &surface(frame)).report;
+        let free = &report.functions["forward_dynamics"];
+        let free = free.mul + free.add + free.div + free.sqrt;
+        let ratio = report.contact[0].counts.flops() as f64 / free as f64;
+        println!("{robot}: {free} operations, in contact {ratio:.3} times as many");
+        assert!(ratio <= most, "{robot}: {ratio:.3}");
+    }
+}
+
+#[test]
+fn a_scene_without_contact_has_nothing_of_it() {
+    let free = generated("ur5.urdf", "[outputs]\nfunctions = [\"forward_dynamics\"]\n");
+    assert!(!free.text.contains("contact") && free.report.contact.is_empty());
+    let in_contact = generated("ur5.urdf", &surface("tool0"));
+    let function = |text: &str| text[text.rfind("/// Forward dynamics q̈ =").expect("it is there")..].to_string();
+    assert_eq!(function(&free.text), function(&in_contact.text), "free motion is what it was");
+}
+
+/// q, q̇, tau that no symmetry of the robot hides behind.
+fn state(n: usize) -> Vec<f64> {
+    let q = (0..n).map(|i| 0.4 + 0.37 * i as f64 - 0.11 * (i * i) as f64);
+    let qd = (0..n).map(|i| 0.9 - 0.53 * i as f64 + 0.07 * (i * i) as f64);
+    let tau = (0..n).map(|i| 3.0 - 1.7 * i as f64);
+    q.chain(qd).chain(tau).collect()
+}
+
+#[test]
+fn under_exact_rules_a_contact_mode_is_the_generic_runtime_bit_for_bit() {
+    let text = surface("tool0").replace("[\"pz\"]", "[\"px\", \"py\", \"ax\", \"ay\"]");
+    let options = Options { grade: Grade::Exact, ..options(&text) };
+    let robot = loaded("ur5.urdf", &options);
+    let modes = Mode::all(&options.scene);
+    let graph = graph(&robot, &options, &modes[0], ContactFunction::ForwardDynamics);
+    let state = state(6);
+    let found = expr::evaluate::<f64>(&graph, &state);
+
+    let model = robot.model.cast::<f64>();
+    let (q, qd, tau) = (&state[..6], &state[6..12], &state[12..]);
+    // the object's axes, in double-double and rounded once, as constants are
+    let unit = |v: Vec3<Dd>| v.scale(Dd::ONE / v.dot(v).sqrt());
+    let d = |x: [f64; 3]| Vec3::from(x.map(Dd::from));
+    let exact = |v: Vec3<Dd>| {
+        let length = v.dot(v).sqrt();
+        v.map(|x| x / length)
+    };
+    let z = exact(d([0.1, 0.2, 1.0]));
+    let x = d([1.0, 0.0, 0.0]);
+    let x = exact(x - z.scale(x.dot(z)));
+    assert!((unit(x) - x).dot(unit(x) - x).hi() < 1e-50);
+    let narrow = |v: Vec3<Dd>| v.map(f64::constant);
+    let contact = Contact {
+        name: "pen".into(),
+        frame: model.frame("tool0").expect("a frame of the robot").clone(),
+        axis: Vec3::new(0.0, 0.0, 1.0),
+        second_axis: Vec3::new(1.0, 0.0, 0.0),
+        object: Object::Fixed(Transform {
+            rotation: Mat3::from_columns(narrow(x), narrow(z.cross(x)), narrow(z)),
+            translation: Vec3::new(0.5, 0.1, 0.2),
+        }),
+        surface: Surface::Plane,
+        constrained: vec![Coordinate::Px, Coordinate::Py, Coordinate::Ax, Coordinate::Ay],
+        free: vec![],
+        friction: None,
+    };
+    let s = alg::constrained_coordinates(&model, &contact, q, qd);
+    let factor = Ltdl::factor(&model, &alg::mass_matrix(&model, q));
+    let drive: Vec<f64> = tau.iter().zip(alg::bias_force(&model, q, qd)).map(|(t, h)| t - h).collect();
+    let motion = alg::constrained_forward_dynamics(&factor, &drive, &s, None, &[Support::Rigid(0.0); 4], 1e-12);
+    let expected = [motion.qdd, motion.force, motion.sdd, motion.violation, vec![motion.pivot]].concat();
+    assert_eq!(found, expected);
+}
+
+/// |p|⁴ = r⁴: a sphere in disguise, far from a distance.
+struct Disguised(f64);
+
+impl ImplicitSurface for Disguised {
+    fn value<T: Real>(&self, p: Vec3<T>) -> T {
+        let square = p.dot(p);
+        square * square - T::constant(Dd::from(self.0.powi(4)))
+    }
+}
+
+#[test]
+fn one_sphere_in_three_forms_gives_one_motion() {
+    let with = |surface: &str| surface_scene(surface);
+    let quadric = "surface = { kind = \"quadric\", matrix = [1, 1, 1], constant = -0.25 }\n";
+    let sphere = options(&with("surface = { kind = \"sphere\", radius = 0.5 }\n"));
+    let mut user = sphere.clone();
+    user.scene.contacts.contacts[0].surface = SurfaceItem::Implicit(UserSurface::new("fourth power", Disguised(0.5)));
+    let robot = loaded("ur5.urdf", &sphere);
+    // a state on the sphere: its centre is placed there
+    let state = state(6);
+    let frame = robot.model.cast::<f64>();
+    let tip = alg::forward_kinematics(&frame, &state[..6], &[frame.frame("tool0").expect("a frame")])[0].translation;
+    let run = |options: &Options| {
+        let mut options = options.clone();
+        let object = options.scene.contacts.contacts[0].object.as_mut().expect("it does not move");
+        object.origin = [tip.x - 0.3, tip.y, tip.z - 0.4];
+        let modes = Mode::all(&options.scene);
+        let graph = graph(&robot, &options, &modes[0], ContactFunction::ForwardDynamics);
+        expr::evaluate::<f64>(&graph, &[&state[..6], &state[12..]].concat())
+    };
+    let expected = run(&sphere);
+    for other in [run(&options(&with(quadric))), run(&user)] {
+        let largest = expected[..7].iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        for (a, b) in expected.iter().zip(&other).take(7) {
+            assert!((a - b).abs() <= 1e-9 * largest, "{expected:?}\n{other:?}");
+        }
+    }
+}
+
+fn surface_scene(surface: &str) -> String {
+    // at rest: where ṡ is not zero, s̈ of a distance and of a first-order distance differ
+    format!("{}{surface}[zero]\nqd = true\n", self::surface("tool0"))
+}
