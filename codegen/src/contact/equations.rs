@@ -240,7 +240,7 @@ fn contacts<'a>(robot: &Robot, mode: &'a Mode, bound: &Bound, added: &Added, red
     all
 }
 
-fn environment(item: &EnvironmentItem, values: &Vec<Expr>) -> Environment<Expr> {
+fn environment(item: &EnvironmentItem, values: &[Expr]) -> Environment<Expr> {
     let at = |key: &str| {
         let k = item.kind.keys().iter().position(|k| *k == key);
         values[k.expect("a key of this kind")]

@@ -17,6 +17,7 @@ pub mod dd;
 pub mod jet;
 #[cfg(feature = "alloc")]
 pub mod model;
+pub mod phases;
 pub mod real;
 #[cfg(feature = "alloc")]
 pub mod reduced;

@@ -1,0 +1,385 @@
+//! Laws of mechanics for a robot in contact, on the generic runtime: energy, impact, drift, and constraints that are nearly or
+//! wholly redundant.
+
+use straightline_core::algorithms::{
+    bias_force, constrained_coordinates, constrained_forward_dynamics, impact, inverse_dynamics, kinetic_energy,
+    mass_matrix, potential_energy, projection, ConstrainedMotion, Environment, FunctionalCoordinates, Ltdl,
+    SpringDamper, Struck, Support,
+};
+use straightline_core::contact::{Contact, Coordinate, Object, Surface};
+use straightline_core::model::{Body, Frame, Joint, JointEffects, JointKind, Limits, Model};
+use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
+use Coordinate::{Px, Py, Pz};
+
+const RIDGE: f64 = 1e-12;
+const GRAVITY: f64 = 9.81;
+
+fn at(x: f64, y: f64, z: f64) -> Transform<f64> {
+    Transform { rotation: Mat3::identity(), translation: Vec3::new(x, y, z) }
+}
+
+fn body(
+    name: &str,
+    kind: JointKind,
+    parent: Option<usize>,
+    iv: usize,
+    placement: Transform<f64>,
+    mass: f64,
+) -> Body<f64> {
+    let inertia = Sym3 { xx: 0.02, xy: 0.003, xz: -0.002, yy: 0.05, yz: 0.004, zz: 0.06 };
+    Body {
+        name: name.into(),
+        parent,
+        joint: Joint { name: name.into(), kind, iq: iv, iv, limits: Limits::default() },
+        placement,
+        inertia: SpatialInertia::new(mass, Vec3::new(0.45, 0.03, 0.02), inertia),
+        link_frame: Transform::identity(),
+        dense: false,
+        effects: JointEffects::none(),
+        load: None,
+    }
+}
+
+/// A chain in the x-y plane of links of 1 m, y up, frame `tip` at its end.
+fn chain(n: usize) -> Model<f64> {
+    let link = |i: usize| {
+        let (parent, x) = if i == 0 { (None, 0.0) } else { (Some(i - 1), 1.0) };
+        body("link", JointKind::Revolute, parent, i, at(x, 0.0, 0.0), 2.0 - 0.3 * i as f64)
+    };
+    Model {
+        name: "chain".into(),
+        bodies: (0..n).map(link).collect(),
+        gravity: Vec3::new(0.0, -GRAVITY, 0.0),
+        frames: vec![Frame { name: "tip".into(), body: Some(n - 1), placement: at(1.0, 0.0, 0.0) }],
+    }
+}
+
+fn contact(model: &Model<f64>, frame: usize, pose: Transform<f64>, constrained: &[Coordinate]) -> Contact<f64> {
+    Contact {
+        name: "contact".into(),
+        frame: model.frames[frame].clone(),
+        axis: Vec3::new(0.0, 0.0, 1.0),
+        second_axis: Vec3::new(1.0, 0.0, 0.0),
+        object: Object::Fixed(pose),
+        surface: Surface::Plane,
+        constrained: constrained.to_vec(),
+        free: vec![],
+        friction: None,
+    }
+}
+
+/// What stands in for the equations of a scene: constrained coordinates at a state.
+fn coordinates(model: &Model<f64>, contacts: &[Contact<f64>], q: &[f64], qd: &[f64]) -> FunctionalCoordinates<f64> {
+    let all = contacts.iter().map(|c| constrained_coordinates(model, c, q, qd));
+    all.fold(FunctionalCoordinates::default(), FunctionalCoordinates::and)
+}
+
+fn factor(model: &Model<f64>, q: &[f64]) -> Ltdl<f64> {
+    Ltdl::factor(model, &mass_matrix(model, q))
+}
+
+fn motion(
+    model: &Model<f64>,
+    s: &FunctionalCoordinates<f64>,
+    q: &[f64],
+    qd: &[f64],
+    tau: &[f64],
+) -> ConstrainedMotion<f64> {
+    let drive: Vec<f64> = tau.iter().zip(bias_force(model, q, qd)).map(|(t, h)| t - h).collect();
+    let rigid = vec![Support::Rigid(0.0); s.len()];
+    constrained_forward_dynamics(&factor(model, q), &drive, s, None, &rigid, RIDGE)
+}
+
+/// One step of Runge and Kutta's for a state of any length.
+fn step(x: &mut [f64], dt: f64, rate: &mut dyn FnMut(&[f64]) -> Vec<f64>) {
+    let along = |x: &[f64], k: &[f64], h: f64| x.iter().zip(k).map(|(x, k)| x + h * k).collect::<Vec<f64>>();
+    let k1 = rate(x);
+    let k2 = rate(&along(x, &k1, 0.5 * dt));
+    let k3 = rate(&along(x, &k2, 0.5 * dt));
+    let k4 = rate(&along(x, &k3, dt));
+    for i in 0..x.len() {
+        x[i] += dt / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+    }
+}
+
+/// A three-link chain whose tip slides on a tilted plane.
+fn on_a_plane() -> (Model<f64>, Contact<f64>, Vec<f64>) {
+    let model = chain(3);
+    let q = vec![-1.3, -0.4, 0.5];
+    // Z of the plane in the x-y plane, through the tip
+    let (s, c) = 0.3f64.sin_cos();
+    let rotation = Mat3::from_columns(Vec3::new(c, s, 0.0), Vec3::new(0.0, 0.0, -1.0), Vec3::new(-s, c, 0.0));
+    let mut contact = contact(&model, 0, Transform { rotation, translation: Vec3::zero() }, &[Pz]);
+    let height = coordinates(&model, &[contact.clone()], &q, &[0.0; 3]).value[0];
+    contact.object = Object::Fixed(Transform { rotation, translation: Vec3::new(-s, c, 0.0).scale(height) });
+    (model, contact, q)
+}
+
+/// The motion on the plane for so many steps: largest |s|, and the work of what the equations add to the drives.
+fn slide(steps: usize, dt: f64, projected: bool) -> (f64, f64) {
+    let (model, contact, q) = on_a_plane();
+    let contacts = [contact];
+    let mut x = [q, vec![0.3, -0.4, 0.2]].concat();
+    let blow = |q: &[f64], qd: &[f64]| {
+        let s = coordinates(&model, &contacts, q, qd);
+        impact(&factor(&model, q), qd, &s, None, &[Struck::Rigid], 0.0, RIDGE).dqd
+    };
+    let start = blow(&x[..3], &x[3..]);
+    (0..3).for_each(|i| x[3 + i] += start[i]);
+    let (mut drift, mut work) = (0.0f64, 0.0f64);
+    for _ in 0..steps {
+        let rate = |x: &[f64]| {
+            let (q, qd) = (&x[..3], &x[3..]);
+            let s = coordinates(&model, &contacts, q, qd);
+            [qd.to_vec(), motion(&model, &s, q, qd, &[0.0; 3]).qdd].concat()
+        };
+        // H q̈ + h − τ with τ = 0 is what the reaction does
+        let reaction = inverse_dynamics(&model, &x[..3], &x[3..], &rate(&x)[3..]);
+        let power: f64 = reaction.iter().zip(&x[3..]).map(|(f, qd)| f * qd).sum();
+        step(&mut x, dt, &mut |x| rate(x));
+        work += power * dt;
+        if projected {
+            let s = coordinates(&model, &contacts, &x[..3], &x[3..]);
+            let dq = projection(&factor(&model, &x[..3]), &s, &s.value, RIDGE);
+            (0..3).for_each(|i| x[i] += dq[i]);
+            let dqd = blow(&x[..3], &x[3..]);
+            (0..3).for_each(|i| x[3 + i] += dqd[i]);
+        }
+        drift = drift.max(coordinates(&model, &contacts, &x[..3], &x[3..]).value[0].abs());
+    }
+    (drift, work.abs())
+}
+
+#[test]
+fn a_reaction_without_friction_does_no_work() {
+    // 10 s, at instants when the constraint holds to rounding
+    let (_, work) = slide(10_000, 1e-3, true);
+    assert!(work < 1e-10, "work {work:.1e} J");
+}
+
+#[test]
+fn projection_holds_the_constraint() {
+    let (free, _) = slide(2_000, 1e-3, false);
+    let (projected, _) = slide(2_000, 1e-3, true);
+    assert!(projected < 1e-12 && projected <= free, "projected {projected:.1e} m, without {free:.1e} m");
+}
+
+/// `cargo test --release -p straightline-core --features reference --test contact -- --ignored --nocapture`
+#[test]
+#[ignore = "a million steps, twice"]
+fn drift_over_a_million_steps() {
+    let (free, _) = slide(1_000_000, 1e-3, false);
+    let (projected, _) = slide(1_000_000, 1e-3, true);
+    println!("1e6 steps of 1 ms: {free:.1e} m without, {projected:.1e} m with projection");
+    assert!(projected <= 1e-9);
+}
+
+#[test]
+fn a_plastic_impact_loses_what_the_closed_form_says() {
+    let model = chain(4);
+    let (q, qd) = ([0.4, -0.7, 0.9, -0.3], [0.5, -1.1, 0.8, 1.7]);
+    let s = coordinates(&model, &[contact(&model, 0, at(0.2, 0.1, 0.0), &[Px, Py])], &q, &qd);
+    let factor = factor(&model, &q);
+    let blow = impact(&factor, &qd, &s, None, &[Struck::Rigid; 2], 0.0, RIDGE);
+    let after: Vec<f64> = qd.iter().zip(&blow.dqd).map(|(a, b)| a + b).collect();
+    let lost = kinetic_energy(&model, &q, &qd) - kinetic_energy(&model, &q, &after);
+    // ½ ṡᵀ (J H⁻¹ Jᵀ)⁻¹ ṡ
+    let g = |i: usize, j: usize| {
+        let column = factor.solve(&s.jacobian[j]);
+        s.jacobian[i].iter().zip(&column).map(|(a, b)| a * b).sum::<f64>()
+    };
+    let determinant = g(0, 0) * g(1, 1) - g(0, 1) * g(1, 0);
+    let [a, b] = [s.rate[0], s.rate[1]];
+    let closed = 0.5 * (a * a * g(1, 1) - 2.0 * a * b * g(0, 1) + b * b * g(0, 0)) / determinant;
+    assert!((blow.energy_loss - closed).abs() < 1e-12 * closed && (lost - closed).abs() < 1e-12 * closed);
+    // restitution 1 loses nothing and turns ṡ round
+    let elastic = impact(&factor, &qd, &s, None, &[Struck::Rigid; 2], 1.0, RIDGE);
+    assert!(elastic.energy_loss.abs() < 1e-12 * closed);
+    for (d, v) in elastic.dsd.iter().zip(&s.rate) {
+        assert!((d + 2.0 * v).abs() < 1e-12);
+    }
+}
+
+/// Presses the chain's tip on an object for 0.4 s: the energy of robot, masses and springs, with the heat of the dampers.
+fn balance(
+    object: &Environment<f64>,
+    energy_of_object: &dyn Fn([f64; 4]) -> f64,
+    heat: &dyn Fn([f64; 4]) -> f64,
+) -> f64 {
+    let (model, contact, q) = on_a_plane();
+    let contacts = [contact];
+    // q, q̇, e, ė, heat
+    let mut x = [q, vec![0.2, -0.3, 0.1], vec![0.0; 3]].concat();
+    let state = |x: &[f64]| {
+        let s = coordinates(&model, &contacts, &x[..3], &x[3..6]);
+        [s.value[0], s.rate[0], x[6], x[7]]
+    };
+    let energy = |x: &[f64]| {
+        kinetic_energy(&model, &x[..3], &x[3..6])
+            + potential_energy(&model, &x[..3])
+            + energy_of_object(state(x))
+            + x[8]
+    };
+    let first = energy(&x);
+    for _ in 0..4_000 {
+        step(&mut x, 1e-4, &mut |x| {
+            let (q, qd) = (&x[..3], &x[3..6]);
+            let s = coordinates(&model, &contacts, q, qd);
+            let (here, own) = ((s.value[0], s.rate[0]), (x[6], x[7]));
+            let drive: Vec<f64> = bias_force(&model, q, qd).iter().map(|h| -h).collect();
+            let support = [object.support(here, own)];
+            let m = constrained_forward_dynamics(&factor(&model, q), &drive, &s, None, &support, RIDGE);
+            let e = object.motion(here, own);
+            [qd.to_vec(), m.qdd, vec![e.velocity, e.acceleration, heat([here.0, here.1, x[6], x[7]])]].concat()
+        });
+    }
+    (energy(&x) - first).abs()
+}
+
+#[test]
+fn the_energy_that_robot_and_environment_lose_is_the_heat_of_the_dampers() {
+    let spring = |stiffness, damping| SpringDamper { stiffness, damping };
+    // (c)
+    let mass = Environment::Mass { mass: 1.7, support: spring(4e3, 30.0) };
+    let error = balance(&mass, &|[s, sd, ..]| 0.5 * (1.7 * sd * sd + 4e3 * s * s), &|[_, sd, ..]| 30.0 * sd * sd);
+    assert!(error < 1e-8, "(c): {error:.1e} J");
+    // (d)
+    let cushioned = Environment::Cushioned { mass: 1.7, support: spring(4e3, 30.0), front: spring(9e3, 12.0) };
+    let error = balance(
+        &cushioned,
+        &|[s, _, e, ed]| 0.5 * (1.7 * ed * ed + 4e3 * e * e + 9e3 * (s - e) * (s - e)),
+        &|[_, sd, _, ed]| 30.0 * ed * ed + 12.0 * (sd - ed) * (sd - ed),
+    );
+    assert!(error < 1e-8, "(d): {error:.1e} J");
+    // (e)
+    let two =
+        Environment::TwoMasses { front_mass: 0.4, front: spring(9e3, 12.0), mass: 1.7, support: spring(4e3, 30.0) };
+    let error = balance(
+        &two,
+        &|[s, sd, e, ed]| 0.5 * (0.4 * sd * sd + 1.7 * ed * ed + 4e3 * e * e + 9e3 * (s - e) * (s - e)),
+        &|[_, sd, _, ed]| 30.0 * ed * ed + 12.0 * (sd - ed) * (sd - ed),
+    );
+    assert!(error < 1e-8, "(e): {error:.1e} J");
+    // both sides
+    let both = Environment::BothSides { tool: spring(9e3, 12.0), surface: spring(4e3, 30.0) };
+    let rate = |[s, sd, e, _]: [f64; 4]| both.motion((s, sd), (e, 0.0)).velocity;
+    let error = balance(&both, &|[s, _, e, _]| 0.5 * (4e3 * e * e + 9e3 * (s - e) * (s - e)), &|x| {
+        let ed = rate(x);
+        30.0 * ed * ed + 12.0 * (x[1] - ed) * (x[1] - ed)
+    });
+    assert!(error < 1e-8, "both sides: {error:.1e} J");
+}
+
+#[test]
+fn a_stretched_arm_has_finite_reactions_that_grow_as_one_over_delta_until_the_ridge() {
+    let model = chain(3);
+    let mut before: Option<f64> = None;
+    for exponent in 0..=12 {
+        let delta = 10f64.powi(-exponent);
+        // the tip held in both directions; with δ = 0 the arm is straight and cannot be shortened
+        let (q, qd) = ([0.3, delta, -0.6 * delta], [0.0; 3]);
+        let s = coordinates(&model, &[contact(&model, 0, at(0.0, 0.0, 0.0), &[Px, Py])], &q, &qd);
+        let m = motion(&model, &s, &q, &qd, &[1.0, -2.0, 0.5]);
+        let force = m.force.iter().fold(0.0f64, |f, x| f.max(x.abs()));
+        let violation = m.violation.iter().fold(0.0f64, |f, x| f.max(x.abs()));
+        println!("δ = {delta:.0e}: F {force:.2e} N, violation {violation:.1e} m/s², pivot {:.1e}", m.pivot);
+        let all = [&m.qdd, &m.force, &m.sdd, &m.violation].into_iter().flatten();
+        assert!(all.chain([&m.pivot]).all(|x| x.is_finite()), "δ = {delta:e}");
+        // at rest the arm answers τ with δ along itself and feels δ² of inverse mass: F ∝ 1/δ, until δ² meets the ridge
+        if delta >= 1e-5 {
+            assert!(violation < 1e-8, "δ = {delta:e}: {violation:.1e}");
+        }
+        if let Some(before) = before.filter(|_| (1e-5..=1e-3).contains(&delta)) {
+            let law = force / before;
+            assert!((9.0..=11.0).contains(&law), "δ = {delta:e}: {law}");
+        }
+        before = Some(force);
+    }
+}
+
+/// A foot that is free in space, with contact frames at its corners.
+fn foot() -> Model<f64> {
+    let mut foot = body("foot", JointKind::Floating, None, 0, Transform::identity(), 3.0);
+    foot.inertia = SpatialInertia::new(3.0, Vec3::new(0.01, 0.02, 0.05), foot.inertia.inertia_com);
+    let corner = |i: usize| {
+        let (x, y) = ([0.1, 0.1, -0.1, -0.1][i], [0.05, -0.05, 0.05, -0.05][i]);
+        Frame { name: format!("corner{i}"), body: Some(0), placement: at(x, y, 0.0) }
+    };
+    Model {
+        name: "foot".into(),
+        bodies: vec![foot],
+        gravity: Vec3::new(0.0, 0.0, -GRAVITY),
+        frames: (0..4).map(corner).collect(),
+    }
+}
+
+#[test]
+fn a_flat_foot_on_four_points_stands_on_twelve_constraints_of_rank_six() {
+    let model = foot();
+    let contacts: Vec<Contact<f64>> =
+        (0..4).map(|i| contact(&model, i, Transform::identity(), &[Px, Py, Pz])).collect();
+    let (q, qd) = ([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], [0.0; 6]);
+    let s = coordinates(&model, &contacts, &q, &qd);
+    let m = motion(&model, &s, &q, &qd, &[0.0; 6]);
+    let violation = m.violation.iter().fold(0.0f64, |f, x| f.max(x.abs()));
+    let carried: f64 = m.force.iter().skip(2).step_by(3).sum();
+    println!("violation {violation:.1e} m/s², pivot {:.1e}, carried {carried} N", m.pivot);
+    assert!(violation <= 0.36 * RIDGE * GRAVITY, "{violation:.1e}");
+    assert!((carried - 3.0 * GRAVITY).abs() < 1e-9 && m.pivot < 1e-11);
+    // of all reactions that hold it these are the least, in a norm of the inverse masses: sideways nothing but what shear
+    // must balance, and none is larger than the weight
+    assert!(m.force.iter().all(|f| f.abs() < 3.0 * GRAVITY));
+
+    // the same contact twice: half of the reaction each
+    let one = coordinates(&model, &contacts[..1], &q, &qd);
+    let twice = one.clone().and(one.clone());
+    let (single, double) = (motion(&model, &one, &q, &qd, &[0.0; 6]), motion(&model, &twice, &q, &qd, &[0.0; 6]));
+    for i in 0..3 {
+        let both = double.force[i] + double.force[i + 3];
+        assert!((both - single.force[i]).abs() < 1e-9 * GRAVITY, "{:?} {:?}", single.force, double.force);
+        assert!((double.force[i] - double.force[i + 3]).abs() < 1e-3 * GRAVITY);
+    }
+}
+
+#[test]
+fn a_constraint_that_nothing_moves_is_finite() {
+    // out of the plane of the chain
+    let model = chain(2);
+    let (q, qd) = ([0.3, 0.5], [0.1, -0.2]);
+    let s = coordinates(&model, &[contact(&model, 0, at(0.0, 0.0, 0.1), &[Pz])], &q, &qd);
+    let m = motion(&model, &s, &q, &qd, &[1.0, 2.0]);
+    assert!(m.qdd.iter().chain(&m.force).chain([&m.pivot]).all(|x| x.is_finite()), "{m:?}");
+}
+
+#[test]
+fn a_parallelogram_turns_as_its_closed_form() {
+    // two cranks of 1 m, 2 m apart, and a coupler on the first whose end is held to the end of the second
+    let mut model = chain(2);
+    model.bodies[1].placement = at(1.0, 0.0, 0.0);
+    model.bodies.push(body("rocker", JointKind::Revolute, None, 2, at(2.0, 0.0, 0.0), 1.4));
+    model.frames = vec![
+        Frame { name: "coupler end".into(), body: Some(1), placement: at(2.0, 0.0, 0.0) },
+        Frame { name: "rocker end".into(), body: Some(2), placement: at(1.0, 0.0, 0.0) },
+    ];
+    let closed = Contact {
+        object: Object::OnRobot(model.frames[1].clone()),
+        ..contact(&model, 0, at(0.0, 0.0, 0.0), &[Px, Py])
+    };
+    let (angle, speed) = (0.8f64, 1.3);
+    // the coupler stays parallel to the ground
+    let (q, qd) = ([angle, -angle, angle], [speed, -speed, speed]);
+    let s = coordinates(&model, &[closed], &q, &qd);
+    assert!(s.value.iter().chain(&s.rate).all(|x| x.abs() < 1e-15));
+    let tau = [2.0, 0.0, -0.5];
+    let m = motion(&model, &s, &q, &qd, &tau);
+    // cranks of inertia about their axes, the coupler a mass at a radius of 1 m
+    let (inertia, com) = (0.06, 0.45 * 0.45 + 0.03 * 0.03);
+    let masses = [2.0, 1.7, 1.4];
+    let total = 2.0 * inertia + (masses[0] + masses[2]) * com + masses[1];
+    let lever = 0.45 * angle.cos() - 0.03 * angle.sin();
+    let weight = GRAVITY * ((masses[0] + masses[2]) * lever + masses[1] * angle.cos());
+    let expected = (tau[0] - tau[1] + tau[2] - weight) / total;
+    for (qdd, sign) in m.qdd.iter().zip([1.0, -1.0, 1.0]) {
+        assert!((qdd - sign * expected).abs() < 1e-12 * expected.abs(), "{:?} against {expected}", m.qdd);
+    }
+}
