@@ -251,7 +251,7 @@ fn functional_coordinates_of_random_robots_are_those_of_the_second_author() {
             let mut q = wide(&random.configuration(loaded.model.nq(), kind.floating));
             if kind.floating {
                 let norm = q[3..7].iter().fold(Dd::ZERO, |sum, x| sum + *x * *x).sqrt();
-                q[3..7].iter_mut().for_each(|x| *x = *x / norm);
+                q[3..7].iter_mut().for_each(|x| *x /= norm);
             }
             let qd = wide(&random.list(loaded.model.nv(), 2.0));
             let speed = 1.0 + qd.iter().fold(0.0, |sum, x| sum + x.abs().hi());
