@@ -67,7 +67,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-pub use straightline_core::Real;
+pub use straightline_core::{control, integrate, Real};
 #[cfg(feature = "derive")]
 pub use straightline_macros::{dynamics, Dynamics};
 

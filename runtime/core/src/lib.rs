@@ -13,7 +13,9 @@ extern crate alloc;
 pub mod algorithms;
 #[cfg(feature = "alloc")]
 pub mod contact;
+pub mod control;
 pub mod dd;
+pub mod integrate;
 pub mod jet;
 #[cfg(feature = "alloc")]
 pub mod model;

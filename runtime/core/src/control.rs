@@ -1,0 +1,180 @@
+//! Pieces of joint controllers around generated dynamics: no allocation, no library.
+//!
+//! With a reference motion r(t) and the measured state, e = r − q:
+//!
+//! | function | torque | handbook |
+//! |---|---|---|
+//! | [`feed_forward`] | τ(r, ṙ, r̈) + K e + D ė: the model runs on the reference, in a table or on line | Fig. 20.10a |
+//! | [`computed_torque`] | τ(q, q̇, r̈ + D ė + K e): the model runs on the measured state, and errors die out like linear springs | Fig. 20.10b |
+//! | [`gravity_compensation`] | g(q) + K e + D ė | |
+//!
+//! The model is a function over arrays, such as a generated `inverse_dynamics`; robots stand on a fixed base, one coordinate per
+//! joint. [`Limits::apply`] keeps torques within what drives can do.
+//!
+//! ```
+//! use straightline_core::control::{computed_torque, Gains, Limits, Measured, Outcome, Reference};
+//! // a mass of 2 kg on a slide
+//! let inverse_dynamics = |_q: &[f64; 1], _qd: &[f64; 1], qdd: &[f64; 1], tau: &mut [f64; 1]| tau[0] = 2.0 * qdd[0];
+//! let wanted = Reference { q: [1.0], qd: [0.0], qdd: [3.0] };
+//! let measured = Measured { q: [0.5], qd: [0.0] };
+//! let mut tau = computed_torque(&wanted, &measured, &Gains { stiffness: [100.0], damping: [20.0] }, inverse_dynamics);
+//! assert_eq!(tau, [2.0 * (3.0 + 100.0 * 0.5)]);
+//! assert_eq!(Limits { greatest: [50.0] }.apply(&mut tau), Outcome::Saturated);
+//! assert_eq!(tau, [50.0]);
+//! ```
+
+use crate::real::Real;
+use core::array::from_fn;
+
+/// What a motion wants at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference<T, const N: usize> {
+    /// Coordinates r \[rad or m\].
+    pub q: [T; N],
+    /// Velocities ṙ \[rad/s or m/s\].
+    pub qd: [T; N],
+    /// Accelerations r̈ \[rad/s² or m/s²\].
+    pub qdd: [T; N],
+}
+
+/// What the sensors say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured<T, const N: usize> {
+    /// Coordinates q \[rad or m\].
+    pub q: [T; N],
+    /// Velocities q̇ \[rad/s or m/s\].
+    pub qd: [T; N],
+}
+
+/// Gains per joint. Of torques for [`feed_forward`] and [`gravity_compensation`]: \[N·m/rad or N/m\], \[N·m·s/rad or N·s/m\]; of
+/// accelerations for [`computed_torque`]: \[1/s²\], \[1/s\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains<T, const N: usize> {
+    /// K.
+    pub stiffness: [T; N],
+    /// D.
+    pub damping: [T; N],
+}
+
+impl<T: Real, const N: usize> Gains<T, N> {
+    /// K e + D ė.
+    pub fn answer(&self, wanted: &Reference<T, N>, measured: &Measured<T, N>) -> [T; N] {
+        from_fn(|i| {
+            self.stiffness[i] * (wanted.q[i] - measured.q[i]) + self.damping[i] * (wanted.qd[i] - measured.qd[i])
+        })
+    }
+}
+
+/// τ(r, ṙ, r̈) + K e + D ė \[N·m or N\]: what the motion takes by the model, on the reference, and what errors ask for.
+pub fn feed_forward<T: Real, const N: usize>(
+    wanted: &Reference<T, N>,
+    measured: &Measured<T, N>,
+    gains: &Gains<T, N>,
+    inverse_dynamics: impl FnOnce(&[T; N], &[T; N], &[T; N], &mut [T; N]),
+) -> [T; N] {
+    let mut tau = [T::zero(); N];
+    inverse_dynamics(&wanted.q, &wanted.qd, &wanted.qdd, &mut tau);
+    added(&tau, &gains.answer(wanted, measured))
+}
+
+/// τ(q, q̇, r̈ + D ė + K e) \[N·m or N\]: with an exact model every error dies out like ë + D ė + K e = 0.
+pub fn computed_torque<T: Real, const N: usize>(
+    wanted: &Reference<T, N>,
+    measured: &Measured<T, N>,
+    gains: &Gains<T, N>,
+    inverse_dynamics: impl FnOnce(&[T; N], &[T; N], &[T; N], &mut [T; N]),
+) -> [T; N] {
+    let mut tau = [T::zero(); N];
+    let qdd = added(&wanted.qdd, &gains.answer(wanted, measured));
+    inverse_dynamics(&measured.q, &measured.qd, &qdd, &mut tau);
+    tau
+}
+
+/// g(q) + K e + D ė \[N·m or N\].
+pub fn gravity_compensation<T: Real, const N: usize>(
+    wanted: &Reference<T, N>,
+    measured: &Measured<T, N>,
+    gains: &Gains<T, N>,
+    gravity_force: impl FnOnce(&[T; N], &mut [T; N]),
+) -> [T; N] {
+    let mut tau = [T::zero(); N];
+    gravity_force(&measured.q, &mut tau);
+    added(&tau, &gains.answer(wanted, measured))
+}
+
+/// The torques of a reference motion, computed off line at M instants, `period` apart, from time zero on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Table<T, const N: usize, const M: usize> {
+    /// Time from row to row \[s\], positive.
+    pub period: T,
+    /// A row per instant \[N·m or N\].
+    pub rows: [[T; N]; M],
+}
+
+impl<T: Real + PartialOrd, const N: usize, const M: usize> Table<T, N, M> {
+    /// The table of a motion, by its inverse dynamics at every instant.
+    pub fn of(
+        period: T,
+        mut motion: impl FnMut(usize) -> Reference<T, N>,
+        mut inverse_dynamics: impl FnMut(&[T; N], &[T; N], &[T; N], &mut [T; N]),
+    ) -> Self {
+        let rows = from_fn(|k| {
+            let (at, mut tau) = (motion(k), [T::zero(); N]);
+            inverse_dynamics(&at.q, &at.qd, &at.qdd, &mut tau);
+            tau
+        });
+        Table { period, rows }
+    }
+
+    /// Between rows `k` and `k + 1`, `fraction` (0 to 1) of the way; at and beyond the last row, that row.
+    pub fn at(&self, k: usize, fraction: T) -> [T; N] {
+        let last = M.saturating_sub(1);
+        match (self.rows.get(k.min(last)), self.rows.get(k.saturating_add(1).min(last))) {
+            (Some(a), Some(b)) => from_fn(|i| a[i] + fraction * (b[i] - a[i])),
+            _ => [T::zero(); N],
+        }
+    }
+}
+
+/// The greatest moduli that drives can do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits<T, const N: usize> {
+    /// Per joint \[N·m or N\].
+    pub greatest: [T; N],
+}
+
+/// What became of torques at their limits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// They were within.
+    Within,
+    /// At least one was beyond, and is at its limit.
+    Saturated,
+    /// At least one is not a number or not finite: all are zero, and the drives are to be stopped.
+    NotFinite,
+}
+
+impl<T: Real + PartialOrd, const N: usize> Limits<T, N> {
+    /// Brings torques within the limits.
+    pub fn apply(&self, tau: &mut [T; N]) -> Outcome {
+        // x − x is zero for finite numbers alone
+        let is_finite = |x: &T| *x - *x == T::zero();
+        if !tau.iter().all(is_finite) {
+            *tau = [T::zero(); N];
+            return Outcome::NotFinite;
+        }
+        let mut outcome = Outcome::Within;
+        for (tau, greatest) in tau.iter_mut().zip(self.greatest) {
+            if *tau > greatest {
+                (*tau, outcome) = (greatest, Outcome::Saturated);
+            } else if *tau < -greatest {
+                (*tau, outcome) = (-greatest, Outcome::Saturated);
+            }
+        }
+        outcome
+    }
+}
+
+fn added<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {
+    from_fn(|i| a[i] + b[i])
+}
