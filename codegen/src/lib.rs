@@ -11,6 +11,8 @@ pub mod description;
 pub mod diagnostic;
 pub mod emit;
 pub mod expansion;
+#[cfg(feature = "cli")]
+pub mod experiment;
 pub mod export;
 pub mod expr;
 pub mod forward_method;

@@ -266,6 +266,19 @@ impl Reader<'_> {
         numbers?.try_into().ok()
     }
 
+    /// Numbers in an array; all complaints of them before `None`.
+    #[cfg(feature = "cli")]
+    pub fn all_reals_at(&mut self, table: &Table, key: &str, range: Range64) -> Option<Vec<f64>> {
+        let (value, span) = table.get(key)?;
+        let what = table.what(key);
+        let DeValue::Array(array) = value else {
+            self.wrong_type(&what, "an array of numbers", value, &span);
+            return None;
+        };
+        let numbers: Vec<_> = array.iter().map(|item| self.real(&what, item.get_ref(), &item.span(), range)).collect();
+        numbers.into_iter().collect()
+    }
+
     fn triple(&mut self, what: &str, value: &DeValue, span: &Span) -> Option<[(f64, Span); 3]> {
         let DeValue::Array(array) = value else {
             self.wrong_type(what, "three numbers in an array", value, span);

@@ -157,8 +157,8 @@ pub enum Outcome {
 impl<T: Real + PartialOrd, const N: usize> Limits<T, N> {
     /// Brings torques within the limits.
     pub fn apply(&self, tau: &mut [T; N]) -> Outcome {
-        // x − x is zero for finite numbers alone
-        let is_finite = |x: &T| *x - *x == T::zero();
+        // of NaN and of infinities the product with zero is NaN
+        let is_finite = |x: &T| *x * T::zero() == T::zero();
         if !tau.iter().all(is_finite) {
             *tau = [T::zero(); N];
             return Outcome::NotFinite;

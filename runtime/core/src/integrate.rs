@@ -291,14 +291,10 @@ fn solved<T: Real, const N: usize>(mut a: [[T; N]; N], mut b: [T; N]) -> [T; N] 
     for j in 0..N {
         for k in 0..j {
             let weight = a[j][k] * a[k][k];
-            for i in j..N {
-                a[i][j] = a[i][j] - a[i][k] * weight;
-            }
+            a[j..].iter_mut().for_each(|row| row[j] = row[j] - row[k] * weight);
         }
         let inverse = T::one() / a[j][j];
-        for i in j + 1..N {
-            a[i][j] = a[i][j] * inverse;
-        }
+        a[j + 1..].iter_mut().for_each(|row| row[j] = row[j] * inverse);
     }
     for i in 0..N {
         for k in 0..i {

@@ -5,6 +5,7 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use straightline_codegen::compile::Options;
 use straightline_codegen::emit::Scalar;
+use straightline_codegen::experiment::parameter::{self, Sweep};
 use straightline_codegen::export::is_identifier;
 use straightline_codegen::expr::Grade;
 use straightline_codegen::model::ModelOptions;
@@ -77,6 +78,27 @@ Examples:
 
 {EXIT_CODES}"))]
     Verify(Verify),
+    /// Simulate a robot under torques or a controller
+    #[command(after_help = format!("\
+The experiment is a TOML file (codegen/SIMULATION.md), or CSV or JSON samples of torques. Results: t, q, qd, tau, energies.
+
+Examples:
+  straightline simulate panda.urdf --input swing.toml --output swing.csv --svg swing.svg
+  straightline simulate panda.urdf --scene panda_payload.toml --input track.toml --output track.json
+
+{EXIT_CODES}"))]
+    Simulate(Simulate),
+    /// What a motion asks of joints and drives: torques, power, energy, limits
+    #[command(after_help = format!("\
+The motion is a TOML file (codegen/SIMULATION.md), or CSV or JSON samples of the joints.
+
+Examples:
+  straightline analyze panda.urdf --motion reach.toml --html reach.html
+  straightline analyze panda.urdf --motion samples.csv --output figures.csv
+  straightline analyze panda.urdf --motion reach.toml --sweep panda_link7.mass=0.5:3:11
+
+{EXIT_CODES}"))]
+    Analyze(Analyze),
     /// Write a self-contained package for other languages
     #[command(after_help = format!("\
 The directory becomes a Rust package without dependencies; `cargo build --release` in it gives a shared and a static
@@ -146,6 +168,49 @@ pub struct Verify {
     pub json: bool,
     #[command(flatten)]
     pub program: ProgramArgs,
+    #[command(flatten)]
+    pub model: ModelArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct Simulate {
+    /// The robot file: URDF or TOML
+    pub robot: PathBuf,
+    /// The experiment: TOML, or samples of torques as CSV or JSON
+    #[arg(short, long, value_name = "FILE")]
+    pub input: PathBuf,
+    /// Where to write the result, as CSV or, if it ends in .json, as JSON
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Where to draw coordinates, torques and, of a controller, errors
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
+    /// The robot as the controller knows it [default: ROBOT in its scene]
+    #[arg(long, value_name = "FILE")]
+    pub controller_robot: Option<PathBuf>,
+    #[command(flatten)]
+    pub model: ModelArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct Analyze {
+    /// The robot file: URDF or TOML
+    pub robot: PathBuf,
+    /// The motion: TOML, or samples of the joints as CSV or JSON
+    #[arg(short, long, value_name = "FILE")]
+    pub motion: PathBuf,
+    /// Where to write torques, power, forces and moments over time, as CSV or, if it ends in .json, as JSON
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Where to write a page with tables and plots
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    /// Time between instants, at most [s]
+    #[arg(long, value_name = "S", default_value_t = 0.005, value_parser = interval)]
+    pub interval: f64,
+    /// Analyse again for each of these values of a number of the robot file: PATH=a,b,c or PATH=from:to:count
+    #[arg(long, value_name = "PATH=VALUES", value_parser = parameter::parse)]
+    pub sweep: Option<Sweep>,
     #[command(flatten)]
     pub model: ModelArgs,
 }
@@ -232,6 +297,13 @@ fn tolerance(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(x) if (0.0..=0.1).contains(&x) => Ok(x),
         _ => Err("an angle between 0 and 0.1 rad".to_string()),
+    }
+}
+
+fn interval(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(x) if (1e-6..=1e3).contains(&x) => Ok(x),
+        _ => Err("a time between 1e-6 and 1000 s".to_string()),
     }
 }
 

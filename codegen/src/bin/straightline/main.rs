@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod motion;
 mod print;
 
 use arguments::{Check, Command, CommandLine, Export, Generate, ModelArgs, ProgramArgs, Report, Verify};
@@ -37,6 +38,8 @@ fn main() -> ExitCode {
         Command::Check(a) => check(&a),
         Command::Verify(a) => verify(&a),
         Command::Export(a) => export(&a),
+        Command::Simulate(a) => motion::simulate(&a),
+        Command::Analyze(a) => motion::analyze(&a),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,0 +1,336 @@
+//! The commands `simulate` and `analyze`.
+
+use crate::arguments::{Analyze, ModelArgs, Simulate};
+use crate::{options, print, read, Failure};
+use anstream::stdout;
+use std::io::Write;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::Mutex;
+use straightline_codegen::compile::Options;
+use straightline_codegen::description::{self, Description};
+use straightline_codegen::diagnostic::{Diagnostics, Severity, Source};
+use straightline_codegen::experiment::{self, parameter, Experiment};
+use straightline_codegen::{model, output, scene};
+use straightline_core::model::Model;
+use straightline_simulation::analysis::{self, Analysis};
+use straightline_simulation::command::Command;
+use straightline_simulation::html::Page;
+use straightline_simulation::motion::Motion;
+use straightline_simulation::plant::Plant;
+use straightline_simulation::plot::{Line, Plot};
+use straightline_simulation::simulate;
+use straightline_simulation::table::Table;
+
+/// Size of a plot in pixels.
+const PLOT: (u32, u32) = (900, 340);
+
+/// The robot of a description in a scene, in f64; what is wrong with it is printed.
+fn built(description: &Description, options: &Options, diagnostics: &mut Diagnostics) -> Option<Model<f64>> {
+    let model = model::build(description, &options.scene.model_options(&options.model), diagnostics);
+    scene::check_options(options, diagnostics);
+    let model = model.and_then(|model| scene::apply(model, &options.scene, diagnostics));
+    model.filter(|_| !diagnostics.has_errors()).map(|model| model.cast())
+}
+
+fn robot(path: &Path, args: &ModelArgs) -> Result<(Description, Options, Model<f64>), Failure> {
+    let options = options(None, args)?;
+    let source = read(path)?;
+    let mut diagnostics = Diagnostics::new();
+    let description = description::read(&source, &mut diagnostics);
+    let model = description.as_ref().and_then(|d| built(d, &options, &mut diagnostics));
+    print::diagnostics(&diagnostics, Severity::Warning);
+    description.zip(model).map(|(d, model)| (d, options, model)).ok_or(Failure::Input)
+}
+
+fn experiment(
+    path: &Path,
+    model: &Model<f64>,
+    controller_model: &Model<f64>,
+    are_torques: bool,
+) -> Result<Experiment, Failure> {
+    let source = read(path)?;
+    // files count from the one that names them
+    let beside = |name: &str| {
+        let file = path.parent().unwrap_or(Path::new("")).join(name);
+        let bytes = std::fs::read(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+        Ok(Source::from_bytes(&file.display().to_string(), bytes))
+    };
+    let mut diagnostics = Diagnostics::new();
+    let experiment = experiment::read(&source, model, controller_model, are_torques, &beside, &mut diagnostics);
+    print::diagnostics(&diagnostics, Severity::Warning);
+    experiment.ok_or(Failure::Input)
+}
+
+/// Writes a table as CSV, or as JSON where the file's name says so.
+fn write_table(path: &Path, table: &Table) -> Result<(), Failure> {
+    let text = match path.extension().is_some_and(|e| e == "json") {
+        true => {
+            let columns = table.names.iter().enumerate().map(|(k, name)| {
+                let numbers = table.rows.iter().map(|row| serde_json::Value::from(row[k])).collect();
+                (name.clone(), serde_json::Value::Array(numbers))
+            });
+            serde_json::Value::Object(columns.collect()).to_string() + "\n"
+        }
+        false => table.csv(),
+    };
+    output::write_file(path, &text)?;
+    Ok(())
+}
+
+/// The columns whose names begin so, as lines over time.
+fn lines<'a>(table: &'a Table, prefix: &str) -> Vec<Line<'a>> {
+    let of = |(k, name): (usize, &'a String)| {
+        let name = name.strip_prefix(prefix)?;
+        Some(Line { name, points: table.rows.iter().map(|row| (row[0], row[k])).collect() })
+    };
+    table.names.iter().enumerate().filter_map(of).collect()
+}
+
+fn drawn(plot: &Plot) -> Result<String, Failure> {
+    plot.svg(PLOT).map_err(|why| {
+        print::error(&format!("the plot cannot be drawn: {why}"));
+        Failure::Input
+    })
+}
+
+pub fn simulate(a: &Simulate) -> Result<(), Failure> {
+    let (_, _, model) = robot(&a.robot, &a.model)?;
+    let controller_model = match &a.controller_robot {
+        None => model.clone(),
+        Some(path) => {
+            let other = robot(path, &a.model)?.2;
+            if other.nv() != model.nv() {
+                let (path, robot) = (path.display(), a.robot.display());
+                print::error(&format!("{path} has {} velocities, {robot} has {}", other.nv(), model.nv()));
+                return Err(Failure::Input);
+            }
+            other
+        }
+    };
+    let experiment = experiment(&a.input, &model, &controller_model, true)?;
+    let plant = Plant::new(model, experiment.coulomb_speed);
+    let bar = print::bar("simulating", 1000);
+    let duration = experiment.settings.duration;
+    let progress = |t: f64| bar.set_position((t / duration * 1000.0) as u64);
+    let start = (&experiment.q[..], &experiment.qd[..]);
+    let run = simulate::simulate(&plant, &experiment.command, start, &experiment.settings, &progress);
+    bar.finish_and_clear();
+    let run = run.map_err(|failure| {
+        print::error(&failure.to_string());
+        print::help("a smaller tolerance, a greater coulomb_speed, or method = \"stiff\" in [simulation] may help");
+        Failure::Input
+    })?;
+    if let Some(path) = &a.output {
+        write_table(path, &run.table)?;
+    }
+    if let Some(path) = &a.svg {
+        let is_controlled = matches!(experiment.command, Command::Controller(_));
+        let (prefix, title) = if is_controlled { ("error.", "tracking errors") } else { ("q.", "coordinates") };
+        let plot = Plot { title, axes: ("t [s]", "rad or m"), lines: lines(&run.table, prefix), levels: Vec::new() };
+        output::write_file(path, &drawn(&plot)?)?;
+    }
+    let mut out = stdout().lock();
+    let balance = run.balance;
+    let last = run.table.rows.last().map_or(0.0, |row| row[0]);
+    writeln!(out, "{}: {last} s, {} steps, {} evaluations", plant.model.name, run.steps, run.evaluations)?;
+    if let Some(stop) = &run.stop {
+        writeln!(out, "stopped at {} s: joint {} reaches its limit {}", stop.time, stop.joint, stop.limit)?;
+    }
+    writeln!(out, "energy [J]: {:.9} before, {:.9} after", balance.before, balance.after)?;
+    writeln!(out, "work of the drives {:.9}, heat of friction {:.9}", balance.work, balance.losses)?;
+    writeln!(out, "missing {:.2e}, {:.2e} of what was turned over", balance.missing(), balance.relative())?;
+    Ok(())
+}
+
+pub fn analyze(a: &Analyze) -> Result<(), Failure> {
+    let (description, options, model) = robot(&a.robot, &a.model)?;
+    let Some(motion) = experiment(&a.motion, &model, &model, false)?.motion else {
+        print::error(&format!("{} prescribes no motion", a.motion.display()));
+        print::help("write a table [motion]");
+        return Err(Failure::Input);
+    };
+    let found = analysis::analyze(&model, &motion, a.interval);
+    if let Some(path) = &a.output {
+        write_table(path, &joined(&found))?;
+    }
+    let swept = match &a.sweep {
+        None => Vec::new(),
+        Some(sweep) => swept(&description, &options, sweep, &motion, a.interval)?,
+    };
+    if let Some(path) = &a.html {
+        output::write_file(path, &page(a, &model, &found, &swept)?)?;
+    }
+    print_analysis(&model, &motion, &found)?;
+    if let Some(sweep) = &a.sweep {
+        print_sweep(sweep, &swept)?;
+    }
+    Ok(())
+}
+
+fn joined(found: &Analysis) -> Table {
+    let names = [&found.table.names[..], &found.wrenches.names[1..]].concat();
+    let rows = found.table.rows.iter().zip(&found.wrenches.rows).map(|(a, b)| [&a[..], &b[1..]].concat());
+    Table { names, rows: rows.collect() }
+}
+
+/// One value of a sweep, with what it leads to.
+type Swept = (f64, Analysis);
+
+/// The motion of robots with other numbers, in parallel.
+fn swept(
+    description: &Description,
+    options: &Options,
+    sweep: &parameter::Sweep,
+    motion: &Motion,
+    interval: f64,
+) -> Result<Vec<Swept>, Failure> {
+    let mut models = Vec::new();
+    for &value in &sweep.values {
+        let changed = parameter::with(description, &sweep.path, value).map_err(|complaint| {
+            let mut diagnostics = Diagnostics::new();
+            diagnostics.push(*complaint);
+            print::diagnostics(&diagnostics, Severity::Warning);
+            Failure::Input
+        })?;
+        let mut diagnostics = Diagnostics::new();
+        let Some(model) = built(&changed, options, &mut diagnostics) else {
+            print::error(&format!("{} = {value}:", sweep.path));
+            print::diagnostics(&diagnostics, Severity::Error);
+            return Err(Failure::Input);
+        };
+        models.push((value, model));
+    }
+    let bar = print::bar("sweeping", models.len() as u64);
+    let (next, results) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(models.len());
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                while let Some((value, model)) = models.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let found = analysis::analyze(model, motion, interval);
+                    results.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((*value, found));
+                    bar.inc(1);
+                }
+            });
+        }
+    });
+    bar.finish_and_clear();
+    let mut results = results.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let place = |value: f64| sweep.values.iter().position(|v| *v == value);
+    results.sort_by_key(|(value, _)| place(*value));
+    Ok(results)
+}
+
+const HEAD: [&str; 10] =
+    ["joint", "peak", "at [s]", "rms", "speed", "power [W]", "given [J]", "taken [J]", "force [N]", "moment [N·m]"];
+
+fn figures(found: &Analysis) -> Vec<Vec<String>> {
+    let row = |j: &analysis::JointFigures| {
+        let number = |x: f64| format!("{x:.4}");
+        let unit = |x: f64| format!("{x:.4} {}", j.unit);
+        let (peak, at) = j.peak;
+        let (force, moment) = j.carried;
+        vec![
+            j.name.clone(),
+            unit(peak),
+            number(at),
+            unit(j.rms),
+            number(j.speed),
+            number(j.power),
+            number(j.given),
+            number(j.taken),
+            number(force),
+            number(moment),
+        ]
+    };
+    found.joints.iter().map(row).collect()
+}
+
+fn violations(found: &Analysis) -> Vec<String> {
+    let line = |v: &analysis::Violation| {
+        let analysis::Violation { time, joint, what, limit, worst } = v;
+        format!("t = {time:.6} s: {what} of joint {joint} leaves {limit}, worst {worst:.6}")
+    };
+    found.violations.iter().map(line).collect()
+}
+
+fn print_analysis(model: &Model<f64>, motion: &Motion, found: &Analysis) -> Result<(), Failure> {
+    let mut out = stdout().lock();
+    writeln!(out, "{}: {} s, {} instants\n", model.name, motion.duration(), found.table.rows.len())?;
+    let width = model.bodies.iter().map(|b| b.joint.name.chars().count()).max().unwrap_or(5).max(5);
+    let line = |row: &mut dyn Iterator<Item = &str>| -> String {
+        let cell = |(k, cell): (usize, &str)| if k == 0 { format!("{cell:<width$}") } else { format!("{cell:>14}") };
+        row.enumerate().map(cell).collect()
+    };
+    writeln!(out, "{}", line(&mut HEAD.iter().copied()))?;
+    for row in figures(found) {
+        writeln!(out, "{}", line(&mut row.iter().map(String::as_str)))?;
+    }
+    let given: f64 = found.joints.iter().map(|j| j.given - j.taken).sum();
+    writeln!(out, "\ndrives give {given:.6} J, energy changes by {:.6} J: the rest is friction", found.energy_change)?;
+    match found.violations.is_empty() {
+        true => writeln!(out, "within all limits")?,
+        false => writeln!(out, "limits exceeded, the first one first:\n  {}", violations(found).join("\n  "))?,
+    }
+    Ok(())
+}
+
+fn print_sweep(sweep: &parameter::Sweep, swept: &[Swept]) -> Result<(), Failure> {
+    let mut out = stdout().lock();
+    writeln!(out, "\n{:<14}{:>14}{:>14}{:>12}  peaks", sweep.path, "given [J]", "taken [J]", "exceeded")?;
+    for (value, found) in swept {
+        let sum = |f: fn(&analysis::JointFigures) -> f64| found.joints.iter().map(f).sum::<f64>();
+        let peaks: Vec<String> = found.joints.iter().map(|j| format!("{:.3}", j.peak.0)).collect();
+        let (given, taken) = (sum(|j| j.given), sum(|j| j.taken));
+        let exceeded = found.violations.len();
+        writeln!(out, "{value:<14}{given:>14.4}{taken:>14.4}{exceeded:>12}  {}", peaks.join(" "))?;
+    }
+    Ok(())
+}
+
+/// The page: figures, violations, plots over time, speed against torque, the sweep.
+fn page(a: &Analyze, model: &Model<f64>, found: &Analysis, swept: &[Swept]) -> Result<String, Failure> {
+    let file = |path: &Path| path.file_name().map(|n| n.to_string_lossy().to_string()).unwrap_or_default();
+    let mut page = Page::new(&format!("Analysis of {}", model.name), &format!("Motion: {}", file(&a.motion)));
+    page.heading("Joints");
+    page.table(&HEAD, &figures(found));
+    page.heading("Limits");
+    match violations(found) {
+        lines if lines.is_empty() => page.paragraph("The motion stays within all limits.", false),
+        lines => lines.iter().for_each(|line| page.paragraph(line, true)),
+    }
+    page.heading("Over time");
+    for (prefix, title, unit) in [
+        ("q.", "coordinates", "rad or m"),
+        ("qd.", "velocities", "rad/s or m/s"),
+        ("tau.", "torques", "N·m or N"),
+        ("power.", "power of the drives", "W"),
+    ] {
+        let plot = Plot { title, axes: ("t [s]", unit), lines: lines(&found.table, prefix), levels: Vec::new() };
+        page.figure(&drawn(&plot)?);
+    }
+    page.heading("Speed against torque, with the limits of the torque");
+    for joint in model.bodies.iter().map(|b| &b.joint) {
+        let column = |prefix: &str| found.table.column(&format!("{prefix}.{}", joint.name)).unwrap_or_default();
+        let points = column("qd").into_iter().zip(column("tau")).collect();
+        let effort = joint.limits.effort;
+        let levels = if effort.is_finite() { vec![-effort, effort] } else { Vec::new() };
+        let lines = vec![Line { name: &joint.name, points }];
+        let plot = Plot { title: &joint.name, axes: ("rad/s or m/s", "N·m or N"), lines, levels };
+        page.figure(&drawn(&plot)?);
+    }
+    if let (Some(sweep), false) = (&a.sweep, swept.is_empty()) {
+        page.heading(&format!("Peak torques over {}", sweep.path));
+        let of = |(j, joint): (usize, &analysis::JointFigures)| (joint.name.clone(), j);
+        let joints: Vec<(String, usize)> = found.joints.iter().enumerate().map(of).collect();
+        let line = |(name, j): &(String, usize)| -> (String, Vec<(f64, f64)>) {
+            (name.clone(), swept.iter().map(|(value, found)| (*value, found.joints[*j].peak.0)).collect())
+        };
+        let named: Vec<(String, Vec<(f64, f64)>)> = joints.iter().map(line).collect();
+        let lines = named.iter().map(|(name, points)| Line { name, points: points.clone() }).collect();
+        let plot = Plot { title: "peak torques", axes: (&sweep.path, "N·m or N"), lines, levels: Vec::new() };
+        page.figure(&drawn(&plot)?);
+    }
+    Ok(page.finish())
+}

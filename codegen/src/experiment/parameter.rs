@@ -1,0 +1,105 @@
+//! Numbers of a robot file that a sweep changes, by a path such as `forearm.mass` or `elbow.damping`.
+
+use super::messages as say;
+use crate::description::{Description, Inertial, Joint, JointDrive, MassCentreLink, Notation, Value};
+use crate::diagnostic::Diagnostic;
+
+/// A parameter and the values that it is to have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sweep {
+    /// `LINK.mass`, `JOINT.damping`, …
+    pub path: String,
+    /// Values in the file's unit.
+    pub values: Vec<f64>,
+}
+
+/// Reads `PATH=a,b,c` or `PATH=from:to:count`.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn parse(text: &str) -> Result<Sweep, String> {
+    let form = || "PATH=a,b,c or PATH=from:to:count, such as forearm.mass=1:3:5".to_string();
+    let (path, values) = text.split_once('=').ok_or_else(form)?;
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(form);
+    let values = match values.split(':').collect::<Vec<_>>()[..] {
+        [from, to, count] => {
+            let (from, to) = (number(from)?, number(to)?);
+            let count = count.trim().parse::<usize>().ok().filter(|n| (2..=10_000).contains(n));
+            let count = count.ok_or("a sweep has 2 to 10000 values")?;
+            (0..count).map(|k| from + (to - from) * k as f64 / (count - 1) as f64).collect()
+        }
+        _ => values.split(',').map(number).collect::<Result<Vec<f64>, String>>()?,
+    };
+    match path.contains('.') && !values.is_empty() {
+        true => Ok(Sweep { path: path.trim().to_string(), values }),
+        false => Err(form()),
+    }
+}
+
+/// The robot file with another value of a parameter. A link's inertia grows with its mass, as of the same body in another density.
+///
+/// # Errors
+/// The file has no such parameter.
+pub fn with(description: &Description, path: &str, value: f64) -> Result<Description, Box<Diagnostic>> {
+    let mut description = description.clone();
+    let wrong = |why: String| Box::new(say::unknown_parameter(path, &why));
+    let (owner, key) = path.rsplit_once('.').ok_or_else(|| wrong("there is no `.` in it".to_string()))?;
+    let found = match (&mut description.notation, key) {
+        (Notation::JointFrames(n), "mass") => {
+            let link = n.links.iter_mut().find(|link| link.name.value == owner);
+            link.and_then(|link| link.inertial.as_mut()).map(|inertial| set_mass(inertial, value))
+        }
+        (Notation::MassCentres(n), "mass") => {
+            let link = n.links.iter_mut().find(|link| link.name.value == owner);
+            link.map(|MassCentreLink { mass, inertia, .. }| scale(mass, &mut inertia.value, value))
+        }
+        (Notation::JointFrames(n), _) => {
+            let joint = n.joints.iter_mut().find(|joint| joint.name.value == owner);
+            joint.and_then(|Joint { drive, .. }| number(drive, key)).map(|number| number.value = value)
+        }
+        (Notation::MassCentres(n), _) => {
+            let link = n.links.iter_mut().find(|link| link.joint_name.value == owner);
+            link.and_then(|MassCentreLink { drive, .. }| number(drive, key)).map(|number| number.value = value)
+        }
+    };
+    match found {
+        Some(()) => Ok(description),
+        None => Err(wrong(format!("the robot file has no value `{key}` of `{owner}`"))),
+    }
+}
+
+fn set_mass(inertial: &mut Inertial, mass: f64) {
+    scale(&mut inertial.mass, &mut inertial.inertia.value, mass);
+}
+
+fn scale(mass: &mut Value<f64>, inertia: &mut straightline_core::spatial::Sym3<f64>, value: f64) {
+    let factor = if mass.value == 0.0 { 1.0 } else { value / mass.value };
+    *inertia = inertia.map(|x| x * factor);
+    mass.value = value;
+}
+
+fn number<'a>(drive: &'a mut JointDrive, key: &str) -> Option<&'a mut Value<f64>> {
+    match key {
+        "damping" => drive.damping.as_mut(),
+        "friction" => drive.friction.as_mut(),
+        "rotor_inertia" => drive.rotor_inertia.as_mut(),
+        "gear_ratio" => drive.gear_ratio.as_mut(),
+        "armature" => drive.armature.as_mut(),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_a_list_or_a_range() {
+        let values = |text: &str| parse(text).unwrap().values;
+        assert_eq!(values("forearm.mass=1,2.5"), [1.0, 2.5]);
+        assert_eq!(values("forearm.mass=1:3:5"), [1.0, 1.5, 2.0, 2.5, 3.0]);
+        for text in ["forearm.mass", "mass=1", "a.mass=1,x", "a.mass=1:2:1", "a.mass=nan", "a.mass=1:2"] {
+            assert!(parse(text).is_err(), "{text}");
+        }
+    }
+}

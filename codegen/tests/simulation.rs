@@ -1,0 +1,167 @@
+//! The commands `simulate` and `analyze` as a person uses them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const ROBOTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../robots");
+
+fn scratch(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("simulation").join(name);
+    fs::create_dir_all(&path).unwrap();
+    path
+}
+
+fn straightline(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_straightline")).args(arguments).output().unwrap()
+}
+
+fn succeeds(arguments: &[&str]) -> String {
+    let output = straightline(arguments);
+    assert!(output.status.success(), "{arguments:?}\n{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// What is said on standard error; the exit code says that the input is wrong.
+fn fails(arguments: &[&str]) -> String {
+    let output = straightline(arguments);
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+fn write(folder: &Path, name: &str, text: &str) -> String {
+    let path = folder.join(name);
+    fs::write(&path, text).unwrap();
+    path.display().to_string()
+}
+
+#[test]
+fn every_example_runs() {
+    let here = scratch("examples");
+    let panda = format!("{ROBOTS}/descriptions/panda.urdf");
+    let example = |name: &str| format!("{ROBOTS}/experiments/{name}");
+    let (csv, svg) = (here.join("track.csv"), here.join("track.svg"));
+    let (csv_path, svg_path) = (csv.display().to_string(), svg.display().to_string());
+    let said = succeeds(&[
+        "simulate",
+        &panda,
+        "--input",
+        &example("panda_track.toml"),
+        "--output",
+        &csv_path,
+        "--svg",
+        &svg_path,
+    ]);
+    assert!(said.contains("1.5 s, ") && said.contains("missing "), "{said}");
+    let rows = fs::read_to_string(&csv).unwrap();
+    assert!(rows.starts_with("t,q.panda_joint1,") && rows.lines().count() == 152, "{}", rows.lines().count());
+    let header: Vec<&str> = rows.lines().next().unwrap().split(',').collect();
+    let errors: Vec<usize> = (0..header.len()).filter(|k| header[*k].starts_with("error.")).collect();
+    // the model is exact; at 1 kHz forces are held for a millisecond
+    for row in rows.lines().skip(1) {
+        let row: Vec<f64> = row.split(',').map(|x| x.parse().unwrap()).collect();
+        assert!(errors.iter().all(|k| row[*k].abs() < 2e-3), "{row:?}");
+    }
+    assert!(fs::read_to_string(svg).unwrap().contains("tracking errors"));
+
+    let (html, json) = (here.join("reach.html"), here.join("reach.json"));
+    let said = succeeds(&[
+        "analyze",
+        &panda,
+        "--motion",
+        &example("panda_reach.toml"),
+        "--html",
+        &html.display().to_string(),
+        "--output",
+        &json.display().to_string(),
+        "--sweep",
+        "panda_link7.mass=0.5,1.5,2.5",
+        "--interval",
+        "0.02",
+    ]);
+    assert!(said.contains("panda_joint2") && said.contains("within all limits"), "{said}");
+    assert_eq!(
+        said.lines().filter(|l| l.starts_with("0.5 ") || l.starts_with("1.5 ") || l.starts_with("2.5 ")).count(),
+        3
+    );
+    let page = fs::read_to_string(html).unwrap();
+    assert!(page.contains("<svg") && page.contains("Peak torques over panda_link7.mass") && !page.contains("<script"));
+    let columns: serde_json::Value = serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
+    assert_eq!(columns["t"].as_array().unwrap().len(), columns["moment.panda_joint7.z"].as_array().unwrap().len());
+}
+
+#[test]
+fn what_a_simulation_writes_an_analysis_reads() {
+    let here = scratch("round");
+    let robot = format!("{ROBOTS}/descriptions/planar_2r.toml");
+    let names: Vec<String> = {
+        let json = here.join("free.json").display().to_string();
+        let input = write(
+            &here,
+            "free.toml",
+            "[start]\nq = [0.3, -0.2]\n[simulation]\nduration = 0.3\nstop_at_limits = false\n",
+        );
+        succeeds(&["simulate", &robot, "--input", &input, "--output", &json]);
+        let table: serde_json::Value = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
+        table.as_object().unwrap().keys().cloned().collect()
+    };
+    assert!(names.contains(&"t".to_string()) && names.contains(&"energy".to_string()));
+    let csv = here.join("free.csv").display().to_string();
+    let input = here.join("free.toml").display().to_string();
+    succeeds(&["simulate", &robot, "--input", &input, "--output", &csv]);
+    // nothing drove it, so that an analysis of the motion finds no torque, up to the splines between samples
+    let said = succeeds(&["analyze", &robot, "--motion", &csv]);
+    assert!(said.contains("0.3 s"), "{said}");
+}
+
+#[test]
+fn everything_that_is_wrong_has_its_place() {
+    let here = scratch("wrong");
+    let robot = format!("{ROBOTS}/descriptions/planar_2r.toml");
+    let solo = format!("{ROBOTS}/descriptions/solo12.urdf");
+    let toml = |text: &str| write(&here, "wrong.toml", text);
+    let two_points = "[[motion.point]]\nt = 0.0\nq = [0.0, 0.0]\n[[motion.point]]\nt = 1.0\nq = [1.0, 0.5]\n";
+    for (text, place, words) in [
+        ("[motions]\n", "wrong.toml:1:2", "motion"),
+        ("[motion]\nkind = \"quintik\"\n", "wrong.toml:2:8", "did you mean `quintic`"),
+        ("[motion]\nkind = \"cubic\"\n", "wrong.toml:1", "two points"),
+        (&format!("[motion]\nkind = \"trapezoidal\"\n{two_points}"), "wrong.toml:4:1", "has no key `t`"),
+        (&format!("[motion]\nkind = \"cubic\"\nframe = \"tipp\"\n{two_points}"), "wrong.toml:3:9", "tip"),
+        (
+            &format!("[motion]\nkind = \"cubic\"\n{}", two_points.replace("1.0\nq", "-1.0\nq")),
+            "wrong.toml:1",
+            "point 2",
+        ),
+        (
+            &format!("[motion]\nkind = \"cubic\"\n{}", two_points.replace("[1.0, 0.5]", "[1.0]")),
+            "wrong.toml:8:5",
+            "1 numbers for 2",
+        ),
+        ("[controller]\nstiffness = 1\ndamping = 1\n", "wrong.toml:1", "[motion]"),
+        ("[simulation]\nduration = -1.0\n", "wrong.toml:2:12", "-1.0"),
+        ("[simulation]\nmethod = \"euler\"\n", "wrong.toml:2:10", "adaptive"),
+        ("[torques]\nfile = \"none.csv\"\n", "wrong.toml:2:8", "none.csv"),
+        ("[start]\nq = [0.0]\n", "wrong.toml:2:5", "1 numbers for 2"),
+    ] {
+        let said = fails(&["simulate", &robot, "--input", &toml(text)]);
+        assert!(said.contains(place) && said.contains(words), "{text}\n{said}");
+    }
+    for (name, text, place, words) in [
+        ("a.csv", "t,joint2\n0,1\n1,x\n", "a.csv:3", "`x`"),
+        ("a.csv", "time,joint2\n0,1\n", "a.csv:1", "`t`"),
+        ("a.csv", "t,joint2x\n0,1\n1,2\n", "a.csv:1", "joint2x"),
+        ("a.csv", "t,joint2\n1,1\n0,2\n", "a.csv:1", "does not come after"),
+        ("a.csv", "t,joint2\n0,1,2\n", "a.csv:2", "samples cannot be read"),
+        ("a.json", "{\"t\": [0, 1], \"joint2\": [1]}", "a.json:1", "the first array 1"),
+        ("a.json", "{\"t\": [0, 1],\n \"joint2\"}", "a.json:2", "samples cannot be read"),
+    ] {
+        let said = fails(&["simulate", &robot, "--input", &write(&here, name, text)]);
+        assert!(said.contains(place) && said.contains(words), "{text}\n{said}");
+    }
+    let motion = toml(&format!("[motion]\nkind = \"cubic\"\n{two_points}"));
+    let said = fails(&["analyze", &solo, "--floating-base", "--motion", &motion]);
+    assert!(said.contains("fixed base") && said.contains("wrong.toml:1"), "{said}");
+    let said = fails(&["analyze", &robot, "--motion", &motion, "--sweep", "forarm.mass=1,2"]);
+    assert!(said.contains("no value `mass` of `forarm`"), "{said}");
+    assert!(fails(&["analyze", &robot, "--motion", &toml("[start]\nq = [0.0, 0.0]\n")]).contains("no motion"));
+}

@@ -1,0 +1,182 @@
+//! What a prescribed motion asks of joints and drives: torques, power, energy, what joints carry, and where limits end.
+
+use crate::motion::Motion;
+use crate::table::Table;
+use straightline_core::algorithms::{inverse_dynamics, joint_wrenches, kinetic_energy, potential_energy};
+use straightline_core::model::{Joint, JointKind, Model};
+
+/// The figures of a motion.
+#[derive(Clone, Debug)]
+pub struct Analysis {
+    /// `t`, then per joint `q.`, `qd.`, `qdd.`, `tau.`, `power.`.
+    pub table: Table,
+    /// `t`, then per joint `force.` and `moment.` with `.x`, `.y`, `.z`: what the joint exerts on its link, in the link's axes, about
+    /// the joint's origin.
+    pub wrenches: Table,
+    /// Per joint.
+    pub joints: Vec<JointFigures>,
+    /// Every limit that is exceeded, where it is first, the earliest first.
+    pub violations: Vec<Violation>,
+    /// Kinetic and potential energy at the end less that at the beginning \[J\].
+    pub energy_change: f64,
+}
+
+/// The figures of a joint over a motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointFigures {
+    /// Its name.
+    pub name: String,
+    /// Unit of its forces.
+    pub unit: &'static str,
+    /// Greatest |τ| \[N·m or N\], and when \[s\].
+    pub peak: (f64, f64),
+    /// Root of the mean square of τ \[N·m or N\].
+    pub rms: f64,
+    /// Greatest |q̇| \[rad/s or m/s\].
+    pub speed: f64,
+    /// Greatest power of the drive \[W\].
+    pub power: f64,
+    /// Energy that the drive gives \[J\].
+    pub given: f64,
+    /// Energy that the drive takes \[J\].
+    pub taken: f64,
+    /// Greatest modulus of the force \[N\] and of the moment \[N·m\] in the joint.
+    pub carried: (f64, f64),
+}
+
+/// A limit that is exceeded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Violation {
+    /// When, for the first time \[s\].
+    pub time: f64,
+    /// The joint.
+    pub joint: String,
+    /// Of what: `position`, `speed` or `effort`.
+    pub what: &'static str,
+    /// The limit.
+    pub limit: f64,
+    /// The worst value over the motion.
+    pub worst: f64,
+}
+
+/// Analyses a motion of all joints at instants at most `interval` \[s\] apart, limits by root finding between them.
+pub fn analyze(model: &Model<f64>, motion: &Motion, interval: f64) -> Analysis {
+    let mut joints: Vec<&Joint> = model.bodies.iter().map(|b| &b.joint).collect();
+    joints.sort_by_key(|j| j.iv);
+    let instants = instants(motion, interval);
+    let names = |prefixes: &[&str], ends: &[&str]| -> Vec<String> {
+        let of = |p: &&str| joints.iter().flat_map(|j| ends.iter().map(|e| format!("{p}.{}{e}", j.name))).collect();
+        let lists: Vec<Vec<String>> = prefixes.iter().map(of).collect();
+        std::iter::once("t".to_string()).chain(lists.into_iter().flatten()).collect()
+    };
+    let mut table = Table { names: names(&["q", "qd", "qdd", "tau", "power"], &[""]), rows: Vec::new() };
+    let mut wrenches = Table { names: names(&["force", "moment"], &[".x", ".y", ".z"]), rows: Vec::new() };
+    for &(piece, t) in &instants {
+        let (q, qd, qdd) = motion.in_piece(piece, t);
+        let tau = inverse_dynamics(model, &q, &qd, &qdd);
+        let power: Vec<f64> = tau.iter().zip(&qd).map(|(tau, qd)| tau * qd).collect();
+        table.rows.push([&[t], &q[..], &qd, &qdd, &tau, &power].concat());
+        let carried = joint_wrenches(model, &q, &qd, &qdd);
+        let forces = carried.iter().flat_map(|w| w.force.to_array());
+        let moments = carried.iter().flat_map(|w| w.moment.to_array());
+        wrenches.rows.push(std::iter::once(t).chain(forces).chain(moments).collect());
+    }
+    let n = joints.len();
+    let figures = (0..n).map(|j| figures(joints[j], j, n, &table, &wrenches)).collect();
+    let mut violations: Vec<Violation> =
+        joints.iter().enumerate().flat_map(|(j, joint)| violations(model, motion, joint, j, n, &table)).collect();
+    violations.sort_by(|a, b| a.time.total_cmp(&b.time));
+    let energy = |t: f64| {
+        let (q, qd, _) = motion.at(t);
+        kinetic_energy(model, &q, &qd) + potential_energy(model, &q)
+    };
+    let energy_change = energy(motion.duration()) - energy(motion.times[0]);
+    Analysis { table, wrenches, joints: figures, violations, energy_change }
+}
+
+/// Instants from knot to knot with the piece that they lie on, equally spaced; a knot between two pieces is in both.
+fn instants(motion: &Motion, interval: f64) -> Vec<(usize, f64)> {
+    let piece = |(k, pair): (usize, &[f64])| {
+        let (start, end) = (pair[0], pair[1]);
+        let steps = ((end - start) / interval).ceil().max(1.0) as usize;
+        let at = move |i: usize| if i == steps { end } else { start + (end - start) * i as f64 / steps as f64 };
+        (0..=steps).map(move |i| (k, at(i))).collect::<Vec<_>>()
+    };
+    motion.times.windows(2).enumerate().flat_map(piece).collect()
+}
+
+/// ∫ y dt by the trapezoidal rule, which is forgiving at corners.
+fn integral(times: &[f64], y: impl Fn(usize) -> f64) -> f64 {
+    (1..times.len()).map(|k| 0.5 * (times[k] - times[k - 1]) * (y(k) + y(k - 1))).sum()
+}
+
+fn figures(joint: &Joint, j: usize, n: usize, table: &Table, wrenches: &Table) -> JointFigures {
+    let rows = &table.rows;
+    let times: Vec<f64> = rows.iter().map(|row| row[0]).collect();
+    let (qd, tau, power) =
+        (|k: usize| rows[k][1 + n + j], |k: usize| rows[k][1 + 3 * n + j], |k: usize| rows[k][1 + 4 * n + j]);
+    let greatest = |y: &dyn Fn(usize) -> f64| {
+        let better = |(best, at): (f64, usize), k: usize| if y(k) > best { (y(k), k) } else { (best, at) };
+        (0..rows.len()).fold((f64::NEG_INFINITY, 0), better)
+    };
+    let (peak, at) = greatest(&|k| tau(k).abs());
+    let modulus = |first: usize| {
+        let of = |k: usize| wrenches.rows[k][first..first + 3].iter().map(|x| x * x).sum::<f64>().sqrt();
+        greatest(&of).0
+    };
+    let time = times.last().unwrap_or(&0.0) - times[0];
+    JointFigures {
+        name: joint.name.clone(),
+        unit: if joint.kind == JointKind::Prismatic { "N" } else { "N·m" },
+        peak: (peak, times[at]),
+        rms: (integral(&times, |k| tau(k) * tau(k)) / time).sqrt(),
+        speed: greatest(&|k| qd(k).abs()).0,
+        power: greatest(&power).0,
+        given: integral(&times, |k| power(k).max(0.0)),
+        taken: integral(&times, |k| (-power(k)).max(0.0)),
+        carried: (modulus(1 + 3 * j), modulus(1 + 3 * n + 3 * j)),
+    }
+}
+
+/// The limits of a joint that the motion exceeds.
+fn violations(model: &Model<f64>, motion: &Motion, joint: &Joint, j: usize, n: usize, table: &Table) -> Vec<Violation> {
+    let limits = joint.limits;
+    let value = |what: &str, t: f64| {
+        let (q, qd, qdd) = motion.at(t);
+        match what {
+            "position" => q[j],
+            "speed" => qd[j],
+            _ => inverse_dynamics(model, &q, &qd, &qdd)[j],
+        }
+    };
+    let sides = [
+        ("position", j, limits.upper, 1.0),
+        ("position", j, limits.lower, -1.0),
+        ("speed", n + j, limits.velocity, 1.0),
+        ("speed", n + j, -limits.velocity, -1.0),
+        ("effort", 3 * n + j, limits.effort, 1.0),
+        ("effort", 3 * n + j, -limits.effort, -1.0),
+    ];
+    let found = sides.into_iter().filter_map(|(what, column, limit, sign)| {
+        let beyond = |y: f64| sign * (y - limit) > 1e-12 * limit.abs();
+        let rows = &table.rows;
+        let first = rows.iter().position(|row| beyond(row[1 + column]))?;
+        let worst = rows.iter().map(|row| row[1 + column]).max_by(|a, b| (sign * a).total_cmp(&(sign * b)))?;
+        // where it begins: bisection between the last instant within and the first beyond
+        let mut time = rows[first][0];
+        if first > 0 {
+            let (mut within, mut after) = (rows[first - 1][0], time);
+            for _ in 0..50 {
+                let middle = 0.5 * (within + after);
+                if beyond(value(what, middle)) {
+                    after = middle
+                } else {
+                    within = middle
+                }
+            }
+            time = after;
+        }
+        Some(Violation { time, joint: joint.name.clone(), what, limit, worst })
+    });
+    found.collect()
+}

@@ -1,0 +1,124 @@
+//! What drives a simulated robot: torques over time, or a controller.
+
+use crate::motion::Motion;
+use straightline_core::algorithms::{gravity_force, inverse_dynamics};
+use straightline_core::model::Model;
+
+/// What gives the generalized forces.
+#[derive(Clone, Debug)]
+pub enum Command {
+    /// None: the robot moves freely.
+    Free,
+    /// Over time, linear in between, constant before the first and after the last row.
+    Torques(Samples),
+    /// A controller.
+    Controller(Box<Controller>),
+}
+
+impl Command {
+    /// Generalized forces \[N·m or N\] at time `t` \[s\] and state (q, q̇).
+    pub fn torques(&self, t: f64, q: &[f64], qd: &[f64]) -> Vec<f64> {
+        match self {
+            Command::Free => vec![0.0; qd.len()],
+            Command::Torques(samples) => samples.at(t),
+            Command::Controller(controller) => controller.torques(t, q, qd),
+        }
+    }
+
+    /// Times at which the forces are not smooth, in order.
+    pub fn corners(&self) -> Vec<f64> {
+        match self {
+            Command::Free => Vec::new(),
+            Command::Torques(samples) => samples.times.clone(),
+            Command::Controller(controller) => controller.motion.corners(),
+        }
+    }
+}
+
+/// Rows over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Samples {
+    /// Times \[s\], each later than the one before; at least one.
+    pub times: Vec<f64>,
+    /// A row per time.
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl Samples {
+    /// The row at time `t`, linear between rows.
+    pub fn at(&self, t: f64) -> Vec<f64> {
+        let after = self.times.partition_point(|time| *time <= t);
+        if after == 0 || after == self.times.len() {
+            return self.rows[after.saturating_sub(1)].clone();
+        }
+        let (t0, t1) = (self.times[after - 1], self.times[after]);
+        let fraction = (t - t0) / (t1 - t0);
+        let between = |(a, b): (&f64, &f64)| a + fraction * (b - a);
+        self.rows[after - 1].iter().zip(&self.rows[after]).map(between).collect()
+    }
+}
+
+/// How a controller uses the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Compensation {
+    /// Not at all: K e + D ė.
+    None,
+    /// g(q) + K e + D ė.
+    Gravity,
+    /// τ(r, ṙ, r̈) + K e + D ė, r the reference.
+    FeedForward,
+    /// τ(q, q̇, r̈ + D ė + K e).
+    ComputedTorque,
+}
+
+impl Compensation {
+    /// Every one with its word.
+    pub const WORDS: [(&str, Compensation); 4] = [
+        ("none", Compensation::None),
+        ("gravity", Compensation::Gravity),
+        ("feed_forward", Compensation::FeedForward),
+        ("computed_torque", Compensation::ComputedTorque),
+    ];
+}
+
+/// A joint controller that follows a motion.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    /// The robot as the controller knows it: not always the one that is driven.
+    pub model: Model<f64>,
+    /// How it uses the model.
+    pub compensation: Compensation,
+    /// The reference.
+    pub motion: Motion,
+    /// K per joint: \[N·m/rad or N/m\], of computed torque \[1/s²\].
+    pub stiffness: Vec<f64>,
+    /// D per joint: \[N·m·s/rad or N·s/m\], of computed torque \[1/s\].
+    pub damping: Vec<f64>,
+    /// Whether forces stay within the joints' effort limits.
+    pub saturates: bool,
+    /// Time from one computation to the next \[s\], forces held in between; `None`: continuous.
+    pub period: Option<f64>,
+}
+
+impl Controller {
+    /// Generalized forces \[N·m or N\] at time `t` \[s\] and state (q, q̇).
+    pub fn torques(&self, t: f64, q: &[f64], qd: &[f64]) -> Vec<f64> {
+        let (r, rd, rdd) = self.motion.at(t);
+        let answer: Vec<f64> =
+            (0..q.len()).map(|i| self.stiffness[i] * (r[i] - q[i]) + self.damping[i] * (rd[i] - qd[i])).collect();
+        let added = |tau: Vec<f64>| tau.iter().zip(&answer).map(|(a, b)| a + b).collect::<Vec<f64>>();
+        let mut tau = match self.compensation {
+            Compensation::None => answer,
+            Compensation::Gravity => added(gravity_force(&self.model, q)),
+            Compensation::FeedForward => added(inverse_dynamics(&self.model, &r, &rd, &rdd)),
+            Compensation::ComputedTorque => inverse_dynamics(&self.model, q, qd, &added(rdd)),
+        };
+        if self.saturates {
+            for joint in self.model.bodies.iter().map(|b| &b.joint) {
+                let most = joint.limits.effort;
+                tau[joint.iv] = tau[joint.iv].clamp(-most, most);
+            }
+        }
+        tau
+    }
+}

@@ -1,0 +1,15 @@
+//! Robots in motion, on the host: prescribed [`motion`]s, [`mod@simulate`]d ones, and what they ask of joints and drives ([`analysis`]).
+//!
+//! Everything runs over the generic numeric runtime of `straightline-core`, `Model<f64>` in and plain tables of numbers out; what
+//! files say, and where they are wrong, is the command line's business.
+#![forbid(unsafe_code)]
+
+pub mod analysis;
+pub mod cartesian;
+pub mod command;
+pub mod html;
+pub mod motion;
+pub mod plant;
+pub mod plot;
+pub mod simulate;
+pub mod table;

@@ -1,0 +1,93 @@
+//! Lines over an axis, as SVG.
+
+use plotters::prelude::*;
+
+/// A line and its name.
+pub struct Line<'a> {
+    /// In the legend.
+    pub name: &'a str,
+    /// x and y.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// A plot.
+pub struct Plot<'a> {
+    /// Above it.
+    pub title: &'a str,
+    /// Below it and beside it.
+    pub axes: (&'a str, &'a str),
+    /// Its lines.
+    pub lines: Vec<Line<'a>>,
+    /// Levels that are limits: grey lines across.
+    pub levels: Vec<f64>,
+}
+
+/// Points of a line, at most: no screen shows more.
+const MOST_POINTS: usize = 2000;
+
+impl Plot<'_> {
+    /// The plot as SVG of this size in pixels.
+    ///
+    /// # Errors
+    /// What the plotting library says.
+    pub fn svg(&self, size: (u32, u32)) -> Result<String, String> {
+        let mut svg = String::new();
+        self.draw(&mut svg, size).map_err(|error| error.to_string())?;
+        Ok(svg)
+    }
+
+    fn draw(&self, svg: &mut String, size: (u32, u32)) -> Result<(), Box<dyn std::error::Error>> {
+        let finite = || self.lines.iter().flat_map(|l| &l.points).filter(|(x, y)| x.is_finite() && y.is_finite());
+        let range = |values: &mut dyn Iterator<Item = f64>| {
+            let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+            match low <= high {
+                true => (low, high),
+                false => (0.0, 1.0),
+            }
+        };
+        let (left, right) = range(&mut finite().map(|p| p.0));
+        let (low, high) = range(&mut finite().map(|p| p.1));
+        // limits far beyond all values would flatten the lines
+        let reach = (high - low).max(1e-12);
+        let shown: Vec<f64> = self.levels.iter().copied().filter(|y| *y > low - reach && *y < high + reach).collect();
+        let (low, high) = range(&mut [low, high].into_iter().chain(shown.iter().copied()));
+        let margin = if high > low { 0.05 * (high - low) } else { low.abs().max(1.0) * 0.05 };
+        let right = if right > left { right } else { left + 1.0 };
+        // room for the names of the lines
+        let end = if self.lines.len() > 1 { right + 0.2 * (right - left) } else { right };
+        let area = SVGBackend::with_string(svg, size).into_drawing_area();
+        area.fill(&WHITE)?;
+        let mut chart = ChartBuilder::on(&area)
+            .caption(self.title, ("sans-serif", 16))
+            .margin(12)
+            .x_label_area_size(36)
+            .y_label_area_size(64)
+            .build_cartesian_2d(left..end, (low - margin)..(high + margin))?;
+        chart.configure_mesh().light_line_style(WHITE).x_desc(self.axes.0).y_desc(self.axes.1).draw()?;
+        for level in shown {
+            let style = RGBColor(120, 120, 120).stroke_width(1);
+            chart.draw_series(LineSeries::new([(left, level), (right, level)], style))?;
+        }
+        for (k, line) in self.lines.iter().enumerate() {
+            let colour = Palette99::pick(k).to_rgba();
+            let step = line.points.len().div_ceil(MOST_POINTS).max(1);
+            let last = line.points.len().saturating_sub(1);
+            let kept = line.points.iter().enumerate().filter(|(i, _)| i % step == 0 || *i == last);
+            let points = kept.map(|(_, p)| *p).filter(|(x, y)| x.is_finite() && y.is_finite());
+            chart
+                .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
+                .label(line.name)
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], colour.stroke_width(2)));
+        }
+        if self.lines.len() > 1 {
+            chart
+                .configure_series_labels()
+                .position(SeriesLabelPosition::UpperRight)
+                .background_style(WHITE.mix(0.8))
+                .border_style(RGBColor(200, 200, 200))
+                .draw()?;
+        }
+        area.present()?;
+        Ok(())
+    }
+}

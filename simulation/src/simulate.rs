@@ -1,0 +1,399 @@
+//! Simulation with adaptive steps: the motion that a command makes of a robot.
+//!
+//! The equations of [`Plant`] are integrated by an ODE library: an explicit method of order 8 with error control, or an implicit
+//! one of order 5 (Kværnø) for stiff systems. Where the command is not smooth the integration begins anew, and a joint
+//! that reaches the end of its range is located as a root between steps.
+
+use crate::command::Command;
+use crate::plant::Plant;
+use crate::table::Table;
+use differential_equations::prelude::*;
+use std::fmt;
+use straightline_core::algorithms::kinetic_energy;
+use straightline_core::model::{JointKind, Limits};
+
+/// How steps are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// Explicit Runge-Kutta of order 8 (Dormand and Prince), for smooth motion.
+    #[default]
+    Adaptive,
+    /// Implicit Runge-Kutta of order 5 (Kværnø, L-stable), for stiff springs, dampers and drives.
+    Stiff,
+}
+
+impl Method {
+    /// Both with their words.
+    pub const WORDS: [(&str, Method); 2] = [("adaptive", Method::Adaptive), ("stiff", Method::Stiff)];
+}
+
+/// How a simulation runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Until this time \[s\], from zero, positive.
+    pub duration: f64,
+    /// From row to row of the result \[s\], positive.
+    pub interval: f64,
+    /// Error per step that is allowed, relative and absolute.
+    pub tolerance: f64,
+    /// How steps are made.
+    pub method: Method,
+    /// Whether it ends where a joint reaches the end of its range.
+    pub stops_at_limits: bool,
+}
+
+/// What came out.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// `t`, then per joint `q.`, `qd.`, `tau.` and, under a controller, `error.` (reference less measured), then `energy`, `work`
+    /// and `losses` \[J\].
+    pub table: Table,
+    /// The last configuration.
+    pub q: Vec<f64>,
+    /// The last velocity.
+    pub qd: Vec<f64>,
+    /// The end of a joint's range where it stopped early.
+    pub stop: Option<Stop>,
+    /// Where the energy went.
+    pub balance: Balance,
+    /// Accepted steps.
+    pub steps: usize,
+    /// Evaluations of the equations of motion.
+    pub evaluations: usize,
+}
+
+/// A joint at the end of its range.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stop {
+    /// When \[s\].
+    pub time: f64,
+    /// The joint.
+    pub joint: String,
+    /// The limit that it reached \[rad or m\].
+    pub limit: f64,
+}
+
+/// Where the energy went \[J\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Balance {
+    /// Kinetic and potential energy, springs and rotors with them, at the beginning.
+    pub before: f64,
+    /// At the end.
+    pub after: f64,
+    /// Work of the given forces.
+    pub work: f64,
+    /// Heat of friction.
+    pub losses: f64,
+    /// The greatest change of kinetic energy on the way.
+    pub turnover: f64,
+}
+
+impl Balance {
+    /// What is missing \[J\]: change of energy + losses − work.
+    pub fn missing(&self) -> f64 {
+        (self.after - self.before) + self.losses - self.work
+    }
+
+    /// The same by the energies that were turned over.
+    pub fn relative(&self) -> f64 {
+        let scale = self.turnover.max(self.work.abs()).max(self.losses);
+        if scale == 0.0 {
+            self.missing().abs()
+        } else {
+            self.missing().abs() / scale
+        }
+    }
+}
+
+/// Why there is no result.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    /// When it went wrong \[s\].
+    pub time: f64,
+    /// What the solver says.
+    pub why: String,
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the simulation failed at t = {} s: {}", self.time, self.why)
+    }
+}
+
+impl std::error::Error for Failure {}
+
+/// Simulates from q, q̇ at time zero; `progress` hears the time as it goes on.
+///
+/// # Errors
+/// The solver found no way on: numbers grew beyond all bounds, or steps became too small.
+pub fn simulate(
+    plant: &Plant,
+    command: &Command,
+    (q, qd): (&[f64], &[f64]),
+    settings: &Settings,
+    progress: &dyn Fn(f64),
+) -> Result<Run, Failure> {
+    let mut state = plant.state(q, qd);
+    let before = plant.energy(q, qd);
+    let mut run = Run {
+        table: Table { names: names(plant, command), rows: Vec::new() },
+        q: q.to_vec(),
+        qd: qd.to_vec(),
+        stop: None,
+        balance: Balance { before, after: before, work: 0.0, losses: 0.0, turnover: 0.0 },
+        steps: 0,
+        evaluations: 0,
+    };
+    let period = match command {
+        Command::Controller(controller) => controller.period,
+        _ => None,
+    };
+    let outputs = (settings.duration / settings.interval).floor() as usize;
+    let mut wanted: Vec<f64> = (0..=outputs).map(|k| k as f64 * settings.interval).collect();
+    if settings.duration - wanted[outputs] > 1e-9 * settings.duration {
+        wanted.push(settings.duration);
+    }
+    let corners = pieces(command, period, settings.duration);
+    let row = |t: f64, state: &[f64], held: Option<&[f64]>| row(plant, command, t, state, held);
+    run.table.rows.push(row(0.0, &state, None));
+    for piece in corners.windows(2) {
+        let (start, end) = (piece[0], piece[1]);
+        let held = period.map(|_| {
+            let (q, qd, ..) = plant.split(&state);
+            command.torques(start, q, qd)
+        });
+        let system = System { plant, command, held: held.as_deref(), progress };
+        let mut times: Vec<f64> = wanted.iter().copied().filter(|t| *t > start && *t < end).collect();
+        times.push(end);
+        let is_wanted = |t: f64| wanted.iter().any(|w| (w - t).abs() <= 1e-12 * settings.duration);
+        let solution = system.solve(start, end, &state, &times, settings)?;
+        for (t, y) in solution.t.iter().zip(&solution.y) {
+            let interrupted = *t < end && !times.contains(t);
+            if is_wanted(*t) || interrupted {
+                run.table.rows.push(row(*t, y, held.as_deref()));
+            }
+        }
+        run.steps += solution.accepted;
+        run.evaluations += solution.evaluations;
+        if let (Some(y), Some(t)) = (solution.y.last(), solution.t.last()) {
+            if !y.iter().all(|x| x.is_finite()) {
+                return Err(Failure { time: *t, why: "a number is not finite".to_string() });
+            }
+            state = plant.normalised(y);
+            if solution.interrupted {
+                run.stop = Some(nearest_limit(plant, *t, y));
+                break;
+            }
+        }
+    }
+    let (q, qd, work, losses) = plant.split(&state);
+    let after = plant.energy(q, qd);
+    let nq = plant.model.nq();
+    let kinetic = |row: &Vec<f64>| kinetic_energy(&plant.model, &row[1..=nq], &row[nq + 1..=nq + qd.len()]);
+    let (least, most) = run.table.rows.iter().map(kinetic).fold((f64::MAX, 0.0f64), |(l, m), e| (l.min(e), m.max(e)));
+    let turnover = most - least;
+    run.balance = Balance { before, after, work, losses, turnover };
+    (run.q, run.qd) = (q.to_vec(), qd.to_vec());
+    Ok(run)
+}
+
+/// The times between which everything is smooth, from zero to the end.
+fn pieces(command: &Command, period: Option<f64>, duration: f64) -> Vec<f64> {
+    let mut times: Vec<f64> = match period {
+        Some(period) => (0..).map(|k| f64::from(k) * period).take_while(|t| *t < duration).collect(),
+        None => command.corners().into_iter().filter(|t| *t > 0.0 && *t < duration).collect(),
+    };
+    times.push(0.0);
+    times.push(duration);
+    times.sort_by(f64::total_cmp);
+    times.dedup_by(|b, a| *b - *a <= 1e-12 * duration);
+    // the end itself, not what lies within rounding of it
+    *times.last_mut().expect("there are two") = duration;
+    times
+}
+
+fn names(plant: &Plant, command: &Command) -> Vec<String> {
+    let mut joints: Vec<_> = plant.model.bodies.iter().map(|b| &b.joint).collect();
+    joints.sort_by_key(|j| j.iv);
+    let named = |prefix: &str, of_base: &[&str]| -> Vec<String> {
+        let of = |joint: &&straightline_core::model::Joint| match joint.kind {
+            JointKind::Floating => of_base.iter().map(|c| format!("{prefix}.{}.{c}", joint.name)).collect(),
+            _ => vec![format!("{prefix}.{}", joint.name)],
+        };
+        joints.iter().flat_map(of).collect()
+    };
+    let mut names = vec!["t".to_string()];
+    names.extend(named("q", &["x", "y", "z", "qx", "qy", "qz", "qw"]));
+    names.extend(named("qd", &["vx", "vy", "vz", "wx", "wy", "wz"]));
+    names.extend(named("tau", &["fx", "fy", "fz", "mx", "my", "mz"]));
+    if matches!(command, Command::Controller(_)) {
+        names.extend(named("error", &[]));
+    }
+    names.extend(["energy", "work", "losses"].map(str::to_string));
+    names
+}
+
+fn row(plant: &Plant, command: &Command, t: f64, state: &[f64], held: Option<&[f64]>) -> Vec<f64> {
+    let state = plant.normalised(state);
+    let (q, qd, work, losses) = plant.split(&state);
+    let tau = held.map_or_else(|| command.torques(t, q, qd), <[f64]>::to_vec);
+    let mut row = [&[t], q, qd, &tau].concat();
+    if let Command::Controller(controller) = command {
+        let (r, ..) = controller.motion.at(t);
+        row.extend(r.iter().zip(q).map(|(r, q)| r - q));
+    }
+    row.extend([plant.energy(q, qd), work, losses]);
+    row
+}
+
+/// The equations of motion under a command, or under forces that are held.
+struct System<'a> {
+    plant: &'a Plant,
+    command: &'a Command,
+    held: Option<&'a [f64]>,
+    progress: &'a dyn Fn(f64),
+}
+
+impl ODE<f64, Vec<f64>> for System<'_> {
+    fn diff(&self, t: f64, y: &Vec<f64>, dydt: &mut Vec<f64>) {
+        (self.progress)(t);
+        match self.held {
+            Some(tau) => self.plant.rate(y, tau, dydt),
+            None => {
+                let (q, qd, ..) = self.plant.split(y);
+                self.plant.rate(y, &self.command.torques(t, q, qd), dydt);
+            }
+        }
+    }
+}
+
+/// Keeps the states at wanted times, and ends where a joint reaches the end of its range.
+struct Watch<'a> {
+    plant: &'a Plant,
+    times: &'a [f64],
+    next: usize,
+    stops_at_limits: bool,
+}
+
+impl Watch<'_> {
+    /// The least distance of a joint to the end of its range; negative beyond it.
+    fn distance(&self, y: &[f64]) -> f64 {
+        distances(self.plant, y).map(|(distance, ..)| distance).fold(f64::MAX, f64::min)
+    }
+}
+
+impl Solout<f64, Vec<f64>> for Watch<'_> {
+    fn solout<I>(
+        &mut self,
+        t: f64,
+        t_before: f64,
+        y: &Vec<f64>,
+        y_before: &Vec<f64>,
+        interpolator: &mut I,
+        solution: &mut Solution<f64, Vec<f64>>,
+    ) -> ControlFlag<f64, Vec<f64>>
+    where
+        I: Interpolation<f64, Vec<f64>> + ?Sized,
+    {
+        let mut end = t;
+        let leaves = self.stops_at_limits && self.distance(y_before) > 0.0 && self.distance(y) <= 0.0;
+        if leaves {
+            // between steps by the method's own interpolation: bisection to the last bit of the time
+            let (mut within, mut beyond) = (t_before, t);
+            for _ in 0..60 {
+                let middle = 0.5 * (within + beyond);
+                match interpolator.interpolate(middle) {
+                    Ok(state) if self.distance(&state) > 0.0 => within = middle,
+                    _ => beyond = middle,
+                }
+            }
+            end = beyond;
+        }
+        while let Some(&wanted) = self.times.get(self.next).filter(|wanted| **wanted <= end) {
+            let state = if wanted == t { Ok(y.clone()) } else { interpolator.interpolate(wanted) };
+            if let Ok(state) = state {
+                solution.push(wanted, state);
+            }
+            self.next += 1;
+        }
+        if !leaves {
+            return ControlFlag::Continue;
+        }
+        if let Ok(state) = interpolator.interpolate(end) {
+            solution.push(end, state);
+        }
+        ControlFlag::Terminate
+    }
+}
+
+/// What a piece of the integration gave.
+struct Solved {
+    t: Vec<f64>,
+    y: Vec<Vec<f64>>,
+    interrupted: bool,
+    accepted: usize,
+    evaluations: usize,
+}
+
+/// Steps of one piece, at most.
+const MOST_STEPS: usize = 10_000_000;
+
+impl System<'_> {
+    fn solve(
+        &self,
+        start: f64,
+        end: f64,
+        state: &[f64],
+        times: &[f64],
+        settings: &Settings,
+    ) -> Result<Solved, Failure> {
+        let tolerance = settings.tolerance;
+        let watch = Watch { plant: self.plant, times, next: 0, stops_at_limits: settings.stops_at_limits };
+        let problem = IVP::ode(self, start, end, state.to_vec()).solout(watch);
+        // interpolation between steps is not under error control: steps are no longer than rows are apart
+        macro_rules! solved {
+            ($method:expr) => {{
+                let method = $method.rtol(tolerance).atol(tolerance).h_max(settings.interval).max_steps(MOST_STEPS);
+                problem.method(method).solve()
+            }};
+        }
+        let solution = match settings.method {
+            Method::Adaptive => solved!(ExplicitRungeKutta::dop853()),
+            Method::Stiff => solved!(DiagonallyImplicitRungeKutta::kvaerno745()),
+        };
+        let solution = solution.map_err(|error| {
+            let (time, why) = match error {
+                Error::MaxSteps { t, .. } => (t, format!("more than {MOST_STEPS} steps")),
+                Error::StepSize { t, .. } => (t, "steps become too small: the motion is not smooth there".to_string()),
+                Error::Stiffness { t, .. } => (t, "the equations are stiff: choose the method `stiff`".to_string()),
+                Error::LinearAlgebra { t, msg, .. } => (t, msg),
+                Error::BadInput { msg } => (start, msg),
+                other => (start, format!("{other:?}")),
+            };
+            Failure { time, why }
+        })?;
+        Ok(Solved {
+            interrupted: matches!(solution.status, Status::Interrupted),
+            accepted: solution.steps.accepted,
+            evaluations: solution.evals.function,
+            t: solution.t.clone(),
+            y: solution.y.clone(),
+        })
+    }
+}
+
+/// Of every joint that has limits: how far it is from the nearer one, its name, and that limit.
+fn distances<'a>(plant: &'a Plant, y: &'a [f64]) -> impl Iterator<Item = (f64, &'a str, f64)> {
+    let joints = plant.model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind != JointKind::Floating);
+    joints.map(|joint| {
+        let (q, Limits { lower, upper, .. }) = (y[joint.iq], joint.limits);
+        let (limit, distance) = if q - lower < upper - q { (lower, q - lower) } else { (upper, upper - q) };
+        (if distance.is_finite() { distance } else { f64::MAX }, joint.name.as_str(), limit)
+    })
+}
+
+fn nearest_limit(plant: &Plant, time: f64, y: &[f64]) -> Stop {
+    let nearest = distances(plant, y).min_by(|a, b| a.0.total_cmp(&b.0));
+    let (_, joint, limit) = nearest.unwrap_or((0.0, "", 0.0));
+    Stop { time, joint: joint.to_string(), limit }
+}

@@ -1,0 +1,36 @@
+//! Numbers in columns with names: what goes to files and into plots.
+
+use std::fmt::Write;
+
+/// Columns of equal length with names; the first is time \[s\].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    /// Names, such as `t` and `q.shoulder`.
+    pub names: Vec<String>,
+    /// Rows of as many numbers as there are names.
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl Table {
+    /// The column of that name.
+    pub fn column(&self, name: &str) -> Option<Vec<f64>> {
+        let k = self.names.iter().position(|n| n == name)?;
+        Some(self.rows.iter().map(|row| row[k]).collect())
+    }
+
+    /// As CSV, RFC 4180: a header, then a row per line, numbers with all their digits.
+    pub fn csv(&self) -> String {
+        let quoted = |name: &String| match name.contains([',', '"', '\n', '\r']) {
+            true => format!("\"{}\"", name.replace('"', "\"\"")),
+            false => name.clone(),
+        };
+        let mut out = self.names.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n";
+        for row in &self.rows {
+            for (k, x) in row.iter().enumerate() {
+                let _ = write!(out, "{}{x:?}", if k == 0 { "" } else { "," });
+            }
+            out.push('\n');
+        }
+        out
+    }
+}

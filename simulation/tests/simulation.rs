@@ -1,0 +1,242 @@
+//! Simulations and analyses against closed forms and balances.
+
+use straightline_core::algorithms::forward_kinematics;
+use straightline_core::model::{Body, Coulomb, Frame, Joint, JointEffects, JointKind, Limits, Model};
+use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
+use straightline_simulation::analysis::analyze;
+use straightline_simulation::cartesian::{joint_motion, NoPath};
+use straightline_simulation::command::{Command, Compensation, Controller, Samples};
+use straightline_simulation::motion::Motion;
+use straightline_simulation::plant::Plant;
+use straightline_simulation::simulate::{simulate, Method, Run, Settings};
+
+fn body(name: &str, parent: Option<usize>, kind: JointKind, i: usize, placement: Transform<f64>) -> Body<f64> {
+    Body {
+        name: name.into(),
+        parent,
+        joint: Joint { name: format!("to_{name}"), kind, iq: i, iv: i, limits: Limits::default() },
+        placement,
+        inertia: SpatialInertia::new(
+            2.0,
+            Vec3::new(0.3, 0.05, -0.02),
+            Sym3 { xx: 0.02, xy: 0.002, xz: -0.001, yy: 0.05, yz: 0.003, zz: 0.045 },
+        ),
+        link_frame: Transform::identity(),
+        dense: false,
+        effects: JointEffects::none(),
+        load: None,
+    }
+}
+
+fn at(rotation: Mat3<f64>, x: f64) -> Transform<f64> {
+    Transform { rotation, translation: Vec3::new(x, 0.0, 0.0) }
+}
+
+/// 2 kg on a slide along x of the world.
+fn cart() -> Model<f64> {
+    let along_x = Mat3 { rows: [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
+    let bodies = vec![body("cart", None, JointKind::Prismatic, 0, at(along_x, 0.0))];
+    Model { name: "cart".into(), bodies, gravity: Vec3::new(0.0, 0.0, -9.81), frames: vec![] }
+}
+
+/// Three joints about skew axes, with rotors, friction and springs.
+fn arm() -> Model<f64> {
+    let across = Mat3 { rows: [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]] };
+    let mut bodies = vec![
+        body("column", None, JointKind::Revolute, 0, at(Mat3::identity(), 0.0)),
+        body("upper", Some(0), JointKind::Revolute, 1, at(across, 0.1)),
+        body("fore", Some(1), JointKind::Revolute, 2, at(Mat3::identity(), 0.5)),
+    ];
+    for (i, body) in bodies.iter_mut().enumerate() {
+        body.effects = JointEffects {
+            rotor_inertia: Some(0.1 + 0.05 * i as f64),
+            damping: 0.2,
+            coulomb: Coulomb::Smooth { force: 0.3, speed: 0.05 },
+            stiffness: if i == 1 { 4.0 } else { 0.0 },
+            spring_rest: 0.2,
+        };
+    }
+    let tip = Frame { name: "tip".into(), body: Some(2), placement: at(Mat3::identity(), 0.4) };
+    Model { name: "arm".into(), bodies, gravity: Vec3::new(0.0, 0.0, -9.81), frames: vec![tip] }
+}
+
+const SETTINGS: Settings =
+    Settings { duration: 1.0, interval: 0.02, tolerance: 1e-11, method: Method::Adaptive, stops_at_limits: true };
+
+fn run(model: Model<f64>, command: &Command, q: &[f64], settings: &Settings) -> Run {
+    let plant = Plant::new(model, 1e-3);
+    simulate(&plant, command, (q, &vec![0.0; q.len()]), settings, &|_| ()).expect("the simulation goes through")
+}
+
+#[test]
+fn a_damped_spring_swings_as_the_closed_form_says() {
+    let mut model = cart();
+    let (m, d, k) = (2.0, 0.8, 50.0);
+    model.bodies[0].effects = JointEffects { damping: d, stiffness: k, ..JointEffects::none() };
+    for method in [Method::Adaptive, Method::Stiff] {
+        let run = run(model.clone(), &Command::Free, &[0.3], &Settings { method, ..SETTINGS });
+        let (decay, omega) = (d / (2.0 * m), (k / m - (d / (2.0 * m)).powi(2)).sqrt());
+        for row in &run.table.rows {
+            let t = row[0];
+            let q = 0.3 * (-decay * t).exp() * ((omega * t).cos() + decay / omega * (omega * t).sin());
+            // tolerance 1e-11 per step, a hundred steps; the implicit one of order 5 asks its own error for 1e-11 of scale
+            assert!((row[1] - q).abs() < 2e-9, "{method:?} t = {t}: {} is not {q}", row[1]);
+        }
+        assert!((run.table.rows.len(), run.table.rows[50][0]) == (51, 1.0));
+        assert!(run.balance.relative() < 1e-9, "{:?}", run.balance);
+    }
+}
+
+#[test]
+fn a_driven_arm_with_every_effect_keeps_its_books_over_ten_seconds() {
+    let rows = (0..=20).map(|k| [0.0, 1.0, 2.0].map(|j| 8.0 * (0.7 * f64::from(k) + j).sin()).to_vec());
+    let times = (0..=20).map(|k| 0.5 * f64::from(k)).collect();
+    let command = Command::Torques(Samples { times, rows: rows.collect() });
+    let settings = Settings { duration: 10.0, interval: 0.05, ..SETTINGS };
+    let all = run(arm(), &command, &[0.1, -0.4, 0.7], &settings);
+    assert!(all.balance.relative() < 1e-9, "{:?}", all.balance);
+    assert!(all.balance.losses > 1.0 && all.balance.work.abs() > 1.0);
+    // each effect by itself
+    let without: [fn(&mut JointEffects<f64>); 3] = [
+        |e| *e = JointEffects { damping: e.damping, ..JointEffects::none() },
+        |e| *e = JointEffects { coulomb: e.coulomb, ..JointEffects::none() },
+        |e| *e = JointEffects { stiffness: e.stiffness, spring_rest: e.spring_rest, ..JointEffects::none() },
+    ];
+    for only in without {
+        let mut model = arm();
+        model.bodies.iter_mut().for_each(|b| only(&mut b.effects));
+        let one = run(model, &command, &[0.1, -0.4, 0.7], &Settings { duration: 2.0, ..settings });
+        assert!(one.balance.relative() < 1e-9, "{:?}", one.balance);
+    }
+}
+
+#[test]
+fn stiff_joints_take_sensible_steps() {
+    let mut model = arm();
+    for body in &mut model.bodies {
+        body.effects.stiffness = 1e6;
+        body.effects.damping = 1e4;
+    }
+    let settings = Settings { method: Method::Stiff, tolerance: 1e-7, ..SETTINGS };
+    let run = run(model, &Command::Free, &[0.2, 0.3, 0.1], &settings);
+    assert!(run.steps < 1000, "{} steps", run.steps);
+    assert!(run.q.iter().all(|q| (q - 0.2).abs() < 1e-3), "{:?}", run.q);
+}
+
+#[test]
+fn a_joint_that_reaches_its_range_stops_the_run_at_that_instant() {
+    let mut model = cart();
+    model.bodies[0].joint.limits.upper = 0.5;
+    let torques = Command::Torques(Samples { times: vec![0.0], rows: vec![vec![6.0]] });
+    let stop = run(model.clone(), &torques, &[0.0], &SETTINGS).stop.expect("the slide is short");
+    // ½ (F/m) t² = 0.5
+    assert!((stop.time - (1.0f64 / 3.0).sqrt()).abs() < 1e-9, "{stop:?}");
+    assert_eq!((stop.joint.as_str(), stop.limit), ("to_cart", 0.5));
+    let free = run(model, &torques, &[0.0], &Settings { stops_at_limits: false, ..SETTINGS });
+    assert!(free.stop.is_none() && (free.q[0] - 1.5).abs() < 1e-9);
+}
+
+#[test]
+fn a_tumbling_base_keeps_energy_and_its_quaternion() {
+    let mut model = arm();
+    model.bodies.iter_mut().for_each(|b| b.effects = JointEffects::none());
+    for body in &mut model.bodies {
+        (body.joint.iq, body.joint.iv) = (body.joint.iq + 7, body.joint.iv + 6);
+        body.parent = Some(body.parent.map_or(0, |p| p + 1));
+    }
+    let mut base = body("base", None, JointKind::Floating, 0, Transform::identity());
+    base.joint = Joint { name: "root".into(), iq: 0, iv: 0, ..base.joint };
+    model.bodies.insert(0, base);
+    let mut q = vec![0.0; 10];
+    (q[3], q[6], q[8]) = (0.6, 0.8, 0.7);
+    let plant = Plant::new(model, 1e-3);
+    let qd: Vec<f64> = (0..9).map(|i| f64::from(i).sin() + 0.3).collect();
+    let run = simulate(&plant, &Command::Free, (&q, &qd), &SETTINGS, &|_| ()).expect("nothing is in the way");
+    assert!(run.balance.relative() < 1e-9, "{:?}", run.balance);
+    let length: f64 = run.q[3..7].iter().map(|x| x * x).sum();
+    assert!((length - 1.0).abs() < 1e-14);
+    // the whole falls: the base's own names, and free fall of the mass centre is in the energy already
+    assert!(run.table.names.contains(&"q.root.qw".to_string()) && run.table.names.contains(&"tau.to_fore".to_string()));
+}
+
+#[test]
+fn computed_torque_with_the_right_model_leaves_the_error_of_a_linear_spring() {
+    let mut model = arm();
+    model.bodies.iter_mut().for_each(|b| b.effects.coulomb = Coulomb::Off);
+    let motion = Motion::quintic(&[0.0, 1.0], &[vec![0.0, -0.5, 0.3], vec![1.0, 0.4, -0.6]]).unwrap();
+    let controller = Controller {
+        model: model.clone(),
+        compensation: Compensation::ComputedTorque,
+        motion,
+        stiffness: vec![100.0; 3],
+        damping: vec![20.0; 3],
+        saturates: false,
+        period: None,
+    };
+    // critically damped from an error of 0.1: e = 0.1 (1 + 10 t) exp(−10 t)
+    let run = run(model, &Command::Controller(Box::new(controller)), &[-0.1, -0.6, 0.2], &SETTINGS);
+    for (row, name) in run.table.rows.iter().flat_map(|r| ["error.to_column", "error.to_fore"].map(|n| (r, n))) {
+        let column = run.table.names.iter().position(|n| n == name).expect("errors are among the results");
+        let t = row[0];
+        let expected = 0.1 * (1.0 + 10.0 * t) * (-10.0 * t).exp();
+        // the method interpolates between steps with order 7
+        assert!((row[column] - expected).abs() < 1e-8, "{name} t = {t}: {} is not {expected}", row[column]);
+    }
+}
+
+#[test]
+fn drives_give_what_becomes_energy_and_heat() {
+    let model = arm();
+    let motion = Motion::quintic(&[0.0, 0.6, 1.5], &[vec![0.0, -0.5, 0.3], vec![1.0, 0.4, -0.6], vec![0.2, 0.9, 0.1]]);
+    let motion = motion.unwrap();
+    let found = analyze(&model, &motion, 1e-3);
+    let plant = Plant::new(model, 1e-3);
+    let times: Vec<f64> = found.table.rows.iter().map(|r| r[0]).collect();
+    let loss = |t: f64| plant.losses(&motion.at(t).1);
+    let losses: f64 = times.windows(2).map(|t| 0.5 * (t[1] - t[0]) * (loss(t[0]) + loss(t[1]))).sum();
+    let given: f64 = found.joints.iter().map(|j| j.given - j.taken).sum();
+    // trapezoidal rule: h² / 12 of the change of the power's slope
+    assert!((given - found.energy_change - losses).abs() < 1e-4, "{given} {} {losses}", found.energy_change);
+    assert!(found.violations.is_empty());
+}
+
+#[test]
+fn the_first_violation_is_found_where_it_is() {
+    let mut model = cart();
+    model.bodies[0].joint.limits = Limits { lower: -1.0, upper: 0.9, velocity: 1.2, effort: 7.5 };
+    // a = 4 m/s² up to 2 m/s, and back to rest: F = 8 N from the beginning on
+    let motion = Motion::trapezoidal(&[vec![0.0], vec![2.0]], &[2.0], &[4.0]).unwrap();
+    let found = analyze(&model, &motion, 0.013);
+    let of = |what: &str| found.violations.iter().find(|v| v.what == what).unwrap_or_else(|| panic!("no {what}"));
+    assert!((of("effort").time, of("effort").limit, of("effort").worst) == (0.0, 7.5, 8.0));
+    assert!((of("speed").time - 0.3).abs() < 1e-9 && of("speed").worst == 2.0);
+    // 0.5 m at 0.5 s, then 2 m/s
+    assert!((of("position").time - 0.7).abs() < 1e-9);
+    assert_eq!(found.violations[0].what, "effort");
+    let cart = &found.joints[0];
+    assert!((cart.peak.0, cart.unit, cart.power) == (8.0, "N", 16.0));
+    // ½ m v² given, and taken back
+    assert!((cart.given - 4.0).abs() < 1e-2 && (cart.taken - 4.0).abs() < 1e-2, "{cart:?}");
+}
+
+#[test]
+fn joints_lead_a_frame_along_its_path() {
+    let model = arm();
+    let tip = model.frame("tip").unwrap();
+    let start = [0.2, -0.4, 0.9];
+    let p = forward_kinematics(&model, &start, &[tip])[0].translation.to_array();
+    let to = vec![p[0] - 0.1, p[1] + 0.15, p[2] + 0.05];
+    let path = Motion::quintic(&[0.0, 1.0], &[p.to_vec(), to.clone()]).unwrap();
+    let motion = joint_motion(&model, tip, &path, &start, false, 0.01).unwrap();
+    for k in 0..=97 {
+        let t = f64::from(k) / 97.0;
+        let (q, ..) = motion.at(t);
+        let found = forward_kinematics(&model, &q, &[tip])[0].translation.to_array();
+        for (found, wanted) in found.iter().zip(path.at(t).0) {
+            // splines between samples 0.01 s apart: h⁴ of a smooth motion
+            assert!((found - wanted).abs() < 1e-6, "t = {t}: {found} {wanted}");
+        }
+    }
+    let far = Motion::quintic(&[0.0, 1.0], &[p.to_vec(), vec![3.0, 0.0, 0.0]]).unwrap();
+    assert!(matches!(joint_motion(&model, tip, &far, &start, false, 0.01), Err(NoPath::OutOfReach { .. })));
+}
