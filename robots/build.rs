@@ -13,6 +13,11 @@ fn main() -> Result<(), Error> {
     Builder::new("descriptions/puma560.urdf").build()?;
     // the file has 1.57079632679 for π/2
     Builder::new("descriptions/ur5.urdf").frames(["tool0"]).angle_tolerance(1e-11).build()?;
+    Builder::new("descriptions/ur5.urdf")
+        .angle_tolerance(1e-11)
+        .scene_file("scenes/ur5_contact_tasks.toml")
+        .module("ur5_contact")
+        .build()?;
     let panda = || Builder::new("descriptions/panda.urdf").frames(["panda_hand_tcp"]);
     panda().build()?;
     panda().module("panda_single").scalar(Scalar::F32).build()?;

@@ -161,3 +161,111 @@ fn surface_scene(surface: &str) -> String {
     // at rest: where ṡ is not zero, s̈ of a distance and of a first-order distance differ
     format!("{}{surface}[zero]\nqd = true\n", self::surface("tool0"))
 }
+
+/// The results of a function of the first mode by the name of the output; inputs by name.
+fn run(
+    options: &Options,
+    robot: &Robot,
+    function: ContactFunction,
+    inputs: &[(&str, &[f64])],
+) -> Vec<(String, Vec<f64>)> {
+    let modes = Mode::all(&options.scene);
+    let graph = graph(robot, options, &modes[0], function);
+    let given = graph.inputs.iter().flat_map(|port| {
+        let found = inputs.iter().find(|(name, _)| *name == port.name);
+        found.unwrap_or_else(|| panic!("the input {} is missing", port.name)).1.to_vec()
+    });
+    let results = expr::evaluate::<f64>(&graph, &given.collect::<Vec<f64>>());
+    let mut rest = &results[..];
+    let output = |port: &expr::Port| {
+        let (own, after) = rest.split_at(port.len());
+        rest = after;
+        (port.name.clone(), own.to_vec())
+    };
+    graph.outputs.iter().map(output).collect()
+}
+
+fn result<'a>(results: &'a [(String, Vec<f64>)], name: &str) -> &'a [f64] {
+    &results.iter().find(|(n, _)| n == name).unwrap_or_else(|| panic!("no result {name}")).1
+}
+
+#[test]
+fn drives_for_a_wanted_motion_and_wanted_reactions_make_them() {
+    for (robot, frame, n) in [("ur5.urdf", "tool0", 6), ("panda.urdf", "panda_hand_tcp", 7)] {
+        let options = options(&surface(frame).replace("contact = [\"forward_dynamics\"]\n", ""));
+        let robot = loaded(robot, &options);
+        let state = state(n);
+        let (q, qd) = (&state[..n], &state[n..2 * n]);
+        let (sdd, force, rest) = ([0.3, -0.7, 0.4, 0.2, -0.5], [25.0], vec![0.1; n]);
+        let inputs: [(&str, &[f64]); 5] = [("q", q), ("qd", qd), ("qdd", &rest), ("sdd_free", &sdd), ("force", &force)];
+        let drives = run(&options, &robot, ContactFunction::InverseDynamics, &inputs);
+        let tau = result(&drives, "tau");
+        let motion = run(&options, &robot, ContactFunction::ForwardDynamics, &[("q", q), ("qd", qd), ("tau", tau)]);
+        assert!((result(&motion, "force")[0] - 25.0).abs() < 1e-9, "{motion:?}");
+        assert!(result(&motion, "violation")[0].abs() < 1e-11);
+        let free = run(&options, &robot, ContactFunction::FreeCoordinates, &[("q", q), ("qd", qd)]);
+        let (j, a, qdd) = (result(&free, "j"), result(&free, "a"), result(&motion, "qdd"));
+        for (k, wanted) in sdd.iter().enumerate() {
+            let found = a[k] + (0..n).map(|i| j[k * n + i] * qdd[i]).sum::<f64>();
+            assert!((found - wanted).abs() < 1e-9, "s̈ {k}: {found} for {wanted}");
+        }
+    }
+}
+
+#[test]
+fn a_mode_may_stick_or_slide_on_several_contacts_and_a_loop_may_close() {
+    // an arm whose hand slides on a table by friction while its slider is held to a point of the hand's frame's axis
+    let scene = r#"
+[outputs]
+functions = []
+
+[[contact]]
+name = "table"
+frame = "tool0"
+object = { origin = [0.4, 0.0, 0.1], z = [0.0, 0.0, 1.0] }
+constrained = ["pz"]
+friction = { coefficient = 0.3 }
+
+[[contact]]
+name = "wall"
+frame = "wrist_1_link"
+object = { origin = [0.4, 0.4, 0.1], z = [0.0, -1.0, 0.0] }
+constrained = ["pz"]
+
+[[mode]]
+name = "sliding"
+contacts = ["table", "wall"]
+
+[[mode]]
+name = "sticking"
+contacts = ["table"]
+sticking = ["table"]
+
+[stabilisation]
+frequency = 40.0
+"#;
+    let generated = generated("ur5.urdf", scene);
+    for text in [
+        "pub enum Mode",
+        "Sliding,",
+        "Sticking,",
+        "[&str; 2] = [\"table.pz\", \"wall.pz\"]",
+        "[&str; 3] = [\"table.px\", \"table.py\", \"table.pz\"]",
+        "pub const MOST_CONSTRAINED: usize = 3;",
+    ] {
+        assert!(generated.text.contains(text), "{text} is missing");
+    }
+    let options = options(scene);
+    let robot = loaded("ur5.urdf", &options);
+    let state = state(6);
+    let (q, qd, tau) = (&state[..6], &state[6..12], &state[12..]);
+    let motion = run(&options, &robot, ContactFunction::ForwardDynamics, &[("q", q), ("qd", qd), ("tau", tau)]);
+    let coordinates = run(&options, &robot, ContactFunction::ConstrainedCoordinates, &[("q", q), ("qd", qd)]);
+    // Baumgarte's s̈, whatever friction does
+    for k in 0..2 {
+        let (s, sd) = (result(&coordinates, "s")[k], result(&coordinates, "sd")[k]);
+        let wanted = -80.0 * sd - 1600.0 * s;
+        let found = result(&motion, "sdd")[k];
+        assert!((found - wanted).abs() < 1e-9 * wanted.abs(), "{found} for {wanted}");
+    }
+}

@@ -110,6 +110,12 @@ pub mod ur5 {
     include!(concat!(env!("OUT_DIR"), "/ur5.rs"));
 }
 
+/// The UR5 in contact: what the four tasks of the example `contact_tasks` take (`scenes/ur5_contact_tasks.toml`).
+#[allow(clippy::all, clippy::pedantic)]
+pub mod ur5_contact {
+    include!(concat!(env!("OUT_DIR"), "/ur5_contact.rs"));
+}
+
 /// The Franka Emika Panda without fingers. 7 revolute joints, nq = nv = 7. In f64; in f32: [`panda::single`].
 ///
 /// Description: `descriptions/panda.urdf`, the numbers of the public description in the example-robot-data package.

@@ -2,12 +2,13 @@
 //! wholly redundant.
 
 use straightline_core::algorithms::{
-    bias_force, constrained_coordinates, constrained_forward_dynamics, impact, inverse_dynamics, kinetic_energy,
-    mass_matrix, potential_energy, projection, ConstrainedMotion, Environment, FunctionalCoordinates, Ltdl,
-    SpringDamper, Struck, Support,
+    applied_rows, bias_force, constrained_coordinates, constrained_forward_dynamics, functional_coordinates, impact,
+    inverse_dynamics, kinetic_energy, mass_matrix, potential_energy, projection, relative_motion, ConstrainedMotion,
+    Environment, FunctionalCoordinates, Ltdl, SpringDamper, Struck, Support,
 };
-use straightline_core::contact::{Contact, Coordinate, Object, Surface};
+use straightline_core::contact::{Contact, Coordinate, Friction, Object, Surface};
 use straightline_core::model::{Body, Frame, Joint, JointEffects, JointKind, Limits, Model};
+use straightline_core::phases::{ContactTask, Simulation};
 use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
 use Coordinate::{Px, Py, Pz};
 
@@ -382,4 +383,105 @@ fn a_parallelogram_turns_as_its_closed_form() {
     for (qdd, sign) in m.qdd.iter().zip([1.0, -1.0, 1.0]) {
         assert!((qdd - sign * expected).abs() < 1e-12 * expected.abs(), "{:?} against {expected}", m.qdd);
     }
+}
+
+/// A block of 2 kg that slides in the x-z plane: two prismatic joints without mass between them.
+fn block() -> Model<f64> {
+    let turned = |x: Vec3<f64>, y: Vec3<f64>, z: Vec3<f64>| Transform {
+        rotation: Mat3::from_columns(x, y, z),
+        translation: Vec3::zero(),
+    };
+    let (x, y, z) = (Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::unit_z());
+    let mut model = chain(2);
+    // z along x of the world; then z along its z
+    model.bodies[0] = body("slide", JointKind::Prismatic, None, 0, turned(-z, y, x), 0.0);
+    model.bodies[0].inertia = SpatialInertia::zero();
+    model.bodies[1] = body("block", JointKind::Prismatic, Some(0), 1, turned(z, y, -x), 2.0);
+    model.gravity = Vec3::new(0.0, 0.0, -GRAVITY);
+    model.frames = vec![Frame { name: "sole".into(), body: Some(1), placement: Transform::identity() }];
+    model
+}
+
+/// A block on a slope of this angle, with friction μ = 0.3 that is full above 1 µm/s.
+fn slope(angle: f64) -> (Model<f64>, Contact<f64>) {
+    let model = block();
+    let (s, c) = angle.sin_cos();
+    let rotation = Mat3::from_columns(Vec3::new(c, 0.0, s), Vec3::new(0.0, 1.0, 0.0), Vec3::new(-s, 0.0, c));
+    let pose = Transform { rotation, translation: Vec3::zero() };
+    let sole = contact(&model, 0, pose, &[Pz]);
+    (model, Contact { friction: Some(Friction { coefficient: 0.3, speed: 1e-6 }), ..sole })
+}
+
+fn sliding(model: &Model<f64>, sole: &Contact<f64>, q: &[f64], qd: &[f64]) -> ConstrainedMotion<f64> {
+    let relative = relative_motion(model, sole, q, qd);
+    let s = functional_coordinates(sole, &relative, &sole.constrained);
+    let drive: Vec<f64> = bias_force(model, q, qd).iter().map(|h| -h).collect();
+    let rows = applied_rows(sole, &relative, &s);
+    constrained_forward_dynamics(&factor(model, q), &drive, &s, Some(&rows), &[Support::Rigid(0.0)], RIDGE)
+}
+
+#[test]
+fn a_block_slides_down_a_slope_as_coulomb_says() {
+    for (speed, direction) in [(-0.7, -1.0), (0.7, 1.0)] {
+        let angle = 0.5f64;
+        let (model, sole) = slope(angle);
+        let (s, c) = angle.sin_cos();
+        let m = sliding(&model, &sole, &[0.0, 0.0], &[speed * c, speed * s]);
+        // along the slope, upwards positive: −g sin α ∓ μ g cos α
+        let along = m.qdd[0] * c + m.qdd[1] * s;
+        let expected = -GRAVITY * s - direction * 0.3 * GRAVITY * c;
+        assert!((along - expected).abs() < 1e-9, "{along} for {expected}");
+        assert!((m.force[0] - 2.0 * GRAVITY * c).abs() < 1e-9);
+    }
+}
+
+/// The block's phases: it slides up, and sticks where its speed along the slope has fallen to zero.
+struct Sliding {
+    model: Model<f64>,
+    sole: Contact<f64>,
+    stopped: f64,
+}
+
+impl ContactTask<4, 1> for Sliding {
+    /// Whether it sticks.
+    type Mode = bool;
+    fn rate(&mut self, sticks: bool, _: f64, x: &[f64; 4]) -> [f64; 4] {
+        let qdd = match sticks {
+            true => {
+                let held = Contact { constrained: vec![Px, Pz], friction: None, ..self.sole.clone() };
+                let s = coordinates(&self.model, &[held], &x[..2], &x[2..]);
+                let m = motion(&self.model, &s, &x[..2], &x[2..], &[0.0; 2]);
+                // within the cone of friction, so that it does stick: tan α < μ
+                assert!(m.force[0].abs() < 0.3 * m.force[1]);
+                m.qdd
+            }
+            false => sliding(&self.model, &self.sole, &x[..2], &x[2..]).qdd,
+        };
+        [x[2], x[3], qdd[0], qdd[1]]
+    }
+    fn guards(&mut self, sticks: bool, _: f64, x: &[f64; 4]) -> [f64; 1] {
+        [if sticks { f64::INFINITY } else { x[2] }]
+    }
+    fn event(&mut self, _: bool, _: usize, time: f64, x: &mut [f64; 4]) -> bool {
+        self.stopped = time;
+        (x[2], x[3]) = (0.0, 0.0);
+        true
+    }
+}
+
+#[test]
+fn a_block_that_slides_up_a_flat_slope_stops_in_time_and_sticks() {
+    let angle = 0.2f64; // tan 0.2 < 0.3
+    let (model, sole) = slope(angle);
+    let (s, c) = angle.sin_cos();
+    let mut task = Sliding { model, sole, stopped: 0.0 };
+    let mut simulation = Simulation { time: 0.0, mode: false, state: [0.0, 0.0, 0.8 * c, 0.8 * s] };
+    for _ in 0..5000 {
+        simulation.step(&mut task, 1e-4).expect("one event");
+    }
+    let expected = 0.8 / (GRAVITY * (s + 0.3 * c));
+    // the last of the four stages may see friction turned round already: a sixth of the step
+    assert!((task.stopped - expected).abs() < 1e-4 / 5.0, "{} for {expected}", task.stopped);
+    let way = 0.5 * 0.8 * expected;
+    assert!((simulation.state[0] - way * c).abs() < 1e-4 * 0.8 / 5.0 && simulation.state[2].abs() < 1e-9);
 }
