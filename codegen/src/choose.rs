@@ -7,7 +7,7 @@ use crate::compile::{candidate_counts, Optimisations, Options};
 use crate::expr::Counts;
 use crate::function::{Function, Robot};
 use crate::reduce::{lengths, reduce, Choice};
-use crate::scene::Gravity;
+use crate::scene::{Contacts, Gravity, Scene};
 use rustc_hash::{FxHashSet, FxHasher};
 use std::hash::{Hash, Hasher};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -48,7 +48,9 @@ pub fn choose(
     let search = |function: Function| {
         // the search is for torques or the mass matrix, whatever becomes of forward dynamics
         let optimisations = Optimisations { cheaper: false, ..optimisations };
-        let key = format!("{function:?} {:?} {optimisations:?}", options.scene);
+        // contacts leave torques and H as they are
+        let scene = Scene { contacts: Contacts::default(), ..options.scene.clone() };
+        let key = format!("{function:?} {scene:?} {optimisations:?}");
         robot.found.or_search(key, || improved(robot, frames, function, options, optimisations))
     };
     match function {

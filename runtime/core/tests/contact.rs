@@ -165,7 +165,7 @@ fn projection_holds_the_constraint() {
     assert!(projected < 1e-12 && projected <= free, "projected {projected:.1e} m, without {free:.1e} m");
 }
 
-/// `cargo test --release -p straightline-core --features reference --test contact -- --ignored --nocapture`
+/// `cargo test --release -p straightline-core --features alloc --test contact -- --ignored --nocapture`
 #[test]
 #[ignore = "a million steps, twice"]
 fn drift_over_a_million_steps() {

@@ -8,6 +8,7 @@ use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
 use straightline_codegen::description::{Description, Ignored};
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
+use straightline_codegen::expr::Counts;
 use straightline_codegen::model::SpecialAngle;
 use straightline_codegen::report::waterfall::{signed, Waterfall};
 use straightline_codegen::report::Report;
@@ -102,6 +103,12 @@ pub fn report(report: &Report) -> io::Result<()> {
             "{name:<20}{:>8}{:>8}{:>8}{:>6}{:>6}{:>8}{:>6}{:>7}{:>8}",
             f.mul, f.add, f.fma, f.div, f.sqrt, f.sincos, f.max_live, f.parts, f.lines
         )?;
+    }
+    for (k, c) in report.contact.iter().enumerate() {
+        let Counts { mul, add, fma, div, sqrt, sin_cos } = c.counts;
+        let name = format!("{}::{}", c.mode, c.function);
+        let start = if k == 0 { "\nin contact\n" } else { "" };
+        writeln!(out, "{start}{name:<40}{mul:>8}{add:>8}{fma:>8}{div:>6}{sqrt:>6}{sin_cos:>8}")?;
     }
     if let Some(staged) = &report.staged {
         writeln!(out)?;
