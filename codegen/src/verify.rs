@@ -406,6 +406,13 @@ impl Truth<'_> {
             Jacobian => per_frame(&|f| reference::frame_jacobian(tree, f, q).transpose().as_slice().to_vec(), &|r| {
                 [vec![r.length.max(1.0); 3 * qd.len()], vec![1.0; 3 * qd.len()]].concat()
             }),
+            KinematicsAndJacobian => {
+                let (mut values, mut scales) = self.outputs(ForwardKinematics);
+                let jacobian = self.outputs(Jacobian);
+                values.extend(jacobian.0);
+                scales.extend(jacobian.1);
+                (values, scales)
+            }
             InverseDynamics => {
                 let mut forces = reference::inverse_dynamics(tree, q, qd, qdd).as_slice().to_vec();
                 let mut scales = force_scale(qd, qdd);

@@ -162,7 +162,7 @@ impl Robot {
             Function::Energy => "energy",
             Function::JointWrenches => "wrench",
             Function::ForwardKinematics => "fk",
-            Function::Jacobian => "jacobian",
+            Function::Jacobian | Function::KinematicsAndJacobian => "jacobian",
             Function::JacobianBias | Function::FrameVelocity | Function::FrameAcceleration => "jdqd",
             Function::CentreOfMass | Function::Momentum => "energy",
         };
@@ -246,6 +246,13 @@ impl Robot {
                 }
                 Some(expected)
             }
+            Function::KinematicsAndJacobian => {
+                let mut both = self.expected(state, Function::ForwardKinematics)?;
+                let jacobian = self.expected(state, Function::Jacobian)?;
+                both.values.extend(jacobian.values);
+                both.scales.extend(jacobian.scales);
+                Some(both)
+            }
             Function::CentreOfMass | Function::Momentum => None,
         }
     }
@@ -275,7 +282,10 @@ impl State {
             InverseDynamics | JointWrenches | FrameAcceleration => Some(&self.qdd),
             _ => None,
         };
-        let position_only = matches!(function, ForwardKinematics | Jacobian | GravityForce | MassMatrix | CentreOfMass);
+        let position_only = matches!(
+            function,
+            ForwardKinematics | Jacobian | KinematicsAndJacobian | GravityForce | MassMatrix | CentreOfMass
+        );
         let middle = (!position_only).then_some(&self.qd);
         [Some(&self.q), middle, last].into_iter().flatten().cloned().collect()
     }

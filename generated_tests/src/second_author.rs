@@ -16,7 +16,8 @@ pub fn value(tree: &MassCentreTree<Dd>, frames: &[String], function: Function, i
     let q = &inputs[0][..];
     let rest = vec![Dd::ZERO; tree.nv()];
     let arg = |i: usize| &inputs[i][..];
-    let frames = || frames.iter().map(|n| tree.frame(n).unwrap_or_else(|| panic!("the reference has no frame {n}")));
+    let names = frames;
+    let frames = || names.iter().map(|n| tree.frame(n).unwrap_or_else(|| panic!("the reference has no frame {n}")));
     let natural = |tree: &MassCentreTree<Dd>, qd: &[Dd], qdd: &[Dd]| -> Vec<f64> {
         chapter::natural_scale(tree, q, qd, qdd).iter().map(|x| x.to_f64()).collect()
     };
@@ -96,6 +97,13 @@ pub fn value(tree: &MassCentreTree<Dd>, frames: &[String], function: Function, i
                 list(&DMatrix::from_fn(j.ncols(), 6, |column, row| j[(row, column)]))
             }),
         ),
+        KinematicsAndJacobian => {
+            let mut both = value(tree, names, ForwardKinematics, inputs);
+            let jacobian = value(tree, names, Jacobian, inputs);
+            both.values.extend(jacobian.values);
+            both.scales.extend(jacobian.scales);
+            both
+        }
         JacobianBias => {
             groups(speed(arg(1)).powi(2), frames().map(|f| list(&chapter::frame_jacobian_bias(tree, f, q, arg(1)))))
         }

@@ -46,6 +46,8 @@ pub enum Function {
     CentreOfMass,
     /// Linear and angular momentum.
     Momentum,
+    /// Poses and Jacobians of the frames.
+    KinematicsAndJacobian,
 }
 
 /// How forward dynamics is computed.
@@ -178,6 +180,21 @@ const TABLE: &[Entry] = &[
     },
 ];
 
+/// Several functions in one, for callers that need all of them at the same inputs: what they share is computed once.
+const COMBINATIONS: &[(Entry, &[Function])] = &[(
+    Entry {
+        function: Function::KinematicsAndJacobian,
+        name: "kinematics_and_jacobian",
+        summary: "Poses and geometric Jacobians of the frames, at the cost of little more than one of them.",
+        inputs: &["q"],
+        outputs: &[
+            ("x", "per frame of [`FRAME_NAMES`]: position p \\[m\\] (3), then orientation R by rows (9); R's columns are the frame's axes"),
+            ("j", "per frame: 6 rows (3 linear at the frame's origin, 3 angular; world axes) of one column per velocity coordinate"),
+        ],
+    },
+    &[Function::ForwardKinematics, Function::Jacobian],
+)];
+
 const INPUT_DOCS: &[(&str, &str)] = &[
     ("q", "configuration \\[rad or m\\]"),
     ("qd", "velocities \\[rad/s or m/s\\]"),
@@ -197,7 +214,7 @@ fn length<T: Real>(input: &str, model: &Model<T>) -> usize {
 
 /// The rows of every family, in the order in which functions stand in generated files.
 fn table() -> impl Iterator<Item = &'static Entry> {
-    TABLE.iter()
+    TABLE.iter().chain(COMBINATIONS.iter().map(|(entry, _)| entry))
 }
 
 impl Function {
@@ -211,9 +228,9 @@ impl Function {
         table().map(|e| e.function)
     }
 
-    /// All that a robot has.
+    /// All that a robot has. Combinations are made for whoever names them.
     pub fn of<T: Real>(model: &Model<T>) -> impl Iterator<Item = Function> + '_ {
-        Function::known().filter(|f| f.is_of(model))
+        Function::known().filter(|f| f.is_of(model) && f.members().is_empty())
     }
 
     /// Those that are meant by a list: [`Function::all`] stands for all that the robot has.
@@ -227,6 +244,11 @@ impl Function {
     /// Whether a robot has what the function is about.
     pub fn is_of<T: Real>(self, _model: &Model<T>) -> bool {
         true
+    }
+
+    /// The functions that it combines; none for a plain one.
+    pub fn members(self) -> &'static [Function] {
+        COMBINATIONS.iter().find(|(entry, _)| entry.function == self).map_or(&[], |(_, members)| members)
     }
 
     /// The function of that name.
@@ -252,6 +274,7 @@ impl Function {
     pub fn is_per_frame(self) -> bool {
         use Function::*;
         matches!(self, ForwardKinematics | FrameVelocity | FrameAcceleration | Jacobian | JacobianBias)
+            || self.members().iter().any(|f| f.is_per_frame())
     }
 
     /// Its inputs for a robot.
@@ -273,6 +296,9 @@ impl Function {
             Energy => &[2],
             CentreOfMass => &[3],
             Momentum => &[6],
+            KinematicsAndJacobian => {
+                return self.members().iter().flat_map(|f| f.outputs(model, frames)).collect();
+            }
         };
         vec![Port::new(self.entry().outputs[0].0, shape)]
     }
@@ -288,6 +314,10 @@ impl Function {
         }
         for (name, text) in entry.outputs {
             doc.push_str(&format!("* `{name}`: {text}\n"));
+        }
+        let of_matrices = [Function::MassMatrix, Function::Jacobian, Function::KinematicsAndJacobian];
+        if scene.by_columns && of_matrices.contains(&self) {
+            doc.push_str("\nThe matrix is written column after column: its first index is the column's.\n");
         }
         if let Some(selection) = scene.outputs.get(&self) {
             for (what, names) in [("joints", &selection.joints), ("frames", &selection.frames)] {
@@ -342,6 +372,10 @@ impl Function {
             Momentum => {
                 let m = alg::momentum(model, q, arg(1));
                 m.linear.to_array().into_iter().chain(m.angular.to_array()).collect()
+            }
+            KinematicsAndJacobian => {
+                let of = |f: &Function| f.evaluate(model, frames, method, inputs);
+                self.members().iter().flat_map(of).collect()
             }
         }
     }

@@ -87,9 +87,30 @@ impl Scene {
     /// The wanted results of a function, as indices into the whole of its outputs, and the blocks that they form.
     pub fn select(&self, function: Function, model: &Model<Dd>, frames: usize) -> (Vec<usize>, Vec<Port>) {
         let blocks = function.outputs(model, frames);
-        let [whole] = &blocks[..] else { return ((0..blocks.iter().map(Port::len).sum()).collect(), blocks) };
-        let all = Selection::default();
-        let selection = self.outputs.get(&function).unwrap_or(&all);
+        let selection = self.outputs.get(&function).cloned().unwrap_or_default();
+        let members = match function.members() {
+            [] if blocks.len() > 1 => return ((0..blocks.iter().map(Port::len).sum()).collect(), blocks),
+            [] => &[function],
+            members => members,
+        };
+        let (mut indices, mut ports, mut first) = (Vec::new(), Vec::new(), 0);
+        for (member, block) in members.iter().zip(&blocks) {
+            let (wanted, port) = self.select_block(*member, &selection, model, block);
+            indices.extend(wanted.into_iter().map(|k| first + k));
+            ports.push(port);
+            first += block.len();
+        }
+        (indices, ports)
+    }
+
+    /// Of the one block of results of a plain function, what a selection wants, in the order of matrices that is asked for.
+    fn select_block(
+        &self,
+        function: Function,
+        selection: &Selection,
+        model: &Model<Dd>,
+        whole: &Port,
+    ) -> (Vec<usize>, Port) {
         let coordinates = selection.coordinates(model);
         let (rows, columns, name) = (whole.shape[0], whole.shape.get(1).copied().unwrap_or(1), &whole.name);
         use Function::*;
@@ -99,6 +120,10 @@ impl Scene {
             }
             MassMatrix if selection.part == Part::Diagonal => {
                 (coordinates.iter().map(|i| i * columns + i).collect(), vec![coordinates.len()])
+            }
+            MassMatrix if self.by_columns => {
+                let entries = coordinates.iter().flat_map(|j| (0..rows).map(move |i| i * columns + j));
+                (entries.collect(), vec![coordinates.len(), rows])
             }
             MassMatrix => {
                 let entries = (0..rows).flat_map(|i| coordinates.iter().map(move |j| i * columns + j));
@@ -117,6 +142,12 @@ impl Scene {
                 let entries = (0..rows).flat_map(|f| part.clone().map(move |k| f * columns + k));
                 (entries.collect(), vec![rows, part.len()])
             }
+            Jacobian if self.by_columns => {
+                let (part, nv) = (&selection.part.of(0..6, 3), whole.shape[2]);
+                let column = |f: usize, j: usize| part.clone().map(move |k| (f * 6 + k) * nv + j);
+                let entries = (0..rows).flat_map(|f| coordinates.iter().flat_map(move |j| column(f, *j)));
+                (entries.collect(), vec![rows, coordinates.len(), part.len()])
+            }
             Jacobian => {
                 let (part, nv) = (selection.part.of(0..6, 3), whole.shape[2]);
                 let row = |r: usize| coordinates.iter().map(move |j| r * nv + j);
@@ -124,8 +155,9 @@ impl Scene {
                 (entries.collect(), vec![rows, part.len(), coordinates.len()])
             }
             Energy | CentreOfMass | Momentum => ((0..whole.len()).collect(), whole.shape.clone()),
+            KinematicsAndJacobian => unreachable!("its members are selected from one by one"),
         };
-        (indices, vec![Port::new(name, &shape)])
+        (indices, Port::new(name, &shape))
     }
 
     /// The frames of a function: its own, or those of the whole program.

@@ -278,7 +278,7 @@ fn by_joints(function: Function) -> bool {
     use Function::*;
     match function {
         InverseDynamics | GravityForce | BiasForce | VelocityForce | ForwardDynamics => true,
-        MassMatrix | JointWrenches | Jacobian => true,
+        MassMatrix | JointWrenches | Jacobian | KinematicsAndJacobian => true,
         ForwardKinematics | FrameVelocity | FrameAcceleration | JacobianBias => false,
         Energy | CentreOfMass | Momentum => false,
     }

@@ -32,6 +32,8 @@ use straightline_core::model::{JointKind, Model};
 pub struct Scene {
     /// What of each function is wanted; a function that is not named is wanted whole.
     pub outputs: BTreeMap<Function, Selection>,
+    /// Whether the mass matrix and Jacobians are written column after column instead of row after row.
+    pub by_columns: bool,
     /// Gravity.
     pub gravity: Gravity,
     /// How the robot stands in the world.

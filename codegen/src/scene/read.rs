@@ -168,8 +168,10 @@ impl SceneReader<'_> {
 
     fn outputs(&mut self, table: &Table) {
         let names: Vec<&str> = Function::known().map(Function::name).collect();
-        self.reader.check_keys(table, &[&["functions", "staged", "contact"], &names[..]].concat());
+        self.reader.check_keys(table, &[&["functions", "staged", "matrices", "contact"], &names[..]].concat());
         self.file.scene.staged = self.reader.flag_at(table, "staged").is_some_and(|flag| flag.value);
+        let orders = [("by rows", false), ("by columns", true)];
+        self.file.scene.by_columns = self.reader.word_at(table, "matrices", &orders).is_some_and(|order| order.value);
         self.contact_functions(table);
         let mut functions: Vec<Function> = Vec::new();
         let mut all_are_known = true;

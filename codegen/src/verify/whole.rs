@@ -77,6 +77,10 @@ impl Coordinates {
             MassMatrix => v.iter().flat_map(|i| v.iter().map(move |j| i * n + j)).collect(),
             Jacobian => (0..6 * frames).flat_map(|row| v.iter().map(move |j| row * n + j)).collect(),
             JointWrenches => self.joints.iter().flat_map(|rank| 6 * rank..6 * rank + 6).collect(),
+            KinematicsAndJacobian => {
+                let poses = 12 * frames;
+                (0..poses).chain(self.results(Jacobian, frames)?.into_iter().map(|k| poses + k)).collect()
+            }
             // its results depend on which joints move: solved for these
             ForwardDynamics => return None,
             ForwardKinematics | FrameVelocity | FrameAcceleration | JacobianBias => return None,

@@ -1,0 +1,57 @@
+//! Several functions in one call, and matrices by columns: the same numbers as the plain functions, at other places or for
+//! fewer operations.
+
+use straightline_codegen::compile::{Options, Program};
+use straightline_codegen::scene::{Scene, Selection};
+use straightline_codegen::Function;
+use straightline_generated_tests::programs::{of_robot, options, run};
+use straightline_generated_tests::random::Random;
+use straightline_generated_tests::reference::{Robot, ROBOTS};
+
+/// The program of a function in a scene, and its results at an asymmetric configuration.
+fn results(robot: &Robot, function: Function, scene: Scene) -> (Program, Vec<f64>) {
+    let program = of_robot(robot, function, &Options { scene, ..options(robot) });
+    let mut random = Random(7);
+    let q = random.configuration(program.graph.inputs[0].len(), robot.floating);
+    let values = run(&program, &[q]);
+    (program, values)
+}
+
+#[test]
+fn poses_and_jacobians_in_one_call_are_those_of_two_calls_for_fewer_operations() {
+    for robot in ROBOTS.map(Robot::load) {
+        let (both, values) = results(&robot, Function::KinematicsAndJacobian, Scene::default());
+        let (poses, x) = results(&robot, Function::ForwardKinematics, Scene::default());
+        let (jacobians, j) = results(&robot, Function::Jacobian, Scene::default());
+        // sums may be taken in another order, where that lets the two share more
+        let largest = values.iter().fold(1.0, |a: f64, b| a.max(b.abs()));
+        for (both, one) in values.iter().zip(x.iter().chain(&j)) {
+            assert!((both - one).abs() <= 4.0 * f64::EPSILON * largest, "{}: {both:e} {one:e}", robot.name);
+        }
+        assert_eq!(values.len(), x.len() + j.len());
+        let [both, poses, jacobians] = [both, poses, jacobians].map(|p| p.graph.counts());
+        assert!(both.sin_cos <= poses.sin_cos.max(jacobians.sin_cos), "{}", robot.name);
+        assert!(both.flops() < poses.flops() + jacobians.flops(), "{}", robot.name);
+    }
+}
+
+#[test]
+fn a_matrix_by_columns_is_the_transposed_one() {
+    for robot in ROBOTS.map(Robot::load) {
+        let by_columns = Scene { by_columns: true, ..Scene::default() };
+        let (program, rows) = results(&robot, Function::Jacobian, Scene::default());
+        let (_, columns) = results(&robot, Function::Jacobian, by_columns.clone());
+        let [frames, six, nv] = program.graph.outputs[0].shape[..] else { panic!("a Jacobian per frame") };
+        for (f, k, i) in (0..frames).flat_map(|f| (0..six).flat_map(move |k| (0..nv).map(move |i| (f, k, i)))) {
+            assert_eq!(rows[(f * six + k) * nv + i], columns[(f * nv + i) * six + k], "{}", robot.name);
+        }
+        // of H, symmetric as a whole, the columns of one joint
+        let last = robot.joints.last().expect("a robot has joints").clone();
+        let one = Selection { joints: vec![last], ..Selection::default() };
+        let scene = Scene { outputs: [(Function::MassMatrix, one)].into(), ..Scene::default() };
+        let (_, rows) = results(&robot, Function::MassMatrix, scene.clone());
+        let (program, column) = results(&robot, Function::MassMatrix, Scene { by_columns: true, ..scene });
+        assert_eq!(program.graph.outputs[0].shape, [1, nv]);
+        assert_eq!(rows, column, "{}: one column has no order of rows and columns", robot.name);
+    }
+}
