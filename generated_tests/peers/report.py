@@ -1,0 +1,198 @@
+"""The record of a run of the peers: report.py WORK RECORD writes RECORD.md and RECORD.svg.
+
+WORK is the harness's scratch folder with results.tsv and peak.tsv. Ratios are quotients of medians of ratios that the harness
+measured back to back with its reference, so that a change of the machine's clock does not enter."""
+
+import os
+import subprocess
+import sys
+
+GENERATED = ["casadi", "casadi_fast", "casadi_cse", "casadi_clang", "cppadcg"]
+OURS = ["straightline", "straightline_fma", "straightline_portable"]
+FUNCTIONS = {"id": "inverse dynamics", "crba": "mass matrix", "aba": "forward dynamics",
+             "fkjac": "forward kinematics + Jacobian"}
+ARMS = ["ur5", "puma560", "panda", "iiwa"]
+# what is aimed at: time relative to the best generated C, and to Pinocchio by clang
+AIMS = {"id": {"arm": (0.50, 0.165), "hyq": (0.55, 0.22), "talos": (0.60, 0.35)},
+        "crba": {"arm": (0.55, 0.20), "hyq": (0.65, 0.31), "talos": (0.70, 0.45)},
+        "aba": {"arm": (0.60, 0.165), "hyq": (0.40, 0.23), "talos": (0.50, 0.32)},
+        "fkjac": {"arm": (0.80, 0.31), "hyq": (0.80, None), "talos": (0.80, None)}}
+LATENCY_AIM = 0.65  # inverse dynamics of arms, each call waiting for the last
+BATCH_AIMS = {"arm": 8.0, "hyq": 6.0}  # states per second relative to the best generated C, AVX-512
+
+
+def rows(path):
+    with open(path) as file:
+        return [line.rstrip("\n").split("\t") for line in file if line.strip()]
+
+
+def kind(robot):
+    return "arm" if robot in ARMS else robot
+
+
+def aims(function, robot):
+    return AIMS.get(function, {}).get(kind(robot), (None, None))
+
+
+class Run:
+    def __init__(self, work):
+        self.time, self.latency, self.batch = {}, {}, {}
+        for row in rows(os.path.join(work, "results.tsv")):
+            if row[0] in ("time", "lat") and row[4] != "FAIL":
+                table = self.time if row[0] == "time" else self.latency
+                # nanoseconds, ratio to the reference, its quartiles, difference
+                table.setdefault((row[1], row[2]), {})[row[3]] = tuple(float(row[k]) for k in (4, 6, 7, 8, 10))
+            elif row[0] in ("time", "lat"):
+                self.time.setdefault((row[1], row[2]), {})[row[3]] = None
+            elif row[0] == "batch":
+                self.batch.setdefault((row[1], row[2]), {})[(row[3], row[4])] = (float(row[6]), float(row[8]))
+        self.machine = {row[0]: row[1] for row in rows(os.path.join(work, "peak.tsv")) if len(row) > 1}
+
+    def robots(self):
+        return list(dict.fromkeys(robot for robot, _ in self.time))
+
+    def functions(self):
+        return [f for f in FUNCTIONS if any(g == f for _, g in self.time)]
+
+
+def measured(cells, names):
+    return [n for n in names if cells.get(n)]
+
+
+def best(cells, names):
+    """The fastest of these contenders, or None."""
+    return min(measured(cells, names), key=lambda n: cells[n][1], default=None)
+
+
+def comparison(cells, ours="straightline"):
+    """Time over that of the best generated C, its name, time over Pinocchio's, half the quartile distance."""
+    rival = best(cells, GENERATED)
+    if not cells.get(ours) or rival is None:
+        return None
+    mine = cells[ours]
+    spread = (mine[3] - mine[2]) / 2 / mine[1] + (cells[rival][3] - cells[rival][2]) / 2 / cells[rival][1]
+    return mine[1] / cells[rival][1], rival, mine[1], spread
+
+
+def verdict(value, aim):
+    if aim is None:
+        return ""
+    return f"{aim:g} {'holds' if value <= aim else '**missed**'}"
+
+
+def comparisons(out, table, title, aim_of):
+    out.append(f"\n## {title}\n")
+    out.append("| function | robot | ns | best generated C | ns | time / generated C | aim | time / Pinocchio | aim | difference |")
+    out.append("|---" * 10 + "|")
+    for (robot, function), cells in table.items():
+        found = comparison(cells)
+        if function not in FUNCTIONS or found is None:
+            continue
+        ratio, rival, to_reference, spread = found
+        aim, reference_aim = aim_of(function, robot)
+        out.append(f"| {FUNCTIONS[function]} | {robot} | {cells['straightline'][0]:.1f} | {rival} | {cells[rival][0]:.1f} "
+                   f"| {ratio:.3f} ± {spread * ratio:.3f} | {verdict(ratio, aim)} | {to_reference:.3f} "
+                   f"| {verdict(to_reference, reference_aim)} | {cells['straightline'][4]:.0e} |")
+
+
+def all_contenders(out, table, title):
+    names = list(dict.fromkeys(name for cells in table.values() for name in cells))
+    out.append(f"\n## {title}\n")
+    out.append("| robot | function | " + " | ".join(names) + " |")
+    out.append("|---" * (2 + len(names)) + "|")
+    for (robot, function), cells in table.items():
+        text = [f"{cells[n][0]:.1f}" if cells.get(n) else ("off" if n in cells else "") for n in names]
+        out.append(f"| {robot} | {function} | " + " | ".join(text) + " |")
+
+
+def batches(out, run):
+    if not run.batch:
+        return
+    peak = float(run.machine.get("fma_avx512_gflops", 0)) or float(run.machine.get("fma_avx2_gflops", 0))
+    out.append("\n## Batches, one core: ns per state\n")
+    out.append(f"States per second relative to the best generated C called in a loop. Peak of this core, measured: {peak:.0f} Gflop/s.\n")
+    out.append("| function | robot | ours | ns | best generated C, ns | times as many states per second | aim |")
+    out.append("|---" * 7 + "|")
+    for (robot, function), cells in run.batch.items():
+        generated = [cells[(n, "loop")][0] for n in GENERATED if (n, "loop") in cells]
+        if not generated:
+            continue
+        for (name, mode), (nanoseconds, _) in cells.items():
+            if name not in OURS:
+                continue
+            gain = min(generated) / nanoseconds
+            aim = BATCH_AIMS.get(kind(robot)) if mode == "soa" and name != "straightline_portable" else None
+            said = "" if aim is None else f"{aim:g} {'holds' if gain >= aim else '**missed**'}"
+            out.append(f"| {FUNCTIONS.get(function, function)} | {robot} | {name}, {mode} | {nanoseconds:.1f} | {min(generated):.1f} | {gain:.2f} | {said} |")
+
+
+def picture(run, path):
+    try:
+        import matplotlib
+    except ImportError:
+        print("peers: no matplotlib, no picture", file=sys.stderr)
+        return
+    matplotlib.use("svg")
+    matplotlib.rcParams.update({"svg.hashsalt": "peers", "font.size": 9, "svg.fonttype": "none",
+                                "font.family": "sans-serif"})
+    from matplotlib import pyplot
+    shown = [("Straightline", "#0b6e4f", lambda cells: "straightline"),
+             ("best generated C (CasADi, CppADCodeGen)", "#e09f3e", lambda cells: best(cells, GENERATED)),
+             ("Pinocchio (C++)", "#5b7db1", lambda cells: "pin"),
+             ("MuJoCo", "#9a9a9a", lambda cells: "mujoco")]
+    longest = 16  # longer bars are cut
+    functions, robots = run.functions(), run.robots()
+    figure, axes = pyplot.subplots(1, len(functions), figsize=(3.6 * len(functions), 0.95 * len(robots) + 1.6), sharey=True,
+                                   squeeze=False)
+    for axis, function in zip(axes[0], functions):
+        for i, robot in enumerate(robots):
+            cells = run.time.get((robot, function), {})
+            if not cells.get("straightline"):
+                continue
+            for k, (label, colour, name_of) in enumerate(shown):
+                name = name_of(cells)
+                if name is None or not cells.get(name):
+                    continue
+                ratio = cells[name][1] / cells["straightline"][1]
+                y = i + (k - 1.5) * 0.21
+                axis.barh(y, min(ratio, longest), height=0.19, color=colour)
+                said = f"{cells[name][0]:.0f} ns" + ("" if k == 0 else f"  ×{ratio:.1f}")
+                axis.text(min(ratio, longest) + 0.1, y, said + (" →" if ratio > longest else ""), va="center", fontsize=7)
+        axis.set_title(FUNCTIONS[function], fontsize=10)
+        axis.axvline(1, color="#0b6e4f", linewidth=0.8, linestyle=":")
+        axis.set_xlim(0, 1.3 * longest)
+        axis.set_xlabel("time per call, Straightline = 1 (shorter is better)")
+        axis.spines[["top", "right"]].set_visible(False)
+    axes[0][0].set_yticks(range(len(robots)), robots)
+    axes[0][0].invert_yaxis()
+    handles = [pyplot.Rectangle((0, 0), 1, 1, color=colour) for _, colour, _ in shown]
+    figure.legend(handles, [label for label, _, _ in shown], loc="upper center", ncol=len(shown), frameon=False)
+    figure.tight_layout(rect=(0, 0, 1, 0.94))
+    figure.savefig(path, metadata={"Date": None})
+
+
+def main():
+    work, record = sys.argv[1:3]
+    run = Run(work)
+    here = os.path.dirname(os.path.abspath(__file__))
+    commit = subprocess.run(["git", "-C", here, "rev-parse", "--short", "HEAD"], capture_output=True, text=True).stdout.strip()
+    rustc = subprocess.run(["rustc", "--version"], capture_output=True, text=True).stdout.strip()
+    name = os.path.basename(record)
+    out = ["# Beside other systems", "",
+           f"`generated_tests/peers/run --harness DIR` at {commit}; {run.machine.get('cpu', '')}, {run.machine.get('clock_ghz', '?')} GHz while measuring; "
+           f"{rustc}; generated C by {run.machine.get('gcc', 'gcc')}, Pinocchio by {run.machine.get('pincxx', 'clang')}.", "",
+           "One process, one pinned core, 4096 states, another one at each call; thread CPU time, medians over rounds, each contender measured "
+           "back to back with Pinocchio. Every output of every contender is compared with Pinocchio's before it is timed: the last column, relative to the "
+           "largest entry. `straightline` is built with `-C target-cpu=native`, `straightline_portable` without; neither fuses a*b + c, and both give the same bits.",
+           "", f"![time per call]({name}.svg)"]
+    comparisons(out, run.time, "Calls that may overlap", aims)
+    comparisons(out, run.latency, "Latency: each call waits for the last",
+                lambda function, robot: (LATENCY_AIM if function == "id" and kind(robot) == "arm" else None, None))
+    batches(out, run)
+    all_contenders(out, run.time, "All contenders, ns per call")
+    with open(record + ".md", "w") as file:
+        file.write("\n".join(out) + "\n")
+    picture(run, record + ".svg")
+
+
+main()
