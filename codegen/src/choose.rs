@@ -5,7 +5,7 @@
 
 use crate::compile::{candidate_counts, Optimisations, Options};
 use crate::expr::Counts;
-use crate::function::{Function, Robot};
+use crate::function::{DriveFunction, Function, Robot};
 use crate::reduce::{lengths, reduce, Choice};
 use crate::scene::{Contacts, Gravity, Scene};
 use rustc_hash::{FxHashSet, FxHasher};
@@ -54,7 +54,7 @@ pub fn choose(
         robot.found.or_search(key, || improved(robot, frames, function, options, optimisations))
     };
     match function {
-        InverseDynamics => {
+        InverseDynamics | Drive(DriveFunction::InverseDynamics) => {
             let choice = search(InverseDynamics);
             robot.reduced_by(&choice, &choice)
         }
@@ -66,7 +66,11 @@ pub fn choose(
             let choice = search(MassMatrix);
             robot.reduced_by(&choice, &choice)
         }
-        ForwardDynamics => {
+        Drive(DriveFunction::Energy) => robot.clone(),
+        Drive(DriveFunction::CompleteModel | DriveFunction::StateSpace | DriveFunction::Power) => {
+            robot.reduced_by(&search(BiasForce), &search(MassMatrix))
+        }
+        ForwardDynamics | Drive(DriveFunction::ForwardDynamics | DriveFunction::Torques) => {
             let (torques, mass_matrix) = (search(BiasForce), search(MassMatrix));
             // articulated bodies share more with frames that turn
             let plain = Choice::plain(&robot.model);

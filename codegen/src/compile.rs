@@ -278,6 +278,17 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
         return Err(diagnostics);
     }
     let functions = Function::wanted(&options.functions, &model);
+    for function in functions.iter().filter(|f| !f.is_of(&model)) {
+        let complaint = scene::messages::function_not_of_robot(function.name(), model.drives.is_empty());
+        let path = match options.scene.outputs.contains_key(function) {
+            true => format!("outputs.{}", function.name()),
+            false => "outputs.functions".to_string(),
+        };
+        options.scene.places.complain(&path, complaint, &mut diagnostics);
+    }
+    if diagnostics.has_errors() {
+        return Err(diagnostics);
+    }
     let resolved = Options { scene: options.scene.resolved(&model), functions, ..options.clone() };
     demand_inertia(&model, &resolved, &mut diagnostics);
     if diagnostics.has_errors() {

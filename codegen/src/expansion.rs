@@ -103,6 +103,13 @@ pub fn associated_items(generated: &Generated) -> String {
     constant("UPPER_LIMITS", &numbers, "Greatest coordinate of every joint \\[rad or m\\]; without a floating base.");
     constant("VELOCITY_LIMITS", &numbers, "Greatest speed of every joint \\[rad/s or m/s\\]; without a floating base.");
     constant("EFFORT_LIMITS", &numbers, "Greatest drive of every joint \\[N·m or N\\]; without a floating base.");
+    if !model.drives.is_empty() {
+        let n = model.drives.len();
+        constant("NU", "usize", "Number of inputs u of the drives.");
+        constant("NX", "usize", "Number of states x of the drives.");
+        constant("DRIVE_NAMES", &format!("[&'static str; {n}]"), "Drives in the order of u.");
+        constant("DRIVE_STATES", &format!("[usize; {n}]"), "How many entries of x each drive has.");
+    }
     for item in &generated.items {
         let name = item.function.name();
         constant(&format!("{}_COST", name.to_uppercase()), "dynamics::Cost", &format!("What [`Self::{name}`] costs."));
@@ -117,7 +124,9 @@ pub fn associated_items(generated: &Generated) -> String {
         let signature: Vec<String> =
             parameters.clone().map(|(p, reference)| format!("{}: {reference}{}", p.name, array(p))).collect();
         let arguments: Vec<&str> = parameters.map(|(p, _)| p.name.as_str()).collect();
-        for line in item.doc.replace("[`FRAME_NAMES`]", "[`Self::FRAME_NAMES`]").lines() {
+        for line in
+            item.doc.replace("[`FRAME_NAMES`]", "[`Self::FRAME_NAMES`]").replace("[`DRIVE_", "[`Self::DRIVE_").lines()
+        {
             let _ = writeln!(out, "/// {line}");
         }
         let _ = writeln!(

@@ -10,7 +10,7 @@ use crate::emit::Scalar;
 use crate::expr::{evaluate, Graph};
 use crate::function::ForwardDynamicsMethod;
 use std::fmt;
-use straightline_core::model::{JointKind, Model};
+use straightline_core::model::{Joint, JointKind, Model};
 use straightline_core::{Dd, Real};
 
 /// The factorisation may lose so many times what articulated bodies lose: about half a decimal digit, which is how far two
@@ -23,6 +23,8 @@ pub const MOST_FOR_FACTORISATION: usize = 40;
 const STATES: usize = 6;
 /// How near \[rad or m\].
 const NEAR: f64 = 0.02;
+/// How far \[rad, rad/s\] springs of transmissions are stretched.
+const STRETCH: f64 = 1e-3;
 /// A joint without limits is tried within ± so much.
 const RANGE: f64 = std::f64::consts::PI;
 
@@ -119,9 +121,11 @@ fn errors_in<T: Real + Into<f64>>(model: &Model<Dd>, articulated: &Graph, factor
     for state in 0..3 * STATES {
         // both were traced with the same ports
         let inputs = &articulated.inputs;
-        let inputs: Vec<f64> =
-            inputs.iter().flat_map(|p| values(model, &p.name, p.len(), state % 3, &mut random)).collect();
-        let rounded: Vec<T> = inputs.into_iter().map(|x| T::constant(Dd::from(x))).collect();
+        let mut groups: Vec<(&str, Vec<f64>)> =
+            inputs.iter().map(|p| (p.name.as_str(), values(model, &p.name, p.len(), state % 3, &mut random))).collect();
+        settle(model, &mut groups, &mut random);
+        let inputs = groups.into_iter().flat_map(|(_, values)| values);
+        let rounded: Vec<T> = inputs.map(|x| T::constant(Dd::from(x))).collect();
         let wide: Vec<Dd> = rounded.iter().map(|x| Dd::from((*x).into())).collect();
         for (graph, worst) in [articulated, factorised].into_iter().zip(&mut worst) {
             let exact = evaluate(graph, &wide);
@@ -169,6 +173,29 @@ fn values(model: &Model<Dd>, port: &str, len: usize, kind: usize, random: &mut U
         // drives of the size of the weights
         _ => (0..len).map(|_| random.within(10.0)).collect(),
     }
+}
+
+/// Turns the shafts of elastic transmissions to where their springs are hardly stretched, as they are while a robot moves.
+fn settle(model: &Model<Dd>, groups: &mut [(&str, Vec<f64>)], random: &mut Uniform) {
+    let named = |name: &str, groups: &[(&str, Vec<f64>)]| groups.iter().find(|g| g.0 == name).map(|g| g.1.clone());
+    let (Some(q), Some(qd), Some(mut x)) = (named("q", groups), named("qd", groups), named("x", groups)) else {
+        return;
+    };
+    let mut first = 0;
+    for drive in &model.drives {
+        let own = drive.actuator.states();
+        let sum = |y: &[f64], index: fn(&Joint) -> usize| -> f64 {
+            drive.joints.iter().map(|(body, n)| n.to_f64() * y[index(&model.bodies[*body].joint)]).sum()
+        };
+        let mut shaft = [sum(&q, |j| j.iq), sum(&qd, |j| j.iv)];
+        for (k, stage) in drive.stages.iter().enumerate().rev() {
+            shaft = shaft.map(|y| stage.ratio.to_f64() * (y + random.within(STRETCH)));
+            let at = if k == 0 { first } else { first + own + 2 * (k - 1) };
+            x[at..at + 2].copy_from_slice(&shaft);
+        }
+        first += drive.states();
+    }
+    groups.iter_mut().filter(|g| g.0 == "x").for_each(|g| g.1.clone_from(&x));
 }
 
 /// Numbers that are the same everywhere (SplitMix64).

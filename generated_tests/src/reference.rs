@@ -94,13 +94,14 @@ pub fn description(name: &str) -> PathBuf {
     folder.join(format!("{name}.{extension}"))
 }
 
-fn json(path: &Path) -> Value {
+/// A file of the reference data.
+pub fn json(path: &Path) -> Value {
     let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
 /// All numbers in a JSON value, depth first.
-fn numbers(value: &Value) -> Vec<Dd> {
+pub fn numbers(value: &Value) -> Vec<Dd> {
     match value {
         Value::String(text) => vec![Dd::from_decimal(text).expect("a decimal number")],
         Value::Array(items) => items.iter().flat_map(numbers).collect(),
@@ -109,7 +110,7 @@ fn numbers(value: &Value) -> Vec<Dd> {
 }
 
 /// Inputs, which are exact f64 values.
-fn inputs(value: &Value) -> Vec<f64> {
+pub fn inputs(value: &Value) -> Vec<f64> {
     let parse = |x: &Value| x.as_str().expect("a decimal string").parse().expect("a number");
     value.as_array().expect("a list").iter().map(parse).collect()
 }
@@ -164,7 +165,7 @@ impl Robot {
             Function::ForwardKinematics => "fk",
             Function::Jacobian | Function::KinematicsAndJacobian => "jacobian",
             Function::JacobianBias | Function::FrameVelocity | Function::FrameAcceleration => "jdqd",
-            Function::CentreOfMass | Function::Momentum => "energy",
+            Function::CentreOfMass | Function::Momentum | Function::Drive(_) => "energy",
         };
         let pinocchio = self.baseline[key]["scaled"].as_f64().expect("the baseline has every robot and function");
         (20.0 * pinocchio).max(1e-14)
@@ -253,7 +254,7 @@ impl Robot {
                 both.scales.extend(jacobian.scales);
                 Some(both)
             }
-            Function::CentreOfMass | Function::Momentum => None,
+            Function::CentreOfMass | Function::Momentum | Function::Drive(_) => None,
         }
     }
 }

@@ -48,7 +48,7 @@ pub(super) fn is_mass_centre_notation(top: &Table) -> bool {
 
 /// Reads a chain. Complaints go to the reader's diagnostics.
 pub(super) fn read(reader: &mut Reader, top: &Table) -> Description {
-    reader.check_keys(top, &["name", "gravity", "base", "link"]);
+    reader.check_keys(top, &["name", "gravity", "base", "link", "drive"]);
     let name = match top.has("name") {
         true => reader.name_at(top, "name", "robot"),
         false => None,
@@ -71,6 +71,7 @@ pub(super) fn read(reader: &mut Reader, top: &Table) -> Description {
         gravity,
         base: None,
         notation: Notation::MassCentres(MassCentreNotation { base, links }),
+        drives: reader.drives_at(top),
         ignored: Vec::new(),
     }
 }

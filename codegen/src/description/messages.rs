@@ -67,6 +67,12 @@ pub const CODES: &[&str] = &[
     "alpha-missing",
     "alpha-on-revolute",
     "e-next-on-last",
+    "drive-number",
+    "drive-joint",
+    "drive-coupling",
+    "actuator-shape",
+    "actuator-inert",
+    "shaft-without-inertia",
 ];
 
 type D = Diagnostic;
@@ -560,4 +566,53 @@ pub fn alpha_on_revolute(joint: &str) -> D {
 pub fn e_next_on_last(link: &str, key: &str) -> D {
     D::warning("e-next-on-last", format!("`{key}` of the last link `{link}` is ignored"))
         .detail("there is no further joint")
+}
+
+/// A number of a drive that cannot be.
+pub fn drive_number(what: &str, value: f64, be: &str, help: &str) -> D {
+    D::error("drive-number", format!("{what} is {value:?}; it must be {be}")).help(help)
+}
+
+/// A drive of a joint that is not there, or does not move.
+pub fn drive_joint<'a>(owner: &str, joint: &str, joints: impl IntoIterator<Item = &'a str>) -> D {
+    let joints: Vec<&str> = joints.into_iter().collect();
+    let d = D::error("drive-joint", format!("{owner}: no moving joint is named `{}`", cut(joint)));
+    match did_you_mean(joint, joints.iter().copied()) {
+        Some(hint) => d.help(hint),
+        None => d.help(format!("there are {}", list(&joints))),
+    }
+}
+
+/// Drives whose ratios are dependent.
+pub fn drive_coupling(name: &str, joints: &[&str]) -> D {
+    D::error(
+        "drive-coupling",
+        format!("the ratios of drive `{}` and of those coupled with it are dependent", cut(name)),
+    )
+    .detail(format!("their matrix is singular: they turn together, whatever {} do", list(joints)))
+    .help("check signs and factors of `joints`, or leave a drive out")
+}
+
+/// A linear actuator whose matrices do not fit.
+pub fn actuator_shape(owner: &str, n: usize) -> D {
+    D::error("actuator-shape", format!("the matrices of the {owner} do not fit each other"))
+        .detail(format!(
+            "f has {n} entries: C must have as many rows and columns, and d, T and `position` as many entries"
+        ))
+        .help("one entry per state of the actuator")
+}
+
+/// A linear actuator that moves nothing, or that nothing moves.
+pub fn actuator_inert(owner: &str, what: &str, help: &str) -> D {
+    D::error("actuator-inert", format!("the actuator of {owner}: {what}")).help(help)
+}
+
+/// A shaft between two springs that has no inertia.
+pub fn shaft_without_inertia(name: &str) -> D {
+    D::error(
+        "shaft-without-inertia",
+        format!("drive `{}`: the shaft before this elastic stage has no inertia", cut(name)),
+    )
+    .detail("its acceleration would be torque over zero")
+    .help("give `input_inertia` or `output_inertia`, or join both springs: 1/c = 1/c₁ + 1/c₂")
 }

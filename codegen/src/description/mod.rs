@@ -6,6 +6,7 @@
 //! the whole robot (tree, inertias, angles) by `crate::model`.
 
 mod chapter;
+pub mod drives;
 pub mod messages;
 pub(crate) mod reader;
 pub(crate) mod table;
@@ -69,6 +70,8 @@ pub struct Description {
     pub base: Option<Value<BaseKind>>,
     /// The bodies.
     pub notation: Notation,
+    /// What drives the joints.
+    pub drives: Vec<drives::Drive>,
     /// What the file holds and the dynamics do not need.
     pub ignored: Vec<Ignored>,
 }

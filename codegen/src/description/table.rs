@@ -296,6 +296,17 @@ impl Reader<'_> {
         Some([numbers.next()?, numbers.next()?, numbers.next()?])
     }
 
+    /// Numbers in an array.
+    pub(super) fn row(&mut self, what: &str, value: &DeValue, span: &Span) -> Option<Vec<f64>> {
+        let DeValue::Array(array) = value else {
+            self.wrong_type(what, "numbers in an array", value, span);
+            return None;
+        };
+        let numbers: Vec<Option<f64>> =
+            array.iter().map(|item| self.real(what, item.get_ref(), &item.span(), Range64::Finite)).collect();
+        numbers.into_iter().collect()
+    }
+
     pub fn vector_at(&mut self, table: &Table, key: &str) -> Option<Value<[f64; 3]>> {
         let (value, span) = table.get(key)?;
         let [x, y, z] = self.triple(&table.what(key), value, &span)?;

@@ -68,13 +68,14 @@ pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Descriptio
         reader.complain(&(0..0), messages::unknown_format());
         return None;
     }
-    reader.check_keys(&top, &["robot", "link", "joint", "frame"]);
+    reader.check_keys(&top, &["robot", "link", "joint", "frame", "drive"]);
     let mut description = Description {
         format: Format::JointFrameToml,
         name: Value::assumed("robot".to_string()),
         gravity: None,
         base: None,
         notation: Notation::JointFrames(JointFrameNotation::default()),
+        drives: Vec::new(),
         ignored: Vec::new(),
     };
     reader.require(&top, "robot", "[robot]\\nname = \"...\"");
@@ -104,6 +105,7 @@ pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Descriptio
     for table in reader.tables_at(&top, "frame") {
         bodies.frames.extend(read_frame(&mut reader, table));
     }
+    description.drives = reader.drives_at(&top);
     description.notation = Notation::JointFrames(bodies);
     description.ignored = reader.into_ignored();
     Some(description)

@@ -226,6 +226,7 @@ fn read_document(mut reader: Reader, document: &Document) -> Option<Description>
         }
     }
     Some(Description {
+        drives: Vec::new(),
         format: Format::Urdf,
         name,
         gravity: None,

@@ -225,6 +225,7 @@ fn constants(out: &mut String, model: &Model<Dd>, frames: &[String], scalar: Sca
         let _ = writeln!(out, "/// {doc}{floating}; infinite where the robot file says nothing.");
         let _ = writeln!(out, "{ALLOW}\npub const {name}: [{t}; {n}] = [{values}];");
     }
+    drive_constants(out, model);
     if !with_costs {
         return;
     }
@@ -240,6 +241,23 @@ fn constants(out: &mut String, model: &Model<Dd>, frames: &[String], scalar: Sca
              /// Most values alive at once, inputs and constants not counted.\n    pub max_live: u32,\n\
          }\n",
     );
+}
+
+/// Numbers and names of the drives, if there are any.
+fn drive_constants(out: &mut String, model: &Model<Dd>) {
+    let drives = &model.drives;
+    if drives.is_empty() {
+        return;
+    }
+    let n = drives.len();
+    let names: Vec<&String> = drives.iter().map(|d| &d.name).collect();
+    let states: Vec<usize> = drives.iter().map(straightline_core::drive::Drive::states).collect();
+    let total: usize = states.iter().sum();
+    let _ = writeln!(out, "/// Number of inputs u of the drives.\npub const NU: usize = {n};");
+    let _ = writeln!(out, "/// Number of states x of the drives.\npub const NX: usize = {total};");
+    let _ = writeln!(out, "/// Drives in the order of u.\npub const DRIVE_NAMES: [&str; {n}] = {names:?};");
+    let _ =
+        writeln!(out, "/// How many entries of x each drive has.\npub const DRIVE_STATES: [usize; {n}] = {states:?};");
 }
 
 fn cost(f: &FunctionReport) -> String {

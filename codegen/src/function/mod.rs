@@ -1,5 +1,9 @@
 //! The functions that can be generated: a table of names, signatures and documentation, and the algorithm behind each.
 
+mod drives;
+
+pub use drives::{DriveFunction, HIGHER_RATES};
+
 use crate::choose::Found;
 use crate::emit::Scalar;
 use crate::expr::{Graph, Port, RuleSet};
@@ -7,6 +11,7 @@ use crate::forward_method::{self, MethodChoice};
 use crate::reduce::{reduce, Choice};
 use crate::scene::{Bound, Part, Scene};
 use crate::trace::{trace, Expr};
+use drives::Rigid;
 use straightline_core::algorithms as alg;
 use straightline_core::model::{Frame, Model};
 use straightline_core::reduced::ReducedModel;
@@ -48,6 +53,8 @@ pub enum Function {
     Momentum,
     /// Poses and Jacobians of the frames.
     KinematicsAndJacobian,
+    /// Of robots with drives.
+    Drive(DriveFunction),
 }
 
 /// How forward dynamics is computed.
@@ -208,13 +215,15 @@ fn length<T: Real>(input: &str, model: &Model<T>) -> usize {
     match input {
         "q" => model.nq(),
         "qd" | "qdd" | "tau" => model.nv(),
+        "x" => alg::drive_states(model),
+        "u" => model.drives.len(),
         _ => panic!("the input `{input}` has no length"),
     }
 }
 
 /// The rows of every family, in the order in which functions stand in generated files.
 fn table() -> impl Iterator<Item = &'static Entry> {
-    TABLE.iter().chain(COMBINATIONS.iter().map(|(entry, _)| entry))
+    TABLE.iter().chain(COMBINATIONS.iter().map(|(entry, _)| entry)).chain(drives::TABLE)
 }
 
 impl Function {
@@ -242,8 +251,20 @@ impl Function {
     }
 
     /// Whether a robot has what the function is about.
-    pub fn is_of<T: Real>(self, _model: &Model<T>) -> bool {
-        true
+    pub fn is_of<T: Real>(self, model: &Model<T>) -> bool {
+        match self {
+            Function::Drive(function) => function.is_of(model),
+            _ => true,
+        }
+    }
+
+    /// Whether it solves for accelerations.
+    pub fn is_forward(self) -> bool {
+        match self {
+            Function::ForwardDynamics => true,
+            Function::Drive(function) => function.solves(),
+            _ => false,
+        }
     }
 
     /// The functions that it combines; none for a plain one.
@@ -279,7 +300,11 @@ impl Function {
 
     /// Its inputs for a robot.
     pub fn inputs<T: Real>(self, model: &Model<T>) -> Vec<Port> {
-        self.entry().inputs.iter().map(|name| Port::new(name, &[length(name, model)])).collect()
+        let own = self.entry().inputs.iter().map(|name| Port::new(name, &[length(name, model)]));
+        match self {
+            Function::Drive(function) => own.chain(function.further_inputs(model)).collect(),
+            _ => own.collect(),
+        }
     }
 
     /// Its blocks of results for a robot and so many frames.
@@ -299,6 +324,10 @@ impl Function {
             KinematicsAndJacobian => {
                 return self.members().iter().flat_map(|f| f.outputs(model, frames)).collect();
             }
+            Drive(function) => {
+                let names = self.entry().outputs.iter().map(|block| block.0);
+                return names.zip(function.shapes(model)).map(|(name, shape)| Port::new(name, &shape)).collect();
+            }
         };
         vec![Port::new(self.entry().outputs[0].0, shape)]
     }
@@ -308,7 +337,7 @@ impl Function {
         let entry = self.entry();
         let mut doc = format!("{}\n\n", entry.summary);
         for port in inputs {
-            let known = INPUT_DOCS.iter().find(|(name, _)| *name == port.name);
+            let known = INPUT_DOCS.iter().chain(drives::INPUT_DOCS).find(|(name, _)| *name == port.name);
             let text = known.map_or("inertial parameters of a body that the robot carries", |(_, text)| text);
             doc.push_str(&format!("* `{}`: {text}\n", port.name));
         }
@@ -377,6 +406,7 @@ impl Function {
                 let of = |f: &Function| f.evaluate(model, frames, method, inputs);
                 self.members().iter().flat_map(of).collect()
             }
+            Drive(function) => function.evaluate(&Rigid { model, reduced: None }, method, inputs),
         }
     }
 
@@ -426,6 +456,7 @@ impl Function {
                     _ => alg::solve_articulated(model, q, &drive),
                 }
             }
+            Drive(function) => function.evaluate(&Rigid { model, reduced: Some((reduced, composite)) }, method, inputs),
             _ => return None,
         })
     }
@@ -472,8 +503,12 @@ impl Function {
                 wanted.iter().map(|k| results[*k]).collect()
             })
         };
-        match (self, method) {
-            (Function::ForwardDynamics, ForwardDynamicsMethod::Cheaper) => {
+        let has_two_forms = match self {
+            Function::Drive(f) => f.solves() && drives::may_be_articulated(&robot.model),
+            _ => self == Function::ForwardDynamics,
+        };
+        match method {
+            ForwardDynamicsMethod::Cheaper if has_two_forms => {
                 let articulated = trace_with(ForwardDynamicsMethod::ArticulatedBody);
                 let factorised = (robot.model.nv() <= forward_method::MOST_FOR_FACTORISATION)
                     .then(|| trace_with(ForwardDynamicsMethod::Factorisation));

@@ -30,6 +30,7 @@
 
 pub(crate) mod angle;
 mod check;
+pub(crate) mod drives;
 pub(crate) mod geometry;
 mod joint_frames;
 mod mass_centres;
@@ -135,18 +136,19 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
     check::motion(&assembly, description, diagnostics);
     add_frames(&mut assembly, options, tolerance, diagnostics);
     order_joints(&mut assembly.bodies, options, diagnostics);
-    if diagnostics.has_errors() {
-        return None;
-    }
     let gravity = options.gravity.or(description.gravity.as_ref().map(|g| g.value)).unwrap_or([0.0, 0.0, -9.81]);
-    let model = Model {
+    let mut model = Model {
         name: description.name.value.clone(),
         bodies: assembly.bodies,
         gravity: vector(gravity),
         frames: assembly.frames,
+        drives: Vec::new(),
     };
-    check::singular(&model, &assembly.joint_places, diagnostics);
-    Some(model)
+    if !diagnostics.has_errors() {
+        check::singular(&model, &assembly.joint_places, diagnostics);
+    }
+    drives::add(&description.drives, &mut model, diagnostics);
+    (!diagnostics.has_errors()).then_some(model)
 }
 
 /// The angles of a description that are taken as multiples of π/4 or π/6 and are not written exactly so.

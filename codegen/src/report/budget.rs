@@ -160,7 +160,7 @@ fn remedies(whole: &Model<Dd>, frames: &[String], function: Function, options: &
     if scene.gravity != Gravity::Constant([0.0; 3]) {
         candidates.push(("no gravity".to_string(), Scene { gravity: Gravity::Constant([0.0; 3]), ..scene.clone() }));
     }
-    let off = Effects { rotor_inertia: false, damping: false, coulomb: Coulomb::Off, springs: false };
+    let off = Effects { rotor_inertia: false, damping: false, coulomb: Coulomb::Off, springs: false, ..scene.effects };
     if scene.effects != off {
         candidates
             .push(("no friction, rotor inertia and springs".to_string(), Scene { effects: off, ..scene.clone() }));

@@ -86,7 +86,8 @@ enum What {
 
 /// The stops of a scene for a robot, `whole` as its file has it: first the empty scene, last the scene itself.
 pub fn stops(whole: &Model<Dd>, scene: &Scene) -> Vec<Stop> {
-    let mut now = Scene { places: scene.places.clone(), ..Scene::default() };
+    // drives belong to the robot, wherever they are written
+    let mut now = Scene { places: scene.places.clone(), drives: scene.drives.clone(), ..Scene::default() };
     let mut stops: Vec<Stop> = robot_in(whole, &now)
         .map(|(robot, scene)| Stop { what: What::Text(String::new()), scene, robot })
         .into_iter()
@@ -191,7 +192,8 @@ fn items(whole: &Model<Dd>, scene: &Scene) -> Vec<(What, Change)> {
         let what = format!("{} at rest", joints(&scene.zero.joints_at_rest));
         item(what, Box::new(|now, s| now.zero.joints_at_rest.clone_from(&s.zero.joints_at_rest)));
     }
-    let Effects { rotor_inertia, damping, coulomb, springs } = scene.effects;
+    let Effects { rotor_inertia, damping, coulomb, springs, transmission_losses, elastic_transmissions } =
+        scene.effects;
     if !rotor_inertia {
         item("no rotor inertia".to_string(), Box::new(|now, _| now.effects.rotor_inertia = false));
     }
@@ -209,6 +211,12 @@ fn items(whole: &Model<Dd>, scene: &Scene) -> Vec<(What, Change)> {
     }
     if !springs {
         item("no springs".to_string(), Box::new(|now, _| now.effects.springs = false));
+    }
+    if !transmission_losses {
+        item("no losses in transmissions".to_string(), Box::new(|now, _| now.effects.transmission_losses = false));
+    }
+    if !elastic_transmissions {
+        item("rigid transmissions".to_string(), Box::new(|now, _| now.effects.elastic_transmissions = false));
     }
     for (i, parameter) in scene.parameters.iter().enumerate() {
         let what = match parameter {

@@ -6,10 +6,11 @@
 use super::{check, Base, Coulomb, Effects, Gravity, Parameter, Scene};
 use crate::description::{Angle, AngleUnit};
 use crate::diagnostic::{Diagnostics, Place};
-use crate::model::angle;
 use crate::model::geometry::{about, compose, turned, vector};
 use crate::model::merge::{merge, Part};
+use crate::model::{angle, drives};
 use straightline_core::algorithms::composing_pays;
+use straightline_core::drive::{Drive, Rotor};
 use straightline_core::model::{self, Body, BodyId, Frame, JointEffects, JointKind, Model};
 use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::Dd;
@@ -29,7 +30,12 @@ pub fn apply(model: Model<Dd>, scene: &Scene, diagnostics: &mut Diagnostics) -> 
     if diagnostics.has_errors() {
         return None;
     }
-    let mut model = lock(without_parameters(model, scene), &held);
+    let mut model = without_parameters(model, scene);
+    drives::add(&scene.drives, &mut model, diagnostics);
+    if diagnostics.has_errors() {
+        return None;
+    }
+    let mut model = lock(model, &held);
     weld(&mut model, scene);
     if let Gravity::Constant(gravity) = scene.gravity {
         model.gravity = vector(gravity);
@@ -37,6 +43,17 @@ pub fn apply(model: Model<Dd>, scene: &Scene, diagnostics: &mut Diagnostics) -> 
     for body in &mut model.bodies {
         body.effects = wanted_effects(&body.effects, &scene.effects);
     }
+    for drive in &mut model.drives {
+        if !scene.effects.elastic_transmissions {
+            *drive = drives::stiffened(drive);
+        }
+        if !scene.effects.transmission_losses {
+            drive.stages.iter_mut().for_each(|stage| stage.efficiency = None);
+            drive.efficiency = None;
+        }
+    }
+    // with joints locked, drives fit the joints that are left or do not; a dependent motion of all is one of a part, too
+    drives::find_shares(&mut model.drives);
     Some(model)
 }
 
@@ -114,7 +131,26 @@ fn lock(model: Model<Dd>, held: &[Option<Held>]) -> Model<Dd> {
         }
         None => frame,
     });
-    Model { frames: frames.collect(), bodies, ..model }
+    let carried = |body: BodyId| carriers[body];
+    let drives = model.drives.into_iter().filter_map(|drive| moved(drive, held, &carried));
+    Model { frames: frames.collect(), drives: drives.collect(), bodies, ..model }
+}
+
+/// A drive on the joints that are left; `None` if there is none. `carried` gives the new body that an old one is part of, and
+/// its pose there.
+fn moved(
+    drive: Drive<Dd>,
+    held: &[Option<Held>],
+    carried: &dyn Fn(BodyId) -> (Option<BodyId>, Transform<Dd>),
+) -> Option<Drive<Dd>> {
+    let joints = drive.joints.iter().filter(|(body, _)| held[*body].is_none());
+    let joints: Vec<(BodyId, Dd)> = joints.filter_map(|(body, n)| Some((carried(*body).0?, *n))).collect();
+    // on the world a rotor does not turn in space
+    let rotor = drive.rotor.and_then(|rotor| {
+        let (body, pose) = carried(rotor.body);
+        Some(Rotor { body: body?, axis: pose.rotation * rotor.axis, ..rotor })
+    });
+    (!joints.is_empty()).then_some(Drive { joints, rotor, ..drive })
 }
 
 /// Gives the joints that are left their places in the coordinate vectors, in the order that they have.

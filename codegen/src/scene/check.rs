@@ -14,7 +14,7 @@ use straightline_core::Dd;
 /// A principal moment may exceed the sum of the others by so much, relatively: the digits of published tensors.
 const MOMENT_DIGITS: f64 = 1e-6;
 /// Names of inputs that a parameter cannot have.
-const INPUTS: [&str; 5] = ["q", "qd", "qdd", "tau", "gravity"];
+const INPUTS: [&str; 14] = ["q", "qd", "qdd", "tau", "gravity", "x", "u", "q3", "q4", "q5", "q6", "q7", "q8", "q9"];
 
 /// What is wrong with a scene, whatever the robot.
 pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
@@ -140,7 +140,7 @@ pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
     if scene.base == Base::Fixed && options.model.floating_base {
         scene.places.complain("hold.base", say::said_twice("the base"), diagnostics);
     }
-    if scene.base == Base::Moving && options.functions.contains(&Function::ForwardDynamics) {
+    if scene.base == Base::Moving && options.functions.iter().any(|f| f.is_forward()) {
         scene.places.complain("hold.base", say::moving_base_forward(), diagnostics);
     }
     // of a file this was said when it was read, whatever functions of it are asked for
@@ -280,7 +280,7 @@ fn by_joints(function: Function) -> bool {
         InverseDynamics | GravityForce | BiasForce | VelocityForce | ForwardDynamics => true,
         MassMatrix | JointWrenches | Jacobian | KinematicsAndJacobian => true,
         ForwardKinematics | FrameVelocity | FrameAcceleration | JacobianBias => false,
-        Energy | CentreOfMass | Momentum => false,
+        Energy | CentreOfMass | Momentum | Drive(_) => false,
     }
 }
 

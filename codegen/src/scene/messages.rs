@@ -45,6 +45,7 @@ pub const CODES: &[&str] = &[
     "empty-mode",
     "contact-on-world",
     "loop-on-one-body",
+    "function-not-of-robot",
 ];
 
 type D = Diagnostic;
@@ -344,4 +345,17 @@ pub fn loop_on_one_body(owner: &str) -> D {
     D::error("loop-on-one-body", format!("{owner}: both frames belong to the same body"))
         .detail("no joint between them can move")
         .help("name frames of two bodies")
+}
+
+/// A function about something that the robot does not have.
+pub fn function_not_of_robot(function: &str, has_no_drives: bool) -> D {
+    let d = D::error("function-not-of-robot", format!("this robot has no function `{function}`"));
+    match has_no_drives {
+        true => d.detail("no drive is given for any of its joints").help("write `[[drive]]` tables, see SCHEMA.md"),
+        false => d
+            .detail(
+                "its drives do not fit its joints one to one, or a motion would be differentiated more than nine times",
+            )
+            .help("leave the function out, or give every driven joint a drive of its own"),
+    }
 }

@@ -22,6 +22,7 @@ pub use places::Places;
 pub use ranges::{ranges_in_words, Interval, JointRanges, Ranges};
 pub use read::{read, SceneFile};
 
+use crate::description::drives::Drive;
 use crate::function::Function;
 use crate::model::ModelOptions;
 use std::collections::BTreeMap;
@@ -42,6 +43,8 @@ pub struct Scene {
     pub locked: Vec<(String, f64)>,
     /// Bodies welded to links.
     pub payloads: Vec<Payload>,
+    /// What drives the joints, beside the robot file's own drives.
+    pub drives: Vec<Drive>,
     /// What is known to be zero.
     pub zero: Zero,
     /// Which effects beside rigid bodies are in.
@@ -193,11 +196,22 @@ pub struct Effects {
     pub coulomb: Coulomb,
     /// Joint springs.
     pub springs: bool,
+    /// Losses of gears, by efficiencies.
+    pub transmission_losses: bool,
+    /// Elastic stages of transmissions; without them a stage is rigid.
+    pub elastic_transmissions: bool,
 }
 
 impl Default for Effects {
     fn default() -> Self {
-        Effects { rotor_inertia: true, damping: true, coulomb: Coulomb::Sign, springs: true }
+        Effects {
+            rotor_inertia: true,
+            damping: true,
+            coulomb: Coulomb::Sign,
+            springs: true,
+            transmission_losses: true,
+            elastic_transmissions: true,
+        }
     }
 }
 

@@ -26,6 +26,7 @@ const TOP: &[&str] = &[
     "zero",
     "effects",
     "parameter",
+    "drive",
     "numbers",
     "budget",
 ];
@@ -136,6 +137,7 @@ impl SceneReader<'_> {
         for table in self.reader.tables_at(top, "parameter") {
             self.parameter(table);
         }
+        self.file.scene.drives = self.reader.drives_at(top);
         if let Some(table) = self.reader.table_at(top, "numbers", "[numbers]") {
             self.numbers(&table);
         }
@@ -173,6 +175,10 @@ impl SceneReader<'_> {
         let orders = [("by rows", false), ("by columns", true)];
         self.file.scene.by_columns = self.reader.word_at(table, "matrices", &orders).is_some_and(|order| order.value);
         self.contact_functions(table);
+        if let Some((_, span)) = table.get("functions") {
+            let place = self.reader.place(&span);
+            self.file.scene.places.note("outputs.functions", &place);
+        }
         let mut functions: Vec<Function> = Vec::new();
         let mut all_are_known = true;
         for name in self.reader.names_at(table, "functions", "function") {
@@ -281,9 +287,11 @@ impl SceneReader<'_> {
     }
 
     fn effects(&mut self, table: &Table) {
-        self.reader.check_keys(table, &["rotor_inertia", "damping", "coulomb", "coulomb_speed", "springs"]);
+        let own = ["rotor_inertia", "damping", "coulomb", "coulomb_speed", "springs"];
+        self.reader.check_keys(table, &[&own[..], &["transmission_losses", "elastic_transmissions"]].concat());
         let mut flag = |key: &str| self.reader.flag_at(table, key).is_none_or(|flag| flag.value);
         let (rotor_inertia, damping, springs) = (flag("rotor_inertia"), flag("damping"), flag("springs"));
+        let (transmission_losses, elastic_transmissions) = (flag("transmission_losses"), flag("elastic_transmissions"));
         let form = self.reader.word_at(table, "coulomb", &COULOMB);
         let speed = self.reader.real_at(table, "coulomb_speed", Range64::Finite);
         let speed_place = speed.as_ref().map(|s| s.place.clone());
@@ -306,7 +314,8 @@ impl SceneReader<'_> {
             }
             (form, None) => form,
         };
-        self.file.scene.effects = super::Effects { rotor_inertia, damping, coulomb, springs };
+        self.file.scene.effects =
+            super::Effects { rotor_inertia, damping, coulomb, springs, transmission_losses, elastic_transmissions };
     }
 
     fn parameter(&mut self, table: Table) {

@@ -84,7 +84,7 @@ impl Coordinates {
             // its results depend on which joints move: solved for these
             ForwardDynamics => return None,
             ForwardKinematics | FrameVelocity | FrameAcceleration | JacobianBias => return None,
-            Energy | CentreOfMass | Momentum => return None,
+            Energy | CentreOfMass | Momentum | Drive(_) => return None,
         })
     }
 }

@@ -15,6 +15,8 @@ pub mod algorithms;
 pub mod contact;
 pub mod control;
 pub mod dd;
+#[cfg(feature = "alloc")]
+pub mod drive;
 pub mod integrate;
 pub mod jet;
 #[cfg(feature = "alloc")]
@@ -26,7 +28,9 @@ pub mod reduced;
 #[cfg(feature = "reference")]
 pub mod reference;
 pub mod spatial;
+pub mod taylor;
 pub mod trig;
 
 pub use dd::Dd;
 pub use real::Real;
+pub use taylor::Taylor;

@@ -6,6 +6,7 @@
 //! [`Body::link_frame`]. A floating base keeps the root link's own frame.
 
 use crate::dd::Dd;
+use crate::drive::Drive;
 use crate::real::Real;
 use crate::spatial::{SpatialInertia, Sym3, Transform, Vec3};
 use alloc::string::String;
@@ -223,6 +224,8 @@ pub struct Model<T> {
     pub gravity: Vec3<T>,
     /// All frames of the robot: one per link of the file, and what was added.
     pub frames: Vec<Frame<T>>,
+    /// What drives the joints, in the order of the inputs u.
+    pub drives: Vec<Drive<T>>,
 }
 
 impl<T: Real> Model<T> {
@@ -266,6 +269,7 @@ impl<T: Real> Model<T> {
                 .iter()
                 .map(|x| Frame { name: x.name.clone(), body: x.body, placement: x.placement.map(&mut f) })
                 .collect(),
+            drives: self.drives.iter().map(|d| d.map(&mut f)).collect(),
         }
     }
 }

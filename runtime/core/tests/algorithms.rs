@@ -206,7 +206,13 @@ fn random_robot(seed: u64) -> Model<Dd> {
     }
     let mut frames = vec![Frame { name: "tip".into(), body: Some(count - 1), placement: random.pose() }];
     frames.push(Frame { name: "side".into(), body: Some(random.below(count)), placement: random.pose() });
-    Model { name: format!("robot{seed}"), bodies, gravity: random.vector().scale(Dd::from(9.81)), frames }
+    Model {
+        name: format!("robot{seed}"),
+        bodies,
+        gravity: random.vector().scale(Dd::from(9.81)),
+        frames,
+        drives: vec![],
+    }
 }
 
 /// A robot in a state of motion.
@@ -815,7 +821,8 @@ fn a_pendulum_swings_as_in_the_textbook() {
         load: None,
     };
     let gravity = Vec3::new(0.0, 0.0, -g).map(d);
-    let model = Model { name: "pendulum".into(), bodies: vec![body], gravity, frames: vec![] }.cast::<f64>();
+    let model =
+        Model { name: "pendulum".into(), bodies: vec![body], gravity, frames: vec![], drives: vec![] }.cast::<f64>();
     let (q, qd, qdd) = (0.7, -1.5, 2.0);
     let expected = (inertia + mass * length * length) * qdd + mass * g * length * f64::sin(q);
     let tau = inverse_dynamics(&model, &[q], &[qd], &[qdd])[0];

@@ -52,6 +52,7 @@ fn chain(n: usize) -> Model<f64> {
         bodies: (0..n).map(link).collect(),
         gravity: Vec3::new(0.0, -GRAVITY, 0.0),
         frames: vec![Frame { name: "tip".into(), body: Some(n - 1), placement: at(1.0, 0.0, 0.0) }],
+        drives: vec![],
     }
 }
 
@@ -311,6 +312,7 @@ fn foot() -> Model<f64> {
         bodies: vec![foot],
         gravity: Vec3::new(0.0, 0.0, -GRAVITY),
         frames: (0..4).map(corner).collect(),
+        drives: vec![],
     }
 }
 

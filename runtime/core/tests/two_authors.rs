@@ -90,6 +90,7 @@ fn canonical(random: &mut Random, tree: &MassCentreTree<Dd>) -> Model<Dd> {
         bodies: bodies.collect(),
         gravity: vec3(&tree.gravity),
         frames: tree.frames.iter().map(frame).collect(),
+        drives: vec![],
     }
 }
 

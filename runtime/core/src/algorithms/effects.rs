@@ -15,10 +15,15 @@ pub fn passive_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
         T::section("friction and springs", Some(i));
         let (q, qd, e) = (q[body.joint.iq], qd[body.joint.iv], &body.effects);
         let spring = e.stiffness * (q - e.spring_rest);
-        let friction = e.damping * qd + coulomb_force(e, qd);
+        let friction = friction_force(e, qd);
         forces[body.joint.iv] = (friction + spring).named("passive", i, "");
     }
     forces
+}
+
+/// d q̇ + f(q̇) \[N·m or N\] of a joint.
+pub(super) fn friction_force<T: Real>(effects: &JointEffects<T>, qd: T) -> T {
+    effects.damping * qd + coulomb_force(effects, qd)
 }
 
 /// f(q̇) \[N·m or N\]. Under the root stands a sum of squares with w > 0.

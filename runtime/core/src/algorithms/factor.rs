@@ -30,8 +30,19 @@ impl<T: Real> Ltdl<T> {
     /// joint moves some mass or inertia; a joint that moves none has no forward dynamics, and what comes out is not
     /// finite.
     pub fn factor(model: &Model<T>, mass_matrix: &[T]) -> Self {
+        Self::factor_along(model, branches(model), mass_matrix)
+    }
+
+    /// The same for a symmetric matrix with entries anywhere, as if all joints stood on one branch.
+    pub fn factor_dense(model: &Model<T>, matrix: &[T]) -> Self {
+        let mut chain = branches(model);
+        chain.parents = (0..chain.coordinates.len()).map(|row| row.checked_sub(1)).collect();
+        Self::factor_along(model, chain, matrix)
+    }
+
+    fn factor_along(model: &Model<T>, branches: Branches, mass_matrix: &[T]) -> Self {
         let nv = model.nv();
-        let Branches { coordinates, bodies, parents } = branches(model);
+        let Branches { coordinates, bodies, parents } = branches;
         // the triangle below the diagonal, in the order of the rows; it becomes L in place
         let entry = |row: usize, column: usize| mass_matrix[coordinates[row] * nv + coordinates[column]];
         let mut lower: Vec<Vec<T>> = (0..nv).map(|i| (0..=i).map(|j| entry(i, j)).collect()).collect();

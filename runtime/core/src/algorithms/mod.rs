@@ -29,6 +29,7 @@
 //!     }],
 //!     gravity: Vec3::new(0.0, 0.0, -10.0),
 //!     frames: vec![],
+//!     drives: vec![],
 //! };
 //! let (q, qd, qdd) = ([0.0], [3.0], [4.0]);
 //! assert_eq!(mass_matrix(&pendulum, &q), [0.5]); // m l²
@@ -45,15 +46,20 @@
 //! | H(q) | [`mass_matrix`] |
 //! | motion under a tau | [`forward_dynamics_aba`], [`forward_dynamics_ltdl`] |
 //! | energy | [`kinetic_energy`], [`potential_energy`] |
+//! | motion under the inputs of drives | [`driven_motion`], [`complete_model`](fn@complete_model), [`state_space`](fn@state_space) |
+//! | inputs of drives for a motion | [`driven_inverse`](fn@driven_inverse) |
 //! | mass centre, momentum | [`momentum`](fn@momentum) |
 //! | contact coordinates, (20.83)-(20.87) | [`relative_motion`], [`functional_coordinates`] |
 //! | motion and reactions in contact, (20.88)-(20.94) | [`constrained_forward_dynamics`], [`hybrid_inverse_dynamics`], [`Environment`] |
 //! | impact, (20.90)-(20.97) | [`impact`](fn@impact) |
 
 mod aba;
+mod actuator;
 mod constraint;
 mod contact_system;
 mod crba;
+mod driven;
+mod driven_inverse;
 mod effects;
 mod energy;
 mod environment;
@@ -69,6 +75,7 @@ mod reduced_gravity;
 mod reduced_mass_matrix;
 mod reduced_turn;
 mod rnea;
+mod transmission;
 mod velocity;
 
 pub use aba::{forward_dynamics_aba, solve_articulated};
@@ -77,6 +84,11 @@ pub use constraint::{
     Support,
 };
 pub use crba::mass_matrix;
+pub use driven::{
+    complete_model, drive_energy, drive_power, drive_states, drive_torques, driven_motion, drives_are_diagonal,
+    state_space, Links,
+};
+pub use driven_inverse::{driven_inverse, inverse_orders, reads_states, InverseOrders};
 pub use effects::{passive_force, rotor_inertias};
 pub use energy::{kinetic_energy, potential_energy};
 pub use environment::{Environment, EnvironmentMotion, SpringDamper};

@@ -44,6 +44,7 @@
 //! ```
 
 mod contact;
+pub mod drives;
 mod dynamics;
 mod energy;
 mod frames;

@@ -1,0 +1,284 @@
+//! Drives as written, on the joints of a model: rigid stages folded into the shafts beside them, names resolved, matrices of
+//! ratios inverted.
+
+use crate::description::drives::{self as written, Noted};
+use crate::description::messages;
+use crate::diagnostic::Diagnostics;
+use std::collections::BTreeSet;
+use straightline_core::drive::{Actuator, Drive, Efficiency, LinearActuator, Motor, Rotor, Stage};
+use straightline_core::model::{BodyId, JointKind, Model};
+use straightline_core::spatial::Vec3;
+use straightline_core::Dd;
+
+/// So small beside its terms a sum counts as zero: far above the rounding of double-double, far below that of f64.
+const ZERO: f64 = 1e-24;
+
+/// Adds the drives to those of a model. Complaints go to `diagnostics`; a drive with errors is left out.
+pub(crate) fn add(drives: &[written::Drive], model: &mut Model<Dd>, diagnostics: &mut Diagnostics) {
+    for drive in drives {
+        if model.drives.iter().any(|d| d.name == drive.name.value) {
+            diagnostics.push(messages::duplicate_name("drive", &drive.name.value).at(&drive.name.place));
+        } else if let Some(built) = build(drive, model, diagnostics) {
+            model.drives.push(built);
+        }
+    }
+    for name in find_shares(&mut model.drives) {
+        if let Some(drive) = drives.iter().find(|d| d.name.value == name) {
+            let joints: Vec<&str> = drive.joints.iter().map(|(joint, _)| joint.value.as_str()).collect();
+            diagnostics.push(messages::drive_coupling(&name, &joints).at(&drive.joints[0].0.place));
+        }
+    }
+}
+
+fn build(drive: &written::Drive, model: &Model<Dd>, diagnostics: &mut Diagnostics) -> Option<Drive<Dd>> {
+    let owner = format!("drive `{}`", drive.name.value);
+    let actuator = actuator(drive, &owner, diagnostics);
+    let joints: Vec<Option<(BodyId, Dd)>> = drive
+        .joints
+        .iter()
+        .map(|(joint, ratio)| body(&owner, joint, model, diagnostics).map(|b| (b, Dd::from(*ratio))))
+        .collect();
+    let joints: Option<Vec<(BodyId, Dd)>> = joints.into_iter().collect();
+    let rotor = match &drive.rotor {
+        None => None,
+        Some((link, axis, inertia)) => {
+            let Some(frame) = model.frame(&link.value) else {
+                let links = model.frames.iter().map(|f| f.name.as_str());
+                diagnostics.push(messages::unknown_link(&owner, &link.value, links).at(&link.place));
+                return None;
+            };
+            let [x, y, z] = axis.map(Dd::from);
+            let axis = frame.placement.rotation * Vec3::new(x, y, z);
+            let axis = axis.scale(Dd::ONE / axis.dot(axis).sqrt());
+            // a rotor on the world does not turn in space
+            frame.body.map(|body| Rotor { body, axis, inertia: Dd::from(*inertia) })
+        }
+    };
+    let mut built = Drive {
+        name: drive.name.value.clone(),
+        actuator: actuator?,
+        stages: Vec::new(),
+        shaft_inertia: None,
+        efficiency: None,
+        joints: joints?,
+        shares: None,
+        input_limit: drive.input_limit.map(Dd::from),
+        current_limit: drive.current_limit.map(Dd::from),
+        rotor,
+    };
+    let is_elastic = drive.stages.iter().any(|s| s.stiffness.is_some());
+    if let (true, Actuator::Linear(LinearActuator { position: None, .. })) = (is_elastic, &built.actuator) {
+        let example = "position = [1, 0, 0]";
+        diagnostics.push(messages::missing_key(&owner, "position", example).at(&drive.name.place));
+        return None;
+    }
+    fold_stages(drive, &mut built, diagnostics).then_some(built)
+}
+
+fn body(owner: &str, joint: &Noted<String>, model: &Model<Dd>, diagnostics: &mut Diagnostics) -> Option<BodyId> {
+    let is_it = |name: &str, kind: JointKind| name == joint.value && kind != JointKind::Floating;
+    let found = model.bodies.iter().position(|b| is_it(&b.joint.name, b.joint.kind));
+    if found.is_none() {
+        let moving = model.bodies.iter().filter(|b| b.joint.kind != JointKind::Floating);
+        let names = moving.map(|b| b.joint.name.as_str());
+        diagnostics.push(messages::drive_joint(owner, &joint.value, names).at(&joint.place));
+    }
+    found
+}
+
+fn actuator(drive: &written::Drive, owner: &str, diagnostics: &mut Diagnostics) -> Option<Actuator<Dd>> {
+    match &drive.actuator {
+        written::Actuator::Motor { torque_constant, emf_constant, resistance, inductance, rotor_inertia, friction } => {
+            Some(Actuator::Motor(Motor {
+                rotor_inertia: Dd::from(*rotor_inertia),
+                torque_constant: Dd::from(*torque_constant),
+                emf_constant: Dd::from(*emf_constant),
+                friction: Dd::from(*friction),
+                resistance: Dd::from(*resistance),
+                inductance: inductance.map(Dd::from),
+            }))
+        }
+        written::Actuator::Linear { c, f, d, t, position } => {
+            let wide = |x: &[f64]| x.iter().map(|x| Dd::from(*x)).collect::<Vec<Dd>>();
+            let n = f.len();
+            // whether T b is zero beside its terms
+            let vanishes = |b: &[Dd]| {
+                let terms = || t.iter().zip(b).map(|(t, b)| Dd::from(*t) * *b);
+                let (sum, moduli) = terms().fold((Dd::ZERO, 0.0), |(s, m), x| (s + x, m + x.to_f64().abs()));
+                sum.to_f64().abs() <= ZERO * moduli
+            };
+            let complain = |what: &str, help: &str, diagnostics: &mut Diagnostics| {
+                diagnostics.push(messages::actuator_inert(owner, what, help).at(&c.place));
+            };
+            if vanishes(&wide(f)) {
+                complain(
+                    "T f = 0: the torque on its shaft does not move it",
+                    "f holds −1/J in the row of the shaft's speed",
+                    diagnostics,
+                );
+                return None;
+            }
+            let mut column = wide(d);
+            let mut relative_degree = None;
+            for r in 0..n {
+                if !vanishes(&column) {
+                    relative_degree = Some(r);
+                    break;
+                }
+                let entry = |row: &[f64]| row.iter().zip(&column).fold(Dd::ZERO, |sum, (a, b)| sum + Dd::from(*a) * *b);
+                column = c.value.chunks(n).map(entry).collect();
+            }
+            let Some(relative_degree) = relative_degree else {
+                complain("u never reaches its shaft: T Cʳ d = 0 for all r", "check d and the rows of C", diagnostics);
+                return None;
+            };
+            Some(Actuator::Linear(LinearActuator {
+                c: wide(&c.value),
+                f: wide(f),
+                d: wide(d),
+                t: wide(t),
+                position: position.as_ref().map(|p| wide(p)),
+                relative_degree,
+            }))
+        }
+    }
+}
+
+/// Rigid stages become part of the shafts: what stands behind a rigid gear is described by the angle before it.
+fn fold_stages(drive: &written::Drive, built: &mut Drive<Dd>, diagnostics: &mut Diagnostics) -> bool {
+    let square = |x: Dd| x * x;
+    // of the shaft that the present stage begins on: angle of the shaft over that before the stage, inertia, losses
+    let (mut ratio, mut inertia, mut losses) = (Dd::ONE, Dd::ZERO, None);
+    for stage in &drive.stages {
+        let n = Dd::from(stage.ratio.value);
+        let gears = Dd::from(stage.input_inertia) + Dd::from(stage.output_inertia) / square(n);
+        inertia = inertia + gears / square(ratio);
+        losses = both(losses, stage.efficiency.map(efficiency));
+        ratio = ratio * n;
+        let Some(stiffness) = stage.stiffness else { continue };
+        if inertia == Dd::ZERO && !built.stages.is_empty() {
+            diagnostics.push(messages::shaft_without_inertia(&built.name).at(&stage.ratio.place));
+            return false;
+        }
+        built.stages.push(Stage {
+            ratio,
+            stiffness: Dd::from(stiffness),
+            damping: stage.damping.map(Dd::from),
+            inertia,
+            efficiency: losses,
+        });
+        (ratio, inertia, losses) = (Dd::ONE, Dd::ZERO, None);
+    }
+    built.joints.iter_mut().for_each(|(_, n)| *n = *n * ratio);
+    built.shaft_inertia = (inertia != Dd::ZERO).then_some(inertia);
+    built.efficiency = both(losses, drive.efficiency.map(efficiency));
+    true
+}
+
+fn efficiency([forward, backward]: [f64; 2]) -> Efficiency<Dd> {
+    Efficiency { forward: Dd::from(forward), backward: Dd::from(backward) }
+}
+
+/// Two gears one after the other.
+fn both(a: Option<Efficiency<Dd>>, b: Option<Efficiency<Dd>>) -> Option<Efficiency<Dd>> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(Efficiency { forward: a.forward * b.forward, backward: a.backward * b.backward }),
+        (a, b) => a.or(b),
+    }
+}
+
+/// The same drive with a rigid transmission of the same ratios and inertias.
+pub(crate) fn stiffened(drive: &Drive<Dd>) -> Drive<Dd> {
+    let (mut ratio, mut inertia, mut losses) = (Dd::ONE, Dd::ZERO, None);
+    for stage in &drive.stages {
+        inertia = inertia + stage.inertia / (ratio * ratio);
+        ratio = ratio * stage.ratio;
+        losses = both(losses, stage.efficiency);
+    }
+    inertia = inertia + drive.shaft_inertia.unwrap_or(Dd::ZERO) / (ratio * ratio);
+    Drive {
+        stages: Vec::new(),
+        shaft_inertia: (inertia != Dd::ZERO).then_some(inertia),
+        efficiency: both(losses, drive.efficiency),
+        joints: drive.joints.iter().map(|(b, n)| (*b, *n * ratio)).collect(),
+        ..drive.clone()
+    }
+}
+
+/// The torque of each drive's last shaft per force of each joint, where drives and joints fit one to one: rows of the
+/// inverse transposed matrix of ratios of those that hang together. Names a drive of every singular matrix.
+pub(crate) fn find_shares(drives: &mut [Drive<Dd>]) -> Vec<String> {
+    let mut singular = Vec::new();
+    let mut is_done = vec![false; drives.len()];
+    for first in 0..drives.len() {
+        if is_done[first] {
+            continue;
+        }
+        let (mut group, mut joints) = (vec![first], BTreeSet::new());
+        is_done[first] = true;
+        let mut next = 0;
+        while let Some(k) = group.get(next).copied() {
+            joints.extend(drives[k].joints.iter().map(|j| j.0));
+            for other in 0..drives.len() {
+                if !is_done[other] && drives[other].joints.iter().any(|j| joints.contains(&j.0)) {
+                    is_done[other] = true;
+                    group.push(other);
+                }
+            }
+            next += 1;
+        }
+        let joints: Vec<BodyId> = joints.into_iter().collect();
+        for k in &group {
+            drives[*k].shares = None;
+        }
+        if group.len() != joints.len() {
+            continue;
+        }
+        let ratio = |k: usize, body: BodyId| -> Dd {
+            drives[k].joints.iter().filter(|j| j.0 == body).fold(Dd::ZERO, |sum, j| sum + j.1)
+        };
+        let matrix: Vec<Vec<Dd>> = group.iter().map(|k| joints.iter().map(|j| ratio(*k, *j)).collect()).collect();
+        match inverse(matrix) {
+            // entry (joint, drive) of the inverse is entry (drive, joint) of its transpose
+            Some(inverse) => {
+                for (column, k) in group.iter().enumerate() {
+                    let row = joints.iter().enumerate().map(|(i, body)| (*body, inverse[i][column]));
+                    drives[*k].shares = Some(row.filter(|(_, share)| *share != Dd::ZERO).collect());
+                }
+            }
+            None => singular.push(drives[first].name.clone()),
+        }
+    }
+    singular
+}
+
+/// Gauss and Jordan with pivots; `None` if the matrix is singular to rounding.
+fn inverse(mut a: Vec<Vec<Dd>>) -> Option<Vec<Vec<Dd>>> {
+    let n = a.len();
+    for (i, row) in a.iter_mut().enumerate() {
+        let scale = row.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
+        if scale == 0.0 {
+            return None;
+        }
+        row.extend((0..n).map(|j| if i == j { Dd::ONE } else { Dd::ZERO }));
+    }
+    let mut size: Vec<f64> =
+        a.iter().map(|row| row[..n].iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max)).collect();
+    for k in 0..n {
+        let better = |i: &usize| a[*i][k].to_f64().abs() / size[*i];
+        let pivot = (k..n).max_by(|i, j| better(i).total_cmp(&better(j)))?;
+        if better(&pivot) <= 1e-12 {
+            return None;
+        }
+        a.swap(k, pivot);
+        size.swap(k, pivot);
+        let inverse_pivot = Dd::ONE / a[k][k];
+        a[k].iter_mut().for_each(|x| *x = *x * inverse_pivot);
+        let row = a[k].clone();
+        for (_, other) in a.iter_mut().enumerate().filter(|(i, _)| *i != k) {
+            let factor = other[k];
+            other.iter_mut().zip(&row).for_each(|(x, r)| *x = *x - factor * *r);
+        }
+    }
+    Some(a.into_iter().map(|row| row[n..].to_vec()).collect())
+}

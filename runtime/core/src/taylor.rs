@@ -1,0 +1,150 @@
+//! Truncated Taylor series in time: a scalar that differentiates whatever runs over it.
+//!
+//! x(t) = Σ x_k tᵏ with N coefficients over another scalar; x_k is the k-th derivative over k!. The algorithms run over it
+//! unchanged, so the derivatives of a torque along a motion come out of the recursion that gives the torque.
+
+use crate::dd::Dd;
+use crate::real::Real;
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A truncated Taylor series.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Taylor<T, const N: usize> {
+    /// The coefficients, that of t⁰ first.
+    pub coefficients: [T; N],
+}
+
+impl<T: Real, const N: usize> Taylor<T, N> {
+    /// The series of a function with these derivatives at t = 0, the function itself first; what is not given is zero.
+    pub fn from_derivatives(derivatives: impl IntoIterator<Item = T>) -> Self {
+        let (mut coefficients, mut factorial) = ([T::zero(); N], Dd::ONE);
+        for (k, (slot, x)) in coefficients.iter_mut().zip(derivatives).enumerate() {
+            if k > 1 {
+                factorial = factorial * Dd::from(k as f64);
+            }
+            // a quotient of exact numbers rounds once
+            *slot = if k > 1 { x / T::constant(factorial) } else { x };
+        }
+        Taylor { coefficients }
+    }
+
+    /// A constant.
+    pub fn fixed(value: T) -> Self {
+        Taylor::from_derivatives([value])
+    }
+
+    /// The k-th derivative at t = 0.
+    pub fn derivative_at(&self, k: usize) -> T {
+        let factorial = (2..=k).fold(Dd::ONE, |product, i| product * Dd::from(i as f64));
+        match k {
+            0 | 1 => self.coefficients[k],
+            _ => self.coefficients[k] * T::constant(factorial),
+        }
+    }
+
+    /// The derivative; its last coefficient is unknown and stands as zero.
+    #[must_use]
+    pub fn derivative(&self) -> Self {
+        let mut coefficients = [T::zero(); N];
+        for k in 1..N {
+            coefficients[k - 1] = self.coefficients[k] * number(k);
+        }
+        Taylor { coefficients }
+    }
+}
+
+fn number<T: Real>(k: usize) -> T {
+    T::constant(Dd::from(k as f64))
+}
+
+/// Σ_{i=from}^{to} a_i b_{k−i}.
+fn convolution<T: Real>(a: &[T], b: &[T], k: usize, from: usize, to: usize) -> Option<T> {
+    (from..=to).map(|i| a[i] * b[k - i]).reduce(|sum, x| sum + x)
+}
+
+impl<T: Real, const N: usize> Add for Taylor<T, N> {
+    type Output = Self;
+    fn add(self, b: Self) -> Self {
+        Taylor { coefficients: core::array::from_fn(|k| self.coefficients[k] + b.coefficients[k]) }
+    }
+}
+
+impl<T: Real, const N: usize> Sub for Taylor<T, N> {
+    type Output = Self;
+    fn sub(self, b: Self) -> Self {
+        Taylor { coefficients: core::array::from_fn(|k| self.coefficients[k] - b.coefficients[k]) }
+    }
+}
+
+impl<T: Real, const N: usize> Neg for Taylor<T, N> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Taylor { coefficients: self.coefficients.map(|x| -x) }
+    }
+}
+
+impl<T: Real, const N: usize> Mul for Taylor<T, N> {
+    type Output = Self;
+    fn mul(self, b: Self) -> Self {
+        let product = |k| convolution(&self.coefficients, &b.coefficients, k, 0, k).expect("a sum has a first term");
+        Taylor { coefficients: core::array::from_fn(product) }
+    }
+}
+
+impl<T: Real, const N: usize> Div for Taylor<T, N> {
+    type Output = Self;
+    /// y = a / b from b y = a: y_k = (a_k − Σ_{i≥1} b_i y_{k−i}) / b_0.
+    fn div(self, b: Self) -> Self {
+        let mut y = [T::zero(); N];
+        for k in 0..N {
+            let rest = convolution(&b.coefficients, &y, k, 1, k);
+            y[k] = rest.map_or(self.coefficients[k], |r| self.coefficients[k] - r) / b.coefficients[0];
+        }
+        Taylor { coefficients: y }
+    }
+}
+
+impl<T: Real, const N: usize> Real for Taylor<T, N> {
+    fn constant(value: Dd) -> Self {
+        Taylor::fixed(T::constant(value))
+    }
+
+    /// From ṡ = c ẋ and ċ = −s ẋ: k s_k = Σ_{i≥1} i x_i c_{k−i}, k c_k = −Σ_{i≥1} i x_i s_{k−i}.
+    fn sin_cos(self) -> (Self, Self) {
+        let (mut s, mut c, mut rates) = ([T::zero(); N], [T::zero(); N], [T::zero(); N]);
+        (s[0], c[0]) = self.coefficients[0].sin_cos();
+        for k in 1..N {
+            rates[k] = self.coefficients[k] * number(k);
+            let (sine, cosine) = (convolution(&rates, &c, k, 1, k), convolution(&rates, &s, k, 1, k));
+            s[k] = sine.expect("k ≥ 1") / number(k);
+            c[k] = -(cosine.expect("k ≥ 1") / number(k));
+        }
+        (Taylor { coefficients: s }, Taylor { coefficients: c })
+    }
+
+    /// From y² = x: 2 y_0 y_k = x_k − Σ_{0<i<k} y_i y_{k−i}.
+    fn sqrt(self) -> Self {
+        let mut y = [T::zero(); N];
+        y[0] = self.coefficients[0].sqrt();
+        for k in 1..N {
+            let inner = convolution(&y, &y, k, 1, k - 1);
+            y[k] = inner.map_or(self.coefficients[k], |r| self.coefficients[k] - r) / (y[0] + y[0]);
+        }
+        Taylor { coefficients: y }
+    }
+
+    /// Constant on either side of zero; at zero as if it stayed there.
+    fn sign(self) -> Self {
+        Taylor::fixed(self.coefficients[0].sign())
+    }
+
+    fn named(self, name: &'static str, index: usize, component: &'static str) -> Self {
+        let mut coefficients = self.coefficients;
+        coefficients[0] = coefficients[0].named(name, index, component);
+        Taylor { coefficients }
+    }
+
+    fn section(phase: &'static str, body: Option<usize>) {
+        T::section(phase, body);
+    }
+}
