@@ -258,7 +258,11 @@ fn every_example_compiles_for_its_robot_without_a_word() {
             continue;
         }
         let scene = read(&path);
-        let robot = if scene.path().starts_with("panda") { "panda.urdf" } else { "solo12.urdf" };
+        let robot = match scene.path() {
+            path if path.starts_with("panda") => "panda.urdf",
+            path if path.starts_with("planar_2r") => "planar_2r.toml",
+            _ => "solo12.urdf",
+        };
         let mut diagnostics = Diagnostics::new();
         let file = scene::read(&scene, &mut diagnostics).unwrap_or_else(|| panic!("{diagnostics}"));
         // of whole robots, one function is enough

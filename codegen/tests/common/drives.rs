@@ -1,3 +1,4 @@
+#![allow(dead_code)] // each test takes what it needs
 //! Robots with drives for the tests: drives are written as `[[drive]]` tables of a scene, so that reading them is tested, too.
 
 use serde_json::Value;
