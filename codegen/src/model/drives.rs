@@ -152,9 +152,8 @@ fn fold_stages(drive: &written::Drive, built: &mut Drive<Dd>, diagnostics: &mut 
     for stage in &drive.stages {
         let n = Dd::from(stage.ratio.value);
         let gears = Dd::from(stage.input_inertia) + Dd::from(stage.output_inertia) / square(n);
-        inertia = inertia + gears / square(ratio);
         losses = both(losses, stage.efficiency.map(efficiency));
-        ratio = ratio * n;
+        (ratio, inertia) = (ratio * n, inertia + gears / square(ratio));
         let Some(stiffness) = stage.stiffness else { continue };
         if inertia == Dd::ZERO && !built.stages.is_empty() {
             diagnostics.push(messages::shaft_without_inertia(&built.name).at(&stage.ratio.place));
@@ -169,7 +168,7 @@ fn fold_stages(drive: &written::Drive, built: &mut Drive<Dd>, diagnostics: &mut 
         });
         (ratio, inertia, losses) = (Dd::ONE, Dd::ZERO, None);
     }
-    built.joints.iter_mut().for_each(|(_, n)| *n = *n * ratio);
+    built.joints = built.joints.iter().map(|(body, n)| (*body, *n * ratio)).collect();
     built.shaft_inertia = (inertia != Dd::ZERO).then_some(inertia);
     built.efficiency = both(losses, drive.efficiency.map(efficiency));
     true
@@ -191,11 +190,10 @@ fn both(a: Option<Efficiency<Dd>>, b: Option<Efficiency<Dd>>) -> Option<Efficien
 pub(crate) fn stiffened(drive: &Drive<Dd>) -> Drive<Dd> {
     let (mut ratio, mut inertia, mut losses) = (Dd::ONE, Dd::ZERO, None);
     for stage in &drive.stages {
-        inertia = inertia + stage.inertia / (ratio * ratio);
-        ratio = ratio * stage.ratio;
+        (ratio, inertia) = (ratio * stage.ratio, inertia + stage.inertia / (ratio * ratio));
         losses = both(losses, stage.efficiency);
     }
-    inertia = inertia + drive.shaft_inertia.unwrap_or(Dd::ZERO) / (ratio * ratio);
+    let inertia = inertia + drive.shaft_inertia.unwrap_or(Dd::ZERO) / (ratio * ratio);
     Drive {
         stages: Vec::new(),
         shaft_inertia: (inertia != Dd::ZERO).then_some(inertia),
@@ -273,12 +271,12 @@ fn inverse(mut a: Vec<Vec<Dd>>) -> Option<Vec<Vec<Dd>>> {
         a.swap(k, pivot);
         size.swap(k, pivot);
         let inverse_pivot = Dd::ONE / a[k][k];
-        a[k].iter_mut().for_each(|x| *x = *x * inverse_pivot);
-        let row = a[k].clone();
+        let row: Vec<Dd> = a[k].iter().map(|x| *x * inverse_pivot).collect();
         for (_, other) in a.iter_mut().enumerate().filter(|(i, _)| *i != k) {
             let factor = other[k];
-            other.iter_mut().zip(&row).for_each(|(x, r)| *x = *x - factor * *r);
+            *other = other.iter().zip(&row).map(|(x, r)| *x - factor * *r).collect();
         }
+        a[k] = row;
     }
     Some(a.into_iter().map(|row| row[n..].to_vec()).collect())
 }

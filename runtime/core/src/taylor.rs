@@ -57,6 +57,11 @@ fn number<T: Real>(k: usize) -> T {
     T::constant(Dd::from(k as f64))
 }
 
+/// a − b, where there is a b.
+fn less<T: Real>(a: T, b: Option<T>) -> T {
+    b.map_or(a, |b| a - b)
+}
+
 /// Σ_{i=from}^{to} a_i b_{k−i}.
 fn convolution<T: Real>(a: &[T], b: &[T], k: usize, from: usize, to: usize) -> Option<T> {
     (from..=to).map(|i| a[i] * b[k - i]).reduce(|sum, x| sum + x)
@@ -98,7 +103,7 @@ impl<T: Real, const N: usize> Div for Taylor<T, N> {
         let mut y = [T::zero(); N];
         for k in 0..N {
             let rest = convolution(&b.coefficients, &y, k, 1, k);
-            y[k] = rest.map_or(self.coefficients[k], |r| self.coefficients[k] - r) / b.coefficients[0];
+            y[k] = less(self.coefficients[k], rest) / b.coefficients[0];
         }
         Taylor { coefficients: y }
     }
@@ -128,7 +133,7 @@ impl<T: Real, const N: usize> Real for Taylor<T, N> {
         y[0] = self.coefficients[0].sqrt();
         for k in 1..N {
             let inner = convolution(&y, &y, k, 1, k - 1);
-            y[k] = inner.map_or(self.coefficients[k], |r| self.coefficients[k] - r) / (y[0] + y[0]);
+            y[k] = less(self.coefficients[k], inner) / (y[0] + y[0]);
         }
         Taylor { coefficients: y }
     }
