@@ -41,7 +41,7 @@ struct Worst(std::collections::BTreeMap<String, (f64, String)>);
 impl Worst {
     fn note(&mut self, quantity: &str, case: &Value, error: f64) {
         let entry = self.0.entry(quantity.to_string()).or_default();
-        if !(error <= entry.0) {
+        if error.is_nan() || error > entry.0 {
             *entry = (error, case["id"].as_str().expect("an id").to_string());
         }
     }
