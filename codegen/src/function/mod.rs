@@ -482,7 +482,7 @@ impl Function {
     }
 
     /// Its equations for a robot in a scene, and for [`ForwardDynamicsMethod::Cheaper`] which form of forward dynamics that
-    /// is and why: see [`forward_method`](crate::forward_method). `reduced`: the reduced robot serves the functions that it
+    /// is and why: see [`forward_method`]. `reduced`: the reduced robot serves the functions that it
     /// can, and rounding moves.
     #[allow(clippy::too_many_arguments)]
     pub fn trace(

@@ -1,6 +1,8 @@
 //! Impact: velocities and impulses when a contact closes, (20.90)-(20.91) and (20.95)-(20.97).
 //!
-//!     H Δq̇ = Ĵᵀ I,    ṡ'' = −e ṡ'
+//! ```text
+//! H Δq̇ = Ĵᵀ I,    ṡ'' = −e ṡ'
+//! ```
 //!
 //! e = 0 is the chapter's plastic impact. Where the object has a mass m_e that is free to give way, ṡ is against it, and
 //! m_e (ṡ_e'' − ṡ_e') = −I. Corrected: (20.97) printed m_e Δṡ = −F Δt, which with (20.95), (20.96) has only the zero
