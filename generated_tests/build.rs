@@ -4,11 +4,12 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use straightline_codegen::compile::{compile, Generated, Options};
 use straightline_codegen::diagnostic::Source;
-use straightline_codegen::emit::Scalar;
+use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::expr::Grade;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::scene::contact::{ContactItem, EnvironmentItem, EnvironmentKind, SurfaceItem};
-use straightline_codegen::scene::{ContactFunction, Contacts, Scene};
+use straightline_codegen::scene::{ContactFunction, Contacts, Parameter, Scene};
+use straightline_codegen::schedule::Limits;
 use straightline_codegen::Function;
 use straightline_core::contact::Coordinate;
 
@@ -80,6 +81,73 @@ fn main() {
     for (robot, kinds) in CONTACTS {
         let text = contacts(&folder, robot, kinds);
         std::fs::write(out.join(format!("contact_{robot}.rs")), text).expect("OUT_DIR can be written");
+    }
+    lanes(&out, &folder);
+}
+
+/// Functions over lanes and batches for `tests/lanes.rs`: in one part and in several, with every shape of output, with a
+/// parameter that all states share, in both scalars, with both homes of the drivers.
+fn lanes(out: &Path, folder: &Path) {
+    use Function::{ForwardDynamics, InverseDynamics, Jacobian, MassMatrix};
+    let robot = |file: &str, options: Options| {
+        let text = std::fs::read_to_string(folder.join(file)).expect("the files are there");
+        compile(&Source::new(file, text), &options).unwrap_or_else(|d| panic!("{}", d.render())).text
+    };
+    let payload = Scene {
+        parameters: vec![Parameter::Payload { name: "load".to_string(), frame: "panda_hand".to_string() }],
+        ..Scene::default()
+    };
+    let modules = [
+        (
+            "lanes_solo12",
+            robot(
+                "solo12.urdf",
+                Options {
+                    functions: vec![InverseDynamics, MassMatrix, ForwardDynamics, Jacobian],
+                    frames: vec!["FL_FOOT".to_string(), "HR_FOOT".to_string()],
+                    limits: Limits { operations: 900 },
+                    model: ModelOptions { floating_base: true, ..ModelOptions::default() },
+                    lanes: Some(Lanes::Runtime),
+                    ..Options::default()
+                },
+            ),
+        ),
+        (
+            "lanes_panda",
+            robot(
+                "panda.urdf",
+                Options {
+                    functions: vec![InverseDynamics],
+                    scalar: Scalar::F32,
+                    lanes: Some(Lanes::Standalone),
+                    ..Options::default()
+                },
+            ),
+        ),
+        (
+            "lanes_payload",
+            robot(
+                "panda.urdf",
+                Options {
+                    functions: vec![InverseDynamics],
+                    scene: payload,
+                    lanes: Some(Lanes::Standalone),
+                    ..Options::default()
+                },
+            ),
+        ),
+    ];
+    let fused = Options {
+        functions: vec![InverseDynamics, ForwardDynamics],
+        limits: Limits { operations: 900 },
+        model: ModelOptions { floating_base: true, ..ModelOptions::default() },
+        lanes: Some(Lanes::Runtime),
+        fma: true,
+        ..Options::default()
+    };
+    let modules = modules.into_iter().chain([("fused_solo12", robot("solo12.urdf", fused))]);
+    for (name, text) in modules {
+        std::fs::write(out.join(format!("{name}.rs")), text).expect("OUT_DIR can be written");
     }
 }
 

@@ -23,7 +23,7 @@
 
 use crate::compile::{compile, Generated, Options};
 use crate::diagnostic::{Diagnostics, Severity, Source};
-use crate::emit::Scalar;
+use crate::emit::{Lanes, Scalar};
 use crate::export::identifier;
 use crate::expr::Grade;
 use crate::function::{ForwardDynamicsMethod, Function};
@@ -83,6 +83,19 @@ impl Builder {
         let mut scalars = scalars.into_iter();
         self.options.scalar = scalars.next().unwrap_or(self.options.scalar);
         self.options.also = scalars.collect();
+        self
+    }
+
+    /// Beside every function the same over lanes of states and over batches.
+    pub fn lanes(mut self, lanes: Lanes) -> Self {
+        self.options.lanes = Some(lanes);
+        self
+    }
+
+    /// Whether a·b + c is one operation, with one rounding, where the machine has it: last bits are other ones there than
+    /// elsewhere. The code needs `std`.
+    pub fn fma(mut self, fma: bool) -> Self {
+        self.options.fma = fma;
         self
     }
 

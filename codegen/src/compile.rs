@@ -3,7 +3,7 @@
 use crate::choose::choose;
 use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
-use crate::emit::{self, Item, Provenance, Scalar};
+use crate::emit::{self, Item, Lanes, Provenance, Scalar, Style};
 use crate::expr::{verify, Counts, Folding, Grade, Graph, Port, RuleSet, Section};
 use crate::forward_method::MethodChoice;
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
@@ -32,6 +32,10 @@ pub struct Options {
     pub scalar: Scalar,
     /// Other scalar types: for each a module with the same items ([`Scalar::module`]).
     pub also: Vec<Scalar>,
+    /// Whether functions over lanes and batches of states stand beside the plain ones.
+    pub lanes: Option<Lanes>,
+    /// Whether a·b + c is one operation, with one rounding, where the machine has it; needs `std`.
+    pub fma: bool,
     /// The weakest rules allowed: with [`Grade::Exact`] the output is the generic runtime bit for bit.
     pub grade: Grade,
     /// How forward dynamics is computed.
@@ -51,6 +55,8 @@ impl Default for Options {
             frames: Vec::new(),
             scalar: Scalar::F64,
             also: Vec::new(),
+            lanes: None,
+            fma: false,
             grade: Grade::Algebraic,
             forward_dynamics: ForwardDynamicsMethod::default(),
             limits: Limits::default(),
@@ -66,6 +72,11 @@ impl Options {
         let algebraic = self.grade == Grade::Algebraic;
         let cheaper = self.forward_dynamics == ForwardDynamicsMethod::Cheaper;
         Optimisations { folding: algebraic, algebraic, reduced: algebraic, sums: algebraic, chosen: algebraic, cheaper }
+    }
+
+    /// How functions are written.
+    pub fn style(&self) -> Style {
+        Style::plain(self.scalar).fused(self.fma)
     }
 
     /// The rewrite rules that these options allow.
@@ -225,6 +236,10 @@ pub struct Generated {
     pub scalar: Scalar,
     /// The same in the other scalar types that were asked for; [`Generated::text`] has them as modules.
     pub others: Vec<Generated>,
+    /// How its functions are written.
+    pub style: Style,
+    /// Whether functions over lanes and batches stand beside the plain ones.
+    pub lanes: Option<Lanes>,
     /// Where it came from.
     pub provenance: Provenance,
     /// Its figures.
@@ -361,11 +376,16 @@ fn generate(
         if let Some(method) = method {
             doc.push_str(&format!("\n{method}\n"));
         }
-        let text = emit::function(graph, schedule, function.name(), &doc, options.scalar, &title);
+        let text = emit::function(graph, schedule, function.name(), &doc, options.style(), &title);
         let figures = FunctionReport::new(&program, options.scalar, text.text.lines().count());
         functions.insert(function.name(), FunctionReport { waterfall, ..figures });
-        let Program { function, graph, .. } = program;
-        items.push(Item { function, inputs: graph.inputs, outputs: graph.outputs, doc, text });
+        let Program { function, graph, schedule, .. } = program;
+        let (inputs, outputs) = (graph.inputs.clone(), graph.outputs.clone());
+        let mut item = Item { function, inputs, outputs, doc, text, lanes: String::new() };
+        if let Some(lanes) = options.lanes {
+            item.lanes = emit::batch::lanes(&item, (&graph, &schedule), options.style(), lanes, &title);
+        }
+        items.push(item);
     }
     let (contact_text, contact) = crate::contact::module(&robot, options, &title);
     let staged = options.scene.staged.then(|| staged(&robot, &frames, options, &title));
@@ -395,7 +415,7 @@ fn generate(
             || (staged_text.clone() + &contact_text).contains(&format!("&{name}"))
     };
     let types = parameter_types(&robot, options, &takes) + &staged_text + &contact_text;
-    let text = emit::file(model, &frames, &items, &report, &provenance, options.scalar, &types);
+    let text = emit::file(model, &frames, &items, &report, &provenance, options.style(), &types, options.lanes);
     Generated {
         model: robot.model,
         frames,
@@ -404,6 +424,8 @@ fn generate(
         items,
         scalar: options.scalar,
         others: Vec::new(),
+        style: options.style(),
+        lanes: options.lanes,
         provenance,
         report,
         warnings,
@@ -431,7 +453,7 @@ fn parameter_types(robot: &Robot, options: &Options, takes: &dyn Fn(&Parameter) 
         let (schedule, name) = (schedule(&graph, options.limits), p.input_name());
         let doc = "The parameters about the origins, and in the axes, of the frames that the equations use.";
         let constructor =
-            emit::function(&graph, &schedule, &format!("{name}_parameters"), doc, options.scalar, &|_| String::new());
+            emit::function(&graph, &schedule, &format!("{name}_parameters"), doc, options.style(), &|_| String::new());
         emit::parameter::parameter(&name, &p.type_name(), p.frame(), LOAD_SCALARS, &constructor, options.scalar)
     });
     let types: String = types.collect();

@@ -2,7 +2,7 @@
 
 use crate::compile::{compile, Generated, Options};
 use crate::diagnostic::{Diagnostic, Diagnostics, Severity, Source};
-use crate::emit::array_type;
+use crate::emit::{array_type, batch};
 use crate::expr::Port;
 use crate::scene;
 use std::fmt::Write;
@@ -135,6 +135,9 @@ pub fn associated_items(generated: &Generated) -> String {
             signature.join(", "),
             arguments.join(", ")
         );
+        if let Some(lanes) = generated.lanes {
+            out.push_str(&batch::associated(item, generated.style, lanes));
+        }
     }
     out
 }

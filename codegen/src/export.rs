@@ -4,7 +4,7 @@
 //! Every function stands in a module of its own, so that rustc's back end can work on several at once.
 
 use crate::compile::Generated;
-use crate::emit::{self, one_line, Scalar};
+use crate::emit::{self, one_line, Item, Scalar};
 use crate::expr::Port;
 use crate::function::Function;
 use crate::output::MARK;
@@ -38,19 +38,31 @@ pub fn c_package(generated: &Generated, prefix: &str) -> Vec<(String, String)> {
         ("src/dynamics/mod.rs".to_string(), package.dynamics()),
     ];
     for item in &generated.items {
-        let mut uses: Vec<&str> = item.inputs.iter().filter_map(|port| port.wrapper.as_deref()).collect();
-        if item.text.calls_kernel() {
-            uses.push("trig");
-        }
-        let uses: String = uses.iter().map(|name| format!("use super::{name};\n")).collect();
-        let gap = if uses.is_empty() { "" } else { "\n" };
-        files.push((format!("src/dynamics/{}.rs", item.function.name()), format!("{uses}{gap}{}", item.text.text)));
+        files.push((format!("src/dynamics/{}.rs", item.function.name()), package.function(item)));
+    }
+    if generated.lanes.is_some() {
+        files.push(("src/dynamics/drivers.rs".to_string(), emit::batch::drivers().to_string()));
+        files.push(("src/dispatch.rs".to_string(), DISPATCH.to_string()));
     }
     if package.calls_kernel() {
-        files.push(("src/dynamics/trig.rs".to_string(), emit::kernel().to_string()));
+        files.push(("src/dynamics/trig.rs".to_string(), emit::kernel(generated.lanes.is_some()).into_owned()));
     }
     files
 }
+
+/// What the header says of batches.
+const BATCHES: &str = "
+/* Functions over batches: ..._batch_soa(n, ...) and ..._batch_aos(n, ...) compute n states with the vector instructions of
+ * the machine (AVX2 or AVX-512 where it has them), each state to the bits that the plain function gives. Every array
+ * holds n states. soa (structure of arrays, the faster one): component c of state s at [c * n + s]; aos (array of structures):
+ * at [s * w + c] for arrays of w numbers to a state. n may be 0. */
+";
+
+/// What chooses the vector instructions of the machine, pasted as it is.
+const DISPATCH: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/src/dispatch.rs"));
+
+/// The layouts of batches, with where component `c` of state `s` is.
+const LAYOUTS: [(&str, &str); 2] = [("soa", "[c * n + s]"), ("aos", "[s * w + c], w numbers to a state")];
 
 struct Package<'a> {
     generated: &'a Generated,
@@ -64,6 +76,8 @@ struct Parameter {
     length: usize,
     array: String,
     is_output: bool,
+    /// Whether one value serves all states of a batch.
+    is_shared: bool,
 }
 
 impl Package<'_> {
@@ -74,6 +88,27 @@ impl Package<'_> {
     fn calls_kernel(&self) -> bool {
         self.generated.items.iter().any(|i| i.text.calls_kernel())
             || self.generated.types.contains("use super::super::trig;")
+    }
+
+    /// The module of one function.
+    fn function(&self, item: &Item) -> String {
+        let kernel = if item.text.calls_kernel() { "use super::trig;\n" } else { "" };
+        let batch = if item.lanes.is_empty() { "" } else { "use super::batch;\n" };
+        let types: String = item
+            .inputs
+            .iter()
+            .filter_map(|p| p.wrapper.as_ref())
+            .map(|wrapper| format!("use super::{wrapper};\n"))
+            .collect();
+        let fused = if self.generated.style.fused {
+            "#[allow(unused_imports)]\nuse super::fused::{fma, fma_if, FUSED};\n"
+        } else {
+            ""
+        };
+        let uses = [fused, kernel, batch, &types].concat();
+        let gap = if uses.is_empty() { "" } else { "\n" };
+        let lanes = if item.lanes.is_empty() { String::new() } else { format!("\n{}", item.lanes) };
+        format!("{uses}{gap}{}{lanes}", item.text.text)
     }
 
     fn provenance(&self) -> String {
@@ -110,9 +145,23 @@ overflow-checks = false
     fn dynamics(&self) -> String {
         let g = self.generated;
         let mut out = emit::preamble(&g.model, &g.frames, &g.report, &g.provenance, g.scalar, &g.types);
+        if g.style.fused {
+            out.push_str(&emit::fused::module(g.scalar));
+        }
         for item in &self.generated.items {
             let name = item.function.name();
-            let _ = write!(out, "\nmod {name};\npub use self::{name}::{name};\n");
+            let names = match self.generated.lanes {
+                Some(_) => format!("{{{name}, {name}_batch_aos, {name}_batch_soa, {name}_lanes}}"),
+                None => name.to_string(),
+            };
+            let _ = write!(out, "\nmod {name};\npub use self::{name}::{names};\n");
+        }
+        if self.generated.lanes.is_some() {
+            out.push_str(
+                "\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod drivers;\n\
+                 /// Batches, with the vector instructions of the machine.\n\
+                 pub mod batch {\n    pub use super::drivers::*;\n    pub use crate::dispatch::{run_f32, run_f64};\n}\n",
+            );
         }
         if self.calls_kernel() {
             out.push_str("\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod trig;\n");
@@ -134,6 +183,7 @@ overflow-checks = false
                     None => emit::array_type(port, self.scalar()),
                 },
                 is_output,
+                is_shared: port.wrapper.is_some(),
             })
             .collect()
     }
@@ -154,7 +204,7 @@ use core::ffi::{{c_char, c_int, CStr}};
 
 #[forbid(unsafe_code)]
 pub mod dynamics;
-
+{dispatch}
 /// Number of configuration coordinates.
 #[no_mangle]
 pub extern "C" fn {prefix}_nq() -> c_int {{
@@ -198,6 +248,10 @@ fn name(names: &[&CStr], i: c_int) -> *const c_char {{
 }}
 "#,
             provenance = self.provenance(),
+            dispatch = match self.generated.lanes {
+                Some(_) => "mod dispatch;\n\nuse dynamics::batch;\n",
+                None => "",
+            },
         );
         for body in self.bodies() {
             let _ = write!(out, "{}", self.constructor(&body));
@@ -231,6 +285,56 @@ pub unsafe extern "C" fn {prefix}_{name}({signature}) {{
 }}
 "#,
                 summary = function.summary(),
+            );
+            if self.generated.lanes.is_some() {
+                out.push_str(&self.batches(function, &parameters));
+            }
+        }
+        out
+    }
+
+    /// The C functions over batches of one function.
+    fn batches(&self, function: Function, parameters: &[Parameter]) -> String {
+        let (prefix, scalar, name) = (self.prefix, self.scalar().name(), function.name());
+        let list = |f: &dyn Fn(&Parameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
+        let pointer = |p: &Parameter| format!("{}: *{} {scalar}", p.name, if p.is_output { "mut" } else { "const" });
+        let slices: String = parameters
+            .iter()
+            .map(|p| match (p.is_output, p.is_shared) {
+                (_, true) => format!("    let {0} = unsafe {{ &*{0}.cast::<{1}>() }};\n", p.name, p.array),
+                (true, _) => format!(
+                    "    let {0} = unsafe {{ core::slice::from_raw_parts_mut({0}, n * {1}) }};\n",
+                    p.name, p.length
+                ),
+                (false, _) => {
+                    format!("    let {0} = unsafe {{ core::slice::from_raw_parts({0}, n * {1}) }};\n", p.name, p.length)
+                }
+            })
+            .collect();
+        let lengths = list(&|p| match p.is_shared {
+            true => format!("`{}` {}", p.name, p.length),
+            false => format!("`{}` n times {}", p.name, p.length),
+        });
+        let (signature, arguments) = (list(&pointer), list(&|p| p.name.clone()));
+        let mut out = String::new();
+        for (layout, place) in LAYOUTS {
+            let _ = write!(
+                out,
+                r#"
+/// The same for `n` states: component c of state s at {place}.
+///
+/// # Safety
+/// The pointers lead to aligned arrays of {scalar}: {lengths}; what is written overlaps nothing that is read.
+#[no_mangle]
+pub unsafe extern "C" fn {prefix}_{name}_batch_{layout}(n: usize, {signature}) {{
+    if n == 0 {{
+        return;
+    }}
+    // SAFETY of all these: the caller's promise
+{slices}    let done = dynamics::{name}_batch_{layout}(n, {arguments});
+    debug_assert!(done.is_ok(), "the slices are made of n");
+}}
+"#
             );
         }
         out
@@ -326,7 +430,7 @@ pub unsafe extern "C" fn {prefix}_{name}_new(
 #define {upper}_NV {nv}
 #define {upper}_JOINT_COUNT {joints}
 #define {upper}_FRAME_COUNT {frames}
-
+{include}
 #ifdef __cplusplus
 extern "C" {{
 #endif
@@ -343,7 +447,11 @@ const char *{prefix}_frame_name(int i);
 "#,
             joints = model.bodies.len(),
             frames = self.generated.frames.len(),
+            include = if self.generated.lanes.is_some() { "\n#include <stddef.h>\n" } else { "" },
         );
+        if self.generated.lanes.is_some() {
+            out.push_str(BATCHES);
+        }
         let c_type = match self.scalar() {
             Scalar::F64 => "double",
             Scalar::F32 => "float",
@@ -371,7 +479,22 @@ const char *{prefix}_frame_name(int i);
                 .iter()
                 .map(|p| format!("{}{c_type} {}[{}]", if p.is_output { "" } else { "const " }, p.name, p.length))
                 .collect();
-            let _ = writeln!(out, " */\nvoid {prefix}_{}({});", item.function.name(), parameters.join(", "));
+            let name = item.function.name();
+            let _ = writeln!(out, " */\nvoid {prefix}_{name}({});", parameters.join(", "));
+            if self.generated.lanes.is_some() {
+                let parameters: Vec<String> = self
+                    .parameters(item.function)
+                    .iter()
+                    .map(|p| match (p.is_output, p.is_shared) {
+                        (true, _) => format!("{c_type} *{}", p.name),
+                        (false, false) => format!("const {c_type} *{}", p.name),
+                        (false, true) => format!("const {c_type} {}[{}]", p.name, p.length),
+                    })
+                    .collect();
+                for (layout, _) in LAYOUTS {
+                    let _ = writeln!(out, "void {prefix}_{name}_batch_{layout}(size_t n, {});", parameters.join(", "));
+                }
+            }
         }
         out.push_str("\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n");
         out

@@ -276,7 +276,7 @@ fn text(
     let mut items = String::new();
     let mut kernel = false;
     let mut private = |graph: &Graph, name: &str, doc: &str| {
-        let text = emit::function(graph, &schedule(graph, options.limits), name, doc, scalar, title);
+        let text = emit::function(graph, &schedule(graph, options.limits), name, doc, options.style(), title);
         kernel |= text.calls_kernel();
         text.text.replacen("pub fn ", "fn ", 1)
     };
@@ -306,6 +306,9 @@ fn text(
          /// A later stage borrows the earlier one: a value of a stage that is out of date does not compile.\n\
          pub mod staged {\n",
     );
+    if options.fma {
+        out.push_str("    #[allow(unused_imports)]\n    use super::fused::fma;\n");
+    }
     let imports = if kernel { "    use super::trig;\n" } else { "" };
     out.push_str(imports);
     let wrappers: Vec<String> =

@@ -1,6 +1,6 @@
 //! The words by which every front names what can be chosen: functions, scalars, rules, methods.
 
-use crate::emit::Scalar;
+use crate::emit::{Lanes, Scalar};
 use crate::expr::Grade;
 use crate::function::{ForwardDynamicsMethod, Function};
 use std::fmt;
@@ -85,6 +85,16 @@ impl Choice for ForwardDynamicsMethod {
     }
 }
 
+impl Choice for Lanes {
+    const WHAT: &'static str = "home of the batches";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        vec![
+            ("standalone", "core alone; the vector instructions that the crate is compiled for", Lanes::Standalone),
+            ("runtime", "the package `straightline`: the machine's instructions, and threads", Lanes::Runtime),
+        ]
+    }
+}
+
 macro_rules! parse_words {
     ($($choice:ty),*) => {$(
         impl FromStr for $choice {
@@ -95,7 +105,7 @@ macro_rules! parse_words {
         }
     )*};
 }
-parse_words!(Function, Scalar, Grade, ForwardDynamicsMethod);
+parse_words!(Function, Scalar, Grade, ForwardDynamicsMethod, Lanes);
 
 #[cfg(test)]
 mod tests {
@@ -113,6 +123,7 @@ mod tests {
         all::<Scalar>();
         all::<Grade>();
         all::<ForwardDynamicsMethod>();
+        all::<Lanes>();
     }
 
     #[test]

@@ -41,7 +41,7 @@ fn c_calls_every_function_and_gets_what_the_generic_runtime_computes() {
     succeeds(
         Command::new(env!("CARGO_BIN_EXE_straightline"))
             .args(["export", ARM, "--c-abi", "--prefix", "Arm3", "--floating-base"])
-            .args(["--frame", "forearm", "--frame", "column", "-o"])
+            .args(["--frame", "forearm", "--frame", "column", "--lanes", "-o"])
             .arg(&package),
     );
     let built = package.join("target");
@@ -75,8 +75,13 @@ fn c_calls_every_function_and_gets_what_the_generic_runtime_computes() {
         let (name, n) = (function.name(), outputs.len());
         let arguments: Vec<_> = inputs.iter().map(|p| p.name.as_str()).chain(["out"]).collect();
         calls.push_str(&format!(
-            "    {{ double out[{n}]; Arm3_{name}({}); show(\"{name}\", out, {n}); }}\n",
-            arguments.join(", ")
+            "    {{ double out[{n}]; Arm3_{name}({0}); show(\"{name}\", out, {n});\n      \
+             double batch[{n}]; Arm3_{name}_batch_soa(1, {1}); if (memcmp(out, batch, sizeof out)) return 4;\n      \
+             Arm3_{name}_batch_aos(1, {1}); if (memcmp(out, batch, sizeof out)) return 5;\n      \
+             Arm3_{name}_batch_aos(0, {2}); }}\n",
+            arguments.join(", "),
+            arguments.join(", ").replace("out", "batch"),
+            vec!["NULL"; arguments.len()].join(", ")
         ));
         truth.extend(outputs.into_iter().enumerate().map(|(k, x)| (format!("{name} {k}"), x)));
     }
@@ -90,6 +95,7 @@ fn c_calls_every_function_and_gets_what_the_generic_runtime_computes() {
     let program = format!(
         r#"#include "arm3_dynamics.h"
 #include <stdio.h>
+#include <string.h>
 static void show(const char *name, const double *x, int n) {{
     for (int k = 0; k < n; k++) printf("%s %d %.17g\n", name, k, x[k]);
 }}

@@ -34,6 +34,7 @@
 //! | `scalar = "f32"`; `scalars("f64", "f32")`: for each further one a module `single` or `double` | `"f64"` |
 //! | `floating_base`: the root link moves freely | as the file says |
 //! | `joint_order("a", "b")`: all joints in the order of their coordinates | depth first, as in the file |
+//! | `lanes`: beside every function the same over lanes of states and over batches ([`batch`]) | one state at a time |
 //! | `gravity(0.0, 0.0, -9.81)` \[m/s²\] | the file's, or this |
 //! | `angle_tolerance = 1e-6`: so near to a multiple of 30 or 45 degrees \[rad\] an angle is taken as that | rounding only |
 //! | `rules = "exact"`: the same bits as the generic runtime | `"all"`: fewest operations |
@@ -60,12 +61,21 @@
 //!
 //! # Features
 //! * `derive` (default): the macros. They run the compiler of dynamics while your crate is built.
+//! * `std`: functions over batches use the vector instructions of the machine, found out at run time.
+//! * `rayon`: functions over batches on several threads; `std` with it.
 //! * `runtime`: the generic numeric algorithms, for robots that are known only at run time; needs an allocator.
 //!
 //! Without features there is `core` only. Build scripts use `straightline_codegen::Builder`; source to commit, C libraries
 //! and reports come from the command `straightline`.
 #![no_std]
-#![forbid(unsafe_code)]
+// `deny`, and allowed in `dispatch` alone: calling a function that is compiled for other instructions is unsafe
+#![deny(unsafe_code)]
+#[cfg(feature = "std")]
+extern crate std;
+
+pub mod batch;
+#[cfg(feature = "std")]
+mod dispatch;
 
 pub use straightline_core::{control, integrate, Real};
 #[cfg(feature = "derive")]

@@ -39,6 +39,11 @@ struct Satellite;
 #[robot("examples/arm.toml", scene = "examples/payload_scene.toml", module = "loaded")]
 pub struct Loaded;
 
+/// Many of them at once.
+#[derive(Dynamics)]
+#[robot("examples/arm.toml", functions(inverse_dynamics), lanes)]
+pub struct Arms;
+
 straightline::dynamics! {
     /// The arm as a module, found from this file.
     pub mod arm = "../examples/arm.toml", scalar = "f32", functions(inverse_dynamics,),
@@ -115,4 +120,28 @@ fn types_of_parameters_and_stages_and_further_scalars_are_reached_through_the_mo
     let tool = loaded::single::Tool::new(0.6, [0.05, 0.01, -0.02], [1e-3, 0.0, 0.0, 2e-3, 0.0, 1.5e-3]).unwrap();
     loaded::single::inverse_dynamics(&narrow(q), &narrow(qd), &narrow(qdd), &tool, &mut single);
     assert!(close(&single.map(f64::from), &tau, 1e-5), "{single:?} {tau:?}");
+}
+
+#[test]
+fn a_batch_is_many_single_calls() {
+    const N: usize = 21;
+    let numbers = |seed: usize| -> Vec<f64> { (0..3 * N).map(|i| ((i * 7 + seed) % 23) as f64 / 8.0 - 1.0).collect() };
+    let (q, qd, qdd) = (numbers(1), numbers(5), numbers(11));
+    let (mut rows, mut components) = (vec![0.0; 3 * N], vec![0.0; 3 * N]);
+    Arms::inverse_dynamics_batch_aos(N, &q, &qd, &qdd, &mut rows).unwrap();
+    let transposed = |x: &[f64]| -> Vec<f64> { (0..3 * N).map(|i| x[i % N * 3 + i / N]).collect() };
+    Arms::inverse_dynamics_batch_soa(N, &transposed(&q), &transposed(&qd), &transposed(&qdd), &mut components).unwrap();
+    assert_eq!(components, transposed(&rows));
+    for s in 0..N {
+        let state = |x: &[f64]| -> [f64; 3] { x[3 * s..3 * s + 3].try_into().unwrap() };
+        let mut tau = [0.0; 3];
+        Arms::inverse_dynamics(&state(&q), &state(&qd), &state(&qdd), &mut tau);
+        assert_eq!(state(&rows), tau);
+        let one = |x: [f64; 3]| x.map(|x| [x]);
+        let mut lanes = [[0.0]; 3];
+        Arms::inverse_dynamics_lanes(&one(state(&q)), &one(state(&qd)), &one(state(&qdd)), &mut lanes);
+        assert_eq!(lanes, one(tau));
+    }
+    let wrong = Arms::inverse_dynamics_batch_aos(N, &q[1..], &qd, &qdd, &mut rows).unwrap_err();
+    assert_eq!(wrong.to_string(), "`q` has 62 numbers: 21 states of 3 are wanted");
 }

@@ -1,7 +1,7 @@
 //! `"panda.urdf", floating_base, scalar = "f32", functions(inverse_dynamics, mass_matrix), …`
 
 use std::str::FromStr;
-use straightline_codegen::emit::Scalar;
+use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::{Function, Options};
 use syn::parse::{Parse, ParseStream};
 use syn::punctuated::Punctuated;
@@ -63,6 +63,8 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
             options.scalar = scalars.next().ok_or_else(|| Error::new(key.span(), "scalars(\"f64\", \"f32\")"))?;
             options.also = scalars.collect();
         }
+        "lanes" => options.lanes = Some(Lanes::Runtime),
+        "fma" => options.fma = true,
         "rules" => options.grade = word(input)?,
         "forward_dynamics" => options.forward_dynamics = word(input)?,
         "max_part_operations" => options.limits.operations = value::<LitInt>(input)?.base10_parse()?,
@@ -83,7 +85,7 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         }
         other => {
             let known =
-                "floating_base, scalar, scalars, rules, forward_dynamics, max_part_operations, angle_tolerance, \
+                "floating_base, scalar, scalars, lanes, fma, rules, forward_dynamics, max_part_operations, angle_tolerance, \
                          functions, frames, joint_order, gravity, scene, module";
             return Err(Error::new(key.span(), format!("there is no option `{other}`; one of: {known}")));
         }

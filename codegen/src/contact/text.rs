@@ -2,7 +2,7 @@
 
 use super::{programs, Mode, ModeProgram};
 use crate::compile::Options;
-use crate::emit::{self, array_type, upper_camel_case};
+use crate::emit::{self, array_type, upper_camel_case, Style};
 use crate::expr::{Port, Section};
 use crate::function::Robot;
 use crate::report::ContactReport;
@@ -34,7 +34,7 @@ pub fn module(robot: &Robot, options: &Options, title: &dyn Fn(Section) -> Strin
                 counts.mul, counts.add, counts.div, counts.sqrt, counts.sin_cos
             );
             let schedule = schedule(graph, options.limits);
-            let source = emit::function(graph, &schedule, function.name(), &doc, options.scalar, title);
+            let source = emit::function(graph, &schedule, function.name(), &doc, Style::plain(options.scalar), title);
             kernel |= source.calls_kernel();
             text.push('\n');
             text.push_str(&source.text);

@@ -1,6 +1,7 @@
 //! One program as one public function, or as a public function over private parts.
 
-use super::{array_type, element, one_line, Names, Scalar};
+use super::fused::{fusions, Fused};
+use super::{one_line, Names, Scalar, Style};
 use crate::expr::{Constant, Graph, NodeId, Op, Port, Section};
 use crate::schedule::{Part, Schedule};
 use std::fmt::Write;
@@ -24,13 +25,18 @@ pub struct FunctionText {
 }
 
 impl FunctionText {
+    fn new() -> Self {
+        FunctionText { text: String::new(), uses_sin_cos: false, uses_sqrt: false }
+    }
+
     /// Whether it needs [`super::kernel`] as a module `trig`.
     pub fn calls_kernel(&self) -> bool {
         self.uses_sin_cos || self.uses_sqrt
     }
 }
 
-/// Writes `pub fn name(q: &[f64; 7], …, tau: &mut [f64; 7])`.
+/// Writes `pub fn name(q: &[f64; 7], …, tau: &mut [f64; 7])`, or over lanes
+/// `pub fn name<const N: usize>(q: &[[f64; N]; 7], …, tau: &mut [[f64; N]; 7])`.
 ///
 /// `doc` stands above it, line by line; `title` words the comment above a section's block.
 pub fn function(
@@ -38,10 +44,10 @@ pub fn function(
     schedule: &Schedule,
     name: &str,
     doc: &str,
-    scalar: Scalar,
+    style: Style,
     title: &dyn Fn(Section) -> String,
 ) -> FunctionText {
-    let mut out = FunctionText { text: String::new(), uses_sin_cos: false, uses_sqrt: false };
+    let mut out = FunctionText::new();
     for line in doc.lines() {
         let _ = writeln!(out.text, "///{}{line}", if line.is_empty() { "" } else { " " });
     }
@@ -66,19 +72,25 @@ pub fn function(
     };
     let signature = parameters(&mut |p, used, out| {
         let (underscore, reference) = (if used { "" } else { "_" }, if out { "&mut " } else { "&" });
-        format!("{underscore}{}: {reference}{}", p.name, array_type(p, scalar))
+        format!("{underscore}{}: {reference}{}", p.name, style.array_type(p))
     });
+    // a body over lanes becomes part of its caller, and takes the caller's vector instructions
+    let (inline, part_inline) = match style.lanes {
+        true => ("\n#[inline(always)]", "#[inline(always)]"),
+        false => ("", "#[inline(never)]"),
+    };
+    let generics = style.generics();
     if let [part] = schedule.parts.as_slice() {
-        let _ = writeln!(out.text, "{ALLOW}\npub fn {name}({signature}) {{");
-        body(graph, part, scalar, title, &mut out);
+        let _ = writeln!(out.text, "{ALLOW}{inline}\npub fn {name}{generics}({signature}) {{");
+        body(graph, part, style, title, &mut out);
         out.text.push_str("}\n");
         return out;
     }
 
     // in parts: the public function calls them one after the other
     let slots = schedule.slots;
-    let _ = writeln!(out.text, "{ALLOW}\npub fn {name}({signature}) {{");
-    let _ = writeln!(out.text, "    let mut live = [0.0; {slots}];");
+    let _ = writeln!(out.text, "{ALLOW}{inline}\npub fn {name}{generics}({signature}) {{");
+    let _ = writeln!(out.text, "    let mut live = [{}; {slots}];", style.zero());
     let mut parts = String::new();
     for (k, part) in schedule.parts.iter().enumerate() {
         let used = used_inputs(&mut part.nodes.iter().copied().chain(part.results.iter().map(|r| graph.results[*r])));
@@ -89,23 +101,24 @@ pub fn function(
         for (i, p) in graph.inputs.iter().enumerate().filter(|(i, _)| used[*i]) {
             let _ = i;
             arguments.push(p.name.to_string());
-            types.push(format!("{}: &{}", p.name, array_type(p, scalar)));
+            types.push(format!("{}: &{}", p.name, style.array_type(p)));
         }
         if !(part.loads.is_empty() && part.stores.is_empty()) {
             let m = if part.stores.is_empty() { "" } else { "mut " };
             arguments.push(format!("&{m}live"));
-            types.push(format!("live: &{m}[{}; {slots}]", scalar.name()));
+            types.push(format!("live: &{m}[{}; {slots}]", style.element_type()));
         }
         for (i, p) in graph.outputs.iter().enumerate() {
             if writes[i] {
                 arguments.push(p.name.to_string());
-                types.push(format!("{}: &mut {}", p.name, array_type(p, scalar)));
+                types.push(format!("{}: &mut {}", p.name, style.array_type(p)));
             }
         }
-        let _ = writeln!(out.text, "    {name}_part{}({});", k + 1, arguments.join(", "));
-        let mut text = FunctionText { text: String::new(), uses_sin_cos: false, uses_sqrt: false };
-        body(graph, part, scalar, title, &mut text);
-        let _ = writeln!(parts, "\n{ALLOW}\n#[inline(never)]\nfn {name}_part{}({}) {{", k + 1, types.join(", "));
+        let called = if style.lanes && style.fused { "::<N, FUSED>" } else { "" };
+        let _ = writeln!(out.text, "    {name}_part{}{called}({});", k + 1, arguments.join(", "));
+        let mut text = FunctionText::new();
+        body(graph, part, style, title, &mut text);
+        let _ = writeln!(parts, "\n{ALLOW}\n{part_inline}\nfn {name}_part{}{generics}({}) {{", k + 1, types.join(", "));
         parts.push_str(&text.text);
         parts.push_str("}\n");
         out.uses_sin_cos |= text.uses_sin_cos;
@@ -139,7 +152,9 @@ enum Binding {
 /// The statements of one part: expressions of single use are written where they are used.
 struct Body<'a> {
     graph: &'a Graph,
-    scalar: Scalar,
+    style: Style,
+    /// Sums that take a product in.
+    fused: Vec<Option<Fused>>,
     /// What stands for each node: its name, its literal, or its expression.
     text: Vec<Option<(String, Binding)>>,
     /// Sine-cosine pairs that are written already.
@@ -150,11 +165,38 @@ struct Body<'a> {
     statements: String,
 }
 
-fn body(graph: &Graph, part: &Part, scalar: Scalar, title: &dyn Fn(Section) -> String, out: &mut FunctionText) {
-    let taken = graph.inputs.iter().chain(&graph.outputs).map(|p| p.name.as_str()).chain(["live", "trig"]);
+/// The statements of one part; over lanes, in a loop over them.
+fn body(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) -> String, out: &mut FunctionText) {
+    if !style.lanes {
+        return statements(graph, part, style, title, out);
+    }
+    let mut inner = FunctionText::new();
+    statements(graph, part, style, title, &mut inner);
+    out.text.push_str("    for lane in 0..N {\n");
+    for line in inner.text.lines() {
+        let _ = writeln!(out.text, "    {line}");
+    }
+    out.text.push_str("    }\n");
+    out.uses_sin_cos |= inner.uses_sin_cos;
+    out.uses_sqrt |= inner.uses_sqrt;
+}
+
+fn statements(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) -> String, out: &mut FunctionText) {
+    let taken = graph
+        .inputs
+        .iter()
+        .chain(&graph.outputs)
+        .map(|p| p.name.as_str())
+        .chain(["live", "trig", "lane", "fma", "fma_if"]);
+    let scalar = style.scalar;
+    let (fused, absorbed) = match style.fused {
+        true => fusions(graph, part),
+        false => (vec![None; graph.ops.len()], vec![false; graph.ops.len()]),
+    };
     let mut b = Body {
         graph,
-        scalar,
+        style,
+        fused,
         text: vec![None; graph.ops.len()],
         paired: vec![false; graph.ops.len()],
         names: Names::with_taken(taken),
@@ -174,7 +216,7 @@ fn body(graph: &Graph, part: &Part, scalar: Scalar, title: &dyn Fn(Section) -> S
     if !part.loads.is_empty() {
         for chunk in part.loads.chunks(DECLARATION) {
             let names: Vec<String> = chunk.iter().map(|(id, _)| b.fresh_name(*id)).collect();
-            let slots: Vec<String> = chunk.iter().map(|(_, s)| format!("live[{s}]")).collect();
+            let slots: Vec<String> = chunk.iter().map(|(_, s)| format!("live[{s}]{}", style.lane())).collect();
             out.text.push_str(&wrapped("    let [", &names, &format!("]: [{}; {}] =", scalar.name(), names.len())));
             out.text.push_str(&wrapped("        [", &slots, "];"));
             for ((id, _), name) in chunk.iter().zip(names) {
@@ -200,11 +242,16 @@ fn body(graph: &Graph, part: &Part, scalar: Scalar, title: &dyn Fn(Section) -> S
                 }
             }
             Op::Sin(_) | Op::Cos(_) => {}
+            _ if absorbed[id.index()] => {}
             _ => {
                 out.uses_sqrt |= matches!(op, Op::Sqrt(_) | Op::Sign(_));
-                let (text, binding) = b.expression(op);
+                let (text, binding) = match b.fused[id.index()] {
+                    Some(fused) => (b.fma(fused), Binding::Atom),
+                    None => b.expression(op),
+                };
                 let named = graph.notes[id.index()].name.is_some();
-                let trivial = matches!(op, Op::Neg(_)) && binding == Binding::Sign && text.len() < 24;
+                // a sign before a name is written wherever it is used; an operation is not
+                let trivial = matches!(op, Op::Neg(_)) && text.len() < 24 && !text.contains("fma");
                 let alone = uses[id.index()] <= 1 && !crosses[id.index()];
                 let result_only = alone && results_of.binary_search_by_key(id, |(r, _)| *r).is_ok();
                 if (trivial && !crosses[id.index()]) || result_only || (alone && !named && text.len() < LINE * 2 / 3) {
@@ -223,7 +270,7 @@ fn body(graph: &Graph, part: &Part, scalar: Scalar, title: &dyn Fn(Section) -> S
         }
         if let Ok(i) = part.stores.binary_search_by_key(id, |(s, _)| *s) {
             let text = b.operand(*id).0;
-            let _ = writeln!(b.statements, "    live[{}] = {text};", part.stores[i].1);
+            let _ = writeln!(b.statements, "    live[{}]{} = {text};", part.stores[i].1, style.lane());
         }
     }
     b.close_block(out, section, title);
@@ -251,9 +298,11 @@ impl Body<'_> {
         match self.graph.op(id) {
             Op::Input(k) => {
                 let (port, k) = port_of(&self.graph.inputs, k as usize);
-                (element(&self.graph.inputs[port], k), Binding::Atom)
+                (self.style.element(&self.graph.inputs[port], k), Binding::Atom)
             }
-            Op::Constant(c) => (literal(c, self.scalar), if c.is_negative() { Binding::Sign } else { Binding::Atom }),
+            Op::Constant(c) => {
+                (literal(c, self.style.scalar), if c.is_negative() { Binding::Sign } else { Binding::Atom })
+            }
             _ => self.text[id.index()].clone().expect("operands stand before their users"),
         }
     }
@@ -268,6 +317,16 @@ impl Body<'_> {
         }
     }
 
+    /// `fma(a, b, c)`; changes of sign are part of the instruction.
+    fn fma(&self, Fused { negated, factors: (x, y), other: (c, subtracted) }: Fused) -> String {
+        let signed = |id, minus: bool| match minus {
+            true => format!("-{}", self.bound(id, Binding::Atom)),
+            false => self.operand(id).0,
+        };
+        let function = if self.style.lanes { "fma_if::<FUSED>" } else { "fma" };
+        format!("{function}({}, {}, {})", signed(x, negated), self.operand(y).0, signed(c, subtracted))
+    }
+
     fn expression(&self, op: Op) -> (String, Binding) {
         use Binding::{Atom, Product, Sign, Sum};
         match op {
@@ -276,8 +335,8 @@ impl Body<'_> {
             Op::Mul(a, b) => (format!("{} * {}", self.bound(a, Product), self.bound(b, Sign)), Product),
             Op::Div(a, b) => (format!("{} / {}", self.bound(a, Product), self.bound(b, Sign)), Product),
             Op::Neg(a) => (format!("-{}", self.bound(a, Atom)), Sign),
-            Op::Sqrt(a) => (format!("trig::sqrt_{}({})", self.scalar.name(), self.operand(a).0), Atom),
-            Op::Sign(a) => (format!("trig::sign_{}({})", self.scalar.name(), self.operand(a).0), Atom),
+            Op::Sqrt(a) => (format!("trig::sqrt_{}({})", self.style.scalar.name(), self.operand(a).0), Atom),
+            Op::Sign(a) => (format!("trig::sign_{}({})", self.style.scalar.name(), self.operand(a).0), Atom),
             Op::Input(_) | Op::Constant(_) | Op::SinCos(_) | Op::Sin(_) | Op::Cos(_) => {
                 unreachable!("written where they are used")
             }
@@ -310,8 +369,12 @@ impl Body<'_> {
             }
         }
         let [sines, cosines] = halves;
-        let scalar = self.scalar.name();
-        if let [(_, angle)] = angles.as_slice() {
+        let scalar = self.style.scalar.name();
+        if self.style.lanes {
+            for ((s, c), (_, angle)) in sines.iter().zip(&cosines).zip(&angles) {
+                let _ = writeln!(self.statements, "    let ({s}, {c}) = trig::sin_cos_{scalar}({angle});");
+            }
+        } else if let [(_, angle)] = angles.as_slice() {
             let (s, c) = (&sines[0], &cosines[0]);
             let _ = writeln!(self.statements, "    let ({s}, {c}) = trig::sin_cos_{scalar}({angle});");
         } else {
@@ -329,7 +392,7 @@ impl Body<'_> {
 
     fn store_result(&mut self, id: NodeId, k: usize) {
         let (port, inner) = port_of(&self.graph.outputs, k);
-        let place = element(&self.graph.outputs[port], inner);
+        let place = self.style.element(&self.graph.outputs[port], inner);
         let _ = writeln!(self.statements, "    {place} = {};", self.operand(id).0);
     }
 
@@ -346,9 +409,9 @@ impl Body<'_> {
         }
         for names in self.declared.chunks(DECLARATION) {
             if let [name] = names {
-                let _ = writeln!(out.text, "    let {name}: {};", self.scalar.name());
+                let _ = writeln!(out.text, "    let {name}: {};", self.style.scalar.name());
             } else {
-                let end = format!("]: [{}; {}];", self.scalar.name(), names.len());
+                let end = format!("]: [{}; {}];", self.style.scalar.name(), names.len());
                 out.text.push_str(&wrapped("    let [", names, &end));
             }
         }

@@ -1,11 +1,13 @@
 //! The generated file: header, constants of the robot, functions, and the sine-cosine kernel they call.
 
+use super::batch::{self, Lanes};
 use super::body::ALLOW;
-use super::{one_line, FunctionText, Scalar};
+use super::{fused, one_line, FunctionText, Scalar, Style};
 use crate::expr::Port;
 use crate::function::Function;
 use crate::report::waterfall::signed;
 use crate::report::{FunctionReport, Report};
+use std::borrow::Cow;
 use std::fmt::Write;
 use straightline_core::model::{JointKind, Model};
 use straightline_core::Dd;
@@ -26,6 +28,8 @@ pub struct Item {
     pub doc: String,
     /// Its source.
     pub text: FunctionText,
+    /// The same over lanes and batches; empty if they were not asked for.
+    pub lanes: String,
 }
 
 /// Where a file came from, for its header.
@@ -42,23 +46,35 @@ pub struct Provenance {
 }
 
 /// Writes the file's items; no inner attributes, so that it can be included anywhere.
+#[allow(clippy::too_many_arguments)]
 pub fn file(
     model: &Model<Dd>,
     frames: &[String],
     items: &[Item],
     report: &Report,
     provenance: &Provenance,
-    scalar: Scalar,
+    style: Style,
     types: &str,
+    lanes: Option<Lanes>,
 ) -> String {
-    let mut out = preamble(model, frames, report, provenance, scalar, types);
+    let mut out = preamble(model, frames, report, provenance, style.scalar, types);
+    if style.fused {
+        out.push_str(&fused::module(style.scalar));
+    }
     for item in items {
         out.push('\n');
         out.push_str(&item.text.text);
+        if !item.lanes.is_empty() {
+            out.push('\n');
+            out.push_str(&item.lanes);
+        }
+    }
+    if let Some(lanes) = lanes {
+        out.push_str(&batch::module(lanes));
     }
     if items.iter().any(|i| i.text.calls_kernel()) || types.contains("use super::super::trig;") {
         out.push_str("\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod trig {\n");
-        for line in kernel().lines() {
+        for line in kernel(lanes.is_some()).lines() {
             let line = if let Some(doc) = line.strip_prefix("//!") { format!("//{doc}") } else { line.to_string() };
             let indent = if line.is_empty() { "" } else { "    " };
             let _ = writeln!(out, "{indent}{line}");
@@ -99,9 +115,13 @@ pub fn scalar_module(scalar: Scalar, text: &str) -> String {
     out + "}\n"
 }
 
-/// The source of the sine-cosine kernel, as a module of its own.
-pub fn kernel() -> &'static str {
-    TRIG
+/// The source of the sine-cosine kernel, as a module of its own. For functions over lanes it becomes part of its callers, so
+/// that a loop over lanes is free of calls.
+pub fn kernel(for_lanes: bool) -> Cow<'static, str> {
+    match for_lanes {
+        true => TRIG.replace("#[inline]", "#[inline(always)]").into(),
+        false => TRIG.into(),
+    }
 }
 
 fn header(out: &mut String, model: &Model<Dd>, report: &Report, provenance: &Provenance) {

@@ -3,11 +3,14 @@
 //! No algebra happens here. A program becomes one function, or a few when it is long; values get the names that the
 //! algorithm gave them; every section of the algorithm is a block under a comment.
 
+pub mod batch;
 mod body;
 mod file;
+pub mod fused;
 mod names;
 pub mod parameter;
 
+pub use batch::Lanes;
 pub use body::{function, FunctionText};
 pub use file::{file, kernel, preamble, scalar_module, Item, Provenance};
 pub use names::{snake_case, upper_camel_case, Names};
@@ -49,12 +52,93 @@ impl Scalar {
     }
 }
 
+/// How a function is written: over one state or over lanes of states.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Style {
+    /// The scalar type.
+    pub scalar: Scalar,
+    /// Whether every scalar of inputs and outputs is an array over `N` lanes.
+    pub lanes: bool,
+    /// Whether a·b + c is one operation where the machine has it: [`fused::module`].
+    pub fused: bool,
+}
+
+impl Style {
+    /// One state.
+    pub fn plain(scalar: Scalar) -> Self {
+        Style { scalar, lanes: false, fused: false }
+    }
+
+    /// With a·b + c as one operation, or without.
+    pub fn fused(self, fused: bool) -> Self {
+        Style { fused, ..self }
+    }
+
+    /// `N` states at once.
+    pub fn lanes(self) -> Self {
+        Style { lanes: true, ..self }
+    }
+
+    /// The type of one scalar of a port.
+    fn element_type(self) -> String {
+        match self.lanes {
+            true => format!("[{}; N]", self.scalar.name()),
+            false => self.scalar.name().to_string(),
+        }
+    }
+
+    /// The value of [`Style::element_type`] that is zero.
+    fn zero(self) -> &'static str {
+        if self.lanes {
+            "[0.0; N]"
+        } else {
+            "0.0"
+        }
+    }
+
+    /// The array type of a port; what has a type of its own is the same for all lanes.
+    pub fn array_type(self, port: &Port) -> String {
+        match port.wrapper {
+            Some(_) => array_type(port, self.scalar),
+            None => shaped(port, self.element_type()),
+        }
+    }
+
+    /// The place of scalar `k` of a port, in lanes that of one lane.
+    fn element(self, port: &Port, k: usize) -> String {
+        let lane = if port.wrapper.is_some() { "" } else { self.lane() };
+        element(port, k) + lane
+    }
+
+    /// The index of the lane.
+    fn lane(self) -> &'static str {
+        if self.lanes {
+            "[lane]"
+        } else {
+            ""
+        }
+    }
+
+    /// The generic parameters.
+    fn generics(self) -> &'static str {
+        match (self.lanes, self.fused) {
+            (false, _) => "",
+            (true, false) => "<const N: usize>",
+            (true, true) => "<const N: usize, const FUSED: bool>",
+        }
+    }
+}
+
+fn shaped(port: &Port, element: String) -> String {
+    port.shape.iter().rev().fold(element, |inner, n| format!("[{inner}; {n}]"))
+}
+
 /// The array type of a port: `[f64; 7]`, `[[f64; 7]; 6]`.
 pub fn array_type(port: &Port, scalar: Scalar) -> String {
     if let Some(wrapper) = &port.wrapper {
         return wrapper.clone();
     }
-    port.shape.iter().rev().fold(scalar.name().to_string(), |inner, n| format!("[{inner}; {n}]"))
+    shaped(port, scalar.name().to_string())
 }
 
 /// The place of scalar `k` of a port: `h[2][3]`.

@@ -11,6 +11,7 @@ extern crate alloc;
 
 #[cfg(feature = "alloc")]
 pub mod algorithms;
+pub mod batch;
 #[cfg(feature = "alloc")]
 pub mod contact;
 pub mod control;

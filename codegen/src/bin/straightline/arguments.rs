@@ -4,7 +4,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use straightline_codegen::compile::Options;
-use straightline_codegen::emit::Scalar;
+use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::experiment::parameter::{self, Sweep};
 use straightline_codegen::export::is_identifier;
 use straightline_codegen::expr::Grade;
@@ -45,6 +45,7 @@ Examples:
   straightline generate panda.urdf -o src/panda.rs --check     # in CI: is the committed file up to date?
   straightline generate arm.urdf --scalar f32 --function inverse_dynamics --function gravity_force
   straightline generate solo12.urdf --floating-base --frame FL_FOOT --frame FR_FOOT -o solo12.rs
+  straightline generate panda.urdf --lanes --function inverse_dynamics -o src/panda.rs
 
 {EXIT_CODES}"))]
     Generate(Generate),
@@ -258,6 +259,13 @@ pub struct ProgramArgs {
     /// Longer functions are cut into parts of at most so many operations
     #[arg(long, value_name = "N", default_value_t = Limits::default().operations, value_parser = part_size)]
     max_part_operations: usize,
+    /// Beside every function the same over lanes of states and over batches
+    #[arg(long, value_name = "HOME", num_args = 0..=1, require_equals = true, default_missing_value = "standalone",
+        value_parser = words::<Lanes>())]
+    lanes: Option<Lanes>,
+    /// Compute a*b + c in one rounding where the machine can; needs std, and the last bits depend on the machine
+    #[arg(long)]
+    fma: bool,
 }
 
 /// How the robot file is read.
@@ -373,6 +381,8 @@ impl ProgramArgs {
             frames: self.frames.clone(),
             scalar: self.scalar.first().copied().unwrap_or(Scalar::F64),
             also: self.scalar.iter().skip(1).copied().collect(),
+            lanes: self.lanes,
+            fma: self.fma,
             grade: self.rules,
             forward_dynamics: self.forward_dynamics,
             limits: Limits { operations: self.max_part_operations },
@@ -404,6 +414,7 @@ mod tests {
         for (arguments, right) in [
             (&["generate", "a", "--function", "inverse_dynamic"][..], "inverse_dynamics"),
             (&["generate", "a", "--scalar", "f16"], "f64, f32"),
+            (&["generate", "a", "--lanes=8"], "standalone, runtime"),
             (&["generate", "a", "--gravity", "1,2"], "0,0,-9.81"),
             (&["generate", "a", "--check"], "--output"),
             (&["export", "a", "-o", "b"], "--c-abi"),

@@ -1,0 +1,93 @@
+//! Fused multiply-add: which products go into which sums, and the functions that compute both in one rounding.
+
+use super::Scalar;
+use crate::expr::{Graph, NodeId, Op};
+use crate::schedule::Part;
+
+/// A sum whose one term is a product: ±x·y ± c.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Fused {
+    /// Whether the product is subtracted.
+    pub negated: bool,
+    /// The factors.
+    pub factors: (NodeId, NodeId),
+    /// The other term, and whether it is subtracted.
+    pub other: (NodeId, bool),
+}
+
+/// The sums of a part that take a product in, and what they take in: those that [`Graph::counts`] counts as `fma`, as far as
+/// product and sum are in the same part.
+pub(super) fn fusions(graph: &Graph, part: &Part) -> (Vec<Option<Fused>>, Vec<bool>) {
+    let mut uses = graph.uses();
+    let mut here = vec![false; graph.ops.len()];
+    part.nodes.iter().for_each(|id| here[id.index()] = true);
+    // what crosses to another part is a value of its own
+    part.stores.iter().for_each(|(id, _)| uses[id.index()] += 1);
+    let mut fused = vec![None; graph.ops.len()];
+    let mut absorbed = vec![false; graph.ops.len()];
+    // the product behind a term, seen through a sign: whether the sign is there, the nodes that vanish, the factors
+    let product = |term: NodeId| {
+        let alone = |id: NodeId| here[id.index()] && uses[id.index()] == 1;
+        let (inner, sign) = match graph.op(term) {
+            Op::Neg(inner) if alone(term) => (inner, true),
+            _ => (term, false),
+        };
+        match graph.op(inner) {
+            Op::Mul(x, y) if alone(inner) => Some((sign, inner, (x, y))),
+            _ => None,
+        }
+    };
+    for id in &part.nodes {
+        let (a, b, minus) = match graph.op(*id) {
+            Op::Add(a, b) => (a, b, false),
+            Op::Sub(a, b) => (a, b, true),
+            _ => continue,
+        };
+        let (term, found, negated, other) = match (product(b), product(a)) {
+            (Some(found), _) => (b, found, found.0 != minus, (a, false)),
+            (None, Some(found)) => (a, found, found.0, (b, minus)),
+            (None, None) => continue,
+        };
+        absorbed[term.index()] = true;
+        absorbed[found.1.index()] = true;
+        fused[id.index()] = Some(Fused { negated, factors: found.2, other });
+    }
+    (fused, absorbed)
+}
+
+/// The module `fused` of a file whose functions are fused.
+pub fn module(scalar: Scalar) -> String {
+    MODULE.replace("f64", scalar.name())
+}
+
+const MODULE: &str = r#"
+#[allow(unused_imports)]
+use fused::{fma, fma_if, FUSED};
+
+/// a·b + c in one rounding.
+///
+/// Only where the machine has it as an instruction, never by a call: the crate is compiled for one (`-C target-cpu`,
+/// `-C target-feature=+fma`), or a batch has asked. Otherwise a·b is rounded, and the sum again.
+#[allow(dead_code, unused_imports)]
+mod fused {
+    // the instruction is not to be had from `core`
+    extern crate std;
+
+    /// Whether this crate is compiled for a machine with the instruction.
+    pub const FUSED: bool = cfg!(any(target_feature = "fma", all(target_arch = "aarch64", target_feature = "neon")));
+
+    #[inline(always)]
+    pub fn fma(a: f64, b: f64, c: f64) -> f64 {
+        fma_if::<FUSED>(a, b, c)
+    }
+
+    #[inline(always)]
+    pub fn fma_if<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
+        if FUSED {
+            a.mul_add(b, c)
+        } else {
+            a * b + c
+        }
+    }
+}
+"#;
