@@ -261,6 +261,7 @@ fn every_example_compiles_for_its_robot_without_a_word() {
         let robot = match scene.path() {
             path if path.starts_with("panda") => "panda.urdf",
             path if path.starts_with("planar_2r") => "planar_2r.toml",
+            path if path.starts_with("ur5") => "ur5.urdf",
             _ => "solo12.urdf",
         };
         let mut diagnostics = Diagnostics::new();
