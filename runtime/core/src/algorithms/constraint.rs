@@ -1,6 +1,8 @@
 //! Constrained motion: accelerations and reactions of a robot in contact, (20.88)-(20.89), and what belongs to it.
 //!
-//!     H q̈ + h = τ + Jᵀ F,    J q̈ + A = s̈*
+//! ```text
+//! H q̈ + h = τ + Jᵀ F,    J q̈ + A = s̈*
+//! ```
 //!
 //! with s̈* = 0 or what pulls a drift back (Baumgarte 1972). A contact that slides with Coulomb friction has its reaction act
 //! along Ĵ = J − μ v_t/√(v_t² + w²) · J_t instead of J; one on a [yielding](super::Environment) object feels what the object does.
