@@ -105,6 +105,12 @@ impl Builder {
         self
     }
 
+    /// Bounds the rounding errors of every function, as constants beside the functions: see [`certify`](crate::certify).
+    pub fn certify(mut self, effort: crate::certify::Effort) -> Self {
+        self.options.certify = Some(effort);
+        self
+    }
+
     /// How forward dynamics is computed; otherwise the cheaper way for this robot.
     pub fn forward_dynamics(mut self, method: ForwardDynamicsMethod) -> Self {
         self.options.forward_dynamics = method;

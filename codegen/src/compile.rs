@@ -1,5 +1,6 @@
 //! The pipeline, as one function.
 
+use crate::certify::{self, Effort};
 use crate::choose::choose;
 use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
@@ -10,6 +11,7 @@ use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model;
 use crate::pass::{count_sums, dead_code, sums, unread_inputs};
 use crate::report::budget::{self, Measures};
+use crate::report::errors::ErrorReport;
 use crate::report::waterfall::{self, Waterfall};
 use crate::report::{FunctionReport, Report};
 use crate::scene::{self, is_optional, load_parameters, Parameter, Scene, LOAD_SCALARS};
@@ -46,6 +48,8 @@ pub struct Options {
     pub model: crate::model::ModelOptions,
     /// What is wanted and what is held.
     pub scene: Scene,
+    /// Whether rounding errors are bounded, and how much is spent on it; a budget of an error bounds them, too.
+    pub certify: Option<Effort>,
 }
 
 impl Default for Options {
@@ -62,6 +66,7 @@ impl Default for Options {
             limits: Limits::default(),
             model: crate::model::ModelOptions::default(),
             scene: Scene::default(),
+            certify: None,
         }
     }
 }
@@ -318,6 +323,9 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let measures: Vec<(Function, Measures)> =
         programs.iter().map(|p| (p.function, Measures::of(p, options.scalar))).collect();
     budget::check(&whole, &frames, &measures, options, &mut diagnostics);
+    let certificates = certificates(&robot, &programs, &resolved);
+    let bounds = programs.iter().map(|p| p.function).zip(&certificates);
+    budget::check_errors(bounds, &resolved, &mut diagnostics);
     if diagnostics.has_errors() {
         diagnostics.sort();
         return Err(diagnostics);
@@ -330,7 +338,8 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
         }
         false => vec![None; programs.len()],
     };
-    Ok(generate(robot, frames, programs, waterfalls, diagnostics, &resolved, source.path(), hash))
+    let programs = programs.into_iter().zip(waterfalls).zip(certificates).map(|((p, w), c)| (p, w, c)).collect();
+    Ok(generate(robot, frames, programs, diagnostics, &resolved, source.path(), hash))
 }
 
 /// Forward dynamics divides by what every joint feels. What a run-time parameter will add is not known here.
@@ -356,8 +365,7 @@ fn demand_inertia(model: &Model<Dd>, options: &Options, diagnostics: &mut Diagno
 fn generate(
     robot: Robot,
     frames: Vec<String>,
-    programs: Vec<Program>,
-    waterfalls: Vec<Option<Waterfall>>,
+    programs: Vec<(Program, Option<Waterfall>, Option<ErrorReport>)>,
     warnings: Diagnostics,
     options: &Options,
     path: &str,
@@ -370,7 +378,7 @@ fn generate(
     };
     let mut items = Vec::new();
     let mut functions = BTreeMap::new();
-    for (program, waterfall) in programs.into_iter().zip(waterfalls) {
+    for (program, waterfall, errors) in programs {
         let Program { function, graph, schedule, method } = &program;
         let mut doc = function.doc(&graph.inputs, &options.scene);
         if let Some(method) = method {
@@ -378,7 +386,7 @@ fn generate(
         }
         let text = emit::function(graph, schedule, function.name(), &doc, options.style(), &title);
         let figures = FunctionReport::new(&program, options.scalar, text.text.lines().count());
-        functions.insert(function.name(), FunctionReport { waterfall, ..figures });
+        functions.insert(function.name(), FunctionReport { waterfall, errors, ..figures });
         let Program { function, graph, schedule, .. } = program;
         let (inputs, outputs) = (graph.inputs.clone(), graph.outputs.clone());
         let mut item = Item { function, inputs, outputs, doc, text, lanes: String::new() };
@@ -430,6 +438,25 @@ fn generate(
         report,
         warnings,
     }
+}
+
+/// The bounds of rounding errors of every program, where they are asked for.
+fn certificates(robot: &Robot, programs: &[Program], options: &Options) -> Vec<Option<ErrorReport>> {
+    let of = |p: &Program| {
+        let budgeted = options.scene.budgets.get(&p.function).is_some_and(|b| b.max_error.is_some());
+        let effort = options.certify.or(budgeted.then(Effort::default))?;
+        let outputs = &p.graph.outputs;
+        let inputs = match certify::input_box(&p.graph.inputs, &options.scene, &robot.model) {
+            Ok(inputs) => inputs,
+            Err(refusal) => return Some(ErrorReport::refused(outputs, refusal)),
+        };
+        let ranges = certify::box_in_words(&p.graph.inputs, &inputs);
+        Some(match certify::certify(&p.graph, options.scalar, &inputs, effort) {
+            Ok(certificate) => ErrorReport::new(outputs, ranges, certificate),
+            Err(refusal) => ErrorReport { ranges, ..ErrorReport::refused(outputs, refusal) },
+        })
+    };
+    programs.iter().map(of).collect()
 }
 
 /// The program of a parameter's constructor: from mass \[kg\], mass centre \[m\] and inertia about it \[kg·m²\] (xx, xy, xz,

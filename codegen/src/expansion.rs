@@ -2,7 +2,7 @@
 
 use crate::compile::{compile, Generated, Options};
 use crate::diagnostic::{Diagnostic, Diagnostics, Severity, Source};
-use crate::emit::{array_type, batch};
+use crate::emit::{array_type, batch, Scalar};
 use crate::expr::Port;
 use crate::scene;
 use std::fmt::Write;
@@ -113,6 +113,15 @@ pub fn associated_items(generated: &Generated) -> String {
     for item in &generated.items {
         let name = item.function.name();
         constant(&format!("{}_COST", name.to_uppercase()), "dynamics::Cost", &format!("What [`Self::{name}`] costs."));
+    }
+    for (name, errors) in generated.report.functions.iter().filter_map(|(n, f)| Some((n, f.errors.as_ref()?))) {
+        for output in &errors.outputs {
+            let kind = array_type(&Port::new(&output.name, &output.shape), Scalar::F64);
+            let ranges = errors.ranges.join("; ").replace('[', "\\[").replace(']', "\\]");
+            let doc =
+                format!("Bound of the rounding errors of [`Self::{name}`], for inputs in these ranges: {ranges}.");
+            constant(&errors.constant_name(name, output), &kind, &doc);
+        }
     }
     for item in &generated.items {
         let name = item.function.name();

@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 pub mod builder;
+pub mod certify;
 pub mod choose;
 pub mod compile;
 pub mod contact;

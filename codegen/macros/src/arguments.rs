@@ -1,6 +1,7 @@
 //! `"panda.urdf", floating_base, scalar = "f32", functions(inverse_dynamics, mass_matrix), …`
 
 use std::str::FromStr;
+use straightline_codegen::certify::Effort;
 use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::{Function, Options};
 use syn::parse::{Parse, ParseStream};
@@ -55,6 +56,7 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         "scene" => arguments.scene = Some(value(input)?),
         "module" => arguments.module = Some(value::<LitStr>(input)?.parse()?),
         "floating_base" => options.model.floating_base = true,
+        "certify" => options.certify = Some(Effort::default()),
         "scalar" => options.scalar = word(input)?,
         "scalars" => {
             let scalars: Result<Vec<Scalar>> =
@@ -85,7 +87,8 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         }
         other => {
             let known =
-                "floating_base, scalar, scalars, lanes, fma, rules, forward_dynamics, max_part_operations, angle_tolerance, \
+                "floating_base, certify, scalar, scalars, lanes, fma, rules, forward_dynamics, max_part_operations, \
+                         angle_tolerance, \
                          functions, frames, joint_order, gravity, scene, module";
             return Err(Error::new(key.span(), format!("there is no option `{other}`; one of: {known}")));
         }

@@ -99,6 +99,9 @@ pub fn preamble(
     for (name, figures) in &report.functions {
         let _ = writeln!(out, "/// What [`{name}`] costs.");
         let _ = writeln!(out, "pub const {}_COST: Cost = {};", name.to_uppercase(), cost(figures));
+        if let Some(errors) = &figures.errors {
+            out.push_str(&errors.constants(name));
+        }
     }
     out.push_str(types);
     out

@@ -1,5 +1,6 @@
 //! Budgets: what a function may cost, and what could be done about it where it costs more.
 
+use super::errors::ErrorReport;
 use super::waterfall::robot_in;
 use crate::compile::{program, Options, Program};
 use crate::diagnostic::Diagnostics;
@@ -141,6 +142,24 @@ pub fn check(
             let message = say::over_budget(name, limit.words, (takes, most), limit.key, &savings);
             places.complain(&format!("budget.{name}.{}", limit.key), message, diagnostics);
         }
+    }
+}
+
+/// Complains of every bound of rounding errors that is greater than the scene allows, and of demanded bounds that do not exist.
+pub fn check_errors<'a>(
+    bounds: impl Iterator<Item = (Function, &'a Option<ErrorReport>)>,
+    options: &Options,
+    diagnostics: &mut Diagnostics,
+) {
+    for (function, errors) in bounds {
+        let (budget, name) = (options.scene.budgets.get(&function), function.name());
+        let (Some(most), Some(errors)) = (budget.and_then(|b| b.max_error), errors) else { continue };
+        let complaint = match (errors.refused, errors.worst()) {
+            (Some(why), _) => say::error_unbounded(name, why),
+            (None, Some((bound, result))) if bound > most => say::error_over_budget(name, &result, bound, most),
+            _ => continue,
+        };
+        options.scene.places.complain(&format!("budget.{name}.max_error"), complaint, diagnostics);
     }
 }
 

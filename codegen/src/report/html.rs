@@ -3,6 +3,7 @@
 //! The page is XHTML, so that an XML reader can check it. Names come from robot files, which anyone may have written:
 //! nothing from outside reaches the page but through `escape`.
 
+use super::errors::{four_digits, ErrorReport};
 use super::tree::{symbol, text_width, tree};
 use super::waterfall::{items_of, signed, By, Waterfall};
 use super::{FunctionReport, Report};
@@ -364,6 +365,40 @@ fn functions(out: &mut String, report: &Report) {
     for (name, method) in report.functions.iter().filter_map(|(name, f)| Some((name, f.method?))) {
         let _ = writeln!(out, "<p><span class=\"mono\">{name}</span>. {method}</p>");
     }
+    let certified: Vec<_> = report.functions.iter().filter_map(|(name, f)| Some((name, f.errors.as_ref()?))).collect();
+    if !certified.is_empty() {
+        errors(out, &certified);
+    }
+}
+
+/// Bounds of rounding errors, a row per function.
+fn errors(out: &mut String, certified: &[(&&'static str, &ErrorReport)]) {
+    out.push_str(
+        "<h2>Rounding errors</h2>\n<p class=\"lead\">Proven bounds: no result is further from the exact value of the equations, for \
+         inputs in these ranges.</p>\n<div class=\"figure\">\n<table>\n<thead><tr><th class=\"l\">Function</th>\
+         <th class=\"l\">Bound of each result</th><th class=\"l\">Ranges</th></tr></thead>\n<tbody>\n",
+    );
+    for (name, errors) in certified {
+        let bounds: Vec<String> = errors.outputs.iter().map(|o| list_of_bounds(&o.name, &o.bounds)).collect();
+        let bounds = errors.refused.map_or(bounds.join("; "), |why| format!("none: {why}"));
+        let _ = writeln!(
+            out,
+            "<tr><td class=\"l mono\">{name}</td><td class=\"l\">{}</td><td class=\"l\">{}</td></tr>",
+            escape(&bounds),
+            escape(&errors.ranges.join("; "))
+        );
+    }
+    out.push_str("</tbody>\n</table>\n</div>\n");
+}
+
+/// All bounds of an output, or the greatest where there are many.
+fn list_of_bounds(name: &str, bounds: &[f64]) -> String {
+    let digits = |x: &f64| format!("{:.1e}", four_digits(*x * 1.05));
+    if bounds.len() > 12 {
+        let worst = bounds.iter().fold(0.0f64, |worst, x| worst.max(*x));
+        return format!("{name}: at most {}", digits(&worst));
+    }
+    format!("{name}: {}", bounds.iter().map(digits).collect::<Vec<_>>().join(", "))
 }
 
 fn stages(out: &mut String, staged: &StagedReport, report: &Report) {

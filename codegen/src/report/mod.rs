@@ -1,6 +1,7 @@
 //! What was generated, in numbers.
 
 pub mod budget;
+pub mod errors;
 pub mod html;
 mod tree;
 pub mod waterfall;
@@ -12,6 +13,7 @@ use crate::forward_method::MethodChoice;
 use crate::function::Function;
 use crate::staged::StagedReport;
 use budget::Measures;
+use errors::ErrorReport;
 use std::collections::BTreeMap;
 use waterfall::Waterfall;
 
@@ -46,6 +48,9 @@ pub struct FunctionReport {
     /// Of forward dynamics: which method was chosen, and why.
     #[cfg_attr(feature = "cli", serde(skip_serializing_if = "Option::is_none"))]
     pub method: Option<MethodChoice>,
+    /// Bounds of its rounding errors, where they were asked for.
+    #[cfg_attr(feature = "cli", serde(skip_serializing_if = "Option::is_none"))]
+    pub errors: Option<ErrorReport>,
     /// How it came to these counts: where it was asked for, and where a scene skips something.
     #[cfg_attr(feature = "cli", serde(flatten, skip_serializing_if = "Option::is_none"))]
     pub waterfall: Option<Waterfall>,
@@ -90,6 +95,7 @@ impl FunctionReport {
             stack_bytes,
             code_bytes,
             method: program.method,
+            errors: None,
             waterfall: None,
         }
     }

@@ -27,6 +27,8 @@ pub const CODES: &[&str] = &[
     "coulomb-speed-alone",
     "budget-alone",
     "over-budget",
+    "error-over-budget",
+    "error-unbounded",
     "moving-base-forward",
     "said-twice",
     "scalar-twice",
@@ -206,6 +208,20 @@ pub fn coulomb_speed_alone() -> D {
 pub fn budget_alone(function: &str) -> D {
     D::error("budget-alone", format!("a budget for `{function}`, which is not among the outputs"))
         .help(format!("add `{function}` to `functions` in [outputs], or remove its budget"))
+}
+
+/// A bound of rounding errors that is greater than it may be.
+pub fn error_over_budget(function: &str, result: &str, bound: f64, most: f64) -> D {
+    let title =
+        format!("the rounding error of `{result}` of `{function}` is bounded by {bound:.3e}, the budget is {most:e}");
+    D::error("error-over-budget", title)
+        .help("what makes it less: narrower `[numbers.ranges]`, `scalar = \"f64\"`, more boxes (`--certify-boxes`)")
+}
+
+/// Rounding errors that have no bound, where one is demanded.
+pub fn error_unbounded(function: &str, why: &str) -> D {
+    D::error("error-unbounded", format!("the rounding errors of `{function}` have no bound: {why}"))
+        .help("narrower `[numbers.ranges]` may help; forward dynamics divides by inertias whose range has zero in it")
 }
 
 /// A function that costs more than it may. `words` stand before the number, after one, and after any other; `savings` are what

@@ -255,7 +255,7 @@ impl Parameter {
 }
 
 /// What a function may cost; what is left out is free.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Budget {
     /// Multiplications, additions, divisions and square roots.
     pub max_flops: Option<usize>,
@@ -267,4 +267,6 @@ pub struct Budget {
     pub max_stack_bytes: Option<usize>,
     /// Bytes of machine code, estimated.
     pub max_code_bytes: Option<usize>,
+    /// The greatest bound of a rounding error, of any result, in its unit.
+    pub max_error: Option<f64>,
 }

@@ -30,7 +30,7 @@ const TOP: &[&str] = &[
     "numbers",
     "budget",
 ];
-const BUDGET: &[&str] = &["max_flops", "max_sincos", "max_live", "max_stack_bytes", "max_code_bytes"];
+const BUDGET: &[&str] = &["max_flops", "max_sincos", "max_live", "max_stack_bytes", "max_code_bytes", "max_error"];
 const BASES: [(&str, Base); 3] = [("fixed", Base::Fixed), ("floating", Base::Floating), ("moving", Base::Moving)];
 /// A place in the list of effects: that its speed is still to be read.
 const SMOOTH: Coulomb = Coulomb::Smooth(0.0);
@@ -441,7 +441,14 @@ impl SceneReader<'_> {
                 max_live: limit("max_live"),
                 max_stack_bytes: limit("max_stack_bytes"),
                 max_code_bytes: limit("max_code_bytes"),
+                max_error: None,
             };
+            let max_error = self.reader.real_at(&limits, "max_error", Range64::Finite);
+            if let Some(value) = max_error.as_ref().filter(|e| e.value <= 0.0) {
+                let complaint = say::not_in_range("max_error", value.value, "above zero");
+                self.reader.diagnostics.push(complaint.at(&value.place));
+            }
+            let budget = Budget { max_error: self.noted(&format!("budget.{name}.max_error"), max_error), ..budget };
             self.file.scene.budgets.insert(function, budget);
             if self.file.functions.as_ref().is_some_and(|functions| !functions.contains(&function)) {
                 self.reader.complain(&limits.span, say::budget_alone(name));

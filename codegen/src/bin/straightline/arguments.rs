@@ -3,6 +3,7 @@
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
+use straightline_codegen::certify::Effort;
 use straightline_codegen::compile::Options;
 use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::experiment::parameter::{self, Sweep};
@@ -266,6 +267,12 @@ pub struct ProgramArgs {
     /// Compute a*b + c in one rounding where the machine can; needs std, and the last bits depend on the machine
     #[arg(long)]
     fma: bool,
+    /// Prove a bound of the rounding errors of every function, for the ranges of its inputs
+    #[arg(long)]
+    certify: bool,
+    /// The same with tighter bounds: the ranges of each result are cut into so many boxes
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    certify_boxes: Option<u32>,
 }
 
 /// How the robot file is read.
@@ -367,6 +374,12 @@ impl ProgramArgs {
         if let [first, others @ ..] = &self.scalar[..] {
             (options.scalar, options.also) = (*first, others.to_vec());
         }
+        options.certify = self.effort().or(options.certify);
+    }
+
+    fn effort(&self) -> Option<Effort> {
+        let boxes = self.certify_boxes.map(|n| Effort { boxes: n as usize });
+        boxes.or(self.certify.then(Effort::default))
     }
 
     pub fn options(&self, model: &ModelArgs) -> Options {
@@ -387,6 +400,7 @@ impl ProgramArgs {
             forward_dynamics: self.forward_dynamics,
             limits: Limits { operations: self.max_part_operations },
             model: model.options(),
+            certify: self.effort(),
             ..Options::default()
         }
     }

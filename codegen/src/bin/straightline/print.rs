@@ -10,6 +10,7 @@ use straightline_codegen::description::{Description, Ignored};
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
 use straightline_codegen::expr::Counts;
 use straightline_codegen::model::SpecialAngle;
+use straightline_codegen::report::errors::four_digits;
 use straightline_codegen::report::waterfall::{signed, Waterfall};
 use straightline_codegen::report::Report;
 use straightline_codegen::staged::{Remaining, StageReport};
@@ -131,6 +132,22 @@ pub fn report(report: &Report) -> io::Result<()> {
     writeln!(out, "\nfma: instructions for mul and add when every a·b ± c is one; live: most values alive at once")?;
     for (name, method) in functions.iter().filter_map(|(name, f)| Some((name, f.method?))) {
         writeln!(out, "\n{name}. {method}")?;
+    }
+    for (name, errors) in functions.iter().filter_map(|(name, f)| Some((name, f.errors.as_ref()?))) {
+        match errors.refused {
+            Some(why) => writeln!(out, "\n{name}: no bound of rounding errors: {why}")?,
+            None => writeln!(out, "\n{name}: rounding errors, at most")?,
+        }
+        for output in &errors.outputs {
+            let bounds: Vec<String> = output.bounds.iter().map(|e| format!("{:.3e}", four_digits(*e))).collect();
+            for (k, row) in bounds.chunks(10).enumerate() {
+                let name = if k == 0 { output.name.as_str() } else { "" };
+                writeln!(out, "{name:>8}  {}", row.join(" "))?;
+            }
+        }
+        for line in &errors.ranges {
+            writeln!(out, "          for {line}")?;
+        }
     }
     let explained = functions.iter().filter_map(|(name, f)| Some((name, f, f.waterfall.as_ref()?)));
     for (name, f, waterfall) in explained {

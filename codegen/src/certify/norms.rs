@@ -1,0 +1,469 @@
+//! Euclidean norms of groups of forms: what a rotation keeps.
+//!
+//! Interval arithmetic takes x cos q − y sin q for up to √2 max(|x|, |y|), and so much again at every joint. Here a group of
+//! forms g = (g₁ … g_k) has a bound of ‖g‖ = √(Σ g_i²), the least of what these rules give. All hold for perturbed values,
+//! where the computed sine and cosine satisfy s² + c² ≤ T² with T a little above 1:
+//!
+//! * **ends**: ‖g‖² ≤ Σ sup |g_i|².
+//! * **triangle**: g = a + b ⇒ ‖g‖ ≤ ‖a‖ + ‖b‖; rounding errors between an atom and its form are such a b.
+//! * **turn**: the part of g_i with one angle is a_i c + b_i s. Two parts with a_j = b_i, b_j = −a_i (or the opposite signs)
+//!   are T times a rotation of (a_i, b_i). One part alone is at most T ‖(a_i, b_i)‖ (Cauchy-Schwarz). Parts on different
+//!   components add up in squares, beside components that do not turn (T ≥ 1): ‖g‖ ≤ T ‖(a_i, b_i, …, the others)‖.
+//! * **matrix**: g = M x with constants M ⇒ ‖g‖ ≤ √‖MᵀM‖_∞ ‖x‖, as the greatest eigenvalue of MᵀM is at most any norm of it.
+//! * **columns**: terms k g_i of several members with one coefficient k are k times a vector: at most |k| ‖(g_i)‖.
+//! * **scaling**: g = C a with values C before adjoints a of one vector ⇒ ‖g‖ ≤ ‖C‖_F ‖a‖; for C = (x, y; −y, x), the derivatives by cosine and
+//!   sine of one turn, ‖C‖ = ‖(x, y)‖, as CᵀC = (x² + y²) 1. One form Σ x_k a_k is at most ‖x‖ ‖a‖.
+//!
+//! The same rules serve adjoints, because the chain rule through a rotation is the rotation back.
+
+use super::forms::{canonical, negated, Coefficient, Form, Forms, Term};
+use super::forms::{simplified, Atom, Flat};
+use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
+
+/// Index of a group.
+pub type GroupId = u32;
+
+/// Which rules are tried on a group: what is left over by one is not worth all of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Effort {
+    /// All.
+    All,
+    /// `columns` only.
+    Columns,
+    /// None: its ends.
+    Ends,
+}
+
+/// A group of forms, and what it can be led back to.
+#[derive(Clone, Debug)]
+pub struct Group {
+    /// Its members, each with a first term of positive sign, sorted.
+    pub members: Vec<Form>,
+    /// Which rules may be tried.
+    pub effort: Effort,
+    /// Whether adjoints are in it, so that its norm is another for each result.
+    pub of_adjoints: bool,
+    /// The members with the groups of their parts, once they are wanted.
+    pub bounded: Option<Vec<Bounded>>,
+    /// The ways, once they are wanted.
+    pub ways: Option<Vec<Way>>,
+}
+
+/// What stands before the group that is left.
+#[derive(Clone, Copy, Debug)]
+pub enum Factor {
+    /// T of a pair.
+    Turn(u32),
+    /// The norm of a matrix.
+    Matrix(f64),
+    /// The magnitude of a coefficient.
+    Coefficient(Coefficient),
+    /// The norm of a group of values.
+    Values(GroupId),
+}
+
+/// ‖group‖ ≤ Σ factor · ‖inner‖ + ‖rest‖ + slack.
+#[derive(Clone, Debug)]
+pub struct Way {
+    /// Factors, and the groups that are left.
+    pub parts: Vec<(Factor, GroupId)>,
+    /// What does not belong to them, one form per member.
+    pub rest: GroupId,
+    /// Nodes whose rounding errors lie between the members and their forms, one list per member.
+    pub slack: Vec<Vec<u32>>,
+}
+
+/// A form with the groups that bound its parts of one angle.
+#[derive(Clone, Debug, Default)]
+pub struct Bounded {
+    /// The terms.
+    pub form: Form,
+    /// Pair, terms by index, and the group of their atoms.
+    pub turns: Vec<(u32, Vec<usize>, GroupId)>,
+    /// Scalar products: terms by index, and the groups of their coefficients and of their atoms.
+    pub dots: Vec<(Vec<usize>, GroupId, GroupId)>,
+}
+
+/// Groups by their members.
+#[derive(Clone, Debug, Default)]
+pub struct Groups {
+    /// All groups.
+    pub groups: Vec<Group>,
+    /// For look-ups only.
+    known: FxHashMap<(Vec<Form>, Effort), GroupId>,
+    /// Adjoints of one vector: the team of a node.
+    pub team: Vec<Option<u32>>,
+}
+
+/// More members than these gain nothing.
+const LARGEST: usize = 3;
+/// More atoms than these under a matrix gain nothing.
+const COLUMNS: usize = 4;
+
+/// So many angles of a group are tried.
+const ANGLES: usize = 2;
+
+/// The pair of a turning term, and whether its coefficient is the sine.
+fn turn(t: &Term) -> Option<(u32, bool)> {
+    match t.coefficient {
+        Coefficient::Sin(p) => Some((p, true)),
+        Coefficient::Cos(p) => Some((p, false)),
+        _ => None,
+    }
+}
+
+fn bare(t: &Term) -> Term {
+    Term { coefficient: Coefficient::One, ..*t }
+}
+
+impl Groups {
+    /// The group of these forms; signs and order do not matter.
+    pub fn group(&mut self, members: impl IntoIterator<Item = Form>) -> GroupId {
+        self.group_with(members, Effort::All)
+    }
+
+    /// The same, with not all rules.
+    fn group_with(&mut self, members: impl IntoIterator<Item = Form>, effort: Effort) -> GroupId {
+        let mut members: Vec<Form> = members.into_iter().filter(|f| !f.is_empty()).map(canonical).collect();
+        members.sort_unstable();
+        let key = (members, effort);
+        if let Some(id) = self.known.get(&key) {
+            return *id;
+        }
+        let id = self.groups.len() as GroupId;
+        let members = key.0.clone();
+        self.known.insert(key, id);
+        let of_adjoints = members.iter().flatten().any(|t| matches!(t.atom, Atom::Adjoint(_) | Atom::Seed(_)));
+        self.groups.push(Group { members, effort, of_adjoints, bounded: None, ways: None });
+        id
+    }
+
+    /// A form with the groups of its angles.
+    pub fn bounded(&mut self, form: Form) -> Bounded {
+        let mut turns: Vec<(u32, Vec<usize>)> = Vec::new();
+        for (k, t) in form.iter().enumerate() {
+            if let Some((pair, _)) = turn(t) {
+                match turns.iter_mut().find(|(p, _)| *p == pair) {
+                    Some((_, terms)) => terms.push(k),
+                    None => turns.push((pair, vec![k])),
+                }
+            }
+        }
+        let turns = turns.into_iter().filter(|(_, terms)| terms.len() > 1).map(|(pair, terms)| {
+            let part = |sine: bool| -> Form {
+                let wanted = terms.iter().map(|k| &form[*k]).filter(|t| turn(t) == Some((pair, sine)));
+                simplified(wanted.map(bare).collect())
+            };
+            let group = self.group([part(true), part(false)]);
+            (pair, terms, group)
+        });
+        let turns = turns.collect();
+        // terms with values before adjoints of one vector, each adjoint once
+        let mut lists: Vec<(u32, Vec<usize>)> = Vec::new();
+        for (k, t) in form.iter().enumerate() {
+            let Some((team, _, atom)) = self.scaled(t) else { continue };
+            let fits = |(other, terms): &&mut (u32, Vec<usize>)| {
+                *other == team && terms.iter().all(|j: &usize| form[*j].atom != atom)
+            };
+            match lists.iter_mut().find(fits) {
+                Some((_, terms)) => terms.push(k),
+                None => lists.push((team, vec![k])),
+            }
+        }
+        let dots = lists.into_iter().filter(|(_, terms)| terms.len() > 1).map(|(_, terms)| {
+            let values = terms.iter().map(|k| vec![value_of(form[*k].coefficient)]);
+            let values = self.group(values.collect::<Vec<_>>());
+            let atoms = self.group(terms.iter().map(|k| vec![bare(&form[*k])]).collect::<Vec<_>>());
+            (terms, values, atoms)
+        });
+        let dots = dots.collect();
+        Bounded { form, turns, dots }
+    }
+
+    /// The team, the node of the value, and the adjoint of a term of value and adjoint.
+    fn scaled(&self, t: &Term) -> Option<(u32, u32, Atom)> {
+        match (t.coefficient, t.atom) {
+            (Coefficient::Node(v), Atom::Adjoint(a)) => Some((self.team.get(a as usize).copied()??, v, t.atom)),
+            _ => None,
+        }
+    }
+
+    /// The members with the groups of their parts, found once.
+    pub fn bound_members(&mut self, id: GroupId) {
+        if self.groups[id as usize].bounded.is_none() {
+            let members = self.groups[id as usize].members.clone();
+            let bounded = members.into_iter().map(|m| self.bounded(m)).collect();
+            self.groups[id as usize].bounded = Some(bounded);
+        }
+    }
+
+    /// The ways of a group, found once.
+    pub fn ways(&mut self, id: GroupId, forms: &Forms) -> usize {
+        if let Some(ways) = &self.groups[id as usize].ways {
+            return ways.len();
+        }
+        let ways = self.find_ways(id, forms);
+        let count = ways.len();
+        self.groups[id as usize].ways = Some(ways);
+        count
+    }
+
+    fn find_ways(&mut self, id: GroupId, forms: &Forms) -> Vec<Way> {
+        let members = self.groups[id as usize].members.clone();
+        if members.len() > LARGEST {
+            return Vec::new();
+        }
+        match self.groups[id as usize].effort {
+            Effort::Ends => return Vec::new(),
+            Effort::Columns => return self.columns(id, &members, &[]).into_iter().collect(),
+            Effort::All => {}
+        }
+        let flats: Vec<_> = members.iter().map(|m| forms.flattened(m)).collect();
+        let slack: Vec<Vec<u32>> = flats.iter().map(|f| f.slack.clone()).collect();
+        let mut angles: Vec<(usize, u32)> = Vec::new();
+        for flat in &flats {
+            let mut seen: Vec<u32> = flat.form.iter().filter_map(|t| turn(t).map(|(p, _)| p)).collect();
+            seen.sort_unstable();
+            seen.dedup();
+            for pair in seen {
+                match angles.iter_mut().find(|(_, p)| *p == pair) {
+                    Some((count, _)) => *count += 1,
+                    None => angles.push((1, pair)),
+                }
+            }
+        }
+        // the angle of most members first, of those the latest
+        angles.sort_unstable();
+        let mut ways = Vec::new();
+        for &(_, pair) in angles.iter().rev().take(ANGLES) {
+            for keep_constants in [false, true] {
+                ways.extend(self.turning(id, pair, &flats, &slack, keep_constants, forms));
+                let has_constants = |f: &Flat| f.form.iter().any(|t| is_linear(t, forms));
+                if !flats.iter().any(has_constants) {
+                    break;
+                }
+            }
+        }
+        ways.extend(self.matrix(id, &flats, &slack, forms));
+        ways.extend(self.scaling(&flats));
+        let flat_members: Vec<Form> = flats.iter().map(|f| f.form.clone()).collect();
+        ways.extend(self.columns(id, &flat_members, &slack));
+        ways
+    }
+
+    /// The rule `turn` for one angle.
+    fn turning(
+        &mut self,
+        id: GroupId,
+        pair: u32,
+        flats: &[Flat],
+        slack: &[Vec<u32>],
+        keep_constants: bool,
+        forms: &Forms,
+    ) -> Option<Way> {
+        let mut inner: Vec<Form> = Vec::new();
+        let mut rests: Vec<Form> = Vec::new();
+        let mut turned: Vec<(Form, Form)> = Vec::new();
+        for flat in flats {
+            let part = |sine: bool| -> Form {
+                simplified(flat.form.iter().filter(|t| turn(t) == Some((pair, sine))).map(bare).collect())
+            };
+            let (a, b) = (part(false), part(true));
+            if a.is_empty() && b.is_empty() {
+                let kept = |t: &&Term| turn(t).is_some() || (keep_constants && is_linear(t, forms));
+                let (main, rest): (Vec<&Term>, Vec<&Term>) = flat.form.iter().partition(kept);
+                inner.push(main.into_iter().copied().collect());
+                rests.push(rest.into_iter().copied().collect());
+            } else {
+                turned.push((a, b));
+                rests.push(flat.form.iter().filter(|t| turn(t).map(|(p, _)| p) != Some(pair)).copied().collect());
+            }
+        }
+        let mut done = vec![false; turned.len()];
+        for i in 0..turned.len() {
+            if done[i] {
+                continue;
+            }
+            let (a, b) = turned[i].clone();
+            let minus = |f: &Form| simplified(negated(f));
+            let mates = |(c, d): &(Form, Form)| (*c == b && *d == minus(&a)) || (*c == minus(&b) && *d == a);
+            if let Some(j) = (i + 1..turned.len()).find(|j| !done[*j] && mates(&turned[*j])) {
+                done[j] = true;
+            }
+            inner.extend([a, b]);
+        }
+        self.way(id, Factor::Turn(pair), inner, rests, slack)
+    }
+
+    /// The rule `matrix`: all terms with constant coefficients.
+    fn matrix(&mut self, id: GroupId, flats: &[Flat], slack: &[Vec<u32>], forms: &Forms) -> Option<Way> {
+        let mut atoms: Vec<Atom> = Vec::new();
+        for t in flats.iter().flat_map(|f| &f.form).filter(|t| is_linear(t, forms)) {
+            if !atoms.contains(&t.atom) {
+                atoms.push(t.atom);
+            }
+        }
+        if atoms.is_empty() || atoms.len() > COLUMNS {
+            return None;
+        }
+        let mut rests = Vec::new();
+        let mut rows = Vec::new();
+        for flat in flats {
+            let (linear, rest): (Vec<&Term>, Vec<&Term>) = flat.form.iter().partition(|t| is_linear(t, forms));
+            rests.push(rest.into_iter().copied().collect());
+            let mut row = vec![(0.0f64, 0.0f64); atoms.len()];
+            for t in linear {
+                let k = atoms.iter().position(|a| *a == t.atom).expect("every atom of a linear term was collected");
+                let (value, error) = match t.coefficient {
+                    Coefficient::Node(c) => forms.constant(c).expect("linear terms have constant coefficients"),
+                    _ => (1.0, 0.0),
+                };
+                let value = if t.negative { -value } else { value };
+                // the sum of two coefficients of one atom is rounded
+                row[k] = (row[k].0 + value, row[k].1 + error + f64::EPSILON * (row[k].0.abs() + value.abs()));
+            }
+            rows.push(row);
+        }
+        let inner = atoms.into_iter().map(|atom| vec![Term { coefficient: Coefficient::One, atom, negative: false }]);
+        let inner = inner.collect();
+        self.way(id, Factor::Matrix(spectral_norm(&rows)), inner, rests, slack)
+    }
+
+    /// The rule `columns`: terms of several members with one coefficient are that coefficient times a vector.
+    fn columns(&mut self, id: GroupId, members: &[Form], slack: &[Vec<u32>]) -> Option<Way> {
+        let mut columns: BTreeMap<Coefficient, Vec<(usize, Term)>> = BTreeMap::new();
+        for (m, member) in members.iter().enumerate() {
+            for t in member {
+                if let Coefficient::Node(_) = t.coefficient {
+                    columns.entry(t.coefficient).or_default().push((m, *t));
+                }
+            }
+        }
+        let mut rests: Vec<Form> = members.to_vec();
+        let mut parts = Vec::new();
+        for (coefficient, terms) in columns {
+            let in_members: std::collections::BTreeSet<usize> = terms.iter().map(|(m, _)| *m).collect();
+            if in_members.len() < 2 {
+                continue;
+            }
+            let mut forms = vec![Form::new(); members.len()];
+            for (m, t) in &terms {
+                forms[*m].push(bare(t));
+                rests[*m].retain(|u| u != t);
+            }
+            let group = self.group(forms.into_iter().map(simplified));
+            parts.push((Factor::Coefficient(coefficient), group));
+        }
+        if parts.is_empty() || parts.iter().any(|(_, group)| *group == id) {
+            return None;
+        }
+        let rest = self.group_with(rests, Effort::Ends);
+        Some(Way { parts, rest, slack: slack.to_vec() })
+    }
+
+    fn way(
+        &mut self,
+        id: GroupId,
+        factor: Factor,
+        inner: Vec<Form>,
+        rests: Vec<Form>,
+        slack: &[Vec<u32>],
+    ) -> Option<Way> {
+        let inner = self.group(inner);
+        if inner == id || self.groups[inner as usize].members.is_empty() {
+            return None;
+        }
+        let rest = self.group_with(rests, Effort::Columns);
+        if rest == id {
+            return None;
+        }
+        let slack = slack.iter().filter(|s| !s.is_empty()).cloned().collect();
+        Some(Way { parts: vec![(factor, inner)], rest, slack })
+    }
+
+    /// The rule `scaling`: adjoints of one vector with values before them, as the derivatives by sine and cosine have them.
+    fn scaling(&mut self, flats: &[Flat]) -> Option<Way> {
+        // team: (member, value, adjoint, sign)
+        let mut teams: BTreeMap<u32, Vec<(usize, u32, Atom, bool)>> = BTreeMap::new();
+        let mut rests: Vec<Form> = vec![Form::new(); flats.len()];
+        for (m, flat) in flats.iter().enumerate() {
+            for t in &flat.form {
+                match self.scaled(t) {
+                    Some((team, value, atom)) => teams.entry(team).or_default().push((m, value, atom, t.negative)),
+                    None => rests[m].push(*t),
+                }
+            }
+        }
+        if teams.is_empty() {
+            return None;
+        }
+        let plain = |v: u32| vec![value_of(Coefficient::Node(v))];
+        let mut parts = Vec::new();
+        for terms in teams.into_values() {
+            let mut atoms: Vec<Atom> = terms.iter().map(|t| t.2).collect();
+            atoms.sort_unstable();
+            atoms.dedup();
+            // entries of the matrix before the adjoints
+            let values: Vec<Form> = match (&terms[..], &atoms[..]) {
+                // m₁ = x u + y v, m₂ = ±(x v − y u): ‖(x, y)‖ ‖(u, v)‖
+                ([a, b, c, d], [_, _]) if is_complex_product([a, b, c, d]) => vec![plain(a.1), plain(b.1)],
+                _ => terms.iter().map(|t| plain(t.1)).collect(),
+            };
+            let atoms =
+                atoms.into_iter().map(|atom| vec![Term { coefficient: Coefficient::One, atom, negative: false }]);
+            let (values, atoms) = (self.group(values), self.group(atoms.collect::<Vec<_>>()));
+            parts.push((Factor::Values(values), atoms));
+        }
+        let rest = self.group_with(rests, Effort::Columns);
+        Some(Way { parts, rest, slack: Vec::new() })
+    }
+}
+
+fn value_of(coefficient: Coefficient) -> Term {
+    let Coefficient::Node(v) = coefficient else { unreachable!("made for values") };
+    Term { coefficient: Coefficient::One, atom: Atom::Value(v), negative: false }
+}
+
+/// Whether two members of two terms each are x u + y v and ±(x v − y u).
+fn is_complex_product([a, b, c, d]: [&(usize, u32, Atom, bool); 4]) -> bool {
+    if a.0 != b.0 || c.0 != d.0 || a.0 == c.0 || a.2 == b.2 || c.2 == d.2 {
+        return false;
+    }
+    // the terms of the second member in the order of the adjoints of the first
+    let (c, d) = if c.2 == a.2 { (c, d) } else { (d, c) };
+    let turned_back = c.1 == b.1 && d.1 == a.1;
+    // (x u + y v)² + (±y u ± x v)²: the mixed terms cancel if an odd number of signs is minus
+    turned_back && (a.3 != b.3) != (c.3 != d.3)
+}
+
+/// Whether the coefficient is a constant, and the atom can be taken apart.
+fn is_linear(t: &Term, forms: &Forms) -> bool {
+    let constant = match t.coefficient {
+        Coefficient::One => true,
+        Coefficient::Node(c) => forms.constant(c).is_some(),
+        _ => false,
+    };
+    constant && !forms.is_leaf(t.atom)
+}
+
+/// An upper bound of the spectral norm of a matrix of values with errors: √‖MᵀM‖_∞ + ‖errors‖_F.
+fn spectral_norm(rows: &[Vec<(f64, f64)>]) -> f64 {
+    let columns = rows.first().map_or(0, Vec::len);
+    let mut largest = 0.0f64;
+    for i in 0..columns {
+        let mut sum = 0.0;
+        for j in 0..columns {
+            let (mut entry, mut size) = (0.0, 0.0);
+            for row in rows {
+                entry += row[i].0 * row[j].0;
+                size += (row[i].0 * row[j].0).abs();
+            }
+            // at most 2 · members roundings of numbers up to `size`
+            sum += entry.abs() + 16.0 * f64::EPSILON * size;
+        }
+        largest = largest.max(sum * (1.0 + 16.0 * f64::EPSILON));
+    }
+    let errors: f64 = rows.iter().flatten().map(|(_, e)| e * e).sum();
+    (largest.sqrt() + errors.sqrt()) * (1.0 + 16.0 * f64::EPSILON)
+}

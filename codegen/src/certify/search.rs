@@ -1,0 +1,126 @@
+//! The worst error that a search finds: what a bound must never fall below, and how far above it may be.
+//!
+//! Hill climbing per result: from the best of many random inputs, single inputs move by steps of all sizes down to the
+//! last place; what makes the error greater is kept. The truth is the same program in double-double.
+
+use super::Interval;
+use crate::emit::Scalar;
+use crate::expr::{evaluate, Graph};
+use straightline_core::Dd;
+
+/// The worst that was found for one output scalar.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// |computed − exact|.
+    pub error: f64,
+    /// At these inputs.
+    pub inputs: Vec<f64>,
+}
+
+/// Numbers that are the same for the same seed (SplitMix64).
+struct Random(u64);
+
+impl Random {
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.bits() % n as u64) as usize
+    }
+}
+
+/// The number of the format that is nearest to x and in the range.
+fn representable(x: f64, range: Interval, scalar: Scalar) -> f64 {
+    let x = x.clamp(range.lo, range.hi);
+    match scalar {
+        Scalar::F64 => x,
+        Scalar::F32 => {
+            let near = x as f32;
+            let near = if f64::from(near) > range.hi { near.next_down() } else { near };
+            let near = if f64::from(near) < range.lo { near.next_up() } else { near };
+            f64::from(near)
+        }
+    }
+}
+
+/// Errors of all output scalars at inputs that the format holds.
+pub fn errors_at(graph: &Graph, scalar: Scalar, inputs: &[f64]) -> Vec<f64> {
+    let truth = evaluate::<Dd>(graph, &inputs.iter().map(|x| Dd::from(*x)).collect::<Vec<_>>());
+    let computed: Vec<f64> = computed_at(graph, scalar, inputs);
+    computed.iter().zip(truth).map(|(c, t)| (Dd::from(*c) - t).to_f64().abs()).collect()
+}
+
+/// What the program computes in its format.
+pub fn computed_at(graph: &Graph, scalar: Scalar, inputs: &[f64]) -> Vec<f64> {
+    match scalar {
+        Scalar::F64 => evaluate(graph, inputs),
+        Scalar::F32 => {
+            let inputs: Vec<f32> = inputs.iter().map(|x| *x as f32).collect();
+            evaluate::<f32>(graph, &inputs).into_iter().map(f64::from).collect()
+        }
+    }
+}
+
+/// The worst errors found in a box with so many evaluations.
+pub fn worst_found(graph: &Graph, scalar: Scalar, ranges: &[Interval], evaluations: usize, seed: u64) -> Vec<Found> {
+    let mut random = Random(seed);
+    let outputs = graph.results.len();
+    let fits = |x: Vec<f64>| -> Vec<f64> { x.iter().zip(ranges).map(|(x, r)| representable(*x, *r, scalar)).collect() };
+    // errors of f32 are seen in f64 well enough to climb; what was found is measured in double-double
+    let errors = |inputs: &[f64]| -> Vec<f64> {
+        match scalar {
+            Scalar::F64 => errors_at(graph, scalar, inputs),
+            Scalar::F32 => {
+                let truth = evaluate::<f64>(graph, inputs);
+                computed_at(graph, scalar, inputs).iter().zip(truth).map(|(c, t)| (c - t).abs()).collect()
+            }
+        }
+    };
+    let mut best = vec![Found { error: -1.0, inputs: Vec::new() }; outputs];
+    let keep = |best: &mut Vec<Found>, inputs: &[f64], errors: &[f64]| {
+        for (found, e) in best.iter_mut().zip(errors) {
+            // an error that is no number is the worst of all
+            if *e > found.error || e.is_nan() {
+                *found = Found { error: if e.is_nan() { f64::INFINITY } else { *e }, inputs: inputs.to_vec() };
+            }
+        }
+    };
+    for _ in 0..evaluations / 5 + 1 {
+        let place = |r: &Interval, random: &mut Random| match random.below(6) {
+            0 => r.lo,
+            1 => r.hi,
+            _ => r.lo + random.unit() * (r.hi - r.lo),
+        };
+        let inputs = fits(ranges.iter().map(|r| place(r, &mut random)).collect());
+        let e = errors(&inputs);
+        keep(&mut best, &inputs, &e);
+    }
+    let climbs = (evaluations - evaluations / 5) / outputs.max(1);
+    for k in 0..outputs {
+        for _ in 0..climbs {
+            let mut inputs = best[k].inputs.clone();
+            for _ in 0..1 + random.below(3) {
+                let i = random.below(inputs.len());
+                let width = ranges[i].hi - ranges[i].lo;
+                // steps from the whole range to the last places, evenly in their exponents
+                let step = width * (-17.0 * random.unit()).exp() * (2.0 * random.unit() - 1.0);
+                inputs[i] += step;
+            }
+            let inputs = fits(inputs);
+            let e = errors(&inputs);
+            keep(&mut best, &inputs, &e);
+        }
+    }
+    for (k, found) in best.iter_mut().enumerate().filter(|(_, found)| found.error.is_finite()) {
+        found.error = errors_at(graph, scalar, &found.inputs)[k];
+    }
+    best
+}

@@ -1,0 +1,140 @@
+//! Bounds of rounding errors, as they stand in the generated file and in reports.
+
+use crate::certify::{Certificate, Refusal};
+use crate::expr::Port;
+use std::fmt::Write;
+
+/// Bounds of a function's rounding errors, or why there are none.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+pub struct ErrorReport {
+    /// The ranges of the inputs for which they hold, a line per input.
+    pub ranges: Vec<String>,
+    /// Name of each output and its bounds, in its order.
+    pub outputs: Vec<OutputErrors>,
+    /// Why there are none.
+    #[cfg_attr(feature = "cli", serde(skip_serializing_if = "Option::is_none"))]
+    pub refused: Option<&'static str>,
+}
+
+/// Bounds of one output.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+pub struct OutputErrors {
+    /// Its name.
+    pub name: String,
+    /// Its shape.
+    #[cfg_attr(feature = "cli", serde(skip))]
+    pub shape: Vec<usize>,
+    /// |computed − exact| of each scalar is at most this.
+    pub bounds: Vec<f64>,
+    /// The absolute value of each scalar is at most this.
+    pub magnitudes: Vec<f64>,
+}
+
+impl ErrorReport {
+    /// From a certificate over these ranges.
+    pub fn new(outputs: &[Port], ranges: Vec<String>, certificate: Certificate) -> Self {
+        let mut first = 0;
+        let outputs = outputs.iter().map(|port| {
+            let of = first..first + port.len();
+            first = of.end;
+            OutputErrors {
+                name: port.name.clone(),
+                shape: port.shape.clone(),
+                bounds: certificate.errors[of.clone()].to_vec(),
+                magnitudes: certificate.magnitudes[of].to_vec(),
+            }
+        });
+        ErrorReport { ranges, outputs: outputs.collect(), refused: None }
+    }
+
+    /// No bounds.
+    pub fn refused(_outputs: &[Port], refusal: Refusal) -> Self {
+        ErrorReport { ranges: Vec::new(), outputs: Vec::new(), refused: Some(refusal.words()) }
+    }
+
+    /// The greatest bound, its output, and the greatest absolute value of that output.
+    pub fn worst(&self) -> Option<(f64, String)> {
+        let all = self.outputs.iter().flat_map(|o| o.bounds.iter().enumerate().map(move |(k, e)| (*e, o, k)));
+        let (error, output, k) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let port = Port::new(&output.name, &output.shape);
+        Some((error, crate::emit::element(&port, k)))
+    }
+
+    /// The constants of a function in the generated file.
+    pub fn constants(&self, function: &str) -> String {
+        let mut out = String::new();
+        if let Some(refused) = self.refused {
+            let _ = writeln!(out, "// No bound of the rounding errors of {function}: {refused}.");
+        }
+        for output in &self.outputs {
+            let name = self.constant_name(function, output);
+            let _ = writeln!(
+                out,
+                "/// Bound of the rounding errors of [`{function}`]: how far `{}` can be from the exact values.",
+                output.name
+            );
+            let _ = writeln!(out, "///\n/// It holds for all inputs in these ranges:");
+            for line in &self.ranges {
+                let _ = writeln!(out, "/// * {}", line.replace('[', "\\[").replace(']', "\\]"));
+            }
+            let kind = Port::new(&output.name, &output.shape);
+            let kind = crate::emit::array_type(&kind, crate::emit::Scalar::F64);
+            let mut bounds = output.bounds.iter();
+            let values = nested(&output.shape, &mut bounds);
+            let _ = writeln!(out, "#[allow(clippy::all)]\npub const {name}: {kind} = {values};");
+        }
+        out
+    }
+
+    /// The name of an output's constant.
+    pub fn constant_name(&self, function: &str, output: &OutputErrors) -> String {
+        let output = if self.outputs.len() == 1 { String::new() } else { format!("_{}", output.name.to_uppercase()) };
+        format!("{}{output}_ERROR_BOUND", function.to_uppercase())
+    }
+}
+
+/// Numbers as a nested array, rounded up to four digits.
+fn nested<'a>(shape: &[usize], numbers: &mut impl Iterator<Item = &'a f64>) -> String {
+    match shape.split_first() {
+        None => numbers.next().map_or(String::new(), |x| format!("{:?}", four_digits(*x))),
+        Some((n, rest)) => {
+            let parts: Vec<String> = (0..*n).map(|_| nested(rest, numbers)).collect();
+            format!("[{}]", parts.join(", "))
+        }
+    }
+}
+
+/// The least number of four decimal digits that is not below x ≥ 0.
+pub fn four_digits(x: f64) -> f64 {
+    if x == 0.0 || !x.is_finite() {
+        return x;
+    }
+    let text = format!("{x:.3e}");
+    let near: f64 = text.parse().expect("a number that was just written");
+    if near >= x {
+        return near;
+    }
+    let (digits, exponent) = text.split_once('e').expect("scientific notation has an exponent");
+    let digits: f64 = digits.parse().expect("digits");
+    let above: f64 = format!("{:.3}e{exponent}", digits + 0.001).parse().expect("a number");
+    if above >= x {
+        above
+    } else {
+        x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::four_digits;
+
+    #[test]
+    fn bounds_are_rounded_up() {
+        for x in [1.0, 1.00001, 9.9999, 1.2344999e-7, 9.999e12, 5e-324, 0.0] {
+            let rounded = four_digits(x);
+            assert!(rounded >= x && rounded <= x * 1.002, "{x} -> {rounded}");
+        }
+    }
+}
