@@ -1,11 +1,12 @@
 //! The torque controller of an arm, as it stands in firmware: called 1000 times a second, `core` only, no allocation, no
 //! panic path (`tests/no_panic.rs` looks into the object file for one), time and stack known beforehand.
 //!
-//! Computed torque: what the motion takes by the dynamics of the arm, plus what the deviation asks for.
+//! Computed torque: what the motion takes by the dynamics of the arm, plus what the deviation asks for. `tests/closed_loop.rs` runs it
+//! against a simulated arm.
 //! ```
 //! use straightline_firmware_example::{control_step, Gains, Measured, Ur5, Wanted};
 //!
-//! let gains = Gains { stiffness: 400.0, damping: 40.0 };
+//! let gains = Gains { stiffness: [400.0; 6], damping: [40.0; 6] };
 //! let wanted = Wanted { q: [0.0, -1.2, 1.4, 0.1, 0.2, 0.3], qd: [0.0; 6], qdd: [0.0; 6] };
 //! let measured = Measured { q: wanted.q, qd: [0.0; 6] };
 //! let mut tau = [0.0; Ur5::NV];
@@ -19,6 +20,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+use straightline::control::{computed_torque, Limits, Outcome, Reference};
 use straightline::Dynamics;
 
 /// The arm: constants and functions of its dynamics, in single precision.
@@ -40,33 +42,11 @@ pub const TORQUE_LIMITS: [f32; Ur5::NV] = [150.0, 150.0, 150.0, 28.0, 28.0, 28.0
 const _: () = assert!(Ur5::INVERSE_DYNAMICS_COST.fma < 2500);
 
 /// The motion that is asked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wanted {
-    /// Joint angles \[rad\].
-    pub q: [f32; Ur5::NQ],
-    /// Joint velocities \[rad/s\].
-    pub qd: [f32; Ur5::NV],
-    /// Joint accelerations \[rad/s²\].
-    pub qdd: [f32; Ur5::NV],
-}
-
+pub type Wanted = Reference<f32, { Ur5::NV }>;
 /// What the sensors say.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measured {
-    /// Joint angles \[rad\].
-    pub q: [f32; Ur5::NQ],
-    /// Joint velocities \[rad/s\].
-    pub qd: [f32; Ur5::NV],
-}
-
-/// How deviations die out: every joint like q̈ + damping q̇ + stiffness q = 0.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gains {
-    /// \[1/s²\]
-    pub stiffness: f32,
-    /// \[1/s\]
-    pub damping: f32,
-}
+pub type Measured = straightline::control::Measured<f32, { Ur5::NV }>;
+/// How deviations die out: every joint like q̈ + damping q̇ + stiffness q = 0 \[1/s, 1/s²\].
+pub type Gains = straightline::control::Gains<f32, { Ur5::NV }>;
 
 /// Why there are no torques to trust; the drives are to be stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,27 +66,18 @@ pub fn control_step(
     measured: &Measured,
     tau: &mut [f32; Ur5::NV],
 ) -> Result<(), Fault> {
-    let qdd = core::array::from_fn(|i| {
-        let (e, ed) = (wanted.q[i] - measured.q[i], wanted.qd[i] - measured.qd[i]);
-        wanted.qdd[i] + gains.damping * ed + gains.stiffness * e
-    });
-    Ur5::inverse_dynamics(&measured.q, &measured.qd, &qdd, tau);
-    if !tau.iter().all(|t| t.is_finite()) {
-        *tau = [0.0; Ur5::NV];
-        return Err(Fault::NotFinite);
+    *tau = computed_torque(wanted, measured, gains, Ur5::inverse_dynamics);
+    match (Limits { greatest: TORQUE_LIMITS }).apply(tau) {
+        Outcome::NotFinite => Err(Fault::NotFinite),
+        Outcome::Within | Outcome::Saturated => Ok(()),
     }
-    for (t, limit) in tau.iter_mut().zip(TORQUE_LIMITS) {
-        // not `clamp`, which panics when its bounds are the wrong way round
-        *t = t.max(-limit).min(limit);
-    }
-    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const GAINS: Gains = Gains { stiffness: 400.0, damping: 40.0 };
+    const GAINS: Gains = Gains { stiffness: [400.0; 6], damping: [40.0; 6] };
     const WANTED: Wanted =
         Wanted { q: [0.3, -1.2, 1.4, 0.1, 0.2, 0.3], qd: [0.1, 0.2, -0.3, 0.4, 0.5, -0.6], qdd: [1.0; 6] };
 

@@ -53,6 +53,14 @@ impl Real for f64 {
         value.to_f64()
     }
     #[inline]
+    fn zero() -> Self {
+        0.0
+    }
+    #[inline]
+    fn one() -> Self {
+        1.0
+    }
+    #[inline]
     fn sin_cos(self) -> (Self, Self) {
         crate::trig::sin_cos_f64(self)
     }
@@ -70,6 +78,14 @@ impl Real for f32 {
     #[inline]
     fn constant(value: Dd) -> Self {
         value.to_f32()
+    }
+    #[inline]
+    fn zero() -> Self {
+        0.0
+    }
+    #[inline]
+    fn one() -> Self {
+        1.0
     }
     #[inline]
     fn sin_cos(self) -> (Self, Self) {
