@@ -107,7 +107,7 @@ pub fn single_against_double(size: Size) -> Vec<Outcome> {
     let mut outcomes = Vec::new();
     for compiled in compiled::F32.iter().filter(|c| !c.exact) {
         let judged = Judged::new(compiled.robot);
-        for function in Function::of(judged.model()) {
+        for function in Function::all() {
             let program = equations(&judged, function);
             let mut random = Random(14);
             let mut worst = 0.0f64;
