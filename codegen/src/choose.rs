@@ -17,7 +17,7 @@ use straightline_core::Dd;
 /// After so many operations in all programs that were counted a search ends with the best so far: some tenths of a second.
 const ENOUGH: usize = 300_000;
 /// Units of length that are tried, the most frequent ones.
-const UNITS: usize = 4;
+const UNITS: usize = 24;
 
 /// What was found for a robot, by function and scene: searched once, used by every function that shares it.
 #[derive(Clone, Debug, Default)]
@@ -73,7 +73,7 @@ pub fn choose(
         ForwardDynamics | Drive(DriveFunction::ForwardDynamics | DriveFunction::Torques) => {
             let (torques, mass_matrix) = (search(BiasForce), search(MassMatrix));
             // articulated bodies share more with frames that turn
-            let plain = Choice::plain(&robot.model);
+            let plain = Choice { adds_angles: optimisations.angle_sums, ..Choice::plain(&robot.model) };
             let pairs =
                 [(&torques, &mass_matrix), (&torques, &torques), (&mass_matrix, &mass_matrix), (&plain, &plain)];
             let robots = pairs.map(|(t, h)| robot.reduced_by(t, h));
@@ -84,11 +84,15 @@ pub fn choose(
     }
 }
 
-/// What is least: instructions with fused multiply-add, then operations.
+/// What is least: operations and instructions with fused multiply-add together, as either may be what a machine does; then
+/// instructions.
 type Price = (usize, usize);
 
+/// As many instructions a pair of sine and cosine, or a division, weighs; in lanes a pair takes about so long.
+const PAIR: usize = 10;
+
 fn price(counts: Counts) -> Price {
-    (counts.fma, counts.flops())
+    (counts.fma + counts.flops() + 2 * PAIR * (counts.sin_cos + counts.div), counts.fma)
 }
 
 /// A search for one function: the best choice so far, and what was tried.
@@ -132,7 +136,9 @@ fn fingerprint(reduced: &ReducedModel<Dd>) -> u64 {
     for body in &reduced.bodies {
         let switches = [body.stays, body.by_axis_acceleration, body.doubled[0], body.doubled[1]];
         switches.hash(&mut hasher);
+        body.phase.is_some().hash(&mut hasher);
     }
+    reduced.adds_angles.hash(&mut hasher);
     let _ = reduced.map(|x| {
         (x.hi().to_bits(), x.lo().to_bits()).hash(&mut hasher);
         x
@@ -149,8 +155,9 @@ fn improved(
     optimisations: Optimisations,
 ) -> Choice {
     let (reduced, bodies) = (&robot.reduced, &robot.reduced.bodies);
-    let plain = Choice::plain(&robot.model);
-    let stays = (0..bodies.len()).map(|i| reduced.may_stay(i)).collect();
+    let plain = Choice { adds_angles: optimisations.angle_sums, ..Choice::plain(&robot.model) };
+    let forms = optimisations.forms;
+    let stays = (0..bodies.len()).map(|i| forms.stays && reduced.may_stay(i)).collect();
     let first = Choice { stays, ..plain.clone() };
     let mut search = Search {
         robot: robot.clone(),
@@ -170,35 +177,44 @@ fn improved(
         depth[i] = body.parent.map_or(0, |p| depth[p] + 1);
     }
     let deepest = depth.iter().copied().max().unwrap_or(0);
-    let units = match options.scene.gravity == Gravity::Input || !options.scene.parameters.is_empty() {
-        // the unit would have to be known where those are made
-        true => Vec::new(),
-        false => lengths(reduced).into_iter().take(UNITS).collect(),
-    };
+    // the unit would have to be known where gravity or parameters are made
+    let fixed_unit = !forms.unit || options.scene.gravity == Gravity::Input || !options.scene.parameters.is_empty();
     type Flags = fn(&mut Choice) -> &mut Vec<bool>;
-    let of_frames_and_parameters: [Flags; 5] = [
-        |c| &mut c.stays,
-        |c| &mut c.regrouped,
-        |c| &mut c.vanish_at_parent[0],
-        |c| &mut c.vanish_at_parent[1],
-        |c| &mut c.vanish_at_parent[2],
+    let all: [(bool, Flags); 11] = [
+        (forms.stays, |c| &mut c.stays),
+        (forms.origins, |c| &mut c.origin_at_parent),
+        (forms.tips, |c| &mut c.turned_tips[0]),
+        (forms.tips, |c| &mut c.turned_tips[1]),
+        (forms.parameters, |c| &mut c.regrouped),
+        (forms.parameters, |c| &mut c.vanish_at_parent[0]),
+        (forms.parameters, |c| &mut c.vanish_at_parent[1]),
+        (forms.parameters, |c| &mut c.vanish_at_parent[2]),
+        (forms.rotations, |c| &mut c.by_axis_acceleration),
+        (forms.rotations, |c| &mut c.doubled[0]),
+        (forms.rotations, |c| &mut c.doubled[1]),
     ];
-    let of_motion: [Flags; 3] = [|c| &mut c.by_axis_acceleration, |c| &mut c.doubled[0], |c| &mut c.doubled[1]];
-    let of_motion: &[Flags] = if function == Function::MassMatrix { &[] } else { &of_motion };
+    let flags: Vec<Flags> = all.into_iter().filter(|(free, _)| *free).map(|(_, flag)| flag).collect();
+    let units_of = |choice: &Choice| match fixed_unit {
+        true => Vec::new(),
+        false => lengths(&reduce(&robot.model, &Choice { unit: Dd::ONE, ..choice.clone() }).0),
+    };
+    let turn = |choice: &mut Choice, flag: Flags, d: usize| {
+        (0..bodies.len()).filter(|i| depth[*i] == d).for_each(|i| flag(choice)[i] ^= true);
+    };
     loop {
         let before = search.least;
         for d in (0..=deepest).rev() {
-            for flag in of_frames_and_parameters.iter().chain(of_motion) {
+            for flag in &flags {
                 let mut turned = search.best.clone();
-                (0..bodies.len()).filter(|i| depth[*i] == d).for_each(|i| flag(&mut turned)[i] ^= true);
+                turn(&mut turned, *flag, d);
                 search.attempt(turned);
             }
             if search.work > ENOUGH {
                 return search.best;
             }
         }
-        for unit in &units {
-            search.attempt(Choice { unit: *unit, ..search.best.clone() });
+        for unit in units_of(&search.best).into_iter().take(UNITS) {
+            search.attempt(Choice { unit, ..search.best.clone() });
         }
         if search.least == before {
             return search.best;

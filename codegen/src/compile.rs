@@ -76,7 +76,17 @@ impl Options {
     pub fn optimisations(&self) -> Optimisations {
         let algebraic = self.grade == Grade::Algebraic;
         let cheaper = self.forward_dynamics == ForwardDynamicsMethod::Cheaper;
-        Optimisations { folding: algebraic, algebraic, reduced: algebraic, sums: algebraic, chosen: algebraic, cheaper }
+        Optimisations {
+            folding: algebraic,
+            algebraic,
+            reduced: algebraic,
+            sums: algebraic,
+            chosen: algebraic,
+            forms: if algebraic { Forms::ALL } else { Forms::default() },
+            // three far angles of f32 may have a sum outside of its sine's domain
+            angle_sums: algebraic && self.scalar == Scalar::F64,
+            cheaper,
+        }
     }
 
     /// How functions are written.
@@ -105,8 +115,35 @@ pub struct Optimisations {
     pub sums: bool,
     /// Of the forms that the reduced robot has, those with the fewest operations: [`choose`].
     pub chosen: bool,
+    /// What is free in those forms.
+    pub forms: Forms,
+    /// Among those forms ones with sums of angles, whose rounding errors go into the reduction of the angle.
+    pub angle_sums: bool,
     /// The cheaper of the two forms of forward dynamics.
     pub cheaper: bool,
+}
+
+/// What [`choose`] may choose, one by one, so that each can be weighed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Forms {
+    /// Tips and chains of parallel joints are described in axes that do not turn.
+    pub stays: bool,
+    /// Origins are at either foot of the common normals.
+    pub origins: bool,
+    /// Tips are turned so that a parameter vanishes.
+    pub tips: bool,
+    /// Inertial parameters vanish here or at the parent, or are not moved.
+    pub parameters: bool,
+    /// The equations of a body's rotation have several forms.
+    pub rotations: bool,
+    /// The unit of length is one that makes a number one.
+    pub unit: bool,
+}
+
+impl Forms {
+    /// All of them.
+    pub const ALL: Forms =
+        Forms { stays: true, origins: true, tips: true, parameters: true, rotations: true, unit: true };
 }
 
 impl Optimisations {
@@ -124,7 +161,10 @@ impl Optimisations {
         step("algebraic rules", self.algebraic, |o| o.algebraic = true);
         step("reduced robot: frames and inertial parameters", self.reduced, |o| o.reduced = true);
         step("sums with all their terms at once", self.sums, |o| o.sums = true);
-        step("forms of the reduced robot chosen by counting", self.chosen, |o| o.chosen = true);
+        step("forms of the reduced robot chosen by counting", self.chosen, |o| {
+            (o.chosen, o.forms) = (true, Forms::ALL)
+        });
+        step("angles of parallel joints added", self.chosen && self.angle_sums, |o| o.angle_sums = true);
         step("the cheaper form of forward dynamics", self.cheaper, |o| o.cheaper = true);
         steps
     }

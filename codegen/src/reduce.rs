@@ -27,6 +27,12 @@ pub struct Choice {
     /// Bodies of whose regrouped mass, axial first moment and axial second moment so much goes to the parent that there
     /// m c_x, m c_y and Σ_yy vanish, instead of all of it.
     pub vanish_at_parent: [Vec<bool>; 3],
+    /// Tips turned about their axis so that m c_y, or Σ_xy, vanishes.
+    pub turned_tips: [Vec<bool>; 2],
+    /// Bodies whose origin is the foot of the common normal with the axis before theirs, instead of with the one behind.
+    pub origin_at_parent: Vec<bool>,
+    /// [`ReducedModel::adds_angles`]; then an offset that is no quarter turn is added, too.
+    pub adds_angles: bool,
     /// The unit of length \[m\], for a robot that does not slide.
     pub unit: Dd,
 }
@@ -41,7 +47,10 @@ impl Choice {
             by_axis_acceleration: none.clone(),
             regrouped: vec![true; n],
             doubled: [none.clone(), none.clone()],
-            vanish_at_parent: [none.clone(), none.clone(), none],
+            vanish_at_parent: [none.clone(), none.clone(), none.clone()],
+            turned_tips: [none.clone(), none.clone()],
+            origin_at_parent: none,
+            adds_angles: false,
             unit: Dd::ONE,
         }
     }
@@ -52,21 +61,72 @@ const WORTH: f64 = 0.02;
 
 /// The reduced robot, and the pose of each of its frames in the body's canonical frame.
 pub fn reduce(model: &Model<Dd>, choice: &Choice) -> (ReducedModel<Dd>, Vec<Transform<Dd>>) {
-    let regauge = choose_frames(model);
+    let regauge = choose_frames(model, choice);
     let mut bodies: Vec<ReducedBody<Dd>> =
         model.bodies.iter().enumerate().map(|(i, b)| in_new_frame(model, &regauge, i, b)).collect();
     for i in (0..bodies.len()).rev().filter(|i| choice.regrouped[*i]) {
         regroup(&mut bodies, i, [0, 1, 2].map(|k| choice.vanish_at_parent[k][i]));
     }
-    let mut reduced = ReducedModel { bodies, gravity: model.gravity, per_unit: Dd::ONE };
+    let adds_angles = choice.adds_angles;
+    let mut reduced = ReducedModel { bodies, gravity: model.gravity, per_unit: Dd::ONE, adds_angles };
     for i in 0..reduced.bodies.len() {
+        if reduced.bodies.iter().all(|b| b.parent != Some(i)) {
+            turn_tip(&mut reduced.bodies[i], [0, 1].map(|k| choice.turned_tips[k][i]));
+        }
         reduced.bodies[i].stays = choice.stays[i] && reduced.may_stay(i);
         let body = &mut reduced.bodies[i];
+        if adds_angles && body.kind == JointKind::Revolute {
+            (body.offset, body.phase) = apart(body.offset);
+        }
         body.by_axis_acceleration = choice.by_axis_acceleration[i] && body.kind != JointKind::Prismatic;
         let derived = body.kind == JointKind::Revolute && body.shares_axis_field && !body.stays;
         body.doubled = [0, 1].map(|k| choice.doubled[k][i] && derived);
     }
     (in_unit(reduced, choice.unit), regauge)
+}
+
+/// Turns the frame of a tip about its axis so that m c_y or else Σ_xy vanishes; the joint's offset takes it back.
+fn turn_tip(body: &mut ReducedBody<Dd>, vanishes: [bool; 2]) {
+    if body.kind != JointKind::Revolute {
+        return;
+    }
+    let (ms, s) = (body.first_moment, body.second_moment);
+    let length = |x: Dd, y: Dd| (x * x + y * y).sqrt();
+    let (sin, cos) = if vanishes[0] && ms.y != Dd::ZERO {
+        let r = length(ms.x, ms.y);
+        (ms.y / r, ms.x / r)
+    } else if vanishes[1] && s.xy != Dd::ZERO {
+        // tan 2φ = 2 Σ_xy / (Σ_xx − Σ_yy), φ within an eighth of a turn
+        let (x, y) = ((s.xx - s.yy).abs(), s.xy + s.xy);
+        let y = if (s.xx - s.yy).hi() < 0.0 { -y } else { y };
+        let r = length(x, y);
+        let half = Dd::from(0.5);
+        let cos = ((Dd::ONE + x / r) * half).sqrt();
+        (y / r * half / cos, cos)
+    } else {
+        return;
+    };
+    // own axes turned by φ: vectors by −φ
+    body.first_moment = ms.turned(-sin, cos);
+    body.second_moment = s.turned(-sin, cos);
+    if vanishes[0] && ms.y != Dd::ZERO {
+        body.first_moment.y = Dd::ZERO;
+    } else {
+        body.second_moment.xy = Dd::ZERO;
+    }
+    let (s0, c0) = body.offset;
+    body.offset = (special(s0 * cos + c0 * sin), special(c0 * cos - s0 * sin));
+}
+
+/// A turn by its sine and cosine, as a quarter turn or as an angle.
+fn apart((s, c): (Dd, Dd)) -> ((Dd, Dd), Option<Dd>) {
+    if s * c == Dd::ZERO {
+        return ((s, c), None);
+    }
+    // one step of Newton's method on sin(φ − φ₀) = 0 from the angle in f64
+    let near = Dd::from(s.hi().atan2(c.hi()));
+    let (sin, cos) = near.sin_cos();
+    ((Dd::ZERO, Dd::ONE), Some(near + (s * cos - c * sin)))
 }
 
 /// The same robot with lengths in another unit: p / L, g / L, m c · L, M L². The second moment and all torques stay, as
@@ -87,13 +147,18 @@ fn in_unit(mut reduced: ReducedModel<Dd>, unit: Dd) -> ReducedModel<Dd> {
     reduced
 }
 
-/// Lengths between joints, each once, the most frequent first: units that make them one.
+/// Units of length that make a number one, each once, the most frequent first: lengths between joints, then of gravity and
+/// first moments.
 pub fn lengths(reduced: &ReducedModel<Dd>) -> Vec<Dd> {
     let mut found: Vec<(Dd, usize)> = Vec::new();
     if reduced.bodies.iter().any(|b| b.kind == JointKind::Prismatic) {
         return Vec::new();
     }
-    for x in reduced.bodies.iter().flat_map(|b| b.translation.to_array()).map(Dd::abs).filter(|x| *x != Dd::ZERO) {
+    let bodies = || reduced.bodies.iter();
+    let between = bodies().flat_map(|b| b.translation.to_array());
+    let moments = bodies().flat_map(|b| b.first_moment.to_array()).filter(|x| *x != Dd::ZERO).map(|x| Dd::ONE / x);
+    let all = between.chain(reduced.gravity.to_array()).chain(moments);
+    for x in all.map(Dd::abs).filter(|x| *x != Dd::ZERO) {
         match found.iter_mut().find(|(y, _)| (x - *y).abs().hi() < DUST * y.hi()) {
             Some((_, times)) => *times += 1,
             None => found.push((x, 1)),
@@ -108,7 +173,7 @@ pub fn lengths(reduced: &ReducedModel<Dd>) -> Vec<Dd> {
 ///
 /// From the tips to the base: x along the common normal to the axis of the first child with the most descendants, the
 /// origin at the normal's foot.
-fn choose_frames(model: &Model<Dd>) -> Vec<Transform<Dd>> {
+fn choose_frames(model: &Model<Dd>, choice: &Choice) -> Vec<Transform<Dd>> {
     let n = model.bodies.len();
     let mut size = vec![1usize; n];
     for i in (0..n).rev() {
@@ -127,15 +192,35 @@ fn choose_frames(model: &Model<Dd>) -> Vec<Transform<Dd>> {
             continue;
         }
         chosen[i] = match primary(i) {
-            Some(c) => along_common_normal(body, &model.bodies[c], &chosen[c]),
+            Some(c) => {
+                let before = foot_before(model, body).filter(|_| choice.origin_at_parent[i]);
+                along_common_normal(body, &model.bodies[c], &chosen[c], before)
+            }
             None => tip_frame(model, body),
         };
     }
     chosen
 }
 
-/// The frame of `body` with x along the common normal of its axis and its child's, and the origin at the normal's foot.
-fn along_common_normal(body: &Body<Dd>, child: &Body<Dd>, child_frame: &Transform<Dd>) -> Transform<Dd> {
+/// How high on its axis a revolute body has the foot of the common normal with the axis of a revolute joint before it.
+fn foot_before(model: &Model<Dd>, body: &Body<Dd>) -> Option<Dd> {
+    let turns = |b: &Body<Dd>| b.joint.kind == JointKind::Revolute;
+    let parent = body.parent.map(|p| &model.bodies[p])?;
+    let (p, u) = (body.placement.translation, body.placement.rotation.column(2));
+    let sine2 = u.x * u.x + u.y * u.y;
+    // foot on {p + s u} of the common normal with the parent's z axis: (p + s u) · (u − u_z z) = 0
+    let foot = || -(p.dot(u) - p.z * u.z) / sine2;
+    (turns(body) && turns(parent) && sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL).then(foot)
+}
+
+/// The frame of `body` with x along the common normal of its axis and its child's, and the origin at the normal's foot, or
+/// at another height.
+fn along_common_normal(
+    body: &Body<Dd>,
+    child: &Body<Dd>,
+    child_frame: &Transform<Dd>,
+    other_height: Option<Dd>,
+) -> Transform<Dd> {
     let to_child = child.placement.compose(child_frame);
     let (u, p) = (to_child.rotation.column(2), to_child.translation);
     let sine2 = u.x * u.x + u.y * u.y;
@@ -151,7 +236,7 @@ fn along_common_normal(body: &Body<Dd>, child: &Body<Dd>, child_frame: &Transfor
         let x = to_child.rotation.column(0);
         (unit_xy(x.x, x.y), p.z)
     };
-    pose_about_z(body, x_axis, height, p)
+    pose_about_z(body, x_axis, other_height.unwrap_or(height), p)
 }
 
 /// A tip's frame: on the foot of the common normal with the axis before it, and turned so that no constant turn remains.
@@ -236,6 +321,7 @@ fn in_new_frame(model: &Model<Dd>, frames: &[Transform<Dd>], i: BodyId, body: &B
         iv: body.joint.iv,
         rotation,
         offset,
+        phase: None,
         translation: dusted(joint.translation),
         mass: moved.mass,
         first_moment: moved.first_moment,

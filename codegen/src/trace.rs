@@ -104,6 +104,24 @@ impl Real for Expr {
         })
     }
 
+    fn sin_cos_of_sum(angles: &[Self]) -> (Self, Self) {
+        with(|g| {
+            // constants are one number, as long as an angle
+            let constant = |a: &Expr| g.as_constant(a.0).map(|c| c.value());
+            let known: Dd = angles.iter().filter_map(constant).fold(Dd::ZERO, |sum, c| sum + c);
+            let free: Vec<NodeId> = angles.iter().filter(|a| constant(a).is_none()).map(|a| a.0).collect();
+            let Some((first, rest)) = free.split_first() else {
+                let (s, c) = g.rules().folding().sin_cos(known);
+                return (Expr(g.constant(s)), Expr(g.constant(c)));
+            };
+            let parts = [known.hi(), known.lo()].map(Dd::from);
+            let parts: Vec<NodeId> = parts.into_iter().filter(|c| *c != Dd::ZERO).map(|c| g.constant(c)).collect();
+            let angle = rest.iter().chain(&parts).fold(*first, |sum, x| g.insert(Op::AngleSum(sum, *x)));
+            let pair = g.add(Op::SinCos(angle));
+            (Expr(g.add(Op::Sin(pair))), Expr(g.add(Op::Cos(pair))))
+        })
+    }
+
     fn sqrt(self) -> Self {
         Expr(with(|g| g.add(Op::Sqrt(self.0))))
     }

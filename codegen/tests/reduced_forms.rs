@@ -60,6 +60,9 @@ fn every_choice_gives_the_torques_and_the_mass_matrix_of_the_full_robot() {
                 regrouped: random.flags(n),
                 doubled: [random.flags(n), random.flags(n)],
                 vanish_at_parent: [random.flags(n), random.flags(n), random.flags(n)],
+                turned_tips: [random.flags(n), random.flags(n)],
+                origin_at_parent: random.flags(n),
+                adds_angles: trial % 3 > 0,
                 unit: if trial % 2 == 0 { Dd::ONE } else { units[trial % units.len()] },
             };
             let (reduced, _) = reduce(&model, &choice);

@@ -42,6 +42,11 @@ fn faults(graph: &Graph, i: usize) -> Vec<(&'static str, Graph)> {
                 ("constant with the other sign", with(graph, i, Op::Constant(Constant::new(-v)))),
             ]
         }
+        // its users must stay sums of angles or sines
+        Op::AngleSum(a, b) => vec![
+            ("first angle twice", with(graph, i, Op::AngleSum(a, a))),
+            ("second angle twice", with(graph, i, Op::AngleSum(b, b))),
+        ],
         Op::Neg(a) => vec![("sign lost", redirected(graph, i, a))],
         Op::Add(a, b) => vec![
             ("+ to −", with(graph, i, Op::Sub(a, b))),

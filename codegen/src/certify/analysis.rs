@@ -250,6 +250,8 @@ impl<'g> Analysis<'g> {
                     () => return Err(Refusal::Sign),
                 }
             }
+            // formed exactly: what rounding loses goes into the reduction
+            Op::AngleSum(a, b) => (v(&self.state, a) + v(&self.state, b), 0.0),
             Op::SinCos(a) => {
                 let angle = v(&self.state, a);
                 if angle.mag() > format.trig_domain {

@@ -310,6 +310,10 @@ fn chain_rule(graph: &Graph, live: &[bool]) -> (Vec<Form>, Vec<u32>) {
                 uses(b, Coefficient::MinusQuotient(id.0), false);
             }
             Op::Sqrt(a) => uses(a, Coefficient::HalfReciprocal(id.0), false),
+            Op::AngleSum(a, b) => {
+                uses(a, Coefficient::One, false);
+                uses(b, Coefficient::One, false);
+            }
             Op::SinCos(a) => uses(a, Coefficient::One, false),
             Op::Sin(p) => uses(p, Coefficient::ExactCos(p.0), false),
             Op::Cos(p) => uses(p, Coefficient::ExactMinusSin(p.0), false),

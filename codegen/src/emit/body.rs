@@ -54,7 +54,7 @@ pub fn function(
     let used_inputs = |nodes: &mut dyn Iterator<Item = NodeId>| {
         let mut used = vec![false; graph.inputs.len()];
         nodes.for_each(|id| {
-            for a in graph.op(id).operands().chain([id]) {
+            for a in graph.op(id).operands().flat_map(|a| graph.angle_terms(a)).chain([id]) {
                 if let Op::Input(k) = graph.op(a) {
                     used[port_of(&graph.inputs, k as usize).0] = true;
                 }
@@ -233,6 +233,7 @@ fn statements(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) 
             section = Some(here);
         }
         match op {
+            Op::AngleSum(..) => {}
             Op::SinCos(_) => {
                 out.uses_sin_cos = true;
                 if !b.paired[id.index()] {
@@ -337,7 +338,7 @@ impl Body<'_> {
             Op::Neg(a) => (format!("-{}", self.bound(a, Atom)), Sign),
             Op::Sqrt(a) => (format!("trig::sqrt_{}({})", self.style.scalar.name(), self.operand(a).0), Atom),
             Op::Sign(a) => (format!("trig::sign_{}({})", self.style.scalar.name(), self.operand(a).0), Atom),
-            Op::Input(_) | Op::Constant(_) | Op::SinCos(_) | Op::Sin(_) | Op::Cos(_) => {
+            Op::Input(_) | Op::Constant(_) | Op::AngleSum(..) | Op::SinCos(_) | Op::Sin(_) | Op::Cos(_) => {
                 unreachable!("written where they are used")
             }
         }
@@ -346,9 +347,12 @@ impl Body<'_> {
     /// `(sin_q3, cos_q3) = trig::sin_cos_f64(q[2]);` for one angle; the angles of a block that are known already go
     /// through one call in lanes, which the compiler turns into vector instructions.
     fn sin_cos<'n>(&mut self, block: impl Iterator<Item = &'n NodeId>, uses: &[u32], part: &Part) {
-        let angles: Vec<(NodeId, String)> = block
+        let terms_of = |a: NodeId| -> Vec<String> {
+            self.graph.angle_terms(a).into_iter().map(|term| self.operand(term).0).collect()
+        };
+        let angles: Vec<(NodeId, Vec<String>)> = block
             .filter_map(|id| match self.graph.op(*id) {
-                Op::SinCos(a) if self.is_written(a) => Some((*id, self.operand(a).0)),
+                Op::SinCos(a) if self.is_written(a) => Some((*id, terms_of(a))),
                 _ => None,
             })
             .collect();
@@ -370,24 +374,34 @@ impl Body<'_> {
         }
         let [sines, cosines] = halves;
         let scalar = self.style.scalar.name();
+        // a sum goes through with what its rounding lost
+        let sums = angles.iter().any(|(_, terms)| terms.len() > 1);
+        let argument = |terms: &Vec<String>| match (sums, terms.as_slice()) {
+            (false, terms) => terms[0].clone(),
+            (true, [angle]) => format!("[{angle}, 0.0]"),
+            (true, terms) => format!("trig::sum_of_angles_{scalar}([{}])", terms.join(", ")),
+        };
+        let arguments: Vec<String> = angles.iter().map(|(_, terms)| argument(terms)).collect();
+        let kernel = if sums { "sin_cos_of_sum" } else { "sin_cos" };
         if self.style.lanes {
-            for ((s, c), (_, angle)) in sines.iter().zip(&cosines).zip(&angles) {
-                let _ = writeln!(self.statements, "    let ({s}, {c}) = trig::sin_cos_{scalar}({angle});");
+            for ((s, c), angle) in sines.iter().zip(&cosines).zip(&arguments) {
+                let _ = writeln!(self.statements, "    let ({s}, {c}) = trig::{kernel}_{scalar}({angle});");
             }
-        } else if let [(_, angle)] = angles.as_slice() {
+        } else if let [angle] = arguments.as_slice() {
             let (s, c) = (&sines[0], &cosines[0]);
-            let _ = writeln!(self.statements, "    let ({s}, {c}) = trig::sin_cos_{scalar}({angle});");
+            let _ = writeln!(self.statements, "    let ({s}, {c}) = trig::{kernel}_{scalar}({angle});");
         } else {
-            let arguments: Vec<String> = angles.into_iter().map(|(_, angle)| angle).collect();
+            let kernel = if sums { "sin_cos_lanes_of_sums" } else { "sin_cos_lanes" };
             self.statements.push_str(&wrapped("    let ([", &sines, "],"));
             self.statements.push_str(&wrapped("        [", &cosines, "]) ="));
-            self.statements.push_str(&wrapped(&format!("        trig::sin_cos_lanes_{scalar}(["), &arguments, "]);"));
+            self.statements.push_str(&wrapped(&format!("        trig::{kernel}_{scalar}(["), &arguments, "]);"));
         }
     }
 
     /// Whether a node can be used as an operand by now.
     fn is_written(&self, id: NodeId) -> bool {
-        matches!(self.graph.op(id), Op::Input(_) | Op::Constant(_)) || self.text[id.index()].is_some()
+        matches!(self.graph.op(id), Op::Input(_) | Op::Constant(_) | Op::AngleSum(..))
+            || self.text[id.index()].is_some()
     }
 
     fn store_result(&mut self, id: NodeId, k: usize) {

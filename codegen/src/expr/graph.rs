@@ -64,6 +64,9 @@ pub enum Op {
     Sqrt(NodeId),
     /// −1, 0 or 1.
     Sign(NodeId),
+    /// The sum of two angles as if it were formed exactly: of inputs, constants and such sums. Only [`Op::SinCos`] may use it,
+    /// and such sums. It is not a value that could be stored, but is formed where its sine is.
+    AngleSum(NodeId, NodeId),
     /// sin and cos of an angle, together; only [`Op::Sin`] and [`Op::Cos`] may use it.
     SinCos(NodeId),
     /// The sine of a [`Op::SinCos`].
@@ -78,7 +81,7 @@ impl Op {
         let (a, b) = match self {
             Op::Input(_) | Op::Constant(_) => (None, None),
             Op::Neg(a) | Op::Sqrt(a) | Op::Sign(a) | Op::SinCos(a) | Op::Sin(a) | Op::Cos(a) => (Some(a), None),
-            Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) => (Some(a), Some(b)),
+            Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) | Op::AngleSum(a, b) => (Some(a), Some(b)),
         };
         a.into_iter().chain(b)
     }
@@ -95,6 +98,7 @@ impl Op {
             Op::Div(a, b) => Op::Div(f(a), f(b)),
             Op::Sqrt(a) => Op::Sqrt(f(a)),
             Op::Sign(a) => Op::Sign(f(a)),
+            Op::AngleSum(a, b) => Op::AngleSum(f(a), f(b)),
             Op::SinCos(a) => Op::SinCos(f(a)),
             Op::Sin(a) => Op::Sin(f(a)),
             Op::Cos(a) => Op::Cos(f(a)),
@@ -170,7 +174,8 @@ pub struct Graph {
     pub results: Vec<NodeId>,
 }
 
-/// Operation counts. Sign flips and signs are free; `sin_cos` counts angles.
+/// Operation counts. Sign flips and signs are free; `sin_cos` counts angles. The sum of two angles is an addition; what keeps
+/// its rounding error for the argument reduction is counted apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(serde::Serialize))]
 pub struct Counts {
@@ -184,6 +189,8 @@ pub struct Counts {
     pub div: usize,
     /// Square roots.
     pub sqrt: usize,
+    /// Additions that carry rounding errors of sums of angles into the reduction of the angle.
+    pub tail: usize,
     /// Pairs of sine and cosine.
     #[cfg_attr(feature = "cli", serde(rename = "sincos"))]
     pub sin_cos: usize,
@@ -196,7 +203,18 @@ impl Counts {
     }
 }
 
+/// Five additions find what a sum lost, one adds it to what other sums lost.
+pub const TAIL: usize = 6;
+
 impl Graph {
+    /// The terms of an angle: of a sum of angles those, of anything else itself.
+    pub fn angle_terms(&self, angle: NodeId) -> Vec<NodeId> {
+        match self.op(angle) {
+            Op::AngleSum(a, b) => [self.angle_terms(a), self.angle_terms(b)].concat(),
+            _ => vec![angle],
+        }
+    }
+
     /// The operation of a node.
     pub fn op(&self, id: NodeId) -> Op {
         self.ops[id.index()]
@@ -261,7 +279,14 @@ impl Graph {
                 }
                 Op::Div(..) => counts.div += 1,
                 Op::Sqrt(_) => counts.sqrt += 1,
-                Op::SinCos(_) => counts.sin_cos += 1,
+                Op::SinCos(a) => {
+                    counts.sin_cos += 1;
+                    counts.tail += usize::from(matches!(self.op(a), Op::AngleSum(..)));
+                }
+                Op::AngleSum(..) => {
+                    counts.add += 1;
+                    counts.tail += TAIL;
+                }
                 Op::Input(_) | Op::Constant(_) | Op::Neg(_) | Op::Sign(_) | Op::Sin(_) | Op::Cos(_) => {}
             }
         }

@@ -26,8 +26,13 @@ pub fn evaluate<T: Real>(graph: &Graph, inputs: &[T]) -> Vec<T> {
             Op::Div(a, b) => v(a) / v(b),
             Op::Sqrt(a) => v(a).sqrt(),
             Op::Sign(a) => v(a).sign(),
+            Op::AngleSum(a, b) => v(a) + v(b),
             Op::SinCos(a) => {
-                let (s, c) = v(a).sin_cos();
+                let terms = graph.angle_terms(a);
+                let (s, c) = match terms.as_slice() {
+                    [angle] => v(*angle).sin_cos(),
+                    _ => T::sin_cos_of_sum(&terms.into_iter().map(v).collect::<Vec<T>>()),
+                };
                 cosine_of[i] = cosines.len() as u32;
                 cosines.push(c);
                 s

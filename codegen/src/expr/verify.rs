@@ -1,6 +1,6 @@
 //! What every graph must be, checked between passes.
 
-use super::{Graph, Op};
+use super::{Graph, NodeId, Op};
 
 /// Checks that operands stand before users, that inputs and results exist, that only `Sin` and `Cos` use a `SinCos`,
 /// and that there is a result per output scalar and a note per node.
@@ -23,6 +23,17 @@ pub fn verify(graph: &Graph) -> Result<(), String> {
                 return Err(format!("node {i} ({op:?}) mixes a sine-cosine pair and a number"));
             }
         }
+        for a in op.operands().filter(|a| matches!(graph.op(*a), Op::AngleSum(..))) {
+            if !matches!(op, Op::AngleSum(..) | Op::SinCos(_)) {
+                return Err(format!("node {i} ({op:?}) takes the sum of angles {} for a number", a.index()));
+            }
+        }
+        if let Op::AngleSum(a, b) = op {
+            let is_angle = |a: NodeId| matches!(graph.op(a), Op::Input(_) | Op::Constant(_) | Op::AngleSum(..));
+            if !(is_angle(*a) && is_angle(*b)) {
+                return Err(format!("node {i} adds something that is neither an input nor a constant to an angle"));
+            }
+        }
         if let Op::Input(k) = op {
             if *k as usize >= inputs {
                 return Err(format!("node {i} reads input {k} of {inputs}"));
@@ -36,7 +47,7 @@ pub fn verify(graph: &Graph) -> Result<(), String> {
     if graph.results.len() != outputs {
         return Err(format!("{} results for {outputs} output scalars", graph.results.len()));
     }
-    match graph.results.iter().find(|r| r.index() >= n || matches!(graph.op(**r), Op::SinCos(_))) {
+    match graph.results.iter().find(|r| r.index() >= n || matches!(graph.op(**r), Op::SinCos(_) | Op::AngleSum(..))) {
         Some(r) => Err(format!("result {r:?} is not a number")),
         None => Ok(()),
     }

@@ -475,6 +475,7 @@ impl Table {
                 Value::Other(Op::Div(..), _) => counts.div += 1,
                 Value::Other(Op::Sqrt(_), _) => counts.sqrt += 1,
                 Value::Other(Op::SinCos(_), _) => counts.sin_cos += 1,
+                Value::Other(Op::AngleSum(..), _) => counts.add += 1,
                 _ => {}
             }
         }
@@ -645,6 +646,11 @@ impl Writer<'_> {
 
     /// The node of a term, negated if need be.
     fn signed(&mut self, term: Term) -> NodeId {
+        let term = self.table.resolved(term);
+        if let Value::Constant(c) = &self.table.values[term.value()] {
+            let c = c.value();
+            return self.builder.constant(if term.is_negative() { -c } else { c });
+        }
         match self.term(term) {
             (node, false) => node,
             (node, true) => self.builder.insert(Op::Neg(node)),

@@ -31,6 +31,8 @@ pub struct FunctionReport {
     pub div: usize,
     /// Square roots.
     pub sqrt: usize,
+    /// Additions that carry rounding errors of sums of angles into their sine-cosine pairs.
+    pub tail: usize,
     /// Sine-cosine pairs of distinct angles.
     pub sincos: usize,
     /// Most values alive at once, inputs and constants not counted.
@@ -79,7 +81,7 @@ impl ContactReport {
 impl FunctionReport {
     /// From a program and its number of lines.
     pub fn new(program: &Program, scalar: Scalar, lines: usize) -> Self {
-        let Counts { mul, add, fma, div, sqrt, sin_cos } = program.graph.counts();
+        let Counts { mul, add, fma, div, sqrt, tail, sin_cos } = program.graph.counts();
         let Measures { stack_bytes, code_bytes, live, .. } = Measures::of(program, scalar);
         FunctionReport {
             mul,
@@ -87,6 +89,7 @@ impl FunctionReport {
             fma,
             div,
             sqrt,
+            tail,
             sincos: sin_cos,
             max_live: live,
             carried_bytes: program.schedule.slots * scalar.bytes(),

@@ -17,6 +17,19 @@ pub trait Real:
     /// `(sin x, cos x)` of an angle in radians.
     fn sin_cos(self) -> (Self, Self);
 
+    /// `(sin, cos)` of the sum of some angles as if it were formed exactly, which it is up to the square of a rounding.
+    fn sin_cos_of_sum(angles: &[Self]) -> (Self, Self) {
+        let (mut sum, mut tail) = (angles[0], Self::zero());
+        for &angle in &angles[1..] {
+            let next = sum + angle;
+            let added = next - sum;
+            tail = tail + ((sum - (next - added)) + (angle - added));
+            sum = next;
+        }
+        let (sin, cos) = sum.sin_cos();
+        (sin + tail * cos, cos - tail * sin)
+    }
+
     /// Square root; NaN below zero.
     fn sqrt(self) -> Self;
 
@@ -63,6 +76,13 @@ impl Real for f64 {
     #[inline]
     fn sin_cos(self) -> (Self, Self) {
         crate::trig::sin_cos_f64(self)
+    }
+    fn sin_cos_of_sum(angles: &[Self]) -> (Self, Self) {
+        let join = |[sum, tail]: [f64; 2], x: &f64| {
+            let [sum, lost] = crate::trig::sum_of_angles_f64([sum, *x]);
+            [sum, tail + lost]
+        };
+        crate::trig::sin_cos_of_sum_f64(angles[1..].iter().fold([angles[0], 0.0], join))
     }
     #[inline]
     fn sqrt(self) -> Self {

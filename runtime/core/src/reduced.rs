@@ -28,6 +28,8 @@ pub struct ReducedBody<T> {
     pub rotation: Mat3<T>,
     /// (sin θ₀, cos θ₀) of a constant turn about z that follows E: the body's rotation is E R_z(θ₀) R_z(q).
     pub offset: (T, T),
+    /// An angle \[rad\] that is added to q, besides the offset.
+    pub phase: Option<T>,
     /// Origin of the joint frame in the parent's frame \[m\].
     pub translation: Vec3<T>,
     /// Mass \[kg\].
@@ -63,6 +65,8 @@ pub struct ReducedModel<T> {
     /// 1 / L, with L the unit of length \[m\] in which positions, first moments, masses and gravity are given; not 1 only
     /// where no joint slides. Coordinates and forces of a floating base are in metres all the same.
     pub per_unit: T,
+    /// The angles of a chain of parallel joints are added, as if exactly, instead of by the addition theorem.
+    pub adds_angles: bool,
 }
 
 impl<T: Real> ReducedModel<T> {
@@ -85,6 +89,7 @@ impl<T: Real> ReducedModel<T> {
             iv: b.iv,
             rotation: b.rotation.map(&mut f),
             offset: (f(b.offset.0), f(b.offset.1)),
+            phase: b.phase.map(&mut f),
             translation: b.translation.map(&mut f),
             mass: f(b.mass),
             first_moment: b.first_moment.map(&mut f),
@@ -96,6 +101,11 @@ impl<T: Real> ReducedModel<T> {
             by_axis_acceleration: b.by_axis_acceleration,
             doubled: b.doubled,
         });
-        ReducedModel { bodies: bodies.collect(), gravity: self.gravity.map(&mut f), per_unit: f(self.per_unit) }
+        ReducedModel {
+            bodies: bodies.collect(),
+            gravity: self.gravity.map(&mut f),
+            per_unit: f(self.per_unit),
+            adds_angles: self.adds_angles,
+        }
     }
 }

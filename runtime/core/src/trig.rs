@@ -16,8 +16,8 @@
 //!
 //! Outside the domain the result is NaN: an angle of a quarter of a million turns has no digits worth a silent answer.
 
-/// [`sin_cos_f64`] answers for |x| up to here, just under 2^20·π/2; beyond, NaN.
-pub const DOMAIN_F64: f64 = 1_647_099.0;
+/// [`sin_cos_f64`] answers for |x| up to here, just under 2^23·π/2; beyond, NaN.
+pub const DOMAIN_F64: f64 = 13_176_794.0;
 
 /// [`sin_cos_f32`] answers for |x| up to here, just under 2^13·π/2; beyond, NaN.
 pub const DOMAIN_F32: f32 = 12_867.0;
@@ -60,6 +60,32 @@ pub fn sin_cos_lanes_f64<const N: usize>(x: [f64; N]) -> ([f64; N], [f64; N]) {
     (sines, cosines)
 }
 
+/// [`sin_cos_of_sum_f64`] of several sums: the same bits, by vector instructions where there are any.
+///
+/// Inlined, so that sines and cosines stay in registers.
+#[inline(always)]
+#[must_use]
+pub fn sin_cos_lanes_of_sums_f64<const N: usize>(x: [[f64; 2]; N]) -> ([f64; N], [f64; N]) {
+    const BLOCK: usize = 8;
+    let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
+    let mut first = 0;
+    while first < N {
+        let used = if N - first < BLOCK { N - first } else { BLOCK };
+        let (mut sum, mut tail) = ([0.0; BLOCK], [0.0; BLOCK]);
+        let (mut sin, mut cos) = ([0.0; BLOCK], [0.0; BLOCK]);
+        for i in 0..used {
+            [sum[i], tail[i]] = x[first + i];
+        }
+        for i in 0..used.next_multiple_of(LANES_F64) {
+            (sin[i], cos[i]) = sin_cos_of_sum_f64([sum[i], tail[i]]);
+        }
+        sines[first..first + used].copy_from_slice(&sin[..used]);
+        cosines[first..first + used].copy_from_slice(&cos[..used]);
+        first += BLOCK;
+    }
+    (sines, cosines)
+}
+
 /// [`sin_cos_f32`] of several angles: the same bits, by vector instructions where there are any.
 ///
 /// Inlined, so that sines and cosines stay in registers.
@@ -89,14 +115,36 @@ pub fn sin_cos_lanes_f32<const N: usize>(x: [f32; N]) -> ([f32; N], [f32; N]) {
 #[inline]
 #[must_use]
 pub fn sin_cos_f64(x: f64) -> (f64, f64) {
+    sin_cos_of_sum_f64([x, 0.0])
+}
+
+/// The sum of some angles, rounded, and what the rounding lost: TwoSum (Knuth 1969) one after the other.
+#[inline(always)]
+#[must_use]
+pub fn sum_of_angles_f64<const N: usize>(angles: [f64; N]) -> [f64; 2] {
+    let (mut sum, mut tail) = (angles[0], 0.0);
+    for angle in &angles[1..] {
+        let next = sum + angle;
+        let added = next - sum;
+        tail += (sum - (next - added)) + (angle - added);
+        sum = next;
+    }
+    [sum, tail]
+}
+
+/// `(sin, cos)` of the sum x + tail, |tail| ≤ ulp(x), as [`sin_cos_f64`] and within 2^-85 more: the tail goes into the
+/// argument reduction, so that far angles keep their digits. NaN for |x| > [`DOMAIN_F64`].
+#[inline]
+#[must_use]
+pub fn sin_cos_of_sum_f64([x, tail]: [f64; 2]) -> (f64, f64) {
     const ROUND: f64 = 6_755_399_441_055_744.0; // 1.5·2^52
-    const P1: f64 = 1.5707963267341256; // 33 bits
-    const P2: f64 = 6.077100506303966e-11; // 33 bits
-    const P3: f64 = 2.0222662487111665e-21; // 33 bits
-    const P4: f64 = 8.4784276603689e-32; // 53 bits; the sum is π/2 within 2^-159
+    const P1: f64 = 1.570796325802803; // 30 bits
+    const P2: f64 = 9.920935791635221e-10; // 30 bits
+    const P3: f64 = 5.17018297889025e-19; // 30 bits
+    const P4: f64 = 2.9038559739793605e-28; // 53 bits; the sum is π/2 within 2^-145
     const SIGN: u64 = 1 << 63;
 
-    // k is the nearest integer to x·2/π, |k| ≤ 2^20
+    // k is the nearest integer to x·2/π, |k| ≤ 2^23
     let shifted = x * core::f64::consts::FRAC_2_PI + ROUND;
     let quadrant = shifted.to_bits();
     let k = shifted - ROUND;
@@ -107,7 +155,7 @@ pub fn sin_cos_f64(x: f64) -> (f64, f64) {
     let w = k * P2;
     let r1 = r0 - w;
     let e1 = (r0 - r1) - w;
-    let t = k * P3 - e1;
+    let t = (k * P3 - e1) - tail;
     let y0 = r1 - t;
     let y1 = ((r1 - y0) - t) - k * P4;
 

@@ -8,7 +8,9 @@
 mod measure;
 
 use measure::{around_multiple, worst_f32, worst_f64, Random, Worst};
-use straightline_core::trig::{sin_cos_f32, sin_cos_f64, sqrt_f32, sqrt_f64, DOMAIN_F32, DOMAIN_F64};
+use straightline_core::trig::{sin_cos_f32, sin_cos_f64, sin_cos_of_sum_f64};
+use straightline_core::trig::{sqrt_f32, sqrt_f64, sum_of_angles_f64, DOMAIN_F32, DOMAIN_F64};
+use straightline_core::{Dd, Real};
 
 /// The bound that follows from adding up the roundings (see the kernel in `trig.rs`).
 const BOUND_F64: f64 = 0.797;
@@ -29,7 +31,7 @@ fn arguments_of_all_sizes(count: u64) -> impl Iterator<Item = f64> {
 }
 
 fn multiples_of_half_pi(stride: usize, reach: u64) -> impl Iterator<Item = f64> {
-    (1..=1u32 << 20).step_by(stride).flat_map(move |k| around_multiple(k, reach)).filter(|x| *x <= DOMAIN_F64)
+    (1..=1u32 << 23).step_by(stride).flat_map(move |k| around_multiple(k, reach)).filter(|x| *x <= DOMAIN_F64)
 }
 
 fn floats_in_the_domain(stride: usize) -> impl Iterator<Item = f32> {
@@ -49,9 +51,9 @@ fn f64_errors_stay_within_the_bound_of_the_roundings() {
 /// Where the result is tiny all of its digits come from the tail of the reduction; the other one is ±1 and must be so.
 #[test]
 fn f64_keeps_every_digit_and_sign_next_to_multiples_of_half_pi() {
-    let worst = worst_f64(sin_cos_f64, multiples_of_half_pi(41, 2));
+    let worst = worst_f64(sin_cos_f64, multiples_of_half_pi(331, 2));
     assert!(worst.max() <= 0.501, "{worst:?}");
-    for k in (1..1 << 20).step_by(41) {
+    for k in (1..1 << 23).step_by(331) {
         for x in around_multiple(k, 2) {
             let (sin, cos) = sin_cos_f64(x);
             let truth = straightline_core::Dd::from(x).sin_cos();
@@ -118,6 +120,40 @@ fn table_of_errors() {
         row(&format!("f32, {from:.3} <= x <= {to:.3}, every 13th"), worst_f32(sin_cos_f32, arguments));
         from = to;
     }
+}
+
+/// The largest error of sin and cos \[ulp\] of sums of three angles, against the exact sum in double-double, above the 2^-85
+/// to which the tail is added.
+fn worst_of_sums(angles: impl Iterator<Item = [f64; 3]>) -> f64 {
+    let ulp = |x: f64| x.abs().next_up() - x.abs();
+    let error = |angles: [f64; 3]| {
+        let exact = angles.iter().fold(Dd::ZERO, |sum, x| sum + Dd::from(*x)).sin_cos();
+        let ours = sin_cos_of_sum_f64(sum_of_angles_f64(angles));
+        let of = |got: f64, truth: Dd| {
+            let error = (Dd::from(got) - truth).abs().to_f64();
+            (error - 2f64.powi(-85)).max(0.0) / ulp(truth.to_f64())
+        };
+        assert_eq!(ours, Real::sin_cos_of_sum(&angles), "the trait's sum has the same bits");
+        of(ours.0, exact.0).max(of(ours.1, exact.1))
+    };
+    angles.map(error).fold(0.0, f64::max)
+}
+
+/// A rounded sum of angles around 1e6 would be wrong in the tenth digit.
+#[test]
+fn sums_of_far_angles_keep_their_digits() {
+    let mut random = Random(5);
+    for range in [1.0, std::f64::consts::PI, 100.0, 1e4, 1e6, DOMAIN_F64 / 3.0] {
+        let worst = worst_of_sums((0..30_000).map(|_| [0; 3].map(|_| random.uniform(-range, range))));
+        assert!(worst <= BOUND_F64, "angles below {range}: {worst}");
+    }
+    // next to multiples of π/2 the result may be smaller than what the rounding of the sum lost
+    let tiny = (1..1u32 << 21).step_by(97).flat_map(|k| around_multiple(k, 1)).map(|x| {
+        let far = random.uniform(-1e6, 1e6);
+        [x - far, far, random.uniform(-1e-9, 1e-9)]
+    });
+    let worst = worst_of_sums(tiny);
+    assert!(worst <= 1.5, "next to multiples of π/2: {worst}");
 }
 
 #[test]

@@ -95,18 +95,18 @@ pub fn report(report: &Report) -> io::Result<()> {
     writeln!(out, "{robot}: nq {nq}, nv {nv}, {scalar}\n")?;
     writeln!(
         out,
-        "{:<20}{:>8}{:>8}{:>8}{:>6}{:>6}{:>8}{:>6}{:>7}{:>8}",
-        "function", "mul", "add", "fma", "div", "sqrt", "sincos", "live", "parts", "lines"
+        "{:<20}{:>8}{:>8}{:>8}{:>6}{:>6}{:>8}{:>6}{:>6}{:>7}{:>8}",
+        "function", "mul", "add", "fma", "div", "sqrt", "sincos", "tail", "live", "parts", "lines"
     )?;
     for (name, f) in functions {
         writeln!(
             out,
-            "{name:<20}{:>8}{:>8}{:>8}{:>6}{:>6}{:>8}{:>6}{:>7}{:>8}",
-            f.mul, f.add, f.fma, f.div, f.sqrt, f.sincos, f.max_live, f.parts, f.lines
+            "{name:<20}{:>8}{:>8}{:>8}{:>6}{:>6}{:>8}{:>6}{:>6}{:>7}{:>8}",
+            f.mul, f.add, f.fma, f.div, f.sqrt, f.sincos, f.tail, f.max_live, f.parts, f.lines
         )?;
     }
     for (k, c) in report.contact.iter().enumerate() {
-        let Counts { mul, add, fma, div, sqrt, sin_cos } = c.counts;
+        let Counts { mul, add, fma, div, sqrt, sin_cos, .. } = c.counts;
         let name = format!("{}::{}", c.mode, c.function);
         let start = if k == 0 { "\nin contact\n" } else { "" };
         writeln!(out, "{start}{name:<40}{mul:>8}{add:>8}{fma:>8}{div:>6}{sqrt:>6}{sin_cos:>8}")?;
@@ -129,7 +129,11 @@ pub fn report(report: &Report) -> io::Result<()> {
             writeln!(out, "stored for {what} dynamics: {stored}")?;
         }
     }
-    writeln!(out, "\nfma: instructions for mul and add when every a·b ± c is one; live: most values alive at once")?;
+    writeln!(
+        out,
+        "\nfma: instructions for mul and add when every a·b ± c is one; tail: additions within sincos that keep what sums of\n\
+         angles lose to rounding; live: most values alive at once"
+    )?;
     for (name, method) in functions.iter().filter_map(|(name, f)| Some((name, f.method?))) {
         writeln!(out, "\n{name}. {method}")?;
     }

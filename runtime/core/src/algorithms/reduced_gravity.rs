@@ -7,6 +7,7 @@
 //! −g of a joint near the base still has zeros.
 
 use super::joint::quaternion_to_rotation;
+use super::reduced_turn::own_angle;
 use crate::model::JointKind;
 use crate::real::Real;
 use crate::reduced::{ReducedBody, ReducedModel};
@@ -21,16 +22,9 @@ pub fn reduced_gravity_force<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T
     let mut up: Vec<Vec3<T>> = Vec::with_capacity(n);
     let mut up_at_joint: Vec<Vec3<T>> = Vec::with_capacity(n);
     T::section("sines and cosines", None);
-    let turn = |(i, body): (usize, &ReducedBody<T>)| {
-        let (s0, c0) = body.offset;
-        match body.kind {
-            JointKind::Revolute => {
-                let (s, c) = q[body.iq].sin_cos();
-                let (s, c) = (s.named("sin_q", i, ""), c.named("cos_q", i, ""));
-                (s * c0 + c * s0, c * c0 - s * s0)
-            }
-            JointKind::Prismatic | JointKind::Floating => (s0, c0),
-        }
+    let turn = |(i, body): (usize, &ReducedBody<T>)| match body.kind {
+        JointKind::Revolute => own_angle(i, body, q),
+        JointKind::Prismatic | JointKind::Floating => body.offset,
     };
     let turns: Vec<(T, T)> = model.bodies.iter().enumerate().map(turn).collect();
     for (i, body) in model.bodies.iter().enumerate() {

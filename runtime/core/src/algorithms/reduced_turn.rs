@@ -2,8 +2,9 @@
 //!
 //! A chain of parallel joints turns about one direction. Its *base axes* are those that the first of them has before it
 //! turns; a body that [stays](ReducedBody::stays) is described in them, one that does not in its own axes, which the sum of
-//! the angles turns from the base axes. Sine and cosine of the sum come from those of its terms by the addition theorem:
-//! adding the angles would lose |q| ε, which is all of the fraction for angles of many turns.
+//! the angles turns from the base axes. Sine and cosine of the sum come from the sum as if it were formed exactly, as a
+//! rounded sum would lose |q| ε, which is all of the fraction for angles of many turns; or from those of its terms by the
+//! addition theorem.
 
 use super::joint::quaternion_to_rotation;
 use crate::model::JointKind;
@@ -19,6 +20,8 @@ pub(super) struct Turn<T> {
     pub angle: Option<(T, T)>,
     /// Whether the base axes are those of the parent, which is described in them too.
     pub continues: bool,
+    /// The terms of the angle besides constant offsets, and sine and cosine of those, where angles are added.
+    sum: (Vec<T>, (T, T)),
     /// Rotation of a floating base.
     free: Option<Mat3<T>>,
 }
@@ -29,23 +32,35 @@ impl<T: Real> Turn<T> {
         T::section("sines and cosines", None);
         let mut turns: Vec<Turn<T>> = Vec::with_capacity(model.bodies.len());
         for (i, body) in model.bodies.iter().enumerate() {
+            let none = || (Vec::new(), (T::zero(), T::one()));
             let turn = match body.kind {
                 JointKind::Revolute => {
-                    let (s, c) = q[body.iq].sin_cos();
-                    let (s, c) = (s.named("sin_q", i, ""), c.named("cos_q", i, ""));
-                    let own = sum_of_angles((s, c), body.offset);
                     let continued = body.parent.filter(|p| body.parallel && model.bodies[*p].stays);
-                    let angle = match continued.and_then(|p| turns[p].angle) {
-                        Some(before) => sum_of_angles(own, before),
-                        None => own,
-                    };
-                    Turn { angle: Some(angle), continues: continued.is_some(), free: None }
+                    let (mut sum, mut angle) = (none(), None);
+                    if model.adds_angles {
+                        let (mut terms, offset) = continued.map_or_else(none, |p| turns[p].sum.clone());
+                        let name = if terms.is_empty() { ("sin_q", "cos_q") } else { ("sin_sum", "cos_sum") };
+                        terms.push(q[body.iq]);
+                        terms.extend(body.phase);
+                        let (s, c) = T::sin_cos_of_sum(&terms);
+                        let offset = sum_of_angles(offset, body.offset);
+                        angle = Some(sum_of_angles((s.named(name.0, i, ""), c.named(name.1, i, "")), offset));
+                        sum = (terms, offset);
+                    }
+                    let angle = angle.unwrap_or_else(|| {
+                        let own = own_angle(i, body, q);
+                        match continued.and_then(|p| turns[p].angle) {
+                            Some(before) => sum_of_angles(own, before),
+                            None => own,
+                        }
+                    });
+                    Turn { angle: Some(angle), continues: continued.is_some(), sum, free: None }
                 }
-                JointKind::Prismatic => Turn { angle: None, continues: false, free: None },
+                JointKind::Prismatic => Turn { angle: None, continues: false, sum: none(), free: None },
                 JointKind::Floating => {
                     let k = body.iq + 3;
                     let rotation = quaternion_to_rotation([q[k], q[k + 1], q[k + 2], q[k + 3]]);
-                    Turn { angle: None, continues: false, free: Some(rotation) }
+                    Turn { angle: None, continues: false, sum: none(), free: Some(rotation) }
                 }
             };
             turns.push(turn);
@@ -91,6 +106,15 @@ impl<T: Real> Turn<T> {
             _ => v,
         }
     }
+}
+
+/// Sine and cosine of the angle by which a revolute joint has turned, offsets included.
+pub(super) fn own_angle<T: Real>(i: usize, body: &ReducedBody<T>, q: &[T]) -> (T, T) {
+    let (s, c) = match body.phase {
+        Some(phase) => T::sin_cos_of_sum(&[q[body.iq], phase]),
+        None => q[body.iq].sin_cos(),
+    };
+    sum_of_angles((s.named("sin_q", i, ""), c.named("cos_q", i, "")), body.offset)
 }
 
 /// Sine and cosine of α + β.
