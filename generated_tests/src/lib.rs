@@ -1,7 +1,8 @@
 //! Truth x inputs x bound: what proves every generated function.
 //!
 //! This library holds the material of the tests: the [reference data](mod@reference), the [`compiled`] functions of all
-//! robots, [`programs`] as the compiler makes them, and the [contact_cases], [random robots](random) written for both authors.
+//! robots, [`programs`] as the compiler makes them, the [contact_cases] and [random robots](random) written for both authors,
+//! and a [`search`] for the worst case.
 //! The tests themselves are in `tests/`, one file per kind of claim.
 #![forbid(unsafe_code)]
 
@@ -11,4 +12,6 @@ pub mod inputs;
 pub mod programs;
 pub mod random;
 pub mod reference;
+pub mod search;
 pub mod second_author;
+pub mod standalone;

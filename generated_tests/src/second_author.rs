@@ -4,7 +4,7 @@ use crate::reference::Expected;
 use nalgebra::DMatrix;
 use straightline_codegen::Function;
 use straightline_core::reference as chapter;
-use straightline_core::reference::{geometry, MassCentreTree};
+use straightline_core::reference::{geometry, ExtendedPosition, MassCentreLink, MassCentreTree};
 use straightline_core::Dd;
 
 /// The value of a function, computed by the reference; scales as in [`crate::reference`].
@@ -108,6 +108,38 @@ pub fn value(tree: &MassCentreTree<Dd>, frames: &[String], function: Function, i
             groups(speed(arg(1)).powi(2), frames().map(|f| list(&chapter::frame_jacobian_bias(tree, f, q, arg(1)))))
         }
         Drive(_) => panic!("drives have their own test"),
+    }
+}
+
+/// The same robot in f64.
+pub fn rounded(tree: &MassCentreTree<Dd>) -> MassCentreTree<f64> {
+    let round = |x: Dd| x.to_f64();
+    let links = tree.links.iter().map(|link| MassCentreLink {
+        name: link.name.clone(),
+        parent: link.parent,
+        joint: link.joint,
+        iq: link.iq,
+        iv: link.iv,
+        mass: round(link.mass),
+        inertia: link.inertia.map(round),
+        e: link.e.map(round),
+        e_parent: link.e_parent.map(round),
+        r: link.r.map(round),
+        r_parent: link.r_parent.map(round),
+        extended: match &link.extended {
+            ExtendedPosition::Matrix(m) => ExtendedPosition::Matrix(m.map(round)),
+            ExtendedPosition::ByVectors { r_star, r_parent_star, alpha } => ExtendedPosition::ByVectors {
+                r_star: r_star.as_ref().map(|v| v.map(round)),
+                r_parent_star: r_parent_star.as_ref().map(|v| v.map(round)),
+                alpha: round(*alpha),
+            },
+        },
+    });
+    MassCentreTree {
+        name: tree.name.clone(),
+        gravity: tree.gravity.map(round),
+        links: links.collect(),
+        frames: Vec::new(),
     }
 }
 

@@ -1,0 +1,295 @@
+//! The pictures: light ground, axes with units, names beside what they name.
+
+use crate::function::{Group, Method, Panel};
+use plotters::prelude::*;
+use std::fmt::Write;
+use std::path::Path;
+use straightline_codegen::Function;
+
+const TITLE: i32 = 22;
+const WORDS: i32 = 15;
+const SMALL: i32 = 12;
+pub const INK: RGBColor = RGBColor(40, 44, 52);
+const PALE: RGBColor = RGBColor(225, 228, 232);
+
+/// Colours that differ for colour-blind eyes too (Okabe and Ito).
+pub const COLOURS: [RGBColor; 6] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(120, 120, 120),
+    RGBColor(230, 159, 0),
+];
+
+fn colour(group: Group) -> RGBColor {
+    COLOURS[Group::ALL.iter().position(|g| *g == group).expect("it is one of them")]
+}
+
+/// 10^k as people write it.
+pub fn power(x: &f64) -> String {
+    // no −0
+    let exponent = x.log10().round() + 0.0;
+    if (x.log10() - exponent).abs() > 1e-6 {
+        return String::new();
+    }
+    let digits: String = format!("{exponent}")
+        .chars()
+        .map(|c| match c {
+            '-' => '⁻',
+            _ => ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][c.to_digit(10).unwrap_or(0) as usize],
+        })
+        .collect();
+    format!("10{digits}")
+}
+
+/// A time in its unit.
+pub fn time(ns: &f64) -> String {
+    match *ns {
+        x if x >= 0.99e9 => format!("{:.0} s", x / 1e9),
+        x if x >= 0.99e6 => format!("{:.0} ms", x / 1e6),
+        x if x >= 0.99e3 => format!("{:.0} µs", x / 1e3),
+        x => format!("{x:.0} ns"),
+    }
+}
+
+/// Names at the right of their points, moved apart where they would meet.
+fn spread(mut places: Vec<(usize, i32)>, gap: i32, low: i32, high: i32) -> Vec<(usize, i32)> {
+    // stable: those at one height keep their order
+    places.sort_by_key(|p| p.1);
+    for i in 1..places.len() {
+        places[i].1 = places[i].1.max(places[i - 1].1 + gap);
+    }
+    let over = places.last().map_or(0, |p| (p.1 - high).max(0));
+    if over > 0 {
+        let mut ceiling = high;
+        for place in places.iter_mut().rev() {
+            place.1 = place.1.min(ceiling).max(low);
+            ceiling = place.1 - gap;
+        }
+    }
+    places
+}
+
+pub fn function(panel: &Panel, path: &Path) {
+    let methods = &panel.methods;
+    let (width, height) = (1180, 760);
+    let area = SVGBackend::new(path, (width, height)).into_drawing_area();
+    area.fill(&WHITE).expect("the picture can be written");
+    let fastest = methods.iter().map(|m| m.time[0]).fold(f64::MAX, f64::min) / 1.6;
+    let slowest = methods.iter().map(|m| m.time[2].max(m.time[0])).fold(0.0, f64::max) * 1.4;
+    let least = methods.iter().map(|m| m.rms).filter(|e| *e > 0.0).fold(f64::MAX, f64::min);
+    let bottom = 10f64.powf(least.log10().floor().max(-34.0));
+    let (plot, names) = area.split_horizontally(width as i32 - 330);
+    let title = format!("{}: {} – time against error", panel.robot, panel.function.name().replace('_', " "));
+    area.draw(&Text::new(title, (24, 16), ("sans-serif", TITLE).into_font().color(&INK))).expect("text");
+    let mut chart = ChartBuilder::on(&plot)
+        .margin_top(56)
+        .margin_bottom(14)
+        .margin_left(14)
+        .x_label_area_size(52)
+        .y_label_area_size(74)
+        .build_cartesian_2d((fastest..slowest).log_scale(), (bottom..3.0).log_scale())
+        .expect("ranges");
+    chart
+        .configure_mesh()
+        .light_line_style(WHITE)
+        .bold_line_style(PALE)
+        .axis_style(INK)
+        .x_desc("time per evaluation (dot: warm caches; thin line to the right: cold)")
+        .y_desc("error over the greatest output in the joints' limits")
+        .axis_desc_style(("sans-serif", WORDS).into_font().color(&INK))
+        .label_style(("sans-serif", SMALL).into_font().color(&INK))
+        .x_label_formatter(&time)
+        .y_label_formatter(&power)
+        .y_labels(12)
+        .draw()
+        .expect("axes");
+    // what a user compares with
+    let sensor = (panel.function == Function::InverseDynamics).then_some((1e-4, "a good torque sensor"));
+    let roundings = [(f64::EPSILON / 2.0, "unit roundoff of f64"), (6e-8, "unit roundoff of f32")];
+    for (level, words) in roundings.into_iter().chain(sensor) {
+        let line = [(fastest, level), (slowest, level)];
+        chart.draw_series(DashedLineSeries::new(line, 4, 4, INK.mix(0.45).stroke_width(1))).expect("line");
+        let at = chart.backend_coord(&(fastest * (slowest / fastest).powf(0.8), level));
+        let style = ("sans-serif", SMALL).into_font().color(&INK.mix(0.6));
+        plot.draw(&Text::new(words, (at.0 + 6, at.1 - 14), style)).expect("text");
+    }
+    for m in methods {
+        let ink = colour(m.group);
+        let warm = m.time[0];
+        let rms = m.rms.max(bottom);
+        if m.time[2] > warm * 1.05 {
+            chart
+                .draw_series([PathElement::new(
+                    vec![(warm, m.worst), (m.time[2], m.worst)],
+                    ink.mix(0.5).stroke_width(1),
+                )])
+                .expect("line");
+        }
+        let top = m.cap.unwrap_or(m.worst);
+        chart.draw_series([PathElement::new(vec![(warm, rms), (warm, top)], ink.stroke_width(2))]).expect("line");
+        chart.draw_series([Circle::new((warm, m.worst), 5, ink.filled())]).expect("dot");
+        chart.draw_series([Circle::new((warm, rms), 3, ink.stroke_width(2))]).expect("dot");
+        if let Some(cap) = m.cap {
+            chart.draw_series([TriangleMarker::new((warm, cap), 7, ink.filled())]).expect("cap");
+        }
+    }
+    // names in a column at the right, in the order of the errors, tied to their points
+    let mut order: Vec<usize> = (0..methods.len()).collect();
+    // of those at one height the rightmost first, so that their lines do not cross
+    order.sort_by(|a, b| methods[*b].time[0].total_cmp(&methods[*a].time[0]));
+    let points: Vec<(usize, i32)> =
+        order.into_iter().map(|i| (i, chart.backend_coord(&(methods[i].time[0], methods[i].worst)).1)).collect();
+    let left = width as i32 - 330;
+    for (i, y) in spread(points, 16, 70, height as i32 - 190) {
+        let m = &methods[i];
+        let (x0, y0) = chart.backend_coord(&(m.time[0], m.worst));
+        let ink = colour(m.group);
+        let end = left + 4;
+        area.draw(&PathElement::new(vec![(x0 + 6, y0), (end - 14, y), (end, y)], ink.mix(0.25).stroke_width(1)))
+            .expect("line");
+        let style = ("sans-serif", SMALL).into_font().color(&ink);
+        let text = format!("{} · {} · {:.0e}", m.name, time(&m.time[0]), m.worst);
+        area.draw(&Text::new(text, (end + 4, y - 7), style)).expect("text");
+    }
+    legend(&names, height as i32 - 160, &shown(methods));
+    area.present().expect("the picture can be written");
+    println!("{}", path.display());
+}
+
+fn shown(methods: &[Method]) -> Vec<(String, RGBColor)> {
+    let groups = Group::ALL.into_iter().filter(|g| methods.iter().any(|m| m.group == *g));
+    groups.map(|g| (g.name().to_string(), colour(g))).collect()
+}
+
+fn legend<DB: DrawingBackend>(area: &DrawingArea<DB, plotters::coord::Shift>, top: i32, entries: &[(String, RGBColor)])
+where
+    DB::ErrorType: 'static,
+{
+    let words = ("sans-serif", SMALL).into_font().color(&INK);
+    for (i, (name, ink)) in entries.iter().enumerate() {
+        let y = top + 18 * i as i32;
+        area.draw(&Rectangle::new([(8, y), (20, y + 10)], ink.filled())).expect("mark");
+        area.draw(&Text::new(name.clone(), (28, y - 2), words.clone())).expect("text");
+    }
+    let y = top + 18 * entries.len() as i32 + 6;
+    for (i, line) in
+        ["● worst found by search   ○ root mean square", "▲ certified: no state is worse"].iter().enumerate()
+    {
+        area.draw(&Text::new(*line, (8, y + 17 * i as i32), words.clone())).expect("text");
+    }
+}
+
+/// The same as a table.
+pub fn table(panel: &Panel) -> String {
+    let mut text = format!(
+        "# {}: {}, time against error\n\n`cargo bench -p straightline-generated-tests --features charts --bench time_error -- function {} {}`\n\n\
+         Compiled for the processor of the machine; a core shared with others, so compare within the table. Errors over the greatest\n\
+         output in the limits of the joints. {}.\n\n\
+         | method | warm, ns | median | cold, ns | rms error | worst found | certified |\n|---|---|---|---|---|---|---|\n",
+        panel.robot,
+        panel.function.name(),
+        panel.robot,
+        panel.function.name(),
+        panel.notes.join("; ")
+    );
+    for m in &panel.methods {
+        let cap = m.cap.map_or("–".to_string(), |c| format!("{c:.1e}"));
+        let _ = writeln!(
+            text,
+            "| {} | {:.1} | {:.1} | {:.0} | {:.1e} | {:.1e} | {cap} |",
+            m.name, m.time[0], m.time[1], m.time[2], m.rms, m.worst
+        );
+    }
+    text
+}
+
+/// One curve of a chart with lines.
+pub struct Curve {
+    pub name: String,
+    pub colour: usize,
+    /// Dashed, for what belongs together in colour but not in kind.
+    pub dashed: bool,
+    pub points: Vec<(f64, f64)>,
+}
+
+/// A chart of curves, both axes logarithmic.
+pub struct Curves<'a> {
+    pub title: &'a str,
+    pub x: &'a str,
+    pub y: &'a str,
+    pub x_format: &'a dyn Fn(&f64) -> String,
+    pub y_format: &'a dyn Fn(&f64) -> String,
+    pub curves: &'a [Curve],
+}
+
+/// Draws charts one below the other.
+pub fn curves(charts: &[Curves], path: &Path) {
+    let (width, each) = (1100, 520);
+    let area = SVGBackend::new(path, (width, each * charts.len() as u32)).into_drawing_area();
+    area.fill(&WHITE).expect("the picture can be written");
+    for (row, c) in area.split_evenly((charts.len(), 1)).iter().zip(charts) {
+        let all = || c.curves.iter().flat_map(|c| &c.points).filter(|p| p.1 > 0.0);
+        let range = |of: fn(&(f64, f64)) -> f64| {
+            let (low, high) = all().map(of).fold((f64::MAX, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
+            low / 1.5..high * 1.5
+        };
+        row.draw(&Text::new(c.title, (24, 14), ("sans-serif", TITLE).into_font().color(&INK))).expect("text");
+        let (plot, _) = row.split_horizontally(width as i32 - 300);
+        let mut chart = ChartBuilder::on(&plot)
+            .margin_top(50)
+            .margin_bottom(12)
+            .margin_left(14)
+            .x_label_area_size(50)
+            .y_label_area_size(74)
+            .build_cartesian_2d(range(|p| p.0).log_scale(), range(|p| p.1).log_scale())
+            .expect("ranges");
+        chart
+            .configure_mesh()
+            .light_line_style(WHITE)
+            .bold_line_style(PALE)
+            .axis_style(INK)
+            .x_desc(c.x)
+            .y_desc(c.y)
+            .axis_desc_style(("sans-serif", WORDS).into_font().color(&INK))
+            .label_style(("sans-serif", SMALL).into_font().color(&INK))
+            .x_label_formatter(&|x| (c.x_format)(x))
+            .y_label_formatter(&|y| (c.y_format)(y))
+            .draw()
+            .expect("axes");
+        let mut ends = Vec::new();
+        for (i, curve) in c.curves.iter().enumerate() {
+            let ink = COLOURS[curve.colour % COLOURS.len()];
+            let points: Vec<(f64, f64)> = curve.points.iter().copied().filter(|p| p.1 > 0.0).collect();
+            if curve.dashed {
+                chart.draw_series(DashedLineSeries::new(points.clone(), 7, 5, ink.stroke_width(2))).expect("line");
+            } else {
+                chart.draw_series(LineSeries::new(points.clone(), ink.stroke_width(2))).expect("line");
+            }
+            chart.draw_series(points.iter().map(|p| Circle::new(*p, 3, ink.filled()))).expect("dots");
+            // the end at the right
+            if let Some(end) = points.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+                ends.push((i, chart.backend_coord(end)));
+            }
+        }
+        let (_, top) = row.get_base_pixel();
+        let places = ends.iter().map(|(i, at)| (*i, at.1 - top)).collect();
+        let left = width as i32 - 300;
+        for (i, y) in spread(places, 17, 50, each as i32 - 70) {
+            let curve = &c.curves[i];
+            let ink = COLOURS[curve.colour % COLOURS.len()];
+            let (x0, y0) = ends.iter().find(|e| e.0 == i).expect("it has an end").1;
+            let line = vec![(x0 + 5, y0 - top), (left - 8, y), (left + 4, y)];
+            row.draw(&PathElement::new(line, ink.mix(0.3).stroke_width(1))).expect("line");
+            row.draw(&Text::new(
+                curve.name.clone(),
+                (left + 8, y - 7),
+                ("sans-serif", SMALL + 1).into_font().color(&ink),
+            ))
+            .expect("text");
+        }
+    }
+    area.present().expect("the picture can be written");
+    println!("{}", path.display());
+}
