@@ -74,6 +74,8 @@ fn generic(graph: &Graph) -> String {
             Op::Div(a, b) => format!("{}.div({})", v(a), v(b)),
             Op::Sqrt(a) => format!("{}.sqrt()", v(a)),
             Op::Sign(a) => format!("{}.sign()", v(a)),
+            // rounded here, unlike in generated code: half an ulp of the angle, which near the joints' limits is little
+            Op::AngleSum(a, b) => format!("{}.add({})", v(a), v(b)),
             Op::SinCos(a) => format!("{}.sin_cos()", v(a)),
             Op::Sin(a) => format!("{}.0", v(a)),
             Op::Cos(a) => format!("{}.1", v(a)),
