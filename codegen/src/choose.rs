@@ -179,12 +179,14 @@ fn improved(
     let deepest = depth.iter().copied().max().unwrap_or(0);
     // the unit would have to be known where gravity or parameters are made
     let fixed_unit = !forms.unit || options.scene.gravity == Gravity::Input || !options.scene.parameters.is_empty();
+    // so would the frames in which parameters are given
+    let fixed_frames = !options.scene.parameters.is_empty();
     type Flags = fn(&mut Choice) -> &mut Vec<bool>;
     let all: [(bool, Flags); 11] = [
         (forms.stays, |c| &mut c.stays),
-        (forms.origins, |c| &mut c.origin_at_parent),
-        (forms.tips, |c| &mut c.turned_tips[0]),
-        (forms.tips, |c| &mut c.turned_tips[1]),
+        (forms.origins && !fixed_frames, |c| &mut c.origin_at_parent),
+        (forms.tips && !fixed_frames, |c| &mut c.turned_tips[0]),
+        (forms.tips && !fixed_frames, |c| &mut c.turned_tips[1]),
         (forms.parameters, |c| &mut c.regrouped),
         (forms.parameters, |c| &mut c.vanish_at_parent[0]),
         (forms.parameters, |c| &mut c.vanish_at_parent[1]),

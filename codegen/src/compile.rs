@@ -75,7 +75,8 @@ impl Options {
     /// The optimisations that these options allow.
     pub fn optimisations(&self) -> Optimisations {
         let algebraic = self.grade == Grade::Algebraic;
-        let cheaper = self.forward_dynamics == ForwardDynamicsMethod::Cheaper;
+        // one method for all scenes of a robot, where bits count
+        let cheaper = algebraic && self.forward_dynamics == ForwardDynamicsMethod::Cheaper;
         Optimisations {
             folding: algebraic,
             algebraic,

@@ -8,7 +8,7 @@ mod equations;
 mod text;
 
 use crate::choose::choose;
-use crate::compile::{Optimisations, Options};
+use crate::compile::{Forms, Optimisations, Options};
 use crate::emit::{snake_case, Scalar};
 use crate::expr::{verify, Graph, Port};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
@@ -124,7 +124,9 @@ pub fn graph(robot: &Robot, options: &Options, mode: &Mode, function: ContactFun
     };
     let factorised = Options { forward_dynamics: ForwardDynamicsMethod::Factorisation, ..options.clone() };
     let chosen = (optimisations.chosen && optimisations.reduced).then(|| {
-        let optimisations = Optimisations { chosen: false, ..optimisations };
+        // contact frames are described in the frames that any robot takes
+        let forms = Forms { origins: false, tips: false, ..optimisations.forms };
+        let optimisations = Optimisations { chosen: false, forms, ..optimisations };
         choose(robot, &[], Function::ForwardDynamics, &factorised, optimisations)
     });
     let robot = chosen.as_ref().unwrap_or(robot);
