@@ -55,6 +55,7 @@
 
 mod aba;
 mod actuator;
+mod composite;
 mod constraint;
 mod contact_system;
 mod crba;

@@ -4,6 +4,7 @@
 //! same. A composite of bodies that [stay](ReducedBody::stays) is put together in the base axes of their chain: there the
 //! constants turn, and no composite.
 
+use super::composite::Composite;
 use super::reduced_turn::Turn;
 use crate::model::JointKind;
 use crate::real::Real;
@@ -22,14 +23,14 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
         h[j * nv + i] = value;
     };
     let mut composites: Vec<Composite<T>> =
-        model.bodies.iter().zip(&turns).map(|(body, turn)| Composite::of_body(body, turn)).collect();
+        model.bodies.iter().zip(&turns).map(|(body, turn)| of_body(body, turn)).collect();
     for (b, body) in model.bodies.iter().enumerate().rev() {
         T::section("composite", Some(b));
         let (iv, composite, turn) = (body.iv, composites[b].named(b), &turns[b]);
         // in base axes, which the joint has turned or slid from already
         let (moved, column) = match body.kind {
             JointKind::Floating => {
-                composite.fill_floating_block(iv, model.per_unit, &mut set);
+                in_metres(&composite, model.per_unit).fill_floating_block(iv, &mut set);
                 continue;
             }
             JointKind::Prismatic => {
@@ -59,7 +60,7 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
             own.unwrap_or(body.translation)
         };
         let Some(parent) = body.parent else { continue };
-        let placed = moved.placed(body, turn, arm_of(b));
+        let placed = placed(&moved, body, turn, arm_of(b));
         composites[parent] = composites[parent].plus(&placed);
 
         // to the base, projected on each joint that it passes
@@ -94,98 +95,29 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
     h
 }
 
-/// The bodies outside a joint as one rigid body, about the origin of the joint's frame.
-#[derive(Clone, Copy)]
-struct Composite<T> {
-    mass: T,
-    first_moment: Vec3<T>,
-    second_moment: Sym3<T>,
+/// In the axes in which the body is described.
+fn of_body<T: Real>(body: &ReducedBody<T>, turn: &Turn<T>) -> Composite<T> {
+    let own = Composite { mass: body.mass, first_moment: body.first_moment, second_moment: body.second_moment };
+    match turn.angle {
+        Some(angle) if body.stays => own.turned(angle),
+        _ => own,
+    }
 }
 
-impl<T: Real> Composite<T> {
-    /// In the axes in which the body is described.
-    fn of_body(body: &ReducedBody<T>, turn: &Turn<T>) -> Self {
-        let own = Composite { mass: body.mass, first_moment: body.first_moment, second_moment: body.second_moment };
-        match turn.angle {
-            Some(angle) if body.stays => own.turned(angle),
-            _ => own,
-        }
-    }
+/// From base axes to those of the parent's description, about the parent's origin, p = arm before it.
+fn placed<T: Real>(composite: &Composite<T>, body: &ReducedBody<T>, turn: &Turn<T>, p: Vec3<T>) -> Composite<T> {
+    let ms = turn.base_to_parent(body, composite.first_moment);
+    let s = match turn.continues {
+        true => composite.second_moment,
+        false => rotated(&body.rotation, composite.second_moment, body.permutes),
+    };
+    Composite::moved(composite.mass, (ms, s), p)
+}
 
-    fn plus(&self, other: &Self) -> Self {
-        Composite {
-            mass: self.mass + other.mass,
-            first_moment: self.first_moment + other.first_moment,
-            second_moment: self.second_moment + other.second_moment,
-        }
-    }
-
-    fn named(&self, b: usize) -> Self {
-        Composite {
-            mass: self.mass,
-            first_moment: self.first_moment.named("first_moment", b),
-            second_moment: self.second_moment.named("second_moment", b),
-        }
-    }
-
-    fn turned(&self, (s, c): (T, T)) -> Self {
-        Composite {
-            mass: self.mass,
-            first_moment: self.first_moment.turned(s, c),
-            second_moment: self.second_moment.turned(s, c),
-        }
-    }
-
-    /// Moved along z by q: Σ' = Σ + q (z (m c)'ᵀ + m c zᵀ).
-    fn slid(&self, q: T) -> Self {
-        let (ms, s) = (self.first_moment, self.second_moment);
-        let msz = ms.z + self.mass * q;
-        Composite {
-            mass: self.mass,
-            first_moment: Vec3 { z: msz, ..ms },
-            second_moment: Sym3 { xz: s.xz + q * ms.x, yz: s.yz + q * ms.y, zz: s.zz + q * (ms.z + msz), ..s },
-        }
-    }
-
-    /// From base axes to those of the parent's description, about the parent's origin, p = arm before it.
-    fn placed(&self, body: &ReducedBody<T>, turn: &Turn<T>, p: Vec3<T>) -> Self {
-        let ms = turn.base_to_parent(body, self.first_moment);
-        let s = match turn.continues {
-            true => self.second_moment,
-            false => rotated(&body.rotation, self.second_moment, body.permutes),
-        };
-        // m c' = m c + M p,  Σ' = Σ + p (m c')ᵀ + m c pᵀ
-        let ms_new = ms + p.scale(self.mass);
-        let shift = Sym3 {
-            xx: p.x * (ms.x + ms_new.x),
-            xy: p.x * ms_new.y + ms.x * p.y,
-            xz: p.x * ms_new.z + ms.x * p.z,
-            yy: p.y * (ms.y + ms_new.y),
-            yz: p.y * ms_new.z + ms.y * p.z,
-            zz: p.z * (ms.z + ms_new.z),
-        };
-        Composite { mass: self.mass, first_moment: ms_new, second_moment: s + shift }
-    }
-
-    /// The 6 × 6 block of a floating base, coordinates (v, ω): f = M v̇ + ε × m c,  n = m c × v̇ + J ε.
-    fn fill_floating_block(&self, iv: usize, per_unit: T, set: &mut impl FnMut(usize, usize, T)) {
-        let (mass, ms, s) = (self.mass * per_unit * per_unit, self.first_moment.scale(per_unit), self.second_moment);
-        let j = s.second_moment_to_inertia();
-        for k in 0..3 {
-            set(iv + k, iv + k, mass);
-        }
-        // row v_i, column ω_k: (e_k × m c)_i
-        set(iv, iv + 4, ms.z);
-        set(iv, iv + 5, -ms.y);
-        set(iv + 1, iv + 3, -ms.z);
-        set(iv + 1, iv + 5, ms.x);
-        set(iv + 2, iv + 3, ms.y);
-        set(iv + 2, iv + 4, -ms.x);
-        for (row, column, value) in [(0, 0, j.xx), (0, 1, j.xy), (0, 2, j.xz), (1, 1, j.yy), (1, 2, j.yz), (2, 2, j.zz)]
-        {
-            set(iv + 3 + row, iv + 3 + column, value);
-        }
-    }
+/// With lengths in metres.
+fn in_metres<T: Real>(composite: &Composite<T>, per_unit: T) -> Composite<T> {
+    let (mass, first_moment) = (composite.mass * per_unit * per_unit, composite.first_moment.scale(per_unit));
+    Composite { mass, first_moment, ..*composite }
 }
 
 /// E S Eᵀ. Where E is dense, E (S − S_zz 1) Eᵀ + S_zz 1, its last entry from the trace, which no rotation changes.
