@@ -115,6 +115,42 @@ fn what_a_simulation_writes_an_analysis_reads() {
 }
 
 #[test]
+fn the_best_mass_of_a_counterweight_is_found() {
+    let here = scratch("optimum");
+    // a beam on a pivot, 2 kg at 0.3 m, and a weight at −0.2 m: at rest everywhere with 3 kg
+    let robot = write(
+        &here,
+        "beam.toml",
+        "[robot]\nname = \"beam\"\n[[link]]\nname = \"post\"\n[[link]]\nname = \"beam\"\nmass = 2.0\n\
+         com = [0.3, 0.0, 0.0]\ninertia = [0.01, 0.02, 0.02]\n[[link]]\nname = \"weight\"\nmass = 1.0\n\
+         com = [0.0, 0.0, 0.0]\ninertia = [0.001, 0.001, 0.001]\n[[joint]]\nname = \"pivot\"\nkind = \"continuous\"\n\
+         parent = \"post\"\nchild = \"beam\"\naxis = \"y\"\n[[joint]]\nname = \"bolt\"\nkind = \"fixed\"\n\
+         parent = \"beam\"\nchild = \"weight\"\norigin = { xyz = [-0.2, 0.0, 0.0] }\n",
+    );
+    // slowly, so that weight is all that counts
+    let motion = write(&here, "slow.csv", "t,pivot\n0,-0.5\n500,0.5\n1000,-0.2\n");
+    let said = succeeds(&[
+        "analyze",
+        &robot,
+        "--motion",
+        &motion,
+        "--interval",
+        "20",
+        "--optimize",
+        "weight.mass=0.5:6",
+        "--minimize",
+        "peak",
+    ]);
+    let line = said.lines().find(|l| l.contains("weight.mass = ")).unwrap_or_else(|| panic!("{said}"));
+    let value: f64 = line.split_whitespace().nth(2).unwrap().parse().unwrap();
+    assert!((value - 3.0).abs() < 1e-3, "{said}");
+    let said = fails(&["analyze", &robot, "--motion", &motion, "--optimize", "weight.mas=0.5:6"]);
+    assert!(said.contains("`weight.mas`"), "{said}");
+    let said = fails(&["analyze", &robot, "--motion", &motion, "--optimize", "weight.mass=-1:6"]);
+    assert!(said.contains("negative"), "{said}");
+}
+
+#[test]
 fn everything_that_is_wrong_has_its_place() {
     let here = scratch("wrong");
     let robot = format!("{ROBOTS}/descriptions/planar_2r.toml");

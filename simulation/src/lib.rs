@@ -9,6 +9,7 @@ pub mod cartesian;
 pub mod command;
 pub mod html;
 pub mod motion;
+pub mod optimize;
 pub mod plant;
 pub mod plot;
 pub mod simulate;

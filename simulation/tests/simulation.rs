@@ -7,6 +7,7 @@ use straightline_simulation::analysis::analyze;
 use straightline_simulation::cartesian::{joint_motion, NoPath};
 use straightline_simulation::command::{Command, Compensation, Controller, Samples};
 use straightline_simulation::motion::Motion;
+use straightline_simulation::optimize::{minimise, Objective};
 use straightline_simulation::plant::Plant;
 use straightline_simulation::simulate::{simulate, Method, Run, Settings};
 
@@ -239,4 +240,32 @@ fn joints_lead_a_frame_along_its_path() {
     }
     let far = Motion::quintic(&[0.0, 1.0], &[p.to_vec(), vec![3.0, 0.0, 0.0]]).unwrap();
     assert!(matches!(joint_motion(&model, tip, &far, &start, false, 0.01), Err(NoPath::OutOfReach { .. })));
+}
+
+#[test]
+fn the_best_spring_is_the_one_that_swings_by_itself() {
+    // q = 0.3 sin(5 t): F = (k − m ω²) q, and none with k = m ω² = 50 N/m, the spring at rest at zero
+    let knots: Vec<_> = (0..=200)
+        .map(|i| {
+            let (s, c) = (5.0 * 0.01 * f64::from(i)).sin_cos();
+            (vec![0.3 * s], vec![1.5 * c], vec![-7.5 * s])
+        })
+        .collect();
+    let times: Vec<f64> = (0..=200).map(|i| 0.01 * f64::from(i)).collect();
+    let motion = Motion::sampled(&times, &knots).unwrap();
+    let cost = |objective: Objective, x: &[f64], limit: f64| {
+        let mut model = cart();
+        model.bodies[0].effects = JointEffects { stiffness: x[0], spring_rest: x[1], ..JointEffects::none() };
+        model.bodies[0].joint.limits.effort = limit;
+        objective.with_limits(&analyze(&model, &motion, 0.01), &[limit])
+    };
+    let ranges = [(0.0, 200.0), (-0.5, 0.7)];
+    for objective in [Objective::Rms, Objective::Peak, Objective::Energy] {
+        let best = minimise(|x| cost(objective, x, f64::INFINITY), &ranges).unwrap();
+        assert!((best.point[0] - 50.0).abs() < 0.1 && best.point[1].abs() < 1e-3, "{objective:?}: {best:?}");
+    }
+    // at the end of a range, and with a limit that costs more than any gain
+    let best = minimise(|x| cost(Objective::Rms, &[x[0], 0.0], f64::INFINITY), &[(80.0, 200.0)]).unwrap();
+    assert!((best.point[0] - 80.0).abs() < 1e-6, "{best:?}");
+    assert!(cost(Objective::Rms, &[0.0, 0.0], 1.0) > 1e3);
 }

@@ -84,6 +84,7 @@ pub fn no_limit(joint: &str, key: &str) -> D {
 /// A parameter of a sweep that the robot file does not have.
 pub fn unknown_parameter(path: &str, why: &str) -> D {
     D::error("unknown-parameter", format!("`{}`: {why}", cut(path))).help(
-        "LINK.mass, or JOINT.damping, JOINT.friction, JOINT.rotor_inertia, JOINT.gear_ratio where the robot file has a value",
+        "LINK.mass, or JOINT.damping, JOINT.friction, JOINT.rotor_inertia, JOINT.gear_ratio, JOINT.armature, \
+         JOINT.spring_stiffness, JOINT.spring_rest where the robot file has a value",
     )
 }

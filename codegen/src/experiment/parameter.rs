@@ -36,6 +36,31 @@ pub fn parse(text: &str) -> Result<Sweep, String> {
     }
 }
 
+/// A parameter and the range in which its best value is looked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Range {
+    /// `LINK.mass`, `JOINT.damping`, …
+    pub path: String,
+    /// From here to there, in the file's unit.
+    pub ends: (f64, f64),
+}
+
+/// Reads `PATH=from:to`.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn parse_range(text: &str) -> Result<Range, String> {
+    let form = || "PATH=from:to with from < to, such as elbow.spring_stiffness=0:50".to_string();
+    let (path, ends) = text.split_once('=').ok_or_else(form)?;
+    let (from, to) = ends.split_once(':').ok_or_else(form)?;
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(form);
+    let ends = (number(from)?, number(to)?);
+    match path.contains('.') && ends.0 < ends.1 {
+        true => Ok(Range { path: path.trim().to_string(), ends }),
+        false => Err(form()),
+    }
+}
+
 /// The robot file with another value of a parameter. A link's inertia grows with its mass, as of the same body in another density.
 ///
 /// # Errors
@@ -85,6 +110,8 @@ fn number<'a>(drive: &'a mut JointDrive, key: &str) -> Option<&'a mut Value<f64>
         "rotor_inertia" => drive.rotor_inertia.as_mut(),
         "gear_ratio" => drive.gear_ratio.as_mut(),
         "armature" => drive.armature.as_mut(),
+        "spring_stiffness" => drive.spring_stiffness.as_mut(),
+        "spring_rest" => drive.spring_rest.as_mut(),
         _ => None,
     }
 }
@@ -100,6 +127,10 @@ mod tests {
         assert_eq!(values("forearm.mass=1:3:5"), [1.0, 1.5, 2.0, 2.5, 3.0]);
         for text in ["forearm.mass", "mass=1", "a.mass=1,x", "a.mass=1:2:1", "a.mass=nan", "a.mass=1:2"] {
             assert!(parse(text).is_err(), "{text}");
+        }
+        assert_eq!(parse_range("a.mass=1:3").unwrap(), Range { path: "a.mass".to_string(), ends: (1.0, 3.0) });
+        for text in ["a.mass=1", "a.mass=3:1", "a.mass=1:x", "mass=1:3"] {
+            assert!(parse_range(text).is_err(), "{text}");
         }
     }
 }

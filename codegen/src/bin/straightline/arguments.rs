@@ -6,13 +6,14 @@ use std::path::PathBuf;
 use straightline_codegen::certify::Effort;
 use straightline_codegen::compile::Options;
 use straightline_codegen::emit::{Lanes, Scalar};
-use straightline_codegen::experiment::parameter::{self, Sweep};
+use straightline_codegen::experiment::parameter::{self, Range, Sweep};
 use straightline_codegen::export::is_identifier;
 use straightline_codegen::expr::Grade;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::schedule::Limits;
 use straightline_codegen::words::Choice;
 use straightline_codegen::{ForwardDynamicsMethod, Function};
+use straightline_simulation::optimize::Objective;
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -98,6 +99,7 @@ Examples:
   straightline analyze panda.urdf --motion reach.toml --html reach.html
   straightline analyze panda.urdf --motion samples.csv --output figures.csv
   straightline analyze panda.urdf --motion reach.toml --sweep panda_link7.mass=0.5:3:11
+  straightline analyze arm.toml --motion pick.toml --optimize elbow.spring_stiffness=0:50 --minimize energy
 
 {EXIT_CODES}"))]
     Analyze(Analyze),
@@ -213,6 +215,12 @@ pub struct Analyze {
     /// Analyse again for each of these values of a number of the robot file: PATH=a,b,c or PATH=from:to:count
     #[arg(long, value_name = "PATH=VALUES", value_parser = parameter::parse)]
     pub sweep: Option<Sweep>,
+    /// Look for the best value of a number of the robot file within this range; may be repeated
+    #[arg(long, value_name = "PATH=FROM:TO", value_parser = parameter::parse_range)]
+    pub optimize: Vec<Range>,
+    /// What the best values make least, limits kept: energy given, rms or peak of the drives
+    #[arg(long, value_name = "WHAT", default_value = "rms", value_parser = objective, requires = "optimize")]
+    pub minimize: Objective,
     #[command(flatten)]
     pub model: ModelArgs,
 }
@@ -313,6 +321,11 @@ fn tolerance(text: &str) -> Result<f64, String> {
         Ok(x) if (0.0..=0.1).contains(&x) => Ok(x),
         _ => Err("an angle between 0 and 0.1 rad".to_string()),
     }
+}
+
+fn objective(text: &str) -> Result<Objective, String> {
+    let word = Objective::WORDS.iter().find(|(word, _)| *word == text);
+    word.map(|w| w.1).ok_or_else(|| "one of energy, rms, peak".to_string())
 }
 
 fn interval(text: &str) -> Result<f64, String> {

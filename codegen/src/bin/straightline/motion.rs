@@ -17,6 +17,7 @@ use straightline_simulation::analysis::{self, Analysis};
 use straightline_simulation::command::Command;
 use straightline_simulation::html::Page;
 use straightline_simulation::motion::Motion;
+use straightline_simulation::optimize;
 use straightline_simulation::plant::Plant;
 use straightline_simulation::plot::{Line, Plot};
 use straightline_simulation::simulate;
@@ -165,6 +166,59 @@ pub fn analyze(a: &Analyze) -> Result<(), Failure> {
     if let Some(sweep) = &a.sweep {
         print_sweep(sweep, &swept)?;
     }
+    match a.optimize.is_empty() {
+        true => Ok(()),
+        false => optimized(a, &description, &options, &motion),
+    }
+}
+
+/// The robot file with these values of the parameters that are optimised; what is wrong is printed.
+fn with(a: &Analyze, description: &Description, options: &Options, values: &[f64]) -> Result<Model<f64>, Failure> {
+    let mut changed = description.clone();
+    let mut diagnostics = Diagnostics::new();
+    for (range, value) in a.optimize.iter().zip(values) {
+        match parameter::with(&changed, &range.path, *value) {
+            Ok(with) => changed = with,
+            Err(complaint) => diagnostics.push(*complaint),
+        }
+    }
+    let model = if diagnostics.has_errors() { None } else { built(&changed, options, &mut diagnostics) };
+    model.ok_or_else(|| {
+        print::diagnostics(&diagnostics, Severity::Error);
+        Failure::Input
+    })
+}
+
+/// Looks for the best values and prints them beside those of the robot file.
+fn optimized(a: &Analyze, description: &Description, options: &Options, motion: &Motion) -> Result<(), Failure> {
+    // both ends of all ranges must be robots, so that everything between them is one
+    let ends = |end: fn(&(f64, f64)) -> f64| a.optimize.iter().map(|r| end(&r.ends)).collect::<Vec<f64>>();
+    with(a, description, options, &ends(|e| e.0))?;
+    with(a, description, options, &ends(|e| e.1))?;
+    let progress = print::spinner("optimising");
+    let cost = |model: &Model<f64>| {
+        let mut joints: Vec<_> = model.bodies.iter().map(|b| &b.joint).collect();
+        joints.sort_by_key(|j| j.iv);
+        let efforts: Vec<f64> = joints.iter().map(|j| j.limits.effort).collect();
+        a.minimize.with_limits(&analysis::analyze(model, motion, a.interval), &efforts)
+    };
+    let ranges: Vec<(f64, f64)> = a.optimize.iter().map(|r| r.ends).collect();
+    let of_values = |values: &[f64]| with(a, description, options, values).map_or(f64::INFINITY, |model| cost(&model));
+    let best = optimize::minimise(of_values, &ranges);
+    progress.finish_and_clear();
+    let best = best.map_err(|why| {
+        print::error(&format!("no optimum was found: {why}"));
+        Failure::Input
+    })?;
+    let mut diagnostics = Diagnostics::new();
+    let as_written = built(description, options, &mut diagnostics).map_or(f64::INFINITY, |model| cost(&model));
+    let mut out = stdout().lock();
+    writeln!(out, "\nbest values after {} analyses:", best.evaluations)?;
+    for (range, value) in a.optimize.iter().zip(&best.point) {
+        writeln!(out, "  {} = {value:.6} (from {} to {})", range.path, range.ends.0, range.ends.1)?;
+    }
+    let word = optimize::Objective::WORDS.iter().find(|w| w.1 == a.minimize).map_or("", |w| w.0);
+    writeln!(out, "{word} {:.6}, as the robot file is {as_written:.6}", best.cost)?;
     Ok(())
 }
 
