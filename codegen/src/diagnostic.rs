@@ -358,6 +358,13 @@ impl Diagnostics {
         Diagnostics { list, ..self.clone() }
     }
 
+    /// All but those complaints.
+    #[must_use]
+    pub fn without(&self, which: impl Fn(&Diagnostic) -> bool) -> Diagnostics {
+        let list = self.list.iter().filter(|d| !which(d)).cloned().collect();
+        Diagnostics { list, ..self.clone() }
+    }
+
     /// Number of complaints of that severity.
     pub fn count(&self, severity: Severity) -> usize {
         self.list.iter().filter(|d| d.severity == severity).count()

@@ -14,51 +14,85 @@ use straightline_core::model::JointKind;
 pub struct Expansion {
     /// The files that were read: the expansion depends on them, right or wrong.
     pub files: Vec<PathBuf>,
-    /// The dynamics, or what to tell the person.
-    pub result: Result<Generated, String>,
+    /// The dynamics, or what is wrong.
+    pub result: Result<Generated, Refusal>,
     /// What to tell the person besides.
     pub warnings: String,
 }
 
-/// Compiles the robot file that a macro names, in the scene that it names, both looked for in these directories. What the
-/// scene says stands in place of what the options say.
-pub fn expand(robot: &str, scene: Option<&str>, directories: &[&Path], options: &Options) -> Expansion {
-    let mut expansion = Expansion { files: Vec::new(), result: Err(String::new()), warnings: String::new() };
-    expansion.result =
-        compiled(robot, scene, directories, options, &mut expansion.files).map(|(warnings, generated)| {
-            expansion.warnings = warnings;
-            generated
-        });
-    expansion
+/// Why nothing was compiled.
+#[derive(Debug, Default)]
+pub struct Refusal {
+    /// What to tell the person of files and options; empty if it is the scene in the macro alone that is wrong.
+    pub message: String,
+    /// Errors of a scene that stands in the macro.
+    pub of_scene: Vec<Diagnostic>,
+}
+
+impl From<String> for Refusal {
+    fn from(message: String) -> Self {
+        Refusal { message, of_scene: Vec::new() }
+    }
+}
+
+/// Where the scene of a macro stands.
+#[derive(Clone, Debug)]
+pub enum SceneOf {
+    /// In the file of that name.
+    File(String),
+    /// In the macro, as the text of a scene file.
+    Macro(Source),
+}
+
+/// Compiles the robot file that a macro names, in the scene that it names or holds; files are looked for in these
+/// directories. What the scene says stands in place of what the options say.
+pub fn expand(robot: &str, scene: Option<&SceneOf>, directories: &[&Path], options: &Options) -> Expansion {
+    let mut files = Vec::new();
+    match compiled(robot, scene, directories, options, &mut files) {
+        Ok((warnings, generated)) => Expansion { files, result: Ok(generated), warnings },
+        Err(refusal) => Expansion { files, result: Err(refusal), warnings: String::new() },
+    }
 }
 
 /// Warnings and dynamics, or what is wrong; notes the files that were read.
 fn compiled(
     robot: &str,
-    scene: Option<&str>,
+    scene: Option<&SceneOf>,
     directories: &[&Path],
     options: &Options,
     files: &mut Vec<PathBuf>,
-) -> Result<(String, Generated), String> {
+) -> Result<(String, Generated), Refusal> {
     let robot = found("robot", robot, directories, files);
-    let scene = scene.map(|scene| found("scene", scene, directories, files)).transpose();
+    let (scene, within) = match scene {
+        None => (Ok(None), None),
+        Some(SceneOf::File(name)) => (found("scene", name, directories, files).map(Some), None),
+        Some(SceneOf::Macro(source)) => (Ok(Some(source.clone())), Some(source.path())),
+    };
     let (robot, scene) = (robot?, scene?);
     let mut diagnostics = Diagnostics::new();
-    let wrong = |what: &str, diagnostics: &Diagnostics| {
-        format!("the {what} is wrong\n{}", diagnostics.at_least(Severity::Warning).render().trim_end())
-    };
     let options = match scene.map(|source| scene::read(&source, &mut diagnostics)) {
         None => options.clone(),
         Some(Some(file)) => file.into_options(options.clone()),
-        Some(None) => return Err(wrong("scene", &diagnostics)),
+        Some(None) => return Err(refusal(&diagnostics, robot.path(), within)),
     };
-    let generated = compile(&robot, &options).map_err(|diagnostics| {
-        let is_of_scene = |d: &Diagnostic| d.place.as_ref().is_some_and(|p| *p.file != *robot.path());
-        let mut errors = diagnostics.iter().filter(|d| d.severity == Severity::Error);
-        wrong(if errors.all(is_of_scene) && diagnostics.has_errors() { "scene" } else { "robot file" }, &diagnostics)
-    })?;
+    let generated = compile(&robot, &options).map_err(|diagnostics| refusal(&diagnostics, robot.path(), within))?;
     diagnostics.extend(generated.warnings.clone());
     Ok((diagnostics.at_least(Severity::Warning).render(), generated))
+}
+
+/// What is wrong with the robot file of that path and its scene, which stands `within` the macro or in another file.
+fn refusal(diagnostics: &Diagnostics, robot: &str, within: Option<&str>) -> Refusal {
+    let file = |d: &Diagnostic| d.place.as_ref().map(|place| place.file.clone());
+    let is_within = |d: &Diagnostic| within.is_some() && file(d).as_deref() == within;
+    let errors = || diagnostics.iter().filter(|d| d.severity == Severity::Error);
+    let of_scene: Vec<Diagnostic> = errors().filter(|d| is_within(d)).cloned().collect();
+    if errors().all(is_within) && !of_scene.is_empty() {
+        return Refusal { message: String::new(), of_scene };
+    }
+    let is_of_scene = |d: &Diagnostic| file(d).is_some_and(|file| *file != *robot);
+    let what = if errors().all(is_of_scene) && diagnostics.has_errors() { "scene" } else { "robot file" };
+    let rest = diagnostics.at_least(Severity::Warning).without(is_within);
+    Refusal { message: format!("the {what} is wrong\n{}", rest.render().trim_end()), of_scene }
 }
 
 /// The file of that name in the first directory that has it.
@@ -200,7 +234,7 @@ limits = { lower = -1.0, upper = 1.0, velocity = 2.0, effort = 50.0 }
         let expansion = expand("cart.toml", None, &directories, &Options::default());
         assert!(expansion.files.is_empty());
         assert_eq!(
-            expansion.result.unwrap_err(),
+            expansion.result.unwrap_err().message,
             "there is no robot file `cart.toml`; tried:\n  /nowhere/cart.toml\n  /nowhere/src/cart.toml\n\
              help: the path counts from the package's manifest, or else from the source file"
         );
@@ -211,7 +245,7 @@ limits = { lower = -1.0, upper = 1.0, velocity = 2.0, effort = 50.0 }
         let here = scratch("wrong", &CART.replace("2.0", "-2.0"));
         let expansion = expand("cart.toml", None, &[&here], &Options::default());
         assert_eq!(expansion.files, [here.join("cart.toml")]);
-        let message = expansion.result.unwrap_err();
+        let message = expansion.result.unwrap_err().message;
         assert!(message.starts_with("the robot file is wrong\nerror[negative-mass]: "), "{message}");
         assert!(message.contains("--> cart.toml:10:8\n") && message.contains("| mass = -2.0"), "{message}");
     }
@@ -221,7 +255,7 @@ limits = { lower = -1.0, upper = 1.0, velocity = 2.0, effort = 50.0 }
         let here = scratch("scene", CART);
         let scene = |text: &str| {
             std::fs::write(here.join("scene.toml"), text).unwrap();
-            expand("cart.toml", Some("scene.toml"), &[&here], &Options::default())
+            expand("cart.toml", Some(&SceneOf::File("scene.toml".into())), &[&here], &Options::default())
         };
         let expansion = scene("[outputs]\nmass_matrix = { part = \"diagonal\" }\n");
         assert_eq!(expansion.files, [here.join("cart.toml"), here.join("scene.toml")]);
@@ -234,10 +268,34 @@ limits = { lower = -1.0, upper = 1.0, velocity = 2.0, effort = 50.0 }
         {
             let expansion = scene(text);
             assert_eq!(expansion.files.len(), 2);
-            let message = expansion.result.unwrap_err();
+            let message = expansion.result.unwrap_err().message;
             assert!(message.starts_with("the scene is wrong\nerror[") && message.contains(place), "{message}");
         }
-        let message = expand("cart.toml", Some("none.toml"), &[&here], &Options::default()).result.unwrap_err();
+        let none = SceneOf::File("none.toml".into());
+        let message = expand("cart.toml", Some(&none), &[&here], &Options::default()).result.unwrap_err().message;
         assert!(message.starts_with("there is no scene file `none.toml`"), "{message}");
+    }
+
+    #[test]
+    fn complaints_of_a_scene_in_the_macro_are_kept_apart() {
+        let here = scratch("within", CART);
+        let scene = |text: &str| {
+            let scene = SceneOf::Macro(Source::new("scene(..)", text));
+            expand("cart.toml", Some(&scene), &[&here], &Options::default())
+        };
+        let expansion = scene("[zero]\nqd = true\n");
+        assert_eq!(expansion.files, [here.join("cart.toml")]);
+        assert!(!associated_items(&expansion.result.unwrap()).contains("qd: &"));
+        for (text, code) in
+            [("[zero]\nqdot = true\n", "unknown-key"), ("[hold]\njoints = { slid = 0 }\n", "unknown-joint")]
+        {
+            let refusal = scene(text).result.unwrap_err();
+            let codes: Vec<&str> = refusal.of_scene.iter().map(|d| d.code).collect();
+            assert_eq!((refusal.message.as_str(), &codes[..]), ("", &[code][..]));
+        }
+        // both wrong: each said once
+        std::fs::write(here.join("cart.toml"), CART.replace("2.0", "-2.0")).unwrap();
+        let refusal = scene("[zero]\nqd = true\n").result.unwrap_err();
+        assert!(refusal.message.starts_with("the robot file is wrong\nerror[negative-mass]"), "{}", refusal.message);
     }
 }

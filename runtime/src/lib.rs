@@ -41,6 +41,7 @@
 //! | `forward_dynamics = "articulated-body"` or `"factorisation"` | the cheaper one |
 //! | `max_part_operations = 1000`: longer functions are cut | 2000 |
 //! | `scene = "scenes/still.toml"`: what is wanted and what is held; what it says wins over other options | everything |
+//! | `scene(zero(qd = true), hold(joints = { yaw = 0.5 }))`: the same tables and keys, without a file | |
 //! | `module = "arm_dynamics"` (derive only): everything stands in that module, beside the type, too | where a scene has types of its own it is needed |
 //!
 //! The path counts from the package's manifest, or else from the source file. The build runs again when the file changes;

@@ -39,6 +39,25 @@ struct Satellite;
 #[robot("examples/arm.toml", scene = "examples/payload_scene.toml", module = "loaded")]
 pub struct Loaded;
 
+/// A scene without a file: the yaw joint is braked, the arm at rest.
+#[derive(Dynamics)]
+#[robot(
+    "examples/arm.toml",
+    scene(
+        outputs(functions = ["inverse_dynamics"], mass_matrix(part = "diagonal")),
+        hold(gravity = [0.0, 0.0, -1.62], joints = { yaw = -0.25 }),
+        zero(qd = true),
+        payload(name = "lamp", frame = "forearm", mass = 0.25, com = [0.1, 0.0, 0.02]),
+        budget(inverse_dynamics(max_flops = 100)),
+    )
+)]
+pub struct OnTheMoon;
+
+/// The same scene in a file.
+#[derive(Dynamics)]
+#[robot("examples/arm.toml", scene = "examples/moon_scene.toml")]
+pub struct OnTheMoonByFile;
+
 /// Many of them at once.
 #[derive(Dynamics)]
 #[robot("examples/arm.toml", functions(inverse_dynamics), lanes)]
@@ -120,6 +139,22 @@ fn types_of_parameters_and_stages_and_further_scalars_are_reached_through_the_mo
     let tool = loaded::single::Tool::new(0.6, [0.05, 0.01, -0.02], [1e-3, 0.0, 0.0, 2e-3, 0.0, 1.5e-3]).unwrap();
     loaded::single::inverse_dynamics(&narrow(q), &narrow(qd), &narrow(qdd), &tool, &mut single);
     assert!(close(&single.map(f64::from), &tau, 1e-5), "{single:?} {tau:?}");
+}
+
+#[test]
+fn a_scene_in_the_attribute_is_that_of_a_file() {
+    let (q, qdd) = ([0.4, -0.7], [1.5, -2.5]);
+    let (mut tau, mut of_file, mut diagonal, mut of_file_too) = ([0.0; 2], [0.0; 2], [0.0; 2], [0.0; 2]);
+    OnTheMoon::inverse_dynamics(&q, &qdd, &mut tau);
+    OnTheMoonByFile::inverse_dynamics(&q, &qdd, &mut of_file);
+    OnTheMoon::mass_matrix(&q, &mut diagonal);
+    OnTheMoonByFile::mass_matrix(&q, &mut of_file_too);
+    assert_eq!((tau, diagonal), (of_file, of_file_too));
+    assert_eq!(OnTheMoon::JOINT_NAMES, ["shoulder", "elbow"]);
+    // the lamp is 0.25 kg at r = (0.1, 0, 0.02) from the elbow's axis a = (0, 0.6, 0.8): m (r² − (a·r)²) = 0.002536
+    let mut h = [[0.0; 3]; 3];
+    Arm::mass_matrix(&[-0.25, q[0], q[1]], &mut h);
+    assert!((diagonal[1] - h[2][2] - 0.002536).abs() < 1e-15, "{diagonal:?} {h:?}");
 }
 
 #[test]

@@ -32,11 +32,15 @@ fn package() -> PathBuf {
     fs::write(package.join("Cargo.toml"), manifest).unwrap();
     // the versions that are here, so that nothing is fetched
     fs::copy(here.join("../Cargo.lock"), package.join("Cargo.lock")).unwrap();
-    fs::write(package.join("src/main.rs"), MAIN).unwrap();
     package
 }
 
 fn run(package: &Path, robot: &str) -> Output {
+    run_program(package, MAIN, robot)
+}
+
+fn run_program(package: &Path, main: &str, robot: &str) -> Output {
+    fs::write(package.join("src/main.rs"), main).unwrap();
     fs::write(package.join("robot/arm.toml"), robot).unwrap();
     Command::new(env!("CARGO"))
         .args(["run", "--offline", "--manifest-path"])
@@ -65,4 +69,13 @@ fn a_robot_file_that_changes_is_compiled_again() {
 
     let stronger = run(&package, &robot.replace("effort = 80.0", "effort = 90.0"));
     assert_eq!(printed(&stronger), "[inf, 90.0, 40.0]", "{}", said(&stronger));
+
+    // a scene in the attribute: its errors stand at the words, all in one run
+    let scene = "scene(zero(qdot = true), hold(gravity = \"nought\"))";
+    let main = MAIN.replace("functions(mass_matrix)", scene);
+    let wrong = run_program(&package, &main, robot);
+    for part in ["[zero] has no key `qdot`", "--> src/main.rs:5:38", "qd, qdd, joints_at_rest", "--> src/main.rs:5:67"]
+    {
+        assert!(said(&wrong).contains(part), "no `{part}` in:\n{}", said(&wrong));
+    }
 }

@@ -1,5 +1,6 @@
 //! `"panda.urdf", floating_base, scalar = "f32", functions(inverse_dynamics, mass_matrix), …`
 
+use crate::scene::InlineScene;
 use std::str::FromStr;
 use straightline_codegen::certify::Effort;
 use straightline_codegen::emit::{Lanes, Scalar};
@@ -11,10 +12,16 @@ use syn::{parenthesized, Attribute, Error, Ident, Lit, LitInt, LitStr, Result, T
 /// The robot file, the scene and the options, as both macros take them.
 pub struct Arguments {
     pub robot: LitStr,
-    pub scene: Option<LitStr>,
+    pub scene: Option<SceneArgument>,
     /// The module that the derive puts everything in, where the user can reach it.
     pub module: Option<Ident>,
     pub options: Options,
+}
+
+/// `scene = "still.toml"` or `scene(zero(qd = true))`
+pub enum SceneArgument {
+    File(LitStr),
+    Inline(InlineScene),
 }
 
 /// `pub mod panda = "panda.urdf", …`
@@ -53,7 +60,14 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
     let key: Ident = input.parse()?;
     let options = &mut arguments.options;
     match key.to_string().as_str() {
-        "scene" => arguments.scene = Some(value(input)?),
+        "scene" if arguments.scene.is_some() => return Err(Error::new(key.span(), "there is a scene already")),
+        "scene" => {
+            arguments.scene = Some(if input.peek(Token![=]) {
+                SceneArgument::File(value(input)?)
+            } else {
+                SceneArgument::Inline(InlineScene::parse(&key, input)?)
+            });
+        }
         "module" => arguments.module = Some(value::<LitStr>(input)?.parse()?),
         "floating_base" => options.model.floating_base = true,
         "certify" => options.certify = Some(Effort::default()),

@@ -3,13 +3,14 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod scene;
 
-use arguments::{Arguments, Module};
+use arguments::{Arguments, Module, SceneArgument};
 use proc_macro::TokenStream;
 use proc_macro2::TokenStream as Tokens;
 use quote::quote;
 use std::path::{Path, PathBuf};
-use straightline_codegen::expansion::{associated_items, expand, needs_a_module};
+use straightline_codegen::expansion::{associated_items, expand, needs_a_module, Refusal, SceneOf};
 use straightline_codegen::Generated;
 use syn::{parse_macro_input, DeriveInput, Error};
 
@@ -74,8 +75,11 @@ fn compiled(arguments: &Arguments, items: impl FnOnce(&Generated) -> Tokens) -> 
     let source_file = proc_macro::Span::call_site().local_file();
     let beside = source_file.as_deref().and_then(Path::parent);
     let directories: Vec<&Path> = [manifest.as_path()].into_iter().chain(beside).collect();
-    let scene = arguments.scene.as_ref().map(|scene| scene.value());
-    let expansion = expand(&arguments.robot.value(), scene.as_deref(), &directories, &arguments.options);
+    let scene = arguments.scene.as_ref().map(|scene| match scene {
+        SceneArgument::File(name) => SceneOf::File(name.value()),
+        SceneArgument::Inline(scene) => SceneOf::Macro(scene.source()),
+    });
+    let expansion = expand(&arguments.robot.value(), scene.as_ref(), &directories, &arguments.options);
     eprint!("{}", expansion.warnings); // a macro has no warnings of its own
     let trackers = expansion.files.iter().map(|file| {
         let path = file.to_string_lossy();
@@ -83,9 +87,19 @@ fn compiled(arguments: &Arguments, items: impl FnOnce(&Generated) -> Tokens) -> 
     });
     let items = match expansion.result {
         Ok(generated) => items(&generated),
-        Err(message) => Error::new(arguments.robot.span(), message).into_compile_error(),
+        Err(refusal) => refused(arguments, &refusal),
     };
     Ok(quote! { #items #(#trackers)* })
+}
+
+/// The complaints as errors of the compiler: those of a scene in the macro at its tokens, the others at the file's name.
+fn refused(arguments: &Arguments, refusal: &Refusal) -> Tokens {
+    let at_the_file = (!refusal.message.is_empty()).then(|| Error::new(arguments.robot.span(), &refusal.message));
+    let at_the_scene = refusal.of_scene.iter().filter_map(|complaint| match &arguments.scene {
+        Some(SceneArgument::Inline(scene)) => Some(scene.error(complaint)),
+        _ => None,
+    });
+    at_the_file.into_iter().chain(at_the_scene).map(Error::into_compile_error).collect()
 }
 
 /// Generated source as tokens.

@@ -30,6 +30,8 @@ const TOP: &[&str] = &[
     "numbers",
     "budget",
 ];
+/// Those of the tables of which there may be several: `[[payload]]`.
+pub const LISTS: &[&str] = &["contact", "loop", "mode", "payload", "parameter", "drive"];
 const BUDGET: &[&str] = &["max_flops", "max_sincos", "max_live", "max_stack_bytes", "max_code_bytes", "max_error"];
 const BASES: [(&str, Base); 3] = [("fixed", Base::Fixed), ("floating", Base::Floating), ("moving", Base::Moving)];
 /// A place in the list of effects: that its speed is still to be read.
