@@ -201,3 +201,91 @@ fn everything_that_is_wrong_has_its_place() {
     assert!(said.contains("no value `mass` of `forarm`"), "{said}");
     assert!(fails(&["analyze", &robot, "--motion", &toml("[start]\nq = [0.0, 0.0]\n")]).contains("no motion"));
 }
+
+/// An example of a UR5 in contact: what is printed, and the table.
+fn ur5_in_contact(name: &str) -> (String, Vec<String>, Vec<Vec<f64>>) {
+    let here = scratch("contact");
+    let (csv, svg) = (here.join(format!("{name}.csv")), here.join(format!("{name}.svg")));
+    let said = succeeds(&[
+        "simulate",
+        &format!("{ROBOTS}/descriptions/ur5.urdf"),
+        "--scene",
+        &format!("{ROBOTS}/scenes/ur5_contact_tasks.toml"),
+        "--input",
+        &format!("{ROBOTS}/experiments/ur5_{name}.toml"),
+        "--output",
+        &csv.display().to_string(),
+        "--svg",
+        &svg.display().to_string(),
+    ]);
+    let drawing = fs::read_to_string(svg).unwrap();
+    assert!(["distance s", "reaction F", "energies"].iter().all(|title| drawing.contains(title)), "{name}");
+    // 1e-9 per step is asked for
+    let missing: f64 = said.rsplit_once("missing ").unwrap().1.split(',').next().unwrap().parse().unwrap();
+    assert!(missing.abs() < 1e-8, "{said}");
+    let rows = fs::read_to_string(csv).unwrap();
+    let names = rows.lines().next().unwrap().split(',').map(str::to_string).collect();
+    let numbers = |row: &str| row.split(',').map(|x| x.parse().unwrap()).collect();
+    (said, names, rows.lines().skip(1).map(numbers).collect())
+}
+
+fn column(names: &[String], rows: &[Vec<f64>], name: &str) -> Vec<f64> {
+    let k = names.iter().position(|n| n == name).unwrap_or_else(|| panic!("{name} in {names:?}"));
+    rows.iter().map(|row| row[k]).collect()
+}
+
+#[test]
+fn four_tasks_go_from_approach_to_lift_off() {
+    let (said, names, rows) = ur5_in_contact("writing");
+    assert!(said.contains("pen  touches") && said.contains("pen  lifts off"), "{said}");
+    let (s, f, t) = (column(&names, &rows, "s.pen"), column(&names, &rows, "F.pen.pz"), column(&names, &rows, "t"));
+    let friction = column(&names, &rows, "friction.pen");
+    for k in 0..t.len() {
+        let writes = t[k] > 0.4 && t[k] < 2.55;
+        assert!(if writes { s[k].abs() < 1e-12 && f[k] > 1.0 } else { s[k] > -1e-12 || f[k] > 0.0 }, "{}", t[k]);
+        // it slides: friction is all that μ = 0.2 allows, above its speed of 5 mm/s
+        assert!(friction[k] <= 0.2 * f[k] + 1e-9, "{}", t[k]);
+    }
+    let (said, names, rows) = ur5_in_contact("peg_in_hole");
+    assert!(said.contains("peg  touches") && said.contains("peg  lifts off"), "{said}");
+    let depth = column(&names, &rows, "s.peg").into_iter().fold(0.0, f64::min);
+    assert!((-0.05..-0.035).contains(&depth), "{depth}");
+    let (said, names, rows) = ur5_in_contact("pressing");
+    assert!(said.contains("wall  touches") && said.contains("wall  lifts off"), "{said}");
+    // in the middle, where it hardly moves, the spring carries the reaction
+    let (s, f, t) = (column(&names, &rows, "s.wall"), column(&names, &rows, "F.wall.pz"), column(&names, &rows, "t"));
+    let k = t.iter().position(|t| *t >= 1.0).unwrap();
+    assert!((f[k] + 2e4 * s[k]).abs() < 0.02 * f[k], "{} N at {} m", f[k], s[k]);
+    let (said, ..) = ur5_in_contact("hammering");
+    assert_eq!(said.matches("nail  touches, impulse 0.000e0").count(), 4, "a spring in front: no impact\n{said}");
+}
+
+#[test]
+fn a_contact_that_an_experiment_says_wrongly_has_its_place() {
+    let here = scratch("contact_wrong");
+    let robot = format!("{ROBOTS}/descriptions/planar_2r.toml");
+    let scene = write(
+        &here,
+        "scene.toml",
+        "[[contact]]\nname = \"belt\"\nframe = \"tip\"\nobject = \"input\"\nconstrained = [\"pz\"]\n\
+         environment = { kind = \"elastic\", parameters = \"input\" }\n",
+    );
+    let belt = "[[contact]]\nname = \"belt\"\nobject = { origin = [0.0, 0.0, -2.0], velocity = [0.1, 0.0, 0.0] }\n";
+    let elastic = "environment = { stiffness = 1e3, damping = 2.0 }\n";
+    for (text, place, words) in [
+        ("[simulation]\nduration = 0.1\n".to_string(), "wrong.toml:1", "leaves its object open"),
+        (belt.to_string(), "wrong.toml:1", "leaves its environment open"),
+        (format!("{belt}{elastic}axis = [0, 0, 1]\n"), "wrong.toml:5", "leave `axis` out"),
+        (format!("{belt}{elastic}restitution = 1.5\n"), "wrong.toml:5", "1.5"),
+        (format!("{belt}{elastic}{belt}"), "wrong.toml:6", "second table"),
+        (belt.replace("belt", "bell") + elastic, "wrong.toml:2", "did you mean `belt`"),
+        (belt.replace("velocity", "speed") + elastic, "wrong.toml:3", "speed"),
+        (format!("{belt}environment = {{ stiffness = 1e3 }}\n"), "wrong.toml:4", "damping"),
+        (format!("[contacts]\nactive = [\"bolt\"]\n{belt}{elastic}"), "wrong.toml:2", "bolt"),
+    ] {
+        let said = fails(&["simulate", &robot, "--scene", &scene, "--input", &write(&here, "wrong.toml", &text)]);
+        assert!(said.contains(place) && said.contains(words), "{text}\n{said}");
+    }
+    let right = write(&here, "right.toml", &format!("{belt}{elastic}[simulation]\nduration = 0.1\n"));
+    succeeds(&["simulate", &robot, "--scene", &scene, "--input", &right]);
+}

@@ -7,6 +7,7 @@
 pub mod analysis;
 pub mod cartesian;
 pub mod command;
+pub mod contact;
 pub mod html;
 pub mod motion;
 pub mod optimize;

@@ -78,7 +78,7 @@ impl Plant {
     }
 
     /// dq/dt: q̇ of joints; of a floating base R v and ½ quaternion ∘ ω.
-    fn configuration_rate(&self, q: &[f64], qd: &[f64]) -> Vec<f64> {
+    pub(crate) fn configuration_rate(&self, q: &[f64], qd: &[f64]) -> Vec<f64> {
         let mut rate = vec![0.0; self.model.nq()];
         for joint in self.model.bodies.iter().map(|b| &b.joint) {
             let (iq, iv) = (joint.iq, joint.iv);

@@ -1,5 +1,6 @@
 //! Lines over an axis, as SVG.
 
+use plotters::coord::Shift;
 use plotters::prelude::*;
 
 /// A line and its name.
@@ -25,18 +26,38 @@ pub struct Plot<'a> {
 /// Points of a line, at most: no screen shows more.
 const MOST_POINTS: usize = 2000;
 
+/// Plots below each other, as SVG of this size in pixels.
+///
+/// # Errors
+/// What the plotting library says.
+pub fn stacked(plots: &[Plot], size: (u32, u32)) -> Result<String, String> {
+    let mut svg = String::new();
+    drawn(plots, &mut svg, size).map_err(|error| error.to_string())?;
+    Ok(svg)
+}
+
+fn drawn(plots: &[Plot], svg: &mut String, size: (u32, u32)) -> Result<(), Box<dyn std::error::Error>> {
+    let area = SVGBackend::with_string(svg, size).into_drawing_area();
+    area.fill(&WHITE)?;
+    // room for the names of the lines, the same in all, so that their axes stand below each other
+    let has_names = plots.iter().any(|plot| plot.lines.len() > 1);
+    for (plot, place) in plots.iter().zip(area.split_evenly((plots.len(), 1))) {
+        plot.draw(&place, has_names)?;
+    }
+    area.present()?;
+    Ok(())
+}
+
 impl Plot<'_> {
     /// The plot as SVG of this size in pixels.
     ///
     /// # Errors
     /// What the plotting library says.
     pub fn svg(&self, size: (u32, u32)) -> Result<String, String> {
-        let mut svg = String::new();
-        self.draw(&mut svg, size).map_err(|error| error.to_string())?;
-        Ok(svg)
+        stacked(std::slice::from_ref(self), size)
     }
 
-    fn draw(&self, svg: &mut String, size: (u32, u32)) -> Result<(), Box<dyn std::error::Error>> {
+    fn draw(&self, area: &DrawingArea<SVGBackend, Shift>, has_room: bool) -> Result<(), Box<dyn std::error::Error>> {
         let finite = || self.lines.iter().flat_map(|l| &l.points).filter(|(x, y)| x.is_finite() && y.is_finite());
         let range = |values: &mut dyn Iterator<Item = f64>| {
             let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
@@ -53,11 +74,8 @@ impl Plot<'_> {
         let (low, high) = range(&mut [low, high].into_iter().chain(shown.iter().copied()));
         let margin = if high > low { 0.05 * (high - low) } else { low.abs().max(1.0) * 0.05 };
         let right = if right > left { right } else { left + 1.0 };
-        // room for the names of the lines
-        let end = if self.lines.len() > 1 { right + 0.2 * (right - left) } else { right };
-        let area = SVGBackend::with_string(svg, size).into_drawing_area();
-        area.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&area)
+        let end = if has_room { right + 0.2 * (right - left) } else { right };
+        let mut chart = ChartBuilder::on(area)
             .caption(self.title, ("sans-serif", 16))
             .margin(12)
             .x_label_area_size(36)
@@ -87,7 +105,6 @@ impl Plot<'_> {
                 .border_style(RGBColor(200, 200, 200))
                 .draw()?;
         }
-        area.present()?;
         Ok(())
     }
 }

@@ -148,11 +148,7 @@ pub fn simulate(
         Command::Controller(controller) => controller.period,
         _ => None,
     };
-    let outputs = (settings.duration / settings.interval).floor() as usize;
-    let mut wanted: Vec<f64> = (0..=outputs).map(|k| k as f64 * settings.interval).collect();
-    if settings.duration - wanted[outputs] > 1e-9 * settings.duration {
-        wanted.push(settings.duration);
-    }
+    let wanted = rows(settings);
     let corners = pieces(command, period, settings.duration);
     let row = |t: f64, state: &[f64], held: Option<&[f64]>| row(plant, command, t, state, held);
     run.table.rows.push(row(0.0, &state, None));
@@ -197,8 +193,18 @@ pub fn simulate(
     Ok(run)
 }
 
+/// The times of the rows of a result.
+pub(crate) fn rows(settings: &Settings) -> Vec<f64> {
+    let count = (settings.duration / settings.interval).floor() as usize;
+    let mut wanted: Vec<f64> = (0..=count).map(|k| k as f64 * settings.interval).collect();
+    if settings.duration - wanted[count] > 1e-9 * settings.duration {
+        wanted.push(settings.duration);
+    }
+    wanted
+}
+
 /// The times between which everything is smooth, from zero to the end.
-fn pieces(command: &Command, period: Option<f64>, duration: f64) -> Vec<f64> {
+pub(crate) fn pieces(command: &Command, period: Option<f64>, duration: f64) -> Vec<f64> {
     let mut times: Vec<f64> = match period {
         Some(period) => (0..).map(|k| f64::from(k) * period).take_while(|t| *t < duration).collect(),
         None => command.corners().into_iter().filter(|t| *t > 0.0 && *t < duration).collect(),
@@ -212,7 +218,7 @@ fn pieces(command: &Command, period: Option<f64>, duration: f64) -> Vec<f64> {
     times
 }
 
-fn names(plant: &Plant, command: &Command) -> Vec<String> {
+pub(crate) fn names(plant: &Plant, command: &Command) -> Vec<String> {
     let mut joints: Vec<_> = plant.model.bodies.iter().map(|b| &b.joint).collect();
     joints.sort_by_key(|j| j.iv);
     let named = |prefix: &str, of_base: &[&str]| -> Vec<String> {
@@ -233,7 +239,7 @@ fn names(plant: &Plant, command: &Command) -> Vec<String> {
     names
 }
 
-fn row(plant: &Plant, command: &Command, t: f64, state: &[f64], held: Option<&[f64]>) -> Vec<f64> {
+pub(crate) fn row(plant: &Plant, command: &Command, t: f64, state: &[f64], held: Option<&[f64]>) -> Vec<f64> {
     let state = plant.normalised(state);
     let (q, qd, work, losses) = plant.split(&state);
     let tau = held.map_or_else(|| command.torques(t, q, qd), <[f64]>::to_vec);
@@ -276,9 +282,8 @@ struct Watch<'a> {
 }
 
 impl Watch<'_> {
-    /// The least distance of a joint to the end of its range; negative beyond it.
     fn distance(&self, y: &[f64]) -> f64 {
-        distances(self.plant, y).map(|(distance, ..)| distance).fold(f64::MAX, f64::min)
+        distance(self.plant, y)
     }
 }
 
@@ -336,7 +341,7 @@ struct Solved {
 }
 
 /// Steps of one piece, at most.
-const MOST_STEPS: usize = 10_000_000;
+pub(crate) const MOST_STEPS: usize = 10_000_000;
 
 impl System<'_> {
     fn solve(
@@ -361,17 +366,7 @@ impl System<'_> {
             Method::Adaptive => solved!(ExplicitRungeKutta::dop853()),
             Method::Stiff => solved!(DiagonallyImplicitRungeKutta::kvaerno745()),
         };
-        let solution = solution.map_err(|error| {
-            let (time, why) = match error {
-                Error::MaxSteps { t, .. } => (t, format!("more than {MOST_STEPS} steps")),
-                Error::StepSize { t, .. } => (t, "steps become too small: the motion is not smooth there".to_string()),
-                Error::Stiffness { t, .. } => (t, "the equations are stiff: choose the method `stiff`".to_string()),
-                Error::LinearAlgebra { t, msg, .. } => (t, msg),
-                Error::BadInput { msg } => (start, msg),
-                other => (start, format!("{other:?}")),
-            };
-            Failure { time, why }
-        })?;
+        let solution = solution.map_err(|error| failure(error, start))?;
         Ok(Solved {
             interrupted: matches!(solution.status, Status::Interrupted),
             accepted: solution.steps.accepted,
@@ -380,6 +375,24 @@ impl System<'_> {
             y: solution.y.clone(),
         })
     }
+}
+
+/// What the solver says of a piece that began at `start` \[s\].
+pub(crate) fn failure(error: Error<f64, Vec<f64>>, start: f64) -> Failure {
+    let (time, why) = match error {
+        Error::MaxSteps { t, .. } => (t, format!("more than {MOST_STEPS} steps")),
+        Error::StepSize { t, .. } => (t, "steps become too small: the motion is not smooth there".to_string()),
+        Error::Stiffness { t, .. } => (t, "the equations are stiff: choose the method `stiff`".to_string()),
+        Error::LinearAlgebra { t, msg, .. } => (t, msg),
+        Error::BadInput { msg } => (start, msg),
+        other => (start, format!("{other:?}")),
+    };
+    Failure { time, why }
+}
+
+/// The least distance of a joint to the end of its range; negative beyond it.
+pub(crate) fn distance(plant: &Plant, y: &[f64]) -> f64 {
+    distances(plant, y).map(|(distance, ..)| distance).fold(f64::MAX, f64::min)
 }
 
 /// Of every joint that has limits: how far it is from the nearer one, its name, and that limit.
@@ -392,7 +405,7 @@ fn distances<'a>(plant: &'a Plant, y: &'a [f64]) -> impl Iterator<Item = (f64, &
     })
 }
 
-fn nearest_limit(plant: &Plant, time: f64, y: &[f64]) -> Stop {
+pub(crate) fn nearest_limit(plant: &Plant, time: f64, y: &[f64]) -> Stop {
     let nearest = distances(plant, y).min_by(|a, b| a.0.total_cmp(&b.0));
     let (_, joint, limit) = nearest.unwrap_or((0.0, "", 0.0));
     Stop { time, joint: joint.to_string(), limit }

@@ -3,14 +3,14 @@
 use super::{ridge, Closed, Mode};
 use crate::compile::Options;
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
-use crate::scene::contact::{EnvironmentItem, EnvironmentKind};
+use crate::scene::contact::tool_axes;
 use crate::scene::{Bound, ContactFunction};
 use crate::trace::Expr;
 use std::collections::BTreeMap;
 use straightline_core::algorithms as alg;
-use straightline_core::algorithms::{Environment, FunctionalCoordinates, Ltdl, RelativeMotion, SpringDamper};
+use straightline_core::algorithms::{Environment, FunctionalCoordinates, Ltdl, RelativeMotion};
 use straightline_core::algorithms::{Struck, Support};
-use straightline_core::contact::{Contact, Coordinate, Friction, Object, ObjectMotion, Surface};
+use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion};
 use straightline_core::spatial::{Mat3, MotionVector, Transform, Vec3};
 use straightline_core::{Dd, Real};
 
@@ -170,10 +170,7 @@ fn contacts<'a>(robot: &Robot, mode: &'a Mode, bound: &Bound, added: &Added, red
             None => (triple(input("axes"), 0), triple(input("axes"), 1)),
         };
         let object = match item.object {
-            Some(object) => Object::Fixed(Transform {
-                rotation: object_axes(object.z, object.x),
-                translation: constant(object.origin.map(Dd::from)),
-            }),
+            Some(object) => Object::Fixed(object.over()),
             None => {
                 let (pose, velocity, acceleration) = (input("pose"), input("velocity"), input("acceleration"));
                 let motion = |x: &[Expr]| MotionVector { linear: triple(x, 0), angular: triple(x, 1) };
@@ -197,10 +194,7 @@ fn contacts<'a>(robot: &Robot, mode: &'a Mode, bound: &Bound, added: &Added, red
             surface: item.surface.traced(),
             constrained: closed.constrained.clone(),
             free: closed.free.clone(),
-            friction: item
-                .friction
-                .filter(|_| closed.slides)
-                .map(|(coefficient, speed)| Friction { coefficient: number(coefficient), speed: number(speed) }),
+            friction: item.friction_over().filter(|_| closed.slides),
         };
         let placed = robot.model.frame(&item.frame).and_then(|f| {
             let body = f.body?;
@@ -216,79 +210,15 @@ fn contacts<'a>(robot: &Robot, mode: &'a Mode, bound: &Bound, added: &Added, red
                 Some(values) => values.iter().map(|x| number(*x)).collect(),
                 None => input("environment").clone(),
             };
-            environment(e, &values)
+            e.over(&values)
         });
         all.push(Traced { closed: Some(closed), contact, motion, constrained, environment });
     }
     for a_loop in mode.loops {
-        let (axis, second_axis) = tool_axes([0.0, 0.0, 1.0]);
-        let contact = Contact {
-            name: a_loop.name.clone(),
-            frame: frame(&a_loop.frame),
-            axis,
-            second_axis,
-            object: Object::OnRobot(frame(&a_loop.with)),
-            surface: Surface::Plane,
-            constrained: a_loop.constrained.clone(),
-            free: vec![],
-            friction: None,
-        };
+        let contact = a_loop.over(frame(&a_loop.frame), frame(&a_loop.with));
         let motion = alg::relative_motion(&bound.model, &contact, q, qd);
         let constrained = alg::functional_coordinates(&contact, &motion, &contact.constrained);
         all.push(Traced { closed: None, contact, motion, constrained, environment: None });
     }
     all
-}
-
-fn environment(item: &EnvironmentItem, values: &[Expr]) -> Environment<Expr> {
-    let at = |key: &str| {
-        let k = item.kind.keys().iter().position(|k| *k == key);
-        values[k.expect("a key of this kind")]
-    };
-    let spring = |prefix: &str| SpringDamper {
-        stiffness: at(&format!("{prefix}stiffness")),
-        damping: at(&format!("{prefix}damping")),
-    };
-    match item.kind {
-        EnvironmentKind::Elastic => Environment::Elastic(spring("")),
-        EnvironmentKind::Mass => Environment::Mass { mass: at("mass"), support: spring("") },
-        EnvironmentKind::Cushioned => {
-            Environment::Cushioned { mass: at("mass"), support: spring(""), front: spring("front_") }
-        }
-        EnvironmentKind::TwoMasses => Environment::TwoMasses {
-            front_mass: at("front_mass"),
-            front: spring("front_"),
-            mass: at("mass"),
-            support: spring(""),
-        },
-        EnvironmentKind::BothSides => Environment::BothSides { tool: spring("tool_"), surface: spring("") },
-    }
-}
-
-fn constant(v: [Dd; 3]) -> Vec3<Expr> {
-    Vec3::from(v.map(Expr::constant))
-}
-
-fn unit(v: Vec3<Dd>) -> Vec3<Dd> {
-    let length = v.dot(v).sqrt();
-    v.map(|x| x / length)
-}
-
-/// Columns X, Y, Z: X = x made perpendicular to Z and normalised, Y = Z × X.
-fn object_axes(z: [f64; 3], x: [f64; 3]) -> Mat3<Expr> {
-    let (z, x) = (unit(Vec3::from(z.map(Dd::from))), Vec3::from(x.map(Dd::from)));
-    let x = unit(x - z.scale(x.dot(z)));
-    let y = z.cross(x);
-    Mat3::from_columns(constant(x.to_array()), constant(y.to_array()), constant(z.to_array()))
-}
-
-/// The tool axis, normalised, and across it the one of the frame's axes that is farthest from it, next in cyclic order of z.
-fn tool_axes(axis: [f64; 3]) -> (Vec3<Expr>, Vec3<Expr>) {
-    let a = unit(Vec3::from(axis.map(Dd::from)));
-    let least = (0..3).min_by(|i, j| axis[*i].abs().total_cmp(&axis[*j].abs())).unwrap_or(0);
-    let mut farthest = [Dd::ZERO; 3];
-    farthest[least] = Dd::ONE;
-    let farthest = Vec3::from(farthest);
-    let b = unit(farthest - a.scale(farthest.dot(a)));
-    (constant(a.to_array()), constant(b.to_array()))
 }

@@ -88,3 +88,35 @@ pub fn unknown_parameter(path: &str, why: &str) -> D {
          JOINT.spring_stiffness, JOINT.spring_rest where the robot file has a value",
     )
 }
+
+/// A contact that the scene does not have.
+pub fn unknown_contact(contact: &str, known: &[&str]) -> D {
+    let d = D::error("unknown-contact", format!("the scene has no contact `{}`", cut(contact)));
+    match did_you_mean(contact, known.iter().copied()) {
+        Some(hint) => d.help(hint),
+        None if known.is_empty() => d.help("contacts stand in a scene: --scene FILE"),
+        None => d.help(format!("there are {}", list(known))),
+    }
+}
+
+/// A contact of which is said something twice.
+pub fn contact_twice(contact: &str) -> D {
+    D::error("contact-twice", format!("a second table of contact `{}`", cut(contact)))
+}
+
+/// What a scene leaves to the caller, and an experiment must say.
+pub fn left_open(contact: &str, key: &str) -> D {
+    D::error("left-open", format!("contact `{}`: the scene leaves its {key} open", cut(contact)))
+        .help(format!("write `{key}` in the [[contact]] table with the name `{}`", cut(contact)))
+}
+
+/// What a scene says, and an experiment may not.
+pub fn said_by_the_scene(contact: &str, key: &str) -> D {
+    D::error("said-by-the-scene", format!("contact `{}`: the scene says what its {key} is", cut(contact)))
+        .help(format!("leave `{key}` out here"))
+}
+
+/// A vector that gives no direction.
+pub fn no_direction(what: &str, [x, y, z]: [f64; 3]) -> D {
+    D::error("no-direction", format!("{what} gives no direction: [{x:?}, {y:?}, {z:?}]"))
+}

@@ -2,6 +2,7 @@
 //!
 //! Every complaint has its place, and all come in one run.
 
+pub mod contact;
 pub mod messages;
 pub mod parameter;
 pub mod samples;
@@ -181,7 +182,8 @@ fn from_toml(
     let document = parse(source, diagnostics)?;
     let top = Table { owner: "an experiment".to_string(), table: document.get_ref(), span: 0..0 };
     let mut r = ExperimentReader { reader: Reader::new(source, diagnostics), model, controller_model, read_file };
-    r.reader.check_keys(&top, &["motion", "controller", "torques", "start", "simulation"]);
+    let keys = [&["motion", "controller", "torques", "start", "simulation"][..], &contact::TABLES].concat();
+    r.reader.check_keys(&top, &keys);
     let table = |r: &mut ExperimentReader, key: &str| r.reader.table_at(&top, key, &format!("[{key}]"));
     let start = table(&mut r, "start");
     if let Some(start) = &start {

@@ -5,8 +5,10 @@ use crate::trace::Expr;
 use std::fmt;
 use std::rc::Rc;
 use std::sync::Arc;
-use straightline_core::contact::{Coordinate, ImplicitSurface, Normal, Surface};
-use straightline_core::spatial::{Sym3, Vec3};
+use straightline_core::algorithms::{Environment, SpringDamper};
+use straightline_core::contact::{Contact, Coordinate, Friction, ImplicitSurface, Normal, Object, Surface};
+use straightline_core::model::Frame;
+use straightline_core::spatial::{Mat3, Sym3, Transform, Vec3};
 use straightline_core::{Dd, Real};
 
 /// All contacts of a scene. The default has none, and nothing of a contact is generated.
@@ -156,8 +158,19 @@ impl fmt::Debug for UserSurface {
 impl SurfaceItem {
     /// The surface over expressions.
     pub fn traced(&self) -> Surface<Expr> {
-        let c = |x: f64| Expr::constant(Dd::from(x));
         match self {
+            SurfaceItem::Implicit(user) => {
+                let value = user.value.clone();
+                Surface::Implicit(Rc::new(move |p| value(p)))
+            }
+            other => other.over().expect("only a user's surface has a scalar of its own"),
+        }
+    }
+
+    /// The surface over a scalar; `None` for a user's, which is a function over expressions.
+    pub fn over<T: Real>(&self) -> Option<Surface<T>> {
+        let c = |x: f64| T::constant(Dd::from(x));
+        Some(match self {
             SurfaceItem::Plane => Surface::Plane,
             SurfaceItem::Sphere { radius, hollow } => Surface::Sphere { radius: c(*radius), hollow: *hollow },
             SurfaceItem::Cylinder { radius, hollow } => Surface::Cylinder { radius: c(*radius), hollow: *hollow },
@@ -166,10 +179,67 @@ impl SurfaceItem {
                 let linear = Vec3::from(linear.map(c));
                 Surface::Quadric { matrix: Sym3 { xx, xy, xz, yy, yz, zz }, linear, constant: c(*constant) }
             }
-            SurfaceItem::Implicit(user) => {
-                let value = user.value.clone();
-                Surface::Implicit(Rc::new(move |p| value(p)))
+            SurfaceItem::Implicit(_) => return None,
+        })
+    }
+}
+
+fn constant<T: Real>(v: Vec3<Dd>) -> Vec3<T> {
+    v.map(T::constant)
+}
+
+fn unit(v: Vec3<Dd>) -> Vec3<Dd> {
+    let length = v.dot(v).sqrt();
+    v.map(|x| x / length)
+}
+
+impl ObjectPose {
+    /// Columns X, Y, Z: X = x made perpendicular to Z and normalised, Y = Z × X.
+    pub fn over<T: Real>(&self) -> Transform<T> {
+        let (z, x) = (unit(Vec3::from(self.z.map(Dd::from))), Vec3::from(self.x.map(Dd::from)));
+        let x = unit(x - z.scale(x.dot(z)));
+        Transform {
+            rotation: Mat3::from_columns(constant(x), constant(z.cross(x)), constant(z)),
+            translation: constant(Vec3::from(self.origin.map(Dd::from))),
+        }
+    }
+}
+
+/// The tool axis, normalised, and across it the one of the frame's axes that is farthest from it, next in cyclic order of z.
+pub fn tool_axes<T: Real>(axis: [f64; 3]) -> (Vec3<T>, Vec3<T>) {
+    let a = unit(Vec3::from(axis.map(Dd::from)));
+    let least = (0..3).min_by(|i, j| axis[*i].abs().total_cmp(&axis[*j].abs())).unwrap_or(0);
+    let mut farthest = [Dd::ZERO; 3];
+    farthest[least] = Dd::ONE;
+    let farthest = Vec3::from(farthest);
+    let b = unit(farthest - a.scale(farthest.dot(a)));
+    (constant(a), constant(b))
+}
+
+impl EnvironmentItem {
+    /// The model with these numbers, in the order of [`EnvironmentKind::keys`].
+    pub fn over<T: Real>(&self, values: &[T]) -> Environment<T> {
+        let at = |key: &str| {
+            let k = self.kind.keys().iter().position(|k| *k == key);
+            values[k.expect("a key of this kind")]
+        };
+        let spring = |prefix: &str| SpringDamper {
+            stiffness: at(&format!("{prefix}stiffness")),
+            damping: at(&format!("{prefix}damping")),
+        };
+        match self.kind {
+            EnvironmentKind::Elastic => Environment::Elastic(spring("")),
+            EnvironmentKind::Mass => Environment::Mass { mass: at("mass"), support: spring("") },
+            EnvironmentKind::Cushioned => {
+                Environment::Cushioned { mass: at("mass"), support: spring(""), front: spring("front_") }
             }
+            EnvironmentKind::TwoMasses => Environment::TwoMasses {
+                front_mass: at("front_mass"),
+                front: spring("front_"),
+                mass: at("mass"),
+                support: spring(""),
+            },
+            EnvironmentKind::BothSides => Environment::BothSides { tool: spring("tool_"), surface: spring("") },
         }
     }
 }
@@ -244,6 +314,24 @@ pub struct LoopItem {
     pub constrained: Vec<Coordinate>,
 }
 
+impl LoopItem {
+    /// The loop over a scalar, of these two frames.
+    pub fn over<T: Real>(&self, frame: Frame<T>, with: Frame<T>) -> Contact<T> {
+        let (axis, second_axis) = tool_axes([0.0, 0.0, 1.0]);
+        Contact {
+            name: self.name.clone(),
+            frame,
+            axis,
+            second_axis,
+            object: Object::OnRobot(with),
+            surface: Surface::Plane,
+            constrained: self.constrained.clone(),
+            free: vec![],
+            friction: None,
+        }
+    }
+}
+
 /// Contacts that are closed together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModeItem {
@@ -282,6 +370,12 @@ impl Contacts {
 }
 
 impl ContactItem {
+    /// Its friction over a scalar.
+    pub fn friction_over<T: Real>(&self) -> Option<Friction<T>> {
+        let number = |x: f64| T::constant(Dd::from(x));
+        self.friction.map(|(coefficient, speed)| Friction { coefficient: number(coefficient), speed: number(speed) })
+    }
+
     /// Its name in identifiers.
     pub fn identifier(&self) -> String {
         snake_case(&self.name)

@@ -202,6 +202,13 @@ impl<T: Real> Surface<T> {
     }
 }
 
+impl<T: Real> Surface<T> {
+    /// Unit normal at a point \[m\] in object axes, towards the robot.
+    pub fn normal(&self, point: Vec3<T>) -> Vec3<T> {
+        self.distance_and_normal(point.map(Functional::still)).1.map(|n| n.value)
+    }
+}
+
 /// φ / |∇φ| and ∇φ / |∇φ|.
 fn first_order<T: Real>(value: Functional<T>, gradient: Vec3<Functional<T>>) -> (Functional<T>, Vec3<Functional<T>>) {
     let inverse = Functional::still(T::one()) / gradient.dot(gradient).sqrt();

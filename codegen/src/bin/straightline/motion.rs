@@ -1,7 +1,7 @@
 //! The commands `simulate` and `analyze`.
 
 use crate::arguments::{Analyze, ModelArgs, Simulate};
-use crate::{options, print, read, Failure};
+use crate::{contact, options, print, read, Failure};
 use anstream::stdout;
 use std::io::Write;
 use std::path::Path;
@@ -15,6 +15,7 @@ use straightline_codegen::{model, output, scene};
 use straightline_core::model::Model;
 use straightline_simulation::analysis::{self, Analysis};
 use straightline_simulation::command::Command;
+use straightline_simulation::contact as in_contact;
 use straightline_simulation::html::Page;
 use straightline_simulation::motion::Motion;
 use straightline_simulation::optimize;
@@ -64,7 +65,7 @@ fn experiment(
 }
 
 /// Writes a table as CSV, or as JSON where the file's name says so.
-fn write_table(path: &Path, table: &Table) -> Result<(), Failure> {
+pub fn write_table(path: &Path, table: &Table) -> Result<(), Failure> {
     let text = match path.extension().is_some_and(|e| e == "json") {
         true => {
             let columns = table.names.iter().enumerate().map(|(k, name)| {
@@ -80,7 +81,7 @@ fn write_table(path: &Path, table: &Table) -> Result<(), Failure> {
 }
 
 /// The columns whose names begin so, as lines over time.
-fn lines<'a>(table: &'a Table, prefix: &str) -> Vec<Line<'a>> {
+pub fn lines<'a>(table: &'a Table, prefix: &str) -> Vec<Line<'a>> {
     let of = |(k, name): (usize, &'a String)| {
         let name = name.strip_prefix(prefix)?;
         Some(Line { name, points: table.rows.iter().map(|row| (row[0], row[k])).collect() })
@@ -96,7 +97,7 @@ fn drawn(plot: &Plot) -> Result<String, Failure> {
 }
 
 pub fn simulate(a: &Simulate) -> Result<(), Failure> {
-    let (_, _, model) = robot(&a.robot, &a.model)?;
+    let (_, options, model) = robot(&a.robot, &a.model)?;
     let controller_model = match &a.controller_robot {
         None => model.clone(),
         Some(path) => {
@@ -110,18 +111,21 @@ pub fn simulate(a: &Simulate) -> Result<(), Failure> {
         }
     };
     let experiment = experiment(&a.input, &model, &controller_model, true)?;
+    let contacts = contact::read(&a.input, &model, &options.scene.contacts)?;
     let plant = Plant::new(model, experiment.coulomb_speed);
     let bar = print::bar("simulating", 1000);
     let duration = experiment.settings.duration;
     let progress = |t: f64| bar.set_position((t / duration * 1000.0) as u64);
     let start = (&experiment.q[..], &experiment.qd[..]);
+    if !contacts.is_empty() {
+        let settings = &experiment.settings;
+        let run = in_contact::simulate(&plant, &contacts, &experiment.command, start, settings, &progress);
+        bar.finish_and_clear();
+        return contact::finish(a, &plant, &contacts, run);
+    }
     let run = simulate::simulate(&plant, &experiment.command, start, &experiment.settings, &progress);
     bar.finish_and_clear();
-    let run = run.map_err(|failure| {
-        print::error(&failure.to_string());
-        print::help("a smaller tolerance, a greater coulomb_speed, or method = \"stiff\" in [simulation] may help");
-        Failure::Input
-    })?;
+    let run = run.map_err(|failure| failed(&failure))?;
     if let Some(path) = &a.output {
         write_table(path, &run.table)?;
     }
@@ -131,6 +135,16 @@ pub fn simulate(a: &Simulate) -> Result<(), Failure> {
         let plot = Plot { title, axes: ("t [s]", "rad or m"), lines: lines(&run.table, prefix), levels: Vec::new() };
         output::write_file(path, &drawn(&plot)?)?;
     }
+    print_run(&plant, &run)
+}
+
+pub fn failed(failure: &simulate::Failure) -> Failure {
+    print::error(&failure.to_string());
+    print::help("a smaller tolerance, a greater coulomb_speed, or method = \"stiff\" in [simulation] may help");
+    Failure::Input
+}
+
+pub fn print_run(plant: &Plant, run: &simulate::Run) -> Result<(), Failure> {
     let mut out = stdout().lock();
     let balance = run.balance;
     let last = run.table.rows.last().map_or(0.0, |row| row[0]);

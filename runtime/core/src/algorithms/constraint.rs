@@ -11,7 +11,7 @@
 use super::contact_system::{ContactSystem, Row};
 use super::factor::Ltdl;
 use super::functional::{FunctionalCoordinates, RelativeMotion};
-use crate::contact::{Contact, Coordinate, Functional};
+use crate::contact::{Contact, Coordinate};
 use crate::real::Real;
 use crate::spatial::Vec3;
 use alloc::vec::Vec;
@@ -151,8 +151,7 @@ pub fn applied_rows<T: Real>(
         return rows;
     };
     T::section("friction", None);
-    let (_, normal) = contact.surface.distance_and_normal(motion.position.map(Functional::still));
-    let n = normal.map(|n| n.value);
+    let n = contact.surface.normal(motion.position);
     let v = motion.velocity;
     let slip: Vec3<T> = v - n.scale(n.dot(v));
     let speed = (slip.dot(slip) + friction.speed * friction.speed).sqrt();
