@@ -14,10 +14,12 @@ pub struct Analysis<'g> {
     groups: Groups,
     /// Per node, the form of a sum with its groups.
     sums: Vec<Option<Bounded>>,
+    /// Per node, the form of a sum in which products have cancelled.
+    cancelled: Vec<Option<Bounded>>,
     /// Per node, the group of the factors of a product.
     products: Vec<Option<GroupId>>,
-    /// Per node, the form of its adjoint with its groups.
-    adjoint_sums: Vec<Option<Bounded>>,
+    /// Per node, its adjoint by the chain rule, and taken apart, with its groups.
+    adjoint_sums: Vec<Option<(Bounded, Bounded)>>,
     /// Errors that share an adjoint, and adjoints that share a norm.
     sharing: Sharing,
     /// Nodes that each result needs, users first.
@@ -36,6 +38,8 @@ pub(super) enum Broken {
     Constants,
     /// A turn shrinks.
     Turn,
+    /// What is left of a sum in which products cancel counts less than once.
+    Cancelled,
     /// One term of the chain rule is forgotten.
     ChainRule,
     /// Errors of a vector count once.
@@ -49,8 +53,12 @@ struct State {
     value: Vec<Interval>,
     /// Greatest rounding error of each node.
     error: Vec<f64>,
-    /// The same, of all nodes that share an adjoint, at the node that stands for them.
+    /// How far each value may be from the exact one.
+    total_error: Vec<f64>,
+    /// Errors of roundings, of all nodes that share an adjoint, at the node that stands for them.
     class_error: Vec<f64>,
+    /// Exact and computed sine and cosine of each pair.
+    sin_cos: Vec<[(Interval, Interval); 2]>,
     /// Adjoints for the result at hand.
     adjoint: Vec<Interval>,
     seed: u32,
@@ -86,6 +94,9 @@ impl Refusal {
     }
 }
 
+/// Ways to bound a norm stay if they come so near to the best one where they are first tried.
+const WORTHWHILE: f64 = 1.5;
+
 impl<'g> Analysis<'g> {
     /// Reads a graph.
     pub fn new(graph: &'g Graph, format: Format) -> Self {
@@ -93,6 +104,7 @@ impl<'g> Analysis<'g> {
         let forms = Forms::new(graph, &live, &format);
         let mut groups = Groups::default();
         let mut sums = vec![None; graph.ops.len()];
+        let mut cancelled = vec![None; graph.ops.len()];
         let mut products = vec![None; graph.ops.len()];
         let mut adjoint_sums = vec![None; graph.ops.len()];
         let sharing = Sharing::new(graph, &live, &forms, &mut groups);
@@ -104,6 +116,7 @@ impl<'g> Analysis<'g> {
                 Op::Add(..) | Op::Sub(..) => {
                     let (form, _) = forms.flat(Atom::Value(id.0));
                     sums[i] = Some(groups.bounded(form.to_vec()));
+                    cancelled[i] = forms.cancelled(id.0).map(|form| groups.bounded(form.to_vec()));
                 }
                 Op::Mul(a, b) if a != b && is_plain(a) && is_plain(b) => {
                     products[i] = Some(groups.group([vec![one(a)], vec![one(b)]]));
@@ -111,7 +124,7 @@ impl<'g> Analysis<'g> {
                 _ => {}
             }
             let form = forms.flat(Atom::Adjoint(id.0)).0.to_vec();
-            adjoint_sums[i] = Some(groups.bounded(form));
+            adjoint_sums[i] = Some((groups.bounded(forms.chain[i].clone()), groups.bounded(form)));
         }
         let mut results: Vec<NodeId> = graph.results.clone();
         results.sort_unstable();
@@ -121,6 +134,8 @@ impl<'g> Analysis<'g> {
         let state = State {
             value: vec![Interval::ZERO; n],
             error: vec![0.0; n],
+            total_error: vec![0.0; n],
+            sin_cos: vec![[(Interval::ZERO, Interval::ZERO); 2]; n],
             adjoint: vec![Interval::ZERO; n],
             ..State::default()
         };
@@ -130,6 +145,7 @@ impl<'g> Analysis<'g> {
             forms,
             groups,
             sums,
+            cancelled,
             products,
             adjoint_sums,
             sharing,
@@ -159,7 +175,16 @@ impl<'g> Analysis<'g> {
         self.state.box_round = self.state.round;
         for i in 0..self.graph.ops.len() {
             let (exact, error) = self.exact_range(i, inputs)?;
-            let range = if matches!(self.graph.ops[i], Op::Constant(_)) { exact } else { exact.widened(error) };
+            let mut range = if matches!(self.graph.ops[i], Op::Constant(_)) { exact } else { exact.widened(error) };
+            self.state.total_error[i] = add_up(self.carried_error(i), error);
+            if let Some(form) = self.cancelled[i].take() {
+                let mut exact = self.enclosure(&form);
+                if self.is_broken(Broken::Cancelled) {
+                    exact = exact.clipped(0.4 * exact.mag());
+                }
+                range = range.intersect(exact.widened(self.state.total_error[i]));
+                self.cancelled[i] = Some(form);
+            }
             if range.mag().is_nan() || range.mag() >= self.format.largest {
                 return Err(Refusal::Overflow);
             }
@@ -168,6 +193,30 @@ impl<'g> Analysis<'g> {
         }
         self.class_errors();
         Ok(())
+    }
+
+    /// How far the errors of its operands take a value from the exact one. Ranges hold both.
+    fn carried_error(&self, i: usize) -> f64 {
+        let error = |a: NodeId| self.state.total_error[a.index()];
+        let value = |a: NodeId| self.state.value[a.index()];
+        match self.graph.ops[i] {
+            // the sign of an input, or of what is off zero
+            Op::Input(_) | Op::Constant(_) | Op::Sign(_) => 0.0,
+            Op::Neg(a) | Op::SinCos(a) | Op::Sin(a) | Op::Cos(a) => error(a),
+            Op::Add(a, b) | Op::Sub(a, b) | Op::AngleSum(a, b) => add_up(error(a), error(b)),
+            // |â b̂ − a b| ≤ |â| |b̂ − b| + |b| |â − a|
+            Op::Mul(a, b) => add_up(mul_up(value(a).mag(), error(b)), mul_up(value(b).mag(), error(a))),
+            // |â/b̂ − a/b| ≤ (|â − a| + |a/b| |b̂ − b|) / |b̂|
+            Op::Div(a, b) => {
+                let quotient = value(a).over(value(b)).mag();
+                mul_up(add_up(error(a), mul_up(quotient, error(b))), Interval::ONE.over(value(b)).mag())
+            }
+            // |√â − √a| = |â − a| / (√â + √a)
+            Op::Sqrt(a) => {
+                let root = value(a).sqrt();
+                mul_up(error(a), Interval::ONE.over(root + root).mag())
+            }
+        }
     }
 
     /// The errors of all nodes that share an adjoint, added up.
@@ -257,14 +306,17 @@ impl<'g> Analysis<'g> {
                 if angle.mag() > format.trig_domain {
                     return Err(Refusal::Overflow);
                 }
+                let (sin, cos) = angle.sin_cos();
+                let e = format.trig_error(1.0);
+                self.state.sin_cos[i] = [(sin, cos), (sin.widened(e), cos.widened(e))];
                 (angle, 0.0)
             }
             Op::Sin(p) => {
-                let (sin, _) = v(&self.state, p).sin_cos();
+                let (sin, _) = self.state.sin_cos[p.index()][0];
                 (sin, format.trig_error(sin.mag()))
             }
             Op::Cos(p) => {
-                let (_, cos) = v(&self.state, p).sin_cos();
+                let (_, cos) = self.state.sin_cos[p.index()][0];
                 (cos, format.trig_error(cos.mag()))
             }
         })
@@ -286,8 +338,8 @@ impl<'g> Analysis<'g> {
         let enclosure = self.enclosure(&sum);
         self.sums[i] = Some(sum);
         let (_, slack) = self.forms.flat(Atom::Value(i as u32));
-        let slack =
-            slack.iter().filter(|n| **n as usize != i).fold(0.0, |s, n| add_up(s, self.state.error[*n as usize]));
+        let others = slack.nodes.iter().filter(|n| **n as usize != i);
+        let slack = others.fold(0.0, |s, n| add_up(s, self.state.error[*n as usize]));
         direct.intersect(enclosure.widened(slack))
     }
 
@@ -335,6 +387,7 @@ impl<'g> Analysis<'g> {
         let atom = match t.atom {
             Atom::One => Interval::ONE,
             Atom::Value(v) => value(v),
+            Atom::Half(v) => value(v) * Interval::point(0.5),
             Atom::Adjoint(v) => self.state.adjoint[v as usize],
             Atom::Seed(r) => {
                 if r == self.state.seed {
@@ -350,10 +403,10 @@ impl<'g> Analysis<'g> {
         let x = match t.coefficient {
             Coefficient::One => atom,
             Coefficient::Node(n) => value(n) * atom,
-            Coefficient::Sin(p) => self.computed_half(p).0 * atom,
-            Coefficient::Cos(p) => self.computed_half(p).1 * atom,
-            Coefficient::ExactCos(p) => value(p).sin_cos().1 * atom,
-            Coefficient::ExactMinusSin(p) => -value(p).sin_cos().0 * atom,
+            Coefficient::Sin(p) => self.state.sin_cos[p as usize][1].0 * atom,
+            Coefficient::Cos(p) => self.state.sin_cos[p as usize][1].1 * atom,
+            Coefficient::ExactCos(p) => self.state.sin_cos[p as usize][0].1 * atom,
+            Coefficient::ExactMinusSin(p) => -self.state.sin_cos[p as usize][0].0 * atom,
             Coefficient::Reciprocal(b) => Interval::ONE.over(value(b)) * atom,
             Coefficient::MinusQuotient(n) => {
                 let Op::Div(a, b) = self.graph.ops[n as usize] else { unreachable!("made for divisions") };
@@ -370,13 +423,6 @@ impl<'g> Analysis<'g> {
         } else {
             x
         }
-    }
-
-    /// Computed sine and cosine of a pair.
-    fn computed_half(&self, pair: u32) -> (Interval, Interval) {
-        let (sin, cos) = self.state.value[pair as usize].sin_cos();
-        let e = self.format.trig_error(1.0);
-        (sin.widened(e), cos.widened(e))
     }
 
     /// An upper bound of the norm of a group.
@@ -410,11 +456,19 @@ impl<'g> Analysis<'g> {
             self.state.norm[k].1 = best;
         }
         self.groups.groups[k].bounded = Some(bounded);
-        self.groups.ways(id, &self.forms);
-        let ways = self.groups.groups[k].ways.take().expect("made above");
+        let is_first = self.groups.groups[k].ways.is_none();
+        if is_first {
+            let mut groups = std::mem::take(&mut self.groups);
+            groups.find_ways(id, &self.forms, &|t| self.term(t).mag());
+            self.groups = groups;
+        }
+        let mut ways = self.groups.groups[k].ways.take().expect("made above");
+        let mut bounds = Vec::with_capacity(ways.len());
         for way in &ways {
-            let errors =
-                way.slack.iter().map(|nodes| nodes.iter().fold(0.0, |s, n| add_up(s, self.state.error[*n as usize])));
+            let errors = way.slack.iter().map(|s| {
+                let rounding = s.nodes.iter().fold(0.0, |s, n| add_up(s, self.state.error[*n as usize]));
+                s.totals.iter().fold(rounding, |s, n| add_up(s, self.state.total_error[*n as usize]))
+            });
             let mut bound = norm_up(errors);
             for (factor, inner) in &way.parts {
                 let factor = match factor {
@@ -434,6 +488,12 @@ impl<'g> Analysis<'g> {
                 bound = add_up(bound, self.norm(way.rest));
                 best = best.min(bound);
             }
+            bounds.push(bound);
+        }
+        if is_first {
+            // what is far off here will hardly be the best elsewhere, and all are sound
+            let mut bounds = bounds.into_iter();
+            ways.retain(|_| bounds.next().is_some_and(|b| b <= WORTHWHILE * best));
         }
         self.groups.groups[k].ways = Some(ways);
         self.state.norm[k] = (current, best);
@@ -448,15 +508,18 @@ impl<'g> Analysis<'g> {
         self.state.result_round = self.state.round;
         self.state.seed = result.0;
         for &n in &nodes {
-            let mut direct = Interval::ZERO;
-            let forgotten = usize::from(self.is_broken(Broken::ChainRule) && self.forms.chain[n as usize].len() > 1);
-            for t in self.forms.chain[n as usize].iter().skip(forgotten) {
-                direct = direct + self.term(t);
+            let sums = self.adjoint_sums[n as usize].take().expect("live nodes have adjoints");
+            let (chain, apart) = &sums;
+            let mut adjoint = if self.is_broken(Broken::ChainRule) && chain.form.len() > 1 {
+                chain.form[1..].iter().fold(Interval::ZERO, |sum, t| sum + self.term(t))
+            } else {
+                self.enclosure(chain)
+            };
+            if !(apart.turns.is_empty() && apart.dots.is_empty()) {
+                adjoint = adjoint.intersect(self.enclosure(apart));
             }
-            let sum = self.adjoint_sums[n as usize].take().expect("live nodes have adjoints");
-            let by_norms = if sum.turns.is_empty() && sum.dots.is_empty() { direct } else { self.enclosure(&sum) };
-            self.adjoint_sums[n as usize] = Some(sum);
-            self.state.adjoint[n as usize] = direct.intersect(by_norms);
+            self.adjoint_sums[n as usize] = Some(sums);
+            self.state.adjoint[n as usize] = adjoint;
         }
         self.cones[cone].1 = nodes;
     }

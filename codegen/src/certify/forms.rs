@@ -5,6 +5,7 @@
 //! Σ over the users u of v of ∂u/∂v · ∂F/∂u. Both kinds rotate: x cos q − y sin q, y cos q + x sin q. That is what
 //! [`norms`](super::norms) looks for.
 
+use super::cancel::cancelled;
 use super::format::Format;
 use crate::expr::{Graph, NodeId, Op};
 
@@ -15,6 +16,8 @@ pub enum Atom {
     One,
     /// The value of a node.
     Value(u32),
+    /// Half the value of a node.
+    Half(u32),
     /// ∂F/∂v of a node v.
     Adjoint(u32),
     /// 1 for the adjoint of the result itself, if it is that node.
@@ -69,8 +72,52 @@ pub type Form = Vec<Term>;
 pub struct Flat {
     /// The terms.
     pub form: Form,
-    /// Nodes whose rounding errors (coefficient ±1) lie between the atom and the form.
-    pub slack: Vec<u32>,
+    /// What lies between the atom and the form.
+    pub slack: Slack,
+}
+
+/// Errors between computed values and a form of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Slack {
+    /// Nodes whose rounding errors count, once each.
+    pub nodes: Vec<u32>,
+    /// Nodes that count with all that lies between them and their exact values.
+    pub totals: Vec<u32>,
+}
+
+impl Slack {
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty() && self.totals.is_empty()
+    }
+
+    fn of_nodes(nodes: Vec<u32>) -> Slack {
+        Slack { nodes, totals: Vec::new() }
+    }
+
+    fn extend(&mut self, other: &Slack) {
+        self.nodes.extend(&other.nodes);
+        self.totals.extend(&other.totals);
+    }
+}
+
+/// How far values are taken apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Depth {
+    /// Down to products.
+    Products,
+    /// Down to components of vectors that have a name.
+    Names,
+    /// As [`Depth::Names`], and sums in which products cancel without these.
+    Cancelled,
+}
+
+impl Flat {
+    /// A value as itself.
+    fn alone(id: NodeId) -> Flat {
+        let term = Term { coefficient: Coefficient::One, atom: Atom::Value(id.0), negative: false };
+        Flat { form: vec![term], slack: Slack::default() }
+    }
 }
 
 /// Forms of more terms stay in parts.
@@ -81,6 +128,10 @@ const LONGEST: usize = 32;
 pub struct Forms {
     /// Of values, taken apart.
     values: Vec<Flat>,
+    /// Of values, taken apart down to components of vectors that have a name.
+    named: Vec<Flat>,
+    /// Of exact values, what is left where products cancel.
+    cancelled: Vec<Option<Form>>,
     /// Of adjoints by the chain rule, one step.
     pub chain: Vec<Form>,
     /// The node that stands for all with its adjoint, up to the sign.
@@ -112,14 +163,21 @@ impl Forms {
         };
         let mut forms = Forms {
             values: Vec::with_capacity(graph.ops.len()),
+            named: Vec::with_capacity(graph.ops.len()),
+            cancelled: cancelled(graph, live),
             chain: Vec::new(),
             class: Vec::new(),
             adjoints: Vec::new(),
             constants: graph.ops.iter().map(constant).collect(),
         };
         for id in graph.ids() {
-            let flat = forms.value(graph, id);
+            let flat = forms.value(graph, id, |a| forms.values[a.index()].clone());
             forms.values.push(flat);
+            let flat = forms.value(graph, id, |a| match graph.notes[a.index()].name {
+                Some((_, _, "x" | "y" | "z")) => Flat::alone(a),
+                _ => forms.named[a.index()].clone(),
+            });
+            forms.named.push(flat);
         }
         (forms.chain, forms.class) = chain_rule(graph, live);
         forms.adjoints = vec![Form::new(); graph.ops.len()];
@@ -130,22 +188,24 @@ impl Forms {
         forms
     }
 
-    fn value(&self, graph: &Graph, id: NodeId) -> Flat {
-        let atom = |id: NodeId| Term { coefficient: Coefficient::One, atom: Atom::Value(id.0), negative: false };
-        let alone = Flat { form: vec![atom(id)], slack: Vec::new() };
+    /// The form of a value, from those of its operands.
+    fn value(&self, graph: &Graph, id: NodeId, of: impl Fn(NodeId) -> Flat) -> Flat {
+        let alone = Flat::alone(id);
         let joined = |a: NodeId, b: NodeId, minus: bool| {
-            let (a, b) = (&self.values[a.index()], &self.values[b.index()]);
+            let (a, b) = (of(a), of(b));
             if a.form.len() + b.form.len() > LONGEST {
                 return alone.clone();
             }
             let form = a.form.iter().copied().chain(b.form.iter().map(|t| t.signed(minus))).collect();
-            let slack = a.slack.iter().chain(&b.slack).copied().chain([id.0]).collect();
+            let mut slack = Slack::of_nodes(vec![id.0]);
+            slack.extend(&a.slack);
+            slack.extend(&b.slack);
             Flat { form: simplified(form), slack }
         };
         match graph.op(id) {
             Op::Neg(a) => {
-                let flat = &self.values[a.index()];
-                Flat { form: flat.form.iter().map(|t| t.signed(true)).collect(), slack: flat.slack.clone() }
+                let flat = of(a);
+                Flat { form: negated(&flat.form), slack: flat.slack }
             }
             Op::Add(a, b) => joined(a, b, false),
             Op::Sub(a, b) => joined(a, b, true),
@@ -169,16 +229,16 @@ impl Forms {
                 };
                 Flat {
                     form: vec![Term { coefficient, atom: Atom::Value(other.0), negative: s != t }],
-                    slack: vec![id.0],
+                    slack: Slack::of_nodes(vec![id.0]),
                 }
             }
             Op::Sin(p) => Flat {
                 form: vec![Term { coefficient: Coefficient::Sin(p.0), atom: Atom::One, negative: false }],
-                slack: vec![],
+                slack: Slack::default(),
             },
             Op::Cos(p) => Flat {
                 form: vec![Term { coefficient: Coefficient::Cos(p.0), atom: Atom::One, negative: false }],
-                slack: vec![],
+                slack: Slack::default(),
             },
             _ => alone,
         }
@@ -206,11 +266,12 @@ impl Forms {
     }
 
     /// What an atom equals.
-    pub fn flat(&self, atom: Atom) -> (&[Term], &[u32]) {
+    pub fn flat(&self, atom: Atom) -> (&[Term], &Slack) {
+        const NONE: &Slack = &Slack { nodes: Vec::new(), totals: Vec::new() };
         match atom {
             Atom::Value(v) => (&self.values[v as usize].form, &self.values[v as usize].slack),
-            Atom::Adjoint(v) => (&self.adjoints[v as usize], &[]),
-            Atom::One | Atom::Seed(_) => (&[], &[]),
+            Atom::Adjoint(v) => (&self.adjoints[v as usize], NONE),
+            Atom::One | Atom::Half(_) | Atom::Seed(_) => (&[], NONE),
         }
     }
 
@@ -223,11 +284,30 @@ impl Forms {
         }
     }
 
-    /// A form with its atoms of coefficient one taken apart, and the nodes whose rounding lies between.
-    pub fn flattened(&self, form: &[Term]) -> Flat {
+    /// What is left of a sum, over exact values, where products cancel.
+    pub fn cancelled(&self, node: u32) -> Option<&Form> {
+        self.cancelled[node as usize].as_ref()
+    }
+
+    /// A form with its atoms of coefficient one taken apart, and the errors between.
+    pub fn flattened(&self, form: &[Term], depth: Depth) -> Flat {
         let mut flat = Flat::default();
         for t in form {
-            let (inner, slack) = self.flat(t.atom);
+            let exact = match t.atom {
+                Atom::Value(v) if depth == Depth::Cancelled && t.coefficient == Coefficient::One => self.cancelled(v),
+                _ => None,
+            };
+            if let (Some(form), Atom::Value(v)) = (exact, t.atom) {
+                flat.form.extend(form.iter().map(|u| u.signed(t.negative)));
+                flat.slack.totals.push(v);
+                continue;
+            }
+            let (inner, slack) = match t.atom {
+                Atom::Value(v) if depth != Depth::Products => {
+                    (&self.named[v as usize].form[..], &self.named[v as usize].slack)
+                }
+                _ => self.flat(t.atom),
+            };
             if t.coefficient == Coefficient::One && !inner.is_empty() && flat.form.len() + inner.len() <= 2 * LONGEST {
                 flat.form.extend(inner.iter().map(|u| u.signed(t.negative)));
                 flat.slack.extend(slack);

@@ -18,7 +18,9 @@
 //!
 //! **3. Ranges and adjoints** ([`analysis`]): interval arithmetic with outward rounding ([`interval`]), forwards for values, backwards by
 //! the chain rule for adjoints; intersected with what the norms of groups give ([`norms`], where each rule has its proof). A value
-//! equals its [form](forms) up to the sum of the errors of the nodes between, which is added.
+//! equals its [form](forms) up to the sum of the errors of the nodes between, which is added. Where products cancel ([`cancel`]), the form is
+//! one of the exact value: ranges hold exact values too (all e_j = 0), and computed ones are off by what errors can have added up to, found
+//! forwards: |â b̂ − a b| ≤ |â| |b̂ − b| + |b| |â − a|, and so on.
 //!
 //! **4. Sums of errors.** Nodes with the same adjoint up to its sign (a product and the sum that alone uses it) add their errors first. For
 //! adjoints g and errors e of one vector, Σ |g_i| |e_i| ≤ ‖g‖ ‖e‖ (Cauchy-Schwarz), and for two products x c, y s of one adjoint
@@ -31,6 +33,7 @@
 //! speed as it is given: where subnormal numbers are read as zero, so is the sign of a subnormal speed.
 
 pub mod analysis;
+mod cancel;
 pub mod format;
 pub mod forms;
 pub mod interval;

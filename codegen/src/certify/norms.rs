@@ -8,15 +8,16 @@
 //! * **triangle**: g = a + b ⇒ ‖g‖ ≤ ‖a‖ + ‖b‖; rounding errors between an atom and its form are such a b.
 //! * **turn**: the part of g_i with one angle is a_i c + b_i s. Two parts with a_j = b_i, b_j = −a_i (or the opposite signs)
 //!   are T times a rotation of (a_i, b_i). One part alone is at most T ‖(a_i, b_i)‖ (Cauchy-Schwarz). Parts on different
-//!   components add up in squares, beside components that do not turn (T ≥ 1): ‖g‖ ≤ T ‖(a_i, b_i, …, the others)‖.
-//! * **matrix**: g = M x with constants M ⇒ ‖g‖ ≤ √‖MᵀM‖_∞ ‖x‖, as the greatest eigenvalue of MᵀM is at most any norm of it.
+//!   components add up in squares, beside components that do not turn (T ≥ 1): ‖g‖ ≤ T ‖(a_i, b_i, …, the others)‖. Any terms may be taken for
+//!   the rest, by the triangle: small ones that turn with the angle, constants times other vectors.
+//! * **matrix**: g = M x with constants M ⇒ ‖g‖ ≤ √‖MᵀM‖_∞ ‖x‖, as the greatest eigenvalue of MᵀM is at most any norm of it; M Mᵀ has the same.
 //! * **columns**: terms k g_i of several members with one coefficient k are k times a vector: at most |k| ‖(g_i)‖.
 //! * **scaling**: g = C a with values C before adjoints a of one vector ⇒ ‖g‖ ≤ ‖C‖_F ‖a‖; for C = (x, y; −y, x), the derivatives by cosine and
 //!   sine of one turn, ‖C‖ = ‖(x, y)‖, as CᵀC = (x² + y²) 1. One form Σ x_k a_k is at most ‖x‖ ‖a‖.
 //!
 //! The same rules serve adjoints, because the chain rule through a rotation is the rotation back.
 
-use super::forms::{canonical, negated, Coefficient, Form, Forms, Term};
+use super::forms::{canonical, negated, Coefficient, Depth, Form, Forms, Slack, Term};
 use super::forms::{simplified, Atom, Flat};
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
@@ -29,6 +30,8 @@ pub type GroupId = u32;
 pub enum Effort {
     /// All.
     All,
+    /// All, of what another rule left over.
+    Rest,
     /// `columns` only.
     Columns,
     /// None: its ends.
@@ -51,7 +54,7 @@ pub struct Group {
 }
 
 /// What stands before the group that is left.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Factor {
     /// T of a pair.
     Turn(u32),
@@ -70,8 +73,8 @@ pub struct Way {
     pub parts: Vec<(Factor, GroupId)>,
     /// What does not belong to them, one form per member.
     pub rest: GroupId,
-    /// Nodes whose rounding errors lie between the members and their forms, one list per member.
-    pub slack: Vec<Vec<u32>>,
+    /// Errors between the members and their forms, for each member.
+    pub slack: Vec<Slack>,
 }
 
 /// A form with the groups that bound its parts of one angle.
@@ -162,7 +165,7 @@ impl Groups {
         // terms with values before adjoints of one vector, each adjoint once
         let mut lists: Vec<(u32, Vec<usize>)> = Vec::new();
         for (k, t) in form.iter().enumerate() {
-            let Some((team, _, atom)) = self.scaled(t) else { continue };
+            let (Some(team), atom) = (self.weighted(t), t.atom) else { continue };
             let fits = |(other, terms): &&mut (u32, Vec<usize>)| {
                 *other == team && terms.iter().all(|j: &usize| form[*j].atom != atom)
             };
@@ -179,6 +182,14 @@ impl Groups {
         });
         let dots = dots.collect();
         Bounded { form, turns, dots }
+    }
+
+    /// The team of the adjoint of a term that has a value before it, or nothing.
+    fn weighted(&self, t: &Term) -> Option<u32> {
+        match (t.coefficient, t.atom) {
+            (Coefficient::Node(_) | Coefficient::One, Atom::Adjoint(a)) => self.team.get(a as usize).copied()?,
+            _ => None,
+        }
     }
 
     /// The team, the node of the value, and the adjoint of a term of value and adjoint.
@@ -199,17 +210,16 @@ impl Groups {
     }
 
     /// The ways of a group, found once.
-    pub fn ways(&mut self, id: GroupId, forms: &Forms) -> usize {
-        if let Some(ways) = &self.groups[id as usize].ways {
-            return ways.len();
+    ///
+    /// `size` says how large a term is in the first box; it only decides which of many ways are worth a try.
+    pub fn find_ways(&mut self, id: GroupId, forms: &Forms, size: &dyn Fn(&Term) -> f64) {
+        if self.groups[id as usize].ways.is_none() {
+            let ways = self.all_ways(id, forms, size);
+            self.groups[id as usize].ways = Some(ways);
         }
-        let ways = self.find_ways(id, forms);
-        let count = ways.len();
-        self.groups[id as usize].ways = Some(ways);
-        count
     }
 
-    fn find_ways(&mut self, id: GroupId, forms: &Forms) -> Vec<Way> {
+    fn all_ways(&mut self, id: GroupId, forms: &Forms, size: &dyn Fn(&Term) -> f64) -> Vec<Way> {
         let members = self.groups[id as usize].members.clone();
         if members.len() > LARGEST {
             return Vec::new();
@@ -217,12 +227,33 @@ impl Groups {
         match self.groups[id as usize].effort {
             Effort::Ends => return Vec::new(),
             Effort::Columns => return self.columns(id, &members, &[]).into_iter().collect(),
-            Effort::All => {}
+            Effort::All | Effort::Rest => {}
         }
-        let flats: Vec<_> = members.iter().map(|m| forms.flattened(m)).collect();
-        let slack: Vec<Vec<u32>> = flats.iter().map(|f| f.slack.clone()).collect();
+        let mut ways = Vec::new();
+        let mut tried: Vec<Vec<Form>> = Vec::new();
+        for depth in [Depth::Products, Depth::Names, Depth::Cancelled] {
+            let flats: Vec<Flat> = members.iter().map(|m| forms.flattened(m, depth)).collect();
+            let flat_forms: Vec<Form> = flats.iter().map(|f| f.form.clone()).collect();
+            if !tried.contains(&flat_forms) {
+                ways.extend(self.ways_of_flat(id, &flats, forms, size));
+                tried.push(flat_forms);
+            }
+        }
+        let mut distinct: Vec<Way> = Vec::with_capacity(ways.len());
+        for way in ways {
+            let same = |w: &Way| w.rest == way.rest && w.parts == way.parts && w.slack == way.slack;
+            if !distinct.iter().any(same) {
+                distinct.push(way);
+            }
+        }
+        distinct
+    }
+
+    /// The ways of a group whose members have these forms.
+    fn ways_of_flat(&mut self, id: GroupId, flats: &[Flat], forms: &Forms, size: &dyn Fn(&Term) -> f64) -> Vec<Way> {
+        let slack: Vec<Slack> = flats.iter().map(|f| f.slack.clone()).collect();
         let mut angles: Vec<(usize, u32)> = Vec::new();
-        for flat in &flats {
+        for flat in flats {
             let mut seen: Vec<u32> = flat.form.iter().filter_map(|t| turn(t).map(|(p, _)| p)).collect();
             seen.sort_unstable();
             seen.dedup();
@@ -237,16 +268,50 @@ impl Groups {
         angles.sort_unstable();
         let mut ways = Vec::new();
         for &(_, pair) in angles.iter().rev().take(ANGLES) {
-            for keep_constants in [false, true] {
-                ways.extend(self.turning(id, pair, &flats, &slack, keep_constants, forms));
+            for kept in 0..3 {
+                let keeps = |t: &Term| {
+                    turn(t).is_some()
+                        || (kept == 1 && t.coefficient == Coefficient::One)
+                        || (kept == 2 && is_linear(t, forms))
+                };
+                // a member whose other terms are larger is kept for them
+                let is_small = |flat: &Flat| {
+                    let largest = |own: bool| {
+                        let is_own = |t: &&Term| turn(t).is_some_and(|(p, _)| p == pair);
+                        let terms = flat.form.iter().filter(|t| is_own(t) == own && keeps(t));
+                        terms.fold(0.0f64, |most, t| most.max(size(t)))
+                    };
+                    largest(true) < largest(false)
+                };
+                let small: Vec<bool> = flats.iter().map(is_small).collect();
+                ways.extend(self.turning(id, pair, flats, &slack, &keeps, &[]));
+                if small.contains(&true) {
+                    ways.extend(self.turning(id, pair, flats, &slack, &keeps, &small));
+                }
                 let has_constants = |f: &Flat| f.form.iter().any(|t| is_linear(t, forms));
                 if !flats.iter().any(has_constants) {
                     break;
                 }
             }
         }
-        ways.extend(self.matrix(id, &flats, &slack, forms));
-        ways.extend(self.scaling(&flats));
+        let any = |_: &Term| true;
+        ways.extend(self.matrix(id, flats, &slack, forms, &any, Effort::Columns));
+        if self.groups[id as usize].effort == Effort::All {
+            // one vector of adjoints after the other
+            let linear = flats.iter().flat_map(|f| &f.form).filter(|t| is_linear(t, forms));
+            let mut teams: Vec<u32> = linear.filter_map(|t| self.weighted(t)).collect();
+            teams.sort_unstable();
+            teams.dedup();
+            for team in teams {
+                let of_adjoints = self.team.clone();
+                let in_team = move |t: &Term| match t.atom {
+                    Atom::Adjoint(a) => of_adjoints.get(a as usize) == Some(&Some(team)),
+                    _ => false,
+                };
+                ways.extend(self.matrix(id, flats, &slack, forms, &in_team, Effort::Rest));
+            }
+        }
+        ways.extend(self.scaling(flats));
         let flat_members: Vec<Form> = flats.iter().map(|f| f.form.clone()).collect();
         ways.extend(self.columns(id, &flat_members, &slack));
         ways
@@ -258,20 +323,20 @@ impl Groups {
         id: GroupId,
         pair: u32,
         flats: &[Flat],
-        slack: &[Vec<u32>],
-        keep_constants: bool,
-        forms: &Forms,
+        slack: &[Slack],
+        keeps: &dyn Fn(&Term) -> bool,
+        small: &[bool],
     ) -> Option<Way> {
         let mut inner: Vec<Form> = Vec::new();
         let mut rests: Vec<Form> = Vec::new();
         let mut turned: Vec<(Form, Form)> = Vec::new();
-        for flat in flats {
+        for (k, flat) in flats.iter().enumerate() {
             let part = |sine: bool| -> Form {
                 simplified(flat.form.iter().filter(|t| turn(t) == Some((pair, sine))).map(bare).collect())
             };
             let (a, b) = (part(false), part(true));
-            if a.is_empty() && b.is_empty() {
-                let kept = |t: &&Term| turn(t).is_some() || (keep_constants && is_linear(t, forms));
+            if (a.is_empty() && b.is_empty()) || small.get(k) == Some(&true) {
+                let kept = |t: &&Term| keeps(t) && turn(t).is_none_or(|(p, _)| p != pair);
                 let (main, rest): (Vec<&Term>, Vec<&Term>) = flat.form.iter().partition(kept);
                 inner.push(main.into_iter().copied().collect());
                 rests.push(rest.into_iter().copied().collect());
@@ -293,13 +358,22 @@ impl Groups {
             }
             inner.extend([a, b]);
         }
-        self.way(id, Factor::Turn(pair), inner, rests, slack)
+        self.way(id, Factor::Turn(pair), inner, rests, slack, Effort::Columns)
     }
 
-    /// The rule `matrix`: all terms with constant coefficients.
-    fn matrix(&mut self, id: GroupId, flats: &[Flat], slack: &[Vec<u32>], forms: &Forms) -> Option<Way> {
+    /// The rule `matrix`: all terms with constant coefficients, of some atoms.
+    fn matrix(
+        &mut self,
+        id: GroupId,
+        flats: &[Flat],
+        slack: &[Slack],
+        forms: &Forms,
+        is_column: &dyn Fn(&Term) -> bool,
+        effort: Effort,
+    ) -> Option<Way> {
+        let is_column = |t: &Term| is_linear(t, forms) && is_column(t);
         let mut atoms: Vec<Atom> = Vec::new();
-        for t in flats.iter().flat_map(|f| &f.form).filter(|t| is_linear(t, forms)) {
+        for t in flats.iter().flat_map(|f| &f.form).filter(|t| is_column(t)) {
             if !atoms.contains(&t.atom) {
                 atoms.push(t.atom);
             }
@@ -310,7 +384,7 @@ impl Groups {
         let mut rests = Vec::new();
         let mut rows = Vec::new();
         for flat in flats {
-            let (linear, rest): (Vec<&Term>, Vec<&Term>) = flat.form.iter().partition(|t| is_linear(t, forms));
+            let (linear, rest): (Vec<&Term>, Vec<&Term>) = flat.form.iter().partition(|t| is_column(t));
             rests.push(rest.into_iter().copied().collect());
             let mut row = vec![(0.0f64, 0.0f64); atoms.len()];
             for t in linear {
@@ -327,11 +401,11 @@ impl Groups {
         }
         let inner = atoms.into_iter().map(|atom| vec![Term { coefficient: Coefficient::One, atom, negative: false }]);
         let inner = inner.collect();
-        self.way(id, Factor::Matrix(spectral_norm(&rows)), inner, rests, slack)
+        self.way(id, Factor::Matrix(spectral_norm(&rows)), inner, rests, slack, effort)
     }
 
     /// The rule `columns`: terms of several members with one coefficient are that coefficient times a vector.
-    fn columns(&mut self, id: GroupId, members: &[Form], slack: &[Vec<u32>]) -> Option<Way> {
+    fn columns(&mut self, id: GroupId, members: &[Form], slack: &[Slack]) -> Option<Way> {
         let mut columns: BTreeMap<Coefficient, Vec<(usize, Term)>> = BTreeMap::new();
         for (m, member) in members.iter().enumerate() {
             for t in member {
@@ -368,13 +442,14 @@ impl Groups {
         factor: Factor,
         inner: Vec<Form>,
         rests: Vec<Form>,
-        slack: &[Vec<u32>],
+        slack: &[Slack],
+        effort: Effort,
     ) -> Option<Way> {
         let inner = self.group(inner);
         if inner == id || self.groups[inner as usize].members.is_empty() {
             return None;
         }
-        let rest = self.group_with(rests, Effort::Columns);
+        let rest = self.group_with(rests, effort);
         if rest == id {
             return None;
         }
@@ -421,8 +496,12 @@ impl Groups {
 }
 
 fn value_of(coefficient: Coefficient) -> Term {
-    let Coefficient::Node(v) = coefficient else { unreachable!("made for values") };
-    Term { coefficient: Coefficient::One, atom: Atom::Value(v), negative: false }
+    let atom = match coefficient {
+        Coefficient::Node(v) => Atom::Value(v),
+        Coefficient::One => Atom::One,
+        _ => unreachable!("made for values"),
+    };
+    Term { coefficient: Coefficient::One, atom, negative: false }
 }
 
 /// Whether two members of two terms each are x u + y v and ±(x v − y u).
@@ -447,23 +526,27 @@ fn is_linear(t: &Term, forms: &Forms) -> bool {
     constant && !forms.is_leaf(t.atom)
 }
 
-/// An upper bound of the spectral norm of a matrix of values with errors: √‖MᵀM‖_∞ + ‖errors‖_F.
+/// An upper bound of the spectral norm of a matrix of values with errors: √ of the lesser of ‖MᵀM‖_∞ and ‖MMᵀ‖_∞, + ‖errors‖_F.
 fn spectral_norm(rows: &[Vec<(f64, f64)>]) -> f64 {
     let columns = rows.first().map_or(0, Vec::len);
-    let mut largest = 0.0f64;
-    for i in 0..columns {
-        let mut sum = 0.0;
-        for j in 0..columns {
-            let (mut entry, mut size) = (0.0, 0.0);
-            for row in rows {
-                entry += row[i].0 * row[j].0;
-                size += (row[i].0 * row[j].0).abs();
+    let gram = |count: usize, others: usize, at: &dyn Fn(usize, usize) -> f64| {
+        let mut largest = 0.0f64;
+        for i in 0..count {
+            let mut sum = 0.0;
+            for j in 0..count {
+                let (mut entry, mut size) = (0.0, 0.0);
+                for k in 0..others {
+                    entry += at(i, k) * at(j, k);
+                    size += (at(i, k) * at(j, k)).abs();
+                }
+                // at most 2 · `others` roundings of numbers up to `size`
+                sum += entry.abs() + 16.0 * f64::EPSILON * size;
             }
-            // at most 2 · members roundings of numbers up to `size`
-            sum += entry.abs() + 16.0 * f64::EPSILON * size;
+            largest = largest.max(sum * (1.0 + 16.0 * f64::EPSILON));
         }
-        largest = largest.max(sum * (1.0 + 16.0 * f64::EPSILON));
-    }
+        largest
+    };
+    let largest = gram(columns, rows.len(), &|i, k| rows[k][i].0).min(gram(rows.len(), columns, &|i, k| rows[i][k].0));
     let errors: f64 = rows.iter().flatten().map(|(_, e)| e * e).sum();
     (largest.sqrt() + errors.sqrt()) * (1.0 + 16.0 * f64::EPSILON)
 }

@@ -62,6 +62,16 @@ fn turns() -> Graph {
     })
 }
 
+/// (x₀ + x₁)(x₂ + x₃) − (x₀ x₂ + x₁ x₂) = (x₀ + x₁) x₃.
+fn products_that_cancel() -> Graph {
+    program(4, |b, x| {
+        let (u, v) = (b.add(Op::Add(x[0], x[1])), b.add(Op::Add(x[2], x[3])));
+        let (whole, p, q) = (b.add(Op::Mul(u, v)), b.add(Op::Mul(x[0], x[2])), b.add(Op::Mul(x[1], x[2])));
+        let sum = b.add(Op::Add(p, q));
+        b.add(Op::Sub(whole, sum))
+    })
+}
+
 const WIDE: [Interval; 7] = [Interval { lo: -0.7, hi: 0.7 }; 7];
 
 /// The bound and the greatest magnitude of the result.
@@ -120,6 +130,7 @@ fn a_bound_with_a_broken_rule_is_violated() {
     broken(tenth(), &unit[..1], Broken::Constants);
     broken(square_of_sum(), &fraction, Broken::ChainRule);
     broken(turns(), &WIDE, Broken::Turn);
+    broken(products_that_cancel(), &CANCELLING, Broken::Cancelled);
     // 2 sin q − 2 cos q near 45°: nothing rounds but sine and cosine
     let difference = program(1, |b, x| {
         let (s, c) = sin_cos(b, x[0]);
@@ -135,6 +146,20 @@ fn a_turned_vector_keeps_its_norm() {
     let (_, magnitude) = bound(&turns(), Format::of(Scalar::F32), &WIDE, None);
     // √2 · 0.7, and a few roundings
     assert!((0.9899..0.99).contains(&magnitude), "{magnitude}");
+}
+
+const CANCELLING: [Interval; 4] = [
+    Interval { lo: -0.9, hi: 0.9 },
+    Interval { lo: -0.9, hi: 0.9 },
+    Interval { lo: -9.0, hi: 9.0 },
+    Interval { lo: -0.1, hi: 0.1 },
+];
+
+#[test]
+fn products_that_cancel_leave_no_range_behind() {
+    let (_, magnitude) = bound(&products_that_cancel(), Format::of(Scalar::F32), &CANCELLING, None);
+    // 1.8 · 0.1, and roundings of products up to 16; without cancelling 33
+    assert!((0.18..0.1801).contains(&magnitude), "{magnitude}");
 }
 
 #[test]
