@@ -269,3 +269,38 @@ frequency = 40.0
         assert!((found - wanted).abs() < 1e-9 * wanted.abs(), "{found} for {wanted}");
     }
 }
+
+#[test]
+fn what_sticks_is_not_pulled_to_the_origin_and_what_gives_way_not_to_the_surface() {
+    let text = |mode: &str, more: &str| {
+        surface("tool0")
+            .replace("contact = [\"forward_dynamics\"]\n", "")
+            .replace("[\"pz\"]\n", &format!("[\"pz\"]\n{more}\n{mode}"))
+    };
+    let state = state(6);
+    let (q, qd, tau) = (&state[..6], &state[6..12], &state[12..]);
+    let mode =
+        "[[mode]]\nname = \"still\"\ncontacts = [\"pen\"]\nsticking = [\"pen\"]\n[stabilisation]\nfrequency = 40.0\n";
+    let sticking = options(&text(mode, "friction = { coefficient = 0.3 }"));
+    let robot = loaded("ur5.urdf", &sticking);
+    let motion = run(&sticking, &robot, ContactFunction::ForwardDynamics, &[("q", q), ("qd", qd), ("tau", tau)]);
+    let found = run(&sticking, &robot, ContactFunction::ConstrainedCoordinates, &[("q", q), ("qd", qd)]);
+    let (s, sd) = (result(&found, "s"), result(&found, "sd"));
+    for (k, square) in [(0, 0.0), (1, 0.0), (2, 1600.0)] {
+        let wanted = -80.0 * sd[k] - square * s[k];
+        let sdd = result(&motion, "sdd")[k];
+        assert!((sdd - wanted).abs() < 1e-9 * wanted.abs(), "{k}: {sdd} for {wanted}");
+    }
+    // J dq: the distance is taken away, the place on the surface stays
+    let corrected = |options: &Options, robot: &Robot| {
+        let dq = run(options, robot, ContactFunction::Projection, &[("q", q)]);
+        let found = run(options, robot, ContactFunction::ConstrainedCoordinates, &[("q", q), ("qd", qd)]);
+        let rows = result(&found, "j").chunks(6).map(|row| row.iter().zip(result(&dq, "dq")).map(|(j, d)| j * d).sum());
+        (rows.collect::<Vec<f64>>(), result(&found, "s").to_vec())
+    };
+    let (moved, s) = corrected(&sticking, &robot);
+    assert!(moved[0].abs() < 1e-9 && moved[1].abs() < 1e-9 && (moved[2] + s[2]).abs() < 1e-9, "{moved:?} {s:?}");
+    let soft = options(&text("", "environment = { kind = \"elastic\", stiffness = 1e4, damping = 10.0 }"));
+    let dq = run(&soft, &loaded("ur5.urdf", &soft), ContactFunction::Projection, &[("q", q)]);
+    assert_eq!(result(&dq, "dq"), [0.0; 6]);
+}

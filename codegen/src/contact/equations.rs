@@ -67,7 +67,9 @@ pub(super) fn equations(
             let stabilised = match options.scene.contacts.stabilisation {
                 Some((frequency, damping)) => {
                     let [frequency, damping] = [frequency, damping].map(|x| Expr::constant(Dd::from(x)));
-                    alg::baumgarte(&constrained, frequency, damping)
+                    let pulled =
+                        FunctionalCoordinates { value: deviations(&traced, &constrained), ..constrained.clone() };
+                    alg::baumgarte(&pulled, frequency, damping)
                 }
                 None => vec![Expr::zero(); constrained.len()],
             };
@@ -145,10 +147,42 @@ pub(super) fn equations(
             [results, after].concat()
         }
         ContactFunction::Projection => {
-            let correction = alg::projection(&factor(), &constrained, &constrained.value, epsilon);
+            let deviations = deviations(&traced, &constrained);
+            let is_rigid = rigid_rows(&traced);
+            let kept = |list: &[Expr]| list.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| *k.0).collect::<Vec<Expr>>();
+            let rows = constrained.jacobian.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| k.0.clone());
+            let rigid = FunctionalCoordinates {
+                value: kept(&constrained.value),
+                rate: kept(&constrained.rate),
+                jacobian: rows.collect(),
+                bias: kept(&constrained.bias),
+            };
+            let correction = match rigid.is_empty() {
+                true => vec![Expr::zero(); bound.model.nv()],
+                false => alg::projection(&factor(), &rigid, &kept(&deviations), epsilon),
+            };
             vec![correction, constrained.value]
         }
     }
+}
+
+/// How far the rows are from where they are held: what sticks is held where that has happened, which is not known here, so that
+/// its rate alone counts.
+fn deviations(traced: &[Traced], constrained: &FunctionalCoordinates<Expr>) -> Vec<Expr> {
+    let by_friction = traced.iter().flat_map(|t| match t.closed {
+        Some(closed) => closed.constrained.iter().map(|c| !closed.item.constrained.contains(c)).collect(),
+        None => vec![false; t.constrained.len()],
+    });
+    constrained.value.iter().zip(by_friction).map(|(s, sticks)| if sticks { Expr::zero() } else { *s }).collect()
+}
+
+/// Rows that are not on an object that gives way.
+fn rigid_rows(traced: &[Traced]) -> Vec<bool> {
+    let of = |t: &Traced| {
+        let yields = t.environment.as_ref().and(t.closed).map(|closed| distance_row(&closed.constrained));
+        (0..t.constrained.len()).map(|k| yields != Some(k)).collect::<Vec<bool>>()
+    };
+    traced.iter().flat_map(of).collect()
 }
 
 /// The row of the distance among the constrained coordinates of a contact.
