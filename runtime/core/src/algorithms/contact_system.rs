@@ -5,8 +5,8 @@
 //!
 //! **Regularisation.** Rows may be redundant (a flat foot on four points) or vanish (a stretched arm): then G is singular.
 //! Each diagonal entry gets a ridge ε G_ii + ε² Σ 1/D: relative to its own row, so that lengths and angles may stand side by
-//! side, and never zero, as Σ 1/D of the joints is not. Solving twice, the second time for what is left, takes the error on
-//! regular rows from ε to ε². A pivot is never let below ε/2 of its diagonal, so that rounding cannot make a division by
+//! side, and never zero, as Σ 1/D of the joints is not. Solving again, for what is left, takes the error on a row with the pivot
+//! p from ε/p to (ε/p)², and where rows know of each other once more to (ε/p)³. A pivot is never let below ε/2 of its diagonal, so that rounding cannot make a division by
 //! zero. What is returned says how far it went: the least pivot against its diagonal, 1 for rows that do not know of each
 //! other, about ε for redundant ones, and the violation that is left.
 
@@ -104,13 +104,16 @@ impl<T: Real> ContactSystem<T> {
         self.inverse_mass.iter().map(|row| dot(row, force)).collect()
     }
 
-    /// F for these right sides, refined once.
+    /// F for these right sides, refined: once for a single row, whose pivot is its diagonal, twice for more.
     pub fn solve(&self, right: &[T]) -> Vec<T> {
         T::section("reactions", None);
-        let first = self.solver.solve(right);
-        let left: Vec<T> = right.iter().zip(&self.matrix).map(|(b, row)| *b - dot(row, &first)).collect();
-        let second = self.solver.solve(&left);
-        first.into_iter().zip(second).enumerate().map(|(i, (x, d))| (x + d).named("reaction", i, "")).collect()
+        let mut x = self.solver.solve(right);
+        for _ in 0..if right.len() > 1 { 2 } else { 1 } {
+            let left: Vec<T> = right.iter().zip(&self.matrix).map(|(b, row)| *b - dot(row, &x)).collect();
+            let added = self.solver.solve(&left);
+            x = x.into_iter().zip(added).map(|(x, d)| x + d).collect();
+        }
+        x.into_iter().enumerate().map(|(i, x)| x.named("reaction", i, "")).collect()
     }
 
     /// Adds the reactions to L⁻ᵀ b.
