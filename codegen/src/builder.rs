@@ -218,15 +218,13 @@ impl Builder {
         let source = read(robot, &self.robot)?;
         let mut options = self.options.clone();
         if let (Some(file), Some(shown)) = (scene, &self.scene_file) {
-            let mut diagnostics = Diagnostics::new();
-            let scene = scene::read(&read(file, shown)?, &mut diagnostics);
-            messages.tell(&diagnostics);
-            let errors = diagnostics.count(Severity::Error);
-            options = scene.ok_or(Error::Robot { path: shown.clone(), errors })?.into_options(options);
+            options = scene::read_partly(&read(file, shown)?).into_options(options);
         }
         let generated = compile(&source, &options).map_err(|diagnostics| {
             messages.tell(&diagnostics);
-            Error::Robot { path: self.robot.clone(), errors: diagnostics.count(Severity::Error) }
+            let of_robot = diagnostics.iter().any(|d| d.place.as_ref().is_none_or(|p| *p.file == *source.path()));
+            let path = self.scene_file.as_ref().filter(|_| !of_robot).unwrap_or(&self.robot).clone();
+            Error::Robot { path, errors: diagnostics.count(Severity::Error) }
         })?;
         messages.tell(&generated.warnings);
         let stem = self.robot.file_stem().unwrap_or_default().to_string_lossy();
@@ -373,13 +371,28 @@ axis = "y"
 
         fs::write(here.join("still.toml"), "[hold]\njoints = { pivt = 0.0 }\n").unwrap();
         let m = Builder::new("pen.toml").scene_file("still.toml").run(&here, &here);
-        assert_eq!(m.result.unwrap_err().to_string(), "pen.toml: 1 error");
+        assert_eq!(m.result.unwrap_err().to_string(), "still.toml: 1 error");
         assert!(m.cargo[2].starts_with("cargo::error=still.toml:2:12: error: "), "{:?}", m.cargo);
 
         fs::write(here.join("still.toml"), "[zero]\nqdot = true\n").unwrap();
         let m = Builder::new("pen.toml").scene_file("still.toml").run(&here, &here);
         assert_eq!(m.result.unwrap_err().to_string(), "still.toml: 1 error");
         assert!(m.person.contains("--> still.toml:2:1"), "{}", m.person);
+    }
+
+    #[test]
+    fn all_that_is_wrong_with_scene_and_robot_is_said_in_one_run() {
+        let errors = |robot: &str| -> Vec<String> {
+            let here = scratch("both", robot);
+            fs::write(here.join("still.toml"), "[zero]\nqdot = true\n[hold]\njoints = { pivt = 0.0 }\n").unwrap();
+            let m = Builder::new("pen.toml").scene_file("still.toml").run(&here, &here);
+            assert!(!here.join("pen.rs").exists());
+            let place =
+                |line: &String| line.strip_prefix("cargo::error=").map(|l| l.split(' ').next().unwrap().to_string());
+            m.cargo.iter().filter_map(place).collect()
+        };
+        assert_eq!(errors(PENDULUM), ["still.toml:2:1:", "still.toml:4:12:"]);
+        assert_eq!(errors(&PENDULUM.replace("mass = 1.5", "mass = -1.5")), ["pen.toml:10:8:", "still.toml:2:1:"]);
     }
 
     #[test]

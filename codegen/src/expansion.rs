@@ -76,8 +76,7 @@ fn compiled(
         Some(None) => return Err(refusal(&diagnostics, robot.path(), within)),
     };
     let generated = compile(&robot, &options).map_err(|diagnostics| refusal(&diagnostics, robot.path(), within))?;
-    diagnostics.extend(generated.warnings.clone());
-    Ok((diagnostics.at_least(Severity::Warning).render(), generated))
+    Ok((generated.warnings.at_least(Severity::Warning).render(), generated))
 }
 
 /// What is wrong with the robot file of that path and its scene, which stands `within` the macro or in another file.

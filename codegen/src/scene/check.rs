@@ -122,10 +122,14 @@ fn ranges_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// What a scene and the options beside it contradict each other in. Scenes from files are read into options by
-/// [`SceneFile::into_options`](super::SceneFile::into_options), which cannot contradict itself.
+/// What reading the scene's file found, or else what the scene and the options beside it contradict each other in. Scenes from
+/// files are read into options by [`SceneFile::into_options`](super::SceneFile::into_options), which cannot contradict itself.
 pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
     let scene = &options.scene;
+    diagnostics.extend(scene.places.complaints().clone());
+    if scene.places.complaints().has_errors() {
+        return;
+    }
     if let Some(source) = scene.places.source() {
         diagnostics.add_source(source);
     }

@@ -20,7 +20,7 @@ pub use check::check_options;
 pub use contact::{ContactFunction, Contacts};
 pub use places::Places;
 pub use ranges::{ranges_in_words, Interval, JointRanges, Ranges};
-pub use read::{read, SceneFile, LISTS};
+pub use read::{read, read_partly, SceneFile, LISTS};
 
 use crate::description::drives::Drive;
 use crate::function::Function;

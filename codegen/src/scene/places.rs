@@ -1,4 +1,4 @@
-//! Where the values of a scene stand in its file.
+//! Where the values of a scene stand in its file, and what is wrong there.
 
 use crate::diagnostic::{Diagnostic, Diagnostics, Place, Source};
 use std::collections::BTreeMap;
@@ -10,12 +10,13 @@ use std::fmt;
 pub struct Places {
     source: Option<Source>,
     places: BTreeMap<String, Place>,
+    complaints: Diagnostics,
 }
 
 impl Places {
     /// Of values in that file.
     pub fn new(source: &Source) -> Places {
-        Places { source: Some(source.clone()), places: BTreeMap::new() }
+        Places { source: Some(source.clone()), ..Places::default() }
     }
 
     /// The file; `None` for a scene made in code.
@@ -38,6 +39,21 @@ impl Places {
                 (None, None) => return None,
             }
         }
+    }
+
+    /// What reading the file found, which whoever uses the scene has still to say; errors leave nothing to use.
+    pub fn complaints(&self) -> &Diagnostics {
+        &self.complaints
+    }
+
+    /// The same, said by the caller.
+    pub(super) fn take_complaints(&mut self) -> Diagnostics {
+        std::mem::take(&mut self.complaints)
+    }
+
+    /// Keeps what reading the file found.
+    pub(super) fn keep(&mut self, complaints: Diagnostics) {
+        self.complaints = complaints;
     }
 
     /// Adds a complaint about the value of that path.

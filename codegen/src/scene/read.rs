@@ -4,7 +4,7 @@ mod contact;
 
 use super::messages as say;
 use super::{check, Base, Budget, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Places};
-use super::{Ranges, Scene, Selection};
+use super::{Contacts, Ranges, Scene, Selection};
 use crate::compile::Options;
 use crate::description::reader::{Range64, Reader, LARGEST_FILE};
 use crate::description::table::{parse, Table};
@@ -82,11 +82,25 @@ impl SceneFile {
 /// assert_eq!(file.scene.locked, [("wrist".to_string(), 0.5)]);
 /// ```
 pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<SceneFile> {
+    let mut file = read_partly(source);
+    let found = file.scene.places.take_complaints();
+    let errors = found.has_errors();
+    diagnostics.extend(found);
+    (!errors).then_some(file)
+}
+
+/// What can be read of a scene file. Its complaints stay with the scene, and are said along with those of the robot, in one
+/// run; if there are errors among them, whatever compiles the scene refuses it.
+pub fn read_partly(source: &Source) -> SceneFile {
     let mut found = Diagnostics::new();
     found.add_source(source);
-    let file = read_text(source, &mut found).filter(|_| !found.has_errors());
+    let mut file = read_text(source, &mut found).unwrap_or_default();
+    if found.has_errors() {
+        // modes name contacts: those that could not be read would be missed
+        file.scene.contacts = Contacts::default();
+    }
     found.sort();
-    diagnostics.extend(found);
+    file.scene.places.keep(found);
     file
 }
 

@@ -60,15 +60,12 @@ fn read(path: &Path) -> Result<Source, Failure> {
     Ok(Source::from_bytes(&shown, bytes))
 }
 
-/// What the command line and the scene that it names say.
+/// What the command line and the scene that it names say; what is wrong with the scene is said when it is used.
 fn options(program: Option<&ProgramArgs>, model: &ModelArgs) -> Result<Options, Failure> {
     let plain = || Options { model: model.options(), ..Options::default() };
     let options = program.map_or_else(plain, |program| program.options(model));
     let Some(path) = &model.scene else { return Ok(options) };
-    let mut diagnostics = Diagnostics::new();
-    let file = scene::read(&read(path)?, &mut diagnostics);
-    print::diagnostics(&diagnostics, Severity::Warning);
-    let mut options = file.ok_or(Failure::Input)?.into_options(options);
+    let mut options = scene::read_partly(&read(path)?).into_options(options);
     model.insist(&mut options);
     if let Some(program) = program {
         program.insist(&mut options);

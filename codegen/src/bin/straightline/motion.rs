@@ -30,7 +30,6 @@ const PLOT: (u32, u32) = (900, 340);
 /// The robot of a description in a scene, in f64; what is wrong with it is printed.
 fn built(description: &Description, options: &Options, diagnostics: &mut Diagnostics) -> Option<Model<f64>> {
     let model = model::build(description, &options.scene.model_options(&options.model), diagnostics);
-    scene::check_options(options, diagnostics);
     let model = model.and_then(|model| scene::apply(model, &options.scene, diagnostics));
     model.filter(|_| !diagnostics.has_errors()).map(|model| model.cast())
 }
@@ -40,6 +39,7 @@ fn robot(path: &Path, args: &ModelArgs) -> Result<(Description, Options, Model<f
     let source = read(path)?;
     let mut diagnostics = Diagnostics::new();
     let description = description::read(&source, &mut diagnostics);
+    scene::check_options(&options, &mut diagnostics);
     let model = description.as_ref().and_then(|d| built(d, &options, &mut diagnostics));
     print::diagnostics(&diagnostics, Severity::Warning);
     description.zip(model).map(|(d, model)| (d, options, model)).ok_or(Failure::Input)
