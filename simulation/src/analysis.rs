@@ -1,5 +1,6 @@
 //! What a prescribed motion asks of joints and drives: torques, power, energy, what joints carry, and where limits end.
 
+use crate::drive_analysis::{self, DriveAnalysis};
 use crate::motion::Motion;
 use crate::table::Table;
 use straightline_core::algorithms::{inverse_dynamics, joint_wrenches, kinetic_energy, potential_energy};
@@ -17,6 +18,8 @@ pub struct Analysis {
     pub joints: Vec<JointFigures>,
     /// Every limit that is exceeded, where it is first, the earliest first.
     pub violations: Vec<Violation>,
+    /// What the motion asks of the drives, if the robot has drives whose inputs follow from a motion.
+    pub drives: Option<DriveAnalysis>,
     /// Kinetic and potential energy at the end less that at the beginning \[J\].
     pub energy_change: f64,
 }
@@ -49,9 +52,10 @@ pub struct JointFigures {
 pub struct Violation {
     /// When, for the first time \[s\].
     pub time: f64,
-    /// The joint.
+    /// The joint, or the drive.
     pub joint: String,
-    /// Of what: `position`, `speed` or `effort`.
+    /// Of what: `position`, `speed` or `effort` of a joint, `voltage`, `current`, `motor speed`, `rms current` or `winding temperature`
+    /// of a drive.
     pub what: &'static str,
     /// The limit.
     pub limit: f64,
@@ -85,13 +89,15 @@ pub fn analyze(model: &Model<f64>, motion: &Motion, interval: f64) -> Analysis {
     let figures = (0..n).map(|j| figures(joints[j], j, n, &table, &wrenches)).collect();
     let mut violations: Vec<Violation> =
         joints.iter().enumerate().flat_map(|(j, joint)| violations(model, motion, joint, j, n, &table)).collect();
+    let drives = drive_analysis::analyze(model, motion, &instants);
+    violations.extend(drives.iter().flat_map(|d| d.violations.iter().cloned()));
     violations.sort_by(|a, b| a.time.total_cmp(&b.time));
     let energy = |t: f64| {
         let (q, qd, _) = motion.at(t);
         kinetic_energy(model, &q, &qd) + potential_energy(model, &q)
     };
     let energy_change = energy(motion.duration()) - energy(motion.times[0]);
-    Analysis { table, wrenches, joints: figures, violations, energy_change }
+    Analysis { table, wrenches, joints: figures, violations, drives, energy_change }
 }
 
 /// Instants from knot to knot with the piece that they lie on, equally spaced; a knot between two pieces is in both.

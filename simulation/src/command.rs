@@ -1,6 +1,8 @@
-//! What drives a simulated robot: torques over time, or a controller.
+//! What drives a simulated robot: torques over time, inputs of its drives, or a controller.
 
+use crate::drives::{demands, without_dampers, Inputs, Load};
 use crate::motion::Motion;
+use crate::plant::{Action, Plant};
 use straightline_core::algorithms::{gravity_force, inverse_dynamics};
 use straightline_core::model::Model;
 
@@ -11,17 +13,40 @@ pub enum Command {
     Free,
     /// Over time, linear in between, constant before the first and after the last row.
     Torques(Samples),
+    /// Inputs of the drives over time, and torques beside them.
+    Inputs(Inputs, Option<Samples>),
     /// A controller.
     Controller(Box<Controller>),
 }
 
 impl Command {
-    /// Generalized forces \[N·m or N\] at time `t` \[s\] and state (q, q̇).
+    /// What acts at time `t` \[s\] on a robot in this state. Drives that nobody commands have the input zero: motors are shorted.
+    pub fn action(&self, plant: &Plant, t: f64, state: &[f64]) -> Action {
+        let (q, qd, ..) = plant.split(state);
+        match self {
+            Command::Controller(controller) if plant.is_driven() => {
+                Action { tau: vec![0.0; qd.len()], u: controller.inputs(t, q, qd, plant.x(state)) }
+            }
+            Command::Inputs(inputs, _) => Action { tau: self.torques(t, q, qd), u: inputs.samples.at(t) },
+            _ => Action { tau: self.torques(t, q, qd), u: vec![0.0; plant.model.drives.len()] },
+        }
+    }
+
+    /// Generalized forces \[N·m or N\] at time `t` \[s\] and state (q, q̇) of a robot without drives.
     pub fn torques(&self, t: f64, q: &[f64], qd: &[f64]) -> Vec<f64> {
         match self {
-            Command::Free => vec![0.0; qd.len()],
-            Command::Torques(samples) => samples.at(t),
+            Command::Free | Command::Inputs(_, None) => vec![0.0; qd.len()],
+            Command::Torques(samples) | Command::Inputs(_, Some(samples)) => samples.at(t),
             Command::Controller(controller) => controller.torques(t, q, qd),
+        }
+    }
+
+    /// Of every drive whether its input is a current.
+    pub fn current_inputs(&self, drives: usize) -> Vec<bool> {
+        match self {
+            Command::Inputs(inputs, _) => inputs.are_currents.clone(),
+            Command::Controller(controller) => vec![controller.gives_currents; drives],
+            Command::Free | Command::Torques(_) => vec![false; drives],
         }
     }
 
@@ -30,6 +55,11 @@ impl Command {
         match self {
             Command::Free => Vec::new(),
             Command::Torques(samples) => samples.times.clone(),
+            Command::Inputs(inputs, torques) => {
+                let mut times = inputs.samples.times.clone();
+                times.extend(torques.iter().flat_map(|s| &s.times));
+                times
+            }
             Command::Controller(controller) => controller.motion.corners(),
         }
     }
@@ -94,8 +124,10 @@ pub struct Controller {
     pub stiffness: Vec<f64>,
     /// D per joint: \[N·m·s/rad or N·s/m\], of computed torque \[1/s\].
     pub damping: Vec<f64>,
-    /// Whether forces stay within the joints' effort limits.
+    /// Whether forces stay within the joints' effort limits. Drives have limits of their own, which always hold.
     pub saturates: bool,
+    /// Whether it commands motors by currents; otherwise by voltages.
+    pub gives_currents: bool,
     /// Time from one computation to the next \[s\], forces held in between; `None`: continuous.
     pub period: Option<f64>,
 }
@@ -104,8 +136,7 @@ impl Controller {
     /// Generalized forces \[N·m or N\] at time `t` \[s\] and state (q, q̇).
     pub fn torques(&self, t: f64, q: &[f64], qd: &[f64]) -> Vec<f64> {
         let (r, rd, rdd) = self.motion.at(t);
-        let answer: Vec<f64> =
-            (0..q.len()).map(|i| self.stiffness[i] * (r[i] - q[i]) + self.damping[i] * (rd[i] - qd[i])).collect();
+        let answer = self.answer((&r, &rd), (q, qd));
         let added = |tau: Vec<f64>| tau.iter().zip(&answer).map(|(a, b)| a + b).collect::<Vec<f64>>();
         let mut tau = match self.compensation {
             Compensation::None => answer,
@@ -120,5 +151,36 @@ impl Controller {
             }
         }
         tau
+    }
+
+    /// K e + D ė.
+    fn answer(&self, (r, rd): (&[f64], &[f64]), (q, qd): (&[f64], &[f64])) -> Vec<f64> {
+        (0..q.len()).map(|i| self.stiffness[i] * (r[i] - q[i]) + self.damping[i] * (rd[i] - qd[i])).collect()
+    }
+
+    /// Inputs of the drives \[V or A\] at time `t` \[s\] and state (q, q̇, x): the inverse of robot and drives, dampers of elastic stages
+    /// left out, for the same forces and motions as [`torques`](Controller::torques). Feed-forward and computed torque know the further
+    /// derivatives of the reference that elastic stages and inductances take.
+    pub fn inputs(&self, t: f64, q: &[f64], qd: &[f64], x: &[f64]) -> Vec<f64> {
+        let model = without_dampers(&self.model);
+        let mut rates = self.motion.derivatives(t);
+        let r = rates.remove(0);
+        let answer = self.answer((&r, &rates[0]), (q, qd));
+        let still = || vec![vec![0.0; qd.len()]; rates.len()];
+        let asked = match self.compensation {
+            Compensation::None => demands(&model, q, &still(), x, Load::Only(&answer)),
+            Compensation::Gravity => demands(&model, q, &still(), x, Load::Motion(&answer)),
+            Compensation::FeedForward => demands(&model, &r, &rates, x, Load::Motion(&answer)),
+            Compensation::ComputedTorque => {
+                rates[0] = qd.to_vec();
+                rates[1].iter_mut().zip(&answer).for_each(|(rdd, answer)| *rdd += answer);
+                demands(&model, q, &rates, x, Load::Motion(&vec![0.0; qd.len()]))
+            }
+        };
+        let of = |d: straightline_core::algorithms::Demand<f64>| match d.current {
+            Some(current) if self.gives_currents => current,
+            _ => d.input,
+        };
+        asked.into_iter().map(of).collect()
     }
 }

@@ -8,6 +8,8 @@ pub mod analysis;
 pub mod cartesian;
 pub mod command;
 pub mod contact;
+pub mod drive_analysis;
+pub mod drives;
 pub mod html;
 pub mod motion;
 pub mod optimize;

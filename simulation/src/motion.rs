@@ -12,7 +12,12 @@ pub struct Motion {
 }
 
 /// Σ c\[n\] xⁿ.
-type Polynomial = [f64; 6];
+type Polynomial = [f64; 10];
+
+/// With these first coefficients.
+fn polynomial<const N: usize>(first: [f64; N]) -> Polynomial {
+    std::array::from_fn(|n| first.get(n).copied().unwrap_or(0.0))
+}
 
 /// Why knots make no motion.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,7 +61,7 @@ impl Motion {
             let joint = |j: usize| {
                 let (q0, q1, v0, v1) = (points[k][j], points[k + 1][j], velocities[k][j], velocities[k + 1][j]);
                 let slope = (q1 - q0) / h;
-                [q0, v0, (3.0 * slope - 2.0 * v0 - v1) / h, (v0 + v1 - 2.0 * slope) / (h * h), 0.0, 0.0]
+                polynomial([q0, v0, (3.0 * slope - 2.0 * v0 - v1) / h, (v0 + v1 - 2.0 * slope) / (h * h)])
             };
             (0..points[0].len()).map(joint).collect()
         });
@@ -81,6 +86,28 @@ impl Motion {
             })
             .collect();
         Ok(Motion::hermite(times, &knots))
+    }
+
+    /// From rest to rest through points at these times, at rest in each, with four derivatives of q zero there: polynomials of degree 9,
+    /// smooth enough for elastic transmissions and inductances.
+    ///
+    /// # Errors
+    /// [`NoMotion`].
+    pub fn smooth(times: &[f64], points: &[Vec<f64>]) -> Result<Motion, NoMotion> {
+        check(times, points)?;
+        // 126 x⁵ − 420 x⁶ + 540 x⁷ − 315 x⁸ + 70 x⁹ goes from 0 to 1
+        const RISE: [f64; 5] = [126.0, -420.0, 540.0, -315.0, 70.0];
+        let pieces = (0..times.len() - 1).map(|k| {
+            let h = times[k + 1] - times[k];
+            let joint = |j: usize| {
+                let mut c = polynomial([points[k][j]]);
+                let way = points[k + 1][j] - points[k][j];
+                RISE.iter().enumerate().for_each(|(i, rise)| c[5 + i] = way * rise / h.powi(5 + i as i32));
+                c
+            };
+            (0..points[0].len()).map(joint).collect()
+        });
+        Ok(Motion { times: times.to_vec(), pieces: pieces.collect() })
     }
 
     /// Through samples with their velocities and accelerations: quintic pieces, nothing is estimated.
@@ -134,14 +161,14 @@ impl Motion {
             let phases = [(ramp, [0.0, 0.0, 0.5 * a]), (cruise, [0.5 * a * ramp * ramp, top, 0.0])];
             let brake = (ramp, [1.0 - 0.5 * a * ramp * ramp, top, -0.5 * a]);
             for (time, [s, sd, half_sdd]) in phases.into_iter().chain([brake]).filter(|(time, _)| *time > 1e-12) {
-                let joint = |j: usize| [pair[0][j] + s * way[j], sd * way[j], half_sdd * way[j], 0.0, 0.0, 0.0];
+                let joint = |j: usize| polynomial([pair[0][j] + s * way[j], sd * way[j], half_sdd * way[j]]);
                 motion.pieces.push((0..n).map(joint).collect());
                 motion.times.push(motion.duration() + time);
             }
         }
         if motion.pieces.is_empty() {
             // all points are the same
-            motion.pieces.push(points[0].iter().map(|q| [*q, 0.0, 0.0, 0.0, 0.0, 0.0]).collect());
+            motion.pieces.push(points[0].iter().map(|q| polynomial([*q])).collect());
             motion.times.push(1.0);
         }
         Ok(motion)
@@ -174,11 +201,35 @@ impl Motion {
         }
     }
 
-    /// The same on the piece from knot `k` on, also at its end, where q̈ may jump.
+    /// q and its derivatives up to the ninth at time `t` \[s\], as [`at`](Motion::at).
+    pub fn derivatives(&self, t: f64) -> Vec<Vec<f64>> {
+        let (first, last) = (self.times.first().copied().unwrap_or(0.0), self.duration());
+        let inside = t.clamp(first, last);
+        let k = self.times.partition_point(|time| *time <= inside).saturating_sub(1).min(self.pieces.len() - 1);
+        let mut all = self.derivatives_in_piece(k, inside);
+        if t < first || t > last {
+            all[1..].iter_mut().for_each(|rates| rates.fill(0.0));
+        }
+        all
+    }
+
+    /// The same on the piece from knot `k` on, also at its end.
+    pub fn derivatives_in_piece(&self, k: usize, t: f64) -> Vec<Vec<f64>> {
+        let x = t - self.times[k];
+        let nth = |order: usize| -> Vec<f64> {
+            // (n)(n − 1)…(n − order + 1)
+            let factor = |n: usize| (n + 1 - order..=n).map(|i| i as f64).product::<f64>();
+            let value = |c: &Polynomial| (order..c.len()).rev().fold(0.0, |sum, n| sum * x + factor(n) * c[n]);
+            self.pieces[k].iter().map(value).collect()
+        };
+        (0..=9).map(nth).collect()
+    }
+
+    /// The same as [`at`](Motion::at) on the piece from knot `k` on, also at its end, where q̈ may jump.
     pub fn in_piece(&self, k: usize, t: f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let x = t - self.times[k];
         let sum = |from: usize, factor: fn(usize) -> usize| -> Vec<f64> {
-            let value = |c: &Polynomial| (from..6).rev().fold(0.0, |sum, n| sum * x + factor(n) as f64 * c[n]);
+            let value = |c: &Polynomial| (from..c.len()).rev().fold(0.0, |sum, n| sum * x + factor(n) as f64 * c[n]);
             self.pieces[k].iter().map(value).collect()
         };
         (sum(0, |_| 1), sum(1, |n| n), sum(2, |n| n * (n - 1)))
@@ -236,7 +287,7 @@ fn quintic_piece(h: f64, [q0, v0, a0]: [f64; 3], [q1, v1, a1]: [f64; 3]) -> Poly
     let c3 = 10.0 * d - 4.0 * e + 0.5 * f;
     let c4 = -15.0 * d + 7.0 * e - f;
     let c5 = 6.0 * d - 3.0 * e + 0.5 * f;
-    [q0, v0, 0.5 * a0, c3 / h.powi(3), c4 / h.powi(4), c5 / h.powi(5)]
+    polynomial([q0, v0, 0.5 * a0, c3 / h.powi(3), c4 / h.powi(4), c5 / h.powi(5)])
 }
 
 #[cfg(test)]

@@ -1,10 +1,15 @@
 //! The robot as a system of first order: state (q, q̇), and beside it the work of drives and the losses.
 //!
-//! The state vector is \[q | q̇ | W | L\]: W the work of the generalized forces that are given, L what friction has turned into
-//! heat \[J\], so that kinetic and potential energy − W + L is constant, which measures a simulation. States of drives have their
-//! place between q̇ and W.
+//! The state vector is \[q | q̇ | x | W | L | D\]: x the states of the drives, W the work of the generalized forces that are given, L
+//! what friction in the joints has turned into heat, and D, of a robot with drives, the [`DriveEnergies`], all in J, so that stored
+//! energy − W + L − electrical + lost is constant, which measures a simulation.
 
-use straightline_core::algorithms::{forward_dynamics_aba, kinetic_energy, potential_energy};
+use crate::drives::{slack_state, smooth_losses, DriveEnergies};
+use straightline_core::algorithms::{
+    bias_force, drive_energy, drive_states, driven_motion, forward_dynamics_aba, kinetic_energy, mass_matrix,
+    potential_energy, DrivenMotion, Links,
+};
+use straightline_core::drive::Actuator;
 use straightline_core::model::{Coulomb, JointKind, Model};
 
 /// A robot that is simulated.
@@ -12,6 +17,17 @@ use straightline_core::model::{Coulomb, JointKind, Model};
 pub struct Plant {
     /// The robot.
     pub model: Model<f64>,
+    /// Of every drive whether its input is a current.
+    currents: Vec<bool>,
+}
+
+/// What acts on a robot.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Action {
+    /// Generalized forces beside those of the drives \[N·m or N\].
+    pub tau: Vec<f64>,
+    /// Inputs of the drives \[V, A, or the unit of u\].
+    pub u: Vec<f64>,
 }
 
 impl Plant {
@@ -26,24 +42,115 @@ impl Plant {
                 };
             }
         }
-        Plant { model }
+        for drive in &mut model.drives {
+            smooth_losses(drive, coulomb_speed);
+        }
+        let currents = vec![false; model.drives.len()];
+        Plant { model, currents }
+    }
+
+    /// The same with amplifiers that keep up a current, as far as the voltage allows: the inputs of these drives are in A, and their
+    /// inductances, which such an amplifier overcomes, are neglected.
+    #[must_use]
+    pub fn with_current_inputs(mut self, are_currents: &[bool]) -> Plant {
+        for ((drive, is_current), of) in self.currents.iter_mut().zip(are_currents).zip(&mut self.model.drives) {
+            if let (true, Actuator::Motor(motor)) = (*is_current, &mut of.actuator) {
+                *drive = true;
+                motor.inductance = None;
+            }
+        }
+        self
+    }
+
+    /// The same with limits of currents that implicit steps find a solution at: an inductive current is slowed down over the last
+    /// hundredth before its limit.
+    #[must_use]
+    pub fn with_soft_limits(mut self) -> Plant {
+        for drive in &mut self.model.drives {
+            drive.soft_current = Some(0.01);
+        }
+        self
     }
 
     /// Number of states.
     pub fn states(&self) -> usize {
-        self.model.nq() + self.model.nv() + 2
+        let of_drives = if self.is_driven() { DriveEnergies::COUNT } else { 0 };
+        self.model.nq() + self.model.nv() + self.drive_states() + 2 + of_drives
     }
 
-    /// The state vector of a configuration and a velocity.
+    /// Whether the robot has drives.
+    pub fn is_driven(&self) -> bool {
+        !self.model.drives.is_empty()
+    }
+
+    /// Number of entries of x.
+    pub fn drive_states(&self) -> usize {
+        drive_states(&self.model)
+    }
+
+    /// The state vector of a configuration and a velocity; drives have slack springs and no currents.
     pub fn state(&self, q: &[f64], qd: &[f64]) -> Vec<f64> {
-        [q, qd, &[0.0, 0.0]].concat()
+        self.state_with(q, qd, &slack_state(&self.model, q, qd))
+    }
+
+    /// The state vector of a configuration, a velocity and a state of the drives.
+    pub fn state_with(&self, q: &[f64], qd: &[f64], x: &[f64]) -> Vec<f64> {
+        let mut state = [q, qd, x].concat();
+        state.resize(self.states(), 0.0);
+        state
     }
 
     /// q, q̇, work and losses of a state.
     pub fn split<'a>(&self, state: &'a [f64]) -> (&'a [f64], &'a [f64], f64, f64) {
         let (q, rest) = state.split_at(self.model.nq());
-        let (qd, energies) = rest.split_at(self.model.nv());
+        let (qd, rest) = rest.split_at(self.model.nv());
+        let energies = &rest[self.drive_states()..];
         (q, qd, energies[0], energies[1])
+    }
+
+    /// x of a state.
+    pub fn x<'a>(&self, state: &'a [f64]) -> &'a [f64] {
+        let first = self.model.nq() + self.model.nv();
+        &state[first..first + self.drive_states()]
+    }
+
+    /// What the drives of a state have taken and lost.
+    pub fn drive_energies(&self, state: &[f64]) -> DriveEnergies {
+        DriveEnergies::from_slice(&state[self.model.nq() + self.model.nv() + self.drive_states() + 2..])
+    }
+
+    /// All energy that is stored in a state \[J\]: [`energy`](Plant::energy), and rotors, transmissions and inductances of drives.
+    pub fn stored(&self, state: &[f64]) -> f64 {
+        let (q, qd, ..) = self.split(state);
+        let of_drives = if self.is_driven() { drive_energy(&self.model, (q, qd, self.x(state))) } else { [0.0; 3] };
+        self.energy(q, qd) + of_drives.iter().sum::<f64>()
+    }
+
+    /// The motion of robot and drives, and what goes on in these.
+    pub fn driven(&self, state: &[f64], action: &Action) -> DrivenMotion<f64> {
+        let (q, qd, ..) = self.split(state);
+        let (q, x) = (unit_quaternions(&self.model, q), self.x(state));
+        let u = self.inputs(qd, x, &action.u);
+        let bias: Vec<f64> = bias_force(&self.model, &q, qd).iter().zip(&action.tau).map(|(h, tau)| h - tau).collect();
+        let h = mass_matrix(&self.model, &q);
+        driven_motion(&self.model, (&q, qd, x, &u), &bias, &Links::MassMatrix(&h))
+    }
+
+    /// Inputs with currents as the voltages that keep them up, R i + C_E θ̇.
+    fn inputs(&self, qd: &[f64], x: &[f64], u: &[f64]) -> Vec<f64> {
+        let mut first = 0;
+        let of = |(k, u): (usize, &f64)| {
+            let drive = &self.model.drives[k];
+            let own = &x[first..first + drive.states()];
+            first += drive.states();
+            let (true, Actuator::Motor(motor)) = (self.currents[k], &drive.actuator) else { return *u };
+            let speed = match drive.stages.is_empty() {
+                true => drive.joints.iter().map(|(body, n)| n * qd[self.model.bodies[*body].joint.iv]).sum::<f64>(),
+                false => own[1],
+            };
+            motor.resistance * u + motor.emf_constant * speed
+        };
+        u.iter().enumerate().map(of).collect()
     }
 
     /// Kinetic and potential energy \[J\], those of rotors and springs with them.
@@ -65,16 +172,26 @@ impl Plant {
         joints.map(|b| loss((qd[b.joint.iv], &b.effects))).sum()
     }
 
-    /// The time derivative of the state under generalized forces `tau`.
-    pub fn rate(&self, state: &[f64], tau: &[f64], rate: &mut [f64]) {
+    /// The time derivative of the state.
+    pub fn rate(&self, state: &[f64], action: &Action, rate: &mut [f64]) {
         let (nq, nv) = (self.model.nq(), self.model.nv());
         let (q, qd, ..) = self.split(state);
         let q = unit_quaternions(&self.model, q);
-        let qdd = forward_dynamics_aba(&self.model, &q, qd, tau);
         rate[..nq].copy_from_slice(&self.configuration_rate(&q, qd));
-        rate[nq..nq + nv].copy_from_slice(&qdd);
-        rate[nq + nv] = tau.iter().zip(qd).map(|(tau, qd)| tau * qd).sum();
-        rate[nq + nv + 1] = self.losses(qd);
+        let after = nq + nv + self.drive_states();
+        if self.is_driven() {
+            let motion = self.driven(state, action);
+            rate[nq..nq + nv].copy_from_slice(&motion.qdd);
+            rate[nq + nv..after].copy_from_slice(&motion.xd);
+            rate[after + 2..].fill(0.0);
+            for flow in motion.flows {
+                rate[after + 2..].iter_mut().zip(flow.powers()).for_each(|(sum, power)| *sum += power);
+            }
+        } else {
+            rate[nq..nq + nv].copy_from_slice(&forward_dynamics_aba(&self.model, &q, qd, &action.tau));
+        }
+        rate[after] = action.tau.iter().zip(qd).map(|(tau, qd)| tau * qd).sum();
+        rate[after + 1] = self.losses(qd);
     }
 
     /// dq/dt: q̇ of joints; of a floating base R v and ½ quaternion ∘ ω.

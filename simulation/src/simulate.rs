@@ -1,13 +1,15 @@
 //! Simulation with adaptive steps: the motion that a command makes of a robot.
 //!
 //! The equations of [`Plant`] are integrated by an ODE library: an explicit method of order 8 with error control, or an implicit
-//! one of order 5 (Kværnø) for stiff systems. Where the command is not smooth the integration begins anew, and a joint
+//! one of order 5 (Radau IIA) for stiff systems. Where the command is not smooth the integration begins anew, and a joint
 //! that reaches the end of its range is located as a root between steps.
 
 use crate::command::Command;
-use crate::plant::Plant;
+use crate::drives::DriveEnergies;
+use crate::plant::{Action, Plant};
 use crate::table::Table;
 use differential_equations::prelude::*;
+use differential_equations::traits::State;
 use std::fmt;
 use straightline_core::algorithms::kinetic_energy;
 use straightline_core::model::{JointKind, Limits};
@@ -18,7 +20,7 @@ pub enum Method {
     /// Explicit Runge-Kutta of order 8 (Dormand and Prince), for smooth motion.
     #[default]
     Adaptive,
-    /// Implicit Runge-Kutta of order 5 (Kværnø, L-stable), for stiff springs, dampers and drives.
+    /// Implicit Runge-Kutta of order 5 (Radau IIA, Hairer and Wanner, L-stable), for stiff springs, dampers and drives.
     Stiff,
 }
 
@@ -46,7 +48,7 @@ pub struct Settings {
 #[derive(Clone, Debug)]
 pub struct Run {
     /// `t`, then per joint `q.`, `qd.`, `tau.` and, under a controller, `error.` (reference less measured), then `energy`, `work`
-    /// and `losses` \[J\].
+    /// and `losses` \[J\]; of a robot with drives per drive `u.` (after limits), `i.`, `speed.` and `m.` of its actuator before these.
     pub table: Table,
     /// The last configuration.
     pub q: Vec<f64>,
@@ -82,21 +84,28 @@ pub struct Balance {
     pub after: f64,
     /// Work of the given forces.
     pub work: f64,
-    /// Heat of friction.
+    /// Heat of friction in the joints.
     pub losses: f64,
+    /// What the drives took and lost.
+    pub drives: DriveEnergies,
     /// The greatest change of kinetic energy on the way.
     pub turnover: f64,
 }
 
 impl Balance {
-    /// What is missing \[J\]: change of energy + losses − work.
+    /// What is missing \[J\]: change of energy + losses − work, those of the drives with them.
     pub fn missing(&self) -> f64 {
-        (self.after - self.before) + self.losses - self.work
+        (self.after - self.before) + self.losses + self.drives.lost() - self.work - self.drives.electrical
     }
 
     /// The same by the energies that were turned over.
     pub fn relative(&self) -> f64 {
-        let scale = self.turnover.max(self.work.abs()).max(self.losses);
+        let scale = self
+            .turnover
+            .max(self.work.abs())
+            .max(self.losses)
+            .max(self.drives.electrical.abs())
+            .max(self.drives.lost());
         if scale == 0.0 {
             self.missing().abs()
         } else {
@@ -122,7 +131,7 @@ impl fmt::Display for Failure {
 
 impl std::error::Error for Failure {}
 
-/// Simulates from q, q̇ at time zero; `progress` hears the time as it goes on.
+/// Simulates from q, q̇ at time zero, drives with slack springs and without currents; `progress` hears the time as it goes on.
 ///
 /// # Errors
 /// The solver found no way on: numbers grew beyond all bounds, or steps became too small.
@@ -133,14 +142,37 @@ pub fn simulate(
     settings: &Settings,
     progress: &dyn Fn(f64),
 ) -> Result<Run, Failure> {
-    let mut state = plant.state(q, qd);
-    let before = plant.energy(q, qd);
+    simulate_from(plant, command, plant.state(q, qd), settings, progress)
+}
+
+/// Simulates from a state of [`Plant`] at time zero.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_from(
+    plant: &Plant,
+    command: &Command,
+    mut state: Vec<f64>,
+    settings: &Settings,
+    progress: &dyn Fn(f64),
+) -> Result<Run, Failure> {
+    let softened = (settings.method == Method::Stiff).then(|| plant.clone().with_soft_limits());
+    let plant = softened.as_ref().unwrap_or(plant);
+    let before = plant.stored(&state);
+    let (q, qd, ..) = plant.split(&state);
     let mut run = Run {
         table: Table { names: names(plant, command), rows: Vec::new() },
         q: q.to_vec(),
         qd: qd.to_vec(),
         stop: None,
-        balance: Balance { before, after: before, work: 0.0, losses: 0.0, turnover: 0.0 },
+        balance: Balance {
+            before,
+            after: before,
+            work: 0.0,
+            losses: 0.0,
+            drives: DriveEnergies::default(),
+            turnover: 0.0,
+        },
         steps: 0,
         evaluations: 0,
     };
@@ -150,15 +182,12 @@ pub fn simulate(
     };
     let wanted = rows(settings);
     let corners = pieces(command, period, settings.duration);
-    let row = |t: f64, state: &[f64], held: Option<&[f64]>| row(plant, command, t, state, held);
+    let row = |t: f64, state: &[f64], held: Option<&Action>| row(plant, command, t, state, held);
     run.table.rows.push(row(0.0, &state, None));
     for piece in corners.windows(2) {
         let (start, end) = (piece[0], piece[1]);
-        let held = period.map(|_| {
-            let (q, qd, ..) = plant.split(&state);
-            command.torques(start, q, qd)
-        });
-        let system = System { plant, command, held: held.as_deref(), progress };
+        let held = period.map(|_| command.action(plant, start, &state));
+        let system = System { plant, command, held: held.as_ref(), progress };
         let mut times: Vec<f64> = wanted.iter().copied().filter(|t| *t > start && *t < end).collect();
         times.push(end);
         let is_wanted = |t: f64| wanted.iter().any(|w| (w - t).abs() <= 1e-12 * settings.duration);
@@ -166,7 +195,7 @@ pub fn simulate(
         for (t, y) in solution.t.iter().zip(&solution.y) {
             let interrupted = *t < end && !times.contains(t);
             if is_wanted(*t) || interrupted {
-                run.table.rows.push(row(*t, y, held.as_deref()));
+                run.table.rows.push(row(*t, y, held.as_ref()));
             }
         }
         run.steps += solution.accepted;
@@ -183,12 +212,12 @@ pub fn simulate(
         }
     }
     let (q, qd, work, losses) = plant.split(&state);
-    let after = plant.energy(q, qd);
+    let after = plant.stored(&state);
     let nq = plant.model.nq();
     let kinetic = |row: &Vec<f64>| kinetic_energy(&plant.model, &row[1..=nq], &row[nq + 1..=nq + qd.len()]);
     let (least, most) = run.table.rows.iter().map(kinetic).fold((f64::MAX, 0.0f64), |(l, m), e| (l.min(e), m.max(e)));
     let turnover = most - least;
-    run.balance = Balance { before, after, work, losses, turnover };
+    run.balance = Balance { before, after, work, losses, drives: plant.drive_energies(&state), turnover };
     (run.q, run.qd) = (q.to_vec(), qd.to_vec());
     Ok(run)
 }
@@ -218,6 +247,12 @@ pub(crate) fn pieces(command: &Command, period: Option<f64>, duration: f64) -> V
     times
 }
 
+/// Columns of every drive.
+const DRIVE_COLUMNS: [&str; 4] = ["u", "i", "speed", "m"];
+/// Columns of all drives together: [`DriveEnergies`].
+const ENERGY_COLUMNS: [&str; DriveEnergies::COUNT] =
+    ["electrical", "joule", "motor_friction", "gear_losses", "damper_losses", "conversion"];
+
 pub(crate) fn names(plant: &Plant, command: &Command) -> Vec<String> {
     let mut joints: Vec<_> = plant.model.bodies.iter().map(|b| &b.joint).collect();
     joints.sort_by_key(|j| j.iv);
@@ -235,20 +270,40 @@ pub(crate) fn names(plant: &Plant, command: &Command) -> Vec<String> {
     if matches!(command, Command::Controller(_)) {
         names.extend(named("error", &[]));
     }
+    for prefix in if plant.is_driven() { &DRIVE_COLUMNS[..] } else { &[] } {
+        names.extend(plant.model.drives.iter().map(|d| format!("{prefix}.{}", d.name)));
+    }
     names.extend(["energy", "work", "losses"].map(str::to_string));
+    if plant.is_driven() {
+        names.extend(ENERGY_COLUMNS.map(str::to_string));
+    }
     names
 }
 
-pub(crate) fn row(plant: &Plant, command: &Command, t: f64, state: &[f64], held: Option<&[f64]>) -> Vec<f64> {
+pub(crate) fn row(plant: &Plant, command: &Command, t: f64, state: &[f64], held: Option<&Action>) -> Vec<f64> {
     let state = plant.normalised(state);
     let (q, qd, work, losses) = plant.split(&state);
-    let tau = held.map_or_else(|| command.torques(t, q, qd), <[f64]>::to_vec);
+    let action = held.map_or_else(|| command.action(plant, t, &state), Action::clone);
+    let driven = plant.is_driven().then(|| plant.driven(&state, &action));
+    let mut tau = action.tau;
+    if let Some(driven) = &driven {
+        tau.iter_mut().zip(&driven.tau).for_each(|(sum, tau)| *sum += tau);
+    }
     let mut row = [&[t], q, qd, &tau].concat();
     if let Command::Controller(controller) = command {
         let (r, ..) = controller.motion.at(t);
         row.extend(r.iter().zip(q).map(|(r, q)| r - q));
     }
-    row.extend([plant.energy(q, qd), work, losses]);
+    let flows = driven.as_ref().map_or(&[][..], |d| &d.flows);
+    row.extend(flows.iter().map(|f| f.voltage));
+    row.extend(flows.iter().map(|f| f.current));
+    row.extend(flows.iter().map(|f| f.speed));
+    row.extend(flows.iter().map(|f| f.torque));
+    row.extend([plant.stored(&state), work, losses]);
+    if driven.is_some() {
+        let e = plant.drive_energies(&state);
+        row.extend([e.electrical, e.joule, e.friction, e.gears, e.dampers, e.conversion]);
+    }
     row
 }
 
@@ -256,20 +311,38 @@ pub(crate) fn row(plant: &Plant, command: &Command, t: f64, state: &[f64], held:
 struct System<'a> {
     plant: &'a Plant,
     command: &'a Command,
-    held: Option<&'a [f64]>,
+    held: Option<&'a Action>,
     progress: &'a dyn Fn(f64),
+}
+
+/// What stands for a rate that is no number: so great that the step is rejected. The library takes the error of a step as small
+/// where it is no number.
+const BEYOND: f64 = 1e100;
+
+impl System<'_> {
+    fn rate(&self, t: f64, y: &[f64], rate: &mut [f64]) {
+        (self.progress)(t);
+        match self.held {
+            Some(action) => self.plant.rate(y, action, rate),
+            None => self.plant.rate(y, &self.command.action(self.plant, t, y), rate),
+        }
+        rate.iter_mut().filter(|x| !x.is_finite()).for_each(|x| *x = BEYOND);
+    }
 }
 
 impl ODE<f64, Vec<f64>> for System<'_> {
     fn diff(&self, t: f64, y: &Vec<f64>, dydt: &mut Vec<f64>) {
-        (self.progress)(t);
-        match self.held {
-            Some(tau) => self.plant.rate(y, tau, dydt),
-            None => {
-                let (q, qd, ..) = self.plant.split(y);
-                self.plant.rate(y, &self.command.torques(t, q, qd), dydt);
-            }
-        }
+        self.rate(t, y, dydt);
+    }
+}
+
+/// The same with room for N states, of which the first are used: the implicit method takes no state of a size that is known at run
+/// time only.
+impl<const N: usize> ODE<f64, [f64; N]> for System<'_> {
+    fn diff(&self, t: f64, y: &[f64; N], dydt: &mut [f64; N]) {
+        let n = self.plant.states();
+        dydt[n..].fill(0.0);
+        self.rate(t, &y[..n], &mut dydt[..n]);
     }
 }
 
@@ -287,28 +360,28 @@ impl Watch<'_> {
     }
 }
 
-impl Solout<f64, Vec<f64>> for Watch<'_> {
+impl<Y: State<f64> + AsRef<[f64]>> Solout<f64, Y> for Watch<'_> {
     fn solout<I>(
         &mut self,
         t: f64,
         t_before: f64,
-        y: &Vec<f64>,
-        y_before: &Vec<f64>,
+        y: &Y,
+        y_before: &Y,
         interpolator: &mut I,
-        solution: &mut Solution<f64, Vec<f64>>,
-    ) -> ControlFlag<f64, Vec<f64>>
+        solution: &mut Solution<f64, Y>,
+    ) -> ControlFlag<f64, Y>
     where
-        I: Interpolation<f64, Vec<f64>> + ?Sized,
+        I: Interpolation<f64, Y> + ?Sized,
     {
         let mut end = t;
-        let leaves = self.stops_at_limits && self.distance(y_before) > 0.0 && self.distance(y) <= 0.0;
+        let leaves = self.stops_at_limits && self.distance(y_before.as_ref()) > 0.0 && self.distance(y.as_ref()) <= 0.0;
         if leaves {
             // between steps by the method's own interpolation: bisection to the last bit of the time
             let (mut within, mut beyond) = (t_before, t);
             for _ in 0..60 {
                 let middle = 0.5 * (within + beyond);
                 match interpolator.interpolate(middle) {
-                    Ok(state) if self.distance(&state) > 0.0 => within = middle,
+                    Ok(state) if self.distance(state.as_ref()) > 0.0 => within = middle,
                     _ => beyond = middle,
                 }
             }
@@ -340,6 +413,8 @@ struct Solved {
     evaluations: usize,
 }
 
+/// States that the implicit method has room for.
+const MOST_STATES: usize = 128;
 /// Steps of one piece, at most.
 pub(crate) const MOST_STEPS: usize = 10_000_000;
 
@@ -354,31 +429,53 @@ impl System<'_> {
     ) -> Result<Solved, Failure> {
         let tolerance = settings.tolerance;
         let watch = Watch { plant: self.plant, times, next: 0, stops_at_limits: settings.stops_at_limits };
-        let problem = IVP::ode(self, start, end, state.to_vec()).solout(watch);
+        let tolerances = vec![tolerance; MOST_STATES.max(state.len())];
         // interpolation between steps is not under error control: steps are no longer than rows are apart
         macro_rules! solved {
-            ($method:expr) => {{
-                let method = $method.rtol(tolerance).atol(tolerance).h_max(settings.interval).max_steps(MOST_STEPS);
-                problem.method(method).solve()
+            ($method:expr, $state:expr) => {{
+                // one tolerance per component: the implicit method adapts a common one once for each of them
+                let method = $method.rtol(tolerances.clone()).atol(tolerances);
+                let method = method.h_max(settings.interval).max_steps(MOST_STEPS);
+                let solution = IVP::ode(self, start, end, $state).solout(watch).method(method).solve();
+                solution.map(|s| Solved::of(&s, state.len())).map_err(|error| failure(error, start))
             }};
         }
-        let solution = match settings.method {
-            Method::Adaptive => solved!(ExplicitRungeKutta::dop853()),
-            Method::Stiff => solved!(DiagonallyImplicitRungeKutta::kvaerno745()),
-        };
-        let solution = solution.map_err(|error| failure(error, start))?;
-        Ok(Solved {
+        macro_rules! implicit {
+            ($room:literal) => {{
+                let mut padded = [0.0; $room];
+                padded[..state.len()].copy_from_slice(state);
+                solved!(ImplicitRungeKutta::radau5().max_rejects(MOST_STEPS), padded)
+            }};
+        }
+        match (settings.method, state.len()) {
+            (Method::Adaptive, _) => solved!(ExplicitRungeKutta::dop853(), state.to_vec()),
+            (Method::Stiff, ..=16) => implicit!(16),
+            (Method::Stiff, ..=32) => implicit!(32),
+            (Method::Stiff, ..=64) => implicit!(64),
+            (Method::Stiff, ..=MOST_STATES) => implicit!(128),
+            (Method::Stiff, n) => {
+                let why = format!("{n} states are more than the {MOST_STATES} that the method `stiff` takes");
+                Err(Failure { time: start, why })
+            }
+        }
+    }
+}
+
+impl Solved {
+    /// From what the library gives, of which the first `states` components count.
+    fn of<Y: State<f64> + AsRef<[f64]>>(solution: &Solution<f64, Y>, states: usize) -> Solved {
+        Solved {
             interrupted: matches!(solution.status, Status::Interrupted),
             accepted: solution.steps.accepted,
             evaluations: solution.evals.function,
             t: solution.t.clone(),
-            y: solution.y.clone(),
-        })
+            y: solution.y.iter().map(|y| y.as_ref()[..states].to_vec()).collect(),
+        }
     }
 }
 
 /// What the solver says of a piece that began at `start` \[s\].
-pub(crate) fn failure(error: Error<f64, Vec<f64>>, start: f64) -> Failure {
+pub(crate) fn failure<Y: State<f64>>(error: Error<f64, Y>, start: f64) -> Failure {
     let (time, why) = match error {
         Error::MaxSteps { t, .. } => (t, format!("more than {MOST_STEPS} steps")),
         Error::StepSize { t, .. } => (t, "steps become too small: the motion is not smooth there".to_string()),

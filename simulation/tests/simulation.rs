@@ -1,8 +1,11 @@
 //! Simulations and analyses against closed forms and balances.
 
+mod common;
+
+use common::{arm, body, cart};
 use straightline_core::algorithms::forward_kinematics;
-use straightline_core::model::{Body, Coulomb, Frame, Joint, JointEffects, JointKind, Limits, Model};
-use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
+use straightline_core::model::{Coulomb, Joint, JointEffects, JointKind, Limits, Model};
+use straightline_core::spatial::Transform;
 use straightline_simulation::analysis::analyze;
 use straightline_simulation::cartesian::{joint_motion, NoPath};
 use straightline_simulation::command::{Command, Compensation, Controller, Samples};
@@ -10,56 +13,6 @@ use straightline_simulation::motion::Motion;
 use straightline_simulation::optimize::{minimise, Objective};
 use straightline_simulation::plant::Plant;
 use straightline_simulation::simulate::{simulate, Method, Run, Settings};
-
-fn body(name: &str, parent: Option<usize>, kind: JointKind, i: usize, placement: Transform<f64>) -> Body<f64> {
-    Body {
-        name: name.into(),
-        parent,
-        joint: Joint { name: format!("to_{name}"), kind, iq: i, iv: i, limits: Limits::default() },
-        placement,
-        inertia: SpatialInertia::new(
-            2.0,
-            Vec3::new(0.3, 0.05, -0.02),
-            Sym3 { xx: 0.02, xy: 0.002, xz: -0.001, yy: 0.05, yz: 0.003, zz: 0.045 },
-        ),
-        link_frame: Transform::identity(),
-        dense: false,
-        effects: JointEffects::none(),
-        load: None,
-    }
-}
-
-fn at(rotation: Mat3<f64>, x: f64) -> Transform<f64> {
-    Transform { rotation, translation: Vec3::new(x, 0.0, 0.0) }
-}
-
-/// 2 kg on a slide along x of the world.
-fn cart() -> Model<f64> {
-    let along_x = Mat3 { rows: [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
-    let bodies = vec![body("cart", None, JointKind::Prismatic, 0, at(along_x, 0.0))];
-    Model { name: "cart".into(), bodies, gravity: Vec3::new(0.0, 0.0, -9.81), frames: vec![], drives: vec![] }
-}
-
-/// Three joints about skew axes, with rotors, friction and springs.
-fn arm() -> Model<f64> {
-    let across = Mat3 { rows: [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]] };
-    let mut bodies = vec![
-        body("column", None, JointKind::Revolute, 0, at(Mat3::identity(), 0.0)),
-        body("upper", Some(0), JointKind::Revolute, 1, at(across, 0.1)),
-        body("fore", Some(1), JointKind::Revolute, 2, at(Mat3::identity(), 0.5)),
-    ];
-    for (i, body) in bodies.iter_mut().enumerate() {
-        body.effects = JointEffects {
-            rotor_inertia: Some(0.1 + 0.05 * i as f64),
-            damping: 0.2,
-            coulomb: Coulomb::Smooth { force: 0.3, speed: 0.05 },
-            stiffness: if i == 1 { 4.0 } else { 0.0 },
-            spring_rest: 0.2,
-        };
-    }
-    let tip = Frame { name: "tip".into(), body: Some(2), placement: at(Mat3::identity(), 0.4) };
-    Model { name: "arm".into(), bodies, gravity: Vec3::new(0.0, 0.0, -9.81), frames: vec![tip], drives: vec![] }
-}
 
 const SETTINGS: Settings =
     Settings { duration: 1.0, interval: 0.02, tolerance: 1e-11, method: Method::Adaptive, stops_at_limits: true };
@@ -172,6 +125,7 @@ fn computed_torque_with_the_right_model_leaves_the_error_of_a_linear_spring() {
         stiffness: vec![100.0; 3],
         damping: vec![20.0; 3],
         saturates: false,
+        gives_currents: false,
         period: None,
     };
     // critically damped from an error of 0.1: e = 0.1 (1 + 10 t) exp(−10 t)

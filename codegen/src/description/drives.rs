@@ -9,8 +9,10 @@ use toml::de::DeValue;
 
 const DRIVE: &[&str] =
     &["name", "joint", "ratio", "joints", "motor", "actuator", "stages", "efficiency", "limits", "rotor"];
-const MOTOR: &[&str] = &["torque_constant", "emf_constant", "resistance", "inductance", "rotor_inertia", "friction"];
+const MOTOR: &[&str] =
+    &["torque_constant", "emf_constant", "resistance", "inductance", "rotor_inertia", "friction", "thermal"];
 const ACTUATOR: &[&str] = &["C", "f", "d", "T", "position"];
+const THERMAL: &[&str] = &["winding_housing", "housing_ambient", "winding_time", "housing_time", "ambient", "limit"];
 const STAGE: &[&str] = &["ratio", "stiffness", "damping", "input_inertia", "output_inertia", "efficiency"];
 
 /// A value with its place, which says nothing of the value: equal and printed alike wherever it stands.
@@ -60,6 +62,36 @@ pub struct Drive {
     /// The link that carries the rotor, the axis in its frame and the inertia about it \[kg·m²\], where its turning in space
     /// counts.
     pub rotor: Option<(Noted<String>, [f64; 3], f64)>,
+    /// What it bears.
+    pub rating: Rating,
+}
+
+/// What an actuator bears: no part of the equations.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rating {
+    /// Greatest speed \[rad/s\].
+    pub speed: Option<f64>,
+    /// Greatest rms current \[A\].
+    pub continuous_current: Option<f64>,
+    /// How its winding heats.
+    pub thermal: Option<Thermal>,
+}
+
+/// Thermal data of a motor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Thermal {
+    /// \[K/W\]
+    pub winding_housing: f64,
+    /// \[K/W\]
+    pub housing_ambient: f64,
+    /// \[s\]
+    pub winding_time: f64,
+    /// \[s\]
+    pub housing_time: f64,
+    /// \[°C\]
+    pub ambient: f64,
+    /// \[°C\]
+    pub limit: Option<f64>,
 }
 
 /// What makes the torque.
@@ -169,14 +201,22 @@ impl Reader<'_> {
         let stages = self.stages(&table);
         let efficiency = self.efficiency(&table);
         let limits = self.table_at(&table, "limits", &format!("limits of {}", table.owner));
-        let (mut input_limit, mut current_limit) = (None, None);
+        let (mut input_limit, mut current_limit, mut rating) = (None, None, Rating::default());
         if let Some(limits) = limits {
-            self.check_keys(&limits, &["input", "current"]);
+            self.check_keys(&limits, &["input", "current", "continuous_current", "speed"]);
             input_limit = self.judged(&limits, "input", Must::BePositive);
             current_limit = self.judged(&limits, "current", Must::BePositive);
-            if let (true, Some((_, span))) = (table.has("actuator"), limits.get("current")) {
-                let known = ["input"];
-                self.complain(&span, messages::unknown_key(&limits.owner, "current", &known));
+            rating.continuous_current = self.judged(&limits, "continuous_current", Must::BePositive);
+            rating.speed = self.judged(&limits, "speed", Must::BePositive);
+            for key in ["current", "continuous_current"] {
+                if let (true, Some((_, span))) = (table.has("actuator"), limits.get(key)) {
+                    self.complain(&span, messages::unknown_key(&limits.owner, key, &["input", "speed"]));
+                }
+            }
+        }
+        if let Some(motor) = self.table_at(&table, "motor", &format!("motor of {}", table.owner)) {
+            if let Some(thermal) = self.table_at(&motor, "thermal", &format!("thermal data of {}", table.owner)) {
+                rating.thermal = self.thermal(&thermal);
             }
         }
         let (actuator, joints) = (actuator?, joints?);
@@ -200,6 +240,7 @@ impl Reader<'_> {
             input_limit,
             current_limit,
             rotor,
+            rating,
         })
     }
 
@@ -267,6 +308,28 @@ impl Reader<'_> {
             inductance: inductance?,
             rotor_inertia: rotor_inertia?,
             friction: friction?.unwrap_or(0.0),
+        })
+    }
+
+    fn thermal(&mut self, table: &Table) -> Option<Thermal> {
+        self.check_keys(table, THERMAL);
+        let mut needed = |key: &str| self.required(table, key, &format!("{key} = 2.0"), Must::BePositive);
+        let (winding_housing, housing_ambient) = (needed("winding_housing"), needed("housing_ambient"));
+        let (winding_time, housing_time) = (needed("winding_time"), needed("housing_time"));
+        let ambient = self.real_at(table, "ambient", Range64::Finite).map_or(25.0, |x| x.value);
+        let limit = self.real_at(table, "limit", Range64::Finite);
+        if let Some(limit) = limit.as_ref().filter(|limit| limit.value <= ambient) {
+            let (be, help) =
+                ("above the ambient temperature", "temperatures are in °C; `ambient` is 25 unless it is given");
+            self.diagnostics.push(messages::drive_number(&table.what("limit"), limit.value, be, help).at(&limit.place));
+        }
+        Some(Thermal {
+            winding_housing: winding_housing?,
+            housing_ambient: housing_ambient?,
+            winding_time: winding_time?,
+            housing_time: housing_time?,
+            ambient,
+            limit: limit.map(|x| x.value),
         })
     }
 

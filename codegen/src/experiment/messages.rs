@@ -31,6 +31,52 @@ pub fn column_unknown(column: &str, known: &[&str]) -> D {
     }
 }
 
+/// A column of no drive.
+pub fn column_of_no_drive(column: &str, known: &[&str]) -> D {
+    let d = D::error("column-unknown", format!("the column `{}` belongs to no drive", cut(column)));
+    let name = column.strip_prefix("i.").or(column.strip_prefix("u.")).unwrap_or(column);
+    match did_you_mean(name, known.iter().copied()) {
+        Some(hint) => d.help(hint),
+        None => d.help(format!("drives: {}; voltages begin with `u.`, currents with `i.`", list(known))),
+    }
+}
+
+/// A current for an actuator that is no motor.
+pub fn current_without_motor(drive: &str) -> D {
+    D::error("current-without-motor", format!("drive `{}` is no motor and takes no current", cut(drive)))
+        .help(format!("name its input `u.{}`", cut(drive)))
+}
+
+/// Two columns of one drive.
+pub fn two_inputs(drive: &str) -> D {
+    D::error("two-inputs", format!("drive `{}` has two columns", cut(drive)))
+        .help("a drive follows a voltage or a current, not both")
+}
+
+/// A key for drives, of a robot without.
+pub fn no_drives(key: &str) -> D {
+    D::error("no-drives", format!("`{key}` is for drives, and the robot has none"))
+        .help("drives are tables [[drive]] of the robot file or of a scene: --scene")
+}
+
+/// A state of the drives of another length.
+pub fn drive_states(found: usize, wanted: usize, states: &[String]) -> D {
+    D::error("drive-states", format!("{found} numbers for the {wanted} states of the drives"))
+        .help(format!("in the order {}", states.join(", ")))
+}
+
+/// A controller that knows other drives.
+pub fn other_drives(known: usize, there: usize) -> D {
+    D::error("other-drives", format!("the controller's robot has {known} drives, the driven one {there}"))
+        .help("give both the same [[drive]] tables")
+}
+
+/// Drives whose inputs no motion gives.
+pub fn inputs_do_not_follow() -> D {
+    D::error("inputs-do-not-follow", "the inputs of these drives do not follow from a motion")
+        .help("as many drives as joints that they move are needed, and rotors in space on rigid transmissions alone")
+}
+
 /// An entry that is no finite number.
 pub fn not_a_number(column: &str, text: &str) -> D {
     D::error("not-a-number", format!("column `{}`: `{}` is not a finite number", cut(column), cut(text)))

@@ -13,9 +13,12 @@ use crate::description::messages::unknown_frame;
 use crate::description::reader::{Range64, Reader};
 use crate::description::table::{parse, Table};
 use crate::diagnostic::{Diagnostics, Place, Source};
+use straightline_core::algorithms::drive_states;
+use straightline_core::drive::Actuator;
 use straightline_core::model::{Joint, JointKind, Model};
 use straightline_simulation::cartesian::joint_motion;
 use straightline_simulation::command::{Command, Compensation, Controller, Samples};
+use straightline_simulation::drives::{further_derivatives, Inputs};
 use straightline_simulation::motion::{Motion, NoMotion};
 use straightline_simulation::simulate::{Method, Settings};
 use toml::de::DeValue;
@@ -31,6 +34,8 @@ pub struct Experiment {
     pub q: Vec<f64>,
     /// Velocity at the beginning.
     pub qd: Vec<f64>,
+    /// State of the drives at the beginning, if the file gives it.
+    pub x: Option<Vec<f64>>,
     /// How it is simulated.
     pub settings: Settings,
     /// Speed at which Coulomb friction has reached 71 % \[rad/s or m/s\], where it is not smooth already.
@@ -111,12 +116,19 @@ fn from_samples(
         let motion = sampled_motion(&columns, model, &place, diagnostics)?;
         let (q, qd, _) = motion.at(motion.times[0]);
         let settings = settings(motion.duration());
-        return Some(Experiment { motion: Some(motion), command: Command::Free, q, qd, settings, coulomb_speed: 1e-3 });
+        return Some(Experiment {
+            motion: Some(motion),
+            command: Command::Free,
+            q,
+            qd,
+            x: None,
+            settings,
+            coulomb_speed: 1e-3,
+        });
     }
-    let samples = torques(&columns, model, &place, diagnostics)?;
-    let last = samples.times.last().copied().unwrap_or(0.0);
-    let (command, qd) = (Command::Torques(samples), vec![0.0; model.nv()]);
-    Some(Experiment { motion: None, command, q, qd, settings: settings(last), coulomb_speed: 1e-3 })
+    let last = columns.get("t")?.last().copied().unwrap_or(0.0);
+    let (command, qd) = (sampled_command(columns, model, &place, diagnostics)?, vec![0.0; model.nv()]);
+    Some(Experiment { motion: None, command, q, qd, x: None, settings: settings(last), coulomb_speed: 1e-3 })
 }
 
 /// Torques over time: per joint a column `tau.JOINT` or `JOINT`; joints without one are free.
@@ -133,6 +145,58 @@ fn torques(columns: &Columns, model: &Model<f64>, place: &Place, diagnostics: &m
         rows.iter_mut().zip(column).for_each(|(row, x)| row[joint.iv] = *x);
     }
     Some(Samples { times, rows })
+}
+
+/// Torques and inputs of drives from the columns of one file: those of drives begin with `u.` or `i.`.
+fn sampled_command(
+    columns: Columns,
+    model: &Model<f64>,
+    place: &Place,
+    diagnostics: &mut Diagnostics,
+) -> Option<Command> {
+    let is_input = |name: &str| !model.drives.is_empty() && INPUT_PREFIXES.iter().any(|p| name.starts_with(p));
+    let of = |wants_inputs: bool| Columns {
+        columns: columns.columns.iter().filter(|(n, _)| n == "t" || is_input(n) == wants_inputs).cloned().collect(),
+    };
+    let (inputs, others) = (of(true), of(false));
+    let torques = match others.columns.len() {
+        1 => None,
+        _ => Some(torques(&others, model, place, diagnostics)?),
+    };
+    match inputs.columns.len() {
+        1 => torques.map(Command::Torques).or(Some(Command::Free)),
+        _ => Some(Command::Inputs(drive_inputs(&inputs, model, place, diagnostics)?, torques)),
+    }
+}
+
+/// How columns of drives begin: voltages, or whatever the inputs are, and currents.
+const INPUT_PREFIXES: [&str; 2] = ["u.", "i."];
+
+/// Inputs of drives over time: per drive a column `u.DRIVE`, `DRIVE` (volts, or the input's unit) or `i.DRIVE` (amperes, of a motor);
+/// drives without one have the input zero.
+fn drive_inputs(columns: &Columns, model: &Model<f64>, place: &Place, diagnostics: &mut Diagnostics) -> Option<Inputs> {
+    let times = columns.get("t")?.to_vec();
+    let mut rows = vec![vec![0.0; model.drives.len()]; times.len()];
+    let mut are_currents = vec![false; model.drives.len()];
+    let mut given = are_currents.clone();
+    let known: Vec<&str> = model.drives.iter().map(|d| d.name.as_str()).collect();
+    for (name, column) in columns.columns.iter().filter(|(name, _)| name != "t") {
+        let current = name.strip_prefix("i.");
+        let drive = current.or(name.strip_prefix("u.")).unwrap_or(name);
+        let Some(k) = known.iter().position(|n| *n == drive) else {
+            diagnostics.push(say::column_of_no_drive(name, &known).at(place));
+            continue;
+        };
+        if current.is_some() && !matches!(model.drives[k].actuator, Actuator::Motor(_)) {
+            diagnostics.push(say::current_without_motor(drive).at(place));
+        }
+        if given[k] {
+            diagnostics.push(say::two_inputs(drive).at(place));
+        }
+        (given[k], are_currents[k]) = (true, current.is_some());
+        rows.iter_mut().zip(column).for_each(|(row, x)| row[k] = *x);
+    }
+    Some(Inputs { samples: Samples { times, rows }, are_currents })
 }
 
 /// A motion from samples: per joint a column `q.JOINT` or `JOINT`; where all have `qd.` and `qdd.` as well, these count.
@@ -182,40 +246,54 @@ fn from_toml(
     let document = parse(source, diagnostics)?;
     let top = Table { owner: "an experiment".to_string(), table: document.get_ref(), span: 0..0 };
     let mut r = ExperimentReader { reader: Reader::new(source, diagnostics), model, controller_model, read_file };
-    let keys = [&["motion", "controller", "torques", "start", "simulation"][..], &contact::TABLES].concat();
+    let keys = [&["motion", "controller", "torques", "inputs", "start", "simulation"][..], &contact::TABLES].concat();
     r.reader.check_keys(&top, &keys);
     let table = |r: &mut ExperimentReader, key: &str| r.reader.table_at(&top, key, &format!("[{key}]"));
     let start = table(&mut r, "start");
     if let Some(start) = &start {
-        r.reader.check_keys(start, &["q", "qd"]);
+        r.reader.check_keys(start, &["q", "qd", "x"]);
     }
     let of_start = |r: &mut ExperimentReader, key: &str, n: usize| {
         start.as_ref().and_then(|start| r.numbers(start, key, n)).filter(|numbers| !numbers.is_empty())
     };
     let q = of_start(&mut r, "q", model.nq());
     let qd = of_start(&mut r, "qd", model.nv());
+    let x = match &start {
+        Some(start) if start.has("x") => r.drive_state(start),
+        _ => None,
+    };
     let has_motion = top.has("motion");
     let motion = table(&mut r, "motion").and_then(|motion| r.motion(&motion, q.as_deref()));
+    let inputs = table(&mut r, "inputs").map(|inputs| r.inputs(&inputs));
     let command = match (table(&mut r, "controller"), table(&mut r, "torques")) {
-        (Some(controller), Some(_)) => {
+        (Some(controller), torques) if torques.is_some() || inputs.is_some() => {
             r.reader.complain(&controller.span, say::controller_and_torques());
             None
         }
-        (Some(controller), None) => {
+        (Some(controller), _) => {
             if !has_motion {
                 r.reader.complain(&controller.span, say::motion_missing());
             }
             r.controller(&controller, motion.clone())
         }
-        (None, Some(torques)) => r.torques(&torques),
-        (None, None) => Some(Command::Free),
+        (None, torques) => {
+            let torques = torques.map(|torques| r.torques(&torques));
+            match (inputs, torques) {
+                (None, None) => Some(Command::Free),
+                (None, Some(torques)) => torques.map(Command::Torques),
+                (Some(inputs), None) => inputs.map(|inputs| Command::Inputs(inputs, None)),
+                (Some(inputs), Some(torques)) => inputs.zip(torques).map(|(u, tau)| Command::Inputs(u, Some(tau))),
+            }
+        }
     };
     let from_motion = motion.as_ref().map(|motion| motion.at(motion.times[0]));
     let q = q.or_else(|| from_motion.as_ref().map(|m| m.0.clone())).unwrap_or_else(|| zero(model));
     let qd = qd.or_else(|| from_motion.as_ref().map(|m| m.1.clone())).unwrap_or_else(|| vec![0.0; model.nv()]);
     let last = match (&motion, &command) {
         (Some(motion), _) => motion.duration(),
-        (None, Some(Command::Torques(samples))) => samples.times.last().copied().unwrap_or(1.0),
+        (None, Some(Command::Torques(samples) | Command::Inputs(Inputs { samples, .. }, _))) => {
+            samples.times.last().copied().unwrap_or(1.0)
+        }
         _ => 1.0,
     };
     let (mut settings, mut coulomb_speed) = (settings(last), 1e-3);
@@ -229,7 +307,22 @@ fn from_toml(
         settings.method = r.reader.word_at(&table, "method", &Method::WORDS).map_or(settings.method, |m| m.value);
         settings.stops_at_limits = r.reader.flag_at(&table, "stop_at_limits").is_none_or(|flag| flag.value);
     }
-    Some(Experiment { motion, command: command?, q, qd, settings, coulomb_speed })
+    let command = command?;
+    let x = x.map(|x| without_currents(model, &x, &command.current_inputs(model.drives.len())));
+    Some(Experiment { motion, command, q, qd, x, settings, coulomb_speed })
+}
+
+/// The state of drives without the currents of those that an amplifier feeds: they are inputs.
+fn without_currents(model: &Model<f64>, x: &[f64], are_currents: &[bool]) -> Vec<f64> {
+    let mut rest = x;
+    let mut kept = Vec::new();
+    for (drive, is_current) in model.drives.iter().zip(are_currents) {
+        let (own, others) = rest.split_at(drive.states());
+        let has_state = matches!(&drive.actuator, Actuator::Motor(m) if m.inductance.is_some());
+        kept.extend(own.iter().enumerate().filter(|(i, _)| !(*is_current && has_state && *i == 2)).map(|(_, x)| x));
+        rest = others;
+    }
+    kept
 }
 
 struct ExperimentReader<'a> {
@@ -282,11 +375,40 @@ impl ExperimentReader<'_> {
         samples::read(&source, self.reader.diagnostics).map(|columns| (columns, file.place))
     }
 
-    fn torques(&mut self, table: &Table) -> Option<Command> {
+    fn torques(&mut self, table: &Table) -> Option<Samples> {
         self.reader.check_keys(table, &["file"]);
         self.reader.require(table, "file", "file = \"torques.csv\"");
         let (columns, place) = self.samples(table)?;
-        torques(&columns, self.model, &place, self.reader.diagnostics).map(Command::Torques)
+        torques(&columns, self.model, &place, self.reader.diagnostics)
+    }
+
+    fn inputs(&mut self, table: &Table) -> Option<Inputs> {
+        self.reader.check_keys(table, &["file"]);
+        self.reader.require(table, "file", "file = \"voltages.csv\"");
+        if self.model.drives.is_empty() {
+            self.reader.complain(&table.span, say::no_drives("inputs"));
+            return None;
+        }
+        let (columns, place) = self.samples(table)?;
+        drive_inputs(&columns, self.model, &place, self.reader.diagnostics)
+    }
+
+    /// The state of the drives, all of it.
+    fn drive_state(&mut self, start: &Table) -> Option<Vec<f64>> {
+        let (_, span) = start.get("x")?;
+        let n = drive_states(self.model);
+        if n == 0 {
+            self.reader.complain(&span, say::no_drives("x"));
+            return None;
+        }
+        let x = self.reader.all_reals_at(start, "x", Range64::Finite)?;
+        if x.len() != n {
+            let of = |d: &straightline_core::drive::Drive<f64>| format!("{} of {}", d.states(), d.name);
+            let states: Vec<String> = self.model.drives.iter().map(of).collect();
+            self.reader.complain(&span, say::drive_states(x.len(), n, &states));
+            return None;
+        }
+        Some(x)
     }
 
     fn motion(&mut self, table: &Table, start: Option<&[f64]>) -> Option<Motion> {
@@ -297,7 +419,7 @@ impl ExperimentReader<'_> {
             return None;
         }
         self.reader.require(table, "kind", "kind = \"quintic\"");
-        let words = [("cubic", 0), ("quintic", 1), ("trapezoidal", 2), ("samples", 3)];
+        let words = [("cubic", 0), ("quintic", 1), ("trapezoidal", 2), ("samples", 3), ("smooth", 4)];
         let kind = self.reader.word_at(table, "kind", &words)?.value;
         if kind == 3 {
             self.reader.require(table, "file", "file = \"motion.csv\"");
@@ -350,6 +472,7 @@ impl ExperimentReader<'_> {
         let motion = match kind {
             0 => Motion::cubic(&times, &points),
             1 => Motion::quintic(&times, &points),
+            4 => Motion::smooth(&times, &points),
             _ => {
                 let (speed, acceleration) = self.speeds(table, n, frame.is_some())?;
                 Motion::trapezoidal(&points, &speed, &acceleration)
@@ -396,7 +519,7 @@ impl ExperimentReader<'_> {
     }
 
     fn controller(&mut self, table: &Table, motion: Option<Motion>) -> Option<Command> {
-        self.reader.check_keys(table, &["compensation", "stiffness", "damping", "saturate", "period"]);
+        self.reader.check_keys(table, &["compensation", "stiffness", "damping", "saturate", "period", "amplifier"]);
         let n = self.model.nv();
         let compensation =
             self.reader.word_at(table, "compensation", &Compensation::WORDS).map_or(Compensation::None, |w| w.value);
@@ -412,12 +535,29 @@ impl ExperimentReader<'_> {
         }
         let saturates = self.reader.flag_at(table, "saturate").is_some_and(|flag| flag.value);
         let period = table.has("period").then(|| self.number(table, "period", 1e-3, (1e-6, 10.0)));
+        let words = [("voltage", false), ("current", true)];
+        let gives_currents = self.reader.word_at(table, "amplifier", &words).is_some_and(|word| word.value);
+        let drives = &self.controller_model.drives;
+        if drives.len() != self.model.drives.len() {
+            let complaint = say::other_drives(drives.len(), self.model.drives.len());
+            self.reader.complain(&table.span, complaint);
+            return None;
+        }
+        if drives.is_empty() {
+            if let (true, Some((_, span))) = (table.has("amplifier"), table.get("amplifier")) {
+                self.reader.complain(&span, say::no_drives("amplifier"));
+            }
+        } else if further_derivatives(self.controller_model).is_none() {
+            self.reader.complain(&table.span, say::inputs_do_not_follow());
+            return None;
+        }
         let motion = motion?;
         if stiffness.len() != n || damping.len() != n {
             return None;
         }
         let model = self.controller_model.clone();
-        let controller = Controller { model, compensation, motion, stiffness, damping, saturates, period };
+        let controller =
+            Controller { model, compensation, motion, stiffness, damping, saturates, gives_currents, period };
         Some(Command::Controller(Box::new(controller)))
     }
 }

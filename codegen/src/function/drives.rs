@@ -180,8 +180,8 @@ impl DriveFunction {
         };
         match self {
             ForwardDynamics => {
-                let (qdd, xd) = alg::driven_motion(model, at(), &bias(), &links);
-                [qdd, xd].concat()
+                let motion = alg::driven_motion(model, at(), &bias(), &links);
+                [motion.qdd, motion.xd].concat()
             }
             Torques => {
                 let (tau, m) = alg::drive_torques(model, at(), &bias(), &links);

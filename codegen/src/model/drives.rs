@@ -5,7 +5,7 @@ use crate::description::drives::{self as written, Noted};
 use crate::description::messages;
 use crate::diagnostic::Diagnostics;
 use std::collections::BTreeSet;
-use straightline_core::drive::{Actuator, Drive, Efficiency, LinearActuator, Motor, Rotor, Stage};
+use straightline_core::drive::{Actuator, Drive, Efficiency, LinearActuator, Motor, Rating, Rotor, Stage, Thermal};
 use straightline_core::model::{BodyId, JointKind, Model};
 use straightline_core::spatial::Vec3;
 use straightline_core::Dd;
@@ -64,7 +64,9 @@ fn build(drive: &written::Drive, model: &Model<Dd>, diagnostics: &mut Diagnostic
         shares: None,
         input_limit: drive.input_limit.map(Dd::from),
         current_limit: drive.current_limit.map(Dd::from),
+        soft_current: None,
         rotor,
+        rating: rating(&drive.rating),
     };
     let is_elastic = drive.stages.iter().any(|s| s.stiffness.is_some());
     if let (true, Actuator::Linear(LinearActuator { position: None, .. })) = (is_elastic, &built.actuator) {
@@ -73,6 +75,22 @@ fn build(drive: &written::Drive, model: &Model<Dd>, diagnostics: &mut Diagnostic
         return None;
     }
     fold_stages(drive, &mut built, diagnostics).then_some(built)
+}
+
+fn rating(written: &written::Rating) -> Rating<Dd> {
+    let thermal = |t: &written::Thermal| Thermal {
+        winding_housing: Dd::from(t.winding_housing),
+        housing_ambient: Dd::from(t.housing_ambient),
+        winding_time: Dd::from(t.winding_time),
+        housing_time: Dd::from(t.housing_time),
+        ambient: Dd::from(t.ambient),
+        limit: t.limit.map(Dd::from),
+    };
+    Rating {
+        speed: written.speed.map(Dd::from),
+        continuous_current: written.continuous_current.map(Dd::from),
+        thermal: written.thermal.as_ref().map(thermal),
+    }
 }
 
 fn body(owner: &str, joint: &Noted<String>, model: &Model<Dd>, diagnostics: &mut Diagnostics) -> Option<BodyId> {
@@ -175,13 +193,15 @@ fn fold_stages(drive: &written::Drive, built: &mut Drive<Dd>, diagnostics: &mut 
 }
 
 fn efficiency([forward, backward]: [f64; 2]) -> Efficiency<Dd> {
-    Efficiency { forward: Dd::from(forward), backward: Dd::from(backward) }
+    Efficiency { forward: Dd::from(forward), backward: Dd::from(backward), speed: None }
 }
 
 /// Two gears one after the other.
 fn both(a: Option<Efficiency<Dd>>, b: Option<Efficiency<Dd>>) -> Option<Efficiency<Dd>> {
     match (a, b) {
-        (Some(a), Some(b)) => Some(Efficiency { forward: a.forward * b.forward, backward: a.backward * b.backward }),
+        (Some(a), Some(b)) => {
+            Some(Efficiency { forward: a.forward * b.forward, backward: a.backward * b.backward, speed: None })
+        }
         (a, b) => a.or(b),
     }
 }

@@ -38,8 +38,63 @@ pub struct Drive<T> {
     pub input_limit: Option<T>,
     /// Greatest |i| \[A\].
     pub current_limit: Option<T>,
+    /// Part of the limit within which an inductive current is slowed down gradually, for implicit integrators, which find no solution
+    /// where a derivative jumps. `None`: it stops at the limit.
+    pub soft_current: Option<T>,
     /// A rotor on a moving link whose turning in space counts.
     pub rotor: Option<Rotor<T>>,
+    /// What it bears: no part of the equations.
+    pub rating: Rating<T>,
+}
+
+/// What an actuator bears.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rating<T> {
+    /// Greatest speed \[rad/s\].
+    pub speed: Option<T>,
+    /// Greatest root of the mean square of the current \[A\].
+    pub continuous_current: Option<T>,
+    /// How it heats.
+    pub thermal: Option<Thermal<T>>,
+}
+
+/// A motor that heats as two bodies: its winding, and its housing between that and the air.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Thermal<T> {
+    /// Thermal resistance from winding to housing \[K/W\].
+    pub winding_housing: T,
+    /// Thermal resistance from housing to air \[K/W\].
+    pub housing_ambient: T,
+    /// Thermal time constant of the winding \[s\].
+    pub winding_time: T,
+    /// Thermal time constant of the housing \[s\].
+    pub housing_time: T,
+    /// Temperature of the air \[°C\].
+    pub ambient: T,
+    /// Greatest temperature of the winding \[°C\].
+    pub limit: Option<T>,
+}
+
+impl<T: Real> Rating<T> {
+    /// Nothing is known.
+    pub fn none() -> Self {
+        Rating { speed: None, continuous_current: None, thermal: None }
+    }
+
+    fn map<U: Real>(&self, mut g: impl FnMut(T) -> U) -> Rating<U> {
+        Rating {
+            speed: self.speed.map(&mut g),
+            continuous_current: self.continuous_current.map(&mut g),
+            thermal: self.thermal.as_ref().map(|t| Thermal {
+                winding_housing: g(t.winding_housing),
+                housing_ambient: g(t.housing_ambient),
+                winding_time: g(t.winding_time),
+                housing_time: g(t.housing_time),
+                ambient: g(t.ambient),
+                limit: t.limit.map(&mut g),
+            }),
+        }
+    }
 }
 
 /// What makes the torque of a drive.
@@ -108,6 +163,16 @@ pub struct Efficiency<T> {
     pub forward: T,
     /// η″, above 0, at most 1.
     pub backward: T,
+    /// Speed w \[rad/s\] of the shaft before the gear: v/√(v² + w²) stands for the sign of its speed v. `None`: the sign itself,
+    /// under which a gear may stick and no equation of motion is left.
+    pub speed: Option<T>,
+}
+
+impl<T: Real> Efficiency<T> {
+    /// Every number through `g`.
+    pub fn map<U: Real>(&self, mut g: impl FnMut(T) -> U) -> Efficiency<U> {
+        Efficiency { forward: g(self.forward), backward: g(self.backward), speed: self.speed.map(g) }
+    }
 }
 
 /// A rotor that turns in space with the link that carries it: its spin θ̇ about the axis couples to the link's ω.
@@ -146,19 +211,21 @@ impl<T: Real> Drive<T> {
             stiffness: g(s.stiffness),
             damping: s.damping.map(&mut *g),
             inertia: g(s.inertia),
-            efficiency: s.efficiency.map(|e| Efficiency { forward: g(e.forward), backward: g(e.backward) }),
+            efficiency: s.efficiency.map(|e| e.map(&mut *g)),
         };
         Drive {
             name: self.name.clone(),
             actuator: self.actuator.map(&mut g),
             stages: self.stages.iter().map(|s| stage(s, &mut g)).collect(),
             shaft_inertia: self.shaft_inertia.map(&mut g),
-            efficiency: self.efficiency.map(|e| Efficiency { forward: g(e.forward), backward: g(e.backward) }),
+            efficiency: self.efficiency.map(|e| e.map(&mut g)),
             joints: self.joints.iter().map(|(b, n)| (*b, g(*n))).collect(),
             shares: self.shares.as_ref().map(|row| row.iter().map(|(b, n)| (*b, g(*n))).collect()),
             input_limit: self.input_limit.map(&mut g),
             current_limit: self.current_limit.map(&mut g),
+            soft_current: self.soft_current.map(&mut g),
             rotor: self.rotor.map(|r| Rotor { body: r.body, axis: r.axis.map(&mut g), inertia: g(r.inertia) }),
+            rating: self.rating.map(&mut g),
         }
     }
 }

@@ -4,7 +4,8 @@ use super::events::objects_at_rest;
 use super::state::{Closed, Phases, Slip, System, GUARDS};
 use super::{Contacts, Event};
 use crate::command::Command;
-use crate::plant::Plant;
+use crate::drives::DriveEnergies;
+use crate::plant::{Action, Plant};
 use crate::simulate::{self, Balance, Failure, Method, Run, Settings, MOST_STEPS};
 use differential_equations::prelude::*;
 use std::cell::RefCell;
@@ -58,7 +59,14 @@ pub fn simulate(
         q: q.to_vec(),
         qd: qd.to_vec(),
         stop: None,
-        balance: Balance { before, after: before, work: 0.0, losses: 0.0, turnover: 0.0 },
+        balance: Balance {
+            before,
+            after: before,
+            work: 0.0,
+            losses: 0.0,
+            drives: DriveEnergies::default(),
+            turnover: 0.0,
+        },
         steps: 0,
         evaluations: 0,
     };
@@ -102,7 +110,8 @@ pub fn simulate(
     let (q, qd, work, losses) = plant.split(&going.state);
     let kinetic = run.table.column("kinetic").unwrap_or_default();
     let (least, most) = kinetic.iter().fold((f64::MAX, 0.0f64), |(l, h), e| (l.min(*e), h.max(*e)));
-    run.balance = Balance { before, after, work, losses, turnover: most - least };
+    let drives = DriveEnergies::default();
+    run.balance = Balance { before, after, work, losses, drives, turnover: most - least };
     (run.q, run.qd) = (q.to_vec(), qd.to_vec());
     Ok(ContactRun { run, events: going.events, drift })
 }
@@ -262,7 +271,8 @@ impl Going<'_> {
 
     fn row(&self, t: f64, held: Option<&[f64]>) -> Vec<f64> {
         let system = &self.system;
-        let mut row = simulate::row(system.plant, self.command, t, &self.state, held);
+        let action = held.map(|tau| Action { tau: tau.to_vec(), u: Vec::new() });
+        let mut row = simulate::row(system.plant, self.command, t, &self.state, action.as_ref());
         let objects = system.energy_of_objects(t, &self.state, &self.phases);
         let energy = row.len() - 3;
         row[energy] += objects;

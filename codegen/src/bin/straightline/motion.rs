@@ -12,10 +12,13 @@ use straightline_codegen::description::{self, Description};
 use straightline_codegen::diagnostic::{Diagnostics, Severity, Source};
 use straightline_codegen::experiment::{self, parameter, Experiment};
 use straightline_codegen::{model, output, scene};
+use straightline_core::drive::Actuator;
 use straightline_core::model::Model;
 use straightline_simulation::analysis::{self, Analysis};
 use straightline_simulation::command::Command;
 use straightline_simulation::contact as in_contact;
+use straightline_simulation::drive_analysis::{torque_limits, DriveAnalysis, DriveFigures, Heating};
+use straightline_simulation::drives::state_of_motion;
 use straightline_simulation::html::Page;
 use straightline_simulation::motion::Motion;
 use straightline_simulation::optimize;
@@ -96,6 +99,21 @@ fn drawn(plot: &Plot) -> Result<String, Failure> {
     })
 }
 
+/// The state at the beginning: drives as the file says, else, where the robot starts in the motion that a controller follows, as that
+/// motion has them, else with slack springs and without currents.
+fn start(plant: &Plant, experiment: &Experiment) -> Vec<f64> {
+    let (q, qd) = (&experiment.q[..], &experiment.qd[..]);
+    let x = experiment.x.clone().or_else(|| match &experiment.command {
+        Command::Controller(controller) if plant.is_driven() => {
+            let first = controller.motion.times[0];
+            let (r, rd, _) = controller.motion.at(first);
+            (r == q && rd == qd).then(|| state_of_motion(&plant.model, &controller.motion, first)).flatten()
+        }
+        _ => None,
+    });
+    x.map_or_else(|| plant.state(q, qd), |x| plant.state_with(q, qd, &x))
+}
+
 pub fn simulate(a: &Simulate) -> Result<(), Failure> {
     let (_, options, model) = robot(&a.robot, &a.model)?;
     let controller_model = match &a.controller_robot {
@@ -112,18 +130,30 @@ pub fn simulate(a: &Simulate) -> Result<(), Failure> {
     };
     let experiment = experiment(&a.input, &model, &controller_model, true)?;
     let contacts = contact::read(&a.input, &model, &options.scene.contacts)?;
-    let plant = Plant::new(model, experiment.coulomb_speed);
+    let currents = experiment.command.current_inputs(model.drives.len());
+    let plant = Plant::new(model, experiment.coulomb_speed).with_current_inputs(&currents);
     let bar = print::bar("simulating", 1000);
     let duration = experiment.settings.duration;
     let progress = |t: f64| bar.set_position((t / duration * 1000.0) as u64);
-    let start = (&experiment.q[..], &experiment.qd[..]);
     if !contacts.is_empty() {
-        let settings = &experiment.settings;
+        if plant.is_driven() {
+            bar.finish_and_clear();
+            print::error("the robot has drives, and contacts are simulated under torques: not both at once");
+            print::help("leave [[drive]] or [[contact]] out of the scene");
+            return Err(Failure::Input);
+        }
+        let (settings, start) = (&experiment.settings, (&experiment.q[..], &experiment.qd[..]));
         let run = in_contact::simulate(&plant, &contacts, &experiment.command, start, settings, &progress);
         bar.finish_and_clear();
         return contact::finish(a, &plant, &contacts, run);
     }
-    let run = simulate::simulate(&plant, &experiment.command, start, &experiment.settings, &progress);
+    let run = simulate::simulate_from(
+        &plant,
+        &experiment.command,
+        start(&plant, &experiment),
+        &experiment.settings,
+        &progress,
+    );
     bar.finish_and_clear();
     let run = run.map_err(|failure| failed(&failure))?;
     if let Some(path) = &a.output {
@@ -153,7 +183,23 @@ pub fn print_run(plant: &Plant, run: &simulate::Run) -> Result<(), Failure> {
         writeln!(out, "stopped at {} s: joint {} reaches its limit {}", stop.time, stop.joint, stop.limit)?;
     }
     writeln!(out, "energy [J]: {:.9} before, {:.9} after", balance.before, balance.after)?;
-    writeln!(out, "work of the drives {:.9}, heat of friction {:.9}", balance.work, balance.losses)?;
+    match plant.is_driven() {
+        false => writeln!(out, "work of the drives {:.9}, heat of friction {:.9}", balance.work, balance.losses)?,
+        true => {
+            let e = balance.drives;
+            writeln!(out, "electrical input {:.9}, work of other forces {:.9}", e.electrical, balance.work)?;
+            writeln!(
+                out,
+                "Joule heat {:.9}, friction in motors {:.9}, in joints {:.9}",
+                e.joule, e.friction, balance.losses
+            )?;
+            writeln!(
+                out,
+                "losses of gears {:.9}, of dampers {:.9}, of conversion {:.9}",
+                e.gears, e.dampers, e.conversion
+            )?;
+        }
+    }
     writeln!(out, "missing {:.2e}, {:.2e} of what was turned over", balance.missing(), balance.relative())?;
     Ok(())
 }
@@ -237,9 +283,12 @@ fn optimized(a: &Analyze, description: &Description, options: &Options, motion: 
 }
 
 fn joined(found: &Analysis) -> Table {
-    let names = [&found.table.names[..], &found.wrenches.names[1..]].concat();
-    let rows = found.table.rows.iter().zip(&found.wrenches.rows).map(|(a, b)| [&a[..], &b[1..]].concat());
-    Table { names, rows: rows.collect() }
+    let beside = |table: Table, other: &Table| Table {
+        names: [&table.names[..], &other.names[1..]].concat(),
+        rows: table.rows.iter().zip(&other.rows).map(|(a, b)| [&a[..], &b[1..]].concat()).collect(),
+    };
+    let joints = beside(found.table.clone(), &found.wrenches);
+    found.drives.iter().fold(joints, |table, drives| beside(table, &drives.table))
 }
 
 /// One value of a sweep, with what it leads to.
@@ -315,10 +364,61 @@ fn figures(found: &Analysis) -> Vec<Vec<String>> {
     found.joints.iter().map(row).collect()
 }
 
+const DRIVE_HEAD: [&str; 12] = [
+    "drive",
+    "input",
+    "current [A]",
+    "rms [A]",
+    "speed [1/s]",
+    "torque [N·m]",
+    "power [W]",
+    "taken [J]",
+    "given back",
+    "heat [J]",
+    "winding [°C]",
+    "settled [°C]",
+];
+
+fn drive_figures(drives: &DriveAnalysis) -> Vec<Vec<String>> {
+    let row = |d: &DriveFigures| {
+        let number = |x: f64| format!("{x:.4}");
+        let of = |heat: fn(&Heating) -> f64| d.heating.as_ref().map_or("-".to_string(), |h| format!("{:.2}", heat(h)));
+        let numbers =
+            [d.input.0, d.current.0, d.rms_current, d.speed, d.torque, d.power, d.energy.0, d.energy.1, d.joule];
+        let heats = [of(|h| h.peak), of(|h| h.settled.0)];
+        std::iter::once(d.name.clone()).chain(numbers.map(number)).chain(heats).collect()
+    };
+    drives.drives.iter().map(row).collect()
+}
+
+/// What is to be said of drives beside their figures and limits.
+fn drive_remarks(model: &Model<f64>, found: &Analysis) -> Vec<String> {
+    let Some(drives) = &found.drives else {
+        return match model.drives.is_empty() {
+            true => Vec::new(),
+            false => vec!["the inputs of the drives do not follow from a motion: figures of joints only".to_string()],
+        };
+    };
+    let heats = |d: &DriveFigures| {
+        let after = d.heating?.limit_after?;
+        Some(format!("{}: the motion over and over again brings the winding to its limit after {after:.1} s", d.name))
+    };
+    let mut remarks: Vec<String> = drives.drives.iter().filter_map(heats).collect();
+    if let Some(jump) = drives.jump {
+        let mut joints: Vec<_> = model.bodies.iter().map(|b| &b.joint).collect();
+        joints.sort_by_key(|j| j.iv);
+        let (joint, order, time) = (&joints[jump.coordinate].name, jump.order, jump.time);
+        remarks.push(format!(
+            "t = {time:.6} s: derivative {order} of {joint} jumps, and drives cannot follow: choose a motion of kind `smooth`"
+        ));
+    }
+    remarks
+}
+
 fn violations(found: &Analysis) -> Vec<String> {
     let line = |v: &analysis::Violation| {
         let analysis::Violation { time, joint, what, limit, worst } = v;
-        format!("t = {time:.6} s: {what} of joint {joint} leaves {limit}, worst {worst:.6}")
+        format!("t = {time:.6} s: {what} of {joint} leaves {limit}, worst {worst:.6}")
     };
     found.violations.iter().map(line).collect()
 }
@@ -326,7 +426,8 @@ fn violations(found: &Analysis) -> Vec<String> {
 fn print_analysis(model: &Model<f64>, motion: &Motion, found: &Analysis) -> Result<(), Failure> {
     let mut out = stdout().lock();
     writeln!(out, "{}: {} s, {} instants\n", model.name, motion.duration(), found.table.rows.len())?;
-    let width = model.bodies.iter().map(|b| b.joint.name.chars().count()).max().unwrap_or(5).max(5);
+    let names = model.bodies.iter().map(|b| &b.joint.name).chain(model.drives.iter().map(|d| &d.name));
+    let width = names.map(|name| name.chars().count()).max().unwrap_or(5).max(5);
     let line = |row: &mut dyn Iterator<Item = &str>| -> String {
         let cell = |(k, cell): (usize, &str)| if k == 0 { format!("{cell:<width$}") } else { format!("{cell:>14}") };
         row.enumerate().map(cell).collect()
@@ -334,6 +435,15 @@ fn print_analysis(model: &Model<f64>, motion: &Motion, found: &Analysis) -> Resu
     writeln!(out, "{}", line(&mut HEAD.iter().copied()))?;
     for row in figures(found) {
         writeln!(out, "{}", line(&mut row.iter().map(String::as_str)))?;
+    }
+    if let Some(drives) = &found.drives {
+        writeln!(out, "\n{}", line(&mut DRIVE_HEAD.iter().copied()))?;
+        for row in drive_figures(drives) {
+            writeln!(out, "{}", line(&mut row.iter().map(String::as_str)))?;
+        }
+    }
+    for remark in drive_remarks(model, found) {
+        writeln!(out, "{remark}")?;
     }
     let given: f64 = found.joints.iter().map(|j| j.given - j.taken).sum();
     writeln!(out, "\ndrives give {given:.6} J, energy changes by {:.6} J: the rest is friction", found.energy_change)?;
@@ -357,12 +467,60 @@ fn print_sweep(sweep: &parameter::Sweep, swept: &[Swept]) -> Result<(), Failure>
     Ok(())
 }
 
+/// Inputs, currents, power and temperatures over time, and the torque of every motor against its speed with what its limits allow.
+fn drive_plots(page: &mut Page, model: &Model<f64>, drives: &DriveAnalysis) -> Result<(), Failure> {
+    page.heading("Drives over time");
+    for (prefix, title, unit) in [
+        ("u.", "inputs", "V"),
+        ("i.", "currents", "A"),
+        ("electrical.", "electrical power", "W"),
+        ("winding.", "temperatures of windings", "°C"),
+    ] {
+        if prefix == "winding." && drives.drives.iter().all(|d| d.heating.is_none()) {
+            continue;
+        }
+        let plot = Plot { title, axes: ("t [s]", unit), lines: lines(&drives.table, prefix), levels: Vec::new() };
+        page.figure(&drawn(&plot)?);
+    }
+    page.heading("Speed against torque of the motors, with what voltage and current allow");
+    for (drive, figures) in model.drives.iter().zip(&drives.drives) {
+        let Actuator::Motor(motor) = &drive.actuator else { continue };
+        let column = |prefix: &str| drives.table.column(&format!("{prefix}.{}", drive.name)).unwrap_or_default();
+        let torques = column("i").into_iter().map(|i| motor.torque_constant * i);
+        let mut lines = vec![Line { name: "motion", points: column("speed").into_iter().zip(torques).collect() }];
+        // limits far beyond what the motion takes would flatten it
+        let (reach, most) = (1.3 * figures.speed.max(1.0), 2.0 * motor.torque_constant * figures.current.0);
+        let allowed = |upper: bool| -> Vec<(f64, f64)> {
+            let at = |k: i32| {
+                let speed = reach * f64::from(k) / 100.0;
+                let (least, greatest) = torque_limits(drive, speed).unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+                (speed, if upper { greatest } else { least })
+            };
+            (-100..=100).map(at).filter(|(_, torque)| torque.abs() <= most).collect()
+        };
+        lines.push(Line { name: "greatest", points: allowed(true) });
+        lines.push(Line { name: "least", points: allowed(false) });
+        let continuous = drive.rating.continuous_current.map(|i| motor.torque_constant * i);
+        let levels = continuous.map_or_else(Vec::new, |torque| vec![-torque, torque]);
+        let plot = Plot { title: &drive.name, axes: ("rad/s", "N·m"), lines, levels };
+        page.figure(&drawn(&plot)?);
+    }
+    Ok(())
+}
+
 /// The page: figures, violations, plots over time, speed against torque, the sweep.
 fn page(a: &Analyze, model: &Model<f64>, found: &Analysis, swept: &[Swept]) -> Result<String, Failure> {
     let file = |path: &Path| path.file_name().map(|n| n.to_string_lossy().to_string()).unwrap_or_default();
     let mut page = Page::new(&format!("Analysis of {}", model.name), &format!("Motion: {}", file(&a.motion)));
     page.heading("Joints");
     page.table(&HEAD, &figures(found));
+    if let Some(drives) = &found.drives {
+        page.heading("Drives");
+        page.table(&DRIVE_HEAD, &drive_figures(drives));
+    }
+    for remark in drive_remarks(model, found) {
+        page.paragraph(&remark, false);
+    }
     page.heading("Limits");
     match violations(found) {
         lines if lines.is_empty() => page.paragraph("The motion stays within all limits.", false),
@@ -377,6 +535,9 @@ fn page(a: &Analyze, model: &Model<f64>, found: &Analysis, swept: &[Swept]) -> R
     ] {
         let plot = Plot { title, axes: ("t [s]", unit), lines: lines(&found.table, prefix), levels: Vec::new() };
         page.figure(&drawn(&plot)?);
+    }
+    if let Some(drives) = &found.drives {
+        drive_plots(&mut page, model, drives)?;
     }
     page.heading("Speed against torque, with the limits of the torque");
     for joint in model.bodies.iter().map(|b| &b.joint) {

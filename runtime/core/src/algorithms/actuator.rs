@@ -68,7 +68,15 @@ pub(super) fn inductive_voltage<T: Real>(motor: &Motor<T>, drive: &Drive<T>, x: 
     let Some(limit) = drive.current_limit else { return voltage };
     let sign = i.sign();
     let grows = step(voltage * sign);
-    voltage * (T::one() - step(i * sign - limit) * grows)
+    let beyond = match drive.soft_current {
+        None => step(i * sign - limit),
+        // 0 to 1 over the last part before the limit
+        Some(part) => {
+            let half = T::constant(Dd::HALF);
+            saturated((i * sign - limit) / (part * limit) + half, Some(half)) + half
+        }
+    };
+    voltage * (T::one() - beyond * grows)
 }
 
 /// e and J of a drive's actuator in a state.

@@ -164,7 +164,7 @@ impl<'a, T: Real> Driven<'a, T> {
     fn losses(&self, phi: Option<&[T]>) -> Vec<T> {
         let of = |(k, state): (usize, &DriveState<T>)| {
             let torque = phi.map_or(state.free, |phi| state.free - state.inertia * phi[k]);
-            giving(self.drives[k].efficiency, torque.sign() * state.speed.sign())
+            giving(self.drives[k].efficiency, torque, state.speed)
         };
         self.states.iter().enumerate().map(of).collect()
     }
@@ -228,12 +228,7 @@ impl<'a, T: Real> Driven<'a, T> {
     /// ẋ of a drive for its part of the state, given the motion of the shafts.
     fn state_derivative(&self, k: usize, x: &[T], u: T, motion: &Motion<T>) -> Vec<T> {
         let (drive, state) = (&self.drives[k], &self.states[k]);
-        let acceleration = match drive.stages.is_empty() {
-            true => motion.phi[k],
-            false => state.shaft_acceleration(drive, 0, motion.spin[k]),
-        };
-        // M that the actuator puts out
-        let torque = state.actuator_torque - state.actuator_inertia * acceleration;
+        let (acceleration, torque) = (self.actuator_acceleration(k, motion), self.actuator_torque(k, motion));
         let mut rates = state_derivative(drive, x, (state.actuator_speed, acceleration), torque, u);
         for stage in 1..drive.stages.len() {
             rates.push(state.stages[stage].speed);
@@ -306,52 +301,139 @@ fn joins_branches<T: Real>(model: &Model<T>, drives: &[Drive<T>]) -> bool {
     })
 }
 
-/// q̈ \[rad/s² or m/s²\] and ẋ under the inputs u, with losses and limits. `bias` is h(q, q̇) with friction and springs of the
-/// joints.
+/// The motion of a robot with drives, and what goes on in them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DrivenMotion<T> {
+    /// q̈ \[rad/s² or m/s²\].
+    pub qdd: Vec<T>,
+    /// ẋ.
+    pub xd: Vec<T>,
+    /// Forces on the joints \[N·m or N\], with which H q̈ + h = τ.
+    pub tau: Vec<T>,
+    /// Per drive.
+    pub flows: Vec<DriveFlow<T>>,
+}
+
+/// What goes on in a drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveFlow<T> {
+    /// Torque M that the actuator puts out \[N·m\].
+    pub torque: T,
+    /// Speed θ̇ of the actuator \[rad/s\].
+    pub speed: T,
+    /// What lies on the motor, after all limits \[V\]; the input of a linear actuator.
+    pub voltage: T,
+    /// Current of a motor \[A\]; zero of a linear actuator.
+    pub current: T,
+    /// Power \[W\] that comes in: electrical, or what the shaft of a linear actuator puts out.
+    pub electrical: T,
+    /// Joule heat R i² \[W\].
+    pub joule: T,
+    /// Friction in the motor B θ̇² \[W\].
+    pub friction: T,
+    /// Losses of the gears \[W\].
+    pub gears: T,
+    /// Dampers of elastic stages \[W\].
+    pub dampers: T,
+    /// What a motor with C_E ≠ C_M turns into nothing, (C_E − C_M) i θ̇ \[W\].
+    pub conversion: T,
+}
+
+impl<T> DriveFlow<T> {
+    /// The powers \[W\]: electrical, Joule heat, friction, gears, dampers, conversion.
+    pub fn powers(self) -> [T; 6] {
+        [self.electrical, self.joule, self.friction, self.gears, self.dampers, self.conversion]
+    }
+}
+
+/// q̈ and ẋ under the inputs u, with losses and limits, and what goes on in the drives: all from one solution. `bias` is h(q, q̇) with
+/// friction and springs of the joints.
 pub fn driven_motion<T: Real>(
     model: &Model<T>,
     (q, qd, x, u): (&[T], &[T], &[T], &[T]),
     bias: &[T],
     links: &Links<T>,
-) -> (Vec<T>, Vec<T>) {
+) -> DrivenMotion<T> {
     let driven = Driven::new(model, &model.drives, (q, qd, x, u));
-    let (qdd, _) = driven.solve(bias, links);
+    let (qdd, losses) = driven.solve(bias, links);
     let motion = driven.motion(&qdd);
-    let mut rates = Vec::new();
+    let (mut xd, mut flows) = (Vec::new(), Vec::new());
     for (k, drive) in model.drives.iter().enumerate() {
-        let own = &x[rates.len()..rates.len() + drive.states()];
-        rates.extend(driven.state_derivative(k, own, u[k], &motion));
+        let own = &x[xd.len()..xd.len() + drive.states()];
+        flows.push(driven.flow(k, own, u[k], &motion, losses[k]));
+        xd.extend(driven.state_derivative(k, own, u[k], &motion));
     }
-    (qdd, rates)
+    DrivenMotion { tau: driven.forces(&qdd, &losses), qdd, xd, flows }
+}
+
+impl<T: Real> Driven<'_, T> {
+    /// Forces on the joints: those at q̈ = 0 less what accelerates rotors, (H* − H) q̈.
+    fn forces(&self, qdd: &[T], losses: &[T]) -> Vec<T> {
+        let (nv, mut tau) = (self.nv(), self.free_forces(losses));
+        let mut added = vec![T::zero(); nv * nv];
+        self.add_inertias(&mut added, losses);
+        for (i, tau) in tau.iter_mut().enumerate() {
+            *tau = *tau - sum((0..nv).map(|j| added[i * nv + j] * qdd[j]));
+        }
+        tau
+    }
+
+    /// θ̈ of an actuator's shaft.
+    fn actuator_acceleration(&self, k: usize, motion: &Motion<T>) -> T {
+        match self.drives[k].stages.is_empty() {
+            true => motion.phi[k],
+            false => self.states[k].shaft_acceleration(&self.drives[k], 0, motion.spin[k]),
+        }
+    }
+
+    /// M that an actuator puts out.
+    fn actuator_torque(&self, k: usize, motion: &Motion<T>) -> T {
+        let state = &self.states[k];
+        state.actuator_torque - state.actuator_inertia * self.actuator_acceleration(k, motion)
+    }
+
+    /// What goes on in a drive, with its part of the state and its losses.
+    fn flow(&self, k: usize, x: &[T], u: T, motion: &Motion<T>, losses: T) -> DriveFlow<T> {
+        let (drive, state, o) = (&self.drives[k], &self.states[k], T::zero());
+        let speed = state.actuator_speed;
+        let torque = self.actuator_torque(k, motion);
+        let [mut joule, mut friction, mut gears, mut dampers, mut conversion, mut i] = [o; 6];
+        let mut voltage = saturated(u, drive.input_limit);
+        let mut electrical = torque * speed;
+        if let Actuator::Motor(m) = &drive.actuator {
+            i = current(m, drive, x, speed, u);
+            let held = m.resistance * i + m.emf_constant * speed;
+            voltage = match (m.inductance, drive.current_limit) {
+                (Some(_), Some(_)) => held + inductive_voltage(m, drive, x, speed, u),
+                (None, Some(_)) => held,
+                (_, None) => voltage,
+            };
+            electrical = voltage * i;
+            joule = m.resistance * i * i;
+            friction = m.friction * speed * speed;
+            conversion = (m.emf_constant - m.torque_constant) * i * speed;
+        }
+        for (stage, at) in drive.stages.iter().zip(&state.stages) {
+            gears = gears + (at.taken - at.torque / stage.ratio) * at.speed;
+            if let Some(d) = stage.damping {
+                dampers = dampers + d * at.stretch.1 * at.stretch.1;
+            }
+        }
+        let carried = state.free - state.inertia * motion.phi[k];
+        gears = gears + carried * (T::one() - losses) * state.speed;
+        DriveFlow { torque, speed, voltage, current: i, electrical, joule, friction, gears, dampers, conversion }
+    }
 }
 
 /// Forces τ on the joints \[N·m or N\], with which H q̈ + h = τ, and torques M that the actuators put out \[N·m\].
 pub fn drive_torques<T: Real>(
     model: &Model<T>,
-    (q, qd, x, u): (&[T], &[T], &[T], &[T]),
+    at: (&[T], &[T], &[T], &[T]),
     bias: &[T],
     links: &Links<T>,
 ) -> (Vec<T>, Vec<T>) {
-    let driven = Driven::new(model, &model.drives, (q, qd, x, u));
-    let (qdd, losses) = driven.solve(bias, links);
-    let motion = driven.motion(&qdd);
-    let mut tau = driven.free_forces(&losses);
-    // less what accelerates rotors: (H* − H) q̈
-    let nv = driven.nv();
-    let mut added = vec![T::zero(); nv * nv];
-    driven.add_inertias(&mut added, &losses);
-    for (i, tau) in tau.iter_mut().enumerate() {
-        *tau = *tau - sum((0..nv).map(|j| added[i * nv + j] * qdd[j]));
-    }
-    let torque = |(k, state): (usize, &DriveState<T>)| {
-        let drive = &model.drives[k];
-        let acceleration = match drive.stages.is_empty() {
-            true => motion.phi[k],
-            false => state.shaft_acceleration(drive, 0, motion.spin[k]),
-        };
-        state.actuator_torque - state.actuator_inertia * acceleration
-    };
-    (tau, driven.states.iter().enumerate().map(torque).collect())
+    let motion = driven_motion(model, at, bias, links);
+    (motion.tau, motion.flows.into_iter().map(|flow| flow.torque).collect())
 }
 
 /// H*, h* and D of H* q̈ + h* = D u (20.72), (20.73), without losses and limits; h* and D hold for the currents and the other
@@ -470,52 +552,16 @@ pub fn drive_power<T: Real>(
     bias: &[T],
     links: &Links<T>,
 ) -> [T; 7] {
-    let driven = Driven::new(model, &model.drives, (q, qd, x, u));
-    let (qdd, losses) = driven.solve(bias, links);
-    let motion = driven.motion(&qdd);
-    let o = T::zero();
-    let [mut electrical, mut joule, mut friction, mut gears, mut dampers, mut joints, mut conversion] = [o; 7];
-    let mut first = 0;
-    for (k, drive) in model.drives.iter().enumerate() {
-        let (state, own) = (&driven.states[k], &x[first..first + drive.states()]);
-        first += drive.states();
-        let speed = state.actuator_speed;
-        match &drive.actuator {
-            Actuator::Motor(m) => {
-                let i = current(m, drive, own, speed, u[k]);
-                let held = m.resistance * i + m.emf_constant * speed;
-                let voltage = match (m.inductance, drive.current_limit) {
-                    (Some(_), Some(_)) => held + inductive_voltage(m, drive, own, speed, u[k]),
-                    (None, Some(_)) => held,
-                    (_, None) => saturated(u[k], drive.input_limit),
-                };
-                electrical = electrical + voltage * i;
-                joule = joule + m.resistance * i * i;
-                friction = friction + m.friction * speed * speed;
-                conversion = conversion + (m.emf_constant - m.torque_constant) * i * speed;
-            }
-            Actuator::Linear(_) => {
-                let acceleration = match drive.stages.is_empty() {
-                    true => motion.phi[k],
-                    false => state.shaft_acceleration(drive, 0, motion.spin[k]),
-                };
-                electrical = electrical + (state.actuator_torque - state.actuator_inertia * acceleration) * speed;
-            }
-        }
-        for (stage, at) in drive.stages.iter().zip(&state.stages) {
-            gears = gears + (at.taken - at.torque / stage.ratio) * at.speed;
-            if let Some(d) = stage.damping {
-                dampers = dampers + d * at.stretch.1 * at.stretch.1;
-            }
-        }
-        let carried = state.free - state.inertia * motion.phi[k];
-        gears = gears + carried * (T::one() - losses[k]) * state.speed;
+    let motion = driven_motion(model, (q, qd, x, u), bias, links);
+    let mut powers = [T::zero(); 6];
+    for flow in motion.flows {
+        powers.iter_mut().zip(flow.powers()).for_each(|(sum, power)| *sum = *sum + power);
     }
-    let moving = |body: &&Body<T>| body.joint.kind != JointKind::Floating;
-    for body in model.bodies.iter().filter(moving) {
-        joints = joints + super::effects::friction_force(&body.effects, qd[body.joint.iv]) * qd[body.joint.iv];
-    }
-    [electrical, joule, friction, gears, dampers, joints, conversion]
+    let [electrical, joule, friction, gears, dampers, conversion] = powers;
+    let moving = model.bodies.iter().filter(|body: &&Body<T>| body.joint.kind != JointKind::Floating);
+    let of_joint =
+        |body: &Body<T>| super::effects::friction_force(&body.effects, qd[body.joint.iv]) * qd[body.joint.iv];
+    [electrical, joule, friction, gears, dampers, sum(moving.map(of_joint)), conversion]
 }
 
 /// Energy \[J\] of the drives: kinetic of rotors and gears, of the springs of elastic stages, of the motors' inductances. Of a

@@ -15,6 +15,7 @@ use crate::drive::{Actuator, Drive, LinearActuator};
 use crate::model::{JointKind, Model};
 use crate::real::Real;
 use crate::taylor::Taylor;
+use alloc::vec;
 use alloc::vec::Vec;
 
 /// The most derivatives of a torque that are computed.
@@ -50,11 +51,7 @@ pub fn inverse_orders<T>(drives: &[Drive<T>]) -> Option<InverseOrders> {
     (of_torque <= MOST).then_some(InverseOrders { of_torque })
 }
 
-/// Inputs u and actuator torques M \[N·m\] of a motion: `rates` holds q̇ and all further derivatives that
-/// [`inverse_orders`] asks for, `torques` makes τ of series q, q̇, q̈. Limits are not applied: what comes out is what the motion
-/// takes.
-///
-/// `torques` is called once, with the model over series.
+/// Inputs u and actuator torques M \[N·m\] of a motion, as [`drive_demands`].
 pub fn driven_inverse<T: Real, const N: usize>(
     model: &Model<T>,
     q: &[T],
@@ -62,6 +59,20 @@ pub fn driven_inverse<T: Real, const N: usize>(
     x: &[T],
     torques: impl FnOnce(&Model<Taylor<T, N>>, &[Taylor<T, N>], &[Taylor<T, N>], &[Taylor<T, N>]) -> Vec<Taylor<T, N>>,
 ) -> (Vec<T>, Vec<T>) {
+    drive_demands(model, q, rates, x, torques).into_iter().map(|d| (d.input, d.torque)).unzip()
+}
+
+/// What a motion asks of every drive: `rates` holds q̇ and all further derivatives that [`inverse_orders`] asks for, `torques` makes
+/// τ of series q, q̇, q̈. Limits are not applied: what comes out is what the motion takes.
+///
+/// `torques` is called once, with the model over series.
+pub fn drive_demands<T: Real, const N: usize>(
+    model: &Model<T>,
+    q: &[T],
+    rates: &[&[T]],
+    x: &[T],
+    torques: impl FnOnce(&Model<Taylor<T, N>>, &[Taylor<T, N>], &[Taylor<T, N>], &[Taylor<T, N>]) -> Vec<Taylor<T, N>>,
+) -> Vec<Demand<T>> {
     let over_series: Model<Taylor<T, N>> = model.map(Taylor::fixed);
     let along = |first: usize| -> Vec<Taylor<T, N>> {
         (0..model.nv())
@@ -73,16 +84,27 @@ pub fn driven_inverse<T: Real, const N: usize>(
     let mut tau = torques(&over_series, &q, &qd, &qdd);
     subtract_rotors(&over_series, &q, &qd, &qdd, &mut tau);
     T::section("drives", None);
-    let (mut inputs, mut shaft_torques) = (Vec::new(), Vec::new());
+    let mut demands = Vec::new();
     let mut first = 0;
     for (drive, original) in over_series.drives.iter().zip(&model.drives) {
         let own = &x[first.min(x.len())..(first + drive.states()).min(x.len())];
         first += drive.states();
-        let (u, m) = drive_input(&over_series, drive, original, [&q, &qd, &qdd], &tau, own);
-        inputs.push(u);
-        shaft_torques.push(m);
+        demands.push(drive_input(&over_series, drive, original, [&q, &qd, &qdd], &tau, own));
     }
-    (inputs, shaft_torques)
+    demands
+}
+
+/// What a motion asks of a drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Demand<T> {
+    /// u \[V, or the unit of u\].
+    pub input: T,
+    /// M that the actuator puts out \[N·m\].
+    pub torque: T,
+    /// Of a motor \[A\].
+    pub current: Option<T>,
+    /// Angle \[rad\] and speed \[rad/s\] of all shafts, from that of the actuator to the last one.
+    pub shafts: Vec<[T; 2]>,
 }
 
 /// q as a series: its rates are q̇, but for a floating base, whose position and quaternion follow from (v, ω) in its own
@@ -136,7 +158,7 @@ fn subtract_rotors<S: Real>(model: &Model<S>, q: &[S], qd: &[S], qdd: &[S], tau:
     }
 }
 
-/// u and M of one drive.
+/// What a motion asks of one drive.
 fn drive_input<T: Real, const N: usize>(
     model: &Model<Taylor<T, N>>,
     drive: &Drive<Taylor<T, N>>,
@@ -144,7 +166,7 @@ fn drive_input<T: Real, const N: usize>(
     [q, qd, qdd]: [&[Taylor<T, N>]; 3],
     tau: &[Taylor<T, N>],
     x: &[T],
-) -> (T, T) {
+) -> Demand<T> {
     type Shaft<T, const N: usize> = [Taylor<T, N>; 3];
     let o = Taylor::fixed(T::zero());
     let sum = |row: &[(usize, Taylor<T, N>)], y: &[Taylor<T, N>], is_q: bool| {
@@ -154,8 +176,9 @@ fn drive_input<T: Real, const N: usize>(
     let joints = &drive.joints;
     let mut shaft: Shaft<T, N> = [sum(joints, q, true), sum(joints, qd, false), sum(joints, qdd, false)];
     let given = sum(drive.shares.as_ref().expect("the inverse problem has a solution"), tau, false);
+    let mut shafts = vec![[shaft[0].coefficients[0], shaft[1].coefficients[0]]];
     // the torque of the last shaft, and what the gear behind it takes for it
-    let taken = given * taking(drive.efficiency, given.sign() * shaft[1].sign());
+    let taken = given * taking(drive.efficiency, given, (shaft[1], None));
     let mut load = drive.shaft_inertia.map_or(taken, |gears| taken + gears * shaft[2]);
     for (k, stage) in drive.stages.iter().enumerate().rev() {
         let behind = shaft;
@@ -184,13 +207,17 @@ fn drive_input<T: Real, const N: usize>(
                 [theta, speed, speed.derivative()]
             }
         };
-        let direction = load.sign() * shaft[1].sign() * stage.ratio.sign();
-        load = load / stage.ratio * taking(stage.efficiency, direction) + stage.inertia * shaft[2];
+        load = load / stage.ratio * taking(stage.efficiency, load, (shaft[1], Some(stage.ratio)))
+            + stage.inertia * shaft[2];
+        shafts.push([shaft[0].coefficients[0], shaft[1].coefficients[0]]);
     }
-    let u = match &drive.actuator {
+    shafts.reverse();
+    let mut current = None;
+    let input = match &drive.actuator {
         Actuator::Motor(m) => {
             // C_M i = M + J θ̈ + B θ̇   (20.62), u = R i + L i̇ + C_E θ̇   (20.63)
             let i = (load + m.rotor_inertia * shaft[2] + m.friction * shaft[1]) / m.torque_constant;
+            current = Some(i.coefficients[0]);
             let held = m.resistance * i + m.emf_constant * shaft[1];
             m.inductance.map_or(held, |l| held + l * i.derivative()).coefficients[0]
         }
@@ -199,7 +226,7 @@ fn drive_input<T: Real, const N: usize>(
             Actuator::Motor(_) => unreachable!("both are the same drive"),
         },
     };
-    (u, load.coefficients[0])
+    Demand { input, torque: load.coefficients[0], current, shafts }
 }
 
 /// u from the r-th derivative of θ̈ = T ẋ: T Cʳ d u = θ̈⁽ʳ⁾ − T Cʳ⁺¹ x − Σ_{m ≤ r} T Cʳ⁻ᵐ f M⁽ᵐ⁾.

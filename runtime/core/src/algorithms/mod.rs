@@ -87,9 +87,9 @@ pub use constraint::{
 pub use crba::mass_matrix;
 pub use driven::{
     complete_model, drive_energy, drive_power, drive_states, drive_torques, driven_motion, drives_are_diagonal,
-    state_space, Links,
+    state_space, DriveFlow, DrivenMotion, Links,
 };
-pub use driven_inverse::{driven_inverse, inverse_orders, reads_states, InverseOrders};
+pub use driven_inverse::{drive_demands, driven_inverse, inverse_orders, reads_states, Demand, InverseOrders};
 pub use effects::{passive_force, rotor_inertias};
 pub use energy::{kinetic_energy, potential_energy};
 pub use environment::{Environment, EnvironmentMotion, SpringDamper};

@@ -66,8 +66,7 @@ impl<T: Real> DriveState<T> {
             let stretch = (before.0 / stage.ratio - behind.0, before.1 / stage.ratio - behind.1);
             let elastic = stage.stiffness * stretch.0;
             let torque = stage.damping.map_or(elastic, |d| elastic + d * stretch.1);
-            let taken =
-                torque / stage.ratio * taking(stage.efficiency, torque.sign() * speed_sign(before.1, stage.ratio));
+            let taken = torque / stage.ratio * taking(stage.efficiency, torque, (before.1, Some(stage.ratio)));
             state.stages.push(StageState { torque, taken, speed: before.1, stretch });
             before = behind;
         }
@@ -86,11 +85,6 @@ impl<T: Real> DriveState<T> {
     }
 }
 
-/// The sign of a shaft's speed behind a gear.
-fn speed_sign<T: Real>(speed: T, ratio: T) -> T {
-    speed.sign() * ratio.sign()
-}
-
 /// Σ n_j y_j over the joints of a drive, y = q or q̇.
 pub(super) fn last_shaft<T: Real>(
     model: &Model<T>,
@@ -106,23 +100,34 @@ pub(super) fn last_shaft<T: Real>(
     terms.reduce(|sum, x| sum + x).unwrap_or_else(T::zero)
 }
 
-/// What a gear makes of a torque that drives it, beside its ratio: η′, 1, 1/η″ for a power above, at and below zero.
-pub(super) fn giving<T: Real>(efficiency: Option<Efficiency<T>>, power_sign: T) -> T {
+/// What a gear makes of a torque that drives it, beside its ratio: η′, 1, 1/η″ for a power above, at and below zero. Power is
+/// that of `torque` at the speed of the shaft before the gear.
+pub(super) fn giving<T: Real>(efficiency: Option<Efficiency<T>>, torque: T, speed: T) -> T {
     match efficiency {
         None => T::one(),
-        Some(e) => chosen(power_sign, e.forward, T::one() / e.backward),
+        Some(e) => chosen(direction(&e, torque, (speed, None)), e.forward, T::one() / e.backward),
     }
 }
 
-/// The reverse: what a gear must be driven by, for the torque behind it.
-pub(super) fn taking<T: Real>(efficiency: Option<Efficiency<T>>, power_sign: T) -> T {
+/// The reverse: what a gear must be driven by, for the torque behind it. The speed is that of the shaft before the gear, with the
+/// ratio whose sign says how the shaft behind it turns.
+pub(super) fn taking<T: Real>(efficiency: Option<Efficiency<T>>, torque: T, speed: (T, Option<T>)) -> T {
     match efficiency {
         None => T::one(),
-        Some(e) => chosen(power_sign, T::one() / e.forward, e.backward),
+        Some(e) => chosen(direction(&e, torque, speed), T::one() / e.forward, e.backward),
     }
 }
 
-/// `above`, 1, `below` for s = 1, 0, −1, without a branch: the factors of the other two are exactly zero.
+/// The sign of the power of a torque, smooth in the speed where the efficiency says so. Under the root stands a sum of squares
+/// with w > 0.
+fn direction<T: Real>(efficiency: &Efficiency<T>, torque: T, (speed, ratio): (T, Option<T>)) -> T {
+    let of_speed = efficiency.speed.map_or(speed.sign(), |w| speed / (speed * speed + w * w).sqrt());
+    let sign = torque.sign() * of_speed;
+    ratio.map_or(sign, |ratio| sign * ratio.sign())
+}
+
+/// `above`, 1, `below` for s = 1, 0, −1, without a branch: the factors of the other two are exactly zero. In between the parabola
+/// through the three, which is below 1 for s > 0 and above for s < 0 if `above` < 1 < `below`, or the other way round: no gear gives energy.
 fn chosen<T: Real>(s: T, above: T, below: T) -> T {
     let half = T::constant(crate::dd::Dd::HALF);
     let square = s * s;
