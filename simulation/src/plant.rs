@@ -137,7 +137,7 @@ impl Plant {
     }
 
     /// Inputs with currents as the voltages that keep them up, R i + C_E θ̇.
-    fn inputs(&self, qd: &[f64], x: &[f64], u: &[f64]) -> Vec<f64> {
+    pub(crate) fn inputs(&self, qd: &[f64], x: &[f64], u: &[f64]) -> Vec<f64> {
         let mut first = 0;
         let of = |(k, u): (usize, &f64)| {
             let drive = &self.model.drives[k];

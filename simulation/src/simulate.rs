@@ -11,7 +11,7 @@ use crate::table::Table;
 use differential_equations::prelude::*;
 use differential_equations::traits::State;
 use std::fmt;
-use straightline_core::algorithms::kinetic_energy;
+use straightline_core::algorithms::{kinetic_energy, DrivenMotion};
 use straightline_core::model::{JointKind, Limits};
 
 /// How steps are made.
@@ -280,13 +280,24 @@ pub(crate) fn names(plant: &Plant, command: &Command) -> Vec<String> {
     names
 }
 
-pub(crate) fn row(plant: &Plant, command: &Command, t: f64, state: &[f64], held: Option<&Action>) -> Vec<f64> {
+fn row(plant: &Plant, command: &Command, t: f64, state: &[f64], held: Option<&Action>) -> Vec<f64> {
     let state = plant.normalised(state);
-    let (q, qd, work, losses) = plant.split(&state);
     let action = held.map_or_else(|| command.action(plant, t, &state), Action::clone);
     let driven = plant.is_driven().then(|| plant.driven(&state, &action));
+    row_of(plant, command, (t, &state), action, driven.as_ref())
+}
+
+/// The same of what the drives are known to do.
+pub(crate) fn row_of(
+    plant: &Plant,
+    command: &Command,
+    (t, state): (f64, &[f64]),
+    action: Action,
+    driven: Option<&DrivenMotion<f64>>,
+) -> Vec<f64> {
+    let (q, qd, work, losses) = plant.split(state);
     let mut tau = action.tau;
-    if let Some(driven) = &driven {
+    if let Some(driven) = driven {
         tau.iter_mut().zip(&driven.tau).for_each(|(sum, tau)| *sum += tau);
     }
     let mut row = [&[t], q, qd, &tau].concat();
@@ -294,14 +305,14 @@ pub(crate) fn row(plant: &Plant, command: &Command, t: f64, state: &[f64], held:
         let (r, ..) = controller.motion.at(t);
         row.extend(r.iter().zip(q).map(|(r, q)| r - q));
     }
-    let flows = driven.as_ref().map_or(&[][..], |d| &d.flows);
+    let flows = driven.map_or(&[][..], |d| &d.flows);
     row.extend(flows.iter().map(|f| f.voltage));
     row.extend(flows.iter().map(|f| f.current));
     row.extend(flows.iter().map(|f| f.speed));
     row.extend(flows.iter().map(|f| f.torque));
-    row.extend([plant.stored(&state), work, losses]);
+    row.extend([plant.stored(state), work, losses]);
     if driven.is_some() {
-        let e = plant.drive_energies(&state);
+        let e = plant.drive_energies(state);
         row.extend([e.electrical, e.joule, e.friction, e.gears, e.dampers, e.conversion]);
     }
     row
@@ -317,7 +328,7 @@ struct System<'a> {
 
 /// What stands for a rate that is no number: so great that the step is rejected. The library takes the error of a step as small
 /// where it is no number.
-const BEYOND: f64 = 1e100;
+pub(crate) const BEYOND: f64 = 1e100;
 
 impl System<'_> {
     fn rate(&self, t: f64, y: &[f64], rate: &mut [f64]) {
@@ -414,7 +425,7 @@ struct Solved {
 }
 
 /// States that the implicit method has room for.
-const MOST_STATES: usize = 128;
+pub(crate) const MOST_STATES: usize = 128;
 /// Steps of one piece, at most.
 pub(crate) const MOST_STEPS: usize = 10_000_000;
 

@@ -3,7 +3,8 @@
 use super::object::{let_go, SLOTS};
 use super::state::{Closed, Parts, Phases, Rows, Seen, Slip, System, GUARDS, RIDGE, SLACK};
 use super::{Event, What};
-use straightline_core::algorithms::{impact, projection, FunctionalCoordinates, Struck, Support};
+use crate::plant::Action;
+use straightline_core::algorithms::{driven_jump, impact, projection, FunctionalCoordinates, Struck, Support};
 use straightline_core::contact::Coordinate;
 
 /// Slower than this \[m/s\] an open contact that stands on its object is at rest there.
@@ -39,7 +40,7 @@ impl System<'_> {
     /// Brings positions and velocities back onto rigid constraints, so often at most; gives how far they are off after it \[m, or
     /// cosine\].
     pub fn project(&self, t: f64, state: &mut Vec<f64>, phases: &Phases, times: usize) -> f64 {
-        let (nq, work) = (self.nq(), self.work());
+        let nq = self.nq();
         let largest = |s: &FunctionalCoordinates<f64>| s.value.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let rigid = |state: &[f64]| Self::rigid(&self.rows(state, &self.see_all(t, state), phases));
         let mut s = rigid(state);
@@ -58,9 +59,18 @@ impl System<'_> {
         }
         let struck = vec![Struck::Rigid; s.len()];
         let factor = self.factor(&state[..nq]);
-        let still = impact(&factor, &state[nq..work], &s, None, &struck, 0.0, RIDGE);
-        state[nq..work].iter_mut().zip(still.dqd).for_each(|(v, d)| *v += d);
+        let still = impact(&factor, &state[self.velocities()], &s, None, &struck, 0.0, RIDGE);
+        self.jump(state, &still.dqd);
         largest(&s)
+    }
+
+    /// q̇ jumps, and what turns with the joints.
+    fn jump(&self, state: &mut [f64], dqd: &[f64]) {
+        if self.plant.is_driven() {
+            let dx = driven_jump(&self.plant.model, &state[..self.nq()], dqd);
+            state[self.drive_states()].iter_mut().zip(dx).for_each(|(x, d)| *x += d);
+        }
+        state[self.velocities()].iter_mut().zip(dqd).for_each(|(v, d)| *v += d);
     }
 
     /// Contact `closing` closes, or begins to stick, in the phases `after`.
@@ -87,8 +97,8 @@ impl System<'_> {
         let blow = impact(&self.factor(q), qd, &rows.s, Some(&rows.applied), &struck, restitution, RIDGE);
         let energy = self.energy(t, state, before);
         let given = self.power_of_objects(state, &seen, &rows, &blow.impulse);
-        let (nq, work) = (self.nq(), self.work());
-        state[nq..work].iter_mut().zip(&blow.dqd).for_each(|(v, d)| *v += d);
+        let work = self.work();
+        self.jump(state, &blow.dqd);
         let own = rows.of[closing].clone();
         if restitution > 0.0 {
             // it leaves again, and so does the mass that it has struck
@@ -175,10 +185,10 @@ impl System<'_> {
 
     /// What cannot last an instant: reactions that pull, contacts that are pressed together though open, friction that holds
     /// what slides slowly or does not hold what sticks. One after the other; `None` if that finds no end.
-    pub fn settle(&self, t: f64, state: &mut Vec<f64>, phases: &mut Phases, tau: &[f64]) -> Option<Vec<Event>> {
+    pub fn settle(&self, t: f64, state: &mut Vec<f64>, phases: &mut Phases, action: &Action) -> Option<Vec<Event>> {
         let mut events = Vec::new();
         for _ in 0..8 * (phases.len() + 1) {
-            match self.unsettled(t, state, phases, tau) {
+            match self.unsettled(t, state, phases, action) {
                 None => return Some(events),
                 Some((k, what)) => {
                     events.extend(what.map(|what| Event { time: t, contact: self.name(k), what }));
@@ -198,11 +208,11 @@ impl System<'_> {
         t: f64,
         state: &mut Vec<f64>,
         phases: &mut Phases,
-        tau: &[f64],
+        action: &Action,
     ) -> Option<(usize, Option<What>)> {
         *state = self.plant.normalised(state);
         let seen = self.see_all(t, state);
-        let moved = self.moved(state, self.rows(state, &seen, phases), tau);
+        let moved = self.moved(state, self.rows(state, &seen, phases), action);
         let count = phases.len();
         // the reaction that pulls most
         let pulls = |k: usize| {
@@ -213,7 +223,13 @@ impl System<'_> {
         };
         let most = (0..count).map(|k| (k, pulls(k))).min_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((k, _)) = most.filter(|(_, force)| *force < 0.0) {
-            return Some((k, Some(self.open(state, &seen[k], phases, k))));
+            // not by rounding: opened, it would rise
+            let mut opened = phases.clone();
+            opened[k] = None;
+            let risen = self.moved(state, self.rows(state, &seen, &opened), action);
+            if seen[k].acceleration(&risen.qdd) > AT_REST {
+                return Some((k, Some(self.open(state, &seen[k], phases, k))));
+            }
         }
         for k in 0..count {
             let (touch, at) = (&self.touches()[k], &seen[k]);
@@ -221,7 +237,7 @@ impl System<'_> {
                 if at.gap.0 > SLACK {
                     continue;
                 }
-                let free = at.row.jacobian[0].iter().zip(&moved.qdd).map(|(j, a)| j * a).sum::<f64>() + at.row.bias[0];
+                let free = at.acceleration(&moved.qdd);
                 let rests = at.gap.1.abs() <= AT_REST && touch.environment.is_none() && free < -AT_REST;
                 let pushes = touch.contact.constrained.contains(&Coordinate::Pz);
                 let is_inside = at.gap.0 < -2.0 * SLACK && at.gap.1 <= AT_REST;
@@ -233,7 +249,7 @@ impl System<'_> {
             };
             let Some(friction) = touch.contact.friction else { continue };
             match closed.slip {
-                Slip::Slow if self.excess(k, &seen, state, phases, tau) < 0.0 => {
+                Slip::Slow if self.excess(k, &seen, state, phases, action) < 0.0 => {
                     return Some((k, Some(self.stick(t, state, phases, k))));
                 }
                 Slip::Fast if at.slip_speed() <= friction.speed => {

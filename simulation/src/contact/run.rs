@@ -6,8 +6,9 @@ use super::{Contacts, Event};
 use crate::command::Command;
 use crate::drives::DriveEnergies;
 use crate::plant::{Action, Plant};
-use crate::simulate::{self, Balance, Failure, Method, Run, Settings, MOST_STEPS};
+use crate::simulate::{self, Balance, Failure, Method, Run, Settings, BEYOND, MOST_STATES, MOST_STEPS};
 use differential_equations::prelude::*;
+use differential_equations::traits::State;
 use std::cell::RefCell;
 use straightline_core::algorithms::kinetic_energy;
 use straightline_core::contact::Coordinate;
@@ -46,6 +47,8 @@ pub fn simulate(
     settings: &Settings,
     progress: &dyn Fn(f64),
 ) -> Result<ContactRun, Failure> {
+    let softened = (settings.method == Method::Stiff).then(|| plant.clone().with_soft_limits());
+    let plant = softened.as_ref().unwrap_or(plant);
     let system = System { plant, contacts };
     let state = plant.normalised(&[plant.state(q, qd), objects_at_rest(contacts.touches.len())].concat());
     let mut going = Going { system, command, settings, progress, state, phases: Vec::new(), events: Vec::new() };
@@ -82,12 +85,12 @@ pub fn simulate(
     for piece in ends.windows(2) {
         let (mut t, end) = (piece[0], piece[1]);
         if let Some(period) = period.filter(|_| t >= next_computation - 1e-12 * settings.duration) {
-            held = Some(going.tau(t, None));
+            held = Some(going.action(t, &going.state, None));
             next_computation += period;
         }
         let mut count = 0;
         while t < end {
-            let reached = going.piece(t, end, held.as_deref(), &mut run)?;
+            let reached = going.piece(t, end, held.as_ref(), &mut run)?;
             t = reached.time;
             if run.stop.is_some() {
                 break;
@@ -99,7 +102,7 @@ pub fn simulate(
         }
         if is_row(t) || run.stop.is_some() {
             drift = drift.max(going.drift(t));
-            run.table.rows.push(going.row(t, held.as_deref()));
+            run.table.rows.push(going.row(t, held.as_ref()));
         }
         if run.stop.is_some() {
             break;
@@ -110,7 +113,8 @@ pub fn simulate(
     let (q, qd, work, losses) = plant.split(&going.state);
     let kinetic = run.table.column("kinetic").unwrap_or_default();
     let (least, most) = kinetic.iter().fold((f64::MAX, 0.0f64), |(l, h), e| (l.min(*e), h.max(*e)));
-    let drives = DriveEnergies::default();
+    // what comes after the plant's states are the objects'
+    let drives = plant.drive_energies(&going.state[..plant.states()]);
     run.balance = Balance { before, after, work, losses, drives, turnover: most - least };
     (run.q, run.qd) = (q.to_vec(), qd.to_vec());
     Ok(ContactRun { run, events: going.events, drift })
@@ -134,9 +138,8 @@ struct Reached {
 }
 
 impl Going<'_> {
-    fn tau(&self, t: f64, held: Option<&[f64]>) -> Vec<f64> {
-        let (q, qd, ..) = self.system.plant.split(&self.state);
-        held.map_or_else(|| self.command.torques(t, q, qd), <[f64]>::to_vec)
+    fn action(&self, t: f64, state: &[f64], held: Option<&Action>) -> Action {
+        held.map_or_else(|| self.command.action(self.system.plant, t, state), Action::clone)
     }
 
     fn refused(&self, time: f64, why: String) -> Failure {
@@ -157,6 +160,12 @@ impl Going<'_> {
             let why = "the contacts and loops that are closed at the beginning cannot be closed from there";
             return Err(self.refused(0.0, format!("{why}: {off:.1e} m, or cosine, is left")));
         }
+        if self.system.plant.is_driven() {
+            // springs of the transmissions are slack where the robot has been brought
+            let (q, qd, ..) = self.system.plant.split(&self.state);
+            let slack = self.system.plant.state(q, qd);
+            self.state[..slack.len()].copy_from_slice(&slack);
+        }
         for (k, touch) in touches.iter().enumerate() {
             let seen = self.system.see(0.0, &self.state, k);
             if let Some(closed) = &mut self.phases[k] {
@@ -173,12 +182,12 @@ impl Going<'_> {
     }
 
     /// Goes on until `end`, or until a phase ends before.
-    fn piece(&mut self, t: f64, end: f64, held: Option<&[f64]>, run: &mut Run) -> Result<Reached, Failure> {
+    fn piece(&mut self, t: f64, end: f64, held: Option<&Action>, run: &mut Run) -> Result<Reached, Failure> {
         if self.system.contacts.projects {
             self.system.project(t, &mut self.state, &self.phases, 1);
         }
-        let tau = self.tau(t, held);
-        let settled = self.system.settle(t, &mut self.state, &mut self.phases, &tau);
+        let action = self.action(t, &self.state, held);
+        let settled = self.system.settle(t, &mut self.state, &mut self.phases, &action);
         let Some(settled) = settled else {
             return Err(self.refused(t, "contacts exclude each other: none of their phases lasts".to_string()));
         };
@@ -218,14 +227,12 @@ impl Going<'_> {
     }
 
     /// The guards of all contacts.
-    fn guards(&self, t: f64, state: &[f64], held: Option<&[f64]>) -> Vec<f64> {
-        let (q, qd, ..) = self.system.plant.split(state);
-        let tau = held.map_or_else(|| self.command.torques(t, q, qd), <[f64]>::to_vec);
-        self.system.all_guards(t, state, &self.phases, &tau)
+    fn guards(&self, t: f64, state: &[f64], held: Option<&Action>) -> Vec<f64> {
+        self.system.all_guards(t, state, &self.phases, &self.action(t, state, held))
     }
 
     /// g/ġ of a guard at a state, ġ from the rate of the state: by how much its root is missed \[s\].
-    fn newton(&self, t: f64, state: &[f64], guard: Guard, held: Option<&[f64]>) -> f64 {
+    fn newton(&self, t: f64, state: &[f64], guard: Guard, held: Option<&Action>) -> f64 {
         let value = |t: f64, y: &[f64]| match guard {
             // the second guard of an open contact stands for the first
             Guard::Contact(k) if k % GUARDS == 1 && self.phases[k / GUARDS].is_none() => self.guards(t, y, held)[k - 1],
@@ -234,7 +241,7 @@ impl Going<'_> {
         };
         let watched = Watched { going: self, held, first: &[], seen: RefCell::new(Seen { last: None, fallen: None }) };
         let (mut rate, h) = (vec![0.0; state.len()], 1e-7);
-        watched.diff(t, &state.to_vec(), &mut rate);
+        watched.rate(t, state, &mut rate);
         let along = |h: f64| state.iter().zip(&rate).map(|(y, r)| y + h * r).collect::<Vec<f64>>();
         let slope = (value(t + h, &along(h)) - value(t - h, &along(-h))) / (2.0 * h);
         let step = value(t, state) / slope;
@@ -269,16 +276,16 @@ impl Going<'_> {
         names
     }
 
-    fn row(&self, t: f64, held: Option<&[f64]>) -> Vec<f64> {
+    fn row(&self, t: f64, held: Option<&Action>) -> Vec<f64> {
         let system = &self.system;
-        let action = held.map(|tau| Action { tau: tau.to_vec(), u: Vec::new() });
-        let mut row = simulate::row(system.plant, self.command, t, &self.state, action.as_ref());
         let objects = system.energy_of_objects(t, &self.state, &self.phases);
-        let energy = row.len() - 3;
-        row[energy] += objects;
         let seen = system.see_all(t, &self.state);
-        let tau = self.tau(t, held);
-        let moved = system.moved(&self.state, system.rows(&self.state, &seen, &self.phases), &tau);
+        let action = self.action(t, &self.state, held);
+        let moved = system.moved(&self.state, system.rows(&self.state, &seen, &self.phases), &action);
+        let mut row = simulate::row_of(system.plant, self.command, (t, &self.state), action, moved.drives.as_ref());
+        if let Some(energy) = simulate::names(system.plant, self.command).iter().position(|name| name == "energy") {
+            row[energy] += objects;
+        }
         for (k, touch) in system.touches().iter().enumerate() {
             let own = moved.rows.of[k].clone();
             let force = |c: &Coordinate| own.clone().find(|i| moved.rows.coordinates[*i] == *c).map(|i| moved.force[i]);
@@ -320,7 +327,7 @@ struct Seen {
 /// A phase under the solver.
 struct Watched<'a, 'b> {
     going: &'a Going<'b>,
-    held: Option<&'a [f64]>,
+    held: Option<&'a Action>,
     /// The guards at the beginning.
     first: &'a [f64],
     seen: RefCell<Seen>,
@@ -328,17 +335,27 @@ struct Watched<'a, 'b> {
 
 impl ODE<f64, Vec<f64>> for Watched<'_, '_> {
     fn diff(&self, t: f64, y: &Vec<f64>, dydt: &mut Vec<f64>) {
-        let Going { system, command, progress, phases, .. } = self.going;
-        progress(t);
-        let (q, qd, ..) = system.plant.split(y);
-        match self.held {
-            Some(tau) => system.rate(t, y, phases, tau, dydt),
-            None => system.rate(t, y, phases, &command.torques(t, q, qd), dydt),
-        }
+        self.rate(t, y, dydt);
+    }
+}
+
+/// With room for N states, as the implicit method has it.
+impl<const N: usize> ODE<f64, [f64; N]> for Watched<'_, '_> {
+    fn diff(&self, t: f64, y: &[f64; N], dydt: &mut [f64; N]) {
+        let n = self.going.state.len();
+        dydt[n..].fill(0.0);
+        self.rate(t, &y[..n], &mut dydt[..n]);
     }
 }
 
 impl Watched<'_, '_> {
+    fn rate(&self, t: f64, y: &[f64], rate: &mut [f64]) {
+        let Going { system, progress, phases, .. } = self.going;
+        progress(t);
+        system.rate(t, y, phases, &self.going.action(t, y, self.held), rate);
+        rate.iter_mut().filter(|x| !x.is_finite()).for_each(|x| *x = BEYOND);
+    }
+
     /// The guards, and that of the joints' ranges. What stands a little inside its object at the beginning of a phase, by
     /// rounding, falls from there.
     fn values(&self, t: f64, y: &[f64]) -> Vec<f64> {
@@ -356,20 +373,35 @@ impl Watched<'_, '_> {
     fn solve(&self, (start, end): (f64, f64), from: &[f64], watches: bool, run: &mut Run) -> Result<(), Failure> {
         let settings = self.going.settings;
         let watch = Watch { of: self, armed: Vec::new(), watches };
-        let problem = IVP::ode(self, start, end, from.to_vec()).solout(watch);
+        let tolerances = vec![settings.tolerance; MOST_STATES.max(from.len())];
         macro_rules! solved {
-            ($method:expr) => {{
-                let method = $method.rtol(settings.tolerance).atol(settings.tolerance);
-                problem.method(method.h_max(settings.interval).max_steps(MOST_STEPS)).solve()
+            ($method:expr, $state:expr) => {{
+                let method = $method.rtol(tolerances.clone()).atol(tolerances);
+                let method = method.h_max(settings.interval).max_steps(MOST_STEPS);
+                let solution = IVP::ode(self, start, end, $state).solout(watch).method(method).solve();
+                solution
+                    .map(|s| (s.steps.accepted, s.evals.function))
+                    .map_err(|error| simulate::failure(error, start))?
             }};
         }
-        let solution = match settings.method {
-            Method::Adaptive => solved!(ExplicitRungeKutta::dop853()),
-            Method::Stiff => solved!(DiagonallyImplicitRungeKutta::kvaerno745()),
+        macro_rules! implicit {
+            ($room:literal) => {{
+                let mut padded = [0.0; $room];
+                padded[..from.len()].copy_from_slice(from);
+                solved!(ImplicitRungeKutta::radau5().max_rejects(MOST_STEPS), padded)
+            }};
+        }
+        let (steps, evaluations) = match (settings.method, from.len()) {
+            (Method::Adaptive, _) => solved!(ExplicitRungeKutta::dop853(), from.to_vec()),
+            (Method::Stiff, ..=32) => implicit!(32),
+            (Method::Stiff, ..=MOST_STATES) => implicit!(128),
+            (Method::Stiff, n) => {
+                let why = format!("{n} states are more than the {MOST_STATES} that the method `stiff` takes");
+                return Err(Failure { time: start, why });
+            }
         };
-        let solution = solution.map_err(|error| simulate::failure(error, start))?;
-        run.steps += solution.steps.accepted;
-        run.evaluations += solution.evals.function;
+        run.steps += steps;
+        run.evaluations += evaluations;
         let seen = self.seen.borrow();
         match &seen.last {
             Some((time, y)) if !y.iter().all(|x| x.is_finite()) => {
@@ -388,20 +420,22 @@ struct Watch<'a, 'b, 'c> {
     watches: bool,
 }
 
-impl Solout<f64, Vec<f64>> for Watch<'_, '_, '_> {
+impl<Y: State<f64> + AsRef<[f64]>> Solout<f64, Y> for Watch<'_, '_, '_> {
     fn solout<I>(
         &mut self,
         t: f64,
         t_before: f64,
-        y: &Vec<f64>,
-        _: &Vec<f64>,
+        y: &Y,
+        _: &Y,
         interpolator: &mut I,
-        _: &mut Solution<f64, Vec<f64>>,
-    ) -> ControlFlag<f64, Vec<f64>>
+        _: &mut Solution<f64, Y>,
+    ) -> ControlFlag<f64, Y>
     where
-        I: Interpolation<f64, Vec<f64>> + ?Sized,
+        I: Interpolation<f64, Y> + ?Sized,
     {
-        self.of.seen.borrow_mut().last = Some((t, y.clone()));
+        let n = self.of.going.state.len();
+        let y = &y.as_ref()[..n];
+        self.of.seen.borrow_mut().last = Some((t, y.to_vec()));
         if !self.watches || !y.iter().all(|x| x.is_finite()) {
             return ControlFlag::Continue;
         }
@@ -421,7 +455,7 @@ impl Solout<f64, Vec<f64>> for Watch<'_, '_, '_> {
                 break;
             }
             let Ok(state) = interpolator.interpolate(middle) else { break };
-            match first_fallen(&self.armed, &self.of.values(middle, &state)) {
+            match first_fallen(&self.armed, &self.of.values(middle, &state.as_ref()[..n])) {
                 Some(first) => (high, guard) = (middle, first),
                 None => low = middle,
             }

@@ -6,11 +6,12 @@
 
 use super::object::{energy_and_heat, front, released, Slots, SLOTS};
 use super::{Contacts, Touch};
-use crate::plant::Plant;
+use crate::plant::{Action, Plant};
 use std::ops::Range;
 use straightline_core::algorithms::{
-    applied_rows, bias_force, constrained_forward_dynamics, functional_coordinates, mass_matrix, relative_motion,
-    FunctionalCoordinates, Ltdl, RelativeMotion, Support,
+    applied_rows, bias_force, constrained_forward_dynamics, driven_contact_motion, driven_factor,
+    functional_coordinates, mass_matrix, relative_motion, ContactRows, DrivenMotion, FunctionalCoordinates, Ltdl,
+    RelativeMotion, Support,
 };
 use straightline_core::contact::{Contact, Coordinate, Object};
 use straightline_core::spatial::Vec3;
@@ -66,7 +67,7 @@ pub(super) struct Seen {
     /// Distance from the object at rest \[m\], and its rate.
     pub s: (f64, f64),
     /// Its second derivative: A for q̈ = 0, and its row of J.
-    pub row: FunctionalCoordinates<f64>,
+    row: FunctionalCoordinates<f64>,
     /// The same from where the object's front is.
     pub gap: (f64, f64),
     normal: Vec3<f64>,
@@ -75,6 +76,11 @@ pub(super) struct Seen {
 }
 
 impl Seen {
+    /// s̈ \[m/s²\].
+    pub fn acceleration(&self, qdd: &[f64]) -> f64 {
+        self.row.jacobian[0].iter().zip(qdd).map(|(j, a)| j * a).sum::<f64>() + self.row.bias[0]
+    }
+
     /// Where the coordinates of a contact that closes are held: the distance at zero, all others where they are.
     pub fn where_it_closes(&self) -> [f64; 6] {
         let now = functional_coordinates(&self.contact, &self.motion, &Coordinate::ALL).value;
@@ -119,6 +125,8 @@ pub(super) struct Moved {
     pub qdd: Vec<f64>,
     pub force: Vec<f64>,
     pub rows: Rows,
+    /// What the drives do, where there are any.
+    pub drives: Option<DrivenMotion<f64>>,
 }
 
 /// Normal force and friction of a contact \[N\].
@@ -137,24 +145,35 @@ impl<'a> System<'a> {
         self.plant.model.nv()
     }
 
-    /// Place of work and losses in the state.
-    pub fn work(&self) -> usize {
-        self.nq() + self.nv()
+    /// Place of q̇ in the state.
+    pub fn velocities(&self) -> Range<usize> {
+        self.nq()..self.nq() + self.nv()
     }
 
-    /// \[q | q̇ | W | L | coordinates of objects\].
+    /// Place of the states of the drives.
+    pub fn drive_states(&self) -> Range<usize> {
+        let first = self.velocities().end;
+        first..first + self.plant.drive_states()
+    }
+
+    /// Place of the work in the state; the losses come after it.
+    pub fn work(&self) -> usize {
+        self.drive_states().end
+    }
+
+    /// The state is that of the plant, then the coordinates of the objects.
     pub fn parts<'s>(&self, state: &'s [f64]) -> Parts<'s> {
-        let (q, rest) = state.split_at(self.nq());
-        Parts { q, qd: &rest[..self.nv()] }
+        let (q, qd, ..) = self.plant.split(state);
+        Parts { q, qd }
     }
 
     pub fn slots(&self, state: &[f64], k: usize) -> Slots {
-        let first = self.work() + 2 + SLOTS * k;
+        let first = self.plant.states() + SLOTS * k;
         [0, 1, 2, 3].map(|i| state[first + i])
     }
 
     pub fn set_slots(&self, state: &mut [f64], k: usize, slots: Slots) {
-        let first = self.work() + 2 + SLOTS * k;
+        let first = self.plant.states() + SLOTS * k;
         state[first..first + SLOTS].copy_from_slice(&slots);
     }
 
@@ -243,18 +262,31 @@ impl<'a> System<'a> {
         self.contacts.stabilisation.map_or(0.0, |(w, zeta)| -2.0 * zeta * w * sd - w * w * s)
     }
 
+    /// The factor of H, rotors of rigid drives in it.
     pub fn factor(&self, q: &[f64]) -> Ltdl<f64> {
-        Ltdl::factor(&self.plant.model, &mass_matrix(&self.plant.model, q))
+        let (model, h) = (&self.plant.model, mass_matrix(&self.plant.model, q));
+        match self.plant.is_driven() {
+            true => driven_factor(model, q, &h),
+            false => Ltdl::factor(model, &h),
+        }
     }
 
-    /// q̈ and F under generalized forces.
-    pub fn moved(&self, state: &[f64], rows: Rows, tau: &[f64]) -> Moved {
-        let Parts { q, qd, .. } = self.parts(state);
-        let bias = bias_force(&self.plant.model, q, qd);
-        let drive: Vec<f64> = tau.iter().zip(bias).map(|(tau, h)| tau - h).collect();
+    /// q̈ and F under what acts.
+    pub fn moved(&self, state: &[f64], rows: Rows, action: &Action) -> Moved {
+        let (model, Parts { q, qd, .. }) = (&self.plant.model, self.parts(state));
+        let bias = bias_force(model, q, qd);
         let applied = Some(rows.applied.as_slice());
+        if self.plant.is_driven() {
+            let x = self.plant.x(state);
+            let u = self.plant.inputs(qd, x, &action.u);
+            let bias: Vec<f64> = bias.iter().zip(&action.tau).map(|(h, tau)| h - tau).collect();
+            let of = ContactRows { coordinates: &rows.s, applied, supports: &rows.supports, ridge: RIDGE };
+            let (found, drives) = driven_contact_motion(model, (q, qd, x, &u), &bias, &mass_matrix(model, q), of);
+            return Moved { qdd: found.qdd, force: found.force, rows, drives: Some(drives) };
+        }
+        let drive: Vec<f64> = action.tau.iter().zip(bias).map(|(tau, h)| tau - h).collect();
         let found = constrained_forward_dynamics(&self.factor(q), &drive, &rows.s, applied, &rows.supports, RIDGE);
-        Moved { qdd: found.qdd, force: found.force, rows }
+        Moved { qdd: found.qdd, force: found.force, rows, drives: None }
     }
 
     /// Power that moving objects give, reactions or impulses being F: what F does on the robot, less what it does on the way
@@ -289,8 +321,7 @@ impl<'a> System<'a> {
 
     /// Energy of robot and objects \[J\].
     pub fn energy(&self, t: f64, state: &[f64], phases: &Phases) -> f64 {
-        let Parts { q, qd, .. } = self.parts(state);
-        self.plant.energy(q, qd) + self.energy_of_objects(t, state, phases)
+        self.plant.stored(state) + self.energy_of_objects(t, state, phases)
     }
 
     /// Energy of masses and springs of objects \[J\].
@@ -304,17 +335,25 @@ impl<'a> System<'a> {
     }
 
     /// The time derivative of the state.
-    pub fn rate(&self, t: f64, state: &[f64], phases: &Phases, tau: &[f64], rate: &mut [f64]) {
+    pub fn rate(&self, t: f64, state: &[f64], phases: &Phases, action: &Action, rate: &mut [f64]) {
         let state = &self.plant.normalised(state);
         let Parts { q, qd, .. } = self.parts(state);
         let seen = self.see_all(t, state);
-        let moved = self.moved(state, self.rows(state, &seen, phases), tau);
-        let (nq, work) = (self.nq(), self.work());
-        rate[..nq].copy_from_slice(&self.plant.configuration_rate(q, qd));
-        rate[nq..work].copy_from_slice(&moved.qdd);
-        let given: f64 = tau.iter().zip(qd).map(|(tau, qd)| tau * qd).sum();
+        let moved = self.moved(state, self.rows(state, &seen, phases), action);
+        let work = self.work();
+        rate[..self.nq()].copy_from_slice(&self.plant.configuration_rate(q, qd));
+        rate[self.velocities()].copy_from_slice(&moved.qdd);
+        let given: f64 = action.tau.iter().zip(qd).map(|(tau, qd)| tau * qd).sum();
         rate[work] = given + self.power_of_objects(state, &seen, &moved.rows, &moved.force);
         rate[work + 1] = self.plant.losses(qd) + self.heat(state, &seen, &moved, phases);
+        if let Some(drives) = &moved.drives {
+            rate[self.drive_states()].copy_from_slice(&drives.xd);
+            let energies = &mut rate[work + 2..self.plant.states()];
+            energies.fill(0.0);
+            for flow in &drives.flows {
+                energies.iter_mut().zip(flow.powers()).for_each(|(sum, power)| *sum += power);
+            }
+        }
         for (k, seen) in seen.iter().enumerate() {
             let slots = self.slots(state, k);
             let rates = match (&self.touches()[k].environment, phases[k]) {
@@ -355,7 +394,7 @@ impl<'a> System<'a> {
         state: &[f64],
         moved: &Moved,
         phases: &Phases,
-        tau: &[f64],
+        action: &Action,
     ) -> [f64; GUARDS] {
         let (touch, at) = (&self.touches()[k], &seen[k]);
         let never = f64::INFINITY;
@@ -370,28 +409,28 @@ impl<'a> System<'a> {
         match closed.slip {
             Slip::Smooth => [ends, never, never],
             Slip::Fast => [ends, at.slip_speed() - speed, never],
-            Slip::Slow => [ends, 2.0 * speed - at.slip_speed(), self.excess(k, seen, state, phases, tau)],
+            Slip::Slow => [ends, 2.0 * speed - at.slip_speed(), self.excess(k, seen, state, phases, action)],
             Slip::Sticks => [ends, coefficient * pressed.normal - pressed.tangential, never],
         }
     }
 
     /// What friction lacks to hold a contact that slides slowly \[N\]: negative where it sticks.
-    pub fn excess(&self, k: usize, seen: &[Seen], state: &[f64], phases: &Phases, tau: &[f64]) -> f64 {
+    pub fn excess(&self, k: usize, seen: &[Seen], state: &[f64], phases: &Phases, action: &Action) -> f64 {
         let mut held = phases.clone();
         if let Some(closed) = &mut held[k] {
             closed.slip = Slip::Sticks;
             closed.held = seen[k].where_it_sticks(closed.held);
         }
-        let moved = self.moved(state, self.rows(state, seen, &held), tau);
+        let moved = self.moved(state, self.rows(state, seen, &held), action);
         let pressed = self.pressed(k, &seen[k], &moved);
         pressed.tangential - self.touches()[k].contact.friction.map_or(0.0, |f| f.coefficient) * pressed.normal
     }
 
     /// The guards of all contacts.
-    pub fn all_guards(&self, t: f64, state: &[f64], phases: &Phases, tau: &[f64]) -> Vec<f64> {
+    pub fn all_guards(&self, t: f64, state: &[f64], phases: &Phases, action: &Action) -> Vec<f64> {
         let state = &self.plant.normalised(state);
         let seen = self.see_all(t, state);
-        let moved = self.moved(state, self.rows(state, &seen, phases), tau);
-        (0..seen.len()).flat_map(|k| self.guards(k, &seen, state, &moved, phases, tau)).collect()
+        let moved = self.moved(state, self.rows(state, &seen, phases), action);
+        (0..seen.len()).flat_map(|k| self.guards(k, &seen, state, &moved, phases, action)).collect()
     }
 }

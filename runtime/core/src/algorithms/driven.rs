@@ -47,7 +47,7 @@ pub fn drives_are_diagonal<T>(drives: &[Drive<T>]) -> bool {
 }
 
 /// A robot and its drives at a state.
-struct Driven<'a, T> {
+pub(super) struct Driven<'a, T> {
     model: &'a Model<T>,
     q: &'a [T],
     drives: &'a [Drive<T>],
@@ -68,15 +68,15 @@ struct Spin<T> {
 }
 
 /// What a motion is, of all shafts.
-struct Motion<T> {
+pub(super) struct Motion<T> {
     /// φ̈ of every drive's last shaft.
-    phi: Vec<T>,
+    pub phi: Vec<T>,
     /// J a · ω̇ of every rotor on a moving link.
-    spin: Vec<T>,
+    pub spin: Vec<T>,
 }
 
 impl<'a, T: Real> Driven<'a, T> {
-    fn new(model: &'a Model<T>, drives: &'a [Drive<T>], (q, qd, x, u): (&'a [T], &[T], &[T], &[T])) -> Self {
+    pub(super) fn new(model: &'a Model<T>, drives: &'a [Drive<T>], (q, qd, x, u): (&'a [T], &[T], &[T], &[T])) -> Self {
         T::section("drives", None);
         let mut first = 0;
         let states = drives.iter().zip(u).map(|(drive, u)| {
@@ -99,12 +99,12 @@ impl<'a, T: Real> Driven<'a, T> {
     }
 
     /// Inertia that turns with the actuator of an elastic drive.
-    fn first_shaft(&self, k: usize) -> T {
+    pub(super) fn first_shaft(&self, k: usize) -> T {
         self.states[k].actuator_inertia + self.drives[k].stages[0].inertia
     }
 
     /// What the drives add to H: Nᵀ r J N, and of rotors on moving links.
-    fn add_inertias(&self, h: &mut [T], losses: &[T]) {
+    pub(super) fn add_inertias(&self, h: &mut [T], losses: &[T]) {
         let nv = self.nv();
         let mut add = |i: usize, j: usize, x: T| h[i * nv + j] = h[i * nv + j] + x;
         for (k, state) in self.states.iter().enumerate() {
@@ -136,7 +136,7 @@ impl<'a, T: Real> Driven<'a, T> {
     }
 
     /// What the drives put on the joints while q̈ = 0: Nᵀ r e and springs, less gyroscopic moments.
-    fn free_forces(&self, losses: &[T]) -> Vec<T> {
+    pub(super) fn free_forces(&self, losses: &[T]) -> Vec<T> {
         let mut forces = vec![T::zero(); self.nv()];
         for (k, state) in self.states.iter().enumerate() {
             for (i, n) in self.row(k) {
@@ -170,7 +170,7 @@ impl<'a, T: Real> Driven<'a, T> {
     }
 
     /// φ̈ of the last shafts and J a · ω̇.
-    fn motion(&self, qdd: &[T]) -> Motion<T> {
+    pub(super) fn motion(&self, qdd: &[T]) -> Motion<T> {
         let phi = (0..self.drives.len()).map(|k| sum(self.row(k).map(|(i, n)| n * qdd[i])));
         let spin = |k: usize| match (&self.spins[k], &self.drives[k].rotor) {
             (Some(spin), Some(rotor)) => {
@@ -183,14 +183,19 @@ impl<'a, T: Real> Driven<'a, T> {
 
     /// q̈ and the losses that go with it.
     fn solve(&self, bias: &[T], links: &Links<T>) -> (Vec<T>, Vec<T>) {
+        self.settled(|losses| self.solve_with(bias, links, losses), |qdd| qdd)
+    }
+
+    /// What `solve` finds with losses that fit the accelerations in it, and these losses.
+    pub(super) fn settled<R>(&self, solve: impl Fn(&[T]) -> R, qdd: impl Fn(&R) -> &[T]) -> (R, Vec<T>) {
         let lossy = self.drives.iter().any(|d| d.efficiency.is_some());
         let mut losses = self.losses(None);
-        let mut qdd = self.solve_with(bias, links, &losses);
+        let mut found = solve(&losses);
         for _ in 0..if lossy { PASSES } else { 0 } {
-            losses = self.losses(Some(&self.motion(&qdd).phi));
-            qdd = self.solve_with(bias, links, &losses);
+            losses = self.losses(Some(&self.motion(qdd(&found)).phi));
+            found = solve(&losses);
         }
-        (qdd, losses)
+        (found, losses)
     }
 
     fn solve_with(&self, bias: &[T], links: &Links<T>, losses: &[T]) -> Vec<T> {
@@ -218,7 +223,7 @@ impl<'a, T: Real> Driven<'a, T> {
         }
     }
 
-    fn factor(&self, h: &[T]) -> Ltdl<T> {
+    pub(super) fn factor(&self, h: &[T]) -> Ltdl<T> {
         match joins_branches(self.model, self.drives) {
             true => Ltdl::factor_dense(self.model, h),
             false => Ltdl::factor(self.model, h),
@@ -356,14 +361,21 @@ pub fn driven_motion<T: Real>(
 ) -> DrivenMotion<T> {
     let driven = Driven::new(model, &model.drives, (q, qd, x, u));
     let (qdd, losses) = driven.solve(bias, links);
-    let motion = driven.motion(&qdd);
-    let (mut xd, mut flows) = (Vec::new(), Vec::new());
-    for (k, drive) in model.drives.iter().enumerate() {
-        let own = &x[xd.len()..xd.len() + drive.states()];
-        flows.push(driven.flow(k, own, u[k], &motion, losses[k]));
-        xd.extend(driven.state_derivative(k, own, u[k], &motion));
+    driven.finished((x, u), qdd, &losses)
+}
+
+impl<T: Real> Driven<'_, T> {
+    /// What goes on in the drives at accelerations with their losses.
+    pub(super) fn finished(&self, (x, u): (&[T], &[T]), qdd: Vec<T>, losses: &[T]) -> DrivenMotion<T> {
+        let motion = self.motion(&qdd);
+        let (mut xd, mut flows) = (Vec::new(), Vec::new());
+        for (k, drive) in self.drives.iter().enumerate() {
+            let own = &x[xd.len()..xd.len() + drive.states()];
+            flows.push(self.flow(k, own, u[k], &motion, losses[k]));
+            xd.extend(self.state_derivative(k, own, u[k], &motion));
+        }
+        DrivenMotion { tau: self.forces(&qdd, losses), qdd, xd, flows }
     }
-    DrivenMotion { tau: driven.forces(&qdd, &losses), qdd, xd, flows }
 }
 
 impl<T: Real> Driven<'_, T> {
@@ -509,7 +521,7 @@ impl<T: Real> Driven<'_, T> {
     }
 
     /// As [`Driven::motion`], of a difference of accelerations.
-    fn motion_per_input(&self, qdd: &[T]) -> Motion<T> {
+    pub(super) fn motion_per_input(&self, qdd: &[T]) -> Motion<T> {
         let motion = self.motion(qdd);
         let spin = motion.spin.into_iter().enumerate().map(|(k, x)| match (&self.spins[k], &self.drives[k].rotor) {
             (Some(spin), Some(rotor)) => x - rotor.inertia * spin.bias,

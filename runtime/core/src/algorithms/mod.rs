@@ -52,6 +52,7 @@
 //! | contact coordinates, (20.83)-(20.87) | [`relative_motion`], [`functional_coordinates`] |
 //! | motion and reactions in contact, (20.88)-(20.94) | [`constrained_forward_dynamics`], [`hybrid_inverse_dynamics`], [`Environment`] |
 //! | impact, (20.90)-(20.97) | [`impact`](fn@impact) |
+//! | motion and reactions in contact under the inputs of drives | [`driven_contact_motion`] |
 
 mod aba;
 mod actuator;
@@ -60,6 +61,7 @@ mod constraint;
 mod contact_system;
 mod crba;
 mod driven;
+mod driven_contact;
 mod driven_inverse;
 mod effects;
 mod energy;
@@ -89,6 +91,7 @@ pub use driven::{
     complete_model, drive_energy, drive_power, drive_states, drive_torques, driven_motion, drives_are_diagonal,
     state_space, DriveFlow, DrivenMotion, Links,
 };
+pub use driven_contact::{driven_contact_motion, driven_factor, driven_jump, ContactRows};
 pub use driven_inverse::{drive_demands, driven_inverse, inverse_orders, reads_states, Demand, InverseOrders};
 pub use effects::{passive_force, rotor_inertias};
 pub use energy::{kinetic_energy, potential_energy};
