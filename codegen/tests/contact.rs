@@ -304,3 +304,48 @@ fn what_sticks_is_not_pulled_to_the_origin_and_what_gives_way_not_to_the_surface
     let dq = run(&soft, &loaded("ur5.urdf", &soft), ContactFunction::Projection, &[("q", q)]);
     assert_eq!(result(&dq, "dq"), [0.0; 6]);
 }
+
+#[test]
+fn drives_in_contact_are_the_robot_of_the_drives_with_the_reactions_on_it() {
+    let path = |name: &str| format!("{}/../robots/scenes/{name}", env!("CARGO_MANIFEST_DIR"));
+    for scene in ["planar_2r_drives.toml", "planar_2r_elastic.toml"] {
+        let text = std::fs::read_to_string(path(scene)).expect("a scene");
+        let contact = "[outputs]\nfunctions = []\n[[contact]]\nname = \"wall\"\nframe = \"tip\"\nobject = { origin = [0.4, 0.0, 0.1], z = \
+                       [-1.0, 0.0, 0.3] }\nconstrained = [\"pz\"]\n";
+        let options = options(&(text + contact));
+        let mut diagnostics = Diagnostics::new();
+        let (model, _) = model::load(&source("planar_2r.toml"), &options.scene.model_options(&options.model));
+        let model = scene::apply(model.expect("a robot"), &options.scene, &mut diagnostics).expect("a scene");
+        let robot = Robot::new(model);
+        let model = robot.model.cast::<f64>();
+        let n = alg::drive_states(&model);
+        let (q, qd, u) = ([0.3, -0.7], [0.4, -0.9], [7.0, -4.0]);
+        let x: Vec<f64> = (0..n).map(|k| [29.7, 35.0, 1.2, -69.0, -88.0, 0.7][k % 6]).collect();
+        let inputs: [(&str, &[f64]); 4] = [("q", &q), ("qd", &qd), ("x", &x), ("u", &u)];
+        let motion = run(&options, &robot, ContactFunction::DrivenForwardDynamics, &inputs);
+        let found = run(&options, &robot, ContactFunction::ConstrainedCoordinates, &inputs);
+        let (j, a, force) = (result(&found, "j"), result(&found, "a"), result(&motion, "force")[0]);
+        let qdd = result(&motion, "qdd");
+        let sdd = j[0] * qdd[0] + j[1] * qdd[1] + a[0];
+        assert!(sdd.abs() < 1e-9 * (j[0] * qdd[0]).abs() && force.abs() > 1.0, "{scene}: {sdd}");
+        // the reaction given as a force beside, by the function without contact
+        let h = alg::bias_force(&model, &q, &qd);
+        let with_reaction: Vec<f64> = (0..2).map(|i| h[i] - j[i] * force).collect();
+        let mass_matrix = alg::mass_matrix(&model, &q);
+        let links = alg::Links::MassMatrix(&mass_matrix);
+        let expected = alg::driven_motion(&model, (&q, &qd, &x, &u), &with_reaction, &links);
+        for (a, b) in qdd.iter().chain(result(&motion, "xd")).zip(expected.qdd.iter().chain(&expected.xd)) {
+            assert!((a - b).abs() <= 1e-10 * b.abs().max(1.0), "{scene}: {a} for {b}");
+        }
+        // H* Δq̇ = Jᵀ I
+        let (h_star, ..) = alg::complete_model(&model, (&q, &qd, &x), &h, &mass_matrix);
+        let blow = run(&options, &robot, ContactFunction::Impact, &[("q", &q), ("qd", &qd), ("restitution", &[0.3])]);
+        let (dqd, impulse) = (result(&blow, "dqd"), result(&blow, "impulse")[0]);
+        for i in 0..2 {
+            let momentum = h_star[2 * i] * dqd[0] + h_star[2 * i + 1] * dqd[1];
+            assert!((momentum - j[i] * impulse).abs() < 1e-10 * impulse.abs(), "{scene}");
+        }
+        let sd = result(&found, "sd")[0];
+        assert!((j[0] * dqd[0] + j[1] * dqd[1] + 1.3 * sd).abs() < 1e-10);
+    }
+}

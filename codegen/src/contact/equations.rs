@@ -8,7 +8,7 @@ use crate::scene::{Bound, ContactFunction};
 use crate::trace::Expr;
 use std::collections::BTreeMap;
 use straightline_core::algorithms as alg;
-use straightline_core::algorithms::{Environment, FunctionalCoordinates, Ltdl, RelativeMotion};
+use straightline_core::algorithms::{ContactRows, Environment, FunctionalCoordinates, Ltdl, RelativeMotion};
 use straightline_core::algorithms::{Struck, Support};
 use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion};
 use straightline_core::spatial::{Mat3, MotionVector, Transform, Vec3};
@@ -51,7 +51,13 @@ pub(super) fn equations(
             reduced.then(|| function.evaluate_reduced(model, for_torques, composite, method, arguments)).flatten();
         by_reduced.unwrap_or_else(|| function.evaluate(model, &[], method, arguments))
     };
-    let factor = || Ltdl::factor(&bound.model, &of_robot(Function::MassMatrix, std::slice::from_ref(q)));
+    let mass_matrix = || of_robot(Function::MassMatrix, std::slice::from_ref(q));
+    let factor = || Ltdl::factor(&bound.model, &mass_matrix());
+    // rotors of rigid drives are struck, too
+    let whole_factor = || match bound.model.drives.is_empty() {
+        true => factor(),
+        false => alg::driven_factor(&bound.model, q, &mass_matrix()),
+    };
     let epsilon = Expr::constant(Dd::from(ridge(options.scalar)));
     let applied = || -> Option<Vec<Vec<Expr>>> {
         let slides = traced.iter().any(|t| t.closed.is_some_and(|c| c.slides));
@@ -61,9 +67,8 @@ pub(super) fn equations(
     match function {
         ContactFunction::ConstrainedCoordinates => list(constrained),
         ContactFunction::FreeCoordinates => list(free()),
-        ContactFunction::ForwardDynamics => {
+        ContactFunction::ForwardDynamics | ContactFunction::DrivenForwardDynamics => {
             let bias = of_robot(Function::BiasForce, &[q.clone(), qd.clone()]);
-            let drive: Vec<Expr> = bound.arguments[2].iter().zip(bias).map(|(tau, h)| *tau - h).collect();
             let stabilised = match options.scene.contacts.stabilisation {
                 Some((frequency, damping)) => {
                     let [frequency, damping] = [frequency, damping].map(|x| Expr::constant(Dd::from(x)));
@@ -94,15 +99,25 @@ pub(super) fn equations(
                 first += t.constrained.len();
             }
             let applied = applied();
-            let motion = alg::constrained_forward_dynamics(
-                &factor(),
-                &drive,
-                &constrained,
-                applied.as_deref(),
-                &supports,
-                epsilon,
-            );
-            let results = vec![motion.qdd, motion.force, motion.sdd, motion.violation, vec![motion.pivot]];
+            let (motion, xd) = if function == ContactFunction::DrivenForwardDynamics {
+                let at = (&q[..], &qd[..], &bound.arguments[2][..], &bound.arguments[3][..]);
+                let rows = ContactRows {
+                    coordinates: &constrained,
+                    applied: applied.as_deref(),
+                    supports: &supports,
+                    ridge: epsilon,
+                };
+                let (motion, drives) = alg::driven_contact_motion(&bound.model, at, &bias, &mass_matrix(), rows);
+                (motion, vec![drives.xd])
+            } else {
+                let drive: Vec<Expr> = bound.arguments[2].iter().zip(bias).map(|(tau, h)| *tau - h).collect();
+                let (factor, applied) = (factor(), applied.as_deref());
+                let motion =
+                    alg::constrained_forward_dynamics(&factor, &drive, &constrained, applied, &supports, epsilon);
+                (motion, vec![])
+            };
+            let results = [vec![motion.qdd], xd].concat();
+            let results = [results, vec![motion.force, motion.sdd, motion.violation, vec![motion.pivot]]].concat();
             [results, own_rates].concat()
         }
         ContactFunction::InverseDynamics => {
@@ -140,8 +155,15 @@ pub(super) fn equations(
                 first += t.constrained.len();
             }
             let applied = applied();
-            let blow =
-                alg::impact(&factor(), qd, &constrained, applied.as_deref(), &struck, added["restitution"][0], epsilon);
+            let blow = alg::impact(
+                &whole_factor(),
+                qd,
+                &constrained,
+                applied.as_deref(),
+                &struck,
+                added["restitution"][0],
+                epsilon,
+            );
             let after = places.iter().map(|k| vec![blow.struck_velocity[*k]]).collect();
             let results = vec![blow.dqd, blow.impulse, blow.dsd, vec![blow.energy_loss], vec![blow.pivot]];
             [results, after].concat()
@@ -159,7 +181,7 @@ pub(super) fn equations(
             };
             let correction = match rigid.is_empty() {
                 true => vec![Expr::zero(); bound.model.nv()],
-                false => alg::projection(&factor(), &rigid, &kept(&deviations), epsilon),
+                false => alg::projection(&whole_factor(), &rigid, &kept(&deviations), epsilon),
             };
             vec![correction, constrained.value]
         }

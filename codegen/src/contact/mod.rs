@@ -11,11 +11,12 @@ use crate::choose::choose;
 use crate::compile::{Forms, Optimisations, Options};
 use crate::emit::{snake_case, Scalar};
 use crate::expr::{verify, Graph, Port};
-use crate::function::{ForwardDynamicsMethod, Function, Robot};
+use crate::function::{DriveFunction, ForwardDynamicsMethod, Function, Robot};
 use crate::pass::{dead_code, sums, unread_inputs};
 use crate::scene::contact::{ContactItem, EnvironmentKind, LoopItem, ModeItem};
 use crate::scene::{is_optional, ContactFunction, Scene};
 use crate::trace::trace;
+use straightline_core::algorithms::drive_states;
 use straightline_core::contact::Coordinate;
 use straightline_core::model::Model;
 use straightline_core::Dd;
@@ -111,7 +112,12 @@ pub struct ModeProgram {
 pub fn programs(robot: &Robot, options: &Options, mode: &Mode) -> Vec<ModeProgram> {
     let wanted = options.scene.contacts.wanted();
     let has_free = !mode.free_names().is_empty();
-    let wanted = wanted.into_iter().filter(|f| has_free || *f != ContactFunction::FreeCoordinates);
+    let is_driven = !robot.model.drives.is_empty();
+    let wanted = wanted.into_iter().filter(|f| match f {
+        ContactFunction::FreeCoordinates => has_free,
+        ContactFunction::DrivenForwardDynamics => is_driven,
+        _ => true,
+    });
     wanted.map(|function| ModeProgram { function, graph: graph(robot, options, mode, function) }).collect()
 }
 
@@ -145,7 +151,8 @@ pub fn graph(robot: &Robot, options: &Options, mode: &Mode, function: ContactFun
         assert!(results.iter().map(Vec::len).eq(lengths.iter().copied()), "results fit the outputs");
         results.concat()
     });
-    let unused = |port: &Port| is_optional(port) || port.name == "qd" || names.contains(&port.name);
+    let unused =
+        |port: &Port| is_optional(port) || matches!(port.name.as_str(), "qd" | "x" | "u") || names.contains(&port.name);
     let graph = check(unread_inputs(check(dead_code(&check(traced))), unused));
     match optimisations.sums {
         true => check(dead_code(&check(sums(&graph)))),
@@ -157,9 +164,14 @@ pub fn graph(robot: &Robot, options: &Options, mode: &Mode, function: ContactFun
 fn base_function(function: ContactFunction) -> Function {
     match function {
         ContactFunction::ForwardDynamics => Function::ForwardDynamics,
+        ContactFunction::DrivenForwardDynamics => Function::Drive(DriveFunction::ForwardDynamics),
         ContactFunction::InverseDynamics => Function::InverseDynamics,
         _ => Function::BiasForce,
     }
+}
+
+fn is_forward(function: ContactFunction) -> bool {
+    matches!(function, ContactFunction::ForwardDynamics | ContactFunction::DrivenForwardDynamics)
 }
 
 /// What it takes beside.
@@ -179,7 +191,7 @@ fn added_ports(function: ContactFunction, mode: &Mode, model: &Model<Dd>) -> Vec
             ports.push(Port::new(&format!("{name}_environment"), &[environment.kind.keys().len()]));
         }
         let (own, struck) = closed.of_environment();
-        if own && function == ContactFunction::ForwardDynamics {
+        if own && is_forward(function) {
             ports.push(Port::new(&format!("{name}_own"), &[2]));
         }
         if struck && function == ContactFunction::Impact {
@@ -211,9 +223,13 @@ fn outputs(function: ContactFunction, mode: &Mode, model: &Model<Dd>) -> Vec<Por
     match function {
         ContactFunction::ConstrainedCoordinates => coordinates(m),
         ContactFunction::FreeCoordinates => coordinates(mode.free_names().len()),
-        ContactFunction::ForwardDynamics => [
+        ContactFunction::ForwardDynamics | ContactFunction::DrivenForwardDynamics => [
+            vec![Port::new("qdd", &[nv])],
+            match function {
+                ContactFunction::DrivenForwardDynamics => vec![Port::new("xd", &[drive_states(model)])],
+                _ => vec![],
+            },
             vec![
-                Port::new("qdd", &[nv]),
                 Port::new("force", &[m]),
                 Port::new("sdd", &[m]),
                 Port::new("violation", &[m]),

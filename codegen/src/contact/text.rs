@@ -144,6 +144,10 @@ fn doc(function: ContactFunction, mode: &Mode, inputs: &[Port], outputs: &[Port]
         ContactFunction::ForwardDynamics => {
             "Motion and reactions in contact: H q̈ + h = τ + Jᵀ F, s̈^c = J q̈ + A, (20.88)-(20.89)."
         }
+        ContactFunction::DrivenForwardDynamics => {
+            "Motion and reactions in contact under the inputs of the drives: H* q̈ + h* = D u + Jᵀ F, s̈^c = J q̈ + A, (20.72) with \
+             (20.88)-(20.89)."
+        }
         ContactFunction::InverseDynamics => {
             "Drives of a wanted motion along s^f and of wanted reactions: hybrid feed-forward. Of the motions that do it, the \
              one nearest to `qdd` in kinetic energy is taken."
@@ -162,6 +166,9 @@ fn doc(function: ContactFunction, mode: &Mode, inputs: &[Port], outputs: &[Port]
             "q" => "configuration \\[rad or m\\]",
             "qd" => "velocities \\[rad/s or m/s\\]",
             "tau" => "generalized forces \\[N·m or N\\]",
+            "x" => "state of the drives, as of `driven_forward_dynamics` of the robot",
+            "u" => "inputs of the drives \\[V, or as in the robot file\\]",
+            "xd" => "derivative of the drives' state, in the order of x",
             "gravity" => "acceleration due to gravity in the world \\[m/s²\\]",
             "qdd" => "accelerations \\[rad/s² or m/s²\\]",
             "force" => "reactions F along s^c \\[N, or N·m of an axis\\]",

@@ -35,6 +35,8 @@ pub enum ContactFunction {
     FreeCoordinates,
     /// Accelerations and reactions of a tau.
     ForwardDynamics,
+    /// The same under the inputs of the drives, of a robot that has drives.
+    DrivenForwardDynamics,
     /// tau of a motion along s^f and of reactions.
     InverseDynamics,
     /// Changes of velocity and impulses when the contacts of the mode close.
@@ -45,10 +47,11 @@ pub enum ContactFunction {
 
 impl ContactFunction {
     /// All of them, with their names in generated code.
-    pub const WORDS: [(&'static str, ContactFunction); 6] = [
+    pub const WORDS: [(&'static str, ContactFunction); 7] = [
         ("constrained_coordinates", ContactFunction::ConstrainedCoordinates),
         ("free_coordinates", ContactFunction::FreeCoordinates),
         ("forward_dynamics", ContactFunction::ForwardDynamics),
+        ("driven_forward_dynamics", ContactFunction::DrivenForwardDynamics),
         ("inverse_dynamics", ContactFunction::InverseDynamics),
         ("impact", ContactFunction::Impact),
         ("projection", ContactFunction::Projection),
