@@ -1,9 +1,10 @@
-//! Scaling: operations, time and error of chains of 2 … 128 joints.
+//! Scaling: operations, time, error and compile time of chains of 2 … 128 joints.
 
 use crate::chart::{self, Curve, Curves};
 use crate::{record, write};
 use serde_json::json;
 use std::fmt::Write;
+use std::time::Instant;
 use straightline_codegen::compile::program;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::{compile, expr, ForwardDynamicsMethod, Function, Options, Scalar, Source};
@@ -57,7 +58,7 @@ fn error<T: Real + Into<f64>>(graph: &expr::Graph, states: usize) -> f64 {
     worst
 }
 
-/// Best nanoseconds per call, of code compiled for this processor.
+/// Best nanoseconds per call, of code compiled for this processor, and the seconds that rustc took.
 fn time(
     folder: &Folder,
     source: &Source,
@@ -65,7 +66,7 @@ fn time(
     function: Function,
     lengths: &[usize],
     shape: &[usize],
-) -> f64 {
+) -> (f64, f64) {
     let generated = compile(source, options).unwrap_or_else(|d| panic!("{d}"));
     let arguments: Vec<String> = (0..lengths.len()).map(|i| format!("&x{i}[k]")).collect();
     let made: String = lengths
@@ -84,8 +85,11 @@ fn time(
         function.name(),
         arguments.join(", ")
     );
+    let start = Instant::now();
     let program = folder.build("scaling", &text, &["-Ctarget-cpu=native"]).unwrap_or_else(|e| panic!("{e}"));
-    run_program(&program, &[]).unwrap_or_else(|e| panic!("{e}")).trim().parse().expect("a number")
+    let seconds = start.elapsed().as_secs_f64();
+    let ns = run_program(&program, &[]).unwrap_or_else(|e| panic!("{e}")).trim().parse().expect("a number");
+    (ns, seconds)
 }
 
 pub fn run() {
@@ -94,6 +98,7 @@ pub fn run() {
     let new = |name: String, colour, dashed| Curve { name, colour, dashed, points: Vec::new() };
     let mut operations: Vec<Curve> = KINDS.iter().enumerate().map(|(i, k)| new(k.0.into(), i, false)).collect();
     let mut times: Vec<Curve> = KINDS.iter().enumerate().map(|(i, k)| new(k.0.into(), i, false)).collect();
+    let mut builds: Vec<Curve> = KINDS.iter().enumerate().map(|(i, k)| new(k.0.into(), i, false)).collect();
     let mut errors: Vec<Curve> = Vec::new();
     for (i, kind) in KINDS.iter().enumerate().filter(|(i, _)| *i != 0 && *i != 4) {
         errors.push(new(format!("{}, f64", kind.0), i, false));
@@ -102,8 +107,9 @@ pub fn run() {
     let mut text = String::from(
         "# Scaling with the number of joints\n\n`cargo bench -p straightline-generated-tests --features charts --bench time_error -- scaling`\n\n\
          Chains of rods about x, y and z in turn. Time: f64, warm, compiled for the processor, best of 12. Errors: worst of 50 random\n\
-         states over the greatest result of the state.\n\n\
-         | joints | function | mul | add | sincos | ns | error f64 | error f32 |\n|---|---|---|---|---|---|---|---|\n",
+         states over the greatest result of the state. rustc: seconds to compile a program of that function, of which an empty one takes\n\
+         the first tenths.\n\n\
+         | joints | function | mul | add | sincos | ns | error f64 | error f32 | rustc, s |\n|---|---|---|---|---|---|---|---|---|\n",
     );
     for n in JOINTS {
         let source = chain(n);
@@ -118,26 +124,27 @@ pub fn run() {
             let counts = double.counts();
             let (e64, e32) = (error::<f64>(&double, 50), error::<f32>(&single, 50));
             let lengths: Vec<usize> = double.inputs.iter().map(|p| p.len()).collect();
-            let ns = time(&folder, &source, &options, function, &lengths, &double.outputs[0].shape);
+            let (ns, seconds) = time(&folder, &source, &options, function, &lengths, &double.outputs[0].shape);
             let _ = writeln!(
                 text,
-                "| {n} | {name} | {} | {} | {} | {ns:.0} | {e64:.1e} | {e32:.1e} |",
+                "| {n} | {name} | {} | {} | {} | {ns:.0} | {e64:.1e} | {e32:.1e} | {seconds:.1} |",
                 counts.mul, counts.add, counts.sin_cos
             );
             rows.push(
                 json!({"joints": n, "function": name, "mul": counts.mul, "add": counts.add, "sincos": counts.sin_cos,
-                             "ns": ns, "error_f64": e64, "error_f32": e32}),
+                             "ns": ns, "error_f64": e64, "error_f32": e32, "rustc_s": seconds}),
             );
             let n = n as f64;
             operations[i].points.push((n, counts.flops() as f64));
             times[i].points.push((n, ns));
+            builds[i].points.push((n, 1e9 * seconds));
             for (curve, e) in [("f64", e64), ("f32", e32)] {
                 let name = format!("{name}, {curve}");
                 if let Some(curve) = errors.iter_mut().find(|c| c.name == name) {
                     curve.points.push((n, e));
                 }
             }
-            println!("{n} {name}: {} operations, {ns:.0} ns, {e64:.1e}, {e32:.1e}", counts.flops());
+            println!("{n} {name}: {} operations, {ns:.0} ns, {e64:.1e}, {e32:.1e}, {seconds:.1} s", counts.flops());
         }
     }
     let joints = |x: &f64| format!("{x}");
@@ -145,6 +152,7 @@ pub fn run() {
     let charts = [
         chart("Chains of 2 … 128 joints: operations", "multiplications and additions", &chart::power, &operations),
         chart("Time per evaluation, f64, warm", "time", &chart::time, &times),
+        chart("Time to compile", "time of rustc", &chart::time, &builds),
         chart("Worst error of 50 random states", "error over the greatest result", &chart::power, &errors),
     ];
     chart::curves(&charts, &record("2026-11-21-time-error-scaling.svg"));

@@ -39,73 +39,93 @@ const LANES_F32: usize = if LANES_F64 > 1 { 2 * LANES_F64 } else { 1 };
 
 /// [`sin_cos_f64`] of several angles: the same bits, by vector instructions where there are any.
 ///
-/// Inlined, so that sines and cosines stay in registers.
+/// Inlined, so that sines and cosines stay in registers. Every loop over lanes has a constant number of turns, or it would
+/// not become vector instructions: whole blocks first, then the rest.
 #[inline(always)]
 #[must_use]
 pub fn sin_cos_lanes_f64<const N: usize>(x: [f64; N]) -> ([f64; N], [f64; N]) {
     const BLOCK: usize = 8;
     let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
+    let (mut sin, mut cos) = ([0.0; BLOCK], [0.0; BLOCK]);
     let mut first = 0;
-    while first < N {
-        let used = if N - first < BLOCK { N - first } else { BLOCK };
-        let (mut angle, mut sin, mut cos) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
-        angle[..used].copy_from_slice(&x[first..first + used]);
-        for i in 0..used.next_multiple_of(LANES_F64) {
+    while first + BLOCK <= N {
+        let mut angle = [0.0; BLOCK];
+        angle.copy_from_slice(&x[first..first + BLOCK]);
+        for i in 0..BLOCK {
             (sin[i], cos[i]) = sin_cos_f64(angle[i]);
         }
-        sines[first..first + used].copy_from_slice(&sin[..used]);
-        cosines[first..first + used].copy_from_slice(&cos[..used]);
+        sines[first..first + BLOCK].copy_from_slice(&sin);
+        cosines[first..first + BLOCK].copy_from_slice(&cos);
         first += BLOCK;
     }
+    let mut angle = [0.0; BLOCK];
+    angle[..N % BLOCK].copy_from_slice(&x[N - N % BLOCK..]);
+    for i in 0..(N % BLOCK).next_multiple_of(LANES_F64) {
+        (sin[i], cos[i]) = sin_cos_f64(angle[i]);
+    }
+    sines[N - N % BLOCK..].copy_from_slice(&sin[..N % BLOCK]);
+    cosines[N - N % BLOCK..].copy_from_slice(&cos[..N % BLOCK]);
     (sines, cosines)
 }
 
-/// [`sin_cos_of_sum_f64`] of several sums: the same bits, by vector instructions where there are any.
-///
-/// Inlined, so that sines and cosines stay in registers.
+/// [`sin_cos_of_sum_f64`] of several sums: the same bits, by vector instructions where there are any; as
+/// [`sin_cos_lanes_f64`].
 #[inline(always)]
 #[must_use]
 pub fn sin_cos_lanes_of_sums_f64<const N: usize>(x: [[f64; 2]; N]) -> ([f64; N], [f64; N]) {
     const BLOCK: usize = 8;
     let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
+    let (mut sin, mut cos) = ([0.0; BLOCK], [0.0; BLOCK]);
     let mut first = 0;
-    while first < N {
-        let used = if N - first < BLOCK { N - first } else { BLOCK };
+    while first + BLOCK <= N {
         let (mut sum, mut tail) = ([0.0; BLOCK], [0.0; BLOCK]);
-        let (mut sin, mut cos) = ([0.0; BLOCK], [0.0; BLOCK]);
-        for i in 0..used {
+        for i in 0..BLOCK {
             [sum[i], tail[i]] = x[first + i];
         }
-        for i in 0..used.next_multiple_of(LANES_F64) {
+        for i in 0..BLOCK {
             (sin[i], cos[i]) = sin_cos_of_sum_f64([sum[i], tail[i]]);
         }
-        sines[first..first + used].copy_from_slice(&sin[..used]);
-        cosines[first..first + used].copy_from_slice(&cos[..used]);
+        sines[first..first + BLOCK].copy_from_slice(&sin);
+        cosines[first..first + BLOCK].copy_from_slice(&cos);
         first += BLOCK;
     }
+    let (mut sum, mut tail) = ([0.0; BLOCK], [0.0; BLOCK]);
+    for i in 0..N % BLOCK {
+        [sum[i], tail[i]] = x[N - N % BLOCK + i];
+    }
+    for i in 0..(N % BLOCK).next_multiple_of(LANES_F64) {
+        (sin[i], cos[i]) = sin_cos_of_sum_f64([sum[i], tail[i]]);
+    }
+    sines[N - N % BLOCK..].copy_from_slice(&sin[..N % BLOCK]);
+    cosines[N - N % BLOCK..].copy_from_slice(&cos[..N % BLOCK]);
     (sines, cosines)
 }
 
-/// [`sin_cos_f32`] of several angles: the same bits, by vector instructions where there are any.
-///
-/// Inlined, so that sines and cosines stay in registers.
+/// [`sin_cos_f32`] of several angles: the same bits, by vector instructions where there are any; as [`sin_cos_lanes_f64`].
 #[inline(always)]
 #[must_use]
 pub fn sin_cos_lanes_f32<const N: usize>(x: [f32; N]) -> ([f32; N], [f32; N]) {
     const BLOCK: usize = 16;
     let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
+    let (mut sin, mut cos) = ([0.0; BLOCK], [0.0; BLOCK]);
     let mut first = 0;
-    while first < N {
-        let used = if N - first < BLOCK { N - first } else { BLOCK };
-        let (mut angle, mut sin, mut cos) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
-        angle[..used].copy_from_slice(&x[first..first + used]);
-        for i in 0..used.next_multiple_of(LANES_F32) {
+    while first + BLOCK <= N {
+        let mut angle = [0.0; BLOCK];
+        angle.copy_from_slice(&x[first..first + BLOCK]);
+        for i in 0..BLOCK {
             (sin[i], cos[i]) = sin_cos_f32(angle[i]);
         }
-        sines[first..first + used].copy_from_slice(&sin[..used]);
-        cosines[first..first + used].copy_from_slice(&cos[..used]);
+        sines[first..first + BLOCK].copy_from_slice(&sin);
+        cosines[first..first + BLOCK].copy_from_slice(&cos);
         first += BLOCK;
     }
+    let mut angle = [0.0; BLOCK];
+    angle[..N % BLOCK].copy_from_slice(&x[N - N % BLOCK..]);
+    for i in 0..(N % BLOCK).next_multiple_of(LANES_F32) {
+        (sin[i], cos[i]) = sin_cos_f32(angle[i]);
+    }
+    sines[N - N % BLOCK..].copy_from_slice(&sin[..N % BLOCK]);
+    cosines[N - N % BLOCK..].copy_from_slice(&cos[..N % BLOCK]);
     (sines, cosines)
 }
 
