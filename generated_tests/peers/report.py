@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 GENERATED = ["casadi", "casadi_fast", "casadi_cse", "casadi_clang", "cppadcg"]
-OURS = ["straightline", "straightline_fma", "straightline_portable"]
+OURS = ["straightline", "straightline_fma", "straightline_avx2", "straightline_portable"]
 FUNCTIONS = {"id": "inverse dynamics", "crba": "mass matrix", "aba": "forward dynamics",
              "fkjac": "forward kinematics + Jacobian"}
 ARMS = ["ur5", "puma560", "panda", "iiwa"]
@@ -18,7 +18,9 @@ AIMS = {"id": {"arm": (0.50, 0.165), "hyq": (0.55, 0.22), "talos": (0.60, 0.35)}
         "aba": {"arm": (0.60, 0.165), "hyq": (0.40, 0.23), "talos": (0.50, 0.32)},
         "fkjac": {"arm": (0.80, 0.31), "hyq": (0.80, None), "talos": (0.80, None)}}
 LATENCY_AIM = 0.65  # inverse dynamics of arms, each call waiting for the last
-BATCH_AIMS = {"arm": 8.0, "hyq": 6.0}  # states per second relative to the best generated C, AVX-512
+# states per second relative to the best generated C; f32: twice f64
+BATCH_AIMS = {"straightline_fma": {"arm": 8.0, "hyq": 6.0}, "straightline_avx2": {"arm": 4.5, "hyq": 3.5}}
+BATCH_FUNCTIONS = {"id": "inverse_dynamics", "aba": "forward_dynamics"}
 
 
 def rows(path):
@@ -46,10 +48,25 @@ class Run:
                 self.time.setdefault((row[1], row[2]), {})[row[3]] = None
             elif row[0] == "batch":
                 self.batch.setdefault((row[1], row[2]), {})[(row[3], row[4])] = (float(row[6]), float(row[8]))
+        self.work = work
+        optional = lambda name: rows(os.path.join(work, name)) if os.path.exists(os.path.join(work, name)) else []
+        self.single = {(row[0], row[1]): (float(row[2]), float(row[3])) for row in optional("single.tsv")}
+        self.load = ", ".join(cell for row in optional("load.txt") for cell in row)
         self.machine = {row[0]: row[1] for row in rows(os.path.join(work, "peak.tsv")) if len(row) > 1}
 
     def robots(self):
         return list(dict.fromkeys(robot for robot, _ in self.time))
+
+    def operations(self, robot, function):
+        """Multiplications, additions and divisions of our function, as the head of its file counts them, fused ones as one."""
+        path = os.path.join(self.work, "ours", f"{robot}.fma.header")
+        if os.path.exists(path):
+            for row in open(path):
+                words = row.split()
+                if words[1:2] == [BATCH_FUNCTIONS.get(function)]:
+                    mul, add, fma, div = map(int, words[2:6])
+                    return mul + add + div, fma + div
+        return None
 
     def functions(self):
         return [f for f in FUNCTIONS if any(g == f for _, g in self.time)]
@@ -110,20 +127,34 @@ def batches(out, run):
         return
     peak = float(run.machine.get("fma_avx512_gflops", 0)) or float(run.machine.get("fma_avx2_gflops", 0))
     out.append("\n## Batches, one core: ns per state\n")
-    out.append(f"States per second relative to the best generated C called in a loop. Peak of this core, measured: {peak:.0f} Gflop/s.\n")
-    out.append("| function | robot | ours | ns | best generated C, ns | times as many states per second | aim |")
-    out.append("|---" * 7 + "|")
+    out.append("States per second relative to the best generated C called in a loop. `straightline_fma` fuses and uses the widest instructions of the "
+               "machine, `straightline_avx2` fuses and has 256 bits at most; `loop` is the plain function. Peak of this core, measured: "
+               f"{float(run.machine.get('fma_avx2_gflops', 0)):.0f} Gflop/s by AVX2, {peak:.0f} by AVX-512. Share of it: operations of the function, without those "
+               "inside sines and cosines, over what the peak would do in that time.\n")
+    out.append("| function | robot | ours | ns | best generated C, ns | times as many states per second | aim | share of peak |")
+    out.append("|---" * 8 + "|")
     for (robot, function), cells in run.batch.items():
         generated = [cells[(n, "loop")][0] for n in GENERATED if (n, "loop") in cells]
         if not generated:
             continue
         for (name, mode), (nanoseconds, _) in cells.items():
-            if name not in OURS:
+            if name not in OURS or (mode == "loop" and name != "straightline"):
                 continue
             gain = min(generated) / nanoseconds
-            aim = BATCH_AIMS.get(kind(robot)) if mode == "soa" and name != "straightline_portable" else None
+            aim = BATCH_AIMS.get(name, {}).get(kind(robot)) if mode == "soa" else None
             said = "" if aim is None else f"{aim:g} {'holds' if gain >= aim else '**missed**'}"
-            out.append(f"| {FUNCTIONS.get(function, function)} | {robot} | {name}, {mode} | {nanoseconds:.1f} | {min(generated):.1f} | {gain:.2f} | {said} |")
+            operations = run.operations(robot, function) if mode == "soa" else None
+            share = f"{100 * operations[0] / nanoseconds / peak:.0f} %" if operations and peak else ""
+            out.append(f"| {FUNCTIONS.get(function, function)} | {robot} | {name}, {mode} | {nanoseconds:.1f} | {min(generated):.1f} | {gain:.2f} | {said} | {share} |")
+    if not run.single:
+        return
+    out.append("\n## Batches in f32\n")
+    out.append("Structure of arrays, fused, the libraries for f64 and f32 by turns (`single.py`); the aim is twice the states per second of f64.\n")
+    out.append("| function | robot | f64, ns | f32, ns | times as many states per second |")
+    out.append("|---" * 5 + "|")
+    for (robot, function), (double, single) in run.single.items():
+        verdict_ = "holds" if double / single >= 2.0 else "**missed**"
+        out.append(f"| {FUNCTIONS[function]} | {robot} | {double:.1f} | {single:.1f} | {double / single:.2f} {verdict_} |")
 
 
 def picture(run, path):
@@ -183,7 +214,8 @@ def main():
            f"{rustc}; generated C by {run.machine.get('gcc', 'gcc')}, Pinocchio by {run.machine.get('pincxx', 'clang')}.", "",
            "One process, one pinned core, 4096 states, another one at each call; thread CPU time, medians over rounds, each contender measured "
            "back to back with Pinocchio. Every output of every contender is compared with Pinocchio's before it is timed: the last column, relative to the "
-           "largest entry. `straightline` is built with `-C target-cpu=native`, `straightline_portable` without; neither fuses a*b + c, and both give the same bits.",
+           "largest entry. `straightline` is built with `-C target-cpu=native`, `straightline_portable` without; neither fuses a*b + c, and both give the same bits. "
+           f"`straightline_fma` is compiled with `--fma`. Load averages of the machine (two cores) at the end: {run.load or 'not known'}.",
            "", f"![time per call]({name}.svg)"]
     comparisons(out, run.time, "Calls that may overlap", aims)
     comparisons(out, run.latency, "Latency: each call waits for the last",

@@ -2,10 +2,11 @@
 //!
 //! A function with `#[target_feature]` is compiled for instructions that the rest of the program may not use; a batch that
 //! becomes part of it, because everything in it is `#[inline(always)]`, is compiled for them, too. Calling such a function is
-//! `unsafe` for one reason: the machine must have the instructions. It is asked first.
-#![allow(unsafe_code)] // the calls into functions for other instructions; nothing else here is unsafe
+//! `unsafe` for one reason: the machine must have the instructions. It is asked first. The instruction that begins to read
+//! memory takes a pointer, which may be any; here it is a reference.
+#![allow(unsafe_code)] // the calls into functions for other instructions, and prefetching; nothing else here is unsafe
 
-use crate::batch::Job;
+use crate::batch::{Job, Machine, Plain};
 
 /// Lanes of a block of f64 for the instructions that this crate is compiled for.
 const LANES_F64: usize = if cfg!(target_feature = "avx512f") { 8 } else { 4 };
@@ -39,17 +40,31 @@ fn run<const AVX512: usize, const AVX2: usize, const OTHER: usize>(job: impl Job
             return unsafe { avx2::<AVX2>(job) };
         }
     }
-    job.run::<OTHER, FUSED>();
+    job.run::<OTHER, FUSED, Plain>();
+}
+
+/// Reads ahead into the second-level cache: the first one holds the block that is computed.
+#[cfg(target_arch = "x86_64")]
+struct X86;
+
+#[cfg(target_arch = "x86_64")]
+impl Machine for X86 {
+    #[inline(always)]
+    fn prefetch<T>(place: &T) {
+        use core::arch::x86_64::{_mm_prefetch, _MM_HINT_T1};
+        // SAFETY: every x86-64 machine has the instruction, and no pointer makes it fail
+        unsafe { _mm_prefetch::<_MM_HINT_T1>(core::ptr::from_ref(place).cast()) }
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl,avx2,fma")]
 fn avx512<const N: usize>(job: impl Job) {
-    job.run::<N, true>();
+    job.run::<N, true, X86>();
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 fn avx2<const N: usize>(job: impl Job) {
-    job.run::<N, true>();
+    job.run::<N, true, X86>();
 }

@@ -14,10 +14,25 @@ pub trait Program<T, const IN: usize, const OUT: usize> {
     fn run<const N: usize, const FUSED: bool>(&self, x: &[[T; N]; IN], y: &mut [[T; N]; OUT]);
 }
 
+/// What a machine can do beside computing.
+pub trait Machine {
+    /// Begins to read what stands there into a cache, and does not wait for it.
+    fn prefetch<T>(place: &T);
+}
+
+/// A machine that is asked for nothing but computing.
+#[derive(Clone, Copy, Debug)]
+pub struct Plain;
+
+impl Machine for Plain {
+    #[inline(always)]
+    fn prefetch<T>(_: &T) {}
+}
+
 /// A batch that is ready to run.
 pub trait Job {
     /// Runs it in blocks of `N` states; `FUSED` as in [`Program::run`].
-    fn run<const N: usize, const FUSED: bool>(self);
+    fn run<const N: usize, const FUSED: bool, M: Machine>(self);
 }
 
 /// A job that can be shared out.
@@ -72,14 +87,20 @@ pub const FUSED: bool = cfg!(any(target_feature = "fma", all(target_arch = "aarc
 /// Runs a batch of f64 with the instructions that this crate is compiled for.
 #[inline]
 pub fn run_f64(job: impl Job) {
-    job.run::<LANES_F64, FUSED>();
+    job.run::<LANES_F64, FUSED, Plain>();
 }
 
 /// Runs a batch of f32 with the instructions that this crate is compiled for.
 #[inline]
 pub fn run_f32(job: impl Job) {
-    job.run::<LANES_F32, FUSED>();
+    job.run::<LANES_F32, FUSED, Plain>();
 }
+
+/// A machine foresees what is read next of some twenty slices at once. With more than that many, each block would wait for its
+/// components; so they are asked for in advance.
+const FORESEEN: usize = 40;
+/// So many bytes of each in advance: enough for the slowest memory, few enough for a second-level cache.
+const AHEAD: usize = 1024;
 
 /// A batch in structure-of-arrays layout: a slice per component, each with as many numbers as there are states.
 #[derive(Debug)]
@@ -114,33 +135,30 @@ pub fn soa<'a, P: Program<T, IN, OUT>, T, const IN: usize, const OUT: usize, con
 
 impl<P: Program<T, IN, OUT>, T: Copy + Default, const IN: usize, const OUT: usize> Job for Soa<'_, P, T, IN, OUT> {
     #[inline(always)]
-    fn run<const N: usize, const FUSED: bool>(self) {
+    fn run<const N: usize, const FUSED: bool, M: Machine>(self) {
         let Soa { program, states, x, mut y } = self;
+        let mut block = [[T::default(); N]; IN];
+        let mut result = [[T::default(); N]; OUT];
         let mut start = 0;
-        while states - start >= N {
-            let mut block = [[T::default(); N]; IN];
-            let mut result = [[T::default(); N]; OUT];
+        while start < states {
+            let there = N.min(states - start);
+            let ahead = start + AHEAD / size_of::<T>();
+            if IN + OUT > FORESEEN && ahead < states {
+                x.iter().for_each(|component| M::prefetch(&component[ahead]));
+                y.iter().for_each(|component| M::prefetch(&component[ahead]));
+            }
             for (lanes, component) in block.iter_mut().zip(&x) {
-                lanes.copy_from_slice(&component[start..start + N]);
+                let component = &component[start..start + there];
+                match <&[T; N]>::try_from(component) {
+                    Ok(whole) => *lanes = *whole,
+                    Err(_) => *lanes = core::array::from_fn(|lane| component[lane.min(there - 1)]),
+                }
             }
             program.run::<N, FUSED>(&block, &mut result);
             for (component, lanes) in y.iter_mut().zip(&result) {
-                component[start..start + N].copy_from_slice(lanes);
+                component[start..start + there].copy_from_slice(&lanes[..there]);
             }
-            start += N;
-        }
-        let rest = states - start;
-        if rest > 0 {
-            let mut block = [[T::default(); N]; IN];
-            let mut result = [[T::default(); N]; OUT];
-            for (lanes, component) in block.iter_mut().zip(&x) {
-                let there = &component[start..states];
-                *lanes = core::array::from_fn(|lane| there[lane.min(rest - 1)]);
-            }
-            program.run::<N, FUSED>(&block, &mut result);
-            for (component, lanes) in y.iter_mut().zip(&result) {
-                component[start..states].copy_from_slice(&lanes[..rest]);
-            }
+            start += there;
         }
     }
 }
@@ -197,7 +215,7 @@ where
     T: Copy + Default,
 {
     #[inline(always)]
-    fn run<const N: usize, const FUSED: bool>(self) {
+    fn run<const N: usize, const FUSED: bool, M: Machine>(self) {
         let Aos { program, states, inputs, mut outputs } = self;
         let mut start = 0;
         while start < states {

@@ -4,38 +4,129 @@
 //! frame is put into that order here.
 #![allow(clippy::missing_safety_doc)] // all of them: the pointers lead to arrays of the harness's sizes, outputs apart
 
-#[allow(dead_code)] // constants that the harness does not ask for
+#[cfg(not(feature = "avx2"))]
+mod dispatch;
+#[cfg(not(feature = "avx2"))]
+use dynamics::batch;
+#[allow(dead_code, unused_imports)] // constants and functions that the harness does not ask for
 mod dynamics;
 
+/// Batches with 256-bit instructions on any machine that has them.
+#[cfg(feature = "avx2")]
+mod dispatch {
+    use crate::dynamics::batch::{Job, Machine};
+    use core::arch::x86_64::{_mm_prefetch, _MM_HINT_T1};
+
+    struct X86;
+
+    impl Machine for X86 {
+        #[inline(always)]
+        fn prefetch<T>(place: &T) {
+            unsafe { _mm_prefetch::<_MM_HINT_T1>(core::ptr::from_ref(place).cast()) }
+        }
+    }
+
+    pub fn run_f64(job: impl Job) {
+        job.run::<4, { cfg!(target_feature = "fma") }, X86>();
+    }
+
+    pub fn run_f32(job: impl Job) {
+        job.run::<8, { cfg!(target_feature = "fma") }, X86>();
+    }
+}
+
+use core::ffi::{c_int, c_long};
 use dynamics::{NQ, NV};
 
-type Q = [f64; NQ];
-type V = [f64; NV];
+#[cfg(not(feature = "single"))]
+type Number = f64;
+#[cfg(feature = "single")]
+type Number = f32;
 
-#[no_mangle]
-pub unsafe extern "C" fn rbd_id(q: &Q, v: &V, a: &V, tau: &mut V) {
-    dynamics::inverse_dynamics(q, v, a, tau);
+/// The functions that the harness calls.
+#[cfg(not(feature = "single"))]
+mod calls {
+    use super::*;
+    use core::slice::{from_raw_parts, from_raw_parts_mut};
+
+    type Q = [f64; NQ];
+    type V = [f64; NV];
+
+    #[no_mangle]
+    pub unsafe extern "C" fn rbd_id(q: &Q, v: &V, a: &V, tau: &mut V) {
+        dynamics::inverse_dynamics(q, v, a, tau);
+    }
+
+    #[no_mangle]
+    pub unsafe extern "C" fn rbd_nle(q: &Q, v: &V, h: &mut V) {
+        dynamics::bias_force(q, v, h);
+    }
+
+    #[no_mangle]
+    pub unsafe extern "C" fn rbd_crba(q: &Q, h: &mut [V; NV]) {
+        dynamics::mass_matrix(q, h);
+    }
+
+    #[no_mangle]
+    pub unsafe extern "C" fn rbd_aba(q: &Q, v: &V, tau: &V, a: &mut V) {
+        dynamics::forward_dynamics(q, v, tau, a);
+    }
+
+    #[no_mangle]
+    pub unsafe extern "C" fn rbd_fkjac(q: &Q, t: &mut [f64; 12], j: &mut [[[f64; 6]; NV]; 1]) {
+        let mut x = [[0.0; 12]; 1];
+        dynamics::kinematics_and_jacobian(q, &mut x, j);
+        let [[px, py, pz, xx, xy, xz, yx, yy, yz, zx, zy, zz]] = x;
+        *t = [xx, yx, zx, xy, yy, zy, xz, yz, zz, px, py, pz];
+    }
+
+    macro_rules! batch {
+        ($name:ident, $function:ident) => {
+            #[no_mangle]
+            pub unsafe extern "C" fn $name(n: c_long, q: *const f64, v: *const f64, x: *const f64, y: *mut f64) {
+                let n = n as usize;
+                let (q, v, x) = (from_raw_parts(q, n * NQ), from_raw_parts(v, n * NV), from_raw_parts(x, n * NV));
+                dynamics::$function(n, q, v, x, from_raw_parts_mut(y, n * NV)).expect("the slices hold n states");
+            }
+        };
+    }
+    batch!(rbd_id_batch_soa, inverse_dynamics_batch_soa);
+    batch!(rbd_id_batch_aos, inverse_dynamics_batch_aos);
+    batch!(rbd_aba_batch_soa, forward_dynamics_batch_soa);
+    batch!(rbd_aba_batch_aos, forward_dynamics_batch_aos);
 }
 
-#[no_mangle]
-pub unsafe extern "C" fn rbd_nle(q: &Q, v: &V, h: &mut V) {
-    dynamics::bias_force(q, v, h);
+/// Random states, structure of arrays, and room for results.
+pub struct Batch {
+    states: usize,
+    inputs: [Vec<Number>; 3],
+    results: Vec<Number>,
 }
 
+/// A batch for [`batch_run`], which is never freed.
 #[no_mangle]
-pub unsafe extern "C" fn rbd_crba(q: &Q, h: &mut [V; NV]) {
-    dynamics::mass_matrix(q, h);
+pub extern "C" fn batch_of(states: c_long) -> *mut Batch {
+    let states = states as usize;
+    let mut seed = 1_u32;
+    let mut random = |width: usize| {
+        let mut next = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed as f32 / u32::MAX as f32 * 2.0 - 1.0) as Number
+        };
+        (0..states * width).map(|_| next()).collect::<Vec<Number>>()
+    };
+    let inputs = [random(NQ), random(NV), random(NV)];
+    Box::into_raw(Box::new(Batch { states, inputs, results: vec![0.0; states * NV] }))
 }
 
+/// Inverse dynamics (0) or forward dynamics (1) of the batch; its first result.
 #[no_mangle]
-pub unsafe extern "C" fn rbd_aba(q: &Q, v: &V, tau: &V, a: &mut V) {
-    dynamics::forward_dynamics(q, v, tau, a);
-}
-
-#[no_mangle]
-pub unsafe extern "C" fn rbd_fkjac(q: &Q, t: &mut [f64; 12], j: &mut [[[f64; 6]; NV]; 1]) {
-    let mut x = [[0.0; 12]; 1];
-    dynamics::kinematics_and_jacobian(q, &mut x, j);
-    let [[px, py, pz, xx, xy, xz, yx, yy, yz, zx, zy, zz]] = x;
-    *t = [xx, yx, zx, xy, yy, zy, xz, yz, zz, px, py, pz];
+pub unsafe extern "C" fn batch_run(batch: &mut Batch, function: c_int) -> f64 {
+    let Batch { states, inputs: [q, v, x], results } = batch;
+    match function {
+        0 => dynamics::inverse_dynamics_batch_soa(*states, q, v, x, results),
+        _ => dynamics::forward_dynamics_batch_soa(*states, q, v, x, results),
+    }
+    .expect("the slices hold so many states");
+    results[0] as f64
 }
