@@ -145,7 +145,19 @@ fn lanes(out: &Path, folder: &Path) {
         fma: true,
         ..Options::default()
     };
-    let modules = modules.into_iter().chain([("fused_solo12", robot("solo12.urdf", fused))]);
+    let generic = Options {
+        functions: vec![InverseDynamics, Function::GravityForce, MassMatrix],
+        limits: Limits { operations: 250 },
+        lanes: Some(Lanes::Runtime),
+        generic: true,
+        ..Options::default()
+    };
+    let sums = Options { functions: vec![InverseDynamics, ForwardDynamics], generic: true, ..Options::default() };
+    let modules = modules.into_iter().chain([
+        ("fused_solo12", robot("solo12.urdf", fused)),
+        ("generic_panda", robot("panda.urdf", generic)),
+        ("generic_ur5", robot("ur5.urdf", sums)),
+    ]);
     for (name, text) in modules {
         std::fs::write(out.join(format!("{name}.rs")), text).expect("OUT_DIR can be written");
     }

@@ -92,6 +92,13 @@ impl Builder {
         self
     }
 
+    /// Whether plain functions take any scalar that is a `straightline::Real`: f32, f64, double-double, dual numbers, types of
+    /// your own. The code depends on the package `straightline`. Lanes, batches and stages keep [`Builder::scalar`].
+    pub fn generic(mut self, generic: bool) -> Self {
+        self.options.generic = generic;
+        self
+    }
+
     /// Whether a·b + c is one operation, with one rounding, where the machine has it: last bits are other ones there than
     /// elsewhere. The code needs `std`.
     pub fn fma(mut self, fma: bool) -> Self {

@@ -38,6 +38,8 @@ pub struct Options {
     pub lanes: Option<Lanes>,
     /// Whether a·b + c is one operation, with one rounding, where the machine has it; needs `std`.
     pub fma: bool,
+    /// Whether plain functions take any scalar that is a `straightline::Real`; lanes, batches and stages keep `scalar`.
+    pub generic: bool,
     /// The weakest rules allowed: with [`Grade::Exact`] the output is the generic runtime bit for bit.
     pub grade: Grade,
     /// How forward dynamics is computed.
@@ -61,6 +63,7 @@ impl Default for Options {
             also: Vec::new(),
             lanes: None,
             fma: false,
+            generic: false,
             grade: Grade::Algebraic,
             forward_dynamics: ForwardDynamicsMethod::default(),
             limits: Limits::default(),
@@ -90,9 +93,17 @@ impl Options {
         }
     }
 
-    /// How functions are written.
+    /// How functions over lanes and the programs inside types are written.
     pub fn style(&self) -> Style {
         Style::plain(self.scalar).fused(self.fma)
+    }
+
+    /// How plain functions are written.
+    pub fn plain_style(&self) -> Style {
+        match self.generic {
+            true => self.style().generic(),
+            false => self.style(),
+        }
     }
 
     /// The rewrite rules that these options allow.
@@ -282,8 +293,10 @@ pub struct Generated {
     pub scalar: Scalar,
     /// The same in the other scalar types that were asked for; [`Generated::text`] has them as modules.
     pub others: Vec<Generated>,
-    /// How its functions are written.
+    /// How its functions over lanes are written.
     pub style: Style,
+    /// How its plain functions are written.
+    pub plain_style: Style,
     /// Whether functions over lanes and batches stand beside the plain ones.
     pub lanes: Option<Lanes>,
     /// Where it came from.
@@ -425,7 +438,7 @@ fn generate(
         if let Some(method) = method {
             doc.push_str(&format!("\n{method}\n"));
         }
-        let text = emit::function(graph, schedule, function.name(), &doc, options.style(), &title);
+        let text = emit::function(graph, schedule, function.name(), &doc, options.plain_style(), &title);
         let figures = FunctionReport::new(&program, options.scalar, text.text.lines().count());
         functions.insert(function.name(), FunctionReport { waterfall, errors, ..figures });
         let Program { function, graph, schedule, .. } = program;
@@ -463,8 +476,10 @@ fn generate(
         ports().any(|port| port.wrapper.as_ref() == Some(&name))
             || (staged_text.clone() + &contact_text).contains(&format!("&{name}"))
     };
+    let generic = if options.generic { emit::GENERIC } else { "" };
     let types = parameter_types(&robot, options, &takes) + &staged_text + &contact_text;
-    let text = emit::file(model, &frames, &items, &report, &provenance, options.style(), &types, options.lanes);
+    let before = generic.to_string() + &types;
+    let text = emit::file(model, &frames, &items, &report, &provenance, options.style(), &before, options.lanes);
     Generated {
         model: robot.model,
         frames,
@@ -474,6 +489,7 @@ fn generate(
         scalar: options.scalar,
         others: Vec::new(),
         style: options.style(),
+        plain_style: options.plain_style(),
         lanes: options.lanes,
         provenance,
         report,

@@ -161,7 +161,7 @@ pub fn associated_items(generated: &Generated) -> String {
         let parameters = item.inputs.iter().map(|p| (p, "&")).chain(item.outputs.iter().map(|p| (p, "&mut ")));
         let array = |p: &Port| {
             let module = if p.wrapper.is_some() { "dynamics::" } else { "" };
-            format!("{module}{}", array_type(p, *scalar))
+            format!("{module}{}", generated.plain_style.array_type(p))
         };
         let signature: Vec<String> =
             parameters.clone().map(|(p, reference)| format!("{}: {reference}{}", p.name, array(p))).collect();
@@ -173,7 +173,8 @@ pub fn associated_items(generated: &Generated) -> String {
         }
         let _ = writeln!(
             out,
-            "#[inline]\npub fn {name}({}) {{\n    dynamics::{name}({})\n}}",
+            "#[inline]\npub fn {name}{}({}) {{\n    dynamics::{name}({})\n}}",
+            if generated.plain_style.generic { "<T: ::straightline::Real>" } else { "" },
             signature.join(", "),
             arguments.join(", ")
         );

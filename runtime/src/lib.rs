@@ -34,12 +34,14 @@
 //! | `scalar = "f32"`; `scalars("f64", "f32")`: for each further one a module `single` or `double` | `"f64"` |
 //! | `floating_base`: the root link moves freely | as the file says |
 //! | `joint_order("a", "b")`: all joints in the order of their coordinates | depth first, as in the file |
+//! | `generic`: functions take any [`Real`]: `f32`, `f64`, [`Dd`], [`Dual`], your own | the scalar alone |
+//! | `fma`: a·b + c in one rounding where the machine has it | the same bits everywhere |
 //! | `lanes`: beside every function the same over lanes of states and over batches ([`batch`]) | one state at a time |
 //! | `gravity(0.0, 0.0, -9.81)` \[m/s²\] | the file's, or this |
 //! | `angle_tolerance = 1e-6`: so near to a multiple of 30 or 45 degrees \[rad\] an angle is taken as that | rounding only |
 //! | `rules = "exact"`: the same bits as the generic runtime | `"all"`: fewest operations |
 //! | `forward_dynamics = "articulated-body"` or `"factorisation"` | the cheaper one |
-//! | `max_part_operations = 1000`: longer functions are cut | 2000 |
+//! | `max_part_operations = 1000`: longer functions are cut | 12000 |
 //! | `scene = "scenes/still.toml"`: what is wanted and what is held; what it says wins over other options | everything |
 //! | `scene(zero(qd = true), hold(joints = { yaw = 0.5 }))`: the same tables and keys, without a file | |
 //! | `module = "arm_dynamics"` (derive only): everything stands in that module, beside the type, too | where a scene has types of its own it is needed |
@@ -78,9 +80,9 @@ pub mod batch;
 #[cfg(feature = "std")]
 mod dispatch;
 
-pub use straightline_core::{control, integrate, Real};
+pub use straightline_core::{control, integrate, Dd, Dual, Real};
 #[cfg(feature = "derive")]
 pub use straightline_macros::{dynamics, Dynamics};
 
 #[cfg(feature = "runtime")]
-pub use straightline_core::{algorithms, model, spatial, Dd};
+pub use straightline_core::{algorithms, model, spatial};

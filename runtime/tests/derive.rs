@@ -63,9 +63,37 @@ pub struct OnTheMoonByFile;
 #[robot("examples/arm.toml", functions(inverse_dynamics), lanes)]
 pub struct Arms;
 
+/// Over any scalar.
+#[derive(Dynamics)]
+#[robot("examples/arm.toml", functions(gravity_force), generic)]
+pub struct Any;
+
 straightline::dynamics! {
     /// The arm as a module, found from this file.
     pub mod arm = "../examples/arm.toml", scalar = "f32", functions(inverse_dynamics,),
+}
+
+/// The slope of gravity forces by a dual number, against a difference quotient, and the bits of the plain function.
+#[test]
+fn functions_take_any_scalar() {
+    use straightline::Dual;
+    let q = [0.3, -0.8, 1.1];
+    let (mut plain, mut any) = ([0.0; Arm::NV], [0.0; Any::NV]);
+    Arm::gravity_force(&q, &mut plain);
+    Any::gravity_force(&q, &mut any);
+    assert_eq!(plain, any);
+    let mut seeded = q.map(Dual::<f64, 1>::fixed);
+    seeded[1] = Dual::variable(q[1], 0);
+    let mut dual = seeded;
+    Any::gravity_force(&seeded, &mut dual);
+    let mut further = [0.0; Any::NV];
+    Any::gravity_force(&[q[0], q[1] + 1e-6, q[2]], &mut further);
+    for ((dual, there), here) in dual.iter().zip(further).zip(plain) {
+        assert_eq!(dual.value, here);
+        // the quotient is off by half a step times the curvature, some tens of N·m
+        assert!((dual.derivatives[0] - (there - here) / 1e-6).abs() < 1e-4, "{dual:?}");
+    }
+    assert!(dual[1].derivatives[0] != 0.0);
 }
 
 #[test]

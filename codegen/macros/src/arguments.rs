@@ -81,6 +81,7 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         }
         "lanes" => options.lanes = Some(Lanes::Runtime),
         "fma" => options.fma = true,
+        "generic" => options.generic = true,
         "rules" => options.grade = word(input)?,
         "forward_dynamics" => options.forward_dynamics = word(input)?,
         "max_part_operations" => options.limits.operations = value::<LitInt>(input)?.base10_parse()?,
@@ -101,7 +102,7 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         }
         other => {
             let known =
-                "floating_base, certify, scalar, scalars, lanes, fma, rules, forward_dynamics, max_part_operations, \
+                "floating_base, certify, scalar, scalars, lanes, fma, generic, rules, forward_dynamics, max_part_operations, \
                          angle_tolerance, \
                          functions, frames, joint_order, gravity, scene, module";
             return Err(Error::new(key.span(), format!("there is no option `{other}`; one of: {known}")));

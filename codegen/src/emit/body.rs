@@ -5,6 +5,7 @@ use super::{one_line, Names, Scalar, Style};
 use crate::expr::{Constant, Graph, NodeId, Op, Port, Section};
 use crate::schedule::{Part, Schedule};
 use std::fmt::Write;
+use std::slice::from_ref;
 
 /// How long an expression may grow before it gets a name of its own.
 const LINE: usize = 84;
@@ -187,8 +188,7 @@ fn statements(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) 
         .iter()
         .chain(&graph.outputs)
         .map(|p| p.name.as_str())
-        .chain(["live", "trig", "lane", "fma", "fma_if"]);
-    let scalar = style.scalar;
+        .chain(["live", "trig", "lane", "fma", "fma_if", "number"]);
     let (fused, absorbed) = match style.fused {
         true => fusions(graph, part),
         false => (vec![None; graph.ops.len()], vec![false; graph.ops.len()]),
@@ -217,7 +217,11 @@ fn statements(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) 
         for chunk in part.loads.chunks(DECLARATION) {
             let names: Vec<String> = chunk.iter().map(|(id, _)| b.fresh_name(*id)).collect();
             let slots: Vec<String> = chunk.iter().map(|(_, s)| format!("live[{s}]{}", style.lane())).collect();
-            out.text.push_str(&wrapped("    let [", &names, &format!("]: [{}; {}] =", scalar.name(), names.len())));
+            out.text.push_str(&wrapped(
+                "    let [",
+                &names,
+                &format!("]: [{}; {}] =", style.scalar_name(), names.len()),
+            ));
             out.text.push_str(&wrapped("        [", &slots, "];"));
             for ((id, _), name) in chunk.iter().zip(names) {
                 b.text[id.index()] = Some((name, Binding::Atom));
@@ -235,7 +239,7 @@ fn statements(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) 
         match op {
             Op::AngleSum(..) => {}
             Op::SinCos(_) => {
-                out.uses_sin_cos = true;
+                out.uses_sin_cos |= !style.generic;
                 if !b.paired[id.index()] {
                     let section_of = |n: &NodeId| graph.notes[n.index()].section;
                     let block = part.nodes[k..].iter().take_while(|n| section_of(n) == here);
@@ -245,7 +249,7 @@ fn statements(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) 
             Op::Sin(_) | Op::Cos(_) => {}
             _ if absorbed[id.index()] => {}
             _ => {
-                out.uses_sqrt |= matches!(op, Op::Sqrt(_) | Op::Sign(_));
+                out.uses_sqrt |= matches!(op, Op::Sqrt(_) | Op::Sign(_)) && !style.generic;
                 let (text, binding) = match b.fused[id.index()] {
                     Some(fused) => (b.fma(fused), Binding::Atom),
                     None => b.expression(op),
@@ -302,7 +306,8 @@ impl Body<'_> {
                 (self.style.element(&self.graph.inputs[port], k), Binding::Atom)
             }
             Op::Constant(c) => {
-                (literal(c, self.style.scalar), if c.is_negative() { Binding::Sign } else { Binding::Atom })
+                let sign = c.is_negative() && !self.style.generic;
+                (literal(c, self.style), if sign { Binding::Sign } else { Binding::Atom })
             }
             _ => self.text[id.index()].clone().expect("operands stand before their users"),
         }
@@ -336,8 +341,8 @@ impl Body<'_> {
             Op::Mul(a, b) => (format!("{} * {}", self.bound(a, Product), self.bound(b, Sign)), Product),
             Op::Div(a, b) => (format!("{} / {}", self.bound(a, Product), self.bound(b, Sign)), Product),
             Op::Neg(a) => (format!("-{}", self.bound(a, Atom)), Sign),
-            Op::Sqrt(a) => (format!("trig::sqrt_{}({})", self.style.scalar.name(), self.operand(a).0), Atom),
-            Op::Sign(a) => (format!("trig::sign_{}({})", self.style.scalar.name(), self.operand(a).0), Atom),
+            Op::Sqrt(a) => (format!("{}({})", self.style.kernel("sqrt"), self.operand(a).0), Atom),
+            Op::Sign(a) => (format!("{}({})", self.style.kernel("sign"), self.operand(a).0), Atom),
             Op::Input(_) | Op::Constant(_) | Op::AngleSum(..) | Op::SinCos(_) | Op::Sin(_) | Op::Cos(_) => {
                 unreachable!("written where they are used")
             }
@@ -373,28 +378,46 @@ impl Body<'_> {
             }
         }
         let [sines, cosines] = halves;
-        let scalar = self.style.scalar.name();
-        // a sum goes through with what its rounding lost
-        let sums = angles.iter().any(|(_, terms)| terms.len() > 1);
-        let argument = |terms: &Vec<String>| match (sums, terms.as_slice()) {
-            (false, terms) => terms[0].clone(),
-            (true, [angle]) => format!("[{angle}, 0.0]"),
-            (true, terms) => format!("trig::sum_of_angles_{scalar}([{}])", terms.join(", ")),
-        };
-        let arguments: Vec<String> = angles.iter().map(|(_, terms)| argument(terms)).collect();
-        let kernel = if sums { "sin_cos_of_sum" } else { "sin_cos" };
         if self.style.lanes {
-            for ((s, c), angle) in sines.iter().zip(&cosines).zip(&arguments) {
-                let _ = writeln!(self.statements, "    let ({s}, {c}) = trig::{kernel}_{scalar}({angle});");
+            // the loop around the body has the lanes
+            for ((s, c), (_, angle)) in sines.iter().zip(&cosines).zip(&angles) {
+                self.sin_cos_call(from_ref(s), from_ref(c), &[angle]);
             }
-        } else if let [angle] = arguments.as_slice() {
-            let (s, c) = (&sines[0], &cosines[0]);
-            let _ = writeln!(self.statements, "    let ({s}, {c}) = trig::{kernel}_{scalar}({angle});");
+            return;
+        }
+        // a call fills the widest vectors there are; more at once would not stay in registers
+        let most = 64 / self.style.scalar.bytes();
+        for ((angles, sines), cosines) in angles.chunks(most).zip(sines.chunks(most)).zip(cosines.chunks(most)) {
+            let angles: Vec<&Vec<String>> = angles.iter().map(|(_, terms)| terms).collect();
+            self.sin_cos_call(sines, cosines, &angles);
+        }
+    }
+
+    /// Sines and cosines of some angles, each a sum of terms, by one call of the kernel.
+    fn sin_cos_call(&mut self, sines: &[String], cosines: &[String], angles: &[&Vec<String>]) {
+        // a sum goes through with what its rounding lost
+        let sums = angles.iter().any(|terms| terms.len() > 1);
+        let argument = |terms: &&Vec<String>| match (sums, terms.as_slice()) {
+            (false, terms) => terms[0].clone(),
+            (true, [angle]) if self.style.generic => format!("[{angle}, T::zero()]"),
+            (true, [angle]) => format!("[{angle}, 0.0]"),
+            (true, terms) if self.style.generic => format!("T::sum_of_angles(&[{}])", terms.join(", ")),
+            (true, terms) => format!("{}([{}])", self.style.kernel("sum_of_angles"), terms.join(", ")),
+        };
+        let arguments: Vec<String> = angles.iter().map(argument).collect();
+        let (single, several) = match (sums, self.style.generic) {
+            (false, _) => ("sin_cos", "sin_cos_lanes"),
+            (true, false) => ("sin_cos_of_sum", "sin_cos_lanes_of_sums"),
+            (true, true) => ("sin_cos_of_pair", "sin_cos_lanes_of_pairs"),
+        };
+        if let ([s], [c], [angle]) = (sines, cosines, arguments.as_slice()) {
+            let single = self.style.kernel(single);
+            let _ = writeln!(self.statements, "    let ({s}, {c}) = {single}({angle});");
         } else {
-            let kernel = if sums { "sin_cos_lanes_of_sums" } else { "sin_cos_lanes" };
-            self.statements.push_str(&wrapped("    let ([", &sines, "],"));
-            self.statements.push_str(&wrapped("        [", &cosines, "]) ="));
-            self.statements.push_str(&wrapped(&format!("        trig::{kernel}_{scalar}(["), &arguments, "]);"));
+            let several = self.style.kernel(several);
+            self.statements.push_str(&wrapped("    let ([", sines, "],"));
+            self.statements.push_str(&wrapped("        [", cosines, "]) ="));
+            self.statements.push_str(&wrapped(&format!("        {several}(["), &arguments, "]);"));
         }
     }
 
@@ -423,9 +446,9 @@ impl Body<'_> {
         }
         for names in self.declared.chunks(DECLARATION) {
             if let [name] = names {
-                let _ = writeln!(out.text, "    let {name}: {};", self.style.scalar.name());
+                let _ = writeln!(out.text, "    let {name}: {};", self.style.scalar_name());
             } else {
-                let end = format!("]: [{}; {}];", self.style.scalar.name(), names.len());
+                let end = format!("]: [{}; {}];", self.style.scalar_name(), names.len());
                 out.text.push_str(&wrapped("    let [", names, &end));
             }
         }
@@ -457,10 +480,12 @@ fn wrapped(start: &str, items: &[String], end: &str) -> String {
     text
 }
 
-/// The constant, rounded once to the scalar's format, as the shortest literal that reads back to it.
-fn literal(c: Constant, scalar: Scalar) -> String {
-    match scalar {
-        Scalar::F64 => format!("{:?}", c.value().to_f64()),
-        Scalar::F32 => format!("{:?}", c.value().to_f32()),
+/// The constant, rounded once to the scalar's format, as the shortest literal that reads back to it; for any scalar in two
+/// parts.
+fn literal(c: Constant, style: Style) -> String {
+    match (style.generic, style.scalar) {
+        (true, _) => format!("number::<T>({:?}, {:?})", c.value().hi(), c.value().lo()),
+        (false, Scalar::F64) => format!("{:?}", c.value().to_f64()),
+        (false, Scalar::F32) => format!("{:?}", c.value().to_f32()),
     }
 }

@@ -72,7 +72,8 @@ pub fn file(
     if let Some(lanes) = lanes {
         out.push_str(&batch::module(lanes));
     }
-    if items.iter().any(|i| i.text.calls_kernel()) || types.contains("use super::super::trig;") {
+    let calls_kernel = |i: &Item| i.text.calls_kernel() || i.lanes.contains("trig::");
+    if types.contains("trig::") || types.contains("use super::super::trig;") || items.iter().any(calls_kernel) {
         out.push_str("\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod trig {\n");
         for line in kernel(lanes.is_some()).lines() {
             let line = if let Some(doc) = line.strip_prefix("//!") { format!("//{doc}") } else { line.to_string() };
@@ -126,6 +127,17 @@ pub fn kernel(for_lanes: bool) -> Cow<'static, str> {
         false => TRIG.into(),
     }
 }
+
+/// What a file of generic functions uses.
+pub const GENERIC: &str = "
+use ::straightline::{Dd, Real};
+
+/// A constant to 32 digits, as the sum of two numbers; rounded once to the scalar's format.
+#[inline(always)]
+fn number<T: Real>(high: f64, low: f64) -> T {
+    T::constant(Dd::new(high, low))
+}
+";
 
 fn header(out: &mut String, model: &Model<Dd>, report: &Report, provenance: &Provenance) {
     let floating = model.bodies.iter().any(|b| b.joint.kind == JointKind::Floating);

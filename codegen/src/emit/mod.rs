@@ -12,7 +12,7 @@ pub mod parameter;
 
 pub use batch::Lanes;
 pub use body::{function, FunctionText};
-pub use file::{file, kernel, preamble, scalar_module, Item, Provenance};
+pub use file::{file, kernel, preamble, scalar_module, Item, Provenance, GENERIC};
 pub use names::{snake_case, upper_camel_case, Names};
 
 use crate::expr::Port;
@@ -61,17 +61,24 @@ pub struct Style {
     pub lanes: bool,
     /// Whether a·b + c is one operation where the machine has it: [`fused::module`].
     pub fused: bool,
+    /// Whether the function takes any `T: straightline::Real` in place of `scalar`.
+    pub generic: bool,
 }
 
 impl Style {
     /// One state.
     pub fn plain(scalar: Scalar) -> Self {
-        Style { scalar, lanes: false, fused: false }
+        Style { scalar, lanes: false, fused: false, generic: false }
     }
 
     /// With a·b + c as one operation, or without.
     pub fn fused(self, fused: bool) -> Self {
         Style { fused, ..self }
+    }
+
+    /// In any scalar; in it nothing is fused.
+    pub fn generic(self) -> Self {
+        Style { generic: true, fused: false, ..self }
     }
 
     /// `N` states at once.
@@ -82,17 +89,26 @@ impl Style {
     /// The type of one scalar of a port.
     fn element_type(self) -> String {
         match self.lanes {
-            true => format!("[{}; N]", self.scalar.name()),
-            false => self.scalar.name().to_string(),
+            true => format!("[{}; N]", self.scalar_name()),
+            false => self.scalar_name().to_string(),
+        }
+    }
+
+    /// The type of a number.
+    fn scalar_name(self) -> &'static str {
+        if self.generic {
+            "T"
+        } else {
+            self.scalar.name()
         }
     }
 
     /// The value of [`Style::element_type`] that is zero.
     fn zero(self) -> &'static str {
-        if self.lanes {
-            "[0.0; N]"
-        } else {
-            "0.0"
+        match (self.generic, self.lanes) {
+            (true, _) => "T::zero()",
+            (false, true) => "[0.0; N]",
+            (false, false) => "0.0",
         }
     }
 
@@ -106,8 +122,19 @@ impl Style {
 
     /// The place of scalar `k` of a port, in lanes that of one lane.
     fn element(self, port: &Port, k: usize) -> String {
-        let lane = if port.wrapper.is_some() { "" } else { self.lane() };
-        element(port, k) + lane
+        match (&port.wrapper, self.generic) {
+            (Some(_), true) => format!("T::constant(Dd::from(f64::from({})))", element(port, k)),
+            (Some(_), false) => element(port, k),
+            (None, _) => element(port, k) + self.lane(),
+        }
+    }
+
+    /// The path of a function of the kernel.
+    fn kernel(self, function: &str) -> String {
+        match self.generic {
+            true => format!("T::{function}"),
+            false => format!("trig::{function}_{}", self.scalar.name()),
+        }
     }
 
     /// The index of the lane.
@@ -122,6 +149,7 @@ impl Style {
     /// The generic parameters.
     fn generics(self) -> &'static str {
         match (self.lanes, self.fused) {
+            (false, _) if self.generic => "<T: Real>",
             (false, _) => "",
             (true, false) => "<const N: usize>",
             (true, true) => "<const N: usize, const FUSED: bool>",

@@ -93,6 +93,7 @@ impl Dd {
     const NAN: Dd = Dd { hi: f64::NAN, lo: 0.0 };
 
     /// The sum of two f64, exact, in any order of size.
+    #[inline]
     pub fn new(hi: f64, lo: f64) -> Dd {
         let (s, e) = two_sum(hi, lo);
         if s.is_finite() {
@@ -199,6 +200,7 @@ impl Dd {
     }
 
     /// The nearest f32, ties to even: rounded once, from all 106 bits.
+    #[inline]
     pub fn to_f32(self) -> f32 {
         if self.lo == 0.0 || !self.hi.is_finite() {
             return self.hi as f32;

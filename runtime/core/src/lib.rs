@@ -18,6 +18,7 @@ pub mod control;
 pub mod dd;
 #[cfg(feature = "alloc")]
 pub mod drive;
+pub mod dual;
 pub mod integrate;
 pub mod jet;
 #[cfg(feature = "alloc")]
@@ -33,5 +34,6 @@ pub mod taylor;
 pub mod trig;
 
 pub use dd::Dd;
+pub use dual::Dual;
 pub use real::Real;
 pub use taylor::Taylor;

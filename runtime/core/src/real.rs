@@ -17,8 +17,9 @@ pub trait Real:
     /// `(sin x, cos x)` of an angle in radians.
     fn sin_cos(self) -> (Self, Self);
 
-    /// `(sin, cos)` of the sum of some angles as if it were formed exactly, which it is up to the square of a rounding.
-    fn sin_cos_of_sum(angles: &[Self]) -> (Self, Self) {
+    /// The sum of some angles, at least one, and what its rounding loses: TwoSum (Knuth 1969) one after the other.
+    #[inline(always)]
+    fn sum_of_angles(angles: &[Self]) -> [Self; 2] {
         let (mut sum, mut tail) = (angles[0], Self::zero());
         for &angle in &angles[1..] {
             let next = sum + angle;
@@ -26,8 +27,43 @@ pub trait Real:
             tail = tail + ((sum - (next - added)) + (angle - added));
             sum = next;
         }
+        [sum, tail]
+    }
+
+    /// `(sin, cos)` of a [sum](Real::sum_of_angles) and its tail, up to the square of the tail.
+    #[inline(always)]
+    fn sin_cos_of_pair([sum, tail]: [Self; 2]) -> (Self, Self) {
         let (sin, cos) = sum.sin_cos();
         (sin + tail * cos, cos - tail * sin)
+    }
+
+    /// `(sin, cos)` of the sum of some angles as if it were formed exactly, which it is up to the square of a rounding.
+    #[inline(always)]
+    fn sin_cos_of_sum(angles: &[Self]) -> (Self, Self) {
+        match angles {
+            [angle] => angle.sin_cos(),
+            angles => Self::sin_cos_of_pair(Self::sum_of_angles(angles)),
+        }
+    }
+
+    /// [`Real::sin_cos`] of several angles: the same bits, faster where numbers have vector instructions.
+    #[inline(always)]
+    fn sin_cos_lanes<const N: usize>(angles: [Self; N]) -> ([Self; N], [Self; N]) {
+        let (mut sines, mut cosines) = ([Self::zero(); N], [Self::zero(); N]);
+        for (i, angle) in angles.iter().enumerate() {
+            (sines[i], cosines[i]) = angle.sin_cos();
+        }
+        (sines, cosines)
+    }
+
+    /// [`Real::sin_cos_of_pair`] of several sums: the same bits, faster where numbers have vector instructions.
+    #[inline(always)]
+    fn sin_cos_lanes_of_pairs<const N: usize>(sums: [[Self; 2]; N]) -> ([Self; N], [Self; N]) {
+        let (mut sines, mut cosines) = ([Self::zero(); N], [Self::zero(); N]);
+        for (i, sum) in sums.iter().enumerate() {
+            (sines[i], cosines[i]) = Self::sin_cos_of_pair(*sum);
+        }
+        (sines, cosines)
     }
 
     /// Square root; NaN below zero.
@@ -77,12 +113,17 @@ impl Real for f64 {
     fn sin_cos(self) -> (Self, Self) {
         crate::trig::sin_cos_f64(self)
     }
-    fn sin_cos_of_sum(angles: &[Self]) -> (Self, Self) {
-        let join = |[sum, tail]: [f64; 2], x: &f64| {
-            let [sum, lost] = crate::trig::sum_of_angles_f64([sum, *x]);
-            [sum, tail + lost]
-        };
-        crate::trig::sin_cos_of_sum_f64(angles[1..].iter().fold([angles[0], 0.0], join))
+    #[inline(always)]
+    fn sin_cos_of_pair(sum: [Self; 2]) -> (Self, Self) {
+        crate::trig::sin_cos_of_sum_f64(sum)
+    }
+    #[inline(always)]
+    fn sin_cos_lanes<const N: usize>(angles: [Self; N]) -> ([Self; N], [Self; N]) {
+        crate::trig::sin_cos_lanes_f64(angles)
+    }
+    #[inline(always)]
+    fn sin_cos_lanes_of_pairs<const N: usize>(sums: [[Self; 2]; N]) -> ([Self; N], [Self; N]) {
+        crate::trig::sin_cos_lanes_of_sums_f64(sums)
     }
     #[inline]
     fn sqrt(self) -> Self {
@@ -110,6 +151,10 @@ impl Real for f32 {
     #[inline]
     fn sin_cos(self) -> (Self, Self) {
         crate::trig::sin_cos_f32(self)
+    }
+    #[inline(always)]
+    fn sin_cos_lanes<const N: usize>(angles: [Self; N]) -> ([Self; N], [Self; N]) {
+        crate::trig::sin_cos_lanes_f32(angles)
     }
     #[inline]
     fn sqrt(self) -> Self {

@@ -275,6 +275,9 @@ pub struct ProgramArgs {
     /// Compute a*b + c in one rounding where the machine can; needs std, and the last bits depend on the machine
     #[arg(long)]
     fma: bool,
+    /// Functions take any scalar that is a `straightline::Real`; the output depends on the package `straightline`
+    #[arg(long)]
+    pub generic: bool,
     /// Prove a bound of the rounding errors of every function, for the ranges of its inputs
     #[arg(long)]
     certify: bool,
@@ -409,6 +412,7 @@ impl ProgramArgs {
             also: self.scalar.iter().skip(1).copied().collect(),
             lanes: self.lanes,
             fma: self.fma,
+            generic: self.generic,
             grade: self.rules,
             forward_dynamics: self.forward_dynamics,
             limits: Limits { operations: self.max_part_operations },

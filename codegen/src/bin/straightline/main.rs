@@ -180,6 +180,11 @@ fn verify(a: &Verify) -> Result<(), Failure> {
 }
 
 fn export(a: &Export) -> Result<(), Failure> {
+    if a.program.generic {
+        print::error("C has no generic functions");
+        print::help("leave out --generic; --scalar says which numbers the C functions take");
+        return Err(Failure::Input);
+    }
     let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;
     if !generated.others.is_empty() || generated.report.staged.is_some() {
         print::error("a C package has one scalar type, and no stages: C could not tell a stage that is out of date");
