@@ -12,7 +12,7 @@ mod run;
 mod state;
 
 pub use object::Law;
-pub use run::{simulate, ContactRun};
+pub use run::{simulate, simulate_from, ContactRun};
 
 use std::fmt;
 use straightline_core::algorithms::Environment;

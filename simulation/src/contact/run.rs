@@ -47,10 +47,26 @@ pub fn simulate(
     settings: &Settings,
     progress: &dyn Fn(f64),
 ) -> Result<ContactRun, Failure> {
+    simulate_from(plant, contacts, command, plant.state(q, qd), settings, progress)
+}
+
+/// Simulates from a state of [`Plant`] at time zero; where the robot has to be brought to its contacts, the springs of its
+/// transmissions keep their stretch.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_from(
+    plant: &Plant,
+    contacts: &Contacts,
+    command: &Command,
+    start: Vec<f64>,
+    settings: &Settings,
+    progress: &dyn Fn(f64),
+) -> Result<ContactRun, Failure> {
     let softened = (settings.method == Method::Stiff).then(|| plant.clone().with_soft_limits());
     let plant = softened.as_ref().unwrap_or(plant);
     let system = System { plant, contacts };
-    let state = plant.normalised(&[plant.state(q, qd), objects_at_rest(contacts.touches.len())].concat());
+    let state = plant.normalised(&[start, objects_at_rest(contacts.touches.len())].concat());
     let mut going = Going { system, command, settings, progress, state, phases: Vec::new(), events: Vec::new() };
     let before = going.start()?;
     let period = match command {
@@ -59,8 +75,8 @@ pub fn simulate(
     };
     let mut run = Run {
         table: crate::table::Table { names: going.names(), rows: Vec::new() },
-        q: q.to_vec(),
-        qd: qd.to_vec(),
+        q: Vec::new(),
+        qd: Vec::new(),
         stop: None,
         balance: Balance {
             before,
@@ -155,16 +171,22 @@ impl Going<'_> {
             touch.closed.then_some(Closed { slip, held: [0.0; 6] })
         };
         self.phases = touches.iter().map(close).collect();
+        let as_given = self.state.clone();
         let off = self.system.project(0.0, &mut self.state, &self.phases, 100);
         if off.is_nan() || off > CLOSED {
             let why = "the contacts and loops that are closed at the beginning cannot be closed from there";
             return Err(self.refused(0.0, format!("{why}: {off:.1e} m, or cosine, is left")));
         }
         if self.system.plant.is_driven() {
-            // springs of the transmissions are slack where the robot has been brought
-            let (q, qd, ..) = self.system.plant.split(&self.state);
-            let slack = self.system.plant.state(q, qd);
-            self.state[..slack.len()].copy_from_slice(&slack);
+            // springs of the transmissions keep their stretch where the robot has been brought
+            let slack = |state: &[f64]| {
+                let (q, qd, ..) = self.system.plant.split(state);
+                self.system.plant.state(q, qd)
+            };
+            let (before, after) = (slack(&as_given), slack(&self.state));
+            for i in self.system.drive_states() {
+                self.state[i] = as_given[i] + (after[i] - before[i]);
+            }
         }
         for (k, touch) in touches.iter().enumerate() {
             let seen = self.system.see(0.0, &self.state, k);

@@ -21,6 +21,9 @@ pub(super) const RIDGE: f64 = 1e-12;
 /// An open contact may be this far inside \[m\] before it counts as closing: rounding at a lift-off.
 pub(super) const SLACK: f64 = 1e-9;
 
+/// A coordinate that moves less than this per unit of every joint does not move.
+const STILL: f64 = 1e-9;
+
 /// Guards of each contact.
 pub(super) const GUARDS: usize = 3;
 
@@ -221,7 +224,13 @@ impl<'a> System<'a> {
             };
             let mut contact = seen.contact.clone();
             let sticks = closed.slip == Slip::Sticks;
-            let also = |c: &Coordinate| sticks && matches!(c, Coordinate::Px | Coordinate::Py);
+            // a direction in which nothing moves, as of a planar arm, needs no force: it would be rounding over rounding
+            let moves = |k: usize| seen.motion.jacobian[k].iter().any(|j| j.abs() > STILL);
+            let also = |c: &Coordinate| match c {
+                Coordinate::Px => sticks && moves(0),
+                Coordinate::Py => sticks && moves(1),
+                _ => false,
+            };
             contact.constrained.retain(|c| !also(c));
             contact.constrained.extend(Coordinate::ALL.iter().filter(|c| also(c)));
             contact.constrained.sort();

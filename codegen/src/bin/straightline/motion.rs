@@ -136,14 +136,8 @@ pub fn simulate(a: &Simulate) -> Result<(), Failure> {
     let duration = experiment.settings.duration;
     let progress = |t: f64| bar.set_position((t / duration * 1000.0) as u64);
     if !contacts.is_empty() {
-        if plant.is_driven() {
-            bar.finish_and_clear();
-            print::error("the robot has drives, and contacts are simulated under torques: not both at once");
-            print::help("leave [[drive]] or [[contact]] out of the scene");
-            return Err(Failure::Input);
-        }
-        let (settings, start) = (&experiment.settings, (&experiment.q[..], &experiment.qd[..]));
-        let run = in_contact::simulate(&plant, &contacts, &experiment.command, start, settings, &progress);
+        let (settings, start) = (&experiment.settings, start(&plant, &experiment));
+        let run = in_contact::simulate_from(&plant, &contacts, &experiment.command, start, settings, &progress);
         bar.finish_and_clear();
         return contact::finish(a, &plant, &contacts, run);
     }
