@@ -438,8 +438,15 @@ fn generate(
         if let Some(method) = method {
             doc.push_str(&format!("\n{method}\n"));
         }
-        let text = emit::function(graph, schedule, function.name(), &doc, options.plain_style(), &title);
+        let mut text = emit::function(graph, schedule, function.name(), &doc, options.plain_style(), &title);
         let figures = FunctionReport::new(&program, options.scalar, text.text.lines().count());
+        if let Some(bound) = companion(&robot, &frames, *function, graph, options) {
+            let bound = error_bound_text(&bound, *function, options);
+            text.text.push('\n');
+            text.text.push_str(&bound.text);
+            text.uses_sin_cos |= bound.uses_sin_cos;
+            text.uses_sqrt |= bound.uses_sqrt;
+        }
         functions.insert(function.name(), FunctionReport { waterfall, errors, ..figures });
         let Program { function, graph, schedule, .. } = program;
         let (inputs, outputs) = (graph.inputs.clone(), graph.outputs.clone());
@@ -514,6 +521,48 @@ fn certificates(robot: &Robot, programs: &[Program], options: &Options) -> Vec<O
         })
     };
     programs.iter().map(of).collect()
+}
+
+/// The program that bounds a function's rounding errors at the state at hand, where it is asked for and there is one.
+/// Where a·b + c is one operation, values are other ones in every program.
+pub fn companion(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    graph: &Graph,
+    options: &Options,
+) -> Option<Graph> {
+    if options.fma || options.generic || !options.certify.is_some_and(|effort| effort.companions) {
+        return None;
+    }
+    let bound = match function {
+        Function::ForwardDynamics => {
+            let of = |f: Function| optimised(robot, frames, f, options, options.optimisations());
+            let (inverse, mass_matrix) = (of(Function::InverseDynamics), of(Function::MassMatrix));
+            certify::companion::forward_dynamics_bound(graph, &inverse, &mass_matrix, options.scalar)
+        }
+        _ => certify::companion::state_bound(graph, options.scalar),
+    };
+    bound.map(|graph| dead_code(&graph))
+}
+
+/// Its source.
+fn error_bound_text(bound: &Graph, function: Function, options: &Options) -> emit::FunctionText {
+    let name = function.name();
+    let mut doc = format!(
+        "How far the results of [`{name}`] can be from the exact values by rounding, at these inputs: proven for this state, whatever \
+         the ranges of the inputs.\n\nInputs below the normal numbers are to be given as zero where the machine reads them so."
+    );
+    if function == Function::ForwardDynamics {
+        doc = format!(
+            "How far the accelerations `qdd`, from [`{name}`] or wherever else, can be from the exact ones at these inputs: proven from \
+             the residual of the inverse dynamics.\n\n`smallest_eigenvalue`: what the smallest eigenvalue of the mass matrix is at least. \
+             Where rounding is too coarse for a proof, both are NaN."
+        );
+    }
+    let schedule = schedule(bound, options.limits);
+    let style = Style::plain(options.scalar);
+    emit::function(bound, &schedule, &format!("{name}_error_bound"), &doc, style, &|_| String::new())
 }
 
 /// The program of a parameter's constructor: from mass \[kg\], mass centre \[m\] and inertia about it \[kg·m²\] (xx, xy, xz,

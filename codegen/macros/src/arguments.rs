@@ -70,7 +70,8 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         }
         "module" => arguments.module = Some(value::<LitStr>(input)?.parse()?),
         "floating_base" => options.model.floating_base = true,
-        "certify" => options.certify = Some(Effort::default()),
+        "certify" => drop(options.certify.get_or_insert_default()),
+        "certify_state" => options.certify.get_or_insert_default().companions = true,
         "scalar" => options.scalar = word(input)?,
         "scalars" => {
             let scalars: Result<Vec<Scalar>> =
@@ -102,7 +103,8 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         }
         other => {
             let known =
-                "floating_base, certify, scalar, scalars, lanes, fma, generic, rules, forward_dynamics, max_part_operations, \
+                "floating_base, certify, certify_state, scalar, scalars, lanes, fma, generic, rules, forward_dynamics, \
+                         max_part_operations, \
                          angle_tolerance, \
                          functions, frames, joint_order, gravity, scene, module";
             return Err(Error::new(key.span(), format!("there is no option `{other}`; one of: {known}")));

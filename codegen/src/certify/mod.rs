@@ -29,11 +29,12 @@
 //! **5. Subdivision.** A bound for a box is the greatest of the bounds of boxes that cover it ([`Effort::boxes`]).
 //!
 //! Programs with a division have a bound where the divisor stays off zero in the box; where it may not, as in forward
-//! dynamics, there is none: [`Refusal`]. A bound also proves that no value overflows and none is NaN. Coulomb friction takes the sign of a
+//! dynamics, there is none: [`Refusal`]. There, and for the state at hand, generated programs bound the error: [`companion`]. A bound also proves that no value overflows and none is NaN. Coulomb friction takes the sign of a
 //! speed as it is given: where subnormal numbers are read as zero, so is the sign of a subnormal speed.
 
 pub mod analysis;
 mod cancel;
+pub mod companion;
 pub mod format;
 pub mod forms;
 pub mod interval;
@@ -57,11 +58,13 @@ use straightline_core::model::{JointKind, Model};
 pub struct Effort {
     /// Boxes that each result's box is cut into at most; 1: the box as it is.
     pub boxes: usize,
+    /// Whether functions for the bound at the state at hand are generated too: [`companion`].
+    pub companions: bool,
 }
 
 impl Default for Effort {
     fn default() -> Self {
-        Effort { boxes: 1 }
+        Effort { boxes: 1, companions: false }
     }
 }
 

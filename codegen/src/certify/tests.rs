@@ -1,6 +1,7 @@
 //! One small program per rule, on which a search comes near the bound; and every rule broken on purpose, which it must notice.
 
 use super::analysis::Broken;
+use super::companion::state_bound_in;
 use super::search::{computed_at, errors_at, worst_found};
 use super::{Analysis, Format, Interval};
 use crate::emit::Scalar;
@@ -189,4 +190,29 @@ fn intervals_hold_what_they_must() {
             assert!(x.mag() > 1e6 || (holds(sin, s) && holds(cos, c)), "{x:?} at {u}");
         }
     }
+}
+
+/// Whether the bound at the state where a search finds the worst error lies below that error.
+fn is_violated_at_a_state(graph: &Graph, ranges: &[Interval], format: Format) -> bool {
+    let bound = state_bound_in(graph, format).expect("the program has no division");
+    let found = worst_found(graph, Scalar::F32, ranges, 20_000, 3).remove(0);
+    found.error > computed_at(&bound, Scalar::F32, &found.inputs)[0]
+}
+
+#[test]
+fn a_bound_at_a_state_holds_and_with_broken_numbers_does_not() {
+    let format = Format::of(Scalar::F32);
+    let unit = [Interval::new(-0.9, 0.9); 2];
+    for (name, graph, ranges) in [
+        ("sum", sum_of_two(), &unit[..]),
+        ("constant", tenth(), &unit[..1]),
+        ("sine", sine(), &unit[..1]),
+        ("square", square_of_sum(), &unit[..1]),
+        ("turns", turns(), &WIDE),
+        ("cancelling", products_that_cancel(), &CANCELLING),
+    ] {
+        assert!(!is_violated_at_a_state(&graph, ranges, format), "{name}");
+    }
+    assert!(is_violated_at_a_state(&sum_of_two(), &unit, Format { u: 0.5 * format.u, ..format }), "rounding");
+    assert!(is_violated_at_a_state(&sine(), &unit[..1], Format { trig_ulps: 0.3, ..format }), "sine");
 }

@@ -284,6 +284,9 @@ pub struct ProgramArgs {
     /// The same with tighter bounds: the ranges of each result are cut into so many boxes
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     certify_boxes: Option<u32>,
+    /// Beside every function `…_error_bound`, which bounds the rounding errors at the state at hand; not with --fma
+    #[arg(long, conflicts_with = "fma")]
+    certify_state: bool,
 }
 
 /// How the robot file is read.
@@ -394,8 +397,9 @@ impl ProgramArgs {
     }
 
     fn effort(&self) -> Option<Effort> {
-        let boxes = self.certify_boxes.map(|n| Effort { boxes: n as usize });
-        boxes.or(self.certify.then(Effort::default))
+        let wanted = self.certify || self.certify_boxes.is_some() || self.certify_state;
+        let boxes = self.certify_boxes.map_or(Effort::default().boxes, |n| n as usize);
+        wanted.then_some(Effort { boxes, companions: self.certify_state })
     }
 
     pub fn options(&self, model: &ModelArgs) -> Options {
