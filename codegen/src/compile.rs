@@ -5,7 +5,7 @@ use crate::choose::choose;
 use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
 use crate::emit::{self, Item, Lanes, Provenance, Scalar, Style};
-use crate::expr::{verify, Counts, Folding, Grade, Graph, Port, RuleSet, Section};
+use crate::expr::{verify, Counts, Folding, Grade, Graph, NodeId, Port, RuleSet, Section};
 use crate::forward_method::MethodChoice;
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model;
@@ -373,7 +373,8 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let robot = Robot::new(model);
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
     let programs = resolved.functions.iter().filter(|f| !is_empty(f));
-    let programs: Vec<Program> = programs.map(|f| program(&robot, &frames, *f, &resolved)).collect();
+    let mut programs: Vec<Program> = programs.map(|f| program(&robot, &frames, *f, &resolved)).collect();
+    programs.iter_mut().for_each(|p| mix_precisions(&robot, p, &resolved));
     let measures: Vec<(Function, Measures)> =
         programs.iter().map(|p| (p.function, Measures::of(p, options.scalar))).collect();
     budget::check(&whole, &frames, &measures, options, &mut diagnostics);
@@ -437,6 +438,10 @@ fn generate(
         let mut doc = function.doc(&graph.inputs, &options.scene);
         if let Some(method) = method {
             doc.push_str(&format!("\n{method}\n"));
+        }
+        if !graph.widths.is_empty() {
+            let (double, all) = (certify::mixed::double_operations(graph), graph.counts().flops());
+            doc.push_str(&format!("\n{double} of its {all} operations are in f64: what its error budget takes.\n"));
         }
         let mut text = emit::function(graph, schedule, function.name(), &doc, options.plain_style(), &title);
         let figures = FunctionReport::new(&program, options.scalar, text.text.lines().count());
@@ -523,6 +528,21 @@ fn certificates(robot: &Robot, programs: &[Program], options: &Options) -> Vec<O
     programs.iter().map(of).collect()
 }
 
+/// A program in f32 gets f64 where its budget allows that and its greatest error takes it.
+fn mix_precisions(robot: &Robot, program: &mut Program, options: &Options) {
+    let budget = options.scene.budgets.get(&program.function).filter(|b| b.mixed_precision);
+    let Some(most) = budget.and_then(|b| b.max_error) else { return };
+    if options.scalar != Scalar::F32 || options.fma || options.generic {
+        return;
+    }
+    let stored: Vec<NodeId> = program.schedule.parts.iter().flat_map(|p| p.stores.iter().map(|(id, _)| *id)).collect();
+    let demand = vec![most; program.graph.results.len()];
+    let inputs = certify::input_box(&program.graph.inputs, &options.scene, &robot.model);
+    // what has no bound at all is refused where bounds are compared with the budget
+    let widened = inputs.and_then(|inputs| certify::mixed::widened(&program.graph, &inputs, &demand, &stored));
+    program.graph = widened.unwrap_or_else(|_| program.graph.clone());
+}
+
 /// The program that bounds a function's rounding errors at the state at hand, where it is asked for and there is one.
 /// Where a·b + c is one operation, values are other ones in every program.
 pub fn companion(
@@ -532,7 +552,8 @@ pub fn companion(
     graph: &Graph,
     options: &Options,
 ) -> Option<Graph> {
-    if options.fma || options.generic || !options.certify.is_some_and(|effort| effort.companions) {
+    let is_plain = !options.fma && !options.generic && graph.widths.is_empty();
+    if !is_plain || !options.certify.is_some_and(|effort| effort.companions) {
         return None;
     }
     let bound = match function {

@@ -4,7 +4,8 @@ use super::format::Format;
 use super::forms::{Atom, Coefficient, Forms, Term};
 use super::interval::{add_up, mul_up, norm_up, Interval};
 use super::norms::{Bounded, Factor, GroupId, Groups};
-use crate::expr::{Graph, NodeId, Op};
+use crate::emit::Scalar;
+use crate::expr::{Graph, NodeId, Op, Width};
 
 /// A graph that is being analysed in a format; what does not depend on the box is found once.
 pub struct Analysis<'g> {
@@ -227,7 +228,7 @@ impl<'g> Analysis<'g> {
             // |x c| + |y s| ≤ ‖(x, y)‖ ‖(c, s)‖, each product rounded by u of itself at most
             let (a, b, pair, group) = self.sharing.products[k];
             let norm = mul_up(self.stretch(pair), self.norm(group));
-            let together = add_up(mul_up(self.format.u, norm), 2.0 * self.format.tiny);
+            let together = add_up(mul_up(self.unit(a, b), norm), 4.0 * self.format.tiny);
             if together < add_up(error[a], error[b]) {
                 (error[a], error[b]) = (together, 0.0);
             }
@@ -239,11 +240,55 @@ impl<'g> Analysis<'g> {
         self.state.class_error = class_error;
     }
 
+    /// What rounding node i to its width can do, up to a magnitude.
+    fn rounding(&self, i: usize, magnitude: f64) -> f64 {
+        let double = || Format::of(Scalar::F64).rounding(magnitude);
+        match self.graph.width(NodeId(i as u32)) {
+            Width::Single => self.format.rounding(magnitude),
+            Width::Double => double(),
+            Width::Rounded => add_up(self.format.rounding(magnitude), double()),
+        }
+    }
+
+    /// u of two values that are bounded together.
+    fn unit(&self, a: usize, b: usize) -> f64 {
+        let double = Format::of(Scalar::F64).u;
+        match [a, b].map(|i| self.graph.width(NodeId(i as u32))) {
+            [Width::Single, Width::Single] => self.format.u,
+            [Width::Double, Width::Double] => double,
+            _ => add_up(self.format.u, double),
+        }
+    }
+
+    /// What the errors of a node's class are worth for the result of [`Analysis::error`] at hand: the node that stands for the class,
+    /// and its greatest adjoint times its errors.
+    pub fn shares(&mut self, cone: usize) -> Vec<(NodeId, f64)> {
+        self.adjoints(cone);
+        let nodes = std::mem::take(&mut self.cones[cone].1);
+        let share = |n: &u32| mul_up(self.state.adjoint[*n as usize].mag(), self.state.class_error[*n as usize]);
+        let shares = nodes.iter().map(|n| (NodeId(*n), share(n))).filter(|(_, share)| *share > 0.0).collect();
+        for &n in &nodes {
+            self.state.adjoint[n as usize] = Interval::ZERO;
+        }
+        self.cones[cone].1 = nodes;
+        shares
+    }
+
+    /// The node that stands for all with the adjoint of a node, up to the sign.
+    pub fn class(&self, id: NodeId) -> NodeId {
+        NodeId(self.sharing.class[id.index()] as u32)
+    }
+
+    /// The greatest rounding error of a node.
+    pub fn rounding_error(&self, id: NodeId) -> f64 {
+        self.state.error[id.index()]
+    }
+
     /// The range of an operation on computed operands, before its own rounding, and the bound of that.
     fn exact_range(&mut self, i: usize, inputs: &[Interval]) -> Result<(Interval, f64), Refusal> {
         let format = self.format;
         let v = |state: &State, a: NodeId| state.value[a.index()];
-        let rounded = |x: Interval| (x, format.rounding(x.mag()));
+        let rounded = |x: Interval, this: &Self| (x, this.rounding(i, x.mag()));
         Ok(match self.graph.ops[i] {
             Op::Input(k) => {
                 let x = inputs[k as usize];
@@ -253,15 +298,29 @@ impl<'g> Analysis<'g> {
             }
             Op::Constant(c) => {
                 // the range holds both the exact and the rounded value
+                let format = match self.graph.width(NodeId(i as u32)) {
+                    Width::Double => Format::of(Scalar::F64),
+                    _ => format,
+                };
                 let (range, error) = format.constant(c.value());
                 (range, if self.is_broken(Broken::Constants) { 0.0 } else { error })
             }
-            Op::Neg(a) => (-v(&self.state, a), 0.0),
-            Op::Add(a, b) => rounded(self.sum(i, v(&self.state, a) + v(&self.state, b))),
-            Op::Sub(a, b) => rounded(self.sum(i, v(&self.state, a) - v(&self.state, b))),
+            Op::Neg(a) => {
+                let x = v(&self.state, a);
+                let is_rounded = self.graph.width(NodeId(i as u32)) == Width::Rounded;
+                (-x, if is_rounded { format.rounding(x.mag()) } else { 0.0 })
+            }
+            Op::Add(a, b) => {
+                let sum = self.sum(i, v(&self.state, a) + v(&self.state, b));
+                rounded(sum, self)
+            }
+            Op::Sub(a, b) => {
+                let sum = self.sum(i, v(&self.state, a) - v(&self.state, b));
+                rounded(sum, self)
+            }
             Op::Mul(a, b) => {
                 if a == b {
-                    return Ok(rounded(v(&self.state, a).square()));
+                    return Ok(rounded(v(&self.state, a).square(), self));
                 }
                 let (x, y) = (v(&self.state, a), v(&self.state, b));
                 let mut product = x * y;
@@ -270,24 +329,25 @@ impl<'g> Analysis<'g> {
                     let norm = self.norm(group);
                     product = product.clipped((0.5 * mul_up(norm, norm)).next_up());
                 }
-                let exact = self.is_power_of_two(a) || self.is_power_of_two(b);
+                let is_single = self.graph.width(NodeId(i as u32)) == Width::Single;
+                let exact = is_single && (self.is_power_of_two(a) || self.is_power_of_two(b));
                 if exact {
                     (product, format.tiny)
                 } else {
-                    rounded(product)
+                    rounded(product, self)
                 }
             }
             Op::Div(a, b) => {
                 if v(&self.state, b).has_zero() {
                     return Err(Refusal::Division);
                 }
-                rounded(v(&self.state, a).over(v(&self.state, b)))
+                rounded(v(&self.state, a).over(v(&self.state, b)), self)
             }
             Op::Sqrt(a) => {
                 if v(&self.state, a).lo <= 0.0 {
                     return Err(Refusal::Division);
                 }
-                rounded(v(&self.state, a).sqrt())
+                rounded(v(&self.state, a).sqrt(), self)
             }
             Op::Sign(a) => {
                 let x = v(&self.state, a);

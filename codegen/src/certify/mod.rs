@@ -38,6 +38,7 @@ pub mod companion;
 pub mod format;
 pub mod forms;
 pub mod interval;
+pub mod mixed;
 pub mod norms;
 pub mod search;
 mod subdivision;

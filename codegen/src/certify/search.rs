@@ -5,7 +5,7 @@
 
 use super::Interval;
 use crate::emit::Scalar;
-use crate::expr::{evaluate, Graph};
+use crate::expr::{evaluate, Graph, NodeId, Op, Width};
 use straightline_core::Dd;
 
 /// The worst that was found for one output scalar.
@@ -62,11 +62,54 @@ pub fn errors_at(graph: &Graph, scalar: Scalar, inputs: &[f64]) -> Vec<f64> {
 pub fn computed_at(graph: &Graph, scalar: Scalar, inputs: &[f64]) -> Vec<f64> {
     match scalar {
         Scalar::F64 => evaluate(graph, inputs),
+        Scalar::F32 if !graph.widths.is_empty() => mixed_at(graph, inputs),
         Scalar::F32 => {
             let inputs: Vec<f32> = inputs.iter().map(|x| *x as f32).collect();
             evaluate::<f32>(graph, &inputs).into_iter().map(f64::from).collect()
         }
     }
+}
+
+/// What a program in mixed precision computes; values of f32 are held as the f64 that they are.
+fn mixed_at(graph: &Graph, inputs: &[f64]) -> Vec<f64> {
+    let mut values: Vec<f64> = Vec::with_capacity(graph.ops.len());
+    let single = |x: f64| x as f32;
+    for (i, op) in graph.ops.iter().enumerate() {
+        let width = graph.width(NodeId(i as u32));
+        let v = |a: NodeId| values[a.index()];
+        let arithmetic = |double: f64, single: f32| match width {
+            Width::Single => f64::from(single),
+            Width::Rounded => f64::from(double as f32),
+            Width::Double => double,
+        };
+        let halves = |pair: NodeId| match graph.op(pair) {
+            Op::SinCos(a) => {
+                let terms: Vec<f32> = graph.angle_terms(a).into_iter().map(|t| single(v(t))).collect();
+                match terms[..] {
+                    [angle] => straightline_core::Real::sin_cos(angle),
+                    _ => <f32 as straightline_core::Real>::sin_cos_of_sum(&terms),
+                }
+            }
+            _ => unreachable!("verified graphs have halves of pairs"),
+        };
+        values.push(match *op {
+            Op::Input(k) => f64::from(single(inputs[k as usize])),
+            Op::Constant(c) if width == Width::Double => c.value().to_f64(),
+            Op::Constant(c) => f64::from(c.value().to_f32()),
+            Op::Neg(a) => arithmetic(-v(a), -single(v(a))),
+            Op::Add(a, b) => arithmetic(v(a) + v(b), single(v(a)) + single(v(b))),
+            Op::Sub(a, b) => arithmetic(v(a) - v(b), single(v(a)) - single(v(b))),
+            Op::Mul(a, b) => arithmetic(v(a) * v(b), single(v(a)) * single(v(b))),
+            Op::Div(a, b) => arithmetic(v(a) / v(b), single(v(a)) / single(v(b))),
+            Op::Sqrt(a) => arithmetic(v(a).sqrt(), single(v(a)).sqrt()),
+            Op::Sign(a) => f64::from(u8::from(v(a) > 0.0)) - f64::from(u8::from(v(a) < 0.0)),
+            // formed where the sine is
+            Op::AngleSum(..) | Op::SinCos(_) => 0.0,
+            Op::Sin(p) => f64::from(halves(p).0),
+            Op::Cos(p) => f64::from(halves(p).1),
+        });
+    }
+    graph.results.iter().map(|r| values[r.index()]).collect()
 }
 
 /// The worst errors found in a box with so many evaluations.

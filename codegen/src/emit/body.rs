@@ -2,7 +2,7 @@
 
 use super::fused::{fusions, Fused};
 use super::{one_line, Names, Scalar, Style};
-use crate::expr::{Constant, Graph, NodeId, Op, Port, Section};
+use crate::expr::{Constant, Graph, NodeId, Op, Port, Section, Width};
 use crate::schedule::{Part, Schedule};
 use std::fmt::Write;
 use std::slice::from_ref;
@@ -161,8 +161,8 @@ struct Body<'a> {
     /// Sine-cosine pairs that are written already.
     paired: Vec<bool>,
     names: Names,
-    /// Locals and statements of the block being written.
-    declared: Vec<String>,
+    /// Locals, with their types, and statements of the block being written.
+    declared: Vec<(String, Scalar)>,
     statements: String,
 }
 
@@ -252,7 +252,7 @@ fn statements(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) 
                 out.uses_sqrt |= matches!(op, Op::Sqrt(_) | Op::Sign(_)) && !style.generic;
                 let (text, binding) = match b.fused[id.index()] {
                     Some(fused) => (b.fma(fused), Binding::Atom),
-                    None => b.expression(op),
+                    None => b.node(*id),
                 };
                 let named = graph.notes[id.index()].name.is_some();
                 // a sign before a name is written wherever it is used; an operation is not
@@ -264,7 +264,7 @@ fn statements(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) 
                 } else {
                     let name = b.fresh_name(*id);
                     let _ = writeln!(b.statements, "    {name} = {text};");
-                    b.declared.push(name.clone());
+                    b.declared.push((name.clone(), b.scalar_of(*id)));
                     b.text[id.index()] = Some((name, Binding::Atom));
                 }
             }
@@ -307,15 +307,61 @@ impl Body<'_> {
             }
             Op::Constant(c) => {
                 let sign = c.is_negative() && !self.style.generic;
-                (literal(c, self.style), if sign { Binding::Sign } else { Binding::Atom })
+                let style = match self.graph.width(id) {
+                    Width::Double => Style::plain(Scalar::F64),
+                    _ => self.style,
+                };
+                (literal(c, style), if sign { Binding::Sign } else { Binding::Atom })
             }
             _ => self.text[id.index()].clone().expect("operands stand before their users"),
         }
     }
 
+    /// The type of a node's text.
+    fn scalar_of(&self, id: NodeId) -> Scalar {
+        match self.graph.width(id) {
+            Width::Double => Scalar::F64,
+            _ => self.style.scalar,
+        }
+    }
+
+    /// The text of a node as an operand of this type; f32 becomes f64 where a program is in mixed precision.
+    fn operand_in(&self, id: NodeId, scalar: Scalar) -> (String, Binding) {
+        let own = self.scalar_of(id);
+        match (self.graph.op(id), own, scalar) {
+            (_, Scalar::F32, Scalar::F64) if self.style.scalar == Scalar::F32 => {
+                (format!("f64::from({})", self.typed(id)), Binding::Atom)
+            }
+            _ => self.operand(id),
+        }
+    }
+
+    /// The text of a node that says its type: what `f64::from` takes.
+    fn typed(&self, id: NodeId) -> String {
+        let text = self.operand(id).0;
+        match self.graph.op(id) {
+            Op::Constant(_) => format!("{text}_f32"),
+            _ => text,
+        }
+    }
+
+    /// The text of an operation; one in f64 that is used in f32 is rounded.
+    fn node(&self, id: NodeId) -> (String, Binding) {
+        let op = self.graph.op(id);
+        match self.graph.width(id) {
+            Width::Single => self.expression(op, self.style.scalar),
+            Width::Double => self.expression(op, Scalar::F64),
+            Width::Rounded => (format!("(({}) as f32)", self.expression(op, Scalar::F64).0), Binding::Atom),
+        }
+    }
+
     /// The text of a node, in parentheses if it binds less than `at_least`.
     fn bound(&self, id: NodeId, at_least: Binding) -> String {
-        let (text, binding) = self.operand(id);
+        self.bound_in(id, at_least, self.style.scalar)
+    }
+
+    fn bound_in(&self, id: NodeId, at_least: Binding, scalar: Scalar) -> String {
+        let (text, binding) = self.operand_in(id, scalar);
         if binding < at_least {
             format!("({text})")
         } else {
@@ -333,14 +379,15 @@ impl Body<'_> {
         format!("{function}({}, {}, {})", signed(x, negated), self.operand(y).0, signed(c, subtracted))
     }
 
-    fn expression(&self, op: Op) -> (String, Binding) {
+    fn expression(&self, op: Op, scalar: Scalar) -> (String, Binding) {
         use Binding::{Atom, Product, Sign, Sum};
+        let bound = |id: NodeId, at_least: Binding| self.bound_in(id, at_least, scalar);
         match op {
-            Op::Add(a, b) => (format!("{} + {}", self.bound(a, Sum), self.bound(b, Product)), Sum),
-            Op::Sub(a, b) => (format!("{} - {}", self.bound(a, Sum), self.bound(b, Product)), Sum),
-            Op::Mul(a, b) => (format!("{} * {}", self.bound(a, Product), self.bound(b, Sign)), Product),
-            Op::Div(a, b) => (format!("{} / {}", self.bound(a, Product), self.bound(b, Sign)), Product),
-            Op::Neg(a) => (format!("-{}", self.bound(a, Atom)), Sign),
+            Op::Add(a, b) => (format!("{} + {}", bound(a, Sum), bound(b, Product)), Sum),
+            Op::Sub(a, b) => (format!("{} - {}", bound(a, Sum), bound(b, Product)), Sum),
+            Op::Mul(a, b) => (format!("{} * {}", bound(a, Product), bound(b, Sign)), Product),
+            Op::Div(a, b) => (format!("{} / {}", bound(a, Product), bound(b, Sign)), Product),
+            Op::Neg(a) => (format!("-{}", bound(a, Atom)), Sign),
             Op::Sqrt(a) => (format!("{}({})", self.style.kernel("sqrt"), self.operand(a).0), Atom),
             Op::Sign(a) => (format!("{}({})", self.style.kernel("sign"), self.operand(a).0), Atom),
             Op::Input(_) | Op::Constant(_) | Op::AngleSum(..) | Op::SinCos(_) | Op::Sin(_) | Op::Cos(_) => {
@@ -444,12 +491,17 @@ impl Body<'_> {
                 let _ = writeln!(out.text, "    // {}", one_line(&title));
             }
         }
-        for names in self.declared.chunks(DECLARATION) {
-            if let [name] = names {
-                let _ = writeln!(out.text, "    let {name}: {};", self.style.scalar_name());
-            } else {
-                let end = format!("]: [{}; {}];", self.style.scalar_name(), names.len());
-                out.text.push_str(&wrapped("    let [", names, &end));
+        for scalar in [Scalar::F32, Scalar::F64] {
+            let own = scalar == self.style.scalar;
+            let scalar_name = if own { self.style.scalar_name() } else { scalar.name() };
+            let names = self.declared.iter().filter(|(_, s)| *s == scalar).map(|(name, _)| name.clone());
+            for names in names.collect::<Vec<String>>().chunks(DECLARATION) {
+                if let [name] = names {
+                    let _ = writeln!(out.text, "    let {name}: {scalar_name};");
+                } else {
+                    let end = format!("]: [{scalar_name}; {}];", names.len());
+                    out.text.push_str(&wrapped("    let [", names, &end));
+                }
             }
         }
         self.declared.clear();

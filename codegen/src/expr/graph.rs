@@ -157,6 +157,18 @@ pub struct Note {
     pub section: u32,
 }
 
+/// How a value of a program in f32 is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Width {
+    /// In f32.
+    #[default]
+    Single,
+    /// In f64, and rounded to f32 for all that use it.
+    Rounded,
+    /// In f64, and used in f64 alone.
+    Double,
+}
+
 /// A program of scalar operations.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Graph {
@@ -172,6 +184,8 @@ pub struct Graph {
     pub outputs: Vec<Port>,
     /// The nodes that are put out, group after group.
     pub results: Vec<NodeId>,
+    /// Of a program in mixed precision, how each value is computed; empty where all are in one format. Passes drop it.
+    pub widths: Vec<Width>,
 }
 
 /// Operation counts. Sign flips and signs are free; `sin_cos` counts angles. The sum of two angles is an addition; what keeps
@@ -213,6 +227,11 @@ impl Graph {
             Op::AngleSum(a, b) => [self.angle_terms(a), self.angle_terms(b)].concat(),
             _ => vec![angle],
         }
+    }
+
+    /// How a value is computed.
+    pub fn width(&self, id: NodeId) -> Width {
+        self.widths.get(id.index()).copied().unwrap_or_default()
     }
 
     /// The operation of a node.

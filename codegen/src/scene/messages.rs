@@ -26,6 +26,7 @@ pub const CODES: &[&str] = &[
     "coulomb-speed-missing",
     "coulomb-speed-alone",
     "budget-alone",
+    "mixed-alone",
     "over-budget",
     "error-over-budget",
     "error-unbounded",
@@ -208,6 +209,12 @@ pub fn coulomb_speed_alone() -> D {
 pub fn budget_alone(function: &str) -> D {
     D::error("budget-alone", format!("a budget for `{function}`, which is not among the outputs"))
         .help(format!("add `{function}` to `functions` in [outputs], or remove its budget"))
+}
+
+/// Mixed precision for no demanded error.
+pub fn mixed_alone() -> D {
+    D::error("mixed-alone", "`mixed_precision` without `max_error`")
+        .help("write the error that is demanded, such as `max_error = 1e-3`, or remove it")
 }
 
 /// A bound of rounding errors that is greater than it may be.

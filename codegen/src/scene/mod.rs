@@ -269,4 +269,6 @@ pub struct Budget {
     pub max_code_bytes: Option<usize>,
     /// The greatest bound of a rounding error, of any result, in its unit.
     pub max_error: Option<f64>,
+    /// Whether a function in f32 may compute in f64 what `max_error` takes.
+    pub mixed_precision: bool,
 }

@@ -32,7 +32,8 @@ const TOP: &[&str] = &[
 ];
 /// Those of the tables of which there may be several: `[[payload]]`.
 pub const LISTS: &[&str] = &["contact", "loop", "mode", "payload", "parameter", "drive"];
-const BUDGET: &[&str] = &["max_flops", "max_sincos", "max_live", "max_stack_bytes", "max_code_bytes", "max_error"];
+const BUDGET: &[&str] =
+    &["max_flops", "max_sincos", "max_live", "max_stack_bytes", "max_code_bytes", "max_error", "mixed_precision"];
 const BASES: [(&str, Base); 3] = [("fixed", Base::Fixed), ("floating", Base::Floating), ("moving", Base::Moving)];
 /// A place in the list of effects: that its speed is still to be read.
 const SMOOTH: Coulomb = Coulomb::Smooth(0.0);
@@ -458,13 +459,20 @@ impl SceneReader<'_> {
                 max_stack_bytes: limit("max_stack_bytes"),
                 max_code_bytes: limit("max_code_bytes"),
                 max_error: None,
+                mixed_precision: false,
             };
             let max_error = self.reader.real_at(&limits, "max_error", Range64::Finite);
             if let Some(value) = max_error.as_ref().filter(|e| e.value <= 0.0) {
                 let complaint = say::not_in_range("max_error", value.value, "above zero");
                 self.reader.diagnostics.push(complaint.at(&value.place));
             }
-            let budget = Budget { max_error: self.noted(&format!("budget.{name}.max_error"), max_error), ..budget };
+            let mixed = self.reader.flag_at(&limits, "mixed_precision").filter(|flag| flag.value);
+            if let (Some(flag), None) = (&mixed, &max_error) {
+                self.reader.diagnostics.push(say::mixed_alone().at(&flag.place));
+            }
+            let mixed_precision = mixed.is_some();
+            let max_error = self.noted(&format!("budget.{name}.max_error"), max_error);
+            let budget = Budget { max_error, mixed_precision, ..budget };
             self.file.scene.budgets.insert(function, budget);
             if self.file.functions.as_ref().is_some_and(|functions| !functions.contains(&function)) {
                 self.reader.complain(&limits.span, say::budget_alone(name));

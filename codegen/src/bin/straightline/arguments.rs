@@ -287,6 +287,9 @@ pub struct ProgramArgs {
     /// Beside every function `…_error_bound`, which bounds the rounding errors at the state at hand; not with --fma
     #[arg(long, conflicts_with = "fma")]
     certify_state: bool,
+    /// Of f32, compute in f64 what it takes for proven errors up to so much, in the results' units, and nothing else
+    #[arg(long, value_name = "MAX_ERROR", value_parser = above_zero, conflicts_with = "fma")]
+    mixed_precision: Option<f64>,
 }
 
 /// How the robot file is read.
@@ -320,6 +323,13 @@ pub struct Vector([f64; 3]);
 fn words<C: Choice + Send + Sync>() -> impl TypedValueParser<Value = C> {
     PossibleValuesParser::new(C::words().into_iter().map(|(word, meaning, _)| PossibleValue::new(word).help(meaning)))
         .map(|word| C::from_word(&word).expect("clap passes possible values only"))
+}
+
+fn above_zero(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+        _ => Err("a number above zero".to_string()),
+    }
 }
 
 fn tolerance(text: &str) -> Result<f64, String> {
@@ -394,6 +404,15 @@ impl ProgramArgs {
             (options.scalar, options.also) = (*first, others.to_vec());
         }
         options.certify = self.effort().or(options.certify);
+        self.mix(options);
+    }
+
+    fn mix(&self, options: &mut Options) {
+        let Some(max_error) = self.mixed_precision else { return };
+        for function in &options.functions {
+            let budget = options.scene.budgets.entry(*function).or_default();
+            (budget.max_error, budget.mixed_precision) = (Some(max_error), true);
+        }
     }
 
     fn effort(&self) -> Option<Effort> {
@@ -409,7 +428,7 @@ impl ProgramArgs {
         if functions.is_empty() {
             functions = Function::all().collect();
         }
-        Options {
+        let mut options = Options {
             functions,
             frames: self.frames.clone(),
             scalar: self.scalar.first().copied().unwrap_or(Scalar::F64),
@@ -423,7 +442,9 @@ impl ProgramArgs {
             model: model.options(),
             certify: self.effort(),
             ..Options::default()
-        }
+        };
+        self.mix(&mut options);
+        options
     }
 }
 

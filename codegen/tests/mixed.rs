@@ -1,0 +1,99 @@
+//! Mixed precision: a demanded error is met with less than all operations in f64, and the text computes what was analysed.
+
+use straightline_codegen::certify::{certify, input_box, mixed, search, Effort};
+use straightline_codegen::compile::{compile, program, Options};
+use straightline_codegen::emit::Scalar;
+use straightline_codegen::expr::Graph;
+use straightline_codegen::function::Robot;
+use straightline_codegen::model;
+use straightline_codegen::scene::{Budget, Interval as Range, JointRanges, Scene};
+use straightline_codegen::{Function, Source};
+
+const FUNCTION: Function = Function::InverseDynamics;
+
+fn ur5() -> Source {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions/ur5.urdf");
+    Source::new("ur5.urdf", std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())))
+}
+
+fn options(max_error: f64) -> Options {
+    let mut scene = Scene::default();
+    scene.ranges.qd = JointRanges::All(Range::within(0.5));
+    scene.ranges.qdd = JointRanges::All(Range::within(1.0));
+    let budget = Budget { max_error: Some(max_error), mixed_precision: true, ..Budget::default() };
+    scene.budgets.insert(FUNCTION, budget);
+    Options { scalar: Scalar::F32, functions: vec![FUNCTION], scene, ..Options::default() }
+}
+
+#[test]
+fn a_demanded_error_is_met_with_less_than_all_operations_in_f64() {
+    let options = options(1.0);
+    let (loaded, complaints) = model::load(&ur5(), &options.model);
+    let robot = Robot::new(loaded.unwrap_or_else(|| panic!("{}", complaints.render())));
+    let graph = program(&robot, &[], FUNCTION, &options).graph;
+    let ranges = input_box(&graph.inputs, &options.scene, &robot.model).expect("every input has a range");
+    let bounds = |graph: &Graph| certify(graph, Scalar::F32, &ranges, Effort::default()).expect("no division").errors;
+    let single = bounds(&graph);
+    let worst = single.iter().copied().fold(0.0, f64::max);
+    let all = graph.counts().flops();
+    let mut before = 0;
+    for part in [1.0, 0.8, 0.6, 0.4] {
+        let demand = vec![part * worst; single.len()];
+        let mixed = mixed::widened(&graph, &ranges, &demand, &[]).expect("no division");
+        let (double, errors) = (mixed::double_operations(&mixed), bounds(&mixed));
+        println!("{part} of {worst:e}: {double} of {all} operations in f64");
+        assert!(errors.iter().all(|e| *e <= demand[0]), "{part}: {errors:?} > {:e}", demand[0]);
+        assert!(double >= before && double < all, "{part}: {double} of {all}, before {before}");
+        assert_eq!(double == 0, part == 1.0, "{part}");
+        before = double;
+        let found = search::worst_found(&mixed, Scalar::F32, &ranges, 6_000, 3);
+        for (k, f) in found.iter().enumerate() {
+            assert!(f.error <= errors[k], "{part}, tau[{k}]: {:e} > {:e} at {:?}", f.error, errors[k], f.inputs);
+        }
+        // that f64 is spent where it counts: what a search finds shrinks too
+        if part == 0.4 {
+            let alone = search::worst_found(&graph, Scalar::F32, &ranges, 6_000, 3);
+            let most = |found: &[search::Found]| found.iter().map(|f| f.error).fold(0.0, f64::max);
+            assert!(most(&found) < 0.7 * most(&alone), "{:e} {:e}", most(&found), most(&alone));
+        }
+    }
+}
+
+/// The generated text, compiled and run, gives the bits that the analysis is about.
+#[test]
+fn the_text_computes_what_was_analysed() {
+    let options = options(5e-4);
+    let generated = compile(&ur5(), &options).unwrap_or_else(|e| panic!("{}", e.render()));
+    assert!(
+        generated.text.contains("f64::from(") && generated.text.contains("operations are in f64"),
+        "nothing in f64"
+    );
+    let robot = Robot::new(generated.model.clone());
+    let plain = program(&robot, &generated.frames, FUNCTION, &options).graph;
+    let ranges = input_box(&plain.inputs, &options.scene, &robot.model).expect("every input has a range");
+    let mixed = mixed::widened(&plain, &ranges, &[5e-4; 6], &[]).expect("no division");
+    let input: Vec<f64> = (0..18).map(|k| f64::from((0.3 + 0.17 * k as f32).sin() * 0.5)).collect();
+    let expected: Vec<u32> =
+        search::computed_at(&mixed, Scalar::F32, &input).into_iter().map(|x| (x as f32).to_bits()).collect();
+    let numbers = |of: &[f64]| of.iter().map(|x| format!("{:?}", *x as f32)).collect::<Vec<_>>().join(", ");
+    let main = format!(
+        "#![allow(dead_code)]\n{}\nfn main() {{ let mut tau = [0.0f32; 6]; inverse_dynamics(&[{}], &[{}], &[{}], &mut tau); \
+         for t in tau {{ println!(\"{{}}\", t.to_bits()); }} }}\n",
+        generated.text,
+        numbers(&input[..6]),
+        numbers(&input[6..12]),
+        numbers(&input[12..]),
+    );
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("mixed");
+    std::fs::create_dir_all(&folder).expect("a folder for the program");
+    let (source, binary) = (folder.join("main.rs"), folder.join("main"));
+    std::fs::write(&source, main).expect("the program is written");
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let mut command = std::process::Command::new(rustc);
+    command.args(["--edition", "2021", "-O", "-o"]).arg(&binary).arg(&source);
+    let compiled = command.output().expect("rustc runs");
+    assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
+    let ran = std::process::Command::new(&binary).output().expect("the program runs");
+    let bits: Vec<u32> = String::from_utf8_lossy(&ran.stdout).lines().map(|l| l.parse().expect("a number")).collect();
+    assert_eq!(bits, expected);
+}
