@@ -2,7 +2,6 @@
 
 use crate::scene::InlineScene;
 use std::str::FromStr;
-use straightline_codegen::certify::Effort;
 use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::{Function, Options};
 use syn::parse::{Parse, ParseStream};
