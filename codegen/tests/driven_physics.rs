@@ -7,13 +7,20 @@ mod common;
 use common::{blocks, description, Driven};
 use nalgebra::{DMatrix, DVector};
 use std::fmt::Write;
+use std::process::Command;
+use straightline_codegen::compile::{compile, program, Options};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::emit::Scalar;
+use straightline_codegen::expr::Graph;
 use straightline_codegen::function::DriveFunction::{
-    CompleteModel, Energy, ForwardDynamics, InverseDynamics, Power, StateSpace, Torques,
+    self, CompleteModel, Energy, ForwardDynamics, InverseDynamics, Power, StateSpace, Torques,
 };
+use straightline_codegen::function::Robot;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::reference_input::mass_centre_tree;
 use straightline_codegen::{description as read, Function};
+use straightline_core::algorithms as alg;
+use straightline_core::model::Model;
 use straightline_core::reference::drives::{before_elastic_stage, ActuatorModel, DcMotor, ElasticStage, UnitedModel};
 use straightline_core::{reference, Dd, Real, Taylor};
 
@@ -644,9 +651,9 @@ fn drives_cost_little_beside_forward_dynamics() {
 
 /// The state (q, q̇, x) of a robot and its rate, with the powers, by generated programs in f64.
 struct Simulated {
-    forward: straightline_codegen::expr::Graph,
-    power: straightline_codegen::expr::Graph,
-    energies: [straightline_codegen::expr::Graph; 2],
+    forward: Graph,
+    power: Graph,
+    energies: [Graph; 2],
     n: usize,
 }
 
@@ -800,4 +807,107 @@ stages = [{ ratio = 60.0, stiffness = 1e6, input_inertia = 1e-6 }]
     let apart = (0..3).map(|i| (fine[i] - coarse[i]).abs()).fold(0.0, f64::max);
     println!("moved {moved:.4} rad in 0.1 s; steps of 1 ms and 0.25 ms are {apart:.1e} rad apart");
     assert!(moved > 0.01 && apart < 0.1 * moved);
+}
+
+/// The functions of the drives as a program of its own: bits of the results for bits of the inputs, one line per function.
+fn program_of(text: &str, functions: &[(DriveFunction, Graph)], inputs: &[(&str, &[f64])], scalar: Scalar) -> String {
+    let (real, word) = match scalar {
+        Scalar::F64 => ("f64", "u64"),
+        Scalar::F32 => ("f32", "u32"),
+    };
+    let bits = |x: f64| match scalar {
+        Scalar::F64 => x.to_bits().to_string(),
+        Scalar::F32 => (x as f32).to_bits().to_string(),
+    };
+    let mut calls = String::new();
+    for (function, graph) in functions {
+        let named = |name: &str| inputs.iter().find(|(n, _)| *n == name).expect("an input").1;
+        let arrays = graph.inputs.iter().map(|port| {
+            let numbers: Vec<String> = named(&port.name).iter().map(|x| bits(*x)).collect();
+            format!("&[{}].map({real}::from_bits)", numbers.join(", "))
+        });
+        let results = (0..graph.outputs.len()).map(|k| format!("&mut y{k}"));
+        let arguments: Vec<String> = arrays.chain(results).collect();
+        for (k, port) in graph.outputs.iter().enumerate() {
+            let zero = port.shape.iter().rev().fold("0.0".to_string(), |inner, n| format!("[{inner}; {n}]"));
+            let _ = writeln!(calls, "    let mut y{k} = {zero};");
+        }
+        let _ = writeln!(calls, "    robot::{}({});", Function::Drive(*function).name(), arguments.join(", "));
+        let shown: String = (0..graph.outputs.len()).map(|k| format!("y{k}.show(); ")).collect();
+        let _ = writeln!(calls, "    {shown}println!();");
+    }
+    format!(
+        "mod robot {{\n{text}\n}}\ntrait Show {{ fn show(&self); }}\nimpl Show for {real} {{ fn show(&self) {{ \
+         print!(\"{{}} \", self.to_bits() as {word}) }} }}\nimpl<T: Show, const N: usize> Show for [T; N] {{ fn show(&self) {{ \
+         self.iter().for_each(Show::show) }} }}\nfn main() {{\n{calls}}}\n"
+    )
+}
+
+#[test]
+fn rustc_makes_of_drives_what_the_interpreter_and_the_runtime_say() {
+    let source = Source::new("arm.toml", ARM);
+    let limited = EVERYTHING.replace("[[drive]]", "[[drive]]\nlimits = { input = 9.0, current = 6.0 }");
+    let model = Driven::new(&source, &ModelOptions::default(), &limited);
+    let functions = [ForwardDynamics, InverseDynamics, Torques, CompleteModel, StateSpace, Power, Energy];
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("driven");
+    std::fs::create_dir_all(&folder).expect("a folder of the tests");
+    for scalar in [Scalar::F64, Scalar::F32] {
+        let options = Options {
+            functions: functions.map(Function::Drive).to_vec(),
+            scene: model.scene.clone(),
+            scalar,
+            ..Options::default()
+        };
+        let generated = compile(&source, &options).unwrap_or_else(|d| panic!("{}", d.render()));
+        let robot = Robot::new(generated.model.clone());
+        let graphs = functions.map(|f| (f, program(&robot, &[], Function::Drive(f), &options).graph));
+        let mut random = Random(31);
+        let rounded = |x: &[Dd]| x.iter().map(|x| f64::from(x.to_f64() as f32)).collect::<Vec<f64>>();
+        let [q, qd, x, u] = state(&mut random).map(|x| rounded(&x));
+        let rates: Vec<Vec<f64>> = (0..8).map(|_| rounded(&wide(&random.list(3, 2.0)))).collect();
+        let names = ["qdd", "q3", "q4", "q5", "q6", "q7", "q8", "q9"];
+        let mut inputs: Vec<(&str, &[f64])> = vec![("q", &q), ("qd", &qd), ("x", &x), ("u", &u)];
+        inputs.extend(names.into_iter().zip(rates.iter().map(Vec::as_slice)));
+        let (text, binary) = (folder.join(format!("{scalar:?}.rs")), folder.join(format!("{scalar:?}")));
+        std::fs::write(&text, program_of(&generated.text, &graphs, &inputs, scalar)).expect("a file of the tests");
+        let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
+        let flags = ["--edition", "2021", "-C", "opt-level=2", "-A", "warnings", "-o"];
+        let built = Command::new(rustc).args(flags).args([&binary, &text]).output().expect("rustc runs");
+        assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+        let said = Command::new(&binary).output().expect("the program runs");
+        let said = String::from_utf8_lossy(&said.stdout).into_owned();
+        assert_eq!(said.lines().count(), functions.len(), "{said}");
+        for ((function, graph), line) in graphs.iter().zip(said.lines()) {
+            let compiled: Vec<f64> = line
+                .split_whitespace()
+                .map(|bits| match scalar {
+                    Scalar::F64 => f64::from_bits(bits.parse().expect("bits")),
+                    Scalar::F32 => f64::from(f32::from_bits(bits.parse().expect("bits"))),
+                })
+                .collect();
+            let interpreted: Vec<f64> = match scalar {
+                Scalar::F64 => blocks::<f64>(graph, &inputs).concat(),
+                Scalar::F32 => {
+                    let single: Vec<(&str, Vec<f32>)> =
+                        inputs.iter().map(|(n, x)| (*n, x.iter().map(|x| *x as f32).collect())).collect();
+                    let single: Vec<(&str, &[f32])> = single.iter().map(|(n, x)| (*n, x.as_slice())).collect();
+                    blocks::<f32>(graph, &single).concat().into_iter().map(f64::from).collect()
+                }
+            };
+            assert_eq!(compiled, interpreted, "{function:?}, {scalar:?}");
+            if *function != ForwardDynamics {
+                continue;
+            }
+            // the generic runtime, which knows nothing of reduced forms
+            let plain: Model<f64> = generated.model.cast();
+            let (h, bias) = (alg::mass_matrix(&plain, &q), alg::bias_force(&plain, &q, &qd));
+            let motion = alg::driven_motion(&plain, (&q, &qd, &x, &u), &bias, &alg::Links::MassMatrix(&h));
+            let bound = if scalar == Scalar::F64 { 1e-12 } else { 1e-3 };
+            for (values, expected) in [(&compiled[..3], &motion.qdd), (&compiled[3..], &motion.xd)] {
+                let size = expected.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+                let error = values.iter().zip(expected).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+                assert!(error <= bound * size, "{scalar:?}: {error:e} of {size}");
+            }
+        }
+    }
 }
