@@ -7,9 +7,10 @@
 //! | [`feed_forward`] | τ(r, ṙ, r̈) + K e + D ė: the model runs on the reference, in a table or on line | Fig. 20.10a |
 //! | [`computed_torque`] | τ(q, q̇, r̈ + D ė + K e): the model runs on the measured state, and errors die out like linear springs | Fig. 20.10b |
 //! | [`gravity_compensation`] | g(q) + K e + D ė | |
+//! | [`drive_feed_forward`] | voltages: u(r, ṙ, r̈, …) + G (K e + D ė), through motors and elastic transmissions | Fig. 20.10a |
 //!
 //! The model is a function over arrays, such as a generated `inverse_dynamics`; robots stand on a fixed base, one coordinate per
-//! joint. [`Limits::apply`] keeps torques within what drives can do.
+//! joint. [`Limits::apply`] keeps torques within what drives can do, [`MotorLimits::apply`] voltages within what a supply gives and a motor bears.
 //!
 //! ```
 //! use straightline_core::control::{computed_torque, Gains, Limits, Measured, Outcome, Reference};
@@ -102,6 +103,33 @@ pub fn gravity_compensation<T: Real, const N: usize>(
     added(&tau, &gains.answer(wanted, measured))
 }
 
+/// u(r, ṙ, r̈, …) + G (K e + D ė) \[V\]: what the reference takes of N joints and M drives, elastic transmissions and inductances with them, and
+/// what errors ask for. `driven_inverse` gives the former: a generated `driven_inverse_dynamics` at the reference, with as many of its
+/// derivatives as it takes. `voltages` is G, volts of each drive per force of each joint: of a motor with the ratio N to one joint
+/// R/(C_M N), whatever springs stand in between.
+///
+/// ```
+/// use straightline_core::control::{drive_feed_forward, Gains, Measured, Reference};
+/// // a motor with R = 2 Ω and C_M = C_E = 0.1 on a joint with 0.5 kg·m² by a gear of 50
+/// let (wanted, measured) = (Reference { q: [1.0], qd: [0.2], qdd: [4.0] }, Measured { q: [0.9], qd: [0.2] });
+/// let gains = Gains { stiffness: [30.0], damping: [3.0] };
+/// let inverse = |u: &mut [f64; 1]| u[0] = 2.0 * (0.5 * wanted.qdd[0] / 50.0) / 0.1 + 0.1 * 50.0 * wanted.qd[0];
+/// let u = drive_feed_forward(&wanted, &measured, &gains, &[[2.0 / (0.1 * 50.0)]], inverse);
+/// assert!((u[0] - (0.8 + 1.0 + 0.4 * 30.0 * 0.1)).abs() < 1e-12);
+/// ```
+pub fn drive_feed_forward<T: Real, const N: usize, const M: usize>(
+    wanted: &Reference<T, N>,
+    measured: &Measured<T, N>,
+    gains: &Gains<T, N>,
+    voltages: &[[T; N]; M],
+    driven_inverse: impl FnOnce(&mut [T; M]),
+) -> [T; M] {
+    let mut u = [T::zero(); M];
+    driven_inverse(&mut u);
+    let answer = gains.answer(wanted, measured);
+    from_fn(|k| (0..N).fold(u[k], |sum, i| sum + voltages[k][i] * answer[i]))
+}
+
 /// The torques of a reference motion, computed off line at M instants, `period` apart, from time zero on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Table<T, const N: usize, const M: usize> {
@@ -172,6 +200,51 @@ impl<T: Real + PartialOrd, const N: usize> Limits<T, N> {
             }
         }
         outcome
+    }
+}
+
+/// What supplies and motors allow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotorLimits<T, const M: usize> {
+    /// Greatest voltage \[V\].
+    pub voltage: [T; M],
+    /// Greatest current \[A\].
+    pub current: [T; M],
+    /// R \[Ω\].
+    pub resistance: [T; M],
+    /// C_E \[V·s/rad\].
+    pub emf_constant: [T; M],
+}
+
+impl<T: Real + PartialOrd, const M: usize> MotorLimits<T, M> {
+    /// Brings voltages within the limits, at these speeds of the motors \[rad/s\]: a current that does not change any more is
+    /// (u − C_E θ̇)/R, so u stays within C_E θ̇ ± R i_max; then within the supply's, which counts more.
+    ///
+    /// ```
+    /// use straightline_core::control::{MotorLimits, Outcome};
+    /// let limits = MotorLimits { voltage: [24.0], current: [5.0], resistance: [2.0], emf_constant: [0.1] };
+    /// let mut u = [20.0];
+    /// assert_eq!(limits.apply(&mut u, &[30.0]), Outcome::Saturated);
+    /// assert_eq!(u, [3.0 + 10.0]);
+    /// assert_eq!(limits.apply(&mut u, &[30.0]), Outcome::Within);
+    /// ```
+    pub fn apply(&self, u: &mut [T; M], speeds: &[T; M]) -> Outcome {
+        let emf: [T; M] = from_fn(|k| self.emf_constant[k] * speeds[k]);
+        let mut driving = from_fn(|k| u[k] - emf[k]);
+        let by_current = Limits { greatest: from_fn(|k| self.resistance[k] * self.current[k]) };
+        let first = by_current.apply(&mut driving);
+        if first == Outcome::NotFinite {
+            *u = [T::zero(); M];
+            return first;
+        }
+        if first == Outcome::Saturated {
+            *u = added(&driving, &emf);
+        }
+        let by_voltage = Limits { greatest: self.voltage };
+        match by_voltage.apply(u) {
+            Outcome::Within => first,
+            second => second,
+        }
     }
 }
 

@@ -184,6 +184,9 @@ pub fn verification(v: &Verification) -> io::Result<()> {
             writeln!(out, "let {input} = {values:?};")?;
         }
     }
+    if !v.left_out.is_empty() {
+        writeln!(out, "\nthe reference has no formulation of {}", v.left_out.join(", "))?;
+    }
     writeln!(out, "\nerrors divided by natural scale; bound {:.1e}", v.bound)
 }
 
