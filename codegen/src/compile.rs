@@ -262,18 +262,18 @@ fn traced(
     function.trace(robot, frames, method, rules, options.scalar, optimisations.reduced, &options.scene)
 }
 
-/// What [`optimised`] would take for a robot in the reduced forms that it is in, and how many operations it took to know
-/// that: without writing the graph, for a search over many forms.
+/// What [`optimised`] would take for a robot in the reduced forms that it is in, and the equations as traced: without writing the
+/// graph, for a search over many forms.
 pub(crate) fn candidate_counts(
     robot: &Robot,
     frames: &[String],
     function: Function,
     options: &Options,
     optimisations: Optimisations,
-) -> (Counts, usize) {
+) -> (Counts, Graph) {
     let (graph, _) = traced(robot, frames, function, options, optimisations);
     let counts = if optimisations.sums { count_sums(&graph) } else { graph.counts() };
-    (counts, graph.ops.len())
+    (counts, graph)
 }
 
 /// What the compiler makes of a robot file.

@@ -7,7 +7,7 @@
 //! so the choice is, too.
 
 use crate::emit::Scalar;
-use crate::expr::{evaluate, Graph};
+use crate::expr::{evaluate, Graph, Port};
 use crate::function::ForwardDynamicsMethod;
 use std::fmt;
 use straightline_core::model::{Joint, JointKind, Model};
@@ -25,6 +25,10 @@ const STATES: usize = 6;
 const NEAR: f64 = 0.02;
 /// How far \[rad, rad/s\] springs of transmissions are stretched.
 const STRETCH: f64 = 1e-3;
+/// A joint without a limit of its speed moves so fast \[rad/s or m/s\], if it does.
+const FAST: f64 = 10.0;
+/// Accelerations at about rest, as a part of others.
+const SLOW: f64 = 0.2;
 /// A joint without limits is tried within ± so much.
 const RANGE: f64 = std::f64::consts::PI;
 
@@ -138,6 +142,27 @@ fn errors_in<T: Real + Into<f64>>(model: &Model<Dd>, articulated: &Graph, factor
         }
     }
     worst
+}
+
+/// Inputs anywhere in the limits, the same everywhere: at about rest, where weights rule, or as fast as the joints allow.
+/// `None` where a run-time parameter is an input.
+pub(crate) fn states(model: &Model<Dd>, inputs: &[Port], count: usize, fast: bool) -> Option<Vec<Vec<f64>>> {
+    if inputs.iter().any(|port| port.wrapper.is_some()) {
+        return None;
+    }
+    let mut random = Uniform(0x9e37_79b9_7f4a_7c15);
+    let mut of_port = |port: &Port| {
+        let mut x = values(model, &port.name, port.len(), 0, &mut random);
+        let rates = port.name == "qd" && port.len() == model.nv();
+        for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| fast && rates && j.kind != JointKind::Floating) {
+            x[joint.iv] *= if joint.limits.velocity.is_finite() { joint.limits.velocity } else { FAST };
+        }
+        if port.name == "qdd" && !fast {
+            x.iter_mut().for_each(|x| *x *= SLOW);
+        }
+        x
+    };
+    Some((0..count).map(|_| inputs.iter().flat_map(&mut of_port).collect()).collect())
 }
 
 /// Values of an input port; `kind` 0: anywhere, 1: nearly stretched, 2: near right angles.

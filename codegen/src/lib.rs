@@ -25,6 +25,7 @@ pub mod reduce;
 #[cfg(feature = "verify")]
 pub mod reference_input;
 pub mod report;
+pub mod rounding;
 pub mod scene;
 pub mod schedule;
 pub mod singular;

@@ -20,16 +20,21 @@ pub struct Choice {
     pub stays: Vec<bool>,
     /// Bodies whose moment is formed by ε_z: [`ReducedBody::by_axis_acceleration`].
     pub by_axis_acceleration: Vec<bool>,
+    /// [`ReducedBody::by_accelerations`].
+    pub by_accelerations: [Vec<bool>; 2],
     /// Bodies whose parameters are moved to the parent where the joint cannot tell.
     pub regrouped: Vec<bool>,
     /// [`ReducedBody::doubled`].
     pub doubled: [Vec<bool>; 2],
-    /// Bodies of whose regrouped mass, axial first moment and axial second moment so much goes to the parent that there
-    /// m c_x, m c_y and Σ_yy vanish, instead of all of it.
-    pub vanish_at_parent: [Vec<bool>; 3],
-    /// Tips turned about their axis so that m c_y, or Σ_xy, vanishes.
-    pub turned_tips: [Vec<bool>; 2],
-    /// Bodies whose origin is the foot of the common normal with the axis before theirs, instead of with the one behind.
+    /// Of which bodies' mass, axial first moment and axial second moment only so much goes to the parent that there this component
+    /// of m c, of m c and of the diagonal of Σ vanishes, instead of all of it.
+    pub vanish_at_parent: [Vec<Option<usize>>; 3],
+    /// Tips turned about their axis so that m c_y, Σ_xy or else Σ_yz vanishes.
+    pub turned_tips: [Vec<bool>; 3],
+    /// Tips whose origin is moved along their axis so that Σ_xz, or else Σ_yz, vanishes.
+    pub shifted_tips: [Vec<bool>; 2],
+    /// Bodies whose origin is the foot of the common normal with the axis before theirs, instead of with the one behind; behind a
+    /// parallel axis, level with the origin there.
     pub origin_at_parent: Vec<bool>,
     /// [`ReducedModel::adds_angles`]; then an offset that is no quarter turn is added, too.
     pub adds_angles: bool,
@@ -45,10 +50,12 @@ impl Choice {
         Choice {
             stays: none.clone(),
             by_axis_acceleration: none.clone(),
+            by_accelerations: [0; 2].map(|_| none.clone()),
             regrouped: vec![true; n],
             doubled: [none.clone(), none.clone()],
-            vanish_at_parent: [none.clone(), none.clone(), none.clone()],
-            turned_tips: [none.clone(), none.clone()],
+            vanish_at_parent: [0; 3].map(|_| vec![None; n]),
+            turned_tips: [0; 3].map(|_| none.clone()),
+            shifted_tips: [0; 2].map(|_| none.clone()),
             origin_at_parent: none,
             adds_angles: false,
             unit: Dd::ONE,
@@ -64,45 +71,54 @@ pub fn reduce(model: &Model<Dd>, choice: &Choice) -> (ReducedModel<Dd>, Vec<Tran
     let regauge = choose_frames(model, choice);
     let mut bodies: Vec<ReducedBody<Dd>> =
         model.bodies.iter().enumerate().map(|(i, b)| in_new_frame(model, &regauge, i, b)).collect();
+    for i in (0..bodies.len()).filter(|i| is_tip(model, *i)) {
+        turn_tip(&mut bodies[i], [0, 1, 2].map(|k| choice.turned_tips[k][i]));
+        shift_tip(&mut bodies[i], [0, 1].map(|k| choice.shifted_tips[k][i]));
+    }
     for i in (0..bodies.len()).rev().filter(|i| choice.regrouped[*i]) {
         regroup(&mut bodies, i, [0, 1, 2].map(|k| choice.vanish_at_parent[k][i]));
     }
     let adds_angles = choice.adds_angles;
     let mut reduced = ReducedModel { bodies, gravity: model.gravity, per_unit: Dd::ONE, adds_angles };
     for i in 0..reduced.bodies.len() {
-        if reduced.bodies.iter().all(|b| b.parent != Some(i)) {
-            turn_tip(&mut reduced.bodies[i], [0, 1].map(|k| choice.turned_tips[k][i]));
-        }
         reduced.bodies[i].stays = choice.stays[i] && reduced.may_stay(i);
         let body = &mut reduced.bodies[i];
         if adds_angles && body.kind == JointKind::Revolute {
             (body.offset, body.phase) = apart(body.offset);
         }
         body.by_axis_acceleration = choice.by_axis_acceleration[i] && body.kind != JointKind::Prismatic;
+        body.by_accelerations = [0, 1].map(|k| choice.by_accelerations[k][i] && body.kind != JointKind::Prismatic);
         let derived = body.kind == JointKind::Revolute && body.shares_axis_field && !body.stays;
         body.doubled = [0, 1].map(|k| choice.doubled[k][i] && derived);
     }
     (in_unit(reduced, choice.unit), regauge)
 }
 
-/// Turns the frame of a tip about its axis so that m c_y or else Σ_xy vanishes; the joint's offset takes it back.
-fn turn_tip(body: &mut ReducedBody<Dd>, vanishes: [bool; 2]) {
+fn is_tip(model: &Model<Dd>, i: BodyId) -> bool {
+    model.bodies.iter().all(|b| b.parent != Some(i))
+}
+
+/// Turns the frame of a tip about its axis so that m c_y, Σ_xy or else Σ_yz vanishes; the joint's offset takes it back.
+fn turn_tip(body: &mut ReducedBody<Dd>, vanishes: [bool; 3]) {
     if body.kind != JointKind::Revolute {
         return;
     }
     let (ms, s) = (body.first_moment, body.second_moment);
-    let length = |x: Dd, y: Dd| (x * x + y * y).sqrt();
+    let along = |x: Dd, y: Dd| {
+        let r = (x * x + y * y).sqrt();
+        (y / r, x / r)
+    };
     let (sin, cos) = if vanishes[0] && ms.y != Dd::ZERO {
-        let r = length(ms.x, ms.y);
-        (ms.y / r, ms.x / r)
+        along(ms.x, ms.y)
     } else if vanishes[1] && s.xy != Dd::ZERO {
         // tan 2φ = 2 Σ_xy / (Σ_xx − Σ_yy), φ within an eighth of a turn
         let (x, y) = ((s.xx - s.yy).abs(), s.xy + s.xy);
-        let y = if (s.xx - s.yy).hi() < 0.0 { -y } else { y };
-        let r = length(x, y);
+        let (sin2, cos2) = along(x, if (s.xx - s.yy).hi() < 0.0 { -y } else { y });
         let half = Dd::from(0.5);
-        let cos = ((Dd::ONE + x / r) * half).sqrt();
-        (y / r * half / cos, cos)
+        let cos = ((Dd::ONE + cos2) * half).sqrt();
+        (sin2 * half / cos, cos)
+    } else if vanishes[2] && s.yz != Dd::ZERO {
+        along(s.xz, s.yz)
     } else {
         return;
     };
@@ -111,11 +127,34 @@ fn turn_tip(body: &mut ReducedBody<Dd>, vanishes: [bool; 2]) {
     body.second_moment = s.turned(-sin, cos);
     if vanishes[0] && ms.y != Dd::ZERO {
         body.first_moment.y = Dd::ZERO;
-    } else {
+    } else if vanishes[1] && s.xy != Dd::ZERO {
         body.second_moment.xy = Dd::ZERO;
+    } else {
+        body.second_moment.yz = Dd::ZERO;
     }
     let (s0, c0) = body.offset;
     body.offset = (special(s0 * cos + c0 * sin), special(c0 * cos - s0 * sin));
+}
+
+/// Moves the origin of a tip along its axis so that Σ_xz, or else Σ_yz, vanishes.
+fn shift_tip(body: &mut ReducedBody<Dd>, vanishes: [bool; 2]) {
+    if body.kind != JointKind::Revolute {
+        return;
+    }
+    let (m, ms, s) = (body.mass, body.first_moment, body.second_moment);
+    // as for parameters that vanish at the parent: never by a small divisor
+    let far = |x: Dd| x.abs().hi() > WORTH * m.hi();
+    let height = match vanishes {
+        [true, _] if far(ms.x) => s.xz / ms.x,
+        [_, true] if far(ms.y) => s.yz / ms.y,
+        _ => return,
+    };
+    // r' = r − h z
+    let moved = |k: Dd| if k.abs().hi() <= DUST * s.zz.hi() { Dd::ZERO } else { k };
+    body.translation = body.translation + body.rotation.column(2).scale(height);
+    body.first_moment.z = ms.z - height * m;
+    let zz = s.zz - height * (ms.z + ms.z - height * m);
+    body.second_moment = Sym3 { xz: moved(s.xz - height * ms.x), yz: moved(s.yz - height * ms.y), zz, ..s };
 }
 
 /// A turn by its sine and cosine, as a quarter turn or as an angle.
@@ -198,6 +237,17 @@ fn choose_frames(model: &Model<Dd>, choice: &Choice) -> Vec<Transform<Dd>> {
             }
             None => tip_frame(model, body),
         };
+    }
+    // behind a parallel axis: level with the origin there, so that the arm has one component less
+    for (i, body) in model.bodies.iter().enumerate() {
+        let turns = |b: &Body<Dd>| b.joint.kind == JointKind::Revolute;
+        let Some(p) = body.parent.filter(|p| turns(body) && turns(&model.bodies[*p])) else { continue };
+        let u = body.placement.rotation.column(2);
+        let parallel = (u.x * u.x + u.y * u.y).hi() < NEARLY_PARALLEL * NEARLY_PARALLEL;
+        if parallel && (is_tip(model, i) || choice.origin_at_parent[i]) {
+            let height = (chosen[p].translation.z - body.placement.translation.z) / u.z;
+            chosen[i].translation = dusted(Vec3::new(Dd::ZERO, Dd::ZERO, height));
+        }
     }
     chosen
 }
@@ -331,6 +381,7 @@ fn in_new_frame(model: &Model<Dd>, frames: &[Transform<Dd>], i: BodyId, body: &B
         parallel: parallel && rotation == Mat3::identity(),
         stays: false,
         by_axis_acceleration: false,
+        by_accelerations: [false; 2],
         doubled: [false; 2],
     }
 }
@@ -363,8 +414,8 @@ fn split_turn(r: &Mat3<Dd>) -> (Mat3<Dd>, (Dd, Dd)) {
 /// Moves what a joint's torque cannot tell from the parent's to the parent (Khalil and Dombre 2002, chapter 9, in second
 /// moments): what lies on a revolute axis; of a sliding body all of the second moment.
 ///
-/// Any part of it may stay: where `vanish` says so, as much is moved as makes m c_x, m c_y or Σ_yy of the parent vanish.
-fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, vanish: [bool; 3]) {
+/// Any part of it may stay: where `vanish` says so, as much is moved as makes that component of the parent vanish.
+fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, vanish: [Option<usize>; 3]) {
     let body = bodies[i].clone();
     let zero = Dd::ZERO;
     let (rotation, a, p) = (body.rotation, body.rotation.column(2), body.translation);
@@ -373,17 +424,23 @@ fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, vanish: [bool; 3]) {
         JointKind::Revolute => {
             let (mut m, mut mz, mut szz) = (body.mass, body.first_moment.z, body.second_moment.zz);
             if let Some(before) = body.parent.map(|p| &bodies[p]) {
-                let (ms, s) = (before.first_moment, before.second_moment);
+                let (ms, s) = (before.first_moment.to_array(), before.second_moment);
+                let (s, p, a) = ([s.xx, s.yy, s.zz], p.to_array(), a.to_array());
                 // never by a small divisor: that would make large parameters that cancel
-                if vanish[0] && p.x.abs().hi() > WORTH {
-                    m = -ms.x / p.x;
+                let by = |k: Option<usize>, x: &[Dd; 3]| k.filter(|k| x[*k].abs().hi() > WORTH);
+                // p_k m + a_k m c_z = −m c_k of the parent, for one k or for two
+                match (by(vanish[0], &p), by(vanish[1], &a)) {
+                    (Some(j), Some(k)) if (p[j] * a[k] - p[k] * a[j]).abs().hi() > WORTH * WORTH => {
+                        let det = p[j] * a[k] - p[k] * a[j];
+                        (m, mz) = ((a[j] * ms[k] - a[k] * ms[j]) / det, (p[k] * ms[j] - p[j] * ms[k]) / det);
+                    }
+                    (Some(k), _) => m = -(ms[k] + a[k] * mz) / p[k],
+                    (None, Some(k)) => mz = -(ms[k] + p[k] * m) / a[k],
+                    (None, None) => {}
                 }
-                if vanish[1] && a.y.abs().hi() > WORTH {
-                    mz = -(ms.y + p.y * m) / a.y;
-                }
-                if vanish[2] && a.y.abs().hi() > WORTH {
+                if let Some(k) = by(vanish[2], &a) {
                     let two = Dd::from(2.0);
-                    szz = -(s.yy + p.y * p.y * m + two * p.y * a.y * mz) / (a.y * a.y);
+                    szz = -(s[k] + p[k] * p[k] * m + two * p[k] * a[k] * mz) / (a[k] * a[k]);
                 }
             }
             let own = &mut bodies[i];
@@ -401,9 +458,12 @@ fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, vanish: [bool; 3]) {
                     parent.second_moment = parent.second_moment + moved;
                     // what vanishes does so exactly
                     let dust = |x: Dd, scale: Dd| if x.abs().hi() <= DUST * scale.abs().hi() { zero } else { x };
-                    parent.first_moment.x = dust(parent.first_moment.x, p.x * m);
-                    parent.first_moment.y = dust(parent.first_moment.y, a.y * mz);
-                    parent.second_moment.yy = dust(parent.second_moment.yy, szz);
+                    let ms = parent.first_moment;
+                    let (x, y, z) = (p.x * m, p.y * m + a.y * mz, p.z * m + a.z * mz);
+                    parent.first_moment = Vec3::new(dust(ms.x, x), dust(ms.y, y), dust(ms.z, z));
+                    let s = parent.second_moment;
+                    let (xx, yy, zz) = (dust(s.xx, moved.xx), dust(s.yy, moved.yy), dust(s.zz, moved.zz));
+                    parent.second_moment = Sym3 { xx, yy, zz, ..s };
                 }
                 None => {
                     // turns about a fixed axis: one moment of inertia

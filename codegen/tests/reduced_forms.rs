@@ -33,6 +33,11 @@ impl Random {
     fn flags(&mut self, n: usize) -> Vec<bool> {
         (0..n).map(|_| self.bits().is_multiple_of(2)).collect()
     }
+
+    /// Components of a vector, or none.
+    fn components(&mut self, n: usize) -> Vec<Option<usize>> {
+        (0..n).map(|_| Some((self.bits() % 4) as usize).filter(|k| *k < 3)).collect()
+    }
 }
 
 #[track_caller]
@@ -57,10 +62,12 @@ fn every_choice_gives_the_torques_and_the_mass_matrix_of_the_full_robot() {
             let choice = Choice {
                 stays: random.flags(n),
                 by_axis_acceleration: random.flags(n),
+                by_accelerations: [random.flags(n), random.flags(n)],
                 regrouped: random.flags(n),
                 doubled: [random.flags(n), random.flags(n)],
-                vanish_at_parent: [random.flags(n), random.flags(n), random.flags(n)],
-                turned_tips: [random.flags(n), random.flags(n)],
+                vanish_at_parent: [0; 3].map(|_| random.components(n)),
+                turned_tips: [0; 3].map(|_| random.flags(n)),
+                shifted_tips: [0; 2].map(|_| random.flags(n)),
                 origin_at_parent: random.flags(n),
                 adds_angles: trial % 3 > 0,
                 unit: if trial % 2 == 0 { Dd::ONE } else { units[trial % units.len()] },

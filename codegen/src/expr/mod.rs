@@ -11,7 +11,7 @@ pub mod rules;
 mod verify;
 
 pub use builder::Builder;
-pub use graph::{Constant, Counts, Graph, NodeId, Note, Op, Port, Section, Width};
+pub use graph::{Constant, Counts, Graph, NodeId, Note, Op, Port, Section, Width, TAIL};
 pub use interpret::evaluate;
 pub use rules::{Folding, Grade, Rule, RuleSet};
 pub use verify::verify;

@@ -11,7 +11,7 @@
 //! Before: any graph that [`verify`](crate::expr::verify()) accepts. After: the same results over the reals, no operation
 //! more. Names and sections go with the values that survive.
 
-use crate::expr::{Builder, Constant, Counts, Graph, NodeId, Note, Op, RuleSet};
+use crate::expr::{Builder, Constant, Counts, Graph, NodeId, Note, Op, RuleSet, TAIL};
 use rustc_hash::{FxHashMap, FxHasher};
 use std::cmp::Reverse;
 use std::collections::hash_map::Entry;
@@ -474,8 +474,15 @@ impl Table {
                 }
                 Value::Other(Op::Div(..), _) => counts.div += 1,
                 Value::Other(Op::Sqrt(_), _) => counts.sqrt += 1,
-                Value::Other(Op::SinCos(_), _) => counts.sin_cos += 1,
-                Value::Other(Op::AngleSum(..), _) => counts.add += 1,
+                Value::Other(Op::SinCos(_), [angle, _]) => {
+                    counts.sin_cos += 1;
+                    let sum = matches!(self.values[self.resolved(*angle).value()], Value::Other(Op::AngleSum(..), _));
+                    counts.tail += usize::from(sum);
+                }
+                Value::Other(Op::AngleSum(..), _) => {
+                    counts.add += 1;
+                    counts.tail += TAIL;
+                }
                 _ => {}
             }
         }

@@ -50,6 +50,9 @@ pub struct ReducedBody<T> {
     pub stays: bool,
     /// Moment about the axis by ε_z (Σ_xx + Σ_yy) + ω_x ω_y (Σ_xx − Σ_yy) instead of U₂₁ Σ_xx − U₁₂ Σ_yy.
     pub by_axis_acceleration: bool,
+    /// Moment about x by U₂₃ (Σ_yy − Σ_zz) + 2 ε_x Σ_yy instead of U₃₂ Σ_yy − U₂₃ Σ_zz, and about y by U₁₃ (Σ_zz − Σ_xx) +
+    /// 2 ε_y Σ_xx: cheaper where the joint behind wants that angular acceleration, and nothing else U₃₂ or U₃₁.
+    pub by_accelerations: [bool; 2],
     /// U₃₁ = (2 ω_z) ω_x − U₁₃ and U₃₂ = (2 ω_z) ω_y − U₂₃, in this order, instead of by ε_y and ε_x: cheaper where those
     /// are not wanted themselves.
     pub doubled: [bool; 2],
@@ -99,6 +102,7 @@ impl<T: Real> ReducedModel<T> {
             parallel: b.parallel,
             stays: b.stays,
             by_axis_acceleration: b.by_axis_acceleration,
+            by_accelerations: b.by_accelerations,
             doubled: b.doubled,
         });
         ReducedModel {

@@ -174,3 +174,11 @@ pub(super) fn quaternion_to_rotation<T: Real>([x, y, z, w]: [T; 4]) -> Mat3<T> {
         ],
     }
 }
+
+/// Rᵀ v for the rotation of a unit quaternion, without R: v + w t + t × u with t = 2 v × u and u = (x, y, z). Where v has one
+/// component this takes what one row of R would, and fewer doublings.
+pub(super) fn rotated_back<T: Real>([x, y, z, w]: [T; 4], v: Vec3<T>) -> Vec3<T> {
+    let u = Vec3::new(x, y, z);
+    let t = (v + v).cross(u);
+    v + t.cross(u) + t.scale(w)
+}

@@ -7,6 +7,7 @@
 //! from that of its parent by three multiplications, and its constants are turned instead of vectors. The second moment
 //! enters as in `rnea.rs`, with Σ_zz = 0 for revolute joints.
 
+use super::joint::rotated_back;
 use super::reduced_turn::Turn;
 use crate::model::{BodyId, JointKind};
 use crate::real::Real;
@@ -343,7 +344,8 @@ impl<T: Real> Link<T> {
                 let (omega, alpha) = (triple(qd, 3), triple(qdd, 3));
                 // v̇ + ω × v − Rᵀ g
                 let moving = (triple(qdd, 0) + omega.cross(triple(qd, 0))).scale(per_unit);
-                let accel = moving + turn.parent_to_base(body, self.accel);
+                let k = body.iq + 3;
+                let accel = moving + rotated_back([q[k], q[k + 1], q[k + 2], q[k + 3]], self.accel);
                 at_rest(Spin::new(omega, alpha), accel.named("accel", i), arm)
             }
         }
@@ -364,9 +366,13 @@ impl<T: Real> Link<T> {
             true => alpha.z * (own.xx + own.yy) + *xy * (s.xx - s.yy),
             false => u21 * s.xx - u12 * s.yy,
         };
+        let [by_x, by_y] = body.by_accelerations;
+        // U₃₂ = U₂₃ + 2 ε_x,  U₃₁ = U₁₃ − 2 ε_y
+        let about_x = if by_x { u23 * (s.yy - s.zz) + alpha.x * (s.yy + s.yy) } else { u32 * s.yy - u23 * s.zz };
+        let about_y = if by_y { u13 * (s.zz - s.xx) + alpha.y * (s.xx + s.xx) } else { u13 * s.zz - u31 * s.xx };
         let moment = Vec3::new(
-            u32 * s.yy - u23 * s.zz + u31 * s.xy - u21 * s.xz + d.x * s.yz,
-            u13 * s.zz - u31 * s.xx + u12 * s.yz - u32 * s.xy + d.y * s.xz,
+            about_x + u31 * s.xy - u21 * s.xz + d.x * s.yz,
+            about_y + u12 * s.yz - u32 * s.xy + d.y * s.xz,
             about_axis + u23 * s.xz - u13 * s.yz + d.z * s.xy,
         );
         ForceVector { moment: moment + ms.cross(self.accel), force: self.accel.scale(body.mass) + *u * ms }

@@ -6,7 +6,7 @@
 //! along the axis is wanted, and a turn about the axis does not change it: it is taken before the turn, where the vector
 //! −g of a joint near the base still has zeros.
 
-use super::joint::quaternion_to_rotation;
+use super::joint::rotated_back;
 use super::reduced_turn::own_angle;
 use crate::model::JointKind;
 use crate::real::Real;
@@ -34,7 +34,7 @@ pub fn reduced_gravity_force<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T
         let at_joint = match body.kind {
             JointKind::Floating => {
                 let k = body.iq + 3;
-                quaternion_to_rotation([q[k], q[k + 1], q[k + 2], q[k + 3]]).transpose_mul(before)
+                rotated_back([q[k], q[k + 1], q[k + 2], q[k + 3]], before)
             }
             _ => body.rotation.transpose_mul(before),
         };

@@ -1,0 +1,152 @@
+//! How much a program loses to rounding, estimated to first order at a few states: to tell forms of the same equations apart, not to
+//! promise anything (that is what `certify` does).
+//!
+//! Every operation makes an error of its own, independent of the others; what it does to an output is the operation's adjoint.
+//! The root of the sum of (adjoint · value)² is the rms error of the output in units of the rounding error (Monte Carlo arithmetic to
+//! first order, without the Monte Carlo). Parameters of moved masses that cancel show here, and nowhere in an operation count.
+
+use crate::expr::{Graph, NodeId, Op};
+use straightline_core::{Dd, Real};
+
+/// So many operations are visited at most for one estimate; if there are more, outputs share a sweep.
+const WORK: usize = 200_000;
+/// An output that is so small against the greatest one is judged by that.
+const SMALL: f64 = 1e-6;
+
+/// The worst rms error of the outputs over the output's rms value, in units of the rounding error.
+pub fn estimate(graph: &Graph, states: &[Vec<f64>]) -> f64 {
+    let values: Vec<Vec<f64>> = states.iter().map(|x| evaluate(graph, x)).collect();
+    let rms = |r: &NodeId| (values.iter().map(|v| v[r.index()].powi(2)).sum::<f64>() / states.len() as f64).sqrt();
+    let scale: Vec<f64> = graph.results.iter().map(rms).collect();
+    let floor = SMALL * scale.iter().copied().fold(0.0, f64::max);
+    if floor == 0.0 {
+        return 0.0;
+    }
+    let rounds: Vec<bool> = graph.ids().map(|id| rounds(graph.op(id))).collect();
+    let sweeps = (WORK / (graph.ops.len() * states.len())).clamp(1, graph.results.len());
+    let mut worst: f64 = 0.0;
+    for sweep in 0..sweeps {
+        let mut square = 0.0;
+        for values in &values {
+            let mut adjoints = vec![0.0; graph.ops.len()];
+            // outputs of one sweep with signs of their own, so that on average they do not meet
+            for (k, r) in graph.results.iter().enumerate().skip(sweep).step_by(sweeps) {
+                let sign = if (k.wrapping_mul(0x9e37_79b9) >> 16) % 2 == 0 { 1.0 } else { -1.0 };
+                adjoints[r.index()] += sign / scale[k].max(floor);
+            }
+            square += swept(graph, values, &rounds, &mut adjoints);
+        }
+        let outputs = (graph.results.len() - sweep).div_ceil(sweeps);
+        worst = worst.max((square / (states.len() * outputs) as f64).sqrt());
+    }
+    worst
+}
+
+/// Whether the result is rounded. Numbers that a short float holds are not; sums of angles keep what they lose.
+fn rounds(op: Op) -> bool {
+    match op {
+        Op::Constant(c) => !c.is(f64::from(c.value().to_f32())),
+        Op::Input(_) | Op::Neg(_) | Op::Sign(_) | Op::AngleSum(..) | Op::SinCos(_) => false,
+        _ => true,
+    }
+}
+
+/// Backwards through the program: the sum of (adjoint · value)² over what is rounded.
+fn swept(graph: &Graph, values: &[f64], rounds: &[bool], adjoints: &mut [f64]) -> f64 {
+    let mut square = 0.0;
+    for i in (0..graph.ops.len()).rev() {
+        let adjoint = adjoints[i];
+        if adjoint == 0.0 {
+            continue;
+        }
+        if rounds[i] {
+            square += (adjoint * values[i]).powi(2);
+        }
+        let mut to = |a: NodeId, slope: f64| adjoints[a.index()] += adjoint * slope;
+        let value = |a: NodeId| values[a.index()];
+        match graph.ops[i] {
+            Op::Add(a, b) => {
+                to(a, 1.0);
+                to(b, 1.0);
+            }
+            Op::Sub(a, b) => {
+                to(a, 1.0);
+                to(b, -1.0);
+            }
+            Op::Mul(a, b) => {
+                to(a, value(b));
+                to(b, value(a));
+            }
+            Op::Div(a, b) => {
+                to(a, 1.0 / value(b));
+                to(b, -values[i] / value(b));
+            }
+            Op::Neg(a) => to(a, -1.0),
+            Op::Sqrt(a) => to(a, 0.5 / values[i]),
+            // angles are inputs
+            Op::Input(_)
+            | Op::Constant(_)
+            | Op::Sign(_)
+            | Op::AngleSum(..)
+            | Op::SinCos(_)
+            | Op::Sin(_)
+            | Op::Cos(_) => {}
+        }
+    }
+    square
+}
+
+fn evaluate(graph: &Graph, inputs: &[f64]) -> Vec<f64> {
+    let mut values: Vec<f64> = Vec::with_capacity(graph.ops.len());
+    for op in &graph.ops {
+        let value = |a: NodeId| values[a.index()];
+        // the pair stands for its angle until a half of it is wanted
+        values.push(match *op {
+            Op::Input(k) => inputs[k as usize],
+            Op::Constant(c) => c.value().to_f64(),
+            Op::Neg(a) => -value(a),
+            Op::Add(a, b) | Op::AngleSum(a, b) => value(a) + value(b),
+            Op::Sub(a, b) => value(a) - value(b),
+            Op::Mul(a, b) => value(a) * value(b),
+            Op::Div(a, b) => value(a) / value(b),
+            Op::Sqrt(a) => Real::sqrt(value(a)),
+            Op::Sign(a) => Dd::from(value(a)).sign().to_f64(),
+            Op::SinCos(a) => value(a),
+            Op::Sin(a) => Real::sin_cos(value(a)).0,
+            Op::Cos(a) => Real::sin_cos(value(a)).1,
+        });
+    }
+    values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::expr::{Builder, Port, RuleSet};
+
+    fn program(results: impl Fn(&mut Builder, NodeId, NodeId) -> NodeId) -> Graph {
+        let mut builder = Builder::new(RuleSet::exact(crate::expr::Folding::F64), vec![Port::new("x", &[2])]);
+        let (x, y) = (builder.insert(Op::Input(0)), builder.insert(Op::Input(1)));
+        let result = results(&mut builder, x, y);
+        builder.finish(vec![Port::new("z", &[1])], vec![result])
+    }
+
+    #[test]
+    fn one_operation_loses_one_rounding_error() {
+        let product = program(|b, x, y| b.insert(Op::Mul(x, y)));
+        assert_eq!(estimate(&product, &[vec![3.0, -7.0]]), 1.0);
+    }
+
+    /// (10⁶ x + y) − 10⁶ x: the product is rounded at 10⁶, and so is the sum; what is left is one.
+    #[test]
+    fn what_cancels_loses_as_much_as_it_was_greater() {
+        let cancelling = program(|b, x, y| {
+            let large = b.insert(Op::Mul(x, x));
+            let sum = b.insert(Op::Add(large, y));
+            b.insert(Op::Sub(sum, large))
+        });
+        // the product's error cancels with itself; that of the sum stays
+        let lost = estimate(&cancelling, &[vec![1e3, 1.0]]);
+        assert!((lost / 1e6 - 1.0).abs() < 1e-5, "{lost:e}");
+    }
+}
