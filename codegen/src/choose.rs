@@ -121,7 +121,8 @@ struct Search<'a> {
     tried: FxHashMap<u64, Price>,
     /// Operations that were counted.
     work: usize,
-    /// What the plain form loses to rounding, once that was asked for; `None` in it: nobody knows.
+    /// What the plain form loses to rounding, or the bodies' own parameters if that is less, once it was asked for; `None` in it:
+    /// nobody knows.
     plain_error: Option<Option<[f64; 2]>>,
 }
 
@@ -156,7 +157,7 @@ impl Search<'_> {
         counted
     }
 
-    /// Whether these equations lose about as little as those of the plain form.
+    /// Whether these equations lose about as little as those of the plain form, and those of the bodies' own parameters.
     fn keeps_digits(&mut self, graph: &Graph) -> bool {
         let plain = match self.plain_error {
             Some(known) => known,
@@ -164,7 +165,10 @@ impl Search<'_> {
                 let (composite, reduced) = (self.robot.composite.clone(), self.robot.reduced.clone());
                 self.set(&Choice::plain(&self.robot.model));
                 let (_, plain) = self.counted();
-                let plain = self.error(&plain);
+                let of_bodies = Optimisations { reduced: false, ..self.optimisations };
+                let (_, of_bodies) = candidate_counts(&self.robot, self.frames, self.function, self.options, of_bodies);
+                let both = self.error(&plain).zip(self.error(&of_bodies));
+                let plain = both.map(|(a, b)| [a[0].min(b[0]), a[1].min(b[1])]);
                 (self.robot.composite, self.robot.reduced) = (composite, reduced);
                 self.plain_error = Some(plain);
                 plain

@@ -59,10 +59,21 @@ fn a_demanded_error_is_met_with_less_than_all_operations_in_f64() {
     }
 }
 
+/// The worst error of the function in f32 alone.
+fn worst_in_single() -> f64 {
+    let options = options(1.0);
+    let (loaded, complaints) = model::load(&ur5(), &options.model);
+    let robot = Robot::new(loaded.unwrap_or_else(|| panic!("{}", complaints.render())));
+    let graph = program(&robot, &[], FUNCTION, &options).graph;
+    let ranges = input_box(&graph.inputs, &options.scene, &robot.model).expect("every input has a range");
+    certify(&graph, Scalar::F32, &ranges, Effort::default()).expect("no division").worst()
+}
+
 /// The generated text, compiled and run, gives the bits that the analysis is about.
 #[test]
 fn the_text_computes_what_was_analysed() {
-    let options = options(5e-4);
+    let demand = 0.7 * worst_in_single();
+    let options = options(demand);
     let generated = compile(&ur5(), &options).unwrap_or_else(|e| panic!("{}", e.render()));
     assert!(
         generated.text.contains("f64::from(") && generated.text.contains("operations are in f64"),
@@ -71,7 +82,7 @@ fn the_text_computes_what_was_analysed() {
     let robot = Robot::new(generated.model.clone());
     let plain = program(&robot, &generated.frames, FUNCTION, &options).graph;
     let ranges = input_box(&plain.inputs, &options.scene, &robot.model).expect("every input has a range");
-    let mixed = mixed::widened(&plain, &ranges, &[5e-4; 6], &[]).expect("no division");
+    let mixed = mixed::widened(&plain, &ranges, &[demand; 6], &[]).expect("no division");
     let input: Vec<f64> = (0..18).map(|k| f64::from((0.3 + 0.17 * k as f32).sin() * 0.5)).collect();
     let expected: Vec<u32> =
         search::computed_at(&mixed, Scalar::F32, &input).into_iter().map(|x| (x as f32).to_bits()).collect();

@@ -30,8 +30,8 @@ pub fn worst_inverse_dynamics(size: Size) -> Vec<Outcome> {
             outcomes.push(Outcome::new(24, name, what, value, bound));
         };
         let found = search(name, single, evaluations, torque_error, PATIENCE, true);
-        // regrouped parameters of this arm exceed the bodies' own: 5.2 were found, 3.0 without them
-        let bound = if name == "chapter_6r" { 7.0 } else { 4.0 };
+        // the reduced form of this arm reaches 4.7 in 36 000 evaluations, its bodies' own parameters 3.6
+        let bound = if name == "chapter_oblique" { 6.0 } else { 4.0 };
         line(format!("worst of {} found, ulp of natural scale", found.evaluations), found.value, bound);
         if size == Size::Full {
             line("rms of random states, same unit".into(), found.rms, 4.0);
