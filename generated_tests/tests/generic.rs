@@ -137,7 +137,8 @@ fn in_every_scalar_they_are_their_program() {
 
 #[test]
 fn in_f64_they_are_the_plain_functions_bit_for_bit() {
-    let subjects: [(&str, Function, fn(&[Vec<f64>]) -> Vec<f64>); 3] = [
+    type Call = fn(&[Vec<f64>]) -> Vec<f64>;
+    let subjects: [(&str, Function, Call); 3] = [
         ("panda", Function::InverseDynamics, panda_torques),
         ("ur5", Function::InverseDynamics, ur5_torques),
         ("ur5", Function::ForwardDynamics, ur5_motion),

@@ -18,7 +18,7 @@
 //!
 //! **3. Ranges and adjoints** ([`analysis`]): interval arithmetic with outward rounding ([`interval`]), forwards for values, backwards by
 //! the chain rule for adjoints; intersected with what the norms of groups give ([`norms`], where each rule has its proof). A value
-//! equals its [form](forms) up to the sum of the errors of the nodes between, which is added. Where products cancel ([`cancel`]), the form is
+//! equals its [form](forms) up to the sum of the errors of the nodes between, which is added. Where products cancel (`cancel.rs`), the form is
 //! one of the exact value: ranges hold exact values too (all e_j = 0), and computed ones are off by what errors can have added up to, found
 //! forwards: |â b̂ − a b| ≤ |â| |b̂ − b| + |b| |â − a|, and so on.
 //!

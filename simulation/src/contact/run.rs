@@ -54,7 +54,7 @@ pub fn simulate(
 /// transmissions keep their stretch.
 ///
 /// # Errors
-/// As [`simulate`].
+/// As [`simulate()`].
 pub fn simulate_from(
     plant: &Plant,
     contacts: &Contacts,
