@@ -1,7 +1,7 @@
 //! Operation counts, recorded, and not above those of others.
 //!
 //! `golden/operation_counts.snap` holds the counts of plain tracing for the ten robots of `count_robots/`; a change there is
-//! a change of what users get. The bounds are the counts of a prototype that unrolls 3-vector Newton-Euler recursion in the
+//! a change of what users get. The bounds are the counts of unrolling the 3-vector Newton-Euler recursion in the
 //! file's own frames, and of CasADi SX on the textbook algorithms (spatial algebra, `cse()`); mul / add (fma), where fma
 //! counts every a·b ± c as one. Constants parameters, gravity along z, no friction, no rotors.
 
@@ -127,10 +127,10 @@ fn mass_matrix_and_forward_dynamics_take_no_more_than_casadi() {
     assert!(above.is_empty(), "{above}");
 }
 
-/// What a prototype of all known techniques takes: mul, add, div, sin_cos. A sum of angles
+/// What all published techniques together take: mul, add, div, sin_cos. A sum of angles
 /// counts as one addition on both sides; what keeps its digits here, and is lost there, is counted apart.
 #[test]
-fn the_counts_of_the_prototype_are_reached() {
+fn the_best_known_counts_are_reached() {
     let goals = [
         ("stanford_paul", Function::InverseDynamics, [113, 89, 0, 3], Some(129)),
         ("panda", Function::InverseDynamics, [269, 263, 0, 6], Some(328)),
