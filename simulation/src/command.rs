@@ -20,6 +20,14 @@ pub enum Command {
 }
 
 impl Command {
+    /// Time from one computation of a controller to the next \[s\]; `None`: continuous.
+    pub fn period(&self) -> Option<f64> {
+        match self {
+            Command::Controller(controller) => controller.period,
+            _ => None,
+        }
+    }
+
     /// What acts at time `t` \[s\] on a robot in this state. Drives that nobody commands have the input zero: motors are shorted.
     pub fn action(&self, plant: &Plant, t: f64, state: &[f64]) -> Action {
         let (q, qd, ..) = plant.split(state);

@@ -16,4 +16,5 @@ pub mod optimize;
 pub mod plant;
 pub mod plot;
 pub mod simulate;
+mod solver;
 pub mod table;

@@ -5,6 +5,8 @@
 //! energy − W + L − electrical + lost is constant, which measures a simulation.
 
 use crate::drives::{slack_state, smooth_losses, DriveEnergies};
+use crate::simulate::Method;
+use std::borrow::Cow;
 use straightline_core::algorithms::{
     bias_force, drive_energy, drive_states, driven_motion, forward_dynamics_aba, kinetic_energy, mass_matrix,
     potential_energy, DrivenMotion, Links,
@@ -70,6 +72,14 @@ impl Plant {
             drive.soft_current = Some(0.01);
         }
         self
+    }
+
+    /// The same, or with soft limits where steps are implicit.
+    pub(crate) fn solved_by(&self, method: Method) -> Cow<'_, Plant> {
+        match method {
+            Method::Adaptive => Cow::Borrowed(self),
+            Method::Stiff => Cow::Owned(self.clone().with_soft_limits()),
+        }
     }
 
     /// Number of states.

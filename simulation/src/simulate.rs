@@ -7,12 +7,16 @@
 use crate::command::Command;
 use crate::drives::DriveEnergies;
 use crate::plant::{Action, Plant};
+use crate::solver::{solve, Equations};
 use crate::table::Table;
 use differential_equations::prelude::*;
 use differential_equations::traits::State;
 use std::fmt;
 use straightline_core::algorithms::{kinetic_energy, DrivenMotion};
 use straightline_core::model::{JointKind, Limits};
+
+/// Times that are no further apart, as a part of the duration, are the same up to rounding.
+pub(crate) const SAME: f64 = 1e-12;
 
 /// How steps are made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -76,7 +80,7 @@ pub struct Stop {
 }
 
 /// Where the energy went \[J\].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Balance {
     /// Kinetic and potential energy, springs and rotors with them, at the beginning.
     pub before: f64,
@@ -90,6 +94,21 @@ pub struct Balance {
     pub drives: DriveEnergies,
     /// The greatest change of kinetic energy on the way.
     pub turnover: f64,
+}
+
+impl Run {
+    /// Before the first row; the energies and the last state come when it has ended.
+    pub(crate) fn beginning(names: Vec<String>) -> Run {
+        Run {
+            table: Table { names, rows: Vec::new() },
+            q: Vec::new(),
+            qd: Vec::new(),
+            stop: None,
+            balance: Balance::default(),
+            steps: 0,
+            evaluations: 0,
+        }
+    }
 }
 
 impl Balance {
@@ -156,30 +175,10 @@ pub fn simulate_from(
     settings: &Settings,
     progress: &dyn Fn(f64),
 ) -> Result<Run, Failure> {
-    let softened = (settings.method == Method::Stiff).then(|| plant.clone().with_soft_limits());
-    let plant = softened.as_ref().unwrap_or(plant);
+    let plant = &*plant.solved_by(settings.method);
     let before = plant.stored(&state);
-    let (q, qd, ..) = plant.split(&state);
-    let mut run = Run {
-        table: Table { names: names(plant, command), rows: Vec::new() },
-        q: q.to_vec(),
-        qd: qd.to_vec(),
-        stop: None,
-        balance: Balance {
-            before,
-            after: before,
-            work: 0.0,
-            losses: 0.0,
-            drives: DriveEnergies::default(),
-            turnover: 0.0,
-        },
-        steps: 0,
-        evaluations: 0,
-    };
-    let period = match command {
-        Command::Controller(controller) => controller.period,
-        _ => None,
-    };
+    let mut run = Run::beginning(names(plant, command));
+    let period = command.period();
     let wanted = rows(settings);
     let corners = pieces(command, period, settings.duration);
     let row = |t: f64, state: &[f64], held: Option<&Action>| row(plant, command, t, state, held);
@@ -190,11 +189,11 @@ pub fn simulate_from(
         let system = System { plant, command, held: held.as_ref(), progress };
         let mut times: Vec<f64> = wanted.iter().copied().filter(|t| *t > start && *t < end).collect();
         times.push(end);
-        let is_wanted = |t: f64| wanted.iter().any(|w| (w - t).abs() <= 1e-12 * settings.duration);
-        let solution = system.solve(start, end, &state, &times, settings)?;
+        let watch = Watch { plant, times: &times, next: 0, stops_at_limits: settings.stops_at_limits };
+        let solution = solve(&system, watch, (start, end), &state, settings)?;
         for (t, y) in solution.t.iter().zip(&solution.y) {
             let interrupted = *t < end && !times.contains(t);
-            if is_wanted(*t) || interrupted {
+            if is_among(&wanted, *t, settings.duration) || interrupted {
                 run.table.rows.push(row(*t, y, held.as_ref()));
             }
         }
@@ -232,6 +231,12 @@ pub(crate) fn rows(settings: &Settings) -> Vec<f64> {
     wanted
 }
 
+/// Whether a time is one of these ascending ones, up to rounding.
+pub(crate) fn is_among(times: &[f64], t: f64, duration: f64) -> bool {
+    let next = times.partition_point(|w| t - w > SAME * duration);
+    times.get(next).is_some_and(|w| w - t <= SAME * duration)
+}
+
 /// The times between which everything is smooth, from zero to the end.
 pub(crate) fn pieces(command: &Command, period: Option<f64>, duration: f64) -> Vec<f64> {
     let mut times: Vec<f64> = match period {
@@ -241,7 +246,7 @@ pub(crate) fn pieces(command: &Command, period: Option<f64>, duration: f64) -> V
     times.push(0.0);
     times.push(duration);
     times.sort_by(f64::total_cmp);
-    times.dedup_by(|b, a| *b - *a <= 1e-12 * duration);
+    times.dedup_by(|b, a| *b - *a <= SAME * duration);
     // the end itself, not what lies within rounding of it
     *times.last_mut().expect("there are two") = duration;
     times
@@ -326,34 +331,17 @@ struct System<'a> {
     progress: &'a dyn Fn(f64),
 }
 
-/// What stands for a rate that is no number: so great that the step is rejected. The library takes the error of a step as small
-/// where it is no number.
-pub(crate) const BEYOND: f64 = 1e100;
+impl Equations for System<'_> {
+    fn states(&self) -> usize {
+        self.plant.states()
+    }
 
-impl System<'_> {
     fn rate(&self, t: f64, y: &[f64], rate: &mut [f64]) {
         (self.progress)(t);
         match self.held {
             Some(action) => self.plant.rate(y, action, rate),
             None => self.plant.rate(y, &self.command.action(self.plant, t, y), rate),
         }
-        rate.iter_mut().filter(|x| !x.is_finite()).for_each(|x| *x = BEYOND);
-    }
-}
-
-impl ODE<f64, Vec<f64>> for System<'_> {
-    fn diff(&self, t: f64, y: &Vec<f64>, dydt: &mut Vec<f64>) {
-        self.rate(t, y, dydt);
-    }
-}
-
-/// The same with room for N states, of which the first are used: the implicit method takes no state of a size that is known at run
-/// time only.
-impl<const N: usize> ODE<f64, [f64; N]> for System<'_> {
-    fn diff(&self, t: f64, y: &[f64; N], dydt: &mut [f64; N]) {
-        let n = self.plant.states();
-        dydt[n..].fill(0.0);
-        self.rate(t, &y[..n], &mut dydt[..n]);
     }
 }
 
@@ -413,89 +401,6 @@ impl<Y: State<f64> + AsRef<[f64]>> Solout<f64, Y> for Watch<'_> {
         }
         ControlFlag::Terminate
     }
-}
-
-/// What a piece of the integration gave.
-struct Solved {
-    t: Vec<f64>,
-    y: Vec<Vec<f64>>,
-    interrupted: bool,
-    accepted: usize,
-    evaluations: usize,
-}
-
-/// States that the implicit method has room for.
-pub(crate) const MOST_STATES: usize = 128;
-/// Steps of one piece, at most.
-pub(crate) const MOST_STEPS: usize = 10_000_000;
-
-impl System<'_> {
-    fn solve(
-        &self,
-        start: f64,
-        end: f64,
-        state: &[f64],
-        times: &[f64],
-        settings: &Settings,
-    ) -> Result<Solved, Failure> {
-        let tolerance = settings.tolerance;
-        let watch = Watch { plant: self.plant, times, next: 0, stops_at_limits: settings.stops_at_limits };
-        let tolerances = vec![tolerance; MOST_STATES.max(state.len())];
-        // interpolation between steps is not under error control: steps are no longer than rows are apart
-        macro_rules! solved {
-            ($method:expr, $state:expr) => {{
-                // one tolerance per component: the implicit method adapts a common one once for each of them
-                let method = $method.rtol(tolerances.clone()).atol(tolerances);
-                let method = method.h_max(settings.interval).max_steps(MOST_STEPS);
-                let solution = IVP::ode(self, start, end, $state).solout(watch).method(method).solve();
-                solution.map(|s| Solved::of(&s, state.len())).map_err(|error| failure(error, start))
-            }};
-        }
-        macro_rules! implicit {
-            ($room:literal) => {{
-                let mut padded = [0.0; $room];
-                padded[..state.len()].copy_from_slice(state);
-                solved!(ImplicitRungeKutta::radau5().max_rejects(MOST_STEPS), padded)
-            }};
-        }
-        match (settings.method, state.len()) {
-            (Method::Adaptive, _) => solved!(ExplicitRungeKutta::dop853(), state.to_vec()),
-            (Method::Stiff, ..=16) => implicit!(16),
-            (Method::Stiff, ..=32) => implicit!(32),
-            (Method::Stiff, ..=64) => implicit!(64),
-            (Method::Stiff, ..=MOST_STATES) => implicit!(128),
-            (Method::Stiff, n) => {
-                let why = format!("{n} states are more than the {MOST_STATES} that the method `stiff` takes");
-                Err(Failure { time: start, why })
-            }
-        }
-    }
-}
-
-impl Solved {
-    /// From what the library gives, of which the first `states` components count.
-    fn of<Y: State<f64> + AsRef<[f64]>>(solution: &Solution<f64, Y>, states: usize) -> Solved {
-        Solved {
-            interrupted: matches!(solution.status, Status::Interrupted),
-            accepted: solution.steps.accepted,
-            evaluations: solution.evals.function,
-            t: solution.t.clone(),
-            y: solution.y.iter().map(|y| y.as_ref()[..states].to_vec()).collect(),
-        }
-    }
-}
-
-/// What the solver says of a piece that began at `start` \[s\].
-pub(crate) fn failure<Y: State<f64>>(error: Error<f64, Y>, start: f64) -> Failure {
-    let (time, why) = match error {
-        Error::MaxSteps { t, .. } => (t, format!("more than {MOST_STEPS} steps")),
-        Error::StepSize { t, .. } => (t, "steps become too small: the motion is not smooth there".to_string()),
-        Error::Stiffness { t, .. } => (t, "the equations are stiff: choose the method `stiff`".to_string()),
-        Error::LinearAlgebra { t, msg, .. } => (t, msg),
-        Error::BadInput { msg } => (start, msg),
-        other => (start, format!("{other:?}")),
-    };
-    Failure { time, why }
 }
 
 /// The least distance of a joint to the end of its range; negative beyond it.

@@ -1,6 +1,9 @@
 //! Simulated contacts against closed forms: when phases change, what impacts and dampers turn into heat, what objects do after
 //! they are let go.
 
+mod common;
+
+use common::{one, plane};
 use std::f64::consts::PI;
 use straightline_core::algorithms::{Environment, SpringDamper};
 use straightline_core::contact::{Contact, Coordinate, Friction, Object, Surface};
@@ -66,32 +69,11 @@ fn pendulum(links: usize) -> Model<f64> {
 }
 
 fn floor(model: &Model<f64>) -> Touch {
-    Touch {
-        contact: Contact {
-            name: "floor".into(),
-            frame: model.frames[0].clone(),
-            axis: Vec3::unit_z(),
-            second_axis: Vec3::new(1.0, 0.0, 0.0),
-            object: Object::Fixed(Transform::identity()),
-            surface: Surface::Plane,
-            constrained: vec![Pz],
-            free: vec![],
-            friction: None,
-        },
-        environment: None,
-        law: None,
-        restitution: 0.0,
-        closed: false,
-        stays: false,
-    }
+    plane("floor", &model.frames[0], Transform::identity())
 }
 
 fn settings(duration: f64) -> Settings {
     Settings { duration, interval: 0.01, tolerance: 1e-11, method: Method::Adaptive, stops_at_limits: true }
-}
-
-fn one(touch: Touch) -> Contacts {
-    Contacts { touches: vec![touch], loops: vec![], stabilisation: None, projects: true, rest_speed: 1e-3 }
 }
 
 fn run(model: Model<f64>, contacts: &Contacts, command: &Command, start: (&[f64], &[f64]), t: f64) -> ContactRun {

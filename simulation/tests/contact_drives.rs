@@ -2,14 +2,14 @@
 
 mod common;
 
-use common::{arm, cart};
+use common::{arm, cart, drive, one, plane};
 use straightline_core::algorithms::{forward_kinematics, Environment, SpringDamper};
-use straightline_core::contact::{Contact, Coordinate, Friction, Object, Surface};
-use straightline_core::drive::{Actuator, Drive, Efficiency, Motor, Rating, Rotor, Stage};
+use straightline_core::contact::Friction;
+use straightline_core::drive::{Drive, Efficiency, Motor, Rotor, Stage};
 use straightline_core::model::{Frame, Model};
 use straightline_core::spatial::{Mat3, Transform, Vec3};
 use straightline_simulation::command::{Command, Samples};
-use straightline_simulation::contact::{simulate, ContactRun, Contacts, Touch, What};
+use straightline_simulation::contact::{simulate, ContactRun, Touch, What};
 use straightline_simulation::drives::Inputs;
 use straightline_simulation::plant::Plant;
 use straightline_simulation::simulate::{Method, Settings};
@@ -33,51 +33,13 @@ const MOTOR: Motor<f64> = Motor {
 /// A motor that only turns: nothing resists and nothing drives it.
 const LOOSE: Motor<f64> = Motor { torque_constant: 0.0, emf_constant: 0.0, friction: 0.0, inductance: None, ..MOTOR };
 
-fn drive(name: &str, motor: Motor<f64>, joints: &[(usize, f64)]) -> Drive<f64> {
-    Drive {
-        name: name.into(),
-        actuator: Actuator::Motor(motor),
-        stages: vec![],
-        shaft_inertia: None,
-        efficiency: None,
-        joints: joints.to_vec(),
-        shares: None,
-        input_limit: None,
-        current_limit: None,
-        soft_current: None,
-        rotor: None,
-        rating: Rating::none(),
-    }
-}
-
 fn stage(ratio: f64, stiffness: f64, damping: f64) -> Stage<f64> {
     Stage { ratio, stiffness, damping: Some(damping), inertia: 0.0, efficiency: None }
 }
 
 /// A contact of a frame with a plane through `origin` whose normal is `z`.
-fn plane(frame: &Frame<f64>, origin: Vec3<f64>, z: Vec3<f64>, x: Vec3<f64>) -> Touch {
-    Touch {
-        contact: Contact {
-            name: "plane".into(),
-            frame: frame.clone(),
-            axis: Vec3::unit_z(),
-            second_axis: Vec3::new(1.0, 0.0, 0.0),
-            object: Object::Fixed(Transform { rotation: Mat3::from_columns(x, z.cross(x), z), translation: origin }),
-            surface: Surface::Plane,
-            constrained: vec![Coordinate::Pz],
-            free: vec![],
-            friction: None,
-        },
-        environment: None,
-        law: None,
-        restitution: 0.0,
-        closed: false,
-        stays: false,
-    }
-}
-
-fn one(touch: Touch) -> Contacts {
-    Contacts { touches: vec![touch], loops: vec![], stabilisation: None, projects: true, rest_speed: 1e-3 }
+fn wall(frame: &Frame<f64>, origin: Vec3<f64>, z: Vec3<f64>, x: Vec3<f64>) -> Touch {
+    plane("plane", frame, Transform { rotation: Mat3::from_columns(x, z.cross(x), z), translation: origin })
 }
 
 fn run(
@@ -99,7 +61,7 @@ fn crash(drive: Drive<f64>, touch: impl Fn(Touch) -> Touch) -> ContactRun {
     let nose = Frame { name: "nose".into(), body: Some(0), placement: Transform::identity() };
     model.frames = vec![nose.clone()];
     model.drives = vec![drive];
-    let wall = plane(&nose, Vec3::new(0.2, 0.0, 0.0), Vec3::new(-1.0, 0.0, 0.0), Vec3::unit_z());
+    let wall = wall(&nose, Vec3::new(0.2, 0.0, 0.0), Vec3::new(-1.0, 0.0, 0.0), Vec3::unit_z());
     let run = run(model, touch(wall), &Command::Free, (&[0.0], &[0.5]), 0.6, Method::Adaptive);
     assert!(run.run.balance.relative() < 1e-9, "{:?}", run.run.balance);
     run
@@ -157,7 +119,7 @@ fn lands(change: impl Fn(Touch) -> Touch, method: Method) -> ContactRun {
     let q = [0.3, -0.4, 0.5];
     let tip = forward_kinematics(&model, &q, &[&model.frames[0]])[0].translation;
     let below = Vec3::new(tip.x, tip.y, tip.z - 0.05);
-    let touch = plane(&model.frames[0], below, Vec3::unit_z(), Vec3::new(1.0, 0.0, 0.0));
+    let touch = wall(&model.frames[0], below, Vec3::unit_z(), Vec3::new(1.0, 0.0, 0.0));
     let times: Vec<f64> = (0..=20).map(|k| 0.05 * f64::from(k)).collect();
     let volts = |t: &f64| vec![6.0 * (5.0 * t).sin(), 3.0 * (7.0 * t).cos(), -5.0 * (3.0 * t).sin()];
     let samples = Samples { rows: times.iter().map(volts).collect(), times };

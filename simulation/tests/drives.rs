@@ -25,25 +25,13 @@ const MOTOR: Motor<f64> = Motor {
 const SETTINGS: Settings =
     Settings { duration: 1.0, interval: 0.02, tolerance: 1e-12, method: Method::Adaptive, stops_at_limits: false };
 
+/// With its share of the joint, if it drives one.
 fn drive(name: &str, motor: Motor<f64>, joints: &[(usize, f64)]) -> Drive<f64> {
     let shares = match joints {
         [(body, n)] => Some(vec![(*body, 1.0 / n)]),
         _ => None,
     };
-    Drive {
-        name: name.into(),
-        actuator: Actuator::Motor(motor),
-        stages: vec![],
-        shaft_inertia: None,
-        efficiency: None,
-        joints: joints.to_vec(),
-        shares,
-        input_limit: None,
-        current_limit: None,
-        soft_current: None,
-        rotor: None,
-        rating: Rating::none(),
-    }
+    Drive { shares, ..common::drive(name, motor, joints) }
 }
 
 fn losses(forward: f64, backward: f64) -> Option<Efficiency<f64>> {

@@ -4,9 +4,9 @@ use super::events::objects_at_rest;
 use super::state::{Closed, Phases, Slip, System, GUARDS};
 use super::{Contacts, Event};
 use crate::command::Command;
-use crate::drives::DriveEnergies;
 use crate::plant::{Action, Plant};
-use crate::simulate::{self, Balance, Failure, Method, Run, Settings, BEYOND, MOST_STATES, MOST_STEPS};
+use crate::simulate::{self, Balance, Failure, Run, Settings, SAME};
+use crate::solver::{solve, Equations};
 use differential_equations::prelude::*;
 use differential_equations::traits::State;
 use std::cell::RefCell;
@@ -63,44 +63,24 @@ pub fn simulate_from(
     settings: &Settings,
     progress: &dyn Fn(f64),
 ) -> Result<ContactRun, Failure> {
-    let softened = (settings.method == Method::Stiff).then(|| plant.clone().with_soft_limits());
-    let plant = softened.as_ref().unwrap_or(plant);
+    let plant = &*plant.solved_by(settings.method);
     let system = System { plant, contacts };
     let state = plant.normalised(&[start, objects_at_rest(contacts.touches.len())].concat());
     let mut going = Going { system, command, settings, progress, state, phases: Vec::new(), events: Vec::new() };
     let before = going.start()?;
-    let period = match command {
-        Command::Controller(controller) => controller.period,
-        _ => None,
-    };
-    let mut run = Run {
-        table: crate::table::Table { names: going.names(), rows: Vec::new() },
-        q: Vec::new(),
-        qd: Vec::new(),
-        stop: None,
-        balance: Balance {
-            before,
-            after: before,
-            work: 0.0,
-            losses: 0.0,
-            drives: DriveEnergies::default(),
-            turnover: 0.0,
-        },
-        steps: 0,
-        evaluations: 0,
-    };
+    let period = command.period();
+    let mut run = Run::beginning(going.names());
     let mut drift = 0.0f64;
     let rows = simulate::rows(settings);
-    let is_row = |t: f64| rows.iter().any(|w| (w - t).abs() <= 1e-12 * settings.duration);
-    let mut ends = [simulate::pieces(command, period, settings.duration), rows.clone()].concat();
+    let mut ends = [&simulate::pieces(command, period, settings.duration)[..], &rows].concat();
     ends.sort_by(f64::total_cmp);
-    ends.dedup_by(|b, a| *b - *a <= 1e-12 * settings.duration);
+    ends.dedup_by(|b, a| *b - *a <= SAME * settings.duration);
     let mut held = None;
     let mut next_computation = 0.0;
     run.table.rows.push(going.row(0.0, None));
     for piece in ends.windows(2) {
         let (mut t, end) = (piece[0], piece[1]);
-        if let Some(period) = period.filter(|_| t >= next_computation - 1e-12 * settings.duration) {
+        if let Some(period) = period.filter(|_| t >= next_computation - SAME * settings.duration) {
             held = Some(going.action(t, &going.state, None));
             next_computation += period;
         }
@@ -116,7 +96,7 @@ pub fn simulate_from(
                 return Err(Failure { time: t, why: format!("more than {MOST_EVENTS} events between two rows") });
             }
         }
-        if is_row(t) || run.stop.is_some() {
+        if simulate::is_among(&rows, t, settings.duration) || run.stop.is_some() {
             drift = drift.max(going.drift(t));
             run.table.rows.push(going.row(t, held.as_ref()));
         }
@@ -134,6 +114,10 @@ pub fn simulate_from(
     run.balance = Balance { before, after, work, losses, drives, turnover: most - least };
     (run.q, run.qd) = (q.to_vec(), qd.to_vec());
     Ok(ContactRun { run, events: going.events, drift })
+}
+
+fn refused(time: f64, why: String) -> Failure {
+    Failure { time, why }
 }
 
 /// A simulation at an instant.
@@ -158,10 +142,6 @@ impl Going<'_> {
         held.map_or_else(|| self.command.action(self.system.plant, t, state), Action::clone)
     }
 
-    fn refused(&self, time: f64, why: String) -> Failure {
-        Failure { time, why }
-    }
-
     /// Closes what is closed at the beginning; gives the energy there.
     fn start(&mut self) -> Result<f64, Failure> {
         let touches = self.system.touches();
@@ -175,7 +155,7 @@ impl Going<'_> {
         let off = self.system.project(0.0, &mut self.state, &self.phases, 100);
         if off.is_nan() || off > CLOSED {
             let why = "the contacts and loops that are closed at the beginning cannot be closed from there";
-            return Err(self.refused(0.0, format!("{why}: {off:.1e} m, or cosine, is left")));
+            return Err(refused(0.0, format!("{why}: {off:.1e} m, or cosine, is left")));
         }
         if self.system.plant.is_driven() {
             // springs of the transmissions keep their stretch where the robot has been brought
@@ -196,7 +176,7 @@ impl Going<'_> {
             } else if touch.contact.constrained.contains(&Coordinate::Pz) && seen.gap.0 < -1e-6 {
                 let (name, depth) = (self.system.name(k), -seen.gap.0);
                 let why = format!("contact {name} is {depth:.3e} m inside its object at the beginning");
-                return Err(self.refused(0.0, why));
+                return Err(refused(0.0, why));
             }
         }
         let energy = self.system.energy(0.0, &self.state, &self.phases);
@@ -211,7 +191,7 @@ impl Going<'_> {
         let action = self.action(t, &self.state, held);
         let settled = self.system.settle(t, &mut self.state, &mut self.phases, &action);
         let Some(settled) = settled else {
-            return Err(self.refused(t, "contacts exclude each other: none of their phases lasts".to_string()));
+            return Err(refused(t, "contacts exclude each other: none of their phases lasts".to_string()));
         };
         self.events.extend(settled);
         let begins = &self.state;
@@ -355,29 +335,19 @@ struct Watched<'a, 'b> {
     seen: RefCell<Seen>,
 }
 
-impl ODE<f64, Vec<f64>> for Watched<'_, '_> {
-    fn diff(&self, t: f64, y: &Vec<f64>, dydt: &mut Vec<f64>) {
-        self.rate(t, y, dydt);
+impl Equations for Watched<'_, '_> {
+    fn states(&self) -> usize {
+        self.going.state.len()
     }
-}
 
-/// With room for N states, as the implicit method has it.
-impl<const N: usize> ODE<f64, [f64; N]> for Watched<'_, '_> {
-    fn diff(&self, t: f64, y: &[f64; N], dydt: &mut [f64; N]) {
-        let n = self.going.state.len();
-        dydt[n..].fill(0.0);
-        self.rate(t, &y[..n], &mut dydt[..n]);
-    }
-}
-
-impl Watched<'_, '_> {
     fn rate(&self, t: f64, y: &[f64], rate: &mut [f64]) {
         let Going { system, progress, phases, .. } = self.going;
         progress(t);
         system.rate(t, y, phases, &self.going.action(t, y, self.held), rate);
-        rate.iter_mut().filter(|x| !x.is_finite()).for_each(|x| *x = BEYOND);
     }
+}
 
+impl Watched<'_, '_> {
     /// The guards, and that of the joints' ranges. What stands a little inside its object at the beginning of a phase, by
     /// rounding, falls from there.
     fn values(&self, t: f64, y: &[f64]) -> Vec<f64> {
@@ -392,38 +362,11 @@ impl Watched<'_, '_> {
         values
     }
 
-    fn solve(&self, (start, end): (f64, f64), from: &[f64], watches: bool, run: &mut Run) -> Result<(), Failure> {
-        let settings = self.going.settings;
+    fn solve(&self, times: (f64, f64), from: &[f64], watches: bool, run: &mut Run) -> Result<(), Failure> {
         let watch = Watch { of: self, armed: Vec::new(), watches };
-        let tolerances = vec![settings.tolerance; MOST_STATES.max(from.len())];
-        macro_rules! solved {
-            ($method:expr, $state:expr) => {{
-                let method = $method.rtol(tolerances.clone()).atol(tolerances);
-                let method = method.h_max(settings.interval).max_steps(MOST_STEPS);
-                let solution = IVP::ode(self, start, end, $state).solout(watch).method(method).solve();
-                solution
-                    .map(|s| (s.steps.accepted, s.evals.function))
-                    .map_err(|error| simulate::failure(error, start))?
-            }};
-        }
-        macro_rules! implicit {
-            ($room:literal) => {{
-                let mut padded = [0.0; $room];
-                padded[..from.len()].copy_from_slice(from);
-                solved!(ImplicitRungeKutta::radau5().max_rejects(MOST_STEPS), padded)
-            }};
-        }
-        let (steps, evaluations) = match (settings.method, from.len()) {
-            (Method::Adaptive, _) => solved!(ExplicitRungeKutta::dop853(), from.to_vec()),
-            (Method::Stiff, ..=32) => implicit!(32),
-            (Method::Stiff, ..=MOST_STATES) => implicit!(128),
-            (Method::Stiff, n) => {
-                let why = format!("{n} states are more than the {MOST_STATES} that the method `stiff` takes");
-                return Err(Failure { time: start, why });
-            }
-        };
-        run.steps += steps;
-        run.evaluations += evaluations;
+        let solved = solve(self, watch, times, from, self.going.settings)?;
+        run.steps += solved.accepted;
+        run.evaluations += solved.evaluations;
         let seen = self.seen.borrow();
         match &seen.last {
             Some((time, y)) if !y.iter().all(|x| x.is_finite()) => {

@@ -1,8 +1,11 @@
 #![allow(dead_code)] // each test takes what it needs
-//! Robots for the tests: asymmetric, with effects in every joint.
+//! Robots for the tests: asymmetric, with effects in every joint; motors, and planes to touch.
 
+use straightline_core::contact::{Contact, Coordinate, Object, Surface};
+use straightline_core::drive::{Actuator, Drive, Motor, Rating};
 use straightline_core::model::{Body, Coulomb, Frame, Joint, JointEffects, JointKind, Limits, Model};
 use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
+use straightline_simulation::contact::{Contacts, Touch};
 
 pub fn body(name: &str, parent: Option<usize>, kind: JointKind, i: usize, placement: Transform<f64>) -> Body<f64> {
     Body {
@@ -52,4 +55,49 @@ pub fn arm() -> Model<f64> {
     }
     let tip = Frame { name: "tip".into(), body: Some(2), placement: at(Mat3::identity(), 0.4) };
     Model { name: "arm".into(), bodies, gravity: Vec3::new(0.0, 0.0, -9.81), frames: vec![tip], drives: vec![] }
+}
+
+/// A motor that drives these joints by these ratios, without anything else.
+pub fn drive(name: &str, motor: Motor<f64>, joints: &[(usize, f64)]) -> Drive<f64> {
+    Drive {
+        name: name.into(),
+        actuator: Actuator::Motor(motor),
+        stages: vec![],
+        shaft_inertia: None,
+        efficiency: None,
+        joints: joints.to_vec(),
+        shares: None,
+        input_limit: None,
+        current_limit: None,
+        soft_current: None,
+        rotor: None,
+        rating: Rating::none(),
+    }
+}
+
+/// A contact of a frame with the plane z = 0 of `object`, rigid and without friction, open at the beginning.
+pub fn plane(name: &str, frame: &Frame<f64>, object: Transform<f64>) -> Touch {
+    Touch {
+        contact: Contact {
+            name: name.into(),
+            frame: frame.clone(),
+            axis: Vec3::unit_z(),
+            second_axis: Vec3::new(1.0, 0.0, 0.0),
+            object: Object::Fixed(object),
+            surface: Surface::Plane,
+            constrained: vec![Coordinate::Pz],
+            free: vec![],
+            friction: None,
+        },
+        environment: None,
+        law: None,
+        restitution: 0.0,
+        closed: false,
+        stays: false,
+    }
+}
+
+/// That contact alone.
+pub fn one(touch: Touch) -> Contacts {
+    Contacts { touches: vec![touch], loops: vec![], stabilisation: None, projects: true, rest_speed: 1e-3 }
 }
