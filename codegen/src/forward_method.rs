@@ -9,6 +9,7 @@
 use crate::emit::Scalar;
 use crate::expr::{evaluate, Graph, Port};
 use crate::function::ForwardDynamicsMethod;
+use crate::random::Random;
 use std::fmt;
 use straightline_core::model::{Joint, JointKind, Model};
 use straightline_core::{Dd, Real};
@@ -19,6 +20,8 @@ pub const TOLERATED: f64 = 3.0;
 /// Beyond so many velocity coordinates the factorisation is not tried: it takes about n³/6 products more on one branch.
 pub const MOST_FOR_FACTORISATION: usize = 40;
 
+/// Of the numbers that states are made of.
+const SEED: u64 = 0x9e37_79b9_7f4a_7c15;
 /// States of each kind: anywhere in the limits, nearly stretched, near right angles.
 const STATES: usize = 6;
 /// How near \[rad or m\].
@@ -121,7 +124,7 @@ fn errors(model: &Model<Dd>, scalar: Scalar, articulated: &Graph, factorised: &G
 
 fn errors_in<T: Real + Into<f64>>(model: &Model<Dd>, articulated: &Graph, factorised: &Graph) -> [f64; 2] {
     let mut worst = [0.0f64; 2];
-    let mut random = Uniform(0x9e37_79b9_7f4a_7c15);
+    let mut random = Random(SEED);
     for state in 0..3 * STATES {
         // both were traced with the same ports
         let inputs = &articulated.inputs;
@@ -150,7 +153,7 @@ pub(crate) fn states(model: &Model<Dd>, inputs: &[Port], count: usize, fast: boo
     if inputs.iter().any(|port| port.wrapper.is_some()) {
         return None;
     }
-    let mut random = Uniform(0x9e37_79b9_7f4a_7c15);
+    let mut random = Random(SEED);
     let mut of_port = |port: &Port| {
         let mut x = values(model, &port.name, port.len(), 0, &mut random);
         let rates = port.name == "qd" && port.len() == model.nv();
@@ -166,24 +169,24 @@ pub(crate) fn states(model: &Model<Dd>, inputs: &[Port], count: usize, fast: boo
 }
 
 /// Values of an input port; `kind` 0: anywhere, 1: nearly stretched, 2: near right angles.
-fn values(model: &Model<Dd>, port: &str, len: usize, kind: usize, random: &mut Uniform) -> Vec<f64> {
+fn values(model: &Model<Dd>, port: &str, len: usize, kind: usize, random: &mut Random) -> Vec<f64> {
     match port {
         "q" if len == model.nq() => {
             let mut q = vec![0.0; len];
             for joint in model.bodies.iter().map(|b| &b.joint) {
                 if joint.kind == JointKind::Floating {
-                    let quaternion: Vec<f64> = (0..4).map(|_| random.within(1.0)).collect();
+                    let quaternion: Vec<f64> = (0..4).map(|_| random.symmetric(1.0)).collect();
                     let norm = quaternion.iter().map(|x| x * x).sum::<f64>();
                     let norm = straightline_core::trig::sqrt_f64(norm);
-                    (0..3).for_each(|k| q[joint.iq + k] = random.within(1.0));
+                    (0..3).for_each(|k| q[joint.iq + k] = random.symmetric(1.0));
                     (0..4).for_each(|k| q[joint.iq + 3 + k] = quaternion[k] / norm);
                     continue;
                 }
                 let or = |limit: f64, other: f64| if limit.is_finite() { limit } else { other };
                 let (lower, upper) = (or(joint.limits.lower, -RANGE), or(joint.limits.upper, RANGE));
-                let anywhere = lower + (upper - lower) * (0.5 + random.within(0.5));
+                let anywhere = lower + (upper - lower) * (0.5 + random.symmetric(0.5));
                 let quarter = std::f64::consts::FRAC_PI_2;
-                let near = random.within(NEAR);
+                let near = random.symmetric(NEAR);
                 q[joint.iq] = match kind {
                     0 => anywhere,
                     1 => near,
@@ -194,14 +197,14 @@ fn values(model: &Model<Dd>, port: &str, len: usize, kind: usize, random: &mut U
             q
         }
         "gravity" => vec![0.3, -0.2, -9.81],
-        "qd" => (0..len).map(|_| random.within(1.0)).collect(),
+        "qd" => (0..len).map(|_| random.symmetric(1.0)).collect(),
         // drives of the size of the weights
-        _ => (0..len).map(|_| random.within(10.0)).collect(),
+        _ => (0..len).map(|_| random.symmetric(10.0)).collect(),
     }
 }
 
 /// Turns the shafts of elastic transmissions to where their springs are hardly stretched, as they are while a robot moves.
-fn settle(model: &Model<Dd>, groups: &mut [(&str, Vec<f64>)], random: &mut Uniform) {
+fn settle(model: &Model<Dd>, groups: &mut [(&str, Vec<f64>)], random: &mut Random) {
     let named = |name: &str, groups: &[(&str, Vec<f64>)]| groups.iter().find(|g| g.0 == name).map(|g| g.1.clone());
     let (Some(q), Some(qd), Some(mut x)) = (named("q", groups), named("qd", groups), named("x", groups)) else {
         return;
@@ -214,23 +217,11 @@ fn settle(model: &Model<Dd>, groups: &mut [(&str, Vec<f64>)], random: &mut Unifo
         };
         let mut shaft = [sum(&q, |j| j.iq), sum(&qd, |j| j.iv)];
         for (k, stage) in drive.stages.iter().enumerate().rev() {
-            shaft = shaft.map(|y| stage.ratio.to_f64() * (y + random.within(STRETCH)));
+            shaft = shaft.map(|y| stage.ratio.to_f64() * (y + random.symmetric(STRETCH)));
             let at = if k == 0 { first } else { first + own + 2 * (k - 1) };
             x[at..at + 2].copy_from_slice(&shaft);
         }
         first += drive.states();
     }
     groups.iter_mut().filter(|g| g.0 == "x").for_each(|g| g.1.clone_from(&x));
-}
-
-/// Numbers that are the same everywhere (SplitMix64).
-struct Uniform(u64);
-
-impl Uniform {
-    fn within(&mut self, size: f64) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        size * (((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0)
-    }
 }

@@ -21,6 +21,7 @@ pub mod function;
 pub mod model;
 pub mod output;
 pub mod pass;
+mod random;
 pub mod reduce;
 #[cfg(feature = "verify")]
 pub mod reference_input;

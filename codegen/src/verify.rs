@@ -14,6 +14,7 @@ use crate::emit::{element_of, Scalar};
 use crate::expr::{evaluate, Graph};
 use crate::function::{Function, Robot};
 use crate::model;
+use crate::random::Random;
 use crate::reference_input::mass_centre_tree;
 use crate::scene::Scene;
 use std::collections::BTreeMap;
@@ -309,7 +310,7 @@ impl State {
                 }
                 JointKind::Floating => {
                     q[joint.iq..joint.iq + 3].fill_with(|| random.symmetric(2.0));
-                    q[joint.iq + 3..joint.iq + 7].copy_from_slice(&random.quaternion());
+                    q[joint.iq + 3..joint.iq + 7].copy_from_slice(&quaternion(random));
                 }
             }
             for i in joint.iv..joint.iv + joint.kind.nv() {
@@ -327,31 +328,13 @@ impl State {
     }
 }
 
-/// SplitMix64 (Steele, Lea and Flood 2014): the same states on every machine.
-struct Random(u64);
-
-impl Random {
-    /// In [0, 1).
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// In [−bound, bound).
-    fn symmetric(&mut self, bound: f64) -> f64 {
-        bound * (2.0 * self.unit() - 1.0)
-    }
-
-    /// A unit quaternion: a point of the ball, not too near its centre, divided by its length.
-    fn quaternion(&mut self) -> [f64; 4] {
-        loop {
-            let x: [f64; 4] = std::array::from_fn(|_| self.symmetric(1.0));
-            let square: f64 = x.iter().map(|x| x * x).sum();
-            if (0.01..=1.0).contains(&square) {
-                return x.map(|x| x / square.sqrt());
-            }
+/// A unit quaternion: a point of the ball, not too near its centre, divided by its length.
+fn quaternion(random: &mut Random) -> [f64; 4] {
+    loop {
+        let x: [f64; 4] = std::array::from_fn(|_| random.symmetric(1.0));
+        let square: f64 = x.iter().map(|x| x * x).sum();
+        if (0.01..=1.0).contains(&square) {
+            return x.map(|x| x / square.sqrt());
         }
     }
 }

@@ -6,6 +6,7 @@
 use super::Interval;
 use crate::emit::Scalar;
 use crate::expr::{evaluate, Graph, NodeId, Op, Width};
+use crate::random::Random;
 use straightline_core::Dd;
 
 /// The worst that was found for one output scalar.
@@ -15,26 +16,6 @@ pub struct Found {
     pub error: f64,
     /// At these inputs.
     pub inputs: Vec<f64>,
-}
-
-/// Numbers that are the same for the same seed (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
-    }
 }
 
 /// The number of the format that is nearest to x and in the range.
