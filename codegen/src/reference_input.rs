@@ -8,6 +8,7 @@
 //! centre; links on fixed joints are lumped into the link that carries them, their inertia combined about the common
 //! mass centre; the joint frame at q = 0 is given by the file, so A⁰ is given as a matrix. Mass-centre notation: as written.
 
+use crate::description::flexible::{Bending, Flexible, Support};
 use crate::description::{
     Angle, AngleUnit, BaseKind, Description, Inertial, Joint as FileJoint, JointFrameNotation, JointKind,
     MassCentreNotation, Notation, Pose, Rotation,
@@ -54,22 +55,34 @@ pub fn mass_centre_tree(description: &Description, options: &ModelOptions) -> Re
     let stated = description.base.as_ref().is_some_and(|base| base.value == BaseKind::Floating);
     let floating = options.floating_base || stated;
     let joint_names = match &description.notation {
-        Notation::JointFrames(notation) => add_joint_frames(&mut tree, notation, floating, options)?,
+        Notation::JointFrames(notation) => {
+            let elastic = Elastic::of(description, options);
+            add_joint_frames(&mut tree, notation, floating, (options, &elastic))?
+        }
+        Notation::MassCentres(_) if !Elastic::of(description, options).is_empty() => {
+            return Err("the reference knows flexible links and supports of joint frames alone".to_string());
+        }
         Notation::MassCentres(notation) => add_mass_centres(&mut tree, notation, options)?,
     };
-    add_frames(&mut tree, options)?;
+    if let Notation::MassCentres(_) = &description.notation {
+        add_frames(&mut tree, options)?;
+    }
     number_coordinates(&mut tree, &joint_names, options);
     Ok(tree)
 }
 
-/// The frames that are asked for beyond the file's, each placed in the frame of a link.
+/// The rotation by roll, pitch and yaw \[rad\] of an option.
+fn turned(rpy: &[f64; 3], options: &ModelOptions) -> Matrix3<Dd> {
+    let angle = |i: usize| Angle { value: rpy[i], ..Angle::zero(Place::none()) };
+    rotation(&Rotation { rpy: [angle(0), angle(1), angle(2)] }, options)
+}
+
+/// The frames that are asked for beyond a chapter robot's, each placed in the frame of a link.
 fn add_frames(tree: &mut MassCentreTree<Dd>, options: &ModelOptions) -> Result<(), String> {
     for FrameOption { name, link, xyz, rpy } in &options.frames {
         let carrier = tree.frame(link).ok_or_else(|| format!("there is no link `{link}`"))?;
         let in_link = Placed { rotation: carrier.rotation, position: carrier.position };
-        let angle = |i: usize| Angle { value: rpy[i], ..Angle::zero(Place::none()) };
-        let turned = rotation(&Rotation { rpy: [angle(0), angle(1), angle(2)] }, options);
-        let place = in_link.then(&Placed { rotation: turned, position: vector(xyz) });
+        let place = in_link.then(&Placed { rotation: turned(rpy, options), position: vector(xyz) });
         let link = carrier.link;
         tree.frames.push(MassCentreFrame {
             name: name.clone(),
@@ -171,10 +184,47 @@ impl Part {
     }
 }
 
+/// What gives way of a robot.
+struct Elastic<'a> {
+    /// Links that are cut into segments.
+    links: Vec<&'a Flexible>,
+    /// Springs below the root link.
+    support: Option<&'a Support>,
+}
+
+impl<'a> Elastic<'a> {
+    fn of(description: &'a Description, options: &'a ModelOptions) -> Elastic<'a> {
+        if options.rigid_links {
+            return Elastic { links: Vec::new(), support: None };
+        }
+        let is_replaced = |f: &&Flexible| options.flexible.iter().any(|other| other.link.value == f.link.value);
+        let of_file = description.flexible.iter().filter(|f| !is_replaced(f));
+        Elastic { links: of_file.chain(&options.flexible).collect(), support: options.support.as_ref() }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.links.is_empty() && self.support.is_none()
+    }
+}
+
+/// The joint of a group.
+struct GroupJoint {
+    /// The group it moves against.
+    parent: usize,
+    /// The joint frame in the parent's link frame.
+    place: Placed,
+    name: String,
+    /// The link that it moves.
+    child: String,
+    kind: Joint,
+    /// In the joint frame.
+    axis: Vector3<Dd>,
+}
+
 /// A moving link of the file, or the world, while the tree is read.
 struct Group {
-    /// The group it moves against, and the joint; `None` for the root group.
-    joint: Option<(usize, Placed, usize)>,
+    /// `None` for the root group.
+    joint: Option<GroupJoint>,
     /// What is rigidly joined to it, in its link frame.
     parts: Vec<Part>,
 }
@@ -186,10 +236,10 @@ fn add_joint_frames(
     tree: &mut MassCentreTree<Dd>,
     notation: &JointFrameNotation,
     floating: bool,
-    options: &ModelOptions,
+    (options, elastic): (&ModelOptions, &Elastic),
 ) -> Result<Vec<String>, String> {
     let mut joint_names = Vec::new();
-    let (groups, frames) = rigid_groups(notation, options)?;
+    let (groups, frames) = rigid_groups(notation, options, elastic)?;
     let lumped: Vec<Part> = groups.iter().map(|group| Part::lump(&group.parts)).collect();
     // the root group: the world, or the floating link
     let link_of = |group: usize| if floating { Some(group) } else { group.checked_sub(1) };
@@ -197,7 +247,7 @@ fn add_joint_frames(
     let centre_of = |group: usize| link_of(group).map_or_else(Vector3::zeros, |_| lumped[group].centre);
     for (group, part) in groups.iter().zip(&lumped) {
         let Part { mass, centre, inertia } = part;
-        let Some((parent, joint_place, joint)) = &group.joint else {
+        let Some(GroupJoint { parent, place, name, child, kind, axis }) = &group.joint else {
             if floating {
                 let root = root_link(notation)?;
                 joint_names.push(floating_root_joint(notation));
@@ -205,22 +255,21 @@ fn add_joint_frames(
             }
             continue;
         };
-        let joint = &notation.joints[*joint];
-        joint_names.push(joint.name.value.clone());
-        let e = unit(&vector(&joint.axis.value));
+        joint_names.push(name.clone());
+        let e = unit(axis);
         tree.links.push(MassCentreLink {
-            name: joint.child.value.clone(),
+            name: child.clone(),
             parent: link_of(*parent),
-            joint: reference_joint(joint)?,
+            joint: *kind,
             iq: 0,
             iv: 0,
             mass: *mass,
             inertia: *inertia,
             e,
-            e_parent: joint_place.rotation * e,
+            e_parent: place.rotation * e,
             r: *centre,
-            r_parent: centre_of(*parent) - joint_place.position,
-            extended: ExtendedPosition::Matrix(joint_place.rotation),
+            r_parent: centre_of(*parent) - place.position,
+            extended: ExtendedPosition::Matrix(place.rotation),
         });
     }
     for (name, group, place) in frames {
@@ -266,7 +315,11 @@ fn root_link(notation: &JointFrameNotation) -> Result<&str, String> {
 }
 
 /// The rigid groups of links, depth first in the file's order, and the frames of links and named frames.
-fn rigid_groups(notation: &JointFrameNotation, options: &ModelOptions) -> Result<(Vec<Group>, Frames), String> {
+fn rigid_groups(
+    notation: &JointFrameNotation,
+    options: &ModelOptions,
+    elastic: &Elastic,
+) -> Result<(Vec<Group>, Frames), String> {
     let links: HashMap<&str, usize> =
         notation.links.iter().enumerate().map(|(i, link)| (link.name.value.as_str(), i)).collect();
     let mut joints_above: HashMap<&str, Vec<usize>> = HashMap::new();
@@ -275,35 +328,55 @@ fn rigid_groups(notation: &JointFrameNotation, options: &ModelOptions) -> Result
     }
 
     let mut groups = vec![Group { joint: None, parts: Vec::new() }];
-    let mut places: HashMap<&str, (usize, Placed)> = HashMap::new();
+    let mut places: HashMap<&str, Segments> = HashMap::new();
     let mut frames = Frames::new();
-    // a link to visit: its name, the joint that leads there, and where that joint's parent is
-    let mut open = vec![(root_link(notation)?, None, (0, Placed::here()))];
-    while let Some((name, joint, (parent_group, parent_place))) = open.pop() {
+    // a link to visit: its name, and the joint that leads there
+    let mut open = vec![(root_link(notation)?, None)];
+    while let Some((name, joint)) = open.pop() {
         let (group, place) = match joint {
-            None => (0, Placed::here()),
+            None => elastic.support.map_or((0, Placed::here()), |support| stand(support, name, &mut groups)),
             Some(i) => {
                 let joint: &FileJoint = &notation.joints[i];
-                let joint_place = parent_place.then(&Placed::read(&joint.origin, options));
+                let above = places.get(joint.parent.value.as_str()).ok_or("a joint hangs on nothing")?;
+                let (parent, parent_place) = above.at(&vector(&joint.origin.xyz.value));
+                let place = parent_place.then(&Placed::read(&joint.origin, options));
                 if joint.kind.value.moves() {
-                    groups.push(Group { joint: Some((parent_group, joint_place, i)), parts: Vec::new() });
+                    groups.push(Group {
+                        joint: Some(GroupJoint {
+                            parent,
+                            place,
+                            name: joint.name.value.clone(),
+                            child: joint.child.value.clone(),
+                            kind: reference_joint(joint)?,
+                            axis: vector(&joint.axis.value),
+                        }),
+                        parts: Vec::new(),
+                    });
                     (groups.len() - 1, Placed::here())
                 } else {
-                    (parent_group, joint_place)
+                    (parent, place)
                 }
             }
         };
-        if places.insert(name, (group, place)).is_some() {
-            return Err(format!("link `{name}` is moved by two joints"));
-        }
         frames.push((name.to_string(), group, place));
         let link = &notation.links[*links.get(name).ok_or_else(|| format!("there is no link `{name}`"))?];
-        if let Some(inertial) = &link.inertial {
-            groups[group].parts.push(Part::read(inertial, &place, options));
+        let inertial = link.inertial.as_ref();
+        let segments = match elastic.links.iter().find(|flexible| flexible.link.value == name) {
+            None => {
+                groups[group].parts.extend(inertial.map(|inertial| Part::read(inertial, &place, options)));
+                Segments::rigid(group, place)
+            }
+            Some(flexible) => {
+                let part = inertial.map(|inertial| Part::read(inertial, &Placed::here(), options));
+                bend(flexible, (group, place), part, &mut groups)?
+            }
+        };
+        if places.insert(name, segments).is_some() {
+            return Err(format!("link `{name}` is moved by two joints"));
         }
         // last in, first out: reversed, so that the first joint of the file is followed first
         for &i in joints_above.get(name).into_iter().flatten().rev() {
-            open.push((notation.joints[i].child.value.as_str(), Some(i), (group, place)));
+            open.push((notation.joints[i].child.value.as_str(), Some(i)));
         }
     }
     if places.len() != notation.links.len() {
@@ -311,10 +384,150 @@ fn rigid_groups(notation: &JointFrameNotation, options: &ModelOptions) -> Result
     }
     for frame in &notation.frames {
         let link = frame.link.value.as_str();
-        let (group, place) = places.get(link).ok_or_else(|| format!("there is no link `{link}`"))?;
-        frames.push((frame.name.value.clone(), *group, place.then(&Placed::read(&frame.pose, options))));
+        let carrier = places.get(link).ok_or_else(|| format!("there is no link `{link}`"))?;
+        let (group, place) = carrier.at(&vector(&frame.pose.xyz.value));
+        frames.push((frame.name.value.clone(), group, place.then(&Placed::read(&frame.pose, options))));
+    }
+    for FrameOption { name, link, xyz, rpy } in &options.frames {
+        let carrier = places.get(link.as_str()).ok_or_else(|| format!("there is no link `{link}`"))?;
+        let (group, place) = carrier.at(&vector(xyz));
+        let in_link = Placed { rotation: turned(rpy, options), position: vector(xyz) };
+        frames.push((name.clone(), group, place.then(&in_link)));
     }
     Ok((groups, frames))
+}
+
+/// The groups that a link consists of, each from so far along the axis on, with the straight link's frame in the group's.
+struct Segments {
+    begin: Vector3<Dd>,
+    along: Vector3<Dd>,
+    groups: Vec<(f64, usize, Placed)>,
+}
+
+impl Segments {
+    fn rigid(group: usize, place: Placed) -> Segments {
+        let groups = vec![(f64::NEG_INFINITY, group, place)];
+        Segments { begin: Vector3::zeros(), along: Vector3::zeros(), groups }
+    }
+
+    fn at(&self, point: &Vector3<Dd>) -> (usize, Placed) {
+        let s = self.along.dot(&(point - self.begin)).to_f64();
+        let inside = self.groups.iter().filter(|group| group.0 <= s).next_back();
+        inside.map_or((0, Placed::here()), |(_, group, place)| (*group, *place))
+    }
+}
+
+/// The bodies between the world and the root link `root` on springs: joint frames parallel with the world's in the support's
+/// point, link frames in the same place at rest.
+fn stand(support: &Support, root: &str, groups: &mut Vec<Group>) -> (usize, Placed) {
+    let given: Vec<usize> = (0..6).filter(|k| support.directions[*k].is_some()).collect();
+    for (i, k) in given.iter().enumerate() {
+        let position = if i == 0 { vector(&support.at) } else { Vector3::zeros() };
+        let name = format!("support_{}", Support::DIRECTIONS[*k]);
+        groups.push(Group {
+            joint: Some(GroupJoint {
+                parent: groups.len() - 1,
+                place: Placed { rotation: Matrix3::identity(), position },
+                child: if i + 1 == given.len() { root.to_string() } else { name.clone() },
+                name,
+                kind: if *k < 3 { Joint::Linear } else { Joint::Revolute },
+                axis: Vector3::from_fn(|row, _| if row == k % 3 { Dd::ONE } else { Dd::ZERO }),
+            }),
+            parts: Vec::new(),
+        });
+    }
+    (groups.len() - 1, Placed { rotation: Matrix3::identity(), position: -vector(&support.at) })
+}
+
+/// A link cut at the middles of equal segments: n joints, n + 1 groups. Frames of the groups are parallel with the link's, with their
+/// origins in the cuts. The mass is that of a rod with the link's inertia, each piece with its share of the inertia across.
+fn bend(
+    flexible: &Flexible,
+    (group, place): (usize, Placed),
+    part: Option<Part>,
+    groups: &mut Vec<Group>,
+) -> Result<Segments, String> {
+    let (begin, end) = (vector(&flexible.from), vector(&flexible.to.value));
+    let along = unit(&(end - begin));
+    let count = flexible.segments.value;
+    let step = (end - begin).dot(&along) / Dd::from(count as f64);
+    let cuts: Vec<Dd> = (0..count).map(|i| step * Dd::from(i as f64) + step / Dd::from(2.0)).collect();
+    let unit_axis = |k: usize| Vector3::from_fn(|row, _| if row == k { Dd::ONE } else { Dd::ZERO });
+    let mut axes: Vec<(String, Vector3<Dd>)> = match &flexible.bending {
+        Bending::None => Vec::new(),
+        Bending::About(given) => {
+            let about = (0..3).filter(|k| given[*k].is_some());
+            about.map(|k| (format!("bend_{}", ["x", "y", "z"][k]), unit_axis(k))).collect()
+        }
+        Bending::Round(_) => match (0..3).position(|k| along[k].abs() == Dd::ONE) {
+            Some(k) => {
+                let across = (0..3).filter(|other| *other != k);
+                across.map(|k| (format!("bend_{}", ["x", "y", "z"][k]), unit_axis(k))).collect()
+            }
+            None => return Err("the reference knows round flexible links along coordinate axes alone".to_string()),
+        },
+    };
+    axes.extend(flexible.torsion.as_ref().map(|_| ("twist".to_string(), along)));
+    let mut parts = match part {
+        Some(part) => pieces(&part, &begin, &along, &cuts),
+        None => Vec::new(),
+    }
+    .into_iter();
+    let moved = |part: Part, place: &Placed| Part {
+        mass: part.mass,
+        centre: place.position + place.rotation * part.centre,
+        inertia: place.rotation * part.inertia * place.rotation.transpose(),
+    };
+    groups[group].parts.extend(parts.next().map(|part| moved(part, &place)));
+    let mut segments = Segments { begin, along, groups: vec![(f64::NEG_INFINITY, group, place)] };
+    let (mut parent, mut parent_place) = (group, place);
+    for (i, cut) in cuts.iter().enumerate() {
+        let point = begin + along * *cut;
+        for (k, (label, axis)) in axes.iter().enumerate() {
+            let in_link = Placed { rotation: Matrix3::identity(), position: point };
+            let link = &flexible.link.value;
+            let name = format!("{link}_{label}{}", i + 1);
+            let child = if k + 1 == axes.len() { format!("{link}_segment{}", i + 1) } else { name.clone() };
+            let place = parent_place.then(&in_link);
+            let joint = GroupJoint { parent, place, name, child, kind: Joint::Revolute, axis: *axis };
+            groups.push(Group { joint: Some(joint), parts: Vec::new() });
+            (parent, parent_place) = (groups.len() - 1, Placed { rotation: Matrix3::identity(), position: -point });
+        }
+        groups[parent].parts.extend(parts.next().map(|part| moved(part, &parent_place)));
+        segments.groups.push((cut.to_f64(), parent, parent_place));
+    }
+    Ok(segments)
+}
+
+/// The pieces of a rod with the mass, mass centre and inertia of `part` between the cuts, in the same frame.
+fn pieces(part: &Part, begin: &Vector3<Dd>, along: &Vector3<Dd>, cuts: &[Dd]) -> Vec<Part> {
+    // ∫ (u·x)² dm = ½ tr J − uᵀ J u, and ∫ (u·x) x dm beside it
+    let half_trace = part.inertia.trace() / Dd::from(2.0);
+    let with_axis = along * half_trace - part.inertia * along;
+    let size = along.dot(&with_axis);
+    let centre = along.dot(&(part.centre - begin));
+    let half = (size * Dd::from(3.0) / part.mass).sqrt();
+    let slope = with_axis.map(|x| x / size);
+    let of_line = Matrix3::identity() * slope.dot(&slope) - slope * slope.transpose();
+    let across = part.inertia - of_line * size;
+    let clamp = |s: Dd| match s.to_f64() {
+        x if x <= (centre - half).to_f64() => centre - half,
+        x if x >= (centre + half).to_f64() => centre + half,
+        _ => s,
+    };
+    let ends: Vec<Dd> =
+        [centre - half].into_iter().chain(cuts.iter().map(|s| clamp(*s))).chain([centre + half]).collect();
+    let piece = |pair: &[Dd]| {
+        let (length, middle) = (pair[1] - pair[0], (pair[0] + pair[1]) / Dd::from(2.0));
+        let share = length / (half + half);
+        let mass = part.mass * share;
+        Part {
+            mass,
+            centre: part.centre + slope * (middle - centre),
+            inertia: across * share + of_line * (mass * length * length / Dd::from(12.0)),
+        }
+    };
+    ends.windows(2).map(piece).collect()
 }
 
 fn add_mass_centres(

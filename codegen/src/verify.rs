@@ -8,12 +8,13 @@
 //! is made of. So 1e-16 is a rounding, whatever cancels, and a wrong formula is anything up to 1.
 
 use crate::compile::{program, Generated, Options, Program};
+use crate::description::flexible::{Bending, Support};
 use crate::description::{self, Description, JointDrive, Notation, Value};
 use crate::diagnostic::{Diagnostics, Source};
 use crate::emit::{element_of, Scalar};
 use crate::expr::{evaluate, Graph};
 use crate::function::{Function, Robot};
-use crate::model;
+use crate::model::{self, ModelOptions};
 use crate::random::Random;
 use crate::reference_input::mass_centre_tree;
 use crate::scene::Scene;
@@ -175,8 +176,54 @@ fn second_reading(
         (link.iq, link.iv) = (joint.iq, joint.iv);
     }
     let joints = model.bodies.iter().map(|body| &body.joint).filter(|joint| joint.kind != JointKind::Floating);
-    let drives = joints.map(|joint| Drive::read(&description, &joint.name, joint.iq, joint.iv)).collect();
+    let elastic = elastic_springs(&description, &options.model);
+    let drives = joints.map(|joint| match elastic.iter().find(|(name, _)| *name == joint.name) {
+        Some((_, [stiffness, damping, rest])) => {
+            let none = Drive::read(&description, "", joint.iq, joint.iv);
+            Drive { stiffness: *stiffness, damping: *damping, rest: *rest, ..none }
+        }
+        None => Drive::read(&description, &joint.name, joint.iq, joint.iv),
+    });
+    let drives = drives.collect();
     Ok((tree, drives))
+}
+
+/// Stiffness, damping and rest of the joints of flexible links and of a support, by name: EI n/L, GJ n/L.
+fn elastic_springs(description: &Description, options: &ModelOptions) -> Vec<(String, [Dd; 3])> {
+    let mut springs = Vec::new();
+    if options.rigid_links {
+        return springs;
+    }
+    for (k, elastic) in options.support.iter().flat_map(|support| support.directions.iter().enumerate()) {
+        if let Some(e) = elastic {
+            let numbers = [e.stiffness.value, e.damping.value, e.rest].map(Dd::from);
+            springs.push((format!("support_{}", Support::DIRECTIONS[k]), numbers));
+        }
+    }
+    for flexible in options.flexible.iter().chain(&description.flexible) {
+        let (link, count) = (&flexible.link.value, flexible.segments.value);
+        let squares = (0..3).fold(Dd::ZERO, |sum, k| {
+            let d = Dd::from(flexible.to.value[k]) - Dd::from(flexible.from[k]);
+            sum + d * d
+        });
+        let per_length = Dd::from(count as f64) / squares.sqrt();
+        let mut about: Vec<(String, f64)> = Vec::new();
+        match &flexible.bending {
+            Bending::None => {}
+            Bending::Round(x) => about.extend(["x", "y", "z"].map(|axis| (format!("bend_{axis}"), x.value))),
+            Bending::About(given) => {
+                let given = given.iter().zip(["x", "y", "z"]);
+                about.extend(given.filter_map(|(x, axis)| Some((format!("bend_{axis}"), x.as_ref()?.value))));
+            }
+        }
+        about.extend(flexible.torsion.as_ref().map(|x| ("twist".to_string(), x.value)));
+        for (label, x) in about {
+            let spring = Dd::from(x) * per_length;
+            let numbers = [spring, spring * Dd::from(flexible.damping.value), Dd::ZERO];
+            springs.extend((1..=count).map(|i| (format!("{link}_{label}{i}"), numbers)));
+        }
+    }
+    springs
 }
 
 /// What a joint adds on its own coordinate, from the file: tau = … + I q̈ + d q̇ + f sgn(q̇) + k (q − q₀).

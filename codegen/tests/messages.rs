@@ -5,6 +5,8 @@
 //! difference.
 
 use std::path::{Path, PathBuf};
+use straightline_codegen::description::drives::Noted;
+use straightline_codegen::description::flexible::{Elastic, Support};
 use straightline_codegen::description::messages::CODES;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{load, ModelOptions};
@@ -39,6 +41,15 @@ fn special_case(code: &str) -> Option<(Source, ModelOptions)> {
         "joint-order-twice" => Some((file(code)?, order(&["elbow", "shoulder", "elbow"]))),
         "joint-order-missing" => Some((file(code)?, order(&["elbow"]))),
         "floating-by-option" => Some((file(code)?, ModelOptions { floating_base: true, ..options })),
+        "support-rigid" | "support-floats" => {
+            let spring = Elastic { stiffness: Noted::assumed(1e5), damping: Noted::assumed(0.0), rest: 0.0 };
+            let directions = match code {
+                "support-rigid" => [const { None }; 6],
+                _ => std::array::from_fn(|_| Some(spring.clone())),
+            };
+            let support = Some(Support { at: [0.0; 3], directions, place: Noted::assumed(()) });
+            Some((file(code)?, ModelOptions { support, ..options }))
+        }
         "bad-option" => Some((file(code)?, ModelOptions { angle_tolerance: f64::NAN, ..options })),
         _ => None,
     }

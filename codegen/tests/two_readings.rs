@@ -11,9 +11,12 @@ use robots::Random;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_6, PI};
 use std::fmt::Write;
 use straightline_codegen::description;
+use straightline_codegen::description::drives::Noted;
+use straightline_codegen::description::flexible::{Bending, Elastic, Flexible, Support};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{self, FrameOption, ModelOptions};
 use straightline_codegen::reference_input::mass_centre_tree;
+use straightline_core::model::JointEffects;
 
 /// A joint of a random robot in joint frames; joint j moves link j + 1.
 struct RandomJoint {
@@ -284,5 +287,61 @@ fn both_readings_of_random_mass_centre_toml_agree() {
         let options = random_options(&mut random, joints, false);
         compare_file(&mut disagreement, &format!("chapter, seed {seed}"), text, &options, &mut random);
     }
+    disagreement.judge();
+}
+
+/// Flexible links of any direction in random robots, and supports below them: rigid bodies as the reference cuts them.
+#[test]
+fn both_readings_of_flexible_links_and_supports_agree() {
+    let mut disagreement = Disagreement::default();
+    let mut cuts = 0;
+    for seed in 0..40 {
+        let mut random = Random(seed);
+        let links = 2 + random.below(6);
+        let robot = random_robot(&mut random, links, true);
+        let mut options = random_options(&mut random, Vec::new(), false);
+        options.joint_order = None;
+        options.rigid_links = seed == 0;
+        for j in 1..links {
+            if random.below(2) == 0 || robot.links[j].is_none() {
+                continue;
+            }
+            let (oblique, stiffness) = (triple(&mut random, 0.1), Noted::assumed(10.0));
+            let along_x = [0.05 + 0.2 * oblique[0].abs(), 0.0, 0.0];
+            let (bending, torsion, from, to) = match random.below(3) {
+                0 => (Bending::Round(stiffness), None, [0.0; 3], along_x),
+                1 => (Bending::About([None, Some(stiffness), None]), None, [-0.01, 0.0, 0.0], along_x),
+                _ => (Bending::None, Some(stiffness), [0.0; 3], oblique),
+            };
+            options.flexible.push(Flexible {
+                link: Noted::assumed(format!("link{j}")),
+                from,
+                to: Noted::assumed(to),
+                segments: Noted::assumed(1 + random.below(3)),
+                bending,
+                torsion,
+                damping: Noted::assumed(0.0),
+            });
+        }
+        if random.below(2) == 0 {
+            let spring = Elastic { stiffness: Noted::assumed(1e4), damping: Noted::assumed(1.0), rest: 0.0 };
+            let directions = std::array::from_fn(|k| (k == 2 || random.below(2) == 0).then(|| spring.clone()));
+            options.support = Some(Support { at: triple(&mut random, 0.3), directions, place: Noted::assumed(()) });
+        }
+        let text = urdf(&mut random, &robot);
+        let source = Source::new("flexible.urdf", text.clone());
+        let (model, diagnostics) = model::load(&source, &options);
+        let mut model = model.unwrap_or_else(|| panic!("seed {seed}: {}\n{text}", diagnostics.render()));
+        if diagnostics.iter().any(|d| d.code == "singular-joint") {
+            continue; // a segment that the link's mass does not reach
+        }
+        cuts += model.bodies.iter().filter(|b| b.effects.stiffness.to_f64() != 0.0).count();
+        // what springs add is no part of this comparison
+        model.bodies.iter_mut().for_each(|body| body.effects = JointEffects::none());
+        let description = description::read(&source, &mut Diagnostics::new()).expect("the file was read before");
+        let tree = mass_centre_tree(&description, &options).expect("the file describes a tree");
+        compare_authors(&mut disagreement, &format!("flexible, seed {seed}"), &tree, &model, &mut random);
+    }
+    assert!(cuts > 60, "only {cuts} elastic joints");
     disagreement.judge();
 }

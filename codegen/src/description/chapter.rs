@@ -2,6 +2,7 @@
 //!
 //! The schema is in `SCHEMA.md`. Links and joints without a name are called `link1`, `link2`, … and `joint1`, `joint2`, ….
 
+use super::flexible::Flexible;
 use super::reader::{Range64, Reader};
 use super::table::Table;
 use super::{Description, Format, JointKind, MassCentreEnd, MassCentreLink, MassCentreNotation, Notation, Value};
@@ -31,6 +32,7 @@ const LINK: &[&str] = &[
     "gear_ratio",
     "armature",
     "spring",
+    "flexible",
 ];
 const KINDS: [(&str, JointKind); 3] =
     [("revolute", JointKind::Revolute), ("linear", JointKind::Prismatic), ("prismatic", JointKind::Prismatic)];
@@ -64,7 +66,10 @@ pub(super) fn read(reader: &mut Reader, top: &Table) -> Description {
         None => MassCentreEnd { e_next: None, r_next: None, r_next_star: None },
     };
     let count = tables.len();
-    let links = tables.into_iter().enumerate().map(|(i, table)| read_link(reader, table, i + 1, count)).collect();
+    let mut flexible = Vec::new();
+    let links =
+        tables.into_iter().enumerate().map(|(i, table)| read_link(reader, table, (i + 1, count), &mut flexible));
+    let links = links.collect();
     Description {
         format: Format::MassCentreToml,
         name: name.unwrap_or_else(|| Value::assumed("robot".to_string())),
@@ -72,6 +77,7 @@ pub(super) fn read(reader: &mut Reader, top: &Table) -> Description {
         base: None,
         notation: Notation::MassCentres(MassCentreNotation { base, links }),
         drives: reader.drives_at(top),
+        flexible,
         ignored: Vec::new(),
     }
 }
@@ -88,7 +94,12 @@ fn read_end(reader: &mut Reader, table: &Table, is_last: bool) -> MassCentreEnd 
     }
 }
 
-fn read_link(reader: &mut Reader, mut table: Table, j: usize, count: usize) -> MassCentreLink {
+fn read_link(
+    reader: &mut Reader,
+    mut table: Table,
+    (j, count): (usize, usize),
+    flexible: &mut Vec<Flexible>,
+) -> MassCentreLink {
     let given = |reader: &mut Reader, table: &Table, key: &str, what: &str| {
         let name = if table.has(key) { reader.name_at(table, key, what) } else { None };
         name.unwrap_or_else(|| reader.value(format!("{what}{j}"), &table.span))
@@ -97,6 +108,7 @@ fn read_link(reader: &mut Reader, mut table: Table, j: usize, count: usize) -> M
     let joint_name = given(reader, &table, "joint_name", "joint");
     table.owner = format!("link `{}`", name.value);
     reader.check_keys(&table, LINK);
+    flexible.extend(reader.flexible_at(&table, Some(&name)));
     for (key, example) in [("type", "type = \"revolute\""), ("mass", "mass = 1.0"), ("J", "J = [0.1, 0.1, 0.1]")] {
         reader.require(&table, key, example);
     }

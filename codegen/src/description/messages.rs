@@ -73,6 +73,13 @@ pub const CODES: &[&str] = &[
     "actuator-shape",
     "actuator-inert",
     "shaft-without-inertia",
+    "elastic-number",
+    "flexible-axis",
+    "flexible-bending",
+    "flexible-rigid",
+    "flexible-mass",
+    "support-rigid",
+    "support-floats",
 ];
 
 type D = Diagnostic;
@@ -615,4 +622,50 @@ pub fn shaft_without_inertia(name: &str) -> D {
     )
     .detail("its acceleration would be torque over zero")
     .help("give `input_inertia` or `output_inertia`, or join both springs: 1/c = 1/c₁ + 1/c₂")
+}
+
+// --- what gives way ---
+
+/// A number of a flexible link or a support that cannot be.
+pub fn elastic_number(what: &str, value: &str, be: &str, help: &str) -> D {
+    D::error("elastic-number", format!("{what} is {value}; it must be {be}")).help(help)
+}
+
+/// A flexible link without a proper axis.
+pub fn flexible_axis(link: &str, why: &str) -> D {
+    D::error("flexible-axis", format!("the axis of the flexible link `{}`: {why}", cut(link)))
+        .help("`from` is the end at the joint that carries the link, `to` the other end, in the link frame in m")
+}
+
+/// Bending about an axis that is not across.
+pub fn flexible_bending(link: &str, axis: &str) -> D {
+    D::error("flexible-bending", format!("link `{}` cannot bend about its {axis} axis", cut(link)))
+        .detail("that axis is not perpendicular to the one from `from` to `to`")
+        .help("write one number for a cross-section that is round, or lay the link frame along the beam; `torsion` is about its axis")
+}
+
+/// A flexible link that nothing can bend.
+pub fn flexible_rigid(link: &str) -> D {
+    D::error("flexible-rigid", format!("the flexible link `{}` has no stiffness", cut(link)))
+        .help("give `bending` (EI in N·m²), `torsion` (GJ in N·m²), or both; without `flexible` a link is rigid")
+}
+
+/// A flexible link whose mass is elsewhere.
+pub fn flexible_mass(link: &str, begins: f64, ends: f64) -> D {
+    let (begins, ends) = (six_digits(begins), six_digits(ends));
+    D::warning("flexible-mass", format!("the mass of the flexible link `{}` is not spread over its axis", cut(link)))
+        .detail(format!("as that of a uniform rod it lies between {begins} and {ends} of the way from `from` to `to`"))
+        .help("write what sits at its ends as links of their own, on fixed joints; a uniform rod has m L²/12 about its middle")
+}
+
+/// A support that does not give way.
+pub fn support_rigid() -> D {
+    D::error("support-rigid", "the support does not give way in any direction")
+        .help("write `z = { stiffness = 1e5, damping = 200.0 }`, or another of x, y, z, rx, ry, rz; without [support] the base is rigid")
+}
+
+/// A support below a base that is not fixed.
+pub fn support_floats() -> D {
+    D::error("support-floats", "a base that moves freely, or as it is told, stands on no support")
+        .help("remove [support], or leave the base fixed")
 }

@@ -7,6 +7,7 @@
 
 mod chapter;
 pub mod drives;
+pub mod flexible;
 pub mod messages;
 pub(crate) mod reader;
 pub(crate) mod table;
@@ -72,6 +73,8 @@ pub struct Description {
     pub notation: Notation,
     /// What drives the joints.
     pub drives: Vec<drives::Drive>,
+    /// Links that bend.
+    pub flexible: Vec<flexible::Flexible>,
     /// What the file holds and the dynamics do not need.
     pub ignored: Vec<Ignored>,
 }

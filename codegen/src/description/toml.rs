@@ -1,5 +1,6 @@
 //! TOML with joint frames; the schema is in `SCHEMA.md`.
 
+use super::flexible::Flexible;
 use super::reader::{Range64, Reader};
 use super::table::{self, Table};
 use super::{
@@ -20,6 +21,7 @@ const LINK: &[&str] = &[
     "inertia_rpy_deg",
     "inertia_rpy_quarter_turns",
     "inertia_rpy_turns",
+    "flexible",
 ];
 const JOINT: &[&str] = &[
     "name",
@@ -76,6 +78,7 @@ pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Descriptio
         base: None,
         notation: Notation::JointFrames(JointFrameNotation::default()),
         drives: Vec::new(),
+        flexible: Vec::new(),
         ignored: Vec::new(),
     };
     reader.require(&top, "robot", "[robot]\\nname = \"...\"");
@@ -91,7 +94,7 @@ pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Descriptio
     }
     let mut bodies = JointFrameNotation::default();
     for table in reader.tables_at(&top, "link") {
-        match read_link(&mut reader, table) {
+        match read_link(&mut reader, table, &mut description.flexible) {
             Some(link) => bodies.links.push(link),
             None => bodies.has_holes = true,
         }
@@ -119,10 +122,11 @@ fn named(reader: &mut Reader, table: &mut Table, what: &str) -> Option<Value<Str
     Some(name)
 }
 
-fn read_link(reader: &mut Reader, mut table: Table) -> Option<Link> {
+fn read_link(reader: &mut Reader, mut table: Table, flexible: &mut Vec<Flexible>) -> Option<Link> {
     let name = named(reader, &mut table, "link");
     reader.check_keys(&table, LINK);
-    let has_inertial = LINK[1..].iter().any(|key| table.has(key));
+    flexible.extend(reader.flexible_at(&table, name.as_ref()));
+    let has_inertial = LINK[1..LINK.len() - 1].iter().any(|key| table.has(key));
     let inertial = if has_inertial { read_inertial(reader, &table) } else { None };
     Some(Link { name: name?, inertial })
 }

@@ -227,6 +227,7 @@ fn read_document(mut reader: Reader, document: &Document) -> Option<Description>
     }
     Some(Description {
         drives: Vec::new(),
+        flexible: Vec::new(),
         format: Format::Urdf,
         name,
         gravity: None,

@@ -1,5 +1,6 @@
 //! From links and joints with frames to bodies: fixed joints merged, canonical frames, depth first.
 
+use super::flexible::{self, Carrier};
 use super::geometry::{canonical_rotation, compose, point, snap_tensor, turned, unit, vector};
 use super::merge::{merge, Part};
 use super::{angle, check, transform, Assembly, ModelOptions};
@@ -8,7 +9,7 @@ use crate::diagnostic::{Diagnostics, Place};
 use std::collections::BTreeMap;
 use straightline_core::algorithms::composing_pays;
 use straightline_core::model::{Body, BodyId, Frame, Joint, JointEffects, JointKind as ModelJointKind, Limits};
-use straightline_core::spatial::{SpatialInertia, Transform};
+use straightline_core::spatial::{SpatialInertia, Transform, Vec3};
 use straightline_core::Dd;
 
 pub(super) fn assemble(
@@ -35,7 +36,12 @@ pub(super) fn assemble(
     let mut bodies: Vec<Body<Dd>> = Vec::new();
     let mut joint_places: Vec<Place> = Vec::new();
     let mut parts: Vec<Vec<Part>> = Vec::new();
-    let mut poses: Vec<(Option<BodyId>, Transform<Dd>)> = vec![(None, Transform::identity()); notation.links.len()];
+    let mut carriers = vec![Carrier::rigid(None, Transform::identity()); notation.links.len()];
+    let names: Vec<&str> = notation.links.iter().map(|link| link.name.value.as_str()).collect();
+    let flexible = match options.rigid_links {
+        true => Vec::new(),
+        false => flexible::chosen(&description.flexible, &options.flexible, &names, diagnostics),
+    };
     if is_floating {
         let root = &notation.links[tree.root].name;
         let joint = Joint {
@@ -48,7 +54,23 @@ pub(super) fn assemble(
         bodies.push(new_body(&root.value, None, joint, Transform::identity(), Transform::identity()));
         joint_places.push(root.place.clone());
         parts.push(Vec::new());
-        poses[tree.root].0 = Some(0);
+        carriers[tree.root] = Carrier::rigid(Some(0), Transform::identity());
+    }
+    match options.support.as_ref().filter(|_| !options.rigid_links) {
+        Some(support) if is_floating => {
+            diagnostics.push(messages::support_floats().at(&support.place.place));
+        }
+        Some(support) => {
+            let elastic = flexible::support(support, names[tree.root], diagnostics)?;
+            let base = elastic.last().map(|body| body.link_frame)?;
+            carriers[tree.root] = Carrier::rigid(Some(elastic.len() - 1), base);
+            for body in elastic {
+                bodies.push(body);
+                joint_places.push(support.place.place.clone());
+                parts.push(Vec::new());
+            }
+        }
+        None => {}
     }
     let mut open: Vec<usize> = vec![tree.root];
     // depth first, the joints of a link in the order of the file: a stack takes them in reverse
@@ -56,9 +78,9 @@ pub(super) fn assemble(
     while let Some(link_index) = open.pop() {
         if let Some(j) = above[link_index] {
             let joint = &notation.joints[j];
-            let parent = poses[tree.parent_of[j]];
+            let parent = carriers[tree.parent_of[j]].at(vector(joint.origin.xyz.value));
             let x_parent_joint = compose(&parent.1, &transform(&joint.origin, tolerance));
-            poses[link_index] = match joint.kind.value {
+            let (body, x_body_link) = match joint.kind.value {
                 JointKind::Fixed | JointKind::Floating => (parent.0, x_parent_joint),
                 kind => {
                     let r_joint_canonical = canonical_rotation(unit(vector(joint.axis.value))?);
@@ -82,10 +104,32 @@ pub(super) fn assemble(
                     (Some(bodies.len() - 1), link_frame)
                 }
             };
+            carriers[link_index] = Carrier::rigid(body, x_body_link);
         }
-        let (body, x_body_link) = poses[link_index];
-        if let (Some(body), Some(inertial)) = (body, &notation.links[link_index].inertial) {
-            parts[body].push(part(inertial, &x_body_link, tolerance));
+        let (body, x_body_link) = carriers[link_index].first();
+        let inertial = notation.links[link_index].inertial.as_ref();
+        match flexible.iter().find(|flexible| flexible.link.value == names[link_index]) {
+            None => {
+                if let (Some(body), Some(inertial)) = (body, inertial) {
+                    parts[body].push(part(inertial, &x_body_link, tolerance));
+                }
+            }
+            Some(flexible) => {
+                let whole = inertial.map(|inertial| part(inertial, &Transform::identity(), tolerance));
+                let (carrier, next) = ((body, x_body_link), bodies.len());
+                if let Some(cut) = flexible::cut(flexible, carrier, Vec3::zero(), whole, next, diagnostics) {
+                    if let (Some(body), Some(first)) = (body, cut.first) {
+                        let Part { mass, com, inertia_com } = first;
+                        parts[body].push(Part::placed(mass, com, inertia_com, &x_body_link));
+                    }
+                    for (body, part) in cut.bodies {
+                        bodies.push(body);
+                        joint_places.push(flexible.link.place.clone());
+                        parts.push(part.into_iter().collect());
+                    }
+                    carriers[link_index] = cut.carrier;
+                }
+            }
         }
         for &j in tree.joints_of[link_index].iter().rev() {
             above[tree.child_of[j]] = Some(j);
@@ -95,16 +139,20 @@ pub(super) fn assemble(
     for (body, parts) in bodies.iter_mut().zip(&parts) {
         body.inertia = merge(parts);
     }
-    zero_masses(notation, &bodies, &poses, diagnostics);
+    if diagnostics.has_errors() {
+        return None;
+    }
+    zero_masses(notation, &bodies, &carriers, diagnostics);
 
     let mut links = BTreeMap::new();
     let mut frames = Vec::new();
-    for (link, &(body, placement)) in notation.links.iter().zip(&poses) {
-        links.insert(link.name.value.clone(), (body, placement));
+    for (link, carrier) in notation.links.iter().zip(carriers) {
+        let (body, placement) = carrier.first();
+        links.insert(link.name.value.clone(), carrier);
         frames.push(Frame { name: link.name.value.clone(), body, placement });
     }
     for frame in &notation.frames {
-        let (body, x_body_link) = *links.get(&frame.link.value)?;
+        let (body, x_body_link) = links.get(&frame.link.value)?.at(vector(frame.pose.xyz.value));
         let placement = compose(&x_body_link, &transform(&frame.pose, tolerance));
         frames.push(Frame { name: frame.name.value.clone(), body, placement });
     }
@@ -166,7 +214,7 @@ fn part(inertial: &Inertial, x_body_link: &Transform<Dd>, tolerance: f64) -> Par
 fn zero_masses(
     notation: &JointFrameNotation,
     bodies: &[Body<Dd>],
-    poses: &[(Option<BodyId>, Transform<Dd>)],
+    carriers: &[Carrier],
     diagnostics: &mut Diagnostics,
 ) {
     let mut carries_mass = vec![false; bodies.len()];
@@ -175,8 +223,8 @@ fn zero_masses(
             carries_mass[parent] |= carries_mass[id] || body.inertia.mass != Dd::ZERO;
         }
     }
-    for (link, (body, _)) in notation.links.iter().zip(poses) {
-        let (Some(body), Some(inertial)) = (*body, &link.inertial) else { continue };
+    for (link, carrier) in notation.links.iter().zip(carriers) {
+        let (Some(body), Some(inertial)) = (carrier.first().0, &link.inertial) else { continue };
         let s = bodies[body].inertia.second_moment_com;
         let has_inertia = [s.xx, s.yy, s.zz].iter().any(|x| *x != Dd::ZERO);
         let is_link_of_joint = bodies[body].name == link.name.value;

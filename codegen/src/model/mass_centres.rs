@@ -5,9 +5,11 @@
 //! The canonical frame of joint j stands in S_j (S''_j for a linear joint) with z along e_j. Vectors are as in the file:
 //! `e`, `r`, `r_star` of link j in frame j (tilde above), `e_next`, … of link j−1 in frame j−1 (tilde below).
 
+use super::flexible::{self, Carrier};
 use super::geometry::{
     about, canonical_rotation, compose, magnitude, snap_rotation, snap_vector, turned, unit, vector,
 };
+use super::merge::{merge, Part};
 use super::{angle, check, Assembly, ModelOptions, MOST_LINKS};
 use crate::description::{messages, Description, JointKind, MassCentreEnd, MassCentreLink, MassCentreNotation, Value};
 use crate::diagnostic::Diagnostics;
@@ -52,8 +54,22 @@ pub(super) fn assemble(
         Assembly { bodies: Vec::new(), joint_places: Vec::new(), frames: Vec::new(), links: BTreeMap::new() };
     let mut end = &chain.base;
     let mut end_owner = "[base]".to_string();
-    // pose of frame j−1 in the canonical frame of its body, or in the world
-    let mut x_body_previous = Transform::identity();
+    // what carries link j−1; the poses are those of frame j−1
+    let mut previous = Carrier::rigid(None, Transform::identity());
+    if let Some(support) = options.support.as_ref().filter(|_| !options.rigid_links) {
+        for body in flexible::support(support, "base", diagnostics)? {
+            assembly.bodies.push(body);
+            assembly.joint_places.push(support.place.place.clone());
+        }
+        let (body, placement) = (assembly.bodies.len().checked_sub(1), assembly.bodies.last()?.link_frame);
+        previous = Carrier::rigid(body, placement);
+        assembly.frames.push(Frame { name: "base".to_string(), body, placement });
+    }
+    let names: Vec<&str> = chain.links.iter().map(|link| link.name.value.as_str()).collect();
+    let flexible = match options.rigid_links {
+        true => Vec::new(),
+        false => flexible::chosen(&description.flexible, &options.flexible, &names, diagnostics),
+    };
     for (index, link) in chain.links.iter().enumerate() {
         check_link(link, description, diagnostics);
         let joint = joint_in_zero_position(&end_owner, end, link, tolerance, diagnostics);
@@ -71,8 +87,9 @@ pub(super) fn assemble(
         let com = snap_vector(r_canonical_link * r_jj, magnitude(r_jj));
         let inertia = link.inertia.value.map(Dd::from).rotated(&r_canonical_link);
         let x_canonical_link = Transform { rotation: r_canonical_link, translation: com };
-        let parent = index.checked_sub(1);
+        let (parent, x_body_previous) = previous.at(x_previous_joint.translation);
         let placement = compose(&x_body_previous, &x_previous_joint);
+        let mass = Dd::from(link.mass.value);
         assembly.bodies.push(Body {
             name: link.name.value.clone(),
             parent,
@@ -90,14 +107,28 @@ pub(super) fn assemble(
             dense: composing_pays(parent, &placement.rotation),
             effects: check::model_effects(&link.drive),
             load: None,
-            inertia: SpatialInertia::new(Dd::from(link.mass.value), com, super::geometry::snap_tensor(inertia)),
+            inertia: SpatialInertia::new(mass, com, super::geometry::snap_tensor(inertia)),
             link_frame: x_canonical_link,
         });
         assembly.joint_places.push(link.joint_name.place.clone());
-        assembly.links.insert(link.name.value.clone(), (Some(index), x_canonical_link));
-        let name = link.name.value.clone();
-        assembly.frames.push(Frame { name, body: Some(index), placement: x_canonical_link });
-        x_body_previous = x_canonical_link;
+        let body = assembly.bodies.len() - 1;
+        previous = Carrier::rigid(Some(body), x_canonical_link);
+        if let Some(flexible) = flexible.iter().find(|flexible| flexible.link.value == link.name.value) {
+            let whole = Part { mass, com: Vec3::zero(), inertia_com: link.inertia.value.map(Dd::from) };
+            let (carrier, next) = (previous.first(), assembly.bodies.len());
+            if let Some(cut) = flexible::cut(flexible, carrier, -r_jj, Some(whole), next, diagnostics) {
+                let placed = |p: Part| Part::placed(p.mass, p.com, p.inertia_com, &x_canonical_link);
+                assembly.bodies[body].inertia = merge(&cut.first.map(placed).into_iter().collect::<Vec<_>>());
+                for (body, part) in cut.bodies {
+                    assembly.bodies.push(Body { inertia: merge(&part.into_iter().collect::<Vec<_>>()), ..body });
+                    assembly.joint_places.push(flexible.link.place.clone());
+                }
+                previous = cut.carrier;
+            }
+        }
+        let (body, placement) = previous.at(Vec3::zero());
+        assembly.links.insert(link.name.value.clone(), previous.clone());
+        assembly.frames.push(Frame { name: link.name.value.clone(), body, placement });
     }
     let last = chain.links.last()?;
     for (key, given) in [("e_next", &last.end.e_next), ("r_next_star", &last.end.r_next_star)] {
@@ -111,10 +142,10 @@ pub(super) fn assemble(
     if let Some(r_next) = &last.end.r_next {
         // tip = C_n − r_{n,n+1}
         let x_link_tip = Transform { rotation: Mat3::identity(), translation: -vector(r_next.value) };
+        let (body, x_body_previous) = previous.at(x_link_tip.translation);
         let placement = compose(&x_body_previous, &x_link_tip);
-        let body = Some(chain.links.len() - 1);
         assembly.frames.push(Frame { name: "tip".to_string(), body, placement });
-        assembly.links.insert("tip".to_string(), (body, placement));
+        assembly.links.insert("tip".to_string(), Carrier::rigid(body, placement));
     }
     Some(assembly)
 }

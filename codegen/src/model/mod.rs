@@ -31,11 +31,14 @@
 pub(crate) mod angle;
 mod check;
 pub(crate) mod drives;
+mod flexible;
 pub(crate) mod geometry;
 mod joint_frames;
 mod mass_centres;
 pub(crate) mod merge;
 
+use self::flexible::Carrier;
+use crate::description::flexible::{Flexible, Support};
 use crate::description::{self, messages, Angle, Description, Notation, Pose, Rotation, Value};
 use crate::diagnostic::{Diagnostics, Place, Source};
 use geometry::{compose, vector};
@@ -62,6 +65,12 @@ pub struct ModelOptions {
     pub gravity: Option<[f64; 3]>,
     /// Further frames.
     pub frames: Vec<FrameOption>,
+    /// Links that bend, in place of what the file says of them.
+    pub flexible: Vec<Flexible>,
+    /// Springs and dampers below the root link.
+    pub support: Option<Support>,
+    /// All links and the support are rigid, whatever file and options say.
+    pub rigid_links: bool,
 }
 
 impl Default for ModelOptions {
@@ -72,6 +81,9 @@ impl Default for ModelOptions {
             angle_tolerance: angle::ROUNDING,
             gravity: None,
             frames: Vec::new(),
+            flexible: Vec::new(),
+            support: None,
+            rigid_links: false,
         }
     }
 }
@@ -133,6 +145,9 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
         Notation::MassCentres(chain) => mass_centres::assemble(chain, description, options, tolerance, diagnostics),
     };
     let mut assembly = assembly?;
+    if !names_are_free(&assembly, diagnostics) {
+        return None;
+    }
     check::motion(&assembly, description, diagnostics);
     add_frames(&mut assembly, options, tolerance, diagnostics);
     order_joints(&mut assembly.bodies, options, diagnostics);
@@ -149,6 +164,20 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
     }
     drives::add(&description.drives, &mut model, diagnostics);
     (!diagnostics.has_errors()).then_some(model)
+}
+
+/// Whether no joint of what gives way has the name of another one.
+fn names_are_free(assembly: &Assembly, diagnostics: &mut Diagnostics) -> bool {
+    let mut seen: HashMap<&str, &Place> = HashMap::new();
+    let mut is_free = true;
+    for (body, place) in assembly.bodies.iter().zip(&assembly.joint_places) {
+        if let Some(first) = seen.insert(&body.joint.name, place) {
+            let complaint = messages::duplicate_name("joint", &body.joint.name).at(place);
+            diagnostics.push(complaint.related(first, "the other one"));
+            is_free = false;
+        }
+    }
+    is_free
 }
 
 /// The angles of a description that are taken as multiples of π/4 or π/6 and are not written exactly so.
@@ -219,8 +248,8 @@ struct Assembly {
     /// For each body, where its joint is written.
     joint_places: Vec<Place>,
     frames: Vec<Frame<Dd>>,
-    /// Body and pose of every link.
-    links: BTreeMap<String, (Option<BodyId>, Transform<Dd>)>,
+    /// What carries every link.
+    links: BTreeMap<String, Carrier>,
 }
 
 fn check_options(options: &ModelOptions, diagnostics: &mut Diagnostics) {
@@ -251,7 +280,7 @@ fn add_frames(assembly: &mut Assembly, options: &ModelOptions, tolerance: f64, d
             diagnostics.push(messages::duplicate_name("frame", &option.name));
             continue;
         }
-        let Some((body, x_body_link)) = assembly.links.get(&option.link) else {
+        let Some(carrier) = assembly.links.get(&option.link) else {
             let owner = format!("frame `{}`", option.name);
             diagnostics.push(messages::unknown_link(&owner, &option.link, assembly.links.keys().map(String::as_str)));
             continue;
@@ -259,8 +288,9 @@ fn add_frames(assembly: &mut Assembly, options: &ModelOptions, tolerance: f64, d
         let zero = Angle::zero(Place::none());
         let rpy = option.rpy.map(|value| Angle { value, ..zero.clone() });
         let pose = Pose { xyz: Value::assumed(option.xyz), rotation: Rotation { rpy } };
-        let placement = compose(x_body_link, &transform(&pose, tolerance));
-        assembly.frames.push(Frame { name: option.name.clone(), body: *body, placement });
+        let (body, x_body_link) = carrier.at(vector(option.xyz));
+        let placement = compose(&x_body_link, &transform(&pose, tolerance));
+        assembly.frames.push(Frame { name: option.name.clone(), body, placement });
     }
 }
 

@@ -192,7 +192,7 @@ fn items(whole: &Model<Dd>, scene: &Scene) -> Vec<(What, Change)> {
         let what = format!("{} at rest", joints(&scene.zero.joints_at_rest));
         item(what, Box::new(|now, s| now.zero.joints_at_rest.clone_from(&s.zero.joints_at_rest)));
     }
-    let Effects { rotor_inertia, damping, coulomb, springs, transmission_losses, elastic_transmissions } =
+    let Effects { rotor_inertia, damping, coulomb, springs, transmission_losses, elastic_transmissions, .. } =
         scene.effects;
     if !rotor_inertia {
         item("no rotor inertia".to_string(), Box::new(|now, _| now.effects.rotor_inertia = false));

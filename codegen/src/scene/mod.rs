@@ -23,6 +23,7 @@ pub use ranges::{ranges_in_words, Interval, JointRanges, Ranges};
 pub use read::{read, read_partly, SceneFile, LISTS};
 
 use crate::description::drives::Drive;
+use crate::description::flexible::{Flexible, Support};
 use crate::function::Function;
 use crate::model::ModelOptions;
 use std::collections::BTreeMap;
@@ -45,6 +46,10 @@ pub struct Scene {
     pub payloads: Vec<Payload>,
     /// What drives the joints, beside the robot file's own drives.
     pub drives: Vec<Drive>,
+    /// Links that bend, in place of what the robot file says of them.
+    pub flexible: Vec<Flexible>,
+    /// Springs and dampers below the root link.
+    pub support: Option<Support>,
     /// What is known to be zero.
     pub zero: Zero,
     /// Which effects beside rigid bodies are in.
@@ -74,7 +79,15 @@ impl Scene {
     /// The options under which the robot file is read for this scene.
     pub fn model_options(&self, options: &ModelOptions) -> ModelOptions {
         let floats = matches!(self.base, Base::Floating | Base::Moving);
-        ModelOptions { floating_base: options.floating_base || floats, ..options.clone() }
+        // of options that hold them already as they are
+        let own = if options.flexible == self.flexible { &[] } else { &self.flexible[..] };
+        ModelOptions {
+            floating_base: options.floating_base || floats,
+            flexible: [&options.flexible[..], own].concat(),
+            support: self.support.clone().or_else(|| options.support.clone()),
+            rigid_links: options.rigid_links || !self.effects.elastic_links,
+            ..options.clone()
+        }
     }
 
     /// The same scene with its outputs spelled out for a robot: where the base moves as it is told, of forces over the
@@ -200,6 +213,8 @@ pub struct Effects {
     pub transmission_losses: bool,
     /// Elastic stages of transmissions; without them a stage is rigid.
     pub elastic_transmissions: bool,
+    /// Flexible links and an elastic support; without them links and base are rigid.
+    pub elastic_links: bool,
 }
 
 impl Default for Effects {
@@ -211,6 +226,7 @@ impl Default for Effects {
             springs: true,
             transmission_losses: true,
             elastic_transmissions: true,
+            elastic_links: true,
         }
     }
 }

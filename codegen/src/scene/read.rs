@@ -27,11 +27,13 @@ const TOP: &[&str] = &[
     "effects",
     "parameter",
     "drive",
+    "flexible",
+    "support",
     "numbers",
     "budget",
 ];
 /// Those of the tables of which there may be several: `[[payload]]`.
-pub const LISTS: &[&str] = &["contact", "loop", "mode", "payload", "parameter", "drive"];
+pub const LISTS: &[&str] = &["contact", "loop", "mode", "payload", "parameter", "drive", "flexible"];
 const BUDGET: &[&str] =
     &["max_flops", "max_sincos", "max_live", "max_stack_bytes", "max_code_bytes", "max_error", "mixed_precision"];
 const BASES: [(&str, Base); 3] = [("fixed", Base::Fixed), ("floating", Base::Floating), ("moving", Base::Moving)];
@@ -155,6 +157,8 @@ impl SceneReader<'_> {
             self.parameter(table);
         }
         self.file.scene.drives = self.reader.drives_at(top);
+        self.file.scene.flexible = self.reader.flexible_links_at(top);
+        self.file.scene.support = self.reader.support_at(top);
         if let Some(table) = self.reader.table_at(top, "numbers", "[numbers]") {
             self.numbers(&table);
         }
@@ -305,10 +309,14 @@ impl SceneReader<'_> {
 
     fn effects(&mut self, table: &Table) {
         let own = ["rotor_inertia", "damping", "coulomb", "coulomb_speed", "springs"];
-        self.reader.check_keys(table, &[&own[..], &["transmission_losses", "elastic_transmissions"]].concat());
+        self.reader.check_keys(
+            table,
+            &[&own[..], &["transmission_losses", "elastic_transmissions", "elastic_links"]].concat(),
+        );
         let mut flag = |key: &str| self.reader.flag_at(table, key).is_none_or(|flag| flag.value);
         let (rotor_inertia, damping, springs) = (flag("rotor_inertia"), flag("damping"), flag("springs"));
         let (transmission_losses, elastic_transmissions) = (flag("transmission_losses"), flag("elastic_transmissions"));
+        let elastic_links = flag("elastic_links");
         let form = self.reader.word_at(table, "coulomb", &COULOMB);
         let speed = self.reader.real_at(table, "coulomb_speed", Range64::Finite);
         let speed_place = speed.as_ref().map(|s| s.place.clone());
@@ -331,8 +339,15 @@ impl SceneReader<'_> {
             }
             (form, None) => form,
         };
-        self.file.scene.effects =
-            super::Effects { rotor_inertia, damping, coulomb, springs, transmission_losses, elastic_transmissions };
+        self.file.scene.effects = super::Effects {
+            rotor_inertia,
+            damping,
+            coulomb,
+            springs,
+            transmission_losses,
+            elastic_transmissions,
+            elastic_links,
+        };
     }
 
     fn parameter(&mut self, table: Table) {
