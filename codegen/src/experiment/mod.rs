@@ -5,6 +5,7 @@
 pub mod contact;
 pub mod messages;
 pub mod parameter;
+pub mod parquet;
 pub mod samples;
 
 use self::messages as say;
@@ -81,6 +82,16 @@ fn joints(model: &Model<f64>) -> Vec<&Joint> {
 
 fn names(model: &Model<f64>) -> Vec<&str> {
     joints(model).iter().map(|j| j.name.as_str()).collect()
+}
+
+/// Numbers per driven joint with zeros for those that are passive; `None` if there are none, or not as many numbers.
+fn with_passive(model: &Model<f64>, numbers: &[f64]) -> Option<Vec<f64>> {
+    let mut is_passive = vec![false; model.nv()];
+    model.bodies.iter().for_each(|b| is_passive[b.joint.iv] = b.is_passive());
+    let driven = is_passive.iter().filter(|passive| !**passive).count();
+    let mut rest = numbers.iter();
+    (driven < model.nv() && numbers.len() == driven && !floats(model))
+        .then(|| is_passive.iter().map(|passive| if *passive { 0.0 } else { *rest.next().unwrap_or(&0.0) }).collect())
 }
 
 fn floats(model: &Model<f64>) -> bool {
@@ -213,8 +224,11 @@ fn sampled_motion(
     let times = columns.get("t")?;
     let column = |prefix: &str, joint: &str| columns.get(&format!("{prefix}.{joint}"));
     let mut q = Vec::new();
+    let rest = vec![0.0; times.len()];
+    let is_passive = |joint: &str| model.bodies.iter().any(|b| b.joint.name == joint && b.is_passive());
     for joint in names(model) {
-        match column("q", joint).or_else(|| columns.get(joint)) {
+        let given = column("q", joint).or_else(|| columns.get(joint));
+        match given.or_else(|| is_passive(joint).then_some(&rest[..])) {
             Some(values) => q.push(values),
             None => diagnostics.push(say::column_missing(joint, &columns.names()).at(place)),
         }
@@ -352,6 +366,9 @@ impl ExperimentReader<'_> {
             DeValue::Array(array) => {
                 let found = array.len();
                 let numbers = self.reader.all_reals_at(table, key, Range64::Finite)?;
+                if let Some(all) = with_passive(self.model, &numbers).filter(|all| all.len() == n) {
+                    return Some(all);
+                }
                 if found != n {
                     let names = names(self.model);
                     self.reader.complain(&span, say::one_per_joint(&what, found, &names));

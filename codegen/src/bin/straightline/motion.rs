@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Mutex;
 use straightline_codegen::compile::Options;
 use straightline_codegen::description::{self, Description};
-use straightline_codegen::diagnostic::{Diagnostics, Severity, Source};
-use straightline_codegen::experiment::{self, parameter, Experiment};
+use straightline_codegen::diagnostic::{Diagnostics, Severity};
+use straightline_codegen::experiment::{self, parameter, parquet, Experiment};
 use straightline_codegen::{model, output, scene};
 use straightline_core::drive::Actuator;
 use straightline_core::model::Model;
@@ -54,12 +54,14 @@ fn experiment(
     controller_model: &Model<f64>,
     are_torques: bool,
 ) -> Result<Experiment, Failure> {
-    let source = read(path)?;
+    let source = match parquet::is_parquet(path) {
+        false => read(path)?,
+        true => parquet::source(path, &path.display().to_string()).map_err(|why| unreadable(path, &why))?,
+    };
     // files count from the one that names them
     let beside = |name: &str| {
         let file = path.parent().unwrap_or(Path::new("")).join(name);
-        let bytes = std::fs::read(&file).map_err(|error| format!("{}: {error}", file.display()))?;
-        Ok(Source::from_bytes(&file.display().to_string(), bytes))
+        parquet::source(&file, &file.display().to_string()).map_err(|why| format!("{}: {why}", file.display()))
     };
     let mut diagnostics = Diagnostics::new();
     let experiment = experiment::read(&source, model, controller_model, are_torques, &beside, &mut diagnostics);
@@ -67,8 +69,17 @@ fn experiment(
     experiment.ok_or(Failure::Input)
 }
 
-/// Writes a table as CSV, or as JSON where the file's name says so.
+fn unreadable(path: &Path, why: &str) -> Failure {
+    print::error(&format!("{}: {why}", path.display()));
+    Failure::Input
+}
+
+/// Writes a table as CSV, or as JSON or Parquet where the file's name says so.
 pub fn write_table(path: &Path, table: &Table) -> Result<(), Failure> {
+    if parquet::is_parquet(path) {
+        output::write_file(path, &parquet::bytes(table).map_err(|why| unreadable(path, &why))?)?;
+        return Ok(());
+    }
     let text = match path.extension().is_some_and(|e| e == "json") {
         true => {
             let columns = table.names.iter().enumerate().map(|(k, name)| {
