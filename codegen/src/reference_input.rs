@@ -412,7 +412,7 @@ impl Segments {
 
     fn at(&self, point: &Vector3<Dd>) -> (usize, Placed) {
         let s = self.along.dot(&(point - self.begin)).to_f64();
-        let inside = self.groups.iter().filter(|group| group.0 <= s).next_back();
+        let inside = self.groups.iter().rfind(|group| group.0 <= s);
         inside.map_or((0, Placed::here()), |(_, group, place)| (*group, *place))
     }
 }

@@ -356,3 +356,28 @@ fn a_contact_that_an_experiment_says_wrongly_has_its_place() {
     let right = write(&here, "right.toml", &format!("{belt}{elastic}[simulation]\nduration = 0.1\n"));
     succeeds(&["simulate", &robot, "--scene", &scene, "--input", &right]);
 }
+
+#[test]
+fn a_flexible_arm_swings_and_its_energy_is_accounted_for() {
+    let here = scratch("flexible");
+    let robot = format!("{ROBOTS}/descriptions/flexible_arm.toml");
+    let csv = here.join("swing.csv").display().to_string();
+    let example = format!("{ROBOTS}/experiments/flexible_arm_swing.toml");
+    let said = succeeds(&["simulate", &robot, "--input", &example, "--output", &csv]);
+    let line = said.lines().find(|l| l.starts_with("missing ")).unwrap_or_else(|| panic!("{said}"));
+    assert!(line.split_whitespace().nth(2).unwrap().parse::<f64>().unwrap() < 1e-6, "{said}");
+    let text = fs::read_to_string(&csv).unwrap();
+    let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let column = |name: &str| -> Vec<f64> {
+        let k = names.iter().position(|n| *n == name).unwrap_or_else(|| panic!("{name}"));
+        text.lines().skip(1).map(|row| row.split(',').nth(k).unwrap().parse().unwrap()).collect()
+    };
+    // nothing acts on elastic joints but their springs, and these bend
+    assert!(column("tau.forearm_bend_y1").iter().all(|tau| *tau == 0.0));
+    assert!(column("q.forearm_bend_y1").iter().any(|q| q.abs() > 1e-4));
+    let (errors, free) = (column("error.elbow"), column("tau.elbow"));
+    assert!(errors.iter().all(|e| e.abs() < 0.1) && free.iter().any(|tau| tau.abs() > 0.5), "{errors:?}");
+    // an analysis says what the straight links would have to bear, without limits of theirs
+    let said = succeeds(&["analyze", &robot, "--motion", &example]);
+    assert!(said.contains("forearm_bend_y1") && said.contains("within all limits"), "{said}");
+}

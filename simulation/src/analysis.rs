@@ -155,13 +155,19 @@ fn violations(model: &Model<f64>, motion: &Motion, joint: &Joint, j: usize, n: u
             _ => inverse_dynamics(model, &q, &qd, &qdd)[j],
         }
     };
+    // of a passive joint the effort is what its motion would take beside its spring
+    let effort = if model.bodies.iter().any(|b| b.joint.iv == joint.iv && b.is_passive()) {
+        f64::INFINITY
+    } else {
+        limits.effort
+    };
     let sides = [
         ("position", j, limits.upper, 1.0),
         ("position", j, limits.lower, -1.0),
         ("speed", n + j, limits.velocity, 1.0),
         ("speed", n + j, -limits.velocity, -1.0),
-        ("effort", 3 * n + j, limits.effort, 1.0),
-        ("effort", 3 * n + j, -limits.effort, -1.0),
+        ("effort", 3 * n + j, effort, 1.0),
+        ("effort", 3 * n + j, -effort, -1.0),
     ];
     let found = sides.into_iter().filter_map(|(what, column, limit, sign)| {
         let beyond = |y: f64| sign * (y - limit) > 1e-12 * limit.abs();

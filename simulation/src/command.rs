@@ -141,7 +141,7 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// Generalized forces \[N·m or N\] at time `t` \[s\] and state (q, q̇).
+    /// Generalized forces \[N·m or N\] at time `t` \[s\] and state (q, q̇); none on passive joints.
     pub fn torques(&self, t: f64, q: &[f64], qd: &[f64]) -> Vec<f64> {
         let (r, rd, rdd) = self.motion.at(t);
         let answer = self.answer((&r, &rd), (q, qd));
@@ -158,12 +158,20 @@ impl Controller {
                 tau[joint.iv] = tau[joint.iv].clamp(-most, most);
             }
         }
+        self.leave_passive(&mut tau);
         tau
     }
 
-    /// K e + D ė.
+    /// K e + D ė, of passive joints nothing.
     fn answer(&self, (r, rd): (&[f64], &[f64]), (q, qd): (&[f64], &[f64])) -> Vec<f64> {
-        (0..q.len()).map(|i| self.stiffness[i] * (r[i] - q[i]) + self.damping[i] * (rd[i] - qd[i])).collect()
+        let of = |i: usize| self.stiffness[i] * (r[i] - q[i]) + self.damping[i] * (rd[i] - qd[i]);
+        let mut answer = (0..q.len()).map(of).collect::<Vec<f64>>();
+        self.leave_passive(&mut answer);
+        answer
+    }
+
+    fn leave_passive(&self, forces: &mut [f64]) {
+        self.model.bodies.iter().filter(|b| b.is_passive()).for_each(|b| forces[b.joint.iv] = 0.0);
     }
 
     /// Inputs of the drives \[V or A\] at time `t` \[s\] and state (q, q̇, x): the inverse of robot and drives, dampers of elastic stages

@@ -202,6 +202,13 @@ impl<T: Real> Body<T> {
     }
 }
 
+impl Body<f64> {
+    /// Whether nothing drives its joint and a spring holds it: joints of flexible links and of elastic supports.
+    pub fn is_passive(&self) -> bool {
+        self.joint.limits.effort == 0.0 && self.effects.stiffness > 0.0
+    }
+}
+
 /// A named frame that outputs may be asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame<T> {
