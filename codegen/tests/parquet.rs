@@ -31,7 +31,8 @@ fn straightline(arguments: &[&str]) -> String {
 #[test]
 fn what_was_written_is_read_to_the_last_bit() {
     let names = ["t", "q.a", "an odd, \"name\""].map(str::to_string).to_vec();
-    let number = |i: usize, k: usize| (i as f64 + 0.1).sqrt() * 10f64.powi(k as i32 * 40 - 60) * if k == 1 { -1.0 } else { 1.0 };
+    let number =
+        |i: usize, k: usize| (i as f64 + 0.1).sqrt() * 10f64.powi(k as i32 * 40 - 60) * if k == 1 { -1.0 } else { 1.0 };
     let rows = (0..3000).map(|i| (0..3).map(|k| number(i, k)).collect()).collect();
     let (table, path) = (Table { names, rows }, scratch("bits.parquet"));
     fs::write(&path, bytes(&table).expect("it can be written")).expect("the file can be written");
@@ -42,7 +43,8 @@ fn what_was_written_is_read_to_the_last_bit() {
 fn a_run_in_parquet_is_the_run_in_csv_and_goes_back_into_an_analysis() {
     let path = |name: &str| scratch(name).display().to_string();
     let input = path("free.toml");
-    fs::write(&input, "[start]\nq = [0.3, -0.2]\n[simulation]\nduration = 0.2\nstop_at_limits = false\n").expect("written");
+    fs::write(&input, "[start]\nq = [0.3, -0.2]\n[simulation]\nduration = 0.2\nstop_at_limits = false\n")
+        .expect("written");
     let (csv, parquet) = (path("run.csv"), path("run.parquet"));
     for output in [&csv, &parquet] {
         assert_eq!(straightline(&["simulate", ROBOT, "--input", &input, "--output", output]), "");
