@@ -4,6 +4,8 @@
 //! more than [`Limits::operations`] is cut into parts, each at the place with the fewest values alive within reach of
 //! its size; values that cross a cut go through an array of reused slots.
 
+mod few_alive;
+
 use crate::expr::{Graph, NodeId, Op};
 
 /// How long one function may be.
@@ -59,9 +61,13 @@ fn weight(op: Op) -> usize {
     }
 }
 
-/// Orders and cuts a graph. Operations keep the order in which the algorithm wrote them.
+/// Orders and cuts a graph. Operations keep the order in which the algorithm wrote them, unless many values would go through
+/// memory; so do programs that are cut.
 pub fn schedule(graph: &Graph, limits: Limits) -> Schedule {
-    let order: Vec<NodeId> = graph.ids().filter(|id| is_value(graph.op(*id))).collect();
+    let mut order: Vec<NodeId> = graph.ids().filter(|id| is_value(graph.op(*id))).collect();
+    if order.iter().map(|id| weight(graph.op(*id))).sum::<usize>() <= limits.operations {
+        order = few_alive::improved(graph, order);
+    }
     let position = {
         let mut position = vec![usize::MAX; graph.ops.len()];
         order.iter().enumerate().for_each(|(p, id)| position[id.index()] = p);
