@@ -1,7 +1,9 @@
 //! The pipeline, as one function.
 
+use crate::certify::companion::Bits;
 use crate::certify::{self, Effort};
 use crate::choose::choose;
+use crate::contact;
 use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
 use crate::emit::{self, Item, Lanes, Provenance, Scalar, Style};
@@ -20,6 +22,7 @@ use crate::singular::singular_joints;
 use crate::staged::{self, staged};
 use crate::trace::trace;
 use std::collections::BTreeMap;
+use std::fmt::Write;
 use straightline_core::model::Model;
 use straightline_core::Dd;
 
@@ -379,8 +382,7 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
         programs.iter().map(|p| (p.function, Measures::of(p, options.scalar))).collect();
     budget::check(&whole, &frames, &measures, options, &mut diagnostics);
     let certificates = certificates(&robot, &programs, &resolved);
-    let bounds = programs.iter().map(|p| p.function).zip(&certificates);
-    budget::check_errors(bounds, &resolved, &mut diagnostics);
+    budget::check_errors(programs.iter().zip(&certificates), &resolved, &mut diagnostics);
     if diagnostics.has_errors() {
         diagnostics.sort();
         return Err(diagnostics);
@@ -445,8 +447,10 @@ fn generate(
         }
         let mut text = emit::function(graph, schedule, function.name(), &doc, options.plain_style(), &title);
         let figures = FunctionReport::new(&program, options.scalar, text.text.lines().count());
-        if let Some(bound) = companion(&robot, &frames, *function, graph, options) {
-            let bound = error_bound_text(&bound, *function, options);
+        if wants_companions(options) {
+            let bound = companion(&robot, *function, graph, options);
+            let by_residual = *function == Function::ForwardDynamics;
+            let bound = error_bound_text(bound, (function.name(), by_residual), graph, options);
             text.text.push('\n');
             text.text.push_str(&bound.text);
             text.uses_sin_cos |= bound.uses_sin_cos;
@@ -531,59 +535,93 @@ fn certificates(robot: &Robot, programs: &[Program], options: &Options) -> Vec<O
 /// A program in f32 gets f64 where its budget allows that and its greatest error takes it.
 fn mix_precisions(robot: &Robot, program: &mut Program, options: &Options) {
     let budget = options.scene.budgets.get(&program.function).filter(|b| b.mixed_precision);
-    let Some(most) = budget.and_then(|b| b.max_error) else { return };
-    if options.scalar != Scalar::F32 || options.fma || options.generic {
+    let Some(most) = budget.and_then(|b| b.max_error.as_ref()) else { return };
+    // fused and generic ones were refused with the options
+    if options.scalar != Scalar::F32 {
         return;
     }
+    // what does not fit is said where bounds are compared with the budget
+    let Ok(demand) = most.of_results(&program.graph.outputs) else { return };
     let stored: Vec<NodeId> = program.schedule.parts.iter().flat_map(|p| p.stores.iter().map(|(id, _)| *id)).collect();
-    let demand = vec![most; program.graph.results.len()];
     let inputs = certify::input_box(&program.graph.inputs, &options.scene, &robot.model);
     // what has no bound at all is refused where bounds are compared with the budget
     let widened = inputs.and_then(|inputs| certify::mixed::widened(&program.graph, &inputs, &demand, &stored));
     program.graph = widened.unwrap_or_else(|_| program.graph.clone());
 }
 
-/// The program that bounds a function's rounding errors at the state at hand, where it is asked for and there is one.
-/// Where a·b + c is one operation, values are other ones in every program.
-pub fn companion(
-    robot: &Robot,
-    frames: &[String],
-    function: Function,
-    graph: &Graph,
-    options: &Options,
-) -> Option<Graph> {
-    let is_plain = !options.fma && !options.generic && graph.widths.is_empty();
-    if !is_plain || !options.certify.is_some_and(|effort| effort.companions) {
-        return None;
+/// Whether programs for the bounds at the state at hand are asked for.
+pub fn wants_companions(options: &Options) -> bool {
+    options.certify.is_some_and(|effort| effort.companions)
+}
+
+/// Which bits the functions of these options compute.
+pub fn bits(options: &Options) -> Bits {
+    if options.fma {
+        Bits::Fused
+    } else {
+        Bits::Plain
     }
+}
+
+/// The program that bounds a function's rounding errors at the state at hand.
+///
+/// # Errors
+/// Why there is none.
+pub fn companion(robot: &Robot, function: Function, graph: &Graph, options: &Options) -> Result<Graph, &'static str> {
     let bound = match function {
         Function::ForwardDynamics => {
-            let of = |f: Function| optimised(robot, frames, f, options, options.optimisations());
-            let (inverse, mass_matrix) = (of(Function::InverseDynamics), of(Function::MassMatrix));
-            certify::companion::forward_dynamics_bound(graph, &inverse, &mass_matrix, options.scalar)
+            let (system, _) = contact::system(robot, options, &contact::Mode::alone(), options.optimisations());
+            certify::residual::acceleration_bound(&system, &[], options.scalar)
         }
-        _ => certify::companion::state_bound(graph, options.scalar),
+        _ => certify::companion::state_bound(graph, options.scalar, bits(options)),
     };
     bound.map(|graph| dead_code(&graph))
 }
 
-/// Its source.
-fn error_bound_text(bound: &Graph, function: Function, options: &Options) -> emit::FunctionText {
-    let name = function.name();
-    let mut doc = format!(
-        "How far the results of [`{name}`] can be from the exact values by rounding, at these inputs: proven for this state, whatever \
-         the ranges of the inputs.\n\nInputs below the normal numbers are to be given as zero where the machine reads them so."
-    );
-    if function == Function::ForwardDynamics {
-        doc = format!(
-            "How far the accelerations `qdd`, from [`{name}`] or wherever else, can be from the exact ones at these inputs: proven from \
-             the residual of the inverse dynamics.\n\n`smallest_eigenvalue`: what the smallest eigenvalue of the mass matrix is at least. \
-             Where rounding is too coarse for a proof, both are NaN."
+/// What a caller must know of a bound at a state.
+const OF_STATE: &str = "Inputs below the normal numbers are to be given as zero where the machine reads them so.";
+
+/// The source of `…_error_bound`, or a comment that says why there is none.
+pub(crate) fn error_bound_text(
+    bound: Result<Graph, &'static str>,
+    (name, by_residual): (&str, bool),
+    graph: &Graph,
+    options: &Options,
+) -> emit::FunctionText {
+    let scalar = match graph.widths.is_empty() {
+        true => options.scalar,
+        false => Scalar::F64,
+    };
+    let bound = match bound {
+        Ok(bound) => bound,
+        Err(why) => return emit::FunctionText::remark(&format!("No `{name}_error_bound`: {why}.")),
+    };
+    let mut doc = match by_residual {
+        false => format!(
+            "How far the results of [`{name}`] can be from the exact values by rounding, at these inputs: proven for this state, \
+             whatever the ranges of the inputs. NaN where nothing is proven: a divisor that may vanish, or a sign that may be wrong."
+        ),
+        true => format!(
+            "How far accelerations and reactions, from [`{name}`] or wherever else, can be from the exact ones at these inputs: \
+             proven from what they leave of the equations.\n\n`smallest_eigenvalue`: what the smallest eigenvalue of the mass matrix is \
+             at least. Where rounding is too coarse for a proof, the results that depend on it are NaN: ask `is_nan()` before use."
+        ),
+    };
+    if by_residual && bound.outputs.iter().any(|p| p.name == "smallest_contact_eigenvalue") {
+        doc.push_str(
+            " `smallest_contact_eigenvalue` is that of the inverse mass J H⁻¹ Jᵀ that reactions feel (where objects give way or contacts \
+             slide with friction, the smallest singular value of the matrix of reactions); redundant contacts have no proof.",
         );
     }
-    let schedule = schedule(bound, options.limits);
-    let style = Style::plain(options.scalar);
-    emit::function(bound, &schedule, &format!("{name}_error_bound"), &doc, style, &|_| String::new())
+    let _ = write!(doc, "\n\n{OF_STATE}");
+    if options.generic {
+        let _ = write!(doc, " Of [`{name}`] in `{}`.", scalar.name());
+    }
+    if !graph.widths.is_empty() {
+        doc.push_str(" In f64, of the function in f32: convert its inputs.");
+    }
+    let schedule = schedule(&bound, options.limits);
+    emit::function(&bound, &schedule, &format!("{name}_error_bound"), &doc, Style::plain(scalar), &|_| String::new())
 }
 
 /// The program of a parameter's constructor: from mass \[kg\], mass centre \[m\] and inertia about it \[kg·m²\] (xx, xy, xz,

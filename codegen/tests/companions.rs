@@ -36,7 +36,7 @@ fn case(file: &str, floating_base: bool, function: Function, scalar: Scalar, spe
     let plain = Optimisations { chosen: false, ..options.optimisations() };
     let graph = optimised(&robot, &[], function, &options, plain);
     let mass_matrix = optimised(&robot, &[], Function::MassMatrix, &options, plain);
-    let bound = companion(&robot, &[], function, &graph, &options).expect("the function has a companion");
+    let bound = companion(&robot, function, &graph, &options).expect("the function has a companion");
     let ranges = input_box(&graph.inputs, &scene, &robot.model).expect("every input has a range");
     Case { graph, bound, ranges, mass_matrix }
 }

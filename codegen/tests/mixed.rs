@@ -1,12 +1,13 @@
 //! Mixed precision: a demanded error is met with less than all operations in f64, and the text computes what was analysed.
 
+use straightline_codegen::certify::companion::{state_bound, Bits};
 use straightline_codegen::certify::{certify, input_box, mixed, search, Effort};
 use straightline_codegen::compile::{compile, program, Options};
 use straightline_codegen::emit::Scalar;
 use straightline_codegen::expr::Graph;
 use straightline_codegen::function::Robot;
 use straightline_codegen::model;
-use straightline_codegen::scene::{Budget, Interval as Range, JointRanges, Scene};
+use straightline_codegen::scene::{Budget, Interval as Range, JointRanges, MaxError, Scene};
 use straightline_codegen::{Function, Source};
 
 const FUNCTION: Function = Function::InverseDynamics;
@@ -20,7 +21,7 @@ fn options(max_error: f64) -> Options {
     let mut scene = Scene::default();
     scene.ranges.qd = JointRanges::All(Range::within(0.5));
     scene.ranges.qdd = JointRanges::All(Range::within(1.0));
-    let budget = Budget { max_error: Some(max_error), mixed_precision: true, ..Budget::default() };
+    let budget = Budget { max_error: Some(MaxError::All(max_error)), mixed_precision: true, ..Budget::default() };
     scene.budgets.insert(FUNCTION, budget);
     Options { scalar: Scalar::F32, functions: vec![FUNCTION], scene, ..Options::default() }
 }
@@ -59,14 +60,71 @@ fn a_demanded_error_is_met_with_less_than_all_operations_in_f64() {
     }
 }
 
-/// The worst error of the function in f32 alone.
-fn worst_in_single() -> f64 {
+/// Each result has a budget of its own: f64 goes where the tight one is, and what none meets is said result by result.
+#[test]
+fn a_budget_by_result_is_met_result_by_result() {
+    let single = errors_in_single();
+    let mut wanted: Vec<f64> = single.iter().map(|e| 2.0 * e).collect();
+    wanted[5] = 0.5 * single[5];
+    let by_result = |max_error: MaxError, mixed_precision: bool| {
+        let mut options = options(1.0);
+        let budget = Budget { max_error: Some(max_error), mixed_precision, ..Budget::default() };
+        options.scene.budgets.insert(FUNCTION, budget);
+        compile(&ur5(), &options)
+    };
+    let named = MaxError::Outputs(vec![("tau".to_string(), MaxError::Each(wanted.clone()))]);
+    let generated = by_result(named, true).unwrap_or_else(|e| panic!("{}", e.render()));
+    let errors = generated.report.functions["inverse_dynamics"].errors.as_ref().expect("errors were bounded");
+    assert!(errors.bounds().zip(&wanted).all(|(bound, most)| bound <= *most), "{errors:?}");
+    assert!(generated.text.contains("operations are in f64"), "nothing in f64");
+    let refused = by_result(MaxError::Each(wanted), false).expect_err("f32 alone does not meet it").render();
+    assert!(refused.contains("`tau[5]` of `inverse_dynamics` is bounded by"), "{refused}");
+    let two = single.iter().enumerate().map(|(k, e)| if k < 2 { 0.5 * e } else { 2.0 * e }).collect();
+    let refused = by_result(MaxError::Each(two), false).expect_err("f32 alone does not meet it").render();
+    assert!(refused.contains("2 results") && refused.contains("`tau[0]`") && refused.contains("`tau[1]`"), "{refused}");
+}
+
+/// The bound at a state is one of the program in mixed precision, not of one in f32.
+#[test]
+fn the_bound_at_a_state_knows_what_is_in_f64() {
     let options = options(1.0);
     let (loaded, complaints) = model::load(&ur5(), &options.model);
     let robot = Robot::new(loaded.unwrap_or_else(|| panic!("{}", complaints.render())));
     let graph = program(&robot, &[], FUNCTION, &options).graph;
     let ranges = input_box(&graph.inputs, &options.scene, &robot.model).expect("every input has a range");
-    certify(&graph, Scalar::F32, &ranges, Effort::default()).expect("no division").worst()
+    let demand: Vec<f64> = errors_in_single().iter().map(|e| 0.4 * e).collect();
+    let mixed = mixed::widened(&graph, &ranges, &demand, &[]).expect("no division");
+    let bound = state_bound(&mixed, Scalar::F32, Bits::Plain).expect("the program is short");
+    let of_single = state_bound(&graph, Scalar::F32, Bits::Plain).expect("the program is short");
+    let mut less = 0;
+    for seed in 0..20 {
+        for found in search::worst_found(&mixed, Scalar::F32, &ranges, 300, seed) {
+            let errors = search::errors_at(&mixed, Scalar::F32, &found.inputs);
+            let bounds = search::computed_at(&bound, Scalar::F64, &found.inputs);
+            let single = search::computed_at(&of_single, Scalar::F32, &found.inputs);
+            for k in 0..errors.len() {
+                assert!(errors[k] <= bounds[k], "tau[{k}]: {:e} > {:e} at {:?}", errors[k], bounds[k], found.inputs);
+                less += usize::from(bounds[k] < 0.8 * single[k]);
+            }
+        }
+    }
+    // of 20 seeds, six results and six states
+    assert!(less > 360, "{less}");
+}
+
+/// The errors of the function in f32 alone.
+fn errors_in_single() -> Vec<f64> {
+    let options = options(1.0);
+    let (loaded, complaints) = model::load(&ur5(), &options.model);
+    let robot = Robot::new(loaded.unwrap_or_else(|| panic!("{}", complaints.render())));
+    let graph = program(&robot, &[], FUNCTION, &options).graph;
+    let ranges = input_box(&graph.inputs, &options.scene, &robot.model).expect("every input has a range");
+    certify(&graph, Scalar::F32, &ranges, Effort::default()).expect("no division").errors
+}
+
+/// The worst error of the function in f32 alone.
+fn worst_in_single() -> f64 {
+    errors_in_single().into_iter().fold(0.0, f64::max)
 }
 
 /// The generated text, compiled and run, gives the bits that the analysis is about.

@@ -42,6 +42,7 @@ fn said_of(code: &str) -> Diagnostics {
     match code {
         "said-twice" => options.model.gravity = Some([0.0, 0.0, -1.62]),
         "base-locked" => options.model.floating_base = true,
+        "mixed-elsewhere" => options.generic = true,
         _ => {}
     }
     let robot = Source::new("arm.toml", ARM);

@@ -2,6 +2,7 @@
 
 use crate::scene::InlineScene;
 use std::str::FromStr;
+use straightline_codegen::certify::Effort;
 use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::{Function, Options};
 use syn::parse::{Parse, ParseStream};
@@ -71,6 +72,17 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         "floating_base" => options.model.floating_base = true,
         "certify" => drop(options.certify.get_or_insert_default()),
         "certify_state" => options.certify.get_or_insert_default().companions = true,
+        "certify_boxes" => options.certify.get_or_insert_default().boxes = count(input, Effort::MOST_BOXES)?,
+        "certify_seconds" => {
+            let given = value::<Lit>(input)?;
+            let seconds = number(&given)?;
+            if !(seconds > 0.0 && seconds <= Effort::MOST_SECONDS) {
+                return Err(Error::new(given.span(), format!("seconds, above 0 and up to {}", Effort::MOST_SECONDS)));
+            }
+            let effort = options.certify.get_or_insert_default();
+            let boxes = (effort.boxes > 1).then_some(effort.boxes);
+            *effort = Effort::new(boxes, Some(seconds), effort.companions);
+        }
         "scalar" => options.scalar = word(input)?,
         "scalars" => {
             let scalars: Result<Vec<Scalar>> =
@@ -102,7 +114,7 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         }
         other => {
             let known =
-                "floating_base, certify, certify_state, scalar, scalars, lanes, fma, generic, rules, forward_dynamics, \
+                "floating_base, certify, certify_boxes, certify_seconds, certify_state, scalar, scalars, lanes, fma, generic, rules, forward_dynamics, \
                          max_part_operations, \
                          angle_tolerance, \
                          functions, frames, joint_order, gravity, scene, module";
@@ -116,6 +128,16 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
 fn value<T: Parse>(input: ParseStream) -> Result<T> {
     input.parse::<Token![=]>()?;
     input.parse()
+}
+
+/// ` = 40`, from 1.
+fn count(input: ParseStream, most: usize) -> Result<usize> {
+    let literal: LitInt = value(input)?;
+    let count: usize = literal.base10_parse()?;
+    match (1..=most).contains(&count) {
+        true => Ok(count),
+        false => Err(Error::new(literal.span(), format!("a number between 1 and {most}"))),
+    }
 }
 
 /// `(a, b, c)`

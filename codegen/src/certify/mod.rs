@@ -26,20 +26,24 @@
 //! adjoints g and errors e of one vector, Σ |g_i| |e_i| ≤ ‖g‖ ‖e‖ (Cauchy-Schwarz), and for two products x c, y s of one adjoint
 //! |x c| + |y s| ≤ ‖(x, y)‖ ‖(c, s)‖, so that their errors are at most u times that together. The least of what applies is taken.
 //!
-//! **5. Subdivision.** A bound for a box is the greatest of the bounds of boxes that cover it ([`Effort::boxes`]).
+//! **5. Subdivision.** A bound for a box is the greatest of the bounds of boxes that cover it ([`Effort::boxes`], [`Effort::time`]).
 //!
 //! Programs with a division have a bound where the divisor stays off zero in the box; where it may not, as in forward
-//! dynamics, there is none: [`Refusal`]. There, and for the state at hand, generated programs bound the error: [`companion`]. A bound also proves that no value overflows and none is NaN. Coulomb friction takes the sign of a
+//! dynamics, there is none: [`Refusal`]. There, and for the state at hand, generated programs bound the error: [`companion`], [`residual`]. A bound also proves that no value overflows and none is NaN. Coulomb friction takes the sign of a
 //! speed as it is given: where subnormal numbers are read as zero, so is the sign of a subnormal speed.
 
 pub mod analysis;
 mod cancel;
 pub mod companion;
+mod congruence;
 pub mod format;
 pub mod forms;
 pub mod interval;
 pub mod mixed;
 pub mod norms;
+mod reactions;
+pub mod residual;
+mod running;
 pub mod search;
 mod subdivision;
 #[cfg(test)]
@@ -52,6 +56,7 @@ pub use interval::Interval;
 use crate::emit::Scalar;
 use crate::expr::{Graph, Port};
 use crate::scene::Scene;
+use std::time::Duration;
 use straightline_core::model::{JointKind, Model};
 
 /// How much is spent on a bound.
@@ -59,13 +64,32 @@ use straightline_core::model::{JointKind, Model};
 pub struct Effort {
     /// Boxes that each result's box is cut into at most; 1: the box as it is.
     pub boxes: usize,
+    /// How long cutting may take, for all results of a function together; none: as long as it takes. Bounds then differ from run to run, and
+    /// from machine to machine; all of them hold.
+    pub time: Option<Duration>,
     /// Whether functions for the bound at the state at hand are generated too: [`companion`].
     pub companions: bool,
 }
 
 impl Default for Effort {
     fn default() -> Self {
-        Effort { boxes: 1, companions: false }
+        Effort { boxes: 1, time: None, companions: false }
+    }
+}
+
+impl Effort {
+    /// So many boxes are enough for anyone.
+    pub const MOST_BOXES: usize = 100_000;
+    /// So many seconds, too.
+    pub const MOST_SECONDS: f64 = 86_400.0;
+
+    /// So many boxes, or, where a time \[s\] alone is given, as many as it allows.
+    ///
+    /// # Panics
+    /// If the time is no number from 0 to [`Effort::MOST_SECONDS`].
+    pub fn new(boxes: Option<usize>, seconds: Option<f64>, companions: bool) -> Self {
+        let unlimited = if seconds.is_some() { Self::MOST_BOXES } else { 1 };
+        Effort { boxes: boxes.unwrap_or(unlimited), time: seconds.map(Duration::from_secs_f64), companions }
     }
 }
 

@@ -1,8 +1,9 @@
 //! Branch and bound: the box of a result is cut where the bound is greatest. The same number of boxes gives the same bound on
-//! every machine.
+//! every machine; a time does not.
 
 use super::{Analysis, Effort, Interval, Refusal};
 use crate::expr::NodeId;
+use std::time::Instant;
 
 /// A part of the box, and the bound of the error there.
 struct Part {
@@ -25,15 +26,24 @@ pub(super) fn bounds(
         .map(|k| (analysis.result(k), analysis.error(k), analysis.range(analysis.result(k)).mag()))
         .collect();
     if effort.boxes > 1 {
+        let (start, count) = (Instant::now(), results.len() as u32);
         for k in results {
-            all[k].1 = all[k].1.min(refined(analysis, inputs, k, effort.boxes)?);
+            let until = effort.time.map(|time| start + time * (k as u32 + 1) / count);
+            all[k].1 = all[k].1.min(refined(analysis, inputs, k, effort.boxes, until)?);
         }
     }
     Ok(all)
 }
 
-/// The bound of one result from so many boxes.
-fn refined(analysis: &mut Analysis, inputs: &[Interval], k: usize, boxes: usize) -> Result<f64, Refusal> {
+/// The bound of one result from so many boxes, or from those that there was time for.
+fn refined(
+    analysis: &mut Analysis,
+    inputs: &[Interval],
+    k: usize,
+    boxes: usize,
+    until: Option<Instant>,
+) -> Result<f64, Refusal> {
+    let is_late = || until.is_some_and(|until| Instant::now() >= until);
     let candidates: Vec<usize> =
         analysis.inputs_of(k).into_iter().filter(|i| inputs[*i].width() > f64::MIN_POSITIVE).collect();
     let mut bound = |ranges: &[Interval]| -> Result<f64, Refusal> {
@@ -44,6 +54,9 @@ fn refined(analysis: &mut Analysis, inputs: &[Interval], k: usize, boxes: usize)
     // what a quarter of each range gains: halves of symmetric ranges have equal magnitudes
     let mut gains = Vec::with_capacity(candidates.len());
     for &i in &candidates {
+        if is_late() {
+            return Ok(whole);
+        }
         let mut worst = 0.0f64;
         for quarter in 0..4 {
             let mut ranges = inputs.to_vec();
@@ -55,7 +68,7 @@ fn refined(analysis: &mut Analysis, inputs: &[Interval], k: usize, boxes: usize)
         gains.push(whole - worst);
     }
     let mut parts = vec![Part { ranges: inputs.to_vec(), error: whole, cuts: vec![0; candidates.len()] }];
-    while parts.len() < boxes {
+    while parts.len() < boxes && !is_late() {
         // the worst part, cut along the input of the greatest gain; each cut in it halves what is left to gain
         let worst =
             (0..parts.len()).max_by(|a, b| parts[*a].error.total_cmp(&parts[*b].error)).expect("there is a part");

@@ -26,6 +26,54 @@ struct Traced<'a> {
     environment: Option<Environment<Expr>>,
 }
 
+/// What is left of the equations at a given q̈ and F, with H, J, the rows in which reactions act, and the masses of yielding rows; one list
+/// per output of [`residual::OUTPUTS`](crate::certify::residual::OUTPUTS).
+pub(super) fn system(
+    robot: &Robot,
+    options: &Options,
+    mode: &Mode,
+    bound: &Bound,
+    added: &Added,
+    (qdd, force): (&[Expr], &[Expr]),
+) -> Vec<Vec<Expr>> {
+    let (q, qd, tau) = (&bound.arguments[0], &bound.arguments[1], &bound.arguments[2]);
+    let reduced = options.optimisations().reduced;
+    let traced = contacts(robot, mode, bound, added, reduced);
+    let constrained = traced.iter().fold(FunctionalCoordinates::default(), |all, t| all.and(t.constrained.clone()));
+    let applied: Vec<Vec<Expr>> =
+        traced.iter().flat_map(|t| alg::applied_rows(&t.contact, &t.motion, &t.constrained)).collect();
+    let (supports, _) = supports(&traced, &constrained, options, added);
+    let inverse = of_robot(bound, reduced, Function::InverseDynamics, &[q.clone(), qd.clone(), qdd.to_vec()]);
+    let mass_matrix = of_robot(bound, reduced, Function::MassMatrix, std::slice::from_ref(q));
+    let residual = (0..inverse.len()).map(|i| {
+        let driven = applied.iter().zip(force).fold(tau[i], |sum, (row, f)| sum + row[i] * *f);
+        driven - inverse[i]
+    });
+    let rows = constrained.jacobian.iter().zip(&constrained.bias).zip(&supports).zip(force);
+    let missing = rows.map(|(((row, bias), support), force)| {
+        let sdd = row.iter().zip(qdd).fold(*bias, |sum, (j, x)| sum + *j * *x);
+        match *support {
+            Support::Rigid(wanted) => wanted - sdd,
+            Support::Yielding { mass, load } => -(load + mass * sdd + *force),
+        }
+    });
+    let masses = supports.iter().map(|support| match *support {
+        Support::Rigid(_) => Expr::zero(),
+        Support::Yielding { mass, .. } => mass,
+    });
+    let (residual, missing, masses) = (residual.collect(), missing.collect(), masses.collect());
+    vec![residual, missing, mass_matrix, constrained.jacobian.concat(), applied.concat(), masses]
+}
+
+/// A function of the robot over these arguments, by its reduced form where it has one.
+fn of_robot(bound: &Bound, reduced: bool, function: Function, arguments: &[Vec<Expr>]) -> Vec<Expr> {
+    let method = ForwardDynamicsMethod::Factorisation;
+    let Bound { model, reduced: for_torques, composite, .. } = bound;
+    let by_reduced =
+        reduced.then(|| function.evaluate_reduced(model, for_torques, composite, method, arguments)).flatten();
+    by_reduced.unwrap_or_else(|| function.evaluate(model, &[], method, arguments))
+}
+
 /// The results of a function, one list per output.
 pub(super) fn equations(
     robot: &Robot,
@@ -44,13 +92,7 @@ pub(super) fn equations(
             traced.iter().filter_map(|t| Some(alg::functional_coordinates(&t.contact, &t.motion, &t.closed?.free)));
         parts.fold(FunctionalCoordinates::default(), FunctionalCoordinates::and)
     };
-    let of_robot = |function: Function, arguments: &[Vec<Expr>]| {
-        let method = ForwardDynamicsMethod::Factorisation;
-        let Bound { model, reduced: for_torques, composite, .. } = bound;
-        let by_reduced =
-            reduced.then(|| function.evaluate_reduced(model, for_torques, composite, method, arguments)).flatten();
-        by_reduced.unwrap_or_else(|| function.evaluate(model, &[], method, arguments))
-    };
+    let of_robot = |function: Function, arguments: &[Vec<Expr>]| of_robot(bound, reduced, function, arguments);
     let mass_matrix = || of_robot(Function::MassMatrix, std::slice::from_ref(q));
     let factor = || Ltdl::factor(&bound.model, &mass_matrix());
     // rotors of rigid drives are struck, too
@@ -69,35 +111,7 @@ pub(super) fn equations(
         ContactFunction::FreeCoordinates => list(free()),
         ContactFunction::ForwardDynamics | ContactFunction::DrivenForwardDynamics => {
             let bias = of_robot(Function::BiasForce, &[q.clone(), qd.clone()]);
-            let stabilised = match options.scene.contacts.stabilisation {
-                Some((frequency, damping)) => {
-                    let [frequency, damping] = [frequency, damping].map(|x| Expr::constant(Dd::from(x)));
-                    let pulled =
-                        FunctionalCoordinates { value: deviations(&traced, &constrained), ..constrained.clone() };
-                    alg::baumgarte(&pulled, frequency, damping)
-                }
-                None => vec![Expr::zero(); constrained.len()],
-            };
-            let mut supports: Vec<Support<Expr>> = stabilised.into_iter().map(Support::Rigid).collect();
-            let mut own_rates = Vec::new();
-            let mut first = 0;
-            for t in &traced {
-                if let (Some(environment), Some(closed)) = (&t.environment, t.closed) {
-                    let k = distance_row(&closed.constrained);
-                    let s = (t.constrained.value[k], t.constrained.rate[k]);
-                    let own = match environment.has_own_coordinate() {
-                        true => {
-                            let own = &added[&format!("{}_own", closed.item.identifier())];
-                            let rates = environment.motion(s, (own[0], own[1]));
-                            own_rates.push(vec![rates.velocity, rates.acceleration]);
-                            (own[0], own[1])
-                        }
-                        false => (Expr::zero(), Expr::zero()),
-                    };
-                    supports[first + k] = environment.support(s, own);
-                }
-                first += t.constrained.len();
-            }
+            let (supports, own_rates) = supports(&traced, &constrained, options, added);
             let applied = applied();
             let (motion, xd) = if function == ContactFunction::DrivenForwardDynamics {
                 let at = (&q[..], &qd[..], &bound.arguments[2][..], &bound.arguments[3][..]);
@@ -186,6 +200,44 @@ pub(super) fn equations(
             vec![correction, constrained.value]
         }
     }
+}
+
+/// What the rows stand on, and the rates of the objects' own coordinates.
+fn supports(
+    traced: &[Traced],
+    constrained: &FunctionalCoordinates<Expr>,
+    options: &Options,
+    added: &Added,
+) -> (Vec<Support<Expr>>, Vec<Vec<Expr>>) {
+    let stabilised = match options.scene.contacts.stabilisation {
+        Some((frequency, damping)) => {
+            let [frequency, damping] = [frequency, damping].map(|x| Expr::constant(Dd::from(x)));
+            let pulled = FunctionalCoordinates { value: deviations(traced, constrained), ..constrained.clone() };
+            alg::baumgarte(&pulled, frequency, damping)
+        }
+        None => vec![Expr::zero(); constrained.len()],
+    };
+    let mut supports: Vec<Support<Expr>> = stabilised.into_iter().map(Support::Rigid).collect();
+    let mut own_rates = Vec::new();
+    let mut first = 0;
+    for t in traced {
+        if let (Some(environment), Some(closed)) = (&t.environment, t.closed) {
+            let k = distance_row(&closed.constrained);
+            let s = (t.constrained.value[k], t.constrained.rate[k]);
+            let own = match environment.has_own_coordinate() {
+                true => {
+                    let own = &added[&format!("{}_own", closed.item.identifier())];
+                    let rates = environment.motion(s, (own[0], own[1]));
+                    own_rates.push(vec![rates.velocity, rates.acceleration]);
+                    (own[0], own[1])
+                }
+                false => (Expr::zero(), Expr::zero()),
+            };
+            supports[first + k] = environment.support(s, own);
+        }
+        first += t.constrained.len();
+    }
+    (supports, own_rates)
 }
 
 /// How far the rows are from where they are held: what sticks is held where that has happened, which is not known here, so that

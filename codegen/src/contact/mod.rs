@@ -7,6 +7,7 @@
 mod equations;
 mod text;
 
+use crate::certify::residual::OUTPUTS;
 use crate::choose::choose;
 use crate::compile::{Forms, Optimisations, Options};
 use crate::emit::{snake_case, Scalar};
@@ -76,6 +77,11 @@ impl<'a> Mode<'a> {
         contacts.all_modes().into_iter().map(mode).collect()
     }
 
+    /// The robot alone.
+    pub fn alone() -> Mode<'static> {
+        Mode { identifier: String::new(), name: String::new(), contacts: Vec::new(), loops: &[] }
+    }
+
     /// Constrained coordinates as `contact.pz`.
     pub fn constrained_names(&self) -> Vec<String> {
         let of_contacts =
@@ -128,13 +134,7 @@ pub fn graph(robot: &Robot, options: &Options, mode: &Mode, function: ContactFun
         verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
         graph
     };
-    let factorised = Options { forward_dynamics: ForwardDynamicsMethod::Factorisation, ..options.clone() };
-    let chosen = (optimisations.chosen && optimisations.reduced).then(|| {
-        // contact frames are described in the frames that any robot takes
-        let forms = Forms { origins: false, tips: false, ..optimisations.forms };
-        let optimisations = Optimisations { chosen: false, forms, ..optimisations };
-        choose(robot, &[], Function::ForwardDynamics, &factorised, optimisations)
-    });
+    let chosen = chosen(robot, options);
     let robot = chosen.as_ref().unwrap_or(robot);
     let base = base_function(function);
     let own = options.scene.ports(base, &robot.model);
@@ -158,6 +158,56 @@ pub fn graph(robot: &Robot, options: &Options, mode: &Mode, function: ContactFun
         true => check(dead_code(&check(sums(&graph)))),
         false => graph,
     }
+}
+
+/// The robot in the form that takes the fewest operations, of those in which contacts can be described.
+fn chosen(robot: &Robot, options: &Options) -> Option<Robot> {
+    let optimisations = options.optimisations();
+    let factorised = Options { forward_dynamics: ForwardDynamicsMethod::Factorisation, ..options.clone() };
+    (optimisations.chosen && optimisations.reduced).then(|| {
+        // contact frames are described in the frames that any robot takes
+        let forms = Forms { origins: false, tips: false, ..optimisations.forms };
+        let optimisations = Optimisations { chosen: false, forms, ..optimisations };
+        choose(robot, &[], Function::ForwardDynamics, &factorised, optimisations)
+    })
+}
+
+/// What is left of the equations of a mode at a given `qdd` and, if it has contacts, `force`: what
+/// [`acceleration_bound`](crate::certify::residual::acceleration_bound) takes, with the flags of rows that yield. The other inputs are those of
+/// forward dynamics. A mode without contacts is the robot alone.
+pub fn system(robot: &Robot, options: &Options, mode: &Mode, optimisations: Optimisations) -> (Graph, Vec<bool>) {
+    let chosen = optimisations.chosen.then(|| chosen(robot, options)).flatten();
+    let robot = chosen.as_ref().unwrap_or(robot);
+    let (nv, m) = (robot.model.nv(), mode.constrained_names().len());
+    let own = options.scene.ports(Function::ForwardDynamics, &robot.model);
+    let added = added_ports(ContactFunction::ForwardDynamics, mode, &robot.model);
+    let names: Vec<String> = added.iter().map(|p| p.name.clone()).collect();
+    let solution = [Port::new("qdd", &[nv]), Port::new("force", &[m])];
+    let solution = solution.into_iter().filter(|p| !p.is_empty());
+    let inputs: Vec<Port> = own.iter().cloned().chain(added).chain(solution).collect();
+    let shapes = [vec![nv], vec![m], vec![nv, nv], vec![m, nv], vec![m, nv], vec![m]];
+    let outputs: Vec<Port> = OUTPUTS.iter().zip(&shapes).map(|(name, shape)| Port::new(name, shape)).collect();
+    let mut yielding = Vec::new();
+    let traced = trace(options.rules(), inputs, outputs, |inputs| {
+        let (given, rest) = inputs.split_at(own.len());
+        let (added, solution) = rest.split_at(names.len());
+        let given = options.scene.bind(Function::ForwardDynamics, robot, given);
+        let added = names.iter().cloned().zip(added.iter().cloned()).collect();
+        let force = solution.get(1).map_or(&[][..], |f| &f[..]);
+        equations::system(robot, options, mode, &given, &added, (&solution[0], force)).concat()
+    });
+    for closed in &mode.contacts {
+        let gives_way = closed.item.environment.is_some();
+        yielding.extend(closed.constrained.iter().map(|c| gives_way && *c == Coordinate::Pz));
+    }
+    yielding.resize(m, false);
+    let unused = |port: &Port| is_optional(port) || port.name == "qd" || names.contains(&port.name);
+    let graph = unread_inputs(dead_code(&traced), unused);
+    let graph = if optimisations.sums { dead_code(&sums(&graph)) } else { graph };
+    (
+        verify(&graph).map(|()| graph).unwrap_or_else(|broken| panic!("system: a pass broke the graph: {broken}")),
+        yielding,
+    )
 }
 
 /// The function of the robot whose inputs a contact function has.

@@ -1,10 +1,13 @@
 //! The module `contact` as text.
 
-use super::{programs, Mode, ModeProgram};
-use crate::compile::Options;
+use super::{programs, system, Mode, ModeProgram};
+use crate::certify::companion::{state_bound, Bits};
+use crate::certify::residual::acceleration_bound;
+use crate::compile::{error_bound_text, wants_companions, Options};
 use crate::emit::{self, array_type, upper_camel_case, Style};
-use crate::expr::{Port, Section};
+use crate::expr::{Graph, Port, Section};
 use crate::function::Robot;
+use crate::pass::dead_code;
 use crate::report::ContactReport;
 use crate::scene::ContactFunction;
 use crate::schedule::schedule;
@@ -38,6 +41,14 @@ pub fn module(robot: &Robot, options: &Options, title: &dyn Fn(Section) -> Strin
             kernel |= source.calls_kernel();
             text.push('\n');
             text.push_str(&source.text);
+            if wants_companions(options) {
+                let by_residual = *function == ContactFunction::ForwardDynamics;
+                let bound = bound(robot, options, mode, *function, graph);
+                let bound = error_bound_text(bound, (function.name(), by_residual), graph, options);
+                kernel |= bound.calls_kernel();
+                text.push('\n');
+                text.push_str(&bound.text);
+            }
             wrappers.extend(graph.inputs.iter().filter_map(|p| p.wrapper.clone()));
             reports.push(ContactReport::new(&mode.identifier, function.name(), counts));
         }
@@ -64,6 +75,24 @@ pub fn module(robot: &Robot, options: &Options, title: &dyn Fn(Section) -> Strin
     indent(&mut out, &inner);
     out.push_str("}\n");
     (out, reports)
+}
+
+/// The program that bounds the errors of a contact function at the state at hand.
+fn bound(
+    robot: &Robot,
+    options: &Options,
+    mode: &Mode,
+    function: ContactFunction,
+    graph: &Graph,
+) -> Result<Graph, &'static str> {
+    let bound = match function {
+        ContactFunction::ForwardDynamics => {
+            let (system, yielding) = system(robot, options, mode, options.optimisations());
+            acceleration_bound(&system, &yielding, options.scalar)
+        }
+        _ => state_bound(graph, options.scalar, Bits::Plain),
+    };
+    bound.map(|graph| dead_code(&graph))
 }
 
 fn indent(out: &mut String, text: &str) {

@@ -138,7 +138,7 @@ impl Reader<'_> {
         self.complain(span, messages::wrong_type(what, expected, &type_name(value)));
     }
 
-    fn real(&mut self, what: &str, value: &DeValue, span: &Span, range: Range64) -> Option<f64> {
+    pub(crate) fn real(&mut self, what: &str, value: &DeValue, span: &Span, range: Range64) -> Option<f64> {
         match value {
             DeValue::Float(float) => self.number(what, float.as_str(), span, range),
             DeValue::Integer(integer) if integer.radix() == 10 => self.number(what, integer.as_str(), span, range),

@@ -30,6 +30,11 @@ impl FunctionText {
         FunctionText { text: String::new(), uses_sin_cos: false, uses_sqrt: false }
     }
 
+    /// A comment in the place of a function.
+    pub fn remark(text: &str) -> Self {
+        FunctionText { text: format!("// {text}\n"), ..FunctionText::new() }
+    }
+
     /// Whether it needs [`super::kernel`] as a module `trig`.
     pub fn calls_kernel(&self) -> bool {
         self.uses_sin_cos || self.uses_sqrt

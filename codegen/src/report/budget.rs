@@ -4,11 +4,11 @@ use super::errors::ErrorReport;
 use super::waterfall::robot_in;
 use crate::compile::{program, Options, Program};
 use crate::diagnostic::Diagnostics;
-use crate::emit::Scalar;
+use crate::emit::{element_of, Scalar};
 use crate::expr::{NodeId, Op};
 use crate::function::Function;
 use crate::scene::messages as say;
-use crate::scene::{Budget, Coulomb, Effects, Gravity, Scene, Zero};
+use crate::scene::{Budget, Coulomb, Effects, Gravity, MaxError, Misfit, Scene, Zero};
 use std::collections::BTreeMap;
 use straightline_core::model::{JointKind, Model};
 use straightline_core::Dd;
@@ -147,19 +147,38 @@ pub fn check(
 
 /// Complains of every bound of rounding errors that is greater than the scene allows, and of demanded bounds that do not exist.
 pub fn check_errors<'a>(
-    bounds: impl Iterator<Item = (Function, &'a Option<ErrorReport>)>,
+    bounds: impl Iterator<Item = (&'a Program, &'a Option<ErrorReport>)>,
     options: &Options,
     diagnostics: &mut Diagnostics,
 ) {
-    for (function, errors) in bounds {
-        let (budget, name) = (options.scene.budgets.get(&function), function.name());
-        let (Some(most), Some(errors)) = (budget.and_then(|b| b.max_error), errors) else { continue };
-        let complaint = match (errors.refused, errors.worst()) {
-            (Some(why), _) => say::error_unbounded(name, why),
-            (None, Some((bound, result))) if bound > most => say::error_over_budget(name, &result, bound, most),
-            _ => continue,
+    for (program, errors) in bounds {
+        let (budget, name) = (options.scene.budgets.get(&program.function), program.function.name());
+        let (Some(most), Some(errors)) = (budget.and_then(|b| b.max_error.as_ref()), errors) else { continue };
+        let path = format!("budget.{name}.max_error");
+        let outputs = &program.graph.outputs;
+        let demand = match most.of_results(outputs) {
+            Ok(demand) => demand,
+            Err(misfit) => {
+                let Misfit { output, complaint } = *misfit;
+                let path = output.map_or(path.clone(), |output| format!("{path}.{output}"));
+                options.scene.places.complain(&path, complaint, diagnostics);
+                continue;
+            }
         };
-        options.scene.places.complain(&format!("budget.{name}.max_error"), complaint, diagnostics);
+        let beyond = errors.bounds().zip(&demand).enumerate().filter(|(_, (bound, most))| bound > *most);
+        let mut beyond: Vec<(String, f64, f64)> =
+            beyond.map(|(k, (bound, most))| (element_of(outputs, k), bound, *most)).collect();
+        if *most == MaxError::All(demand.first().copied().unwrap_or_default()) {
+            // the worst of all
+            let worst = beyond.iter().max_by(|a, b| a.1.total_cmp(&b.1)).cloned();
+            beyond = worst.into_iter().collect();
+        }
+        let complaint = match errors.refused {
+            Some(why) => say::error_unbounded(name, why),
+            None if !beyond.is_empty() => say::error_over_budget(name, &beyond),
+            None => continue,
+        };
+        options.scene.places.complain(&path, complaint, diagnostics);
     }
 }
 

@@ -54,12 +54,9 @@ impl ErrorReport {
         ErrorReport { ranges: Vec::new(), outputs: Vec::new(), refused: Some(refusal.words()) }
     }
 
-    /// The greatest bound, its output, and the greatest absolute value of that output.
-    pub fn worst(&self) -> Option<(f64, String)> {
-        let all = self.outputs.iter().flat_map(|o| o.bounds.iter().enumerate().map(move |(k, e)| (*e, o, k)));
-        let (error, output, k) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let port = Port::new(&output.name, &output.shape);
-        Some((error, crate::emit::element(&port, k)))
+    /// The bounds of all results, in their order.
+    pub fn bounds(&self) -> impl Iterator<Item = f64> + '_ {
+        self.outputs.iter().flat_map(|o| o.bounds.iter().copied())
     }
 
     /// The constants of a function in the generated file.

@@ -147,6 +147,14 @@ pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
     if scene.base == Base::Moving && options.functions.iter().any(|f| f.is_forward()) {
         scene.places.complain("hold.base", say::moving_base_forward(), diagnostics);
     }
+    for (function, _) in scene.budgets.iter().filter(|(_, b)| b.mixed_precision) {
+        let path = format!("budget.{}.mixed_precision", function.name());
+        for (with, is_asked) in [("`fma`", options.fma), ("`generic`", options.generic)] {
+            if is_asked {
+                scene.places.complain(&path, say::mixed_elsewhere(with), diagnostics);
+            }
+        }
+    }
     // of a file this was said when it was read, whatever functions of it are asked for
     let is_alone = |function: &&Function| scene.places.source().is_none() && !options.functions.contains(function);
     for function in scene.budgets.keys().filter(is_alone) {

@@ -27,6 +27,9 @@ pub const CODES: &[&str] = &[
     "coulomb-speed-alone",
     "budget-alone",
     "mixed-alone",
+    "mixed-elsewhere",
+    "error-budget-output",
+    "error-budget-count",
     "over-budget",
     "error-over-budget",
     "error-unbounded",
@@ -217,12 +220,47 @@ pub fn mixed_alone() -> D {
         .help("write the error that is demanded, such as `max_error = 1e-3`, or remove it")
 }
 
-/// A bound of rounding errors that is greater than it may be.
-pub fn error_over_budget(function: &str, result: &str, bound: f64, most: f64) -> D {
-    let title =
-        format!("the rounding error of `{result}` of `{function}` is bounded by {bound:.3e}, the budget is {most:e}");
-    D::error("error-over-budget", title)
-        .help("what makes it less: narrower `[numbers.ranges]`, `scalar = \"f64\"`, more boxes (`--certify-boxes`)")
+/// Mixed precision where functions cannot have it.
+pub fn mixed_elsewhere(with: &str) -> D {
+    D::error("mixed-elsewhere", format!("`mixed_precision` together with {with}"))
+        .detail("it computes parts of functions in f32 in f64, operation by operation")
+        .help(format!("choose one of the two: remove `mixed_precision`, or {with}"))
+}
+
+/// A budget of errors for what is no output.
+pub fn error_budget_output<'a>(output: &str, known: impl IntoIterator<Item = &'a str>) -> D {
+    let d = D::error("error-budget-output", format!("`max_error` of `{output}`, which is no output of the function"));
+    hinted(d, output, known)
+}
+
+/// A budget of errors with too many numbers, or too few.
+pub fn error_budget_count(outputs: &[&str], found: usize, wanted: usize) -> D {
+    let title = format!("`max_error` has {found} numbers, `{}` has {wanted}", outputs.join("`, `"));
+    D::error("error-budget-count", title)
+        .help("write one number for all, one per result, or `{ output = .. }` with either of them")
+}
+
+/// Bounds of rounding errors that are greater than they may be: each result, its bound, and its budget.
+pub fn error_over_budget(function: &str, results: &[(String, f64, f64)]) -> D {
+    let title = match results {
+        [(result, bound, most)] => {
+            format!(
+                "the rounding error of `{result}` of `{function}` is bounded by {bound:.3e}, the budget is {most:e}"
+            )
+        }
+        _ => format!(
+            "the rounding errors of {} results of `{function}` are bounded by more than their budgets",
+            results.len()
+        ),
+    };
+    let line = |(result, bound, most): &(String, f64, f64)| format!("`{result}` {bound:.3e} > {most:e}");
+    let lines: Vec<String> = results.iter().map(line).collect();
+    let d = D::error("error-over-budget", title);
+    let d = if lines.len() > 1 { d.detail(lines.join(", ")) } else { d };
+    d.help(
+        "what makes it less: narrower `[numbers.ranges]`, `scalar = \"f64\"`, more boxes (`certify_boxes` or \
+               `certify_seconds` in [numbers])",
+    )
 }
 
 /// Rounding errors that have no bound, where one is demanded.

@@ -24,6 +24,8 @@ pub use read::{read, read_partly, SceneFile, LISTS};
 
 use crate::description::drives::Drive;
 use crate::description::flexible::{Flexible, Support};
+use crate::diagnostic::Diagnostic;
+use crate::expr::Port;
 use crate::function::Function;
 use crate::model::ModelOptions;
 use std::collections::BTreeMap;
@@ -270,8 +272,61 @@ impl Parameter {
     }
 }
 
+/// The greatest bounds that rounding errors of a function's results may have, in the results' units.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MaxError {
+    /// Of every result.
+    All(f64),
+    /// One per result, in their order.
+    Each(Vec<f64>),
+    /// By the outputs' names; what is left out is free.
+    Outputs(Vec<(String, MaxError)>),
+}
+
+/// A bound of errors that does not fit the outputs of its function.
+#[derive(Clone, Debug)]
+pub struct Misfit {
+    /// The output that it was given for, if it was for one.
+    pub output: Option<String>,
+    /// What is wrong.
+    pub complaint: Diagnostic,
+}
+
+impl MaxError {
+    /// The bound of each result of a function with these outputs; infinite of what is free.
+    ///
+    /// # Errors
+    /// What does not fit the outputs.
+    pub fn of_results(&self, outputs: &[Port]) -> Result<Vec<f64>, Box<Misfit>> {
+        let count = outputs.iter().map(Port::len).sum();
+        match self {
+            MaxError::All(most) => Ok(vec![*most; count]),
+            MaxError::Each(list) if list.len() == count => Ok(list.clone()),
+            MaxError::Each(list) => {
+                let names: Vec<&str> = outputs.iter().map(|p| p.name.as_str()).collect();
+                let complaint = messages::error_budget_count(&names, list.len(), count);
+                Err(Box::new(Misfit { output: None, complaint }))
+            }
+            MaxError::Outputs(named) => {
+                let mut all = vec![f64::INFINITY; count];
+                for (name, most) in named {
+                    let of = |complaint| Box::new(Misfit { output: Some(name.clone()), complaint });
+                    let Some(k) = outputs.iter().position(|p| p.name == *name) else {
+                        let known = outputs.iter().map(|p| p.name.as_str());
+                        return Err(of(messages::error_budget_output(name, known)));
+                    };
+                    let first: usize = outputs[..k].iter().map(Port::len).sum();
+                    let part = most.of_results(&outputs[k..k + 1]).map_err(|misfit| of(misfit.complaint))?;
+                    all[first..first + part.len()].copy_from_slice(&part);
+                }
+                Ok(all)
+            }
+        }
+    }
+}
+
 /// What a function may cost; what is left out is free.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Budget {
     /// Multiplications, additions, divisions and square roots.
     pub max_flops: Option<usize>,
@@ -283,8 +338,8 @@ pub struct Budget {
     pub max_stack_bytes: Option<usize>,
     /// Bytes of machine code, estimated.
     pub max_code_bytes: Option<usize>,
-    /// The greatest bound of a rounding error, of any result, in its unit.
-    pub max_error: Option<f64>,
+    /// The greatest bounds of rounding errors.
+    pub max_error: Option<MaxError>,
     /// Whether a function in f32 may compute in f64 what `max_error` takes.
     pub mixed_precision: bool,
 }

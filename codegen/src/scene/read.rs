@@ -3,8 +3,9 @@
 mod contact;
 
 use super::messages as say;
-use super::{check, Base, Budget, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Places};
+use super::{check, Base, Budget, Coulomb, Gravity, Interval, JointRanges, MaxError, Parameter, Part, Payload, Places};
 use super::{Contacts, Ranges, Scene, Selection};
+use crate::certify::Effort;
 use crate::compile::Options;
 use crate::description::reader::{Range64, Reader, LARGEST_FILE};
 use crate::description::table::{parse, Table};
@@ -52,6 +53,8 @@ pub struct SceneFile {
     pub scalars: Vec<Scalar>,
     /// So near to a special angle \[rad\] an angle of the robot file is taken as that.
     pub angle_tolerance: Option<f64>,
+    /// Whether rounding errors are bounded, and what is spent on it; none: as the options say.
+    pub certify: Option<Effort>,
 }
 
 impl SceneFile {
@@ -67,6 +70,7 @@ impl SceneFile {
             (options.scalar, options.also) = (*first, others.to_vec());
         }
         options.model.angle_tolerance = self.angle_tolerance.unwrap_or(options.model.angle_tolerance);
+        options.certify = self.certify.or(options.certify);
         options.scene = self.scene;
         options
     }
@@ -375,7 +379,9 @@ impl SceneReader<'_> {
     }
 
     fn numbers(&mut self, table: &Table) {
-        self.reader.check_keys(table, &["scalar", "angle_tolerance", "ranges"]);
+        let certify = ["certify", "certify_boxes", "certify_seconds", "certify_state"];
+        self.reader.check_keys(table, &[&["scalar", "angle_tolerance", "ranges"], &certify[..]].concat());
+        self.certify(table);
         let scalars: Vec<(&str, Scalar)> = Scalar::words().into_iter().map(|(word, _, s)| (word, s)).collect();
         self.file.scalars = match table.get("scalar") {
             Some((DeValue::Array(_), span)) => {
@@ -394,6 +400,29 @@ impl SceneReader<'_> {
         self.file.angle_tolerance = tolerance.map(|t| t.value);
         if let Some(ranges) = self.reader.table_at(table, "ranges", "[numbers.ranges]") {
             self.ranges(&ranges);
+        }
+    }
+
+    fn certify(&mut self, table: &Table) {
+        let certify = self.reader.flag_at(table, "certify").is_some_and(|flag| flag.value);
+        let companions = self.reader.flag_at(table, "certify_state").is_some_and(|flag| flag.value);
+        let boxes = self.reader.count_at(table, "certify_boxes");
+        let seconds = self.reader.real_at(table, "certify_seconds", Range64::Finite);
+        let (most_boxes, most_seconds) = (Effort::MOST_BOXES, Effort::MOST_SECONDS);
+        if let Some(n) = boxes.as_ref().filter(|n| !(1..=most_boxes).contains(&n.value)) {
+            let range = format!("between 1 and {most_boxes}");
+            let complaint = say::not_in_range("certify_boxes", n.value as f64, &range);
+            self.reader.diagnostics.push(complaint.at(&n.place));
+        }
+        let is_sound = |x: f64| x > 0.0 && x <= most_seconds;
+        if let Some(s) = seconds.as_ref().filter(|s| !is_sound(s.value)) {
+            let complaint =
+                say::not_in_range("certify_seconds", s.value, &format!("above 0 and up to {most_seconds} s"));
+            self.reader.diagnostics.push(complaint.at(&s.place));
+        }
+        if certify || companions || boxes.is_some() || seconds.is_some() {
+            let seconds = seconds.map(|s| s.value).filter(|s| is_sound(*s));
+            self.file.certify = Some(Effort::new(boxes.map(|n| n.value), seconds, companions));
         }
     }
 
@@ -453,6 +482,55 @@ impl SceneReader<'_> {
         }
     }
 
+    /// A number for all results, an array with one for each, or, where they may be named, a table of such by output.
+    fn max_error(&mut self, table: &Table, key: &str, path: &str, named: bool) -> Option<MaxError> {
+        let (value, span) = table.get(key)?;
+        let place = self.reader.place(&span);
+        self.file.scene.places.note(path, &place);
+        let found = match value {
+            DeValue::Integer(_) | DeValue::Float(_) => {
+                MaxError::All(self.reader.real_at(table, key, Range64::Finite)?.value)
+            }
+            DeValue::Array(array) => {
+                let what = table.what(key);
+                let numbers: Vec<Option<f64>> = array
+                    .iter()
+                    .map(|item| self.reader.real(&what, item.get_ref(), &item.span(), Range64::Finite))
+                    .collect();
+                MaxError::Each(numbers.into_iter().collect::<Option<Vec<f64>>>()?)
+            }
+            DeValue::Table(_) if named => {
+                let outputs = self.reader.table_at(table, key, &table.what(key))?;
+                let mut keys: Vec<_> = outputs.table.keys().collect();
+                keys.sort_by_key(|key| key.span().start);
+                let keys: Vec<String> = keys.into_iter().map(|key| key.get_ref().to_string()).collect();
+                let parts = keys.into_iter().filter_map(|output| {
+                    let most = self.max_error(&outputs, &output, &format!("{path}.{output}"), false)?;
+                    Some((output, most))
+                });
+                MaxError::Outputs(parts.collect())
+            }
+            _ => {
+                let forms = match named {
+                    true => "a number, an array of numbers, or `{ output = number or array }`",
+                    false => "a number, or an array of numbers",
+                };
+                self.reader.wrong_type(&table.what(key), forms, value, &span);
+                return None;
+            }
+        };
+        let numbers = match &found {
+            MaxError::All(x) => std::slice::from_ref(x),
+            MaxError::Each(list) => &list[..],
+            MaxError::Outputs(_) => &[],
+        };
+        if let Some(x) = numbers.iter().find(|x| **x <= 0.0) {
+            self.reader.diagnostics.push(say::not_in_range("max_error", *x, "above zero").at(&place));
+            return None;
+        }
+        Some(found)
+    }
+
     fn budgets(&mut self, table: &Table) {
         let names: Vec<&str> = Function::known().map(Function::name).collect();
         self.reader.check_keys(table, &names);
@@ -476,17 +554,12 @@ impl SceneReader<'_> {
                 max_error: None,
                 mixed_precision: false,
             };
-            let max_error = self.reader.real_at(&limits, "max_error", Range64::Finite);
-            if let Some(value) = max_error.as_ref().filter(|e| e.value <= 0.0) {
-                let complaint = say::not_in_range("max_error", value.value, "above zero");
-                self.reader.diagnostics.push(complaint.at(&value.place));
-            }
+            let max_error = self.max_error(&limits, "max_error", &format!("budget.{name}.max_error"), true);
             let mixed = self.reader.flag_at(&limits, "mixed_precision").filter(|flag| flag.value);
             if let (Some(flag), None) = (&mixed, &max_error) {
                 self.reader.diagnostics.push(say::mixed_alone().at(&flag.place));
             }
-            let mixed_precision = mixed.is_some();
-            let max_error = self.noted(&format!("budget.{name}.max_error"), max_error);
+            let mixed_precision = self.noted(&format!("budget.{name}.mixed_precision"), mixed).is_some();
             let budget = Budget { max_error, mixed_precision, ..budget };
             self.file.scene.budgets.insert(function, budget);
             if self.file.functions.as_ref().is_some_and(|functions| !functions.contains(&function)) {

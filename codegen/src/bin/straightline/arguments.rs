@@ -10,6 +10,7 @@ use straightline_codegen::experiment::parameter::{self, Range, Sweep};
 use straightline_codegen::export::is_identifier;
 use straightline_codegen::expr::Grade;
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::scene::MaxError;
 use straightline_codegen::schedule::Limits;
 use straightline_codegen::words::Choice;
 use straightline_codegen::{ForwardDynamicsMethod, Function};
@@ -284,8 +285,11 @@ pub struct ProgramArgs {
     /// The same with tighter bounds: the ranges of each result are cut into so many boxes
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     certify_boxes: Option<u32>,
-    /// Beside every function `…_error_bound`, which bounds the rounding errors at the state at hand; not with --fma
-    #[arg(long, conflicts_with = "fma")]
+    /// The same, for so long per function and scalar type \[s\]; --certify-boxes limits it further
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    certify_seconds: Option<f64>,
+    /// Beside every function `…_error_bound`, which bounds the rounding errors at the state at hand
+    #[arg(long)]
     certify_state: bool,
     /// Of f32, compute in f64 what it takes for proven errors up to so much, in the results' units, and nothing else
     #[arg(long, value_name = "MAX_ERROR", value_parser = above_zero, conflicts_with = "fma")]
@@ -329,6 +333,13 @@ fn above_zero(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
         _ => Err("a number above zero".to_string()),
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match above_zero(text) {
+        Ok(x) if x <= Effort::MOST_SECONDS => Ok(x),
+        _ => Err(format!("seconds, above zero and up to {}", Effort::MOST_SECONDS)),
     }
 }
 
@@ -411,14 +422,15 @@ impl ProgramArgs {
         let Some(max_error) = self.mixed_precision else { return };
         for function in &options.functions {
             let budget = options.scene.budgets.entry(*function).or_default();
-            (budget.max_error, budget.mixed_precision) = (Some(max_error), true);
+            (budget.max_error, budget.mixed_precision) = (Some(MaxError::All(max_error)), true);
         }
     }
 
     fn effort(&self) -> Option<Effort> {
-        let wanted = self.certify || self.certify_boxes.is_some() || self.certify_state;
-        let boxes = self.certify_boxes.map_or(Effort::default().boxes, |n| n as usize);
-        wanted.then_some(Effort { boxes, companions: self.certify_state })
+        let wanted =
+            self.certify || self.certify_boxes.is_some() || self.certify_seconds.is_some() || self.certify_state;
+        let boxes = self.certify_boxes.map(|n| n as usize);
+        wanted.then(|| Effort::new(boxes, self.certify_seconds, self.certify_state))
     }
 
     pub fn options(&self, model: &ModelArgs) -> Options {
