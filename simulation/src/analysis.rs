@@ -5,6 +5,7 @@ use crate::motion::Motion;
 use crate::table::Table;
 use straightline_core::algorithms::{inverse_dynamics, joint_wrenches, kinetic_energy, potential_energy};
 use straightline_core::model::{Joint, JointKind, Model};
+use straightline_core::spatial::ForceVector;
 
 /// The figures of a motion.
 #[derive(Clone, Debug)]
@@ -63,8 +64,44 @@ pub struct Violation {
     pub worst: f64,
 }
 
+/// Where the forces of a motion come from: the generic runtime of a model, or a generated program.
+pub trait Equations {
+    /// Joint torques or forces \[N·m or N\].
+    fn torques(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64>;
+    /// What every joint exerts on its link: force \[N\], then moment about the joint's origin \[N·m\], in the link's axes.
+    fn wrenches(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<[f64; 6]>;
+}
+
+impl Equations for Model<f64> {
+    fn torques(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
+        inverse_dynamics(self, q, qd, qdd)
+    }
+
+    fn wrenches(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<[f64; 6]> {
+        let six = |w: &ForceVector<f64>| {
+            let ([fx, fy, fz], [mx, my, mz]) = (w.force.to_array(), w.moment.to_array());
+            [fx, fy, fz, mx, my, mz]
+        };
+        joint_wrenches(self, q, qd, qdd).iter().map(six).collect()
+    }
+}
+
+/// The motion at the instants of an analysis: time, q, q̇, q̈; at a knot between two pieces twice.
+pub fn states(motion: &Motion, interval: f64) -> Vec<(f64, [Vec<f64>; 3])> {
+    let at = |(piece, t): (usize, f64)| {
+        let (q, qd, qdd) = motion.in_piece(piece, t);
+        (t, [q, qd, qdd])
+    };
+    instants(motion, interval).into_iter().map(at).collect()
+}
+
 /// Analyses a motion of all joints at instants at most `interval` \[s\] apart, limits by root finding between them.
 pub fn analyze(model: &Model<f64>, motion: &Motion, interval: f64) -> Analysis {
+    analyze_by(model, model, motion, interval)
+}
+
+/// The same with torques and joint forces from elsewhere.
+pub fn analyze_by(model: &Model<f64>, equations: &dyn Equations, motion: &Motion, interval: f64) -> Analysis {
     let mut joints: Vec<&Joint> = model.bodies.iter().map(|b| &b.joint).collect();
     joints.sort_by_key(|j| j.iv);
     let instants = instants(motion, interval);
@@ -77,18 +114,21 @@ pub fn analyze(model: &Model<f64>, motion: &Motion, interval: f64) -> Analysis {
     let mut wrenches = Table { names: names(&["force", "moment"], &[".x", ".y", ".z"]), rows: Vec::new() };
     for &(piece, t) in &instants {
         let (q, qd, qdd) = motion.in_piece(piece, t);
-        let tau = inverse_dynamics(model, &q, &qd, &qdd);
+        let tau = equations.torques(&q, &qd, &qdd);
         let power: Vec<f64> = tau.iter().zip(&qd).map(|(tau, qd)| tau * qd).collect();
         table.rows.push([&[t], &q[..], &qd, &qdd, &tau, &power].concat());
-        let carried = joint_wrenches(model, &q, &qd, &qdd);
-        let forces = carried.iter().flat_map(|w| w.force.to_array());
-        let moments = carried.iter().flat_map(|w| w.moment.to_array());
+        let carried = equations.wrenches(&q, &qd, &qdd);
+        let forces = carried.iter().flat_map(|w| w[..3].to_vec());
+        let moments = carried.iter().flat_map(|w| w[3..].to_vec());
         wrenches.rows.push(std::iter::once(t).chain(forces).chain(moments).collect());
     }
     let n = joints.len();
     let figures = (0..n).map(|j| figures(joints[j], j, n, &table, &wrenches)).collect();
-    let mut violations: Vec<Violation> =
-        joints.iter().enumerate().flat_map(|(j, joint)| violations(model, motion, joint, j, n, &table)).collect();
+    let mut violations: Vec<Violation> = joints
+        .iter()
+        .enumerate()
+        .flat_map(|(j, joint)| violations((model, equations), motion, joint, (j, n), &table))
+        .collect();
     let drives = drive_analysis::analyze(model, motion, &instants);
     violations.extend(drives.iter().flat_map(|d| d.violations.iter().cloned()));
     violations.sort_by(|a, b| a.time.total_cmp(&b.time));
@@ -145,14 +185,20 @@ fn figures(joint: &Joint, j: usize, n: usize, table: &Table, wrenches: &Table) -
 }
 
 /// The limits of a joint that the motion exceeds.
-fn violations(model: &Model<f64>, motion: &Motion, joint: &Joint, j: usize, n: usize, table: &Table) -> Vec<Violation> {
+fn violations(
+    (model, equations): (&Model<f64>, &dyn Equations),
+    motion: &Motion,
+    joint: &Joint,
+    (j, n): (usize, usize),
+    table: &Table,
+) -> Vec<Violation> {
     let limits = joint.limits;
     let value = |what: &str, t: f64| {
         let (q, qd, qdd) = motion.at(t);
         match what {
             "position" => q[j],
             "speed" => qd[j],
-            _ => inverse_dynamics(model, &q, &qd, &qdd)[j],
+            _ => equations.torques(&q, &qd, &qdd)[j],
         }
     };
     // of a passive joint the effort is what its motion would take beside its spring

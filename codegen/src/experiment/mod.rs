@@ -3,6 +3,7 @@
 //! Every complaint has its place, and all come in one run.
 
 pub mod contact;
+pub mod design;
 pub mod messages;
 pub mod parameter;
 pub mod parquet;

@@ -5,12 +5,14 @@
 //! operations are one node, and applies the [rules] on the way in.
 
 mod builder;
+mod gradient;
 mod graph;
 mod interpret;
 pub mod rules;
 mod verify;
 
 pub use builder::Builder;
+pub use gradient::gradient;
 pub use graph::{Constant, Counts, Graph, NodeId, Note, Op, Port, Section, Width, TAIL};
 pub use interpret::evaluate;
 pub use rules::{Folding, Grade, Rule, RuleSet};

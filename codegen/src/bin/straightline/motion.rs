@@ -10,10 +10,12 @@ use std::sync::Mutex;
 use straightline_codegen::compile::Options;
 use straightline_codegen::description::{self, Description};
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
+use straightline_codegen::experiment::design::Design;
 use straightline_codegen::experiment::{self, parameter, parquet, Experiment};
 use straightline_codegen::{model, output, scene};
 use straightline_core::drive::Actuator;
-use straightline_core::model::Model;
+use straightline_core::model::{Body, Model};
+use straightline_core::Dd;
 use straightline_simulation::analysis::{self, Analysis};
 use straightline_simulation::command::Command;
 use straightline_simulation::contact as in_contact;
@@ -21,7 +23,7 @@ use straightline_simulation::drive_analysis::{torque_limits, DriveAnalysis, Driv
 use straightline_simulation::drives::state_of_motion;
 use straightline_simulation::html::Page;
 use straightline_simulation::motion::Motion;
-use straightline_simulation::optimize;
+use straightline_simulation::optimize::{self, Sampled};
 use straightline_simulation::plant::Plant;
 use straightline_simulation::plot::{Line, Plot};
 use straightline_simulation::simulate;
@@ -30,11 +32,40 @@ use straightline_simulation::table::Table;
 /// Size of a plot in pixels.
 const PLOT: (u32, u32) = (900, 340);
 
-/// The robot of a description in a scene, in f64; what is wrong with it is printed.
-fn built(description: &Description, options: &Options, diagnostics: &mut Diagnostics) -> Option<Model<f64>> {
+/// The robot of a description in a scene; what is wrong with it goes to `diagnostics`.
+fn built_in_full(description: &Description, options: &Options, diagnostics: &mut Diagnostics) -> Option<Model<Dd>> {
     let model = model::build(description, &options.scene.model_options(&options.model), diagnostics);
     let model = model.and_then(|model| scene::apply(model, &options.scene, diagnostics));
-    model.filter(|_| !diagnostics.has_errors()).map(|model| model.cast())
+    model.filter(|_| !diagnostics.has_errors())
+}
+
+/// The same in f64.
+fn built(description: &Description, options: &Options, diagnostics: &mut Diagnostics) -> Option<Model<f64>> {
+    built_in_full(description, options, diagnostics).map(|model| model.cast())
+}
+
+/// The generated programs of a robot with some of its numbers as run-time parameters.
+fn design(description: &Description, options: &Options, paths: &[&str]) -> Result<Design, Failure> {
+    let build = |d: &Description| built_in_full(d, options, &mut Diagnostics::new());
+    Design::new(description, &build, paths).map_err(|complaint| {
+        let mut diagnostics = Diagnostics::new();
+        diagnostics.push(*complaint);
+        print::diagnostics(&diagnostics, Severity::Warning);
+        Failure::Input
+    })
+}
+
+/// Generated programs at these values of their parameters.
+struct At<'a>(&'a Design, &'a [f64]);
+
+impl analysis::Equations for At<'_> {
+    fn torques(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
+        self.0.torques(q, qd, qdd, self.1)
+    }
+
+    fn wrenches(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<[f64; 6]> {
+        self.0.wrenches(q, qd, qdd, self.1)
+    }
 }
 
 fn robot(path: &Path, args: &ModelArgs) -> Result<(Description, Options, Model<f64>), Failure> {
@@ -167,7 +198,13 @@ pub fn simulate(a: &Simulate) -> Result<(), Failure> {
     if let Some(path) = &a.svg {
         let is_controlled = matches!(experiment.command, Command::Controller(_));
         let (prefix, title) = if is_controlled { ("error.", "tracking errors") } else { ("q.", "coordinates") };
-        let plot = Plot { title, axes: ("t [s]", "rad or m"), lines: lines(&run.table, prefix), levels: Vec::new() };
+        let mut lines = lines(&run.table, prefix);
+        if is_controlled {
+            // no controller leads what is passive
+            let is_passive = |name: &str| plant.model.bodies.iter().any(|b| b.is_passive() && b.joint.name == name);
+            lines.retain(|line| !is_passive(line.name));
+        }
+        let plot = Plot { title, axes: ("t [s]", "rad or m"), lines, levels: Vec::new() };
         output::write_file(path, &drawn(&plot)?)?;
     }
     print_run(&plant, &run)
@@ -260,25 +297,55 @@ fn optimized(a: &Analyze, description: &Description, options: &Options, motion: 
     let ends = |end: fn(&(f64, f64)) -> f64| a.optimize.iter().map(|r| end(&r.ends)).collect::<Vec<f64>>();
     with(a, description, options, &ends(|e| e.0))?;
     with(a, description, options, &ends(|e| e.1))?;
+    let paths: Vec<&str> = a.optimize.iter().map(|range| range.path.as_str()).collect();
+    let design = design(description, options, &paths)?;
+    let mut diagnostics = Diagnostics::new();
+    let Some(model) = built(description, options, &mut diagnostics) else { return Err(Failure::Input) };
     let progress = print::spinner("optimising");
-    let cost = |model: &Model<f64>| {
-        let mut joints: Vec<_> = model.bodies.iter().map(|b| &b.joint).collect();
-        joints.sort_by_key(|j| j.iv);
-        let efforts: Vec<f64> = joints.iter().map(|j| j.limits.effort).collect();
-        a.minimize.with_limits(&analysis::analyze(model, motion, a.interval), &efforts)
-    };
+    let mut bodies: Vec<_> = model.bodies.iter().collect();
+    bodies.sort_by_key(|b| b.joint.iv);
+    let effort = |b: &&Body<f64>| if b.is_passive() { f64::INFINITY } else { b.joint.limits.effort };
+    let efforts: Vec<f64> = bodies.iter().map(effort).collect();
     let ranges: Vec<(f64, f64)> = a.optimize.iter().map(|r| r.ends).collect();
-    let of_values = |values: &[f64]| with(a, description, options, values).map_or(f64::INFINITY, |model| cost(&model));
-    let best = optimize::minimise(of_values, &ranges);
+    let states = analysis::states(motion, a.interval);
+    let (times, qd): (Vec<f64>, Vec<Vec<f64>>) = states.iter().map(|(t, [_, qd, _])| (*t, qd.clone())).unzip();
+    let by_gradient = |p: &[f64]| {
+        let tau: Vec<Vec<f64>> = states.iter().map(|(_, [q, qd, qdd])| design.torques(q, qd, qdd, p)).collect();
+        let sampled = Sampled { times: &times, qd: &qd, tau: &tau, efforts: &efforts };
+        let (cost, slopes) = a.minimize.with_slopes(sampled);
+        let mut gradient = vec![0.0; p.len()];
+        for ((_, [q, qd, qdd]), seed) in states.iter().zip(&slopes).filter(|(_, s)| s.iter().any(|x| *x != 0.0)) {
+            let more = design.gradient(q, qd, qdd, p, seed);
+            gradient.iter_mut().zip(more).for_each(|(sum, x)| *sum += x);
+        }
+        (cost, gradient)
+    };
+    // limits of drives count, too, which takes the drives of each robot
+    let of_values = |values: &[f64]| {
+        let at = At(&design, values);
+        let found = match model.drives.is_empty() {
+            true => analysis::analyze_by(&model, &at, motion, a.interval),
+            false => match with(a, description, options, values) {
+                Ok(model) => analysis::analyze_by(&model, &at, motion, a.interval),
+                Err(_) => return f64::INFINITY,
+            },
+        };
+        a.minimize.with_limits(&found, &efforts)
+    };
+    let downhill = optimize::descend(by_gradient, &ranges);
+    let best = downhill.and_then(|downhill| {
+        let best = optimize::minimise_from(of_values, &ranges, &downhill.point, 0.02)?;
+        Ok((downhill, best))
+    });
     progress.finish_and_clear();
-    let best = best.map_err(|why| {
+    let (downhill, best) = best.map_err(|why| {
         print::error(&format!("no optimum was found: {why}"));
         Failure::Input
     })?;
-    let mut diagnostics = Diagnostics::new();
-    let as_written = built(description, options, &mut diagnostics).map_or(f64::INFINITY, |model| cost(&model));
+    let as_written = a.minimize.with_limits(&analysis::analyze(&model, motion, a.interval), &efforts);
     let mut out = stdout().lock();
-    writeln!(out, "\nbest values after {} analyses:", best.evaluations)?;
+    let (steps, analyses) = (downhill.evaluations, best.evaluations);
+    writeln!(out, "\nbest values after {steps} evaluations along the gradient and {analyses} analyses:")?;
     for (range, value) in a.optimize.iter().zip(&best.point) {
         writeln!(out, "  {} = {value:.6} (from {} to {})", range.path, range.ends.0, range.ends.1)?;
     }
@@ -323,6 +390,7 @@ fn swept(
         };
         models.push((value, model));
     }
+    let design = design(description, options, &[&sweep.path])?;
     let bar = print::bar("sweeping", models.len() as u64);
     let (next, results) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let workers = std::thread::available_parallelism().map_or(1, usize::from).min(models.len());
@@ -330,7 +398,7 @@ fn swept(
         for _ in 0..workers {
             scope.spawn(|| {
                 while let Some((value, model)) = models.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let found = analysis::analyze(model, motion, interval);
+                    let found = analysis::analyze_by(model, &At(&design, &[*value]), motion, interval);
                     results.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((*value, found));
                     bar.inc(1);
                 }
