@@ -131,7 +131,8 @@ fn actuator(drive: &written::Drive, owner: &str, diagnostics: &mut Diagnostics) 
             if vanishes(&wide(f)) {
                 complain(
                     "T f = 0: the torque on its shaft does not move it",
-                    "f holds −1/J in the row of the shaft's speed",
+                    "f holds −1/J in the row of the shaft's speed; for a shaft that follows u whatever its load, which (20.80) \
+                     allows and a complete model with an inertia of its own, (20.73), does not, take J far above what it drives",
                     diagnostics,
                 );
                 return None;
