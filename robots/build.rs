@@ -8,6 +8,9 @@ const FEET: [&str; 4] = ["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"];
 
 fn main() -> Result<(), Error> {
     Builder::new("descriptions/planar_2r.toml").frames(["tip"]).build()?;
+    let driven = |scene: &str| Builder::new("descriptions/planar_2r.toml").frames(["tip"]).scene_file(scene);
+    driven("scenes/planar_2r_drives.toml").module("planar_2r_geared").build()?;
+    driven("scenes/planar_2r_elastic.toml").module("planar_2r_elastic").build()?;
     Builder::new("descriptions/chapter_cylindrical.toml").module("cylindrical").build()?;
     Builder::new("descriptions/chapter_stanford.toml").module("stanford").build()?;
     Builder::new("descriptions/puma560.urdf").build()?;

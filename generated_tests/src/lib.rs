@@ -1,13 +1,14 @@
 //! Truth x inputs x bound: what proves every generated function.
 //!
 //! This library holds the material of the tests: the [reference data](mod@reference), the [`compiled`] functions of all
-//! robots, [`programs`] as the compiler makes them, the [contact_cases] and [random robots](random) written for both authors,
+//! robots, [`programs`] as the compiler makes them, the [contact_cases], [robots with drives](drives) and [random robots](random) written for both authors,
 //! and a [`search`] for the worst case.
 //! The tests themselves are in `tests/`, one file per kind of claim.
 #![forbid(unsafe_code)]
 
 pub mod compiled;
 pub mod contact_cases;
+pub mod drives;
 pub mod inputs;
 pub mod programs;
 pub mod random;

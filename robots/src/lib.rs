@@ -37,6 +37,43 @@ pub mod planar_2r {
     include!(concat!(env!("OUT_DIR"), "/planar_2r.rs"));
 }
 
+/// The planar arm with geared DC motors on both joints: voltages in, motion out. The state of the drives is θ, θ̇ and the current of each.
+///
+/// Scene: `scenes/planar_2r_drives.toml`, with figures of a data sheet.
+///
+/// ```
+/// use straightline_robots::planar_2r_geared as arm;
+/// // motors shorted, at rest: the arm begins to fall, held back by its rotors behind the gears
+/// let (mut qdd, mut xd) = ([0.0; arm::NV], [0.0; arm::NX]);
+/// arm::driven_forward_dynamics(&[0.0; 2], &[0.0; 2], &[0.0; arm::NX], &[0.0; arm::NU], &mut qdd, &mut xd);
+/// let (mut free, tau) = ([0.0; 2], [0.0; 2]);
+/// arm::forward_dynamics(&[0.0; 2], &[0.0; 2], &tau, &mut free);
+/// assert!(qdd[0] < 0.0 && qdd[0] > free[0]);
+/// ```
+#[allow(clippy::all, clippy::pedantic)]
+pub mod planar_2r_geared {
+    include!(concat!(env!("OUT_DIR"), "/planar_2r_geared.rs"));
+}
+
+/// The planar arm behind elastic transmissions: motors and joints turn independently of each other.
+///
+/// Scene: `scenes/planar_2r_elastic.toml`, with figures of a data sheet.
+///
+/// ```
+/// use straightline_robots::planar_2r_elastic as arm;
+/// // voltages that hold the stretched arm still, and the torques of its springs: its weight
+/// let (still, mut u, mut m) = ([0.0; arm::NV], [0.0; arm::NU], [0.0; arm::NU]);
+/// let mut x = [0.0; arm::NX];
+/// x[3] = 100.0 * (0.75 * 9.81 * 0.2) / 7e3; // the second spring is damped: its stretch is free
+/// arm::driven_inverse_dynamics(&[0.0; 2], &still, &still, &still, &still, &still, &x, &mut u, &mut m);
+/// let weight = 9.81 * (1.5 * 0.25 + 0.75 * 0.7);
+/// assert!((m[0] - weight / 100.0).abs() < 1e-12, "{m:?}");
+/// ```
+#[allow(clippy::all, clippy::pedantic)]
+pub mod planar_2r_elastic {
+    include!(concat!(env!("OUT_DIR"), "/planar_2r_elastic.rs"));
+}
+
 /// A cylindrical arm: a column that turns, a carriage that climbs it, an arm that slides out, a hand that rolls.
 /// 2 revolute and 2 linear joints, nq = nv = 4.
 ///

@@ -1,15 +1,13 @@
 //! Drives and transmissions against the reference data of `reference/cases`: compiled programs, operation by operation in f64.
 
-#[path = "common/drives.rs"]
-mod common;
-
-use common::{folder, inputs, json, numbers, Driven};
 use serde_json::Value;
 use std::fmt::Write;
 use straightline_codegen::function::DriveFunction::{
     self, CompleteModel, ForwardDynamics, InverseDynamics, StateSpace, Torques,
 };
 use straightline_core::Dd;
+use straightline_generated_tests::drives::Driven;
+use straightline_generated_tests::reference::{folder, inputs, json, numbers};
 
 /// Error over scale that the values with 25 digits allow.
 const BOUND: f64 = 1e-12;

@@ -1,8 +1,7 @@
-#![allow(dead_code)] // each test takes what it needs
 //! Robots with drives for the tests: drives are written as `[[drive]]` tables of a scene, so that reading them is tested, too.
 
+use crate::reference::{description, numbers};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
 use straightline_codegen::compile::{optimised, Optimisations, Options};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::expr::{evaluate, Graph};
@@ -11,38 +10,6 @@ use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::scene::{self, Scene};
 use straightline_codegen::Function;
 use straightline_core::{Dd, Real};
-
-/// The reference data.
-pub fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../generated_tests/reference")
-}
-
-/// The description of a robot of the reference data.
-pub fn description(name: &str) -> PathBuf {
-    let extension = if name.starts_with("chapter_") { "toml" } else { "urdf" };
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../robots/descriptions/{name}.{extension}"))
-}
-
-/// A file of the reference data.
-pub fn json(path: &Path) -> Value {
-    let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
-}
-
-/// All numbers in a JSON value, depth first.
-pub fn numbers(value: &Value) -> Vec<Dd> {
-    match value {
-        Value::String(text) => vec![Dd::from_decimal(text).expect("a decimal number")],
-        Value::Array(items) => items.iter().flat_map(numbers).collect(),
-        other => panic!("numbers of the reference data are strings, not {other}"),
-    }
-}
-
-/// Inputs, which are exact f64 values.
-pub fn inputs(value: &Value) -> Vec<f64> {
-    let parse = |x: &Value| x.as_str().expect("a decimal string").parse().expect("a number");
-    value.as_array().expect("a list").iter().map(parse).collect()
-}
 
 /// A robot in a scene.
 pub struct Driven {

@@ -1,10 +1,6 @@
 //! Drives against the reference's own formulation in double-double, and against what physics says of any drive: rotors as
 //! bodies of their own, power that goes nowhere else, motions that come back.
 
-#[path = "common/drives.rs"]
-mod common;
-
-use common::{blocks, description, Driven};
 use nalgebra::{DMatrix, DVector};
 use std::fmt::Write;
 use std::process::Command;
@@ -24,30 +20,9 @@ use straightline_core::algorithms as alg;
 use straightline_core::model::Model;
 use straightline_core::reference::drives::{before_elastic_stage, ActuatorModel, DcMotor, ElasticStage, UnitedModel};
 use straightline_core::{reference, Dd, Real, Taylor};
-
-/// Numbers that are the same for the same seed (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn list(&mut self, n: usize, size: f64) -> Vec<f64> {
-        (0..n).map(|_| self.between(-size, size)).collect()
-    }
-
-    fn below(&mut self, n: u64) -> u64 {
-        self.bits() % n
-    }
-}
+use straightline_generated_tests::drives::{blocks, Driven};
+use straightline_generated_tests::random::Random;
+use straightline_generated_tests::reference::description;
 
 fn source(robot: &str) -> Source {
     let path = description(robot);
@@ -289,7 +264,7 @@ fn random_motors_agree_with_the_chapter_in_double_double() {
     }
 }
 
-/// Slow: more robots, many seeds. `cargo test --release -p straightline-codegen --features cli --test driven_physics --
+/// Slow: more robots, many seeds. `cargo test --release -p straightline-generated-tests --test driven_physics --
 /// --ignored`.
 #[test]
 #[ignore = "minutes"]
@@ -742,7 +717,7 @@ fn the_energy_balance_closes_over_a_simulation() {
 }
 
 /// Ten seconds; with losses, whose switching takes an integrator that sees it, in the simulation's own tests: `cargo test --release -p
-/// straightline-codegen --features cli --test driven_physics -- --ignored --nocapture ten_seconds`.
+/// straightline-generated-tests --test driven_physics -- --ignored --nocapture ten_seconds`.
 #[test]
 #[ignore = "half a minute"]
 fn the_energy_balance_closes_over_ten_seconds() {
