@@ -211,6 +211,14 @@ fn the_best_mass_of_a_counterweight_is_found() {
     let line = said.lines().find(|l| l.contains("weight.mass = ")).unwrap_or_else(|| panic!("{said}"));
     let value: f64 = line.split_whitespace().nth(2).unwrap().parse().unwrap();
     assert!((value - 3.0).abs() < 1e-3, "{said}");
+    // a smooth objective: along the gradient at once
+    let rms = ["analyze", &robot, "--motion", &motion, "--interval", "20", "--optimize", "weight.mass=0.5:6"];
+    let said = succeeds(&[&rms[..], &["--minimize", "rms"]].concat());
+    let line = said.lines().find(|l| l.contains("weight.mass = ")).unwrap_or_else(|| panic!("{said}"));
+    let value: f64 = line.split_whitespace().nth(2).unwrap().parse().unwrap();
+    assert!((value - 3.0).abs() < 1e-3, "{said}");
+    let words: Vec<&str> = said.lines().find(|l| l.starts_with("best values")).unwrap().split_whitespace().collect();
+    assert!((3..1000).contains(&words[3].parse::<u32>().unwrap()), "{said}");
     let said = fails(&["analyze", &robot, "--motion", &motion, "--optimize", "weight.mas=0.5:6"]);
     assert!(said.contains("`weight.mas`"), "{said}");
     let said = fails(&["analyze", &robot, "--motion", &motion, "--optimize", "weight.mass=-1:6"]);

@@ -164,8 +164,11 @@ impl Reader<'_> {
             let rest = self.real_at(&spring, "rest", Range64::Finite).map_or(0.0, |rest| rest.value);
             Some(Elastic { stiffness, damping, rest })
         });
+        // a spring that could not be read was complained of, and the base is not rigid for that
+        let is_read =
+            directions.iter().zip(Support::DIRECTIONS).all(|(spring, key)| spring.is_some() || !table.has(key));
         let place = Noted { value: (), place: self.place(&table.span) };
-        Some(Support { at, directions, place })
+        is_read.then_some(Support { at, directions, place })
     }
 }
 

@@ -84,7 +84,8 @@ Examples:
     Verify(Verify),
     /// Simulate a robot under torques or a controller
     #[command(after_help = format!("\
-The experiment is a TOML file (codegen/SIMULATION.md), or CSV or JSON samples of torques. Results: t, q, qd, tau, energies.
+The experiment is a TOML file (codegen/SIMULATION.md), or CSV, JSON or Parquet samples of torques.
+Results: t, q, qd, tau, energies.
 
 Examples:
   straightline simulate panda.urdf --input swing.toml --output swing.csv --svg swing.svg
@@ -94,7 +95,7 @@ Examples:
     Simulate(Simulate),
     /// What a motion asks of joints and drives: torques, power, energy, limits
     #[command(after_help = format!("\
-The motion is a TOML file (codegen/SIMULATION.md), or CSV or JSON samples of the joints.
+The motion is a TOML file (codegen/SIMULATION.md), or CSV, JSON or Parquet samples of the joints.
 
 Examples:
   straightline analyze panda.urdf --motion reach.toml --html reach.html
