@@ -3,15 +3,15 @@
 //! Which description of a body is cheaper depends on what else needs the same products, so it is not decided by a rule
 //! but by counting the finished program. Bodies at the same depth of the tree (the thighs of a quadruped) choose alike.
 
-use crate::compile::{candidate_counts, Forms, Optimisations, Options};
+use crate::compile::{candidate, Forms, Optimisations, Options};
 use crate::emit::Scalar;
-use crate::expr::{Counts, Graph};
+use crate::expr::{Counts, Graph, DIVISION};
 use crate::forward_method;
 use crate::function::{DriveFunction, Function, Robot};
 use crate::reduce::{lengths, reduce, Choice};
 use crate::rounding;
 use crate::scene::{Contacts, Gravity, Scene};
-use rustc_hash::{FxHashMap, FxHasher};
+use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use std::hash::{Hash, Hasher};
 use std::sync::{Arc, Mutex, PoisonError};
 use straightline_core::reduced::ReducedModel;
@@ -21,6 +21,8 @@ use straightline_core::Dd;
 const ENOUGH: usize = 300_000;
 /// So many more from neighbours of the best, where the search came to its end.
 const MORE: usize = 300_000;
+/// Neighbours of the best are looked at that cost so much more (half operations).
+const SLACK: usize = 16;
 /// A form may lose so many times what the plain one does: two samples of the same form come as far apart.
 const TOLERATED: f64 = 1.75;
 /// The same in f32, which has fewer digits to lose.
@@ -88,25 +90,35 @@ pub fn choose(
             let pairs =
                 [(&torques, &mass_matrix), (&torques, &torques), (&mass_matrix, &mass_matrix), (&plain, &plain)];
             let robots = pairs.map(|(t, h)| robot.reduced_by(t, h));
-            let cost = |r: &Robot| price(candidate_counts(r, frames, function, options, optimisations).0);
-            robots.into_iter().min_by_key(cost).expect("there are four pairs")
+            // one of the pairs, with the method that it gets, not a step on the way to something else
+            let cost = |r: &Robot| {
+                let (counts, _, method) = candidate(r, frames, function, options, optimisations);
+                let other = (counts.flops() + DIVISION * (counts.div + counts.sqrt)) as f64;
+                method.map_or(other, |m| m.weight()) + (PAIR * counts.sin_cos + counts.tail) as f64
+            };
+            let costs = robots.each_ref().map(cost);
+            let least = (0..robots.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).expect("there are four pairs");
+            robots[least].clone()
         }
         _ => robot.clone(),
     }
 }
 
 /// What is least: operations and instructions with fused multiply-add together, as either may be what a machine does; then
-/// instructions.
-type Price = (usize, usize);
+/// instructions. What keeps the digits of sums of angles weighs half: it is executed, but before the sines, which wait for the
+/// longest sum anyway.
+pub(crate) type Price = (usize, usize);
 
-/// As many instructions a pair of sine and cosine, or a division, weighs; in lanes a pair takes about so long.
+/// As many instructions a pair of sine and cosine weighs; in lanes it takes about so long.
 const PAIR: usize = 10;
 
 /// Of what is not wanted at any price.
 const NEVER: Price = (usize::MAX, usize::MAX);
 
-fn price(counts: Counts) -> Price {
-    (counts.fma + counts.flops() + 2 * PAIR * (counts.sin_cos + counts.div), counts.fma)
+/// What operations cost.
+pub(crate) fn price(counts: Counts) -> Price {
+    let apart = 2 * (PAIR * counts.sin_cos + DIVISION * counts.div) + counts.tail;
+    (counts.fma + counts.flops() + apart, counts.fma)
 }
 
 /// A search for one function, and what was tried.
@@ -152,9 +164,9 @@ impl Search<'_> {
     }
 
     fn counted(&mut self) -> (Counts, Graph) {
-        let counted = candidate_counts(&self.robot, self.frames, self.function, self.options, self.optimisations);
-        self.work += counted.1.ops.len();
-        counted
+        let (counts, graph, _) = candidate(&self.robot, self.frames, self.function, self.options, self.optimisations);
+        self.work += graph.ops.len();
+        (counts, graph)
     }
 
     /// Whether these equations lose about as little as those of the plain form, and those of the bodies' own parameters.
@@ -166,7 +178,7 @@ impl Search<'_> {
                 self.set(&Choice::plain(&self.robot.model));
                 let (_, plain) = self.counted();
                 let of_bodies = Optimisations { reduced: false, ..self.optimisations };
-                let (_, of_bodies) = candidate_counts(&self.robot, self.frames, self.function, self.options, of_bodies);
+                let (_, of_bodies, _) = candidate(&self.robot, self.frames, self.function, self.options, of_bodies);
                 let both = self.error(&plain).zip(self.error(&of_bodies));
                 let plain = both.map(|(a, b)| [a[0].min(b[0]), a[1].min(b[1])]);
                 (self.robot.composite, self.robot.reduced) = (composite, reduced);
@@ -189,14 +201,13 @@ impl Search<'_> {
         Some([slow, fast].map(|states| rounding::estimate(graph, &states)))
     }
 
-    /// Greedy: every choice at every depth, kept where it saves, until none does or enough was tried.
-    fn descend(&mut self, from: (Choice, Price), enough: usize, ways: &Ways) -> (Choice, Price) {
+    /// Greedy: every choice at every depth, kept where it saves, until none does or enough was tried; of the choices the first ones.
+    fn descend(&mut self, from: (Choice, Price), enough: usize, ways: &Ways, among: usize) -> (Choice, Price) {
         let (mut best, mut least) = from;
-        let deepest = ways.depth.iter().copied().max().unwrap_or(0);
         loop {
             let before = least;
-            for d in (0..=deepest).rev() {
-                for change in &ways.moves {
+            for d in (0..=ways.deepest()).rev() {
+                for change in &ways.moves[..among] {
                     let changed = ways.moved(&best, change, d);
                     if let Some(price) = self.attempt(&changed, least) {
                         (best, least) = (changed, price);
@@ -206,8 +217,10 @@ impl Search<'_> {
                     return (best, least);
                 }
             }
-            for unit in ways.units(&self.robot, &best) {
-                let changed = Choice { unit, ..best.clone() };
+            let units = ways.units(&self.robot, &best).into_iter().map(|unit| Choice { unit, ..best.clone() });
+            let other_angles = Choice { adds_angles: !best.adds_angles, ..best.clone() };
+            let whole: Vec<Choice> = units.chain(ways.angle_sums.then_some(other_angles)).collect();
+            for changed in whole {
                 if let Some(price) = self.attempt(&changed, least) {
                     (best, least) = (changed, price);
                 }
@@ -217,14 +230,50 @@ impl Search<'_> {
             }
         }
     }
+
+    /// Greedy again from neighbours of the best, one change away and hardly dearer; origins first, which move many parameters at once.
+    fn around(&mut self, mut best: (Choice, Price), enough: usize, ways: &Ways) -> (Choice, Price) {
+        let mut left: FxHashSet<u64> = FxHashSet::default();
+        'better: loop {
+            // whether it is no origin, what it costs, and which change at which depth it is
+            let mut neighbours: Vec<(bool, Price, usize, usize)> = Vec::new();
+            for d in 0..=ways.deepest() {
+                for (k, change) in ways.moves.iter().enumerate() {
+                    let hash = self.set(&ways.moved(&best.0, change, d));
+                    let Some(price) = self.tried.get(&hash).copied().filter(|price| *price < NEVER) else { continue };
+                    let origin = ways.origins == Some(k);
+                    if origin || price.0 <= best.1 .0.saturating_add(SLACK) {
+                        neighbours.push((!origin, price, d, k));
+                    }
+                }
+            }
+            neighbours.sort_unstable();
+            for (_, price, d, k) in neighbours {
+                if self.work >= enough {
+                    return best;
+                }
+                let moved = ways.moved(&best.0, &ways.moves[k], d);
+                let hash = self.set(&moved);
+                if !left.insert(hash) {
+                    continue;
+                }
+                let found = self.descend((moved, price), enough, ways, ways.moves.len());
+                if found.1 < best.1 {
+                    best = found;
+                    continue 'better;
+                }
+            }
+            return best;
+        }
+    }
 }
 
 /// A hash of all numbers and switches.
 fn fingerprint(reduced: &ReducedModel<Dd>) -> u64 {
     let mut hasher = FxHasher::default();
     for body in &reduced.bodies {
-        let switches = [body.stays, body.by_axis_acceleration, body.doubled[0], body.doubled[1]];
-        switches.hash(&mut hasher);
+        let switches = [body.stays, body.turns_sums, body.shares_axis_field, body.by_axis_acceleration];
+        (switches, body.doubled).hash(&mut hasher);
         body.by_accelerations.hash(&mut hasher);
         body.phase.is_some().hash(&mut hasher);
     }
@@ -239,10 +288,13 @@ fn fingerprint(reduced: &ReducedModel<Dd>) -> u64 {
 /// A change of one body's form; made again, it is taken back.
 type Move = Box<dyn Fn(&mut Choice, usize)>;
 
-fn moves(options: &Options, forms: Forms) -> Vec<Move> {
+/// All changes, and how many of them, the first ones, may save much.
+fn moves(options: &Options, forms: Forms, function: Function) -> (Vec<Move>, usize) {
     type Flags = fn(&mut Choice) -> &mut Vec<bool>;
     // the frames in which parameters are given would have to be known where they are made
     let frames = options.scene.parameters.is_empty();
+    // ways to form moments, of which H has none
+    let rotations = forms.rotations && function != Function::MassMatrix;
     let all: [(bool, Flags); 13] = [
         (forms.stays, |c| &mut c.stays),
         (forms.origins && frames, |c| &mut c.origin_at_parent),
@@ -252,33 +304,50 @@ fn moves(options: &Options, forms: Forms) -> Vec<Move> {
         (forms.tips && frames, |c| &mut c.shifted_tips[0]),
         (forms.tips && frames, |c| &mut c.shifted_tips[1]),
         (forms.parameters, |c| &mut c.regrouped),
-        (forms.rotations, |c| &mut c.by_axis_acceleration),
-        (forms.rotations, |c| &mut c.by_accelerations[0]),
-        (forms.rotations, |c| &mut c.by_accelerations[1]),
-        (forms.rotations, |c| &mut c.doubled[0]),
-        (forms.rotations, |c| &mut c.doubled[1]),
+        (rotations, |c| &mut c.by_axis_acceleration),
+        (rotations, |c| &mut c.by_accelerations[0]),
+        (rotations, |c| &mut c.by_accelerations[1]),
+        (rotations, |c| &mut c.doubled[0]),
+        (rotations, |c| &mut c.doubled[1]),
     ];
-    let flips = all.into_iter().filter(|(free, _)| *free);
-    let mut moves: Vec<Move> =
-        flips.map(|(_, flag)| Box::new(move |c: &mut Choice, i: usize| flag(c)[i] ^= true) as Move).collect();
+    let minor: [(bool, Flags); 4] = [
+        (forms.parameters, |c| &mut c.axial_balances[0]),
+        (forms.parameters, |c| &mut c.axial_balances[1]),
+        (rotations, |c| &mut c.turns_sums),
+        (rotations, |c| &mut c.other_acceleration),
+    ];
+    let flip = |(_, flag): (bool, Flags)| Box::new(move |c: &mut Choice, i: usize| flag(c)[i] ^= true) as Move;
+    let mut moves: Vec<Move> = all.into_iter().filter(|(free, _)| *free).map(flip).collect();
     for (kind, component) in (0..9).map(|k| (k / 3, k % 3)).filter(|_| forms.parameters) {
         moves.push(Box::new(move |c: &mut Choice, i: usize| {
             let vanishes = &mut c.vanish_at_parent[kind][i];
             *vanishes = if *vanishes == Some(component) { None } else { Some(component) };
         }));
     }
-    moves
+    let major = moves.len();
+    moves.extend(minor.into_iter().filter(|(free, _)| *free).map(flip));
+    (moves, major)
 }
 
 /// What may change.
 struct Ways {
     moves: Vec<Move>,
+    /// So many of them, the first ones, may save much.
+    major: usize,
+    /// Which of them moves origins.
+    origins: Option<usize>,
     /// How many joints stand before each body.
     depth: Vec<usize>,
     fixed_unit: bool,
+    /// Whether angles of parallel joints may be added.
+    angle_sums: bool,
 }
 
 impl Ways {
+    fn deepest(&self) -> usize {
+        self.depth.iter().copied().max().unwrap_or(0)
+    }
+
     fn moved(&self, choice: &Choice, change: &Move, depth: usize) -> Choice {
         let mut changed = choice.clone();
         (0..self.depth.len()).filter(|i| self.depth[*i] == depth).for_each(|i| change(&mut changed, i));
@@ -323,30 +392,20 @@ fn improved(
     for (i, body) in bodies.iter().enumerate() {
         depth[i] = body.parent.map_or(0, |p| depth[p] + 1);
     }
-    let deepest = depth.iter().copied().max().unwrap_or(0);
     // the unit would have to be known where gravity or parameters are made
     let fixed_unit = !forms.unit || options.scene.gravity == Gravity::Input || !options.scene.parameters.is_empty();
-    let ways = Ways { moves: moves(options, forms), depth, fixed_unit };
+    let origins = (forms.origins && options.scene.parameters.is_empty()).then_some(usize::from(forms.stays));
+    let ((moves, major), angle_sums) = (moves(options, forms, function), optimisations.angle_sums);
+    let ways = Ways { moves, major, origins, depth, fixed_unit, angle_sums };
     let mut best = (plain, NEVER);
     for choice in [first, best.0.clone()] {
         if let Some(price) = search.attempt(&choice, best.1) {
             best = (choice, price);
         }
     }
-    best = search.descend(best, ENOUGH, &ways);
+    best = search.descend(best, ENOUGH, &ways, ways.major);
     let enough = if search.work > ENOUGH { search.work } else { search.work + MORE };
-    let origins: Move = Box::new(|c, i| c.origin_at_parent[i] ^= true);
-    for d in (0..=deepest).filter(|_| forms.origins && options.scene.parameters.is_empty()) {
-        if search.work >= enough {
-            break;
-        }
-        let moved = ways.moved(&best.0, &origins, d);
-        let hash = search.set(&moved);
-        let Some(price) = search.tried.get(&hash).copied().filter(|price| *price < NEVER) else { continue };
-        let found = search.descend((moved, price), enough, &ways);
-        if found.1 < best.1 {
-            best = found;
-        }
-    }
-    best.0
+    // what saves little by itself comes later, so that it is not in the way of what saves much
+    best = search.descend(best, enough, &ways, ways.moves.len());
+    search.around(best, enough, &ways).0
 }

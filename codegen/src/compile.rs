@@ -2,7 +2,7 @@
 
 use crate::certify::companion::Bits;
 use crate::certify::{self, Effort};
-use crate::choose::choose;
+use crate::choose::{choose, price};
 use crate::contact;
 use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
@@ -237,15 +237,30 @@ fn optimised_with(
         verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
         graph
     };
-    let chosen = (optimisations.chosen && optimisations.reduced)
-        .then(|| choose(robot, frames, function, options, Optimisations { chosen: false, ..optimisations }));
-    let robot = chosen.as_ref().unwrap_or(robot);
-    let (traced, choice) = traced(robot, frames, function, options, optimisations);
-    let graph = check(unread_inputs(check(dead_code(&check(traced))), is_optional));
-    let graph = match optimisations.sums {
-        true => check(dead_code(&check(sums(&graph)))),
-        false => graph,
+    let finished = |robot: &Robot, options: &Options, optimisations: Optimisations| {
+        let (traced, choice) = traced(robot, frames, function, options, optimisations);
+        let graph = check(unread_inputs(check(dead_code(&check(traced))), is_optional));
+        let graph = match optimisations.sums {
+            true => check(dead_code(&check(sums(&graph)))),
+            false => graph,
+        };
+        (graph, choice)
     };
+    if !(optimisations.chosen && optimisations.reduced) {
+        return finished(robot, options, optimisations);
+    }
+    let chosen = choose(robot, frames, function, options, Optimisations { chosen: false, ..optimisations });
+    let (graph, choice) = finished(&chosen, options, optimisations);
+    // by the bodies' own parameters in their own frames, where those have more zeros; the method stays
+    let same_method = choice.map_or(options.forward_dynamics, |choice| choice.method());
+    let same_method = Options { forward_dynamics: same_method, ..options.clone() };
+    let of_bodies = Optimisations { reduced: false, ..optimisations };
+    if function.has_reduced_form() {
+        let (counts, ..) = candidate(robot, frames, function, &same_method, of_bodies);
+        if price(counts) < price(graph.counts()) {
+            return (finished(robot, &same_method, of_bodies).0, choice);
+        }
+    }
     (graph, choice)
 }
 
@@ -265,18 +280,18 @@ fn traced(
     function.trace(robot, frames, method, rules, options.scalar, optimisations.reduced, &options.scene)
 }
 
-/// What [`optimised`] would take for a robot in the reduced forms that it is in, and the equations as traced: without writing the
-/// graph, for a search over many forms.
-pub(crate) fn candidate_counts(
+/// What [`optimised`] would take for a robot in the reduced forms that it is in, the equations as traced, and the method of forward
+/// dynamics that was chosen: without writing the graph, for a search over many forms.
+pub(crate) fn candidate(
     robot: &Robot,
     frames: &[String],
     function: Function,
     options: &Options,
     optimisations: Optimisations,
-) -> (Counts, Graph) {
-    let (graph, _) = traced(robot, frames, function, options, optimisations);
+) -> (Counts, Graph, Option<MethodChoice>) {
+    let (graph, method) = traced(robot, frames, function, options, optimisations);
     let counts = if optimisations.sums { count_sums(&graph) } else { graph.counts() };
-    (counts, graph)
+    (counts, graph, method)
 }
 
 /// What the compiler makes of a robot file.

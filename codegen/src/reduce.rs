@@ -29,6 +29,13 @@ pub struct Choice {
     /// Of which bodies' mass, axial first moment and axial second moment only so much goes to the parent that there this component
     /// of m c, of m c and of the diagonal of Σ vanishes, instead of all of it.
     pub vanish_at_parent: [Vec<Option<usize>>; 3],
+    /// Of which bodies' axial second moment as much stays that Σ_zz = −Σ_xx, or else −Σ_yy: then one principal entry of J vanishes,
+    /// which is cheaper where only ε turns the body.
+    pub axial_balances: [Vec<bool>; 2],
+    /// Bodies for which [`ReducedBody::shares_axis_field`] is turned round.
+    pub other_acceleration: Vec<bool>,
+    /// [`ReducedBody::turns_sums`].
+    pub turns_sums: Vec<bool>,
     /// Tips turned about their axis so that m c_y, Σ_xy or else Σ_yz vanishes.
     pub turned_tips: [Vec<bool>; 3],
     /// Tips whose origin is moved along their axis so that Σ_xz, or else Σ_yz, vanishes.
@@ -54,6 +61,9 @@ impl Choice {
             regrouped: vec![true; n],
             doubled: [none.clone(), none.clone()],
             vanish_at_parent: [0; 3].map(|_| vec![None; n]),
+            axial_balances: [0; 2].map(|_| none.clone()),
+            other_acceleration: none.clone(),
+            turns_sums: none.clone(),
             turned_tips: [0; 3].map(|_| none.clone()),
             shifted_tips: [0; 2].map(|_| none.clone()),
             origin_at_parent: none,
@@ -76,7 +86,8 @@ pub fn reduce(model: &Model<Dd>, choice: &Choice) -> (ReducedModel<Dd>, Vec<Tran
         shift_tip(&mut bodies[i], [0, 1].map(|k| choice.shifted_tips[k][i]));
     }
     for i in (0..bodies.len()).rev().filter(|i| choice.regrouped[*i]) {
-        regroup(&mut bodies, i, [0, 1, 2].map(|k| choice.vanish_at_parent[k][i]));
+        let balances = [0, 1].map(|k| choice.axial_balances[k][i]);
+        regroup(&mut bodies, i, [0, 1, 2].map(|k| choice.vanish_at_parent[k][i]), balances);
     }
     let adds_angles = choice.adds_angles;
     let mut reduced = ReducedModel { bodies, gravity: model.gravity, per_unit: Dd::ONE, adds_angles };
@@ -86,6 +97,8 @@ pub fn reduce(model: &Model<Dd>, choice: &Choice) -> (ReducedModel<Dd>, Vec<Tran
         if adds_angles && body.kind == JointKind::Revolute {
             (body.offset, body.phase) = apart(body.offset);
         }
+        body.turns_sums = choice.turns_sums[i] && body.stays;
+        body.shares_axis_field ^= choice.other_acceleration[i] && body.kind == JointKind::Revolute;
         body.by_axis_acceleration = choice.by_axis_acceleration[i] && body.kind != JointKind::Prismatic;
         body.by_accelerations = [0, 1].map(|k| choice.by_accelerations[k][i] && body.kind != JointKind::Prismatic);
         let derived = body.kind == JointKind::Revolute && body.shares_axis_field && !body.stays;
@@ -380,6 +393,7 @@ fn in_new_frame(model: &Model<Dd>, frames: &[Transform<Dd>], i: BodyId, body: &B
         permutes,
         parallel: parallel && rotation == Mat3::identity(),
         stays: false,
+        turns_sums: false,
         by_axis_acceleration: false,
         by_accelerations: [false; 2],
         doubled: [false; 2],
@@ -414,8 +428,9 @@ fn split_turn(r: &Mat3<Dd>) -> (Mat3<Dd>, (Dd, Dd)) {
 /// Moves what a joint's torque cannot tell from the parent's to the parent (Khalil and Dombre 2002, chapter 9, in second
 /// moments): what lies on a revolute axis; of a sliding body all of the second moment.
 ///
-/// Any part of it may stay: where `vanish` says so, as much is moved as makes that component of the parent vanish.
-fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, vanish: [Option<usize>; 3]) {
+/// Any part of it may stay: where `vanish` says so, as much is moved as makes that component of the parent vanish; where
+/// `balances` says so, as much as leaves Σ_zz = −Σ_xx or −Σ_yy.
+fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, vanish: [Option<usize>; 3], balances: [bool; 2]) {
     let body = bodies[i].clone();
     let zero = Dd::ZERO;
     let (rotation, a, p) = (body.rotation, body.rotation.column(2), body.translation);
@@ -441,6 +456,8 @@ fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, vanish: [Option<usize>; 3])
                 if let Some(k) = by(vanish[2], &a) {
                     let two = Dd::from(2.0);
                     szz = -(s[k] + p[k] * p[k] * m + two * p[k] * a[k] * mz) / (a[k] * a[k]);
+                } else if let Some(k) = balances.iter().position(|b| *b) {
+                    szz = body.second_moment.zz + [body.second_moment.xx, body.second_moment.yy][k];
                 }
             }
             let own = &mut bodies[i];

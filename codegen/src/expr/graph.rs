@@ -217,6 +217,9 @@ impl Counts {
     }
 }
 
+/// As many multiplications or additions a division or a square root weighs.
+pub const DIVISION: usize = 10;
+
 /// Five additions find what a sum lost, one adds it to what other sums lost.
 pub const TAIL: usize = 6;
 

@@ -267,6 +267,12 @@ impl Function {
         }
     }
 
+    /// Whether the reduced robot serves it: torques, H and what is made of them.
+    pub(crate) fn has_reduced_form(self) -> bool {
+        use Function::*;
+        matches!(self, InverseDynamics | GravityForce | BiasForce | VelocityForce | MassMatrix | ForwardDynamics)
+    }
+
     /// The functions that it combines; none for a plain one.
     pub fn members(self) -> &'static [Function] {
         COMBINATIONS.iter().find(|(entry, _)| entry.function == self).map_or(&[], |(_, members)| members)

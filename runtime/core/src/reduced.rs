@@ -48,6 +48,9 @@ pub struct ReducedBody<T> {
     /// Described in the axes that its joint, or the first of a chain of parallel joints that all stay, has before it
     /// turns; for a body whose children, if any, are all [parallel](Self::parallel).
     pub stays: bool,
+    /// Of a body that [stays](Self::stays), the moment of m c and of Σ_xz, Σ_yz about the axis from sums in the axes before the turn, of
+    /// which one component is turned back, instead of turned parameters: cheaper where nothing else needs those.
+    pub turns_sums: bool,
     /// Moment about the axis by ε_z (Σ_xx + Σ_yy) + ω_x ω_y (Σ_xx − Σ_yy) instead of U₂₁ Σ_xx − U₁₂ Σ_yy.
     pub by_axis_acceleration: bool,
     /// Moment about x by U₂₃ (Σ_yy − Σ_zz) + 2 ε_x Σ_yy instead of U₃₂ Σ_yy − U₂₃ Σ_zz, and about y by U₁₃ (Σ_zz − Σ_xx) +
@@ -101,6 +104,7 @@ impl<T: Real> ReducedModel<T> {
             permutes: b.permutes,
             parallel: b.parallel,
             stays: b.stays,
+            turns_sums: b.turns_sums,
             by_axis_acceleration: b.by_axis_acceleration,
             by_accelerations: b.by_accelerations,
             doubled: b.doubled,

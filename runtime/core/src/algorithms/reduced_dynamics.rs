@@ -370,11 +370,23 @@ impl<T: Real> Link<T> {
         // U₃₂ = U₂₃ + 2 ε_x,  U₃₁ = U₁₃ − 2 ε_y
         let about_x = if by_x { u23 * (s.yy - s.zz) + alpha.x * (s.yy + s.yy) } else { u32 * s.yy - u23 * s.zz };
         let about_y = if by_y { u13 * (s.zz - s.xx) + alpha.y * (s.xx + s.xx) } else { u13 * s.zz - u31 * s.xx };
+        let about_axis = about_axis + d.z * s.xy;
+        let a = self.accel;
+        let of_pairs = match turn.angle {
+            // with complex numbers m c = x + i y, Im(conj(m c e^iθ) a) = Im(e^−iθ conj(m c) a), and so for Σ_xz + i Σ_yz and U z
+            Some((sin, cos)) if body.stays && body.turns_sums => {
+                let own_ms = body.first_moment;
+                let along = own_ms.x * a.x + own_ms.y * a.y + own.xz * u13 + own.yz * u23;
+                let across = own_ms.x * a.y - own_ms.y * a.x + own.xz * u23 - own.yz * u13;
+                cos * across - sin * along
+            }
+            _ => u23 * s.xz - u13 * s.yz + (ms.x * a.y - ms.y * a.x),
+        };
         let moment = Vec3::new(
-            about_x + u31 * s.xy - u21 * s.xz + d.x * s.yz,
-            about_y + u12 * s.yz - u32 * s.xy + d.y * s.xz,
-            about_axis + u23 * s.xz - u13 * s.yz + d.z * s.xy,
+            about_x + u31 * s.xy - u21 * s.xz + d.x * s.yz + (ms.y * a.z - ms.z * a.y),
+            about_y + u12 * s.yz - u32 * s.xy + d.y * s.xz + (ms.z * a.x - ms.x * a.z),
+            about_axis + of_pairs,
         );
-        ForceVector { moment: moment + ms.cross(self.accel), force: self.accel.scale(body.mass) + *u * ms }
+        ForceVector { moment, force: a.scale(body.mass) + *u * ms }
     }
 }
