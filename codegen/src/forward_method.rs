@@ -7,8 +7,8 @@
 //! so the choice is, too.
 //!
 //! What is weighed is multiplications and additions one by one, also where they will be fused: the factorisation fuses more of them,
-//! but its sums wait for each other. Quadrupeds (18 coordinates) take 4 to 24 % longer by a factorisation with 2 % fewer to 2 % more
-//! operations, fused or not, arms of up to 7 joints 11 to 28 % less with 8 to 18 % fewer (x86-64 with and without AVX-512).
+//! but its sums wait for each other. Measured on x86-64 with and without AVX-512, fused and not: quadrupeds (18 coordinates) take 4
+//! to 25 % longer by a factorisation with 2 % fewer to 2 % more operations; arms of 6 and 7 joints 1 to 31 % less with 8 to 18 % fewer.
 
 use crate::emit::Scalar;
 use crate::expr::{evaluate, Graph, Port, DIVISION};
