@@ -3,7 +3,7 @@
 
 use straightline_codegen::certify::residual::acceleration_bound;
 use straightline_codegen::certify::search;
-use straightline_codegen::compile::{Optimisations, Options};
+use straightline_codegen::compile::{compile, Optimisations, Options};
 use straightline_codegen::contact::{self, Mode};
 use straightline_codegen::diagnostic::Diagnostics;
 use straightline_codegen::emit::Scalar;
@@ -369,4 +369,52 @@ fn of_redundant_contacts_nothing_is_proven_but_the_mass_matrix_is() {
             assert!(eigenvalues[0] > 0.0 && (eigenvalues[1].is_nan() || eigenvalues[1] == 0.0), "{bounds:?}");
         }
     }
+}
+
+/// What rustc makes of the text is the program that was analysed, in a module of f64 and one of f32.
+#[test]
+fn the_text_of_a_bound_computes_its_bits() {
+    let scene = contact_of("tool0", "constrained = [\"pz\", \"ax\"]")
+        + "[outputs]\nfunctions = [\"forward_dynamics\"]\ncontact = [\"forward_dynamics\"]\n[numbers]\nscalar = [\"f64\", \"f32\"]\n\
+           certify_state = true\n";
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions/ur5.urdf");
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let whole = options(&scene, false, Scalar::F64);
+    let generated = compile(&Source::new("ur5.urdf", text), &whole).unwrap_or_else(|e| panic!("{}", e.render()));
+    let mut main = String::new();
+    let mut expected = Vec::new();
+    for (scalar, module) in [(Scalar::F64, ""), (Scalar::F32, "single::")] {
+        let options = Options { scalar, also: Vec::new(), ..whole.clone() };
+        let robot = robot("ur5.urdf", None, &options);
+        let modes = Mode::all(&options.scene);
+        let (system, yielding) = contact::system(&robot, &options, &modes[0], options.optimisations());
+        let bound = acceleration_bound(&system, &yielding, scalar).expect("the program is short");
+        let input: Vec<f64> = (0..26).map(|k| f64::from(((0.3 + 0.17 * f64::from(k)).sin()) as f32)).collect();
+        expected.extend(search::computed_at(&bound, scalar, &input));
+        let part = |range: std::ops::Range<usize>| format!("{:?}", &input[range]);
+        main.push_str(&format!(
+            "{{ type T = {}; let (mut a, mut f, mut h, mut c) = ([0.0 as T; 6], [0.0 as T; 2], [0.0 as T], [0.0 as T]);\n\
+             {module}contact::tool0::forward_dynamics_error_bound(&{}, &{}, &{}, &{}, &{}, &mut a, &mut f, &mut h, &mut c);\n\
+             for x in a.iter().chain(&f).chain(&h).chain(&c) {{ println!(\"{{:e}}\", f64::from(*x)); }} }}\n",
+            scalar.name(),
+            part(0..6),
+            part(6..12),
+            part(12..18),
+            part(18..24),
+            part(24..26)
+        ));
+    }
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("acceleration_bounds");
+    std::fs::create_dir_all(&folder).expect("a folder for the program");
+    let (source, binary) = (folder.join("main.rs"), folder.join("main"));
+    std::fs::write(&source, format!("{}\nfn main() {{\n{main}}}\n", generated.text)).expect("the program is written");
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let mut command = std::process::Command::new(rustc);
+    command.args(["--edition", "2021", "-C", "opt-level=1", "-A", "warnings", "-o"]).arg(&binary).arg(&source);
+    let compiled = command.output().expect("rustc runs");
+    assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
+    let ran = std::process::Command::new(&binary).output().expect("the program runs");
+    let found: Vec<f64> = String::from_utf8_lossy(&ran.stdout).lines().map(|l| l.parse().expect("a number")).collect();
+    assert_eq!(found, expected);
+    assert!(found.iter().all(|x| *x > 0.0), "{found:?}");
 }

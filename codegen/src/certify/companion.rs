@@ -19,8 +19,11 @@ pub enum Bits {
 /// is one in f64. Where a divisor may vanish, a root has none, or a sign may be wrong, the bound is NaN.
 ///
 /// # Errors
-/// If it would be so long that its own roundings count.
+/// If it would be so long that its own roundings count, or takes parameters in mixed precision.
 pub fn state_bound(graph: &Graph, scalar: Scalar, bits: Bits) -> Result<Graph, &'static str> {
+    if !graph.widths.is_empty() && graph.inputs.iter().any(|p| p.wrapper.is_some()) {
+        return Err("parameters that are inputs are in f32, and the bound of mixed precision is in f64");
+    }
     let format = Format::of(scalar);
     let ports = graph.inputs.clone();
     let program = match (graph.widths.is_empty(), bits) {

@@ -14,6 +14,7 @@
 //! * **columns**: terms k g_i of several members with one coefficient k are k times a vector: at most |k| ‖(g_i)‖.
 //! * **scaling**: g = C a with values C before adjoints a of one vector ⇒ ‖g‖ ≤ ‖C‖_F ‖a‖; for C = (x, y; −y, x), the derivatives by cosine and
 //!   sine of one turn, ‖C‖ = ‖(x, y)‖, as CᵀC = (x² + y²) 1. One form Σ x_k a_k is at most ‖x‖ ‖a‖.
+//! * **products**: of a product a b of two values |a b| ≤ (a² + b²)/2 = ‖(a, b)‖²/2, since (|a| − |b|)² ≥ 0.
 //!
 //! The same rules serve adjoints, because the chain rule through a rotation is the rotation back.
 

@@ -5,7 +5,7 @@
 //! H q̈ + h = τ + Ĵᵀ F, and for each row of the contact s̈ = J q̈ + A = s̈* (rigid) or F = −(m s̈ + load) (yielding),
 //!
 //! the [`system`](crate::contact::system) has what is left at the given q̈ and F, r = τ + Ĵᵀ F − ID(q, q̇, q̈) and c = s̈* − J q̈ − A or
-//! c = −(m s̈ + load) − F, and H, J, Ĵ, m; all with their [running bounds](super::running). The errors δ of q̈ and φ of F obey
+//! c = −(m s̈ + load) − F, and H, J, Ĵ, m; all with their running bounds (`running.rs`). The errors δ of q̈ and φ of F obey
 //!
 //! H δ = r + Ĵᵀ φ,  κ J δ + σ φ = c,  with κ = 1, σ = 0 of rigid rows and κ = m, σ = 1 of yielding ones.
 //!
