@@ -13,6 +13,10 @@ const DUST: f64 = 1e-28;
 /// Below this sine two axes are taken as parallel when a frame is chosen; the transform itself stays exact.
 const NEARLY_PARALLEL: f64 = 1e-4;
 
+/// So many times as far as the next origin the foot of a common normal may be: beyond, axes are so nearly parallel that the lever
+/// would cancel.
+const FAR: f64 = 10.0;
+
 /// What is free in a reduced form; torques depend on none of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
@@ -273,7 +277,13 @@ fn foot_before(model: &Model<Dd>, body: &Body<Dd>) -> Option<Dd> {
     let sine2 = u.x * u.x + u.y * u.y;
     // foot on {p + s u} of the common normal with the parent's z axis: (p + s u) · (u − u_z z) = 0
     let foot = || -(p.dot(u) - p.z * u.z) / sine2;
-    (turns(body) && turns(parent) && sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL).then(foot)
+    let found = (turns(body) && turns(parent) && sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL).then(foot);
+    found.filter(|height| !is_far(*height, p))
+}
+
+/// Whether a height on an axis is far beyond a lever.
+fn is_far(height: Dd, lever: Vec3<Dd>) -> bool {
+    height.abs().hi() > FAR * lever.dot(lever).sqrt().hi()
 }
 
 /// The frame of `body` with x along the common normal of its axis and its child's, and the origin at the normal's foot, or
@@ -290,7 +300,8 @@ fn along_common_normal(
     let slides = child.joint.kind == JointKind::Prismatic;
     let (x_axis, height) = if sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL {
         // z × u; the foot on z of the common normal of {h z} and {p + s u}; the line of a sliding joint may be anywhere
-        let height = if slides { p.z } else { (p.z - u.z * p.dot(u)) / sine2 };
+        let foot = (p.z - u.z * p.dot(u)) / sine2;
+        let height = if slides || is_far(foot - p.z, p) { p.z } else { foot };
         (unit_xy(-u.y, u.x), height)
     } else if (p.x * p.x + p.y * p.y).hi() > 1e-20 && !slides {
         (unit_xy(p.x, p.y), p.z)
@@ -313,7 +324,8 @@ fn tip_frame(model: &Model<Dd>, body: &Body<Dd>) -> Transform<Dd> {
     }
     if sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL {
         // foot on {p + s u} of the common normal with the parent's z axis: (p + s u) · (u − u_z z) = 0
-        let s = -(p.dot(u) - p.z * u.z) / sine2;
+        let foot = -(p.dot(u) - p.z * u.z) / sine2;
+        let s = if is_far(foot, p) { -(p.z * u.z) } else { foot };
         // x so that it is the parent's common normal, z × u, in own axes
         let x = r.transpose_mul(Vec3::new(-u.y, u.x, Dd::ZERO));
         pose_about_z(body, unit_xy(x.x, x.y), s, free)

@@ -155,7 +155,7 @@ fn no_robot_takes_more_operations_than_by_its_bodies_own_parameters_nor_loses_di
         chain(2, &[("prismatic", OBLIQUE)]),
         chain(3, &[("prismatic", HERE), ("revolute", OBLIQUE), ("prismatic", HARDLY)]),
         chain(4, &[("revolute", QUARTER), ("prismatic", OBLIQUE), ("prismatic", QUARTER), ("revolute", HERE)]),
-        chain(5, &[("revolute", HERE), ("revolute", HERE), ("revolute", QUARTER), ("revolute", OBLIQUE)]),
+        chain(5, &[("revolute", HERE), ("revolute", HARDLY), ("revolute", QUARTER), ("revolute", HARDLY)]),
         chain(6, &[("revolute", OBLIQUE), ("revolute", OBLIQUE), ("prismatic", HERE), ("revolute", QUARTER)]),
     ];
     let options = Options::default();
