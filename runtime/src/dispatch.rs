@@ -3,7 +3,7 @@
 //! A function with `#[target_feature]` is compiled for instructions that the rest of the program may not use; a batch that
 //! becomes part of it, because everything in it is `#[inline(always)]`, is compiled for them, too. Calling such a function is
 //! `unsafe` for one reason: the machine must have the instructions. It is asked first. The instruction that begins to read
-//! memory takes a pointer, which may be any; here it is a reference.
+//! memory takes a pointer, which may be any.
 #![allow(unsafe_code)] // the calls into functions for other instructions, and prefetching; nothing else here is unsafe
 
 use crate::batch::{Job, Machine, Plain};
@@ -43,17 +43,24 @@ fn run<const AVX512: usize, const AVX2: usize, const OTHER: usize>(job: impl Job
     job.run::<OTHER, FUSED, Plain>();
 }
 
-/// Reads ahead into the second-level cache: the first one holds the block that is computed.
+/// Reads ahead.
 #[cfg(target_arch = "x86_64")]
 struct X86;
 
 #[cfg(target_arch = "x86_64")]
 impl Machine for X86 {
     #[inline(always)]
-    fn prefetch<T>(place: &T) {
-        use core::arch::x86_64::{_mm_prefetch, _MM_HINT_T1};
+    fn prefetch<T>(place: *const T) {
+        use core::arch::x86_64::{_mm_prefetch, _MM_HINT_T0};
         // SAFETY: every x86-64 machine has the instruction, and no pointer makes it fail
-        unsafe { _mm_prefetch::<_MM_HINT_T1>(core::ptr::from_ref(place).cast()) }
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(place.cast()) }
+    }
+
+    #[inline(always)]
+    fn prefetch_far<T>(place: *const T) {
+        use core::arch::x86_64::{_mm_prefetch, _MM_HINT_T1};
+        // SAFETY: as above
+        unsafe { _mm_prefetch::<_MM_HINT_T1>(place.cast()) }
     }
 }
 

@@ -16,8 +16,10 @@ pub trait Program<T, const IN: usize, const OUT: usize> {
 
 /// What a machine can do beside computing.
 pub trait Machine {
-    /// Begins to read what stands there into a cache, and does not wait for it.
-    fn prefetch<T>(place: &T);
+    /// Begins to read what stands there into the first-level cache, and does not wait for it; the place need not exist.
+    fn prefetch<T>(place: *const T);
+    /// As [`Machine::prefetch`], into the second-level cache.
+    fn prefetch_far<T>(place: *const T);
 }
 
 /// A machine that is asked for nothing but computing.
@@ -26,7 +28,9 @@ pub struct Plain;
 
 impl Machine for Plain {
     #[inline(always)]
-    fn prefetch<T>(_: &T) {}
+    fn prefetch<T>(_: *const T) {}
+    #[inline(always)]
+    fn prefetch_far<T>(_: *const T) {}
 }
 
 /// A batch that is ready to run.
@@ -96,11 +100,13 @@ pub fn run_f32(job: impl Job) {
     job.run::<LANES_F32, FUSED, Plain>();
 }
 
-/// A machine foresees what is read next of some twenty slices at once. With more than that many, each block would wait for its
-/// components; so they are asked for in advance.
-const FORESEEN: usize = 40;
-/// So many bytes of each in advance: enough for the slowest memory, few enough for a second-level cache.
-const AHEAD: usize = 1024;
+/// Bytes that memory hands over together.
+const LINE: usize = 64;
+/// A first-level cache holds what is read ahead of so many slices; of more of them, the second one does.
+const NEAR: usize = 40;
+/// So many lines ahead: by then they are there, and not yet gone.
+const LINES_NEAR: usize = 2;
+const LINES_FAR: usize = 16;
 
 /// A batch in structure-of-arrays layout: a slice per component, each with as many numbers as there are states.
 #[derive(Debug)]
@@ -142,10 +148,16 @@ impl<P: Program<T, IN, OUT>, T: Copy + Default, const IN: usize, const OUT: usiz
         let mut start = 0;
         while start < states {
             let there = N.min(states - start);
-            let ahead = start + AHEAD / size_of::<T>();
-            if IN + OUT > FORESEEN && ahead < states {
-                x.iter().for_each(|component| M::prefetch(&component[ahead]));
-                y.iter().for_each(|component| M::prefetch(&component[ahead]));
+            // a machine foresees what is read next of a few slices; with more of them each block would wait for its numbers, so
+            // they are asked for in advance, line by line
+            let begins_line = start * size_of::<T>() % LINE < N * size_of::<T>();
+            let next = |lines: usize| start + lines * LINE / size_of::<T>();
+            if IN + OUT > NEAR {
+                x.iter().for_each(|c| M::prefetch_far(c.as_ptr().wrapping_add(next(LINES_FAR))));
+                y.iter().for_each(|c| M::prefetch_far(c.as_ptr().wrapping_add(next(LINES_FAR))));
+            } else if begins_line {
+                x.iter().for_each(|c| M::prefetch(c.as_ptr().wrapping_add(next(LINES_NEAR))));
+                y.iter().for_each(|c| M::prefetch(c.as_ptr().wrapping_add(next(LINES_NEAR))));
             }
             for (lanes, component) in block.iter_mut().zip(&x) {
                 let component = &component[start..start + there];

@@ -15,14 +15,19 @@ mod dynamics;
 #[cfg(feature = "avx2")]
 mod dispatch {
     use crate::dynamics::batch::{Job, Machine};
-    use core::arch::x86_64::{_mm_prefetch, _MM_HINT_T1};
+    use core::arch::x86_64::{_mm_prefetch, _MM_HINT_T0, _MM_HINT_T1};
 
     struct X86;
 
     impl Machine for X86 {
         #[inline(always)]
-        fn prefetch<T>(place: &T) {
-            unsafe { _mm_prefetch::<_MM_HINT_T1>(core::ptr::from_ref(place).cast()) }
+        fn prefetch<T>(place: *const T) {
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(place.cast()) }
+        }
+
+        #[inline(always)]
+        fn prefetch_far<T>(place: *const T) {
+            unsafe { _mm_prefetch::<_MM_HINT_T1>(place.cast()) }
         }
     }
 
@@ -99,8 +104,19 @@ mod calls {
 /// Random states, structure of arrays, and room for results.
 pub struct Batch {
     states: usize,
-    inputs: [Vec<Number>; 3],
-    results: Vec<Number>,
+    inputs: [&'static mut [Number]; 3],
+    results: &'static mut [Number],
+}
+
+/// Numbers that begin where a line of a cache does, as those of the harness do; they are never freed.
+fn aligned(numbers: impl ExactSizeIterator<Item = Number>) -> &'static mut [Number] {
+    const LINE: usize = 64 / size_of::<Number>();
+    let count = numbers.len();
+    let mut room: Vec<Number> = Vec::with_capacity(count + LINE);
+    let first = room.as_ptr().align_offset(64);
+    room.resize(first, 0.0);
+    room.extend(numbers);
+    &mut room.leak()[first..]
 }
 
 /// A batch for [`batch_run`], which is never freed.
@@ -113,10 +129,11 @@ pub extern "C" fn batch_of(states: c_long) -> *mut Batch {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (seed as f32 / u32::MAX as f32 * 2.0 - 1.0) as Number
         };
-        (0..states * width).map(|_| next()).collect::<Vec<Number>>()
+        aligned((0..states * width).map(|_| next()))
     };
     let inputs = [random(NQ), random(NV), random(NV)];
-    Box::into_raw(Box::new(Batch { states, inputs, results: vec![0.0; states * NV] }))
+    let results = aligned((0..states * NV).map(|_| 0.0));
+    Box::into_raw(Box::new(Batch { states, inputs, results }))
 }
 
 /// Inverse dynamics (0) or forward dynamics (1) of the batch; its first result.
