@@ -45,7 +45,10 @@ pub fn c_package(generated: &Generated, prefix: &str) -> Vec<(String, String)> {
         files.push(("src/dispatch.rs".to_string(), DISPATCH.to_string()));
     }
     if package.calls_kernel() {
-        files.push(("src/dynamics/trig.rs".to_string(), emit::kernel(generated.lanes.is_some()).into_owned()));
+        files.push((
+            "src/dynamics/trig.rs".to_string(),
+            emit::kernel(generated.lanes.is_some(), generated.style.fused).into_owned(),
+        ));
     }
     files
 }
@@ -92,7 +95,11 @@ impl Package<'_> {
 
     /// The module of one function.
     fn function(&self, item: &Item) -> String {
-        let kernel = if item.text.calls_kernel() { "use super::trig;\n" } else { "" };
+        let kernel = match (item.text.calls_kernel(), self.generated.style.fused) {
+            (false, _) => "",
+            (true, false) => "use super::trig;\n",
+            (true, true) => "#[allow(unused_imports)]\nuse super::trig;\n",
+        };
         let batch = if item.lanes.is_empty() { "" } else { "use super::batch;\n" };
         let types: String = item
             .inputs
@@ -101,7 +108,7 @@ impl Package<'_> {
             .map(|wrapper| format!("use super::{wrapper};\n"))
             .collect();
         let fused = if self.generated.style.fused {
-            "#[allow(unused_imports)]\nuse super::fused::{fma, fma_if, FUSED};\n"
+            "#[allow(unused_imports)]\nuse super::fused::{self, fma, fma_if, FUSED};\n"
         } else {
             ""
         };
@@ -146,7 +153,7 @@ overflow-checks = false
         let g = self.generated;
         let mut out = emit::preamble(&g.model, &g.frames, &g.report, &g.provenance, g.scalar, &g.types);
         if g.style.fused {
-            out.push_str(&emit::fused::module(g.scalar));
+            out.push_str(&emit::fused::module(g.scalar, self.calls_kernel()));
         }
         for item in &self.generated.items {
             let name = item.function.name();

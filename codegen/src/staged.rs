@@ -307,7 +307,7 @@ fn text(
          pub mod staged {\n",
     );
     if options.fma {
-        out.push_str("    #[allow(unused_imports)]\n    use super::fused::fma;\n");
+        out.push_str("    #[allow(unused_imports)]\n    use super::fused::{self, fma};\n");
     }
     let imports = if kernel { "    use super::trig;\n" } else { "" };
     out.push_str(imports);

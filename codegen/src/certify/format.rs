@@ -4,8 +4,8 @@ use super::interval::{add_up, norm_up, Interval};
 use crate::emit::Scalar;
 use straightline_core::{trig, Dd};
 
-/// The bound of the cosine kernel, in both formats \[ulp\]: see `trig.rs`.
-const COSINE_KERNEL_ULPS: f64 = 0.615;
+/// The bound of the cosine kernel, in both formats \[ulp\]: see `trig.rs`; of sums of far angles in f32 2^-32 more.
+const COSINE_KERNEL_ULPS: f64 = 0.622;
 
 /// A binary floating-point format, with the proven error of its sine and cosine.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +37,8 @@ impl Format {
                 u: f64::from(f32::EPSILON) / 2.0,
                 tiny: f64::from(f32::MIN_POSITIVE),
                 largest: f64::from(f32::MAX),
-                trig_ulps: 0.798,
+                // 0.801, and the 2^-32 more of sums of far angles
+                trig_ulps: 0.806,
                 trig_domain: f64::from(trig::DOMAIN_F32),
             },
         }

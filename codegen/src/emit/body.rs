@@ -193,7 +193,7 @@ fn statements(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) 
         .iter()
         .chain(&graph.outputs)
         .map(|p| p.name.as_str())
-        .chain(["live", "trig", "lane", "fma", "fma_if", "number"]);
+        .chain(["live", "trig", "lane", "fma", "fma_if", "fused", "number"]);
     let (fused, absorbed) = match style.fused {
         true => fusions(graph, part),
         false => (vec![None; graph.ops.len()], vec![false; graph.ops.len()]),
@@ -463,10 +463,10 @@ impl Body<'_> {
             (true, true) => ("sin_cos_of_pair", "sin_cos_lanes_of_pairs"),
         };
         if let ([s], [c], [angle]) = (sines, cosines, arguments.as_slice()) {
-            let single = self.style.kernel(single);
+            let single = self.style.sin_cos(single);
             let _ = writeln!(self.statements, "    let ({s}, {c}) = {single}({angle});");
         } else {
-            let several = self.style.kernel(several);
+            let several = self.style.sin_cos(several);
             self.statements.push_str(&wrapped("    let ([", sines, "],"));
             self.statements.push_str(&wrapped("        [", cosines, "]) ="));
             self.statements.push_str(&wrapped(&format!("        {several}(["), &arguments, "]);"));

@@ -58,8 +58,11 @@ pub fn file(
     lanes: Option<Lanes>,
 ) -> String {
     let mut out = preamble(model, frames, report, provenance, style.scalar, types);
+    let calls_kernel = |i: &Item| i.text.calls_kernel() || i.lanes.contains("trig::");
+    let with_kernel =
+        types.contains("trig::") || types.contains("use super::super::trig;") || items.iter().any(calls_kernel);
     if style.fused {
-        out.push_str(&fused::module(style.scalar));
+        out.push_str(&fused::module(style.scalar, with_kernel));
     }
     for item in items {
         out.push('\n');
@@ -72,10 +75,9 @@ pub fn file(
     if let Some(lanes) = lanes {
         out.push_str(&batch::module(lanes));
     }
-    let calls_kernel = |i: &Item| i.text.calls_kernel() || i.lanes.contains("trig::");
-    if types.contains("trig::") || types.contains("use super::super::trig;") || items.iter().any(calls_kernel) {
+    if with_kernel {
         out.push_str("\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod trig {\n");
-        for line in kernel(lanes.is_some()).lines() {
+        for line in kernel(lanes.is_some(), style.fused).lines() {
             let line = if let Some(doc) = line.strip_prefix("//!") { format!("//{doc}") } else { line.to_string() };
             let indent = if line.is_empty() { "" } else { "    " };
             let _ = writeln!(out, "{indent}{line}");
@@ -121,10 +123,14 @@ pub fn scalar_module(scalar: Scalar, text: &str) -> String {
 
 /// The source of the sine-cosine kernel, as a module of its own. For functions over lanes it becomes part of its callers, so
 /// that a loop over lanes is free of calls.
-pub fn kernel(for_lanes: bool) -> Cow<'static, str> {
+pub fn kernel(for_lanes: bool, fused: bool) -> Cow<'static, str> {
+    let text = match TRIG.find("// With fused multiply-add:") {
+        Some(end) if !fused => TRIG[..end].trim_end(),
+        _ => TRIG,
+    };
     match for_lanes {
-        true => TRIG.replace("#[inline]", "#[inline(always)]").into(),
-        false => TRIG.into(),
+        true => text.replace("#[inline]", "#[inline(always)]").into(),
+        false => text.into(),
     }
 }
 

@@ -1,4 +1,5 @@
-//! Fused multiply-add: which products go into which sums, and the functions that compute both in one rounding.
+//! Fused multiply-add: which products go into which sums, and the functions that compute both in one rounding, sines and
+//! cosines among them.
 
 use super::Scalar;
 use crate::expr::{Graph, NodeId, Op};
@@ -55,9 +56,10 @@ pub(super) fn fusions(graph: &Graph, part: &Part) -> (Vec<Option<Fused>>, Vec<bo
     (fused, absorbed)
 }
 
-/// The module `fused` of a file whose functions are fused.
-pub fn module(scalar: Scalar) -> String {
-    MODULE.replace("f64", scalar.name())
+/// The module `fused` of a file whose functions are fused; with sines and cosines if there is a module `trig` beside it.
+pub fn module(scalar: Scalar, with_kernel: bool) -> String {
+    let kernel = if with_kernel { KERNEL } else { "" };
+    [MODULE, kernel, "}\n"].concat().replace("f64", scalar.name())
 }
 
 const MODULE: &str = r#"
@@ -89,5 +91,54 @@ mod fused {
             a * b + c
         }
     }
-}
+"#;
+
+const KERNEL: &str = r#"
+    use super::trig;
+
+    #[inline(always)]
+    pub fn sin_cos_f64(x: f64) -> (f64, f64) {
+        sin_cos_if_f64::<FUSED>(x)
+    }
+
+    #[inline(always)]
+    pub fn sin_cos_of_sum_f64(x: [f64; 2]) -> (f64, f64) {
+        sin_cos_of_sum_if_f64::<FUSED>(x)
+    }
+
+    #[inline(always)]
+    pub fn sin_cos_if_f64<const FUSED: bool>(x: f64) -> (f64, f64) {
+        if FUSED {
+            trig::sin_cos_fused_f64(x, f64::mul_add)
+        } else {
+            trig::sin_cos_f64(x)
+        }
+    }
+
+    #[inline(always)]
+    pub fn sin_cos_of_sum_if_f64<const FUSED: bool>(x: [f64; 2]) -> (f64, f64) {
+        if FUSED {
+            trig::sin_cos_of_sum_fused_f64(x, f64::mul_add)
+        } else {
+            trig::sin_cos_of_sum_f64(x)
+        }
+    }
+
+    #[inline(always)]
+    pub fn sin_cos_lanes_f64<const N: usize>(x: [f64; N]) -> ([f64; N], [f64; N]) {
+        if FUSED {
+            trig::sin_cos_lanes_fused_f64(x, f64::mul_add)
+        } else {
+            trig::sin_cos_lanes_f64(x)
+        }
+    }
+
+    #[inline(always)]
+    pub fn sin_cos_lanes_of_sums_f64<const N: usize>(x: [[f64; 2]; N]) -> ([f64; N], [f64; N]) {
+        if FUSED {
+            trig::sin_cos_lanes_of_sums_fused_f64(x, f64::mul_add)
+        } else {
+            trig::sin_cos_lanes_of_sums_f64(x)
+        }
+    }
 "#;

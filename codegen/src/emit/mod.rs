@@ -137,6 +137,16 @@ impl Style {
         }
     }
 
+    /// The path of a sine and cosine; over lanes it is told whether to fuse.
+    fn sin_cos(self, function: &str) -> String {
+        let scalar = self.scalar.name();
+        match (self.fused, self.lanes) {
+            (false, _) => self.kernel(function),
+            (true, false) => format!("fused::{function}_{scalar}"),
+            (true, true) => format!("fused::{function}_if_{scalar}::<FUSED>"),
+        }
+    }
+
     /// The index of the lane.
     fn lane(self) -> &'static str {
         if self.lanes {

@@ -153,8 +153,16 @@ impl Real for f32 {
         crate::trig::sin_cos_f32(self)
     }
     #[inline(always)]
+    fn sin_cos_of_pair(sum: [Self; 2]) -> (Self, Self) {
+        crate::trig::sin_cos_of_sum_f32(sum)
+    }
+    #[inline(always)]
     fn sin_cos_lanes<const N: usize>(angles: [Self; N]) -> ([Self; N], [Self; N]) {
         crate::trig::sin_cos_lanes_f32(angles)
+    }
+    #[inline(always)]
+    fn sin_cos_lanes_of_pairs<const N: usize>(sums: [[Self; 2]; N]) -> ([Self; N], [Self; N]) {
+        crate::trig::sin_cos_lanes_of_sums_f32(sums)
     }
     #[inline]
     fn sqrt(self) -> Self {

@@ -8,14 +8,27 @@
 mod measure;
 
 use measure::{around_multiple, worst_f32, worst_f64, Random, Worst};
-use straightline_core::trig::{sin_cos_f32, sin_cos_f64, sin_cos_of_sum_f64};
-use straightline_core::trig::{sqrt_f32, sqrt_f64, sum_of_angles_f64, DOMAIN_F32, DOMAIN_F64};
+use straightline_core::trig::{sin_cos_f32, sin_cos_f64, sin_cos_of_sum_f32, sin_cos_of_sum_f64};
+use straightline_core::trig::{sin_cos_of_sum_fused_f32, sin_cos_of_sum_fused_f64};
+use straightline_core::trig::{sqrt_f32, sqrt_f64, sum_of_angles_f32, sum_of_angles_f64, DOMAIN_F32, DOMAIN_F64};
 use straightline_core::{Dd, Real};
 
 /// The bound that follows from adding up the roundings (see the kernel in `trig.rs`).
 const BOUND_F64: f64 = 0.797;
 /// The largest error of all f32 in the domain, found by `every_f32_in_the_domain`.
 const BOUND_F32: f64 = 0.771;
+/// As [`BOUND_F64`], with fused multiply-add.
+const BOUND_FUSED_F64: f64 = 0.72;
+/// As [`BOUND_F32`], with fused multiply-add.
+const BOUND_FUSED_F32: f64 = 0.771;
+
+fn fused_f64(x: f64) -> (f64, f64) {
+    sin_cos_of_sum_fused_f64([x, 0.0], f64::mul_add)
+}
+
+fn fused_f32(x: f32) -> (f32, f32) {
+    sin_cos_of_sum_fused_f32([x, 0.0], f32::mul_add)
+}
 
 const RANGES: [f64; 6] = [std::f64::consts::FRAC_PI_4, std::f64::consts::PI, 100.0, 1e4, 1e6, DOMAIN_F64];
 
@@ -43,22 +56,28 @@ fn f64_errors_stay_within_the_bound_of_the_roundings() {
     for range in RANGES {
         let worst = worst_f64(sin_cos_f64, random_arguments(range, 100_000));
         assert!(worst.max() <= BOUND_F64, "|x| < {range}: {worst:?}");
+        let worst = worst_f64(fused_f64, random_arguments(range, 100_000));
+        assert!(worst.max() <= BOUND_FUSED_F64, "|x| < {range}, fused: {worst:?}");
     }
     let worst = worst_f64(sin_cos_f64, arguments_of_all_sizes(100_000));
     assert!(worst.max() <= BOUND_F64, "all sizes: {worst:?}");
+    let worst = worst_f64(fused_f64, arguments_of_all_sizes(100_000));
+    assert!(worst.max() <= BOUND_FUSED_F64, "all sizes, fused: {worst:?}");
 }
 
 /// Where the result is tiny all of its digits come from the tail of the reduction; the other one is ±1 and must be so.
 #[test]
 fn f64_keeps_every_digit_and_sign_next_to_multiples_of_half_pi() {
-    let worst = worst_f64(sin_cos_f64, multiples_of_half_pi(331, 2));
-    assert!(worst.max() <= 0.501, "{worst:?}");
-    for k in (1..1 << 23).step_by(331) {
-        for x in around_multiple(k, 2) {
-            let (sin, cos) = sin_cos_f64(x);
-            let truth = straightline_core::Dd::from(x).sin_cos();
-            assert_eq!(sin.is_sign_negative(), truth.0.to_f64().is_sign_negative(), "sin {x:e}");
-            assert_eq!(cos.is_sign_negative(), truth.1.to_f64().is_sign_negative(), "cos {x:e}");
+    for kernel in [sin_cos_f64, fused_f64] {
+        let worst = worst_f64(kernel, multiples_of_half_pi(331, 2));
+        assert!(worst.max() <= 0.501, "{worst:?}");
+        for k in (1..1 << 23).step_by(331) {
+            for x in around_multiple(k, 2) {
+                let (sin, cos) = kernel(x);
+                let truth = straightline_core::Dd::from(x).sin_cos();
+                assert_eq!(sin.is_sign_negative(), truth.0.to_f64().is_sign_negative(), "sin {x:e}");
+                assert_eq!(cos.is_sign_negative(), truth.1.to_f64().is_sign_negative(), "cos {x:e}");
+            }
         }
     }
 }
@@ -66,38 +85,48 @@ fn f64_keeps_every_digit_and_sign_next_to_multiples_of_half_pi() {
 #[test]
 #[ignore = "all multiples in the domain: 5 s in release"]
 fn f64_keeps_every_digit_next_to_every_multiple_of_half_pi() {
-    let worst = worst_f64(sin_cos_f64, multiples_of_half_pi(1, 2));
-    println!("{worst:?}");
-    assert!(worst.max() <= 0.501, "{worst:?}");
+    for kernel in [sin_cos_f64, fused_f64] {
+        let worst = worst_f64(kernel, multiples_of_half_pi(1, 2));
+        println!("{worst:?}");
+        assert!(worst.max() <= 0.501, "{worst:?}");
+    }
 }
 
 #[test]
 fn f32_errors_stay_within_the_bound() {
     let worst = worst_f32(sin_cos_f32, floats_in_the_domain(257));
     assert!(worst.max() <= BOUND_F32, "{worst:?}");
-    let next_to_multiples = (1..=1u32 << 13).flat_map(|k| {
+    let worst = worst_f32(fused_f32, floats_in_the_domain(257));
+    assert!(worst.max() <= BOUND_FUSED_F32, "fused: {worst:?}");
+    let next_to_multiples = |k: u32| {
         let nearest = (f64::from(k) * std::f64::consts::FRAC_PI_2) as f32;
         (nearest.to_bits() - 2..=nearest.to_bits() + 2).map(f32::from_bits).filter(|x| *x <= DOMAIN_F32)
-    });
-    let worst = worst_f32(sin_cos_f32, next_to_multiples);
-    assert!(worst.max() <= 0.501, "next to multiples of π/2: {worst:?}");
+    };
+    for kernel in [sin_cos_f32, fused_f32] {
+        let worst = worst_f32(kernel, (1..=1u32 << 15).flat_map(next_to_multiples));
+        assert!(worst.max() <= 0.501, "next to multiples of π/2: {worst:?}");
+    }
 }
 
 #[test]
-#[ignore = "1.2e9 numbers: about a minute in release"]
+#[ignore = "1.2e9 numbers, twice: some minutes in release"]
 fn every_f32_in_the_domain() {
-    let start = std::time::Instant::now();
     let count = DOMAIN_F32.to_bits() + 1;
-    let worst = worst_f32(sin_cos_f32, floats_in_the_domain(1));
-    println!(
-        "{count} floats, 0 <= x <= {DOMAIN_F32}, and as many negative ones by symmetry: {worst:?}, {:?}",
-        start.elapsed()
-    );
-    assert!(worst.max() <= BOUND_F32, "{worst:?}");
-    for bits in 0..=DOMAIN_F32.to_bits() {
-        let (sin, cos) = sin_cos_f32(f32::from_bits(bits));
-        let (minus_sin, same_cos) = sin_cos_f32(-f32::from_bits(bits));
-        assert!(sin.to_bits() ^ minus_sin.to_bits() == 1 << 31 && cos.to_bits() == same_cos.to_bits(), "{bits:#x}");
+    for (name, kernel, bound) in
+        [("", sin_cos_f32 as fn(f32) -> (f32, f32), BOUND_F32), (", fused", fused_f32, BOUND_FUSED_F32)]
+    {
+        let start = std::time::Instant::now();
+        let worst = worst_f32(kernel, floats_in_the_domain(1));
+        let time = start.elapsed();
+        println!(
+            "{count} floats, 0 <= x <= {DOMAIN_F32}, and as many negative ones by symmetry{name}: {worst:?}, {time:?}"
+        );
+        assert!(worst.max() <= bound, "{worst:?}");
+        for bits in 0..=DOMAIN_F32.to_bits() {
+            let (sin, cos) = kernel(f32::from_bits(bits));
+            let (minus_sin, same_cos) = kernel(-f32::from_bits(bits));
+            assert!(sin.to_bits() ^ minus_sin.to_bits() == 1 << 31 && cos.to_bits() == same_cos.to_bits(), "{bits:#x}");
+        }
     }
 }
 
@@ -112,28 +141,33 @@ fn table_of_errors() {
     println!("|------------------------------------------------|--------|--------|");
     for range in RANGES {
         row(&format!("f64, |x| < {range:.3}, 5e6 random"), worst_f64(sin_cos_f64, random_arguments(range, 5_000_000)));
+        row(
+            &format!("f64, fused, |x| < {range:.3}, 5e6 random"),
+            worst_f64(fused_f64, random_arguments(range, 5_000_000)),
+        );
     }
     row("f64, 5 around each multiple of π/2", worst_f64(sin_cos_f64, multiples_of_half_pi(1, 2)));
+    row("f64, fused, 5 around each multiple of π/2", worst_f64(fused_f64, multiples_of_half_pi(1, 2)));
     let mut from = 0.0f32;
     for to in [std::f32::consts::FRAC_PI_4, std::f32::consts::PI, 100.0, 1e4, DOMAIN_F32] {
         let arguments = (from.to_bits()..=to.to_bits()).step_by(13).map(f32::from_bits);
-        row(&format!("f32, {from:.3} <= x <= {to:.3}, every 13th"), worst_f32(sin_cos_f32, arguments));
+        row(&format!("f32, {from:.3} <= x <= {to:.3}, every 13th"), worst_f32(sin_cos_f32, arguments.clone()));
+        row(&format!("f32, fused, {from:.3} <= x <= {to:.3}, every 13th"), worst_f32(fused_f32, arguments));
         from = to;
     }
 }
 
 /// The largest error of sin and cos \[ulp\] of sums of three angles, against the exact sum in double-double, above the 2^-85
 /// to which the tail is added.
-fn worst_of_sums(angles: impl Iterator<Item = [f64; 3]>) -> f64 {
+fn worst_of_sums(kernel: impl Fn([f64; 3]) -> (f64, f64), angles: impl Iterator<Item = [f64; 3]>) -> f64 {
     let ulp = |x: f64| x.abs().next_up() - x.abs();
     let error = |angles: [f64; 3]| {
         let exact = angles.iter().fold(Dd::ZERO, |sum, x| sum + Dd::from(*x)).sin_cos();
-        let ours = sin_cos_of_sum_f64(sum_of_angles_f64(angles));
+        let ours = kernel(angles);
         let of = |got: f64, truth: Dd| {
             let error = (Dd::from(got) - truth).abs().to_f64();
             (error - 2f64.powi(-85)).max(0.0) / ulp(truth.to_f64())
         };
-        assert_eq!(ours, Real::sin_cos_of_sum(&angles), "the trait's sum has the same bits");
         of(ours.0, exact.0).max(of(ours.1, exact.1))
     };
     angles.map(error).fold(0.0, f64::max)
@@ -142,60 +176,107 @@ fn worst_of_sums(angles: impl Iterator<Item = [f64; 3]>) -> f64 {
 /// A rounded sum of angles around 1e6 would be wrong in the tenth digit.
 #[test]
 fn sums_of_far_angles_keep_their_digits() {
-    let mut random = Random(5);
-    for range in [1.0, std::f64::consts::PI, 100.0, 1e4, 1e6, DOMAIN_F64 / 3.0] {
-        let worst = worst_of_sums((0..30_000).map(|_| [0; 3].map(|_| random.uniform(-range, range))));
-        assert!(worst <= BOUND_F64, "angles below {range}: {worst}");
+    let plain = |angles: [f64; 3]| {
+        let ours = sin_cos_of_sum_f64(sum_of_angles_f64(angles));
+        assert_eq!(ours, Real::sin_cos_of_sum(&angles), "the trait's sum has the same bits");
+        ours
+    };
+    let fused = |angles: [f64; 3]| sin_cos_of_sum_fused_f64(sum_of_angles_f64(angles), f64::mul_add);
+    let kernels: [(&dyn Fn([f64; 3]) -> (f64, f64), f64); 2] = [(&plain, BOUND_F64), (&fused, BOUND_FUSED_F64)];
+    for (kernel, bound) in kernels {
+        let mut random = Random(5);
+        for range in [1.0, std::f64::consts::PI, 100.0, 1e4, 1e6, DOMAIN_F64 / 3.0] {
+            let worst = worst_of_sums(kernel, (0..30_000).map(|_| [0; 3].map(|_| random.uniform(-range, range))));
+            assert!(worst <= bound, "angles below {range}: {worst}");
+        }
+        // next to multiples of π/2 the result may be smaller than what the rounding of the sum lost
+        let tiny = (1..1u32 << 21).step_by(97).flat_map(|k| around_multiple(k, 1)).map(|x| {
+            let far = random.uniform(-1e6, 1e6);
+            [x - far, far, random.uniform(-1e-9, 1e-9)]
+        });
+        let worst = worst_of_sums(kernel, tiny);
+        assert!(worst <= 1.5, "next to multiples of π/2: {worst}");
     }
-    // next to multiples of π/2 the result may be smaller than what the rounding of the sum lost
-    let tiny = (1..1u32 << 21).step_by(97).flat_map(|k| around_multiple(k, 1)).map(|x| {
-        let far = random.uniform(-1e6, 1e6);
-        [x - far, far, random.uniform(-1e-9, 1e-9)]
-    });
-    let worst = worst_of_sums(tiny);
-    assert!(worst <= 1.5, "next to multiples of π/2: {worst}");
+}
+
+/// As in f64, above the 2^-32 to which the tail is added. Sums of four angles that each had a sine before do have one.
+#[test]
+fn sums_of_far_angles_in_f32_keep_their_digits() {
+    let ulp = |x: f64| f64::from((x as f32).abs().next_up() - (x as f32).abs());
+    let plain = |angles: [f32; 4]| {
+        let ours = sin_cos_of_sum_f32(sum_of_angles_f32(angles));
+        assert_eq!(ours, Real::sin_cos_of_sum(&angles), "the trait's sum has the same bits");
+        ours
+    };
+    let fused = |angles: [f32; 4]| sin_cos_of_sum_fused_f32(sum_of_angles_f32(angles), f32::mul_add);
+    let kernels: [&dyn Fn([f32; 4]) -> (f32, f32); 2] = [&plain, &fused];
+    for kernel in kernels {
+        let mut random = Random(6);
+        for range in [1.0, std::f64::consts::PI, 100.0, 1e3, 12_867.0] {
+            for _ in 0..30_000 {
+                let angles = [0; 4].map(|_| random.uniform(-range, range) as f32);
+                // four f32 have an exact sum in f64, and a sine of it far below an ulp of f32
+                let exact = angles.iter().map(|x| f64::from(*x)).sum::<f64>().sin_cos();
+                let ours = kernel(angles);
+                for (got, truth) in [(ours.0, exact.0), (ours.1, exact.1)] {
+                    let error = ((f64::from(got) - truth).abs() - 2f64.powi(-32)).max(0.0) / ulp(truth);
+                    assert!(error <= 0.801, "{angles:?}: {got:e}, not {truth:e}: {error} ulp");
+                }
+            }
+        }
+    }
 }
 
 #[test]
 fn sin_is_odd_and_cos_is_even_to_the_bit() {
     for x in random_arguments(DOMAIN_F64, 20_000).chain(arguments_of_all_sizes(20_000)) {
-        let ((sin, cos), (minus_sin, same_cos)) = (sin_cos_f64(x), sin_cos_f64(-x));
-        assert_eq!((minus_sin.to_bits(), same_cos.to_bits()), ((-sin).to_bits(), cos.to_bits()), "{x:e}");
+        for kernel in [sin_cos_f64, fused_f64] {
+            let ((sin, cos), (minus_sin, same_cos)) = (kernel(x), kernel(-x));
+            assert_eq!((minus_sin.to_bits(), same_cos.to_bits()), ((-sin).to_bits(), cos.to_bits()), "{x:e}");
+        }
     }
     for x in floats_in_the_domain(30_011) {
-        let ((sin, cos), (minus_sin, same_cos)) = (sin_cos_f32(x), sin_cos_f32(-x));
-        assert_eq!((minus_sin.to_bits(), same_cos.to_bits()), ((-sin).to_bits(), cos.to_bits()), "{x:e}");
+        for kernel in [sin_cos_f32, fused_f32] {
+            let ((sin, cos), (minus_sin, same_cos)) = (kernel(x), kernel(-x));
+            assert_eq!((minus_sin.to_bits(), same_cos.to_bits()), ((-sin).to_bits(), cos.to_bits()), "{x:e}");
+        }
     }
 }
 
 #[test]
 fn tiny_angles_are_their_own_sines() {
     for x in arguments_of_all_sizes(50_000).take_while(|x| *x < 1e-8).flat_map(|x| [x, -x]) {
-        let (sin, cos) = sin_cos_f64(x);
-        assert_eq!((sin.to_bits(), cos), (x.to_bits(), 1.0), "{x:e}");
+        for (sin, cos) in [sin_cos_f64(x), fused_f64(x)] {
+            assert_eq!((sin.to_bits(), cos), (x.to_bits(), 1.0), "{x:e}");
+        }
     }
     for x in floats_in_the_domain(9_973).take_while(|x| *x < 2e-4).flat_map(|x| [x, -x]) {
-        let (sin, cos) = sin_cos_f32(x);
-        assert_eq!((sin.to_bits(), cos), (x.to_bits(), 1.0), "{x:e}");
+        for (sin, cos) in [sin_cos_f32(x), fused_f32(x)] {
+            assert_eq!((sin.to_bits(), cos), (x.to_bits(), 1.0), "{x:e}");
+        }
     }
 }
 
 #[test]
 fn the_domain_ends_where_it_says_and_beyond_is_nan() {
-    for x in [DOMAIN_F64, -DOMAIN_F64] {
-        assert!(sin_cos_f64(x).0.is_finite() && sin_cos_f64(x).1.is_finite());
+    for kernel in [sin_cos_f64, fused_f64] {
+        for x in [DOMAIN_F64, -DOMAIN_F64] {
+            assert!(kernel(x).0.is_finite() && kernel(x).1.is_finite());
+        }
+        let mut random = Random(1);
+        let outside = (0..100_000).map(|_| f64::from_bits(random.bits())).filter(|x| x.abs() > DOMAIN_F64);
+        for x in outside.chain([DOMAIN_F64.next_up(), f64::MAX, f64::INFINITY, f64::NAN]).flat_map(|x| [x, -x]) {
+            assert!(kernel(x).0.is_nan() && kernel(x).1.is_nan(), "{x:e}");
+        }
     }
-    for x in [DOMAIN_F32, -DOMAIN_F32] {
-        assert!(sin_cos_f32(x).0.is_finite() && sin_cos_f32(x).1.is_finite());
-    }
-    let mut random = Random(1);
-    let outside = (0..100_000).map(|_| f64::from_bits(random.bits())).filter(|x| x.abs() > DOMAIN_F64);
-    for x in outside.chain([DOMAIN_F64.next_up(), f64::MAX, f64::INFINITY, f64::NAN]).flat_map(|x| [x, -x]) {
-        assert!(sin_cos_f64(x).0.is_nan() && sin_cos_f64(x).1.is_nan(), "{x:e}");
-    }
-    let outside = (DOMAIN_F32.to_bits() + 1..0x8000_0000).step_by(9_973).map(f32::from_bits);
-    for x in outside.chain([DOMAIN_F32.next_up(), f32::MAX, f32::INFINITY, f32::NAN]).flat_map(|x| [x, -x]) {
-        assert!(sin_cos_f32(x).0.is_nan() && sin_cos_f32(x).1.is_nan(), "{x:e}");
+    for kernel in [sin_cos_f32, fused_f32] {
+        for x in [DOMAIN_F32, -DOMAIN_F32] {
+            assert!(kernel(x).0.is_finite() && kernel(x).1.is_finite());
+        }
+        let outside = (DOMAIN_F32.to_bits() + 1..0x8000_0000).step_by(9_973).map(f32::from_bits);
+        for x in outside.chain([DOMAIN_F32.next_up(), f32::MAX, f32::INFINITY, f32::NAN]).flat_map(|x| [x, -x]) {
+            assert!(kernel(x).0.is_nan() && kernel(x).1.is_nan(), "{x:e}");
+        }
     }
 }
 
@@ -219,7 +300,7 @@ fn the_bits_are_the_same_on_every_target() {
     assert_eq!(fingerprint, FINGERPRINT, "{fingerprint:#x}");
 }
 
-const FINGERPRINT: u64 = 0xf372_0da3_0494_9c9e;
+const FINGERPRINT: u64 = 0x0177_2c64_ec68_ad09;
 
 /// What the compiler makes of a loop over lanes may use other instructions; it may not give other bits.
 #[test]
