@@ -182,7 +182,8 @@ fn sums_of_far_angles_keep_their_digits() {
         ours
     };
     let fused = |angles: [f64; 3]| sin_cos_of_sum_fused_f64(sum_of_angles_f64(angles), f64::mul_add);
-    let kernels: [(&dyn Fn([f64; 3]) -> (f64, f64), f64); 2] = [(&plain, BOUND_F64), (&fused, BOUND_FUSED_F64)];
+    type Kernel<'a> = &'a dyn Fn([f64; 3]) -> (f64, f64);
+    let kernels: [(Kernel, f64); 2] = [(&plain, BOUND_F64), (&fused, BOUND_FUSED_F64)];
     for (kernel, bound) in kernels {
         let mut random = Random(5);
         for range in [1.0, std::f64::consts::PI, 100.0, 1e4, 1e6, DOMAIN_F64 / 3.0] {
