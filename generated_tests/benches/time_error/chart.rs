@@ -2,6 +2,7 @@
 
 use crate::function::{Group, Method, Panel};
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::fmt::Write;
 use std::path::Path;
 use straightline_codegen::Function;
@@ -53,23 +54,38 @@ pub fn time(ns: &f64) -> String {
     }
 }
 
-/// Names at the right of their points, moved apart where they would meet.
+/// Names at the heights of their points, moved apart where they would meet: each heap of them about its middle.
 fn spread(mut places: Vec<(usize, i32)>, gap: i32, low: i32, high: i32) -> Vec<(usize, i32)> {
     // stable: those at one height keep their order
     places.sort_by_key(|p| p.1);
-    for i in 1..places.len() {
-        places[i].1 = places[i].1.max(places[i - 1].1 + gap);
-    }
-    let over = places.last().map_or(0, |p| (p.1 - high).max(0));
-    if over > 0 {
-        let mut ceiling = high;
-        for place in places.iter_mut().rev() {
-            place.1 = place.1.min(ceiling).max(low);
-            ceiling = place.1 - gap;
+    // heaps: how many, and where the middle of the first name is wanted to be
+    let mut heaps: Vec<(usize, f64)> = Vec::new();
+    let reach = |(n, top): (usize, f64)| top + f64::from(gap) * n as f64;
+    for place in &places {
+        heaps.push((1, f64::from(place.1)));
+        while let [.., (m, above), (n, below)] = heaps[..] {
+            if reach((m, above)) <= below {
+                break;
+            }
+            heaps.truncate(heaps.len() - 2);
+            let (all, shifted) = (m + n, below - f64::from(gap) * m as f64);
+            let top = (above * m as f64 + shifted * n as f64) / all as f64;
+            let highest = f64::from(high) - f64::from(gap) * (all - 1) as f64;
+            heaps.push((all, top.min(highest).max(f64::from(low))));
         }
     }
-    places
+    let tops = heaps.into_iter().flat_map(|(n, top)| (0..n).map(move |k| top as i32 + gap * k as i32));
+    places.iter().zip(tops).map(|(p, y)| (p.0, y)).collect()
 }
+
+/// What belongs together: `gravity alone, 10 % speed` is one of `gravity alone`; its own mark is `10 %`.
+fn family(m: &Method) -> Option<(&str, String)> {
+    let (name, mark) = m.name.split_once(", ").or_else(|| m.name.split_once(" for "))?;
+    (m.group == Group::Reduced).then(|| (name, mark.replace(" speed", "")))
+}
+
+/// Errors below this are drawn at it, with a mark: the axis ends where no plain format reaches.
+const LEAST: f64 = 3e-18;
 
 pub fn function(panel: &Panel, path: &Path) {
     let methods = &panel.methods;
@@ -78,10 +94,13 @@ pub fn function(panel: &Panel, path: &Path) {
     area.fill(&WHITE).expect("the picture can be written");
     let fastest = methods.iter().map(|m| m.time[0]).fold(f64::MAX, f64::min) / 1.6;
     let slowest = methods.iter().map(|m| m.time[2].max(m.time[0])).fold(0.0, f64::max) * 1.4;
-    let least = methods.iter().map(|m| m.rms).filter(|e| *e > 0.0).fold(f64::MAX, f64::min);
-    let bottom = 10f64.powf(least.log10().floor().max(-34.0));
+    let bottom = LEAST;
     let (plot, names) = area.split_horizontally(width as i32 - 330);
-    let title = format!("{}: {} – time against error", panel.robot, panel.function.name().replace('_', " "));
+    let title = format!(
+        "{}, {}: every way to compute it, time against error (further down and left is better)",
+        panel.robot,
+        panel.function.name().replace('_', " ")
+    );
     area.draw(&Text::new(title, (24, 16), ("sans-serif", TITLE).into_font().color(&INK))).expect("text");
     let mut chart = ChartBuilder::on(&plot)
         .margin_top(56)
@@ -89,14 +108,14 @@ pub fn function(panel: &Panel, path: &Path) {
         .margin_left(14)
         .x_label_area_size(52)
         .y_label_area_size(74)
-        .build_cartesian_2d((fastest..slowest).log_scale(), (bottom..3.0).log_scale())
+        .build_cartesian_2d((fastest..slowest).log_scale(), (bottom..10.0).log_scale())
         .expect("ranges");
     chart
         .configure_mesh()
         .light_line_style(WHITE)
         .bold_line_style(PALE)
         .axis_style(INK)
-        .x_desc("time per evaluation (dot: warm caches; thin line to the right: cold)")
+        .x_desc("time per evaluation")
         .y_desc("error over the greatest output in the joints' limits")
         .axis_desc_style(("sans-serif", WORDS).into_font().color(&INK))
         .label_style(("sans-serif", SMALL).into_font().color(&INK))
@@ -111,47 +130,61 @@ pub fn function(panel: &Panel, path: &Path) {
     for (level, words) in roundings.into_iter().chain(sensor) {
         let line = [(fastest, level), (slowest, level)];
         chart.draw_series(DashedLineSeries::new(line, 4, 4, INK.mix(0.45).stroke_width(1))).expect("line");
-        let at = chart.backend_coord(&(fastest * (slowest / fastest).powf(0.8), level));
+        let at = chart.backend_coord(&(slowest, level));
         let style = ("sans-serif", SMALL).into_font().color(&INK.mix(0.6));
-        plot.draw(&Text::new(words, (at.0 + 6, at.1 - 14), style)).expect("text");
+        let style = style.pos(Pos::new(HPos::Right, VPos::Bottom));
+        plot.draw(&Text::new(words, (at.0 - 4, at.1 - 1), style)).expect("text");
     }
     for m in methods {
         let ink = colour(m.group);
         let warm = m.time[0];
-        let rms = m.rms.max(bottom);
+        let (rms, worst) = (m.rms.max(bottom), m.worst.max(1.5 * bottom));
         if m.time[2] > warm * 1.05 {
-            chart
-                .draw_series([PathElement::new(
-                    vec![(warm, m.worst), (m.time[2], m.worst)],
-                    ink.mix(0.5).stroke_width(1),
-                )])
-                .expect("line");
+            let line = vec![(warm, worst), (m.time[2], worst)];
+            chart.draw_series([PathElement::new(line, ink.mix(0.4).stroke_width(1))]).expect("line");
         }
-        let top = m.cap.unwrap_or(m.worst);
+        let top = m.cap.unwrap_or(worst);
         chart.draw_series([PathElement::new(vec![(warm, rms), (warm, top)], ink.stroke_width(2))]).expect("line");
-        chart.draw_series([Circle::new((warm, m.worst), 5, ink.filled())]).expect("dot");
-        chart.draw_series([Circle::new((warm, rms), 3, ink.stroke_width(2))]).expect("dot");
+        chart.draw_series([Circle::new((warm, worst), 5, ink.filled())]).expect("dot");
+        if m.rms > bottom {
+            chart.draw_series([Circle::new((warm, rms), 3, ink.stroke_width(2))]).expect("dot");
+        }
         if let Some(cap) = m.cap {
             chart.draw_series([TriangleMarker::new((warm, cap), 7, ink.filled())]).expect("cap");
         }
+        if let Some((_, mark)) = family(m) {
+            let (x, y) = chart.backend_coord(&(warm, worst));
+            let style = ("sans-serif", SMALL).into_font().color(&ink).pos(Pos::new(HPos::Right, VPos::Center));
+            plot.draw(&Text::new(mark, (x - 8, y), style)).expect("text");
+        }
     }
-    // names in a column at the right, in the order of the errors, tied to their points
-    let mut order: Vec<usize> = (0..methods.len()).collect();
+    // names in a column at the right, in the order of the errors, tied to their points; a family has one, at its greatest error
+    let mut order: Vec<usize> = Vec::new();
+    for (i, m) in methods.iter().enumerate() {
+        let same = |k: &usize| family(m).is_some_and(|(name, _)| family(&methods[*k]).is_some_and(|f| f.0 == name));
+        if !order.iter().any(same) {
+            order.push(i);
+        }
+    }
     // of those at one height the rightmost first, so that their lines do not cross
     order.sort_by(|a, b| methods[*b].time[0].total_cmp(&methods[*a].time[0]));
-    let points: Vec<(usize, i32)> =
-        order.into_iter().map(|i| (i, chart.backend_coord(&(methods[i].time[0], methods[i].worst)).1)).collect();
+    let point = |i: usize| chart.backend_coord(&(methods[i].time[0], methods[i].worst.max(1.5 * bottom)));
+    let points: Vec<(usize, i32)> = order.into_iter().map(|i| (i, point(i).1)).collect();
     let left = width as i32 - 330;
-    for (i, y) in spread(points, 16, 70, height as i32 - 190) {
+    for (i, y) in spread(points, 17, 66, height as i32 - 190) {
         let m = &methods[i];
-        let (x0, y0) = chart.backend_coord(&(m.time[0], m.worst));
+        let (x0, y0) = point(i);
         let ink = colour(m.group);
         let end = left + 4;
-        area.draw(&PathElement::new(vec![(x0 + 6, y0), (end - 14, y), (end, y)], ink.mix(0.25).stroke_width(1)))
+        area.draw(&PathElement::new(vec![(x0 + 7, y0), (end - 14, y), (end, y)], ink.mix(0.25).stroke_width(1)))
             .expect("line");
-        let style = ("sans-serif", SMALL).into_font().color(&ink);
-        let text = format!("{} · {} · {:.0e}", m.name, time(&m.time[0]), m.worst);
-        area.draw(&Text::new(text, (end + 4, y - 7), style)).expect("text");
+        let style = ("sans-serif", SMALL + 1).into_font().color(&ink);
+        let text = match family(m) {
+            Some((name, _)) => format!("{name} · {}", time(&m.time[0])),
+            None if m.worst < bottom => format!("{} · {} · {:.0e}, below the axis", m.name, time(&m.time[0]), m.worst),
+            None => format!("{} · {} · {:.0e}", m.name, time(&m.time[0]), m.worst),
+        };
+        area.draw(&Text::new(text, (end + 4, y - 8), style)).expect("text");
     }
     legend(&names, height as i32 - 160, &shown(methods));
     area.present().expect("the picture can be written");
@@ -175,7 +208,9 @@ where
     }
     let y = top + 18 * entries.len() as i32 + 6;
     for (i, line) in
-        ["● worst found by search   ○ root mean square", "▲ certified: no state is worse"].iter().enumerate()
+        ["● worst found by search   ○ root mean square", "▲ certified: no state is worse   — to the right: cold"]
+            .iter()
+            .enumerate()
     {
         area.draw(&Text::new(*line, (8, y + 17 * i as i32), words.clone())).expect("text");
     }
@@ -185,7 +220,7 @@ where
 pub fn table(panel: &Panel) -> String {
     let mut text = format!(
         "# {}: {}, time against error\n\n`cargo bench -p straightline-generated-tests --features charts --bench time_error -- function {} {}`\n\n\
-         Compiled for the processor of the machine; a core shared with others, so compare within the table. Errors over the greatest\n\
+         Compiled for the processor of the machine, which was shared with other work while this ran: compare within the table. Errors over the greatest\n\
          output in the limits of the joints. {}.\n\n\
          | method | warm, ns | median | cold, ns | rms error | worst found | certified |\n|---|---|---|---|---|---|---|\n",
         panel.robot,
@@ -218,6 +253,8 @@ pub struct Curve {
 pub struct Curves<'a> {
     pub title: &'a str,
     pub x: &'a str,
+    /// Where the x axis has its marks: at powers of this.
+    pub x_base: f64,
     pub y: &'a str,
     pub x_format: &'a dyn Fn(&f64) -> String,
     pub y_format: &'a dyn Fn(&f64) -> String,
@@ -243,7 +280,7 @@ pub fn curves(charts: &[Curves], path: &Path) {
             .margin_left(14)
             .x_label_area_size(50)
             .y_label_area_size(74)
-            .build_cartesian_2d(range(|p| p.0).log_scale(), range(|p| p.1).log_scale())
+            .build_cartesian_2d(range(|p| p.0).log_scale().base(c.x_base), range(|p| p.1).log_scale())
             .expect("ranges");
         chart
             .configure_mesh()

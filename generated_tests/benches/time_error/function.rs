@@ -9,8 +9,9 @@ use std::time::Instant;
 use straightline_codegen::certify::{certify, Effort, Interval};
 use straightline_codegen::compile::{compile, program, Options, Program};
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::scene::{self, Budget, JointRanges};
 use straightline_codegen::{expr, ForwardDynamicsMethod, Function, Robot, Scalar, Source};
-use straightline_core::model::{JointKind, Model};
+use straightline_core::model::{Joint, JointKind, Model};
 use straightline_core::reference as chapter;
 use straightline_core::{Dd, Real};
 use straightline_generated_tests::programs;
@@ -19,9 +20,16 @@ use straightline_generated_tests::reference::Robot as Data;
 use straightline_generated_tests::search::Ranges;
 use straightline_generated_tests::standalone::Folder;
 
-/// Random states of the root mean square, and evaluations of the search.
+/// Random states of the root mean square, and evaluations of the search, for an arm; of a robot with n velocity coordinates as
+/// many less as its equations are longer, n² against 49.
 const STATES: usize = 2000;
 const SEARCH: usize = 8000;
+/// How many of them at least.
+const LEAST: usize = 400;
+/// Of the bound of f32, what a program in mixed precision has to stay within.
+const HALVED: f64 = 0.5;
+/// A Python with the package `pinocchio`; without the variable there are no peers in the chart.
+const PEERS: &str = "STRAIGHTLINE_PEERS_PYTHON";
 /// Where a file gives no limit: rad or m, rad/s or m/s; accelerations in any case. Files that state a hundred rad/s state what
 /// the motor could: no joint is moved faster than the last.
 const RANGE: f64 = std::f64::consts::PI;
@@ -124,6 +132,9 @@ struct Case {
     ranges: Ranges,
     lengths: Vec<usize>,
     floating: bool,
+    /// Random states, and evaluations of a search.
+    states: usize,
+    search: usize,
 }
 
 impl Case {
@@ -135,7 +146,19 @@ impl Case {
         let inputs = function.inputs(&robot.model);
         let ranges = inputs.iter().flat_map(|p| ranges(&robot.model, &p.name, p.len())).collect();
         let lengths = inputs.iter().map(|p| p.len()).collect();
-        Case { source, options, robot, program, ranges: Ranges(ranges), lengths, floating: data.floating }
+        let fewer = |count: usize| (count * 49 / (robot.model.nv() * robot.model.nv()).max(49)).max(LEAST);
+        let (states, search) = (fewer(STATES), fewer(SEARCH));
+        Case {
+            source,
+            options,
+            robot,
+            program,
+            ranges: Ranges(ranges),
+            lengths,
+            floating: data.floating,
+            states,
+            search,
+        }
     }
 
     /// A state as f32 holds it, so that its own rounding is no error of f32; a quaternion has length one, nearly.
@@ -146,6 +169,28 @@ impl Case {
             x[3..7].iter_mut().for_each(|v| *v = if norm > 0.0 { *v / norm } else { 0.5 });
         }
         x.iter().map(|v| f64::from(*v as f32)).collect()
+    }
+
+    /// The box of the states, as a scene states it.
+    fn stated_ranges(&self, function: Function) -> scene::Ranges {
+        let mut stated = scene::Ranges::default();
+        let mut first = 0;
+        for (port, len) in function.inputs(&self.robot.model).iter().zip(&self.lengths) {
+            let of = |joint: &Joint| {
+                let index = first + if port.name == "q" { joint.iq } else { joint.iv };
+                let (lower, upper) = self.ranges.0[index];
+                (joint.name.clone(), scene::Interval { lower, upper })
+            };
+            let joints = JointRanges::Joints(self.robot.model.bodies.iter().map(|b| of(&b.joint)).collect());
+            match port.name.as_str() {
+                "q" => stated.q = joints,
+                "qd" => stated.qd = joints,
+                "qdd" => stated.qdd = joints,
+                _ => stated.tau = joints,
+            }
+            first += len;
+        }
+        stated
     }
 
     fn truth(&self, x: &[f64]) -> Vec<Dd> {
@@ -243,6 +288,22 @@ pub fn measure(name: &str, function: Function) -> Panel {
         with_std_trig(generated("double", &case, &case.options, function)),
     ];
     let caps = [certified(&case, &case.options, function), certified(&case, &single, function)];
+    let mut mixed_cap = None;
+    if let Some(cap) = caps[1] {
+        let mut mixed = single.clone();
+        let max_error = Some(HALVED * cap);
+        mixed.scene.budgets.insert(function, Budget { max_error, mixed_precision: true, ..Budget::default() });
+        mixed.scene.ranges = case.stated_ranges(function);
+        match compile(&case.source, &mixed) {
+            Ok(_) => {
+                texts.push(generated("certified_mixed", &case, &mixed, function));
+                mixed_cap = max_error;
+            }
+            Err(refused) => {
+                notes.push(format!("no mixed precision: {}", refused.iter().next().expect("a reason").title))
+            }
+        }
+    }
     let articulated = function == Function::ForwardDynamics;
     if articulated {
         for (module, method) in [
@@ -269,10 +330,13 @@ pub fn measure(name: &str, function: Function) -> Panel {
     let program = folder.build("kernel", &source, &["-Ctarget-cpu=native"]).unwrap_or_else(|e| panic!("{e}"));
 
     let mut random = Random(5);
-    let states: Vec<Vec<f64>> = (0..STATES).map(|_| case.exact(&case.ranges.anywhere(&mut random))).collect();
+    let states: Vec<Vec<f64>> = (0..case.states).map(|_| case.exact(&case.ranges.anywhere(&mut random))).collect();
     let truths: Vec<Vec<Dd>> = states.iter().map(|x| case.truth(x)).collect();
     let greatest = truths.iter().flatten().map(|t| t.to_f64().abs()).fold(0.0, f64::max);
-    notes.push(format!("greatest output of {STATES} random states: {greatest:.3}"));
+    notes.push(format!(
+        "greatest output of {} random states: {greatest:.3}; {} evaluations of each search",
+        case.states, case.search
+    ));
     let file = folder.file("states");
     std::fs::write(&file, states.iter().flatten().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>())
         .expect("the folder can be written");
@@ -306,6 +370,7 @@ pub fn measure(name: &str, function: Function) -> Panel {
             "fused_lanes_f32" => ("f32 × 16 lanes, fused", Group::Single, None),
             "compensated_f32" => ("f32, compensated", Group::Extended, None),
             "mixed" => ("products f32, sums f64", Group::Extended, None),
+            "certified_mixed" => ("f32, f64 where it counts", Group::Extended, mixed_cap),
             "at_rest" => ("no Coriolis terms", Group::Reduced, None),
             "gravity" => {
                 gravity_time = Some((index, times[index]));
@@ -330,7 +395,7 @@ pub fn measure(name: &str, function: Function) -> Panel {
         for (x, truth) in states.iter().zip(&truths) {
             squares += error(&server.call(index, x, outputs), truth).powi(2);
         }
-        let found = case.ranges.climb(&mut Random(6), SEARCH, |x| {
+        let found = case.ranges.climb(&mut Random(6), case.search, |x| {
             let x = case.exact(x);
             error(&server.call(index, &x, outputs), &case.truth(&x))
         });
@@ -355,6 +420,10 @@ pub fn measure(name: &str, function: Function) -> Panel {
     }
     drop(server);
     methods.extend(libraries(&data, &case, function, &states, &truths, greatest));
+    match peer(&data, function, &folder, &file, &truths, greatest) {
+        Ok(pinocchio) => methods.extend(pinocchio),
+        Err(why) => notes.push(why),
+    }
     Panel { robot: name.to_string(), function, methods, notes }
 }
 
@@ -455,7 +524,7 @@ fn libraries(
         if searched {
             worst = worst.max(
                 case.ranges
-                    .climb(&mut Random(6), SEARCH / 4, |x| {
+                    .climb(&mut Random(6), case.search / 4, |x| {
                         let x = case.exact(x);
                         error(&call(&x), &case.truth(&x))
                     })
@@ -505,6 +574,81 @@ fn libraries(
     let name = "double-double, generic runtime".to_string();
     methods.push(Method { name, group: Group::Library, time: [time; 3], rms: exact / 3.0, worst: exact, cap: None });
     methods
+}
+
+/// What it says: nanoseconds per call; its results, state after state, go to a file.
+const PINOCCHIO: &str = r#"
+import sys, time
+import numpy as np
+import pinocchio as pin
+file, floating, function, states, results, joints = sys.argv[1:]
+root = [pin.JointModelFreeFlyer()] if floating == "true" else []
+model = pin.buildModelFromUrdf(file, *root)
+data = model.createData()
+x = np.fromfile(states).reshape(-1, model.nq + 2 * model.nv)
+q, v, u = np.split(x, [model.nq, model.nq + model.nv], axis=1)
+# its own order of the joints: where each of ours stands
+ids = [model.getJointId(name) for name in joints.split(",")]
+base = range(len(root))
+iq = [k for _ in base for k in range(7)] + [model.joints[i].idx_q for i in ids if i > len(root)]
+iv = [k for _ in base for k in range(6)] + [model.joints[i].idx_v for i in ids if i > len(root)]
+def placed(rows, at):
+    out = np.empty_like(rows)
+    out[:, at] = rows
+    return list(out)
+q, v, u = placed(q, iq), placed(v, iv), placed(u, iv)
+call = {"inverse_dynamics": pin.rnea, "forward_dynamics": pin.aba}[function]
+np.array([call(model, data, *s)[iv] for s in zip(q, v, u)]).tofile(results)
+best = float("inf")
+for _ in range(15):
+    start = time.perf_counter_ns()
+    for k in range(len(q)): call(model, data, q[k], v[k], u[k])
+    best = min(best, (time.perf_counter_ns() - start) / len(q))
+print(best)
+"#;
+
+/// Pinocchio through Python, where it is installed and the robot is one that it reads.
+///
+/// # Errors
+/// Why it is not in the chart.
+fn peer(
+    data: &Data,
+    function: Function,
+    folder: &Folder,
+    states: &Path,
+    truths: &[Vec<Dd>],
+    greatest: f64,
+) -> Result<Option<Method>, String> {
+    let reads = data.file.extension().is_some_and(|e| e == "urdf");
+    if !reads || !matches!(function, Function::InverseDynamics | Function::ForwardDynamics) {
+        return Ok(None);
+    }
+    let python = std::env::var_os(PEERS).ok_or_else(|| format!("no peers: {PEERS} is not set"))?;
+    let results = folder.file("pinocchio");
+    let floating = data.floating.to_string();
+    let output = Command::new(python)
+        .args(["-c", PINOCCHIO])
+        .arg(&data.file)
+        .args([&floating, function.name()])
+        .args([states, &results])
+        .arg(data.joints.join(","))
+        .output()
+        .map_err(|e| format!("no peers: {e}"))?;
+    let said = String::from_utf8_lossy(&output.stdout);
+    let time: f64 =
+        said.trim().parse().map_err(|_| format!("no peers: {}", String::from_utf8_lossy(&output.stderr)))?;
+    let bytes = std::fs::read(&results).map_err(|e| format!("no peers: {e}"))?;
+    let numbers: Vec<f64> =
+        bytes.chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes"))).collect();
+    let (mut squares, mut worst) = (0.0, 0.0f64);
+    for (computed, truth) in numbers.chunks_exact(truths[0].len()).zip(truths) {
+        let e = error(computed, truth);
+        squares += e * e;
+        worst = worst.max(e);
+    }
+    let rms = (squares / truths.len() as f64).sqrt() / greatest;
+    let name = "Pinocchio, through Python".to_string();
+    Ok(Some(Method { name, group: Group::Library, time: [time; 3], rms, worst: worst / greatest, cap: None }))
 }
 
 /// Best nanoseconds per call of several runs of a millisecond.

@@ -192,7 +192,7 @@ use std::time::Instant;
 
 /// States that a warm run goes through, again and again.
 const STATES: usize = 512;
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 8;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();

@@ -7,7 +7,7 @@
 //! cargo bench -p straightline-generated-tests --features charts --bench time_error
 //! ```
 //!
-//! The last one makes all charts. Each is a picture, a table and JSON under `generated_tests/record/`. Errors are those of the code
+//! The last one makes all charts. `STRAIGHTLINE_PEERS_PYTHON` names a Python that has `pinocchio`, for its point in them. Each is a picture, a table and JSON under `generated_tests/record/`. Errors are those of the code
 //! that is timed, against the same equations in double-double, which in the same run are held against values of 25 digits.
 
 mod chart;
@@ -20,8 +20,9 @@ use std::path::{Path, PathBuf};
 use straightline_codegen::Function;
 
 /// The charts that are made if none is named.
-const FUNCTIONS: [(&str, &str); 5] = [
+const FUNCTIONS: [(&str, &str); 6] = [
     ("panda", "inverse_dynamics"),
+    ("panda", "mass_matrix"),
     ("panda", "forward_dynamics"),
     ("ur5", "inverse_dynamics"),
     ("solo12", "inverse_dynamics"),

@@ -148,7 +148,8 @@ pub fn run() {
         }
     }
     let joints = |x: &f64| format!("{x}");
-    let chart = |title, y, y_format, curves| Curves { title, x: "joints", y, x_format: &joints, y_format, curves };
+    let chart =
+        |title, y, y_format, curves| Curves { title, x: "joints", x_base: 2.0, y, x_format: &joints, y_format, curves };
     let charts = [
         chart("Chains of 2 … 128 joints: operations", "multiplications and additions", &chart::power, &operations),
         chart("Time per evaluation, f64, warm", "time", &chart::time, &times),

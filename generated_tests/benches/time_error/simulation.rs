@@ -237,6 +237,7 @@ pub fn run() {
         Curves {
             title: "Simulation of a planar arm: error of the state after 1 s",
             x,
+            x_base: 10.0,
             y: "error over the greatest component",
             x_format: format,
             y_format: &chart::power,
@@ -245,6 +246,7 @@ pub fn run() {
         Curves {
             title: "The same: change of energy in 20 s",
             x,
+            x_base: 10.0,
             y: "greatest |ΔE| / |V|",
             x_format: format,
             y_format: &chart::power,
