@@ -62,7 +62,7 @@ fn spread(mut places: Vec<(usize, i32)>, gap: i32, low: i32, high: i32) -> Vec<(
     let mut heaps: Vec<(usize, f64)> = Vec::new();
     let reach = |(n, top): (usize, f64)| top + f64::from(gap) * n as f64;
     for place in &places {
-        heaps.push((1, f64::from(place.1)));
+        heaps.push((1, f64::from(place.1.clamp(low, high))));
         while let [.., (m, above), (n, below)] = heaps[..] {
             if reach((m, above)) <= below {
                 break;
@@ -95,7 +95,7 @@ pub fn function(panel: &Panel, path: &Path) {
     let fastest = methods.iter().map(|m| m.time[0]).fold(f64::MAX, f64::min) / 1.6;
     let slowest = methods.iter().map(|m| m.time[2].max(m.time[0])).fold(0.0, f64::max) * 1.4;
     let bottom = LEAST;
-    let (plot, names) = area.split_horizontally(width as i32 - 330);
+    let (plot, _) = area.split_horizontally(width as i32 - 330);
     let title = format!(
         "{}, {}: every way to compute it, time against error (further down and left is better)",
         panel.robot,
@@ -154,8 +154,10 @@ pub fn function(panel: &Panel, path: &Path) {
         }
         if let Some((_, mark)) = family(m) {
             let (x, y) = chart.backend_coord(&(warm, worst));
-            let style = ("sans-serif", SMALL).into_font().color(&ink).pos(Pos::new(HPos::Right, VPos::Center));
-            plot.draw(&Text::new(mark, (x - 8, y), style)).expect("text");
+            // times at the right of their dots, speeds at the left: two families stand close
+            let (x, side) = if mark.ends_with("ms") { (x + 8, HPos::Left) } else { (x - 8, HPos::Right) };
+            let style = ("sans-serif", SMALL).into_font().color(&ink).pos(Pos::new(side, VPos::Bottom));
+            plot.draw(&Text::new(mark, (x, y + 2), style)).expect("text");
         }
     }
     // names in a column at the right, in the order of the errors, tied to their points; a family has one, at its greatest error
@@ -171,7 +173,7 @@ pub fn function(panel: &Panel, path: &Path) {
     let point = |i: usize| chart.backend_coord(&(methods[i].time[0], methods[i].worst.max(1.5 * bottom)));
     let points: Vec<(usize, i32)> = order.into_iter().map(|i| (i, point(i).1)).collect();
     let left = width as i32 - 330;
-    for (i, y) in spread(points, 17, 66, height as i32 - 190) {
+    for (i, y) in spread(points, 17, 66, height as i32 - 76) {
         let m = &methods[i];
         let (x0, y0) = point(i);
         let ink = colour(m.group);
@@ -181,12 +183,13 @@ pub fn function(panel: &Panel, path: &Path) {
         let style = ("sans-serif", SMALL + 1).into_font().color(&ink);
         let text = match family(m) {
             Some((name, _)) => format!("{name} · {}", time(&m.time[0])),
-            None if m.worst < bottom => format!("{} · {} · {:.0e}, below the axis", m.name, time(&m.time[0]), m.worst),
             None => format!("{} · {} · {:.0e}", m.name, time(&m.time[0]), m.worst),
         };
         area.draw(&Text::new(text, (end + 4, y - 8), style)).expect("text");
     }
-    legend(&names, height as i32 - 160, &shown(methods));
+    // between what f32 and what f64 lose nothing lies
+    let (at, top) = chart.backend_coord(&(fastest * 1.2, 6e-9));
+    legend(&plot, (at, top), &shown(methods));
     area.present().expect("the picture can be written");
     println!("{}", path.display());
 }
@@ -196,15 +199,18 @@ fn shown(methods: &[Method]) -> Vec<(String, RGBColor)> {
     groups.map(|g| (g.name().to_string(), colour(g))).collect()
 }
 
-fn legend<DB: DrawingBackend>(area: &DrawingArea<DB, plotters::coord::Shift>, top: i32, entries: &[(String, RGBColor)])
-where
+fn legend<DB: DrawingBackend>(
+    area: &DrawingArea<DB, plotters::coord::Shift>,
+    (left, top): (i32, i32),
+    entries: &[(String, RGBColor)],
+) where
     DB::ErrorType: 'static,
 {
     let words = ("sans-serif", SMALL).into_font().color(&INK);
     for (i, (name, ink)) in entries.iter().enumerate() {
         let y = top + 18 * i as i32;
-        area.draw(&Rectangle::new([(8, y), (20, y + 10)], ink.filled())).expect("mark");
-        area.draw(&Text::new(name.clone(), (28, y - 2), words.clone())).expect("text");
+        area.draw(&Rectangle::new([(left, y), (left + 12, y + 10)], ink.filled())).expect("mark");
+        area.draw(&Text::new(name.clone(), (left + 20, y - 2), words.clone())).expect("text");
     }
     let y = top + 18 * entries.len() as i32 + 6;
     for (i, line) in
@@ -212,7 +218,7 @@ where
             .iter()
             .enumerate()
     {
-        area.draw(&Text::new(*line, (8, y + 17 * i as i32), words.clone())).expect("text");
+        area.draw(&Text::new(*line, (left, y + 17 * i as i32), words.clone())).expect("text");
     }
 }
 

@@ -94,6 +94,25 @@ impl Panel {
             .collect();
         json!({"robot": self.robot, "function": self.function.name(), "methods": methods, "notes": self.notes})
     }
+
+    /// What [`Panel::json`] wrote.
+    pub fn read(value: &Value) -> Panel {
+        let text = |v: &Value| v.as_str().expect("a text").to_string();
+        let list = |key: &str| value[key].as_array().expect("a list").iter();
+        let method = |m: &Value| {
+            let number = |key: &str| m[key].as_f64().expect("a number");
+            let group = Group::ALL.into_iter().find(|g| m["group"] == g.name()).expect("a group");
+            let time = ["ns", "ns_median", "ns_cold"].map(number);
+            let (rms, worst, cap) = (number("rms"), number("worst_found"), m["certified"].as_f64());
+            Method { name: text(&m["name"]), group, time, rms, worst, cap }
+        };
+        Panel {
+            robot: text(&value["robot"]),
+            function: Function::from_name(&text(&value["function"])).expect("a function"),
+            methods: list("methods").map(method).collect(),
+            notes: list("notes").map(text).collect(),
+        }
+    }
 }
 
 /// The binary as a calculator: requests in, results out.
