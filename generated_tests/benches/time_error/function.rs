@@ -9,7 +9,7 @@ use std::time::Instant;
 use straightline_codegen::certify::{certify, Effort, Interval};
 use straightline_codegen::compile::{compile, program, Options, Program};
 use straightline_codegen::model::ModelOptions;
-use straightline_codegen::scene::{self, Budget, JointRanges};
+use straightline_codegen::scene::{self, Budget, JointRanges, MaxError};
 use straightline_codegen::{expr, ForwardDynamicsMethod, Function, Robot, Scalar, Source};
 use straightline_core::model::{Joint, JointKind, Model};
 use straightline_core::reference as chapter;
@@ -310,13 +310,14 @@ pub fn measure(name: &str, function: Function) -> Panel {
     let mut mixed_cap = None;
     if let Some(cap) = caps[1] {
         let mut mixed = single.clone();
-        let max_error = Some(HALVED * cap);
+        let halved = HALVED * cap;
+        let max_error = Some(MaxError::All(halved));
         mixed.scene.budgets.insert(function, Budget { max_error, mixed_precision: true, ..Budget::default() });
         mixed.scene.ranges = case.stated_ranges(function);
         match compile(&case.source, &mixed) {
             Ok(_) => {
                 texts.push(generated("certified_mixed", &case, &mixed, function));
-                mixed_cap = max_error;
+                mixed_cap = Some(halved);
             }
             Err(refused) => {
                 notes.push(format!("no mixed precision: {}", refused.iter().next().expect("a reason").title))

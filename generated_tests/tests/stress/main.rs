@@ -9,6 +9,7 @@
 
 mod angles;
 mod chains;
+mod contacts;
 mod machines;
 mod motion;
 mod outcome;
@@ -23,7 +24,7 @@ use outcome::{judge, Outcome, Size};
 type Suite = fn(Size) -> Vec<Outcome>;
 
 /// All tests that apply to what exists, in the order of the list.
-const SUITES: [Suite; 14] = [
+const SUITES: [Suite; 18] = [
     round_trips::inverse_then_forward,
     round_trips::gravity_compensation,
     chains::uniform,
@@ -37,6 +38,10 @@ const SUITES: [Suite; 14] = [
     precision::single_against_double,
     motion::energy_and_momentum,
     motion::damping,
+    contacts::redundant,
+    contacts::next_to_singular,
+    contacts::closed_loop,
+    contacts::stacks,
     search::worst_inverse_dynamics,
 ];
 
@@ -66,6 +71,10 @@ small! {
     single_precision_loses_its_own_rounding_only = precision::single_against_double;
     energy_and_momentum_stay = motion::energy_and_momentum;
     stiff_dampers_never_add_energy = motion::damping;
+    redundant_contacts_share_their_load = contacts::redundant;
+    constraints_next_to_singular_have_finite_reactions = contacts::next_to_singular;
+    closed_loops_stay_closed = contacts::closed_loop;
+    stacks_carry_their_weight_whatever_the_ratio_of_masses = contacts::stacks;
     the_worst_inverse_dynamics_found_is_within_four_ulp = search::worst_inverse_dynamics;
 }
 
