@@ -26,56 +26,76 @@ pub(super) fn bounds(
         .map(|k| (analysis.result(k), analysis.error(k), analysis.range(analysis.result(k)).mag()))
         .collect();
     if effort.boxes > 1 {
-        let (start, count) = (Instant::now(), results.len() as u32);
-        for k in results {
-            let until = effort.time.map(|time| start + time * (k as u32 + 1) / count);
-            all[k].1 = all[k].1.min(refined(analysis, inputs, k, effort.boxes, until)?);
+        let start = Instant::now();
+        let until = |share: f64| effort.time.map(|time| start + time.mul_f64(share));
+        let whole: Vec<f64> = all.iter().map(|result| result.1).collect();
+        if let Some(gains) = gains(analysis, inputs, &whole, until(1.0))? {
+            // what is left of the time in equal shares
+            let spent = effort.time.map_or(0.0, |time| start.elapsed().as_secs_f64() / time.as_secs_f64());
+            for k in results {
+                let until = until(spent + (1.0 - spent) * (k + 1) as f64 / whole.len() as f64);
+                all[k].1 = all[k].1.min(refined(analysis, inputs, (k, whole[k]), &gains[k], (effort.boxes, until))?);
+            }
         }
     }
     Ok(all)
 }
 
-/// The bound of one result from so many boxes, or from those that there was time for.
+/// Of every result the inputs that it depends on, each with what is gained if it keeps to a quarter of its range; `None`: no time.
+fn gains(
+    analysis: &mut Analysis,
+    inputs: &[Interval],
+    whole: &[f64],
+    until: Option<Instant>,
+) -> Result<Option<Vec<Vec<(usize, f64)>>>, Refusal> {
+    let depends: Vec<Vec<usize>> = (0..whole.len()).map(|k| analysis.inputs_of(k)).collect();
+    let mut gains = vec![Vec::new(); whole.len()];
+    for (i, range) in inputs.iter().enumerate().filter(|(_, range)| range.width() > f64::MIN_POSITIVE) {
+        if until.is_some_and(|until| Instant::now() >= until) {
+            return Ok(None);
+        }
+        // halves of symmetric ranges have equal magnitudes
+        let quarters = if range.lo == -range.hi { 2 } else { 4 };
+        let concerned: Vec<usize> = (0..whole.len()).filter(|k| depends[*k].contains(&i)).collect();
+        let mut worst = vec![0.0f64; whole.len()];
+        for quarter in 0..quarters {
+            let end = |q: i32| if q == 4 { range.hi } else { range.lo + (range.hi - range.lo) * 0.25 * f64::from(q) };
+            let mut ranges = inputs.to_vec();
+            ranges[i] = Interval { lo: end(quarter), hi: end(quarter + 1) };
+            analysis.ranges(&ranges)?;
+            for k in &concerned {
+                worst[*k] = worst[*k].max(analysis.error(*k));
+            }
+        }
+        for k in concerned {
+            gains[k].push((i, whole[k] - worst[k]));
+        }
+    }
+    Ok(Some(gains))
+}
+
+/// The bound of result k, which is `whole` in one box, from so many boxes, or from those that there was time for.
 fn refined(
     analysis: &mut Analysis,
     inputs: &[Interval],
-    k: usize,
-    boxes: usize,
-    until: Option<Instant>,
+    (k, whole): (usize, f64),
+    gains: &[(usize, f64)],
+    (boxes, until): (usize, Option<Instant>),
 ) -> Result<f64, Refusal> {
     let is_late = || until.is_some_and(|until| Instant::now() >= until);
-    let candidates: Vec<usize> =
-        analysis.inputs_of(k).into_iter().filter(|i| inputs[*i].width() > f64::MIN_POSITIVE).collect();
     let mut bound = |ranges: &[Interval]| -> Result<f64, Refusal> {
         analysis.ranges(ranges)?;
         Ok(analysis.error(k))
     };
-    let whole = bound(inputs)?;
-    // what a quarter of each range gains: halves of symmetric ranges have equal magnitudes
-    let mut gains = Vec::with_capacity(candidates.len());
-    for &i in &candidates {
-        if is_late() {
-            return Ok(whole);
-        }
-        let mut worst = 0.0f64;
-        for quarter in 0..4 {
-            let mut ranges = inputs.to_vec();
-            let (lo, width) = (inputs[i].lo, inputs[i].hi - inputs[i].lo);
-            let end = |q: i32| if q == 4 { inputs[i].hi } else { lo + width * 0.25 * f64::from(q) };
-            ranges[i] = Interval { lo: end(quarter), hi: end(quarter + 1) };
-            worst = worst.max(bound(&ranges)?);
-        }
-        gains.push(whole - worst);
-    }
-    let mut parts = vec![Part { ranges: inputs.to_vec(), error: whole, cuts: vec![0; candidates.len()] }];
+    let mut parts = vec![Part { ranges: inputs.to_vec(), error: whole, cuts: vec![0; gains.len()] }];
     while parts.len() < boxes && !is_late() {
         // the worst part, cut along the input of the greatest gain; each cut in it halves what is left to gain
         let worst =
             (0..parts.len()).max_by(|a, b| parts[*a].error.total_cmp(&parts[*b].error)).expect("there is a part");
-        let gain = |part: &Part, c: usize| gains[c] / f64::from(1u32 << part.cuts[c].min(31));
+        let gain = |part: &Part, c: usize| gains[c].1 / f64::from(1u32 << part.cuts[c].min(31));
         let part = &parts[worst];
-        let Some(c) = (0..candidates.len()).max_by(|a, b| gain(part, *a).total_cmp(&gain(part, *b))) else { break };
-        let i = candidates[c];
+        let Some(c) = (0..gains.len()).max_by(|a, b| gain(part, *a).total_cmp(&gain(part, *b))) else { break };
+        let i = gains[c].0;
         let range = part.ranges[i];
         let middle = range.lo + 0.5 * (range.hi - range.lo);
         if !(range.lo < middle && middle < range.hi) {
