@@ -41,13 +41,16 @@ pub(super) fn bounds(
     Ok(all)
 }
 
-/// Of every result the inputs that it depends on, each with what is gained if it keeps to a quarter of its range; `None`: no time.
+/// The inputs that a result depends on, each with what is gained if it keeps to a quarter of its range.
+type Gains = Vec<(usize, f64)>;
+
+/// Those of every result; `None`: no time.
 fn gains(
     analysis: &mut Analysis,
     inputs: &[Interval],
     whole: &[f64],
     until: Option<Instant>,
-) -> Result<Option<Vec<Vec<(usize, f64)>>>, Refusal> {
+) -> Result<Option<Vec<Gains>>, Refusal> {
     let depends: Vec<Vec<usize>> = (0..whole.len()).map(|k| analysis.inputs_of(k)).collect();
     let mut gains = vec![Vec::new(); whole.len()];
     for (i, range) in inputs.iter().enumerate().filter(|(_, range)| range.width() > f64::MIN_POSITIVE) {
