@@ -10,7 +10,7 @@ use argmin::core::{CostFunction, Error, Executor, Gradient, State};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::neldermead::NelderMead;
 use argmin::solver::quasinewton::LBFGS;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 
 /// What is to be least.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -151,10 +151,18 @@ pub fn descend(cost: impl Fn(&[f64]) -> (f64, Vec<f64>), ranges: &[(f64, f64)]) 
         z.iter().zip(ranges).zip(gradient).map(of).collect()
     };
     let asked = Cell::new(0);
+    // the library asks for the value and for the gradient of the same point, one after the other
+    let last: RefCell<Option<Known>> = RefCell::new(None);
     let of_unbounded = |z: &[f64]| {
+        let mut last = last.borrow_mut();
+        if let Some((_, found)) = last.as_ref().filter(|(at, _)| at == z) {
+            return found.clone();
+        }
         asked.set(asked.get() + 1);
         let (value, gradient) = cost(&inside(z));
-        (value, slope(z, &gradient))
+        let found = (value, slope(z, &gradient));
+        *last = Some((z.to_vec(), found.clone()));
+        found
     };
     let start = vec![0.0; ranges.len()];
     let (first, _) = cost(&inside(&start));
@@ -168,6 +176,9 @@ pub fn descend(cost: impl Fn(&[f64]) -> (f64, Vec<f64>), ranges: &[(f64, f64)]) 
     let point = state.get_best_param().map_or_else(|| inside(&start), |z| inside(z));
     Ok(Optimum { cost: cost(&point).0, point, evaluations })
 }
+
+/// A point, and the cost there with its gradient.
+type Known = (Vec<f64>, (f64, Vec<f64>));
 
 /// A cost with its gradient.
 type WithGradient<'a> = dyn Fn(&[f64]) -> (f64, Vec<f64>) + 'a;
