@@ -1,7 +1,7 @@
 //! Mixed precision: a demanded error is met with less than all operations in f64, and the text computes what was analysed.
 
 use straightline_codegen::certify::companion::{state_bound, Bits};
-use straightline_codegen::certify::{certify, input_box, mixed, search, Effort};
+use straightline_codegen::certify::{certify, input_box, mixed, search, Effort, Interval};
 use straightline_codegen::compile::{compile, program, Options};
 use straightline_codegen::emit::Scalar;
 use straightline_codegen::expr::Graph;
@@ -26,13 +26,19 @@ fn options(max_error: f64) -> Options {
     Options { scalar: Scalar::F32, functions: vec![FUNCTION], scene, ..Options::default() }
 }
 
-#[test]
-fn a_demanded_error_is_met_with_less_than_all_operations_in_f64() {
+/// The function in f32 alone, and the box of its inputs.
+fn in_single() -> (Graph, Vec<Interval>) {
     let options = options(1.0);
     let (loaded, complaints) = model::load(&ur5(), &options.model);
     let robot = Robot::new(loaded.unwrap_or_else(|| panic!("{}", complaints.render())));
     let graph = program(&robot, &[], FUNCTION, &options).graph;
     let ranges = input_box(&graph.inputs, &options.scene, &robot.model).expect("every input has a range");
+    (graph, ranges)
+}
+
+#[test]
+fn a_demanded_error_is_met_with_less_than_all_operations_in_f64() {
+    let (graph, ranges) = in_single();
     let bounds = |graph: &Graph| certify(graph, Scalar::F32, &ranges, Effort::default()).expect("no division").errors;
     let single = bounds(&graph);
     let worst = single.iter().copied().fold(0.0, f64::max);
@@ -87,11 +93,7 @@ fn a_budget_by_result_is_met_result_by_result() {
 /// The bound at a state is one of the program in mixed precision, not of one in f32.
 #[test]
 fn the_bound_at_a_state_knows_what_is_in_f64() {
-    let options = options(1.0);
-    let (loaded, complaints) = model::load(&ur5(), &options.model);
-    let robot = Robot::new(loaded.unwrap_or_else(|| panic!("{}", complaints.render())));
-    let graph = program(&robot, &[], FUNCTION, &options).graph;
-    let ranges = input_box(&graph.inputs, &options.scene, &robot.model).expect("every input has a range");
+    let (graph, ranges) = in_single();
     let demand: Vec<f64> = errors_in_single().iter().map(|e| 0.4 * e).collect();
     let mixed = mixed::widened(&graph, &ranges, &demand, &[]).expect("no division");
     let bound = state_bound(&mixed, Scalar::F32, Bits::Plain).expect("the program is short");
@@ -114,11 +116,7 @@ fn the_bound_at_a_state_knows_what_is_in_f64() {
 
 /// The errors of the function in f32 alone.
 fn errors_in_single() -> Vec<f64> {
-    let options = options(1.0);
-    let (loaded, complaints) = model::load(&ur5(), &options.model);
-    let robot = Robot::new(loaded.unwrap_or_else(|| panic!("{}", complaints.render())));
-    let graph = program(&robot, &[], FUNCTION, &options).graph;
-    let ranges = input_box(&graph.inputs, &options.scene, &robot.model).expect("every input has a range");
+    let (graph, ranges) = in_single();
     certify(&graph, Scalar::F32, &ranges, Effort::default()).expect("no division").errors
 }
 

@@ -707,13 +707,18 @@ fn at_ease(q: [f64; 3]) -> Vec<f64> {
     y
 }
 
-#[test]
-fn the_energy_balance_closes_over_a_simulation() {
+/// The energy balance of the arm with every effect, in so many steps of so many seconds.
+fn balance_closes(steps: (usize, f64)) {
     let source = Source::new("arm.toml", ARM);
     let driven = Driven::new(&source, &ModelOptions::default(), &format!("{SMOOTH}{EVERYTHING}"));
-    let (brought, rest) = Simulated::new(&driven).balance(at_ease([0.3, -0.4, 0.5]), voltages, (2500, 2e-4));
+    let (brought, rest) = Simulated::new(&driven).balance(at_ease([0.3, -0.4, 0.5]), voltages, steps);
     println!("{brought:.3} J, not accounted for {rest:.2e} J");
     assert!(rest.abs() <= 1e-9 * brought, "{rest:e} of {brought}");
+}
+
+#[test]
+fn the_energy_balance_closes_over_a_simulation() {
+    balance_closes((2500, 2e-4));
 }
 
 /// Ten seconds; with losses, whose switching takes an integrator that sees it, in the simulation's own tests: `cargo test --release -p
@@ -721,11 +726,7 @@ fn the_energy_balance_closes_over_a_simulation() {
 #[test]
 #[ignore = "half a minute"]
 fn the_energy_balance_closes_over_ten_seconds() {
-    let source = Source::new("arm.toml", ARM);
-    let driven = Driven::new(&source, &ModelOptions::default(), &format!("{SMOOTH}{EVERYTHING}"));
-    let (brought, rest) = Simulated::new(&driven).balance(at_ease([0.3, -0.4, 0.5]), voltages, (100_000, 1e-4));
-    println!("{brought:.3} J, not accounted for {rest:.2e} J");
-    assert!(rest.abs() <= 1e-9 * brought, "{rest:e} of {brought}");
+    balance_closes((100_000, 1e-4));
 }
 
 #[test]

@@ -100,13 +100,8 @@ fn change(
     if key == "mass" {
         let (whole, double) = (at(1.0)?, at(2.0)?);
         let Some((whole, double)) = whole.zip(double) else { return Ok(None) };
-        let share = |(one, two): (Load<Dd>, Load<Dd>)| Load {
-            mass: two.mass - one.mass,
-            first_moment: two.first_moment - one.first_moment,
-            second_moment: two.second_moment - one.second_moment,
-        };
         let bodies = whole.bodies.iter().zip(&double.bodies).enumerate();
-        let shares = bodies.map(|(id, (a, b))| (id, share((a.total_about_origin(), b.total_about_origin()))));
+        let shares = bodies.map(|(id, (one, two))| (id, two.total_about_origin() - one.total_about_origin()));
         let shares: Vec<(usize, Load<Dd>)> = shares.filter(|(_, load)| load.mass != Dd::ZERO).collect();
         return Ok(Some(Change::Mass { whole: mass_of(description, owner), shares }));
     }
@@ -148,16 +143,7 @@ fn with_inputs(model: &Model<Dd>, changes: &[Change], inputs: &[Expr]) -> Model<
                 // what the file's value is there already
                 let more = *p - Expr::constant(Dd::from(*whole));
                 for (id, share) in shares {
-                    let load = share.map(|x| Expr::constant(x) * more);
-                    let load = match traced.bodies[*id].load {
-                        None => load,
-                        Some(other) => Load {
-                            mass: other.mass + load.mass,
-                            first_moment: other.first_moment + load.first_moment,
-                            second_moment: other.second_moment + load.second_moment,
-                        },
-                    };
-                    traced.bodies[*id].load = Some(load);
+                    traced.bodies[*id].carry(share.map(|x| Expr::constant(x) * more));
                 }
             }
             Change::Effect { body, key, drive } => {

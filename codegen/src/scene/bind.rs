@@ -71,10 +71,7 @@ impl Scene {
             let values = given.next().expect("a port per parameter");
             let Some(body) = parameter.body(&robot.model) else { continue };
             let (canonical, in_reduced) = (load(&values[..10]), load(&values[10..]));
-            model.bodies[body].load = Some(match model.bodies[body].load {
-                None => canonical,
-                Some(other) => sum(other, canonical),
-            });
+            model.bodies[body].carry(canonical);
             for r in [&mut reduced.bodies[body], &mut composite.bodies[body]] {
                 r.mass = r.mass + in_reduced.mass;
                 r.first_moment = r.first_moment + in_reduced.first_moment;
@@ -228,14 +225,6 @@ fn load(x: &[Expr]) -> Load<Expr> {
         mass: x[0],
         first_moment: Vec3::new(x[1], x[2], x[3]),
         second_moment: Sym3 { xx: x[4], xy: x[5], xz: x[6], yy: x[7], yz: x[8], zz: x[9] },
-    }
-}
-
-fn sum(a: Load<Expr>, b: Load<Expr>) -> Load<Expr> {
-    Load {
-        mass: a.mass + b.mass,
-        first_moment: a.first_moment + b.first_moment,
-        second_moment: a.second_moment + b.second_moment,
     }
 }
 

@@ -68,7 +68,6 @@ impl Flow {
         // in the order in which they are written
         let mut ready: Vec<NodeId> =
             written.iter().copied().filter(|id| !placed[id.index()] && missing[id.index()] == 0).collect();
-        let by_index: Vec<NodeId> = graph.ids().collect();
         while !ready.is_empty() {
             let gain = |id: &NodeId| {
                 let ends = self.operands[id.index()].iter().filter(|a| users_left[**a] == 1).count();
@@ -83,7 +82,7 @@ impl Flow {
             for user in &self.users[id.index()] {
                 missing[*user] -= 1;
                 if missing[*user] == 0 {
-                    ready.push(by_index[*user]);
+                    ready.push(NodeId(*user as u32));
                 }
             }
         }

@@ -11,6 +11,7 @@ use crate::real::Real;
 use crate::spatial::{SpatialInertia, Sym3, Transform, Vec3};
 use alloc::string::String;
 use alloc::vec::Vec;
+use core::ops::{Add, Sub};
 
 /// Index of a body in [`Model::bodies`].
 pub type BodyId = usize;
@@ -161,6 +162,28 @@ impl<T: Real> Load<T> {
     }
 }
 
+impl<T: Real> Add for Load<T> {
+    type Output = Load<T>;
+    fn add(self, other: Load<T>) -> Load<T> {
+        Load {
+            mass: self.mass + other.mass,
+            first_moment: self.first_moment + other.first_moment,
+            second_moment: self.second_moment + other.second_moment,
+        }
+    }
+}
+
+impl<T: Real> Sub for Load<T> {
+    type Output = Load<T>;
+    fn sub(self, other: Load<T>) -> Load<T> {
+        Load {
+            mass: self.mass - other.mass,
+            first_moment: self.first_moment - other.first_moment,
+            second_moment: self.second_moment - other.second_moment,
+        }
+    }
+}
+
 /// A moving body with the joint that carries it. Links that are fixed to it are merged in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body<T> {
@@ -191,14 +214,12 @@ impl<T: Real> Body<T> {
     pub fn total_about_origin(&self) -> Load<T> {
         let i = &self.inertia;
         let own = Load { mass: i.mass, first_moment: i.first_moment, second_moment: i.second_moment };
-        match self.load {
-            None => own,
-            Some(l) => Load {
-                mass: own.mass + l.mass,
-                first_moment: own.first_moment + l.first_moment,
-                second_moment: own.second_moment + l.second_moment,
-            },
-        }
+        self.load.map_or(own, |load| own + load)
+    }
+
+    /// Lets the body carry this, too.
+    pub fn carry(&mut self, more: Load<T>) {
+        self.load = Some(self.load.map_or(more, |load| load + more));
     }
 }
 
