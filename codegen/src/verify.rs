@@ -11,17 +11,18 @@ use crate::compile::{program, Generated, Options, Program};
 use crate::description::flexible::{Bending, Support};
 use crate::description::{self, Description, JointDrive, Notation, Value};
 use crate::diagnostic::{Diagnostics, Source};
-use crate::emit::{element_of, Scalar};
+use crate::emit::{element_of, fused, Scalar};
 use crate::expr::{evaluate, Graph};
 use crate::function::{Function, Robot};
 use crate::model::{self, ModelOptions};
 use crate::random::Random;
 use crate::reference_input::mass_centre_tree;
 use crate::scene::Scene;
+use crate::schedule::Schedule;
 use std::collections::BTreeMap;
 use straightline_core::model::{JointKind, Model};
 use straightline_core::reference::{self, Joint, MassCentreFrame, MassCentreTree};
-use straightline_core::Dd;
+use straightline_core::{trig, Dd};
 
 mod drives;
 mod whole;
@@ -122,8 +123,8 @@ pub fn verify(
         let tree = &mut tree.clone();
         whole::random_inputs(scene, &parameters, options.scalar, (&mut inputs, tree), &mut random)?;
         let (tree, whole_state) = (&*tree, &coordinates.expand(&inputs));
-        for Program { function, graph, .. } in &programs {
-            let values = run(graph, &inputs, options.scalar);
+        for Program { function, graph, schedule, .. } in &programs {
+            let values = run((graph, schedule), &inputs, options);
             let names = scene.frames_of(*function, frames);
             let frame = |name: &String| tree.frame(name).ok_or_else(|| format!("the reference has no frame `{name}`"));
             let frames: Vec<&MassCentreFrame<Dd>> = names.iter().map(frame).collect::<Result<_, _>>()?;
@@ -292,14 +293,24 @@ fn scaled(value: f64, expected: Dd, scale: f64) -> f64 {
     }
 }
 
-/// The program's outputs in its own arithmetic.
-fn run(graph: &Graph, state: &State, scalar: Scalar) -> Vec<f64> {
+/// The program's outputs in its own arithmetic; of one that fuses, as on a machine with the instruction.
+fn run((graph, schedule): (&Graph, &Schedule), state: &State, options: &Options) -> Vec<f64> {
     let inputs = graph.inputs.iter().flat_map(|port| state.get(&port.name)).copied();
-    match scalar {
-        Scalar::F64 => evaluate::<f64>(graph, &inputs.collect::<Vec<_>>()),
-        Scalar::F32 => {
+    let program = (graph, schedule);
+    match (options.scalar, options.fma) {
+        (Scalar::F64, false) => evaluate::<f64>(graph, &inputs.collect::<Vec<_>>()),
+        (Scalar::F64, true) => {
+            let sin_cos = |x| trig::sin_cos_of_sum_fused_f64(x, f64::mul_add);
+            fused::evaluate(program, &inputs.collect::<Vec<_>>(), f64::mul_add, sin_cos)
+        }
+        (Scalar::F32, fma) => {
             let inputs: Vec<f32> = inputs.map(|x| x as f32).collect();
-            evaluate::<f32>(graph, &inputs).into_iter().map(f64::from).collect()
+            let sin_cos = |x| trig::sin_cos_of_sum_fused_f32(x, f32::mul_add);
+            let results = match fma {
+                false => evaluate(graph, &inputs),
+                true => fused::evaluate(program, &inputs, f32::mul_add, sin_cos),
+            };
+            results.into_iter().map(f64::from).collect()
         }
     }
 }

@@ -1,8 +1,10 @@
 //! Fused multiply-add: every sum that counts as fused is, and the results stay as exact as without.
 
 use straightline_codegen::compile::{compile, program, Options};
+use straightline_codegen::emit::fused;
+use straightline_codegen::schedule::Limits;
 use straightline_codegen::Function;
-use straightline_core::Dd;
+use straightline_core::{trig, Dd};
 use straightline_generated_tests::inputs;
 use straightline_generated_tests::programs::{self, cast};
 use straightline_generated_tests::random::Random;
@@ -48,7 +50,8 @@ fn without_the_option_nothing_is_fused() {
 #[test]
 fn fused_results_are_as_exact_as_the_others() {
     let robot = Robot::load("solo12");
-    let options = programs::options(&robot);
+    // as in the build script
+    let options = Options { fma: true, limits: Limits { operations: 900 }, ..programs::options(&robot) };
     let loaded = programs::load(&programs::source(&robot), &options.model);
     type Batch = fn(usize, &[f64], &[f64], &[f64], &mut [f64]) -> Result<(), solo12::batch::WrongLength>;
     type Plain = fn(&[f64; 19], &[f64; 18], &[f64; 18], &mut [f64; 18]);
@@ -64,6 +67,15 @@ fn fused_results_are_as_exact_as_the_others() {
         let all = |k: usize| states.iter().flat_map(|s| s[k].clone()).collect::<Vec<f64>>();
         let mut found = vec![0.0; N * 18];
         batch(N, &all(0), &all(1), &all(2), &mut found).unwrap();
+        #[cfg(target_arch = "x86_64")]
+        if std::is_x86_feature_detected!("fma") {
+            let sin_cos = |x| trig::sin_cos_of_sum_fused_f64(x, f64::mul_add);
+            let interpreted = |s: &Vec<Vec<f64>>| {
+                fused::evaluate((&program.graph, &program.schedule), &s.concat(), f64::mul_add, sin_cos)
+            };
+            let interpreted: Vec<f64> = states.iter().flat_map(interpreted).collect();
+            assert_eq!(found, interpreted, "{function:?}: what is verified is what runs, bit by bit");
+        }
         let (mut differ, mut worst, mut worst_plain) = (0, 0.0_f64, 0.0_f64);
         for (state, found) in states.iter().zip(found.chunks(18)) {
             let truth: Vec<f64> = programs::run::<Dd>(&program, &cast(state)).into_iter().map(|x| x.to_f64()).collect();

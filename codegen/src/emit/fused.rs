@@ -2,8 +2,9 @@
 //! cosines among them.
 
 use super::Scalar;
-use crate::expr::{Graph, NodeId, Op};
-use crate::schedule::Part;
+use crate::expr::{evaluate_by, Graph, NodeId, Op};
+use crate::schedule::{Part, Schedule};
+use straightline_core::Real;
 
 /// A sum whose one term is a product: ±x·y ± c.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +55,31 @@ pub(super) fn fusions(graph: &Graph, part: &Part) -> (Vec<Option<Fused>>, Vec<bo
         fused[id.index()] = Some(Fused { negated, factors: found.2, other });
     }
     (fused, absorbed)
+}
+
+/// The results of a program as its fused text computes them where the machine has the instruction: `fma` is a·b + c in one
+/// rounding, `sin_cos` the fused sine and cosine of a sum in two pieces.
+pub fn evaluate<T: Real>(
+    (graph, schedule): (&Graph, &Schedule),
+    inputs: &[T],
+    fma: impl Fn(T, T, T) -> T,
+    sin_cos: impl Fn([T; 2]) -> (T, T),
+) -> Vec<T> {
+    let mut fused: Vec<Option<Fused>> = vec![None; graph.ops.len()];
+    for part in &schedule.parts {
+        let found = fusions(graph, part).0;
+        part.nodes.iter().for_each(|id| fused[id.index()] = found[id.index()]);
+    }
+    let sum = |id: NodeId, values: &[T]| {
+        let Fused { negated, factors: (a, b), other: (c, minus) } = fused[id.index()]?;
+        let [a, b, c] = [a, b, c].map(|id| values[id.index()]);
+        Some(fma(if negated { -a } else { a }, b, if minus { -c } else { c }))
+    };
+    let sin_cos = |angles: &[T]| match angles {
+        [angle] => sin_cos([*angle, T::zero()]),
+        angles => sin_cos(T::sum_of_angles(angles)),
+    };
+    evaluate_by(graph, inputs, sum, sin_cos)
 }
 
 /// The module `fused` of a file whose functions are fused; with sines and cosines if there is a module `trig` beside it.

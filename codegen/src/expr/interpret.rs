@@ -1,6 +1,6 @@
 //! Runs a graph over any scalar.
 
-use super::{Graph, Op};
+use super::{Graph, NodeId, Op};
 use straightline_core::Real;
 
 /// The results of a graph for these inputs (group after group), as many as the graph has results.
@@ -8,6 +8,20 @@ use straightline_core::Real;
 /// # Panics
 /// If the number of inputs is not the graph's.
 pub fn evaluate<T: Real>(graph: &Graph, inputs: &[T]) -> Vec<T> {
+    evaluate_by(graph, inputs, |_, _| None, T::sin_cos_of_sum)
+}
+
+/// [`evaluate`] where some operations are computed otherwise: `other` gives the value of a node from those before it, or
+/// none, and `sin_cos` those of a sum of angles.
+///
+/// # Panics
+/// As [`evaluate`].
+pub fn evaluate_by<T: Real>(
+    graph: &Graph,
+    inputs: &[T],
+    other: impl Fn(NodeId, &[T]) -> Option<T>,
+    sin_cos: impl Fn(&[T]) -> (T, T),
+) -> Vec<T> {
     let expected: usize = graph.inputs.iter().map(|p| p.len()).sum();
     assert_eq!(inputs.len(), expected, "one number per input scalar");
     // a SinCos node holds the sine; its cosine stands beside it
@@ -15,7 +29,11 @@ pub fn evaluate<T: Real>(graph: &Graph, inputs: &[T]) -> Vec<T> {
     let mut cosines: Vec<T> = Vec::new();
     let mut cosine_of = vec![0u32; graph.ops.len()];
     for (i, op) in graph.ops.iter().enumerate() {
-        let v = |id: super::NodeId| values[id.index()];
+        if let Some(value) = other(NodeId(i as u32), &values) {
+            values.push(value);
+            continue;
+        }
+        let v = |id: NodeId| values[id.index()];
         let value = match *op {
             Op::Input(k) => inputs[k as usize],
             Op::Constant(c) => T::constant(c.value()),
@@ -28,11 +46,7 @@ pub fn evaluate<T: Real>(graph: &Graph, inputs: &[T]) -> Vec<T> {
             Op::Sign(a) => v(a).sign(),
             Op::AngleSum(a, b) => v(a) + v(b),
             Op::SinCos(a) => {
-                let terms = graph.angle_terms(a);
-                let (s, c) = match terms.as_slice() {
-                    [angle] => v(*angle).sin_cos(),
-                    _ => T::sin_cos_of_sum(&terms.into_iter().map(v).collect::<Vec<T>>()),
-                };
+                let (s, c) = sin_cos(&graph.angle_terms(a).into_iter().map(v).collect::<Vec<T>>());
                 cosine_of[i] = cosines.len() as u32;
                 cosines.push(c);
                 s
