@@ -4,10 +4,14 @@
 //! table. Warm: another one of 1024 states at each call. Cold: caches and branch predictors are filled with other things before
 //! each call, as in a control loop with other work; a read of the clock is in that time. Both are the tenth percentile of the
 //! samples, which other work on the machine moves less than the median. The error is against the generic runtime
-//! over double-double, the worst of the states, relative to the largest component of the result.
+//! over double-double, the worst of the states, relative to the largest component of the result. Code is of this program's
+//! instructions, in bytes; on x86-64 they are read: the most bytes of stack that the function or one of its parts sets aside, and
+//! how many of its instructions read from and write to the stack: values that do not fit into registers.
+
+mod machine_code;
 
 use criterion::Criterion;
-use object::{Object, ObjectSymbol};
+use machine_code::{MachineCode, Spills};
 use std::cell::RefCell;
 use std::hint::black_box;
 use std::path::Path;
@@ -204,15 +208,6 @@ impl Subject {
     }
 }
 
-/// Bytes of machine code of a function and its parts, in this program.
-fn code_bytes(program: &object::File, module: &str, function: &str) -> u64 {
-    let is_of = |name: &str| {
-        let begins = |function: &str| name.contains(&format!("{}{module}{}{function}", module.len(), function.len()));
-        begins(function) || (1..100).any(|k| begins(&format!("{function}_part{k}")))
-    };
-    program.symbols().filter(|s| s.name().is_ok_and(is_of)).map(|s| s.size()).sum()
-}
-
 fn main() {
     let right_angles = ModelOptions { angle_tolerance: 1e-11, ..ModelOptions::default() };
     let floating = ModelOptions { floating_base: true, ..ModelOptions::default() };
@@ -252,16 +247,22 @@ fn main() {
             // those that the command line leaves out have no time
             let (Some(warm), Some(cold)) = times else { continue };
             let [mul, add, div, sin_cos] = case.cost;
+            let code = MachineCode::of(&program, subject.name, name);
+            let spills = code.spills.map_or("- | - | -".to_string(), |Spills { frame, reads, writes }| {
+                format!("{frame} | {reads} | {writes}")
+            });
             table.push_str(&format!(
-                "| {} | {name} | {warm:.1} | {cold:.0} | {:.1e} | {mul} / {add}{}, {sin_cos} | {} |\n",
+                "| {} | {name} | {warm:.1} | {cold:.0} | {:.1e} | {mul} / {add}{}, {sin_cos} | {} | {spills} |\n",
                 subject.name,
                 subject.error(case),
                 if div > 0 { format!(" + {div} div") } else { String::new() },
-                code_bytes(&program, subject.name, name),
+                code.bytes,
             ));
         }
     }
-    println!("\n| robot | function | warm [ns] | cold [ns] | error | mul / add, sincos | code [bytes] |");
-    println!("|---|---|---|---|---|---|---|\n{table}");
+    println!(
+        "\n| robot | function | warm [ns] | cold [ns] | error | mul / add, sincos | code [bytes] | stack [bytes] | reads | writes |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|\n{table}");
     criterion.final_summary();
 }
