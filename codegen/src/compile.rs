@@ -11,11 +11,12 @@ use crate::expr::{verify, Counts, Folding, Grade, Graph, NodeId, Port, RuleSet, 
 use crate::forward_method::MethodChoice;
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model;
-use crate::pass::{count_sums, dead_code, sums, unread_inputs};
+use crate::pass::{count_sums, dead_code, order, sums, unread_inputs};
 use crate::report::budget::{self, Measures};
 use crate::report::errors::ErrorReport;
 use crate::report::waterfall::{self, Waterfall};
 use crate::report::{FunctionReport, Report};
+use crate::rounding;
 use crate::scene::{self, is_optional, load_parameters, Parameter, Scene, LOAD_SCALARS};
 use crate::schedule::{schedule, Limits, Schedule};
 use crate::singular::singular_joints;
@@ -243,6 +244,12 @@ fn optimised_with(
         let graph = match optimisations.sums {
             true => check(dead_code(&check(sums(&graph)))),
             false => graph,
+        };
+        // fused products want another order
+        let ordered = optimisations.sums && !options.fma;
+        let graph = match ordered.then(|| rounding::samples(&robot.model, &graph)).flatten() {
+            Some(states) => check(order(&graph, &states)),
+            None => graph,
         };
         (graph, choice)
     };

@@ -6,12 +6,24 @@
 //! first order, without the Monte Carlo). Parameters of moved masses that cancel show here, and nowhere in an operation count.
 
 use crate::expr::{Graph, NodeId, Op};
+use crate::forward_method;
+use straightline_core::model::Model;
 use straightline_core::{Dd, Real};
 
 /// So many operations are visited at most for one estimate; if there are more, outputs share a sweep.
 const WORK: usize = 200_000;
 /// An output that is so small against the greatest one is judged by that.
 const SMALL: f64 = 1e-6;
+
+/// States of each kind whose values [`samples`] gives: at about rest, where weights rule, and as fast as the joints may move.
+const SAMPLES: usize = 8;
+
+/// The values of all nodes at some states; `None` where a run-time parameter is an input.
+pub fn samples(model: &Model<Dd>, graph: &Graph) -> Option<Vec<Vec<f64>>> {
+    let states = |fast| forward_method::states(model, &graph.inputs, SAMPLES, fast);
+    let (slow, fast) = states(false).zip(states(true))?;
+    Some(slow.iter().chain(&fast).map(|x| evaluate(graph, x)).collect())
+}
 
 /// The worst rms error of the outputs over the output's rms value, in units of the rounding error.
 pub fn estimate(graph: &Graph, states: &[Vec<f64>]) -> f64 {

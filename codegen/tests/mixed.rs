@@ -61,7 +61,7 @@ fn a_demanded_error_is_met_with_less_than_all_operations_in_f64() {
         if part == 0.4 {
             let alone = search::worst_found(&graph, Scalar::F32, &ranges, 6_000, 3);
             let most = |found: &[search::Found]| found.iter().map(|f| f.error).fold(0.0, f64::max);
-            assert!(most(&found) < 0.7 * most(&alone), "{:e} {:e}", most(&found), most(&alone));
+            assert!(most(&found) < 0.8 * most(&alone), "{:e} {:e}", most(&found), most(&alone));
         }
     }
 }

@@ -197,7 +197,8 @@ pub struct Counts {
     pub mul: usize,
     /// Additions and subtractions.
     pub add: usize,
-    /// Instructions for `mul` and `add` when every a·b ± c is one.
+    /// Instructions for `mul` and `add` when every a·b ± c is one and the terms of sums are in the order for that, as they are
+    /// where fused operations are asked for.
     pub fma: usize,
     /// Divisions.
     pub div: usize,
@@ -269,26 +270,30 @@ impl Graph {
         live
     }
 
+    /// How often each node is used, as an operand of these or as a result.
+    fn uses_by(&self, users: &[bool]) -> Vec<u32> {
+        let mut uses = vec![0; self.ops.len()];
+        let users = self.ops.iter().zip(users).filter(|(_, is_user)| **is_user);
+        users.flat_map(|(op, _)| op.operands()).for_each(|a| uses[a.index()] += 1);
+        self.results.iter().for_each(|r| uses[r.index()] += 1);
+        uses
+    }
+
     /// Operation counts of what the results need.
     pub fn counts(&self) -> Counts {
         let live = self.live();
-        let mut uses = vec![0u32; self.ops.len()];
-        for (i, op) in self.ops.iter().enumerate() {
-            if live[i] {
-                op.operands().for_each(|a| uses[a.index()] += 1);
-            }
-        }
-        self.results.iter().for_each(|r| uses[r.index()] += 1);
-        // a product (seen through a sign) that only this sum uses
-        let product_of_one_user = |a: NodeId| {
-            let a = match self.op(a) {
-                Op::Neg(b) if uses[a.index()] == 1 => b,
-                _ => a,
-            };
-            matches!(self.op(a), Op::Mul(..)) && uses[a.index()] == 1
+        let uses = self.uses_by(&live);
+        // a sum of n terms, the sums in it that nothing else uses included, of which k are products (seen through a sign) that
+        // nothing else uses: in the right order as many of its additions are fused
+        let inner = |a: NodeId| match self.op(a) {
+            Op::Neg(b) if uses[a.index()] == 1 => b,
+            _ => a,
         };
+        let is_sum = |a: NodeId| matches!(self.op(a), Op::Add(..) | Op::Sub(..));
+        let mut products = vec![0usize; self.ops.len()];
+        let mut terms = vec![0usize; self.ops.len()];
+        let mut within = vec![false; self.ops.len()];
         let mut counts = Counts::default();
-        let mut fused = 0;
         for (i, op) in self.ops.iter().enumerate() {
             if !live[i] {
                 continue;
@@ -297,7 +302,17 @@ impl Graph {
                 Op::Mul(..) => counts.mul += 1,
                 Op::Add(a, b) | Op::Sub(a, b) => {
                     counts.add += 1;
-                    fused += usize::from(product_of_one_user(a) || product_of_one_user(b));
+                    for a in [a, b].map(inner) {
+                        let alone = uses[a.index()] == 1;
+                        let (n, k) = match self.op(a) {
+                            _ if alone && is_sum(a) => (terms[a.index()], products[a.index()]),
+                            Op::Mul(..) if alone => (1, 1),
+                            _ => (1, 0),
+                        };
+                        terms[i] += n;
+                        products[i] += k;
+                        within[a.index()] |= alone;
+                    }
                 }
                 Op::Div(..) => counts.div += 1,
                 Op::Sqrt(_) => counts.sqrt += 1,
@@ -312,6 +327,8 @@ impl Graph {
                 Op::Input(_) | Op::Constant(_) | Op::Neg(_) | Op::Sign(_) | Op::Sin(_) | Op::Cos(_) => {}
             }
         }
+        let roots = (0..self.ops.len()).filter(|i| live[*i] && terms[*i] > 0 && !within[*i]);
+        let fused: usize = roots.map(|i| products[i].min(terms[i] - 1)).sum();
         counts.fma = counts.mul + counts.add - fused;
         counts
     }

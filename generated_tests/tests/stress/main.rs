@@ -24,7 +24,7 @@ use outcome::{judge, Outcome, Size};
 type Suite = fn(Size) -> Vec<Outcome>;
 
 /// All tests that apply to what exists, in the order of the list.
-const SUITES: [Suite; 18] = [
+const SUITES: [Suite; 19] = [
     round_trips::inverse_then_forward,
     round_trips::gravity_compensation,
     chains::uniform,
@@ -43,6 +43,7 @@ const SUITES: [Suite; 18] = [
     contacts::closed_loop,
     contacts::stacks,
     search::worst_inverse_dynamics,
+    search::random_arms,
 ];
 
 macro_rules! small {
@@ -76,6 +77,7 @@ small! {
     closed_loops_stay_closed = contacts::closed_loop;
     stacks_carry_their_weight_whatever_the_ratio_of_masses = contacts::stacks;
     the_worst_inverse_dynamics_found_is_within_four_ulp = search::worst_inverse_dynamics;
+    the_worst_inverse_dynamics_of_random_arms_stays_small = search::random_arms;
 }
 
 #[test]

@@ -18,7 +18,18 @@ pub fn equations(judged: &Judged, function: Function) -> Program {
 
 /// The worst error of computed torques in units of `unit` times the natural scales of [`scales`].
 pub fn torque_error(judged: &Judged, inputs: &[Vec<f64>], computed: &[f64], truth: &[Dd], unit: f64) -> f64 {
-    scaled(&scales(&judged.tree, &inputs[0], &inputs[1], &inputs[2]), computed, truth, unit)
+    torque_error_of(&judged.tree, inputs, computed, truth, unit)
+}
+
+/// The same for any tree.
+pub fn torque_error_of(
+    tree: &MassCentreTree<f64>,
+    inputs: &[Vec<f64>],
+    computed: &[f64],
+    truth: &[Dd],
+    unit: f64,
+) -> f64 {
+    scaled(&scales(tree, &inputs[0], &inputs[1], &inputs[2]), computed, truth, unit)
 }
 
 /// The same against the scale of the reference data, in which an acceleration is one term.

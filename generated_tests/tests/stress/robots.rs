@@ -45,26 +45,7 @@ impl Judged {
 
     /// The limits of a function's inputs, one after the other; a quaternion has yet to be made one.
     pub fn ranges(&self, function: Function) -> Ranges {
-        let model = self.model();
-        let mut ranges = Vec::new();
-        for port in function.inputs(model) {
-            let mut group = vec![(0.0, 0.0); port.len()];
-            for joint in model.bodies.iter().map(|b| &b.joint) {
-                let or = |limit: f64, other: f64| if limit.is_finite() { limit } else { other };
-                let (first, size) = match port.name.as_str() {
-                    "q" => (joint.iq, joint.kind.nq()),
-                    _ => (joint.iv, joint.kind.nv()),
-                };
-                group[first..first + size].fill(match (port.name.as_str(), joint.kind) {
-                    (_, JointKind::Floating) => (-1.0, 1.0),
-                    ("q", _) => (or(joint.limits.lower, -RANGE), or(joint.limits.upper, RANGE)),
-                    ("qd", _) => (-or(joint.limits.velocity, VELOCITY), or(joint.limits.velocity, VELOCITY)),
-                    _ => (-ACCELERATION, ACCELERATION),
-                });
-            }
-            ranges.extend(group);
-        }
-        Ranges(ranges)
+        ranges(self.model(), function)
     }
 
     /// Flat inputs in groups, the quaternion of length one.
@@ -94,6 +75,29 @@ impl Judged {
     pub fn state(&self, function: Function, random: &mut Random) -> Vec<Vec<f64>> {
         self.groups(function, &self.ranges(function).anywhere(random))
     }
+}
+
+/// The limits of a function's inputs, one after the other.
+pub fn ranges(model: &Model<Dd>, function: Function) -> Ranges {
+    let mut ranges = Vec::new();
+    for port in function.inputs(model) {
+        let mut group = vec![(0.0, 0.0); port.len()];
+        for joint in model.bodies.iter().map(|b| &b.joint) {
+            let or = |limit: f64, other: f64| if limit.is_finite() { limit } else { other };
+            let (first, size) = match port.name.as_str() {
+                "q" => (joint.iq, joint.kind.nq()),
+                _ => (joint.iv, joint.kind.nv()),
+            };
+            group[first..first + size].fill(match (port.name.as_str(), joint.kind) {
+                (_, JointKind::Floating) => (-1.0, 1.0),
+                ("q", _) => (or(joint.limits.lower, -RANGE), or(joint.limits.upper, RANGE)),
+                ("qd", _) => (-or(joint.limits.velocity, VELOCITY), or(joint.limits.velocity, VELOCITY)),
+                _ => (-ACCELERATION, ACCELERATION),
+            });
+        }
+        ranges.extend(group);
+    }
+    Ranges(ranges)
 }
 
 /// A link of a chain; all numbers exact in f32, so that constants bring no error of their own.

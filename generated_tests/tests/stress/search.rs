@@ -1,16 +1,17 @@
 //! The worst inverse dynamics that a search finds, in the limits of every robot.
 
 use crate::outcome::{Outcome, Size};
-use crate::precision::{equations, in_single, torque_error, torque_error_after_cancellation};
-use crate::robots::Judged;
-use straightline_codegen::compile::{optimised, Optimisations};
+use crate::precision::{equations, in_single, torque_error, torque_error_after_cancellation, torque_error_of};
+use crate::robots::{ranges, Judged};
+use straightline_codegen::compile::{optimised, program, Optimisations, Options};
 use straightline_codegen::expr::{evaluate, Graph};
 use straightline_codegen::Function;
 use straightline_core::Dd;
 use straightline_generated_tests::compiled;
 use straightline_generated_tests::programs::{self, cast};
-use straightline_generated_tests::random::Random;
+use straightline_generated_tests::random::{Kind, Random, RandomRobot};
 use straightline_generated_tests::search::{Found, PATIENCE};
+use straightline_generated_tests::second_author::rounded;
 
 /// An ulp of one: of f64 and f32.
 const ULP: [f64; 2] = [f64::EPSILON, f32::EPSILON as f64];
@@ -30,9 +31,7 @@ pub fn worst_inverse_dynamics(size: Size) -> Vec<Outcome> {
             outcomes.push(Outcome::new(24, name, what, value, bound));
         };
         let found = search(name, single, evaluations, torque_error, PATIENCE, true);
-        // the reduced form of this arm reaches 4.7 in 36 000 evaluations, its bodies' own parameters 3.6
-        let bound = if name == "chapter_oblique" { 6.0 } else { 4.0 };
-        line(format!("worst of {} found, ulp of natural scale", found.evaluations), found.value, bound);
+        line(format!("worst of {} found, ulp of natural scale", found.evaluations), found.value, 4.0);
         if size == Size::Full {
             line("rms of random states, same unit".into(), found.rms, 4.0);
             // a search would find accelerations that cancel, and this scale with them
@@ -42,6 +41,40 @@ pub fn worst_inverse_dynamics(size: Size) -> Vec<Outcome> {
             let plain = search(name, single, evaluations, torque_error, PATIENCE, false);
             line("as the robot file has it, worst found".into(), plain.value, 5.0);
         }
+    }
+    outcomes
+}
+
+/// Random arms with oblique axes and with right-angled ones, a quarter of their joints sliding, by the interpreter: the bits of
+/// the compiled code.
+pub fn random_arms(size: Size) -> Vec<Outcome> {
+    let (arms, evaluations) = size.pick((2, 100), (50, 36_000));
+    let function = Function::InverseDynamics;
+    let mut outcomes = Vec::new();
+    for right_angled in [false, true] {
+        let mut worst: Vec<f64> = (0..arms)
+            .map(|seed| {
+                let kind = Kind { joints: 6, branched: false, floating: false, welded: 0, right_angled };
+                let robot = RandomRobot::new(&mut Random(seed + 1), kind);
+                let (loaded, tree) = (robot.load(), rounded(&robot.reference()));
+                let graph = program(&loaded, &[], function, &Options::default()).graph;
+                let error = |flat: &[f64]| {
+                    let groups: Vec<Vec<f64>> = flat.chunks(kind.joints).map(<[f64]>::to_vec).collect();
+                    let truth = evaluate::<Dd>(&graph, &cast(&groups).concat());
+                    torque_error_of(&tree, &groups, &evaluate::<f64>(&graph, flat), &truth, ULP[0])
+                };
+                ranges(&loaded.model, function).climb(&mut Random(24), evaluations, error).value
+            })
+            .collect();
+        worst.sort_by(f64::total_cmp);
+        let name = format!("{arms} random arms, {}", if right_angled { "right angles" } else { "oblique axes" });
+        let mut line = |what: &str, value: f64, bound: f64| {
+            let what = format!("f64 inverse dynamics, worst of {evaluations} found, {what}, ulp of natural scale");
+            outcomes.push(Outcome::new(24, &name, what, value, bound));
+        };
+        line("of the median arm", worst[worst.len() / 2], 2.0);
+        // one of fifty oblique arms reaches 4.8: its parameters were regrouped, and their errors meet in one direction
+        line("of the worst arm", worst[worst.len() - 1], if right_angled { 4.0 } else { 5.0 });
     }
     outcomes
 }
