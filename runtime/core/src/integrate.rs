@@ -6,7 +6,7 @@
 //!
 //! | method | order | for |
 //! |---|---|---|
-//! | [`Step::semi_implicit_euler`] | 1 | many cheap steps, energy that stays bounded |
+//! | [`Step::semi_implicit_euler`] | 1 | many cheap steps; energy drifts where inertia changes with q |
 //! | [`Step::implicit_euler`] | 1 | stiff dampers and springs of the joints: stable at any step |
 //! | [`Step::runge_kutta_4`] | 4 | smooth motion, most accurate for its cost |
 //! | [`Step::implicit_midpoint`] | 2 | long runs: no drift of energy |
@@ -73,7 +73,8 @@ impl<T: Real, const NQ: usize, const NV: usize> Compensated<T, NQ, NV> {
         Compensated { state, lost: State { q: [T::zero(); NQ], qd: [T::zero(); NV] } }
     }
 
-    /// Adds a change; `base` as in [`Step::base`].
+    /// Adds a change; `base` as in [`Step::base`]. What brings a quaternion back to length one is a change like another: multiplied by
+    /// it, its entries would be rounded at every step again.
     pub fn add(&mut self, change: &Change<T, NQ, NV>, base: usize) {
         for (x, (lost, dx)) in self.state.q.iter_mut().zip(self.lost.q.iter_mut().zip(change.q)) {
             (*x, *lost) = two_sum(*x, *lost + dx);
@@ -81,7 +82,13 @@ impl<T: Real, const NQ: usize, const NV: usize> Compensated<T, NQ, NV> {
         for (x, (lost, dx)) in self.state.qd.iter_mut().zip(self.lost.qd.iter_mut().zip(change.qd)) {
             (*x, *lost) = two_sum(*x, *lost + dx);
         }
-        normalise::<T, NQ, NV>(&mut self.state.q, base);
+        if NQ == NV {
+            return;
+        }
+        let longer = inverse_length(&self.state.q[base + 3..base + 7]) - T::one();
+        for (x, lost) in self.state.q.iter_mut().zip(self.lost.q.iter_mut()).skip(base + 3).take(4) {
+            (*x, *lost) = two_sum(*x, *lost + *x * longer);
+        }
     }
 }
 
@@ -101,7 +108,7 @@ impl<T: Real> Step<T> {
         Step { length, base: 0 }
     }
 
-    /// q̇' = q̇ + h f(t, q, q̇), then q' = q ⊕ h q̇' (symplectic Euler).
+    /// q̇' = q̇ + h f(t, q, q̇), then q' = q ⊕ h q̇': symplectic where H is constant, as then q̇ is the momentum but for a factor.
     pub fn semi_implicit_euler<const NQ: usize, const NV: usize>(
         &self,
         t: T,
@@ -236,20 +243,25 @@ fn over_joints<T: Real, const NQ: usize, const NV: usize>(qd: &[T; NV], base: us
     from_fn(|i| if shift(i) < NV { qd[shift(i)] } else { T::zero() })
 }
 
-/// Brings the quaternion of a base back to length one. Newton's iteration for 1/√n from 1, three times: an error of 1e-2 of
-/// the length is gone.
+/// Brings the quaternion of a base back to length one.
 fn normalise<T: Real, const NQ: usize, const NV: usize>(q: &mut [T; NQ], base: usize) {
     if NQ == NV {
         return;
     }
     let quaternion = &mut q[base + 3..base + 7];
+    let inverse = inverse_length(quaternion);
+    quaternion.iter_mut().for_each(|x| *x = *x * inverse);
+}
+
+/// 1/|q|. Newton's iteration for 1/√n from 1, three times: an error of 1e-2 of the length is gone.
+fn inverse_length<T: Real>(quaternion: &[T]) -> T {
     let square = quaternion.iter().fold(T::zero(), |sum, x| sum + *x * *x);
     let (half, three) = (T::constant(Dd::HALF), T::constant(Dd::from(3.0)));
     let mut inverse = T::one();
     for _ in 0..3 {
         inverse = half * inverse * (three - square * inverse * inverse);
     }
-    quaternion.iter_mut().for_each(|x| *x = *x * inverse);
+    inverse
 }
 
 fn sum<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {

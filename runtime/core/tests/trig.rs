@@ -18,9 +18,9 @@ const BOUND_F64: f64 = 0.797;
 /// The largest error of all f32 in the domain, found by `every_f32_in_the_domain`.
 const BOUND_F32: f64 = 0.771;
 /// As [`BOUND_F64`], with fused multiply-add.
-const BOUND_FUSED_F64: f64 = 0.72;
+const BOUND_FUSED_F64: f64 = 0.74;
 /// As [`BOUND_F32`], with fused multiply-add.
-const BOUND_FUSED_F32: f64 = 0.771;
+const BOUND_FUSED_F32: f64 = 0.718;
 
 fn fused_f64(x: f64) -> (f64, f64) {
     sin_cos_of_sum_fused_f64([x, 0.0], f64::mul_add)
@@ -133,26 +133,39 @@ fn every_f32_in_the_domain() {
 #[test]
 #[ignore = "prints the table of the README: 20 s in release"]
 fn table_of_errors() {
-    let row = |name: &str, worst: Worst| {
+    let row = |name: &str, worst: Worst, bound: f64| {
         println!("| {name:<46} | {:.4} | {:.4} |", worst.sin.0, worst.cos.0);
-        assert!(worst.max() <= BOUND_F64);
+        assert!(worst.max() <= bound, "{name}: {worst:?}");
     };
     println!("| largest error found [ulp]                      | sin    | cos    |");
     println!("|------------------------------------------------|--------|--------|");
     for range in RANGES {
-        row(&format!("f64, |x| < {range:.3}, 5e6 random"), worst_f64(sin_cos_f64, random_arguments(range, 5_000_000)));
+        row(
+            &format!("f64, |x| < {range:.3}, 5e6 random"),
+            worst_f64(sin_cos_f64, random_arguments(range, 5_000_000)),
+            BOUND_F64,
+        );
         row(
             &format!("f64, fused, |x| < {range:.3}, 5e6 random"),
             worst_f64(fused_f64, random_arguments(range, 5_000_000)),
+            BOUND_FUSED_F64,
         );
     }
-    row("f64, 5 around each multiple of π/2", worst_f64(sin_cos_f64, multiples_of_half_pi(1, 2)));
-    row("f64, fused, 5 around each multiple of π/2", worst_f64(fused_f64, multiples_of_half_pi(1, 2)));
+    row("f64, 5 around each multiple of π/2", worst_f64(sin_cos_f64, multiples_of_half_pi(1, 2)), BOUND_F64);
+    row("f64, fused, 5 around each multiple of π/2", worst_f64(fused_f64, multiples_of_half_pi(1, 2)), BOUND_FUSED_F64);
     let mut from = 0.0f32;
     for to in [std::f32::consts::FRAC_PI_4, std::f32::consts::PI, 100.0, 1e4, DOMAIN_F32] {
         let arguments = (from.to_bits()..=to.to_bits()).step_by(13).map(f32::from_bits);
-        row(&format!("f32, {from:.3} <= x <= {to:.3}, every 13th"), worst_f32(sin_cos_f32, arguments.clone()));
-        row(&format!("f32, fused, {from:.3} <= x <= {to:.3}, every 13th"), worst_f32(fused_f32, arguments));
+        row(
+            &format!("f32, {from:.3} <= x <= {to:.3}, every 13th"),
+            worst_f32(sin_cos_f32, arguments.clone()),
+            BOUND_F32,
+        );
+        row(
+            &format!("f32, fused, {from:.3} <= x <= {to:.3}, every 13th"),
+            worst_f32(fused_f32, arguments),
+            BOUND_FUSED_F32,
+        );
         from = to;
     }
 }
