@@ -2,10 +2,12 @@
 
 use super::format::Format;
 use super::forms::{Atom, Coefficient, Forms, Term};
-use super::interval::{add_up, mul_up, norm_up, Interval};
+use super::interval::{add_up, mul_up, Interval};
 use super::norms::{Bounded, Factor, GroupId, Groups};
+use super::tape::{Bound, Norm, Pen, Range, Tape};
 use crate::emit::Scalar;
 use crate::expr::{Graph, NodeId, Op, Width};
+use std::sync::Arc;
 
 /// A graph that is being analysed in a format; what does not depend on the box is found once.
 pub struct Analysis<'g> {
@@ -45,29 +47,35 @@ pub(super) enum Broken {
     ChainRule,
     /// Errors of a vector count once.
     Team,
+    /// Of two halves of a part one is forgotten.
+    Part,
+    /// Half a turn counts as a whole one.
+    HalfTurn,
 }
 
 /// Numbers of one box, and of one result.
 #[derive(Clone, Default)]
 struct State {
     /// Values, rounding included.
-    value: Vec<Interval>,
+    value: Vec<Range>,
     /// Greatest rounding error of each node.
-    error: Vec<f64>,
+    error: Vec<Bound>,
     /// How far each value may be from the exact one.
-    total_error: Vec<f64>,
+    total_error: Vec<Bound>,
     /// Errors of roundings, of all nodes that share an adjoint, at the node that stands for them.
-    class_error: Vec<f64>,
+    class_error: Vec<Bound>,
     /// Exact and computed sine and cosine of each pair.
-    sin_cos: Vec<[(Interval, Interval); 2]>,
+    sin_cos: Vec<[(Range, Range); 2]>,
     /// Adjoints for the result at hand.
-    adjoint: Vec<Interval>,
+    adjoint: Vec<Range>,
     seed: u32,
     /// Norms of groups, with the round in which they were found.
-    norm: Vec<(u64, f64)>,
+    norm: Vec<(u64, Bound)>,
     box_round: u64,
     result_round: u64,
     round: u64,
+    /// What all of them are computed by.
+    pen: Pen,
 }
 
 /// Why a result has no certificate.
@@ -133,11 +141,11 @@ impl<'g> Analysis<'g> {
         let cones = results.into_iter().map(|r| (r, cone(graph, r))).collect();
         let n = graph.ops.len();
         let state = State {
-            value: vec![Interval::ZERO; n],
-            error: vec![0.0; n],
-            total_error: vec![0.0; n],
-            sin_cos: vec![[(Interval::ZERO, Interval::ZERO); 2]; n],
-            adjoint: vec![Interval::ZERO; n],
+            value: vec![Range::ZERO; n],
+            error: vec![Bound::ZERO; n],
+            total_error: vec![Bound::ZERO; n],
+            sin_cos: vec![[(Range::ZERO, Range::ZERO); 2]; n],
+            adjoint: vec![Range::ZERO; n],
             ..State::default()
         };
         Analysis {
@@ -158,12 +166,12 @@ impl<'g> Analysis<'g> {
     }
 
     #[cfg(test)]
-    fn is_broken(&self, what: Broken) -> bool {
+    pub(super) fn is_broken(&self, what: Broken) -> bool {
         self.broken == Some(what)
     }
 
     #[cfg(not(test))]
-    fn is_broken(&self, _what: Broken) -> bool {
+    pub(super) fn is_broken(&self, _what: Broken) -> bool {
         false
     }
 
@@ -172,21 +180,35 @@ impl<'g> Analysis<'g> {
     /// # Errors
     /// If a value can be no number.
     pub fn ranges(&mut self, inputs: &[Interval]) -> Result<(), Refusal> {
+        self.find_ranges(inputs, false)
+    }
+
+    /// The same, and all that is computed is written down, for [`Analysis::error_and_tape`].
+    pub(super) fn ranges_on_tape(&mut self, inputs: &[Interval]) -> Result<(), Refusal> {
+        self.find_ranges(inputs, true)
+    }
+
+    fn find_ranges(&mut self, inputs: &[Interval], writes: bool) -> Result<(), Refusal> {
+        self.state.pen.start(writes);
         self.state.round += 1;
         self.state.box_round = self.state.round;
         for i in 0..self.graph.ops.len() {
             let (exact, error) = self.exact_range(i, inputs)?;
-            let mut range = if matches!(self.graph.ops[i], Op::Constant(_)) { exact } else { exact.widened(error) };
-            self.state.total_error[i] = add_up(self.carried_error(i), error);
+            let is_constant = matches!(self.graph.ops[i], Op::Constant(_));
+            let mut range = if is_constant { exact } else { self.state.pen.widened(exact, error) };
+            let carried = self.carried_error(i);
+            self.state.total_error[i] = self.state.pen.add_up(carried, error);
             if let Some(form) = self.cancelled[i].take() {
                 let mut exact = self.enclosure(&form);
                 if self.is_broken(Broken::Cancelled) {
-                    exact = exact.clipped(0.4 * exact.mag());
+                    let less = self.state.pen.number(0.4 * exact.x.mag());
+                    exact = self.state.pen.clipped(exact, less);
                 }
-                range = range.intersect(exact.widened(self.state.total_error[i]));
+                let computed = self.state.pen.widened(exact, self.state.total_error[i]);
+                range = self.state.pen.intersect(range, computed);
                 self.cancelled[i] = Some(form);
             }
-            if range.mag().is_nan() || range.mag() >= self.format.largest {
+            if range.x.mag().is_nan() || range.x.mag() >= self.format.largest {
                 return Err(Refusal::Overflow);
             }
             self.state.value[i] = range;
@@ -197,56 +219,83 @@ impl<'g> Analysis<'g> {
     }
 
     /// How far the errors of its operands take a value from the exact one. Ranges hold both.
-    fn carried_error(&self, i: usize) -> f64 {
-        let error = |a: NodeId| self.state.total_error[a.index()];
-        let value = |a: NodeId| self.state.value[a.index()];
+    fn carried_error(&mut self, i: usize) -> Bound {
+        let State { total_error, value, pen, .. } = &mut self.state;
+        let error = |a: NodeId| total_error[a.index()];
+        let value = |a: NodeId| value[a.index()];
         match self.graph.ops[i] {
             // the sign of an input, or of what is off zero
-            Op::Input(_) | Op::Constant(_) | Op::Sign(_) => 0.0,
+            Op::Input(_) | Op::Constant(_) | Op::Sign(_) => Bound::ZERO,
             Op::Neg(a) | Op::SinCos(a) | Op::Sin(a) | Op::Cos(a) => error(a),
-            Op::Add(a, b) | Op::Sub(a, b) | Op::AngleSum(a, b) => add_up(error(a), error(b)),
+            Op::Add(a, b) | Op::Sub(a, b) | Op::AngleSum(a, b) => pen.add_up(error(a), error(b)),
             // |â b̂ − a b| ≤ |â| |b̂ − b| + |b| |â − a|
-            Op::Mul(a, b) => add_up(mul_up(value(a).mag(), error(b)), mul_up(value(b).mag(), error(a))),
+            Op::Mul(a, b) => {
+                let (x, y) = (pen.mag(value(a)), pen.mag(value(b)));
+                let (first, second) = (pen.mul_up(x, error(b)), pen.mul_up(y, error(a)));
+                pen.add_up(first, second)
+            }
             // |â/b̂ − a/b| ≤ (|â − a| + |a/b| |b̂ − b|) / |b̂|
             Op::Div(a, b) => {
-                let quotient = value(a).over(value(b)).mag();
-                mul_up(add_up(error(a), mul_up(quotient, error(b))), Interval::ONE.over(value(b)).mag())
+                let quotient = pen.over(value(a), value(b));
+                let quotient = pen.mag(quotient);
+                let shifted = pen.mul_up(quotient, error(b));
+                let sum = pen.add_up(error(a), shifted);
+                let reciprocal = pen.over(Range::ONE, value(b));
+                let reciprocal = pen.mag(reciprocal);
+                pen.mul_up(sum, reciprocal)
             }
             // |√â − √a| = |â − a| / (√â + √a)
             Op::Sqrt(a) => {
-                let root = value(a).sqrt();
-                mul_up(error(a), Interval::ONE.over(root + root).mag())
+                let root = pen.sqrt(value(a));
+                let both = pen.add(root, root);
+                let reciprocal = pen.over(Range::ONE, both);
+                let reciprocal = pen.mag(reciprocal);
+                pen.mul_up(error(a), reciprocal)
             }
         }
     }
 
     /// The errors of all nodes that share an adjoint, added up.
     fn class_errors(&mut self) {
-        let mut class_error = vec![0.0; self.graph.ops.len()];
+        let mut class_error = vec![Bound::ZERO; self.graph.ops.len()];
         let mut error = self.state.error.clone();
         for k in 0..self.sharing.products.len() {
             // |x c| + |y s| ≤ ‖(x, y)‖ ‖(c, s)‖, each product rounded by u of itself at most
             let (a, b, pair, group) = self.sharing.products[k];
-            let norm = mul_up(self.stretch(pair), self.norm(group));
-            let together = add_up(mul_up(self.unit(a, b), norm), 4.0 * self.format.tiny);
-            if together < add_up(error[a], error[b]) {
-                (error[a], error[b]) = (together, 0.0);
+            let norm = self.norm(group);
+            let (stretch, unit) = (self.stretch(pair), self.unit(a, b));
+            let pen = &mut self.state.pen;
+            let (stretch, unit, least) = (pen.number(stretch), pen.number(unit), pen.number(4.0 * self.format.tiny));
+            let norm = pen.mul_up(stretch, norm);
+            let rounding = pen.mul_up(unit, norm);
+            let together = pen.add_up(rounding, least);
+            let apart = pen.add_up(error[a], error[b]);
+            if together.x < apart.x {
+                (error[a], error[b]) = (pen.least(together, apart), Bound::ZERO);
             }
         }
-        for (i, e) in error.into_iter().enumerate().filter(|(_, e)| *e > 0.0) {
+        for (i, e) in error.into_iter().enumerate().filter(|(_, e)| e.x > 0.0) {
             let class = self.sharing.class[i];
-            class_error[class] = add_up(class_error[class], e);
+            class_error[class] = self.state.pen.add_up(class_error[class], e);
         }
         self.state.class_error = class_error;
     }
 
-    /// What rounding node i to its width can do, up to a magnitude.
-    fn rounding(&self, i: usize, magnitude: f64) -> f64 {
-        let double = || Format::of(Scalar::F64).rounding(magnitude);
+    /// What rounding node i to its width can do.
+    fn rounding(&mut self, i: usize, range: Range) -> Bound {
+        let magnitude = self.state.pen.mag(range);
+        let mut to = |format: &Format| {
+            let error = format.rounding(magnitude.x);
+            self.state.pen.rounding(magnitude, error, 0.5 * format.u, format.tiny)
+        };
+        let double = Format::of(Scalar::F64);
         match self.graph.width(NodeId(i as u32)) {
-            Width::Single => self.format.rounding(magnitude),
-            Width::Double => double(),
-            Width::Rounded => add_up(self.format.rounding(magnitude), double()),
+            Width::Single => to(&self.format),
+            Width::Double => to(&double),
+            Width::Rounded => {
+                let (single, double) = (to(&self.format), to(&double));
+                self.state.pen.add_up(single, double)
+            }
         }
     }
 
@@ -265,10 +314,11 @@ impl<'g> Analysis<'g> {
     pub fn shares(&mut self, cone: usize) -> Vec<(NodeId, f64)> {
         self.adjoints(cone);
         let nodes = std::mem::take(&mut self.cones[cone].1);
-        let share = |n: &u32| mul_up(self.state.adjoint[*n as usize].mag(), self.state.class_error[*n as usize]);
+        let state = &self.state;
+        let share = |n: &u32| mul_up(state.adjoint[*n as usize].x.mag(), state.class_error[*n as usize].x);
         let shares = nodes.iter().map(|n| (NodeId(*n), share(n))).filter(|(_, share)| *share > 0.0).collect();
         for &n in &nodes {
-            self.state.adjoint[n as usize] = Interval::ZERO;
+            self.state.adjoint[n as usize] = Range::ZERO;
         }
         self.cones[cone].1 = nodes;
         shares
@@ -281,20 +331,21 @@ impl<'g> Analysis<'g> {
 
     /// The greatest rounding error of a node.
     pub fn rounding_error(&self, id: NodeId) -> f64 {
-        self.state.error[id.index()]
+        self.state.error[id.index()].x
     }
 
     /// The range of an operation on computed operands, before its own rounding, and the bound of that.
-    fn exact_range(&mut self, i: usize, inputs: &[Interval]) -> Result<(Interval, f64), Refusal> {
+    fn exact_range(&mut self, i: usize, inputs: &[Interval]) -> Result<(Range, Bound), Refusal> {
         let format = self.format;
-        let v = |state: &State, a: NodeId| state.value[a.index()];
-        let rounded = |x: Interval, this: &Self| (x, this.rounding(i, x.mag()));
+        let v = |this: &Self, a: NodeId| this.state.value[a.index()];
+        let rounded = |this: &mut Self, x: Range| Ok((x, this.rounding(i, x)));
         Ok(match self.graph.ops[i] {
             Op::Input(k) => {
                 let x = inputs[k as usize];
                 // a number below the normal ones may be read as zero
                 let subnormal = x.lo < format.tiny && x.hi > -format.tiny && !x.is_zero();
-                (x, if subnormal { format.tiny } else { 0.0 })
+                let error = if subnormal { format.tiny } else { 0.0 };
+                (self.state.pen.input(k, x), self.state.pen.number(error))
             }
             Op::Constant(c) => {
                 // the range holds both the exact and the rounded value
@@ -303,83 +354,99 @@ impl<'g> Analysis<'g> {
                     _ => format,
                 };
                 let (range, error) = format.constant(c.value());
-                (range, if self.is_broken(Broken::Constants) { 0.0 } else { error })
+                let error = if self.is_broken(Broken::Constants) { 0.0 } else { error };
+                (self.state.pen.constant(range), self.state.pen.number(error))
             }
             Op::Neg(a) => {
-                let x = v(&self.state, a);
-                let is_rounded = self.graph.width(NodeId(i as u32)) == Width::Rounded;
-                (-x, if is_rounded { format.rounding(x.mag()) } else { 0.0 })
+                let x = v(self, a);
+                let minus = self.state.pen.neg(x);
+                if self.graph.width(NodeId(i as u32)) != Width::Rounded {
+                    return Ok((minus, Bound::ZERO));
+                }
+                let magnitude = self.state.pen.mag(x);
+                let error = format.rounding(magnitude.x);
+                (minus, self.state.pen.rounding(magnitude, error, 0.5 * format.u, format.tiny))
             }
             Op::Add(a, b) => {
-                let sum = self.sum(i, v(&self.state, a) + v(&self.state, b));
-                rounded(sum, self)
+                let direct = self.state.pen.add(v(self, a), v(self, b));
+                let sum = self.sum(i, direct);
+                return rounded(self, sum);
             }
             Op::Sub(a, b) => {
-                let sum = self.sum(i, v(&self.state, a) - v(&self.state, b));
-                rounded(sum, self)
+                let direct = self.state.pen.sub(v(self, a), v(self, b));
+                let sum = self.sum(i, direct);
+                return rounded(self, sum);
             }
             Op::Mul(a, b) => {
                 if a == b {
-                    return Ok(rounded(v(&self.state, a).square(), self));
+                    let square = self.state.pen.square(v(self, a));
+                    return rounded(self, square);
                 }
-                let (x, y) = (v(&self.state, a), v(&self.state, b));
-                let mut product = x * y;
+                let mut product = self.state.pen.mul(v(self, a), v(self, b));
                 if let Some(group) = self.products[i] {
                     // |a b| ≤ (a² + b²)/2
                     let norm = self.norm(group);
-                    product = product.clipped((0.5 * mul_up(norm, norm)).next_up());
+                    let half = self.state.pen.number(0.5);
+                    let square = self.state.pen.mul_up(norm, norm);
+                    let most = self.state.pen.mul_up(half, square);
+                    product = self.state.pen.clipped(product, most);
                 }
                 let is_single = self.graph.width(NodeId(i as u32)) == Width::Single;
                 let exact = is_single && (self.is_power_of_two(a) || self.is_power_of_two(b));
-                if exact {
-                    (product, format.tiny)
-                } else {
-                    rounded(product, self)
+                if !exact {
+                    return rounded(self, product);
                 }
+                (product, self.state.pen.number(format.tiny))
             }
             Op::Div(a, b) => {
-                if v(&self.state, b).has_zero() {
+                if v(self, b).x.has_zero() {
                     return Err(Refusal::Division);
                 }
-                rounded(v(&self.state, a).over(v(&self.state, b)), self)
+                let quotient = self.state.pen.over(v(self, a), v(self, b));
+                return rounded(self, quotient);
             }
             Op::Sqrt(a) => {
-                if v(&self.state, a).lo <= 0.0 {
+                if v(self, a).x.lo <= 0.0 {
                     return Err(Refusal::Division);
                 }
-                rounded(v(&self.state, a).sqrt(), self)
+                let root = self.state.pen.sqrt(v(self, a));
+                return rounded(self, root);
             }
             Op::Sign(a) => {
-                let x = v(&self.state, a);
+                let x = v(self, a).x;
                 let is_input = matches!(self.graph.op(a), Op::Input(_));
-                match () {
-                    () if x.lo > 0.0 => (Interval::ONE, 0.0),
-                    () if x.hi < 0.0 => (-Interval::ONE, 0.0),
-                    () if is_input => (Interval { lo: -1.0, hi: 1.0 }, 0.0),
+                let sign = match () {
+                    () if x.lo > 0.0 => Interval::ONE,
+                    () if x.hi < 0.0 => -Interval::ONE,
+                    () if is_input => Interval { lo: -1.0, hi: 1.0 },
                     () => return Err(Refusal::Sign),
-                }
+                };
+                (self.state.pen.constant(sign), Bound::ZERO)
             }
             // formed exactly: what rounding loses goes into the reduction
-            Op::AngleSum(a, b) => (v(&self.state, a) + v(&self.state, b), 0.0),
+            Op::AngleSum(a, b) => (self.state.pen.add(v(self, a), v(self, b)), Bound::ZERO),
             Op::SinCos(a) => {
-                let angle = v(&self.state, a);
-                if angle.mag() > format.trig_domain {
+                let angle = v(self, a);
+                if angle.x.mag() > format.trig_domain {
                     return Err(Refusal::Overflow);
                 }
-                let (sin, cos) = angle.sin_cos();
-                let e = format.trig_error(1.0);
-                self.state.sin_cos[i] = [(sin, cos), (sin.widened(e), cos.widened(e))];
-                (angle, 0.0)
+                let pen = &mut self.state.pen;
+                let (sin, cos) = pen.sin_cos(angle);
+                let e = pen.number(format.trig_error(1.0));
+                self.state.sin_cos[i] = [(sin, cos), (pen.widened(sin, e), pen.widened(cos, e))];
+                (angle, Bound::ZERO)
             }
-            Op::Sin(p) => {
-                let (sin, _) = self.state.sin_cos[p.index()][0];
-                (sin, format.trig_error(sin.mag()))
-            }
-            Op::Cos(p) => {
-                let (_, cos) = self.state.sin_cos[p.index()][0];
-                (cos, format.trig_error(cos.mag()))
-            }
+            Op::Sin(p) => self.half(self.state.sin_cos[p.index()][0].0),
+            Op::Cos(p) => self.half(self.state.sin_cos[p.index()][0].1),
         })
+    }
+
+    /// A sine or cosine, and its error.
+    fn half(&mut self, exact: Range) -> (Range, Bound) {
+        let magnitude = self.state.pen.mag(exact);
+        let error = self.format.trig_error(magnitude.x);
+        let unit = (self.format.trig_ulps * self.format.u).next_up();
+        (exact, self.state.pen.rounding(magnitude, error, unit, self.format.tiny))
     }
 
     fn is_power_of_two(&self, id: NodeId) -> bool {
@@ -393,47 +460,53 @@ impl<'g> Analysis<'g> {
     }
 
     /// The range of a sum, from that of its operands and from its form.
-    fn sum(&mut self, i: usize, direct: Interval) -> Interval {
+    fn sum(&mut self, i: usize, direct: Range) -> Range {
         let Some(sum) = self.sums[i].take() else { return direct };
         let enclosure = self.enclosure(&sum);
         self.sums[i] = Some(sum);
         let (_, slack) = self.forms.flat(Atom::Value(i as u32));
+        let State { error, pen, .. } = &mut self.state;
         let others = slack.nodes.iter().filter(|n| **n as usize != i);
-        let slack = others.fold(0.0, |s, n| add_up(s, self.state.error[*n as usize]));
-        direct.intersect(enclosure.widened(slack))
+        let slack = others.fold(Bound::ZERO, |s, n| pen.add_up(s, error[*n as usize]));
+        let enclosure = pen.widened(enclosure, slack);
+        pen.intersect(direct, enclosure)
     }
 
     /// A form's range: parts of one angle by their norm where that is less.
-    fn enclosure(&mut self, form: &Bounded) -> Interval {
-        let terms: Vec<Interval> = form.form.iter().map(|t| self.term(t)).collect();
-        let mut sum = Interval::ZERO;
-        let mut done = vec![false; terms.len()];
+    fn enclosure(&mut self, form: &Bounded) -> Range {
+        let mut sum = Range::ZERO;
         for (pair, members, group) in &form.turns {
-            let mut part = Interval::ZERO;
-            for k in members {
-                done[*k] = true;
-                part = part + terms[*k];
-            }
-            if !part.is_zero() {
+            let mut part = self.part(form, members, Range::ZERO);
+            if !part.x.is_zero() {
                 let norm = self.norm(*group);
-                let norm = if self.is_broken(Broken::Turn) { 0.4 * norm } else { norm };
-                part = part.clipped(mul_up(self.stretch(*pair), norm));
+                let stretch = self.stretch(*pair);
+                let stretch = if self.is_broken(Broken::Turn) { 0.4 * stretch } else { stretch };
+                let pen = &mut self.state.pen;
+                let stretch = pen.number(stretch);
+                let most = pen.mul_up(stretch, norm);
+                part = pen.clipped(part, most);
             }
-            sum = sum + part;
+            sum = self.state.pen.add(sum, part);
         }
         for (members, values, atoms) in &form.dots {
-            let mut part = Interval::ZERO;
-            for k in members {
-                done[*k] = true;
-                part = part + terms[*k];
+            let mut part = self.part(form, members, Range::ZERO);
+            if !part.x.is_zero() {
+                let (values, atoms) = (self.norm(*values), self.norm(*atoms));
+                let most = self.state.pen.mul_up(values, atoms);
+                part = self.state.pen.clipped(part, most);
             }
-            if !part.is_zero() {
-                let norm = mul_up(self.norm(*values), self.norm(*atoms));
-                part = part.clipped(norm);
-            }
-            sum = sum + part;
+            sum = self.state.pen.add(sum, part);
         }
-        terms.into_iter().zip(done).filter(|(_, done)| !done).fold(sum, |sum, (term, _)| sum + term)
+        self.part(form, &form.others, sum)
+    }
+
+    /// A sum, and some terms of a form.
+    fn part(&mut self, form: &Bounded, members: &[usize], mut sum: Range) -> Range {
+        for k in members {
+            let term = self.state.term(self.graph, &form.form[*k]);
+            sum = self.state.pen.add(sum, term);
+        }
+        sum
     }
 
     /// T of a pair: s² + c² ≤ T² for the computed sine and cosine, each within an error of the exact one.
@@ -442,118 +515,98 @@ impl<'g> Analysis<'g> {
         (1.0 + (1.5 * e).next_up()).next_up()
     }
 
-    fn term(&self, t: &Term) -> Interval {
-        let value = |n: u32| self.state.value[n as usize];
-        let atom = match t.atom {
-            Atom::One => Interval::ONE,
-            Atom::Value(v) => value(v),
-            Atom::Half(v) => value(v) * Interval::point(0.5),
-            Atom::Adjoint(v) => self.state.adjoint[v as usize],
-            Atom::Seed(r) => {
-                if r == self.state.seed {
-                    Interval::ONE
-                } else {
-                    Interval::ZERO
-                }
-            }
-        };
-        if atom.is_zero() {
-            return atom;
-        }
-        let x = match t.coefficient {
-            Coefficient::One => atom,
-            Coefficient::Node(n) => value(n) * atom,
-            Coefficient::Sin(p) => self.state.sin_cos[p as usize][1].0 * atom,
-            Coefficient::Cos(p) => self.state.sin_cos[p as usize][1].1 * atom,
-            Coefficient::ExactCos(p) => self.state.sin_cos[p as usize][0].1 * atom,
-            Coefficient::ExactMinusSin(p) => -self.state.sin_cos[p as usize][0].0 * atom,
-            Coefficient::Reciprocal(b) => Interval::ONE.over(value(b)) * atom,
-            Coefficient::MinusQuotient(n) => {
-                let Op::Div(a, b) = self.graph.ops[n as usize] else { unreachable!("made for divisions") };
-                -(value(a.0).over(value(b.0).square())) * atom
-            }
-            Coefficient::HalfReciprocal(n) => {
-                let Op::Sqrt(a) = self.graph.ops[n as usize] else { unreachable!("made for roots") };
-                let root = value(a.0).sqrt();
-                Interval::ONE.over(root + root) * atom
-            }
-        };
-        if t.negative {
-            -x
-        } else {
-            x
-        }
-    }
-
     /// An upper bound of the norm of a group.
-    fn norm(&mut self, id: GroupId) -> f64 {
+    fn norm(&mut self, id: GroupId) -> Bound {
         let k = id as usize;
         if self.state.norm.len() <= k {
-            self.state.norm.resize(self.groups.groups.len().max(k + 1), (0, 0.0));
+            self.state.norm.resize(self.groups.groups.len().max(k + 1), (0, Bound::ZERO));
         }
         let current = if self.groups.groups[k].of_adjoints { self.state.result_round } else { self.state.box_round };
         if self.state.norm[k].0 == current {
             return self.state.norm[k].1;
         }
-        let mut best = norm_up(self.groups.groups[k].members.iter().map(|m| {
-            let mut sum = Interval::ZERO;
+        let mut ends = Norm::ZERO;
+        for m in self.groups.groups[k].members.iter() {
+            let mut sum = Range::ZERO;
             for t in m {
-                sum = sum + self.term(t);
+                let term = self.state.term(self.graph, t);
+                sum = self.state.pen.add(sum, term);
             }
-            sum.mag()
-        }));
+            let magnitude = self.state.pen.mag(sum);
+            self.state.pen.add_square(&mut ends, magnitude);
+        }
+        let mut best = self.state.pen.root(ends);
         // what is asked for on the way back to itself is answered by its ends
         self.state.norm[k] = (current, best);
-        let alone = matches!(self.groups.groups[k].members.as_slice(), [m] if m.len() == 1);
-        if best == 0.0 || alone {
+        let alone = matches!(&*self.groups.groups[k].members, [m] if m.len() == 1);
+        if best.x == 0.0 || alone {
             return best;
         }
         self.groups.bound_members(id);
         let bounded = self.groups.groups[k].bounded.take().expect("made above");
         if bounded.iter().any(|b| !(b.turns.is_empty() && b.dots.is_empty())) {
-            let ends: Vec<f64> = bounded.iter().map(|b| self.enclosure(b).mag()).collect();
-            best = best.min(norm_up(ends));
+            let mut ends = Norm::ZERO;
+            for b in &bounded {
+                let enclosure = self.enclosure(b);
+                let magnitude = self.state.pen.mag(enclosure);
+                self.state.pen.add_square(&mut ends, magnitude);
+            }
+            let clipped = self.state.pen.root(ends);
+            best = self.state.pen.least(best, clipped);
             self.state.norm[k].1 = best;
         }
         self.groups.groups[k].bounded = Some(bounded);
         let is_first = self.groups.groups[k].ways.is_none();
         if is_first {
-            let mut groups = std::mem::take(&mut self.groups);
-            groups.find_ways(id, &self.forms, &|t| self.term(t).mag());
-            self.groups = groups;
+            let state = std::cell::RefCell::new(std::mem::take(&mut self.state));
+            self.groups.find_ways(id, &self.forms, &|t| state.borrow_mut().size(self.graph, t));
+            self.state = state.into_inner();
         }
         let mut ways = self.groups.groups[k].ways.take().expect("made above");
-        let mut bounds = Vec::with_capacity(ways.len());
+        let mut bounds = Vec::with_capacity(if is_first { ways.len() } else { 0 });
         for way in &ways {
-            let errors = way.slack.iter().map(|s| {
-                let rounding = s.nodes.iter().fold(0.0, |s, n| add_up(s, self.state.error[*n as usize]));
-                s.totals.iter().fold(rounding, |s, n| add_up(s, self.state.total_error[*n as usize]))
-            });
-            let mut bound = norm_up(errors);
+            let mut slack = Norm::ZERO;
+            for s in way.slack.iter() {
+                let State { error, total_error, pen, .. } = &mut self.state;
+                let rounding = s.nodes.iter().fold(Bound::ZERO, |s, n| pen.add_up(s, error[*n as usize]));
+                let all = s.totals.iter().fold(rounding, |s, n| pen.add_up(s, total_error[*n as usize]));
+                pen.add_square(&mut slack, all);
+            }
+            let mut bound = self.state.pen.root(slack);
             for (factor, inner) in &way.parts {
                 let factor = match factor {
-                    Factor::Turn(pair) => self.stretch(*pair),
-                    Factor::Matrix(x) => *x,
+                    Factor::Turn(pair) => {
+                        let stretch = self.stretch(*pair);
+                        self.state.pen.number(stretch)
+                    }
+                    Factor::Matrix(x) => self.state.pen.number(*x),
                     Factor::Coefficient(c) => {
-                        self.term(&Term { coefficient: *c, atom: Atom::One, negative: false }).mag()
+                        let alone = Term { coefficient: *c, atom: Atom::One, negative: false };
+                        let value = self.state.term(self.graph, &alone);
+                        self.state.pen.mag(value)
                     }
                     Factor::Values(group) => self.norm(*group),
                 };
-                bound = add_up(bound, mul_up(factor, self.norm(*inner)));
-                if bound >= best {
+                let inner = self.norm(*inner);
+                let part = self.state.pen.mul_up(factor, inner);
+                bound = self.state.pen.add_up(bound, part);
+                if bound.x >= best.x {
                     break;
                 }
             }
-            if bound < best {
-                bound = add_up(bound, self.norm(way.rest));
-                best = best.min(bound);
+            if bound.x < best.x {
+                let rest = self.norm(way.rest);
+                bound = self.state.pen.add_up(bound, rest);
+                best = self.state.pen.least(best, bound);
             }
-            bounds.push(bound);
+            if is_first {
+                bounds.push(bound.x);
+            }
         }
         if is_first {
             // what is far off here will hardly be the best elsewhere, and all are sound
             let mut bounds = bounds.into_iter();
-            ways.retain(|_| bounds.next().is_some_and(|b| b <= WORTHWHILE * best));
+            ways.retain(|_| bounds.next().is_some_and(|b| b <= WORTHWHILE * best.x));
         }
         self.groups.groups[k].ways = Some(ways);
         self.state.norm[k] = (current, best);
@@ -571,12 +624,14 @@ impl<'g> Analysis<'g> {
             let sums = self.adjoint_sums[n as usize].take().expect("live nodes have adjoints");
             let (chain, apart) = &sums;
             let mut adjoint = if self.is_broken(Broken::ChainRule) && chain.form.len() > 1 {
-                chain.form[1..].iter().fold(Interval::ZERO, |sum, t| sum + self.term(t))
+                let others: Vec<usize> = (1..chain.form.len()).collect();
+                self.part(chain, &others, Range::ZERO)
             } else {
                 self.enclosure(chain)
             };
             if !(apart.turns.is_empty() && apart.dots.is_empty()) {
-                adjoint = adjoint.intersect(self.enclosure(apart));
+                let apart = self.enclosure(apart);
+                adjoint = self.state.pen.intersect(adjoint, apart);
             }
             self.adjoint_sums[n as usize] = Some(sums);
             self.state.adjoint[n as usize] = adjoint;
@@ -586,7 +641,7 @@ impl<'g> Analysis<'g> {
 
     /// The range of a node's value, over the box of [`Analysis::ranges`].
     pub fn range(&self, id: NodeId) -> Interval {
-        self.state.value[id.index()]
+        self.state.value[id.index()].x
     }
 
     /// How many results are distinct nodes.
@@ -597,6 +652,19 @@ impl<'g> Analysis<'g> {
     /// The node of a distinct result.
     pub fn result(&self, k: usize) -> NodeId {
         self.cones[k].0
+    }
+
+    /// Which inputs are angles of which nothing but the sine and cosine is taken, or those of their sums.
+    pub(super) fn turning_inputs(&self) -> Vec<usize> {
+        let is_input = |id: NodeId| matches!(self.graph.op(id), Op::Input(_));
+        let turns = |op: &Op| matches!(op, Op::SinCos(_) | Op::AngleSum(..));
+        let inputs = self.graph.ids().filter(|id| is_input(*id) && !self.graph.results.contains(id));
+        let other_uses: std::collections::BTreeSet<NodeId> =
+            self.graph.ops.iter().filter(|op| !turns(op)).flat_map(|op| op.operands()).collect();
+        let angles = inputs.filter(|id| !other_uses.contains(id));
+        angles
+            .map(|id| if let Op::Input(k) = self.graph.op(id) { k as usize } else { unreachable!("it is an input") })
+            .collect()
     }
 
     /// Which inputs a distinct result depends on.
@@ -610,41 +678,135 @@ impl<'g> Analysis<'g> {
 
     /// The greatest error of a distinct result, over the box of [`Analysis::ranges`].
     pub fn error(&mut self, cone: usize) -> f64 {
+        self.error_bound(cone).x
+    }
+
+    /// The same after [`Analysis::ranges_on_tape`], and the steps by which it is found. `samples`: parts of the box, as [`Tape::new`] takes them.
+    pub(super) fn error_and_tape(&mut self, cone: usize, samples: &[&[Interval]]) -> (f64, Tape) {
+        let mark = self.state.pen.mark();
+        let error = self.error_bound(cone);
+        let tape = Tape::new(&self.state.pen, error, samples);
+        self.state.pen.forget(mark);
+        // norms of values that only this result has asked for are written anew for the next one
+        self.state.norm.iter_mut().filter(|(_, norm)| norm.is_since(mark)).for_each(|(round, _)| *round = 0);
+        (error.x, tape)
+    }
+
+    fn error_bound(&mut self, cone: usize) -> Bound {
         self.adjoints(cone);
         let nodes = std::mem::take(&mut self.cones[cone].1);
-        let mut sum = 0.0;
+        let mut sum = Bound::ZERO;
         let mut grouped: Vec<usize> = Vec::new();
         for &n in &nodes {
             let class = n as usize;
-            if self.state.class_error[class] == 0.0 {
+            if self.state.class_error[class].x == 0.0 {
                 continue;
             }
             match self.sharing.team[class] {
                 Some(team) => grouped.push(team),
-                None => sum = add_up(sum, mul_up(self.state.adjoint[class].mag(), self.state.class_error[class])),
+                None => sum = self.state.add_share(sum, class),
             }
         }
         grouped.sort_unstable();
         grouped.dedup();
         for team in grouped {
-            let (classes, group) = self.sharing.teams[team].clone();
-            let one_by_one = classes
-                .iter()
-                .fold(0.0, |s, c| add_up(s, mul_up(self.state.adjoint[*c].mag(), self.state.class_error[*c])));
-            let active = classes.iter().filter(|c| !self.state.adjoint[**c].is_zero());
-            let mut errors = norm_up(active.map(|c| self.state.class_error[*c]));
-            if self.sharing.halves[team] {
-                errors = errors.min(self.format.pair_error());
+            let group = self.sharing.teams[team].1;
+            let classes = &self.sharing.teams[team].0;
+            let mut one_by_one = Bound::ZERO;
+            let mut errors = Norm::ZERO;
+            for c in classes {
+                one_by_one = self.state.add_share(one_by_one, *c);
+                if !self.state.adjoint[*c].x.is_zero() {
+                    self.state.pen.add_square(&mut errors, self.state.class_error[*c]);
+                }
             }
-            let together = mul_up(self.norm(group), errors);
-            let together = if self.is_broken(Broken::Team) { 0.5 * together } else { together };
-            sum = add_up(sum, one_by_one.min(together));
+            let mut errors = self.state.pen.root(errors);
+            if self.sharing.halves[team] {
+                let pair = self.state.pen.number(self.format.pair_error());
+                errors = self.state.pen.least(errors, pair);
+            }
+            let norm = self.norm(group);
+            let mut together = self.state.pen.mul_up(norm, errors);
+            if self.is_broken(Broken::Team) {
+                let half = self.state.pen.number(0.5);
+                together = self.state.pen.mul_up(half, together);
+            }
+            let least = self.state.pen.least(one_by_one, together);
+            sum = self.state.pen.add_up(sum, least);
         }
         for &n in &nodes {
-            self.state.adjoint[n as usize] = Interval::ZERO;
+            self.state.adjoint[n as usize] = Range::ZERO;
         }
         self.cones[cone].1 = nodes;
         sum
+    }
+}
+
+impl State {
+    /// A sum, and what the errors of a class are worth.
+    fn add_share(&mut self, sum: Bound, class: usize) -> Bound {
+        let adjoint = self.pen.mag(self.adjoint[class]);
+        let share = self.pen.mul_up(adjoint, self.class_error[class]);
+        self.pen.add_up(sum, share)
+    }
+
+    fn term(&mut self, graph: &Graph, t: &Term) -> Range {
+        let State { value, adjoint, sin_cos, pen, .. } = self;
+        let value = |n: u32| value[n as usize];
+        let atom = match t.atom {
+            Atom::One => Range::ONE,
+            Atom::Value(v) => value(v),
+            Atom::Half(v) => {
+                let half = pen.constant(Interval::point(0.5));
+                pen.mul(value(v), half)
+            }
+            Atom::Adjoint(v) => adjoint[v as usize],
+            Atom::Seed(r) => {
+                if r == self.seed {
+                    Range::ONE
+                } else {
+                    Range::ZERO
+                }
+            }
+        };
+        if atom.x.is_zero() {
+            return atom;
+        }
+        let factor = match t.coefficient {
+            Coefficient::One => Range::ONE,
+            Coefficient::Node(n) => value(n),
+            Coefficient::Sin(p) => sin_cos[p as usize][1].0,
+            Coefficient::Cos(p) => sin_cos[p as usize][1].1,
+            Coefficient::ExactCos(p) => sin_cos[p as usize][0].1,
+            Coefficient::ExactMinusSin(p) => pen.neg(sin_cos[p as usize][0].0),
+            Coefficient::Reciprocal(b) => pen.over(Range::ONE, value(b)),
+            Coefficient::MinusQuotient(n) => {
+                let Op::Div(a, b) = graph.ops[n as usize] else { unreachable!("made for divisions") };
+                let square = pen.square(value(b.0));
+                let quotient = pen.over(value(a.0), square);
+                pen.neg(quotient)
+            }
+            Coefficient::HalfReciprocal(n) => {
+                let Op::Sqrt(a) = graph.ops[n as usize] else { unreachable!("made for roots") };
+                let root = pen.sqrt(value(a.0));
+                let both = pen.add(root, root);
+                pen.over(Range::ONE, both)
+            }
+        };
+        let x = pen.mul(factor, atom);
+        if t.negative {
+            pen.neg(x)
+        } else {
+            x
+        }
+    }
+
+    /// How large a term is.
+    fn size(&mut self, graph: &Graph, t: &Term) -> f64 {
+        let mark = self.pen.mark();
+        let size = self.term(graph, t).x.mag();
+        self.pen.forget(mark);
+        size
     }
 }
 
@@ -724,8 +886,9 @@ impl Sharing {
             };
             let group = groups.group(classes.iter().map(adjoint));
             classes.iter().for_each(|c| team[*c] = Some(teams.len()));
-            groups.team.resize(n, None);
-            classes.iter().for_each(|c| groups.team[*c] = Some(teams.len() as u32));
+            let of_nodes = Arc::make_mut(&mut groups.team);
+            of_nodes.resize(n, None);
+            classes.iter().for_each(|c| of_nodes[*c] = Some(teams.len() as u32));
             teams.push((classes, group));
         }
         // turning products by adjoint and pair

@@ -46,6 +46,7 @@ pub mod residual;
 mod running;
 pub mod search;
 mod subdivision;
+mod tape;
 #[cfg(test)]
 mod tests;
 

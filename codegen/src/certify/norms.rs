@@ -20,8 +20,10 @@
 
 use super::forms::{canonical, negated, Coefficient, Depth, Form, Forms, Slack, Term};
 use super::forms::{simplified, Atom, Flat};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxBuildHasher, FxHashMap};
 use std::collections::BTreeMap;
+use std::hash::BuildHasher;
+use std::sync::Arc;
 
 /// Index of a group.
 pub type GroupId = u32;
@@ -43,7 +45,7 @@ pub enum Effort {
 #[derive(Clone, Debug)]
 pub struct Group {
     /// Its members, each with a first term of positive sign, sorted.
-    pub members: Vec<Form>,
+    pub members: Arc<[Form]>,
     /// Which rules may be tried.
     pub effort: Effort,
     /// Whether adjoints are in it, so that its norm is another for each result.
@@ -52,6 +54,8 @@ pub struct Group {
     pub bounded: Option<Vec<Bounded>>,
     /// The ways, once they are wanted.
     pub ways: Option<Vec<Way>>,
+    /// Another group of the same hash.
+    next: Option<GroupId>,
 }
 
 /// What stands before the group that is left.
@@ -75,7 +79,7 @@ pub struct Way {
     /// What does not belong to them, one form per member.
     pub rest: GroupId,
     /// Errors between the members and their forms, for each member.
-    pub slack: Vec<Slack>,
+    pub slack: Arc<[Slack]>,
 }
 
 /// A form with the groups that bound its parts of one angle.
@@ -87,6 +91,8 @@ pub struct Bounded {
     pub turns: Vec<(u32, Vec<usize>, GroupId)>,
     /// Scalar products: terms by index, and the groups of their coefficients and of their atoms.
     pub dots: Vec<(Vec<usize>, GroupId, GroupId)>,
+    /// Terms in neither.
+    pub others: Vec<usize>,
 }
 
 /// Groups by their members.
@@ -94,10 +100,10 @@ pub struct Bounded {
 pub struct Groups {
     /// All groups.
     pub groups: Vec<Group>,
-    /// For look-ups only.
-    known: FxHashMap<(Vec<Form>, Effort), GroupId>,
+    /// The first group of each hash; for look-ups only.
+    known: FxHashMap<u64, GroupId>,
     /// Adjoints of one vector: the team of a node.
-    pub team: Vec<Option<u32>>,
+    pub team: Arc<Vec<Option<u32>>>,
 }
 
 /// More members than these gain nothing.
@@ -131,15 +137,19 @@ impl Groups {
     fn group_with(&mut self, members: impl IntoIterator<Item = Form>, effort: Effort) -> GroupId {
         let mut members: Vec<Form> = members.into_iter().filter(|f| !f.is_empty()).map(canonical).collect();
         members.sort_unstable();
-        let key = (members, effort);
-        if let Some(id) = self.known.get(&key) {
-            return *id;
+        let hash = FxBuildHasher.hash_one((&members, effort));
+        let mut same_hash = self.known.get(&hash).copied();
+        while let Some(id) = same_hash {
+            let group = &self.groups[id as usize];
+            if group.effort == effort && *group.members == members[..] {
+                return id;
+            }
+            same_hash = group.next;
         }
         let id = self.groups.len() as GroupId;
-        let members = key.0.clone();
-        self.known.insert(key, id);
+        let next = self.known.insert(hash, id);
         let of_adjoints = members.iter().flatten().any(|t| matches!(t.atom, Atom::Adjoint(_) | Atom::Seed(_)));
-        self.groups.push(Group { members, effort, of_adjoints, bounded: None, ways: None });
+        self.groups.push(Group { members: members.into(), effort, of_adjoints, bounded: None, ways: None, next });
         id
     }
 
@@ -162,7 +172,7 @@ impl Groups {
             let group = self.group([part(true), part(false)]);
             (pair, terms, group)
         });
-        let turns = turns.collect();
+        let turns: Vec<(u32, Vec<usize>, GroupId)> = turns.collect();
         // terms with values before adjoints of one vector, each adjoint once
         let mut lists: Vec<(u32, Vec<usize>)> = Vec::new();
         for (k, t) in form.iter().enumerate() {
@@ -181,8 +191,12 @@ impl Groups {
             let atoms = self.group(terms.iter().map(|k| vec![bare(&form[*k])]).collect::<Vec<_>>());
             (terms, values, atoms)
         });
-        let dots = dots.collect();
-        Bounded { form, turns, dots }
+        let dots: Vec<(Vec<usize>, GroupId, GroupId)> = dots.collect();
+        let mut is_other = vec![true; form.len()];
+        let in_parts = turns.iter().flat_map(|t| &t.1).chain(dots.iter().flat_map(|d| &d.0));
+        in_parts.for_each(|k| is_other[*k] = false);
+        let others = (0..form.len()).filter(|k| is_other[*k]).collect();
+        Bounded { form, turns, dots, others }
     }
 
     /// The team of the adjoint of a term that has a value before it, or nothing.
@@ -205,7 +219,7 @@ impl Groups {
     pub fn bound_members(&mut self, id: GroupId) {
         if self.groups[id as usize].bounded.is_none() {
             let members = self.groups[id as usize].members.clone();
-            let bounded = members.into_iter().map(|m| self.bounded(m)).collect();
+            let bounded = members.iter().map(|m| self.bounded(m.clone())).collect();
             self.groups[id as usize].bounded = Some(bounded);
         }
     }
@@ -227,17 +241,20 @@ impl Groups {
         }
         match self.groups[id as usize].effort {
             Effort::Ends => return Vec::new(),
-            Effort::Columns => return self.columns(id, &members, &[]).into_iter().collect(),
+            Effort::Columns => {
+                let members: Vec<&Form> = members.iter().collect();
+                return self.columns(id, &members, &Arc::from([])).into_iter().collect();
+            }
             Effort::All | Effort::Rest => {}
         }
         let mut ways = Vec::new();
-        let mut tried: Vec<Vec<Form>> = Vec::new();
+        let mut tried: Vec<Vec<Flat>> = Vec::new();
         for depth in [Depth::Products, Depth::Names, Depth::Cancelled] {
             let flats: Vec<Flat> = members.iter().map(|m| forms.flattened(m, depth)).collect();
-            let flat_forms: Vec<Form> = flats.iter().map(|f| f.form.clone()).collect();
-            if !tried.contains(&flat_forms) {
+            let is_same = |others: &Vec<Flat>| others.iter().zip(&flats).all(|(a, b)| a.form == b.form);
+            if !tried.iter().any(is_same) {
                 ways.extend(self.ways_of_flat(id, &flats, forms, size));
-                tried.push(flat_forms);
+                tried.push(flats);
             }
         }
         let mut distinct: Vec<Way> = Vec::with_capacity(ways.len());
@@ -252,7 +269,7 @@ impl Groups {
 
     /// The ways of a group whose members have these forms.
     fn ways_of_flat(&mut self, id: GroupId, flats: &[Flat], forms: &Forms, size: &dyn Fn(&Term) -> f64) -> Vec<Way> {
-        let slack: Vec<Slack> = flats.iter().map(|f| f.slack.clone()).collect();
+        let slack: Arc<[Slack]> = flats.iter().map(|f| &f.slack).filter(|s| !s.is_empty()).cloned().collect();
         let mut angles: Vec<(usize, u32)> = Vec::new();
         for flat in flats {
             let mut seen: Vec<u32> = flat.form.iter().filter_map(|t| turn(t).map(|(p, _)| p)).collect();
@@ -304,7 +321,7 @@ impl Groups {
             teams.sort_unstable();
             teams.dedup();
             for team in teams {
-                let of_adjoints = self.team.clone();
+                let of_adjoints = Arc::clone(&self.team);
                 let in_team = move |t: &Term| match t.atom {
                     Atom::Adjoint(a) => of_adjoints.get(a as usize) == Some(&Some(team)),
                     _ => false,
@@ -313,7 +330,7 @@ impl Groups {
             }
         }
         ways.extend(self.scaling(flats));
-        let flat_members: Vec<Form> = flats.iter().map(|f| f.form.clone()).collect();
+        let flat_members: Vec<&Form> = flats.iter().map(|f| &f.form).collect();
         ways.extend(self.columns(id, &flat_members, &slack));
         ways
     }
@@ -324,7 +341,7 @@ impl Groups {
         id: GroupId,
         pair: u32,
         flats: &[Flat],
-        slack: &[Slack],
+        slack: &Arc<[Slack]>,
         keeps: &dyn Fn(&Term) -> bool,
         small: &[bool],
     ) -> Option<Way> {
@@ -367,7 +384,7 @@ impl Groups {
         &mut self,
         id: GroupId,
         flats: &[Flat],
-        slack: &[Slack],
+        slack: &Arc<[Slack]>,
         forms: &Forms,
         is_column: &dyn Fn(&Term) -> bool,
         effort: Effort,
@@ -406,22 +423,23 @@ impl Groups {
     }
 
     /// The rule `columns`: terms of several members with one coefficient are that coefficient times a vector.
-    fn columns(&mut self, id: GroupId, members: &[Form], slack: &[Slack]) -> Option<Way> {
+    fn columns(&mut self, id: GroupId, members: &[&Form], slack: &Arc<[Slack]>) -> Option<Way> {
         let mut columns: BTreeMap<Coefficient, Vec<(usize, Term)>> = BTreeMap::new();
         for (m, member) in members.iter().enumerate() {
-            for t in member {
+            for t in *member {
                 if let Coefficient::Node(_) = t.coefficient {
                     columns.entry(t.coefficient).or_default().push((m, *t));
                 }
             }
         }
-        let mut rests: Vec<Form> = members.to_vec();
+        // terms are in the order of their members
+        columns.retain(|_, terms| terms.first().map(|t| t.0) != terms.last().map(|t| t.0));
+        if columns.is_empty() {
+            return None;
+        }
+        let mut rests: Vec<Form> = members.iter().map(|m| (*m).clone()).collect();
         let mut parts = Vec::new();
         for (coefficient, terms) in columns {
-            let in_members: std::collections::BTreeSet<usize> = terms.iter().map(|(m, _)| *m).collect();
-            if in_members.len() < 2 {
-                continue;
-            }
             let mut forms = vec![Form::new(); members.len()];
             for (m, t) in &terms {
                 forms[*m].push(bare(t));
@@ -430,11 +448,11 @@ impl Groups {
             let group = self.group(forms.into_iter().map(simplified));
             parts.push((Factor::Coefficient(coefficient), group));
         }
-        if parts.is_empty() || parts.iter().any(|(_, group)| *group == id) {
+        if parts.iter().any(|(_, group)| *group == id) {
             return None;
         }
         let rest = self.group_with(rests, Effort::Ends);
-        Some(Way { parts, rest, slack: slack.to_vec() })
+        Some(Way { parts, rest, slack: Arc::clone(slack) })
     }
 
     fn way(
@@ -443,7 +461,7 @@ impl Groups {
         factor: Factor,
         inner: Vec<Form>,
         rests: Vec<Form>,
-        slack: &[Slack],
+        slack: &Arc<[Slack]>,
         effort: Effort,
     ) -> Option<Way> {
         let inner = self.group(inner);
@@ -454,8 +472,7 @@ impl Groups {
         if rest == id {
             return None;
         }
-        let slack = slack.iter().filter(|s| !s.is_empty()).cloned().collect();
-        Some(Way { parts: vec![(factor, inner)], rest, slack })
+        Some(Way { parts: vec![(factor, inner)], rest, slack: Arc::clone(slack) })
     }
 
     /// The rule `scaling`: adjoints of one vector with values before them, as the derivatives by sine and cosine have them.
@@ -492,7 +509,7 @@ impl Groups {
             parts.push((Factor::Values(values), atoms));
         }
         let rest = self.group_with(rests, Effort::Columns);
-        Some(Way { parts, rest, slack: Vec::new() })
+        Some(Way { parts, rest, slack: Arc::from([]) })
     }
 }
 

@@ -5,9 +5,11 @@ use super::companion;
 use super::residual::{bound_of, OUTPUTS};
 use super::running::{BrokenProof, Running};
 use super::search::{computed_at, errors_at, worst_found};
-use super::{Analysis, Format, Interval};
+use super::tape::Registers;
+use super::{certify, subdivision, Analysis, Effort, Format, Interval};
 use crate::emit::Scalar;
 use crate::expr::{Builder, Graph, NodeId, Op, Port, RuleSet};
+use crate::random::Random;
 use straightline_core::Dd;
 
 /// A program of `inputs` numbers with one result.
@@ -142,6 +144,135 @@ fn a_bound_with_a_broken_rule_is_violated() {
         b.add(Op::Sub(s, c))
     });
     broken(difference, &[Interval::new(0.7, 0.87)], Broken::Team);
+}
+
+/// Every operation there is, with a range for each input: √((x₀ + 2)²) / (x₁ + 3) cos x₂ + x₀ x₁ 0.1 − sin(x₁ + x₂) x₀.
+fn all_operations() -> (Graph, [Interval; 3]) {
+    let graph = program(3, |b, x| {
+        let (two, three, tenth) = (b.constant(Dd::from(2.0)), b.constant(Dd::from(3.0)), b.constant(Dd::from(0.1)));
+        let (u, v) = (b.add(Op::Add(x[0], two)), b.add(Op::Add(x[1], three)));
+        let square = b.insert(Op::Mul(u, u));
+        let root = b.insert(Op::Sqrt(square));
+        let quotient = b.add(Op::Div(root, v));
+        let (_, c) = sin_cos(b, x[2]);
+        let angle = b.insert(Op::AngleSum(x[1], x[2]));
+        let (s, _) = sin_cos(b, angle);
+        let (first, product, last) = (b.add(Op::Mul(quotient, c)), b.add(Op::Mul(x[0], x[1])), b.add(Op::Mul(s, x[0])));
+        let second = b.add(Op::Mul(product, tenth));
+        let sum = b.add(Op::Add(first, second));
+        b.add(Op::Sub(sum, last))
+    });
+    (graph, [Interval::new(-0.9, 0.7), Interval::new(-0.3, 0.9), Interval::new(-3.0, 1.1)])
+}
+
+/// The bounds of a tape in parts of the box, at all depths: never below what a search finds there, and near those of an analysis of the part.
+#[test]
+fn what_is_played_for_a_part_is_what_an_analysis_of_it_finds() {
+    let (operations, ranges) = all_operations();
+    let cases: [(&str, Graph, &[Interval]); 4] = [
+        ("operations", operations, &ranges),
+        ("square", square_of_sum(), &[Interval { lo: 0.0, hi: 0.9 }]),
+        ("turns", turns(), &WIDE),
+        ("cancelling", products_that_cancel(), &CANCELLING),
+    ];
+    for (name, graph, ranges) in cases {
+        let format = Format::of(Scalar::F32);
+        let mut analysis = Analysis::new(&graph, format);
+        analysis.ranges_on_tape(ranges).expect("the program is sound in its box");
+        let samples = subdivision::samples(ranges);
+        let samples: Vec<&[Interval]> = samples.iter().map(Vec::as_slice).collect();
+        let (whole, tape) = analysis.error_and_tape(0, &samples);
+        assert_eq!(whole, bound(&graph, format, ranges, None).0, "{name}: writing changes nothing");
+        let mut random = Random(5);
+        for depth in 0..40 {
+            let mut part = ranges.to_vec();
+            for _ in 0..depth {
+                let x = &mut part[random.below(ranges.len())];
+                let middle = 0.5 * (x.lo + x.hi);
+                *x = if random.below(2) == 0 { Interval::new(x.lo, middle) } else { Interval::new(middle, x.hi) };
+            }
+            let played = tape.bounds(&[&part], &mut Registers::default())[0];
+            let found = worst_found(&graph, Scalar::F32, &part, 300, depth).remove(0);
+            assert!(found.error <= played, "{name}: {:e} > {played:e} at {:?}", found.error, found.inputs);
+            let analysed = bound(&graph, format, &part, None).0;
+            // minima without what was not the least elsewhere
+            assert!((0.9..1.3).contains(&(played / analysed)), "{name}: {played:e}, not {analysed:e} in {part:?}");
+        }
+    }
+}
+
+#[test]
+fn parts_cover_the_box() {
+    let effort = Effort { boxes: 16, ..Effort::default() };
+    let of = |graph: &Graph, ranges: &[Interval], broken: Option<Broken>| {
+        let mut analysis = Analysis::new(graph, Format::of(Scalar::F32));
+        analysis.broken = broken;
+        let (_, error, magnitude) =
+            subdivision::bounds(&mut analysis, ranges, effort).expect("it is sound in its box")[0];
+        (error, magnitude)
+    };
+    let (operations, ranges) = all_operations();
+    for (graph, ranges) in [(operations, &ranges[..]), (turns(), &WIDE), (products_that_cancel(), &CANCELLING)] {
+        let whole = bound(&graph, Format::of(Scalar::F32), ranges, None);
+        let cut = of(&graph, ranges, None);
+        assert!(cut.0 <= whole.0 && cut.1 == whole.1);
+        assert!(!is_violated(&graph, ranges, cut));
+    }
+    // its error is greatest at the lower end, which a search with a part forgotten does not see
+    let falling = program(1, |b, x| {
+        let c = b.constant(Dd::ONE);
+        let a = b.add(Op::Sub(c, x[0]));
+        b.add(Op::Mul(a, a))
+    });
+    let fraction = [Interval::new(0.0, 0.9)];
+    assert!(!is_violated(&falling, &fraction, of(&falling, &fraction, None)));
+    assert!(is_violated(&falling, &fraction, of(&falling, &fraction, Some(Broken::Part))));
+}
+
+#[test]
+fn one_turn_of_an_angle_stands_for_all() {
+    let effort = Effort { boxes: 64, ..Effort::default() };
+    let of = |graph: &Graph, ranges: &[Interval], broken: Option<Broken>| {
+        let mut analysis = Analysis::new(graph, Format::of(Scalar::F32));
+        analysis.broken = broken;
+        let (_, error, magnitude) =
+            subdivision::bounds(&mut analysis, ranges, effort).expect("it is sound in its box")[0];
+        (error, magnitude)
+    };
+    // (1 + sin x)²: greatest near π/2 and 5π/2, which half a turn from 3.2 does not meet
+    let raised = program(1, |b, x| {
+        let c = b.constant(Dd::ONE);
+        let (s, _) = sin_cos(b, x[0]);
+        let a = b.add(Op::Add(s, c));
+        b.add(Op::Mul(a, a))
+    });
+    let turns = [Interval::new(3.2, 16.0)];
+    let once = [Interval::new(3.2, 3.2 + 6.3)];
+    assert_eq!(of(&raised, &turns, None).0, of(&raised, &once, None).0);
+    assert!(!is_violated(&raised, &turns, of(&raised, &turns, None)));
+    assert!(is_violated(&raised, &turns, of(&raised, &turns, Some(Broken::HalfTurn))));
+    // x sin x does not repeat itself
+    let growing = program(1, |b, x| {
+        let (s, _) = sin_cos(b, x[0]);
+        b.add(Op::Mul(s, x[0]))
+    });
+    let turns = [Interval::new(0.1, 16.0)];
+    assert!(!is_violated(&growing, &turns, of(&growing, &turns, None)));
+    assert!(of(&growing, &turns, None).0 > 2.0 * of(&growing, &[Interval::new(0.1, 6.4)], None).0);
+}
+
+/// Results are refined by threads: which takes which changes no bit.
+#[test]
+fn bounds_from_boxes_are_the_same_every_time() {
+    let mut graph = turns();
+    let last = graph.results[0].0;
+    graph.results = (8..=last).map(NodeId).filter(|id| matches!(graph.op(*id), Op::Add(..) | Op::Sub(..))).collect();
+    graph.outputs = vec![Port::new("y", &[graph.results.len()])];
+    let effort = Effort { boxes: 50, ..Effort::default() };
+    let of = || certify(&graph, Scalar::F32, &WIDE, effort).expect("it is sound in its box");
+    let first = of();
+    assert!(graph.results.len() > 4);
+    (0..5).for_each(|_| assert_eq!(of(), first));
 }
 
 #[test]
