@@ -50,7 +50,7 @@ pub struct Group {
     pub effort: Effort,
     /// Whether adjoints are in it, so that its norm is another for each result.
     pub of_adjoints: bool,
-    /// The members with the groups of their parts, once they are wanted.
+    /// The members with the groups of their parts, once they are wanted; none if no member has such parts.
     pub bounded: Option<Vec<Bounded>>,
     /// The ways, once they are wanted.
     pub ways: Option<Vec<Way>>,
@@ -219,7 +219,13 @@ impl Groups {
     pub fn bound_members(&mut self, id: GroupId) {
         if self.groups[id as usize].bounded.is_none() {
             let members = self.groups[id as usize].members.clone();
-            let bounded = members.iter().map(|m| self.bounded(m.clone())).collect();
+            let has_two = |m: &Form, of: &dyn Fn(&Term) -> bool| m.iter().filter(|t| of(t)).count() > 1;
+            let may_have_parts =
+                |m: &Form| has_two(m, &|t| turn(t).is_some()) || has_two(m, &|t| self.weighted(t).is_some());
+            let bounded = match members.iter().any(may_have_parts) {
+                true => members.iter().map(|m| self.bounded(m.clone())).collect(),
+                false => Vec::new(),
+            };
             self.groups[id as usize].bounded = Some(bounded);
         }
     }
@@ -287,11 +293,19 @@ impl Groups {
         let mut ways = Vec::new();
         for &(_, pair) in angles.iter().rev().take(ANGLES) {
             for kept in 0..3 {
-                let keeps = |t: &Term| {
+                let is_kept_by = |kept: usize, t: &Term| {
                     turn(t).is_some()
                         || (kept == 1 && t.coefficient == Coefficient::One)
                         || (kept == 2 && is_linear(t, forms))
                 };
+                let keeps = |t: &Term| is_kept_by(kept, t);
+                let is_as_before = |earlier: usize| {
+                    let mut terms = flats.iter().flat_map(|f| &f.form);
+                    terms.all(|t| is_kept_by(earlier, t) == keeps(t))
+                };
+                if (0..kept).any(is_as_before) {
+                    continue;
+                }
                 // a member whose other terms are larger is kept for them
                 let is_small = |flat: &Flat| {
                     let largest = |own: bool| {
