@@ -156,7 +156,7 @@ pub fn speeds(size: Size) -> Vec<Outcome> {
                 name,
                 format!("f64 velocity forces, |q̇| ≤ {speed:.0e}, u of the greatest"),
                 worst,
-                100.0,
+                300.0,
             ));
         }
         let Some(single) = compiled::F32.iter().find(|c| !c.exact && c.robot == name) else { continue };

@@ -3,10 +3,16 @@
 //! Forward errors of the generic runtime, which the generated code equals under exact rules bit for bit.
 
 use crate::outcome::{Outcome, Size};
-use crate::robots::{chain, rounded_model, Link, AXES};
+use crate::robots::{chain, file, rounded_model, Link, AXES};
+use straightline_codegen::compile::{program, Options};
+use straightline_codegen::expr::evaluate;
+use straightline_codegen::forward_method::Figures;
+use straightline_codegen::model::ModelOptions;
+use straightline_codegen::Function;
 use straightline_core::algorithms::{forward_dynamics_aba, forward_dynamics_ltdl, inverse_dynamics};
 use straightline_core::model::Model;
 use straightline_core::{Dd, Real};
+use straightline_generated_tests::programs::load;
 use straightline_generated_tests::random::Random;
 
 /// Where the joints of a chain stand.
@@ -125,7 +131,40 @@ pub fn stretched_and_folded(size: Size) -> Vec<Outcome> {
             }
         }
     }
+    for &n in size.pick(&[8][..], &[3, 8, 16, 24][..]) {
+        outcomes.push(chosen(n, size.pick(3, 20)));
+    }
     outcomes
+}
+
+/// What the generated program of a stretched chain loses, whichever form the compiler chose: it says which, and why.
+fn chosen(n: usize, states: usize) -> Outcome {
+    let robot = load(&file(&vec![Link::rod(1.0); n]), &ModelOptions::default());
+    let options = Options::default();
+    let program = program(&robot, &[], Function::ForwardDynamics, &options);
+    let method = program.method.expect("the choice is the compiler's");
+    let (mut random, mut worst) = (Random(n as u64), 0.0f64);
+    for _ in 0..states {
+        let q = (0..n).map(|_| random.between(-0.01, 0.01)).collect();
+        let inputs: Vec<f64> = [q, random.list(n, 1.0), random.list(n, 10.0)].concat();
+        let truth = evaluate(&program.graph, &inputs.iter().map(|x| Dd::from(*x)).collect::<Vec<_>>());
+        let scale = truth.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
+        for (x, t) in evaluate(&program.graph, &inputs).into_iter().zip(truth) {
+            let error = (Dd::from(x) - t).to_f64().abs() / scale / UNITS[0];
+            worst = if error.is_finite() { worst.max(error) } else { f64::INFINITY };
+        }
+    }
+    let form = if method.articulated_bodies { "articulated bodies" } else { "the factorisation" };
+    let errors = |f: Figures| f.error.map_or("not tried".to_string(), |e| format!("{:.0} u", e / UNITS[0]));
+    let other = match method.factorisation {
+        Some(factorisation) => {
+            format!("worst seen {}, of the factorisation {}", errors(method.articulated), errors(factorisation))
+        }
+        None => "the other is not tried on so many joints".to_string(),
+    };
+    let what = format!("f64 generated, by {form} ({other}), u of q̈");
+    // the factorisation may lose three times what articulated bodies do
+    Outcome::new(5, format!("stretched planar chain, {n} joints"), what, worst, 3.0 * 10.0 * (n + 8) as f64)
 }
 
 pub fn light_tips(size: Size) -> Vec<Outcome> {

@@ -134,7 +134,9 @@ pub fn redundant(size: Size) -> Vec<Outcome> {
     let points = size.pick(&[4, 8][..], &[4, 8, 100][..]);
     let of = |n: &usize| {
         let double = standing::<f64>("f64", *n, 1e-12, 1e-9);
-        double.into_iter().chain(standing::<f32>("f32", *n, 1e-6, 1e-3))
+        // three rows per point: in f32 the rounding of 300 of them, 2e-5, is more than the usual ridge of 1e-6, and pivots vanish
+        let ridge = if *n < 50 { 1e-6 } else { 1e-4 };
+        double.into_iter().chain(standing::<f32>("f32", *n, ridge, 1e-3))
     };
     points.iter().flat_map(of).collect()
 }

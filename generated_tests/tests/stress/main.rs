@@ -10,6 +10,9 @@
 mod angles;
 mod chains;
 mod contacts;
+mod derivatives;
+mod drives;
+mod forms;
 mod machines;
 mod motion;
 mod outcome;
@@ -20,11 +23,13 @@ mod search;
 mod zero_inertia;
 
 use outcome::{judge, Outcome, Size};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::Mutex;
 
 type Suite = fn(Size) -> Vec<Outcome>;
 
 /// All tests that apply to what exists, in the order of the list.
-const SUITES: [Suite; 19] = [
+const SUITES: [Suite; 23] = [
     round_trips::inverse_then_forward,
     round_trips::gravity_compensation,
     chains::uniform,
@@ -42,9 +47,16 @@ const SUITES: [Suite; 19] = [
     contacts::next_to_singular,
     contacts::closed_loop,
     contacts::stacks,
+    drives::motors_and_transmissions,
+    forms::lanes,
+    forms::any_scalar,
+    derivatives::derivatives,
     search::worst_inverse_dynamics,
     search::random_arms,
 ];
+
+/// Suites that run at the same time where the table is made.
+const THREADS: usize = 4;
 
 macro_rules! small {
     ($($(#[$doc:meta])* $name:ident = $suite:path;)*) => {
@@ -76,6 +88,10 @@ small! {
     constraints_next_to_singular_have_finite_reactions = contacts::next_to_singular;
     closed_loops_stay_closed = contacts::closed_loop;
     stacks_carry_their_weight_whatever_the_ratio_of_masses = contacts::stacks;
+    motors_and_transmissions_keep_their_digits = drives::motors_and_transmissions;
+    lanes_and_batches_keep_the_bits_of_hard_states = forms::lanes;
+    any_scalar_gives_its_own_digits = forms::any_scalar;
+    derivatives_keep_their_digits = derivatives::derivatives;
     the_worst_inverse_dynamics_found_is_within_four_ulp = search::worst_inverse_dynamics;
     the_worst_inverse_dynamics_of_random_arms_stays_small = search::random_arms;
 }
@@ -94,17 +110,33 @@ fn a_microcontroller_computes_the_same_bits() {
 }
 
 #[test]
-#[ignore = "the full sizes: ten minutes in release; writes the table to record/"]
+#[ignore = "the full sizes: fifteen minutes of a core in release; writes the table to record/"]
 fn record() {
     let start = std::time::Instant::now();
-    let mut outcomes = Vec::new();
-    if let Some(toolchain) = std::env::var_os("STRAIGHTLINE_CORTEX_M") {
-        outcomes.extend(machines::microcontroller(std::path::Path::new(&toolchain)));
-    }
-    for suite in SUITES.into_iter().chain([machines::this_machine as Suite]) {
-        outcomes.extend(suite(Size::Full));
-        println!("{} outcomes after {:.0} s", outcomes.len(), start.elapsed().as_secs_f64());
-    }
+    let (outcomes, next) = (Mutex::new(Vec::new()), AtomicUsize::new(0));
+    let toolchain = std::env::var_os("STRAIGHTLINE_CORTEX_M");
+    std::thread::scope(|scope| {
+        let work = || loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            // the longest first
+            let new = match SUITES.iter().rev().nth(number) {
+                Some(suite) => suite(Size::Full),
+                None if number == SUITES.len() => machines::this_machine(Size::Full),
+                None => break,
+            };
+            let mut outcomes = outcomes.lock().expect("no suite panics");
+            outcomes.push((number, new));
+            println!("{} suites after {:.0} s", outcomes.len(), start.elapsed().as_secs_f64());
+        };
+        (0..THREADS).for_each(|_| drop(scope.spawn(work)));
+        if let Some(toolchain) = &toolchain {
+            let new = machines::microcontroller(std::path::Path::new(toolchain));
+            outcomes.lock().expect("no suite panics").push((SUITES.len() + 1, new));
+        }
+    });
+    let mut outcomes = outcomes.into_inner().expect("no suite panics");
+    outcomes.sort_by_key(|(number, _)| std::cmp::Reverse(*number));
+    let mut outcomes: Vec<Outcome> = outcomes.into_iter().flat_map(|(_, new)| new).collect();
     outcome::write_record(&mut outcomes);
     judge(&outcomes);
 }
