@@ -118,6 +118,12 @@ impl Builder {
         self
     }
 
+    /// How identical limbs are computed; otherwise each by itself.
+    pub fn limbs(mut self, form: crate::limbs::LimbForm) -> Self {
+        self.options.limbs = form;
+        self
+    }
+
     /// How forward dynamics is computed; otherwise the cheaper way for this robot.
     pub fn forward_dynamics(mut self, method: ForwardDynamicsMethod) -> Self {
         self.options.forward_dynamics = method;

@@ -10,6 +10,7 @@ use crate::emit::{self, Item, Lanes, Provenance, Scalar, Style};
 use crate::expr::{verify, Counts, Folding, Grade, Graph, NodeId, Port, RuleSet, Section};
 use crate::forward_method::MethodChoice;
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
+use crate::limbs::{self, LimbForm};
 use crate::model;
 use crate::pass::{count_sums, dead_code, order, sums, unread_inputs};
 use crate::report::budget::{self, Measures};
@@ -48,6 +49,8 @@ pub struct Options {
     pub grade: Grade,
     /// How forward dynamics is computed.
     pub forward_dynamics: ForwardDynamicsMethod,
+    /// How identical limbs are computed.
+    pub limbs: LimbForm,
     /// How long one function may be.
     pub limits: Limits,
     /// How the robot file is read.
@@ -70,6 +73,7 @@ impl Default for Options {
             generic: false,
             grade: Grade::Algebraic,
             forward_dynamics: ForwardDynamicsMethod::default(),
+            limbs: LimbForm::default(),
             limits: Limits::default(),
             model: crate::model::ModelOptions::default(),
             scene: Scene::default(),
@@ -94,6 +98,7 @@ impl Options {
             // in f32 a constant of a sum would be rounded by itself: a Panda's torques would lose 1.8e-6, not 1.4e-6
             angle_sums: algebraic && self.scalar == Scalar::F64,
             cheaper,
+            limbs: algebraic && self.limbs != LimbForm::Apart,
         }
     }
 
@@ -137,6 +142,8 @@ pub struct Optimisations {
     pub angle_sums: bool,
     /// The cheaper of the two forms of forward dynamics.
     pub cheaper: bool,
+    /// Identical limbs as lanes of one body, where the options have them so: [`limbs`].
+    pub limbs: bool,
 }
 
 /// What [`choose`] may choose, one by one, so that each can be weighed.
@@ -182,10 +189,11 @@ impl Optimisations {
         });
         step("angles of parallel joints added", self.chosen && self.angle_sums, |o| o.angle_sums = true);
         step("the cheaper form of forward dynamics", self.cheaper, |o| o.cheaper = true);
+        step("identical limbs as lanes of one body", self.limbs, |o| o.limbs = true);
         steps
     }
 
-    fn rules(self, scalar: Scalar) -> RuleSet {
+    pub(crate) fn rules(self, scalar: Scalar) -> RuleSet {
         match (self.algebraic, self.folding, scalar) {
             (true, _, _) => RuleSet::all(),
             (false, true, _) => RuleSet::exact(Folding::DoubleDouble),
@@ -234,6 +242,12 @@ fn optimised_with(
     options: &Options,
     optimisations: Optimisations,
 ) -> (Graph, Option<MethodChoice>) {
+    if optimisations.limbs {
+        if let Some(graph) = limbs::program(robot, frames, function, options, optimisations) {
+            return (graph, None);
+        }
+    }
+    let optimisations = Optimisations { limbs: false, ..optimisations };
     let check = |graph: Graph| {
         verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
         graph
@@ -387,6 +401,9 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     }
     if diagnostics.has_errors() {
         return Err(diagnostics);
+    }
+    if options.limbs == LimbForm::Lanes && limbs::limbs(&model).is_empty() {
+        options.scene.places.complain("outputs.limbs", scene::messages::no_identical_limbs(), &mut diagnostics);
     }
     let resolved = Options { scene: options.scene.resolved(&model), functions, ..options.clone() };
     demand_inertia(&model, &resolved, &mut diagnostics);

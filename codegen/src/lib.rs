@@ -18,6 +18,7 @@ pub mod export;
 pub mod expr;
 pub mod forward_method;
 pub mod function;
+pub mod limbs;
 pub mod model;
 pub mod output;
 pub mod pass;

@@ -2,7 +2,8 @@
 //!
 //! rustc and LLVM take more than linear time for one huge function. So a program of
 //! more than [`Limits::operations`] is cut into parts, each at the place with the fewest values alive within reach of
-//! its size; values that cross a cut go through an array of reused slots.
+//! its size; values that cross a cut go through an array of reused slots. A program with loops over limbs stays in one part, in its
+//! own order.
 
 mod few_alive;
 
@@ -65,7 +66,8 @@ fn weight(op: Op) -> usize {
 /// memory; so do programs that are cut.
 pub fn schedule(graph: &Graph, limits: Limits) -> Schedule {
     let mut order: Vec<NodeId> = graph.ids().filter(|id| is_value(graph.op(*id))).collect();
-    if order.iter().map(|id| weight(graph.op(*id))).sum::<usize>() <= limits.operations {
+    let limits = if graph.alike.is_empty() { limits } else { Limits { operations: usize::MAX } };
+    if graph.alike.is_empty() && order.iter().map(|id| weight(graph.op(*id))).sum::<usize>() <= limits.operations {
         order = few_alive::improved(graph, order);
     }
     let position = {

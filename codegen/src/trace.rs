@@ -28,6 +28,21 @@ pub fn trace(
     outputs: Vec<Port>,
     algorithm: impl FnOnce(&[Vec<Expr>]) -> Vec<Expr>,
 ) -> Graph {
+    let (builder, results) = written(rules, inputs, algorithm);
+    builder.finish(outputs, results)
+}
+
+/// The same for an algorithm of which only itself knows how many results it has: they are one port, `results`.
+pub(crate) fn trace_all(rules: RuleSet, inputs: Vec<Port>, algorithm: impl FnOnce(&[Vec<Expr>]) -> Vec<Expr>) -> Graph {
+    let (builder, results) = written(rules, inputs, algorithm);
+    builder.finish(vec![Port::new("results", &[results.len()])], results)
+}
+
+fn written(
+    rules: RuleSet,
+    inputs: Vec<Port>,
+    algorithm: impl FnOnce(&[Vec<Expr>]) -> Vec<Expr>,
+) -> (Builder, Vec<NodeId>) {
     struct Close;
     impl Drop for Close {
         fn drop(&mut self) {
@@ -50,7 +65,19 @@ pub fn trace(
         .collect();
     let results: Vec<NodeId> = algorithm(&arguments).into_iter().map(|e| e.0).collect();
     let builder = BUILDER.with_borrow_mut(Option::take).expect("the trace that was opened above");
-    builder.finish(outputs, results)
+    (builder, results)
+}
+
+impl Expr {
+    /// Its node.
+    pub(crate) fn node(self) -> NodeId {
+        self.0
+    }
+
+    /// Its value, if it is a constant.
+    pub(crate) fn as_constant(self) -> Option<Dd> {
+        with(|g| g.as_constant(self.0)).map(|c| c.value())
+    }
 }
 
 impl Add for Expr {

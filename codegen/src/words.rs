@@ -3,6 +3,7 @@
 use crate::emit::{Lanes, Scalar};
 use crate::expr::Grade;
 use crate::function::{ForwardDynamicsMethod, Function};
+use crate::limbs::LimbForm;
 use std::fmt;
 use std::str::FromStr;
 
@@ -85,6 +86,17 @@ impl Choice for ForwardDynamicsMethod {
     }
 }
 
+impl Choice for LimbForm {
+    const WHAT: &'static str = "form of identical limbs";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        vec![
+            ("apart", "each by itself, with its own constants: fewest operations", LimbForm::Apart),
+            ("lanes", "as lanes of one body: least code, and least time where there are four", LimbForm::Lanes),
+            ("auto", "as lanes where that is measured to be faster, otherwise apart", LimbForm::Auto),
+        ]
+    }
+}
+
 impl Choice for Lanes {
     const WHAT: &'static str = "home of the batches";
     fn words() -> Vec<(&'static str, &'static str, Self)> {
@@ -105,7 +117,7 @@ macro_rules! parse_words {
         }
     )*};
 }
-parse_words!(Function, Scalar, Grade, ForwardDynamicsMethod, Lanes);
+parse_words!(Function, Scalar, Grade, ForwardDynamicsMethod, LimbForm, Lanes);
 
 #[cfg(test)]
 mod tests {
@@ -123,6 +135,7 @@ mod tests {
         all::<Scalar>();
         all::<Grade>();
         all::<ForwardDynamicsMethod>();
+        all::<LimbForm>();
         all::<Lanes>();
     }
 

@@ -96,6 +96,7 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         "generic" => options.generic = true,
         "rules" => options.grade = word(input)?,
         "forward_dynamics" => options.forward_dynamics = word(input)?,
+        "limbs" => options.limbs = word(input)?,
         "max_part_operations" => options.limits.operations = value::<LitInt>(input)?.base10_parse()?,
         "angle_tolerance" => options.model.angle_tolerance = number(&value(input)?)?,
         "functions" => {
@@ -114,7 +115,7 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         }
         other => {
             let known =
-                "floating_base, certify, certify_boxes, certify_seconds, certify_state, scalar, scalars, lanes, fma, generic, rules, forward_dynamics, \
+                "floating_base, certify, certify_boxes, certify_seconds, certify_state, scalar, scalars, lanes, fma, generic, rules, forward_dynamics, limbs, \
                          max_part_operations, \
                          angle_tolerance, \
                          functions, frames, joint_order, gravity, scene, module";

@@ -148,7 +148,7 @@ fn port_of(ports: &[Port], mut k: usize) -> (usize, usize) {
 
 /// How strongly an expression binds.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Binding {
+pub(super) enum Binding {
     Sum,
     Product,
     Sign,
@@ -156,19 +156,19 @@ enum Binding {
 }
 
 /// The statements of one part: expressions of single use are written where they are used.
-struct Body<'a> {
-    graph: &'a Graph,
-    style: Style,
+pub(super) struct Body<'a> {
+    pub graph: &'a Graph,
+    pub style: Style,
     /// Sums that take a product in.
     fused: Vec<Option<Fused>>,
     /// What stands for each node: its name, its literal, or its expression.
-    text: Vec<Option<(String, Binding)>>,
+    pub text: Vec<Option<(String, Binding)>>,
     /// Sine-cosine pairs that are written already.
     paired: Vec<bool>,
-    names: Names,
+    pub names: Names,
     /// Locals, with their types, and statements of the block being written.
     declared: Vec<(String, Scalar)>,
-    statements: String,
+    pub statements: String,
 }
 
 /// The statements of one part; over lanes, in a loop over them.
@@ -194,20 +194,7 @@ fn statements(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) 
         .chain(&graph.outputs)
         .map(|p| p.name.as_str())
         .chain(["live", "trig", "lane", "fma", "fma_if", "fused", "number"]);
-    let (fused, absorbed) = match style.fused {
-        true => fusions(graph, part),
-        false => (vec![None; graph.ops.len()], vec![false; graph.ops.len()]),
-    };
-    let mut b = Body {
-        graph,
-        style,
-        fused,
-        text: vec![None; graph.ops.len()],
-        paired: vec![false; graph.ops.len()],
-        names: Names::with_taken(taken),
-        declared: Vec::new(),
-        statements: String::new(),
-    };
+    let (mut b, absorbed) = Body::new(graph, part, style, Names::with_taken(taken));
     let mut uses = vec![0u32; graph.ops.len()];
     for id in &part.nodes {
         graph.op(*id).operands().for_each(|a| uses[a.index()] += 1);
@@ -233,66 +220,126 @@ fn statements(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) 
             }
         }
     }
-    let mut section = None;
-    for (k, id) in part.nodes.iter().enumerate() {
-        let op = graph.op(*id);
-        let here = graph.notes[id.index()].section;
-        if section != Some(here) {
-            b.close_block(out, section, title);
-            section = Some(here);
-        }
-        match op {
-            Op::AngleSum(..) => {}
-            Op::SinCos(_) => {
-                out.uses_sin_cos |= !style.generic;
-                if !b.paired[id.index()] {
-                    let section_of = |n: &NodeId| graph.notes[n.index()].section;
-                    let block = part.nodes[k..].iter().take_while(|n| section_of(n) == here);
-                    b.sin_cos(block, &uses, part);
-                }
-            }
-            Op::Sin(_) | Op::Cos(_) => {}
-            _ if absorbed[id.index()] => {}
-            _ => {
-                out.uses_sqrt |= matches!(op, Op::Sqrt(_) | Op::Sign(_)) && !style.generic;
-                let (text, binding) = match b.fused[id.index()] {
-                    Some(fused) => (b.fma(fused), Binding::Atom),
-                    None => b.node(*id),
-                };
-                let named = graph.notes[id.index()].name.is_some();
-                // a sign before a name is written wherever it is used; an operation is not
-                let trivial = matches!(op, Op::Neg(_)) && text.len() < 24 && !text.contains("fma");
-                let alone = uses[id.index()] <= 1 && !crosses[id.index()];
-                let result_only = alone && results_of.binary_search_by_key(id, |(r, _)| *r).is_ok();
-                if (trivial && !crosses[id.index()]) || result_only || (alone && !named && text.len() < LINE * 2 / 3) {
-                    b.text[id.index()] = Some((text, binding));
-                } else {
-                    let name = b.fresh_name(*id);
-                    let _ = writeln!(b.statements, "    {name} = {text};");
-                    b.declared.push((name.clone(), b.scalar_of(*id)));
-                    b.text[id.index()] = Some((name, Binding::Atom));
-                }
-            }
-        }
-        let first = results_of.partition_point(|(r, _)| r < id);
-        for (_, k) in results_of[first..].iter().take_while(|(r, _)| r == id) {
-            b.store_result(*id, *k);
-        }
-        if let Ok(i) = part.stores.binary_search_by_key(id, |(s, _)| *s) {
-            let text = b.operand(*id).0;
-            let _ = writeln!(b.statements, "    live[{}]{} = {text};", part.stores[i].1, style.lane());
-        }
+    let mut plan = Plan { part, uses, results_of, crosses, absorbed, arrays: Vec::new() };
+    if style.lanes || graph.alike.is_empty() {
+        b.run(&part.nodes, &plan, title, out);
+    } else {
+        b.with_loops(&mut plan, title, out);
     }
-    b.close_block(out, section, title);
     // results that are constants or inputs
     let mut plain = String::new();
-    for (id, k) in &results_of {
+    for (id, k) in &plan.results_of {
         if matches!(graph.op(*id), Op::Input(_) | Op::Constant(_)) {
             b.store_result(*id, *k);
         }
     }
     std::mem::swap(&mut plain, &mut b.statements);
     out.text.push_str(&plain);
+}
+
+/// What is known of a part before its statements are written.
+pub(super) struct Plan<'a> {
+    pub part: &'a Part,
+    pub uses: Vec<u32>,
+    /// Results by their nodes, in the order of those.
+    pub results_of: Vec<(NodeId, usize)>,
+    /// What needs a name, because something else than a statement here uses it.
+    pub crosses: Vec<bool>,
+    pub absorbed: Vec<bool>,
+    /// Of a loop over limbs what goes into arrays, by its nodes, in the order of those, and the places there.
+    pub arrays: Vec<(NodeId, String)>,
+}
+
+impl<'a> Body<'a> {
+    /// Before its first statement, and which products sums take in.
+    pub fn new(graph: &'a Graph, part: &Part, style: Style, names: Names) -> (Body<'a>, Vec<bool>) {
+        let (fused, absorbed) = match style.fused {
+            true => fusions(graph, part),
+            false => (vec![None; graph.ops.len()], vec![false; graph.ops.len()]),
+        };
+        let body = Body {
+            graph,
+            style,
+            fused,
+            text: vec![None; graph.ops.len()],
+            paired: vec![false; graph.ops.len()],
+            names,
+            declared: Vec::new(),
+            statements: String::new(),
+        };
+        (body, absorbed)
+    }
+
+    /// The statements of these nodes of a part.
+    pub fn run(
+        &mut self,
+        nodes: &[NodeId],
+        plan: &Plan<'_>,
+        title: &dyn Fn(Section) -> String,
+        out: &mut FunctionText,
+    ) {
+        let (graph, style, part) = (self.graph, self.style, plan.part);
+        let (uses, results_of, crosses) = (&plan.uses, &plan.results_of, &plan.crosses);
+        let b = self;
+        let mut section = None;
+        for (k, id) in nodes.iter().enumerate() {
+            let op = graph.op(*id);
+            let here = graph.notes[id.index()].section;
+            if section != Some(here) {
+                b.close_block(out, section, title);
+                section = Some(here);
+            }
+            match op {
+                Op::AngleSum(..) => {}
+                Op::SinCos(_) => {
+                    out.uses_sin_cos |= !style.generic;
+                    if !b.paired[id.index()] {
+                        let section_of = |n: &NodeId| graph.notes[n.index()].section;
+                        let block = nodes[k..].iter().take_while(|n| section_of(n) == here);
+                        b.sin_cos(block, uses, part);
+                    }
+                }
+                Op::Sin(_) | Op::Cos(_) => {}
+                _ if plan.absorbed[id.index()] => {}
+                _ => {
+                    out.uses_sqrt |= matches!(op, Op::Sqrt(_) | Op::Sign(_)) && !style.generic;
+                    let (text, binding) = match b.fused[id.index()] {
+                        Some(fused) => (b.fma(fused), Binding::Atom),
+                        None => b.node(*id),
+                    };
+                    let named = graph.notes[id.index()].name.is_some();
+                    // a sign before a name is written wherever it is used; an operation is not
+                    let trivial = matches!(op, Op::Neg(_)) && text.len() < 24 && !text.contains("fma");
+                    let alone = uses[id.index()] <= 1 && !crosses[id.index()];
+                    let result_only = alone && results_of.binary_search_by_key(id, |(r, _)| *r).is_ok();
+                    if (trivial && !crosses[id.index()])
+                        || result_only
+                        || (alone && !named && text.len() < LINE * 2 / 3)
+                    {
+                        b.text[id.index()] = Some((text, binding));
+                    } else {
+                        let name = b.fresh_name(*id);
+                        let _ = writeln!(b.statements, "    {name} = {text};");
+                        b.declared.push((name.clone(), b.scalar_of(*id)));
+                        b.text[id.index()] = Some((name, Binding::Atom));
+                    }
+                }
+            }
+            let first = results_of.partition_point(|(r, _)| r < id);
+            for (_, k) in results_of[first..].iter().take_while(|(r, _)| r == id) {
+                b.store_result(*id, *k);
+            }
+            if let Ok(i) = part.stores.binary_search_by_key(id, |(s, _)| *s) {
+                let text = b.operand(*id).0;
+                let _ = writeln!(b.statements, "    live[{}]{} = {text};", part.stores[i].1, style.lane());
+            }
+            if let Ok(i) = plan.arrays.binary_search_by_key(id, |(n, _)| *n) {
+                let text = b.operand(*id).0;
+                let _ = writeln!(b.statements, "    {} = {text};", plan.arrays[i].1);
+            }
+        }
+        b.close_block(out, section, title);
+    }
 }
 
 impl Body<'_> {
@@ -304,8 +351,10 @@ impl Body<'_> {
     }
 
     /// The text of a node as an operand.
-    fn operand(&self, id: NodeId) -> (String, Binding) {
+    pub fn operand(&self, id: NodeId) -> (String, Binding) {
         match self.graph.op(id) {
+            // what a loop takes from outside
+            _ if self.text[id.index()].is_some() => self.text[id.index()].clone().expect("it is there"),
             Op::Input(k) => {
                 let (port, k) = port_of(&self.graph.inputs, k as usize);
                 (self.style.element(&self.graph.inputs[port], k), Binding::Atom)
@@ -318,7 +367,7 @@ impl Body<'_> {
                 };
                 (literal(c, style), if sign { Binding::Sign } else { Binding::Atom })
             }
-            _ => self.text[id.index()].clone().expect("operands stand before their users"),
+            _ => panic!("operands stand before their users"),
         }
     }
 
@@ -479,7 +528,7 @@ impl Body<'_> {
             || self.text[id.index()].is_some()
     }
 
-    fn store_result(&mut self, id: NodeId, k: usize) {
+    pub fn store_result(&mut self, id: NodeId, k: usize) {
         let (port, inner) = port_of(&self.graph.outputs, k);
         let place = self.style.element(&self.graph.outputs[port], inner);
         let _ = writeln!(self.statements, "    {place} = {};", self.operand(id).0);
@@ -515,7 +564,7 @@ impl Body<'_> {
 }
 
 /// `start`, the items with commas, `end`; lines of bounded length.
-fn wrapped(start: &str, items: &[String], end: &str) -> String {
+pub(super) fn wrapped(start: &str, items: &[String], end: &str) -> String {
     let mut text = String::from(start);
     let mut column = start.len();
     for (i, item) in items.iter().enumerate() {

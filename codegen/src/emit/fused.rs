@@ -21,6 +21,8 @@ pub(super) struct Fused {
 /// product and sum are in the same part.
 pub(super) fn fusions(graph: &Graph, part: &Part) -> (Vec<Option<Fused>>, Vec<bool>) {
     let mut uses = graph.uses();
+    // what crosses to a loop over limbs, or from one, is a value of its own
+    uses.iter_mut().zip(graph.uses_across()).for_each(|(uses, across)| *uses += across);
     let mut here = vec![false; graph.ops.len()];
     part.nodes.iter().for_each(|id| here[id.index()] = true);
     // what crosses to another part is a value of its own

@@ -7,6 +7,7 @@ pub mod batch;
 mod body;
 mod file;
 pub mod fused;
+mod limbs;
 mod names;
 pub mod parameter;
 

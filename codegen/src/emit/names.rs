@@ -31,6 +31,21 @@ impl Names {
         name
     }
 
+    /// This name, or with a number if it is taken; it may be handed out again.
+    pub fn free(&self, name: &str) -> String {
+        let numbered = (2..).map(|k| format!("{name}_{k}"));
+        let free = [name.to_string()].into_iter().chain(numbered).find(|name| !self.taken.contains(name));
+        free.expect("numbers do not end")
+    }
+
+    /// `c1`, `c2`, … with the prefix `c`.
+    pub fn numbered(&mut self, prefix: &str) -> String {
+        let free = (1..).map(|k| format!("{prefix}{k}")).find(|name| !self.taken.contains(name));
+        let name = free.expect("numbers do not end");
+        self.taken.insert(name.clone());
+        name
+    }
+
     /// `t1`, `t2`, …
     pub fn temporary(&mut self) -> String {
         loop {

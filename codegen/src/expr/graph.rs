@@ -169,6 +169,16 @@ pub enum Width {
     Double,
 }
 
+/// Operations that are the same for several limbs: a loop over them can write each row once.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Alike {
+    /// The first body of each limb.
+    pub limbs: Vec<usize>,
+    /// One operation for all limbs: of every limb its node, which has the same kind of operation. Rows stand behind those that they
+    /// use, and all of them behind one another.
+    pub rows: Vec<Vec<NodeId>>,
+}
+
 /// A program of scalar operations.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Graph {
@@ -186,6 +196,8 @@ pub struct Graph {
     pub results: Vec<NodeId>,
     /// Of a program in mixed precision, how each value is computed; empty where all are in one format. Passes drop it.
     pub widths: Vec<Width>,
+    /// Stretches that may be written as loops over limbs. Passes drop them.
+    pub alike: Vec<Alike>,
 }
 
 /// Operation counts. Sign flips and signs are free; `sin_cos` counts angles. The sum of two angles is an addition; what keeps
@@ -258,11 +270,42 @@ impl Graph {
         uses
     }
 
+    /// The stretch of [`Graph::alike`] that each node lies in.
+    pub fn stretches(&self) -> Vec<Option<usize>> {
+        let mut stretch = vec![None; self.ops.len()];
+        for (k, alike) in self.alike.iter().enumerate() {
+            alike.rows.iter().flatten().for_each(|id| stretch[id.index()] = Some(k));
+        }
+        stretch
+    }
+
+    /// How often each node is used from another stretch than its own: there it is a number that is rounded.
+    pub fn uses_across(&self) -> Vec<u32> {
+        let mut uses = vec![0; self.ops.len()];
+        if self.alike.is_empty() {
+            return uses;
+        }
+        let stretch = self.stretches();
+        for (i, op) in self.ops.iter().enumerate() {
+            op.operands().filter(|a| stretch[a.index()] != stretch[i]).for_each(|a| uses[a.index()] += 1);
+        }
+        uses
+    }
+
     /// Which nodes the results need.
     pub fn live(&self) -> Vec<bool> {
         let mut live = vec![false; self.ops.len()];
         self.results.iter().for_each(|r| live[r.index()] = true);
+        // a row of a loop over limbs is computed for all of them; its users stand behind all of its nodes
+        let mut row_of: Vec<Option<&Vec<NodeId>>> = vec![None; if self.alike.is_empty() { 0 } else { self.ops.len() }];
+        for row in self.alike.iter().flat_map(|alike| &alike.rows) {
+            row_of[row[row.len() - 1].index()] = Some(row);
+        }
         for (i, op) in self.ops.iter().enumerate().rev() {
+            if let Some(row) = row_of.get(i).copied().flatten() {
+                let any = row.iter().any(|id| live[id.index()]);
+                row.iter().for_each(|id| live[id.index()] = any);
+            }
             if live[i] {
                 op.operands().for_each(|a| live[a.index()] = true);
             }
@@ -282,7 +325,8 @@ impl Graph {
     /// Operation counts of what the results need.
     pub fn counts(&self) -> Counts {
         let live = self.live();
-        let uses = self.uses_by(&live);
+        let mut uses = self.uses_by(&live);
+        uses.iter_mut().zip(self.uses_across()).for_each(|(uses, across)| *uses += across);
         // a sum of n terms, the sums in it that nothing else uses included, of which k are products (seen through a sign) that
         // nothing else uses: in the right order as many of its additions are fused
         let inner = |a: NodeId| match self.op(a) {

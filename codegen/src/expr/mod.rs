@@ -13,7 +13,7 @@ mod verify;
 
 pub use builder::Builder;
 pub use gradient::gradient;
-pub use graph::{Constant, Counts, Graph, NodeId, Note, Op, Port, Section, Width, DIVISION, TAIL};
+pub use graph::{Alike, Constant, Counts, Graph, NodeId, Note, Op, Port, Section, Width, DIVISION, TAIL};
 pub use interpret::{evaluate, evaluate_by};
 pub use rules::{Folding, Grade, Rule, RuleSet};
 pub use verify::verify;

@@ -3,7 +3,7 @@
 use super::{Graph, NodeId, Op};
 
 /// Checks that operands stand before users, that inputs and results exist, that only `Sin` and `Cos` use a `SinCos`,
-/// and that there is a result per output scalar and a note per node.
+/// that there is a result per output scalar and a note per node, and that rows for several limbs have the same operation for each.
 ///
 /// # Errors
 /// The first broken promise, in words.
@@ -41,6 +41,12 @@ pub fn verify(graph: &Graph) -> Result<(), String> {
         }
         if graph.notes[i].section as usize >= graph.sections.len() {
             return Err(format!("node {i} lies in a section that does not exist"));
+        }
+    }
+    for (row, limbs) in graph.alike.iter().flat_map(|alike| alike.rows.iter().map(|row| (row, alike.limbs.len()))) {
+        let kind = |id: &NodeId| graph.ops.get(id.index()).map(std::mem::discriminant);
+        if row.len() != limbs || row.iter().any(|id| kind(id).is_none() || kind(id) != kind(&row[0])) {
+            return Err(format!("the row {row:?} is not the same operation for {limbs} limbs"));
         }
     }
     let outputs: usize = graph.outputs.iter().map(|p| p.len()).sum();

@@ -427,11 +427,14 @@ impl Function {
     ) -> Option<Vec<T>> {
         use Function::*;
         let q = &inputs[0];
-        let rest = rest(model);
         let bias = || {
-            let rigid = alg::reduced_inverse_dynamics(reduced, q, &inputs[1], &rest);
-            let passive = alg::passive_force(model, q, &inputs[1]);
-            rigid.into_iter().zip(passive).map(|(f, p)| f + p).collect::<Vec<T>>()
+            reduced_bias(
+                model,
+                reduced,
+                q,
+                &inputs[1],
+                &mut Limbs { wrench: &mut |_, _| None, first_moment: &mut |_, _| None },
+            )
         };
         let mass_matrix = || {
             let mut h = alg::reduced_mass_matrix(composite, q);
@@ -442,19 +445,13 @@ impl Function {
             h
         };
         Some(match self {
-            InverseDynamics => {
-                let rigid = alg::reduced_inverse_dynamics(reduced, q, &inputs[1], &inputs[2]);
-                let passive = alg::passive_force(model, q, &inputs[1]);
-                let rotors = alg::rotor_inertias(model).into_iter().zip(&inputs[2]).map(|(i, qdd)| i * *qdd);
-                rigid.into_iter().zip(rotors.zip(passive)).map(|(f, (r, p))| f + (r + p)).collect()
-            }
+            InverseDynamics | GravityForce | BiasForce | VelocityForce => self.reduced_forces(
+                model,
+                reduced,
+                inputs,
+                &mut Limbs { wrench: &mut |_, _| None, first_moment: &mut |_, _| None },
+            )?,
             MassMatrix => mass_matrix(),
-            GravityForce => alg::reduced_gravity_force(reduced, q),
-            BiasForce => bias(),
-            VelocityForce => {
-                let weightless = ReducedModel { gravity: Vec3::zero(), ..reduced.clone() };
-                alg::reduced_inverse_dynamics(&weightless, q, &inputs[1], &rest)
-            }
             ForwardDynamics => {
                 let drive: Vec<T> = inputs[2].iter().zip(bias()).map(|(tau, h)| *tau - h).collect();
                 match method {
@@ -463,6 +460,35 @@ impl Function {
                 }
             }
             Drive(function) => function.evaluate(&Rigid { model, reduced: Some((reduced, composite)) }, method, inputs),
+            _ => return None,
+        })
+    }
+
+    /// The reduced form of the functions to which a limb adds a wrench on the body that carries it, and the forces on its own joints.
+    pub(crate) fn reduced_forces<T: Real>(
+        self,
+        model: &Model<T>,
+        reduced: &ReducedModel<T>,
+        inputs: &[Vec<T>],
+        limbs: &mut Limbs<'_, T>,
+    ) -> Option<Vec<T>> {
+        use Function::*;
+        let q = &inputs[0];
+        Some(match self {
+            InverseDynamics => {
+                let motion = [&q[..], &inputs[1], &inputs[2]];
+                let rigid = alg::reduced_inverse_dynamics_with_limbs(reduced, motion, limbs.wrench);
+                let passive = alg::passive_force(model, q, &inputs[1]);
+                let rotors = alg::rotor_inertias(model).into_iter().zip(&inputs[2]).map(|(i, qdd)| i * *qdd);
+                rigid.into_iter().zip(rotors.zip(passive)).map(|(f, (r, p))| f + (r + p)).collect()
+            }
+            GravityForce => alg::reduced_gravity_force_with_limbs(reduced, q, limbs.first_moment),
+            BiasForce => reduced_bias(model, reduced, q, &inputs[1], limbs),
+            VelocityForce => {
+                let weightless = ReducedModel { gravity: Vec3::zero(), ..reduced.clone() };
+                let motion = [&q[..], &inputs[1], &rest(model)];
+                alg::reduced_inverse_dynamics_with_limbs(&weightless, motion, limbs.wrench)
+            }
             _ => return None,
         })
     }
@@ -558,6 +584,28 @@ impl Robot {
         let (reduced, composite) = (reduce(&self.model, torques).0, reduce(&self.model, mass_matrix).0);
         Robot { reduced, composite, ..self.clone() }
     }
+}
+
+/// What the bodies that stand for several limbs each pass on to those that carry them, all limbs together: see
+/// [`alg::reduced_inverse_dynamics_with_limbs`] and [`alg::reduced_gravity_force_with_limbs`].
+pub(crate) struct Limbs<'a, T> {
+    /// Force and moment.
+    pub wrench: &'a mut alg::LimbWrenches<'a, T>,
+    /// First moment and mass.
+    pub first_moment: &'a mut alg::LimbMoments<'a, T>,
+}
+
+/// Bias forces by the reduced robot.
+fn reduced_bias<T: Real>(
+    model: &Model<T>,
+    reduced: &ReducedModel<T>,
+    q: &[T],
+    qd: &[T],
+    limbs: &mut Limbs<'_, T>,
+) -> Vec<T> {
+    let rigid = alg::reduced_inverse_dynamics_with_limbs(reduced, [q, qd, &rest(model)], limbs.wrench);
+    let passive = alg::passive_force(model, q, qd);
+    rigid.into_iter().zip(passive).map(|(f, p)| f + p).collect()
 }
 
 /// q̇ = 0 or q̈ = 0.

@@ -62,7 +62,15 @@ fn code_bytes(program: &Program, scalar: Scalar) -> usize {
         Scalar::F64 => F64_CODE,
         Scalar::F32 => F32_CODE,
     };
-    let mut bytes = operation * graph.counts().flops() as f64;
+    // a row of a loop over limbs is there once
+    let live = graph.live();
+    let again = |row: &&Vec<NodeId>| match graph.op(row[0]) {
+        Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Div(..) | Op::Sqrt(_) => row.len() - 1,
+        _ => 0,
+    };
+    let rows = graph.alike.iter().flat_map(|alike| &alike.rows).filter(|row| live[row[0].index()]);
+    let again: usize = rows.map(|row| again(&row)).sum();
+    let mut bytes = operation * (graph.counts().flops() - again) as f64;
     let section = |id: &NodeId| graph.notes[id.index()].section;
     for run in schedule.parts.iter().flat_map(|part| part.nodes.chunk_by(|a, b| section(a) == section(b))) {
         bytes += match run.iter().filter(|id| matches!(graph.op(**id), Op::SinCos(_))).count() {

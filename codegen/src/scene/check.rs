@@ -5,7 +5,9 @@ use super::messages::{self as say, unphysical_moments};
 use super::{Base, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Scene};
 use crate::compile::Options;
 use crate::diagnostic::Diagnostics;
+use crate::expr::Grade;
 use crate::function::Function;
+use crate::limbs::LimbForm;
 use crate::model::geometry::principal_moments;
 use straightline_core::model::{JointKind, Model};
 use straightline_core::spatial::Sym3;
@@ -149,11 +151,17 @@ pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
     }
     for (function, _) in scene.budgets.iter().filter(|(_, b)| b.mixed_precision) {
         let path = format!("budget.{}.mixed_precision", function.name());
-        for (with, is_asked) in [("`fma`", options.fma), ("`generic`", options.generic)] {
+        let in_lanes = options.limbs == LimbForm::Lanes;
+        for (with, is_asked) in
+            [("`fma`", options.fma), ("`generic`", options.generic), ("`limbs = \"lanes\"`", in_lanes)]
+        {
             if is_asked {
                 scene.places.complain(&path, say::mixed_elsewhere(with), diagnostics);
             }
         }
+    }
+    if options.limbs == LimbForm::Lanes && options.grade == Grade::Exact {
+        scene.places.complain("outputs.limbs", say::limbs_exact(), diagnostics);
     }
     // of a file this was said when it was read, whatever functions of it are asked for
     let is_alone = |function: &&Function| scene.places.source().is_none() && !options.functions.contains(function);

@@ -28,6 +28,8 @@ pub const CODES: &[&str] = &[
     "budget-alone",
     "mixed-alone",
     "mixed-elsewhere",
+    "limbs-exact",
+    "no-identical-limbs",
     "error-budget-output",
     "error-budget-count",
     "over-budget",
@@ -225,6 +227,22 @@ pub fn mixed_elsewhere(with: &str) -> D {
     D::error("mixed-elsewhere", format!("`mixed_precision` together with {with}"))
         .detail("it computes parts of functions in f32 in f64, operation by operation")
         .help(format!("choose one of the two: remove `mixed_precision`, or {with}"))
+}
+
+/// Identical limbs as lanes where rules keep every bit.
+pub fn limbs_exact() -> D {
+    D::error("limbs-exact", "`limbs = \"lanes\"` together with `rules = \"exact\"`".to_string())
+        .detail(
+            "by exact rules the output is the generic runtime bit for bit, and that adds up limbs one after the other",
+        )
+        .help("choose one of the two: remove `limbs`, or `rules`")
+}
+
+/// Identical limbs of a robot that has none.
+pub fn no_identical_limbs() -> D {
+    D::error("no-identical-limbs", "`limbs = \"lanes\"`, but no two limbs of the robot are alike".to_string())
+        .detail("limbs are alike that hang on the same link and have the same kinds of joints in the same order; numbers may differ")
+        .help("remove `limbs`, or say `limbs = \"auto\"`: lanes where there are any")
 }
 
 /// A budget of errors for what is no output.

@@ -13,6 +13,7 @@ use crate::description::{messages, Value};
 use crate::diagnostic::{Diagnostics, Source};
 use crate::emit::Scalar;
 use crate::function::Function;
+use crate::limbs::LimbForm;
 use crate::words::Choice;
 use toml::de::DeValue;
 
@@ -53,6 +54,8 @@ pub struct SceneFile {
     pub scalars: Vec<Scalar>,
     /// So near to a special angle \[rad\] an angle of the robot file is taken as that.
     pub angle_tolerance: Option<f64>,
+    /// How identical limbs are computed; none: as the options say.
+    pub limbs: Option<LimbForm>,
     /// Whether rounding errors are bounded, and what is spent on it; none: as the options say.
     pub certify: Option<Effort>,
 }
@@ -70,6 +73,7 @@ impl SceneFile {
             (options.scalar, options.also) = (*first, others.to_vec());
         }
         options.model.angle_tolerance = self.angle_tolerance.unwrap_or(options.model.angle_tolerance);
+        options.limbs = self.limbs.unwrap_or(options.limbs);
         options.certify = self.certify.or(options.certify);
         options.scene = self.scene;
         options
@@ -195,8 +199,13 @@ impl SceneReader<'_> {
 
     fn outputs(&mut self, table: &Table) {
         let names: Vec<&str> = Function::known().map(Function::name).collect();
-        self.reader.check_keys(table, &[&["functions", "staged", "matrices", "contact"], &names[..]].concat());
+        self.reader.check_keys(table, &[&["functions", "staged", "limbs", "matrices", "contact"], &names[..]].concat());
         self.file.scene.staged = self.reader.flag_at(table, "staged").is_some_and(|flag| flag.value);
+        let forms: Vec<(&str, LimbForm)> = LimbForm::words().into_iter().map(|(word, _, form)| (word, form)).collect();
+        if let Some(form) = self.reader.word_at(table, "limbs", &forms) {
+            self.file.scene.places.note("outputs.limbs", &form.place);
+            self.file.limbs = Some(form.value);
+        }
         let orders = [("by rows", false), ("by columns", true)];
         self.file.scene.by_columns = self.reader.word_at(table, "matrices", &orders).is_some_and(|order| order.value);
         self.contact_functions(table);

@@ -9,6 +9,7 @@ use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::experiment::parameter::{self, Range, Sweep};
 use straightline_codegen::export::is_identifier;
 use straightline_codegen::expr::Grade;
+use straightline_codegen::limbs::LimbForm;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::scene::MaxError;
 use straightline_codegen::schedule::Limits;
@@ -267,6 +268,9 @@ pub struct ProgramArgs {
     /// How forward dynamics is computed
     #[arg(long, value_name = "METHOD", default_value = "cheaper", value_parser = words::<ForwardDynamicsMethod>())]
     forward_dynamics: ForwardDynamicsMethod,
+    /// How identical limbs are computed
+    #[arg(long, value_name = "FORM", default_value = "apart", value_parser = words::<LimbForm>())]
+    limbs: LimbForm,
     /// Longer functions are cut into parts of at most so many operations
     #[arg(long, value_name = "N", default_value_t = Limits::default().operations, value_parser = part_size)]
     max_part_operations: usize,
@@ -451,6 +455,7 @@ impl ProgramArgs {
             generic: self.generic,
             grade: self.rules,
             forward_dynamics: self.forward_dynamics,
+            limbs: self.limbs,
             limits: Limits { operations: self.max_part_operations },
             model: model.options(),
             certify: self.effort(),

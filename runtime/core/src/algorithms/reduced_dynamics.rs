@@ -18,6 +18,19 @@ use alloc::vec::Vec;
 
 /// Generalized forces tau \[N·m or N\] of a motion: [`inverse_dynamics`](super::inverse_dynamics) of the full robot.
 pub fn reduced_inverse_dynamics<T: Real>(model: &ReducedModel<T>, q: &[T], qd: &[T], qdd: &[T]) -> Vec<T> {
+    reduced_inverse_dynamics_with_limbs(model, [q, qd, qdd], &mut |_, _| None)
+}
+
+/// `of_all(i, wrench)`: force and moment that all limbs for which body `i` stands pass on to their parent, about its origin in the
+/// axes in which it is described, where `wrench()` is what body `i` passes on; `None`: body `i` stands for itself.
+pub type LimbWrenches<'a, T> = dyn FnMut(BodyId, &dyn Fn() -> ForceVector<T>) -> Option<ForceVector<T>> + 'a;
+
+/// The same of a robot on which some bodies stand for several limbs each.
+pub fn reduced_inverse_dynamics_with_limbs<T: Real>(
+    model: &ReducedModel<T>,
+    [q, qd, qdd]: [&[T]; 3],
+    of_all: &mut LimbWrenches<'_, T>,
+) -> Vec<T> {
     let (turns, links) = motions(model, q, qd, qdd);
     let mut tau = vec![T::zero(); model.nv()];
     let mut carried = vec![ForceVector::zero(); model.bodies.len()];
@@ -40,6 +53,12 @@ pub fn reduced_inverse_dynamics<T: Real>(model: &ReducedModel<T>, q: &[T], qd: &
             let to_parent = |v| turns[i].base_to_parent(body, turns[i].described_to_base(body, v));
             let (f, n) = (to_parent(force), to_parent(moment));
             let arm = links[i].arm;
+            let passed_on = || ForceVector { moment: n + arm.cross(f), force: f };
+            if let Some(all) = of_all(i, &passed_on) {
+                carried[p].force = carried[p].force + all.force;
+                carried[p].moment = carried[p].moment + all.moment;
+                continue;
+            }
             carried[p].force = carried[p].force + f;
             carried[p].moment = carried[p].moment + n + arm.cross(f);
         }

@@ -8,7 +8,7 @@
 
 use super::joint::rotated_back;
 use super::reduced_turn::own_angle;
-use crate::model::JointKind;
+use crate::model::{BodyId, JointKind};
 use crate::real::Real;
 use crate::reduced::{ReducedBody, ReducedModel};
 use crate::spatial::Vec3;
@@ -17,6 +17,19 @@ use alloc::vec::Vec;
 
 /// Generalized forces \[N·m or N\] that hold the robot at rest: [`gravity_force`](super::gravity_force) of the full robot.
 pub fn reduced_gravity_force<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> {
+    reduced_gravity_force_with_limbs(model, q, &mut |_, _| None)
+}
+
+/// `of_all(i, first_moment)`: the first moment about the parent's origin, and the mass, of all limbs for which body `i` stands, where
+/// `first_moment()` is that of body `i` and what it carries; `None`: body `i` stands for itself.
+pub type LimbMoments<'a, T> = dyn FnMut(BodyId, &dyn Fn() -> Vec3<T>) -> Option<(Vec3<T>, T)> + 'a;
+
+/// The same of a robot on which some bodies stand for several limbs each.
+pub fn reduced_gravity_force_with_limbs<T: Real>(
+    model: &ReducedModel<T>,
+    q: &[T],
+    of_all: &mut LimbMoments<'_, T>,
+) -> Vec<T> {
     let n = model.bodies.len();
     // −g in body axes, and for each joint before its turn
     let mut up: Vec<Vec3<T>> = Vec::with_capacity(n);
@@ -64,6 +77,12 @@ pub fn reduced_gravity_force<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T
                 JointKind::Prismatic => body.translation + body.rotation.column(2).scale(q[body.iq]),
                 _ => body.translation,
             };
+            let passed_on = || body.rotation * at_joint + arm.scale(mass[i]);
+            if let Some((all, all_mass)) = of_all(i, &passed_on) {
+                first_moment[p] = first_moment[p] + all;
+                mass[p] = mass[p] + all_mass;
+                continue;
+            }
             first_moment[p] = first_moment[p] + body.rotation * at_joint + arm.scale(mass[i]);
             mass[p] = mass[p] + mass[i];
         }

@@ -1,0 +1,199 @@
+//! What is alike for several limbs as a loop over them.
+//!
+//! ```text
+//! static C1: [f64; 4] = [0.0875, -0.0875, 0.0875, -0.0875];
+//! let sin_qs2: [f64; 4] = [sin_q2, sin_q5, sin_q8, sin_q11];
+//! let mut forces1_x = [0.0; 4];
+//! for limb in 0..4 {
+//!     …
+//!     forces1_x[limb] = …;
+//! }
+//! ```
+//!
+//! What differs from limb to limb is an array over limbs, what does not a local from before the loop. LLVM's loop vectoriser makes
+//! vector instructions of the body, as of functions over lanes.
+
+use super::body::{wrapped, Binding, Body, FunctionText, Plan};
+use super::one_line;
+use crate::expr::{Alike, Graph, NodeId, Op, Section};
+use crate::schedule::Part;
+use rustc_hash::FxHashMap;
+use std::fmt::Write;
+
+impl Body<'_> {
+    /// The statements of a part, with loops over limbs.
+    pub(super) fn with_loops(
+        &mut self,
+        plan: &mut Plan<'_>,
+        title: &dyn Fn(Section) -> String,
+        out: &mut FunctionText,
+    ) {
+        let graph = self.graph;
+        let stretch = graph.stretches();
+        let nodes = &plan.part.nodes;
+        // what another stretch uses has a name
+        let mut used_across = vec![false; graph.ops.len()];
+        for id in nodes {
+            for a in graph.op(*id).operands().filter(|a| stretch[a.index()] != stretch[id.index()]) {
+                used_across[a.index()] = true;
+            }
+        }
+        plan.results_of.iter().for_each(|(id, _)| used_across[id.index()] |= stretch[id.index()].is_some());
+        for id in nodes.iter().filter(|id| stretch[id.index()].is_none()) {
+            plan.crosses[id.index()] |= used_across[id.index()];
+        }
+        let mut done = 0;
+        while done < nodes.len() {
+            let here = stretch[nodes[done].index()];
+            let count = nodes[done..].iter().take_while(|id| stretch[id.index()] == here).count();
+            match here {
+                None => self.run(&nodes[done..done + count], plan, title, out),
+                Some(k) => self.limb_loop(&graph.alike[k], plan, &used_across, title, out),
+            }
+            done += count;
+        }
+    }
+
+    fn limb_loop(
+        &mut self,
+        alike: &Alike,
+        plan: &Plan<'_>,
+        used_across: &[bool],
+        title: &dyn Fn(Section) -> String,
+        out: &mut FunctionText,
+    ) {
+        let limbs = alike.limbs.len();
+        // an odd limb is a lane of its own beside one that nobody reads: half a vector would take longer
+        let count = if limbs > 2 { limbs.next_multiple_of(2) } else { limbs };
+        let scalar = self.style.scalar_name();
+        let limb = self.names.free("limb");
+        for body in &alike.limbs {
+            let _ = writeln!(out.text, "    // {}", one_line(&title(Section { phase: "limb", body: Some(*body) })));
+        }
+        let Loop { graph, part, outside, results } = Loop::new(self.graph, alike, used_across);
+
+        // what comes from outside
+        let mut texts: Vec<(NodeId, String)> = Vec::new();
+        for (node, of_limbs) in &outside {
+            if of_limbs.len() == 1 {
+                texts.push((*node, self.operand(of_limbs[0]).0));
+                continue;
+            }
+            let last = of_limbs.last().into_iter().cycle();
+            let padded = of_limbs.iter().chain(last).take(count);
+            let values: Vec<String> = padded.map(|id| self.operand(*id).0).collect();
+            let are_constants = of_limbs.iter().all(|id| matches!(self.graph.op(*id), Op::Constant(_)));
+            let (declared, name) =
+                match (are_constants && !self.style.generic, self.graph.notes[of_limbs[0].index()].name) {
+                    (true, _) => ("static", self.names.numbered("C")),
+                    (false, Some((quantity, index, component))) => {
+                        ("let", self.names.named(&format!("{quantity}s"), index, component))
+                    }
+                    (false, None) => ("let", self.names.numbered("x")),
+                };
+            out.text.push_str(&wrapped(&format!("    {declared} {name}: [{scalar}; {count}] = ["), &values, "];"));
+            texts.push((*node, format!("{name}[{limb}]")));
+        }
+        // what goes there
+        let (mut arrays, mut names): (Vec<(NodeId, String)>, Vec<String>) = (Vec::new(), Vec::new());
+        for (node, row) in &results {
+            let name = match self.graph.notes[row[0].index()].name {
+                Some((quantity, index, component)) => self.names.named(&format!("{quantity}s"), index, component),
+                None => self.names.numbered("y"),
+            };
+            let _ = writeln!(out.text, "    let mut {name} = [{}; {count}];", self.style.zero());
+            arrays.push((*node, format!("{name}[{limb}]")));
+            names.push(name);
+        }
+
+        let (mut inner, absorbed) = Body::new(&graph, &part, self.style, std::mem::take(&mut self.names));
+        for (node, text) in texts {
+            inner.text[node.index()] = Some((text, Binding::Atom));
+        }
+        let mut uses = vec![0u32; graph.ops.len()];
+        let mut crosses = vec![false; graph.ops.len()];
+        for id in &part.nodes {
+            graph.op(*id).operands().for_each(|a| uses[a.index()] += 1);
+        }
+        for (node, _) in &results {
+            crosses[node.index()] = uses[node.index()] > 0;
+        }
+        let plan_of_loop = Plan { part: &part, uses, results_of: Vec::new(), crosses, absorbed, arrays };
+        let mut text = FunctionText::remark("");
+        text.text.clear();
+        inner.run(&part.nodes, &plan_of_loop, title, &mut text);
+        self.names = std::mem::take(&mut inner.names);
+        let _ = writeln!(out.text, "    for {limb} in 0..{count} {{");
+        for line in text.text.lines() {
+            let _ = writeln!(out.text, "    {line}");
+        }
+        out.text.push_str("    }\n");
+        out.uses_sin_cos |= text.uses_sin_cos;
+        out.uses_sqrt |= text.uses_sqrt;
+
+        for ((_, row), name) in results.iter().zip(&names) {
+            for (limb, id) in row.iter().enumerate() {
+                self.text[id.index()] = Some((format!("{name}[{limb}]"), Binding::Atom));
+                let first = plan.results_of.partition_point(|(r, _)| r < id);
+                for (_, k) in plan.results_of[first..].iter().take_while(|(r, _)| r == id) {
+                    self.store_result(*id, *k);
+                }
+            }
+        }
+        out.text.push_str(&std::mem::take(&mut self.statements));
+    }
+}
+
+/// A loop over limbs as a program of its own: rows are nodes, and so is what they take from outside.
+struct Loop {
+    graph: Graph,
+    part: Part,
+    /// Of nodes from outside what stands for them: a node for all limbs, or one per limb.
+    outside: Vec<(NodeId, Vec<NodeId>)>,
+    /// What is used behind the loop, with its row.
+    results: Vec<(NodeId, Vec<NodeId>)>,
+}
+
+impl Loop {
+    fn new(graph: &Graph, alike: &Alike, used_across: &[bool]) -> Loop {
+        let mut inner = Graph { sections: graph.sections.clone(), inputs: graph.inputs.clone(), ..Graph::default() };
+        let push = |inner: &mut Graph, op: Op, note| {
+            inner.ops.push(op);
+            inner.notes.push(note);
+            NodeId(inner.ops.len() as u32 - 1)
+        };
+        let mut known: FxHashMap<Vec<NodeId>, NodeId> = FxHashMap::default();
+        let (mut part, mut outside, mut results) = (Part::default(), Vec::new(), Vec::new());
+        for row in &alike.rows {
+            let operands: Vec<Vec<NodeId>> = row.iter().map(|id| graph.op(*id).operands().collect()).collect();
+            let mut of_op = Vec::new();
+            for k in 0..operands[0].len() {
+                let mut of_limbs: Vec<NodeId> = operands.iter().map(|o| o[k]).collect();
+                if of_limbs.iter().all(|a| *a == of_limbs[0]) {
+                    of_limbs.truncate(1);
+                }
+                let first = of_limbs[0];
+                let node = *known.entry(of_limbs.clone()).or_insert_with(|| {
+                    let leaf = matches!(graph.op(first), Op::Input(_) | Op::Constant(_)) && of_limbs.len() == 1;
+                    let op = if leaf { graph.op(first) } else { Op::Input(0) };
+                    let node = push(&mut inner, op, graph.notes[first.index()]);
+                    if !leaf {
+                        outside.push((node, of_limbs.clone()));
+                    }
+                    node
+                });
+                of_op.push(node);
+            }
+            let mut of_op = of_op.into_iter();
+            let op = graph.op(row[0]).map(|_| of_op.next().expect("as many operands"));
+            let node = push(&mut inner, op, graph.notes[row[0].index()]);
+            known.insert(row.clone(), node);
+            part.nodes.push(node);
+            if row.iter().any(|id| used_across[id.index()]) {
+                results.push((node, row.clone()));
+                inner.results.push(node);
+            }
+        }
+        Loop { graph: inner, part, outside, results }
+    }
+}

@@ -1,0 +1,163 @@
+//! Identical limbs (legs of a quadruped, fingers of a hand) as lanes of one body.
+//!
+//! Limbs of one kind hang on the same body and have the same joints in the same order. They take the same operations on other
+//! numbers, and what they add to the rest of the robot is one wrench on the body that carries them. So one limb is traced for all
+//! of them (`template.rs`): where their numbers differ it has inputs, a number per limb, and where the wrench reaches the body stands
+//! an input for the sum. What comes out is optimised like any program. Then it is written out, once per limb
+//! (`expand.rs`), into one program of plain operations, so that bounds of errors, counts and tests see what
+//! is executed, with a note which of them are the same for all limbs ([`Alike`](crate::expr::Alike)): those become a loop over
+//! limbs, which compilers turn into vector instructions.
+//!
+//! Mirrored limbs need nothing more: their numbers differ by signs, and a sign is part of a number.
+
+mod constants;
+mod expand;
+mod template;
+
+use crate::choose::choose;
+use crate::compile::{Optimisations, Options};
+use crate::expr::{verify, Graph};
+use crate::function::{Function, Robot};
+use crate::pass::{dead_code, sums, unread_inputs};
+use crate::scene::is_optional;
+use straightline_core::model::{BodyId, Coulomb, JointKind, Model};
+
+/// How identical limbs are computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum LimbForm {
+    /// Each by itself, with its own constants folded: fewest operations.
+    #[default]
+    Apart,
+    /// As lanes of one body, wherever two are alike: least code.
+    Lanes,
+    /// As lanes where that is measured to be faster, otherwise apart: see [`LimbForm::of`].
+    Auto,
+}
+
+/// Pairs take longer in lanes than apart: legs and arms of a humanoid 1.1 to 1.3 times as long. Three or more take 0.5 to 0.8 times
+/// as long with AVX, and no longer without.
+const LANES_PAY: usize = 3;
+/// Limbs of one joint have too few operations to make up for what goes into lanes and comes out of them.
+const JOINTS_PAY: usize = 2;
+
+impl LimbForm {
+    /// Which limbs of a robot are lanes in a function. [`LimbForm::Auto`]: where a body carries three or more of at least two
+    /// joints, except for gravity forces, which have few operations and take as long either way
+    /// (`generated_tests/record/2026-11-21-limbs.md`).
+    pub fn of<T>(self, model: &Model<T>, function: Function) -> Vec<Limbs> {
+        let mut found = if serves(function) { limbs(model) } else { Vec::new() };
+        match self {
+            LimbForm::Apart => found.clear(),
+            LimbForm::Lanes => {}
+            LimbForm::Auto if function == Function::GravityForce => found.clear(),
+            LimbForm::Auto => found.retain(|l| l.bodies.len() >= LANES_PAY && l.bodies[0].len() >= JOINTS_PAY),
+        }
+        found
+    }
+}
+
+/// Limbs of one kind.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Limbs {
+    /// The body that carries them; `None`: the world.
+    pub carrier: Option<BodyId>,
+    /// The bodies of each limb, parents first; those at the same place correspond to one another.
+    pub bodies: Vec<Vec<BodyId>>,
+}
+
+/// All identical limbs of a robot, those nearest to the base where some carry others.
+pub fn limbs<T>(model: &Model<T>) -> Vec<Limbs> {
+    let mut found = Vec::new();
+    let mut carriers = vec![None];
+    while let Some(carrier) = carriers.pop() {
+        let mut kinds: Vec<(String, Vec<Vec<BodyId>>)> = Vec::new();
+        for child in children(model, carrier) {
+            let (kind, bodies) = kind_of(model, child);
+            match kinds.iter_mut().find(|(k, _)| *k == kind) {
+                Some((_, limbs)) => limbs.push(bodies),
+                None => kinds.push((kind, vec![bodies])),
+            }
+        }
+        for (_, bodies) in kinds.into_iter().rev() {
+            match bodies.as_slice() {
+                [only] => carriers.push(Some(only[0])),
+                _ => found.push(Limbs { carrier, bodies }),
+            }
+        }
+    }
+    found.sort_by_key(|l| l.bodies[0][0]);
+    found
+}
+
+fn children<T>(model: &Model<T>, carrier: Option<BodyId>) -> Vec<BodyId> {
+    (0..model.bodies.len()).filter(|i| model.bodies[*i].parent == carrier).collect()
+}
+
+/// What a limb is like from its first body on, and its bodies in an order that depends on that alone.
+fn kind_of<T>(model: &Model<T>, first: BodyId) -> (String, Vec<BodyId>) {
+    let body = &model.bodies[first];
+    let friction = match body.effects.coulomb {
+        Coulomb::Off => "",
+        Coulomb::Sign(_) => " with friction",
+        Coulomb::Smooth { .. } => " with smooth friction",
+    };
+    let joint = match body.joint.kind {
+        JointKind::Revolute => "turns",
+        JointKind::Prismatic => "slides",
+        JointKind::Floating => "floats",
+    };
+    let mut carried: Vec<(String, Vec<BodyId>)> =
+        children(model, Some(first)).into_iter().map(|c| kind_of(model, c)).collect();
+    carried.sort_by(|a, b| a.0.cmp(&b.0));
+    let (mut kind, mut bodies) = (format!("{joint}{friction} ("), vec![first]);
+    for (k, b) in carried {
+        kind.push_str(&k);
+        bodies.extend(b);
+    }
+    (kind + ")", bodies)
+}
+
+/// Whether limbs add to this function nothing but a wrench on the body that carries them, and forces on their own joints.
+pub fn serves(function: Function) -> bool {
+    use Function::{BiasForce, GravityForce, InverseDynamics, VelocityForce};
+    matches!(function, InverseDynamics | GravityForce | BiasForce | VelocityForce)
+}
+
+/// The program of a function with limbs as lanes; `None` where no limbs are to be.
+pub(crate) fn program(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+    optimisations: Optimisations,
+) -> Option<Graph> {
+    let limbs = options.limbs.of(&robot.model, function);
+    // `lanes` was refused with it
+    let mixed = options.scene.budgets.get(&function).is_some_and(|budget| budget.mixed_precision);
+    if limbs.is_empty() || mixed || !optimisations.reduced {
+        return None;
+    }
+    let apart = Optimisations { limbs: false, ..optimisations };
+    let chosen = match optimisations.chosen {
+        true => choose(robot, frames, function, options, Optimisations { chosen: false, ..apart }),
+        false => robot.clone(),
+    };
+    let check = |graph: Graph| {
+        verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
+        graph
+    };
+    let rules = || apart.rules(options.scalar);
+    let mut template = template::template(&chosen, function, &options.scene, &limbs, rules());
+    let wanted = options.scene.select(function, &chosen.model, 0).0;
+    template.keep(&chosen.model, &wanted);
+    template.graph = check(dead_code(&check(template.graph)));
+    template = constants::folded(template, rules());
+    if optimisations.sums {
+        template.graph = check(dead_code(&check(sums(&template.graph))));
+        // a sum of products with one factor in common is a product with a sum, which may be one of constants
+        template = constants::folded(template, rules());
+    }
+    template.drop_unread(&chosen.model, &wanted);
+    let graph = expand::written_out(&check(template.graph.clone()), &template, &chosen.model, &options.scene, function);
+    Some(check(unread_inputs(check(graph), is_optional)))
+}
