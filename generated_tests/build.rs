@@ -6,6 +6,7 @@ use straightline_codegen::compile::{compile, Generated, Options};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::expr::Grade;
+use straightline_codegen::limbs::LimbForm;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::scene::contact::{ContactItem, EnvironmentItem, EnvironmentKind, SurfaceItem};
 use straightline_codegen::scene::{ContactFunction, Contacts, Parameter, Scene};
@@ -152,11 +153,22 @@ fn lanes(out: &Path, folder: &Path) {
         generic: true,
         ..Options::default()
     };
+    let limbs = |functions: &[Function], generic| Options {
+        functions: functions.to_vec(),
+        model: ModelOptions { floating_base: true, ..ModelOptions::default() },
+        limbs: LimbForm::Lanes,
+        generic,
+        ..Options::default()
+    };
+    let forces = [InverseDynamics, Function::GravityForce, Function::BiasForce, Function::VelocityForce];
     let sums = Options { functions: vec![InverseDynamics, ForwardDynamics], generic: true, ..Options::default() };
     let modules = modules.into_iter().chain([
         ("fused_solo12", robot("solo12.urdf", fused)),
         ("generic_panda", robot("panda.urdf", generic)),
         ("generic_ur5", robot("ur5.urdf", sums)),
+        ("limbs_hyq", robot("hyq.urdf", limbs(&forces, false))),
+        ("limbs_humanoid", robot("simple_humanoid.urdf", limbs(&forces, false))),
+        ("limbs_generic", robot("solo12.urdf", limbs(&[InverseDynamics], true))),
     ]);
     for (name, text) in modules {
         std::fs::write(out.join(format!("{name}.rs")), text).expect("OUT_DIR can be written");
