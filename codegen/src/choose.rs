@@ -63,7 +63,7 @@ pub fn choose(
         let optimisations = Optimisations { cheaper: false, ..optimisations };
         // contacts leave torques and H as they are
         let scene = Scene { contacts: Contacts::default(), ..options.scene.clone() };
-        let key = format!("{function:?} {scene:?} {optimisations:?}");
+        let key = format!("{function:?} {scene:?} {optimisations:?} {:?}", options.scalar);
         robot.found.or_search(key, || improved(robot, frames, function, options, optimisations))
     };
     match function {
@@ -86,7 +86,7 @@ pub fn choose(
         ForwardDynamics | Drive(DriveFunction::ForwardDynamics | DriveFunction::Torques) => {
             let (torques, mass_matrix) = (search(BiasForce), search(MassMatrix));
             // articulated bodies share more with frames that turn
-            let plain = Choice { adds_angles: optimisations.angle_sums, ..Choice::plain(&robot.model) };
+            let plain = plain(robot, options, optimisations);
             let pairs =
                 [(&torques, &mass_matrix), (&torques, &torques), (&mass_matrix, &mass_matrix), (&plain, &plain)];
             let robots = pairs.map(|(t, h)| robot.reduced_by(t, h));
@@ -364,6 +364,12 @@ impl Ways {
     }
 }
 
+/// Khalil and Dombre's parameters, with sums of angles where they may be.
+fn plain(robot: &Robot, options: &Options, optimisations: Optimisations) -> Choice {
+    let adds_offsets = options.scalar == Scalar::F64;
+    Choice { adds_angles: optimisations.angle_sums, adds_offsets, ..Choice::plain(&robot.model) }
+}
+
 /// The cheapest form that greedy steps lead to, from the plain form and, for a robot of few joints, from neighbours of what
 /// was found: origins that move for many parameters at once.
 fn improved(
@@ -374,7 +380,7 @@ fn improved(
     optimisations: Optimisations,
 ) -> Choice {
     let (reduced, bodies) = (&robot.reduced, &robot.reduced.bodies);
-    let plain = Choice { adds_angles: optimisations.angle_sums, ..Choice::plain(&robot.model) };
+    let plain = plain(robot, options, optimisations);
     let forms = optimisations.forms;
     let stays = (0..bodies.len()).map(|i| forms.stays && reduced.may_stay(i)).collect();
     let first = Choice { stays, ..plain.clone() };

@@ -95,8 +95,7 @@ impl Options {
             sums: algebraic,
             chosen: algebraic,
             forms: if algebraic { Forms::ALL } else { Forms::default() },
-            // in f32 a constant of a sum would be rounded by itself: a Panda's torques would lose 1.8e-6, not 1.4e-6
-            angle_sums: algebraic && self.scalar == Scalar::F64,
+            angle_sums: algebraic,
             cheaper,
             limbs: algebraic && self.limbs != LimbForm::Apart,
         }
@@ -117,7 +116,11 @@ impl Options {
 
     /// The rewrite rules that these options allow.
     pub fn rules(&self) -> RuleSet {
-        self.optimisations().rules(self.scalar)
+        self.rules_of(self.optimisations())
+    }
+
+    fn rules_of(&self, optimisations: Optimisations) -> RuleSet {
+        optimisations.rules(self.scalar).with_short_angles(self.generic || self.scalar == Scalar::F32)
     }
 }
 
@@ -297,7 +300,7 @@ fn traced(
         ForwardDynamicsMethod::Cheaper if !optimisations.cheaper => ForwardDynamicsMethod::ArticulatedBody,
         method => method,
     };
-    let rules = optimisations.rules(options.scalar);
+    let rules = options.rules_of(optimisations);
     function.trace(robot, frames, method, rules, options.scalar, optimisations.reduced, &options.scene)
 }
 

@@ -47,8 +47,11 @@ pub struct Choice {
     /// Bodies whose origin is the foot of the common normal with the axis before theirs, instead of with the one behind; behind a
     /// parallel axis, level with the origin there.
     pub origin_at_parent: Vec<bool>,
-    /// [`ReducedModel::adds_angles`]; then an offset that is no quarter turn is added, too.
+    /// [`ReducedModel::adds_angles`].
     pub adds_angles: bool,
+    /// Then an offset that is no quarter turn is added, too; otherwise the addition theorem takes it. In f32 an offset is three terms,
+    /// whose tails take more than the theorem.
+    pub adds_offsets: bool,
     /// The unit of length \[m\], for a robot that does not slide.
     pub unit: Dd,
 }
@@ -72,6 +75,7 @@ impl Choice {
             shifted_tips: [0; 2].map(|_| none.clone()),
             origin_at_parent: none,
             adds_angles: false,
+            adds_offsets: false,
             unit: Dd::ONE,
         }
     }
@@ -98,7 +102,7 @@ pub fn reduce(model: &Model<Dd>, choice: &Choice) -> (ReducedModel<Dd>, Vec<Tran
     for i in 0..reduced.bodies.len() {
         reduced.bodies[i].stays = choice.stays[i] && reduced.may_stay(i);
         let body = &mut reduced.bodies[i];
-        if adds_angles && body.kind == JointKind::Revolute {
+        if adds_angles && choice.adds_offsets && body.kind == JointKind::Revolute {
             (body.offset, body.phase) = apart(body.offset);
         }
         body.turns_sums = choice.turns_sums[i] && body.stays;

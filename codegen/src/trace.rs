@@ -141,8 +141,7 @@ impl Real for Expr {
                 let (s, c) = g.rules().folding().sin_cos(known);
                 return (Expr(g.constant(s)), Expr(g.constant(c)));
             };
-            let parts = [known.hi(), known.lo()].map(Dd::from);
-            let parts: Vec<NodeId> = parts.into_iter().filter(|c| *c != Dd::ZERO).map(|c| g.constant(c)).collect();
+            let parts: Vec<NodeId> = g.rules().angle_parts(known).into_iter().map(|c| g.constant(c)).collect();
             let angle = rest.iter().chain(&parts).fold(*first, |sum, x| g.insert(Op::AngleSum(sum, *x)));
             let pair = g.add(Op::SinCos(angle));
             (Expr(g.add(Op::Sin(pair))), Expr(g.add(Op::Cos(pair))))

@@ -77,6 +77,7 @@ fn every_choice_gives_the_torques_and_the_mass_matrix_of_the_full_robot() {
                 shifted_tips: [0; 2].map(|_| random.flags(n)),
                 origin_at_parent: random.flags(n),
                 adds_angles: trial % 3 > 0,
+                adds_offsets: trial % 2 == 0,
                 unit: if trial % 2 == 0 { Dd::ONE } else { units[trial % units.len()] },
             };
             let (reduced, _) = reduce(&model, &choice);

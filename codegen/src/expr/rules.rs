@@ -101,17 +101,39 @@ impl std::fmt::Debug for Rule {
 pub struct RuleSet {
     rules: &'static [Rule],
     folding: Folding,
+    short_angles: bool,
 }
 
 impl RuleSet {
     /// Only rules that keep every bit of the generic runtime in `folding`'s format.
     pub fn exact(folding: Folding) -> Self {
-        RuleSet { rules: &RULES[..EXACT_RULES], folding }
+        RuleSet { rules: &RULES[..EXACT_RULES], folding, short_angles: false }
     }
 
     /// All rules; constants in double-double.
     pub fn all() -> Self {
-        RuleSet { rules: RULES, folding: Folding::DoubleDouble }
+        RuleSet { rules: RULES, folding: Folding::DoubleDouble, short_angles: false }
+    }
+
+    /// The same, with [parts of angles](RuleSet::angle_parts) that keep their digits where a program runs in f32.
+    #[must_use]
+    pub fn with_short_angles(self, short_angles: bool) -> Self {
+        RuleSet { short_angles, ..self }
+    }
+
+    /// A constant angle as terms of a sum: where the program may run in f32, two that f32 has and a rest below 2^-48 of it;
+    /// otherwise the two halves of its double-double.
+    pub fn angle_parts(&self, angle: Dd) -> Vec<Dd> {
+        let short = |x: Dd| Dd::from(f64::from(x.to_f32()));
+        let mut parts = match self.short_angles {
+            true => {
+                let rest = angle - short(angle);
+                vec![short(angle), short(rest), rest - short(rest)]
+            }
+            false => [angle.hi(), angle.lo()].map(Dd::from).to_vec(),
+        };
+        parts.retain(|x| *x != Dd::ZERO);
+        parts
     }
 
     /// The rules, in the order in which they are tried.
