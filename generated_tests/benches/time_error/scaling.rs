@@ -14,16 +14,15 @@ use straightline_generated_tests::random::Random;
 use straightline_generated_tests::standalone::{run as run_program, Folder};
 
 const JOINTS: [usize; 7] = [2, 4, 8, 16, 32, 64, 128];
-/// H has n² entries, and its factor n³/6 products.
-const MOST_FOR_MATRICES: usize = 32;
 
-/// What is measured: its name, the function, the method, whether it is quadratic or worse.
-const KINDS: [(&str, Function, ForwardDynamicsMethod, bool); 5] = [
-    ("gravity forces", Function::GravityForce, ForwardDynamicsMethod::Cheaper, false),
-    ("inverse dynamics", Function::InverseDynamics, ForwardDynamicsMethod::Cheaper, false),
-    ("forward dynamics, articulated bodies", Function::ForwardDynamics, ForwardDynamicsMethod::ArticulatedBody, false),
-    ("forward dynamics, factorisation", Function::ForwardDynamics, ForwardDynamicsMethod::Factorisation, true),
-    ("mass matrix", Function::MassMatrix, ForwardDynamicsMethod::Cheaper, true),
+/// What is measured: its name, the function, the method, up to how many joints. The factor of H takes n³/6 products, at 128 joints
+/// minutes of rustc.
+const KINDS: [(&str, Function, ForwardDynamicsMethod, usize); 5] = [
+    ("gravity forces", Function::GravityForce, ForwardDynamicsMethod::Cheaper, 128),
+    ("inverse dynamics", Function::InverseDynamics, ForwardDynamicsMethod::Cheaper, 128),
+    ("forward dynamics, articulated bodies", Function::ForwardDynamics, ForwardDynamicsMethod::ArticulatedBody, 128),
+    ("forward dynamics, factorisation", Function::ForwardDynamics, ForwardDynamicsMethod::Factorisation, 64),
+    ("mass matrix", Function::MassMatrix, ForwardDynamicsMethod::Cheaper, 128),
 ];
 
 /// Rods of half a metre about x, y and z in turn.
@@ -58,7 +57,7 @@ fn error<T: Real + Into<f64>>(graph: &expr::Graph, states: usize) -> f64 {
     worst
 }
 
-/// Best nanoseconds per call, of code compiled for this processor, and the seconds that rustc took.
+/// Best nanoseconds per call, of code compiled for this processor, and the seconds that generation and rustc took.
 fn time(
     folder: &Folder,
     source: &Source,
@@ -66,8 +65,10 @@ fn time(
     function: Function,
     lengths: &[usize],
     shape: &[usize],
-) -> (f64, f64) {
+) -> (f64, [f64; 2]) {
+    let start = Instant::now();
     let generated = compile(source, options).unwrap_or_else(|d| panic!("{d}"));
+    let generation = start.elapsed().as_secs_f64();
     let arguments: Vec<String> = (0..lengths.len()).map(|i| format!("&x{i}[k]")).collect();
     let made: String = lengths
         .iter()
@@ -87,9 +88,9 @@ fn time(
     );
     let start = Instant::now();
     let program = folder.build("scaling", &text, &["-Ctarget-cpu=native"]).unwrap_or_else(|e| panic!("{e}"));
-    let seconds = start.elapsed().as_secs_f64();
+    let rustc = start.elapsed().as_secs_f64();
     let ns = run_program(&program, &[]).unwrap_or_else(|e| panic!("{e}")).trim().parse().expect("a number");
-    (ns, seconds)
+    (ns, [generation, rustc])
 }
 
 pub fn run() {
@@ -107,15 +108,16 @@ pub fn run() {
     let mut text = String::from(
         "# Scaling with the number of joints\n\n`cargo bench -p straightline-generated-tests --features charts --bench time_error -- scaling`\n\n\
          Chains of rods about x, y and z in turn. Time: f64, warm, compiled for the processor, best of 12. Errors: worst of 50 random\n\
-         states over the greatest result of the state. rustc: seconds to compile a program of that function, of which an empty one takes\n\
-         the first tenths.\n\n\
-         | joints | function | mul | add | sincos | ns | error f64 | error f32 | rustc, s |\n|---|---|---|---|---|---|---|---|---|\n",
+         states over the greatest result of the state. Generation: seconds from the robot file to the source, search for the cheapest form\n\
+         included. rustc: seconds to compile a program of that function, of which an empty one takes the first tenths.\n\n\
+         | joints | function | mul | add | sincos | ns | error f64 | error f32 | generation, s | rustc, s |\n\
+         |---|---|---|---|---|---|---|---|---|---|\n",
     );
     for n in JOINTS {
         let source = chain(n);
         let robot = programs::load(&source, &ModelOptions::default());
-        for (i, (name, function, method, large)) in KINDS.into_iter().enumerate() {
-            if large && n > MOST_FOR_MATRICES {
+        for (i, (name, function, method, most)) in KINDS.into_iter().enumerate() {
+            if n > most {
                 continue;
             }
             let options = Options { functions: vec![function], forward_dynamics: method, ..Options::default() };
@@ -124,27 +126,31 @@ pub fn run() {
             let counts = double.counts();
             let (e64, e32) = (error::<f64>(&double, 50), error::<f32>(&single, 50));
             let lengths: Vec<usize> = double.inputs.iter().map(|p| p.len()).collect();
-            let (ns, seconds) = time(&folder, &source, &options, function, &lengths, &double.outputs[0].shape);
+            let (ns, [generation, rustc]) =
+                time(&folder, &source, &options, function, &lengths, &double.outputs[0].shape);
             let _ = writeln!(
                 text,
-                "| {n} | {name} | {} | {} | {} | {ns:.0} | {e64:.1e} | {e32:.1e} | {seconds:.1} |",
+                "| {n} | {name} | {} | {} | {} | {ns:.0} | {e64:.1e} | {e32:.1e} | {generation:.2} | {rustc:.1} |",
                 counts.mul, counts.add, counts.sin_cos
             );
             rows.push(
                 json!({"joints": n, "function": name, "mul": counts.mul, "add": counts.add, "sincos": counts.sin_cos,
-                             "ns": ns, "error_f64": e64, "error_f32": e32, "rustc_s": seconds}),
+                             "ns": ns, "error_f64": e64, "error_f32": e32, "generation_s": generation, "rustc_s": rustc}),
             );
             let n = n as f64;
             operations[i].points.push((n, counts.flops() as f64));
             times[i].points.push((n, ns));
-            builds[i].points.push((n, 1e9 * seconds));
+            builds[i].points.push((n, 1e9 * (generation + rustc)));
             for (curve, e) in [("f64", e64), ("f32", e32)] {
                 let name = format!("{name}, {curve}");
                 if let Some(curve) = errors.iter_mut().find(|c| c.name == name) {
                     curve.points.push((n, e));
                 }
             }
-            println!("{n} {name}: {} operations, {ns:.0} ns, {e64:.1e}, {e32:.1e}, {seconds:.1} s", counts.flops());
+            println!(
+                "{n} {name}: {} operations, {ns:.0} ns, {e64:.1e}, {e32:.1e}, {generation:.2} s, rustc {rustc:.1} s",
+                counts.flops()
+            );
         }
     }
     let joints = |x: &f64| format!("{x}");
@@ -153,7 +159,7 @@ pub fn run() {
     let charts = [
         chart("Chains of 2 … 128 joints: operations", "multiplications and additions", &chart::power, &operations),
         chart("Time per evaluation, f64, warm", "time", &chart::time, &times),
-        chart("Time to compile", "time of rustc", &chart::time, &builds),
+        chart("Time to compile", "time of generation and rustc", &chart::time, &builds),
         chart("Worst error of 50 random states", "error over the greatest result", &chart::power, &errors),
     ];
     chart::curves(&charts, &record("2026-11-21-time-error-scaling.svg"));
