@@ -14,6 +14,7 @@ use crate::scene::{Contacts, Gravity, Scene};
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use std::hash::{Hash, Hasher};
 use std::sync::{Arc, Mutex, PoisonError};
+use straightline_core::model::Model;
 use straightline_core::reduced::ReducedModel;
 use straightline_core::Dd;
 
@@ -27,6 +28,8 @@ const SLACK: usize = 16;
 const TOLERATED: f64 = 1.75;
 /// The same in f32, which has fewer digits to lose.
 const TOLERATED_SINGLE: f64 = 1.25;
+/// Values formed of others may lose so many times what they did, all together.
+const TOLERATED_LOCALLY: f64 = 1.1;
 /// At so many states that is estimated.
 const STATES: usize = 4;
 /// Units of length that are tried, the most frequent ones.
@@ -119,6 +122,18 @@ const NEVER: Price = (usize::MAX, usize::MAX);
 pub(crate) fn price(counts: Counts) -> Price {
     let apart = 2 * (PAIR * counts.sin_cos + DIVISION * counts.div) + counts.tail;
     (counts.fma + counts.flops() + apart, counts.fma)
+}
+
+/// Whether equations lose hardly more than these; where run-time parameters are inputs nobody knows, and what is local must do.
+pub(crate) fn keeps_digits_of<'g>(model: &'g Model<Dd>, graph: &'g Graph) -> impl Fn(&Graph) -> bool + 'g {
+    let states = [false, true].map(|fast| forward_method::states(model, &graph.inputs, STATES, fast));
+    let before = states.each_ref().map(|s| s.as_ref().map(|s| rounding::estimate(graph, s)));
+    move |graph| {
+        let mut both = states.iter().zip(&before);
+        both.all(|(s, before)| {
+            s.as_ref().zip(*before).is_none_or(|(s, before)| rounding::estimate(graph, s) <= TOLERATED_LOCALLY * before)
+        })
+    }
 }
 
 /// A search for one function, and what was tried.

@@ -2,7 +2,7 @@
 
 use crate::certify::companion::Bits;
 use crate::certify::{self, Effort};
-use crate::choose::{choose, price};
+use crate::choose::{self, choose, price};
 use crate::contact;
 use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
@@ -12,7 +12,7 @@ use crate::forward_method::MethodChoice;
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::limbs::{self, LimbForm};
 use crate::model;
-use crate::pass::{count_sums, dead_code, order, sums, unread_inputs};
+use crate::pass::{count_sums, dead_code, order, substitute, sums, unread_inputs};
 use crate::report::budget::{self, Measures};
 use crate::report::errors::ErrorReport;
 use crate::report::waterfall::{self, Waterfall};
@@ -98,6 +98,7 @@ impl Options {
             angle_sums: algebraic,
             cheaper,
             limbs: algebraic && self.limbs != LimbForm::Apart,
+            substitutes: algebraic,
         }
     }
 
@@ -147,6 +148,8 @@ pub struct Optimisations {
     pub cheaper: bool,
     /// Identical limbs as lanes of one body, where the options have them so: [`limbs`].
     pub limbs: bool,
+    /// Values of the mass matrix, and of forward dynamics, formed of others that are there anyway: [`substitute`].
+    pub substitutes: bool,
 }
 
 /// What [`choose`] may choose, one by one, so that each can be weighed.
@@ -193,6 +196,7 @@ impl Optimisations {
         step("angles of parallel joints added", self.chosen && self.angle_sums, |o| o.angle_sums = true);
         step("the cheaper form of forward dynamics", self.cheaper, |o| o.cheaper = true);
         step("identical limbs as lanes of one body", self.limbs, |o| o.limbs = true);
+        step("values formed of others that are there", self.substitutes, |o| o.substitutes = true);
         steps
     }
 
@@ -260,6 +264,12 @@ fn optimised_with(
         let graph = check(unread_inputs(check(dead_code(&check(traced))), is_optional));
         let graph = match optimisations.sums {
             true => check(dead_code(&check(sums(&graph)))),
+            false => graph,
+        };
+        // joint torques gain an operation of two hundred
+        let gains = matches!(function, Function::MassMatrix | Function::ForwardDynamics);
+        let graph = match optimisations.substitutes && gains {
+            true => check(substitute(&graph, &choose::keeps_digits_of(&robot.model, &graph))),
             false => graph,
         };
         // fused products want another order

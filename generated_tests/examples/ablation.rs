@@ -1,6 +1,7 @@
 //! What each technique that lowers operation counts is worth: counts of the programs with all of them, and without each.
 //!
-//! `cargo run -p straightline-generated-tests --example ablation`
+//! `cargo run -p straightline-generated-tests --example ablation [FUNCTION…]`, some minutes; functions are `inverse_dynamics`,
+//! `mass_matrix`, `forward_dynamics`.
 
 use std::path::Path;
 use straightline_codegen::compile::{optimised, Optimisations, Options};
@@ -9,22 +10,25 @@ use straightline_codegen::model::ModelOptions;
 use straightline_codegen::Function;
 use straightline_generated_tests::programs;
 
-const COLUMNS: [(&str, bool, Function); 10] = [
-    ("puma560_armstrong", false, Function::InverseDynamics),
-    ("stanford_paul", false, Function::InverseDynamics),
-    ("ur5", false, Function::InverseDynamics),
-    ("iiwa7", false, Function::InverseDynamics),
-    ("panda", false, Function::InverseDynamics),
-    ("solo12", true, Function::InverseDynamics),
-    ("ur5", false, Function::MassMatrix),
-    ("panda", false, Function::MassMatrix),
-    ("ur5", false, Function::ForwardDynamics),
-    ("panda", false, Function::ForwardDynamics),
+/// Robots, and whether they float.
+const ROBOTS: [(&str, bool); 10] = [
+    ("puma560_armstrong", false),
+    ("stanford_paul", false),
+    ("ur5", false),
+    ("iiwa7", false),
+    ("panda", false),
+    ("puma560_general_inertia", false),
+    ("stanford_general_inertia", false),
+    ("general_6r", false),
+    ("solo12", true),
+    ("go1", true),
 ];
+
+const FUNCTIONS: [Function; 3] = [Function::InverseDynamics, Function::MassMatrix, Function::ForwardDynamics];
 
 type Switch = fn(&mut Optimisations);
 
-const ROWS: [(&str, Switch); 12] = [
+const ROWS: [(&str, Switch); 14] = [
     ("all", |_| {}),
     ("reduced robot (frames, base parameters, U z, Σ)", |o| o.reduced = false),
     ("sums (factor, share, order)", |o| o.sums = false),
@@ -36,31 +40,36 @@ const ROWS: [(&str, Switch); 12] = [
     ("… forms of a body's rotation", |o| o.forms.rotations = false),
     ("… unit of length", |o| o.forms.unit = false),
     ("angles added", |o| o.angle_sums = false),
+    ("values formed of others", |o| o.substitutes = false),
+    ("the cheaper form of forward dynamics", |o| o.cheaper = false),
     ("algebraic rules", |o| o.algebraic = false),
 ];
 
 fn main() {
-    let short = |name: &str| name.split('_').next().unwrap_or(name).to_string();
-    let words = |f: Function| match f {
-        Function::MassMatrix => " H",
-        Function::ForwardDynamics => " FD",
-        _ => "",
-    };
-    let heads: Vec<String> = COLUMNS.iter().map(|(name, _, f)| short(name) + words(*f)).collect();
-    println!("| without | {} |", heads.join(" | "));
-    println!("|---|{}", "---|".repeat(COLUMNS.len()));
-    for (what, switch) in ROWS {
-        let cell = |(name, floating, function): &(&str, bool, Function)| {
-            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("count_robots/{name}.urdf"));
-            let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-            let options = ModelOptions { floating_base: *floating, ..ModelOptions::default() };
-            let robot = programs::load(&Source::new(name, text), &options);
-            let options = Options::default();
-            let mut optimisations = options.optimisations();
-            switch(&mut optimisations);
-            let c = optimised(&robot, &[], *function, &options, optimisations).counts();
-            format!("{}/{} ({})", c.mul, c.add, c.fma)
-        };
-        println!("| {what} | {} |", COLUMNS.iter().map(cell).collect::<Vec<_>>().join(" | "));
+    let asked: Vec<String> = std::env::args().skip(1).collect();
+    let unknown = |name: &&String| FUNCTIONS.iter().all(|f| f.name() != name.as_str());
+    if let Some(name) = asked.iter().find(unknown) {
+        eprintln!("`{name}` is none of {}", FUNCTIONS.map(|f| f.name()).join(", "));
+        std::process::exit(2);
+    }
+    for function in FUNCTIONS.into_iter().filter(|f| asked.is_empty() || asked.iter().any(|name| name == f.name())) {
+        let heads: Vec<String> = ROBOTS.iter().map(|(name, _)| name.replace('_', " ")).collect();
+        println!("\n{}\n\n| without | {} |", function.name(), heads.join(" | "));
+        println!("|---|{}", "---|".repeat(ROBOTS.len()));
+        for (what, switch) in ROWS {
+            let cell = |(name, floating): &(&str, bool)| {
+                let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("count_robots/{name}.urdf"));
+                let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+                let options = ModelOptions { floating_base: *floating, ..ModelOptions::default() };
+                let robot = programs::load(&Source::new(name, text), &options);
+                let options = Options::default();
+                let mut optimisations = options.optimisations();
+                switch(&mut optimisations);
+                let c = optimised(&robot, &[], function, &options, optimisations).counts();
+                let divisions = if c.div > 0 { format!(" + {}", c.div) } else { String::new() };
+                format!("{}/{} ({}) {}{divisions}", c.mul, c.add, c.fma, c.sin_cos)
+            };
+            println!("| {what} | {} |", ROBOTS.iter().map(cell).collect::<Vec<_>>().join(" | "));
+        }
     }
 }
