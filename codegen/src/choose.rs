@@ -25,7 +25,7 @@ const MORE: usize = 300_000;
 /// Neighbours of the best are looked at that cost so much more (half operations).
 const SLACK: usize = 16;
 /// A form may lose so many times what the plain one does: two samples of the same form come as far apart.
-const TOLERATED: f64 = 1.75;
+const TOLERATED: f64 = 1.5;
 /// The same in f32, which has fewer digits to lose.
 const TOLERATED_SINGLE: f64 = 1.25;
 /// Values formed of others may lose so many times what they did, all together.
