@@ -138,7 +138,7 @@ pub struct Optimisations {
     pub reduced: bool,
     /// Sums with all their terms at once: [`sums`].
     pub sums: bool,
-    /// Of the forms that the reduced robot has, those with the fewest operations: [`choose`].
+    /// Of the forms that the reduced robot has, those with the fewest operations: [`choose`](choose()).
     pub chosen: bool,
     /// What is free in those forms.
     pub forms: Forms,
@@ -152,7 +152,7 @@ pub struct Optimisations {
     pub substitutes: bool,
 }
 
-/// What [`choose`] may choose, one by one, so that each can be weighed.
+/// What [`choose`](choose()) may choose, one by one, so that each can be weighed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Forms {
     /// Tips and chains of parallel joints are described in axes that do not turn.
