@@ -71,8 +71,13 @@ fn robots_of(joints: usize) {
 }
 
 #[test]
-fn robots_of_one_to_seven_joints_agree_with_the_second_author() {
-    [1, 2, 3, 5, 7].into_iter().for_each(robots_of);
+fn robots_of_one_to_five_joints_agree_with_the_second_author() {
+    [1, 2, 3, 5].into_iter().for_each(robots_of);
+}
+
+#[test]
+fn robots_of_seven_joints_agree_with_the_second_author() {
+    robots_of(7);
 }
 
 #[test]

@@ -36,6 +36,9 @@ const GREATER: f64 = 4.0;
 const LARGEST: usize = 3000;
 /// Values of the greatest graph that is searched once more: that finds little in great ones.
 const TWICE: usize = 600;
+/// Values that are looked at while moves are tried, in one round: of a robot whose values agree by the thousand, the moves that gain
+/// little are left; of all others, none.
+const WORK: usize = 700_000;
 /// Operands of a pair, and what a value is formed of, lie at most so many values apart in the program: what belongs together stands
 /// together, and the time stays linear. Inputs, constants, sines and cosines are always there.
 const WINDOW: usize = 80;
@@ -61,13 +64,21 @@ fn round(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
     let mut net = Net { ops: graph.ops.clone(), notes: graph.notes.clone() };
     let mut best = count_sums(graph);
     let mut taken = None;
+    let mut live = net.live(graph);
+    let mut work = 0;
     for found in Search::new(graph).moves() {
+        // moves taken before may have left no use of it
+        if work > WORK || !found.becomes.iter().any(|b| live[b.value]) {
+            continue;
+        }
         let tried = net.with(&found);
         let Some(ordered) = tried.ordered(graph) else { continue };
+        work += ordered.ops.len();
         let counts = count_sums(&ordered);
         let fewer = price(counts) < price(best) && counts.flops() <= best.flops() && counts.fma <= best.fma;
         if fewer && keeps(&ordered) {
             (net, best, taken) = (tried, counts, Some(ordered));
+            live = net.live(graph);
         }
     }
     taken
@@ -174,10 +185,8 @@ impl Net {
         net
     }
 
-    /// As a graph, in the order that it was in where that can be; none if a value would need itself.
-    fn ordered(&self, graph: &Graph) -> Option<Graph> {
-        const OPEN: NodeId = NodeId(u32::MAX - 1);
-        const UNSEEN: NodeId = NodeId(u32::MAX);
+    /// Which of the operations the results of the graph need.
+    fn live(&self, graph: &Graph) -> Vec<bool> {
         let mut live = vec![false; self.ops.len()];
         let mut stack: Vec<usize> = graph.results.iter().map(|r| r.index()).collect();
         while let Some(i) = stack.pop() {
@@ -185,6 +194,15 @@ impl Net {
                 stack.extend(self.ops[i].operands().map(NodeId::index));
             }
         }
+        live
+    }
+
+    /// As a graph, in the order that it was in where that can be; none if a value would need itself.
+    fn ordered(&self, graph: &Graph) -> Option<Graph> {
+        const OPEN: NodeId = NodeId(u32::MAX - 1);
+        const UNSEEN: NodeId = NodeId(u32::MAX);
+        let live = self.live(graph);
+        let mut stack = Vec::new();
         let mut ordered = Graph {
             sections: graph.sections.clone(),
             inputs: graph.inputs.clone(),
@@ -374,6 +392,9 @@ impl<'g> Search<'g> {
                     }
                 }
                 for way in WAYS {
+                    if way != Form::Product && is_one_lost(target, own) {
+                        continue;
+                    }
                     let rest = self.rest(v, x, way);
                     for y in self.found(rest).filter(|y| self.may_form(*y, v, &later)) {
                         let Some((form, negative)) = self.form(v, way, own, &self.values[y]) else { continue };
@@ -530,7 +551,11 @@ impl Pairs {
                     continue;
                 }
                 let (x, y) = (values[i][0].hi(), values[j][0].hi());
-                for (form, z) in [(Form::Sum, x + y), (Form::Difference, x - y), (Form::Product, x * y)] {
+                let is_one_lost = is_one_lost(&values[i], &values[j]);
+                for (form, z) in [(Form::Product, x * y), (Form::Sum, x + y), (Form::Difference, x - y)] {
+                    if form != Form::Product && is_one_lost {
+                        break;
+                    }
                     if wanted.may_have(key(z)) && (i != j || form != Form::Difference) {
                         entries.entry(key(z)).or_default().push((i, j, form));
                     }
@@ -545,6 +570,12 @@ impl Pairs {
     fn find(&self, x: f64) -> impl Iterator<Item = Pair> + '_ {
         keys(x).filter(|k| self.known.may_have(*k)).filter_map(|k| self.entries.get(&k)).flatten().copied()
     }
+}
+
+/// Whether one of two is too small for the key of their sum: that is the other's.
+fn is_one_lost(x: &Value, y: &Value) -> bool {
+    let [x, y] = [x, y].map(|v| v[0].hi().abs());
+    x.min(y) < 1e-9 * x.max(y)
 }
 
 /// Numbers that agree to some 1e-9 have the same key, whatever their sign, or neighbouring ones.
