@@ -21,8 +21,8 @@ pub struct Analysis<'g> {
     cancelled: Vec<Option<Bounded>>,
     /// Per node, the group of the factors of a product.
     products: Vec<Option<GroupId>>,
-    /// Per node, its adjoint by the chain rule, and taken apart, with its groups.
-    adjoint_sums: Vec<Option<(Bounded, Bounded)>>,
+    /// Per node, its adjoint by the chain rule, and taken apart if that has groups.
+    adjoint_sums: Vec<Option<(Bounded, Option<Bounded>)>>,
     /// Errors that share an adjoint, and adjoints that share a norm.
     sharing: Sharing,
     /// Nodes that each result needs, users first.
@@ -69,7 +69,7 @@ struct State {
     /// Adjoints for the result at hand.
     adjoint: Vec<Range>,
     seed: u32,
-    /// Norms of groups, with the round in which they were found.
+    /// Norms of groups, with the round in which they were found; the first is 1.
     norm: Vec<(u64, Bound)>,
     box_round: u64,
     result_round: u64,
@@ -133,7 +133,8 @@ impl<'g> Analysis<'g> {
                 _ => {}
             }
             let form = forms.flat(Atom::Adjoint(id.0)).0.to_vec();
-            adjoint_sums[i] = Some((groups.bounded(forms.chain[i].clone()), groups.bounded(form)));
+            let (chain, apart) = (groups.bounded(forms.chain[i].clone()), groups.bounded(form));
+            adjoint_sums[i] = Some((chain, Some(apart).filter(|a| !a.is_plain())));
         }
         let mut results: Vec<NodeId> = graph.results.clone();
         results.sort_unstable();
@@ -475,8 +476,10 @@ impl<'g> Analysis<'g> {
     /// A form's range: parts of one angle by their norm where that is less.
     fn enclosure(&mut self, form: &Bounded) -> Range {
         let mut sum = Range::ZERO;
-        for (pair, members, group) in &form.turns {
-            let mut part = self.part(form, members, Range::ZERO);
+        let mut start = 0;
+        for (pair, end, group) in &form.turns {
+            let mut part = self.part(&form.form[start..*end], Range::ZERO);
+            start = *end;
             if !part.x.is_zero() {
                 let norm = self.norm(*group);
                 let stretch = self.stretch(*pair);
@@ -488,8 +491,9 @@ impl<'g> Analysis<'g> {
             }
             sum = self.state.pen.add(sum, part);
         }
-        for (members, values, atoms) in &form.dots {
-            let mut part = self.part(form, members, Range::ZERO);
+        for (end, values, atoms) in &form.dots {
+            let mut part = self.part(&form.form[start..*end], Range::ZERO);
+            start = *end;
             if !part.x.is_zero() {
                 let (values, atoms) = (self.norm(*values), self.norm(*atoms));
                 let most = self.state.pen.mul_up(values, atoms);
@@ -497,13 +501,13 @@ impl<'g> Analysis<'g> {
             }
             sum = self.state.pen.add(sum, part);
         }
-        self.part(form, &form.others, sum)
+        self.part(&form.form[start..], sum)
     }
 
-    /// A sum, and some terms of a form.
-    fn part(&mut self, form: &Bounded, members: &[usize], mut sum: Range) -> Range {
-        for k in members {
-            let term = self.state.term(self.graph, &form.form[*k]);
+    /// A sum, and some terms.
+    fn part(&mut self, terms: &[Term], mut sum: Range) -> Range {
+        for t in terms {
+            let term = self.state.term(self.graph, t);
             sum = self.state.pen.add(sum, term);
         }
         sum
@@ -521,12 +525,14 @@ impl<'g> Analysis<'g> {
         if self.state.norm.len() <= k {
             self.state.norm.resize(self.groups.groups.len().max(k + 1), (0, Bound::ZERO));
         }
-        let current = if self.groups.groups[k].of_adjoints { self.state.result_round } else { self.state.box_round };
-        if self.state.norm[k].0 == current {
-            return self.state.norm[k].1;
+        // a round is either a box's or a result's, and asks for no group of the other kind
+        let known = self.state.norm[k];
+        if known.0 > 0 && (known.0 == self.state.result_round || known.0 == self.state.box_round) {
+            return known.1;
         }
+        let current = if self.groups.groups[k].of_adjoints { self.state.result_round } else { self.state.box_round };
         let mut ends = Norm::ZERO;
-        for m in self.groups.groups[k].members.iter() {
+        for m in self.groups.members(id) {
             let mut sum = Range::ZERO;
             for t in m {
                 let term = self.state.term(self.graph, t);
@@ -538,13 +544,12 @@ impl<'g> Analysis<'g> {
         let mut best = self.state.pen.root(ends);
         // what is asked for on the way back to itself is answered by its ends
         self.state.norm[k] = (current, best);
-        let alone = matches!(&*self.groups.groups[k].members, [m] if m.len() == 1);
-        if best.x == 0.0 || alone {
+        if best.x == 0.0 || self.groups.is_term(id) {
             return best;
         }
         self.groups.bound_members(id);
         let bounded = self.groups.groups[k].bounded.take().expect("made above");
-        if bounded.iter().any(|b| !(b.turns.is_empty() && b.dots.is_empty())) {
+        if !bounded.is_empty() {
             let mut ends = Norm::ZERO;
             for b in &bounded {
                 let enclosure = self.enclosure(b);
@@ -573,7 +578,7 @@ impl<'g> Analysis<'g> {
                 pen.add_square(&mut slack, all);
             }
             let mut bound = self.state.pen.root(slack);
-            for (factor, inner) in &way.parts {
+            for (factor, inner) in way.parts.iter() {
                 let factor = match factor {
                     Factor::Turn(pair) => {
                         let stretch = self.stretch(*pair);
@@ -624,12 +629,11 @@ impl<'g> Analysis<'g> {
             let sums = self.adjoint_sums[n as usize].take().expect("live nodes have adjoints");
             let (chain, apart) = &sums;
             let mut adjoint = if self.is_broken(Broken::ChainRule) && chain.form.len() > 1 {
-                let others: Vec<usize> = (1..chain.form.len()).collect();
-                self.part(chain, &others, Range::ZERO)
+                self.part(&chain.form[1..], Range::ZERO)
             } else {
                 self.enclosure(chain)
             };
-            if !(apart.turns.is_empty() && apart.dots.is_empty()) {
+            if let Some(apart) = apart {
                 let apart = self.enclosure(apart);
                 adjoint = self.state.pen.intersect(adjoint, apart);
             }
@@ -857,8 +861,7 @@ impl Sharing {
         for i in (0..n).filter(|i| live[*i]) {
             let bounded = groups.bounded(forms.chain[i].clone());
             for (_, _, group) in &bounded.turns {
-                let members = &groups.groups[*group as usize].members;
-                let alone = members.iter().map(|m| match m[..] {
+                let alone = groups.members(*group).map(|m| match m[..] {
                     [Term { coefficient: Coefficient::One, atom: Atom::Adjoint(u), .. }] => Some(class[u as usize]),
                     _ => None,
                 });

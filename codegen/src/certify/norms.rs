@@ -44,8 +44,8 @@ pub enum Effort {
 /// A group of forms, and what it can be led back to.
 #[derive(Clone, Debug)]
 pub struct Group {
-    /// Its members, each with a first term of positive sign, sorted.
-    pub members: Arc<[Form]>,
+    /// Where its members stand: the first, and behind the last.
+    members: (u32, u32),
     /// Which rules may be tried.
     pub effort: Effort,
     /// Whether adjoints are in it, so that its norm is another for each result.
@@ -75,24 +75,49 @@ pub enum Factor {
 #[derive(Clone, Debug)]
 pub struct Way {
     /// Factors, and the groups that are left.
-    pub parts: Vec<(Factor, GroupId)>,
+    pub parts: Parts,
     /// What does not belong to them, one form per member.
     pub rest: GroupId,
     /// Errors between the members and their forms, for each member.
     pub slack: Arc<[Slack]>,
 }
 
+/// What a way leads back to: a factor and a group, as a rule, which stands in its place.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Parts {
+    /// One.
+    One([(Factor, GroupId); 1]),
+    /// Several.
+    Several(Vec<(Factor, GroupId)>),
+}
+
+impl std::ops::Deref for Parts {
+    type Target = [(Factor, GroupId)];
+
+    fn deref(&self) -> &Self::Target {
+        match self {
+            Parts::One(part) => part,
+            Parts::Several(parts) => parts,
+        }
+    }
+}
+
 /// A form with the groups that bound its parts of one angle.
 #[derive(Clone, Debug, Default)]
 pub struct Bounded {
-    /// The terms.
-    pub form: Form,
-    /// Pair, terms by index, and the group of their atoms.
-    pub turns: Vec<(u32, Vec<usize>, GroupId)>,
-    /// Scalar products: terms by index, and the groups of their coefficients and of their atoms.
-    pub dots: Vec<(Vec<usize>, GroupId, GroupId)>,
-    /// Terms in neither.
-    pub others: Vec<usize>,
+    /// The terms: those of the turns, those of the scalar products, the others.
+    pub form: Box<[Term]>,
+    /// Pair, where its terms end, and the group of their atoms.
+    pub turns: Vec<(u32, usize, GroupId)>,
+    /// Scalar products: where their terms end, and the groups of their coefficients and of their atoms.
+    pub dots: Vec<(usize, GroupId, GroupId)>,
+}
+
+impl Bounded {
+    /// Whether it is nothing but terms.
+    pub fn is_plain(&self) -> bool {
+        self.turns.is_empty() && self.dots.is_empty()
+    }
 }
 
 /// Groups by their members.
@@ -100,6 +125,10 @@ pub struct Bounded {
 pub struct Groups {
     /// All groups.
     pub groups: Vec<Group>,
+    /// Terms of all members, one behind the other: there are many, most of one term.
+    terms: Vec<Term>,
+    /// Where each member ends.
+    ends: Vec<u32>,
     /// The first group of each hash; for look-ups only.
     known: FxHashMap<u64, GroupId>,
     /// Adjoints of one vector: the team of a node.
@@ -141,7 +170,7 @@ impl Groups {
         let mut same_hash = self.known.get(&hash).copied();
         while let Some(id) = same_hash {
             let group = &self.groups[id as usize];
-            if group.effort == effort && *group.members == members[..] {
+            if group.effort == effort && self.members(id).eq(members.iter().map(|m| &m[..])) {
                 return id;
             }
             same_hash = group.next;
@@ -149,8 +178,34 @@ impl Groups {
         let id = self.groups.len() as GroupId;
         let next = self.known.insert(hash, id);
         let of_adjoints = members.iter().flatten().any(|t| matches!(t.atom, Atom::Adjoint(_) | Atom::Seed(_)));
-        self.groups.push(Group { members: members.into(), effort, of_adjoints, bounded: None, ways: None, next });
+        let first = self.ends.len() as u32;
+        for m in members {
+            self.terms.extend(m);
+            self.ends.push(self.terms.len() as u32);
+        }
+        let members = (first, self.ends.len() as u32);
+        self.groups.push(Group { members, effort, of_adjoints, bounded: None, ways: None, next });
         id
+    }
+
+    /// The members of a group, each with a first term of positive sign, sorted.
+    pub fn members(&self, id: GroupId) -> impl ExactSizeIterator<Item = &[Term]> + Clone {
+        let (first, end) = self.groups[id as usize].members;
+        (first as usize..end as usize).map(|k| {
+            let start = if k == 0 { 0 } else { self.ends[k - 1] as usize };
+            &self.terms[start..self.ends[k] as usize]
+        })
+    }
+
+    /// Whether a group is a term alone.
+    pub fn is_term(&self, id: GroupId) -> bool {
+        let mut members = self.members(id);
+        members.len() == 1 && members.all(|m| m.len() == 1)
+    }
+
+    /// Copies of the members, while groups are added.
+    fn forms(&self, id: GroupId) -> Vec<Form> {
+        self.members(id).map(<[Term]>::to_vec).collect()
     }
 
     /// A form with the groups of its angles.
@@ -192,11 +247,17 @@ impl Groups {
             (terms, values, atoms)
         });
         let dots: Vec<(Vec<usize>, GroupId, GroupId)> = dots.collect();
-        let mut is_other = vec![true; form.len()];
-        let in_parts = turns.iter().flat_map(|t| &t.1).chain(dots.iter().flat_map(|d| &d.0));
-        in_parts.for_each(|k| is_other[*k] = false);
-        let others = (0..form.len()).filter(|k| is_other[*k]).collect();
-        Bounded { form, turns, dots, others }
+        let mut is_placed = vec![false; form.len()];
+        let mut terms = Vec::with_capacity(form.len());
+        let mut place = |part: &[usize]| {
+            terms.extend(part.iter().map(|k| form[*k]));
+            part.iter().for_each(|k| is_placed[*k] = true);
+            terms.len()
+        };
+        let turns = turns.into_iter().map(|(pair, part, group)| (pair, place(&part), group)).collect();
+        let dots = dots.into_iter().map(|(part, values, atoms)| (place(&part), values, atoms)).collect();
+        terms.extend(form.iter().zip(is_placed).filter(|(_, is_placed)| !is_placed).map(|(t, _)| *t));
+        Bounded { form: terms.into(), turns, dots }
     }
 
     /// The team of the adjoint of a term that has a value before it, or nothing.
@@ -218,14 +279,16 @@ impl Groups {
     /// The members with the groups of their parts, found once.
     pub fn bound_members(&mut self, id: GroupId) {
         if self.groups[id as usize].bounded.is_none() {
-            let members = self.groups[id as usize].members.clone();
-            let has_two = |m: &Form, of: &dyn Fn(&Term) -> bool| m.iter().filter(|t| of(t)).count() > 1;
+            let has_two = |m: &[Term], of: &dyn Fn(&Term) -> bool| m.iter().filter(|t| of(t)).count() > 1;
             let may_have_parts =
-                |m: &Form| has_two(m, &|t| turn(t).is_some()) || has_two(m, &|t| self.weighted(t).is_some());
-            let bounded = match members.iter().any(may_have_parts) {
-                true => members.iter().map(|m| self.bounded(m.clone())).collect(),
-                false => Vec::new(),
-            };
+                |m: &[Term]| has_two(m, &|t| turn(t).is_some()) || has_two(m, &|t| self.weighted(t).is_some());
+            let mut bounded = Vec::new();
+            if self.members(id).any(may_have_parts) {
+                bounded.extend(self.forms(id).into_iter().map(|m| self.bounded(m)));
+            }
+            if bounded.iter().all(Bounded::is_plain) {
+                bounded = Vec::new();
+            }
             self.groups[id as usize].bounded = Some(bounded);
         }
     }
@@ -241,17 +304,14 @@ impl Groups {
     }
 
     fn all_ways(&mut self, id: GroupId, forms: &Forms, size: &dyn Fn(&Term) -> f64) -> Vec<Way> {
-        let members = self.groups[id as usize].members.clone();
-        if members.len() > LARGEST {
+        let effort = self.groups[id as usize].effort;
+        if effort == Effort::Ends || self.members(id).len() > LARGEST {
             return Vec::new();
         }
-        match self.groups[id as usize].effort {
-            Effort::Ends => return Vec::new(),
-            Effort::Columns => {
-                let members: Vec<&Form> = members.iter().collect();
-                return self.columns(id, &members, &Arc::from([])).into_iter().collect();
-            }
-            Effort::All | Effort::Rest => {}
+        let members = self.forms(id);
+        if effort == Effort::Columns {
+            let members: Vec<&Form> = members.iter().collect();
+            return self.columns(id, &members, &Arc::from([])).into_iter().collect();
         }
         let mut ways = Vec::new();
         let mut tried: Vec<Vec<Flat>> = Vec::new();
@@ -466,7 +526,7 @@ impl Groups {
             return None;
         }
         let rest = self.group_with(rests, Effort::Ends);
-        Some(Way { parts, rest, slack: Arc::clone(slack) })
+        Some(Way { parts: Parts::Several(parts), rest, slack: Arc::clone(slack) })
     }
 
     fn way(
@@ -479,14 +539,14 @@ impl Groups {
         effort: Effort,
     ) -> Option<Way> {
         let inner = self.group(inner);
-        if inner == id || self.groups[inner as usize].members.is_empty() {
+        if inner == id || self.members(inner).len() == 0 {
             return None;
         }
         let rest = self.group_with(rests, effort);
         if rest == id {
             return None;
         }
-        Some(Way { parts: vec![(factor, inner)], rest, slack: Arc::clone(slack) })
+        Some(Way { parts: Parts::One([(factor, inner)]), rest, slack: Arc::clone(slack) })
     }
 
     /// The rule `scaling`: adjoints of one vector with values before them, as the derivatives by sine and cosine have them.
@@ -523,7 +583,7 @@ impl Groups {
             parts.push((Factor::Values(values), atoms));
         }
         let rest = self.group_with(rests, Effort::Columns);
-        Some(Way { parts, rest, slack: Arc::from([]) })
+        Some(Way { parts: Parts::Several(parts), rest, slack: Arc::from([]) })
     }
 }
 
