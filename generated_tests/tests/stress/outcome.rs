@@ -116,7 +116,7 @@ pub fn write_record(outcomes: &mut [Outcome]) {
             let _ = writeln!(text, "| {robot} | {what} | {} | {} | {elsewhere} |", figure(o.value), figure(o.bound));
         }
     }
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("record/2026-11-21-stress.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("record/2026-11-22-stress.md");
     std::fs::write(&path, text).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     println!("{}", path.display());
 }
