@@ -8,6 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 use straightline_codegen::certify::{certify, Effort, Interval};
 use straightline_codegen::compile::{compile, program, Options, Program};
+use straightline_codegen::emit::Lanes;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::scene::{self, Budget, JointRanges, MaxError};
 use straightline_codegen::{expr, ForwardDynamicsMethod, Function, Robot, Scalar, Source};
@@ -262,8 +263,20 @@ fn generated(module: &'static str, case: &Case, options: &Options, function: Fun
         scalar: options.scalar.name(),
         inputs: item.inputs.iter().map(|p| place(&p.name)).collect(),
         output: item.outputs[0].shape.clone(),
+        lanes: None,
         text: made.text,
     }
+}
+
+/// The same, and over lanes; those are called `lanes` in the binary.
+fn generated_with_lanes(
+    [module, lanes]: [&'static str; 2],
+    case: &Case,
+    options: &Options,
+    function: Function,
+) -> Generated {
+    let options = Options { lanes: Some(Lanes::Standalone), ..options.clone() };
+    Generated { lanes: Some(lanes), ..generated(module, case, &options, function) }
 }
 
 /// The kernel's sines and cosines replaced by the standard library's, one after the other.
@@ -298,9 +311,12 @@ pub fn measure(name: &str, function: Function) -> Panel {
     notes.push(format!("truth against the 25-digit reference values: {checked:.1e} of scale"));
 
     let single = Options { scalar: Scalar::F32, ..case.options.clone() };
+    let [fused, fused_single] = [&case.options, &single].map(|o| Options { fma: true, ..o.clone() });
     let mut texts = vec![
-        generated("double", &case, &case.options, function),
-        generated("single", &case, &single, function),
+        generated_with_lanes(["double", "lanes_f64"], &case, &case.options, function),
+        generated_with_lanes(["single", "lanes_f32"], &case, &single, function),
+        generated_with_lanes(["fused_f64", "fused_lanes_f64"], &case, &fused, function),
+        generated_with_lanes(["fused_f32", "fused_lanes_f32"], &case, &fused_single, function),
         with_std_trig(generated("double", &case, &case.options, function)),
     ];
     let caps = [certified(&case, &case.options, function), certified(&case, &single, function)];
@@ -436,7 +452,7 @@ pub fn measure(name: &str, function: Function) -> Panel {
         methods.extend(held_inertia(&case, &states, greatest, time));
     }
     drop(server);
-    methods.extend(libraries(&data, &case, function, &states, &truths, greatest));
+    methods.extend(libraries(&data, &case, function, &states, greatest));
     match peer(&data, function, &folder, &file, &truths, greatest) {
         Ok(pinocchio) => methods.extend(pinocchio),
         Err(why) => notes.push(why),
@@ -516,16 +532,9 @@ fn product_time(n: usize) -> f64 {
 }
 
 /// The generic runtime, the reference formulation, and double-double.
-fn libraries(
-    data: &Data,
-    case: &Case,
-    function: Function,
-    states: &[Vec<f64>],
-    truths: &[Vec<Dd>],
-    greatest: f64,
-) -> Vec<Method> {
+fn libraries(data: &Data, case: &Case, function: Function, states: &[Vec<f64>], greatest: f64) -> Vec<Method> {
     let mut methods = Vec::new();
-    let mut add = |name: &str, group: Group, call: &dyn Fn(&[f64]) -> Vec<f64>, searched: bool| {
+    let mut add = |name: &str, call: &dyn Fn(&[f64]) -> Vec<f64>, truth: &dyn Fn(&[f64]) -> Vec<Dd>| {
         let mut at = 0;
         let time = best_time(|| {
             at = (at + 1) % states.len();
@@ -533,49 +542,50 @@ fn libraries(
         });
         let mut squares = 0.0;
         let mut worst = 0.0f64;
-        for (x, truth) in states.iter().zip(truths).take(500) {
-            let e = error(&call(x), truth);
+        for x in states.iter().take(500) {
+            let e = error(&call(x), &truth(x));
             squares += e * e;
             worst = worst.max(e);
         }
-        if searched {
-            worst = worst.max(
-                case.ranges
-                    .climb(&mut Random(6), case.search / 4, |x| {
-                        let x = case.exact(x);
-                        error(&call(&x), &case.truth(&x))
-                    })
-                    .value,
-            );
-        }
+        let found = case.ranges.climb(&mut Random(6), case.search / 4, |x| {
+            let x = case.exact(x);
+            error(&call(&x), &truth(&x))
+        });
+        worst = worst.max(found.value);
         let rms = (squares / states.len().min(500) as f64).sqrt() / greatest;
-        methods.push(Method { name: name.into(), group, time: [time; 3], rms, worst: worst / greatest, cap: None });
+        let (group, worst) = (Group::Library, worst / greatest);
+        methods.push(Method { name: name.into(), group, time: [time; 3], rms, worst, cap: None });
     };
+    let truth = |x: &[f64]| case.truth(x);
     let of = |x: &[f64]| case.groups(x);
     let model = case.robot.model.cast::<f64>();
     let method = ForwardDynamicsMethod::ArticulatedBody;
-    add("generic runtime, f64", Group::Library, &|x| function.evaluate(&model, &[], method, &of(x)), true);
+    add("generic runtime, f64", &|x| function.evaluate(&model, &[], method, &of(x)), &truth);
     let single = case.robot.model.cast::<f32>();
     add(
         "generic runtime, f32",
-        Group::Library,
         &|x| {
             let groups: Vec<Vec<f32>> = of(x).iter().map(|g| g.iter().map(|v| *v as f32).collect()).collect();
             function.evaluate(&single, &[], method, &groups).into_iter().map(f64::from).collect()
         },
-        true,
+        &truth,
     );
     let options: &ModelOptions = &case.options.model;
     let described =
         straightline_codegen::description::read(&case.source, &mut straightline_codegen::Diagnostics::new());
     let tree = described.and_then(|d| straightline_codegen::reference_input::mass_centre_tree(&d, options).ok());
     if let Some(tree) = tree.filter(|_| function == Function::InverseDynamics) {
+        // its own truth: of a quaternion whose length is one to 1e-8, as f32 has them, both make something else
+        let exact = |x: &[f64]| {
+            let g: Vec<Vec<Dd>> = of(x).iter().map(|g| g.iter().map(|v| Dd::from(*v)).collect()).collect();
+            chapter::inverse_dynamics(&tree, &g[0], &g[1], &g[2]).as_slice().to_vec()
+        };
         let tree = straightline_generated_tests::second_author::rounded(&tree);
         let reference = |x: &[f64]| {
             let g = of(x);
             chapter::inverse_dynamics(&tree, &g[0], &g[1], &g[2]).as_slice().to_vec()
         };
-        add("reference formulation, f64", Group::Library, &reference, true);
+        add("reference formulation, f64", &reference, &exact);
     }
     // its error is that of the truth, found with the 25-digit values of the data
     let wide = &case.robot.model;

@@ -20,6 +20,8 @@ pub struct Generated {
     pub inputs: Vec<(usize, usize)>,
     /// Number of results, by their shape.
     pub output: Vec<usize>,
+    /// What its function over lanes is called in the binary, if it has one.
+    pub lanes: Option<&'static str>,
 }
 
 /// A way to compute: its name in the binary, its width in states per call, and the expression that calls it on `x` and `y`.
@@ -103,33 +105,22 @@ trait Scalar: Copy {
     fn sin_cos(self) -> (Self, Self);
     fn product_plus(a: Self, b: Self, c: Self) -> Self { a.mul(b).add(c) }
 }
-macro_rules! plain {
-    ($name:ident, $t:ty, $trig:ident, $sqrt:ident, $sign:ident, $plus:expr) => {
-        #[derive(Clone, Copy)]
-        struct $name($t);
-        impl Scalar for $name {
-            #[inline(always)] fn constant(hi: f64, lo: f64) -> Self { $name((hi + lo) as $t) }
-            #[inline(always)] fn input(x: f64) -> Self { $name(x as $t) }
-            #[inline(always)] fn output(self) -> f64 { self.0 as f64 }
-            #[inline(always)] fn neg(self) -> Self { $name(-self.0) }
-            #[inline(always)] fn add(self, b: Self) -> Self { $name(self.0 + b.0) }
-            #[inline(always)] fn sub(self, b: Self) -> Self { $name(self.0 - b.0) }
-            #[inline(always)] fn mul(self, b: Self) -> Self { $name(self.0 * b.0) }
-            #[inline(always)] fn div(self, b: Self) -> Self { $name(self.0 / b.0) }
-            #[inline(always)] fn sqrt(self) -> Self { $name(trig::$sqrt(self.0)) }
-            #[inline(always)] fn sign(self) -> Self { $name(trig::$sign(self.0)) }
-            #[inline(always)] fn sin_cos(self) -> (Self, Self) { let (s, c) = trig::$trig(self.0); ($name(s), $name(c)) }
-            #[inline(always)] fn product_plus(a: Self, b: Self, c: Self) -> Self {
-                let plus: fn($t, $t, $t) -> $t = $plus;
-                $name(plus(a.0, b.0, c.0))
-            }
-        }
-    };
+/// The plain one, to see that the form costs nothing.
+#[derive(Clone, Copy)]
+struct F64(f64);
+impl Scalar for F64 {
+    #[inline(always)] fn constant(hi: f64, lo: f64) -> Self { F64(hi + lo) }
+    #[inline(always)] fn input(x: f64) -> Self { F64(x) }
+    #[inline(always)] fn output(self) -> f64 { self.0 }
+    #[inline(always)] fn neg(self) -> Self { F64(-self.0) }
+    #[inline(always)] fn add(self, b: Self) -> Self { F64(self.0 + b.0) }
+    #[inline(always)] fn sub(self, b: Self) -> Self { F64(self.0 - b.0) }
+    #[inline(always)] fn mul(self, b: Self) -> Self { F64(self.0 * b.0) }
+    #[inline(always)] fn div(self, b: Self) -> Self { F64(self.0 / b.0) }
+    #[inline(always)] fn sqrt(self) -> Self { F64(trig::sqrt_f64(self.0)) }
+    #[inline(always)] fn sign(self) -> Self { F64(trig::sign_f64(self.0)) }
+    #[inline(always)] fn sin_cos(self) -> (Self, Self) { let (s, c) = trig::sin_cos_f64(self.0); (F64(s), F64(c)) }
 }
-plain!(F64, f64, sin_cos_f64, sqrt_f64, sign_f64, |a, b, c| a * b + c);
-plain!(F32, f32, sin_cos_f32, sqrt_f32, sign_f32, |a, b, c| a * b + c);
-plain!(FusedF64, f64, sin_cos_f64, sqrt_f64, sign_f64, |a, b, c| a.mul_add(b, c));
-plain!(FusedF32, f32, sin_cos_f32, sqrt_f32, sign_f32, |a, b, c| a.mul_add(b, c));
 
 /// An f32 and what sums and products have rounded away, to first order (compensated evaluation).
 #[derive(Clone, Copy)]
@@ -275,6 +266,26 @@ fn time(states: &str) {
 }
 "#;
 
+/// The function over as many lanes as a register of 64 bytes has.
+fn over_lanes(g: &Generated, name: &str) -> Call {
+    let n = if g.scalar == "f32" { 16 } else { 8 };
+    let argument = |(first, len): &(usize, usize)| {
+        format!("inputs.lanes{n}[k][{first}..{}].first_chunk::<{len}>().unwrap()", first + len)
+    };
+    let arguments: Vec<String> = g.inputs.iter().map(argument).collect();
+    let zero = g.output.iter().rev().fold(format!("[0.0; {n}]"), |inner, n| format!("[{inner}; {n}]"));
+    let flat = if g.output.len() == 2 { "out.as_flattened()" } else { "&out[..]" };
+    // only the last state's results are copied: a user's batch stays in lanes
+    let code = format!(
+        "let mut out = {zero}; {}::{}_lanes::<{n}>({}, &mut out); black_box(&mut out); \
+         for (y, v) in y[{n} - 1].iter_mut().zip({flat}) {{ *y = v[{n} - 1] as f64; }}",
+        g.module,
+        g.function,
+        arguments.join(", ")
+    );
+    Call { name: name.to_string(), lanes: n, code }
+}
+
 /// The source of the binary, and its calls in order.
 pub fn source(generated: &[Generated], graph: &Graph, total_in: usize) -> (String, Vec<Call>) {
     let total_out = graph.results.len();
@@ -300,40 +311,16 @@ pub fn source(generated: &[Generated], graph: &Graph, total_in: usize) -> (Strin
                 arguments.join(", ")
             ),
         });
+        calls.extend(g.lanes.map(|name| over_lanes(g, name)));
     }
     text += "use double::trig;\n";
     text += SCALARS;
     text += &generic(graph);
-    for (name, scalar) in [
-        ("generic_f64", "F64"),
-        ("fused_f64", "FusedF64"),
-        ("fused_f32", "FusedF32"),
-        ("compensated_f32", "Compensated"),
-        ("mixed", "Mixed"),
-    ] {
+    for (name, scalar) in [("generic_f64", "F64"), ("compensated_f32", "Compensated"), ("mixed", "Mixed")] {
         let code = format!(
             "let x: [{scalar}; IN] = inputs.rows[k].map({scalar}::input); y[0] = generic(&x).map({scalar}::output);"
         );
         calls.push(Call { name: name.to_string(), lanes: 1, code });
-    }
-    for (name, scalar, float, n) in [
-        ("lanes_f64", "F64", "f64", 8),
-        ("lanes_f32", "F32", "f32", 16),
-        ("fused_lanes_f64", "FusedF64", "f64", 8),
-        ("fused_lanes_f32", "FusedF32", "f32", 16),
-    ] {
-        let _ = writeln!(
-            text,
-            "#[inline(never)]\nfn {name}(x: &[[{float}; {n}]; IN], y: &mut [[{float}; {n}]; OUT]) {{\n    for l in 0..{n} {{\n        \
-             let x: [{scalar}; IN] = std::array::from_fn(|i| {scalar}(x[i][l]));\n        let out = generic(&x);\n        \
-             for i in 0..OUT {{ y[i][l] = out[i].0; }}\n    }}\n}}"
-        );
-        // only the last state's results are copied: a user's batch stays in lanes
-        let code = format!(
-            "let mut out = [[0.0; {n}]; OUT]; {name}(&inputs.lanes{n}[k], &mut out); \
-             for i in 0..OUT {{ y[{n} - 1][i] = out[i][{n} - 1] as f64; }}"
-        );
-        calls.push(Call { name: name.to_string(), lanes: n, code });
     }
     let _ = writeln!(text, "const IN: usize = {total_in};\nconst OUT: usize = {total_out};");
     let entries: Vec<String> =

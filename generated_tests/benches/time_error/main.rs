@@ -63,7 +63,7 @@ fn one(robot: &str, function: &str) {
 }
 
 fn record_name(robot: &str, function: &str) -> String {
-    format!("2026-11-21-time-error-{robot}-{}", function.replace('_', "-"))
+    format!("2026-11-22-time-error-{robot}-{}", function.replace('_', "-"))
 }
 
 /// A file of the record.

@@ -162,7 +162,7 @@ pub fn run() {
         chart("Time to compile", "time of generation and rustc", &chart::time, &builds),
         chart("Worst error of 50 random states", "error over the greatest result", &chart::power, &errors),
     ];
-    chart::curves(&charts, &record("2026-11-21-time-error-scaling.svg"));
-    write("2026-11-21-time-error-scaling.md", &text);
-    write("2026-11-21-time-error-scaling.json", &(serde_json::to_string(&rows).expect("plain values") + "\n"));
+    chart::curves(&charts, &record("2026-11-22-time-error-scaling.svg"));
+    write("2026-11-22-time-error-scaling.md", &text);
+    write("2026-11-22-time-error-scaling.json", &(serde_json::to_string(&rows).expect("plain values") + "\n"));
 }

@@ -253,7 +253,7 @@ pub fn run() {
             curves: &energy,
         },
     ];
-    chart::curves(&charts, &record("2026-11-21-time-error-simulation.svg"));
-    write("2026-11-21-time-error-simulation.md", &text);
-    write("2026-11-21-time-error-simulation.json", &(serde_json::to_string(&rows).expect("plain values") + "\n"));
+    chart::curves(&charts, &record("2026-11-22-time-error-simulation.svg"));
+    write("2026-11-22-time-error-simulation.md", &text);
+    write("2026-11-22-time-error-simulation.json", &(serde_json::to_string(&rows).expect("plain values") + "\n"));
 }
