@@ -319,7 +319,7 @@ pub fn measure(name: &str, function: Function) -> Panel {
         generated_with_lanes(["fused_f32", "fused_lanes_f32"], &case, &fused_single, function),
         with_std_trig(generated("double", &case, &case.options, function)),
     ];
-    let caps = [certified(&case, &case.options, function), certified(&case, &single, function)];
+    let caps = [&case.options, &single, &fused, &fused_single].map(|options| certified(&case, options, function));
     let mut mixed_cap = None;
     if let Some(cap) = caps[1] {
         let mut mixed = single.clone();
@@ -395,12 +395,12 @@ pub fn measure(name: &str, function: Function) -> Panel {
             "std_trig" => ("f64, sin and cos of std", Group::Double, None),
             "articulated" => ("f64, articulated bodies", Group::Double, None),
             "factorised" => ("f64, factorisation of H", Group::Double, None),
-            "fused_f64" => ("f64, fused", Group::Double, None),
-            "fused_f32" => ("f32, fused", Group::Single, None),
+            "fused_f64" => ("f64, fused", Group::Double, caps[2]),
+            "fused_f32" => ("f32, fused", Group::Single, caps[3]),
             "lanes_f64" => ("f64 × 8 lanes", Group::Double, caps[0]),
             "lanes_f32" => ("f32 × 16 lanes", Group::Single, caps[1]),
-            "fused_lanes_f64" => ("f64 × 8 lanes, fused", Group::Double, None),
-            "fused_lanes_f32" => ("f32 × 16 lanes, fused", Group::Single, None),
+            "fused_lanes_f64" => ("f64 × 8 lanes, fused", Group::Double, caps[2]),
+            "fused_lanes_f32" => ("f32 × 16 lanes, fused", Group::Single, caps[3]),
             "compensated_f32" => ("f32, compensated", Group::Extended, None),
             "mixed" => ("products f32, sums f64", Group::Extended, None),
             "certified_mixed" => ("f32, f64 where it counts", Group::Extended, mixed_cap),
