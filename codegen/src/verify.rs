@@ -227,6 +227,42 @@ fn elastic_springs(description: &Description, options: &ModelOptions) -> Vec<(St
     springs
 }
 
+/// The second author's reading of a robot file without a scene, to be asked for the results of any function at any state.
+pub struct SecondReading {
+    tree: MassCentreTree<Dd>,
+    drives: Vec<Drive>,
+    moving: Vec<usize>,
+}
+
+impl SecondReading {
+    /// Reads the file again; of `model`, the compiler's own reading, it takes the places of the coordinates alone.
+    ///
+    /// # Errors
+    /// The reference does not understand the file.
+    pub fn new(source: &Source, model: &Model<Dd>, options: &Options) -> Result<SecondReading, String> {
+        let (tree, drives) = second_reading(source, model, options)?;
+        Ok(SecondReading { tree, drives, moving: (0..model.nv()).collect() })
+    }
+
+    /// The results of a function and their natural scales at (q, q̇, q̈, τ), of which every function takes what it needs.
+    ///
+    /// # Errors
+    /// The reference has no frame of that name.
+    pub fn outputs(
+        &self,
+        function: Function,
+        frames: &[String],
+        at: [&[Dd]; 4],
+    ) -> Result<(Vec<Dd>, Vec<f64>), String> {
+        let frame = |name: &String| self.tree.frame(name).ok_or_else(|| format!("the reference has no frame `{name}`"));
+        let frames: Vec<&MassCentreFrame<Dd>> = frames.iter().map(frame).collect::<Result<_, _>>()?;
+        let [q, qd, qdd, tau] = at.map(|x| x.iter().map(|x| x.to_f64()).collect());
+        let state = &State { q, qd, qdd, tau, others: BTreeMap::new() };
+        let truth = Truth { tree: &self.tree, drives: &self.drives, frames: &frames, state, moving: &self.moving };
+        Ok(truth.outputs_at(function, at))
+    }
+}
+
 /// What a joint adds on its own coordinate, from the file: tau = … + I q̈ + d q̇ + f sgn(q̇) + k (q − q₀).
 struct Drive {
     iq: usize,
@@ -426,11 +462,15 @@ struct Reach {
 impl Truth<'_> {
     /// The outputs of a function and their natural scales.
     fn outputs(&self, function: Function) -> (Vec<Dd>, Vec<f64>) {
+        let state = [&self.state.q, &self.state.qd, &self.state.qdd, &self.state.tau];
+        let [q, qd, qdd, tau] = state.map(|x| x.iter().map(|x| Dd::from(*x)).collect::<Vec<Dd>>());
+        self.outputs_at(function, [&q, &qd, &qdd, &tau])
+    }
+
+    /// The same with the state in more digits than it is kept in, for values; scales take what is kept.
+    fn outputs_at(&self, function: Function, [q, qd, qdd, tau]: [&[Dd]; 4]) -> (Vec<Dd>, Vec<f64>) {
         use Function::*;
         let tree = self.tree;
-        let wide = |x: &[f64]| x.iter().map(|x| Dd::from(*x)).collect::<Vec<Dd>>();
-        let (q, qd, qdd, tau) =
-            (&wide(&self.state.q), &wide(&self.state.qd), &wide(&self.state.qdd), &wide(&self.state.tau));
         let rest = &vec![Dd::ZERO; qd.len()];
         let narrow = |x: &[Dd]| x.iter().map(|x| x.to_f64().abs()).collect::<Vec<f64>>();
         let force_scale = |qd: &[Dd], qdd: &[Dd]| narrow(reference::natural_scale(tree, q, qd, qdd).as_slice());
@@ -465,8 +505,8 @@ impl Truth<'_> {
                 [vec![r.length.max(1.0); 3 * qd.len()], vec![1.0; 3 * qd.len()]].concat()
             }),
             KinematicsAndJacobian => {
-                let (mut values, mut scales) = self.outputs(ForwardKinematics);
-                let jacobian = self.outputs(Jacobian);
+                let (mut values, mut scales) = self.outputs_at(ForwardKinematics, [q, qd, qdd, tau]);
+                let jacobian = self.outputs_at(Jacobian, [q, qd, qdd, tau]);
                 values.extend(jacobian.0);
                 scales.extend(jacobian.1);
                 (values, scales)

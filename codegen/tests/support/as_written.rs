@@ -1,0 +1,318 @@
+//! The judge of robots as they are written: every function, in f64 and f32, beside its plain program.
+
+use super::written::{Shape, Style, Written};
+use std::fmt::Write;
+use std::panic::{catch_unwind, AssertUnwindSafe};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::Mutex;
+use straightline_codegen::compile::{optimised, program, Optimisations, Options};
+use straightline_codegen::diagnostic::Source;
+use straightline_codegen::expr::{evaluate, Graph};
+use straightline_codegen::function::Robot;
+use straightline_codegen::model::{self, ModelOptions};
+use straightline_codegen::singular::singular_joints;
+use straightline_codegen::verify::SecondReading;
+use straightline_codegen::{Function, Scalar};
+use straightline_core::model::{JointKind, Model};
+use straightline_core::{Dd, Real};
+
+use super::written::Random;
+
+/// A program may lose so many times what the plain one loses.
+const TIMES: f64 = 20.0;
+/// The plain program loses an ulp of natural scale, even where the few states that are tried show less.
+const ULP: f64 = 1.0;
+/// The same of the equations themselves, run in double-double.
+const EQUATIONS: f64 = 1e-25;
+
+/// A robot to be judged.
+#[derive(Clone, Copy, Debug)]
+pub struct Case {
+    pub style: Style,
+    pub shape: Shape,
+    pub seed: u64,
+}
+
+impl Case {
+    pub fn new(style: Style, shape: Shape, seed: u64) -> Case {
+        Case { style, shape, seed }
+    }
+
+    pub fn robot(&self) -> Written {
+        Written::new(self.style, self.shape, self.seed)
+    }
+}
+
+/// A function that loses too much.
+#[derive(Clone, Debug)]
+pub struct Failure {
+    pub scalar: Scalar,
+    pub function: Function,
+    /// Which result, and at which state.
+    pub result: usize,
+    pub state: Vec<Vec<f64>>,
+    /// What it loses, what the plain program does, against natural scale; of the equations in double-double or of the program.
+    pub error: f64,
+    pub plain: f64,
+    pub of_equations: bool,
+}
+
+/// What came of a robot.
+pub enum Outcome {
+    Refused(String),
+    Judged(Vec<Failure>),
+}
+
+/// A state: q, q̇, q̈, τ. Numbers that f32 holds, so that all formats are asked the same; a quaternion is of length one.
+struct State([Vec<Dd>; 4]);
+
+impl State {
+    /// Small or any angles, slow or fast.
+    fn new(model: &Model<Dd>, random: &mut Random, kind: usize) -> State {
+        let nv = model.nv();
+        let (near, fast) = (kind % 2 == 0, kind / 2 % 2 == 1);
+        let mut state: [Vec<f64>; 4] = [vec![0.0; model.nq()], vec![0.0; nv], vec![0.0; nv], vec![0.0; nv]];
+        let mut quaternion = None;
+        for joint in model.bodies.iter().map(|b| &b.joint) {
+            match joint.kind {
+                JointKind::Floating => {
+                    quaternion = Some(joint.iq + 3);
+                    (0..3).for_each(|k| state[0][joint.iq + k] = random.between(-1.0, 1.0));
+                    (3..7).for_each(|k| state[0][joint.iq + k] = random.sign() * random.between(0.2, 1.0));
+                }
+                _ if near => state[0][joint.iq] = random.between(-1e-3, 1e-3),
+                _ => state[0][joint.iq] = random.between(-3.1, 3.1),
+            }
+            for i in joint.iv..joint.iv + joint.kind.nv() {
+                let most = joint.limits.velocity;
+                let rate = if most.is_finite() { most.min(100.0) } else { 10.0 };
+                state[1][i] = random.between(-1.0, 1.0) * if fast { rate } else { 0.02 };
+                state[2][i] = random.between(-1.0, 1.0) * if fast { 10.0 } else { 0.1 };
+                state[3][i] = random.between(-20.0, 20.0);
+            }
+        }
+        if kind == 4 {
+            // at rest in the zero configuration, as robots are first tried
+            state[0].iter_mut().for_each(|x| *x = 0.0);
+            state[1].fill(0.0);
+            state[2].fill(0.0);
+            if let Some(at) = quaternion {
+                state[0][at + 3] = 1.0;
+            }
+        }
+        let mut state = state.map(|x| x.into_iter().map(|x| Dd::from(f64::from(x as f32))).collect::<Vec<Dd>>());
+        if let Some(at) = quaternion {
+            // functions take its length for granted
+            let norm = state[0][at..at + 4].iter().fold(Dd::ZERO, |sum, x| sum + *x * *x).sqrt();
+            state[0][at..at + 4].iter_mut().for_each(|x| *x /= norm);
+        }
+        State(state)
+    }
+
+    /// The inputs of a program.
+    fn inputs<T: Real>(&self, graph: &Graph) -> Vec<T> {
+        let group = |name: &str| ["q", "qd", "qdd", "tau"].iter().position(|n| *n == name).expect("a state's input");
+        graph.inputs.iter().flat_map(|port| &self.0[group(&port.name)]).map(|x| T::constant(*x)).collect()
+    }
+}
+
+/// The scaled errors of a program: the worst one, and of which result.
+fn worst<T: Real>(
+    graph: &Graph,
+    state: &State,
+    (values, scales): &(Vec<Dd>, Vec<f64>),
+    wide: fn(T) -> Dd,
+) -> (f64, usize) {
+    let results = evaluate::<T>(graph, &state.inputs(graph));
+    assert_eq!(results.len(), values.len());
+    let mut worst = (0.0, 0);
+    for (k, ((x, truth), scale)) in results.into_iter().zip(values).zip(scales).enumerate() {
+        let error = (wide(x) - *truth).to_f64().abs();
+        let scaled = if error == 0.0 { 0.0 } else { error / scale };
+        let scaled = if scaled.is_nan() { f64::INFINITY } else { scaled };
+        if scaled > worst.0 {
+            worst = (scaled, k);
+        }
+    }
+    worst
+}
+
+/// The worst error of a program at a state, and of which result.
+type Judge = dyn Fn(&Graph, &State, &(Vec<Dd>, Vec<f64>)) -> (f64, usize);
+
+/// Judges a robot; of some functions and scalars alone where that is asked for.
+pub fn judge(robot: &Written, only: Option<(Scalar, Function)>) -> Outcome {
+    let source = Source::new(robot.file_name(), robot.text());
+    let model = ModelOptions { floating_base: robot.floating, ..ModelOptions::default() };
+    let options = Options { model, ..Options::default() };
+    let (model, diagnostics) = model::load(&source, &options.model);
+    let Some(model) = model.filter(|_| !diagnostics.has_errors()) else {
+        return Outcome::Refused(diagnostics.render());
+    };
+    let second = match SecondReading::new(&source, &model, &options) {
+        Ok(second) => second,
+        Err(why) => panic!("the second author refuses what the compiler takes: {why}\n{}", robot.text()),
+    };
+    let frames = robot.tips();
+    let mut functions: Vec<Function> = Function::all().chain([Function::KinematicsAndJacobian]).collect();
+    if !singular_joints(&model).is_empty() {
+        functions.retain(|f| *f != Function::ForwardDynamics);
+    }
+    let mut random = Random(99);
+    let states: Vec<State> = (0..6).map(|kind| State::new(&model, &mut random, kind)).collect();
+    let loaded = Robot::new(model);
+    let mut failures = Vec::new();
+    for function in functions {
+        if only.is_some_and(|(_, f)| f != function) {
+            continue;
+        }
+        let truths: Vec<(Vec<Dd>, Vec<f64>)> = states
+            .iter()
+            .map(|s| second.outputs(function, &frames, s.0.each_ref().map(|x| &x[..])).expect("a reading has its tips"))
+            .collect();
+        for scalar in [Scalar::F64, Scalar::F32] {
+            if only.is_some_and(|(s, _)| s != scalar) {
+                continue;
+            }
+            let options = Options { scalar, ..options.clone() };
+            let plain = optimised(&loaded, &frames, function, &options, Optimisations::default());
+            let full = program(&loaded, &frames, function, &options).graph;
+            let mut fail = |plain: Option<&Graph>, least: f64, error: &Judge| {
+                let all = |graph: &Graph| -> Vec<(f64, usize)> {
+                    states.iter().zip(&truths).map(|(s, t)| error(graph, s, t)).collect()
+                };
+                let of_equations = plain.is_none();
+                let plain = plain.map_or(0.0, |plain| all(plain).into_iter().fold(0.0, |m: f64, (e, _)| m.max(e)));
+                let errors = all(&full);
+                let at =
+                    (0..errors.len()).max_by(|a, b| errors[*a].0.total_cmp(&errors[*b].0)).expect("there are states");
+                let (error, result) = errors[at];
+                if error > TIMES * plain.max(least) {
+                    let state = states[at].0.iter().map(|x| x.iter().map(|x| x.to_f64()).collect()).collect();
+                    failures.push(Failure { scalar, function, result, state, error, plain, of_equations });
+                }
+            };
+            match scalar {
+                Scalar::F64 => {
+                    fail(None, EQUATIONS, &|g, s, t| worst::<Dd>(g, s, t, |x| x));
+                    fail(Some(&plain), ULP * f64::EPSILON, &|g, s, t| worst::<f64>(g, s, t, Dd::from));
+                }
+                Scalar::F32 => fail(Some(&plain), ULP * f64::from(f32::EPSILON), &|g, s, t| {
+                    worst::<f32>(g, s, t, |x| Dd::from(f64::from(x)))
+                }),
+            }
+        }
+    }
+    Outcome::Judged(failures)
+}
+
+/// What happened to a list of robots.
+#[derive(Default)]
+pub struct Tally {
+    pub refused: usize,
+    pub judged: usize,
+    /// Those that failed, with all that they failed by, or with the words of a panic.
+    pub failed: Vec<(Case, Result<Vec<Failure>, String>)>,
+}
+
+/// Judges robots, two at a time; `tell` is called with each failure.
+pub fn judge_all(cases: &[Case], tell: impl Fn(&Case, &Result<Vec<Failure>, String>) + Sync) -> Tally {
+    let (next, tally) = (AtomicUsize::new(0), Mutex::new(Tally::default()));
+    let work = || {
+        while let Some(case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let outcome = catch_unwind(AssertUnwindSafe(|| judge(&case.robot(), None)));
+            let words = |panic: Box<dyn std::any::Any + Send>| {
+                let text = panic.downcast_ref::<String>().cloned();
+                text.or(panic.downcast_ref::<&str>().map(|s| s.to_string())).unwrap_or_default()
+            };
+            let outcome = match outcome {
+                Ok(Outcome::Refused(why)) => {
+                    if std::env::var_os("REFUSED").is_some() {
+                        println!("REFUSED {case:?}\n{why}");
+                    }
+                    None
+                }
+                Ok(Outcome::Judged(failures)) => Some(Ok(failures)),
+                Err(panic) => Some(Err(words(panic))),
+            };
+            let mut tally = tally.lock().expect("no thread panics with the tally");
+            match outcome {
+                None => tally.refused += 1,
+                Some(outcome) => {
+                    tally.judged += 1;
+                    if !matches!(&outcome, Ok(failures) if failures.is_empty()) {
+                        tell(case, &outcome);
+                        tally.failed.push((*case, outcome));
+                    }
+                }
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(work);
+        scope.spawn(work);
+    });
+    tally.into_inner().expect("no thread panics with the tally")
+}
+
+/// A failure in a few words.
+pub fn in_words(failure: &Failure) -> String {
+    let Failure { scalar, function, result, error, plain, of_equations, .. } = failure;
+    let scalar = if *of_equations { "equations" } else { scalar.name() };
+    format!("{scalar} {}[{result}] {error:.1e} plain {plain:.1e}", function.name())
+}
+
+/// Judges robots and prints those that fail, the first of each kind of failure shrunk.
+///
+/// # Panics
+/// If any fails.
+pub fn survey(cases: Vec<Case>) {
+    let shrinks = std::env::var("SHRINK").map_or(0, |n| n.parse().expect("SHRINK is a number"));
+    let tally = judge_all(&cases, |case, outcome| match outcome {
+        Ok(failures) => {
+            let words: Vec<String> = failures.iter().map(in_words).collect();
+            println!("FAIL {} {:?}: {}", case.style.name(), case, words.join("; "));
+        }
+        Err(panic) => println!("PANIC {} {:?}: {panic}", case.style.name(), case),
+    });
+    for (case, outcome) in tally.failed.iter().take(shrinks) {
+        println!("{}", shrunk(case, outcome));
+    }
+    let worst = |(_, outcome): &&(Case, Result<Vec<Failure>, String>)| outcome.is_err();
+    println!(
+        "{} robots: {} refused, {} judged, {} failed, {} of them by a panic",
+        cases.len(),
+        tally.refused,
+        tally.judged,
+        tally.failed.len(),
+        tally.failed.iter().filter(worst).count()
+    );
+    assert!(tally.failed.is_empty(), "{} robots of {} lose digits", tally.failed.len(), cases.len());
+}
+
+/// The least robot that fails by the same function in the same format, as a file.
+pub fn shrunk(case: &Case, outcome: &Result<Vec<Failure>, String>) -> String {
+    let robot = case.robot();
+    let (least, what) = match outcome {
+        Err(panic) => {
+            let least = robot.shrunk(|r| catch_unwind(AssertUnwindSafe(|| judge(r, None))).is_err());
+            (least, format!("panic: {panic}"))
+        }
+        Ok(failures) => {
+            let Failure { scalar, function, of_equations, .. } = failures[0].clone();
+            let fails = |r: &Written| {
+                let outcome = catch_unwind(AssertUnwindSafe(|| judge(r, Some((scalar, function)))));
+                match outcome {
+                    Ok(Outcome::Judged(failures)) => failures.into_iter().find(|f| f.of_equations == of_equations),
+                    _ => None,
+                }
+            };
+            let least = robot.shrunk(|r| fails(r).is_some());
+            let failure = fails(&least).unwrap_or(failures[0].clone());
+            (least, format!("{} at {:?}", in_words(&failure), failure.state))
+        }
+    };
+    let mut text = String::new();
+    let _ = writeln!(text, "SHRUNK {case:?}\n{what}\nfloating: {}\n{}", least.floating, least.text());
+    text
+}
