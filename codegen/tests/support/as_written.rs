@@ -31,11 +31,41 @@ pub struct Case {
     pub style: Style,
     pub shape: Shape,
     pub seed: u64,
+    /// In one format, and of the functions that share a search for forms in one group, by the number that this is of the
+    /// list; otherwise all.
+    pub part: Option<usize>,
 }
 
 impl Case {
+    /// All functions in both formats.
     pub fn new(style: Style, shape: Shape, seed: u64) -> Case {
-        Case { style, shape, seed }
+        Case { style, shape, seed, part: None }
+    }
+
+    /// Of each robot a part: what takes time are the searches for forms, three in each format, and many robots find more than many
+    /// functions of a few.
+    pub fn in_turn(cases: Vec<Case>) -> Vec<Case> {
+        cases.into_iter().enumerate().map(|(k, case)| Case { part: Some(k), ..case }).collect()
+    }
+
+    fn wants(&self, scalar: Scalar, function: Function) -> bool {
+        use Function::{BiasForce, ForwardDynamics, GravityForce, InverseDynamics, MassMatrix, VelocityForce};
+        let group = match function {
+            InverseDynamics => Some(0),
+            MassMatrix => Some(1),
+            BiasForce | GravityForce | VelocityForce => Some(2),
+            // which takes two of the searches
+            ForwardDynamics => Some(3),
+            _ => None,
+        };
+        self.part.is_none_or(|k| {
+            let in_turn = group.is_none_or(|group| [0, 1, 2, 0, 1, 2, 3][k / 2 % 7] == group);
+            in_turn && scalar == [Scalar::F64, Scalar::F32][k & 1]
+        })
+    }
+
+    fn judge(&self) -> Outcome {
+        judge(&File::from(&self.robot()), &|scalar, function| self.wants(scalar, function))
     }
 
     pub fn robot(&self) -> Written {
@@ -64,13 +94,13 @@ pub enum Outcome {
 }
 
 /// A state: q, q̇, q̈, τ. Numbers that f32 holds, so that all formats are asked the same; a quaternion is of length one.
-struct State([Vec<Dd>; 4]);
+pub struct State([Vec<Dd>; 4]);
 
 impl State {
     /// Small or any angles, slow or fast.
-    fn new(model: &Model<Dd>, random: &mut Random, kind: usize) -> State {
+    pub fn new(model: &Model<Dd>, random: &mut Random, kind: usize) -> State {
         let nv = model.nv();
-        let (near, fast) = (kind % 2 == 0, kind / 2 % 2 == 1);
+        let (near, fast) = (kind & 1 == 0, kind & 2 != 0);
         let mut state: [Vec<f64>; 4] = [vec![0.0; model.nq()], vec![0.0; nv], vec![0.0; nv], vec![0.0; nv]];
         let mut quaternion = None;
         for joint in model.bodies.iter().map(|b| &b.joint) {
@@ -83,12 +113,11 @@ impl State {
                 _ if near => state[0][joint.iq] = random.between(-1e-3, 1e-3),
                 _ => state[0][joint.iq] = random.between(-3.1, 3.1),
             }
-            for i in joint.iv..joint.iv + joint.kind.nv() {
-                let most = joint.limits.velocity;
-                let rate = if most.is_finite() { most.min(100.0) } else { 10.0 };
-                state[1][i] = random.between(-1.0, 1.0) * if fast { rate } else { 0.02 };
-                state[2][i] = random.between(-1.0, 1.0) * if fast { 10.0 } else { 0.1 };
-                state[3][i] = random.between(-20.0, 20.0);
+            let most = joint.limits.velocity;
+            let rate = if most.is_finite() { most.min(100.0) } else { 10.0 };
+            let sizes = if fast { [rate, 10.0, 20.0] } else { [0.02, 0.1, 20.0] };
+            for (of_kind, size) in state[1..].iter_mut().zip(sizes) {
+                of_kind[joint.iv..joint.iv + joint.kind.nv()].fill_with(|| random.between(-size, size));
             }
         }
         if kind == 4 {
@@ -109,10 +138,15 @@ impl State {
         State(state)
     }
 
+    /// The numbers of an input.
+    pub fn group(&self, name: &str) -> &[Dd] {
+        let k = ["q", "qd", "qdd", "tau"].iter().position(|n| *n == name);
+        &self.0[k.expect("functions of robots without drives have no other inputs")]
+    }
+
     /// The inputs of a program.
-    fn inputs<T: Real>(&self, graph: &Graph) -> Vec<T> {
-        let group = |name: &str| ["q", "qd", "qdd", "tau"].iter().position(|n| *n == name).expect("a state's input");
-        graph.inputs.iter().flat_map(|port| &self.0[group(&port.name)]).map(|x| T::constant(*x)).collect()
+    pub fn inputs<T: Real>(&self, graph: &Graph) -> Vec<T> {
+        graph.inputs.iter().flat_map(|port| self.group(&port.name)).map(|x| T::constant(*x)).collect()
     }
 }
 
@@ -140,20 +174,40 @@ fn worst<T: Real>(
 /// The worst error of a program at a state, and of which result.
 type Judge = dyn Fn(&Graph, &State, &(Vec<Dd>, Vec<f64>)) -> (f64, usize);
 
-/// Judges a robot; of some functions and scalars alone where that is asked for.
-pub fn judge(robot: &Written, only: Option<(Scalar, Function)>) -> Outcome {
-    let source = Source::new(robot.file_name(), robot.text());
-    let model = ModelOptions { floating_base: robot.floating, ..ModelOptions::default() };
-    let options = Options { model, ..Options::default() };
-    let (model, diagnostics) = model::load(&source, &options.model);
+/// A robot file, and how it is read.
+pub struct File {
+    pub source: Source,
+    pub floating: bool,
+    /// Of functions that answer per frame.
+    pub frames: Vec<String>,
+}
+
+impl From<&Written> for File {
+    fn from(robot: &Written) -> File {
+        let source = Source::new(robot.file_name(), robot.text());
+        File { source, floating: robot.floating, frames: robot.tips() }
+    }
+}
+
+impl File {
+    /// How the compiler reads it.
+    pub fn options(&self) -> Options {
+        Options {
+            model: ModelOptions { floating_base: self.floating, ..ModelOptions::default() },
+            ..Options::default()
+        }
+    }
+}
+
+/// Judges a robot, of the functions and formats that are wanted.
+pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome {
+    let (File { source, frames, .. }, options) = (file, file.options());
+    let (model, diagnostics) = model::load(source, &options.model);
     let Some(model) = model.filter(|_| !diagnostics.has_errors()) else {
         return Outcome::Refused(diagnostics.render());
     };
-    let second = match SecondReading::new(&source, &model, &options) {
-        Ok(second) => second,
-        Err(why) => panic!("the second author refuses what the compiler takes: {why}\n{}", robot.text()),
-    };
-    let frames = robot.tips();
+    let second = SecondReading::new(source, &model, &options);
+    let second = second.unwrap_or_else(|why| panic!("what the compiler takes the second author refuses: {why}"));
     let mut functions: Vec<Function> = Function::all().chain([Function::KinematicsAndJacobian]).collect();
     if !singular_joints(&model).is_empty() {
         functions.retain(|f| *f != Function::ForwardDynamics);
@@ -163,20 +217,19 @@ pub fn judge(robot: &Written, only: Option<(Scalar, Function)>) -> Outcome {
     let loaded = Robot::new(model);
     let mut failures = Vec::new();
     for function in functions {
-        if only.is_some_and(|(_, f)| f != function) {
+        let scalars: Vec<Scalar> =
+            [Scalar::F64, Scalar::F32].into_iter().filter(|scalar| wanted(*scalar, function)).collect();
+        if scalars.is_empty() {
             continue;
         }
         let truths: Vec<(Vec<Dd>, Vec<f64>)> = states
             .iter()
-            .map(|s| second.outputs(function, &frames, s.0.each_ref().map(|x| &x[..])).expect("a reading has its tips"))
+            .map(|s| second.outputs(function, frames, s.0.each_ref().map(|x| &x[..])).expect("a reading has its tips"))
             .collect();
-        for scalar in [Scalar::F64, Scalar::F32] {
-            if only.is_some_and(|(s, _)| s != scalar) {
-                continue;
-            }
+        for scalar in scalars {
             let options = Options { scalar, ..options.clone() };
-            let plain = optimised(&loaded, &frames, function, &options, Optimisations::default());
-            let full = program(&loaded, &frames, function, &options).graph;
+            let plain = optimised(&loaded, frames, function, &options, Optimisations::default());
+            let full = program(&loaded, frames, function, &options).graph;
             let mut fail = |plain: Option<&Graph>, least: f64, error: &Judge| {
                 let all = |graph: &Graph| -> Vec<(f64, usize)> {
                     states.iter().zip(&truths).map(|(s, t)| error(graph, s, t)).collect()
@@ -184,19 +237,17 @@ pub fn judge(robot: &Written, only: Option<(Scalar, Function)>) -> Outcome {
                 let of_equations = plain.is_none();
                 let plain = plain.map_or(0.0, |plain| all(plain).into_iter().fold(0.0, |m: f64, (e, _)| m.max(e)));
                 let errors = all(&full);
-                let at =
-                    (0..errors.len()).max_by(|a, b| errors[*a].0.total_cmp(&errors[*b].0)).expect("there are states");
+                let worst = (0..errors.len()).max_by(|a, b| errors[*a].0.total_cmp(&errors[*b].0));
+                let at = worst.expect("there are states");
                 let (error, result) = errors[at];
                 if error > TIMES * plain.max(least) {
                     let state = states[at].0.iter().map(|x| x.iter().map(|x| x.to_f64()).collect()).collect();
                     failures.push(Failure { scalar, function, result, state, error, plain, of_equations });
                 }
             };
+            fail(None, EQUATIONS, &|g, s, t| worst::<Dd>(g, s, t, |x| x));
             match scalar {
-                Scalar::F64 => {
-                    fail(None, EQUATIONS, &|g, s, t| worst::<Dd>(g, s, t, |x| x));
-                    fail(Some(&plain), ULP * f64::EPSILON, &|g, s, t| worst::<f64>(g, s, t, Dd::from));
-                }
+                Scalar::F64 => fail(Some(&plain), ULP * f64::EPSILON, &|g, s, t| worst::<f64>(g, s, t, Dd::from)),
                 Scalar::F32 => fail(Some(&plain), ULP * f64::from(f32::EPSILON), &|g, s, t| {
                     worst::<f32>(g, s, t, |x| Dd::from(f64::from(x)))
                 }),
@@ -220,7 +271,7 @@ pub fn judge_all(cases: &[Case], tell: impl Fn(&Case, &Result<Vec<Failure>, Stri
     let (next, tally) = (AtomicUsize::new(0), Mutex::new(Tally::default()));
     let work = || {
         while let Some(case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let outcome = catch_unwind(AssertUnwindSafe(|| judge(&case.robot(), None)));
+            let outcome = catch_unwind(AssertUnwindSafe(|| case.judge()));
             let words = |panic: Box<dyn std::any::Any + Send>| {
                 let text = panic.downcast_ref::<String>().cloned();
                 text.or(panic.downcast_ref::<&str>().map(|s| s.to_string())).unwrap_or_default()
@@ -258,8 +309,8 @@ pub fn judge_all(cases: &[Case], tell: impl Fn(&Case, &Result<Vec<Failure>, Stri
 /// A failure in a few words.
 pub fn in_words(failure: &Failure) -> String {
     let Failure { scalar, function, result, error, plain, of_equations, .. } = failure;
-    let scalar = if *of_equations { "equations" } else { scalar.name() };
-    format!("{scalar} {}[{result}] {error:.1e} plain {plain:.1e}", function.name())
+    let of = if *of_equations { " equations" } else { "" };
+    format!("{}{of} {}[{result}] {error:.1e} plain {plain:.1e}", scalar.name(), function.name())
 }
 
 /// Judges robots and prints those that fail, the first of each kind of failure shrunk.
@@ -295,13 +346,15 @@ pub fn shrunk(case: &Case, outcome: &Result<Vec<Failure>, String>) -> String {
     let robot = case.robot();
     let (least, what) = match outcome {
         Err(panic) => {
-            let least = robot.shrunk(|r| catch_unwind(AssertUnwindSafe(|| judge(r, None))).is_err());
+            let least =
+                robot.shrunk(|r| catch_unwind(AssertUnwindSafe(|| judge(&File::from(r), &|_, _| true))).is_err());
             (least, format!("panic: {panic}"))
         }
         Ok(failures) => {
             let Failure { scalar, function, of_equations, .. } = failures[0].clone();
             let fails = |r: &Written| {
-                let outcome = catch_unwind(AssertUnwindSafe(|| judge(r, Some((scalar, function)))));
+                let outcome =
+                    catch_unwind(AssertUnwindSafe(|| judge(&File::from(r), &|s, f| (s, f) == (scalar, function))));
                 match outcome {
                     Ok(Outcome::Judged(failures)) => failures.into_iter().find(|f| f.of_equations == of_equations),
                     _ => None,
