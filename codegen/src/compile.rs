@@ -20,7 +20,7 @@ use crate::report::{FunctionReport, Report};
 use crate::rounding;
 use crate::scene::{self, is_optional, load_parameters, Parameter, Scene, LOAD_SCALARS};
 use crate::schedule::{schedule, Limits, Schedule};
-use crate::singular::singular_joints;
+use crate::singular;
 use crate::staged::{self, staged};
 use crate::trace::trace;
 use std::collections::BTreeMap;
@@ -419,7 +419,7 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
         options.scene.places.complain("outputs.limbs", scene::messages::no_identical_limbs(), &mut diagnostics);
     }
     let resolved = Options { scene: options.scene.resolved(&model), functions, ..options.clone() };
-    demand_inertia(&model, &resolved, &mut diagnostics);
+    singular::demand_inertia(&model, &resolved, &mut diagnostics);
     if diagnostics.has_errors() {
         diagnostics.sort();
         return Err(diagnostics);
@@ -449,24 +449,6 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     };
     let programs = programs.into_iter().zip(waterfalls).zip(certificates).map(|((p, w), c)| (p, w, c)).collect();
     Ok(generate(robot, frames, programs, diagnostics, &resolved, source.path(), hash))
-}
-
-/// Forward dynamics divides by what every joint feels. What a run-time parameter will add is not known here.
-fn demand_inertia(model: &Model<Dd>, options: &Options, diagnostics: &mut Diagnostics) {
-    if !options.functions.contains(&Function::ForwardDynamics) || !options.scene.parameters.is_empty() {
-        return;
-    }
-    for id in singular_joints(model) {
-        let joint = &model.bodies[id].joint.name;
-        let complaint = messages::no_forward_dynamics(joint);
-        let named = format!("joint `{joint}`");
-        let warning = diagnostics.iter().find(|d| d.code == "singular-joint" && d.title.starts_with(&named));
-        let place = warning.and_then(|d| d.place.clone());
-        diagnostics.push(match place {
-            Some(place) => complaint.at(&place),
-            None => complaint,
-        });
-    }
 }
 
 /// The rest of the pipeline: from programs to text.

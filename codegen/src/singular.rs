@@ -5,25 +5,48 @@
 //! articulated-body algorithm. Whether it vanishes at all configurations, and not at some, is asked at three of them that
 //! have nothing in common with right angles. Links without mass, point masses on the joint axis, wrists about a point
 //! mass and coaxial joints without an inertia between them are found alike.
+//!
+//! What vanishes is said against the inertia that the joint would feel with what it moves at arm's length: with a point mass on an oblique
+//! axis H itself has nothing but rounding in its place. And what stands against the robot's own as 1e-28 to 1 is dust in place of a zero.
 
-use straightline_core::algorithms::mass_matrix;
-use straightline_core::model::{BodyId, JointKind, Model};
+use crate::compile::Options;
+use crate::contact::Mode;
+use crate::description::messages;
+use crate::diagnostic::{Diagnostic, Diagnostics};
+use crate::function::{DriveFunction, Function};
+use crate::model::merge::{merge, Part};
+use crate::scene::ContactFunction;
+use straightline_core::algorithms::{complete_model, drive_states, forward_kinematics, mass_matrix};
+use straightline_core::model::{BodyId, Frame, JointKind, Model};
+use straightline_core::spatial::{Sym3, Transform, Vec3};
 use straightline_core::Dd;
 
-/// A pivot is zero if so much smaller than the inertia it is what is left of. Double-double has 1e-32; a mass ratio of
+/// A pivot is zero if so much smaller than the inertia of what its joint moves. Double-double has 1e-32; a mass ratio of
 /// 1e-12 between neighbours leaves about 1e-12.
 const VANISHED: f64 = 1e-22;
+
+/// A pivot is dust if so much smaller than the inertia of the whole robot: masses as 1e20 to 1 are meant.
+const DUST: f64 = 1e-28;
 
 /// The golden ratio's fraction: multiples of it, wrapped, are never near each other.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
+/// Which inertia is divided by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Inertia {
+    /// H: links, and rotors that joints have as a number.
+    OfLinks,
+    /// H*: drives, too; joints whose drives do not give way are not divided by.
+    WithDrives,
+}
+
 /// The bodies whose joints nothing resists at any configuration; of joints that share one lack, the one nearest to the tips.
-pub fn singular_joints(model: &Model<Dd>) -> Vec<BodyId> {
-    let mut always = vanished_pivots(model, &generic_configuration(model, 1));
+pub fn singular_joints(model: &Model<Dd>, inertia: Inertia) -> Vec<BodyId> {
+    let mut always = vanished_pivots(model, inertia, &generic_configuration(model, 1));
     for seed in 2..=3 {
         let here = match always.is_empty() {
             true => return Vec::new(),
-            false => vanished_pivots(model, &generic_configuration(model, seed)),
+            false => vanished_pivots(model, inertia, &generic_configuration(model, seed)),
         };
         always.retain(|body| here.contains(body));
     }
@@ -41,21 +64,68 @@ fn generic_configuration(model: &Model<Dd>, seed: usize) -> Vec<Dd> {
     q
 }
 
+/// What each coordinate would feel at least with all that its joint moves at a distance from it, at q: masses, and moments about the
+/// joint's origin of the masses and of the bodies themselves, whatever the axis. By velocity coordinate.
+fn natural_inertias(model: &Model<Dd>, q: &[Dd]) -> Vec<f64> {
+    let bodies = &model.bodies;
+    let frame = |b: BodyId| Frame { name: String::new(), body: Some(b), placement: Transform::identity() };
+    let frames: Vec<Frame<Dd>> = (0..bodies.len()).map(frame).collect();
+    let poses = forward_kinematics(model, q, &frames.iter().collect::<Vec<_>>());
+    let mut scales = vec![0.0; model.nv()];
+    for (b, body) in bodies.iter().enumerate() {
+        let inertia = &body.inertia;
+        let mass = inertia.mass.to_f64().abs();
+        let own = inertia.second_moment_com;
+        let own: f64 = [own.xx, own.yy, own.zz].iter().map(|x| 2.0 * x.to_f64().abs()).sum();
+        let centre = poses[b].rotation * inertia.com + poses[b].translation;
+        for carrier in std::iter::successors(Some(b), |&c| bodies[c].parent) {
+            let joint = &bodies[carrier].joint;
+            let arm = centre - poses[carrier].translation;
+            let moment = mass * arm.dot(arm).to_f64() + own;
+            for k in 0..joint.kind.nv() {
+                let linear = joint.kind == JointKind::Prismatic || joint.kind == JointKind::Floating && k < 3;
+                scales[joint.iv + k] += if linear { mass } else { moment };
+            }
+        }
+    }
+    scales
+}
+
 /// The bodies with a vanished pivot at q: H eliminated from the tips to the base; a row without a pivot is left out, as
 /// if its joint were held.
-fn vanished_pivots(model: &Model<Dd>, q: &[Dd]) -> Vec<BodyId> {
+fn vanished_pivots(model: &Model<Dd>, inertia: Inertia, q: &[Dd]) -> Vec<BodyId> {
     let nv = model.nv();
     let mut h = mass_matrix(model, q);
-    let diagonal: Vec<f64> = (0..nv).map(|i| h[i * nv + i].to_f64()).collect();
-    // the coordinates of a body and of all that carry it, those of the body itself last
+    let mut held = Vec::new();
+    let with_drives = inertia == Inertia::WithDrives && !model.drives.is_empty();
+    if with_drives {
+        let (rest, x) = (vec![Dd::ZERO; nv], vec![Dd::ZERO; drive_states(model)]);
+        h = complete_model(model, (q, &rest, &x), &rest, &h).0;
+        held = model.drives.iter().filter_map(|d| d.held_joint()).map(|(b, _)| model.bodies[b].joint.iv).collect();
+    }
+    let scales = natural_inertias(model, q);
+    let sizes: Vec<f64> = (0..nv).map(|i| scales[i].max(h[i * nv + i].to_f64().abs())).collect();
+    let is_linear: Vec<bool> = linear_coordinates(model);
+    let greatest = |linear: bool| {
+        let alike = sizes.iter().zip(&is_linear).zip(0..nv).filter(|((_, l), i)| **l == linear && !held.contains(i));
+        alike.map(|((size, _), _)| *size).fold(0.0, f64::max)
+    };
+    let of_robot = [greatest(false), greatest(true)];
+    let is_gone = |pivot: Dd, k: usize| {
+        let pivot = pivot.to_f64().abs();
+        pivot <= VANISHED * sizes[k] || pivot <= DUST * of_robot[usize::from(is_linear[k])]
+    };
+    // the coordinates of a body and of all that carry it, those of the body itself last; drives may couple branches
     let chain = |body: BodyId| {
-        let bodies = std::iter::successors(Some(body), |&b| model.bodies[b].parent);
-        let mut coordinates: Vec<usize> = bodies
-            .flat_map(|b| {
-                let joint = &model.bodies[b].joint;
-                (joint.iv..joint.iv + joint.kind.nv()).rev()
-            })
-            .collect();
+        let bodies: Vec<BodyId> = match with_drives {
+            true => (0..=body).rev().collect(),
+            false => std::iter::successors(Some(body), |&b| model.bodies[b].parent).collect(),
+        };
+        let coordinates = bodies.iter().flat_map(|b| {
+            let joint = &model.bodies[*b].joint;
+            (joint.iv..joint.iv + joint.kind.nv()).rev()
+        });
+        let mut coordinates: Vec<usize> = coordinates.collect();
         coordinates.reverse();
         coordinates
     };
@@ -64,14 +134,17 @@ fn vanished_pivots(model: &Model<Dd>, q: &[Dd]) -> Vec<BodyId> {
         let mut rows = chain(body);
         for _ in 0..model.bodies[body].joint.kind.nv() {
             let k = rows.pop().expect("a body's chain has its own coordinates");
+            if held.contains(&k) {
+                continue;
+            }
             let pivot = h[k * nv + k];
-            if pivot.to_f64().abs() <= VANISHED * diagonal[k].abs() {
+            if is_gone(pivot, k) {
                 if !found.contains(&body) {
                     found.push(body);
                 }
                 continue;
             }
-            for &i in &rows {
+            for &i in rows.iter().filter(|i| !held.contains(i)) {
                 let factor = h[k * nv + i] / pivot;
                 for &j in &rows {
                     h[i * nv + j] = h[i * nv + j] - factor * h[k * nv + j];
@@ -81,4 +154,138 @@ fn vanished_pivots(model: &Model<Dd>, q: &[Dd]) -> Vec<BodyId> {
     }
     found.sort_unstable();
     found
+}
+
+/// Which coordinates are lengths.
+fn linear_coordinates(model: &Model<Dd>) -> Vec<bool> {
+    let mut linear = vec![false; model.nv()];
+    for joint in model.bodies.iter().map(|b| &b.joint) {
+        for k in 0..joint.kind.nv() {
+            linear[joint.iv + k] = joint.kind == JointKind::Prismatic || joint.kind == JointKind::Floating && k < 3;
+        }
+    }
+    linear
+}
+
+/// What is asked for that divides by an inertia, in words, and what to look at in the scene.
+struct Asked {
+    inertia: Inertia,
+    words: String,
+    path: &'static str,
+}
+
+/// All that is asked for that divides by what joints feel: functions, their error bounds and stages, and the functions of contact modes.
+fn asked(model: &Model<Dd>, options: &Options) -> Vec<Asked> {
+    let is_driven = !model.drives.is_empty();
+    let of_function = |f: &Function| match f {
+        Function::ForwardDynamics => Some(Inertia::OfLinks),
+        Function::Drive(DriveFunction::StateSpace) => Some(Inertia::WithDrives),
+        Function::Drive(f) if f.solves() => Some(Inertia::WithDrives),
+        _ => None,
+    };
+    let of_contact = |f: &ContactFunction| match f {
+        ContactFunction::ForwardDynamics | ContactFunction::InverseDynamics => Some(Inertia::OfLinks),
+        ContactFunction::DrivenForwardDynamics => is_driven.then_some(Inertia::WithDrives),
+        ContactFunction::Impact | ContactFunction::Projection => Some(Inertia::WithDrives),
+        ContactFunction::ConstrainedCoordinates | ContactFunction::FreeCoordinates => None,
+    };
+    let contacts = match Mode::all(&options.scene).is_empty() {
+        true => Vec::new(),
+        false => options.scene.contacts.wanted(),
+    };
+    let mut asked = Vec::new();
+    for inertia in [Inertia::OfLinks, Inertia::WithDrives] {
+        let functions = options.functions.iter().filter(|f| of_function(f) == Some(inertia));
+        let functions: Vec<String> = functions.map(|f| f.name().to_string()).collect();
+        let modes = contacts.iter().filter(|f| of_contact(f) == Some(inertia));
+        let modes: Vec<String> = modes.map(|f| format!("`{}`", f.name())).collect();
+        match &functions[..] {
+            [] => {}
+            [one] if one == "forward_dynamics" => {
+                asked.push(Asked { inertia, words: "forward dynamics is".to_string(), path: "outputs.functions" });
+            }
+            several => {
+                let names: Vec<String> = several.iter().map(|name| format!("`{name}`")).collect();
+                let words = format!("{} {}", names.join(", "), if names.len() == 1 { "is" } else { "are" });
+                asked.push(Asked { inertia, words, path: "outputs.functions" });
+            }
+        }
+        if !modes.is_empty() {
+            let be = if modes.len() == 1 { "is" } else { "are" };
+            let words = format!("{} of contact modes {be}", modes.join(", "));
+            asked.push(Asked { inertia, words, path: "outputs.contact" });
+        }
+    }
+    asked
+}
+
+/// Whatever is asked for that divides by what a joint feels, while it feels nothing, is an error at that joint. Where the joint feels what
+/// a run-time parameter brings, and nothing else, it cannot be decided here, and is a warning.
+pub(crate) fn demand_inertia(model: &Model<Dd>, options: &Options, diagnostics: &mut Diagnostics) {
+    let full = (!options.scene.parameters.is_empty()).then(|| with_parameters(model, options));
+    let mut said = Vec::new();
+    for asked in asked(model, options) {
+        let never = singular_joints(full.as_ref().unwrap_or(model), asked.inertia);
+        for &id in &never {
+            let complaint = messages::no_forward_dynamics(&asked.words, &model.bodies[id].joint.name);
+            place(complaint, &model.bodies[id].joint.name, Some((asked.path, options)), diagnostics);
+        }
+        if full.is_none() {
+            continue;
+        }
+        for id in singular_joints(model, asked.inertia).into_iter().filter(|id| !never.contains(id)) {
+            if said.contains(&id) {
+                continue;
+            }
+            said.push(id);
+            let joint = &model.bodies[id].joint.name;
+            let names: Vec<String> = options.scene.parameters.iter().map(|p| format!("`{}`", p.name())).collect();
+            let complaint = messages::inertia_by_parameters(&asked.words, joint, &names.join(", "));
+            place(complaint, joint, Some((asked.path, options)), diagnostics);
+        }
+    }
+}
+
+/// The same of a robot alone, of what is `asked` for in words ("a simulation is").
+pub fn demand_inertia_for(asked: &str, model: &Model<Dd>, inertia: Inertia, diagnostics: &mut Diagnostics) {
+    for id in singular_joints(model, inertia) {
+        let joint = &model.bodies[id].joint.name;
+        place(messages::no_forward_dynamics(asked, joint), joint, None, diagnostics);
+    }
+}
+
+/// A complaint at the joint, where its file was complained of, or at what the scene asks for.
+fn place(complaint: Diagnostic, joint: &str, asked: Option<(&str, &Options)>, diagnostics: &mut Diagnostics) {
+    let named = format!("joint `{joint}`");
+    let warning = diagnostics.iter().find(|d| d.code == "singular-joint" && d.title.starts_with(&named));
+    match (warning.and_then(|d| d.place.clone()), asked) {
+        (Some(place), _) => diagnostics.push(complaint.at(&place)),
+        (None, Some((path, options))) => options.scene.places.complain(path, complaint, diagnostics),
+        (None, None) => diagnostics.push(complaint),
+    }
+}
+
+/// The robot with some inertia in place of every run-time parameter, as much as the robot has of its own.
+fn with_parameters(model: &Model<Dd>, options: &Options) -> Model<Dd> {
+    let mut full = model.clone();
+    let total = model.bodies.iter().map(|b| b.inertia.mass.to_f64()).sum::<f64>();
+    let mass = if total > 0.0 { total } else { 1.0 };
+    let lengths = model.bodies.iter().map(|b| b.placement.translation.dot(b.placement.translation).to_f64().sqrt());
+    let longest = lengths.fold(0.0, f64::max);
+    let length = if longest > 0.0 { longest } else { 1.0 };
+    for body in options.scene.parameters.iter().filter_map(|p| p.body(model)) {
+        let com = Vec3::new(0.31, -0.17, 0.23).map(|x| Dd::from(x * length));
+        let moment = |x: f64| Dd::from(x * mass * length * length);
+        let inertia_com = Sym3 {
+            xx: moment(0.2),
+            yy: moment(0.3),
+            zz: moment(0.25),
+            xy: moment(0.02),
+            xz: moment(-0.03),
+            yz: moment(0.01),
+        };
+        let own = Part::of(&full.bodies[body].inertia);
+        full.bodies[body].inertia = merge(&[own, Part { mass: Dd::from(mass), com, inertia_com }]);
+    }
+    full
 }

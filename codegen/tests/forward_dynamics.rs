@@ -1,8 +1,11 @@
 //! What the compiler demands of a robot before it writes its forward dynamics, and which method it writes.
 
+use straightline_codegen::compile::Generated;
+use straightline_codegen::diagnostic::Diagnostics;
 use straightline_codegen::forward_method::{MethodChoice, TOLERATED};
 use straightline_codegen::model::{load, ModelOptions};
-use straightline_codegen::singular::singular_joints;
+use straightline_codegen::scene::read;
+use straightline_codegen::singular::{singular_joints, Inertia};
 use straightline_codegen::{compile, Function, Options, Scalar, Source};
 
 /// A chain of revolute joints in TOML: per link its joint's origin, its axis and its inertial lines.
@@ -32,7 +35,7 @@ const HERE: [f64; 3] = [0.0, 0.0, 0.0];
 fn singular(source: &Source) -> Vec<String> {
     let (model, diagnostics) = load(source, &ModelOptions::default());
     let model = model.unwrap_or_else(|| panic!("{diagnostics}"));
-    singular_joints(&model).into_iter().map(|b| model.bodies[b].joint.name.clone()).collect()
+    singular_joints(&model, Inertia::OfLinks).into_iter().map(|b| model.bodies[b].joint.name.clone()).collect()
 }
 
 #[test]
@@ -73,6 +76,108 @@ fn forward_dynamics_of_a_joint_without_inertia_is_an_error_with_place_and_remedy
     assert!(compile(&source, &Options { functions, ..Options::default() }).is_ok());
     let with_rotor = Source::new("chain.toml", format!("{}armature = 1e-4\n", source.text()));
     assert!(compile(&with_rotor, &Options::default()).is_ok());
+}
+
+/// What the compiler makes of a robot in a scene.
+fn compiled(robot: &Source, scene: &str) -> Result<Generated, Diagnostics> {
+    let mut diagnostics = Diagnostics::new();
+    let file = read(&Source::new("scene.toml", scene), &mut diagnostics);
+    let file = file.unwrap_or_else(|| panic!("{}", diagnostics.render()));
+    compile(robot, &file.into_options(Options::default()))
+}
+
+/// The titles of the complaints with a code.
+fn titles(diagnostics: &Diagnostics, code: &str) -> Vec<String> {
+    diagnostics.iter().filter(|d| d.code == code).map(|d| d.title.clone()).collect()
+}
+
+const CONTACT: &str =
+    "[[contact]]\nname = \"foot\"\nframe = \"link2\"\nobject = { origin = [0.0, 0.0, 0.0], z = [0.0, 0.0, 1.0] }\n\
+                       constrained = [\"pz\"]\n";
+
+#[test]
+fn contact_modes_divide_by_inertia_too() {
+    // whatever nothing resists: a tip, a root that floats without any mass, a joint whose inertia is rounding
+    let tip = chain(&[(OFF, Z, BODY), (OFF, Y, MASSLESS)]);
+    let root = Source::new("root.toml", "[robot]\nname = \"root\"\nbase = \"floating\"\n[[link]]\nname = \"link2\"\n");
+    let functions = |list: &str| format!("[outputs]\nfunctions = [\"energy\"]\ncontact = [{list}]\n{CONTACT}");
+    for (robot, joint) in [(&tip, "joint2"), (&root, "root_joint")] {
+        for (name, is_divided) in [
+            ("forward_dynamics", true),
+            ("inverse_dynamics", true),
+            ("impact", true),
+            ("projection", true),
+            ("constrained_coordinates", false),
+        ] {
+            let result = compiled(robot, &functions(&format!("\"{name}\"")));
+            match is_divided {
+                false => assert!(result.is_ok(), "{name} divides by nothing: {}", result.unwrap_err()),
+                true => {
+                    let errors = result.expect_err(name);
+                    let title = format!("`{name}` of contact modes is asked for, and joint `{joint}` feels no inertia");
+                    assert_eq!(titles(&errors, "no-forward-dynamics"), [title], "{errors}");
+                    let error = errors.iter().find(|d| d.code == "no-forward-dynamics").expect("it is there");
+                    assert!(error.place.is_some(), "{errors}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn functions_of_drives_divide_by_the_inertia_with_drives() {
+    let tip = chain(&[(OFF, Z, BODY), (OFF, Y, MASSLESS)]);
+    let motor = "motor = { torque_constant = 0.05, resistance = 1.2, rotor_inertia = 1e-5 }";
+    let scene = |function: &str, stages: &str| {
+        format!("[outputs]\nfunctions = [\"{function}\"]\n[[drive]]\njoint = \"joint2\"\n{motor}\n{stages}\n")
+    };
+    let elastic = "stages = [{ ratio = 50.0, stiffness = 1e4 }]";
+    for function in ["driven_forward_dynamics", "drive_torques", "drive_power", "state_space"] {
+        // a rotor is inertia, behind a spring it is none of the joint's
+        compiled(&tip, &scene(function, "ratio = 50.0")).unwrap_or_else(|d| panic!("{function}: {d}"));
+        let errors = compiled(&tip, &scene(function, elastic)).expect_err(function);
+        let title = format!("`{function}` is asked for, and joint `joint2` feels no inertia");
+        assert_eq!(titles(&errors, "no-forward-dynamics"), [title], "{errors}");
+    }
+    for function in ["complete_model", "driven_inverse_dynamics", "drive_energy"] {
+        compiled(&tip, &scene(function, elastic)).unwrap_or_else(|d| panic!("{function}: {d}"));
+    }
+}
+
+#[test]
+fn inertia_that_is_rounding_or_dust_is_none() {
+    // a point mass on an oblique axis leaves rounding of what its links have
+    let axis = [0.48, -0.6, 0.64];
+    let on_axis = "mass = 1.0\ncom = [0.144, -0.18, 0.192]\ninertia = [0.0, 0.0, 0.0]";
+    assert_eq!(singular(&chain(&[(OFF, Y, BODY), (OFF, axis, on_axis)])), ["joint2"]);
+    // dust in place of a zero
+    let body = |factor: f64| {
+        let [m, x, y, z] = [1.0, 0.02, 0.03, 0.025].map(|x: f64| x * factor);
+        format!("mass = {m:e}\ncom = [0.1, 0.02, -0.03]\ninertia = [{x:e}, {y:e}, {z:e}]")
+    };
+    assert_eq!(singular(&chain(&[(OFF, Z, BODY), (OFF, Y, &body(1e-30))])), ["joint2"]);
+    // small is not dust, and of a robot that is small everywhere nothing is
+    assert_eq!(singular(&chain(&[(OFF, Z, BODY), (OFF, Y, &body(1e-20))])), [""; 0]);
+    assert_eq!(singular(&chain(&[(OFF, Z, &body(1e-30)), (OFF, Y, &body(1e-30))])), [""; 0]);
+}
+
+#[test]
+fn what_a_run_time_parameter_alone_brings_is_a_warning() {
+    let tip = chain(&[(OFF, Z, BODY), (OFF, Y, MASSLESS)]);
+    let scene = |link: &str| {
+        format!("[outputs]\nfunctions = [\"forward_dynamics\"]\n[[parameter]]\nkind = \"payload\"\nname = \"load\"\nframe = \"{link}\"\n")
+    };
+    let generated = compiled(&tip, &scene("link2")).unwrap_or_else(|d| panic!("{d}"));
+    let said = titles(&generated.warnings, "inertia-by-parameters");
+    assert_eq!(said, ["joint `joint2` feels no inertia but that of `load`"]);
+    assert!(generated.text.contains("joint `joint2` feels no inertia but that of `load`"), "{}", generated.text);
+    // a parameter elsewhere does not help
+    let errors = compiled(&tip, &scene("link1")).expect_err("nothing resists the second joint");
+    assert_eq!(titles(&errors, "no-forward-dynamics").len(), 1, "{errors}");
+    // where it is not needed there is nothing to say
+    let sound = chain(&[(OFF, Z, BODY), (OFF, Y, BODY)]);
+    let generated = compiled(&sound, &scene("link2")).unwrap_or_else(|d| panic!("{d}"));
+    assert!(titles(&generated.warnings, "inertia-by-parameters").is_empty());
 }
 
 /// n rods in a plane: what stretches is ill-conditioned.

@@ -389,3 +389,17 @@ fn a_flexible_arm_swings_and_its_energy_is_accounted_for() {
     let said = succeeds(&["analyze", &robot, "--motion", &example]);
     assert!(said.contains("forearm_bend_y1") && said.contains("within all limits"), "{said}");
 }
+
+#[test]
+fn a_joint_that_feels_no_inertia_cannot_be_simulated() {
+    let here = scratch("no_inertia");
+    let text = "[robot]\nname = \"arm\"\n[[link]]\nname = \"base\"\n[[link]]\nname = \"upper\"\nmass = 2.0\ncom = [0.1, 0.0, 0.2]\n\
+                inertia = [0.02, 0.021, 0.004]\n[[link]]\nname = \"empty\"\n[[joint]]\nname = \"shoulder\"\nkind = \"continuous\"\n\
+                parent = \"base\"\nchild = \"upper\"\naxis = \"y\"\n[[joint]]\nname = \"elbow\"\nkind = \"continuous\"\nparent = \"upper\"\n\
+                child = \"empty\"\norigin = { xyz = [0.1, 0.0, 0.4] }\naxis = \"x\"\n";
+    let input = write(&here, "fall.toml", "[start]\nq = [0.1, 0.2]\n[simulation]\nduration = 0.1\n");
+    let said = fails(&["simulate", &write(&here, "arm.toml", text), "--input", &input]);
+    assert!(said.contains("a simulation is asked for, and joint `elbow` feels no inertia"), "{said}");
+    let sound = format!("{text}armature = 0.01\n");
+    succeeds(&["simulate", &write(&here, "sound.toml", &sound), "--input", &input]);
+}

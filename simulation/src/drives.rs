@@ -1,7 +1,9 @@
 //! Drives of a robot that moves: their inputs, their states, and where their power goes.
 
 use crate::command::Samples;
-use straightline_core::algorithms::{drive_demands, inverse_dynamics, inverse_orders, reads_states, Demand};
+use straightline_core::algorithms::{
+    drive_demands, inverse_dynamics, inverse_orders, reads_states, Demand, MOST_DERIVATIVES,
+};
 use straightline_core::drive::{Actuator, Drive};
 use straightline_core::model::Model;
 use straightline_core::Taylor;
@@ -151,7 +153,9 @@ pub fn demands(model: &Model<f64>, q: &[f64], rates: &[Vec<f64>], x: &[f64], add
     match inverse_orders(&model.drives).expect("the inputs follow from the motion").of_torque {
         0 => over::<1>(model, q, rates, x, added),
         1..=3 => over::<4>(model, q, rates, x, added),
-        _ => over::<8>(model, q, rates, x, added),
+        4..=7 => over::<8>(model, q, rates, x, added),
+        8..=15 => over::<16>(model, q, rates, x, added),
+        _ => over::<{ MOST_DERIVATIVES + 1 }>(model, q, rates, x, added),
     }
 }
 

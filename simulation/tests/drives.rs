@@ -285,6 +285,7 @@ fn a_linear_actuator_that_is_a_motor_moves_as_the_motor() {
         t: vec![0.0, 1.0, 0.0],
         position: None,
         relative_degree: 1,
+        is_unyielding: false,
     };
     let with_actuator = each(|d| d.actuator = Actuator::Linear(actuator.clone()));
     let settings = Settings { duration: 0.5, ..SETTINGS };

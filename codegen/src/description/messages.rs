@@ -72,6 +72,7 @@ pub const CODES: &[&str] = &[
     "drive-coupling",
     "actuator-shape",
     "actuator-inert",
+    "unyielding-joints",
     "shaft-without-inertia",
     "elastic-number",
     "flexible-axis",
@@ -478,14 +479,23 @@ pub fn singular_joint(joint: &str, what: &str) -> D {
         )
 }
 
-/// Forward dynamics of a robot with a joint that feels no inertia.
-pub fn no_forward_dynamics(joint: &str) -> D {
-    D::error("no-forward-dynamics", format!("forward dynamics is asked for, and joint `{joint}` feels no inertia"))
+/// What divides by what joints feel, of a robot with a joint that feels no inertia. `asked`: in words, what is asked for.
+pub fn no_forward_dynamics(asked: &str, joint: &str) -> D {
+    D::error("no-forward-dynamics", format!("{asked} asked for, and joint `{joint}` feels no inertia"))
         .detail("with the joints beyond it free nothing resists its motion: the equations would divide by zero")
         .help(
             "give the joint a rotor inertia (TOML: `rotor_inertia` or `armature`) or its links their mass and inertia, make it \
              fixed, or name the functions that are wanted without `forward_dynamics`",
         )
+}
+
+/// What divides by what joints feel, of a robot with a joint that feels what run-time parameters bring and nothing else.
+pub fn inertia_by_parameters(asked: &str, joint: &str, parameters: &str) -> D {
+    D::warning("inertia-by-parameters", format!("joint `{joint}` feels no inertia but that of {parameters}"))
+        .detail(format!(
+            "{asked} asked for, which divides by it: of a parameter without inertia what comes out is not finite"
+        ))
+        .help("give the links themselves some inertia, or make sure that what is passed has mass")
 }
 
 /// An angle that may be meant as a right angle.
@@ -612,6 +622,26 @@ pub fn actuator_shape(owner: &str, n: usize) -> D {
 /// A linear actuator that moves nothing, or that nothing moves.
 pub fn actuator_inert(owner: &str, what: &str, help: &str) -> D {
     D::error("actuator-inert", format!("the actuator of {owner}: {what}")).help(help)
+}
+
+/// A shaft that does not give way, geared to several joints.
+pub fn unyielding_joints(name: &str, joints: usize) -> D {
+    D::error(
+        "unyielding-joints",
+        format!("drive `{}` turns {joints} joints, and T f = 0: its shaft does not give way", cut(name)),
+    )
+    .detail("the shaft's motion does not say what each of the joints does")
+    .help("give each joint a drive of its own, an elastic stage between, or in f −1/J in the row of the shaft's speed")
+}
+
+/// Two shafts that do not give way on one joint.
+pub fn unyielding_twice(name: &str, other: &str) -> D {
+    D::error(
+        "unyielding-joints",
+        format!("drives `{}` and `{}` turn one joint, and T f = 0 in both", cut(other), cut(name)),
+    )
+    .detail("neither shaft gives way: two motions are asked of one joint")
+    .help("leave one out, put an elastic stage between, or give one in f −1/J in the row of the shaft's speed")
 }
 
 /// A shaft between two springs that has no inertia.

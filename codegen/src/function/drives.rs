@@ -3,7 +3,7 @@
 use super::{Entry, ForwardDynamicsMethod, Function};
 use crate::expr::Port;
 use straightline_core::algorithms as alg;
-use straightline_core::algorithms::Links;
+use straightline_core::algorithms::{Links, MOST_DERIVATIVES};
 use straightline_core::model::Model;
 use straightline_core::reduced::ReducedModel;
 use straightline_core::{Real, Taylor};
@@ -60,10 +60,11 @@ pub(super) const TABLE: &[Entry] = &[
     Entry {
         function: Function::Drive(CompleteModel),
         name: "complete_model",
-        summary: "The complete model H* q̈ + h* = D u (20.72), (20.73), without losses and limits, at the currents and shaft states of x.",
+        summary: "The complete model H* q̈ + h* = D u (20.72), (20.73), without losses and limits, at the currents and shaft states of x; \
+                  of a shaft that does not give way, the row of its joint is its own equation n q̈ = T (C x + d u).",
         inputs: &["q", "qd", "x"],
         outputs: &[
-            ("h_star", "rows of H*, symmetric \\[kg·m², kg·m, kg\\]"),
+            ("h_star", "rows of H*, symmetric but for such rows \\[kg·m², kg·m, kg\\]"),
             ("bias", "h* \\[N·m or N\\]"),
             ("d", "rows of D, one per velocity coordinate \\[N·m/V\\]"),
         ],
@@ -102,17 +103,28 @@ pub(super) const INPUT_DOCS: &[(&str, &str)] = &[
          and speed of shafts between elastic stages",
     ),
     ("u", "inputs of the drives, in the order of [`DRIVE_NAMES`] \\[V, or as in the robot file\\]"),
-    ("q3", "third derivatives \\[rad/s³ or m/s³\\]"),
-    ("q4", "fourth derivatives \\[rad/s⁴ or m/s⁴\\]"),
-    ("q5", "fifth derivatives \\[rad/s⁵ or m/s⁵\\]"),
-    ("q6", "sixth derivatives \\[rad/s⁶ or m/s⁶\\]"),
-    ("q7", "seventh derivatives \\[rad/s⁷ or m/s⁷\\]"),
-    ("q8", "eighth derivatives \\[rad/s⁸ or m/s⁸\\]"),
-    ("q9", "ninth derivatives \\[rad/s⁹ or m/s⁹\\]"),
 ];
 
-/// Third and further derivatives of q.
-pub const HIGHER_RATES: [&str; 7] = ["q3", "q4", "q5", "q6", "q7", "q8", "q9"];
+/// Which derivative of q an input is, of the third and further ones: 3 of `q3`.
+pub fn higher_rate(input: &str) -> Option<usize> {
+    let order = input.strip_prefix('q')?.parse().ok()?;
+    (input == rate_name(order) && (3..=MOST_DERIVATIVES + 2).contains(&order)).then_some(order)
+}
+
+/// The name of the input that is so high a derivative of q.
+fn rate_name(order: usize) -> String {
+    format!("q{order}")
+}
+
+/// What the input is, if it is such a derivative.
+pub(super) fn rate_doc(input: &str) -> Option<String> {
+    const WORDS: [&str; 7] = ["third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth"];
+    let order = higher_rate(input)?;
+    let word = WORDS.get(order - 3).map_or_else(|| format!("{order}th"), |word| word.to_string());
+    let digit = |d: char| d.to_digit(10).map_or(d, |d| ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][d as usize]);
+    let power: String = order.to_string().chars().map(digit).collect();
+    Some(format!("{word} derivatives \\[rad/s{power} or m/s{power}\\]"))
+}
 
 impl DriveFunction {
     /// Whether a robot has it.
@@ -122,7 +134,7 @@ impl DriveFunction {
     }
 
     /// Whether accelerations are solved for.
-    pub(super) fn solves(self) -> bool {
+    pub(crate) fn solves(self) -> bool {
         matches!(self, ForwardDynamics | Torques | Power)
     }
 
@@ -132,7 +144,7 @@ impl DriveFunction {
             return Vec::new();
         }
         let orders = alg::inverse_orders(&model.drives).map_or(0, |o| o.of_torque);
-        let rates = HIGHER_RATES[..orders].iter().map(|name| Port::new(name, &[model.nv()]));
+        let rates = (3..3 + orders).map(|order| Port::new(&rate_name(order), &[model.nv()]));
         let state = alg::reads_states(&model.drives).then(|| Port::new("x", &[alg::drive_states(model)]));
         rates.chain(state).collect()
     }
@@ -204,7 +216,8 @@ impl DriveFunction {
 
 /// Whether articulated bodies can solve for the motion: drives add to the diagonal of H, and nothing is lost.
 pub(super) fn may_be_articulated<T: Real>(model: &Model<T>) -> bool {
-    alg::drives_are_diagonal(&model.drives) && model.drives.iter().all(|d| d.efficiency.is_none())
+    alg::drives_are_diagonal(&model.drives)
+        && model.drives.iter().all(|d| d.efficiency.is_none() && d.held_joint().is_none())
 }
 
 /// The rigid bodies, by the plain or by the reduced form.
@@ -252,7 +265,9 @@ fn inverse<T: Real>(rigid: &Rigid<T>, inputs: &[Vec<T>]) -> Vec<T> {
     match alg::inverse_orders(&rigid.model.drives).map_or(0, |o| o.of_torque) {
         0 => inverse_over::<T, 1>(rigid, inputs),
         1..=3 => inverse_over::<T, 4>(rigid, inputs),
-        _ => inverse_over::<T, 8>(rigid, inputs),
+        4..=7 => inverse_over::<T, 8>(rigid, inputs),
+        8..=15 => inverse_over::<T, 16>(rigid, inputs),
+        _ => inverse_over::<T, { MOST_DERIVATIVES + 1 }>(rigid, inputs),
     }
 }
 

@@ -2,7 +2,7 @@
 
 mod drives;
 
-pub use drives::{DriveFunction, HIGHER_RATES};
+pub use drives::{higher_rate, DriveFunction};
 
 use crate::choose::Found;
 use crate::emit::Scalar;
@@ -344,7 +344,8 @@ impl Function {
         let mut doc = format!("{}\n\n", entry.summary);
         for port in inputs {
             let known = INPUT_DOCS.iter().chain(drives::INPUT_DOCS).find(|(name, _)| *name == port.name);
-            let text = known.map_or("inertial parameters of a body that the robot carries", |(_, text)| text);
+            let known = known.map(|(_, text)| text.to_string()).or_else(|| drives::rate_doc(&port.name));
+            let text = known.unwrap_or_else(|| "inertial parameters of a body that the robot carries".to_string());
             doc.push_str(&format!("* `{}`: {text}\n", port.name));
         }
         for (name, text) in entry.outputs {

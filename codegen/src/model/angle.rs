@@ -59,6 +59,10 @@ pub(super) fn radians(angle: &Angle) -> Dd {
 /// Reads an angle.
 pub(crate) fn read(angle: &Angle, tolerance: f64) -> Reading {
     let x = radians(angle);
+    if x.to_f64().is_nan() || x.to_f64().abs() > GREATEST_ANGLE {
+        // an error of its own, and nothing that an integer could count
+        return Reading { sin_cos: (Dd::ZERO, Dd::ONE), special: None, right_angles: 0, deviation: f64::INFINITY };
+    }
     let is_special = |m: i64| m % 2 == 0 || m % 3 == 0;
     let twelfth = Dd::PI / Dd::from(12.0);
     let off = |m: i64| (x - twelfth * Dd::from(m as f64)).to_f64();

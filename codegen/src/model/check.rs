@@ -6,7 +6,7 @@ use crate::description::{
     messages, Description, Format, Joint, JointDrive, JointFrameNotation, JointKind, JointLimits, Value,
 };
 use crate::diagnostic::{Diagnostics, Place};
-use crate::singular::singular_joints;
+use crate::singular::{singular_joints, Inertia};
 use std::collections::HashMap;
 use straightline_core::model::{Coulomb, JointEffects, JointKind as ModelJointKind, Limits, Model};
 use straightline_core::spatial::Sym3;
@@ -317,7 +317,7 @@ pub(super) fn motion(assembly: &Assembly, description: &Description, diagnostics
 
 /// Whether every joint feels some inertia.
 pub(super) fn singular(model: &Model<Dd>, joint_places: &[Place], diagnostics: &mut Diagnostics) {
-    for id in singular_joints(model) {
+    for id in singular_joints(model, Inertia::OfLinks) {
         diagnostics.push(
             messages::singular_joint(&model.bodies[id].joint.name, what_is_missing(model, id)).at(&joint_places[id]),
         );

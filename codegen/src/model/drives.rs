@@ -3,7 +3,7 @@
 
 use crate::description::drives::{self as written, Noted};
 use crate::description::messages;
-use crate::diagnostic::Diagnostics;
+use crate::diagnostic::{Diagnostic, Diagnostics};
 use std::collections::BTreeSet;
 use straightline_core::drive::{Actuator, Drive, Efficiency, LinearActuator, Motor, Rating, Rotor, Stage, Thermal};
 use straightline_core::model::{BodyId, JointKind, Model};
@@ -22,12 +22,33 @@ pub(crate) fn add(drives: &[written::Drive], model: &mut Model<Dd>, diagnostics:
             model.drives.push(built);
         }
     }
+    for (drive, complaint) in unyielding(&model.drives) {
+        let written = drives.iter().find(|d| d.name.value == drive);
+        diagnostics.push(written.map_or(complaint.clone(), |d| complaint.at(&d.name.place)));
+    }
     for name in find_shares(&mut model.drives) {
         if let Some(drive) = drives.iter().find(|d| d.name.value == name) {
             let joints: Vec<&str> = drive.joints.iter().map(|(joint, _)| joint.value.as_str()).collect();
             diagnostics.push(messages::drive_coupling(&name, &joints).at(&drive.joints[0].0.place));
         }
     }
+}
+
+/// What is wrong with drives whose shafts do not give way, and with which: a rigid transmission from one of them says what its joint does,
+/// so it has one joint, and the joint no other.
+pub(crate) fn unyielding(drives: &[Drive<Dd>]) -> Vec<(String, Diagnostic)> {
+    let holds = |d: &Drive<Dd>| matches!(&d.actuator, Actuator::Linear(a) if a.is_unyielding) && d.stages.is_empty();
+    let mut wrong = Vec::new();
+    for (k, drive) in drives.iter().enumerate().filter(|(_, d)| holds(d)) {
+        let earlier = drives[..k].iter().filter(|d| holds(d) && d.joints.len() == 1);
+        let twice = |other: &&Drive<Dd>| other.joints.iter().any(|(body, _)| drive.joints.iter().any(|j| j.0 == *body));
+        if drive.joints.len() > 1 {
+            wrong.push((drive.name.clone(), messages::unyielding_joints(&drive.name, drive.joints.len())));
+        } else if let Some(other) = earlier.into_iter().find(twice) {
+            wrong.push((drive.name.clone(), messages::unyielding_twice(&drive.name, &other.name)));
+        }
+    }
+    wrong
 }
 
 fn build(drive: &written::Drive, model: &Model<Dd>, diagnostics: &mut Diagnostics) -> Option<Drive<Dd>> {
@@ -128,15 +149,6 @@ fn actuator(drive: &written::Drive, owner: &str, diagnostics: &mut Diagnostics) 
             let complain = |what: &str, help: &str, diagnostics: &mut Diagnostics| {
                 diagnostics.push(messages::actuator_inert(owner, what, help).at(&c.place));
             };
-            if vanishes(&wide(f)) {
-                complain(
-                    "T f = 0: the torque on its shaft does not move it",
-                    "f holds −1/J in the row of the shaft's speed; for a shaft that follows u whatever its load, which (20.80) \
-                     allows and a complete model with an inertia of its own, (20.73), does not, take J far above what it drives",
-                    diagnostics,
-                );
-                return None;
-            }
             let mut column = wide(d);
             let mut relative_degree = None;
             for r in 0..n {
@@ -158,6 +170,7 @@ fn actuator(drive: &written::Drive, owner: &str, diagnostics: &mut Diagnostics) 
                 t: wide(t),
                 position: position.as_ref().map(|p| wide(p)),
                 relative_degree,
+                is_unyielding: vanishes(&wide(f)),
             }))
         }
     }

@@ -52,6 +52,12 @@ pub fn apply(model: Model<Dd>, scene: &Scene, diagnostics: &mut Diagnostics) -> 
             drive.efficiency = None;
         }
     }
+    for (_, complaint) in drives::unyielding(&model.drives) {
+        scene.places.complain("effects.elastic_transmissions", complaint, diagnostics);
+    }
+    if diagnostics.has_errors() {
+        return None;
+    }
     // with joints locked, drives fit the joints that are left or do not; a dependent motion of all is one of a part, too
     drives::find_shares(&mut model.drives);
     Some(model)

@@ -3,7 +3,7 @@
 use super::{Gravity, Parameter, Part, Scene, Selection};
 use crate::emit::{snake_case, upper_camel_case};
 use crate::expr::Port;
-use crate::function::{Function, Robot, HIGHER_RATES};
+use crate::function::{higher_rate, Function, Robot};
 use crate::trace::Expr;
 use straightline_core::model::{Load, Model};
 use straightline_core::reduced::ReducedModel;
@@ -37,7 +37,7 @@ impl Scene {
     }
 
     fn is_zero(&self, input: &str) -> bool {
-        (input == "qd" && self.zero.qd) || (input == "qdd" || HIGHER_RATES.contains(&input)) && self.zero.qdd
+        (input == "qd" && self.zero.qd) || (input == "qdd" || higher_rate(input).is_some()) && self.zero.qdd
     }
 
     /// What the trace starts from, given the expressions of [`Scene::ports`].
@@ -52,7 +52,7 @@ impl Scene {
                 true => vec![Expr::zero(); port.len()],
                 false => given.next().expect("a port per input").clone(),
             };
-            if port.name == "qd" || port.name == "qdd" || HIGHER_RATES.contains(&port.name.as_str()) {
+            if port.name == "qd" || port.name == "qdd" || higher_rate(&port.name).is_some() {
                 for joint in robot.model.bodies.iter().map(|b| &b.joint) {
                     if self.zero.joints_at_rest.contains(&joint.name) {
                         values[joint.iv..joint.iv + joint.kind.nv()].fill(Expr::zero());

@@ -6,7 +6,7 @@ use super::{Base, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payl
 use crate::compile::Options;
 use crate::diagnostic::Diagnostics;
 use crate::expr::Grade;
-use crate::function::Function;
+use crate::function::{higher_rate, Function};
 use crate::limbs::LimbForm;
 use crate::model::geometry::principal_moments;
 use straightline_core::model::{JointKind, Model};
@@ -16,7 +16,7 @@ use straightline_core::Dd;
 /// A principal moment may exceed the sum of the others by so much, relatively: the digits of published tensors.
 const MOMENT_DIGITS: f64 = 1e-6;
 /// Names of inputs that a parameter cannot have.
-const INPUTS: [&str; 14] = ["q", "qd", "qdd", "tau", "gravity", "x", "u", "q3", "q4", "q5", "q6", "q7", "q8", "q9"];
+const INPUTS: [&str; 7] = ["q", "qd", "qdd", "tau", "gravity", "x", "u"];
 
 /// What is wrong with a scene, whatever the robot.
 pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
@@ -79,7 +79,7 @@ pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
         let (name, input, path) = (parameter.name(), parameter.input_name(), format!("parameter.{i}"));
         let earlier = &scene.parameters[..i];
         let taken = match () {
-            () if INPUTS.contains(&input.as_str()) => Some("one of the robot's own"),
+            () if INPUTS.contains(&input.as_str()) || higher_rate(&input).is_some() => Some("one of the robot's own"),
             () if input.is_empty() || input == "unnamed" => Some("no name: it has no letter or digit"),
             () if earlier.iter().any(|other| other.input_name() == input) => Some("that of another parameter"),
             () => None,

@@ -433,7 +433,7 @@ pub fn function_not_of_robot(function: &str, has_no_drives: bool) -> D {
         true => d.detail("no drive is given for any of its joints").help("write `[[drive]]` tables, see SCHEMA.md"),
         false => d
             .detail(
-                "its drives do not fit its joints one to one, or a motion would be differentiated more than nine times",
+                "its drives do not fit its joints one to one, or a motion would be differentiated more than 33 times",
             )
             .help("leave the function out, or give every driven joint a drive of its own"),
     }

@@ -9,7 +9,9 @@ use crate::function::DriveFunction;
 use nalgebra::{DMatrix, DVector};
 use straightline_core::drive::{Actuator, Drive, Efficiency};
 use straightline_core::model::Model;
-use straightline_core::reference::drives::{before_elastic_stage, ActuatorModel, DcMotor, ElasticStage, UnitedModel};
+use straightline_core::reference::drives::{
+    before_elastic_stage, solve_general, ActuatorModel, DcMotor, ElasticStage, UnitedModel,
+};
 use straightline_core::reference::solve_symmetric;
 use straightline_core::Dd;
 
@@ -69,11 +71,11 @@ struct At {
     speed: Dd,
     /// Ratios to the velocity coordinates.
     row: Vec<Dd>,
-    /// Of the actuator and the gears on its shaft.
-    inertia: f64,
+    /// Inertia of the actuator and the gears on its shaft; none of a shaft that does not give way.
+    gives_way: Option<f64>,
     /// Of the gears on its shaft.
     gears: Dd,
-    /// Sum of the moduli of the terms of its torque while it does not accelerate.
+    /// Sum of the moduli of the terms of its torque while it does not accelerate; of θ̈ of a shaft that does not give way.
     free: f64,
     efficiency: Option<(Dd, Dd)>,
 }
@@ -100,7 +102,8 @@ pub(super) fn outputs(
         first += drive.states();
         let at = At::new(model, drive, (&q, &qd), own, *u);
         if drive.stages.is_empty() {
-            let reflected = at.free * at.efficiency.map_or(1.0, |(_, backward)| 1.0 / backward.to_f64());
+            let free = if at.gives_way.is_some() { at.free } else { 0.0 };
+            let reflected = free * at.efficiency.map_or(1.0, |(_, backward)| 1.0 / backward.to_f64());
             forces.iter_mut().zip(&at.row).for_each(|(f, n)| *f += n.to_f64().abs() * reflected);
             found.push(None);
             rigid.push(at);
@@ -134,12 +137,13 @@ pub(super) fn outputs(
         (lossy.losses, motion)
     });
     let qdd = united.as_ref().map_or_else(|| solve_symmetric(&h_matrix, &-free.clone()), |(_, m)| m.qdd.clone());
+    let of_links = h_matrix.clone();
     // |H*⁻¹| (scales of forces + |H*| |q̈|), H* with the rotors
     let mut complete = h_matrix.clone();
     if let Some((losses, _)) = &united {
         for (at, r) in rigid.iter().zip(losses.iter()) {
             let row = DVector::from_column_slice(&at.row);
-            complete += &row * row.transpose() * (*r * Dd::from(at.inertia));
+            complete += &row * row.transpose() * (*r * Dd::from(at.gives_way.unwrap_or(0.0)));
         }
     }
     let moduli = |m: &DMatrix<Dd>, x: &[f64]| -> Vec<f64> {
@@ -148,21 +152,42 @@ pub(super) fn outputs(
     let sizes: Vec<f64> = qdd.iter().map(|x| x.to_f64().abs()).collect();
     let inertial = moduli(&complete, &sizes);
     let right: Vec<f64> = forces.iter().zip(&inertial).map(|(f, i)| f + i).collect();
+    // where a shaft does not give way, the row of its joint says n q̈ = θ̈
+    let mut right = right;
+    for at in rigid.iter().filter(|at| at.gives_way.is_none()) {
+        let joint = at.row.iter().position(|n| *n != Dd::ZERO).expect("it has a joint");
+        complete.row_mut(joint).fill(Dd::ZERO);
+        complete[(joint, joint)] = at.row[joint];
+        right[joint] = at.free;
+    }
     let mut inverse = DMatrix::from_element(nv, nv, Dd::ZERO);
     for j in 0..nv {
         let unit = DVector::from_fn(nv, |i, _| if i == j { Dd::ONE } else { Dd::ZERO });
-        inverse.set_column(j, &solve_symmetric(&complete, &unit));
+        inverse.set_column(j, &solve_general(complete.clone(), unit));
     }
     let qdd_scale = moduli(&inverse, &right);
     let tau = &rigid_bodies * &qdd + DVector::from_column_slice(bias);
-    let tau_scale: Vec<f64> =
+    let mut tau_scale: Vec<f64> =
         right.iter().zip(moduli(&complete, &qdd_scale)).map(|(force, motion)| force + motion).collect();
+    let links = moduli(&of_links, &qdd_scale);
+    for at in rigid.iter().filter(|at| at.gives_way.is_none()) {
+        let joint = at.row.iter().position(|n| *n != Dd::ZERO).expect("it has a joint");
+        tau_scale[joint] = forces[joint] + links[joint];
+    }
     if let Some((_, motion)) = &united {
         let (mut first, mut k) = (0, 0);
         for slot in found.iter_mut().filter(|slot| slot.is_none()) {
             let (at, n) = (&rigid[k], rigid[k].x.len());
             let acceleration: f64 = at.row.iter().zip(&qdd_scale).map(|(n, a)| n.to_f64().abs() * a).sum();
-            let torque = at.free + at.inertia * acceleration;
+            let torque = match at.gives_way {
+                Some(inertia) => at.free + inertia * acceleration,
+                // what its joint takes, losses in the gear
+                None => {
+                    let joint = at.row.iter().position(|n| *n != Dd::ZERO).expect("it has a joint");
+                    let lossy = at.efficiency.map_or(1.0, |(forward, _)| 1.0 / forward.to_f64());
+                    tau_scale[joint] / at.row[joint].to_f64().abs() * lossy
+                }
+            };
             let phi = at.row.iter().zip(qdd.iter()).fold(Dd::ZERO, |sum, (n, a)| sum + *n * *a);
             // gears on the shaft take their part of what the actuator puts out
             let own = motion.torques[k] + at.gears * phi;
@@ -251,13 +276,14 @@ impl At {
         }
         let terms = moduli_of_rates(&actuator, &sizes, u);
         let driving: f64 = terms.iter().zip(actuator.t.iter()).map(|(x, t)| t.to_f64().abs() * x).sum();
-        let whole = 1.0 / actuator.t.dot(&actuator.f).to_f64().abs();
+        let is_unyielding = matches!(&drive.actuator, Actuator::Linear(a) if a.is_unyielding);
+        let whole = if is_unyielding { 1.0 } else { 1.0 / actuator.t.dot(&actuator.f).to_f64().abs() };
         At {
             free: whole * driving,
             // the rotor's own, with the gears of its shaft
-            inertia: match &drive.actuator {
-                Actuator::Motor(m) => (m.rotor_inertia + gears).to_f64(),
-                Actuator::Linear(_) => whole,
+            gives_way: match &drive.actuator {
+                Actuator::Motor(m) => Some((m.rotor_inertia + gears).to_f64()),
+                Actuator::Linear(_) => (!is_unyielding).then_some(whole),
             },
             gears,
             x: own,
@@ -340,8 +366,13 @@ impl Elastic {
         }
         let first = stages[0].inertia();
         let (m, own_rates) = before_elastic_stage(&at.model, &at.x, at.u, first, taken[0].0);
-        let acceleration = (at.free + taken[0].1) / (at.inertia + first.to_f64());
-        let m_scale = at.free + at.inertia * acceleration;
+        let (acceleration, m_scale) = match at.gives_way {
+            Some(inertia) => {
+                let acceleration = (at.free + taken[0].1) / (inertia + first.to_f64());
+                (acceleration, at.free + inertia * acceleration)
+            }
+            None => (at.free, taken[0].1 + first.to_f64() * at.free),
+        };
         let mut rates: Vec<Dd> = own_rates.iter().copied().collect();
         let mut scales = at.rate_scales(m_scale, acceleration);
         for k in 1..stages.len() {

@@ -124,6 +124,10 @@ pub struct Motor<T> {
 }
 
 /// ẋ = C x + f M + d u (20.74) with the shaft's acceleration θ̈ = T ẋ, in which M is the torque that the shaft puts out.
+///
+/// Where T f ≠ 0, −1/(T f) is the inertia of the shaft, which H* (20.73) takes up. Where T f = 0, as (20.80) allows, there is none: the
+/// shaft moves by θ̈ = T (C x + d u) whatever its load, and M is what that takes. Then the joint that it drives rigidly has θ̈ = n q̈ in place
+/// of its row of H* q̈ + h* = D u.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearActuator<T> {
     /// C, n × n by rows.
@@ -138,6 +142,8 @@ pub struct LinearActuator<T> {
     pub position: Option<Vec<T>>,
     /// Least r with T Cʳ d ≠ 0: how often θ̈ is to be differentiated until u appears.
     pub relative_degree: usize,
+    /// Whether T f = 0: the shaft does not give way to its load.
+    pub is_unyielding: bool,
 }
 
 /// A gear, then a spring with a damper: τ = c (θ/n − θ′) + d (θ̇/n − θ̇′) (20.99) on the next shaft θ′.
@@ -195,6 +201,15 @@ impl<T: Real> Drive<T> {
     /// Whether nothing turns with the joints alone, so that H stays as it is.
     pub fn is_inertia_free(&self) -> bool {
         !self.stages.is_empty() && self.shaft_inertia.is_none()
+    }
+
+    /// The joint that moves as the actuator's state says whatever its load, with its ratio: that of an unyielding actuator with a
+    /// rigid transmission, of which there is one.
+    pub fn held_joint(&self) -> Option<(BodyId, T)> {
+        match (&self.actuator, &self.stages[..], &self.joints[..]) {
+            (Actuator::Linear(a), [], [joint]) if a.is_unyielding => Some(*joint),
+            _ => None,
+        }
     }
 
     /// The same drive without losses and limits, which is affine in x and u.
@@ -258,6 +273,7 @@ impl<T: Real> Actuator<T> {
                     t: all(&a.t),
                     position: a.position.as_ref().map(all),
                     relative_degree: a.relative_degree,
+                    is_unyielding: a.is_unyielding,
                 })
             }
         }

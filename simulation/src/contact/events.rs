@@ -4,7 +4,9 @@ use super::object::{let_go, SLOTS};
 use super::state::{Closed, Parts, Phases, Rows, Seen, Slip, System, GUARDS, RIDGE, SLACK};
 use super::{Event, What};
 use crate::plant::Action;
-use straightline_core::algorithms::{driven_jump, impact, projection, FunctionalCoordinates, Struck, Support};
+use straightline_core::algorithms::{
+    driven_jump, impact, mass_matrix, projection, FunctionalCoordinates, Struck, Support,
+};
 use straightline_core::contact::Coordinate;
 
 /// Slower than this \[m/s\] an open contact that stands on its object is at rest there.
@@ -60,14 +62,20 @@ impl System<'_> {
         let struck = vec![Struck::Rigid; s.len()];
         let factor = self.factor(&state[..nq]);
         let still = impact(&factor, &state[self.velocities()], &s, None, &struck, 0.0, RIDGE);
-        self.jump(state, &still.dqd);
+        self.jump(state, &still.dqd, (&s.jacobian, &still.impulse));
         largest(&s)
     }
 
-    /// q̇ jumps, and what turns with the joints.
-    fn jump(&self, state: &mut [f64], dqd: &[f64]) {
+    /// q̇ jumps, and what turns with the joints, under impulses in these directions.
+    fn jump(&self, state: &mut [f64], dqd: &[f64], (directions, impulses): (&[Vec<f64>], &[f64])) {
         if self.plant.is_driven() {
-            let dx = driven_jump(&self.plant.model, &state[..self.nq()], dqd);
+            let (model, q) = (&self.plant.model, &state[..self.nq()]);
+            let inertial = |row: &[f64]| row.iter().zip(dqd).map(|(h, x)| h * x).sum::<f64>();
+            let mut held: Vec<f64> = mass_matrix(model, q).chunks(dqd.len()).map(inertial).collect();
+            for (row, impulse) in directions.iter().zip(impulses) {
+                held.iter_mut().zip(row).for_each(|(sum, j)| *sum -= j * impulse);
+            }
+            let dx = driven_jump(model, q, dqd, &held);
             state[self.drive_states()].iter_mut().zip(dx).for_each(|(x, d)| *x += d);
         }
         state[self.velocities()].iter_mut().zip(dqd).for_each(|(v, d)| *v += d);
@@ -98,7 +106,7 @@ impl System<'_> {
         let energy = self.energy(t, state, before);
         let given = self.power_of_objects(state, &seen, &rows, &blow.impulse);
         let work = self.work();
-        self.jump(state, &blow.dqd);
+        self.jump(state, &blow.dqd, (&rows.applied, &blow.impulse));
         let own = rows.of[closing].clone();
         if restitution > 0.0 {
             // it leaves again, and so does the mass that it has struck

@@ -12,6 +12,7 @@ use straightline_codegen::description::{self, Description};
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
 use straightline_codegen::experiment::design::Design;
 use straightline_codegen::experiment::{self, parameter, parquet, Experiment};
+use straightline_codegen::singular::{self, Inertia};
 use straightline_codegen::{model, output, scene};
 use straightline_core::drive::Actuator;
 use straightline_core::model::{Body, Model};
@@ -68,14 +69,19 @@ impl analysis::Equations for At<'_> {
     }
 }
 
-fn robot(path: &Path, args: &ModelArgs) -> Result<(Description, Options, Model<f64>), Failure> {
+/// The robot of a file; to be `moved` by forces, its joints have to feel some inertia.
+fn robot(path: &Path, args: &ModelArgs, moved: bool) -> Result<(Description, Options, Model<f64>), Failure> {
     let options = options(None, args)?;
     let source = read(path)?;
     let mut diagnostics = Diagnostics::new();
     let description = description::read(&source, &mut diagnostics);
     scene::check_options(&options, &mut diagnostics);
-    let model = description.as_ref().and_then(|d| built(d, &options, &mut diagnostics));
+    let model = description.as_ref().and_then(|d| built_in_full(d, &options, &mut diagnostics));
+    if let (Some(model), true) = (&model, moved) {
+        singular::demand_inertia_for("a simulation is", model, Inertia::WithDrives, &mut diagnostics);
+    }
     print::diagnostics(&diagnostics, Severity::Warning);
+    let model = model.filter(|_| !diagnostics.has_errors()).map(|model| model.cast());
     description.zip(model).map(|(d, model)| (d, options, model)).ok_or(Failure::Input)
 }
 
@@ -157,11 +163,11 @@ fn start(plant: &Plant, experiment: &Experiment) -> Vec<f64> {
 }
 
 pub fn simulate(a: &Simulate) -> Result<(), Failure> {
-    let (_, options, model) = robot(&a.robot, &a.model)?;
+    let (_, options, model) = robot(&a.robot, &a.model, true)?;
     let controller_model = match &a.controller_robot {
         None => model.clone(),
         Some(path) => {
-            let other = robot(path, &a.model)?.2;
+            let other = robot(path, &a.model, false)?.2;
             if other.nv() != model.nv() {
                 let (path, robot) = (path.display(), a.robot.display());
                 print::error(&format!("{path} has {} velocities, {robot} has {}", other.nv(), model.nv()));
@@ -247,7 +253,7 @@ pub fn print_run(plant: &Plant, run: &simulate::Run) -> Result<(), Failure> {
 }
 
 pub fn analyze(a: &Analyze) -> Result<(), Failure> {
-    let (description, options, model) = robot(&a.robot, &a.model)?;
+    let (description, options, model) = robot(&a.robot, &a.model, false)?;
     let Some(motion) = experiment(&a.motion, &model, &model, false)?.motion else {
         print::error(&format!("{} prescribes no motion", a.motion.display()));
         print::help("write a table [motion]");

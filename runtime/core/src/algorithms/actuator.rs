@@ -2,7 +2,8 @@
 //!
 //! Whatever the actuator, its shaft puts out M = e − J θ̈: e is what it would put out without acceleration, J an inertia. Of
 //! a motor these are C_M i − B θ̇ and the rotor's inertia (20.62). Of ẋ = C x + f M + d u with θ̈ = T ẋ,
-//! T f M = θ̈ − T (C x + d u), so J = −1/(T f) and e = J T (C x + d u). That is why the complete model stays symmetric.
+//! T f M = θ̈ − T (C x + d u), so J = −1/(T f) and e = J T (C x + d u). That is why the complete model stays symmetric. Where T f = 0,
+//! θ̈ = T (C x + d u) is all that there is, and M follows from the motion.
 
 use crate::dd::Dd;
 use crate::drive::{Actuator, Drive, LinearActuator, Motor};
@@ -86,11 +87,32 @@ pub(super) fn free_torque<T: Real>(drive: &Drive<T>, x: &[T], speed: T, u: T) ->
             let i = current(m, drive, x, speed, u);
             FreeTorque { torque: m.torque_constant * i - m.friction * speed, inertia: m.rotor_inertia }
         }
+        Actuator::Linear(a) if a.is_unyielding => FreeTorque { torque: T::zero(), inertia: T::zero() },
         Actuator::Linear(a) => {
             let inertia = equivalent_inertia(a);
-            let rate = dot(&a.t, &state_rate(a, x)) + dot(&a.t, &a.d) * saturated(u, drive.input_limit);
-            FreeTorque { torque: inertia * rate, inertia }
+            FreeTorque { torque: inertia * loadless_acceleration(a, drive, x, u), inertia }
         }
+    }
+}
+
+/// T (C x + d u): θ̈ of a shaft without load.
+fn loadless_acceleration<T: Real>(a: &LinearActuator<T>, drive: &Drive<T>, x: &[T], u: T) -> T {
+    dot(&a.t, &state_rate(a, x)) + dot(&a.t, &a.d) * saturated(u, drive.input_limit)
+}
+
+/// θ̈ of an actuator whose shaft does not give way, in a state; of others `None`.
+pub(super) fn held_acceleration<T: Real>(drive: &Drive<T>, x: &[T], u: T) -> Option<T> {
+    match &drive.actuator {
+        Actuator::Linear(a) if a.is_unyielding => Some(loadless_acceleration(a, drive, x, u)),
+        _ => None,
+    }
+}
+
+/// ∂θ̈/∂u of an actuator whose shaft does not give way; of others `None`.
+pub(super) fn held_gain<T: Real>(actuator: &Actuator<T>) -> Option<T> {
+    match actuator {
+        Actuator::Linear(a) if a.is_unyielding => Some(dot(&a.t, &a.d)),
+        _ => None,
     }
 }
 
@@ -99,6 +121,7 @@ pub(super) fn input_gain<T: Real>(actuator: &Actuator<T>) -> T {
     match actuator {
         Actuator::Motor(m) if m.inductance.is_some() => T::zero(),
         Actuator::Motor(m) => m.torque_constant / m.resistance,
+        Actuator::Linear(a) if a.is_unyielding => T::zero(),
         Actuator::Linear(a) => equivalent_inertia(a) * dot(&a.t, &a.d),
     }
 }
@@ -139,8 +162,8 @@ pub(super) fn state_rate<T: Real>(a: &LinearActuator<T>, x: &[T]) -> Vec<T> {
     a.c.chunks(a.f.len()).map(|row| dot(row, x)).collect()
 }
 
-/// J = −1/(T f); T f is not zero, as the reader of robot files sees to.
-pub(super) fn equivalent_inertia<T: Real>(a: &LinearActuator<T>) -> T {
+/// J = −1/(T f) of a shaft that gives way: T f is not zero.
+fn equivalent_inertia<T: Real>(a: &LinearActuator<T>) -> T {
     -(T::one() / dot(&a.t, &a.f))
 }
 

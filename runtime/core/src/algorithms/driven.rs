@@ -5,17 +5,21 @@
 //! actuators are; the N × N matrix (E − H T F) of (20.80) is never formed. An elastic drive acts by its last spring (20.99), which
 //! the state alone gives, and leaves H as it is.
 //!
+//! **Shafts that do not give way** (T f = 0): (20.80) inverts E − H T F, which is regular however many of the T_j f_j vanish, but there is
+//! no J for H*. A rigid drive of that kind says θ̈ = n q̈ of its joint: q̈ there is known, the other rows are solved without that joint, so
+//! that nothing is divided by what it feels, and its own row gives the torque. Behind springs such a shaft is a state like others.
+//!
 //! **Losses** depend on the direction of power M φ̇, and M on the accelerations. The equations are piecewise linear in q̈:
 //! the directions are guessed from e, and [`PASSES`] times solved for and corrected.
 //!
 //! **Rotors on moving links** (optional): beside ½ J θ̇² the kinetic energy of a rotor has J θ̇ (a · ω) with the link's angular
 //! velocity ω and the axis a. It puts J (Nᵀ g + gᵀ N) into H*, g = aᵀ J_ω, and a gyroscopic moment J θ̇ ω × a on the link.
 
-use super::actuator::{current, inductive_voltage, input_column, input_gain, saturated, state_derivative};
+use super::actuator::{current, held_gain, inductive_voltage, input_column, input_gain, saturated, state_derivative};
 use super::factor::Ltdl;
 use super::jacobian::{jacobian, jacobian_bias};
 use super::solve_articulated;
-use super::transmission::{giving, last_shaft, DriveState};
+use super::transmission::{giving, last_shaft, taking, DriveState};
 use crate::dd::Dd;
 use crate::drive::{Actuator, Drive, Rotor};
 use crate::model::{Body, BodyId, Frame, JointKind, Model};
@@ -73,6 +77,8 @@ pub(super) struct Motion<T> {
     pub phi: Vec<T>,
     /// J a · ω̇ of every rotor on a moving link.
     pub spin: Vec<T>,
+    /// What shafts that do not give way put on their joints, per ratio; of other drives zero.
+    pub put: Vec<T>,
 }
 
 impl<'a, T: Real> Driven<'a, T> {
@@ -98,7 +104,7 @@ impl<'a, T: Real> Driven<'a, T> {
         self.drives[k].joints.iter().map(|(body, n)| (self.model.bodies[*body].joint.iv, *n))
     }
 
-    /// Inertia that turns with the actuator of an elastic drive.
+    /// Inertia that turns with the actuator of an elastic drive, which gives way.
     pub(super) fn first_shaft(&self, k: usize) -> T {
         self.states[k].actuator_inertia + self.drives[k].stages[0].inertia
     }
@@ -123,7 +129,7 @@ impl<'a, T: Real> Driven<'a, T> {
                         add(j, *i, rotor.inertia * *n * *g);
                     }
                 }
-            } else {
+            } else if self.states[k].held.is_none() {
                 // θ̈ is free: what is left of J θ̈ (a · ω̇) when it is eliminated
                 let less = -(rotor.inertia * rotor.inertia / self.first_shaft(k));
                 for (i, a) in spin.g.iter().enumerate() {
@@ -178,7 +184,51 @@ impl<'a, T: Real> Driven<'a, T> {
             }
             _ => T::zero(),
         };
-        Motion { phi: phi.collect(), spin: (0..self.drives.len()).map(spin).collect() }
+        let put = vec![T::zero(); self.drives.len()];
+        Motion { phi: phi.collect(), spin: (0..self.drives.len()).map(spin).collect(), put }
+    }
+
+    /// The joints whose acceleration is known: drive, velocity coordinate, ratio.
+    fn held(&self) -> impl Iterator<Item = (usize, usize, T)> + '_ {
+        let joint = |drive: &Drive<T>| drive.held_joint().map(|(body, n)| (self.model.bodies[body].joint.iv, n));
+        self.drives.iter().enumerate().filter_map(move |(k, drive)| joint(drive).map(|(i, n)| (k, i, n)))
+    }
+
+    /// Whether the actuator of a drive does not give way.
+    pub(super) fn is_unyielding(&self, k: usize) -> bool {
+        self.states[k].held.is_some()
+    }
+
+    /// Whether there are such joints.
+    pub(super) fn holds(&self) -> bool {
+        self.held().next().is_some()
+    }
+
+    /// q̈ of the joints whose acceleration is known, of all others zero.
+    pub(super) fn known(&self) -> Vec<T> {
+        let mut qdd = vec![T::zero(); self.nv()];
+        for (k, i, n) in self.held() {
+            qdd[i] = self.states[k].held.unwrap_or_else(T::zero) / n;
+        }
+        qdd
+    }
+
+    /// What shafts that do not give way put on their joints, from the forces that all joints take, and those that the other drives put there.
+    pub(super) fn put(&self, taken: &[T], others: &[T]) -> Vec<T> {
+        let mut put = vec![T::zero(); self.drives.len()];
+        for (k, i, n) in self.held() {
+            put[k] = (taken[i] - others[i]) / n;
+        }
+        put
+    }
+
+    /// x with H* x = `right` but for the coordinates in which x is `known`.
+    pub(super) fn solve_but(&self, factor: &Ltdl<T>, h: &[T], known: &[T], right: &[T]) -> Vec<T> {
+        if !self.holds() {
+            return factor.solve(right);
+        }
+        let right: Vec<T> = right.iter().zip(times(h, known)).map(|(f, x)| *f - x).collect();
+        factor.solve(&right).into_iter().zip(known).map(|(x, known)| x + *known).collect()
     }
 
     /// q̈ and the losses that go with it.
@@ -204,7 +254,7 @@ impl<'a, T: Real> Driven<'a, T> {
             Links::MassMatrix(h) => {
                 let mut h = h.to_vec();
                 self.add_inertias(&mut h, losses);
-                self.factor(&h).solve(&right)
+                self.solve_but(&self.factor(&h), &h, &self.known(), &right)
             }
             Links::Articulated => {
                 let mut model = self.model.clone();
@@ -224,10 +274,8 @@ impl<'a, T: Real> Driven<'a, T> {
     }
 
     pub(super) fn factor(&self, h: &[T]) -> Ltdl<T> {
-        match joins_branches(self.model, self.drives) {
-            true => Ltdl::factor_dense(self.model, h),
-            false => Ltdl::factor(self.model, h),
-        }
+        let held: Vec<usize> = self.held().map(|(_, i, _)| i).collect();
+        Ltdl::factor_holding(self.model, h, &held, joins_branches(self.model, self.drives))
     }
 
     /// ẋ of a drive for its part of the state, given the motion of the shafts.
@@ -290,6 +338,11 @@ pub(super) fn rotor_forces<T: Real>(
 fn axis_frame<T: Real>(rotor: &Rotor<T>) -> Frame<T> {
     let placement = Transform { rotation: Mat3::identity(), translation: Vec3::zero() };
     Frame { name: alloc::string::String::new(), body: Some(rotor.body), placement }
+}
+
+/// H x, of rows as long as x.
+pub(super) fn times<T: Real>(h: &[T], x: &[T]) -> Vec<T> {
+    h.chunks(x.len()).map(|row| sum(row.iter().zip(x).map(|(h, x)| *h * *x))).collect()
 }
 
 fn sum<T: Real>(terms: impl Iterator<Item = T>) -> T {
@@ -361,20 +414,35 @@ pub fn driven_motion<T: Real>(
 ) -> DrivenMotion<T> {
     let driven = Driven::new(model, &model.drives, (q, qd, x, u));
     let (qdd, losses) = driven.solve(bias, links);
-    driven.finished((x, u), qdd, &losses)
+    let taken = match links {
+        Links::MassMatrix(h) if driven.holds() => {
+            times(h, &qdd).into_iter().zip(bias).map(|(inertial, h)| inertial + *h).collect()
+        }
+        _ => Vec::new(),
+    };
+    driven.finished((x, u), qdd, &losses, &taken)
 }
 
 impl<T: Real> Driven<'_, T> {
-    /// What goes on in the drives at accelerations with their losses.
-    pub(super) fn finished(&self, (x, u): (&[T], &[T]), qdd: Vec<T>, losses: &[T]) -> DrivenMotion<T> {
-        let motion = self.motion(&qdd);
+    /// What goes on in the drives at accelerations with their losses. `taken` is what the joints take from all drives, which is read where
+    /// a shaft does not give way.
+    pub(super) fn finished(&self, (x, u): (&[T], &[T]), qdd: Vec<T>, losses: &[T], taken: &[T]) -> DrivenMotion<T> {
+        let of_others = self.holds().then(|| self.forces(&qdd, losses));
+        let mut motion = self.motion(&qdd);
+        if let Some(others) = &of_others {
+            motion.put = self.put(taken, others);
+        }
         let (mut xd, mut flows) = (Vec::new(), Vec::new());
         for (k, drive) in self.drives.iter().enumerate() {
             let own = &x[xd.len()..xd.len() + drive.states()];
             flows.push(self.flow(k, own, u[k], &motion, losses[k]));
             xd.extend(self.state_derivative(k, own, u[k], &motion));
         }
-        DrivenMotion { tau: self.forces(&qdd, losses), qdd, xd, flows }
+        let mut tau = of_others.unwrap_or_else(|| self.forces(&qdd, losses));
+        for (_, i, _) in self.held() {
+            tau[i] = taken[i];
+        }
+        DrivenMotion { tau, qdd, xd, flows }
     }
 }
 
@@ -400,8 +468,20 @@ impl<T: Real> Driven<'_, T> {
 
     /// M that an actuator puts out.
     fn actuator_torque(&self, k: usize, motion: &Motion<T>) -> T {
-        let state = &self.states[k];
+        let (drive, state) = (&self.drives[k], &self.states[k]);
+        if drive.held_joint().is_some() {
+            let carried = self.carried(k, motion);
+            return drive.shaft_inertia.map_or(carried, |gears| carried + gears * motion.phi[k]);
+        }
+        if let (Some(held), Some(stage)) = (state.held, drive.stages.first()) {
+            return state.stages[0].taken + stage.inertia * held + motion.spin[k];
+        }
         state.actuator_torque - state.actuator_inertia * self.actuator_acceleration(k, motion)
+    }
+
+    /// The torque before the gears of a shaft that does not give way, losses in them.
+    fn carried(&self, k: usize, motion: &Motion<T>) -> T {
+        motion.put[k] * taking(self.drives[k].efficiency, motion.put[k], (self.states[k].speed, None))
     }
 
     /// What goes on in a drive, with its part of the state and its losses.
@@ -431,8 +511,13 @@ impl<T: Real> Driven<'_, T> {
                 dampers = dampers + d * at.stretch.1 * at.stretch.1;
             }
         }
-        let carried = state.free - state.inertia * motion.phi[k];
-        gears = gears + carried * (T::one() - losses) * state.speed;
+        gears = match drive.held_joint() {
+            Some(_) => gears + (self.carried(k, motion) - motion.put[k]) * state.speed,
+            None => {
+                let carried = state.free - state.inertia * motion.phi[k];
+                gears + carried * (T::one() - losses) * state.speed
+            }
+        };
         DriveFlow { torque, speed, voltage, current: i, electrical, joule, friction, gears, dampers, conversion }
     }
 }
@@ -449,7 +534,8 @@ pub fn drive_torques<T: Real>(
 }
 
 /// H*, h* and D of H* q̈ + h* = D u (20.72), (20.73), without losses and limits; h* and D hold for the currents and the other
-/// states in x. `bias` and `mass_matrix` are h and H.
+/// states in x. `bias` and `mass_matrix` are h and H. The row of a joint that a shaft drives which does not give way is that shaft's own
+/// equation n q̈ = T (C x + d u); all others are symmetric among themselves.
 pub fn complete_model<T: Real>(
     model: &Model<T>,
     (q, qd, x): (&[T], &[T], &[T]),
@@ -462,8 +548,16 @@ pub fn complete_model<T: Real>(
     let ideal = vec![T::one(); drives.len()];
     let mut h_star = mass_matrix.to_vec();
     driven.add_inertias(&mut h_star, &ideal);
-    let bias = driven.free_forces(&ideal).into_iter().zip(bias).map(|(f, h)| *h - f).collect();
-    (h_star, bias, driven.input_matrix())
+    let mut bias: Vec<T> = driven.free_forces(&ideal).into_iter().zip(bias).map(|(f, h)| *h - f).collect();
+    let (mut gains, nv, m) = (driven.input_matrix(), model.nv(), drives.len());
+    for (k, i, n) in driven.held() {
+        h_star[i * nv..(i + 1) * nv].fill(T::zero());
+        h_star[i * nv + i] = n;
+        bias[i] = -driven.states[k].held.unwrap_or_else(T::zero);
+        gains[i * m..(i + 1) * m].fill(T::zero());
+        gains[i * m + k] = held_gain(&drives[k].actuator).unwrap_or_else(T::zero);
+    }
+    (h_star, bias, gains)
 }
 
 /// Ĉ(x) and D̂(x), number of states × number of drives, of ẋ = Ĉ + D̂ u (20.81), (20.82), without losses and limits.
@@ -482,11 +576,25 @@ pub fn state_space<T: Real>(
     driven.add_inertias(&mut h_star, &ideal);
     let factor = driven.factor(&h_star);
     let right: Vec<T> = driven.free_forces(&ideal).into_iter().zip(bias).map(|(f, h)| f - *h).collect();
-    let motion = driven.motion(&factor.solve(&right));
+    let qdd = driven.solve_but(&factor, &h_star, &driven.known(), &right);
+    // what joints take beyond what the drives give that do yield: H* q̈ less the right-hand side
+    let put = |qdd: &[T], right: &[T]| match driven.holds() {
+        true => driven.put(&times(&h_star, qdd), right),
+        false => vec![T::zero(); m],
+    };
+    let motion = Motion { put: put(&qdd, &right), ..driven.motion(&qdd) };
     let gains = driven.input_matrix();
     let column = |k: usize| (0..nv).map(|i| gains[i * m + k]).collect::<Vec<T>>();
     // motions of the shafts per unit of each input
-    let per_input: Vec<Motion<T>> = (0..m).map(|k| driven.motion_per_input(&factor.solve(&column(k)))).collect();
+    let per_input = |k: usize| {
+        let mut known = vec![T::zero(); nv];
+        for (_, i, n) in driven.held().filter(|held| held.0 == k) {
+            known[i] = held_gain(&drives[k].actuator).unwrap_or_else(T::zero) / n;
+        }
+        let qdd = driven.solve_but(&factor, &h_star, &known, &column(k));
+        Motion { put: put(&qdd, &column(k)), ..driven.motion_per_input(&qdd) }
+    };
+    let per_input: Vec<Motion<T>> = (0..m).map(per_input).collect();
     let (mut drift, mut gain): (Vec<T>, Vec<T>) = (Vec::new(), Vec::new());
     for (k, drive) in drives.iter().enumerate() {
         let own = &x[drift.len()..drift.len() + drive.states()];
@@ -511,7 +619,7 @@ impl<T: Real> Driven<'_, T> {
                     d[i * m + k] = d[i * m + k] + n * gain;
                 }
             } else if let (Some(spin), Some(rotor)) = (&self.spins[k], &drive.rotor) {
-                let theta = gain / self.first_shaft(k);
+                let theta = held_gain(&drive.actuator).unwrap_or_else(|| gain / self.first_shaft(k));
                 for (i, g) in spin.g.iter().enumerate() {
                     d[i * m + k] = d[i * m + k] - rotor.inertia * theta * *g;
                 }
@@ -527,7 +635,7 @@ impl<T: Real> Driven<'_, T> {
             (Some(spin), Some(rotor)) => x - rotor.inertia * spin.bias,
             _ => x,
         });
-        Motion { phi: motion.phi, spin: spin.collect() }
+        Motion { spin: spin.collect(), ..motion }
     }
 
     /// ∂ẋ of drive k per input l, whose motion of the shafts is `motion`.
@@ -535,9 +643,17 @@ impl<T: Real> Driven<'_, T> {
         let (drive, state) = (&self.drives[k], &self.states[k]);
         let (own, o) = (k == l, T::zero());
         let gain = if own { input_gain(&drive.actuator) } else { o };
-        let acceleration = match drive.stages.is_empty() {
-            true => motion.phi[k],
-            false => (gain - motion.spin[k]) / self.first_shaft(k),
+        let held = held_gain(&drive.actuator);
+        let acceleration = match (drive.stages.is_empty(), held) {
+            (true, _) => motion.phi[k],
+            (false, Some(held)) => {
+                if own {
+                    held
+                } else {
+                    o
+                }
+            }
+            (false, None) => (gain - motion.spin[k]) / self.first_shaft(k),
         };
         let mut rates = match own {
             true => input_column(&drive.actuator),
@@ -546,7 +662,11 @@ impl<T: Real> Driven<'_, T> {
         match &drive.actuator {
             Actuator::Motor(_) => rates[1] = acceleration,
             Actuator::Linear(a) => {
-                let torque = gain - state.actuator_inertia * acceleration;
+                let torque = match (drive.stages.first(), held) {
+                    (_, None) => gain - state.actuator_inertia * acceleration,
+                    (Some(stage), _) => stage.inertia * acceleration + motion.spin[k],
+                    (None, _) => motion.put[k] + drive.shaft_inertia.map_or(o, |gears| gears * acceleration),
+                };
                 rates.iter_mut().zip(&a.f).for_each(|(rate, f)| *rate = *rate + *f * torque);
             }
         }

@@ -18,8 +18,8 @@ use crate::taylor::Taylor;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// The most derivatives of a torque that are computed.
-const MOST: usize = 7;
+/// The most derivatives of a torque that are computed: fifteen elastic stages one after the other, and an inductance.
+pub const MOST_DERIVATIVES: usize = 31;
 
 /// What the inverse problem of a robot needs of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +34,7 @@ pub fn reads_states<T>(drives: &[Drive<T>]) -> bool {
 }
 
 /// What the inverse problem needs; `None` if the inputs do not follow from the motion (ratios that are no regular square
-/// matrix, a rotor in space on an elastic drive) or more than seven derivatives are wanted.
+/// matrix, a rotor in space on an elastic drive) or more than [`MOST_DERIVATIVES`] are wanted.
 pub fn inverse_orders<T>(drives: &[Drive<T>]) -> Option<InverseOrders> {
     let mut of_torque = 0;
     for drive in drives {
@@ -48,7 +48,7 @@ pub fn inverse_orders<T>(drives: &[Drive<T>]) -> Option<InverseOrders> {
         let stages: usize = drive.stages.iter().map(|s| if s.damping.is_some() { 1 } else { 2 }).sum();
         of_torque = of_torque.max(own + stages);
     }
-    (of_torque <= MOST).then_some(InverseOrders { of_torque })
+    (of_torque <= MOST_DERIVATIVES).then_some(InverseOrders { of_torque })
 }
 
 /// Inputs u and actuator torques M \[N·m\] of a motion, as [`drive_demands`].

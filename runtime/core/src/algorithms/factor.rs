@@ -30,24 +30,37 @@ impl<T: Real> Ltdl<T> {
     /// joint moves some mass or inertia; a joint that moves none has no forward dynamics, and what comes out is not
     /// finite.
     pub fn factor(model: &Model<T>, mass_matrix: &[T]) -> Self {
-        Self::factor_along(model, branches(model), mass_matrix)
+        Self::factor_along(model, branches(model), mass_matrix, &[])
+    }
+
+    /// The same with coordinates that do not move, by their indices: what [`solve`](Ltdl::solve) gives is zero there, and elsewhere what
+    /// the matrix without their rows and columns gives. They are not divided by, whatever their joints feel.
+    pub fn factor_holding(model: &Model<T>, matrix: &[T], held: &[usize], is_dense: bool) -> Self {
+        let mut chain = branches(model);
+        if is_dense {
+            chain.parents = (0..chain.coordinates.len()).map(|row| row.checked_sub(1)).collect();
+        }
+        Self::factor_along(model, chain, matrix, held)
     }
 
     /// The same for a symmetric matrix with entries anywhere, as if all joints stood on one branch.
     pub fn factor_dense(model: &Model<T>, matrix: &[T]) -> Self {
-        let mut chain = branches(model);
-        chain.parents = (0..chain.coordinates.len()).map(|row| row.checked_sub(1)).collect();
-        Self::factor_along(model, chain, matrix)
+        Self::factor_holding(model, matrix, &[], true)
     }
 
-    fn factor_along(model: &Model<T>, branches: Branches, mass_matrix: &[T]) -> Self {
+    fn factor_along(model: &Model<T>, branches: Branches, mass_matrix: &[T], held: &[usize]) -> Self {
         let nv = model.nv();
         let Branches { coordinates, bodies, parents } = branches;
         // the triangle below the diagonal, in the order of the rows; it becomes L in place
-        let entry = |row: usize, column: usize| mass_matrix[coordinates[row] * nv + coordinates[column]];
+        let is_held = |row: usize| held.contains(&coordinates[row]);
+        let entry = |row: usize, column: usize| match is_held(row) || is_held(column) {
+            true => T::zero(),
+            false => mass_matrix[coordinates[row] * nv + coordinates[column]],
+        };
         let mut lower: Vec<Vec<T>> = (0..nv).map(|i| (0..=i).map(|j| entry(i, j)).collect()).collect();
         let mut inverse_pivots = vec![T::zero(); nv];
-        for k in (0..nv).rev() {
+        // what is held has an infinite pivot
+        for k in (0..nv).rev().filter(|k| !is_held(*k)) {
             T::section("factor", Some(bodies[k]));
             let inverse_pivot = (T::one() / lower[k][k]).named("inverse_pivot", coordinates[k], "");
             inverse_pivots[k] = inverse_pivot;

@@ -92,7 +92,9 @@ pub use driven::{
     state_space, DriveFlow, DrivenMotion, Links,
 };
 pub use driven_contact::{driven_contact_motion, driven_factor, driven_jump, ContactRows};
-pub use driven_inverse::{drive_demands, driven_inverse, inverse_orders, reads_states, Demand, InverseOrders};
+pub use driven_inverse::{
+    drive_demands, driven_inverse, inverse_orders, reads_states, Demand, InverseOrders, MOST_DERIVATIVES,
+};
 pub use effects::{passive_force, rotor_inertias};
 pub use energy::{kinetic_energy, potential_energy};
 pub use environment::{Environment, EnvironmentMotion, SpringDamper};

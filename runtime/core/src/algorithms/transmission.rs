@@ -1,6 +1,6 @@
 //! Transmissions: gears with losses, elastic stages one after the other (handbook chapter, (20.68), (20.69), (20.98), (20.99)).
 
-use super::actuator::{actuator_angle, actuator_speed, free_torque};
+use super::actuator::{actuator_angle, actuator_speed, free_torque, held_acceleration};
 use crate::drive::{Drive, Efficiency};
 use crate::model::Model;
 use crate::real::Real;
@@ -21,6 +21,8 @@ pub(super) struct DriveState<T> {
     pub actuator_torque: T,
     /// The actuator's own inertia J.
     pub actuator_inertia: T,
+    /// θ̈ of the actuator's shaft, if it does not give way.
+    pub held: Option<T>,
     /// The elastic stages.
     pub stages: Vec<StageState<T>>,
 }
@@ -47,10 +49,15 @@ impl<T: Real> DriveState<T> {
         let mut state = DriveState {
             speed: phi_dot,
             free: own.torque,
-            inertia: drive.shaft_inertia.map_or(own.inertia, |gears| own.inertia + gears),
+            // what turns with a shaft that does not give way is that shaft's load
+            inertia: match drive.held_joint() {
+                Some(_) => T::zero(),
+                None => drive.shaft_inertia.map_or(own.inertia, |gears| own.inertia + gears),
+            },
             actuator_speed: speed,
             actuator_torque: own.torque,
             actuator_inertia: own.inertia,
+            held: held_acceleration(drive, x, u),
             stages: Vec::new(),
         };
         if drive.stages.is_empty() {
@@ -77,6 +84,9 @@ impl<T: Real> DriveState<T> {
 
     /// θ̈ of the shaft before stage k, (20.98) with (20.62); `spin` is what the link's turning adds to the actuator's.
     pub fn shaft_acceleration(&self, drive: &Drive<T>, k: usize, spin: T) -> T {
+        if let (0, Some(held)) = (k, self.held) {
+            return held;
+        }
         let (driving, inertia) = match k {
             0 => (self.actuator_torque - spin, self.actuator_inertia + drive.stages[0].inertia),
             _ => (self.stages[k - 1].torque, drive.stages[k].inertia),

@@ -5,7 +5,6 @@
 //! connection. The matrices are inverted as they stand, without looking for symmetry. Elastic transmissions follow
 //! (20.98), (20.99), stage after stage; efficiencies are found by trying all combinations of directions.
 
-use super::solve_symmetric;
 use crate::dd::Dd;
 use alloc::vec::Vec;
 use nalgebra::{DMatrix, DVector};
@@ -110,22 +109,24 @@ impl UnitedModel {
     }
 
     /// The motion under u. The acceleration of the shafts is θ̈ = T (C x + F M + D u) and N q̈, with H q̈ + h = Nᵀ r M: one
-    /// linear system for M.
+    /// linear system for q̈ and M, which is regular where H T F of (20.80) may vanish, and H itself.
     pub fn solve(&self, x: &DVector<Dd>, u: &DVector<Dd>) -> UnitedMotion {
         let [c, f, d, t] = self.stacked();
         let n = &self.ratios;
+        let (m, nv) = (n.nrows(), n.ncols());
         let to_joints = n.transpose() * DMatrix::from_diagonal(&self.losses);
-        let mut per_torque = to_joints.clone();
-        for mut column in per_torque.column_iter_mut() {
-            let solved = solve_symmetric(&self.h_matrix, &column.clone_owned());
-            column.copy_from(&solved);
-        }
         let free = &c * x + &d * u;
-        let matrix = &t * &f - n * per_torque;
-        let right = -(n * solve_symmetric(&self.h_matrix, &self.h)) - &t * &free;
-        let torques = solve_general(matrix, right);
+        let mut matrix = DMatrix::from_element(nv + m, nv + m, Dd::ZERO);
+        matrix.view_mut((0, 0), (nv, nv)).copy_from(&self.h_matrix);
+        matrix.view_mut((0, nv), (nv, m)).copy_from(&-&to_joints);
+        matrix.view_mut((nv, 0), (m, nv)).copy_from(n);
+        matrix.view_mut((nv, nv), (m, m)).copy_from(&-(&t * &f));
+        let mut right = DVector::from_element(nv + m, Dd::ZERO);
+        right.rows_mut(0, nv).copy_from(&-&self.h);
+        right.rows_mut(nv, m).copy_from(&(&t * &free));
+        let solution = solve_general(matrix, right);
+        let (qdd, torques) = (solution.rows(0, nv).clone_owned(), solution.rows(nv, m).clone_owned());
         let tau = to_joints * &torques;
-        let qdd = solve_symmetric(&self.h_matrix, &(&tau - &self.h));
         UnitedMotion { xd: free + f * &torques, torques, tau, qdd }
     }
 
