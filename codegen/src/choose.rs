@@ -8,7 +8,7 @@ use crate::emit::Scalar;
 use crate::expr::{Counts, Graph, DIVISION};
 use crate::forward_method;
 use crate::function::{DriveFunction, Function, Robot};
-use crate::reduce::{lengths, reduce, Choice};
+use crate::reduce::{is_in_proportion, lengths, longest_lever, reduce, Choice};
 use crate::rounding;
 use crate::scene::{Contacts, Gravity, Scene};
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
@@ -169,10 +169,13 @@ impl Search<'_> {
         if self.tried.contains_key(&hash) {
             return None;
         }
-        let (counts, graph) = self.counted();
-        let mut cost = price(counts);
-        if cost < least && !self.keeps_digits(&graph) {
-            cost = NEVER;
+        let mut cost = NEVER;
+        if is_in_proportion(&self.robot.model, &self.robot.reduced) {
+            let (counts, graph) = self.counted();
+            cost = price(counts);
+            if cost < least && !self.keeps_digits(&graph) {
+                cost = NEVER;
+            }
         }
         self.tried.insert(hash, cost);
         (cost < least).then_some(cost)
@@ -373,7 +376,8 @@ impl Ways {
         if self.fixed_unit {
             return Vec::new();
         }
-        let mut units = lengths(&reduce(&robot.model, &Choice { unit: Dd::ONE, ..choice.clone() }).0);
+        let metres = reduce(&robot.model, &Choice { unit: Dd::ONE, ..choice.clone() }).0;
+        let mut units = lengths(&metres, longest_lever(&robot.model));
         units.truncate(UNITS);
         units
     }

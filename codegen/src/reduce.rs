@@ -6,16 +6,20 @@
 use straightline_core::model::{Body, BodyId, JointKind, Model};
 use straightline_core::reduced::{ReducedBody, ReducedModel};
 use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
-use straightline_core::Dd;
+use straightline_core::{Dd, Real};
 
 /// Where rounding in double-double ends: smaller entries of rotations, or lengths against the robot's, are zero.
 const DUST: f64 = 1e-28;
 /// Below this sine two axes are taken as parallel when a frame is chosen; the transform itself stays exact.
 const NEARLY_PARALLEL: f64 = 1e-4;
 
-/// So many times as far as the next origin the foot of a common normal may be: beyond, axes are so nearly parallel that the lever
-/// would cancel.
+/// So many times as far as the next origin, and so many times the robot's longest lever, the foot of a common normal may be: beyond,
+/// axes are so nearly parallel that the lever would cancel.
 const FAR: f64 = 10.0;
+/// A part of a lever beside an axis sets no direction where it is less than this part of the robot's longest lever.
+const BESIDE: f64 = 1e-8;
+/// A unit of length is at most so many times the robot's longest lever, or such a part of it.
+const UNIT_RANGE: f64 = 1e3;
 
 /// What is free in a reduced form; torques depend on none of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,21 +85,37 @@ impl Choice {
     }
 }
 
-/// Least length \[m\], or sine, by which a parameter that vanishes may be divided.
+/// Least sine, or part of the robot's longest lever, by which a parameter that vanishes may be divided.
 const WORTH: f64 = 0.02;
+
+/// The longest lever of a robot \[m\]: from a joint to the next, or to a centre of mass. What is long and what is short is said against it.
+pub fn longest_lever(model: &Model<Dd>) -> f64 {
+    // where the base stands makes no difference
+    let to_joints = model.bodies.iter().filter(|b| b.parent.is_some()).map(|b| b.placement.translation);
+    let longest = to_joints.chain(model.bodies.iter().map(|b| b.inertia.com)).map(norm).fold(0.0, f64::max);
+    match longest > 0.0 {
+        true => longest,
+        false => 1.0,
+    }
+}
+
+fn norm(v: Vec3<Dd>) -> f64 {
+    v.to_array().into_iter().map(Dd::hi).fold(0.0, f64::hypot)
+}
 
 /// The reduced robot, and the pose of each of its frames in the body's canonical frame.
 pub fn reduce(model: &Model<Dd>, choice: &Choice) -> (ReducedModel<Dd>, Vec<Transform<Dd>>) {
-    let regauge = choose_frames(model, choice);
+    let lever = longest_lever(model);
+    let regauge = choose_frames(model, lever, choice);
     let mut bodies: Vec<ReducedBody<Dd>> =
         model.bodies.iter().enumerate().map(|(i, b)| in_new_frame(model, &regauge, i, b)).collect();
     for i in (0..bodies.len()).filter(|i| is_tip(model, *i)) {
         turn_tip(&mut bodies[i], [0, 1, 2].map(|k| choice.turned_tips[k][i]));
-        shift_tip(&mut bodies[i], [0, 1].map(|k| choice.shifted_tips[k][i]));
+        shift_tip(&mut bodies[i], lever, [0, 1].map(|k| choice.shifted_tips[k][i]));
     }
     for i in (0..bodies.len()).rev().filter(|i| choice.regrouped[*i]) {
         let balances = [0, 1].map(|k| choice.axial_balances[k][i]);
-        regroup(&mut bodies, i, [0, 1, 2].map(|k| choice.vanish_at_parent[k][i]), balances);
+        regroup(&mut bodies, i, lever, [0, 1, 2].map(|k| choice.vanish_at_parent[k][i]), balances);
     }
     let adds_angles = choice.adds_angles;
     let mut reduced = ReducedModel { bodies, gravity: model.gravity, per_unit: Dd::ONE, adds_angles };
@@ -113,6 +133,36 @@ pub fn reduce(model: &Model<Dd>, choice: &Choice) -> (ReducedModel<Dd>, Vec<Tran
         body.doubled = [0, 1].map(|k| choice.doubled[k][i] && derived);
     }
     (in_unit(reduced, choice.unit), regauge)
+}
+
+/// Levers and inertial parameters of a reduced robot are at most so many times the robot's own.
+const PROPORTION: f64 = 1e4;
+
+/// Whether the numbers of a reduced robot are in proportion to the robot's own, however its frames and parameters were moved; a lever more
+/// for each moment. Otherwise torques would be what is left of numbers that cancel.
+pub fn is_in_proportion(model: &Model<Dd>, reduced: &ReducedModel<Dd>) -> bool {
+    let lever = longest_lever(model);
+    let sum = |of: &dyn Fn(&Body<Dd>) -> f64| model.bodies.iter().map(of).sum::<f64>();
+    let mass = sum(&|b| b.inertia.mass.hi());
+    let inertia = sum(&|b| {
+        let i = b.inertia.inertia_com;
+        i.xx.hi() + i.yy.hi() + i.zz.hi()
+    }) + mass * lever * lever;
+    // lengths in metres again
+    let metre = reduced.per_unit.hi();
+    reduced.bodies.iter().zip(&model.bodies).all(|(body, old)| {
+        let stands = if old.parent.is_none() { norm(old.placement.translation) } else { 0.0 };
+        let s = body.second_moment;
+        let second_moment = [s.xx, s.xy, s.xz, s.yy, s.yz, s.zz].map(Dd::hi).into_iter().fold(0.0, f64::hypot);
+        [
+            (norm(body.translation) / metre, lever + stands),
+            (body.mass.hi().abs() * metre * metre, mass),
+            (norm(body.first_moment) * metre, mass * lever),
+            (second_moment, inertia),
+        ]
+        .into_iter()
+        .all(|(found, own)| found <= PROPORTION * own)
+    })
 }
 
 fn is_tip(model: &Model<Dd>, i: BodyId) -> bool {
@@ -158,13 +208,13 @@ fn turn_tip(body: &mut ReducedBody<Dd>, vanishes: [bool; 3]) {
 }
 
 /// Moves the origin of a tip along its axis so that Σ_xz, or else Σ_yz, vanishes.
-fn shift_tip(body: &mut ReducedBody<Dd>, vanishes: [bool; 2]) {
+fn shift_tip(body: &mut ReducedBody<Dd>, lever: f64, vanishes: [bool; 2]) {
     if body.kind != JointKind::Revolute {
         return;
     }
     let (m, ms, s) = (body.mass, body.first_moment, body.second_moment);
     // as for parameters that vanish at the parent: never by a small divisor
-    let far = |x: Dd| x.abs().hi() > WORTH * m.hi();
+    let far = |x: Dd| x.abs().hi() > WORTH * lever * m.hi();
     let height = match vanishes {
         [true, _] if far(ms.x) => s.xz / ms.x,
         [_, true] if far(ms.y) => s.yz / ms.y,
@@ -197,7 +247,7 @@ fn in_unit(mut reduced: ReducedModel<Dd>, unit: Dd) -> ReducedModel<Dd> {
     }
     assert!(reduced.bodies.iter().all(|b| b.kind != JointKind::Prismatic), "a unit of length is for turning joints");
     for body in &mut reduced.bodies {
-        body.translation = body.translation.map(|x| special(x / unit));
+        body.translation = body.translation.map(|x| if is_about(x.abs(), unit) { Real::sign(x) } else { x / unit });
         body.first_moment = body.first_moment.scale(unit);
         let mass = body.mass * unit * unit;
         body.mass = mass;
@@ -208,8 +258,8 @@ fn in_unit(mut reduced: ReducedModel<Dd>, unit: Dd) -> ReducedModel<Dd> {
 }
 
 /// Units of length that make a number one, each once, the most frequent first: lengths between joints, then of gravity and
-/// first moments.
-pub fn lengths(reduced: &ReducedModel<Dd>) -> Vec<Dd> {
+/// first moments. None of them is out of proportion to the robot: what is as small as dust is no unit.
+pub fn lengths(reduced: &ReducedModel<Dd>, lever: f64) -> Vec<Dd> {
     let mut found: Vec<(Dd, usize)> = Vec::new();
     if reduced.bodies.iter().any(|b| b.kind == JointKind::Prismatic) {
         return Vec::new();
@@ -218,8 +268,9 @@ pub fn lengths(reduced: &ReducedModel<Dd>) -> Vec<Dd> {
     let between = bodies().flat_map(|b| b.translation.to_array());
     let moments = bodies().flat_map(|b| b.first_moment.to_array()).filter(|x| *x != Dd::ZERO).map(|x| Dd::ONE / x);
     let all = between.chain(reduced.gravity.to_array()).chain(moments);
-    for x in all.map(Dd::abs).filter(|x| *x != Dd::ZERO) {
-        match found.iter_mut().find(|(y, _)| (x - *y).abs().hi() < DUST * y.hi()) {
+    let in_proportion = |x: &Dd| (lever / UNIT_RANGE..=lever * UNIT_RANGE).contains(&x.hi());
+    for x in all.map(Dd::abs).filter(in_proportion) {
+        match found.iter_mut().find(|(y, _)| is_about(x, *y)) {
             Some((_, times)) => *times += 1,
             None => found.push((x, 1)),
         }
@@ -228,12 +279,17 @@ pub fn lengths(reduced: &ReducedModel<Dd>) -> Vec<Dd> {
     found.into_iter().map(|(x, _)| x).collect()
 }
 
+/// Whether double-double cannot tell two positive numbers apart.
+fn is_about(x: Dd, y: Dd) -> bool {
+    (x - y).abs().hi() < DUST * y.hi()
+}
+
 /// For each body the pose of its new frame in its canonical one: turned about z and shifted along it; for a prismatic
 /// joint the origin may be anywhere.
 ///
 /// From the tips to the base: x along the common normal to the axis of the first child with the most descendants, the
 /// origin at the normal's foot.
-fn choose_frames(model: &Model<Dd>, choice: &Choice) -> Vec<Transform<Dd>> {
+fn choose_frames(model: &Model<Dd>, lever: f64, choice: &Choice) -> Vec<Transform<Dd>> {
     let n = model.bodies.len();
     let mut size = vec![1usize; n];
     for i in (0..n).rev() {
@@ -253,10 +309,10 @@ fn choose_frames(model: &Model<Dd>, choice: &Choice) -> Vec<Transform<Dd>> {
         }
         chosen[i] = match primary(i) {
             Some(c) => {
-                let before = foot_before(model, body).filter(|_| choice.origin_at_parent[i]);
-                along_common_normal(body, &model.bodies[c], &chosen[c], before)
+                let before = foot_before(model, body, lever).filter(|_| choice.origin_at_parent[i]);
+                along_common_normal(body, &model.bodies[c], &chosen[c], before, lever)
             }
-            None => tip_frame(model, body),
+            None => tip_frame(model, body, lever),
         };
     }
     // behind a parallel axis: level with the origin there, so that the arm has one component less
@@ -266,15 +322,18 @@ fn choose_frames(model: &Model<Dd>, choice: &Choice) -> Vec<Transform<Dd>> {
         let u = body.placement.rotation.column(2);
         let parallel = (u.x * u.x + u.y * u.y).hi() < NEARLY_PARALLEL * NEARLY_PARALLEL;
         if parallel && (is_tip(model, i) || choice.origin_at_parent[i]) {
-            let height = (chosen[p].translation.z - body.placement.translation.z) / u.z;
-            chosen[i].translation = dusted(Vec3::new(Dd::ZERO, Dd::ZERO, height));
+            let (to, from) = (chosen[p].translation.z, body.placement.translation.z);
+            let height = dusted((to - from) / u.z, to.abs().hi() + from.abs().hi());
+            if height.abs().hi() <= FAR * lever {
+                chosen[i].translation = Vec3::new(Dd::ZERO, Dd::ZERO, height);
+            }
         }
     }
     chosen
 }
 
 /// How high on its axis a revolute body has the foot of the common normal with the axis of a revolute joint before it.
-fn foot_before(model: &Model<Dd>, body: &Body<Dd>) -> Option<Dd> {
+fn foot_before(model: &Model<Dd>, body: &Body<Dd>, lever: f64) -> Option<Dd> {
     let turns = |b: &Body<Dd>| b.joint.kind == JointKind::Revolute;
     let parent = body.parent.map(|p| &model.bodies[p])?;
     let (p, u) = (body.placement.translation, body.placement.rotation.column(2));
@@ -282,12 +341,12 @@ fn foot_before(model: &Model<Dd>, body: &Body<Dd>) -> Option<Dd> {
     // foot on {p + s u} of the common normal with the parent's z axis: (p + s u) · (u − u_z z) = 0
     let foot = || -(p.dot(u) - p.z * u.z) / sine2;
     let found = (turns(body) && turns(parent) && sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL).then(foot);
-    found.filter(|height| !is_far(*height, p))
+    found.filter(|height| !is_far(*height, p, lever))
 }
 
-/// Whether a height on an axis is far beyond a lever.
-fn is_far(height: Dd, lever: Vec3<Dd>) -> bool {
-    height.abs().hi() > FAR * lever.dot(lever).sqrt().hi()
+/// Whether a height on an axis is far beyond the way to the next origin, or beyond the robot's longest lever.
+fn is_far(height: Dd, way: Vec3<Dd>, longest: f64) -> bool {
+    height.abs().hi() > FAR * norm(way).min(longest)
 }
 
 /// The frame of `body` with x along the common normal of its axis and its child's, and the origin at the normal's foot, or
@@ -297,6 +356,7 @@ fn along_common_normal(
     child: &Body<Dd>,
     child_frame: &Transform<Dd>,
     other_height: Option<Dd>,
+    lever: f64,
 ) -> Transform<Dd> {
     let to_child = child.placement.compose(child_frame);
     let (u, p) = (to_child.rotation.column(2), to_child.translation);
@@ -305,51 +365,61 @@ fn along_common_normal(
     let (x_axis, height) = if sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL {
         // z × u; the foot on z of the common normal of {h z} and {p + s u}; the line of a sliding joint may be anywhere
         let foot = (p.z - u.z * p.dot(u)) / sine2;
-        let height = if slides || is_far(foot - p.z, p) { p.z } else { foot };
+        let height = if slides || is_far(foot - p.z, p, lever) { p.z } else { foot };
         (unit_xy(-u.y, u.x), height)
-    } else if (p.x * p.x + p.y * p.y).hi() > 1e-20 && !slides {
+    } else if (p.x * p.x + p.y * p.y).hi() > (BESIDE * lever).powi(2) && !slides {
         (unit_xy(p.x, p.y), p.z)
     } else {
         // on one line: as the child's, so that nothing turns
         let x = to_child.rotation.column(0);
         (unit_xy(x.x, x.y), p.z)
     };
-    pose_about_z(body, x_axis, other_height.unwrap_or(height), p)
+    pose_about_z(body, x_axis, other_height.unwrap_or(height), Some(p), lever)
 }
 
 /// A tip's frame: on the foot of the common normal with the axis before it, and turned so that no constant turn remains.
-fn tip_frame(model: &Model<Dd>, body: &Body<Dd>) -> Transform<Dd> {
+fn tip_frame(model: &Model<Dd>, body: &Body<Dd>, lever: f64) -> Transform<Dd> {
     let (r, p) = (body.placement.rotation, body.placement.translation);
     let u = r.column(2);
     let sine2 = u.x * u.x + u.y * u.y;
-    let free = Vec3::zero();
     if body.parent.is_none_or(|p| model.bodies[p].joint.kind == JointKind::Floating) {
         return Transform::identity();
     }
     if sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL {
         // foot on {p + s u} of the common normal with the parent's z axis: (p + s u) · (u − u_z z) = 0
         let foot = -(p.dot(u) - p.z * u.z) / sine2;
-        let s = if is_far(foot, p) { -(p.z * u.z) } else { foot };
+        let s = if is_far(foot, p, lever) { -(p.z * u.z) } else { foot };
         // x so that it is the parent's common normal, z × u, in own axes
         let x = r.transpose_mul(Vec3::new(-u.y, u.x, Dd::ZERO));
-        pose_about_z(body, unit_xy(x.x, x.y), s, free)
+        pose_about_z(body, unit_xy(x.x, x.y), s, None, lever)
     } else {
         // parallel: in the plane of the parent's origin, axes as the parent's
         let x = r.row(0);
-        pose_about_z(body, unit_xy(x.x, x.y), -(p.z * u.z), free)
+        pose_about_z(body, unit_xy(x.x, x.y), -(p.z * u.z), None, lever)
     }
 }
 
-fn pose_about_z(body: &Body<Dd>, (c, s): (Dd, Dd), height: Dd, child_origin: Vec3<Dd>) -> Transform<Dd> {
+/// Turned about z, and moved along it unless that is out of proportion to the robot's longest lever.
+fn pose_about_z(
+    body: &Body<Dd>,
+    (c, s): (Dd, Dd),
+    height: Dd,
+    child_origin: Option<Vec3<Dd>>,
+    lever: f64,
+) -> Transform<Dd> {
     let z = Vec3::unit_z();
     let x = Vec3::new(c, s, Dd::ZERO);
     let rotation = Mat3::from_columns(x, z.cross(x), z);
     let translation = match body.joint.kind {
         // anywhere: where the child is, so that its arm vanishes
-        JointKind::Prismatic => child_origin,
-        _ => Vec3::new(Dd::ZERO, Dd::ZERO, height),
+        JointKind::Prismatic => child_origin.unwrap_or(Vec3::zero()),
+        _ if height.abs().hi() > FAR * lever => Vec3::zero(),
+        _ => {
+            let terms = norm(child_origin.unwrap_or(body.placement.translation));
+            Vec3::new(Dd::ZERO, Dd::ZERO, dusted(height, terms))
+        }
     };
-    Transform { rotation, translation: dusted(translation) }
+    Transform { rotation, translation }
 }
 
 /// A direction in the x-y plane, of length one, special values exact.
@@ -368,8 +438,13 @@ fn special(x: Dd) -> Dd {
     x
 }
 
-fn dusted(v: Vec3<Dd>) -> Vec3<Dd> {
-    v.map(|x| if x.abs().hi() < DUST { Dd::ZERO } else { x })
+/// A sum of terms of this size: exactly 0 where double-double cannot tell.
+fn dusted(x: Dd, size: f64) -> Dd {
+    if x.abs().hi() < DUST * size {
+        Dd::ZERO
+    } else {
+        x
+    }
 }
 
 /// A body with its inertia in its new frame, and its joint between new frames.
@@ -380,6 +455,7 @@ fn in_new_frame(model: &Model<Dd>, frames: &[Transform<Dd>], i: BodyId, body: &B
         None => Transform::identity(),
     };
     let joint = from_parent.compose(&body.placement).compose(own);
+    let terms = [from_parent, body.placement, *own].map(|x| norm(x.translation)).iter().sum::<f64>();
     let inertia = &body.inertia;
     let r = own.rotation.transpose();
     let com = own.rotation.transpose_mul(inertia.com - own.translation);
@@ -401,7 +477,7 @@ fn in_new_frame(model: &Model<Dd>, frames: &[Transform<Dd>], i: BodyId, body: &B
         rotation,
         offset,
         phase: None,
-        translation: dusted(joint.translation),
+        translation: joint.translation.map(|x| dusted(x, terms)),
         mass: moved.mass,
         first_moment: moved.first_moment,
         second_moment: moved.second_moment,
@@ -446,7 +522,7 @@ fn split_turn(r: &Mat3<Dd>) -> (Mat3<Dd>, (Dd, Dd)) {
 ///
 /// Any part of it may stay: where `vanish` says so, as much is moved as makes that component of the parent vanish; where
 /// `balances` says so, as much as leaves Σ_zz = −Σ_xx or −Σ_yy.
-fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, vanish: [Option<usize>; 3], balances: [bool; 2]) {
+fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, lever: f64, vanish: [Option<usize>; 3], balances: [bool; 2]) {
     let body = bodies[i].clone();
     let zero = Dd::ZERO;
     let (rotation, a, p) = (body.rotation, body.rotation.column(2), body.translation);
@@ -458,10 +534,10 @@ fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, vanish: [Option<usize>; 3],
                 let (ms, s) = (before.first_moment.to_array(), before.second_moment);
                 let (s, p, a) = ([s.xx, s.yy, s.zz], p.to_array(), a.to_array());
                 // never by a small divisor: that would make large parameters that cancel
-                let by = |k: Option<usize>, x: &[Dd; 3]| k.filter(|k| x[*k].abs().hi() > WORTH);
+                let by = |k: Option<usize>, x: &[Dd; 3], unit: f64| k.filter(|k| x[*k].abs().hi() > WORTH * unit);
                 // p_k m + a_k m c_z = −m c_k of the parent, for one k or for two
-                match (by(vanish[0], &p), by(vanish[1], &a)) {
-                    (Some(j), Some(k)) if (p[j] * a[k] - p[k] * a[j]).abs().hi() > WORTH * WORTH => {
+                match (by(vanish[0], &p, lever), by(vanish[1], &a, 1.0)) {
+                    (Some(j), Some(k)) if (p[j] * a[k] - p[k] * a[j]).abs().hi() > WORTH * WORTH * lever => {
                         let det = p[j] * a[k] - p[k] * a[j];
                         (m, mz) = ((a[j] * ms[k] - a[k] * ms[j]) / det, (p[k] * ms[j] - p[j] * ms[k]) / det);
                     }
@@ -469,7 +545,7 @@ fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, vanish: [Option<usize>; 3],
                     (None, Some(k)) => mz = -(ms[k] + p[k] * m) / a[k],
                     (None, None) => {}
                 }
-                if let Some(k) = by(vanish[2], &a) {
+                if let Some(k) = by(vanish[2], &a, 1.0) {
                     let two = Dd::from(2.0);
                     szz = -(s[k] + p[k] * p[k] * m + two * p[k] * a[k] * mz) / (a[k] * a[k]);
                 } else if let Some(k) = balances.iter().position(|b| *b) {
