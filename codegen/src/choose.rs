@@ -432,5 +432,12 @@ fn improved(
     let enough = if search.work > ENOUGH { search.work } else { search.work + MORE };
     // what saves little by itself comes later, so that it is not in the way of what saves much
     best = search.descend(best, enough, &ways, ways.moves.len());
-    search.around(best, enough, &ways).0
+    let (choice, _) = search.around(best, enough, &ways);
+    search.set(&choice);
+    assert!(
+        is_in_proportion(&search.robot.model, &search.robot.reduced),
+        "{}: a reduced form has numbers out of proportion to the robot's own",
+        search.robot.model.name
+    );
+    choice
 }

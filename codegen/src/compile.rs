@@ -7,6 +7,7 @@ use crate::contact;
 use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
 use crate::emit::{self, Item, Lanes, Provenance, Scalar, Style};
+use crate::equivalence::{self, Disagreement, Plainer};
 use crate::expr::{verify, Counts, Folding, Grade, Graph, NodeId, Port, RuleSet, Section};
 use crate::forward_method::MethodChoice;
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
@@ -120,7 +121,7 @@ impl Options {
         self.rules_of(self.optimisations())
     }
 
-    fn rules_of(&self, optimisations: Optimisations) -> RuleSet {
+    pub(crate) fn rules_of(&self, optimisations: Optimisations) -> RuleSet {
         optimisations.rules(self.scalar).with_short_angles(self.generic || self.scalar == Scalar::F32)
     }
 }
@@ -200,6 +201,51 @@ impl Optimisations {
         steps
     }
 
+    /// Without any of them but exact folding: the equations as they are.
+    pub(crate) fn plain(self) -> Optimisations {
+        Optimisations { folding: self.folding, ..Optimisations::default() }
+    }
+
+    /// Plainer and plainer, each with what was left out last.
+    fn plainer(self) -> Vec<(&'static str, Optimisations)> {
+        let mut now = self;
+        let mut found = vec![("", now)];
+        let mut step = |what, off: fn(&mut Optimisations)| {
+            let before = now;
+            off(&mut now);
+            if now != before {
+                found.push((what, now));
+            }
+        };
+        step("identical limbs as lanes of one body", |o| o.limbs = false);
+        step("values formed of others that are there", |o| o.substitutes = false);
+        step("sums with all their terms at once", |o| o.sums = false);
+        step("forms of the reduced robot", |o| (o.chosen, o.forms, o.angle_sums) = (false, Forms::default(), false));
+        step("the reduced robot", |o| o.reduced = false);
+        step("algebraic rules and the cheaper form of forward dynamics", |o| *o = o.plain());
+        found
+    }
+
+    /// What `make` makes by the first of these that it is content with; all of them, then plainer ones.
+    ///
+    /// # Errors
+    /// What was wrong at first, if it is content with none.
+    pub(crate) fn first_that_agrees<T>(
+        self,
+        mut make: impl FnMut(Optimisations) -> Result<T, Disagreement>,
+    ) -> Result<(T, Option<Plainer>), Disagreement> {
+        let mut first = None;
+        for (without, optimisations) in self.plainer() {
+            match make(optimisations) {
+                Ok(made) => return Ok((made, first.map(|disagreement| Plainer { disagreement, without }))),
+                Err(disagreement) => {
+                    first.get_or_insert(disagreement);
+                }
+            }
+        }
+        Err(first.expect("all of them were tried"))
+    }
+
     pub(crate) fn rules(self, scalar: Scalar) -> RuleSet {
         match (self.algebraic, self.folding, scalar) {
             (true, _, _) => RuleSet::all(),
@@ -221,13 +267,34 @@ pub struct Program {
     pub schedule: Schedule,
     /// Of forward dynamics whose method was left to the compiler: which, and why.
     pub method: Option<MethodChoice>,
+    /// Whether it has another form than it would have had, as that one was wrong.
+    pub plainer: Option<Plainer>,
 }
 
-/// Traces and optimises one function of a robot.
+/// Traces and optimises one function of a robot, and checks what came out.
+///
+/// # Panics
+/// If no form of it agrees with its plain equations.
 pub fn program(robot: &Robot, frames: &[String], function: Function, options: &Options) -> Program {
-    let (graph, method) = optimised_with(robot, frames, function, options, options.optimisations());
+    checked(robot, frames, function, options).unwrap_or_else(|wrong| panic!("{wrong}"))
+}
+
+/// The program of a function with the fewest operations that agrees with its plain equations: see [`equivalence`].
+///
+/// # Errors
+/// What was wrong, if none does.
+pub fn checked(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+) -> Result<Program, Disagreement> {
+    let ((graph, method), plainer) = options.optimisations().first_that_agrees(|optimisations| {
+        let made = optimised_with(robot, frames, function, options, optimisations);
+        equivalence::of_function(robot, frames, function, options, &made.0).map(|()| made)
+    })?;
     let schedule = schedule(&graph, options.limits);
-    Program { function, graph, schedule, method }
+    Ok(Program { function, graph, schedule, method, plainer })
 }
 
 /// The operations of one function of a robot, with these optimisations only.
@@ -255,27 +322,25 @@ fn optimised_with(
         }
     }
     let optimisations = Optimisations { limbs: false, ..optimisations };
-    let check = |graph: Graph| {
-        verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
-        graph
-    };
+    let check = |pass, graph| passed(pass, function.name(), graph);
     let finished = |robot: &Robot, options: &Options, optimisations: Optimisations| {
         let (traced, choice) = traced(robot, frames, function, options, optimisations);
-        let graph = check(unread_inputs(check(dead_code(&check(traced))), is_optional));
+        let graph = check("dead code", dead_code(&check("traced", traced)));
+        let graph = check("unread inputs", unread_inputs(graph, is_optional));
         let graph = match optimisations.sums {
-            true => check(dead_code(&check(sums(&graph)))),
+            true => dead_code(&check("sums", sums(&graph))),
             false => graph,
         };
         // joint torques gain an operation of two hundred
         let gains = matches!(function, Function::MassMatrix | Function::ForwardDynamics);
         let graph = match optimisations.substitutes && gains {
-            true => check(substitute(&graph, &choose::keeps_digits_of(&robot.model, &graph))),
+            true => check("substitute", substitute(&graph, &choose::keeps_digits_of(&robot.model, &graph))),
             false => graph,
         };
         // fused products want another order; forward dynamics takes 6 to 9 % longer in this one, and its digits go elsewhere
         let ordered = optimisations.sums && !options.fma && function != Function::ForwardDynamics;
         let graph = match ordered.then(|| rounding::samples(&robot.model, &graph)).flatten() {
-            Some(states) => check(order(&graph, &states)),
+            Some(states) => check("order", order(&graph, &states)),
             None => graph,
         };
         (graph, choice)
@@ -296,6 +361,14 @@ fn optimised_with(
         }
     }
     (graph, choice)
+}
+
+/// What a pass made, if it kept what graphs promise.
+pub(crate) fn passed(pass: &'static str, program: &str, graph: Graph) -> Graph {
+    #[cfg(test)]
+    let graph = equivalence::sabotage::applied(pass, graph);
+    verify(&graph).unwrap_or_else(|broken| panic!("{program}: the pass `{pass}` broke the graph: {broken}"));
+    graph
 }
 
 /// The equations of one function, by these optimisations of the form of the robot and of the rules.
@@ -377,7 +450,8 @@ pub fn explain(source: &Source, options: &Options) -> Result<Generated, Diagnost
     if generated.report.staged.is_none() && !generated.items.is_empty() {
         let robot = Robot::new(generated.model.clone());
         let options = Options { scene: options.scene.resolved(&robot.model), ..options.clone() };
-        generated.report.staged = Some(staged::figures(&robot, &generated.frames, &options));
+        let figures = staged::figures(&robot, &generated.frames, &options);
+        generated.report.staged = Some(figures.map_err(|wrong| only(wrong.error(&robot.model)))?);
     }
     Ok(generated)
 }
@@ -428,8 +502,21 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let robot = Robot::new(model);
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
     let programs = resolved.functions.iter().filter(|f| !is_empty(f));
-    let mut programs: Vec<Program> = programs.map(|f| program(&robot, &frames, *f, &resolved)).collect();
-    programs.iter_mut().for_each(|p| mix_precisions(&robot, p, &resolved));
+    let programs: Result<Vec<Program>, _> = programs.map(|f| checked(&robot, &frames, *f, &resolved)).collect();
+    let mut programs = programs.map_err(|wrong| only(wrong.error(&robot.model)))?;
+    for program in &mut programs {
+        mix_precisions(&robot, program, &resolved);
+        let of = (program.function, &program.graph);
+        let mixed = !program.graph.widths.is_empty();
+        if let Some(wrong) =
+            mixed.then(|| equivalence::of_function(&robot, &frames, of.0, &resolved, of.1).err()).flatten()
+        {
+            diagnostics.push(wrong.error(&robot.model));
+        }
+        if let Some(plainer) = &program.plainer {
+            diagnostics.push(plainer.warning(&robot.model));
+        }
+    }
     let measures: Vec<(Function, Measures)> =
         programs.iter().map(|p| (p.function, Measures::of(p, options.scalar))).collect();
     budget::check(&whole, &frames, &measures, options, &mut diagnostics);
@@ -448,7 +535,15 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
         false => vec![None; programs.len()],
     };
     let programs = programs.into_iter().zip(waterfalls).zip(certificates).map(|((p, w), c)| (p, w, c)).collect();
-    Ok(generate(robot, frames, programs, diagnostics, &resolved, source.path(), hash))
+    let model = robot.model.clone();
+    let generated = generate(robot, frames, programs, diagnostics, &resolved, source.path(), hash);
+    generated.map_err(|wrong| only(wrong.error(&model)))
+}
+
+fn only(error: Diagnostic) -> Diagnostics {
+    let mut all = Diagnostics::default();
+    all.push(error);
+    all
 }
 
 /// The rest of the pipeline: from programs to text.
@@ -457,11 +552,11 @@ fn generate(
     robot: Robot,
     frames: Vec<String>,
     programs: Vec<(Program, Option<Waterfall>, Option<ErrorReport>)>,
-    warnings: Diagnostics,
+    mut warnings: Diagnostics,
     options: &Options,
     path: &str,
     hash: u64,
-) -> Generated {
+) -> Result<Generated, Disagreement> {
     let model = &robot.model;
     let title = |section: Section| match section.body {
         Some(i) => format!("{}, body {}: {}", section.phase, i + 1, model.bodies[i].name),
@@ -470,7 +565,7 @@ fn generate(
     let mut items = Vec::new();
     let mut functions = BTreeMap::new();
     for (program, waterfall, errors) in programs {
-        let Program { function, graph, schedule, method } = &program;
+        let Program { function, graph, schedule, method, .. } = &program;
         let mut doc = function.doc(&graph.inputs, &options.scene);
         if let Some(method) = method {
             doc.push_str(&format!("\n{method}\n"));
@@ -483,6 +578,9 @@ fn generate(
         let figures = FunctionReport::new(&program, options.scalar, text.text.lines().count());
         if wants_companions(options) {
             let bound = companion(&robot, *function, graph, options);
+            if let Ok(bound) = &bound {
+                equivalence::of_bound(&robot, options, function.name(), (graph, bound))?;
+            }
             let by_residual = *function == Function::ForwardDynamics;
             let bound = error_bound_text(bound, (function.name(), by_residual), graph, options);
             text.text.push('\n');
@@ -499,9 +597,20 @@ fn generate(
         }
         items.push(item);
     }
-    let (contact_text, contact) = crate::contact::module(&robot, options, &title);
-    let staged = options.scene.staged.then(|| staged(&robot, &frames, options, &title));
-    let (staged_text, staged_report) = staged.map_or((String::new(), None), |(text, report)| (text, Some(report)));
+    let (contact_text, contact, plainer) = crate::contact::module(&robot, options, &title)?;
+    plainer.iter().for_each(|p| warnings.push(p.warning(model)));
+    let staged = options.scene.staged.then(|| staged(&robot, &frames, options, &title)).transpose()?;
+    let (staged_text, staged_report) = match staged {
+        Some((text, report, plainer)) => {
+            plainer.iter().for_each(|p| warnings.push(p.warning(model)));
+            (text, Some(report))
+        }
+        None => (String::new(), None),
+    };
+    for parameter in options.scene.parameters.iter().filter(|p| p.body(model).is_some()) {
+        let constructor = parameter_program(&robot, parameter, options);
+        equivalence::of_parameter(&robot, parameter, options, &constructor)?;
+    }
     let report = Report {
         robot: model.name.clone(),
         nq: model.nq(),
@@ -530,7 +639,7 @@ fn generate(
     let types = parameter_types(&robot, options, &takes) + &staged_text + &contact_text;
     let before = generic.to_string() + &types;
     let text = emit::file(model, &frames, &items, &report, &provenance, options.style(), &before, options.lanes);
-    Generated {
+    Ok(Generated {
         model: robot.model,
         frames,
         text,
@@ -544,7 +653,7 @@ fn generate(
         provenance,
         report,
         warnings,
-    }
+    })
 }
 
 /// The bounds of rounding errors of every program, where they are asked for.

@@ -186,18 +186,20 @@ pub(crate) fn states(model: &Model<Dd>, inputs: &[Port], count: usize, fast: boo
         return None;
     }
     let mut random = Random(SEED);
-    let mut of_port = |port: &Port| {
-        let mut x = values(model, &port.name, port.len(), 0, &mut random);
-        let rates = port.name == "qd" && port.len() == model.nv();
-        for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| fast && rates && j.kind != JointKind::Floating) {
-            x[joint.iv] *= if joint.limits.velocity.is_finite() { joint.limits.velocity } else { FAST };
-        }
-        if port.name == "qdd" && !fast {
-            x.iter_mut().for_each(|x| *x *= SLOW);
-        }
-        x
-    };
-    Some((0..count).map(|_| inputs.iter().flat_map(&mut of_port).collect()).collect())
+    Some((0..count).map(|_| inputs.iter().flat_map(|port| of_port(model, port, fast, &mut random)).collect()).collect())
+}
+
+/// One of these states, of one port.
+pub(crate) fn of_port(model: &Model<Dd>, port: &Port, fast: bool, random: &mut Random) -> Vec<f64> {
+    let mut x = values(model, &port.name, port.len(), 0, random);
+    let rates = port.name == "qd" && port.len() == model.nv();
+    for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| fast && rates && j.kind != JointKind::Floating) {
+        x[joint.iv] *= if joint.limits.velocity.is_finite() { joint.limits.velocity } else { FAST };
+    }
+    if port.name == "qdd" && !fast {
+        x.iter_mut().for_each(|x| *x *= SLOW);
+    }
+    x
 }
 
 /// Values of an input port; `kind` 0: anywhere, 1: nearly stretched, 2: near right angles.
@@ -236,7 +238,7 @@ fn values(model: &Model<Dd>, port: &str, len: usize, kind: usize, random: &mut R
 }
 
 /// Turns the shafts of elastic transmissions to where their springs are hardly stretched, as they are while a robot moves.
-fn settle(model: &Model<Dd>, groups: &mut [(&str, Vec<f64>)], random: &mut Random) {
+pub(crate) fn settle(model: &Model<Dd>, groups: &mut [(&str, Vec<f64>)], random: &mut Random) {
     let named = |name: &str, groups: &[(&str, Vec<f64>)]| groups.iter().find(|g| g.0 == name).map(|g| g.1.clone());
     let (Some(q), Some(qd), Some(mut x)) = (named("q", groups), named("qd", groups), named("x", groups)) else {
         return;

@@ -11,6 +11,7 @@ pub mod contact;
 pub mod description;
 pub mod diagnostic;
 pub mod emit;
+pub mod equivalence;
 pub mod expansion;
 #[cfg(feature = "cli")]
 pub mod experiment;

@@ -7,6 +7,7 @@
 use crate::choose::choose;
 use crate::compile::{Optimisations, Options};
 use crate::emit::{self, array_type, Scalar};
+use crate::equivalence::{self, Disagreement, Plainer};
 use crate::expr::{verify, Counts, Graph, Port, Section};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::pass::{dead_code, sums};
@@ -107,7 +108,21 @@ pub struct Programs {
 
 /// Traces and cuts: of the forms that inverse and forward dynamics and the reduced robot have, those with the fewest operations
 /// per call, then in the stages, then with the fewest stored values.
-pub fn programs(robot: &Robot, frames: &[String], options: &Options) -> Programs {
+///
+/// # Errors
+/// A function whose programs all differ from its plain equations.
+pub fn programs(
+    robot: &Robot,
+    frames: &[String],
+    options: &Options,
+) -> Result<(Programs, Option<Plainer>), Disagreement> {
+    options.optimisations().first_that_agrees(|optimisations| {
+        let made = optimised(robot, frames, options, optimisations);
+        equivalence::of_stages(robot, frames, &made.functions, options, &made.staged).map(|()| made)
+    })
+}
+
+fn optimised(robot: &Robot, frames: &[String], options: &Options, optimisations: Optimisations) -> Programs {
     let functions: Vec<Function> = options
         .functions
         .iter()
@@ -128,12 +143,12 @@ pub fn programs(robot: &Robot, frames: &[String], options: &Options) -> Programs
     };
     // the form first, then what else there is to choose in it: each by itself takes the time of a trace
     let cuts = |robot: &Robot, form| {
-        let (graph, stage_of, stages) = joint_program(robot, frames, options, &functions, form);
+        let (graph, stage_of, stages) = joint_program(robot, frames, (options, optimisations), &functions, form);
         let names: Vec<&str> = stages.iter().map(|s| s.values).collect();
         let blocks: Vec<usize> = functions.iter().map(|f| f.outputs(&robot.model, frames.len()).len()).collect();
         let mut pieces = cut(&graph, &stage_of, &names, &blocks);
         let mut found = Vec::new();
-        if options.optimisations().sums {
+        if optimisations.sums {
             // before the cut, where all terms are in sight, or within its pieces, which keeps stages apart
             found.push(cut(&dead_code(&sums(&graph)), &stage_of, &names, &blocks));
             let regrouped = |graph: &mut Graph| *graph = dead_code(&sums(graph));
@@ -145,7 +160,9 @@ pub fn programs(robot: &Robot, frames: &[String], options: &Options) -> Programs
     };
     let of_forms = forms.iter().map(|form| cuts(robot, *form));
     let first = of_forms.min_by_key(|(s, _, _)| cost(s)).expect("there are four forms");
-    let of_robots = chosen_robots(robot, frames, options, &functions).into_iter().map(|robot| cuts(&robot, first.2));
+    let of_robots = chosen_robots(robot, frames, (options, optimisations), &functions)
+        .into_iter()
+        .map(|robot| cuts(&robot, first.2));
     let best = of_robots.min_by_key(|(s, _, _)| cost(s)).filter(|(s, _, _)| cost(s) < cost(&first.0));
     let (staged, stages, form) = best.unwrap_or(first);
     for graph in staged.stages.iter().chain(staged.functions.iter().map(|(_, g)| g)) {
@@ -155,9 +172,13 @@ pub fn programs(robot: &Robot, frames: &[String], options: &Options) -> Programs
 }
 
 /// The robot in the reduced forms that serve one of the functions best; none where nothing is to be chosen.
-fn chosen_robots(robot: &Robot, frames: &[String], options: &Options, functions: &[Function]) -> Vec<Robot> {
+fn chosen_robots(
+    robot: &Robot,
+    frames: &[String],
+    (options, optimisations): (&Options, Optimisations),
+    functions: &[Function],
+) -> Vec<Robot> {
     use Function::{BiasForce, ForwardDynamics, InverseDynamics, MassMatrix};
-    let optimisations = options.optimisations();
     if !optimisations.chosen || !optimisations.reduced {
         return Vec::new();
     }
@@ -167,27 +188,33 @@ fn chosen_robots(robot: &Robot, frames: &[String], options: &Options, functions:
 }
 
 /// The module `staged` as text, and its figures.
+///
+/// # Errors
+/// As [`programs`].
 pub fn staged(
     robot: &Robot,
     frames: &[String],
     options: &Options,
     title: &dyn Fn(Section) -> String,
-) -> (String, StagedReport) {
-    let programs = programs(robot, frames, options);
+) -> Result<(String, StagedReport, Option<Plainer>), Disagreement> {
+    let (programs, plainer) = programs(robot, frames, options)?;
     let Programs { functions, staged, stages, .. } = &programs;
-    (text(functions, staged, stages, options, title), report(&programs))
+    Ok((text(functions, staged, stages, options, title), report(&programs), plainer))
 }
 
 /// The figures of the staged form alone.
-pub fn figures(robot: &Robot, frames: &[String], options: &Options) -> StagedReport {
-    report(&programs(robot, frames, options))
+///
+/// # Errors
+/// As [`programs`].
+pub fn figures(robot: &Robot, frames: &[String], options: &Options) -> Result<StagedReport, Disagreement> {
+    programs(robot, frames, options).map(|(programs, _)| report(&programs))
 }
 
 /// All functions in one program; the stage of each of its input ports; the stages.
 fn joint_program(
     robot: &Robot,
     frames: &[String],
-    options: &Options,
+    (options, optimisations): (&Options, Optimisations),
     functions: &[Function],
     (inverse, forward): (InverseForm, ForwardDynamicsMethod),
 ) -> (Graph, Vec<usize>, Vec<Stage>) {
@@ -213,13 +240,13 @@ fn joint_program(
         functions.iter().map(|f| scene.select(*f, &robot.model, scene.frames_of(*f, frames).len())).collect();
     let outputs = selected.iter().flat_map(|(_, ports)| ports.clone()).collect();
     let names: Vec<String> = ports.iter().map(|p| p.name.clone()).collect();
-    let graph = trace(options.rules(), ports, outputs, |inputs| {
+    let graph = trace(options.rules_of(optimisations), ports, outputs, |inputs| {
         let argument =
             |name: &String| inputs[names.iter().position(|n| n == name).expect("ports are the union")].clone();
         let equations = |function: Function| {
             let own: Vec<Vec<Expr>> = scene.ports(function, &robot.model).iter().map(|p| argument(&p.name)).collect();
             let frames = scene.frames_of(function, frames);
-            function.equations(robot, frames, forward, options.optimisations().reduced, scene, &own)
+            function.equations(robot, frames, forward, optimisations.reduced, scene, &own)
         };
         let mut results = Vec::new();
         for (function, (wanted, _)) in functions.iter().zip(&selected) {

@@ -5,7 +5,7 @@ use straightline_codegen::diagnostic::Source;
 use straightline_codegen::expr::{evaluate, Graph, DIVISION};
 use straightline_codegen::function::Robot;
 use straightline_codegen::model::{load, ModelOptions};
-use straightline_codegen::reduce::{lengths, reduce, Choice};
+use straightline_codegen::reduce::{lengths, longest_lever, reduce, Choice};
 use straightline_codegen::Function;
 use straightline_core::algorithms as alg;
 use straightline_core::model::Model;
@@ -62,7 +62,7 @@ fn every_choice_gives_the_torques_and_the_mass_matrix_of_the_full_robot() {
         let (n, nv) = (model.bodies.len(), model.nv());
         for trial in 0..30 {
             let (plain, _) = reduce(&model, &Choice::plain(&model));
-            let units = lengths(&plain);
+            let units = lengths(&plain, longest_lever(&model));
             let choice = Choice {
                 stays: random.flags(n),
                 by_axis_acceleration: random.flags(n),
@@ -107,7 +107,7 @@ fn every_choice_gives_the_torques_and_the_mass_matrix_of_the_full_robot() {
 fn the_length_that_is_the_unit_is_exactly_one() {
     let model = robot("ur5", false);
     let (plain, _) = reduce(&model, &Choice::plain(&model));
-    let unit = lengths(&plain)[0];
+    let unit = lengths(&plain, longest_lever(&model))[0];
     let (reduced, _) = reduce(&model, &Choice { unit, ..Choice::plain(&model) });
     assert!(reduced.bodies.iter().any(|b| b.translation.to_array().iter().any(|x| x.abs() == Dd::ONE)));
 }

@@ -1,50 +1,58 @@
-//! The equations of a contact mode over expressions.
+//! The equations of a contact mode, over any scalar.
 
 use super::{ridge, Closed, Mode};
 use crate::compile::Options;
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
-use crate::scene::contact::tool_axes;
+use crate::scene::contact::{tool_axes, SurfaceItem};
 use crate::scene::{Bound, ContactFunction};
-use crate::trace::Expr;
 use std::collections::BTreeMap;
 use straightline_core::algorithms as alg;
 use straightline_core::algorithms::{ContactRows, Environment, FunctionalCoordinates, Ltdl, RelativeMotion};
 use straightline_core::algorithms::{Struck, Support};
-use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion};
+use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion, Surface};
 use straightline_core::spatial::{Mat3, MotionVector, Transform, Vec3};
 use straightline_core::{Dd, Real};
 
 /// Inputs beside the robot's own, by name.
-type Added = BTreeMap<String, Vec<Expr>>;
+type Added<T> = BTreeMap<String, Vec<T>>;
+
+/// Which of their forms equations take.
+#[derive(Clone, Copy)]
+pub(super) struct Form<T> {
+    /// By the reduced robot, where it serves.
+    pub reduced: bool,
+    /// The surfaces of objects over this scalar.
+    pub surface: fn(&SurfaceItem) -> Surface<T>,
+}
 
 /// A contact, how its frame moves, and what it constrains.
-struct Traced<'a> {
+struct Traced<'a, T> {
     closed: Option<&'a Closed<'a>>,
-    contact: Contact<Expr>,
-    motion: RelativeMotion<Expr>,
-    constrained: FunctionalCoordinates<Expr>,
-    environment: Option<Environment<Expr>>,
+    contact: Contact<T>,
+    motion: RelativeMotion<T>,
+    constrained: FunctionalCoordinates<T>,
+    environment: Option<Environment<T>>,
 }
 
 /// What is left of the equations at a given q̈ and F, with H, J, the rows in which reactions act, and the masses of yielding rows; one list
 /// per output of [`residual::OUTPUTS`](crate::certify::residual::OUTPUTS).
-pub(super) fn system(
+pub(super) fn system<T: Real>(
     robot: &Robot,
     options: &Options,
     mode: &Mode,
-    bound: &Bound,
-    added: &Added,
-    (qdd, force): (&[Expr], &[Expr]),
-) -> Vec<Vec<Expr>> {
+    bound: &Bound<T>,
+    form: Form<T>,
+    added: &Added<T>,
+    (qdd, force): (&[T], &[T]),
+) -> Vec<Vec<T>> {
     let (q, qd, tau) = (&bound.arguments[0], &bound.arguments[1], &bound.arguments[2]);
-    let reduced = options.optimisations().reduced;
-    let traced = contacts(robot, mode, bound, added, reduced);
+    let traced = contacts(robot, mode, bound, added, form);
     let constrained = traced.iter().fold(FunctionalCoordinates::default(), |all, t| all.and(t.constrained.clone()));
-    let applied: Vec<Vec<Expr>> =
+    let applied: Vec<Vec<T>> =
         traced.iter().flat_map(|t| alg::applied_rows(&t.contact, &t.motion, &t.constrained)).collect();
     let (supports, _) = supports(&traced, &constrained, options, added);
-    let inverse = of_robot(bound, reduced, Function::InverseDynamics, &[q.clone(), qd.clone(), qdd.to_vec()]);
-    let mass_matrix = of_robot(bound, reduced, Function::MassMatrix, std::slice::from_ref(q));
+    let inverse = of_robot(bound, form.reduced, Function::InverseDynamics, &[q.clone(), qd.clone(), qdd.to_vec()]);
+    let mass_matrix = of_robot(bound, form.reduced, Function::MassMatrix, std::slice::from_ref(q));
     let residual = (0..inverse.len()).map(|i| {
         let driven = applied.iter().zip(force).fold(tau[i], |sum, (row, f)| sum + row[i] * *f);
         driven - inverse[i]
@@ -58,7 +66,7 @@ pub(super) fn system(
         }
     });
     let masses = supports.iter().map(|support| match *support {
-        Support::Rigid(_) => Expr::zero(),
+        Support::Rigid(_) => T::zero(),
         Support::Yielding { mass, .. } => mass,
     });
     let (residual, missing, masses) = (residual.collect(), missing.collect(), masses.collect());
@@ -66,7 +74,7 @@ pub(super) fn system(
 }
 
 /// A function of the robot over these arguments, by its reduced form where it has one.
-fn of_robot(bound: &Bound, reduced: bool, function: Function, arguments: &[Vec<Expr>]) -> Vec<Expr> {
+fn of_robot<T: Real>(bound: &Bound<T>, reduced: bool, function: Function, arguments: &[Vec<T>]) -> Vec<T> {
     let method = ForwardDynamicsMethod::Factorisation;
     let Bound { model, reduced: for_torques, composite, .. } = bound;
     let by_reduced =
@@ -75,24 +83,24 @@ fn of_robot(bound: &Bound, reduced: bool, function: Function, arguments: &[Vec<E
 }
 
 /// The results of a function, one list per output.
-pub(super) fn equations(
+pub(super) fn equations<T: Real>(
     robot: &Robot,
     options: &Options,
     mode: &Mode,
     function: ContactFunction,
-    bound: &Bound,
-    added: &Added,
-) -> Vec<Vec<Expr>> {
+    form: Form<T>,
+    bound: &Bound<T>,
+    added: &Added<T>,
+) -> Vec<Vec<T>> {
     let (q, qd) = (&bound.arguments[0], &bound.arguments[1]);
-    let reduced = options.optimisations().reduced;
-    let traced = contacts(robot, mode, bound, added, reduced);
+    let traced = contacts(robot, mode, bound, added, form);
     let constrained = traced.iter().fold(FunctionalCoordinates::default(), |all, t| all.and(t.constrained.clone()));
     let free = || {
         let parts =
             traced.iter().filter_map(|t| Some(alg::functional_coordinates(&t.contact, &t.motion, &t.closed?.free)));
         parts.fold(FunctionalCoordinates::default(), FunctionalCoordinates::and)
     };
-    let of_robot = |function: Function, arguments: &[Vec<Expr>]| of_robot(bound, reduced, function, arguments);
+    let of_robot = |function: Function, arguments: &[Vec<T>]| of_robot(bound, form.reduced, function, arguments);
     let mass_matrix = || of_robot(Function::MassMatrix, std::slice::from_ref(q));
     let factor = || Ltdl::factor(&bound.model, &mass_matrix());
     // rotors of rigid drives are struck, too
@@ -100,12 +108,12 @@ pub(super) fn equations(
         true => factor(),
         false => alg::driven_factor(&bound.model, q, &mass_matrix()),
     };
-    let epsilon = Expr::constant(Dd::from(ridge(options.scalar)));
-    let applied = || -> Option<Vec<Vec<Expr>>> {
+    let epsilon = T::constant(Dd::from(ridge(options.scalar)));
+    let applied = || -> Option<Vec<Vec<T>>> {
         let slides = traced.iter().any(|t| t.closed.is_some_and(|c| c.slides));
         slides.then(|| traced.iter().flat_map(|t| alg::applied_rows(&t.contact, &t.motion, &t.constrained)).collect())
     };
-    let list = |c: FunctionalCoordinates<Expr>| vec![c.value, c.rate, c.jacobian.concat(), c.bias];
+    let list = |c: FunctionalCoordinates<T>| vec![c.value, c.rate, c.jacobian.concat(), c.bias];
     match function {
         ContactFunction::ConstrainedCoordinates => list(constrained),
         ContactFunction::FreeCoordinates => list(free()),
@@ -124,7 +132,7 @@ pub(super) fn equations(
                 let (motion, drives) = alg::driven_contact_motion(&bound.model, at, &bias, &mass_matrix(), rows);
                 (motion, vec![drives.xd])
             } else {
-                let drive: Vec<Expr> = bound.arguments[2].iter().zip(bias).map(|(tau, h)| *tau - h).collect();
+                let drive: Vec<T> = bound.arguments[2].iter().zip(bias).map(|(tau, h)| *tau - h).collect();
                 let (factor, applied) = (factor(), applied.as_deref());
                 let motion =
                     alg::constrained_forward_dynamics(&factor, &drive, &constrained, applied, &supports, epsilon);
@@ -138,7 +146,7 @@ pub(super) fn equations(
             let qdd = &bound.arguments[2];
             let inverse = of_robot(Function::InverseDynamics, &[q.clone(), qd.clone(), qdd.clone()]);
             let wanted =
-                [vec![Expr::zero(); constrained.len()], added.get("sdd_free").cloned().unwrap_or_default()].concat();
+                [vec![T::zero(); constrained.len()], added.get("sdd_free").cloned().unwrap_or_default()].concat();
             let (tau, pivot) = alg::hybrid_inverse_dynamics(
                 &factor(),
                 &inverse,
@@ -162,7 +170,7 @@ pub(super) fn equations(
                             places.push(k);
                             added[&format!("{}_struck", closed.item.identifier())][0]
                         }
-                        false => Expr::zero(),
+                        false => T::zero(),
                     };
                     struck[k] = Struck::Mass { mass: environment.struck_mass(), velocity };
                 }
@@ -185,7 +193,7 @@ pub(super) fn equations(
         ContactFunction::Projection => {
             let deviations = deviations(&traced, &constrained);
             let is_rigid = rigid_rows(&traced);
-            let kept = |list: &[Expr]| list.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| *k.0).collect::<Vec<Expr>>();
+            let kept = |list: &[T]| list.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| *k.0).collect::<Vec<T>>();
             let rows = constrained.jacobian.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| k.0.clone());
             let rigid = FunctionalCoordinates {
                 value: kept(&constrained.value),
@@ -194,7 +202,7 @@ pub(super) fn equations(
                 bias: kept(&constrained.bias),
             };
             let correction = match rigid.is_empty() {
-                true => vec![Expr::zero(); bound.model.nv()],
+                true => vec![T::zero(); bound.model.nv()],
                 false => alg::projection(&whole_factor(), &rigid, &kept(&deviations), epsilon),
             };
             vec![correction, constrained.value]
@@ -203,21 +211,21 @@ pub(super) fn equations(
 }
 
 /// What the rows stand on, and the rates of the objects' own coordinates.
-fn supports(
-    traced: &[Traced],
-    constrained: &FunctionalCoordinates<Expr>,
+fn supports<T: Real>(
+    traced: &[Traced<T>],
+    constrained: &FunctionalCoordinates<T>,
     options: &Options,
-    added: &Added,
-) -> (Vec<Support<Expr>>, Vec<Vec<Expr>>) {
+    added: &Added<T>,
+) -> (Vec<Support<T>>, Vec<Vec<T>>) {
     let stabilised = match options.scene.contacts.stabilisation {
         Some((frequency, damping)) => {
-            let [frequency, damping] = [frequency, damping].map(|x| Expr::constant(Dd::from(x)));
+            let [frequency, damping] = [frequency, damping].map(|x| T::constant(Dd::from(x)));
             let pulled = FunctionalCoordinates { value: deviations(traced, constrained), ..constrained.clone() };
             alg::baumgarte(&pulled, frequency, damping)
         }
-        None => vec![Expr::zero(); constrained.len()],
+        None => vec![T::zero(); constrained.len()],
     };
-    let mut supports: Vec<Support<Expr>> = stabilised.into_iter().map(Support::Rigid).collect();
+    let mut supports: Vec<Support<T>> = stabilised.into_iter().map(Support::Rigid).collect();
     let mut own_rates = Vec::new();
     let mut first = 0;
     for t in traced {
@@ -231,7 +239,7 @@ fn supports(
                     own_rates.push(vec![rates.velocity, rates.acceleration]);
                     (own[0], own[1])
                 }
-                false => (Expr::zero(), Expr::zero()),
+                false => (T::zero(), T::zero()),
             };
             supports[first + k] = environment.support(s, own);
         }
@@ -242,17 +250,17 @@ fn supports(
 
 /// How far the rows are from where they are held: what sticks is held where that has happened, which is not known here, so that
 /// its rate alone counts.
-fn deviations(traced: &[Traced], constrained: &FunctionalCoordinates<Expr>) -> Vec<Expr> {
+fn deviations<T: Real>(traced: &[Traced<T>], constrained: &FunctionalCoordinates<T>) -> Vec<T> {
     let by_friction = traced.iter().flat_map(|t| match t.closed {
         Some(closed) => closed.constrained.iter().map(|c| !closed.item.constrained.contains(c)).collect(),
         None => vec![false; t.constrained.len()],
     });
-    constrained.value.iter().zip(by_friction).map(|(s, sticks)| if sticks { Expr::zero() } else { *s }).collect()
+    constrained.value.iter().zip(by_friction).map(|(s, sticks)| if sticks { T::zero() } else { *s }).collect()
 }
 
 /// Rows that are not on an object that gives way.
-fn rigid_rows(traced: &[Traced]) -> Vec<bool> {
-    let of = |t: &Traced| {
+fn rigid_rows<T: Real>(traced: &[Traced<T>]) -> Vec<bool> {
+    let of = |t: &Traced<T>| {
         let yields = t.environment.as_ref().and(t.closed).map(|closed| distance_row(&closed.constrained));
         (0..t.constrained.len()).map(|k| yields != Some(k)).collect::<Vec<bool>>()
     };
@@ -265,14 +273,20 @@ fn distance_row(constrained: &[Coordinate]) -> usize {
 }
 
 /// Contacts and loops of a mode, traced.
-fn contacts<'a>(robot: &Robot, mode: &'a Mode, bound: &Bound, added: &Added, reduced: bool) -> Vec<Traced<'a>> {
+fn contacts<'a, T: Real>(
+    robot: &Robot,
+    mode: &'a Mode,
+    bound: &Bound<T>,
+    added: &Added<T>,
+    form: Form<T>,
+) -> Vec<Traced<'a, T>> {
     let (q, qd) = (&bound.arguments[0], &bound.arguments[1]);
     let frame = |name: &str| bound.model.frame(name).expect("the frames of contacts were checked").clone();
     let mut all = Vec::new();
     for closed in &mode.contacts {
         let (item, name) = (closed.item, closed.item.identifier());
         let input = |suffix: &str| &added[&format!("{name}_{suffix}")];
-        let triple = |x: &[Expr], k: usize| Vec3::new(x[3 * k], x[3 * k + 1], x[3 * k + 2]);
+        let triple = |x: &[T], k: usize| Vec3::new(x[3 * k], x[3 * k + 1], x[3 * k + 2]);
         let (axis, second_axis) = match item.axis {
             Some(axis) => tool_axes(axis),
             None => (triple(input("axes"), 0), triple(input("axes"), 1)),
@@ -281,7 +295,7 @@ fn contacts<'a>(robot: &Robot, mode: &'a Mode, bound: &Bound, added: &Added, red
             Some(object) => Object::Fixed(object.over()),
             None => {
                 let (pose, velocity, acceleration) = (input("pose"), input("velocity"), input("acceleration"));
-                let motion = |x: &[Expr]| MotionVector { linear: triple(x, 0), angular: triple(x, 1) };
+                let motion = |x: &[T]| MotionVector { linear: triple(x, 0), angular: triple(x, 1) };
                 Object::Moving(ObjectMotion {
                     pose: Transform {
                         rotation: Mat3::from_columns(triple(pose, 1), triple(pose, 2), triple(pose, 3)),
@@ -292,24 +306,24 @@ fn contacts<'a>(robot: &Robot, mode: &'a Mode, bound: &Bound, added: &Added, red
                 })
             }
         };
-        let number = |x: f64| Expr::constant(Dd::from(x));
+        let number = |x: f64| T::constant(Dd::from(x));
         let contact = Contact {
             name: item.name.clone(),
             frame: frame(&item.frame),
             axis,
             second_axis,
             object,
-            surface: item.surface.traced(),
+            surface: (form.surface)(&item.surface),
             constrained: closed.constrained.clone(),
             free: closed.free.clone(),
             friction: item.friction_over().filter(|_| closed.slides),
         };
         let placed = robot.model.frame(&item.frame).and_then(|f| {
             let body = f.body?;
-            Some((body, robot.reduced_frames[body].inverse().compose(&f.placement).map(Expr::constant)))
+            Some((body, robot.reduced_frames[body].inverse().compose(&f.placement).map(T::constant)))
         });
         let by_reduced = placed
-            .filter(|_| reduced)
+            .filter(|_| form.reduced)
             .and_then(|placed| alg::reduced_relative_motion(&bound.reduced, &contact, placed, q, qd));
         let motion = by_reduced.unwrap_or_else(|| alg::relative_motion(&bound.model, &contact, q, qd));
         let constrained = alg::functional_coordinates(&contact, &motion, &contact.constrained);

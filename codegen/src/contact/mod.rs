@@ -11,16 +11,18 @@ use crate::certify::residual::OUTPUTS;
 use crate::choose::choose;
 use crate::compile::{Forms, Optimisations, Options};
 use crate::emit::{snake_case, Scalar};
+use crate::equivalence::{self, Disagreement, Plainer};
 use crate::expr::{verify, Graph, Port};
 use crate::function::{DriveFunction, ForwardDynamicsMethod, Function, Robot};
 use crate::pass::{dead_code, sums, unread_inputs};
-use crate::scene::contact::{ContactItem, EnvironmentKind, LoopItem, ModeItem};
+use crate::scene::contact::{ContactItem, EnvironmentKind, LoopItem, ModeItem, SurfaceItem};
 use crate::scene::{is_optional, ContactFunction, Scene};
-use crate::trace::trace;
+use crate::trace::{trace, Expr};
+use equations::Form;
 use straightline_core::algorithms::drive_states;
 use straightline_core::contact::Coordinate;
 use straightline_core::model::Model;
-use straightline_core::Dd;
+use straightline_core::{Dd, Real};
 
 pub use text::module;
 
@@ -112,10 +114,15 @@ pub struct ModeProgram {
     pub function: ContactFunction,
     /// Its operations.
     pub graph: Graph,
+    /// Whether it has another form than it would have had.
+    pub plainer: Option<Plainer>,
 }
 
 /// All functions of a mode that its scene wants.
-pub fn programs(robot: &Robot, options: &Options, mode: &Mode) -> Vec<ModeProgram> {
+///
+/// # Errors
+/// A function whose programs all differ from its plain equations.
+pub fn programs(robot: &Robot, options: &Options, mode: &Mode) -> Result<Vec<ModeProgram>, Disagreement> {
     let wanted = options.scene.contacts.wanted();
     let has_free = !mode.free_names().is_empty();
     let is_driven = !robot.model.drives.is_empty();
@@ -124,17 +131,75 @@ pub fn programs(robot: &Robot, options: &Options, mode: &Mode) -> Vec<ModeProgra
         ContactFunction::DrivenForwardDynamics => is_driven,
         _ => true,
     });
-    wanted.map(|function| ModeProgram { function, graph: graph(robot, options, mode, function) }).collect()
+    wanted.map(|function| checked(robot, options, mode, function)).collect()
+}
+
+/// The inputs that a function of a mode may have.
+pub(crate) fn ports(robot: &Robot, options: &Options, mode: &Mode, function: ContactFunction) -> Vec<Port> {
+    let own = options.scene.ports(base_function(function), &robot.model);
+    own.into_iter().chain(added_ports(function, mode, &robot.model)).collect()
+}
+
+/// A function of a mode in the form with the fewest operations that agrees with its plain equations.
+fn checked(
+    robot: &Robot,
+    options: &Options,
+    mode: &Mode,
+    function: ContactFunction,
+) -> Result<ModeProgram, Disagreement> {
+    let plain = || optimised(robot, options, mode, function, options.optimisations().plain());
+    let (graph, plainer) = options.optimisations().first_that_agrees(|optimisations| {
+        let graph = optimised(robot, options, mode, function, optimisations);
+        equivalence::of_contact(robot, options, mode, function, &graph, &plain).map(|()| graph)
+    })?;
+    Ok(ModeProgram { function, graph, plainer })
+}
+
+/// Over expressions every surface is there.
+fn traced_form(optimisations: Optimisations) -> Form<Expr> {
+    Form { reduced: optimisations.reduced, surface: SurfaceItem::traced }
+}
+
+/// The results of one function of a mode by the robot's own parameters, over any scalar, without a graph: `given` stands for the inputs of
+/// [`graph`] by name. `None` where a surface has a scalar of its own.
+pub(crate) fn evaluate<T: Real>(
+    robot: &Robot,
+    options: &Options,
+    mode: &Mode,
+    function: ContactFunction,
+    given: &dyn Fn(&Port) -> Vec<T>,
+    prepare: &dyn Fn(&mut Model<T>),
+) -> Option<Vec<T>> {
+    if mode.contacts.iter().any(|c| c.item.surface.over::<T>().is_none()) {
+        return None;
+    }
+    let base = base_function(function);
+    let own: Vec<Vec<T>> = options.scene.ports(base, &robot.model).iter().map(given).collect();
+    let mut bound = options.scene.bind(base, robot, &own);
+    prepare(&mut bound.model);
+    let added = added_ports(function, mode, &robot.model).into_iter().map(|p| (p.name.clone(), given(&p))).collect();
+    let form = Form { reduced: false, surface: |s: &SurfaceItem| s.over().expect("asked for above") };
+    Some(equations::equations(robot, options, mode, function, form, &bound, &added).concat())
 }
 
 /// The operations of one function of a mode.
 pub fn graph(robot: &Robot, options: &Options, mode: &Mode, function: ContactFunction) -> Graph {
-    let optimisations = options.optimisations();
+    optimised(robot, options, mode, function, options.optimisations())
+}
+
+/// The same, with these optimisations only.
+pub(crate) fn optimised(
+    robot: &Robot,
+    options: &Options,
+    mode: &Mode,
+    function: ContactFunction,
+    optimisations: Optimisations,
+) -> Graph {
     let check = |graph: Graph| {
         verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
         graph
     };
-    let chosen = chosen(robot, options);
+    let chosen = chosen(robot, options, optimisations);
     let robot = chosen.as_ref().unwrap_or(robot);
     let base = base_function(function);
     let own = options.scene.ports(base, &robot.model);
@@ -143,11 +208,11 @@ pub fn graph(robot: &Robot, options: &Options, mode: &Mode, function: ContactFun
     let inputs: Vec<Port> = own.iter().cloned().chain(added).collect();
     let outputs = outputs(function, mode, &robot.model);
     let lengths: Vec<usize> = outputs.iter().map(Port::len).collect();
-    let traced = trace(options.rules(), inputs, outputs, |inputs| {
+    let traced = trace(options.rules_of(optimisations), inputs, outputs, |inputs| {
         let (given, added) = inputs.split_at(own.len());
         let given = options.scene.bind(base, robot, given);
         let added = names.iter().cloned().zip(added.iter().cloned()).collect();
-        let results = equations::equations(robot, options, mode, function, &given, &added);
+        let results = equations::equations(robot, options, mode, function, traced_form(optimisations), &given, &added);
         assert!(results.iter().map(Vec::len).eq(lengths.iter().copied()), "results fit the outputs");
         results.concat()
     });
@@ -161,8 +226,7 @@ pub fn graph(robot: &Robot, options: &Options, mode: &Mode, function: ContactFun
 }
 
 /// The robot in the form that takes the fewest operations, of those in which contacts can be described.
-fn chosen(robot: &Robot, options: &Options) -> Option<Robot> {
-    let optimisations = options.optimisations();
+fn chosen(robot: &Robot, options: &Options, optimisations: Optimisations) -> Option<Robot> {
     let factorised = Options { forward_dynamics: ForwardDynamicsMethod::Factorisation, ..options.clone() };
     (optimisations.chosen && optimisations.reduced).then(|| {
         // contact frames are described in the frames that any robot takes
@@ -176,7 +240,7 @@ fn chosen(robot: &Robot, options: &Options) -> Option<Robot> {
 /// [`acceleration_bound`](crate::certify::residual::acceleration_bound) takes, with the flags of rows that yield. The other inputs are those of
 /// forward dynamics. A mode without contacts is the robot alone.
 pub fn system(robot: &Robot, options: &Options, mode: &Mode, optimisations: Optimisations) -> (Graph, Vec<bool>) {
-    let chosen = optimisations.chosen.then(|| chosen(robot, options)).flatten();
+    let chosen = chosen(robot, options, optimisations);
     let robot = chosen.as_ref().unwrap_or(robot);
     let (nv, m) = (robot.model.nv(), mode.constrained_names().len());
     let own = options.scene.ports(Function::ForwardDynamics, &robot.model);
@@ -188,13 +252,14 @@ pub fn system(robot: &Robot, options: &Options, mode: &Mode, optimisations: Opti
     let shapes = [vec![nv], vec![m], vec![nv, nv], vec![m, nv], vec![m, nv], vec![m]];
     let outputs: Vec<Port> = OUTPUTS.iter().zip(&shapes).map(|(name, shape)| Port::new(name, shape)).collect();
     let mut yielding = Vec::new();
-    let traced = trace(options.rules(), inputs, outputs, |inputs| {
+    let traced = trace(options.rules_of(optimisations), inputs, outputs, |inputs| {
         let (given, rest) = inputs.split_at(own.len());
         let (added, solution) = rest.split_at(names.len());
         let given = options.scene.bind(Function::ForwardDynamics, robot, given);
         let added = names.iter().cloned().zip(added.iter().cloned()).collect();
         let force = solution.get(1).map_or(&[][..], |f| &f[..]);
-        equations::system(robot, options, mode, &given, &added, (&solution[0], force)).concat()
+        equations::system(robot, options, mode, &given, traced_form(optimisations), &added, (&solution[0], force))
+            .concat()
     });
     for closed in &mode.contacts {
         let gives_way = closed.item.environment.is_some();

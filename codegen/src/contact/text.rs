@@ -5,6 +5,7 @@ use crate::certify::companion::{state_bound, Bits};
 use crate::certify::residual::acceleration_bound;
 use crate::compile::{error_bound_text, wants_companions, Options};
 use crate::emit::{self, array_type, upper_camel_case, Style};
+use crate::equivalence::{self, Disagreement, Plainer};
 use crate::expr::{Graph, Port, Section};
 use crate::function::Robot;
 use crate::pass::dead_code;
@@ -14,22 +15,31 @@ use crate::schedule::schedule;
 use std::fmt::Write;
 
 /// The module of all modes, and the figures of their functions; nothing for a scene without contacts.
-pub fn module(robot: &Robot, options: &Options, title: &dyn Fn(Section) -> String) -> (String, Vec<ContactReport>) {
+///
+/// # Errors
+/// A function whose programs all differ from its plain equations.
+pub fn module(
+    robot: &Robot,
+    options: &Options,
+    title: &dyn Fn(Section) -> String,
+) -> Result<(String, Vec<ContactReport>, Vec<Plainer>), Disagreement> {
     let modes = Mode::all(&options.scene);
     if modes.is_empty() {
-        return (String::new(), Vec::new());
+        return Ok((String::new(), Vec::new(), Vec::new()));
     }
     let mut inner = String::new();
     let mut reports = Vec::new();
+    let mut plainer = Vec::new();
     enumeration(&mut inner, &modes);
     let mut signatures = Vec::new();
     for mode in &modes {
-        let programs = programs(robot, options, mode);
+        let programs = programs(robot, options, mode)?;
+        plainer.extend(programs.iter().filter_map(|p| p.plainer.clone()));
         let mut text = String::new();
         constants(&mut text, mode);
         let mut kernel = false;
         let mut wrappers: Vec<String> = Vec::new();
-        for ModeProgram { function, graph } in &programs {
+        for ModeProgram { function, graph, .. } in &programs {
             let counts = graph.counts();
             let doc = doc(*function, mode, &graph.inputs, &graph.outputs);
             let doc = format!(
@@ -44,6 +54,9 @@ pub fn module(robot: &Robot, options: &Options, title: &dyn Fn(Section) -> Strin
             if wants_companions(options) {
                 let by_residual = *function == ContactFunction::ForwardDynamics;
                 let bound = bound(robot, options, mode, *function, graph);
+                if let Ok(bound) = &bound {
+                    equivalence::of_bound(robot, options, function.name(), (graph, bound))?;
+                }
                 let bound = error_bound_text(bound, (function.name(), by_residual), graph, options);
                 kernel |= bound.calls_kernel();
                 text.push('\n');
@@ -74,7 +87,7 @@ pub fn module(robot: &Robot, options: &Options, title: &dyn Fn(Section) -> Strin
     );
     indent(&mut out, &inner);
     out.push_str("}\n");
-    (out, reports)
+    Ok((out, reports, plainer))
 }
 
 /// The program that bounds the errors of a contact function at the state at hand.

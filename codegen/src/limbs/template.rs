@@ -199,7 +199,7 @@ struct Folded {
 }
 
 impl Folded {
-    fn new(bound: &Bound, bodies: &[(Option<usize>, Vec<BodyId>)], table: &mut Lanes<'_>) -> Folded {
+    fn new(bound: &Bound<Expr>, bodies: &[(Option<usize>, Vec<BodyId>)], table: &mut Lanes<'_>) -> Folded {
         let place = |i: BodyId| bodies.iter().position(|(_, b)| b[0] == i).expect("a limb's carrier is no limb's");
         let mut folded = Folded {
             model: Model { bodies: Vec::new(), ..bound.model.clone() },
@@ -247,7 +247,7 @@ impl Folded {
     fn forces(
         &self,
         function: Function,
-        bound: &Bound,
+        bound: &Bound<Expr>,
         bodies: &[(Option<usize>, Vec<BodyId>)],
         limbs: &[Limbs],
         sums: &[Expr],

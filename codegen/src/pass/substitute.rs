@@ -9,7 +9,8 @@
 //! * x ∘ p, p = y ∘ z, where p is new and may serve several values.
 //!
 //! Which of these hold is not derived, by whatever rules, but seen: at random inputs, in double-double. All values are rational in
-//! the inputs, sines and cosines; roots and signs count as inputs of their own. Two that agree to 1e-25 at four random states are one.
+//! the inputs, sines and cosines; roots and signs count as inputs of their own. Two that agree to 1e-25 at four random states are one,
+//! as long as no result of the program sees what they differ by: what is below all digits of a value need not be below those of a result.
 //! That finds what follows from distributive laws, from s² + c² = 1 and from constants that fit, however many steps it takes, and
 //! nothing that holds for unit quaternions alone.
 //!
@@ -30,6 +31,8 @@ use straightline_core::Dd;
 const POINTS: usize = 4;
 /// Two values that agree so well are equal; double-double has 1e-31, of the greatest term.
 const EQUAL: f64 = 1e-25;
+/// So little of it a result may change.
+const UNCHANGED: f64 = 1e-24;
 /// How much greater than the terms of what it replaces a term may be.
 const GREATER: f64 = 4.0;
 /// Values of the greatest graph that is searched; it takes some tenths of a second.
@@ -64,6 +67,7 @@ fn round(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
     let mut net = Net { ops: graph.ops.clone(), notes: graph.notes.clone() };
     let mut best = count_sums(graph);
     let mut taken = None;
+    let before = results(graph);
     let mut live = net.live(graph);
     let mut work = 0;
     for found in Search::new(graph).moves() {
@@ -76,12 +80,28 @@ fn round(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
         work += ordered.ops.len();
         let counts = count_sums(&ordered);
         let fewer = price(counts) < price(best) && counts.flops() <= best.flops() && counts.fma <= best.fma;
-        if fewer && keeps(&ordered) {
+        if fewer && is_unchanged(&before, &ordered) && keeps(&ordered) {
             (net, best, taken) = (tried, counts, Some(ordered));
             live = net.live(graph);
         }
     }
     taken
+}
+
+/// The results at the random states; none where roots and signs stand for inputs, whose order is that of the graph.
+fn results(graph: &Graph) -> Option<Vec<Value>> {
+    let has_atoms = graph.ops.iter().any(|op| matches!(op, Op::Sqrt(_) | Op::Sign(_)));
+    (!has_atoms).then(|| {
+        let values = values(graph);
+        graph.results.iter().map(|r| values[r.index()]).collect()
+    })
+}
+
+/// Whether another program has the same results.
+fn is_unchanged(before: &Option<Vec<Value>>, graph: &Graph) -> bool {
+    let Some(before) = before else { return true };
+    let same = |(a, b): (&Value, &Value)| (0..POINTS).all(|k| (a[k] - b[k]).abs().hi() <= UNCHANGED * a[k].abs().hi());
+    results(graph).is_some_and(|after| before.iter().zip(&after).all(same))
 }
 
 /// Operations and instructions with fused multiply-add, as either may be what a machine does.

@@ -4,7 +4,6 @@ use super::{Gravity, Parameter, Part, Scene, Selection};
 use crate::emit::{snake_case, upper_camel_case};
 use crate::expr::Port;
 use crate::function::{higher_rate, Function, Robot};
-use crate::trace::Expr;
 use straightline_core::model::{Load, Model};
 use straightline_core::reduced::ReducedModel;
 use straightline_core::spatial::{SpatialInertia, Sym3, Vec3};
@@ -13,16 +12,16 @@ use straightline_core::{Dd, Real};
 /// Scalars of a run-time load: its ten parameters in the canonical frame, then in the reduced robot's frame.
 pub const LOAD_SCALARS: usize = 20;
 
-/// The bodies, as the trace sees them.
-pub struct Bound {
-    /// The robot over expressions.
-    pub model: Model<Expr>,
+/// The bodies, as a function of them sees them.
+pub struct Bound<T> {
+    /// The robot.
+    pub model: Model<T>,
     /// Its reduced form.
-    pub reduced: ReducedModel<Expr>,
+    pub reduced: ReducedModel<T>,
     /// Its reduced form for the mass matrix.
-    pub composite: ReducedModel<Expr>,
+    pub composite: ReducedModel<T>,
     /// The function's arguments, whole.
-    pub arguments: Vec<Vec<Expr>>,
+    pub arguments: Vec<Vec<T>>,
 }
 
 impl Scene {
@@ -40,28 +39,28 @@ impl Scene {
         (input == "qd" && self.zero.qd) || (input == "qdd" || higher_rate(input).is_some()) && self.zero.qdd
     }
 
-    /// What the trace starts from, given the expressions of [`Scene::ports`].
-    pub fn bind(&self, function: Function, robot: &Robot, inputs: &[Vec<Expr>]) -> Bound {
-        let mut model: Model<Expr> = robot.model.cast();
-        let mut reduced = robot.reduced.map(Expr::constant);
-        let mut composite = robot.composite.map(Expr::constant);
+    /// What a trace or an evaluation starts from, given what stands for [`Scene::ports`].
+    pub fn bind<T: Real>(&self, function: Function, robot: &Robot, inputs: &[Vec<T>]) -> Bound<T> {
+        let mut model: Model<T> = robot.model.cast();
+        let mut reduced = robot.reduced.map(T::constant);
+        let mut composite = robot.composite.map(T::constant);
         let mut given = inputs.iter();
         let whole = function.inputs(&robot.model);
         let arguments = whole.iter().map(|port| {
             let mut values = match self.is_zero(&port.name) {
-                true => vec![Expr::zero(); port.len()],
+                true => vec![T::zero(); port.len()],
                 false => given.next().expect("a port per input").clone(),
             };
             if port.name == "qd" || port.name == "qdd" || higher_rate(&port.name).is_some() {
                 for joint in robot.model.bodies.iter().map(|b| &b.joint) {
                     if self.zero.joints_at_rest.contains(&joint.name) {
-                        values[joint.iv..joint.iv + joint.kind.nv()].fill(Expr::zero());
+                        values[joint.iv..joint.iv + joint.kind.nv()].fill(T::zero());
                     }
                 }
             }
             values
         });
-        let arguments: Vec<Vec<Expr>> = arguments.collect();
+        let arguments: Vec<Vec<T>> = arguments.collect();
         if self.gravity == Gravity::Input {
             let g = given.next().expect("a port for gravity");
             model.gravity = Vec3::new(g[0], g[1], g[2]);
@@ -220,7 +219,7 @@ impl Parameter {
     }
 }
 
-fn load(x: &[Expr]) -> Load<Expr> {
+fn load<T: Copy>(x: &[T]) -> Load<T> {
     Load {
         mass: x[0],
         first_moment: Vec3::new(x[1], x[2], x[3]),
@@ -230,7 +229,7 @@ fn load(x: &[Expr]) -> Load<Expr> {
 
 /// The ten parameters of a body given by mass, mass centre and inertia in a frame, in the two frames that the algorithms
 /// use: the program of a parameter's constructor. Inputs: mass, com\[3\], inertia about it (xx, xy, xz, yy, yz, zz).
-pub fn load_parameters(robot: &Robot, parameter: &Parameter, inputs: &[Vec<Expr>]) -> Vec<Expr> {
+pub fn load_parameters<T: Real>(robot: &Robot, parameter: &Parameter, inputs: &[Vec<T>]) -> Vec<T> {
     let frame = robot.model.frame(parameter.frame()).expect("frames were checked against the model");
     let body = frame.body.expect("parameters of the world were refused");
     let regauge = robot.reduced_frames[body].inverse();
@@ -242,7 +241,7 @@ pub fn load_parameters(robot: &Robot, parameter: &Parameter, inputs: &[Vec<Expr>
     [in_canonical, in_reduced]
         .into_iter()
         .flat_map(|pose| {
-            let pose = pose.map(Expr::constant);
+            let pose = pose.map(T::constant);
             let c = pose.translation + pose.rotation * Vec3::new(com[0], com[1], com[2]);
             let i = SpatialInertia::new(mass, c, tensor.rotated(&pose.rotation));
             let (f, s) = (i.first_moment, i.second_moment);

@@ -22,6 +22,7 @@ pub mod dual;
 pub mod integrate;
 pub mod jet;
 #[cfg(feature = "alloc")]
+pub mod magnitude;
 pub mod model;
 pub mod phases;
 pub mod real;

@@ -1,0 +1,673 @@
+//! Every compilation checks itself: each final program, after all passes, against the plain equations of the same robot.
+//!
+//! The plain side is the generic runtime, run in double-double on the robot's own frames and inertial parameters: no reduced form, no rewrite
+//! rule, no pass, no graph. The compiled side is the graph that text is written from, run in double-double, too. Where a pass
+//! drops what it may not drop, or a form of the robot is not the robot, the two differ, and the next plainer form is taken.
+//!
+//! Differences are compared with the natural scale of the *result*: what its plain equations are made of
+//! ([`Magnitude`](straightline_core::magnitude::Magnitude)), each vector counted with its length. Accelerations are judged by what they leave of
+//! the equations of motion, τ − H q̈ − h: that says the same for robots whose H is nearly singular.
+
+use crate::compile::Options;
+use crate::contact;
+use crate::diagnostic::Diagnostic;
+use crate::emit::{element_of, Scalar};
+use crate::expr::{evaluate, Grade, Graph, Port};
+use crate::forward_method::{self, settle};
+use crate::function::{ForwardDynamicsMethod, Function, Robot};
+use crate::random::Random;
+use crate::scene::{load_parameters, ContactFunction};
+use crate::stage::Staged;
+use std::collections::BTreeMap;
+use std::fmt;
+use straightline_core::magnitude::Magnitude;
+use straightline_core::model::{JointKind, Model};
+use straightline_core::spatial::{Sym3, Transform, Vec3};
+use straightline_core::{Dd, Real};
+
+/// Results agree to so much of their natural scale; double-double has 5e-32.
+const AGREE: f64 = 1e-24;
+/// At so many random states.
+const STATES: usize = 3;
+/// Where random numbers begin: another place than where states for choices come from.
+const SEED: u64 = 0x6a09_e667_f3bc_c908;
+
+/// How a program differs from the plain equations of its robot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Disagreement {
+    /// The program's name.
+    pub program: String,
+    /// The result that differs most, such as `tau[2]`.
+    pub result: String,
+    /// By how much of its natural scale.
+    pub difference: f64,
+}
+
+impl fmt::Display for Disagreement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Disagreement { program, result, difference } = self;
+        write!(f, "`{program}` differs from the plain equations of the robot: {result} by {difference:.1e} of its natural scale")
+    }
+}
+
+/// A program in another form than it would have had, as that one did not agree.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plainer {
+    /// What was wrong.
+    pub disagreement: Disagreement,
+    /// The optimisation without which it is right.
+    pub without: &'static str,
+}
+
+impl Plainer {
+    /// What the user is told.
+    pub fn warning(&self, model: &Model<Dd>) -> Diagnostic {
+        let Plainer { disagreement, without } = self;
+        Diagnostic::warning("plainer-form", format!("`{}` is written in a plainer form", disagreement.program))
+            .detail(format!("{disagreement}; without “{without}” it agrees{}", suspect(model)))
+            .help("the code is right, but takes more operations than it might: please report the robot file")
+    }
+}
+
+impl Disagreement {
+    /// What the user is told where no form agrees.
+    pub fn error(&self, model: &Model<Dd>) -> Diagnostic {
+        Diagnostic::error(
+            "internal-disagreement",
+            format!("no form of `{}` is right: nothing is written", self.program),
+        )
+        .detail(format!("{self}{}", suspect(model)))
+        .help("this is a fault of Straightline: please report it together with the robot file and the scene")
+    }
+}
+
+/// The number that is probably behind it.
+fn suspect(model: &Model<Dd>) -> String {
+    let number = out_of_proportion(model);
+    number.map_or(String::new(), |number| {
+        format!("; of the robot's numbers the one most out of proportion is the {number}")
+    })
+}
+
+/// A state: what stands for each input port, by name.
+type State = BTreeMap<String, Vec<Dd>>;
+
+/// Whether a function's program says what its plain equations say.
+///
+/// # Errors
+/// The first difference that was found.
+pub(crate) fn of_function(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+    graph: &Graph,
+) -> Result<(), Disagreement> {
+    let ports = options.scene.ports(function, &robot.model);
+    let mut states = States::new(robot, options);
+    for _ in 0..STATES {
+        let state = states.next(&ports);
+        if options.grade == Grade::Exact {
+            match options.scalar {
+                Scalar::F64 => same_bits::<f64>(robot, frames, function, options, graph, &state)?,
+                Scalar::F32 => same_bits::<f32>(robot, frames, function, options, graph, &state)?,
+            }
+            continue;
+        }
+        let found = evaluate(graph, &inputs(graph, &state));
+        compare(function.name(), &graph.outputs, &differences(robot, frames, function, options, &state, &found))?;
+    }
+    Ok(())
+}
+
+/// Results that differ by more than a part of their sizes, if any.
+fn compare(program: &str, outputs: &[Port], differences: &[Magnitude]) -> Result<(), Disagreement> {
+    let mut worst: Option<(f64, usize)> = None;
+    for (k, x) in differences.iter().enumerate() {
+        let off = x.value.hi().abs();
+        // what is no number does not agree
+        let agrees = off <= AGREE * x.size;
+        let relative = if x.size > 0.0 { off / x.size } else { f64::INFINITY };
+        if !agrees && worst.is_none_or(|(most, _)| relative > most || relative.is_nan()) {
+            worst = Some((relative, k));
+        }
+    }
+    match worst {
+        None => Ok(()),
+        Some((difference, k)) => {
+            Err(Disagreement { program: program.to_string(), result: element_of(outputs, k), difference })
+        }
+    }
+}
+
+/// What a program found, less what the plain equations say, with their natural scale.
+fn differences(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+    state: &State,
+    found: &[Dd],
+) -> Vec<Magnitude> {
+    let scene = &options.scene;
+    let frames = scene.frames_of(function, frames);
+    let (wanted, _) = scene.select(function, &robot.model, frames.len());
+    let given = of_ports(&scene.ports(function, &robot.model), state, Magnitude::new);
+    let mut bound = scene.bind(function, robot, &given);
+    with_sizes(&mut bound.model);
+    let nv = robot.model.nv();
+    if function == Function::ForwardDynamics && wanted.iter().copied().eq(0..nv) {
+        let motion = [&bound.arguments[0], &bound.arguments[1], &found.iter().copied().map(Magnitude::new).collect()];
+        let takes = Function::InverseDynamics.evaluate(
+            &bound.model,
+            &[],
+            ForwardDynamicsMethod::ArticulatedBody,
+            &motion.map(Vec::clone),
+        );
+        return takes.into_iter().zip(&bound.arguments[2]).map(|(takes, tau)| takes - *tau).collect();
+    }
+    let frames: Vec<_> =
+        frames.iter().map(|f| bound.model.frame(f).expect("frames were checked against the model")).collect();
+    let all = function.evaluate(&bound.model, &frames, ForwardDynamicsMethod::ArticulatedBody, &bound.arguments);
+    wanted.iter().zip(found).map(|(k, found)| difference(*found, all[*k])).collect()
+}
+
+fn difference(found: Dd, plain: Magnitude) -> Magnitude {
+    // where the plain equations divide by zero, so may the program
+    let both = [found, plain.value].iter().all(|x| !x.hi().is_finite());
+    Magnitude { value: if both { Dd::ZERO } else { found - plain.value }, size: plain.size }
+}
+
+/// With exact rules a program is the generic runtime, bit for bit.
+fn same_bits<T: Real + PartialEq + Into<f64>>(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+    graph: &Graph,
+    state: &State,
+) -> Result<(), Disagreement> {
+    let scene = &options.scene;
+    let frames = scene.frames_of(function, frames);
+    let (wanted, _) = scene.select(function, &robot.model, frames.len());
+    let bound = scene.bind(function, robot, &of_ports(&scene.ports(function, &robot.model), state, T::constant));
+    let frames: Vec<_> =
+        frames.iter().map(|f| bound.model.frame(f).expect("frames were checked against the model")).collect();
+    let all = function.evaluate(&bound.model, &frames, options.forward_dynamics, &bound.arguments);
+    let rounded: Vec<T> = inputs(graph, state).into_iter().map(T::constant).collect();
+    let found = evaluate(graph, &rounded);
+    let off = |(k, found): (&usize, &T)| {
+        let same = *found == all[*k];
+        let [a, b]: [f64; 2] = [(*found).into(), all[*k].into()];
+        // neither is a number
+        let value = if same || (a.is_nan() && b.is_nan()) { 0.0 } else { a - b };
+        Magnitude { value: Dd::from(value), size: 0.0 }
+    };
+    compare(function.name(), &graph.outputs, &wanted.iter().zip(&found).map(off).collect::<Vec<_>>())
+}
+
+/// Whether the program of a contact function says what its plain equations say; `plain`: the same function traced by exact rules, for
+/// surfaces that have a scalar of their own.
+///
+/// # Errors
+/// As [`of_function`].
+pub(crate) fn of_contact(
+    robot: &Robot,
+    options: &Options,
+    mode: &contact::Mode,
+    function: ContactFunction,
+    graph: &Graph,
+    plain: &dyn Fn() -> Graph,
+) -> Result<(), Disagreement> {
+    let mut states = States::new(robot, options);
+    let ports = contact::ports(robot, options, mode, function);
+    for _ in 0..STATES {
+        let state = states.next(&ports);
+        let given = |port: &Port| state[&port.name].iter().copied().map(Magnitude::new).collect();
+        let by_numbers = contact::evaluate(robot, options, mode, function, &given, &with_sizes);
+        let truth = by_numbers.unwrap_or_else(|| {
+            let plain = plain();
+            let inputs: Vec<Magnitude> = inputs(&plain, &state).into_iter().map(Magnitude::new).collect();
+            evaluate(&plain, &inputs)
+        });
+        let found = evaluate(graph, &inputs(graph, &state));
+        let off: Vec<Magnitude> = found.into_iter().zip(truth).map(|(found, plain)| difference(found, plain)).collect();
+        let name = format!("{}::{}", mode.identifier, function.name());
+        compare(&name, &graph.outputs, &off)?;
+    }
+    Ok(())
+}
+
+/// Whether stages, one after the other, say what the plain equations of each function say.
+///
+/// # Errors
+/// As [`of_function`].
+pub(crate) fn of_stages(
+    robot: &Robot,
+    frames: &[String],
+    functions: &[Function],
+    options: &Options,
+    staged: &Staged,
+) -> Result<(), Disagreement> {
+    let mut states = States::new(robot, options);
+    let mut ports: Vec<Port> = Vec::new();
+    for port in functions.iter().flat_map(|f| options.scene.ports(*f, &robot.model)) {
+        if !ports.contains(&port) {
+            ports.push(port);
+        }
+    }
+    for _ in 0..STATES {
+        let mut state = states.next(&ports);
+        for stage in &staged.stages {
+            let values = evaluate(stage, &inputs(stage, &state));
+            let name = stage.outputs.first().map_or(String::new(), |port| port.name.clone());
+            state.insert(name, values);
+        }
+        for (function, (_, graph)) in functions.iter().zip(&staged.functions) {
+            let found = evaluate(graph, &inputs(graph, &state));
+            let off = match options.grade {
+                // of another order than the runtime's
+                Grade::Exact => continue,
+                Grade::Algebraic => differences(robot, frames, *function, options, &state, &found),
+            };
+            compare(&format!("staged::{}", function.name()), &graph.outputs, &off)?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether the constructor of a run-time parameter makes what the functions take.
+///
+/// # Errors
+/// As [`of_function`].
+pub(crate) fn of_parameter(
+    robot: &Robot,
+    parameter: &crate::scene::Parameter,
+    options: &Options,
+    graph: &Graph,
+) -> Result<(), Disagreement> {
+    if options.grade == Grade::Exact {
+        return Ok(());
+    }
+    let mut states = States::new(robot, options);
+    for _ in 0..STATES {
+        let body = states.body();
+        let wide: Vec<Vec<Magnitude>> = body.iter().map(|x| x.iter().copied().map(Magnitude::new).collect()).collect();
+        let off = evaluate(graph, &body.concat()).into_iter().zip(load_parameters(robot, parameter, &wide));
+        let off: Vec<Magnitude> = off.map(|(found, plain)| difference(found, plain)).collect();
+        // axes that hardly turn: what is left beside them is of the size of the whole
+        let most = off.iter().map(|x| x.size).fold(0.0, f64::max);
+        let off: Vec<Magnitude> = off.into_iter().map(|x| x.of_size(most)).collect();
+        compare(&parameter.input_name(), &graph.outputs, &off)?;
+    }
+    Ok(())
+}
+
+/// Whether a program that bounds another's errors bounds those that it makes: at random states, in the format that it is made for.
+///
+/// # Errors
+/// An error that is greater than its bound.
+pub(crate) fn of_bound(
+    robot: &Robot,
+    options: &Options,
+    name: &str,
+    (graph, bound): (&Graph, &Graph),
+) -> Result<(), Disagreement> {
+    match options.scalar {
+        Scalar::F64 => bounded::<f64>(robot, options, name, graph, bound),
+        Scalar::F32 => bounded::<f32>(robot, options, name, graph, bound),
+    }
+}
+
+fn bounded<T: Real + Into<f64>>(
+    robot: &Robot,
+    options: &Options,
+    name: &str,
+    graph: &Graph,
+    bound: &Graph,
+) -> Result<(), Disagreement> {
+    let mut states = States::new(robot, options);
+    for _ in 0..STATES {
+        let state = states.next(&graph.inputs);
+        let rounded: State = state
+            .into_iter()
+            .map(|(n, x)| (n, x.into_iter().map(|x| Dd::from(T::constant(x).into())).collect()))
+            .collect();
+        let mut short: BTreeMap<String, Vec<T>> =
+            rounded.iter().map(|(n, x)| (n.clone(), x.iter().copied().map(T::constant).collect())).collect();
+        let of = |graph: &Graph, given: &BTreeMap<String, Vec<T>>| -> Vec<T> {
+            graph.inputs.iter().flat_map(|p| given[&p.name].clone()).collect()
+        };
+        let found = evaluate(graph, &of(graph, &short));
+        let exact = evaluate(graph, &inputs(graph, &rounded));
+        // a bound by residuals asks for what is to be judged
+        let mut first = 0;
+        for port in &graph.outputs {
+            short.entry(port.name.clone()).or_insert_with(|| found[first..first + port.len()].to_vec());
+            first += port.len();
+        }
+        if bound.inputs.iter().any(|p| !short.contains_key(&p.name)) {
+            return Ok(());
+        }
+        let bounds = evaluate(bound, &of(bound, &short));
+        for (k, ((found, exact), most)) in found.iter().zip(&exact).zip(&bounds).enumerate() {
+            let off = (Dd::from((*found).into()) - *exact).hi().abs();
+            let most: f64 = (*most).into();
+            if off > most {
+                let result = format!("the error of {}", element_of(&graph.outputs, k));
+                return Err(Disagreement { program: format!("{name}_error_bound"), result, difference: off / most });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The robot's number that is most out of proportion to its others, in words: where something is lost on the way, it is mostly this.
+fn out_of_proportion(model: &Model<Dd>) -> Option<String> {
+    let lever = crate::reduce::longest_lever(model);
+    let mass = model.bodies.iter().map(|b| b.inertia.mass.hi()).fold(0.0, f64::max);
+    let mut worst: Option<(f64, String)> = None;
+    for body in &model.bodies {
+        let (p, c, i) = (body.placement.translation, body.inertia.com, body.inertia.inertia_com);
+        let rotation = body.placement.rotation.rows.concat();
+        let groups = [
+            ("origin of joint", body.joint.name.as_str(), "m", p.to_array().to_vec(), lever),
+            ("axes of joint", body.joint.name.as_str(), "", rotation, 1.0),
+            ("mass of link", body.name.as_str(), "kg", vec![body.inertia.mass], mass),
+            ("centre of mass of link", body.name.as_str(), "m", c.to_array().to_vec(), lever),
+            (
+                "inertia of link",
+                body.name.as_str(),
+                "kg·m²",
+                vec![i.xx, i.xy, i.xz, i.yy, i.yz, i.zz],
+                mass * lever * lever,
+            ),
+        ];
+        for (what, name, unit, numbers, scale) in groups {
+            for x in numbers.into_iter().map(Dd::hi).filter(|x| *x != 0.0) {
+                let off = (x.abs() / scale).log10().abs();
+                if off.is_finite() && worst.as_ref().is_none_or(|(most, _)| off > *most) {
+                    worst = Some((off, format!("{what} `{name}`: {x:e} {unit}").trim_end().to_string()));
+                }
+            }
+        }
+    }
+    worst.map(|(_, words)| words)
+}
+
+fn inputs(graph: &Graph, state: &State) -> Vec<Dd> {
+    graph.inputs.iter().flat_map(|p| state[&p.name].clone()).collect()
+}
+
+fn of_ports<T>(ports: &[Port], state: &State, number: fn(Dd) -> T) -> Vec<Vec<T>> {
+    ports.iter().map(|p| state[&p.name].iter().copied().map(number).collect()).collect()
+}
+
+/// Gives every number of a robot the size of the vector, rotation or tensor that it is a part of: turned into other axes, it takes part in
+/// all components.
+fn with_sizes(model: &mut Model<Magnitude>) {
+    let of_vector = |v: &mut Vec3<Magnitude>| {
+        let size = v.to_array().iter().map(|x| x.size).fold(0.0, f64::hypot);
+        *v = v.map(|x| x.of_size(size));
+    };
+    let of_tensor = |s: &mut Sym3<Magnitude>| {
+        let size = [s.xx, s.xy, s.xz, s.yy, s.yz, s.zz].iter().map(|x| x.size).fold(0.0, f64::hypot);
+        *s = s.map(|x| x.of_size(size));
+    };
+    let of_pose = |x: &mut Transform<Magnitude>| {
+        x.rotation = x.rotation.map(|r| r.of_size(1.0));
+        of_vector(&mut x.translation);
+    };
+    for body in &mut model.bodies {
+        of_pose(&mut body.placement);
+        of_pose(&mut body.link_frame);
+        let i = &mut body.inertia;
+        [&mut i.com, &mut i.first_moment, &mut i.anisotropy_com].into_iter().for_each(of_vector);
+        [&mut i.inertia_com, &mut i.second_moment_com, &mut i.second_moment].into_iter().for_each(of_tensor);
+        // differences of moments that cancel
+        let size = i.inertia_com.xx.size;
+        i.anisotropy_com = i.anisotropy_com.map(|x| x.of_size(size));
+        if let Some(load) = &mut body.load {
+            of_vector(&mut load.first_moment);
+            of_tensor(&mut load.second_moment);
+        }
+    }
+    model.frames.iter_mut().for_each(|f| of_pose(&mut f.placement));
+    of_vector(&mut model.gravity);
+}
+
+/// Random states that the inputs allow, the same everywhere: every other one is fast.
+struct States<'a> {
+    robot: &'a Robot,
+    options: &'a Options,
+    random: Random,
+    count: usize,
+}
+
+impl<'a> States<'a> {
+    fn new(robot: &'a Robot, options: &'a Options) -> Self {
+        States { robot, options, random: Random(SEED), count: 0 }
+    }
+
+    fn next(&mut self, ports: &[Port]) -> State {
+        let (robot, model) = (self.robot, &self.robot.model);
+        self.count += 1;
+        let fast = self.count.is_multiple_of(2);
+        let mut state = State::new();
+        let mut plain: Vec<(&str, Vec<f64>)> = Vec::new();
+        for port in ports {
+            let name = port.name.as_str();
+            if port.wrapper.is_some() {
+                let parameter = self.options.scene.parameters.iter().find(|p| p.input_name() == name);
+                let parameter = parameter.expect("a parameter per input with a type of its own");
+                let body = self.body();
+                let values = match parameter.body(model) {
+                    Some(_) => load_parameters(robot, parameter, &body),
+                    None => vec![Dd::ZERO; port.len()],
+                };
+                state.insert(name.to_string(), values);
+                continue;
+            }
+            let is_positive = ["_environment", "_struck", "restitution"].iter().any(|end| name.ends_with(end));
+            let in_contact =
+                ["_axes", "_pose", "_velocity", "_acceleration", "_own"].iter().any(|end| name.ends_with(end));
+            let values = match (is_positive, in_contact) {
+                (true, _) => (0..port.len()).map(|_| 0.5 + self.random.unit()).collect(),
+                (_, true) => (0..port.len()).map(|_| self.random.symmetric(1.0)).collect(),
+                _ => forward_method::of_port(model, port, fast, &mut self.random),
+            };
+            plain.push((name, values));
+        }
+        settle(model, &mut plain, &mut self.random);
+        state.extend(plain.into_iter().map(|(n, x)| (n.to_string(), x.into_iter().map(Dd::from).collect())));
+        // of length one in double-double, too
+        for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind == JointKind::Floating) {
+            if let Some(q) = state.get_mut("q") {
+                let q = &mut q[joint.iq + 3..joint.iq + 7];
+                let length = q.iter().fold(Dd::ZERO, |sum, x| sum + *x * *x).sqrt();
+                q.iter_mut().for_each(|x| *x /= length);
+            }
+        }
+        state
+    }
+
+    /// Mass, centre of mass and inertia of a body that may be.
+    fn body(&mut self) -> Vec<Vec<Dd>> {
+        let mut any = |least: f64, most: f64| Dd::from(least + (most - least) * self.random.unit());
+        let mass = any(0.1, 3.0);
+        let com = (0..3).map(|_| any(-0.2, 0.2)).collect();
+        let [xx, yy, zz] = [0; 3].map(|_| any(0.02, 0.03));
+        let [xy, xz, yz] = [0; 3].map(|_| any(-0.004, 0.004));
+        vec![vec![mass], com, vec![xx, xy, xz, yy, yz, zz]]
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod sabotage {
+    //! Passes that are broken on purpose.
+
+    use crate::expr::Graph;
+    use std::cell::RefCell;
+
+    type Break = Box<dyn FnMut(&str, Graph) -> Graph>;
+
+    thread_local! {
+        static BREAK: RefCell<Option<Break>> = const { RefCell::new(None) };
+    }
+
+    /// Runs `work` while what every pass makes goes through `broken`, which is told the name of the pass.
+    pub fn with<R>(broken: impl FnMut(&str, Graph) -> Graph + 'static, work: impl FnOnce() -> R) -> R {
+        BREAK.set(Some(Box::new(broken)));
+        let done = work();
+        BREAK.set(None);
+        done
+    }
+
+    pub fn applied(pass: &str, graph: Graph) -> Graph {
+        BREAK.with_borrow_mut(|b| match b {
+            Some(broken) => broken(pass, graph),
+            None => graph,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compile::checked;
+    use crate::diagnostic::Source;
+    use crate::expr::{verify, Constant, Op};
+    use crate::model::{load, ModelOptions};
+    use crate::scene::Scene;
+
+    /// Numbers as exporters write them: a right angle with fewer digits, dust, a fixed finger.
+    const ARM: &str = r#"<robot name="arm"><link name="base"/>
+<link name="a"><inertial><origin xyz="0.02 1e-17 -0.1" rpy="0 0 0"/><mass value="2.5"/>
+<inertia ixx="0.03" iyy="0.028" izz="0.01" ixy="1e-4" ixz="0" iyz="-2e-4"/></inertial></link>
+<link name="b"><inertial><origin xyz="0.15 0.01 1e-12" rpy="0 0 0"/><mass value="1.2"/>
+<inertia ixx="0.004" iyy="0.02" izz="0.019" ixy="0" ixz="3e-4" iyz="0"/></inertial></link>
+<link name="c"><inertial><origin xyz="0 0.002 0.06" rpy="0 0 0"/><mass value="0.4"/>
+<inertia ixx="0.001" iyy="0.0011" izz="0.0006" ixy="1e-19" ixz="0" iyz="0"/></inertial></link>
+<link name="finger"><inertial><origin xyz="0 0.01 0.02" rpy="0 0 0"/><mass value="0.05"/>
+<inertia ixx="2e-5" iyy="2e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="one" type="revolute"><parent link="base"/><child link="a"/><origin xyz="0 0 0.3" rpy="0 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-2.9" upper="2.9" effort="50" velocity="2"/></joint>
+<joint name="two" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0.05 0 1e-16" rpy="1.5708 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" effort="50" velocity="2"/></joint>
+<joint name="three" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0.3 0.02 0" rpy="0 1.5707963267949 0"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" effort="20" velocity="3"/></joint>
+<joint name="fixed" type="fixed"><parent link="c"/><child link="finger"/><origin xyz="0 0.04 0.1" rpy="0 0 1.5707963267949"/></joint>
+</robot>"#;
+
+    fn robot(text: &str) -> Robot {
+        let (model, complaints) = load(&Source::new("arm.urdf", text), &ModelOptions::default());
+        Robot::new(model.unwrap_or_else(|| panic!("{complaints:?}")))
+    }
+
+    const FUNCTIONS: [Function; 5] = [
+        Function::InverseDynamics,
+        Function::GravityForce,
+        Function::MassMatrix,
+        Function::ForwardDynamics,
+        Function::JointWrenches,
+    ];
+
+    #[test]
+    fn robots_as_people_write_them_keep_their_cheapest_form() {
+        let robot = robot(ARM);
+        for function in FUNCTIONS {
+            let program = checked(&robot, &[], function, &Options::default()).unwrap_or_else(|wrong| panic!("{wrong}"));
+            assert_eq!(program.plainer, None);
+        }
+    }
+
+    /// Changes one operation of a program so that it computes something else; `None` where there is none of the kind.
+    fn mutant(graph: &Graph, kind: usize, random: &mut Random) -> Option<Graph> {
+        let live = graph.live();
+        let fits = |i: &usize| {
+            live[*i]
+                && match (kind, graph.ops[*i]) {
+                    (0, Op::Add(..)) | (1, Op::Sub(..)) | (2, Op::Mul(..)) | (4, Op::Neg(_)) => true,
+                    (5, Op::Sin(_)) => true,
+                    (3, Op::Constant(c)) => c.value() != Dd::ZERO && c.value().hi().abs() > 1e-9,
+                    _ => false,
+                }
+        };
+        let places: Vec<usize> = (0..graph.ops.len()).filter(fits).collect();
+        let at = *places.get(random.below(places.len().max(1)))?;
+        let mut broken = graph.clone();
+        broken.ops[at] = match graph.ops[at] {
+            Op::Add(a, b) => Op::Sub(a, b),
+            Op::Sub(a, b) => Op::Sub(b, a),
+            Op::Mul(a, b) => Op::Add(a, b),
+            // a part in 1e13, as a constant has that is rounded too early
+            Op::Constant(c) => Op::Constant(Constant::new(c.value() * Dd::new(1.0, 1e-13))),
+            // as far as the operand may be used here at all
+            Op::Neg(a) => Op::Mul(a, a),
+            Op::Sin(a) => Op::Cos(a),
+            op => op,
+        };
+        verify(&broken).ok().map(|()| broken)
+    }
+
+    /// Far from where the compiler looked, and against the generic runtime itself.
+    fn is_right(robot: &Robot, function: Function, graph: &Graph) -> bool {
+        let options = Options::default();
+        let mut states = States { random: Random(77), ..States::new(robot, &options) };
+        let ports = options.scene.ports(function, &robot.model);
+        (0..5).all(|_| {
+            let state = states.next(&ports);
+            let found = evaluate(graph, &inputs(graph, &state));
+            let plain: Vec<Vec<Dd>> = ports.iter().map(|p| state[&p.name].clone()).collect();
+            let method = ForwardDynamicsMethod::ArticulatedBody;
+            let plain = function.evaluate(&robot.model, &[], method, &plain);
+            let most = plain.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
+            found.iter().zip(plain).all(|(a, b)| (*a - b).hi().abs() <= 1e-20 * most)
+        })
+    }
+
+    /// Every pass broken in every way that a program can be wrong by one operation: what comes out is right, or nothing does.
+    #[test]
+    fn a_broken_pass_never_reaches_the_text() {
+        let robot = robot(ARM);
+        let mut random = Random(3);
+        let (mut caught, mut written) = (0, 0);
+        for function in FUNCTIONS {
+            for pass in ["traced", "unread inputs", "sums", "substitute", "order"] {
+                for kind in 0..6 {
+                    let mut seed = Random(random.bits());
+                    // every form that is tried is broken, until the plain one is as well
+                    let broken = move |name: &str, graph: Graph| match name == pass {
+                        true => mutant(&graph, kind, &mut seed).unwrap_or(graph),
+                        false => graph,
+                    };
+                    match sabotage::with(broken, || checked(&robot, &[], function, &Options::default())) {
+                        Err(_) => caught += 1,
+                        Ok(program) => {
+                            caught += usize::from(program.plainer.is_some());
+                            written += 1;
+                            assert!(is_right(&robot, function, &program.graph), "{function:?}, {pass}, {kind}");
+                        }
+                    }
+                }
+            }
+        }
+        println!("{caught} of {} caught, {written} written in a form that is right", FUNCTIONS.len() * 5 * 6);
+        assert!(caught > 90, "{caught}");
+    }
+
+    /// A form of the robot that is not the robot.
+    #[test]
+    fn a_wrong_form_of_the_robot_gives_way_to_a_plainer_one() {
+        let mut robot = robot(ARM);
+        robot.reduced.bodies[2].first_moment.x *= Dd::new(1.0, 1e-15);
+        let options = Options { scene: Scene::default(), ..Options::default() };
+        let optimisations = crate::compile::Optimisations { chosen: false, ..options.optimisations() };
+        let graph = crate::compile::optimised(&robot, &[], Function::InverseDynamics, &options, optimisations);
+        let wrong =
+            of_function(&robot, &[], Function::InverseDynamics, &options, &graph).expect_err("it is another robot");
+        assert!(wrong.result.starts_with("tau[") && wrong.difference > 1e-20, "{wrong}");
+        let message = wrong.error(&robot.model);
+        assert!(message.detail.contains("link `c`: 1e-19") || message.detail.contains("1e-1"), "{}", message.detail);
+    }
+}

@@ -1,0 +1,119 @@
+//! Numbers that know how large the terms were that they are made of: what an error is to be compared with.
+//!
+//! A sum of large terms may be small, and what rounding leaves in it is of the size of the terms. [`Magnitude`] carries that size along: it
+//! is how far the value would move, to first order, if each constant and each input moved by its own size, times one part in all. An error
+//! of ε times the size is what an evaluation with unit roundoff ε is allowed.
+
+use crate::dd::Dd;
+use crate::real::Real;
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A value and the size of what it is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Magnitude {
+    /// The value.
+    pub value: Dd,
+    /// How large its terms are; never less than the value.
+    pub size: f64,
+}
+
+impl Magnitude {
+    /// A number that is as large as it is.
+    pub fn new(value: Dd) -> Self {
+        Magnitude { value, size: value.hi().abs() }
+    }
+
+    /// The same number as a part of something of this size, such as a component of a vector of this length.
+    #[must_use]
+    pub fn of_size(self, size: f64) -> Self {
+        Magnitude { size: self.size.max(size), ..self }
+    }
+}
+
+impl Add for Magnitude {
+    type Output = Self;
+    fn add(self, b: Self) -> Self {
+        Magnitude { value: self.value + b.value, size: self.size + b.size }
+    }
+}
+
+impl Sub for Magnitude {
+    type Output = Self;
+    fn sub(self, b: Self) -> Self {
+        Magnitude { value: self.value - b.value, size: self.size + b.size }
+    }
+}
+
+impl Mul for Magnitude {
+    type Output = Self;
+    fn mul(self, b: Self) -> Self {
+        let [x, y] = [self, b].map(|v| v.value.hi().abs());
+        Magnitude { value: self.value * b.value, size: self.size * y + x * b.size }
+    }
+}
+
+impl Div for Magnitude {
+    type Output = Self;
+    fn div(self, b: Self) -> Self {
+        let value = self.value / b.value;
+        Magnitude { value, size: (self.size + value.hi().abs() * b.size) / b.value.hi().abs() }
+    }
+}
+
+impl Neg for Magnitude {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Magnitude { value: -self.value, ..self }
+    }
+}
+
+impl Real for Magnitude {
+    fn constant(value: Dd) -> Self {
+        Magnitude::new(value)
+    }
+
+    /// Both are parts of a rotation, whose size is one.
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = self.value.sin_cos();
+        (Magnitude { value: sin, size: 1.0 }, Magnitude { value: cos, size: 1.0 })
+    }
+
+    fn sin_cos_of_sum(angles: &[Self]) -> (Self, Self) {
+        angles.iter().fold(Self::zero(), |sum, angle| sum + *angle).sin_cos()
+    }
+
+    fn sqrt(self) -> Self {
+        let root = Dd::sqrt(self.value);
+        Magnitude { value: root, size: self.size / (2.0 * root.hi()) + root.hi() }
+    }
+
+    fn sign(self) -> Self {
+        Magnitude::new(Real::sign(self.value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cancels_keeps_the_size_of_its_terms() {
+        let [a, b] = [1e6 + 1.0, 1e6].map(|x| Magnitude::new(Dd::from(x)));
+        let rest = a - b;
+        assert_eq!((rest.value, rest.size), (Dd::ONE, 2e6 + 1.0));
+    }
+
+    #[test]
+    fn a_component_that_vanishes_counts_with_its_vector() {
+        let [zero, two] = [0.0, 2.0].map(|x| Magnitude::new(Dd::from(x)));
+        assert_eq!((zero.of_size(0.5) * two).size, 1.0);
+        assert_eq!((zero * two).size, 0.0);
+    }
+
+    #[test]
+    fn a_small_divisor_makes_what_its_terms_leave_large() {
+        let [a, b, c] = [1.0, 1.001, 1.0].map(|x| Magnitude::new(Dd::from(x)));
+        let quotient = a / (b - c);
+        assert!((quotient.size / (1000.0 * 2001.0) - 1.0).abs() < 1e-3, "{quotient:?}");
+    }
+}
