@@ -18,8 +18,8 @@ const NEARLY_PARALLEL: f64 = 1e-4;
 const FAR: f64 = 10.0;
 /// A part of a lever beside an axis sets no direction where it is less than this part of the robot's longest lever.
 const BESIDE: f64 = 1e-8;
-/// A unit of length is at most so many times the robot's longest lever, or such a part of it.
-const UNIT_RANGE: f64 = 1e3;
+/// Units of length come from lengths and first moments that are at least this part of the robot's greatest.
+const NO_DUST: f64 = 1e-6;
 
 /// What is free in a reduced form; torques depend on none of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -258,18 +258,21 @@ fn in_unit(mut reduced: ReducedModel<Dd>, unit: Dd) -> ReducedModel<Dd> {
 }
 
 /// Units of length that make a number one, each once, the most frequent first: lengths between joints, then of gravity and
-/// first moments. None of them is out of proportion to the robot: what is as small as dust is no unit.
+/// first moments. What is as small as dust against the robot, whose longest lever is given, is no unit.
 pub fn lengths(reduced: &ReducedModel<Dd>, lever: f64) -> Vec<Dd> {
     let mut found: Vec<(Dd, usize)> = Vec::new();
     if reduced.bodies.iter().any(|b| b.kind == JointKind::Prismatic) {
         return Vec::new();
     }
     let bodies = || reduced.bodies.iter();
-    let between = bodies().flat_map(|b| b.translation.to_array());
-    let moments = bodies().flat_map(|b| b.first_moment.to_array()).filter(|x| *x != Dd::ZERO).map(|x| Dd::ONE / x);
-    let all = between.chain(reduced.gravity.to_array()).chain(moments);
-    let in_proportion = |x: &Dd| (lever / UNIT_RANGE..=lever * UNIT_RANGE).contains(&x.hi());
-    for x in all.map(Dd::abs).filter(in_proportion) {
+    let above = |least: f64| move |x: &Dd| x.abs().hi() > least;
+    let between = bodies().flat_map(|b| b.translation.to_array()).filter(above(NO_DUST * lever));
+    let gravity = reduced.gravity.to_array();
+    let most = gravity.iter().map(|x| x.abs().hi()).fold(0.0, f64::max);
+    let heaviest = bodies().map(|b| norm(b.first_moment)).fold(0.0, f64::max);
+    let moments = bodies().flat_map(|b| b.first_moment.to_array()).filter(above(NO_DUST * heaviest));
+    let all = between.chain(gravity.into_iter().filter(above(NO_DUST * most))).chain(moments.map(|x| Dd::ONE / x));
+    for x in all.map(Dd::abs) {
         match found.iter_mut().find(|(y, _)| is_about(x, *y)) {
             Some((_, times)) => *times += 1,
             None => found.push((x, 1)),

@@ -10,7 +10,7 @@ use straightline_codegen::diagnostic::Source;
 use straightline_codegen::expr::{evaluate, Graph};
 use straightline_codegen::function::Robot;
 use straightline_codegen::model::{self, ModelOptions};
-use straightline_codegen::singular::singular_joints;
+use straightline_codegen::singular::{singular_joints, Inertia};
 use straightline_codegen::verify::SecondReading;
 use straightline_codegen::{Function, Scalar};
 use straightline_core::model::{JointKind, Model};
@@ -209,7 +209,7 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
     let second = SecondReading::new(source, &model, &options);
     let second = second.unwrap_or_else(|why| panic!("what the compiler takes the second author refuses: {why}"));
     let mut functions: Vec<Function> = Function::all().chain([Function::KinematicsAndJacobian]).collect();
-    if !singular_joints(&model).is_empty() {
+    if !singular_joints(&model, Inertia::OfLinks).is_empty() {
         functions.retain(|f| *f != Function::ForwardDynamics);
     }
     let mut random = Random(99);
