@@ -22,7 +22,7 @@
 //! build, warnings do not. Nothing is written outside `OUT_DIR`.
 
 use crate::compile::{compile, Generated, Options};
-use crate::diagnostic::{Diagnostics, Severity, Source};
+use crate::diagnostic::{Diagnostics, Front, Level, Reporting, Severity, Source};
 use crate::emit::{Lanes, Scalar};
 use crate::export::identifier;
 use crate::expr::Grade;
@@ -54,7 +54,9 @@ pub struct Builder {
 impl Builder {
     /// From a robot file (URDF or TOML), relative to the package's manifest; with all functions, in f64.
     pub fn new(robot: impl Into<PathBuf>) -> Self {
-        Builder { robot: robot.into(), scene_file: None, module: None, out_dir: None, options: Options::default() }
+        let reporting = Reporting { front: Front::Builder, ..Reporting::default() };
+        let options = Options { reporting, ..Options::default() };
+        Builder { robot: robot.into(), scene_file: None, module: None, out_dir: None, options }
     }
 
     /// These functions only.
@@ -157,6 +159,26 @@ impl Builder {
     /// Acceleration due to gravity in the world \[m/s²\]; otherwise the file's, or (0, 0, −9.81).
     pub fn gravity(mut self, gravity: [f64; 3]) -> Self {
         self.options.model.gravity = Some(gravity);
+        self
+    }
+
+    /// Warnings of this code are not said; `"warnings"`: none.
+    pub fn allow(self, code: impl Into<String>) -> Self {
+        self.level(code, Level::Allow)
+    }
+
+    /// Warnings of this code are said, whatever a scene or an earlier call says.
+    pub fn warn(self, code: impl Into<String>) -> Self {
+        self.level(code, Level::Warn)
+    }
+
+    /// Warnings of this code are errors; `"warnings"`: all.
+    pub fn deny(self, code: impl Into<String>) -> Self {
+        self.level(code, Level::Deny)
+    }
+
+    fn level(mut self, code: impl Into<String>, level: Level) -> Self {
+        self.options.reporting.levels.set(code, level);
         self
     }
 
@@ -266,7 +288,8 @@ impl Messages {
             };
             self.cargo.push(format!("cargo::{kind}={}", diagnostic.line()));
         }
-        self.person.push_str(&diagnostics.at_least(Severity::Warning).render());
+        // cargo shows warnings from its own lines, whether the build fails or not
+        self.person.push_str(&diagnostics.at_least(Severity::Error).render());
     }
 }
 

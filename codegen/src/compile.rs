@@ -5,7 +5,7 @@ use crate::certify::{self, Effort};
 use crate::choose::{self, choose, price};
 use crate::contact;
 use crate::description::messages;
-use crate::diagnostic::{Diagnostic, Diagnostics, Source};
+use crate::diagnostic::{Diagnostic, Diagnostics, Reporting, Source};
 use crate::emit::{self, Item, Lanes, Provenance, Scalar, Style};
 use crate::equivalence::{self, Disagreement, Plainer};
 use crate::expr::{verify, Counts, Folding, Grade, Graph, NodeId, Port, RuleSet, Section};
@@ -25,12 +25,12 @@ use crate::singular;
 use crate::staged::{self, staged};
 use crate::trace::trace;
 use std::collections::BTreeMap;
-use std::fmt::Write;
+use std::fmt::{self, Write};
 use straightline_core::model::Model;
 use straightline_core::Dd;
 
 /// What to generate, and how.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Options {
     /// The functions, without repetition.
     pub functions: Vec<Function>,
@@ -60,6 +60,47 @@ pub struct Options {
     pub scene: Scene,
     /// Whether rounding errors are bounded, and how much is spent on it; a budget of an error bounds them, too.
     pub certify: Option<Effort>,
+    /// What becomes of warnings, and in whose words they are said: nothing of what is generated.
+    pub reporting: Reporting,
+}
+
+/// Without what is only said: what is generated carries a hash of this text.
+impl fmt::Debug for Options {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Options {
+            functions,
+            frames,
+            scalar,
+            also,
+            lanes,
+            fma,
+            generic,
+            grade,
+            forward_dynamics,
+            limbs,
+            limits,
+            model,
+            scene,
+            certify,
+            reporting: _,
+        } = self;
+        f.debug_struct("Options")
+            .field("functions", functions)
+            .field("frames", frames)
+            .field("scalar", scalar)
+            .field("also", also)
+            .field("lanes", lanes)
+            .field("fma", fma)
+            .field("generic", generic)
+            .field("grade", grade)
+            .field("forward_dynamics", forward_dynamics)
+            .field("limbs", limbs)
+            .field("limits", limits)
+            .field("model", model)
+            .field("scene", scene)
+            .field("certify", certify)
+            .finish()
+    }
 }
 
 impl Default for Options {
@@ -79,6 +120,7 @@ impl Default for Options {
             model: crate::model::ModelOptions::default(),
             scene: Scene::default(),
             certify: None,
+            reporting: Reporting::default(),
         }
     }
 }
@@ -467,18 +509,37 @@ fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> R
     Ok(generated)
 }
 
-fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
-    let (whole, mut diagnostics) = model::load(source, &options.scene.model_options(&options.model));
+/// What is wrong with the file or the options, without compiling: all that [`compile`] would say but what only the finished
+/// programs tell, such as exceeded budgets.
+pub fn examine(source: &Source, options: &Options) -> Diagnostics {
+    match prepare(source, options) {
+        Ok(prepared) => prepared.diagnostics,
+        Err(diagnostics) => diagnostics,
+    }
+}
+
+/// A robot in its scene, and options that fit it.
+struct Prepared {
+    /// The robot without its scene.
+    whole: Model<Dd>,
+    model: Model<Dd>,
+    frames: Vec<String>,
+    /// The options, spelled out for the robot.
+    resolved: Options,
+    /// Warnings.
+    diagnostics: Diagnostics,
+}
+
+/// Reads and checks everything.
+fn prepare(source: &Source, options: &Options) -> Result<Prepared, Diagnostics> {
+    let mut diagnostics = Diagnostics::reporting(&options.reporting);
+    let whole = model::load_into(source, &options.scene.model_options(&options.model), &mut diagnostics);
     scene::check_options(options, &mut diagnostics);
     let model = whole.clone().and_then(|whole| scene::apply(whole, &options.scene, &mut diagnostics));
-    let frames = model.as_ref().map(|m| choose_frames(m, &options.frames, &mut diagnostics)).unwrap_or_default();
-    diagnostics.sort();
-    let (Some(whole), Some(model)) = (whole, model) else { return Err(diagnostics) };
-    if diagnostics.has_errors() {
-        return Err(diagnostics);
-    }
-    let functions = Function::wanted(&options.functions, &model);
-    for function in functions.iter().filter(|f| !f.is_of(&model)) {
+    let of_frames = model.as_ref().or(whole.as_ref());
+    let frames = of_frames.map(|m| choose_frames(m, &options.frames, &mut diagnostics)).unwrap_or_default();
+    let functions = of_frames.map(|m| Function::wanted(&options.functions, m)).unwrap_or_default();
+    for (function, model) in functions.iter().filter_map(|f| Some((f, of_frames?))).filter(|(f, m)| !f.is_of(*m)) {
         let complaint = scene::messages::function_not_of_robot(function.name(), model.drives.is_empty());
         let path = match options.scene.outputs.contains_key(function) {
             true => format!("outputs.{}", function.name()),
@@ -486,18 +547,24 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
         };
         options.scene.places.complain(&path, complaint, &mut diagnostics);
     }
-    if diagnostics.has_errors() {
-        return Err(diagnostics);
-    }
-    if options.limbs == LimbForm::Lanes && limbs::limbs(&model).is_empty() {
+    if options.limbs == LimbForm::Lanes && model.as_ref().is_some_and(|model| limbs::limbs(model).is_empty()) {
         options.scene.places.complain("outputs.limbs", scene::messages::no_identical_limbs(), &mut diagnostics);
     }
+    diagnostics.sort();
+    let (Some(whole), Some(model), false) = (whole, model, diagnostics.has_errors()) else { return Err(diagnostics) };
     let resolved = Options { scene: options.scene.resolved(&model), functions, ..options.clone() };
     singular::demand_inertia(&model, &resolved, &mut diagnostics);
-    if diagnostics.has_errors() {
-        diagnostics.sort();
-        return Err(diagnostics);
+    match diagnostics.has_errors() {
+        true => {
+            diagnostics.sort();
+            Err(diagnostics)
+        }
+        false => Ok(Prepared { whole, model, frames, resolved, diagnostics }),
     }
+}
+
+fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
+    let Prepared { whole, model, frames, resolved, mut diagnostics } = prepare(source, options)?;
     let hash = hash(source.text(), &resolved);
     let robot = Robot::new(model);
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();

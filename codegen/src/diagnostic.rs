@@ -4,7 +4,13 @@
 //! [`Diagnostics::lines`] where one line is all there is. Sources are UTF-8; lines and columns count from 1, columns in
 //! characters.
 
-use annotate_snippets::{renderer::DecorStyle, AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+pub mod codes;
+pub mod levels;
+pub mod messages;
+
+pub use levels::{Front, Level, Levels, Reporting};
+
+use annotate_snippets::{renderer::DecorStyle, AnnotationKind, Group, Level as Shown, Origin, Renderer, Snippet};
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
@@ -195,6 +201,10 @@ pub struct Diagnostic {
     pub help: String,
     /// Other places that belong to it, each with a word on what stands there.
     pub related: Vec<(Place, String)>,
+    /// An option of the fronts and its value: `{option}` in the texts becomes what the front that speaks writes.
+    pub option: Option<(&'static str, Option<String>)>,
+    /// Whether one line says it all, also for people.
+    pub brief: bool,
 }
 
 impl Diagnostic {
@@ -208,6 +218,8 @@ impl Diagnostic {
             detail: String::new(),
             help: String::new(),
             related: Vec::new(),
+            option: None,
+            brief: false,
         }
     }
 
@@ -247,6 +259,32 @@ impl Diagnostic {
         self
     }
 
+    /// With an option of the fronts, and its value unless it is switched on: where `{option}` stands in the texts, the
+    /// front that speaks writes it in its own way.
+    #[must_use]
+    pub fn option(mut self, name: &'static str, value: Option<String>) -> Diagnostic {
+        self.option = Some((name, value));
+        self
+    }
+
+    /// In one line, also for people.
+    #[must_use]
+    pub fn brief(mut self) -> Diagnostic {
+        self.brief = true;
+        self
+    }
+
+    /// In the words of a front.
+    fn said_by(mut self, front: Front) -> Diagnostic {
+        if let Some((name, value)) = self.option.take() {
+            let option = front.option(name, value.as_deref());
+            for text in [&mut self.title, &mut self.detail, &mut self.help] {
+                *text = text.replace("{option}", &option);
+            }
+        }
+        self
+    }
+
     /// With another place that belongs to it.
     #[must_use]
     pub fn related(mut self, place: &Place, word: impl Into<String>) -> Diagnostic {
@@ -258,18 +296,24 @@ impl Diagnostic {
 
     /// One line: `path:line:column: error: title; detail; help: remedy`, control characters escaped.
     pub fn line(&self) -> String {
-        let mut line = String::new();
-        if let Some(place) = &self.place {
-            line += &format!("{place}: ");
-        }
-        line += &format!("{}: {}", self.severity, self.title);
-        if !self.detail.is_empty() {
-            line += &format!("; {}", self.detail);
-        }
-        if !self.help.is_empty() {
-            line += &format!("; help: {}", self.help);
-        }
+        let place = self.place.as_ref().map_or_else(String::new, |place| format!("{place}: "));
+        let line = format!("{place}{}: {}", self.severity, self.said());
         line.chars().flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] }).collect()
+    }
+}
+
+impl Diagnostic {
+    /// Title, detail and help.
+    fn said(&self) -> String {
+        let detail = if self.detail.is_empty() { String::new() } else { format!("; {}", self.detail) };
+        let help = if self.help.is_empty() { String::new() } else { format!("; help: {}", self.help) };
+        format!("{}{detail}{help}", self.title)
+    }
+
+    /// The file and what is said of it, for people.
+    fn in_one_line(&self) -> String {
+        let file = self.place.as_ref().map_or_else(String::new, |place| format!("{}: ", place.file));
+        format!("{file}{}", self.said())
     }
 }
 
@@ -280,6 +324,7 @@ pub struct Diagnostics {
     sources: Vec<Source>,
     /// How often each code was pushed, in the order of their first complaints.
     counts: Vec<(&'static str, usize)>,
+    reporting: Reporting,
 }
 
 impl Diagnostics {
@@ -289,6 +334,14 @@ impl Diagnostics {
     /// No complaints.
     pub fn new() -> Diagnostics {
         Diagnostics::default()
+    }
+
+    /// No complaints yet: they will be said in the words of a front, each at its level; what is wrong with the levels is
+    /// said first.
+    pub fn reporting(reporting: &Reporting) -> Diagnostics {
+        let mut diagnostics = Diagnostics { reporting: reporting.clone(), ..Diagnostics::default() };
+        reporting.levels.complaints().for_each(|complaint| diagnostics.push(complaint));
+        diagnostics
     }
 
     /// Makes a source known, so that its lines can be shown.
@@ -305,6 +358,8 @@ impl Diagnostics {
 
     /// Adds a complaint. Of one code, [`Diagnostics::SHOWN_PER_CODE`] are kept and the others counted.
     pub fn push(&mut self, diagnostic: Diagnostic) {
+        let diagnostic = diagnostic.said_by(self.reporting.front);
+        let Some(diagnostic) = self.reporting.levels.applied(diagnostic) else { return };
         let code = diagnostic.code;
         let index = self.counts.iter().position(|c| c.0 == code).unwrap_or_else(|| {
             self.counts.push((code, 0));
@@ -402,10 +457,16 @@ impl Diagnostics {
 
     fn group<'a>(&'a self, diagnostic: &'a Diagnostic) -> Group<'a> {
         let level = match diagnostic.severity {
-            Severity::Error => Level::ERROR,
-            Severity::Warning => Level::WARNING,
-            Severity::Note => Level::NOTE,
+            Severity::Error => Shown::ERROR,
+            Severity::Warning => Shown::WARNING,
+            Severity::Note => Shown::NOTE,
         };
+        if diagnostic.brief {
+            return level
+                .primary_title(plain(&diagnostic.in_one_line()))
+                .id(diagnostic.code)
+                .elements([] as [Origin; 0]);
+        }
         let mut group = level.primary_title(plain(&diagnostic.title)).id(diagnostic.code).elements([] as [Origin; 0]);
         if let Some(place) = &diagnostic.place {
             group = self.show(group, place, AnnotationKind::Primary, "");
@@ -414,10 +475,10 @@ impl Diagnostics {
             group = self.show(group, place, AnnotationKind::Context, word);
         }
         if !diagnostic.detail.is_empty() {
-            group = group.element(Level::NOTE.message(plain(&diagnostic.detail)));
+            group = group.element(Shown::NOTE.message(plain(&diagnostic.detail)));
         }
         if !diagnostic.help.is_empty() {
-            group = group.element(Level::HELP.message(plain(&diagnostic.help)));
+            group = group.element(Shown::HELP.message(plain(&diagnostic.help)));
         }
         group
     }

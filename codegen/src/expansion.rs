@@ -1,7 +1,7 @@
 //! What the macros expand to, as text; `straightline-macros` is a shell over this.
 
-use crate::compile::{compile, Generated, Options};
-use crate::diagnostic::{Diagnostic, Diagnostics, Severity, Source};
+use crate::compile::{self, Generated, Options};
+use crate::diagnostic::{Diagnostic, Diagnostics, Front, Reporting, Severity, Source};
 use crate::emit::{array_type, batch, Scalar};
 use crate::expr::Port;
 use crate::scene;
@@ -18,6 +18,8 @@ pub struct Expansion {
     pub result: Result<Generated, Refusal>,
     /// What to tell the person besides.
     pub warnings: String,
+    /// The text of the scene, right or wrong, if there is one.
+    pub scene: Option<String>,
 }
 
 /// Why nothing was compiled.
@@ -48,34 +50,93 @@ pub enum SceneOf {
 /// directories. What the scene says stands in place of what the options say.
 pub fn expand(robot: &str, scene: Option<&SceneOf>, directories: &[&Path], options: &Options) -> Expansion {
     let mut files = Vec::new();
-    match compiled(robot, scene, directories, options, &mut files) {
-        Ok((warnings, generated)) => Expansion { files, result: Ok(generated), warnings },
-        Err(refusal) => Expansion { files, result: Err(refusal), warnings: String::new() },
+    let opened = open(robot, scene, directories, &mut files);
+    let text = scene_text(scene, &opened);
+    match opened.map_err(|(refusal, _)| refusal).and_then(|opened| compiled(&opened, options)) {
+        Ok((warnings, generated)) => Expansion { files, result: Ok(generated), warnings, scene: text },
+        Err(refusal) => Expansion { files, result: Err(refusal), warnings: String::new(), scene: text },
     }
 }
 
-/// Warnings and dynamics, or what is wrong; notes the files that were read.
-fn compiled(
+/// The same, where the options are wrong and nothing is to be made: what else is wrong, if anything is.
+pub fn examine(
     robot: &str,
     scene: Option<&SceneOf>,
     directories: &[&Path],
     options: &Options,
+) -> (Vec<PathBuf>, Option<Refusal>, Option<String>) {
+    let mut files = Vec::new();
+    let opened = open(robot, scene, directories, &mut files);
+    let text = scene_text(scene, &opened);
+    let refusal = match opened {
+        Err((refusal, _)) => Some(refusal),
+        Ok(opened) => {
+            let found = compile::examine(&opened.robot, &opened.options(options));
+            found.has_errors().then(|| refusal(&found, opened.robot.path(), opened.within()))
+        }
+    };
+    (files, refusal, text)
+}
+
+/// The files of a macro.
+struct Opened {
+    robot: Source,
+    scene: Option<Source>,
+    is_within: bool,
+}
+
+impl Opened {
+    /// The options, with what the scene says of them.
+    fn options(&self, options: &Options) -> Options {
+        let reporting = Reporting { front: Front::Derive, ..options.reporting.clone() };
+        let options = Options { reporting, ..options.clone() };
+        match &self.scene {
+            None => options,
+            Some(source) => scene::read_partly(source).into_options(options),
+        }
+    }
+
+    /// The path of the scene, if it stands in the macro.
+    fn within(&self) -> Option<&str> {
+        self.scene.as_ref().filter(|_| self.is_within).map(Source::path)
+    }
+}
+
+/// Opens robot file and scene and notes the files; what is missing, with the scene's source if that is there.
+fn open(
+    robot: &str,
+    scene: Option<&SceneOf>,
+    directories: &[&Path],
     files: &mut Vec<PathBuf>,
-) -> Result<(String, Generated), Refusal> {
+) -> Result<Opened, (Refusal, Option<Source>)> {
     let robot = found("robot", robot, directories, files);
-    let (scene, within) = match scene {
-        None => (Ok(None), None),
-        Some(SceneOf::File(name)) => (found("scene", name, directories, files).map(Some), None),
-        Some(SceneOf::Macro(source)) => (Ok(Some(source.clone())), Some(source.path())),
+    let (scene, is_within) = match scene {
+        None => (Ok(None), false),
+        Some(SceneOf::File(name)) => (found("scene", name, directories, files).map(Some), false),
+        Some(SceneOf::Macro(source)) => (Ok(Some(source.clone())), true),
     };
-    let (robot, scene) = (robot?, scene?);
-    let mut diagnostics = Diagnostics::new();
-    let options = match scene.map(|source| scene::read(&source, &mut diagnostics)) {
-        None => options.clone(),
-        Some(Some(file)) => file.into_options(options.clone()),
-        Some(None) => return Err(refusal(&diagnostics, robot.path(), within)),
+    match (robot, scene) {
+        (Ok(robot), Ok(scene)) => Ok(Opened { robot, scene, is_within }),
+        (Err(a), Err(b)) => Err((format!("{a}\n{b}").into(), None)),
+        (Err(message), Ok(scene)) => Err((message.into(), scene)),
+        (Ok(_), Err(message)) => Err((message.into(), None)),
+    }
+}
+
+/// The text of the scene; empty if its file cannot be read.
+fn scene_text(scene: Option<&SceneOf>, opened: &Result<Opened, (Refusal, Option<Source>)>) -> Option<String> {
+    let source = match opened {
+        Ok(opened) => opened.scene.as_ref(),
+        Err((_, source)) => source.as_ref(),
     };
-    let generated = compile(&robot, &options).map_err(|diagnostics| refusal(&diagnostics, robot.path(), within))?;
+    scene.map(|_| source.map_or_else(String::new, |source| source.text().to_string()))
+}
+
+/// Warnings and dynamics, or what is wrong.
+fn compiled(opened: &Opened, options: &Options) -> Result<(String, Generated), Refusal> {
+    let robot = &opened.robot;
+    let generated = compile::compile(robot, &opened.options(options))
+        .map_err(|diagnostics| refusal(&diagnostics, robot.path(), opened.within()))?;
     Ok((generated.warnings.at_least(Severity::Warning).render(), generated))
 }
 

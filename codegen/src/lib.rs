@@ -34,6 +34,7 @@ pub mod schedule;
 pub mod singular;
 pub mod stage;
 pub mod staged;
+pub mod stubs;
 pub mod trace;
 #[cfg(feature = "verify")]
 pub mod verify;

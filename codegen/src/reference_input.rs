@@ -1,6 +1,6 @@
 //! The robot file in the reference's terms: from a [`Description`] to mass centres, joint axes and joint vectors.
 //!
-//! A second reading of the file, independent of `crate::model`, so that `verify` proves the way from the file to the
+//! A second reading of the file, independent of `crate::model`, so that `verify` tests the way from the file to the
 //! equations and not only the equations. Everything is in double-double; the numbers of the file count as the nearest
 //! f64 of their text. The description is one that was checked: what cannot be a robot gives an error without a place.
 //!

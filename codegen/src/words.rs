@@ -1,5 +1,6 @@
 //! The words by which every front names what can be chosen: functions, scalars, rules, methods.
 
+use crate::description::messages::did_you_mean;
 use crate::emit::{Lanes, Scalar};
 use crate::expr::Grade;
 use crate::function::{ForwardDynamicsMethod, Function};
@@ -15,6 +16,11 @@ pub trait Choice: Copy + PartialEq + Sized + 'static {
     /// Every word, its meaning in a sentence, and the choice it stands for.
     fn words() -> Vec<(&'static str, &'static str, Self)>;
 
+    /// The choice that someone may mean who calls it by another name.
+    fn called(_: &str) -> Option<&'static str> {
+        None
+    }
+
     /// The choice behind a word.
     ///
     /// # Errors
@@ -27,6 +33,7 @@ pub trait Choice: Copy + PartialEq + Sized + 'static {
                 what: Self::WHAT,
                 word: word.to_string(),
                 known: words.iter().map(|(w, _, _)| *w).collect(),
+                called: Self::called(word),
             }),
         }
     }
@@ -41,11 +48,18 @@ pub struct UnknownWord {
     pub word: String,
     /// The words that there are.
     pub known: Vec<&'static str>,
+    /// The word of what is called so elsewhere.
+    pub called: Option<&'static str>,
 }
 
 impl fmt::Display for UnknownWord {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "there is no {} `{}`; one of: {}", self.what, self.word.escape_default(), self.known.join(", "))
+        write!(f, "there is no {} `{}`", self.what, self.word.escape_default())?;
+        let called = self.called.map(|word| format!("did you mean `{word}`?"));
+        match called.or_else(|| did_you_mean(&self.word, self.known.iter().copied())) {
+            Some(hint) => write!(f, "; {hint}"),
+            None => write!(f, "; one of: {}", self.known.join(", ")),
+        }
     }
 }
 
@@ -55,6 +69,9 @@ impl Choice for Function {
     const WHAT: &'static str = "function";
     fn words() -> Vec<(&'static str, &'static str, Self)> {
         Function::known().map(|f| (f.name(), f.summary(), f)).collect()
+    }
+    fn called(alias: &str) -> Option<&'static str> {
+        Function::called(alias).map(Function::name)
     }
 }
 
@@ -141,7 +158,40 @@ mod tests {
 
     #[test]
     fn an_unknown_word_is_answered_with_the_known_ones() {
-        let error = "f16".parse::<Scalar>().unwrap_err();
-        assert_eq!(error.to_string(), "there is no scalar `f16`; one of: f64, f32");
+        let error = "half".parse::<Scalar>().unwrap_err();
+        assert_eq!(error.to_string(), "there is no scalar `half`; one of: f64, f32");
+    }
+
+    #[test]
+    fn a_word_that_is_nearly_known_or_known_elsewhere_is_answered_with_the_one_that_is_meant() {
+        for (word, meant) in
+            [("inverse_dynamic", "inverse_dynamics"), ("RNEA", "inverse_dynamics"), ("aba", "forward_dynamics")]
+        {
+            let error = word.parse::<Function>().unwrap_err();
+            assert_eq!(error.to_string(), format!("there is no function `{word}`; did you mean `{meant}`?"));
+        }
+    }
+
+    /// What is certified is proven; what agrees on many states is tested.
+    #[test]
+    fn the_documents_say_proven_of_bounds_and_tested_of_tests() {
+        for name in [
+            "README.md",
+            "ARCHITECTURE.md",
+            "CHANGELOG.md",
+            "codegen/SCENES.md",
+            "codegen/SCHEMA.md",
+            "codegen/SIMULATION.md",
+        ] {
+            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name);
+            let text = std::fs::read_to_string(path).expect("the document is there");
+            let paragraphs = text.split("\n\n").flat_map(|p| p.split("\n- ")).flat_map(|p| p.split("\n|"));
+            for paragraph in paragraphs.map(|p| p.to_lowercase().replace("provenance", "")) {
+                let words = ["proven", "proves", "prove ", "proof"];
+                let says = words.iter().any(|word| paragraph.contains(word));
+                let is_certified = ["bound", "rounding", "certif", "error"].iter().any(|word| paragraph.contains(word));
+                assert!(!says || is_certified, "{name}: {paragraph}");
+            }
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Truth x inputs x bound: what proves every generated function.
+//! Truth x inputs x bound: what tests every generated function.
 //!
 //! This library holds the material of the tests: the [reference data](mod@reference), the [`compiled`] functions of all
 //! robots, [`programs`] as the compiler makes them, the [contact_cases], [robots with drives](drives) and [random robots](random) written for both authors,

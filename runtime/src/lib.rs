@@ -42,12 +42,14 @@
 //! | `rules = "exact"`: the same bits as the generic runtime | `"all"`: fewest operations |
 //! | `forward_dynamics = "articulated-body"` or `"factorisation"` | the cheaper one |
 //! | `max_part_operations = 1000`: longer functions are cut | 12000 |
+//! | `allow("near-right-angle")`, `warn(..)`, `deny(..)`: what becomes of warnings, by their codes; `"warnings"`: of all | each is said |
 //! | `scene = "scenes/still.toml"`: what is wanted and what is held; what it says wins over other options | everything |
 //! | `scene(zero(qd = true), hold(joints = { yaw = 0.5 }))`: the same tables and keys, without a file | |
 //! | `module = "arm_dynamics"` (derive only): everything stands in that module, beside the type, too | where a scene has types of its own it is needed |
 //!
 //! The path counts from the package's manifest, or else from the source file. The build runs again when the file changes;
-//! complaints about it come as compiler errors with the file's line.
+//! complaints about it, and about options, come as compiler errors with the file's line, all in one run, and stay the only ones:
+//! constants and functions are there in name, so that whatever uses them compiles.
 //!
 //! # A module
 //! [`dynamics!`] takes the same and makes a module:

@@ -1,4 +1,4 @@
-//! The macros as a user meets them. That the numbers are right is proven elsewhere, robot by robot.
+//! The macros as a user meets them. That the numbers are right is tested elsewhere, robot by robot.
 #![cfg(feature = "derive")]
 #![deny(warnings, missing_docs, clippy::all)]
 #![forbid(unsafe_code)]

@@ -1,21 +1,42 @@
 //! `"panda.urdf", floating_base, scalar = "f32", functions(inverse_dynamics, mass_matrix), …`
 
 use crate::scene::InlineScene;
+use proc_macro2::{Span, TokenTree};
 use std::str::FromStr;
 use straightline_codegen::certify::Effort;
-use straightline_codegen::emit::{Lanes, Scalar};
-use straightline_codegen::{Function, Options};
+use straightline_codegen::description::messages::did_you_mean;
+use straightline_codegen::diagnostic::{Level, Levels};
+use straightline_codegen::emit::Lanes;
+use straightline_codegen::Options;
 use syn::parse::{Parse, ParseStream};
 use syn::punctuated::Punctuated;
 use syn::{parenthesized, Attribute, Error, Ident, Lit, LitInt, LitStr, Result, Token, Visibility};
 
 /// The robot file, the scene and the options, as both macros take them.
 pub struct Arguments {
-    pub robot: LitStr,
+    /// The name of the robot file; `None` if it cannot be read.
+    pub robot: Option<LitStr>,
     pub scene: Option<SceneArgument>,
     /// The module that the derive puts everything in, where the user can reach it.
     pub module: Option<Ident>,
     pub options: Options,
+    /// What is wrong with them: what could be read of the others counts nevertheless.
+    pub errors: Vec<Error>,
+    /// What was asked for as a function and is none.
+    pub unknown: Vec<Ident>,
+}
+
+impl Arguments {
+    /// Those of which nothing can be read.
+    pub fn unreadable(error: Error) -> Self {
+        let errors = error.into_iter().collect();
+        Arguments { robot: None, scene: None, module: None, options: Options::default(), errors, unknown: Vec::new() }
+    }
+
+    /// Where complaints about all of it stand.
+    pub fn place(&self) -> Span {
+        self.robot.as_ref().map_or_else(Span::call_site, LitStr::span)
+    }
 }
 
 /// `scene = "still.toml"` or `scene(zero(qd = true))`
@@ -45,16 +66,77 @@ impl Parse for Module {
 
 impl Parse for Arguments {
     fn parse(input: ParseStream) -> Result<Self> {
-        let mut arguments = Arguments { robot: input.parse()?, scene: None, module: None, options: Options::default() };
+        let mut arguments = Arguments {
+            robot: None,
+            scene: None,
+            module: None,
+            options: Options::default(),
+            errors: Vec::new(),
+            unknown: Vec::new(),
+        };
+        match input.peek(LitStr) {
+            true => arguments.robot = Some(input.parse()?),
+            false => {
+                arguments.errors.push(input.error("the path of a robot file comes first, as in \"robots/arm.urdf\""))
+            }
+        }
         while !input.is_empty() {
-            input.parse::<Token![,]>()?;
+            if arguments.robot.is_some() || input.peek(Token![,]) {
+                if let Err(error) = input.parse::<Token![,]>() {
+                    arguments.errors.extend(error);
+                    skip(input)?;
+                    continue;
+                }
+            }
             if !input.is_empty() {
-                option(input, &mut arguments)?;
+                if let Err(error) = option(input, &mut arguments) {
+                    arguments.errors.extend(error);
+                    skip(input)?;
+                } else if !input.is_empty() && !input.peek(Token![,]) {
+                    arguments.errors.push(input.error("a comma is wanted between options"));
+                    skip(input)?;
+                }
             }
         }
         Ok(arguments)
     }
 }
+
+/// Goes on to the next comma.
+fn skip(input: ParseStream) -> Result<()> {
+    while !input.is_empty() && !input.peek(Token![,]) {
+        input.parse::<TokenTree>()?;
+    }
+    Ok(())
+}
+
+/// All options, in the order of the documentation.
+const OPTIONS: &[&str] = &[
+    "functions",
+    "frames",
+    "scalar",
+    "scalars",
+    "floating_base",
+    "joint_order",
+    "generic",
+    "fma",
+    "lanes",
+    "gravity",
+    "angle_tolerance",
+    "rules",
+    "forward_dynamics",
+    "limbs",
+    "max_part_operations",
+    "certify",
+    "certify_boxes",
+    "certify_seconds",
+    "certify_state",
+    "scene",
+    "module",
+    "allow",
+    "warn",
+    "deny",
+];
 
 fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
     let key: Ident = input.parse()?;
@@ -85,9 +167,7 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         }
         "scalar" => options.scalar = word(input)?,
         "scalars" => {
-            let scalars: Result<Vec<Scalar>> =
-                list::<LitStr>(input)?.iter().map(|name| parsed(&name.value(), name)).collect();
-            let mut scalars = scalars?.into_iter();
+            let mut scalars = all(list::<LitStr>(input)?.iter().map(|name| parsed(&name.value(), name)))?.into_iter();
             options.scalar = scalars.next().ok_or_else(|| Error::new(key.span(), "scalars(\"f64\", \"f32\")"))?;
             options.also = scalars.collect();
         }
@@ -100,11 +180,21 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         "max_part_operations" => options.limits.operations = value::<LitInt>(input)?.base10_parse()?,
         "angle_tolerance" => options.model.angle_tolerance = number(&value(input)?)?,
         "functions" => {
-            let functions: Result<Vec<Function>> =
-                list::<Ident>(input)?.iter().map(|name| parsed(&name.to_string(), name)).collect();
-            options.functions = functions?;
+            // those that are known are wanted, whatever is wrong with the others
+            let mut errors = None;
+            options.functions = Vec::new();
+            for name in list::<Ident>(input)? {
+                match parsed(&name.to_string(), &name) {
+                    Ok(function) => options.functions.push(function),
+                    Err(error) => {
+                        keep(&mut errors, error);
+                        arguments.unknown.push(name);
+                    }
+                }
+            }
             options.functions.sort_unstable();
             options.functions.dedup();
+            errors.map_or(Ok(()), Err)?;
         }
         "frames" => options.frames = strings(input)?,
         "joint_order" => options.model.joint_order = Some(strings(input)?),
@@ -113,16 +203,51 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
             let three = || Error::new(key.span(), "gravity takes three numbers: gravity(0.0, 0.0, -9.81)");
             options.model.gravity = Some(numbers.try_into().map_err(|_| three())?);
         }
+        "allow" => levels(input, options, Level::Allow)?,
+        "warn" => levels(input, options, Level::Warn)?,
+        "deny" => levels(input, options, Level::Deny)?,
         other => {
-            let known =
-                "floating_base, certify, certify_boxes, certify_seconds, certify_state, scalar, scalars, lanes, fma, generic, rules, forward_dynamics, limbs, \
-                         max_part_operations, \
-                         angle_tolerance, \
-                         functions, frames, joint_order, gravity, scene, module";
-            return Err(Error::new(key.span(), format!("there is no option `{other}`; one of: {known}")));
+            let hint = did_you_mean(other, OPTIONS.iter().copied());
+            let hint = hint.unwrap_or_else(|| format!("one of: {}", OPTIONS.join(", ")));
+            return Err(Error::new(key.span(), format!("there is no option `{other}`; {hint}")));
         }
     }
     Ok(())
+}
+
+/// `("near-right-angle", "axis-length")`
+fn levels(input: ParseStream, options: &mut Options, level: Level) -> Result<()> {
+    let mut errors = None;
+    for code in list::<LitStr>(input)? {
+        match Levels::complaint(&code.value(), level) {
+            None => options.reporting.levels.set(code.value(), level),
+            Some(complaint) => {
+                let said = [complaint.title, complaint.help].join("; ");
+                keep(&mut errors, Error::new(code.span(), said));
+            }
+        }
+    }
+    errors.map_or(Ok(()), Err)
+}
+
+/// One error more.
+fn keep(errors: &mut Option<Error>, error: Error) {
+    match errors {
+        None => *errors = Some(error),
+        Some(errors) => errors.combine(error),
+    }
+}
+
+/// All values, or all errors.
+fn all<T>(results: impl Iterator<Item = Result<T>>) -> Result<Vec<T>> {
+    let (mut values, mut errors) = (Vec::new(), None);
+    for result in results {
+        match result {
+            Ok(value) => values.push(value),
+            Err(error) => keep(&mut errors, error),
+        }
+    }
+    errors.map_or(Ok(values), Err)
 }
 
 /// ` = value`

@@ -8,10 +8,12 @@ mod scene;
 use arguments::{Arguments, Module, SceneArgument};
 use proc_macro::TokenStream;
 use proc_macro2::TokenStream as Tokens;
-use quote::quote;
+use quote::{quote, quote_spanned};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use straightline_codegen::expansion::{associated_items, expand, needs_a_module, Refusal, SceneOf};
-use straightline_codegen::Generated;
+use std::sync::{Mutex, PoisonError};
+use straightline_codegen::expansion::{associated_items, examine, expand, needs_a_module, Expansion, Refusal, SceneOf};
+use straightline_codegen::{stubs, Function, Generated, Options};
 use syn::{parse_macro_input, DeriveInput, Error};
 
 /// Gives a type the dynamics of a robot as associated constants and functions; see the package `straightline`.
@@ -19,39 +21,48 @@ use syn::{parse_macro_input, DeriveInput, Error};
 pub fn derive_dynamics(input: TokenStream) -> TokenStream {
     let input = parse_macro_input!(input as DeriveInput);
     let robots: Vec<_> = input.attrs.iter().filter(|a| a.path().is_ident("robot")).collect();
-    let [robot] = robots[..] else {
-        let text = "`#[derive(Dynamics)]` takes one `#[robot(\"path/to/file.urdf\")]`";
-        return Error::new_spanned(&input.ident, text).into_compile_error().into();
-    };
-    let arguments = match robot.parse_args::<Arguments>() {
-        Ok(arguments) => arguments,
-        Err(error) => return error.into_compile_error().into(),
+    let arguments = match robots[..] {
+        [robot] => robot.parse_args::<Arguments>().unwrap_or_else(Arguments::unreadable),
+        _ => {
+            let text = "`#[derive(Dynamics)]` takes one `#[robot(\"path/to/file.urdf\")]`";
+            Arguments::unreadable(Error::new_spanned(&input.ident, text))
+        }
     };
     let (ident, generics) = (&input.ident, &input.generics);
     let (impl_generics, type_generics, where_clause) = generics.split_for_impl();
     let visibility = &input.vis;
-    compiled(&arguments, |generated| {
-        let (items, associated) = (source(&generated.text), source(&associated_items(generated)));
-        let associated = quote! {
+    let impl_of = |associated: Tokens| {
+        quote! {
             #[allow(dead_code)]
             impl #impl_generics #ident #type_generics #where_clause { #associated }
-        };
-        match &arguments.module {
-            Some(name) => {
-                let doc = format!("What `{ident}` is made of: its functions, and types of parameters and stages.");
-                quote! {
-                    #[doc = #doc]
-                    #[allow(dead_code)]
-                    #visibility mod #name { #items }
-                    const _: () = { use #name as dynamics; #associated };
-                }
-            }
-            None if needs_a_module(generated) => Error::new_spanned(robot, NEEDS_A_MODULE).into_compile_error(),
-            None => quote! { const _: () = { #[allow(dead_code)] mod dynamics { #items } #associated }; },
         }
-    })
-    .unwrap_or_else(Error::into_compile_error)
-    .into()
+    };
+    let doc = format!("What `{ident}` is made of: its functions, and types of parameters and stages.");
+    let with_module = |items: Tokens, associated: Tokens| match &arguments.module {
+        Some(name) => quote! {
+            #[doc = #doc]
+            #[allow(dead_code)]
+            #visibility mod #name { #items }
+            const _: () = { use #name as dynamics; #associated };
+        },
+        None => quote! { const _: () = { #[allow(dead_code)] mod dynamics { #items } #associated }; },
+    };
+    let Compiled { result, scene, trackers } = compiled(&arguments);
+    let result = result.and_then(|generated| match arguments.module.is_none() && needs_a_module(&generated) {
+        true => Err(vec![Error::new(arguments.place(), NEEDS_A_MODULE)]),
+        false => Ok(generated),
+    });
+    let items = match result {
+        Ok(generated) => with_module(source(&generated.text), impl_of(source(&associated_items(&generated)))),
+        Err(errors) => {
+            let associated = source(&stubs::associated_items(&stubbed(&arguments), scene.as_deref()));
+            let unknown = arguments.unknown.iter();
+            let unknown = quote! { #(pub const #unknown: dynamics::__Missing = <dynamics::__Missing>::value;)* };
+            let associated = impl_of(quote! { #![allow(warnings, clippy::all)] #associated #unknown });
+            with_module(broken(&arguments, scene.as_deref(), errors), associated)
+        }
+    };
+    quote! { #items #trackers }.into()
 }
 
 const NEEDS_A_MODULE: &str = "the scene has types or scalars of its own, which need a module to be reached in\n\
@@ -60,46 +71,105 @@ const NEEDS_A_MODULE: &str = "the scene has types or scalars of its own, which n
 /// Makes a module of the dynamics of a robot; see the package `straightline`.
 #[proc_macro]
 pub fn dynamics(input: TokenStream) -> TokenStream {
-    let Module { attributes, visibility, name, arguments } = parse_macro_input!(input as Module);
+    let Module { attributes, visibility, name, mut arguments } = parse_macro_input!(input as Module);
     if let Some(module) = &arguments.module {
-        return Error::new(module.span(), "`module` is for the derive: this is a module").into_compile_error().into();
+        arguments.errors.push(Error::new(module.span(), "`module` is for the derive: this is a module"));
     }
-    compiled(&arguments, |generated| source(&generated.text))
-        .map_or_else(Error::into_compile_error, |items| quote! { #(#attributes)* #visibility mod #name { #items } })
-        .into()
+    let Compiled { result, scene, trackers } = compiled(&arguments);
+    let items = match result {
+        Ok(generated) => source(&generated.text),
+        Err(errors) => broken(&arguments, scene.as_deref(), errors),
+    };
+    quote! { #(#attributes)* #visibility mod #name { #items } #trackers }.into()
 }
 
-/// The items made of the dynamics, or the complaints at the place of the file's name; both depend on the files.
-fn compiled(arguments: &Arguments, items: impl FnOnce(&Generated) -> Tokens) -> Result<Tokens, Error> {
+/// What came out of the files that a macro names.
+struct Compiled {
+    /// The dynamics, or all that is wrong.
+    result: Result<Generated, Vec<Error>>,
+    /// The text of the scene, if there is one.
+    scene: Option<String>,
+    /// Items by which the compiler knows the files that the expansion depends on.
+    trackers: Tokens,
+}
+
+fn compiled(arguments: &Arguments) -> Compiled {
     let manifest = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
     let source_file = proc_macro::Span::call_site().local_file();
     let beside = source_file.as_deref().and_then(Path::parent);
     let directories: Vec<&Path> = [manifest.as_path()].into_iter().chain(beside).collect();
-    let scene = arguments.scene.as_ref().map(|scene| match scene {
+    let scene_of = arguments.scene.as_ref().map(|scene| match scene {
         SceneArgument::File(name) => SceneOf::File(name.value()),
         SceneArgument::Inline(scene) => SceneOf::Macro(scene.source()),
     });
-    let expansion = expand(&arguments.robot.value(), scene.as_ref(), &directories, &arguments.options);
-    eprint!("{}", expansion.warnings); // a macro has no warnings of its own
-    let trackers = expansion.files.iter().map(|file| {
+    let (files, result, scene) = match &arguments.robot {
+        None => (Vec::new(), Err(arguments.errors.clone()), scene_of.map(|_| String::new())),
+        Some(robot) if arguments.errors.is_empty() => {
+            let expansion = expand(&robot.value(), scene_of.as_ref(), &directories, &arguments.options);
+            let Expansion { files, result, warnings, scene } = expansion;
+            say(&warnings);
+            (files, result.map_err(|refusal| refused(arguments, &refusal)), scene)
+        }
+        Some(robot) => {
+            let (files, refusal, scene) = examine(&robot.value(), scene_of.as_ref(), &directories, &arguments.options);
+            let further = refusal.map(|refusal| refused(arguments, &refusal)).unwrap_or_default();
+            (files, Err(arguments.errors.iter().cloned().chain(further).collect()), scene)
+        }
+    };
+    let trackers = files.iter().map(|file| {
         let path = file.to_string_lossy();
         quote! { const _: &[u8] = include_bytes!(#path); }
     });
-    let items = match expansion.result {
-        Ok(generated) => items(&generated),
-        Err(refusal) => refused(arguments, &refusal),
-    };
-    Ok(quote! { #items #(#trackers)* })
+    Compiled { result, scene, trackers: trackers.collect() }
+}
+
+/// Warnings, each once however many types have the same robot: a macro has no warnings of its own.
+fn say(warnings: &str) {
+    static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
+    if said.insert(warnings.to_string()) {
+        eprint!("{warnings}");
+    }
 }
 
 /// The complaints as errors of the compiler: those of a scene in the macro at its tokens, the others at the file's name.
-fn refused(arguments: &Arguments, refusal: &Refusal) -> Tokens {
-    let at_the_file = (!refusal.message.is_empty()).then(|| Error::new(arguments.robot.span(), &refusal.message));
+fn refused(arguments: &Arguments, refusal: &Refusal) -> Vec<Error> {
+    let at_the_file = (!refusal.message.is_empty()).then(|| Error::new(arguments.place(), &refusal.message));
     let at_the_scene = refusal.of_scene.iter().filter_map(|complaint| match &arguments.scene {
         Some(SceneArgument::Inline(scene)) => Some(scene.error(complaint)),
         _ => None,
     });
-    at_the_file.into_iter().chain(at_the_scene).map(Error::into_compile_error).collect()
+    at_the_file.into_iter().chain(at_the_scene).collect()
+}
+
+/// The options of which stubs are made: all functions where an option is wrong, as it may be their list.
+fn stubbed(arguments: &Arguments) -> Options {
+    let mut options = arguments.options.clone();
+    if !arguments.errors.is_empty() {
+        options.functions = Function::all().collect();
+    }
+    options
+}
+
+/// A module that says what is wrong, and has items of all names that it would have, so that this stays the only error.
+fn broken(arguments: &Arguments, scene: Option<&str>, errors: Vec<Error>) -> Tokens {
+    let mut errors = errors.into_iter();
+    let first = errors.next().unwrap_or_else(|| Error::new(arguments.place(), "the robot cannot be compiled"));
+    let message = first.to_string();
+    let said = quote_spanned! { first.span() => ::core::compile_error!(#message) };
+    let others = errors.map(Error::into_compile_error);
+    let definition = source(stubs::DEFINITION);
+    let items = source(&stubs::module_items(&stubbed(arguments), scene));
+    let unknown = arguments.unknown.iter();
+    quote! {
+        #![allow(warnings, clippy::all)]
+        #definition
+        #[doc(hidden)]
+        pub type __Missing = <__Why<{ #said }> as __Stub>::Item;
+        #items
+        #(pub const #unknown: __Missing = <__Missing>::value;)*
+        #(#others)*
+    }
 }
 
 /// Generated source as tokens.

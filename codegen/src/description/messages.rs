@@ -85,38 +85,44 @@ pub const CODES: &[&str] = &[
 
 type D = Diagnostic;
 
-/// ` Did you mean …?`, if there is a candidate close to `word`.
-pub(crate) fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
-    closest(word, candidates).map(|c| format!("did you mean `{c}`?"))
+/// `did you mean …?`, if there are candidates close to `word`.
+pub fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    let nearest = nearest(word, candidates);
+    let (last, rest) = nearest.split_last()?;
+    let quoted = |c: &&str| format!("`{}`", cut(c));
+    Some(match rest.is_empty() {
+        true => format!("did you mean {}?", quoted(last)),
+        false => {
+            format!("did you mean {} or {}?", rest.iter().map(quoted).collect::<Vec<_>>().join(", "), quoted(last))
+        }
+    })
 }
 
-/// The candidate with the least edit distance to `word`, if that is at most a third of its length.
+/// The candidate next to `word`, if it is close.
 pub fn closest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    if word.chars().count() > 64 {
-        return None;
-    }
-    let best = candidates
-        .into_iter()
-        .filter(|c| c.chars().count() <= 64)
-        .take(1000)
-        .map(|c| (edit_distance(&word.to_lowercase(), &c.to_lowercase()), c))
-        .min_by_key(|&(d, _)| d)?;
-    (best.0 <= (best.1.chars().count() / 3).max(1)).then_some(best.1)
+    nearest(word, candidates).first().copied()
 }
 
-/// Levenshtein's distance.
-fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, &y) in b.iter().enumerate() {
-            let next = (diagonal + usize::from(x != y)).min(row[j] + 1).min(row[j + 1] + 1);
-            diagonal = std::mem::replace(&mut row[j + 1], next);
+/// The candidates that the fewest slips of the pen make of `word`, three at most: a slip for every three letters
+/// is close.
+pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
+    let length = |word: &str| word.chars().count();
+    if length(word) > 64 {
+        return Vec::new();
+    }
+    let word = word.to_lowercase();
+    let slips = |c: &str| strsim::damerau_levenshtein(&word, &c.to_lowercase());
+    let candidates = candidates.into_iter().filter(|c| length(c) <= 64).take(1000);
+    let close: Vec<(usize, &str)> =
+        candidates.map(|c| (slips(c), c)).filter(|(d, c)| *d <= (length(c) / 3).max(1)).collect();
+    let Some(least) = close.iter().map(|(d, _)| *d).min() else { return Vec::new() };
+    let mut nearest: Vec<&str> = Vec::new();
+    for (_, c) in close.iter().filter(|(d, _)| *d == least) {
+        if nearest.len() < 3 && !nearest.contains(c) {
+            nearest.push(c);
         }
     }
-    row[b.len()]
+    nearest
 }
 
 /// A text of the file, cut where it is long.
@@ -316,7 +322,8 @@ pub fn not_supported_yet(owner: &str, what: &str, why: &str, help: &str) -> D {
 /// A floating joint.
 pub fn floating_joint(joint: &str) -> D {
     D::error("floating-joint", format!("joint `{joint}` is floating: only the root link can move freely"))
-        .help("remove the joint and its parent, and ask for a floating base: `--floating-base`, `floating_base` in the macro, `.floating_base(true)` in a build script, or `base = \"floating\"` in TOML")
+        .help("remove the joint and its parent, and ask for a floating base: `{option}`, or `base = \"floating\"` in TOML")
+        .option("floating_base", None)
 }
 
 /// Friction, an inertia or a stiffness below zero.
@@ -352,9 +359,9 @@ pub fn too_many_links(links: usize, limit: usize) -> D {
 
 /// A robot that does not move.
 pub fn nothing_moves(robot: &str) -> D {
-    D::error("nothing-moves", format!("robot `{}` has no joint that moves, and its base is fixed", cut(robot))).help(
-        "ask for a floating base if the robot is one free body: `--floating-base`, or `base = \"floating\"` in TOML",
-    )
+    D::error("nothing-moves", format!("robot `{}` has no joint that moves, and its base is fixed", cut(robot)))
+        .help("ask for a floating base if the robot is one free body: `{option}`, or `base = \"floating\"` in TOML")
+        .option("floating_base", None)
 }
 
 /// A name that is in use.
@@ -498,24 +505,24 @@ pub fn inertia_by_parameters(asked: &str, joint: &str, parameters: &str) -> D {
         .help("give the links themselves some inertia, or make sure that what is passed has mass")
 }
 
-/// An angle that may be meant as a right angle.
-pub fn near_right_angle(what: &str, text: &str, name: &str, deviation: f64) -> D {
-    D::warning("near-right-angle", format!("{what}: {text} is {name} only to {:.1e} rad", deviation.abs()))
-        .detail("taken literally: the frames are not at right angles, and the equations keep the small terms")
-        .help(format!(
-            "for {name} exactly: `--angle-tolerance {}`, `.angle_tolerance({})` in a build script, or quarter turns in TOML",
-            tolerance_above(deviation),
-            tolerance_above(deviation)
-        ))
+/// So many angles that may be meant as right angles; the one farthest from it is off by `deviation` \[rad\].
+pub fn near_right_angle(count: usize, deviation: f64) -> D {
+    let (angles, all, them) = match count {
+        1 => ("an angle is a right one".to_string(), "it", "it"),
+        n => (format!("{n} angles are right ones"), "them all", "them"),
+    };
+    D::warning("near-right-angle", format!("{angles} only to {:.1e} rad, taken as written", deviation.abs()))
+        .help(format!("`{{option}}` takes {all} as exact, `straightline check` lists {them}"))
+        .option("angle_tolerance", Some(format!("{:e}", tolerance_above(deviation))))
+        .brief()
 }
 
 /// The least power of ten above |x|.
-fn tolerance_above(x: f64) -> String {
-    let mut exponent = -16;
-    while exponent < 0 && x.abs() >= 10f64.powi(exponent) {
-        exponent += 1;
-    }
-    format!("1e{exponent}")
+pub(crate) fn tolerance_above(x: f64) -> f64 {
+    let powers =
+        ["1e-16", "1e-15", "1e-14", "1e-13", "1e-12", "1e-11", "1e-10", "1e-9", "1e-8", "1e-7", "1e-6", "1e-5"];
+    let powers = powers.into_iter().chain(["1e-4", "1e-3", "1e-2", "0.1"]).map(|text| text.parse().expect("a number"));
+    powers.into_iter().find(|power| x.abs() < *power).unwrap_or(1.0)
 }
 
 /// A floating base by option, a fixed one by file.

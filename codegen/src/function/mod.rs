@@ -1,5 +1,6 @@
 //! The functions that can be generated: a table of names, signatures and documentation, and the algorithm behind each.
 
+mod aliases;
 mod drives;
 
 pub use drives::{higher_rate, DriveFunction};
@@ -22,6 +23,7 @@ use straightline_core::{Dd, Real};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Function {
     /// Poses of the frames.
+    #[doc(alias("FK"))]
     ForwardKinematics,
     /// Velocities of the frames.
     FrameVelocity,
@@ -32,24 +34,31 @@ pub enum Function {
     /// J̇q̇ of the frames.
     JacobianBias,
     /// Motion to drives.
+    #[doc(alias("RNEA", "Newton-Euler"))]
     InverseDynamics,
     /// The drives that hold the robot still.
     GravityForce,
     /// h of τ = H q̈ + h.
+    #[doc(alias("Coriolis", "nonlinear effects"))]
     BiasForce,
     /// The part of h that velocities make.
+    #[doc(alias("Coriolis", "centrifugal"))]
     VelocityForce,
     /// H of τ = H q̈ + h.
+    #[doc(alias("CRBA", "inertia matrix"))]
     MassMatrix,
     /// Drives to motion.
+    #[doc(alias("ABA", "articulated body"))]
     ForwardDynamics,
     /// What the joints carry.
     JointWrenches,
     /// Kinetic and potential energy.
     Energy,
     /// The mass centre of the whole robot.
+    #[doc(alias("COM", "center of mass"))]
     CentreOfMass,
     /// Linear and angular momentum.
+    #[doc(alias("centroidal momentum"))]
     Momentum,
     /// Poses and Jacobians of the frames.
     KinematicsAndJacobian,
@@ -295,6 +304,18 @@ impl Function {
     /// What it computes, in a sentence.
     pub fn summary(self) -> &'static str {
         self.entry().summary
+    }
+
+    /// Number of its arguments in generated code without a scene, if that does not depend on the robot.
+    pub(crate) fn arguments(self) -> Option<usize> {
+        let entry = self.entry();
+        let depends = self == Function::Drive(DriveFunction::InverseDynamics);
+        (!depends).then_some(entry.inputs.len() + entry.outputs.len())
+    }
+
+    /// Names of its blocks of results.
+    pub(crate) fn output_names(self) -> impl Iterator<Item = &'static str> {
+        self.entry().outputs.iter().map(|(name, _)| *name)
     }
 
     /// Whether its outputs are asked for per frame.

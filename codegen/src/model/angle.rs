@@ -28,6 +28,13 @@ pub(crate) struct Reading {
     pub deviation: f64,
 }
 
+impl Reading {
+    /// Whether a right angle may be meant, and is not what it is taken as.
+    pub fn is_doubtful(&self) -> bool {
+        self.special.is_none() && self.deviation.abs() <= DOUBTFUL
+    }
+}
+
 /// Twelfths of π in one unit, where that is a whole number.
 fn twelfths(angle: &Angle) -> Option<i64> {
     // the remainder of a floating-point division is exact

@@ -1,7 +1,7 @@
 //! What needs the whole robot to be judged: tree, masses and inertias, axes, limits, angles.
 
 use super::geometry::principal_moments;
-use super::{angle, each_angle, Assembly, MOST_LINKS};
+use super::{angle, doubtful_angles, each_angle, Assembly, ModelOptions, MOST_LINKS};
 use crate::description::{
     messages, Description, Format, Joint, JointDrive, JointFrameNotation, JointKind, JointLimits, Value,
 };
@@ -291,21 +291,19 @@ pub(super) fn model_limits(kind: JointKind, limits: &JointLimits) -> Limits {
 }
 
 /// Angles that are near a right angle and not taken as one, and angles of a million radians.
-pub(super) fn angles(description: &Description, tolerance: f64, diagnostics: &mut Diagnostics) {
+pub(super) fn angles(description: &Description, options: &ModelOptions, diagnostics: &mut Diagnostics) {
     each_angle(description, &mut |what, written| {
         let greatest = angle::radians(written).to_f64();
         if greatest.abs() > angle::GREATEST_ANGLE {
             diagnostics.push(messages::out_of_range(&what(), greatest, angle::GREATEST_ANGLE).at(&written.place));
-            return;
-        }
-        let reading = angle::read(written, tolerance);
-        let is_near = reading.special.is_none() && reading.deviation.abs() <= angle::DOUBTFUL;
-        if is_near {
-            let name = angle::name_of_twelfths(6 * reading.right_angles);
-            let complaint = messages::near_right_angle(&what(), &written.text, &name, reading.deviation);
-            diagnostics.push(complaint.at(&written.place));
         }
     });
+    // who takes every angle literally does so on purpose
+    let doubtful = if options.angle_tolerance > 0.0 { doubtful_angles(description, options) } else { Vec::new() };
+    let farthest = doubtful.iter().max_by(|a, b| a.deviation.abs().total_cmp(&b.deviation.abs()));
+    if let Some(farthest) = farthest {
+        diagnostics.push(messages::near_right_angle(doubtful.len(), farthest.deviation).at(&doubtful[0].place));
+    }
 }
 
 /// Whether something moves.

@@ -116,13 +116,34 @@ pub struct SpecialAngle {
     pub deviation: f64,
 }
 
+/// An angle that is nearly a multiple of π/2 and is taken as it is written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DoubtfulAngle {
+    /// Where it stands.
+    pub place: Place,
+    /// Whose angle it is, such as ``roll of the origin of joint `elbow` ``.
+    pub what: String,
+    /// How it is written.
+    pub text: String,
+    /// What it is near, such as `π/2`.
+    pub near: String,
+    /// What is written less what it is near \[rad\].
+    pub deviation: f64,
+}
+
 /// Reads a robot file and builds its model: [`description::read`], then [`build`].
 pub fn load(source: &Source, options: &ModelOptions) -> (Option<Model<Dd>>, Diagnostics) {
     let mut diagnostics = Diagnostics::new();
-    let description = description::read(source, &mut diagnostics);
-    let model = description.and_then(|description| build(&description, options, &mut diagnostics));
-    finish(&mut diagnostics);
+    let model = load_into(source, options, &mut diagnostics);
     (model, diagnostics)
+}
+
+/// The same, where complaints are said as `diagnostics` has them.
+pub(crate) fn load_into(source: &Source, options: &ModelOptions, diagnostics: &mut Diagnostics) -> Option<Model<Dd>> {
+    let description = description::read(source, diagnostics);
+    let model = description.and_then(|description| build(&description, options, diagnostics));
+    finish(diagnostics);
+    model
 }
 
 /// Orders the complaints and says how many were dropped.
@@ -139,7 +160,7 @@ pub fn finish(diagnostics: &mut Diagnostics) {
 pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mut Diagnostics) -> Option<Model<Dd>> {
     check_options(options, diagnostics);
     let tolerance = if options.angle_tolerance >= 0.0 { options.angle_tolerance } else { angle::ROUNDING };
-    check::angles(description, tolerance, diagnostics);
+    check::angles(description, &ModelOptions { angle_tolerance: tolerance, ..options.clone() }, diagnostics);
     let assembly = match &description.notation {
         Notation::JointFrames(bodies) => joint_frames::assemble(bodies, description, options, tolerance, diagnostics),
         Notation::MassCentres(chain) => mass_centres::assemble(chain, description, options, tolerance, diagnostics),
@@ -196,6 +217,30 @@ pub fn special_angles(description: &Description, options: &ModelOptions) -> Vec<
         }
     });
     found
+}
+
+/// The angles of a description that are near a multiple of π/2 and are taken as they are written.
+pub fn doubtful_angles(description: &Description, options: &ModelOptions) -> Vec<DoubtfulAngle> {
+    let mut found = Vec::new();
+    each_angle(description, &mut |what, angle| {
+        let reading = angle::read(angle, options.angle_tolerance);
+        if reading.is_doubtful() {
+            found.push(DoubtfulAngle {
+                place: angle.place.clone(),
+                what: what(),
+                text: angle.text.clone(),
+                near: angle::name_of_twelfths(6 * reading.right_angles),
+                deviation: reading.deviation,
+            });
+        }
+    });
+    found
+}
+
+/// The tolerance \[rad\] by which all of these are taken as exact: a power of ten.
+pub fn tolerance_that_mends(angles: &[DoubtfulAngle]) -> f64 {
+    let farthest = angles.iter().map(|a| a.deviation.abs()).fold(0.0, f64::max);
+    messages::tolerance_above(farthest)
 }
 
 /// What an angle of a file is taken as \[rad\].

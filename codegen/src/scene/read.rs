@@ -10,7 +10,7 @@ use crate::compile::Options;
 use crate::description::reader::{Range64, Reader, LARGEST_FILE};
 use crate::description::table::{parse, Table};
 use crate::description::{messages, Value};
-use crate::diagnostic::{Diagnostics, Source};
+use crate::diagnostic::{Diagnostics, Level, Levels, Source};
 use crate::emit::Scalar;
 use crate::function::Function;
 use crate::limbs::LimbForm;
@@ -33,6 +33,7 @@ const TOP: &[&str] = &[
     "support",
     "numbers",
     "budget",
+    "diagnostics",
 ];
 /// Those of the tables of which there may be several: `[[payload]]`.
 pub const LISTS: &[&str] = &["contact", "loop", "mode", "payload", "parameter", "drive", "flexible"];
@@ -58,6 +59,8 @@ pub struct SceneFile {
     pub limbs: Option<LimbForm>,
     /// Whether rounding errors are bounded, and what is spent on it; none: as the options say.
     pub certify: Option<Effort>,
+    /// What becomes of warnings, unless the options say otherwise.
+    pub levels: Levels,
 }
 
 impl SceneFile {
@@ -75,6 +78,8 @@ impl SceneFile {
         options.model.angle_tolerance = self.angle_tolerance.unwrap_or(options.model.angle_tolerance);
         options.limbs = self.limbs.unwrap_or(options.limbs);
         options.certify = self.certify.or(options.certify);
+        let own = std::mem::replace(&mut options.reporting.levels, self.levels);
+        options.reporting.levels.extend(&own);
         options.scene = self.scene;
         options
     }
@@ -173,7 +178,23 @@ impl SceneReader<'_> {
         if let Some(table) = self.reader.table_at(top, "budget", "[budget]") {
             self.budgets(&table);
         }
+        if let Some(table) = self.reader.table_at(top, "diagnostics", "[diagnostics]") {
+            self.levels(&table);
+        }
         self.contacts(top);
+    }
+
+    /// What becomes of warnings.
+    fn levels(&mut self, table: &Table) {
+        self.reader.check_keys(table, &Level::ALL.map(Level::word));
+        for level in Level::ALL {
+            for code in self.reader.names_at(table, level.word(), "code") {
+                match Levels::complaint(&code.value, level) {
+                    Some(complaint) => self.reader.diagnostics.push(complaint.at(&code.place)),
+                    None => self.file.levels.set(code.value, level),
+                }
+            }
+        }
     }
 
     /// The value, its place noted under that path.

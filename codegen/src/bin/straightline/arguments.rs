@@ -1,10 +1,13 @@
 //! The command line, and what it says in the library's terms.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand};
+use std::ffi::OsString;
 use std::path::PathBuf;
 use straightline_codegen::certify::Effort;
 use straightline_codegen::compile::Options;
+use straightline_codegen::diagnostic::{Diagnostic, Front, Level, Levels, Reporting};
 use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::experiment::parameter::{self, Range, Sweep};
 use straightline_codegen::export::is_identifier;
@@ -117,6 +120,52 @@ Examples:
 
 {EXIT_CODES}"))]
     Export(Export),
+    /// List the functions, or those that a word is about: their names, summaries, and what else they are called
+    #[command(after_help = "\
+Examples:
+  straightline functions
+  straightline functions RNEA")]
+    Functions(Functions),
+    /// Say what a complaint's code stands for, or list all codes
+    #[command(after_help = "\
+Warnings have levels: --allow CODE, --warn CODE and --deny CODE on the command line, allow(\"CODE\") in the derive,
+.allow(\"CODE\") in a build script, and in a scene
+
+  [diagnostics]
+  allow = [\"CODE\"]
+
+Examples:
+  straightline explain
+  straightline explain near-right-angle")]
+    Explain(Explain),
+}
+
+impl Command {
+    /// How the command reads robots, if it does.
+    pub fn model(&self) -> Option<&ModelArgs> {
+        Some(match self {
+            Command::Generate(a) => &a.model,
+            Command::Report(a) => &a.model,
+            Command::Check(a) => &a.model,
+            Command::Verify(a) => &a.model,
+            Command::Simulate(a) => &a.model,
+            Command::Analyze(a) => &a.model,
+            Command::Export(a) => &a.model,
+            Command::Functions(_) | Command::Explain(_) => return None,
+        })
+    }
+}
+
+#[derive(Debug, Args)]
+pub struct Functions {
+    /// A word of the name, of the summary, or another name, such as `RNEA`
+    pub word: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct Explain {
+    /// The code, as it stands in `warning[near-right-angle]`
+    pub code: Option<String>,
 }
 
 #[derive(Debug, Args)]
@@ -323,6 +372,33 @@ pub struct ModelArgs {
     /// Acceleration due to gravity in the world [m/s²] [default: the file's, or 0,0,-9.81]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector)]
     gravity: Option<Vector>,
+    #[command(flatten)]
+    reporting: ReportingArgs,
+}
+
+/// What is said.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What is said")]
+pub struct ReportingArgs {
+    /// Say no warnings, show no progress
+    #[arg(short, long)]
+    quiet: bool,
+    /// Say no warnings of this code (`warnings`: none); `straightline explain` lists the codes; may be repeated
+    #[arg(long, value_name = "CODE", value_parser = |code: &str| code_at(code, Level::Allow))]
+    allow: Vec<String>,
+    /// Say warnings of this code, whatever the scene says; may be repeated
+    #[arg(long, value_name = "CODE", value_parser = |code: &str| code_at(code, Level::Warn))]
+    warn: Vec<String>,
+    /// Warnings of this code are errors (`warnings`: all); may be repeated
+    #[arg(long, value_name = "CODE", value_parser = |code: &str| code_at(code, Level::Deny))]
+    deny: Vec<String>,
+}
+
+fn code_at(code: &str, level: Level) -> Result<String, String> {
+    match Levels::complaint(code, level) {
+        None => Ok(code.to_string()),
+        Some(Diagnostic { title, help, .. }) => Err(format!("{title}; {help}")),
+    }
 }
 
 /// Three numbers; a type of its own because clap takes a list for a repeated argument.
@@ -400,6 +476,21 @@ impl ModelArgs {
 }
 
 impl ModelArgs {
+    /// What becomes of warnings.
+    pub fn reporting(&self) -> Reporting {
+        let ReportingArgs { allow, warn, deny, .. } = &self.reporting;
+        let mut levels = Levels::default();
+        for (codes, level) in [(allow, Level::Allow), (warn, Level::Warn), (deny, Level::Deny)] {
+            codes.iter().for_each(|code| levels.set(code, level));
+        }
+        Reporting { levels, front: Front::CommandLine }
+    }
+
+    /// Whether warnings and progress are left out.
+    pub fn is_quiet(&self) -> bool {
+        self.reporting.quiet
+    }
+
     /// What the command line says of options that a scene gives, too.
     pub fn insist(&self, options: &mut Options) {
         if self.literal_angles || self.angle_tolerance.is_some() {
@@ -459,6 +550,7 @@ impl ProgramArgs {
             limits: Limits { operations: self.max_part_operations },
             model: model.options(),
             certify: self.effort(),
+            reporting: model.reporting(),
             ..Options::default()
         };
         self.mix(&mut options);
@@ -466,9 +558,94 @@ impl ProgramArgs {
     }
 }
 
+impl CommandLine {
+    /// Reads these arguments.
+    ///
+    /// # Errors
+    /// All that is wrong with them, each once: after a complaint about one, the others are read without it, or as it was
+    /// meant. Also a request for help.
+    pub fn read(mut given: Vec<OsString>) -> Result<CommandLine, Vec<clap::Error>> {
+        let mut complaints = Vec::new();
+        loop {
+            let error = match CommandLine::try_parse_from(&given) {
+                Ok(line) if complaints.is_empty() => return Ok(line),
+                Ok(_) => return Err(complaints),
+                Err(error) => error,
+            };
+            let further = without(&given, &error);
+            complaints.push(error);
+            match further.filter(|further| *further != given) {
+                Some(further) => given = further,
+                None => return Err(complaints),
+            }
+        }
+    }
+}
+
+/// Prints complaints, the usage behind the last one, and ends; help is no failure.
+pub fn exit(complaints: Vec<clap::Error>) -> ! {
+    if let [only] = &complaints[..] {
+        only.exit();
+    }
+    for (k, error) in complaints.iter().enumerate() {
+        let text = error.to_string();
+        let end = ["\nUsage:", "\nFor more information"].iter().filter_map(|word| text.find(word)).min();
+        let is_last = k + 1 == complaints.len();
+        anstream::eprintln!("{}\n", text[..end.filter(|_| !is_last).unwrap_or(text.len())].trim_end());
+    }
+    std::process::exit(2)
+}
+
+/// The arguments without what the complaint is about, or with what was meant there; `None` where that is not known.
+fn without(given: &[OsString], error: &clap::Error) -> Option<Vec<OsString>> {
+    let text = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.as_str()),
+        _ => None,
+    };
+    let argument = text(ContextKind::InvalidArg)?.split([' ', '=', '[']).next()?;
+    let at = |word: &str| given.iter().position(|given| given == word);
+    let mut rest = given.to_vec();
+    match error.kind() {
+        ErrorKind::InvalidValue | ErrorKind::ValueValidation => {
+            let value = text(ContextKind::InvalidValue)?;
+            if let Some(joined) = at(&format!("{argument}={value}")) {
+                rest.remove(joined);
+            } else {
+                let pair = given.windows(2).position(|pair| pair[0] == argument && pair[1] == value)?;
+                rest.drain(pair..pair + 2);
+            }
+        }
+        ErrorKind::UnknownArgument => match text(ContextKind::SuggestedArg) {
+            Some(meant) => {
+                let index = given.iter().position(|g| g.to_string_lossy().split('=').next() == Some(argument))?;
+                rest[index] = given[index].to_string_lossy().replacen(argument, meant, 1).into();
+            }
+            None => {
+                let index = at(argument)?;
+                let is_alone = given.get(index + 1).is_none_or(|next| next.to_string_lossy().starts_with('-'));
+                is_alone.then(|| rest.remove(index))?;
+            }
+        },
+        _ => return None,
+    }
+    Some(rest)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn all_that_is_wrong_with_the_arguments_is_said_at_once() {
+        let given = "straightline generate arm.urdf --function inverse_dynamic --scaler f46 --allow near-right-angel --function RNEA --gravity 1,2";
+        let complaints = CommandLine::read(given.split(' ').map(OsString::from).collect()).unwrap_err();
+        let said: Vec<String> = complaints.iter().map(ToString::to_string).collect();
+        let parts = ["'inverse_dynamics'", "'--scalar'", "f64, f32", "`near-right-angle`", "RNEA", "0,0,-9.81"];
+        assert_eq!(said.len(), parts.len(), "{said:?}");
+        for part in parts {
+            assert_eq!(said.iter().filter(|text| text.contains(part)).count(), 1, "{part}: {said:?}");
+        }
+    }
     use clap::CommandFactory;
 
     #[test]

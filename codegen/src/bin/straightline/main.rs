@@ -6,15 +6,15 @@
 mod arguments;
 mod contact;
 mod motion;
+mod page;
 mod print;
 
 use arguments::{Check, Command, CommandLine, Export, Generate, ModelArgs, ProgramArgs, Report, Verify};
-use clap::Parser;
 use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 use straightline_codegen::compile::{compile, explain, Generated, Options};
-use straightline_codegen::diagnostic::{Diagnostics, Severity, Source};
+use straightline_codegen::diagnostic::{self, codes, Diagnostics, Severity, Source};
 use straightline_codegen::report::html;
 use straightline_codegen::{description, export, model, output, scene, verify};
 
@@ -33,7 +33,11 @@ impl From<io::Error> for Failure {
 }
 
 fn main() -> ExitCode {
-    let done = match CommandLine::parse().command {
+    let command = CommandLine::read(std::env::args_os().collect())
+        .unwrap_or_else(|complaints| arguments::exit(complaints))
+        .command;
+    print::be_quiet(command.model().is_some_and(ModelArgs::is_quiet));
+    let done = match command {
         Command::Generate(a) => generate(&a),
         Command::Report(a) => report(&a),
         Command::Check(a) => check(&a),
@@ -41,6 +45,8 @@ fn main() -> ExitCode {
         Command::Export(a) => export(&a),
         Command::Simulate(a) => motion::simulate(&a),
         Command::Analyze(a) => motion::analyze(&a),
+        Command::Functions(a) => print::functions(a.word.as_deref()).map_err(Failure::Files),
+        Command::Explain(a) => explain_code(a.code.as_deref()),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -62,7 +68,7 @@ fn read(path: &Path) -> Result<Source, Failure> {
 
 /// What the command line and the scene that it names say; what is wrong with the scene is said when it is used.
 fn options(program: Option<&ProgramArgs>, model: &ModelArgs) -> Result<Options, Failure> {
-    let plain = || Options { model: model.options(), ..Options::default() };
+    let plain = || Options { model: model.options(), reporting: model.reporting(), ..Options::default() };
     let options = program.map_or_else(plain, |program| program.options(model));
     let Some(path) = &model.scene else { return Ok(options) };
     let mut options = scene::read_partly(&read(path)?).into_options(options);
@@ -96,6 +102,20 @@ fn compiled_by(
         }
         Err(diagnostics) => {
             print::diagnostics(&diagnostics, Severity::Warning);
+            Err(Failure::Input)
+        }
+    }
+}
+
+/// What a code stands for, or all codes.
+fn explain_code(code: Option<&str>) -> Result<(), Failure> {
+    let Some(code) = code else { return Ok(print::codes(codes::ALL)?) };
+    match codes::find(code) {
+        Some(found) => Ok(print::codes(std::slice::from_ref(found))?),
+        None => {
+            let complaint = diagnostic::messages::unknown_code(code);
+            print::error(&complaint.title);
+            print::help(&complaint.help);
             Err(Failure::Input)
         }
     }
@@ -140,7 +160,7 @@ fn check(a: &Check) -> Result<(), Failure> {
     let mut wrong = false;
     for robot in &a.robots {
         let source = read(robot)?;
-        let mut diagnostics = Diagnostics::new();
+        let mut diagnostics = Diagnostics::reporting(&options.reporting);
         let description = description::read(&source, &mut diagnostics);
         let model = description.as_ref().and_then(|d| model::build(d, &model_options, &mut diagnostics));
         scene::check_options(&options, &mut diagnostics);
@@ -149,7 +169,8 @@ fn check(a: &Check) -> Result<(), Failure> {
         print::diagnostics(&diagnostics, Severity::Note);
         print::verdict(source.path(), model.as_ref(), &diagnostics)?;
         if let Some(description) = &description {
-            print::notes(description, &model::special_angles(description, &model_options))?;
+            let special = model::special_angles(description, &model_options);
+            print::notes(description, &special, &model::doubtful_angles(description, &model_options))?;
         }
         wrong |= diagnostics.has_errors();
     }

@@ -5,16 +5,19 @@ use anstyle::{AnsiColor, Style};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::io::{self, IsTerminal, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use straightline_codegen::description::{Description, Ignored};
+use straightline_codegen::diagnostic::codes::Code;
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
 use straightline_codegen::expr::Counts;
-use straightline_codegen::model::SpecialAngle;
+use straightline_codegen::model::{tolerance_that_mends, DoubtfulAngle, SpecialAngle};
 use straightline_codegen::report::errors::four_digits;
 use straightline_codegen::report::waterfall::{signed, Waterfall};
 use straightline_codegen::report::Report;
 use straightline_codegen::staged::{Remaining, StageReport};
 use straightline_codegen::verify::Verification;
+use straightline_codegen::Function;
 use straightline_core::model::Model;
 use straightline_core::Dd;
 
@@ -32,13 +35,53 @@ pub fn help(text: &str) {
     eprintln!("{HELP}help{HELP:#}: {text}");
 }
 
+/// Whether warnings and progress are left out.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Warnings, notes and progress are left out from now on.
+pub fn be_quiet(quiet: bool) {
+    QUIET.store(quiet, Ordering::Relaxed);
+}
+
+fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
 /// Diagnostics of at least that severity; the stream drops the colours where there is no terminal.
 pub fn diagnostics(all: &Diagnostics, least: Severity) {
+    let least = if is_quiet() { Severity::Error } else { least };
     let shown = all.at_least(least);
     if !shown.is_empty() {
         eprintln!("{}", shown.render_coloured().trim_end());
         eprintln!();
     }
+}
+
+/// Codes, how bad each is, and what it is about.
+pub fn codes(codes: &[Code]) -> io::Result<()> {
+    let mut out = stdout().lock();
+    for Code { code, severity, sentence } in codes {
+        writeln!(out, "{code:<26}{:<9}{sentence}", severity.to_string())?;
+    }
+    Ok(())
+}
+
+/// The functions that a word is about, or all of them.
+pub fn functions(word: Option<&str>) -> io::Result<()> {
+    let mut out = stdout().lock();
+    let found = Function::known().filter(|f| word.is_none_or(|word| f.is_about(word)));
+    let mut none = true;
+    for function in found {
+        none = false;
+        writeln!(out, "{:<30}{}", function.name(), function.summary())?;
+        if !function.aliases().is_empty() {
+            writeln!(out, "{:<30}also: {}", "", function.aliases().join(", "))?;
+        }
+    }
+    if none {
+        writeln!(out, "no function is about `{}`", word.unwrap_or_default())?;
+    }
+    Ok(())
 }
 
 /// Generated source.
@@ -72,8 +115,29 @@ pub fn verdict(path: &str, model: Option<&Model<Dd>>, diagnostics: &Diagnostics)
 
 /// What the reading assumed without a doubt: angles that are multiples of 30 or 45 degrees but for rounding, elements
 /// that the dynamics do not need.
-pub fn notes(description: &Description, angles: &[SpecialAngle]) -> io::Result<()> {
+pub fn notes(description: &Description, angles: &[SpecialAngle], doubtful: &[DoubtfulAngle]) -> io::Result<()> {
     let mut out = stdout().lock();
+    if is_quiet() {
+        return Ok(());
+    }
+    if !doubtful.is_empty() {
+        let tolerance = tolerance_that_mends(doubtful);
+        writeln!(
+            out,
+            "  angles near right ones, taken as written (--angle-tolerance {tolerance:e} takes all as exact):"
+        )?;
+        for a in doubtful {
+            writeln!(
+                out,
+                "    {}: {}: {} is {} only to {:.1e} rad",
+                a.place,
+                a.what,
+                a.text,
+                a.near,
+                a.deviation.abs()
+            )?;
+        }
+    }
     if !angles.is_empty() {
         writeln!(out, "  angles taken as exact (--literal-angles takes them as written):")?;
         for a in angles {
@@ -193,6 +257,9 @@ pub fn verification(v: &Verification) -> io::Result<()> {
 /// Something is being done; shown on a terminal only.
 pub fn spinner(what: &str) -> ProgressBar {
     let bar = ProgressBar::new_spinner().with_message(what.to_string());
+    if is_quiet() {
+        return ProgressBar::hidden();
+    }
     if io::stderr().is_terminal() {
         bar.enable_steady_tick(Duration::from_millis(100));
     }
@@ -201,6 +268,9 @@ pub fn spinner(what: &str) -> ProgressBar {
 
 /// So many things are being done; shown on a terminal only.
 pub fn bar(what: &'static str, count: u64) -> ProgressBar {
+    if is_quiet() {
+        return ProgressBar::hidden();
+    }
     let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}").expect("a template of indicatif");
     ProgressBar::new(count).with_style(style).with_message(what)
 }

@@ -14,6 +14,7 @@ use alloc::vec::Vec;
 
 /// q̈ \[rad/s² or m/s²\] that the generalized forces tau \[N·m or N\] cause, by the articulated-body algorithm.
 #[doc(alias = "aba")]
+#[doc(alias("ABA", "articulated body"))]
 pub fn forward_dynamics_aba<T: Real>(model: &Model<T>, q: &[T], qd: &[T], tau: &[T]) -> Vec<T> {
     let bias = bias_force(model, q, qd);
     let drive: Vec<T> = tau.iter().zip(&bias).map(|(&t, &h)| t - h).collect();
@@ -24,6 +25,7 @@ pub fn forward_dynamics_aba<T: Real>(model: &Model<T>, q: &[T], qd: &[T], tau: &
 ///
 /// Divides by what each joint feels of the mass beyond it, with the joints beyond free: positive as long as every joint
 /// moves some mass or inertia; a joint that moves none has no forward dynamics, and what comes out is not finite.
+#[doc(alias("ABA"))]
 pub fn solve_articulated<T: Real>(model: &Model<T>, q: &[T], drive: &[T]) -> Vec<T> {
     let poses = JointPose::all(&model.bodies, q);
     let mut inertias: Vec<ArticulatedInertia<T>> = model.bodies.iter().map(ArticulatedInertia::of_body).collect();

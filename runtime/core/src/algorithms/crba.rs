@@ -16,6 +16,7 @@ use alloc::vec::Vec;
 /// branches are structural zeros.
 #[doc(alias = "crba")]
 #[doc(alias = "joint space inertia matrix")]
+#[doc(alias("CRBA", "inertia matrix"))]
 pub fn mass_matrix<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
     let poses = JointPose::all(&model.bodies, q);
     let nv = model.nv();

@@ -119,6 +119,7 @@ impl<T: Real> Ltdl<T> {
 }
 
 /// q̈ \[rad/s² or m/s²\] that the generalized forces tau \[N·m or N\] cause: H q̈ = tau − h, with [`Ltdl`].
+#[doc(alias("forward dynamics", "LTDL"))]
 pub fn forward_dynamics_ltdl<T: Real>(model: &Model<T>, q: &[T], qd: &[T], tau: &[T]) -> Vec<T> {
     let bias = bias_force(model, q, qd);
     let drive: Vec<T> = tau.iter().zip(&bias).map(|(&t, &h)| t - h).collect();

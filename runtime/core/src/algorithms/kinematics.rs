@@ -10,6 +10,7 @@ use crate::spatial::{Mat3, MotionVector, Transform, Vec3};
 use alloc::vec::Vec;
 
 /// Poses in the world of the frames asked for \[m\]: columns of the rotation are the frame's axes.
+#[doc(alias("FK"))]
 pub fn forward_kinematics<T: Real>(model: &Model<T>, q: &[T], frames: &[&Frame<T>]) -> Vec<Transform<T>> {
     let poses = world_poses(model, q);
     let pose = |frame: &&Frame<T>| match frame.body {

@@ -28,6 +28,7 @@ pub struct Momentum<T> {
 
 /// Mass centre, its velocity, and the momenta of the motion (q, qd). Divides by the mass of the moving bodies, which is
 /// positive for a robot.
+#[doc(alias("COM", "centroidal momentum", "center of mass"))]
 pub fn momentum<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Momentum<T> {
     let poses = JointPose::all(&model.bodies, q);
     let velocities = body_velocities(model, &poses, qd);

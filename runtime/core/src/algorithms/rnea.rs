@@ -21,6 +21,7 @@ use alloc::vec::Vec;
 /// what rotors, friction and springs of the joints take.
 #[doc(alias = "direct dynamics")]
 #[doc(alias = "rnea")]
+#[doc(alias("RNEA", "Newton-Euler"))]
 pub fn inverse_dynamics<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T]) -> Vec<T> {
     let rigid = rigid_body_forces(model, q, qd, qdd, model.gravity);
     let effects = passive_force(model, q, qd).into_iter().zip(rotor_inertias(model)).zip(qdd);
@@ -29,18 +30,20 @@ pub fn inverse_dynamics<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T])
 
 /// Generalized forces \[N·m or N\] that hold the robot at rest against gravity: g(q) = ∂V/∂q. For a floating base the
 /// force and the moment on the root link.
+#[doc(alias("gravity compensation"))]
 pub fn gravity_force<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
     let rest = vec![T::zero(); model.nv()];
     rigid_body_forces(model, q, &rest, &rest, model.gravity)
 }
 
 /// h(q, q̇) = C q̇ + g + friction and springs: generalized forces \[N·m or N\] of a motion without q̈, so that tau = H q̈ + h.
-#[doc(alias = "nonlinear effects")]
+#[doc(alias("Coriolis", "nonlinear effects"))]
 pub fn bias_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
     inverse_dynamics(model, q, qd, &vec![T::zero(); model.nv()])
 }
 
 /// C(q, q̇) q̇: generalized centrifugal and Coriolis forces \[N·m or N\]: the same recursion without gravity and q̈.
+#[doc(alias("Coriolis", "centrifugal"))]
 pub fn velocity_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
     let no_acceleration = vec![T::zero(); model.nv()];
     rigid_body_forces(model, q, qd, &no_acceleration, Vec3::zero())

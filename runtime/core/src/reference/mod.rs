@@ -1,4 +1,4 @@
-//! The chapter's own formulation of robot dynamics: the second author, who proves the first.
+//! The chapter's own formulation of robot dynamics: the second author, who tests the first.
 //!
 //! Source: the handbook chapter *Robot Dynamics*, sections 20.1, 20.2, 20.5.2 and 20.5.3 and its appendix, equations
 //! (20.1)–(20.61), (20.83)–(20.97) and (20.100)–(20.111); equation numbers in this module are the chapter's. Its misprints are corrected where they occur,

@@ -1,0 +1,212 @@
+//! The codes of all complaints: how bad each is by default, and what it is about, in a sentence.
+
+use super::Severity::{self, Error, Note, Warning};
+
+/// One kind of complaint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Code {
+    /// The code, as it stands in `error[negative-mass]`.
+    pub code: &'static str,
+    /// How bad it is unless a level says otherwise.
+    pub severity: Severity,
+    /// What it is about, in a sentence.
+    pub sentence: &'static str,
+}
+
+/// The code of that name.
+pub fn find(code: &str) -> Option<&'static Code> {
+    ALL.iter().find(|c| c.code == code)
+}
+
+/// All of them, in the order of the alphabet.
+pub const ALL: &[Code] = &[
+    code("actuator-inert", Error, "A linear actuator that moves nothing, or that nothing moves."),
+    code("actuator-shape", Error, "A linear actuator whose matrices do not fit."),
+    code("alpha-missing", Warning, "A linear joint without its constant angle."),
+    code("alpha-on-revolute", Error, "A revolute joint with a constant angle."),
+    code("axis-length", Warning, "An axis far from unit length."),
+    code("bad-option", Error, "An option with a value out of its range."),
+    code("base-floats", Error, "A motion of a robot whose base floats."),
+    code("base-locked", Error, "A lock on the joint of a floating base."),
+    code("budget-alone", Error, "A budget for what is not generated."),
+    code("cannot-stick", Error, "A contact that cannot stick in a mode."),
+    code("column-missing", Error, "A column that is needed and is not there."),
+    code("column-unknown", Error, "A column that belongs to nothing."),
+    code("contact-name", Error, "A name of a contact, a loop or a mode that makes no identifier of its own."),
+    code("contact-on-world", Error, "A contact of what does not move."),
+    code("contact-twice", Error, "A contact of which is said something twice."),
+    code("controller-and-torques", Error, "Two things that drive one robot."),
+    code("coordinate-twice", Error, "A coordinate named twice, or as constrained and as free."),
+    code("coulomb-speed-alone", Error, "A width of what is not smooth."),
+    code("coulomb-speed-missing", Error, "Smooth friction without a width."),
+    code("current-without-motor", Error, "A current for an actuator that is no motor."),
+    code("cycle", Error, "Links that carry each other."),
+    code("drive-coupling", Error, "Drives whose ratios are dependent."),
+    code("drive-joint", Error, "A drive of a joint that is not there, or does not move."),
+    code("drive-number", Error, "A number of a drive that no drive has."),
+    code("drive-states", Error, "A state of the drives of another length."),
+    code("duplicate-name", Error, "A name that another one of the same kind has."),
+    code("e-next-on-last", Warning, "An axis beyond the last link."),
+    code("elastic-number", Error, "A number of a flexible link or a support that none has."),
+    code("empty-mode", Error, "A mode in which nothing is closed."),
+    code("empty-name", Error, "A name without characters."),
+    code("empty-range", Error, "A range without a value."),
+    code("error-budget-count", Error, "A budget of errors with too many numbers, or too few."),
+    code("error-budget-output", Error, "A budget of errors for what is no output."),
+    code("error-over-budget", Error, "Bounds of rounding errors that are greater than they may be."),
+    code("error-unbounded", Error, "Rounding errors that have no bound, where one is demanded."),
+    code("file-too-large", Error, "A file larger than the readers take."),
+    code("flexible-axis", Error, "A flexible link without a proper axis."),
+    code("flexible-bending", Error, "Bending about an axis that is not across."),
+    code("flexible-mass", Warning, "A flexible link whose mass is elsewhere."),
+    code("flexible-rigid", Error, "A flexible link that nothing can bend."),
+    code("floating-by-option", Warning, "A floating base by option, a fixed one by file."),
+    code("floating-joint", Error, "A floating joint."),
+    code("function-not-of-robot", Error, "A function about something that the robot does not have."),
+    code("gear-ratio-alone", Warning, "A gear without a rotor."),
+    code("gear-ratio-zero", Error, "A gear that stands still."),
+    code("inertia-by-parameters", Warning, "What divides by what joints feel, of a robot with a joint that feels what run-time parameters bring and nothing else."),
+    code("inertia-without-mass", Warning, "Inertia without mass."),
+    code("inputs-do-not-follow", Error, "Drives whose inputs no motion gives."),
+    code("joint-order-missing", Error, "A joint order with joints left out."),
+    code("joint-order-twice", Error, "A joint order with a name that stands twice."),
+    code("joint-order-unknown", Error, "A joint order with a name that no joint has."),
+    code("left-open", Error, "What a scene leaves to the caller, and an experiment must say."),
+    code("level-of-error", Error, "A level for a complaint that is an error whatever is said."),
+    code("limbs-exact", Error, "Identical limbs as lanes where rules keep every bit."),
+    code("limits-missing", Warning, "A revolute or prismatic joint without limits."),
+    code("limits-reversed", Warning, "Lower limit above the upper one."),
+    code("link-given-twice", Error, "Two parameters for one inertia."),
+    code("locked-beyond-limits", Warning, "A value that the joint cannot reach."),
+    code("locked-joint-wanted", Error, "A coordinate of a joint that has none in this scene."),
+    code("locked-twice", Error, "A joint with two values."),
+    code("loop-on-one-body", Error, "A loop between parts of one body."),
+    code("missing-attribute", Error, "An attribute that must be there."),
+    code("missing-element", Error, "An element that must be there."),
+    code("missing-key", Error, "A key that must be there."),
+    code("misspelt-element", Warning, "An element that looks like a known one."),
+    code("mixed-alone", Error, "Mixed precision for no demanded error."),
+    code("mixed-elsewhere", Error, "Mixed precision where functions cannot have it."),
+    code("more-complaints", Note, "A run of complaints was cut."),
+    code("motion-missing", Error, "A controller that follows nothing."),
+    code("moving-base-forward", Error, "Forward dynamics where the base's motion is given."),
+    code("near-right-angle", Warning, "Angles that may be meant as right angles, and are taken as they are written."),
+    code("negative-effect", Error, "Friction, an inertia or a stiffness below zero."),
+    code("negative-limit", Warning, "A greatest speed or torque below zero."),
+    code("negative-mass", Error, "A mass below zero."),
+    code("negative-moment", Warning, "A tensor with a negative principal moment."),
+    code("no-coordinate", Error, "A contact or a loop that holds nothing."),
+    code("no-direction", Error, "A vector that gives no direction."),
+    code("no-drives", Error, "A key for drives, of a robot without."),
+    code("no-forward-dynamics", Error, "What divides by what joints feel, of a robot with a joint that feels no inertia. `asked`: in words, what is asked for."),
+    code("no-identical-limbs", Error, "Identical limbs of a robot that has none."),
+    code("no-limit", Error, "A joint without the limits that a trapezoid takes."),
+    code("no-links", Error, "A robot without links."),
+    code("no-motion", Error, "Points that make no motion."),
+    code("no-such-part", Error, "A part that the results of a function do not have."),
+    code("no-surface", Error, "A quadric without a gradient."),
+    code("not-a-number", Error, "Text where a number is wanted."),
+    code("not-a-robot", Error, "XML, but not of a robot."),
+    code("not-a-selection", Error, "Joints or frames of a function whose results are not by joints or frames."),
+    code("not-finite", Error, "NaN, or a number beyond f64."),
+    code("not-in-range", Error, "A number out of its range."),
+    code("not-samples", Error, "A file that is no table of numbers."),
+    code("not-supported-yet", Error, "Something that changes the dynamics and is not part of the equations."),
+    code("not-symmetric", Error, "An inertia matrix that is not symmetric."),
+    code("not-utf8", Error, "Bytes that are not UTF-8."),
+    code("nothing-left", Error, "A robot that does not move any more."),
+    code("nothing-moves", Error, "A robot that does not move."),
+    code("nothing-slides", Error, "Friction without a surface to slide on."),
+    code("nothing-yields", Error, "An environment without a distance."),
+    code("one-per-joint", Error, "A list of another length than that of the joints."),
+    code("other-drives", Error, "A controller that knows other drives."),
+    code("out-of-range", Error, "A finite number beyond anything a robot has."),
+    code("over-budget", Error, "A function that costs more than it may."),
+    code("parameter-name", Error, "A parameter whose name as an input is taken."),
+    code("parameter-on-world", Error, "A parameter of what does not move."),
+    code("payload-name-twice", Error, "A name for two payloads."),
+    code("payload-on-world", Warning, "A payload that moves with nothing."),
+    code("point-mass", Warning, "Mass without inertia."),
+    code("range-alone", Error, "A range of what is no input."),
+    code("repeated-element", Error, "An element that may be there once."),
+    code("said-by-the-scene", Error, "What a scene says, and an experiment may not."),
+    code("said-twice", Error, "What the scene and an option beside it both say."),
+    code("scalar-twice", Error, "A scalar type that is asked for twice."),
+    code("shaft-without-inertia", Error, "A shaft between two springs that has no inertia."),
+    code("singular-joint", Warning, "A joint that feels no inertia."),
+    code("specificity", Error, "A vector that is parallel with the joint axis and cannot define the zero of the coordinate."),
+    code("support-floats", Error, "A support below a base that is not fixed."),
+    code("support-rigid", Error, "A support that does not give way."),
+    code("time-goes-back", Error, "A time that does not go on."),
+    code("toml-syntax", Error, "Text that is not valid TOML."),
+    code("too-complex", Error, "More of something than any robot file has."),
+    code("too-many-links", Error, "A robot with more links than can be compiled."),
+    code("triangle-inequality", Warning, "A tensor that violates the triangle inequality."),
+    code("two-inputs", Error, "Two columns of one drive."),
+    code("two-parents", Error, "A link that is the child of two joints."),
+    code("two-roots", Error, "Several links without a parent."),
+    code("unknown-attribute", Warning, "An attribute that the element does not have."),
+    code("unknown-code", Error, "A level for a code that no complaint has."),
+    code("unknown-contact", Error, "A mode with a contact that is not there."),
+    code("unknown-contact-function", Error, "A function that contact modes do not have."),
+    code("unknown-format", Error, "A text that is neither XML nor TOML of a robot."),
+    code("unknown-frame", Error, "A frame that is asked for and not there."),
+    code("unknown-joint", Error, "A joint that is not there, or does not move."),
+    code("unknown-key", Error, "A key that the schema does not have."),
+    code("unknown-link", Error, "A link that is not there."),
+    code("unknown-moving-link", Error, "A link whose inertia cannot be an input by itself."),
+    code("unknown-parameter", Error, "A parameter of a sweep that the robot file does not have."),
+    code("unknown-scene-frame", Error, "A frame that is not there."),
+    code("unknown-word", Error, "A word that is none of those known there."),
+    code("unphysical-body", Error, "Mass and inertia that no body has."),
+    code("unyielding-joints", Error, "A shaft that does not give way, geared to several joints."),
+    code("written-twice", Error, "Two keys for the same thing."),
+    code("wrong-count", Error, "Too many numbers in a list, or too few."),
+    code("wrong-type", Error, "A value of another type."),
+    code("xacro-left", Error, "Xacro that was not expanded."),
+    code("xml-syntax", Error, "XML that is not well-formed."),
+    code("zero-axis", Error, "An axis without direction."),
+    code("zero-mass", Warning, "A moving link whose mass is written as zero."),
+];
+
+const fn code(code: &'static str, severity: Severity, sentence: &'static str) -> Code {
+    Code { code, severity, sentence }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    /// Every `D::error("code", …)` of the tables of messages, with its severity.
+    fn said() -> Vec<(String, Severity)> {
+        let mut found = Vec::new();
+        for table in ["description", "scene", "experiment", "diagnostic"] {
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("src/{table}/messages.rs"));
+            let text = std::fs::read_to_string(path).expect("the table is there");
+            for (call, severity) in [("D::error(", Error), ("D::warning(", Warning), ("D::note(", Note)] {
+                for rest in text.split(call).skip(1) {
+                    let code = rest.trim_start().strip_prefix('"').and_then(|rest| rest.split('"').next());
+                    found.push((code.expect("a code comes first").to_string(), severity));
+                }
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn the_codes_are_those_that_are_said_each_with_its_severity() {
+        let mut said = said();
+        said.sort();
+        said.dedup();
+        let listed: Vec<(String, Severity)> = ALL.iter().map(|c| (c.code.to_string(), c.severity)).collect();
+        assert_eq!(listed, said);
+    }
+
+    #[test]
+    fn every_code_has_a_sentence() {
+        for Code { code, sentence, .. } in ALL {
+            assert!(sentence.ends_with('.') && sentence.starts_with(char::is_uppercase), "{code}: {sentence}");
+        }
+    }
+}

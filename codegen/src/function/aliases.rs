@@ -1,0 +1,67 @@
+//! What functions are called elsewhere: for searches in documentation and on the command line.
+
+use super::Function;
+
+/// Names in use for what each function computes, or for the algorithm behind it.
+const ALIASES: &[(&str, &[&str])] = &[
+    ("forward_kinematics", &["FK", "direct kinematics"]),
+    ("frame_velocity", &["twist"]),
+    ("jacobian", &["geometric Jacobian"]),
+    ("jacobian_bias", &["Jdot qdot", "velocity product acceleration"]),
+    ("inverse_dynamics", &["RNEA", "ID", "Newton-Euler", "computed torque"]),
+    ("gravity_force", &["gravity compensation", "generalized gravity"]),
+    ("bias_force", &["nonlinear effects", "NLE", "Coriolis"]),
+    ("velocity_force", &["Coriolis", "centrifugal"]),
+    ("mass_matrix", &["CRBA", "inertia matrix", "joint space inertia", "JSIM"]),
+    ("forward_dynamics", &["ABA", "FD", "articulated body"]),
+    ("joint_wrenches", &["constraint forces", "joint reactions"]),
+    ("energy", &["kinetic energy", "potential energy"]),
+    ("centre_of_mass", &["COM", "center of mass", "centroid"]),
+    ("momentum", &["centroidal momentum"]),
+    ("kinematics_and_jacobian", &["FK", "geometric Jacobian"]),
+    ("driven_inverse_dynamics", &["feedforward", "flatness"]),
+];
+
+impl Function {
+    /// What it is called elsewhere.
+    pub fn aliases(self) -> &'static [&'static str] {
+        ALIASES.iter().find(|(name, _)| *name == self.name()).map_or(&[], |(_, aliases)| aliases)
+    }
+
+    /// Whether its name, its summary or what it is called elsewhere has the word in it, in upper or lower case.
+    pub fn is_about(self, word: &str) -> bool {
+        let word = word.to_lowercase();
+        let texts = [self.name(), self.summary()].into_iter().chain(self.aliases().iter().copied());
+        texts.map(str::to_lowercase).any(|text| text.contains(&word) || text.replace('_', " ").contains(&word))
+    }
+
+    /// The first of that other name, in upper or lower case.
+    pub fn called(alias: &str) -> Option<Function> {
+        Function::known().find(|f| f.aliases().iter().any(|a| a.eq_ignore_ascii_case(alias)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn functions_are_found_by_what_they_are_called_elsewhere() {
+        for (alias, name) in [
+            ("RNEA", "inverse_dynamics"),
+            ("crba", "mass_matrix"),
+            ("ABA", "forward_dynamics"),
+            ("com", "centre_of_mass"),
+            ("Coriolis", "bias_force"),
+        ] {
+            assert_eq!(Function::called(alias).map(Function::name), Some(name));
+        }
+        let about: Vec<&str> = Function::known().filter(|f| f.is_about("coriolis")).map(Function::name).collect();
+        assert_eq!(about, ["bias_force", "velocity_force"]);
+    }
+
+    #[test]
+    fn every_row_belongs_to_a_function() {
+        assert!(ALIASES.iter().all(|(name, _)| Function::from_name(name).is_some()));
+    }
+}

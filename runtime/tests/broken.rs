@@ -1,0 +1,222 @@
+//! A robot file, a scene or an option that is wrong is one error of the compiler, whatever the code does with the robot.
+#![cfg(feature = "derive")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const ARM: &str = include_str!("../examples/arm.toml");
+
+/// The ways in which people use a type with dynamics: arrays of its lengths, patterns, constants, limits.
+const USE: &str = r#"
+struct State { q: [f64; Arm::NQ], tau: [f64; Arm::NV] }
+const BUDGET: () = assert!(Arm::INVERSE_DYNAMICS_COST.fma < 200);
+fn torques(q: &[f64; Arm::NQ]) -> [f64; Arm::NV] {
+    let mut tau = [0.0; Arm::NV];
+    Arm::inverse_dynamics(q, &[0.0; 3], &[0.0; Arm::NV], &mut tau);
+    tau
+}
+fn main() {
+    let () = BUDGET;
+    let q = [0.1, -0.2, 0.3];
+    let [a, b, c] = torques(&q);
+    let mut h = [[0.0; Arm::NV]; Arm::NV];
+    Arm::mass_matrix(&q, &mut h);
+    assert_eq!(h[0][1], h[1][0]);
+    let State { tau, .. } = State { q, tau: [a, b, c] };
+    let mut x = [[0.0; 12]; Arm::FRAME_NAMES.len()];
+    Arm::forward_kinematics(&q, &mut x);
+    for (name, limit) in Arm::JOINT_NAMES.iter().zip(Arm::EFFORT_LIMITS) {
+        println!("{name} {limit}");
+    }
+    let norm: f64 = tau.iter().map(|t| t * t).sum::<f64>().sqrt();
+    println!("{norm} {:?} {}", Arm::JOINT_NAMES, x[0][1]);
+}
+"#;
+
+/// Lanes and batches.
+const USE_LANES: &str = r#"
+fn main() {
+    let q = [[0.1; 8]; 3];
+    let mut g = [[0.0; 8]; Arm::NV];
+    Arm::gravity_force_lanes(&q, &mut g);
+    Arm::gravity_force_lanes::<8>(&q, &mut g);
+    let (many, mut all) = (vec![0.0; 30], vec![0.0; 30]);
+    Arm::gravity_force_batch_soa(10, &many, &mut all).unwrap();
+    if let Err(wrong) = Arm::gravity_force_batch_aos(10, &many[1..], &mut all) {
+        println!("{wrong}");
+    }
+}
+"#;
+
+/// Parameters, stages, further scalars and contact modes of a scene.
+const USE_SCENE: &str = r#"
+use loaded::staged::{Configuration, Parameters};
+struct Robot { tool: loaded::Tool, q: [f64; loaded::NQ] }
+fn hold(robot: &Robot) -> Result<[f64; Arm::NV], loaded::Unphysical> {
+    let mut g = [0.0; Arm::NV];
+    Arm::gravity_force(&robot.q, &robot.tool, &mut g);
+    let parameters = Parameters::new(&robot.tool);
+    Configuration::new(&parameters, &robot.q).gravity_force(&mut g);
+    loaded::contact::pushed::forward_dynamics(&robot.q, &robot.q, &g, &mut [0.0; 3]);
+    Ok(g)
+}
+fn main() {
+    let tool = loaded::Tool::new(0.6, [0.05, 0.01, -0.02], [1e-3, 0.0, 0.0, 2e-3, 0.0, 1.5e-3]).unwrap();
+    let robot = Robot { tool, q: [0.3, -0.8, 1.1] };
+    match hold(&robot) {
+        Ok([a, b, c]) => println!("{a} {b} {c}"),
+        Err(loaded::Unphysical::NegativeMass) => println!("{}", loaded::GRAVITY_FORCE_COST.mul),
+        Err(other) => println!("{other}"),
+    }
+    loaded::single::gravity_force(&[0.3_f32, -0.8, 1.1], &loaded::single::Tool::NONE, &mut [0.0; 3]);
+}
+"#;
+
+const SCENE: &str =
+    "[outputs]\nstaged = true\n[[parameter]]\nkind = \"payload\"\nname = \"tool\"\nframe = \"forearm\"\n\
+                     [[mode]]\nname = \"pushed\"\ncontacts = []\n";
+
+/// Name, attribute, what follows, robot file, scene file, number of errors, and what they say.
+type Case = (&'static str, &'static str, &'static str, String, String, &'static [&'static str]);
+
+fn cases() -> Vec<Case> {
+    let arm = |old: &str, new: &str| {
+        assert!(ARM.contains(old), "the arm has `{old}`");
+        ARM.replacen(old, new, 1)
+    };
+    let right = || ARM.to_string();
+    let none = String::new;
+    vec![
+        ("missing", r#""robot/none.toml""#, USE, none(), none(), &["there is no robot file `robot/none.toml`"]),
+        ("syntax", r#""robot/syntax.toml""#, USE, arm("mass = 2.5", "mass = = 2.5"), none(), &["toml-syntax"]),
+        ("key", r#""robot/key.toml""#, USE, arm("mass = 2.5", "maas = 2.5"), none(), &["did you mean `mass`?"]),
+        ("mass", r#""robot/mass.toml""#, USE, arm("mass = 2.5", "mass = -2.5"), none(), &["negative-mass"]),
+        (
+            "inertia",
+            r#""robot/inertia.toml", deny("triangle-inequality")"#,
+            USE,
+            ARM.lines()
+                .map(|line| {
+                    if line.starts_with("inertia") {
+                        "inertia = { xx = 0.5, yy = 0.01, zz = 0.01 }\n".into()
+                    } else {
+                        format!("{line}\n")
+                    }
+                })
+                .collect(),
+            none(),
+            &["triangle-inequality"],
+        ),
+        ("frame", r#""robot/frame.toml", frames("forarm")"#, USE, right(), none(), &["did you mean `forearm`?"]),
+        ("option", r#""robot/option.toml", flaoting_base"#, USE, right(), none(), &["did you mean `floating_base`?"]),
+        (
+            "function",
+            r#""robot/function.toml", functions(inverse_dynamic, mass_matrix, RNEA)"#,
+            USE,
+            right(),
+            none(),
+            &["`inverse_dynamic`; did you mean `inverse_dynamics`?", "`RNEA`; did you mean `inverse_dynamics`?"],
+        ),
+        (
+            "lanes",
+            r#""robot/none.toml", functions(gravity_force), lanes"#,
+            USE_LANES,
+            none(),
+            none(),
+            &["no robot file"],
+        ),
+        (
+            "inline",
+            r#""robot/inline.toml", module = "loaded", scene(outputs(staged = true), zero(qdot = true),
+                parameter(kind = "payload", name = "tool", frame = "forearm"), mode(name = "pushed", contacts = []))"#,
+            USE_SCENE,
+            right(),
+            none(),
+            &["[zero] has no key `qdot`", "has no contact"],
+        ),
+        (
+            "scene_syntax",
+            r#""robot/scene_syntax.toml", module = "loaded", scene = "robot/scene_syntax_scene.toml""#,
+            USE_SCENE,
+            right(),
+            SCENE.replace("staged = true", "staged ="),
+            &["toml-syntax"],
+        ),
+        (
+            "all_at_once",
+            r#""robot/all_at_once.toml", frams("forearm"), scalar = "f46", allow("near-right-angel"), rules = "exact""#,
+            USE,
+            arm("mass = 2.5", "mass = -2.5"),
+            none(),
+            &["did you mean `frames`?", "did you mean `f64`?", "did you mean `near-right-angle`?", "negative-mass"],
+        ),
+    ]
+}
+
+fn package() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let package = Path::new(env!("CARGO_TARGET_TMPDIR")).join("broken");
+    for directory in ["src/bin", "robot"] {
+        fs::create_dir_all(package.join(directory)).unwrap();
+    }
+    let manifest = format!(
+        "[package]\nname = \"broken\"\nversion = \"0.1.0\"\nedition = \"2021\"\n\n\
+         [dependencies]\nstraightline = {{ path = {here:?} }}\n\n[profile.dev]\ndebug = false\n\n[workspace]\n"
+    );
+    fs::write(package.join("Cargo.toml"), manifest).unwrap();
+    fs::copy(here.join("../Cargo.lock"), package.join("Cargo.lock")).unwrap();
+    package
+}
+
+#[test]
+fn what_is_wrong_is_said_once_and_every_use_compiles() {
+    let package = package();
+    let mut wrong = String::new();
+    for (name, attribute, uses, robot, scene, expected) in cases() {
+        let main =
+            format!("use straightline::Dynamics;\n\n#[derive(Dynamics)]\n#[robot({attribute})]\nstruct Arm;\n{uses}");
+        fs::write(package.join(format!("src/bin/{name}.rs")), main).unwrap();
+        fs::write(package.join(format!("robot/{name}.toml")), robot).unwrap();
+        fs::write(package.join(format!("robot/{name}_scene.toml")), scene).unwrap();
+        let output = Command::new(env!("CARGO"))
+            .args(["check", "--offline", "--quiet", "--bin", name, "--manifest-path"])
+            .arg(package.join("Cargo.toml"))
+            // that of the test beside this one, so that dependencies are compiled once
+            .env("CARGO_TARGET_DIR", package.parent().unwrap().join("rebuild/target"))
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).to_string();
+        let is_own = |line: &&str| {
+            line.starts_with("error")
+                && !line.starts_with("error: aborting")
+                && !line.starts_with("error: could not compile")
+        };
+        let errors = said.lines().filter(is_own).count();
+        let missing: Vec<&&str> = expected.iter().filter(|part| said.matches(**part).count() == 0).collect();
+        if errors != expected.len() || !missing.is_empty() {
+            wrong +=
+                &format!("--- {name}: {errors} errors instead of {}, without {missing:?}\n{said}\n", expected.len());
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+}
+
+/// A module by the other macro.
+#[test]
+fn a_module_of_a_broken_robot_is_one_error_too() {
+    let package = package();
+    let main = "straightline::dynamics! {\n    pub mod arm = \"robot/none.toml\", functions(mass_matrix), generic,\n}\n\
+                fn main() {\n    let mut h = [[0.0; arm::NV]; arm::NV];\n    arm::mass_matrix(&[0.1, 0.2, 0.3], &mut h);\n    \
+                arm::mass_matrix::<f64>(&[0.1, 0.2, 0.3], &mut h);\n    println!(\"{}\", h[0][0] + 1.0);\n}\n";
+    fs::write(package.join("src/bin/module.rs"), main).unwrap();
+    let output = Command::new(env!("CARGO"))
+        .args(["check", "--offline", "--quiet", "--bin", "module", "--manifest-path"])
+        .arg(package.join("Cargo.toml"))
+        .env("CARGO_TARGET_DIR", package.parent().unwrap().join("rebuild/target"))
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).to_string();
+    assert_eq!(said.matches("\nerror").count() + usize::from(said.starts_with("error")), 2, "{said}");
+    assert!(said.contains("there is no robot file `robot/none.toml`") && said.contains("could not compile"), "{said}");
+}
