@@ -84,8 +84,25 @@ fn every_example_runs() {
         said.lines().filter(|l| l.starts_with("0.5 ") || l.starts_with("1.5 ") || l.starts_with("2.5 ")).count(),
         3
     );
+    assert!(said.contains("  panda_joint1 [N·m]  panda_joint2 [N·m]"), "columns of a sweep have names: {said}");
     let page = fs::read_to_string(html).unwrap();
     assert!(page.contains("<svg") && page.contains("Peak torques over panda_link7.mass") && !page.contains("<script"));
+    assert!(page.contains("<th>peak panda_joint2 [N·m]</th>") && page.contains("prefers-color-scheme: dark"));
+    roxmltree::Document::parse_with_options(&page, roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() })
+        .expect("the page is well-formed XML");
+    // a card per joint, and numbers with units and four significant digits
+    assert_eq!(page.matches("<section class=\"card\">").count(), 7 + 1);
+    let cells: Vec<&str> = page.split("<td>").skip(1).filter_map(|cell| cell.split("</td>").next()).collect();
+    for cell in cells.iter().filter(|cell| cell.ends_with(" N·m") || cell.ends_with(" W")) {
+        let digits = cell.split(['e', ' ']).next().unwrap().chars().filter(char::is_ascii_digit).collect::<String>();
+        let significant = digits.trim_start_matches('0');
+        assert!(significant.len() == 4 || digits == "0" || significant.len() > 4, "{cell}");
+    }
+    // the axis of time ends where the motion ends
+    let duration = said.lines().find_map(|l| l.split(": ").nth(1)?.split(" s,").next()?.parse::<f64>().ok()).unwrap();
+    let end = straightline_simulation::html::four_digits(duration);
+    let end = end.trim_end_matches('0').trim_end_matches('.');
+    assert!(page.contains(&format!(">{end} s</text>")), "{duration}");
     let columns: serde_json::Value = serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
     assert_eq!(columns["t"].as_array().unwrap().len(), columns["moment.panda_joint7.z"].as_array().unwrap().len());
 }

@@ -13,6 +13,7 @@ pub mod drives;
 pub mod html;
 pub mod motion;
 pub mod optimize;
+pub mod panel;
 pub mod plant;
 pub mod plot;
 pub mod simulate;

@@ -74,13 +74,20 @@ impl Plot<'_> {
         let (low, high) = range(&mut [low, high].into_iter().chain(shown.iter().copied()));
         let margin = if high > low { 0.05 * (high - low) } else { low.abs().max(1.0) * 0.05 };
         let right = if right > left { right } else { left + 1.0 };
-        let end = if has_room { right + 0.2 * (right - left) } else { right };
-        let mut chart = ChartBuilder::on(area)
+        // names of the lines stand beside the axes, which end where the lines end
+        let (axes, names) = match has_room {
+            true => {
+                let (axes, names) = area.split_horizontally(82.percent_width());
+                (axes, Some(names))
+            }
+            false => (area.clone(), None),
+        };
+        let mut chart = ChartBuilder::on(&axes)
             .caption(self.title, ("sans-serif", 16))
             .margin(12)
             .x_label_area_size(36)
             .y_label_area_size(64)
-            .build_cartesian_2d(left..end, (low - margin)..(high + margin))?;
+            .build_cartesian_2d(left..right, (low - margin)..(high + margin))?;
         chart.configure_mesh().light_line_style(WHITE).x_desc(self.axes.0).y_desc(self.axes.1).draw()?;
         for level in shown {
             let style = RGBColor(120, 120, 120).stroke_width(1);
@@ -92,19 +99,46 @@ impl Plot<'_> {
             let last = line.points.len().saturating_sub(1);
             let kept = line.points.iter().enumerate().filter(|(i, _)| i % step == 0 || *i == last);
             let points = kept.map(|(_, p)| *p).filter(|(x, y)| x.is_finite() && y.is_finite());
-            chart
-                .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
-                .label(line.name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], colour.stroke_width(2)));
+            chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?;
         }
-        if self.lines.len() > 1 {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
-                .background_style(WHITE.mix(0.8))
-                .border_style(RGBColor(200, 200, 200))
-                .draw()?;
+        if let Some(names) = names.filter(|_| self.lines.len() > 1) {
+            let height = names.dim_in_pixel().1 as i32;
+            let step = ((height - 40) / self.lines.len() as i32).clamp(4, 18);
+            for (k, line) in self.lines.iter().enumerate() {
+                let y = 36 + step * k as i32;
+                let colour = Palette99::pick(k).to_rgba();
+                names.draw(&PathElement::new([(0, y), (16, y)], colour.stroke_width(2)))?;
+                names.draw(&Text::new(line.name, (22, y - 7), ("sans-serif", 13)))?;
+            }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The greatest x of the polylines of that width.
+    fn rightmost(svg: &str, width: u32) -> f64 {
+        let of_width = format!("stroke-width=\"{width}\"");
+        let lines = svg.lines().filter(|l| l.starts_with("<polyline") && l.contains(&of_width));
+        let points = lines.filter_map(|l| l.split("points=\"").nth(1)?.split('"').next());
+        let numbers = points.flat_map(|p| p.split(' ')).filter_map(|p| p.split(',').next()?.parse::<f64>().ok());
+        numbers.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    #[test]
+    fn axes_end_where_the_run_ends_and_names_stand_beside_them() {
+        let points = |slope: f64| (0..=100).map(|k| (f64::from(k) * 0.0137, slope * f64::from(k))).collect();
+        let lines = vec![Line { name: "elbow", points: points(1.0) }, Line { name: "wrist", points: points(-1.0) }];
+        let plot = Plot { title: "run", axes: ("t [s]", "rad"), lines, levels: Vec::new() };
+        let svg = plot.svg((900, 340)).unwrap();
+        let (axis, legend) = (rightmost(&svg, 1), rightmost(&svg, 2));
+        // the swatches of the names lie right of the axes, the lines do not
+        let line = svg.lines().find(|l| l.starts_with("<polyline") && l.matches(',').count() > 50).unwrap();
+        let end = rightmost(line, 2);
+        assert!((end - axis).abs() <= 1.0 && legend > axis + 10.0, "{end} {axis} {legend}");
+        assert!(svg.contains("elbow") && svg.contains("wrist"));
     }
 }

@@ -20,7 +20,8 @@ use std::fmt::Write;
 use straightline_core::model::{JointKind, Model};
 use straightline_core::Dd;
 
-const STYLE: &str = include_str!("page.css");
+/// The style of all pages.
+pub const STYLE: &str = include_str!("page.css");
 /// In a greater mass matrix single entries have no words.
 const ENTRIES_WITH_WORDS: usize = 60;
 

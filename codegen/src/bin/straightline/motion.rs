@@ -1,7 +1,7 @@
 //! The commands `simulate` and `analyze`.
 
 use crate::arguments::{Analyze, ModelArgs, Simulate};
-use crate::{contact, options, print, read, Failure};
+use crate::{contact, options, page, print, read, Failure};
 use anstream::stdout;
 use std::io::Write;
 use std::path::Path;
@@ -14,15 +14,14 @@ use straightline_codegen::experiment::design::Design;
 use straightline_codegen::experiment::{self, parameter, parquet, Experiment};
 use straightline_codegen::singular::{self, Inertia};
 use straightline_codegen::{model, output, scene};
-use straightline_core::drive::Actuator;
 use straightline_core::model::{Body, Model};
 use straightline_core::Dd;
 use straightline_simulation::analysis::{self, Analysis};
 use straightline_simulation::command::Command;
 use straightline_simulation::contact as in_contact;
-use straightline_simulation::drive_analysis::{torque_limits, DriveAnalysis, DriveFigures, Heating};
+use straightline_simulation::drive_analysis::{DriveAnalysis, DriveFigures, Heating};
 use straightline_simulation::drives::state_of_motion;
-use straightline_simulation::html::Page;
+use straightline_simulation::html::four_digits;
 use straightline_simulation::motion::Motion;
 use straightline_simulation::optimize::{self, Sampled};
 use straightline_simulation::plant::Plant;
@@ -73,7 +72,7 @@ impl analysis::Equations for At<'_> {
 fn robot(path: &Path, args: &ModelArgs, moved: bool) -> Result<(Description, Options, Model<f64>), Failure> {
     let options = options(None, args)?;
     let source = read(path)?;
-    let mut diagnostics = Diagnostics::new();
+    let mut diagnostics = Diagnostics::reporting(&options.reporting);
     let description = description::read(&source, &mut diagnostics);
     scene::check_options(&options, &mut diagnostics);
     let model = description.as_ref().and_then(|d| built_in_full(d, &options, &mut diagnostics));
@@ -268,7 +267,7 @@ pub fn analyze(a: &Analyze) -> Result<(), Failure> {
         Some(sweep) => swept(&description, &options, sweep, &motion, a.interval)?,
     };
     if let Some(path) = &a.html {
-        output::write_file(path, &page(a, &model, &found, &swept)?)?;
+        output::write_file(path, &page::page(a, &model, &motion, &found, &swept))?;
     }
     print_analysis(&model, &motion, &found)?;
     if let Some(sweep) = &a.sweep {
@@ -370,7 +369,7 @@ fn joined(found: &Analysis) -> Table {
 }
 
 /// One value of a sweep, with what it leads to.
-type Swept = (f64, Analysis);
+pub type Swept = (f64, Analysis);
 
 /// The motion of robots with other numbers, in parallel.
 fn swept(
@@ -471,7 +470,7 @@ fn drive_figures(drives: &DriveAnalysis) -> Vec<Vec<String>> {
 }
 
 /// What is to be said of drives beside their figures and limits.
-fn drive_remarks(model: &Model<f64>, found: &Analysis) -> Vec<String> {
+pub fn drive_remarks(model: &Model<f64>, found: &Analysis) -> Vec<String> {
     let Some(drives) = &found.drives else {
         return match model.drives.is_empty() {
             true => Vec::new(),
@@ -494,7 +493,7 @@ fn drive_remarks(model: &Model<f64>, found: &Analysis) -> Vec<String> {
     remarks
 }
 
-fn violations(found: &Analysis) -> Vec<String> {
+pub fn violations(found: &Analysis) -> Vec<String> {
     let line = |v: &analysis::Violation| {
         let analysis::Violation { time, joint, what, limit, worst } = v;
         format!("t = {time:.6} s: {what} of {joint} leaves {limit}, worst {worst:.6}")
@@ -535,110 +534,23 @@ fn print_analysis(model: &Model<f64>, motion: &Motion, found: &Analysis) -> Resu
 
 fn print_sweep(sweep: &parameter::Sweep, swept: &[Swept]) -> Result<(), Failure> {
     let mut out = stdout().lock();
-    writeln!(out, "\n{:<14}{:>14}{:>14}{:>12}  peaks", sweep.path, "given [J]", "taken [J]", "exceeded")?;
+    // every joint's peak under its name
+    let names: Vec<String> = swept
+        .first()
+        .map_or_else(Vec::new, |(_, found)| found.joints.iter().map(|j| format!("{} [{}]", j.name, j.unit)).collect());
+    let heads: String = names.iter().map(|name| format!("  {name:>12}")).collect();
+    let width = sweep.path.chars().count().max(14);
+    writeln!(out, "\n{:<width$}{:>14}{:>14}{:>12}  peaks:", "", "", "", "")?;
+    writeln!(out, "{:<width$}{:>14}{:>14}{:>12}{heads}", sweep.path, "given [J]", "taken [J]", "exceeded")?;
     for (value, found) in swept {
         let sum = |f: fn(&analysis::JointFigures) -> f64| found.joints.iter().map(f).sum::<f64>();
-        let peaks: Vec<String> = found.joints.iter().map(|j| format!("{:.3}", j.peak.0)).collect();
+        let peak = |(name, j): (&String, &analysis::JointFigures)| {
+            format!("  {:>1$}", four_digits(j.peak.0), name.chars().count().max(12))
+        };
+        let peaks: String = names.iter().zip(&found.joints).map(peak).collect();
         let (given, taken) = (sum(|j| j.given), sum(|j| j.taken));
         let exceeded = found.violations.len();
-        writeln!(out, "{value:<14}{given:>14.4}{taken:>14.4}{exceeded:>12}  {}", peaks.join(" "))?;
+        writeln!(out, "{value:<width$}{given:>14.4}{taken:>14.4}{exceeded:>12}{peaks}")?;
     }
     Ok(())
-}
-
-/// Inputs, currents, power and temperatures over time, and the torque of every motor against its speed with what its limits allow.
-fn drive_plots(page: &mut Page, model: &Model<f64>, drives: &DriveAnalysis) -> Result<(), Failure> {
-    page.heading("Drives over time");
-    for (prefix, title, unit) in [
-        ("u.", "inputs", "V"),
-        ("i.", "currents", "A"),
-        ("electrical.", "electrical power", "W"),
-        ("winding.", "temperatures of windings", "°C"),
-    ] {
-        if prefix == "winding." && drives.drives.iter().all(|d| d.heating.is_none()) {
-            continue;
-        }
-        let plot = Plot { title, axes: ("t [s]", unit), lines: lines(&drives.table, prefix), levels: Vec::new() };
-        page.figure(&drawn(&plot)?);
-    }
-    page.heading("Speed against torque of the motors, with what voltage and current allow");
-    for (drive, figures) in model.drives.iter().zip(&drives.drives) {
-        let Actuator::Motor(motor) = &drive.actuator else { continue };
-        let column = |prefix: &str| drives.table.column(&format!("{prefix}.{}", drive.name)).unwrap_or_default();
-        let torques = column("i").into_iter().map(|i| motor.torque_constant * i);
-        let mut lines = vec![Line { name: "motion", points: column("speed").into_iter().zip(torques).collect() }];
-        // limits far beyond what the motion takes would flatten it
-        let (reach, most) = (1.3 * figures.speed.max(1.0), 2.0 * motor.torque_constant * figures.current.0);
-        let allowed = |upper: bool| -> Vec<(f64, f64)> {
-            let at = |k: i32| {
-                let speed = reach * f64::from(k) / 100.0;
-                let (least, greatest) = torque_limits(drive, speed).unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-                (speed, if upper { greatest } else { least })
-            };
-            (-100..=100).map(at).filter(|(_, torque)| torque.abs() <= most).collect()
-        };
-        lines.push(Line { name: "greatest", points: allowed(true) });
-        lines.push(Line { name: "least", points: allowed(false) });
-        let continuous = drive.rating.continuous_current.map(|i| motor.torque_constant * i);
-        let levels = continuous.map_or_else(Vec::new, |torque| vec![-torque, torque]);
-        let plot = Plot { title: &drive.name, axes: ("rad/s", "N·m"), lines, levels };
-        page.figure(&drawn(&plot)?);
-    }
-    Ok(())
-}
-
-/// The page: figures, violations, plots over time, speed against torque, the sweep.
-fn page(a: &Analyze, model: &Model<f64>, found: &Analysis, swept: &[Swept]) -> Result<String, Failure> {
-    let file = |path: &Path| path.file_name().map(|n| n.to_string_lossy().to_string()).unwrap_or_default();
-    let mut page = Page::new(&format!("Analysis of {}", model.name), &format!("Motion: {}", file(&a.motion)));
-    page.heading("Joints");
-    page.table(&HEAD, &figures(found));
-    if let Some(drives) = &found.drives {
-        page.heading("Drives");
-        page.table(&DRIVE_HEAD, &drive_figures(drives));
-    }
-    for remark in drive_remarks(model, found) {
-        page.paragraph(&remark, false);
-    }
-    page.heading("Limits");
-    match violations(found) {
-        lines if lines.is_empty() => page.paragraph("The motion stays within all limits.", false),
-        lines => lines.iter().for_each(|line| page.paragraph(line, true)),
-    }
-    page.heading("Over time");
-    for (prefix, title, unit) in [
-        ("q.", "coordinates", "rad or m"),
-        ("qd.", "velocities", "rad/s or m/s"),
-        ("tau.", "torques", "N·m or N"),
-        ("power.", "power of the drives", "W"),
-    ] {
-        let plot = Plot { title, axes: ("t [s]", unit), lines: lines(&found.table, prefix), levels: Vec::new() };
-        page.figure(&drawn(&plot)?);
-    }
-    if let Some(drives) = &found.drives {
-        drive_plots(&mut page, model, drives)?;
-    }
-    page.heading("Speed against torque, with the limits of the torque");
-    for joint in model.bodies.iter().map(|b| &b.joint) {
-        let column = |prefix: &str| found.table.column(&format!("{prefix}.{}", joint.name)).unwrap_or_default();
-        let points = column("qd").into_iter().zip(column("tau")).collect();
-        let effort = joint.limits.effort;
-        let levels = if effort.is_finite() { vec![-effort, effort] } else { Vec::new() };
-        let lines = vec![Line { name: &joint.name, points }];
-        let plot = Plot { title: &joint.name, axes: ("rad/s or m/s", "N·m or N"), lines, levels };
-        page.figure(&drawn(&plot)?);
-    }
-    if let (Some(sweep), false) = (&a.sweep, swept.is_empty()) {
-        page.heading(&format!("Peak torques over {}", sweep.path));
-        let of = |(j, joint): (usize, &analysis::JointFigures)| (joint.name.clone(), j);
-        let joints: Vec<(String, usize)> = found.joints.iter().enumerate().map(of).collect();
-        let line = |(name, j): &(String, usize)| -> (String, Vec<(f64, f64)>) {
-            (name.clone(), swept.iter().map(|(value, found)| (*value, found.joints[*j].peak.0)).collect())
-        };
-        let named: Vec<(String, Vec<(f64, f64)>)> = joints.iter().map(line).collect();
-        let lines = named.iter().map(|(name, points)| Line { name, points: points.clone() }).collect();
-        let plot = Plot { title: "peak torques", axes: (&sweep.path, "N·m or N"), lines, levels: Vec::new() };
-        page.figure(&drawn(&plot)?);
-    }
-    Ok(page.finish())
 }
