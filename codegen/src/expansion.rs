@@ -234,7 +234,8 @@ pub fn associated_items(generated: &Generated) -> String {
         }
         let _ = writeln!(
             out,
-            "#[inline]\npub fn {name}{}({}) {{\n    dynamics::{name}({})\n}}",
+            "{}#[inline]\npub fn {name}{}({}) {{\n    dynamics::{name}({})\n}}",
+            item.function.alias_attribute(),
             if generated.plain_style.generic { "<T: ::straightline::Real>" } else { "" },
             signature.join(", "),
             arguments.join(", ")
@@ -287,6 +288,7 @@ limits = { lower = -1.0, upper = 1.0, velocity = 2.0, effort = 50.0 }
         let items = associated_items(&expansion.result.unwrap());
         assert!(items.contains("pub const EFFORT_LIMITS: [f64; 1] = dynamics::EFFORT_LIMITS;"), "{items}");
         assert!(items.contains("pub fn mass_matrix(q: &[f64; 1], h: &mut [[f64; 1]; 1]) {"), "{items}");
+        assert!(items.contains("#[doc(alias(\"CRBA\", "), "{items}");
     }
 
     #[test]

@@ -28,6 +28,15 @@ impl Function {
         ALIASES.iter().find(|(name, _)| *name == self.name()).map_or(&[], |(_, aliases)| aliases)
     }
 
+    /// The attribute by which documentation of generated code is found under those names; empty without.
+    pub(crate) fn alias_attribute(self) -> String {
+        let quoted: Vec<String> = self.aliases().iter().map(|alias| format!("{alias:?}")).collect();
+        match quoted.is_empty() {
+            true => String::new(),
+            false => format!("#[doc(alias({}))]\n", quoted.join(", ")),
+        }
+    }
+
     /// Whether its name, its summary or what it is called elsewhere has the word in it, in upper or lower case.
     pub fn is_about(self, word: &str) -> bool {
         let word = word.to_lowercase();
