@@ -1,7 +1,7 @@
 //! The pipeline, as one function.
 
 use crate::certify::companion::Bits;
-use crate::certify::{self, Effort};
+use crate::certify::{self, Effort, Known};
 use crate::choose::{self, choose, price};
 use crate::contact;
 use crate::description::messages;
@@ -734,12 +734,29 @@ fn certificates(robot: &Robot, programs: &[Program], options: &Options) -> Vec<O
             Err(refusal) => return Some(ErrorReport::refused(outputs, refusal)),
         };
         let ranges = certify::box_in_words(&p.graph.inputs, &inputs);
-        Some(match certify::certify(&p.graph, options.scalar, &inputs, effort) {
+        let known = match p.function {
+            Function::ForwardDynamics => known(robot, &p.graph, &inputs, options),
+            _ => Known::default(),
+        };
+        Some(match certify::certify_with(&p.graph, options.scalar, &inputs, effort, &known) {
             Ok(certificate) => ErrorReport::new(outputs, ranges, certificate),
             Err(refusal) => ErrorReport { ranges, ..ErrorReport::refused(outputs, refusal) },
         })
     };
     programs.iter().map(of).collect()
+}
+
+/// What mechanics knows of the values of forward dynamics: [`certify::pivots`].
+pub fn known(robot: &Robot, graph: &Graph, inputs: &[certify::Interval], options: &Options) -> Known {
+    if !certify::pivots::is_arm(&robot.model, graph) {
+        return Known::default();
+    }
+    let all = options.optimisations();
+    let plain = Optimisations { chosen: false, limbs: false, substitutes: false, ..all };
+    let of = |function| optimised(robot, &[], function, options, plain);
+    let (mass_matrix, torques) = (of(Function::MassMatrix), of(Function::InverseDynamics));
+    let sizes = certify::pivots::Sizes::of(&mass_matrix, &torques, &options.scene, &robot.model);
+    sizes.map_or_else(|_| Known::default(), |sizes| certify::pivots::known(&robot.model, graph, inputs, &sizes))
 }
 
 /// A program in f32 gets f64 where its budget allows that and its greatest error takes it.
@@ -808,12 +825,12 @@ pub(crate) fn error_bound_text(
     };
     let mut doc = match by_residual {
         false => format!(
-            "How far the results of [`{name}`] can be from the exact values by rounding, at these inputs: proven for this state, \
-             whatever the ranges of the inputs. NaN where nothing is proven: a divisor that may vanish, or a sign that may be wrong."
+            "How far the results of [`{name}`] can be from the exact values by rounding, at these inputs: certified for this state, \
+             whatever the ranges of the inputs. NaN where nothing is certified: a divisor that may vanish, or a sign that may be wrong."
         ),
         true => format!(
             "How far accelerations and reactions, from [`{name}`] or wherever else, can be from the exact ones at these inputs: \
-             proven from what they leave of the equations.\n\n`smallest_eigenvalue`: what the smallest eigenvalue of the mass matrix is \
+             certified by what they leave of the equations.\n\n`smallest_eigenvalue`: what the smallest eigenvalue of the mass matrix is \
              at least. Where rounding is too coarse for a proof, the results that depend on it are NaN: ask `is_nan()` before use."
         ),
     };

@@ -4,9 +4,11 @@ use super::format::Format;
 use super::forms::{Atom, Coefficient, Forms, Term};
 use super::interval::{add_up, mul_up, Interval};
 use super::norms::{Bounded, Factor, GroupId, Groups};
+use super::pivots::Known;
 use super::tape::{Bound, Norm, Pen, Range, Tape};
 use crate::emit::Scalar;
 use crate::expr::{Graph, NodeId, Op, Width};
+use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
 /// A graph that is being analysed in a format; what does not depend on the box is found once.
@@ -28,6 +30,10 @@ pub struct Analysis<'g> {
     /// Nodes that each result needs, users first.
     cones: Vec<(NodeId, Vec<u32>)>,
     state: State,
+    /// Per node, what is known of its exact value.
+    known: Vec<Option<Interval>>,
+    /// Of a result and a node, at most so much is the exact adjoint.
+    known_adjoints: FxHashMap<(u32, u32), f64>,
     /// A rule that is wrong on purpose: tests must notice.
     #[cfg(test)]
     pub(super) broken: Option<Broken>,
@@ -68,6 +74,8 @@ struct State {
     sin_cos: Vec<[(Range, Range); 2]>,
     /// Adjoints for the result at hand.
     adjoint: Vec<Range>,
+    /// How far they may be from those of the exact program; found where something is known of these.
+    adjoint_off: Vec<Bound>,
     seed: u32,
     /// Norms of groups, with the round in which they were found; the first is 1.
     norm: Vec<(u64, Bound)>,
@@ -147,6 +155,7 @@ impl<'g> Analysis<'g> {
             total_error: vec![Bound::ZERO; n],
             sin_cos: vec![[(Range::ZERO, Range::ZERO); 2]; n],
             adjoint: vec![Range::ZERO; n],
+            adjoint_off: vec![Bound::ZERO; n],
             ..State::default()
         };
         Analysis {
@@ -161,8 +170,23 @@ impl<'g> Analysis<'g> {
             sharing,
             cones,
             state,
+            known: Vec::new(),
+            known_adjoints: FxHashMap::default(),
             #[cfg(test)]
             broken: None,
+        }
+    }
+
+    /// What is known of exact values and adjoints, wherever it is known from.
+    pub(super) fn know(&mut self, known: &Known) {
+        self.known.resize(self.graph.ops.len(), None);
+        for (id, range) in &known.values {
+            let at = &mut self.known[id.index()];
+            *at = Some(at.map_or(*range, |before| before.intersect(*range)));
+        }
+        for (result, id, most) in &known.adjoints {
+            let at = self.known_adjoints.entry((result.0, id.0)).or_insert(*most);
+            *at = at.min(*most);
         }
     }
 
@@ -208,6 +232,12 @@ impl<'g> Analysis<'g> {
                 let computed = self.state.pen.widened(exact, self.state.total_error[i]);
                 range = self.state.pen.intersect(range, computed);
                 self.cancelled[i] = Some(form);
+            }
+            if let Some(Some(exact)) = self.known.get(i) {
+                let pen = &mut self.state.pen;
+                let exact = pen.constant(*exact);
+                let computed = pen.widened(exact, self.state.total_error[i]);
+                range = pen.intersect(range, computed);
             }
             if range.x.mag().is_nan() || range.x.mag() >= self.format.largest {
                 return Err(Refusal::Overflow);
@@ -637,10 +667,84 @@ impl<'g> Analysis<'g> {
                 let apart = self.enclosure(apart);
                 adjoint = self.state.pen.intersect(adjoint, apart);
             }
+            if !self.known_adjoints.is_empty() {
+                let off = self.adjoint_off(chain);
+                self.state.adjoint_off[n as usize] = off;
+                if let Some(most) = self.known_adjoints.get(&(result.0, n)) {
+                    let pen = &mut self.state.pen;
+                    let exact = pen.constant(Interval::around_zero(*most));
+                    let perturbed = pen.widened(exact, off);
+                    adjoint = pen.intersect(adjoint, perturbed);
+                }
+            }
             self.adjoint_sums[n as usize] = Some(sums);
             self.state.adjoint[n as usize] = adjoint;
         }
         self.cones[cone].1 = nodes;
+    }
+
+    /// How far an adjoint of the perturbed program may be from that of the exact one, from those of its users:
+    /// |c̃ ã − c a| ≤ |c̃| |ã − a| + |a| |c̃ − c|.
+    fn adjoint_off(&mut self, chain: &Bounded) -> Bound {
+        let mut sum = Bound::ZERO;
+        for t in &*chain.form {
+            let (Atom::Adjoint(_) | Atom::Seed(_)) = t.atom else { unreachable!("adjoints come from adjoints") };
+            let of_user = self.state.term(self.graph, &Term { coefficient: Coefficient::One, ..*t });
+            let alone = Term { coefficient: t.coefficient, atom: Atom::One, negative: false };
+            let coefficient = self.state.term(self.graph, &alone);
+            let coefficient_off = self.coefficient_off(t.coefficient);
+            let State { pen, adjoint_off, .. } = &mut self.state;
+            if let Atom::Adjoint(u) = t.atom {
+                let coefficient = pen.mag(coefficient);
+                let part = pen.mul_up(coefficient, adjoint_off[u as usize]);
+                sum = pen.add_up(sum, part);
+            }
+            let of_user = pen.mag(of_user);
+            let part = pen.mul_up(of_user, coefficient_off);
+            sum = pen.add_up(sum, part);
+        }
+        sum
+    }
+
+    /// How far a coefficient of the perturbed program may be from the exact one.
+    fn coefficient_off(&mut self, coefficient: Coefficient) -> Bound {
+        let kernel = self.format.trig_error(1.0);
+        let State { pen, value, total_error, .. } = &mut self.state;
+        let off = |n: u32| total_error[n as usize];
+        let reciprocal = |b: NodeId, pen: &mut Pen| {
+            let reciprocal = pen.over(Range::ONE, value[b.index()]);
+            pen.mag(reciprocal)
+        };
+        match coefficient {
+            Coefficient::One => Bound::ZERO,
+            Coefficient::Node(n) => off(n),
+            Coefficient::Sin(p) | Coefficient::Cos(p) => {
+                let kernel = pen.number(kernel);
+                pen.add_up(kernel, off(p))
+            }
+            Coefficient::ExactCos(p) | Coefficient::ExactMinusSin(p) => off(p),
+            // |1/b̃ − 1/b| = |b̃ − b|/|b̃ b|
+            Coefficient::Reciprocal(b) => {
+                let r = reciprocal(NodeId(b), pen);
+                let square = pen.mul_up(r, r);
+                pen.mul_up(square, off(b))
+            }
+            // |ã/b̃² − a/b²| ≤ |ã − a|/b̃² + |a| |b̃ − b| |b̃ + b|/(b̃ b)²
+            Coefficient::MinusQuotient(n) => {
+                let Op::Div(a, b) = self.graph.ops[n as usize] else { unreachable!("made for divisions") };
+                let r = reciprocal(b, pen);
+                let square = pen.mul_up(r, r);
+                let two = pen.number(2.0);
+                let size = pen.mag(value[a.index()]);
+                let shifted = pen.mul_up(two, size);
+                let shifted = pen.mul_up(shifted, r);
+                let shifted = pen.mul_up(shifted, off(b.0));
+                let sum = pen.add_up(off(a.0), shifted);
+                pen.mul_up(square, sum)
+            }
+            // nothing is known of programs with roots
+            Coefficient::HalfReciprocal(_) => pen.number(f64::INFINITY),
+        }
     }
 
     /// The range of a node's value, over the box of [`Analysis::ranges`].

@@ -1,10 +1,10 @@
-//! Bounds of rounding errors, as they stand in the generated file and in reports.
+//! Certified bounds of errors, as they stand in the generated file and in reports.
 
 use crate::certify::{Certificate, Refusal};
 use crate::expr::Port;
 use std::fmt::Write;
 
-/// Bounds of a function's rounding errors, or why there are none.
+/// Certified bounds of a function's errors, or why there are none.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "cli", derive(serde::Serialize))]
 pub struct ErrorReport {
@@ -63,13 +63,14 @@ impl ErrorReport {
     pub fn constants(&self, function: &str) -> String {
         let mut out = String::new();
         if let Some(refused) = self.refused {
-            let _ = writeln!(out, "// No bound of the rounding errors of {function}: {refused}.");
+            let _ = writeln!(out, "// No certified bound of the errors of {function}: {refused}.");
         }
         for output in &self.outputs {
             let name = self.constant_name(function, output);
             let _ = writeln!(
                 out,
-                "/// Bound of the rounding errors of [`{function}`]: how far `{}` can be from the exact values.",
+                "/// Certified bound of the errors of [`{function}`]: how far `{}` can be from the exact dynamics of the robot file.\n///\n\
+                 /// Numbers of the file are the nearest f64; angles that were taken as exact are exact.",
                 output.name
             );
             let _ = writeln!(out, "///\n/// It holds for all inputs in these ranges:");

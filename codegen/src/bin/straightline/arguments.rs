@@ -333,7 +333,7 @@ pub struct ProgramArgs {
     /// Functions take any scalar that is a `straightline::Real`; the output depends on the package `straightline`
     #[arg(long)]
     pub generic: bool,
-    /// Prove a bound of the rounding errors of every function, for the ranges of its inputs
+    /// Certify a bound of the errors of every function, for the ranges of its inputs
     #[arg(long)]
     certify: bool,
     /// The same with tighter bounds: the ranges of each result are cut into so many boxes
@@ -342,7 +342,7 @@ pub struct ProgramArgs {
     /// The same, for so long per function and scalar type \[s\]; --certify-boxes limits it further
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     certify_seconds: Option<f64>,
-    /// Beside every function `…_error_bound`, which bounds the rounding errors at the state at hand
+    /// Beside every function `…_error_bound`, which bounds the errors at the state at hand
     #[arg(long)]
     certify_state: bool,
     /// Of f32, compute in f64 what it takes for proven errors up to so much, in the results' units, and nothing else
