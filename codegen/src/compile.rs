@@ -14,6 +14,7 @@ use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::limbs::{self, LimbForm};
 use crate::model;
 use crate::pass::{count_sums, dead_code, order, substitute, sums, unread_inputs};
+use crate::readback::{self, ParameterProgram, Programs};
 use crate::report::budget::{self, Measures};
 use crate::report::errors::ErrorReport;
 use crate::report::waterfall::{self, Waterfall};
@@ -472,6 +473,8 @@ pub struct Generated {
     pub report: Report,
     /// What was assumed on the way.
     pub warnings: Diagnostics,
+    /// What its text is to compute: [`readback`] compares.
+    pub programs: Programs,
 }
 
 /// From the text of a robot file to the text of its dynamics. Where a scene skips something, the report says how much.
@@ -506,7 +509,7 @@ fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> R
         generated.text.push_str(&emit::scalar_module(scalar, &other.text));
         generated.others.push(other);
     }
-    Ok(generated)
+    readback::checked(generated)
 }
 
 /// What is wrong with the file or the options, without compiling: all that [`compile`] would say but what only the finished
@@ -631,6 +634,7 @@ fn generate(
     };
     let mut items = Vec::new();
     let mut functions = BTreeMap::new();
+    let mut written = Programs::default();
     for (program, waterfall, errors) in programs {
         let Program { function, graph, schedule, method, .. } = &program;
         let mut doc = function.doc(&graph.inputs, &options.scene);
@@ -649,7 +653,7 @@ fn generate(
                 equivalence::of_bound(&robot, options, function.name(), (graph, bound))?;
             }
             let by_residual = *function == Function::ForwardDynamics;
-            let bound = error_bound_text(bound, (function.name(), by_residual), graph, options);
+            let bound = error_bound_text(bound, (function.name(), by_residual), graph, options, &mut written.functions);
             text.text.push('\n');
             text.text.push_str(&bound.text);
             text.uses_sin_cos |= bound.uses_sin_cos;
@@ -663,12 +667,22 @@ fn generate(
             item.lanes = emit::batch::lanes(&item, (&graph, &schedule), options.style(), lanes, &title);
         }
         items.push(item);
+        written.functions.push(readback::Program {
+            name: function.name().to_string(),
+            graph,
+            scalar: options.scalar,
+            generic: options.generic,
+            lanes: options.lanes.is_some(),
+        });
     }
-    let (contact_text, contact, plainer) = crate::contact::module(&robot, options, &title)?;
+    let crate::contact::ContactModule { text: contact_text, reports: contact, plainer, programs: modes } =
+        crate::contact::module(&robot, options, &title)?;
+    written.modes = modes;
     plainer.iter().for_each(|p| warnings.push(p.warning(model)));
     let staged = options.scene.staged.then(|| staged(&robot, &frames, options, &title)).transpose()?;
     let (staged_text, staged_report) = match staged {
-        Some((text, report, plainer)) => {
+        Some((text, report, plainer, programs)) => {
+            written.staged = Some(programs);
             plainer.iter().for_each(|p| warnings.push(p.warning(model)));
             (text, Some(report))
         }
@@ -703,7 +717,7 @@ fn generate(
             || (staged_text.clone() + &contact_text).contains(&format!("&{name}"))
     };
     let generic = if options.generic { emit::GENERIC } else { "" };
-    let types = parameter_types(&robot, options, &takes) + &staged_text + &contact_text;
+    let types = parameter_types(&robot, options, &takes, &mut written.parameters) + &staged_text + &contact_text;
     let before = generic.to_string() + &types;
     let text = emit::file(model, &frames, &items, &report, &provenance, options.style(), &before, options.lanes);
     Ok(Generated {
@@ -720,6 +734,7 @@ fn generate(
         provenance,
         report,
         warnings,
+        programs: written,
     })
 }
 
@@ -814,6 +829,7 @@ pub(crate) fn error_bound_text(
     (name, by_residual): (&str, bool),
     graph: &Graph,
     options: &Options,
+    written: &mut Vec<readback::Program>,
 ) -> emit::FunctionText {
     let scalar = match graph.widths.is_empty() {
         true => options.scalar,
@@ -848,7 +864,10 @@ pub(crate) fn error_bound_text(
         doc.push_str(" In f64, of the function in f32: convert its inputs.");
     }
     let schedule = schedule(&bound, options.limits);
-    emit::function(&bound, &schedule, &format!("{name}_error_bound"), &doc, Style::plain(scalar), &|_| String::new())
+    let name = format!("{name}_error_bound");
+    let text = emit::function(&bound, &schedule, &name, &doc, Style::plain(scalar), &|_| String::new());
+    written.push(readback::Program { name, graph: bound, scalar, generic: false, lanes: false });
+    text
 }
 
 /// The program of a parameter's constructor: from mass \[kg\], mass centre \[m\] and inertia about it \[kg·m²\] (xx, xy, xz,
@@ -865,14 +884,21 @@ pub(crate) fn file_name(path: &str) -> &str {
 }
 
 /// The types of those run-time parameters that something takes, with what they share.
-fn parameter_types(robot: &Robot, options: &Options, takes: &dyn Fn(&Parameter) -> bool) -> String {
+fn parameter_types(
+    robot: &Robot,
+    options: &Options,
+    takes: &dyn Fn(&Parameter) -> bool,
+    written: &mut Vec<ParameterProgram>,
+) -> String {
     let parameters = options.scene.parameters.iter().filter(|p| p.body(&robot.model).is_some() && takes(p));
     let types = parameters.map(|p| {
         let graph = parameter_program(robot, p, options);
         let (schedule, name) = (schedule(&graph, options.limits), p.input_name());
         let doc = "The parameters about the origins, and in the axes, of the frames that the equations use.";
-        let constructor =
-            emit::function(&graph, &schedule, &format!("{name}_parameters"), doc, options.style(), &|_| String::new());
+        let private = format!("{name}_parameters");
+        let constructor = emit::function(&graph, &schedule, &private, doc, options.style(), &|_| String::new());
+        let program = readback::Program { name: private, graph, scalar: options.scalar, generic: false, lanes: false };
+        written.push(ParameterProgram { type_name: p.type_name(), program });
         emit::parameter::parameter(&name, &p.type_name(), p.frame(), LOAD_SCALARS, &constructor, options.scalar)
     });
     let types: String = types.collect();

@@ -24,6 +24,7 @@ pub mod model;
 pub mod output;
 pub mod pass;
 mod random;
+pub mod readback;
 pub mod reduce;
 #[cfg(feature = "verify")]
 pub mod reference_input;

@@ -11,6 +11,7 @@ use crate::equivalence::{self, Disagreement, Plainer};
 use crate::expr::{verify, Counts, Graph, Port, Section};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::pass::{dead_code, sums};
+use crate::readback::{self, StageProgram, StagedPrograms};
 use crate::scene::is_optional;
 use crate::schedule::schedule;
 use crate::stage::{cut, Staged};
@@ -187,7 +188,7 @@ fn chosen_robots(
     of.map(|f| choose(robot, frames, f, options, optimisations)).collect()
 }
 
-/// The module `staged` as text, and its figures.
+/// The module `staged` as text, its figures, what is plainer, and its programs.
 ///
 /// # Errors
 /// As [`programs`].
@@ -196,10 +197,32 @@ pub fn staged(
     frames: &[String],
     options: &Options,
     title: &dyn Fn(Section) -> String,
-) -> Result<(String, StagedReport, Option<Plainer>), Disagreement> {
+) -> Result<(String, StagedReport, Option<Plainer>, StagedPrograms), Disagreement> {
     let (programs, plainer) = programs(robot, frames, options)?;
     let Programs { functions, staged, stages, .. } = &programs;
-    Ok((text(functions, staged, stages, options, title), report(&programs), plainer))
+    let (text, report) = (text(functions, staged, stages, options, title), report(&programs));
+    Ok((text, report, plainer, programs.written(options.scalar)))
+}
+
+impl Programs {
+    /// What the module is to compute.
+    fn written(self, scalar: Scalar) -> StagedPrograms {
+        let storing = self.stages.len() - 1;
+        let program = |name: String, graph| readback::Program { name, graph, scalar, generic: false, lanes: false };
+        let stage = |(stage, graph): (&Stage, Graph)| StageProgram {
+            type_name: stage.type_name.to_string(),
+            values: stage.values.to_string(),
+            program: program(format!("{}_values", stage.values), graph),
+        };
+        let function = |(f, (own, graph)): (Function, (usize, Graph))| {
+            // what the last stage makes is called on the stage before it
+            (own.min(storing - 1), program(f.name().to_string(), graph))
+        };
+        StagedPrograms {
+            stages: self.stages[..storing].iter().zip(self.staged.stages).map(stage).collect(),
+            functions: self.functions.into_iter().zip(self.staged.functions).map(function).collect(),
+        }
+    }
 }
 
 /// The figures of the staged form alone.

@@ -24,7 +24,7 @@ use straightline_core::contact::Coordinate;
 use straightline_core::model::Model;
 use straightline_core::{Dd, Real};
 
-pub use text::module;
+pub use text::{module, ContactModule};
 
 /// A contact mode of a scene, its contacts looked up.
 #[derive(Clone, Debug)]

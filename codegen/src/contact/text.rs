@@ -9,12 +9,25 @@ use crate::equivalence::{self, Disagreement, Plainer};
 use crate::expr::{Graph, Port, Section};
 use crate::function::Robot;
 use crate::pass::dead_code;
+use crate::readback::{self, ModePrograms};
 use crate::report::ContactReport;
 use crate::scene::ContactFunction;
 use crate::schedule::schedule;
 use std::fmt::Write;
 
-/// The module of all modes, and the figures of their functions; nothing for a scene without contacts.
+/// The module of all modes.
+pub struct ContactModule {
+    /// Its text; empty for a scene without contacts.
+    pub text: String,
+    /// The figures of its functions.
+    pub reports: Vec<ContactReport>,
+    /// Functions that are computed more plainly than they were to be.
+    pub plainer: Vec<Plainer>,
+    /// What the text is to compute.
+    pub programs: Vec<ModePrograms>,
+}
+
+/// The module of all modes; nothing for a scene without contacts.
 ///
 /// # Errors
 /// A function whose programs all differ from its plain equations.
@@ -22,10 +35,11 @@ pub fn module(
     robot: &Robot,
     options: &Options,
     title: &dyn Fn(Section) -> String,
-) -> Result<(String, Vec<ContactReport>, Vec<Plainer>), Disagreement> {
+) -> Result<ContactModule, Disagreement> {
     let modes = Mode::all(&options.scene);
+    let mut written = Vec::new();
     if modes.is_empty() {
-        return Ok((String::new(), Vec::new(), Vec::new()));
+        return Ok(ContactModule { text: String::new(), reports: Vec::new(), plainer: Vec::new(), programs: written });
     }
     let mut inner = String::new();
     let mut reports = Vec::new();
@@ -39,6 +53,7 @@ pub fn module(
         constants(&mut text, mode);
         let mut kernel = false;
         let mut wrappers: Vec<String> = Vec::new();
+        let mut functions = Vec::new();
         for ModeProgram { function, graph, .. } in &programs {
             let counts = graph.counts();
             let doc = doc(*function, mode, &graph.inputs, &graph.outputs);
@@ -57,14 +72,23 @@ pub fn module(
                 if let Ok(bound) = &bound {
                     equivalence::of_bound(robot, options, function.name(), (graph, bound))?;
                 }
-                let bound = error_bound_text(bound, (function.name(), by_residual), graph, options);
+                let bound = error_bound_text(bound, (function.name(), by_residual), graph, options, &mut functions);
                 kernel |= bound.calls_kernel();
                 text.push('\n');
                 text.push_str(&bound.text);
             }
             wrappers.extend(graph.inputs.iter().filter_map(|p| p.wrapper.clone()));
             reports.push(ContactReport::new(&mode.identifier, function.name(), counts));
+            functions.push(readback::Program {
+                name: function.name().to_string(),
+                graph: graph.clone(),
+                scalar: options.scalar,
+                generic: false,
+                lanes: false,
+            });
         }
+        let coordinates = [mode.constrained_names(), mode.free_names()];
+        written.push(ModePrograms { identifier: mode.identifier.clone(), coordinates, functions });
         signatures.push(programs);
         wrappers.sort();
         wrappers.dedup();
@@ -87,7 +111,7 @@ pub fn module(
     );
     indent(&mut out, &inner);
     out.push_str("}\n");
-    Ok((out, reports, plainer))
+    Ok(ContactModule { text: out, reports, plainer, programs: written })
 }
 
 /// The program that bounds the errors of a contact function at the state at hand.

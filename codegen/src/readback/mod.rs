@@ -1,0 +1,418 @@
+//! Reads what was emitted back, and compares it with the programs that it was to be.
+//!
+//! The text is cut into words, its items are found, and every function is run over [`values`], where two values are the same if and only
+//! if the same operations on the same inputs make them. The programs are run there, too. So a text passes if and only if it has, for
+//! every result, the program's operations on the program's operands and constants, bit for bit, whatever its locals are called and
+//! wherever it is cut: a fused a·b + c counts as the product and the sum, and what a program does not compute no text may compute.
+//! Around the functions stands text that follows from their inputs and outputs (batches, stages, modes, parameters): it is written here
+//! a second time (`around.rs`), and compared word by word; what is the same in all files is known by its source or its checksum.
+//!
+//! Nothing of `emit` is used but its source files of the kernel. Whatever is not understood is refused, and so is what nothing asked for.
+
+mod around;
+mod items;
+mod run;
+mod tokens;
+mod values;
+
+use crate::compile::Generated;
+use crate::diagnostic::{Diagnostic, Diagnostics};
+use crate::emit::Scalar;
+use crate::expr::{Graph, Port};
+use around::Around;
+use items::{Extent, Items, Sort, Type};
+use run::{count_of, Run, Thing};
+use rustc_hash::FxHashMap;
+use std::fmt;
+use tokens::{Kind, Words};
+use values::{Format, Value, Values};
+
+/// A function that a text is to have.
+#[derive(Clone, Debug)]
+pub struct Program {
+    /// Its name.
+    pub name: String,
+    /// What it computes.
+    pub graph: Graph,
+    /// Its scalar type.
+    pub scalar: Scalar,
+    /// Whether it takes any scalar.
+    pub generic: bool,
+    /// Whether there is one over lanes beside it, in the file's scalar, and batches.
+    pub lanes: bool,
+}
+
+/// The type of a run-time parameter, and the program of its constructor.
+#[derive(Clone, Debug)]
+pub struct ParameterProgram {
+    /// The name of the type.
+    pub type_name: String,
+    /// The private function.
+    pub program: Program,
+}
+
+/// A stage: a type around stored values.
+#[derive(Clone, Debug)]
+pub struct StageProgram {
+    /// The name of the type.
+    pub type_name: String,
+    /// The name of its values where others take them.
+    pub values: String,
+    /// What it stores.
+    pub program: Program,
+}
+
+/// The programs of a staged form.
+#[derive(Clone, Debug)]
+pub struct StagedPrograms {
+    /// The stages that store something, the rarest first.
+    pub stages: Vec<StageProgram>,
+    /// The functions, each with the stage whose method it is.
+    pub functions: Vec<(usize, Program)>,
+}
+
+/// The programs of a contact mode.
+#[derive(Clone, Debug)]
+pub struct ModePrograms {
+    /// Its module.
+    pub identifier: String,
+    /// Its constrained and its free coordinates.
+    pub coordinates: [Vec<String>; 2],
+    /// Its functions.
+    pub functions: Vec<Program>,
+}
+
+/// All programs that a text is to have.
+#[derive(Clone, Debug, Default)]
+pub struct Programs {
+    /// The functions of the robot, and the bounds of their errors.
+    pub functions: Vec<Program>,
+    /// Run-time parameters.
+    pub parameters: Vec<ParameterProgram>,
+    /// The staged form.
+    pub staged: Option<StagedPrograms>,
+    /// Contact modes, in order.
+    pub modes: Vec<ModePrograms>,
+}
+
+/// Where a text is not what it was to be.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mismatch {
+    /// The function, if it is in one.
+    pub function: String,
+    /// The line, from 1.
+    pub line: usize,
+    /// What stands there.
+    pub text: String,
+    /// What is wrong.
+    pub what: String,
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Mismatch { function, line, text, what } = self;
+        write!(f, "line {line}, `{function}`: {what}: `{text}`")
+    }
+}
+
+/// Where reading ends, in bytes from the text's first, and why.
+#[derive(Clone, Debug)]
+struct Stop(Box<(usize, String)>);
+
+impl Stop {
+    fn at(at: usize, what: impl Into<String>) -> Stop {
+        Stop(Box::new((at, what.into())))
+    }
+}
+
+/// Checks a finished text against the programs that it was made of.
+///
+/// # Errors
+/// The first place where they disagree.
+pub fn check(generated: &Generated) -> Result<(), Mismatch> {
+    Reader::new(generated).check(&generated.text)
+}
+
+/// The text, or an internal error: what disagrees with its programs is no text for anybody.
+///
+/// # Errors
+/// The first place where they disagree, with a request to report it.
+pub fn checked(generated: Generated) -> Result<Generated, Diagnostics> {
+    match check(&generated) {
+        Ok(()) => Ok(generated),
+        Err(mismatch) => {
+            let mut diagnostics = Diagnostics::new();
+            diagnostics.push(complaint(&mismatch));
+            Err(diagnostics)
+        }
+    }
+}
+
+/// A mismatch as a complaint.
+pub fn complaint(mismatch: &Mismatch) -> Diagnostic {
+    let Mismatch { function, line, text, what } = mismatch;
+    Diagnostic::error(
+        "internal-error",
+        format!("the text of `{function}` that was about to be written is not the program that was compiled; nothing is written"),
+    )
+    .detail(format!("line {line} of the text: {what}: `{text}`"))
+    .help(
+        "this is an error of straightline, not of your files: please report it, with the robot file, the scene and the options",
+    )
+}
+
+/// A function of the text, and what it is to compute.
+struct Wanted<'g> {
+    path: Vec<u32>,
+    name: String,
+    word: u32,
+    inputs: &'g [Port],
+    outputs: &'g [Port],
+    given: Vec<Value>,
+    results: Vec<Value>,
+    format: Format,
+    lanes: bool,
+    public: bool,
+}
+
+/// What reads texts of the same programs.
+pub struct Reader<'g> {
+    generated: &'g Generated,
+    words: Words,
+    /// Per scalar type: its module, its values, its functions.
+    parts: Vec<Part<'g>>,
+}
+
+struct Part<'g> {
+    generated: &'g Generated,
+    module: Option<&'static str>,
+    values: Values,
+    wanted: Vec<Wanted<'g>>,
+}
+
+impl<'g> Reader<'g> {
+    /// For the text of this, or others in its place.
+    pub fn new(generated: &'g Generated) -> Reader<'g> {
+        let mut words = Words::new();
+        let mut parts = vec![Part::new(generated, None, &mut words)];
+        for other in &generated.others {
+            parts.push(Part::new(other, Some(other.scalar.module()), &mut words));
+        }
+        Reader { generated, words, parts }
+    }
+
+    /// Checks a text.
+    ///
+    /// # Errors
+    /// The first place where it is not what it was to be.
+    pub fn check(&mut self, text: &str) -> Result<(), Mismatch> {
+        let mut function = String::new();
+        self.read(text, &mut function).map_err(|Stop(stop)| {
+            let (at, what) = *stop;
+            let before = &text[..at.min(text.len())];
+            let start = before.rfind('\n').map_or(0, |k| k + 1);
+            let line = text[start..].lines().next().unwrap_or_default().trim();
+            let shown: String = line.chars().take(200).collect();
+            if function.is_empty() {
+                function = self.generated.report.robot.clone();
+            }
+            Mismatch { function, line: before.matches('\n').count() + 1, text: shown, what }
+        })
+    }
+
+    fn read(&mut self, text: &str, function: &mut String) -> Result<(), Stop> {
+        let items = Items::read(text, &mut self.words)?;
+        for part in &mut self.parts {
+            part.read(&items, &mut self.words, function)?;
+        }
+        function.clear();
+        match items.all.iter().find(|item| !item.claimed.get()) {
+            Some(item) => items.stop(item.start, "an item that nothing asked for"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl<'g> Part<'g> {
+    fn new(generated: &'g Generated, module: Option<&'static str>, words: &mut Words) -> Part<'g> {
+        let mut part = Part { generated, module, values: Values::default(), wanted: Vec::new() };
+        let programs = &generated.programs;
+        for program in &programs.functions {
+            part.want(&[], program, true, words);
+        }
+        for parameter in &programs.parameters {
+            part.want(&[], &parameter.program, false, words);
+        }
+        if let Some(staged) = &programs.staged {
+            let stages = staged.stages.iter().map(|s| &s.program);
+            for program in stages.chain(staged.functions.iter().map(|(_, program)| program)) {
+                part.want(&["staged"], program, false, words);
+            }
+        }
+        for mode in &programs.modes {
+            for program in &mode.functions {
+                part.want(&["contact", &mode.identifier], program, true, words);
+            }
+        }
+        part.values.close();
+        part
+    }
+
+    fn want(&mut self, path: &[&str], program: &'g Program, public: bool, words: &mut Words) {
+        let path: Vec<u32> = self.module.iter().chain(path).map(|m| words.number(m)).collect();
+        let format = if program.generic { Format::Any } else { Format::from(program.scalar) };
+        let wanted = self.wanted_in(program, format, words);
+        let (given, results) = (wanted.given.clone(), wanted.results.clone());
+        self.wanted.push(Wanted { path: path.clone(), public, ..wanted });
+        if !program.lanes {
+            return;
+        }
+        let of_lanes = Format::from(self.generated.scalar);
+        let wanted = match of_lanes == format {
+            true => Wanted { given, results, ..self.wanted_in_name(program, format) },
+            false => self.wanted_in(program, of_lanes, words),
+        };
+        let name = format!("{}_lanes", program.name);
+        self.wanted.push(Wanted { path, public, word: words.number(&name), name, lanes: true, ..wanted });
+    }
+
+    fn wanted_in_name(&self, program: &'g Program, format: Format) -> Wanted<'g> {
+        let Graph { inputs, outputs, .. } = &program.graph;
+        Wanted {
+            path: Vec::new(),
+            name: program.name.clone(),
+            word: 0,
+            inputs,
+            outputs,
+            given: Vec::new(),
+            results: Vec::new(),
+            format,
+            lanes: false,
+            public: false,
+        }
+    }
+
+    /// The results of a program in a format.
+    fn wanted_in(&mut self, program: &'g Program, format: Format, words: &mut Words) -> Wanted<'g> {
+        let mut given = Vec::new();
+        for port in &program.graph.inputs {
+            let name = words.number(&port.name);
+            given.extend((0..port.len()).map(|k| self.values.input(name, k, format)));
+        }
+        let results = self.values.results(&program.graph, &given, format);
+        let word = words.number(&program.name);
+        Wanted { word, given, results, ..self.wanted_in_name(program, format) }
+    }
+
+    /// Reads this part of a text.
+    fn read(&mut self, items: &Items, words: &mut Words, function: &mut String) -> Result<(), Stop> {
+        let nothing = |name: &str| Stop::at(items.text.len(), format!("`{name}` is missing"));
+        let root = match self.module {
+            Some(module) => items.inner(0, words.number(module)).ok_or_else(|| nothing(module))?,
+            None => 0,
+        };
+        function.clear();
+        let around = Around { items, words, generated: self.generated, root };
+        let known = around.read()?;
+        let plain = Format::from(self.generated.scalar);
+        let mut signatures = FxHashMap::default();
+        for wanted in &self.wanted {
+            function.clone_from(&wanted.name);
+            let module = wanted
+                .path
+                .iter()
+                .skip(usize::from(self.module.is_some()))
+                .try_fold(root, |m, name| items.inner(m, *name));
+            let module = module.ok_or_else(|| nothing(&wanted.name))?;
+            let item = items
+                .named
+                .get(&(module, Sort::Function, wanted.word))
+                .copied()
+                .ok_or_else(|| nothing(&wanted.name))?;
+            // functions of bounds may be in another scalar than the file
+            let own = if wanted.format == Format::Any { plain } else { wanted.format };
+            self.values.forget();
+            let count = words.len();
+            let known = known.get(&module).copied().unwrap_or_default();
+            let mut run = Run::new(items, &mut self.values, &mut signatures, count, (module, known, own));
+            wanted.compare(&mut run, item, items, words)?;
+        }
+        Ok(())
+    }
+}
+
+impl Wanted<'_> {
+    /// Runs the function of the text, and compares its results.
+    fn compare(&self, run: &mut Run, item: usize, items: &Items, words: &mut Words) -> Result<(), Stop> {
+        let signature = run.signature(item)?;
+        let start = items.all[item].start;
+        if self.public && items.kind(start) != Kind::Word(tokens::PUB) {
+            return items.stop(start, "a function that nobody can call");
+        }
+        let generics: &[u32] = match (self.lanes, self.format) {
+            (true, _) => &[tokens::N],
+            (false, Format::Any) => &[tokens::T],
+            (false, _) => &[],
+        };
+        if signature.generics != generics {
+            return items.stop(start, "other generic parameters are expected");
+        }
+        let ports = || self.inputs.iter().map(|p| (p, false)).chain(self.outputs.iter().map(|p| (p, true)));
+        if signature.parameters.len() != ports().count() {
+            return items.stop(start, format!("{} parameters are expected", ports().count()));
+        }
+        let (mut arguments, mut results) = (Vec::new(), Vec::new());
+        let mut given = &self.given[..];
+        for ((port, is_output), parameter) in ports().zip(&signature.parameters) {
+            let named = words.number(&port.name) == parameter.name
+                || words.number(&format!("_{}", port.name)) == parameter.name;
+            if !named {
+                return items.stop(start, format!("the parameter `{}` is expected in its place", port.name));
+            }
+            let mut extents: Vec<Extent> = port.shape.iter().map(|n| Extent::Of(*n)).collect();
+            let of = match &port.wrapper {
+                Some(wrapper) => Type::Named(words.number(wrapper)),
+                None => {
+                    extents.extend(self.lanes.then_some(Extent::Lanes));
+                    Type::Array(extents.clone(), self.format)
+                }
+            };
+            if parameter.of != Type::To(is_output, Box::new(of)) {
+                return items.stop(start, format!("the parameter `{}` is to have another type", port.name));
+            }
+            let numbers = match is_output {
+                true => vec![Value::NONE; port.len()],
+                false => {
+                    let (own, rest) = given.split_at(port.len());
+                    given = rest;
+                    own.to_vec()
+                }
+            };
+            debug_assert!(count_of(&extents) == port.len(), "an array has room for its port");
+            let place = run.array(&extents, self.format, &numbers, is_output);
+            if is_output {
+                results.push((port, place));
+            }
+            arguments.push(match &port.wrapper {
+                Some(wrapper) => Thing::Wrapped(words.number(wrapper), place),
+                None => Thing::Place(place),
+            });
+        }
+        run.call(item, &arguments)?;
+        let mut wanted = self.results.iter();
+        for (port, place) in results {
+            let (numbers, written) = run.numbers(place);
+            for (k, ((found, wanted), token)) in numbers.iter().zip(&mut wanted).zip(written).enumerate() {
+                if found == wanted {
+                    continue;
+                }
+                let what = match *found {
+                    Value::NONE => format!("result {k} of `{}` is never put out", port.name),
+                    _ => format!("result {k} of `{}` is to be another value", port.name),
+                };
+                return items.stop(if *found == Value::NONE { start } else { *token as usize }, what);
+            }
+        }
+        Ok(())
+    }
+}

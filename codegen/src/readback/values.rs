@@ -1,0 +1,262 @@
+//! Values by what they are made of: two values have the same number if and only if the same operations on the same inputs make them.
+//!
+//! Signs stand beside the numbers, as a change of sign is exact: (−a)·b is −(a·b), a − b is a + (−b), bit for bit, and so may factors and
+//! terms of one operation change places. Nothing else is taken as equal: (a + b) + c is not a + (b + c).
+
+use crate::emit::Scalar;
+use crate::expr::{Graph, NodeId, Op, Width};
+use rustc_hash::FxHashMap;
+
+/// In which format a value is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Double precision.
+    F64,
+    /// Single precision.
+    F32,
+    /// That of the caller.
+    Any,
+}
+
+impl From<Scalar> for Format {
+    fn from(scalar: Scalar) -> Format {
+        match scalar {
+            Scalar::F64 => Format::F64,
+            Scalar::F32 => Format::F32,
+        }
+    }
+}
+
+/// A value and its sign.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Value(u32);
+
+impl Value {
+    /// No value.
+    pub const NONE: Value = Value(u32::MAX);
+
+    fn new(number: u32, negative: bool) -> Value {
+        Value(number << 1 | u32::from(negative))
+    }
+
+    fn number(self) -> u32 {
+        self.0 >> 1
+    }
+
+    fn is_negative(self) -> bool {
+        self.0 & 1 == 1
+    }
+
+    /// With the other sign.
+    pub fn negated(self) -> Value {
+        Value(self.0 ^ 1)
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+enum What {
+    Input,
+    Constant,
+    Long,
+    Add,
+    Mul,
+    Div,
+    Sqrt,
+    Sign,
+    Angle,
+    Sin,
+    Cos,
+    Widened,
+    Rounded,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+struct Key {
+    what: What,
+    format: u8,
+    a: u32,
+    b: u32,
+}
+
+/// All values that are known.
+#[derive(Clone, Debug, Default)]
+pub struct Values {
+    known: FxHashMap<Key, u32>,
+    formats: Vec<Format>,
+    /// How many of them the programs have: others are the text's alone.
+    wanted: usize,
+}
+
+impl Values {
+    fn get(&mut self, what: What, format: Format, a: u32, b: u32) -> u32 {
+        let key = Key { what, format: format as u8, a, b };
+        let next = self.formats.len() as u32;
+        let number = *self.known.entry(key).or_insert(next);
+        if number == next {
+            self.formats.push(format);
+        }
+        number
+    }
+
+    /// From here on values are the text's.
+    pub fn close(&mut self) {
+        self.wanted = self.formats.len();
+    }
+
+    /// Whether some program computes this.
+    pub fn is_wanted(&self, value: Value) -> bool {
+        (value.number() as usize) < self.wanted
+    }
+
+    /// Forgets what was not there when [`Values::close`] was called.
+    pub fn forget(&mut self) {
+        let wanted = self.wanted as u32;
+        if self.formats.len() > self.wanted {
+            self.known.retain(|_, number| *number < wanted);
+            self.formats.truncate(self.wanted);
+        }
+    }
+
+    /// The format of a value.
+    pub fn format(&self, value: Value) -> Format {
+        self.formats[value.number() as usize]
+    }
+
+    /// Scalar `index` of the input of that name.
+    pub fn input(&mut self, name: u32, index: usize, format: Format) -> Value {
+        Value::new(self.get(What::Input, format, name, index as u32), false)
+    }
+
+    /// A number.
+    pub fn constant(&mut self, x: f64, format: Format) -> Value {
+        let bits = x.abs().to_bits();
+        Value::new(self.get(What::Constant, format, (bits >> 32) as u32, bits as u32), x.is_sign_negative())
+    }
+
+    /// A number in two parts, of a caller's format.
+    pub fn long(&mut self, high: f64, low: f64) -> Value {
+        let negative = high < 0.0;
+        let [high, low] = if negative { [-high, -low] } else { [high, low] };
+        let [a, b] = [high + 0.0, low + 0.0].map(|x| self.constant(x, Format::F64).0);
+        Value::new(self.get(What::Long, Format::Any, a, b), negative)
+    }
+
+    /// a + b.
+    pub fn add(&mut self, a: Value, b: Value) -> Value {
+        let format = self.format(a);
+        Value::new(self.get(What::Add, format, a.min(b).0, a.max(b).0), false)
+    }
+
+    fn product(&mut self, what: What, a: Value, b: Value) -> Value {
+        let format = self.format(a);
+        Value::new(self.get(what, format, a.number(), b.number()), a.is_negative() != b.is_negative())
+    }
+
+    /// a · b.
+    pub fn mul(&mut self, a: Value, b: Value) -> Value {
+        let [first, second] = if a.number() <= b.number() { [a, b] } else { [b, a] };
+        self.product(What::Mul, first, second)
+    }
+
+    /// a / b.
+    pub fn div(&mut self, a: Value, b: Value) -> Value {
+        self.product(What::Div, a, b)
+    }
+
+    /// √a.
+    pub fn sqrt(&mut self, a: Value) -> Value {
+        let format = self.format(a);
+        Value::new(self.get(What::Sqrt, format, a.0, 0), false)
+    }
+
+    /// −1, 0 or 1.
+    pub fn sign(&mut self, a: Value) -> Value {
+        let format = self.format(a);
+        Value::new(self.get(What::Sign, format, a.0, 0), false)
+    }
+
+    /// An angle, the sum of these in this order: what sine and cosine take.
+    pub fn angle(&mut self, terms: impl IntoIterator<Item = Value>) -> Value {
+        let mut angle = Value::NONE;
+        for term in terms {
+            let format = self.format(term);
+            angle = Value::new(self.get(What::Angle, format, angle.0, term.0), false);
+        }
+        angle
+    }
+
+    /// Sine and cosine of an angle.
+    pub fn sin_cos(&mut self, angle: Value) -> (Value, Value) {
+        let format = self.format(angle);
+        let mut of = |what| Value::new(self.get(what, format, angle.0, 0), false);
+        (of(What::Sin), of(What::Cos))
+    }
+
+    /// In f64 what was in f32.
+    pub fn widened(&mut self, a: Value) -> Value {
+        Value::new(self.get(What::Widened, Format::F64, a.number(), 0), a.is_negative())
+    }
+
+    /// In f32 what was in f64.
+    pub fn rounded(&mut self, a: Value) -> Value {
+        Value::new(self.get(What::Rounded, Format::F32, a.number(), 0), a.is_negative())
+    }
+
+    /// The results of a graph for these inputs.
+    pub fn results(&mut self, graph: &Graph, inputs: &[Value], format: Format) -> Vec<Value> {
+        let mut values: Vec<Value> = Vec::with_capacity(graph.ops.len());
+        for (i, op) in graph.ops.iter().enumerate() {
+            let width = graph.widths.get(i).copied().unwrap_or_default();
+            let computed = if width == Width::Single { format } else { Format::F64 };
+            // an operand in the format in which the operation is computed
+            let operand = |id: NodeId, known: &mut Values| {
+                let value = values[id.index()];
+                match (known.format(value), computed) {
+                    (Format::F32, Format::F64) => known.widened(value),
+                    _ => value,
+                }
+            };
+            let value = match *op {
+                Op::Input(k) => inputs[k as usize],
+                Op::Constant(c) => match if width == Width::Double { Format::F64 } else { format } {
+                    Format::F64 => self.constant(c.value().to_f64(), Format::F64),
+                    Format::F32 => self.constant(f64::from(c.value().to_f32()), Format::F32),
+                    Format::Any => self.long(c.value().hi(), c.value().lo()),
+                },
+                Op::Neg(a) => operand(a, self).negated(),
+                Op::Add(a, b) => {
+                    let (a, b) = (operand(a, self), operand(b, self));
+                    self.add(a, b)
+                }
+                Op::Sub(a, b) => {
+                    let (a, b) = (operand(a, self), operand(b, self).negated());
+                    self.add(a, b)
+                }
+                Op::Mul(a, b) => {
+                    let (a, b) = (operand(a, self), operand(b, self));
+                    self.mul(a, b)
+                }
+                Op::Div(a, b) => {
+                    let (a, b) = (operand(a, self), operand(b, self));
+                    self.div(a, b)
+                }
+                Op::Sqrt(a) => {
+                    let a = operand(a, self);
+                    self.sqrt(a)
+                }
+                Op::Sign(a) => {
+                    let a = operand(a, self);
+                    self.sign(a)
+                }
+                // formed where its sine is
+                Op::AngleSum(..) => Value::NONE,
+                Op::SinCos(a) => self.angle(graph.angle_terms(a).into_iter().map(|term| values[term.index()])),
+                Op::Sin(a) => self.sin_cos(values[a.index()]).0,
+                Op::Cos(a) => self.sin_cos(values[a.index()]).1,
+            };
+            let is_operation = !matches!(op, Op::Input(_) | Op::Constant(_));
+            values.push(if width == Width::Rounded && is_operation { self.rounded(value) } else { value });
+        }
+        graph.results.iter().map(|r| values[r.index()]).collect()
+    }
+}
