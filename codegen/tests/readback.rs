@@ -276,13 +276,14 @@ fn words(text: &str) -> Vec<Range<usize>> {
             at += text[at..].find('\n').unwrap_or(text.len() - at);
             continue;
         } else if bytes[at].is_ascii_digit() {
-            let ends = |at: usize| !is_word(bytes[at]) && !(bytes[at] == b'.' && bytes[at + 1].is_ascii_digit());
-            let in_exponent = |at: usize| matches!(bytes[at], b'-' | b'+') && bytes[at - 1] == b'e';
+            let byte = |at: usize| bytes.get(at).copied().unwrap_or(b' ');
+            let ends = |at: usize| !is_word(byte(at)) && !(byte(at) == b'.' && byte(at + 1).is_ascii_digit());
+            let in_exponent = |at: usize| matches!(byte(at), b'-' | b'+') && byte(at - 1) == b'e';
             while !ends(at) || in_exponent(at) {
                 at += 1;
             }
         } else if is_word(bytes[at]) {
-            while is_word(bytes[at]) {
+            while at < bytes.len() && is_word(bytes[at]) {
                 at += 1;
             }
         } else if bytes[at] == b'"' {

@@ -519,6 +519,7 @@ impl Around<'_, '_, '_> {
             let above = |n: usize| (0..n).fold(item.module, |m, _| items.modules[m].parent);
             let text: String = (item.start..item.end).map(|at| items.text_of(at)).collect::<Vec<_>>().join(" ");
             let at_root = item.module == root;
+            let is_inner = !at_root && [above(1), above(2)].contains(&root);
             let (depth, trig_path) = match text.as_str() {
                 "use super : : trig ;" => (1, true),
                 "use super : : super : : trig ;" => (2, true),
@@ -537,7 +538,7 @@ impl Around<'_, '_, '_> {
                 && text == "pub use : : straightline : : batch ;"
                 && self.generated.lanes == Some(Lanes::Runtime)
             {
-            } else if !(above(1) == root || above(2) == root) || at_root || !self.is_of_parameters(item) {
+            } else if !is_inner || !self.is_of_parameters(item) {
                 continue;
             }
             item.claimed.set(true);
