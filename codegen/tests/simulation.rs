@@ -420,3 +420,189 @@ fn a_joint_that_feels_no_inertia_cannot_be_simulated() {
     let sound = format!("{text}armature = 0.01\n");
     succeeds(&["simulate", &write(&here, "sound.toml", &sound), "--input", &input]);
 }
+
+/// Every number of an experiment is of every size: what comes is a result of finite numbers, or an error that says what is wrong; never a
+/// panic, and all of it within a bounded number of steps.
+#[test]
+fn numbers_of_all_sizes_in_an_experiment_end_in_results_or_in_words() {
+    let here = scratch("sizes");
+    let robot = format!("{ROBOTS}/descriptions/planar_2r.toml");
+    let csv = here.join("run.csv").display().to_string();
+    // a motion, a controller and a simulation, a number of which is replaced
+    let plain: [(&str, &str); 13] = [
+        ("t", "0.2"),
+        ("q", "0.4"),
+        ("speed", "1.0"),
+        ("acceleration", "4.0"),
+        ("stiffness", "60.0"),
+        ("damping", "6.0"),
+        ("period", "0.01"),
+        ("start", "0.1"),
+        ("duration", "0.2"),
+        ("interval", "0.05"),
+        ("tolerance", "1e-6"),
+        ("coulomb_speed", "1e-3"),
+        ("max_steps", "2000"),
+    ];
+    let sizes = ["0.0", "-1.0", "nan", "inf", "1e300", "1e-300", "1e59", "1e-6"];
+    let (mut results, mut errors) = (0, 0);
+    for (key, _) in plain {
+        for size in sizes {
+            let of = |wanted: &str| {
+                if key == wanted {
+                    size
+                } else {
+                    plain.iter().find(|(key, _)| *key == wanted).unwrap().1
+                }
+            };
+            let kind = if ["speed", "acceleration"].contains(&key) { "trapezoidal" } else { "quintic" };
+            let time = |t: &str| if kind == "quintic" { format!("t = {t}\n") } else { String::new() };
+            let speeds = match kind {
+                "quintic" => String::new(),
+                _ => format!("speed = {}\nacceleration = {}\n", of("speed"), of("acceleration")),
+            };
+            let text = format!(
+                "[motion]\nkind = \"{kind}\"\n{speeds}[[motion.point]]\n{}q = [0.1, 0.1]\n[[motion.point]]\n{}q = [0.3, {}]\n\
+                 [controller]\ncompensation = \"gravity\"\nstiffness = {}\ndamping = {}\nperiod = {}\n\
+                 [start]\nq = [{}, 0.1]\n[simulation]\nduration = {}\ninterval = {}\ntolerance = {}\ncoulomb_speed = {}\n\
+                 max_steps = {}\nstop_at_limits = false\n",
+                time("0.0"),
+                time(of("t")),
+                of("q"),
+                of("stiffness"),
+                of("damping"),
+                of("period"),
+                of("start"),
+                of("duration"),
+                of("interval"),
+                of("tolerance"),
+                of("coulomb_speed"),
+                of("max_steps"),
+            );
+            let input = write(&here, "sizes.toml", &text);
+            let of_motion = ["t", "q", "speed", "acceleration"].contains(&key);
+            for (command, input_of) in [("simulate", "--input"), ("analyze", "--motion")] {
+                if command == "analyze" && !of_motion {
+                    continue;
+                }
+                let output = straightline(&[command, &robot, input_of, &input, "--output", &csv]);
+                let (said, wrong) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+                let table = fs::read_to_string(&csv).unwrap_or_default();
+                match output.status.code() {
+                    Some(0) => {
+                        results += 1;
+                        let numbers = table.lines().skip(1).flat_map(|l| l.split(','));
+                        let bad = numbers.filter(|x| !x.parse::<f64>().is_ok_and(f64::is_finite)).count();
+                        assert!(
+                            bad == 0 && !said.contains("NaN") && !said.contains("inf"),
+                            "{command}\n{text}\n{said}"
+                        );
+                    }
+                    Some(1) => {
+                        errors += 1;
+                        assert!(wrong.contains("error"), "{command}\n{text}\n{wrong}");
+                    }
+                    code => panic!("{command} ends with {code:?}\n{text}\n{wrong}"),
+                }
+                let _ = fs::remove_file(&csv);
+            }
+        }
+    }
+    println!("{results} results, {errors} errors");
+    assert!(results > 20 && errors > 40, "{results} results, {errors} errors");
+}
+
+#[test]
+fn what_does_not_end_says_so_and_what_helps() {
+    let here = scratch("endless");
+    let robot = format!("{ROBOTS}/descriptions/planar_2r.toml");
+    let simulated = |text: &str, more: &[&str]| {
+        let input = write(&here, "endless.toml", text);
+        fails(&[&["simulate", &robot, "--input", &input][..], more].concat())
+    };
+    let rows = simulated("[simulation]\nduration = 1e6\ninterval = 1e-6\n", &[]);
+    assert!(rows.contains("1.0e12 rows") && rows.contains("interval of "), "{rows}");
+    let stiff = "[motion]\nkind = \"quintic\"\n[[motion.point]]\nt = 0.0\nq = [0.1, 0.1]\n[[motion.point]]\nt = 9.0\nq = [0.3, 0.4]\n\
+        [controller]\nstiffness = 1e12\ndamping = 1e3\n";
+    let endless = simulated(stiff, &["--max-steps", "100000"]);
+    assert!(endless.contains("method = \"stiff\"") && endless.contains("--max-steps"), "{endless}");
+    let few = simulated("[simulation]\nduration = 2.0\nmax_steps = 300\n", &["--max-steps", "100"]);
+    assert!(few.contains("2.0e2 rows") && few.contains("at most 100 rows"), "{few}");
+    let far = simulated("[start]\nq = [1e8, 0.0]\n", &[]);
+    assert!(far.contains("angle-beyond-sines") && far.contains("joint1"), "{far}");
+}
+
+#[test]
+fn numbers_of_drives_are_swept_and_searched() {
+    let robot = format!("{ROBOTS}/descriptions/planar_2r.toml");
+    let scene = format!("{ROBOTS}/scenes/planar_2r_drives.toml");
+    let motion = format!("{ROBOTS}/experiments/planar_2r_drives.toml");
+    let analysed = |more: &[&str]| {
+        let arguments = ["analyze", &robot, "--scene", &scene, "--motion", &motion, "--interval", "0.02"];
+        straightline(&[&arguments[..], more].concat())
+    };
+    let said = |more: &[&str]| {
+        let output = analysed(more);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    // heat over the ratio, and how many limits are exceeded: light gears take current, heavy ones speed up the rotor
+    let heat = |values: &str| -> Vec<(f64, f64)> {
+        let path = format!("joint1.ratio={values}");
+        let said = said(&["--sweep", &path]);
+        let rows = said.lines().skip_while(|line| !line.starts_with("joint1.ratio")).skip(1);
+        let number = |row: &str, k: usize| row.split_whitespace().nth(k).unwrap().parse().unwrap();
+        rows.take(values.split(',').count()).map(|row| (number(row, 4), number(row, 5))).collect()
+    };
+    let swept = heat("20,156,1500");
+    assert!(swept[0].0 > 1.5 * swept[1].0 && swept[2].0 > 0.0, "{swept:?}");
+    let found = said(&["--optimize", "joint1.ratio=20:600", "--minimize", "heat"]);
+    let best: f64 = {
+        let line = found.lines().find(|line| line.trim_start().starts_with("joint1.ratio = ")).unwrap();
+        line.split_whitespace().nth(2).unwrap().parse().unwrap()
+    };
+    let near = heat(&format!("{best},{},{}", 0.9 * best, (1.1 * best).min(600.0)));
+    // what is beside it is hotter, or beyond a limit
+    assert!(near[1..].iter().all(|(heat, exceeded)| *heat >= near[0].0 * (1.0 - 1e-6) || *exceeded > 0.0), "{near:?}");
+    let taken = said(&["--optimize", "joint1.resistance=0.1:0.6", "--minimize", "electrical"]);
+    assert!(taken.contains("joint1.resistance = 0.1"), "{taken}");
+    // a number that the drive does not have, and one that it cannot have
+    for (path, words) in [
+        ("joint1.stiffness=1,2", "drive `joint1` has no value `stiffness`"),
+        ("joint1.resistance=-1,2", "not positive"),
+    ] {
+        let output = analysed(&["--sweep", path]);
+        let wrong = String::from_utf8_lossy(&output.stderr).to_string();
+        assert!(output.status.code() == Some(1) && wrong.contains(words), "{wrong}");
+    }
+    let output =
+        straightline(&["analyze", &robot, "--motion", &motion, "--optimize", "link1.mass=1:2", "--minimize", "heat"]);
+    assert_eq!(output.status.code(), Some(1));
+}
+
+#[test]
+fn an_analysis_says_what_would_keep_a_limit() {
+    let here = scratch("advice");
+    let robot = format!("{ROBOTS}/descriptions/planar_2r.toml");
+    let scene = format!("{ROBOTS}/scenes/planar_2r_drives.toml");
+    let of = |duration: f64| {
+        let text = format!(
+            "[motion]\nkind = \"smooth\"\n[[motion.point]]\nt = 0.0\nq = [0.0, 0.0]\n[[motion.point]]\nt = {duration}\nq = [1.6, -1.2]\n"
+        );
+        let motion = write(&here, "fast.toml", &text);
+        succeeds(&["analyze", &robot, "--scene", &scene, "--motion", &motion])
+    };
+    let said = of(0.4);
+    // of all that is exceeded, what asks for most time
+    let of_line = |line: &str| -> Option<(f64, String)> {
+        let times = line.split(" the motion ").nth(1)?.split_whitespace().next()?.parse().ok()?;
+        let limit = line.split(" s: ").nth(1)?.split(" leaves").next()?;
+        Some((times, format!("{limit} leaves")))
+    };
+    let advised = said.lines().filter(|line| line.contains("each by itself would keep it")).filter_map(of_line);
+    let (times, limit) = advised.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_else(|| panic!("{said}"));
+    assert!(times > 1.2 && !of(0.4 * times).contains(&limit), "{times} {limit}");
+    assert!(of(0.4 * (1.0 + 0.9 * (times - 1.0))).contains(&limit), "{times} {limit}");
+    // what is friction is said, and nothing else is called so
+    assert!(said.contains("friction in the joints takes ") && !said.contains("the rest is friction"), "{said}");
+}

@@ -2,6 +2,9 @@
 
 use crate::drive_analysis::{self, DriveAnalysis};
 use crate::motion::Motion;
+use crate::plant::{angle_beyond_sines, joint_friction};
+use crate::quadrature::integral;
+use crate::simulate::{Failure, MOST_NUMBERS};
 use crate::table::Table;
 use straightline_core::algorithms::{inverse_dynamics, joint_wrenches, kinetic_energy, potential_energy};
 use straightline_core::model::{Joint, JointKind, Model};
@@ -23,6 +26,21 @@ pub struct Analysis {
     pub drives: Option<DriveAnalysis>,
     /// Kinetic and potential energy at the end less that at the beginning \[J\].
     pub energy_change: f64,
+    /// What friction in the joints turns into heat \[J\].
+    pub friction: f64,
+}
+
+impl Analysis {
+    /// Energy that the drives give less what they take \[J\].
+    pub fn given(&self) -> f64 {
+        self.joints.iter().map(|j| j.given - j.taken).sum()
+    }
+
+    /// By how much the books are open \[J\]: what drives give, less the change of energy, less friction. It is the error of the integrals
+    /// over the instants, nothing else.
+    pub fn missing(&self) -> f64 {
+        self.given() - self.energy_change - self.friction
+    }
 }
 
 /// The figures of a joint over a motion.
@@ -96,14 +114,26 @@ pub fn states(motion: &Motion, interval: f64) -> Vec<(f64, [Vec<f64>; 3])> {
 }
 
 /// Analyses a motion of all joints at instants at most `interval` \[s\] apart, limits by root finding between them.
-pub fn analyze(model: &Model<f64>, motion: &Motion, interval: f64) -> Analysis {
+///
+/// # Errors
+/// Too many instants, angles beyond those whose sine has digits, or a number that is not finite.
+pub fn analyze(model: &Model<f64>, motion: &Motion, interval: f64) -> Result<Analysis, Failure> {
     analyze_by(model, model, motion, interval)
 }
 
 /// The same with torques and joint forces from elsewhere.
-pub fn analyze_by(model: &Model<f64>, equations: &dyn Equations, motion: &Motion, interval: f64) -> Analysis {
+///
+/// # Errors
+/// As [`analyze`].
+pub fn analyze_by(
+    model: &Model<f64>,
+    equations: &dyn Equations,
+    motion: &Motion,
+    interval: f64,
+) -> Result<Analysis, Failure> {
     let mut joints: Vec<&Joint> = model.bodies.iter().map(|b| &b.joint).collect();
     joints.sort_by_key(|j| j.iv);
+    check(motion, interval, 1 + 11 * joints.len() + 7 * model.drives.len())?;
     let instants = instants(motion, interval);
     let names = |prefixes: &[&str], ends: &[&str]| -> Vec<String> {
         let of = |p: &&str| joints.iter().flat_map(|j| ends.iter().map(|e| format!("{p}.{}{e}", j.name))).collect();
@@ -114,6 +144,10 @@ pub fn analyze_by(model: &Model<f64>, equations: &dyn Equations, motion: &Motion
     let mut wrenches = Table { names: names(&["force", "moment"], &[".x", ".y", ".z"]), rows: Vec::new() };
     for &(piece, t) in &instants {
         let (q, qd, qdd) = motion.in_piece(piece, t);
+        if let Some((joint, q)) = angle_beyond_sines(model, &q) {
+            let why = format!("joint `{joint}` is at {q} rad, where a sine has no digits left");
+            return Err(Failure::new(t, why));
+        }
         let tau = equations.torques(&q, &qd, &qdd);
         let power: Vec<f64> = tau.iter().zip(&qd).map(|(tau, qd)| tau * qd).collect();
         table.rows.push([&[t], &q[..], &qd, &qdd, &tau, &power].concat());
@@ -137,23 +171,40 @@ pub fn analyze_by(model: &Model<f64>, equations: &dyn Equations, motion: &Motion
         kinetic_energy(model, &q, &qd) + potential_energy(model, &q)
     };
     let energy_change = energy(motion.duration()) - energy(motion.times[0]);
-    Analysis { table, wrenches, joints: figures, violations, drives, energy_change }
+    let times: Vec<f64> = table.rows.iter().map(|row| row[0]).collect();
+    let friction = integral(&times, |k| joint_friction(model, &table.rows[k][1 + n..=2 * n]));
+    for table in [&table, &wrenches].into_iter().chain(drives.as_ref().map(|d| &d.table)) {
+        table.check().map_err(|(t, why)| Failure::new(t, why))?;
+    }
+    Ok(Analysis { table, wrenches, joints: figures, violations, drives, energy_change, friction })
 }
 
-/// Instants from knot to knot with the piece that they lie on, equally spaced; a knot between two pieces is in both.
+/// # Errors
+/// A motion that takes more instants than there is room for.
+fn check(motion: &Motion, interval: f64, columns: usize) -> Result<(), Failure> {
+    if !(interval.is_finite() && interval > 0.0) {
+        return Err(Failure::new(0.0, format!("the interval is {interval}, no positive number")));
+    }
+    let rows = (motion.duration() - motion.times[0]) / interval + 3.0 * motion.times.len() as f64;
+    let most = (MOST_NUMBERS / columns) as f64;
+    if rows > most {
+        let duration = motion.duration();
+        let why = format!("{duration} s with an instant every {interval} s are {rows:.1e} rows of {columns} numbers");
+        let help = format!("at most {most:.0} rows are possible: a greater --interval, or a shorter motion");
+        return Err(Failure::new(0.0, why).with_help(&help));
+    }
+    Ok(())
+}
+
+/// Instants from knot to knot with the piece that they lie on, equally spaced, odd in number; a knot between two pieces is in both.
 fn instants(motion: &Motion, interval: f64) -> Vec<(usize, f64)> {
     let piece = |(k, pair): (usize, &[f64])| {
         let (start, end) = (pair[0], pair[1]);
-        let steps = ((end - start) / interval).ceil().max(1.0) as usize;
+        let steps = 2 * (0.5 * (end - start) / interval).ceil().max(1.0) as usize;
         let at = move |i: usize| if i == steps { end } else { start + (end - start) * i as f64 / steps as f64 };
         (0..=steps).map(move |i| (k, at(i))).collect::<Vec<_>>()
     };
     motion.times.windows(2).enumerate().flat_map(piece).collect()
-}
-
-/// ∫ y dt by the trapezoidal rule, which is forgiving at corners.
-fn integral(times: &[f64], y: impl Fn(usize) -> f64) -> f64 {
-    (1..times.len()).map(|k| 0.5 * (times[k] - times[k - 1]) * (y(k) + y(k - 1))).sum()
 }
 
 fn figures(joint: &Joint, j: usize, n: usize, table: &Table, wrenches: &Table) -> JointFigures {

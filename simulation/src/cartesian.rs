@@ -9,6 +9,8 @@ use straightline_core::model::{Frame, Model};
 const ITERATIONS: usize = 100;
 /// So near \[m, rad\] a point counts as reached.
 const REACHED: f64 = 1e-10;
+/// Instants of a path, at most.
+const MOST_POINTS: usize = 200_000;
 /// Damping of the least squares \[m or rad\]: keeps steps finite near singular poses, and is small beside any reach.
 const DAMPING: f64 = 1e-6;
 
@@ -24,6 +26,8 @@ pub enum NoPath {
     },
     /// The points are no motion.
     Points(NoMotion),
+    /// It lasts too long \[s\].
+    TooLong(f64),
 }
 
 impl fmt::Display for NoPath {
@@ -33,6 +37,9 @@ impl fmt::Display for NoPath {
                 write!(f, "the frame does not reach its place at t = {time} s: it stays {distance:.3e} (m or rad) away")
             }
             NoPath::Points(why) => why.fmt(f),
+            NoPath::TooLong(time) => {
+                write!(f, "{time} s are too long for a path of a frame: the joints are solved for at {MOST_POINTS} instants at most")
+            }
         }
     }
 }
@@ -52,6 +59,9 @@ pub fn joint_motion(
     interval: f64,
 ) -> Result<Motion, NoPath> {
     let steps = (path.duration() / interval).ceil().max(4.0) as usize;
+    if steps > MOST_POINTS {
+        return Err(NoPath::TooLong(path.duration()));
+    }
     let orientation = forward_kinematics(model, start, &[frame])[0].rotation;
     let mut q = start.to_vec();
     let (mut times, mut points) = (Vec::new(), Vec::new());

@@ -10,6 +10,7 @@
 use crate::analysis::Violation;
 use crate::drives::{demands, further_derivatives, slack_state, without_dampers, Load};
 use crate::motion::Motion;
+use crate::quadrature::integral;
 use crate::table::Table;
 use straightline_core::algorithms::Demand;
 use straightline_core::drive::{Actuator, Drive, Thermal};
@@ -154,21 +155,12 @@ fn jump(motion: &Motion, order: usize) -> Option<Jump> {
         let time = motion.times[k];
         let [before, after] = [k - 1, k].map(|piece| motion.derivatives_in_piece(piece, time));
         (1..=order).find_map(|order| {
-            let size = |x: &[Vec<f64>]| x[order].iter().fold(0.0f64, |m, x| m.max(x.abs()));
-            // what the derivative amounts to on the pieces beside it
-            let reach = [(k - 1, motion.times[k - 1]), (k, motion.times[k + 1])]
-                .map(|(piece, t)| size(&motion.derivatives_in_piece(piece, t)))
-                .into_iter()
-                .fold(size(&before).max(size(&after)), f64::max);
-            let jumps = |c: usize| (before[order][c] - after[order][c]).abs() > 1e-9 * reach.max(1e-9);
+            // what the derivative amounts to within the pieces beside it: the rounding of a knot is that of their greatest terms
+            let reach = |c: usize| motion.greatest_terms(k - 1, order)[c].max(motion.greatest_terms(k, order)[c]);
+            let jumps = |c: usize| (before[order][c] - after[order][c]).abs() > 1e-9 * reach(c);
             (0..motion.coordinates()).find(|c| jumps(*c)).map(|coordinate| Jump { time, coordinate, order })
         })
     })
-}
-
-/// ∫ y dt by the trapezoidal rule, which is forgiving at corners.
-fn integral(times: &[f64], y: impl Fn(usize) -> f64) -> f64 {
-    (1..times.len()).map(|i| 0.5 * (times[i] - times[i - 1]) * (y(i) + y(i - 1))).sum()
 }
 
 fn figures(drive: &Drive<f64>, times: &[f64], rows: &[Vec<Instant>], k: usize, winding: &[f64]) -> DriveFigures {

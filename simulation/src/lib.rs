@@ -4,6 +4,7 @@
 //! files say, and where they are wrong, is the command line's business.
 #![forbid(unsafe_code)]
 
+pub mod advice;
 pub mod analysis;
 pub mod cartesian;
 pub mod command;
@@ -12,10 +13,11 @@ pub mod drive_analysis;
 pub mod drives;
 pub mod html;
 pub mod motion;
+mod ode;
 pub mod optimize;
 pub mod panel;
 pub mod plant;
 pub mod plot;
+mod quadrature;
 pub mod simulate;
-mod solver;
 pub mod table;

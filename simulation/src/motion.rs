@@ -32,6 +32,8 @@ pub enum NoMotion {
     NotFinite(usize),
     /// A speed or acceleration that is not positive: index of the joint.
     NoSpeed(usize),
+    /// Between this point and the next one numbers are beyond all measure: times too near, points too far, speeds too small or too great.
+    BeyondMeasure(usize),
 }
 
 impl fmt::Display for NoMotion {
@@ -43,6 +45,9 @@ impl fmt::Display for NoMotion {
             NoMotion::NotFinite(i) => write!(f, "point {}: a number is not finite", i + 1),
             NoMotion::NoSpeed(i) => {
                 write!(f, "joint {}: greatest speed and acceleration are to be positive and finite", i + 1)
+            }
+            NoMotion::BeyondMeasure(i) => {
+                write!(f, "from point {} on: the times, ways or speeds there are beyond all measure", i + 1)
             }
         }
     }
@@ -65,7 +70,7 @@ impl Motion {
             };
             (0..points[0].len()).map(joint).collect()
         });
-        Ok(Motion { times: times.to_vec(), pieces: pieces.collect() })
+        Motion { times: times.to_vec(), pieces: pieces.collect() }.checked()
     }
 
     /// From rest to rest through points at these times, q̈ zero at both ends and continuous, its rate continuous within pieces:
@@ -85,7 +90,7 @@ impl Motion {
                 (q, qd, qdd)
             })
             .collect();
-        Ok(Motion::hermite(times, &knots))
+        Motion::hermite(times, &knots).checked()
     }
 
     /// From rest to rest through points at these times, at rest in each, with four derivatives of q zero there: polynomials of degree 9,
@@ -107,7 +112,7 @@ impl Motion {
             };
             (0..points[0].len()).map(joint).collect()
         });
-        Ok(Motion { times: times.to_vec(), pieces: pieces.collect() })
+        Motion { times: times.to_vec(), pieces: pieces.collect() }.checked()
     }
 
     /// Through samples with their velocities and accelerations: quintic pieces, nothing is estimated.
@@ -117,7 +122,7 @@ impl Motion {
     pub fn sampled(times: &[f64], knots: &[(Vec<f64>, Vec<f64>, Vec<f64>)]) -> Result<Motion, NoMotion> {
         let rows: Vec<Vec<f64>> = knots.iter().map(|(q, qd, qdd)| [&q[..], qd, qdd].concat()).collect();
         check(times, &rows)?;
-        Ok(Motion::hermite(times, knots))
+        Motion::hermite(times, knots).checked()
     }
 
     fn hermite(times: &[f64], knots: &[(Vec<f64>, Vec<f64>, Vec<f64>)]) -> Motion {
@@ -144,7 +149,7 @@ impl Motion {
             return Err(NoMotion::NoSpeed(j));
         }
         let mut motion = Motion { times: vec![0.0], pieces: Vec::new() };
-        for pair in points.windows(2) {
+        for (k, pair) in points.windows(2).enumerate() {
             let way: Vec<f64> = (0..n).map(|j| pair[1][j] - pair[0][j]).collect();
             // of the path from 0 to 1, the greatest speed and acceleration that no joint minds
             let least = |limits: &[f64]| {
@@ -160,7 +165,14 @@ impl Motion {
             let (top, cruise) = (a * ramp, 1.0 / (a * ramp) - ramp);
             let phases = [(ramp, [0.0, 0.0, 0.5 * a]), (cruise, [0.5 * a * ramp * ramp, top, 0.0])];
             let brake = (ramp, [1.0 - 0.5 * a * ramp * ramp, top, -0.5 * a]);
-            for (time, [s, sd, half_sdd]) in phases.into_iter().chain([brake]).filter(|(time, _)| *time > 1e-12) {
+            // a cruise that is rounding is none
+            let whole = 2.0 * ramp + cruise;
+            if !whole.is_normal() || motion.duration() + ramp <= motion.duration() {
+                return Err(NoMotion::BeyondMeasure(k));
+            }
+            let before = motion.duration();
+            let lasts = |time: f64| time > 1e-12 * whole && before + time > before;
+            for (time, [s, sd, half_sdd]) in phases.into_iter().chain([brake]).filter(|(time, _)| lasts(*time)) {
                 let joint = |j: usize| polynomial([pair[0][j] + s * way[j], sd * way[j], half_sdd * way[j]]);
                 motion.pieces.push((0..n).map(joint).collect());
                 motion.times.push(motion.duration() + time);
@@ -171,7 +183,44 @@ impl Motion {
             motion.pieces.push(points[0].iter().map(|q| polynomial([*q])).collect());
             motion.times.push(1.0);
         }
-        Ok(motion)
+        motion.checked()
+    }
+
+    /// A motion whose numbers are all finite and whose times go on.
+    fn checked(self) -> Result<Motion, NoMotion> {
+        let fits = |k: usize| {
+            let (start, end) = (self.times[k], self.times[k + 1]);
+            let finite = |rates: Vec<Vec<f64>>| rates.iter().flatten().all(|x| x.is_finite());
+            end.is_finite()
+                && end > start
+                && finite(self.derivatives_in_piece(k, end))
+                && self.pieces[k].iter().flatten().all(|c| c.is_finite())
+        };
+        match (0..self.pieces.len()).find(|k| !fits(*k)) {
+            None => Ok(self),
+            Some(k) => Err(NoMotion::BeyondMeasure(k)),
+        }
+    }
+
+    /// Per coordinate the sum of the moduli of all terms of a derivative at the end of the piece from knot `k` on.
+    pub(crate) fn greatest_terms(&self, k: usize, order: usize) -> Vec<f64> {
+        let absolute = |c: &Polynomial| c.map(f64::abs);
+        let motion = Motion {
+            times: vec![0.0, self.times[k + 1] - self.times[k]],
+            pieces: vec![self.pieces[k].iter().map(absolute).collect()],
+        };
+        motion.derivatives_in_piece(0, motion.times[1]).swap_remove(order)
+    }
+
+    /// The same way in `factor` times the time.
+    #[must_use]
+    pub fn slowed(&self, factor: f64) -> Motion {
+        // cₙ xⁿ = cₙ/factorⁿ (factor x)ⁿ
+        let slower = |c: &Polynomial| std::array::from_fn(|n| c[n] / factor.powi(n as i32));
+        Motion {
+            times: self.times.iter().map(|t| t * factor).collect(),
+            pieces: self.pieces.iter().map(|piece| piece.iter().map(slower).collect()).collect(),
+        }
     }
 
     /// The time of its last knot \[s\].
@@ -361,6 +410,28 @@ mod tests {
         // the first way: 0.8 rad at 1 rad/s and 3 rad/s², 0.8/1 + 1/3 s
         close(&motion.at(0.8 + 1.0 / 3.0).0, &points()[1], 1e-14);
         assert_eq!(Motion::trapezoidal(&points(), &[1.0, f64::INFINITY], &[3.0, 4.0]), Err(NoMotion::NoSpeed(1)));
+    }
+
+    #[test]
+    fn what_is_beyond_measure_is_no_motion() {
+        let points = [vec![0.0], vec![1.0]];
+        for times in [[0.0, 1e-300], [-1e308, 1e308]] {
+            for motion in [Motion::cubic, Motion::quintic, Motion::smooth] {
+                assert_eq!(motion(&times, &points), Err(NoMotion::BeyondMeasure(0)), "{times:?}");
+            }
+        }
+        for [speed, acceleration] in [[1e-300, 1e-300], [1e-300, 1e300], [1e300, 1e300], [1e-200, 1.0]] {
+            let found = Motion::trapezoidal(&points, &[speed], &[acceleration]);
+            assert!(
+                found.as_ref().map_or_else(|e| *e == NoMotion::BeyondMeasure(0), |m| m.duration().is_normal()),
+                "{found:?}"
+            );
+        }
+        // fast is not the same as standing still
+        let fast = Motion::trapezoidal(&points, &[1e8], &[1e26]).expect("a motion");
+        close(&fast.at(fast.duration()).0, &[1.0], 1e-12);
+        assert!(fast.duration() < 1e-7);
+        assert_eq!(Motion::cubic(&[0.0, 1.0], &[vec![1e308], vec![-1e308]]), Err(NoMotion::BeyondMeasure(0)));
     }
 
     #[test]

@@ -6,6 +6,8 @@
 //! where it ended until that gains nothing. Both are of the library `argmin`.
 
 use crate::analysis::Analysis;
+use crate::drive_analysis::DriveFigures;
+use crate::quadrature;
 use argmin::core::{CostFunction, Error, Executor, Gradient, State};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::neldermead::NelderMead;
@@ -21,12 +23,26 @@ pub enum Objective {
     Rms,
     /// The greatest peak of all joints by its effort limit, or, without limits, by itself.
     Peak,
+    /// The energy that drives take from their supplies \[J\].
+    Electrical,
+    /// Joule heat in the drives' windings \[J\].
+    Heat,
 }
 
 impl Objective {
     /// Every one with its word.
-    pub const WORDS: [(&str, Objective); 3] =
-        [("energy", Objective::Energy), ("rms", Objective::Rms), ("peak", Objective::Peak)];
+    pub const WORDS: [(&str, Objective); 5] = [
+        ("energy", Objective::Energy),
+        ("rms", Objective::Rms),
+        ("peak", Objective::Peak),
+        ("electrical", Objective::Electrical),
+        ("heat", Objective::Heat),
+    ];
+
+    /// Whether it is one of drives, which takes their figures.
+    pub fn is_of_drives(self) -> bool {
+        matches!(self, Objective::Electrical | Objective::Heat)
+    }
 
     /// Its value for a motion; `efforts` are the joints' effort limits, infinite where there are none.
     pub fn of(self, found: &Analysis, efforts: &[f64]) -> f64 {
@@ -41,6 +57,8 @@ impl Objective {
                 };
                 joints.iter().zip(efforts).map(part).fold(0.0, f64::max)
             }
+            Objective::Electrical => of_drives(found, |d| d.energy.0),
+            Objective::Heat => of_drives(found, |d| d.joule),
         }
     }
 
@@ -50,6 +68,11 @@ impl Objective {
         let value = self.of(found, efforts);
         value + (1.0 + value) * PENALTY * found.violations.iter().map(beyond).sum::<f64>()
     }
+}
+
+/// A sum over all drives; infinite where there are no figures of any.
+fn of_drives(found: &Analysis, figure: impl Fn(&DriveFigures) -> f64) -> f64 {
+    found.drives.as_ref().map_or(f64::INFINITY, |drives| drives.drives.iter().map(figure).sum())
 }
 
 /// A motion at instants, with torques of all joints: what an objective is made of.
@@ -67,12 +90,13 @@ pub struct Sampled<'a> {
 
 impl Objective {
     /// [`with_limits`](Objective::with_limits), of limits those of effort, from samples, and its derivative by every τ. At a kink that of
-    /// one side.
+    /// one side. Of objectives of drives, which torques alone do not give, only what exceeded limits cost.
     pub fn with_slopes(self, s: Sampled) -> (f64, Vec<Vec<f64>>) {
         let (m, n) = (s.times.len(), s.efforts.len());
         let duration = s.times[m - 1] - s.times[0];
-        // of the trapezoidal rule
-        let weight = |k: usize| 0.5 * (s.times[(k + 1).min(m - 1)] - s.times[k.saturating_sub(1)]);
+        // of the integrals that an analysis forms
+        let weights = quadrature::weights(s.times);
+        let weight = |k: usize| weights[k];
         let mut slopes = vec![vec![0.0; n]; m];
         let samples = || (0..m).flat_map(|k| (0..n).map(move |j| (k, j)));
         let value = match self {
@@ -98,6 +122,7 @@ impl Objective {
                     part((k, j))
                 })
             }
+            Objective::Electrical | Objective::Heat => 0.0,
         };
         let mut beyond = 0.0;
         let mut of_limits = Vec::new();

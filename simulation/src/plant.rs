@@ -12,7 +12,8 @@ use straightline_core::algorithms::{
     potential_energy, DrivenMotion, Links,
 };
 use straightline_core::drive::Actuator;
-use straightline_core::model::{Coulomb, JointKind, Model};
+use straightline_core::model::{Coulomb, Joint, JointEffects, JointKind, Model};
+use straightline_core::trig::DOMAIN_F64;
 
 /// A robot that is simulated.
 #[derive(Clone, Debug)]
@@ -80,6 +81,38 @@ impl Plant {
             Method::Adaptive => Cow::Borrowed(self),
             Method::Stiff => Cow::Owned(self.clone().with_soft_limits()),
         }
+    }
+
+    /// What an entry of the state is, in words.
+    pub(crate) fn quantity(&self, i: usize) -> String {
+        let (nq, nv) = (self.model.nq(), self.model.nv());
+        let joint = |of: &dyn Fn(&Joint) -> std::ops::Range<usize>| {
+            let found = self.model.bodies.iter().map(|b| &b.joint).find(|j| of(j).contains(&i));
+            found.map_or(String::new(), |j| format!("joint `{}`", j.name))
+        };
+        if i < nq {
+            return format!("the position of {}", joint(&|j| j.iq..j.iq + if floats(j) { 7 } else { 1 }));
+        }
+        if i < nq + nv {
+            return format!("the velocity of {}", joint(&|j| nq + j.iv..nq + j.iv + if floats(j) { 6 } else { 1 }));
+        }
+        let mut rest = i - nq - nv;
+        for drive in &self.model.drives {
+            match rest < drive.states() {
+                true => return format!("state {} of drive `{}`", rest + 1, drive.name),
+                false => rest -= drive.states(),
+            }
+        }
+        "an energy".to_string()
+    }
+
+    /// What is wrong with a state, if anything: angles beyond those whose sine has digits.
+    pub(crate) fn objection(&self, state: &[f64]) -> Option<String> {
+        angle_beyond_sines(&self.model, state).map(|(joint, q)| {
+            format!(
+                "joint `{joint}` is at {q} rad: beyond {DOMAIN_F64} rad, two million turns, a sine has no digits left"
+            )
+        })
     }
 
     /// Number of states.
@@ -170,16 +203,7 @@ impl Plant {
 
     /// Power that friction turns into heat \[W\]: Σ (d q̇ + f(q̇)) q̇.
     pub fn losses(&self, qd: &[f64]) -> f64 {
-        let joints = self.model.bodies.iter().filter(|b| b.joint.kind != JointKind::Floating);
-        let loss = |(v, e): (f64, &straightline_core::model::JointEffects<f64>)| {
-            let coulomb = match e.coulomb {
-                Coulomb::Off => 0.0,
-                Coulomb::Sign(force) => force * v.abs(),
-                Coulomb::Smooth { force, speed } => force * v * v / (v * v + speed * speed).sqrt(),
-            };
-            e.damping * v * v + coulomb
-        };
-        joints.map(|b| loss((qd[b.joint.iv], &b.effects))).sum()
+        joint_friction(&self.model, qd)
     }
 
     /// The time derivative of the state.
@@ -236,6 +260,31 @@ impl Plant {
         let nq = self.model.nq();
         [&unit_quaternions(&self.model, &state[..nq]), &state[nq..]].concat()
     }
+}
+
+/// The first joint whose angle \[rad\] is beyond those whose sine has digits, and that angle.
+pub fn angle_beyond_sines<'a>(model: &'a Model<f64>, q: &[f64]) -> Option<(&'a str, f64)> {
+    let turning = model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind == JointKind::Revolute);
+    let mut angles = turning.map(|j| (j.name.as_str(), q[j.iq]));
+    angles.find(|(_, q)| q.is_nan() || q.abs() > DOMAIN_F64)
+}
+
+/// Power that friction in the joints turns into heat \[W\]: Σ (d q̇ + f(q̇)) q̇.
+pub(crate) fn joint_friction(model: &Model<f64>, qd: &[f64]) -> f64 {
+    let joints = model.bodies.iter().filter(|b| b.joint.kind != JointKind::Floating);
+    let loss = |(v, e): (f64, &JointEffects<f64>)| {
+        let coulomb = match e.coulomb {
+            Coulomb::Off => 0.0,
+            Coulomb::Sign(force) => force * v.abs(),
+            Coulomb::Smooth { force, speed } => force * v * v / (v * v + speed * speed).sqrt(),
+        };
+        e.damping * v * v + coulomb
+    };
+    joints.map(|b| loss((qd[b.joint.iv], &b.effects))).sum()
+}
+
+fn floats(joint: &Joint) -> bool {
+    joint.kind == JointKind::Floating
 }
 
 /// q with quaternions of length one.

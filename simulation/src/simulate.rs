@@ -1,22 +1,25 @@
 //! Simulation with adaptive steps: the motion that a command makes of a robot.
 //!
-//! The equations of [`Plant`] are integrated by an ODE library: an explicit method of order 8 with error control, or an implicit
-//! one of order 5 (Radau IIA) for stiff systems. Where the command is not smooth the integration begins anew, and a joint
-//! that reaches the end of its range is located as a root between steps.
+//! The equations of [`Plant`] are integrated by an explicit method of order 8 with error control, or an implicit one of order 5
+//! (Radau IIA) for stiff systems. Where the command is not smooth the integration begins anew, and a joint that reaches the end of its
+//! range is located as a root between steps. Every run ends: what would take too many steps or too much memory is refused, and no number of
+//! a result is anything but finite.
 
 use crate::command::Command;
 use crate::drives::DriveEnergies;
+use crate::ode::{solve, Equations, Pace, Step, Watch};
 use crate::plant::{Action, Plant};
-use crate::solver::{solve, Equations};
 use crate::table::Table;
-use differential_equations::prelude::*;
-use differential_equations::traits::State;
 use std::fmt;
+use std::ops::ControlFlow;
 use straightline_core::algorithms::{kinetic_energy, DrivenMotion};
 use straightline_core::model::{JointKind, Limits};
 
 /// Times that are no further apart, as a part of the duration, are the same up to rounding.
 pub(crate) const SAME: f64 = 1e-12;
+
+/// Numbers in the table of a result, at most.
+pub const MOST_NUMBERS: usize = 20_000_000;
 
 /// How steps are made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,6 +49,53 @@ pub struct Settings {
     pub method: Method,
     /// Whether it ends where a joint reaches the end of its range.
     pub stops_at_limits: bool,
+    /// Steps, rejected ones with them, that a simulation may take; where the end is not in sight, it is given up long before.
+    pub most_steps: usize,
+}
+
+impl Settings {
+    /// Rows every 10 ms, an error of 1e-9 per step, explicit steps, at most a million of them, an end at the joints' ranges.
+    pub const fn lasting(duration: f64) -> Settings {
+        Settings {
+            duration,
+            interval: 0.01,
+            tolerance: 1e-9,
+            method: Method::Adaptive,
+            stops_at_limits: true,
+            most_steps: 1_000_000,
+        }
+    }
+
+    /// # Errors
+    /// Numbers that no simulation has, or too many rows or steps.
+    pub(crate) fn check(&self, columns: usize, period: Option<f64>) -> Result<(), Failure> {
+        let numbers =
+            [("duration", Some(self.duration)), ("interval", Some(self.interval)), ("tolerance", Some(self.tolerance))];
+        for (what, number) in numbers.into_iter().chain([("period of the controller", period)]) {
+            if let Some(number) = number.filter(|x| !(x.is_finite() && *x > 0.0)) {
+                return Err(Failure::new(0.0, format!("the {what} is {number}, no positive number")));
+            }
+        }
+        let rows = (self.duration / self.interval).floor() + 2.0;
+        let most_rows = (MOST_NUMBERS / columns.max(1)).min(self.most_steps).max(2);
+        if rows > most_rows as f64 {
+            let (duration, interval) = (self.duration, self.interval);
+            let why = format!("{duration} s with a row every {interval} s are {rows:.1e} rows of {columns} numbers");
+            let least = duration / (most_rows as f64 - 2.0).max(1.0);
+            let help =
+                format!("at most {most_rows} rows are written: an interval of {least:.1e} s or more, or less time");
+            return Err(Failure::new(0.0, why).with_help(&help));
+        }
+        if let Some(count) = period.map(|p| self.duration / p).filter(|count| *count > self.most_steps as f64) {
+            let why = format!("the controller computes {count:.1e} times, and each time takes a step");
+            let help = format!(
+                "at most {} steps are made: a longer period, less time, or max_steps in [simulation]",
+                self.most_steps
+            );
+            return Err(Failure::new(0.0, why).with_help(&help));
+        }
+        Ok(())
+    }
 }
 
 /// What came out.
@@ -109,6 +159,25 @@ impl Run {
             evaluations: 0,
         }
     }
+
+    /// # Errors
+    /// A number of the row is not finite.
+    pub(crate) fn push(&mut self, row: Vec<f64>) -> Result<(), Failure> {
+        self.table.check_row(&row).map_err(|(t, why)| Failure::new(t, why))?;
+        self.table.rows.push(row);
+        Ok(())
+    }
+
+    /// # Errors
+    /// The energies are not finite.
+    pub(crate) fn end(self) -> Result<Run, Failure> {
+        let Balance { before, after, turnover, .. } = self.balance;
+        let t = self.table.rows.last().map_or(0.0, |row| row[0]);
+        match [before, after, turnover, self.balance.missing()].iter().all(|x| x.is_finite()) {
+            true => Ok(self),
+            false => Err(Failure::new(t, "the energy is not a finite number".to_string())),
+        }
+    }
 }
 
 impl Balance {
@@ -140,6 +209,19 @@ pub struct Failure {
     pub time: f64,
     /// What the solver says.
     pub why: String,
+    /// What may help.
+    pub help: Option<String>,
+}
+
+impl Failure {
+    pub(crate) fn new(time: f64, why: String) -> Failure {
+        Failure { time, why, help: None }
+    }
+
+    pub(crate) fn with_help(mut self, help: &str) -> Failure {
+        self.help = Some(help.to_string());
+        self
+    }
 }
 
 impl fmt::Display for Failure {
@@ -176,39 +258,38 @@ pub fn simulate_from(
     progress: &dyn Fn(f64),
 ) -> Result<Run, Failure> {
     let plant = &*plant.solved_by(settings.method);
-    let before = plant.stored(&state);
     let mut run = Run::beginning(names(plant, command));
     let period = command.period();
+    settings.check(run.table.names.len(), period)?;
+    check_start(plant, &state)?;
+    let pace = Pace::new(settings);
+    let before = plant.stored(&state);
     let wanted = rows(settings);
     let corners = pieces(command, period, settings.duration);
     let row = |t: f64, state: &[f64], held: Option<&Action>| row(plant, command, t, state, held);
-    run.table.rows.push(row(0.0, &state, None));
+    run.push(row(0.0, &state, None))?;
     for piece in corners.windows(2) {
         let (start, end) = (piece[0], piece[1]);
         let held = period.map(|_| command.action(plant, start, &state));
         let system = System { plant, command, held: held.as_ref(), progress };
         let mut times: Vec<f64> = wanted.iter().copied().filter(|t| *t > start && *t < end).collect();
         times.push(end);
-        let watch = Watch { plant, times: &times, next: 0, stops_at_limits: settings.stops_at_limits };
-        let solution = solve(&system, watch, (start, end), &state, settings)?;
-        for (t, y) in solution.t.iter().zip(&solution.y) {
-            let interrupted = *t < end && !times.contains(t);
-            if is_among(&wanted, *t, settings.duration) || interrupted {
-                run.table.rows.push(row(*t, y, held.as_ref()));
+        let stops_at_limits = settings.stops_at_limits;
+        let mut watch = Looks { plant, times: &times, next: 0, stops_at_limits, seen: Vec::new(), stop: None };
+        let solved = solve(&system, &mut watch, (start, end), &state, settings, &pace)?;
+        for (t, y) in watch.seen.iter().chain(&watch.stop) {
+            if is_among(&wanted, *t, settings.duration) || watch.stop.as_ref().is_some_and(|stop| stop.0 == *t) {
+                run.push(row(*t, y, held.as_ref()))?;
             }
         }
-        run.steps += solution.accepted;
-        run.evaluations += solution.evaluations;
-        if let (Some(y), Some(t)) = (solution.y.last(), solution.t.last()) {
-            if !y.iter().all(|x| x.is_finite()) {
-                return Err(Failure { time: *t, why: "a number is not finite".to_string() });
-            }
-            state = plant.normalised(y);
-            if solution.interrupted {
-                run.stop = Some(nearest_limit(plant, *t, y));
-                break;
-            }
+        run.steps += solved.accepted;
+        run.evaluations += solved.evaluations;
+        if let Some((t, y)) = watch.stop {
+            state = plant.normalised(&y);
+            run.stop = Some(nearest_limit(plant, t, &y));
+            break;
         }
+        state = plant.normalised(&solved.y);
     }
     let (q, qd, work, losses) = plant.split(&state);
     let after = plant.stored(&state);
@@ -218,7 +299,16 @@ pub fn simulate_from(
     let turnover = most - least;
     run.balance = Balance { before, after, work, losses, drives: plant.drive_energies(&state), turnover };
     (run.q, run.qd) = (q.to_vec(), qd.to_vec());
-    Ok(run)
+    run.end()
+}
+
+/// Whether the state at the beginning is one that can be gone on from.
+pub(crate) fn check_start(plant: &Plant, state: &[f64]) -> Result<(), Failure> {
+    let not_finite = plant.objection(state).or_else(|| {
+        let i = state.iter().position(|x| !x.is_finite())?;
+        Some(format!("{} is {}, not a finite number", plant.quantity(i), state[i]))
+    });
+    not_finite.map_or(Ok(()), |why| Err(Failure::new(0.0, why)))
 }
 
 /// The times of the rows of a result.
@@ -240,7 +330,7 @@ pub(crate) fn is_among(times: &[f64], t: f64, duration: f64) -> bool {
 /// The times between which everything is smooth, from zero to the end.
 pub(crate) fn pieces(command: &Command, period: Option<f64>, duration: f64) -> Vec<f64> {
     let mut times: Vec<f64> = match period {
-        Some(period) => (0..).map(|k| f64::from(k) * period).take_while(|t| *t < duration).collect(),
+        Some(period) => (0u64..).map(|k| k as f64 * period).take_while(|t| *t < duration).collect(),
         None => command.corners().into_iter().filter(|t| *t > 0.0 && *t < duration).collect(),
     };
     times.push(0.0);
@@ -332,10 +422,6 @@ struct System<'a> {
 }
 
 impl Equations for System<'_> {
-    fn states(&self) -> usize {
-        self.plant.states()
-    }
-
     fn rate(&self, t: f64, y: &[f64], rate: &mut [f64]) {
         (self.progress)(t);
         match self.held {
@@ -343,63 +429,59 @@ impl Equations for System<'_> {
             None => self.plant.rate(y, &self.command.action(self.plant, t, y), rate),
         }
     }
+
+    fn quantity(&self, i: usize) -> String {
+        self.plant.quantity(i)
+    }
+
+    fn objection(&self, y: &[f64]) -> Option<String> {
+        self.plant.objection(y)
+    }
 }
 
 /// Keeps the states at wanted times, and ends where a joint reaches the end of its range.
-struct Watch<'a> {
+struct Looks<'a> {
     plant: &'a Plant,
     times: &'a [f64],
     next: usize,
     stops_at_limits: bool,
+    /// The states at wanted times.
+    seen: Vec<(f64, Vec<f64>)>,
+    /// Where it ended.
+    stop: Option<(f64, Vec<f64>)>,
 }
 
-impl Watch<'_> {
-    fn distance(&self, y: &[f64]) -> f64 {
-        distance(self.plant, y)
-    }
-}
-
-impl<Y: State<f64> + AsRef<[f64]>> Solout<f64, Y> for Watch<'_> {
-    fn solout<I>(
-        &mut self,
-        t: f64,
-        t_before: f64,
-        y: &Y,
-        y_before: &Y,
-        interpolator: &mut I,
-        solution: &mut Solution<f64, Y>,
-    ) -> ControlFlag<f64, Y>
-    where
-        I: Interpolation<f64, Y> + ?Sized,
-    {
+impl Watch for Looks<'_> {
+    fn step(&mut self, step: &Step) -> ControlFlow<()> {
+        let Step { t_before, t, y_before, y, within } = *step;
         let mut end = t;
-        let leaves = self.stops_at_limits && self.distance(y_before.as_ref()) > 0.0 && self.distance(y.as_ref()) <= 0.0;
+        let inside = |y: &[f64]| distance(self.plant, y) > 0.0;
+        let leaves = self.stops_at_limits && inside(y_before) && !inside(y);
         if leaves {
             // between steps by the method's own interpolation: bisection to the last bit of the time
-            let (mut within, mut beyond) = (t_before, t);
+            let (mut low, mut high) = (t_before, t);
             for _ in 0..60 {
-                let middle = 0.5 * (within + beyond);
-                match interpolator.interpolate(middle) {
-                    Ok(state) if self.distance(state.as_ref()) > 0.0 => within = middle,
-                    _ => beyond = middle,
+                let middle = 0.5 * (low + high);
+                match inside(&within(middle)) {
+                    true => low = middle,
+                    false => high = middle,
                 }
             }
-            end = beyond;
+            end = high;
         }
+        let at = |time: f64| if time == t { y.to_vec() } else { within(time) };
         while let Some(&wanted) = self.times.get(self.next).filter(|wanted| **wanted <= end) {
-            let state = if wanted == t { Ok(y.clone()) } else { interpolator.interpolate(wanted) };
-            if let Ok(state) = state {
-                solution.push(wanted, state);
-            }
+            self.seen.push((wanted, at(wanted)));
             self.next += 1;
         }
         if !leaves {
-            return ControlFlag::Continue;
+            return ControlFlow::Continue(());
         }
-        if let Ok(state) = interpolator.interpolate(end) {
-            solution.push(end, state);
+        if self.seen.last().is_some_and(|(time, _)| *time == end) {
+            self.seen.pop();
         }
-        ControlFlag::Terminate
+        self.stop = Some((end, at(end)));
+        ControlFlow::Break(())
     }
 }
 

@@ -18,6 +18,25 @@ impl Table {
         Some(self.rows.iter().map(|row| row[k]).collect())
     }
 
+    /// What is wrong with the first number that is not finite, and the time of its row.
+    ///
+    /// # Errors
+    /// There is one.
+    pub(crate) fn check(&self) -> Result<(), (f64, String)> {
+        self.rows.iter().try_for_each(|row| self.check_row(row))
+    }
+
+    /// The same of one row.
+    ///
+    /// # Errors
+    /// As [`check`](Table::check).
+    pub(crate) fn check_row(&self, row: &[f64]) -> Result<(), (f64, String)> {
+        match row.iter().position(|x| !x.is_finite()) {
+            None => Ok(()),
+            Some(k) => Err((row[0], format!("`{}` is {}, not a finite number", self.names[k], row[k]))),
+        }
+    }
+
     /// As CSV, RFC 4180: a header, then a row per line, numbers with all their digits.
     pub fn csv(&self) -> String {
         let quoted = |name: &String| match name.contains([',', '"', '\n', '\r']) {

@@ -73,7 +73,14 @@ fn floor(model: &Model<f64>) -> Touch {
 }
 
 fn settings(duration: f64) -> Settings {
-    Settings { duration, interval: 0.01, tolerance: 1e-11, method: Method::Adaptive, stops_at_limits: true }
+    Settings {
+        duration,
+        interval: 0.01,
+        tolerance: 1e-11,
+        method: Method::Adaptive,
+        stops_at_limits: true,
+        most_steps: 1_000_000,
+    }
 }
 
 fn run(model: Model<f64>, contacts: &Contacts, command: &Command, start: (&[f64], &[f64]), t: f64) -> ContactRun {

@@ -51,7 +51,14 @@ fn run(
     method: Method,
 ) -> ContactRun {
     let plant = Plant::new(model, 1e-3);
-    let settings = Settings { duration: t, interval: 0.01, tolerance: 1e-11, method, stops_at_limits: false };
+    let settings = Settings {
+        duration: t,
+        interval: 0.01,
+        tolerance: 1e-11,
+        method,
+        stops_at_limits: false,
+        most_steps: 1_000_000,
+    };
     simulate(&plant, &one(touch), command, start, &settings, &|_| ()).unwrap_or_else(|why| panic!("{why}"))
 }
 

@@ -6,6 +6,7 @@ use common::{arm, cart};
 use straightline_core::drive::{Actuator, Drive, Efficiency, LinearActuator, Motor, Rating, Rotor, Stage, Thermal};
 use straightline_core::model::{Coulomb, JointEffects, Model};
 use straightline_core::spatial::Vec3;
+use straightline_simulation::advice::{advise, Lever};
 use straightline_simulation::analysis::analyze;
 use straightline_simulation::command::{Command, Compensation, Controller, Samples};
 use straightline_simulation::drives::Inputs;
@@ -22,8 +23,14 @@ const MOTOR: Motor<f64> = Motor {
     inductance: Some(2e-3),
 };
 
-const SETTINGS: Settings =
-    Settings { duration: 1.0, interval: 0.02, tolerance: 1e-12, method: Method::Adaptive, stops_at_limits: false };
+const SETTINGS: Settings = Settings {
+    duration: 1.0,
+    interval: 0.02,
+    tolerance: 1e-12,
+    method: Method::Adaptive,
+    stops_at_limits: false,
+    most_steps: 1_000_000,
+};
 
 /// With its share of the joint, if it drives one.
 fn drive(name: &str, motor: Motor<f64>, joints: &[(usize, f64)]) -> Drive<f64> {
@@ -364,7 +371,7 @@ fn an_analysis_asks_of_a_spindle_what_the_closed_form_says() {
     };
     model.drives = vec![spindle];
     let motion = Motion::smooth(&[0.0, 1.0], &[vec![0.0], vec![0.25]]).expect("a motion");
-    let found = analyze(&model, &motion, 1e-3);
+    let found = analyze(&model, &motion, 1e-3).expect("it can be analysed");
     let drives = found.drives.expect("its inputs follow from the motion");
     let mass = 2.0 + MOTOR.rotor_inertia * n * n;
     let voltage = |t: f64| {
@@ -396,7 +403,12 @@ fn an_analysis_asks_of_a_spindle_what_the_closed_form_says() {
     assert_eq!(heating.limit_after.is_some(), heating.settled.0 > 30.0);
     assert!(drives.jump.is_none());
     let trapezoid = Motion::trapezoidal(&[vec![0.0], vec![0.25]], &[1.0], &[2.0]).expect("a motion");
-    let rough = analyze(&model, &trapezoid, 1e-2).drives.expect("drives").jump.expect("its acceleration jumps");
+    let rough = analyze(&model, &trapezoid, 1e-2)
+        .expect("it can be analysed")
+        .drives
+        .expect("drives")
+        .jump
+        .expect("its acceleration jumps");
     assert!(rough.order == 2 && rough.coordinate == 0 && rough.time > 0.0);
 }
 
@@ -417,7 +429,7 @@ fn a_winding_heats_as_the_closed_form_of_one_body_says() {
     spindle.rating.thermal = Some(thermal);
     model.drives = vec![spindle];
     let still = Motion::cubic(&[0.0, 100.0], &[vec![0.1], vec![0.1]]).expect("a motion");
-    let drives = analyze(&model, &still, 0.1).drives.expect("drives");
+    let drives = analyze(&model, &still, 0.1).expect("it can be analysed").drives.expect("drives");
     let current = 2.0 * 9.81 / (0.1 * 200.0);
     let rise = 2.0 * MOTOR.resistance * current * current;
     let column = drives.table.column("winding.spindle").expect("a column");
@@ -427,4 +439,73 @@ fn a_winding_heats_as_the_closed_form_of_one_body_says() {
     }
     let after = drives.drives[0].heating.and_then(|h| h.limit_after).expect("it gets too hot");
     assert!((after - -40.0 * (1.0 - 0.5 / rise).ln()).abs() < 1e-2, "{after}");
+}
+
+#[test]
+fn a_smooth_motion_through_a_point_does_not_jump() {
+    let model = each(|d| elastic(d, None));
+    let points = [vec![0.1, -0.6, 0.2], vec![0.45, 0.2, 0.25], vec![0.9, -0.2, -0.5]];
+    for times in [[0.0, 0.5, 1.0], [0.0, 0.37, 1.31], [0.0, 1e-2, 30.0]] {
+        let jump = |motion: Motion| analyze(&model, &motion, 0.1).expect("figures").drives.expect("drives").jump;
+        assert_eq!(jump(Motion::smooth(&times, &points).expect("a motion")), None, "{times:?}");
+        // of quintic splines the third derivative jumps, which springs would have to follow
+        let found = jump(Motion::quintic(&times, &points).expect("a motion")).expect("it jumps");
+        assert_eq!((found.order, found.time), (3, times[1]), "{times:?}");
+    }
+}
+
+/// Advice that is followed keeps the limit, and a little less of it does not.
+#[test]
+fn advice_that_is_followed_keeps_the_limit() {
+    let mut model = each(|d| {
+        d.input_limit = Some(14.0);
+        d.current_limit = Some(1.2);
+        d.rating = Rating {
+            speed: Some(90.0),
+            continuous_current: Some(0.8),
+            thermal: Some(Thermal {
+                winding_housing: 2.0,
+                housing_ambient: 5.0,
+                winding_time: 4.0,
+                housing_time: 100.0,
+                ambient: 20.0,
+                limit: Some(20.3),
+            }),
+        };
+    });
+    model.bodies[1].joint.limits.effort = 25.0;
+    model.bodies[2].joint.limits.velocity = 0.8;
+    let points = [vec![0.1, -1.2, 0.2], vec![1.2, 0.2, -0.9]];
+    let (motion, interval) = (Motion::quintic(&[0.0, 1.0], &points).expect("a motion"), 0.01);
+    let found = analyze(&model, &motion, interval).expect("figures");
+    let (mut kinds, mut levers) = (Vec::new(), Vec::new());
+    for violation in &found.violations {
+        let all = advise(&model, &motion, interval, violation);
+        kinds.push(violation.what);
+        for advice in &all {
+            println!("{} of {}: {advice}", violation.what, violation.joint);
+            let is_kept = |factor: f64| {
+                let (model, motion) = advice.lever.apply(factor, &model, &motion);
+                let found = analyze(&model, &motion, interval).expect("figures");
+                !found.violations.iter().any(|v| v.joint == violation.joint && v.what == violation.what)
+            };
+            assert!(is_kept(advice.factor), "{violation:?}: {advice}");
+            // three digits, and half a percent for the instants
+            let less = 1.0 + 0.97 * (advice.factor - 1.0);
+            assert!(!is_kept(less), "{violation:?}: {advice}: less would do");
+            let kind = match advice.lever {
+                Lever::Time => "time",
+                Lever::GearRatio(_) => "ratio",
+                Lever::MotorConstant(_) => "constant",
+                Lever::Mass(_) => "mass",
+            };
+            levers.push(kind);
+        }
+    }
+    for kind in ["effort", "speed", "voltage", "current", "motor speed", "rms current", "winding temperature"] {
+        assert!(kinds.contains(&kind), "no {kind} in {kinds:?}");
+    }
+    for lever in ["time", "ratio", "constant", "mass"] {
+        assert!(levers.contains(&lever), "no {lever} in {levers:?}");
+    }
 }

@@ -14,8 +14,14 @@ use straightline_simulation::optimize::{minimise, Objective};
 use straightline_simulation::plant::Plant;
 use straightline_simulation::simulate::{simulate, Method, Run, Settings};
 
-const SETTINGS: Settings =
-    Settings { duration: 1.0, interval: 0.02, tolerance: 1e-11, method: Method::Adaptive, stops_at_limits: true };
+const SETTINGS: Settings = Settings {
+    duration: 1.0,
+    interval: 0.02,
+    tolerance: 1e-11,
+    method: Method::Adaptive,
+    stops_at_limits: true,
+    most_steps: 1_000_000,
+};
 
 fn run(model: Model<f64>, command: &Command, q: &[f64], settings: &Settings) -> Run {
     let plant = Plant::new(model, 1e-3);
@@ -144,7 +150,7 @@ fn drives_give_what_becomes_energy_and_heat() {
     let model = arm();
     let motion = Motion::quintic(&[0.0, 0.6, 1.5], &[vec![0.0, -0.5, 0.3], vec![1.0, 0.4, -0.6], vec![0.2, 0.9, 0.1]]);
     let motion = motion.unwrap();
-    let found = analyze(&model, &motion, 1e-3);
+    let found = analyze(&model, &motion, 1e-3).expect("it can be analysed");
     let plant = Plant::new(model, 1e-3);
     let times: Vec<f64> = found.table.rows.iter().map(|r| r[0]).collect();
     let loss = |t: f64| plant.losses(&motion.at(t).1);
@@ -161,7 +167,7 @@ fn the_first_violation_is_found_where_it_is() {
     model.bodies[0].joint.limits = Limits { lower: -1.0, upper: 0.9, velocity: 1.2, effort: 7.5 };
     // a = 4 m/s² up to 2 m/s, and back to rest: F = 8 N from the beginning on
     let motion = Motion::trapezoidal(&[vec![0.0], vec![2.0]], &[2.0], &[4.0]).unwrap();
-    let found = analyze(&model, &motion, 0.013);
+    let found = analyze(&model, &motion, 0.013).expect("it can be analysed");
     let of = |what: &str| found.violations.iter().find(|v| v.what == what).unwrap_or_else(|| panic!("no {what}"));
     assert!((of("effort").time, of("effort").limit, of("effort").worst) == (0.0, 7.5, 8.0));
     assert!((of("speed").time - 0.3).abs() < 1e-9 && of("speed").worst == 2.0);
@@ -211,7 +217,7 @@ fn the_best_spring_is_the_one_that_swings_by_itself() {
         let mut model = cart();
         model.bodies[0].effects = JointEffects { stiffness: x[0], spring_rest: x[1], ..JointEffects::none() };
         model.bodies[0].joint.limits.effort = limit;
-        objective.with_limits(&analyze(&model, &motion, 0.01), &[limit])
+        objective.with_limits(&analyze(&model, &motion, 0.01).expect("it can be analysed"), &[limit])
     };
     let ranges = [(0.0, 200.0), (-0.5, 0.7)];
     for objective in [Objective::Rms, Objective::Peak, Objective::Energy] {
@@ -222,4 +228,51 @@ fn the_best_spring_is_the_one_that_swings_by_itself() {
     let best = minimise(|x| cost(Objective::Rms, &[x[0], 0.0], f64::INFINITY), &[(80.0, 200.0)]).unwrap();
     assert!((best.point[0] - 80.0).abs() < 1e-6, "{best:?}");
     assert!(cost(Objective::Rms, &[0.0, 0.0], 1.0) > 1e3);
+}
+
+#[test]
+fn the_books_of_an_analysis_are_open_by_the_error_of_its_integrals_alone() {
+    let points = [vec![0.0, -0.5, 0.3], vec![1.0, 0.4, -0.6], vec![0.2, 0.1, 0.9]];
+    for motion in [
+        Motion::quintic(&[0.0, 0.7, 1.5], &points).expect("a motion"),
+        Motion::trapezoidal(&points, &[2.0; 3], &[9.0; 3]).expect("a motion"),
+    ] {
+        let mut rough = arm();
+        rough.bodies.iter_mut().for_each(|b| b.effects.coulomb = Coulomb::Off);
+        let mut smooth = rough.clone();
+        smooth.bodies.iter_mut().for_each(|b| b.effects.damping = 0.0);
+        for (model, has_friction) in [(rough, true), (smooth, false)] {
+            let open = |interval: f64| analyze(&model, &motion, interval).expect("it can be analysed").missing();
+            let found = analyze(&model, &motion, 0.005).expect("it can be analysed");
+            assert_eq!(found.friction > 0.1, has_friction, "{}", found.friction);
+            assert_eq!(found.friction != 0.0, has_friction);
+            let turned: f64 = found.joints.iter().map(|j| j.given + j.taken).sum();
+            // Simpson's rule: order 4, where the trapezoidal rule left 1e-5 of it
+            assert!(found.missing().abs() < 1e-7 * turned, "{:e} of {turned}", found.missing());
+            assert!(open(0.04).abs() > 8.0 * open(0.02).abs(), "{:e} {:e}", open(0.04), open(0.02));
+        }
+    }
+}
+
+#[test]
+fn an_analysis_that_cannot_be_is_refused() {
+    let model = arm();
+    let of = |points: &[Vec<f64>], times: &[f64], interval: f64| {
+        let motion = Motion::quintic(times, points).expect("a motion");
+        analyze(&model, &motion, interval).err().map(|failure| failure.to_string())
+    };
+    let points = [vec![0.0; 3], vec![0.5; 3]];
+    let long = of(&points, &[0.0, 1e59], 0.005).expect("there is no room");
+    assert!(long.contains("rows"), "{long}");
+    let far = of(&[vec![0.0; 3], vec![0.0, 1e9, 0.0]], &[0.0, 1.0], 0.01).expect("no sine answers");
+    assert!(far.contains("to_upper") && far.contains("sine"), "{far}");
+    // torques of 1e320
+    let fast = of(&[vec![0.0; 3], vec![1.0; 3]], &[0.0, 1e-30], 0.01);
+    assert!(fast.is_none_or(|why| why.contains("finite")));
+    let mut heavy = arm();
+    heavy.bodies[2].inertia.mass = 1e308;
+    let motion = Motion::quintic(&[0.0, 1.0], &[vec![0.0; 3], vec![90.0; 3]]).expect("a motion");
+    let why = analyze(&heavy, &motion, 0.01).err().expect("torques are beyond all numbers").to_string();
+    assert!(why.contains("tau.") && why.contains("finite"), "{why}");
+    assert_eq!(of(&points, &[0.0, 1.0], 0.005), None);
 }

@@ -144,6 +144,57 @@ pub struct Stage {
     pub efficiency: Option<[f64; 2]>,
 }
 
+impl Drive {
+    /// Numbers of drives that can be set by name: of a drive of one joint `ratio`, of motors their keys (`friction` as `motor_friction`), of the
+    /// one elastic stage `stiffness` and `stage_damping`.
+    pub const NUMBERS: [&str; 9] = [
+        "ratio",
+        "torque_constant",
+        "emf_constant",
+        "resistance",
+        "inductance",
+        "rotor_inertia",
+        "motor_friction",
+        "stiffness",
+        "stage_damping",
+    ];
+
+    /// Sets one of [`NUMBERS`](Drive::NUMBERS); a voltage constant that is the torque constant remains it. `None` if the drive has no such
+    /// number.
+    ///
+    /// # Errors
+    /// What the number has to be.
+    pub fn set(&mut self, key: &str, value: f64) -> Option<Result<(), &'static str>> {
+        let (number, must) = match (key, &mut self.actuator) {
+            ("ratio", _) => match (&mut self.stages[..], &mut self.joints[..]) {
+                ([], [(_, ratio)]) => (ratio, Must::NotBeZero),
+                ([stage], [_]) => (&mut stage.ratio.value, Must::NotBeZero),
+                _ => return None,
+            },
+            ("stiffness", _) => (self.stages.iter_mut().find_map(|s| s.stiffness.as_mut())?, Must::BePositive),
+            ("stage_damping", _) => (self.stages.iter_mut().find_map(|s| s.damping.as_mut())?, Must::NotBeNegative),
+            (_, Actuator::Motor { torque_constant, emf_constant, resistance, inductance, rotor_inertia, friction }) => {
+                match key {
+                    "torque_constant" if emf_constant == torque_constant => {
+                        *emf_constant = value;
+                        (torque_constant, Must::BePositive)
+                    }
+                    "torque_constant" => (torque_constant, Must::BePositive),
+                    "emf_constant" => (emf_constant, Must::NotBeNegative),
+                    "resistance" => (resistance, Must::BePositive),
+                    "inductance" => (inductance.as_mut()?, Must::BePositive),
+                    "rotor_inertia" => (rotor_inertia, Must::BePositive),
+                    "motor_friction" => (friction, Must::NotBeNegative),
+                    _ => return None,
+                }
+            }
+            _ => return None,
+        };
+        *number = value;
+        Some(if must.holds(value) { Ok(()) } else { Err(must.words().0) })
+    }
+}
+
 /// Which numbers a key takes.
 #[derive(Clone, Copy)]
 enum Must {

@@ -109,6 +109,7 @@ pub const ALL: &[Code] = &[
     code("not-a-robot", Error, "XML, but not of a robot."),
     code("not-a-selection", Error, "Joints or frames of a function whose results are not by joints or frames."),
     code("not-finite", Error, "NaN, or a number beyond f64."),
+    code("angle-beyond-sines", Error, "An angle of an experiment that no sine answers for."),
     code("not-in-range", Error, "A number out of its range."),
     code("not-samples", Error, "A file that is no table of numbers."),
     code("not-supported-yet", Error, "Something that changes the dynamics and is not part of the equations."),

@@ -3,6 +3,7 @@
 
 use crate::description::messages::{cut, did_you_mean, list};
 use crate::diagnostic::Diagnostic;
+use straightline_core::trig::DOMAIN_F64;
 
 type D = Diagnostic;
 
@@ -99,6 +100,15 @@ pub fn not_in_range(what: &str, value: f64, range: &str) -> D {
     D::error("not-in-range", format!("{what}: {value:?} is not {range}"))
 }
 
+/// An angle that no sine answers for.
+pub fn angle_beyond_sines(joint: &str, angle: f64) -> D {
+    D::error(
+        "angle-beyond-sines",
+        format!("joint `{}`: {angle:?} rad are beyond those whose sine has digits", cut(joint)),
+    )
+    .help(format!("angles stay within ±{DOMAIN_F64} rad, two million turns; leave whole turns out"))
+}
+
 /// A controller that follows nothing.
 pub fn motion_missing() -> D {
     D::error("motion-missing", "the controller has no motion to follow").help("write a table [motion]")
@@ -131,7 +141,8 @@ pub fn no_limit(joint: &str, key: &str) -> D {
 pub fn unknown_parameter(path: &str, why: &str) -> D {
     D::error("unknown-parameter", format!("`{}`: {why}", cut(path))).help(
         "LINK.mass, or JOINT.damping, JOINT.friction, JOINT.rotor_inertia, JOINT.gear_ratio, JOINT.armature, \
-         JOINT.spring_stiffness, JOINT.spring_rest where the robot file has a value",
+         JOINT.spring_stiffness, JOINT.spring_rest, or DRIVE.ratio, DRIVE.torque_constant and other numbers of drives, \
+         where the robot file or the scene has a value",
     )
 }
 

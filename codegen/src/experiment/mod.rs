@@ -22,6 +22,7 @@ use straightline_simulation::cartesian::joint_motion;
 use straightline_simulation::command::{Command, Compensation, Controller, Samples};
 use straightline_simulation::drives::{further_derivatives, Inputs};
 use straightline_simulation::motion::{Motion, NoMotion};
+use straightline_simulation::plant::angle_beyond_sines;
 use straightline_simulation::simulate::{Method, Settings};
 use toml::de::DeValue;
 
@@ -47,8 +48,6 @@ pub struct Experiment {
 /// Where files that an experiment names are read from.
 pub type ReadFile<'a> = &'a dyn Fn(&str) -> Result<Source, String>;
 
-/// Of samples between rows of the result \[s\], unless the file says so.
-const INTERVAL: f64 = 0.01;
 /// Samples of a path in the world \[s\].
 const PATH_INTERVAL: f64 = 0.01;
 
@@ -111,10 +110,6 @@ fn zero(model: &Model<f64>) -> Vec<f64> {
     q
 }
 
-fn settings(duration: f64) -> Settings {
-    Settings { duration, interval: INTERVAL, tolerance: 1e-9, method: Method::Adaptive, stops_at_limits: true }
-}
-
 fn from_samples(
     source: &Source,
     model: &Model<f64>,
@@ -127,7 +122,7 @@ fn from_samples(
     if !are_torques {
         let motion = sampled_motion(&columns, model, &place, diagnostics)?;
         let (q, qd, _) = motion.at(motion.times[0]);
-        let settings = settings(motion.duration());
+        let settings = Settings::lasting(motion.duration());
         return Some(Experiment {
             motion: Some(motion),
             command: Command::Free,
@@ -140,7 +135,7 @@ fn from_samples(
     }
     let last = columns.get("t")?.last().copied().unwrap_or(0.0);
     let (command, qd) = (sampled_command(columns, model, &place, diagnostics)?, vec![0.0; model.nv()]);
-    Some(Experiment { motion: None, command, q, qd, x: None, settings: settings(last), coulomb_speed: 1e-3 })
+    Some(Experiment { motion: None, command, q, qd, x: None, settings: Settings::lasting(last), coulomb_speed: 1e-3 })
 }
 
 /// Torques over time: per joint a column `tau.JOINT` or `JOINT`; joints without one are free.
@@ -241,6 +236,10 @@ fn sampled_motion(
         (0..times.len()).map(|k| columns.iter().map(|column| column[k]).collect()).collect()
     };
     let all = |prefix: &str| names(model).into_iter().map(|j| column(prefix, j)).collect::<Option<Vec<_>>>();
+    if let Some((joint, angle)) = rows(&q).iter().find_map(|q| angle_beyond_sines(model, q)) {
+        diagnostics.push(say::angle_beyond_sines(joint, angle).at(place));
+        return None;
+    }
     let motion = match (all("qd"), all("qdd")) {
         (Some(qd), Some(qdd)) => {
             let knots = rows(&q).into_iter().zip(rows(&qd)).zip(rows(&qdd)).map(|((q, qd), qdd)| (q, qd, qdd));
@@ -269,7 +268,12 @@ fn from_toml(
         r.reader.check_keys(start, &["q", "qd", "x"]);
     }
     let of_start = |r: &mut ExperimentReader, key: &str, n: usize| {
-        start.as_ref().and_then(|start| r.numbers(start, key, n)).filter(|numbers| !numbers.is_empty())
+        let numbers =
+            start.as_ref().and_then(|start| r.numbers(start, key, n)).filter(|numbers| !numbers.is_empty())?;
+        if let (Some(start), "q") = (&start, key) {
+            r.angles(start, &numbers);
+        }
+        Some(numbers)
     };
     let q = of_start(&mut r, "q", model.nq());
     let qd = of_start(&mut r, "qd", model.nv());
@@ -311,15 +315,26 @@ fn from_toml(
         }
         _ => 1.0,
     };
-    let (mut settings, mut coulomb_speed) = (settings(last), 1e-3);
+    let (mut settings, mut coulomb_speed) = (Settings::lasting(last), 1e-3);
     if let Some(table) = table(&mut r, "simulation") {
-        let keys = ["duration", "interval", "tolerance", "method", "stop_at_limits", "coulomb_speed"];
+        let keys = ["duration", "interval", "tolerance", "method", "stop_at_limits", "coulomb_speed", "max_steps"];
         r.reader.check_keys(&table, &keys);
         settings.duration = r.number(&table, "duration", settings.duration, (1e-9, 1e6));
         settings.interval = r.number(&table, "interval", settings.interval, (1e-6, 1e6));
         settings.tolerance = r.number(&table, "tolerance", settings.tolerance, (1e-13, 0.1));
         coulomb_speed = r.number(&table, "coulomb_speed", coulomb_speed, (1e-9, 1e3));
         settings.method = r.reader.word_at(&table, "method", &Method::WORDS).map_or(settings.method, |m| m.value);
+        if let Some(most) = r.reader.real_at(&table, "max_steps", Range64::Finite) {
+            let whole = (1.0..=1e9).contains(&most.value) && most.value.fract() == 0.0;
+            match whole {
+                true => settings.most_steps = most.value as usize,
+                false => {
+                    let complaint =
+                        say::not_in_range(&table.what("max_steps"), most.value, "a whole number from 1 to 1e9");
+                    r.reader.diagnostics.push(complaint.at(&most.place));
+                }
+            }
+        }
         settings.stops_at_limits = r.reader.flag_at(&table, "stop_at_limits").is_none_or(|flag| flag.value);
     }
     let command = command?;
@@ -378,6 +393,13 @@ impl ExperimentReader<'_> {
                 Some(numbers)
             }
             _ => self.reader.real_at(table, key, Range64::Finite).map(|x| vec![x.value; n]).or(Some(Vec::new())),
+        }
+    }
+
+    /// Complains of angles beyond those whose sine has digits.
+    fn angles(&mut self, table: &Table, q: &[f64]) {
+        if let (Some((joint, angle)), Some((_, span))) = (angle_beyond_sines(self.model, q), table.get("q")) {
+            self.reader.complain(&span, say::angle_beyond_sines(joint, angle));
         }
     }
 
@@ -469,6 +491,9 @@ impl ExperimentReader<'_> {
                 Some(_) => self.reader.vector_at(&point, key).map(|xyz| xyz.value.to_vec()),
                 None => self.numbers(&point, key, n).filter(|numbers| !numbers.is_empty()),
             };
+            if let (None, Some(q)) = (frame, &numbers) {
+                self.angles(&point, q);
+            }
             if kind != 2 {
                 self.reader.require(&point, "t", "t = 1.0");
             }

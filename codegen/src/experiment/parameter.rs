@@ -1,6 +1,8 @@
-//! Numbers of a robot file that a sweep changes, by a path such as `forearm.mass` or `elbow.damping`.
+//! Numbers of a robot file, and of the drives of its scene, that a sweep changes, by a path such as `forearm.mass`, `elbow.damping` or
+//! `elbow_drive.ratio`.
 
 use super::messages as say;
+use crate::description::drives::Drive;
 use crate::description::{Description, Inertial, Joint, JointDrive, MassCentreLink, Notation, Value};
 use crate::diagnostic::Diagnostic;
 
@@ -91,6 +93,45 @@ pub fn with(description: &Description, path: &str, value: f64) -> Result<Descrip
         Some(()) => Ok(description),
         None => Err(wrong(format!("the robot file has no value `{key}` of `{owner}`"))),
     }
+}
+
+/// The robot file or the drives of a scene with another value of a parameter: [`with`], or a number of a drive ([`Drive::NUMBERS`]). Where a
+/// joint and a drive of one name both have it, it is the joint's.
+///
+/// # Errors
+/// Neither has such a parameter, or a drive cannot have that value.
+pub fn with_drives(
+    description: &Description,
+    of_scene: &[Drive],
+    path: &str,
+    value: f64,
+) -> Result<(Description, Vec<Drive>), Box<Diagnostic>> {
+    let complaint = match with(description, path, value) {
+        Ok(changed) => return Ok((changed, of_scene.to_vec())),
+        Err(complaint) => complaint,
+    };
+    let Some((owner, key)) = path.rsplit_once('.') else { return Err(complaint) };
+    let (mut changed, mut of_scene) = (description.clone(), of_scene.to_vec());
+    let mut drives = changed.drives.iter_mut().chain(&mut of_scene);
+    let Some(drive) = drives.find(|drive| drive.name.value == owner) else { return Err(complaint) };
+    match drive.set(key, value) {
+        Some(Ok(())) => Ok((changed, of_scene)),
+        Some(Err(be)) => Err(Box::new(say::not_in_range(path, value, be))),
+        None => {
+            let why = format!("drive `{owner}` has no value `{key}`");
+            let numbers = Drive::NUMBERS.join(", ");
+            Err(Box::new(
+                say::unknown_parameter(path, &why).help(format!("of drives: {numbers}, where they are written")),
+            ))
+        }
+    }
+}
+
+/// Whether a path names a number of a drive, and none of the robot's bodies and joints.
+pub fn is_of_drive(description: &Description, of_scene: &[Drive], path: &str) -> bool {
+    let Some((owner, _)) = path.rsplit_once('.') else { return false };
+    let drives = description.drives.iter().chain(of_scene);
+    with(description, path, 1.0).is_err() && drives.into_iter().any(|drive| drive.name.value == owner)
 }
 
 fn set_mass(inertial: &mut Inertial, mass: f64) {

@@ -1,6 +1,6 @@
 //! Robots that touch objects, on the host: approach, impact, contact with what is rigid or gives way, lift-off.
 //!
-//! Each phase is smooth and integrated by the ODE library as everything else ([`crate::simulate`]); where it ends, that is a
+//! Each phase is smooth and integrated as everything else ([`crate::simulate`]); where it ends, that is a
 //! root of the distance s, of the reaction F, or of the speed along the surface, is found on the method's own interpolation
 //! between two steps, and the phase is integrated anew up to there. An impact, (20.90)-(20.91) or with the object's mass
 //! (20.95)-(20.97), or another set of closed contacts follows. Any set of contacts may be closed; which one it is follows from

@@ -1,15 +1,14 @@
 //! From phase to phase.
 
 use super::events::objects_at_rest;
+use super::object::SLOTS;
 use super::state::{Closed, Phases, Slip, System, GUARDS};
 use super::{Contacts, Event};
 use crate::command::Command;
+use crate::ode::{solve, Equations, Pace, Step, Watch};
 use crate::plant::{Action, Plant};
 use crate::simulate::{self, Balance, Failure, Run, Settings, SAME};
-use crate::solver::{solve, Equations};
-use differential_equations::prelude::*;
-use differential_equations::traits::State;
-use std::cell::RefCell;
+use std::ops::ControlFlow;
 use straightline_core::algorithms::kinetic_energy;
 use straightline_core::contact::Coordinate;
 
@@ -66,10 +65,13 @@ pub fn simulate_from(
     let plant = &*plant.solved_by(settings.method);
     let system = System { plant, contacts };
     let state = plant.normalised(&[start, objects_at_rest(contacts.touches.len())].concat());
-    let mut going = Going { system, command, settings, progress, state, phases: Vec::new(), events: Vec::new() };
-    let before = going.start()?;
-    let period = command.period();
+    let pace = Pace::new(settings);
+    let mut going = Going { system, command, settings, progress, pace, state, phases: Vec::new(), events: Vec::new() };
     let mut run = Run::beginning(going.names());
+    let period = command.period();
+    settings.check(run.table.names.len(), period)?;
+    simulate::check_start(plant, &going.state[..plant.states()])?;
+    let before = going.start()?;
     let mut drift = 0.0f64;
     let rows = simulate::rows(settings);
     let mut ends = [&simulate::pieces(command, period, settings.duration)[..], &rows].concat();
@@ -77,7 +79,7 @@ pub fn simulate_from(
     ends.dedup_by(|b, a| *b - *a <= SAME * settings.duration);
     let mut held = None;
     let mut next_computation = 0.0;
-    run.table.rows.push(going.row(0.0, None));
+    run.push(going.row(0.0, None))?;
     for piece in ends.windows(2) {
         let (mut t, end) = (piece[0], piece[1]);
         if let Some(period) = period.filter(|_| t >= next_computation - SAME * settings.duration) {
@@ -93,12 +95,12 @@ pub fn simulate_from(
             }
             count += usize::from(reached.has_event);
             if count > MOST_EVENTS {
-                return Err(Failure { time: t, why: format!("more than {MOST_EVENTS} events between two rows") });
+                return Err(refused(t, format!("more than {MOST_EVENTS} events between two rows")));
             }
         }
         if simulate::is_among(&rows, t, settings.duration) || run.stop.is_some() {
             drift = drift.max(going.drift(t));
-            run.table.rows.push(going.row(t, held.as_ref()));
+            run.push(going.row(t, held.as_ref()))?;
         }
         if run.stop.is_some() {
             break;
@@ -113,11 +115,11 @@ pub fn simulate_from(
     let drives = plant.drive_energies(&going.state[..plant.states()]);
     run.balance = Balance { before, after, work, losses, drives, turnover: most - least };
     (run.q, run.qd) = (q.to_vec(), qd.to_vec());
-    Ok(ContactRun { run, events: going.events, drift })
+    Ok(ContactRun { run: run.end()?, events: going.events, drift })
 }
 
 fn refused(time: f64, why: String) -> Failure {
-    Failure { time, why }
+    Failure::new(time, why)
 }
 
 /// A simulation at an instant.
@@ -126,6 +128,7 @@ struct Going<'a> {
     command: &'a Command,
     settings: &'a Settings,
     progress: &'a dyn Fn(f64),
+    pace: Pace,
     state: Vec<f64>,
     phases: Phases,
     events: Vec<Event>,
@@ -197,20 +200,17 @@ impl Going<'_> {
         let begins = &self.state;
         let first = self.guards(t, begins, held);
         let watched = |end: f64, watches: bool, run: &mut Run| {
-            let watched =
-                Watched { going: self, held, first: &first, seen: RefCell::new(Seen { last: None, fallen: None }) };
-            watched.solve((t, end), begins, watches, run)?;
-            Ok::<Seen, Failure>(watched.seen.into_inner())
+            Watched { going: self, held, first: &first }.solve((t, end), begins, watches, run)
         };
         let Seen { last, fallen } = watched(end, true, run)?;
         let Some((guard, mut time)) = fallen else {
-            self.state = last.map_or_else(|| self.state.clone(), |(_, y)| self.system.plant.normalised(&y));
+            self.state = self.system.plant.normalised(&last);
             return Ok(Reached { time: end, has_event: false });
         };
         // the state there as exactly as everywhere, not by interpolation, and the instant once more from it
         let at = |time: f64, run: &mut Run| match time - t > 1e-13 * end.max(1.0) {
-            true => Ok(watched(time, false, run)?.last.map_or_else(|| begins.clone(), |(_, y)| y)),
-            false => Ok(begins.clone()),
+            true => Ok(watched(time, false, run)?.last),
+            false => Ok::<_, Failure>(begins.clone()),
         };
         let better = time - self.newton(time, &at(time, run)?, guard, held);
         if better > t && better < end {
@@ -241,7 +241,7 @@ impl Going<'_> {
             Guard::Contact(k) => self.guards(t, y, held)[k],
             Guard::Limit => simulate::distance(self.system.plant, y),
         };
-        let watched = Watched { going: self, held, first: &[], seen: RefCell::new(Seen { last: None, fallen: None }) };
+        let watched = Watched { going: self, held, first: &[] };
         let (mut rate, h) = (vec![0.0; state.len()], 1e-7);
         watched.rate(t, state, &mut rate);
         let along = |h: f64| state.iter().zip(&rate).map(|(y, r)| y + h * r).collect::<Vec<f64>>();
@@ -322,7 +322,7 @@ enum Guard {
 
 /// What the solver has shown.
 struct Seen {
-    last: Option<(f64, Vec<f64>)>,
+    last: Vec<f64>,
     fallen: Option<(Guard, f64)>,
 }
 
@@ -332,18 +332,25 @@ struct Watched<'a, 'b> {
     held: Option<&'a Action>,
     /// The guards at the beginning.
     first: &'a [f64],
-    seen: RefCell<Seen>,
 }
 
 impl Equations for Watched<'_, '_> {
-    fn states(&self) -> usize {
-        self.going.state.len()
-    }
-
     fn rate(&self, t: f64, y: &[f64], rate: &mut [f64]) {
         let Going { system, progress, phases, .. } = self.going;
         progress(t);
         system.rate(t, y, phases, &self.going.action(t, y, self.held), rate);
+    }
+
+    fn quantity(&self, i: usize) -> String {
+        let plant = self.going.system.plant;
+        match i < plant.states() {
+            true => plant.quantity(i),
+            false => format!("the object of contact `{}`", self.going.system.name((i - plant.states()) / SLOTS)),
+        }
+    }
+
+    fn objection(&self, y: &[f64]) -> Option<String> {
+        self.going.system.plant.objection(y)
     }
 }
 
@@ -362,48 +369,30 @@ impl Watched<'_, '_> {
         values
     }
 
-    fn solve(&self, times: (f64, f64), from: &[f64], watches: bool, run: &mut Run) -> Result<(), Failure> {
-        let watch = Watch { of: self, armed: Vec::new(), watches };
-        let solved = solve(self, watch, times, from, self.going.settings)?;
+    fn solve(&self, times: (f64, f64), from: &[f64], watches: bool, run: &mut Run) -> Result<Seen, Failure> {
+        let mut looks = Looks { of: self, armed: Vec::new(), watches, fallen: None };
+        let solved = solve(self, &mut looks, times, from, self.going.settings, &self.going.pace)?;
         run.steps += solved.accepted;
         run.evaluations += solved.evaluations;
-        let seen = self.seen.borrow();
-        match &seen.last {
-            Some((time, y)) if !y.iter().all(|x| x.is_finite()) => {
-                Err(Failure { time: *time, why: "a number is not finite".to_string() })
-            }
-            _ => Ok(()),
-        }
+        Ok(Seen { last: solved.y, fallen: looks.fallen })
     }
 }
 
 /// Looks between steps for the first guard that falls.
-struct Watch<'a, 'b, 'c> {
+struct Looks<'a, 'b, 'c> {
     of: &'a Watched<'b, 'c>,
     /// Guards that have been positive.
     armed: Vec<bool>,
     watches: bool,
+    fallen: Option<(Guard, f64)>,
 }
 
-impl<Y: State<f64> + AsRef<[f64]>> Solout<f64, Y> for Watch<'_, '_, '_> {
-    fn solout<I>(
-        &mut self,
-        t: f64,
-        t_before: f64,
-        y: &Y,
-        _: &Y,
-        interpolator: &mut I,
-        _: &mut Solution<f64, Y>,
-    ) -> ControlFlag<f64, Y>
-    where
-        I: Interpolation<f64, Y> + ?Sized,
-    {
-        let n = self.of.going.state.len();
-        let y = &y.as_ref()[..n];
-        self.of.seen.borrow_mut().last = Some((t, y.to_vec()));
-        if !self.watches || !y.iter().all(|x| x.is_finite()) {
-            return ControlFlag::Continue;
+impl Watch for Looks<'_, '_, '_> {
+    fn step(&mut self, step: &Step) -> ControlFlow<()> {
+        if !self.watches {
+            return ControlFlow::Continue(());
         }
+        let Step { t_before, t, y, within, .. } = *step;
         let now = self.of.values(t, y);
         let first_fallen = |armed: &[bool], values: &[f64]| {
             (0..values.len()).find(|i| armed.get(*i) == Some(&true) && values[*i] <= 0.0)
@@ -411,7 +400,7 @@ impl<Y: State<f64> + AsRef<[f64]>> Solout<f64, Y> for Watch<'_, '_, '_> {
         let arms = |armed: Vec<bool>| (0..now.len()).map(|i| armed.get(i) == Some(&true) || now[i] > 0.0).collect();
         let Some(mut guard) = first_fallen(&self.armed, &now).filter(|_| t > t_before) else {
             self.armed = arms(std::mem::take(&mut self.armed));
-            return ControlFlag::Continue;
+            return ControlFlow::Continue(());
         };
         let (mut low, mut high) = (t_before, t);
         for _ in 0..HALVINGS {
@@ -419,15 +408,14 @@ impl<Y: State<f64> + AsRef<[f64]>> Solout<f64, Y> for Watch<'_, '_, '_> {
             if middle <= low || middle >= high {
                 break;
             }
-            let Ok(state) = interpolator.interpolate(middle) else { break };
-            match first_fallen(&self.armed, &self.of.values(middle, &state.as_ref()[..n])) {
+            match first_fallen(&self.armed, &self.of.values(middle, &within(middle))) {
                 Some(first) => (high, guard) = (middle, first),
                 None => low = middle,
             }
         }
         let limit = GUARDS * self.of.going.phases.len();
         let guard = if guard == limit { Guard::Limit } else { Guard::Contact(guard) };
-        self.of.seen.borrow_mut().fallen = Some((guard, high));
-        ControlFlag::Terminate
+        self.fallen = Some((guard, high));
+        ControlFlow::Break(())
     }
 }

@@ -241,6 +241,9 @@ pub struct Simulate {
     /// Where to draw coordinates, torques and, of a controller, errors
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
+    /// Steps that the integration may take [default: max_steps of the experiment, or 1000000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..).map(|n| n as usize))]
+    pub max_steps: Option<usize>,
     /// The robot as the controller knows it [default: ROBOT in its scene]
     #[arg(long, value_name = "FILE")]
     pub controller_robot: Option<PathBuf>,
@@ -270,7 +273,8 @@ pub struct Analyze {
     /// Look for the best value of a number of the robot file within this range; may be repeated
     #[arg(long, value_name = "PATH=FROM:TO", value_parser = parameter::parse_range)]
     pub optimize: Vec<Range>,
-    /// What the best values make least, limits kept: energy given, rms or peak of the drives
+    /// What the best values make least, limits kept: energy given at the joints, rms or peak of their forces; of drives the electrical
+    /// energy that they take, or their Joule heat
     #[arg(long, value_name = "WHAT", default_value = "rms", value_parser = objective, requires = "optimize")]
     pub minimize: Objective,
     #[command(flatten)]

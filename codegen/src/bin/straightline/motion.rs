@@ -9,18 +9,19 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Mutex;
 use straightline_codegen::compile::Options;
 use straightline_codegen::description::{self, Description};
-use straightline_codegen::diagnostic::{Diagnostics, Severity};
+use straightline_codegen::diagnostic::{Diagnostic, Diagnostics, Severity};
 use straightline_codegen::experiment::design::Design;
 use straightline_codegen::experiment::{self, parameter, parquet, Experiment};
 use straightline_codegen::singular::{self, Inertia};
 use straightline_codegen::{model, output, scene};
 use straightline_core::model::{Body, Model};
 use straightline_core::Dd;
+use straightline_simulation::advice::{advise, affordable, Advice};
 use straightline_simulation::analysis::{self, Analysis};
 use straightline_simulation::command::Command;
 use straightline_simulation::contact as in_contact;
 use straightline_simulation::drive_analysis::{DriveAnalysis, DriveFigures, Heating};
-use straightline_simulation::drives::state_of_motion;
+use straightline_simulation::drives::{further_derivatives, state_of_motion};
 use straightline_simulation::html::four_digits;
 use straightline_simulation::motion::Motion;
 use straightline_simulation::optimize::{self, Sampled};
@@ -56,15 +57,53 @@ fn design(description: &Description, options: &Options, paths: &[&str]) -> Resul
 }
 
 /// Generated programs at these values of their parameters.
-struct At<'a>(&'a Design, &'a [f64]);
+struct At<'a>(&'a Design, Vec<f64>);
+
+/// The generated programs for parameters of which some are numbers of drives: torques of the joints do not depend on these.
+struct Programs {
+    design: Design,
+    /// Which of all parameters the programs take.
+    kept: Vec<usize>,
+}
+
+impl Programs {
+    fn new(description: &Description, options: &Options, paths: &[&str]) -> Result<Programs, Failure> {
+        let is_kept = |k: &usize| !parameter::is_of_drive(description, &options.scene.drives, paths[*k]);
+        let kept: Vec<usize> = (0..paths.len()).filter(is_kept).collect();
+        let design = design(description, options, &kept.iter().map(|k| paths[*k]).collect::<Vec<_>>())?;
+        Ok(Programs { design, kept })
+    }
+
+    /// The values that the programs take.
+    fn kept(&self, values: &[f64]) -> Vec<f64> {
+        self.kept.iter().map(|k| values[*k]).collect()
+    }
+
+    fn at(&self, values: &[f64]) -> At<'_> {
+        At(&self.design, self.kept(values))
+    }
+}
+
+/// A robot with other numbers in its file and in the drives of its scene.
+fn changed(
+    description: &Description,
+    options: &Options,
+    path: &str,
+    value: f64,
+) -> Result<(Description, Options), Box<Diagnostic>> {
+    let (description, drives) = parameter::with_drives(description, &options.scene.drives, path, value)?;
+    let mut options = options.clone();
+    options.scene.drives = drives;
+    Ok((description, options))
+}
 
 impl analysis::Equations for At<'_> {
     fn torques(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
-        self.0.torques(q, qd, qdd, self.1)
+        self.0.torques(q, qd, qdd, &self.1)
     }
 
     fn wrenches(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<[f64; 6]> {
-        self.0.wrenches(q, qd, qdd, self.1)
+        self.0.wrenches(q, qd, qdd, &self.1)
     }
 }
 
@@ -175,13 +214,20 @@ pub fn simulate(a: &Simulate) -> Result<(), Failure> {
             other
         }
     };
-    let experiment = experiment(&a.input, &model, &controller_model, true)?;
+    let mut experiment = experiment(&a.input, &model, &controller_model, true)?;
+    if let Some(most) = a.max_steps {
+        experiment.settings.most_steps = most;
+    }
     let contacts = contact::read(&a.input, &model, &options.scene.contacts)?;
     let currents = experiment.command.current_inputs(model.drives.len());
     let plant = Plant::new(model, experiment.coulomb_speed).with_current_inputs(&currents);
     let bar = print::bar("simulating", 1000);
     let duration = experiment.settings.duration;
-    let progress = |t: f64| bar.set_position((t / duration * 1000.0) as u64);
+    let patience = print::Patience::new();
+    let progress = |t: f64| {
+        bar.set_position((t / duration * 1000.0) as u64);
+        patience.say(|| format!("at t = {t:.3e} s of {duration} s"));
+    };
     if !contacts.is_empty() {
         let (settings, start) = (&experiment.settings, start(&plant, &experiment));
         let run = in_contact::simulate_from(&plant, &contacts, &experiment.command, start, settings, &progress);
@@ -217,7 +263,14 @@ pub fn simulate(a: &Simulate) -> Result<(), Failure> {
 
 pub fn failed(failure: &simulate::Failure) -> Failure {
     print::error(&failure.to_string());
-    print::help("a smaller tolerance, a greater coulomb_speed, or method = \"stiff\" in [simulation] may help");
+    failure.help.iter().for_each(|help| print::help(help));
+    Failure::Input
+}
+
+/// Why a motion has no figures.
+fn not_analysed(failure: &simulate::Failure) -> Failure {
+    print::error(&format!("the motion cannot be analysed: at t = {} s {}", failure.time, failure.why));
+    failure.help.iter().for_each(|help| print::help(help));
     Failure::Input
 }
 
@@ -258,7 +311,7 @@ pub fn analyze(a: &Analyze) -> Result<(), Failure> {
         print::help("write a table [motion]");
         return Err(Failure::Input);
     };
-    let found = analysis::analyze(&model, &motion, a.interval);
+    let found = analysis::analyze(&model, &motion, a.interval).map_err(|failure| not_analysed(&failure))?;
     if let Some(path) = &a.output {
         write_table(path, &joined(&found))?;
     }
@@ -266,10 +319,11 @@ pub fn analyze(a: &Analyze) -> Result<(), Failure> {
         None => Vec::new(),
         Some(sweep) => swept(&description, &options, sweep, &motion, a.interval)?,
     };
+    let advice = advised(&model, &motion, a.interval, &found);
     if let Some(path) = &a.html {
-        output::write_file(path, &page::page(a, &model, &motion, &found, &swept))?;
+        output::write_file(path, &page::page(a, &model, &motion, (&found, &advice), &swept))?;
     }
-    print_analysis(&model, &motion, &found)?;
+    print_analysis(&model, &motion, &found, &advice)?;
     if let Some(sweep) = &a.sweep {
         print_sweep(sweep, &swept)?;
     }
@@ -281,15 +335,15 @@ pub fn analyze(a: &Analyze) -> Result<(), Failure> {
 
 /// The robot file with these values of the parameters that are optimised; what is wrong is printed.
 fn with(a: &Analyze, description: &Description, options: &Options, values: &[f64]) -> Result<Model<f64>, Failure> {
-    let mut changed = description.clone();
+    let (mut description, mut options) = (description.clone(), options.clone());
     let mut diagnostics = Diagnostics::new();
     for (range, value) in a.optimize.iter().zip(values) {
-        match parameter::with(&changed, &range.path, *value) {
-            Ok(with) => changed = with,
+        match changed(&description, &options, &range.path, *value) {
+            Ok(changed) => (description, options) = changed,
             Err(complaint) => diagnostics.push(*complaint),
         }
     }
-    let model = if diagnostics.has_errors() { None } else { built(&changed, options, &mut diagnostics) };
+    let model = if diagnostics.has_errors() { None } else { built(&description, &options, &mut diagnostics) };
     model.ok_or_else(|| {
         print::diagnostics(&diagnostics, Severity::Error);
         Failure::Input
@@ -303,9 +357,16 @@ fn optimized(a: &Analyze, description: &Description, options: &Options, motion: 
     with(a, description, options, &ends(|e| e.0))?;
     with(a, description, options, &ends(|e| e.1))?;
     let paths: Vec<&str> = a.optimize.iter().map(|range| range.path.as_str()).collect();
-    let design = design(description, options, &paths)?;
+    let programs = Programs::new(description, options, &paths)?;
     let mut diagnostics = Diagnostics::new();
     let Some(model) = built(description, options, &mut diagnostics) else { return Err(Failure::Input) };
+    if a.minimize.is_of_drives() && drive_analysis_is_missing(&model) {
+        print::error(
+            "what drives take cannot be minimised: the robot has no drives whose inputs follow from its motion",
+        );
+        print::help("drives are tables [[drive]] of the robot file or of a scene: --scene");
+        return Err(Failure::Input);
+    }
     let progress = print::spinner("optimising");
     let mut bodies: Vec<_> = model.bodies.iter().collect();
     bodies.sort_by_key(|b| b.joint.iv);
@@ -315,19 +376,22 @@ fn optimized(a: &Analyze, description: &Description, options: &Options, motion: 
     let states = analysis::states(motion, a.interval);
     let (times, qd): (Vec<f64>, Vec<Vec<f64>>) = states.iter().map(|(t, [_, qd, _])| (*t, qd.clone())).unzip();
     let by_gradient = |p: &[f64]| {
-        let tau: Vec<Vec<f64>> = states.iter().map(|(_, [q, qd, qdd])| design.torques(q, qd, qdd, p)).collect();
+        let of_design = programs.kept(p);
+        let design = &programs.design;
+        let tau: Vec<Vec<f64>> =
+            states.iter().map(|(_, [q, qd, qdd])| design.torques(q, qd, qdd, &of_design)).collect();
         let sampled = Sampled { times: &times, qd: &qd, tau: &tau, efforts: &efforts };
         let (cost, slopes) = a.minimize.with_slopes(sampled);
         let mut gradient = vec![0.0; p.len()];
         for ((_, [q, qd, qdd]), seed) in states.iter().zip(&slopes).filter(|(_, s)| s.iter().any(|x| *x != 0.0)) {
-            let more = design.gradient(q, qd, qdd, p, seed);
-            gradient.iter_mut().zip(more).for_each(|(sum, x)| *sum += x);
+            let more = design.gradient(q, qd, qdd, &of_design, seed);
+            programs.kept.iter().zip(more).for_each(|(k, x)| gradient[*k] += x);
         }
         (cost, gradient)
     };
     // limits of drives count, too, which takes the drives of each robot
     let of_values = |values: &[f64]| {
-        let at = At(&design, values);
+        let at = programs.at(values);
         let found = match model.drives.is_empty() {
             true => analysis::analyze_by(&model, &at, motion, a.interval),
             false => match with(a, description, options, values) {
@@ -335,9 +399,22 @@ fn optimized(a: &Analyze, description: &Description, options: &Options, motion: 
                 Err(_) => return f64::INFINITY,
             },
         };
-        a.minimize.with_limits(&found, &efforts)
+        found.map_or(f64::INFINITY, |found| a.minimize.with_limits(&found, &efforts))
     };
-    let downhill = optimize::descend(by_gradient, &ranges);
+    // what drives take does not follow from torques alone: differences along each number
+    let by_difference = |p: &[f64]| {
+        let slope = |k: usize| {
+            let h = 1e-4 * (ranges[k].1 - ranges[k].0);
+            let ends = [(p[k] - h).max(ranges[k].0), (p[k] + h).min(ranges[k].1)];
+            let [low, high] = ends.map(|x| of_values(&[&p[..k], &[x], &p[k + 1..]].concat()));
+            (high - low) / (ends[1] - ends[0])
+        };
+        (of_values(p), (0..p.len()).map(slope).collect::<Vec<f64>>())
+    };
+    let downhill = match a.minimize.is_of_drives() || programs.kept.len() < ranges.len() {
+        true => optimize::descend(by_difference, &ranges),
+        false => optimize::descend(by_gradient, &ranges),
+    };
     let best = downhill.and_then(|downhill| {
         let best = optimize::minimise_from(of_values, &ranges, &downhill.point, 0.02)?;
         Ok((downhill, best))
@@ -347,7 +424,8 @@ fn optimized(a: &Analyze, description: &Description, options: &Options, motion: 
         print::error(&format!("no optimum was found: {why}"));
         Failure::Input
     })?;
-    let as_written = a.minimize.with_limits(&analysis::analyze(&model, motion, a.interval), &efforts);
+    let as_written = analysis::analyze(&model, motion, a.interval).map_err(|failure| not_analysed(&failure))?;
+    let as_written = a.minimize.with_limits(&as_written, &efforts);
     let mut out = stdout().lock();
     let (steps, analyses) = (downhill.evaluations, best.evaluations);
     writeln!(out, "\nbest values after {steps} evaluations along the gradient and {analyses} analyses:")?;
@@ -357,6 +435,10 @@ fn optimized(a: &Analyze, description: &Description, options: &Options, motion: 
     let word = optimize::Objective::WORDS.iter().find(|w| w.1 == a.minimize).map_or("", |w| w.0);
     writeln!(out, "{word} {:.6}, as the robot file is {as_written:.6}", best.cost)?;
     Ok(())
+}
+
+fn drive_analysis_is_missing(model: &Model<f64>) -> bool {
+    model.drives.is_empty() || further_derivatives(model).is_none()
 }
 
 fn joined(found: &Analysis) -> Table {
@@ -381,21 +463,21 @@ fn swept(
 ) -> Result<Vec<Swept>, Failure> {
     let mut models = Vec::new();
     for &value in &sweep.values {
-        let changed = parameter::with(description, &sweep.path, value).map_err(|complaint| {
+        let (changed, in_scene) = changed(description, options, &sweep.path, value).map_err(|complaint| {
             let mut diagnostics = Diagnostics::new();
             diagnostics.push(*complaint);
             print::diagnostics(&diagnostics, Severity::Warning);
             Failure::Input
         })?;
         let mut diagnostics = Diagnostics::new();
-        let Some(model) = built(&changed, options, &mut diagnostics) else {
+        let Some(model) = built(&changed, &in_scene, &mut diagnostics) else {
             print::error(&format!("{} = {value}:", sweep.path));
             print::diagnostics(&diagnostics, Severity::Error);
             return Err(Failure::Input);
         };
         models.push((value, model));
     }
-    let design = design(description, options, &[&sweep.path])?;
+    let programs = Programs::new(description, options, &[&sweep.path])?;
     let bar = print::bar("sweeping", models.len() as u64);
     let (next, results) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let workers = std::thread::available_parallelism().map_or(1, usize::from).min(models.len());
@@ -403,7 +485,7 @@ fn swept(
         for _ in 0..workers {
             scope.spawn(|| {
                 while let Some((value, model)) = models.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let found = analysis::analyze_by(model, &At(&design, &[*value]), motion, interval);
+                    let found = analysis::analyze_by(model, &programs.at(&[*value]), motion, interval);
                     results.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((*value, found));
                     bar.inc(1);
                 }
@@ -414,7 +496,13 @@ fn swept(
     let mut results = results.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
     let place = |value: f64| sweep.values.iter().position(|v| *v == value);
     results.sort_by_key(|(value, _)| place(*value));
-    Ok(results)
+    let sound = |(value, found): (f64, Result<Analysis, simulate::Failure>)| {
+        found.map(|found| (value, found)).map_err(|failure| {
+            print::error(&format!("{} = {value}:", sweep.path));
+            not_analysed(&failure)
+        })
+    };
+    results.into_iter().map(sound).collect()
 }
 
 const HEAD: [&str; 10] =
@@ -493,15 +581,44 @@ pub fn drive_remarks(model: &Model<f64>, found: &Analysis) -> Vec<String> {
     remarks
 }
 
-pub fn violations(found: &Analysis) -> Vec<String> {
-    let line = |v: &analysis::Violation| {
-        let analysis::Violation { time, joint, what, limit, worst } = v;
-        format!("t = {time:.6} s: {what} of {joint} leaves {limit}, worst {worst:.6}")
+/// Where the work of the drives went.
+fn books(found: &Analysis) -> String {
+    let (given, change, friction) = (found.given(), found.energy_change, found.friction);
+    let turned: f64 = found.joints.iter().map(|j| j.given + j.taken).sum();
+    let open = match found.missing() {
+        missing if missing.abs() <= 1e-9 * turned => String::new(),
+        missing => format!(" ({missing:.1e} J is left by the integrals over these instants: --interval)"),
     };
-    found.violations.iter().map(line).collect()
+    format!(
+        "drives give {given:.6} J: energy changes by {change:.6} J, friction in the joints takes {friction:.6} J{open}"
+    )
 }
 
-fn print_analysis(model: &Model<f64>, motion: &Motion, found: &Analysis) -> Result<(), Failure> {
+/// Limits that are exceeded, and what would keep the first ones of each kind.
+pub fn violations(found: &Analysis, advice: &[Vec<Advice>]) -> Vec<String> {
+    let line = |(k, v): (usize, &analysis::Violation)| {
+        let analysis::Violation { time, joint, what, limit, worst } = v;
+        let line = format!("t = {time:.6} s: {what} of {joint} leaves {limit}, worst {worst:.6}");
+        let remedies: Vec<String> = advice.get(k).into_iter().flatten().map(Advice::to_string).collect();
+        match remedies.is_empty() {
+            true => line,
+            false => format!("{line}; each by itself would keep it: {}", remedies.join(", or ")),
+        }
+    };
+    found.violations.iter().enumerate().map(line).collect()
+}
+
+/// What would keep the limits that are exceeded first.
+fn advised(model: &Model<f64>, motion: &Motion, interval: f64, found: &Analysis) -> Vec<Vec<Advice>> {
+    found.violations.iter().take(affordable(motion)).map(|v| advise(model, motion, interval, v)).collect()
+}
+
+fn print_analysis(
+    model: &Model<f64>,
+    motion: &Motion,
+    found: &Analysis,
+    advice: &[Vec<Advice>],
+) -> Result<(), Failure> {
     let mut out = stdout().lock();
     writeln!(out, "{}: {} s, {} instants\n", model.name, motion.duration(), found.table.rows.len())?;
     let names = model.bodies.iter().map(|b| &b.joint.name).chain(model.drives.iter().map(|d| &d.name));
@@ -523,25 +640,27 @@ fn print_analysis(model: &Model<f64>, motion: &Motion, found: &Analysis) -> Resu
     for remark in drive_remarks(model, found) {
         writeln!(out, "{remark}")?;
     }
-    let given: f64 = found.joints.iter().map(|j| j.given - j.taken).sum();
-    writeln!(out, "\ndrives give {given:.6} J, energy changes by {:.6} J: the rest is friction", found.energy_change)?;
+    writeln!(out, "\n{}", books(found))?;
     match found.violations.is_empty() {
         true => writeln!(out, "within all limits")?,
-        false => writeln!(out, "limits exceeded, the first one first:\n  {}", violations(found).join("\n  "))?,
+        false => writeln!(out, "limits exceeded, the first one first:\n  {}", violations(found, advice).join("\n  "))?,
     }
     Ok(())
 }
 
 fn print_sweep(sweep: &parameter::Sweep, swept: &[Swept]) -> Result<(), Failure> {
     let mut out = stdout().lock();
+    let has_drives = swept.iter().any(|(_, found)| found.drives.is_some());
+    let of_drives = if has_drives { format!("{:>16}{:>12}", "electrical [J]", "heat [J]") } else { String::new() };
+    let gap = if has_drives { " ".repeat(28) } else { String::new() };
     // every joint's peak under its name
     let names: Vec<String> = swept
         .first()
         .map_or_else(Vec::new, |(_, found)| found.joints.iter().map(|j| format!("{} [{}]", j.name, j.unit)).collect());
     let heads: String = names.iter().map(|name| format!("  {name:>12}")).collect();
     let width = sweep.path.chars().count().max(14);
-    writeln!(out, "\n{:<width$}{:>14}{:>14}{:>12}  peaks:", "", "", "", "")?;
-    writeln!(out, "{:<width$}{:>14}{:>14}{:>12}{heads}", sweep.path, "given [J]", "taken [J]", "exceeded")?;
+    writeln!(out, "\n{:<width$}{:>14}{:>14}{gap}{:>12}  peaks:", "", "", "", "")?;
+    writeln!(out, "{:<width$}{:>14}{:>14}{of_drives}{:>12}{heads}", sweep.path, "given [J]", "taken [J]", "exceeded")?;
     for (value, found) in swept {
         let sum = |f: fn(&analysis::JointFigures) -> f64| found.joints.iter().map(f).sum::<f64>();
         let peak = |(name, j): (&String, &analysis::JointFigures)| {
@@ -550,7 +669,11 @@ fn print_sweep(sweep: &parameter::Sweep, swept: &[Swept]) -> Result<(), Failure>
         let peaks: String = names.iter().zip(&found.joints).map(peak).collect();
         let (given, taken) = (sum(|j| j.given), sum(|j| j.taken));
         let exceeded = found.violations.len();
-        writeln!(out, "{value:<width$}{given:>14.4}{taken:>14.4}{exceeded:>12}{peaks}")?;
+        let of_drives = found.drives.as_ref().map_or(String::new(), |drives| {
+            let sum = |f: fn(&DriveFigures) -> f64| drives.drives.iter().map(f).sum::<f64>();
+            format!("{:>16.4}{:>12.4}", sum(|d| d.energy.0), sum(|d| d.joule))
+        });
+        writeln!(out, "{value:<width$}{given:>14.4}{taken:>14.4}{of_drives}{exceeded:>12}{peaks}")?;
     }
     Ok(())
 }

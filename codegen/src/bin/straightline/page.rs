@@ -6,6 +6,7 @@ use std::path::Path;
 use straightline_codegen::report::html::STYLE;
 use straightline_core::drive::Actuator;
 use straightline_core::model::{Joint, Model};
+use straightline_simulation::advice::Advice;
 use straightline_simulation::analysis::{Analysis, JointFigures};
 use straightline_simulation::drive_analysis::{torque_limits, DriveAnalysis, DriveFigures, Heating};
 use straightline_simulation::html::{four_digits, Page};
@@ -27,7 +28,13 @@ fn units(figures: &JointFigures) -> (&'static str, &'static str) {
 }
 
 /// The page: figures, limits, a card per joint and per drive, the sweep.
-pub fn page(a: &Analyze, model: &Model<f64>, motion: &Motion, found: &Analysis, swept: &[Swept]) -> String {
+pub fn page(
+    a: &Analyze,
+    model: &Model<f64>,
+    motion: &Motion,
+    (found, advice): (&Analysis, &[Vec<Advice>]),
+    swept: &[Swept],
+) -> String {
     let file = |path: &Path| path.file_name().map(|n| n.to_string_lossy().to_string()).unwrap_or_default();
     let given: f64 = found.joints.iter().map(|j| j.given).sum();
     let taken: f64 = found.joints.iter().map(|j| j.taken).sum();
@@ -44,7 +51,7 @@ pub fn page(a: &Analyze, model: &Model<f64>, motion: &Motion, found: &Analysis, 
     let line = "What a motion asks of joints and drives: torques, power, energy, limits.";
     let mut page = Page::new(&format!("Analysis of {}", model.name), line, &facts, STYLE);
     page.heading("Limits", "");
-    match violations(found) {
+    match violations(found, advice) {
         lines if lines.is_empty() => page.remarks(&["The motion stays within all limits.".to_string()], false),
         lines => page.remarks(&lines, true),
     }

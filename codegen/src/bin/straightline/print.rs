@@ -4,9 +4,10 @@ use anstream::{eprintln, stdout};
 use anstyle::{AnsiColor, Style};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
+use std::cell::Cell;
 use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use straightline_codegen::description::{Description, Ignored};
 use straightline_codegen::diagnostic::codes::Code;
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
@@ -45,6 +46,28 @@ pub fn be_quiet(quiet: bool) {
 
 fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
+}
+
+/// Says after ten seconds, and then after twice as long again and again, how far something has come.
+pub struct Patience {
+    began: Instant,
+    next: Cell<u64>,
+    calls: Cell<u32>,
+}
+
+impl Patience {
+    pub fn new() -> Patience {
+        Patience { began: Instant::now(), next: Cell::new(10), calls: Cell::new(0) }
+    }
+
+    /// Often called, and cheap.
+    pub fn say(&self, how_far: impl Fn() -> String) {
+        self.calls.set(self.calls.get().wrapping_add(1));
+        if !is_quiet() && self.calls.get() % 256 == 0 && self.began.elapsed() >= Duration::from_secs(self.next.get()) {
+            eprintln!("{} s gone by: {}", self.next.get(), how_far());
+            self.next.set(2 * self.next.get());
+        }
+    }
 }
 
 /// Diagnostics of at least that severity; the stream drops the colours where there is no terminal.
