@@ -222,6 +222,7 @@ fn asked(model: &Model<Dd>, options: &Options) -> Vec<Asked> {
 /// Whatever is asked for that divides by what a joint feels, while it feels nothing, is an error at that joint. Where the joint feels what
 /// a run-time parameter brings, and nothing else, it cannot be decided here, and is a warning.
 pub(crate) fn demand_inertia(model: &Model<Dd>, options: &Options, diagnostics: &mut Diagnostics) {
+    demand_mass(model, options, diagnostics);
     let full = (!options.scene.parameters.is_empty()).then(|| with_parameters(model, options));
     let mut said = Vec::new();
     for asked in asked(model, options) {
@@ -243,6 +244,17 @@ pub(crate) fn demand_inertia(model: &Model<Dd>, options: &Options, diagnostics: 
             let complaint = messages::inertia_by_parameters(&asked.words, joint, &names.join(", "));
             place(complaint, joint, Some((asked.path, options)), diagnostics);
         }
+    }
+}
+
+/// A mass centre takes some mass; what a run-time parameter brings is not known here.
+fn demand_mass(model: &Model<Dd>, options: &Options, diagnostics: &mut Diagnostics) {
+    let divides = |f: &&Function| matches!(f, Function::CentreOfMass | Function::Momentum);
+    let names: Vec<String> = options.functions.iter().filter(divides).map(|f| format!("`{}`", f.name())).collect();
+    let has_mass = model.bodies.iter().any(|b| b.inertia.mass != Dd::ZERO);
+    if !names.is_empty() && !has_mass && options.scene.parameters.is_empty() {
+        let asked = format!("{} {}", names.join(", "), if names.len() == 1 { "is" } else { "are" });
+        options.scene.places.complain("outputs.functions", messages::no_mass(&asked), diagnostics);
     }
 }
 

@@ -145,6 +145,18 @@ fn functions_of_drives_divide_by_the_inertia_with_drives() {
 }
 
 #[test]
+fn a_mass_centre_takes_some_mass() {
+    let none = chain(&[(OFF, Z, MASSLESS), (OFF, Y, MASSLESS)]);
+    let options = |functions: &[Function]| Options { functions: functions.to_vec(), ..Options::default() };
+    let errors = compile(&none, &options(&[Function::CentreOfMass, Function::Momentum])).expect_err("0/0");
+    let title = "`centre_of_mass`, `momentum` are asked for, and nothing that moves has mass";
+    assert_eq!(titles(&errors, "no-mass"), [title], "{errors}");
+    assert!(compile(&none, &options(&[Function::Energy])).is_ok());
+    let some = chain(&[(OFF, Z, BODY), (OFF, Y, MASSLESS)]);
+    assert!(compile(&some, &options(&[Function::CentreOfMass])).is_ok());
+}
+
+#[test]
 fn inertia_that_is_rounding_or_dust_is_none() {
     // a point mass on an oblique axis leaves rounding of what its links have
     let axis = [0.48, -0.6, 0.64];

@@ -496,6 +496,13 @@ pub fn no_forward_dynamics(asked: &str, joint: &str) -> D {
         )
 }
 
+/// What divides by the mass of a robot that has none. `asked`: in words, what is asked for.
+pub fn no_mass(asked: &str) -> D {
+    D::error("no-mass", format!("{asked} asked for, and nothing that moves has mass"))
+        .detail("the mass centre of no mass is nowhere: the equations would divide by zero")
+        .help("give the links their mass (URDF: `<inertial>`), or name the functions that are wanted without these")
+}
+
 /// What divides by what joints feel, of a robot with a joint that feels what run-time parameters bring and nothing else.
 pub fn inertia_by_parameters(asked: &str, joint: &str, parameters: &str) -> D {
     D::warning("inertia-by-parameters", format!("joint `{joint}` feels no inertia but that of {parameters}"))

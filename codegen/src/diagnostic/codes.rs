@@ -102,6 +102,7 @@ pub const ALL: &[Code] = &[
     code("no-identical-limbs", Error, "Identical limbs of a robot that has none."),
     code("no-limit", Error, "A joint without the limits that a trapezoid takes."),
     code("no-links", Error, "A robot without links."),
+    code("no-mass", Error, "What divides by the mass of a robot that has none. `asked`: in words, what is asked for."),
     code("no-motion", Error, "Points that make no motion."),
     code("no-such-part", Error, "A part that the results of a function do not have."),
     code("no-surface", Error, "A quadric without a gradient."),
