@@ -47,24 +47,26 @@ impl Panel<'_> {
             escape(self.title)
         );
         let (bottom, end) = (height - below, width - right);
-        for y in ticks(y0, y1, 4) {
-            let (at, label) = (at_y(y), tick(y));
+        let (step, marks) = ticks(y0, y1, 4);
+        for y in marks {
+            let (at, label) = (at_y(y), tick(y, step));
             let _ = writeln!(out, "<path class=\"grid\" d=\"M{left} {at:.1}H{end}\"/>");
             let _ =
                 writeln!(out, "<text class=\"small end\" x=\"{}\" y=\"{:.1}\">{label}</text>", left - 6.0, at + 4.0);
         }
         let _ = writeln!(out, "<path class=\"axis\" d=\"M{left} {above}V{bottom}H{end}\"/>");
         // the end of the run has its number, whatever is round
-        let last = format!("{} {}", tick(x1), escape(self.units.0));
+        let last = format!("{} {}", without_zeros(four_digits(x1)), escape(self.units.0));
         let taken = 7.0 * last.chars().count() as f64 + 12.0;
-        for x in ticks(x0, x1, 4).into_iter().filter(|x| at_x(x1) - at_x(*x) > taken) {
+        let (step, marks) = ticks(x0, x1, 4);
+        for x in marks.into_iter().filter(|x| at_x(x1) - at_x(*x) > taken) {
             let at = at_x(x);
             let _ = writeln!(out, "<path class=\"axis\" d=\"M{at:.1} {bottom}v4\"/>");
             let _ = writeln!(
                 out,
                 "<text class=\"small middle\" x=\"{at:.1}\" y=\"{:.1}\">{}</text>",
                 bottom + 16.0,
-                tick(x)
+                tick(x, step)
             );
         }
         let _ = writeln!(out, "<path class=\"axis\" d=\"M{end} {bottom}v4\"/>");
@@ -94,24 +96,34 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     }
 }
 
-/// Round numbers between two others, about so many.
-fn ticks(low: f64, high: f64, about: usize) -> Vec<f64> {
+/// Round numbers between two others, about so many, and the step between them.
+fn ticks(low: f64, high: f64, about: usize) -> (f64, Vec<f64>) {
     let raw = (high - low) / about as f64;
     let power = 10f64.powf(raw.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|step| *step >= raw).unwrap_or(raw);
     if !(step.is_finite() && step > 0.0) {
-        return Vec::new();
+        return (1.0, Vec::new());
     }
     let first = (low / step).ceil();
-    (0..=2 * about).map(|k| (first + k as f64) * step).take_while(|x| *x <= high).collect()
+    (step, (0..=2 * about).map(|k| (first + k as f64) * step).take_while(|x| *x <= high).collect())
 }
 
-/// A round number without what its binary form adds.
-fn tick(x: f64) -> String {
-    let text = four_digits(x);
-    match text.contains('.') && !text.contains('e') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
-        false => text,
+/// A multiple of a step, with the decimals that tell it from the next one.
+fn tick(x: f64, step: f64) -> String {
+    match (1e-6..1e6).contains(&step) && x.abs() < 1e6 {
+        true => without_zeros(format!("{:.*}", (-step.log10().floor()).max(0.0) as usize, x)),
+        false => four_digits(x),
+    }
+}
+
+/// Without zeros behind the point, and without the sign of zero.
+fn without_zeros(text: String) -> String {
+    if !text.contains('.') || text.contains('e') {
+        return text;
+    }
+    match text.trim_end_matches('0').trim_end_matches('.') {
+        "-0" => "0".to_string(),
+        rest => rest.to_string(),
     }
 }
 
@@ -156,6 +168,15 @@ mod tests {
         assert_eq!(last, end);
         assert!(svg.contains(&format!("H{end}")) && svg.contains(">1.37 s</text>"), "{svg}");
         assert!(svg.contains("torque &lt;1&gt;") && svg.contains(">N·m</text>"), "{svg}");
+    }
+
+    #[test]
+    fn marks_next_to_each_other_have_different_numbers() {
+        for (low, high) in [(25.0, 25.012), (-0.3, 0.3), (0.0, 1.0), (1e-9, 4e-9), (-2e7, 5e7), (1999.0, 2001.0)] {
+            let (step, marks) = ticks(low, high, 4);
+            let labels: Vec<String> = marks.iter().map(|x| tick(*x, step)).collect();
+            assert!(labels.len() >= 2 && labels.windows(2).all(|pair| pair[0] != pair[1]), "{labels:?}");
+        }
     }
 
     #[test]
