@@ -76,6 +76,9 @@ pub fn bound(scalar: Scalar) -> f64 {
     8192.0 * unit(scalar)
 }
 
+/// A natural scale that is so small a part of what it would be if nothing cancelled, is rounding noise.
+const NOISE: f64 = 1e-6;
+
 /// Half the distance from 1 to the next number.
 fn unit(scalar: Scalar) -> f64 {
     match scalar {
@@ -473,7 +476,12 @@ impl Truth<'_> {
         let tree = self.tree;
         let rest = &vec![Dd::ZERO; qd.len()];
         let narrow = |x: &[Dd]| x.iter().map(|x| x.to_f64().abs()).collect::<Vec<f64>>();
-        let force_scale = |qd: &[Dd], qdd: &[Dd]| narrow(reference::natural_scale(tree, q, qd, qdd).as_slice());
+        let force_scale = |qd: &[Dd], qdd: &[Dd]| {
+            let mut scales = narrow(reference::natural_scale(tree, q, qd, qdd).as_slice());
+            let (moves, drives) = (qd.iter().any(|x| *x != Dd::ZERO), qdd.iter().any(|x| *x != Dd::ZERO));
+            self.raise(&mut scales, length(tree.gravity.as_slice()), (moves, drives));
+            scales
+        };
         let per_frame = |values: &dyn Fn(&MassCentreFrame<Dd>) -> Vec<Dd>, scales: &dyn Fn(Reach) -> Vec<f64>| {
             let reach = |f: &MassCentreFrame<Dd>| self.reach(f.link, length(f.position.as_slice()));
             (
@@ -532,8 +540,9 @@ impl Truth<'_> {
             VelocityForce => {
                 let mut weightless = tree.clone();
                 weightless.gravity.fill(Dd::ZERO);
-                let scale = reference::natural_scale(&weightless, q, qd, rest);
-                (reference::velocity_force(tree, q, qd).as_slice().to_vec(), narrow(scale.as_slice()))
+                let mut scales = narrow(reference::natural_scale(&weightless, q, qd, rest).as_slice());
+                self.raise(&mut scales, 0.0, (true, false));
+                (reference::velocity_force(tree, q, qd).as_slice().to_vec(), scales)
             }
             MassMatrix => {
                 let mut h = reference::mass_matrix(tree, q);
@@ -620,6 +629,34 @@ impl Truth<'_> {
             forces[drive.iv] += force;
             scales[drive.iv] += scale;
         }
+    }
+
+    /// Raises natural scales of forces that are rounding noise themselves: where a mass centre lies on the axis that turns it, its
+    /// acceleration cancels, and nothing is left to judge by.
+    fn raise(&self, scales: &mut [f64], weight: f64, (moves, drives): (bool, bool)) {
+        let mut uncancelled = vec![0.0; scales.len()];
+        for (k, link) in self.tree.links.iter().enumerate() {
+            let reach = self.reach(Some(k), 0.0);
+            let part = |on: bool, x: f64| if on { x } else { 0.0 };
+            let acceleration =
+                weight + part(moves, 2.0 * reach.turning * reach.moving) + part(drives, reach.moving_rate);
+            let spin = part(moves, reach.turning * reach.turning) + part(drives, reach.turning_rate);
+            let force = link.mass.to_f64().abs() * acceleration;
+            let moment = force * reach.length + length(link.inertia.as_slice()) * spin;
+            let mut at = Some(k);
+            while let Some(j) = at {
+                let joint = &self.tree.links[j];
+                let of_joint: &mut [f64] = &mut uncancelled[joint.iv..joint.iv + joint.joint.nv()];
+                let terms = match joint.joint {
+                    Joint::Linear => vec![force],
+                    Joint::Revolute => vec![moment],
+                    Joint::Free => [[force; 3], [moment; 3]].concat(),
+                };
+                of_joint.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+                at = joint.parent;
+            }
+        }
+        scales.iter_mut().zip(uncancelled).for_each(|(scale, most)| *scale = scale.max(NOISE * most));
     }
 
     /// The reach of a point of a link, `beyond` its mass centre.

@@ -5,7 +5,7 @@
 //! `ROBOTS=500 SEED=7 STYLES=exported,digits4 cargo test --release -p straightline-codegen --test robots_as_written -- --ignored --nocapture`
 
 #[path = "../../generated_tests/src/written/mod.rs"]
-#[allow(dead_code)] // other tests use the rest
+#[allow(dead_code, unused_imports)] // other tests use the rest
 mod written;
 
 #[path = "support/as_written.rs"]
@@ -63,26 +63,22 @@ fn all_keep_their_digits(cases: Vec<Case>) {
 }
 
 #[test]
-#[ignore = "robots lose digits"]
 fn arms_of_few_joints_with_numbers_of_few_decimals_keep_their_digits() {
     all_keep_their_digits(small_arms(84, 1));
 }
 
 #[test]
-#[ignore = "robots lose digits"]
 fn robots_as_exporters_write_them_keep_their_digits() {
     all_keep_their_digits(exported(42, 2, 4));
 }
 
 #[test]
-#[ignore = "robots lose digits"]
 fn robots_of_every_style_keep_their_digits() {
     all_keep_their_digits(any_shape(&Style::all(), 84, 3, 3));
 }
 
 /// The files of `tests/files/as_written`, each the least robot that once lost digits, or a whole one that did.
 #[test]
-#[ignore = "robots lose digits"]
 fn robots_that_once_lost_digits_keep_them() {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/files/as_written");
     let mut files: Vec<PathBuf> =

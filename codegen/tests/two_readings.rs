@@ -5,6 +5,9 @@
 mod compare;
 #[path = "../../runtime/core/tests/support/robots.rs"]
 mod robots;
+#[path = "../../generated_tests/src/written/mod.rs"]
+#[allow(dead_code, unused_imports)] // other tests use the rest
+mod written;
 
 use compare::{compare_authors, Disagreement};
 use robots::Random;
@@ -17,6 +20,7 @@ use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{self, FrameOption, ModelOptions};
 use straightline_codegen::reference_input::mass_centre_tree;
 use straightline_core::model::JointEffects;
+use written::{Shape, Style, Written};
 
 /// A joint of a random robot in joint frames; joint j moves link j + 1.
 struct RandomJoint {
@@ -235,10 +239,21 @@ fn compare_file(
     options: &ModelOptions,
     random: &mut Random,
 ) {
-    let source = Source::new(robot, text.clone());
-    let (model, diagnostics) = model::load(&source, options);
-    let model = model.unwrap_or_else(|| panic!("{}\n{text}", diagnostics.render()));
-    let description = description::read(&source, &mut Diagnostics::new()).expect("the file was read before");
+    compare_source(disagreement, robot, &Source::new(robot, text), options, random);
+}
+
+fn compare_source(
+    disagreement: &mut Disagreement,
+    robot: &str,
+    source: &Source,
+    options: &ModelOptions,
+    random: &mut Random,
+) {
+    let (model, diagnostics) = model::load(source, options);
+    let mut model = model.unwrap_or_else(|| panic!("{}\n{}", diagnostics.render(), source.text()));
+    // friction is no part of this comparison
+    model.bodies.iter_mut().for_each(|body| body.effects = JointEffects::none());
+    let description = description::read(source, &mut Diagnostics::new()).expect("the file was read before");
     let tree = mass_centre_tree(&description, options).expect("the file describes a tree");
     compare_authors(disagreement, robot, &tree, &model, random);
 }
@@ -258,6 +273,23 @@ fn both_readings_of_random_urdf_agree() {
         let options = random_options(&mut random, moving_joints(&robot), floating);
         let text = urdf(&mut random, &robot);
         compare_file(&mut disagreement, &format!("urdf, seed {seed}"), text, &options, &mut random);
+    }
+    disagreement.judge();
+}
+
+/// Few digits, right angles cut anywhere, dust, masses and units of every size.
+#[test]
+fn both_readings_of_robots_as_people_write_them_agree() {
+    let mut disagreement = Disagreement::default();
+    for (seed, style) in (0..3).flat_map(|k| Style::all().into_iter().map(move |style| (k, style))) {
+        let shape = Shape::any(&mut written::Random(seed), 7);
+        let robot = Written::new(style, shape, 100 + seed);
+        let mut random = Random(seed);
+        let mut options = random_options(&mut random, Vec::new(), robot.floating);
+        (options.joint_order, options.frames[0].link) = (None, "l1".to_string());
+        let name = format!("{}, seed {seed}", style.name());
+        let source = Source::new(robot.file_name(), robot.text());
+        compare_source(&mut disagreement, &name, &source, &options, &mut random);
     }
     disagreement.judge();
 }

@@ -1,8 +1,8 @@
 //! Truth x inputs x bound: what tests every generated function.
 //!
 //! This library holds the material of the tests: the [reference data](mod@reference), the [`compiled`] functions of all
-//! robots, [`programs`] as the compiler makes them, the [contact_cases], [robots with drives](drives) and [random robots](random) written for both authors,
-//! and a [`search`] for the worst case.
+//! robots, [`programs`] as the compiler makes them, the [contact_cases], [robots with drives](drives), [random robots](random) written
+//! for both authors, [robots as people write them](written), and a [`search`] for the worst case.
 //! The tests themselves are in `tests/`, one file per kind of claim.
 #![forbid(unsafe_code)]
 
@@ -16,3 +16,4 @@ pub mod reference;
 pub mod search;
 pub mod second_author;
 pub mod standalone;
+pub mod written;

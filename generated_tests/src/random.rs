@@ -10,29 +10,10 @@ use straightline_codegen::model::ModelOptions;
 use straightline_core::reference::{ExtendedPosition, Joint, MassCentreFrame, MassCentreLink, MassCentreTree};
 use straightline_core::Dd;
 
-/// Numbers that are the same for the same seed (SplitMix64).
-#[derive(Clone, Debug)]
-pub struct Random(pub u64);
+pub use crate::written::Random;
 
+/// More of what tests draw.
 impl Random {
-    /// The next 64 bits.
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// One of `0 .. n`.
-    pub fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
-    }
-
-    /// Uniform in `low … high`.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
     /// Three numbers from −`size` to `size`.
     pub fn three(&mut self, size: f64) -> [f64; 3] {
         [0; 3].map(|_| self.between(-size, size))

@@ -9,7 +9,7 @@ mod numbers;
 mod shrink;
 
 pub use make::{Shape, Style};
-pub use numbers::Random;
+pub use numbers::{cut, decimals, significant, Random};
 
 use std::fmt::{self, Write};
 
