@@ -8,7 +8,7 @@
 //! infinities pass through as in f64; in the last binade before overflow a result may already be infinite or NaN.
 
 use core::fmt;
-use core::ops::{Add, Div, Mul, Neg, Sub};
+use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 /// A double-double number `hi + lo`, with `hi` the f64 nearest to the sum.
 ///
@@ -497,5 +497,29 @@ impl Backwards {
 
     fn as_str(&self) -> &str {
         core::str::from_utf8(&self.bytes[self.start..]).expect("digits are ASCII")
+    }
+}
+
+impl AddAssign for Dd {
+    fn add_assign(&mut self, b: Self) {
+        *self = *self + b;
+    }
+}
+
+impl SubAssign for Dd {
+    fn sub_assign(&mut self, b: Self) {
+        *self = *self - b;
+    }
+}
+
+impl MulAssign for Dd {
+    fn mul_assign(&mut self, b: Self) {
+        *self = *self * b;
+    }
+}
+
+impl DivAssign for Dd {
+    fn div_assign(&mut self, b: Self) {
+        *self = *self / b;
     }
 }

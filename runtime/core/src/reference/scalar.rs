@@ -24,27 +24,3 @@ impl One for Dd {
         Dd::ONE
     }
 }
-
-impl AddAssign for Dd {
-    fn add_assign(&mut self, b: Self) {
-        *self = *self + b;
-    }
-}
-
-impl SubAssign for Dd {
-    fn sub_assign(&mut self, b: Self) {
-        *self = *self - b;
-    }
-}
-
-impl MulAssign for Dd {
-    fn mul_assign(&mut self, b: Self) {
-        *self = *self * b;
-    }
-}
-
-impl DivAssign for Dd {
-    fn div_assign(&mut self, b: Self) {
-        *self = *self / b;
-    }
-}
