@@ -144,7 +144,11 @@ overflow-checks = false
 # on its own, wherever it stands
 [workspace]
 "#,
-            name = name.trim_matches('-'),
+            // cargo takes no name that begins with a digit
+            name = match name.trim_matches('-') {
+                name if name.starts_with(|c: char| c.is_ascii_digit()) => format!("robot-{name}"),
+                name => name.to_string(),
+            },
             provenance = self.provenance(),
         )
     }

@@ -285,7 +285,7 @@ pub struct Analyze {
 pub struct Export {
     /// The robot file: URDF or TOML
     pub robot: PathBuf,
-    /// The directory to write: new, empty, or an earlier export, which is replaced
+    /// The directory to write: new, empty, or an earlier export, whose files are replaced; others stay
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Functions with C's calling convention, and a header (the only kind of package so far)

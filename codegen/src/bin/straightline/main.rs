@@ -5,11 +5,13 @@
 
 mod arguments;
 mod contact;
+mod files;
 mod motion;
 mod page;
 mod print;
 
 use arguments::{Check, Command, CommandLine, Export, Generate, ModelArgs, ProgramArgs, Report, Verify};
+use files::read;
 use std::io;
 use std::path::Path;
 use std::process::ExitCode;
@@ -58,12 +60,6 @@ fn main() -> ExitCode {
             ExitCode::from(3)
         }
     }
-}
-
-fn read(path: &Path) -> Result<Source, Failure> {
-    let shown = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|e| io::Error::new(e.kind(), format!("{shown}: {e}")))?;
-    Ok(Source::from_bytes(&shown, bytes))
 }
 
 /// What the command line and the scene that it names say; what is wrong with the scene is said when it is used.
@@ -125,7 +121,7 @@ fn generate(a: &Generate) -> Result<(), Failure> {
     let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;
     let Some(path) = &a.output else { return Ok(print::text(&generated.text)?) };
     if !a.check {
-        output::write_file(path, &generated.text)?;
+        files::write(path, &generated.text)?;
         return Ok(());
     }
     let (file, robot) = (path.display(), a.robot.display());
@@ -148,7 +144,7 @@ fn generate(a: &Generate) -> Result<(), Failure> {
 fn report(a: &Report) -> Result<(), Failure> {
     let (generated, options) = compiled_by(explain, &a.robot, &a.program, &a.model)?;
     if let Some(path) = &a.html {
-        output::write_file(path, &html::page(&read(&a.robot)?, &options, &generated))?;
+        files::write(path, &html::page(&read(&a.robot)?, &options, &generated))?;
         return Ok(());
     }
     Ok(if a.json { print::json(&generated.report) } else { print::report(&generated.report) }?)
