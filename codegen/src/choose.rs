@@ -127,13 +127,27 @@ pub(crate) fn price(counts: Counts) -> Price {
 /// Whether equations lose hardly more than these; where run-time parameters are inputs nobody knows, and what is local must do.
 pub(crate) fn keeps_digits_of<'g>(model: &'g Model<Dd>, graph: &'g Graph) -> impl Fn(&Graph) -> bool + 'g {
     let states = [false, true].map(|fast| forward_method::states(model, &graph.inputs, STATES, fast));
-    let before = states.each_ref().map(|s| s.as_ref().map(|s| rounding::estimate(graph, s)));
+    let before = states.each_ref().map(|s| {
+        s.as_ref().map(|s| {
+            let scales = rounding::scales(graph, s);
+            (rounding::estimate(graph, s, &scales), scales)
+        })
+    });
     move |graph| {
         let mut both = states.iter().zip(&before);
         both.all(|(s, before)| {
-            s.as_ref().zip(*before).is_none_or(|(s, before)| rounding::estimate(graph, s) <= TOLERATED_LOCALLY * before)
+            s.as_ref()
+                .zip(before.as_ref())
+                .is_none_or(|(s, (before, scales))| rounding::estimate(graph, s, scales) <= TOLERATED_LOCALLY * before)
         })
     }
+}
+
+/// What the plain form loses, and the scales of its outputs.
+#[derive(Clone)]
+struct PlainError {
+    lost: f64,
+    scales: Vec<f64>,
 }
 
 /// A search for one function, and what was tried.
@@ -148,9 +162,9 @@ struct Search<'a> {
     tried: FxHashMap<u64, Price>,
     /// Operations that were counted.
     work: usize,
-    /// What the plain form loses to rounding, or the bodies' own parameters if that is less, once it was asked for; `None` in it:
-    /// nobody knows.
-    plain_error: Option<Option<[f64; 2]>>,
+    /// What the plain form loses to rounding, or the bodies' own parameters if that is less, once it was asked for, and what it is compared
+    /// with; `None` in it: nobody knows.
+    plain_error: Option<Option<[PlainError; 2]>>,
 }
 
 impl Search<'_> {
@@ -189,34 +203,45 @@ impl Search<'_> {
 
     /// Whether these equations lose about as little as those of the plain form, and those of the bodies' own parameters.
     fn keeps_digits(&mut self, graph: &Graph) -> bool {
-        let plain = match self.plain_error {
-            Some(known) => known,
+        let plain = match &self.plain_error {
+            Some(known) => known.clone(),
             None => {
                 let (composite, reduced) = (self.robot.composite.clone(), self.robot.reduced.clone());
                 self.set(&Choice::plain(&self.robot.model));
                 let (_, plain) = self.counted();
                 let of_bodies = Optimisations { reduced: false, ..self.optimisations };
                 let (_, of_bodies, _) = candidate(&self.robot, self.frames, self.function, self.options, of_bodies);
-                let both = self.error(&plain).zip(self.error(&of_bodies));
-                let plain = both.map(|(a, b)| [a[0].min(b[0]), a[1].min(b[1])]);
+                let states = self.states_of(&of_bodies);
+                let plain = states.map(|states| {
+                    states.map(|states| {
+                        let scales = rounding::scales(&of_bodies, &states);
+                        let lost = [&plain, &of_bodies].map(|graph| rounding::estimate(graph, &states, &scales));
+                        PlainError { lost: lost[0].min(lost[1]), scales }
+                    })
+                });
                 (self.robot.composite, self.robot.reduced) = (composite, reduced);
-                self.plain_error = Some(plain);
+                self.plain_error = Some(plain.clone());
                 plain
             }
         };
-        let pair = plain.and_then(|plain| self.error(graph).zip(Some(plain)));
+        let pair = plain.and_then(|plain| self.error(graph, &plain).zip(Some(plain)));
         let times = match self.options.scalar {
             Scalar::F64 => TOLERATED,
             Scalar::F32 => TOLERATED_SINGLE,
         };
-        pair.is_none_or(|(mine, plain)| (0..2).all(|k| mine[k] <= times * plain[k]))
+        pair.is_none_or(|(mine, plain)| (0..2).all(|k| mine[k] <= times * plain[k].lost))
     }
 
     /// What equations lose to rounding, at about rest and as fast as the joints may move.
-    fn error(&self, graph: &Graph) -> Option<[f64; 2]> {
+    fn error(&self, graph: &Graph, plain: &[PlainError; 2]) -> Option<[f64; 2]> {
+        let states = self.states_of(graph)?;
+        Some([0, 1].map(|k| rounding::estimate(graph, &states[k], &plain[k].scales)))
+    }
+
+    /// States of a program: at about rest, and as fast as the joints may move.
+    fn states_of(&self, graph: &Graph) -> Option<[Vec<Vec<f64>>; 2]> {
         let states = |fast| forward_method::states(&self.robot.model, &graph.inputs, STATES, fast);
-        let (slow, fast) = states(false).zip(states(true))?;
-        Some([slow, fast].map(|states| rounding::estimate(graph, &states)))
+        states(false).zip(states(true)).map(|(slow, fast)| [slow, fast])
     }
 
     /// Greedy: every choice at every depth, kept where it saves, until none does or enough was tried; of the choices the first ones.

@@ -7,12 +7,13 @@
 
 use crate::expr::{Graph, NodeId, Op};
 use crate::forward_method;
+use straightline_core::magnitude::Magnitude;
 use straightline_core::model::Model;
 use straightline_core::{Dd, Real};
 
 /// So many operations are visited at most for one estimate; if there are more, outputs share a sweep.
 const WORK: usize = 200_000;
-/// An output that is so small against the greatest one is judged by that.
+/// An output that is so small against what it is made of is judged by that.
 const SMALL: f64 = 1e-6;
 
 /// States of each kind whose values [`samples`] gives: at about rest, where weights rule, and as fast as the joints may move.
@@ -25,13 +26,24 @@ pub fn samples(model: &Model<Dd>, graph: &Graph) -> Option<Vec<Vec<f64>>> {
     Some(slow.iter().chain(&fast).map(|x| evaluate(graph, x)).collect())
 }
 
-/// The worst rms error of the outputs over the output's rms value, in units of the rounding error.
-pub fn estimate(graph: &Graph, states: &[Vec<f64>]) -> f64 {
+/// What errors of each output are compared with: its rms value at these states, or, where that is small against what it is made of, a part of
+/// that. Each by itself: a light wrist below a heavy base has digits of its own.
+pub fn scales(graph: &Graph, states: &[Vec<f64>]) -> Vec<f64> {
+    let of_state = |x: &Vec<f64>| {
+        let inputs: Vec<Magnitude> = x.iter().map(|x| Magnitude::new(Dd::from(*x))).collect();
+        crate::expr::evaluate(graph, &inputs)
+    };
+    let outputs: Vec<Vec<Magnitude>> = states.iter().map(of_state).collect();
+    let rms = |of: &dyn Fn(&Magnitude) -> f64, k: usize| {
+        (outputs.iter().map(|x| of(&x[k]).powi(2)).sum::<f64>() / states.len() as f64).sqrt()
+    };
+    (0..graph.results.len()).map(|k| rms(&|x| x.value.hi(), k).max(SMALL * rms(&|x| x.size, k))).collect()
+}
+
+/// The worst rms error of the outputs over these [`scales`], in units of the rounding error.
+pub fn estimate(graph: &Graph, states: &[Vec<f64>], scales: &[f64]) -> f64 {
     let values: Vec<Vec<f64>> = states.iter().map(|x| evaluate(graph, x)).collect();
-    let rms = |r: &NodeId| (values.iter().map(|v| v[r.index()].powi(2)).sum::<f64>() / states.len() as f64).sqrt();
-    let scale: Vec<f64> = graph.results.iter().map(rms).collect();
-    let floor = SMALL * scale.iter().copied().fold(0.0, f64::max);
-    if floor == 0.0 {
+    if graph.results.is_empty() {
         return 0.0;
     }
     let rounds: Vec<bool> = graph.ids().map(|id| rounds(graph.op(id))).collect();
@@ -44,7 +56,10 @@ pub fn estimate(graph: &Graph, states: &[Vec<f64>]) -> f64 {
             // outputs of one sweep with signs of their own, so that on average they do not meet
             for (k, r) in graph.results.iter().enumerate().skip(sweep).step_by(sweeps) {
                 let sign = if (k.wrapping_mul(0x9e37_79b9) >> 16) % 2 == 0 { 1.0 } else { -1.0 };
-                adjoints[r.index()] += sign / scale[k].max(floor);
+                // what is made of nothing is zero
+                if scales[k] > 0.0 {
+                    adjoints[r.index()] += sign / scales[k];
+                }
             }
             square += swept(graph, values, &rounds, &mut adjoints);
         }
@@ -146,7 +161,8 @@ mod tests {
     #[test]
     fn one_operation_loses_one_rounding_error() {
         let product = program(|b, x, y| b.insert(Op::Mul(x, y)));
-        assert_eq!(estimate(&product, &[vec![3.0, -7.0]]), 1.0);
+        let states = [vec![3.0, -7.0]];
+        assert_eq!(estimate(&product, &states, &scales(&product, &states)), 1.0);
     }
 
     /// (10⁶ x + y) − 10⁶ x: the product is rounded at 10⁶, and so is the sum; what is left is one.
@@ -158,7 +174,8 @@ mod tests {
             b.insert(Op::Sub(sum, large))
         });
         // the product's error cancels with itself; that of the sum stays
-        let lost = estimate(&cancelling, &[vec![1e3, 1.0]]);
+        let states = [vec![1e3, 1.0]];
+        let lost = estimate(&cancelling, &states, &scales(&cancelling, &states));
         assert!((lost / 1e6 - 1.0).abs() < 1e-5, "{lost:e}");
     }
 }
