@@ -7,6 +7,9 @@
 //! Differences are compared with the natural scale of the *result*: what its plain equations are made of
 //! ([`Magnitude`](straightline_core::magnitude::Magnitude)), each vector counted with its length. Accelerations are judged by what they leave of
 //! the equations of motion, τ − H q̈ − h: that says the same for robots whose H is nearly singular.
+//!
+//! What is equal over the reals may still lose digits that the plain equations keep, or leave the range of f32. So both run in the scalar that
+//! is generated, too, and the program may lose sixteen times what the plain equations lose.
 
 use crate::compile::Options;
 use crate::contact;
@@ -27,8 +30,10 @@ use straightline_core::{Dd, Real};
 
 /// Results agree to so much of their natural scale; double-double has 5e-32.
 const AGREE: f64 = 1e-24;
+/// A program may lose so many times what the plain equations lose in the same scalar, or one rounding of all that a result is made of.
+const LOSSES: f64 = 16.0;
 /// At so many random states.
-const STATES: usize = 3;
+const STATES: usize = 4;
 /// Where random numbers begin: another place than where states for choices come from.
 const SEED: u64 = 0x6a09_e667_f3bc_c908;
 
@@ -41,11 +46,19 @@ pub struct Disagreement {
     pub result: String,
     /// By how much of its natural scale.
     pub difference: f64,
+    /// What the plain equations lose to rounding in the same scalar, where that is what the program is compared with.
+    pub plain: Option<f64>,
 }
 
 impl fmt::Display for Disagreement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Disagreement { program, result, difference } = self;
+        let Disagreement { program, result, difference, plain } = self;
+        if let Some(plain) = plain {
+            return write!(
+                f,
+                "`{program}` loses digits that the plain equations of the robot keep: {result} is off by {difference:.1e}, theirs by {plain:.1e}"
+            );
+        }
         write!(f, "`{program}` differs from the plain equations of the robot: {result} by {difference:.1e} of its natural scale")
     }
 }
@@ -105,6 +118,7 @@ pub(crate) fn of_function(
 ) -> Result<(), Disagreement> {
     let ports = options.scene.ports(function, &robot.model);
     let mut states = States::new(robot, options);
+    let mut losses = Losses::new(graph);
     for _ in 0..STATES {
         let state = states.next(&ports);
         if options.grade == Grade::Exact {
@@ -115,9 +129,106 @@ pub(crate) fn of_function(
             continue;
         }
         let found = evaluate(graph, &inputs(graph, &state));
-        compare(function.name(), &graph.outputs, &differences(robot, frames, function, options, &state, &found))?;
+        let off = differences(robot, frames, function, options, &state, &found);
+        compare(function.name(), &graph.outputs, &off)?;
+        // residuals have no scale of accelerations
+        let sizes = match function {
+            Function::ForwardDynamics => found.iter().map(|x| x.hi().abs()).collect(),
+            _ => off.iter().map(|x| x.size).collect::<Vec<f64>>(),
+        };
+        match options.scalar {
+            Scalar::F64 => losses.add(graph, &state, &sizes, |state| {
+                plain_results::<f64>(robot, frames, function, options, ForwardDynamicsMethod::ArticulatedBody, state)
+            }),
+            Scalar::F32 => losses.add(graph, &state, &sizes, |state| {
+                plain_results::<f32>(robot, frames, function, options, ForwardDynamicsMethod::ArticulatedBody, state)
+            }),
+        }
     }
-    Ok(())
+    losses.compare(function.name(), graph, options.scalar)
+}
+
+/// What a program and the plain equations lose to rounding: of each result the worst of some states, over its natural scale.
+struct Losses {
+    program: Vec<f64>,
+    plain: Vec<f64>,
+}
+
+impl Losses {
+    fn new(graph: &Graph) -> Self {
+        let none = vec![0.0; graph.results.len()];
+        Losses { program: none.clone(), plain: none }
+    }
+
+    /// At one more state, rounded to the scalar.
+    fn add<T: Real + Into<f64>>(
+        &mut self,
+        graph: &Graph,
+        state: &State,
+        sizes: &[f64],
+        plain: impl Fn(&State) -> Vec<T>,
+    ) {
+        let rounded: State =
+            state.iter().map(|(n, x)| (n.clone(), x.iter().map(|x| rounded::<T>(*x)).collect())).collect();
+        let wide = inputs(graph, &rounded);
+        let exact = evaluate(graph, &wide);
+        let found = evaluate(graph, &wide.into_iter().map(T::constant).collect::<Vec<T>>());
+        let plain = plain(&rounded);
+        for (k, exact) in exact.into_iter().enumerate().filter(|(k, _)| sizes[*k] > 0.0) {
+            let lost = |x: T| {
+                let off = (Dd::from(x.into()) - exact).hi().abs() / sizes[k];
+                if off.is_nan() {
+                    f64::INFINITY
+                } else {
+                    off
+                }
+            };
+            self.program[k] = self.program[k].max(lost(found[k]));
+            self.plain[k] = self.plain[k].max(lost(plain[k]));
+        }
+    }
+
+    fn compare(self, program: &str, graph: &Graph, scalar: Scalar) -> Result<(), Disagreement> {
+        let rounding = match scalar {
+            _ if !graph.widths.is_empty() => return Ok(()),
+            Scalar::F64 => f64::EPSILON,
+            Scalar::F32 => f64::from(f32::EPSILON),
+        };
+        let is_worse = |k: &usize| self.program[*k] > (LOSSES * self.plain[*k]).max(rounding);
+        match (0..self.program.len()).find(is_worse) {
+            None => Ok(()),
+            Some(k) => Err(Disagreement {
+                program: program.to_string(),
+                result: element_of(&graph.outputs, k),
+                difference: self.program[k],
+                plain: Some(self.plain[k]),
+            }),
+        }
+    }
+}
+
+/// The nearest number of a scalar.
+fn rounded<T: Real + Into<f64>>(x: Dd) -> Dd {
+    Dd::from(T::constant(x).into())
+}
+
+/// The results that are wanted of a function, by the generic runtime in this scalar.
+fn plain_results<T: Real>(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+    method: ForwardDynamicsMethod,
+    state: &State,
+) -> Vec<T> {
+    let scene = &options.scene;
+    let frames = scene.frames_of(function, frames);
+    let (wanted, _) = scene.select(function, &robot.model, frames.len());
+    let bound = scene.bind(function, robot, &of_ports(&scene.ports(function, &robot.model), state, T::constant));
+    let frames: Vec<_> =
+        frames.iter().map(|f| bound.model.frame(f).expect("frames were checked against the model")).collect();
+    let all = function.evaluate(&bound.model, &frames, method, &bound.arguments);
+    wanted.iter().map(|k| all[*k]).collect()
 }
 
 /// Results that differ by more than a part of their sizes, if any.
@@ -135,7 +246,7 @@ fn compare(program: &str, outputs: &[Port], differences: &[Magnitude]) -> Result
     match worst {
         None => Ok(()),
         Some((difference, k)) => {
-            Err(Disagreement { program: program.to_string(), result: element_of(outputs, k), difference })
+            Err(Disagreement { program: program.to_string(), result: element_of(outputs, k), difference, plain: None })
         }
     }
 }
@@ -187,23 +298,17 @@ fn same_bits<T: Real + PartialEq + Into<f64>>(
     graph: &Graph,
     state: &State,
 ) -> Result<(), Disagreement> {
-    let scene = &options.scene;
-    let frames = scene.frames_of(function, frames);
-    let (wanted, _) = scene.select(function, &robot.model, frames.len());
-    let bound = scene.bind(function, robot, &of_ports(&scene.ports(function, &robot.model), state, T::constant));
-    let frames: Vec<_> =
-        frames.iter().map(|f| bound.model.frame(f).expect("frames were checked against the model")).collect();
-    let all = function.evaluate(&bound.model, &frames, options.forward_dynamics, &bound.arguments);
+    let plain = plain_results::<T>(robot, frames, function, options, options.forward_dynamics, state);
     let rounded: Vec<T> = inputs(graph, state).into_iter().map(T::constant).collect();
     let found = evaluate(graph, &rounded);
-    let off = |(k, found): (&usize, &T)| {
-        let same = *found == all[*k];
-        let [a, b]: [f64; 2] = [(*found).into(), all[*k].into()];
+    let off = |(found, plain): (T, T)| {
+        let same = found == plain;
+        let [a, b]: [f64; 2] = [found.into(), plain.into()];
         // neither is a number
         let value = if same || (a.is_nan() && b.is_nan()) { 0.0 } else { a - b };
         Magnitude { value: Dd::from(value), size: 0.0 }
     };
-    compare(function.name(), &graph.outputs, &wanted.iter().zip(&found).map(off).collect::<Vec<_>>())
+    compare(function.name(), &graph.outputs, &found.into_iter().zip(plain).map(off).collect::<Vec<_>>())
 }
 
 /// Whether the program of a contact function says what its plain equations say; `plain`: the same function traced by exact rules, for
@@ -329,17 +434,14 @@ fn bounded<T: Real + Into<f64>>(
     let mut states = States::new(robot, options);
     for _ in 0..STATES {
         let state = states.next(&graph.inputs);
-        let rounded: State = state
-            .into_iter()
-            .map(|(n, x)| (n, x.into_iter().map(|x| Dd::from(T::constant(x).into())).collect()))
-            .collect();
+        let given: State = state.into_iter().map(|(n, x)| (n, x.into_iter().map(rounded::<T>).collect())).collect();
         let mut short: BTreeMap<String, Vec<T>> =
-            rounded.iter().map(|(n, x)| (n.clone(), x.iter().copied().map(T::constant).collect())).collect();
+            given.iter().map(|(n, x)| (n.clone(), x.iter().copied().map(T::constant).collect())).collect();
         let of = |graph: &Graph, given: &BTreeMap<String, Vec<T>>| -> Vec<T> {
             graph.inputs.iter().flat_map(|p| given[&p.name].clone()).collect()
         };
         let found = evaluate(graph, &of(graph, &short));
-        let exact = evaluate(graph, &inputs(graph, &rounded));
+        let exact = evaluate(graph, &inputs(graph, &given));
         // a bound by residuals asks for what is to be judged
         let mut first = 0;
         for port in &graph.outputs {
@@ -355,7 +457,8 @@ fn bounded<T: Real + Into<f64>>(
             let most: f64 = (*most).into();
             if off > most {
                 let result = format!("the error of {}", element_of(&graph.outputs, k));
-                return Err(Disagreement { program: format!("{name}_error_bound"), result, difference: off / most });
+                let program = format!("{name}_error_bound");
+                return Err(Disagreement { program, result, difference: off / most, plain: None });
             }
         }
     }
