@@ -232,7 +232,7 @@ mod tests {
     fn a_package_that_cannot_be_written_leaves_the_old_one() {
         let directory = scratch("refused");
         let manifest = ("Cargo.toml".to_string(), format!("{MARK}\n"));
-        write_directory(&directory, &[manifest.clone()]).unwrap();
+        write_directory(&directory, std::slice::from_ref(&manifest)).unwrap();
         fs::write(directory.join("src"), "a file where a directory is wanted").unwrap();
         let changed = ("Cargo.toml".to_string(), format!("{MARK} again\n"));
         write_directory(&directory, &[changed, ("src/lib.rs".to_string(), String::new())]).unwrap_err();

@@ -4,6 +4,7 @@
 //! Every evaluation is one of a climb towards the worst error, with the truth computed anew. The long search is
 //! `cargo test --release -p straightline-codegen --no-default-features --features verify --test certificates_of_robots -- --ignored --nocapture`
 
+#[allow(unused_imports)] // shared with tests that take more
 #[path = "../../generated_tests/src/written/mod.rs"]
 #[allow(dead_code)] // other tests use the rest
 mod written;
@@ -46,7 +47,7 @@ const FUNCTIONS: [Function; 4] =
 fn from_files() -> Vec<Source> {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions");
     let read = |file: &str| std::fs::read_to_string(folder.join(file)).unwrap_or_else(|e| panic!("{file}: {e}"));
-    FILES.iter().map(|file| Source::new(*file, read(file))).collect()
+    FILES.iter().map(|file| Source::new(file, read(file))).collect()
 }
 
 /// Numbers of 1 to 16 digits, right angles cut anywhere, dust, tiny masses, zeros.

@@ -277,7 +277,7 @@ fn words(text: &str) -> Vec<Range<usize>> {
             continue;
         } else if bytes[at].is_ascii_digit() {
             let byte = |at: usize| bytes.get(at).copied().unwrap_or(b' ');
-            let ends = |at: usize| !is_word(byte(at)) && !(byte(at) == b'.' && byte(at + 1).is_ascii_digit());
+            let ends = |at: usize| !(is_word(byte(at)) || byte(at) == b'.' && byte(at + 1).is_ascii_digit());
             let in_exponent = |at: usize| matches!(byte(at), b'-' | b'+') && byte(at - 1) == b'e';
             while !ends(at) || in_exponent(at) {
                 at += 1;
@@ -527,7 +527,7 @@ fn let_through(most: usize) -> (usize, Vec<String>) {
         }
         for mutant in mutants {
             count += 1;
-            let text = mutant.text + &generated.text[end..];
+            let text = format!("{}{}", mutant.text, &generated.text[end..]);
             if reader.check(&text).is_ok() && !mutant.same(&generated.text) {
                 missed.push(format!("{name}, {}", mutant.what));
             }

@@ -156,7 +156,7 @@ fn elastic(model: &mut Model<f64>, stiffness: f64) {
     let stage = Stage { ratio: 60.0, stiffness, damping: Some(1e-3 * stiffness), inertia: 2e-6, efficiency: None };
     let of = |i: usize| {
         let mut drive = drive(&format!("d{i}"), MOTOR, &[(i, 1.0)]);
-        drive.stages = vec![stage.clone()];
+        drive.stages = vec![stage];
         drive.input_limit = Some(24.0);
         drive
     };
@@ -177,7 +177,7 @@ fn a_tree_of_thirty_driven_joints_has_room_in_the_implicit_method() {
         .map(|i: usize| match i {
             0 => None,
             1..6 => Some(i - 1),
-            _ if i % 6 == 0 => Some(5),
+            _ if i.is_multiple_of(6) => Some(5),
             _ => Some(i - 1),
         })
         .collect();

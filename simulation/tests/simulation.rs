@@ -272,7 +272,7 @@ fn an_analysis_that_cannot_be_is_refused() {
     let mut heavy = arm();
     heavy.bodies[2].inertia.mass = 1e308;
     let motion = Motion::quintic(&[0.0, 1.0], &[vec![0.0; 3], vec![90.0; 3]]).expect("a motion");
-    let why = analyze(&heavy, &motion, 0.01).err().expect("torques are beyond all numbers").to_string();
+    let why = analyze(&heavy, &motion, 0.01).expect_err("torques are beyond all numbers").to_string();
     assert!(why.contains("tau.") && why.contains("finite"), "{why}");
     assert_eq!(of(&points, &[0.0, 1.0], 0.005), None);
 }

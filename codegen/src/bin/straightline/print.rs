@@ -63,7 +63,10 @@ impl Patience {
     /// Often called, and cheap.
     pub fn say(&self, how_far: impl Fn() -> String) {
         self.calls.set(self.calls.get().wrapping_add(1));
-        if !is_quiet() && self.calls.get() % 256 == 0 && self.began.elapsed() >= Duration::from_secs(self.next.get()) {
+        if !is_quiet()
+            && self.calls.get().is_multiple_of(256)
+            && self.began.elapsed() >= Duration::from_secs(self.next.get())
+        {
             eprintln!("{} s gone by: {}", self.next.get(), how_far());
             self.next.set(2 * self.next.get());
         }
