@@ -276,7 +276,10 @@ fn joint_program(
             let all = if *function == Function::InverseDynamics && inverse == InverseForm::MassMatrix {
                 let (h, bias) = (equations(Function::MassMatrix), equations(Function::BiasForce));
                 let nv = bias.len();
-                let qdd = if scene.zero.qdd { vec![Expr::zero(); nv] } else { argument(&"qdd".to_string()) };
+                // what the scene knows to be at rest is so here, too
+                let own: Vec<Vec<Expr>> =
+                    scene.ports(*function, &robot.model).iter().map(|p| argument(&p.name)).collect();
+                let qdd = scene.bind(*function, robot, &own).arguments[2].clone();
                 Expr::section("inverse dynamics, H q̈ + h", None);
                 let row = |i: usize| (0..nv).fold(bias[i], |sum, j| sum + h[i * nv + j] * qdd[j]);
                 (0..nv).map(row).collect()

@@ -21,8 +21,8 @@ pub mod drive;
 pub mod dual;
 pub mod integrate;
 pub mod jet;
-#[cfg(feature = "alloc")]
 pub mod magnitude;
+#[cfg(feature = "alloc")]
 pub mod model;
 pub mod phases;
 pub mod real;
