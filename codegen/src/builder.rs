@@ -24,10 +24,10 @@
 use crate::compile::{compile, Generated, Options};
 use crate::diagnostic::{Diagnostics, Front, Level, Reporting, Severity, Source};
 use crate::emit::{Lanes, Scalar};
-use crate::export::identifier;
 use crate::expr::Grade;
 use crate::function::{ForwardDynamicsMethod, Function};
-use crate::output::write_file;
+use crate::identifier::prefix;
+use crate::output::write_file_apart;
 use crate::scene::{self, Scene};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -102,9 +102,16 @@ impl Builder {
     }
 
     /// Whether a·b + c is one operation, with one rounding, where the machine has it: last bits are other ones there than
-    /// elsewhere. The code needs `std`.
+    /// elsewhere. The operation is that of `std`; where there is none (`target_os = "none"`), a·b is rounded first.
     pub fn fma(mut self, fma: bool) -> Self {
         self.options.fma = fma;
+        self
+    }
+
+    /// The same with the operation from your crate, `crate::mul_add_f64(a, b, c)` and of f32 `crate::mul_add_f32`, such as `libm::fma`
+    /// or an instruction: always fused, and the code needs `core` alone.
+    pub fn fma_by_caller(mut self) -> Self {
+        (self.options.fma, self.options.fma_by_caller) = (true, true);
         self
     }
 
@@ -263,8 +270,12 @@ impl Builder {
         })?;
         messages.tell(&generated.warnings);
         let stem = self.robot.file_stem().unwrap_or_default().to_string_lossy();
-        let module = self.module.clone().unwrap_or_else(|| identifier(&stem));
-        write_file(&out_dir.join(format!("{module}.rs")), &generated.text).map_err(Error::Write)?;
+        let module = self.module.clone().unwrap_or_else(|| prefix(&stem));
+        if Path::new(&module).file_name().is_none_or(|name| name != module.as_str()) {
+            return Err(Error::Module(module));
+        }
+        let file = out_dir.join(format!("{module}.rs"));
+        write_file_apart(&file, &generated.text, [robot].into_iter().chain(scene)).map_err(Error::Write)?;
         Ok(generated)
     }
 }
@@ -306,6 +317,8 @@ pub enum Error {
     Read(PathBuf, std::io::Error),
     /// The output cannot be written.
     Write(std::io::Error),
+    /// What [`Builder::module`] was told is no name of a file.
+    Module(String),
     /// Neither cargo's `OUT_DIR` nor [`Builder::out_dir`] says where to write.
     NoOutDir,
 }
@@ -317,6 +330,9 @@ impl fmt::Display for Error {
             Error::Robot { path, errors } => write!(f, "{}: {errors} errors", path.display()),
             Error::Read(path, error) => write!(f, "{}: {error}", path.display()),
             Error::Write(error) => write!(f, "{error}"),
+            Error::Module(name) => {
+                write!(f, "`{}` is no name of a module: it becomes that of a file", name.escape_default())
+            }
             Error::NoOutDir => f.write_str("OUT_DIR is not set: outside of a build script, say where with `out_dir`"),
         }
     }
@@ -333,7 +349,7 @@ impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
             Error::Read(_, error) | Error::Write(error) => Some(error),
-            Error::Robot { .. } | Error::NoOutDir => None,
+            Error::Robot { .. } | Error::Module(_) | Error::NoOutDir => None,
         }
     }
 }

@@ -211,3 +211,80 @@ fn a_scene_reaches_every_command_and_the_command_line_wins() {
     assert!(twice.code == 1 && twice.err.contains("gravity is given by the scene and by an option"), "{}", twice.err);
     assert_eq!(straightline(&["report", ARM, "--scene", "nowhere.toml"]).code, 3);
 }
+
+#[test]
+fn no_command_writes_over_what_it_reads() {
+    let directory = scratch("inputs");
+    let text = fs::read_to_string(ARM).unwrap();
+    let (robot, scene) = (directory.join("arm.toml"), directory.join("scene.toml"));
+    fs::write(&robot, &text).unwrap();
+    fs::write(&scene, "[zero]\nqd = true\n").unwrap();
+    let inside = directory.join("../inputs/arm.toml");
+    let mut commands = vec![
+        vec!["generate", robot.to_str().unwrap(), "-o", robot.to_str().unwrap()],
+        vec!["generate", robot.to_str().unwrap(), "-o", inside.to_str().unwrap()],
+        vec!["report", robot.to_str().unwrap(), "--html", robot.to_str().unwrap()],
+        vec!["generate", robot.to_str().unwrap(), "--scene", scene.to_str().unwrap(), "-o", scene.to_str().unwrap()],
+    ];
+    let link = directory.join("link.rs");
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(&robot, &link).unwrap();
+        commands.push(vec!["generate", robot.to_str().unwrap(), "-o", link.to_str().unwrap()]);
+    }
+    for command in commands {
+        let run = straightline(&command);
+        assert_eq!(run.code, 3, "{command:?}: {}", run.err);
+        assert!(run.err.contains("this is the input") && run.err.contains("nothing was written"), "{}", run.err);
+        assert_eq!(fs::read_to_string(&robot).unwrap(), text, "{command:?}");
+        assert_eq!(fs::read_to_string(&scene).unwrap(), "[zero]\nqd = true\n", "{command:?}");
+    }
+}
+
+#[test]
+fn a_second_export_leaves_what_is_not_its_own() {
+    let directory = scratch("twice");
+    let package = directory.join("package");
+    let export = |functions: &[&str]| {
+        let mut arguments = vec!["export", ARM, "--c-abi", "-o", package.to_str().unwrap()];
+        functions.iter().for_each(|f| arguments.extend(["--function", f]));
+        let run = straightline(&arguments);
+        assert_eq!(run.code, 0, "{}", run.err);
+    };
+    export(&["gravity_force", "mass_matrix"]);
+    fs::create_dir(package.join(".git")).unwrap();
+    fs::write(package.join(".git/HEAD"), "ref: refs/heads/main").unwrap();
+    fs::write(package.join("src/mine.rs"), "// mine").unwrap();
+    export(&["gravity_force"]);
+    assert_eq!(fs::read_to_string(package.join(".git/HEAD")).unwrap(), "ref: refs/heads/main");
+    assert_eq!(fs::read_to_string(package.join("src/mine.rs")).unwrap(), "// mine");
+    assert!(!package.join("src/dynamics/mass_matrix.rs").exists(), "it is no longer part of the package");
+    assert!(package.join("src/dynamics/gravity_force.rs").exists());
+}
+
+#[test]
+fn robots_of_any_name_export_a_package_that_cargo_takes() {
+    let directory = scratch("named");
+    let text = fs::read_to_string(ARM).unwrap();
+    for (k, name) in ["(2R)", "[7dof]", "\u{440}\u{443}\u{43a}\u{430}", "-", "test"].into_iter().enumerate() {
+        let (robot, package) = (directory.join(format!("{k}.toml")), directory.join(format!("{k}")));
+        fs::write(&robot, text.replacen("name = \"arm\"", &format!("name = \"{name}\""), 1)).unwrap();
+        let run = straightline(&[
+            "export",
+            robot.to_str().unwrap(),
+            "--c-abi",
+            "--function",
+            "gravity_force",
+            "-o",
+            package.to_str().unwrap(),
+        ]);
+        assert_eq!(run.code, 0, "{name}: {}", run.err);
+        // reads the manifest, and compiles nothing
+        let cargo = Command::new(env!("CARGO"))
+            .args(["metadata", "--offline", "--no-deps", "--format-version=1", "--manifest-path"])
+            .arg(package.join("Cargo.toml"))
+            .output()
+            .unwrap();
+        assert!(cargo.status.success(), "{name}: {}", String::from_utf8_lossy(&cargo.stderr));
+    }
+}

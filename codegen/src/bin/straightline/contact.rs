@@ -1,14 +1,15 @@
 //! The command `simulate` of a robot that touches objects.
 
 use crate::arguments::Simulate;
+use crate::files::{self, read as read_file};
 use crate::motion::{failed, lines, print_run, write_table};
-use crate::{print, read as read_file, Failure};
+use crate::{print, Failure};
 use anstream::stdout;
 use std::io::Write;
 use std::path::Path;
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
+use straightline_codegen::experiment;
 use straightline_codegen::scene::contact::Contacts as Items;
-use straightline_codegen::{experiment, output};
 use straightline_core::model::Model;
 use straightline_simulation::contact::{ContactRun, Contacts};
 use straightline_simulation::plant::Plant;
@@ -64,7 +65,7 @@ pub fn finish(
             print::error(&format!("the plot cannot be drawn: {why}"));
             Failure::Input
         })?;
-        output::write_file(path, &svg)?;
+        files::write(path, &svg)?;
     }
     let mut out = stdout().lock();
     let width = contacts.touches.iter().map(|t| t.contact.name.chars().count()).max().unwrap_or(0);

@@ -5,18 +5,20 @@
 
 mod arguments;
 mod contact;
+mod files;
 mod motion;
 mod page;
 mod print;
 
 use arguments::{Check, Command, CommandLine, Export, Generate, ModelArgs, ProgramArgs, Report, Verify};
+use files::read;
 use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 use straightline_codegen::compile::{compile, explain, Generated, Options};
 use straightline_codegen::diagnostic::{self, codes, Diagnostics, Severity, Source};
 use straightline_codegen::report::html;
-use straightline_codegen::{description, export, model, output, scene, verify};
+use straightline_codegen::{description, export, identifier, model, output, scene, verify};
 
 /// Why a command ended early; what there is to say was said where it happened, except for [`Failure::Files`].
 enum Failure {
@@ -58,12 +60,6 @@ fn main() -> ExitCode {
             ExitCode::from(3)
         }
     }
-}
-
-fn read(path: &Path) -> Result<Source, Failure> {
-    let shown = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|e| io::Error::new(e.kind(), format!("{shown}: {e}")))?;
-    Ok(Source::from_bytes(&shown, bytes))
 }
 
 /// What the command line and the scene that it names say; what is wrong with the scene is said when it is used.
@@ -125,7 +121,7 @@ fn generate(a: &Generate) -> Result<(), Failure> {
     let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;
     let Some(path) = &a.output else { return Ok(print::text(&generated.text)?) };
     if !a.check {
-        output::write_file(path, &generated.text)?;
+        files::write(path, &generated.text)?;
         return Ok(());
     }
     let (file, robot) = (path.display(), a.robot.display());
@@ -148,7 +144,7 @@ fn generate(a: &Generate) -> Result<(), Failure> {
 fn report(a: &Report) -> Result<(), Failure> {
     let (generated, options) = compiled_by(explain, &a.robot, &a.program, &a.model)?;
     if let Some(path) = &a.html {
-        output::write_file(path, &html::page(&read(&a.robot)?, &options, &generated))?;
+        files::write(path, &html::page(&read(&a.robot)?, &options, &generated))?;
         return Ok(());
     }
     Ok(if a.json { print::json(&generated.report) } else { print::report(&generated.report) }?)
@@ -206,13 +202,18 @@ fn export(a: &Export) -> Result<(), Failure> {
         print::help("leave out --generic; --scalar says which numbers the C functions take");
         return Err(Failure::Input);
     }
+    if a.program.fma_by_caller() {
+        print::error("an exported package has no crate around it that could have `mul_add_f64`");
+        print::help("write --fma: the package has std");
+        return Err(Failure::Input);
+    }
     let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;
     if !generated.others.is_empty() || generated.report.staged.is_some() {
         print::error("a C package has one scalar type, and no stages: C could not tell a stage that is out of date");
         print::help("say which with `--scalar`, and leave `staged` out of the scene");
         return Err(Failure::Input);
     }
-    let prefix = a.prefix.clone().unwrap_or_else(|| export::identifier(&generated.model.name));
+    let prefix = a.prefix.clone().unwrap_or_else(|| identifier::prefix(&generated.model.name));
     output::write_directory(&a.output, &export::c_package(&generated, &prefix))?;
     Ok(())
 }

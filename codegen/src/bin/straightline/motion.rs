@@ -1,7 +1,8 @@
 //! The commands `simulate` and `analyze`.
 
 use crate::arguments::{Analyze, ModelArgs, Simulate};
-use crate::{contact, options, page, print, read, Failure};
+use crate::files::{self, read};
+use crate::{contact, options, page, print, Failure};
 use anstream::stdout;
 use std::io::Write;
 use std::path::Path;
@@ -13,7 +14,7 @@ use straightline_codegen::diagnostic::{Diagnostics, Severity};
 use straightline_codegen::experiment::design::Design;
 use straightline_codegen::experiment::{self, parameter, parquet, Experiment};
 use straightline_codegen::singular::{self, Inertia};
-use straightline_codegen::{model, output, scene};
+use straightline_codegen::{model, scene};
 use straightline_core::model::{Body, Model};
 use straightline_core::Dd;
 use straightline_simulation::analysis::{self, Analysis};
@@ -92,11 +93,15 @@ fn experiment(
 ) -> Result<Experiment, Failure> {
     let source = match parquet::is_parquet(path) {
         false => read(path)?,
-        true => parquet::source(path, &path.display().to_string()).map_err(|why| unreadable(path, &why))?,
+        true => {
+            files::note(path);
+            parquet::source(path, &path.display().to_string()).map_err(|why| unreadable(path, &why))?
+        }
     };
     // files count from the one that names them
     let beside = |name: &str| {
         let file = path.parent().unwrap_or(Path::new("")).join(name);
+        files::note(&file);
         parquet::source(&file, &file.display().to_string()).map_err(|why| format!("{}: {why}", file.display()))
     };
     let mut diagnostics = Diagnostics::new();
@@ -113,7 +118,7 @@ fn unreadable(path: &Path, why: &str) -> Failure {
 /// Writes a table as CSV, or as JSON or Parquet where the file's name says so.
 pub fn write_table(path: &Path, table: &Table) -> Result<(), Failure> {
     if parquet::is_parquet(path) {
-        output::write_file(path, &parquet::bytes(table).map_err(|why| unreadable(path, &why))?)?;
+        files::write(path, &parquet::bytes(table).map_err(|why| unreadable(path, &why))?)?;
         return Ok(());
     }
     let text = match path.extension().is_some_and(|e| e == "json") {
@@ -126,7 +131,7 @@ pub fn write_table(path: &Path, table: &Table) -> Result<(), Failure> {
         }
         false => table.csv(),
     };
-    output::write_file(path, &text)?;
+    files::write(path, &text)?;
     Ok(())
 }
 
@@ -210,7 +215,7 @@ pub fn simulate(a: &Simulate) -> Result<(), Failure> {
             lines.retain(|line| !is_passive(line.name));
         }
         let plot = Plot { title, axes: ("t [s]", "rad or m"), lines, levels: Vec::new() };
-        output::write_file(path, &drawn(&plot)?)?;
+        files::write(path, &drawn(&plot)?)?;
     }
     print_run(&plant, &run)
 }
@@ -267,7 +272,7 @@ pub fn analyze(a: &Analyze) -> Result<(), Failure> {
         Some(sweep) => swept(&description, &options, sweep, &motion, a.interval)?,
     };
     if let Some(path) = &a.html {
-        output::write_file(path, &page::page(a, &model, &motion, &found, &swept))?;
+        files::write(path, &page::page(a, &model, &motion, &found, &swept))?;
     }
     print_analysis(&model, &motion, &found)?;
     if let Some(sweep) = &a.sweep {
