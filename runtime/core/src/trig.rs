@@ -49,6 +49,11 @@ macro_rules! in_lanes {
             x: [$scalar; N]
             $(, $fma: impl Fn($scalar, $scalar, $scalar) -> $scalar + Copy)?
         ) -> ([$scalar; N], [$scalar; N]) {
+            if $lanes == 1 {
+                // no vectors: arrays that are filled later would begin as calls of `memset`
+                let both = x.map(|x| $one(x $(, $fma)?));
+                return (both.map(|(sin, _)| sin), both.map(|(_, cos)| cos));
+            }
             const BLOCK: usize = $block;
             let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
             let (mut sin, mut cos) = ([0.0; BLOCK], [0.0; BLOCK]);
@@ -85,6 +90,10 @@ macro_rules! sums_in_lanes {
             x: [[$scalar; 2]; N]
             $(, $fma: impl Fn($scalar, $scalar, $scalar) -> $scalar + Copy)?
         ) -> ([$scalar; N], [$scalar; N]) {
+            if $lanes == 1 {
+                let both = x.map(|x| $one(x $(, $fma)?));
+                return (both.map(|(sin, _)| sin), both.map(|(_, cos)| cos));
+            }
             const BLOCK: usize = $block;
             let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
             let (mut sin, mut cos) = ([0.0; BLOCK], [0.0; BLOCK]);
