@@ -154,9 +154,9 @@ fn cases() -> Vec<Case> {
     ]
 }
 
-fn package() -> PathBuf {
+fn package(name: &str) -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let package = Path::new(env!("CARGO_TARGET_TMPDIR")).join("broken");
+    let package = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     for directory in ["src/bin", "robot"] {
         fs::create_dir_all(package.join(directory)).unwrap();
     }
@@ -171,7 +171,7 @@ fn package() -> PathBuf {
 
 #[test]
 fn what_is_wrong_is_said_once_and_every_use_compiles() {
-    let package = package();
+    let package = package("broken");
     let mut wrong = String::new();
     for (name, attribute, uses, robot, scene, expected) in cases() {
         let main =
@@ -205,7 +205,7 @@ fn what_is_wrong_is_said_once_and_every_use_compiles() {
 /// A module by the other macro.
 #[test]
 fn a_module_of_a_broken_robot_is_one_error_too() {
-    let package = package();
+    let package = package("broken_module");
     let main = "straightline::dynamics! {\n    pub mod arm = \"robot/none.toml\", functions(mass_matrix), generic,\n}\n\
                 fn main() {\n    let mut h = [[0.0; arm::NV]; arm::NV];\n    arm::mass_matrix(&[0.1, 0.2, 0.3], &mut h);\n    \
                 arm::mass_matrix::<f64>(&[0.1, 0.2, 0.3], &mut h);\n    println!(\"{}\", h[0][0] + 1.0);\n}\n";
