@@ -5,7 +5,7 @@
 //! drops what it may not drop, or a form of the robot is not the robot, the two differ, and the next plainer form is taken.
 //!
 //! Differences are compared with the natural scale of the *result*: what its plain equations are made of
-//! ([`Magnitude`](straightline_core::magnitude::Magnitude)), each vector counted with its length. Accelerations are judged by what they leave of
+//! ([`Magnitude`]), each vector counted with its length. Accelerations are judged by what they leave of
 //! the equations of motion, τ − H q̈ − h: that says the same for robots whose H is nearly singular.
 //!
 //! What is equal over the reals may still lose digits that the plain equations keep, or leave the range of f32. So both run in the scalar that

@@ -1,6 +1,6 @@
 //! Reads what was emitted back, and compares it with the programs that it was to be.
 //!
-//! The text is cut into words, its items are found, and every function is run over [`values`], where two values are the same if and only
+//! The text is cut into words, its items are found, and every function is run over `values`, where two values are the same if and only
 //! if the same operations on the same inputs make them. The programs are run there, too. So a text passes if and only if it has, for
 //! every result, the program's operations on the program's operands and constants, bit for bit, whatever its locals are called and
 //! wherever it is cut: a fused a·b + c counts as the product and the sum, and what a program does not compute no text may compute.
