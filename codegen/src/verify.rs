@@ -547,7 +547,9 @@ impl Truth<'_> {
             MassMatrix => {
                 let mut h = reference::mass_matrix(tree, q);
                 self.drives.iter().for_each(|drive| h[(drive.iv, drive.iv)] += drive.inertia);
-                let root: Vec<f64> = (0..h.nrows()).map(|i| h[(i, i)].to_f64().sqrt()).collect();
+                let uncancelled = self.uncancelled_inertias();
+                let root: Vec<f64> =
+                    (0..h.nrows()).map(|i| h[(i, i)].to_f64().max(NOISE * uncancelled[i]).sqrt()).collect();
                 (h.as_slice().to_vec(), root.iter().flat_map(|a| root.iter().map(move |b| a * b)).collect())
             }
             ForwardDynamics => {
@@ -657,6 +659,34 @@ impl Truth<'_> {
             }
         }
         scales.iter_mut().zip(uncancelled).for_each(|(scale, most)| *scale = scale.max(NOISE * most));
+    }
+
+    /// What the diagonal of the mass matrix would be if every mass centre stood off every axis as far as it can. Where all that a joint
+    /// moves comes to lie on its axis, the entry itself is rounding noise, and nothing is left to judge by.
+    fn uncancelled_inertias(&self) -> Vec<f64> {
+        let tree = self.tree;
+        let mut sums = vec![0.0; tree.nv()];
+        for link in &tree.links {
+            let (mass, inertia) = (link.mass.to_f64().abs(), length(link.inertia.as_slice()));
+            let mut lever = 0.0;
+            let mut carrier = Some(link);
+            while let Some(joint) = carrier {
+                lever += length(joint.r.as_slice());
+                let moment = mass * lever * lever + inertia;
+                let terms = match joint.joint {
+                    Joint::Linear => vec![mass],
+                    Joint::Revolute => vec![moment],
+                    Joint::Free => [[mass; 3], [moment; 3]].concat(),
+                };
+                sums[joint.iv..].iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+                if joint.joint == Joint::Linear {
+                    lever += self.state.q[joint.iq].abs();
+                }
+                lever += length(joint.r_parent.as_slice());
+                carrier = joint.parent.map(|parent| &tree.links[parent]);
+            }
+        }
+        sums
     }
 
     /// The reach of a point of a link, `beyond` its mass centre.

@@ -9,7 +9,7 @@ use straightline_codegen::diagnostic::Diagnostics;
 use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::limbs::LimbForm;
 use straightline_codegen::readback::{checked, complaint, Reader};
-use straightline_codegen::scene::{Budget, Interval, JointRanges, MaxError};
+use straightline_codegen::scene::{Budget, Interval, JointRanges, MaxError, Scene};
 use straightline_codegen::schedule::Limits;
 use straightline_codegen::{compile, scene, Function, Grade, Source};
 
@@ -116,7 +116,7 @@ fn generated(robot: &Source, options: &Options) -> Generated {
 type Way = (&'static str, fn(Options) -> Options);
 
 /// Ways to write a robot's functions.
-const STYLES: [Way; 10] = [
+const STYLES: [Way; 11] = [
     ("plain", |o| o),
     ("in parts", |o| Options { limits: Limits { operations: 60 }, ..o }),
     ("exact", |o| Options { grade: Grade::Exact, ..o }),
@@ -137,6 +137,7 @@ const STYLES: [Way; 10] = [
         scalar: Scalar::F32,
         ..o
     }),
+    ("fused stages", |o| Options { scene: Scene { staged: true, ..o.scene }, fma: true, ..o }),
     ("bounds at a state", |o| Options { certify: Some(Effort { companions: true, ..Effort::default() }), ..o }),
 ];
 
@@ -172,8 +173,8 @@ fn scene_of(text: &str, frame: &str) -> Source {
     Source::new("scene.toml", text.replace("FRAME", frame))
 }
 
-/// A program in f32 that computes some values in f64.
-fn in_mixed_precision() -> Generated {
+/// A program in f32 that computes some values in f64; `companions`: with bounds of its errors at a state.
+fn in_mixed_precision(companions: bool) -> Generated {
     let robot = file("descriptions/planar_2r.toml");
     let mut options = Options { scalar: Scalar::F32, ..options(&[Function::InverseDynamics]) };
     options.scene.ranges.qd = JointRanges::All(Interval::within(0.5));
@@ -184,8 +185,10 @@ fn in_mixed_precision() -> Generated {
     let most = 0.5 * errors.bounds().fold(0.0, f64::max);
     let budget = Budget { max_error: Some(MaxError::All(most)), mixed_precision: true, ..Budget::default() };
     options.scene.budgets.insert(Function::InverseDynamics, budget);
+    options.certify = Some(Effort { companions, ..Effort::default() });
     let mixed = generated(&robot, &options);
     assert!(mixed.text.contains("as f32)") && mixed.text.contains("f64::from("), "nothing is in f64");
+    assert_eq!(mixed.text.contains("fn inverse_dynamics_error_bound("), companions);
     mixed
 }
 
@@ -207,13 +210,16 @@ fn small_texts() -> Vec<(String, Generated)> {
     texts.push(("stages with a parameter".into(), generated(&robot, &staged)));
     let batches = Options { lanes: Some(Lanes::Runtime), ..staged.clone() };
     texts.push(("batches with a parameter".into(), generated(&robot, &batches)));
-    let generic = Options { generic: true, ..staged };
+    let generic = Options { generic: true, ..staged.clone() };
     texts.push(("generic with a parameter".into(), generated(&robot, &generic)));
+    let fused = Options { fma: true, scalar: Scalar::F32, ..staged };
+    texts.push(("fused stages with a parameter in f32".into(), generated(&robot, &fused)));
     let contacts = in_scene(&scene_of(CONTACTS, "limb0_1"), options(&[Function::BiasForce]));
     let contacts = generated(&robot, &contacts);
     assert!(contacts.text.contains("match mode {"), "there is no function for all modes");
     texts.push(("contacts".into(), contacts));
-    texts.push(("mixed precision".into(), in_mixed_precision()));
+    texts.push(("mixed precision".into(), in_mixed_precision(false)));
+    texts.push(("mixed precision with bounds at a state".into(), in_mixed_precision(true)));
     texts
 }
 

@@ -14,7 +14,7 @@ mod as_written;
 #[path = "../../generated_tests/src/standalone.rs"]
 mod standalone;
 
-use as_written::{in_words, judge, judge_all, survey, Case, File, Outcome, State};
+use as_written::{by_steps, in_words, judge, judge_all, survey, Case, File, Outcome, State};
 use standalone::Folder;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -95,6 +95,21 @@ fn robots_that_once_lost_digits_keep_them() {
                 let words: Vec<String> = failures.iter().map(in_words).collect();
                 assert!(words.is_empty(), "{name}: {}", words.join("; "));
             }
+        }
+    }
+}
+
+/// What each optimisation does to the digits of `FILE=…`, a robot file: of all functions, or of `FUNCTION=…`.
+#[test]
+#[ignore = "for one robot that is asked for"]
+fn steps_of_a_file() {
+    let Ok(path) = std::env::var("FILE") else { return };
+    let source = Source::new(&path, std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path}: {e}")));
+    let file = File { source, floating: path.contains("floating"), frames: Vec::new() };
+    let wanted = std::env::var("FUNCTION").ok();
+    for function in Function::all().filter(|f| wanted.as_ref().is_none_or(|w| w == f.name())) {
+        for scalar in [Scalar::F64, Scalar::F32] {
+            println!("{} in {}\n{}", function.name(), scalar.name(), by_steps(&file, scalar, function));
         }
     }
 }

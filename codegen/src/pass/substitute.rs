@@ -9,7 +9,7 @@
 //! * x ∘ p, p = y ∘ z, where p is new and may serve several values.
 //!
 //! Which of these hold is not derived, by whatever rules, but seen: at random inputs, in double-double. All values are rational in
-//! the inputs, sines and cosines; roots and signs count as inputs of their own. Two that agree to 1e-25 at four random states are one,
+//! the inputs, sines and cosines; roots and signs count as inputs of their own. Two that agree to 1e-28 at four random states are one,
 //! as long as no result of the program sees what they differ by: what is below all digits of a value need not be below those of a result.
 //! That finds what follows from distributive laws, from s² + c² = 1 and from constants that fit, however many steps it takes, and
 //! nothing that holds for unit quaternions alone.
@@ -29,10 +29,11 @@ use straightline_core::Dd;
 
 /// Random states.
 const POINTS: usize = 4;
-/// Two values that agree so well are equal; double-double has 1e-31, of the greatest term.
-const EQUAL: f64 = 1e-25;
+/// Two values that agree so well are equal; double-double has 1e-31, of the greatest term. Less well agree those of robots whose inertias
+/// differ by 1e20: a term that is missed there may be all that another state has.
+const EQUAL: f64 = 1e-28;
 /// So little of it a result may change.
-const UNCHANGED: f64 = 1e-24;
+const UNCHANGED: f64 = 1e-27;
 /// How much greater than the terms of what it replaces a term may be.
 const GREATER: f64 = 4.0;
 /// Values of the greatest graph that is searched; it takes some tenths of a second.

@@ -174,6 +174,37 @@ fn worst<T: Real>(
 /// The worst error of a program at a state, and of which result.
 type Judge = dyn Fn(&Graph, &State, &(Vec<Dd>, Vec<f64>)) -> (f64, usize);
 
+/// The worst scaled error of a program over some states, in double-double and in the scalar that it is made for.
+fn losses(graph: &Graph, scalar: Scalar, states: &[State], truths: &[(Vec<Dd>, Vec<f64>)]) -> [f64; 2] {
+    let most = |error: &Judge| states.iter().zip(truths).map(|(s, t)| error(graph, s, t).0).fold(0.0, f64::max);
+    let in_scalar = match scalar {
+        Scalar::F64 => most(&|g, s, t| worst::<f64>(g, s, t, Dd::from)),
+        Scalar::F32 => most(&|g, s, t| worst::<f32>(g, s, t, |x| Dd::from(f64::from(x)))),
+    };
+    [most(&|g, s, t| worst::<Dd>(g, s, t, |x| x)), in_scalar]
+}
+
+/// What a function loses with one optimisation more at each step, in words, a line each.
+pub fn by_steps(file: &File, scalar: Scalar, function: Function) -> String {
+    let options = Options { scalar, ..file.options() };
+    let Some(model) = model::load(&file.source, &options.model).0 else { return String::new() };
+    let Ok(second) = SecondReading::new(&file.source, &model, &options) else { return String::new() };
+    let mut random = Random(99);
+    let states: Vec<State> = (0..6).map(|kind| State::new(&model, &mut random, kind)).collect();
+    let of_state = |s: &State| second.outputs(function, &file.frames, s.0.each_ref().map(|x| &x[..]));
+    let Ok(truths) = states.iter().map(of_state).collect::<Result<Vec<_>, _>>() else { return String::new() };
+    let loaded = Robot::new(model);
+    let mut steps = vec![("the equations as they are", Optimisations::default())];
+    steps.extend(options.optimisations().steps());
+    let mut text = String::new();
+    for (step, optimisations) in steps {
+        let graph = optimised(&loaded, &file.frames, function, &options, optimisations);
+        let [equations, program] = losses(&graph, scalar, &states, &truths);
+        let _ = writeln!(text, "  {step}: equations {equations:.1e}, {} {program:.1e}", scalar.name());
+    }
+    text
+}
+
 /// A robot file, and how it is read.
 pub struct File {
     pub source: Source,
@@ -367,7 +398,9 @@ pub fn shrunk(case: &Case, outcome: &Result<Vec<Failure>, String>) -> String {
             (least, format!("{} at {:?}", in_words(&failure), failure.state))
         }
     };
-    let mut text = String::new();
-    let _ = writeln!(text, "SHRUNK {case:?}\n{what}\nfloating: {}\n{}", least.floating, least.text());
-    text
+    let steps = match outcome {
+        Ok(failures) => by_steps(&File::from(&least), failures[0].scalar, failures[0].function),
+        Err(_) => String::new(),
+    };
+    format!("SHRUNK {case:?}\n{what}\nfloating: {}\n{steps}{}", least.floating, least.text())
 }
