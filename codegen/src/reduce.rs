@@ -146,7 +146,9 @@ pub fn is_in_proportion(model: &Model<Dd>, reduced: &ReducedModel<Dd>) -> bool {
     let mass = sum(&|b| b.inertia.mass.hi());
     let inertia = sum(&|b| {
         let i = b.inertia.inertia_com;
-        i.xx.hi() + i.yy.hi() + i.zz.hi()
+        let norm = [i.xx, i.yy, i.zz, i.xy, i.xy, i.xz, i.xz, i.yz, i.yz].map(Dd::hi).into_iter().fold(0.0, f64::hypot);
+        // the trace, but of tensors that are taken as written and belong to no rigid body
+        norm.max(i.xx.hi() + i.yy.hi() + i.zz.hi())
     }) + mass * lever * lever;
     // lengths in metres again
     let metre = reduced.per_unit.hi();

@@ -288,3 +288,19 @@ fn robots_of_any_name_export_a_package_that_cargo_takes() {
         assert!(cargo.status.success(), "{name}: {}", String::from_utf8_lossy(&cargo.stderr));
     }
 }
+
+/// A file that is not written yet to its end takes the command long, and no time of the processor.
+#[cfg(unix)]
+#[test]
+fn what_takes_long_says_so() {
+    use std::io::{BufRead, BufReader};
+    use std::process::Stdio;
+    let mut command = Command::new(env!("CARGO_BIN_EXE_straightline"));
+    let command = command.args(["check", "/dev/stdin"]).stdin(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.stdout(Stdio::null()).spawn().unwrap();
+    let mut said = String::new();
+    BufReader::new(child.stderr.take().unwrap()).read_line(&mut said).unwrap();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(said, "5 s gone by: checking\n");
+}

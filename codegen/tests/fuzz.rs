@@ -16,8 +16,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Processor time of one case \[s\].
-const MOST_SECONDS: f64 = 10.0;
+/// Processor time of one case without a word \[s\].
+const MOST_SILENCE: f64 = 10.0;
+/// Processor time of one case that says how far it is \[s\].
+const MOST_SECONDS: f64 = 60.0;
 /// Memory of one case \[kB\].
 const MOST_MEMORY: u64 = 4_000_000;
 
@@ -166,8 +168,23 @@ const FUNCTIONS: &[&str] = &[
     "drive_energy",
 ];
 
-const SWEEPS: &[&str] =
-    &["upper_arm.mass=0.5:3:3", "forearm.mass=0,1", "elbow.damping=1e300,nan", "x.mass=1:2:3", "elbow.friction=0:1:2"];
+const SWEEPS: &[&str] = &[
+    "upper_arm.mass=0.5:3:3",
+    "link2.mass=0.5:3:3",
+    "forearm.mass=0,1",
+    "elbow.damping=1e300,nan",
+    "x.mass=1:2:3",
+    "elbow.friction=0:1:2",
+];
+
+const RANGES: &[&str] = &[
+    "upper_arm.mass=0.5:3",
+    "forearm.mass=0:1e300",
+    "elbow.damping=0:1",
+    "link2.mass=1:1",
+    "link2.mass=0.1:2",
+    "x.mass=1:2",
+];
 
 impl Case {
     fn new(corpus: &Corpus, seed: u64, number: u64) -> Case {
@@ -262,6 +279,9 @@ impl Case {
                 if r.percent(30) {
                     add(&["--svg", "out.svg"]);
                 }
+                if r.percent(5) {
+                    add(&["--max-steps", r.one(&["0", "1", "1000", "18446744073709551615"])]);
+                }
             }
             "analyze" => {
                 match r.percent(50) {
@@ -273,6 +293,9 @@ impl Case {
                 }
                 if r.percent(10) {
                     add(&["--sweep", r.one(SWEEPS)]);
+                }
+                if r.percent(5) {
+                    add(&["--optimize", r.one(RANGES), "--minimize", r.one(&["rms", "energy", "peak", "heat"])]);
                 }
             }
             "generate" => add(&["-o", "out.rs"]),
@@ -354,13 +377,15 @@ fn used(pid: u32) -> Option<(f64, u64)> {
 
 /// Runs a command in a folder until it ends or has taken too much.
 fn run(binary: &Path, arguments: &[String], folder: &Path) -> Ending {
-    let errors = std::fs::File::create(folder.join("stderr")).expect("a file");
+    let file = |name: &str| std::fs::File::create(folder.join(name)).expect("a file");
+    // warnings are no news of what takes long
+    let is_silent = || !std::fs::read_to_string(folder.join("stderr")).is_ok_and(|text| text.contains("s gone by"));
     let mut child = Command::new(binary)
         .args(arguments)
         .current_dir(folder)
         .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(errors)
+        .stdout(file("stdout"))
+        .stderr(file("stderr"))
         .spawn()
         .expect("the command starts");
     let start = Instant::now();
@@ -375,7 +400,9 @@ fn run(binary: &Path, arguments: &[String], folder: &Path) -> Ending {
         if start.elapsed() > Duration::from_millis(200) {
             let (time, memory) = used(child.id()).unwrap_or((start.elapsed().as_secs_f64(), 0));
             seconds = time;
-            what = if time > MOST_SECONDS {
+            what = if time > MOST_SILENCE && is_silent() {
+                Some("takes long without a word")
+            } else if time > MOST_SECONDS {
                 Some("takes too long")
             } else if memory > MOST_MEMORY {
                 Some("takes too much memory")
@@ -413,14 +440,20 @@ fn judged(ending: &Ending, case: &Case, folder: &Path) -> Option<String> {
         Some(1..=3) => return None,
         Some(code) => return Some(format!("{command} ends with {code}")),
     }
-    if matches!(command.as_str(), "simulate" | "analyze") {
-        let table = std::fs::read_to_string(folder.join("out.csv")).unwrap_or_default();
-        let is_none = |cell: &str| cell.trim().parse::<f64>().is_ok_and(|x| !x.is_finite());
-        if table.lines().skip(1).any(|line| line.split(',').any(is_none)) {
-            return Some(format!("{command} writes a number that is none"));
-        }
-    }
-    None
+    let files: &[&str] = match command.as_str() {
+        "simulate" | "analyze" => &["stdout", "out.csv", "out.json", "out.svg", "out.html"],
+        "report" => &["stdout", "out.html"],
+        "verify" => &["stdout"],
+        _ => &[],
+    };
+    let has_none = |name: &&&str| {
+        let bytes = std::fs::read(folder.join(name)).unwrap_or_default();
+        String::from_utf8_lossy(&bytes).split(|c: char| !c.is_alphanumeric() && c != '_').any(|word| {
+            // JSON has no other word for it; of a table every number is one
+            matches!(word, "NaN" | "inf") || word == "null" && **name == "out.json"
+        })
+    };
+    files.iter().find(has_none).map(|name| format!("{command} writes a number that is none: {name}"))
 }
 
 /// Whether rustc takes what a case has written; none: it has written nothing that stands alone.
@@ -466,7 +499,8 @@ struct Tally {
     done: u64,
     compiled: u64,
     slowest: (f64, u64),
-    commands: BTreeMap<String, [u64; 2]>,
+    /// Per command: cases, those that were done, and those that took more than [`MOST_SILENCE`].
+    commands: BTreeMap<String, [u64; 3]>,
     findings: BTreeMap<String, Vec<u64>>,
 }
 
@@ -508,6 +542,7 @@ fn fuzz(binary: &Path, seed: u64, (first, count): (u64, u64), sample: u64, folde
                 let counts = tally.commands.entry(case.arguments[0].clone()).or_default();
                 counts[0] += 1;
                 counts[1] += u64::from(ending.code == Some(0));
+                counts[2] += u64::from(ending.seconds > MOST_SILENCE);
                 tally.done += u64::from(ending.code == Some(0));
                 if ending.seconds > tally.slowest.0 {
                     tally.slowest = (ending.seconds, number);
@@ -548,8 +583,8 @@ fn shown(tally: &Tally, folder: &Path) -> String {
         "{} cases, {} done, {} compiled by rustc, slowest {:.1} s (case {})\n",
         tally.cases, tally.done, tally.compiled, tally.slowest.0, tally.slowest.1
     );
-    for (command, [all, done]) in &tally.commands {
-        text += &format!("  {command}: {all}, {done} of them done\n");
+    for (command, [all, done, long]) in &tally.commands {
+        text += &format!("  {command}: {all}, {done} of them done, {long} over {MOST_SILENCE} s\n");
     }
     for (finding, cases) in &tally.findings {
         text += &format!("{} times, such as case {}: {finding}\n", cases.len(), cases[0]);

@@ -144,6 +144,26 @@ fn chain(seed: u64, joints: &[(&str, [f64; 3])]) -> Model<Dd> {
     model.unwrap_or_else(|| panic!("{complaints}"))
 }
 
+/// Tensors that belong to no rigid body are taken as written, with a warning: their products count where numbers are held against the robot's.
+#[test]
+fn an_inertia_of_products_alone_is_in_proportion_to_itself() {
+    let path = format!("{}/../robots/descriptions/ur5.urdf", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).unwrap();
+    for products in [
+        "ixx=\"0.0\" ixy=\"0.0\" ixz=\"0.0\" iyy=\"0.0\" iyz=\"1e6\"",
+        "ixx=\"1e6\" ixy=\"0.0\" ixz=\"0.0\" iyy=\"-1e6\" iyz=\"0.0\"",
+    ] {
+        let none = "ixx=\"0.0\" ixy=\"0.0\" ixz=\"0.0\" iyy=\"0.0\" iyz=\"0.0\"";
+        let (before, after) = text.rsplit_once(none).expect("a body without inertia");
+        let (model, complaints) =
+            load(&Source::new("ur5.urdf", format!("{before}{products}{after}")), &ModelOptions::default());
+        assert!(complaints.to_string().contains("negative-moment"), "{complaints}");
+        let robot = Robot::new(model.unwrap());
+        let options = Options::default();
+        optimised(&robot, &[], Function::GravityForce, &options, options.optimisations());
+    }
+}
+
 /// Oblique and nearly parallel axes and slides in every place: where the reduced robot has more terms than the bodies, it is not used.
 #[test]
 fn no_robot_takes_more_operations_than_by_its_bodies_own_parameters_nor_loses_digits() {

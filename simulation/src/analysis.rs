@@ -1,6 +1,6 @@
 //! What a prescribed motion asks of joints and drives: torques, power, energy, what joints carry, and where limits end.
 
-use crate::drive_analysis::{self, DriveAnalysis};
+use crate::drive_analysis::{self, DriveAnalysis, DriveFigures};
 use crate::motion::Motion;
 use crate::plant::{angle_beyond_sines, joint_friction};
 use crate::quadrature::integral;
@@ -34,6 +34,42 @@ impl Analysis {
     /// Energy that the drives give less what they take \[J\].
     pub fn given(&self) -> f64 {
         self.joints.iter().map(|j| j.given - j.taken).sum()
+    }
+
+    /// Whether all numbers are finite: of tables, of what was integrated and squared, and of temperatures.
+    ///
+    /// # Errors
+    /// The first one that is not, by name, with the time of its row.
+    fn check(&self) -> Result<(), Failure> {
+        let help = "are masses, lengths, the motion and its times of a size that the robot can have?";
+        for table in [&self.table, &self.wrenches].into_iter().chain(self.drives.as_ref().map(|d| &d.table)) {
+            table.check().map_err(|(t, why)| Failure::new(t, why).with_help(help))?;
+        }
+        let of_joints = self.joints.iter().flat_map(|j| {
+            let JointFigures { name, peak, rms, speed, power, given, taken, carried, .. } = j;
+            let figures = [
+                ("peak", peak.0),
+                ("rms", *rms),
+                ("speed", *speed),
+                ("power", *power),
+                ("energy given", *given),
+                ("energy taken", *taken),
+                ("force", carried.0),
+                ("moment", carried.1),
+            ];
+            figures.map(|(what, x)| (what, name.as_str(), x))
+        });
+        let of_drives = self.drives.iter().flat_map(|d| &d.drives).flat_map(DriveFigures::numbers);
+        let of_all =
+            [("energy change", self.energy_change), ("friction", self.friction), ("missing energy", self.missing())];
+        let of_all = of_all.map(|(what, x)| (what, "all joints", x));
+        match of_joints.chain(of_drives).chain(of_all).find(|(.., x)| !x.is_finite()) {
+            None => Ok(()),
+            Some((what, name, x)) => {
+                let t = self.table.rows.last().map_or(0.0, |row| row[0]);
+                Err(Failure::new(t, format!("`{what}` of {name} is {x}, not a finite number")).with_help(help))
+            }
+        }
     }
 
     /// By how much the books are open \[J\]: what drives give, less the change of energy, less friction. It is the error of the integrals
@@ -173,10 +209,9 @@ pub fn analyze_by(
     let energy_change = energy(motion.duration()) - energy(motion.times[0]);
     let times: Vec<f64> = table.rows.iter().map(|row| row[0]).collect();
     let friction = integral(&times, |k| joint_friction(model, &table.rows[k][1 + n..=2 * n]));
-    for table in [&table, &wrenches].into_iter().chain(drives.as_ref().map(|d| &d.table)) {
-        table.check().map_err(|(t, why)| Failure::new(t, why))?;
-    }
-    Ok(Analysis { table, wrenches, joints: figures, violations, drives, energy_change, friction })
+    let found = Analysis { table, wrenches, joints: figures, violations, drives, energy_change, friction };
+    found.check()?;
+    Ok(found)
 }
 
 /// # Errors

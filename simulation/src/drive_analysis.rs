@@ -54,6 +54,34 @@ pub struct DriveFigures {
     pub heating: Option<Heating>,
 }
 
+impl DriveFigures {
+    /// All figures: what it is, of which drive, its value.
+    pub(crate) fn numbers(&self) -> Vec<(&'static str, &str, f64)> {
+        let mut numbers = vec![
+            ("input", self.input.0),
+            ("current", self.current.0),
+            ("rms current", self.rms_current),
+            ("motor speed", self.speed),
+            ("motor torque", self.torque),
+            ("electrical power", self.power),
+            ("energy taken", self.energy.0),
+            ("energy given back", self.energy.1),
+            ("Joule heat", self.joule),
+        ];
+        if let Some(heating) = &self.heating {
+            let Heating { peak, settled: (winding, housing), limit_after } = heating;
+            let after = limit_after.unwrap_or(0.0);
+            numbers.extend([
+                ("greatest temperature of the winding", *peak),
+                ("settled temperature of the winding", *winding),
+                ("settled temperature of the housing", *housing),
+                ("time until the winding is too hot", after),
+            ]);
+        }
+        numbers.into_iter().map(|(what, x)| (what, self.name.as_str(), x)).collect()
+    }
+}
+
 /// Temperatures of a motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Heating {
@@ -229,18 +257,37 @@ fn limit_after(thermal: &Thermal<f64>, heat: f64) -> Option<f64> {
     if heat * (thermal.winding_housing + thermal.housing_ambient) <= rise {
         return None;
     }
-    let dt = 0.01 * thermal.winding_time.min(thermal.housing_time);
-    let (mut state, mut time) = ([0.0; 2], 0.0);
-    // it rises without end towards a value above the limit: in some ten of the longer time constants it is there, or within rounding of it
-    let most = (40.0 * thermal.winding_time.max(thermal.housing_time) / dt) as usize;
-    for _ in 0..most {
-        let next = step(thermal, state, heat, dt);
-        if next[0] >= rise {
-            return Some(time + dt * (rise - state[0]) / (next[0] - state[0]));
-        }
-        (state, time) = (next, time + dt);
+    if rise <= 0.0 {
+        return Some(0.0);
     }
-    None
+    // W(t) = W∞ − c₁ e^{−λ₁ t} − c₂ e^{−λ₂ t} from W(0) = 0, Ẇ(0) = a R₁ P; with λ₁ + λ₂ = a + b (r + 1), λ₁ λ₂ = a b both are real
+    let (a, b) = (1.0 / thermal.winding_time, 1.0 / thermal.housing_time);
+    let r = thermal.housing_ambient / thermal.winding_housing;
+    let apart = (a - b * (r + 1.0)).hypot(2.0 * (a.sqrt() * b.sqrt() * r.sqrt()));
+    let fast = 0.5 * (a + b * (r + 1.0) + apart);
+    let slow = a * (b / fast);
+    let settled = heat * (thermal.winding_housing + thermal.housing_ambient);
+    // λ₁ = λ₂ without a resistance to the air only, where there is one body
+    let of_fast = if apart > 0.0 { (a * thermal.winding_housing * heat - slow * settled) / apart } else { 0.0 };
+    // W = Σ c (1 − e^{−λ t}): no difference of large numbers while little time has gone by
+    let risen = |t: f64| -(of_fast * (-fast * t).exp_m1() + (settled - of_fast) * (-slow * t).exp_m1());
+    // it rises all the time; in forty of the longer time constants it is there, or within rounding of it
+    let (mut before, mut after) = (0.0, 40.0 / slow);
+    if !(after.is_finite() && risen(after) >= rise) {
+        return None;
+    }
+    // halved until the two are neighbours, which takes as often as there are bits and powers of two: some 1100 times at most
+    loop {
+        let middle = 0.5 * (before + after);
+        if middle <= before || middle >= after {
+            break;
+        }
+        match risen(middle) >= rise {
+            true => after = middle,
+            false => before = middle,
+        }
+    }
+    Some(after)
 }
 
 /// The limits of a drive that the motion exceeds.

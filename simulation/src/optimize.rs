@@ -238,7 +238,7 @@ pub fn minimise(cost: impl Fn(&[f64]) -> f64, ranges: &[(f64, f64)]) -> Result<O
 /// The same from a point on, which the first simplex leaves by so much of each range.
 ///
 /// # Errors
-/// As [`minimise`].
+/// As [`minimise`], or no cost was found that is a finite number.
 pub fn minimise_from(
     cost: impl Fn(&[f64]) -> f64,
     ranges: &[(f64, f64)],
@@ -284,7 +284,11 @@ pub fn minimise_from(
         }
     }
     let point = inside(&best.point);
-    Ok(Optimum { cost: cost(&point), point, evaluations: asked.get() })
+    let cost = cost(&point);
+    match cost.is_finite() {
+        true => Ok(Optimum { cost, point, evaluations: asked.get() }),
+        false => Err(format!("what is to be least is {cost}, not a finite number, wherever it was looked for")),
+    }
 }
 
 struct Cost<'a>(&'a dyn Fn(&[f64]) -> f64);
@@ -348,5 +352,13 @@ mod tests {
         let first = descend(kink, &[(0.5, 6.0)]).expect("it ends");
         let found = minimise_from(|x| kink(x).0, &[(0.5, 6.0)], &first.point, 0.02).expect("it ends");
         assert!((found.point[0] - 3.0).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn what_has_no_finite_cost_has_no_optimum() {
+        for cost in [f64::INFINITY, f64::NAN] {
+            let why = minimise(|_| cost, &[(0.0, 1.0), (2.0, 3.0)]).expect_err("none is best");
+            assert!(why.contains("not a finite number"), "{why}");
+        }
     }
 }

@@ -154,6 +154,20 @@ impl Command {
             Command::Functions(_) | Command::Explain(_) => return None,
         })
     }
+
+    /// What it does, in a word.
+    pub fn doing(&self) -> &'static str {
+        match self {
+            Command::Generate(_) => "generating",
+            Command::Report(_) => "reporting",
+            Command::Check(_) => "checking",
+            Command::Verify(_) => "verifying",
+            Command::Simulate(_) => "simulating",
+            Command::Analyze(_) => "analysing",
+            Command::Export(_) => "exporting",
+            Command::Functions(_) | Command::Explain(_) => "looking up",
+        }
+    }
 }
 
 #[derive(Debug, Args)]

@@ -39,6 +39,7 @@ fn main() -> ExitCode {
         .unwrap_or_else(|complaints| arguments::exit(complaints))
         .command;
     print::be_quiet(command.model().is_some_and(ModelArgs::is_quiet));
+    print::watch(command.doing());
     let done = match command {
         Command::Generate(a) => generate(&a),
         Command::Report(a) => report(&a),

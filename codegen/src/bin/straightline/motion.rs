@@ -228,10 +228,10 @@ pub fn simulate(a: &Simulate) -> Result<(), Failure> {
     let plant = Plant::new(model, experiment.coulomb_speed).with_current_inputs(&currents);
     let bar = print::bar("simulating", 1000);
     let duration = experiment.settings.duration;
-    let patience = print::Patience::new();
+    let how_far = print::Progress::new();
     let progress = |t: f64| {
         bar.set_position((t / duration * 1000.0) as u64);
-        patience.say(|| format!("at t = {t:.3e} s of {duration} s"));
+        how_far.say(|| format!("simulating, at t = {t:.3e} s of {duration} s"));
     };
     if !contacts.is_empty() {
         let (settings, start) = (&experiment.settings, start(&plant, &experiment));
@@ -431,6 +431,10 @@ fn optimized(a: &Analyze, description: &Description, options: &Options, motion: 
     })?;
     let as_written = analysis::analyze(&model, motion, a.interval).map_err(|failure| not_analysed(&failure))?;
     let as_written = a.minimize.with_limits(&as_written, &efforts);
+    if !as_written.is_finite() {
+        print::error(&format!("what is to be least is {as_written} of the robot file itself, not a finite number"));
+        return Err(Failure::Input);
+    }
     let mut out = stdout().lock();
     let (steps, analyses) = (downhill.evaluations, best.evaluations);
     writeln!(out, "\nbest values after {steps} evaluations along the gradient and {analyses} analyses:")?;

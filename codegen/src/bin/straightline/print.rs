@@ -7,7 +7,8 @@ use serde::Serialize;
 use std::cell::Cell;
 use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 use straightline_codegen::description::{Description, Ignored};
 use straightline_codegen::diagnostic::codes::Code;
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
@@ -48,27 +49,49 @@ fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
 }
 
-/// Says after ten seconds, and then after twice as long again and again, how far something has come.
-pub struct Patience {
-    began: Instant,
-    next: Cell<u64>,
-    calls: Cell<u32>,
+/// What is being done, and whether a bar on the terminal shows it.
+static DOING: Mutex<(String, bool)> = Mutex::new((String::new(), false));
+/// When it is said for the first time that something takes long; then each time after twice as long.
+const SILENCE: Duration = Duration::from_secs(5);
+
+fn now(what: String, on_terminal: bool) {
+    *DOING.lock().unwrap_or_else(PoisonError::into_inner) = (what, on_terminal);
 }
 
-impl Patience {
-    pub fn new() -> Patience {
-        Patience { began: Instant::now(), next: Cell::new(10), calls: Cell::new(0) }
+/// From now on says what is being done where that takes long, whatever it is; not if quiet, nor where a bar on the terminal shows it.
+pub fn watch(command: &str) {
+    now(command.to_string(), false);
+    let say = || {
+        let mut pause = SILENCE;
+        let mut gone_by = Duration::ZERO;
+        loop {
+            std::thread::sleep(pause);
+            gone_by += pause;
+            pause = gone_by;
+            let (what, on_terminal) = DOING.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            if !(is_quiet() || on_terminal && io::stderr().is_terminal()) {
+                // nobody may be reading any more
+                let _ = writeln!(anstream::stderr(), "{} s gone by: {what}", gone_by.as_secs());
+            }
+        }
+    };
+    // without another thread nothing is said; the work is done all the same
+    let _ = std::thread::Builder::new().name("watch".to_string()).spawn(say);
+}
+
+/// How far something is, for [`watch`].
+pub struct Progress(Cell<u32>);
+
+impl Progress {
+    pub fn new() -> Progress {
+        Progress(Cell::new(0))
     }
 
     /// Often called, and cheap.
     pub fn say(&self, how_far: impl Fn() -> String) {
-        self.calls.set(self.calls.get().wrapping_add(1));
-        if !is_quiet()
-            && self.calls.get().is_multiple_of(256)
-            && self.began.elapsed() >= Duration::from_secs(self.next.get())
-        {
-            eprintln!("{} s gone by: {}", self.next.get(), how_far());
-            self.next.set(2 * self.next.get());
+        self.0.set(self.0.get().wrapping_add(1));
+        if self.0.get().is_multiple_of(1024) {
+            now(how_far(), true);
         }
     }
 }
@@ -282,6 +305,7 @@ pub fn verification(v: &Verification) -> io::Result<()> {
 
 /// Something is being done; shown on a terminal only.
 pub fn spinner(what: &str) -> ProgressBar {
+    now(what.to_string(), true);
     let bar = ProgressBar::new_spinner().with_message(what.to_string());
     if is_quiet() {
         return ProgressBar::hidden();
@@ -294,6 +318,7 @@ pub fn spinner(what: &str) -> ProgressBar {
 
 /// So many things are being done; shown on a terminal only.
 pub fn bar(what: &'static str, count: u64) -> ProgressBar {
+    now(what.to_string(), true);
     if is_quiet() {
         return ProgressBar::hidden();
     }
