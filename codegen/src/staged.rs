@@ -388,14 +388,15 @@ fn stage_type(stages: &[Stage], s: usize, graph: &Graph, methods: &str, scalar: 
     });
     let own: Vec<&Port> = graph.inputs.iter().filter(|p| !stages.iter().any(|e| e.values == p.name)).collect();
     let parameters: Vec<String> = own.iter().map(|p| format!("{}: &{}", p.name, array_type(p, scalar))).collect();
-    let arguments: Vec<String> = graph.inputs.iter().map(|p| reach(stages, s, &p.name, "self")).collect();
+    // no zeros: they would be a call of `memset` where there are no vector instructions
+    let filler = own.first().map_or("0.0".to_string(), |p| emit::element(p, 0));
     let mut out = format!(
         "\n/// {}\n#[derive(Clone, Debug)]\npub struct {name}{lifetime} {{\n{field}    values: [{t}; {stored}],\n}}\n",
         stage.doc
     );
     let make = |receiver: &str| {
-        let arguments: Vec<String> = arguments.iter().map(|a| a.replace("self", receiver)).collect();
-        let arguments: String = arguments.iter().map(|a| format!("{a}, ")).collect();
+        let reached = graph.inputs.iter().map(|p| reach(stages, s, &p.name, receiver));
+        let arguments: String = reached.map(|a| format!("{a}, ")).collect();
         format!("{}_values({arguments}&mut values);", stage.values)
     };
     let _ = write!(out, "\nimpl{lifetime} {name}{lifetime} {{\n");
@@ -403,7 +404,7 @@ fn stage_type(stages: &[Stage], s: usize, graph: &Graph, methods: &str, scalar: 
         None => {
             let _ = write!(
                 out,
-                "    /// Computes the stage.\n    #[must_use]\n    pub fn new({}) -> {name} {{\n        let mut values = [0.0; {stored}];\n        {}\n        {name} {{ values }}\n    }}\n",
+                "    /// Computes the stage.\n    #[must_use]\n    pub fn new({}) -> {name} {{\n        let mut values = [{filler}; {stored}];\n        {}\n        {name} {{ values }}\n    }}\n",
                 parameters.join(", "),
                 make("")
             );
@@ -412,7 +413,7 @@ fn stage_type(stages: &[Stage], s: usize, graph: &Graph, methods: &str, scalar: 
             let inner = if s > 1 { "<'a>" } else { "" };
             let _ = write!(
                 out,
-                "    /// Computes the stage on top of an earlier one.\n    #[must_use]\n    pub fn new({0}: &'a {1}{inner}, {2}) -> {name}<'a> {{\n        let mut values = [0.0; {stored}];\n        {3}\n        {name} {{ {0}, values }}\n    }}\n",
+                "    /// Computes the stage on top of an earlier one.\n    #[must_use]\n    pub fn new({0}: &'a {1}{inner}, {2}) -> {name}<'a> {{\n        let mut values = [{filler}; {stored}];\n        {3}\n        {name} {{ {0}, values }}\n    }}\n",
                 e.values,
                 e.type_name,
                 parameters.join(", "),

@@ -1,8 +1,9 @@
 //! One program as one public function, or as a public function over private parts.
 
 use super::fused::{fusions, Fused};
-use super::{one_line, Names, Scalar, Style};
+use super::{number, Names, Scalar, Style};
 use crate::expr::{Constant, Graph, NodeId, Op, Port, Section, Width};
+use crate::identifier::comment;
 use crate::schedule::{Part, Schedule};
 use std::fmt::Write;
 use std::slice::from_ref;
@@ -96,7 +97,7 @@ pub fn function(
     // in parts: the public function calls them one after the other
     let slots = schedule.slots;
     let _ = writeln!(out.text, "{ALLOW}{inline}\npub fn {name}{generics}({signature}) {{");
-    let _ = writeln!(out.text, "    let mut live = [{}; {slots}];", style.zero());
+    let _ = writeln!(out.text, "    let mut live = [{}; {slots}];", filler(graph, &all_used, style));
     let mut parts = String::new();
     for (k, part) in schedule.parts.iter().enumerate() {
         let used = used_inputs(&mut part.nodes.iter().copied().chain(part.results.iter().map(|r| graph.results[*r])));
@@ -133,6 +134,16 @@ pub fn function(
     out.text.push_str("}\n");
     out.text.push_str(&parts);
     out
+}
+
+/// What an array holds before its elements are computed: an input that is read anyway, as an array of zeros is filled by a call
+/// of `memset` where there are no vector instructions.
+fn filler(graph: &Graph, used: &[bool], style: Style) -> String {
+    let mut plain = graph.inputs.iter().zip(used).filter(|(p, used)| **used && p.wrapper.is_none()).map(|(p, _)| p);
+    match plain.next().filter(|_| !style.lanes && !style.generic) {
+        Some(port) => style.element(port, 0),
+        None => style.zero().to_string(),
+    }
 }
 
 /// The port that holds flat index `k`, and the index inside it.
@@ -542,7 +553,7 @@ impl Body<'_> {
         if let Some(s) = section {
             let title = title(self.graph.sections[s as usize]);
             if !title.is_empty() {
-                let _ = writeln!(out.text, "    // {}", one_line(&title));
+                let _ = writeln!(out.text, "    // {}", comment(&title));
             }
         }
         for scalar in [Scalar::F32, Scalar::F64] {
@@ -591,7 +602,7 @@ pub(super) fn wrapped(start: &str, items: &[String], end: &str) -> String {
 fn literal(c: Constant, style: Style) -> String {
     match (style.generic, style.scalar) {
         (true, _) => format!("number::<T>({:?}, {:?})", c.value().hi(), c.value().lo()),
-        (false, Scalar::F64) => format!("{:?}", c.value().to_f64()),
-        (false, Scalar::F32) => format!("{:?}", c.value().to_f32()),
+        (false, Scalar::F64) => number(c.value().to_f64(), Scalar::F64),
+        (false, Scalar::F32) => number(f64::from(c.value().to_f32()), Scalar::F32),
     }
 }

@@ -14,8 +14,8 @@
 //! vector instructions of the body, as of functions over lanes.
 
 use super::body::{wrapped, Binding, Body, FunctionText, Plan};
-use super::one_line;
 use crate::expr::{Alike, Graph, NodeId, Op, Section};
+use crate::identifier::comment;
 use crate::schedule::Part;
 use rustc_hash::FxHashMap;
 use std::fmt::Write;
@@ -68,7 +68,7 @@ impl Body<'_> {
         let scalar = self.style.scalar_name();
         let limb = self.names.free("limb");
         for body in &alike.limbs {
-            let _ = writeln!(out.text, "    // {}", one_line(&title(Section { phase: "limb", body: Some(*body) })));
+            let _ = writeln!(out.text, "    // {}", comment(&title(Section { phase: "limb", body: Some(*body) })));
         }
         let Loop { graph, part, outside, results } = Loop::new(self.graph, alike, used_across);
 
@@ -95,13 +95,16 @@ impl Body<'_> {
             texts.push((*node, format!("{name}[{limb}]")));
         }
         // what goes there
+        let zero = self.style.zero().to_string();
+        // no zeros: they would be a call of `memset` where there are no vector instructions
+        let filler = outside.first().filter(|_| !self.style.generic).map_or(zero, |(_, of)| self.operand(of[0]).0);
         let (mut arrays, mut names): (Vec<(NodeId, String)>, Vec<String>) = (Vec::new(), Vec::new());
         for (node, row) in &results {
             let name = match self.graph.notes[row[0].index()].name {
                 Some((quantity, index, component)) => self.names.named(&format!("{quantity}s"), index, component),
                 None => self.names.numbered("y"),
             };
-            let _ = writeln!(out.text, "    let mut {name} = [{}; {count}];", self.style.zero());
+            let _ = writeln!(out.text, "    let mut {name} = [{}; {count}];", filler);
             arrays.push((*node, format!("{name}[{limb}]")));
             names.push(name);
         }

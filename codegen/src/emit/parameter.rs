@@ -1,6 +1,7 @@
 //! Types of run-time parameters: the ten inertial parameters of a body, checked when they are made.
 
 use super::{FunctionText, Scalar};
+use crate::identifier::doc;
 use std::fmt::Write;
 
 /// The error type and the check that all parameters of a file share.
@@ -72,6 +73,7 @@ pub fn parameter(
     scalar: Scalar,
 ) -> String {
     let t = scalar.name();
+    let frame = doc(frame);
     let mut out = String::new();
     let _ = write!(
         out,
@@ -92,7 +94,7 @@ impl {type_name} {{
     /// No body has such parameters.
     pub fn new(mass: {t}, com: [{t}; 3], inertia: [{t}; 6]) -> Result<{type_name}, Unphysical> {{
         check_inertia(mass, &com, &inertia)?;
-        let mut parameters = [0.0; {scalars}];
+        let mut parameters = [mass; {scalars}];
         {name}_parameters(&[mass], &com, &inertia, &mut parameters);
         Ok({type_name}(parameters))
     }}
