@@ -24,9 +24,9 @@
 use crate::compile::{compile, Generated, Options};
 use crate::diagnostic::{Diagnostics, Front, Level, Reporting, Severity, Source};
 use crate::emit::{Lanes, Scalar};
-use crate::export::identifier;
 use crate::expr::Grade;
 use crate::function::{ForwardDynamicsMethod, Function};
+use crate::identifier::prefix;
 use crate::output::write_file_apart;
 use crate::scene::{self, Scene};
 use std::fmt;
@@ -263,7 +263,7 @@ impl Builder {
         })?;
         messages.tell(&generated.warnings);
         let stem = self.robot.file_stem().unwrap_or_default().to_string_lossy();
-        let module = self.module.clone().unwrap_or_else(|| identifier(&stem));
+        let module = self.module.clone().unwrap_or_else(|| prefix(&stem));
         if Path::new(&module).file_name().is_none_or(|name| name != module.as_str()) {
             return Err(Error::Module(module));
         }

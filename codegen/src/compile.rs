@@ -4,7 +4,7 @@ use crate::certify::companion::Bits;
 use crate::certify::{self, Effort, Known};
 use crate::choose::{self, choose, price};
 use crate::contact;
-use crate::description::messages;
+use crate::description::{self, messages};
 use crate::diagnostic::{Diagnostic, Diagnostics, Reporting, Source};
 use crate::emit::{self, Item, Lanes, Provenance, Scalar, Style};
 use crate::equivalence::{self, Disagreement, Plainer};
@@ -14,6 +14,7 @@ use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::limbs::{self, LimbForm};
 use crate::model;
 use crate::pass::{count_sums, dead_code, order, substitute, sums, unread_inputs};
+use crate::range;
 use crate::readback::{self, ParameterProgram, Programs};
 use crate::report::budget::{self, Measures};
 use crate::report::errors::ErrorReport;
@@ -43,8 +44,11 @@ pub struct Options {
     pub also: Vec<Scalar>,
     /// Whether functions over lanes and batches of states stand beside the plain ones.
     pub lanes: Option<Lanes>,
-    /// Whether a·b + c is one operation, with one rounding, where the machine has it; needs `std`.
+    /// Whether a·b + c is one operation, with one rounding, where the machine has it.
     pub fma: bool,
+    /// Whether that operation comes from the crate around the output, as `crate::mul_add_f64` (of f32 `crate::mul_add_f32`): the
+    /// output needs `core` alone then.
+    pub fma_by_caller: bool,
     /// Whether plain functions take any scalar that is a `straightline::Real`; lanes, batches and stages keep `scalar`.
     pub generic: bool,
     /// The weakest rules allowed: with [`Grade::Exact`] the output is the generic runtime bit for bit.
@@ -75,6 +79,7 @@ impl fmt::Debug for Options {
             also,
             lanes,
             fma,
+            fma_by_caller,
             generic,
             grade,
             forward_dynamics,
@@ -92,6 +97,7 @@ impl fmt::Debug for Options {
             .field("also", also)
             .field("lanes", lanes)
             .field("fma", fma)
+            .field("fma_by_caller", fma_by_caller)
             .field("generic", generic)
             .field("grade", grade)
             .field("forward_dynamics", forward_dynamics)
@@ -113,6 +119,7 @@ impl Default for Options {
             also: Vec::new(),
             lanes: None,
             fma: false,
+            fma_by_caller: false,
             generic: false,
             grade: Grade::Algebraic,
             forward_dynamics: ForwardDynamicsMethod::default(),
@@ -148,7 +155,7 @@ impl Options {
 
     /// How functions over lanes and the programs inside types are written.
     pub fn style(&self) -> Style {
-        Style::plain(self.scalar).fused(self.fma)
+        Style::plain(self.scalar).fused(self.fma).by_caller(self.fma_by_caller)
     }
 
     /// How plain functions are written.
@@ -539,6 +546,10 @@ fn prepare(source: &Source, options: &Options) -> Result<Prepared, Diagnostics> 
     let whole = model::load_into(source, &options.scene.model_options(&options.model), &mut diagnostics);
     scene::check_options(options, &mut diagnostics);
     let model = whole.clone().and_then(|whole| scene::apply(whole, &options.scene, &mut diagnostics));
+    if options.scalar == Scalar::F32 && !diagnostics.has_errors() {
+        let description = description::read(source, &mut Diagnostics::new());
+        description.iter().for_each(|d| range::of_robot(d, &options.scene, options.scalar, &mut diagnostics));
+    }
     let of_frames = model.as_ref().or(whole.as_ref());
     let frames = of_frames.map(|m| choose_frames(m, &options.frames, &mut diagnostics)).unwrap_or_default();
     let functions = of_frames.map(|m| Function::wanted(&options.functions, m)).unwrap_or_default();
@@ -576,6 +587,11 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let mut programs = programs.map_err(|wrong| only(wrong.error(&robot.model)))?;
     for program in &mut programs {
         mix_precisions(&robot, program, &resolved);
+        if let Some(why) = range::of_program(&robot.model, &program.graph, options.scalar) {
+            let function = program.function.name();
+            let complaint = scene::messages::program_beyond_scalar(function, options.scalar.name(), &why);
+            options.scene.places.complain("numbers.scalar", complaint, &mut diagnostics);
+        }
         let of = (program.function, &program.graph);
         let mixed = !program.graph.widths.is_empty();
         if let Some(wrong) =
@@ -607,7 +623,21 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let programs = programs.into_iter().zip(waterfalls).zip(certificates).map(|((p, w), c)| (p, w, c)).collect();
     let model = robot.model.clone();
     let generated = generate(robot, frames, programs, diagnostics, &resolved, source.path(), hash);
-    generated.map_err(|wrong| only(wrong.error(&model)))
+    let generated = generated.map_err(|wrong| only(wrong.error(&model)))?;
+    // what has a program of its own is asked above, all else here
+    let mut beyond = generated.programs.all().filter_map(|p| Some((p, range::of_constants(&p.graph, p.scalar)?)));
+    match beyond.next() {
+        None => {
+            drop(beyond);
+            Ok(generated)
+        }
+        Some((program, why)) => {
+            let complaint = scene::messages::program_beyond_scalar(&program.name, program.scalar.name(), &why);
+            let mut diagnostics = generated.warnings.clone();
+            options.scene.places.complain("numbers.scalar", complaint, &mut diagnostics);
+            Err(diagnostics)
+        }
+    }
 }
 
 fn only(error: Diagnostic) -> Diagnostics {

@@ -41,6 +41,17 @@ const FAST: f64 = 10.0;
 const SLOW: f64 = 0.2;
 /// A joint without limits is tried within ± so much.
 const RANGE: f64 = std::f64::consts::PI;
+/// A limit beyond this is none \[rad, m, rad/s or m/s\].
+const NO_LIMIT: f64 = 1e6;
+
+/// A limit, or what is tried without one.
+fn within(limit: f64, other: f64) -> f64 {
+    if limit.abs() <= NO_LIMIT {
+        limit
+    } else {
+        other
+    }
+}
 
 /// A form of forward dynamics in figures.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -194,7 +205,7 @@ pub(crate) fn of_port(model: &Model<Dd>, port: &Port, fast: bool, random: &mut R
     let mut x = values(model, &port.name, port.len(), 0, random);
     let rates = port.name == "qd" && port.len() == model.nv();
     for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| fast && rates && j.kind != JointKind::Floating) {
-        x[joint.iv] *= if joint.limits.velocity.is_finite() { joint.limits.velocity } else { FAST };
+        x[joint.iv] *= within(joint.limits.velocity, FAST);
     }
     if port.name == "qdd" && !fast {
         x.iter_mut().for_each(|x| *x *= SLOW);
@@ -216,8 +227,7 @@ fn values(model: &Model<Dd>, port: &str, len: usize, kind: usize, random: &mut R
                     (0..4).for_each(|k| q[joint.iq + 3 + k] = quaternion[k] / norm);
                     continue;
                 }
-                let or = |limit: f64, other: f64| if limit.is_finite() { limit } else { other };
-                let (lower, upper) = (or(joint.limits.lower, -RANGE), or(joint.limits.upper, RANGE));
+                let (lower, upper) = (within(joint.limits.lower, -RANGE), within(joint.limits.upper, RANGE));
                 let anywhere = lower + (upper - lower) * (0.5 + random.symmetric(0.5));
                 let quarter = std::f64::consts::FRAC_PI_2;
                 let near = random.symmetric(NEAR);

@@ -19,11 +19,13 @@ pub mod export;
 pub mod expr;
 pub mod forward_method;
 pub mod function;
+pub mod identifier;
 pub mod limbs;
 pub mod model;
 pub mod output;
 pub mod pass;
 mod random;
+mod range;
 pub mod readback;
 pub mod reduce;
 #[cfg(feature = "verify")]

@@ -18,6 +18,7 @@ use crate::stage::{cut, Staged};
 use crate::trace::{trace, Expr};
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::iter::once;
 use straightline_core::Real;
 
 /// Figures of one stage.
@@ -389,7 +390,7 @@ fn stage_type(stages: &[Stage], s: usize, graph: &Graph, methods: &str, scalar: 
     let own: Vec<&Port> = graph.inputs.iter().filter(|p| !stages.iter().any(|e| e.values == p.name)).collect();
     let parameters: Vec<String> = own.iter().map(|p| format!("{}: &{}", p.name, array_type(p, scalar))).collect();
     // no zeros: they would be a call of `memset` where there are no vector instructions
-    let filler = own.first().map_or("0.0".to_string(), |p| emit::element(p, 0));
+    let filler = own.iter().find(|p| !p.is_empty()).map_or("0.0".to_string(), |p| emit::element(p, 0));
     let mut out = format!(
         "\n/// {}\n#[derive(Clone, Debug)]\npub struct {name}{lifetime} {{\n{field}    values: [{t}; {stored}],\n}}\n",
         stage.doc
@@ -411,13 +412,14 @@ fn stage_type(stages: &[Stage], s: usize, graph: &Graph, methods: &str, scalar: 
         }
         Some(e) => {
             let inner = if s > 1 { "<'a>" } else { "" };
+            let before = format!("{}: &'a {}{inner}", e.values, e.type_name);
+            let parameters: Vec<String> = once(before).chain(parameters).collect();
             let _ = write!(
                 out,
-                "    /// Computes the stage on top of an earlier one.\n    #[must_use]\n    pub fn new({0}: &'a {1}{inner}, {2}) -> {name}<'a> {{\n        let mut values = [{filler}; {stored}];\n        {3}\n        {name} {{ {0}, values }}\n    }}\n",
+                "    /// Computes the stage on top of an earlier one.\n    #[must_use]\n    pub fn new({2}) -> {name}<'a> {{\n        let mut values = [{filler}; {stored}];\n        {1}\n        {name} {{ {0}, values }}\n    }}\n",
                 e.values,
-                e.type_name,
+                make(e.values),
                 parameters.join(", "),
-                make(e.values)
             );
         }
     }

@@ -7,8 +7,9 @@
 //! `<Why<{ compile_error!(..) }> as Stub>::Item`; [`DEFINITION`] has what it takes. Lengths are numbers that do not evaluate.
 
 use crate::compile::Options;
-use crate::emit::{snake_case, upper_camel_case, Lanes, Scalar};
+use crate::emit::{Lanes, Scalar};
 use crate::function::Function;
+use crate::identifier::{identifier, upper_camel_case};
 use crate::scene::ContactFunction;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -41,14 +42,6 @@ const CONSTANTS: [&str; 8] = [
     "EFFORT_LIMITS",
     "DRIVE_NAMES",
     "DRIVE_STATES",
-];
-
-/// Names of a scene that make no module.
-const KEYWORDS: [&str; 45] = [
-    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do", "dyn", "else",
-    "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let", "loop", "macro", "match", "mod",
-    "move", "mut", "override", "priv", "pub", "ref", "return", "self", "static", "struct", "super", "trait", "true",
-    "try", "type", "unsafe", "use",
 ];
 
 /// The items of the module, beside the definition of [`MISSING`]; `scene` is the text of the scene, if there is one.
@@ -185,10 +178,9 @@ fn names(text: &str) -> BTreeSet<String> {
         let Some(quoted) = rest.trim_start().strip_prefix('=').map(str::trim_start) else { continue };
         let quote = quoted.chars().next().filter(|c| ['"', '\''].contains(c));
         if let Some(name) = quote.and_then(|quote| quoted[1..].split(quote).next()) {
-            names.insert(snake_case(name));
+            names.extend(["body", "mode"].map(|what| identifier(name, what)));
         }
     }
-    names.retain(|name| !KEYWORDS.contains(&name.as_str()));
     names
 }
 

@@ -120,6 +120,7 @@ const OPTIONS: &[&str] = &[
     "joint_order",
     "generic",
     "fma",
+    "fma_by_caller",
     "lanes",
     "gravity",
     "angle_tolerance",
@@ -173,6 +174,7 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
         }
         "lanes" => options.lanes = Some(Lanes::Runtime),
         "fma" => options.fma = true,
+        "fma_by_caller" => (options.fma, options.fma_by_caller) = (true, true),
         "generic" => options.generic = true,
         "rules" => options.grade = word(input)?,
         "forward_dynamics" => options.forward_dynamics = word(input)?,

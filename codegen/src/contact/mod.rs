@@ -10,10 +10,11 @@ mod text;
 use crate::certify::residual::OUTPUTS;
 use crate::choose::choose;
 use crate::compile::{Forms, Optimisations, Options};
-use crate::emit::{snake_case, Scalar};
+use crate::emit::Scalar;
 use crate::equivalence::{self, Disagreement, Plainer};
 use crate::expr::{verify, Graph, Port};
 use crate::function::{DriveFunction, ForwardDynamicsMethod, Function, Robot};
+use crate::identifier::identifier;
 use crate::pass::{dead_code, sums, unread_inputs};
 use crate::scene::contact::{ContactItem, EnvironmentKind, LoopItem, ModeItem, SurfaceItem};
 use crate::scene::{is_optional, ContactFunction, Scene};
@@ -71,7 +72,7 @@ impl<'a> Mode<'a> {
             }
         };
         let mode = |mode: ModeItem| Mode {
-            identifier: snake_case(&mode.name),
+            identifier: identifier(&mode.name, "mode"),
             contacts: mode.contacts.iter().map(|name| closed(&mode, name)).collect(),
             name: mode.name,
             loops: &contacts.loops,

@@ -4,10 +4,11 @@ use super::{programs, system, Mode, ModeProgram};
 use crate::certify::companion::{state_bound, Bits};
 use crate::certify::residual::acceleration_bound;
 use crate::compile::{error_bound_text, wants_companions, Options};
-use crate::emit::{self, array_type, upper_camel_case, Style};
+use crate::emit::{self, array_type, Style};
 use crate::equivalence::{self, Disagreement, Plainer};
 use crate::expr::{Graph, Port, Section};
 use crate::function::Robot;
+use crate::identifier::{comment, doc, string_literals, upper_camel_case};
 use crate::pass::dead_code;
 use crate::readback::{self, ModePrograms};
 use crate::report::ContactReport;
@@ -56,7 +57,7 @@ pub fn module(
         let mut functions = Vec::new();
         for ModeProgram { function, graph, .. } in &programs {
             let counts = graph.counts();
-            let doc = doc(*function, mode, &graph.inputs, &graph.outputs);
+            let doc = documentation(*function, mode, &graph.inputs, &graph.outputs);
             let doc = format!(
                 "{doc}\n{} mul, {} add, {} div, {} sqrt, {} pairs of sine and cosine.\n",
                 counts.mul, counts.add, counts.div, counts.sqrt, counts.sin_cos
@@ -92,7 +93,7 @@ pub fn module(
         signatures.push(programs);
         wrappers.sort();
         wrappers.dedup();
-        let _ = writeln!(inner, "\n/// Mode `{}`.\npub mod {} {{", emit::one_line(&mode.name), mode.identifier);
+        let _ = writeln!(inner, "\n/// Mode `{}`.\npub mod {} {{", doc(&mode.name), mode.identifier);
         if kernel {
             inner.push_str("    use super::super::trig;\n");
         }
@@ -144,8 +145,8 @@ fn enumeration(out: &mut String, modes: &[Mode]) {
         let _ = writeln!(
             out,
             "    /// `{}`: {} constrained.\n    {},",
-            emit::one_line(&mode.name),
-            mode.constrained_names().join(", "),
+            doc(&mode.name),
+            comment(&mode.constrained_names().join(", ")),
             upper_camel_case(&mode.identifier)
         );
     }
@@ -157,7 +158,12 @@ fn constants(out: &mut String, mode: &Mode) {
         ("CONSTRAINED", "The constrained coordinates s^c, in order.", mode.constrained_names()),
         ("FREE", "The free coordinates s^f, in order.", mode.free_names()),
     ] {
-        let _ = writeln!(out, "/// {doc}\npub const {name}: [&str; {}] = {names:?};", names.len());
+        let _ = writeln!(
+            out,
+            "/// {doc}\npub const {name}: [&str; {}] = [{}];",
+            names.len(),
+            string_literals(names.iter().map(String::as_str))
+        );
     }
 }
 
@@ -176,21 +182,26 @@ fn dispatch(out: &mut String, modes: &[Mode], programs: &[Vec<ModeProgram>], opt
     let parameters: String = inputs.iter().map(|p| format!("{}: &{}, ", p.name, parameter_type(p, options))).collect();
     let arguments: String = inputs.iter().map(|p| format!("{}, ", p.name)).collect();
     let qdd = array_type(&first.graph.outputs[0], options.scalar);
+    // no zeros in arrays that are computed: they would be a call of `memset` where there are no vector instructions
+    let filler =
+        inputs.iter().find(|p| p.wrapper.is_none() && !p.is_empty()).map_or("0.0".to_string(), |p| emit::element(p, 0));
     let _ = write!(
         out,
         "\n/// The most constrained coordinates that a mode has.\npub const MOST_CONSTRAINED: usize = {most};\n\n\
          /// `forward_dynamics` of a mode; reactions stand in the order of the mode's `CONSTRAINED`, zeros after them. Gives the\n\
          /// least pivot.\npub fn forward_dynamics(mode: Mode, {parameters}qdd: &mut {qdd}, force: &mut [{t}; {most}]) -> {t} {{\n    \
-         *force = [0.0; {most}];\n    let mut pivot = [0.0];\n    match mode {{\n"
+         let mut pivot = [0.0];\n    match mode {{\n"
     );
     for mode in modes {
         let (m, id) = (mode.constrained_names().len(), &mode.identifier);
+        let forces = (0..most).map(|i| if i < m { format!("f[{i}]") } else { "0.0".to_string() });
         let _ = write!(
             out,
-            "        Mode::{} => {{\n            let (mut f, mut sdd, mut violation) = ([0.0; {m}], [0.0; {m}], [0.0; {m}]);\n            \
+            "        Mode::{} => {{\n            let (mut f, mut sdd, mut violation) = ([{filler}; {m}], [{filler}; {m}], [{filler}; {m}]);\n            \
              {id}::forward_dynamics({arguments}qdd, &mut f, &mut sdd, &mut violation, &mut pivot);\n            \
-             force[..{m}].copy_from_slice(&f);\n        }}\n",
-            upper_camel_case(id)
+             *force = [{}];\n        }}\n",
+            upper_camel_case(id),
+            forces.collect::<Vec<_>>().join(", ")
         );
     }
     out.push_str("    }\n    pivot[0]\n}\n");
@@ -203,7 +214,7 @@ fn parameter_type(port: &Port, options: &Options) -> String {
     }
 }
 
-fn doc(function: ContactFunction, mode: &Mode, inputs: &[Port], outputs: &[Port]) -> String {
+fn documentation(function: ContactFunction, mode: &Mode, inputs: &[Port], outputs: &[Port]) -> String {
     let summary = match function {
         ContactFunction::ConstrainedCoordinates => "The constrained coordinates s^c, with s̈ = J q̈ + A, (20.86).",
         ContactFunction::FreeCoordinates => "The free coordinates s^f, with s̈ = J q̈ + A, (20.85).",
@@ -224,7 +235,7 @@ fn doc(function: ContactFunction, mode: &Mode, inputs: &[Port], outputs: &[Port]
              it, and then `impact` with restitution 0 to the velocities, against drift."
         }
     };
-    let mut doc = format!("{summary}\n\nMode `{}`.\n\n", emit::one_line(&mode.name));
+    let mut doc = format!("{summary}\n\nMode `{}`.\n\n", doc(&mode.name));
     for port in inputs.iter().chain(outputs) {
         let name = port.name.as_str();
         let suffix = |s: &str| name.ends_with(s);

@@ -1,8 +1,9 @@
 //! Lanes and batches beside a plain function: its body over lanes, and the two functions over slices that run it.
 
 use super::body::ALLOW;
-use super::{function, upper_camel_case, Item, Style};
+use super::{function, Item, Style};
 use crate::expr::{Graph, Port, Section};
+use crate::identifier::upper_camel_case;
 use crate::schedule::Schedule;
 use std::fmt::Write;
 

@@ -89,7 +89,8 @@ pub fn function(
     let generics = style.generics();
     if let [part] = schedule.parts.as_slice() {
         let _ = writeln!(out.text, "{ALLOW}{inline}\npub fn {name}{generics}({signature}) {{");
-        body(graph, part, style, title, &mut out);
+        let filler = filler(graph, &all_used, style);
+        body(graph, part, style, filler, title, &mut out);
         out.text.push_str("}\n");
         return out;
     }
@@ -97,7 +98,11 @@ pub fn function(
     // in parts: the public function calls them one after the other
     let slots = schedule.slots;
     let _ = writeln!(out.text, "{ALLOW}{inline}\npub fn {name}{generics}({signature}) {{");
-    let _ = writeln!(out.text, "    let mut live = [{}; {slots}];", filler(graph, &all_used, style));
+    let _ = writeln!(
+        out.text,
+        "    let mut live = [{}; {slots}];",
+        filler(graph, &all_used, style).unwrap_or(style.zero().into())
+    );
     let mut parts = String::new();
     for (k, part) in schedule.parts.iter().enumerate() {
         let used = used_inputs(&mut part.nodes.iter().copied().chain(part.results.iter().map(|r| graph.results[*r])));
@@ -124,7 +129,12 @@ pub fn function(
         let called = if style.lanes && style.fused { "::<N, FUSED>" } else { "" };
         let _ = writeln!(out.text, "    {name}_part{}{called}({});", k + 1, arguments.join(", "));
         let mut text = FunctionText::new();
-        body(graph, part, style, title, &mut text);
+        let filler = match filler(graph, &used, style) {
+            Some(filler) => Some(filler),
+            None if part.loads.is_empty() || style.lanes || style.generic => None,
+            None => Some("live[0]".to_string()),
+        };
+        body(graph, part, style, filler, title, &mut text);
         let _ = writeln!(parts, "\n{ALLOW}\n{part_inline}\nfn {name}_part{}{generics}({}) {{", k + 1, types.join(", "));
         parts.push_str(&text.text);
         parts.push_str("}\n");
@@ -136,14 +146,11 @@ pub fn function(
     out
 }
 
-/// What an array holds before its elements are computed: an input that is read anyway, as an array of zeros is filled by a call
-/// of `memset` where there are no vector instructions.
-fn filler(graph: &Graph, used: &[bool], style: Style) -> String {
+/// What an array of one state holds before its elements are computed: an input that is read anyway, as an array of zeros is filled by
+/// a call of `memset` where there are no vector instructions.
+fn filler(graph: &Graph, used: &[bool], style: Style) -> Option<String> {
     let mut plain = graph.inputs.iter().zip(used).filter(|(p, used)| **used && p.wrapper.is_none()).map(|(p, _)| p);
-    match plain.next().filter(|_| !style.lanes && !style.generic) {
-        Some(port) => style.element(port, 0),
-        None => style.zero().to_string(),
-    }
+    plain.next().filter(|_| !style.lanes && !style.generic).map(|port| style.element(port, 0))
 }
 
 /// The port that holds flat index `k`, and the index inside it.
@@ -170,6 +177,8 @@ pub(super) enum Binding {
 pub(super) struct Body<'a> {
     pub graph: &'a Graph,
     pub style: Style,
+    /// What an array holds before its elements are computed, if not zeros.
+    pub filler: Option<String>,
     /// Sums that take a product in.
     fused: Vec<Option<Fused>>,
     /// What stands for each node: its name, its literal, or its expression.
@@ -183,12 +192,19 @@ pub(super) struct Body<'a> {
 }
 
 /// The statements of one part; over lanes, in a loop over them.
-fn body(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) -> String, out: &mut FunctionText) {
+fn body(
+    graph: &Graph,
+    part: &Part,
+    style: Style,
+    filler: Option<String>,
+    title: &dyn Fn(Section) -> String,
+    out: &mut FunctionText,
+) {
     if !style.lanes {
-        return statements(graph, part, style, title, out);
+        return statements(graph, part, style, filler, title, out);
     }
     let mut inner = FunctionText::new();
-    statements(graph, part, style, title, &mut inner);
+    statements(graph, part, style, filler, title, &mut inner);
     out.text.push_str("    for lane in 0..N {\n");
     for line in inner.text.lines() {
         let _ = writeln!(out.text, "    {line}");
@@ -198,14 +214,21 @@ fn body(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) -> Str
     out.uses_sqrt |= inner.uses_sqrt;
 }
 
-fn statements(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) -> String, out: &mut FunctionText) {
+fn statements(
+    graph: &Graph,
+    part: &Part,
+    style: Style,
+    filler: Option<String>,
+    title: &dyn Fn(Section) -> String,
+    out: &mut FunctionText,
+) {
     let taken = graph
         .inputs
         .iter()
         .chain(&graph.outputs)
         .map(|p| p.name.as_str())
         .chain(["live", "trig", "lane", "fma", "fma_if", "fused", "number"]);
-    let (mut b, absorbed) = Body::new(graph, part, style, Names::with_taken(taken));
+    let (mut b, absorbed) = Body::new(graph, part, style, filler, Names::with_taken(taken));
     let mut uses = vec![0u32; graph.ops.len()];
     for id in &part.nodes {
         graph.op(*id).operands().for_each(|a| uses[a.index()] += 1);
@@ -263,7 +286,13 @@ pub(super) struct Plan<'a> {
 
 impl<'a> Body<'a> {
     /// Before its first statement, and which products sums take in.
-    pub fn new(graph: &'a Graph, part: &Part, style: Style, names: Names) -> (Body<'a>, Vec<bool>) {
+    pub fn new(
+        graph: &'a Graph,
+        part: &Part,
+        style: Style,
+        filler: Option<String>,
+        names: Names,
+    ) -> (Body<'a>, Vec<bool>) {
         let (fused, absorbed) = match style.fused {
             true => fusions(graph, part),
             false => (vec![None; graph.ops.len()], vec![false; graph.ops.len()]),
@@ -271,6 +300,7 @@ impl<'a> Body<'a> {
         let body = Body {
             graph,
             style,
+            filler,
             fused,
             text: vec![None; graph.ops.len()],
             paired: vec![false; graph.ops.len()],

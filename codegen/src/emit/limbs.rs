@@ -95,21 +95,19 @@ impl Body<'_> {
             texts.push((*node, format!("{name}[{limb}]")));
         }
         // what goes there
-        let zero = self.style.zero().to_string();
-        // no zeros: they would be a call of `memset` where there are no vector instructions
-        let filler = outside.first().filter(|_| !self.style.generic).map_or(zero, |(_, of)| self.operand(of[0]).0);
+        let filler = self.filler.clone().unwrap_or_else(|| self.style.zero().to_string());
         let (mut arrays, mut names): (Vec<(NodeId, String)>, Vec<String>) = (Vec::new(), Vec::new());
         for (node, row) in &results {
             let name = match self.graph.notes[row[0].index()].name {
                 Some((quantity, index, component)) => self.names.named(&format!("{quantity}s"), index, component),
                 None => self.names.numbered("y"),
             };
-            let _ = writeln!(out.text, "    let mut {name} = [{}; {count}];", filler);
+            let _ = writeln!(out.text, "    let mut {name} = [{filler}; {count}];");
             arrays.push((*node, format!("{name}[{limb}]")));
             names.push(name);
         }
 
-        let (mut inner, absorbed) = Body::new(&graph, &part, self.style, std::mem::take(&mut self.names));
+        let (mut inner, absorbed) = Body::new(&graph, &part, self.style, None, std::mem::take(&mut self.names));
         for (node, text) in texts {
             inner.text[node.index()] = Some((text, Binding::Atom));
         }

@@ -14,7 +14,7 @@ pub mod parameter;
 pub use batch::Lanes;
 pub use body::{function, FunctionText};
 pub use file::{file, kernel, preamble, scalar_module, Item, Provenance, GENERIC};
-pub use names::{snake_case, upper_camel_case, Names};
+pub use names::Names;
 
 use crate::expr::Port;
 
@@ -62,6 +62,8 @@ pub struct Style {
     pub lanes: bool,
     /// Whether a·b + c is one operation where the machine has it: [`fused::module`].
     pub fused: bool,
+    /// Whether that operation is `crate::mul_add_f64` of the crate around the output, not that of `std`.
+    pub fused_by_caller: bool,
     /// Whether the function takes any `T: straightline::Real` in place of `scalar`.
     pub generic: bool,
 }
@@ -69,12 +71,17 @@ pub struct Style {
 impl Style {
     /// One state.
     pub fn plain(scalar: Scalar) -> Self {
-        Style { scalar, lanes: false, fused: false, generic: false }
+        Style { scalar, lanes: false, fused: false, fused_by_caller: false, generic: false }
     }
 
     /// With a·b + c as one operation, or without.
     pub fn fused(self, fused: bool) -> Self {
         Style { fused, ..self }
+    }
+
+    /// With that operation from the crate around the output.
+    pub fn by_caller(self, fused_by_caller: bool) -> Self {
+        Style { fused_by_caller, ..self }
     }
 
     /// In any scalar; in it nothing is fused.
@@ -203,10 +210,19 @@ pub fn element_of(ports: &[Port], mut k: usize) -> String {
     panic!("an element beyond the ports");
 }
 
-/// A name from a robot file as part of a comment: it stays on its line, and in C does not end the comment.
-pub fn one_line(name: &str) -> String {
-    let is_break = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
-    name.chars().map(|c| if is_break(c) { ' ' } else { c }).collect::<String>().replace("*/", "* /")
+/// A number as a literal of the scalar; beyond its range the constant `INFINITY`, which means no limit where it is one, and is refused
+/// in a function ([`crate::compile()`]).
+pub(crate) fn number(x: f64, scalar: Scalar) -> String {
+    let (held, name) = match scalar {
+        Scalar::F64 => (x, "f64"),
+        Scalar::F32 => (f64::from(x as f32), "f32"),
+    };
+    match scalar {
+        _ if held.is_nan() => format!("{name}::NAN"),
+        _ if held.is_infinite() => format!("{}{name}::INFINITY", if held < 0.0 { "-" } else { "" }),
+        Scalar::F64 => format!("{x:?}"),
+        Scalar::F32 => format!("{:?}", x as f32),
+    }
 }
 
 #[cfg(test)]
@@ -214,7 +230,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_cannot_leave_the_comment_it_stands_in() {
-        assert_eq!(one_line("a*/\nint x;"), "a* / int x;");
+    fn a_number_is_a_literal_or_a_constant_of_its_type() {
+        for (x, scalar, text) in [
+            (0.1, Scalar::F32, "0.1"),
+            (1e40, Scalar::F32, "f32::INFINITY"),
+            (-f64::MAX, Scalar::F32, "-f32::INFINITY"),
+            (1e40, Scalar::F64, "1e40"),
+            (f64::INFINITY, Scalar::F64, "f64::INFINITY"),
+            (1e-45, Scalar::F32, "1e-45"),
+            (f64::NAN, Scalar::F64, "f64::NAN"),
+        ] {
+            assert_eq!(number(x, scalar), text);
+        }
     }
 }

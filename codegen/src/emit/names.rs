@@ -57,30 +57,3 @@ impl Names {
         }
     }
 }
-
-/// A name from a robot file as an identifier: `left hand-2` becomes `left_hand_2`.
-pub fn snake_case(name: &str) -> String {
-    let mut out = String::new();
-    for c in name.chars() {
-        if c.is_ascii_alphanumeric() {
-            out.push(c.to_ascii_lowercase());
-        } else if !out.is_empty() && !out.ends_with('_') {
-            out.push('_');
-        }
-    }
-    let out = out.trim_end_matches('_');
-    match out.chars().next() {
-        Some(c) if c.is_ascii_digit() => format!("n{out}"),
-        None => "unnamed".to_string(),
-        _ => out.to_string(),
-    }
-}
-
-/// An identifier as a type: `left_hand_2` becomes `LeftHand2`.
-pub fn upper_camel_case(name: &str) -> String {
-    let word = |w: &str| {
-        let mut letters = w.chars();
-        letters.next().map(|c| c.to_ascii_uppercase()).into_iter().chain(letters).collect::<String>()
-    };
-    name.split('_').map(word).collect()
-}

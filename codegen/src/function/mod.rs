@@ -9,6 +9,7 @@ use crate::choose::Found;
 use crate::emit::Scalar;
 use crate::expr::{Graph, Port, RuleSet};
 use crate::forward_method::{self, MethodChoice};
+use crate::identifier;
 use crate::reduce::{reduce, Choice};
 use crate::scene::{Bound, Part, Scene};
 use crate::trace::{trace, Expr};
@@ -379,6 +380,7 @@ impl Function {
         if let Some(selection) = scene.outputs.get(&self) {
             for (what, names) in [("joints", &selection.joints), ("frames", &selection.frames)] {
                 if !names.is_empty() {
+                    let names: Vec<String> = names.iter().map(|name| identifier::doc(name)).collect();
                     doc.push_str(&format!("\nOnly for the {what} {}.\n", names.join(", ")));
                 }
             }

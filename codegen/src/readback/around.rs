@@ -5,8 +5,9 @@ use super::run::Known;
 use super::tokens::{self as t, Kind, Words};
 use super::Stop;
 use crate::compile::Generated;
-use crate::emit::{Lanes, Scalar};
+use crate::emit::{self, Lanes, Scalar};
 use crate::expr::Port;
+use crate::identifier::string_literals;
 use rustc_hash::FxHashMap;
 use straightline_core::model::{JointKind, Limits};
 
@@ -22,8 +23,12 @@ const FIXED: &[(Sort, u32, &[u64])] = &[
     (Sort::Function, t::CHECK_INERTIA, &[0x0c81_c665_d150_516d]),
     // in a file of f64, and of f32
     (Sort::Function, t::NUMBER, &[0xfaad_a6a9_71e5_37b2, 0x6ce6_7a96_9b86_e86e]),
-    // without sines, and with them
-    (Sort::Given, t::FUSED_MODULE, &[0xcd10_895d_ac6a_0dde, 0x942b_8e84_d1e1_e3e1]),
+    // by `std` without sines and with them, by the caller
+    (
+        Sort::Given,
+        t::FUSED_MODULE,
+        &[0xe0d0_0692_3bd3_0376, 0xa099_d5d1_962f_8eb5, 0x72ed_cfc4_692c_6ea9, 0x323c_9069_a7ae_e566],
+    ),
 ];
 
 type Read<X> = Result<X, Stop>;
@@ -100,7 +105,9 @@ impl Around<'_, '_, '_> {
         let root = self.root;
         let mut joints: Vec<_> = model.bodies.iter().map(|b| &b.joint).collect();
         joints.sort_by_key(|j| j.iv);
-        let names = |names: Vec<&String>| format!("[&str; {}] = {names:?}", names.len());
+        let names = |names: Vec<&String>| {
+            format!("[&str; {}] = [{}]", names.len(), string_literals(names.iter().map(|name| name.as_str())))
+        };
         let mut plain = vec![
             ("NQ", format!("usize = {}", model.nq())),
             ("NV", format!("usize = {}", model.nv())),
@@ -186,7 +193,7 @@ impl Around<'_, '_, '_> {
                     pub const NONE: {name} = {name}([0.0; {n}]);
                     pub fn new(mass: {s}, com: [{s}; 3], inertia: [{s}; 6]) -> Result<{name}, Unphysical> {{
                         check_inertia(mass, &com, &inertia)?;
-                        let mut parameters = [0.0; {n}];
+                        let mut parameters = [mass; {n}];
                         {function}(&[mass], &com, &inertia, &mut parameters);
                         Ok({name}(parameters))
                     }}
@@ -314,6 +321,8 @@ impl Around<'_, '_, '_> {
             let text = format!("pub struct {name}{0} {{ {field} values: [{s}; {n}], }}", life(k));
             self.is(module, Sort::Struct, name, &text)?;
             let own = listed(&mut graph.inputs.iter().filter(|p| !is_stored(p)), "&");
+            let mut given = graph.inputs.iter().filter(|p| !is_stored(p) && !p.is_empty());
+            let filler = given.next().map_or("0.0".to_string(), |p| emit::element(p, 0));
             let before = earlier.map(|(e, life)| format!("{}: &'a {}{life}", e.values, e.type_name));
             let parameters: Vec<String> = before.into_iter().chain(own).collect();
             let receiver = earlier.map_or("", |(e, _)| &e.values);
@@ -323,7 +332,7 @@ impl Around<'_, '_, '_> {
                 "impl{0} {name}{0} {{
                     #[must_use]
                     pub fn new({1}) -> {name}{0} {{
-                        let mut values = [0.0; {n}];
+                        let mut values = [{filler}; {n}];
                         {2}({arguments}&mut values);
                         {name} {{ {3} values }}
                     }}",
@@ -365,7 +374,8 @@ impl Around<'_, '_, '_> {
         for mode in modes {
             let module = self.module(contact, &mode.identifier)?;
             for (name, names) in ["CONSTRAINED", "FREE"].iter().zip(&mode.coordinates) {
-                let text = format!("pub const {name}: [&str; {}] = {names:?};", names.len());
+                let quoted = string_literals(names.iter().map(String::as_str));
+                let text = format!("pub const {name}: [&str; {}] = [{quoted}];", names.len());
                 self.is(module, Sort::Constant, name, &text)?;
             }
         }
@@ -398,12 +408,15 @@ impl Around<'_, '_, '_> {
                 None => format!("{}: &{}, ", p.name, shaped(p, s)),
             })
             .collect();
+        let mut given = inputs.iter().filter(|p| p.wrapper.is_none() && !p.is_empty());
+        let filler = given.next().map_or("0.0".to_string(), |p| emit::element(p, 0));
         let arms: String = variants
             .iter()
             .zip(modes)
             .zip(&programs)
             .map(|((variant, mode), program)| {
                 let m = mode.coordinates[0].len();
+                let forces = (0..most).map(|i| if i < m { format!("f[{i}]") } else { "0.0".to_string() });
                 let arguments: Vec<&str> = program
                     .graph
                     .inputs
@@ -419,19 +432,19 @@ impl Around<'_, '_, '_> {
                     .collect();
                 format!(
                     "Mode::{variant} => {{
-                        let (mut f, mut sdd, mut violation) = ([0.0; {m}], [0.0; {m}], [0.0; {m}]);
+                        let (mut f, mut sdd, mut violation) = ([{filler}; {m}], [{filler}; {m}], [{filler}; {m}]);
                         {}::forward_dynamics({});
-                        force[..{m}].copy_from_slice(&f);
+                        *force = [{}];
                     }}",
                     mode.identifier,
-                    arguments.join(", ")
+                    arguments.join(", "),
+                    forces.collect::<Vec<_>>().join(", ")
                 )
             })
             .collect();
         let nv = self.generated.model.nv();
         let text = format!(
             "pub fn forward_dynamics(mode: Mode, {parameters}qdd: &mut [{s}; {nv}], force: &mut [{s}; {most}]) -> {s} {{
-                *force = [0.0; {most}];
                 let mut pivot = [0.0];
                 match mode {{ {arms} }}
                 pivot[0]

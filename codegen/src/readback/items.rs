@@ -35,6 +35,8 @@ pub struct Parameter {
     pub name: u32,
     /// Its type.
     pub of: Type,
+    /// Whether its name says that it is used.
+    pub used: bool,
 }
 
 /// A function's signature and where its body is.
@@ -364,12 +366,13 @@ impl<'t> Items<'t> {
         let mut parameters: Vec<Parameter> = Vec::new();
         while at < end {
             let name = self.word(&mut at)?;
+            let used = !self.text_of(at - 1).starts_with('_');
             if parameters.iter().any(|p| p.name == name) {
                 return self.stop(at - 1, "a second parameter of that name");
             }
             self.mark(&mut at, b':')?;
             let of = self.type_of(&mut at, format)?;
-            parameters.push(Parameter { name, of });
+            parameters.push(Parameter { name, of, used });
             if at < end {
                 self.mark(&mut at, b',')?;
             }

@@ -95,6 +95,18 @@ pub struct Programs {
     pub modes: Vec<ModePrograms>,
 }
 
+impl Programs {
+    /// All of them.
+    pub fn all(&self) -> impl Iterator<Item = &Program> {
+        let staged = self.staged.iter().flat_map(|staged| {
+            let stages = staged.stages.iter().map(|stage| &stage.program);
+            stages.chain(staged.functions.iter().map(|(_, program)| program))
+        });
+        let modes = self.modes.iter().flat_map(|mode| &mode.functions);
+        self.functions.iter().chain(self.parameters.iter().map(|p| &p.program)).chain(staged).chain(modes)
+    }
+}
+
 /// Where a text is not what it was to be.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mismatch {

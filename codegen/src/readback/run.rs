@@ -87,6 +87,8 @@ pub struct Run<'a, 't> {
     named: Vec<u32>,
     /// Locals before this one are another function's.
     own: usize,
+    /// The first array that the function is given and uses.
+    given: Option<u32>,
     names: Vec<u32>,
 }
 
@@ -114,6 +116,7 @@ impl<'a, 't> Run<'a, 't> {
             locals: Vec::new(),
             named: vec![0; words],
             own: 0,
+            given: None,
             names: Vec::new(),
         }
     }
@@ -145,13 +148,17 @@ impl<'a, 't> Run<'a, 't> {
         if function.parameters.len() != arguments.len() {
             return items.stop(self.at, "a call with another number of arguments");
         }
-        let (at, own, count) = (self.at, self.own, self.locals.len());
+        let (at, own, given, count) = (self.at, self.own, self.given, self.locals.len());
         for (parameter, argument) in function.parameters.iter().zip(arguments) {
             if !self.fits(*argument, &parameter.of) {
                 return items.stop(self.at, "an argument of another type");
             }
         }
         self.own = count;
+        self.given = function.parameters.iter().zip(arguments).find_map(|(p, argument)| match argument {
+            Thing::Place(place) if p.used => Some(place.array),
+            _ => None,
+        });
         for (parameter, argument) in function.parameters.iter().zip(arguments) {
             self.bind(parameter.name, *argument);
         }
@@ -161,7 +168,7 @@ impl<'a, 't> Run<'a, 't> {
         self.block(&function, format)?;
         self.depth -= 1;
         self.unbind(count);
-        (self.at, self.own) = (at, own);
+        (self.at, self.own, self.given) = (at, own, given);
         Ok(())
     }
 
@@ -406,7 +413,7 @@ impl<'a, 't> Run<'a, 't> {
             Kind::Mark(b'(') => self.sines(format),
             Kind::Word(t::MUT) => {
                 self.at += 1;
-                self.array_of_zeros(format)
+                self.array_to_fill(format)
             }
             Kind::Word(name) => {
                 if self.ahead(1) == Kind::Mark(b':') && self.ahead(2) == Kind::Mark(b'[') {
@@ -455,8 +462,8 @@ impl<'a, 't> Run<'a, 't> {
         Ok(())
     }
 
-    /// `live = [0.0; 12];`, `forces = [T::zero(); 4];`, `live = [[0.0; N]; 12];` behind `let mut`.
-    fn array_of_zeros(&mut self, format: Format) -> Ran<()> {
+    /// `live = [q[0]; 12];`, `forces = [T::zero(); 4];`, `live = [[0.0; N]; 12];` behind `let mut`.
+    fn array_to_fill(&mut self, format: Format) -> Ran<()> {
         let name = self.word()?;
         self.mark(b'=')?;
         self.mark(b'[')?;
@@ -464,8 +471,10 @@ impl<'a, 't> Run<'a, 't> {
         self.at += usize::from(lanes);
         let start = self.at;
         let value = self.number(format, format)?;
-        if value != self.zero(format) {
-            return self.items.stop(start, "an array begins with zeros");
+        if value != self.zero(format) && self.first_given() != Some(value) {
+            return self
+                .items
+                .stop(start, "an array begins with zeros, or the first number that the function is given");
         }
         if lanes {
             self.mark(b';')?;
@@ -608,6 +617,11 @@ impl<'a, 't> Run<'a, 't> {
             self.bind_all(names, &values)?;
         }
         Ok(())
+    }
+
+    /// The first number of [`Run::given`].
+    fn first_given(&self) -> Option<Value> {
+        self.cells.get(self.arrays[self.given? as usize].first as usize).copied()
     }
 
     fn zero(&mut self, format: Format) -> Value {

@@ -1,6 +1,7 @@
 //! Certified bounds of errors, as they stand in the generated file and in reports.
 
 use crate::certify::{Certificate, Refusal};
+use crate::emit::{number, Scalar};
 use crate::expr::Port;
 use std::fmt::Write;
 
@@ -96,7 +97,7 @@ impl ErrorReport {
 /// Numbers as a nested array, rounded up to four digits.
 fn nested<'a>(shape: &[usize], numbers: &mut impl Iterator<Item = &'a f64>) -> String {
     match shape.split_first() {
-        None => numbers.next().map_or(String::new(), |x| format!("{:?}", four_digits(*x))),
+        None => numbers.next().map_or(String::new(), |x| number(four_digits(*x), Scalar::F64)),
         Some((n, rest)) => {
             let parts: Vec<String> = (0..*n).map(|_| nested(rest, numbers)).collect();
             format!("[{}]", parts.join(", "))

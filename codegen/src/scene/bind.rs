@@ -1,9 +1,9 @@
 //! A scene where it meets the equations: which inputs are left, what stands for the others, which results are wanted.
 
 use super::{Gravity, Parameter, Part, Scene, Selection};
-use crate::emit::{snake_case, upper_camel_case};
 use crate::expr::Port;
 use crate::function::{higher_rate, Function, Robot};
+use crate::identifier::{identifier, upper_camel_case};
 use straightline_core::model::{Load, Model};
 use straightline_core::reduced::ReducedModel;
 use straightline_core::spatial::{SpatialInertia, Sym3, Vec3};
@@ -194,10 +194,7 @@ impl Part {
 impl Parameter {
     /// Name of the input.
     pub fn input_name(&self) -> String {
-        match self {
-            Parameter::Payload { name, .. } => snake_case(name),
-            Parameter::Link { link } => snake_case(link),
-        }
+        identifier(self.name(), "body")
     }
 
     /// Name of the input's type.

@@ -1,12 +1,14 @@
 //! What can be wrong with a scene: by itself, beside the options, and with a robot.
 
 use super::check_contact;
+use super::contact::ContactItem;
 use super::messages::{self as say, unphysical_moments};
 use super::{Base, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Scene};
 use crate::compile::Options;
 use crate::diagnostic::Diagnostics;
 use crate::expr::Grade;
-use crate::function::{higher_rate, Function};
+use crate::function::Function;
+use crate::identifier::UNNAMED;
 use crate::limbs::LimbForm;
 use crate::model::geometry::principal_moments;
 use straightline_core::model::{JointKind, Model};
@@ -15,8 +17,6 @@ use straightline_core::Dd;
 
 /// A principal moment may exceed the sum of the others by so much, relatively: the digits of published tensors.
 const MOMENT_DIGITS: f64 = 1e-6;
-/// Names of inputs that a parameter cannot have.
-const INPUTS: [&str; 7] = ["q", "qd", "qdd", "tau", "gravity", "x", "u"];
 
 /// What is wrong with a scene, whatever the robot.
 pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
@@ -75,13 +75,16 @@ pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
             places.complain(&format!("payload.{i}.{key}"), say::unphysical_body(&payload.name, &why), diagnostics);
         }
     }
+    let of_contacts: Vec<String> = scene.contacts.contacts.iter().flat_map(ContactItem::port_names).collect();
     for (i, parameter) in scene.parameters.iter().enumerate() {
         let (name, input, path) = (parameter.name(), parameter.input_name(), format!("parameter.{i}"));
         let earlier = &scene.parameters[..i];
         let taken = match () {
-            () if INPUTS.contains(&input.as_str()) || higher_rate(&input).is_some() => Some("one of the robot's own"),
-            () if input.is_empty() || input == "unnamed" => Some("no name: it has no letter or digit"),
-            () if earlier.iter().any(|other| other.input_name() == input) => Some("that of another parameter"),
+            () if input == UNNAMED => Some("no name: it has no letter or digit"),
+            () if earlier.iter().any(|other| other.type_name() == parameter.type_name()) => {
+                Some("that of another parameter")
+            }
+            () if of_contacts.contains(&input) => Some("that of a contact"),
             () => None,
         };
         match (parameter, taken) {

@@ -3,13 +3,11 @@
 use super::contact::{ContactItem, EnvironmentKind, SurfaceItem};
 use super::{messages as say, Scene};
 use crate::diagnostic::Diagnostics;
-use crate::emit::snake_case;
+use crate::identifier::{identifier, upper_camel_case, UNNAMED};
 use straightline_core::contact::Coordinate;
 use straightline_core::model::Model;
 use straightline_core::Dd;
 
-/// Names of inputs and results that a contact's own cannot have, as they would be the same identifier.
-const TAKEN: [&str; 4] = ["unnamed", "contact", "mode", "trig"];
 /// A direction of this length or less is none.
 const SHORT: f64 = 1e-9;
 
@@ -35,11 +33,12 @@ pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
         ("mode", all.modes.iter().map(|c| c.name.as_str()).collect()),
     ];
     for (kind, names) in &groups {
-        let identifiers: Vec<String> = names.iter().map(|n| snake_case(n)).collect();
+        let identifiers: Vec<String> = names.iter().map(|n| identifier(n, kind)).collect();
+        let types: Vec<String> = identifiers.iter().map(|i| upper_camel_case(i)).collect();
         for (i, name) in names.iter().enumerate() {
-            let twice = identifiers[..i].contains(&identifiers[i]);
-            if twice || TAKEN.contains(&identifiers[i].as_str()) {
-                complain(format!("{kind}.{i}.name"), say::contact_name(kind, name, &identifiers[i], twice));
+            let other = types[..i].iter().position(|t| *t == types[i]).map(|k| names[k]);
+            if other.is_some() || identifiers[i] == UNNAMED {
+                complain(format!("{kind}.{i}.name"), say::contact_name(kind, name, &identifiers[i], other));
             }
         }
     }

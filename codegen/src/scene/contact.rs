@@ -1,6 +1,6 @@
 //! Contacts of a scene: what the robot touches, which coordinates are constrained there, and in which modes.
 
-use crate::emit::snake_case;
+use crate::identifier::snake_case;
 use crate::trace::Expr;
 use std::fmt;
 use std::rc::Rc;
@@ -372,6 +372,10 @@ impl Contacts {
     }
 }
 
+/// What stands behind a contact's name in the names of its inputs and results.
+const PORTS: [&str; 9] =
+    ["axes", "pose", "velocity", "acceleration", "environment", "own", "own_rate", "struck", "struck_after"];
+
 impl ContactItem {
     /// Its friction over a scalar.
     pub fn friction_over<T: Real>(&self) -> Option<Friction<T>> {
@@ -379,8 +383,14 @@ impl ContactItem {
         self.friction.map(|(coefficient, speed)| Friction { coefficient: number(coefficient), speed: number(speed) })
     }
 
-    /// Its name in identifiers.
+    /// Its name as the beginning of identifiers: those of [`ContactItem::port_names`].
     pub fn identifier(&self) -> String {
         snake_case(&self.name)
+    }
+
+    /// The names that inputs and results of its own have, as far as its modes have them.
+    pub fn port_names(&self) -> impl Iterator<Item = String> {
+        let name = self.identifier();
+        PORTS.iter().map(move |what| format!("{name}_{what}"))
     }
 }

@@ -54,6 +54,8 @@ pub const CODES: &[&str] = &[
     "contact-on-world",
     "loop-on-one-body",
     "function-not-of-robot",
+    "number-beyond-scalar",
+    "program-beyond-scalar",
 ];
 
 type D = Diagnostic;
@@ -323,6 +325,26 @@ pub fn scalar_twice(scalar: &str) -> D {
     D::error("scalar-twice", format!("the scalar type `{scalar}` is asked for twice")).help("name each once")
 }
 
+/// A number of the robot, or of a payload, that the scalar type cannot hold.
+pub fn number_beyond_scalar(what: &str, value: f64, scalar: &str, is_too_great: bool) -> D {
+    let d = D::error("number-beyond-scalar", format!("{what}: {scalar} cannot hold {value:?}"));
+    let d = match is_too_great {
+        true => d.detail(format!("the greatest {scalar} is 3.4e38")),
+        false => d.detail(format!("below 1.2e-38 {scalar} loses digits, and then the number")),
+    };
+    d.help("generate in f64, and look whether the units are kg and m; what is no mass at all is 0")
+}
+
+/// A program whose constants or values leave the range of the scalar type.
+pub fn program_beyond_scalar(function: &str, scalar: &str, why: &str) -> D {
+    D::error("program-beyond-scalar", format!("`{function}` cannot be computed in {scalar}: {why}"))
+        .detail("each number of the robot is in range, but not what is made of several of them")
+        .help(match scalar {
+            "f32" => "generate in f64, and look whether the units are kg and m",
+            _ => "no scalar type holds that; look whether the units are kg and m",
+        })
+}
+
 /// A range without a value.
 pub fn empty_range(what: &str, lower: f64, upper: f64) -> D {
     let d = D::error("empty-range", format!("{what}: nothing lies between {lower:?} and {upper:?}"));
@@ -345,10 +367,10 @@ pub fn unknown_contact_function(function: &str, known: &[&str]) -> D {
 }
 
 /// A name of a contact, a loop or a mode that makes no identifier of its own.
-pub fn contact_name(kind: &str, name: &str, identifier: &str, twice: bool) -> D {
-    let why = match twice {
-        true => format!("another {kind} has the name `{identifier}` in generated code, too"),
-        false => format!("in generated code it would be `{identifier}`, which is taken"),
+pub fn contact_name(kind: &str, name: &str, identifier: &str, other: Option<&str>) -> D {
+    let why = match other {
+        Some(other) => format!("in generated code it would be `{identifier}`, as {kind} `{}`", cut(other)),
+        None => "it has no letter or digit".to_string(),
     };
     D::error("contact-name", format!("{kind} `{}`: its name is not free", cut(name)))
         .detail(why)

@@ -420,7 +420,11 @@ impl SceneReader<'_> {
                 let words = self.reader.names_at(table, "scalar", "scalar type");
                 words.iter().filter_map(|word| self.reader.word("scalar types", word, &scalars)).collect()
             }
-            _ => self.reader.word_at(table, "scalar", &scalars).map(|s| s.value).into_iter().collect(),
+            _ => {
+                let word = self.reader.word_at(table, "scalar", &scalars);
+                word.iter().for_each(|word| self.file.scene.places.note("numbers.scalar", &word.place));
+                word.map(|word| word.value).into_iter().collect()
+            }
         };
         let tolerance = self.reader.real_at(table, "angle_tolerance", Range64::Finite);
         if let Some(value) = tolerance.as_ref().filter(|t| !(0.0..=0.1).contains(&t.value)) {

@@ -10,8 +10,8 @@ use straightline_codegen::compile::Options;
 use straightline_codegen::diagnostic::{Diagnostic, Front, Level, Levels, Reporting};
 use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::experiment::parameter::{self, Range, Sweep};
-use straightline_codegen::export::is_identifier;
 use straightline_codegen::expr::Grade;
+use straightline_codegen::identifier::is_prefix;
 use straightline_codegen::limbs::LimbForm;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::scene::MaxError;
@@ -307,7 +307,7 @@ pub struct Export {
     pub c_abi: bool,
     /// How the C names begin [default: the robot's name]
     #[arg(long, value_parser = |text: &str| {
-        is_identifier(text).then(|| text.to_string()).ok_or("letters, digits and _ only, and no digit in front")
+        is_prefix(text).then(|| text.to_string()).ok_or("up to 64 letters, digits and _ only, and no digit in front")
     })]
     pub prefix: Option<String>,
     #[command(flatten)]
@@ -345,9 +345,11 @@ pub struct ProgramArgs {
     #[arg(long, value_name = "HOME", num_args = 0..=1, require_equals = true, default_missing_value = "standalone",
         value_parser = words::<Lanes>())]
     lanes: Option<Lanes>,
-    /// Compute a*b + c in one rounding where the machine can; needs std, and the last bits depend on the machine
-    #[arg(long)]
-    fma: bool,
+    /// Compute a*b + c in one rounding: as the machine can, by std (the last bits depend on it then), or by `caller`: always, by
+    /// `mul_add_f64` of the crate around the output, which needs core alone then
+    #[arg(long, value_name = "BY", num_args = 0..=1, require_equals = true, default_missing_value = "std",
+        value_parser = ["std", "caller"])]
+    fma: Option<String>,
     /// Functions take any scalar that is a `straightline::Real`; the output depends on the package `straightline`
     #[arg(long)]
     pub generic: bool,
@@ -518,6 +520,11 @@ impl ModelArgs {
 }
 
 impl ProgramArgs {
+    /// Whether a*b + c comes from the crate around the output.
+    pub fn fma_by_caller(&self) -> bool {
+        self.fma.as_deref() == Some("caller")
+    }
+
     /// What the command line says of options that a scene gives, too.
     pub fn insist(&self, options: &mut Options) {
         if !self.functions.is_empty() {
@@ -560,7 +567,8 @@ impl ProgramArgs {
             scalar: self.scalar.first().copied().unwrap_or(Scalar::F64),
             also: self.scalar.iter().skip(1).copied().collect(),
             lanes: self.lanes,
-            fma: self.fma,
+            fma: self.fma.is_some(),
+            fma_by_caller: self.fma_by_caller(),
             generic: self.generic,
             grade: self.rules,
             forward_dynamics: self.forward_dynamics,

@@ -18,7 +18,7 @@ use std::process::ExitCode;
 use straightline_codegen::compile::{compile, explain, Generated, Options};
 use straightline_codegen::diagnostic::{self, codes, Diagnostics, Severity, Source};
 use straightline_codegen::report::html;
-use straightline_codegen::{description, export, model, output, scene, verify};
+use straightline_codegen::{description, export, identifier, model, output, scene, verify};
 
 /// Why a command ended early; what there is to say was said where it happened, except for [`Failure::Files`].
 enum Failure {
@@ -209,7 +209,7 @@ fn export(a: &Export) -> Result<(), Failure> {
         print::help("say which with `--scalar`, and leave `staged` out of the scene");
         return Err(Failure::Input);
     }
-    let prefix = a.prefix.clone().unwrap_or_else(|| export::identifier(&generated.model.name));
+    let prefix = a.prefix.clone().unwrap_or_else(|| identifier::prefix(&generated.model.name));
     output::write_directory(&a.output, &export::c_package(&generated, &prefix))?;
     Ok(())
 }

@@ -1,0 +1,162 @@
+//! Numbers that the scalar of generated code cannot hold.
+//!
+//! Two questions, as a number may be lost before or after it is multiplied. Of the robot file and the scene: is every number in
+//! the range of the scalar, and no mass so small that it would be zero? Of a finished program: are its constants numbers, and
+//! do its values stay in range where the exact ones do, at some states near rest? What no limit, however large, has to do with:
+//! limits beyond the range say "no limit" and are written so. A length that vanishes is dust, and vanishes.
+
+use crate::description::{Description, Notation};
+use crate::diagnostic::{Diagnostic, Diagnostics, Place};
+use crate::emit::Scalar;
+use crate::expr::{evaluate, Graph, Op, Width};
+use crate::forward_method;
+use crate::scene::messages as say;
+use crate::scene::Scene;
+use straightline_core::model::Model;
+use straightline_core::Dd;
+
+/// States at which a program is tried.
+const STATES: usize = 3;
+/// An input beyond this is no state to try a program at.
+const GREATEST_INPUT: f64 = 1e6;
+
+/// Complains about the numbers of a robot file and of a scene's payloads that the scalar cannot hold.
+pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagnostics: &mut Diagnostics) {
+    // the readers keep all numbers within 1e±60, or so small that f64 has them as zero
+    if scalar == Scalar::F64 {
+        return;
+    }
+    let mut complain = |place: Option<&Place>, what: String, value: f64, is_mass: bool| {
+        if let Some(complaint) = unheld(&what, value, is_mass) {
+            diagnostics.push(match place {
+                Some(place) => complaint.at(place),
+                None => complaint,
+            });
+        }
+    };
+    let drive = |name: &str, drive: &crate::description::JointDrive, complain: &mut dyn FnMut(&Place, String, f64)| {
+        for (what, value) in [
+            ("damping", &drive.damping),
+            ("friction", &drive.friction),
+            ("rotor_inertia", &drive.rotor_inertia),
+            ("gear_ratio", &drive.gear_ratio),
+            ("armature", &drive.armature),
+            ("spring_stiffness", &drive.spring_stiffness),
+            ("spring_rest", &drive.spring_rest),
+        ] {
+            if let Some(value) = value {
+                complain(&value.place, format!("{what} of joint `{name}`"), value.value);
+            }
+        }
+    };
+    if let Some(gravity) = &description.gravity {
+        gravity.value.iter().for_each(|x| complain(Some(&gravity.place), "gravity".to_string(), *x, false));
+    }
+    match &description.notation {
+        Notation::JointFrames(bodies) => {
+            for link in &bodies.links {
+                let (name, Some(inertial)) = (&link.name.value, &link.inertial) else { continue };
+                let j = inertial.inertia.value;
+                complain(Some(&inertial.mass.place), format!("mass of link `{name}`"), inertial.mass.value, true);
+                for x in inertial.com.value {
+                    complain(Some(&inertial.com.place), format!("mass centre of link `{name}`"), x, false);
+                }
+                for x in [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz] {
+                    complain(Some(&inertial.inertia.place), format!("inertia of link `{name}`"), x, false);
+                }
+            }
+            for joint in &bodies.joints {
+                let (name, xyz) = (&joint.name.value, &joint.origin.xyz);
+                for x in xyz.value {
+                    complain(Some(&xyz.place), format!("origin of joint `{name}`"), x, false);
+                }
+                drive(name, &joint.drive, &mut |place, what, x| complain(Some(place), what, x, false));
+            }
+        }
+        Notation::MassCentres(chain) => {
+            for link in &chain.links {
+                let (name, j) = (&link.name.value, link.inertia.value);
+                complain(Some(&link.mass.place), format!("mass of link `{name}`"), link.mass.value, true);
+                for x in [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz] {
+                    complain(Some(&link.inertia.place), format!("inertia of link `{name}`"), x, false);
+                }
+                for x in link.r.value {
+                    complain(Some(&link.r.place), format!("r of link `{name}`"), x, false);
+                }
+                let joint = &link.joint_name.value;
+                drive(joint, &link.drive, &mut |place, what, x| complain(Some(place), what, x, false));
+            }
+        }
+    }
+    for (i, payload) in scene.payloads.iter().enumerate() {
+        let numbers = [("mass", &[payload.mass][..]), ("com", &payload.com), ("inertia", &payload.inertia)];
+        for (key, values) in numbers {
+            for x in values {
+                let what = format!("{key} of payload `{}`", payload.name);
+                if let Some(complaint) = unheld(&what, *x, key == "mass") {
+                    scene.places.complain(&format!("payload.{i}.{key}"), complaint, diagnostics);
+                }
+            }
+        }
+    }
+}
+
+/// What is wrong with a number in f32: it is too great, or it is a mass and vanishes.
+fn unheld(what: &str, value: f64, is_mass: bool) -> Option<Diagnostic> {
+    let is_lost = is_mass && value != 0.0 && value.abs() < f64::from(f32::MIN_POSITIVE);
+    let is_too_great = (value as f32).is_infinite();
+    (is_lost || is_too_great).then(|| say::number_beyond_scalar(what, value, Scalar::F32.name(), is_too_great))
+}
+
+/// Why a program cannot be computed in its scalar, if that is so: a constant that is no number there, or a value that leaves the
+/// range at an ordinary state.
+pub fn of_program(model: &Model<Dd>, graph: &Graph, scalar: Scalar) -> Option<String> {
+    if let Some(why) = of_constants(graph, scalar) {
+        return Some(why);
+    }
+    // mixed precision is f64 where it has to be
+    if !graph.widths.is_empty() || scalar == Scalar::F64 {
+        return None;
+    }
+    let all = Graph { results: graph.ids().collect(), ..graph.clone() };
+    let states = forward_method::states(model, &graph.inputs, STATES, false)?;
+    let ordinary = states.iter().filter(|x| x.iter().all(|x| x.abs() <= GREATEST_INPUT));
+    ordinary.filter_map(|x| leaves(&all, x)).next()
+}
+
+/// The first value of a program that leaves the range of f32 at these inputs, and not that of f64.
+fn leaves(graph: &Graph, inputs: &[f64]) -> Option<String> {
+    let exact: Vec<f64> = evaluate(graph, inputs);
+    let single: Vec<f32> = evaluate(graph, &inputs.iter().map(|x| *x as f32).collect::<Vec<f32>>());
+    let is_lost = |x: f64| x != 0.0 && x.abs() < f64::from(f32::MIN_POSITIVE);
+    for (k, (exact_value, value)) in exact.iter().zip(&single).enumerate() {
+        if value.is_finite() || !exact_value.is_finite() {
+            continue;
+        }
+        return match graph.ops[k] {
+            // a divisor that cancellation has made zero is another matter
+            Op::Div(_, b) if single[b.index()] == 0.0 && !is_lost(exact[b.index()]) => None,
+            Op::Div(_, b) if single[b.index()] == 0.0 => Some(format!("it divides by {:.3e}", exact[b.index()])),
+            _ if exact_value.abs() > f64::from(f32::MAX) => Some(format!("a value on the way is {exact_value:.3e}")),
+            _ => None,
+        };
+    }
+    None
+}
+
+/// Why a program cannot be written in its scalar, if a constant is no number there.
+pub fn of_constants(graph: &Graph, scalar: Scalar) -> Option<String> {
+    graph.ids().find_map(|id| {
+        let Op::Constant(c) = graph.op(id) else { return None };
+        let exact = c.value().to_f64();
+        let held = match (graph.width(id), scalar) {
+            (Width::Double, _) | (_, Scalar::F64) => exact,
+            (_, Scalar::F32) => f64::from(c.value().to_f32()),
+        };
+        match (exact.is_finite(), held.is_finite()) {
+            (false, _) => Some("a product of constants is beyond f64".to_string()),
+            (_, false) => Some(format!("a product of constants is {exact:.3e}")),
+            _ => None,
+        }
+    })
+}
