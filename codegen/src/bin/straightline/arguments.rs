@@ -596,7 +596,7 @@ impl CommandLine {
             let error = match CommandLine::try_parse_from(&given) {
                 Ok(line) if complaints.is_empty() => return Ok(line),
                 Ok(_) => return Err(complaints),
-                Err(error) => error,
+                Err(error) => by_its_name_here(error),
             };
             let further = without(&given, &error);
             complaints.push(error);
@@ -620,6 +620,22 @@ pub fn exit(complaints: Vec<clap::Error>) -> ! {
         anstream::eprintln!("{}\n", text[..end.filter(|_| !is_last).unwrap_or(text.len())].trim_end());
     }
     std::process::exit(2)
+}
+
+/// A complaint about a function says what it is called here if it is known by another name: RNEA is `inverse_dynamics`.
+fn by_its_name_here(mut error: clap::Error) -> clap::Error {
+    let is_about_functions = matches!(
+        error.get(ContextKind::InvalidArg),
+        Some(ContextValue::String(argument)) if argument.split(' ').next() == Some("--function")
+    );
+    let called = match error.get(ContextKind::InvalidValue) {
+        Some(ContextValue::String(value)) if is_about_functions => Function::called(value),
+        _ => None,
+    };
+    if let Some(function) = called {
+        error.insert(ContextKind::SuggestedValue, ContextValue::String(function.name().to_string()));
+    }
+    error
 }
 
 /// The arguments without what the complaint is about, or with what was meant there; `None` where that is not known.
@@ -673,6 +689,18 @@ mod tests {
         }
     }
     use clap::CommandFactory;
+
+    #[test]
+    fn a_function_known_by_another_name_is_suggested() {
+        for (alias, name) in [("RNEA", "'inverse_dynamics'"), ("crba", "'mass_matrix'"), ("ABA", "'forward_dynamics'")]
+        {
+            let given = ["straightline", "generate", "arm.urdf", "--function", alias].map(OsString::from);
+            let [complaint] = &CommandLine::read(given.to_vec()).unwrap_err()[..] else { panic!("one complaint") };
+            let said = complaint.to_string();
+            let tip = said.lines().find(|line| line.contains("tip:")).unwrap_or_else(|| panic!("{said}"));
+            assert!(tip.contains(name), "{said}");
+        }
+    }
 
     #[test]
     fn the_command_line_is_consistent() {
