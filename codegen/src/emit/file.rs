@@ -67,6 +67,7 @@ pub fn file(
     }
     for item in items {
         out.push('\n');
+        out.push_str(&item.function.alias_attribute());
         out.push_str(&item.text.text);
         if !item.lanes.is_empty() {
             out.push('\n');

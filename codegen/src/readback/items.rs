@@ -191,7 +191,7 @@ impl<'t> Items<'t> {
                 return self.stop(at, "an attribute of the file");
             }
             match self.kind(at + 1) {
-                Kind::Word(t::ALLOW | t::INLINE | t::DERIVE | t::REPR | t::MUST_USE) => {}
+                Kind::Word(t::ALLOW | t::DOC | t::INLINE | t::DERIVE | t::REPR | t::MUST_USE) => {}
                 _ => return self.stop(at + 1, "an attribute that is not known"),
             }
             at = self.tokens[at].closes as usize + 1;
