@@ -17,7 +17,8 @@ const LONGEST_SHOWN: usize = 200;
 /// What an identifier is made of a name without a letter or digit; nothing else becomes that.
 pub const UNNAMED: &str = "unnamed";
 
-/// Words that no identifier of ours may be, in groups that are each one reason.
+/// Words that no identifier of ours may be, in groups that are each one reason; the first two are of the language, and hold for modules,
+/// too.
 const RESERVED: &[&[&str]] = &[
     // Rust's keywords of all editions: strict, reserved, weak
     &[
@@ -365,6 +366,16 @@ pub fn identifier(name: &str, what: &str) -> String {
     }
 }
 
+/// A name as a module with a variant of its own beside it, both among their like only: what is reserved for inputs or functions is not
+/// for them. A keyword, or a type that the module would hide, gets a word more.
+pub fn module_name(name: &str, what: &str) -> String {
+    let word = snake_case(name);
+    match RESERVED[..2].iter().any(|group| group.contains(&word.as_str())) {
+        true => format!("{word}_{what}"),
+        false => word,
+    }
+}
+
 /// An identifier as a type: `left_hand_2` becomes `LeftHand2`.
 pub fn upper_camel_case(name: &str) -> String {
     let word = |w: &str| {
@@ -503,6 +514,11 @@ mod tests {
             ("", UNNAMED),
         ] {
             assert_eq!(identifier(name, "body"), expected, "{name:?}");
+        }
+        for (name, expected) in
+            [("mass", "mass"), ("q", "q"), ("loop", "loop_mode"), ("self", "self_mode"), ("f64", "f64_mode")]
+        {
+            assert_eq!(module_name(name, "mode"), expected);
         }
         let long = identifier(&"ab_".repeat(1000), "body");
         assert!(long.len() <= LONGEST && !long.ends_with('_'), "{long}");

@@ -14,7 +14,7 @@ use crate::emit::Scalar;
 use crate::equivalence::{self, Disagreement, Plainer};
 use crate::expr::{verify, Graph, Port};
 use crate::function::{DriveFunction, ForwardDynamicsMethod, Function, Robot};
-use crate::identifier::identifier;
+use crate::identifier::module_name;
 use crate::pass::{dead_code, sums, unread_inputs};
 use crate::scene::contact::{ContactItem, EnvironmentKind, LoopItem, ModeItem, SurfaceItem};
 use crate::scene::{is_optional, ContactFunction, Scene};
@@ -72,7 +72,7 @@ impl<'a> Mode<'a> {
             }
         };
         let mode = |mode: ModeItem| Mode {
-            identifier: identifier(&mode.name, "mode"),
+            identifier: module_name(&mode.name, "mode"),
             contacts: mode.contacts.iter().map(|name| closed(&mode, name)).collect(),
             name: mode.name,
             loops: &contacts.loops,

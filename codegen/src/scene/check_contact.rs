@@ -3,7 +3,7 @@
 use super::contact::{ContactItem, EnvironmentKind, SurfaceItem};
 use super::{messages as say, Scene};
 use crate::diagnostic::Diagnostics;
-use crate::identifier::{identifier, upper_camel_case, UNNAMED};
+use crate::identifier::{identifier, module_name, upper_camel_case, UNNAMED};
 use straightline_core::contact::Coordinate;
 use straightline_core::model::Model;
 use straightline_core::Dd;
@@ -27,13 +27,14 @@ fn repeated(coordinates: &[Coordinate]) -> Option<Coordinate> {
 pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
     let (all, places) = (&scene.contacts, &scene.places);
     let mut complain = |path: String, complaint| places.complain(&path, complaint, diagnostics);
-    let groups = [
-        ("contact", all.contacts.iter().map(|c| c.name.as_str()).collect::<Vec<&str>>()),
-        ("loop", all.loops.iter().map(|c| c.name.as_str()).collect()),
-        ("mode", all.modes.iter().map(|c| c.name.as_str()).collect()),
+    type Named = fn(&str, &str) -> String;
+    let groups: [(&str, Named, Vec<&str>); 3] = [
+        ("contact", identifier, all.contacts.iter().map(|c| c.name.as_str()).collect()),
+        ("loop", identifier, all.loops.iter().map(|c| c.name.as_str()).collect()),
+        ("mode", module_name, all.modes.iter().map(|c| c.name.as_str()).collect()),
     ];
-    for (kind, names) in &groups {
-        let identifiers: Vec<String> = names.iter().map(|n| identifier(n, kind)).collect();
+    for (kind, named, names) in &groups {
+        let identifiers: Vec<String> = names.iter().map(|n| named(n, kind)).collect();
         let types: Vec<String> = identifiers.iter().map(|i| upper_camel_case(i)).collect();
         for (i, name) in names.iter().enumerate() {
             let other = types[..i].iter().position(|t| *t == types[i]).map(|k| names[k]);
