@@ -42,7 +42,7 @@ const SLOW: f64 = 0.2;
 /// A joint without limits is tried within ± so much.
 const RANGE: f64 = std::f64::consts::PI;
 /// A limit beyond this is none \[rad, m, rad/s or m/s\].
-const NO_LIMIT: f64 = 1e6;
+pub(crate) const NO_LIMIT: f64 = 1e6;
 
 /// A limit, or what is tried without one.
 fn within(limit: f64, other: f64) -> f64 {

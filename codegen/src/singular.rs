@@ -14,10 +14,11 @@ use crate::contact::Mode;
 use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::function::{DriveFunction, Function};
+use crate::model::geometry::principal_moments;
 use crate::model::merge::{merge, Part};
 use crate::scene::ContactFunction;
 use straightline_core::algorithms::{complete_model, drive_states, forward_kinematics, mass_matrix};
-use straightline_core::model::{BodyId, Frame, JointKind, Model};
+use straightline_core::model::{Body, BodyId, Frame, JointKind, Model};
 use straightline_core::spatial::{Sym3, Transform, Vec3};
 use straightline_core::Dd;
 
@@ -42,6 +43,9 @@ pub enum Inertia {
 
 /// The bodies whose joints nothing resists at any configuration; of joints that share one lack, the one nearest to the tips.
 pub fn singular_joints(model: &Model<Dd>, inertia: Inertia) -> Vec<BodyId> {
+    if each_feels_its_own_link(model, inertia) {
+        return Vec::new();
+    }
     let mut always = vanished_pivots(model, inertia, &generic_configuration(model, 1));
     for seed in 2..=3 {
         let here = match always.is_empty() {
@@ -51,6 +55,32 @@ pub fn singular_joints(model: &Model<Dd>, inertia: Inertia) -> Vec<BodyId> {
         always.retain(|body| here.contains(body));
     }
     always
+}
+
+/// Whether every joint feels enough by the one link that it moves, whatever comes behind: the links beyond it, free, add to a pivot and take
+/// nothing away, if no inertia is negative. Elimination takes the cube of the number of joints, of a chain of thousands hours; this the square.
+fn each_feels_its_own_link(model: &Model<Dd>, inertia: Inertia) -> bool {
+    let has_more =
+        inertia == Inertia::WithDrives && !model.drives.is_empty() || model.bodies.iter().any(|b| b.load.is_some());
+    if has_more || model.bodies.iter().any(|b| b.joint.kind == JointKind::Floating) {
+        return false;
+    }
+    // H itself is at most the natural inertia and the rotor; what is near the bound is left to elimination
+    const MARGIN: f64 = 100.0;
+    let scales = natural_inertias(model, &generic_configuration(model, 1));
+    let rotor = |body: &Body<Dd>| body.effects.rotor_inertia.map_or(0.0, Dd::to_f64);
+    let most = |body: &Body<Dd>| scales[body.joint.iv] + rotor(body);
+    let greatest = model.bodies.iter().map(most).fold(0.0, f64::max);
+    model.bodies.iter().all(|body| {
+        let own = &body.inertia;
+        let (mass, com, tensor) = (own.mass.to_f64(), own.com.map(Dd::to_f64), own.inertia_com.map(Dd::to_f64));
+        let link = match body.joint.kind {
+            JointKind::Prismatic => mass,
+            _ => tensor.zz + mass * (com.x * com.x + com.y * com.y),
+        };
+        let is_sound = mass >= 0.0 && rotor(body) >= 0.0 && principal_moments(tensor)[0] >= 0.0;
+        is_sound && link + rotor(body) > MARGIN * (VANISHED * most(body) + DUST * greatest)
+    })
 }
 
 /// Angles and lengths within ±2; a floating base in the world's place, which its inertia does not depend on.

@@ -13,6 +13,7 @@ use crate::description::{self, Description, JointDrive, Notation, Value};
 use crate::diagnostic::{Diagnostics, Source};
 use crate::emit::{element_of, fused, Scalar};
 use crate::expr::{evaluate, Graph};
+use crate::forward_method::NO_LIMIT;
 use crate::function::{Function, Robot};
 use crate::model::{self, ModelOptions};
 use crate::random::Random;
@@ -397,7 +398,7 @@ impl State {
         let (mut qdd, mut tau) = (vec![0.0; nv], vec![0.0; nv]);
         for joint in model.bodies.iter().map(|b| &b.joint) {
             let limits = joint.limits;
-            let finite = |x: f64, otherwise: f64| if x.is_finite() { x } else { otherwise };
+            let finite = |x: f64, otherwise: f64| if x.abs() <= NO_LIMIT { x } else { otherwise };
             match joint.kind {
                 JointKind::Revolute | JointKind::Prismatic => {
                     let wide = if joint.kind == JointKind::Revolute { std::f64::consts::PI } else { 1.0 };

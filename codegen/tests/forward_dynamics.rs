@@ -55,6 +55,20 @@ fn joints_that_feel_no_inertia_are_found() {
     assert_eq!(singular(&chain(&wrist)), ["joint2", "joint3", "joint4"]);
 }
 
+/// Elimination of a thousand rows in double-double takes seconds, of ten thousand, which a robot may have, hours: here, and only here, it takes
+/// none.
+#[test]
+fn a_chain_of_a_thousand_joints_is_checked_link_by_link() {
+    let light = "mass = 1e-3\ncom = [0.1, 0.0, 0.02]\ninertia = [1e-6, 2e-6, 2e-6]";
+    let link = |k: usize| if k % 3 == 0 { (OFF, X, light) } else { (OFF, Z, BODY) };
+    assert_eq!(singular(&chain(&(0..1000).map(link).collect::<Vec<_>>())), [""; 0]);
+    // of few joints it is the same with and without a link that takes elimination
+    let few: Vec<_> = (0..12).map(link).collect();
+    assert_eq!(singular(&chain(&few)), [""; 0]);
+    let with_none = [&few[..], &[(OFF, Y, MASSLESS), (OFF, X, BODY), (HERE, X, MASSLESS)]].concat();
+    assert_eq!(singular(&chain(&with_none)), ["joint15"]);
+}
+
 #[test]
 fn tips_a_million_million_times_lighter_are_no_fault() {
     let light = "mass = 1e-12\ncom = [0.1, 0.02, -0.03]\ninertia = [0.02e-12, 0.03e-12, 0.025e-12]";

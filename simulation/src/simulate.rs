@@ -272,8 +272,9 @@ pub fn simulate_from(
         let (start, end) = (piece[0], piece[1]);
         let held = period.map(|_| command.action(plant, start, &state));
         let system = System { plant, command, held: held.as_ref(), progress };
-        let mut times: Vec<f64> = wanted.iter().copied().filter(|t| *t > start && *t < end).collect();
-        times.push(end);
+        // rows are ascending; a controller's pieces are many
+        let (first, last) = (wanted.partition_point(|t| *t <= start), wanted.partition_point(|t| *t < end));
+        let times = [wanted.get(first..last).unwrap_or_default(), &[end]].concat();
         let stops_at_limits = settings.stops_at_limits;
         let mut watch = Looks { plant, times: &times, next: 0, stops_at_limits, seen: Vec::new(), stop: None };
         let solved = solve(&system, &mut watch, (start, end), &state, settings, &pace)?;

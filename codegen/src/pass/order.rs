@@ -128,7 +128,8 @@ fn ordered(terms: &[(NodeId, bool)], states: &[Vec<f64>]) -> Vec<(NodeId, bool)>
         let size = values.iter().map(|x| x * x).sum::<f64>().sqrt();
         values.into_iter().map(|x| if size > 0.0 { x / size } else { 0.0 }).collect()
     };
-    let states: Vec<Vec<f64>> = states.iter().map(signed).collect();
+    // a state at which a term is beyond the numbers says nothing of an order
+    let states: Vec<Vec<f64>> = states.iter().map(signed).filter(|s| s.iter().all(|x| x.is_finite())).collect();
     if n > ALL_ORDERS {
         let size = |k: usize| states.iter().map(|s| s[k] * s[k]).sum::<f64>();
         let mut order: Vec<usize> = (0..n).collect();
@@ -192,6 +193,22 @@ mod tests {
         let large = ordered.ids().find(|id| ordered.op(*id) == Op::Input(0)).expect("the large term");
         assert!(last.operands().any(|a| a == large), "{ordered:?}");
         assert_eq!(ordered.counts(), graph.counts());
+    }
+
+    #[test]
+    fn states_beyond_the_numbers_say_nothing() {
+        let x = [1e3, 1.0, -1.5, 2.5];
+        let (graph, values) = chain(&x, &[false; 4]);
+        let alone = order(&graph, &[values.clone()]);
+        for beyond in [f64::NAN, f64::INFINITY, 1e300] {
+            let mut wild = values.clone();
+            wild[1] = beyond;
+            wild[2] = -beyond;
+            let [only, beside] = [vec![wild.clone()], vec![values.clone(), wild]].map(|states| order(&graph, &states));
+            verify(&only).expect("a graph as before");
+            assert_eq!(only.counts(), graph.counts());
+            assert_eq!(beside.ops, alone.ops, "{beyond}");
+        }
     }
 
     #[test]
