@@ -335,7 +335,7 @@ type Move = Box<dyn Fn(&mut Choice, usize)>;
 fn moves(options: &Options, forms: Forms, function: Function) -> (Vec<Move>, usize) {
     type Flags = fn(&mut Choice) -> &mut Vec<bool>;
     // the frames in which parameters are given would have to be known where they are made
-    let frames = options.scene.parameters.is_empty();
+    let frames = !options.scene.has_loads();
     // ways to form moments, of which H has none
     let rotations = forms.rotations && function != Function::MassMatrix;
     let all: [(bool, Flags); 13] = [
@@ -443,8 +443,8 @@ fn improved(
         depth[i] = body.parent.map_or(0, |p| depth[p] + 1);
     }
     // the unit would have to be known where gravity or parameters are made
-    let fixed_unit = !forms.unit || options.scene.gravity == Gravity::Input || !options.scene.parameters.is_empty();
-    let origins = (forms.origins && options.scene.parameters.is_empty()).then_some(usize::from(forms.stays));
+    let fixed_unit = !forms.unit || options.scene.gravity == Gravity::Input || options.scene.has_loads();
+    let origins = (forms.origins && !options.scene.has_loads()).then_some(usize::from(forms.stays));
     let ((moves, major), angle_sums) = (moves(options, forms, function), optimisations.angle_sums);
     let ways = Ways { moves, major, origins, depth, fixed_unit, angle_sums };
     let mut best = (plain, NEVER);

@@ -15,13 +15,14 @@ use crate::limbs::{self, LimbForm};
 use crate::model;
 use crate::pass::{count_sums, dead_code, order, substitute, sums, unread_inputs};
 use crate::range;
-use crate::readback::{self, ParameterProgram, Programs};
+use crate::readback::{self, DriveNumbers, ParameterProgram, Programs};
 use crate::report::budget::{self, Measures};
 use crate::report::errors::ErrorReport;
 use crate::report::waterfall::{self, Waterfall};
 use crate::report::{FunctionReport, Report};
 use crate::rounding;
-use crate::scene::{self, is_optional, load_parameters, Parameter, Scene, LOAD_SCALARS};
+use crate::scene::free_drive::FreeDrive;
+use crate::scene::{self, constructed, is_optional, Parameter, Scene};
 use crate::schedule::{schedule, Limits, Schedule};
 use crate::singular;
 use crate::staged::{self, staged};
@@ -134,6 +135,16 @@ impl Default for Options {
 }
 
 impl Options {
+    /// The same options, whose scene knows the drives of a robot file as far as it names them. What is wrong with the file is said elsewhere.
+    #[must_use]
+    pub fn knowing(&self, source: &Source) -> Options {
+        if !self.scene.parameters.iter().any(|p| !p.is_load()) {
+            return self.clone();
+        }
+        let description = description::read(source, &mut Diagnostics::new());
+        Options { scene: self.scene.knowing(&description.map(|d| d.drives).unwrap_or_default()), ..self.clone() }
+    }
+
     /// The optimisations that these options allow.
     pub fn optimisations(&self) -> Optimisations {
         let algebraic = self.grade == Grade::Algebraic;
@@ -501,7 +512,8 @@ pub fn explain(source: &Source, options: &Options) -> Result<Generated, Diagnost
     let mut generated = compile_and_explain(source, options, true)?;
     if generated.report.staged.is_none() && !generated.items.is_empty() {
         let robot = Robot::new(generated.model.clone());
-        let options = Options { scene: options.scene.resolved(&robot.model), ..options.clone() };
+        let options = options.knowing(source);
+        let options = Options { scene: options.scene.resolved(&robot.model), ..options };
         let figures = staged::figures(&robot, &generated.frames, &options);
         generated.report.staged = Some(figures.map_err(|wrong| only(wrong.error(&robot.model)))?);
     }
@@ -522,7 +534,7 @@ fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> R
 /// What is wrong with the file or the options, without compiling: all that [`compile`] would say but what only the finished
 /// programs tell, such as exceeded budgets.
 pub fn examine(source: &Source, options: &Options) -> Diagnostics {
-    match prepare(source, options) {
+    match prepare(source, &options.knowing(source)) {
         Ok(prepared) => prepared.diagnostics,
         Err(diagnostics) => diagnostics,
     }
@@ -578,6 +590,7 @@ fn prepare(source: &Source, options: &Options) -> Result<Prepared, Diagnostics> 
 }
 
 fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
+    let options = &options.knowing(source);
     let Prepared { whole, model, frames, resolved, mut diagnostics } = prepare(source, options)?;
     let hash = hash(source.text(), &resolved);
     let robot = Robot::new(model);
@@ -718,7 +731,7 @@ fn generate(
         }
         None => (String::new(), None),
     };
-    for parameter in options.scene.parameters.iter().filter(|p| p.body(model).is_some()) {
+    for parameter in options.scene.parameters.iter().filter(|p| p.is_of(model)) {
         let constructor = parameter_program(&robot, parameter, options);
         equivalence::of_parameter(&robot, parameter, options, &constructor)?;
     }
@@ -901,11 +914,10 @@ pub(crate) fn error_bound_text(
 }
 
 /// The program of a parameter's constructor: from mass \[kg\], mass centre \[m\] and inertia about it \[kg·m²\] (xx, xy, xz,
-/// yy, yz, zz) in the parameter's frame to the scalars that the functions take.
+/// yy, yz, zz) in the parameter's frame, or from the free numbers of a drive, to the scalars that the functions take.
 pub fn parameter_program(robot: &Robot, parameter: &Parameter, options: &Options) -> Graph {
-    let inputs = vec![Port::new("mass", &[1]), Port::new("com", &[3]), Port::new("inertia", &[6])];
-    let outputs = vec![Port::new("parameters", &[LOAD_SCALARS])];
-    dead_code(&trace(options.rules(), inputs, outputs, |x| load_parameters(robot, parameter, x)))
+    let outputs = vec![Port::new("parameters", &[parameter.scalars(&robot.model)])];
+    dead_code(&trace(options.rules(), parameter.given(), outputs, |x| constructed(robot, parameter, x)))
 }
 
 /// The last part of a path.
@@ -920,22 +932,38 @@ fn parameter_types(
     takes: &dyn Fn(&Parameter) -> bool,
     written: &mut Vec<ParameterProgram>,
 ) -> String {
-    let parameters = options.scene.parameters.iter().filter(|p| p.body(&robot.model).is_some() && takes(p));
+    let parameters = options.scene.parameters.iter().filter(|p| p.is_of(&robot.model) && takes(p));
     let types = parameters.map(|p| {
         let graph = parameter_program(robot, p, options);
         let (schedule, name) = (schedule(&graph, options.limits), p.input_name());
-        let doc = "The parameters about the origins, and in the axes, of the frames that the equations use.";
+        let drive = FreeDrive::new(p, &robot.model);
+        let doc = match &drive {
+            None => "The parameters about the origins, and in the axes, of the frames that the equations use.",
+            Some(_) => "The numbers of the drive that the equations use.",
+        };
         let private = format!("{name}_parameters");
         let constructor = emit::function(&graph, &schedule, &private, doc, options.style(), &|_| String::new());
         let program = readback::Program { name: private, graph, scalar: options.scalar, generic: false, lanes: false };
-        written.push(ParameterProgram { type_name: p.type_name(), program });
-        emit::parameter::parameter(&name, &p.type_name(), p.frame(), LOAD_SCALARS, &constructor, options.scalar)
+        let scalars = p.scalars(&robot.model);
+        let (text, numbers) = match drive {
+            None => {
+                let frame = p.frame().unwrap_or_default();
+                (emit::parameter::body(&name, &p.type_name(), frame, scalars, &constructor, options.scalar), None)
+            }
+            Some(drive) => {
+                let numbers = DriveNumbers { nominal: drive.values(&drive.nominal()), numbers: drive.numbers };
+                let names = (&name[..], &p.type_name()[..], p.name());
+                (emit::parameter::drive(names, &numbers, &constructor, options.scalar), Some(numbers))
+            }
+        };
+        written.push(ParameterProgram { type_name: p.type_name(), program, numbers });
+        text
     });
     let types: String = types.collect();
-    if types.is_empty() {
-        return types;
-    }
-    emit::parameter::check(options.scalar) + &types
+    let is_there = |drive: bool| written.iter().any(|p| p.numbers.is_some() == drive);
+    let checks = [(false, emit::parameter::check as fn(Scalar) -> String), (true, emit::parameter::check_drive)];
+    checks.into_iter().filter(|(drive, _)| is_there(*drive)).map(|(_, text)| text(options.scalar)).collect::<String>()
+        + &types
 }
 
 /// The frames asked for, or the tips of the robot: the last frame on every body that carries no other.

@@ -18,8 +18,10 @@ use crate::emit::{element_of, Scalar};
 use crate::expr::{evaluate, Grade, Graph, Port};
 use crate::forward_method::{self, settle};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
+use crate::model::drives::entries;
 use crate::random::Random;
-use crate::scene::{load_parameters, ContactFunction};
+use crate::scene::free_drive::FreeDrive;
+use crate::scene::{constructed, ContactFunction};
 use crate::stage::Staged;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -405,15 +407,45 @@ pub(crate) fn of_parameter(
     graph: &Graph,
 ) -> Result<(), Disagreement> {
     let mut states = States::new(robot, options);
-    for _ in 0..STATES {
-        let body = states.body();
+    let drive = FreeDrive::new(parameter, &robot.model);
+    for state in 0..STATES {
+        let body = match &drive {
+            // the first is the robot file's
+            Some(drive) if state == 0 => vec![drive.nominal()],
+            _ => states.given(parameter),
+        };
         let wide: Vec<Vec<Magnitude>> = body.iter().map(|x| x.iter().copied().map(Magnitude::new).collect()).collect();
-        let off = evaluate(graph, &body.concat()).into_iter().zip(load_parameters(robot, parameter, &wide));
+        let off = evaluate(graph, &body.concat()).into_iter().zip(constructed(robot, parameter, &wide));
         let off: Vec<Magnitude> = off.map(|(found, plain)| difference(found, plain)).collect();
+        if let Some(drive) = &drive {
+            compare(&parameter.input_name(), &graph.outputs, &off, AGREE)?;
+            of_drive(parameter, drive, &body[0], (state == 0).then_some(&robot.model))?;
+            continue;
+        }
         // axes that hardly turn: what is left beside them is of the size of the whole
         let most = off.iter().map(|x| x.size).fold(0.0, f64::max);
         let off: Vec<Magnitude> = off.into_iter().map(|x| x.of_size(most)).collect();
         compare(&parameter.input_name(), &graph.outputs, &off, agreeing(options))?;
+    }
+    Ok(())
+}
+
+/// Whether functions run over the drive that these numbers make, all of it, and for those of the robot file over the robot's own.
+fn of_drive(
+    parameter: &crate::scene::Parameter,
+    drive: &FreeDrive,
+    numbers: &[Dd],
+    of_file: Option<&Model<Dd>>,
+) -> Result<(), Disagreement> {
+    let bound = entries(&drive.bound(numbers));
+    let own = of_file.and_then(|model| model.drives.iter().find(|d| d.name == drive.name())).map(entries);
+    for expected in [Some(entries(&drive.derived(numbers))), own].into_iter().flatten() {
+        let agree = |(found, plain): (&Dd, &Dd)| (*found - *plain).hi().abs() <= AGREE * plain.hi().abs();
+        let differs = bound.len() != expected.len() || !bound.iter().zip(&expected).all(agree);
+        if differs {
+            let result = format!("a number of drive `{}`", drive.name());
+            return Err(Disagreement { program: parameter.input_name(), result, difference: 1.0, plain: None });
+        }
     }
     Ok(())
 }
@@ -573,10 +605,10 @@ impl<'a> States<'a> {
             if port.wrapper.is_some() {
                 let parameter = self.options.scene.parameters.iter().find(|p| p.input_name() == name);
                 let parameter = parameter.expect("a parameter per input with a type of its own");
-                let body = self.body();
-                let values = match parameter.body(model) {
-                    Some(_) => load_parameters(robot, parameter, &body),
-                    None => vec![Dd::ZERO; port.len()],
+                let given = self.given(parameter);
+                let values = match parameter.is_of(model) {
+                    true => constructed(robot, parameter, &given),
+                    false => vec![Dd::ZERO; port.len()],
                 };
                 state.insert(name.to_string(), values);
                 continue;
@@ -602,6 +634,14 @@ impl<'a> States<'a> {
             }
         }
         state
+    }
+
+    /// What the constructor of a parameter may be given.
+    fn given(&mut self, parameter: &crate::scene::Parameter) -> Vec<Vec<Dd>> {
+        match FreeDrive::new(parameter, &self.robot.model) {
+            Some(drive) => vec![drive.random(|| self.random.unit()).into_iter().map(Dd::from).collect()],
+            None => self.body(),
+        }
     }
 
     /// Mass, centre of mass and inertia of a body that may be.

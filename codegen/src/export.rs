@@ -4,6 +4,7 @@
 //! Every function stands in a module of its own, so that rustc's back end can work on several at once.
 
 use crate::compile::Generated;
+use crate::description::drives::Number;
 use crate::emit::{self, Item, Scalar};
 use crate::expr::Port;
 use crate::function::Function;
@@ -341,10 +342,49 @@ pub unsafe extern "C" fn {prefix}_{name}_batch_{layout}(n: usize, {signature}) {
         bodies
     }
 
+    /// The free numbers of a run-time parameter that is of a drive.
+    fn drive_numbers(&self, of: &Port) -> Option<&[Number]> {
+        let parameters = &self.generated.programs.parameters;
+        let found = parameters.iter().find(|p| Some(&p.type_name) == of.wrapper.as_ref())?;
+        found.numbers.as_ref().map(|numbers| &numbers.numbers[..])
+    }
+
     /// The C function that makes a run-time parameter.
     fn constructor(&self, body: &Port) -> String {
         let (prefix, scalar, name, length) = (self.prefix, self.scalar().name(), &body.name, body.len());
         let type_name = body.wrapper.as_deref().unwrap_or_default();
+        if let Some(numbers) = self.drive_numbers(body) {
+            let each = |text: &dyn Fn(usize, &str) -> String| -> String {
+                numbers.iter().enumerate().map(|(k, n)| text(k, &n.name)).collect()
+            };
+            let arguments = each(&|_, n| format!("    {n}: {scalar},\n"));
+            let fields = each(&|_, n| format!("{n}, "));
+            let refusals = each(&|k, n| format!("        Err(e) if e.number == {n:?} => {},\n", k + 1));
+            return format!(
+                r#"
+/// A drive as the functions take it in `made`, with these numbers. Zero, or which of them no drive has, counted from 1, or one more than
+/// there are where what follows from them is not finite; `made` is untouched then.
+///
+/// # Safety
+/// The pointer leads to an aligned array of {length} {scalar}.
+#[no_mangle]
+pub unsafe extern "C" fn {prefix}_{name}_new(
+{arguments}    made: *mut {scalar},
+) -> c_int {{
+    // SAFETY: the caller's promise
+    let made = unsafe {{ &mut *made.cast::<dynamics::{type_name}>() }};
+    match dynamics::{type_name}::new(dynamics::{type_name}Numbers {{ {fields}}}) {{
+        Ok(drive) => {{
+            *made = drive;
+            0
+        }}
+{refusals}        Err(_) => {},
+    }}
+}}
+"#,
+                numbers.len() + 1
+            );
+        }
         format!(
             r#"
 /// A body as the functions take it in `{name}`, from mass, mass centre and inertia (xx, xy, xz, yy, yz, zz) about the mass
@@ -448,6 +488,28 @@ const char *{prefix}_frame_name(int i);
         };
         for body in self.bodies() {
             let (name, length) = (&body.name, body.len());
+            if let Some(numbers) = self.drive_numbers(&body) {
+                let arguments: String = numbers.iter().map(|n| format!("{c_type} {}, ", n.name)).collect();
+                let _ =
+                    writeln!(out, "\n/* A drive as the functions take it in `{name}`, made outside the control loop:");
+                for n in numbers {
+                    let _ = writeln!(
+                        out,
+                        " *   {}: {}; {:?} in the robot file",
+                        n.name,
+                        n.quantity.meaning.replace('\\', ""),
+                        n.value
+                    );
+                }
+                let _ = write!(
+                    out,
+                    " * Returns 0, or which of the numbers no drive has, counted from 1, or {} where what follows from them is not\n \
+                     * finite; made is untouched then. */\n\
+                     int {prefix}_{name}_new({arguments}{c_type} made[{length}]);\n",
+                    numbers.len() + 1
+                );
+                continue;
+            }
             let _ = write!(
                 out,
                 "\n/* A body as the functions take it in {name}, made outside the control loop, of this mass [kg], with its mass\n \

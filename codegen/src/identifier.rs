@@ -249,6 +249,7 @@ const RESERVED: &[&[&str]] = &[
     &[
         "batch",
         "check_inertia",
+        "check_number",
         "com",
         "configuration",
         "contact",
@@ -270,6 +271,8 @@ const RESERVED: &[&[&str]] = &[
         "n",
         "none",
         "number",
+        "numbers",
+        "out_of_range",
         "parameters",
         "real",
         "single",

@@ -11,7 +11,7 @@ use crate::emit::Scalar;
 use crate::expr::{evaluate, Graph, Op, Width};
 use crate::forward_method;
 use crate::scene::messages as say;
-use crate::scene::Scene;
+use crate::scene::{Parameter, Scene};
 use straightline_core::model::Model;
 use straightline_core::Dd;
 
@@ -85,6 +85,14 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
                 }
                 let joint = &link.joint_name.value;
                 drive(joint, &link.drive, &mut |place, what, x| complain(Some(place), what, x, false));
+            }
+        }
+    }
+    for (i, parameter) in scene.parameters.iter().enumerate() {
+        let Parameter::Drive { drive, numbers, form: Some(form), .. } = parameter else { continue };
+        for number in form.numbers().iter().filter(|number| numbers.contains(&number.name)) {
+            if let Some(complaint) = unheld(&format!("{} of drive `{drive}`", number.name), number.value, false) {
+                scene.places.complain(&format!("parameter.{i}.numbers"), complaint, diagnostics);
             }
         }
     }

@@ -253,7 +253,7 @@ fn asked(model: &Model<Dd>, options: &Options) -> Vec<Asked> {
 /// a run-time parameter brings, and nothing else, it cannot be decided here, and is a warning.
 pub(crate) fn demand_inertia(model: &Model<Dd>, options: &Options, diagnostics: &mut Diagnostics) {
     demand_mass(model, options, diagnostics);
-    let full = (!options.scene.parameters.is_empty()).then(|| with_parameters(model, options));
+    let full = options.scene.has_loads().then(|| with_parameters(model, options));
     let mut said = Vec::new();
     for asked in asked(model, options) {
         let never = singular_joints(full.as_ref().unwrap_or(model), asked.inertia);
@@ -270,7 +270,8 @@ pub(crate) fn demand_inertia(model: &Model<Dd>, options: &Options, diagnostics: 
             }
             said.push(id);
             let joint = &model.bodies[id].joint.name;
-            let names: Vec<String> = options.scene.parameters.iter().map(|p| format!("`{}`", p.name())).collect();
+            let names: Vec<String> =
+                options.scene.parameters.iter().filter(|p| p.is_load()).map(|p| format!("`{}`", p.name())).collect();
             let complaint = messages::inertia_by_parameters(&asked.words, joint, &names.join(", "));
             place(complaint, joint, Some((asked.path, options)), diagnostics);
         }
@@ -282,7 +283,7 @@ fn demand_mass(model: &Model<Dd>, options: &Options, diagnostics: &mut Diagnosti
     let divides = |f: &&Function| matches!(f, Function::CentreOfMass | Function::Momentum);
     let names: Vec<String> = options.functions.iter().filter(divides).map(|f| format!("`{}`", f.name())).collect();
     let has_mass = model.bodies.iter().any(|b| b.inertia.mass != Dd::ZERO);
-    if !names.is_empty() && !has_mass && options.scene.parameters.is_empty() {
+    if !names.is_empty() && !has_mass && !options.scene.has_loads() {
         let asked = format!("{} {}", names.join(", "), if names.len() == 1 { "is" } else { "are" });
         options.scene.places.complain("outputs.functions", messages::no_mass(&asked), diagnostics);
     }

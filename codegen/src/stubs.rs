@@ -83,8 +83,10 @@ fn items_and_types(options: &Options, scene: Option<&str>, upwards: &str) -> Str
         return out;
     }
     add_type(&mut out, "Unphysical");
+    add_type(&mut out, "OutOfRange");
     for name in &names {
         add_type(&mut out, &upper_camel_case(name));
+        add_type(&mut out, &(upper_camel_case(name) + "Numbers"));
     }
     let stages = ["Parameters", "Configuration", "Velocity"];
     let stages: String = stages.iter().map(|name| format!("    pub type {name} = super::{missing};\n")).collect();
@@ -174,7 +176,9 @@ fn generic(name: &str, parameter: &str, arguments: usize, missing: &str) -> Stri
 fn names(text: &str) -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     for line in text.split(['\n', ',', '{', '(']) {
-        let Some(rest) = line.trim_start().strip_prefix("name") else { continue };
+        // a parameter of a link or of a drive has their name
+        let keys = ["name", "link", "drive"];
+        let Some(rest) = keys.iter().find_map(|key| line.trim_start().strip_prefix(key)) else { continue };
         let Some(quoted) = rest.trim_start().strip_prefix('=').map(str::trim_start) else { continue };
         let quote = quoted.chars().next().filter(|c| ['"', '\''].contains(c));
         if let Some(name) = quote.and_then(|quote| quoted[1..].split(quote).next()) {

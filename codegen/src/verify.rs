@@ -101,6 +101,7 @@ pub fn verify(
     mut tick: impl FnMut(),
 ) -> Result<Verification, String> {
     let (model, frames) = (&generated.model, &generated.frames);
+    let options = &options.knowing(source);
     let scene = &options.scene.resolved(model);
     let options = &Options { scene: scene.clone(), model: scene.model_options(&options.model), ..options.clone() };
     let whole = model::load(source, &options.model).0.ok_or("the file holds no robot")?;
@@ -123,6 +124,8 @@ pub fn verify(
     for state in 0..states {
         let mut inputs = State::random(model, options.scalar, &mut random);
         inputs.set_zeros(scene, model);
+        let model = &mut model.clone();
+        whole::random_drives(&parameters, options.scalar, (&mut inputs, model), &mut random);
         drives::random_inputs(model, options.scalar, &mut inputs, &mut random);
         let tree = &mut tree.clone();
         whole::random_inputs(scene, &parameters, options.scalar, (&mut inputs, tree), &mut random)?;

@@ -12,7 +12,7 @@ use crate::identifier::{comment, doc, string_literals, upper_camel_case};
 use crate::pass::dead_code;
 use crate::readback::{self, ModePrograms};
 use crate::report::ContactReport;
-use crate::scene::ContactFunction;
+use crate::scene::{ContactFunction, Parameter, Scene};
 use crate::schedule::schedule;
 use std::fmt::Write;
 
@@ -57,7 +57,7 @@ pub fn module(
         let mut functions = Vec::new();
         for ModeProgram { function, graph, .. } in &programs {
             let counts = graph.counts();
-            let doc = documentation(*function, mode, &graph.inputs, &graph.outputs);
+            let doc = documentation(*function, (mode, &options.scene), &graph.inputs, &graph.outputs);
             let doc = format!(
                 "{doc}\n{} mul, {} add, {} div, {} sqrt, {} pairs of sine and cosine.\n",
                 counts.mul, counts.add, counts.div, counts.sqrt, counts.sin_cos
@@ -214,7 +214,12 @@ fn parameter_type(port: &Port, options: &Options) -> String {
     }
 }
 
-fn documentation(function: ContactFunction, mode: &Mode, inputs: &[Port], outputs: &[Port]) -> String {
+fn documentation(
+    function: ContactFunction,
+    (mode, scene): (&Mode, &Scene),
+    inputs: &[Port],
+    outputs: &[Port],
+) -> String {
     let summary = match function {
         ContactFunction::ConstrainedCoordinates => "The constrained coordinates s^c, with s̈ = J q̈ + A, (20.86).",
         ContactFunction::FreeCoordinates => "The free coordinates s^f, with s̈ = J q̈ + A, (20.85).",
@@ -235,6 +240,7 @@ fn documentation(function: ContactFunction, mode: &Mode, inputs: &[Port], output
              it, and then `impact` with restitution 0 to the velocities, against drift."
         }
     };
+    let of_scene = |name: &str| scene.parameters.iter().find(|p| p.input_name() == name).map(Parameter::in_words);
     let mut doc = format!("{summary}\n\nMode `{}`.\n\n", doc(&mode.name));
     for port in inputs.iter().chain(outputs) {
         let name = port.name.as_str();
@@ -274,7 +280,7 @@ fn documentation(function: ContactFunction, mode: &Mode, inputs: &[Port], output
             _ if suffix("_own_rate") => "their rates \\[m/s, m/s²\\]",
             _ if suffix("_struck") => "velocity of the struck mass along pz before \\[m/s\\]",
             _ if suffix("_struck_after") => "its velocity after \\[m/s\\]",
-            _ => "inertial parameters of a body that the robot carries",
+            _ => &of_scene(name).unwrap_or_default(),
         };
         let _ = writeln!(doc, "* `{name}`: {text}");
     }

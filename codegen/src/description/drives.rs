@@ -5,6 +5,7 @@ use super::table::Table;
 use super::{messages, Value};
 use crate::diagnostic::Place;
 use std::fmt;
+use straightline_core::{Dd, Real};
 use toml::de::DeValue;
 
 const DRIVE: &[&str] =
@@ -42,26 +43,26 @@ impl<T> From<Value<T>> for Noted<T> {
     }
 }
 
-/// A drive as written.
+/// A drive as written; over another scalar, with such numbers in place of those that can be set by name.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Drive {
+pub struct Drive<T = f64> {
     /// Its name: that of its joint where the file says nothing.
     pub name: Noted<String>,
     /// Its joints, with the speed of the last shaft over that of each \[1 or rad/m\].
-    pub joints: Vec<(Noted<String>, f64)>,
+    pub joints: Vec<(Noted<String>, T)>,
     /// What makes the torque.
-    pub actuator: Actuator,
+    pub actuator: Actuator<T>,
     /// Stages of the transmission, from the actuator on.
-    pub stages: Vec<Stage>,
+    pub stages: Vec<Stage<T>>,
     /// η′ and η″ of the gear before the joints.
-    pub efficiency: Option<[f64; 2]>,
+    pub efficiency: Option<[T; 2]>,
     /// Greatest input \[V, or the input's unit\].
-    pub input_limit: Option<f64>,
+    pub input_limit: Option<T>,
     /// Greatest current \[A\].
-    pub current_limit: Option<f64>,
+    pub current_limit: Option<T>,
     /// The link that carries the rotor, the axis in its frame and the inertia about it \[kg·m²\], where its turning in space
     /// counts.
-    pub rotor: Option<(Noted<String>, [f64; 3], f64)>,
+    pub rotor: Option<(Noted<String>, [f64; 3], T)>,
     /// What it bears.
     pub rating: Rating,
 }
@@ -96,21 +97,21 @@ pub struct Thermal {
 
 /// What makes the torque.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Actuator {
+pub enum Actuator<T = f64> {
     /// A DC motor.
     Motor {
         /// C_M \[N·m/A\].
-        torque_constant: f64,
+        torque_constant: T,
         /// C_E \[V·s/rad\]; C_M where the file says nothing.
-        emf_constant: f64,
+        emf_constant: T,
         /// R \[Ω\].
-        resistance: f64,
+        resistance: T,
         /// L \[H\].
-        inductance: Option<f64>,
+        inductance: Option<T>,
         /// J \[kg·m²\].
-        rotor_inertia: f64,
+        rotor_inertia: T,
         /// B \[N·m·s/rad\].
-        friction: f64,
+        friction: T,
     },
     /// ẋ = C x + f M + d u with θ̈ = T ẋ.
     Linear {
@@ -129,83 +130,272 @@ pub enum Actuator {
 
 /// A stage of a transmission; rigid without stiffness.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stage {
+pub struct Stage<T = f64> {
     /// N: speed before it over speed behind it.
-    pub ratio: Noted<f64>,
+    pub ratio: Noted<T>,
     /// c \[N·m/rad\], on the side of the joint.
-    pub stiffness: Option<f64>,
+    pub stiffness: Option<T>,
     /// d \[N·m·s/rad\], on the side of the joint.
-    pub damping: Option<f64>,
+    pub damping: Option<T>,
     /// I′ \[kg·m²\], before the gear.
-    pub input_inertia: f64,
+    pub input_inertia: T,
     /// I″ \[kg·m²\], behind the gear.
-    pub output_inertia: f64,
+    pub output_inertia: T,
     /// η′ and η″.
-    pub efficiency: Option<[f64; 2]>,
+    pub efficiency: Option<[T; 2]>,
+}
+
+/// What a number of drives is.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Quantity {
+    /// Its name, of stages without the number of the stage.
+    pub name: &'static str,
+    /// What it means, with its unit.
+    pub meaning: &'static str,
+    /// Which values files and sweeps may give it.
+    pub must: Must,
+    /// Which values it may have at run time, where the equations keep their form.
+    pub at_run_time: Must,
+}
+
+macro_rules! quantities {
+    ($($constant:ident: $name:literal, $meaning:literal, $must:ident, $at_run_time:ident;)*) => {
+        $(const $constant: &Quantity =
+            &Quantity { name: $name, meaning: $meaning, must: Must::$must, at_run_time: Must::$at_run_time };)*
+
+        /// Everything that can be set by name.
+        pub const QUANTITIES: &[&Quantity] = &[$($constant),*];
+    };
+}
+
+quantities! {
+    RATIO: "ratio", "speed of the shaft over speed of the joint, or before the gear over behind it \\[1 or rad/m\\]", NotBeZero, NotBeZero;
+    TORQUE_CONSTANT: "torque_constant", "C_M \\[N·m/A\\]", BePositive, BePositive;
+    EMF_CONSTANT: "emf_constant", "C_E \\[V·s/rad\\]", NotBeNegative, NotBeNegative;
+    RESISTANCE: "resistance", "R \\[Ω\\]", BePositive, BePositive;
+    INDUCTANCE: "inductance", "L \\[H\\]", BePositive, BePositive;
+    ROTOR_INERTIA: "rotor_inertia", "J of the motor about its axis \\[kg·m²\\]", BePositive, BePositive;
+    MOTOR_FRICTION: "motor_friction", "B, viscous \\[N·m·s/rad\\]", NotBeNegative, NotBeNegative;
+    STIFFNESS: "stiffness", "c of the spring behind the gear \\[N·m/rad\\]", BePositive, BePositive;
+    STAGE_DAMPING: "damping", "d of the spring behind the gear \\[N·m·s/rad\\]", NotBeNegative, BePositive;
+    INPUT_INERTIA: "input_inertia", "I′ of the gear \\[kg·m²\\]", NotBeNegative, BePositive;
+    OUTPUT_INERTIA: "output_inertia", "I″ of the gear \\[kg·m²\\]", NotBeNegative, BePositive;
+    EFFICIENCY: "efficiency", "η of the gear in both directions \\[1\\]", BeAnEfficiency, BeAnEfficiency;
+    EFFICIENCY_FORWARD: "efficiency_forward", "η′ of the gear while it drives \\[1\\]", BeAnEfficiency, BeAnEfficiency;
+    EFFICIENCY_BACKWARD: "efficiency_backward", "η″ of the gear while it is driven \\[1\\]", BeAnEfficiency, BeAnEfficiency;
+    INPUT_LIMIT: "input_limit", "greatest \\|u\\| \\[V, or the unit of u\\]", BePositive, BePositive;
+    CURRENT_LIMIT: "current_limit", "greatest current \\[A\\]", BePositive, BePositive;
+}
+
+/// A number of a drive that can be set by name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Number {
+    /// Its name: `ratio`, `stage_2_stiffness`.
+    pub name: String,
+    /// What it is.
+    pub quantity: &'static Quantity,
+    /// Its value.
+    pub value: f64,
+    /// Where it stands among the drive's numbers, then those that follow it unless they are set by a name of their own.
+    at: Vec<usize>,
+}
+
+impl Number {
+    /// Whether it is another's, by whatever name.
+    pub fn is(&self, other: &Number) -> bool {
+        self.at[0] == other.at[0]
+    }
+}
+
+impl<T> Drive<T> {
+    /// All numbers in their order, each with the stage that it is of.
+    fn flat(&mut self) -> Vec<(&'static Quantity, Option<usize>, &mut T)> {
+        let mut all: Vec<(&'static Quantity, Option<usize>, &mut T)> = Vec::new();
+        if let Actuator::Motor { torque_constant, emf_constant, resistance, inductance, rotor_inertia, friction } =
+            &mut self.actuator
+        {
+            all.extend([
+                (TORQUE_CONSTANT, None, torque_constant),
+                (EMF_CONSTANT, None, emf_constant),
+                (RESISTANCE, None, resistance),
+                (ROTOR_INERTIA, None, rotor_inertia),
+                (MOTOR_FRICTION, None, friction),
+            ]);
+            all.extend(inductance.as_mut().map(|x| (INDUCTANCE, None, x)));
+        }
+        for (k, stage) in self.stages.iter_mut().enumerate() {
+            let of = Some(k);
+            all.push((RATIO, of, &mut stage.ratio.value));
+            all.extend(stage.stiffness.as_mut().map(|x| (STIFFNESS, of, x)));
+            all.extend(stage.damping.as_mut().map(|x| (STAGE_DAMPING, of, x)));
+            all.push((INPUT_INERTIA, of, &mut stage.input_inertia));
+            all.push((OUTPUT_INERTIA, of, &mut stage.output_inertia));
+            for [forward, backward] in stage.efficiency.iter_mut().map(|both| both.each_mut()) {
+                all.extend([(EFFICIENCY_FORWARD, of, forward), (EFFICIENCY_BACKWARD, of, backward)]);
+            }
+        }
+        for [forward, backward] in self.efficiency.iter_mut().map(|both| both.each_mut()) {
+            all.extend([(EFFICIENCY_FORWARD, None, forward), (EFFICIENCY_BACKWARD, None, backward)]);
+        }
+        all.extend(self.input_limit.as_mut().map(|x| (INPUT_LIMIT, None, x)));
+        all.extend(self.current_limit.as_mut().map(|x| (CURRENT_LIMIT, None, x)));
+        // what has no name of its own, or not always
+        all.extend(self.rotor.as_mut().map(|(_, _, inertia)| (ROTOR_INERTIA, None, inertia)));
+        all.extend(self.joints.iter_mut().map(|(_, ratio)| (RATIO, None, ratio)));
+        all
+    }
 }
 
 impl Drive {
-    /// Numbers of drives that can be set by name: of a drive of one joint `ratio`, of motors their keys (`friction` as `motor_friction`), of the
-    /// one elastic stage `stiffness` and `stage_damping`.
-    pub const NUMBERS: [&str; 9] = [
-        "ratio",
-        "torque_constant",
-        "emf_constant",
-        "resistance",
-        "inductance",
-        "rotor_inertia",
-        "motor_friction",
-        "stiffness",
-        "stage_damping",
-    ];
+    /// Numbers that can be set by name, as far as the drive has them: of a motor its keys (`friction` as `motor_friction`), of stages
+    /// `stage_2_ratio` and so on, of the drive `efficiency`, `input_limit` and `current_limit`, and `joint_ratio` of the one joint. For
+    /// short, `ratio` is that of the only gear, `stiffness` and `stage_damping` those of the first elastic stage. A voltage constant that is the
+    /// torque constant remains it, and so does the inertia of a rotor that turns in space remain the motor's.
+    pub fn numbers(&self) -> Vec<Number> {
+        let mut copy = self.clone();
+        let flat: Vec<_> = copy.flat().into_iter().map(|(quantity, stage, x)| (quantity, stage, *x)).collect();
+        let (joints, rotors) = (self.joints.len(), usize::from(self.rotor.is_some()));
+        let (joint_ratio, rotor) = (flat.len() - joints, flat.len() - joints - rotors);
+        let is_motor = matches!(self.actuator, Actuator::Motor { .. });
+        let mut all: Vec<Number> = Vec::new();
+        let mut add =
+            |name: String, quantity, at: Vec<usize>| all.push(Number { name, quantity, value: flat[at[0]].2, at });
+        for (k, (quantity, stage, x)) in flat[..rotor].iter().enumerate() {
+            let named = |name: &str| stage.map_or(name.to_string(), |stage| format!("stage_{}_{name}", stage + 1));
+            let next = |quantity| flat.get(k + 1).filter(|next| next.0 == quantity && next.2 == *x).map(|_| k + 1);
+            let follower = match quantity.name {
+                "torque_constant" => next(EMF_CONSTANT),
+                "rotor_inertia" => (rotors == 1 && flat[rotor].2 == *x).then_some(rotor),
+                _ => None,
+            };
+            add(named(quantity.name), quantity, [k].into_iter().chain(follower).collect());
+            if *quantity == EFFICIENCY_FORWARD {
+                next(EFFICIENCY_BACKWARD)
+                    .into_iter()
+                    .for_each(|other| add(named(EFFICIENCY.name), EFFICIENCY, vec![k, other]));
+            }
+        }
+        if rotors == 1 && !is_motor {
+            add(ROTOR_INERTIA.name.to_string(), ROTOR_INERTIA, vec![rotor]);
+        }
+        if joints == 1 {
+            add("joint_ratio".to_string(), RATIO, vec![joint_ratio]);
+        }
+        // for short
+        let at = |quantity: &'static Quantity| flat.iter().position(|x| x.0 == quantity && x.1.is_some());
+        let ratio = match (self.stages.len(), joints) {
+            (0, 1) => Some(joint_ratio),
+            (1, 1) => at(RATIO),
+            _ => None,
+        };
+        for (name, quantity, at) in [
+            ("ratio", RATIO, ratio),
+            ("stiffness", STIFFNESS, at(STIFFNESS)),
+            ("stage_damping", STAGE_DAMPING, at(STAGE_DAMPING)),
+        ] {
+            at.into_iter().for_each(|at| add(name.to_string(), quantity, vec![at]));
+        }
+        all
+    }
 
-    /// Sets one of [`NUMBERS`](Drive::NUMBERS); a voltage constant that is the torque constant remains it. `None` if the drive has no such
-    /// number.
+    /// Sets one of its [`numbers`](Drive::numbers). `None` if the drive has no such number.
     ///
     /// # Errors
     /// What the number has to be.
-    pub fn set(&mut self, key: &str, value: f64) -> Option<Result<(), &'static str>> {
-        let (number, must) = match (key, &mut self.actuator) {
-            ("ratio", _) => match (&mut self.stages[..], &mut self.joints[..]) {
-                ([], [(_, ratio)]) => (ratio, Must::NotBeZero),
-                ([stage], [_]) => (&mut stage.ratio.value, Must::NotBeZero),
-                _ => return None,
-            },
-            ("stiffness", _) => (self.stages.iter_mut().find_map(|s| s.stiffness.as_mut())?, Must::BePositive),
-            ("stage_damping", _) => (self.stages.iter_mut().find_map(|s| s.damping.as_mut())?, Must::NotBeNegative),
-            (_, Actuator::Motor { torque_constant, emf_constant, resistance, inductance, rotor_inertia, friction }) => {
-                match key {
-                    "torque_constant" if emf_constant == torque_constant => {
-                        *emf_constant = value;
-                        (torque_constant, Must::BePositive)
-                    }
-                    "torque_constant" => (torque_constant, Must::BePositive),
-                    "emf_constant" => (emf_constant, Must::NotBeNegative),
-                    "resistance" => (resistance, Must::BePositive),
-                    "inductance" => (inductance.as_mut()?, Must::BePositive),
-                    "rotor_inertia" => (rotor_inertia, Must::BePositive),
-                    "motor_friction" => (friction, Must::NotBeNegative),
-                    _ => return None,
-                }
-            }
-            _ => return None,
-        };
-        *number = value;
+    pub fn set(&mut self, name: &str, value: f64) -> Option<Result<(), &'static str>> {
+        let number = self.numbers().into_iter().find(|number| number.name == name)?;
+        *self = self.with(&[number.clone()], &[value]);
+        let must = number.quantity.must;
         Some(if must.holds(value) { Ok(()) } else { Err(must.words().0) })
+    }
+
+    /// The same drive over another scalar, with these values of some of its numbers.
+    #[must_use]
+    pub fn with<T: Real>(&self, numbers: &[Number], values: &[T]) -> Drive<T> {
+        let mut drive = self.over::<T>();
+        let mut flat = drive.flat();
+        // what is named itself does not follow
+        for follows in [true, false] {
+            for (number, value) in numbers.iter().zip(values) {
+                let at = if follows { &number.at[1..] } else { &number.at[..1] };
+                at.iter().for_each(|at| *flat[*at].2 = *value);
+            }
+        }
+        drive
+    }
+
+    /// The same drive with rigid stages, or without losses.
+    #[must_use]
+    pub fn in_part(&self, is_elastic: bool, is_lossy: bool) -> Drive {
+        let mut drive = self.clone();
+        for stage in &mut drive.stages {
+            stage.stiffness = stage.stiffness.filter(|_| is_elastic);
+            stage.damping = stage.damping.filter(|_| is_elastic);
+            stage.efficiency = stage.efficiency.filter(|_| is_lossy);
+        }
+        drive.efficiency = drive.efficiency.filter(|_| is_lossy);
+        drive
+    }
+
+    fn over<T: Real>(&self) -> Drive<T> {
+        let t = |x: f64| T::constant(Dd::from(x));
+        let both = |e: [f64; 2]| e.map(t);
+        let stage = |s: &Stage| Stage {
+            ratio: Noted { value: t(s.ratio.value), place: s.ratio.place.clone() },
+            stiffness: s.stiffness.map(t),
+            damping: s.damping.map(t),
+            input_inertia: t(s.input_inertia),
+            output_inertia: t(s.output_inertia),
+            efficiency: s.efficiency.map(both),
+        };
+        Drive {
+            name: self.name.clone(),
+            joints: self.joints.iter().map(|(joint, ratio)| (joint.clone(), t(*ratio))).collect(),
+            actuator: match &self.actuator {
+                Actuator::Motor { torque_constant, emf_constant, resistance, inductance, rotor_inertia, friction } => {
+                    Actuator::Motor {
+                        torque_constant: t(*torque_constant),
+                        emf_constant: t(*emf_constant),
+                        resistance: t(*resistance),
+                        inductance: inductance.map(t),
+                        rotor_inertia: t(*rotor_inertia),
+                        friction: t(*friction),
+                    }
+                }
+                Actuator::Linear { c, f, d, t, position } => Actuator::Linear {
+                    c: c.clone(),
+                    f: f.clone(),
+                    d: d.clone(),
+                    t: t.clone(),
+                    position: position.clone(),
+                },
+            },
+            stages: self.stages.iter().map(stage).collect(),
+            efficiency: self.efficiency.map(both),
+            input_limit: self.input_limit.map(t),
+            current_limit: self.current_limit.map(t),
+            rotor: self.rotor.as_ref().map(|(link, axis, inertia)| (link.clone(), *axis, t(*inertia))),
+            rating: self.rating.clone(),
+        }
     }
 }
 
 /// Which numbers a key takes.
-#[derive(Clone, Copy)]
-enum Must {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Must {
+    /// Above zero.
     BePositive,
+    /// Zero or above.
     NotBeNegative,
+    /// Not zero.
     NotBeZero,
+    /// Above zero, at most one.
     BeAnEfficiency,
 }
 
 impl Must {
-    fn holds(self, x: f64) -> bool {
+    /// Whether a number is of them.
+    pub fn holds(self, x: f64) -> bool {
         match self {
             Must::BePositive => x > 0.0,
             Must::NotBeNegative => x >= 0.0,
@@ -214,7 +404,18 @@ impl Must {
         }
     }
 
-    fn words(self) -> (&'static str, &'static str) {
+    /// The same in Rust, of a variable `x` that is finite.
+    pub fn condition(self) -> &'static str {
+        match self {
+            Must::BePositive => "x > 0.0",
+            Must::NotBeNegative => "x >= 0.0",
+            Must::NotBeZero => "x != 0.0",
+            Must::BeAnEfficiency => "x > 0.0 && x <= 1.0",
+        }
+    }
+
+    /// What a number must be, and what to write otherwise.
+    pub fn words(self) -> (&'static str, &'static str) {
         match self {
             Must::BePositive => ("positive", "leave the key out where the effect is to be neglected, if it may be"),
             Must::NotBeNegative => ("zero or positive", "write its modulus"),

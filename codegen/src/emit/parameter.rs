@@ -1,10 +1,13 @@
-//! Types of run-time parameters: the ten inertial parameters of a body, checked when they are made.
+//! Types of run-time parameters, checked when they are made: the ten inertial parameters of a body, numbers of a drive.
 
-use super::{FunctionText, Scalar};
+use super::{number, FunctionText, Scalar};
+use crate::description::drives::Number;
 use crate::identifier::doc;
+use crate::readback::DriveNumbers;
 use std::fmt::Write;
+use straightline_core::Dd;
 
-/// The error type and the check that all parameters of a file share.
+/// The error type and the check that all bodies of a file share.
 pub fn check(scalar: Scalar) -> String {
     CHECK.replace("f64", scalar.name())
 }
@@ -64,7 +67,7 @@ fn check_inertia(mass: f64, com: &[f64; 3], inertia: &[f64; 6]) -> Result<(), Un
 ";
 
 /// The type of one parameter; `constructor` is the program that brings it into the frames of the equations.
-pub fn parameter(
+pub fn body(
     name: &str,
     type_name: &str,
     frame: &str,
@@ -104,4 +107,117 @@ impl {type_name} {{
     );
     out.push_str(&constructor.text.replacen("pub fn ", "fn ", 1));
     out
+}
+
+/// The error type and the check that all drives of a file share.
+pub fn check_drive(scalar: Scalar) -> String {
+    CHECK_DRIVE.replace("f64", scalar.name())
+}
+
+const CHECK_DRIVE: &str = "
+/// Why numbers cannot be those of a drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OutOfRange {
+    /// The number.
+    pub number: &'static str,
+    /// What it must be.
+    pub must: &'static str,
+}
+
+impl core::fmt::Display for OutOfRange {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, \"`{}` must be {}\", self.number, self.must)
+    }
+}
+
+/// A number of a drive is finite and in its range.
+fn check_number(number: &'static str, x: f64, holds: bool, must: &'static str) -> Result<(), OutOfRange> {
+    match (x.is_finite(), holds) {
+        (true, true) => Ok(()),
+        (true, false) => Err(OutOfRange { number, must }),
+        (false, _) => Err(OutOfRange { number, must: \"finite\" }),
+    }
+}
+";
+
+/// The type of the numbers of a drive: name of the input, of the type and of the drive; `constructor` is the program that makes of the free
+/// numbers what functions take.
+pub fn drive(
+    (name, type_name, drive): (&str, &str, &str),
+    numbers: &DriveNumbers,
+    constructor: &FunctionText,
+    scalar: Scalar,
+) -> String {
+    let (t, scalars) = (scalar.name(), numbers.nominal.len());
+    let of_numbers = format!("{type_name}Numbers");
+    let fields = |text: &dyn Fn(&Number) -> String| numbers.numbers.iter().map(text).collect::<String>();
+    let list = |items: Vec<String>| items.join(", ");
+    let declared = fields(&|n| format!("    /// {}.\n    pub {}: {t},\n", n.quantity.meaning, n.name));
+    let values = list(numbers.numbers.iter().map(|n| format!("{}: {}", n.name, number(n.value, scalar))).collect());
+    let nominal = list(numbers.nominal.iter().map(|x| number(rounded(*x, scalar), scalar)).collect());
+    let checks = fields(&|n| {
+        let (name, must) = (&n.name, n.quantity.at_run_time);
+        let condition = must.condition().replace('x', &format!("numbers.{name}"));
+        format!("        check_number({name:?}, numbers.{name}, {condition}, {:?})?;\n", must.words().0)
+    });
+    let given = list(numbers.numbers.iter().map(|n| format!("numbers.{}", n.name)).collect());
+    let drive = doc(drive);
+    let first = &numbers.numbers[0].name;
+    let mut out = format!(
+        "
+/// Numbers of the drive `{drive}`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct {of_numbers} {{
+{declared}}}
+
+impl {of_numbers} {{
+    /// Those of the robot file.
+    pub const NOMINAL: {of_numbers} = {of_numbers} {{ {values} }};
+}}
+
+impl Default for {of_numbers} {{
+    fn default() -> {of_numbers} {{
+        {of_numbers}::NOMINAL
+    }}
+}}
+
+/// The drive `{drive}`, as the functions take it: made outside the control loop, checked once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(transparent)]
+pub struct {type_name}([{t}; {scalars}]);
+
+impl {type_name} {{
+    /// With the numbers of the robot file.
+    pub const NOMINAL: {type_name} = {type_name}([{nominal}]);
+
+    /// With these numbers; the others are those of the robot file.
+    ///
+    /// # Errors
+    /// No drive has such numbers, or what follows from them is not finite.
+    pub fn new(numbers: {of_numbers}) -> Result<{type_name}, OutOfRange> {{
+{checks}        let mut parameters = [numbers.{first}; {scalars}];
+        {name}_parameters(&[{given}], &mut parameters);
+        check_number(\"numbers\", 0.0, parameters.iter().all(|x| x.is_finite()), \"of such sizes that what follows from them is finite\")?;
+        Ok({type_name}(parameters))
+    }}
+}}
+
+impl Default for {type_name} {{
+    fn default() -> {type_name} {{
+        {type_name}::NOMINAL
+    }}
+}}
+
+"
+    );
+    out.push_str(&constructor.text.replacen("pub fn ", "fn ", 1));
+    out
+}
+
+/// In the scalar of the file.
+fn rounded(x: Dd, scalar: Scalar) -> f64 {
+    match scalar {
+        Scalar::F64 => x.to_f64(),
+        Scalar::F32 => f64::from(x.to_f32()),
+    }
 }

@@ -95,7 +95,7 @@ pub fn with(description: &Description, path: &str, value: f64) -> Result<Descrip
     }
 }
 
-/// The robot file or the drives of a scene with another value of a parameter: [`with`], or a number of a drive ([`Drive::NUMBERS`]). Where a
+/// The robot file or the drives of a scene with another value of a parameter: [`with`], or a number of a drive ([`Drive::numbers`]). Where a
 /// joint and a drive of one name both have it, it is the joint's.
 ///
 /// # Errors
@@ -119,10 +119,8 @@ pub fn with_drives(
         Some(Err(be)) => Err(Box::new(say::not_in_range(path, value, be))),
         None => {
             let why = format!("drive `{owner}` has no value `{key}`");
-            let numbers = Drive::NUMBERS.join(", ");
-            Err(Box::new(
-                say::unknown_parameter(path, &why).help(format!("of drives: {numbers}, where they are written")),
-            ))
+            let numbers: Vec<String> = drive.numbers().into_iter().map(|number| number.name).collect();
+            Err(Box::new(say::unknown_parameter(path, &why).help(format!("it has {}", numbers.join(", ")))))
         }
     }
 }

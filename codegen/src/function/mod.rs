@@ -11,7 +11,7 @@ use crate::expr::{Graph, Port, RuleSet};
 use crate::forward_method::{self, MethodChoice};
 use crate::identifier;
 use crate::reduce::{reduce, Choice};
-use crate::scene::{Bound, Part, Scene};
+use crate::scene::{Bound, Parameter, Part, Scene};
 use crate::trace::{trace, Expr};
 use drives::Rigid;
 use straightline_core::algorithms as alg;
@@ -367,7 +367,8 @@ impl Function {
         for port in inputs {
             let known = INPUT_DOCS.iter().chain(drives::INPUT_DOCS).find(|(name, _)| *name == port.name);
             let known = known.map(|(_, text)| text.to_string()).or_else(|| drives::rate_doc(&port.name));
-            let text = known.unwrap_or_else(|| "inertial parameters of a body that the robot carries".to_string());
+            let of_scene = || scene.parameters.iter().find(|p| p.input_name() == port.name).map(Parameter::in_words);
+            let text = known.or_else(of_scene).unwrap_or_default();
             doc.push_str(&format!("* `{}`: {text}\n", port.name));
         }
         for (name, text) in entry.outputs {

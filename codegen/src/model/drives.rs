@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use straightline_core::drive::{Actuator, Drive, Efficiency, LinearActuator, Motor, Rating, Rotor, Stage, Thermal};
 use straightline_core::model::{BodyId, JointKind, Model};
 use straightline_core::spatial::Vec3;
-use straightline_core::Dd;
+use straightline_core::{Dd, Real};
 
 /// So small beside its terms a sum counts as zero: far above the rounding of double-double, far below that of f64.
 const ZERO: f64 = 1e-24;
@@ -176,42 +176,78 @@ fn actuator(drive: &written::Drive, owner: &str, diagnostics: &mut Diagnostics) 
     }
 }
 
-/// Rigid stages become part of the shafts: what stands behind a rigid gear is described by the angle before it.
+/// Rigid stages become part of the shafts: what stands behind a rigid gear is described by the angle before it. What is zero in the file is
+/// left out of the equations.
 fn fold_stages(drive: &written::Drive, built: &mut Drive<Dd>, diagnostics: &mut Diagnostics) -> bool {
-    let square = |x: Dd| x * x;
-    // of the shaft that the present stage begins on: angle of the shaft over that before the stage, inertia, losses
-    let (mut ratio, mut inertia, mut losses) = (Dd::ONE, Dd::ZERO, None);
-    for stage in &drive.stages {
-        let n = Dd::from(stage.ratio.value);
-        let gears = Dd::from(stage.input_inertia) + Dd::from(stage.output_inertia) / square(n);
-        losses = both(losses, stage.efficiency.map(efficiency));
-        (ratio, inertia) = (ratio * n, inertia + gears / square(ratio));
-        let Some(stiffness) = stage.stiffness else { continue };
-        if inertia == Dd::ZERO && !built.stages.is_empty() {
-            diagnostics.push(messages::shaft_without_inertia(&built.name).at(&stage.ratio.place));
+    let folded = folded(&drive.with::<Dd>(&[], &[]), drive);
+    for (k, stage) in folded.stages.iter().enumerate().skip(1) {
+        if stage.inertia.is_none() {
+            let elastic: Vec<&written::Stage> = drive.stages.iter().filter(|s| s.stiffness.is_some()).collect();
+            diagnostics.push(messages::shaft_without_inertia(&built.name).at(&elastic[k].ratio.place));
             return false;
         }
-        built.stages.push(Stage {
-            ratio,
-            stiffness: Dd::from(stiffness),
-            damping: stage.damping.map(Dd::from),
-            inertia,
-            efficiency: losses,
-        });
-        (ratio, inertia, losses) = (Dd::ONE, Dd::ZERO, None);
     }
-    built.joints = built.joints.iter().map(|(body, n)| (*body, *n * ratio)).collect();
-    built.shaft_inertia = (inertia != Dd::ZERO).then_some(inertia);
-    built.efficiency = both(losses, drive.efficiency.map(efficiency));
+    let zero = Dd::ZERO;
+    built.stages = folded.stages.into_iter().map(|s| s.built(zero)).collect();
+    built.joints = built.joints.iter().map(|(body, n)| (*body, *n * folded.ratio)).collect();
+    built.shaft_inertia = folded.inertia;
+    built.efficiency = folded.efficiency;
     true
 }
 
-fn efficiency([forward, backward]: [f64; 2]) -> Efficiency<Dd> {
-    Efficiency { forward: Dd::from(forward), backward: Dd::from(backward), speed: None }
+/// The transmission of a drive with rigid stages folded into the shafts beside them.
+struct Folded<T> {
+    stages: Vec<FoldedStage<T>>,
+    /// Of the last shaft: its speed after the last elastic stage over that which `ratio` or `joints` count from, gears on it, losses behind it.
+    ratio: T,
+    inertia: Option<T>,
+    efficiency: Option<Efficiency<T>>,
+}
+
+struct FoldedStage<T> {
+    ratio: T,
+    stiffness: T,
+    damping: Option<T>,
+    inertia: Option<T>,
+    efficiency: Option<Efficiency<T>>,
+}
+
+impl<T: Real> FoldedStage<T> {
+    fn built(self, zero: T) -> Stage<T> {
+        let FoldedStage { ratio, stiffness, damping, inertia, efficiency } = self;
+        Stage { ratio, stiffness, damping, inertia: inertia.unwrap_or(zero), efficiency }
+    }
+}
+
+/// `form`: the same drive as it is in the file, which says what there is.
+fn folded<T: Real>(drive: &written::Drive<T>, form: &written::Drive) -> Folded<T> {
+    let sum = |a: Option<T>, b: Option<T>| match (a, b) {
+        (Some(a), Some(b)) => Some(a + b),
+        (a, b) => a.or(b),
+    };
+    // of the shaft that the present stage begins on: angle of the shaft over that before the stage, inertia, losses
+    let mut stages = Vec::new();
+    let (mut ratio, mut inertia, mut losses) = (T::one(), None, None);
+    for (stage, form) in drive.stages.iter().zip(&form.stages) {
+        let n = stage.ratio.value;
+        let before = (form.input_inertia != 0.0).then_some(stage.input_inertia);
+        let behind = (form.output_inertia != 0.0).then(|| stage.output_inertia / (n * n));
+        let gears = sum(before, behind).map(|gears| gears / (ratio * ratio));
+        losses = both(losses, stage.efficiency.map(efficiency));
+        (ratio, inertia) = (ratio * n, sum(inertia, gears));
+        let Some(stiffness) = stage.stiffness else { continue };
+        stages.push(FoldedStage { ratio, stiffness, damping: stage.damping, inertia, efficiency: losses });
+        (ratio, inertia, losses) = (T::one(), None, None);
+    }
+    Folded { stages, ratio, inertia, efficiency: both(losses, drive.efficiency.map(efficiency)) }
+}
+
+fn efficiency<T>([forward, backward]: [T; 2]) -> Efficiency<T> {
+    Efficiency { forward, backward, speed: None }
 }
 
 /// Two gears one after the other.
-fn both(a: Option<Efficiency<Dd>>, b: Option<Efficiency<Dd>>) -> Option<Efficiency<Dd>> {
+fn both<T: Real>(a: Option<Efficiency<T>>, b: Option<Efficiency<T>>) -> Option<Efficiency<T>> {
     match (a, b) {
         (Some(a), Some(b)) => {
             Some(Efficiency { forward: a.forward * b.forward, backward: a.backward * b.backward, speed: None })
@@ -235,6 +271,60 @@ pub(crate) fn stiffened(drive: &Drive<Dd>) -> Drive<Dd> {
         joints: drive.joints.iter().map(|(b, n)| (*b, *n * ratio)).collect(),
         ..drive.clone()
     }
+}
+
+/// A drive of a model with other numbers. `form`: as the model has it, which says what there is; `built`: what the model made of that.
+///
+/// What has no name stays as it is: actuators other than motors, ratios of several joints to each other. So ratios change by one factor, and
+/// the shares of the joints' forces by its inverse, whatever other drives these joints have.
+pub(crate) fn derived<T: Real>(
+    drive: &written::Drive<T>,
+    form: &written::Drive,
+    (built, model): (&Drive<Dd>, &Model<Dd>),
+) -> Drive<T> {
+    let (folded, built) = (folded(drive, form), built.map(T::constant));
+    let ratio = |body: BodyId| {
+        let joint = &model.bodies[body].joint.name;
+        drive.joints.iter().find(|(name, _)| name.value == *joint).map(|(_, n)| *n * folded.ratio)
+    };
+    let joints: Vec<(BodyId, T)> = built.joints.iter().map(|(body, n)| (*body, ratio(*body).unwrap_or(*n))).collect();
+    let less = built.joints[0].1 / joints[0].1;
+    let actuator = match &drive.actuator {
+        written::Actuator::Motor { torque_constant, emf_constant, resistance, inductance, rotor_inertia, friction } => {
+            Actuator::Motor(Motor {
+                rotor_inertia: *rotor_inertia,
+                torque_constant: *torque_constant,
+                emf_constant: *emf_constant,
+                friction: *friction,
+                resistance: *resistance,
+                inductance: *inductance,
+            })
+        }
+        written::Actuator::Linear { .. } => built.actuator.clone(),
+    };
+    let inertia = drive.rotor.as_ref().map(|(_, _, inertia)| *inertia);
+    Drive {
+        actuator,
+        stages: folded.stages.into_iter().map(|s| s.built(T::zero())).collect(),
+        shaft_inertia: folded.inertia,
+        efficiency: folded.efficiency,
+        shares: built.shares.as_ref().map(|row| row.iter().map(|(body, share)| (*body, *share * less)).collect()),
+        joints,
+        input_limit: drive.input_limit,
+        current_limit: drive.current_limit,
+        rotor: built.rotor.zip(inertia).map(|(rotor, inertia)| Rotor { inertia, ..rotor }),
+        ..built
+    }
+}
+
+/// All numbers of a drive, in the order of [`Drive::map`].
+pub(crate) fn entries<T: Real>(drive: &Drive<T>) -> Vec<T> {
+    let mut all = Vec::new();
+    drive.map(|x| {
+        all.push(x);
+        x
+    });
+    all
 }
 
 /// The torque of each drive's last shaft per force of each joint, where drives and joints fit one to one: rows of the

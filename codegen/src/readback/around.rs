@@ -3,13 +3,15 @@
 use super::items::{Item, Items, Sort};
 use super::run::Known;
 use super::tokens::{self as t, Kind, Words};
-use super::Stop;
+use super::{DriveNumbers, Stop};
 use crate::compile::Generated;
+use crate::description::drives::{Must, Number};
 use crate::emit::{self, Lanes, Scalar};
 use crate::expr::Port;
 use crate::identifier::string_literals;
 use rustc_hash::FxHashMap;
 use straightline_core::model::{JointKind, Limits};
+use straightline_core::Dd;
 
 /// The sources of what is pasted.
 const TRIG: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/core/src/trig.rs"));
@@ -21,6 +23,9 @@ const FIXED: &[(Sort, u32, &[u64])] = &[
     (Sort::Enum, t::UNPHYSICAL, &[0x9c18_e7bc_b078_e440]),
     (Sort::ImplOf, t::UNPHYSICAL, &[0x516a_84d1_a60c_e6cc]),
     (Sort::Function, t::CHECK_INERTIA, &[0x0c81_c665_d150_516d]),
+    (Sort::Struct, t::OUT_OF_RANGE, &[0x409f_cec0_afb1_97f5]),
+    (Sort::ImplOf, t::OUT_OF_RANGE, &[0xc627_469e_e21a_a86b]),
+    (Sort::Function, t::CHECK_NUMBER, &[0x7b12_b587_29f0_268c]),
     // in a file of f64, and of f32
     (Sort::Function, t::NUMBER, &[0xfaad_a6a9_71e5_37b2, 0x6ce6_7a96_9b86_e86e]),
     // by `std` without sines and with them, by the caller
@@ -188,6 +193,10 @@ impl Around<'_, '_, '_> {
             let (name, function) = (&parameter.type_name, &parameter.program.name);
             let n: usize = parameter.program.graph.outputs.iter().map(Port::len).sum();
             self.is(root, Sort::Struct, name, &format!("pub struct {name}([{s}; {n}]);"))?;
+            if let Some(numbers) = &parameter.numbers {
+                self.drive(name, function, numbers)?;
+                continue;
+            }
             let text = format!(
                 "impl {name} {{
                     pub const NONE: {name} = {name}([0.0; {n}]);
@@ -200,6 +209,67 @@ impl Around<'_, '_, '_> {
                 }}"
             );
             self.is(root, Sort::Impl, name, &text)?;
+        }
+        Ok(())
+    }
+
+    /// The types around the free numbers of a drive.
+    fn drive(&mut self, name: &str, function: &str, numbers: &DriveNumbers) -> Read<()> {
+        let (root, s, n) = (self.root, self.scalar().name(), numbers.nominal.len());
+        let (all, of_numbers) = (&numbers.numbers, format!("{name}Numbers"));
+        let first = &all[0].name;
+        let written = |x: Dd| match self.scalar() {
+            Scalar::F64 => format!("{:?}", x.to_f64()),
+            Scalar::F32 => format!("{:?}", x.to_f32()),
+        };
+        let each = |text: &dyn Fn(&Number) -> String| all.iter().map(text).collect::<Vec<_>>();
+        let fields: String = each(&|x| format!("pub {}: {s},", x.name)).concat();
+        let values = each(&|x| format!("{}: {}", x.name, written(Dd::from(x.value)))).join(", ");
+        let given = each(&|x| format!("numbers.{}", x.name)).join(", ");
+        let nominal = numbers.nominal.iter().map(|x| written(*x)).collect::<Vec<_>>().join(", ");
+        let checks: String = each(&|x| {
+            let (name, must) = (&x.name, x.quantity.at_run_time);
+            let of = format!("numbers.{name}");
+            let (condition, be) = match must {
+                Must::BePositive => (format!("{of} > 0.0"), "positive"),
+                Must::NotBeNegative => (format!("{of} >= 0.0"), "zero or positive"),
+                Must::NotBeZero => (format!("{of} != 0.0"), "not zero"),
+                Must::BeAnEfficiency => (format!("{of} > 0.0 && {of} <= 1.0"), "above 0 and at most 1"),
+            };
+            format!("check_number(\"{name}\", {of}, {condition}, \"{be}\")?;")
+        })
+        .concat();
+        let default =
+            |name: &str| format!("impl Default for {name} {{ fn default() -> {name} {{ {name}::NOMINAL }} }}");
+        let types = [
+            (Sort::Struct, &of_numbers[..], format!("pub struct {of_numbers} {{ {fields} }}")),
+            (
+                Sort::Impl,
+                &of_numbers,
+                format!("impl {of_numbers} {{ pub const NOMINAL: {of_numbers} = {of_numbers} {{ {values} }}; }}"),
+            ),
+            (Sort::ImplOf, &of_numbers, default(&of_numbers)),
+            (
+                Sort::Impl,
+                name,
+                format!(
+                    "impl {name} {{
+                        pub const NOMINAL: {name} = {name}([{nominal}]);
+                        pub fn new(numbers: {of_numbers}) -> Result<{name}, OutOfRange> {{
+                            {checks}
+                            let mut parameters = [numbers.{first}; {n}];
+                            {function}(&[{given}], &mut parameters);
+                            check_number(\"numbers\", 0.0, parameters.iter().all(|x| x.is_finite()),
+                                \"of such sizes that what follows from them is finite\")?;
+                            Ok({name}(parameters))
+                        }}
+                    }}"
+                ),
+            ),
+            (Sort::ImplOf, name, default(name)),
+        ];
+        for (sort, name, text) in types {
+            self.is(root, sort, name, &text)?;
         }
         Ok(())
     }

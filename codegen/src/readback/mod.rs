@@ -16,6 +16,7 @@ mod tokens;
 mod values;
 
 use crate::compile::Generated;
+use crate::description::drives::Number;
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::emit::Scalar;
 use crate::expr::{Graph, Port};
@@ -24,6 +25,7 @@ use items::{Extent, Items, Sort, Type};
 use run::{count_of, Run, Thing};
 use rustc_hash::FxHashMap;
 use std::fmt;
+use straightline_core::Dd;
 use tokens::{Kind, Words};
 use values::{Format, Value, Values};
 
@@ -49,6 +51,17 @@ pub struct ParameterProgram {
     pub type_name: String,
     /// The private function.
     pub program: Program,
+    /// Of a drive, its free numbers.
+    pub numbers: Option<DriveNumbers>,
+}
+
+/// The free numbers of a drive.
+#[derive(Clone, Debug)]
+pub struct DriveNumbers {
+    /// What they are, with their values in the robot file.
+    pub numbers: Vec<Number>,
+    /// What functions take for the values of the robot file.
+    pub nominal: Vec<Dd>,
 }
 
 /// A stage: a type around stored values.

@@ -49,6 +49,7 @@ words! {
     ZERO = "zero", CONSTANT = "constant", NUMBER = "number", INFINITY = "INFINITY",
     N = "N", FUSED = "FUSED", FMA = "fma", FMA_IF = "fma_if", FUSED_MODULE = "fused", TRIG = "trig", BATCH = "batch",
     COST = "Cost", UNPHYSICAL = "Unphysical", CHECK_INERTIA = "check_inertia",
+    OUT_OF_RANGE = "OutOfRange", CHECK_NUMBER = "check_number",
     ALLOW = "allow", DOC = "doc", DERIVE = "derive", INLINE = "inline", MUST_USE = "must_use", REPR = "repr",
     SINGLE = "single", DOUBLE = "double", STRAIGHTLINE = "straightline", WITH_THREADS = "with_threads",
 }

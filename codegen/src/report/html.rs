@@ -148,7 +148,7 @@ fn kinematics(whole: &Model<Dd>, scene: &Scene, model: &Model<Dd>) -> (String, f
     let carries = |i: usize| {
         let on_body = |frame: &str| whole.frame(frame).and_then(|f| f.body) == Some(i);
         let fixed = scene.payloads.iter().filter(|p| on_body(&p.frame)).map(|p| p.name.clone());
-        let at_run_time = scene.parameters.iter().filter(|p| on_body(p.frame())).map(|p| p.input_name());
+        let at_run_time = scene.parameters.iter().filter(|p| p.frame().is_some_and(on_body)).map(|p| p.input_name());
         fixed.chain(at_run_time).fold(String::new(), |text, name| format!("{text} + {name}"))
     };
     let mut out = String::from(

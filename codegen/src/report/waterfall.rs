@@ -104,12 +104,17 @@ pub fn stops(whole: &Model<Dd>, scene: &Scene) -> Vec<Stop> {
 pub fn waterfall(stops: &[Stop], frames: &[String], function: Function, options: &Options, last: Counts) -> Waterfall {
     // frames that only the scene names are those of every stop
     let frames = if frames.is_empty() { options.scene.frames_of(function, frames) } else { frames };
+    // a robot may have a function only as its scene has it, as where drives of several joints are left with one
+    let stops: Vec<&Stop> = stops.iter().filter(|stop| function.is_of(&stop.robot.model)).collect();
+    if stops.is_empty() {
+        return Waterfall { plain: last, full: last, savings: Vec::new() };
+    }
     let counts = |stop: &Stop, optimisations| {
         let options = Options { scene: stop.scene.clone(), ..options.clone() };
         optimised(&stop.robot, frames, function, &options, optimisations).counts()
     };
     let all = options.optimisations();
-    let plain = counts(&stops[0], Optimisations::default());
+    let plain = counts(stops[0], Optimisations::default());
     let mut now = plain;
     let mut savings = Vec::new();
     let mut step = |what: &str, by, after: Counts| {
@@ -123,7 +128,7 @@ pub fn waterfall(stops: &[Stop], frames: &[String], function: Function, options:
     };
     let mut full = plain;
     for (what, optimisations) in all.steps() {
-        full = step(what, By::Compiler, counts(&stops[0], optimisations));
+        full = step(what, By::Compiler, counts(stops[0], optimisations));
     }
     for (i, stop) in stops.iter().enumerate().skip(1) {
         let what = match &stop.what {
@@ -222,6 +227,7 @@ fn items(whole: &Model<Dd>, scene: &Scene) -> Vec<(What, Change)> {
         let what = match parameter {
             Parameter::Payload { name, frame } => format!("payload {name} on {frame} at run time"),
             Parameter::Link { link } => format!("inertia of {link} at run time"),
+            Parameter::Drive { drive, numbers, .. } => format!("{} of drive {drive} at run time", numbers.join(", ")),
         };
         item(what, Box::new(move |now, s| now.parameters.push(s.parameters[i].clone())));
     }

@@ -32,6 +32,7 @@ pub fn apply(model: Model<Dd>, scene: &Scene, diagnostics: &mut Diagnostics) -> 
     }
     let mut model = without_parameters(model, scene);
     drives::add(&scene.drives, &mut model, diagnostics);
+    check::drives(&model, scene, &held.iter().map(Option::is_some).collect::<Vec<_>>(), diagnostics);
     if diagnostics.has_errors() {
         return None;
     }

@@ -1,16 +1,17 @@
 //! A scene where it meets the equations: which inputs are left, what stands for the others, which results are wanted.
 
+use super::free_drive::FreeDrive;
 use super::{Gravity, Parameter, Part, Scene, Selection};
 use crate::expr::Port;
 use crate::function::{higher_rate, Function, Robot};
-use crate::identifier::{identifier, upper_camel_case};
+use crate::identifier::{doc, identifier, upper_camel_case};
 use straightline_core::model::{Load, Model};
 use straightline_core::reduced::ReducedModel;
 use straightline_core::spatial::{SpatialInertia, Sym3, Vec3};
 use straightline_core::{Dd, Real};
 
 /// Scalars of a run-time load: its ten parameters in the canonical frame, then in the reduced robot's frame.
-pub const LOAD_SCALARS: usize = 20;
+const LOAD_SCALARS: usize = 20;
 
 /// The bodies, as a function of them sees them.
 pub struct Bound<T> {
@@ -31,7 +32,7 @@ impl Scene {
         let own = function.inputs(model).into_iter().filter(|p| !self.is_zero(&p.name));
         let gravity = (self.gravity == Gravity::Input).then(|| Port::new("gravity", &[3]));
         let parameters =
-            self.parameters.iter().map(|p| Port::wrapped(&p.input_name(), &[LOAD_SCALARS], &p.type_name()));
+            self.parameters.iter().map(|p| Port::wrapped(&p.input_name(), &[p.scalars(model)], &p.type_name()));
         own.chain(gravity).chain(parameters).collect()
     }
 
@@ -68,6 +69,9 @@ impl Scene {
         }
         for parameter in &self.parameters {
             let values = given.next().expect("a port per parameter");
+            if let Some(drive) = FreeDrive::new(parameter, &robot.model) {
+                drive.put(&mut model, values);
+            }
             let Some(body) = parameter.body(&robot.model) else { continue };
             let (canonical, in_reduced) = (load(&values[..10]), load(&values[10..]));
             model.bodies[body].carry(canonical);
@@ -202,17 +206,52 @@ impl Parameter {
         upper_camel_case(&self.input_name())
     }
 
-    /// The frame in which the parameters are given.
-    pub fn frame(&self) -> &str {
+    /// What functions take of it, in words.
+    pub fn in_words(&self) -> String {
         match self {
-            Parameter::Payload { frame, .. } => frame,
-            Parameter::Link { link } => link,
+            Parameter::Drive { drive, numbers, .. } => {
+                format!("drive `{}` with its {}", doc(drive), numbers.join(", "))
+            }
+            _ => "inertial parameters of a body that the robot carries".to_string(),
         }
     }
 
-    /// The body that carries it; `None` if it stands on the world.
+    /// The frame in which inertial parameters are given; `None` of a drive.
+    pub fn frame(&self) -> Option<&str> {
+        match self {
+            Parameter::Payload { frame, .. } => Some(frame),
+            Parameter::Link { link } => Some(link),
+            Parameter::Drive { .. } => None,
+        }
+    }
+
+    /// The body that carries it; `None` if it stands on the world, or is none of a body.
     pub fn body(&self, model: &Model<Dd>) -> Option<usize> {
-        model.frame(self.frame()).and_then(|f| f.body)
+        model.frame(self.frame()?).and_then(|f| f.body)
+    }
+
+    /// Whether something of a robot depends on it.
+    pub fn is_of(&self, model: &Model<Dd>) -> bool {
+        match self {
+            Parameter::Drive { drive, .. } => model.drives.iter().any(|d| d.name == *drive),
+            _ => self.body(model).is_some(),
+        }
+    }
+
+    /// How many scalars functions take.
+    pub fn scalars(&self, model: &Model<Dd>) -> usize {
+        match self {
+            Parameter::Drive { .. } => FreeDrive::new(self, model).map_or(0, |drive| drive.scalars()),
+            _ => LOAD_SCALARS,
+        }
+    }
+
+    /// What its constructor takes.
+    pub fn given(&self) -> Vec<Port> {
+        match self {
+            Parameter::Drive { numbers, .. } => vec![Port::new("numbers", &[numbers.len()])],
+            _ => vec![Port::new("mass", &[1]), Port::new("com", &[3]), Port::new("inertia", &[6])],
+        }
     }
 }
 
@@ -224,10 +263,23 @@ fn load<T: Copy>(x: &[T]) -> Load<T> {
     }
 }
 
+/// What functions take of a parameter, from what its constructor takes ([`Parameter::given`]): the program of the constructor. Of a body:
+/// mass \[kg\], com\[3\] \[m\], inertia about it (xx, xy, xz, yy, yz, zz) \[kg·m²\]; of a drive: its free numbers.
+///
+/// # Panics
+/// If nothing of the robot depends on the parameter, which is refused before.
+pub fn constructed<T: Real>(robot: &Robot, parameter: &Parameter, inputs: &[Vec<T>]) -> Vec<T> {
+    match FreeDrive::new(parameter, &robot.model) {
+        Some(drive) => drive.values(&inputs[0]),
+        None => load_parameters(robot, parameter, inputs),
+    }
+}
+
 /// The ten parameters of a body given by mass, mass centre and inertia in a frame, in the two frames that the algorithms
-/// use: the program of a parameter's constructor. Inputs: mass, com\[3\], inertia about it (xx, xy, xz, yy, yz, zz).
-pub fn load_parameters<T: Real>(robot: &Robot, parameter: &Parameter, inputs: &[Vec<T>]) -> Vec<T> {
-    let frame = robot.model.frame(parameter.frame()).expect("frames were checked against the model");
+/// use. Inputs: mass, com\[3\], inertia about it (xx, xy, xz, yy, yz, zz).
+fn load_parameters<T: Real>(robot: &Robot, parameter: &Parameter, inputs: &[Vec<T>]) -> Vec<T> {
+    let frame = parameter.frame().and_then(|frame| robot.model.frame(frame));
+    let frame = frame.expect("frames were checked against the model");
     let body = frame.body.expect("parameters of the world were refused");
     let regauge = robot.reduced_frames[body].inverse();
     let (mass, com, inertia) = (inputs[0][0], &inputs[1], &inputs[2]);

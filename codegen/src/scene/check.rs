@@ -85,12 +85,22 @@ pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
                 Some("that of another parameter")
             }
             () if of_contacts.contains(&input) => Some("that of a contact"),
+            // the type of the numbers of a drive has a name, too
+            () if scene
+                .parameters
+                .iter()
+                .any(|other| !other.is_load() && other.type_name() + "Numbers" == parameter.type_name()) =>
+            {
+                Some("that of a parameter's numbers")
+            }
             () => None,
         };
         match (parameter, taken) {
             (Parameter::Link { link }, Some(_)) if earlier.contains(parameter) => {
                 places.complain(&format!("{path}.link"), say::link_given_twice(link), diagnostics);
             }
+            // that is said where the drive is looked up
+            (Parameter::Drive { name: None, drive, .. }, Some(_)) if earlier.iter().any(|p| p.is_of_drive(drive)) => {}
             (_, Some(taken)) => {
                 places.complain(&format!("{path}.name"), say::parameter_name(name, &input, taken), diagnostics);
             }
@@ -255,7 +265,8 @@ fn frames(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnostics: &mut Dia
     }
     for (i, parameter) in scene.parameters.iter().enumerate() {
         let owner = format!("parameter `{}`", parameter.name());
-        let (name, moves_with) = (parameter.frame(), carrier(parameter.frame()));
+        let Some(name) = parameter.frame() else { continue };
+        let moves_with = carrier(name);
         let is_known = model.frame(name).is_some();
         let complaint = match (parameter, moves_with) {
             (Parameter::Payload { .. }, _) if !is_known => unknown(&owner, name),
@@ -269,6 +280,48 @@ fn frames(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnostics: &mut Dia
         };
         let key = if matches!(parameter, Parameter::Link { .. }) { "link" } else { "frame" };
         places.complain(&format!("parameter.{i}.{key}"), complaint, diagnostics);
+    }
+}
+
+/// The drives whose numbers are free, once the model has all of them; `held` as above.
+pub(super) fn drives(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnostics: &mut Diagnostics) {
+    let mut complain = |path: String, complaint| scene.places.complain(&path, complaint, diagnostics);
+    for (i, parameter) in scene.parameters.iter().enumerate() {
+        let Parameter::Drive { drive, numbers, form, .. } = parameter else { continue };
+        let owner = format!("parameter `{}`", parameter.name());
+        let path = format!("parameter.{i}");
+        let Some(built) = model.drives.iter().find(|d| d.name == *drive) else {
+            let drives = model.drives.iter().map(|d| d.name.as_str());
+            complain(format!("{path}.drive"), say::unknown_drive(&owner, drive, drives));
+            continue;
+        };
+        if scene.parameters[..i].iter().any(|earlier| earlier.is_of_drive(drive)) {
+            complain(format!("{path}.drive"), say::drive_given_twice(drive));
+        }
+        if built.joints.iter().all(|(body, _)| held[*body]) {
+            complain(format!("{path}.drive"), say::idle_drive(&owner, drive));
+            continue;
+        }
+        let Some(form) = form else { continue };
+        let all = form.numbers();
+        let names = || all.iter().map(|n| n.name.as_str());
+        if numbers.is_empty() {
+            complain(format!("{path}.numbers"), say::no_free_number(&owner, names()));
+        }
+        for (k, name) in numbers.iter().enumerate() {
+            let path = format!("{path}.numbers.{k}");
+            let Some(number) = all.iter().find(|n| n.name == *name) else {
+                complain(path, say::unknown_drive_number(&owner, drive, name, names()));
+                continue;
+            };
+            let is_same = |other: &&String| all.iter().any(|n| n.name == **other && n.is(number));
+            if let Some(other) = numbers[..k].iter().find(is_same) {
+                complain(path, say::drive_number_twice(&owner, name, other));
+            } else if !number.quantity.at_run_time.holds(number.value) {
+                let be = number.quantity.at_run_time.words().0;
+                complain(path, say::drive_number_fixed(&owner, name, number.value, be));
+            }
+        }
     }
 }
 

@@ -23,6 +23,13 @@ pub const CODES: &[&str] = &[
     "parameter-on-world",
     "parameter-name",
     "link-given-twice",
+    "unknown-drive",
+    "no-free-number",
+    "unknown-drive-number",
+    "drive-number-twice",
+    "drive-number-fixed",
+    "drive-given-twice",
+    "idle-drive",
     "coulomb-speed-missing",
     "coulomb-speed-alone",
     "budget-alone",
@@ -197,6 +204,61 @@ pub fn parameter_name(name: &str, input: &str, taken: &str) -> D {
 pub fn link_given_twice(link: &str) -> D {
     D::error("link-given-twice", format!("the inertia of link `{}` is a parameter twice", cut(link)))
         .help("keep one; a payload in its frame adds to it")
+}
+
+/// A drive that is not there.
+pub fn unknown_drive<'a>(owner: &str, drive: &str, drives: impl IntoIterator<Item = &'a str>) -> D {
+    let d = D::error("unknown-drive", format!("{owner}: the robot has no drive `{}`", cut(drive)));
+    hinted(d, drive, drives)
+}
+
+/// A parameter of a drive without numbers.
+pub fn no_free_number<'a>(owner: &str, numbers: impl IntoIterator<Item = &'a str>) -> D {
+    let d = D::error("no-free-number", format!("{owner}: none of the drive's numbers is free"));
+    hinted(d, "", numbers)
+}
+
+/// A number that a drive does not have.
+pub fn unknown_drive_number<'a>(
+    owner: &str,
+    drive: &str,
+    number: &str,
+    numbers: impl IntoIterator<Item = &'a str>,
+) -> D {
+    let title = format!("{owner}: drive `{}` has no number `{}`", cut(drive), cut(number));
+    let d = D::error("unknown-drive-number", title)
+        .detail("what the robot file does not have, or the scene leaves out, is not in the equations");
+    hinted(d, number, numbers)
+}
+
+/// Two names of one number.
+pub fn drive_number_twice(owner: &str, number: &str, other: &str) -> D {
+    let number = if number == other {
+        format!("`{number}` is free twice")
+    } else {
+        format!("`{number}` and `{other}` are one number")
+    };
+    D::error("drive-number-twice", format!("{owner}: {number}")).help("keep one")
+}
+
+/// A number with which the equations have another form than with those that it may have at run time.
+pub fn drive_number_fixed(owner: &str, number: &str, value: f64, be: &str) -> D {
+    D::error("drive-number-fixed", format!("{owner}: `{number}` cannot be free: it is {value:?} in the robot file"))
+        .detail(format!("at run time it must be {be}, which gives the equations another form"))
+        .help("give it such a value in the robot file, or keep it constant")
+}
+
+/// Two parameters for one drive.
+pub fn drive_given_twice(drive: &str) -> D {
+    D::error("drive-given-twice", format!("the numbers of drive `{}` are a parameter twice", cut(drive)))
+        .help("name all of its numbers in one")
+}
+
+/// A parameter of a drive whose joints do not move.
+pub fn idle_drive(owner: &str, drive: &str) -> D {
+    D::error("idle-drive", format!("{owner}: nothing depends on it"))
+        .detail(format!("no joint of drive `{}` moves in this scene", cut(drive)))
+        .help("remove the parameter")
 }
 
 /// Smooth friction without a width.

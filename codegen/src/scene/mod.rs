@@ -9,13 +9,14 @@ mod bind;
 mod check;
 mod check_contact;
 pub mod contact;
+pub mod free_drive;
 pub mod messages;
 mod places;
 mod ranges;
 mod read;
 
 pub use apply::apply;
-pub use bind::{is_optional, load_parameters, Bound, LOAD_SCALARS};
+pub use bind::{constructed, is_optional, Bound};
 pub use check::check_options;
 pub use contact::{ContactFunction, Contacts};
 pub use places::Places;
@@ -90,6 +91,25 @@ impl Scene {
             rigid_links: options.rigid_links || !self.effects.elastic_links,
             ..options.clone()
         }
+    }
+
+    /// The same scene with what it has to know of the robot file's drives: of those whose numbers are parameters, how they are written.
+    #[must_use]
+    pub fn knowing(&self, of_file: &[Drive]) -> Scene {
+        let mut scene = self.clone();
+        let all: Vec<&Drive> = of_file.iter().chain(&self.drives).collect();
+        for parameter in &mut scene.parameters {
+            let Parameter::Drive { drive, form, .. } = parameter else { continue };
+            let written = all.iter().find(|d| d.name.value == *drive);
+            *form = written
+                .map(|d| Box::new(d.in_part(self.effects.elastic_transmissions, self.effects.transmission_losses)));
+        }
+        scene
+    }
+
+    /// Whether functions take inertial parameters of bodies, whose frames and unit have to be known where they are made.
+    pub(crate) fn has_loads(&self) -> bool {
+        self.parameters.iter().any(Parameter::is_load)
     }
 
     /// The same scene with its outputs spelled out for a robot: where the base moves as it is told, of forces over the
@@ -260,14 +280,36 @@ pub enum Parameter {
         /// The link.
         link: String,
     },
+    /// Numbers of a drive, in place of the file's.
+    Drive {
+        /// Name of the input; the drive's where it has none.
+        name: Option<String>,
+        /// The drive.
+        drive: String,
+        /// Which numbers: names of [`Drive::numbers`].
+        numbers: Vec<String>,
+        /// The drive as written, with what the scene leaves of its effects; [`Scene::knowing`] finds it.
+        form: Option<Box<Drive>>,
+    },
 }
 
 impl Parameter {
-    /// Its name as it is given: that of the payload, or of the link.
+    /// Whether it is of that drive.
+    pub(crate) fn is_of_drive(&self, name: &str) -> bool {
+        matches!(self, Parameter::Drive { drive, .. } if drive == name)
+    }
+
+    /// Whether it is the inertia of a body.
+    pub(crate) fn is_load(&self) -> bool {
+        !matches!(self, Parameter::Drive { .. })
+    }
+
+    /// Its name as it is given: that of the payload, of the link, or of the drive.
     pub fn name(&self) -> &str {
         match self {
             Parameter::Payload { name, .. } => name,
             Parameter::Link { link } => link,
+            Parameter::Drive { name, drive, .. } => name.as_ref().unwrap_or(drive),
         }
     }
 }

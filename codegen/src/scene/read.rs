@@ -63,6 +63,14 @@ pub struct SceneFile {
     pub levels: Levels,
 }
 
+/// What a `[[parameter]]` is of.
+#[derive(Clone, Copy)]
+enum Kind {
+    Payload,
+    Link,
+    Drive,
+}
+
 impl SceneFile {
     /// These options with what the file says in their place, and with its scene. Where neither names functions, a base that
     /// moves as it is told has all but forward dynamics.
@@ -390,20 +398,36 @@ impl SceneReader<'_> {
         let place = reader.place(&table.span);
         self.file.scene.places.note(format!("parameter.{i}"), &place);
         reader.require(&table, "kind", "kind = \"payload\"");
-        let Some(kind) = reader.word_at(&table, "kind", &[("payload", true), ("link", false)]) else { return };
-        let parameter = if kind.value {
-            reader.check_keys(&table, &["kind", "name", "frame"]);
-            reader.require(&table, "name", "name = \"payload\"");
-            reader.require(&table, "frame", "frame = \"...\"");
-            let (name, frame) = (reader.name_at(&table, "name", "parameter"), reader.name_at(&table, "frame", "frame"));
-            let name = self.noted(&format!("parameter.{i}.name"), name);
-            let frame = self.noted(&format!("parameter.{i}.frame"), frame);
-            name.zip(frame).map(|(name, frame)| Parameter::Payload { name, frame })
-        } else {
-            reader.check_keys(&table, &["kind", "link"]);
-            reader.require(&table, "link", "link = \"...\"");
-            let link = reader.name_at(&table, "link", "link");
-            self.noted(&format!("parameter.{i}.link"), link).map(|link| Parameter::Link { link })
+        let kinds = [("payload", Kind::Payload), ("link", Kind::Link), ("drive", Kind::Drive)];
+        let Some(kind) = reader.word_at(&table, "kind", &kinds) else { return };
+        let parameter = match kind.value {
+            Kind::Payload => {
+                reader.check_keys(&table, &["kind", "name", "frame"]);
+                reader.require(&table, "name", "name = \"payload\"");
+                reader.require(&table, "frame", "frame = \"...\"");
+                let (name, frame) =
+                    (reader.name_at(&table, "name", "parameter"), reader.name_at(&table, "frame", "frame"));
+                let name = self.noted(&format!("parameter.{i}.name"), name);
+                let frame = self.noted(&format!("parameter.{i}.frame"), frame);
+                name.zip(frame).map(|(name, frame)| Parameter::Payload { name, frame })
+            }
+            Kind::Link => {
+                reader.check_keys(&table, &["kind", "link"]);
+                reader.require(&table, "link", "link = \"...\"");
+                let link = reader.name_at(&table, "link", "link");
+                self.noted(&format!("parameter.{i}.link"), link).map(|link| Parameter::Link { link })
+            }
+            Kind::Drive => {
+                reader.check_keys(&table, &["kind", "name", "drive", "numbers"]);
+                reader.require(&table, "drive", "drive = \"...\"");
+                reader.require(&table, "numbers", "numbers = [\"ratio\", \"rotor_inertia\"]");
+                let (name, drive) =
+                    (reader.name_at(&table, "name", "parameter"), reader.name_at(&table, "drive", "drive"));
+                let name = self.noted(&format!("parameter.{i}.name"), name);
+                let drive = self.noted(&format!("parameter.{i}.drive"), drive);
+                let numbers = self.names(&format!("parameter.{i}.numbers"), &table, "numbers", "number");
+                drive.map(|drive| Parameter::Drive { name, drive, numbers, form: None })
+            }
         };
         self.file.scene.parameters.extend(parameter);
     }

@@ -9,6 +9,7 @@ use crate::compile::{parameter_program, Options};
 use crate::emit::Scalar;
 use crate::expr::{evaluate, Graph};
 use crate::function::{Function, Robot};
+use crate::scene::free_drive::FreeDrive;
 use crate::scene::{Base, Coulomb, Gravity, Parameter, Scene};
 use nalgebra::{Matrix3, Vector3};
 use straightline_core::model::{JointKind, Model};
@@ -203,6 +204,7 @@ pub(super) fn random_inputs(
         state.others.insert("gravity".to_string(), gravity.to_vec());
     }
     for (parameter, program) in parameters {
+        let Some(frame) = parameter.frame() else { continue };
         let mass = rounded(1.0 + random.symmetric(0.75));
         let com: [f64; 3] = std::array::from_fn(|_| rounded(random.symmetric(0.2)));
         // three points of equal mass: a body that can be
@@ -211,15 +213,37 @@ pub(super) fn random_inputs(
         let j = (sum * (mass / 3.0)).map(rounded);
         let six = [j[(0, 0)], j[(0, 1)], j[(0, 2)], j[(1, 1)], j[(1, 2)], j[(2, 2)]];
         let inputs = [&[mass][..], &com, &six].concat();
-        let scalars = match scalar {
-            Scalar::F64 => evaluate::<f64>(program, &inputs),
-            Scalar::F32 => {
-                let inputs: Vec<f32> = inputs.iter().map(|x| *x as f32).collect();
-                evaluate::<f32>(program, &inputs).into_iter().map(f64::from).collect()
-            }
-        };
-        state.others.insert(parameter.input_name(), scalars);
-        weld(tree, parameter.frame(), mass, com, j)?;
+        state.others.insert(parameter.input_name(), made(program, scalar, &inputs));
+        weld(tree, frame, mass, com, j)?;
     }
     Ok(())
+}
+
+/// Random values of the free numbers of drives: into the state as the program takes them, into the model as they are meant.
+pub(super) fn random_drives(
+    parameters: &[(Parameter, Graph)],
+    scalar: Scalar,
+    (state, model): (&mut State, &mut Model<Dd>),
+    random: &mut Random,
+) {
+    let of_file = model.clone();
+    for (parameter, program) in parameters {
+        let Some(drive) = FreeDrive::new(parameter, &of_file) else { continue };
+        let rounded = |x: f64| if scalar == Scalar::F32 { f64::from(x as f32) } else { x };
+        let numbers: Vec<f64> = drive.random(|| 0.5 + random.symmetric(0.5)).into_iter().map(rounded).collect();
+        state.others.insert(parameter.input_name(), made(program, scalar, &numbers));
+        let derived = drive.derived(&numbers.iter().map(|x| Dd::from(*x)).collect::<Vec<_>>());
+        model.drives.iter_mut().filter(|d| d.name == derived.name).for_each(|d| *d = derived.clone());
+    }
+}
+
+/// What a constructor makes, in the scalar that is generated.
+fn made(program: &Graph, scalar: Scalar, inputs: &[f64]) -> Vec<f64> {
+    match scalar {
+        Scalar::F64 => evaluate::<f64>(program, inputs),
+        Scalar::F32 => {
+            let inputs: Vec<f32> = inputs.iter().map(|x| *x as f32).collect();
+            evaluate::<f32>(program, &inputs).into_iter().map(f64::from).collect()
+        }
+    }
 }

@@ -37,7 +37,7 @@ const PLOT: (u32, u32) = (900, 340);
 /// The robot of a description in a scene; what is wrong with it goes to `diagnostics`.
 fn built_in_full(description: &Description, options: &Options, diagnostics: &mut Diagnostics) -> Option<Model<Dd>> {
     let model = model::build(description, &options.scene.model_options(&options.model), diagnostics);
-    let model = model.and_then(|model| scene::apply(model, &options.scene, diagnostics));
+    let model = model.and_then(|model| scene::apply(model, &options.scene.knowing(&description.drives), diagnostics));
     model.filter(|_| !diagnostics.has_errors())
 }
 

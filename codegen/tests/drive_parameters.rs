@@ -1,0 +1,528 @@
+//! Numbers of drives as run-time parameters: functions that take them compute what the functions of a robot file do in which these numbers
+//! stand.
+
+use std::path::Path;
+use std::process::Command;
+use straightline_codegen::compile::{optimised, parameter_program, Optimisations};
+use straightline_codegen::contact::{programs as contact_programs, Mode};
+use straightline_codegen::diagnostic::Diagnostics;
+use straightline_codegen::emit::Lanes;
+use straightline_codegen::expr::{evaluate, Graph};
+use straightline_codegen::function::Robot;
+use straightline_codegen::verify::verify;
+use straightline_codegen::{compile, model, scene, staged, Function, Generated, Options, Scalar, Source};
+use straightline_core::{Dd, Real};
+
+/// A chain of three joints about all axes.
+fn arm(drives: &str) -> Source {
+    let link = |name: &str, inertial: &str| format!("[[link]]\nname = \"{name}\"\n{inertial}\n");
+    let joint = |name: &str, parent: &str, child: &str, rest: &str| {
+        format!(
+            "[[joint]]\nname = \"{name}\"\nkind = \"continuous\"\nparent = \"{parent}\"\nchild = \"{child}\"\n{rest}\n"
+        )
+    };
+    let text = [
+        "[robot]\nname = \"arm\"\n".to_string(),
+        link("base", ""),
+        link("a", "mass = 2.5\ncom = [0.1, 0.01, 0.2]\ninertia = [0.02, 0.021, 0.004]"),
+        link("b", "mass = 1.5\ncom = [0.03, 0.02, 0.1]\ninertia = [0.01, 0.011, 0.002]"),
+        link("c", "mass = 0.7\ncom = [0.02, 0.05, 0.03]\ninertia = [0.003, 0.004, 0.002]"),
+        joint("one", "base", "a", "axis = \"y\""),
+        joint("two", "a", "b", "origin = { xyz = [0.1, -0.2, 0.4] }\naxis = [0.6, 0.0, 0.8]"),
+        joint("three", "b", "c", "origin = { xyz = [0.0, 0.1, 0.3] }\naxis = \"x\""),
+        drives.to_string(),
+    ];
+    Source::new("arm.toml", text.concat())
+}
+
+/// What a robot file says with these numbers in the places `$1`, `$2`, …
+fn with(text: &str, numbers: &[f64]) -> String {
+    numbers
+        .iter()
+        .enumerate()
+        .rev()
+        .fold(text.to_string(), |text, (k, x)| text.replace(&format!("${}", k + 1), &format!("{x:?}")))
+}
+
+/// Robots by their drives, the scene's parameters, the numbers of the robot file, and others, in the order of the parameters' numbers.
+struct Case {
+    drives: &'static str,
+    parameters: &'static str,
+    numbers: &'static [f64],
+    others: &'static [f64],
+}
+
+const RIGID: Case = Case {
+    drives: "
+[[drive]]
+joint = \"one\"
+ratio = $1
+motor = { torque_constant = $4, emf_constant = 0.045, resistance = $3, rotor_inertia = $2, friction = $5 }
+efficiency = { forward = $6, backward = $7 }
+limits = { input = $8, current = $9 }
+[[drive]]
+name = \"second motor\"
+joint = \"two\"
+motor = { torque_constant = $10, resistance = 0.8, inductance = $11, rotor_inertia = 2e-5 }
+stages = [{ ratio = 2.5, input_inertia = 1e-6 }, { ratio = $12, input_inertia = $13, output_inertia = $14, efficiency = $15 }]
+[[drive]]
+joint = \"three\"
+ratio = $16
+actuator = { C = [[0.0, 1.0], [-1.0, -2.0]], f = [0.1, -8.0], d = [0.0, 5.0], T = [0.0, 1.0] }
+",
+    parameters: "
+[[parameter]]
+kind = \"drive\"
+drive = \"one\"
+numbers = [\"ratio\", \"rotor_inertia\", \"resistance\", \"torque_constant\", \"motor_friction\", \"efficiency_forward\", \"efficiency_backward\", \"input_limit\", \"current_limit\"]
+[[parameter]]
+kind = \"drive\"
+name = \"middle\"
+drive = \"second motor\"
+numbers = [\"torque_constant\", \"inductance\", \"stage_2_ratio\", \"stage_2_input_inertia\", \"stage_2_output_inertia\", \"stage_2_efficiency\"]
+[[parameter]]
+kind = \"drive\"
+drive = \"three\"
+numbers = [\"ratio\"]
+",
+    numbers: &[
+        100.0, 1e-5, 1.2, 0.05, 2e-5, 0.8, 0.65, 24.0, 6.0, 0.06, 5e-4, 40.0, 3e-6, 7e-6, 0.9, 1.5,
+    ],
+    others: &[
+        -61.0, 2.3e-5, 0.7, 0.033, 4e-5, 0.71, 0.59, 18.0, 4.5, 0.081, 3e-4, 51.0, 1.7e-6, 9e-6, 0.77, -0.8,
+    ],
+};
+
+const ELASTIC: Case = Case {
+    drives: "
+[[drive]]
+joint = \"one\"
+motor = { torque_constant = $1, resistance = 1.2, inductance = $2, rotor_inertia = $3 }
+stages = [{ ratio = $4, stiffness = $5, input_inertia = 2e-6, output_inertia = $6 }]
+[[drive]]
+joint = \"two\"
+motor = { torque_constant = 0.05, resistance = $7, rotor_inertia = 1e-5 }
+stages = [
+    { ratio = 2.5, stiffness = $8, damping = $9, input_inertia = 2e-6, output_inertia = 8e-6 },
+    { ratio = $10, stiffness = 1.6e4, damping = 4.0, input_inertia = $11 },
+]
+",
+    parameters: "
+[[parameter]]
+kind = \"drive\"
+drive = \"one\"
+numbers = [\"torque_constant\", \"inductance\", \"rotor_inertia\", \"ratio\", \"stiffness\", \"stage_1_output_inertia\"]
+[[parameter]]
+kind = \"drive\"
+drive = \"two\"
+numbers = [\"resistance\", \"stage_1_stiffness\", \"stage_damping\", \"stage_2_ratio\", \"stage_2_input_inertia\"]
+",
+    numbers: &[0.05, 5e-4, 1e-5, 80.0, 9e3, 5e-6, 1.2, 90.0, 0.01, 100.0, 1e-5],
+    others: &[0.07, 2e-4, 3e-5, 121.0, 4e3, 9e-6, 0.4, 140.0, 0.03, -73.0, 2.5e-5],
+};
+
+/// Two motors that drive two joints together, one of them with a gear before both, and a rotor that turns in space.
+const COUPLED: Case = Case {
+    drives: "
+[[drive]]
+name = \"left\"
+joints = { two = 30.0, three = 31.0 }
+motor = { torque_constant = 0.05, resistance = 1.2, rotor_inertia = $1 }
+stages = [{ ratio = $2, input_inertia = 1e-6 }]
+[[drive]]
+name = \"right\"
+joints = { two = 28.0, three = -33.0 }
+motor = { torque_constant = 0.05, resistance = $3, rotor_inertia = 1e-5 }
+[[drive]]
+joint = \"one\"
+ratio = $5
+motor = { torque_constant = 0.05, resistance = 1.2, rotor_inertia = $4 }
+rotor = { link = \"a\", axis = [0.3, 0.1, 1.0] }
+",
+    parameters: "
+[[parameter]]
+kind = \"drive\"
+drive = \"left\"
+numbers = [\"rotor_inertia\", \"stage_1_ratio\"]
+[[parameter]]
+kind = \"drive\"
+drive = \"right\"
+numbers = [\"resistance\"]
+[[parameter]]
+kind = \"drive\"
+drive = \"one\"
+numbers = [\"rotor_inertia\", \"joint_ratio\"]
+",
+    numbers: &[1e-5, 2.0, 1.2, 2e-5, 50.0],
+    others: &[3e-5, -3.5, 0.7, 5e-5, 90.0],
+};
+
+const CASES: [(&str, &Case); 3] = [("rigid", &RIGID), ("elastic", &ELASTIC), ("coupled", &COUPLED)];
+
+const FUNCTIONS: [&str; 7] = [
+    "driven_forward_dynamics",
+    "driven_inverse_dynamics",
+    "drive_torques",
+    "complete_model",
+    "state_space",
+    "drive_power",
+    "drive_energy",
+];
+
+fn options(scene_text: &str) -> Options {
+    let names = FUNCTIONS.map(|name| format!("\"{name}\"")).join(", ");
+    let text = format!("[outputs]\nfunctions = [{names}]\n{scene_text}");
+    let mut complaints = Diagnostics::new();
+    let file = scene::read(&Source::new("scene.toml", text), &mut complaints);
+    file.unwrap_or_else(|| panic!("{complaints}")).into_options(Options::default())
+}
+
+fn compiled(source: &Source, options: &Options) -> Generated {
+    compile(source, options).unwrap_or_else(|complaints| panic!("{complaints}"))
+}
+
+/// A robot in a scene that knows it.
+struct InScene {
+    robot: Robot,
+    options: Options,
+}
+
+impl InScene {
+    fn new(source: &Source, options: &Options) -> InScene {
+        let options = options.knowing(source);
+        let mut complaints = Diagnostics::new();
+        let model = model::load(source, &options.scene.model_options(&options.model)).0;
+        let model = model.and_then(|model| scene::apply(model, &options.scene, &mut complaints));
+        let robot = Robot::new(model.unwrap_or_else(|| panic!("{complaints}")));
+        let scene = options.scene.resolved(&robot.model);
+        InScene { robot, options: Options { scene, ..options } }
+    }
+
+    fn functions(&self) -> Vec<Function> {
+        self.options.functions.iter().copied().filter(|f| f.is_of(&self.robot.model)).collect()
+    }
+
+    /// All that a search finds for these functions is tried elsewhere.
+    fn graph(&self, function: Function) -> Graph {
+        let optimisations = Optimisations { chosen: false, substitutes: false, ..self.options.optimisations() };
+        optimised(&self.robot, &[], function, &self.options, optimisations)
+    }
+
+    /// The values of the scene's parameters, from all their numbers in a row.
+    fn made<T: Real>(&self, numbers: &[f64]) -> Vec<(String, Vec<T>)> {
+        let mut rest = numbers;
+        let parameters = self.options.scene.parameters.iter().map(|parameter| {
+            let constructor = parameter_program(&self.robot, parameter, &self.options);
+            let (own, others) = rest.split_at(constructor.inputs[0].len());
+            rest = others;
+            let own: Vec<T> = own.iter().map(|x| T::constant(Dd::from(*x))).collect();
+            (parameter.input_name(), evaluate(&constructor, &own))
+        });
+        let parameters = parameters.collect();
+        assert!(rest.is_empty(), "every number belongs to a parameter");
+        parameters
+    }
+}
+
+/// Numbers for an input, the same for every robot.
+fn input(name: &str, len: usize) -> Vec<f64> {
+    let seed = name.bytes().fold(7.0, |seed, byte| seed * 1.3 + f64::from(byte));
+    let of = |k: usize| ((seed + k as f64 * 0.618_034) * 12.9898).sin() * if name == "u" { 15.0 } else { 1.1 };
+    (0..len).map(of).collect()
+}
+
+/// A program at a state, `made` the values of its run-time parameters.
+fn run<T: Real>(graph: &Graph, made: &[(String, Vec<T>)]) -> Vec<T> {
+    let of = |port: &straightline_codegen::expr::Port| match made.iter().find(|(name, _)| *name == port.name) {
+        Some((_, values)) => values.clone(),
+        None => input(&port.name, port.len()).into_iter().map(|x| T::constant(Dd::from(x))).collect(),
+    };
+    evaluate(graph, &graph.inputs.iter().flat_map(of).collect::<Vec<T>>())
+}
+
+fn assert_near(what: &str, found: &[Dd], expected: &[Dd], tolerance: f64) {
+    assert_eq!(found.len(), expected.len(), "{what}");
+    let scale = expected.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
+    for (k, (a, b)) in found.iter().zip(expected).enumerate() {
+        let off = (*a - *b).hi().abs();
+        assert!(
+            off <= tolerance * scale,
+            "{what}: result {k} is {} for {}, off by {off:e} of {scale:e}",
+            a.hi(),
+            b.hi()
+        );
+    }
+}
+
+/// At these numbers all functions are those of the robot file in which the numbers stand.
+fn agrees(name: &str, case: &Case, numbers: &[f64], scene_text: &str) {
+    let free =
+        InScene::new(&arm(&with(case.drives, case.numbers)), &options(&format!("{}{scene_text}", case.parameters)));
+    let fixed = InScene::new(&arm(&with(case.drives, numbers)), &options(scene_text));
+    assert!(free.functions().len() >= 6 && free.functions() == fixed.functions(), "{name}: {:?}", free.functions());
+    let (exact, rounded) = (free.made::<Dd>(numbers), free.made::<f64>(numbers));
+    let mut takes = 0;
+    for function in free.functions() {
+        let (a, b) = (free.graph(function), fixed.graph(function));
+        takes += a.inputs.iter().filter(|p| p.wrapper.is_some()).count();
+        let what = format!("{name}, {}", function.name());
+        let truth = run::<Dd>(&b, &[]);
+        assert_near(&what, &run::<Dd>(&a, &exact), &truth, 1e-24);
+        let found: Vec<Dd> = run::<f64>(&a, &rounded).into_iter().map(Dd::from).collect();
+        // constants of the file are rounded once, here every number is
+        assert_near(&format!("{what} in f64"), &found, &truth, 3e-13);
+    }
+    assert!(takes >= 5, "{name}: functions take {takes} parameters");
+}
+
+#[test]
+fn at_the_numbers_of_the_robot_file_functions_are_those_without_parameters() {
+    for (name, case) in CASES {
+        agrees(name, case, case.numbers, "");
+    }
+}
+
+#[test]
+fn at_other_numbers_functions_are_those_of_a_robot_file_with_these() {
+    for (name, case) in CASES {
+        agrees(name, case, case.others, "");
+    }
+}
+
+#[test]
+fn effects_that_a_scene_leaves_out_are_left_out_of_what_follows_from_the_numbers() {
+    // no stiffness and no efficiency is there to be named then
+    let elastic = Case {
+        parameters: "
+[[parameter]]
+kind = \"drive\"
+drive = \"one\"
+numbers = [\"torque_constant\", \"inductance\", \"rotor_inertia\", \"ratio\", \"stage_1_output_inertia\"]
+[[parameter]]
+kind = \"drive\"
+drive = \"two\"
+numbers = [\"resistance\", \"stage_2_ratio\", \"stage_2_input_inertia\"]
+",
+        drives: ELASTIC.drives,
+        numbers: ELASTIC.numbers,
+        others: ELASTIC.others,
+    };
+    let text = "[effects]\nelastic_transmissions = false\ntransmission_losses = false\n";
+    let free =
+        InScene::new(&arm(&with(elastic.drives, elastic.numbers)), &options(&format!("{}{text}", elastic.parameters)));
+    let fixed = InScene::new(&arm(&with(elastic.drives, elastic.others)), &options(text));
+    let o = elastic.others;
+    let exact = free.made::<Dd>(&[o[0], o[1], o[2], o[3], o[5], o[6], o[9], o[10]]);
+    for function in free.functions() {
+        let (a, b) = (free.graph(function), fixed.graph(function));
+        assert_near(function.name(), &run::<Dd>(&a, &exact), &run::<Dd>(&b, &[]), 1e-24);
+    }
+}
+
+#[test]
+fn joints_that_a_scene_locks_leave_the_drives_of_the_others() {
+    agrees("coupled, locked", &COUPLED_LOCKED, COUPLED_LOCKED.others, "[hold]\njoints = { three = 0.4 }\n");
+}
+
+/// Of a drive on two joints one is left.
+const COUPLED_LOCKED: Case = Case {
+    drives: "
+[[drive]]
+name = \"left\"
+joints = { two = 30.0, three = 31.0 }
+motor = { torque_constant = 0.05, resistance = $3, rotor_inertia = $1 }
+stages = [{ ratio = $2, input_inertia = 1e-6 }]
+",
+    parameters: "
+[[parameter]]
+kind = \"drive\"
+drive = \"left\"
+numbers = [\"rotor_inertia\", \"stage_1_ratio\", \"resistance\"]
+",
+    numbers: &[1e-5, 2.0, 1.2],
+    others: &[3e-5, -3.5, 0.7],
+};
+
+#[test]
+fn constants_of_the_robot_file_are_in_the_text() {
+    let source = arm(&with(ELASTIC.drives, ELASTIC.numbers));
+    let options = Options { functions: only("drive_energy"), ..options(ELASTIC.parameters) };
+    let text = compiled(&source, &options).text;
+    for part in [
+        "pub struct OneNumbers {",
+        "    /// C_M \\[N·m/A\\].\n    pub torque_constant: f64,",
+        "pub const NOMINAL: OneNumbers = OneNumbers { torque_constant: 0.05, inductance: 0.0005, rotor_inertia: 1e-5, ratio: 80.0, stiffness: 9000.0, stage_1_output_inertia: 5e-6 };",
+        "impl Default for One {",
+        "pub fn new(numbers: TwoNumbers) -> Result<Two, OutOfRange> {",
+        "check_number(\"stage_2_ratio\", numbers.stage_2_ratio, numbers.stage_2_ratio != 0.0, \"not zero\")?;",
+        "one: &One, two: &Two",
+    ] {
+        assert!(text.contains(part), "{part} is not in\n{}", &text[..9000]);
+    }
+}
+
+/// What the constructor takes and refuses, as rustc compiles it.
+#[test]
+fn the_constructor_checks_what_it_is_given() {
+    let source = arm(&with(ELASTIC.drives, ELASTIC.numbers));
+    let options = Options { functions: only("drive_energy"), ..options(ELASTIC.parameters) };
+    let text = compiled(&source, &options).text;
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("drive_parameters");
+    std::fs::create_dir_all(&folder).expect("a folder for programs");
+    let (file, program) = (folder.join("drive.rs"), folder.join("drive"));
+    let main = "
+fn main() {
+    use arm::{One, OneNumbers};
+    let said = |numbers: OneNumbers| One::new(numbers).unwrap_err().to_string();
+    let of_file = OneNumbers::default();
+    assert_eq!(said(OneNumbers { ratio: 0.0, ..of_file }), \"`ratio` must be not zero\");
+    assert_eq!(said(OneNumbers { stiffness: -1.0, ..of_file }), \"`stiffness` must be positive\");
+    assert_eq!(said(OneNumbers { inductance: f64::NAN, ..of_file }), \"`inductance` must be finite\");
+    assert!(said(OneNumbers { ratio: 1e-200, ..of_file }).contains(\"what follows from them is finite\"));
+    let energy = |one: &One| {
+        let mut e = [0.0; 3];
+        arm::drive_energy(&[0.1, 0.2, 0.3], &[1.0, 2.0, 3.0], &[0.7; 7], one, &arm::Two::NOMINAL, &mut e);
+        e
+    };
+    let (a, b) = (energy(&One::NOMINAL), energy(&One::new(of_file).unwrap()));
+    assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-14 * a.abs()), \"{a:?} {b:?}\");
+    // L i²/2 of the only motor with an inductance, three times as much
+    let more = energy(&One::new(OneNumbers { inductance: 3.0 * of_file.inductance, ..of_file }).unwrap());
+    assert!((more[2] - 3.0 * a[2]).abs() <= 1e-14 * more[2]);
+}
+";
+    std::fs::write(&file, format!("#[allow(dead_code)]\nmod arm {{\n{text}\n}}\n{main}")).expect("it can be written");
+    let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
+    let built =
+        Command::new(rustc).args(["--edition", "2021", "-o"]).args([&program, &file]).output().expect("rustc runs");
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    let ran = Command::new(&program).output().expect("the program runs");
+    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+}
+
+#[test]
+fn in_stages_they_are_parameters() {
+    let free = InScene::new(&arm(&with(RIGID.drives, RIGID.numbers)), &options(RIGID.parameters));
+    let functions = vec![only("driven_forward_dynamics")[0], only("drive_power")[0]];
+    let options = Options { functions, ..free.options.clone() };
+    let programs = staged::programs(&free.robot, &[], &options).expect("they agree with their equations").0;
+    let mut values: Vec<(String, Vec<Dd>)> = free.made(RIGID.others);
+    assert_eq!(programs.staged.stages.len(), 3, "parameters, configuration, velocity");
+    for stage in &programs.staged.stages {
+        let stored = run::<Dd>(stage, &values);
+        values.push((stage.outputs[0].name.clone(), stored));
+    }
+    for (function, (_, graph)) in programs.functions.iter().zip(&programs.staged.functions) {
+        let plain = run::<Dd>(&free.graph(*function), &values);
+        assert_near(function.name(), &run::<Dd>(graph, &values), &plain, 1e-24);
+    }
+}
+
+#[test]
+fn in_contact_too() {
+    let contact = "[[contact]]\nname = \"floor\"\nframe = \"c\"\nobject = { origin = [0.0, 0.0, 0.0], z = [0.0, 0.0, 1.0], x = [1.0, 0.0, 0.0] }\nconstrained = [\"pz\"]\n";
+    let graphs = |drives: &[f64], parameters: &str| {
+        let robot = InScene::new(&arm(&with(RIGID.drives, drives)), &options(&format!("{parameters}{contact}")));
+        let mode = Mode::all(&robot.options.scene).remove(0);
+        let programs = contact_programs(&robot.robot, &robot.options, &mode).expect("they agree with their equations");
+        let values = if parameters.is_empty() { Vec::new() } else { robot.made::<Dd>(RIGID.others) };
+        (programs, values)
+    };
+    let (free, values) = graphs(RIGID.numbers, RIGID.parameters);
+    let (fixed, _) = graphs(RIGID.others, "");
+    let mut takes = 0;
+    for (a, b) in free.iter().zip(&fixed) {
+        takes += usize::from(a.graph.inputs.iter().any(|p| p.wrapper.is_some()));
+        assert_near(a.function.name(), &run::<Dd>(&a.graph, &values), &run::<Dd>(&b.graph, &[]), 1e-24);
+    }
+    assert!(takes >= 2, "{takes}");
+}
+
+#[test]
+fn the_second_author_agrees_in_every_scalar_and_style() {
+    let source = arm(&with(RIGID.drives, RIGID.numbers));
+    for (scalar, lanes, fma, generic) in [
+        (Scalar::F64, true, false, false),
+        (Scalar::F32, true, false, false),
+        (Scalar::F64, true, true, false),
+        (Scalar::F64, false, false, true),
+    ] {
+        let lanes = lanes.then_some(Lanes::Standalone);
+        let functions = only("driven_forward_dynamics");
+        let options = Options { scalar, lanes, fma, generic, functions, ..options(RIGID.parameters) };
+        // the text is read back here
+        let generated = compiled(&source, &options);
+        let verification = verify(&source, &generated, &options, (3, 5), || {}).unwrap_or_else(|why| panic!("{why}"));
+        let worst = &verification.functions["driven_forward_dynamics"];
+        assert!(worst.error <= verification.bound, "{scalar:?}: {}", worst.error);
+    }
+}
+
+fn only(name: &str) -> Vec<Function> {
+    Function::known().filter(|f| f.name() == name).collect()
+}
+
+fn complaints(drives: &str, parameters: &str) -> String {
+    match compile(&arm(drives), &options(parameters)) {
+        Ok(generated) => panic!("compiled: {}", generated.text.len()),
+        Err(complaints) => complaints.to_string(),
+    }
+}
+
+#[test]
+fn what_cannot_be_is_said_all_at_once() {
+    let drives = with(ELASTIC.drives, ELASTIC.numbers);
+    let said = complaints(
+        &drives,
+        "
+[[parameter]]
+kind = \"drive\"
+drive = \"on\"
+numbers = [\"ratio\"]
+[[parameter]]
+kind = \"drive\"
+drive = \"one\"
+numbers = [\"ratoi\", \"stage_1_ratio\", \"ratio\", \"efficiency\", \"stage_1_damping\"]
+[[parameter]]
+kind = \"drive\"
+name = \"again\"
+drive = \"one\"
+numbers = [\"inductance\"]
+[[parameter]]
+kind = \"drive\"
+drive = \"two\"
+numbers = [\"inductance\", \"stage_2_output_inertia\", \"C\"]
+",
+    );
+    for part in [
+        "parameter `on`: the robot has no drive `on`",
+        "did you mean `one`?",
+        "parameter `one`: drive `one` has no number `ratoi`",
+        "did you mean `ratio`?",
+        "parameter `one`: `ratio` and `stage_1_ratio` are one number",
+        "drive `one` has no number `efficiency`",
+        "drive `one` has no number `stage_1_damping`",
+        "the numbers of drive `one` are a parameter twice",
+        "drive `two` has no number `inductance`",
+        "`stage_2_output_inertia` cannot be free: it is 0.0 in the robot file",
+        "drive `two` has no number `C`",
+        "scene.toml:",
+    ] {
+        assert!(said.contains(part), "`{part}` is not in\n{said}");
+    }
+}
+
+#[test]
+fn numbers_of_what_does_not_move_are_an_error() {
+    let said = complaints(
+        &with(RIGID.drives, RIGID.numbers),
+        "[hold]\njoints = { one = 0.3 }\n[[parameter]]\nkind = \"drive\"\ndrive = \"one\"\nnumbers = [\"ratio\"]\n",
+    );
+    assert!(said.contains("no joint of drive `one` moves in this scene"), "{said}");
+}
+
+#[test]
+fn functions_without_drives_take_nothing() {
+    let free = InScene::new(&arm(&with(RIGID.drives, RIGID.numbers)), &options(RIGID.parameters));
+    assert!(free.graph(Function::InverseDynamics).inputs.iter().all(|p| p.wrapper.is_none()));
+}
