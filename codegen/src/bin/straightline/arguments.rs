@@ -682,7 +682,7 @@ mod tests {
         let given = "straightline generate arm.urdf --function inverse_dynamic --scaler f46 --allow near-right-angel --function RNEA --gravity 1,2";
         let complaints = CommandLine::read(given.split(' ').map(OsString::from).collect()).unwrap_err();
         let said: Vec<String> = complaints.iter().map(ToString::to_string).collect();
-        let parts = ["'inverse_dynamics'", "'--scalar'", "f64, f32", "`near-right-angle`", "RNEA", "0,0,-9.81"];
+        let parts = ["'inverse_dynamic'", "'--scalar'", "f64, f32", "`near-right-angle`", "'RNEA'", "0,0,-9.81"];
         assert_eq!(said.len(), parts.len(), "{said:?}");
         for part in parts {
             assert_eq!(said.iter().filter(|text| text.contains(part)).count(), 1, "{part}: {said:?}");
