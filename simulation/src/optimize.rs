@@ -254,6 +254,8 @@ pub fn minimise_from(
         asked.set(asked.get() + 1);
         let outside: f64 = unit.iter().map(|u| (u - u.clamp(0.0, 1.0)).abs()).sum();
         let inner = cost(&inside(unit));
+        // what is no number compares with nothing, and is no better than anything
+        let inner = if inner.is_nan() { f64::INFINITY } else { inner };
         if outside == 0.0 {
             inner
         } else {

@@ -304,7 +304,7 @@ impl Drive {
     /// What the number has to be.
     pub fn set(&mut self, name: &str, value: f64) -> Option<Result<(), &'static str>> {
         let number = self.numbers().into_iter().find(|number| number.name == name)?;
-        *self = self.with(&[number.clone()], &[value]);
+        *self = self.with(std::slice::from_ref(&number), &[value]);
         let must = number.quantity.must;
         Some(if must.holds(value) { Ok(()) } else { Err(must.words().0) })
     }
