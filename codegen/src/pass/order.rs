@@ -199,7 +199,7 @@ mod tests {
     fn states_beyond_the_numbers_say_nothing() {
         let x = [1e3, 1.0, -1.5, 2.5];
         let (graph, values) = chain(&x, &[false; 4]);
-        let alone = order(&graph, &[values.clone()]);
+        let alone = order(&graph, std::slice::from_ref(&values));
         for beyond in [f64::NAN, f64::INFINITY, 1e300] {
             let mut wild = values.clone();
             wild[1] = beyond;
