@@ -389,8 +389,7 @@ fn stage_type(stages: &[Stage], s: usize, graph: &Graph, methods: &str, scalar: 
     });
     let own: Vec<&Port> = graph.inputs.iter().filter(|p| !stages.iter().any(|e| e.values == p.name)).collect();
     let parameters: Vec<String> = own.iter().map(|p| format!("{}: &{}", p.name, array_type(p, scalar))).collect();
-    // no zeros: they would be a call of `memset` where there are no vector instructions
-    let filler = own.iter().find(|p| !p.is_empty()).map_or("0.0".to_string(), |p| emit::element(p, 0));
+    let filler = emit::filler(own.iter().copied());
     let mut out = format!(
         "\n/// {}\n#[derive(Clone, Debug)]\npub struct {name}{lifetime} {{\n{field}    values: [{t}; {stored}],\n}}\n",
         stage.doc

@@ -182,9 +182,7 @@ fn dispatch(out: &mut String, modes: &[Mode], programs: &[Vec<ModeProgram>], opt
     let parameters: String = inputs.iter().map(|p| format!("{}: &{}, ", p.name, parameter_type(p, options))).collect();
     let arguments: String = inputs.iter().map(|p| format!("{}, ", p.name)).collect();
     let qdd = array_type(&first.graph.outputs[0], options.scalar);
-    // no zeros in arrays that are computed: they would be a call of `memset` where there are no vector instructions
-    let filler =
-        inputs.iter().find(|p| p.wrapper.is_none() && !p.is_empty()).map_or("0.0".to_string(), |p| emit::element(p, 0));
+    let filler = emit::filler(inputs.iter().filter(|p| p.wrapper.is_none()));
     let _ = write!(
         out,
         "\n/// The most constrained coordinates that a mode has.\npub const MOST_CONSTRAINED: usize = {most};\n\n\

@@ -58,20 +58,8 @@ pub fn function(
     for line in doc.lines() {
         let _ = writeln!(out.text, "///{}{line}", if line.is_empty() { "" } else { " " });
     }
-    let used_inputs = |nodes: &mut dyn Iterator<Item = NodeId>| {
-        let mut used = vec![false; graph.inputs.len()];
-        nodes.for_each(|id| {
-            for a in graph.op(id).operands().flat_map(|a| graph.angle_terms(a)).chain([id]) {
-                if let Op::Input(k) = graph.op(a) {
-                    used[port_of(&graph.inputs, k as usize).0] = true;
-                }
-            }
-        });
-        used
-    };
-    let all_used = used_inputs(
-        &mut schedule.parts.iter().flat_map(|p| p.nodes.iter().copied()).chain(graph.results.iter().copied()),
-    );
+    let all_nodes = schedule.parts.iter().flat_map(|p| p.nodes.iter().copied()).chain(graph.results.iter().copied());
+    let all_used = used_inputs(graph, all_nodes);
     let parameters = |f: &mut dyn FnMut(&Port, bool, bool) -> String| {
         let inputs = graph.inputs.iter().enumerate().map(|(i, p)| (p, all_used[i], false));
         let outputs = graph.outputs.iter().map(|p| (p, true, true));
@@ -89,8 +77,7 @@ pub fn function(
     let generics = style.generics();
     if let [part] = schedule.parts.as_slice() {
         let _ = writeln!(out.text, "{ALLOW}{inline}\npub fn {name}{generics}({signature}) {{");
-        let filler = filler(graph, &all_used, style);
-        body(graph, part, style, filler, title, &mut out);
+        body(graph, part, style, title, &mut out);
         out.text.push_str("}\n");
         return out;
     }
@@ -101,11 +88,11 @@ pub fn function(
     let _ = writeln!(
         out.text,
         "    let mut live = [{}; {slots}];",
-        filler(graph, &all_used, style).unwrap_or(style.zero().into())
+        first_used(graph, &all_used, style).unwrap_or(style.zero().into())
     );
     let mut parts = String::new();
     for (k, part) in schedule.parts.iter().enumerate() {
-        let used = used_inputs(&mut part.nodes.iter().copied().chain(part.results.iter().map(|r| graph.results[*r])));
+        let used = used_inputs(graph, nodes_of(graph, part));
         let mut writes = vec![false; graph.outputs.len()];
         part.results.iter().for_each(|r| writes[port_of(&graph.outputs, *r).0] = true);
         let mut arguments = Vec::new();
@@ -129,12 +116,7 @@ pub fn function(
         let called = if style.lanes && style.fused { "::<N, FUSED>" } else { "" };
         let _ = writeln!(out.text, "    {name}_part{}{called}({});", k + 1, arguments.join(", "));
         let mut text = FunctionText::new();
-        let filler = match filler(graph, &used, style) {
-            Some(filler) => Some(filler),
-            None if part.loads.is_empty() || style.lanes || style.generic => None,
-            None => Some("live[0]".to_string()),
-        };
-        body(graph, part, style, filler, title, &mut text);
+        body(graph, part, style, title, &mut text);
         let _ = writeln!(parts, "\n{ALLOW}\n{part_inline}\nfn {name}_part{}{generics}({}) {{", k + 1, types.join(", "));
         parts.push_str(&text.text);
         parts.push_str("}\n");
@@ -146,9 +128,26 @@ pub fn function(
     out
 }
 
-/// What an array of one state holds before its elements are computed: an input that is read anyway, as an array of zeros is filled by
-/// a call of `memset` where there are no vector instructions.
-fn filler(graph: &Graph, used: &[bool], style: Style) -> Option<String> {
+/// What a part computes, and the results that it stores.
+fn nodes_of<'a>(graph: &'a Graph, part: &'a Part) -> impl Iterator<Item = NodeId> + 'a {
+    part.nodes.iter().copied().chain(part.results.iter().map(|r| graph.results[*r]))
+}
+
+/// Which input ports these nodes read.
+fn used_inputs(graph: &Graph, nodes: impl Iterator<Item = NodeId>) -> Vec<bool> {
+    let mut used = vec![false; graph.inputs.len()];
+    nodes.for_each(|id| {
+        for a in graph.op(id).operands().flat_map(|a| graph.angle_terms(a)).chain([id]) {
+            if let Op::Input(k) = graph.op(a) {
+                used[port_of(&graph.inputs, k as usize).0] = true;
+            }
+        }
+    });
+    used
+}
+
+/// The first number of the inputs that are read anyway: [`emit::filler`](super::filler) of a body of one state.
+fn first_used(graph: &Graph, used: &[bool], style: Style) -> Option<String> {
     let mut plain = graph.inputs.iter().zip(used).filter(|(p, used)| **used && p.wrapper.is_none()).map(|(p, _)| p);
     plain.next().filter(|_| !style.lanes && !style.generic).map(|port| style.element(port, 0))
 }
@@ -177,8 +176,6 @@ pub(super) enum Binding {
 pub(super) struct Body<'a> {
     pub graph: &'a Graph,
     pub style: Style,
-    /// What an array holds before its elements are computed, if not zeros.
-    pub filler: Option<String>,
     /// Sums that take a product in.
     fused: Vec<Option<Fused>>,
     /// What stands for each node: its name, its literal, or its expression.
@@ -192,19 +189,12 @@ pub(super) struct Body<'a> {
 }
 
 /// The statements of one part; over lanes, in a loop over them.
-fn body(
-    graph: &Graph,
-    part: &Part,
-    style: Style,
-    filler: Option<String>,
-    title: &dyn Fn(Section) -> String,
-    out: &mut FunctionText,
-) {
+fn body(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) -> String, out: &mut FunctionText) {
     if !style.lanes {
-        return statements(graph, part, style, filler, title, out);
+        return statements(graph, part, style, title, out);
     }
     let mut inner = FunctionText::new();
-    statements(graph, part, style, filler, title, &mut inner);
+    statements(graph, part, style, title, &mut inner);
     out.text.push_str("    for lane in 0..N {\n");
     for line in inner.text.lines() {
         let _ = writeln!(out.text, "    {line}");
@@ -214,21 +204,14 @@ fn body(
     out.uses_sqrt |= inner.uses_sqrt;
 }
 
-fn statements(
-    graph: &Graph,
-    part: &Part,
-    style: Style,
-    filler: Option<String>,
-    title: &dyn Fn(Section) -> String,
-    out: &mut FunctionText,
-) {
+fn statements(graph: &Graph, part: &Part, style: Style, title: &dyn Fn(Section) -> String, out: &mut FunctionText) {
     let taken = graph
         .inputs
         .iter()
         .chain(&graph.outputs)
         .map(|p| p.name.as_str())
         .chain(["live", "trig", "lane", "fma", "fma_if", "fused", "number"]);
-    let (mut b, absorbed) = Body::new(graph, part, style, filler, Names::with_taken(taken));
+    let (mut b, absorbed) = Body::new(graph, part, style, Names::with_taken(taken));
     let mut uses = vec![0u32; graph.ops.len()];
     for id in &part.nodes {
         graph.op(*id).operands().for_each(|a| uses[a.index()] += 1);
@@ -286,13 +269,7 @@ pub(super) struct Plan<'a> {
 
 impl<'a> Body<'a> {
     /// Before its first statement, and which products sums take in.
-    pub fn new(
-        graph: &'a Graph,
-        part: &Part,
-        style: Style,
-        filler: Option<String>,
-        names: Names,
-    ) -> (Body<'a>, Vec<bool>) {
+    pub fn new(graph: &'a Graph, part: &Part, style: Style, names: Names) -> (Body<'a>, Vec<bool>) {
         let (fused, absorbed) = match style.fused {
             true => fusions(graph, part),
             false => (vec![None; graph.ops.len()], vec![false; graph.ops.len()]),
@@ -300,7 +277,6 @@ impl<'a> Body<'a> {
         let body = Body {
             graph,
             style,
-            filler,
             fused,
             text: vec![None; graph.ops.len()],
             paired: vec![false; graph.ops.len()],
@@ -309,6 +285,14 @@ impl<'a> Body<'a> {
             statements: String::new(),
         };
         (body, absorbed)
+    }
+
+    /// What an array of a part holds before its elements are computed.
+    pub fn filler(&self, part: &Part) -> String {
+        let used = used_inputs(self.graph, nodes_of(self.graph, part));
+        let has_live = !(part.loads.is_empty() || self.style.lanes || self.style.generic);
+        let of_part = first_used(self.graph, &used, self.style).or_else(|| has_live.then(|| "live[0]".to_string()));
+        of_part.unwrap_or_else(|| self.style.zero().to_string())
     }
 
     /// The statements of these nodes of a part.

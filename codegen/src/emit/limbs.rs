@@ -95,7 +95,7 @@ impl Body<'_> {
             texts.push((*node, format!("{name}[{limb}]")));
         }
         // what goes there
-        let filler = self.filler.clone().unwrap_or_else(|| self.style.zero().to_string());
+        let filler = self.filler(plan.part);
         let (mut arrays, mut names): (Vec<(NodeId, String)>, Vec<String>) = (Vec::new(), Vec::new());
         for (node, row) in &results {
             let name = match self.graph.notes[row[0].index()].name {
@@ -107,7 +107,7 @@ impl Body<'_> {
             names.push(name);
         }
 
-        let (mut inner, absorbed) = Body::new(&graph, &part, self.style, None, std::mem::take(&mut self.names));
+        let (mut inner, absorbed) = Body::new(&graph, &part, self.style, std::mem::take(&mut self.names));
         for (node, text) in texts {
             inner.text[node.index()] = Some((text, Binding::Atom));
         }

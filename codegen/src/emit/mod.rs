@@ -199,6 +199,12 @@ pub fn element(port: &Port, k: usize) -> String {
     indices.iter().rev().fold(name, |text, i| format!("{text}[{i}]"))
 }
 
+/// What an array holds before its elements are computed: the first number of the inputs. An array of zeros would be filled by a call of
+/// `memset` where there are no vector instructions.
+pub fn filler<'a>(inputs: impl IntoIterator<Item = &'a Port>) -> String {
+    inputs.into_iter().find(|p| !p.is_empty()).map_or("0.0".to_string(), |p| element(p, 0))
+}
+
 /// Element k of ports that stand one after the other.
 pub fn element_of(ports: &[Port], mut k: usize) -> String {
     for port in ports {

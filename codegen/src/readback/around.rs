@@ -391,8 +391,7 @@ impl Around<'_, '_, '_> {
             let text = format!("pub struct {name}{0} {{ {field} values: [{s}; {n}], }}", life(k));
             self.is(module, Sort::Struct, name, &text)?;
             let own = listed(&mut graph.inputs.iter().filter(|p| !is_stored(p)), "&");
-            let mut given = graph.inputs.iter().filter(|p| !is_stored(p) && !p.is_empty());
-            let filler = given.next().map_or("0.0".to_string(), |p| emit::element(p, 0));
+            let filler = first_of(graph.inputs.iter().filter(|p| !is_stored(p)));
             let before = earlier.map(|(e, life)| format!("{}: &'a {}{life}", e.values, e.type_name));
             let parameters: Vec<String> = before.into_iter().chain(own).collect();
             let receiver = earlier.map_or("", |(e, _)| &e.values);
@@ -478,8 +477,7 @@ impl Around<'_, '_, '_> {
                 None => format!("{}: &{}, ", p.name, shaped(p, s)),
             })
             .collect();
-        let mut given = inputs.iter().filter(|p| p.wrapper.is_none() && !p.is_empty());
-        let filler = given.next().map_or("0.0".to_string(), |p| emit::element(p, 0));
+        let filler = first_of(inputs.iter().filter(|p| p.wrapper.is_none()));
         let arms: String = variants
             .iter()
             .zip(modes)
@@ -696,6 +694,11 @@ fn is_rounded_up(found: f64, bound: f64) -> bool {
         format!("{digits}e{exponent}").parse::<f64>().ok()
     });
     found == bound || found > bound && text.parse() == Ok(found) && before.is_some_and(|before| before < bound)
+}
+
+/// The first number of what is given, which arrays begin with.
+fn first_of<'a>(mut given: impl Iterator<Item = &'a Port>) -> String {
+    given.find(|p| !p.is_empty()).map_or("0.0".to_string(), |p| emit::element(p, 0))
 }
 
 /// `[[f64; 7]; 6]`
