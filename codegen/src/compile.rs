@@ -4,7 +4,8 @@ use crate::certify::companion::Bits;
 use crate::certify::{self, Effort, Known};
 use crate::choose::{self, choose, price};
 use crate::contact;
-use crate::description::{self, messages};
+use crate::description::drives::Drive;
+use crate::description::{self, messages, Description};
 use crate::diagnostic::{Diagnostic, Diagnostics, Reporting, Source};
 use crate::emit::{self, Item, Lanes, Provenance, Scalar, Style};
 use crate::equivalence::{self, Disagreement, Plainer};
@@ -142,7 +143,12 @@ impl Options {
             return self.clone();
         }
         let description = description::read(source, &mut Diagnostics::new());
-        Options { scene: self.scene.knowing(&description.map(|d| d.drives).unwrap_or_default()), ..self.clone() }
+        self.knowing_drives(description.as_ref().map_or(&[], |d| &d.drives))
+    }
+
+    /// The same with the drives as they were read.
+    fn knowing_drives(&self, drives: &[Drive]) -> Options {
+        Options { scene: self.scene.knowing(drives), ..self.clone() }
     }
 
     /// The optimisations that these options allow.
@@ -534,7 +540,7 @@ fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> R
 /// What is wrong with the file or the options, without compiling: all that [`compile`] would say but what only the finished
 /// programs tell, such as exceeded budgets.
 pub fn examine(source: &Source, options: &Options) -> Diagnostics {
-    match prepare(source, &options.knowing(source)) {
+    match prepare(source, options) {
         Ok(prepared) => prepared.diagnostics,
         Err(diagnostics) => diagnostics,
     }
@@ -546,7 +552,9 @@ struct Prepared {
     whole: Model<Dd>,
     model: Model<Dd>,
     frames: Vec<String>,
-    /// The options, spelled out for the robot.
+    /// The options, whose scene knows the drives of the file.
+    options: Options,
+    /// The same, spelled out for the robot.
     resolved: Options,
     /// Warnings.
     diagnostics: Diagnostics,
@@ -555,11 +563,14 @@ struct Prepared {
 /// Reads and checks everything.
 fn prepare(source: &Source, options: &Options) -> Result<Prepared, Diagnostics> {
     let mut diagnostics = Diagnostics::reporting(&options.reporting);
-    let whole = model::load_into(source, &options.scene.model_options(&options.model), &mut diagnostics);
+    let description = description::read(source, &mut diagnostics);
+    let options = &options.knowing_drives(description.as_ref().map_or(&[], |d| &d.drives));
+    let build = |d: &Description| model::build(d, &options.scene.model_options(&options.model), &mut diagnostics);
+    let whole = description.as_ref().and_then(build);
+    model::finish(&mut diagnostics);
     scene::check_options(options, &mut diagnostics);
     let model = whole.clone().and_then(|whole| scene::apply(whole, &options.scene, &mut diagnostics));
     if options.scalar == Scalar::F32 && !diagnostics.has_errors() {
-        let description = description::read(source, &mut Diagnostics::new());
         description.iter().for_each(|d| range::of_robot(d, &options.scene, options.scalar, &mut diagnostics));
     }
     let of_frames = model.as_ref().or(whole.as_ref());
@@ -585,25 +596,26 @@ fn prepare(source: &Source, options: &Options) -> Result<Prepared, Diagnostics> 
             diagnostics.sort();
             Err(diagnostics)
         }
-        false => Ok(Prepared { whole, model, frames, resolved, diagnostics }),
+        false => Ok(Prepared { whole, model, frames, options: options.clone(), resolved, diagnostics }),
     }
 }
 
 fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
-    let options = &options.knowing(source);
-    let Prepared { whole, model, frames, resolved, mut diagnostics } = prepare(source, options)?;
+    let Prepared { whole, model, frames, options, resolved, mut diagnostics } = prepare(source, options)?;
     let hash = hash(source.text(), &resolved);
     let robot = Robot::new(model);
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
     let programs = resolved.functions.iter().filter(|f| !is_empty(f));
     let programs: Result<Vec<Program>, _> = programs.map(|f| checked(&robot, &frames, *f, &resolved)).collect();
     let mut programs = programs.map_err(|wrong| only(wrong.error(&robot.model)))?;
+    let beyond = |program: &str, why: &str, diagnostics: &mut Diagnostics| {
+        let complaint = scene::messages::program_beyond_scalar(program, options.scalar.name(), why);
+        options.scene.places.complain("numbers.scalar", complaint, diagnostics);
+    };
     for program in &mut programs {
         mix_precisions(&robot, program, &resolved);
         if let Some(why) = range::of_program(&robot.model, &program.graph, options.scalar) {
-            let function = program.function.name();
-            let complaint = scene::messages::program_beyond_scalar(function, options.scalar.name(), &why);
-            options.scene.places.complain("numbers.scalar", complaint, &mut diagnostics);
+            beyond(program.function.name(), &why, &mut diagnostics);
         }
         let of = (program.function, &program.graph);
         let mixed = !program.graph.widths.is_empty();
@@ -618,7 +630,7 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     }
     let measures: Vec<(Function, Measures)> =
         programs.iter().map(|p| (p.function, Measures::of(p, options.scalar))).collect();
-    budget::check(&whole, &frames, &measures, options, &mut diagnostics);
+    budget::check(&whole, &frames, &measures, &options, &mut diagnostics);
     let certificates = certificates(&robot, &programs, &resolved);
     budget::check_errors(programs.iter().zip(&certificates), &resolved, &mut diagnostics);
     if diagnostics.has_errors() {
@@ -638,16 +650,13 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let generated = generate(robot, frames, programs, diagnostics, &resolved, source.path(), hash);
     let generated = generated.map_err(|wrong| only(wrong.error(&model)))?;
     // what has a program of its own is asked above, all else here
-    let mut beyond = generated.programs.all().filter_map(|p| Some((p, range::of_constants(&p.graph, p.scalar)?)));
-    match beyond.next() {
-        None => {
-            drop(beyond);
-            Ok(generated)
-        }
+    let why = |p: &readback::Program| Some((p.name.clone(), range::of_constants(&p.graph, p.scalar)?));
+    let first = generated.programs.all().find_map(why);
+    match first {
+        None => Ok(generated),
         Some((program, why)) => {
-            let complaint = scene::messages::program_beyond_scalar(&program.name, program.scalar.name(), &why);
-            let mut diagnostics = generated.warnings.clone();
-            options.scene.places.complain("numbers.scalar", complaint, &mut diagnostics);
+            let mut diagnostics = generated.warnings;
+            beyond(&program, &why, &mut diagnostics);
             Err(diagnostics)
         }
     }

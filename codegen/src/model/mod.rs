@@ -134,16 +134,10 @@ pub struct DoubtfulAngle {
 /// Reads a robot file and builds its model: [`description::read`], then [`build`].
 pub fn load(source: &Source, options: &ModelOptions) -> (Option<Model<Dd>>, Diagnostics) {
     let mut diagnostics = Diagnostics::new();
-    let model = load_into(source, options, &mut diagnostics);
+    let description = description::read(source, &mut diagnostics);
+    let model = description.and_then(|description| build(&description, options, &mut diagnostics));
+    finish(&mut diagnostics);
     (model, diagnostics)
-}
-
-/// The same, where complaints are said as `diagnostics` has them.
-pub(crate) fn load_into(source: &Source, options: &ModelOptions, diagnostics: &mut Diagnostics) -> Option<Model<Dd>> {
-    let description = description::read(source, diagnostics);
-    let model = description.and_then(|description| build(&description, options, diagnostics));
-    finish(diagnostics);
-    model
 }
 
 /// Orders the complaints and says how many were dropped.
