@@ -5,7 +5,7 @@
 //! do its values stay in range where the exact ones do, at some states near rest? What no limit, however large, has to do with:
 //! limits beyond the range say "no limit" and are written so. A length that vanishes is dust, and vanishes.
 
-use crate::description::{Description, Notation};
+use crate::description::{Description, JointDrive, Notation};
 use crate::diagnostic::{Diagnostic, Diagnostics, Place};
 use crate::emit::Scalar;
 use crate::expr::{evaluate, Graph, Op, Width};
@@ -17,8 +17,6 @@ use straightline_core::Dd;
 
 /// States at which a program is tried.
 const STATES: usize = 3;
-/// An input beyond this is no state to try a program at.
-const GREATEST_INPUT: f64 = 1e6;
 
 /// Complains about the numbers of a robot file and of a scene's payloads that the scalar cannot hold.
 pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagnostics: &mut Diagnostics) {
@@ -26,15 +24,10 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
     if scalar == Scalar::F64 {
         return;
     }
-    let mut complain = |place: Option<&Place>, what: String, value: f64, is_mass: bool| {
-        if let Some(complaint) = unheld(&what, value, is_mass) {
-            diagnostics.push(match place {
-                Some(place) => complaint.at(place),
-                None => complaint,
-            });
-        }
+    let mut complain = |place: &Place, what: String, value: f64, is_mass: bool| {
+        unheld(&what, value, is_mass).into_iter().for_each(|complaint| diagnostics.push(complaint.at(place)));
     };
-    let drive = |name: &str, drive: &crate::description::JointDrive, complain: &mut dyn FnMut(&Place, String, f64)| {
+    let drive = |name: &str, drive: &JointDrive, complain: &mut dyn FnMut(&Place, String, f64)| {
         for (what, value) in [
             ("damping", &drive.damping),
             ("friction", &drive.friction),
@@ -50,41 +43,41 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
         }
     };
     if let Some(gravity) = &description.gravity {
-        gravity.value.iter().for_each(|x| complain(Some(&gravity.place), "gravity".to_string(), *x, false));
+        gravity.value.iter().for_each(|x| complain(&gravity.place, "gravity".to_string(), *x, false));
     }
     match &description.notation {
         Notation::JointFrames(bodies) => {
             for link in &bodies.links {
                 let (name, Some(inertial)) = (&link.name.value, &link.inertial) else { continue };
                 let j = inertial.inertia.value;
-                complain(Some(&inertial.mass.place), format!("mass of link `{name}`"), inertial.mass.value, true);
+                complain(&inertial.mass.place, format!("mass of link `{name}`"), inertial.mass.value, true);
                 for x in inertial.com.value {
-                    complain(Some(&inertial.com.place), format!("mass centre of link `{name}`"), x, false);
+                    complain(&inertial.com.place, format!("mass centre of link `{name}`"), x, false);
                 }
                 for x in [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz] {
-                    complain(Some(&inertial.inertia.place), format!("inertia of link `{name}`"), x, false);
+                    complain(&inertial.inertia.place, format!("inertia of link `{name}`"), x, false);
                 }
             }
             for joint in &bodies.joints {
                 let (name, xyz) = (&joint.name.value, &joint.origin.xyz);
                 for x in xyz.value {
-                    complain(Some(&xyz.place), format!("origin of joint `{name}`"), x, false);
+                    complain(&xyz.place, format!("origin of joint `{name}`"), x, false);
                 }
-                drive(name, &joint.drive, &mut |place, what, x| complain(Some(place), what, x, false));
+                drive(name, &joint.drive, &mut |place, what, x| complain(place, what, x, false));
             }
         }
         Notation::MassCentres(chain) => {
             for link in &chain.links {
                 let (name, j) = (&link.name.value, link.inertia.value);
-                complain(Some(&link.mass.place), format!("mass of link `{name}`"), link.mass.value, true);
+                complain(&link.mass.place, format!("mass of link `{name}`"), link.mass.value, true);
                 for x in [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz] {
-                    complain(Some(&link.inertia.place), format!("inertia of link `{name}`"), x, false);
+                    complain(&link.inertia.place, format!("inertia of link `{name}`"), x, false);
                 }
                 for x in link.r.value {
-                    complain(Some(&link.r.place), format!("r of link `{name}`"), x, false);
+                    complain(&link.r.place, format!("r of link `{name}`"), x, false);
                 }
                 let joint = &link.joint_name.value;
-                drive(joint, &link.drive, &mut |place, what, x| complain(Some(place), what, x, false));
+                drive(joint, &link.drive, &mut |place, what, x| complain(place, what, x, false));
             }
         }
     }
@@ -128,8 +121,7 @@ pub fn of_program(model: &Model<Dd>, graph: &Graph, scalar: Scalar) -> Option<St
     }
     let all = Graph { results: graph.ids().collect(), ..graph.clone() };
     let states = forward_method::states(model, &graph.inputs, STATES, false)?;
-    let ordinary = states.iter().filter(|x| x.iter().all(|x| x.abs() <= GREATEST_INPUT));
-    ordinary.filter_map(|x| leaves(&all, x)).next()
+    states.iter().find_map(|x| leaves(&all, x))
 }
 
 /// The first value of a program that leaves the range of f32 at these inputs, and not that of f64.
