@@ -35,6 +35,12 @@ const AGREE: f64 = 1e-24;
 /// With exact rules constants are rounded to the scalar, one by one, as the generic runtime holds them: what is not that runtime bit for
 /// bit (stages, contact modes, constructors of parameters) differs by so many roundings of them.
 const ROUNDINGS: f64 = 1e4;
+/// A program may lose so many times what the plain equations lose in the same scalar, or one rounding of all that a result is made of.
+const LOSSES: f64 = 16.0;
+/// At so many random states.
+const STATES: usize = 4;
+/// Where random numbers begin: another place than where states for choices come from.
+const SEED: u64 = 0x6a09_e667_f3bc_c908;
 
 /// Up to which part of their natural scale results agree.
 fn agreeing(options: &Options) -> f64 {
@@ -44,12 +50,6 @@ fn agreeing(options: &Options) -> f64 {
         (Grade::Exact, Scalar::F32) => ROUNDINGS * f64::from(f32::EPSILON),
     }
 }
-/// A program may lose so many times what the plain equations lose in the same scalar, or one rounding of all that a result is made of.
-const LOSSES: f64 = 16.0;
-/// At so many random states.
-const STATES: usize = 4;
-/// Where random numbers begin: another place than where states for choices come from.
-const SEED: u64 = 0x6a09_e667_f3bc_c908;
 
 /// How a program differs from the plain equations of its robot.
 #[derive(Clone, Debug, PartialEq)]
@@ -418,7 +418,7 @@ pub(crate) fn of_parameter(
         let off = evaluate(graph, &body.concat()).into_iter().zip(constructed(robot, parameter, &wide));
         let off: Vec<Magnitude> = off.map(|(found, plain)| difference(found, plain)).collect();
         if let Some(drive) = &drive {
-            compare(&parameter.input_name(), &graph.outputs, &off, AGREE)?;
+            compare(&parameter.input_name(), &graph.outputs, &off, agreeing(options))?;
             of_drive(parameter, drive, &body[0], (state == 0).then_some(&robot.model))?;
             continue;
         }
