@@ -530,6 +530,12 @@ fn what_does_not_end_says_so_and_what_helps() {
     assert!(few.contains("2.0e2 rows") && few.contains("at most 100 rows"), "{few}");
     let far = simulated("[start]\nq = [1e8, 0.0]\n", &[]);
     assert!(far.contains("angle-beyond-sines") && far.contains("joint1"), "{far}");
+    let slow = "[motion]\nkind = \"trapezoidal\"\nspeed = 2.0\nacceleration = [8.0, 1e-7]\n[[motion.point]]\nq = [0.2, -0.3]\n\
+        [[motion.point]]\nq = [0.7, 0.3]\n";
+    let motion = write(&here, "slow.toml", slow);
+    let search = ["--optimize", "link2.mass=0.1:2", "--minimize", "peak", "--interval", "0.05"];
+    let searched = fails(&[&["analyze", &robot, "--motion", &motion][..], &search].concat());
+    assert!(searched.contains("97982 instants") && searched.contains("at most 50000"), "{searched}");
 }
 
 #[test]

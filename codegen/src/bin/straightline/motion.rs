@@ -33,6 +33,8 @@ use straightline_simulation::table::Table;
 
 /// Size of a plot in pixels.
 const PLOT: (u32, u32) = (900, 340);
+/// A search takes about a minute at so many instants.
+const MOST_SEARCHED: usize = 50_000;
 
 /// The robot of a description in a scene; what is wrong with it goes to `diagnostics`.
 fn built_in_full(description: &Description, options: &Options, diagnostics: &mut Diagnostics) -> Option<Model<Dd>> {
@@ -379,6 +381,15 @@ fn optimized(a: &Analyze, description: &Description, options: &Options, motion: 
     let efforts: Vec<f64> = bodies.iter().map(effort).collect();
     let ranges: Vec<(f64, f64)> = a.optimize.iter().map(|r| r.ends).collect();
     let states = analysis::states(motion, a.interval);
+    if states.len() > MOST_SEARCHED {
+        progress.finish_and_clear();
+        let instants = states.len();
+        print::error(&format!("a search runs through the motion hundreds of times, which has {instants} instants"));
+        print::help(&format!(
+            "at most {MOST_SEARCHED} instants are searched: a greater --interval, or a shorter motion"
+        ));
+        return Err(Failure::Input);
+    }
     let (times, qd): (Vec<f64>, Vec<Vec<f64>>) = states.iter().map(|(t, [_, qd, _])| (*t, qd.clone())).unzip();
     let by_gradient = |p: &[f64]| {
         let of_design = programs.kept(p);
