@@ -212,6 +212,14 @@ fn robots_as_written_are_right_in_every_scene() {
     assert!(refused < 5, "{refused}");
 }
 
+/// Contacts on or along the axis of a joint, whose zeros were judged by no scale; reactions whose bounds were compared with eigenvalues.
+#[test]
+fn what_was_wrong_once_is_right() {
+    for (digits, seed) in [(2, 2), (3, 3), (14, 10013), (16, 184)] {
+        all_are_right(1, seed, &[Style::Digits(digits)]);
+    }
+}
+
 #[test]
 #[ignore = "minutes"]
 fn very_many_robots_as_written_are_right_in_every_scene() {

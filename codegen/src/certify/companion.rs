@@ -6,6 +6,9 @@ use super::Format;
 use crate::emit::Scalar;
 use crate::expr::{Graph, Port};
 
+/// What the output of a bound is called behind the result that it is of.
+pub const OF_ERROR: &str = "_error";
+
 /// Which bits the program in question computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bits {
@@ -39,6 +42,6 @@ pub(super) fn bound_of(mut p: Running, graph: &Graph) -> Result<Graph, &'static 
     let zero = p.constant(0.0);
     let errors = p.follow(graph, &inputs).into_iter().map(|r| r.error.unwrap_or(zero)).collect::<Vec<_>>();
     let errors = p.all_settled(&errors);
-    let outputs = graph.outputs.iter().map(|p| Port::new(&format!("{}_error", p.name), &p.shape)).collect();
+    let outputs = graph.outputs.iter().map(|p| Port::new(&format!("{}{OF_ERROR}", p.name), &p.shape)).collect();
     p.finish(outputs, errors).ok_or("its own roundings would count")
 }

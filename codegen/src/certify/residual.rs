@@ -41,6 +41,7 @@
 //! Where a ≥ 1 or a' ≥ 1 nothing is proven, and all that depends on it is NaN, by the root of 1 − a: a robot so near to a singular mass
 //! matrix, or redundant contacts, or such that are too near to it for the format.
 
+use super::companion::OF_ERROR;
 use super::congruence::Congruence;
 use super::reactions::Contact;
 use super::running::{BrokenProof, Running, Tracked};
@@ -81,7 +82,7 @@ pub(super) fn bound_of(mut p: Running, system: &Graph, yielding: &[bool]) -> Res
 
     let congruence = Congruence::new(&mut p, h, n).ok_or("a joint has no inertia")?;
     let eigenvalue = congruence.smallest_eigenvalue(&mut p);
-    let mut outputs = vec![Port::new("qdd_error", &[n])];
+    let mut outputs = vec![Port::new(&format!("qdd{OF_ERROR}"), &[n])];
     let known: Vec<Tracked> = match p.is_broken(BrokenProof::Residual) {
         true => residual.iter().map(|r| Running::exact(r.value)).collect(),
         false => residual.clone(),
@@ -101,7 +102,7 @@ pub(super) fn bound_of(mut p: Running, system: &Graph, yielding: &[bool]) -> Res
                 driven[i] = p.insert(Op::Add(driven[i], reactions.driven[i]));
             }
         }
-        outputs.push(Port::new("force_error", &[m]));
+        outputs.push(Port::new(&format!("force{OF_ERROR}"), &[m]));
         results = reactions.bounds;
         last.push(reactions.smallest);
         outputs.push(Port::new("smallest_eigenvalue", &[1]));

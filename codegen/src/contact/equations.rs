@@ -23,6 +23,8 @@ pub(super) struct Form<T> {
     pub reduced: bool,
     /// The surfaces of objects over this scalar.
     pub surface: fn(&SurfaceItem) -> Surface<T>,
+    /// What is added to accelerations of contact points and taken away again, as the reduced robot does with gravity.
+    pub falls: Option<T>,
 }
 
 /// A contact, how its frame moves, and what it constrains.
@@ -325,7 +327,10 @@ fn contacts<'a, T: Real>(
         let by_reduced = placed
             .filter(|_| form.reduced)
             .and_then(|placed| alg::reduced_relative_motion(&bound.reduced, &contact, placed, q, qd));
-        let motion = by_reduced.unwrap_or_else(|| alg::relative_motion(&bound.model, &contact, q, qd));
+        let mut motion = by_reduced.unwrap_or_else(|| alg::relative_motion(&bound.model, &contact, q, qd));
+        if let Some(g) = form.falls {
+            motion.acceleration = motion.acceleration.map(|x| (x + g) - g);
+        }
         let constrained = alg::functional_coordinates(&contact, &motion, &contact.constrained);
         let environment = item.environment.as_ref().map(|e| {
             let values = match &e.values {

@@ -158,18 +158,19 @@ fn checked(
 
 /// Over expressions every surface is there.
 fn traced_form(optimisations: Optimisations) -> Form<Expr> {
-    Form { reduced: optimisations.reduced, surface: SurfaceItem::traced }
+    Form { reduced: optimisations.reduced, surface: SurfaceItem::traced, falls: None }
 }
 
 /// The results of one function of a mode by the robot's own parameters, over any scalar, without a graph: `given` stands for the inputs of
-/// [`graph`] by name. `None` where a surface has a scalar of its own.
+/// [`graph`] by name. `None` where a surface has a scalar of its own. `prepare` may change the robot's numbers; what it returns is added to
+/// accelerations and taken away again.
 pub(crate) fn evaluate<T: Real>(
     robot: &Robot,
     options: &Options,
     mode: &Mode,
     function: ContactFunction,
     given: &dyn Fn(&Port) -> Vec<T>,
-    prepare: &dyn Fn(&mut Model<T>),
+    prepare: &dyn Fn(&mut Model<T>) -> Option<T>,
 ) -> Option<Vec<T>> {
     if mode.contacts.iter().any(|c| c.item.surface.over::<T>().is_none()) {
         return None;
@@ -177,9 +178,9 @@ pub(crate) fn evaluate<T: Real>(
     let base = base_function(function);
     let own: Vec<Vec<T>> = options.scene.ports(base, &robot.model).iter().map(given).collect();
     let mut bound = options.scene.bind(base, robot, &own);
-    prepare(&mut bound.model);
+    let falls = prepare(&mut bound.model);
     let added = added_ports(function, mode, &robot.model).into_iter().map(|p| (p.name.clone(), given(&p))).collect();
-    let form = Form { reduced: false, surface: |s: &SurfaceItem| s.over().expect("asked for above") };
+    let form = Form { reduced: false, surface: |s: &SurfaceItem| s.over().expect("asked for above"), falls };
     Some(equations::equations(robot, options, mode, function, form, &bound, &added).concat())
 }
 

@@ -71,7 +71,8 @@ pub fn module(
                 let by_residual = *function == ContactFunction::ForwardDynamics;
                 let bound = bound(robot, options, mode, *function, graph);
                 if let Ok(bound) = &bound {
-                    equivalence::of_bound(robot, options, function.name(), (graph, bound))?;
+                    let name = format!("{}::{}", mode.identifier, function.name());
+                    equivalence::of_bound(robot, options, &name, (graph, bound))?;
                 }
                 let bound = error_bound_text(bound, (function.name(), by_residual), graph, options, &mut functions);
                 kernel |= bound.calls_kernel();
