@@ -1,6 +1,10 @@
 //! Shafts that do not give way (T f = 0): (20.80) allows them, as E − H T F stays regular, and the complete model has none of their inertia.
 //! Against the second author, who solves the united system of chain and actuators as it is printed, in double-double.
 
+#[path = "support/chain.rs"]
+mod chain;
+
+use chain::{arm, LAST_LINK};
 use nalgebra::{DMatrix, DVector};
 use straightline_codegen::compile::optimised;
 use straightline_codegen::expr::evaluate;
@@ -9,37 +13,13 @@ use straightline_codegen::model::{load, ModelOptions};
 use straightline_codegen::verify::verify;
 use straightline_codegen::{compile, Function, Options, Source};
 use straightline_core::algorithms::{
-    bias_force, drive_states, driven_contact_motion, driven_jump, impact, mass_matrix, ContactRows,
-    FunctionalCoordinates, Struck, Support,
+    bias_force, drive_energy, drive_states, driven_contact_motion, driven_jump, impact, kinetic_energy, mass_matrix,
+    ContactRows, FunctionalCoordinates, Struck, Support,
 };
 use straightline_core::drive::Actuator;
 use straightline_core::model::Model;
 use straightline_core::reference::drives::{ActuatorModel, UnitedModel};
 use straightline_core::Dd;
-
-/// A chain of three joints about all axes; `last`: what the last link has.
-fn arm(last: &str, drives: &str) -> Source {
-    let link = |name: &str, inertial: &str| format!("[[link]]\nname = \"{name}\"\n{inertial}\n");
-    let joint = |name: &str, parent: &str, child: &str, rest: &str| {
-        format!(
-            "[[joint]]\nname = \"{name}\"\nkind = \"continuous\"\nparent = \"{parent}\"\nchild = \"{child}\"\n{rest}\n"
-        )
-    };
-    let text = [
-        "[robot]\nname = \"arm\"\n".to_string(),
-        link("base", ""),
-        link("a", "mass = 2.5\ncom = [0.1, 0.01, 0.2]\ninertia = [0.02, 0.021, 0.004]"),
-        link("b", "mass = 1.5\ncom = [0.03, 0.02, 0.1]\ninertia = [0.01, 0.011, 0.002]"),
-        link("c", last),
-        joint("one", "base", "a", "axis = \"y\""),
-        joint("two", "a", "b", "origin = { xyz = [0.1, -0.2, 0.4] }\naxis = [0.6, 0.0, 0.8]"),
-        joint("three", "b", "c", "origin = { xyz = [0.0, 0.1, 0.3] }\naxis = \"x\""),
-        drives.to_string(),
-    ];
-    Source::new("arm.toml", text.concat())
-}
-
-const BODY: &str = "mass = 0.7\ncom = [0.02, 0.05, 0.03]\ninertia = [0.003, 0.004, 0.002]";
 
 /// A motor; a shaft that does not give way, whose third state feels its load; an actuator with an inertia of its own. Connected directly.
 const DIRECT: &str = "
@@ -151,7 +131,7 @@ const EXACT: f64 = 1e-26;
 #[test]
 fn motion_and_torques_are_those_of_the_printed_equations() {
     // the last link without any inertia is driven by an actuator with an inertia of its own
-    for last in [BODY, ""] {
+    for last in [LAST_LINK, ""] {
         let robot = robot(&arm(last, DIRECT));
         let at = state(&robot.model);
         let (united, own) = united(&robot.model, &at);
@@ -195,7 +175,7 @@ fn a_massless_link_needs_no_inertia_where_its_shaft_does_not_give_way() {
 
 #[test]
 fn gears_losses_and_springs_behind_such_shafts_agree_with_the_second_author() {
-    let source = arm(BODY, GEARED);
+    let source = arm(LAST_LINK, GEARED);
     let functions = [DriveFunction::ForwardDynamics, DriveFunction::Torques].map(Function::Drive).to_vec();
     let options = Options { functions, ..Options::default() };
     let generated = compile(&source, &options).unwrap_or_else(|d| panic!("{d}"));
@@ -209,7 +189,7 @@ fn the_rows_of_the_complete_model_hold_and_the_inputs_follow_from_the_motion() {
     for drives in
         [DIRECT, &GEARED.replace("efficiency = 0.9", "").replace("efficiency = { forward = 0.8, backward = 0.7 }", "")]
     {
-        let robot = robot(&arm(BODY, drives));
+        let robot = robot(&arm(LAST_LINK, drives));
         let State([q, qd, x, u]) = state(&robot.model);
         let inputs = [("q", &q[..]), ("qd", &qd), ("x", &x), ("u", &u)];
         let motion = run(&robot, DriveFunction::ForwardDynamics, &inputs);
@@ -224,7 +204,7 @@ fn the_rows_of_the_complete_model_hold_and_the_inputs_follow_from_the_motion() {
         assert!(apart(&left, &right) < EXACT, "{drives}");
         assert_eq!(model[0][3..6].iter().filter(|h| **h != Dd::ZERO).count(), 1, "the row of its joint is its own");
     }
-    let robot = robot(&arm(BODY, &DIRECT.replace("inductance = 0.01, ", "")));
+    let robot = robot(&arm(LAST_LINK, &DIRECT.replace("inductance = 0.01, ", "")));
     let State([q, qd, x, u]) = state(&robot.model);
     let motion = run(&robot, DriveFunction::ForwardDynamics, &[("q", &q[..]), ("qd", &qd), ("x", &x), ("u", &u)]);
     let back =
@@ -242,7 +222,7 @@ fn rows(model: &Model<Dd>) -> FunctionalCoordinates<Dd> {
 
 #[test]
 fn such_shafts_hold_their_joints_against_contacts_and_impacts() {
-    let robot = robot(&arm(BODY, DIRECT));
+    let robot = robot(&arm(LAST_LINK, DIRECT));
     let model = &robot.model;
     let at = state(model);
     let (united, own) = united(model, &at);
@@ -281,4 +261,74 @@ fn such_shafts_hold_their_joints_against_contacts_and_impacts() {
     let [_, of_speed, third] = [jump[3], jump[4], jump[5]];
     assert_eq!(of_speed.to_f64(), 0.0);
     assert!(apart(&[third], &[Dd::from(0.3) * impulses[1]]) < EXACT, "{jump:?} {impulses:?}");
+}
+
+/// Kinetic energy of links and rotors, by the generic runtime.
+fn kinetic(model: &Model<Dd>, q: &[Dd], qd: &[Dd], x: &[Dd]) -> f64 {
+    (kinetic_energy(model, q, qd) + drive_energy(model, (q, qd, x))[0]).to_f64()
+}
+
+/// Rotors, gears before and behind springs, a rotor that turns in space, and joints that shafts hold in their motion.
+#[test]
+fn an_impact_loses_the_kinetic_energy_of_all_that_moves() {
+    let motors = "
+[[drive]]
+joint = \"one\"
+motor = { torque_constant = 0.8, resistance = 1.2, rotor_inertia = 1e-4 }
+stages = [{ ratio = 20.0, stiffness = 400.0, input_inertia = 1e-5 }, { ratio = 3.0, output_inertia = 2e-3 }]
+rotor = { link = \"a\", axis = [0.3, 0.1, 1.0] }
+[[drive]]
+name = \"both\"
+joints = { two = -12.0, three = 5.0 }
+motor = { torque_constant = 0.08, resistance = 1.2, rotor_inertia = 4e-4 }
+rotor = { link = \"b\", axis = [0.3, 0.7, 1.0] }
+[[drive]]
+joint = \"three\"
+motor = { torque_constant = 0.08, resistance = 1.2, rotor_inertia = 4e-4 }
+";
+    for (drives, holds) in [(GEARED, true), (motors, false)] {
+        let robot = robot(&arm(LAST_LINK, drives));
+        let model = &robot.model;
+        let State([q, qd, x, _]) = &state(model);
+        let h = mass_matrix(model, q);
+        let factor = straightline_core::algorithms::driven_factor(model, q, &h);
+        let rows = rows(model);
+        let rate = rows.jacobian.iter().map(|row| dot(row, qd)).collect();
+        let rows = FunctionalCoordinates { rate, ..rows };
+        // reactions that act along the rows, or are tilted by friction
+        let tilted = vec![wide(&[0.41, 0.85, -0.33]), wide(&[-0.7, 0.25, 0.48])];
+        let masses = [Struck::Mass { mass: Dd::from(0.4), velocity: Dd::from(-0.2) }, Struck::Rigid];
+        for (applied, struck) in [(None, [Struck::Rigid; 2]), (Some(&tilted[..]), [Struck::Rigid; 2]), (None, masses)] {
+            for restitution in [0.0, 0.3] {
+                let blow = impact(&factor, qd, &rows, applied, &struck, Dd::from(restitution), Dd::from(1e-30));
+                let directions = applied.unwrap_or(&rows.jacobian);
+                let held: Vec<Dd> = (0..3)
+                    .map(|i| {
+                        let inertial = (0..3).fold(Dd::ZERO, |sum, j| sum + h[3 * i + j] * blow.dqd[j]);
+                        inertial - directions[0][i] * blow.impulse[0] - directions[1][i] * blow.impulse[1]
+                    })
+                    .collect();
+                let sum = |a: &[Dd], b: &[Dd]| -> Vec<Dd> { a.iter().zip(b).map(|(a, b)| *a + *b).collect() };
+                let jump = driven_jump(model, q, &blow.dqd, &held);
+                let mut lost = kinetic(model, q, qd, x) - kinetic(model, q, &sum(qd, &blow.dqd), &sum(x, &jump));
+                for (struck, after) in struck.iter().zip(&blow.struck_velocity) {
+                    if let Struck::Mass { mass, velocity } = *struck {
+                        lost += (Dd::HALF * mass * (velocity * velocity - *after * *after)).to_f64();
+                    }
+                }
+                let said = blow.energy_loss.to_f64();
+                let size = kinetic(model, q, qd, x).max(lost.abs());
+                assert!((said - lost).abs() < 1e-14 * size, "restitution {restitution}: {said} for {lost} of {size}");
+                // the contact's own part is another where a shaft works
+                let mean = |row: &[Dd]| dot(row, qd) + Dd::HALF * dot(row, &blow.dqd);
+                let contact = directions.iter().zip(&blow.impulse).fold(Dd::ZERO, |sum, (row, i)| sum - *i * mean(row));
+                let is_rigid = struck.iter().all(|s| *s == Struck::Rigid);
+                assert!(!is_rigid || ((contact.to_f64() - lost).abs() > 1e-3 * size) == holds, "{contact:?} {lost}");
+            }
+        }
+    }
+}
+
+fn dot(a: &[Dd], b: &[Dd]) -> Dd {
+    a.iter().zip(b).fold(Dd::ZERO, |sum, (a, b)| sum + *a * *b)
 }

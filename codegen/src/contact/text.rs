@@ -267,7 +267,7 @@ fn documentation(
             "dqd" => "changes of the velocities \\[rad/s or m/s\\]",
             "impulse" => "impulses F Δt along s^c \\[N·s or N·m·s\\]",
             "dsd" => "changes of ṡ^c \\[m/s or 1/s\\]",
-            "energy_loss" => "kinetic energy lost by robot and struck masses \\[J\\]",
+            "energy_loss" => "kinetic energy lost by robot, rotors and struck masses \\[J\\]",
             "restitution" => "coefficient of restitution: 0 plastic, 1 elastic",
             "dq" => "correction by velocity coordinate \\[rad or m\\]",
             _ if suffix("_axes") => "tool axis and an axis across it, unit vectors in the frame",

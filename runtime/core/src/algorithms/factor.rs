@@ -21,6 +21,8 @@ pub struct Ltdl<T> {
     lower: Vec<Vec<T>>,
     /// 1 / D.
     inverse_pivots: Vec<T>,
+    /// Coordinates that do not move, each with its row of H.
+    held: Vec<(usize, Vec<T>)>,
 }
 
 impl<T: Real> Ltdl<T> {
@@ -73,12 +75,20 @@ impl<T: Real> Ltdl<T> {
                 lower[k][i] = factor;
             }
         }
-        Ltdl { coordinates, parents, lower, inverse_pivots }
+        let row = |i: usize| (i, mass_matrix[i * nv..(i + 1) * nv].to_vec());
+        let held = held.iter().map(|i| row(*i)).collect();
+        Ltdl { coordinates, parents, lower, inverse_pivots, held }
     }
 
     /// x with H x = `right`, nv numbers by velocity coordinate.
     pub fn solve(&self, right: &[T]) -> Vec<T> {
         self.finish(self.half(right))
+    }
+
+    /// (H x)_i of the coordinates i that do not move: what moves the others as x says puts on them.
+    pub(super) fn on_held<'a>(&'a self, x: &'a [T]) -> impl Iterator<Item = (usize, T)> + 'a {
+        let along = move |row: &[T]| row.iter().zip(x).fold(T::zero(), |sum, (h, x)| sum + *h * *x);
+        self.held.iter().map(move |(i, row)| (*i, along(row)))
     }
 
     /// y with Lᵀ y = `right`, by rows from the base outwards: bᵀ H⁻¹ c is y_bᵀ D⁻¹ y_c.

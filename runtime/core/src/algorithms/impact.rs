@@ -41,7 +41,8 @@ pub struct Impact<T> {
     pub dsd: Vec<T>,
     /// ṡ_e'' of the masses that are struck, by constrained coordinate \[m/s\]; of a rigid object zero.
     pub struck_velocity: Vec<T>,
-    /// Kinetic energy that robot and struck masses lose \[J\].
+    /// Kinetic energy that robot, rotors of its drives and struck masses lose \[J\]. Where a shaft does not give way, so that its joint goes on
+    /// through the impact, the shaft's work in it counts: negative, if it puts more into the robot than is lost.
     pub energy_loss: T,
     /// As of [`ConstrainedMotion`](super::ConstrainedMotion).
     pub pivot: T,
@@ -87,7 +88,7 @@ pub fn impact<T: Real>(
     let dsd = system.response_to(&impulse);
     let half = T::constant(Dd::HALF);
     let mean: Vec<T> = qd.iter().zip(&dqd).map(|(qd, d)| *qd + half * *d).collect();
-    // T' − T'' = −Σ I_i ĵ_i · (q̇' + q̇'')/2, and of a mass I (ṡ_e' + ṡ_e'')/2
+    // T' − T'' = −Δq̇ᵀ H (q̇' + q̇'')/2 = −Σ I_i ĵ_i · (q̇' + q̇'')/2, and of a mass I (ṡ_e' + ṡ_e'')/2
     let directions = applied.unwrap_or(&constrained.jacobian);
     let mut energy_loss = T::zero();
     let mut struck_velocity = Vec::with_capacity(struck.len());
@@ -103,6 +104,11 @@ pub fn impact<T: Real>(
             }
         });
         energy_loss = energy_loss - impulse[i] * of_both;
+    }
+    // what holds a joint i in its motion gives R = (H Δq̇ − Ĵᵀ I)_i, and does the work R q̇_i
+    for (i, inertial) in factor.on_held(&dqd) {
+        let pushed = directions.iter().zip(&impulse).fold(T::zero(), |sum, (row, force)| sum + row[i] * *force);
+        energy_loss = energy_loss - (inertial - pushed) * qd[i];
     }
     Impact { dqd, impulse, dsd, struck_velocity, energy_loss, pivot: system.pivot }
 }
