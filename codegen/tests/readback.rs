@@ -1,17 +1,22 @@
 //! Texts of all styles are read back as the programs that they were made of; a text with a word changed is not.
 
+#[path = "../../generated_tests/src/written/mod.rs"]
+#[allow(dead_code, unused_imports)] // other tests use the rest
+mod written;
+
 use std::fmt::Write;
 use std::ops::Range;
 use std::path::Path;
 use straightline_codegen::certify::Effort;
 use straightline_codegen::compile::{Generated, Options};
-use straightline_codegen::diagnostic::Diagnostics;
+use straightline_codegen::diagnostic::{Diagnostics, Severity};
 use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::limbs::LimbForm;
 use straightline_codegen::readback::{checked, complaint, Reader};
 use straightline_codegen::scene::{Budget, Interval, JointRanges, MaxError, Scene};
 use straightline_codegen::schedule::Limits;
 use straightline_codegen::{compile, scene, Function, Grade, Source};
+use written::{Shape, Style, Written};
 
 const ROBOTS: [&str; 13] = [
     "chapter_6r.toml",
@@ -95,6 +100,12 @@ fn random_robot(seed: u64, limbs: usize, joints: usize) -> Source {
     }
     text.push_str("</robot>");
     Source::new("random.urdf", text)
+}
+
+/// A robot with numbers as people and exporters write them.
+fn as_written(style: Style, seed: u64, joints: usize) -> Source {
+    let robot = Written::new(style, Shape::arm(joints), seed);
+    Source::new(robot.file_name(), robot.text())
 }
 
 fn options(functions: &[Function]) -> Options {
@@ -218,9 +229,59 @@ fn small_texts() -> Vec<(String, Generated)> {
     let contacts = generated(&robot, &contacts);
     assert!(contacts.text.contains("match mode {"), "there is no function for all modes");
     texts.push(("contacts".into(), contacts));
+    // constants with few digits, of 1e-6 and of 1e20
+    for (k, style) in
+        [Style::Digits(2), Style::Exported, Style::Round, Style::Tiny, Style::Ratios].into_iter().enumerate()
+    {
+        let robot = as_written(style, k as u64, 2);
+        texts.push((style.name(), generated(&robot, &options(&functions[k % 2..=k % 2]))));
+    }
     texts.push(("mixed precision".into(), in_mixed_precision(false)));
     texts.push(("mixed precision with bounds at a state".into(), in_mixed_precision(true)));
     texts
+}
+
+/// Reads back what people write, in as many ways of writing functions; how many were generated, and how many refused, as f32 cannot hold
+/// their numbers.
+fn read_back_as_written(seeds: u64, ways: usize) -> [usize; 2] {
+    let mut found = [0, 0];
+    let all = Style::all();
+    for seed in 0..seeds {
+        for (k, style) in all.iter().enumerate() {
+            for way in 0..ways {
+                // every style is written in every way in the end
+                let (name, of) = STYLES[(k + way + seed as usize * 5) % STYLES.len()];
+                let functions = [Function::InverseDynamics, Function::MassMatrix, Function::GravityForce];
+                let functions = &functions[(k + way) % 3..=(k + way) % 3];
+                let robot = as_written(*style, 700 + 100 * seed + k as u64, 2 + (k + seed as usize) % 2);
+                match compile(&robot, &of(options(functions))) {
+                    Ok(_) => found[0] += 1,
+                    Err(diagnostics) => {
+                        let is_of_scalar =
+                            |code: &str| ["number-beyond-scalar", "program-beyond-scalar"].contains(&code);
+                        let is_said = diagnostics.iter().all(|d| d.severity != Severity::Error || is_of_scalar(d.code));
+                        assert!(is_said, "{}, {name}: {}\n{}", style.name(), diagnostics.render(), robot.text());
+                        found[1] += 1;
+                    }
+                }
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn robots_as_people_write_them_are_read_back() {
+    let [read, refused] = read_back_as_written(1, 1);
+    assert!(read >= 18 && read + refused == Style::all().len(), "{read} and {refused}");
+}
+
+#[test]
+#[ignore = "minutes: every style of numbers in every style of text"]
+fn many_robots_as_people_write_them_are_read_back() {
+    let [read, refused] = read_back_as_written(5, STYLES.len());
+    println!("{read} texts, {refused} refused");
+    assert!(read > 20 * refused, "{read} and {refused}");
 }
 
 #[test]

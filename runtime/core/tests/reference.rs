@@ -15,7 +15,7 @@ use straightline_core::reference::{
 use straightline_core::Dd;
 use support::chapter::chapter_robot;
 use support::data::{inputs, numbers, reference_file};
-use support::robots::{random_position, random_robot, Random, RobotKind};
+use support::robots::{random_position, random_robot, written_robots, Random, RobotKind};
 
 const CHAPTER_ROBOTS: [&str; 4] = ["chapter_cylindrical", "chapter_stanford", "chapter_6r", "chapter_oblique"];
 
@@ -309,10 +309,10 @@ fn wrong_robots_do_not_pass() {
 
 // Laws of mechanics and closed forms: need no data.
 
-/// Ten random robots of every kind, with a random state.
+/// Ten random robots of every kind and one of every style of numbers as people write them, with a random state.
 fn random_states() -> impl Iterator<Item = (MassCentreTree<Dd>, [Vec<Dd>; 3])> {
     let kinds = [(false, false), (false, true), (true, false), (true, true)];
-    (0..40).map(move |seed| {
+    let oblique = (0..40).map(move |seed| {
         let (branched, floating) = kinds[seed % 4];
         let mut random = Random(seed as u64);
         let kind = RobotKind { links: 2 + random.below(7), branched, floating };
@@ -321,7 +321,14 @@ fn random_states() -> impl Iterator<Item = (MassCentreTree<Dd>, [Vec<Dd>; 3])> {
         let q = random_position(&mut random, &tree);
         let (qd, qdd) = (random.list(tree.nv(), 2.0), random.list(tree.nv(), 2.0));
         (tree, [q, qd, qdd])
-    })
+    });
+    let written = written_robots(1).enumerate().map(|(k, (_, tree))| {
+        let mut random = Random(400 + k as u64);
+        let q = random_position(&mut random, &tree);
+        let (qd, qdd) = (random.list(tree.nv(), 2.0), random.list(tree.nv(), 2.0));
+        (tree, [q, qd, qdd])
+    });
+    oblique.chain(written)
 }
 
 fn assert_close(what: &str, tree: &MassCentreTree<Dd>, a: &[Dd], b: &[Dd], tolerance: f64) {
@@ -414,19 +421,26 @@ fn every_link_is_in_equilibrium() {
                 force -= loads[k].force;
                 moment += -loads[k].moment + position[k].r_parent.cross(&loads[k].force);
             }
-            let close = |what: &str, a: Vector3<Dd>, b: Vector3<Dd>| {
-                assert_close(what, &tree, a.as_slice(), b.as_slice(), 1e-28);
+            // against the sum of the terms, as far as they are more than one
+            let norm = |v: &Vector3<Dd>| v.dot(v).sqrt().hi();
+            let turned = |r: &Vector3<Dd>, k: usize| norm(&loads[k].moment) + norm(r) * norm(&loads[k].force);
+            let carried = |f: &dyn Fn(usize) -> f64| above.iter().map(|k| f(*k)).sum::<f64>();
+            let forces = 1.0 + norm(&loads[j].force) + carried(&|k| norm(&loads[k].force));
+            let moments = 1.0 + turned(r_dash, j) + carried(&|k| turned(&position[k].r_parent, k));
+            let close = |what: &str, a: Vector3<Dd>, b: Vector3<Dd>, scale: f64| {
+                let error = norm(&(a - b)) / scale;
+                assert!(error <= 1e-28, "{what}: {error:e} of the scale, {}", tree.name);
             };
-            close("Newton's law", motion[j].w * link.mass, force);
+            close("Newton's law", motion[j].w * link.mass, force, forces);
             let omega = rotation.transpose() * motion[j].omega;
             let epsilon = rotation.transpose() * motion[j].epsilon;
             let inertial = link.inertia * epsilon + omega.cross(&(link.inertia * omega));
-            close("Euler's equations", inertial, rotation.transpose() * moment);
+            close("Euler's equations", inertial, rotation.transpose() * moment, moments);
             // reactions do no work: F_R ⟂ e (linear), M_R ⟂ e (revolute), with (20.19)
             let e = &position[j].e;
             match link.joint {
-                Joint::Linear => assert!(loads[j].reaction_force.dot(e).abs().hi() < 1e-27),
-                Joint::Revolute => assert!(loads[j].reaction_moment.dot(e).abs().hi() < 1e-27),
+                Joint::Linear => assert!(loads[j].reaction_force.dot(e).abs().hi() < 1e-28 * forces),
+                Joint::Revolute => assert!(loads[j].reaction_moment.dot(e).abs().hi() < 1e-28 * moments),
                 Joint::Free => assert_eq!(loads[j].reaction_force, Vector3::zeros()),
             }
         }

@@ -5,12 +5,14 @@ mod support;
 
 use nalgebra::{Matrix3, Vector3};
 use straightline_core::algorithms;
+use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion, Surface};
 use straightline_core::model::{self, Body, Frame, JointKind, Limits, Model};
-use straightline_core::reference::{self, unit, ExtendedPosition, Joint, MassCentreTree};
-use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
+use straightline_core::reference::{self, unit, Component, ContactFrames, ExtendedPosition, Joint, MassCentreTree};
+use straightline_core::spatial::{Mat3, MotionVector, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::Dd;
 use support::compare::{compare_authors, Disagreement};
-use support::robots::{random_robot, Random, RobotKind};
+use support::robots::{random_position, random_robot, written_robots, Random, RobotKind};
+use support::written::Style;
 
 fn vec3(v: &Vector3<Dd>) -> Vec3<Dd> {
     Vec3::new(v.x, v.y, v.z)
@@ -158,4 +160,132 @@ fn both_authors_agree_on_floating_chains() {
 #[test]
 fn both_authors_agree_on_floating_trees() {
     compare_robots(true, true, 60, 14);
+}
+
+/// Numbers as people and exporters write them: few digits, dust, masses of 1e-6 kg, ratios of 1e20, millimetres for metres.
+fn compare_written(seeds: u64) {
+    let mut disagreement = Disagreement::default();
+    for (k, (_, mut tree)) in written_robots(seeds).enumerate() {
+        let mut random = Random(k as u64);
+        if k % 3 == 0 {
+            shuffle_coordinates(&mut random, &mut tree);
+        }
+        let model = canonical(&mut random, &tree);
+        compare_authors(&mut disagreement, &tree.name, &tree, &model, &mut random);
+    }
+    disagreement.judge();
+}
+
+#[test]
+fn both_authors_agree_on_robots_as_people_write_them() {
+    compare_written(4);
+}
+
+#[test]
+#[ignore = "a minute: thousands of them"]
+fn both_authors_agree_on_thousands_of_robots_as_people_write_them() {
+    compare_written(100);
+}
+
+fn dot(a: &[Dd], b: &[Dd]) -> Dd {
+    a.iter().zip(b).fold(Dd::ZERO, |sum, (a, b)| sum + *a * *b)
+}
+
+/// A tip that meets an object on the way: coordinates, reactions and what an impact loses. Motions are judged by what they leave of the
+/// second author's equations, as ratios of masses of 1e20 leave no digits to accelerations themselves.
+#[test]
+fn contacts_of_robots_as_people_write_them_fit_the_equations_of_the_second_author() {
+    let mut compared = 0;
+    for (k, (style, tree)) in written_robots(4).enumerate() {
+        let mut random = Random(900 + k as u64);
+        let model = canonical(&mut random, &tree);
+        let tip = model.frames.last().expect("a frame on every link");
+        let (q, n) = (random_position(&mut random, &tree), tree.nv());
+        let (qd, tau) = (random.list(n, 2.0), random.list(n, 10.0));
+        // an object that moves with a velocity and an acceleration
+        let [origin, v, w, vd, wd] = [0; 5].map(|_| random.vector());
+        let (object, axes) = (random.rotation(), random.rotation());
+        let axis = |k: usize| axes.column(k).into_owned();
+        let contact = Contact {
+            name: "touch".into(),
+            frame: tip.clone(),
+            axis: vec3(&axis(0)),
+            second_axis: vec3(&axis(1)),
+            object: Object::Moving(ObjectMotion {
+                pose: Transform { rotation: mat3(&object), translation: vec3(&origin) },
+                velocity: MotionVector { angular: vec3(&w), linear: vec3(&v) },
+                acceleration: MotionVector { angular: vec3(&wd), linear: vec3(&vd) },
+            }),
+            surface: Surface::Plane,
+            constrained: vec![Coordinate::Pz],
+            free: vec![],
+            friction: None,
+        };
+        let frame = tree.frames.last().expect("a frame on every link").clone();
+        let frames =
+            ContactFrames { frame, axes: [axis(0), axis(1)], origin, object, motion: [v, w, vd, wd], radius: Dd::ONE };
+        let expected = reference::functional_coordinate(&tree, &frames, &q, &qd, Component::Position(2));
+        let found = algorithms::constrained_coordinates(&model, &contact, &q, &qd);
+        let lengths = tree.links.iter().map(|l| l.r.dot(&l.r).sqrt().hi() + l.r_parent.dot(&l.r_parent).sqrt().hi());
+        let size = lengths.sum::<f64>() + 10.0;
+        let speed = 1.0 + qd.iter().map(|x| x.abs().hi()).sum::<f64>();
+        let row: Vec<Dd> = expected.jacobian.iter().copied().collect();
+        let errors = [
+            (found.value[0] - expected.s).abs().hi() / size,
+            (found.rate[0] - expected.sd).abs().hi() / (size * speed),
+            (found.bias[0] - expected.adjoint).abs().hi() / (size * speed * speed),
+            found.jacobian[0].iter().zip(&row).fold(0.0, |m: f64, (a, b)| m.max((*a - *b).abs().hi())) / size,
+        ];
+        assert!(errors.iter().all(|e| *e < 1e-28), "s, ṡ, A, J differ by {errors:?}: {}", tree.name);
+        if row.iter().all(|x| x.abs().hi() < 1e-3 * size) {
+            continue; // hardly any joint moves the tip across
+        }
+        compared += 1;
+        let (h, bias) = (reference::mass_matrix(&tree, &q), reference::bias_force(&tree, &q, &qd));
+        let factor = algorithms::Ltdl::factor(&model, &algorithms::mass_matrix(&model, &q));
+        let ridge = Dd::from(1e-16);
+        let drive: Vec<Dd> = tau.iter().zip(algorithms::bias_force(&model, &q, &qd)).map(|(t, h)| *t - h).collect();
+        let supports = [algorithms::Support::Rigid(Dd::ZERO)];
+        let motion = algorithms::constrained_forward_dynamics(&factor, &drive, &found, None, &supports, ridge);
+        // H q̈ + h − τ − Jᵀ F and J q̈ + A, each against the sum of its terms
+        for i in 0..n {
+            let terms: Vec<Dd> = (0..n)
+                .map(|j| h[(i, j)] * motion.qdd[j])
+                .chain([bias[i], -tau[i], -row[i] * motion.force[0]])
+                .collect();
+            let (left, sizes) = terms.iter().fold((Dd::ZERO, 0.0), |(sum, m), x| (sum + *x, m + x.abs().hi()));
+            assert!(left.abs().hi() <= 1e-24 * sizes, "joint {i}: {left:?} of {sizes:e}: {}", tree.name);
+        }
+        let terms: f64 = row.iter().zip(&motion.qdd).map(|(j, x)| (*j * *x).abs().hi()).sum();
+        let left = (dot(&row, &motion.qdd) + expected.adjoint).abs().hi();
+        // beside ratios of 1e40 the ridge is seen, and what it leaves is said
+        let said = motion.violation[0].abs().hi();
+        let scale = terms + expected.adjoint.abs().hi();
+        assert!(left <= 1e-24 * scale + 1.01 * said, "J q̈ + A: {left:e} of {scale:e}, {said:e} is said: {}", tree.name);
+        let is_ratio = style == Style::Ratios;
+        assert!(is_ratio || said <= 1e-24 * scale, "{said:e} of {scale:e} is said: {}", tree.name);
+        // what a fixed object takes out of it is the loss of kinetic energy
+        let still = Contact {
+            object: Object::Fixed(Transform { rotation: mat3(&object), translation: vec3(&origin) }),
+            ..contact
+        };
+        let s = algorithms::constrained_coordinates(&model, &still, &q, &qd);
+        for restitution in [0.0, 0.5] {
+            let struck = [algorithms::Struck::Rigid];
+            let blow = algorithms::impact(&factor, &qd, &s, None, &struck, Dd::from(restitution), ridge);
+            let after: Vec<Dd> = qd.iter().zip(&blow.dqd).map(|(a, b)| *a + *b).collect();
+            let energy = |qd: &[Dd]| reference::kinetic_energy(&tree, &q, qd);
+            let (before, now) = (energy(&qd), energy(&after));
+            let off = (before - now - blow.energy_loss).abs().hi();
+            assert!(
+                off <= 1e-24 * (before.hi() + now.hi()),
+                "lost {:?}, off by {off:e}: {}",
+                blow.energy_loss,
+                tree.name
+            );
+            let turned = (s.rate[0] + blow.dsd[0] + Dd::from(restitution) * s.rate[0]).abs().hi();
+            assert!(is_ratio || turned <= 1e-24 * size * speed, "ṡ'' = −e ṡ' is off by {turned:e}: {}", tree.name);
+        }
+    }
+    assert!(compared > 50, "{compared} contacts");
 }

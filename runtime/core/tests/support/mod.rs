@@ -4,3 +4,7 @@ pub mod chapter;
 pub mod compare;
 pub mod data;
 pub mod robots;
+
+#[path = "../../../../generated_tests/src/written/mod.rs"]
+#[allow(dead_code, unused_imports)] // other tests use the rest
+pub mod written;

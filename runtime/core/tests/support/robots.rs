@@ -1,6 +1,7 @@
 //! Random robots and states.
 #![allow(dead_code)] // every test file uses a part of it
 
+use super::written::{Motion, Shape, Style, Written};
 use nalgebra::{Matrix3, Vector3};
 use straightline_core::reference::{unit, ExtendedPosition, Joint, MassCentreFrame, MassCentreLink, MassCentreTree};
 use straightline_core::Dd;
@@ -165,4 +166,76 @@ pub fn random_position(random: &mut Random, tree: &MassCentreTree<Dd>) -> Vec<Dd
         q[i..i + 4].iter_mut().for_each(|x| *x /= norm);
     }
     q
+}
+
+/// A robot as people and exporters write it, its numbers taken literally, without links that are welded on. One frame on every link.
+///
+/// # Panics
+/// If a link is welded on, or a link that moves says nothing of its mass.
+pub fn written_robot(written: &Written, name: String) -> MassCentreTree<Dd> {
+    let vector = |x: [f64; 3]| Vector3::from(x.map(Dd::from));
+    let tensor = |[xx, yy, zz, xy, xz, yz]: [f64; 6]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz).map(Dd::from);
+    // link 0 of a fixed base is the world
+    let first = usize::from(!written.floating);
+    let of = |i: usize| written.links[i].inertial.as_ref().expect("links that move have a mass");
+    let links = written.links.iter().enumerate().skip(first).map(|(i, link)| {
+        let (name, inertial) = (format!("l{i}"), of(i));
+        let turned = rpy_matrix(inertial.rpy);
+        let (mass, com) = (Dd::from(inertial.mass), vector(inertial.com));
+        let inertia = turned * tensor(inertial.inertia) * turned.transpose();
+        if i == 0 {
+            return MassCentreLink::free(name, mass, inertia, com);
+        }
+        assert_ne!(link.motion, Motion::Fixed, "nothing is welded");
+        let parent = link.parent.checked_sub(first);
+        let (e, extended) = (unit(&vector(link.axis)), rpy_matrix(link.rpy));
+        let carried = parent.map_or(Vector3::zeros(), |_| vector(of(link.parent).com));
+        MassCentreLink {
+            name,
+            parent,
+            joint: if link.motion == Motion::Prismatic { Joint::Linear } else { Joint::Revolute },
+            iq: 0,
+            iv: 0,
+            mass,
+            inertia,
+            e,
+            e_parent: extended * e,
+            r: com,
+            r_parent: carried - vector(link.xyz),
+            extended: ExtendedPosition::Matrix(extended),
+        }
+    });
+    let links: Vec<MassCentreLink<Dd>> = links.collect();
+    let frame = |(j, link): (usize, &MassCentreLink<Dd>)| MassCentreFrame {
+        name: format!("frame{j}"),
+        link: Some(j),
+        position: -link.r,
+        rotation: Matrix3::identity(),
+    };
+    let frames = links.iter().enumerate().map(frame).collect();
+    let mut tree = MassCentreTree { name, gravity: vector([0.0, 0.0, -9.81]), links, frames };
+    tree.number_coordinates();
+    tree
+}
+
+/// Robots in every style of numbers, `seeds` of each: chains and trees with up to seven joints, some of which slide, some afloat.
+pub fn written_robots(seeds: u64) -> impl Iterator<Item = (Style, MassCentreTree<Dd>)> {
+    let of = |seed: u64, k: usize, style: Style| {
+        let (branched, floating) = ((k + seed as usize) % 3 == 0, (k + seed as usize) % 5 == 0);
+        let joints = 1 + (k * 3 + seed as usize) % 7;
+        let shape = Shape { joints, fixed: 0, branched, floating, sliding: 4 };
+        let written = Written::new(style, shape, 40 + 100 * seed + k as u64);
+        (style, written_robot(&written, format!("{}, seed {seed}\n{}", style.name(), written.text())))
+    };
+    (0..seeds).flat_map(move |seed| Style::all().into_iter().enumerate().map(move |(k, style)| of(seed, k, style)))
+}
+
+/// R = Rz(yaw) Ry(pitch) Rx(roll).
+fn rpy_matrix(rpy: [f64; 3]) -> Matrix3<Dd> {
+    let [(sr, cr), (sp, cp), (sy, cy)] = rpy.map(|a| Dd::from(a).sin_cos());
+    let (o, i) = (Dd::ZERO, Dd::ONE);
+    let x = Matrix3::new(i, o, o, o, cr, -sr, o, sr, cr);
+    let y = Matrix3::new(cp, o, sp, o, i, o, -sp, o, cp);
+    let z = Matrix3::new(cy, -sy, o, sy, cy, o, o, o, i);
+    z * y * x
 }
