@@ -406,10 +406,10 @@ impl Diagnostics {
         self.list.iter().any(|d| d.severity == Severity::Error)
     }
 
-    /// The complaints of that severity or worse.
+    /// The complaints of that severity or worse, and those that are always said.
     #[must_use]
     pub fn at_least(&self, severity: Severity) -> Diagnostics {
-        let list = self.list.iter().filter(|d| d.severity <= severity).cloned().collect();
+        let list = self.list.iter().filter(|d| d.severity <= severity || codes::is_firm(d.code)).cloned().collect();
         Diagnostics { list, ..self.clone() }
     }
 

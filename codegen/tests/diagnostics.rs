@@ -3,8 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use straightline_codegen::diagnostic::{codes, Diagnostics, Front, Levels, Reporting, Severity, Source};
+use straightline_codegen::diagnostic::{codes, Diagnostics, Front, Level, Levels, Reporting, Severity, Source};
+use straightline_codegen::equivalence::{Disagreement, Plainer};
 use straightline_codegen::expansion::expand;
+use straightline_codegen::model::{load, ModelOptions};
 use straightline_codegen::{compile, Builder, Function, Options};
 
 /// An arm of which two angles have six digits, and one eleven.
@@ -151,10 +153,48 @@ fn codes_are_explained_and_functions_found() {
     assert!(Function::known().all(|f| out.contains(f.name())), "{out}");
 }
 
+/// That a plainer form had to be taken is a failure of ours, which nothing silences.
+#[test]
+fn a_plainer_form_is_always_said() {
+    let source = Source::new("arm.toml", cut_angles());
+    let model = load(&source, &ModelOptions::default()).0.unwrap();
+    let disagreement =
+        Disagreement { program: "mass_matrix".into(), result: "h[0]".into(), difference: 0.1, plain: None };
+    let warning = || Plainer { disagreement: disagreement.clone(), without: "reduced forms" }.warning(&model);
+    let said = |level: Option<Level>| {
+        let mut levels = Levels::default();
+        level.into_iter().for_each(|level| levels.set("warnings", level));
+        let mut diagnostics = Diagnostics::reporting(&Reporting { levels, front: Front::Builder });
+        diagnostics.push(warning());
+        // as `-q` says it
+        let shown = diagnostics.at_least(Severity::Error);
+        assert_eq!(shown.len(), 1);
+        let found: Vec<_> = shown.iter().map(|d| (d.code, d.severity)).collect();
+        found[0]
+    };
+    for level in [None, Some(Level::Allow), Some(Level::Warn)] {
+        assert_eq!(said(level), ("plainer-form", Severity::Warning));
+    }
+    assert_eq!(said(Some(Level::Deny)), ("plainer-form", Severity::Error));
+
+    let here = scratch("firm");
+    let with = |more: &[&str]| straightline(&here, &[&GRAVITY[..], more].concat());
+    let refused = "`plainer-form` is always said: it cannot be set to `allow`";
+    let (code, out, said) = with(&["--allow", "plainer-form"]);
+    assert!(code != 0 && out.is_empty() && said.contains(refused), "{said}");
+    fs::write(here.join("calm.toml"), "[diagnostics]\nallow = [\"plainer-form\"]\n").unwrap();
+    let (code, _, said) = with(&["--scene", "calm.toml"]);
+    assert!(code == 1 && said.contains(refused) && said.contains("calm.toml:2:10"), "{said}");
+    assert_eq!(with(&["--deny", "plainer-form"]).0, 0, "the arm needs no plainer form");
+    let builder = || Builder::new(here.join("arm.toml")).functions([Function::GravityForce]).out_dir(&here);
+    assert!(builder().allow("plainer-form").build().is_err());
+    assert!(builder().deny("plainer-form").build().is_ok());
+}
+
 #[test]
 fn a_level_of_an_unknown_code_is_an_error_of_the_library_too() {
     let mut levels = Levels::default();
-    levels.set("nonsense", straightline_codegen::diagnostic::Level::Allow);
+    levels.set("nonsense", Level::Allow);
     let diagnostics = Diagnostics::reporting(&Reporting { levels, front: Front::Builder });
     assert_eq!(diagnostics.count(Severity::Error), 1);
 }

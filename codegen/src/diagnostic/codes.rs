@@ -11,11 +11,18 @@ pub struct Code {
     pub severity: Severity,
     /// What it is about, in a sentence.
     pub sentence: &'static str,
+    /// Whether it is said whatever the levels are: it is no matter of the robot, but says that this program has failed.
+    pub is_firm: bool,
 }
 
 /// The code of that name.
 pub fn find(code: &str) -> Option<&'static Code> {
     ALL.iter().find(|c| c.code == code)
+}
+
+/// Whether a complaint of that code is said whatever the levels are.
+pub fn is_firm(code: &str) -> bool {
+    find(code).is_some_and(|c| c.is_firm)
 }
 
 /// All of them, in the order of the alphabet.
@@ -80,6 +87,7 @@ pub const ALL: &[Code] = &[
     code("joint-order-unknown", Error, "A joint order with a name that no joint has."),
     code("left-open", Error, "What a scene leaves to the caller, and an experiment must say."),
     code("level-of-error", Error, "A level for a complaint that is an error whatever is said."),
+    code("level-of-firm", Error, "A level that silences what is always said."),
     code("limbs-exact", Error, "Identical limbs as lanes where rules keep every bit."),
     code("limits-missing", Warning, "A revolute or prismatic joint without limits."),
     code("limits-reversed", Warning, "Lower limit above the upper one."),
@@ -136,7 +144,7 @@ pub const ALL: &[Code] = &[
     code("parameter-on-world", Error, "A parameter of what does not move."),
     code("payload-name-twice", Error, "A name for two payloads."),
     code("payload-on-world", Warning, "A payload that moves with nothing."),
-    code("plainer-form", Warning, "A program that did not agree with the plain one, for which a plainer form was taken."),
+    firm("plainer-form", Warning, "A program that did not agree with the plain one, for which a plainer form was taken."),
     code("point-mass", Warning, "Mass without inertia."),
     code("program-beyond-scalar", Error, "A constant of the generated code that the scalar type cannot hold."),
     code("range-alone", Error, "A range of what is no input."),
@@ -184,7 +192,11 @@ pub const ALL: &[Code] = &[
 ];
 
 const fn code(code: &'static str, severity: Severity, sentence: &'static str) -> Code {
-    Code { code, severity, sentence }
+    Code { code, severity, sentence, is_firm: false }
+}
+
+const fn firm(code: &'static str, severity: Severity, sentence: &'static str) -> Code {
+    Code { code, severity, sentence, is_firm: true }
 }
 
 #[cfg(test)]

@@ -67,6 +67,7 @@ impl Levels {
             _ if code == ALL_WARNINGS => None,
             None => Some(say::unknown_code(code)),
             Some(c) if c.severity == Severity::Error && level != Level::Deny => Some(say::level_of_error(level, code)),
+            Some(c) if c.is_firm && level == Level::Allow => Some(say::level_of_firm(code)),
             Some(_) => None,
         }
     }
@@ -84,6 +85,7 @@ impl Levels {
             return Some(diagnostic);
         }
         match self.of(diagnostic.code) {
+            Some(Level::Allow) if codes::is_firm(diagnostic.code) => Some(diagnostic),
             Some(Level::Allow) => None,
             Some(Level::Deny) => {
                 diagnostic.severity = Severity::Error;

@@ -25,3 +25,10 @@ pub fn level_of_error(level: Level, code: &str) -> D {
         .detail("levels are for warnings, where something could be assumed")
         .help("mend what it complains about")
 }
+
+/// A level that silences what has to be said.
+pub fn level_of_firm(code: &str) -> D {
+    D::error("level-of-firm", format!("`{code}` is always said: it cannot be set to `allow`"))
+        .detail("it says that a program of ours has failed, and which one was taken in its place")
+        .help("leave the level out, or set it to `deny`, and report the robot file")
+}

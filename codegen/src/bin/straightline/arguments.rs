@@ -134,6 +134,8 @@ Warnings have levels: --allow CODE, --warn CODE and --deny CODE on the command l
   [diagnostics]
   allow = [\"CODE\"]
 
+Of these plainer-form says that an optimisation of Straightline failed: it is always said, and can only be denied.
+
 Examples:
   straightline explain
   straightline explain near-right-angle")]

@@ -109,7 +109,7 @@ pub fn diagnostics(all: &Diagnostics, least: Severity) {
 /// Codes, how bad each is, and what it is about.
 pub fn codes(codes: &[Code]) -> io::Result<()> {
     let mut out = stdout().lock();
-    for Code { code, severity, sentence } in codes {
+    for Code { code, severity, sentence, .. } in codes {
         writeln!(out, "{code:<26}{:<9}{sentence}", severity.to_string())?;
     }
     Ok(())
