@@ -563,7 +563,10 @@ struct Prepared {
 /// Reads and checks everything.
 fn prepare(source: &Source, options: &Options) -> Result<Prepared, Diagnostics> {
     let mut diagnostics = Diagnostics::reporting(&options.reporting);
-    let description = description::read(source, &mut diagnostics);
+    let (mut description, mut options) = (description::read(source, &mut diagnostics), options.clone());
+    for drives in description.iter_mut().map(|d| &mut d.drives).chain([&mut options.scene.drives]) {
+        range::leave_out_lost_limits(drives, &options.scene.parameters, options.scalar);
+    }
     let options = &options.knowing_drives(description.as_ref().map_or(&[], |d| &d.drives));
     let build = |d: &Description| model::build(d, &options.scene.model_options(&options.model), &mut diagnostics);
     let whole = description.as_ref().and_then(build);

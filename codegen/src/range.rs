@@ -5,6 +5,7 @@
 //! do its values stay in range where the exact ones do, at some states near rest? What no limit, however large, has to do with:
 //! limits beyond the range say "no limit" and are written so. A length that vanishes is dust, and vanishes.
 
+use crate::description::drives::Drive;
 use crate::description::{Description, JointDrive, Notation};
 use crate::diagnostic::{Diagnostic, Diagnostics, Place};
 use crate::emit::Scalar;
@@ -24,8 +25,8 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
     if scalar == Scalar::F64 {
         return;
     }
-    let mut complain = |place: &Place, what: String, value: f64, is_mass: bool| {
-        unheld(&what, value, is_mass).into_iter().for_each(|complaint| diagnostics.push(complaint.at(place)));
+    let mut complain = |place: &Place, what: String, value: f64, is_needed: bool| {
+        unheld(&what, value, is_needed).into_iter().for_each(|complaint| diagnostics.push(complaint.at(place)));
     };
     let drive = |name: &str, drive: &JointDrive, complain: &mut dyn FnMut(&Place, String, f64)| {
         for (what, value) in [
@@ -81,9 +82,13 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
             }
         }
     }
+    for number in description.drives.iter().chain(&scene.drives).flat_map(|drive| &drive.written.0) {
+        complain(&number.place, number.what.clone(), number.value, number.is_needed);
+    }
     for (i, parameter) in scene.parameters.iter().enumerate() {
         let Parameter::Drive { drive, numbers, form: Some(form), .. } = parameter else { continue };
-        for number in form.numbers().iter().filter(|number| numbers.contains(&number.name)) {
+        // the others stand in the file
+        for number in form.numbers().iter().filter(|number| number.is_limit() && numbers.contains(&number.name)) {
             if let Some(complaint) = unheld(&format!("{} of drive `{drive}`", number.name), number.value, false) {
                 scene.places.complain(&format!("parameter.{i}.numbers"), complaint, diagnostics);
             }
@@ -102,9 +107,27 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
     }
 }
 
-/// What is wrong with a number in f32: it is too great, or it is a mass and vanishes.
-fn unheld(what: &str, value: f64, is_mass: bool) -> Option<Diagnostic> {
-    let is_lost = is_mass && value != 0.0 && value.abs() < f64::from(f32::MIN_POSITIVE);
+/// Takes limits of drives that the scalar cannot hold for what they are there: none. Those that a parameter makes free stay, to be complained
+/// about.
+pub fn leave_out_lost_limits(drives: &mut [Drive], parameters: &[Parameter], scalar: Scalar) {
+    if scalar == Scalar::F64 {
+        return;
+    }
+    for drive in drives {
+        let name = &drive.name.value;
+        let is_free = |number: &str| {
+            let frees = |p: &Parameter| matches!(p, Parameter::Drive { drive, numbers, .. } if drive == name && numbers.iter().any(|n| n == number));
+            parameters.iter().any(frees)
+        };
+        let (input, current) = (is_free("input_limit"), is_free("current_limit"));
+        drive.input_limit = drive.input_limit.filter(|x| input || (*x as f32).is_finite());
+        drive.current_limit = drive.current_limit.filter(|x| current || (*x as f32).is_finite());
+    }
+}
+
+/// What is wrong with a number in f32: it is too great, or it vanishes where it must not: a mass, a ratio, a resistance.
+fn unheld(what: &str, value: f64, is_needed: bool) -> Option<Diagnostic> {
+    let is_lost = is_needed && value != 0.0 && value.abs() < f64::from(f32::MIN_POSITIVE);
     let is_too_great = (value as f32).is_infinite();
     (is_lost || is_too_great).then(|| say::number_beyond_scalar(what, value, Scalar::F32.name(), is_too_great))
 }

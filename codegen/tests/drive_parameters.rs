@@ -1,38 +1,28 @@
 //! Numbers of drives as run-time parameters: functions that take them compute what the functions of a robot file do in which these numbers
 //! stand.
 
+#[path = "support/chain.rs"]
+mod chain;
+
 use std::path::Path;
 use std::process::Command;
 use straightline_codegen::compile::{optimised, parameter_program, Optimisations};
 use straightline_codegen::contact::{programs as contact_programs, Mode};
+use straightline_codegen::description::Description;
 use straightline_codegen::diagnostic::Diagnostics;
 use straightline_codegen::emit::Lanes;
+use straightline_codegen::experiment::parameter;
 use straightline_codegen::expr::{evaluate, Graph};
 use straightline_codegen::function::Robot;
+use straightline_codegen::scene::Parameter;
 use straightline_codegen::verify::verify;
-use straightline_codegen::{compile, model, scene, staged, Function, Generated, Options, Scalar, Source};
+use straightline_codegen::{
+    compile, model, scene, staged, Builder, Function, Generated, Grade, Options, Scalar, Source,
+};
 use straightline_core::{Dd, Real};
 
-/// A chain of three joints about all axes.
 fn arm(drives: &str) -> Source {
-    let link = |name: &str, inertial: &str| format!("[[link]]\nname = \"{name}\"\n{inertial}\n");
-    let joint = |name: &str, parent: &str, child: &str, rest: &str| {
-        format!(
-            "[[joint]]\nname = \"{name}\"\nkind = \"continuous\"\nparent = \"{parent}\"\nchild = \"{child}\"\n{rest}\n"
-        )
-    };
-    let text = [
-        "[robot]\nname = \"arm\"\n".to_string(),
-        link("base", ""),
-        link("a", "mass = 2.5\ncom = [0.1, 0.01, 0.2]\ninertia = [0.02, 0.021, 0.004]"),
-        link("b", "mass = 1.5\ncom = [0.03, 0.02, 0.1]\ninertia = [0.01, 0.011, 0.002]"),
-        link("c", "mass = 0.7\ncom = [0.02, 0.05, 0.03]\ninertia = [0.003, 0.004, 0.002]"),
-        joint("one", "base", "a", "axis = \"y\""),
-        joint("two", "a", "b", "origin = { xyz = [0.1, -0.2, 0.4] }\naxis = [0.6, 0.0, 0.8]"),
-        joint("three", "b", "c", "origin = { xyz = [0.0, 0.1, 0.3] }\naxis = \"x\""),
-        drives.to_string(),
-    ];
-    Source::new("arm.toml", text.concat())
+    chain::arm(chain::LAST_LINK, drives)
 }
 
 /// What a robot file says with these numbers in the places `$1`, `$2`, …
@@ -525,4 +515,317 @@ fn numbers_of_what_does_not_move_are_an_error() {
 fn functions_without_drives_take_nothing() {
     let free = InScene::new(&arm(&with(RIGID.drives, RIGID.numbers)), &options(RIGID.parameters));
     assert!(free.graph(Function::InverseDynamics).inputs.iter().all(|p| p.wrapper.is_none()));
+}
+
+fn succeeds(command: &mut Command) -> String {
+    let output = command.output().expect("the program is there");
+    assert!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// The lines of a program that make each parameter of these numbers, and its name and length.
+fn in_c(robot: &InScene, numbers: &[f64]) -> (String, Vec<(String, usize)>) {
+    let (mut rest, mut lines, mut all) = (numbers, String::new(), Vec::new());
+    for parameter in &robot.options.scene.parameters {
+        let constructor = parameter_program(&robot.robot, parameter, &robot.options);
+        let (own, others) = rest.split_at(constructor.inputs[0].len());
+        rest = others;
+        let (name, length) = (parameter.input_name(), constructor.outputs[0].len());
+        let own: Vec<String> = own.iter().map(|x| format!("{x:?}")).collect();
+        lines.push_str(&format!("    double {name}[{length}] = {{0}};\n"));
+        lines.push_str(&format!("    if (arm_{name}_new({}, {name}) != 0) return 1;\n", own.join(", ")));
+        all.push((name, length));
+    }
+    (lines, all)
+}
+
+#[test]
+fn c_makes_a_drive_of_its_numbers_and_is_told_which_of_them_cannot_be() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("drive_parameters_in_c");
+    std::fs::create_dir_all(&folder).expect("a folder for programs");
+    let functions = ["driven_forward_dynamics", "drive_torques", "drive_energy"];
+    let names = functions.map(|name| format!("\"{name}\"")).join(", ");
+    let text = format!("[outputs]\nfunctions = [{names}]\n{}", RIGID.parameters);
+    let (robot, scene, package) = (folder.join("arm.toml"), folder.join("scene.toml"), folder.join("package"));
+    std::fs::write(&robot, arm(&with(RIGID.drives, RIGID.numbers)).text()).expect("it can be written");
+    std::fs::write(&scene, text).expect("it can be written");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_straightline"));
+    succeeds(command.arg("export").arg(&robot).args(["--c-abi", "--scene"]).arg(&scene).arg("-o").arg(&package));
+    let header = std::fs::read_to_string(package.join("include/arm_dynamics.h")).expect("there is a header");
+    for part in [
+        "ratio: speed of the shaft over speed of the joint",
+        "rotor_inertia: J of the motor about its axis [kg·m²]; 1e-5 in the robot file",
+        "Returns 0, or which of the numbers no drive has, counted from 1, or 10 where",
+        "int arm_one_new(double ratio, double rotor_inertia, double resistance, double torque_constant, double motor_friction, ",
+        "int arm_middle_new(double torque_constant, double inductance, double stage_2_ratio, ",
+        "const double middle[",
+    ] {
+        assert!(header.contains(part), "`{part}` is not in\n{header}");
+    }
+    if Command::new("cc").arg("--version").output().is_err() {
+        eprintln!("skipped: there is no C compiler");
+        return;
+    }
+    let built = package.join("target");
+    succeeds(
+        Command::new(env!("CARGO"))
+            .args(["build", "--offline", "--manifest-path"])
+            .arg(package.join("Cargo.toml"))
+            .env("CARGO_TARGET_DIR", &built)
+            .env("RUSTFLAGS", "-Dwarnings"),
+    );
+    let free = InScene::new(&arm(&with(RIGID.drives, RIGID.numbers)), &options(RIGID.parameters));
+    let fixed = InScene::new(&arm(&with(RIGID.drives, RIGID.others)), &options(""));
+    let (makes, parameters) = in_c(&free, RIGID.others);
+    let (mut arrays, mut calls, mut truth) = (Vec::new(), String::new(), Vec::new());
+    for name in functions {
+        let graph = free.graph(only(name)[0]);
+        let arguments: Vec<&str> = graph.inputs.iter().map(|port| port.name.as_str()).collect();
+        for port in graph.inputs.iter().filter(|port| !parameters.iter().any(|(name, _)| *name == port.name)) {
+            let numbers: Vec<String> = input(&port.name, port.len()).iter().map(|x| format!("{x:?}")).collect();
+            let array = format!("    static const double {}[] = {{{}}};\n", port.name, numbers.join(", "));
+            if !arrays.contains(&array) {
+                arrays.push(array);
+            }
+        }
+        let outputs: Vec<String> = (0..graph.outputs.len()).map(|k| format!("{name}_{k}")).collect();
+        for (output, port) in outputs.iter().zip(&graph.outputs) {
+            calls.push_str(&format!("    double {output}[{}];\n", port.len()));
+        }
+        calls.push_str(&format!("    arm_{name}({}, {});\n", arguments.join(", "), outputs.join(", ")));
+        for (output, port) in outputs.iter().zip(&graph.outputs) {
+            calls.push_str(&format!("    show({output}, {});\n", port.len()));
+        }
+        truth.push(run::<Dd>(&fixed.graph(only(name)[0]), &[]));
+    }
+    let nominal: Vec<String> = RIGID.numbers[10..15].iter().map(|x| format!("{x:?}")).collect();
+    let program = format!(
+        r#"#include "arm_dynamics.h"
+#include <stdio.h>
+static void show(const double *x, int n) {{
+    for (int k = 0; k < n; k++) printf("%.17g\n", x[k]);
+}}
+int main(void) {{
+{makes}    double before = middle[0];
+    if (arm_middle_new(-0.06, {numbers}, middle) != 1) return 2;
+    if (arm_middle_new(0.06, 5e-4, 0.0, 3e-6, 7e-6, 0.9, middle) != 3) return 3;
+    if (arm_middle_new(0.06, 5e-4, 40.0, 3e-6, 7e-6, 1.1, middle) != 6) return 4;
+    if (arm_middle_new(0.0 / 0.0, {numbers}, middle) != 1) return 5;
+    if (arm_middle_new(0.06, 5e-4, 1e-200, 3e-6, 7e-6, 0.9, middle) != 7) return 6;
+    if (middle[0] != before) return 7;
+{arrays}{calls}    return 0;
+}}
+"#,
+        numbers = nominal.join(", "),
+        arrays = arrays.concat(),
+    );
+    std::fs::write(folder.join("main.c"), program).expect("it can be written");
+    succeeds(
+        Command::new("cc")
+            .args(["-Wall", "-Wextra", "-Werror", "-pedantic", "-std=c99"])
+            .arg(folder.join("main.c"))
+            .arg("-I")
+            .arg(package.join("include"))
+            .arg(built.join("debug/libarm_dynamics.a"))
+            .args(["-lm", "-lpthread", "-ldl", "-o"])
+            .arg(folder.join("main")),
+    );
+    let printed = succeeds(&mut Command::new(folder.join("main")));
+    let mut found = printed.lines().map(|line| Dd::from(line.parse::<f64>().expect("a number")));
+    for (name, truth) in functions.iter().zip(&truth) {
+        let values: Vec<Dd> = found.by_ref().take(truth.len()).collect();
+        // as in f64 above
+        assert_near(name, &values, truth, 3e-13);
+    }
+    assert_eq!(found.next(), None);
+}
+
+/// The builder of build scripts: what it writes compiles, and computes what the file with these numbers does.
+#[test]
+fn a_build_script_gets_them_too() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("drive_parameters_built");
+    std::fs::create_dir_all(&folder).expect("a folder for programs");
+    let text = format!("[outputs]\nfunctions = [\"driven_forward_dynamics\"]\n{}", COUPLED.parameters);
+    std::fs::write(folder.join("scene.toml"), text).expect("it can be written");
+    for (name, numbers) in [("free", COUPLED.numbers), ("fixed", COUPLED.others)] {
+        std::fs::write(folder.join(format!("{name}.toml")), arm(&with(COUPLED.drives, numbers)).text())
+            .expect("it can be written");
+    }
+    let build = |name: &str| Builder::new(folder.join(format!("{name}.toml"))).out_dir(&folder).module(name);
+    build("free").scene_file(folder.join("scene.toml")).build().expect("it compiles");
+    build("fixed").functions(only("driven_forward_dynamics")).build().expect("it compiles");
+    let [left, right, one] = [&COUPLED.others[..2], &COUPLED.others[2..3], &COUPLED.others[3..]].map(|numbers| {
+        let numbers: Vec<String> = numbers.iter().map(|x| format!("{x:?}")).collect();
+        numbers
+    });
+    let main = format!(
+        "#[allow(dead_code)] mod free {{ include!(\"free.rs\"); }}
+#[allow(dead_code)] mod fixed {{ include!(\"fixed.rs\"); }}
+fn main() {{
+    let left = free::Left::new(free::LeftNumbers {{ rotor_inertia: {}, stage_1_ratio: {} }}).unwrap();
+    let right = free::Right::new(free::RightNumbers {{ resistance: {} }}).unwrap();
+    let one = free::One::new(free::OneNumbers {{ rotor_inertia: {}, joint_ratio: {} }}).unwrap();
+    let (q, qd, x, u) = ([0.3, -0.8, 1.1], [0.5, -1.2, 0.7], [0.4; 6], [7.0, -3.0, 11.0]);
+    let (mut a, mut b, mut xd) = ([0.0; 3], [0.0; 3], [0.0; 6]);
+    free::driven_forward_dynamics(&q, &qd, &x, &u, &left, &right, &one, &mut a, &mut xd);
+    fixed::driven_forward_dynamics(&q, &qd, &x, &u, &mut b, &mut xd);
+    let size = b.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= 3e-13 * size), \"{{a:?}} {{b:?}}\");
+    assert!(size > 0.1);
+}}
+",
+        left[0], left[1], right[0], one[0], one[1]
+    );
+    std::fs::write(folder.join("main.rs"), main).expect("it can be written");
+    let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
+    let program = folder.join("main");
+    succeeds(
+        Command::new(rustc).args(["--edition", "2021", "-Dwarnings", "-o"]).args([&program, &folder.join("main.rs")]),
+    );
+    succeeds(&mut Command::new(program));
+}
+
+/// With exact rules functions are those of the robot file to the bit of the generic runtime, and parameters agree.
+#[test]
+fn under_exact_rules_they_compile_and_agree() {
+    for (name, case) in CASES {
+        let source = arm(&with(case.drives, case.numbers));
+        let exact = |options: Options| Options { grade: Grade::Exact, ..options };
+        let free = InScene::new(&source, &exact(options(case.parameters)));
+        let fixed = InScene::new(&arm(&with(case.drives, case.others)), &exact(options("")));
+        // constructors are compared in a compilation
+        let functions = only("driven_forward_dynamics");
+        compiled(&source, &Options { functions, ..exact(options(case.parameters)) });
+        let (exactly, rounded) = (free.made::<Dd>(case.others), free.made::<f64>(case.others));
+        for function in free.functions() {
+            let (a, b) = (free.graph(function), fixed.graph(function));
+            let what = format!("{name}, {}", function.name());
+            let truth = run::<Dd>(&b, &[]);
+            // constants of the graph are rounded to f64 under exact rules
+            assert_near(&what, &run::<Dd>(&a, &exactly), &truth, 1e-13);
+            let found: Vec<Dd> = run::<f64>(&a, &rounded).into_iter().map(Dd::from).collect();
+            assert_near(&format!("{what} in f64"), &found, &truth, 3e-13);
+        }
+    }
+}
+
+/// Every number of a drive, in the robot file or in the scene, free or not.
+#[test]
+fn numbers_that_f32_cannot_hold_are_errors_at_their_places() {
+    let single = |drives: &str, scene_text: &str| {
+        let options = Options { scalar: Scalar::F32, ..options(scene_text) };
+        match compile(&arm(drives), &options) {
+            Ok(generated) => Ok(generated.text),
+            Err(complaints) => Err(complaints.to_string()),
+        }
+    };
+    for case in [&RIGID, &ELASTIC] {
+        let places = (1..=case.numbers.len()).filter(|k| {
+            let before = &case.drives[..case.drives.find(&format!("${k}")).expect("it has a place")];
+            // efficiencies are at most 1, and limits beyond f32 are none
+            !["forward = ", "backward = ", "efficiency = ", "input = ", "current = "]
+                .iter()
+                .any(|key| before.ends_with(key))
+        });
+        let places: Vec<usize> = places.collect();
+        for (value, cannot) in [(1e40, "f32 cannot hold 1e40"), (1e-46, "f32 cannot hold 1e-46")] {
+            let mut numbers = case.numbers.to_vec();
+            places.iter().for_each(|k| numbers[k - 1] = value);
+            for parameters in ["", case.parameters] {
+                let said = single(&with(case.drives, &numbers), parameters).expect_err("they are beyond f32");
+                // inertias of gears and damping by friction may be zero
+                let most = if value < 1.0 { places.len() - 5 } else { places.len() };
+                let found = said.matches(cannot).count();
+                assert!((most..=places.len()).contains(&found), "{found} of {} are in\n{said}", places.len());
+                for part in ["ratio of ", "arm.toml:", "1e", "generate in f64"] {
+                    assert!(said.contains(part), "`{part}` is not in\n{said}");
+                }
+            }
+        }
+    }
+    let actuator = with(RIGID.drives, RIGID.numbers).replace("-8.0", "-8e39");
+    let said = single(&actuator, "").expect_err("it is beyond f32");
+    assert!(said.contains("f of actuator of drive `three`: f32 cannot hold -8e39"), "{said}");
+    // in a scene, too
+    let said = single("", "[[drive]]\njoint = \"one\"\nratio = 1e39\nmotor = { torque_constant = 0.05, resistance = 1.2, rotor_inertia = 1e-5 }\n");
+    let said = said.expect_err("it is beyond f32");
+    assert!(said.contains("scene.toml:5:9") && said.contains("ratio of drive `one`: f32 cannot hold 1e39"), "{said}");
+    // a limit beyond f32 is none
+    let mut numbers = RIGID.numbers.to_vec();
+    (numbers[7], numbers[8]) = (1e39, 1e40);
+    let text = single(&with(RIGID.drives, &numbers), "").unwrap_or_else(|why| panic!("{why}"));
+    assert!(!text.contains("1e39") && !text.contains("1e40"));
+}
+
+fn described(drives: &str) -> Description {
+    let mut complaints = Diagnostics::new();
+    straightline_codegen::description::read(&arm(drives), &mut complaints).unwrap_or_else(|| panic!("{complaints}"))
+}
+
+/// A drive that has what the others lack.
+const RATED: &str = "
+[[drive]]
+joint = \"one\"
+ratio = 20.0
+motor = { torque_constant = 0.05, resistance = 1.2, rotor_inertia = 1e-5, thermal = { winding_housing = 1.9, housing_ambient = 4.6, winding_time = 41.0, housing_time = 1120.0, ambient = 23.0, limit = 155.0 } }
+limits = { speed = 1256.0, continuous_current = 3.5 }
+[[drive]]
+joint = \"two\"
+actuator = { C = [[0.0, 1.0], [-1.5, -2.0]], f = [0.1, -8.0], d = [0.0, 5.0], T = [0.0, 1.0], position = [1.0, 0.0] }
+";
+
+/// Sweeps and searches change a drive as another number in the file does, whichever number that is.
+#[test]
+fn every_number_of_a_drive_can_be_swept_and_searched() {
+    for (name, case) in CASES {
+        let parameters = options(case.parameters).scene.parameters;
+        let paths: Vec<String> = parameters
+            .iter()
+            .flat_map(|parameter| match parameter {
+                Parameter::Drive { drive, numbers, .. } => numbers.iter().map(|n| format!("{drive}.{n}")).collect(),
+                _ => Vec::new(),
+            })
+            .collect();
+        assert_eq!(paths.len(), case.numbers.len(), "{name}");
+        let of_file = described(&with(case.drives, case.numbers));
+        for (k, path) in paths.iter().enumerate() {
+            let mut numbers = case.numbers.to_vec();
+            numbers[k] = case.others[k];
+            let written = described(&with(case.drives, &numbers));
+            let (set, _) = parameter::with_drives(&of_file, &[], path, numbers[k]).unwrap_or_else(|d| panic!("{d:?}"));
+            assert_eq!(set.drives, written.drives, "{name}: {path}");
+            assert_ne!(set.drives, of_file.drives, "{name}: {path}");
+        }
+    }
+    let coupled = with(COUPLED.drives, COUPLED.numbers);
+    for (text, path, from, to, value) in [
+        (&coupled[..], "right.joint_ratio_three", "three = -33.0", "three = -37.5", -37.5),
+        (RATED, "one.winding_housing", "winding_housing = 1.9", "winding_housing = 1.1", 1.1),
+        (RATED, "one.housing_ambient", "housing_ambient = 4.6", "housing_ambient = 5.0", 5.0),
+        (RATED, "one.winding_time", "winding_time = 41.0", "winding_time = 50.0", 50.0),
+        (RATED, "one.housing_time", "housing_time = 1120.0", "housing_time = 900.0", 900.0),
+        (RATED, "one.ambient", "ambient = 23.0", "ambient = -5.0", -5.0),
+        (RATED, "one.temperature_limit", "limit = 155.0", "limit = 125.0", 125.0),
+        (RATED, "one.speed_limit", "speed = 1256.0", "speed = 700.0", 700.0),
+        (RATED, "one.continuous_current", "continuous_current = 3.5", "continuous_current = 2.0", 2.0),
+        (RATED, "two.C_2_1", "[-1.5, -2.0]", "[-1.75, -2.0]", -1.75),
+        (RATED, "two.f_2", "-8.0", "-9.0", -9.0),
+        (RATED, "two.d_2", "5.0]", "7.0]", 7.0),
+        (RATED, "two.T_2", "T = [0.0, 1.0]", "T = [0.0, 2.0]", 2.0),
+        (RATED, "two.position_1", "position = [1.0", "position = [0.5", 0.5),
+    ] {
+        let (of_file, written) = (described(text), described(&text.replace(from, to)));
+        let (set, _) = parameter::with_drives(&of_file, &[], path, value).unwrap_or_else(|d| panic!("{d:?}"));
+        assert_eq!(set.drives, written.drives, "{path}");
+        assert_ne!(set.drives, of_file.drives, "{path}");
+    }
+    for (path, value, words) in [
+        ("one.winding_time", 0.0, "one.winding_time: 0.0 is not positive"),
+        ("one.ambient", 200.0, "one.ambient: 200.0 is not below the limit of the winding"),
+        ("one.temperature_limit", 20.0, "one.temperature_limit: 20.0 is not above the ambient temperature"),
+        ("two.C_3_1", 1.0, "drive `two` has no value `C_3_1`"),
+    ] {
+        let complaint = parameter::with_drives(&described(RATED), &[], path, value).expect_err(path);
+        assert!(complaint.line().contains(words), "{}", complaint.line());
+    }
 }

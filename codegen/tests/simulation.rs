@@ -572,6 +572,11 @@ fn numbers_of_drives_are_swept_and_searched() {
     assert!(near[1..].iter().all(|(heat, exceeded)| *heat >= near[0].0 * (1.0 - 1e-6) || *exceeded > 0.0), "{near:?}");
     let taken = said(&["--optimize", "joint1.resistance=0.1:0.6", "--minimize", "electrical"]);
     assert!(taken.contains("joint1.resistance = 0.1"), "{taken}");
+    let gear = said(&["--optimize", "joint2.efficiency_forward=0.5:0.9", "--minimize", "electrical"]);
+    assert!(gear.contains("joint2.efficiency_forward = 0.9"), "{gear}");
+    // what no equation of motion has
+    let hotter = said(&["--sweep", "joint1.winding_housing=1,3"]);
+    assert!(hotter.contains("joint1.winding_housing"), "{hotter}");
     // a number that the drive does not have, and one that it cannot have
     for (path, words) in [
         ("joint1.stiffness=1,2", "drive `joint1` has no value `stiffness`"),

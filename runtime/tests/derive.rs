@@ -58,6 +58,38 @@ pub struct OnTheMoon;
 #[robot("examples/arm.toml", scene = "examples/moon_scene.toml")]
 pub struct OnTheMoonByFile;
 
+/// A motor whose numbers are parameters at run time.
+#[derive(Dynamics)]
+#[robot(
+    "examples/arm.toml",
+    module = "geared",
+    scene(
+        outputs(functions = ["driven_forward_dynamics"]),
+        drive(
+            joint = "yaw",
+            motor = { torque_constant = 0.05, resistance = 1.2, rotor_inertia = 1e-5 },
+            stages = [{ ratio = 100.0, input_inertia = 2e-6, efficiency = 0.8 }],
+        ),
+        parameter(kind = "drive", drive = "yaw", numbers = ["torque_constant", "ratio", "stage_1_efficiency"]),
+    )
+)]
+pub struct Geared;
+
+/// The same motor with other numbers.
+#[derive(Dynamics)]
+#[robot(
+    "examples/arm.toml",
+    scene(
+        outputs(functions = ["driven_forward_dynamics"]),
+        drive(
+            joint = "yaw",
+            motor = { torque_constant = 0.071, resistance = 1.2, rotor_inertia = 1e-5 },
+            stages = [{ ratio = -63.0, input_inertia = 2e-6, efficiency = 0.66 }],
+        ),
+    )
+)]
+pub struct GearedOtherwise;
+
 /// Many of them at once.
 #[derive(Dynamics)]
 #[robot("examples/arm.toml", functions(inverse_dynamics), lanes)]
@@ -183,6 +215,25 @@ fn a_scene_in_the_attribute_is_that_of_a_file() {
     let mut h = [[0.0; 3]; 3];
     Arm::mass_matrix(&[-0.25, q[0], q[1]], &mut h);
     assert!((diagonal[1] - h[2][2] - 0.002536).abs() < 1e-15, "{diagonal:?} {h:?}");
+}
+
+#[test]
+fn numbers_of_a_drive_are_parameters() {
+    let (q, qd, x, u) = ([0.3, -0.8, 1.1], [0.5, -1.2, 0.7], [0.0; 2], [11.0]);
+    let mut xd = [0.0; 2];
+    let numbers = geared::YawNumbers { torque_constant: 0.071, ratio: -63.0, stage_1_efficiency: 0.66 };
+    let drive = geared::Yaw::new(numbers).unwrap();
+    let (mut of_file, mut free, mut fixed) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+    Geared::driven_forward_dynamics(&q, &qd, &x, &u, &geared::Yaw::NOMINAL, &mut of_file, &mut xd);
+    Geared::driven_forward_dynamics(&q, &qd, &x, &u, &drive, &mut free, &mut xd);
+    GearedOtherwise::driven_forward_dynamics(&q, &qd, &x, &u, &mut fixed, &mut xd);
+    for (a, b) in free.iter().zip(fixed) {
+        // roundings of accelerations near 10 through a condition number near 10
+        assert!((a - b).abs() < 1e-12, "{free:?} {fixed:?}");
+    }
+    assert!((free[0] - of_file[0]).abs() > 0.1, "{free:?} {of_file:?}");
+    let refused = geared::Yaw::new(geared::YawNumbers { ratio: 0.0, ..numbers });
+    assert_eq!(refused.unwrap_err().to_string(), "`ratio` must be not zero");
 }
 
 #[test]

@@ -65,6 +65,31 @@ pub struct Drive<T = f64> {
     pub rotor: Option<(Noted<String>, [f64; 3], T)>,
     /// What it bears.
     pub rating: Rating,
+    /// The numbers of the file that equations have.
+    pub written: AsWritten,
+}
+
+/// A number as it is written in a file.
+#[derive(Clone, Debug)]
+pub struct Written {
+    /// Which it is: ``ratio of drive `one` ``.
+    pub what: String,
+    /// Its value.
+    pub value: f64,
+    /// Whether it must not become zero.
+    pub is_needed: bool,
+    /// Where it stands.
+    pub place: Place,
+}
+
+/// Numbers as they are written: no part of the drive, which may have been given others since.
+#[derive(Clone, Debug, Default)]
+pub struct AsWritten(pub Vec<Written>);
+
+impl PartialEq for AsWritten {
+    fn eq(&self, _: &AsWritten) -> bool {
+        true
+    }
 }
 
 /// What an actuator bears: no part of the equations.
@@ -201,6 +226,11 @@ pub struct Number {
 }
 
 impl Number {
+    /// Whether it is a limit, which no equation has beside saturation.
+    pub fn is_limit(&self) -> bool {
+        [INPUT_LIMIT, CURRENT_LIMIT].contains(&self.quantity)
+    }
+
     /// Whether it is another's, by whatever name.
     pub fn is(&self, other: &Number) -> bool {
         self.at[0] == other.at[0]
@@ -298,15 +328,78 @@ impl Drive {
         all
     }
 
-    /// Sets one of its [`numbers`](Drive::numbers). `None` if the drive has no such number.
+    /// What can be set beside its [`numbers`](Drive::numbers), but is no parameter at run time: `joint_ratio_elbow` of each of several joints,
+    /// entries of an actuator's matrices (`C_1_2`, `f_1`, `d_1`, `T_1`, `position_1`), and what the actuator bears.
+    fn others(&mut self) -> Vec<(String, Option<Must>, &mut f64)> {
+        let mut all: Vec<(String, Option<Must>, &mut f64)> = Vec::new();
+        if self.joints.len() > 1 {
+            let ratio = |(joint, n)| (format!("joint_ratio_{}", joint), Some(Must::NotBeZero), n);
+            all.extend(self.joints.iter_mut().map(|(joint, n)| ratio((&joint.value, n))));
+        }
+        if let Actuator::Linear { c, f, d, t, position } = &mut self.actuator {
+            let n = f.len();
+            let entry = |(k, x)| (format!("C_{}_{}", k / n + 1, k % n + 1), None, x);
+            all.extend(c.value.iter_mut().enumerate().map(entry));
+            for (key, row) in
+                [("f", f), ("d", d), ("T", t)].into_iter().chain(position.as_mut().map(|p| ("position", p)))
+            {
+                all.extend(row.iter_mut().enumerate().map(|(k, x)| (format!("{key}_{}", k + 1), None, x)));
+            }
+        }
+        let Rating { speed, continuous_current, thermal } = &mut self.rating;
+        let borne = [("speed_limit", speed), ("continuous_current", continuous_current)];
+        let positive = |name: &str| (name.to_string(), Some(Must::BePositive));
+        for (name, x) in borne.into_iter().filter_map(|(name, x)| Some((positive(name), x.as_mut()?))) {
+            all.push((name.0, name.1, x));
+        }
+        if let Some(Thermal { winding_housing, housing_ambient, winding_time, housing_time, ambient, limit }) = thermal
+        {
+            for (name, x) in [
+                ("winding_housing", winding_housing),
+                ("housing_ambient", housing_ambient),
+                ("winding_time", winding_time),
+                ("housing_time", housing_time),
+            ] {
+                all.push((name.to_string(), Some(Must::BePositive), x));
+            }
+            all.push(("ambient".to_string(), None, ambient));
+            all.extend(limit.as_mut().map(|x| ("temperature_limit".to_string(), None, x)));
+        }
+        all
+    }
+
+    /// The names of everything that [`set`](Drive::set) sets.
+    pub fn names(&self) -> Vec<String> {
+        let numbers = self.numbers().into_iter().map(|number| number.name);
+        numbers.chain(self.clone().others().into_iter().map(|(name, ..)| name)).collect()
+    }
+
+    /// Sets one of its numbers: those that can be parameters at run time, and entries of actuators, ratios of several joints and
+    /// what the actuator bears. `None` if the drive has no such number.
     ///
     /// # Errors
     /// What the number has to be.
     pub fn set(&mut self, name: &str, value: f64) -> Option<Result<(), &'static str>> {
-        let number = self.numbers().into_iter().find(|number| number.name == name)?;
-        *self = self.with(std::slice::from_ref(&number), &[value]);
-        let must = number.quantity.must;
-        Some(if must.holds(value) { Ok(()) } else { Err(must.words().0) })
+        let must = match self.numbers().into_iter().find(|number| number.name == name) {
+            Some(number) => {
+                *self = self.with(std::slice::from_ref(&number), &[value]);
+                Some(number.quantity.must)
+            }
+            None => {
+                let (_, must, x) = self.others().into_iter().find(|(other, ..)| other == name)?;
+                *x = value;
+                must
+            }
+        };
+        let is_hot = |t: &Thermal| t.limit.is_some_and(|limit| limit <= t.ambient);
+        Some(match must {
+            Some(must) if !must.holds(value) => Err(must.words().0),
+            _ if self.rating.thermal.as_ref().is_some_and(is_hot) => match name {
+                "ambient" => Err("below the limit of the winding"),
+                _ => Err("above the ambient temperature"),
+            },
+            _ => Ok(()),
+        })
     }
 
     /// The same drive over another scalar, with these values of some of its numbers.
@@ -376,6 +469,7 @@ impl Drive {
             current_limit: self.current_limit.map(t),
             rotor: self.rotor.as_ref().map(|(link, axis, inertia)| (link.clone(), *axis, t(*inertia))),
             rating: self.rating.clone(),
+            written: self.written.clone(),
         }
     }
 }
@@ -433,6 +527,7 @@ impl Reader<'_> {
     }
 
     fn drive(&mut self, mut table: Table) -> Option<Drive> {
+        self.drive_numbers.clear();
         let named = self.name_at(&table, "name", "drive");
         let joint = self.name_at(&table, "joint", "joint");
         let name = named.or_else(|| joint.clone());
@@ -456,10 +551,10 @@ impl Reader<'_> {
         let (mut input_limit, mut current_limit, mut rating) = (None, None, Rating::default());
         if let Some(limits) = limits {
             self.check_keys(&limits, &["input", "current", "continuous_current", "speed"]);
-            input_limit = self.judged(&limits, "input", Must::BePositive);
-            current_limit = self.judged(&limits, "current", Must::BePositive);
-            rating.continuous_current = self.judged(&limits, "continuous_current", Must::BePositive);
-            rating.speed = self.judged(&limits, "speed", Must::BePositive);
+            input_limit = self.rated(&limits, "input", Must::BePositive);
+            current_limit = self.rated(&limits, "current", Must::BePositive);
+            rating.continuous_current = self.rated(&limits, "continuous_current", Must::BePositive);
+            rating.speed = self.rated(&limits, "speed", Must::BePositive);
             for key in ["current", "continuous_current"] {
                 if let (true, Some((_, span))) = (table.has("actuator"), limits.get(key)) {
                     self.complain(&span, messages::unknown_key(&limits.owner, key, &["input", "speed"]));
@@ -493,14 +588,28 @@ impl Reader<'_> {
             current_limit,
             rotor,
             rating,
+            written: AsWritten(std::mem::take(&mut self.drive_numbers)),
         })
     }
 
-    /// A number of a range, or a complaint.
+    /// A number of a range that equations have, or a complaint.
     fn judged(&mut self, table: &Table, key: &str, must: Must) -> Option<f64> {
+        let x = self.in_range(table, key, must)?;
+        let is_needed = !must.holds(0.0);
+        let written = Written { what: table.what(key), value: x.value, is_needed, place: x.place };
+        self.drive_numbers.push(written);
+        Some(x.value)
+    }
+
+    /// A number of a range that no equation has, or a complaint.
+    fn rated(&mut self, table: &Table, key: &str, must: Must) -> Option<f64> {
+        self.in_range(table, key, must).map(|x| x.value)
+    }
+
+    fn in_range(&mut self, table: &Table, key: &str, must: Must) -> Option<Value<f64>> {
         let x = self.real_at(table, key, Range64::Finite)?;
         if must.holds(x.value) {
-            return Some(x.value);
+            return Some(x);
         }
         let (be, help) = must.words();
         self.diagnostics.push(messages::drive_number(&table.what(key), x.value, be, help).at(&x.place));
@@ -565,7 +674,10 @@ impl Reader<'_> {
 
     fn thermal(&mut self, table: &Table) -> Option<Thermal> {
         self.check_keys(table, THERMAL);
-        let mut needed = |key: &str| self.required(table, key, &format!("{key} = 2.0"), Must::BePositive);
+        let mut needed = |key: &str| {
+            self.require(table, key, &format!("{key} = 2.0"));
+            self.rated(table, key, Must::BePositive)
+        };
         let (winding_housing, housing_ambient) = (needed("winding_housing"), needed("housing_ambient"));
         let (winding_time, housing_time) = (needed("winding_time"), needed("housing_time"));
         let ambient = self.real_at(table, "ambient", Range64::Finite).map_or(25.0, |x| x.value);
@@ -603,9 +715,20 @@ impl Reader<'_> {
             self.complain(&a.span, messages::actuator_shape(&a.owner, n));
             return None;
         }
+        for (key, row) in [("f", &f), ("d", &d), ("T", &t)].into_iter().chain(position.iter().map(|p| ("position", p)))
+        {
+            self.write_down(&a, key, row);
+        }
         let flat = Value::new(c.value.concat(), c.place);
+        self.write_down(&a, "C", &flat);
         let position = position.map(|p| p.value);
         Some(Actuator::Linear { c: flat.into(), f: f.value, d: d.value, t: t.value, position })
+    }
+
+    fn write_down(&mut self, table: &Table, key: &str, row: &Value<Vec<f64>>) {
+        let (what, place) = (table.what(key), &row.place);
+        let written = |x: &f64| Written { what: what.clone(), value: *x, is_needed: false, place: place.clone() };
+        self.drive_numbers.extend(row.value.iter().map(written));
     }
 
     fn row_at(&mut self, table: &Table, key: &str) -> Option<Value<Vec<f64>>> {

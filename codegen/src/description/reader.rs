@@ -16,6 +16,8 @@ pub(crate) struct Reader<'a> {
     pub diagnostics: &'a mut Diagnostics,
     ignored: Vec<Ignored>,
     ignored_index: HashMap<String, usize>,
+    /// Numbers of the drive that is being read, as far as equations have them.
+    pub drive_numbers: Vec<super::drives::Written>,
 }
 
 /// Which numbers are taken.
@@ -29,7 +31,7 @@ pub(crate) enum Range64 {
 
 impl<'a> Reader<'a> {
     pub fn new(source: &'a Source, diagnostics: &'a mut Diagnostics) -> Reader<'a> {
-        Reader { source, diagnostics, ignored: Vec::new(), ignored_index: HashMap::new() }
+        Reader { source, diagnostics, ignored: Vec::new(), ignored_index: HashMap::new(), drive_numbers: Vec::new() }
     }
 
     pub fn place(&self, span: &Range<usize>) -> Place {

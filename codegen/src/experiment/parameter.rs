@@ -119,8 +119,7 @@ pub fn with_drives(
         Some(Err(be)) => Err(Box::new(say::not_in_range(path, value, be))),
         None => {
             let why = format!("drive `{owner}` has no value `{key}`");
-            let numbers: Vec<String> = drive.numbers().into_iter().map(|number| number.name).collect();
-            Err(Box::new(say::unknown_parameter(path, &why).help(format!("it has {}", numbers.join(", ")))))
+            Err(Box::new(say::unknown_parameter(path, &why).help(format!("it has {}", drive.names().join(", ")))))
         }
     }
 }

@@ -394,7 +394,7 @@ pub fn number_beyond_scalar(what: &str, value: f64, scalar: &str, is_too_great: 
         true => d.detail(format!("the greatest {scalar} is 3.4e38")),
         false => d.detail(format!("below 1.2e-38 {scalar} loses digits, and then the number")),
     };
-    d.help("generate in f64, and look whether the units are kg and m; what is no mass at all is 0")
+    d.help("generate in f64, and look whether the units are kg and m; what is no mass at all, or no effect, is 0")
 }
 
 /// A program whose constants or values leave the range of the scalar type.
