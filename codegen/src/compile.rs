@@ -296,21 +296,24 @@ impl Optimisations {
     /// What `make` makes by the first of these that it is content with; all of them, then plainer ones.
     ///
     /// # Errors
-    /// What was wrong at first, if it is content with none.
+    /// What was wrong at first, if it is content with none; or what the plainest loses to rounding.
     pub(crate) fn first_that_agrees<T>(
         self,
         mut make: impl FnMut(Optimisations) -> Result<T, Disagreement>,
     ) -> Result<(T, Option<Plainer>), Disagreement> {
-        let mut first = None;
+        let (mut first, mut last) = (None, None);
         for (without, optimisations) in self.plainer() {
             match make(optimisations) {
                 Ok(made) => return Ok((made, first.map(|disagreement| Plainer { disagreement, without }))),
                 Err(disagreement) => {
-                    first.get_or_insert(disagreement);
+                    first.get_or_insert_with(|| disagreement.clone());
+                    last = Some(disagreement);
                 }
             }
         }
-        Err(first.expect("all of them were tried"))
+        // the plainest form against the plain equations in the same scalar: that says most of the robot
+        let of_digits = last.filter(|disagreement| disagreement.plain.is_some());
+        Err(of_digits.or(first).expect("all of them were tried"))
     }
 
     pub(crate) fn rules(self, scalar: Scalar) -> RuleSet {
@@ -610,7 +613,7 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
     let programs = resolved.functions.iter().filter(|f| !is_empty(f));
     let programs: Result<Vec<Program>, _> = programs.map(|f| checked(&robot, &frames, *f, &resolved)).collect();
-    let mut programs = programs.map_err(|wrong| only(wrong.error(&robot.model)))?;
+    let mut programs = programs.map_err(|wrong| only(no_form(&wrong, &robot.model, options.scalar, source)))?;
     let beyond = |program: &str, why: &str, diagnostics: &mut Diagnostics| {
         let complaint = scene::messages::program_beyond_scalar(program, options.scalar.name(), why);
         options.scene.places.complain("numbers.scalar", complaint, diagnostics);
@@ -662,6 +665,18 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
             beyond(&program, &why, &mut diagnostics);
             Err(diagnostics)
         }
+    }
+}
+
+/// What is said of a function of which no form agrees.
+fn no_form(wrong: &Disagreement, model: &Model<Dd>, scalar: Scalar, source: &Source) -> Diagnostic {
+    let Some((body, part)) = wrong.beyond_digits(model, scalar) else { return wrong.error(model) };
+    let (joint, link) = (&model.bodies[body].joint.name, &model.bodies[body].name);
+    let complaint = messages::inertia_beyond_digits(&wrong.program, scalar.name(), joint, part);
+    let description = description::read(source, &mut Diagnostics::new());
+    match description.as_ref().and_then(|d| d.place_of(joint, link)) {
+        Some(place) => complaint.at(place),
+        None => complaint,
     }
 }
 

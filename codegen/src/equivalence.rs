@@ -24,11 +24,12 @@ use crate::random::Random;
 use crate::reduce::longest_lever;
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::{constructed, ContactFunction};
+use crate::singular::weakest_joint;
 use crate::stage::Staged;
 use std::collections::BTreeMap;
 use std::fmt;
 use straightline_core::magnitude::Magnitude;
-use straightline_core::model::{JointKind, Model};
+use straightline_core::model::{BodyId, JointKind, Model};
 use straightline_core::spatial::{Sym3, Transform, Vec3};
 use straightline_core::{Dd, Real};
 
@@ -41,6 +42,8 @@ const ROUNDINGS: f64 = 1e4;
 const POINT: f64 = 1e-3;
 /// A program may lose so many times what the plain equations lose in the same scalar, or one rounding of all that a result is made of.
 const LOSSES: f64 = 16.0;
+/// A difference of inertias that is so many roundings of them has hardly a digit.
+const NO_DIGIT: f64 = 1e3;
 /// At so many random states.
 const STATES: usize = 4;
 /// Where random numbers begin: another place than where states for choices come from.
@@ -50,8 +53,7 @@ const SEED: u64 = 0x6a09_e667_f3bc_c908;
 fn agreeing(options: &Options) -> f64 {
     match (options.grade, options.scalar) {
         (Grade::Algebraic, _) => AGREE,
-        (Grade::Exact, Scalar::F64) => ROUNDINGS * f64::EPSILON,
-        (Grade::Exact, Scalar::F32) => ROUNDINGS * f64::from(f32::EPSILON),
+        (Grade::Exact, scalar) => ROUNDINGS * scalar.epsilon(),
     }
 }
 
@@ -101,6 +103,13 @@ impl Plainer {
 }
 
 impl Disagreement {
+    /// Whether the plain equations themselves lose nearly all digits in this scalar, as inertias are too far apart: then no form is right.
+    /// Which joint feels too little, and which part of what it moves.
+    pub fn beyond_digits(&self, model: &Model<Dd>, scalar: Scalar) -> Option<(BodyId, f64)> {
+        let lost = self.plain.is_some_and(|plain| LOSSES * plain >= 1.0);
+        weakest_joint(model).filter(|(_, part)| lost && *part <= NO_DIGIT * scalar.epsilon())
+    }
+
     /// What the user is told where no form agrees.
     pub fn error(&self, model: &Model<Dd>) -> Diagnostic {
         Diagnostic::error(
@@ -214,8 +223,7 @@ impl Losses {
     fn compare(self, program: &str, graph: &Graph, scalar: Scalar) -> Result<(), Disagreement> {
         let rounding = match scalar {
             _ if !graph.widths.is_empty() => return Ok(()),
-            Scalar::F64 => f64::EPSILON,
-            Scalar::F32 => f64::from(f32::EPSILON),
+            scalar => scalar.epsilon(),
         };
         let is_worse = |k: &usize| self.program[*k] > (LOSSES * self.plain[*k]).max(rounding);
         match (0..self.program.len()).find(is_worse) {

@@ -22,6 +22,8 @@ use straightline_core::{Dd, Real};
 /// The factorisation may lose so many times what articulated bodies lose: about half a decimal digit, which is how far two
 /// samples of the same quality come apart.
 pub const TOLERATED: f64 = 3.0;
+/// The same of each acceleration by itself, as a heavy link may hide what the light ones lose; or one rounding of it.
+const TOLERATED_OF_ONE: f64 = 8.0;
 /// The factorisation has to save this part of the operations of articulated bodies.
 pub const WORTH: f64 = 0.05;
 /// Beyond so many velocity coordinates the factorisation is not tried: it takes about n³/6 products more on one branch.
@@ -147,15 +149,47 @@ pub fn choose(model: &Model<Dd>, scalar: Scalar, articulated: &Graph, factorised
         return MethodChoice { articulated_bodies: true, articulated, factorisation: None };
     };
     let errors = errors(model, scalar, articulated, factorised);
-    let articulated = Figures::new(articulated, errors.map(|e| e[0]));
-    let factorisation = Figures::new(factorised, errors.map(|e| e[1]));
+    let keeps_digits = errors.as_ref().is_none_or(|[a, f]| f.keeps_digits_of(a, scalar));
+    let [of_articulated, of_factorised] = errors.map_or([None; 2], |errors| errors.map(|e| Some(e.worst)));
+    let articulated = Figures::new(articulated, of_articulated);
+    let factorisation = Figures::new(factorised, of_factorised);
     let cheaper = factorisation.cost() < (1.0 - WORTH) * articulated.cost();
-    let keeps_digits = errors.is_none_or(|[a, f]| f <= TOLERATED * a);
     MethodChoice { articulated_bodies: !(cheaper && keeps_digits), articulated, factorisation: Some(factorisation) }
 }
 
-/// The worst errors of both programs; `None` where a run-time parameter is an input: there is no one robot to try.
-fn errors(model: &Model<Dd>, scalar: Scalar, articulated: &Graph, factorised: &Graph) -> Option<[f64; 2]> {
+/// What a program loses at some states.
+#[derive(Default)]
+struct Errors {
+    /// The worst error, over the greatest acceleration of its state.
+    worst: f64,
+    /// Of each acceleration the worst error, as it is, and the greatest value.
+    each: Vec<[f64; 2]>,
+}
+
+impl Errors {
+    fn add<T: Real + Into<f64>>(&mut self, found: Vec<T>, exact: Vec<Dd>) {
+        let scale = exact.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
+        self.each.resize(exact.len(), [0.0; 2]);
+        for ((x, truth), [worst, greatest]) in found.into_iter().zip(exact).zip(&mut self.each) {
+            let error = (Dd::from(x.into()) - truth).to_f64().abs();
+            // what is no number, is as wrong as can be
+            let error = if error.is_finite() { error } else { f64::INFINITY };
+            let relative = error / scale;
+            self.worst = if relative.is_finite() { self.worst.max(relative) } else { f64::INFINITY };
+            (*worst, *greatest) = (worst.max(error), greatest.max(truth.to_f64().abs()));
+        }
+    }
+
+    fn keeps_digits_of(&self, other: &Errors, scalar: Scalar) -> bool {
+        let keeps = |([f, greatest], [a, _]): (&[f64; 2], &[f64; 2])| {
+            *f <= TOLERATED_OF_ONE * a.max(scalar.epsilon() * greatest)
+        };
+        self.worst <= TOLERATED * other.worst && self.each.iter().zip(&other.each).all(keeps)
+    }
+}
+
+/// What both programs lose; `None` where a run-time parameter is an input: there is no one robot to try.
+fn errors(model: &Model<Dd>, scalar: Scalar, articulated: &Graph, factorised: &Graph) -> Option<[Errors; 2]> {
     if articulated.inputs.iter().chain(&factorised.inputs).any(|port| port.wrapper.is_some()) {
         return None;
     }
@@ -165,8 +199,8 @@ fn errors(model: &Model<Dd>, scalar: Scalar, articulated: &Graph, factorised: &G
     })
 }
 
-fn errors_in<T: Real + Into<f64>>(model: &Model<Dd>, articulated: &Graph, factorised: &Graph) -> [f64; 2] {
-    let mut worst = [0.0f64; 2];
+fn errors_in<T: Real + Into<f64>>(model: &Model<Dd>, articulated: &Graph, factorised: &Graph) -> [Errors; 2] {
+    let mut errors = [Errors::default(), Errors::default()];
     let mut random = Random(SEED);
     for state in 0..3 * STATES {
         // both were traced with the same ports
@@ -177,17 +211,11 @@ fn errors_in<T: Real + Into<f64>>(model: &Model<Dd>, articulated: &Graph, factor
         let inputs = groups.into_iter().flat_map(|(_, values)| values);
         let rounded: Vec<T> = inputs.map(|x| T::constant(Dd::from(x))).collect();
         let wide: Vec<Dd> = rounded.iter().map(|x| Dd::from((*x).into())).collect();
-        for (graph, worst) in [articulated, factorised].into_iter().zip(&mut worst) {
-            let exact = evaluate(graph, &wide);
-            let scale = exact.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
-            for (x, truth) in evaluate(graph, &rounded).into_iter().zip(exact) {
-                let error = (Dd::from(x.into()) - truth).to_f64().abs() / scale;
-                // what is no number, is as wrong as can be
-                *worst = if error.is_finite() { worst.max(error) } else { f64::INFINITY };
-            }
+        for (graph, errors) in [articulated, factorised].into_iter().zip(&mut errors) {
+            errors.add(evaluate(graph, &rounded), evaluate(graph, &wide));
         }
     }
-    worst
+    errors
 }
 
 /// Inputs anywhere in the limits, the same everywhere: at about rest, where weights rule, or as fast as the joints allow.

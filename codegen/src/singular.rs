@@ -57,6 +57,17 @@ pub fn singular_joints(model: &Model<Dd>, inertia: Inertia) -> Vec<BodyId> {
     always
 }
 
+/// The joint that, with the joints beyond it free, feels the least part of the inertia that it moves, and that part.
+pub(crate) fn weakest_joint(model: &Model<Dd>) -> Option<(BodyId, f64)> {
+    let mut least: Option<(BodyId, f64)> = None;
+    eliminate(model, Inertia::OfLinks, &generic_configuration(model, 1), &mut |body, part| {
+        if least.is_none_or(|(_, other)| part < other) {
+            least = Some((body, part));
+        }
+    });
+    least
+}
+
 /// Whether every joint feels enough by the one link that it moves, whatever comes behind: the links beyond it, free, add to a pivot and take
 /// nothing away, if no inertia is negative. Elimination takes the cube of the number of joints, of a chain of thousands hours; this the square.
 fn each_feels_its_own_link(model: &Model<Dd>, inertia: Inertia) -> bool {
@@ -121,9 +132,14 @@ fn natural_inertias(model: &Model<Dd>, q: &[Dd]) -> Vec<f64> {
     scales
 }
 
-/// The bodies with a vanished pivot at q: H eliminated from the tips to the base; a row without a pivot is left out, as
-/// if its joint were held.
+/// The bodies with a vanished pivot at q.
 fn vanished_pivots(model: &Model<Dd>, inertia: Inertia, q: &[Dd]) -> Vec<BodyId> {
+    eliminate(model, inertia, q, &mut |_, _| {})
+}
+
+/// H eliminated from the tips to the base; a row without a pivot is left out, as if its joint were held. Those bodies come back; `tell` gets
+/// every body with a pivot of it, as a part of the inertia that its joint moves.
+fn eliminate(model: &Model<Dd>, inertia: Inertia, q: &[Dd], tell: &mut dyn FnMut(BodyId, f64)) -> Vec<BodyId> {
     let nv = model.nv();
     let mut h = mass_matrix(model, q);
     let mut held = Vec::new();
@@ -168,6 +184,7 @@ fn vanished_pivots(model: &Model<Dd>, inertia: Inertia, q: &[Dd]) -> Vec<BodyId>
                 continue;
             }
             let pivot = h[k * nv + k];
+            tell(body, pivot.to_f64().abs() / sizes[k]);
             if is_gone(pivot, k) {
                 if !found.contains(&body) {
                     found.push(body);

@@ -92,6 +92,27 @@ fn forward_dynamics_of_a_joint_without_inertia_is_an_error_with_place_and_remedy
     assert!(compile(&with_rotor, &Options::default()).is_ok());
 }
 
+/// A base of 1 kg on which 3.5e20 kg slide: what the base feels along the slide is a difference that f64 has no digit of.
+#[test]
+fn a_joint_whose_inertia_is_lost_beside_what_it_moves_is_refused_at_its_place() {
+    let text = "[robot]\nname = \"sledge\"\n\n[[link]]\nname = \"base\"\nmass = 1.0\ncom = [0.0, 0.0, 0.0]\n\
+                inertia = [0.01, 0.01, 0.01]\n\n[[link]]\nname = \"planet\"\nmass = 3.5e20\ncom = [0.1, -0.2, 0.05]\n\
+                inertia = [3.5e18, 3.5e18, 3.5e18]\n\n[[joint]]\nname = \"slide\"\nkind = \"prismatic\"\nparent = \"base\"\n\
+                child = \"planet\"\norigin = { xyz = [-0.5, 0.0, 0.0], rpy = [0.3, 0.2, 0.1] }\naxis = [0.0, 0.0, 1.0]\n";
+    let floating = ModelOptions { floating_base: true, ..ModelOptions::default() };
+    let refused = [Scalar::F64, Scalar::F32].map(|scalar| {
+        let options = Options { scalar, model: floating.clone(), ..Options::default() };
+        let Err(errors) = compile(&Source::new("sledge.toml", text), &options) else { return 0 };
+        assert!(errors.iter().all(|d| d.code != "internal-disagreement"), "{errors}");
+        let Some(error) = errors.iter().find(|d| d.code == "no-forward-dynamics") else { return 0 };
+        assert_eq!(error.place.as_ref().map(|p| p.line), Some(5), "{errors}");
+        assert!(error.title.contains(scalar.name()) && error.title.contains("of the inertia"), "{errors}");
+        assert!(error.help.contains("kg") && error.help.contains("forward_dynamics"), "{errors}");
+        1
+    });
+    assert!(refused.contains(&1), "{refused:?}");
+}
+
 /// What the compiler makes of a robot in a scene.
 fn compiled(robot: &Source, scene: &str) -> Result<Generated, Diagnostics> {
     let mut diagnostics = Diagnostics::new();

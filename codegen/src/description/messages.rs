@@ -496,6 +496,21 @@ pub fn no_forward_dynamics(asked: &str, joint: &str) -> D {
         )
 }
 
+/// What divides by what a joint feels, where that is lost in what the joint moves: `part` of it.
+pub fn inertia_beyond_digits(function: &str, scalar: &str, joint: &str, part: f64) -> D {
+    D::error(
+        "no-forward-dynamics",
+        format!("`{function}` cannot be computed in {scalar}: joint `{joint}` feels {part:.0e} of the inertia that it moves"),
+    )
+    .detail(format!(
+        "with the joints beyond it free that is all that resists its motion, a difference of inertias of which {scalar} keeps no digit"
+    ))
+    .help(
+        "look whether all masses are in kg and all lengths in m; make the joint fixed, or name the functions that are wanted without \
+         `forward_dynamics`",
+    )
+}
+
 /// What divides by the mass of a robot that has none. `asked`: in words, what is asked for.
 pub fn no_mass(asked: &str) -> D {
     D::error("no-mass", format!("{asked} asked for, and nothing that moves has mass"))

@@ -79,6 +79,23 @@ pub struct Description {
     pub ignored: Vec<Ignored>,
 }
 
+impl Description {
+    /// Where a joint stands, or the link that it moves where the file has no such joint.
+    pub(crate) fn place_of(&self, joint: &str, link: &str) -> Option<&Place> {
+        let named = |(name, wanted): (&'_ Value<String>, &str)| name.value == wanted;
+        match &self.notation {
+            Notation::JointFrames(bodies) => {
+                let joints = bodies.joints.iter().map(|j| (&j.name, joint));
+                joints.chain(bodies.links.iter().map(|l| (&l.name, link))).find(|n| named(*n)).map(|(n, _)| &n.place)
+            }
+            Notation::MassCentres(chain) => {
+                let joints = chain.links.iter().map(|l| (&l.joint_name, joint));
+                joints.chain(chain.links.iter().map(|l| (&l.name, link))).find(|n| named(*n)).map(|(n, _)| &n.place)
+            }
+        }
+    }
+}
+
 /// The two ways of describing bodies.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Notation {

@@ -51,6 +51,14 @@ impl Scalar {
             Scalar::F32 => 4,
         }
     }
+
+    /// The distance from one to the next number.
+    pub fn epsilon(self) -> f64 {
+        match self {
+            Scalar::F64 => f64::EPSILON,
+            Scalar::F32 => f64::from(f32::EPSILON),
+        }
+    }
 }
 
 /// How a function is written: over one state or over lanes of states.

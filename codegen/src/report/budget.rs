@@ -2,7 +2,7 @@
 
 use super::errors::ErrorReport;
 use super::waterfall::robot_in;
-use crate::compile::{program, Options, Program};
+use crate::compile::{checked, Options, Program};
 use crate::diagnostic::Diagnostics;
 use crate::emit::{element_of, Scalar};
 use crate::expr::{NodeId, Op};
@@ -222,7 +222,9 @@ fn remedies(whole: &Model<Dd>, frames: &[String], function: Function, options: &
     let measured = candidates.into_iter().filter_map(|(what, scene)| {
         let (robot, scene) = robot_in(whole, &Scene { budgets: BTreeMap::new(), ..scene })?;
         let options = Options { scene, ..options.clone() };
-        Some((what, Measures::of(&program(&robot, frames, function, &options), options.scalar)))
+        // what has no right form in that scene is no advice
+        let program = checked(&robot, frames, function, &options).ok()?;
+        Some((what, Measures::of(&program, options.scalar)))
     });
     measured.collect()
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::panic::{catch_unwind, AssertUnwindSafe};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Mutex;
-use straightline_codegen::compile::{optimised, program, Optimisations, Options};
+use straightline_codegen::compile::{checked, optimised, Optimisations, Options};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::expr::{evaluate, Graph};
 use straightline_codegen::function::Robot;
@@ -90,7 +90,8 @@ pub struct Failure {
 /// What came of a robot.
 pub enum Outcome {
     Refused(String),
-    Judged(Vec<Failure>),
+    /// The failures, and how many functions the compiler refuses in a format that has no digit for them.
+    Judged(Vec<Failure>, usize),
 }
 
 /// A state: q, q̇, q̈, τ. Numbers that f32 holds, so that all formats are asked the same; a quaternion is of length one.
@@ -246,7 +247,7 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
     let mut random = Random(99);
     let states: Vec<State> = (0..6).map(|kind| State::new(&model, &mut random, kind)).collect();
     let loaded = Robot::new(model);
-    let mut failures = Vec::new();
+    let (mut failures, mut refused) = (Vec::new(), 0);
     for function in functions {
         let scalars: Vec<Scalar> =
             [Scalar::F64, Scalar::F32].into_iter().filter(|scalar| wanted(*scalar, function)).collect();
@@ -259,7 +260,14 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
             .collect();
         for scalar in scalars {
             let options = Options { scalar, ..options.clone() };
-            let full = program(&loaded, frames, function, &options).graph;
+            let full = match checked(&loaded, frames, function, &options) {
+                Ok(program) => program.graph,
+                Err(wrong) if wrong.beyond_digits(&loaded.model, scalar).is_some() => {
+                    refused += 1;
+                    continue;
+                }
+                Err(wrong) => panic!("{wrong}"),
+            };
             let unfolded = Optimisations::default();
             let plain = optimised(&loaded, frames, function, &options, unfolded);
             // constants in double-double, too
@@ -287,7 +295,7 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
             }
         }
     }
-    Outcome::Judged(failures)
+    Outcome::Judged(failures, refused)
 }
 
 /// What happened to a list of robots.
@@ -295,6 +303,8 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
 pub struct Tally {
     pub refused: usize,
     pub judged: usize,
+    /// Functions of those that were judged.
+    pub refused_functions: usize,
     /// Those that failed, with all that they failed by, or with the words of a panic.
     pub failed: Vec<(Case, Result<Vec<Failure>, String>)>,
 }
@@ -316,7 +326,7 @@ pub fn judge_all(cases: &[Case], tell: impl Fn(&Case, &Result<Vec<Failure>, Stri
                     }
                     None
                 }
-                Ok(Outcome::Judged(failures)) => Some(Ok(failures)),
+                Ok(Outcome::Judged(failures, refused)) => Some(Ok((failures, refused))),
                 Err(panic) => Some(Err(words(panic))),
             };
             let mut tally = tally.lock().expect("no thread panics with the tally");
@@ -324,6 +334,10 @@ pub fn judge_all(cases: &[Case], tell: impl Fn(&Case, &Result<Vec<Failure>, Stri
                 None => tally.refused += 1,
                 Some(outcome) => {
                     tally.judged += 1;
+                    let outcome = outcome.map(|(failures, refused)| {
+                        tally.refused_functions += refused;
+                        failures
+                    });
                     if !matches!(&outcome, Ok(failures) if failures.is_empty()) {
                         tell(case, &outcome);
                         tally.failed.push((*case, outcome));
@@ -364,10 +378,11 @@ pub fn survey(cases: Vec<Case>) {
     }
     let worst = |(_, outcome): &&(Case, Result<Vec<Failure>, String>)| outcome.is_err();
     println!(
-        "{} robots: {} refused, {} judged, {} failed, {} of them by a panic",
+        "{} robots: {} refused, {} judged ({} functions of them refused), {} failed, {} of them by a panic",
         cases.len(),
         tally.refused,
         tally.judged,
+        tally.refused_functions,
         tally.failed.len(),
         tally.failed.iter().filter(worst).count()
     );
@@ -389,7 +404,7 @@ pub fn shrunk(case: &Case, outcome: &Result<Vec<Failure>, String>) -> String {
                 let outcome =
                     catch_unwind(AssertUnwindSafe(|| judge(&File::from(r), &|s, f| (s, f) == (scalar, function))));
                 match outcome {
-                    Ok(Outcome::Judged(failures)) => failures.into_iter().find(|f| f.of_equations == of_equations),
+                    Ok(Outcome::Judged(failures, _)) => failures.into_iter().find(|f| f.of_equations == of_equations),
                     _ => None,
                 }
             };
