@@ -28,7 +28,6 @@ struct Case {
 }
 
 /// What came of a case.
-#[derive(Debug)]
 enum Outcome {
     /// With the first complaint.
     Refused(String),
@@ -190,9 +189,13 @@ fn all_are_right(count: u64, seed: u64, styles: &[Style]) -> usize {
                     Ok(Outcome::Right) => {}
                     Ok(Outcome::Refused(why)) => found.0.push(why),
                     wrong => {
+                        let why = match wrong {
+                            Ok(Outcome::Wrong(why)) => why,
+                            _ => "a panic".to_string(),
+                        };
                         let [robot, scene] = case.sources();
                         let of = (seed + k, case.options.scalar, case.options.fma, case.options.certify.is_some());
-                        println!("{of:?}: {wrong:?}\n{}\n{}", robot.text(), scene.text());
+                        println!("{of:?}: {why}\n{}\n{}", robot.text(), scene.text());
                         found.1.push(seed + k);
                     }
                 }
