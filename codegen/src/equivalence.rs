@@ -45,7 +45,7 @@ const LOSSES: f64 = 16.0;
 /// A difference of inertias that is so many roundings of them has hardly a digit.
 const NO_DIGIT: f64 = 1e3;
 /// At so many random states.
-const STATES: usize = 4;
+const STATES: usize = 8;
 /// Where random numbers begin: another place than where states for choices come from.
 const SEED: u64 = 0x6a09_e667_f3bc_c908;
 
@@ -158,11 +158,10 @@ pub(crate) fn of_function(
         let found = evaluate(graph, &inputs(graph, &state));
         let off = differences(robot, frames, function, options, &state, &found);
         compare(function.name(), &graph.outputs, &off, AGREE)?;
-        // residuals have no scale of accelerations: all of them are judged by the greatest
         let sizes = match function {
-            Function::ForwardDynamics => {
-                vec![found.iter().map(|x| x.hi().abs()).fold(0.0, f64::max); found.len()]
-            }
+            // residuals have no scale of accelerations: all of them are judged by the greatest
+            Function::ForwardDynamics => vec![found.iter().map(|x| x.hi().abs()).fold(0.0, f64::max); found.len()],
+            Function::MassMatrix => sizes_of_inertias(robot, frames, options, &state),
             _ => off.iter().map(|x| x.size).collect::<Vec<f64>>(),
         };
         match options.scalar {
@@ -178,6 +177,20 @@ pub(crate) fn of_function(
         losses.plain = vec![losses.plain.iter().copied().fold(0.0, f64::max); losses.plain.len()];
     }
     losses.compare(function.name(), graph, options.scalar)
+}
+
+/// Natural scales of the wanted entries of H: √(H_ii H_jj), where H_ii is not what is left of terms that cancel.
+fn sizes_of_inertias(robot: &Robot, frames: &[String], options: &Options, state: &State) -> Vec<f64> {
+    let (scene, nv) = (&options.scene, robot.model.nv());
+    let (wanted, _) =
+        scene.select(Function::MassMatrix, &robot.model, scene.frames_of(Function::MassMatrix, frames).len());
+    let ports = scene.ports(Function::MassMatrix, &robot.model);
+    let mut bound = scene.bind(Function::MassMatrix, robot, &of_ports(&ports, state, Magnitude::new));
+    with_sizes(&mut bound.model, longest_lever(&robot.model));
+    let method = ForwardDynamicsMethod::ArticulatedBody;
+    let h = Function::MassMatrix.evaluate(&bound.model, &[], method, &bound.arguments);
+    let root = |i: usize| h[i * nv + i].value.hi().abs().max(POINT * h[i * nv + i].size).sqrt();
+    wanted.into_iter().map(|k| root(k / nv) * root(k % nv)).collect()
 }
 
 /// What a program and the plain equations lose to rounding: of each result the worst of some states, over its natural scale.
