@@ -55,6 +55,33 @@ fn a_common_factor_is_taken_out_of_products_without_another_user() {
 }
 
 #[test]
+fn multiples_of_one_value_meet_in_their_constants() {
+    let g = graph(|g, [a, b, c, ..]| {
+        let ab = g.add(Op::Mul(a, b));
+        let [most, more] = [0.98, -3.0].map(|x| g.constant(Dd::from(x)));
+        let (x, y) = (g.add(Op::Mul(most, ab)), g.add(Op::Mul(more, c)));
+        let rest = g.add(Op::Sub(ab, x));
+        let sum = g.add(Op::Add(rest, y));
+        vec![g.add(Op::Add(sum, c))]
+    });
+    let (before, after) = before_and_after(&g);
+    // 0.02 a b − 2 c
+    assert_eq!((before.mul, before.add, after.mul, after.add), (3, 3, 3, 1));
+}
+
+#[test]
+fn a_multiple_with_another_user_stays() {
+    let g = graph(|g, [a, b, ..]| {
+        let half = g.constant(Dd::from(0.7));
+        let product = g.add(Op::Mul(half, a));
+        let sum = g.add(Op::Add(a, product));
+        vec![g.add(Op::Add(sum, b)), product]
+    });
+    let (before, after) = before_and_after(&g);
+    assert_eq!((before.mul, before.add), (after.mul, after.add));
+}
+
+#[test]
 fn a_product_with_another_user_keeps_its_factors() {
     let g = graph(|g, [a, b, c, ..]| {
         let (ab, ac) = (g.add(Op::Mul(a, b)), g.add(Op::Mul(a, c)));

@@ -1,8 +1,9 @@
 //! Fewer and better fused additions: sums with all their terms at once.
 //!
-//! Equal over the reals, so only where rules of grade `Algebraic` are allowed. Four steps, in rounds until none helps:
+//! Equal over the reals, so only where rules of grade `Algebraic` are allowed. Five steps, in rounds until none helps:
 //!
 //! * flatten: (a + b) + c = a + b + c where a + b has no other user; x − x goes;
+//! * gather: c x + x = (c + 1) x where nothing else uses the product: what cancels does so among constants, without rounding;
 //! * factor: a b + a c = a (b + c) where neither product has another user: a multiplication less, and no fused
 //!   instruction more; a b + a b = a (b + b), where the product fuses;
 //! * share: the pair ±x ± y that stands in most sums is added once, for all of them;
@@ -122,6 +123,7 @@ impl Table {
         for round in 0..ROUNDS {
             self.changed = false;
             self.flatten();
+            self.gather();
             self.double();
             if self.factor() {
                 self.flatten();
@@ -334,6 +336,60 @@ impl Table {
         let negative = key[0].is_negative();
         key.iter_mut().for_each(|t| *t = t.signed(negative));
         negative
+    }
+
+    /// c x ± d x ± x = (c ± d ± 1) x, where nothing else uses the products.
+    fn gather(&mut self) {
+        let (uses, order) = self.uses();
+        let mut any = false;
+        for v in order {
+            let Value::Sum(terms) = &self.values[v] else { continue };
+            let multiple = |t: Term| self.multiple(t, uses.get(t.value()) == Some(&1));
+            let multiples: Vec<(Term, Option<Dd>)> = terms.iter().map(|t| multiple(*t)).collect();
+            let is_met = |k: &usize| {
+                let (x, factor) = multiples[*k];
+                factor.is_some() && multiples.iter().filter(|(other, _)| other.value() == x.value()).count() > 1
+            };
+            let Some(first) = (0..terms.len()).find(is_met) else { continue };
+            let x = multiples[first].0.value();
+            let (met, rest): (Vec<usize>, Vec<usize>) = (0..terms.len()).partition(|k| multiples[*k].0.value() == x);
+            let signed = |(x, factor): (Term, Option<Dd>)| {
+                let factor = factor.unwrap_or(Dd::ONE);
+                if x.is_negative() {
+                    -factor
+                } else {
+                    factor
+                }
+            };
+            let factor = met.iter().fold(Dd::ZERO, |sum, k| sum + signed(multiples[*k]));
+            let mut terms: Vec<Term> = rest.into_iter().map(|k| terms[k]).collect();
+            let x = Term::new(x, false);
+            if factor == Dd::ONE || factor == -Dd::ONE {
+                terms.push(x.signed(factor == -Dd::ONE));
+            } else if factor != Dd::ZERO {
+                let factor = self.constant(factor);
+                terms.push(self.product(factor, x, None));
+            }
+            self.set_sum(v, &terms);
+            any = true;
+        }
+        if any {
+            self.unite();
+        }
+    }
+
+    /// What a term is a multiple of, and the factor, where it may be taken apart: a product with a constant.
+    fn multiple(&self, t: Term, is_own: bool) -> (Term, Option<Dd>) {
+        if is_own && self.is_product(t) {
+            let [a, b] = self.factors(t.value());
+            for (c, x) in [(a, b), (b, a)] {
+                if let Value::Constant(factor) = self.values[c.value()] {
+                    let negative = c.is_negative() != x.is_negative();
+                    return (Term::new(x.value(), t.is_negative() != negative), Some(factor.value()));
+                }
+            }
+        }
+        (t, None)
     }
 
     /// a b + a b = a (b + b), where nothing else uses the product: then it fuses. Twice the factor that more values use,
