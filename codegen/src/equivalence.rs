@@ -45,7 +45,7 @@ const LOSSES: f64 = 16.0;
 /// A difference of inertias that is so many roundings of them has hardly a digit.
 const NO_DIGIT: f64 = 1e3;
 /// At so many random states.
-const STATES: usize = 8;
+const STATES: usize = 6;
 /// Where random numbers begin: another place than where states for choices come from.
 const SEED: u64 = 0x6a09_e667_f3bc_c908;
 

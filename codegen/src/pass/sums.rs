@@ -1,9 +1,9 @@
 //! Fewer and better fused additions: sums with all their terms at once.
 //!
-//! Equal over the reals, so only where rules of grade `Algebraic` are allowed. Five steps, in rounds until none helps:
+//! Equal over the reals, so only where rules of grade `Algebraic` are allowed. Four steps, in rounds until none helps:
 //!
 //! * flatten: (a + b) + c = a + b + c where a + b has no other user; x − x goes;
-//! * gather: c x + x = (c + 1) x where nothing else uses the product: what cancels does so among constants, without rounding;
+//!   c x + x = (c + 1) x, where nothing else uses the product: what cancels does so among constants, without rounding;
 //! * factor: a b + a c = a (b + c) where neither product has another user: a multiplication less, and no fused
 //!   instruction more; a b + a b = a (b + b), where the product fuses;
 //! * share: the pair ±x ± y that stands in most sums is added once, for all of them;
@@ -123,7 +123,6 @@ impl Table {
         for round in 0..ROUNDS {
             self.changed = false;
             self.flatten();
-            self.gather();
             self.double();
             if self.factor() {
                 self.flatten();
@@ -224,7 +223,7 @@ impl Table {
         (uses, order)
     }
 
-    /// Sums without another user dissolve in the sum that uses them; constants of a sum become one, opposites go.
+    /// Sums without another user dissolve in the sum that uses them; constants of a sum become one, multiples of a value one, opposites go.
     fn flatten(&mut self) {
         let (uses, order) = self.uses();
         let mut flat: Vec<Term> = Vec::new();
@@ -240,6 +239,7 @@ impl Table {
                     _ => flat.push(t),
                 }
             }
+            self.gather(&mut flat, &uses);
             self.set_sum(v, &flat);
         }
         self.unite();
@@ -338,49 +338,38 @@ impl Table {
         negative
     }
 
-    /// c x ± d x ± x = (c ± d ± 1) x, where nothing else uses the products.
-    fn gather(&mut self) {
-        let (uses, order) = self.uses();
-        let mut any = false;
-        for v in order {
-            let Value::Sum(terms) = &self.values[v] else { continue };
-            let multiple = |t: Term| self.multiple(t, uses.get(t.value()) == Some(&1));
-            let multiples: Vec<(Term, Option<Dd>)> = terms.iter().map(|t| multiple(*t)).collect();
-            let is_met = |k: &usize| {
-                let (x, factor) = multiples[*k];
-                factor.is_some() && multiples.iter().filter(|(other, _)| other.value() == x.value()).count() > 1
-            };
-            let Some(first) = (0..terms.len()).find(is_met) else { continue };
-            let x = multiples[first].0.value();
-            let (met, rest): (Vec<usize>, Vec<usize>) = (0..terms.len()).partition(|k| multiples[*k].0.value() == x);
-            let signed = |(x, factor): (Term, Option<Dd>)| {
-                let factor = factor.unwrap_or(Dd::ONE);
-                if x.is_negative() {
-                    -factor
-                } else {
-                    factor
-                }
-            };
-            let factor = met.iter().fold(Dd::ZERO, |sum, k| sum + signed(multiples[*k]));
-            let mut terms: Vec<Term> = rest.into_iter().map(|k| terms[k]).collect();
-            let x = Term::new(x, false);
-            if factor == Dd::ONE || factor == -Dd::ONE {
-                terms.push(x.signed(factor == -Dd::ONE));
-            } else if factor != Dd::ZERO {
-                let factor = self.constant(factor);
-                terms.push(self.product(factor, x, None));
+    /// Of the terms of one sum: c x ± d x ± x = (c ± d ± 1) x, where nothing else uses the products.
+    fn gather(&mut self, terms: &mut Vec<Term>, uses: &[u32]) {
+        let mut first = 0;
+        while let Some(k) = (first..terms.len()).find(|k| self.multiple(terms[*k], uses).1.is_some()) {
+            first = k + 1;
+            let x = self.multiple(terms[k], uses).0.value();
+            let is_met = |t: &Term| self.multiple(*t, uses).0.value() == x;
+            if terms.iter().filter(|t| is_met(t)).count() < 2 {
+                continue;
             }
-            self.set_sum(v, &terms);
-            any = true;
-        }
-        if any {
-            self.unite();
+            let mut sum = Dd::ZERO;
+            for (x, factor) in terms.iter().filter(|t| is_met(t)).map(|t| self.multiple(*t, uses)) {
+                let factor = factor.unwrap_or(Dd::ONE);
+                sum = if x.is_negative() { sum - factor } else { sum + factor };
+            }
+            let rest: Vec<Term> = terms.iter().copied().filter(|t| !is_met(t)).collect();
+            *terms = rest;
+            first = 0;
+            let x = Term::new(x, false);
+            if sum == Dd::ONE || sum == -Dd::ONE {
+                terms.push(x.signed(sum == -Dd::ONE));
+            } else if sum != Dd::ZERO {
+                let factor = self.constant(sum);
+                let product = self.product(factor, x, None);
+                terms.push(product);
+            }
         }
     }
 
     /// What a term is a multiple of, and the factor, where it may be taken apart: a product with a constant.
-    fn multiple(&self, t: Term, is_own: bool) -> (Term, Option<Dd>) {
-        if is_own && self.is_product(t) {
+    fn multiple(&self, t: Term, uses: &[u32]) -> (Term, Option<Dd>) {
+        if self.is_product(t) && uses.get(t.value()) == Some(&1) {
             let [a, b] = self.factors(t.value());
             for (c, x) in [(a, b), (b, a)] {
                 if let Value::Constant(factor) = self.values[c.value()] {
