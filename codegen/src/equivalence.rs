@@ -146,6 +146,8 @@ pub(crate) fn of_function(
     let ports = options.scene.ports(function, &robot.model);
     let mut states = States::new(robot, options);
     let mut losses = Losses::new(graph);
+    let (wanted, _) = options.scene.select(function, &robot.model, options.scene.frames_of(function, frames).len());
+    let is_whole = wanted.into_iter().eq(0..robot.model.nv().pow(2));
     for _ in 0..STATES {
         let state = states.next(&ports);
         if options.grade == Grade::Exact {
@@ -161,7 +163,7 @@ pub(crate) fn of_function(
         let sizes = match function {
             // residuals have no scale of accelerations: all of them are judged by the greatest
             Function::ForwardDynamics => vec![found.iter().map(|x| x.hi().abs()).fold(0.0, f64::max); found.len()],
-            Function::MassMatrix => sizes_of_inertias(robot, frames, options, &state),
+            Function::MassMatrix if is_whole => sizes_of_inertias(robot.model.nv(), &found, &off),
             _ => off.iter().map(|x| x.size).collect::<Vec<f64>>(),
         };
         match options.scalar {
@@ -179,18 +181,10 @@ pub(crate) fn of_function(
     losses.compare(function.name(), graph, options.scalar)
 }
 
-/// Natural scales of the wanted entries of H: √(H_ii H_jj), where H_ii is not what is left of terms that cancel.
-fn sizes_of_inertias(robot: &Robot, frames: &[String], options: &Options, state: &State) -> Vec<f64> {
-    let (scene, nv) = (&options.scene, robot.model.nv());
-    let (wanted, _) =
-        scene.select(Function::MassMatrix, &robot.model, scene.frames_of(Function::MassMatrix, frames).len());
-    let ports = scene.ports(Function::MassMatrix, &robot.model);
-    let mut bound = scene.bind(Function::MassMatrix, robot, &of_ports(&ports, state, Magnitude::new));
-    with_sizes(&mut bound.model, longest_lever(&robot.model));
-    let method = ForwardDynamicsMethod::ArticulatedBody;
-    let h = Function::MassMatrix.evaluate(&bound.model, &[], method, &bound.arguments);
-    let root = |i: usize| h[i * nv + i].value.hi().abs().max(POINT * h[i * nv + i].size).sqrt();
-    wanted.into_iter().map(|k| root(k / nv) * root(k % nv)).collect()
+/// Natural scales of the entries of H: √(H_ii H_jj), where H_ii is not what is left of terms that cancel.
+fn sizes_of_inertias(nv: usize, h: &[Dd], off: &[Magnitude]) -> Vec<f64> {
+    let root = |i: usize| h[i * nv + i].hi().abs().max(POINT * off[i * nv + i].size).sqrt();
+    (0..nv * nv).map(|k| root(k / nv) * root(k % nv)).collect()
 }
 
 /// What a program and the plain equations lose to rounding: of each result the worst of some states, over its natural scale.
