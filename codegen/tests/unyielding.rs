@@ -296,7 +296,7 @@ motor = { torque_constant = 0.08, resistance = 1.2, rotor_inertia = 4e-4 }
         let rate = rows.jacobian.iter().map(|row| dot(row, qd)).collect();
         let rows = FunctionalCoordinates { rate, ..rows };
         // reactions that act along the rows, or are tilted by friction
-        let tilted = vec![wide(&[0.41, 0.85, -0.33]), wide(&[-0.7, 0.25, 0.48])];
+        let tilted = [wide(&[0.41, 0.85, -0.33]), wide(&[-0.7, 0.25, 0.48])];
         let masses = [Struck::Mass { mass: Dd::from(0.4), velocity: Dd::from(-0.2) }, Struck::Rigid];
         for (applied, struck) in [(None, [Struck::Rigid; 2]), (Some(&tilted[..]), [Struck::Rigid; 2]), (None, masses)] {
             for restitution in [0.0, 0.3] {

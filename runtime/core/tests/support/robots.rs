@@ -221,7 +221,7 @@ pub fn written_robot(written: &Written, name: String) -> MassCentreTree<Dd> {
 /// Robots in every style of numbers, `seeds` of each: chains and trees with up to seven joints, some of which slide, some afloat.
 pub fn written_robots(seeds: u64) -> impl Iterator<Item = (Style, MassCentreTree<Dd>)> {
     let of = |seed: u64, k: usize, style: Style| {
-        let (branched, floating) = ((k + seed as usize) % 3 == 0, (k + seed as usize) % 5 == 0);
+        let (branched, floating) = ((k + seed as usize).is_multiple_of(3), (k + seed as usize).is_multiple_of(5));
         let joints = 1 + (k * 3 + seed as usize) % 7;
         let shape = Shape { joints, fixed: 0, branched, floating, sliding: 4 };
         let written = Written::new(style, shape, 40 + 100 * seed + k as u64);
