@@ -83,7 +83,7 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
         }
     }
     for number in description.drives.iter().chain(&scene.drives).flat_map(|drive| &drive.written.0) {
-        complain(&number.place, number.what.clone(), number.value, number.is_needed);
+        complain(&number.value.place, number.what.clone(), number.value.value, number.is_needed);
     }
     for (i, parameter) in scene.parameters.iter().enumerate() {
         let Parameter::Drive { drive, numbers, form: Some(form), .. } = parameter else { continue };

@@ -298,3 +298,22 @@ fn scenes_in_code_are_checked_as_those_in_files() {
         Payload { name: "p".into(), frame: "camera".into(), mass: 1.0, com: [0.0; 3], inertia: [f64::NAN; 6] };
     assert_eq!(codes(&Scene { payloads: vec![payload], ..Scene::default() }), ["unphysical-body"]);
 }
+
+/// Output depends on what a scene says, not on where its file stands.
+#[test]
+fn a_scene_gives_the_same_bytes_wherever_its_file_stands() {
+    let [robot, text] = ["descriptions/planar_2r.toml", "scenes/planar_2r_elastic.toml"].map(|file| {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots").join(file);
+        std::fs::read_to_string(path).expect("a file of the repository")
+    });
+    let at = |folder: &str| {
+        let source = Source::new(&format!("{folder}/planar_2r.toml"), robot.clone());
+        let file = Source::new(&format!("{folder}/scene.toml"), text.clone());
+        let mut diagnostics = Diagnostics::new();
+        let file = scene::read(&file, &mut diagnostics).expect("a scene of the repository");
+        let functions = vec![Function::GravityForce];
+        let options = Options { functions, ..Default::default() };
+        compile(&source, &file.into_options(options)).expect("it compiles").text
+    };
+    assert!(at("here") == at("/somewhere/else"));
+}

@@ -75,11 +75,9 @@ pub struct Written {
     /// Which it is: ``ratio of drive `one` ``.
     pub what: String,
     /// Its value.
-    pub value: f64,
+    pub value: Noted<f64>,
     /// Whether it must not become zero.
     pub is_needed: bool,
-    /// Where it stands.
-    pub place: Place,
 }
 
 /// Numbers as they are written: no part of the drive, which may have been given others since.
@@ -596,9 +594,9 @@ impl Reader<'_> {
     fn judged(&mut self, table: &Table, key: &str, must: Must) -> Option<f64> {
         let x = self.in_range(table, key, must)?;
         let is_needed = !must.holds(0.0);
-        let written = Written { what: table.what(key), value: x.value, is_needed, place: x.place };
-        self.drive_numbers.push(written);
-        Some(x.value)
+        let value = x.value;
+        self.drive_numbers.push(Written { what: table.what(key), value: x.into(), is_needed });
+        Some(value)
     }
 
     /// A number of a range that no equation has, or a complaint.
@@ -727,7 +725,8 @@ impl Reader<'_> {
 
     fn write_down(&mut self, table: &Table, key: &str, row: &Value<Vec<f64>>) {
         let (what, place) = (table.what(key), &row.place);
-        let written = |x: &f64| Written { what: what.clone(), value: *x, is_needed: false, place: place.clone() };
+        let noted = |x: &f64| Noted { value: *x, place: place.clone() };
+        let written = |x: &f64| Written { what: what.clone(), value: noted(x), is_needed: false };
         self.drive_numbers.extend(row.value.iter().map(written));
     }
 
