@@ -551,6 +551,8 @@ pub fn examine(source: &Source, options: &Options) -> Diagnostics {
 
 /// A robot in its scene, and options that fit it.
 struct Prepared {
+    /// What the file says.
+    description: Description,
     /// The robot without its scene.
     whole: Model<Dd>,
     model: Model<Dd>,
@@ -594,7 +596,10 @@ fn prepare(source: &Source, options: &Options) -> Result<Prepared, Diagnostics> 
         options.scene.places.complain("outputs.limbs", scene::messages::no_identical_limbs(), &mut diagnostics);
     }
     diagnostics.sort();
-    let (Some(whole), Some(model), false) = (whole, model, diagnostics.has_errors()) else { return Err(diagnostics) };
+    let (Some(description), Some(whole), Some(model), false) = (description, whole, model, diagnostics.has_errors())
+    else {
+        return Err(diagnostics);
+    };
     let resolved = Options { scene: options.scene.resolved(&model), functions, ..options.clone() };
     singular::demand_inertia(&model, &resolved, &mut diagnostics);
     match diagnostics.has_errors() {
@@ -602,18 +607,18 @@ fn prepare(source: &Source, options: &Options) -> Result<Prepared, Diagnostics> 
             diagnostics.sort();
             Err(diagnostics)
         }
-        false => Ok(Prepared { whole, model, frames, options: options.clone(), resolved, diagnostics }),
+        false => Ok(Prepared { description, whole, model, frames, options: options.clone(), resolved, diagnostics }),
     }
 }
 
 fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
-    let Prepared { whole, model, frames, options, resolved, mut diagnostics } = prepare(source, options)?;
+    let Prepared { description, whole, model, frames, options, resolved, mut diagnostics } = prepare(source, options)?;
     let hash = hash(source.text(), &resolved);
     let robot = Robot::new(model);
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
     let programs = resolved.functions.iter().filter(|f| !is_empty(f));
     let programs: Result<Vec<Program>, _> = programs.map(|f| checked(&robot, &frames, *f, &resolved)).collect();
-    let mut programs = programs.map_err(|wrong| only(no_form(&wrong, &robot.model, options.scalar, source)))?;
+    let mut programs = programs.map_err(|wrong| only(no_form(&wrong, &robot.model, options.scalar, &description)))?;
     let beyond = |program: &str, why: &str, diagnostics: &mut Diagnostics| {
         let complaint = scene::messages::program_beyond_scalar(program, options.scalar.name(), why);
         options.scene.places.complain("numbers.scalar", complaint, diagnostics);
@@ -669,12 +674,11 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
 }
 
 /// What is said of a function of which no form agrees.
-fn no_form(wrong: &Disagreement, model: &Model<Dd>, scalar: Scalar, source: &Source) -> Diagnostic {
+fn no_form(wrong: &Disagreement, model: &Model<Dd>, scalar: Scalar, description: &Description) -> Diagnostic {
     let Some((body, part)) = wrong.beyond_digits(model, scalar) else { return wrong.error(model) };
     let (joint, link) = (&model.bodies[body].joint.name, &model.bodies[body].name);
     let complaint = messages::inertia_beyond_digits(&wrong.program, scalar.name(), joint, part);
-    let description = description::read(source, &mut Diagnostics::new());
-    match description.as_ref().and_then(|d| d.place_of(joint, link)) {
+    match description.place_of(joint, link) {
         Some(place) => complaint.at(place),
         None => complaint,
     }

@@ -359,6 +359,15 @@ fn with(a: &Analyze, description: &Description, options: &Options, values: &[f64
 
 /// Looks for the best values and prints them beside those of the robot file.
 fn optimized(a: &Analyze, description: &Description, options: &Options, motion: &Motion) -> Result<(), Failure> {
+    let states = analysis::states(motion, a.interval);
+    if states.len() > MOST_SEARCHED {
+        let instants = states.len();
+        print::error(&format!("a search runs through the motion hundreds of times, which has {instants} instants"));
+        print::help(&format!(
+            "at most {MOST_SEARCHED} instants are searched: a greater --interval, or a shorter motion"
+        ));
+        return Err(Failure::Input);
+    }
     // both ends of all ranges must be robots, so that everything between them is one
     let ends = |end: fn(&(f64, f64)) -> f64| a.optimize.iter().map(|r| end(&r.ends)).collect::<Vec<f64>>();
     with(a, description, options, &ends(|e| e.0))?;
@@ -380,16 +389,6 @@ fn optimized(a: &Analyze, description: &Description, options: &Options, motion: 
     let effort = |b: &&Body<f64>| if b.is_passive() { f64::INFINITY } else { b.joint.limits.effort };
     let efforts: Vec<f64> = bodies.iter().map(effort).collect();
     let ranges: Vec<(f64, f64)> = a.optimize.iter().map(|r| r.ends).collect();
-    let states = analysis::states(motion, a.interval);
-    if states.len() > MOST_SEARCHED {
-        progress.finish_and_clear();
-        let instants = states.len();
-        print::error(&format!("a search runs through the motion hundreds of times, which has {instants} instants"));
-        print::help(&format!(
-            "at most {MOST_SEARCHED} instants are searched: a greater --interval, or a shorter motion"
-        ));
-        return Err(Failure::Input);
-    }
     let (times, qd): (Vec<f64>, Vec<Vec<f64>>) = states.iter().map(|(t, [_, qd, _])| (*t, qd.clone())).unzip();
     let by_gradient = |p: &[f64]| {
         let of_design = programs.kept(p);
