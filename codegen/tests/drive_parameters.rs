@@ -3,7 +3,10 @@
 
 #[path = "support/chain.rs"]
 mod chain;
+#[path = "support/in_c.rs"]
+mod in_c;
 
+use in_c::{succeeds, Library};
 use std::path::Path;
 use std::process::Command;
 use straightline_codegen::compile::{optimised, parameter_program, Optimisations};
@@ -517,14 +520,8 @@ fn functions_without_drives_take_nothing() {
     assert!(free.graph(Function::InverseDynamics).inputs.iter().all(|p| p.wrapper.is_none()));
 }
 
-fn succeeds(command: &mut Command) -> String {
-    let output = command.output().expect("the program is there");
-    assert!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).expect("text")
-}
-
 /// The lines of a program that make each parameter of these numbers, and its name and length.
-fn in_c(robot: &InScene, numbers: &[f64]) -> (String, Vec<(String, usize)>) {
+fn made_in_c(robot: &InScene, numbers: &[f64]) -> (String, Vec<(String, usize)>) {
     let (mut rest, mut lines, mut all) = (numbers, String::new(), Vec::new());
     for parameter in &robot.options.scene.parameters {
         let constructor = parameter_program(&robot.robot, parameter, &robot.options);
@@ -562,21 +559,9 @@ fn c_makes_a_drive_of_its_numbers_and_is_told_which_of_them_cannot_be() {
     ] {
         assert!(header.contains(part), "`{part}` is not in\n{header}");
     }
-    if Command::new("cc").arg("--version").output().is_err() {
-        eprintln!("skipped: there is no C compiler");
-        return;
-    }
-    let built = package.join("target");
-    succeeds(
-        Command::new(env!("CARGO"))
-            .args(["build", "--offline", "--manifest-path"])
-            .arg(package.join("Cargo.toml"))
-            .env("CARGO_TARGET_DIR", &built)
-            .env("RUSTFLAGS", "-Dwarnings"),
-    );
     let free = InScene::new(&arm(&with(RIGID.drives, RIGID.numbers)), &options(RIGID.parameters));
     let fixed = InScene::new(&arm(&with(RIGID.drives, RIGID.others)), &options(""));
-    let (makes, parameters) = in_c(&free, RIGID.others);
+    let (makes, parameters) = made_in_c(&free, RIGID.others);
     let (mut arrays, mut calls, mut truth) = (Vec::new(), String::new(), Vec::new());
     for name in functions {
         let graph = free.graph(only(name)[0]);
@@ -619,18 +604,7 @@ int main(void) {{
         numbers = nominal.join(", "),
         arrays = arrays.concat(),
     );
-    std::fs::write(folder.join("main.c"), program).expect("it can be written");
-    succeeds(
-        Command::new("cc")
-            .args(["-Wall", "-Wextra", "-Werror", "-pedantic", "-std=c99"])
-            .arg(folder.join("main.c"))
-            .arg("-I")
-            .arg(package.join("include"))
-            .arg(built.join("debug/libarm_dynamics.a"))
-            .args(["-lm", "-lpthread", "-ldl", "-o"])
-            .arg(folder.join("main")),
-    );
-    let printed = succeeds(&mut Command::new(folder.join("main")));
+    let Some(printed) = in_c::printed(&package, "arm_dynamics", Library::StaticDebug, &program) else { return };
     let mut found = printed.lines().map(|line| Dd::from(line.parse::<f64>().expect("a number")));
     for (name, truth) in functions.iter().zip(&truth) {
         let values: Vec<Dd> = found.by_ref().take(truth.len()).collect();

@@ -1,5 +1,9 @@
 //! The exported package as a stranger uses it: written by the command, built by cargo, called from C.
 
+#[path = "support/in_c.rs"]
+mod in_c;
+
+use in_c::{is_there, succeeds, Library};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -24,16 +28,6 @@ fn scratch(name: &str) -> PathBuf {
     path
 }
 
-fn succeeds(command: &mut Command) -> String {
-    let output = command.output().unwrap();
-    assert!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
-
-fn is_there(program: &str) -> bool {
-    Command::new(program).arg("--version").output().is_ok()
-}
-
 #[test]
 fn c_calls_every_function_and_gets_what_the_generic_runtime_computes() {
     let scratch = scratch("export");
@@ -44,20 +38,6 @@ fn c_calls_every_function_and_gets_what_the_generic_runtime_computes() {
             .args(["--frame", "forearm", "--frame", "column", "--lanes", "-o"])
             .arg(&package),
     );
-    let built = package.join("target");
-    succeeds(
-        Command::new(env!("CARGO"))
-            .args(["build", "--release", "--offline", "--manifest-path"])
-            .arg(package.join("Cargo.toml"))
-            .env("CARGO_TARGET_DIR", &built)
-            // warnings of generated code are ours to prevent
-            .env("RUSTFLAGS", "-Dwarnings"),
-    );
-    if !is_there("cc") {
-        eprintln!("skipped: there is no C compiler");
-        return;
-    }
-
     // truth: the generic algorithms in double-double
     let options = ModelOptions { floating_base: true, ..ModelOptions::default() };
     let (model, _) = load(&Source::new(ARM, fs::read_to_string(ARM).unwrap()), &options);
@@ -108,28 +88,12 @@ int main(void) {{
 }}
 "#
     );
-    fs::write(scratch.join("main.c"), program).unwrap();
-    let (include, release) = (package.join("include"), built.join("release"));
-    let strict = ["-Wall", "-Wextra", "-Werror", "-pedantic"];
-    succeeds(
-        Command::new("cc")
-            .args(strict)
-            .arg("-std=c99")
-            .arg(scratch.join("main.c"))
-            .arg("-I")
-            .arg(&include)
-            .arg("-L")
-            .arg(&release)
-            .args(["-larm3_dynamics", "-o"])
-            .arg(scratch.join("main"))
-            .arg(format!("-Wl,-rpath,{}", release.display())),
-    );
+    let printed = in_c::printed(&package, "arm3_dynamics", Library::SharedRelease, &program);
     if is_there("c++") {
-        succeeds(
-            Command::new("c++").args(strict).args(["-fsyntax-only", "-x", "c++"]).arg(include.join("arm3_dynamics.h")),
-        );
+        let strict = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-fsyntax-only", "-x", "c++"];
+        succeeds(Command::new("c++").args(strict).arg(package.join("include/arm3_dynamics.h")));
     }
-    let printed = succeeds(&mut Command::new(scratch.join("main")));
+    let Some(printed) = printed else { return };
     let mut lines = printed.lines();
     assert_eq!(lines.next(), Some("elbow forearm column"));
     assert_eq!(lines.clone().count(), truth.len());
@@ -175,18 +139,6 @@ fn c_makes_a_run_time_parameter_and_is_told_why_it_cannot_be() {
     fs::write(&scene, TOOL).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_straightline"));
     succeeds(command.args(["export", ARM, "--c-abi", "--scene"]).arg(&scene).arg("-o").arg(&package));
-    let built = package.join("target");
-    succeeds(
-        Command::new(env!("CARGO"))
-            .args(["build", "--offline", "--manifest-path"])
-            .arg(package.join("Cargo.toml"))
-            .env("CARGO_TARGET_DIR", &built)
-            .env("RUSTFLAGS", "-Dwarnings"),
-    );
-    if !is_there("cc") {
-        eprintln!("skipped: there is no C compiler");
-        return;
-    }
     let program = r#"#include "arm_dynamics.h"
 #include <stdio.h>
 int main(void) {
@@ -203,18 +155,7 @@ int main(void) {
     return 0;
 }
 "#;
-    fs::write(scratch.join("main.c"), program).unwrap();
-    succeeds(
-        Command::new("cc")
-            .args(["-Wall", "-Wextra", "-Werror", "-pedantic", "-std=c99"])
-            .arg(scratch.join("main.c"))
-            .arg("-I")
-            .arg(package.join("include"))
-            .arg(built.join("debug/libarm_dynamics.a"))
-            .args(["-lm", "-lpthread", "-ldl", "-o"])
-            .arg(scratch.join("main")),
-    );
-    let printed = succeeds(&mut Command::new(scratch.join("main")));
+    let Some(printed) = in_c::printed(&package, "arm_dynamics", Library::StaticDebug, program) else { return };
     // truth: m g · ∂p/∂q of the tool's mass centre, which is a frame there, by the generic algorithms
     let centre = FrameOption { name: "centre".into(), link: "forearm".into(), xyz: [0.1, 0.02, -0.05], rpy: [0.0; 3] };
     let options = ModelOptions { frames: vec![centre], ..ModelOptions::default() };
