@@ -5,6 +5,8 @@
 mod compare;
 #[path = "../../runtime/core/tests/support/robots.rs"]
 mod robots;
+#[path = "../../generated_tests/src/roll_pitch_yaw.rs"]
+mod roll_pitch_yaw;
 #[path = "../../generated_tests/src/written/mod.rs"]
 #[allow(dead_code, unused_imports)] // other tests use the rest
 mod written;

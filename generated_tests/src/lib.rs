@@ -13,6 +13,7 @@ pub mod inputs;
 pub mod programs;
 pub mod random;
 pub mod reference;
+pub mod roll_pitch_yaw;
 pub mod search;
 pub mod second_author;
 pub mod standalone;

@@ -2,6 +2,7 @@
 //! reference. The second way shares nothing with the compiler's reading, merging and framing of links.
 
 use crate::programs;
+use crate::roll_pitch_yaw::rotation;
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write;
 use straightline_codegen::diagnostic::Source;
@@ -93,16 +94,6 @@ pub struct RandomRobot {
 
 fn dd(v: [f64; 3]) -> Vector3<Dd> {
     Vector3::from(v.map(Dd::from))
-}
-
-/// R = Rz(yaw) Ry(pitch) Rx(roll).
-fn rotation(rpy: [f64; 3]) -> Matrix3<Dd> {
-    let [(sr, cr), (sp, cp), (sy, cy)] = rpy.map(|a| Dd::from(a).sin_cos());
-    let (o, i) = (Dd::ZERO, Dd::ONE);
-    let x = Matrix3::new(i, o, o, o, cr, -sr, o, sr, cr);
-    let y = Matrix3::new(cp, o, sp, o, i, o, -sp, o, cp);
-    let z = Matrix3::new(cy, -sy, o, sy, cy, o, o, o, i);
-    z * y * x
 }
 
 /// Mass, mass centre, and tensor about it, of links welded together, in the axes of one of them.

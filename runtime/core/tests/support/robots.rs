@@ -1,6 +1,7 @@
 //! Random robots and states.
 #![allow(dead_code)] // every test file uses a part of it
 
+use super::roll_pitch_yaw::rotation;
 use super::written::{Motion, Shape, Style, Written};
 use nalgebra::{Matrix3, Vector3};
 use straightline_core::reference::{unit, ExtendedPosition, Joint, MassCentreFrame, MassCentreLink, MassCentreTree};
@@ -180,7 +181,7 @@ pub fn written_robot(written: &Written, name: String) -> MassCentreTree<Dd> {
     let of = |i: usize| written.links[i].inertial.as_ref().expect("links that move have a mass");
     let links = written.links.iter().enumerate().skip(first).map(|(i, link)| {
         let (name, inertial) = (format!("l{i}"), of(i));
-        let turned = rpy_matrix(inertial.rpy);
+        let turned = rotation(inertial.rpy);
         let (mass, com) = (Dd::from(inertial.mass), vector(inertial.com));
         let inertia = turned * tensor(inertial.inertia) * turned.transpose();
         if i == 0 {
@@ -188,7 +189,7 @@ pub fn written_robot(written: &Written, name: String) -> MassCentreTree<Dd> {
         }
         assert_ne!(link.motion, Motion::Fixed, "nothing is welded");
         let parent = link.parent.checked_sub(first);
-        let (e, extended) = (unit(&vector(link.axis)), rpy_matrix(link.rpy));
+        let (e, extended) = (unit(&vector(link.axis)), rotation(link.rpy));
         let carried = parent.map_or(Vector3::zeros(), |_| vector(of(link.parent).com));
         MassCentreLink {
             name,
@@ -228,14 +229,4 @@ pub fn written_robots(seeds: u64) -> impl Iterator<Item = (Style, MassCentreTree
         (style, written_robot(&written, format!("{}, seed {seed}\n{}", style.name(), written.text())))
     };
     (0..seeds).flat_map(move |seed| Style::all().into_iter().enumerate().map(move |(k, style)| of(seed, k, style)))
-}
-
-/// R = Rz(yaw) Ry(pitch) Rx(roll).
-fn rpy_matrix(rpy: [f64; 3]) -> Matrix3<Dd> {
-    let [(sr, cr), (sp, cp), (sy, cy)] = rpy.map(|a| Dd::from(a).sin_cos());
-    let (o, i) = (Dd::ZERO, Dd::ONE);
-    let x = Matrix3::new(i, o, o, o, cr, -sr, o, sr, cr);
-    let y = Matrix3::new(cp, o, sp, o, i, o, -sp, o, cp);
-    let z = Matrix3::new(cy, -sy, o, sy, cy, o, o, o, i);
-    z * y * x
 }
