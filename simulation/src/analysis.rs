@@ -224,7 +224,8 @@ fn check(motion: &Motion, interval: f64, columns: usize) -> Result<(), Failure> 
     let most = (MOST_NUMBERS / columns) as f64;
     if rows > most {
         let duration = motion.duration();
-        let why = format!("{duration} s with an instant every {interval} s are {rows:.1e} rows of {columns} numbers");
+        let why =
+            format!("{duration:?} s with an instant every {interval:?} s are {rows:.1e} rows of {columns} numbers");
         let help = format!("at most {most:.0} rows are possible: a greater --interval, or a shorter motion");
         return Err(Failure::new(0.0, why).with_help(&help));
     }

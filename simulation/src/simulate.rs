@@ -80,7 +80,8 @@ impl Settings {
         let most_rows = (MOST_NUMBERS / columns.max(1)).min(self.most_steps).max(2);
         if rows > most_rows as f64 {
             let (duration, interval) = (self.duration, self.interval);
-            let why = format!("{duration} s with a row every {interval} s are {rows:.1e} rows of {columns} numbers");
+            let why =
+                format!("{duration:?} s with a row every {interval:?} s are {rows:.1e} rows of {columns} numbers");
             let least = duration / (most_rows as f64 - 2.0).max(1.0);
             let help =
                 format!("at most {most_rows} rows are written: an interval of {least:.1e} s or more, or less time");
@@ -226,7 +227,7 @@ impl Failure {
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the simulation failed at t = {} s: {}", self.time, self.why)
+        write!(f, "the simulation failed at t = {:?} s: {}", self.time, self.why)
     }
 }
 

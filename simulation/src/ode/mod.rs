@@ -182,7 +182,7 @@ impl Piece<'_> {
 
     fn not_finite(&self, t: f64) -> Failure {
         let (i, when) = self.blame.get().unwrap_or((0, t));
-        let why = format!("{} leaves the finite numbers at t = {when} s", self.equations.quantity(i));
+        let why = format!("{} leaves the finite numbers at t = {when:?} s", self.equations.quantity(i));
         Failure::new(t, why)
             .with_help("are masses, stiffnesses, gains and the start of a size that the robot can have?")
     }

@@ -276,7 +276,7 @@ pub fn failed(failure: &simulate::Failure) -> Failure {
 
 /// Why a motion has no figures.
 fn not_analysed(failure: &simulate::Failure) -> Failure {
-    print::error(&format!("the motion cannot be analysed: at t = {} s {}", failure.time, failure.why));
+    print::error(&format!("the motion cannot be analysed: at t = {:?} s {}", failure.time, failure.why));
     failure.help.iter().for_each(|help| print::help(help));
     Failure::Input
 }
