@@ -12,6 +12,7 @@ use straightline_core::reference::{ExtendedPosition, Joint, MassCentreFrame, Mas
 use straightline_core::Dd;
 
 pub use crate::written::Random;
+use crate::written::{Inertial, Motion, Shape, Style, Written};
 
 /// More of what tests draw.
 impl Random {
@@ -56,14 +57,6 @@ pub struct Kind {
     pub welded: usize,
     /// Right angles and axes along x, y, z, as most robots have them; otherwise everything is oblique.
     pub right_angled: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Motion {
-    Revolute,
-    Continuous,
-    Prismatic,
-    Fixed,
 }
 
 /// A link with the joint that carries it.
@@ -164,6 +157,23 @@ impl RandomRobot {
         let mut order: Vec<usize> = (1..total).collect();
         random.shuffle(&mut order);
         RandomRobot { kind, links, order }
+    }
+
+    /// A robot as people and exporters write it; limits and friction, which the chapter has not, are left out.
+    pub fn as_written(style: Style, shape: Shape, seed: u64) -> RandomRobot {
+        let written = Written::new(style, shape, seed);
+        let joints = written.joints();
+        let welded = written.links.len() - 1 - joints;
+        let Shape { branched, floating, .. } = shape;
+        let none = Inertial { mass: 0.0, com: [0.0; 3], rpy: [0.0; 3], inertia: [0.0; 6] };
+        let links = written.links.into_iter().map(|link| {
+            let Inertial { mass, com, rpy: inertia_rpy, inertia } = link.inertial.unwrap_or(none);
+            let crate::written::Link { parent, motion, xyz, rpy, axis, .. } = link;
+            Link { parent, motion, xyz, rpy, axis, mass, com, inertia_rpy, inertia }
+        });
+        let links: Vec<Link> = links.collect();
+        let order = (1..links.len()).collect();
+        RandomRobot { kind: Kind { joints, branched, floating, welded, right_angled: false }, links, order }
     }
 
     /// The name of a link.

@@ -5,6 +5,7 @@ use straightline_codegen::diagnostic::Source;
 use straightline_generated_tests::programs::{options, source};
 use straightline_generated_tests::random::{Kind, Random, RandomRobot};
 use straightline_generated_tests::reference::Robot;
+use straightline_generated_tests::written::{Shape, Style};
 
 fn generate(source: &Source, options: &Options) -> String {
     compile(source, options).unwrap_or_else(|d| panic!("{}", d.render())).text
@@ -33,11 +34,18 @@ fn the_same_robot_gives_the_same_bytes_on_any_thread() {
 fn what_was_compiled_before_leaves_no_trace() {
     let kind = Kind { joints: 9, branched: true, floating: false, welded: 3, right_angled: false };
     let file = |seed| Source::new("random.urdf", RandomRobot::new(&mut Random(seed), kind).urdf());
+    leaves_no_trace(file(5), file(6));
+    let shape = Shape { branched: true, fixed: 3, sliding: 4, ..Shape::arm(6) };
+    let file = |seed| Source::new("random.urdf", RandomRobot::as_written(Style::Exported, shape, seed).urdf());
+    leaves_no_trace(file(5), file(6));
+}
+
+fn leaves_no_trace(file: Source, before: Source) {
     let options = Options::default();
     let alone = std::thread::spawn({
-        let (file, options) = (file(5), options.clone());
+        let (file, options) = (file.clone(), options.clone());
         move || generate(&file, &options)
     });
-    generate(&file(6), &options);
-    assert!(generate(&file(5), &options) == alone.join().expect("compilation does not panic"));
+    generate(&before, &options);
+    assert!(generate(&file, &options) == alone.join().expect("compilation does not panic"));
 }

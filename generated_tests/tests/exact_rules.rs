@@ -12,6 +12,7 @@ use straightline_generated_tests::inputs::{self, ready_to_paste};
 use straightline_generated_tests::programs::{self, cast};
 use straightline_generated_tests::random::{Kind, Random, RandomRobot};
 use straightline_generated_tests::reference::{Robot, ROBOTS};
+use straightline_generated_tests::written::{Shape, Style};
 
 const STATES: usize = 20;
 const METHODS: [ForwardDynamicsMethod; 2] =
@@ -71,6 +72,21 @@ fn exact_programs_are_the_generic_runtime_for_random_trees() {
         let name = format!("random robot {seed} {kind:?}");
         interpreter_is_runtime::<f64>(&name, &loaded, &robot.frames(), Scalar::F64);
         interpreter_is_runtime::<f32>(&name, &loaded, &robot.frames(), Scalar::F32);
+    }
+}
+
+#[test]
+fn exact_programs_are_the_generic_runtime_for_robots_as_written() {
+    use Style::{Digits, Exported, Ratios, Round, Tiny, Units};
+    for (k, style) in [Digits(1), Digits(3), Digits(16), Exported, Round, Tiny, Ratios, Units].into_iter().enumerate() {
+        let shape = Shape { joints: 2 + k % 3, fixed: 3, branched: k % 2 == 0, floating: k % 3 == 0, sliding: 4 };
+        let robot = RandomRobot::as_written(style, shape, k as u64);
+        let (loaded, name) = (robot.load(), format!("{style:?}, {shape:?}, seed {k}"));
+        interpreter_is_runtime::<f64>(&name, &loaded, &robot.frames(), Scalar::F64);
+        // where masses are as 1 to 1e±20, f32 has no numbers for them
+        if style != Ratios {
+            interpreter_is_runtime::<f32>(&name, &loaded, &robot.frames(), Scalar::F32);
+        }
     }
 }
 

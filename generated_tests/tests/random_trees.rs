@@ -7,6 +7,7 @@ use straightline_generated_tests::inputs::{self, ready_to_paste};
 use straightline_generated_tests::programs::{self, cast};
 use straightline_generated_tests::random::{Kind, Random, RandomRobot};
 use straightline_generated_tests::second_author;
+use straightline_generated_tests::written::{Shape, Style};
 
 /// Equations: what double-double may lose, whose unit is 1.2e-32; both sides lose it.
 const EQUATIONS: f64 = 1e-26;
@@ -31,6 +32,11 @@ fn exact(inputs: &[Vec<f64>], kind: Kind) -> Vec<Vec<Dd>> {
 fn check(seed: u64, kind: Kind, states: usize) {
     let mut random = Random(seed);
     let robot = RandomRobot::new(&mut random, kind);
+    check_robot(&robot, &format!("{seed}"), &mut random, states);
+}
+
+fn check_robot(robot: &RandomRobot, name: &str, random: &mut Random, states: usize) {
+    let kind = robot.kind;
     let (loaded, literal) = (robot.load(), robot.load_literally());
     let (tree, frames) = (robot.reference(), robot.frames());
     let options = Options::default();
@@ -38,14 +44,14 @@ fn check(seed: u64, kind: Kind, states: usize) {
         let equations = program(&literal, &frames, function, &options);
         let program = program(&loaded, &frames, function, &options);
         for _ in 0..states {
-            let inputs = inputs::random(&mut random, &loaded.model, function);
+            let inputs = inputs::random(random, &loaded.model, function);
             let wide = exact(&inputs, kind);
             let expected = second_author::value(&tree, &frames, function, &wide);
             let (equations, i) = expected.worst(&programs::run(&equations, &wide));
             let (rounded, k) = expected.worst(&programs::run::<f64>(&program, &inputs));
             let about = || {
                 format!(
-                    "{} of random robot {seed} {kind:?}\n{}\n{}",
+                    "{} of random robot {name} {kind:?}\n{}\n{}",
                     function.name(),
                     ready_to_paste(&inputs),
                     robot.urdf()
@@ -73,6 +79,17 @@ fn robots_of(joints: usize) {
 #[test]
 fn robots_of_one_to_five_joints_agree_with_the_second_author() {
     [1, 2, 3, 5].into_iter().for_each(robots_of);
+}
+
+#[test]
+fn robots_as_written_agree_with_the_second_author() {
+    // few: codegen/tests/robots_as_written.rs has many, beside their plain programs
+    for (k, style) in Style::all().into_iter().step_by(4).chain([Style::Exported, Style::Units]).enumerate() {
+        let (branched, floating) = (k % 3 == 1, k % 5 == 2);
+        let shape = Shape { joints: 1 + k % 3, fixed: 3, branched, floating, sliding: 4 };
+        let robot = RandomRobot::as_written(style, shape, k as u64);
+        check_robot(&robot, &format!("{style:?}, {k}"), &mut Random(k as u64), 2);
+    }
 }
 
 #[test]
