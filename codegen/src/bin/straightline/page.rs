@@ -1,7 +1,7 @@
 //! The page of an analysis: what a motion asks of every joint and drive, in the style of the report.
 
 use super::arguments::Analyze;
-use super::motion::{drive_remarks, lines, violations, Swept};
+use super::motion::{drive_remarks, lines, six_digits, violations, Swept};
 use std::path::Path;
 use straightline_codegen::report::html::STYLE;
 use straightline_core::drive::Actuator;
@@ -220,7 +220,8 @@ fn sweep_section(page: &mut Page, path: &str, found: &Analysis, swept: &[Swept])
         [path, "given [J]", "taken [J]", "exceeded"].into_iter().chain(peaks.iter().map(String::as_str)).collect();
     let row = |(value, found): &Swept| {
         let sum = |f: fn(&JointFigures) -> f64| four_digits(found.joints.iter().map(f).sum());
-        let own = [format!("{value}"), sum(|j| j.given), sum(|j| j.taken), found.violations.len().to_string()];
+        let own =
+            [six_digits(*value).to_string(), sum(|j| j.given), sum(|j| j.taken), found.violations.len().to_string()];
         own.into_iter().chain(found.joints.iter().map(|j| four_digits(j.peak.0))).collect()
     };
     page.table(&head, &swept.iter().map(row).collect::<Vec<Vec<String>>>());
