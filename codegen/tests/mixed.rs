@@ -164,3 +164,21 @@ fn the_text_computes_what_was_analysed() {
     let bits: Vec<u32> = String::from_utf8_lossy(&ran.stdout).lines().map(|l| l.parse().expect("a number")).collect();
     assert_eq!(bits, expected);
 }
+
+/// From all in f32 to all in f64: constants stand in f32 beside values that are made f64, and the like.
+#[test]
+fn every_budget_is_met_or_said_to_be_too_tight() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions/planar_2r.toml");
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let robot = Source::new("planar_2r.toml", text);
+    let mut met = 0;
+    for max_error in [1.2e-5, 4e-6, 3e-6, 2.5e-6, 2.2e-6, 1.8e-6, 1.5e-6, 1e-6] {
+        match compile(&robot, &options(max_error)) {
+            Ok(_) => met += 1,
+            Err(said) => {
+                assert!(said.iter().all(|d| d.code == "error-over-budget"), "{max_error:e}: {}", said.render())
+            }
+        }
+    }
+    assert!((4..8).contains(&met), "{met} of 8");
+}

@@ -224,6 +224,30 @@ impl<'a, 't> Run<'a, 't> {
         self.items.tokens[self.at + by].kind
     }
 
+    /// Whether a number stands here that does not say its format.
+    fn begins_with_a_number(&self) -> bool {
+        let at = self.at + usize::from(self.kind() == Kind::Mark(b'-'));
+        self.items.tokens[at].kind == Kind::Number && !self.items.text_of(at).ends_with("_f32")
+    }
+
+    /// Whether there is a name before the bracket closes that is open here.
+    fn names_a_value(&self) -> bool {
+        let mut open = 1;
+        for token in &self.items.tokens[self.at..] {
+            match token.kind {
+                Kind::Word(_) => return true,
+                Kind::Mark(b'(') => open += 1,
+                Kind::Mark(b')') => open -= 1,
+                Kind::End => return false,
+                _ => {}
+            }
+            if open == 0 {
+                return false;
+            }
+        }
+        false
+    }
+
     fn stop<X>(&self, what: &str) -> Ran<X> {
         self.items.stop(self.at, what)
     }
@@ -920,13 +944,8 @@ impl<'a, 't> Run<'a, 't> {
                 self.mark(b':')?;
                 self.items.keyword(&mut self.at, t::FROM)?;
                 self.mark(b'(')?;
-                // a number alone would be one of f64
-                let alone = self.kind() == Kind::Number && !self.items.text_of(self.at).ends_with("_f32");
-                let alone = alone
-                    || self.kind() == Kind::Mark(b'-')
-                        && self.ahead(1) == Kind::Number
-                        && !self.items.text_of(self.at + 1).ends_with("_f32");
-                if alone {
+                // numbers alone would be of f64; beside a value they have its format
+                if self.begins_with_a_number() && !self.names_a_value() {
                     return self.stop("a number of no format");
                 }
                 let value = self.number(Format::F32, format)?;
