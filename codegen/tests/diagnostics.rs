@@ -149,6 +149,17 @@ fn codes_are_explained_and_functions_found() {
     assert!(code == 1 && said.contains("did you mean `near-right-angle`?"), "{said}");
     let (code, out, _) = straightline(&here, &["functions", "rnea"]);
     assert!(code == 0 && out.starts_with("inverse_dynamics ") && out.lines().count() == 2, "{out}");
+    // what is called so stands first, before what has the letters in another word
+    for (word, function) in [
+        ("CRBA", "mass_matrix "),
+        ("ABA", "forward_dynamics "),
+        ("Coriolis", "bias_force "),
+        ("COM", "centre_of_mass "),
+        ("com", "centre_of_mass "),
+    ] {
+        let (_, out, _) = straightline(&here, &["functions", word]);
+        assert!(out.starts_with(function), "{word}: {out}");
+    }
     let (_, out, _) = straightline(&here, &["functions"]);
     assert!(Function::known().all(|f| out.contains(f.name())), "{out}");
 }

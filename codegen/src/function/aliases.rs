@@ -44,9 +44,14 @@ impl Function {
         texts.map(str::to_lowercase).any(|text| text.contains(&word) || text.replace('_', " ").contains(&word))
     }
 
+    /// Whether this is what it is called elsewhere, in upper or lower case.
+    pub fn is_called(self, alias: &str) -> bool {
+        self.aliases().iter().any(|a| a.eq_ignore_ascii_case(alias))
+    }
+
     /// The first of that other name, in upper or lower case.
     pub fn called(alias: &str) -> Option<Function> {
-        Function::known().find(|f| f.aliases().iter().any(|a| a.eq_ignore_ascii_case(alias)))
+        Function::known().find(|f| f.is_called(alias))
     }
 }
 

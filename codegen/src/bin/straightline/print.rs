@@ -118,16 +118,16 @@ pub fn codes(codes: &[Code]) -> io::Result<()> {
 /// The functions that a word is about, or all of them.
 pub fn functions(word: Option<&str>) -> io::Result<()> {
     let mut out = stdout().lock();
-    let found = Function::known().filter(|f| word.is_none_or(|word| f.is_about(word)));
-    let mut none = true;
-    for function in found {
-        none = false;
+    let mut found: Vec<Function> = Function::known().filter(|f| word.is_none_or(|word| f.is_about(word))).collect();
+    // `COM` is a name of the mass centre, and the beginning of computed torque
+    found.sort_by_key(|f| !word.is_some_and(|word| f.is_called(word)));
+    for function in &found {
         writeln!(out, "{:<30}{}", function.name(), function.summary())?;
         if !function.aliases().is_empty() {
             writeln!(out, "{:<30}also: {}", "", function.aliases().join(", "))?;
         }
     }
-    if none {
+    if found.is_empty() {
         writeln!(out, "no function is about `{}`", word.unwrap_or_default())?;
     }
     Ok(())
