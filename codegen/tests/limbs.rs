@@ -1,5 +1,9 @@
 //! Identical limbs as lanes of one body: the physics of the second author, bounds of errors, and the bits that rustc makes.
 
+#[path = "../../generated_tests/src/written/mod.rs"]
+#[allow(dead_code, unused_imports)] // other tests use the rest
+mod written;
+
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
@@ -183,6 +187,44 @@ fn lanes_are_what_the_second_author_says() {
     let torques = vec![Function::InverseDynamics];
     agrees(&hand(), &Options { scalar: Scalar::F32, functions: torques.clone(), ..options(false) });
     agrees(&crab(), &Options { fma: true, functions: torques, ..options(true) });
+}
+
+/// The same robot as an exporter writes it: places and axes of so many digits, every third number dust or nothing, turns by right
+/// angles that are cut anywhere.
+fn exported(source: &Source, seed: u64, digits: usize) -> Source {
+    let random = &mut written::Random(seed);
+    let mut text = String::new();
+    for (k, part) in source.text().split('"').enumerate() {
+        let key = text.trim_end_matches(['=', '"']).rsplit(' ').next().unwrap_or_default().to_string();
+        let number = |x: &str, random: &mut written::Random| -> String {
+            let x: f64 = x.parse().expect("a number");
+            let x = match &key[..] {
+                "rpy" => written::cut(random.right_angle(), 1 + random.below(16)),
+                _ if random.one_in(6) => 0.0,
+                _ if random.one_in(5) => random.dust(),
+                _ => written::decimals(x, digits),
+            };
+            format!("{x:?}")
+        };
+        match k % 2 == 1 && ["xyz", "rpy"].contains(&&key[..]) {
+            true => text += &part.split(' ').map(|x| number(x, random)).collect::<Vec<_>>().join(" "),
+            false => text += part,
+        }
+        text.push('"');
+    }
+    text.pop();
+    // an axis of dust and zeros alone is none
+    Source::new("robot.urdf", text.replace("<axis xyz=\"0.0 0.0 0.0\"/>", "<axis xyz=\"0 0 1\"/>"))
+}
+
+#[test]
+fn lanes_of_robots_as_exporters_write_them_are_what_the_second_author_says() {
+    let robots: [(Source, bool, usize, Scalar); 3] =
+        [(stool(), true, 1, Scalar::F64), (crab(), true, 3, Scalar::F64), (hand(), false, 9, Scalar::F32)];
+    for ((source, floating, digits, scalar), seed) in robots.into_iter().zip([0, 2, 4]) {
+        let functions = vec![Function::InverseDynamics, Function::GravityForce];
+        agrees(&exported(&source, seed, digits), &Options { functions, scalar, ..options(floating) });
+    }
 }
 
 /// What a scene holds of one limb and not of the others is a number of that limb.

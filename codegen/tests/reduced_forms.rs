@@ -1,5 +1,9 @@
 //! Whatever is chosen among the reduced forms of a robot, its torques and its mass matrix are those of the full robot.
 
+#[path = "../../generated_tests/src/written/mod.rs"]
+#[allow(dead_code, unused_imports)] // other tests use the rest
+mod written;
+
 use straightline_codegen::compile::{optimised, Optimisations, Options};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::expr::{evaluate, Graph, DIVISION};
@@ -10,6 +14,7 @@ use straightline_codegen::Function;
 use straightline_core::algorithms as alg;
 use straightline_core::model::Model;
 use straightline_core::Dd;
+use written::{Shape, Style, Written};
 
 /// Arms with parallel and right-angled joints, and a robot with a floating base and four legs.
 const ROBOTS: [(&str, bool); 4] = [("ur5", false), ("panda", false), ("puma560", false), ("solo12", true)];
@@ -56,50 +61,72 @@ fn assert_equal(got: &[Dd], expected: &[Dd], what: &str) {
 
 #[test]
 fn every_choice_gives_the_torques_and_the_mass_matrix_of_the_full_robot() {
-    let mut random = Random(11);
     for (name, floating) in ROBOTS {
-        let model = robot(name, floating);
-        let (n, nv) = (model.bodies.len(), model.nv());
-        for trial in 0..30 {
-            let (plain, _) = reduce(&model, &Choice::plain(&model));
-            let units = lengths(&plain, longest_lever(&model));
-            let choice = Choice {
-                stays: random.flags(n),
-                by_axis_acceleration: random.flags(n),
-                by_accelerations: [random.flags(n), random.flags(n)],
-                regrouped: random.flags(n),
-                doubled: [random.flags(n), random.flags(n)],
-                vanish_at_parent: [0; 3].map(|_| random.components(n)),
-                axial_balances: [0; 2].map(|_| random.flags(n)),
-                other_acceleration: random.flags(n),
-                turns_sums: random.flags(n),
-                turned_tips: [0; 3].map(|_| random.flags(n)),
-                shifted_tips: [0; 2].map(|_| random.flags(n)),
-                origin_at_parent: random.flags(n),
-                adds_angles: trial % 3 > 0,
-                adds_offsets: trial % 2 == 0,
-                unit: if trial % 2 == 0 { Dd::ONE } else { units[trial % units.len()] },
-            };
-            let (reduced, _) = reduce(&model, &choice);
-            let mut q = random.numbers(model.nq());
-            if floating {
-                let norm = q[3..7].iter().fold(Dd::ZERO, |sum, x| sum + *x * *x).sqrt();
-                let unit: Vec<Dd> = q[3..7].iter().map(|x| *x / norm).collect();
-                q[3..7].copy_from_slice(&unit);
-            }
-            let (qd, qdd) = (random.numbers(nv), random.numbers(nv));
-            let what = format!("{name}, {choice:?}");
-            // rotors are no part of the reduced robot
-            let rotors = alg::rotor_inertias(&model);
-            let passive = alg::passive_force(&model, &q, &qd);
-            let full = alg::inverse_dynamics(&model, &q, &qd, &qdd);
-            let rigid: Vec<Dd> = (0..nv).map(|i| full[i] - rotors[i] * qdd[i] - passive[i]).collect();
-            assert_equal(&alg::reduced_inverse_dynamics(&reduced, &q, &qd, &qdd), &rigid, &what);
-            assert_equal(&alg::reduced_gravity_force(&reduced, &q), &alg::gravity_force(&model, &q), &what);
-            let h = alg::reduced_mass_matrix(&reduced, &q).into_iter().enumerate();
-            let h: Vec<Dd> = h.map(|(k, x)| if k % (nv + 1) == 0 { x + rotors[k / nv] } else { x }).collect();
-            assert_equal(&h, &alg::mass_matrix(&model, &q), &what);
+        every_choice_is_the_robot(name, &robot(name, floating), floating, 30);
+    }
+}
+
+#[test]
+fn every_choice_gives_them_of_robots_as_people_write_them() {
+    for (k, style) in Style::all().into_iter().enumerate() {
+        let shape = Shape {
+            joints: 2 + k % 5,
+            fixed: 3,
+            branched: k % 3 == 1,
+            floating: k % 4 == 2,
+            sliding: if k % 2 == 0 { 3 } else { 0 },
+        };
+        let written = Written::new(style, shape, 3 + k as u64);
+        let options = ModelOptions { floating_base: shape.floating, ..ModelOptions::default() };
+        let (model, complaints) = load(&Source::new(written.file_name(), written.text()), &options);
+        let model = model.unwrap_or_else(|| panic!("{complaints}"));
+        every_choice_is_the_robot(&format!("{style:?}, {shape:?}"), &model, shape.floating, 10);
+    }
+}
+
+fn every_choice_is_the_robot(name: &str, model: &Model<Dd>, floating: bool, trials: usize) {
+    let mut random = Random(11);
+    let (n, nv) = (model.bodies.len(), model.nv());
+    for trial in 0..trials {
+        let (plain, _) = reduce(model, &Choice::plain(model));
+        let units = lengths(&plain, longest_lever(model));
+        let choice = Choice {
+            stays: random.flags(n),
+            by_axis_acceleration: random.flags(n),
+            by_accelerations: [random.flags(n), random.flags(n)],
+            regrouped: random.flags(n),
+            doubled: [random.flags(n), random.flags(n)],
+            vanish_at_parent: [0; 3].map(|_| random.components(n)),
+            axial_balances: [0; 2].map(|_| random.flags(n)),
+            other_acceleration: random.flags(n),
+            turns_sums: random.flags(n),
+            turned_tips: [0; 3].map(|_| random.flags(n)),
+            shifted_tips: [0; 2].map(|_| random.flags(n)),
+            origin_at_parent: random.flags(n),
+            adds_angles: trial % 3 > 0,
+            adds_offsets: trial % 2 == 0,
+            // a robot may have no lengths
+            unit: if trial % 2 == 0 || units.is_empty() { Dd::ONE } else { units[trial % units.len()] },
+        };
+        let (reduced, _) = reduce(model, &choice);
+        let mut q = random.numbers(model.nq());
+        if floating {
+            let norm = q[3..7].iter().fold(Dd::ZERO, |sum, x| sum + *x * *x).sqrt();
+            let unit: Vec<Dd> = q[3..7].iter().map(|x| *x / norm).collect();
+            q[3..7].copy_from_slice(&unit);
         }
+        let (qd, qdd) = (random.numbers(nv), random.numbers(nv));
+        let what = format!("{name}, {choice:?}");
+        // rotors are no part of the reduced robot
+        let rotors = alg::rotor_inertias(model);
+        let passive = alg::passive_force(model, &q, &qd);
+        let full = alg::inverse_dynamics(model, &q, &qd, &qdd);
+        let rigid: Vec<Dd> = (0..nv).map(|i| full[i] - rotors[i] * qdd[i] - passive[i]).collect();
+        assert_equal(&alg::reduced_inverse_dynamics(&reduced, &q, &qd, &qdd), &rigid, &what);
+        assert_equal(&alg::reduced_gravity_force(&reduced, &q), &alg::gravity_force(model, &q), &what);
+        let h = alg::reduced_mass_matrix(&reduced, &q).into_iter().enumerate();
+        let h: Vec<Dd> = h.map(|(k, x)| if k % (nv + 1) == 0 { x + rotors[k / nv] } else { x }).collect();
+        assert_equal(&h, &alg::mass_matrix(model, &q), &what);
     }
 }
 
