@@ -160,6 +160,8 @@ struct Search<'a> {
     optimisations: Optimisations,
     /// What the reduced robots cost that were tried, by their hashes: many a choice changes nothing for this robot, or leads back.
     tried: FxHashMap<u64, Price>,
+    /// The hashes of the reduced robots of choices, by theirs.
+    reduced: FxHashMap<u64, u64>,
     /// Operations that were counted.
     work: usize,
     /// What the plain form loses to rounding, or the bodies' own parameters if that is less, once it was asked for, and what it is compared
@@ -168,10 +170,17 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// By which hash the reduced robot of a choice is known.
+    fn hash(&mut self, choice: &Choice) -> u64 {
+        let known = self.reduced.get(&choice.fingerprint()).copied();
+        known.unwrap_or_else(|| self.set(choice))
+    }
+
     /// The reduced robot of a choice is looked at from here on, and known by this hash.
     fn set(&mut self, choice: &Choice) -> u64 {
         let reduced = reduce(&self.robot.model, choice).0;
         let hash = fingerprint(&reduced);
+        self.reduced.insert(choice.fingerprint(), hash);
         self.robot.composite.clone_from(&reduced);
         self.robot.reduced = reduced;
         hash
@@ -179,6 +188,10 @@ impl Search<'_> {
 
     /// What a choice costs, if it is worth a look: it was not tried before, is cheaper than that, and keeps its digits.
     fn attempt(&mut self, choice: &Choice, least: Price) -> Option<Price> {
+        let known = self.reduced.get(&choice.fingerprint());
+        if known.is_some_and(|hash| self.tried.contains_key(hash)) {
+            return None;
+        }
         let hash = self.set(choice);
         if self.tried.contains_key(&hash) {
             return None;
@@ -282,7 +295,7 @@ impl Search<'_> {
             let mut neighbours: Vec<(bool, Price, usize, usize)> = Vec::new();
             for d in 0..=ways.deepest() {
                 for (k, change) in ways.moves.iter().enumerate() {
-                    let hash = self.set(&ways.moved(&best.0, change, d));
+                    let hash = self.hash(&ways.moved(&best.0, change, d));
                     let Some(price) = self.tried.get(&hash).copied().filter(|price| *price < NEVER) else { continue };
                     let origin = ways.origins == Some(k);
                     if origin || price.0 <= best.1 .0.saturating_add(SLACK) {
@@ -296,7 +309,7 @@ impl Search<'_> {
                     return best;
                 }
                 let moved = ways.moved(&best.0, &ways.moves[k], d);
-                let hash = self.set(&moved);
+                let hash = self.hash(&moved);
                 if !left.insert(hash) {
                     continue;
                 }
@@ -435,6 +448,7 @@ fn improved(
         options,
         optimisations,
         tried: FxHashMap::default(),
+        reduced: FxHashMap::default(),
         work: 0,
         plain_error: None,
     };

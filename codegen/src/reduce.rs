@@ -3,6 +3,8 @@
 //! Both steps are exact over the reals and done in double-double, in closed form: a solution by least squares would let
 //! digits of heavy links leak into light ones.
 
+use rustc_hash::FxHasher;
+use std::hash::{Hash, Hasher};
 use straightline_core::model::{Body, BodyId, JointKind, Model};
 use straightline_core::reduced::{ReducedBody, ReducedModel};
 use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
@@ -82,6 +84,33 @@ impl Choice {
             adds_offsets: false,
             unit: Dd::ONE,
         }
+    }
+
+    /// A hash of all that is chosen.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        let Choice {
+            stays,
+            by_axis_acceleration,
+            by_accelerations,
+            regrouped,
+            doubled,
+            vanish_at_parent,
+            axial_balances,
+            other_acceleration,
+            turns_sums,
+            turned_tips,
+            shifted_tips,
+            origin_at_parent,
+            adds_angles,
+            adds_offsets,
+            unit,
+        } = self;
+        let mut hasher = FxHasher::default();
+        (stays, by_axis_acceleration, by_accelerations, regrouped, doubled, vanish_at_parent).hash(&mut hasher);
+        (axial_balances, other_acceleration, turns_sums, turned_tips, shifted_tips).hash(&mut hasher);
+        (origin_at_parent, adds_angles, adds_offsets).hash(&mut hasher);
+        (unit.hi().to_bits(), unit.lo().to_bits()).hash(&mut hasher);
+        hasher.finish()
     }
 }
 

@@ -2,8 +2,12 @@
 
 use super::rules::RuleSet;
 use super::{Constant, Graph, NodeId, Note, Op, Port, Section};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxBuildHasher, FxHashMap};
+use std::collections::hash_map::Entry;
 use straightline_core::Dd;
+
+/// So many operations the equations of a robot have, more or less: room for them from the beginning.
+const ABOUT: usize = 1000;
 
 /// Adds operations to a graph: equal ones once, and simplified by the rules on the way in.
 #[derive(Debug)]
@@ -19,7 +23,7 @@ impl Builder {
     /// An empty graph with these inputs.
     pub fn new(rules: RuleSet, inputs: Vec<Port>) -> Self {
         let graph = Graph { inputs, sections: vec![Section { phase: "", body: None }], ..Graph::default() };
-        Builder { graph, known: FxHashMap::default(), rules, section: 0 }
+        Builder { graph, known: FxHashMap::with_capacity_and_hasher(ABOUT, FxBuildHasher), rules, section: 0 }
     }
 
     /// The rules in force.
@@ -63,14 +67,14 @@ impl Builder {
 
     /// The node of this very operation, without rules.
     pub fn insert(&mut self, op: Op) -> NodeId {
-        if let Some(&id) = self.known.get(&op) {
-            return id;
-        }
+        let place = match self.known.entry(op) {
+            Entry::Occupied(known) => return *known.get(),
+            Entry::Vacant(place) => place,
+        };
         let id = NodeId(u32::try_from(self.graph.ops.len()).expect("a graph has fewer than 2^32 nodes"));
         self.graph.ops.push(op);
         self.graph.notes.push(Note { name: None, section: self.section });
-        self.known.insert(op, id);
-        id
+        *place.insert(id)
     }
 
     /// What follows belongs to this section.

@@ -69,7 +69,7 @@ enum Value {
     /// The same as that one.
     Same(Term),
     /// Anything else: the operation, and its operands with their signs.
-    Other(Op, [Term; 2]),
+    Other(Op, [Option<Term>; 2]),
 }
 
 /// A graph as sums of many terms.
@@ -107,8 +107,8 @@ impl Table {
                 Op::Add(a, b) => table.push(Value::Sum(vec![t(a), t(b)]), Some(id)),
                 Op::Sub(a, b) => table.push(Value::Sum(vec![t(a), t(b).signed(true)]), Some(id)),
                 op => {
-                    let mut operands = [Term(0); 2];
-                    op.operands().zip(&mut operands).for_each(|(a, place)| *place = t(a));
+                    let mut operands = [None; 2];
+                    op.operands().zip(&mut operands).for_each(|(a, place)| *place = Some(t(a)));
                     table.push(Value::Other(op, operands), Some(id))
                 }
             };
@@ -144,10 +144,10 @@ impl Table {
     fn constant(&mut self, c: Dd) -> Term {
         let negative = c.hi() < 0.0;
         let key = Constant::new(if negative { -c } else { c });
-        let value = match self.constants.get(&key) {
-            Some(v) => *v,
-            None => self.push(Value::Constant(key), None).value(),
-        };
+        if let Some(value) = self.constants.get(&key) {
+            return Term::new(*value, negative);
+        }
+        let value = self.push(Value::Constant(key), None).value();
         self.constants.insert(key, value);
         Term::new(value, negative)
     }
@@ -155,12 +155,13 @@ impl Table {
     fn product(&mut self, a: Term, b: Term, origin: Option<NodeId>) -> Term {
         let (a, b) = (self.resolved(a), self.resolved(b));
         let key = (a.value().min(b.value()), a.value().max(b.value()));
-        let value = match self.products.get(&key) {
-            Some(v) => *v,
-            None => self.push(Value::Product(key.0, key.1), origin).value(),
-        };
+        let negative = a.is_negative() != b.is_negative();
+        if let Some(value) = self.products.get(&key) {
+            return Term::new(*value, negative);
+        }
+        let value = self.push(Value::Product(key.0, key.1), origin).value();
         self.products.insert(key, value);
-        Term::new(value, a.is_negative() != b.is_negative())
+        Term::new(value, negative)
     }
 
     fn resolved(&self, mut term: Term) -> Term {
@@ -177,7 +178,7 @@ impl Table {
             Value::Product(a, b) => [*a, *b].get(k).map(|v| Term::new(*v, false)),
             Value::Sum(terms) => terms.get(k).copied(),
             Value::Same(t) => (k == 0).then_some(*t),
-            Value::Other(op, operands) => operands[..op.operands().count()].get(k).copied(),
+            Value::Other(_, operands) => operands.get(k).copied().flatten(),
         };
         term.map(|t| self.resolved(t))
     }
@@ -203,21 +204,40 @@ impl Table {
         // a value, and which of its operands is next
         let mut stack: Vec<(usize, usize)> = Vec::new();
         for r in &self.results {
-            let mut next = Some(self.resolved(*r));
-            loop {
-                if let Some(t) = next {
-                    uses[t.value()] += 1;
-                    if uses[t.value()] == 1 {
-                        stack.push((t.value(), 0));
+            let root = self.resolved(*r).value();
+            uses[root] += 1;
+            if uses[root] == 1 {
+                stack.push((root, 0));
+            }
+            'values: while let Some((value, first)) = stack.pop() {
+                let two: [Term; 2];
+                let operands: &[Term] = match &self.values[value] {
+                    Value::Sum(terms) => terms,
+                    Value::Product(a, b) => {
+                        two = [a, b].map(|v| Term::new(*v, false));
+                        &two
                     }
+                    Value::Other(_, operands) => {
+                        two = operands.map(|t| t.unwrap_or(Term(0)));
+                        &two[..operands.iter().flatten().count()]
+                    }
+                    Value::Same(t) => std::slice::from_ref(t),
+                    Value::Constant(_) => &[],
+                };
+                for (k, t) in operands.iter().enumerate().skip(first) {
+                    let operand = self.resolved(*t).value();
+                    uses[operand] += 1;
+                    if uses[operand] > 1 {
+                        continue;
+                    }
+                    if matches!(self.values[operand], Value::Constant(_) | Value::Other(_, [None, None])) {
+                        order.push(operand);
+                        continue;
+                    }
+                    stack.extend([(value, k + 1), (operand, 0)]);
+                    continue 'values;
                 }
-                let Some((value, k)) = stack.last_mut() else { break };
-                next = self.operand(*value, *k);
-                *k += 1;
-                if next.is_none() {
-                    order.push(*value);
-                    stack.pop();
-                }
+                order.push(value);
             }
         }
         (uses, order)
@@ -519,7 +539,7 @@ impl Table {
                 }
                 Value::Other(Op::Div(..), _) => counts.div += 1,
                 Value::Other(Op::Sqrt(_), _) => counts.sqrt += 1,
-                Value::Other(Op::SinCos(_), [angle, _]) => {
+                Value::Other(Op::SinCos(_), [Some(angle), _]) => {
                     counts.sin_cos += 1;
                     let sum = matches!(self.values[self.resolved(*angle).value()], Value::Other(Op::AngleSum(..), _));
                     counts.tail += usize::from(sum);
@@ -669,7 +689,7 @@ impl Writer<'_> {
             Value::Sum(_) => self.sum(&self.table.terms(value)),
             Value::Same(_) => unreachable!("terms are resolved"),
             Value::Other(op, operands) => {
-                let operands: Vec<NodeId> = operands[..op.operands().count()].iter().map(|t| self.signed(*t)).collect();
+                let operands: Vec<NodeId> = operands.iter().flatten().map(|t| self.signed(*t)).collect();
                 let mut given = operands.into_iter();
                 let op = op.map(|_| given.next().expect("as many operands as before"));
                 let node = self.builder.insert(op);
