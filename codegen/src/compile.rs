@@ -1,7 +1,7 @@
 //! The pipeline, as one function.
 
 use crate::certify::companion::Bits;
-use crate::certify::{self, Effort, Known};
+use crate::certify::{self, Effort, Known, Refusal};
 use crate::choose::{self, choose, price};
 use crate::contact;
 use crate::description::drives::Drive;
@@ -254,7 +254,7 @@ impl Optimisations {
                 steps.push((what, now));
             }
         };
-        step("constants folded in double-double", self.folding, |o| o.folding = true);
+        step(FOLDING, self.folding, |o| o.folding = true);
         step("algebraic rules", self.algebraic, |o| o.algebraic = true);
         step("reduced robot: frames and inertial parameters", self.reduced, |o| o.reduced = true);
         step("sums with all their terms at once", self.sums, |o| o.sums = true);
@@ -290,6 +290,7 @@ impl Optimisations {
         step("forms of the reduced robot", |o| (o.chosen, o.forms, o.angle_sums) = (false, Forms::default(), false));
         step("the reduced robot", |o| o.reduced = false);
         step("algebraic rules and the cheaper form of forward dynamics", |o| *o = o.plain());
+        step(FOLDING, |o| o.folding = false);
         found
     }
 
@@ -303,6 +304,10 @@ impl Optimisations {
     ) -> Result<(T, Option<Plainer>), Disagreement> {
         let (mut first, mut last) = (None, None);
         for (without, optimisations) in self.plainer() {
+            // what is left is the generic runtime, which has no more digits
+            if without == FOLDING && last.as_ref().is_some_and(Disagreement::is_of_the_robot) {
+                break;
+            }
             match make(optimisations) {
                 Ok(made) => return Ok((made, first.map(|disagreement| Plainer { disagreement, without }))),
                 Err(disagreement) => {
@@ -326,6 +331,9 @@ impl Optimisations {
     }
 }
 
+/// What even equations as they are have, unless rules are exact.
+const FOLDING: &str = "constants folded in double-double";
+
 /// A program between tracing and text.
 #[derive(Clone, Debug)]
 pub struct Program {
@@ -339,6 +347,13 @@ pub struct Program {
     pub method: Option<MethodChoice>,
     /// Whether it has another form than it would have had, as that one was wrong.
     pub plainer: Option<Plainer>,
+}
+
+impl Program {
+    /// Whether its constants are those of the robot, in double-double: otherwise no bound of its errors is one of the robot.
+    fn has_folded_constants(&self, options: &Options) -> bool {
+        options.optimisations().folding && self.plainer.as_ref().is_none_or(|plainer| plainer.without != FOLDING)
+    }
 }
 
 /// Traces and optimises one function of a robot, and checks what came out.
@@ -361,7 +376,7 @@ pub fn checked(
 ) -> Result<Program, Disagreement> {
     let ((graph, method), plainer) = options.optimisations().first_that_agrees(|optimisations| {
         let made = optimised_with(robot, frames, function, options, optimisations);
-        equivalence::of_function(robot, frames, function, options, &made.0).map(|()| made)
+        equivalence::of_function(robot, frames, function, options, optimisations, &made.0).map(|()| made)
     })?;
     let schedule = schedule(&graph, options.limits);
     Ok(Program { function, graph, schedule, method, plainer })
@@ -628,12 +643,13 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
         if let Some(why) = range::of_program(&robot.model, &program.graph, options.scalar) {
             beyond(program.function.name(), &why, &mut diagnostics);
         }
-        let of = (program.function, &program.graph);
-        let mixed = !program.graph.widths.is_empty();
-        if let Some(wrong) =
-            mixed.then(|| equivalence::of_function(&robot, &frames, of.0, &resolved, of.1).err()).flatten()
-        {
-            diagnostics.push(wrong.error(&robot.model));
+        if !program.graph.widths.is_empty() {
+            let folding = program.has_folded_constants(&resolved);
+            let made_by = Optimisations { folding, ..resolved.optimisations() };
+            let (function, graph) = (program.function, &program.graph);
+            if let Err(wrong) = equivalence::of_function(&robot, &frames, function, &resolved, made_by, graph) {
+                diagnostics.push(wrong.error(&robot.model));
+            }
         }
         if let Some(plainer) = &program.plainer {
             diagnostics.push(plainer.warning(&robot.model));
@@ -722,7 +738,10 @@ fn generate(
         let mut text = emit::function(graph, schedule, function.name(), &doc, options.plain_style(), &title);
         let figures = FunctionReport::new(&program, options.scalar, text.text.lines().count());
         if wants_companions(options) {
-            let bound = companion(&robot, *function, graph, options);
+            let bound = match program.has_folded_constants(options) {
+                true => companion(&robot, *function, graph, options),
+                false => Err(Refusal::Rounded.words()),
+            };
             if let Ok(bound) = &bound {
                 equivalence::of_bound(&robot, options, function.name(), (graph, bound))?;
             }
@@ -818,6 +837,9 @@ fn certificates(robot: &Robot, programs: &[Program], options: &Options) -> Vec<O
         let budgeted = options.scene.budgets.get(&p.function).is_some_and(|b| b.max_error.is_some());
         let effort = options.certify.or(budgeted.then(Effort::default))?;
         let outputs = &p.graph.outputs;
+        if !p.has_folded_constants(options) {
+            return Some(ErrorReport::refused(outputs, Refusal::Rounded));
+        }
         let inputs = match certify::input_box(&p.graph.inputs, &options.scene, &robot.model) {
             Ok(inputs) => inputs,
             Err(refusal) => return Some(ErrorReport::refused(outputs, refusal)),

@@ -12,11 +12,11 @@
 //! is generated, too, and the program may lose sixteen times what the plain equations lose.
 
 use crate::certify;
-use crate::compile::Options;
+use crate::compile::{Optimisations, Options};
 use crate::contact;
 use crate::diagnostic::Diagnostic;
 use crate::emit::{element_of, Scalar};
-use crate::expr::{evaluate, Grade, Graph, Port};
+use crate::expr::{evaluate, Grade, Graph, Op, Port};
 use crate::forward_method::{self, settle};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model::drives::entries;
@@ -28,6 +28,7 @@ use crate::singular::weakest_joint;
 use crate::stage::Staged;
 use std::collections::BTreeMap;
 use std::fmt;
+use straightline_core::algorithms::Ltdl;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::model::{BodyId, JointKind, Model};
 use straightline_core::spatial::{Sym3, Transform, Vec3};
@@ -40,12 +41,18 @@ const AGREE: f64 = 1e-24;
 const ROUNDINGS: f64 = 1e4;
 /// A point on an axis is off it by so much of the longest lever, for all that rounding says.
 const POINT: f64 = 1e-3;
-/// A program may lose so many times what the plain equations lose in the same scalar, or one rounding of all that a result is made of.
-const LOSSES: f64 = 16.0;
+/// A program may lose so many times what the plain equations lose in the same scalar.
+const LOSSES: f64 = 12.0;
 /// A difference of inertias that is so many roundings of them has hardly a digit.
 const NO_DIGIT: f64 = 1e3;
 /// At so many random states.
 const STATES: usize = 6;
+/// Digits of H are looked at in so many more.
+const MORE_STATES: usize = 18;
+/// Where the plain equations lose such a part of the greatest result to rounding, a state says nothing.
+const REGULAR: f64 = 1e-2;
+/// Near the zero configuration, where robots are tried first, coordinates and rates are within this.
+const NEAR: f64 = 1e-3;
 /// Where random numbers begin: another place than where states for choices come from.
 const SEED: u64 = 0x6a09_e667_f3bc_c908;
 
@@ -103,11 +110,18 @@ impl Plainer {
 }
 
 impl Disagreement {
+    /// Whether the plain equations themselves lose nearly all digits.
+    pub(crate) fn is_of_the_robot(&self) -> bool {
+        self.plain.is_some_and(|plain| LOSSES * plain >= 1.0)
+    }
+
     /// Whether the plain equations themselves lose nearly all digits in this scalar, as inertias are too far apart: then no form is right.
     /// Which joint feels too little, and which part of what it moves.
     pub fn beyond_digits(&self, model: &Model<Dd>, scalar: Scalar) -> Option<(BodyId, f64)> {
-        let lost = self.plain.is_some_and(|plain| LOSSES * plain >= 1.0);
-        weakest_joint(model).filter(|(_, part)| lost && *part <= NO_DIGIT * scalar.epsilon())
+        if !self.is_of_the_robot() {
+            return None;
+        }
+        weakest_joint(model).filter(|(_, part)| *part <= NO_DIGIT * scalar.epsilon())
     }
 
     /// What the user is told where no form agrees.
@@ -132,7 +146,7 @@ fn suspect(model: &Model<Dd>) -> String {
 /// A state: what stands for each input port, by name.
 type State = BTreeMap<String, Vec<Dd>>;
 
-/// Whether a function's program says what its plain equations say.
+/// Whether a function's program, made by these optimisations, says what its plain equations say.
 ///
 /// # Errors
 /// The first difference that was found.
@@ -141,44 +155,132 @@ pub(crate) fn of_function(
     frames: &[String],
     function: Function,
     options: &Options,
+    optimisations: Optimisations,
     graph: &Graph,
 ) -> Result<(), Disagreement> {
     let ports = options.scene.ports(function, &robot.model);
+    if !optimisations.folding {
+        let mut states = States::new(robot, options);
+        return (0..STATES).try_for_each(|_| {
+            let state = states.next(&ports);
+            match options.scalar {
+                Scalar::F64 => same_bits::<f64>(robot, frames, function, options, graph, &state),
+                Scalar::F32 => same_bits::<f32>(robot, frames, function, options, graph, &state),
+            }
+        });
+    }
+    let check = Check { robot, frames, function, options, graph };
     let mut states = States::new(robot, options);
     let mut losses = Losses::new(graph);
-    let (wanted, _) = options.scene.select(function, &robot.model, options.scene.frames_of(function, frames).len());
-    let is_whole = wanted.into_iter().eq(0..robot.model.nv().pow(2));
     for _ in 0..STATES {
-        let state = states.next(&ports);
-        if options.grade == Grade::Exact {
-            match options.scalar {
-                Scalar::F64 => same_bits::<f64>(robot, frames, function, options, graph, &state)?,
-                Scalar::F32 => same_bits::<f32>(robot, frames, function, options, graph, &state)?,
-            }
-            continue;
+        check.at(&states.next(&ports), &mut losses, true)?;
+    }
+    if function == Function::MassMatrix {
+        // of all results these lose most where the robot happens to stand so that an entry is small
+        for _ in 0..MORE_STATES {
+            check.at(&states.next(&ports), &mut losses, false)?;
         }
-        let found = evaluate(graph, &inputs(graph, &state));
-        let off = differences(robot, frames, function, options, &state, &found);
-        compare(function.name(), &graph.outputs, &off, AGREE)?;
-        let sizes = match function {
+    }
+    check.compare(losses)?;
+    // where users begin much is zero: that may hide what is lost elsewhere, and the other way round
+    for place in [Place::NearZero, Place::Zero] {
+        let state = states.placed(&ports, place);
+        if check.is_regular(&state) {
+            let mut losses = Losses::new(graph);
+            check.at(&state, &mut losses, true)?;
+            check.compare(losses)?;
+        }
+    }
+    Ok(())
+}
+
+/// The program of a function beside its plain equations.
+struct Check<'a> {
+    robot: &'a Robot,
+    frames: &'a [String],
+    function: Function,
+    options: &'a Options,
+    graph: &'a Graph,
+}
+
+impl Check<'_> {
+    /// At one more state: what it loses to rounding and, if `by_equations`, whether it is right.
+    fn at(&self, state: &State, losses: &mut Losses, by_equations: bool) -> Result<(), Disagreement> {
+        let Check { robot, frames, function, options, graph } = *self;
+        let found = evaluate(graph, &inputs(graph, state));
+        let off = differences(robot, frames, function, options, state, &found);
+        if by_equations {
+            compare(function.name(), &graph.outputs, &off, AGREE)?;
+        }
+        let sizes = self.sizes(state, &found, &off);
+        let plain = ForwardDynamicsMethod::ArticulatedBody;
+        match options.scalar {
+            Scalar::F64 => losses.add(graph, (state, &found), &sizes, |state| {
+                plain_results::<f64>(robot, frames, function, options, plain, state)
+            }),
+            Scalar::F32 => losses.add(graph, (state, &found), &sizes, |state| {
+                plain_results::<f32>(robot, frames, function, options, plain, state)
+            }),
+        }
+        Ok(())
+    }
+
+    /// Whether the plain equations have digits there: stretched, a chain of point masses may have a mass matrix without inverse.
+    fn is_regular(&self, state: &State) -> bool {
+        if !self.graph.ops.iter().any(|op| matches!(op, Op::Div(..))) {
+            return true;
+        }
+        let Check { robot, frames, function, options, .. } = *self;
+        let method = ForwardDynamicsMethod::ArticulatedBody;
+        let exact = plain_results::<Dd>(robot, frames, function, options, method, state);
+        let short: Vec<f64> = match options.scalar {
+            Scalar::F64 => plain_results::<f64>(robot, frames, function, options, method, state),
+            Scalar::F32 => plain_results::<f32>(robot, frames, function, options, method, state)
+                .into_iter()
+                .map(f64::from)
+                .collect(),
+        };
+        let most = exact.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
+        // written so that NaN is not regular
+        exact.iter().zip(short).all(|(exact, short)| (exact.hi() - short).abs() <= REGULAR * most)
+    }
+
+    /// What losses are compared with.
+    fn sizes(&self, state: &State, found: &[Dd], off: &[Magnitude]) -> Vec<f64> {
+        let (nv, scene) = (self.robot.model.nv(), &self.options.scene);
+        let is_whole = |all: usize| {
+            let frames = scene.frames_of(self.function, self.frames).len();
+            scene.select(self.function, &self.robot.model, frames).0.into_iter().eq(0..all)
+        };
+        match self.function {
+            Function::ForwardDynamics if is_whole(nv) => sizes_of_accelerations(self.robot, self.options, state, off),
             // residuals have no scale of accelerations: all of them are judged by the greatest
             Function::ForwardDynamics => vec![found.iter().map(|x| x.hi().abs()).fold(0.0, f64::max); found.len()],
-            Function::MassMatrix if is_whole => sizes_of_inertias(robot.model.nv(), &found, &off),
-            _ => off.iter().map(|x| x.size).collect::<Vec<f64>>(),
-        };
-        match options.scalar {
-            Scalar::F64 => losses.add(graph, &state, &sizes, |state| {
-                plain_results::<f64>(robot, frames, function, options, ForwardDynamicsMethod::ArticulatedBody, state)
-            }),
-            Scalar::F32 => losses.add(graph, &state, &sizes, |state| {
-                plain_results::<f32>(robot, frames, function, options, ForwardDynamicsMethod::ArticulatedBody, state)
-            }),
+            Function::MassMatrix if is_whole(nv * nv) => sizes_of_inertias(nv, found, off),
+            _ => off.iter().map(|x| x.size).collect(),
         }
     }
-    if function == Function::ForwardDynamics {
-        losses.plain = vec![losses.plain.iter().copied().fold(0.0, f64::max); losses.plain.len()];
+
+    fn compare(&self, mut losses: Losses) -> Result<(), Disagreement> {
+        if self.function == Function::ForwardDynamics {
+            let lost = Disagreement {
+                program: self.function.name().to_string(),
+                result: element_of(&self.graph.outputs, 0),
+                difference: losses.of_greatest,
+                plain: Some(losses.of_greatest),
+            };
+            if lost.beyond_digits(&self.robot.model, self.options.scalar).is_some() {
+                return Err(lost);
+            }
+            losses.plain = vec![losses.plain.iter().copied().fold(0.0, f64::max); losses.plain.len()];
+        }
+        // a rounding of all that a result is made of is little; of a scale that is a result's own it is what any program loses
+        let least = match self.function {
+            Function::ForwardDynamics | Function::MassMatrix => LOSSES / 2.0,
+            _ => 1.0,
+        };
+        losses.compare(self.function.name(), self.graph, self.options.scalar, least)
     }
-    losses.compare(function.name(), graph, options.scalar)
 }
 
 /// Natural scales of the entries of H: √(H_ii H_jj), where H_ii is not what is left of terms that cancel.
@@ -187,32 +289,58 @@ fn sizes_of_inertias(nv: usize, h: &[Dd], off: &[Magnitude]) -> Vec<f64> {
     (0..nv * nv).map(|k| root(k / nv) * root(k % nv)).collect()
 }
 
+/// Natural scales of accelerations: |H⁻¹| times those of the forces that make them, given with what the equations of motion are off by.
+fn sizes_of_accelerations(robot: &Robot, options: &Options, state: &State, off: &[Magnitude]) -> Vec<f64> {
+    let ports = options.scene.ports(Function::ForwardDynamics, &robot.model);
+    let bound = options.scene.bind(Function::ForwardDynamics, robot, &of_ports(&ports, state, |x| x));
+    let h = Function::MassMatrix.evaluate(&bound.model, &[], ForwardDynamicsMethod::ArticulatedBody, &bound.arguments);
+    let factor = Ltdl::factor(&bound.model, &h);
+    let mut sizes = vec![0.0; off.len()];
+    for (j, force) in off.iter().enumerate() {
+        let mut unit = vec![Dd::ZERO; off.len()];
+        unit[j] = Dd::ONE;
+        let column = factor.solve(&unit);
+        sizes.iter_mut().zip(column).for_each(|(size, x)| *size += x.hi().abs() * force.size);
+    }
+    sizes
+}
+
 /// What a program and the plain equations lose to rounding: of each result the worst of some states, over its natural scale.
 struct Losses {
     program: Vec<f64>,
     plain: Vec<f64>,
+    /// What the plain equations lose of the greatest result.
+    of_greatest: f64,
 }
 
 impl Losses {
     fn new(graph: &Graph) -> Self {
         let none = vec![0.0; graph.results.len()];
-        Losses { program: none.clone(), plain: none }
+        Losses { program: none.clone(), plain: none, of_greatest: 0.0 }
     }
 
-    /// At one more state, rounded to the scalar.
+    /// At one more state, rounded to the scalar; `found`: the results there in double-double.
     fn add<T: Real + Into<f64>>(
         &mut self,
         graph: &Graph,
-        state: &State,
+        (state, found): (&State, &[Dd]),
         sizes: &[f64],
         plain: impl Fn(&State) -> Vec<T>,
     ) {
         let rounded: State =
             state.iter().map(|(n, x)| (n.clone(), x.iter().map(|x| rounded::<T>(*x)).collect())).collect();
         let wide = inputs(graph, &rounded);
-        let exact = evaluate(graph, &wide);
+        let exact = match rounded == *state {
+            true => found.to_vec(),
+            false => evaluate(graph, &wide),
+        };
         let found = evaluate(graph, &wide.into_iter().map(T::constant).collect::<Vec<T>>());
         let plain = plain(&rounded);
+        let greatest = exact.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
+        for (plain, exact) in plain.iter().zip(&exact).filter(|_| greatest > 0.0) {
+            let off = (Dd::from((*plain).into()) - *exact).hi().abs() / greatest;
+            self.of_greatest = if off.is_nan() { f64::INFINITY } else { self.of_greatest.max(off) };
+        }
         for (k, exact) in exact.into_iter().enumerate().filter(|(k, _)| sizes[*k] > 0.0) {
             let lost = |x: T| {
                 let off = (Dd::from(x.into()) - exact).hi().abs() / sizes[k];
@@ -227,12 +355,12 @@ impl Losses {
         }
     }
 
-    fn compare(self, program: &str, graph: &Graph, scalar: Scalar) -> Result<(), Disagreement> {
-        let rounding = match scalar {
+    fn compare(self, program: &str, graph: &Graph, scalar: Scalar, least: f64) -> Result<(), Disagreement> {
+        let least = match scalar {
             _ if !graph.widths.is_empty() => return Ok(()),
-            scalar => scalar.epsilon(),
+            scalar => least * scalar.epsilon(),
         };
-        let is_worse = |k: &usize| self.program[*k] > (LOSSES * self.plain[*k]).max(rounding);
+        let is_worse = |k: &usize| self.program[*k] > (LOSSES * self.plain[*k]).max(least);
         match (0..self.program.len()).find(is_worse) {
             None => Ok(()),
             Some(k) => Err(Disagreement {
@@ -628,12 +756,37 @@ struct States<'a> {
     count: usize,
 }
 
+/// Where a robot stands.
+#[derive(Clone, Copy, PartialEq)]
+enum Place {
+    Anywhere,
+    NearZero,
+    /// At rest, too.
+    Zero,
+}
+
+impl Place {
+    /// Numbers from anywhere, brought there.
+    fn of(self, values: Vec<f64>) -> Vec<f64> {
+        let least = match self {
+            Place::Anywhere => return values,
+            Place::NearZero => NEAR,
+            Place::Zero => 0.0,
+        };
+        values.into_iter().map(|x| least * x).collect()
+    }
+}
+
 impl<'a> States<'a> {
     fn new(robot: &'a Robot, options: &'a Options) -> Self {
         States { robot, options, random: Random(SEED), count: 0 }
     }
 
     fn next(&mut self, ports: &[Port]) -> State {
+        self.placed(ports, Place::Anywhere)
+    }
+
+    fn placed(&mut self, ports: &[Port], place: Place) -> State {
         let (robot, model) = (self.robot, &self.robot.model);
         self.count += 1;
         let fast = self.count.is_multiple_of(2);
@@ -660,14 +813,20 @@ impl<'a> States<'a> {
                 (_, true) => (0..port.len()).map(|_| self.random.symmetric(1.0)).collect(),
                 _ => forward_method::of_port(model, port, fast, &mut self.random),
             };
+            let values = if matches!(name, "q" | "qd") { place.of(values) } else { values };
             plain.push((name, values));
         }
         settle(model, &mut plain, &mut self.random);
-        state.extend(plain.into_iter().map(|(n, x)| (n.to_string(), x.into_iter().map(Dd::from).collect())));
+        // numbers that all scalars hold
+        let short = |x: f64| Dd::from(f64::from(x as f32));
+        state.extend(plain.into_iter().map(|(n, x)| (n.to_string(), x.into_iter().map(short).collect())));
         // of length one in double-double, too
         for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind == JointKind::Floating) {
             if let Some(q) = state.get_mut("q") {
                 let q = &mut q[joint.iq + 3..joint.iq + 7];
+                if place == Place::Zero {
+                    q[3] = Dd::ONE;
+                }
                 let length = q.iter().fold(Dd::ZERO, |sum, x| sum + *x * *x).sqrt();
                 q.iter_mut().for_each(|x| *x /= length);
             }
@@ -728,7 +887,7 @@ mod tests {
     use super::*;
     use crate::compile::checked;
     use crate::diagnostic::Source;
-    use crate::expr::{verify, Constant, Op};
+    use crate::expr::{verify, Constant};
     use crate::model::{load, ModelOptions};
     use crate::scene::Scene;
 
@@ -855,8 +1014,8 @@ mod tests {
         let options = Options { scene: Scene::default(), ..Options::default() };
         let optimisations = crate::compile::Optimisations { chosen: false, ..options.optimisations() };
         let graph = crate::compile::optimised(&robot, &[], Function::InverseDynamics, &options, optimisations);
-        let wrong =
-            of_function(&robot, &[], Function::InverseDynamics, &options, &graph).expect_err("it is another robot");
+        let wrong = of_function(&robot, &[], Function::InverseDynamics, &options, optimisations, &graph)
+            .expect_err("it is another robot");
         assert!(wrong.result.starts_with("tau[") && wrong.difference > 1e-20, "{wrong}");
         let message = wrong.error(&robot.model);
         assert!(message.detail.contains("link `c`: 1e-19") || message.detail.contains("1e-1"), "{}", message.detail);

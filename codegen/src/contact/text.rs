@@ -3,6 +3,7 @@
 use super::{programs, system, Mode, ModeProgram};
 use crate::certify::companion::{state_bound, Bits};
 use crate::certify::residual::acceleration_bound;
+use crate::certify::Refusal;
 use crate::compile::{error_bound_text, wants_companions, Options};
 use crate::emit::{self, array_type, Style};
 use crate::equivalence::{self, Disagreement, Plainer};
@@ -124,6 +125,9 @@ fn bound(
     function: ContactFunction,
     graph: &Graph,
 ) -> Result<Graph, &'static str> {
+    if !options.optimisations().folding {
+        return Err(Refusal::Rounded.words());
+    }
     let bound = match function {
         ContactFunction::ForwardDynamics => {
             let (system, yielding) = system(robot, options, mode, options.optimisations());
