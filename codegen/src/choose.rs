@@ -60,6 +60,19 @@ pub fn choose(
     options: &Options,
     optimisations: Optimisations,
 ) -> Robot {
+    let chosen = chosen(robot, frames, function, options, optimisations);
+    #[cfg(test)]
+    let chosen = crate::equivalence::sabotage::formed(chosen);
+    chosen
+}
+
+fn chosen(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+    optimisations: Optimisations,
+) -> Robot {
     use Function::*;
     let search = |function: Function| {
         // the search is for torques or the mass matrix, whatever becomes of forward dynamics

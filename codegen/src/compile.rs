@@ -332,7 +332,7 @@ impl Optimisations {
 }
 
 /// What even equations as they are have, unless rules are exact.
-const FOLDING: &str = "constants folded in double-double";
+pub(crate) const FOLDING: &str = "constants folded in double-double";
 
 /// A program between tracing and text.
 #[derive(Clone, Debug)]
@@ -413,7 +413,7 @@ fn optimised_with(
         let graph = check("dead code", dead_code(&check("traced", traced)));
         let graph = check("unread inputs", unread_inputs(graph, is_optional));
         let graph = match optimisations.sums {
-            true => dead_code(&check("sums", sums(&graph))),
+            true => check("dead code", dead_code(&check("sums", sums(&graph)))),
             false => graph,
         };
         // joint torques gain an operation of two hundred
@@ -639,17 +639,11 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
         options.scene.places.complain("numbers.scalar", complaint, diagnostics);
     };
     for program in &mut programs {
-        mix_precisions(&robot, program, &resolved);
+        if let Err(wrong) = mix_precisions(&robot, &frames, program, &resolved) {
+            diagnostics.push(wrong.error(&robot.model));
+        }
         if let Some(why) = range::of_program(&robot.model, &program.graph, options.scalar) {
             beyond(program.function.name(), &why, &mut diagnostics);
-        }
-        if !program.graph.widths.is_empty() {
-            let folding = program.has_folded_constants(&resolved);
-            let made_by = Optimisations { folding, ..resolved.optimisations() };
-            let (function, graph) = (program.function, &program.graph);
-            if let Err(wrong) = equivalence::of_function(&robot, &frames, function, &resolved, made_by, graph) {
-                diagnostics.push(wrong.error(&robot.model));
-            }
         }
         if let Some(plainer) = &program.plainer {
             diagnostics.push(plainer.warning(&robot.model));
@@ -738,13 +732,11 @@ fn generate(
         let mut text = emit::function(graph, schedule, function.name(), &doc, options.plain_style(), &title);
         let figures = FunctionReport::new(&program, options.scalar, text.text.lines().count());
         if wants_companions(options) {
-            let bound = match program.has_folded_constants(options) {
-                true => companion(&robot, *function, graph, options),
-                false => Err(Refusal::Rounded.words()),
+            let (bound, plainer) = match program.has_folded_constants(options) {
+                true => checked_companion(&robot, *function, graph, options)?,
+                false => (Err(Refusal::Rounded.words()), None),
             };
-            if let Ok(bound) = &bound {
-                equivalence::of_bound(&robot, options, function.name(), (graph, bound))?;
-            }
+            plainer.iter().for_each(|p| warnings.push(p.warning(model)));
             let by_residual = *function == Function::ForwardDynamics;
             let bound = error_bound_text(bound, (function.name(), by_residual), graph, options, &mut written.functions);
             text.text.push('\n');
@@ -781,10 +773,6 @@ fn generate(
         }
         None => (String::new(), None),
     };
-    for parameter in options.scene.parameters.iter().filter(|p| p.is_of(model)) {
-        let constructor = parameter_program(&robot, parameter, options);
-        equivalence::of_parameter(&robot, parameter, options, &constructor)?;
-    }
     let report = Report {
         robot: model.name.clone(),
         nq: model.nq(),
@@ -810,7 +798,7 @@ fn generate(
             || (staged_text.clone() + &contact_text).contains(&format!("&{name}"))
     };
     let generic = if options.generic { emit::GENERIC } else { "" };
-    let types = parameter_types(&robot, options, &takes, &mut written.parameters) + &staged_text + &contact_text;
+    let types = parameter_types(&robot, options, &takes, &mut written.parameters)? + &staged_text + &contact_text;
     let before = generic.to_string() + &types;
     let text = emit::file(model, &frames, &items, &report, &provenance, options.style(), &before, options.lanes);
     Ok(Generated {
@@ -871,20 +859,32 @@ pub fn known(robot: &Robot, graph: &Graph, inputs: &[certify::Interval], options
 }
 
 /// A program in f32 gets f64 where its budget allows that and its greatest error takes it.
-fn mix_precisions(robot: &Robot, program: &mut Program, options: &Options) {
+///
+/// # Errors
+/// If the program differs from the plain equations then.
+pub(crate) fn mix_precisions(
+    robot: &Robot,
+    frames: &[String],
+    program: &mut Program,
+    options: &Options,
+) -> Result<(), Disagreement> {
     let budget = options.scene.budgets.get(&program.function).filter(|b| b.mixed_precision);
-    let Some(most) = budget.and_then(|b| b.max_error.as_ref()) else { return };
+    let Some(most) = budget.and_then(|b| b.max_error.as_ref()) else { return Ok(()) };
     // fused and generic ones were refused with the options
     if options.scalar != Scalar::F32 {
-        return;
+        return Ok(());
     }
     // what does not fit is said where bounds are compared with the budget
-    let Ok(demand) = most.of_results(&program.graph.outputs) else { return };
+    let Ok(demand) = most.of_results(&program.graph.outputs) else { return Ok(()) };
     let stored: Vec<NodeId> = program.schedule.parts.iter().flat_map(|p| p.stores.iter().map(|(id, _)| *id)).collect();
     let inputs = certify::input_box(&program.graph.inputs, &options.scene, &robot.model);
     // what has no bound at all is refused where bounds are compared with the budget
     let widened = inputs.and_then(|inputs| certify::mixed::widened(&program.graph, &inputs, &demand, &stored));
-    program.graph = widened.unwrap_or_else(|_| program.graph.clone());
+    // what has none is the program that was checked before
+    let Ok(graph) = widened else { return Ok(()) };
+    program.graph = passed("mixed precision", program.function.name(), graph);
+    let made_by = Optimisations { folding: program.has_folded_constants(options), ..options.optimisations() };
+    equivalence::of_function(robot, frames, program.function, options, made_by, &program.graph)
 }
 
 /// Whether programs for the bounds at the state at hand are asked for.
@@ -905,15 +905,45 @@ pub fn bits(options: &Options) -> Bits {
 ///
 /// # Errors
 /// Why there is none.
+///
+/// # Panics
+/// If no form of the equations that accelerations are judged by agrees with the plain ones, or what was made is no bound.
 pub fn companion(robot: &Robot, function: Function, graph: &Graph, options: &Options) -> Result<Graph, &'static str> {
-    let bound = match function {
-        Function::ForwardDynamics => {
-            let (system, _) = contact::system(robot, options, &contact::Mode::alone(), options.optimisations());
-            certify::residual::acceleration_bound(&system, &[], options.scalar)
-        }
-        _ => certify::companion::state_bound(graph, options.scalar, bits(options)),
-    };
-    bound.map(|graph| dead_code(&graph))
+    checked_companion(robot, function, graph, options).unwrap_or_else(|wrong| panic!("{wrong}")).0
+}
+
+/// A bound at a state, or why there is none.
+pub(crate) type StateBound = Result<Graph, &'static str>;
+
+/// The same, checked, and whether the equations that it is made of are plainer than they were to be.
+///
+/// # Errors
+/// What was wrong.
+pub(crate) fn checked_companion(
+    robot: &Robot,
+    function: Function,
+    graph: &Graph,
+    options: &Options,
+) -> Result<(StateBound, Option<Plainer>), Disagreement> {
+    let name = function.name();
+    if function != Function::ForwardDynamics {
+        let bound = certify::companion::state_bound(graph, options.scalar, bits(options));
+        let bound = bound.map(|bound| finished_bound(name, bound));
+        bound.iter().try_for_each(|bound| equivalence::of_bound(robot, options, name, (graph, bound)))?;
+        return Ok((bound, None));
+    }
+    let ((system, _), plainer) = contact::checked_system(robot, options, &contact::Mode::alone())?;
+    let bound = certify::residual::acceleration_bound(&system, &[], options.scalar);
+    let bound = bound.map(|bound| finished_bound(name, bound));
+    bound.iter().try_for_each(|bound| {
+        equivalence::of_acceleration_bound(robot, options, name, (graph, bound), Some(&system))
+    })?;
+    Ok((bound, plainer))
+}
+
+/// A bound without what no result needs.
+pub(crate) fn finished_bound(program: &str, bound: Graph) -> Graph {
+    passed("bound: dead code", program, dead_code(&passed("bound: traced", program, bound)))
 }
 
 /// What a caller must know of a bound at a state.
@@ -970,12 +1000,27 @@ pub(crate) fn error_bound_text(
 /// yy, yz, zz) in the parameter's frame, or from the free numbers of a drive, to the scalars that the functions take.
 pub fn parameter_program(robot: &Robot, parameter: &Parameter, options: &Options) -> Graph {
     let outputs = vec![Port::new("parameters", &[parameter.scalars(&robot.model)])];
-    dead_code(&trace(options.rules(), parameter.given(), outputs, |x| constructed(robot, parameter, x)))
+    let name = parameter.input_name();
+    let traced = trace(options.rules(), parameter.given(), outputs, |x| constructed(robot, parameter, x));
+    passed("parameter: dead code", &name, dead_code(&passed("parameter: traced", &name, traced)))
 }
 
 /// The last part of a path.
 pub(crate) fn file_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
+/// The same, if it makes what the functions take.
+///
+/// # Errors
+/// If it does not.
+pub(crate) fn checked_parameter(
+    robot: &Robot,
+    parameter: &Parameter,
+    options: &Options,
+) -> Result<Graph, Disagreement> {
+    let graph = parameter_program(robot, parameter, options);
+    equivalence::of_parameter(robot, parameter, options, &graph).map(|()| graph)
 }
 
 /// The types of those run-time parameters that something takes, with what they share.
@@ -984,10 +1029,11 @@ fn parameter_types(
     options: &Options,
     takes: &dyn Fn(&Parameter) -> bool,
     written: &mut Vec<ParameterProgram>,
-) -> String {
+) -> Result<String, Disagreement> {
     let parameters = options.scene.parameters.iter().filter(|p| p.is_of(&robot.model) && takes(p));
-    let types = parameters.map(|p| {
-        let graph = parameter_program(robot, p, options);
+    let mut types = String::new();
+    for p in parameters {
+        let graph = checked_parameter(robot, p, options)?;
         let (schedule, name) = (schedule(&graph, options.limits), p.input_name());
         let drive = FreeDrive::new(p, &robot.model);
         let doc = match &drive {
@@ -1010,13 +1056,12 @@ fn parameter_types(
             }
         };
         written.push(ParameterProgram { type_name: p.type_name(), program, numbers });
-        text
-    });
-    let types: String = types.collect();
+        types.push_str(&text);
+    }
     let is_there = |drive: bool| written.iter().any(|p| p.numbers.is_some() == drive);
     let checks = [(false, emit::parameter::check as fn(Scalar) -> String), (true, emit::parameter::check_drive)];
-    checks.into_iter().filter(|(drive, _)| is_there(*drive)).map(|(_, text)| text(options.scalar)).collect::<String>()
-        + &types
+    let checks = checks.into_iter().filter(|(drive, _)| is_there(*drive)).map(|(_, text)| text(options.scalar));
+    Ok(checks.collect::<String>() + &types)
 }
 
 /// The frames asked for, or the tips of the robot: the last frame on every body that carries no other.

@@ -5,10 +5,10 @@
 //! of a stage cannot outlive a change of what it was computed from.
 
 use crate::choose::choose;
-use crate::compile::{Optimisations, Options};
+use crate::compile::{passed, Optimisations, Options};
 use crate::emit::{self, array_type, Scalar};
 use crate::equivalence::{self, Disagreement, Plainer};
-use crate::expr::{verify, Counts, Graph, Port, Section};
+use crate::expr::{Counts, Graph, Port, Section};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::pass::{dead_code, sums};
 use crate::readback::{self, StageProgram, StagedPrograms};
@@ -152,8 +152,12 @@ fn optimised(robot: &Robot, frames: &[String], options: &Options, optimisations:
         let mut found = Vec::new();
         if optimisations.sums {
             // before the cut, where all terms are in sight, or within its pieces, which keeps stages apart
-            found.push(cut(&dead_code(&sums(&graph)), &stage_of, &names, &blocks));
-            let regrouped = |graph: &mut Graph| *graph = dead_code(&sums(graph));
+            let regroup = |graph: &Graph| {
+                let graph = passed("stages: sums", "stages", sums(graph));
+                passed("stages: dead code", "stages", dead_code(&graph))
+            };
+            found.push(cut(&regroup(&graph), &stage_of, &names, &blocks));
+            let regrouped = |graph: &mut Graph| *graph = regroup(graph);
             pieces.stages.iter_mut().chain(pieces.functions.iter_mut().map(|(_, g)| g)).for_each(regrouped);
         }
         found.push(pieces);
@@ -166,9 +170,9 @@ fn optimised(robot: &Robot, frames: &[String], options: &Options, optimisations:
         .into_iter()
         .map(|robot| cuts(&robot, first.2));
     let best = of_robots.min_by_key(|(s, _, _)| cost(s)).filter(|(s, _, _)| cost(s) < cost(&first.0));
-    let (staged, stages, form) = best.unwrap_or(first);
-    for graph in staged.stages.iter().chain(staged.functions.iter().map(|(_, g)| g)) {
-        verify(graph).unwrap_or_else(|broken| panic!("a stage is broken: {broken}"));
+    let (mut staged, stages, form) = best.unwrap_or(first);
+    for graph in staged.stages.iter_mut().chain(staged.functions.iter_mut().map(|(_, g)| g)) {
+        *graph = passed("stages: cut", "stages", std::mem::take(graph));
     }
     Programs { functions, staged, stages, form }
 }
@@ -291,7 +295,8 @@ fn joint_program(
         }
         results
     });
-    (dead_code(&graph), stage_of, stages)
+    let graph = dead_code(&passed("stages: traced", "stages", graph));
+    (passed("stages: dead code", "stages", graph), stage_of, stages)
 }
 
 fn report(programs: &Programs) -> StagedReport {

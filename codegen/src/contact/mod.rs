@@ -9,10 +9,10 @@ mod text;
 
 use crate::certify::residual::OUTPUTS;
 use crate::choose::choose;
-use crate::compile::{Forms, Optimisations, Options};
+use crate::compile::{passed, Forms, Optimisations, Options};
 use crate::emit::Scalar;
 use crate::equivalence::{self, Disagreement, Plainer};
-use crate::expr::{verify, Graph, Port};
+use crate::expr::{Graph, Port};
 use crate::function::{DriveFunction, ForwardDynamicsMethod, Function, Robot};
 use crate::identifier::module_name;
 use crate::pass::{dead_code, sums, unread_inputs};
@@ -25,6 +25,8 @@ use straightline_core::contact::Coordinate;
 use straightline_core::model::Model;
 use straightline_core::{Dd, Real};
 
+#[cfg(test)]
+pub(crate) use text::bound as mode_bound;
 pub use text::{module, ContactModule};
 
 /// A contact mode of a scene, its contacts looked up.
@@ -197,10 +199,7 @@ pub(crate) fn optimised(
     function: ContactFunction,
     optimisations: Optimisations,
 ) -> Graph {
-    let check = |graph: Graph| {
-        verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
-        graph
-    };
+    let check = |pass, graph| passed(pass, function.name(), graph);
     let chosen = chosen(robot, options, optimisations);
     let robot = chosen.as_ref().unwrap_or(robot);
     let base = base_function(function);
@@ -220,9 +219,10 @@ pub(crate) fn optimised(
     });
     let unused =
         |port: &Port| is_optional(port) || matches!(port.name.as_str(), "qd" | "x" | "u") || names.contains(&port.name);
-    let graph = check(unread_inputs(check(dead_code(&check(traced))), unused));
+    let graph = check("contact: dead code", dead_code(&check("contact: traced", traced)));
+    let graph = check("contact: unread inputs", unread_inputs(graph, unused));
     match optimisations.sums {
-        true => check(dead_code(&check(sums(&graph)))),
+        true => check("contact: dead code", dead_code(&check("contact: sums", sums(&graph)))),
         false => graph,
     }
 }
@@ -248,8 +248,7 @@ pub fn system(robot: &Robot, options: &Options, mode: &Mode, optimisations: Opti
     let own = options.scene.ports(Function::ForwardDynamics, &robot.model);
     let added = added_ports(ContactFunction::ForwardDynamics, mode, &robot.model);
     let names: Vec<String> = added.iter().map(|p| p.name.clone()).collect();
-    let solution = [Port::new("qdd", &[nv]), Port::new("force", &[m])];
-    let solution = solution.into_iter().filter(|p| !p.is_empty());
+    let solution = solution_ports(&robot.model, mode).into_iter().filter(|p| !p.is_empty());
     let inputs: Vec<Port> = own.iter().cloned().chain(added).chain(solution).collect();
     let shapes = [vec![nv], vec![m], vec![nv, nv], vec![m, nv], vec![m, nv], vec![m]];
     let outputs: Vec<Port> = OUTPUTS.iter().zip(&shapes).map(|(name, shape)| Port::new(name, shape)).collect();
@@ -269,12 +268,66 @@ pub fn system(robot: &Robot, options: &Options, mode: &Mode, optimisations: Opti
     }
     yielding.resize(m, false);
     let unused = |port: &Port| is_optional(port) || port.name == "qd" || names.contains(&port.name);
-    let graph = unread_inputs(dead_code(&traced), unused);
-    let graph = if optimisations.sums { dead_code(&sums(&graph)) } else { graph };
-    (
-        verify(&graph).map(|()| graph).unwrap_or_else(|broken| panic!("system: a pass broke the graph: {broken}")),
-        yielding,
-    )
+    let check = |pass, graph| passed(pass, "the equations of motion", graph);
+    let graph = check("system: dead code", dead_code(&check("system: traced", traced)));
+    let graph = check("system: unread inputs", unread_inputs(graph, unused));
+    let graph = match optimisations.sums {
+        true => check("system: dead code", dead_code(&check("system: sums", sums(&graph)))),
+        false => graph,
+    };
+    (graph, yielding)
+}
+
+/// A system with its flags of rows that yield.
+pub(crate) type System = (Graph, Vec<bool>);
+
+/// [`system`] in the form with the fewest operations that agrees with its plain equations.
+///
+/// # Errors
+/// What was wrong, if none does.
+pub(crate) fn checked_system(
+    robot: &Robot,
+    options: &Options,
+    mode: &Mode,
+) -> Result<(System, Option<Plainer>), Disagreement> {
+    let plain = || system(robot, options, mode, options.optimisations().plain()).0;
+    options.optimisations().first_that_agrees(|optimisations| {
+        let made = system(robot, options, mode, optimisations);
+        equivalence::of_system(robot, options, mode, &made.0, &plain).map(|()| made)
+    })
+}
+
+/// The results of a [`system`] by the robot's own parameters, as [`evaluate`] has those of functions.
+pub(crate) fn evaluate_system<T: Real>(
+    robot: &Robot,
+    options: &Options,
+    mode: &Mode,
+    given: &dyn Fn(&Port) -> Vec<T>,
+    prepare: &dyn Fn(&mut Model<T>) -> Option<T>,
+) -> Option<Vec<T>> {
+    if mode.contacts.iter().any(|c| c.item.surface.over::<T>().is_none()) {
+        return None;
+    }
+    let base = Function::ForwardDynamics;
+    let own: Vec<Vec<T>> = options.scene.ports(base, &robot.model).iter().map(given).collect();
+    let mut bound = options.scene.bind(base, robot, &own);
+    let falls = prepare(&mut bound.model);
+    let added = added_ports(ContactFunction::ForwardDynamics, mode, &robot.model);
+    let added = added.into_iter().map(|p| (p.name.clone(), given(&p))).collect();
+    let form = Form { reduced: false, surface: |s: &SurfaceItem| s.over().expect("asked for above"), falls };
+    let [qdd, force] = solution_ports(&robot.model, mode).map(|p| if p.is_empty() { Vec::new() } else { given(&p) });
+    Some(equations::system(robot, options, mode, &bound, form, &added, (&qdd, &force)).concat())
+}
+
+/// What a system judges: accelerations and reactions.
+fn solution_ports(model: &Model<Dd>, mode: &Mode) -> [Port; 2] {
+    [Port::new("qdd", &[model.nv()]), Port::new("force", &[mode.constrained_names().len()])]
+}
+
+/// All inputs that a system may have.
+pub(crate) fn system_ports(robot: &Robot, options: &Options, mode: &Mode) -> Vec<Port> {
+    let own = ports(robot, options, mode, ContactFunction::ForwardDynamics);
+    own.into_iter().chain(solution_ports(&robot.model, mode).into_iter().filter(|p| !p.is_empty())).collect()
 }
 
 /// The function of the robot whose inputs a contact function has.

@@ -1,16 +1,15 @@
 //! The module `contact` as text.
 
-use super::{programs, system, Mode, ModeProgram};
+use super::{checked_system, programs, Mode, ModeProgram};
 use crate::certify::companion::{state_bound, Bits};
 use crate::certify::residual::acceleration_bound;
 use crate::certify::Refusal;
-use crate::compile::{error_bound_text, wants_companions, Options};
+use crate::compile::{error_bound_text, finished_bound, wants_companions, Options, StateBound};
 use crate::emit::{self, array_type, Style};
 use crate::equivalence::{self, Disagreement, Plainer};
 use crate::expr::{Graph, Port, Section};
 use crate::function::Robot;
 use crate::identifier::{comment, doc, string_literals, upper_camel_case};
-use crate::pass::dead_code;
 use crate::readback::{self, ModePrograms};
 use crate::report::ContactReport;
 use crate::scene::{ContactFunction, Parameter, Scene};
@@ -70,11 +69,8 @@ pub fn module(
             text.push_str(&source.text);
             if wants_companions(options) {
                 let by_residual = *function == ContactFunction::ForwardDynamics;
-                let bound = bound(robot, options, mode, *function, graph);
-                if let Ok(bound) = &bound {
-                    let name = format!("{}::{}", mode.identifier, function.name());
-                    equivalence::of_bound(robot, options, &name, (graph, bound))?;
-                }
+                let (bound, of_system) = bound(robot, options, mode, *function, graph)?;
+                plainer.extend(of_system);
                 let bound = error_bound_text(bound, (function.name(), by_residual), graph, options, &mut functions);
                 kernel |= bound.calls_kernel();
                 text.push('\n');
@@ -117,25 +113,33 @@ pub fn module(
     Ok(ContactModule { text: out, reports, plainer, programs: written })
 }
 
-/// The program that bounds the errors of a contact function at the state at hand.
-fn bound(
+/// The program that bounds the errors of a contact function at the state at hand, and whether the equations that it is made of are plainer
+/// than they were to be.
+///
+/// # Errors
+/// What was wrong with it.
+pub(crate) fn bound(
     robot: &Robot,
     options: &Options,
     mode: &Mode,
     function: ContactFunction,
     graph: &Graph,
-) -> Result<Graph, &'static str> {
+) -> Result<(StateBound, Option<Plainer>), Disagreement> {
     if !options.optimisations().folding {
-        return Err(Refusal::Rounded.words());
+        return Ok((Err(Refusal::Rounded.words()), None));
     }
-    let bound = match function {
-        ContactFunction::ForwardDynamics => {
-            let (system, yielding) = system(robot, options, mode, options.optimisations());
-            acceleration_bound(&system, &yielding, options.scalar)
-        }
-        _ => state_bound(graph, options.scalar, Bits::Plain),
-    };
-    bound.map(|graph| dead_code(&graph))
+    let name = format!("{}::{}", mode.identifier, function.name());
+    if function != ContactFunction::ForwardDynamics {
+        let bound = state_bound(graph, options.scalar, Bits::Plain).map(|bound| finished_bound(&name, bound));
+        bound.iter().try_for_each(|bound| equivalence::of_bound(robot, options, &name, (graph, bound)))?;
+        return Ok((bound, None));
+    }
+    let ((system, yielding), plainer) = checked_system(robot, options, mode)?;
+    let bound = acceleration_bound(&system, &yielding, options.scalar).map(|bound| finished_bound(&name, bound));
+    bound
+        .iter()
+        .try_for_each(|bound| equivalence::of_acceleration_bound(robot, options, &name, (graph, bound), None))?;
+    Ok((bound, plainer))
 }
 
 fn indent(out: &mut String, text: &str) {

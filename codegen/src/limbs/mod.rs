@@ -15,8 +15,8 @@ mod expand;
 mod template;
 
 use crate::choose::choose;
-use crate::compile::{Optimisations, Options};
-use crate::expr::{verify, Graph};
+use crate::compile::{passed, Optimisations, Options};
+use crate::expr::Graph;
 use crate::function::{Function, Robot};
 use crate::pass::{dead_code, sums, unread_inputs};
 use crate::scene::is_optional;
@@ -142,22 +142,20 @@ pub(crate) fn program(
         true => choose(robot, frames, function, options, Optimisations { chosen: false, ..apart }),
         false => robot.clone(),
     };
-    let check = |graph: Graph| {
-        verify(&graph).unwrap_or_else(|broken| panic!("{}: a pass broke the graph: {broken}", function.name()));
-        graph
-    };
+    let check = |pass, graph| passed(pass, function.name(), graph);
     let rules = || apart.rules(options.scalar);
     let mut template = template::template(&chosen, function, &options.scene, &limbs, rules());
     let wanted = options.scene.select(function, &chosen.model, 0).0;
     template.keep(&chosen.model, &wanted);
-    template.graph = check(dead_code(&check(template.graph)));
+    template.graph = check("limbs: dead code", dead_code(&check("limbs: traced", template.graph)));
     template = constants::folded(template, rules());
     if optimisations.sums {
-        template.graph = check(dead_code(&check(sums(&template.graph))));
+        template.graph = check("limbs: dead code", dead_code(&check("limbs: sums", sums(&template.graph))));
         // a sum of products with one factor in common is a product with a sum, which may be one of constants
         template = constants::folded(template, rules());
     }
     template.drop_unread(&chosen.model, &wanted);
-    let graph = expand::written_out(&check(template.graph.clone()), &template, &chosen.model, &options.scene, function);
-    Some(check(unread_inputs(check(graph), is_optional)))
+    let folded = check("limbs: folded constants", template.graph.clone());
+    let graph = expand::written_out(&folded, &template, &chosen.model, &options.scene, function);
+    Some(check("limbs: unread inputs", unread_inputs(check("limbs: written out", graph), is_optional)))
 }
