@@ -3,7 +3,7 @@
 //! Errors that a program happens to make are mostly far below what can be proven, so they alone would miss a bound that is too small. What can
 //! be proven is Σ |∂y/∂v| u |v| at least, over all values v that are rounded, to first order: adjoints of the program give that without
 //! any of the bound's own rules. A bound of accelerations is asked about accelerations that are off by a known amount, too: those of
-//! other forces, one after the other; there it is hardly greater than what they are off by.
+//! other forces, one after the other, where it is hardly greater than what they are off by, and any others.
 
 use super::{inputs, rounded, Disagreement, State, States, STATES};
 use crate::certify::companion::OF_ERROR;
@@ -13,6 +13,7 @@ use crate::compile::Options;
 use crate::emit::{element_of, Scalar};
 use crate::expr::{evaluate, Graph, NodeId, Op, Port, Width};
 use crate::function::Robot;
+use crate::random::Random;
 use std::collections::BTreeMap;
 use straightline_core::Dd;
 
@@ -20,6 +21,8 @@ use straightline_core::Dd;
 const FIRST_ORDER: f64 = 0.99;
 /// Forces are off by so much of the greatest: by far more than rounding, by less than the forces.
 const OFF: f64 = 1.0 / 1024.0;
+/// Accelerations and reactions are off in any direction by such parts of the greatest.
+const ANYWHERE: [f64; 4] = [0.3, 1e-2, 1e-5, 0.3];
 /// So many steps towards the smallest eigenvalue: every step gives an upper bound of it.
 const STEPS: usize = 20;
 
@@ -89,6 +92,9 @@ pub(crate) fn of_acceleration_bound(
             Ok(bounds)
         };
         let of_found = asked(&found)?;
+        for part in ANYWHERE {
+            asked(&off_by(part, &found, &mut states.random))?;
+        }
         // what forces would have to be off by for accelerations to be off by so much: columns of the inverse mass matrix
         let Some(forces) = state.get("tau") else { continue };
         let by = Dd::from(OFF * forces.iter().map(|x| x.hi().abs()).fold(f64::MIN_POSITIVE, f64::max));
@@ -123,6 +129,15 @@ pub(crate) fn of_acceleration_bound(
         }
     }
     Ok(())
+}
+
+/// All numbers off by up to a part of the greatest of their port.
+fn off_by(part: f64, solution: &State, random: &mut Random) -> State {
+    let off = |x: &Vec<Dd>, random: &mut Random| {
+        let most = x.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
+        x.iter().map(|x| *x + Dd::from(part * most * random.symmetric(1.0))).collect()
+    };
+    solution.iter().map(|(name, x)| (name.clone(), off(x, random))).collect()
 }
 
 /// Of a symmetric matrix, from below.
