@@ -30,6 +30,7 @@ use crate::scene::{constructed, ContactFunction};
 use crate::singular::weakest_joint;
 use crate::stage::Staged;
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::fmt;
 use straightline_core::algorithms::Ltdl;
 use straightline_core::magnitude::Magnitude;
@@ -48,6 +49,8 @@ const ROUNDINGS: f64 = 1e4;
 const SOLVED: f64 = 1e3;
 /// A point on an axis is off it by so much of the longest lever, for all that rounding says.
 const POINT: f64 = 1e-3;
+/// What is left so small a part of where nothing cancels, is rounding noise.
+const NOISE: f64 = 1e-6;
 /// A program may lose so many times what the plain equations lose in the same scalar.
 const LOSSES: f64 = 12.0;
 /// A difference of inertias that is so many roundings of them has hardly a digit.
@@ -184,8 +187,8 @@ pub(crate) fn of_function(
     }
     if function == Function::MassMatrix {
         // of all results these lose most where the robot happens to stand so that an entry is small
-        for _ in 0..MORE_STATES {
-            check.at(&states.next(&ports), &mut losses, false)?;
+        for place in [Place::Anywhere, Place::Beyond].into_iter().cycle().take(MORE_STATES) {
+            check.at(&states.placed(&ports, place), &mut losses, false)?;
         }
     }
     check.compare(losses)?;
@@ -292,7 +295,7 @@ impl Check<'_> {
 
 /// Natural scales of the entries of H: √(H_ii H_jj), where H_ii is not what is left of terms that cancel.
 fn sizes_of_inertias(nv: usize, h: &[Dd], off: &[Magnitude]) -> Vec<f64> {
-    let root = |i: usize| h[i * nv + i].hi().abs().max(POINT * off[i * nv + i].size).sqrt();
+    let root = |i: usize| h[i * nv + i].hi().abs().max(NOISE * off[i * nv + i].size).sqrt();
     (0..nv * nv).map(|k| root(k / nv) * root(k % nv)).collect()
 }
 
@@ -756,21 +759,25 @@ struct States<'a> {
 /// Where a robot stands.
 #[derive(Clone, Copy, PartialEq)]
 enum Place {
+    /// Within the limits of its joints.
     Anywhere,
+    /// Whatever the limits.
+    Beyond,
     NearZero,
     /// At rest, too.
     Zero,
 }
 
 impl Place {
-    /// Numbers from anywhere, brought there.
-    fn of(self, values: Vec<f64>) -> Vec<f64> {
-        let least = match self {
-            Place::Anywhere => return values,
-            Place::NearZero => NEAR,
-            Place::Zero => 0.0,
-        };
-        values.into_iter().map(|x| least * x).collect()
+    /// Coordinates or rates from anywhere, brought there.
+    fn of(self, name: &str, values: Vec<f64>, random: &mut Random) -> Vec<f64> {
+        let times = |factor: f64| values.iter().map(|x| factor * x).collect();
+        match self {
+            Place::Beyond if name == "q" => values.iter().map(|_| random.symmetric(PI)).collect(),
+            Place::Anywhere | Place::Beyond => values,
+            Place::NearZero => times(NEAR),
+            Place::Zero => times(0.0),
+        }
     }
 }
 
@@ -810,7 +817,10 @@ impl<'a> States<'a> {
                 (_, true) => (0..port.len()).map(|_| self.random.symmetric(1.0)).collect(),
                 _ => forward_method::of_port(model, port, fast, &mut self.random),
             };
-            let values = if matches!(name, "q" | "qd") { place.of(values) } else { values };
+            let values = match name {
+                "q" | "qd" => place.of(name, values, &mut self.random),
+                _ => values,
+            };
             plain.push((name, values));
         }
         settle(model, &mut plain, &mut self.random);
