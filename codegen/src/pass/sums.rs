@@ -18,6 +18,7 @@ use std::cmp::Reverse;
 use std::collections::hash_map::Entry;
 use std::collections::BTreeSet;
 use std::hash::{Hash, Hasher};
+use std::rc::Rc;
 use straightline_core::Dd;
 
 /// More rounds have not been seen to help; this only bounds the time.
@@ -82,9 +83,14 @@ struct Table {
     /// For look-ups only.
     products: FxHashMap<(usize, usize), usize>,
     constants: FxHashMap<Constant, usize>,
+    /// What was counted since the last change.
+    uses: Option<Rc<Uses>>,
     /// Whether anything is not as it was.
     changed: bool,
 }
+
+/// How often each value is used, and the values that are, operands before users.
+type Uses = (Vec<u32>, Vec<usize>);
 
 impl Table {
     fn read(graph: &Graph) -> Table {
@@ -94,6 +100,7 @@ impl Table {
             origin: Vec::with_capacity(graph.ops.len()),
             products: FxHashMap::default(),
             constants: FxHashMap::default(),
+            uses: None,
             changed: false,
         };
         let live = graph.live();
@@ -136,6 +143,7 @@ impl Table {
     }
 
     fn push(&mut self, value: Value, origin: Option<NodeId>) -> Term {
+        self.uses = None;
         self.values.push(value);
         self.origin.push(origin);
         Term::new(self.values.len() - 1, false)
@@ -198,7 +206,13 @@ impl Table {
     }
 
     /// How often each value is used by what the results need, and those values, operands before users.
-    fn uses(&self) -> (Vec<u32>, Vec<usize>) {
+    fn uses(&mut self) -> Rc<Uses> {
+        let found = self.uses.take().unwrap_or_else(|| Rc::new(self.counted_uses()));
+        self.uses = Some(Rc::clone(&found));
+        found
+    }
+
+    fn counted_uses(&self) -> Uses {
         let mut uses = vec![0; self.values.len()];
         let mut order = Vec::with_capacity(self.values.len());
         // a value, and which of its operands is next
@@ -245,9 +259,10 @@ impl Table {
 
     /// Sums without another user dissolve in the sum that uses them; constants of a sum become one, multiples of a value one, opposites go.
     fn flatten(&mut self) {
-        let (uses, order) = self.uses();
+        let found = self.uses();
+        let (uses, order) = &*found;
         let mut flat: Vec<Term> = Vec::new();
-        for v in order {
+        for v in order.iter().copied() {
             let Value::Sum(terms) = &self.values[v] else { continue };
             flat.clear();
             for t in terms.iter().map(|t| self.resolved(*t)) {
@@ -259,7 +274,7 @@ impl Table {
                     _ => flat.push(t),
                 }
             }
-            self.gather(&mut flat, &uses);
+            self.gather(&mut flat, uses);
             self.set_sum(v, &flat);
         }
         self.unite();
@@ -288,6 +303,7 @@ impl Table {
 
     fn set(&mut self, v: usize, value: Value) {
         if self.values[v] != value {
+            self.uses = None;
             self.values[v] = value;
             self.changed = true;
         }
@@ -295,13 +311,13 @@ impl Table {
 
     /// Equal products and equal sums become one: operands may have become equal.
     fn unite(&mut self) {
-        let (_, order) = self.uses();
+        let found = self.uses();
         self.products.clear();
         // sums by a hash of their terms; two that share one by chance stay apart
         let mut sums: FxHashMap<u64, (usize, bool)> = FxHashMap::default();
         let mut key: Vec<Term> = Vec::new();
         let mut other: Vec<Term> = Vec::new();
-        for v in order {
+        for v in found.1.iter().copied() {
             match &self.values[v] {
                 Value::Product(..) => {
                     let [a, b] = self.factors(v);
@@ -404,10 +420,11 @@ impl Table {
     /// a b + a b = a (b + b), where nothing else uses the product: then it fuses. Twice the factor that more values use,
     /// as it may be wanted doubled elsewhere.
     fn double(&mut self) {
-        let (uses, order) = self.uses();
+        let found = self.uses();
+        let (uses, order) = &*found;
         let used = |t: Term| uses.get(t.value()).copied().unwrap_or(0);
         let mut doubled = false;
-        for v in order {
+        for v in order.iter().copied() {
             let Value::Sum(terms) = &self.values[v] else { continue };
             let is_twice = |k: &usize| {
                 let t = terms[*k];
@@ -435,9 +452,10 @@ impl Table {
         let mut members: Vec<(usize, usize)> = Vec::new();
         let mut any = false;
         loop {
-            let (uses, order) = self.uses();
+            let found = self.uses();
+            let (uses, order) = &*found;
             let mut factored = false;
-            for v in order {
+            for v in order.iter().copied() {
                 let Value::Sum(terms) = &self.values[v] else { continue };
                 members.clear();
                 for (k, t) in terms.iter().enumerate() {
@@ -479,9 +497,9 @@ impl Table {
 
     /// The pair of terms, up to a common sign, that stands in most sums is added once.
     fn share(&mut self) {
-        let (_, order) = self.uses();
+        let found = self.uses();
         let mut pairs = Pairs::default();
-        for v in order {
+        for v in found.1.iter().copied() {
             if let Value::Sum(_) = self.values[v] {
                 pairs.insert(v, &self.terms(v));
             }
@@ -523,11 +541,12 @@ impl Table {
     }
 
     /// As [`Graph::counts`] of what [`Table::write`] makes: n products of one user and a rest are n fused instructions.
-    fn counts(&self) -> Counts {
-        let (uses, order) = self.uses();
+    fn counts(&mut self) -> Counts {
+        let found = self.uses();
+        let (uses, order) = &*found;
         let mut counts = Counts::default();
         let mut fused = 0;
-        for v in order {
+        for v in order.iter().copied() {
             match &self.values[v] {
                 Value::Product(..) => counts.mul += 1,
                 Value::Sum(_) => {
@@ -556,7 +575,7 @@ impl Table {
     }
 
     fn write(&self, graph: &Graph) -> Graph {
-        let (uses, order) = self.uses();
+        let (uses, order) = self.counted_uses();
         // in the order of the original; what has a single user goes to it
         let mut roots: Vec<(NodeId, usize)> = order
             .iter()
