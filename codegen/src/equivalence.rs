@@ -52,7 +52,7 @@ const POINT: f64 = 1e-3;
 /// What is left so small a part of where nothing cancels, is rounding noise.
 const NOISE: f64 = 1e-6;
 /// A program may lose so many times what the plain equations lose in the same scalar.
-const LOSSES: f64 = 12.0;
+const LOSSES: f64 = 8.0;
 /// A difference of inertias that is so many roundings of them has hardly a digit.
 const NO_DIGIT: f64 = 1e3;
 /// At so many random states.

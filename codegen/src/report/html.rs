@@ -375,7 +375,7 @@ fn functions(out: &mut String, report: &Report) {
 /// Bounds of rounding errors, a row per function.
 fn errors(out: &mut String, certified: &[(&&'static str, &ErrorReport)]) {
     out.push_str(
-        "<h2>Rounding errors</h2>\n<p class=\"lead\">Proven bounds: no result is further from the exact value of the equations, for \
+        "<h2>Rounding errors</h2>\n<p class=\"lead\">Proven bounds: no result is further from the exact dynamics of the robot file, for \
          inputs in these ranges.</p>\n<div class=\"figure\">\n<table>\n<thead><tr><th class=\"l\">Function</th>\
          <th class=\"l\">Bound of each result</th><th class=\"l\">Ranges</th></tr></thead>\n<tbody>\n",
     );
