@@ -51,8 +51,12 @@ const SOLVED: f64 = 1e3;
 const POINT: f64 = 1e-3;
 /// What is left so small a part of where nothing cancels, is rounding noise.
 const NOISE: f64 = 1e-6;
+/// So much [`nudge`] moves axes and, of the longest lever, origins.
+const NUDGE: f64 = 1e-26;
 /// A program may lose so many times what the plain equations lose in the same scalar.
 const LOSSES: f64 = 8.0;
+/// So many roundings of √(H_ii H_jj) any program may lose of H_ij.
+const OF_INERTIAS: f64 = 12.0;
 /// A difference of inertias that is so many roundings of them has hardly a digit.
 const NO_DIGIT: f64 = 1e3;
 /// At so many random states.
@@ -183,13 +187,19 @@ pub(crate) fn of_function(
     let mut states = States::new(robot, options);
     let mut losses = Losses::new(graph);
     for _ in 0..STATES {
-        check.at(&states.next(&ports), &mut losses, true)?;
+        check.at(&states.next(&ports), (&mut losses, POINT), true)?;
     }
     if function == Function::MassMatrix {
         // of all results these lose most where the robot happens to stand so that an entry is small
-        for place in [Place::Anywhere, Place::Beyond].into_iter().cycle().take(MORE_STATES) {
-            check.at(&states.placed(&ports, place), &mut losses, false)?;
+        for _ in 0..MORE_STATES {
+            check.at(&states.next(&ports), (&mut losses, POINT), false)?;
         }
+        // where plain entries are almost rounding noise they hide what others lose: by themselves
+        let mut losses = Losses::new(graph);
+        for _ in 0..STATES {
+            check.at(&states.placed(&ports, Place::Beyond), (&mut losses, NOISE), false)?;
+        }
+        check.compare(losses)?;
     }
     check.compare(losses)?;
     // where users begin much is zero: that may hide what is lost elsewhere, and the other way round
@@ -197,7 +207,7 @@ pub(crate) fn of_function(
         let state = states.placed(&ports, place);
         if check.is_regular(&state) {
             let mut losses = Losses::new(graph);
-            check.at(&state, &mut losses, true)?;
+            check.at(&state, (&mut losses, NOISE), true)?;
             check.compare(losses)?;
         }
     }
@@ -214,15 +224,16 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// At one more state: what it loses to rounding and, if `by_equations`, whether it is right.
-    fn at(&self, state: &State, losses: &mut Losses, by_equations: bool) -> Result<(), Disagreement> {
+    /// At one more state: what it loses to rounding, where an inertia counts as such a part of what it is made of at least, and, if
+    /// `by_equations`, whether it is right.
+    fn at(&self, state: &State, (losses, least): (&mut Losses, f64), by_equations: bool) -> Result<(), Disagreement> {
         let Check { robot, frames, function, options, graph } = *self;
         let found = evaluate(graph, &inputs(graph, state));
         let off = differences(robot, frames, function, options, state, &found);
         if by_equations {
             compare(function.name(), &graph.outputs, &off, AGREE)?;
         }
-        let sizes = self.sizes(state, &found, &off);
+        let sizes = self.sizes(state, &found, &off, least);
         let plain = ForwardDynamicsMethod::ArticulatedBody;
         match options.scalar {
             Scalar::F64 => losses.add(graph, (state, &found), &sizes, |state| {
@@ -256,7 +267,7 @@ impl Check<'_> {
     }
 
     /// What losses are compared with.
-    fn sizes(&self, state: &State, found: &[Dd], off: &[Magnitude]) -> Vec<f64> {
+    fn sizes(&self, state: &State, found: &[Dd], off: &[Magnitude], least: f64) -> Vec<f64> {
         let (nv, scene) = (self.robot.model.nv(), &self.options.scene);
         let is_whole = |all: usize| {
             let frames = scene.frames_of(self.function, self.frames).len();
@@ -266,7 +277,7 @@ impl Check<'_> {
             Function::ForwardDynamics if is_whole(nv) => sizes_of_accelerations(self.robot, self.options, state, off),
             // residuals have no scale of accelerations: all of them are judged by the greatest
             Function::ForwardDynamics => vec![found.iter().map(|x| x.hi().abs()).fold(0.0, f64::max); found.len()],
-            Function::MassMatrix if is_whole(nv * nv) => sizes_of_inertias(nv, found, off),
+            Function::MassMatrix if is_whole(nv * nv) => sizes_of_inertias(nv, found, off, least),
             _ => off.iter().map(|x| x.size).collect(),
         }
     }
@@ -283,20 +294,22 @@ impl Check<'_> {
                 return Err(lost);
             }
         }
-        // a rounding of all that a result is made of is little; of a scale that is a result's own any program loses one, and entries that
-        // the plain equations get without do not say more than the others
-        let of_its_own = matches!(self.function, Function::ForwardDynamics | Function::MassMatrix);
-        if of_its_own {
-            losses.plain = vec![losses.plain.iter().copied().fold(0.0, f64::max); losses.plain.len()];
-        }
-        let least = if of_its_own { LOSSES / 2.0 } else { 1.0 };
+        // a rounding of all that a result is made of is little; of a scale that is a result's own any program loses some
+        let least = match self.function {
+            Function::ForwardDynamics => {
+                losses.plain = vec![losses.plain.iter().copied().fold(0.0, f64::max); losses.plain.len()];
+                LOSSES / 2.0
+            }
+            Function::MassMatrix => OF_INERTIAS,
+            _ => 1.0,
+        };
         losses.compare(self.function.name(), self.graph, self.options.scalar, least)
     }
 }
 
 /// Natural scales of the entries of H: √(H_ii H_jj), where H_ii is not what is left of terms that cancel.
-fn sizes_of_inertias(nv: usize, h: &[Dd], off: &[Magnitude]) -> Vec<f64> {
-    let root = |i: usize| h[i * nv + i].hi().abs().max(NOISE * off[i * nv + i].size).sqrt();
+fn sizes_of_inertias(nv: usize, h: &[Dd], off: &[Magnitude], least: f64) -> Vec<f64> {
+    let root = |i: usize| h[i * nv + i].hi().abs().max(least * off[i * nv + i].size).sqrt();
     (0..nv * nv).map(|k| root(k / nv) * root(k % nv)).collect()
 }
 
@@ -320,14 +333,14 @@ fn sizes_of_accelerations(robot: &Robot, options: &Options, state: &State, off: 
 struct Losses {
     program: Vec<f64>,
     plain: Vec<f64>,
-    /// What the plain equations lose of the greatest result.
+    /// What the plain equations lose of the greatest result at least.
     of_greatest: f64,
 }
 
 impl Losses {
     fn new(graph: &Graph) -> Self {
         let none = vec![0.0; graph.results.len()];
-        Losses { program: none.clone(), plain: none, of_greatest: 0.0 }
+        Losses { program: none.clone(), plain: none, of_greatest: f64::INFINITY }
     }
 
     /// At one more state, rounded to the scalar; `found`: the results there in double-double.
@@ -348,10 +361,12 @@ impl Losses {
         let found = evaluate(graph, &wide.into_iter().map(T::constant).collect::<Vec<T>>());
         let plain = plain(&rounded);
         let greatest = exact.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
+        let mut lost: f64 = 0.0;
         for (plain, exact) in plain.iter().zip(&exact).filter(|_| greatest > 0.0) {
             let off = (Dd::from((*plain).into()) - *exact).hi().abs() / greatest;
-            self.of_greatest = if off.is_nan() { f64::INFINITY } else { self.of_greatest.max(off) };
+            lost = if off.is_nan() { f64::INFINITY } else { lost.max(off) };
         }
+        self.of_greatest = self.of_greatest.min(lost);
         for (k, exact) in exact.into_iter().enumerate().filter(|(k, _)| sizes[*k] > 0.0) {
             let lost = |x: T| {
                 let off = (Dd::from(x.into()) - exact).hi().abs() / sizes[k];
@@ -510,6 +525,11 @@ pub(crate) fn of_contact(
         let by_numbers = contact::evaluate(robot, options, mode, function, &given, &prepare);
         let short = |port: &Port| state[&port.name].iter().map(|x| x.to_f64()).collect();
         let in_f64 = contact::evaluate::<f64>(robot, options, mode, function, &short, &|_| None);
+        let of_another = |port: &Port| state[&port.name].clone();
+        let of_another = contact::evaluate::<Dd>(robot, options, mode, function, &of_another, &|model| {
+            nudge(model, longest_lever(&robot.model));
+            None
+        });
         let (truth, in_f64) = by_numbers.zip(in_f64).unwrap_or_else(|| {
             let plain = plain();
             let wide: Vec<Magnitude> = inputs(&plain, &state).into_iter().map(Magnitude::new).collect();
@@ -517,7 +537,7 @@ pub(crate) fn of_contact(
             (evaluate(&plain, &wide), evaluate(&plain, &short))
         });
         let found = evaluate(graph, &inputs(graph, &state));
-        let most = solved_size(&truth, &in_f64);
+        let most = solved_size(&truth, &in_f64, of_another.as_deref());
         let off: Vec<Magnitude> = found.into_iter().zip(truth).map(|(found, plain)| difference(found, plain)).collect();
         let off: Vec<Magnitude> = off.into_iter().map(|x| Magnitude { size: x.size.min(most), ..x }).collect();
         let name = format!("{}::{}", mode.identifier, function.name());
@@ -527,17 +547,33 @@ pub(crate) fn of_contact(
 }
 
 /// How large results may count that are solved for. [`Magnitude`] takes the worst of every pivot, one after the other, and tells nothing where
-/// there are many; what the same equations lose in f64, at inputs that are hardly rounded, is what they are made of. All results count
-/// together: some are zero by their equations.
-fn solved_size(truth: &[Magnitude], in_f64: &[f64]) -> f64 {
-    let size = |(wide, short): (&Magnitude, &f64)| {
-        let lost = (wide.value - Dd::from(*short)).hi().abs() / f64::EPSILON;
-        wide.value.hi().abs() + lost
+/// there are many; what the same equations lose in f64, at inputs that are hardly rounded, is what they are made of, or what they change by for
+/// `another` robot, as next to nothing that is not zero keeps its digits in f64. All results count together: some are zero by their equations.
+fn solved_size(truth: &[Magnitude], in_f64: &[f64], another: Option<&[Dd]>) -> f64 {
+    let size = |k: usize| {
+        let off = |x: Dd, by: f64| (truth[k].value - x).hi().abs() / by;
+        let changed = another.map_or(0.0, |another| off(another[k], NUDGE));
+        truth[k].value.hi().abs() + off(Dd::from(in_f64[k]), f64::EPSILON) + changed
     };
-    let sizes: Vec<f64> = truth.iter().zip(in_f64).map(size).collect();
+    let sizes: Vec<f64> = (0..truth.len()).map(size).collect();
     match sizes.iter().all(|x| x.is_finite()) {
         true => SOLVED * sizes.into_iter().fold(0.0, f64::max),
         false => f64::INFINITY,
+    }
+}
+
+/// Another robot, by far less than its numbers are known: axes and origins, of which forms of a robot keep so much.
+fn nudge(model: &mut Model<Dd>, lever: f64) {
+    let mut sign = 1.0;
+    let mut nudged = |x: Dd, size: f64| {
+        sign = -sign;
+        x + Dd::from(sign * NUDGE * size)
+    };
+    let places =
+        model.bodies.iter_mut().map(|b| &mut b.placement).chain(model.frames.iter_mut().map(|f| &mut f.placement));
+    for place in places {
+        place.rotation = place.rotation.map(|x| nudged(x, 1.0));
+        place.translation = place.translation.map(|x| nudged(x, lever));
     }
 }
 

@@ -87,7 +87,7 @@ fn every_example_runs() {
     let page = fs::read_to_string(html).unwrap();
     assert!(page.contains("<svg") && page.contains("Peak torques over panda_link7.mass") && !page.contains("<script"));
     assert!(
-        page.contains("<td>1.33333</td>")
+        page.contains("<td class=\"l\">1.33333</td>")
             && page.contains("<th>peak panda_joint2 [N·m]</th>")
             && page.contains("prefers-color-scheme: dark")
     );

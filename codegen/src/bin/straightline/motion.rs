@@ -359,6 +359,10 @@ fn with(a: &Analyze, description: &Description, options: &Options, values: &[f64
 
 /// Looks for the best values and prints them beside those of the robot file.
 fn optimized(a: &Analyze, description: &Description, options: &Options, motion: &Motion) -> Result<(), Failure> {
+    // both ends of all ranges must be robots, so that everything between them is one
+    let ends = |end: fn(&(f64, f64)) -> f64| a.optimize.iter().map(|r| end(&r.ends)).collect::<Vec<f64>>();
+    with(a, description, options, &ends(|e| e.0))?;
+    with(a, description, options, &ends(|e| e.1))?;
     let states = analysis::states(motion, a.interval);
     if states.len() > MOST_SEARCHED {
         let instants = states.len();
@@ -368,10 +372,6 @@ fn optimized(a: &Analyze, description: &Description, options: &Options, motion: 
         ));
         return Err(Failure::Input);
     }
-    // both ends of all ranges must be robots, so that everything between them is one
-    let ends = |end: fn(&(f64, f64)) -> f64| a.optimize.iter().map(|r| end(&r.ends)).collect::<Vec<f64>>();
-    with(a, description, options, &ends(|e| e.0))?;
-    with(a, description, options, &ends(|e| e.1))?;
     let paths: Vec<&str> = a.optimize.iter().map(|range| range.path.as_str()).collect();
     let programs = Programs::new(description, options, &paths)?;
     let mut diagnostics = Diagnostics::new();
