@@ -20,6 +20,11 @@ const MARK: usize = 1024;
 /// A longer line is not shown with its complaint.
 const LONGEST_LINE_SHOWN: usize = 400;
 
+/// The nearest number of six digits: what people are shown of numbers that were computed.
+pub fn six_digits(x: f64) -> f64 {
+    format!("{x:.5e}").parse().unwrap_or(x)
+}
+
 /// A text with its name.
 ///
 /// ```

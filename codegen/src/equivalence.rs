@@ -9,7 +9,7 @@
 //! the equations of motion, τ − H q̈ − h: that says the same for robots whose H is nearly singular.
 //!
 //! What is equal over the reals may still lose digits that the plain equations keep, or leave the range of f32. So both run in the scalar that
-//! is generated, too, and the program may lose sixteen times what the plain equations lose.
+//! is generated, too, and the program may lose eight times what the plain equations lose.
 
 mod bounds;
 #[cfg(test)]
@@ -518,7 +518,7 @@ pub(crate) fn of_contact(
 ) -> Result<(), Disagreement> {
     let mut states = States::new(robot, options);
     let ports = contact::ports(robot, options, mode, function);
-    let prepare = falling(robot);
+    let (prepare, lever) = (falling(robot), longest_lever(&robot.model));
     for _ in 0..STATES {
         let state = states.next(&ports);
         let given = |port: &Port| state[&port.name].iter().copied().map(Magnitude::new).collect();
@@ -527,7 +527,7 @@ pub(crate) fn of_contact(
         let in_f64 = contact::evaluate::<f64>(robot, options, mode, function, &short, &|_| None);
         let of_another = |port: &Port| state[&port.name].clone();
         let of_another = contact::evaluate::<Dd>(robot, options, mode, function, &of_another, &|model| {
-            nudge(model, longest_lever(&robot.model));
+            nudge(model, lever);
             None
         });
         let (truth, in_f64) = by_numbers.zip(in_f64).unwrap_or_else(|| {

@@ -81,14 +81,23 @@ fn rounds(op: Op) -> bool {
 /// Backwards through the program: the sum of (adjoint · value)² over what is rounded.
 fn swept(graph: &Graph, values: &[f64], rounds: &[bool], adjoints: &mut [f64]) -> f64 {
     let mut square = 0.0;
-    for i in (0..graph.ops.len()).rev() {
+    backwards(graph, values, adjoints, |i, adjoint| {
+        if rounds[i] {
+            square += (adjoint * values[i]).powi(2);
+        }
+    });
+    square
+}
+
+/// Backwards through the first operations of a program, as many as there are adjoints: `tell` gets each whose adjoint is not zero, with it.
+/// Angles count as inputs.
+pub(crate) fn backwards(graph: &Graph, values: &[f64], adjoints: &mut [f64], mut tell: impl FnMut(usize, f64)) {
+    for i in (0..adjoints.len()).rev() {
         let adjoint = adjoints[i];
         if adjoint == 0.0 {
             continue;
         }
-        if rounds[i] {
-            square += (adjoint * values[i]).powi(2);
-        }
+        tell(i, adjoint);
         let mut to = |a: NodeId, slope: f64| adjoints[a.index()] += adjoint * slope;
         let value = |a: NodeId| values[a.index()];
         match graph.ops[i] {
@@ -110,7 +119,6 @@ fn swept(graph: &Graph, values: &[f64], rounds: &[bool], adjoints: &mut [f64]) -
             }
             Op::Neg(a) => to(a, -1.0),
             Op::Sqrt(a) => to(a, 0.5 / values[i]),
-            // angles are inputs
             Op::Input(_)
             | Op::Constant(_)
             | Op::Sign(_)
@@ -120,7 +128,6 @@ fn swept(graph: &Graph, values: &[f64], rounds: &[bool], adjoints: &mut [f64]) -
             | Op::Cos(_) => {}
         }
     }
-    square
 }
 
 fn evaluate(graph: &Graph, inputs: &[f64]) -> Vec<f64> {

@@ -14,7 +14,7 @@ use straightline_core::spatial::{Mat3, MotionVector, Transform, Vec3};
 use straightline_core::{Dd, Real};
 
 /// Inputs beside the robot's own, by name.
-type Added<T> = BTreeMap<String, Vec<T>>;
+pub(super) type Added<T> = BTreeMap<String, Vec<T>>;
 
 /// Which of their forms equations take.
 #[derive(Clone, Copy)]

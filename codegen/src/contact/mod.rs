@@ -17,9 +17,9 @@ use crate::function::{DriveFunction, ForwardDynamicsMethod, Function, Robot};
 use crate::identifier::module_name;
 use crate::pass::{dead_code, sums, unread_inputs};
 use crate::scene::contact::{ContactItem, EnvironmentKind, LoopItem, ModeItem, SurfaceItem};
-use crate::scene::{is_optional, ContactFunction, Scene};
+use crate::scene::{is_optional, Bound, ContactFunction, Scene};
 use crate::trace::{trace, Expr};
-use equations::Form;
+use equations::{Added, Form};
 use straightline_core::algorithms::drive_states;
 use straightline_core::contact::Coordinate;
 use straightline_core::model::Model;
@@ -174,16 +174,30 @@ pub(crate) fn evaluate<T: Real>(
     given: &dyn Fn(&Port) -> Vec<T>,
     prepare: &dyn Fn(&mut Model<T>) -> Option<T>,
 ) -> Option<Vec<T>> {
+    let (bound, form, added) = plainly(robot, options, mode, function, given, prepare)?;
+    Some(equations::equations(robot, options, mode, function, form, &bound, &added).concat())
+}
+
+/// What equations take by the robot's own parameters: the robot bound, their form, and what the
+/// function takes beside; none where a surface is not to be had over this scalar.
+fn plainly<T: Real>(
+    robot: &Robot,
+    options: &Options,
+    mode: &Mode,
+    function: ContactFunction,
+    given: &dyn Fn(&Port) -> Vec<T>,
+    prepare: &dyn Fn(&mut Model<T>) -> Option<T>,
+) -> Option<(Bound<T>, Form<T>, Added<T>)> {
     if mode.contacts.iter().any(|c| c.item.surface.over::<T>().is_none()) {
         return None;
     }
-    let base = base_function(function);
-    let own: Vec<Vec<T>> = options.scene.ports(base, &robot.model).iter().map(given).collect();
-    let mut bound = options.scene.bind(base, robot, &own);
+    let own = base_function(function);
+    let inputs: Vec<Vec<T>> = options.scene.ports(own, &robot.model).iter().map(given).collect();
+    let mut bound = options.scene.bind(own, robot, &inputs);
     let falls = prepare(&mut bound.model);
     let added = added_ports(function, mode, &robot.model).into_iter().map(|p| (p.name.clone(), given(&p))).collect();
     let form = Form { reduced: false, surface: |s: &SurfaceItem| s.over().expect("asked for above"), falls };
-    Some(equations::equations(robot, options, mode, function, form, &bound, &added).concat())
+    Some((bound, form, added))
 }
 
 /// The operations of one function of a mode.
@@ -305,16 +319,8 @@ pub(crate) fn evaluate_system<T: Real>(
     given: &dyn Fn(&Port) -> Vec<T>,
     prepare: &dyn Fn(&mut Model<T>) -> Option<T>,
 ) -> Option<Vec<T>> {
-    if mode.contacts.iter().any(|c| c.item.surface.over::<T>().is_none()) {
-        return None;
-    }
-    let base = Function::ForwardDynamics;
-    let own: Vec<Vec<T>> = options.scene.ports(base, &robot.model).iter().map(given).collect();
-    let mut bound = options.scene.bind(base, robot, &own);
-    let falls = prepare(&mut bound.model);
-    let added = added_ports(ContactFunction::ForwardDynamics, mode, &robot.model);
-    let added = added.into_iter().map(|p| (p.name.clone(), given(&p))).collect();
-    let form = Form { reduced: false, surface: |s: &SurfaceItem| s.over().expect("asked for above"), falls };
+    let function = ContactFunction::ForwardDynamics;
+    let (bound, form, added) = plainly(robot, options, mode, function, given, prepare)?;
     let [qdd, force] = solution_ports(&robot.model, mode).map(|p| if p.is_empty() { Vec::new() } else { given(&p) });
     Some(equations::system(robot, options, mode, &bound, form, &added, (&qdd, &force)).concat())
 }

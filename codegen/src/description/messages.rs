@@ -136,8 +136,7 @@ pub(crate) fn cut(text: &str) -> String {
 
 /// A number with at most six digits.
 pub(crate) fn six_digits(x: f64) -> String {
-    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
-    format!("{rounded:?}")
+    format!("{:?}", crate::diagnostic::six_digits(x))
 }
 
 /// `a, b and c`, each in backquotes.

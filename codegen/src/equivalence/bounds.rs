@@ -14,6 +14,7 @@ use crate::emit::{element_of, Scalar};
 use crate::expr::{evaluate, Graph, NodeId, Op, Port, Width};
 use crate::function::Robot;
 use crate::random::Random;
+use crate::rounding::backwards;
 use std::collections::BTreeMap;
 use straightline_core::Dd;
 
@@ -225,47 +226,11 @@ fn least_provable(graph: &Graph, scalar: Scalar, given: &[f64]) -> Vec<f64> {
     graph.results.iter().map(|result| swept(graph, *result, &values, &own)).collect()
 }
 
-/// Σ |adjoint| · own error.
+/// Σ |adjoint| · own error. What angles are off by is counted with the robot's numbers alone: leaving it out asks for less.
 fn swept(graph: &Graph, result: NodeId, values: &[f64], own: &[f64]) -> f64 {
     let mut adjoints = vec![0.0; result.index() + 1];
     adjoints[result.index()] = 1.0;
     let mut sum = 0.0;
-    for i in (0..=result.index()).rev() {
-        let adjoint: f64 = adjoints[i];
-        if adjoint == 0.0 {
-            continue;
-        }
-        sum += adjoint.abs() * own[i];
-        let value = |a: NodeId| values[a.index()];
-        let mut to = |a: NodeId, slope: f64| adjoints[a.index()] += adjoint * slope;
-        match graph.ops[i] {
-            Op::Add(a, b) => {
-                to(a, 1.0);
-                to(b, 1.0);
-            }
-            Op::Sub(a, b) => {
-                to(a, 1.0);
-                to(b, -1.0);
-            }
-            Op::Mul(a, b) => {
-                to(a, value(b));
-                to(b, value(a));
-            }
-            Op::Div(a, b) => {
-                to(a, 1.0 / value(b));
-                to(b, -values[i] / value(b));
-            }
-            Op::Neg(a) => to(a, -1.0),
-            Op::Sqrt(a) => to(a, 0.5 / values[i]),
-            // what angles are off by is counted with the robot's numbers alone: leaving it out asks for less
-            Op::Input(_)
-            | Op::Constant(_)
-            | Op::Sign(_)
-            | Op::AngleSum(..)
-            | Op::SinCos(_)
-            | Op::Sin(_)
-            | Op::Cos(_) => {}
-        }
-    }
+    backwards(graph, values, &mut adjoints, |i, adjoint| sum += adjoint.abs() * own[i]);
     sum
 }

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Mutex;
 use straightline_codegen::compile::Options;
 use straightline_codegen::description::{self, Description};
-use straightline_codegen::diagnostic::{Diagnostic, Diagnostics, Severity};
+use straightline_codegen::diagnostic::{six_digits, Diagnostic, Diagnostics, Severity};
 use straightline_codegen::experiment::design::Design;
 use straightline_codegen::experiment::{self, parameter, parquet, Experiment};
 use straightline_codegen::singular::{self, Inertia};
@@ -667,11 +667,6 @@ fn print_analysis(
     Ok(())
 }
 
-/// A value of a sweep as it is shown: one between two ends has as many digits as f64 has.
-pub fn six_digits(value: f64) -> f64 {
-    format!("{value:.5e}").parse().unwrap_or(value)
-}
-
 fn print_sweep(sweep: &parameter::Sweep, swept: &[Swept]) -> Result<(), Failure> {
     let mut out = stdout().lock();
     let has_drives = swept.iter().any(|(_, found)| found.drives.is_some());
@@ -697,6 +692,7 @@ fn print_sweep(sweep: &parameter::Sweep, swept: &[Swept]) -> Result<(), Failure>
             let sum = |f: fn(&DriveFigures) -> f64| drives.drives.iter().map(f).sum::<f64>();
             format!("{:>16.4}{:>12.4}", sum(|d| d.energy.0), sum(|d| d.joule))
         });
+        // one between two ends has as many digits as f64 has
         let value = six_digits(*value);
         writeln!(out, "{value:<width$}{given:>14.4}{taken:>14.4}{of_drives}{exceeded:>12}{peaks}")?;
     }

@@ -1,8 +1,9 @@
 //! The page of an analysis: what a motion asks of every joint and drive, in the style of the report.
 
 use super::arguments::Analyze;
-use super::motion::{drive_remarks, lines, six_digits, violations, Swept};
+use super::motion::{drive_remarks, lines, violations, Swept};
 use std::path::Path;
+use straightline_codegen::diagnostic::six_digits;
 use straightline_codegen::report::html::STYLE;
 use straightline_core::drive::Actuator;
 use straightline_core::model::{Joint, Model};
