@@ -130,7 +130,7 @@ impl fmt::Display for MethodChoice {
         });
         write!(
             f,
-            "By {chosen}: {} multiplications and additions{mine_div}, by {other} {}{others_div}",
+            "By {chosen}: {} multiplications and additions{mine_div} before the last passes, by {other} {}{others_div}",
             mine.operations, others.operations
         )?;
         match (mine.error, others.error) {

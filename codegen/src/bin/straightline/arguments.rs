@@ -4,7 +4,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand};
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use straightline_codegen::certify::Effort;
 use straightline_codegen::compile::Options;
 use straightline_codegen::diagnostic::{Diagnostic, Front, Level, Levels, Reporting};
@@ -666,8 +666,12 @@ fn without(given: &[OsString], error: &clap::Error) -> Option<Vec<OsString>> {
             }
             None => {
                 let index = at(argument)?;
-                let is_alone = given.get(index + 1).is_none_or(|next| next.to_string_lossy().starts_with('-'));
-                is_alone.then(|| rest.remove(index))?;
+                rest.remove(index);
+                // its value goes with it; a file may be the robot
+                let is_value = |next: &OsString| !next.to_string_lossy().starts_with('-') && !Path::new(next).exists();
+                if rest.get(index).is_some_and(is_value) {
+                    rest.remove(index);
+                }
             }
         },
         _ => return None,
@@ -678,6 +682,7 @@ fn without(given: &[OsString], error: &clap::Error) -> Option<Vec<OsString>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::CommandFactory;
 
     #[test]
     fn all_that_is_wrong_with_the_arguments_is_said_at_once() {
@@ -690,7 +695,18 @@ mod tests {
             assert_eq!(said.iter().filter(|text| text.contains(part)).count(), 1, "{part}: {said:?}");
         }
     }
-    use clap::CommandFactory;
+
+    #[test]
+    fn a_value_of_an_option_that_is_not_there_hides_no_complaint() {
+        for given in
+            ["arm.urdf --lamda 3 --scalr f32", "--lamda 3 --scalr f32 arm.urdf", "--lamda Cargo.toml --scalr f32"]
+        {
+            let given = ["straightline", "generate"].into_iter().chain(given.split(' '));
+            let complaints = CommandLine::read(given.map(OsString::from).collect()).unwrap_err();
+            let said: Vec<String> = complaints.iter().map(ToString::to_string).collect();
+            assert!(said.len() == 2 && said[0].contains("'--lamda'") && said[1].contains("'--scalar'"), "{said:?}");
+        }
+    }
 
     #[test]
     fn a_function_known_by_another_name_is_suggested() {
