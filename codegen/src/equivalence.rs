@@ -100,6 +100,9 @@ impl fmt::Display for Disagreement {
                 "`{program}` loses digits that the plain equations of the robot keep: {result} is off by {difference:.1e}, theirs by {plain:.1e}"
             );
         }
+        if !difference.is_finite() {
+            return write!(f, "`{program}` differs from the plain equations of the robot: {result} is no number");
+        }
         write!(f, "`{program}` differs from the plain equations of the robot: {result} by {difference:.1e} of its natural scale")
     }
 }

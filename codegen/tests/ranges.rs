@@ -2,7 +2,8 @@
 
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::expr::Port;
-use straightline_codegen::scene::{self, Interval};
+use straightline_codegen::model::ModelOptions;
+use straightline_codegen::scene::{self, Gravity, Interval, Scene};
 use straightline_codegen::{compile, Function, Generated, Options};
 
 const ARM: &str = include_str!("files/arm.toml");
@@ -26,6 +27,34 @@ fn arm(scene: &str, floating: bool) -> (Generated, impl Fn(&str) -> Vec<Interval
 
 fn between(lower: f64, upper: f64) -> Interval {
     Interval { lower, upper }
+}
+
+/// Less than 1e-30 m/s² is zero to every robot, and has no digits in double-double.
+#[test]
+fn gravity_is_zero_or_one_that_has_digits_whoever_says_it() {
+    for (gravity, is_fit) in
+        [([0.0, 0.0, 0.0], true), ([0.0, 1e-300, -9.81], true), ([1e-300, 0.0, 0.0], false), ([0.0, 2e6, 0.0], false)]
+    {
+        let written = ARM.replacen("gravity = [0.0, 0.0, -9.81]", &format!("gravity = {gravity:?}"), 1);
+        let functions = vec![Function::GravityForce];
+        let of_file = compile(&Source::new("arm.toml", written), &Options { functions, ..Options::default() });
+        let model = ModelOptions { gravity: Some(gravity), ..ModelOptions::default() };
+        let functions = vec![Function::GravityForce];
+        let of_options = compile(&Source::new("arm.toml", ARM), &Options { functions, model, ..Options::default() });
+        let held = Scene { gravity: Gravity::Constant(gravity), ..Scene::default() };
+        let functions = vec![Function::GravityForce];
+        let of_scene =
+            compile(&Source::new("arm.toml", ARM), &Options { functions, scene: held, ..Options::default() });
+        for (front, compiled) in [("file", of_file), ("options", of_options), ("scene", of_scene)] {
+            match compiled {
+                Ok(generated) => {
+                    let is_plainer = generated.warnings.iter().any(|d| d.code == "plainer-form");
+                    assert!(is_fit && !is_plainer, "{front}: {gravity:?}: {:?}", generated.warnings);
+                }
+                Err(said) => assert!(!is_fit && said.to_string().contains("from 1e-30 to 1e6 m/s²"), "{front}: {said}"),
+            }
+        }
+    }
 }
 
 #[test]

@@ -579,6 +579,11 @@ pub fn bad_option(option: &str, value: &str, expected: &str) -> D {
     D::error("bad-option", format!("{option}: `{}` is not {expected}", cut(value)))
 }
 
+/// A gravity that is neither none nor one.
+pub fn gravity_out_of_range(value: &str, expected: &str) -> D {
+    D::error("out-of-range", format!("gravity: {value} is not {expected}")).help("write [0.0, 0.0, 0.0] for none")
+}
+
 // --- the chapter's notation ---
 
 /// A vector that is parallel with the joint axis and cannot define the zero of the coordinate.

@@ -166,6 +166,10 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
     check::motion(&assembly, description, diagnostics);
     add_frames(&mut assembly, options, tolerance, diagnostics);
     order_joints(&mut assembly.bodies, options, diagnostics);
+    if let Some(gravity) = description.gravity.as_ref().filter(|g| options.gravity.is_none() && !is_gravity(&g.value)) {
+        let value = format!("{:?}", gravity.value);
+        diagnostics.push(messages::gravity_out_of_range(&value, GRAVITY).at(&gravity.place));
+    }
     let gravity = options.gravity.or(description.gravity.as_ref().map(|g| g.value)).unwrap_or([0.0, 0.0, -9.81]);
     let mut model = Model {
         name: description.name.value.clone(),
@@ -291,14 +295,23 @@ struct Assembly {
     links: BTreeMap<String, Carrier>,
 }
 
+/// What [`is_gravity`] takes, in words.
+pub(crate) const GRAVITY: &str = "zero or an acceleration from 1e-30 to 1e6 m/s²";
+
+/// Whether gravity is a number that forces can be made of: what is less is zero to every robot, and leaves the range of double-double.
+pub(crate) fn is_gravity(vector: &[f64; 3]) -> bool {
+    let greatest = vector.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    vector.iter().all(|x| x.is_finite()) && (greatest == 0.0 || (1e-30..=1e6).contains(&greatest))
+}
+
 fn check_options(options: &ModelOptions, diagnostics: &mut Diagnostics) {
     let tolerance = options.angle_tolerance;
     if !(0.0..=0.1).contains(&tolerance) {
         diagnostics.push(messages::bad_option("angle tolerance", &format!("{tolerance:?}"), "between 0 and 0.1 rad"));
     }
     let is_fit = |v: &[f64; 3]| v.iter().all(|x| x.abs() <= 1e6);
-    if let Some(gravity) = options.gravity.filter(|g| !is_fit(g)) {
-        diagnostics.push(messages::bad_option("gravity", &format!("{gravity:?}"), "three finite numbers in m/s²"));
+    if let Some(gravity) = options.gravity.filter(|g| !is_gravity(g)) {
+        diagnostics.push(messages::bad_option("gravity", &format!("{gravity:?}"), GRAVITY));
     }
     for frame in &options.frames {
         if !is_fit(&frame.xyz) || !is_fit(&frame.rpy) {

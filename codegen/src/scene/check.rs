@@ -11,6 +11,7 @@ use crate::function::Function;
 use crate::identifier::UNNAMED;
 use crate::limbs::LimbForm;
 use crate::model::geometry::principal_moments;
+use crate::model::{is_gravity, GRAVITY};
 use straightline_core::model::{JointKind, Model};
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
@@ -52,12 +53,9 @@ pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
         }
     }
     if let Gravity::Constant(gravity) = scene.gravity {
-        if let Some(x) = gravity.into_iter().find(|x| !(-1e6..=1e6).contains(x)) {
-            places.complain(
-                "hold.gravity",
-                say::not_in_range("gravity", x, "an acceleration up to 1e6 m/s²"),
-                diagnostics,
-            );
+        if !is_gravity(&gravity) {
+            let complaint = say::gravity_not_in_range(&format!("{gravity:?}"), GRAVITY);
+            places.complain("hold.gravity", complaint, diagnostics);
         }
     }
     if let Coulomb::Smooth(speed) = scene.effects.coulomb {

@@ -156,6 +156,11 @@ pub fn not_in_range(what: &str, value: f64, range: &str) -> D {
     D::error("not-in-range", format!("{what}: {value:?} is not {range}"))
 }
 
+/// A gravity that is neither none nor one.
+pub fn gravity_not_in_range(value: &str, range: &str) -> D {
+    D::error("not-in-range", format!("gravity: {value} is not {range}")).help("write \"zero\" for none")
+}
+
 /// Mass and inertia that no body has.
 pub fn unphysical_body(payload: &str, why: &str) -> D {
     D::error("unphysical-body", format!("payload `{}` cannot be a rigid body", cut(payload)))
