@@ -11,6 +11,7 @@ use crate::function::{DriveFunction, Function, Robot};
 use crate::reduce::{is_in_proportion, lengths, longest_lever, reduce, Choice};
 use crate::rounding;
 use crate::scene::{Contacts, Gravity, Scene};
+use crate::stable::Stable;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use std::hash::{Hash, Hasher};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -79,7 +80,7 @@ fn chosen(
         let optimisations = Optimisations { cheaper: false, ..optimisations };
         // contacts leave torques and H as they are
         let scene = Scene { contacts: Contacts::default(), ..options.scene.clone() };
-        let key = format!("{function:?} {scene:?} {optimisations:?} {:?}", options.scalar);
+        let key = ((function, scene), optimisations, options.scalar).stable_text();
         robot.found.or_search(key, || improved(robot, frames, function, options, optimisations))
     };
     match function {

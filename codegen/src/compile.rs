@@ -26,15 +26,16 @@ use crate::scene::free_drive::FreeDrive;
 use crate::scene::{self, constructed, is_optional, Parameter, Scene};
 use crate::schedule::{schedule, Limits, Schedule};
 use crate::singular;
+use crate::stable::Stable;
 use crate::staged::{self, staged};
 use crate::trace::trace;
 use std::collections::BTreeMap;
-use std::fmt::{self, Write};
+use std::fmt::Write;
 use straightline_core::model::Model;
 use straightline_core::Dd;
 
 /// What to generate, and how.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Options {
     /// The functions, without repetition.
     pub functions: Vec<Function>,
@@ -69,47 +70,6 @@ pub struct Options {
     pub certify: Option<Effort>,
     /// What becomes of warnings, and in whose words they are said: nothing of what is generated.
     pub reporting: Reporting,
-}
-
-/// Without what is only said: what is generated carries a hash of this text.
-impl fmt::Debug for Options {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Options {
-            functions,
-            frames,
-            scalar,
-            also,
-            lanes,
-            fma,
-            fma_by_caller,
-            generic,
-            grade,
-            forward_dynamics,
-            limbs,
-            limits,
-            model,
-            scene,
-            certify,
-            reporting: _,
-        } = self;
-        f.debug_struct("Options")
-            .field("functions", functions)
-            .field("frames", frames)
-            .field("scalar", scalar)
-            .field("also", also)
-            .field("lanes", lanes)
-            .field("fma", fma)
-            .field("fma_by_caller", fma_by_caller)
-            .field("generic", generic)
-            .field("grade", grade)
-            .field("forward_dynamics", forward_dynamics)
-            .field("limbs", limbs)
-            .field("limits", limits)
-            .field("model", model)
-            .field("scene", scene)
-            .field("certify", certify)
-            .finish()
-    }
 }
 
 impl Default for Options {
@@ -1079,7 +1039,7 @@ fn choose_frames(model: &Model<Dd>, asked: &[String], diagnostics: &mut Diagnost
 
 /// FNV-1a over everything that the output depends on.
 fn hash(text: &str, options: &Options) -> u64 {
-    let settings = format!("{}\0{options:?}", crate::VERSION);
+    let settings = [crate::VERSION, "\0", &options.stable_text()].concat();
     text.bytes()
         .chain([0])
         .chain(settings.bytes())

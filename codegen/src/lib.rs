@@ -35,6 +35,7 @@ pub mod rounding;
 pub mod scene;
 pub mod schedule;
 pub mod singular;
+mod stable;
 pub mod stage;
 pub mod staged;
 pub mod stubs;

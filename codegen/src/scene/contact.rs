@@ -144,6 +144,11 @@ impl UserSurface {
     pub fn new(name: impl Into<String>, surface: impl ImplicitSurface + Send + Sync + 'static) -> Self {
         UserSurface { name: name.into(), value: Arc::new(move |p| surface.value(p)) }
     }
+
+    /// What tells it from others.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
 }
 
 impl PartialEq for UserSurface {
