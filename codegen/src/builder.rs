@@ -24,13 +24,13 @@
 use crate::compile::{compile, Generated, Options};
 use crate::diagnostic::{Diagnostics, Front, Level, Reporting, Severity, Source};
 use crate::emit::{Lanes, Scalar};
-use crate::expr::Grade;
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::identifier::prefix;
 use crate::output::write_file_apart;
 use crate::scene::{self, Scene};
 use std::fmt;
 use std::path::{Path, PathBuf};
+use straightline_graph::expr::Grade;
 
 /// Compiles a robot file as it is, with all functions, into `$OUT_DIR/<file stem>.rs`.
 ///
@@ -114,8 +114,8 @@ impl Builder {
         self
     }
 
-    /// Bounds the rounding errors of every function, as constants beside the functions: see [`certify`](crate::certify).
-    pub fn certify(mut self, effort: crate::certify::Effort) -> Self {
+    /// Bounds the rounding errors of every function, as constants beside the functions: see [`certify`](straightline_graph::certify).
+    pub fn certify(mut self, effort: straightline_graph::certify::Effort) -> Self {
         self.options.certify = Some(effort);
         self
     }

@@ -5,11 +5,9 @@
 
 use crate::compile::{candidate, Forms, Optimisations, Options};
 use crate::emit::Scalar;
-use crate::expr::{Counts, Graph, DIVISION};
 use crate::forward_method;
 use crate::function::{DriveFunction, Function, Robot};
 use crate::reduce::{is_in_proportion, lengths, longest_lever, reduce, Choice};
-use crate::rounding;
 use crate::scene::{Contacts, Gravity, Scene};
 use crate::stable::Stable;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
@@ -18,6 +16,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use straightline_core::model::Model;
 use straightline_core::reduced::ReducedModel;
 use straightline_core::Dd;
+use straightline_graph::expr::{Counts, Graph, DIVISION};
+use straightline_graph::rounding;
 
 /// After so many operations in all programs that were counted a search ends with the best so far: some tenths of a second.
 const ENOUGH: usize = 300_000;

@@ -1,7 +1,5 @@
 //! The pipeline, as one function.
 
-use crate::certify::companion::Bits;
-use crate::certify::{self, Effort, Known, Refusal};
 use crate::choose::{self, choose, price};
 use crate::contact;
 use crate::description::drives::Drive;
@@ -9,30 +7,33 @@ use crate::description::{self, messages, Description};
 use crate::diagnostic::{Diagnostic, Diagnostics, Reporting, Source};
 use crate::emit::{self, Item, Lanes, Provenance, Scalar, Style};
 use crate::equivalence::{self, Disagreement, Plainer};
-use crate::expr::{verify, Counts, Folding, Grade, Graph, NodeId, Port, RuleSet, Section};
-use crate::forward_method::MethodChoice;
+use crate::forward_method::{self, MethodChoice};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
+use crate::input_box::input_box;
 use crate::limbs::{self, LimbForm};
 use crate::model;
-use crate::pass::{count_sums, dead_code, order, substitute, sums, unread_inputs};
+use crate::pivots;
 use crate::range;
 use crate::readback::{self, DriveNumbers, ParameterProgram, Programs};
 use crate::report::budget::{self, Measures};
 use crate::report::errors::ErrorReport;
 use crate::report::waterfall::{self, Waterfall};
 use crate::report::{FunctionReport, Report};
-use crate::rounding;
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::{self, constructed, is_optional, Parameter, Scene};
-use crate::schedule::{schedule, Limits, Schedule};
 use crate::singular;
 use crate::stable::Stable;
 use crate::staged::{self, staged};
-use crate::trace::trace;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use straightline_core::model::Model;
 use straightline_core::Dd;
+use straightline_graph::certify::companion::Bits;
+use straightline_graph::certify::{self, Effort, Known, Refusal};
+use straightline_graph::expr::{verify, Counts, Folding, Grade, Graph, NodeId, Port, RuleSet, Section};
+use straightline_graph::pass::{count_sums, dead_code, order, substitute, sums, unread_inputs};
+use straightline_graph::schedule::{schedule, Limits, Schedule};
+use straightline_graph::trace::trace;
 
 /// What to generate, and how.
 #[derive(Clone, Debug)]
@@ -384,7 +385,7 @@ fn optimised_with(
         };
         // fused products want another order; forward dynamics takes 6 to 9 % longer in this one, and its digits go elsewhere
         let ordered = optimisations.sums && !options.fma && function != Function::ForwardDynamics;
-        let graph = match ordered.then(|| rounding::samples(&robot.model, &graph)).flatten() {
+        let graph = match ordered.then(|| forward_method::samples(&robot.model, &graph)).flatten() {
             Some(states) => check("order", order(&graph, &states)),
             None => graph,
         };
@@ -788,7 +789,7 @@ fn certificates(robot: &Robot, programs: &[Program], options: &Options) -> Vec<O
         if !p.has_folded_constants(options) {
             return Some(ErrorReport::refused(outputs, Refusal::Rounded));
         }
-        let inputs = match certify::input_box(&p.graph.inputs, &options.scene, &robot.model) {
+        let inputs = match input_box(&p.graph.inputs, &options.scene, &robot.model) {
             Ok(inputs) => inputs,
             Err(refusal) => return Some(ErrorReport::refused(outputs, refusal)),
         };
@@ -805,17 +806,17 @@ fn certificates(robot: &Robot, programs: &[Program], options: &Options) -> Vec<O
     programs.iter().map(of).collect()
 }
 
-/// What mechanics knows of the values of forward dynamics: [`certify::pivots`].
+/// What mechanics knows of the values of forward dynamics: [`pivots`].
 pub fn known(robot: &Robot, graph: &Graph, inputs: &[certify::Interval], options: &Options) -> Known {
-    if !certify::pivots::is_arm(&robot.model, graph) {
+    if !pivots::is_arm(&robot.model, graph) {
         return Known::default();
     }
     let all = options.optimisations();
     let plain = Optimisations { chosen: false, limbs: false, substitutes: false, ..all };
     let of = |function| optimised(robot, &[], function, options, plain);
     let (mass_matrix, torques) = (of(Function::MassMatrix), of(Function::InverseDynamics));
-    let sizes = certify::pivots::Sizes::of(&mass_matrix, &torques, &options.scene, &robot.model);
-    sizes.map_or_else(|_| Known::default(), |sizes| certify::pivots::known(&robot.model, graph, inputs, &sizes))
+    let sizes = pivots::Sizes::of(&mass_matrix, &torques, &options.scene, &robot.model);
+    sizes.map_or_else(|_| Known::default(), |sizes| pivots::known(&robot.model, graph, inputs, &sizes))
 }
 
 /// A program in f32 gets f64 where its budget allows that and its greatest error takes it.
@@ -837,7 +838,7 @@ pub(crate) fn mix_precisions(
     // what does not fit is said where bounds are compared with the budget
     let Ok(demand) = most.of_results(&program.graph.outputs) else { return Ok(()) };
     let stored: Vec<NodeId> = program.schedule.parts.iter().flat_map(|p| p.stores.iter().map(|(id, _)| *id)).collect();
-    let inputs = certify::input_box(&program.graph.inputs, &options.scene, &robot.model);
+    let inputs = input_box(&program.graph.inputs, &options.scene, &robot.model);
     // what has no bound at all is refused where bounds are compared with the budget
     let widened = inputs.and_then(|inputs| certify::mixed::widened(&program.graph, &inputs, &demand, &stored));
     // what has none is the program that was checked before

@@ -19,16 +19,13 @@ use crate::compile::{Optimisations, Options};
 use crate::contact;
 use crate::diagnostic::Diagnostic;
 use crate::emit::{element_of, Scalar};
-use crate::expr::{evaluate, Grade, Graph, Op, Port};
 use crate::forward_method::{self, settle};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::model::drives::entries;
-use crate::random::Random;
 use crate::reduce::longest_lever;
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::{constructed, ContactFunction};
 use crate::singular::weakest_joint;
-use crate::stage::Staged;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::fmt;
@@ -37,6 +34,9 @@ use straightline_core::magnitude::Magnitude;
 use straightline_core::model::{BodyId, JointKind, Model};
 use straightline_core::spatial::{Sym3, Transform, Vec3};
 use straightline_core::{Dd, Real};
+use straightline_graph::expr::{evaluate, Grade, Graph, Op, Port};
+use straightline_graph::pass::cut::Staged;
+use straightline_graph::random::Random;
 
 pub(crate) use bounds::{of_acceleration_bound, of_bound};
 
@@ -904,9 +904,9 @@ impl<'a> States<'a> {
 pub(crate) mod sabotage {
     //! Passes that are broken on purpose.
 
-    use crate::expr::Graph;
     use crate::function::Robot;
     use std::cell::RefCell;
+    use straightline_graph::expr::Graph;
 
     type Break = Box<dyn FnMut(&str, Graph) -> Graph>;
     type Form = Box<dyn FnMut(Robot) -> Robot>;

@@ -3,11 +3,11 @@
 use crate::compile::{self, Generated, Options};
 use crate::diagnostic::{Diagnostic, Diagnostics, Front, Reporting, Severity, Source};
 use crate::emit::{array_type, batch, Scalar};
-use crate::expr::Port;
 use crate::scene;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use straightline_core::model::JointKind;
+use straightline_graph::expr::Port;
 
 /// What became of a robot file and its scene.
 #[derive(Debug)]

@@ -6,12 +6,12 @@
 use crate::compile::Generated;
 use crate::description::drives::Number;
 use crate::emit::{self, Item, Scalar};
-use crate::expr::Port;
 use crate::function::Function;
 use crate::identifier::{comment, package_name, string_literal};
 use crate::output::MARK;
 use std::fmt::Write;
 use straightline_core::model::JointKind;
+use straightline_graph::expr::Port;
 
 /// The files of the package, by their paths inside it. All C names begin with `prefix`, an identifier.
 pub fn c_package(generated: &Generated, prefix: &str) -> Vec<(String, String)> {

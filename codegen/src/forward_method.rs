@@ -11,13 +11,13 @@
 //! to 25 % longer by a factorisation with 2 % fewer to 2 % more operations; arms of 6 and 7 joints 1 to 31 % less with 8 to 18 % fewer.
 
 use crate::emit::Scalar;
-use crate::expr::{evaluate, Graph, Port, DIVISION};
 use crate::function::ForwardDynamicsMethod;
-use crate::pass::count_sums;
-use crate::random::Random;
 use std::fmt;
 use straightline_core::model::{Joint, JointKind, Model};
 use straightline_core::{Dd, Real};
+use straightline_graph::expr::{evaluate, Graph, Port, DIVISION};
+use straightline_graph::pass::count_sums;
+use straightline_graph::random::Random;
 
 /// The factorisation may lose so many times what articulated bodies lose: about half a decimal digit, which is how far two
 /// samples of the same quality come apart.
@@ -296,4 +296,14 @@ pub(crate) fn settle(model: &Model<Dd>, groups: &mut [(&str, Vec<f64>)], random:
         first += drive.states();
     }
     groups.iter_mut().filter(|g| g.0 == "x").for_each(|g| g.1.clone_from(&x));
+}
+
+/// States of each kind whose values [`samples`] gives: at about rest, where weights rule, and as fast as the joints may move.
+const SAMPLES: usize = 8;
+
+/// The values of all nodes at some states; `None` where a run-time parameter is an input.
+pub fn samples(model: &Model<Dd>, graph: &Graph) -> Option<Vec<Vec<f64>>> {
+    let at = |fast| states(model, &graph.inputs, SAMPLES, fast);
+    let (slow, fast) = at(false).zip(at(true))?;
+    Some(slow.iter().chain(&fast).map(|x| straightline_graph::rounding::evaluate(graph, x)).collect())
 }

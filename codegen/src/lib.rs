@@ -4,7 +4,6 @@
 #![forbid(unsafe_code)]
 
 pub mod builder;
-pub mod certify;
 pub mod choose;
 pub mod compile;
 pub mod contact;
@@ -16,30 +15,25 @@ pub mod expansion;
 #[cfg(feature = "cli")]
 pub mod experiment;
 pub mod export;
-pub mod expr;
 pub mod forward_method;
 pub mod function;
 pub mod identifier;
+pub mod input_box;
 pub mod limbs;
 pub mod model;
 pub mod output;
-pub mod pass;
-mod random;
+pub mod pivots;
 mod range;
 pub mod readback;
 pub mod reduce;
 #[cfg(feature = "verify")]
 pub mod reference_input;
 pub mod report;
-pub mod rounding;
 pub mod scene;
-pub mod schedule;
 pub mod singular;
 mod stable;
-pub mod stage;
 pub mod staged;
 pub mod stubs;
-pub mod trace;
 #[cfg(feature = "verify")]
 pub mod verify;
 pub mod words;
@@ -48,8 +42,9 @@ pub use builder::{compile_robot, Builder};
 pub use compile::{compile, Generated, Options};
 pub use diagnostic::{Diagnostics, Source};
 pub use emit::Scalar;
-pub use expr::Grade;
 pub use function::{ForwardDynamicsMethod, Function, Robot};
+pub use straightline_graph::expr::Grade;
+pub use straightline_graph::{certify, expr, pass, rounding, schedule, trace};
 
 /// Version of the generator, as it stands in generated files.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -9,12 +9,12 @@ use crate::description::drives::Drive;
 use crate::description::{Description, JointDrive, Notation};
 use crate::diagnostic::{Diagnostic, Diagnostics, Place};
 use crate::emit::Scalar;
-use crate::expr::{evaluate, Graph, Op, Width};
 use crate::forward_method;
 use crate::scene::messages as say;
 use crate::scene::{Parameter, Scene};
 use straightline_core::model::Model;
 use straightline_core::Dd;
+use straightline_graph::expr::{evaluate, Graph, Op, Width};
 
 /// States at which a program is tried.
 const STATES: usize = 3;

@@ -4,7 +4,6 @@
 //! may be renamed or moved, and an option added, without another hash of files that say nothing of it. A field that is neither named
 //! nor left out on purpose does not compile.
 
-use crate::certify::Effort;
 use crate::compile::{Forms, Optimisations, Options};
 use crate::description::drives::{Actuator, Drive, Noted, Rating, Stage, Thermal};
 use crate::description::flexible::{Bending, Elastic, Flexible, Support};
@@ -16,12 +15,13 @@ use crate::scene::{
     Base, Budget, ContactFunction, Coulomb, Effects, Gravity, Interval, JointRanges, MaxError, Parameter, Part,
     Payload, Ranges, Scene, Selection, Zero,
 };
-use crate::schedule::Limits;
 use crate::words::Choice;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::time::Duration;
 use straightline_core::contact::Coordinate;
+use straightline_graph::certify::Effort;
+use straightline_graph::schedule::Limits;
 
 /// What has such a text.
 pub(crate) trait Stable {

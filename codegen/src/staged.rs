@@ -1,25 +1,25 @@
 //! The staged form of a robot's functions: typed values for what depends on parameters, on q, on q and q̇.
 //!
 //! All functions are traced into one program, so that they share what they have in common, and the program is cut by
-//! [`crate::stage`]. Around each stage's stored values stands a struct; a later stage borrows the earlier one, so that a value
+//! [`cut`](straightline_graph::pass::cut). Around each stage's stored values stands a struct; a later stage borrows the earlier one, so that a value
 //! of a stage cannot outlive a change of what it was computed from.
 
 use crate::choose::choose;
 use crate::compile::{passed, Optimisations, Options};
 use crate::emit::{self, array_type, Scalar};
 use crate::equivalence::{self, Disagreement, Plainer};
-use crate::expr::{Counts, Graph, Port, Section};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
-use crate::pass::{dead_code, sums};
 use crate::readback::{self, StageProgram, StagedPrograms};
 use crate::scene::is_optional;
-use crate::schedule::schedule;
-use crate::stage::{cut, Staged};
-use crate::trace::{trace, Expr};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::iter::once;
 use straightline_core::Real;
+use straightline_graph::expr::{Counts, Graph, Port, Section};
+use straightline_graph::pass::cut::{cut, Staged};
+use straightline_graph::pass::{dead_code, sums};
+use straightline_graph::schedule::schedule;
+use straightline_graph::trace::{trace, Expr};
 
 /// Figures of one stage.
 #[derive(Clone, Debug)]

@@ -2,11 +2,11 @@
 
 use crate::description::messages::did_you_mean;
 use crate::emit::{Lanes, Scalar};
-use crate::expr::Grade;
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::limbs::LimbForm;
 use std::fmt;
 use std::str::FromStr;
+use straightline_graph::expr::Grade;
 
 /// A choice that has words.
 pub trait Choice: Copy + PartialEq + Sized + 'static {
@@ -134,7 +134,7 @@ macro_rules! parse_words {
         }
     )*};
 }
-parse_words!(Function, Scalar, Grade, ForwardDynamicsMethod, LimbForm, Lanes);
+parse_words!(Function, ForwardDynamicsMethod, LimbForm, Lanes);
 
 #[cfg(test)]
 mod tests {
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn an_unknown_word_is_answered_with_the_known_ones() {
-        let error = "half".parse::<Scalar>().unwrap_err();
+        let error = Scalar::from_word("half").unwrap_err();
         assert_eq!(error.to_string(), "there is no scalar `half`; one of: f64, f32");
     }
 

@@ -4,11 +4,12 @@
 //! `cargo test --release -p straightline-codegen --test certificates -- --ignored --nocapture ten_million`;
 //! the table of the README is printed by the same with `bounds_of_the_panda`, how long a humanoid takes with `time_of_a_humanoid`.
 
-use straightline_codegen::certify::{certify, input_box, search, Certificate, Effort, Interval};
+use straightline_codegen::certify::{certify, search, Certificate, Effort, Interval};
 use straightline_codegen::compile::{optimised, program, Optimisations, Options};
 use straightline_codegen::emit::Scalar;
 use straightline_codegen::expr::{evaluate, Graph, Port};
 use straightline_codegen::function::Robot;
+use straightline_codegen::input_box::input_box;
 use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::scene::{Interval as Range, JointRanges, Scene};
 use straightline_codegen::{Function, Source};

@@ -9,11 +9,12 @@
 #[allow(dead_code)] // other tests use the rest
 mod written;
 
-use straightline_codegen::certify::{certify_with, input_box, search, Effort, Interval};
+use straightline_codegen::certify::{certify_with, search, Effort, Interval};
 use straightline_codegen::compile::{known, program, Options};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::expr::Graph;
 use straightline_codegen::function::Robot;
+use straightline_codegen::input_box::input_box;
 use straightline_codegen::model;
 use straightline_codegen::scene::{Interval as Range, JointRanges, Scene};
 use straightline_codegen::singular::{singular_joints, Inertia};

@@ -1,11 +1,12 @@
 //! Mixed precision: a demanded error is met with less than all operations in f64, and the text computes what was analysed.
 
 use straightline_codegen::certify::companion::{state_bound, Bits};
-use straightline_codegen::certify::{certify, input_box, mixed, search, Effort, Interval};
+use straightline_codegen::certify::{certify, mixed, search, Effort, Interval};
 use straightline_codegen::compile::{compile, program, Options};
 use straightline_codegen::emit::Scalar;
 use straightline_codegen::expr::Graph;
 use straightline_codegen::function::Robot;
+use straightline_codegen::input_box::input_box;
 use straightline_codegen::model;
 use straightline_codegen::scene::{Budget, Interval as Range, JointRanges, MaxError, Scene};
 use straightline_codegen::{Function, Source};

@@ -23,7 +23,8 @@ fn sum(text: &str) -> String {
 
 /// The files of a folder with this extension, by name.
 fn files(folder: &Path, extension: &str) -> BTreeMap<String, String> {
-    let entries = std::fs::read_dir(folder).expect("the folder can be read").map(|entry| entry.expect("an entry").path());
+    let entries =
+        std::fs::read_dir(folder).expect("the folder can be read").map(|entry| entry.expect("an entry").path());
     let named = entries.filter(|path| path.extension().is_some_and(|e| e == extension)).map(|path| {
         let name = path.file_stem().expect("a file has a name").to_string_lossy().into_owned();
         (name, std::fs::read_to_string(&path).expect("a file can be read"))
@@ -37,7 +38,8 @@ fn no_generated_byte_changes_unnoticed() {
     let modules = files(Path::new(env!("OUT_DIR")), "rs");
     let mut sums: Vec<String> = modules.iter().map(|(name, text)| format!("{} {name}", sum(text))).collect();
     for (name, text) in files(&folder.join("scenes"), "toml") {
-        let (_, robot) = ROBOTS.into_iter().find(|(start, _)| name.starts_with(start)).expect("a scene of a known robot");
+        let (_, robot) =
+            ROBOTS.into_iter().find(|(start, _)| name.starts_with(start)).expect("a scene of a known robot");
         let source = std::fs::read_to_string(folder.join("descriptions").join(robot)).expect("a file can be read");
         let options = scene::read_partly(&Source::new(&format!("{name}.toml"), text)).into_options(Options::default());
         let generated = compile(&Source::new(robot, source), &options).unwrap_or_else(|d| panic!("{}", d.render()));

@@ -2,11 +2,11 @@
 
 use crate::scene::InlineScene;
 use proc_macro2::{Span, TokenTree};
-use std::str::FromStr;
 use straightline_codegen::certify::Effort;
 use straightline_codegen::description::messages::did_you_mean;
 use straightline_codegen::diagnostic::{Level, Levels};
 use straightline_codegen::emit::Lanes;
+use straightline_codegen::words::Choice;
 use straightline_codegen::Options;
 use syn::parse::{Parse, ParseStream};
 use syn::punctuated::Punctuated;
@@ -280,13 +280,13 @@ fn strings(input: ParseStream) -> Result<Vec<String>> {
 }
 
 /// ` = "word"`
-fn word<T: FromStr<Err: std::fmt::Display>>(input: ParseStream) -> Result<T> {
+fn word<T: Choice>(input: ParseStream) -> Result<T> {
     let text: LitStr = value(input)?;
     parsed(&text.value(), &text)
 }
 
-fn parsed<T: FromStr<Err: std::fmt::Display>>(text: &str, place: &dyn quote::ToTokens) -> Result<T> {
-    text.parse().map_err(|error: T::Err| Error::new_spanned(place, error))
+fn parsed<T: Choice>(text: &str, place: &dyn quote::ToTokens) -> Result<T> {
+    T::from_word(text).map_err(|error| Error::new_spanned(place, error))
 }
 
 fn number(literal: &Lit) -> Result<f64> {

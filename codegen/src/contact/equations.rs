@@ -37,7 +37,7 @@ struct Traced<'a, T> {
 }
 
 /// What is left of the equations at a given q̈ and F, with H, J, the rows in which reactions act, and the masses of yielding rows; one list
-/// per output of [`residual::OUTPUTS`](crate::certify::residual::OUTPUTS).
+/// per output of [`residual::OUTPUTS`](straightline_graph::certify::residual::OUTPUTS).
 pub(super) fn system<T: Real>(
     robot: &Robot,
     options: &Options,

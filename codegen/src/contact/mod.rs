@@ -7,23 +7,23 @@
 mod equations;
 mod text;
 
-use crate::certify::residual::OUTPUTS;
 use crate::choose::choose;
 use crate::compile::{passed, Forms, Optimisations, Options};
 use crate::emit::Scalar;
 use crate::equivalence::{self, Disagreement, Plainer};
-use crate::expr::{Graph, Port};
 use crate::function::{DriveFunction, ForwardDynamicsMethod, Function, Robot};
 use crate::identifier::module_name;
-use crate::pass::{dead_code, sums, unread_inputs};
 use crate::scene::contact::{ContactItem, EnvironmentKind, LoopItem, ModeItem, SurfaceItem};
 use crate::scene::{is_optional, Bound, ContactFunction, Scene};
-use crate::trace::{trace, Expr};
 use equations::{Added, Form};
 use straightline_core::algorithms::drive_states;
 use straightline_core::contact::Coordinate;
 use straightline_core::model::Model;
 use straightline_core::{Dd, Real};
+use straightline_graph::certify::residual::OUTPUTS;
+use straightline_graph::expr::{Graph, Port};
+use straightline_graph::pass::{dead_code, sums, unread_inputs};
+use straightline_graph::trace::{trace, Expr};
 
 #[cfg(test)]
 pub(crate) use text::bound as mode_bound;
@@ -253,7 +253,7 @@ fn chosen(robot: &Robot, options: &Options, optimisations: Optimisations) -> Opt
 }
 
 /// What is left of the equations of a mode at a given `qdd` and, if it has contacts, `force`: what
-/// [`acceleration_bound`](crate::certify::residual::acceleration_bound) takes, with the flags of rows that yield. The other inputs are those of
+/// [`acceleration_bound`](straightline_graph::certify::residual::acceleration_bound) takes, with the flags of rows that yield. The other inputs are those of
 /// forward dynamics. A mode without contacts is the robot alone.
 pub fn system(robot: &Robot, options: &Options, mode: &Mode, optimisations: Optimisations) -> (Graph, Vec<bool>) {
     let chosen = chosen(robot, options, optimisations);

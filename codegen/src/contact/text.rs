@@ -1,20 +1,20 @@
 //! The module `contact` as text.
 
 use super::{checked_system, programs, Mode, ModeProgram};
-use crate::certify::companion::{state_bound, Bits};
-use crate::certify::residual::acceleration_bound;
-use crate::certify::Refusal;
 use crate::compile::{error_bound_text, finished_bound, wants_companions, Options, StateBound};
 use crate::emit::{self, array_type, Style};
 use crate::equivalence::{self, Disagreement, Plainer};
-use crate::expr::{Graph, Port, Section};
 use crate::function::Robot;
 use crate::identifier::{comment, doc, string_literals, upper_camel_case};
 use crate::readback::{self, ModePrograms};
 use crate::report::ContactReport;
 use crate::scene::{ContactFunction, Parameter, Scene};
-use crate::schedule::schedule;
 use std::fmt::Write;
+use straightline_graph::certify::companion::{state_bound, Bits};
+use straightline_graph::certify::residual::acceleration_bound;
+use straightline_graph::certify::Refusal;
+use straightline_graph::expr::{Graph, Port, Section};
+use straightline_graph::schedule::schedule;
 
 /// The module of all modes.
 pub struct ContactModule {

@@ -2,10 +2,10 @@
 
 use super::body::ALLOW;
 use super::{function, Item, Style};
-use crate::expr::{Graph, Port, Section};
 use crate::identifier::upper_camel_case;
-use crate::schedule::Schedule;
 use std::fmt::Write;
+use straightline_graph::expr::{Graph, Port, Section};
+use straightline_graph::schedule::Schedule;
 
 /// The drivers' source, pasted as it is where generated code depends on `core` alone.
 const BATCH: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/core/src/batch.rs"));

@@ -2,11 +2,11 @@
 
 use super::fused::{fusions, Fused};
 use super::{number, Names, Scalar, Style};
-use crate::expr::{Constant, Graph, NodeId, Op, Port, Section, Width};
 use crate::identifier::comment;
-use crate::schedule::{Part, Schedule};
 use std::fmt::Write;
 use std::slice::from_ref;
+use straightline_graph::expr::{Constant, Graph, NodeId, Op, Port, Section, Width};
+use straightline_graph::schedule::{Part, Schedule};
 
 /// How long an expression may grow before it gets a name of its own.
 const LINE: usize = 84;

@@ -3,7 +3,6 @@
 use super::batch::{self, Lanes};
 use super::body::ALLOW;
 use super::{fused, number, FunctionText, Scalar, Style};
-use crate::expr::Port;
 use crate::function::Function;
 use crate::identifier::{comment, string_literals};
 use crate::report::waterfall::signed;
@@ -12,6 +11,7 @@ use std::borrow::Cow;
 use std::fmt::Write;
 use straightline_core::model::{JointKind, Model};
 use straightline_core::Dd;
+use straightline_graph::expr::Port;
 
 /// The kernel's source, pasted as it is: generated code depends on `core` alone.
 const TRIG: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/core/src/trig.rs"));

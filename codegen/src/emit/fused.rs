@@ -2,9 +2,9 @@
 //! cosines among them.
 
 use super::Style;
-use crate::expr::{evaluate_by, Graph, NodeId, Op};
-use crate::schedule::{Part, Schedule};
 use straightline_core::Real;
+use straightline_graph::expr::{evaluate_by, Graph, NodeId, Op};
+use straightline_graph::schedule::{Part, Schedule};
 
 /// A sum whose one term is a product: ±x·y ± c.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -14,11 +14,11 @@
 //! vector instructions of the body, as of functions over lanes.
 
 use super::body::{wrapped, Binding, Body, FunctionText, Plan};
-use crate::expr::{Alike, Graph, NodeId, Op, Section};
 use crate::identifier::comment;
-use crate::schedule::Part;
 use rustc_hash::FxHashMap;
 use std::fmt::Write;
+use straightline_graph::expr::{Alike, Graph, NodeId, Op, Section};
+use straightline_graph::schedule::Part;
 
 impl Body<'_> {
     /// The statements of a part, with loops over limbs.

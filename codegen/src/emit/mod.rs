@@ -16,50 +16,8 @@ pub use body::{function, FunctionText};
 pub use file::{file, kernel, preamble, scalar_module, Item, Provenance, GENERIC};
 pub use names::Names;
 
-use crate::expr::Port;
-
-/// The scalar type of generated code.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Scalar {
-    /// Double precision.
-    F64,
-    /// Single precision.
-    F32,
-}
-
-impl Scalar {
-    /// Its Rust name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Scalar::F64 => "f64",
-            Scalar::F32 => "f32",
-        }
-    }
-
-    /// The module of a generated file that has the same items in this scalar.
-    pub fn module(self) -> &'static str {
-        match self {
-            Scalar::F64 => "double",
-            Scalar::F32 => "single",
-        }
-    }
-
-    /// Its size in bytes.
-    pub fn bytes(self) -> usize {
-        match self {
-            Scalar::F64 => 8,
-            Scalar::F32 => 4,
-        }
-    }
-
-    /// The distance from one to the next number.
-    pub fn epsilon(self) -> f64 {
-        match self {
-            Scalar::F64 => f64::EPSILON,
-            Scalar::F32 => f64::from(f32::EPSILON),
-        }
-    }
-}
+use straightline_graph::expr::Port;
+pub use straightline_graph::{element, element_of, Scalar};
 
 /// How a function is written: over one state or over lanes of states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -195,33 +153,10 @@ pub fn array_type(port: &Port, scalar: Scalar) -> String {
     shaped(port, scalar.name().to_string())
 }
 
-/// The place of scalar `k` of a port: `h[2][3]`.
-pub fn element(port: &Port, k: usize) -> String {
-    let mut rest = k;
-    let mut indices = Vec::new();
-    for n in port.shape.iter().rev() {
-        indices.push(rest % n);
-        rest /= n;
-    }
-    let name = if port.wrapper.is_some() { format!("{}.0", port.name) } else { port.name.clone() };
-    indices.iter().rev().fold(name, |text, i| format!("{text}[{i}]"))
-}
-
 /// What an array holds before its elements are computed: the first number of the inputs. An array of zeros would be filled by a call of
 /// `memset` where there are no vector instructions.
 pub fn filler<'a>(inputs: impl IntoIterator<Item = &'a Port>) -> String {
     inputs.into_iter().find(|p| !p.is_empty()).map_or("0.0".to_string(), |p| element(p, 0))
-}
-
-/// Element k of ports that stand one after the other.
-pub fn element_of(ports: &[Port], mut k: usize) -> String {
-    for port in ports {
-        if k < port.len() {
-            return element(port, k);
-        }
-        k -= port.len();
-    }
-    panic!("an element beyond the ports");
 }
 
 /// A number as a literal of the scalar; beyond its range the constant `INFINITY`, which means no limit where it is one, and is refused

@@ -6,17 +6,17 @@
 //! other forces, one after the other, where it is hardly greater than what they are off by, and any others.
 
 use super::{inputs, rounded, Disagreement, State, States, STATES};
-use crate::certify::companion::OF_ERROR;
-use crate::certify::search::computed_at;
-use crate::certify::Format;
 use crate::compile::Options;
 use crate::emit::{element_of, Scalar};
-use crate::expr::{evaluate, Graph, NodeId, Op, Port, Width};
 use crate::function::Robot;
-use crate::random::Random;
-use crate::rounding::backwards;
 use std::collections::BTreeMap;
 use straightline_core::Dd;
+use straightline_graph::certify::companion::OF_ERROR;
+use straightline_graph::certify::search::computed_at;
+use straightline_graph::certify::Format;
+use straightline_graph::expr::{evaluate, Graph, NodeId, Op, Port, Width};
+use straightline_graph::random::Random;
+use straightline_graph::rounding::backwards;
 
 /// What is known of a bound to first order it may fall below by so much.
 const FIRST_ORDER: f64 = 0.99;

@@ -3,22 +3,17 @@
 
 use super::tests::ARM;
 use super::{inputs, plain_results, sabotage, Disagreement, State, States, ROUNDINGS};
-use crate::certify::companion::OF_ERROR;
-use crate::certify::search::computed_at;
-use crate::certify::{certify, input_box, Effort};
 use crate::compile::{
     checked, checked_companion, checked_parameter, mix_precisions, wants_companions, Options, FOLDING,
 };
 use crate::contact::{self, Mode};
 use crate::diagnostic::{Diagnostics, Source};
 use crate::emit::{element_of, Scalar};
-use crate::expr::{evaluate, verify, Constant, Graph, NodeId, Op};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
+use crate::input_box::input_box;
 use crate::limbs::LimbForm;
 use crate::model::load;
-use crate::random::Random;
 use crate::scene::{self, constructed, Budget, ContactFunction, Interval, JointRanges, MaxError};
-use crate::stage::Staged;
 use crate::staged;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -26,6 +21,12 @@ use std::fmt::Write;
 use std::panic::{catch_unwind, AssertUnwindSafe};
 use std::rc::Rc;
 use straightline_core::Dd;
+use straightline_graph::certify::companion::OF_ERROR;
+use straightline_graph::certify::search::computed_at;
+use straightline_graph::certify::{certify, Effort};
+use straightline_graph::expr::{evaluate, verify, Constant, Graph, NodeId, Op};
+use straightline_graph::pass::cut::Staged;
+use straightline_graph::random::Random;
 
 /// Two joints about axes that are parallel to nothing.
 const OBLIQUE: &str = r#"<robot name="oblique"><link name="base"/>

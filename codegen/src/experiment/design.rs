@@ -7,12 +7,12 @@
 use super::parameter;
 use crate::description::{Description, JointDrive, Notation, Value};
 use crate::diagnostic::Diagnostic;
-use crate::expr::{evaluate, gradient, Graph, Port, RuleSet};
-use crate::pass::dead_code;
-use crate::trace::{trace, Expr};
 use straightline_core::algorithms::{inverse_dynamics, joint_wrenches};
 use straightline_core::model::{Coulomb, JointEffects, Load, Model};
 use straightline_core::{Dd, Real};
+use straightline_graph::expr::{evaluate, gradient, Graph, Port, RuleSet};
+use straightline_graph::pass::dead_code;
+use straightline_graph::trace::{trace, Expr};
 
 /// The programs of a robot with some of its numbers as inputs.
 #[derive(Clone, Debug)]
@@ -191,7 +191,7 @@ mod tests {
     use crate::description;
     use crate::diagnostic::{Diagnostics, Source};
     use crate::model::{self, ModelOptions};
-    use crate::random::Random;
+    use straightline_graph::random::Random;
 
     const ARM: &str = r#"
 [robot]

@@ -1,12 +1,12 @@
 //! The functions of a robot with drives: motors and other actuators, transmissions.
 
 use super::{Entry, ForwardDynamicsMethod, Function};
-use crate::expr::Port;
 use straightline_core::algorithms as alg;
 use straightline_core::algorithms::{Links, MOST_DERIVATIVES};
 use straightline_core::model::Model;
 use straightline_core::reduced::ReducedModel;
 use straightline_core::{Real, Taylor};
+use straightline_graph::expr::Port;
 
 /// A function of a robot with drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

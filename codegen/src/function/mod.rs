@@ -7,18 +7,18 @@ pub use drives::{higher_rate, DriveFunction};
 
 use crate::choose::Found;
 use crate::emit::Scalar;
-use crate::expr::{Graph, Port, RuleSet};
 use crate::forward_method::{self, MethodChoice};
 use crate::identifier;
 use crate::reduce::{reduce, Choice};
 use crate::scene::{Bound, Parameter, Part, Scene};
-use crate::trace::{trace, Expr};
 use drives::Rigid;
 use straightline_core::algorithms as alg;
 use straightline_core::model::{Frame, Model};
 use straightline_core::reduced::ReducedModel;
 use straightline_core::spatial::{Transform, Vec3};
 use straightline_core::{Dd, Real};
+use straightline_graph::expr::{Graph, Port, RuleSet};
+use straightline_graph::trace::{trace, Expr};
 
 /// A function of the robot that can be generated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -4,8 +4,8 @@
 //! sections stay.
 
 use super::template::{same, LaneValue, Template};
-use crate::expr::{Builder, NodeId, Op, RuleSet};
 use straightline_core::Dd;
+use straightline_graph::expr::{Builder, NodeId, Op, RuleSet};
 
 /// The template with such constants formed, and known ones where they are the same for all limbs.
 pub(super) fn folded(template: Template, rules: RuleSet) -> Template {
@@ -40,7 +40,7 @@ pub(super) fn folded(template: Template, rules: RuleSet) -> Template {
     let results = graph.results.iter().map(|r| node[r.index()]).collect();
     let mut graph = builder.finish(graph.outputs, results);
     graph.inputs.last_mut().expect("the port of lanes").shape = vec![lanes.len()];
-    Template { graph: crate::pass::dead_code(&graph), lanes, ..template }
+    Template { graph: straightline_graph::pass::dead_code(&graph), lanes, ..template }
 }
 
 /// The constants of the limbs that an operation makes of such constants and of those that all limbs share; `None` where

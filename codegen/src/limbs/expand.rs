@@ -1,12 +1,12 @@
 //! A template written out: plain operations, once per limb, and which of them are alike.
 
 use super::template::{coordinates, LaneValue, Template};
-use crate::expr::{Alike, Constant, Graph, NodeId, Note, Op, Port, Section};
 use crate::function::Function;
 use crate::scene::Scene;
 use rustc_hash::FxHashMap;
 use straightline_core::model::Model;
 use straightline_core::Dd;
+use straightline_graph::expr::{Alike, Constant, Graph, NodeId, Note, Op, Port, Section};
 
 /// Where a node of the template is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

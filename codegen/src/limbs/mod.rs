@@ -5,7 +5,7 @@
 //! of them (`template.rs`): where their numbers differ it has inputs, a number per limb, and where the wrench reaches the body stands
 //! an input for the sum. What comes out is optimised like any program. Then it is written out, once per limb
 //! (`expand.rs`), into one program of plain operations, so that bounds of errors, counts and tests see what
-//! is executed, with a note which of them are the same for all limbs ([`Alike`](crate::expr::Alike)): those become a loop over
+//! is executed, with a note which of them are the same for all limbs ([`Alike`](straightline_graph::expr::Alike)): those become a loop over
 //! limbs, which compilers turn into vector instructions.
 //!
 //! Mirrored limbs need nothing more: their numbers differ by signs, and a sign is part of a number.
@@ -16,11 +16,11 @@ mod template;
 
 use crate::choose::choose;
 use crate::compile::{passed, Optimisations, Options};
-use crate::expr::Graph;
 use crate::function::{Function, Robot};
-use crate::pass::{dead_code, sums, unread_inputs};
 use crate::scene::is_optional;
 use straightline_core::model::{BodyId, Coulomb, JointKind, Model};
+use straightline_graph::expr::Graph;
+use straightline_graph::pass::{dead_code, sums, unread_inputs};
 
 /// How identical limbs are computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

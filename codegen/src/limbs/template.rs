@@ -1,14 +1,14 @@
 //! One limb traced for all of its kind.
 
 use super::Limbs;
-use crate::expr::{Graph, Op, Port, RuleSet};
 use crate::function::{self, Function, Robot};
 use crate::scene::{Bound, Scene};
-use crate::trace::{trace_all, Expr};
 use straightline_core::model::{Body, BodyId, Coulomb, JointEffects, JointKind, Model};
 use straightline_core::reduced::{ReducedBody, ReducedModel};
 use straightline_core::spatial::{ForceVector, Mat3, Sym3, Vec3};
 use straightline_core::{Dd, Real};
+use straightline_graph::expr::{Graph, Op, Port, RuleSet};
+use straightline_graph::trace::{trace_all, Expr};
 
 /// Below this relative difference two constants are one: where rounding in double-double ends.
 const SAME: f64 = 1e-28;
@@ -98,7 +98,7 @@ impl Template {
     fn drop_results(&mut self, dropped: Vec<usize>, wanted: Option<usize>) {
         let Some(wanted) = wanted else { return };
         dropped.into_iter().for_each(|k| self.graph.results[k] = self.graph.results[wanted]);
-        self.graph = crate::pass::dead_code(&self.graph);
+        self.graph = straightline_graph::pass::dead_code(&self.graph);
     }
 }
 

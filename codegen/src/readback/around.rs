@@ -7,11 +7,11 @@ use super::{DriveNumbers, Stop};
 use crate::compile::Generated;
 use crate::description::drives::{Must, Number};
 use crate::emit::{self, Lanes, Scalar};
-use crate::expr::Port;
 use crate::identifier::string_literals;
 use rustc_hash::FxHashMap;
 use straightline_core::model::{JointKind, Limits};
 use straightline_core::Dd;
+use straightline_graph::expr::Port;
 
 /// The sources of what is pasted.
 const TRIG: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/core/src/trig.rs"));

@@ -19,13 +19,13 @@ use crate::compile::Generated;
 use crate::description::drives::Number;
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::emit::Scalar;
-use crate::expr::{Graph, Port};
 use around::Around;
 use items::{Extent, Items, Sort, Type};
 use run::{count_of, Run, Thing};
 use rustc_hash::FxHashMap;
 use std::fmt;
 use straightline_core::Dd;
+use straightline_graph::expr::{Graph, Port};
 use tokens::{Kind, Words};
 use values::{Format, Value, Values};
 

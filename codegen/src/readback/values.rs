@@ -4,8 +4,8 @@
 //! terms of one operation change places. Nothing else is taken as equal: (a + b) + c is not a + (b + c).
 
 use crate::emit::Scalar;
-use crate::expr::{Graph, NodeId, Op, Width};
 use rustc_hash::FxHashMap;
+use straightline_graph::expr::{Graph, NodeId, Op, Width};
 
 /// In which format a value is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,13 +5,13 @@ use super::waterfall::robot_in;
 use crate::compile::{checked, Options, Program};
 use crate::diagnostic::Diagnostics;
 use crate::emit::{element_of, Scalar};
-use crate::expr::{NodeId, Op};
 use crate::function::Function;
 use crate::scene::messages as say;
 use crate::scene::{Budget, Coulomb, Effects, Gravity, MaxError, Misfit, Scene, Zero};
 use std::collections::BTreeMap;
 use straightline_core::model::{JointKind, Model};
 use straightline_core::Dd;
+use straightline_graph::expr::{NodeId, Op};
 
 /// Of the things that could be held, so many are named.
 const REMEDIES: usize = 3;

@@ -1,9 +1,9 @@
 //! Certified bounds of errors, as they stand in the generated file and in reports.
 
-use crate::certify::{Certificate, Refusal};
 use crate::emit::{number, Scalar};
-use crate::expr::Port;
 use std::fmt::Write;
+use straightline_graph::certify::{Certificate, Refusal};
+use straightline_graph::expr::Port;
 
 /// Certified bounds of a function's errors, or why there are none.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,7 +10,6 @@ use super::{FunctionReport, Report};
 use crate::compile::{file_name, optimised, Generated, Options};
 use crate::description;
 use crate::diagnostic::{Diagnostic, Diagnostics, Severity, Source};
-use crate::expr::{Counts, Graph, Op};
 use crate::function::{Function, Robot};
 use crate::model::{self, SpecialAngle};
 use crate::scene::{Base, Scene};
@@ -19,6 +18,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use straightline_core::model::{JointKind, Model};
 use straightline_core::Dd;
+use straightline_graph::expr::{Counts, Graph, Op};
 
 /// The style of all pages.
 pub const STYLE: &str = include_str!("page.css");

@@ -8,13 +8,13 @@ pub mod waterfall;
 
 use crate::compile::Program;
 use crate::emit::Scalar;
-use crate::expr::Counts;
 use crate::forward_method::MethodChoice;
 use crate::function::Function;
 use crate::staged::StagedReport;
 use budget::Measures;
 use errors::ErrorReport;
 use std::collections::BTreeMap;
+use straightline_graph::expr::Counts;
 use waterfall::Waterfall;
 
 /// Figures of one generated function.

@@ -6,11 +6,11 @@
 
 use crate::compile::{optimised, Optimisations, Options};
 use crate::diagnostic::Diagnostics;
-use crate::expr::Counts;
 use crate::function::{Function, Robot};
 use crate::scene::{apply, Base, Coulomb, Effects, Gravity, Parameter, Part, Scene};
 use straightline_core::model::Model;
 use straightline_core::Dd;
+use straightline_graph::expr::Counts;
 
 /// How a function came to its operations.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -2,13 +2,13 @@
 
 use super::free_drive::FreeDrive;
 use super::{Gravity, Parameter, Part, Scene, Selection};
-use crate::expr::Port;
 use crate::function::{higher_rate, Function, Robot};
 use crate::identifier::{doc, identifier, upper_camel_case};
 use straightline_core::model::{Load, Model};
 use straightline_core::reduced::ReducedModel;
 use straightline_core::spatial::{SpatialInertia, Sym3, Vec3};
 use straightline_core::{Dd, Real};
+use straightline_graph::expr::Port;
 
 /// Scalars of a run-time load: its ten parameters in the canonical frame, then in the reduced robot's frame.
 const LOAD_SCALARS: usize = 20;

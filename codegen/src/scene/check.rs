@@ -6,7 +6,6 @@ use super::messages::{self as say, unphysical_moments};
 use super::{Base, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Scene};
 use crate::compile::Options;
 use crate::diagnostic::Diagnostics;
-use crate::expr::Grade;
 use crate::function::Function;
 use crate::identifier::UNNAMED;
 use crate::limbs::LimbForm;
@@ -15,6 +14,7 @@ use crate::model::{is_gravity, GRAVITY};
 use straightline_core::model::{JointKind, Model};
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
+use straightline_graph::expr::Grade;
 
 /// A principal moment may exceed the sum of the others by so much, relatively: the digits of published tensors.
 const MOMENT_DIGITS: f64 = 1e-6;

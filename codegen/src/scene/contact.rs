@@ -1,7 +1,6 @@
 //! Contacts of a scene: what the robot touches, which coordinates are constrained there, and in which modes.
 
 use crate::identifier::snake_case;
-use crate::trace::Expr;
 use std::fmt;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -10,6 +9,7 @@ use straightline_core::contact::{Contact, Coordinate, Friction, ImplicitSurface,
 use straightline_core::model::Frame;
 use straightline_core::spatial::{Mat3, Sym3, Transform, Vec3};
 use straightline_core::{Dd, Real};
+use straightline_graph::trace::Expr;
 
 /// All contacts of a scene. The default has none, and nothing of a contact is generated.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -26,11 +26,11 @@ pub use read::{read, read_partly, SceneFile, LISTS};
 use crate::description::drives::Drive;
 use crate::description::flexible::{Flexible, Support};
 use crate::diagnostic::Diagnostic;
-use crate::expr::Port;
 use crate::function::Function;
 use crate::model::ModelOptions;
 use std::collections::BTreeMap;
 use straightline_core::model::{JointKind, Model};
+use straightline_graph::expr::Port;
 
 /// A scene. The default asks for everything and holds nothing.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -4,8 +4,8 @@
 //! unlimited, and says so ([`Interval::is_bounded`]).
 
 use super::Scene;
-use crate::expr::Port;
 use straightline_core::model::{Joint, JointKind, Limits, Model};
+use straightline_graph::expr::Port;
 
 /// From `lower` to `upper`, both in it; infinite where there is no limit.
 #[derive(Clone, Copy, Debug, PartialEq)]

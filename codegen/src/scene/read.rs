@@ -5,7 +5,6 @@ mod contact;
 use super::messages as say;
 use super::{check, Base, Budget, Coulomb, Gravity, Interval, JointRanges, MaxError, Parameter, Part, Payload, Places};
 use super::{Contacts, Ranges, Scene, Selection};
-use crate::certify::Effort;
 use crate::compile::Options;
 use crate::description::reader::{Range64, Reader, LARGEST_FILE};
 use crate::description::table::{parse, Table};
@@ -15,6 +14,7 @@ use crate::emit::Scalar;
 use crate::function::Function;
 use crate::limbs::LimbForm;
 use crate::words::Choice;
+use straightline_graph::certify::Effort;
 use toml::de::DeValue;
 
 const TOP: &[&str] = &[

@@ -7,7 +7,6 @@
 use super::{Drive, Random, State};
 use crate::compile::{parameter_program, Options};
 use crate::emit::Scalar;
-use crate::expr::{evaluate, Graph};
 use crate::function::{Function, Robot};
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::{Base, Coulomb, Gravity, Parameter, Scene};
@@ -15,6 +14,7 @@ use nalgebra::{Matrix3, Vector3};
 use straightline_core::model::{JointKind, Model};
 use straightline_core::reference::{ExtendedPosition, MassCentreTree};
 use straightline_core::Dd;
+use straightline_graph::expr::{evaluate, Graph};
 
 /// How the coordinates of a scene sit among those of the whole robot.
 pub(super) struct Coordinates {

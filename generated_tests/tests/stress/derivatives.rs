@@ -6,9 +6,10 @@
 use crate::outcome::{Outcome, Size};
 use crate::robots::{ranges, Judged};
 use straightline::{Dual, Real};
-use straightline_codegen::certify::{certify, input_box, Effort, Interval};
+use straightline_codegen::certify::{certify, Effort, Interval};
 use straightline_codegen::compile::{program, Options};
 use straightline_codegen::expr::{evaluate, gradient, Graph};
+use straightline_codegen::input_box::input_box;
 use straightline_codegen::scene::{Interval as Range, JointRanges, Scene};
 use straightline_codegen::{Function, Scalar};
 use straightline_core::model::JointKind;

@@ -6,25 +6,13 @@
 //! first order, without the Monte Carlo). Parameters of moved masses that cancel show here, and nowhere in an operation count.
 
 use crate::expr::{Graph, NodeId, Op};
-use crate::forward_method;
 use straightline_core::magnitude::Magnitude;
-use straightline_core::model::Model;
 use straightline_core::{Dd, Real};
 
 /// So many operations are visited at most for one estimate; if there are more, outputs share a sweep.
 const WORK: usize = 200_000;
 /// An output that is so small against what it is made of is judged by that.
 const SMALL: f64 = 1e-6;
-
-/// States of each kind whose values [`samples`] gives: at about rest, where weights rule, and as fast as the joints may move.
-const SAMPLES: usize = 8;
-
-/// The values of all nodes at some states; `None` where a run-time parameter is an input.
-pub fn samples(model: &Model<Dd>, graph: &Graph) -> Option<Vec<Vec<f64>>> {
-    let states = |fast| forward_method::states(model, &graph.inputs, SAMPLES, fast);
-    let (slow, fast) = states(false).zip(states(true))?;
-    Some(slow.iter().chain(&fast).map(|x| evaluate(graph, x)).collect())
-}
 
 /// What errors of each output are compared with: its rms value at these states, or, where that is small against what it is made of, a part of
 /// that. Each by itself: a light wrist below a heavy base has digits of its own.
@@ -91,7 +79,7 @@ fn swept(graph: &Graph, values: &[f64], rounds: &[bool], adjoints: &mut [f64]) -
 
 /// Backwards through the first operations of a program, as many as there are adjoints: `tell` gets each whose adjoint is not zero, with it.
 /// Angles count as inputs.
-pub(crate) fn backwards(graph: &Graph, values: &[f64], adjoints: &mut [f64], mut tell: impl FnMut(usize, f64)) {
+pub fn backwards(graph: &Graph, values: &[f64], adjoints: &mut [f64], mut tell: impl FnMut(usize, f64)) {
     for i in (0..adjoints.len()).rev() {
         let adjoint = adjoints[i];
         if adjoint == 0.0 {
@@ -130,7 +118,8 @@ pub(crate) fn backwards(graph: &Graph, values: &[f64], adjoints: &mut [f64], mut
     }
 }
 
-fn evaluate(graph: &Graph, inputs: &[f64]) -> Vec<f64> {
+/// The values of all nodes; angles are inputs.
+pub fn evaluate(graph: &Graph, inputs: &[f64]) -> Vec<f64> {
     let mut values: Vec<f64> = Vec::with_capacity(graph.ops.len());
     for op in &graph.ops {
         let value = |a: NodeId| values[a.index()];

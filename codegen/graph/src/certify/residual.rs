@@ -4,7 +4,7 @@
 //!
 //! H q̈ + h = τ + Ĵᵀ F, and for each row of the contact s̈ = J q̈ + A = s̈* (rigid) or F = −(m s̈ + load) (yielding),
 //!
-//! the [`system`](crate::contact::system) has what is left at the given q̈ and F, r = τ + Ĵᵀ F − ID(q, q̇, q̈) and c = s̈* − J q̈ − A or
+//! the system of a contact mode has what is left at the given q̈ and F, r = τ + Ĵᵀ F − ID(q, q̇, q̈) and c = s̈* − J q̈ − A or
 //! c = −(m s̈ + load) − F, and H, J, Ĵ, m; all with their running bounds (`running.rs`). The errors δ of q̈ and φ of F obey
 //!
 //! H δ = r + Ĵᵀ φ,  κ J δ + σ φ = c,  with κ = 1, σ = 0 of rigid rows and κ = m, σ = 1 of yielding ones.
@@ -46,8 +46,8 @@ use super::congruence::Congruence;
 use super::reactions::Contact;
 use super::running::{BrokenProof, Running, Tracked};
 use super::Format;
-use crate::emit::Scalar;
 use crate::expr::{Graph, NodeId, Op, Port};
+use crate::number::Scalar;
 
 /// Longer programs are not written: rustc would take minutes.
 const MOST_OPERATIONS: usize = 150_000;
@@ -56,7 +56,7 @@ const MOST_OPERATIONS: usize = 150_000;
 /// act; m of yielding rows.
 pub const OUTPUTS: [&str; 6] = ["residual", "missing", "h", "j", "applied", "mass"];
 
-/// A program that bounds how far accelerations and reactions are from the exact ones: the inputs of a [`system`](crate::contact::system),
+/// A program that bounds how far accelerations and reactions are from the exact ones: the inputs of a system of a contact mode,
 /// with `qdd` and, in contact, `force`; `yielding` says of each row of the contact whether the object gives way.
 ///
 /// # Errors

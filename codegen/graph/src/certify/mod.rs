@@ -40,7 +40,7 @@
 //! **5. Subdivision.** A bound for a box is the greatest of the bounds of boxes that cover it ([`Effort::boxes`], [`Effort::time`]).
 //!
 //! Programs with a division have a bound where the divisor stays off zero in the box; where it may not, there is none: [`Refusal`]. Of forward
-//! dynamics intervals alone know little: what mechanics knows of pivots, of what is left of H and of accelerations comes from [`pivots`]. It holds for
+//! dynamics intervals alone know little: what mechanics knows of pivots, of what is left of H and of accelerations is given, as [`Known`]. It holds for
 //! exact values and adjoints; those of the perturbed program are off by what errors add up to, found as in 3. Where that reaches a pivot,
 //! as in f32 on long arms with light tips, there is no bound for a box. There, and for the state at hand, generated programs bound the
 //! error: [`companion`], [`residual`]. A bound also proves that no value overflows and none is NaN. Coulomb friction takes the sign of a
@@ -55,7 +55,6 @@ pub mod forms;
 pub mod interval;
 pub mod mixed;
 pub mod norms;
-pub mod pivots;
 mod reactions;
 pub mod residual;
 mod running;
@@ -65,16 +64,13 @@ mod tape;
 #[cfg(test)]
 mod tests;
 
-pub use analysis::{Analysis, Refusal};
+pub use analysis::{Analysis, Known, Refusal};
 pub use format::Format;
 pub use interval::Interval;
-pub use pivots::Known;
 
-use crate::emit::Scalar;
 use crate::expr::{Graph, Port};
-use crate::scene::Scene;
+use crate::number::Scalar;
 use std::time::Duration;
-use straightline_core::model::{JointKind, Model};
 
 /// What constants of a program may be off by, relative to what they make: 2^-80.
 pub const OF_THE_FORM: f64 = 8.271806125530277e-25;
@@ -115,7 +111,7 @@ impl Effort {
 
 /// Bounds on the results of a program.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Certificate {
     /// Of every output scalar in order: |computed − exact| is at most this, *exact* as in [`certify`](self).
     pub errors: Vec<f64>,
@@ -138,7 +134,7 @@ pub fn certify(graph: &Graph, scalar: Scalar, inputs: &[Interval], effort: Effor
     certify_with(graph, scalar, inputs, effort, &Known::default())
 }
 
-/// The same where something is known of exact values and adjoints ([`pivots`]).
+/// The same where something is known of exact values and adjoints .
 ///
 /// # Errors
 /// As [`certify`].
@@ -161,45 +157,6 @@ pub fn certify_with(
         errors: graph.results.iter().map(|r| of(*r).1).collect(),
         magnitudes: graph.results.iter().map(|r| of(*r).2).collect(),
     })
-}
-
-/// Where neither the scene nor the robot file limits an input: angles within π, slides and positions within 10 m, speeds within
-/// 10 rad/s or m/s, accelerations within 100 rad/s² or m/s², forces within 1000 N·m or N, gravity within 10 m/s² per component.
-const DEFAULTS: [(&str, f64); 4] = [("qd", 10.0), ("qdd", 100.0), ("tau", 1000.0), ("gravity", 10.0)];
-const SLIDE: f64 = 10.0;
-
-/// The box of a program's inputs in a scene, an interval per input scalar: the scene's ranges, the robot file's limits, and where
-/// there is neither, defaults.
-///
-/// # Errors
-/// If an input is neither (an inertial parameter).
-pub fn input_box<T>(inputs: &[Port], scene: &Scene, model: &Model<T>) -> Result<Vec<Interval>, Refusal> {
-    let mut all = Vec::new();
-    for port in inputs {
-        let mut ranges = scene.input_ranges(port, model);
-        if port.name == "q" {
-            for joint in model.bodies.iter().map(|b| &b.joint) {
-                let count = if joint.kind == JointKind::Floating { 3 } else { 1 };
-                let bound = if joint.kind == JointKind::Revolute { std::f64::consts::PI } else { SLIDE };
-                ranges[joint.iq..joint.iq + count].iter_mut().for_each(|r| limit(r, bound));
-            }
-        } else {
-            let bound = DEFAULTS.iter().find(|(name, _)| *name == port.name).ok_or(Refusal::Unlimited)?.1;
-            ranges.iter_mut().for_each(|r| limit(r, bound));
-        }
-        all.extend(ranges.into_iter().map(|r| Interval { lo: r.lower, hi: r.upper }));
-    }
-    Ok(all)
-}
-
-/// Infinite ends become this far from zero, or from the other end.
-fn limit(range: &mut crate::scene::Interval, bound: f64) {
-    if range.lower == f64::NEG_INFINITY {
-        range.lower = (-bound).min(range.upper - bound);
-    }
-    if range.upper == f64::INFINITY {
-        range.upper = bound.max(range.lower + bound);
-    }
 }
 
 /// A box in words, one line per input: runs of equal ranges are one.

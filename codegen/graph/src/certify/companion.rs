@@ -3,8 +3,8 @@
 
 use super::running::Running;
 use super::Format;
-use crate::emit::Scalar;
 use crate::expr::{Graph, Port};
+use crate::number::Scalar;
 
 /// What the output of a bound is called behind the result that it is of.
 pub const OF_ERROR: &str = "_error";

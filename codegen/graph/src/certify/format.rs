@@ -1,7 +1,7 @@
 //! What rounding to a number format can do: the standard model with the binade of the result.
 
 use super::interval::{add_up, norm_up, Interval};
-use crate::emit::Scalar;
+use crate::number::Scalar;
 use straightline_core::{trig, Dd};
 
 /// The bound of the cosine kernel, in both formats \[ulp\]: see `trig.rs`; of sums of far angles in f32 2^-32 more.

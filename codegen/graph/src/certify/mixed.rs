@@ -8,8 +8,8 @@
 //! A value in f64 is either used in f64 alone or rounded to f32 for all its users, so that each node still has one error.
 
 use super::{Analysis, Format, Interval, Refusal};
-use crate::emit::Scalar;
 use crate::expr::{Graph, NodeId, Op, Width};
+use crate::number::Scalar;
 
 /// So often a choice is made.
 const ATTEMPTS: usize = 6;

@@ -1,5 +1,6 @@
 //! Passes: each takes a graph and returns a graph that computes the same results.
 
+pub mod cut;
 mod dead_code;
 mod order;
 mod substitute;

@@ -23,14 +23,15 @@
 //! double-double at random states, as `pass/substitute.rs` finds values that are the same. All are rational in the inputs, sines and
 //! cosines: two that differ anywhere agree at a random state with probability zero.
 
-use super::{input_box, Analysis, Format, Interval, Refusal};
-use crate::emit::Scalar;
-use crate::expr::{evaluate, Graph, NodeId, Op, Port};
-use crate::random::Random;
+use crate::input_box::input_box;
 use crate::scene::Scene;
 use straightline_core::algorithms::mass_matrix;
 use straightline_core::model::{Body, JointKind, Model};
 use straightline_core::Dd;
+use straightline_graph::certify::{Analysis, Format, Interval, Known, Refusal};
+use straightline_graph::expr::{evaluate, Graph, NodeId, Op, Port};
+use straightline_graph::random::Random;
+use straightline_graph::Scalar;
 
 /// Random states.
 const STATES: usize = 3;
@@ -72,15 +73,6 @@ impl Sizes {
         let entries = magnitudes(mass_matrix)?;
         Ok(Sizes { inertia: (0..n).map(|k| entries[k * n + k]).collect(), bias: magnitudes(torques)? })
     }
-}
-
-/// What is known of a program for forward dynamics, beyond what its operations say.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Known {
-    /// Ranges of exact values.
-    pub values: Vec<(NodeId, Interval)>,
-    /// Of a result and a value: the exact adjoint is at most so much.
-    pub adjoints: Vec<(NodeId, NodeId, f64)>,
 }
 
 /// Joints of the greatest robot that is looked at: beyond, errors add up to more than is left of H, and the search for values is long.

@@ -21,8 +21,8 @@
 //! operation, so that s = 1 + 6 n u. Products that underflow lose less than the smallest normal number; t is four of them.
 
 use super::Format;
-use crate::emit::Scalar;
 use crate::expr::{Builder, Folding, Graph, NodeId, Op, Port, RuleSet, Width};
+use crate::number::Scalar;
 use straightline_core::Dd;
 
 /// A value, and a bound of its error; none if it is exact.

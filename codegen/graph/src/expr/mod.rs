@@ -8,6 +8,7 @@ mod builder;
 mod gradient;
 mod graph;
 mod interpret;
+pub mod port_text;
 pub mod rules;
 mod verify;
 

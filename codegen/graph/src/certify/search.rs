@@ -4,8 +4,8 @@
 //! last place; what makes the error greater is kept. The truth is the same program in double-double.
 
 use super::Interval;
-use crate::emit::Scalar;
 use crate::expr::{evaluate, Graph, NodeId, Op, Width};
+use crate::number::Scalar;
 use crate::random::Random;
 use straightline_core::Dd;
 

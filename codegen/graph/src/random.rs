@@ -2,7 +2,7 @@
 
 /// SplitMix64 (Steele, Lea and Flood 2014); the number is the seed.
 #[derive(Clone, Debug)]
-pub(crate) struct Random(pub u64);
+pub struct Random(pub u64);
 
 impl Random {
     /// The next 64 bits.

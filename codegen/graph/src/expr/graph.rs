@@ -203,7 +203,7 @@ pub struct Graph {
 /// Operation counts. Sign flips and signs are free; `sin_cos` counts angles. The sum of two angles is an addition; what keeps
 /// its rounding error for the argument reduction is counted apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Counts {
     /// Multiplications.
     pub mul: usize,
@@ -219,7 +219,7 @@ pub struct Counts {
     /// Additions that carry rounding errors of sums of angles into the reduction of the angle.
     pub tail: usize,
     /// Pairs of sine and cosine.
-    #[cfg_attr(feature = "cli", serde(rename = "sincos"))]
+    #[cfg_attr(feature = "serde", serde(rename = "sincos"))]
     pub sin_cos: usize,
 }
 

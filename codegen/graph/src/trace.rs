@@ -33,7 +33,7 @@ pub fn trace(
 }
 
 /// The same for an algorithm of which only itself knows how many results it has: they are one port, `results`.
-pub(crate) fn trace_all(rules: RuleSet, inputs: Vec<Port>, algorithm: impl FnOnce(&[Vec<Expr>]) -> Vec<Expr>) -> Graph {
+pub fn trace_all(rules: RuleSet, inputs: Vec<Port>, algorithm: impl FnOnce(&[Vec<Expr>]) -> Vec<Expr>) -> Graph {
     let (builder, results) = written(rules, inputs, algorithm);
     builder.finish(vec![Port::new("results", &[results.len()])], results)
 }
@@ -70,12 +70,12 @@ fn written(
 
 impl Expr {
     /// Its node.
-    pub(crate) fn node(self) -> NodeId {
+    pub fn node(self) -> NodeId {
         self.0
     }
 
     /// Its value, if it is a constant.
-    pub(crate) fn as_constant(self) -> Option<Dd> {
+    pub fn as_constant(self) -> Option<Dd> {
         with(|g| g.as_constant(self.0)).map(|c| c.value())
     }
 }

@@ -7,8 +7,8 @@ use super::running::{BrokenProof, Running};
 use super::search::{computed_at, errors_at, worst_found};
 use super::tape::Registers;
 use super::{certify, subdivision, Analysis, Effort, Format, Interval};
-use crate::emit::Scalar;
 use crate::expr::{Builder, Graph, NodeId, Op, Port, RuleSet};
+use crate::number::Scalar;
 use crate::random::Random;
 use straightline_core::Dd;
 

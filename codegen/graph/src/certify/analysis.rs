@@ -4,12 +4,20 @@ use super::format::Format;
 use super::forms::{Atom, Coefficient, Forms, Term};
 use super::interval::{add_up, mul_up, Interval};
 use super::norms::{Bounded, Factor, GroupId, Groups};
-use super::pivots::Known;
 use super::tape::{Bound, Norm, Pen, Range, Tape};
-use crate::emit::Scalar;
 use crate::expr::{Graph, NodeId, Op, Width};
+use crate::number::Scalar;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
+
+/// What is known of a program for forward dynamics, beyond what its operations say.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Known {
+    /// Ranges of exact values.
+    pub values: Vec<(NodeId, Interval)>,
+    /// Of a result and a value: the exact adjoint is at most so much.
+    pub adjoints: Vec<(NodeId, NodeId, f64)>,
+}
 
 /// A graph that is being analysed in a format; what does not depend on the box is found once.
 pub struct Analysis<'g> {

@@ -1,0 +1,16 @@
+//! Programs of numbers: graphs of operations, the passes that make them cheaper, their order, and what they lose to rounding.
+//!
+//! Nothing here knows what is computed.
+#![forbid(unsafe_code)]
+
+pub mod certify;
+pub mod expr;
+mod number;
+pub mod pass;
+pub mod random;
+pub mod rounding;
+pub mod schedule;
+pub mod trace;
+
+pub use expr::port_text::{element, element_of};
+pub use number::Scalar;
