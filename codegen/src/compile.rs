@@ -967,7 +967,7 @@ pub fn parameter_program(robot: &Robot, parameter: &Parameter, options: &Options
 }
 
 /// The last part of a path.
-pub(crate) fn file_name(path: &str) -> &str {
+pub fn file_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 

@@ -57,7 +57,7 @@ fn within(limit: f64, other: f64) -> f64 {
 
 /// A form of forward dynamics in figures.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Figures {
     /// Multiplications and additions.
     pub operations: usize,
@@ -82,7 +82,7 @@ impl Figures {
 
 /// What was chosen, and why.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct MethodChoice {
     /// Whether articulated bodies were chosen.
     pub articulated_bodies: bool,

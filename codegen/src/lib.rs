@@ -12,8 +12,6 @@ pub mod diagnostic;
 pub mod emit;
 pub mod equivalence;
 pub mod expansion;
-#[cfg(feature = "cli")]
-pub mod experiment;
 pub mod export;
 pub mod forward_method;
 pub mod function;

@@ -23,7 +23,7 @@ use straightline_graph::trace::{trace, Expr};
 
 /// Figures of one stage.
 #[derive(Clone, Debug)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct StageReport {
     /// Its type's name.
     pub name: &'static str,
@@ -43,7 +43,7 @@ pub struct StageReport {
 
 /// Operations of a function on top of its stages.
 #[derive(Clone, Debug)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Remaining {
     /// Multiplications.
     pub mul: usize,
@@ -57,7 +57,7 @@ pub struct Remaining {
 
 /// Figures of the staged form.
 #[derive(Clone, Debug)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct StagedReport {
     /// The stages, the rarest first.
     pub stages: Vec<StageReport>,

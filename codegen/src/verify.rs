@@ -32,7 +32,7 @@ use whole::Coordinates;
 
 /// Worst error of a function.
 #[derive(Clone, Debug)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Worst {
     /// The error, divided by the natural scale.
     pub error: f64,
@@ -46,7 +46,7 @@ pub struct Worst {
 
 /// What came out.
 #[derive(Clone, Debug)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Verification {
     /// The robot's name.
     pub robot: String,

@@ -2,7 +2,7 @@
 //! far computed numbers are from the exact dynamics of the robot, constants and the reduced form included.
 //!
 //! Every evaluation is one of a climb towards the worst error, with the truth computed anew. The long search is
-//! `cargo test --release -p straightline-codegen --no-default-features --features verify --test certificates_of_robots -- --ignored --nocapture`
+//! `cargo test --release -p straightline-codegen --features verify --test certificates_of_robots -- --ignored --nocapture`
 
 #[allow(unused_imports)] // shared with tests that take more
 #[path = "../../generated_tests/src/written/mod.rs"]

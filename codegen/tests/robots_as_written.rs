@@ -2,7 +2,7 @@
 //! many times what the plain program of the same robot loses, against the second author in double-double.
 //!
 //! Nothing is compiled by rustc: programs are run operation by operation in their own arithmetic. More robots, or others:
-//! `ROBOTS=500 SEED=7 STYLES=exported,digits4 cargo test --release -p straightline-codegen --test robots_as_written -- --ignored --nocapture`
+//! `ROBOTS=500 SEED=7 STYLES=exported,digits4 cargo test --release -p straightline-codegen --features verify --test robots_as_written -- --ignored --nocapture`
 
 #[path = "../../generated_tests/src/written/mod.rs"]
 #[allow(dead_code, unused_imports)] // other tests use the rest

@@ -3,7 +3,7 @@
 //! Each compilation compares every program (functions, stages, contact modes, limbs, parameters, bounds at a state, mixed precision) with
 //! its plain equations, and its text with the program. So a robot in a scene fails here where it is compiled in a plainer form or not at
 //! all, or where what is compiled is not what the second author reads from robot file and scene.
-//! `ROBOTS=500 SEED=7 STYLES=exported,digits4 cargo test --release -p straightline-codegen --test scenes_as_written -- --ignored --nocapture`
+//! `ROBOTS=500 SEED=7 STYLES=exported,digits4 cargo test --release -p straightline-codegen --features verify --test scenes_as_written -- --ignored --nocapture`
 
 #[path = "../../generated_tests/src/written/mod.rs"]
 #[allow(dead_code, unused_imports)] // other tests use the rest

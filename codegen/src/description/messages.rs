@@ -126,7 +126,7 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
 }
 
 /// A text of the file, cut where it is long.
-pub(crate) fn cut(text: &str) -> String {
+pub fn cut(text: &str) -> String {
     if text.chars().count() <= 60 {
         text.to_string()
     } else {
@@ -140,7 +140,7 @@ pub(crate) fn six_digits(x: f64) -> String {
 }
 
 /// `a, b and c`, each in backquotes.
-pub(crate) fn list(words: &[&str]) -> String {
+pub fn list(words: &[&str]) -> String {
     let quoted: Vec<String> = words.iter().take(12).map(|w| format!("`{}`", cut(w))).collect();
     let more = words.len().saturating_sub(12);
     match (quoted.split_last(), more) {

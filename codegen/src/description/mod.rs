@@ -9,8 +9,8 @@ mod chapter;
 pub mod drives;
 pub mod flexible;
 pub mod messages;
-pub(crate) mod reader;
-pub(crate) mod table;
+pub mod reader;
+pub mod table;
 mod toml;
 mod urdf;
 

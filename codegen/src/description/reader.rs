@@ -6,13 +6,15 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 /// The largest file that is read \[bytes\].
-pub(crate) const LARGEST_FILE: usize = 64 << 20;
+pub const LARGEST_FILE: usize = 64 << 20;
 /// The greatest magnitude that is computed with: products of a few such numbers stay inside f64's range.
 const GREATEST: f64 = 1e60;
 
 /// A file that is being read.
-pub(crate) struct Reader<'a> {
+pub struct Reader<'a> {
+    /// The file.
     pub source: &'a Source,
+    /// What is said about it.
     pub diagnostics: &'a mut Diagnostics,
     ignored: Vec<Ignored>,
     ignored_index: HashMap<String, usize>,
@@ -22,7 +24,7 @@ pub(crate) struct Reader<'a> {
 
 /// Which numbers are taken.
 #[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Range64 {
+pub enum Range64 {
     /// What equations are made of.
     Finite,
     /// What a coordinate is compared with: infinite, too.
@@ -30,19 +32,23 @@ pub(crate) enum Range64 {
 }
 
 impl<'a> Reader<'a> {
+    /// Nothing is read yet.
     pub fn new(source: &'a Source, diagnostics: &'a mut Diagnostics) -> Reader<'a> {
         Reader { source, diagnostics, ignored: Vec::new(), ignored_index: HashMap::new(), drive_numbers: Vec::new() }
     }
 
+    /// The place of bytes of the file.
     pub fn place(&self, span: &Range<usize>) -> Place {
         self.source.place(span.clone())
     }
 
+    /// Says something about bytes of the file.
     pub fn complain(&mut self, span: &Range<usize>, diagnostic: Diagnostic) {
         let place = self.place(span);
         self.diagnostics.push(diagnostic.at(&place));
     }
 
+    /// A value with the bytes that say it.
     pub fn value<T>(&self, value: T, span: &Range<usize>) -> Value<T> {
         Value::new(value, self.place(span))
     }
@@ -58,6 +64,7 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// What was skipped.
     pub fn into_ignored(self) -> Vec<Ignored> {
         self.ignored
     }

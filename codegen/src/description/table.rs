@@ -15,14 +15,17 @@ type Span = Range<usize>;
 const DEEPEST: usize = 16;
 
 /// A table and how complaints name it.
-pub(crate) struct Table<'a, 'i> {
+pub struct Table<'a, 'i> {
+    /// What it describes, in complaints: ``joint `elbow` ``.
     pub owner: String,
+    /// Keys and values.
     pub table: &'a DeTable<'i>,
+    /// Where it stands.
     pub span: Span,
 }
 
 /// The document, or complaints about its syntax.
-pub(crate) fn parse<'i>(source: &'i Source, diagnostics: &mut Diagnostics) -> Option<Spanned<DeTable<'i>>> {
+pub fn parse<'i>(source: &'i Source, diagnostics: &mut Diagnostics) -> Option<Spanned<DeTable<'i>>> {
     let mut reader = Reader::new(source, diagnostics);
     if !brackets_match(&mut reader) {
         return None;
@@ -94,6 +97,7 @@ impl<'a, 'i> Table<'a, 'i> {
         self.table.get(key).map(|value| (value.get_ref(), value.span()))
     }
 
+    /// Whether the file has the key.
     pub fn has(&self, key: &str) -> bool {
         self.table.contains_key(key)
     }
@@ -138,7 +142,8 @@ impl Reader<'_> {
         self.complain(span, messages::wrong_type(what, expected, &type_name(value)));
     }
 
-    pub(crate) fn real(&mut self, what: &str, value: &DeValue, span: &Span, range: Range64) -> Option<f64> {
+    /// A number, or a complaint.
+    pub fn real(&mut self, what: &str, value: &DeValue, span: &Span, range: Range64) -> Option<f64> {
         match value {
             DeValue::Float(float) => self.number(what, float.as_str(), span, range),
             DeValue::Integer(integer) if integer.radix() == 10 => self.number(what, integer.as_str(), span, range),
@@ -156,6 +161,7 @@ impl Reader<'_> {
         }
     }
 
+    /// The number of a key; `None` where there is no such key, or after a complaint.
     pub fn real_at(&mut self, table: &Table, key: &str, range: Range64) -> Option<Value<f64>> {
         let (value, span) = table.get(key)?;
         let value = self.real(&table.what(key), value, &span, range)?;
@@ -211,6 +217,7 @@ impl Reader<'_> {
         names
     }
 
+    /// The text of a key; `None` likewise.
     pub fn string_at(&mut self, table: &Table, key: &str) -> Option<Value<String>> {
         let (value, span) = table.get(key)?;
         match value {
@@ -222,6 +229,7 @@ impl Reader<'_> {
         }
     }
 
+    /// The text of a key as a name: not empty, and of characters that can be shown.
     pub fn name_at(&mut self, table: &Table, key: &str, what: &str) -> Option<Value<String>> {
         let text = self.string_at(table, key)?;
         self.name(what, &text.value, &text.place.span)
@@ -267,7 +275,6 @@ impl Reader<'_> {
     }
 
     /// Numbers in an array; all complaints of them before `None`.
-    #[cfg(feature = "cli")]
     pub fn all_reals_at(&mut self, table: &Table, key: &str, range: Range64) -> Option<Vec<f64>> {
         let (value, span) = table.get(key)?;
         let what = table.what(key);
@@ -297,7 +304,7 @@ impl Reader<'_> {
     }
 
     /// Numbers in an array.
-    pub(super) fn row(&mut self, what: &str, value: &DeValue, span: &Span) -> Option<Vec<f64>> {
+    pub fn row(&mut self, what: &str, value: &DeValue, span: &Span) -> Option<Vec<f64>> {
         let DeValue::Array(array) = value else {
             self.wrong_type(what, "numbers in an array", value, span);
             return None;
@@ -307,6 +314,7 @@ impl Reader<'_> {
         numbers.into_iter().collect()
     }
 
+    /// Three numbers in an array.
     pub fn vector_at(&mut self, table: &Table, key: &str) -> Option<Value<[f64; 3]>> {
         let (value, span) = table.get(key)?;
         let [x, y, z] = self.triple(&table.what(key), value, &span)?;

@@ -7,25 +7,25 @@ use straightline_graph::expr::Port;
 
 /// Certified bounds of a function's errors, or why there are none.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ErrorReport {
     /// The ranges of the inputs for which they hold, a line per input.
     pub ranges: Vec<String>,
     /// Name of each output and its bounds, in its order.
     pub outputs: Vec<OutputErrors>,
     /// Why there are none.
-    #[cfg_attr(feature = "cli", serde(skip_serializing_if = "Option::is_none"))]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub refused: Option<&'static str>,
 }
 
 /// Bounds of one output.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct OutputErrors {
     /// Its name.
     pub name: String,
     /// Its shape.
-    #[cfg_attr(feature = "cli", serde(skip))]
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub shape: Vec<usize>,
     /// |computed − exact| of each scalar is at most this.
     pub bounds: Vec<f64>,

@@ -2,8 +2,6 @@
 
 pub mod budget;
 pub mod errors;
-pub mod html;
-mod tree;
 pub mod waterfall;
 
 use crate::compile::Program;
@@ -19,7 +17,7 @@ use waterfall::Waterfall;
 
 /// Figures of one generated function.
 #[derive(Clone, Debug)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct FunctionReport {
     /// Multiplications.
     pub mul: usize,
@@ -48,26 +46,26 @@ pub struct FunctionReport {
     /// Bytes of machine code, estimated for x86-64.
     pub code_bytes: usize,
     /// Of forward dynamics: which method was chosen, and why.
-    #[cfg_attr(feature = "cli", serde(skip_serializing_if = "Option::is_none"))]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub method: Option<MethodChoice>,
     /// Bounds of its rounding errors, where they were asked for.
-    #[cfg_attr(feature = "cli", serde(skip_serializing_if = "Option::is_none"))]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub errors: Option<ErrorReport>,
     /// How it came to these counts: where it was asked for, and where a scene skips something.
-    #[cfg_attr(feature = "cli", serde(flatten, skip_serializing_if = "Option::is_none"))]
+    #[cfg_attr(feature = "serde", serde(flatten, skip_serializing_if = "Option::is_none"))]
     pub waterfall: Option<Waterfall>,
 }
 
 /// Figures of one function of a contact mode.
 #[derive(Clone, Debug)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ContactReport {
     /// The mode.
     pub mode: String,
     /// The function.
     pub function: &'static str,
     /// Its operations.
-    #[cfg_attr(feature = "cli", serde(flatten))]
+    #[cfg_attr(feature = "serde", serde(flatten))]
     pub counts: Counts,
 }
 
@@ -111,7 +109,7 @@ impl FunctionReport {
 
 /// Figures of everything that was generated for a robot.
 #[derive(Clone, Debug)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Report {
     /// The robot's name.
     pub robot: String,
@@ -124,10 +122,10 @@ pub struct Report {
     /// Name of each function and its figures.
     pub functions: BTreeMap<&'static str, FunctionReport>,
     /// Figures of the staged form, if it was generated.
-    #[cfg_attr(feature = "cli", serde(skip_serializing_if = "Option::is_none"))]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub staged: Option<StagedReport>,
     /// The functions of contact modes, in the order of the file.
-    #[cfg_attr(feature = "cli", serde(skip_serializing_if = "Vec::is_empty"))]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub contact: Vec<ContactReport>,
 }
 

@@ -14,7 +14,7 @@ use straightline_graph::expr::Counts;
 
 /// How a function came to its operations.
 #[derive(Clone, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Waterfall {
     /// Plain unrolling: the generic runtime with the robot's numbers, without what multiplies or adds zeros and what no
     /// result needs, and equal subexpressions once.
@@ -27,7 +27,7 @@ pub struct Waterfall {
 
 /// One step of a waterfall.
 #[derive(Clone, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Saving {
     /// Such as `joints wrist_1, wrist_2 locked`.
     pub what: String,
@@ -43,7 +43,7 @@ pub struct Saving {
 
 /// Who saves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(serde::Serialize), serde(rename_all = "lowercase"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "lowercase"))]
 pub enum By {
     /// An optimisation of the compiler.
     Compiler,
@@ -142,14 +142,14 @@ pub fn waterfall(stops: &[Stop], frames: &[String], function: Function, options:
 }
 
 /// The robot that a scene makes of the whole one, and the scene in its terms.
-pub(super) fn robot_in(whole: &Model<Dd>, scene: &Scene) -> Option<(Robot, Scene)> {
+pub fn robot_in(whole: &Model<Dd>, scene: &Scene) -> Option<(Robot, Scene)> {
     let model = apply(whole.clone(), scene, &mut Diagnostics::new())?;
     let scene = scene.resolved(&model);
     Some((Robot::new(model), scene))
 }
 
 /// The items of a scene in words, those of its selected outputs by function.
-pub(super) fn items_of(whole: &Model<Dd>, scene: &Scene) -> Vec<String> {
+pub fn items_of(whole: &Model<Dd>, scene: &Scene) -> Vec<String> {
     let words = |(what, _)| match what {
         What::Text(text) => vec![text],
         What::Selection => scene.outputs.keys().map(|f| format!("{}: {}", f.name(), selection(*f, scene))).collect(),

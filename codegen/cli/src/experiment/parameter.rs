@@ -2,9 +2,9 @@
 //! `elbow_drive.ratio`.
 
 use super::messages as say;
-use crate::description::drives::Drive;
-use crate::description::{Description, Inertial, Joint, JointDrive, MassCentreLink, Notation, Value};
-use crate::diagnostic::Diagnostic;
+use straightline_codegen::description::drives::Drive;
+use straightline_codegen::description::{Description, Inertial, Joint, JointDrive, MassCentreLink, Notation, Value};
+use straightline_codegen::diagnostic::Diagnostic;
 
 /// A parameter and the values that it is to have.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/examples/arm.toml");
+const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../runtime/examples/arm.toml");
 
 struct Run {
     code: i32,

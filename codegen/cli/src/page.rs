@@ -3,8 +3,8 @@
 use super::arguments::Analyze;
 use super::motion::{drive_remarks, lines, violations, Swept};
 use std::path::Path;
+use straightline_cli::html::STYLE;
 use straightline_codegen::diagnostic::six_digits;
-use straightline_codegen::report::html::STYLE;
 use straightline_core::drive::Actuator;
 use straightline_core::model::{Joint, Model};
 use straightline_simulation::advice::Advice;

@@ -3,7 +3,7 @@
 //! Every tip of the tree has a column, every joint a row by its distance from the world; a joint stands in the middle of the
 //! columns that it carries, its names to its right. So symbols, lines and names of different branches never meet.
 
-use super::html::escape;
+use super::escape;
 use std::fmt::Write;
 use straightline_core::model::{JointKind, Model};
 use straightline_core::Dd;

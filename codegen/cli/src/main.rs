@@ -15,9 +15,9 @@ use files::read;
 use std::io;
 use std::path::Path;
 use std::process::ExitCode;
+use straightline_cli::html;
 use straightline_codegen::compile::{compile, explain, Generated, Options};
 use straightline_codegen::diagnostic::{self, codes, Diagnostics, Severity, Source};
-use straightline_codegen::report::html;
 use straightline_codegen::{description, export, identifier, model, output, scene, verify};
 
 /// Why a command ended early; what there is to say was said where it happened, except for [`Failure::Files`].

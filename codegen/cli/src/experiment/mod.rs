@@ -11,10 +11,10 @@ pub mod samples;
 
 use self::messages as say;
 use self::samples::Columns;
-use crate::description::messages::unknown_frame;
-use crate::description::reader::{Range64, Reader};
-use crate::description::table::{parse, Table};
-use crate::diagnostic::{Diagnostics, Place, Source};
+use straightline_codegen::description::messages::unknown_frame;
+use straightline_codegen::description::reader::{Range64, Reader};
+use straightline_codegen::description::table::{parse, Table};
+use straightline_codegen::diagnostic::{Diagnostics, Place, Source};
 use straightline_core::algorithms::drive_states;
 use straightline_core::drive::Actuator;
 use straightline_core::model::{Joint, JointKind, Model};

@@ -1,6 +1,6 @@
 //! The exported package as a stranger uses it: written by the command, built by cargo, called from C.
 
-#[path = "support/in_c.rs"]
+#[path = "../../tests/support/in_c.rs"]
 mod in_c;
 
 use in_c::{is_there, succeeds, Library};
@@ -12,7 +12,7 @@ use straightline_codegen::{ForwardDynamicsMethod, Function, Source};
 use straightline_core::model::Frame;
 use straightline_core::Dd;
 
-const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/examples/arm.toml");
+const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../runtime/examples/arm.toml");
 
 /// A state that nothing is special about.
 const STATE: [(&str, [f64; 10]); 4] = [

@@ -2,15 +2,15 @@
 
 use serde_json::Value;
 use std::collections::BTreeSet;
+use straightline_cli::html;
 use straightline_codegen::compile::{compile, explain, Generated, Options};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
-use straightline_codegen::report::html;
 use straightline_codegen::report::waterfall::By;
 use straightline_codegen::scene::{self, Budget, Gravity, Parameter, Scene, Selection, Zero};
 use straightline_codegen::{Function, Grade};
 
-const ARM: &str = include_str!("files/arm.toml");
-const BRANCHED: &str = include_str!("files/branched.toml");
+const ARM: &str = include_str!("../../tests/files/arm.toml");
+const BRANCHED: &str = include_str!("../../tests/files/branched.toml");
 
 fn source(text: &str) -> Source {
     Source::new("robot.toml", text)

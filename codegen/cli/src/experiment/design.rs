@@ -5,8 +5,8 @@
 //! in the equations as they are. What the scene leaves out stays out.
 
 use super::parameter;
-use crate::description::{Description, JointDrive, Notation, Value};
-use crate::diagnostic::Diagnostic;
+use straightline_codegen::description::{Description, JointDrive, Notation, Value};
+use straightline_codegen::diagnostic::Diagnostic;
 use straightline_core::algorithms::{inverse_dynamics, joint_wrenches};
 use straightline_core::model::{Coulomb, JointEffects, Load, Model};
 use straightline_core::{Dd, Real};
@@ -188,9 +188,9 @@ fn with_effect(effects: &JointEffects<Expr>, key: &str, p: Expr, geared: Expr) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description;
-    use crate::diagnostic::{Diagnostics, Source};
-    use crate::model::{self, ModelOptions};
+    use straightline_codegen::description;
+    use straightline_codegen::diagnostic::{Diagnostics, Source};
+    use straightline_codegen::model::{self, ModelOptions};
     use straightline_graph::random::Random;
 
     const ARM: &str = r#"

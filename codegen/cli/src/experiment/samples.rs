@@ -1,7 +1,7 @@
 //! Samples over time from CSV and JSON files, with the place of whatever is wrong.
 
 use super::messages as say;
-use crate::diagnostic::{Diagnostics, Source};
+use straightline_codegen::diagnostic::{Diagnostics, Source};
 
 /// Columns of numbers by name.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,10 +1,12 @@
 //! Contacts of a scene in an experiment: which of them can happen, what they hit with, and how objects move.
 
 use super::messages as say;
-use crate::description::reader::{Range64, Reader};
-use crate::description::table::{parse, Table};
-use crate::diagnostic::{Diagnostics, Source};
-use crate::scene::contact::{tool_axes, ContactItem, Contacts as Items, EnvironmentItem, ObjectPose, SurfaceItem};
+use straightline_codegen::description::reader::{Range64, Reader};
+use straightline_codegen::description::table::{parse, Table};
+use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::scene::contact::{
+    tool_axes, ContactItem, Contacts as Items, EnvironmentItem, ObjectPose, SurfaceItem,
+};
 use straightline_core::algorithms::Environment;
 use straightline_core::contact::{Contact, Coordinate, Object};
 use straightline_core::model::Model;

@@ -2,7 +2,7 @@
 //! refusal with words, no number that is none, and what is written compiles.
 //!
 //! Every case is a process of its own, so that one that aborts or does not end is a finding with its files. Cases depend on the seed
-//! and their number alone. `cargo test -p straightline-codegen --test fuzz -- --ignored --nocapture` runs 1e5 (`FUZZ_CASES`, `FUZZ_SEED`,
+//! and their number alone. `cargo test -p straightline-cli --test fuzz -- --ignored --nocapture` runs 1e5 (`FUZZ_CASES`, `FUZZ_SEED`,
 //! `FUZZ_FIRST`, `FUZZ_THREADS`; rustc sees one of `FUZZ_SAMPLE` programs; `FUZZ_ONLY=simulate,analyze` leaves the cases of other commands
 //! out); what is found stands under `target/tmp/fuzz`, files, command and output together.
 
@@ -49,7 +49,7 @@ const SMALL: usize = 2_000;
 const LARGE: usize = 5_000;
 
 fn repository() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
 fn files(folder: &str, endings: &[&str]) -> Vec<Seed> {

@@ -9,10 +9,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
-use straightline_codegen::experiment::parquet::{bytes, read};
+use straightline_cli::experiment::parquet::{bytes, read};
 use straightline_simulation::table::Table;
 
-const ROBOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../robots/descriptions/planar_2r.toml");
+const ROBOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/descriptions/planar_2r.toml");
 
 fn scratch(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("parquet");

@@ -1,7 +1,7 @@
 //! Samples in Parquet files: columns of doubles, as CSV has them.
 
-use crate::diagnostic::Source;
 use std::path::Path;
+use straightline_codegen::diagnostic::Source;
 use straightline_simulation::table::Table;
 
 /// Whether a file's name says that it is a Parquet file.

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-const ROBOTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../robots");
+const ROBOTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots");
 
 fn scratch(name: &str) -> PathBuf {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("simulation").join(name);

@@ -1,20 +1,20 @@
 //! Numbers of drives as run-time parameters: functions that take them compute what the functions of a robot file do in which these numbers
 //! stand.
 
-#[path = "support/chain.rs"]
+#[path = "../../tests/support/chain.rs"]
 mod chain;
-#[path = "support/in_c.rs"]
+#[path = "../../tests/support/in_c.rs"]
 mod in_c;
 
 use in_c::{succeeds, Library};
 use std::path::Path;
 use std::process::Command;
+use straightline_cli::experiment::parameter;
 use straightline_codegen::compile::{optimised, parameter_program, Optimisations};
 use straightline_codegen::contact::{programs as contact_programs, Mode};
 use straightline_codegen::description::Description;
 use straightline_codegen::diagnostic::Diagnostics;
 use straightline_codegen::emit::Lanes;
-use straightline_codegen::experiment::parameter;
 use straightline_codegen::expr::{evaluate, Graph};
 use straightline_codegen::function::Robot;
 use straightline_codegen::scene::Parameter;

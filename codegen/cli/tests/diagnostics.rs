@@ -11,7 +11,7 @@ use straightline_codegen::{compile, Builder, Function, Options};
 
 /// An arm of which two angles have six digits, and one eleven.
 fn cut_angles() -> String {
-    include_str!("../../runtime/examples/arm.toml").replacen(
+    include_str!("../../../runtime/examples/arm.toml").replacen(
         "rpy_quarter_turns = [1.0, 0.0, 0.0]",
         "rpy = [1.570796, 1.57079632679, -3.141592]",
         1,
