@@ -22,7 +22,7 @@ use crate::report::{FunctionReport, Report};
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::{self, constructed, is_optional, Parameter, Scene};
 use crate::singular;
-use crate::stable::Stable;
+use crate::stable::{fnv_1a, Stable};
 use crate::staged::{self, staged};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -1038,11 +1038,7 @@ fn choose_frames(model: &Model<Dd>, asked: &[String], diagnostics: &mut Diagnost
     asked.to_vec()
 }
 
-/// FNV-1a over everything that the output depends on.
+/// Over everything that the output depends on.
 fn hash(text: &str, options: &Options) -> u64 {
-    let settings = [crate::VERSION, "\0", &options.stable_text()].concat();
-    text.bytes()
-        .chain([0])
-        .chain(settings.bytes())
-        .fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3))
+    fnv_1a([text, "\0", crate::VERSION, "\0", &options.stable_text()].concat().bytes())
 }

@@ -29,7 +29,7 @@ pub mod reference_input;
 pub mod report;
 pub mod scene;
 pub mod singular;
-mod stable;
+pub mod stable;
 pub mod staged;
 pub mod stubs;
 #[cfg(feature = "verify")]

@@ -23,6 +23,13 @@ use straightline_core::contact::Coordinate;
 use straightline_graph::certify::Effort;
 use straightline_graph::schedule::Limits;
 
+/// A hash of bytes that is the same in every version and on every machine: FNV-1a.
+pub fn fnv_1a(bytes: impl IntoIterator<Item = u8>) -> u64 {
+    bytes
+        .into_iter()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
+}
+
 /// What has such a text.
 pub(crate) trait Stable {
     /// Appends it.
@@ -37,7 +44,7 @@ pub(crate) trait Stable {
 }
 
 /// `name=value;`
-fn said<T: Stable + ?Sized>(name: &str, value: &T, out: &mut String) {
+fn said<T: Stable>(name: &str, value: &T, out: &mut String) {
     out.push_str(name);
     out.push('=');
     value.say(out);
@@ -316,7 +323,7 @@ impl Stable for Actuator {
     }
 }
 
-printed! { bool usize f64 str Duration }
+printed! { bool usize f64 Duration }
 
 worded! {
     String: text => &format!("{text:?}");
@@ -325,7 +332,6 @@ worded! {
     Coordinate: coordinate => coordinate.name();
     EnvironmentKind: kind => EnvironmentKind::WORDS.iter().find(|w| w.1 == *kind).expect("every kind has a word").0;
     UserSurface: surface => &format!("{:?}", surface.name());
-    (): _nothing => "";
 }
 
 /// What every front names by words.
@@ -384,28 +390,22 @@ impl<K: Stable, V: Stable> Stable for BTreeMap<K, V> {
     }
 }
 
-impl<A: Stable, B: Stable> Stable for (A, B) {
-    fn say(&self, out: &mut String) {
-        out.push('(');
-        self.0.say(out);
-        out.push(',');
-        self.1.say(out);
-        out.push(')');
-    }
+macro_rules! tuple {
+    ($($name:ident)*; $first:tt $($index:tt)*) => {
+        impl<$($name: Stable),*> Stable for ($($name),*) {
+            fn say(&self, out: &mut String) {
+                out.push('(');
+                self.$first.say(out);
+                $(out.push(',');
+                self.$index.say(out);)*
+                out.push(')');
+            }
+        }
+    };
 }
 
-impl<A: Stable, B: Stable, C: Stable> Stable for (A, B, C) {
-    fn say(&self, out: &mut String) {
-        let (a, b, c) = self;
-        out.push('(');
-        a.say(out);
-        out.push(',');
-        b.say(out);
-        out.push(',');
-        c.say(out);
-        out.push(')');
-    }
-}
+tuple!(A B; 0 1);
+tuple!(A B C; 0 1 2);
 
 #[cfg(test)]
 mod tests {

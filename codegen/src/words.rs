@@ -5,7 +5,6 @@ use crate::emit::{Lanes, Scalar};
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::limbs::LimbForm;
 use std::fmt;
-use std::str::FromStr;
 use straightline_graph::expr::Grade;
 
 /// A choice that has words.
@@ -124,18 +123,6 @@ impl Choice for Lanes {
     }
 }
 
-macro_rules! parse_words {
-    ($($choice:ty),*) => {$(
-        impl FromStr for $choice {
-            type Err = UnknownWord;
-            fn from_str(word: &str) -> Result<Self, UnknownWord> {
-                Self::from_word(word)
-            }
-        }
-    )*};
-}
-parse_words!(Function, ForwardDynamicsMethod, LimbForm, Lanes);
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -167,7 +154,7 @@ mod tests {
         for (word, meant) in
             [("inverse_dynamic", "inverse_dynamics"), ("RNEA", "inverse_dynamics"), ("aba", "forward_dynamics")]
         {
-            let error = word.parse::<Function>().unwrap_err();
+            let error = Function::from_word(word).unwrap_err();
             assert_eq!(error.to_string(), format!("there is no function `{word}`; did you mean `{meant}`?"));
         }
     }

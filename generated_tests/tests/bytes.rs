@@ -8,6 +8,7 @@ use std::path::Path;
 use straightline_codegen::compile::{compile, Options};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::scene;
+use straightline_codegen::stable::fnv_1a;
 
 /// By how a scene's file begins: the robot that it is of.
 const ROBOTS: [(&str, &str); 4] =
@@ -17,8 +18,7 @@ const ROBOTS: [(&str, &str); 4] =
 fn sum(text: &str) -> String {
     let lines = text.lines().filter(|line| !line.starts_with("// Inputs' hash"));
     let bytes = lines.flat_map(|line| line.bytes().chain([b'\n']));
-    let sum = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
-    format!("{sum:016x} {:>8}", text.len())
+    format!("{:016x} {:>8}", fnv_1a(bytes), text.len())
 }
 
 /// The files of a folder with this extension, by name.

@@ -8,6 +8,7 @@ use crate::compile::Generated;
 use crate::description::drives::{Must, Number};
 use crate::emit::{self, Lanes, Scalar};
 use crate::identifier::string_literals;
+use crate::stable::fnv_1a;
 use rustc_hash::FxHashMap;
 use straightline_core::model::{JointKind, Limits};
 use straightline_core::Dd;
@@ -547,16 +548,12 @@ impl Around<'_, '_, '_> {
             Scalar::F64 => "f32",
             Scalar::F32 => "f64",
         };
-        let mut sum = 0xcbf2_9ce4_8422_2325_u64;
-        for at in item.start..item.end {
+        fnv_1a((item.start..item.end).flat_map(|at| {
             let text = self.items.text_of(at);
             // a scalar that the file has not is no other's
             let text = if text.contains(other) { "?".to_string() } else { text.replace("f32", "f64") };
-            for byte in text.bytes().chain([0]) {
-                sum = (sum ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
-            }
-        }
-        sum
+            text.into_bytes().into_iter().chain([0])
+        }))
     }
 
     /// A module is its source, but for comments and how strongly it is inlined, or the source up to some item.
