@@ -16,7 +16,7 @@ use crate::pivots;
 use crate::range;
 use crate::readback::{self, DriveNumbers, ParameterProgram, Programs};
 use crate::report::budget::{self, Measures};
-use crate::report::errors::ErrorReport;
+use crate::report::errors::{ErrorReport, ROUNDED};
 use crate::report::waterfall::{self, Waterfall};
 use crate::report::{FunctionReport, Report};
 use crate::scene::free_drive::FreeDrive;
@@ -29,7 +29,7 @@ use std::fmt::Write;
 use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::certify::companion::Bits;
-use straightline_graph::certify::{self, Effort, Known, Refusal};
+use straightline_graph::certify::{self, Effort, Known};
 use straightline_graph::expr::{verify, Counts, Folding, Grade, Graph, NodeId, Port, RuleSet, Section};
 use straightline_graph::pass::{count_sums, dead_code, order, substitute, sums, unread_inputs};
 use straightline_graph::schedule::{schedule, Limits, Schedule};
@@ -673,7 +673,7 @@ fn generate(
     hash: u64,
 ) -> Result<Generated, Disagreement> {
     let model = &robot.model;
-    let title = |section: Section| match section.body {
+    let title = |section: Section| match section.index {
         Some(i) => format!("{}, body {}: {}", section.phase, i + 1, model.bodies[i].name),
         None => section.phase.to_string(),
     };
@@ -695,7 +695,7 @@ fn generate(
         if wants_companions(options) {
             let (bound, plainer) = match program.has_folded_constants(options) {
                 true => checked_companion(&robot, *function, graph, options)?,
-                false => (Err(Refusal::Rounded.words()), None),
+                false => (Err(ROUNDED), None),
             };
             plainer.iter().for_each(|p| warnings.push(p.warning(model)));
             let by_residual = *function == Function::ForwardDynamics;
@@ -787,11 +787,11 @@ fn certificates(robot: &Robot, programs: &[Program], options: &Options) -> Vec<O
         let effort = options.certify.or(budgeted.then(Effort::default))?;
         let outputs = &p.graph.outputs;
         if !p.has_folded_constants(options) {
-            return Some(ErrorReport::refused(outputs, Refusal::Rounded));
+            return Some(ErrorReport::refused(ROUNDED));
         }
         let inputs = match input_box(&p.graph.inputs, &options.scene, &robot.model) {
             Ok(inputs) => inputs,
-            Err(refusal) => return Some(ErrorReport::refused(outputs, refusal)),
+            Err(refusal) => return Some(ErrorReport::refused(refusal.words())),
         };
         let ranges = certify::box_in_words(&p.graph.inputs, &inputs);
         let known = match p.function {
@@ -800,7 +800,7 @@ fn certificates(robot: &Robot, programs: &[Program], options: &Options) -> Vec<O
         };
         Some(match certify::certify_with(&p.graph, options.scalar, &inputs, effort, &known) {
             Ok(certificate) => ErrorReport::new(outputs, ranges, certificate),
-            Err(refusal) => ErrorReport { ranges, ..ErrorReport::refused(outputs, refusal) },
+            Err(refusal) => ErrorReport { ranges, ..ErrorReport::refused(refusal.words()) },
         })
     };
     programs.iter().map(of).collect()

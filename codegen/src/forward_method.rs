@@ -305,5 +305,5 @@ const SAMPLES: usize = 8;
 pub fn samples(model: &Model<Dd>, graph: &Graph) -> Option<Vec<Vec<f64>>> {
     let at = |fast| states(model, &graph.inputs, SAMPLES, fast);
     let (slow, fast) = at(false).zip(at(true))?;
-    Some(slow.iter().chain(&fast).map(|x| straightline_graph::rounding::evaluate(graph, x)).collect())
+    Some(slow.iter().chain(&fast).map(|x| straightline_graph::expr::values(graph, x)).collect())
 }

@@ -5,9 +5,9 @@
 //! The root of the sum of (adjoint · value)² is the rms error of the output in units of the rounding error (Monte Carlo arithmetic to
 //! first order, without the Monte Carlo). Parameters of moved masses that cancel show here, and nowhere in an operation count.
 
-use crate::expr::{Graph, NodeId, Op};
+use crate::expr::{values, Graph, NodeId, Op};
 use straightline_core::magnitude::Magnitude;
-use straightline_core::{Dd, Real};
+use straightline_core::Dd;
 
 /// So many operations are visited at most for one estimate; if there are more, outputs share a sweep.
 const WORK: usize = 200_000;
@@ -30,7 +30,7 @@ pub fn scales(graph: &Graph, states: &[Vec<f64>]) -> Vec<f64> {
 
 /// The worst rms error of the outputs over these [`scales`], in units of the rounding error.
 pub fn estimate(graph: &Graph, states: &[Vec<f64>], scales: &[f64]) -> f64 {
-    let values: Vec<Vec<f64>> = states.iter().map(|x| evaluate(graph, x)).collect();
+    let values: Vec<Vec<f64>> = states.iter().map(|x| values(graph, x)).collect();
     if graph.results.is_empty() {
         return 0.0;
     }
@@ -116,30 +116,6 @@ pub fn backwards(graph: &Graph, values: &[f64], adjoints: &mut [f64], mut tell: 
             | Op::Cos(_) => {}
         }
     }
-}
-
-/// The values of all nodes; angles are inputs.
-pub fn evaluate(graph: &Graph, inputs: &[f64]) -> Vec<f64> {
-    let mut values: Vec<f64> = Vec::with_capacity(graph.ops.len());
-    for op in &graph.ops {
-        let value = |a: NodeId| values[a.index()];
-        // the pair stands for its angle until a half of it is wanted
-        values.push(match *op {
-            Op::Input(k) => inputs[k as usize],
-            Op::Constant(c) => c.value().to_f64(),
-            Op::Neg(a) => -value(a),
-            Op::Add(a, b) | Op::AngleSum(a, b) => value(a) + value(b),
-            Op::Sub(a, b) => value(a) - value(b),
-            Op::Mul(a, b) => value(a) * value(b),
-            Op::Div(a, b) => value(a) / value(b),
-            Op::Sqrt(a) => Real::sqrt(value(a)),
-            Op::Sign(a) => Dd::from(value(a)).sign().to_f64(),
-            Op::SinCos(a) => value(a),
-            Op::Sin(a) => Real::sin_cos(value(a)).0,
-            Op::Cos(a) => Real::sin_cos(value(a)).1,
-        });
-    }
-    values
 }
 
 #[cfg(test)]

@@ -161,7 +161,7 @@ impl Real for Expr {
         self
     }
 
-    fn section(phase: &'static str, body: Option<usize>) {
-        with(|g| g.section(Section { phase, body }));
+    fn section(phase: &'static str, index: Option<usize>) {
+        with(|g| g.section(Section { phase, index }));
     }
 }

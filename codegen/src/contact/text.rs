@@ -7,12 +7,12 @@ use crate::equivalence::{self, Disagreement, Plainer};
 use crate::function::Robot;
 use crate::identifier::{comment, doc, string_literals, upper_camel_case};
 use crate::readback::{self, ModePrograms};
+use crate::report::errors::ROUNDED;
 use crate::report::ContactReport;
 use crate::scene::{ContactFunction, Parameter, Scene};
 use std::fmt::Write;
 use straightline_graph::certify::companion::{state_bound, Bits};
 use straightline_graph::certify::residual::acceleration_bound;
-use straightline_graph::certify::Refusal;
 use straightline_graph::expr::{Graph, Port, Section};
 use straightline_graph::schedule::schedule;
 
@@ -126,7 +126,7 @@ pub(crate) fn bound(
     graph: &Graph,
 ) -> Result<(StateBound, Option<Plainer>), Disagreement> {
     if !options.optimisations().folding {
-        return Ok((Err(Refusal::Rounded.words()), None));
+        return Ok((Err(ROUNDED), None));
     }
     let name = format!("{}::{}", mode.identifier, function.name());
     if function != ContactFunction::ForwardDynamics {

@@ -68,7 +68,7 @@ impl Body<'_> {
         let scalar = self.style.scalar_name();
         let limb = self.names.free("limb");
         for body in &alike.limbs {
-            let _ = writeln!(out.text, "    // {}", comment(&title(Section { phase: "limb", body: Some(*body) })));
+            let _ = writeln!(out.text, "    // {}", comment(&title(Section { phase: "limb", index: Some(*body) })));
         }
         let Loop { graph, part, outside, results } = Loop::new(self.graph, alike, used_across);
 

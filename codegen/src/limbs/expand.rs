@@ -139,7 +139,7 @@ impl Writer<'_> {
     fn push(&mut self, op: Op, note: Note, limb: usize) -> NodeId {
         let section = self.graph.sections[note.section as usize];
         let body = |i: usize| self.template.bodies[i].1[limb.min(self.template.bodies[i].1.len() - 1)];
-        let section = Section { body: section.body.map(body), ..section };
+        let section = Section { index: section.index.map(body), ..section };
         let name = note.name.map(|(quantity, i, component)| (quantity, body(i), component));
         self.push_in(section, op, name)
     }
@@ -224,7 +224,7 @@ impl Writer<'_> {
         let mut terms: Vec<NodeId> = (0..self.template.count(kind)).map(|limb| self.of_limb(result, limb)).collect();
         while terms.len() > 1 {
             let pairs = terms.chunks(2).map(|pair| match pair {
-                [a, b] => self.push_in(Section { phase: "sums over limbs", body: None }, Op::Add(*a, *b), None),
+                [a, b] => self.push_in(Section { phase: "sums over limbs", index: None }, Op::Add(*a, *b), None),
                 _ => pair[0],
             });
             terms = pairs.collect();

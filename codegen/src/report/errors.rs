@@ -2,8 +2,12 @@
 
 use crate::emit::{number, Scalar};
 use std::fmt::Write;
-use straightline_graph::certify::{Certificate, Refusal};
+use straightline_graph::certify::Certificate;
 use straightline_graph::expr::Port;
+
+/// Why programs by exact rules alone have no bounds: their exact values are not those of the robot.
+pub(crate) const ROUNDED: &str =
+    "its constants are rounded one by one, as the generic runtime holds them: what that does to the robot is not bounded";
 
 /// Certified bounds of a function's errors, or why there are none.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,9 +54,9 @@ impl ErrorReport {
         ErrorReport { ranges, outputs: outputs.collect(), refused: None }
     }
 
-    /// No bounds.
-    pub fn refused(_outputs: &[Port], refusal: Refusal) -> Self {
-        ErrorReport { ranges: Vec::new(), outputs: Vec::new(), refused: Some(refusal.words()) }
+    /// No bounds, and why.
+    pub fn refused(why: &'static str) -> Self {
+        ErrorReport { ranges: Vec::new(), outputs: Vec::new(), refused: Some(why) }
     }
 
     /// The bounds of all results, in their order.

@@ -105,8 +105,6 @@ pub enum Refusal {
     Sign,
     /// A value may exceed the format, or an angle the domain of sine and cosine.
     Overflow,
-    /// Constants are rounded one by one on the way: the program's exact values are not those of the robot.
-    Rounded,
 }
 
 impl Refusal {
@@ -117,9 +115,6 @@ impl Refusal {
             Refusal::Division => "a divisor or the argument of a root may vanish",
             Refusal::Sign => "the sign of a computed value may be wrong",
             Refusal::Overflow => "a value may overflow, or an angle leave the domain of sine and cosine",
-            Refusal::Rounded => {
-                "its constants are rounded one by one, as the generic runtime holds them: what that does to the robot is not bounded"
-            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Sums in which products cancel, written without what cancels.
 //!
 //! A row and a column of U = \[ε×\] + \[ω×\]\[ω×\] make such sums: U₃₁ = 2 ω_x ω_z − U₁₃, and U₁₃ holds ω_x ω_z once more. Intervals of the
-//! terms know nothing of that, and the loss grows threefold with every body. With ω_z = ω′ + q̇ and what the turned vectors are
+//! terms know nothing of that, and the loss grows threefold with every link. With ω_z = ω′ + q̇ and what the turned vectors are
 //! turned from, most of it goes: U₃₁ = 2 q̇ ω_x − (c U₂₁′ + s U₂₃′).
 //!
 //! A value is expanded over the real numbers, so that what is found here holds for exact values; a computed one is off by its

@@ -1,7 +1,7 @@
 //! Certified bounds of errors: |computed − exact| of every result, for all inputs in a box.
 //!
 //! *Computed* is what the generated function returns, operation by operation in its format (in whatever order of lanes, with or
-//! without fused multiply-adds, with subnormal numbers or flushed to zero). *Exact* are the dynamics of the robot that the file describes, over
+//! without fused multiply-adds, with subnormal numbers or flushed to zero). *Exact* are the equations that the file describes, over
 //! the real numbers: each number of the file is the nearest f64 (half an ulp, 1.1e-16 of it, from the decimal that is written, as for every
 //! program that reads the file in f64), each angle what the compiler says that it was taken as.
 //!
@@ -12,8 +12,8 @@
 //! * **The way to the program**: reading, reduction, rewriting and folding compute constants in double-double, to 2^-104 per operation, and call
 //!   zero what is below 1e-28 of its terms. Every rounded value of the program counts as off by [`OF_THE_FORM`] of itself besides, some
 //!   ten million such roundings: a bound in f64 grows by 1.5e-8 of itself, one in f32 by nothing. The premise, that each step is an identity over
-//!   the reals and no parameter of a reduced form is many orders greater than the robot's numbers, is tested, not proven: against the second author's
-//!   reading of the file in double-double (`tests/certificates_of_robots.rs`).
+//!   the reals and no parameter of a reduced form is many orders greater than the file's numbers, is tested, not proven: against the second author's
+//!   reading of the file in double-double (the tests of certificates in `straightline-generated-tests`).
 //!
 //! # Why the bound holds
 //!

@@ -1,6 +1,6 @@
 //! Euclidean norms of groups of forms: what a rotation keeps.
 //!
-//! Interval arithmetic takes x cos q − y sin q for up to √2 max(|x|, |y|), and so much again at every joint. Here a group of
+//! Interval arithmetic takes x cos q − y sin q for up to √2 max(|x|, |y|), and so much again at every rotation. Here a group of
 //! forms g = (g₁ … g_k) has a bound of ‖g‖ = √(Σ g_i²), the least of what these rules give. All hold for perturbed values,
 //! where the computed sine and cosine satisfy s² + c² ≤ T² with T a little above 1:
 //!

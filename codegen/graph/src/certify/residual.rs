@@ -38,7 +38,7 @@
 //! 1/Σ |N⁻¹_ij|. Then δ = H⁻¹ r + W D⁻¹ (V̂ᵀ φ − B z): with Q = W D⁻¹ V̂ᵀ it is Q φ = Q R' (N φ) + Q M φ, where Q R' stays small in
 //! directions in which reactions are hardly known.
 //!
-//! Where a ≥ 1 or a' ≥ 1 nothing is proven, and all that depends on it is NaN, by the root of 1 − a: a robot so near to a singular mass
+//! Where a ≥ 1 or a' ≥ 1 nothing is proven, and all that depends on it is NaN, by the root of 1 − a: equations so near to a singular mass
 //! matrix, or redundant contacts, or such that are too near to it for the format.
 
 use super::companion::OF_ERROR;
@@ -80,7 +80,7 @@ pub(super) fn bound_of(mut p: Running, system: &Graph, yielding: &[bool]) -> Res
     let [residual, missing, h, j, applied, mass] = &parts[..] else { unreachable!("a system has six outputs") };
     let rows = |x: &[Tracked]| -> Vec<Vec<Tracked>> { x.chunks(n).map(<[Tracked]>::to_vec).collect() };
 
-    let congruence = Congruence::new(&mut p, h, n).ok_or("a joint has no inertia")?;
+    let congruence = Congruence::new(&mut p, h, n).ok_or("a diagonal entry of the mass matrix is zero")?;
     let eigenvalue = congruence.smallest_eigenvalue(&mut p);
     let mut outputs = vec![Port::new(&format!("qdd{OF_ERROR}"), &[n])];
     let known: Vec<Tracked> = match p.is_broken(BrokenProof::Residual) {

@@ -6,7 +6,7 @@ use rustc_hash::{FxBuildHasher, FxHashMap};
 use std::collections::hash_map::Entry;
 use straightline_core::Dd;
 
-/// So many operations the equations of a robot have, more or less: room for them from the beginning.
+/// So many operations a program has, more or less: room for them from the beginning.
 const ABOUT: usize = 1000;
 
 /// Adds operations to a graph: equal ones once, and simplified by the rules on the way in.
@@ -22,7 +22,7 @@ pub struct Builder {
 impl Builder {
     /// An empty graph with these inputs.
     pub fn new(rules: RuleSet, inputs: Vec<Port>) -> Self {
-        let graph = Graph { inputs, sections: vec![Section { phase: "", body: None }], ..Graph::default() };
+        let graph = Graph { inputs, sections: vec![Section { phase: "", index: None }], ..Graph::default() };
         Builder { graph, known: FxHashMap::with_capacity_and_hasher(ABOUT, FxBuildHasher), rules, section: 0 }
     }
 

@@ -139,19 +139,19 @@ impl Port {
     }
 }
 
-/// A stretch of an algorithm: its phase, and the body it is about.
+/// A stretch of an algorithm: its phase, and which of many parts it is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Section {
     /// Such as `forward`.
     pub phase: &'static str,
-    /// Index of the body, where there is one.
-    pub body: Option<usize>,
+    /// Index of the part, where the phase goes from one to the next.
+    pub index: Option<usize>,
 }
 
 /// What a reader wants to know of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Note {
-    /// Quantity, index of the body, component: `("omega", 3, "x")`.
+    /// Quantity, index of the part that it belongs to, component: `("omega", 3, "x")`.
     pub name: Option<(&'static str, usize, &'static str)>,
     /// Index into [`Graph::sections`].
     pub section: u32,
@@ -172,7 +172,7 @@ pub enum Width {
 /// Operations that are the same for several limbs: a loop over them can write each row once.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Alike {
-    /// The first body of each limb.
+    /// The first part of each limb, as sections count them.
     pub limbs: Vec<usize>,
     /// One operation for all limbs: of every limb its node, which has the same kind of operation. Rows stand behind those that they
     /// use, and all of them behind one another.

@@ -22,6 +22,34 @@ pub fn evaluate_by<T: Real>(
     other: impl Fn(NodeId, &[T]) -> Option<T>,
     sin_cos: impl Fn(&[T]) -> (T, T),
 ) -> Vec<T> {
+    let values = values_by(graph, inputs, other, sin_cos);
+    graph.results.iter().map(|r| values[r.index()]).collect()
+}
+
+/// The values of all nodes, sums of angles rounded like any other; of a pair of sine and cosine that of its sine.
+///
+/// # Panics
+/// As [`evaluate`].
+pub fn values<T: Real>(graph: &Graph, inputs: &[T]) -> Vec<T> {
+    values_by(graph, inputs, |_, _| None, of_rounded_sum)
+}
+
+/// Sine and cosine of a sum of angles that is rounded.
+pub(crate) fn of_rounded_sum<T: Real>(angles: &[T]) -> (T, T) {
+    let (first, rest) = angles.split_first().expect("an angle has a term");
+    rest.iter().fold(*first, |sum, x| sum + *x).sin_cos()
+}
+
+/// [`values`] where some operations are computed otherwise, as in [`evaluate_by`].
+///
+/// # Panics
+/// As [`evaluate`].
+pub fn values_by<T: Real>(
+    graph: &Graph,
+    inputs: &[T],
+    other: impl Fn(NodeId, &[T]) -> Option<T>,
+    sin_cos: impl Fn(&[T]) -> (T, T),
+) -> Vec<T> {
     let expected: usize = graph.inputs.iter().map(|p| p.len()).sum();
     assert_eq!(inputs.len(), expected, "one number per input scalar");
     // a SinCos node holds the sine; its cosine stands beside it
@@ -56,5 +84,5 @@ pub fn evaluate_by<T: Real>(
         };
         values.push(value);
     }
-    graph.results.iter().map(|r| values[r.index()]).collect()
+    values
 }

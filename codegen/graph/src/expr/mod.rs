@@ -1,4 +1,4 @@
-//! The expression graph: a hash-consed DAG of scalar operations. It knows nothing of robots.
+//! The expression graph: a hash-consed DAG of scalar operations. It knows nothing of what is computed.
 //!
 //! A [`Graph`] is a value: operations in an order in which operands stand before their users, grouped inputs, grouped
 //! outputs. A [`Builder`] is the only way to make one: it looks every operation up before adding it, so that equal
@@ -15,6 +15,7 @@ mod verify;
 pub use builder::Builder;
 pub use gradient::gradient;
 pub use graph::{Alike, Constant, Counts, Graph, NodeId, Note, Op, Port, Section, Width, DIVISION, TAIL};
-pub use interpret::{evaluate, evaluate_by};
+pub(crate) use interpret::of_rounded_sum;
+pub use interpret::{evaluate, evaluate_by, values, values_by};
 pub use rules::{Folding, Grade, Rule, RuleSet};
 pub use verify::verify;

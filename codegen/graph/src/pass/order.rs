@@ -2,7 +2,7 @@
 //!
 //! a + b + c rounds a + b and then all of it: what is large is best added last, and terms that cancel are best added to each other.
 //! How large terms are is seen at some states. In the recursion of Newton and Euler the acceleration of the base, gravity, is
-//! handed from body to body, and at each of them terms of the motion are added to it: as it stands one after the other, each
+//! handed from link to link, and at each of them terms of the motion are added to it: as it stands one after the other, each
 //! addition rounded at the size of gravity; in this order together, rounded at their own. It is also the order in which the value
 //! that everything waits for is needed last.
 //!

@@ -21,7 +21,7 @@
 //! that stay keep their order, names and sections.
 
 use super::{count_sums, dead_code, sums};
-use crate::expr::{Constant, Counts, Graph, NodeId, Note, Op};
+use crate::expr::{of_rounded_sum, values_by, Constant, Counts, Graph, NodeId, Note, Op};
 use crate::random::Random;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ use straightline_core::Dd;
 
 /// Random states.
 const POINTS: usize = 4;
-/// Two values that agree so well are equal; double-double has 1e-31, of the greatest term. Less well agree those of robots whose inertias
+/// Two values that agree so well are equal; double-double has 1e-31, of the greatest term. Less well agree those of programs whose constants
 /// differ by 1e20: a term that is missed there may be all that another state has.
 const EQUAL: f64 = 1e-28;
 /// So little of it a result may change.
@@ -40,7 +40,7 @@ const GREATER: f64 = 4.0;
 const LARGEST: usize = 3000;
 /// Values of the greatest graph that is searched once more: that finds little in great ones.
 const TWICE: usize = 600;
-/// Values that are looked at while moves are tried, in one round: of a robot whose values agree by the thousand, the moves that gain
+/// Values that are looked at while moves are tried, in one round: of a program whose values agree by the thousand, the moves that gain
 /// little are left; of all others, none.
 const WORK: usize = 700_000;
 /// Operands of a pair, and what a value is formed of, lie at most so many values apart in the program: what belongs together stands
@@ -659,33 +659,13 @@ fn values(graph: &Graph) -> Vec<Value> {
     };
     let inputs: usize = graph.inputs.iter().map(|p| p.len()).sum();
     let inputs: Vec<Value> = (0..inputs).map(|_| any()).collect();
-    let mut values: Vec<Value> = Vec::with_capacity(graph.ops.len());
-    let mut cosines: FxHashMap<usize, Value> = FxHashMap::default();
-    for (i, op) in graph.ops.iter().enumerate() {
-        let v = |a: NodeId| values[a.index()];
-        let value = match *op {
-            Op::Input(k) => inputs[k as usize],
-            Op::Constant(c) => [c.value(); POINTS],
-            Op::Neg(a) => v(a).map(|x| -x),
-            Op::Add(a, b) | Op::AngleSum(a, b) => Form::Sum.of(&v(a), &v(b)),
-            Op::Sub(a, b) => Form::Difference.of(&v(a), &v(b)),
-            Op::Mul(a, b) => Form::Product.of(&v(a), &v(b)),
-            Op::Div(a, b) => {
-                let (x, y) = (v(a), v(b));
-                std::array::from_fn(|k| x[k] / y[k])
-            }
-            Op::Sqrt(_) | Op::Sign(_) => any(),
-            Op::SinCos(a) => {
-                let both = v(a).map(|x| x.sin_cos());
-                cosines.insert(i, both.map(|(_, cosine)| cosine));
-                both.map(|(sine, _)| sine)
-            }
-            Op::Sin(a) => v(a),
-            Op::Cos(a) => cosines[&a.index()],
-        };
-        values.push(value);
-    }
-    values
+    let is_atom = |op: &Op| matches!(op, Op::Sqrt(_) | Op::Sign(_));
+    let atoms: Vec<Option<Value>> = graph.ops.iter().map(|op| is_atom(op).then(&mut any)).collect();
+    let points: [Vec<Dd>; POINTS] = std::array::from_fn(|k| {
+        let inputs: Vec<Dd> = inputs.iter().map(|x| x[k]).collect();
+        values_by(graph, &inputs, |id, _| atoms[id.index()].map(|x| x[k]), of_rounded_sum)
+    });
+    (0..graph.ops.len()).map(|i| std::array::from_fn(|k| points[k][i])).collect()
 }
 
 #[cfg(test)]

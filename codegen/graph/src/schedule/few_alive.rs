@@ -9,7 +9,7 @@ use crate::expr::{Graph, NodeId, Op};
 
 /// Registers of the machine that reloads are counted for; vectors of 512 bits have twice as many.
 const REGISTERS: usize = 16;
-/// Programs with fewer reloads keep the order in which a reader finds body after body.
+/// Programs with fewer reloads keep the order in which a reader finds one section after the other.
 const FEW: usize = 100;
 
 /// The same operations in such an order, if that saves reloads in a program that has many.
