@@ -34,7 +34,7 @@ use straightline_core::magnitude::Magnitude;
 use straightline_core::model::{BodyId, JointKind, Model};
 use straightline_core::spatial::{Sym3, Transform, Vec3};
 use straightline_core::{Dd, Real};
-use straightline_graph::expr::{evaluate, Grade, Graph, Op, Port};
+use straightline_graph::expr::{evaluate, Binary, Grade, Graph, Op, Port};
 use straightline_graph::pass::cut::Staged;
 use straightline_graph::random::Random;
 
@@ -251,7 +251,7 @@ impl Check<'_> {
 
     /// Whether the plain equations have digits there: stretched, a chain of point masses may have a mass matrix without inverse.
     fn is_regular(&self, state: &State) -> bool {
-        if !self.graph.ops.iter().any(|op| matches!(op, Op::Div(..))) {
+        if !self.graph.ops.iter().any(|op| matches!(op, Op::Binary(Binary::Div, ..))) {
             return true;
         }
         let Check { robot, frames, function, options, .. } = *self;

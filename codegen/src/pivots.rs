@@ -29,8 +29,9 @@ use straightline_core::algorithms::mass_matrix;
 use straightline_core::model::{Body, JointKind, Model};
 use straightline_core::Dd;
 use straightline_graph::certify::{Analysis, Format, Interval, Known, Refusal};
-use straightline_graph::expr::{evaluate, Graph, NodeId, Op, Port};
+use straightline_graph::expr::{evaluate, Graph, NodeId, Port};
 use straightline_graph::random::Random;
+use straightline_graph::rounding::backwards;
 use straightline_graph::Scalar;
 
 /// Random states.
@@ -161,35 +162,11 @@ fn agreements(graph: &Graph, of_nodes: &[Vec<Dd>], facts: &[&Vec<(Dd, Interval)>
 
 /// ∂ result/∂ node from the values of all nodes, without what goes through sines.
 pub fn adjoints(graph: &Graph, values: &[Dd], result: NodeId) -> Vec<Dd> {
-    let mut adjoint = vec![Dd::ZERO; graph.ops.len()];
-    adjoint[result.index()] = Dd::ONE;
-    for i in (0..graph.ops.len()).rev().filter(|i| *i <= result.index()) {
-        let x = adjoint[i];
-        let mut add = |a: NodeId, y: Dd| adjoint[a.index()] += y;
-        let v = |a: NodeId| values[a.index()];
-        match graph.ops[i] {
-            _ if x == Dd::ZERO => {}
-            Op::Neg(a) => add(a, -x),
-            Op::Add(a, b) => {
-                add(a, x);
-                add(b, x);
-            }
-            Op::Sub(a, b) => {
-                add(a, x);
-                add(b, -x);
-            }
-            Op::Mul(a, b) => {
-                add(a, x * v(b));
-                add(b, x * v(a));
-            }
-            Op::Div(a, b) => {
-                add(a, x / v(b));
-                add(b, -x * values[i] / v(b));
-            }
-            _ => {}
-        }
-    }
-    adjoint
+    let mut adjoints = vec![Dd::ZERO; result.index() + 1];
+    adjoints[result.index()] = Dd::ONE;
+    backwards(graph, values, &mut adjoints, |_, _| ());
+    adjoints.resize(graph.ops.len(), Dd::ZERO);
+    adjoints
 }
 
 /// What is known of all entries.

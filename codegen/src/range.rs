@@ -14,7 +14,7 @@ use crate::scene::messages as say;
 use crate::scene::{Parameter, Scene};
 use straightline_core::model::Model;
 use straightline_core::Dd;
-use straightline_graph::expr::{evaluate, Graph, Op, Width};
+use straightline_graph::expr::{evaluate, Binary, Graph, Op, Width};
 
 /// States at which a program is tried.
 const STATES: usize = 3;
@@ -158,8 +158,10 @@ fn leaves(graph: &Graph, inputs: &[f64]) -> Option<String> {
         }
         return match graph.ops[k] {
             // a divisor that cancellation has made zero is another matter
-            Op::Div(_, b) if single[b.index()] == 0.0 && !is_lost(exact[b.index()]) => None,
-            Op::Div(_, b) if single[b.index()] == 0.0 => Some(format!("it divides by {:.3e}", exact[b.index()])),
+            Op::Binary(Binary::Div, _, b) if single[b.index()] == 0.0 && !is_lost(exact[b.index()]) => None,
+            Op::Binary(Binary::Div, _, b) if single[b.index()] == 0.0 => {
+                Some(format!("it divides by {:.3e}", exact[b.index()]))
+            }
             _ if exact_value.abs() > f64::from(f32::MAX) => Some(format!("a value on the way is {exact_value:.3e}")),
             _ => None,
         };

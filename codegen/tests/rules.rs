@@ -27,79 +27,79 @@ fn constant(b: &mut Builder, x: f64) -> Op {
 }
 
 fn neg(b: &mut Builder, x: NodeId) -> NodeId {
-    b.insert(Op::Neg(x))
+    b.insert(Op::neg(x))
 }
 
 const CASES: &[Case] = &[
     Case {
         rule: "fold",
-        fires: |b, _, _| (Op::Add(c(b, 2.0), c(b, 3.0)), constant(b, 5.0)),
-        stays: |b, x, _| Op::Add(x, c(b, 3.0)),
+        fires: |b, _, _| (Op::add(c(b, 2.0), c(b, 3.0)), constant(b, 5.0)),
+        stays: |b, x, _| Op::add(x, c(b, 3.0)),
     },
     Case {
         rule: "add-zero",
-        fires: |b, x, _| (Op::Add(x, c(b, 0.0)), b.op(x)),
-        stays: |b, x, _| Op::Add(x, c(b, 1.0)),
+        fires: |b, x, _| (Op::add(x, c(b, 0.0)), b.op(x)),
+        stays: |b, x, _| Op::add(x, c(b, 1.0)),
     },
     Case {
         rule: "sub-zero",
-        fires: |b, x, _| (Op::Sub(c(b, 0.0), x), Op::Neg(x)),
-        stays: |b, x, _| Op::Sub(c(b, 1.0), x),
+        fires: |b, x, _| (Op::sub(c(b, 0.0), x), Op::neg(x)),
+        stays: |b, x, _| Op::sub(c(b, 1.0), x),
     },
-    Case { rule: "sub-self", fires: |b, x, _| (Op::Sub(x, x), constant(b, 0.0)), stays: |_, x, y| Op::Sub(x, y) },
+    Case { rule: "sub-self", fires: |b, x, _| (Op::sub(x, x), constant(b, 0.0)), stays: |_, x, y| Op::sub(x, y) },
     Case {
         rule: "mul-zero",
-        fires: |b, x, _| (Op::Mul(x, c(b, 0.0)), constant(b, 0.0)),
-        stays: |b, x, _| Op::Mul(x, c(b, 2.0)),
+        fires: |b, x, _| (Op::mul(x, c(b, 0.0)), constant(b, 0.0)),
+        stays: |b, x, _| Op::mul(x, c(b, 2.0)),
     },
     Case {
         rule: "mul-one",
-        fires: |b, x, _| (Op::Mul(c(b, -1.0), x), Op::Neg(x)),
-        stays: |b, x, _| Op::Mul(x, c(b, 2.0)),
+        fires: |b, x, _| (Op::mul(c(b, -1.0), x), Op::neg(x)),
+        stays: |b, x, _| Op::mul(x, c(b, 2.0)),
     },
-    Case { rule: "div-one", fires: |b, x, _| (Op::Div(x, c(b, 1.0)), b.op(x)), stays: |b, x, _| Op::Div(c(b, 1.0), x) },
-    Case { rule: "neg-neg", fires: |b, x, _| (Op::Neg(neg(b, x)), b.op(x)), stays: |_, x, _| Op::Neg(x) },
-    Case { rule: "add-neg", fires: |b, x, y| (Op::Add(x, neg(b, y)), Op::Sub(x, y)), stays: |_, x, y| Op::Add(x, y) },
-    Case { rule: "sub-neg", fires: |b, x, y| (Op::Sub(x, neg(b, y)), Op::Add(x, y)), stays: |_, x, y| Op::Sub(x, y) },
+    Case { rule: "div-one", fires: |b, x, _| (Op::div(x, c(b, 1.0)), b.op(x)), stays: |b, x, _| Op::div(c(b, 1.0), x) },
+    Case { rule: "neg-neg", fires: |b, x, _| (Op::neg(neg(b, x)), b.op(x)), stays: |_, x, _| Op::neg(x) },
+    Case { rule: "add-neg", fires: |b, x, y| (Op::add(x, neg(b, y)), Op::sub(x, y)), stays: |_, x, y| Op::add(x, y) },
+    Case { rule: "sub-neg", fires: |b, x, y| (Op::sub(x, neg(b, y)), Op::add(x, y)), stays: |_, x, y| Op::sub(x, y) },
     Case {
         rule: "mul-neg",
         fires: |b, x, _| {
             let product = {
                 let two = c(b, 2.0);
-                b.insert(Op::Mul(x, two))
+                b.insert(Op::mul(x, two))
             };
-            (Op::Mul(x, c(b, -2.0)), Op::Neg(product))
+            (Op::mul(x, c(b, -2.0)), Op::neg(product))
         },
-        stays: |_, x, y| Op::Mul(x, y),
+        stays: |_, x, y| Op::mul(x, y),
     },
     Case {
         rule: "div-neg",
         fires: |b, x, y| {
-            let quotient = b.insert(Op::Div(x, y));
-            (Op::Div(x, neg(b, y)), Op::Neg(quotient))
+            let quotient = b.insert(Op::div(x, y));
+            (Op::div(x, neg(b, y)), Op::neg(quotient))
         },
-        stays: |_, x, y| Op::Div(x, y),
+        stays: |_, x, y| Op::div(x, y),
     },
-    Case { rule: "commute", fires: |_, x, y| (Op::Mul(y, x), Op::Mul(x, y)), stays: |_, x, y| Op::Sub(x, y) },
+    Case { rule: "commute", fires: |_, x, y| (Op::mul(y, x), Op::mul(x, y)), stays: |_, x, y| Op::sub(x, y) },
     Case {
         rule: "sub-flip",
         fires: |b, x, y| {
-            let d = b.insert(Op::Sub(x, y));
-            (Op::Sub(y, x), Op::Neg(d))
+            let d = b.insert(Op::sub(x, y));
+            (Op::sub(y, x), Op::neg(d))
         },
-        stays: |_, x, y| Op::Sub(y, x),
+        stays: |_, x, y| Op::sub(y, x),
     },
     Case {
         rule: "mul-mul",
         fires: |b, x, _| {
             let two = c(b, 2.0);
-            let inner = b.insert(Op::Mul(x, two));
+            let inner = b.insert(Op::mul(x, two));
             let six = c(b, 6.0);
-            (Op::Mul(inner, c(b, 3.0)), Op::Mul(x, six))
+            (Op::mul(inner, c(b, 3.0)), Op::mul(x, six))
         },
         stays: |b, x, y| {
-            let inner = b.insert(Op::Mul(x, y));
-            Op::Mul(inner, c(b, 3.0))
+            let inner = b.insert(Op::mul(x, y));
+            Op::mul(inner, c(b, 3.0))
         },
     },
 ];
@@ -144,7 +144,7 @@ fn constants_fold_as_the_number_format_would() {
     let sum = |rules| {
         let mut b = Builder::new(rules, vec![]);
         let (x, y) = (b.constant(Dd::from(0.1)), b.constant(Dd::from(0.2)));
-        let id = b.add(Op::Add(x, y));
+        let id = b.add(Op::add(x, y));
         b.as_constant(id).unwrap().value()
     };
     assert_eq!(sum(RuleSet::exact(Folding::F64)), Dd::from(0.1 + 0.2));
@@ -157,7 +157,7 @@ fn constants_fold_as_the_number_format_would() {
 #[test]
 fn exact_rules_keep_every_bit() {
     let values = [0.0, 1.0, -1.0, 0.1, -0.3, 1e300, -7e-300, 3.5e17, -2.0, 5e-324];
-    let ops: [fn(NodeId, NodeId) -> Op; 4] = [Op::Add, Op::Sub, Op::Mul, Op::Div];
+    let ops: [fn(NodeId, NodeId) -> Op; 4] = [Op::add, Op::sub, Op::mul, Op::div];
     let plain = |op: usize, a: f64, b: f64| match op {
         0 => a + b,
         1 => a - b,
@@ -170,9 +170,9 @@ fn exact_rules_keep_every_bit() {
             for (sign_x, sign_y) in [(false, false), (true, false), (false, true), (true, true)] {
                 for against_constant in [false, true] {
                     let (mut b, x, y) = builder(RuleSet::exact(Folding::F64));
-                    let left = if sign_x { b.add(Op::Neg(x)) } else { x };
+                    let left = if sign_x { b.add(Op::neg(x)) } else { x };
                     let right = if against_constant { c(&mut b, k) } else { y };
-                    let right = if sign_y { b.add(Op::Neg(right)) } else { right };
+                    let right = if sign_y { b.add(Op::neg(right)) } else { right };
                     let id = b.add(make(left, right));
                     let graph = b.finish(vec![Port::new("out", &[1])], vec![id]);
                     for u in values {

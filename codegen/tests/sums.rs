@@ -1,6 +1,6 @@
 //! The steps of the pass over sums: the smallest graph where each fires, one where it must not, and the same results.
 
-use straightline_codegen::expr::{evaluate, verify, Builder, Counts, Graph, NodeId, Op, Port, RuleSet};
+use straightline_codegen::expr::{evaluate, verify, Binary, Builder, Counts, Graph, NodeId, Op, Port, RuleSet};
 use straightline_codegen::pass::{dead_code, sums};
 use straightline_core::Dd;
 
@@ -26,9 +26,9 @@ fn before_and_after(graph: &Graph) -> (Counts, Counts) {
 #[test]
 fn products_come_last_so_that_each_fuses() {
     let g = graph(|g, [a, b, c, d, e]| {
-        let (ab, cd) = (g.add(Op::Mul(a, b)), g.add(Op::Mul(c, d)));
-        let products = g.add(Op::Add(ab, cd));
-        vec![g.add(Op::Add(e, products))]
+        let (ab, cd) = (g.add(Op::mul(a, b)), g.add(Op::mul(c, d)));
+        let products = g.add(Op::add(ab, cd));
+        vec![g.add(Op::add(e, products))]
     });
     let (before, after) = before_and_after(&g);
     // both count the best order, which only one of them has
@@ -39,15 +39,19 @@ fn products_come_last_so_that_each_fuses() {
 /// Additions that take a product of no other user in, in the order as it stands.
 fn fused_as_it_stands(graph: &Graph) -> usize {
     let uses = graph.uses();
-    let fuses = |a: NodeId| matches!(graph.op(a), Op::Mul(..)) && uses[a.index()] == 1;
-    graph.ops.iter().filter(|op| matches!(op, Op::Add(..) | Op::Sub(..)) && op.operands().any(fuses)).count()
+    let fuses = |a: NodeId| matches!(graph.op(a), Op::Binary(Binary::Mul, ..)) && uses[a.index()] == 1;
+    graph
+        .ops
+        .iter()
+        .filter(|op| matches!(op, Op::Binary(Binary::Add | Binary::Sub, ..)) && op.operands().any(fuses))
+        .count()
 }
 
 #[test]
 fn a_common_factor_is_taken_out_of_products_without_another_user() {
     let g = graph(|g, [a, b, c, ..]| {
-        let (ab, ac) = (g.add(Op::Mul(a, b)), g.add(Op::Mul(a, c)));
-        vec![g.add(Op::Sub(ab, ac))]
+        let (ab, ac) = (g.add(Op::mul(a, b)), g.add(Op::mul(a, c)));
+        vec![g.add(Op::sub(ab, ac))]
     });
     let (before, after) = before_and_after(&g);
     assert_eq!((before.mul, after.mul), (2, 1));
@@ -57,12 +61,12 @@ fn a_common_factor_is_taken_out_of_products_without_another_user() {
 #[test]
 fn multiples_of_one_value_meet_in_their_constants() {
     let g = graph(|g, [a, b, c, ..]| {
-        let ab = g.add(Op::Mul(a, b));
+        let ab = g.add(Op::mul(a, b));
         let [most, more] = [0.98, -3.0].map(|x| g.constant(Dd::from(x)));
-        let (x, y) = (g.add(Op::Mul(most, ab)), g.add(Op::Mul(more, c)));
-        let rest = g.add(Op::Sub(ab, x));
-        let sum = g.add(Op::Add(rest, y));
-        vec![g.add(Op::Add(sum, c))]
+        let (x, y) = (g.add(Op::mul(most, ab)), g.add(Op::mul(more, c)));
+        let rest = g.add(Op::sub(ab, x));
+        let sum = g.add(Op::add(rest, y));
+        vec![g.add(Op::add(sum, c))]
     });
     let (before, after) = before_and_after(&g);
     // 0.02 a b − 2 c
@@ -73,9 +77,9 @@ fn multiples_of_one_value_meet_in_their_constants() {
 fn a_multiple_with_another_user_stays() {
     let g = graph(|g, [a, b, ..]| {
         let half = g.constant(Dd::from(0.7));
-        let product = g.add(Op::Mul(half, a));
-        let sum = g.add(Op::Add(a, product));
-        vec![g.add(Op::Add(sum, b)), product]
+        let product = g.add(Op::mul(half, a));
+        let sum = g.add(Op::add(a, product));
+        vec![g.add(Op::add(sum, b)), product]
     });
     let (before, after) = before_and_after(&g);
     assert_eq!((before.mul, before.add), (after.mul, after.add));
@@ -84,8 +88,8 @@ fn a_multiple_with_another_user_stays() {
 #[test]
 fn a_product_with_another_user_keeps_its_factors() {
     let g = graph(|g, [a, b, c, ..]| {
-        let (ab, ac) = (g.add(Op::Mul(a, b)), g.add(Op::Mul(a, c)));
-        vec![g.add(Op::Sub(ab, ac)), ab]
+        let (ab, ac) = (g.add(Op::mul(a, b)), g.add(Op::mul(a, c)));
+        vec![g.add(Op::sub(ab, ac)), ab]
     });
     let (before, after) = before_and_after(&g);
     assert_eq!(before, after);
@@ -94,10 +98,10 @@ fn a_product_with_another_user_keeps_its_factors() {
 #[test]
 fn a_pair_in_two_sums_is_added_once_whatever_its_sign() {
     let g = graph(|g, [a, b, c, d, _]| {
-        let first = g.add(Op::Sub(a, c));
-        let first = g.add(Op::Sub(first, b));
-        let second = g.add(Op::Add(d, b));
-        vec![first, g.add(Op::Sub(second, a))]
+        let first = g.add(Op::sub(a, c));
+        let first = g.add(Op::sub(first, b));
+        let second = g.add(Op::add(d, b));
+        vec![first, g.add(Op::sub(second, a))]
     });
     let (before, after) = before_and_after(&g);
     assert_eq!((before.add, after.add), (4, 3));
@@ -106,10 +110,10 @@ fn a_pair_in_two_sums_is_added_once_whatever_its_sign() {
 #[test]
 fn pairs_of_other_relative_sign_are_not_shared() {
     let g = graph(|g, [a, b, c, d, _]| {
-        let first = g.add(Op::Add(a, c));
-        let first = g.add(Op::Add(first, b));
-        let second = g.add(Op::Sub(d, b));
-        vec![first, g.add(Op::Add(second, a))]
+        let first = g.add(Op::add(a, c));
+        let first = g.add(Op::add(first, b));
+        let second = g.add(Op::sub(d, b));
+        vec![first, g.add(Op::add(second, a))]
     });
     let (before, after) = before_and_after(&g);
     assert_eq!(before, after);
@@ -118,9 +122,9 @@ fn pairs_of_other_relative_sign_are_not_shared() {
 #[test]
 fn opposites_in_a_sum_go() {
     let g = graph(|g, [a, b, c, ..]| {
-        let sum = g.add(Op::Add(a, b));
-        let more = g.add(Op::Add(sum, c));
-        vec![g.add(Op::Sub(more, a))]
+        let sum = g.add(Op::add(a, b));
+        let more = g.add(Op::add(sum, c));
+        vec![g.add(Op::sub(more, a))]
     });
     let (_, after) = before_and_after(&g);
     assert_eq!(after.add, 1);
@@ -129,11 +133,11 @@ fn opposites_in_a_sum_go() {
 #[test]
 fn a_sum_of_negatives_costs_no_operation_more() {
     let g = graph(|g, [a, b, c, d, e]| {
-        let ab = g.add(Op::Mul(a, b));
-        let n = g.add(Op::Neg(ab));
-        let sum = g.add(Op::Sub(n, c));
-        let de = g.add(Op::Mul(d, e));
-        vec![g.add(Op::Sub(sum, de)), g.add(Op::Div(sum, a))]
+        let ab = g.add(Op::mul(a, b));
+        let n = g.add(Op::neg(ab));
+        let sum = g.add(Op::sub(n, c));
+        let de = g.add(Op::mul(d, e));
+        vec![g.add(Op::sub(sum, de)), g.add(Op::div(sum, a))]
     });
     let (before, after) = before_and_after(&g);
     assert!(after.flops() <= before.flops() && after.fma <= before.fma, "{before:?} {after:?}");
@@ -142,9 +146,9 @@ fn a_sum_of_negatives_costs_no_operation_more() {
 #[test]
 fn a_product_added_twice_is_one_product_that_fuses() {
     let g = graph(|g, [a, b, c, ..]| {
-        let ab = g.add(Op::Mul(a, b));
-        let twice = g.add(Op::Add(ab, ab));
-        vec![g.add(Op::Sub(twice, c))]
+        let ab = g.add(Op::mul(a, b));
+        let twice = g.add(Op::add(ab, ab));
+        vec![g.add(Op::sub(twice, c))]
     });
     let (before, after) = before_and_after(&g);
     assert_eq!((before.fma, after.fma), (3, 2));

@@ -7,7 +7,7 @@
 
 use straightline_codegen::compile::{program, Program};
 use straightline_codegen::diagnostic::Source;
-use straightline_codegen::expr::{self, Constant, Graph, NodeId, Op};
+use straightline_codegen::expr::{self, Binary, Constant, Graph, NodeId, Op, Unary};
 use straightline_codegen::Function;
 use straightline_core::Dd;
 use straightline_generated_tests::inputs;
@@ -47,23 +47,23 @@ fn faults(graph: &Graph, i: usize) -> Vec<(&'static str, Graph)> {
             ("first angle twice", with(graph, i, Op::AngleSum(a, a))),
             ("second angle twice", with(graph, i, Op::AngleSum(b, b))),
         ],
-        Op::Neg(a) => vec![("sign lost", redirected(graph, i, a))],
-        Op::Add(a, b) => vec![
-            ("+ to −", with(graph, i, Op::Sub(a, b))),
+        Op::Unary(Unary::Neg, a) => vec![("sign lost", redirected(graph, i, a))],
+        Op::Binary(Binary::Add, a, b) => vec![
+            ("+ to −", with(graph, i, Op::sub(a, b))),
             ("first term dropped", redirected(graph, i, b)),
             ("second term dropped", redirected(graph, i, a)),
         ],
-        Op::Sub(a, b) => vec![
-            ("− to +", with(graph, i, Op::Add(a, b))),
-            ("operands swapped", with(graph, i, Op::Sub(b, a))),
+        Op::Binary(Binary::Sub, a, b) => vec![
+            ("− to +", with(graph, i, Op::add(a, b))),
+            ("operands swapped", with(graph, i, Op::sub(b, a))),
             ("subtrahend dropped", redirected(graph, i, a)),
         ],
-        Op::Mul(a, b) => {
-            vec![("wrong factor", with(graph, i, Op::Mul(a, a))), ("factor dropped", redirected(graph, i, b))]
+        Op::Binary(Binary::Mul, a, b) => {
+            vec![("wrong factor", with(graph, i, Op::mul(a, a))), ("factor dropped", redirected(graph, i, b))]
         }
-        Op::Div(a, b) => vec![("operands swapped", with(graph, i, Op::Div(b, a)))],
-        Op::Sign(a) => vec![("sign function dropped", redirected(graph, i, a))],
-        Op::Sqrt(a) => vec![("root dropped", redirected(graph, i, a))],
+        Op::Binary(Binary::Div, a, b) => vec![("operands swapped", with(graph, i, Op::div(b, a)))],
+        Op::Unary(Unary::Sign, a) => vec![("sign function dropped", redirected(graph, i, a))],
+        Op::Unary(Unary::Sqrt, a) => vec![("root dropped", redirected(graph, i, a))],
         Op::Sin(p) => vec![("sin to cos", with(graph, i, Op::Cos(p)))],
         Op::Cos(p) => vec![("cos to sin", with(graph, i, Op::Sin(p)))],
     }

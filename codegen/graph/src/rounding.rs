@@ -5,9 +5,10 @@
 //! The root of the sum of (adjoint · value)² is the rms error of the output in units of the rounding error (Monte Carlo arithmetic to
 //! first order, without the Monte Carlo). Parameters of moved masses that cancel show here, and nowhere in an operation count.
 
+use crate::expr::op::Slope;
 use crate::expr::{values, Graph, NodeId, Op};
 use straightline_core::magnitude::Magnitude;
-use straightline_core::Dd;
+use straightline_core::{Dd, Real};
 
 /// So many operations are visited at most for one estimate; if there are more, outputs share a sweep.
 const WORK: usize = 200_000;
@@ -61,8 +62,9 @@ pub fn estimate(graph: &Graph, states: &[Vec<f64>], scales: &[f64]) -> f64 {
 fn rounds(op: Op) -> bool {
     match op {
         Op::Constant(c) => !c.is(f64::from(c.value().to_f32())),
-        Op::Input(_) | Op::Neg(_) | Op::Sign(_) | Op::AngleSum(..) | Op::SinCos(_) => false,
-        _ => true,
+        Op::Input(_) | Op::AngleSum(..) | Op::SinCos(_) => false,
+        Op::Sin(_) | Op::Cos(_) => true,
+        Op::Unary(..) | Op::Binary(..) => op.row().is_some_and(|row| !row.is_exact),
     }
 }
 
@@ -79,41 +81,27 @@ fn swept(graph: &Graph, values: &[f64], rounds: &[bool], adjoints: &mut [f64]) -
 
 /// Backwards through the first operations of a program, as many as there are adjoints: `tell` gets each whose adjoint is not zero, with it.
 /// Angles count as inputs.
-pub fn backwards(graph: &Graph, values: &[f64], adjoints: &mut [f64], mut tell: impl FnMut(usize, f64)) {
+pub fn backwards<T: Real + PartialEq>(graph: &Graph, values: &[T], adjoints: &mut [T], mut tell: impl FnMut(usize, T)) {
+    let zero = T::zero();
     for i in (0..adjoints.len()).rev() {
         let adjoint = adjoints[i];
-        if adjoint == 0.0 {
+        if adjoint == zero {
             continue;
         }
         tell(i, adjoint);
-        let mut to = |a: NodeId, slope: f64| adjoints[a.index()] += adjoint * slope;
-        let value = |a: NodeId| values[a.index()];
+        let v = |a: NodeId| values[a.index()];
+        let mut to = |a: NodeId, slope: Slope, other: NodeId| {
+            if let Some(part) = slope.times(adjoint, v(a), v(other), values[i]) {
+                adjoints[a.index()] = adjoints[a.index()] + part;
+            }
+        };
         match graph.ops[i] {
-            Op::Add(a, b) => {
-                to(a, 1.0);
-                to(b, 1.0);
+            Op::Unary(op, a) => to(a, op.row().slopes[0], a),
+            Op::Binary(op, a, b) => {
+                to(a, op.row().slopes[0], b);
+                to(b, op.row().slopes[1], a);
             }
-            Op::Sub(a, b) => {
-                to(a, 1.0);
-                to(b, -1.0);
-            }
-            Op::Mul(a, b) => {
-                to(a, value(b));
-                to(b, value(a));
-            }
-            Op::Div(a, b) => {
-                to(a, 1.0 / value(b));
-                to(b, -values[i] / value(b));
-            }
-            Op::Neg(a) => to(a, -1.0),
-            Op::Sqrt(a) => to(a, 0.5 / values[i]),
-            Op::Input(_)
-            | Op::Constant(_)
-            | Op::Sign(_)
-            | Op::AngleSum(..)
-            | Op::SinCos(_)
-            | Op::Sin(_)
-            | Op::Cos(_) => {}
+            Op::Input(_) | Op::Constant(_) | Op::AngleSum(..) | Op::SinCos(_) | Op::Sin(_) | Op::Cos(_) => {}
         }
     }
 }
@@ -132,7 +120,7 @@ mod tests {
 
     #[test]
     fn one_operation_loses_one_rounding_error() {
-        let product = program(|b, x, y| b.insert(Op::Mul(x, y)));
+        let product = program(|b, x, y| b.insert(Op::mul(x, y)));
         let states = [vec![3.0, -7.0]];
         assert_eq!(estimate(&product, &states, &scales(&product, &states)), 1.0);
     }
@@ -141,9 +129,9 @@ mod tests {
     #[test]
     fn what_cancels_loses_as_much_as_it_was_greater() {
         let cancelling = program(|b, x, y| {
-            let large = b.insert(Op::Mul(x, x));
-            let sum = b.insert(Op::Add(large, y));
-            b.insert(Op::Sub(sum, large))
+            let large = b.insert(Op::mul(x, x));
+            let sum = b.insert(Op::add(large, y));
+            b.insert(Op::sub(sum, large))
         });
         // the product's error cancels with itself; that of the sum stays
         let states = [vec![1e2, 1.0]];

@@ -43,6 +43,18 @@ fn written(
     inputs: Vec<Port>,
     algorithm: impl FnOnce(&[Vec<Expr>]) -> Vec<Expr>,
 ) -> (Builder, Vec<NodeId>) {
+    let mut builder = Builder::new(rules, inputs.clone());
+    let mut next = 0;
+    let mut arguments: Vec<Vec<Expr>> = Vec::with_capacity(inputs.len());
+    for port in &inputs {
+        arguments.push((next..next + port.len() as u32).map(|k| Expr(builder.insert(Op::Input(k)))).collect());
+        next += port.len() as u32;
+    }
+    continued(builder, || algorithm(&arguments).into_iter().map(|e| e.0).collect())
+}
+
+/// What `algorithm` adds to a graph that is being made, and what it returns.
+pub(crate) fn continued<R>(builder: Builder, algorithm: impl FnOnce() -> R) -> (Builder, R) {
     struct Close;
     impl Drop for Close {
         fn drop(&mut self) {
@@ -51,25 +63,25 @@ fn written(
     }
     BUILDER.with_borrow_mut(|b| {
         assert!(b.is_none(), "a trace is not nested in another");
-        *b = Some(Builder::new(rules, inputs.clone()));
+        *b = Some(builder);
     });
     let _close = Close;
-    let mut next = 0;
-    let arguments: Vec<Vec<Expr>> = inputs
-        .iter()
-        .map(|port| {
-            let group = (next..next + port.len() as u32).map(|k| Expr(with(|b| b.insert(Op::Input(k))))).collect();
-            next += port.len() as u32;
-            group
-        })
-        .collect();
-    let results: Vec<NodeId> = algorithm(&arguments).into_iter().map(|e| e.0).collect();
-    let builder = BUILDER.with_borrow_mut(Option::take).expect("the trace that was opened above");
-    (builder, results)
+    let results = algorithm();
+    (BUILDER.with_borrow_mut(Option::take).expect("the trace that was opened above"), results)
 }
 
 impl Expr {
-    /// Its node.
+    /// That of a node of the graph that is being made.
+    pub(crate) fn of(node: NodeId) -> Expr {
+        Expr(node)
+    }
+
+    /// That of an operation.
+    pub(crate) fn of_op(op: Op) -> Expr {
+        Expr(with(|g| g.add(op)))
+    }
+
+    /// Its node in the graph.
     pub fn node(self) -> NodeId {
         self.0
     }
@@ -83,35 +95,35 @@ impl Expr {
 impl Add for Expr {
     type Output = Expr;
     fn add(self, b: Expr) -> Expr {
-        Expr(with(|g| g.add(Op::Add(self.0, b.0))))
+        Expr(with(|g| g.add(Op::add(self.0, b.0))))
     }
 }
 
 impl Sub for Expr {
     type Output = Expr;
     fn sub(self, b: Expr) -> Expr {
-        Expr(with(|g| g.add(Op::Sub(self.0, b.0))))
+        Expr(with(|g| g.add(Op::sub(self.0, b.0))))
     }
 }
 
 impl Mul for Expr {
     type Output = Expr;
     fn mul(self, b: Expr) -> Expr {
-        Expr(with(|g| g.add(Op::Mul(self.0, b.0))))
+        Expr(with(|g| g.add(Op::mul(self.0, b.0))))
     }
 }
 
 impl Div for Expr {
     type Output = Expr;
     fn div(self, b: Expr) -> Expr {
-        Expr(with(|g| g.add(Op::Div(self.0, b.0))))
+        Expr(with(|g| g.add(Op::div(self.0, b.0))))
     }
 }
 
 impl Neg for Expr {
     type Output = Expr;
     fn neg(self) -> Expr {
-        Expr(with(|g| g.add(Op::Neg(self.0))))
+        Expr(with(|g| g.add(Op::neg(self.0))))
     }
 }
 
@@ -149,11 +161,11 @@ impl Real for Expr {
     }
 
     fn sqrt(self) -> Self {
-        Expr(with(|g| g.add(Op::Sqrt(self.0))))
+        Expr(with(|g| g.add(Op::sqrt(self.0))))
     }
 
     fn sign(self) -> Self {
-        Expr(with(|g| g.add(Op::Sign(self.0))))
+        Expr(with(|g| g.add(Op::sign(self.0))))
     }
 
     fn named(self, name: &'static str, index: usize, component: &'static str) -> Self {

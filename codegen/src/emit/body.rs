@@ -5,7 +5,8 @@ use super::{number, Names, Scalar, Style};
 use crate::identifier::comment;
 use std::fmt::Write;
 use std::slice::from_ref;
-use straightline_graph::expr::{Constant, Graph, NodeId, Op, Port, Section, Width};
+use straightline_graph::expr::op::Text;
+use straightline_graph::expr::{Constant, Graph, NodeId, Op, Port, Section, Unary, Width};
 use straightline_graph::schedule::{Part, Schedule};
 
 /// How long an expression may grow before it gets a name of its own.
@@ -327,14 +328,14 @@ impl<'a> Body<'a> {
                 Op::Sin(_) | Op::Cos(_) => {}
                 _ if plan.absorbed[id.index()] => {}
                 _ => {
-                    out.uses_sqrt |= matches!(op, Op::Sqrt(_) | Op::Sign(_)) && !style.generic;
+                    out.uses_sqrt |= op.row().is_some_and(|row| matches!(row.text, Text::Call(_))) && !style.generic;
                     let (text, binding) = match b.fused[id.index()] {
                         Some(fused) => (b.fma(fused), Binding::Atom),
                         None => b.node(*id),
                     };
                     let named = graph.notes[id.index()].name.is_some();
                     // a sign before a name is written wherever it is used; an operation is not
-                    let trivial = matches!(op, Op::Neg(_)) && text.len() < 24 && !text.contains("fma");
+                    let trivial = matches!(op, Op::Unary(Unary::Neg, _)) && text.len() < 24 && !text.contains("fma");
                     let alone = uses[id.index()] <= 1 && !crosses[id.index()];
                     let result_only = alone && results_of.binary_search_by_key(id, |(r, _)| *r).is_ok();
                     if (trivial && !crosses[id.index()])
@@ -460,18 +461,19 @@ impl Body<'_> {
 
     fn expression(&self, op: Op, scalar: Scalar) -> (String, Binding) {
         use Binding::{Atom, Product, Sign, Sum};
+        let row = op.row().expect("leaves and angles are written where they are used");
         let bound = |id: NodeId, at_least: Binding| self.bound_in(id, at_least, scalar);
-        match op {
-            Op::Add(a, b) => (format!("{} + {}", bound(a, Sum), bound(b, Product)), Sum),
-            Op::Sub(a, b) => (format!("{} - {}", bound(a, Sum), bound(b, Product)), Sum),
-            Op::Mul(a, b) => (format!("{} * {}", bound(a, Product), bound(b, Sign)), Product),
-            Op::Div(a, b) => (format!("{} / {}", bound(a, Product), bound(b, Sign)), Product),
-            Op::Neg(a) => (format!("-{}", bound(a, Atom)), Sign),
-            Op::Sqrt(a) => (format!("{}({})", self.style.kernel("sqrt"), self.operand(a).0), Atom),
-            Op::Sign(a) => (format!("{}({})", self.style.kernel("sign"), self.operand(a).0), Atom),
-            Op::Input(_) | Op::Constant(_) | Op::AngleSum(..) | Op::SinCos(_) | Op::Sin(_) | Op::Cos(_) => {
-                unreachable!("written where they are used")
+        match (row.text, op) {
+            (Text::Sum(sign), Op::Binary(_, a, b)) => (format!("{} {sign} {}", bound(a, Sum), bound(b, Product)), Sum),
+            (Text::Product(sign), Op::Binary(_, a, b)) => {
+                (format!("{} {sign} {}", bound(a, Product), bound(b, Sign)), Product)
             }
+            (Text::Sign(sign), Op::Unary(_, a)) => (format!("{sign}{}", bound(a, Atom)), Sign),
+            (Text::Call(function), _) => {
+                let operands: Vec<String> = op.operands().map(|a| self.operand(a).0).collect();
+                (format!("{}({})", self.style.kernel(function), operands.join(", ")), Atom)
+            }
+            _ => unreachable!("sums and products have two operands, signs one"),
         }
     }
 

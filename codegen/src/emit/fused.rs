@@ -3,7 +3,7 @@
 
 use super::Style;
 use straightline_core::Real;
-use straightline_graph::expr::{evaluate_by, Graph, NodeId, Op};
+use straightline_graph::expr::{evaluate_by, Binary, Graph, NodeId, Op, Unary};
 use straightline_graph::schedule::{Part, Schedule};
 
 /// A sum whose one term is a product: ±x·y ± c.
@@ -33,18 +33,18 @@ pub(super) fn fusions(graph: &Graph, part: &Part) -> (Vec<Option<Fused>>, Vec<bo
     let product = |term: NodeId| {
         let alone = |id: NodeId| here[id.index()] && uses[id.index()] == 1;
         let (inner, sign) = match graph.op(term) {
-            Op::Neg(inner) if alone(term) => (inner, true),
+            Op::Unary(Unary::Neg, inner) if alone(term) => (inner, true),
             _ => (term, false),
         };
         match graph.op(inner) {
-            Op::Mul(x, y) if alone(inner) => Some((sign, inner, (x, y))),
+            Op::Binary(Binary::Mul, x, y) if alone(inner) => Some((sign, inner, (x, y))),
             _ => None,
         }
     };
     for id in &part.nodes {
         let (a, b, minus) = match graph.op(*id) {
-            Op::Add(a, b) => (a, b, false),
-            Op::Sub(a, b) => (a, b, true),
+            Op::Binary(Binary::Add, a, b) => (a, b, false),
+            Op::Binary(Binary::Sub, a, b) => (a, b, true),
             _ => continue,
         };
         let (term, found, negated, other) = match (product(b), product(a)) {

@@ -216,9 +216,7 @@ fn least_provable(graph: &Graph, scalar: Scalar, given: &[f64]) -> Vec<f64> {
                 Op::Constant(c) => of_width.constant(c.value()).1,
                 // half an ulp, whatever the kernel
                 Op::Sin(_) | Op::Cos(_) => 0.5 * format.u * values[id.index()].abs(),
-                Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Div(..) | Op::Sqrt(_) => {
-                    of_width.u * values[id.index()].abs()
-                }
+                op if op.row().is_some_and(|row| !row.is_exact) => of_width.u * values[id.index()].abs(),
                 _ => 0.0,
             }
         })

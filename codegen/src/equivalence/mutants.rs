@@ -24,7 +24,7 @@ use straightline_core::Dd;
 use straightline_graph::certify::companion::OF_ERROR;
 use straightline_graph::certify::search::computed_at;
 use straightline_graph::certify::{certify, Effort};
-use straightline_graph::expr::{evaluate, verify, Constant, Graph, NodeId, Op};
+use straightline_graph::expr::{evaluate, verify, Binary, Constant, Graph, NodeId, Op, Unary};
 use straightline_graph::pass::cut::Staged;
 use straightline_graph::random::Random;
 
@@ -450,18 +450,18 @@ fn mutant(graph: &Graph, kind: usize, random: &mut Random) -> Option<Graph> {
     let live = graph.live();
     let changed = |op: Op| -> Option<Op> {
         Some(match (KINDS[kind], op) {
-            ("sum to difference", Op::Add(a, b)) => Op::Sub(a, b),
-            ("difference turned round", Op::Sub(a, b)) => Op::Sub(b, a),
-            ("product to sum", Op::Mul(a, b)) => Op::Add(a, b),
+            ("sum to difference", Op::Binary(Binary::Add, a, b)) => Op::sub(a, b),
+            ("difference turned round", Op::Binary(Binary::Sub, a, b)) => Op::sub(b, a),
+            ("product to sum", Op::Binary(Binary::Mul, a, b)) => Op::add(a, b),
             // as a constant has that is rounded too early
             ("constant off by 1e-13", Op::Constant(c)) if c.value().hi().abs() > 1e-9 => {
                 Op::Constant(Constant::new(c.value() * Dd::new(1.0, 1e-13)))
             }
             // as far as the operand may be used here at all
-            ("negation to square", Op::Neg(a)) => Op::Mul(a, a),
-            ("product to square", Op::Mul(a, b)) if a != b => Op::Mul(a, a),
-            ("quotient turned round", Op::Div(a, b)) => Op::Div(b, a),
-            ("root to square", Op::Sqrt(a)) => Op::Mul(a, a),
+            ("negation to square", Op::Unary(Unary::Neg, a)) => Op::mul(a, a),
+            ("product to square", Op::Binary(Binary::Mul, a, b)) if a != b => Op::mul(a, a),
+            ("quotient turned round", Op::Binary(Binary::Div, a, b)) => Op::div(b, a),
+            ("root to square", Op::Unary(Unary::Sqrt, a)) => Op::mul(a, a),
             ("inputs exchanged", Op::Input(k)) => Op::Input(if k == 0 { 1 } else { k - 1 }),
             ("constant to zero", Op::Constant(c)) if c.value().hi().abs() > 1e-9 => {
                 Op::Constant(Constant::new(Dd::ZERO))

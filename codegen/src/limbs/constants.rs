@@ -54,13 +54,9 @@ fn combined<'a>(
     let of = |a: NodeId, limb: usize| known(a).map(|(_, values)| values[limb]).or_else(|| shared(a));
     let value = |limb: usize| {
         Some(match op {
-            Op::Neg(a) => -of(a, limb)?,
-            Op::Add(a, b) => of(a, limb)? + of(b, limb)?,
-            Op::Sub(a, b) => of(a, limb)? - of(b, limb)?,
-            Op::Mul(a, b) => of(a, limb)? * of(b, limb)?,
+            Op::Unary(op, a) => op.value(of(a, limb)?),
             // a divisor that is a constant of the robot was checked when it was read; what is not finite stays an operation
-            Op::Div(a, b) => of(a, limb)? / of(b, limb)?,
-            Op::Sqrt(a) => of(a, limb)?.sqrt(),
+            Op::Binary(op, a, b) => op.value(of(a, limb)?, of(b, limb)?),
             _ => return None,
         })
     };
@@ -95,7 +91,7 @@ fn constant(
     };
     let input = builder.insert(Op::Input((first_lane + position) as u32));
     if opposite {
-        builder.add(Op::Neg(input))
+        builder.add(Op::neg(input))
     } else {
         input
     }

@@ -224,7 +224,7 @@ impl Writer<'_> {
         let mut terms: Vec<NodeId> = (0..self.template.count(kind)).map(|limb| self.of_limb(result, limb)).collect();
         while terms.len() > 1 {
             let pairs = terms.chunks(2).map(|pair| match pair {
-                [a, b] => self.push_in(Section { phase: "sums over limbs", index: None }, Op::Add(*a, *b), None),
+                [a, b] => self.push_in(Section { phase: "sums over limbs", index: None }, Op::add(*a, *b), None),
                 _ => pair[0],
             });
             terms = pairs.collect();

@@ -5,7 +5,7 @@
 
 use crate::emit::Scalar;
 use rustc_hash::FxHashMap;
-use straightline_graph::expr::{Graph, NodeId, Op, Width};
+use straightline_graph::expr::{Binary, Graph, NodeId, Op, Unary, Width};
 
 /// In which format a value is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -223,30 +223,22 @@ impl Values {
                     Format::F32 => self.constant(f64::from(c.value().to_f32()), Format::F32),
                     Format::Any => self.long(c.value().hi(), c.value().lo()),
                 },
-                Op::Neg(a) => operand(a, self).negated(),
-                Op::Add(a, b) => {
-                    let (a, b) = (operand(a, self), operand(b, self));
-                    self.add(a, b)
-                }
-                Op::Sub(a, b) => {
-                    let (a, b) = (operand(a, self), operand(b, self).negated());
-                    self.add(a, b)
-                }
-                Op::Mul(a, b) => {
-                    let (a, b) = (operand(a, self), operand(b, self));
-                    self.mul(a, b)
-                }
-                Op::Div(a, b) => {
-                    let (a, b) = (operand(a, self), operand(b, self));
-                    self.div(a, b)
-                }
-                Op::Sqrt(a) => {
+                Op::Unary(op, a) => {
                     let a = operand(a, self);
-                    self.sqrt(a)
+                    match op {
+                        Unary::Neg => a.negated(),
+                        Unary::Sqrt => self.sqrt(a),
+                        Unary::Sign => self.sign(a),
+                    }
                 }
-                Op::Sign(a) => {
-                    let a = operand(a, self);
-                    self.sign(a)
+                Op::Binary(op, a, b) => {
+                    let (a, b) = (operand(a, self), operand(b, self));
+                    match op {
+                        Binary::Add => self.add(a, b),
+                        Binary::Sub => self.add(a, b.negated()),
+                        Binary::Mul => self.mul(a, b),
+                        Binary::Div => self.div(a, b),
+                    }
                 }
                 // formed where its sine is
                 Op::AngleSum(..) => Value::NONE,

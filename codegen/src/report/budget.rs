@@ -64,10 +64,7 @@ fn code_bytes(program: &Program, scalar: Scalar) -> usize {
     };
     // a row of a loop over limbs is there once
     let live = graph.live();
-    let again = |row: &&Vec<NodeId>| match graph.op(row[0]) {
-        Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Div(..) | Op::Sqrt(_) => row.len() - 1,
-        _ => 0,
-    };
+    let again = |row: &&Vec<NodeId>| if graph.op(row[0]).is_counted() { row.len() - 1 } else { 0 };
     let rows = graph.alike.iter().flat_map(|alike| &alike.rows).filter(|row| live[row[0].index()]);
     let again: usize = rows.map(|row| again(&row)).sum();
     let mut bytes = operation * (graph.counts().flops() - again) as f64;

@@ -4,7 +4,7 @@
 //! the code that is timed; called with `time` it prints nanoseconds per evaluation.
 
 use std::fmt::Write;
-use straightline_codegen::expr::{Graph, Op};
+use straightline_codegen::expr::{Binary, Graph, Op};
 
 /// A function's text in a module, and how it is called.
 pub struct Generated {
@@ -43,12 +43,12 @@ fn generic(graph: &Graph) -> String {
         format!("#[inline(always)]\nfn generic<S: Scalar>(x: &[S; {inputs}]) -> [S; {}] {{\n", graph.results.len());
     // a product that one sum alone needs
     let product = |id: straightline_codegen::expr::NodeId| match graph.ops[id.index()] {
-        Op::Mul(a, b) if uses[id.index()] == 1 => Some((a.index(), b.index())),
+        Op::Binary(Binary::Mul, a, b) if uses[id.index()] == 1 => Some((a.index(), b.index())),
         _ => None,
     };
     let mut contracted = vec![false; graph.ops.len()];
     for op in &graph.ops {
-        if let Op::Add(a, b) | Op::Sub(a, b) = *op {
+        if let Op::Binary(Binary::Add | Binary::Sub, a, b) = *op {
             let inside = if product(b).is_some() { b } else { a };
             if product(inside).is_some() {
                 contracted[inside.index()] = true;
@@ -61,21 +61,18 @@ fn generic(graph: &Graph) -> String {
         let value = match *op {
             Op::Input(k) => format!("x[{k}]"),
             Op::Constant(c) => format!("S::constant({:?}, {:?})", c.value().hi(), c.value().lo()),
-            Op::Neg(a) => format!("{}.neg()", v(a)),
-            Op::Add(a, b) => match (of(a), of(b)) {
+            Op::Binary(Binary::Add, a, b) => match (of(a), of(b)) {
                 (_, Some((m, n))) => format!("S::product_plus(t{m}, t{n}, {})", v(a)),
                 (Some((m, n)), _) => format!("S::product_plus(t{m}, t{n}, {})", v(b)),
                 _ => format!("{}.add({})", v(a), v(b)),
             },
-            Op::Sub(a, b) => match (of(a), of(b)) {
+            Op::Binary(Binary::Sub, a, b) => match (of(a), of(b)) {
                 (_, Some((m, n))) => format!("S::product_plus(t{m}.neg(), t{n}, {})", v(a)),
                 (Some((m, n)), _) => format!("S::product_plus(t{m}, t{n}, {}.neg())", v(b)),
                 _ => format!("{}.sub({})", v(a), v(b)),
             },
-            Op::Mul(a, b) => format!("{}.mul({})", v(a), v(b)),
-            Op::Div(a, b) => format!("{}.div({})", v(a), v(b)),
-            Op::Sqrt(a) => format!("{}.sqrt()", v(a)),
-            Op::Sign(a) => format!("{}.sign()", v(a)),
+            Op::Unary(op, a) => format!("{}.{}()", v(a), op.row().name),
+            Op::Binary(op, a, b) => format!("{}.{}({})", v(a), op.row().name, v(b)),
             // rounded here, unlike in generated code: half an ulp of the angle, which near the joints' limits is little
             Op::AngleSum(a, b) => format!("{}.add({})", v(a), v(b)),
             Op::SinCos(a) => format!("{}.sin_cos()", v(a)),

@@ -5,7 +5,8 @@ use super::forms::{Atom, Coefficient, Forms, Term};
 use super::interval::{add_up, mul_up, Interval};
 use super::norms::{Bounded, Factor, GroupId, Groups};
 use super::tape::{Bound, Norm, Pen, Range, Tape};
-use crate::expr::{Graph, NodeId, Op, Width};
+use crate::expr::op::Slope;
+use crate::expr::{Binary, Graph, NodeId, Op, Unary, Width};
 use crate::number::Scalar;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -138,12 +139,12 @@ impl<'g> Analysis<'g> {
         for id in graph.ids().filter(|id| live[id.index()]) {
             let i = id.index();
             match graph.op(id) {
-                Op::Add(..) | Op::Sub(..) => {
+                Op::Binary(Binary::Add | Binary::Sub, ..) => {
                     let (form, _) = forms.flat(Atom::Value(id.0));
                     sums[i] = Some(groups.bounded(form.to_vec()));
                     cancelled[i] = forms.cancelled(id.0).map(|form| groups.bounded(form.to_vec()));
                 }
-                Op::Mul(a, b) if a != b && is_plain(a) && is_plain(b) => {
+                Op::Binary(Binary::Mul, a, b) if a != b && is_plain(a) && is_plain(b) => {
                     products[i] = Some(groups.group([vec![one(a)], vec![one(b)]]));
                 }
                 _ => {}
@@ -263,18 +264,11 @@ impl<'g> Analysis<'g> {
         let error = |a: NodeId| total_error[a.index()];
         let value = |a: NodeId| value[a.index()];
         match self.graph.ops[i] {
-            // the sign of an input, or of what is off zero
-            Op::Input(_) | Op::Constant(_) | Op::Sign(_) => Bound::ZERO,
-            Op::Neg(a) | Op::SinCos(a) | Op::Sin(a) | Op::Cos(a) => error(a),
-            Op::Add(a, b) | Op::Sub(a, b) | Op::AngleSum(a, b) => pen.add_up(error(a), error(b)),
-            // |â b̂ − a b| ≤ |â| |b̂ − b| + |b| |â − a|
-            Op::Mul(a, b) => {
-                let (x, y) = (pen.mag(value(a)), pen.mag(value(b)));
-                let (first, second) = (pen.mul_up(x, error(b)), pen.mul_up(y, error(a)));
-                pen.add_up(first, second)
-            }
+            Op::Input(_) | Op::Constant(_) => Bound::ZERO,
+            Op::SinCos(a) | Op::Sin(a) | Op::Cos(a) => error(a),
+            Op::AngleSum(a, b) => pen.add_up(error(a), error(b)),
             // |â/b̂ − a/b| ≤ (|â − a| + |a/b| |b̂ − b|) / |b̂|
-            Op::Div(a, b) => {
+            Op::Binary(Binary::Div, a, b) => {
                 let quotient = pen.over(value(a), value(b));
                 let quotient = pen.mag(quotient);
                 let shifted = pen.mul_up(quotient, error(b));
@@ -283,13 +277,14 @@ impl<'g> Analysis<'g> {
                 let reciprocal = pen.mag(reciprocal);
                 pen.mul_up(sum, reciprocal)
             }
-            // |√â − √a| = |â − a| / (√â + √a)
-            Op::Sqrt(a) => {
-                let root = pen.sqrt(value(a));
-                let both = pen.add(root, root);
-                let reciprocal = pen.over(Range::ONE, both);
-                let reciprocal = pen.mag(reciprocal);
-                pen.mul_up(error(a), reciprocal)
+            Op::Unary(op, a) => {
+                carried(pen, op.row().slopes[0], error(a), [value(a); 2], &|pen| pen.unary(op, value(a)))
+            }
+            Op::Binary(op, a, b) => {
+                let v = |pen: &mut Pen| pen.binary(op, value(a), value(b));
+                let of_a = carried(pen, op.row().slopes[0], error(a), [value(a), value(b)], &v);
+                let of_b = carried(pen, op.row().slopes[1], error(b), [value(b), value(a)], &v);
+                pen.add_up(of_a, of_b)
             }
         }
     }
@@ -396,71 +391,55 @@ impl<'g> Analysis<'g> {
                 let error = if self.is_broken(Broken::Constants) { 0.0 } else { error };
                 (self.state.pen.constant(range), self.state.pen.number(error))
             }
-            Op::Neg(a) => {
-                let x = v(self, a);
-                let minus = self.state.pen.neg(x);
-                if self.graph.width(NodeId(i as u32)) != Width::Rounded {
-                    return Ok((minus, Bound::ZERO));
+            Op::Unary(Unary::Sign, a) => {
+                let sign = v(self, a).x.sign();
+                if sign.has_zero() && !matches!(self.graph.op(a), Op::Input(_)) {
+                    return Err(Refusal::Sign);
                 }
-                let magnitude = self.state.pen.mag(x);
+                (self.state.pen.constant(sign), Bound::ZERO)
+            }
+            Op::Unary(op, a) => {
+                if op == Unary::Sqrt && v(self, a).x.lo <= 0.0 {
+                    return Err(Refusal::Division);
+                }
+                let value = self.state.pen.unary(op, v(self, a));
+                if !op.row().is_exact {
+                    return rounded(self, value);
+                }
+                if self.graph.width(NodeId(i as u32)) != Width::Rounded {
+                    return Ok((value, Bound::ZERO));
+                }
+                let magnitude = self.state.pen.mag(value);
                 let error = format.rounding(magnitude.x);
-                (minus, self.state.pen.rounding(magnitude, error, 0.5 * format.u, format.tiny))
+                (value, self.state.pen.rounding(magnitude, error, 0.5 * format.u, format.tiny))
             }
-            Op::Add(a, b) => {
-                let direct = self.state.pen.add(v(self, a), v(self, b));
-                let sum = self.sum(i, direct);
-                return rounded(self, sum);
-            }
-            Op::Sub(a, b) => {
-                let direct = self.state.pen.sub(v(self, a), v(self, b));
-                let sum = self.sum(i, direct);
-                return rounded(self, sum);
-            }
-            Op::Mul(a, b) => {
-                if a == b {
+            Op::Binary(op, a, b) => {
+                if op == Binary::Div && v(self, b).x.has_zero() {
+                    return Err(Refusal::Division);
+                }
+                if op == Binary::Mul && a == b {
                     let square = self.state.pen.square(v(self, a));
                     return rounded(self, square);
                 }
-                let mut product = self.state.pen.mul(v(self, a), v(self, b));
+                let mut value = self.state.pen.binary(op, v(self, a), v(self, b));
+                if self.sums[i].is_some() {
+                    value = self.sum(i, value);
+                }
                 if let Some(group) = self.products[i] {
                     // |a b| ≤ (a² + b²)/2
                     let norm = self.norm(group);
                     let half = self.state.pen.number(0.5);
                     let square = self.state.pen.mul_up(norm, norm);
                     let most = self.state.pen.mul_up(half, square);
-                    product = self.state.pen.clipped(product, most);
+                    value = self.state.pen.clipped(value, most);
                 }
                 let is_single = self.graph.width(NodeId(i as u32)) == Width::Single;
-                let exact = is_single && (self.is_power_of_two(a) || self.is_power_of_two(b));
-                if !exact {
-                    return rounded(self, product);
+                let is_shift = op == Binary::Mul && is_single && (self.is_power_of_two(a) || self.is_power_of_two(b));
+                match (is_shift, op.row().is_exact) {
+                    (true, _) => (value, self.state.pen.number(format.tiny)),
+                    (false, true) => (value, Bound::ZERO),
+                    (false, false) => return rounded(self, value),
                 }
-                (product, self.state.pen.number(format.tiny))
-            }
-            Op::Div(a, b) => {
-                if v(self, b).x.has_zero() {
-                    return Err(Refusal::Division);
-                }
-                let quotient = self.state.pen.over(v(self, a), v(self, b));
-                return rounded(self, quotient);
-            }
-            Op::Sqrt(a) => {
-                if v(self, a).x.lo <= 0.0 {
-                    return Err(Refusal::Division);
-                }
-                let root = self.state.pen.sqrt(v(self, a));
-                return rounded(self, root);
-            }
-            Op::Sign(a) => {
-                let x = v(self, a).x;
-                let is_input = matches!(self.graph.op(a), Op::Input(_));
-                let sign = match () {
-                    () if x.lo > 0.0 => Interval::ONE,
-                    () if x.hi < 0.0 => -Interval::ONE,
-                    () if is_input => Interval { lo: -1.0, hi: 1.0 },
-                    () => return Err(Refusal::Sign),
-                };
-                (self.state.pen.constant(sign), Bound::ZERO)
             }
             // formed exactly: what rounding loses goes into the reduction
             Op::AngleSum(a, b) => (self.state.pen.add(v(self, a), v(self, b)), Bound::ZERO),
@@ -500,7 +479,7 @@ impl<'g> Analysis<'g> {
 
     /// The range of a sum, from that of its operands and from its form.
     fn sum(&mut self, i: usize, direct: Range) -> Range {
-        let Some(sum) = self.sums[i].take() else { return direct };
+        let sum = self.sums[i].take().expect("sums have forms");
         let enclosure = self.enclosure(&sum);
         self.sums[i] = Some(sum);
         let (_, slack) = self.forms.flat(Atom::Value(i as u32));
@@ -739,7 +718,9 @@ impl<'g> Analysis<'g> {
             }
             // |ã/b̃² − a/b²| ≤ |ã − a|/b̃² + |a| |b̃ − b| |b̃ + b|/(b̃ b)²
             Coefficient::MinusQuotient(n) => {
-                let Op::Div(a, b) = self.graph.ops[n as usize] else { unreachable!("made for divisions") };
+                let Op::Binary(Binary::Div, a, b) = self.graph.ops[n as usize] else {
+                    unreachable!("made for divisions")
+                };
                 let r = reciprocal(b, pen);
                 let square = pen.mul_up(r, r);
                 let two = pen.number(2.0);
@@ -858,6 +839,34 @@ impl<'g> Analysis<'g> {
     }
 }
 
+/// What the error of an operand does to a value: |f(â) − f(a)| ≤ sup |f′| |â − a|, as ranges hold computed operands and exact ones. Of
+/// products |â b̂ − a b| ≤ |â| |b̂ − b| + |b| |â − a|, of roots |√â − √a| = |â − a|/(√â + √a).
+fn carried(
+    pen: &mut Pen,
+    slope: Slope,
+    error: Bound,
+    [operand, other]: [Range; 2],
+    value: &dyn Fn(&mut Pen) -> Range,
+) -> Bound {
+    let slope = match slope {
+        Slope::Zero => return Bound::ZERO,
+        Slope::One | Slope::MinusOne => return error,
+        Slope::Other => other,
+        Slope::Reciprocal => pen.over(Range::ONE, other),
+        Slope::MinusQuotient => {
+            let value = value(pen);
+            pen.over(value, operand)
+        }
+        Slope::HalfReciprocal => {
+            let value = value(pen);
+            let both = pen.add(value, value);
+            pen.over(Range::ONE, both)
+        }
+    };
+    let slope = pen.mag(slope);
+    pen.mul_up(slope, error)
+}
+
 impl State {
     /// A sum, and what the errors of a class are worth.
     fn add_share(&mut self, sum: Bound, class: usize) -> Bound {
@@ -897,13 +906,13 @@ impl State {
             Coefficient::ExactMinusSin(p) => pen.neg(sin_cos[p as usize][0].0),
             Coefficient::Reciprocal(b) => pen.over(Range::ONE, value(b)),
             Coefficient::MinusQuotient(n) => {
-                let Op::Div(a, b) = graph.ops[n as usize] else { unreachable!("made for divisions") };
+                let Op::Binary(Binary::Div, a, b) = graph.ops[n as usize] else { unreachable!("made for divisions") };
                 let square = pen.square(value(b.0));
                 let quotient = pen.over(value(a.0), square);
                 pen.neg(quotient)
             }
             Coefficient::HalfReciprocal(n) => {
-                let Op::Sqrt(a) = graph.ops[n as usize] else { unreachable!("made for roots") };
+                let Op::Unary(Unary::Sqrt, a) = graph.ops[n as usize] else { unreachable!("made for roots") };
                 let root = pen.sqrt(value(a.0));
                 let both = pen.add(root, root);
                 pen.over(Range::ONE, both)
@@ -1009,7 +1018,7 @@ impl Sharing {
         // turning products by adjoint and pair
         type Products = [Vec<(usize, Term)>; 2];
         let mut turning: std::collections::BTreeMap<(usize, u32), Products> = std::collections::BTreeMap::new();
-        for i in (0..n).filter(|i| live[*i] && matches!(graph.ops[*i], Op::Mul(..))) {
+        for i in (0..n).filter(|i| live[*i] && matches!(graph.ops[*i], Op::Binary(Binary::Mul, ..))) {
             if let ([t], _) = forms.flat(Atom::Value(i as u32)) {
                 match t.coefficient {
                     Coefficient::Sin(p) => turning.entry((class[i], p)).or_default()[0].push((i, *t)),

@@ -8,7 +8,7 @@
 //! accumulated error at most, which [`analysis`](super::analysis) adds.
 
 use super::forms::{simplified, Atom, Coefficient, Form, Term};
-use crate::expr::{Graph, NodeId, Op};
+use crate::expr::{Binary, Graph, NodeId, Op, Unary};
 use std::collections::BTreeMap;
 
 /// Factors by node, sorted.
@@ -29,7 +29,7 @@ pub fn cancelled(graph: &Graph, live: &[bool]) -> Vec<Option<Form>> {
     let mut forms = Vec::with_capacity(graph.ops.len());
     for id in graph.ids() {
         let sum = sums.expand(id);
-        let is_sum = live[id.index()] && matches!(graph.op(id), Op::Add(..) | Op::Sub(..));
+        let is_sum = live[id.index()] && matches!(graph.op(id), Op::Binary(Binary::Add | Binary::Sub, ..));
         forms.push(if is_sum { sums.without_cancelling(&sum) } else { None });
         let (canonical, negative) = canonical(&sum);
         sums.nodes.entry(canonical).or_insert((id.0, negative));
@@ -79,10 +79,10 @@ impl Sums<'_> {
             }
         };
         match self.graph.op(id) {
-            Op::Neg(a) => self.of[a.index()].iter().map(|(m, k)| (m.clone(), -k)).collect(),
-            Op::Add(a, b) => joined(a, b, 1),
-            Op::Sub(a, b) => joined(a, b, -1),
-            Op::Mul(a, b) => {
+            Op::Unary(Unary::Neg, a) => self.of[a.index()].iter().map(|(m, k)| (m.clone(), -k)).collect(),
+            Op::Binary(Binary::Add, a, b) => joined(a, b, 1),
+            Op::Binary(Binary::Sub, a, b) => joined(a, b, -1),
+            Op::Binary(Binary::Mul, a, b) => {
                 // products of products are one; sums are factors
                 let factors = |x: NodeId| match self.of[x.index()].first_key_value() {
                     Some((m, k)) if self.of[x.index()].len() == 1 => (*k, m.clone()),
@@ -105,11 +105,11 @@ impl Sums<'_> {
     /// A sum without its sign and without a doubling.
     fn bare(&self, id: NodeId) -> (i64, u32) {
         match self.graph.op(id) {
-            Op::Neg(a) => {
+            Op::Unary(Unary::Neg, a) => {
                 let (k, node) = self.bare(a);
                 (-k, node)
             }
-            Op::Add(a, b) if a == b => {
+            Op::Binary(Binary::Add, a, b) if a == b => {
                 let (k, node) = self.bare(a);
                 (2 * k, node)
             }
@@ -129,11 +129,11 @@ impl Sums<'_> {
             }
         };
         match self.graph.ops[id as usize] {
-            Op::Add(a, b) => {
+            Op::Binary(Binary::Add, a, b) => {
                 push(a, 1);
                 push(b, 1);
             }
-            Op::Sub(a, b) => {
+            Op::Binary(Binary::Sub, a, b) => {
                 push(a, 1);
                 push(b, -1);
             }

@@ -39,8 +39,8 @@ impl Congruence {
         let units: Vec<NodeId> = d
             .iter()
             .map(|d| {
-                let root = p.insert(Op::Sqrt(*d));
-                p.insert(Op::Div(one, root))
+                let root = p.insert(Op::sqrt(*d));
+                p.insert(Op::div(one, root))
             })
             .collect();
         let mut this = Congruence { lower, inverse, d, units, shift: Vec::new(), contraction: one, left: one };
@@ -53,14 +53,14 @@ impl Congruence {
         let all = p.settled(all);
         let inertia = [&[one], &this.d[..]].concat();
         let inertia = p.total(&inertia);
-        let floor = p.insert(Op::Mul(inertia, all));
+        let floor = p.insert(Op::mul(inertia, all));
         let floor = p.scaled(16.0 * n as f64 * p.format.tiny, floor);
         let four_gamma = 4.0 * gamma(n + 8, p.format);
         let factored: Vec<NodeId> = (0..n)
             .map(|k| {
-                let product = p.insert(Op::Mul(this.d[k], y[k]));
+                let product = p.insert(Op::mul(this.d[k], y[k]));
                 let product = p.scaled(four_gamma, product);
-                p.insert(Op::Add(product, floor))
+                p.insert(Op::add(product, floor))
             })
             .collect();
         let factored = p.all_settled(&factored);
@@ -71,7 +71,7 @@ impl Congruence {
                 let errors: Vec<(NodeId, NodeId)> = errors.collect();
                 if !errors.is_empty() {
                     let errors = p.dot(&errors);
-                    *off = p.insert(Op::Add(*off, errors));
+                    *off = p.insert(Op::add(*off, errors));
                 }
             }
         }
@@ -95,7 +95,7 @@ impl Congruence {
                 true => x[k],
                 false => {
                     let sum = p.dot(&others);
-                    p.insert(Op::Add(x[k], sum))
+                    p.insert(Op::add(x[k], sum))
                 }
             }
         };
@@ -115,14 +115,14 @@ impl Congruence {
         let columns: Vec<NodeId> = (0..n)
             .map(|k| {
                 let squares: Vec<NodeId> =
-                    self.inverse.iter().filter_map(|row| row[k]).map(|w| p.insert(Op::Mul(w, w))).collect();
+                    self.inverse.iter().filter_map(|row| row[k]).map(|w| p.insert(Op::mul(w, w))).collect();
                 let sum = p.total(&[&[one], &squares[..]].concat());
                 p.over(sum, self.d[k])
             })
             .collect();
         let sum = p.total(&columns);
         let sum = p.settled(sum);
-        let least = p.insert(Op::Div(self.left, sum));
+        let least = p.insert(Op::div(self.left, sum));
         p.scaled(1.0 - 4.0 * p.format.u, least)
     }
 
@@ -137,11 +137,11 @@ impl Congruence {
                 let terms: Vec<NodeId> = (0..n)
                     .filter_map(|k| {
                         let (a, b) = (entry(i, k)?, entry(j, k)?);
-                        let scaled = p.insert(Op::Div(b, self.d[k]));
-                        Some(if a == one { scaled } else { p.insert(Op::Mul(a, scaled)) })
+                        let scaled = p.insert(Op::div(b, self.d[k]));
+                        Some(if a == one { scaled } else { p.insert(Op::mul(a, scaled)) })
                     })
                     .collect();
-                let Some(sum) = terms.into_iter().reduce(|a, b| p.insert(Op::Add(a, b))) else { continue };
+                let Some(sum) = terms.into_iter().reduce(|a, b| p.insert(Op::add(a, b))) else { continue };
                 let size = p.absolute(sum);
                 products[i].push((size, r[j]));
                 if i != j {
@@ -160,9 +160,9 @@ impl Congruence {
         (0..n)
             .map(|i| {
                 let off = p.scaled(gamma, rounding[i]);
-                let off = p.insert(Op::Add(off, underflow));
+                let off = p.insert(Op::add(off, underflow));
                 let sum = p.dot(&products[i]);
-                p.insert(Op::Add(sum, off))
+                p.insert(Op::add(sum, off))
             })
             .collect()
     }
@@ -187,7 +187,7 @@ impl Congruence {
 /// At most 1 − a, for what is at least a; NaN below zero.
 pub(super) fn remainder(p: &mut Running, contraction: NodeId) -> NodeId {
     let one = p.constant(1.0);
-    let left = p.insert(Op::Sub(one, contraction));
+    let left = p.insert(Op::sub(one, contraction));
     let left = p.positive(left);
     p.scaled(1.0 - 8.0 * p.format.u, left)
 }
@@ -208,13 +208,13 @@ fn factor(p: &mut Running, h: &dyn Fn(usize, usize) -> Tracked, n: usize) -> Opt
         left.retain(|i| *i != k);
         let near: Vec<(usize, NodeId)> = left.iter().filter_map(|i| Some((*i, a[k.max(*i)][k.min(*i)]?))).collect();
         for &(i, x) in &near {
-            let factor = p.insert(Op::Div(x, pivot));
+            let factor = p.insert(Op::div(x, pivot));
             lower[k][i] = Some(factor);
             for &(j, y) in near.iter().filter(|(j, _)| *j <= i) {
-                let product = p.insert(Op::Mul(y, factor));
+                let product = p.insert(Op::mul(y, factor));
                 a[i][j] = Some(match a[i][j] {
-                    Some(x) => p.insert(Op::Sub(x, product)),
-                    None => p.insert(Op::Neg(product)),
+                    Some(x) => p.insert(Op::sub(x, product)),
+                    None => p.insert(Op::neg(product)),
                 });
             }
         }
@@ -233,13 +233,13 @@ fn inverse(p: &mut Running, lower: &Sparse, order: &[usize]) -> Sparse {
             let mut sum = lower[k][j];
             for i in (0..n).filter(|i| *i != j) {
                 let (Some(l), Some(x)) = (lower[k][i], w[i][j]) else { continue };
-                let product = p.insert(Op::Mul(l, x));
+                let product = p.insert(Op::mul(l, x));
                 sum = Some(match sum {
-                    Some(sum) => p.insert(Op::Add(sum, product)),
+                    Some(sum) => p.insert(Op::add(sum, product)),
                     None => product,
                 });
             }
-            w[k][j] = sum.map(|sum| p.insert(Op::Neg(sum)));
+            w[k][j] = sum.map(|sum| p.insert(Op::neg(sum)));
         }
     }
     w

@@ -7,7 +7,8 @@
 
 use super::cancel::cancelled;
 use super::format::Format;
-use crate::expr::{Graph, NodeId, Op};
+use crate::expr::op::Slope;
+use crate::expr::{Binary, Graph, NodeId, Op, Unary};
 
 /// A value, an adjoint, or a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -203,17 +204,17 @@ impl Forms {
             Flat { form: simplified(form), slack }
         };
         match graph.op(id) {
-            Op::Neg(a) => {
+            Op::Unary(Unary::Neg, a) => {
                 let flat = of(a);
                 Flat { form: negated(&flat.form), slack: flat.slack }
             }
-            Op::Add(a, b) => joined(a, b, false),
-            Op::Sub(a, b) => joined(a, b, true),
-            Op::Mul(a, b) => {
+            Op::Binary(Binary::Add, a, b) => joined(a, b, false),
+            Op::Binary(Binary::Sub, a, b) => joined(a, b, true),
+            Op::Binary(Binary::Mul, a, b) => {
                 // the signs of operands come out
                 let bare = |mut x: NodeId| {
                     let mut negative = false;
-                    while let Op::Neg(y) = graph.op(x) {
+                    while let Op::Unary(Unary::Neg, y) = graph.op(x) {
                         (x, negative) = (y, !negative);
                     }
                     (x, negative)
@@ -369,31 +370,23 @@ fn chain_rule(graph: &Graph, live: &[bool]) -> (Vec<Form>, Vec<u32>) {
         let mut uses = |a: NodeId, coefficient: Coefficient, negative: bool| {
             chain[a.index()].push(Term { coefficient, atom, negative: negative != sign });
         };
-        let factor = |x: NodeId| half(graph, x).unwrap_or(Coefficient::Node(x.0));
+        let mut by_slope = |slope: Slope, a: NodeId, other: NodeId| match slope {
+            Slope::Zero => {}
+            Slope::One => uses(a, Coefficient::One, false),
+            Slope::MinusOne => uses(a, Coefficient::One, true),
+            Slope::Other => uses(a, half(graph, other).unwrap_or(Coefficient::Node(other.0)), false),
+            Slope::Reciprocal => uses(a, Coefficient::Reciprocal(other.0), false),
+            Slope::MinusQuotient => uses(a, Coefficient::MinusQuotient(id.0), false),
+            Slope::HalfReciprocal => uses(a, Coefficient::HalfReciprocal(id.0), false),
+        };
         match graph.op(id) {
-            Op::Input(_) | Op::Constant(_) | Op::Sign(_) => {}
-            Op::Neg(a) => uses(a, Coefficient::One, true),
-            Op::Add(a, b) => {
-                uses(a, Coefficient::One, false);
-                uses(b, Coefficient::One, false);
+            Op::Input(_) | Op::Constant(_) => {}
+            Op::Unary(op, a) => by_slope(op.row().slopes[0], a, a),
+            Op::Binary(op, a, b) => {
+                by_slope(op.row().slopes[0], a, b);
+                by_slope(op.row().slopes[1], b, a);
             }
-            Op::Sub(a, b) => {
-                uses(a, Coefficient::One, false);
-                uses(b, Coefficient::One, true);
-            }
-            Op::Mul(a, b) => {
-                uses(a, factor(b), false);
-                uses(b, factor(a), false);
-            }
-            Op::Div(a, b) => {
-                uses(a, Coefficient::Reciprocal(b.0), false);
-                uses(b, Coefficient::MinusQuotient(id.0), false);
-            }
-            Op::Sqrt(a) => uses(a, Coefficient::HalfReciprocal(id.0), false),
-            Op::AngleSum(a, b) => {
-                uses(a, Coefficient::One, false);
-                uses(b, Coefficient::One, false);
-            }
+            Op::AngleSum(a, b) => [a, b].into_iter().for_each(|a| uses(a, Coefficient::One, false)),
             Op::SinCos(a) => uses(a, Coefficient::One, false),
             Op::Sin(p) => uses(p, Coefficient::ExactCos(p.0), false),
             Op::Cos(p) => uses(p, Coefficient::ExactMinusSin(p.0), false),

@@ -172,6 +172,16 @@ impl Interval {
         Interval { lo: root.lo.max(0.0), hi: root.hi }
     }
 
+    /// The signs of the numbers in it.
+    #[must_use]
+    pub fn sign(self) -> Self {
+        match self {
+            Interval { lo, .. } if lo > 0.0 => Interval::ONE,
+            Interval { hi, .. } if hi < 0.0 => -Interval::ONE,
+            _ => Interval { lo: -1.0, hi: 1.0 },
+        }
+    }
+
     /// Sines and cosines of the angles in it.
     ///
     /// At the ends the kernel's values, which are within an ulp, two steps outwards; between them the extremes that lie
@@ -224,6 +234,14 @@ impl std::ops::Sub for Interval {
     type Output = Self;
     fn sub(self, b: Self) -> Self {
         self + -b
+    }
+}
+
+impl std::ops::Div for Interval {
+    type Output = Self;
+    /// As [`Interval::over`].
+    fn div(self, b: Self) -> Self {
+        self.over(b)
     }
 }
 

@@ -54,7 +54,7 @@ pub fn widened(graph: &Graph, inputs: &[Interval], demand: &[f64], stored: &[Nod
 
 /// How many operations are computed in f64.
 pub fn double_operations(graph: &Graph) -> usize {
-    let is_operation = |id: &NodeId| matches!(graph.op(*id), Op::Add(..) | Op::Sub(..) | Op::Mul(..));
+    let is_operation = |id: &NodeId| graph.op(*id).is_polynomial() && graph.op(*id).is_counted();
     graph.ids().filter(|id| graph.width(*id) != Width::Single && is_operation(id)).count()
 }
 
@@ -91,7 +91,7 @@ impl<'g> Classes<'g> {
             graph.op(id).operands().for_each(|a| users[a.index()].push(id.index()));
         }
         graph.results.iter().chain(stored_nodes).for_each(|id| stored[id.index()] = true);
-        let can = |i: usize| live[i] && matches!(graph.ops[i], Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Neg(_));
+        let can = |i: usize| live[i] && graph.ops[i].is_polynomial();
         let class: Vec<usize> = graph.ids().map(|id| analysis.class(id).index()).collect();
         let mut members = vec![Vec::new(); n];
         (0..n).filter(|i| can(*i)).for_each(|i| members[class[i]].push(i));

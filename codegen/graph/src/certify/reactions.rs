@@ -132,8 +132,8 @@ impl Contact<'_> {
                 .collect();
             for (l, right) in right.iter().enumerate() {
                 let terms: Vec<NodeId> =
-                    (0..m).map(|k| p.insert(Op::Mul(row[k].value, solved.inverse[k * m + l]))).collect();
-                let sum = terms.into_iter().reduce(|a, b| p.insert(Op::Add(a, b))).expect("there is a row");
+                    (0..m).map(|k| p.insert(Op::mul(row[k].value, solved.inverse[k * m + l]))).collect();
+                let sum = terms.into_iter().reduce(|a, b| p.insert(Op::add(a, b))).expect("there is a row");
                 parts.push((p.absolute(sum), *right));
             }
             for (k, x) in row.into_iter().enumerate() {
@@ -180,11 +180,11 @@ fn norm(p: &mut Running, row: &[Option<Tracked>], d: &[NodeId]) -> NodeId {
         let Some(x) = x else { continue };
         let size = p.magnitude(*x);
         let size = p.settled(size);
-        let square = p.insert(Op::Mul(size, size));
+        let square = p.insert(Op::mul(size, size));
         squares.push(p.over(square, *d));
     }
     let sum = p.total(&squares);
-    p.insert(Op::Sqrt(sum))
+    p.insert(Op::sqrt(sum))
 }
 
 /// N φ = right, solved.
@@ -206,7 +206,7 @@ fn solve(p: &mut Running, matrix: &[Vec<Tracked>], right: &[NodeId], scales: &[N
     let inverse = dense_inverse(p, &values, m);
     let sizes: Vec<NodeId> = inverse.iter().map(|x| p.absolute(*x)).collect();
     let one = p.constant(1.0);
-    let units: Vec<NodeId> = scales.iter().map(|s| p.insert(Op::Div(one, *s))).collect();
+    let units: Vec<NodeId> = scales.iter().map(|s| p.insert(Op::div(one, *s))).collect();
     let gamma = gamma(m + 4, p.format);
     // what a product of R' with column j can lose: the errors of N, and m + 4 roundings
     let losses: Vec<NodeId> = matrix
@@ -216,7 +216,7 @@ fn solve(p: &mut Running, matrix: &[Vec<Tracked>], right: &[NodeId], scales: &[N
             let size = p.absolute(x.value);
             let rounding = p.scaled(gamma, size);
             match x.error {
-                Some(e) => p.insert(Op::Add(rounding, e)),
+                Some(e) => p.insert(Op::add(rounding, e)),
                 None => rounding,
             }
         })
@@ -227,11 +227,11 @@ fn solve(p: &mut Running, matrix: &[Vec<Tracked>], right: &[NodeId], scales: &[N
         let mut row = Vec::new();
         for j in 0..m {
             // 1 − R' N, and what it may be off by
-            let terms: Vec<NodeId> = (0..m).map(|k| p.insert(Op::Mul(inverse[i * m + k], values[k * m + j]))).collect();
-            let product = terms.into_iter().reduce(|a, b| p.insert(Op::Add(a, b))).expect("there is a row");
-            let difference = if i == j { p.insert(Op::Sub(one, product)) } else { product };
+            let terms: Vec<NodeId> = (0..m).map(|k| p.insert(Op::mul(inverse[i * m + k], values[k * m + j]))).collect();
+            let product = terms.into_iter().reduce(|a, b| p.insert(Op::add(a, b))).expect("there is a row");
+            let difference = if i == j { p.insert(Op::sub(one, product)) } else { product };
             let mut entry = vec![p.absolute(difference)];
-            entry.extend((0..m).map(|k| p.insert(Op::Mul(sizes[i * m + k], losses[k * m + j]))));
+            entry.extend((0..m).map(|k| p.insert(Op::mul(sizes[i * m + k], losses[k * m + j]))));
             entry.push(p.constant(4.0 * p.format.u));
             let entry = p.total(&entry);
             row.push((entry, units[j]));
@@ -259,9 +259,9 @@ fn solve(p: &mut Running, matrix: &[Vec<Tracked>], right: &[NodeId], scales: &[N
     let mut loose = Vec::new();
     for i in 0..m {
         let share = p.times(contractions[i], most);
-        bounds.push(p.insert(Op::Add(direct[i], share)));
+        bounds.push(p.insert(Op::add(direct[i], share)));
         let lost = p.scaled(gamma, direct[i]);
-        loose.push(p.insert(Op::Add(share, lost)));
+        loose.push(p.insert(Op::add(share, lost)));
     }
     let (bounds, loose) = (p.all_settled(&bounds), p.all_settled(&loose));
 
@@ -278,9 +278,9 @@ fn solve(p: &mut Running, matrix: &[Vec<Tracked>], right: &[NodeId], scales: &[N
     let rows = p.total(&contractions);
     let product = p.times(rows, columns);
     let rest = p.over(product, left);
-    let sum = p.insert(Op::Add(all, rest));
+    let sum = p.insert(Op::add(all, rest));
     let sum = p.settled(sum);
-    let smallest = p.insert(Op::Div(one, sum));
+    let smallest = p.insert(Op::div(one, sum));
     let smallest = p.scaled(1.0 - 4.0 * p.format.u, smallest);
     Solved { inverse, bounds, loose, smallest }
 }
@@ -291,23 +291,23 @@ fn dense_inverse(p: &mut Running, matrix: &[NodeId], m: usize) -> Vec<NodeId> {
     let mut a: Vec<Vec<NodeId>> = matrix.chunks(m).map(<[NodeId]>::to_vec).collect();
     let mut b: Vec<Vec<NodeId>> = (0..m).map(|i| (0..m).map(|j| if i == j { one } else { zero }).collect()).collect();
     for k in 0..m {
-        let inverse = p.insert(Op::Div(one, a[k][k]));
+        let inverse = p.insert(Op::div(one, a[k][k]));
         for j in 0..m {
-            a[k][j] = p.insert(Op::Mul(a[k][j], inverse));
+            a[k][j] = p.insert(Op::mul(a[k][j], inverse));
             if b[k][j] != zero {
-                b[k][j] = if b[k][j] == one { inverse } else { p.insert(Op::Mul(b[k][j], inverse)) };
+                b[k][j] = if b[k][j] == one { inverse } else { p.insert(Op::mul(b[k][j], inverse)) };
             }
         }
         let (row, inverse_row) = (a[k].clone(), b[k].clone());
         for i in (0..m).filter(|i| *i != k) {
             let factor = a[i][k];
             for (x, y) in a[i].iter_mut().zip(&row).skip(k + 1) {
-                let product = p.insert(Op::Mul(factor, *y));
-                *x = p.insert(Op::Sub(*x, product));
+                let product = p.insert(Op::mul(factor, *y));
+                *x = p.insert(Op::sub(*x, product));
             }
             for (x, y) in b[i].iter_mut().zip(&inverse_row).filter(|(_, y)| **y != zero) {
-                let product = p.insert(Op::Mul(factor, *y));
-                *x = if *x == zero { p.insert(Op::Neg(product)) } else { p.insert(Op::Sub(*x, product)) };
+                let product = p.insert(Op::mul(factor, *y));
+                *x = if *x == zero { p.insert(Op::neg(product)) } else { p.insert(Op::sub(*x, product)) };
             }
         }
     }

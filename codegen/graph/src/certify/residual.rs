@@ -98,8 +98,8 @@ pub(super) fn bound_of(mut p: Running, system: &Graph, yielding: &[bool]) -> Res
         let reactions = contact.reactions(&mut p, &congruence);
         if !p.is_broken(BrokenProof::Reactions) {
             for i in 0..n {
-                bounds[i] = p.insert(Op::Add(bounds[i], reactions.accelerations[i]));
-                driven[i] = p.insert(Op::Add(driven[i], reactions.driven[i]));
+                bounds[i] = p.insert(Op::add(bounds[i], reactions.accelerations[i]));
+                driven[i] = p.insert(Op::add(driven[i], reactions.driven[i]));
             }
         }
         outputs.push(Port::new(&format!("force{OF_ERROR}"), &[m]));
@@ -112,7 +112,7 @@ pub(super) fn bound_of(mut p: Running, system: &Graph, yielding: &[bool]) -> Res
     }
     let driven = p.all_settled(&driven);
     let shifted = congruence.shifted(&mut p, &driven);
-    let accelerations: Vec<NodeId> = (0..n).map(|i| p.insert(Op::Add(bounds[i], shifted[i]))).collect();
+    let accelerations: Vec<NodeId> = (0..n).map(|i| p.insert(Op::add(bounds[i], shifted[i]))).collect();
     let accelerations = p.all_settled(&accelerations);
     if p.operations() > MOST_OPERATIONS {
         return Err(TOO_LONG);

@@ -21,7 +21,7 @@
 //! operation, so that s = 1 + 6 n u. Products that underflow lose less than the smallest normal number; t is four of them.
 
 use super::Format;
-use crate::expr::{Builder, Folding, Graph, NodeId, Op, Port, RuleSet, Width};
+use crate::expr::{Binary, Builder, Folding, Graph, NodeId, Op, Port, RuleSet, Unary, Width};
 use crate::number::Scalar;
 use straightline_core::Dd;
 
@@ -125,39 +125,39 @@ impl Running {
 
     /// x · sign x.
     pub fn absolute(&mut self, x: NodeId) -> NodeId {
-        let sign = self.insert(Op::Sign(x));
-        self.insert(Op::Mul(x, sign))
+        let sign = self.insert(Op::sign(x));
+        self.insert(Op::mul(x, sign))
     }
 
     pub fn scaled(&mut self, factor: f64, x: NodeId) -> NodeId {
         let factor = self.constant(factor);
-        self.insert(Op::Mul(factor, x))
+        self.insert(Op::mul(factor, x))
     }
 
     fn plus(&mut self, a: NodeId, b: Option<NodeId>) -> NodeId {
         match b {
-            Some(b) => self.insert(Op::Add(a, b)),
+            Some(b) => self.insert(Op::add(a, b)),
             None => a,
         }
     }
 
     fn plus_tiny(&mut self, a: NodeId, count: usize) -> NodeId {
         let tiny = self.constant(4.0 * count as f64 * self.rounding.tiny);
-        self.insert(Op::Add(a, tiny))
+        self.insert(Op::add(a, tiny))
     }
 
     /// x where it is positive, a little less or more by rounding; else NaN.
     pub fn positive(&mut self, x: NodeId) -> NodeId {
-        let root = self.insert(Op::Sqrt(x));
-        self.insert(Op::Mul(root, root))
+        let root = self.insert(Op::sqrt(x));
+        self.insert(Op::mul(root, root))
     }
 
     /// The greatest of numbers ≥ 0: (x + y + |x − y|)/2.
     pub fn greatest(&mut self, parts: &[NodeId]) -> NodeId {
         let greater = |a: NodeId, b: NodeId| {
-            let (sum, difference) = (self.insert(Op::Add(a, b)), self.insert(Op::Sub(a, b)));
+            let (sum, difference) = (self.insert(Op::add(a, b)), self.insert(Op::sub(a, b)));
             let difference = self.absolute(difference);
-            let twice = self.insert(Op::Add(sum, difference));
+            let twice = self.insert(Op::add(sum, difference));
             self.scaled(0.5, twice)
         };
         let most = parts.iter().copied().reduce(greater).expect("there is a part");
@@ -166,25 +166,25 @@ impl Running {
 
     /// Of numbers ≥ 0, with what so many products can lose by underflow.
     pub fn total(&mut self, parts: &[NodeId]) -> NodeId {
-        let sum = parts.iter().copied().reduce(|a, b| self.insert(Op::Add(a, b))).expect("there is a part");
+        let sum = parts.iter().copied().reduce(|a, b| self.insert(Op::add(a, b))).expect("there is a part");
         self.plus_tiny(sum, parts.len())
     }
 
     /// a b of numbers ≥ 0.
     pub fn times(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        let product = self.insert(Op::Mul(a, b));
+        let product = self.insert(Op::mul(a, b));
         self.plus_tiny(product, 1)
     }
 
     /// a / b of numbers ≥ 0.
     pub fn over(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        let quotient = self.insert(Op::Div(a, b));
+        let quotient = self.insert(Op::div(a, b));
         self.plus_tiny(quotient, 1)
     }
 
     /// Σ a b of numbers ≥ 0, of which one each has lost nothing.
     pub fn dot(&mut self, pairs: &[(NodeId, NodeId)]) -> NodeId {
-        let products: Vec<NodeId> = pairs.iter().map(|(a, b)| self.insert(Op::Mul(*a, *b))).collect();
+        let products: Vec<NodeId> = pairs.iter().map(|(a, b)| self.insert(Op::mul(*a, *b))).collect();
         self.total(&products)
     }
 
@@ -227,24 +227,23 @@ impl Running {
 
     fn either(&mut self, a: Option<NodeId>, b: Option<NodeId>) -> Option<NodeId> {
         match (a, b) {
-            (Some(x), Some(y)) => Some(self.insert(Op::Add(x, y))),
+            (Some(x), Some(y)) => Some(self.insert(Op::add(x, y))),
             (x, y) => x.or(y),
         }
     }
 
-    fn sum_in(&mut self, a: Tracked, b: Tracked, minus: bool, unit: f64) -> Tracked {
-        let op = if minus { Op::Sub(a.value, b.value) } else { Op::Add(a.value, b.value) };
-        let value = self.insert(op);
+    fn sum_in(&mut self, op: Binary, a: Tracked, b: Tracked, unit: f64) -> Tracked {
+        let value = self.insert(Op::Binary(op, a.value, b.value));
         let others = self.either(a.error, b.error);
         self.rounded(value, others, unit)
     }
 
     fn product_in(&mut self, a: Tracked, b: Tracked, unit: f64) -> Tracked {
-        let value = self.insert(Op::Mul(a.value, b.value));
+        let value = self.insert(Op::mul(a.value, b.value));
         let mut others = None;
         if let Some(e) = b.error {
             let size = self.absolute(a.value);
-            others = Some(self.insert(Op::Mul(size, e)));
+            others = Some(self.insert(Op::mul(size, e)));
         }
         if let Some(e) = a.error {
             let size = self.absolute(b.value);
@@ -252,53 +251,53 @@ impl Running {
             let factor = if self.other_bits { 4.0 } else { 2.0 };
             let more = b.error.map(|e| self.scaled(factor, e));
             let size = self.plus(size, more);
-            let carried = self.insert(Op::Mul(size, e));
+            let carried = self.insert(Op::mul(size, e));
             others = Some(self.plus(carried, others));
         }
         self.rounded(value, others, unit)
     }
 
     fn quotient_in(&mut self, a: Tracked, b: Tracked, unit: f64) -> Tracked {
-        let value = self.insert(Op::Div(a.value, b.value));
+        let value = self.insert(Op::div(a.value, b.value));
         let size = self.absolute(b.value);
         let divisor_error = b.error.filter(|_| !self.is_broken(BrokenProof::Divisor));
         let Some(e) = divisor_error else {
-            let others = a.error.map(|e| self.insert(Op::Div(e, size)));
+            let others = a.error.map(|e| self.insert(Op::div(e, size)));
             return self.rounded(value, others, unit);
         };
         // 2 s e, and what the difference is rounded by
         let off = self.scaled(4.0, e);
-        let left = self.insert(Op::Sub(size, off));
+        let left = self.insert(Op::sub(size, off));
         let left = self.positive(left);
         let most = self.absolute(a.value);
         let twice = a.error.map(|e| self.scaled(2.0, e));
         let most = self.plus(most, twice);
-        let most = self.insert(Op::Div(most, left));
-        let carried = self.insert(Op::Mul(most, e));
+        let most = self.insert(Op::div(most, left));
+        let carried = self.insert(Op::mul(most, e));
         let carried = self.plus(carried, a.error);
-        let carried = self.insert(Op::Div(carried, left));
+        let carried = self.insert(Op::div(carried, left));
         self.rounded(value, Some(carried), unit)
     }
 
     fn root_in(&mut self, a: Tracked, unit: f64) -> Tracked {
-        let value = self.insert(Op::Sqrt(a.value));
+        let value = self.insert(Op::sqrt(a.value));
         let others = a.error.map(|e| {
             let off = self.scaled(4.0, e);
-            let least = self.insert(Op::Sub(a.value, off));
-            let least = self.insert(Op::Sqrt(least));
-            self.insert(Op::Div(e, least))
+            let least = self.insert(Op::sub(a.value, off));
+            let least = self.insert(Op::sqrt(least));
+            self.insert(Op::div(e, least))
         });
         self.rounded(value, others, unit)
     }
 
     fn sign(&mut self, a: Tracked) -> Tracked {
-        let value = self.insert(Op::Sign(a.value));
+        let value = self.insert(Op::sign(a.value));
         let error = a.error.map(|e| {
             let size = self.absolute(a.value);
             let off = self.scaled(4.0, e);
-            let left = self.insert(Op::Sub(size, off));
+            let left = self.insert(Op::sub(size, off));
             // 0, or NaN
-            let root = self.insert(Op::Sqrt(left));
+            let root = self.insert(Op::sqrt(left));
             self.scaled(0.0, root)
         });
         Tracked { value, error }
@@ -306,12 +305,12 @@ impl Running {
 
     /// a + b of this program's own.
     pub fn sum(&mut self, a: Tracked, b: Tracked) -> Tracked {
-        self.sum_in(a, b, false, self.format.u)
+        self.sum_in(Binary::Add, a, b, self.format.u)
     }
 
     /// a − b.
     pub fn difference(&mut self, a: Tracked, b: Tracked) -> Tracked {
-        self.sum_in(a, b, true, self.format.u)
+        self.sum_in(Binary::Sub, a, b, self.format.u)
     }
 
     /// a b.
@@ -363,19 +362,18 @@ impl Running {
                     let error = (error != 0.0).then(|| self.constant(error * (1.0 + 4.0 * self.format.u)));
                     Tracked { value, error }
                 }
-                Op::Neg(a) => {
-                    let value = self.insert(Op::Neg(of(a).value));
+                Op::Unary(Unary::Neg, a) => {
+                    let value = self.insert(Op::neg(of(a).value));
                     match width {
                         Width::Rounded => self.rounded(value, of(a).error, unit),
                         _ => Tracked { value, ..of(a) },
                     }
                 }
-                Op::Add(a, b) => self.sum_in(of(a), of(b), false, unit),
-                Op::Sub(a, b) => self.sum_in(of(a), of(b), true, unit),
-                Op::Mul(a, b) => self.product_in(of(a), of(b), unit),
-                Op::Div(a, b) => self.quotient_in(of(a), of(b), unit),
-                Op::Sqrt(a) => self.root_in(of(a), unit),
-                Op::Sign(a) => self.sign(of(a)),
+                Op::Binary(op @ (Binary::Add | Binary::Sub), a, b) => self.sum_in(op, of(a), of(b), unit),
+                Op::Binary(Binary::Mul, a, b) => self.product_in(of(a), of(b), unit),
+                Op::Binary(Binary::Div, a, b) => self.quotient_in(of(a), of(b), unit),
+                Op::Unary(Unary::Sqrt, a) => self.root_in(of(a), unit),
+                Op::Unary(Unary::Sign, a) => self.sign(of(a)),
                 // exact sums of inputs and constants, and what is exact with them
                 Op::AngleSum(a, b) => {
                     let error = self.either(of(a).error, of(b).error);

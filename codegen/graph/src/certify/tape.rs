@@ -14,6 +14,7 @@
 //! or no number in a box, its bound is infinite.
 
 use super::interval::{add_up, mul_up, Interval};
+use crate::expr::{Binary, Unary};
 use rustc_hash::FxHashMap;
 
 /// An enclosure of a number, and the step that computes it.
@@ -59,8 +60,10 @@ enum Step {
     Add(u32, u32),
     Mul(u32, u32),
     Square(u32),
-    Over(u32, u32),
-    Root(u32),
+    /// Any other operation on a number.
+    Unary(Unary, u32),
+    /// Any other operation on two numbers.
+    Binary(Binary, u32, u32),
     Sine(u32),
     Cosine(u32),
     /// A range, and how far on both sides.
@@ -83,12 +86,12 @@ impl Step {
         use Step::*;
         let (a, b) = match self {
             Input(_) | Constant(_) => (None, None),
-            Neg(a) | Square(a) | Root(a) | Sine(a) | Cosine(a) | Magnitude(a) | RootOfBound(a) | Rounding(a, _) => {
+            Neg(a) | Square(a) | Unary(_, a) | Sine(a) | Cosine(a) | Magnitude(a) | RootOfBound(a) | Rounding(a, _) => {
                 (Some(a), None)
             }
             Add(a, b)
             | Mul(a, b)
-            | Over(a, b)
+            | Binary(_, a, b)
             | Widened(a, b)
             | Clipped(a, b)
             | Intersection(a, b)
@@ -105,7 +108,7 @@ impl Step {
             Input(_) | Constant(_) => self,
             Neg(a) => Neg(f(a)),
             Square(a) => Square(f(a)),
-            Root(a) => Root(f(a)),
+            Unary(op, a) => Unary(op, f(a)),
             Sine(a) => Sine(f(a)),
             Cosine(a) => Cosine(f(a)),
             Magnitude(a) => Magnitude(f(a)),
@@ -113,7 +116,7 @@ impl Step {
             Rounding(a, k) => Rounding(f(a), k),
             Add(a, b) => Add(f(a), f(b)),
             Mul(a, b) => Mul(f(a), f(b)),
-            Over(a, b) => Over(f(a), f(b)),
+            Binary(op, a, b) => Binary(op, f(a), f(b)),
             Widened(a, b) => Widened(f(a), f(b)),
             Clipped(a, b) => Clipped(f(a), f(b)),
             Intersection(a, b) => Intersection(f(a), f(b)),
@@ -242,11 +245,27 @@ impl Pen {
     }
 
     pub fn over(&mut self, a: Range, b: Range) -> Range {
-        Range { x: a.x.over(b.x), at: self.write(Step::Over(a.at, b.at)) }
+        self.binary(Binary::Div, a, b)
     }
 
     pub fn sqrt(&mut self, a: Range) -> Range {
-        Range { x: a.x.sqrt(), at: self.write(Step::Root(a.at)) }
+        self.unary(Unary::Sqrt, a)
+    }
+
+    pub fn unary(&mut self, op: Unary, a: Range) -> Range {
+        match op {
+            Unary::Neg => self.neg(a),
+            op => Range { x: op.range(a.x), at: self.write(Step::Unary(op, a.at)) },
+        }
+    }
+
+    pub fn binary(&mut self, op: Binary, a: Range, b: Range) -> Range {
+        match op {
+            Binary::Add => self.add(a, b),
+            Binary::Sub => self.sub(a, b),
+            Binary::Mul => self.mul(a, b),
+            op => Range { x: op.range(a.x, b.x), at: self.write(Step::Binary(op, a.at, b.at)) },
+        }
     }
 
     pub fn sin_cos(&mut self, a: Range) -> (Range, Range) {
@@ -497,15 +516,15 @@ impl Tape {
                     }
                 }
                 Step::Square(a) => each(out, at(a), |x| x.square()),
-                Step::Over(a, b) => {
+                Step::Binary(op, a, b) => {
                     let b = at(b);
                     let mut l = 0;
                     each(out, at(a), |x| {
                         l += 1;
-                        x.over(Interval { lo: b.0[l - 1], hi: b.1[l - 1] })
+                        op.range(x, Interval { lo: b.0[l - 1], hi: b.1[l - 1] })
                     });
                 }
-                Step::Root(a) => each(out, at(a), |x| x.sqrt()),
+                Step::Unary(op, a) => each(out, at(a), |x| op.range(x)),
                 Step::Sine(a) => each(out, at(a), |x| x.sin_cos().0),
                 Step::Cosine(a) => each(out, at(a), |x| x.sin_cos().1),
                 Step::Widened(a, h) => {

@@ -7,7 +7,7 @@ use super::running::{BrokenProof, Running};
 use super::search::{computed_at, errors_at, worst_found};
 use super::tape::Registers;
 use super::{certify, subdivision, Analysis, Effort, Format, Interval};
-use crate::expr::{Builder, Graph, NodeId, Op, Port, RuleSet};
+use crate::expr::{Binary, Builder, Graph, NodeId, Op, Port, RuleSet};
 use crate::number::Scalar;
 use crate::random::Random;
 use straightline_core::Dd;
@@ -28,19 +28,19 @@ fn sin_cos(b: &mut Builder, angle: NodeId) -> (NodeId, NodeId) {
 /// x cos q − y sin q, y cos q + x sin q.
 fn turned(b: &mut Builder, x: NodeId, y: NodeId, q: NodeId) -> (NodeId, NodeId) {
     let (s, c) = sin_cos(b, q);
-    let mut product = |a, f| b.add(Op::Mul(a, f));
+    let mut product = |a, f| b.add(Op::mul(a, f));
     let (xc, ys, yc, xs) = (product(x, c), product(y, s), product(y, c), product(x, s));
-    (b.add(Op::Sub(xc, ys)), b.add(Op::Add(yc, xs)))
+    (b.add(Op::sub(xc, ys)), b.add(Op::add(yc, xs)))
 }
 
 fn sum_of_two() -> Graph {
-    program(2, |b, x| b.add(Op::Add(x[0], x[1])))
+    program(2, |b, x| b.add(Op::add(x[0], x[1])))
 }
 
 fn tenth() -> Graph {
     program(1, |b, x| {
         let c = b.constant(Dd::from(0.1));
-        b.add(Op::Mul(c, x[0]))
+        b.add(Op::mul(c, x[0]))
     })
 }
 
@@ -51,8 +51,8 @@ fn sine() -> Graph {
 fn square_of_sum() -> Graph {
     program(1, |b, x| {
         let c = b.constant(Dd::ONE);
-        let a = b.add(Op::Add(x[0], c));
-        b.add(Op::Mul(a, a))
+        let a = b.add(Op::add(x[0], c));
+        b.add(Op::mul(a, a))
     })
 }
 
@@ -70,10 +70,10 @@ fn turns() -> Graph {
 /// (x₀ + x₁)(x₂ + x₃) − (x₀ x₂ + x₁ x₂) = (x₀ + x₁) x₃.
 fn products_that_cancel() -> Graph {
     program(4, |b, x| {
-        let (u, v) = (b.add(Op::Add(x[0], x[1])), b.add(Op::Add(x[2], x[3])));
-        let (whole, p, q) = (b.add(Op::Mul(u, v)), b.add(Op::Mul(x[0], x[2])), b.add(Op::Mul(x[1], x[2])));
-        let sum = b.add(Op::Add(p, q));
-        b.add(Op::Sub(whole, sum))
+        let (u, v) = (b.add(Op::add(x[0], x[1])), b.add(Op::add(x[2], x[3])));
+        let (whole, p, q) = (b.add(Op::mul(u, v)), b.add(Op::mul(x[0], x[2])), b.add(Op::mul(x[1], x[2])));
+        let sum = b.add(Op::add(p, q));
+        b.add(Op::sub(whole, sum))
     })
 }
 
@@ -140,8 +140,8 @@ fn a_bound_with_a_broken_rule_is_violated() {
     let difference = program(1, |b, x| {
         let (s, c) = sin_cos(b, x[0]);
         let two = b.constant(Dd::from(2.0));
-        let (s, c) = (b.add(Op::Mul(two, s)), b.add(Op::Mul(two, c)));
-        b.add(Op::Sub(s, c))
+        let (s, c) = (b.add(Op::mul(two, s)), b.add(Op::mul(two, c)));
+        b.add(Op::sub(s, c))
     });
     broken(difference, &[Interval::new(0.7, 0.87)], Broken::Team);
 }
@@ -150,17 +150,17 @@ fn a_bound_with_a_broken_rule_is_violated() {
 fn all_operations() -> (Graph, [Interval; 3]) {
     let graph = program(3, |b, x| {
         let (two, three, tenth) = (b.constant(Dd::from(2.0)), b.constant(Dd::from(3.0)), b.constant(Dd::from(0.1)));
-        let (u, v) = (b.add(Op::Add(x[0], two)), b.add(Op::Add(x[1], three)));
-        let square = b.insert(Op::Mul(u, u));
-        let root = b.insert(Op::Sqrt(square));
-        let quotient = b.add(Op::Div(root, v));
+        let (u, v) = (b.add(Op::add(x[0], two)), b.add(Op::add(x[1], three)));
+        let square = b.insert(Op::mul(u, u));
+        let root = b.insert(Op::sqrt(square));
+        let quotient = b.add(Op::div(root, v));
         let (_, c) = sin_cos(b, x[2]);
         let angle = b.insert(Op::AngleSum(x[1], x[2]));
         let (s, _) = sin_cos(b, angle);
-        let (first, product, last) = (b.add(Op::Mul(quotient, c)), b.add(Op::Mul(x[0], x[1])), b.add(Op::Mul(s, x[0])));
-        let second = b.add(Op::Mul(product, tenth));
-        let sum = b.add(Op::Add(first, second));
-        b.add(Op::Sub(sum, last))
+        let (first, product, last) = (b.add(Op::mul(quotient, c)), b.add(Op::mul(x[0], x[1])), b.add(Op::mul(s, x[0])));
+        let second = b.add(Op::mul(product, tenth));
+        let sum = b.add(Op::add(first, second));
+        b.add(Op::sub(sum, last))
     });
     (graph, [Interval::new(-0.9, 0.7), Interval::new(-0.3, 0.9), Interval::new(-3.0, 1.1)])
 }
@@ -221,8 +221,8 @@ fn parts_cover_the_box() {
     // its error is greatest at the lower end, which a search with a part forgotten does not see
     let falling = program(1, |b, x| {
         let c = b.constant(Dd::ONE);
-        let a = b.add(Op::Sub(c, x[0]));
-        b.add(Op::Mul(a, a))
+        let a = b.add(Op::sub(c, x[0]));
+        b.add(Op::mul(a, a))
     });
     let fraction = [Interval::new(0.0, 0.9)];
     assert!(!is_violated(&falling, &fraction, of(&falling, &fraction, None)));
@@ -243,8 +243,8 @@ fn one_turn_of_an_angle_stands_for_all() {
     let raised = program(1, |b, x| {
         let c = b.constant(Dd::ONE);
         let (s, _) = sin_cos(b, x[0]);
-        let a = b.add(Op::Add(s, c));
-        b.add(Op::Mul(a, a))
+        let a = b.add(Op::add(s, c));
+        b.add(Op::mul(a, a))
     });
     let turns = [Interval::new(3.2, 16.0)];
     let once = [Interval::new(3.2, 3.2 + 6.3)];
@@ -254,7 +254,7 @@ fn one_turn_of_an_angle_stands_for_all() {
     // x sin x does not repeat itself
     let growing = program(1, |b, x| {
         let (s, _) = sin_cos(b, x[0]);
-        b.add(Op::Mul(s, x[0]))
+        b.add(Op::mul(s, x[0]))
     });
     let turns = [Interval::new(0.1, 16.0)];
     assert!(!is_violated(&growing, &turns, of(&growing, &turns, None)));
@@ -266,7 +266,10 @@ fn one_turn_of_an_angle_stands_for_all() {
 fn bounds_from_boxes_are_the_same_every_time() {
     let mut graph = turns();
     let last = graph.results[0].0;
-    graph.results = (8..=last).map(NodeId).filter(|id| matches!(graph.op(*id), Op::Add(..) | Op::Sub(..))).collect();
+    graph.results = (8..=last)
+        .map(NodeId)
+        .filter(|id| matches!(graph.op(*id), Op::Binary(Binary::Add | Binary::Sub, ..)))
+        .collect();
     graph.outputs = vec![Port::new("y", &[graph.results.len()])];
     let effort = Effort { boxes: 50, ..Effort::default() };
     let of = || certify(&graph, Scalar::F32, &WIDE, effort).expect("it is sound in its box");
@@ -298,7 +301,7 @@ fn products_that_cancel_leave_no_range_behind() {
 
 #[test]
 fn what_may_be_no_number_has_no_bound() {
-    let quotient = program(2, |b, x| b.add(Op::Div(x[0], x[1])));
+    let quotient = program(2, |b, x| b.add(Op::div(x[0], x[1])));
     let refused = |ranges: &[Interval]| Analysis::new(&quotient, Format::of(Scalar::F32)).ranges(ranges).err();
     assert_eq!(refused(&[Interval::ONE, Interval::new(-1.0, 1.0)]), Some(super::Refusal::Division));
     assert_eq!(refused(&[Interval::ONE, Interval::new(0.5, 1.0)]), None);
@@ -353,9 +356,9 @@ fn a_bound_at_a_state_holds_and_with_broken_numbers_does_not() {
 /// 1/(x₀ x₁ − x₂ x₃) x₄.
 fn quotient() -> Graph {
     program(5, |b, x| {
-        let (p, q) = (b.add(Op::Mul(x[0], x[1])), b.add(Op::Mul(x[2], x[3])));
-        let divisor = b.add(Op::Sub(p, q));
-        b.add(Op::Div(x[4], divisor))
+        let (p, q) = (b.add(Op::mul(x[0], x[1])), b.add(Op::mul(x[2], x[3])));
+        let divisor = b.add(Op::sub(p, q));
+        b.add(Op::div(x[4], divisor))
     })
 }
 
@@ -365,15 +368,15 @@ fn one_coordinate() -> Graph {
     let mut b = Builder::new(RuleSet::all(), ports);
     let x: Vec<NodeId> = (0..12).map(|k| b.insert(Op::Input(k))).collect();
     let mut difference = |k: usize| {
-        let (p, q) = (b.add(Op::Mul(x[k], x[k + 1])), b.add(Op::Mul(x[k + 2], x[k + 3])));
-        b.add(Op::Sub(p, q))
+        let (p, q) = (b.add(Op::mul(x[k], x[k + 1])), b.add(Op::mul(x[k + 2], x[k + 3])));
+        b.add(Op::sub(p, q))
     };
     let (h, j) = (difference(0), difference(4));
-    let (inertia, reaction, response) = (b.add(Op::Mul(h, x[10])), b.add(Op::Mul(j, x[11])), b.add(Op::Mul(j, x[10])));
-    let driven = b.add(Op::Add(x[8], reaction));
-    let residual = b.add(Op::Sub(driven, inertia));
-    let sdd = b.add(Op::Add(response, x[9]));
-    let (missing, zero) = (b.add(Op::Neg(sdd)), b.constant(Dd::ZERO));
+    let (inertia, reaction, response) = (b.add(Op::mul(h, x[10])), b.add(Op::mul(j, x[11])), b.add(Op::mul(j, x[10])));
+    let driven = b.add(Op::add(x[8], reaction));
+    let residual = b.add(Op::sub(driven, inertia));
+    let sdd = b.add(Op::add(response, x[9]));
+    let (missing, zero) = (b.add(Op::neg(sdd)), b.constant(Dd::ZERO));
     let outputs = OUTPUTS.iter().map(|name| Port::new(name, if *name == "h" { &[1, 1] } else { &[1] })).collect();
     b.finish(outputs, vec![residual, missing, h, j, j, zero])
 }
@@ -456,9 +459,9 @@ fn quotients_roots_and_signs_have_bounds_at_a_state_or_none() {
     assert!(holds(&quotient(), None));
     assert!(!holds(&quotient(), Some(BrokenProof::Divisor)));
     let root = program(2, |b, x| {
-        let difference = b.add(Op::Sub(x[0], x[1]));
-        let square = b.add(Op::Mul(difference, x[0]));
-        b.add(Op::Sqrt(square))
+        let difference = b.add(Op::sub(x[0], x[1]));
+        let square = b.add(Op::mul(difference, x[0]));
+        b.add(Op::sqrt(square))
     });
     assert!(holds(&root, None));
     // at a zero that may as well be none
@@ -466,9 +469,9 @@ fn quotients_roots_and_signs_have_bounds_at_a_state_or_none() {
     let third = f64::from(1.0f32 / 3.0);
     assert!(computed_at(&bound, Scalar::F32, &[third, third, third, third, 1.0])[0].is_nan());
     let sign = program(4, |b, x| {
-        let (p, q) = (b.add(Op::Mul(x[0], x[1])), b.add(Op::Mul(x[2], x[3])));
-        let difference = b.add(Op::Sub(p, q));
-        b.add(Op::Sign(difference))
+        let (p, q) = (b.add(Op::mul(x[0], x[1])), b.add(Op::mul(x[2], x[3])));
+        let difference = b.add(Op::sub(p, q));
+        b.add(Op::sign(difference))
     });
     let bound = companion::bound_of(Running::new(sign.inputs.clone(), format), &sign).expect("it is short");
     assert!(computed_at(&bound, Scalar::F32, &[third, third, third, third])[0].is_nan());
@@ -488,7 +491,7 @@ fn fused_sums_keep_to_the_bound_for_other_bits() {
         let mut values: Vec<f64> = Vec::new();
         for op in &graph.ops {
             let product = |a: NodeId| match graph.op(a) {
-                Op::Mul(x, y) => values[x.index()] * values[y.index()],
+                Op::Binary(Binary::Mul, x, y) => values[x.index()] * values[y.index()],
                 _ => values[a.index()],
             };
             let v = |a: NodeId| values[a.index()];
@@ -498,9 +501,9 @@ fn fused_sums_keep_to_the_bound_for_other_bits() {
             };
             let x = match *op {
                 Op::Input(k) => f64::from(inputs[k as usize]),
-                Op::Mul(a, b) => f64::from(v(a) as f32 * v(b) as f32),
-                Op::Add(a, b) => f64::from((product(a) + v(b)) as f32),
-                Op::Sub(a, b) => f64::from((product(a) - v(b)) as f32),
+                Op::Binary(Binary::Mul, a, b) => f64::from(v(a) as f32 * v(b) as f32),
+                Op::Binary(Binary::Add, a, b) => f64::from((product(a) + v(b)) as f32),
+                Op::Binary(Binary::Sub, a, b) => f64::from((product(a) - v(b)) as f32),
                 Op::SinCos(_) => 0.0,
                 Op::Sin(pair) => f64::from(halves(pair).0),
                 Op::Cos(pair) => f64::from(halves(pair).1),

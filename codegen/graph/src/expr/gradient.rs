@@ -1,7 +1,8 @@
 //! The program of a gradient: from a graph with results r(x, p) to one with λᵀ ∂r/∂p, backwards through the operations.
 
 use super::{Builder, Graph, NodeId, Op, Port, RuleSet};
-use straightline_core::Dd;
+use crate::trace::{self, Expr};
+use straightline_core::Real;
 
 /// The program of Σ_k λ_k ∂r_k/∂p for the inputs of the group `of` of a graph with results r. Its inputs are those of the graph and a
 /// group `seed` with a λ_k per result, its one output the gradient. About twice to four times the operations of the graph, however many
@@ -21,79 +22,55 @@ pub fn gradient(graph: &Graph, of: &str) -> Graph {
     let mut inputs = graph.inputs.clone();
     inputs.push(Port::new("seed", &[graph.results.len()]));
     let mut b = Builder::new(RuleSet::all(), inputs);
-    let mut copy: Vec<NodeId> = Vec::with_capacity(graph.ops.len());
+    let mut copy: Vec<Expr> = Vec::with_capacity(graph.ops.len());
     for op in &graph.ops {
-        let id = b.insert(op.map(|id| copy[id.index()]));
-        copy.push(id);
+        copy.push(Expr::of(b.insert(op.map(|id| copy[id.index()].node()))));
     }
-    // ∂/∂(node) of Σ λ r; of a pair of sine and cosine that of its angle
-    let mut adjoint: Vec<Option<NodeId>> = vec![None; graph.ops.len()];
-    let add = |b: &mut Builder, adjoint: &mut Vec<Option<NodeId>>, to: NodeId, x: NodeId| {
-        adjoint[to.index()] = Some(match adjoint[to.index()] {
-            None => x,
-            Some(sum) => b.add(Op::Add(sum, x)),
-        });
-    };
-    for (k, result) in graph.results.iter().enumerate() {
-        let seed = b.insert(Op::Input(seed_at + k as u32));
-        add(&mut b, &mut adjoint, *result, seed);
-    }
-    let mut of_inputs: Vec<Option<NodeId>> = vec![None; group.len()];
-    for (i, op) in graph.ops.iter().enumerate().rev() {
-        let Some(a) = adjoint[i] else { continue };
-        match *op {
-            Op::Input(k) if group.contains(&k) => of_inputs[(k - group.start) as usize] = Some(a),
-            Op::Input(_) | Op::Constant(_) | Op::Sign(_) => {}
-            Op::Neg(x) => {
-                let minus = b.add(Op::Neg(a));
-                add(&mut b, &mut adjoint, x, minus);
-            }
-            Op::Add(x, y) | Op::AngleSum(x, y) => {
-                add(&mut b, &mut adjoint, x, a);
-                add(&mut b, &mut adjoint, y, a);
-            }
-            Op::Sub(x, y) => {
-                let minus = b.add(Op::Neg(a));
-                add(&mut b, &mut adjoint, x, a);
-                add(&mut b, &mut adjoint, y, minus);
-            }
-            Op::Mul(x, y) => {
-                let (of_x, of_y) = (b.add(Op::Mul(a, copy[y.index()])), b.add(Op::Mul(a, copy[x.index()])));
-                add(&mut b, &mut adjoint, x, of_x);
-                add(&mut b, &mut adjoint, y, of_y);
-            }
-            Op::Div(x, y) => {
-                // v = x/y: 1/y and −v/y
-                let of_x = b.add(Op::Div(a, copy[y.index()]));
-                let product = b.add(Op::Mul(of_x, copy[i]));
-                let of_y = b.add(Op::Neg(product));
-                add(&mut b, &mut adjoint, x, of_x);
-                add(&mut b, &mut adjoint, y, of_y);
-            }
-            Op::Sqrt(x) => {
-                let half = b.constant(Dd::HALF);
-                let scaled = b.add(Op::Mul(a, half));
-                let of_x = b.add(Op::Div(scaled, copy[i]));
-                add(&mut b, &mut adjoint, x, of_x);
-            }
-            Op::Sin(pair) => {
-                let cos = b.add(Op::Cos(copy[pair.index()]));
-                let of_angle = b.add(Op::Mul(a, cos));
-                add(&mut b, &mut adjoint, pair, of_angle);
-            }
-            Op::Cos(pair) => {
-                let sin = b.add(Op::Sin(copy[pair.index()]));
-                let product = b.add(Op::Mul(a, sin));
-                let of_angle = b.add(Op::Neg(product));
-                add(&mut b, &mut adjoint, pair, of_angle);
-            }
-            Op::SinCos(angle) => add(&mut b, &mut adjoint, angle, a),
+    let (b, results) = trace::continued(b, || {
+        // ∂/∂(node) of Σ λ r; of a pair of sine and cosine that of its angle
+        let mut adjoint: Vec<Option<Expr>> = vec![None; graph.ops.len()];
+        for (k, result) in graph.results.iter().enumerate() {
+            let seed = Expr::of_op(Op::Input(seed_at + k as u32));
+            add(&mut adjoint, *result, seed);
         }
-    }
-    let zero = b.constant(Dd::ZERO);
-    let results = of_inputs.into_iter().map(|a| a.unwrap_or(zero)).collect();
+        let mut of_inputs: Vec<Option<Expr>> = vec![None; group.len()];
+        for (i, op) in graph.ops.iter().enumerate().rev() {
+            let Some(x) = adjoint[i] else { continue };
+            let v = |a: NodeId| copy[a.index()];
+            let slopes = op.row().map_or(&[][..], |row| row.slopes);
+            match *op {
+                Op::Input(k) if group.contains(&k) => of_inputs[(k - group.start) as usize] = Some(x),
+                Op::Input(_) | Op::Constant(_) => {}
+                Op::Unary(_, a) => {
+                    let part = slopes[0].times(x, v(a), v(a), copy[i]);
+                    part.into_iter().for_each(|part| add(&mut adjoint, a, part));
+                }
+                Op::Binary(_, a, b) => {
+                    let parts = [(a, b, slopes[0]), (b, a, slopes[1])]
+                        .map(|(own, other, slope)| (own, slope.times(x, v(own), v(other), copy[i])));
+                    for (own, part) in parts {
+                        part.into_iter().for_each(|part| add(&mut adjoint, own, part));
+                    }
+                }
+                Op::AngleSum(a, b) => [a, b].into_iter().for_each(|a| add(&mut adjoint, a, x)),
+                Op::SinCos(angle) => add(&mut adjoint, angle, x),
+                Op::Sin(pair) => add(&mut adjoint, pair, x * Expr::of_op(Op::Cos(v(pair).node()))),
+                Op::Cos(pair) => add(&mut adjoint, pair, -(x * Expr::of_op(Op::Sin(v(pair).node())))),
+            }
+        }
+        let zero = Expr::zero();
+        of_inputs.into_iter().map(|a| a.unwrap_or(zero).node()).collect()
+    });
     let shape = [group.len()];
     b.finish(vec![Port::new("gradient", &shape)], results)
+}
+
+/// One more part of an adjoint.
+fn add(adjoint: &mut [Option<Expr>], to: NodeId, part: Expr) {
+    adjoint[to.index()] = Some(match adjoint[to.index()] {
+        None => part,
+        Some(sum) => sum + part,
+    });
 }
 
 #[cfg(test)]
@@ -101,7 +78,7 @@ mod tests {
     use super::*;
     use crate::expr::evaluate;
     use crate::trace::trace;
-    use straightline_core::Real;
+    use straightline_core::Dd;
 
     /// Every operation, against central differences of the program itself in double-double.
     #[test]
@@ -110,7 +87,7 @@ mod tests {
         let graph = trace(RuleSet::all(), inputs, vec![Port::new("r", &[2])], |given| {
             let (x, p) = (&given[0], &given[1]);
             let (sin, cos) = (p[0] * x[0]).sin_cos();
-            let (s, c) = crate::trace::Expr::sin_cos_of_sum(&[p[1], x[1], p[2]]);
+            let (s, c) = Expr::sin_cos_of_sum(&[p[1], x[1], p[2]]);
             let root = (p[0] * p[0] + cos * cos).sqrt();
             vec![sin * p[1] - s / root + p[2].sign() * p[2], -(c * p[2]) / (p[1] + x[0]) + cos]
         });

@@ -1,5 +1,7 @@
 //! Nodes, graphs, and how operations are counted.
 
+use super::op::{Binary, Counted, Kind, Row, Unary};
+use std::hash::{Hash, Hasher};
 use straightline_core::Dd;
 
 /// Index of a node in its [`Graph`]; operands have smaller indices than their users.
@@ -43,27 +45,17 @@ impl Constant {
     }
 }
 
-/// One scalar operation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// A node of a program: a leaf, an operation of the [tables](super::op), or part of an angle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Op {
     /// The input of that flat index (groups one after the other).
     Input(u32),
     /// A constant.
     Constant(Constant),
-    /// −a.
-    Neg(NodeId),
-    /// a + b.
-    Add(NodeId, NodeId),
-    /// a − b.
-    Sub(NodeId, NodeId),
-    /// a · b.
-    Mul(NodeId, NodeId),
-    /// a / b.
-    Div(NodeId, NodeId),
-    /// √a.
-    Sqrt(NodeId),
-    /// −1, 0 or 1.
-    Sign(NodeId),
+    /// An operation on a number.
+    Unary(Unary, NodeId),
+    /// An operation on two numbers.
+    Binary(Binary, NodeId, NodeId),
     /// The sum of two angles as if it were formed exactly: of inputs, constants and such sums. Only [`Op::SinCos`] may use it,
     /// and such sums. It is not a value that could be stored, but is formed where its sine is.
     AngleSum(NodeId, NodeId),
@@ -75,13 +67,36 @@ pub enum Op {
     Cos(NodeId),
 }
 
+impl Hash for Op {
+    /// In as few words as there can be: graphs are made by looking operations up.
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        let word = |kind: u64, a: u32| kind << 32 | u64::from(a);
+        match *self {
+            Op::Input(k) => state.write_u64(word(1, k)),
+            Op::Constant(c) => c.hash(state),
+            Op::Unary(op, a) => state.write_u64(word(0x100 + op as u64, a.0)),
+            Op::Binary(op, a, b) => {
+                state.write_u64(word(0x200 + op as u64, a.0));
+                state.write_u32(b.0);
+            }
+            Op::AngleSum(a, b) => {
+                state.write_u64(word(2, a.0));
+                state.write_u32(b.0);
+            }
+            Op::SinCos(a) => state.write_u64(word(3, a.0)),
+            Op::Sin(a) => state.write_u64(word(4, a.0)),
+            Op::Cos(a) => state.write_u64(word(5, a.0)),
+        }
+    }
+}
+
 impl Op {
     /// The operands, in order.
     pub fn operands(self) -> impl Iterator<Item = NodeId> {
         let (a, b) = match self {
             Op::Input(_) | Op::Constant(_) => (None, None),
-            Op::Neg(a) | Op::Sqrt(a) | Op::Sign(a) | Op::SinCos(a) | Op::Sin(a) | Op::Cos(a) => (Some(a), None),
-            Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) | Op::AngleSum(a, b) => (Some(a), Some(b)),
+            Op::Unary(_, a) | Op::SinCos(a) | Op::Sin(a) | Op::Cos(a) => (Some(a), None),
+            Op::Binary(_, a, b) | Op::AngleSum(a, b) => (Some(a), Some(b)),
         };
         a.into_iter().chain(b)
     }
@@ -91,17 +106,49 @@ impl Op {
     pub fn map(self, mut f: impl FnMut(NodeId) -> NodeId) -> Op {
         match self {
             Op::Input(_) | Op::Constant(_) => self,
-            Op::Neg(a) => Op::Neg(f(a)),
-            Op::Add(a, b) => Op::Add(f(a), f(b)),
-            Op::Sub(a, b) => Op::Sub(f(a), f(b)),
-            Op::Mul(a, b) => Op::Mul(f(a), f(b)),
-            Op::Div(a, b) => Op::Div(f(a), f(b)),
-            Op::Sqrt(a) => Op::Sqrt(f(a)),
-            Op::Sign(a) => Op::Sign(f(a)),
+            Op::Unary(op, a) => Op::Unary(op, f(a)),
+            Op::Binary(op, a, b) => Op::Binary(op, f(a), f(b)),
             Op::AngleSum(a, b) => Op::AngleSum(f(a), f(b)),
             Op::SinCos(a) => Op::SinCos(f(a)),
             Op::Sin(a) => Op::Sin(f(a)),
             Op::Cos(a) => Op::Cos(f(a)),
+        }
+    }
+
+    /// What is known of an operation on numbers; none of leaves, angles and what is made of these.
+    #[inline]
+    pub fn row(self) -> Option<&'static Row> {
+        match self {
+            Op::Unary(op, _) => Some(op.row()),
+            Op::Binary(op, ..) => Some(op.row()),
+            _ => None,
+        }
+    }
+
+    /// Whether it is an operation on numbers that is not [free](Counted::Free).
+    #[inline]
+    pub fn is_counted(self) -> bool {
+        self.row().is_some_and(|row| row.counted != Counted::Free)
+    }
+
+    /// Whether it is a polynomial of its operands.
+    #[inline]
+    pub fn is_polynomial(self) -> bool {
+        self.row().is_some_and(|row| row.kind == Kind::Polynomial)
+    }
+
+    /// Whether it is an input or a constant.
+    #[inline]
+    pub fn is_leaf(self) -> bool {
+        matches!(self, Op::Input(_) | Op::Constant(_))
+    }
+
+    /// Whether it is the same operation, whatever its operands, inputs and numbers are.
+    pub fn is_alike(self, other: Op) -> bool {
+        match (self, other) {
+            (Op::Unary(op, _), Op::Unary(other, _)) => op == other,
+            (Op::Binary(op, ..), Op::Binary(other, ..)) => op == other,
+            _ => std::mem::discriminant(&self) == std::mem::discriminant(&other),
         }
     }
 }
@@ -224,6 +271,17 @@ pub struct Counts {
 }
 
 impl Counts {
+    /// One operation more.
+    pub(crate) fn count(&mut self, counted: Counted) {
+        match counted {
+            Counted::Free => {}
+            Counted::Addition => self.add += 1,
+            Counted::Multiplication => self.mul += 1,
+            Counted::Division => self.div += 1,
+            Counted::Root => self.sqrt += 1,
+        }
+    }
+
     /// All floating-point operations but sines and cosines.
     pub fn flops(&self) -> usize {
         self.mul + self.add + self.div + self.sqrt
@@ -330,10 +388,10 @@ impl Graph {
         // a sum of n terms, the sums in it that nothing else uses included, of which k are products (seen through a sign) that
         // nothing else uses: in the right order as many of its additions are fused
         let inner = |a: NodeId| match self.op(a) {
-            Op::Neg(b) if uses[a.index()] == 1 => b,
+            Op::Unary(Unary::Neg, b) if uses[a.index()] == 1 => b,
             _ => a,
         };
-        let is_sum = |a: NodeId| matches!(self.op(a), Op::Add(..) | Op::Sub(..));
+        let is_sum = |a: NodeId| matches!(self.op(a), Op::Binary(Binary::Add | Binary::Sub, ..));
         let mut products = vec![0usize; self.ops.len()];
         let mut terms = vec![0usize; self.ops.len()];
         let mut within = vec![false; self.ops.len()];
@@ -342,15 +400,16 @@ impl Graph {
             if !live[i] {
                 continue;
             }
+            if let Some(row) = op.row() {
+                counts.count(row.counted);
+            }
             match *op {
-                Op::Mul(..) => counts.mul += 1,
-                Op::Add(a, b) | Op::Sub(a, b) => {
-                    counts.add += 1;
+                Op::Binary(Binary::Add | Binary::Sub, a, b) => {
                     for a in [a, b].map(inner) {
                         let alone = uses[a.index()] == 1;
                         let (n, k) = match self.op(a) {
                             _ if alone && is_sum(a) => (terms[a.index()], products[a.index()]),
-                            Op::Mul(..) if alone => (1, 1),
+                            Op::Binary(Binary::Mul, ..) if alone => (1, 1),
                             _ => (1, 0),
                         };
                         terms[i] += n;
@@ -358,8 +417,6 @@ impl Graph {
                         within[a.index()] |= alone;
                     }
                 }
-                Op::Div(..) => counts.div += 1,
-                Op::Sqrt(_) => counts.sqrt += 1,
                 Op::SinCos(a) => {
                     counts.sin_cos += 1;
                     counts.tail += usize::from(matches!(self.op(a), Op::AngleSum(..)));
@@ -368,7 +425,7 @@ impl Graph {
                     counts.add += 1;
                     counts.tail += TAIL;
                 }
-                Op::Input(_) | Op::Constant(_) | Op::Neg(_) | Op::Sign(_) | Op::Sin(_) | Op::Cos(_) => {}
+                _ => {}
             }
         }
         let roots = (0..self.ops.len()).filter(|i| live[*i] && terms[*i] > 0 && !within[*i]);

@@ -65,13 +65,8 @@ pub fn values_by<T: Real>(
         let value = match *op {
             Op::Input(k) => inputs[k as usize],
             Op::Constant(c) => T::constant(c.value()),
-            Op::Neg(a) => -v(a),
-            Op::Add(a, b) => v(a) + v(b),
-            Op::Sub(a, b) => v(a) - v(b),
-            Op::Mul(a, b) => v(a) * v(b),
-            Op::Div(a, b) => v(a) / v(b),
-            Op::Sqrt(a) => v(a).sqrt(),
-            Op::Sign(a) => v(a).sign(),
+            Op::Unary(op, a) => op.value(v(a)),
+            Op::Binary(op, a, b) => op.value(v(a), v(b)),
             Op::AngleSum(a, b) => v(a) + v(b),
             Op::SinCos(a) => {
                 let (s, c) = sin_cos(&graph.angle_terms(a).into_iter().map(v).collect::<Vec<T>>());

@@ -1,13 +1,14 @@
 //! The expression graph: a hash-consed DAG of scalar operations. It knows nothing of what is computed.
 //!
 //! A [`Graph`] is a value: operations in an order in which operands stand before their users, grouped inputs, grouped
-//! outputs. A [`Builder`] is the only way to make one: it looks every operation up before adding it, so that equal
+//! outputs. What an operation is stands in the tables of [`op`]. A [`Builder`] is the only way to make one: it looks every operation up before adding it, so that equal
 //! operations are one node, and applies the [rules] on the way in.
 
 mod builder;
 mod gradient;
 mod graph;
 mod interpret;
+pub mod op;
 pub mod port_text;
 pub mod rules;
 mod verify;
@@ -17,5 +18,6 @@ pub use gradient::gradient;
 pub use graph::{Alike, Constant, Counts, Graph, NodeId, Note, Op, Port, Section, Width, DIVISION, TAIL};
 pub(crate) use interpret::of_rounded_sum;
 pub use interpret::{evaluate, evaluate_by, values, values_by};
+pub use op::{Binary, Unary};
 pub use rules::{Folding, Grade, Rule, RuleSet};
 pub use verify::verify;

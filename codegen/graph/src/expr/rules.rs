@@ -4,7 +4,7 @@
 //! rules give the same bits for all finite inputs, up to the sign of a zero; `Algebraic` ones are equal over the reals
 //! and move the rounding. With `Exact` rules alone the generated program is the generic runtime, bit for bit.
 
-use super::{Builder, NodeId, Op};
+use super::{Binary, Builder, NodeId, Op, Unary};
 use straightline_core::{Dd, Real};
 
 /// What a rule promises.
@@ -37,19 +37,19 @@ impl Folding {
         }
     }
 
-    /// The value of an operation on constants.
-    fn fold(
-        self,
-        wide: fn(Dd, Dd) -> Dd,
-        f64_op: fn(f64, f64) -> f64,
-        f32_op: fn(f32, f32) -> f32,
-        a: Dd,
-        b: Dd,
-    ) -> Dd {
+    /// The value of an operation on constants, as many as it takes.
+    fn fold(self, op: Op, a: Dd, b: Dd) -> Dd {
+        fn value<T: Real>(op: Op, a: T, b: T) -> T {
+            match op {
+                Op::Unary(op, _) => op.value(a),
+                Op::Binary(op, ..) => op.value(a, b),
+                _ => unreachable!("only operations on numbers are folded"),
+            }
+        }
         match self {
-            Folding::F64 => Dd::from(f64_op(a.to_f64(), b.to_f64())),
-            Folding::F32 => Dd::from(f64::from(f32_op(a.to_f32(), b.to_f32()))),
-            Folding::DoubleDouble => wide(a, b),
+            Folding::F64 => Dd::from(value(op, a.to_f64(), b.to_f64())),
+            Folding::F32 => Dd::from(f64::from(value(op, a.to_f32(), b.to_f32()))),
+            Folding::DoubleDouble => value(op, a, b),
         }
     }
 
@@ -65,14 +65,6 @@ impl Folding {
                 (Dd::from(f64::from(s)), Dd::from(f64::from(c)))
             }
             Folding::DoubleDouble => x.sin_cos(),
-        }
-    }
-
-    fn sqrt(self, x: Dd) -> Dd {
-        match self {
-            Folding::F64 => Dd::from(Real::sqrt(x.to_f64())),
-            Folding::F32 => Dd::from(f64::from(Real::sqrt(x.to_f32()))),
-            Folding::DoubleDouble => x.sqrt(),
         }
     }
 }
@@ -191,18 +183,13 @@ pub const RULES: &[Rule] = &[
 ];
 
 fn fold(b: &mut Builder, op: Op) -> Option<NodeId> {
-    let folding = b.rules().folding();
     let value = |id: NodeId| b.as_constant(id).map(|c| c.value());
-    let folded = match op {
-        Op::Add(x, y) => folding.fold(|x, y| x + y, |x, y| x + y, |x, y| x + y, value(x)?, value(y)?),
-        Op::Sub(x, y) => folding.fold(|x, y| x - y, |x, y| x - y, |x, y| x - y, value(x)?, value(y)?),
-        Op::Mul(x, y) => folding.fold(|x, y| x * y, |x, y| x * y, |x, y| x * y, value(x)?, value(y)?),
-        Op::Div(x, y) => folding.fold(|x, y| x / y, |x, y| x / y, |x, y| x / y, value(x)?, value(y)?),
-        Op::Neg(x) => -value(x)?,
-        Op::Sqrt(x) => folding.sqrt(value(x)?),
-        Op::Sign(x) => value(x)?.sign(),
+    let (x, y) = match op {
+        Op::Unary(_, x) => (value(x)?, Dd::ZERO),
+        Op::Binary(_, x, y) => (value(x)?, value(y)?),
         _ => return None,
     };
+    let folded = b.rules().folding().fold(op, x, y);
     Some(b.constant(folded))
 }
 
@@ -212,57 +199,57 @@ fn is(b: &Builder, id: NodeId, x: f64) -> bool {
 
 fn add_zero(b: &mut Builder, op: Op) -> Option<NodeId> {
     match op {
-        Op::Add(x, y) if is(b, y, 0.0) => Some(x),
-        Op::Add(x, y) if is(b, x, 0.0) => Some(y),
+        Op::Binary(Binary::Add, x, y) if is(b, y, 0.0) => Some(x),
+        Op::Binary(Binary::Add, x, y) if is(b, x, 0.0) => Some(y),
         _ => None,
     }
 }
 
 fn sub_zero(b: &mut Builder, op: Op) -> Option<NodeId> {
     match op {
-        Op::Sub(x, y) if is(b, y, 0.0) => Some(x),
-        Op::Sub(x, y) if is(b, x, 0.0) => Some(b.add(Op::Neg(y))),
+        Op::Binary(Binary::Sub, x, y) if is(b, y, 0.0) => Some(x),
+        Op::Binary(Binary::Sub, x, y) if is(b, x, 0.0) => Some(b.add(Op::neg(y))),
         _ => None,
     }
 }
 
 fn sub_self(b: &mut Builder, op: Op) -> Option<NodeId> {
     match op {
-        Op::Sub(x, y) if x == y => Some(b.constant(Dd::ZERO)),
+        Op::Binary(Binary::Sub, x, y) if x == y => Some(b.constant(Dd::ZERO)),
         _ => None,
     }
 }
 
 fn mul_zero(b: &mut Builder, op: Op) -> Option<NodeId> {
     match op {
-        Op::Mul(x, y) if is(b, x, 0.0) || is(b, y, 0.0) => Some(b.constant(Dd::ZERO)),
+        Op::Binary(Binary::Mul, x, y) if is(b, x, 0.0) || is(b, y, 0.0) => Some(b.constant(Dd::ZERO)),
         _ => None,
     }
 }
 
 fn mul_one(b: &mut Builder, op: Op) -> Option<NodeId> {
     match op {
-        Op::Mul(x, y) if is(b, y, 1.0) => Some(x),
-        Op::Mul(x, y) if is(b, x, 1.0) => Some(y),
-        Op::Mul(x, y) if is(b, y, -1.0) => Some(b.add(Op::Neg(x))),
-        Op::Mul(x, y) if is(b, x, -1.0) => Some(b.add(Op::Neg(y))),
+        Op::Binary(Binary::Mul, x, y) if is(b, y, 1.0) => Some(x),
+        Op::Binary(Binary::Mul, x, y) if is(b, x, 1.0) => Some(y),
+        Op::Binary(Binary::Mul, x, y) if is(b, y, -1.0) => Some(b.add(Op::neg(x))),
+        Op::Binary(Binary::Mul, x, y) if is(b, x, -1.0) => Some(b.add(Op::neg(y))),
         _ => None,
     }
 }
 
 fn div_one(b: &mut Builder, op: Op) -> Option<NodeId> {
     match op {
-        Op::Div(x, y) if is(b, y, 1.0) => Some(x),
-        Op::Div(x, y) if is(b, y, -1.0) => Some(b.add(Op::Neg(x))),
-        Op::Div(x, _) if is(b, x, 0.0) => Some(x),
+        Op::Binary(Binary::Div, x, y) if is(b, y, 1.0) => Some(x),
+        Op::Binary(Binary::Div, x, y) if is(b, y, -1.0) => Some(b.add(Op::neg(x))),
+        Op::Binary(Binary::Div, x, _) if is(b, x, 0.0) => Some(x),
         _ => None,
     }
 }
 
 fn neg_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
     match op {
-        Op::Neg(x) => match b.op(x) {
-            Op::Neg(y) => Some(y),
+        Op::Unary(Unary::Neg, x) => match b.op(x) {
+            Op::Unary(Unary::Neg, y) => Some(y),
             _ => None,
         },
         _ => None,
@@ -270,29 +257,29 @@ fn neg_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
 }
 
 fn add_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
-    let Op::Add(x, y) = op else { return None };
+    let Op::Binary(Binary::Add, x, y) = op else { return None };
     let ((u, s), (v, t)) = (without_sign(b, x), without_sign(b, y));
     match (s, t) {
         (true, true) => {
-            let sum = b.add(Op::Add(u, v));
-            Some(b.add(Op::Neg(sum)))
+            let sum = b.add(Op::add(u, v));
+            Some(b.add(Op::neg(sum)))
         }
-        (true, false) => Some(b.add(Op::Sub(v, u))),
-        (false, true) => Some(b.add(Op::Sub(u, v))),
+        (true, false) => Some(b.add(Op::sub(v, u))),
+        (false, true) => Some(b.add(Op::sub(u, v))),
         (false, false) => None,
     }
 }
 
 fn sub_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
-    let Op::Sub(x, y) = op else { return None };
+    let Op::Binary(Binary::Sub, x, y) = op else { return None };
     let ((u, s), (v, t)) = (without_sign(b, x), without_sign(b, y));
     match (s, t) {
-        (true, true) => Some(b.add(Op::Sub(v, u))),
+        (true, true) => Some(b.add(Op::sub(v, u))),
         (true, false) => {
-            let sum = b.add(Op::Add(u, v));
-            Some(b.add(Op::Neg(sum)))
+            let sum = b.add(Op::add(u, v));
+            Some(b.add(Op::neg(sum)))
         }
-        (false, true) => Some(b.add(Op::Add(u, v))),
+        (false, true) => Some(b.add(Op::add(u, v))),
         (false, false) => None,
     }
 }
@@ -300,63 +287,62 @@ fn sub_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
 /// `x` without its sign, and whether it had one: a negation or a negative constant.
 fn without_sign(b: &mut Builder, x: NodeId) -> (NodeId, bool) {
     match b.op(x) {
-        Op::Neg(y) => (y, true),
+        Op::Unary(Unary::Neg, y) => (y, true),
         Op::Constant(c) if c.is_negative() => (b.constant(-c.value()), true),
         _ => (x, false),
     }
 }
 
 fn mul_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
-    let Op::Mul(x, y) = op else { return None };
+    let Op::Binary(Binary::Mul, x, y) = op else { return None };
     let ((x, s), (y, t)) = (without_sign(b, x), without_sign(b, y));
     if !(s || t) {
         return None;
     }
-    let product = b.add(Op::Mul(x, y));
-    Some(if s != t { b.add(Op::Neg(product)) } else { product })
+    let product = b.add(Op::mul(x, y));
+    Some(if s != t { b.add(Op::neg(product)) } else { product })
 }
 
 fn div_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
-    let Op::Div(x, y) = op else { return None };
+    let Op::Binary(Binary::Div, x, y) = op else { return None };
     let ((x, s), (y, t)) = (without_sign(b, x), without_sign(b, y));
     if !(s || t) {
         return None;
     }
-    let quotient = b.add(Op::Div(x, y));
-    Some(if s != t { b.add(Op::Neg(quotient)) } else { quotient })
+    let quotient = b.add(Op::div(x, y));
+    Some(if s != t { b.add(Op::neg(quotient)) } else { quotient })
 }
 
 fn commute(b: &mut Builder, op: Op) -> Option<NodeId> {
     match op {
-        Op::Add(x, y) if y < x => Some(b.add(Op::Add(y, x))),
-        Op::Mul(x, y) if y < x => Some(b.add(Op::Mul(y, x))),
+        Op::Binary(f, x, y) if f.row().commutes && y < x => Some(b.add(Op::Binary(f, y, x))),
         _ => None,
     }
 }
 
 fn sub_flip(b: &mut Builder, op: Op) -> Option<NodeId> {
     match op {
-        Op::Sub(x, y) => {
-            let flipped = b.find(Op::Sub(y, x))?;
-            Some(b.add(Op::Neg(flipped)))
+        Op::Binary(Binary::Sub, x, y) => {
+            let flipped = b.find(Op::sub(y, x))?;
+            Some(b.add(Op::neg(flipped)))
         }
         _ => None,
     }
 }
 
 fn mul_mul(b: &mut Builder, op: Op) -> Option<NodeId> {
-    let Op::Mul(x, y) = op else { return None };
+    let Op::Binary(Binary::Mul, x, y) = op else { return None };
     let (c, inner) = match (b.as_constant(x), b.as_constant(y)) {
         (Some(c), None) => (c, y),
         (None, Some(c)) => (c, x),
         _ => return None,
     };
-    let Op::Mul(u, v) = b.op(inner) else { return None };
+    let Op::Binary(Binary::Mul, u, v) = b.op(inner) else { return None };
     let (d, w) = match (b.as_constant(u), b.as_constant(v)) {
         (Some(d), _) => (d, v),
         (_, Some(d)) => (d, u),
         _ => return None,
     };
     let k = b.constant(c.value() * d.value());
-    Some(b.add(Op::Mul(k, w)))
+    Some(b.add(Op::mul(k, w)))
 }

@@ -44,8 +44,9 @@ pub fn verify(graph: &Graph) -> Result<(), String> {
         }
     }
     for (row, limbs) in graph.alike.iter().flat_map(|alike| alike.rows.iter().map(|row| (row, alike.limbs.len()))) {
-        let kind = |id: &NodeId| graph.ops.get(id.index()).map(std::mem::discriminant);
-        if row.len() != limbs || row.iter().any(|id| kind(id).is_none() || kind(id) != kind(&row[0])) {
+        let op = |id: &NodeId| graph.ops.get(id.index()).copied();
+        let is_alike = |id: &NodeId| op(id).zip(op(&row[0])).is_some_and(|(a, b)| a.is_alike(b));
+        if row.len() != limbs || !row.iter().all(is_alike) {
             return Err(format!("the row {row:?} is not the same operation for {limbs} limbs"));
         }
     }

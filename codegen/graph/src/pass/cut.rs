@@ -5,7 +5,7 @@
 //! so no operation is ever done twice, and what is stored is only what crosses: a change of sign is free and crosses by its
 //! operand.
 
-use crate::expr::{Graph, NodeId, Op, Port};
+use crate::expr::{Graph, NodeId, Op, Port, Unary};
 use crate::pass::{dead_code, unread_inputs};
 
 /// A program cut into stages.
@@ -35,7 +35,7 @@ pub fn cut(graph: &Graph, stage_of: &[usize], names: &[&str], blocks: &[usize]) 
     }
     let live = graph.live();
     let free = |id: NodeId| match graph.op(id) {
-        Op::Neg(a) => a,
+        Op::Unary(Unary::Neg, a) => a,
         _ => id,
     };
     // what each stage stores: read by a later stage, or a result

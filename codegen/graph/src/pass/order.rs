@@ -10,7 +10,7 @@
 //! [`verify`](crate::expr::verify()) accepts. After: the same sums of the same terms, so as many operations; where a product is to be
 //! one instruction with its addition, the order of [`sums`](super::sums) has fewer of those.
 
-use crate::expr::{Builder, Graph, NodeId, Op, RuleSet};
+use crate::expr::{Binary, Builder, Graph, NodeId, Op, RuleSet};
 
 /// Of so many terms all orders are compared.
 const ALL_ORDERS: usize = 9;
@@ -22,9 +22,9 @@ pub fn order(graph: &Graph, states: &[Vec<f64>]) -> Graph {
     let mut inside = vec![false; graph.ops.len()];
     let alone = |a: NodeId| uses[a.index()] == 1;
     for id in graph.ids() {
-        if let Op::Add(a, b) | Op::Sub(a, b) = graph.op(id) {
+        if let Op::Binary(Binary::Add | Binary::Sub, a, b) = graph.op(id) {
             for x in [a, b].into_iter().filter(|x| alone(*x)) {
-                inside[x.index()] = matches!(graph.op(x), Op::Add(..) | Op::Sub(..) | Op::Mul(..));
+                inside[x.index()] = matches!(graph.op(x), Op::Binary(Binary::Add | Binary::Sub | Binary::Mul, ..));
             }
         }
     }
@@ -59,7 +59,7 @@ impl Writer<'_> {
         }
         let op = self.graph.op(id);
         let new = match op {
-            Op::Add(..) | Op::Sub(..) => self.sum(id),
+            Op::Binary(Binary::Add | Binary::Sub, ..) => self.sum(id),
             _ => {
                 let op = op.map(|a| self.node(a));
                 self.builder.insert(op)
@@ -88,17 +88,17 @@ impl Writer<'_> {
         for &(term, negative) in &terms[1..] {
             let node = self.node(term);
             sum = match (turned, negative) {
-                (true, true) => self.builder.insert(Op::Add(sum, node)),
+                (true, true) => self.builder.insert(Op::add(sum, node)),
                 (true, false) => {
                     turned = false;
-                    self.builder.insert(Op::Sub(node, sum))
+                    self.builder.insert(Op::sub(node, sum))
                 }
-                (false, true) => self.builder.insert(Op::Sub(sum, node)),
-                (false, false) => self.builder.insert(Op::Add(sum, node)),
+                (false, true) => self.builder.insert(Op::sub(sum, node)),
+                (false, false) => self.builder.insert(Op::add(sum, node)),
             };
         }
         match turned {
-            true => self.builder.insert(Op::Neg(sum)),
+            true => self.builder.insert(Op::neg(sum)),
             false => sum,
         }
     }
@@ -106,11 +106,11 @@ impl Writer<'_> {
     /// The terms of a sum with their signs.
     fn collect(&self, id: NodeId, negative: bool, is_root: bool, terms: &mut Vec<(NodeId, bool)>) {
         match self.graph.op(id) {
-            Op::Add(a, b) if is_root || self.inside[id.index()] => {
+            Op::Binary(Binary::Add, a, b) if is_root || self.inside[id.index()] => {
                 self.collect(a, negative, false, terms);
                 self.collect(b, negative, false, terms);
             }
-            Op::Sub(a, b) if is_root || self.inside[id.index()] => {
+            Op::Binary(Binary::Sub, a, b) if is_root || self.inside[id.index()] => {
                 self.collect(a, negative, false, terms);
                 self.collect(b, !negative, false, terms);
             }
@@ -178,7 +178,7 @@ mod tests {
         let mut sum = terms[0];
         for k in 1..values.len() {
             let before = all[sum.index()];
-            sum = builder.insert(if negative[k] { Op::Sub(sum, terms[k]) } else { Op::Add(sum, terms[k]) });
+            sum = builder.insert(if negative[k] { Op::sub(sum, terms[k]) } else { Op::add(sum, terms[k]) });
             all.push(if negative[k] { before - values[k] } else { before + values[k] });
         }
         (builder.finish(vec![Port::new("y", &[1])], vec![sum]), all)

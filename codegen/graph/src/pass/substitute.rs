@@ -21,7 +21,8 @@
 //! that stay keep their order, names and sections.
 
 use super::{count_sums, dead_code, sums};
-use crate::expr::{of_rounded_sum, values_by, Constant, Counts, Graph, NodeId, Note, Op};
+use crate::expr::op::Kind;
+use crate::expr::{of_rounded_sum, values_by, Binary, Constant, Counts, Graph, NodeId, Note, Op, Unary};
 use crate::random::Random;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
@@ -91,7 +92,7 @@ fn round(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
 
 /// The results at the random states; none where roots and signs stand for inputs, whose order is that of the graph.
 fn results(graph: &Graph) -> Option<Vec<Value>> {
-    let has_atoms = graph.ops.iter().any(|op| matches!(op, Op::Sqrt(_) | Op::Sign(_)));
+    let has_atoms = graph.ops.iter().any(is_atom);
     (!has_atoms).then(|| {
         let values = values(graph);
         graph.results.iter().map(|r| values[r.index()]).collect()
@@ -122,20 +123,17 @@ enum Form {
 }
 
 impl Form {
-    fn op(self, x: NodeId, y: NodeId) -> Op {
+    fn op(self) -> Binary {
         match self {
-            Form::Sum => Op::Add(x, y),
-            Form::Difference => Op::Sub(x, y),
-            Form::Product => Op::Mul(x, y),
+            Form::Sum => Binary::Add,
+            Form::Difference => Binary::Sub,
+            Form::Product => Binary::Mul,
         }
     }
 
     fn of(self, x: &Value, y: &Value) -> Value {
-        std::array::from_fn(|k| match self {
-            Form::Sum => x[k] + y[k],
-            Form::Difference => x[k] - y[k],
-            Form::Product => x[k] * y[k],
-        })
+        let op = self.op();
+        std::array::from_fn(|k| op.value(x[k], y[k]))
     }
 }
 
@@ -184,22 +182,22 @@ impl Net {
             NodeId(net.ops.len() as u32 - 1)
         };
         let node = |i: usize| NodeId(i as u32);
-        let pair = found.pair.map(|(x, y, form)| push(&mut net, form.op(node(x), node(y))));
+        let pair = found.pair.map(|(x, y, form)| push(&mut net, Op::Binary(form.op(), node(x), node(y))));
         for b in &found.becomes {
             let mut becomes = match b.y {
-                None => Op::Neg(node(b.x)),
+                None => Op::neg(node(b.x)),
                 Some((form, y)) => {
                     let y = match y {
                         Operand::Node(y) => node(y),
                         Operand::Constant(c) => push(&mut net, Op::Constant(Constant::new(c))),
                         Operand::Pair => pair.expect("a pair where an operand is one"),
                     };
-                    form.op(node(b.x), y)
+                    Op::Binary(form.op(), node(b.x), y)
                 }
             };
             // −(x ∘ y), and x itself as −(−x): sums dissolves signs
             if b.negative != b.y.is_none() {
-                becomes = Op::Neg(push(&mut net, becomes));
+                becomes = Op::neg(push(&mut net, becomes));
             }
             net.ops[b.value] = becomes;
         }
@@ -302,15 +300,15 @@ impl<'g> Search<'g> {
         }
         graph.results.iter().for_each(|r| uses[r.index()] += 1);
         let is_number = |i: &usize| match graph.ops[*i] {
-            Op::Neg(_) | Op::SinCos(_) | Op::AngleSum(..) => false,
+            Op::Unary(Unary::Neg, _) | Op::SinCos(_) | Op::AngleSum(..) => false,
             Op::Constant(c) => live[*i] && c.value() != Dd::ZERO,
             _ => live[*i],
         };
         let numbers: Vec<usize> = (0..n).filter(is_number).collect();
         let is_free = |op: &Op| matches!(op, Op::Input(_) | Op::Constant(_) | Op::Sin(_) | Op::Cos(_));
         let free: Vec<bool> = graph.ops.iter().map(is_free).collect();
-        let atoms: Vec<usize> =
-            (0..n).filter(|i| matches!(graph.ops[*i], Op::Div(..) | Op::Sqrt(_) | Op::Sign(_))).collect();
+        let may_be_no_number = |i: &usize| graph.ops[*i].row().is_some_and(|row| row.kind != Kind::Polynomial);
+        let atoms: Vec<usize> = (0..n).filter(may_be_no_number).collect();
         let words = atoms.len().div_ceil(64);
         let mut quotients = vec![0; n * words];
         for i in 0..n {
@@ -465,7 +463,7 @@ impl<'g> Search<'g> {
 
     /// Whether a value may be formed in another way.
     fn is_formed(&self, v: usize) -> bool {
-        matches!(self.graph.ops[v], Op::Mul(..) | Op::Add(..) | Op::Sub(..))
+        self.graph.ops[v].is_counted() && self.graph.ops[v].is_polynomial()
     }
 
     /// Values that are about ± this at the first point.
@@ -498,7 +496,7 @@ impl<'g> Search<'g> {
     fn keeps(&self, v: usize, form: Form, x: &Value, y: &Value) -> bool {
         let size = |i: usize, k: usize| self.values[i][k].abs().hi();
         let most = |k: usize| match self.graph.ops[v] {
-            Op::Add(a, b) | Op::Sub(a, b) => size(v, k).max(size(a.index(), k)).max(size(b.index(), k)),
+            Op::Binary(Binary::Add | Binary::Sub, a, b) => size(v, k).max(size(a.index(), k)).max(size(b.index(), k)),
             _ => size(v, k),
         };
         form == Form::Product || (0..POINTS).all(|k| x[k].abs().hi().max(y[k].abs().hi()) <= GREATER * most(k))
@@ -510,7 +508,7 @@ impl<'g> Search<'g> {
         let mut freed = 0;
         let mut stack = vec![v];
         while let Some(i) = stack.pop() {
-            freed += usize::from(matches!(self.graph.ops[i], Op::Mul(..) | Op::Add(..) | Op::Sub(..) | Op::Div(..)));
+            freed += usize::from(self.graph.ops[i].is_counted() && !is_atom(&self.graph.ops[i]));
             for a in self.graph.ops[i].operands().map(NodeId::index) {
                 let times = match less.iter_mut().find(|l| l.0 == a) {
                     Some(l) => {
@@ -648,6 +646,11 @@ fn constant(v: &Value, x: &Value) -> Option<(Form, Dd, bool)> {
     None
 }
 
+/// Whether a value counts as an input of its own: it is not rational in its operands.
+fn is_atom(op: &Op) -> bool {
+    op.row().is_some_and(|row| row.kind == Kind::Other)
+}
+
 /// All values at random inputs; roots and signs are random themselves.
 fn values(graph: &Graph) -> Vec<Value> {
     let mut random = Random(0x2545_f491_4f6c_dd1d);
@@ -659,7 +662,6 @@ fn values(graph: &Graph) -> Vec<Value> {
     };
     let inputs: usize = graph.inputs.iter().map(|p| p.len()).sum();
     let inputs: Vec<Value> = (0..inputs).map(|_| any()).collect();
-    let is_atom = |op: &Op| matches!(op, Op::Sqrt(_) | Op::Sign(_));
     let atoms: Vec<Option<Value>> = graph.ops.iter().map(|op| is_atom(op).then(&mut any)).collect();
     let points: [Vec<Dd>; POINTS] = std::array::from_fn(|k| {
         let inputs: Vec<Dd> = inputs.iter().map(|x| x[k]).collect();
@@ -695,13 +697,13 @@ mod tests {
     #[test]
     fn what_is_there_already_is_not_computed_in_another_way() {
         let programs = programs(|b, [x, y, z, _]| {
-            let [xx, yy] = [x, y].map(|v| b.add(Op::Mul(v, v)));
-            let sum = b.add(Op::Add(x, y));
-            let square = b.add(Op::Mul(sum, sum));
-            let rest = b.add(Op::Sub(square, xx));
-            let twice = b.add(Op::Sub(rest, yy));
-            let product = b.add(Op::Mul(x, y));
-            let last = b.add(Op::Mul(product, z));
+            let [xx, yy] = [x, y].map(|v| b.add(Op::mul(v, v)));
+            let sum = b.add(Op::add(x, y));
+            let square = b.add(Op::mul(sum, sum));
+            let rest = b.add(Op::sub(square, xx));
+            let twice = b.add(Op::sub(rest, yy));
+            let product = b.add(Op::mul(x, y));
+            let last = b.add(Op::mul(product, z));
             vec![twice, product, last, xx, yy]
         });
         assert_eq!(flops(&programs), [8, 5]);
@@ -713,9 +715,9 @@ mod tests {
         let programs = programs(|b, [q, x, ..]| {
             let pair = b.add(Op::SinCos(q));
             let halves = [Op::Sin(pair), Op::Cos(pair)].map(|half| b.add(half));
-            let turned = halves.map(|half| b.add(Op::Mul(half, x)));
-            let back = [0, 1].map(|k| b.add(Op::Mul(halves[k], turned[k])));
-            let sum = b.add(Op::Add(back[0], back[1]));
+            let turned = halves.map(|half| b.add(Op::mul(half, x)));
+            let back = [0, 1].map(|k| b.add(Op::mul(halves[k], turned[k])));
+            let sum = b.add(Op::add(back[0], back[1]));
             vec![turned[0], turned[1], sum]
         });
         assert_eq!(flops(&programs), [5, 2]);
@@ -726,8 +728,8 @@ mod tests {
     fn a_new_value_may_serve_two() {
         let programs = programs(|b, [x, y, z, w]| {
             let of = [x, y].map(|v| {
-                let product = b.add(Op::Mul(v, z));
-                b.add(Op::Mul(product, w))
+                let product = b.add(Op::mul(v, z));
+                b.add(Op::mul(product, w))
             });
             of.to_vec()
         });
@@ -738,21 +740,22 @@ mod tests {
     #[test]
     fn no_value_gets_a_quotient_that_it_did_not_need() {
         let [_, after] = programs(|b, [x, y, z, w]| {
-            let quotient = b.add(Op::Div(y, x));
+            let quotient = b.add(Op::div(y, x));
             let of = [x, y].map(|v| {
-                let product = b.add(Op::Mul(v, z));
-                b.add(Op::Mul(product, w))
+                let product = b.add(Op::mul(v, z));
+                b.add(Op::mul(product, w))
             });
             vec![quotient, of[0], of[1]]
         });
-        let quotient = after.ids().find(|id| matches!(after.op(*id), Op::Div(..))).expect("it is a result");
+        let quotient =
+            after.ids().find(|id| matches!(after.op(*id), Op::Binary(Binary::Div, ..))).expect("it is a result");
         assert_eq!(after.uses()[quotient.index()], 1);
     }
 
     /// x y as the difference of two numbers of its size, and of two that are a thousand times as great.
     #[test]
     fn no_value_becomes_the_difference_of_greater_ones() {
-        let [graph, _] = programs(|b, [x, y, ..]| vec![b.add(Op::Mul(x, y))]);
+        let [graph, _] = programs(|b, [x, y, ..]| vec![b.add(Op::mul(x, y))]);
         let search = Search::new(&graph);
         let product = graph.results[0].index();
         let times = |k: f64| search.values[product].map(|v| v * Dd::from(k));

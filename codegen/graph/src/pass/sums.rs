@@ -12,7 +12,7 @@
 //! Before: any graph that [`verify`](crate::expr::verify()) accepts. After: the same results over the reals, no operation
 //! more. Names and sections go with the values that survive.
 
-use crate::expr::{Builder, Constant, Counts, Graph, NodeId, Note, Op, RuleSet, TAIL};
+use crate::expr::{Binary, Builder, Constant, Counts, Graph, NodeId, Note, Op, RuleSet, Unary, TAIL};
 use rustc_hash::{FxHashMap, FxHasher};
 use std::cmp::Reverse;
 use std::collections::hash_map::Entry;
@@ -108,11 +108,11 @@ impl Table {
         for id in graph.ids().filter(|id| live[id.index()]) {
             let t = |a: NodeId| term_of[a.index()];
             let term = match graph.op(id) {
-                Op::Neg(a) => t(a).signed(true),
+                Op::Unary(Unary::Neg, a) => t(a).signed(true),
                 Op::Constant(c) => table.constant(c.value()),
-                Op::Mul(a, b) => table.product(t(a), t(b), Some(id)),
-                Op::Add(a, b) => table.push(Value::Sum(vec![t(a), t(b)]), Some(id)),
-                Op::Sub(a, b) => table.push(Value::Sum(vec![t(a), t(b).signed(true)]), Some(id)),
+                Op::Binary(Binary::Mul, a, b) => table.product(t(a), t(b), Some(id)),
+                Op::Binary(Binary::Add, a, b) => table.push(Value::Sum(vec![t(a), t(b)]), Some(id)),
+                Op::Binary(Binary::Sub, a, b) => table.push(Value::Sum(vec![t(a), t(b).signed(true)]), Some(id)),
                 op => {
                     let mut operands = [None; 2];
                     op.operands().zip(&mut operands).for_each(|(a, place)| *place = Some(t(a)));
@@ -556,8 +556,6 @@ impl Table {
                     counts.add += additions;
                     fused += products.min(additions);
                 }
-                Value::Other(Op::Div(..), _) => counts.div += 1,
-                Value::Other(Op::Sqrt(_), _) => counts.sqrt += 1,
                 Value::Other(Op::SinCos(_), [Some(angle), _]) => {
                     counts.sin_cos += 1;
                     let sum = matches!(self.values[self.resolved(*angle).value()], Value::Other(Op::AngleSum(..), _));
@@ -567,7 +565,8 @@ impl Table {
                     counts.add += 1;
                     counts.tail += TAIL;
                 }
-                _ => {}
+                Value::Other(op, _) => op.row().into_iter().for_each(|row| counts.count(row.counted)),
+                Value::Constant(_) | Value::Same(_) => {}
             }
         }
         counts.fma = counts.mul + counts.add - fused;
@@ -703,7 +702,7 @@ impl Writer<'_> {
             Value::Product(..) => {
                 let [a, b] = self.table.factors(value);
                 let ((a, s), (b, t)) = (self.term(a), self.term(b));
-                (self.builder.insert(Op::Mul(a.min(b), a.max(b))), s != t)
+                (self.builder.insert(Op::mul(a.min(b), a.max(b))), s != t)
             }
             Value::Sum(_) => self.sum(&self.table.terms(value)),
             Value::Same(_) => unreachable!("terms are resolved"),
@@ -744,7 +743,7 @@ impl Writer<'_> {
         }
         match self.term(term) {
             (node, false) => node,
-            (node, true) => self.builder.insert(Op::Neg(node)),
+            (node, true) => self.builder.insert(Op::neg(node)),
         }
     }
 
@@ -768,8 +767,8 @@ impl Writer<'_> {
         let (mut sum, _) = left.remove(lead.unwrap_or(0));
         let mut add = |builder: &mut Builder, (node, negative): (NodeId, bool)| {
             sum = builder.insert(match negative != turned {
-                true => Op::Sub(sum, node),
-                false => Op::Add(sum, node),
+                true => Op::sub(sum, node),
+                false => Op::add(sum, node),
             });
         };
         for t in left {

@@ -142,14 +142,14 @@ mod tests {
     fn products_first(n: usize) -> Graph {
         let mut b = Builder::new(RuleSet::all(), vec![Port::new("x", &[n + 2])]);
         let x: Vec<NodeId> = (0..n + 2).map(|k| b.insert(Op::Input(k as u32))).collect();
-        let products: Vec<NodeId> = (0..n).map(|k| b.add(Op::Mul(x[0], x[k + 2]))).collect();
+        let products: Vec<NodeId> = (0..n).map(|k| b.add(Op::mul(x[0], x[k + 2]))).collect();
         let mut sum = products[0];
         for product in &products[1..] {
-            sum = b.add(Op::Add(sum, *product));
+            sum = b.add(Op::add(sum, *product));
         }
         let pair = b.add(Op::SinCos(x[1]));
         let (sine, cosine) = (b.add(Op::Sin(pair)), b.add(Op::Cos(pair)));
-        let results = vec![b.add(Op::Mul(sum, sine)), b.add(Op::Mul(sum, cosine))];
+        let results = vec![b.add(Op::mul(sum, sine)), b.add(Op::mul(sum, cosine))];
         b.finish(vec![Port::new("y", &[2])], results)
     }
 

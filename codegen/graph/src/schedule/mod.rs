@@ -55,10 +55,8 @@ fn is_value(op: Op) -> bool {
 
 fn weight(op: Op) -> usize {
     match op {
-        Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Div(..) | Op::Sqrt(_) => 1,
         Op::SinCos(_) => 40,
-        Op::Input(_) | Op::Constant(_) | Op::AngleSum(..) => 0,
-        Op::Neg(_) | Op::Sign(_) | Op::Sin(_) | Op::Cos(_) => 0,
+        op => usize::from(op.is_counted()),
     }
 }
 
