@@ -86,7 +86,7 @@ fn main() {
     lanes(&out, &folder);
 }
 
-/// Functions over lanes and batches for `tests/lanes.rs`: in one part and in several, with every shape of output, with a
+/// Functions over lanes and batches for `tests/suite/lanes.rs`: in one part and in several, with every shape of output, with a
 /// parameter that all states share, in both scalars, with both homes of the drivers.
 fn lanes(out: &Path, folder: &Path) {
     use Function::{ForwardDynamics, InverseDynamics, Jacobian, MassMatrix};

@@ -223,7 +223,9 @@ impl Builder {
         result
     }
 
-    fn run(&self, manifest: &Path, out_dir: &Path) -> Messages {
+    /// What [`build`](Builder::build) does and says, without saying it.
+    #[doc(hidden)]
+    pub fn run(&self, manifest: &Path, out_dir: &Path) -> Messages {
         let robot = manifest.join(&self.robot);
         let scene = self.scene_file.as_ref().map(|scene| manifest.join(scene));
         let files: Vec<&PathBuf> = [&robot].into_iter().chain(&scene).collect();
@@ -274,12 +276,15 @@ impl Builder {
 }
 
 /// What goes where.
-struct Messages {
+#[derive(Debug)]
+#[doc(hidden)]
+pub struct Messages {
     /// Lines on standard output, which cargo reads.
-    cargo: Vec<String>,
+    pub cargo: Vec<String>,
     /// Text on standard error, which cargo shows when the build fails.
-    person: String,
-    result: Result<Generated, Error>,
+    pub person: String,
+    /// What was made.
+    pub result: Result<Generated, Error>,
 }
 
 impl Messages {
@@ -344,106 +349,5 @@ impl std::error::Error for Error {
             Error::Read(_, error) | Error::Write(error) => Some(error),
             Error::Robot { .. } | Error::Module(_) | Error::NoOutDir => None,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::fs;
-
-    const PENDULUM: &str = r#"
-[robot]
-name = "pendulum"
-
-[[link]]
-name = "world"
-
-[[link]]
-name = "bob"
-mass = 1.5
-com = [0.0, 0.0, -0.4]
-inertia = [0.02, 0.02, 0.001]
-
-[[joint]]
-name = "pivot"
-kind = "continuous"
-parent = "world"
-child = "bob"
-axis = "y"
-"#;
-
-    fn scratch(name: &str, text: &str) -> PathBuf {
-        let path = std::env::temp_dir().join(format!("straightline-builder-{}-{name}", std::process::id()));
-        fs::create_dir_all(&path).unwrap();
-        fs::write(path.join("pen.toml"), text).unwrap();
-        path
-    }
-
-    #[test]
-    fn the_output_stands_in_out_dir_and_cargo_knows_what_it_depends_on() {
-        let here = scratch("good", PENDULUM);
-        let m = Builder::new("pen.toml").functions([Function::GravityForce]).run(&here, &here);
-        let generated = m.result.unwrap();
-        assert_eq!(fs::read_to_string(here.join("pen.rs")).unwrap(), generated.text);
-        assert_eq!(m.cargo, [format!("cargo::rerun-if-changed={}", here.join("pen.toml").display())]);
-        assert!(generated.text.contains("pub fn gravity_force(q: &[f64; 1], g: &mut [f64; 1])"));
-        assert!(!generated.text.contains("pub fn mass_matrix"));
-    }
-
-    #[test]
-    fn errors_reach_cargo_in_one_line_each_and_people_with_the_source_line() {
-        let here =
-            scratch("bad", &PENDULUM.replace("mass = 1.5", "mass = -1.5").replace("\"bob\"\naxis", "\"bib\"\naxis"));
-        let m = Builder::new("pen.toml").run(&here, &here);
-        assert_eq!(m.result.unwrap_err().to_string(), "pen.toml: 2 errors");
-        let errors: Vec<_> = m.cargo.iter().filter(|l| l.starts_with("cargo::error=pen.toml:")).collect();
-        assert_eq!(errors.len(), 2, "{:?}", m.cargo);
-        assert!(m.person.contains("--> pen.toml:10:8"), "{}", m.person);
-        assert!(!here.join("pen.rs").exists());
-    }
-
-    #[test]
-    fn a_scene_file_says_what_is_wanted_and_is_an_input_of_the_build() {
-        let here = scratch("scene", PENDULUM);
-        fs::write(here.join("still.toml"), "[outputs]\nfunctions = [\"inverse_dynamics\"]\n[zero]\nqd = true\n")
-            .unwrap();
-        let m = Builder::new("pen.toml").scene_file("still.toml").run(&here, &here);
-        let text = m.result.unwrap().text;
-        assert!(text.contains("pub fn inverse_dynamics(q: &[f64; 1], qdd: &[f64; 1], tau: &mut [f64; 1])"), "{text}");
-        assert!(!text.contains("pub fn gravity_force"));
-        assert_eq!(m.cargo[1], format!("cargo::rerun-if-changed={}", here.join("still.toml").display()));
-
-        fs::write(here.join("still.toml"), "[hold]\njoints = { pivt = 0.0 }\n").unwrap();
-        let m = Builder::new("pen.toml").scene_file("still.toml").run(&here, &here);
-        assert_eq!(m.result.unwrap_err().to_string(), "still.toml: 1 error");
-        assert!(m.cargo[2].starts_with("cargo::error=still.toml:2:12: error: "), "{:?}", m.cargo);
-
-        fs::write(here.join("still.toml"), "[zero]\nqdot = true\n").unwrap();
-        let m = Builder::new("pen.toml").scene_file("still.toml").run(&here, &here);
-        assert_eq!(m.result.unwrap_err().to_string(), "still.toml: 1 error");
-        assert!(m.person.contains("--> still.toml:2:1"), "{}", m.person);
-    }
-
-    #[test]
-    fn all_that_is_wrong_with_scene_and_robot_is_said_in_one_run() {
-        let errors = |robot: &str| -> Vec<String> {
-            let here = scratch("both", robot);
-            fs::write(here.join("still.toml"), "[zero]\nqdot = true\n[hold]\njoints = { pivt = 0.0 }\n").unwrap();
-            let m = Builder::new("pen.toml").scene_file("still.toml").run(&here, &here);
-            assert!(!here.join("pen.rs").exists());
-            let place =
-                |line: &String| line.strip_prefix("cargo::error=").map(|l| l.split(' ').next().unwrap().to_string());
-            m.cargo.iter().filter_map(place).collect()
-        };
-        assert_eq!(errors(PENDULUM), ["still.toml:2:1:", "still.toml:4:12:"]);
-        assert_eq!(errors(&PENDULUM.replace("mass = 1.5", "mass = -1.5")), ["pen.toml:10:8:", "still.toml:2:1:"]);
-    }
-
-    #[test]
-    fn a_missing_file_is_named() {
-        let here = scratch("missing", PENDULUM);
-        let m = Builder::new("pan.toml").run(&here, &here);
-        assert!(m.cargo[1].starts_with("cargo::error=") && m.cargo[1].contains("pan.toml: "), "{:?}", m.cargo);
     }
 }

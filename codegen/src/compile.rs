@@ -411,7 +411,7 @@ fn optimised_with(
 
 /// What a pass made, if it kept what graphs promise.
 pub(crate) fn passed(pass: &'static str, program: &str, graph: Graph) -> Graph {
-    #[cfg(test)]
+    #[cfg(feature = "internals")]
     let graph = equivalence::sabotage::applied(pass, graph);
     verify(&graph).unwrap_or_else(|broken| panic!("{program}: the pass `{pass}` broke the graph: {broken}"));
     graph

@@ -12,8 +12,8 @@
 //! is generated, too, and the program may lose eight times what the plain equations lose.
 
 mod bounds;
-#[cfg(test)]
-mod mutants;
+#[cfg(feature = "internals")]
+pub(crate) mod mutants;
 
 use crate::compile::{Optimisations, Options};
 use crate::contact;
@@ -900,7 +900,7 @@ impl<'a> States<'a> {
     }
 }
 
-#[cfg(test)]
+#[cfg(feature = "internals")]
 pub(crate) mod sabotage {
     //! Passes that are broken on purpose.
 
@@ -944,70 +944,5 @@ pub(crate) mod sabotage {
             Some(broken) => broken(pass, graph),
             None => graph,
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::compile::checked;
-    use crate::diagnostic::Source;
-    use crate::model::{load, ModelOptions};
-    use crate::scene::Scene;
-
-    /// Numbers as exporters write them: a right angle with fewer digits, dust, a fixed finger.
-    pub(super) const ARM: &str = r#"<robot name="arm"><link name="base"/>
-<link name="a"><inertial><origin xyz="0.02 1e-17 -0.1" rpy="0 0 0"/><mass value="2.5"/>
-<inertia ixx="0.03" iyy="0.028" izz="0.01" ixy="1e-4" ixz="0" iyz="-2e-4"/></inertial></link>
-<link name="b"><inertial><origin xyz="0.15 0.01 1e-12" rpy="0 0 0"/><mass value="1.2"/>
-<inertia ixx="0.004" iyy="0.02" izz="0.019" ixy="0" ixz="3e-4" iyz="0"/></inertial></link>
-<link name="c"><inertial><origin xyz="0 0.002 0.06" rpy="0 0 0"/><mass value="0.4"/>
-<inertia ixx="0.001" iyy="0.0011" izz="0.0006" ixy="1e-19" ixz="0" iyz="0"/></inertial></link>
-<link name="finger"><inertial><origin xyz="0 0.01 0.02" rpy="0 0 0"/><mass value="0.05"/>
-<inertia ixx="2e-5" iyy="2e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="one" type="revolute"><parent link="base"/><child link="a"/><origin xyz="0 0 0.3" rpy="0 0 0"/><axis xyz="0 0 1"/>
-<limit lower="-2.9" upper="2.9" effort="50" velocity="2"/></joint>
-<joint name="two" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0.05 0 1e-16" rpy="1.5708 0 0"/><axis xyz="0 0 1"/>
-<limit lower="-2" upper="2" effort="50" velocity="2"/></joint>
-<joint name="three" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0.3 0.02 0" rpy="0 1.5707963267949 0"/><axis xyz="0 0 1"/>
-<limit lower="-2" upper="2" effort="20" velocity="3"/></joint>
-<joint name="fixed" type="fixed"><parent link="c"/><child link="finger"/><origin xyz="0 0.04 0.1" rpy="0 0 1.5707963267949"/></joint>
-</robot>"#;
-
-    fn robot(text: &str) -> Robot {
-        let (model, complaints) = load(&Source::new("arm.urdf", text), &ModelOptions::default());
-        Robot::new(model.unwrap_or_else(|| panic!("{complaints:?}")))
-    }
-
-    const FUNCTIONS: [Function; 5] = [
-        Function::InverseDynamics,
-        Function::GravityForce,
-        Function::MassMatrix,
-        Function::ForwardDynamics,
-        Function::JointWrenches,
-    ];
-
-    #[test]
-    fn robots_as_people_write_them_keep_their_cheapest_form() {
-        let robot = robot(ARM);
-        for function in FUNCTIONS {
-            let program = checked(&robot, &[], function, &Options::default()).unwrap_or_else(|wrong| panic!("{wrong}"));
-            assert_eq!(program.plainer, None);
-        }
-    }
-
-    /// A form of the robot that is not the robot.
-    #[test]
-    fn a_wrong_form_of_the_robot_gives_way_to_a_plainer_one() {
-        let mut robot = robot(ARM);
-        robot.reduced.bodies[2].first_moment.x *= Dd::new(1.0, 1e-15);
-        let options = Options { scene: Scene::default(), ..Options::default() };
-        let optimisations = crate::compile::Optimisations { chosen: false, ..options.optimisations() };
-        let graph = crate::compile::optimised(&robot, &[], Function::InverseDynamics, &options, optimisations);
-        let wrong = of_function(&robot, &[], Function::InverseDynamics, &options, optimisations, &graph)
-            .expect_err("it is another robot");
-        assert!(wrong.result.starts_with("tau[") && wrong.difference > 1e-20, "{wrong}");
-        let message = wrong.error(&robot.model);
-        assert!(message.detail.contains("link `c`: 1e-19") || message.detail.contains("1e-1"), "{}", message.detail);
     }
 }

@@ -44,5 +44,16 @@ pub use function::{ForwardDynamicsMethod, Function, Robot};
 pub use straightline_graph::expr::Grade;
 pub use straightline_graph::{certify, expr, pass, rounding, schedule, trace};
 
+/// What the tests break inside the compiler. As unit tests they would be a second build of it, as long as the first.
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::equivalence::mutants::{
+        a_broken_pass_never_reaches_the_text, a_wrong_form_of_the_robot_gives_way_to_a_plainer_one,
+        every_kind_of_program_goes_through_the_passes_that_are_broken,
+        robots_as_people_write_them_keep_their_cheapest_form, thousands_of_broken_passes_never_reach_the_text,
+    };
+}
+
 /// Version of the generator, as it stands in generated files.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

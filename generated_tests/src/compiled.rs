@@ -68,3 +68,48 @@ flatten_scalar!(f32);
 flatten_scalar!(f64);
 
 include!(concat!(env!("OUT_DIR"), "/compiled.rs"));
+
+macro_rules! modules {
+    ($($(#[$doc:meta])* $name:ident;)*) => {$(
+        $(#[$doc])*
+        #[allow(clippy::all, dead_code)]
+        pub mod $name {
+            include!(concat!(env!("OUT_DIR"), "/", stringify!($name), ".rs"));
+        }
+    )*};
+}
+
+modules! {
+    /// A floating quadruped in several parts, with the drivers of the package `straightline`.
+    lanes_solo12;
+    /// An arm in single precision that depends on `core` alone.
+    lanes_panda;
+    /// An arm with a load that is the same for all states of a batch.
+    lanes_payload;
+    /// A floating quadruped in several parts; its batches fuse where the machine can.
+    fused_solo12;
+    /// An arm in several parts.
+    generic_panda;
+    /// An arm with parallel joints, whose angles are added.
+    generic_ur5;
+    /// Four legs of three joints.
+    limbs_hyq;
+    /// Two legs of six joints on the pelvis, two arms of seven on the chest.
+    limbs_humanoid;
+    /// Four legs, in any scalar.
+    limbs_generic;
+    /// The planar2r in the contacts of the contact cases.
+    contact_planar2r;
+    /// The chapter_cylindrical in the contacts of the contact cases.
+    contact_chapter_cylindrical;
+    /// The chapter_stanford in the contacts of the contact cases.
+    contact_chapter_stanford;
+    /// The chapter_6r in the contacts of the contact cases.
+    contact_chapter_6r;
+    /// The puma560 in the contacts of the contact cases.
+    contact_puma560;
+    /// The ur5 in the contacts of the contact cases.
+    contact_ur5;
+    /// The panda in the contacts of the contact cases.
+    contact_panda;
+}

@@ -10,6 +10,7 @@ pub mod compiled;
 pub mod contact_cases;
 pub mod drives;
 pub mod inputs;
+pub mod made;
 pub mod programs;
 pub mod random;
 pub mod reference;

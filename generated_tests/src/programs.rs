@@ -1,7 +1,8 @@
-//! Programs as the compiler makes them, before they become text: for the interpreter.
+//! Programs as the compiler makes them, before they become text: for the interpreter. Each is made once, whichever test asks first.
 
+use crate::made::Made;
 use crate::reference::Robot;
-use straightline_codegen::compile::{program, Options, Program};
+use straightline_codegen::compile::{self, Options, Program};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::function::Robot as Loaded;
 use straightline_codegen::model::{self, ModelOptions};
@@ -28,9 +29,19 @@ pub fn options(robot: &Robot) -> Options {
 /// # Panics
 /// With the complaints about the file, if it has errors.
 pub fn load(source: &Source, options: &ModelOptions) -> Loaded {
-    let (model, diagnostics) = model::load(source, options);
-    assert!(!diagnostics.has_errors(), "{}", diagnostics.render());
-    Loaded::new(model.expect("a file without errors has a model"))
+    static LOADED: Made<Loaded> = Made::nothing();
+    LOADED.once(format!("{source:?} {options:?}"), || {
+        let (model, diagnostics) = model::load(source, options);
+        assert!(!diagnostics.has_errors(), "{}", diagnostics.render());
+        Loaded::new(model.expect("a file without errors has a model"))
+    })
+}
+
+/// The program of a function of a robot in no other form than [`load`] gives it.
+pub fn program(robot: &Loaded, frames: &[String], function: Function, options: &Options) -> Program {
+    static MADE: Made<Program> = Made::nothing();
+    let key = format!("{function:?} {frames:?} {options:?} {:?}", robot.model);
+    MADE.once(key, || compile::program(robot, frames, function, options))
 }
 
 /// The program of a function of a robot of the reference data.

@@ -1,6 +1,6 @@
 //! Instructions per call, counted by valgrind's callgrind: the same on a busy machine, so that a change of code shows.
 //!
-//! `cargo bench -p straightline-robots --features bench --bench instructions` compares with
+//! `cargo bench -p straightline-robots --bench instructions` compares with
 //! `instructions.tsv` and fails if a function takes over 2 % more; `INSTRUCTIONS_UPDATE=1` writes that file anew. Without
 //! valgrind it says so and succeeds. Instructions depend on the compiler: the file says of which one its figures are.
 //!

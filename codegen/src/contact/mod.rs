@@ -25,7 +25,7 @@ use straightline_graph::expr::{Graph, Port};
 use straightline_graph::pass::{dead_code, sums, unread_inputs};
 use straightline_graph::trace::{trace, Expr};
 
-#[cfg(test)]
+#[cfg(feature = "internals")]
 pub(crate) use text::bound as mode_bound;
 pub use text::{module, ContactModule};
 

@@ -1,8 +1,7 @@
 //! Programs of every kind with one pass broken on purpose, and forms of the robot with one wrong number: what is written is right, or nothing
 //! is. Right is what the generic runtime says at states of its own, and a bound is one that nothing exceeds there.
 
-use super::tests::ARM;
-use super::{inputs, plain_results, sabotage, Disagreement, State, States, ROUNDINGS};
+use super::{inputs, of_function, plain_results, sabotage, Disagreement, State, States, ROUNDINGS};
 use crate::compile::{
     checked, checked_companion, checked_parameter, mix_precisions, wants_companions, Options, FOLDING,
 };
@@ -12,7 +11,7 @@ use crate::emit::{element_of, Scalar};
 use crate::function::{ForwardDynamicsMethod, Function, Robot};
 use crate::input_box::input_box;
 use crate::limbs::LimbForm;
-use crate::model::load;
+use crate::model::{load, ModelOptions};
 use crate::scene::{self, constructed, Budget, ContactFunction, Interval, JointRanges, MaxError};
 use crate::staged;
 use std::cell::RefCell;
@@ -27,6 +26,25 @@ use straightline_graph::certify::{certify, Effort};
 use straightline_graph::expr::{evaluate, verify, Binary, Constant, Graph, NodeId, Op, Unary};
 use straightline_graph::pass::cut::Staged;
 use straightline_graph::random::Random;
+
+/// Numbers as exporters write them: a right angle with fewer digits, dust, a fixed finger.
+const ARM: &str = r#"<robot name="arm"><link name="base"/>
+<link name="a"><inertial><origin xyz="0.02 1e-17 -0.1" rpy="0 0 0"/><mass value="2.5"/>
+<inertia ixx="0.03" iyy="0.028" izz="0.01" ixy="1e-4" ixz="0" iyz="-2e-4"/></inertial></link>
+<link name="b"><inertial><origin xyz="0.15 0.01 1e-12" rpy="0 0 0"/><mass value="1.2"/>
+<inertia ixx="0.004" iyy="0.02" izz="0.019" ixy="0" ixz="3e-4" iyz="0"/></inertial></link>
+<link name="c"><inertial><origin xyz="0 0.002 0.06" rpy="0 0 0"/><mass value="0.4"/>
+<inertia ixx="0.001" iyy="0.0011" izz="0.0006" ixy="1e-19" ixz="0" iyz="0"/></inertial></link>
+<link name="finger"><inertial><origin xyz="0 0.01 0.02" rpy="0 0 0"/><mass value="0.05"/>
+<inertia ixx="2e-5" iyy="2e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="one" type="revolute"><parent link="base"/><child link="a"/><origin xyz="0 0 0.3" rpy="0 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-2.9" upper="2.9" effort="50" velocity="2"/></joint>
+<joint name="two" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0.05 0 1e-16" rpy="1.5708 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" effort="50" velocity="2"/></joint>
+<joint name="three" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0.3 0.02 0" rpy="0 1.5707963267949 0"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" effort="20" velocity="3"/></joint>
+<joint name="fixed" type="fixed"><parent link="c"/><child link="finger"/><origin xyz="0 0.04 0.1" rpy="0 0 1.5707963267949"/></joint>
+</robot>"#;
 
 /// Two joints about axes that are parallel to nothing.
 const OBLIQUE: &str = r#"<robot name="oblique"><link name="base"/>
@@ -611,8 +629,7 @@ fn seen(case: &Case) -> (BTreeSet<String>, Vec<String>) {
 }
 
 /// So that no pass is listed that is never reached, and none is reached that is not listed.
-#[test]
-fn every_kind_of_program_goes_through_the_passes_that_are_broken() {
+pub fn every_kind_of_program_goes_through_the_passes_that_are_broken() {
     let mut wrong = Vec::new();
     for case in Case::all() {
         let listed: BTreeSet<String> = case.passes.iter().map(ToString::to_string).collect();
@@ -625,8 +642,7 @@ fn every_kind_of_program_goes_through_the_passes_that_are_broken() {
 }
 
 /// Every pass of every kind of program broken: what comes out is right, or nothing does.
-#[test]
-fn a_broken_pass_never_reaches_the_text() {
+pub fn a_broken_pass_never_reaches_the_text() {
     let mut all = Tally::default();
     for case in Case::all() {
         let mut tally = Tally::default();
@@ -656,10 +672,8 @@ fn a_broken_pass_never_reaches_the_text() {
 }
 
 /// `CASE` and `PASS`: of these cases and passes alone, by parts of their names.
-/// `MUTANTS=30 cargo test --release -p straightline-codegen --lib mutants -- --ignored --nocapture`
-#[test]
-#[ignore = "minutes: thousands of mutants"]
-fn thousands_of_broken_passes_never_reach_the_text() {
+/// `MUTANTS=30 cargo test --release -p straightline-codegen --test suite mutants:: -- --ignored --nocapture`
+pub fn thousands_of_broken_passes_never_reach_the_text() {
     let count: u64 = std::env::var("MUTANTS").ok().and_then(|x| x.parse().ok()).unwrap_or(20);
     let only = |variable: &str| std::env::var(variable).unwrap_or_default();
     let (only_case, only_pass) = (only("CASE"), only("PASS"));
@@ -685,4 +699,40 @@ fn thousands_of_broken_passes_never_reach_the_text() {
     }
     println!("{all:?}");
     assert!(all.wrong.is_empty(), "{:#?}", all.wrong);
+}
+
+fn robot(text: &str) -> Robot {
+    let (model, complaints) = load(&Source::new("arm.urdf", text), &ModelOptions::default());
+    Robot::new(model.unwrap_or_else(|| panic!("{complaints:?}")))
+}
+
+const FUNCTIONS: [Function; 5] = [
+    Function::InverseDynamics,
+    Function::GravityForce,
+    Function::MassMatrix,
+    Function::ForwardDynamics,
+    Function::JointWrenches,
+];
+
+/// Nothing gives way where nothing is wrong.
+pub fn robots_as_people_write_them_keep_their_cheapest_form() {
+    let robot = robot(ARM);
+    for function in FUNCTIONS {
+        let program = checked(&robot, &[], function, &Options::default()).unwrap_or_else(|wrong| panic!("{wrong}"));
+        assert_eq!(program.plainer, None);
+    }
+}
+
+/// A form of the robot that is not the robot.
+pub fn a_wrong_form_of_the_robot_gives_way_to_a_plainer_one() {
+    let mut robot = robot(ARM);
+    robot.reduced.bodies[2].first_moment.x *= Dd::new(1.0, 1e-15);
+    let options = Options::default();
+    let optimisations = crate::compile::Optimisations { chosen: false, ..options.optimisations() };
+    let graph = crate::compile::optimised(&robot, &[], Function::InverseDynamics, &options, optimisations);
+    let wrong = of_function(&robot, &[], Function::InverseDynamics, &options, optimisations, &graph)
+        .expect_err("it is another robot");
+    assert!(wrong.result.starts_with("tau[") && wrong.difference > 1e-20, "{wrong}");
+    let message = wrong.error(&robot.model);
+    assert!(message.detail.contains("link `c`: 1e-19") || message.detail.contains("1e-1"), "{}", message.detail);
 }

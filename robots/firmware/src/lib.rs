@@ -1,7 +1,7 @@
 //! The torque controller of an arm, as it stands in firmware: called 1000 times a second, `core` only, no allocation, no
-//! panic path (`tests/no_panic.rs` looks into the object file for one), time and stack known beforehand.
+//! panic path (`tests/suite/no_panic.rs` looks into the object file for one), time and stack known beforehand.
 //!
-//! Computed torque: what the motion takes by the dynamics of the arm, plus what the deviation asks for. `tests/closed_loop.rs` runs it
+//! Computed torque: what the motion takes by the dynamics of the arm, plus what the deviation asks for. `tests/suite/closed_loop.rs` runs it
 //! against a simulated arm.
 //! ```
 //! use straightline_firmware_example::{control_step, Gains, Measured, Ur5, Wanted};

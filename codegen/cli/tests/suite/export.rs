@@ -1,0 +1,171 @@
+//! The exported package as a stranger uses it: written by the command, built by cargo, called from C.
+
+use crate::in_c::{is_there, succeeds, Library};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use straightline_codegen::model::{load, FrameOption, ModelOptions};
+use straightline_codegen::{ForwardDynamicsMethod, Function, Source};
+use straightline_core::model::Frame;
+use straightline_core::Dd;
+
+const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../runtime/examples/arm.toml");
+
+/// A state that nothing is special about.
+const STATE: [(&str, [f64; 10]); 4] = [
+    ("q", [0.3, -0.2, 0.5, 0.1, -0.5, 0.7, 0.5, 0.4, -1.1, 0.9]),
+    ("qd", [0.2, -0.4, 0.3, 1.1, -0.7, 0.6, 0.8, -1.3, 1.7, 0.0]),
+    ("qdd", [1.2, -2.4, 0.7, 3.1, -1.7, 2.6, -1.8, 2.3, -0.7, 0.0]),
+    ("tau", [5.2, -1.4, 3.7, 1.6, -2.7, 0.6, 7.8, -3.3, 1.7, 0.0]),
+];
+
+fn scratch(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::create_dir_all(&path).unwrap();
+    path
+}
+
+#[test]
+fn c_calls_every_function_and_gets_what_the_generic_runtime_computes() {
+    let scratch = scratch("export");
+    let package = scratch.join("arm");
+    succeeds(
+        Command::new(env!("CARGO_BIN_EXE_straightline"))
+            .args(["export", ARM, "--c-abi", "--prefix", "Arm3", "--floating-base"])
+            .args(["--frame", "forearm", "--frame", "column", "--lanes", "-o"])
+            .arg(&package),
+    );
+    // truth: the generic algorithms in double-double
+    let options = ModelOptions { floating_base: true, ..ModelOptions::default() };
+    let (model, _) = load(&Source::new(ARM, fs::read_to_string(ARM).unwrap()), &options);
+    let model = model.unwrap();
+    let frames: Vec<&Frame<Dd>> = ["forearm", "column"].iter().map(|name| model.frame(name).unwrap()).collect();
+    let state = |name: &str| STATE.iter().find(|(n, _)| *n == name).unwrap().1;
+    let mut calls = String::new();
+    let mut truth = Vec::new();
+    for function in Function::all() {
+        let inputs = function.inputs(&model);
+        let numbers: Vec<Vec<Dd>> =
+            inputs.iter().map(|p| state(&p.name)[..p.len()].iter().map(|x| Dd::from(*x)).collect()).collect();
+        let method = ForwardDynamicsMethod::Factorisation;
+        let outputs = function.evaluate(&model, &frames, method, &numbers);
+        let (name, n) = (function.name(), outputs.len());
+        let arguments: Vec<_> = inputs.iter().map(|p| p.name.as_str()).chain(["out"]).collect();
+        calls.push_str(&format!(
+            "    {{ double out[{n}]; Arm3_{name}({0}); show(\"{name}\", out, {n});\n      \
+             double batch[{n}]; Arm3_{name}_batch_soa(1, {1}); if (memcmp(out, batch, sizeof out)) return 4;\n      \
+             Arm3_{name}_batch_aos(1, {1}); if (memcmp(out, batch, sizeof out)) return 5;\n      \
+             Arm3_{name}_batch_aos(0, {2}); }}\n",
+            arguments.join(", "),
+            arguments.join(", ").replace("out", "batch"),
+            vec!["NULL"; arguments.len()].join(", ")
+        ));
+        truth.extend(outputs.into_iter().enumerate().map(|(k, x)| (format!("{name} {k}"), x)));
+    }
+    let arrays: String = STATE
+        .iter()
+        .map(|(name, x)| {
+            let numbers: Vec<String> = x.iter().map(|x| format!("{x:?}")).collect();
+            format!("    static const double {name}[] = {{{}}};\n", numbers.join(", "))
+        })
+        .collect();
+    let program = format!(
+        r#"#include "arm3_dynamics.h"
+#include <stdio.h>
+#include <string.h>
+static void show(const char *name, const double *x, int n) {{
+    for (int k = 0; k < n; k++) printf("%s %d %.17g\n", name, k, x[k]);
+}}
+int main(void) {{
+{arrays}    if (Arm3_nq() != ARM3_NQ || Arm3_nv() != ARM3_NV) return 1;
+    if (Arm3_joint_count() != ARM3_JOINT_COUNT || Arm3_frame_count() != ARM3_FRAME_COUNT) return 2;
+    if (Arm3_joint_name(-1) || Arm3_frame_name(ARM3_FRAME_COUNT)) return 3;
+    printf("%s %s %s\n", Arm3_joint_name(3), Arm3_frame_name(0), Arm3_frame_name(1));
+{calls}    return 0;
+}}
+"#
+    );
+    let printed = crate::in_c::printed(&package, "arm3_dynamics", Library::SharedRelease, &program);
+    if is_there("c++") {
+        let strict = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-fsyntax-only", "-x", "c++"];
+        succeeds(Command::new("c++").args(strict).arg(package.join("include/arm3_dynamics.h")));
+    }
+    let Some(printed) = printed else { return };
+    let mut lines = printed.lines();
+    assert_eq!(lines.next(), Some("elbow forearm column"));
+    assert_eq!(lines.clone().count(), truth.len());
+    for (line, (name, expected)) in lines.zip(truth) {
+        let (found, value) = line.rsplit_once(' ').unwrap();
+        assert_eq!(found, name);
+        let error = (Dd::from(value.parse::<f64>().unwrap()) - expected).to_f64().abs();
+        // values up to 100, condition number of H near 100: 1e-16 times both, and room for a few roundings
+        assert!(error < 1e-11, "{name}: {value}, off by {error:e}");
+    }
+}
+
+#[test]
+fn names_from_the_robot_file_cannot_become_code() {
+    let scratch = scratch("names");
+    let (robot, package) = (scratch.join("arm.toml"), scratch.join("package"));
+    let text = fs::read_to_string(ARM).unwrap();
+    let text = text.replace("\"arm\"", r#""x*/\n#error ""#).replace("\"yaw\"", r#""y\"a\n}\u0000 #error\u2028\"w""#);
+    let text = text.replace("\"forearm\"", r#""fore\narm }""#);
+    fs::write(&robot, text).unwrap();
+    succeeds(
+        Command::new(env!("CARGO_BIN_EXE_straightline")).args(["export", "--c-abi", "-o"]).args([&package, &robot]),
+    );
+    succeeds(
+        Command::new(env!("CARGO"))
+            .args(["check", "--offline", "--manifest-path"])
+            .arg(package.join("Cargo.toml"))
+            .env("CARGO_TARGET_DIR", package.join("target")),
+    );
+    if is_there("cc") {
+        let header = fs::read_dir(package.join("include")).unwrap().next().unwrap().unwrap().path();
+        succeeds(Command::new("cc").args(["-fsyntax-only", "-x", "c"]).arg(header));
+    }
+}
+
+const TOOL: &str = "[outputs]\nfunctions = [\"gravity_force\"]\n\
+                    [[parameter]]\nkind = \"payload\"\nname = \"tool\"\nframe = \"forearm\"\n";
+
+#[test]
+fn c_makes_a_run_time_parameter_and_is_told_why_it_cannot_be() {
+    let scratch = scratch("parameter");
+    let (scene, package) = (scratch.join("tool.toml"), scratch.join("arm"));
+    fs::write(&scene, TOOL).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_straightline"));
+    succeeds(command.args(["export", ARM, "--c-abi", "--scene"]).arg(&scene).arg("-o").arg(&package));
+    let program = r#"#include "arm_dynamics.h"
+#include <stdio.h>
+int main(void) {
+    static const double q[3] = {0.3, -0.8, 1.1}, com[3] = {0.1, 0.02, -0.05};
+    static const double inertia[6] = {1e-3, 0, 0, 2e-3, 0, 1.5e-3}, impossible[6] = {1e-3, 0, 0, 1e-3, 0, 3e-3};
+    double tool[20] = {0}, g[3], loaded[3];
+    arm_gravity_force(q, tool, g);
+    if (arm_tool_new(-1.0, com, inertia, tool) != 2 || arm_tool_new(0.0, com, inertia, tool) != 3) return 1;
+    if (arm_tool_new(0.0 / 0.0, com, inertia, tool) != 1 || arm_tool_new(1.0, com, impossible, tool) != 4) return 2;
+    for (int i = 0; i < 20; i++) if (tool[i] != 0) return 3;
+    if (arm_tool_new(0.7, com, inertia, tool) != 0) return 4;
+    arm_gravity_force(q, tool, loaded);
+    for (int i = 0; i < 3; i++) printf("%.17g\n", loaded[i] - g[i]);
+    return 0;
+}
+"#;
+    let Some(printed) = crate::in_c::printed(&package, "arm_dynamics", Library::StaticDebug, program) else { return };
+    // truth: m g · ∂p/∂q of the tool's mass centre, which is a frame there, by the generic algorithms
+    let centre = FrameOption { name: "centre".into(), link: "forearm".into(), xyz: [0.1, 0.02, -0.05], rpy: [0.0; 3] };
+    let options = ModelOptions { frames: vec![centre], ..ModelOptions::default() };
+    let (model, _) = load(&Source::new(ARM, fs::read_to_string(ARM).unwrap()), &options);
+    let model = model.unwrap();
+    let q: Vec<Dd> = [0.3, -0.8, 1.1].map(Dd::from).to_vec();
+    let frames = [model.frame("centre").unwrap()];
+    let jacobian = Function::Jacobian.evaluate(&model, &frames, ForwardDynamicsMethod::Factorisation, &[q]);
+    for (i, line) in printed.lines().enumerate() {
+        let expected = (Dd::from(0.7 * 9.81) * jacobian[2 * 3 + i]).to_f64();
+        let found: f64 = line.parse().unwrap();
+        // differences of torques near 10
+        assert!((found - expected).abs() < 1e-13, "{i}: {found} is not {expected}");
+    }
+    assert_eq!(printed.lines().count(), 3);
+}

@@ -1,0 +1,18 @@
+//! All tests of the package in one binary: it is linked once, and what several files stand on is compiled once.
+//! A file is chosen by its name: `cargo test -p straightline-cli --test suite report::`.
+
+#[path = "../../../tests/suite/chain.rs"]
+mod chain;
+mod command_line;
+mod diagnostics;
+mod drive_parameters;
+mod export;
+#[cfg(feature = "parquet")]
+mod fuzz;
+mod in_c;
+#[path = "../../../../generated_tests/src/made.rs"]
+mod made;
+#[cfg(feature = "parquet")]
+mod parquet;
+mod report;
+mod simulation;

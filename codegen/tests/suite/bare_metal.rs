@@ -1,0 +1,181 @@
+//! Generated text where there is `core` and nothing else: no call that the compiler's runtime would have to answer, and a·b + c in one
+//! rounding by whoever has it.
+//!
+//! With `STRAIGHTLINE_THUMB=DIR` the object for a Cortex-M4 is looked at: DIR holds `rustc` and a `sysroot` with `core` for
+//! thumbv7em-none-eabihf. Without it, the text alone is.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use straightline_codegen::compile::{compile, program, Options};
+use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::emit::fused;
+use straightline_codegen::model::load;
+use straightline_codegen::schedule::Limits;
+use straightline_codegen::{scene, Function, Robot, Scalar};
+use straightline_core::trig;
+
+const ARM: &str = include_str!("../files/arm.toml");
+const TORQUES: [Function; 2] = [Function::InverseDynamics, Function::GravityForce];
+
+fn scratch() -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bare_metal");
+    std::fs::create_dir_all(&folder).expect("a folder for programs");
+    folder
+}
+
+fn text(scene_text: &str, options: Options) -> String {
+    let mut diagnostics = Diagnostics::new();
+    let file = scene::read(&Source::new("scene.toml", scene_text), &mut diagnostics);
+    let options = file.unwrap_or_else(|| panic!("{diagnostics}")).into_options(options);
+    compile(&Source::new("arm.toml", ARM), &options).unwrap_or_else(|errors| panic!("{errors}")).text
+}
+
+/// Texts with every kind of array that holds values on their way: between parts, in stages, of parameters and of contact modes.
+fn texts() -> Vec<String> {
+    let base = Options { functions: TORQUES.to_vec(), scalar: Scalar::F32, ..Options::default() };
+    let parts = Options { limits: Limits { operations: 40 }, ..base.clone() };
+    let contact =
+        "[[contact]]\nname = \"pen\"\nframe = \"hand\"\nobject = { origin = [0.5, 0.0, 0.2], z = [0.0, 0.0, 1.0] }\n\
+                   constrained = [\"pz\"]\n[outputs]\ncontact = [\"forward_dynamics\"]\n";
+    let staged = "[outputs]\nstaged = true\n[[parameter]]\nkind = \"payload\"\nname = \"tool\"\nframe = \"hand\"\n";
+    vec![text("", base.clone()), text("", parts), text(staged, base.clone()), text(contact, base)]
+}
+
+#[test]
+fn plain_functions_fill_no_arrays_with_zeros() {
+    for text in texts() {
+        let pasted = text.find("\nmod trig {").expect("all of them turn something");
+        for line in text[..pasted].lines().filter(|line| !line.contains("pub const ")) {
+            assert!(!line.contains("[0.0; "), "`memset` where there are no vector instructions: {line}");
+        }
+    }
+    let kernel = include_str!("../../../runtime/core/src/trig.rs");
+    let of_lanes = kernel.split("const BLOCK: usize").next().expect("the text before it");
+    assert!(of_lanes.trim_end().ends_with('}') && of_lanes.contains("if $lanes == 1 {"), "one angle after the other");
+}
+
+/// The symbols that an object wants from elsewhere.
+fn wanted(object: &Path) -> Option<String> {
+    let output = Command::new("nm").arg("-u").arg(object).output().ok()?;
+    // how an error of a parameter prints is `core`'s, and called only by who prints it
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    Some(text.lines().filter(|line| !line.contains("4core3fmt")).collect())
+}
+
+#[test]
+fn an_object_for_a_cortex_m4_calls_nothing() {
+    let Some(directory) = std::env::var_os("STRAIGHTLINE_THUMB").map(PathBuf::from) else {
+        eprintln!("skipped: STRAIGHTLINE_THUMB names no compiler for thumbv7em-none-eabihf");
+        return;
+    };
+    for (k, text) in texts().into_iter().enumerate() {
+        let (file, object) = (scratch().join("thumb.rs"), scratch().join("thumb.o"));
+        // functions that are small would not be in the object
+        let text = text.replace("pub fn ", "#[inline(never)]\npub fn ");
+        std::fs::write(&file, format!("#![no_std]\n#![allow(warnings)]\n{text}")).expect("a file");
+        for level in ["2", "3"] {
+            let built = Command::new(directory.join("rustc"))
+                .arg(format!("--sysroot={}", directory.join("sysroot").display()))
+                .args(["--edition=2021", "--crate-type=rlib", "--crate-name=arm", "--target=thumbv7em-none-eabihf"])
+                .args(["-Cpanic=abort", "-Ccodegen-units=1", "-Cembed-bitcode=no", "-Ctarget-cpu=cortex-m4"])
+                .arg(format!("-Copt-level={level}"))
+                .arg(format!("--emit=obj={}", object.display()))
+                .arg(&file)
+                .output()
+                .expect("the compiler runs");
+            assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+            let Some(wanted) = wanted(&object) else {
+                eprintln!("skipped: there is no nm");
+                return;
+            };
+            assert_eq!(wanted, "", "text {k}, opt-level {level}");
+        }
+    }
+}
+
+/// a·b + c in one rounding without an instruction for it: the exact product and sum in parts, the least of them rounded to odd
+/// (Boldo and Melquiond 2008). For numbers whose parts do not underflow.
+const MUL_ADD: &str = "
+pub fn mul_add_f64(a: f64, b: f64, c: f64) -> f64 {
+    fn two_sum(a: f64, b: f64) -> (f64, f64) {
+        let s = a + b;
+        let t = s - a;
+        (s, (a - (s - t)) + (b - t))
+    }
+    fn split(a: f64) -> (f64, f64) {
+        let t = 134217729.0 * a;
+        let high = t - (t - a);
+        (high, a - high)
+    }
+    let p = a * b;
+    let ((ah, al), (bh, bl)) = (split(a), split(b));
+    let e = al * bl - (((p - ah * bh) - al * bh) - ah * bl);
+    let (th, tl) = two_sum(c, e);
+    let (vh, vl) = two_sum(p, th);
+    let (z, rest) = two_sum(tl, vl);
+    let odd = match z.to_bits() {
+        bits if rest == 0.0 || bits & 1 == 1 => z,
+        bits if (rest > 0.0) == (z > 0.0) => f64::from_bits(bits + 1),
+        bits => f64::from_bits(bits - 1),
+    };
+    vh + odd
+}
+";
+
+fn rustc(arguments: &[&str], file: &Path) {
+    let mut rustc = Command::new(std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string()));
+    let built = rustc.current_dir(scratch()).args(["--edition=2021", "-Awarnings", "-Copt-level=1"]).args(arguments);
+    let built = built.arg(file).output().expect("rustc runs");
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+}
+
+#[test]
+fn fused_text_needs_core_alone_and_has_the_fused_bits() {
+    let options =
+        Options { functions: vec![Function::InverseDynamics], fma: true, fma_by_caller: true, ..Options::default() };
+    let source = Source::new("arm.toml", ARM);
+    let text = compile(&source, &options).unwrap_or_else(|errors| panic!("{errors}")).text;
+    assert!(!text.contains("extern crate") && !text.contains("std::"), "{text}");
+
+    let robot = Robot::new(load(&source, &options.model).0.expect("the arm is sound"));
+    let (nq, nv) = (robot.model.nq(), robot.model.nv());
+    let states: Vec<Vec<f64>> =
+        (0..20).map(|s| (0..nq + 2 * nv).map(|k| ((s * 31 + k * 7) as f64 * 0.618).sin() * 2.0).collect()).collect();
+    let library = scratch().join("arm_on_core.rs");
+    std::fs::write(&library, format!("#![no_std]\n#![forbid(unsafe_code)]\n{MUL_ADD}\npub mod arm {{\n{text}\n}}\n"))
+        .unwrap();
+    rustc(&["--crate-type=rlib", "--crate-name=arm_on_core"], &library);
+    let main = scratch().join("fused_main.rs");
+    let program_text = format!(
+        "fn main() {{\n    for x in {states:?} {{\n        let (q, qd, qdd) = (&x[..{nq}], &x[{nq}..{0}], &x[{0}..]);\n        \
+         let mut tau = [0.0; {nv}];\n        arm_on_core::arm::inverse_dynamics(q.try_into().unwrap(), qd.try_into().unwrap(), \
+         qdd.try_into().unwrap(), &mut tau);\n        println!(\"{{tau:?}}\");\n    }}\n}}\n",
+        nq + nv
+    );
+    std::fs::write(&main, program_text).unwrap();
+    rustc(&["--crate-name=fused_main", "--extern", "arm_on_core=libarm_on_core.rlib"], &main);
+    let output = Command::new(scratch().join("fused_main")).output().expect("the program runs");
+    let printed = String::from_utf8(output.stdout).expect("text");
+    let program = program(&robot, &[], Function::InverseDynamics, &options);
+    let sin_cos = |x| trig::sin_cos_of_sum_fused_f64(x, f64::mul_add);
+    let mut differs_from_plain = false;
+    for (state, line) in states.iter().zip(printed.lines()) {
+        let run = (&program.graph, &program.schedule);
+        assert_eq!(line, format!("{:?}", fused::evaluate(run, state, f64::mul_add, sin_cos)), "at {state:?}");
+        let plain = fused::evaluate(run, state, |a, b, c| a * b + c, trig::sin_cos_of_sum_f64);
+        differs_from_plain |= line != format!("{plain:?}");
+    }
+    assert_eq!(printed.lines().count(), states.len());
+    assert!(differs_from_plain, "one rounding is not two");
+}
+
+#[test]
+fn fused_text_asks_for_std_only_where_there_is_an_operating_system() {
+    let options = Options { functions: TORQUES.to_vec(), fma: true, ..Options::default() };
+    let text = compile(&Source::new("arm.toml", ARM), &options).unwrap_or_else(|errors| panic!("{errors}")).text;
+    let before = text.split("extern crate std;").next().expect("a text before it");
+    assert!(before.trim_end().ends_with("#[cfg(not(target_os = \"none\"))]"), "{before}");
+    let file = scratch().join("fused_by_std.rs");
+    std::fs::write(&file, format!("#![no_std]\n#![forbid(unsafe_code)]\n{text}")).unwrap();
+    rustc(&["--crate-type=lib", "--emit=metadata"], &file);
+}

@@ -1,0 +1,115 @@
+//! What the macros stand on: files looked for, items of a type, complaints as they are shown.
+
+use std::path::{Path, PathBuf};
+use straightline_codegen::expansion::{associated_items, expand, SceneOf};
+use straightline_codegen::{Options, Source};
+
+const CART: &str = r#"
+[robot]
+name = "cart"
+
+[[link]]
+name = "rail"
+
+[[link]]
+name = "cart"
+mass = 2.0
+com = [0.0, 0.0, 0.1]
+inertia = [0.1, 0.1, 0.1]
+
+[[joint]]
+name = "slide"
+kind = "prismatic"
+parent = "rail"
+child = "cart"
+axis = "x"
+limits = { lower = -1.0, upper = 1.0, velocity = 2.0, effort = 50.0 }
+"#;
+
+fn scratch(name: &str, text: &str) -> PathBuf {
+    let path = std::env::temp_dir().join(format!("straightline-expansion-{}-{name}", std::process::id()));
+    std::fs::create_dir_all(&path).unwrap();
+    std::fs::write(path.join("cart.toml"), text).unwrap();
+    path.canonicalize().unwrap()
+}
+
+#[test]
+fn the_first_directory_that_has_the_file_counts() {
+    let here = scratch("found", CART);
+    let expansion = expand("cart.toml", None, &[Path::new("/nowhere"), &here], &Options::default());
+    assert_eq!(expansion.files, [here.join("cart.toml")]);
+    let items = associated_items(&expansion.result.unwrap());
+    assert!(items.contains("pub const EFFORT_LIMITS: [f64; 1] = dynamics::EFFORT_LIMITS;"), "{items}");
+    assert!(items.contains("pub fn mass_matrix(q: &[f64; 1], h: &mut [[f64; 1]; 1]) {"), "{items}");
+    assert!(items.contains("#[doc(alias(\"CRBA\", "), "{items}");
+}
+
+#[test]
+fn a_missing_file_is_answered_with_every_path_that_was_tried() {
+    let directories = [Path::new("/nowhere"), Path::new("/nowhere/src")];
+    let expansion = expand("cart.toml", None, &directories, &Options::default());
+    assert!(expansion.files.is_empty());
+    assert_eq!(
+        expansion.result.unwrap_err().message,
+        "there is no robot file `cart.toml`; tried:\n  /nowhere/cart.toml\n  /nowhere/src/cart.toml\n\
+         help: the path counts from the package's manifest, or else from the source file"
+    );
+}
+
+#[test]
+fn a_wrong_file_is_shown_at_the_place_and_stays_an_input() {
+    let here = scratch("wrong", &CART.replace("2.0", "-2.0"));
+    let expansion = expand("cart.toml", None, &[&here], &Options::default());
+    assert_eq!(expansion.files, [here.join("cart.toml")]);
+    let message = expansion.result.unwrap_err().message;
+    assert!(message.starts_with("the robot file is wrong\nerror[negative-mass]: "), "{message}");
+    assert!(message.contains("--> cart.toml:10:8\n") && message.contains("| mass = -2.0"), "{message}");
+}
+
+#[test]
+fn a_scene_is_an_input_too_and_its_complaints_have_their_place() {
+    let here = scratch("scene", CART);
+    let scene = |text: &str| {
+        std::fs::write(here.join("scene.toml"), text).unwrap();
+        expand("cart.toml", Some(&SceneOf::File("scene.toml".into())), &[&here], &Options::default())
+    };
+    let expansion = scene("[outputs]\nmass_matrix = { part = \"diagonal\" }\n");
+    assert_eq!(expansion.files, [here.join("cart.toml"), here.join("scene.toml")]);
+    let items = associated_items(&expansion.result.unwrap());
+    assert!(items.contains("pub fn mass_matrix(q: &[f64; 1], h: &mut [f64; 1])"), "{items}");
+    assert!(!items.contains("pub fn inverse_dynamics"));
+
+    for (text, place) in
+        [("[zero]\nqdot = true\n", "scene.toml:2:1"), ("[hold]\njoints = { slid = 0 }\n", "scene.toml:2:12")]
+    {
+        let expansion = scene(text);
+        assert_eq!(expansion.files.len(), 2);
+        let message = expansion.result.unwrap_err().message;
+        assert!(message.starts_with("the scene is wrong\nerror[") && message.contains(place), "{message}");
+    }
+    let none = SceneOf::File("none.toml".into());
+    let message = expand("cart.toml", Some(&none), &[&here], &Options::default()).result.unwrap_err().message;
+    assert!(message.starts_with("there is no scene file `none.toml`"), "{message}");
+}
+
+#[test]
+fn complaints_of_a_scene_in_the_macro_are_kept_apart() {
+    let here = scratch("within", CART);
+    let scene = |text: &str| {
+        let scene = SceneOf::Macro(Source::new("scene(..)", text));
+        expand("cart.toml", Some(&scene), &[&here], &Options::default())
+    };
+    let expansion = scene("[zero]\nqd = true\n");
+    assert_eq!(expansion.files, [here.join("cart.toml")]);
+    assert!(!associated_items(&expansion.result.unwrap()).contains("qd: &"));
+    for (text, code) in [("[zero]\nqdot = true\n", "unknown-key"), ("[hold]\njoints = { slid = 0 }\n", "unknown-joint")]
+    {
+        let refusal = scene(text).result.unwrap_err();
+        let codes: Vec<&str> = refusal.of_scene.iter().map(|d| d.code).collect();
+        assert_eq!((refusal.message.as_str(), &codes[..]), ("", &[code][..]));
+    }
+    // both wrong: each said once
+    std::fs::write(here.join("cart.toml"), CART.replace("2.0", "-2.0")).unwrap();
+    let refusal = scene("[zero]\nqd = true\n").result.unwrap_err();
+    assert!(refusal.message.starts_with("the robot file is wrong\nerror[negative-mass]"), "{}", refusal.message);
+}

@@ -1,0 +1,55 @@
+//! All tests of the package in one binary: it is linked once, and what several files stand on is compiled once.
+//! A file is chosen by its name: `cargo test -p straightline-codegen --test suite rules::`.
+
+mod acceleration_bounds;
+mod as_written;
+mod bare_metal;
+mod builder;
+mod certificates;
+mod certificates_of_robots;
+mod chain;
+mod companions;
+mod contact;
+mod contact_compiled;
+mod effects;
+mod elastic_inverse;
+mod expansion;
+mod flexible;
+mod forward_dynamics;
+mod forward_dynamics_bounds;
+mod limbs;
+mod malformed;
+mod messages;
+mod mixed;
+mod mutants;
+mod names;
+mod ranges;
+mod readback;
+mod reduced_forms;
+mod reference_input;
+mod robot_files;
+mod robots_as_written;
+mod rules;
+mod scene;
+mod scene_messages;
+mod scene_verify;
+mod scenes_as_written;
+mod scope;
+mod staged;
+mod sums;
+mod two_readings;
+mod unyielding;
+
+#[path = "../../../runtime/core/tests/suite/support/compare.rs"]
+mod compare;
+#[path = "../../../runtime/core/tests/suite/support/data.rs"]
+mod data;
+#[path = "../../../runtime/core/tests/suite/support/robots.rs"]
+mod robots;
+#[path = "../../../generated_tests/src/roll_pitch_yaw.rs"]
+mod roll_pitch_yaw;
+#[path = "../../../generated_tests/src/standalone.rs"]
+mod standalone;
+#[path = "../../../generated_tests/src/written/mod.rs"]
+#[allow(dead_code, unused_imports)] // other packages use the rest
+mod written;
