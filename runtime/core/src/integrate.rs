@@ -29,6 +29,8 @@
 //! ```
 
 use crate::dd::Dd;
+use crate::joint::quaternion::inverse_length;
+use crate::joint::FLOATING_BASE;
 use crate::real::Real;
 use core::array::from_fn;
 
@@ -204,20 +206,8 @@ impl<T: Real> Step<T> {
         let mut change = over_joints(qd, self.base);
         change = scaled(&change, h);
         if NQ > NV {
-            let b = self.base;
-            let quarter = h * T::constant(Dd::from(0.25));
-            let [ax, ay, az] = [qd[b + 3], qd[b + 4], qd[b + 5]].map(|omega| omega * quarter);
-            let square = ax * ax + ay * ay + az * az;
-            let norm = T::one() / (T::one() + square);
-            let quaternion = [q[b + 3], q[b + 4], q[b + 5], q[b + 6]];
-            // q ∘ (1 + a)², less q: 1 goes out before anything is rounded
-            let two = norm + norm;
-            let turned = product(&quaternion, &[two * ax, two * ay, two * az, -(two * square)]);
-            // the base moves in its axes at the middle of the step: q ∘ (1 + a), whose square of length is 1/norm
-            let middle = product(&quaternion, &[ax, ay, az, T::one()]);
-            let velocity = rotated(&middle, &[qd[b], qd[b + 1], qd[b + 2]]);
-            change[b..b + 3].copy_from_slice(&velocity.map(|v| v * norm * h));
-            change[b + 3..b + 7].copy_from_slice(&turned);
+            let (q, qd) = self.of_base(q, qd);
+            FLOATING_BASE.mechanics().displacement(q, qd, h, &mut change[self.base..self.base + 7]);
         }
         change
     }
@@ -226,14 +216,14 @@ impl<T: Real> Step<T> {
     fn rate<const NQ: usize, const NV: usize>(&self, q: &[T; NQ], qd: &[T; NV]) -> [T; NQ] {
         let mut rate = over_joints(qd, self.base);
         if NQ > NV {
-            let b = self.base;
-            let half = T::constant(Dd::HALF);
-            let quaternion = [q[b + 3], q[b + 4], q[b + 5], q[b + 6]];
-            let [x, y, z] = [qd[b + 3], qd[b + 4], qd[b + 5]].map(|omega| omega * half);
-            rate[b..b + 3].copy_from_slice(&rotated(&quaternion, &[qd[b], qd[b + 1], qd[b + 2]]));
-            rate[b + 3..b + 7].copy_from_slice(&product(&quaternion, &[x, y, z, T::zero()]));
+            let (q, qd) = self.of_base(q, qd);
+            FLOATING_BASE.configuration_rate(q, qd, &mut rate[self.base..self.base + 7]);
         }
         rate
+    }
+
+    fn of_base<'a, const NQ: usize, const NV: usize>(&self, q: &'a [T; NQ], qd: &'a [T; NV]) -> (&'a [T], &'a [T]) {
+        (&q[self.base..self.base + FLOATING_BASE.nq()], &qd[self.base..self.base + FLOATING_BASE.nv()])
     }
 }
 
@@ -253,17 +243,6 @@ fn normalise<T: Real, const NQ: usize, const NV: usize>(q: &mut [T; NQ], base: u
     quaternion.iter_mut().for_each(|x| *x = *x * inverse);
 }
 
-/// 1/|q|. Newton's iteration for 1/√n from 1, three times: an error of 1e-2 of the length is gone.
-fn inverse_length<T: Real>(quaternion: &[T]) -> T {
-    let square = quaternion.iter().fold(T::zero(), |sum, x| sum + *x * *x);
-    let (half, three) = (T::constant(Dd::HALF), T::constant(Dd::from(3.0)));
-    let mut inverse = T::one();
-    for _ in 0..3 {
-        inverse = half * inverse * (three - square * inverse * inverse);
-    }
-    inverse
-}
-
 fn sum<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {
     from_fn(|i| a[i] + b[i])
 }
@@ -277,25 +256,6 @@ fn two_sum<T: Real>(a: T, b: T) -> (T, T) {
     let s = a + b;
     let from_b = s - a;
     (s, (a - (s - from_b)) + (b - from_b))
-}
-
-/// Product of quaternions (x, y, z, w).
-fn product<T: Real>(a: &[T; 4], b: &[T; 4]) -> [T; 4] {
-    let ([ax, ay, az, aw], [bx, by, bz, bw]) = (*a, *b);
-    [
-        aw * bx + ax * bw + (ay * bz - az * by),
-        aw * by + ay * bw + (az * bx - ax * bz),
-        aw * bz + az * bw + (ax * by - ay * bx),
-        aw * bw - (ax * bx + ay * by + az * bz),
-    ]
-}
-
-/// |q|² R(q) v: for quaternions of length one R v.
-fn rotated<T: Real>(q: &[T; 4], v: &[T; 3]) -> [T; 3] {
-    let [x, y, z, w] = *q;
-    let conjugate = [-x, -y, -z, w];
-    let [rx, ry, rz, _] = product(&product(q, &[v[0], v[1], v[2], T::zero()]), &conjugate);
-    [rx, ry, rz]
 }
 
 /// x of A x = b with A symmetric and positive definite, by its LDLᵀ factor.

@@ -21,6 +21,7 @@ pub mod drive;
 pub mod dual;
 pub mod integrate;
 pub mod jet;
+pub mod joint;
 pub mod magnitude;
 #[cfg(feature = "alloc")]
 pub mod model;

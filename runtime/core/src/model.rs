@@ -7,6 +7,7 @@
 
 use crate::dd::Dd;
 use crate::drive::Drive;
+pub use crate::joint::JointKind;
 use crate::real::Real;
 use crate::spatial::{SpatialInertia, Sym3, Transform, Vec3};
 use alloc::string::String;
@@ -15,39 +16,6 @@ use core::ops::{Add, Sub};
 
 /// Index of a body in [`Model::bodies`].
 pub type BodyId = usize;
-
-/// How a body moves against its parent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum JointKind {
-    /// Turns about z by q \[rad\]; also a continuous joint.
-    Revolute,
-    /// Slides along z by q \[m\].
-    #[doc(alias = "linear")]
-    Prismatic,
-    /// The root body, free in the world. q = (x, y, z, qx, qy, qz, qw): position and orientation (a unit quaternion) of
-    /// the root link in the world; qd = (v, ω): velocity of the root link's origin and angular velocity, in root-link
-    /// axes; qdd the componentwise derivative of qd; tau the force and the moment about that origin, in root-link axes.
-    /// It has no parent, and q says all about its pose: [`Body::placement`] and [`Body::link_frame`] are the identity.
-    Floating,
-}
-
-impl JointKind {
-    /// Number of configuration coordinates.
-    pub const fn nq(self) -> usize {
-        match self {
-            JointKind::Revolute | JointKind::Prismatic => 1,
-            JointKind::Floating => 7,
-        }
-    }
-
-    /// Number of velocity coordinates.
-    pub const fn nv(self) -> usize {
-        match self {
-            JointKind::Revolute | JointKind::Prismatic => 1,
-            JointKind::Floating => 6,
-        }
-    }
-}
 
 /// Range of a joint's coordinate and what its drive can do; infinite where the file says nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,6 +49,18 @@ pub struct Joint {
     pub iv: usize,
     /// Ranges.
     pub limits: Limits,
+}
+
+impl Joint {
+    /// Its part of q.
+    pub fn coordinates<'a, T>(&self, q: &'a [T]) -> &'a [T] {
+        &q[self.iq..self.iq + self.kind.nq()]
+    }
+
+    /// Its part of qd, qdd or tau.
+    pub fn rates<'a, T>(&self, rates: &'a [T]) -> &'a [T] {
+        &rates[self.iv..self.iv + self.kind.nv()]
+    }
 }
 
 /// What a joint adds to the rigid bodies, on its own coordinate.
@@ -265,6 +245,11 @@ impl<T: Real> Model<T> {
     /// Number of velocity coordinates.
     pub fn nv(&self) -> usize {
         self.bodies.iter().map(|b| b.joint.kind.nv()).sum()
+    }
+
+    /// Whether its base floats.
+    pub fn floats(&self) -> bool {
+        self.bodies.iter().any(|b| b.joint.kind.is_base())
     }
 
     /// The frame of that name.

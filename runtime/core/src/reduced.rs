@@ -83,7 +83,7 @@ impl<T: Real> ReducedModel<T> {
 
     /// Whether a body may [stay](ReducedBody::stays): it turns, and all that it carries turns about parallel axes.
     pub fn may_stay(&self, i: BodyId) -> bool {
-        self.bodies[i].kind == JointKind::Revolute && self.bodies.iter().all(|b| b.parent != Some(i) || b.parallel)
+        self.bodies[i].kind.turns() && self.bodies.iter().all(|b| b.parent != Some(i) || b.parallel)
     }
 
     /// The same robot over another scalar: every number through `f`.

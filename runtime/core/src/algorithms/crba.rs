@@ -4,11 +4,11 @@
 //! origin of the joint's frame. Σ moves more cheaply than the inertia tensor J = tr(Σ) 1 − Σ. Column j of H is the wrench
 //! that accelerates that composite by q̈_j = 1, carried down to the base and projected on every joint that it passes.
 
-use super::composite::Composite;
-use super::joint::JointPose;
-use crate::model::{Body, JointKind, Model};
+use super::composite_of;
+use crate::joint::JointPose;
+use crate::model::{Body, Model};
 use crate::real::Real;
-use crate::spatial::{ForceVector, Vec3};
+use crate::spatial::Composite;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -25,49 +25,33 @@ pub fn mass_matrix<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
         h[i * nv + j] = value;
         h[j * nv + i] = value;
     };
-    let mut composites: Vec<Composite<T>> = model.bodies.iter().map(of_body).collect();
+    let mut composites: Vec<Composite<T>> = model.bodies.iter().map(composite_of).collect();
     for (b, body) in model.bodies.iter().enumerate().rev() {
         T::section("composite", Some(b));
-        let iv = body.joint.iv;
         let composite = composites[b].named(b);
-        let joint = &poses[b];
-
-        // The wrench of q̈_j = 1, and the composite, in axes that the joint has turned or slid back already.
-        let (column, moved) = match (body.joint.kind, joint.turn) {
-            (JointKind::Floating, _) => {
-                composite.fill_floating_block(iv, &mut set);
-                continue; // a root: nothing below it
-            }
-            (JointKind::Prismatic, _) => {
-                // f = M z,  n = m c × z
-                set(iv, iv, with_rotor(composite.mass, body));
-                let ms = composite.first_moment;
-                let force = Vec3::new(T::zero(), T::zero(), composite.mass);
-                let moment = Vec3::new(ms.y, -ms.x, T::zero());
-                (ForceVector { moment, force }, composite.slid(joint.slide_or_zero()))
-            }
-            (JointKind::Revolute, turn) => {
-                // f = z × m c,  n = J z = (−Σ_xz, −Σ_yz, Σ_xx + Σ_yy)
-                let inertia = composite.second_moment.xx + composite.second_moment.yy;
-                set(iv, iv, with_rotor(inertia, body));
-                let moved = composite.turned(turn.expect("a revolute joint turns"));
-                let (ms, s) = (moved.first_moment, moved.second_moment);
-                let force = Vec3::new(-ms.y, ms.x, T::zero());
-                (ForceVector { moment: Vec3::new(-s.xz, -s.yz, inertia), force }, moved)
-            }
-        };
+        let (joint, pose) = (&body.joint, &poses[b]);
+        let (mechanics, own, nv) = (joint.kind.mechanics(), joint.coordinates(q), joint.kind.nv());
+        mechanics.block(&composite, own, nv, &mut |i, j, value| {
+            set(joint.iv + i, joint.iv + j, if i == j { with_rotor(value, body) } else { value });
+        });
         let Some(parent) = body.parent else { continue };
-        composites[parent] = composites[parent].plus(&placed(&moved, joint));
-
-        let mut column = joint.placed_wrench(&column);
-        let mut ancestor = parent;
-        loop {
-            T::section("column", Some(b));
-            let below = &model.bodies[ancestor];
-            project(&column, below, |i, value| set(i, iv, value));
-            let Some(next) = below.parent else { break };
-            column = poses[ancestor].wrench_to_parent(&column);
-            ancestor = next;
+        let back = pose.composite_back(&composite);
+        composites[parent] = composites[parent].plus(&placed(&back, pose));
+        for k in 0..nv {
+            let column = mechanics.wrench_back(k, [&composite, &back], pose, own);
+            let mut column = pose.placed_wrench(&column);
+            let mut ancestor = parent;
+            loop {
+                T::section("column", Some(b));
+                let below = &model.bodies[ancestor].joint;
+                for i in 0..below.kind.nv() {
+                    let value = below.kind.mechanics().along(i, below.coordinates(q), &column);
+                    set(below.iv + i, joint.iv + k, value);
+                }
+                let Some(next) = model.bodies[ancestor].parent else { break };
+                column = poses[ancestor].wrench_to_parent(&column);
+                ancestor = next;
+            }
         }
     }
     h
@@ -76,23 +60,6 @@ pub fn mass_matrix<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
 /// The inertia on a joint's own coordinate, rotor included.
 fn with_rotor<T: Real>(inertia: T, body: &Body<T>) -> T {
     body.effects.rotor_inertia.map_or(inertia, |rotor| inertia + rotor)
-}
-
-/// What a wrench does along the joint of a body, by velocity coordinate.
-fn project<T: Real>(w: &ForceVector<T>, body: &Body<T>, mut set: impl FnMut(usize, T)) {
-    let iv = body.joint.iv;
-    match body.joint.kind {
-        JointKind::Revolute => set(iv, w.moment.z),
-        JointKind::Prismatic => set(iv, w.force.z),
-        JointKind::Floating => {
-            w.force.to_array().into_iter().chain(w.moment.to_array()).enumerate().for_each(|(k, x)| set(iv + k, x));
-        }
-    }
-}
-
-fn of_body<T: Real>(body: &Body<T>) -> Composite<T> {
-    let total = body.total_about_origin();
-    Composite { mass: total.mass, first_moment: total.first_moment, second_moment: total.second_moment }
 }
 
 /// In the parent's axes, about the parent's origin.

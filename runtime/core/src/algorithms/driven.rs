@@ -22,7 +22,7 @@ use super::solve_articulated;
 use super::transmission::{giving, last_shaft, taking, DriveState};
 use crate::dd::Dd;
 use crate::drive::{Actuator, Drive, Rotor};
-use crate::model::{Body, BodyId, Frame, JointKind, Model};
+use crate::model::{Body, BodyId, Frame, Model};
 use crate::real::Real;
 use crate::spatial::{Mat3, Transform, Vec3};
 use alloc::vec;
@@ -690,7 +690,7 @@ pub fn drive_power<T: Real>(
         powers.iter_mut().zip(flow.powers()).for_each(|(sum, power)| *sum = *sum + power);
     }
     let [electrical, joule, friction, gears, dampers, conversion] = powers;
-    let moving = model.bodies.iter().filter(|body: &&Body<T>| body.joint.kind != JointKind::Floating);
+    let moving = model.bodies.iter().filter(|body: &&Body<T>| body.joint.kind.is_single());
     let of_joint =
         |body: &Body<T>| super::effects::friction_force(&body.effects, qd[body.joint.iv]) * qd[body.joint.iv];
     [electrical, joule, friction, gears, dampers, sum(moving.map(of_joint)), conversion]

@@ -12,7 +12,8 @@ use super::actuator::{actuator_angle, dot, state_rate};
 use super::transmission::taking;
 use crate::dd::Dd;
 use crate::drive::{Actuator, Drive, LinearActuator};
-use crate::model::{JointKind, Model};
+use crate::joint::MOST_COORDINATES;
+use crate::model::Model;
 use crate::real::Real;
 use crate::taylor::Taylor;
 use alloc::vec;
@@ -112,41 +113,18 @@ pub struct Demand<T> {
 fn positions<T: Real, const N: usize>(model: &Model<T>, q: &[T], qd: &[Taylor<T, N>]) -> Vec<Taylor<T, N>> {
     let mut series: Vec<Taylor<T, N>> = q.iter().map(|q| Taylor::fixed(*q)).collect();
     for joint in model.bodies.iter().map(|b| &b.joint) {
-        let (iq, iv) = (joint.iq, joint.iv);
+        let own = joint.iq..joint.iq + joint.kind.nq();
         for k in 1..N {
             let per = T::constant(Dd::ONE / Dd::from(k as f64));
-            match joint.kind {
-                JointKind::Floating => {
-                    let rates = floating_rates(&series[iq..iq + 7], &qd[iv..iv + 6]);
-                    for (x, rate) in series[iq..iq + 7].iter_mut().zip(rates) {
-                        x.coefficients[k] = rate.coefficients[k - 1] * per;
-                    }
-                }
-                _ => series[iq].coefficients[k] = qd[iv].coefficients[k - 1] * per,
+            let mut rates = [Taylor::fixed(T::zero()); MOST_COORDINATES];
+            let rates = &mut rates[..own.len()];
+            joint.kind.configuration_rate(joint.coordinates(&series), joint.rates(qd), rates);
+            for (x, rate) in series[own.clone()].iter_mut().zip(rates) {
+                x.coefficients[k] = rate.coefficients[k - 1] * per;
             }
         }
     }
     series
-}
-
-/// Rates of (x, y, z, qx, qy, qz, qw) at the velocity (v, ω) in the body's axes.
-fn floating_rates<S: Real>(q: &[S], velocity: &[S]) -> [S; 7] {
-    let ([x, y, z, w], [a, b, c]) = ([q[3], q[4], q[5], q[6]], [velocity[3], velocity[4], velocity[5]]);
-    let half = S::constant(Dd::HALF);
-    // R v = v + w t + s × t with t = 2 s × v
-    let v = crate::spatial::Vec3::new(velocity[0], velocity[1], velocity[2]);
-    let s = crate::spatial::Vec3::new(x, y, z);
-    let t = s.cross(v) + s.cross(v);
-    let p = v + t.scale(w) + s.cross(t);
-    [
-        p.x,
-        p.y,
-        p.z,
-        (w * a + y * c - z * b) * half,
-        (w * b + z * a - x * c) * half,
-        (w * c + x * b - y * a) * half,
-        -(x * a + y * b + z * c) * half,
-    ]
 }
 
 /// What rotors on moving links take from the joints beside J θ̈, as in `driven.rs`: J (Nᵀ (a · ω̇) + J_ωᵀ (θ̈ a + θ̇ ω × a)).

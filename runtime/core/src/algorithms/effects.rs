@@ -1,9 +1,9 @@
 //! What joints add on their own coordinates: rotor inertia, friction, springs.
 //!
-//! tau = (rigid bodies) + I q̈ + d q̇ + f(q̇) + k (q − q₀), joint by joint; a floating base adds nothing.
+//! tau = (rigid bodies) + I q̈ + d q̇ + f(q̇) + k (q − q₀), joint by joint; a joint of several coordinates adds nothing.
 
 use crate::dd::Dd;
-use crate::model::{Coulomb, JointEffects, JointKind, Model};
+use crate::model::{Coulomb, JointEffects, Model};
 use crate::real::Real;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 /// Generalized forces \[N·m or N\] that friction and springs take: d q̇ + f(q̇) + k (q − q₀).
 pub fn passive_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
     let mut forces = vec![T::zero(); model.nv()];
-    for (i, body) in model.bodies.iter().enumerate().filter(|(_, b)| b.joint.kind != JointKind::Floating) {
+    for (i, body) in model.bodies.iter().enumerate().filter(|(_, b)| b.joint.kind.is_single()) {
         T::section("friction and springs", Some(i));
         let (q, qd, e) = (q[body.joint.iq], qd[body.joint.iv], &body.effects);
         let spring = e.stiffness * (q - e.spring_rest);
@@ -38,7 +38,7 @@ fn coulomb_force<T: Real>(effects: &JointEffects<T>, qd: T) -> T {
 /// Inertia that joints add to the diagonal of H, by velocity coordinate \[kg·m² or kg\].
 pub fn rotor_inertias<T: Real>(model: &Model<T>) -> Vec<T> {
     let mut inertias = vec![T::zero(); model.nv()];
-    for body in model.bodies.iter().filter(|b| b.joint.kind != JointKind::Floating) {
+    for body in model.bodies.iter().filter(|b| b.joint.kind.is_single()) {
         inertias[body.joint.iv] = body.effects.rotor_inertia.unwrap_or_else(T::zero);
     }
     inertias
@@ -52,7 +52,7 @@ pub fn rotor_energy<T: Real>(model: &Model<T>, qd: &[T]) -> T {
 
 /// ½ Σ k (q − q₀)² \[J\] of the springs.
 pub fn spring_energy<T: Real>(model: &Model<T>, q: &[T]) -> T {
-    let joints = model.bodies.iter().filter(|b| b.joint.kind != JointKind::Floating);
+    let joints = model.bodies.iter().filter(|b| b.joint.kind.is_single());
     let squares = joints.map(|b| {
         let stretch = q[b.joint.iq] - b.effects.spring_rest;
         b.effects.stiffness * stretch * stretch

@@ -1,10 +1,10 @@
 //! Kinetic and potential energy.
 
 use super::effects::{rotor_energy, spring_energy};
-use super::joint::JointPose;
 use super::momentum::{anchor, first_moments_in_world};
 use super::velocity::body_velocities;
 use crate::dd::Dd;
+use crate::joint::JointPose;
 use crate::model::Model;
 use crate::real::Real;
 
@@ -12,7 +12,7 @@ use crate::real::Real;
 /// second sum is over the rotors.
 pub fn kinetic_energy<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> T {
     let poses = JointPose::all(&model.bodies, q);
-    let velocities = body_velocities(model, &poses, qd);
+    let velocities = body_velocities(model, &poses, [q, qd]);
     let mut twice = T::zero();
     for (i, (body, velocity)) in model.bodies.iter().zip(&velocities).enumerate() {
         T::section("energy", Some(i));

@@ -4,7 +4,7 @@
 //! prismatic joint (z, 0): the chapter's matrices Ξ and Λ, (20.40) and (20.42).
 
 use super::kinematics::{frame_acceleration, lever_of, path_to, world_poses};
-use crate::model::{Frame, JointKind, Model};
+use crate::model::{Frame, Model};
 use crate::real::Real;
 use crate::spatial::{MotionVector, Vec3};
 use alloc::vec;
@@ -24,17 +24,10 @@ pub fn jacobian<T: Real>(model: &Model<T>, q: &[T], frame: &Frame<T>) -> Vec<T> 
     for &b in path_to(model, frame.body).iter().rev() {
         T::section("jacobian", Some(b));
         let (joint, pose) = (&model.bodies[b].joint, &poses[b]);
-        let z = pose.rotation.column(2);
-        match joint.kind {
-            JointKind::Revolute => set_column(joint.iv, z.cross(lever), z),
-            JointKind::Prismatic => set_column(joint.iv, z, Vec3::zero()),
-            JointKind::Floating => {
-                for k in 0..3 {
-                    let axis = pose.rotation.column(k);
-                    set_column(joint.iv + k, axis, Vec3::zero());
-                    set_column(joint.iv + 3 + k, axis.cross(lever), axis);
-                }
-            }
+        for k in 0..joint.kind.nv() {
+            let own = joint.coordinates(q);
+            let (linear, angular) = joint.kind.mechanics().world_column(k, own, &pose.rotation, lever);
+            set_column(joint.iv + k, linear, angular);
         }
         lever = lever + pose.lever;
     }

@@ -3,8 +3,8 @@
 //! In world axes: every pose needs its rotation to the world anyway. Levers are summed joint by joint from where they
 //! start, never taken as differences of positions, so a robot far from the world's origin loses no digits.
 
-use super::joint::JointPose;
-use crate::model::{BodyId, Frame, JointKind, Model};
+use crate::joint::JointPose;
+use crate::model::{BodyId, Frame, Model};
 use crate::real::Real;
 use crate::spatial::{Mat3, MotionVector, Transform, Vec3};
 use alloc::vec::Vec;
@@ -33,16 +33,11 @@ pub fn frame_velocity<T: Real>(model: &Model<T>, q: &[T], qd: &[T], frame: &Fram
     for b in path_to(model, frame.body) {
         T::section("velocity", Some(b));
         let (joint, pose) = (&model.bodies[b].joint, &poses[b]);
-        let (iv, z) = (joint.iv, pose.rotation.column(2));
         v = v + omega.cross(pose.lever); // (20.26)
-        match joint.kind {
-            JointKind::Revolute => omega = omega + z.scale(qd[iv]), // (20.23)
-            JointKind::Prismatic => v = v + z.scale(qd[iv]),
-            JointKind::Floating => {
-                v = pose.rotation * Vec3::new(qd[iv], qd[iv + 1], qd[iv + 2]);
-                omega = pose.rotation * Vec3::new(qd[iv + 3], qd[iv + 4], qd[iv + 5]);
-            }
-        }
+        let own = [joint.coordinates(q), joint.rates(qd)];
+        let at = MotionVector { angular: omega, linear: v };
+        let moved = joint.kind.mechanics().world_velocity(at, &pose.rotation, own);
+        (omega, v) = (moved.angular, moved.linear);
         (omega, v) = (omega.named("omega", b), v.named("v", b));
     }
     MotionVector { angular: omega, linear: v + omega.cross(lever_of(&poses, frame)) }
@@ -62,24 +57,9 @@ pub fn frame_acceleration<T: Real>(
     for b in path_to(model, frame.body) {
         T::section("acceleration", Some(b));
         let (joint, pose) = (&model.bodies[b].joint, &poses[b]);
-        let (iv, z) = (joint.iv, pose.rotation.column(2));
         a = a + lever_acceleration(omega, alpha, pose.lever);
-        match joint.kind {
-            JointKind::Revolute => {
-                alpha = alpha + z.scale(qdd[iv]) + omega.cross(z).scale(qd[iv]); // (20.24)
-                omega = omega + z.scale(qd[iv]);
-            }
-            JointKind::Prismatic => a = a + z.scale(qdd[iv]) + omega.cross(z).scale(qd[iv] + qd[iv]), // (20.27)
-            JointKind::Floating => {
-                let (v_body, w_body) = (
-                    Vec3::new(qd[iv], qd[iv + 1], qd[iv + 2]), // both in axes that turn with the body
-                    Vec3::new(qd[iv + 3], qd[iv + 4], qd[iv + 5]),
-                );
-                a = pose.rotation * (Vec3::new(qdd[iv], qdd[iv + 1], qdd[iv + 2]) + w_body.cross(v_body));
-                alpha = pose.rotation * Vec3::new(qdd[iv + 3], qdd[iv + 4], qdd[iv + 5]);
-                omega = pose.rotation * w_body;
-            }
-        }
+        let own = [joint.coordinates(q), joint.rates(qd), joint.rates(qdd)];
+        (omega, alpha, a) = joint.kind.mechanics().world_acceleration((omega, alpha, a), &pose.rotation, own);
         (omega, alpha, a) = (omega.named("omega", b), alpha.named("alpha", b), a.named("accel", b));
     }
     let lever = lever_of(&poses, frame);

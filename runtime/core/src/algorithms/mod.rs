@@ -56,7 +56,6 @@
 
 mod aba;
 mod actuator;
-mod composite;
 mod constraint;
 mod contact_system;
 mod crba;
@@ -70,7 +69,6 @@ mod factor;
 mod functional;
 mod impact;
 mod jacobian;
-mod joint;
 mod kinematics;
 mod momentum;
 mod reduced_dynamics;
@@ -81,6 +79,7 @@ mod rnea;
 mod transmission;
 mod velocity;
 
+pub use crate::joint::composing_pays;
 pub use aba::{forward_dynamics_aba, solve_articulated};
 pub use constraint::{
     applied_rows, baumgarte, constrained_forward_dynamics, hybrid_inverse_dynamics, projection, ConstrainedMotion,
@@ -105,10 +104,19 @@ pub use functional::{
 };
 pub use impact::{impact, Impact, Struck};
 pub use jacobian::{jacobian, jacobian_bias};
-pub use joint::composing_pays;
 pub use kinematics::{forward_kinematics, frame_acceleration, frame_velocity};
 pub use momentum::{momentum, Momentum};
 pub use reduced_dynamics::{reduced_inverse_dynamics, reduced_inverse_dynamics_with_limbs, LimbWrenches};
 pub use reduced_gravity::{reduced_gravity_force, reduced_gravity_force_with_limbs, LimbMoments};
 pub use reduced_mass_matrix::reduced_mass_matrix;
 pub use rnea::{bias_force, gravity_force, inverse_dynamics, joint_wrenches, velocity_force};
+
+use crate::model::Body;
+use crate::spatial::Composite;
+use crate::Real;
+
+/// What a body is and carries.
+fn composite_of<T: Real>(body: &Body<T>) -> Composite<T> {
+    let total = body.total_about_origin();
+    Composite { mass: total.mass, first_moment: total.first_moment, second_moment: total.second_moment }
+}

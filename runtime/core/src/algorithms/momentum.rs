@@ -3,9 +3,9 @@
 //! First moments, linear and angular momenta are summed from the tips to the base like forces; at the base about the root
 //! body's joint, so that what stands far from the world's origin loses no digits.
 
-use super::joint::JointPose;
 use super::velocity::body_velocities;
-use crate::model::{JointKind, Model};
+use crate::joint::JointPose;
+use crate::model::Model;
 use crate::real::Real;
 use crate::spatial::{ForceVector, Vec3};
 use alloc::vec;
@@ -31,7 +31,7 @@ pub struct Momentum<T> {
 #[doc(alias("COM", "centroidal momentum", "center of mass"))]
 pub fn momentum<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Momentum<T> {
     let poses = JointPose::all(&model.bodies, q);
-    let velocities = body_velocities(model, &poses, qd);
+    let velocities = body_velocities(model, &poses, [q, qd]);
     let anchor = anchor(&poses);
     let (mass, first_moment) = first_moments_in_world(model, &poses);
 
@@ -90,8 +90,8 @@ pub(super) fn first_moments_in_world<T: Real>(model: &Model<T>, poses: &[JointPo
     for (i, body) in model.bodies.iter().enumerate().rev() {
         T::section("first moment", Some(i));
         let (m, mut ms) = moments[i];
-        if body.joint.kind == JointKind::Prismatic {
-            ms.z = ms.z + m * poses[i].slide_or_zero();
+        if let Some(slide) = poses[i].slide {
+            ms.z = ms.z + m * slide;
         }
         let ms = poses[i].to_parent(ms).named("first_moment", i);
         match body.parent {

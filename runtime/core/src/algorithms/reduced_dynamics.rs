@@ -7,8 +7,8 @@
 //! from that of its parent by three multiplications, and its constants are turned instead of vectors. The second moment
 //! enters as in `rnea.rs`, with Σ_zz = 0 for revolute joints.
 
-use super::joint::rotated_back;
 use super::reduced_turn::Turn;
+use crate::joint::quaternion::rotated_back;
 use crate::model::{BodyId, JointKind};
 use crate::real::Real;
 use crate::reduced::{ReducedBody, ReducedModel};

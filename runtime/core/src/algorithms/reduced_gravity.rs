@@ -6,8 +6,8 @@
 //! along the axis is wanted, and a turn about the axis does not change it: it is taken before the turn, where the vector
 //! −g of a joint near the base still has zeros.
 
-use super::joint::rotated_back;
 use super::reduced_turn::own_angle;
+use crate::joint::quaternion::rotated_back;
 use crate::model::{BodyId, JointKind};
 use crate::real::Real;
 use crate::reduced::{ReducedBody, ReducedModel};

@@ -4,12 +4,11 @@
 //! same. A composite of bodies that [stay](ReducedBody::stays) is put together in the base axes of their chain: there the
 //! constants turn, and no composite.
 
-use super::composite::Composite;
 use super::reduced_turn::Turn;
 use crate::model::JointKind;
 use crate::real::Real;
 use crate::reduced::{ReducedBody, ReducedModel};
-use crate::spatial::{ForceVector, Mat3, Sym3, Vec3};
+use crate::spatial::{Composite, ForceVector, Mat3, Sym3, Vec3};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -30,7 +29,10 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
         // in base axes, which the joint has turned or slid from already
         let (moved, column) = match body.kind {
             JointKind::Floating => {
-                in_metres(&composite, model.per_unit).fill_floating_block(iv, &mut set);
+                let composite = in_metres(&composite, model.per_unit);
+                let own = &q[body.iq..body.iq + body.kind.nq()];
+                let mut set = |i, j, value| set(iv + i, iv + j, value);
+                body.kind.mechanics().block(&composite, own, body.kind.nv(), &mut set);
                 continue;
             }
             JointKind::Prismatic => {

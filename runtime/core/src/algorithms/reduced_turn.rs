@@ -6,7 +6,7 @@
 //! rounded sum would lose |q| ε, which is all of the fraction for angles of many turns; or from those of its terms by the
 //! addition theorem.
 
-use super::joint::quaternion_to_rotation;
+use crate::joint::quaternion::quaternion_to_rotation;
 use crate::model::JointKind;
 use crate::real::Real;
 use crate::reduced::{ReducedBody, ReducedModel};

@@ -10,8 +10,8 @@
 //!   a PUMA 560 they cost two digits.
 
 use super::effects::{passive_force, rotor_inertias};
-use super::joint::JointPose;
-use crate::model::{Body, JointKind, Load, Model};
+use crate::joint::JointPose;
+use crate::model::{Body, Load, Model};
 use crate::real::Real;
 use crate::spatial::{ForceVector, Mat3, SpatialInertia, Vec3};
 use alloc::vec;
@@ -50,7 +50,7 @@ pub fn velocity_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
 }
 
 fn rigid_body_forces<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T], gravity: Vec3<T>) -> Vec<T> {
-    generalized_forces(model, &transmitted_wrenches(model, q, qd, qdd, gravity))
+    generalized_forces(model, q, &transmitted_wrenches(model, q, qd, qdd, gravity))
 }
 
 /// The wrench that each joint, its drive included, exerts on its child: force \[N\] and moment \[N·m\] about the origin of
@@ -72,17 +72,12 @@ pub fn joint_wrenches<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T]) -
 }
 
 /// The component of each joint's wrench along the joint: the generalized forces, by velocity coordinate   (20.50)
-fn generalized_forces<T: Real>(model: &Model<T>, wrenches: &[ForceVector<T>]) -> Vec<T> {
+fn generalized_forces<T: Real>(model: &Model<T>, q: &[T], wrenches: &[ForceVector<T>]) -> Vec<T> {
     let mut tau = vec![T::zero(); model.nv()];
     for (body, w) in model.bodies.iter().zip(wrenches) {
-        let iv = body.joint.iv;
-        match body.joint.kind {
-            JointKind::Revolute => tau[iv] = w.moment.z,
-            JointKind::Prismatic => tau[iv] = w.force.z,
-            JointKind::Floating => {
-                tau[iv..iv + 3].copy_from_slice(&w.force.to_array());
-                tau[iv + 3..iv + 6].copy_from_slice(&w.moment.to_array());
-            }
+        let (joint, mechanics) = (&body.joint, body.joint.kind.mechanics());
+        for k in 0..joint.kind.nv() {
+            tau[joint.iv + k] = mechanics.along(k, joint.coordinates(q), w);
         }
     }
     tau
@@ -159,39 +154,15 @@ impl<T: Real> Motion<T> {
 
     /// The motion of `body`, which joint `pose` carries, from that of its parent.
     fn of_child(&self, i: usize, body: &Body<T>, pose: &JointPose<T>, [q, qd, qdd]: [&[T]; 3]) -> Self {
-        let (kind, iv) = (body.joint.kind, body.joint.iv);
-        let (omega, alpha) = match kind {
-            JointKind::Revolute => {
-                // ω_j = ω_{j−1} + q̇_j e_j,  ε_j = ε_{j−1} + q̈_j e_j + q̇_j ω_j × e_j   (20.23), (20.24)
-                let (w, e) = (pose.to_child(self.omega), pose.to_child(self.alpha));
-                let (qd, qdd) = (qd[iv], qdd[iv]);
-                (Vec3::new(w.x, w.y, w.z + qd), Vec3::new(e.x + w.y * qd, e.y - w.x * qd, e.z + qdd))
-            }
-            JointKind::Prismatic => (pose.to_child(self.omega), pose.to_child(self.alpha)),
-            JointKind::Floating => {
-                (Vec3::new(qd[iv + 3], qd[iv + 4], qd[iv + 5]), Vec3::new(qdd[iv + 3], qdd[iv + 4], qdd[iv + 5]))
-            }
-        };
+        let (joint, mechanics) = (&body.joint, body.joint.kind.mechanics());
+        let own = [joint.coordinates(q), joint.rates(qd), joint.rates(qdd)];
+        let (w, e) = (pose.to_child(self.omega), pose.to_child(self.alpha));
+        let (omega, alpha) = mechanics.spin((w, e), own);
         let omega = omega.named("omega", i);
         let alpha = alpha.named("alpha", i);
         let field = AccelerationField::new(omega, alpha);
-        let accel = match kind {
-            JointKind::Revolute => pose.to_child(self.accel + self.field.u * pose.translation),
-            JointKind::Prismatic => {
-                // the joint frame's, then U z q + 2 q̇ ω × z + q̈ z
-                let a = pose.to_child(self.accel + self.field.u * pose.translation);
-                let along_z = field.u.column(2).scale(q[body.joint.iq]);
-                let twice_qd = qd[iv] + qd[iv];
-                let coriolis = Vec3::new(omega.y * twice_qd, -(omega.x * twice_qd), qdd[iv]);
-                a + along_z + coriolis
-            }
-            JointKind::Floating => {
-                // v̇ + ω × v − Rᵀ g: v is given in axes that turn
-                let v = Vec3::new(qd[iv], qd[iv + 1], qd[iv + 2]);
-                let vd = Vec3::new(qdd[iv], qdd[iv + 1], qdd[iv + 2]);
-                vd + omega.cross(v) + pose.to_child(self.accel)
-            }
-        };
+        let at = pose.to_child(self.accel + self.field.u * pose.translation);
+        let accel = mechanics.acceleration(at, [w, omega], &field.u, own);
         Motion { omega, alpha, accel: accel.named("accel", i), field }
     }
 }

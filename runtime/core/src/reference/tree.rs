@@ -25,6 +25,15 @@ pub enum Joint {
 }
 
 impl Joint {
+    /// The joint that robot files mean by a word; `None`: it has not one degree of freedom.
+    pub fn of_word(word: &str) -> Option<Joint> {
+        match word {
+            "revolute" | "continuous" => Some(Joint::Revolute),
+            "prismatic" | "linear" => Some(Joint::Linear),
+            _ => None,
+        }
+    }
+
     /// The indicator s_j of (20.6): 0 for a revolute joint, 1 for a linear one.
     ///
     /// # Panics

@@ -3,10 +3,13 @@
 //! Spatial quantities are pairs of 3-vectors, angular part first. Nothing here skips a zero: what is structurally zero is
 //! the compiler's business.
 
+#[cfg_attr(not(feature = "alloc"), allow(dead_code))] // without models nothing is swept
+mod composite;
 mod matrix;
 mod rigid;
 mod vector;
 
+pub(crate) use composite::Composite;
 pub use matrix::{Mat3, Sym3};
 pub use rigid::{ForceVector, MotionVector, SpatialInertia, Transform};
 pub use vector::Vec3;

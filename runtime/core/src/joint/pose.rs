@@ -1,20 +1,23 @@
 //! Where a body stands against its parent, and how vectors, wrenches and tensors cross the joint.
 //!
-//! The pose of a body in its parent's frame is a constant placement (E, p) followed by the joint's own motion: a turn
-//! R_z(q), a slide q z, or, for a floating base, all of q. So the rotation from child to parent is R = E R_z(q).
+//! The pose of a body in its parent's frame is a constant placement (E, p) followed by the joint's own motion. That of a turn R_z(q) and
+//! of a slide q z stay apart from the placement, as vectors cross them with fewer operations: R = E R_z(q). That of any other
+//! joint is part of the placement.
 
 use crate::dd::Dd;
-use crate::model::{Body, BodyId, JointKind};
+#[cfg(feature = "alloc")]
+use crate::model::Body;
 use crate::real::Real;
-use crate::spatial::{ForceVector, Mat3, Sym3, Vec3};
+use crate::spatial::{Composite, ForceVector, Mat3, MotionVector, Sym3, Transform, Vec3};
+#[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
 /// Whether E R_z(q) should be multiplied out once, rather than R_z and E be applied to every vector one after the other:
-/// the value of [`Body::dense`], from the exact E.
+/// the value of [`Body::dense`](crate::model::Body::dense), from the exact E.
 ///
 /// Counts the multiplications of five vectors, as many as inverse dynamics takes through a joint. A zero or ±1 in E is
 /// free; a body on the world never composes, because there E meets constants.
-pub fn composing_pays(parent: Option<BodyId>, rotation: &Mat3<Dd>) -> bool {
+pub fn composing_pays(parent: Option<usize>, rotation: &Mat3<Dd>) -> bool {
     const VECTORS: usize = 5;
     let is_free = |x: Dd| x == Dd::ZERO || x.abs() == Dd::ONE;
     let (mut compose, mut composed, mut separate) = (0, 0, 4);
@@ -31,10 +34,10 @@ pub fn composing_pays(parent: Option<BodyId>, rotation: &Mat3<Dd>) -> bool {
 
 /// Pose of a body in its parent's frame at one configuration.
 #[derive(Clone, Debug)]
-pub(super) struct JointPose<T> {
-    /// E, or the unit matrix for a floating base.
+pub(crate) struct JointPose<T> {
+    /// E; of joints that neither turn nor slide along z R itself.
     pub placement: Mat3<T>,
-    /// p: origin of the joint frame in the parent's frame \[m\], for a floating base that of the body.
+    /// p: origin of the joint frame in the parent's frame \[m\]; of joints that neither turn nor slide that of the body.
     pub translation: Vec3<T>,
     /// How far the body has slid along z \[m\], for a prismatic joint.
     pub slide: Option<T>,
@@ -42,45 +45,38 @@ pub(super) struct JointPose<T> {
     pub turn: Option<(T, T)>,
     /// R as one matrix, where that is the cheaper form.
     composed: Option<Mat3<T>>,
-    /// [`Body::dense`].
+    /// [`Body::dense`](crate::model::Body::dense).
     pub dense: bool,
 }
 
 impl<T: Real> JointPose<T> {
-    pub fn new(i: BodyId, body: &Body<T>, q: &[T]) -> Self {
-        let (iq, placement, translation) = (body.joint.iq, body.placement.rotation, body.placement.translation);
-        let dense = body.dense;
-        match body.joint.kind {
-            JointKind::Revolute => {
-                let (s, c) = q[iq].sin_cos();
-                let (s, c) = (s.named("sin_q", i, ""), c.named("cos_q", i, ""));
-                let composed = dense.then(|| turn_columns(&placement, s, c));
-                JointPose { placement, translation, slide: None, turn: Some((s, c)), composed, dense }
-            }
-            JointKind::Prismatic => {
-                JointPose { placement, translation, slide: Some(q[iq]), turn: None, composed: None, dense }
-            }
-            JointKind::Floating => JointPose {
-                placement: Mat3::identity(),
-                translation: Vec3::new(q[iq], q[iq + 1], q[iq + 2]),
-                slide: None,
-                turn: None,
-                composed: Some(quaternion_to_rotation([q[iq + 3], q[iq + 4], q[iq + 5], q[iq + 6]])),
-                dense: true,
-            },
-        }
+    /// Where a joint has turned the body about z by the angle with this (sin, cos).
+    pub fn turned(placement: &Transform<T>, (s, c): (T, T), dense: bool) -> Self {
+        let composed = dense.then(|| turn_columns(&placement.rotation, s, c));
+        let (placement, translation) = (placement.rotation, placement.translation);
+        JointPose { placement, translation, slide: None, turn: Some((s, c)), composed, dense }
+    }
+
+    /// Where a joint has slid the body along z by this \[m\].
+    pub fn slid(placement: &Transform<T>, slide: T, dense: bool) -> Self {
+        let (placement, translation) = (placement.rotation, placement.translation);
+        JointPose { placement, translation, slide: Some(slide), turn: None, composed: None, dense }
+    }
+
+    /// Where a joint has moved the body to this pose in the joint's frame.
+    pub fn moved(placement: &Transform<T>, moved: &Transform<T>) -> Self {
+        let Transform { rotation, translation } = placement.compose(moved);
+        JointPose { placement: rotation, translation, slide: None, turn: None, composed: None, dense: true }
     }
 
     /// All poses of a model, by body.
+    #[cfg(feature = "alloc")]
     pub fn all(bodies: &[Body<T>], q: &[T]) -> Vec<Self> {
         T::section("sines and cosines", None);
-        let pose = |(i, body)| JointPose::new(i, body, q);
+        let pose = |(i, body): (usize, &Body<T>)| {
+            body.joint.kind.mechanics().pose(i, &body.placement, body.dense, body.joint.coordinates(q))
+        };
         bodies.iter().enumerate().map(pose).collect()
-    }
-
-    /// The slide, or zero for a joint that has none.
-    pub fn slide_or_zero(&self) -> T {
-        self.slide.unwrap_or_else(T::zero)
     }
 
     /// The same rotation with another translation.
@@ -113,6 +109,34 @@ impl<T: Real> JointPose<T> {
             (Some((s, c)), _) => turn_columns(&(*r_parent * self.placement), s, c),
             (None, Some(r)) => *r_parent * *r,
             (None, None) => *r_parent * self.placement,
+        }
+    }
+
+    /// Angular velocity and velocity of the origin that the parent's motion alone gives the child, in child axes.
+    pub fn motion_to_child(&self, parent: &MotionVector<T>) -> MotionVector<T> {
+        let angular = self.to_child(parent.angular);
+        let v = self.to_child(parent.linear + parent.angular.cross(self.translation));
+        let linear = match self.slide {
+            Some(q) => Vec3::new(v.x + angular.y * q, v.y - angular.x * q, v.z), // + ω × q z
+            None => v,
+        };
+        MotionVector { angular, linear }
+    }
+
+    /// Bodies as one, in axes that the joint has turned or slid back.
+    pub fn composite_back(&self, composite: &Composite<T>) -> Composite<T> {
+        match (self.turn, self.slide) {
+            (Some(turn), _) => composite.turned(turn),
+            (None, Some(slide)) => composite.slid(slide),
+            (None, None) => *composite,
+        }
+    }
+
+    /// A wrench on the child, in axes that the joint has turned back; not for joints that slide along z.
+    pub fn wrench_back(&self, w: &ForceVector<T>) -> ForceVector<T> {
+        match self.turn {
+            Some((s, c)) => ForceVector { moment: w.moment.turned(s, c), force: w.force.turned(s, c) },
+            None => *w,
         }
     }
 
@@ -156,29 +180,4 @@ fn conjugated<T: Real>(e: &Mat3<T>, s: &Sym3<T>) -> Sym3<T> {
 /// A R_z(q).
 fn turn_columns<T: Real>(a: &Mat3<T>, s: T, c: T) -> Mat3<T> {
     Mat3 { rows: a.rows.map(|[x, y, z]| [x * c + y * s, y * c - x * s, z]) }
-}
-
-/// The rotation matrix (body to world) of a unit quaternion (x, y, z, w). Not normalised here: an error of the norm goes
-/// into the result to first order, and there is no root and no division.
-pub(super) fn quaternion_to_rotation<T: Real>([x, y, z, w]: [T; 4]) -> Mat3<T> {
-    let (x2, y2, z2) = (x + x, y + y, z + z);
-    let (xx, yy, zz) = (x * x2, y * y2, z * z2);
-    let (xy, xz, yz) = (x * y2, x * z2, y * z2);
-    let (wx, wy, wz) = (w * x2, w * y2, w * z2);
-    let one = T::one();
-    Mat3 {
-        rows: [
-            [one - (yy + zz), xy - wz, xz + wy],
-            [xy + wz, one - (xx + zz), yz - wx],
-            [xz - wy, yz + wx, one - (xx + yy)],
-        ],
-    }
-}
-
-/// Rᵀ v for the rotation of a unit quaternion, without R: v + w t + t × u with t = 2 v × u and u = (x, y, z). Where v has one
-/// component this takes what one row of R would, and fewer doublings.
-pub(super) fn rotated_back<T: Real>([x, y, z, w]: [T; 4], v: Vec3<T>) -> Vec3<T> {
-    let u = Vec3::new(x, y, z);
-    let t = (v + v).cross(u);
-    v + t.cross(u) + t.scale(w)
 }

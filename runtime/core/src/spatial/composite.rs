@@ -1,10 +1,10 @@
 //! Several bodies as one rigid body: mass, first and second moment, which is what both forms of the mass matrix carry down.
 
 use crate::real::Real;
-use crate::spatial::{Sym3, Vec3};
+use crate::spatial::{ForceVector, MotionVector, Sym3, Vec3};
 
 /// The bodies outside a joint as one rigid body, about the origin of the joint's frame.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Composite<T> {
     /// M \[kg\].
     pub mass: T,
@@ -68,23 +68,12 @@ impl<T: Real> Composite<T> {
         Composite { mass, first_moment: ms_new, second_moment: s + shift }
     }
 
-    /// The 6 × 6 block of a floating base, coordinates (v, ω): f = M v̇ + ε × m c,  n = m c × v̇ + J ε.
-    pub fn fill_floating_block(&self, iv: usize, set: &mut impl FnMut(usize, usize, T)) {
-        let (ms, s) = (self.first_moment, self.second_moment);
-        let j = s.second_moment_to_inertia();
-        for k in 0..3 {
-            set(iv + k, iv + k, self.mass);
-        }
-        // row v_i, column ω_k: (e_k × m c)_i
-        set(iv, iv + 4, ms.z);
-        set(iv, iv + 5, -ms.y);
-        set(iv + 1, iv + 3, -ms.z);
-        set(iv + 1, iv + 5, ms.x);
-        set(iv + 2, iv + 3, ms.y);
-        set(iv + 2, iv + 4, -ms.x);
-        for (row, column, value) in [(0, 0, j.xx), (0, 1, j.xy), (0, 2, j.xz), (1, 1, j.yy), (1, 2, j.yz), (2, 2, j.zz)]
-        {
-            set(iv + 3 + row, iv + 3 + column, value);
+    /// The wrench about the origin that this acceleration, from rest, takes: f = M a + ε × m c,  n = m c × a + J ε.
+    pub fn wrench_of(&self, a: &MotionVector<T>) -> ForceVector<T> {
+        let j = self.second_moment.second_moment_to_inertia();
+        ForceVector {
+            moment: self.first_moment.cross(a.linear) + j * a.angular,
+            force: a.linear.scale(self.mass) + a.angular.cross(self.first_moment),
         }
     }
 }
