@@ -31,7 +31,7 @@ use std::f64::consts::PI;
 use std::fmt;
 use straightline_core::algorithms::Ltdl;
 use straightline_core::magnitude::Magnitude;
-use straightline_core::model::{BodyId, JointKind, Model};
+use straightline_core::model::{BodyId, Model};
 use straightline_core::spatial::{Sym3, Transform, Vec3};
 use straightline_core::{Dd, Real};
 use straightline_graph::expr::{evaluate, Binary, Grade, Graph, Op, Port};
@@ -868,14 +868,13 @@ impl<'a> States<'a> {
         let short = |x: f64| Dd::from(f64::from(x as f32));
         state.extend(plain.into_iter().map(|(n, x)| (n.to_string(), x.into_iter().map(short).collect())));
         // of length one in double-double, too
-        for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind == JointKind::Floating) {
+        for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| !j.kind.is_single()) {
             if let Some(q) = state.get_mut("q") {
-                let q = &mut q[joint.iq + 3..joint.iq + 7];
+                let own = &mut q[joint.iq..joint.iq + joint.kind.nq()];
                 if place == Place::Zero {
-                    q[3] = Dd::ONE;
+                    own.iter_mut().zip(joint.kind.row().neutral).for_each(|(q, neutral)| *q = Dd::from(*neutral));
                 }
-                let length = q.iter().fold(Dd::ZERO, |sum, x| sum + *x * *x).sqrt();
-                q.iter_mut().for_each(|x| *x /= length);
+                joint.kind.normalise(own);
             }
         }
         state

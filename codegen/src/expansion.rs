@@ -6,7 +6,6 @@ use crate::emit::{array_type, batch, Scalar};
 use crate::scene;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use straightline_core::model::JointKind;
 use straightline_graph::expr::Port;
 
 /// What became of a robot file and its scene.
@@ -179,7 +178,7 @@ pub fn needs_a_module(generated: &Generated) -> bool {
 pub fn associated_items(generated: &Generated) -> String {
     let Generated { model, frames, scalar, .. } = generated;
     let joints = model.bodies.len();
-    let limited = model.bodies.iter().filter(|b| b.joint.kind != JointKind::Floating).count();
+    let limited = model.bodies.iter().filter(|b| b.joint.kind.is_single()).count();
     let numbers = format!("[{}; {limited}]", scalar.name());
     let mut out = String::new();
     let mut constant = |name: &str, kind: &str, doc: &str| {

@@ -10,7 +10,6 @@ use crate::function::Function;
 use crate::identifier::{comment, package_name, string_literal};
 use crate::output::MARK;
 use std::fmt::Write;
-use straightline_core::model::JointKind;
 use straightline_graph::expr::Port;
 
 /// The files of the package, by their paths inside it. All C names begin with `prefix`, an identifier.
@@ -433,13 +432,10 @@ pub unsafe extern "C" fn {prefix}_{name}_new(
             provenance = self.provenance(),
         );
         for joint in self.joints() {
-            let kind = match joint.kind {
-                JointKind::Revolute => "revolute [rad]",
-                JointKind::Prismatic => "prismatic [m]",
-                JointKind::Floating => {
-                    "floating: q = position (3) and quaternion x y z w (4) of the root link in the world;\n *       \
-                     qd = linear and angular velocity in root-link axes; tau = force and moment, likewise"
-                }
+            let row = joint.kind.row();
+            let kind = match joint.kind.is_single() {
+                true => format!("{} [{}]", row.name, joint.kind.units()[0]),
+                false => format!("{}: {}", row.name, row.coordinates.replace('\n', "\n *       ")),
             };
             let _ = writeln!(out, " *   {:>3} {:>3}  {}, {kind}", joint.iq, joint.iv, comment(&joint.name));
         }

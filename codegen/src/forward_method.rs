@@ -13,7 +13,7 @@
 use crate::emit::Scalar;
 use crate::function::ForwardDynamicsMethod;
 use std::fmt;
-use straightline_core::model::{Joint, JointKind, Model};
+use straightline_core::model::{Joint, Model};
 use straightline_core::{Dd, Real};
 use straightline_graph::expr::{evaluate, Graph, Port, DIVISION};
 use straightline_graph::pass::count_sums;
@@ -232,7 +232,7 @@ pub(crate) fn states(model: &Model<Dd>, inputs: &[Port], count: usize, fast: boo
 pub(crate) fn of_port(model: &Model<Dd>, port: &Port, fast: bool, random: &mut Random) -> Vec<f64> {
     let mut x = values(model, &port.name, port.len(), 0, random);
     let rates = port.name == "qd" && port.len() == model.nv();
-    for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| fast && rates && j.kind != JointKind::Floating) {
+    for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| fast && rates && j.kind.is_single()) {
         x[joint.iv] *= within(joint.limits.velocity, FAST);
     }
     if port.name == "qdd" && !fast {
@@ -247,24 +247,26 @@ fn values(model: &Model<Dd>, port: &str, len: usize, kind: usize, random: &mut R
         "q" if len == model.nq() => {
             let mut q = vec![0.0; len];
             for joint in model.bodies.iter().map(|b| &b.joint) {
-                if joint.kind == JointKind::Floating {
+                if let Some(first) = joint.kind.row().quaternion {
                     let quaternion: Vec<f64> = (0..4).map(|_| random.symmetric(1.0)).collect();
                     let norm = quaternion.iter().map(|x| x * x).sum::<f64>();
                     let norm = straightline_core::trig::sqrt_f64(norm);
-                    (0..3).for_each(|k| q[joint.iq + k] = random.symmetric(1.0));
-                    (0..4).for_each(|k| q[joint.iq + 3 + k] = quaternion[k] / norm);
+                    (0..first).for_each(|k| q[joint.iq + k] = random.symmetric(1.0));
+                    (0..4).for_each(|k| q[joint.iq + first + k] = quaternion[k] / norm);
                     continue;
                 }
-                let (lower, upper) = (within(joint.limits.lower, -RANGE), within(joint.limits.upper, RANGE));
-                let anywhere = lower + (upper - lower) * (0.5 + random.symmetric(0.5));
-                let quarter = std::f64::consts::FRAC_PI_2;
-                let near = random.symmetric(NEAR);
-                q[joint.iq] = match kind {
-                    0 => anywhere,
-                    1 => near,
-                    _ => (anywhere / quarter).round() * quarter + near,
+                for q in &mut q[joint.iq..joint.iq + joint.kind.nq()] {
+                    let (lower, upper) = (within(joint.limits.lower, -RANGE), within(joint.limits.upper, RANGE));
+                    let anywhere = lower + (upper - lower) * (0.5 + random.symmetric(0.5));
+                    let quarter = std::f64::consts::FRAC_PI_2;
+                    let near = random.symmetric(NEAR);
+                    *q = match kind {
+                        0 => anywhere,
+                        1 => near,
+                        _ => (anywhere / quarter).round() * quarter + near,
+                    }
+                    .clamp(lower.min(upper), upper.max(lower));
                 }
-                .clamp(lower.min(upper), upper.max(lower));
             }
             q
         }

@@ -1,7 +1,8 @@
 //! The box of a program's inputs: what bounds on rounding errors are computed for.
 
 use crate::scene::Scene;
-use straightline_core::model::{JointKind, Model};
+use straightline_core::joint::Measure;
+use straightline_core::model::Model;
 use straightline_graph::certify::{Interval, Refusal};
 use straightline_graph::expr::Port;
 
@@ -21,9 +22,10 @@ pub fn input_box<T>(inputs: &[Port], scene: &Scene, model: &Model<T>) -> Result<
         let mut ranges = scene.input_ranges(port, model);
         if port.name == "q" {
             for joint in model.bodies.iter().map(|b| &b.joint) {
-                let count = if joint.kind == JointKind::Floating { 3 } else { 1 };
-                let bound = if joint.kind == JointKind::Revolute { std::f64::consts::PI } else { SLIDE };
-                ranges[joint.iq..joint.iq + count].iter_mut().for_each(|r| limit(r, bound));
+                let own = ranges[joint.iq..].iter_mut().zip(joint.kind.measures());
+                own.for_each(|(r, measure)| {
+                    limit(r, if measure == Measure::Angle { std::f64::consts::PI } else { SLIDE })
+                });
             }
         } else {
             let bound = DEFAULTS.iter().find(|(name, _)| *name == port.name).ok_or(Refusal::Unlimited)?.1;

@@ -26,7 +26,7 @@
 use crate::input_box::input_box;
 use crate::scene::Scene;
 use straightline_core::algorithms::mass_matrix;
-use straightline_core::model::{Body, JointKind, Model};
+use straightline_core::model::{Body, Model};
 use straightline_core::Dd;
 use straightline_graph::certify::{Analysis, Format, Interval, Known, Refusal};
 use straightline_graph::expr::{evaluate, Graph, NodeId, Port};
@@ -79,13 +79,13 @@ impl Sizes {
 /// Joints of the greatest robot that is looked at: beyond, errors add up to more than is left of H, and the search for values is long.
 const MOST_JOINTS: usize = 12;
 
-/// Whether something is known of this program: no base floats, no inertia is an input, and all accelerations of a few
+/// Whether something is known of this program: all joints turn or slide, no inertia is an input, and all accelerations of a few
 /// joints are results.
 pub fn is_arm(model: &Model<Dd>, graph: &Graph) -> bool {
-    let floats = model.bodies.iter().any(|b| b.joint.kind == JointKind::Floating);
+    let turns_or_slides = model.bodies.iter().all(|b| b.joint.kind.elementary().is_some());
     let is_known = |name: &str| ["q", "qd", "tau", "gravity"].contains(&name);
     let is_whole = graph.results.len() == model.nv() && model.nv() <= MOST_JOINTS;
-    !floats && is_whole && graph.inputs.iter().all(|p| is_known(&p.name))
+    turns_or_slides && is_whole && graph.inputs.iter().all(|p| is_known(&p.name))
 }
 
 /// What is known for inputs in a box. Nothing where it [is no arm](is_arm).
@@ -321,7 +321,7 @@ fn interval(x: Dd) -> Interval {
 
 /// The component of a twist (ω, v) that a joint moves.
 fn axis(body: &Body<Dd>) -> usize {
-    if body.joint.kind == JointKind::Prismatic {
+    if body.joint.kind.slides() {
         5
     } else {
         2
@@ -352,7 +352,7 @@ fn inertia_of(body: &Body<Dd>) -> Inertia {
 fn least(first: &Body<Dd>, second: &Body<Dd>, q: &[Interval], wanted: Wanted) -> f64 {
     let range = q.get(second.joint.iq).copied().unwrap_or(Interval::ZERO);
     let turn = std::f64::consts::TAU * (1.0 + SLACK);
-    let turns = second.joint.kind == JointKind::Revolute && range.width() > turn;
+    let turns = second.joint.kind.turns() && range.width() > turn;
     let range = if turns { Interval::new(0.0, turn) } else { range };
     let inertias = [inertia_of(first), inertia_of(second)];
     let step = (range.hi - range.lo) / PARTS as f64;
@@ -440,7 +440,7 @@ impl Pose {
     fn of(body: &Body<Dd>, q: Interval) -> Pose {
         let r = body.placement.rotation.rows.map(|row| row.map(interval));
         let p = body.placement.translation.to_array().map(interval);
-        if body.joint.kind == JointKind::Prismatic {
+        if body.joint.kind.slides() {
             return Pose { rotation: r, translation: [0, 1, 2].map(|i| p[i] + r[i][2] * q) };
         }
         let (s, c) = q.sin_cos();

@@ -10,8 +10,8 @@
 
 use crate::description::flexible::{Bending, Flexible, Support};
 use crate::description::{
-    Angle, AngleUnit, BaseKind, Description, Inertial, Joint as FileJoint, JointFrameNotation, JointKind,
-    MassCentreNotation, Notation, Pose, Rotation,
+    Angle, AngleUnit, BaseKind, Description, Inertial, Joint as FileJoint, JointFrameNotation, MassCentreNotation,
+    Notation, Pose, Rotation,
 };
 use crate::diagnostic::Place;
 use crate::model::{FrameOption, ModelOptions};
@@ -294,13 +294,8 @@ fn floating_root_joint(notation: &JointFrameNotation) -> String {
 }
 
 fn reference_joint(joint: &FileJoint) -> Result<Joint, String> {
-    match joint.kind.value {
-        JointKind::Revolute | JointKind::Continuous => Ok(Joint::Revolute),
-        JointKind::Prismatic => Ok(Joint::Linear),
-        JointKind::Fixed | JointKind::Floating => {
-            Err(format!("joint `{}` has not one degree of freedom", joint.name.value))
-        }
-    }
+    Joint::of_word(joint.kind.value.word)
+        .ok_or_else(|| format!("joint `{}` has not one degree of freedom", joint.name.value))
 }
 
 /// The link that no joint moves.
@@ -340,7 +335,7 @@ fn rigid_groups(
                 let above = places.get(joint.parent.value.as_str()).ok_or("a joint hangs on nothing")?;
                 let (parent, parent_place) = above.at(&vector(&joint.origin.xyz.value));
                 let place = parent_place.then(&Placed::read(&joint.origin, options));
-                if joint.kind.value.moves() {
+                if joint.kind.value.kind.is_some() {
                     groups.push(Group {
                         joint: Some(GroupJoint {
                             parent,
@@ -543,11 +538,8 @@ fn add_mass_centres(
         tree.links.push(MassCentreLink {
             name: link.name.value.clone(),
             parent: j.checked_sub(1),
-            joint: match link.kind.value {
-                JointKind::Prismatic => Joint::Linear,
-                JointKind::Revolute => Joint::Revolute,
-                _ => return Err(format!("joint `{}` is neither revolute nor linear", link.joint_name.value)),
-            },
+            joint: Joint::of_word(link.kind.value.word)
+                .ok_or_else(|| format!("joint `{}` is neither revolute nor linear", link.joint_name.value))?,
             iq: 0,
             iv: 0,
             mass: Dd::from(link.mass.value),

@@ -18,7 +18,8 @@ use crate::model::geometry::principal_moments;
 use crate::model::merge::{merge, Part};
 use crate::scene::ContactFunction;
 use straightline_core::algorithms::{complete_model, drive_states, forward_kinematics, mass_matrix};
-use straightline_core::model::{Body, BodyId, Frame, JointKind, Model};
+use straightline_core::joint::Measure;
+use straightline_core::model::{Body, BodyId, Frame, Model};
 use straightline_core::spatial::{Sym3, Transform, Vec3};
 use straightline_core::Dd;
 
@@ -73,7 +74,7 @@ pub(crate) fn weakest_joint(model: &Model<Dd>) -> Option<(BodyId, f64)> {
 fn each_feels_its_own_link(model: &Model<Dd>, inertia: Inertia) -> bool {
     let has_more =
         inertia == Inertia::WithDrives && !model.drives.is_empty() || model.bodies.iter().any(|b| b.load.is_some());
-    if has_more || model.bodies.iter().any(|b| b.joint.kind == JointKind::Floating) {
+    if has_more {
         return false;
     }
     // H itself is at most the natural inertia and the rotor; what is near the bound is left to elimination
@@ -85,9 +86,10 @@ fn each_feels_its_own_link(model: &Model<Dd>, inertia: Inertia) -> bool {
     model.bodies.iter().all(|body| {
         let own = &body.inertia;
         let (mass, com, tensor) = (own.mass.to_f64(), own.com.map(Dd::to_f64), own.inertia_com.map(Dd::to_f64));
-        let link = match body.joint.kind {
-            JointKind::Prismatic => mass,
-            _ => tensor.zz + mass * (com.x * com.x + com.y * com.y),
+        let link = match body.joint.kind.elementary() {
+            None => return false,
+            Some(Measure::Length) => mass,
+            Some(Measure::Angle) => tensor.zz + mass * (com.x * com.x + com.y * com.y),
         };
         let is_sound = mass >= 0.0 && rotor(body) >= 0.0 && principal_moments(tensor)[0] >= 0.0;
         is_sound && link + rotor(body) > MARGIN * (VANISHED * most(body) + DUST * greatest)
@@ -98,9 +100,9 @@ fn each_feels_its_own_link(model: &Model<Dd>, inertia: Inertia) -> bool {
 fn generic_configuration(model: &Model<Dd>, seed: usize) -> Vec<Dd> {
     let mut q: Vec<Dd> =
         (0..model.nq()).map(|i| Dd::from(4.0 * ((i * 3 + seed) as f64 * GOLDEN).fract() - 2.0)).collect();
-    for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind == JointKind::Floating) {
-        q[joint.iq..joint.iq + 6].fill(Dd::ZERO);
-        q[joint.iq + 6] = Dd::ONE;
+    for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_base()) {
+        let neutral = joint.kind.row().neutral;
+        q[joint.iq..].iter_mut().zip(neutral).for_each(|(q, neutral)| *q = Dd::from(*neutral));
     }
     q
 }
@@ -123,9 +125,8 @@ fn natural_inertias(model: &Model<Dd>, q: &[Dd]) -> Vec<f64> {
             let joint = &bodies[carrier].joint;
             let arm = centre - poses[carrier].translation;
             let moment = mass * arm.dot(arm).to_f64() + own;
-            for k in 0..joint.kind.nv() {
-                let linear = joint.kind == JointKind::Prismatic || joint.kind == JointKind::Floating && k < 3;
-                scales[joint.iv + k] += if linear { mass } else { moment };
+            for (scale, measure) in scales[joint.iv..].iter_mut().zip(joint.kind.row().measures) {
+                *scale += if *measure == Measure::Length { mass } else { moment };
             }
         }
     }
@@ -207,9 +208,8 @@ fn eliminate(model: &Model<Dd>, inertia: Inertia, q: &[Dd], tell: &mut dyn FnMut
 fn linear_coordinates(model: &Model<Dd>) -> Vec<bool> {
     let mut linear = vec![false; model.nv()];
     for joint in model.bodies.iter().map(|b| &b.joint) {
-        for k in 0..joint.kind.nv() {
-            linear[joint.iv + k] = joint.kind == JointKind::Prismatic || joint.kind == JointKind::Floating && k < 3;
-        }
+        let measures = joint.kind.row().measures;
+        linear[joint.iv..].iter_mut().zip(measures).for_each(|(l, measure)| *l = *measure == Measure::Length);
     }
     linear
 }

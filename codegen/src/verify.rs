@@ -18,7 +18,8 @@ use crate::model::{self, ModelOptions};
 use crate::reference_input::mass_centre_tree;
 use crate::scene::Scene;
 use std::collections::BTreeMap;
-use straightline_core::model::{JointKind, Model};
+use straightline_core::joint::Measure;
+use straightline_core::model::Model;
 use straightline_core::reference::{self, Joint, MassCentreFrame, MassCentreTree};
 use straightline_core::{trig, Dd};
 use straightline_graph::expr::{evaluate, Graph};
@@ -183,7 +184,7 @@ fn second_reading(
         let joint = &body.ok_or_else(|| format!("the model has no body `{}`", link.name))?.joint;
         (link.iq, link.iv) = (joint.iq, joint.iv);
     }
-    let joints = model.bodies.iter().map(|body| &body.joint).filter(|joint| joint.kind != JointKind::Floating);
+    let joints = model.bodies.iter().map(|body| &body.joint).filter(|joint| joint.kind.is_single());
     let elastic = elastic_springs(&description, &options.model);
     let drives = joints.map(|joint| match elastic.iter().find(|(name, _)| *name == joint.name) {
         Some((_, [stiffness, damping, rest])) => {
@@ -402,17 +403,18 @@ impl State {
         for joint in model.bodies.iter().map(|b| &b.joint) {
             let limits = joint.limits;
             let finite = |x: f64, otherwise: f64| if x.abs() <= NO_LIMIT { x } else { otherwise };
-            match joint.kind {
-                JointKind::Revolute | JointKind::Prismatic => {
-                    let wide = if joint.kind == JointKind::Revolute { std::f64::consts::PI } else { 1.0 };
-                    let lower = finite(limits.lower, finite(limits.upper, wide) - 2.0 * wide);
-                    let upper = finite(limits.upper, lower + 2.0 * wide);
-                    q[joint.iq] = lower + (upper - lower) * random.unit();
-                }
-                JointKind::Floating => {
-                    q[joint.iq..joint.iq + 3].fill_with(|| random.symmetric(2.0));
-                    q[joint.iq + 3..joint.iq + 7].copy_from_slice(&quaternion(random));
-                }
+            for (q, measure) in q[joint.iq..].iter_mut().zip(joint.kind.measures()) {
+                let wide = match measure {
+                    _ if joint.kind.is_base() => 2.0,
+                    Measure::Angle => std::f64::consts::PI,
+                    Measure::Length => 1.0,
+                };
+                let lower = finite(limits.lower, finite(limits.upper, wide) - 2.0 * wide);
+                let upper = finite(limits.upper, lower + 2.0 * wide);
+                *q = lower + (upper - lower) * random.unit();
+            }
+            if let Some(first) = joint.kind.row().quaternion {
+                q[joint.iq + first..joint.iq + first + 4].copy_from_slice(&quaternion(random));
             }
             for i in joint.iv..joint.iv + joint.kind.nv() {
                 qd[i] = random.symmetric(finite(limits.velocity, 2.0).min(10.0));

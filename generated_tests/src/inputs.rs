@@ -2,12 +2,12 @@
 
 use crate::random::Random;
 use straightline_codegen::Function;
-use straightline_core::model::{JointKind, Model};
+use straightline_core::model::Model;
 use straightline_core::Dd;
 
 /// Random inputs of a function, in the order of its ports; the quaternion of a floating base has length one.
 pub fn random(random: &mut Random, model: &Model<Dd>, function: Function) -> Vec<Vec<f64>> {
-    let floating = model.bodies.iter().any(|b| b.joint.kind == JointKind::Floating);
+    let floating = model.floats();
     function
         .inputs(model)
         .iter()

@@ -7,7 +7,7 @@ use crate::quadrature::integral;
 use crate::simulate::{Failure, MOST_NUMBERS};
 use crate::table::Table;
 use straightline_core::algorithms::{inverse_dynamics, joint_wrenches, kinetic_energy, potential_energy};
-use straightline_core::model::{Joint, JointKind, Model};
+use straightline_core::model::{Joint, Model};
 use straightline_core::spatial::ForceVector;
 
 /// The figures of a motion.
@@ -260,7 +260,7 @@ fn figures(joint: &Joint, j: usize, n: usize, table: &Table, wrenches: &Table) -
     let time = times.last().unwrap_or(&0.0) - times[0];
     JointFigures {
         name: joint.name.clone(),
-        unit: if joint.kind == JointKind::Prismatic { "N" } else { "N·m" },
+        unit: joint.kind.units()[3],
         peak: (peak, times[at]),
         rms: (integral(&times, |k| tau(k) * tau(k)) / time).sqrt(),
         speed: greatest(&|k| qd(k).abs()).0,

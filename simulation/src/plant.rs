@@ -12,7 +12,7 @@ use straightline_core::algorithms::{
     potential_energy, DrivenMotion, Links,
 };
 use straightline_core::drive::Actuator;
-use straightline_core::model::{Coulomb, Joint, JointEffects, JointKind, Model};
+use straightline_core::model::{Coulomb, Joint, JointEffects, Model};
 use straightline_core::trig::DOMAIN_F64;
 
 /// A robot that is simulated.
@@ -232,25 +232,8 @@ impl Plant {
     pub(crate) fn configuration_rate(&self, q: &[f64], qd: &[f64]) -> Vec<f64> {
         let mut rate = vec![0.0; self.model.nq()];
         for joint in self.model.bodies.iter().map(|b| &b.joint) {
-            let (iq, iv) = (joint.iq, joint.iv);
-            if joint.kind != JointKind::Floating {
-                rate[iq] = qd[iv];
-                continue;
-            }
-            let (v, w) = ([qd[iv], qd[iv + 1], qd[iv + 2]], [qd[iv + 3], qd[iv + 4], qd[iv + 5]]);
-            let [x, y, z, s] = [q[iq + 3], q[iq + 4], q[iq + 5], q[iq + 6]];
-            // R v = v + 2 s (u × v) + 2 u × (u × v)
-            let u = [x, y, z];
-            let c = cross(u, v);
-            let cc = cross(u, c);
-            for k in 0..3 {
-                rate[iq + k] = v[k] + 2.0 * (s * c[k] + cc[k]);
-            }
-            let turned = cross(u, w);
-            for k in 0..3 {
-                rate[iq + 3 + k] = 0.5 * (s * w[k] + turned[k]);
-            }
-            rate[iq + 6] = -0.5 * (x * w[0] + y * w[1] + z * w[2]);
+            let own = &mut rate[joint.iq..joint.iq + joint.kind.nq()];
+            joint.kind.configuration_rate(joint.coordinates(q), joint.rates(qd), own);
         }
         rate
     }
@@ -264,14 +247,14 @@ impl Plant {
 
 /// The first joint whose angle \[rad\] is beyond those whose sine has digits, and that angle.
 pub fn angle_beyond_sines<'a>(model: &'a Model<f64>, q: &[f64]) -> Option<(&'a str, f64)> {
-    let turning = model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind == JointKind::Revolute);
+    let turning = model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.turns());
     let mut angles = turning.map(|j| (j.name.as_str(), q[j.iq]));
     angles.find(|(_, q)| q.is_nan() || q.abs() > DOMAIN_F64)
 }
 
 /// Power that friction in the joints turns into heat \[W\]: Σ (d q̇ + f(q̇)) q̇.
 pub(crate) fn joint_friction(model: &Model<f64>, qd: &[f64]) -> f64 {
-    let joints = model.bodies.iter().filter(|b| b.joint.kind != JointKind::Floating);
+    let joints = model.bodies.iter().filter(|b| b.joint.kind.is_single());
     let loss = |(v, e): (f64, &JointEffects<f64>)| {
         let coulomb = match e.coulomb {
             Coulomb::Off => 0.0,
@@ -284,20 +267,14 @@ pub(crate) fn joint_friction(model: &Model<f64>, qd: &[f64]) -> f64 {
 }
 
 fn floats(joint: &Joint) -> bool {
-    joint.kind == JointKind::Floating
+    joint.kind.is_base()
 }
 
 /// q with quaternions of length one.
 fn unit_quaternions(model: &Model<f64>, q: &[f64]) -> Vec<f64> {
     let mut q = q.to_vec();
-    for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind == JointKind::Floating) {
-        let quaternion = &mut q[joint.iq + 3..joint.iq + 7];
-        let norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
-        quaternion.iter_mut().for_each(|x| *x /= norm);
+    for joint in model.bodies.iter().map(|b| &b.joint) {
+        joint.kind.normalise(&mut q[joint.iq..joint.iq + joint.kind.nq()]);
     }
     q
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

@@ -13,7 +13,8 @@ use crate::table::Table;
 use std::fmt;
 use std::ops::ControlFlow;
 use straightline_core::algorithms::{kinetic_energy, DrivenMotion};
-use straightline_core::model::{JointKind, Limits};
+use straightline_core::joint::Descriptor;
+use straightline_core::model::Limits;
 
 /// Times that are no further apart, as a part of the duration, are the same up to rounding.
 pub(crate) const SAME: f64 = 1e-12;
@@ -353,19 +354,19 @@ const ENERGY_COLUMNS: [&str; DriveEnergies::COUNT] =
 pub(crate) fn names(plant: &Plant, command: &Command) -> Vec<String> {
     let mut joints: Vec<_> = plant.model.bodies.iter().map(|b| &b.joint).collect();
     joints.sort_by_key(|j| j.iv);
-    let named = |prefix: &str, of_base: &[&str]| -> Vec<String> {
-        let of = |joint: &&straightline_core::model::Joint| match joint.kind {
-            JointKind::Floating => of_base.iter().map(|c| format!("{prefix}.{}.{c}", joint.name)).collect(),
-            _ => vec![format!("{prefix}.{}", joint.name)],
+    let named = |prefix: &str, entries: fn(&Descriptor) -> &'static [&'static str]| -> Vec<String> {
+        let of = |joint: &&straightline_core::model::Joint| match joint.kind.is_single() {
+            true => vec![format!("{prefix}.{}", joint.name)],
+            false => entries(joint.kind.row()).iter().map(|c| format!("{prefix}.{}.{c}", joint.name)).collect(),
         };
         joints.iter().flat_map(of).collect()
     };
     let mut names = vec!["t".to_string()];
-    names.extend(named("q", &["x", "y", "z", "qx", "qy", "qz", "qw"]));
-    names.extend(named("qd", &["vx", "vy", "vz", "wx", "wy", "wz"]));
-    names.extend(named("tau", &["fx", "fy", "fz", "mx", "my", "mz"]));
+    names.extend(named("q", |row| row.entries[0]));
+    names.extend(named("qd", |row| row.entries[1]));
+    names.extend(named("tau", |row| row.entries[2]));
     if matches!(command, Command::Controller(_)) {
-        names.extend(named("error", &[]));
+        names.extend(named("error", |_| &[]));
     }
     for prefix in if plant.is_driven() { &DRIVE_COLUMNS[..] } else { &[] } {
         names.extend(plant.model.drives.iter().map(|d| format!("{prefix}.{}", d.name)));
@@ -494,7 +495,7 @@ pub(crate) fn distance(plant: &Plant, y: &[f64]) -> f64 {
 
 /// Of every joint that has limits: how far it is from the nearer one, its name, and that limit.
 fn distances<'a>(plant: &'a Plant, y: &'a [f64]) -> impl Iterator<Item = (f64, &'a str, f64)> {
-    let joints = plant.model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind != JointKind::Floating);
+    let joints = plant.model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single());
     joints.map(|joint| {
         let (q, Limits { lower, upper, .. }) = (y[joint.iq], joint.limits);
         let (limit, distance) = if q - lower < upper - q { (lower, q - lower) } else { (upper, upper - q) };

@@ -5,7 +5,7 @@
 use super::flexible::Flexible;
 use super::reader::{Range64, Reader};
 use super::table::Table;
-use super::{Description, Format, JointKind, MassCentreEnd, MassCentreLink, MassCentreNotation, Notation, Value};
+use super::{Description, Format, JointType, MassCentreEnd, MassCentreLink, MassCentreNotation, Notation, Value};
 use straightline_core::spatial::Sym3;
 
 const LINK: &[&str] = &[
@@ -34,8 +34,6 @@ const LINK: &[&str] = &[
     "spring",
     "flexible",
 ];
-const KINDS: [(&str, JointKind); 3] =
-    [("revolute", JointKind::Revolute), ("linear", JointKind::Prismatic), ("prismatic", JointKind::Prismatic)];
 
 /// Whether a document speaks of mass centres rather than joint frames.
 pub(super) fn is_mass_centre_notation(top: &Table) -> bool {
@@ -112,14 +110,14 @@ fn read_link(
     for (key, example) in [("type", "type = \"revolute\""), ("mass", "mass = 1.0"), ("J", "J = [0.1, 0.1, 0.1]")] {
         reader.require(&table, key, example);
     }
-    let kind = reader.word_at(&table, "type", &KINDS);
+    let kind = reader.word_at(&table, "type", &JointType::words(Format::MassCentreToml));
     let mass = reader.real_at(&table, "mass", Range64::Finite);
     let inertia = reader.tensor_at(&table, "J");
     let zero = Sym3 { xx: 0.0, xy: 0.0, xz: 0.0, yy: 0.0, yz: 0.0, zz: 0.0 };
     MassCentreLink {
         name,
         joint_name,
-        kind: kind.unwrap_or_else(|| reader.value(JointKind::Revolute, &table.span)),
+        kind: kind.unwrap_or_else(|| reader.value(JointType::turning(true), &table.span)),
         mass: mass.unwrap_or_else(|| reader.value(0.0, &table.span)),
         inertia: inertia.unwrap_or_else(|| reader.value(zero, &table.span)),
         e: reader.required_vector(&table, "e", "e = [0.0, 0.0, 1.0]"),

@@ -15,6 +15,7 @@ mod toml;
 mod urdf;
 
 use crate::diagnostic::{Diagnostics, Place, Source};
+use straightline_core::joint::{self, Dialect, JointKind, Measure};
 use straightline_core::spatial::Sym3;
 
 /// A value with its place in the file.
@@ -47,6 +48,17 @@ pub enum Format {
     JointFrameToml,
     /// Mass centres, joint axes and joint vectors in TOML, as in the chapter.
     MassCentreToml,
+}
+
+impl Format {
+    /// Its words for joints in the table of joints.
+    pub fn dialect(self) -> Dialect {
+        match self {
+            Format::Urdf => Dialect::Urdf,
+            Format::JointFrameToml => Dialect::JointFrames,
+            Format::MassCentreToml => Dialect::MassCentres,
+        }
+    }
 }
 
 /// How the robot stands in the world.
@@ -214,26 +226,48 @@ impl Pose {
     }
 }
 
-/// How a joint of a file moves.
+/// What a file says of how a joint moves: a word of the table of joints, or `fixed`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum JointKind {
-    /// Turns, within limits.
-    Revolute,
-    /// Turns, without limits.
-    Continuous,
-    /// Slides.
-    #[doc(alias = "linear")]
-    Prismatic,
-    /// Does not move.
-    Fixed,
-    /// Moves freely.
-    Floating,
+pub struct JointType {
+    /// The word.
+    pub word: &'static str,
+    /// How it moves; `None`: not at all.
+    pub kind: Option<JointKind>,
+    /// Whether its coordinate has a range, which the file then gives.
+    pub has_range: bool,
 }
 
-impl JointKind {
-    /// Whether it turns or slides.
-    pub fn moves(self) -> bool {
-        !matches!(self, JointKind::Fixed)
+impl JointType {
+    /// All words of a kind of file: joints between links, then `fixed` where the file has such joints, then free bases.
+    pub fn words(format: Format) -> Vec<(&'static str, JointType)> {
+        let words = || {
+            joint::words(format.dialect()).map(|(kind, word)| JointType {
+                word: word.text,
+                kind: Some(kind),
+                has_range: word.has_range,
+            })
+        };
+        let fixed = JointType { word: "fixed", kind: None, has_range: false };
+        let between_links = words().filter(|t| !t.is_free()).chain((format != Format::MassCentreToml).then_some(fixed));
+        between_links.chain(words().filter(|t| t.is_free())).map(|t| (t.word, t)).collect()
+    }
+
+    /// A joint that turns, with a range or without.
+    pub fn turning(has_range: bool) -> JointType {
+        let kind = Measure::Angle.joint();
+        let word =
+            kind.row().words.iter().find(|word| word.has_range == has_range).expect("there is a word for either");
+        JointType { word: word.text, kind: Some(kind), has_range }
+    }
+
+    /// Whether it would let a link move freely, which no joint between links does.
+    pub fn is_free(self) -> bool {
+        self.kind.is_some_and(|kind| kind.is_base())
+    }
+
+    /// How it moves one link against another; `None`: it does not.
+    pub fn between_links(self) -> Option<JointKind> {
+        self.kind.filter(|kind| !kind.is_base())
     }
 }
 
@@ -243,7 +277,7 @@ pub struct Joint {
     /// Its name.
     pub name: Value<String>,
     /// How it moves.
-    pub kind: Value<JointKind>,
+    pub kind: Value<JointType>,
     /// The link that carries it.
     pub parent: Value<String>,
     /// The link that it moves.
@@ -329,8 +363,8 @@ pub struct MassCentreLink {
     pub name: Value<String>,
     /// Name of the joint: `joint1`, `joint2`, … where the file says nothing.
     pub joint_name: Value<String>,
-    /// s_j: whether the joint is linear. [`JointKind::Revolute`] or [`JointKind::Prismatic`].
-    pub kind: Value<JointKind>,
+    /// s_j: whether the joint is linear.
+    pub kind: Value<JointType>,
     /// m_j \[kg\].
     pub mass: Value<f64>,
     /// J_j about C_j, in frame j \[kg·m²\].

@@ -4,7 +4,7 @@ use super::flexible::Flexible;
 use super::reader::{Range64, Reader};
 use super::table::{self, Table};
 use super::{
-    chapter, messages, BaseKind, Description, Format, Inertial, Joint, JointFrameNotation, JointKind, Link, NamedFrame,
+    chapter, messages, BaseKind, Description, Format, Inertial, Joint, JointFrameNotation, JointType, Link, NamedFrame,
     Notation, Pose, Value,
 };
 use crate::diagnostic::{Diagnostics, Source};
@@ -42,13 +42,6 @@ const JOINT: &[&str] = &[
 ];
 const POSE: &[&str] = &["xyz", "rpy", "rpy_rad", "rpy_deg", "rpy_quarter_turns", "rpy_turns"];
 const FRAME: &[&str] = &["name", "link", "xyz", "rpy", "rpy_rad", "rpy_deg", "rpy_quarter_turns", "rpy_turns"];
-const KINDS: [(&str, JointKind); 5] = [
-    ("revolute", JointKind::Revolute),
-    ("continuous", JointKind::Continuous),
-    ("prismatic", JointKind::Prismatic),
-    ("fixed", JointKind::Fixed),
-    ("floating", JointKind::Floating),
-];
 const AXES: [(&str, [f64; 3]); 6] = [
     ("x", [1.0, 0.0, 0.0]),
     ("y", [0.0, 1.0, 0.0]),
@@ -148,7 +141,7 @@ fn read_joint(reader: &mut Reader, mut table: Table) -> Option<Joint> {
     let name = named(reader, &mut table, "joint");
     reader.check_keys(&table, JOINT);
     reader.require(&table, "kind", "kind = \"revolute\"");
-    let kind = reader.word_at(&table, "kind", &KINDS);
+    let kind = reader.word_at(&table, "kind", &JointType::words(Format::JointFrameToml));
     reader.require(&table, "parent", "parent = \"...\"");
     let parent = reader.name_at(&table, "parent", "link");
     reader.require(&table, "child", "child = \"...\"");
@@ -160,7 +153,7 @@ fn read_joint(reader: &mut Reader, mut table: Table) -> Option<Joint> {
         }
         None => Pose::identity(reader.place(&table.span)),
     };
-    let moves = kind.as_ref().is_some_and(|k| k.value.moves() && k.value != JointKind::Floating);
+    let moves = kind.as_ref().is_some_and(|k| k.value.between_links().is_some());
     if moves {
         reader.require(&table, "axis", "axis = \"z\"");
     }
@@ -181,7 +174,7 @@ fn read_joint(reader: &mut Reader, mut table: Table) -> Option<Joint> {
         }
     }
     // a kind that was complained of stands for the one with an axis and no limits, so that the axis is judged in the same run
-    let kind = kind.unwrap_or_else(|| Value::new(JointKind::Continuous, axis.place.clone()));
+    let kind = kind.unwrap_or_else(|| Value::new(JointType::turning(false), axis.place.clone()));
     Some(Joint { name: name?, kind, parent: parent?, child: child?, origin, axis, limits, drive })
 }
 

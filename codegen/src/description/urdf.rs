@@ -6,8 +6,8 @@
 
 use super::reader::{Range64, Reader};
 use super::{
-    messages, Angle, AngleUnit, Description, Format, Inertial, Joint, JointDrive, JointFrameNotation, JointKind,
-    JointLimits, Link, Notation, Pose, Rotation, Value,
+    messages, Angle, AngleUnit, Description, Format, Inertial, Joint, JointDrive, JointFrameNotation, JointLimits,
+    JointType, Link, Notation, Pose, Rotation, Value,
 };
 use crate::diagnostic::{Diagnostics, Source};
 use roxmltree::{Attribute, Document, Node, ParsingOptions};
@@ -471,7 +471,7 @@ fn read_joint(reader: &mut Reader, node: Node) -> Option<Joint> {
     };
     let (parent, child) = (end(parent, "parent"), end(child, "child"));
     let origin = read_pose(reader, &format!("{owner}, origin"), origin, node);
-    let moves = kind.as_ref().is_none_or(|k| k.value.moves());
+    let moves = kind.as_ref().is_none_or(|k| k.value.kind.is_some());
     if let Some(axis) = axis.filter(|_| moves) {
         check_attributes(reader, &owner, axis, &["xyz"]);
     }
@@ -507,14 +507,13 @@ fn read_joint(reader: &mut Reader, node: Node) -> Option<Joint> {
     Some(Joint { name: name?, kind: kind?, parent: parent?, child: child?, origin, axis, limits, drive })
 }
 
-fn read_kind(reader: &mut Reader, owner: &str, attribute: Attribute) -> Option<Value<JointKind>> {
+fn read_kind(reader: &mut Reader, owner: &str, attribute: Attribute) -> Option<Value<JointType>> {
     let span = attribute.range_value();
+    let words = JointType::words(Format::Urdf);
     let kind = match attribute.value().trim() {
-        "revolute" => JointKind::Revolute,
-        "continuous" => JointKind::Continuous,
-        "prismatic" => JointKind::Prismatic,
-        "fixed" => JointKind::Fixed,
-        "floating" => JointKind::Floating,
+        word if words.iter().any(|(known, _)| *known == word) => {
+            words.into_iter().find(|(known, _)| *known == word).map(|(_, kind)| kind)?
+        }
         kind @ ("planar" | "spherical" | "ball") => {
             let help = "write its motions as single joints, with links without inertia in between";
             let why = "a joint has one coordinate";
@@ -522,7 +521,7 @@ fn read_kind(reader: &mut Reader, owner: &str, attribute: Attribute) -> Option<V
             return None;
         }
         word => {
-            let known = ["revolute", "continuous", "prismatic", "fixed"];
+            let known: Vec<&str> = words.iter().filter(|(_, t)| !t.is_free()).map(|(known, _)| *known).collect();
             reader.complain(&span, messages::unknown_word(&format!("type of {owner}"), word, &known));
             return None;
         }

@@ -9,7 +9,7 @@ use crate::report::waterfall::signed;
 use crate::report::{FunctionReport, Report};
 use std::borrow::Cow;
 use std::fmt::Write;
-use straightline_core::model::{JointKind, Model};
+use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::expr::Port;
 
@@ -148,7 +148,7 @@ fn number<T: Real>(high: f64, low: f64) -> T {
 ";
 
 fn header(out: &mut String, model: &Model<Dd>, report: &Report, provenance: &Provenance) {
-    let floating = model.bodies.iter().any(|b| b.joint.kind == JointKind::Floating);
+    let floating = model.floats();
     let _ = writeln!(out, "// Dynamics of `{}` as straight-line code.", comment(&model.name));
     let _ = writeln!(
         out,
@@ -167,11 +167,7 @@ fn header(out: &mut String, model: &Model<Dd>, report: &Report, provenance: &Pro
         report.nv
     );
     for (i, b) in model.bodies.iter().enumerate() {
-        let kind = match b.joint.kind {
-            JointKind::Revolute => "revolute",
-            JointKind::Prismatic => "prismatic",
-            JointKind::Floating => "floating",
-        };
+        let kind = b.joint.kind.row().name;
         let parent = b.parent.map_or("world".to_string(), |p| format!("body {}", p + 1));
         let _ = writeln!(
             out,
@@ -254,7 +250,7 @@ fn constants(out: &mut String, model: &Model<Dd>, frames: &[String], scalar: Sca
     let _ = writeln!(out, "/// Frames of the functions that answer per frame.");
     let names = string_literals(frames.iter().map(String::as_str));
     let _ = writeln!(out, "pub const FRAME_NAMES: [&str; {}] = [{names}];", frames.len());
-    let single: Vec<_> = joints.iter().filter(|j| j.kind != JointKind::Floating).collect();
+    let single: Vec<_> = joints.iter().filter(|j| j.kind.is_single()).collect();
     let list = |f: &dyn Fn(&straightline_core::model::Limits) -> f64| {
         single.iter().map(|j| number(f(&j.limits), scalar)).collect::<Vec<_>>().join(", ")
     };

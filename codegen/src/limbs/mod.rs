@@ -18,7 +18,7 @@ use crate::choose::choose;
 use crate::compile::{passed, Optimisations, Options};
 use crate::function::{Function, Robot};
 use crate::scene::is_optional;
-use straightline_core::model::{BodyId, Coulomb, JointKind, Model};
+use straightline_core::model::{BodyId, Coulomb, Model};
 use straightline_graph::expr::Graph;
 use straightline_graph::pass::{dead_code, sums, unread_inputs};
 
@@ -101,11 +101,7 @@ fn kind_of<T>(model: &Model<T>, first: BodyId) -> (String, Vec<BodyId>) {
         Coulomb::Sign(_) => " with friction",
         Coulomb::Smooth { .. } => " with smooth friction",
     };
-    let joint = match body.joint.kind {
-        JointKind::Revolute => "turns",
-        JointKind::Prismatic => "slides",
-        JointKind::Floating => "floats",
-    };
+    let joint = body.joint.kind.row().verb;
     let mut carried: Vec<(String, Vec<BodyId>)> =
         children(model, Some(first)).into_iter().map(|c| kind_of(model, c)).collect();
     carried.sort_by(|a, b| a.0.cmp(&b.0));

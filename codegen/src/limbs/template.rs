@@ -3,7 +3,7 @@
 use super::Limbs;
 use crate::function::{self, Function, Robot};
 use crate::scene::{Bound, Scene};
-use straightline_core::model::{Body, BodyId, Coulomb, JointEffects, JointKind, Model};
+use straightline_core::model::{Body, BodyId, Coulomb, JointEffects, Model};
 use straightline_core::reduced::{ReducedBody, ReducedModel};
 use straightline_core::spatial::{ForceVector, Mat3, Sym3, Vec3};
 use straightline_core::{Dd, Real};
@@ -356,7 +356,7 @@ pub(super) fn coordinates(model: &Model<Dd>, bodies: &[(Option<usize>, Vec<BodyI
     let mut coordinates = vec![(0, 0); model.nv()];
     let mut next = 0;
     for (_, of) in bodies {
-        let kind: JointKind = model.bodies[of[0]].joint.kind;
+        let kind = model.bodies[of[0]].joint.kind;
         for (limb, body) in of.iter().enumerate() {
             for k in 0..kind.nv() {
                 coordinates[model.bodies[*body].joint.iv + k] = (next + k, limb);

@@ -3,12 +3,13 @@
 use super::geometry::principal_moments;
 use super::{angle, doubtful_angles, each_angle, Assembly, ModelOptions, MOST_LINKS};
 use crate::description::{
-    messages, Description, Format, Joint, JointDrive, JointFrameNotation, JointKind, JointLimits, Value,
+    messages, Description, Format, Joint, JointDrive, JointFrameNotation, JointLimits, JointType, Value,
 };
 use crate::diagnostic::{Diagnostics, Place};
 use crate::singular::{singular_joints, Inertia};
 use std::collections::HashMap;
-use straightline_core::model::{Coulomb, JointEffects, JointKind as ModelJointKind, Limits, Model};
+use straightline_core::joint::Measure;
+use straightline_core::model::{Coulomb, JointEffects, Limits, Model};
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
 
@@ -185,13 +186,11 @@ pub(super) fn axis_length(what: &str, axis: &Value<[f64; 3]>, diagnostics: &mut 
 /// One joint by itself.
 pub(super) fn joint(joint: &Joint, format: Format, diagnostics: &mut Diagnostics) {
     let name = &joint.name.value;
-    match joint.kind.value {
-        JointKind::Fixed => return,
-        JointKind::Floating => {
-            diagnostics.push(messages::floating_joint(name).at(&joint.kind.place));
-            return;
-        }
-        JointKind::Revolute | JointKind::Continuous | JointKind::Prismatic => {}
+    if joint.kind.value.is_free() {
+        diagnostics.push(messages::floating_joint(name).at(&joint.kind.place));
+    }
+    if joint.kind.value.between_links().is_none() {
+        return;
     }
     axis_length(&format!("axis of joint `{name}`"), &joint.axis, diagnostics);
     limits(&joint.name, joint.kind.value, &joint.limits, format, diagnostics);
@@ -243,18 +242,15 @@ pub(super) fn model_effects(drive: &JointDrive) -> JointEffects<Dd> {
 /// The limits of a joint that moves.
 pub(super) fn limits(
     joint: &Value<String>,
-    kind: JointKind,
+    kind: JointType,
     limits: &JointLimits,
     format: Format,
     diagnostics: &mut Diagnostics,
 ) {
     let name = &joint.value;
-    if kind != JointKind::Continuous {
-        let word = match (kind, format) {
-            (JointKind::Revolute, _) => "revolute",
-            (_, Format::MassCentreToml) => "linear",
-            _ => "prismatic",
-        };
+    if kind.has_range {
+        let same = JointType::words(format).into_iter().find(|(_, t)| t.kind == kind.kind && t.has_range);
+        let word = same.map_or(kind.word, |(word, _)| word);
         match (&limits.lower, &limits.upper) {
             (None, None) => {
                 let help = match format {
@@ -279,12 +275,11 @@ pub(super) fn limits(
 }
 
 /// The limits as the model has them.
-pub(super) fn model_limits(kind: JointKind, limits: &JointLimits) -> Limits {
+pub(super) fn model_limits(kind: JointType, limits: &JointLimits) -> Limits {
     let or = |limit: &Option<Value<f64>>, default: f64| limit.as_ref().map_or(default, |l| l.value);
-    let is_continuous = kind == JointKind::Continuous;
     Limits {
-        lower: if is_continuous { f64::NEG_INFINITY } else { or(&limits.lower, f64::NEG_INFINITY) },
-        upper: if is_continuous { f64::INFINITY } else { or(&limits.upper, f64::INFINITY) },
+        lower: if kind.has_range { or(&limits.lower, f64::NEG_INFINITY) } else { f64::NEG_INFINITY },
+        upper: if kind.has_range { or(&limits.upper, f64::INFINITY) } else { f64::INFINITY },
         velocity: or(&limits.velocity, f64::INFINITY).abs(),
         effort: or(&limits.effort, f64::INFINITY).abs(),
     }
@@ -338,9 +333,9 @@ fn what_is_missing(model: &Model<Dd>, id: usize) -> &'static str {
         let s = b.inertia.second_moment_com;
         [s.xx, s.yy, s.zz, s.xy, s.xz, s.yz].iter().any(|x| x.to_f64() != 0.0)
     });
-    match bodies[id].joint.kind {
-        ModelJointKind::Prismatic | ModelJointKind::Floating if !has_mass => "mass",
-        ModelJointKind::Revolute if !has_mass && !has_inertia => "mass",
+    match bodies[id].joint.kind.row().measures.contains(&Measure::Length) {
+        true if !has_mass => "mass",
+        false if !has_mass && !has_inertia => "mass",
         _ if moved().count() == 1 => "inertia about its axis",
         _ => "inertia that is left where the joints beyond it are free",
     }

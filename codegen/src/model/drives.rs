@@ -115,10 +115,10 @@ fn rating(written: &written::Rating) -> Rating<Dd> {
 }
 
 fn body(owner: &str, joint: &Noted<String>, model: &Model<Dd>, diagnostics: &mut Diagnostics) -> Option<BodyId> {
-    let is_it = |name: &str, kind: JointKind| name == joint.value && kind != JointKind::Floating;
+    let is_it = |name: &str, kind: JointKind| name == joint.value && kind.is_single();
     let found = model.bodies.iter().position(|b| is_it(&b.joint.name, b.joint.kind));
     if found.is_none() {
-        let moving = model.bodies.iter().filter(|b| b.joint.kind != JointKind::Floating);
+        let moving = model.bodies.iter().filter(|b| b.joint.kind.is_single());
         let names = moving.map(|b| b.joint.name.as_str());
         diagnostics.push(messages::drive_joint(owner, &joint.value, names).at(&joint.place));
     }

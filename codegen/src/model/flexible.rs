@@ -23,6 +23,7 @@ use crate::description::flexible::{judge_number, Bending, Elastic, Flexible, Sup
 use crate::description::messages;
 use crate::diagnostic::Diagnostics;
 use straightline_core::algorithms::composing_pays;
+use straightline_core::joint::Measure;
 use straightline_core::model::{Body, BodyId, Joint, JointEffects, JointKind, Limits};
 use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::Dd;
@@ -149,7 +150,7 @@ pub(super) fn cut(
             let spring = *stiffness / h;
             let effects = JointEffects { stiffness: spring, damping: spring * damping, ..JointEffects::none() };
             let body =
-                elastic_body(name, parent, (joint, JointKind::Revolute), (&x_parent_link, &x_link_joint), effects);
+                elastic_body(name, parent, (joint, Measure::Angle.joint()), (&x_parent_link, &x_link_joint), effects);
             (parent, x_parent_link) = (Some(next + bodies.len()), body.link_frame);
             bodies.push((body, None));
         }
@@ -316,7 +317,7 @@ pub(super) fn support(support: &Support, root: &str, diagnostics: &mut Diagnosti
         let mut complain = |d| diagnostics.push(d);
         is_sound &= judge_number(format!("stiffness of `{label}` of [support]"), stiffness, false, &mut complain);
         is_sound &= judge_number(format!("damping of `{label}` of [support]"), damping, true, &mut complain);
-        let kind = if k < 3 { JointKind::Prismatic } else { JointKind::Revolute };
+        let kind = if k < 3 { Measure::Length.joint() } else { Measure::Angle.joint() };
         let joint = format!("support_{label}");
         let name = if bodies.len() + 1 == count { root.to_string() } else { joint.clone() };
         let x_world_joint = Transform { rotation: canonical_rotation(axes[k % 3]), translation: vector(support.at) };

@@ -4,11 +4,12 @@ use super::flexible::{self, Carrier};
 use super::geometry::{canonical_rotation, compose, point, snap_tensor, turned, unit, vector};
 use super::merge::{merge, Part};
 use super::{angle, check, transform, Assembly, ModelOptions};
-use crate::description::{messages, BaseKind, Description, Inertial, JointFrameNotation, JointKind};
+use crate::description::{messages, BaseKind, Description, Inertial, JointFrameNotation};
 use crate::diagnostic::{Diagnostics, Place};
 use std::collections::BTreeMap;
 use straightline_core::algorithms::composing_pays;
-use straightline_core::model::{Body, BodyId, Frame, Joint, JointEffects, JointKind as ModelJointKind, Limits};
+use straightline_core::joint::FLOATING_BASE;
+use straightline_core::model::{Body, BodyId, Frame, Joint, JointEffects, Limits};
 use straightline_core::spatial::{SpatialInertia, Transform, Vec3};
 use straightline_core::Dd;
 
@@ -44,13 +45,8 @@ pub(super) fn assemble(
     };
     if is_floating {
         let root = &notation.links[tree.root].name;
-        let joint = Joint {
-            name: root_joint_name(notation),
-            kind: ModelJointKind::Floating,
-            iq: 0,
-            iv: 0,
-            limits: Limits::default(),
-        };
+        let joint =
+            Joint { name: root_joint_name(notation), kind: FLOATING_BASE, iq: 0, iv: 0, limits: Limits::default() };
         bodies.push(new_body(&root.value, None, joint, Transform::identity(), Transform::identity()));
         joint_places.push(root.place.clone());
         parts.push(Vec::new());
@@ -80,21 +76,18 @@ pub(super) fn assemble(
             let joint = &notation.joints[j];
             let parent = carriers[tree.parent_of[j]].at(vector(joint.origin.xyz.value));
             let x_parent_joint = compose(&parent.1, &transform(&joint.origin, tolerance));
-            let (body, x_body_link) = match joint.kind.value {
-                JointKind::Fixed | JointKind::Floating => (parent.0, x_parent_joint),
-                kind => {
+            let (body, x_body_link) = match joint.kind.value.between_links() {
+                None => (parent.0, x_parent_joint),
+                Some(kind) => {
                     let r_joint_canonical = canonical_rotation(unit(vector(joint.axis.value))?);
                     let placement = compose(&x_parent_joint, &turned(r_joint_canonical));
                     let link_frame = turned(r_joint_canonical.transpose());
                     let model_joint = Joint {
                         name: joint.name.value.clone(),
-                        kind: match kind {
-                            JointKind::Prismatic => ModelJointKind::Prismatic,
-                            _ => ModelJointKind::Revolute,
-                        },
+                        kind,
                         iq: 0,
                         iv: 0,
-                        limits: check::model_limits(kind, &joint.limits),
+                        limits: check::model_limits(joint.kind.value, &joint.limits),
                     };
                     let effects = check::model_effects(&joint.drive);
                     let body = new_body(&joint.child.value, parent.0, model_joint, placement, link_frame);

@@ -11,11 +11,11 @@ use super::geometry::{
 };
 use super::merge::{merge, Part};
 use super::{angle, check, Assembly, ModelOptions, MOST_LINKS};
-use crate::description::{messages, Description, JointKind, MassCentreEnd, MassCentreLink, MassCentreNotation, Value};
+use crate::description::{messages, Description, MassCentreEnd, MassCentreLink, MassCentreNotation, Value};
 use crate::diagnostic::Diagnostics;
 use std::collections::BTreeMap;
 use straightline_core::algorithms::composing_pays;
-use straightline_core::model::{Body, Frame, Joint, JointKind as ModelJointKind};
+use straightline_core::model::{Body, Frame, Joint};
 use straightline_core::spatial::{Mat3, SpatialInertia, Transform, Vec3};
 use straightline_core::Dd;
 
@@ -95,10 +95,7 @@ pub(super) fn assemble(
             parent,
             joint: Joint {
                 name: link.joint_name.value.clone(),
-                kind: match link.kind.value {
-                    JointKind::Prismatic => ModelJointKind::Prismatic,
-                    _ => ModelJointKind::Revolute,
-                },
+                kind: link.kind.value.between_links()?,
                 iq: 0,
                 iv: 0,
                 limits: check::model_limits(link.kind.value, &link.limits),
@@ -165,15 +162,19 @@ fn check_link(link: &MassCentreLink, description: &Description, diagnostics: &mu
     if let Some(e_next) = &link.end.e_next {
         check::axis_length(&format!("`e_next` of link `{name}`"), e_next, diagnostics);
     }
-    match (&link.alpha, link.kind.value) {
-        (None, JointKind::Prismatic) => {
+    match (&link.alpha, slides(link)) {
+        (None, true) => {
             diagnostics.push(messages::alpha_missing(&link.joint_name.value).at(&link.kind.place));
         }
-        (Some(alpha), JointKind::Revolute) if alpha.value != 0.0 => {
+        (Some(alpha), false) if alpha.value != 0.0 => {
             diagnostics.push(messages::alpha_on_revolute(&link.joint_name.value).at(&alpha.place));
         }
         _ => {}
     }
+}
+
+fn slides(link: &MassCentreLink) -> bool {
+    link.kind.value.kind.is_some_and(|kind| kind.slides())
 }
 
 /// A_{j−1,j} at q_j = 0, and e_j in frame j; `None` after a complaint.
@@ -203,8 +204,8 @@ fn joint_in_zero_position(
     let in_previous = Mat3::from_columns(e_previous, a_previous, e_previous.cross(a_previous));
     let in_link = Mat3::from_columns(e_link, a_link, e_link.cross(a_link));
     let extended = snap_rotation(in_previous * in_link.transpose());
-    let turn = match (&link.alpha, link.kind.value) {
-        (Some(alpha), JointKind::Prismatic) => about(e_previous, angle::read(alpha, tolerance).sin_cos),
+    let turn = match (&link.alpha, slides(link)) {
+        (Some(alpha), true) => about(e_previous, angle::read(alpha, tolerance).sin_cos),
         _ => Mat3::identity(),
     };
     Some((compose(&turned(turn), &turned(extended)).rotation, e_link))

@@ -43,7 +43,7 @@ use crate::description::{self, messages, Angle, Description, Notation, Pose, Rot
 use crate::diagnostic::{Diagnostics, Place, Source};
 use geometry::{compose, vector};
 use std::collections::{BTreeMap, HashMap};
-use straightline_core::model::{Body, BodyId, Frame, JointKind, Model};
+use straightline_core::model::{Body, BodyId, Frame, Model};
 use straightline_core::spatial::Transform;
 use straightline_core::Dd;
 
@@ -355,7 +355,7 @@ fn order_joints(bodies: &mut [Body<Dd>], options: &ModelOptions, diagnostics: &m
             let index: HashMap<&str, BodyId> =
                 bodies.iter().enumerate().map(|(id, b)| (b.joint.name.as_str(), id)).collect();
             let mut seen = vec![false; bodies.len()];
-            let root = bodies.iter().position(|b| b.joint.kind == JointKind::Floating);
+            let root = bodies.iter().position(|b| b.joint.kind.is_base());
             if let Some(root) = root.filter(|&r| !names.contains(&bodies[r].joint.name)) {
                 seen[root] = true;
                 order.push(root);

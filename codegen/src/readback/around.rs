@@ -10,7 +10,7 @@ use crate::emit::{self, Lanes, Scalar};
 use crate::identifier::string_literals;
 use crate::stable::fnv_1a;
 use rustc_hash::FxHashMap;
-use straightline_core::model::{JointKind, Limits};
+use straightline_core::model::Limits;
 use straightline_core::Dd;
 use straightline_graph::expr::Port;
 
@@ -130,7 +130,7 @@ impl Around<'_, '_, '_> {
         for (name, value) in plain {
             self.is(root, Sort::Constant, name, &format!("pub const {name}: {value};"))?;
         }
-        let single: Vec<&Limits> = joints.iter().filter(|j| j.kind != JointKind::Floating).map(|j| &j.limits).collect();
+        let single: Vec<&Limits> = joints.iter().filter(|j| j.kind.is_single()).map(|j| &j.limits).collect();
         let of = |number: fn(&Limits) -> f64| single.iter().map(|l| number(l)).collect::<Vec<f64>>();
         let limits = [
             ("LOWER_LIMITS", of(|l| l.lower)),

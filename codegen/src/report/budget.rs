@@ -9,7 +9,7 @@ use crate::function::Function;
 use crate::scene::messages as say;
 use crate::scene::{Budget, Coulomb, Effects, Gravity, MaxError, Misfit, Scene, Zero};
 use std::collections::BTreeMap;
-use straightline_core::model::{JointKind, Model};
+use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::expr::{NodeId, Op};
 
@@ -212,7 +212,7 @@ fn remedies(whole: &Model<Dd>, frames: &[String], function: Function, options: &
         let rest = scene.outputs.values().flat_map(|s| &s.joints).chain(&scene.zero.joints_at_rest);
         !scene.locked.iter().any(|(locked, _)| locked == name) && !rest.into_iter().any(|n| n == name)
     };
-    for joint in whole.bodies.iter().map(|b| &b.joint).filter(|j| j.kind != JointKind::Floating && is_free(&j.name)) {
+    for joint in whole.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single() && is_free(&j.name)) {
         let locked = scene.locked.iter().cloned().chain([(joint.name.clone(), 0.0)]).collect();
         candidates.push((format!("joint {} locked", joint.name), Scene { locked, ..scene.clone() }));
     }

@@ -11,8 +11,8 @@ use crate::model::merge::{merge, Part};
 use crate::model::{angle, drives};
 use straightline_core::algorithms::composing_pays;
 use straightline_core::drive::{Drive, Rotor};
-use straightline_core::model::{self, Body, BodyId, Frame, JointEffects, JointKind, Model};
-use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
+use straightline_core::model::{self, Body, BodyId, Frame, JointEffects, Model};
+use straightline_core::spatial::{SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::Dd;
 
 /// The robot of a scene, from the robot of the file as [`Scene::model_options`] reads it. All names of the scene are
@@ -80,17 +80,16 @@ type Held = Transform<Dd>;
 
 /// How a scene holds a body against its parent; `None` if its joint moves.
 fn held(body: &Body<Dd>, scene: &Scene) -> Option<Held> {
-    if body.joint.kind == JointKind::Floating {
+    if body.joint.kind.is_base() {
         return (scene.base == Base::Fixed).then(Transform::identity);
     }
     let (_, q) = scene.locked.iter().find(|(name, _)| *name == body.joint.name)?;
-    let z = Vec3::unit_z();
-    Some(match body.joint.kind {
-        JointKind::Prismatic => Transform { rotation: Mat3::identity(), translation: z.scale(Dd::from(*q)) },
-        _ => {
+    Some(match body.joint.kind.turns() {
+        false => body.joint.kind.motion(&[Dd::from(*q)]),
+        true => {
             // as in robot files: 1.5707963267948966 is a right angle
             let q = Angle { value: *q, unit: AngleUnit::Radian, text: String::new(), place: Place::none() };
-            turned(about(z, angle::read(&q, angle::ROUNDING).sin_cos))
+            turned(about(Vec3::unit_z(), angle::read(&q, angle::ROUNDING).sin_cos))
         }
     })
 }

@@ -11,7 +11,7 @@ use crate::identifier::UNNAMED;
 use crate::limbs::LimbForm;
 use crate::model::geometry::principal_moments;
 use crate::model::{is_gravity, GRAVITY};
-use straightline_core::model::{JointKind, Model};
+use straightline_core::model::Model;
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
 use straightline_graph::expr::Grade;
@@ -220,7 +220,7 @@ pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnosti
             continue;
         };
         let (kind, limits) = (model.bodies[body].joint.kind, model.bodies[body].joint.limits);
-        if kind == JointKind::Floating {
+        if kind.is_base() {
             places.complain(&path, say::base_locked(joint), diagnostics);
         } else if *value < limits.lower || *value > limits.upper {
             let complaint = say::locked_beyond_limits(joint, *value, limits.lower, limits.upper);

@@ -29,7 +29,7 @@ use crate::diagnostic::Diagnostic;
 use crate::function::Function;
 use crate::model::ModelOptions;
 use std::collections::BTreeMap;
-use straightline_core::model::{JointKind, Model};
+use straightline_core::model::Model;
 use straightline_graph::expr::Port;
 
 /// A scene. The default asks for everything and holds nothing.
@@ -118,7 +118,7 @@ impl Scene {
         let mut scene = self.clone();
         if self.base == Base::Moving {
             use Function::{BiasForce, GravityForce, InverseDynamics, VelocityForce};
-            let joints = model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind != JointKind::Floating);
+            let joints = model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single());
             let joints: Vec<String> = joints.map(|j| j.name.clone()).collect();
             for function in [InverseDynamics, GravityForce, BiasForce, VelocityForce] {
                 let selection = scene.outputs.entry(function).or_default();

@@ -105,8 +105,8 @@ impl Scene {
                 _ => (joint.iv, joint.kind.nv()),
             };
             all[first..first + count].fill(range);
-            if name == "q" && joint.kind == JointKind::Floating {
-                all[first + 3..first + count].fill(Interval::within(1.0));
+            if let Some(quaternion) = joint.kind.row().quaternion.filter(|_| name == "q") {
+                all[first + quaternion..first + count].fill(Interval::within(1.0));
             }
         }
         all
@@ -140,16 +140,8 @@ fn in_words(range: Interval, unit: &str) -> String {
 
 /// The unit of an input; of the base's velocity and force, which have two, that of the linear part.
 fn unit(name: &str, kind: JointKind) -> &'static str {
-    match (name, kind) {
-        ("q", JointKind::Revolute) => "rad",
-        ("q", _) => "m",
-        ("qd", JointKind::Revolute) => "rad/s",
-        ("qd", _) => "m/s",
-        ("qdd", JointKind::Revolute) => "rad/s²",
-        ("qdd", _) => "m/s²",
-        (_, JointKind::Revolute) => "N·m",
-        _ => "N",
-    }
+    let index = ["q", "qd", "qdd"].iter().position(|input| *input == name);
+    kind.units()[index.unwrap_or(3)]
 }
 
 /// The range of a joint's coordinate of the input of that name.

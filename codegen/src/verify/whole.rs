@@ -11,7 +11,7 @@ use crate::function::{Function, Robot};
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::{Base, Coulomb, Gravity, Parameter, Scene};
 use nalgebra::{Matrix3, Vector3};
-use straightline_core::model::{JointKind, Model};
+use straightline_core::model::Model;
 use straightline_core::reference::{ExtendedPosition, MassCentreTree};
 use straightline_core::Dd;
 use straightline_graph::expr::{evaluate, Graph};
@@ -47,10 +47,10 @@ impl Coordinates {
             v.extend(all[rank].iv..all[rank].iv + joint.kind.nv());
         }
         for joint in &all {
-            match (joint.kind, scene.locked.iter().find(|(name, _)| *name == joint.name)) {
-                (JointKind::Floating, _) => held[joint.iq + 6] = 1.0,
-                (_, Some((_, value))) => held[joint.iq] = *value,
-                _ => {}
+            let neutral = joint.kind.row().neutral;
+            held[joint.iq..joint.iq + neutral.len()].copy_from_slice(neutral);
+            if let Some((_, value)) = scene.locked.iter().find(|(name, _)| *name == joint.name) {
+                held[joint.iq] = *value;
             }
         }
         Ok(Coordinates { q, v, joints, held, nv: whole.nv() })
@@ -101,7 +101,7 @@ pub(super) fn hold(
     let stands = |mut body: Option<usize>| {
         while let Some(id) = body {
             let joint = &model.bodies[id].joint;
-            let is_held = is_locked(&joint.name) || joint.kind == JointKind::Floating && scene.base == Base::Fixed;
+            let is_held = is_locked(&joint.name) || joint.kind.is_base() && scene.base == Base::Fixed;
             if !is_held {
                 return false;
             }

@@ -12,7 +12,7 @@ use straightline_codegen::emit::Lanes;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::scene::{self, Budget, JointRanges, MaxError};
 use straightline_codegen::{expr, ForwardDynamicsMethod, Function, Robot, Scalar, Source};
-use straightline_core::model::{Joint, JointKind, Model};
+use straightline_core::model::{Joint, Model};
 use straightline_core::reference as chapter;
 use straightline_core::{Dd, Real};
 use straightline_generated_tests::programs;
@@ -230,7 +230,7 @@ impl Case {
 
 fn ranges(model: &Model<Dd>, port: &str, len: usize) -> Vec<(f64, f64)> {
     let mut ranges = vec![(-1.0, 1.0); len];
-    for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind != JointKind::Floating) {
+    for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single()) {
         let or = |limit: f64, other: f64| if limit.is_finite() { limit } else { other };
         let speed = or(joint.limits.velocity, VELOCITY).min(FASTEST);
         match port {

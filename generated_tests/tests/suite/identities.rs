@@ -73,7 +73,7 @@ impl State {
         for joint in self.loaded.model.bodies.iter().map(|b| &b.joint) {
             let v = |k: usize| Dd::from(rate[joint.iv + k]) * Dd::from(t);
             let i = joint.iq;
-            if joint.kind != JointKind::Floating {
+            if joint.kind.is_single() {
                 q[i] += v(0);
                 continue;
             }

@@ -6,7 +6,6 @@ use straightline_codegen::function::Robot as Loaded;
 use straightline_codegen::model;
 use straightline_codegen::scene::{apply, Gravity, Part, Scene, Selection, Zero};
 use straightline_codegen::{Diagnostics, Function};
-use straightline_core::model::JointKind;
 use straightline_generated_tests::inputs::{self, ready_to_paste};
 use straightline_generated_tests::programs::{self, program};
 use straightline_generated_tests::random::Random;
@@ -91,7 +90,7 @@ fn without_velocities_or_accelerations_a_scene_is_the_program_at_zero() {
 #[test]
 fn joints_at_rest_are_the_program_with_their_rates_at_zero() {
     let resting = |loaded: &Loaded| -> Vec<usize> {
-        let turning = loaded.model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind != JointKind::Floating);
+        let turning = loaded.model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single());
         turning.step_by(2).map(|j| j.iv).collect()
     };
     let scene = |loaded: &Loaded| {
@@ -164,7 +163,7 @@ fn locked_joints_are_the_full_robot_with_them_held() {
     for robot in ROBOTS.map(Robot::load) {
         let full = in_scene(&robot, &Scene::default());
         let joints: Vec<_> = full.model.bodies.iter().map(|b| b.joint.clone()).collect();
-        let single: Vec<_> = joints.iter().filter(|j| j.kind != JointKind::Floating).collect();
+        let single: Vec<_> = joints.iter().filter(|j| j.kind.is_single()).collect();
         // the last two joints of the file, at awkward values
         let held: Vec<(String, f64)> = single
             .iter()

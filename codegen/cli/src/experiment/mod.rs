@@ -17,7 +17,7 @@ use straightline_codegen::description::table::{parse, Table};
 use straightline_codegen::diagnostic::{Diagnostics, Place, Source};
 use straightline_core::algorithms::drive_states;
 use straightline_core::drive::Actuator;
-use straightline_core::model::{Joint, JointKind, Model};
+use straightline_core::model::{Joint, Model};
 use straightline_simulation::cartesian::joint_motion;
 use straightline_simulation::command::{Command, Compensation, Controller, Samples};
 use straightline_simulation::drives::{further_derivatives, Inputs};
@@ -95,16 +95,15 @@ fn with_passive(model: &Model<f64>, numbers: &[f64]) -> Option<Vec<f64>> {
 }
 
 fn floats(model: &Model<f64>) -> bool {
-    model.bodies.iter().any(|b| b.joint.kind == JointKind::Floating)
+    model.floats()
 }
 
 /// Zero, or the nearest that the joints' ranges allow; a base at the origin.
 fn zero(model: &Model<f64>) -> Vec<f64> {
     let mut q = vec![0.0; model.nq()];
     for joint in model.bodies.iter().map(|b| &b.joint) {
-        match joint.kind {
-            JointKind::Floating => q[joint.iq + 6] = 1.0,
-            _ => q[joint.iq] = 0.0f64.max(joint.limits.lower).min(joint.limits.upper),
+        for (q, neutral) in q[joint.iq..].iter_mut().zip(joint.kind.row().neutral) {
+            *q = neutral.max(joint.limits.lower).min(joint.limits.upper);
         }
     }
     q
@@ -145,7 +144,7 @@ fn torques(columns: &Columns, model: &Model<f64>, place: &Place, diagnostics: &m
     let known = names(model);
     for (name, column) in columns.columns.iter().filter(|(name, _)| name != "t") {
         let joint = name.strip_prefix("tau.").unwrap_or(name);
-        let Some(joint) = joints(model).into_iter().find(|j| j.name == joint && j.kind != JointKind::Floating) else {
+        let Some(joint) = joints(model).into_iter().find(|j| j.name == joint && j.kind.is_single()) else {
             diagnostics.push(say::column_unknown(name, &known).at(place));
             continue;
         };

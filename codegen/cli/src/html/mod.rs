@@ -17,7 +17,8 @@ use straightline_codegen::report::waterfall::{items_of, signed, By, Waterfall};
 use straightline_codegen::report::{FunctionReport, Report};
 use straightline_codegen::scene::{Base, Scene};
 use straightline_codegen::staged::{Remaining, StagedReport};
-use straightline_core::model::{JointKind, Model};
+use straightline_core::joint::KINDS;
+use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::expr::{Counts, Graph, Op};
 use tree::{symbol, text_width, tree};
@@ -89,7 +90,7 @@ pub(super) fn escape(text: &str) -> String {
 
 fn header(out: &mut String, generated: &Generated, whole: &Model<Dd>, options: &Options) {
     let (model, report) = (&generated.model, &generated.report);
-    let base = match model.bodies.iter().any(|b| b.joint.kind == JointKind::Floating) {
+    let base = match model.floats() {
         true => "floating",
         false => "fixed",
     };
@@ -137,8 +138,7 @@ fn header(out: &mut String, generated: &Generated, whole: &Model<Dd>, options: &
 fn kinematics(whole: &Model<Dd>, scene: &Scene, model: &Model<Dd>) -> (String, f64) {
     let locked = |i: usize| {
         let joint = &whole.bodies[i].joint;
-        (joint.kind == JointKind::Floating && scene.base == Base::Fixed)
-            || scene.locked.iter().any(|(name, _)| *name == joint.name)
+        (joint.kind.is_base() && scene.base == Base::Fixed) || scene.locked.iter().any(|(name, _)| *name == joint.name)
     };
     // what stands in the coordinates is told by the robot of the scene
     let mut drawn = whole.clone();
@@ -157,12 +157,8 @@ fn kinematics(whole: &Model<Dd>, scene: &Scene, model: &Model<Dd>) -> (String, f
         "<h2>Kinematic tree</h2>\n<p class=\"lead\">Joints by their kind, with the bodies that they move; bodies that are fixed to \
          each other are one.</p>\n<ul class=\"legend\">\n",
     );
-    for (kind, words) in [
-        (Some(JointKind::Revolute), "turns"),
-        (Some(JointKind::Prismatic), "slides"),
-        (Some(JointKind::Floating), "moves freely"),
-        (None, "held by the scene"),
-    ] {
+    let moving = KINDS.iter().map(|kind| (Some(*kind), kind.row().verb));
+    for (kind, words) in moving.chain([(None, "held by the scene")]) {
         let here = |i: usize| if locked(i) { None } else { Some(whole.bodies[i].joint.kind) };
         if (0..whole.bodies.len()).any(|i| here(i) == kind) {
             let _ = writeln!(
@@ -219,12 +215,12 @@ fn mass_matrix(generated: &Generated, options: &Options) -> (String, f64) {
     let nv = model.nv();
     let mut names = vec![String::new(); nv];
     for joint in model.bodies.iter().map(|b| &b.joint) {
-        match joint.kind {
-            JointKind::Floating => {
-                let axes = ["v x", "v y", "v z", "ω x", "ω y", "ω z"];
-                axes.iter().enumerate().for_each(|(k, axis)| names[joint.iv + k] = format!("{} {axis}", joint.name));
-            }
-            _ => names[joint.iv].clone_from(&joint.name),
+        for (k, name) in names[joint.iv..joint.iv + joint.kind.nv()].iter_mut().enumerate() {
+            *name = match joint.kind.row().entries[1].get(k) {
+                // "vx" as "v x", "wx" as "ω x"
+                Some(entry) => format!("{} {}", joint.name, entry.replace('v', "v ").replace('w', "ω ")),
+                None => joint.name.clone(),
+            };
         }
     }
     let class = |entry: Option<usize>| match entry {

@@ -86,7 +86,7 @@ pub(super) fn tree(model: &Model<Dd>, held: &dyn Fn(usize) -> bool, notes: &dyn 
     let _ = writeln!(out, "<text class=\"small\" x=\"{:.1}\" y=\"20\" font-size=\"12\">world</text>", right + 12.0);
     // bodies: from their joint to the joints that they carry
     for i in roots {
-        let class = if model.bodies[i].joint.kind == JointKind::Floating && !held(i) { "free" } else { "link" };
+        let class = if model.bodies[i].joint.kind.is_base() && !held(i) { "free" } else { "link" };
         let _ = writeln!(out, "<path class=\"{class}\" d=\"M{:.1} 22V{:.1}\"/>", nodes[i].x, y(0));
     }
     for node in &nodes {
@@ -124,20 +124,25 @@ pub(super) fn tree(model: &Model<Dd>, held: &dyn Fn(usize) -> bool, notes: &dyn 
 
 /// The symbol of a joint around a point; `None` for one that is held.
 pub(super) fn symbol(kind: Option<JointKind>, x: f64, y: f64) -> String {
-    match kind {
-        Some(JointKind::Revolute) => format!(
+    match kind.map(|kind| kind.row().name) {
+        Some("revolute") => format!(
             "<circle class=\"glyph revolute\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"8\"/><circle class=\"mark revolute\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"1.5\"/>"
         ),
-        Some(JointKind::Prismatic) => format!(
+        Some("prismatic") => format!(
             "<rect class=\"glyph prismatic\" x=\"{:.1}\" y=\"{:.1}\" width=\"15\" height=\"15\" rx=\"2\"/><path class=\"mark prismatic\" d=\"M{x:.1} {:.1}v7m-2.5 -4.5l2.5 -2.5l2.5 2.5m-5 2l2.5 2.5l2.5 -2.5\"/>",
             x - 7.5,
             y - 7.5,
             y - 3.5
         ),
-        Some(JointKind::Floating) => format!(
+        Some("floating") => format!(
             "<path class=\"glyph floating\" d=\"M{x:.1} {:.1}l10 10l-10 10l-10 -10z\"/><path class=\"mark floating\" d=\"M{:.1} {y:.1}h7m-3.5 -3.5v7\"/>",
             y - 10.0,
             x - 3.5
+        ),
+        Some(other) => format!(
+            "<circle class=\"glyph {other}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"8\"/><text x=\"{x:.1}\" y=\"{:.1}\" font-size=\"10\" text-anchor=\"middle\">{}</text>",
+            y + 3.5,
+            &other[..1]
         ),
         None => format!(
             "<rect class=\"glyph held\" x=\"{:.1}\" y=\"{:.1}\" width=\"13\" height=\"13\" rx=\"2\"/><path class=\"mark held\" d=\"M{:.1} {:.1}l6 6m0 -6l-6 6\"/>",

@@ -1,0 +1,58 @@
+//! A kind of joint is one file and one row of a table: who needs to know something of it asks for a column, and names no kind.
+
+use std::fs::{read_dir, read_to_string};
+use std::path::{Path, PathBuf};
+
+/// Where kinds are told apart: their own room, the algorithms that have a form for some of them, the second author, the
+/// reduction, which is written for joints that turn or slide.
+const ALLOWED: [&str; 4] =
+    ["runtime/core/src/joint/", "runtime/core/src/algorithms/", "runtime/core/src/reference/", "reduce.rs"];
+const ROOMS: [&str; 6] =
+    ["runtime/core/src", "runtime/src", "codegen/src", "codegen/cli/src", "codegen/macros/src", "simulation/src"];
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in read_dir(folder).expect("a folder of sources").map(|entry| entry.expect("an entry").path()) {
+        match entry.is_dir() {
+            true => sources(&entry, found),
+            false if entry.extension().is_some_and(|e| e == "rs") => found.push(entry),
+            false => {}
+        }
+    }
+}
+
+/// Lines of product code that name a kind of joint, each with its place.
+fn kinds_named(path: &str, text: &str) -> Vec<String> {
+    let product = text.split("#[cfg(test)]").next().unwrap_or("");
+    let lines = product.lines().enumerate().filter(|(_, line)| {
+        let code = line.split("//").next().unwrap_or("");
+        code.contains("JointKind::")
+    });
+    lines.map(|(k, line)| format!("{path}:{}: {}", k + 1, line.trim())).collect()
+}
+
+#[test]
+fn who_is_not_in_the_room_of_joints_names_no_kind_of_joint() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace");
+    let mut files = Vec::new();
+    ROOMS.iter().for_each(|room| sources(&root.join(room), &mut files));
+    files.sort();
+    let mut complaints = Vec::new();
+    for file in &files {
+        let path = file.strip_prefix(root).expect("a path in the workspace").to_string_lossy().replace('\\', "/");
+        if !ALLOWED.iter().any(|allowed| path.starts_with(allowed) || path.ends_with(&format!("/{allowed}"))) {
+            complaints.extend(kinds_named(&path, &read_to_string(file).expect("a text")));
+        }
+    }
+    let remedy = "ask for a column of `Descriptor` or a method of the kind instead";
+    assert!(
+        complaints.is_empty(),
+        "kinds of joints are named outside their room; {remedy}:\n{}",
+        complaints.join("\n")
+    );
+}
+
+#[test]
+fn a_kind_that_is_named_is_told_with_its_line() {
+    let text = "// JointKind::Revolute is for comments\nlet turns = kind == JointKind::Revolute;\n";
+    assert_eq!(kinds_named("a.rs", text), ["a.rs:2: let turns = kind == JointKind::Revolute;"]);
+}
