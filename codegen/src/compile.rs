@@ -391,7 +391,7 @@ fn optimised_with(
         };
         (graph, choice)
     };
-    if !(optimisations.chosen && optimisations.reduced) {
+    if !(optimisations.chosen && optimisations.reduced && robot.reduced.serves(&robot.model)) {
         return finished(robot, options, optimisations);
     }
     let chosen = choose(robot, frames, function, options, Optimisations { chosen: false, ..optimisations });

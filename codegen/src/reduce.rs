@@ -5,8 +5,8 @@
 
 use rustc_hash::FxHasher;
 use std::hash::{Hash, Hasher};
-use straightline_core::model::{Body, BodyId, JointKind, Model};
-use straightline_core::reduced::{ReducedBody, ReducedModel};
+use straightline_core::model::{Body, BodyId, Model};
+use straightline_core::reduced::{ReducedBody, ReducedJoint, ReducedModel};
 use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::{Dd, Real};
 
@@ -134,6 +134,11 @@ fn norm(v: Vec3<Dd>) -> f64 {
 
 /// The reduced robot, and the pose of each of its frames in the body's canonical frame.
 pub fn reduce(model: &Model<Dd>, choice: &Choice) -> (ReducedModel<Dd>, Vec<Transform<Dd>>) {
+    let identity = || vec![Transform::identity(); model.bodies.len()];
+    if model.bodies.iter().any(|body| ReducedJoint::of(body.joint.kind).is_none()) {
+        let none = ReducedModel { bodies: Vec::new(), gravity: model.gravity, per_unit: Dd::ONE, adds_angles: false };
+        return (none, identity());
+    }
     let lever = longest_lever(model);
     let regauge = choose_frames(model, lever, choice);
     let mut bodies: Vec<ReducedBody<Dd>> =
@@ -151,14 +156,14 @@ pub fn reduce(model: &Model<Dd>, choice: &Choice) -> (ReducedModel<Dd>, Vec<Tran
     for i in 0..reduced.bodies.len() {
         reduced.bodies[i].stays = choice.stays[i] && reduced.may_stay(i);
         let body = &mut reduced.bodies[i];
-        if adds_angles && choice.adds_offsets && body.kind == JointKind::Revolute {
+        if adds_angles && choice.adds_offsets && body.kind == ReducedJoint::Turn {
             (body.offset, body.phase) = apart(body.offset);
         }
         body.turns_sums = choice.turns_sums[i] && body.stays;
-        body.shares_axis_field ^= choice.other_acceleration[i] && body.kind == JointKind::Revolute;
-        body.by_axis_acceleration = choice.by_axis_acceleration[i] && body.kind != JointKind::Prismatic;
-        body.by_accelerations = [0, 1].map(|k| choice.by_accelerations[k][i] && body.kind != JointKind::Prismatic);
-        let derived = body.kind == JointKind::Revolute && body.shares_axis_field && !body.stays;
+        body.shares_axis_field ^= choice.other_acceleration[i] && body.kind == ReducedJoint::Turn;
+        body.by_axis_acceleration = choice.by_axis_acceleration[i] && body.kind != ReducedJoint::Slide;
+        body.by_accelerations = [0, 1].map(|k| choice.by_accelerations[k][i] && body.kind != ReducedJoint::Slide);
+        let derived = body.kind == ReducedJoint::Turn && body.shares_axis_field && !body.stays;
         body.doubled = [0, 1].map(|k| choice.doubled[k][i] && derived);
     }
     (in_unit(reduced, choice.unit), regauge)
@@ -202,7 +207,7 @@ fn is_tip(model: &Model<Dd>, i: BodyId) -> bool {
 
 /// Turns the frame of a tip about its axis so that m c_y, Σ_xy or else Σ_yz vanishes; the joint's offset takes it back.
 fn turn_tip(body: &mut ReducedBody<Dd>, vanishes: [bool; 3]) {
-    if body.kind != JointKind::Revolute {
+    if body.kind != ReducedJoint::Turn {
         return;
     }
     let (ms, s) = (body.first_moment, body.second_moment);
@@ -240,7 +245,7 @@ fn turn_tip(body: &mut ReducedBody<Dd>, vanishes: [bool; 3]) {
 
 /// Moves the origin of a tip along its axis so that Σ_xz, or else Σ_yz, vanishes.
 fn shift_tip(body: &mut ReducedBody<Dd>, lever: f64, vanishes: [bool; 2]) {
-    if body.kind != JointKind::Revolute {
+    if body.kind != ReducedJoint::Turn {
         return;
     }
     let (m, ms, s) = (body.mass, body.first_moment, body.second_moment);
@@ -276,7 +281,7 @@ fn in_unit(mut reduced: ReducedModel<Dd>, unit: Dd) -> ReducedModel<Dd> {
     if unit == Dd::ONE {
         return reduced;
     }
-    assert!(reduced.bodies.iter().all(|b| b.kind != JointKind::Prismatic), "a unit of length is for turning joints");
+    assert!(reduced.bodies.iter().all(|b| b.kind != ReducedJoint::Slide), "a unit of length is for turning joints");
     for body in &mut reduced.bodies {
         body.translation = body.translation.map(|x| if is_about(x.abs(), unit) { Real::sign(x) } else { x / unit });
         body.first_moment = body.first_moment.scale(unit);
@@ -292,7 +297,7 @@ fn in_unit(mut reduced: ReducedModel<Dd>, unit: Dd) -> ReducedModel<Dd> {
 /// first moments. What is as small as dust against the robot, whose longest lever is given, is no unit.
 pub fn lengths(reduced: &ReducedModel<Dd>, lever: f64) -> Vec<Dd> {
     let mut found: Vec<(Dd, usize)> = Vec::new();
-    if reduced.bodies.iter().any(|b| b.kind == JointKind::Prismatic) {
+    if reduced.bodies.iter().any(|b| b.kind == ReducedJoint::Slide) {
         return Vec::new();
     }
     let bodies = || reduced.bodies.iter();
@@ -338,7 +343,7 @@ fn choose_frames(model: &Model<Dd>, lever: f64, choice: &Choice) -> Vec<Transfor
     let mut chosen = vec![Transform::identity(); n];
     for i in (0..n).rev() {
         let body = &model.bodies[i];
-        if body.joint.kind == JointKind::Floating {
+        if body.joint.kind.is_base() {
             continue;
         }
         chosen[i] = match primary(i) {
@@ -351,7 +356,7 @@ fn choose_frames(model: &Model<Dd>, lever: f64, choice: &Choice) -> Vec<Transfor
     }
     // behind a parallel axis: level with the origin there, so that the arm has one component less
     for (i, body) in model.bodies.iter().enumerate() {
-        let turns = |b: &Body<Dd>| b.joint.kind == JointKind::Revolute;
+        let turns = |b: &Body<Dd>| b.joint.kind.turns();
         let Some(p) = body.parent.filter(|p| turns(body) && turns(&model.bodies[*p])) else { continue };
         let u = body.placement.rotation.column(2);
         let parallel = (u.x * u.x + u.y * u.y).hi() < NEARLY_PARALLEL * NEARLY_PARALLEL;
@@ -368,7 +373,7 @@ fn choose_frames(model: &Model<Dd>, lever: f64, choice: &Choice) -> Vec<Transfor
 
 /// How high on its axis a revolute body has the foot of the common normal with the axis of a revolute joint before it.
 fn foot_before(model: &Model<Dd>, body: &Body<Dd>, lever: f64) -> Option<Dd> {
-    let turns = |b: &Body<Dd>| b.joint.kind == JointKind::Revolute;
+    let turns = |b: &Body<Dd>| b.joint.kind.turns();
     let parent = body.parent.map(|p| &model.bodies[p])?;
     let (p, u) = (body.placement.translation, body.placement.rotation.column(2));
     let sine2 = u.x * u.x + u.y * u.y;
@@ -395,7 +400,7 @@ fn along_common_normal(
     let to_child = child.placement.compose(child_frame);
     let (u, p) = (to_child.rotation.column(2), to_child.translation);
     let sine2 = u.x * u.x + u.y * u.y;
-    let slides = child.joint.kind == JointKind::Prismatic;
+    let slides = child.joint.kind.slides();
     let (x_axis, height) = if sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL {
         // z × u; the foot on z of the common normal of {h z} and {p + s u}; the line of a sliding joint may be anywhere
         let foot = (p.z - u.z * p.dot(u)) / sine2;
@@ -416,7 +421,7 @@ fn tip_frame(model: &Model<Dd>, body: &Body<Dd>, lever: f64) -> Transform<Dd> {
     let (r, p) = (body.placement.rotation, body.placement.translation);
     let u = r.column(2);
     let sine2 = u.x * u.x + u.y * u.y;
-    if body.parent.is_none_or(|p| model.bodies[p].joint.kind == JointKind::Floating) {
+    if body.parent.is_none_or(|p| model.bodies[p].joint.kind.is_base()) {
         return Transform::identity();
     }
     if sine2.hi() > NEARLY_PARALLEL * NEARLY_PARALLEL {
@@ -444,9 +449,9 @@ fn pose_about_z(
     let z = Vec3::unit_z();
     let x = Vec3::new(c, s, Dd::ZERO);
     let rotation = Mat3::from_columns(x, z.cross(x), z);
-    let translation = match body.joint.kind {
+    let translation = match body.joint.kind.slides() {
         // anywhere: where the child is, so that its arm vanishes
-        JointKind::Prismatic => child_origin.unwrap_or(Vec3::zero()),
+        true => child_origin.unwrap_or(Vec3::zero()),
         _ if height.abs().hi() > FAR * lever => Vec3::zero(),
         _ => {
             let terms = norm(child_origin.unwrap_or(body.placement.translation));
@@ -495,17 +500,17 @@ fn in_new_frame(model: &Model<Dd>, frames: &[Transform<Dd>], i: BodyId, body: &B
     let com = own.rotation.transpose_mul(inertia.com - own.translation);
     let moved = SpatialInertia::new(inertia.mass, com, inertia.inertia_com.rotated(&r));
     let rotation = joint.rotation.map(special);
-    let (rotation, offset) = match body.joint.kind {
-        JointKind::Prismatic => (rotation, (Dd::ZERO, Dd::ONE)),
-        _ => split_turn(&rotation),
+    let (rotation, offset) = match body.joint.kind.slides() {
+        true => (rotation, (Dd::ZERO, Dd::ONE)),
+        false => split_turn(&rotation),
     };
     let permutes = rotation.rows.iter().flatten().all(|x| *x == Dd::ZERO || x.abs() == Dd::ONE);
-    let revolute = |b: &Body<Dd>| b.joint.kind == JointKind::Revolute;
+    let revolute = |b: &Body<Dd>| b.joint.kind.turns();
     let parallel = revolute(body) && body.parent.is_some_and(|p| revolute(&model.bodies[p]));
     let parent_turns = body.parent.is_some_and(|p| model.bodies[p].parent.is_some());
     ReducedBody {
         parent: body.parent,
-        kind: body.joint.kind,
+        kind: ReducedJoint::of(body.joint.kind).expect("the reduced form is written for this joint"),
         iq: body.joint.iq,
         iv: body.joint.iv,
         rotation,
@@ -561,8 +566,8 @@ fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, lever: f64, vanish: [Option
     let zero = Dd::ZERO;
     let (rotation, a, p) = (body.rotation, body.rotation.column(2), body.translation);
     match body.kind {
-        JointKind::Floating => {}
-        JointKind::Revolute => {
+        ReducedJoint::Free => {}
+        ReducedJoint::Turn => {
             let (mut m, mut mz, mut szz) = (body.mass, body.first_moment.z, body.second_moment.zz);
             if let Some(before) = body.parent.map(|p| &bodies[p]) {
                 let (ms, s) = (before.first_moment.to_array(), before.second_moment);
@@ -615,7 +620,7 @@ fn regroup(bodies: &mut [ReducedBody<Dd>], i: usize, lever: f64, vanish: [Option
                 }
             }
         }
-        JointKind::Prismatic => {
+        ReducedJoint::Slide => {
             let (s0, c0) = body.offset;
             let moved = body.second_moment.turned(s0, c0).rotated(&rotation);
             let own = &mut bodies[i];

@@ -185,7 +185,7 @@ fn chosen_robots(
     functions: &[Function],
 ) -> Vec<Robot> {
     use Function::{BiasForce, ForwardDynamics, InverseDynamics, MassMatrix};
-    if !optimisations.chosen || !optimisations.reduced {
+    if !(optimisations.chosen && optimisations.reduced && robot.reduced.serves(&robot.model)) {
         return Vec::new();
     }
     let optimisations = Optimisations { chosen: false, ..optimisations };

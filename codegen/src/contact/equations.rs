@@ -325,7 +325,7 @@ fn contacts<'a, T: Real>(
             Some((body, robot.reduced_frames[body].inverse().compose(&f.placement).map(T::constant)))
         });
         let by_reduced = placed
-            .filter(|_| form.reduced)
+            .filter(|_| form.reduced && bound.reduced.serves(&bound.model))
             .and_then(|placed| alg::reduced_relative_motion(&bound.reduced, &contact, placed, q, qd));
         let mut motion = by_reduced.unwrap_or_else(|| alg::relative_motion(&bound.model, &contact, q, qd));
         if let Some(g) = form.falls {

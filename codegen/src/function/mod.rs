@@ -451,6 +451,9 @@ impl Function {
         inputs: &[Vec<T>],
     ) -> Option<Vec<T>> {
         use Function::*;
+        if !reduced.serves(model) {
+            return None;
+        }
         let q = &inputs[0];
         let bias = || {
             reduced_bias(

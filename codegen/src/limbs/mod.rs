@@ -19,6 +19,7 @@ use crate::compile::{passed, Optimisations, Options};
 use crate::function::{Function, Robot};
 use crate::scene::is_optional;
 use straightline_core::model::{BodyId, Coulomb, Model};
+use straightline_core::reduced::ReducedJoint;
 use straightline_graph::expr::Graph;
 use straightline_graph::pass::{dead_code, sums, unread_inputs};
 
@@ -65,9 +66,12 @@ pub struct Limbs {
     pub bodies: Vec<Vec<BodyId>>,
 }
 
-/// All identical limbs of a robot, those nearest to the base where some carry others.
+/// All identical limbs of a robot, those nearest to the base where some carry others; none of a robot without a reduced form.
 pub fn limbs<T>(model: &Model<T>) -> Vec<Limbs> {
     let mut found = Vec::new();
+    if model.bodies.iter().any(|body| ReducedJoint::of(body.joint.kind).is_none()) {
+        return found;
+    }
     let mut carriers = vec![None];
     while let Some(carrier) = carriers.pop() {
         let mut kinds: Vec<(String, Vec<Vec<BodyId>>)> = Vec::new();

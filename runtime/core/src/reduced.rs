@@ -8,10 +8,49 @@
 //!
 //! Only joint torques are computed on a reduced robot: a link's own velocity, reaction or pose is not a quantity of it.
 
-use crate::model::{BodyId, JointKind};
+use crate::joint::{JointKind, Measure, FLOATING_BASE};
+use crate::model::{BodyId, Model};
 use crate::real::Real;
 use crate::spatial::{Mat3, Sym3, Vec3};
 use alloc::vec::Vec;
+
+/// How a body of a [`ReducedModel`] moves: what the reduced form is written for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReducedJoint {
+    /// Turns about z.
+    Turn,
+    /// Slides along z.
+    Slide,
+    /// Moves freely in the world.
+    Free,
+}
+
+impl ReducedJoint {
+    /// What a joint does; `None`: something that the reduced form is not written for.
+    pub fn of(kind: JointKind) -> Option<Self> {
+        match kind.elementary() {
+            Some(Measure::Angle) => Some(ReducedJoint::Turn),
+            Some(Measure::Length) => Some(ReducedJoint::Slide),
+            None => (kind == FLOATING_BASE).then_some(ReducedJoint::Free),
+        }
+    }
+
+    /// Number of configuration coordinates.
+    pub const fn nq(self) -> usize {
+        match self {
+            ReducedJoint::Turn | ReducedJoint::Slide => 1,
+            ReducedJoint::Free => FLOATING_BASE.nq(),
+        }
+    }
+
+    /// Number of velocity coordinates.
+    pub const fn nv(self) -> usize {
+        match self {
+            ReducedJoint::Turn | ReducedJoint::Slide => 1,
+            ReducedJoint::Free => FLOATING_BASE.nv(),
+        }
+    }
+}
 
 /// A body of a [`ReducedModel`].
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +58,7 @@ pub struct ReducedBody<T> {
     /// The body it moves against; `None`: the world.
     pub parent: Option<BodyId>,
     /// How it moves.
-    pub kind: JointKind,
+    pub kind: ReducedJoint,
     /// First index into q.
     pub iq: usize,
     /// First index into qd, qdd and tau.
@@ -81,9 +120,15 @@ impl<T: Real> ReducedModel<T> {
         self.bodies.iter().map(|b| b.kind.nv()).sum()
     }
 
+    /// Whether it stands for this robot: a robot with other joints than turning and sliding ones has no reduced form, and its reduced robot no
+    /// bodies.
+    pub fn serves<U>(&self, model: &Model<U>) -> bool {
+        self.bodies.len() == model.bodies.len()
+    }
+
     /// Whether a body may [stay](ReducedBody::stays): it turns, and all that it carries turns about parallel axes.
     pub fn may_stay(&self, i: BodyId) -> bool {
-        self.bodies[i].kind.turns() && self.bodies.iter().all(|b| b.parent != Some(i) || b.parallel)
+        self.bodies[i].kind == ReducedJoint::Turn && self.bodies.iter().all(|b| b.parent != Some(i) || b.parallel)
     }
 
     /// The same robot over another scalar: every number through `f`.

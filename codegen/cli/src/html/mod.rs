@@ -17,7 +17,7 @@ use straightline_codegen::report::waterfall::{items_of, signed, By, Waterfall};
 use straightline_codegen::report::{FunctionReport, Report};
 use straightline_codegen::scene::{Base, Scene};
 use straightline_codegen::staged::{Remaining, StagedReport};
-use straightline_core::joint::KINDS;
+use straightline_core::joint;
 use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::expr::{Counts, Graph, Op};
@@ -157,7 +157,7 @@ fn kinematics(whole: &Model<Dd>, scene: &Scene, model: &Model<Dd>) -> (String, f
         "<h2>Kinematic tree</h2>\n<p class=\"lead\">Joints by their kind, with the bodies that they move; bodies that are fixed to \
          each other are one.</p>\n<ul class=\"legend\">\n",
     );
-    let moving = KINDS.iter().map(|kind| (Some(*kind), kind.row().verb));
+    let moving = joint::KINDS.iter().map(|kind| (Some(*kind), kind.row().verb));
     for (kind, words) in moving.chain([(None, "held by the scene")]) {
         let here = |i: usize| if locked(i) { None } else { Some(whole.bodies[i].joint.kind) };
         if (0..whole.bodies.len()).any(|i| here(i) == kind) {

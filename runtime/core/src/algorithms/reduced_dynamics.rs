@@ -9,9 +9,9 @@
 
 use super::reduced_turn::Turn;
 use crate::joint::quaternion::rotated_back;
-use crate::model::{BodyId, JointKind};
+use crate::model::BodyId;
 use crate::real::Real;
-use crate::reduced::{ReducedBody, ReducedModel};
+use crate::reduced::{ReducedBody, ReducedJoint, ReducedModel};
 use crate::spatial::{ForceVector, Mat3, Transform, Vec3};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -40,9 +40,9 @@ pub fn reduced_inverse_dynamics_with_limbs<T: Real>(
         let moment = (own.moment + carried[i].moment).named("moment", i);
         let force = (own.force + carried[i].force).named("force", i);
         match body.kind {
-            JointKind::Revolute => tau[body.iv] = moment.z,
-            JointKind::Prismatic => tau[body.iv] = force.z,
-            JointKind::Floating => {
+            ReducedJoint::Turn => tau[body.iv] = moment.z,
+            ReducedJoint::Slide => tau[body.iv] = force.z,
+            ReducedJoint::Free => {
                 let force = force.scale(model.per_unit);
                 for (k, x) in force.to_array().into_iter().chain(moment.to_array()).enumerate() {
                     tau[body.iv + k] = x;
@@ -137,7 +137,7 @@ pub(super) fn carried_motion<T: Real>(
     while let Some(i) = next {
         let (body, turn) = (&model.bodies[i], &turns[i]);
         path.push((body.clone(), turn.clone(), lever));
-        if body.kind == JointKind::Floating {
+        if body.kind == ReducedJoint::Free {
             origin = Vec3::new(q[body.iq], q[body.iq + 1], q[body.iq + 2]);
         }
         lever = links[i].arm + turn.base_to_parent(body, turn.described_to_base(body, lever));
@@ -178,12 +178,12 @@ impl<T: Real> CarriedMotion<T> {
             (n, f) = (down(n), down(f));
             let iv = body.iv;
             match body.kind {
-                JointKind::Revolute => {
+                ReducedJoint::Turn => {
                     linear[iv] = r.x * f.y - r.y * f.x; // (r × f) · z
                     angular[iv] = n.z;
                 }
-                JointKind::Prismatic => linear[iv] = f.z,
-                JointKind::Floating => {
+                ReducedJoint::Slide => linear[iv] = f.z,
+                ReducedJoint::Free => {
                     let about = r.cross(f).to_array();
                     for (k, (n, about)) in n.to_array().into_iter().zip(about).enumerate() {
                         linear[iv + k] = n;
@@ -319,7 +319,7 @@ impl<T: Real> Link<T> {
         let iv = body.iv;
         let at_rest = |spin, accel: Vec3<T>, arm| Link { spin, accel, arm, base: (spin, T::zero(), T::zero()) };
         match body.kind {
-            JointKind::Revolute => {
+            ReducedJoint::Turn => {
                 let at_joint = turn.parent_to_base(body, self.accel + self.spin.u * arm);
                 let (base, rate, rate_rate) = match (turn.continues, self.base) {
                     (true, (base, rate, rate_rate)) => (base, rate + qd[iv], rate_rate + qdd[iv]),
@@ -347,7 +347,7 @@ impl<T: Real> Link<T> {
                 };
                 Link { spin, accel, arm, base: (base, rate, rate_rate) }
             }
-            JointKind::Prismatic => {
+            ReducedJoint::Slide => {
                 let q = q[body.iq];
                 let spin = self.spin.in_axes(&body.rotation, body.permutes);
                 let at_joint = turn.parent_to_base(body, self.accel + self.spin.u * arm);
@@ -358,7 +358,7 @@ impl<T: Real> Link<T> {
                 let accel = (at_joint + field + coriolis).named("accel", i);
                 at_rest(spin, accel, arm + body.rotation.column(2).scale(q))
             }
-            JointKind::Floating => {
+            ReducedJoint::Free => {
                 let triple = |x: &[T], k: usize| Vec3::new(x[iv + k], x[iv + k + 1], x[iv + k + 2]);
                 let (omega, alpha) = (triple(qd, 3), triple(qdd, 3));
                 // v̇ + ω × v − Rᵀ g

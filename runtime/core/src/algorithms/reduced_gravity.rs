@@ -8,9 +8,9 @@
 
 use super::reduced_turn::own_angle;
 use crate::joint::quaternion::rotated_back;
-use crate::model::{BodyId, JointKind};
+use crate::model::BodyId;
 use crate::real::Real;
-use crate::reduced::{ReducedBody, ReducedModel};
+use crate::reduced::{ReducedBody, ReducedJoint, ReducedModel};
 use crate::spatial::Vec3;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -36,8 +36,8 @@ pub fn reduced_gravity_force_with_limbs<T: Real>(
     let mut up_at_joint: Vec<Vec3<T>> = Vec::with_capacity(n);
     T::section("sines and cosines", None);
     let turn = |(i, body): (usize, &ReducedBody<T>)| match body.kind {
-        JointKind::Revolute => own_angle(i, body, q),
-        JointKind::Prismatic | JointKind::Floating => body.offset,
+        ReducedJoint::Turn => own_angle(i, body, q),
+        ReducedJoint::Slide | ReducedJoint::Free => body.offset,
     };
     let turns: Vec<(T, T)> = model.bodies.iter().enumerate().map(turn).collect();
     for (i, body) in model.bodies.iter().enumerate() {
@@ -45,13 +45,13 @@ pub fn reduced_gravity_force_with_limbs<T: Real>(
         let before = body.parent.map_or(-model.gravity, |p| up[p]);
         let (s, c) = turns[i];
         let at_joint = match body.kind {
-            JointKind::Floating => {
+            ReducedJoint::Free => {
                 let k = body.iq + 3;
                 rotated_back([q[k], q[k + 1], q[k + 2], q[k + 3]], before)
             }
             _ => body.rotation.transpose_mul(before),
         };
-        let own = if body.kind == JointKind::Floating { at_joint } else { at_joint.turned(-s, c) };
+        let own = if body.kind == ReducedJoint::Free { at_joint } else { at_joint.turned(-s, c) };
         up.push(own.named("up", i));
         up_at_joint.push(at_joint);
     }
@@ -65,16 +65,16 @@ pub fn reduced_gravity_force_with_limbs<T: Real>(
         let (sin, cos) = turns[i];
         let (at_joint, g) = (s.turned(sin, cos), up_at_joint[i]);
         match body.kind {
-            JointKind::Revolute => forces[body.iv] = at_joint.x * g.y - at_joint.y * g.x,
-            JointKind::Prismatic => forces[body.iv] = mass[i] * g.z,
-            JointKind::Floating => {
+            ReducedJoint::Turn => forces[body.iv] = at_joint.x * g.y - at_joint.y * g.x,
+            ReducedJoint::Slide => forces[body.iv] = mass[i] * g.z,
+            ReducedJoint::Free => {
                 let both = g.scale(mass[i]).scale(model.per_unit).to_array().into_iter().chain(s.cross(g).to_array());
                 both.enumerate().for_each(|(k, f)| forces[body.iv + k] = f);
             }
         }
         if let Some(p) = body.parent {
             let arm = match body.kind {
-                JointKind::Prismatic => body.translation + body.rotation.column(2).scale(q[body.iq]),
+                ReducedJoint::Slide => body.translation + body.rotation.column(2).scale(q[body.iq]),
                 _ => body.translation,
             };
             let passed_on = || body.rotation * at_joint + arm.scale(mass[i]);

@@ -5,9 +5,9 @@
 //! constants turn, and no composite.
 
 use super::reduced_turn::Turn;
-use crate::model::JointKind;
+use crate::joint::FLOATING_BASE;
 use crate::real::Real;
-use crate::reduced::{ReducedBody, ReducedModel};
+use crate::reduced::{ReducedBody, ReducedJoint, ReducedModel};
 use crate::spatial::{Composite, ForceVector, Mat3, Sym3, Vec3};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -28,14 +28,14 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
         let (iv, composite, turn) = (body.iv, composites[b].named(b), &turns[b]);
         // in base axes, which the joint has turned or slid from already
         let (moved, column) = match body.kind {
-            JointKind::Floating => {
+            ReducedJoint::Free => {
                 let composite = in_metres(&composite, model.per_unit);
-                let own = &q[body.iq..body.iq + body.kind.nq()];
+                let own = &q[body.iq..body.iq + FLOATING_BASE.nq()];
                 let mut set = |i, j, value| set(iv + i, iv + j, value);
-                body.kind.mechanics().block(&composite, own, body.kind.nv(), &mut set);
+                FLOATING_BASE.mechanics().block(&composite, own, FLOATING_BASE.nv(), &mut set);
                 continue;
             }
-            JointKind::Prismatic => {
+            ReducedJoint::Slide => {
                 // f = M z,  n = m c × z
                 set(iv, iv, composite.mass);
                 let ms = composite.first_moment;
@@ -43,7 +43,7 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
                 let moment = Vec3::new(ms.y, -ms.x, T::zero());
                 (composite.slid(q[body.iq]), ForceVector { moment, force })
             }
-            JointKind::Revolute => {
+            ReducedJoint::Turn => {
                 // f = z × m c,  n = J z = (−Σ_xz, −Σ_yz, Σ_xx + Σ_yy)
                 let inertia = composite.second_moment.xx + composite.second_moment.yy;
                 set(iv, iv, inertia);
@@ -74,9 +74,9 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
             let moment = turn.base_to_parent(body, wrench.moment) + arm_of(below).cross(force);
             let over = &model.bodies[ancestor];
             match over.kind {
-                JointKind::Revolute => set(iv, over.iv, moment.z),
-                JointKind::Prismatic => set(iv, over.iv, force.z),
-                JointKind::Floating => {
+                ReducedJoint::Turn => set(iv, over.iv, moment.z),
+                ReducedJoint::Slide => set(iv, over.iv, force.z),
+                ReducedJoint::Free => {
                     let both = force.scale(model.per_unit).to_array().into_iter().chain(moment.to_array());
                     both.enumerate().for_each(|(k, x)| set(iv, over.iv + k, x));
                 }
@@ -84,7 +84,7 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
             let turned = |v| turns[ancestor].described_to_base(over, v);
             let moment = match over.kind {
                 // q z × F
-                JointKind::Prismatic => {
+                ReducedJoint::Slide => {
                     let slide = q[over.iq];
                     moment + Vec3::new(-(slide * force.y), slide * force.x, T::zero())
                 }

@@ -7,9 +7,8 @@
 //! addition theorem.
 
 use crate::joint::quaternion::quaternion_to_rotation;
-use crate::model::JointKind;
 use crate::real::Real;
-use crate::reduced::{ReducedBody, ReducedModel};
+use crate::reduced::{ReducedBody, ReducedJoint, ReducedModel};
 use crate::spatial::{Mat3, Vec3};
 use alloc::vec::Vec;
 
@@ -34,7 +33,7 @@ impl<T: Real> Turn<T> {
         for (i, body) in model.bodies.iter().enumerate() {
             let none = || (Vec::new(), (T::zero(), T::one()));
             let turn = match body.kind {
-                JointKind::Revolute => {
+                ReducedJoint::Turn => {
                     let continued = body.parent.filter(|p| body.parallel && model.bodies[*p].stays);
                     let (mut sum, mut angle) = (none(), None);
                     if model.adds_angles {
@@ -56,8 +55,8 @@ impl<T: Real> Turn<T> {
                     });
                     Turn { angle: Some(angle), continues: continued.is_some(), sum, free: None }
                 }
-                JointKind::Prismatic => Turn { angle: None, continues: false, sum: none(), free: None },
-                JointKind::Floating => {
+                ReducedJoint::Slide => Turn { angle: None, continues: false, sum: none(), free: None },
+                ReducedJoint::Free => {
                     let k = body.iq + 3;
                     let rotation = quaternion_to_rotation([q[k], q[k + 1], q[k + 2], q[k + 3]]);
                     Turn { angle: None, continues: false, sum: none(), free: Some(rotation) }
