@@ -4,8 +4,8 @@
 //! frame unless a tilde says otherwise. A sum over k = j … n is here a sum over the links k that joint j carries.
 
 use super::{
-    geometry, linear_forms, motion, skew, solve_symmetric, Joint, LinearForms, LinkGeometry, LinkMotion,
-    MassCentreTree, Number,
+    geometry, linear_forms, motion, skew, solve_symmetric, LinearForms, LinkGeometry, LinkMotion, MassCentreTree,
+    Number,
 };
 use crate::dd::Dd;
 use alloc::vec;
@@ -95,17 +95,15 @@ fn joint_load<T: Number>(
         // M_{Sj} = −Σ_k (M_{kI} + r_k^{(j)} × (G_k + F_{kI}))                                                  (20.48)
         moment += applied_couple(tree, k, &position[k], &motion[k]) + lever(tree, position, j, k).cross(&applied);
     }
-    let (reaction_force, reaction_moment) = match tree.links[j].joint {
-        Joint::Free => (Vector3::zeros(), Vector3::zeros()),
-        joint => {
-            let s: T = joint.indicator();
-            let one: T = nalgebra::one();
+    let (reaction_force, reaction_moment) = match tree.links[j].joint.shares::<T>() {
+        None => (Vector3::zeros(), Vector3::zeros()),
+        Some([turns, s]) => {
             let e = &position[j].e;
             // τ_j = F_{Sj} · e_j (20.50) or M_{Sj} · e_j (20.51)
-            let tau = s * force.dot(e) + (one - s) * moment.dot(e);
+            let tau = s * force.dot(e) + turns * moment.dot(e);
             // F_{Sj} = F_{Rj} + s_j τ_j e_j
             // M_{Sj} = M_{Rj} + (1 − s_j) τ_j e_j                                                              (20.19)
-            (force - e * (s * tau), moment - e * ((one - s) * tau))
+            (force - e * (s * tau), moment - e * (turns * tau))
         }
     };
     JointLoad { force, moment, reaction_force, reaction_moment }
@@ -136,28 +134,25 @@ pub fn dalembert_inverse_dynamics<T: Number>(tree: &MassCentreTree<T>, q: &[T], 
     let mut tau = DVector::zeros(tree.nv());
     for (j, link) in tree.links.iter().enumerate() {
         let e = &position[j].e;
-        match link.joint {
-            Joint::Linear => {
-                for k in carried(tree, j) {
-                    // τ_j = Σ_k m_k (w_k − g) · e_j                                                            (20.50)
-                    tau[link.iv] += ((motion[k].w - tree.gravity) * tree.links[k].mass).dot(e);
-                }
-            }
-            Joint::Revolute => {
+        match link.joint.shares::<T>() {
+            Some([turns, s]) => {
                 for k in carried(tree, j) {
                     let LinkGeometry { rotation, .. } = &position[k];
                     let inertia = &tree.links[k].inertia;
                     let omega = rotation.transpose() * motion[k].omega;
                     let epsilon = rotation.transpose() * motion[k].epsilon;
                     let lever = lever(tree, &position, j, k);
+                    let force = (motion[k].w - tree.gravity) * tree.links[k].mass;
+                    // a linear joint: τ_j = Σ_k m_k (w_k − g) · e_j                                            (20.50)
+                    tau[link.iv] += s * force.dot(e);
                     // corrected: J̃_k ε̃_k, printed J̃_k q̈~_k
+                    // a revolute one:
                     // τ_j = Σ_k (A_k (J̃_k ε̃_k + ω̃_k × (J̃_k ω̃_k)) + r_k^{(j)} × m_k (w_k − g)) · e_j             (20.51)
-                    tau[link.iv] += (rotation * (inertia * epsilon + omega.cross(&(inertia * omega)))
-                        + lever.cross(&((motion[k].w - tree.gravity) * tree.links[k].mass)))
-                    .dot(e);
+                    let couple = rotation * (inertia * epsilon + omega.cross(&(inertia * omega)));
+                    tau[link.iv] += turns * (couple + lever.cross(&force)).dot(e);
                 }
             }
-            Joint::Free => {
+            None => {
                 // τ = (F̃_S, M̃_S), all six components
                 let load = joint_load(tree, &position, &motion, j);
                 let rotation = position[j].rotation.transpose();
@@ -222,21 +217,18 @@ pub fn equations_of_motion<T: Number>(tree: &MassCentreTree<T>, q: &[T], qd: &[T
         for k in carried(tree, j) {
             let LinkTerms { force_matrix, force, couple_matrix, couple } = &terms[k];
             let lever = skew(&lever(tree, &position, j, k));
-            match link.joint {
-                Joint::Linear => {
+            match link.joint.shares::<T>() {
+                Some([turns, s]) => {
                     // H'_j = Σ_k e_jᵀ m_k Ξ^k,    h'_j = Σ_k e_jᵀ m_k (Δ^k − g)                                 (20.54)
-                    let mut row = mass_matrix.row_mut(link.iv);
-                    row += e.transpose() * force_matrix;
-                    bias_force[link.iv] += e.dot(force);
-                }
-                Joint::Revolute => {
                     // H''_j = Σ_k e_jᵀ (A_k J̃_k A_k⁻¹ Λ^k + r̲_k^{(j)} m_k Ξ^k)
                     // h''_j = Σ_k e_jᵀ (A_k J̃_k A_k⁻¹ Γ^k + A_k ω̲̃_k J̃_k ω̃_k + r̲_k^{(j)} m_k (Δ^k − g))           (20.58)
+                    let along = e.transpose() * force_matrix;
+                    let about = e.transpose() * couple_matrix + (e.transpose() * lever) * force_matrix;
                     let mut row = mass_matrix.row_mut(link.iv);
-                    row += e.transpose() * couple_matrix + (e.transpose() * lever) * force_matrix;
-                    bias_force[link.iv] += e.dot(&(couple + lever * force));
+                    row += along * s + about * turns;
+                    bias_force[link.iv] += s * e.dot(force) + turns * e.dot(&(couple + lever * force));
                 }
-                Joint::Free => {
+                None => {
                     // the columns of A_j instead of e_j: first as in (20.54), then as in (20.58)
                     let axes = position[j].rotation.transpose();
                     let mut rows = mass_matrix.fixed_rows_mut::<3>(link.iv);
@@ -306,16 +298,16 @@ pub fn natural_scale<T: Number>(tree: &MassCentreTree<T>, q: &[T], qd: &[T], qdd
     let position = geometry(tree, q);
     let motion = motion(tree, &position, qd, qdd);
     let norm = |v: &Vector3<T>| v.dot(v).sqrt();
+    let norm_of = |x: T| (x * x).sqrt();
     let mut scale = DVector::zeros(tree.nv());
     for (j, link) in tree.links.iter().enumerate() {
         for k in carried(tree, j) {
             let force = norm(&applied_force(tree, k, &motion[k]));
             let moment =
                 norm(&lever(tree, &position, j, k)) * force + norm(&applied_couple(tree, k, &position[k], &motion[k]));
-            match link.joint {
-                Joint::Linear => scale[link.iv] += force,
-                Joint::Revolute => scale[link.iv] += moment,
-                Joint::Free => {
+            match link.joint.shares::<T>() {
+                Some([turns, s]) => scale[link.iv] += force * norm_of(s) + moment * norm_of(turns),
+                None => {
                     for i in 0..3 {
                         scale[link.iv + i] += force;
                         scale[link.iv + 3 + i] += moment;

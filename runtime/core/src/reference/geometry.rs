@@ -98,11 +98,8 @@ fn relative_rotation<T: Number>(link: &MassCentreLink<T>, q: T) -> Matrix3<T> {
             (extended_joint(&link.e_parent, &r_parent, &link.e, &r), *alpha)
         }
     };
-    let angle = match link.joint {
-        Joint::Revolute => q,
-        Joint::Linear => alpha,
-        Joint::Free => unreachable!("a free link has no extended position"),
-    };
+    let [turns, _] = link.joint.shares().expect("a free link has no extended position");
+    let angle = if link.joint == Joint::Linear { alpha } else { q * turns };
     // A⁰_{j−1,j} = [V⁰_{j1} V⁰_{j2} V⁰_{j3}]                                                                   (20.107)
     let v0 = |k: usize| extended.column(k).into_owned();
     let v = |k: usize| rodrigues(&v0(k), &link.e_parent, angle);
@@ -115,15 +112,15 @@ pub fn geometry<T: Number>(tree: &MassCentreTree<T>, q: &[T]) -> Vec<LinkGeometr
     assert_eq!(q.len(), tree.nq(), "one value per position coordinate");
     let mut links: Vec<LinkGeometry<T>> = Vec::with_capacity(tree.links.len());
     for link in &tree.links {
-        let here = match link.joint {
-            Joint::Revolute | Joint::Linear => {
+        let here = match link.joint.shares() {
+            Some([_, s]) => {
                 let (parent_rotation, parent_mass_centre) = match link.parent {
                     Some(p) => (links[p].rotation, links[p].mass_centre),
                     None => (Matrix3::identity(), Vector3::zeros()),
                 };
-                one_joint(link, q[link.iq], &parent_rotation, &parent_mass_centre)
+                one_joint(link, (q[link.iq], s), &parent_rotation, &parent_mass_centre)
             }
-            Joint::Free => free(link, &q[link.iq..link.iq + 7]),
+            None => free(link, &q[link.iq..link.iq + 7]),
         };
         links.push(here);
     }
@@ -132,11 +129,10 @@ pub fn geometry<T: Number>(tree: &MassCentreTree<T>, q: &[T]) -> Vec<LinkGeometr
 
 fn one_joint<T: Number>(
     link: &MassCentreLink<T>,
-    q: T,
+    (q, s): (T, T),
     parent_rotation: &Matrix3<T>,
     parent_mass_centre: &Vector3<T>,
 ) -> LinkGeometry<T> {
-    let s: T = link.joint.indicator();
     // A_j = A_{0,1} A_{1,2} … A_{j−1,j}                                                                        (20.111)
     let rotation = parent_rotation * relative_rotation(link, q);
     // a_j = A_j ã_j                                                                                             (20.9)

@@ -2,7 +2,7 @@
 //!
 //! Section 20.2.1, equations (20.23)–(20.43). All vectors are in the external frame.
 
-use super::{skew, Joint, LinkGeometry, MassCentreTree, Number};
+use super::{skew, LinkGeometry, MassCentreTree, Number};
 use alloc::vec::Vec;
 use nalgebra::{Matrix3xX, Vector3};
 
@@ -39,9 +39,9 @@ pub fn motion<T: Number>(
     let mut links: Vec<LinkMotion<T>> = Vec::with_capacity(tree.links.len());
     for (link, position) in tree.links.iter().zip(geometry) {
         let parent = link.parent.map_or_else(LinkMotion::rest, |p| links[p].clone());
-        let here = match link.joint {
-            Joint::Revolute | Joint::Linear => one_joint(link.joint, position, &parent, qd[link.iv], qdd[link.iv]),
-            Joint::Free => free(position, &qd[link.iv..link.iv + 6], &qdd[link.iv..link.iv + 6]),
+        let here = match link.joint.shares() {
+            Some(shares) => one_joint(shares, position, &parent, qd[link.iv], qdd[link.iv]),
+            None => free(position, &qd[link.iv..link.iv + 6], &qdd[link.iv..link.iv + 6]),
         };
         links.push(here);
     }
@@ -49,7 +49,7 @@ pub fn motion<T: Number>(
 }
 
 fn one_joint<T: Number>(
-    joint: Joint,
+    [turns, s]: [T; 2],
     position: &LinkGeometry<T>,
     parent: &LinkMotion<T>,
     qd: T,
@@ -57,14 +57,13 @@ fn one_joint<T: Number>(
 ) -> LinkMotion<T> {
     let LinkGeometry { e, r_dash, r_parent, .. } = position;
     let LinkMotion { omega: omega_parent, epsilon: epsilon_parent, v: v_parent, w: w_parent } = parent;
-    let s: T = joint.indicator();
     let one: T = nalgebra::one();
     let two = one + one;
 
     // ω_j = ω_{j−1} + q̇_j (1 − s_j) e_j                                                                        (20.23)
-    let omega = omega_parent + e * (qd * (one - s));
+    let omega = omega_parent + e * (qd * turns);
     // ε_j = ε_{j−1} + (q̈_j e_j + q̇_j (ω_j × e_j)) (1 − s_j)                                                     (20.24)
-    let epsilon = epsilon_parent + (e * qdd + omega.cross(e) * qd) * (one - s);
+    let epsilon = epsilon_parent + (e * qdd + omega.cross(e) * qd) * turns;
     // v_j = v_{j−1} − ω_{j−1} × r_{j−1,j} + ω_j × r'_{j,j} + q̇_j s_j e_j                                        (20.26)
     let v = v_parent - omega_parent.cross(r_parent) + omega.cross(r_dash) + e * (qd * s);
     // w_j = w_{j−1} − ε_{j−1} × r_{j−1,j} − ω_{j−1} × (ω_{j−1} × r_{j−1,j}) + ε_j × r'_{j,j}
@@ -118,9 +117,9 @@ pub fn linear_forms<T: Number>(
     let mut links: Vec<LinearForms<T>> = Vec::with_capacity(tree.links.len());
     for (link, position) in tree.links.iter().zip(geometry) {
         let parent = link.parent.map_or_else(|| base_forms(n), |p| links[p].clone());
-        let here = match link.joint {
-            Joint::Revolute | Joint::Linear => one_joint_forms(link.joint, position, &parent, link.iv, qd[link.iv]),
-            Joint::Free => free_forms(position, parent, link.iv, &qd[link.iv..link.iv + 6]),
+        let here = match link.joint.shares() {
+            Some(shares) => one_joint_forms(shares, position, &parent, link.iv, qd[link.iv]),
+            None => free_forms(position, parent, link.iv, &qd[link.iv..link.iv + 6]),
         };
         links.push(here);
     }
@@ -134,7 +133,7 @@ fn base_forms<T: Number>(n: usize) -> LinearForms<T> {
 }
 
 fn one_joint_forms<T: Number>(
-    joint: Joint,
+    [turns, s]: [T; 2],
     position: &LinkGeometry<T>,
     parent: &LinearForms<T>,
     j: usize,
@@ -148,17 +147,16 @@ fn one_joint_forms<T: Number>(
         delta: delta_parent,
         omega: omega_parent,
     } = parent;
-    let s: T = joint.indicator();
     let one: T = nalgebra::one();
     let two = one + one;
-    let omega = omega_parent + e * (qd * (one - s)); // (20.23)
+    let omega = omega_parent + e * (qd * turns); // (20.23)
 
     // λ_k^j = λ_k^{j−1}, k = 1, …, j−1
     // λ_j^j = (1 − s_j) e_j                                                                                    (20.40)
     let mut lambda = lambda_parent.clone();
-    lambda.set_column(j, &(e * (one - s)));
+    lambda.set_column(j, &(e * turns));
     // γ^j = γ^{j−1} + q̇_j (ω_j × e_j) (1 − s_j)                                                                 (20.41)
-    let gamma = gamma_parent + omega.cross(e) * (qd * (one - s));
+    let gamma = gamma_parent + omega.cross(e) * (qd * turns);
     // ξ_k^j = ξ_k^{j−1} − λ_k^{j−1} × r_{j−1,j} + λ_k^j × r'_{j,j}, k = 1, …, j−1
     // ξ_j^j = e_j s_j + λ_j^j × r'_{j,j}                                                                       (20.42)
     let mut xi = xi_parent.clone();

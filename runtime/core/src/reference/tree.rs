@@ -34,32 +34,32 @@ impl Joint {
         }
     }
 
-    /// The indicator s_j of (20.6): 0 for a revolute joint, 1 for a linear one.
-    ///
-    /// # Panics
-    /// For a free link, which has none.
+    /// (1 − s_j, s_j) with the indicator s_j of (20.6), 0 for a revolute joint, 1 for a linear one: how much a joint turns and how much it
+    /// slides per unit of its coordinate. A free link has none.
     #[doc(alias = "s_j")]
-    pub fn indicator<T: Number>(self) -> T {
+    pub fn shares<T: Number>(self) -> Option<[T; 2]> {
         match self {
-            Joint::Revolute => nalgebra::zero(),
-            Joint::Linear => nalgebra::one(),
-            Joint::Free => unreachable!("equations with s_j are for one-degree-of-freedom joints"),
+            Joint::Revolute => Some([nalgebra::one(), nalgebra::zero()]),
+            Joint::Linear => Some([nalgebra::zero(), nalgebra::one()]),
+            Joint::Free => None,
         }
     }
 
     /// Number of position coordinates.
     pub const fn nq(self) -> usize {
-        match self {
-            Joint::Revolute | Joint::Linear => 1,
-            Joint::Free => 7,
+        if matches!(self, Joint::Free) {
+            7
+        } else {
+            1
         }
     }
 
     /// Number of velocity coordinates.
     pub const fn nv(self) -> usize {
-        match self {
-            Joint::Revolute | Joint::Linear => 1,
-            Joint::Free => 6,
+        if matches!(self, Joint::Free) {
+            6
+        } else {
+            1
         }
     }
 }
