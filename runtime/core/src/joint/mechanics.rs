@@ -144,3 +144,98 @@ pub(crate) trait Mechanics<T: Real> {
         change.iter_mut().zip(qd).for_each(|(change, qd)| *change = *qd * h);
     }
 }
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::joint::{JointKind, KINDS};
+    use crate::spatial::Sym3;
+    use std::vec::Vec;
+
+    /// A joint of which nothing is known but its pose and its motion subspace.
+    struct Plain(JointKind);
+
+    impl Mechanics<f64> for Plain {
+        fn motion(&self, q: &[f64]) -> Transform<f64> {
+            self.0.mechanics().motion(q)
+        }
+
+        fn column(&self, k: usize, q: &[f64]) -> MotionVector<f64> {
+            self.0.mechanics().column(k, q)
+        }
+    }
+
+    fn vector(k: usize) -> Vec3<f64> {
+        let x = |i: usize| ((k * 3 + i) as f64 * 0.618).fract() * 2.0 - 0.9;
+        Vec3::new(x(0), x(1), x(2))
+    }
+
+    fn twist(k: usize) -> MotionVector<f64> {
+        MotionVector { angular: vector(k), linear: vector(k + 1) }
+    }
+
+    fn numbers(vectors: &[Vec3<f64>]) -> Vec<f64> {
+        vectors.iter().flat_map(|v| v.to_array()).collect()
+    }
+
+    /// Everything that sweeps ask of a joint that carries some bodies, as one list.
+    fn answers(joint: &dyn Mechanics<f64>, kind: JointKind, q: &[f64]) -> Vec<f64> {
+        let (nv, mut all) = (kind.nv(), Vec::new());
+        let qd: Vec<f64> = (0..nv).map(|k| 0.3 - 0.2 * k as f64).collect();
+        let qdd: Vec<f64> = (0..nv).map(|k| 0.7 * k as f64 - 0.4).collect();
+        let r = Mat3::about_z(0.6, 0.8);
+        let second_moment = Sym3 { xx: 2.0, xy: 0.1, xz: -0.3, yy: 1.5, yz: 0.2, zz: 1.2 };
+        let bodies = Composite { mass: 2.5, first_moment: vector(4), second_moment };
+        let placement = Transform { rotation: Mat3::about_z(0.28, 0.96), translation: vector(2) };
+        let pose = joint.pose(0, &placement, false, q);
+        let wrench = ForceVector { moment: vector(5), force: vector(6) };
+        all.extend(numbers(&[pose.to_parent(vector(1)), pose.wrench_to_parent(&wrench).moment]));
+        let moved = pose.motion_to_child(&twist(3));
+        all.extend(numbers(&[moved.angular, moved.linear]));
+        for k in 0..nv {
+            let added = joint.add(k, twist(7), q, 0.4);
+            let (linear, angular) = joint.world_column(k, q, &r, vector(8));
+            all.extend(numbers(&[added.angular, added.linear, linear, angular]));
+            all.push(joint.along(k, q, &wrench));
+            let back = pose.composite_back(&bodies);
+            let column = joint.wrench_back(k, [&bodies, &back], &pose, q);
+            let column = pose.placed_wrench(&column);
+            all.extend(numbers(&[column.moment, column.force]));
+            let inertia = ArticulatedInertia::of_body(&bodies);
+            for rotor in [None, Some(0.5)] {
+                let (free, rest) = joint.free((k, q), &inertia, (rotor, 1.3), 0);
+                let felt = rest.wrench_of(&twist(9));
+                all.extend(numbers(&[free.moment_per_inertia, free.force_per_inertia, felt.moment, felt.force]));
+                all.push(free.rate);
+            }
+        }
+        let mut block = std::vec![0.0; nv * nv];
+        joint.block(&bodies, q, nv, &mut |i, j, x| (block[i * nv + j], block[j * nv + i]) = (x, x));
+        all.extend(block);
+        let added = joint.add_all(twist(1), q, &qd);
+        let v = joint.world_velocity(twist(2), &r, [q, &qd]);
+        let (omega, alpha, a) = joint.world_acceleration((vector(3), vector(4), vector(5)), &r, [q, &qd, &qdd]);
+        let (w, e) = joint.spin((vector(6), vector(7)), [q, &qd, &qdd]);
+        all.extend(numbers(&[added.angular, added.linear, v.angular, v.linear, omega, alpha, a, w, e]));
+        // without the field, by which a joint that slides takes the acceleration from its frame's origin
+        let field = Mat3 { rows: [[0.0; 3]; 3] };
+        let own = joint.acceleration(vector(8), [vector(6), w], &field, [q, &qd, &qdd]);
+        all.extend(numbers(&[own]));
+        all
+    }
+
+    #[test]
+    fn what_a_joint_does_in_a_form_of_its_own_follows_from_its_pose_and_its_motion_subspace() {
+        for kind in KINDS {
+            let mut q = kind.row().neutral.to_vec();
+            q.iter_mut().enumerate().for_each(|(k, q)| *q += 0.4 - 0.15 * k as f64);
+            kind.normalise(&mut q);
+            let (own, plain) = (answers(kind.mechanics(), *kind, &q), answers(&Plain(*kind), *kind, &q));
+            assert_eq!(own.len(), plain.len());
+            for (i, (own, plain)) in own.iter().zip(&plain).enumerate() {
+                assert!((own - plain).abs() < 1e-14, "{}: answer {i} is {own}, not {plain}", kind.row().name);
+            }
+        }
+    }
+}

@@ -26,8 +26,8 @@ pub(super) struct Revolute;
 
 impl<T: Real> Mechanics<T> for Revolute {
     fn motion(&self, q: &[T]) -> Transform<T> {
-        let ((s, c), x) = (q[0].sin_cos(), Transform::identity());
-        Transform { rotation: x.rotation.turned(s, c), ..x }
+        let (s, c) = q[0].sin_cos();
+        Transform { rotation: Mat3::about_z(s, c), translation: Vec3::zero() }
     }
 
     fn column(&self, _: usize, _: &[T]) -> MotionVector<T> {

@@ -19,6 +19,12 @@ impl<T: Real> Mat3<T> {
         Mat3 { rows: [[i, o, o], [o, i, o], [o, o, i]] }
     }
 
+    /// R_z: the turn about z by the angle with this sine and cosine.
+    pub fn about_z(sin: T, cos: T) -> Self {
+        let (o, i) = (T::zero(), T::one());
+        Mat3 { rows: [[cos, -sin, o], [sin, cos, o], [o, o, i]] }
+    }
+
     /// A matrix from its columns.
     pub fn from_columns(a: Vec3<T>, b: Vec3<T>, c: Vec3<T>) -> Self {
         Mat3 { rows: [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]] }
