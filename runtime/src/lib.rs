@@ -82,7 +82,7 @@ pub mod batch;
 #[cfg(feature = "std")]
 mod dispatch;
 
-pub use straightline_core::{control, integrate, Dd, Dual, Real};
+pub use straightline_core::{control, integrate, phases, Dd, Dual, Real};
 #[cfg(feature = "derive")]
 pub use straightline_macros::{dynamics, Dynamics};
 

@@ -180,32 +180,36 @@ pub fn words(dialect: Dialect) -> impl Iterator<Item = (JointKind, &'static Word
     JointKind::ALL.iter().flat_map(of_kind).filter(move |(_, word)| word.dialects.contains(&dialect))
 }
 
-/// The kinds, and what goes by kind: the one place that tells them apart.
+/// The kinds, and what goes by kind: the one place that tells them apart. A row is a file and the type in it; a kind with numbers of its own, such
+/// as a pitch, has them in that type: `screw::Screw(screw: Screw = Screw::of(0.0))`.
 macro_rules! joints {
-    ($($(#[$about:meta])* $module:ident::$Name:ident,)+) => {
+    (@$own:ident $module:ident::$Name:ident) => { $own };
+    (@$module:ident::$Name:ident) => { &$module::$Name };
+    ($($(#[$about:meta])* $module:ident::$Name:ident $(($own:ident: $Own:ident = $zero:expr))?,)+) => {
+        $($(pub use $module::$Own;)?)+
         $(mod $module;)+
 
         /// How a body moves against its parent.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum JointKind {
-            $($(#[$about])* $Name,)+
+            $($(#[$about])* $Name $(($Own))?,)+
         }
 
         impl JointKind {
             /// All kinds.
-            pub const ALL: &'static [JointKind] = &[$(JointKind::$Name),+];
+            pub const ALL: &'static [JointKind] = &[$(JointKind::$Name $(($zero))?),+];
 
             /// Its row of the table.
             pub const fn row(self) -> &'static Descriptor {
                 match self {
-                    $(JointKind::$Name => &$module::ROW,)+
+                    $(JointKind::$Name { .. } => &$module::ROW,)+
                 }
             }
 
             /// Its mechanics.
             pub(crate) fn mechanics<T: crate::Real>(&self) -> &dyn Mechanics<T> {
                 match self {
-                    $(JointKind::$Name => &$module::$Name,)+
+                    $(JointKind::$Name $(($own))? => joints!(@$($own)? $module::$Name),)+
                 }
             }
         }
