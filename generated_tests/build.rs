@@ -2,16 +2,18 @@
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use straightline_codegen::compile::{compile, Generated, Options};
+use straightline_codegen::choices::{Lanes, LimbForm};
+use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::Source;
-use straightline_codegen::emit::{Lanes, Scalar};
+use straightline_codegen::emit::Generated;
 use straightline_codegen::expr::Grade;
-use straightline_codegen::limbs::LimbForm;
+use straightline_codegen::function::ContactFunction;
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::options::Options;
 use straightline_codegen::scene::contact::{ContactItem, EnvironmentItem, EnvironmentKind, SurfaceItem};
-use straightline_codegen::scene::{ContactFunction, Contacts, Parameter, Scene};
+use straightline_codegen::scene::{Contacts, Parameter, Scene};
 use straightline_codegen::schedule::Limits;
-use straightline_codegen::Function;
+use straightline_codegen::{Function, Scalar};
 use straightline_core::contact::Coordinate;
 
 /// Robot, its file, whether it floats, its frames; as in `reference/robots.json`.

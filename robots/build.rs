@@ -1,8 +1,7 @@
 //! Generates the dynamics of every robot from its description.
 
-use straightline_codegen::builder::Error;
-use straightline_codegen::emit::Scalar;
-use straightline_codegen::Builder;
+use straightline_codegen::fronts::builder::Error;
+use straightline_codegen::{Builder, Scalar};
 
 const FEET: [&str; 4] = ["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"];
 

@@ -5,8 +5,7 @@
 //! another one. What a language or the generated file itself needs for something else gets a word more (`box` of a body becomes
 //! `box_body`); two names that become one are for the caller to refuse.
 
-use crate::function::{higher_rate, Function};
-use crate::scene::ContactFunction;
+use crate::function::{higher_rate, ContactFunction, Function};
 use deunicode::deunicode_with_tofu;
 
 /// An identifier has at most so many characters, without what it gets for being reserved.
@@ -484,6 +483,11 @@ fn escaped(c: char) -> Option<String> {
             '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}'
             | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}');
     is_invisible.then(|| c.escape_default().to_string())
+}
+
+/// The last part of a path.
+pub fn file_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
 #[cfg(test)]

@@ -4,9 +4,10 @@
 //! `mass_matrix`, `forward_dynamics`.
 
 use std::path::Path;
-use straightline_codegen::compile::{optimised, Optimisations, Options};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::options::{Optimisations, Options};
+use straightline_codegen::program::optimised;
 use straightline_codegen::Function;
 use straightline_generated_tests::programs;
 

@@ -5,7 +5,7 @@
 //! The functions as they are generated with `limbs = "apart"` and `limbs = "lanes"`, in one program that first checks that their
 //! results agree, then times calls warm and cold; bytes of machine code by `nm -S`.
 
-use straightline_codegen::limbs::LimbForm;
+use straightline_codegen::choices::LimbForm;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::{compile, Function, Generated, Options, Source};
 use straightline_generated_tests::standalone::{run, Folder};

@@ -4,14 +4,13 @@ use crate::reference::{description, folder};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
-use straightline_codegen::function::Robot as Loaded;
+use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::model::ModelOptions;
-use straightline_codegen::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::mass_centre_tree;
 use straightline_core::contact::{Contact, Coordinate, Object, Surface};
-use straightline_core::reference as chapter;
 use straightline_core::reference::{at_rest, Component, ContactFrames, MassCentreTree};
 use straightline_core::spatial::{Mat3, Transform, Vec3};
-use straightline_core::Dd;
+use straightline_core::{reference as chapter, Dd};
 
 /// A case with its numbers still as text.
 #[derive(Debug)]

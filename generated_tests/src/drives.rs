@@ -2,11 +2,13 @@
 
 use crate::reference::{description, numbers};
 use serde_json::Value;
-use straightline_codegen::compile::{optimised, Optimisations, Options};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
-use straightline_codegen::function::{DriveFunction, Robot};
+use straightline_codegen::function::DriveFunction;
 use straightline_codegen::model::{self, ModelOptions};
+use straightline_codegen::options::{Optimisations, Options};
+use straightline_codegen::program::optimised;
 use straightline_codegen::scene::{self, Scene};
 use straightline_codegen::Function;
 use straightline_core::{Dd, Real};

@@ -2,10 +2,12 @@
 
 use crate::made::Made;
 use crate::reference::Robot;
-use straightline_codegen::compile::{self, Options, Program};
+use straightline_codegen::compile;
 use straightline_codegen::diagnostic::Source;
-use straightline_codegen::function::Robot as Loaded;
+use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::model::{self, ModelOptions};
+use straightline_codegen::options::Options;
+use straightline_codegen::program::Program;
 use straightline_codegen::{expr, Function};
 use straightline_core::{Dd, Real};
 

@@ -6,7 +6,7 @@ use crate::roll_pitch_yaw::rotation;
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write;
 use straightline_codegen::diagnostic::Source;
-use straightline_codegen::function::Robot as Loaded;
+use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::model::ModelOptions;
 use straightline_core::reference::{ExtendedPosition, Joint, MassCentreFrame, MassCentreLink, MassCentreTree};
 use straightline_core::Dd;

@@ -14,7 +14,7 @@ use std::time::Instant;
 use straightline_codegen::description;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::ModelOptions;
-use straightline_codegen::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::mass_centre_tree;
 use straightline_core::reference::{inverse_dynamics, natural_scale, MassCentreTree};
 use straightline_core::Dd;
 use straightline_robots::panda;

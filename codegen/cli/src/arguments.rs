@@ -7,17 +7,15 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use straightline_cli::experiment::parameter::{self, Range, Sweep};
 use straightline_codegen::certify::Effort;
-use straightline_codegen::compile::Options;
+use straightline_codegen::choices::{Choice, Lanes, LimbForm};
 use straightline_codegen::diagnostic::{Diagnostic, Front, Level, Levels, Reporting};
-use straightline_codegen::emit::{Lanes, Scalar};
 use straightline_codegen::expr::Grade;
 use straightline_codegen::identifier::is_prefix;
-use straightline_codegen::limbs::LimbForm;
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::options::Options;
 use straightline_codegen::scene::MaxError;
 use straightline_codegen::schedule::Limits;
-use straightline_codegen::words::Choice;
-use straightline_codegen::{ForwardDynamicsMethod, Function};
+use straightline_codegen::{ForwardDynamicsMethod, Function, Scalar};
 use straightline_simulation::optimize::Objective;
 
 const EXIT_CODES: &str = "\

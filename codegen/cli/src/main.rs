@@ -16,9 +16,11 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 use straightline_cli::html;
-use straightline_codegen::compile::{compile, explain, Generated, Options};
+use straightline_codegen::compile::{compile, explain};
 use straightline_codegen::diagnostic::{self, codes, Diagnostics, Severity, Source};
-use straightline_codegen::{description, export, identifier, model, output, scene, verify};
+use straightline_codegen::emit::{c_package as export, Generated};
+use straightline_codegen::options::{check_options, Options};
+use straightline_codegen::{description, identifier, model, output, scene, verify};
 
 /// Why a command ended early; what there is to say was said where it happened, except for [`Failure::Files`].
 enum Failure {
@@ -160,7 +162,7 @@ fn check(a: &Check) -> Result<(), Failure> {
         let mut diagnostics = Diagnostics::reporting(&options.reporting);
         let description = description::read(&source, &mut diagnostics);
         let model = description.as_ref().and_then(|d| model::build(d, &model_options, &mut diagnostics));
-        scene::check_options(&options, &mut diagnostics);
+        check_options(&options, &mut diagnostics);
         let model = model.and_then(|model| scene::apply(model, &options.scene, &mut diagnostics));
         model::finish(&mut diagnostics);
         print::diagnostics(&diagnostics, Severity::Note);

@@ -10,17 +10,17 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Mutex;
 use straightline_cli::experiment::design::Design;
 use straightline_cli::experiment::{self, parameter, parquet, Experiment};
-use straightline_codegen::compile::Options;
 use straightline_codegen::description::{self, Description};
 use straightline_codegen::diagnostic::{six_digits, Diagnostic, Diagnostics, Severity};
-use straightline_codegen::singular::{self, Inertia};
+use straightline_codegen::model::singular::Inertia;
+use straightline_codegen::options::{check_options, Options};
+use straightline_codegen::program::demand_inertia::demand_inertia_for;
 use straightline_codegen::{model, scene};
 use straightline_core::model::{Body, Model};
 use straightline_core::Dd;
 use straightline_simulation::advice::{advise, affordable, Advice};
 use straightline_simulation::analysis::{self, Analysis};
 use straightline_simulation::command::Command;
-use straightline_simulation::contact as in_contact;
 use straightline_simulation::drive_analysis::{DriveAnalysis, DriveFigures, Heating};
 use straightline_simulation::drives::{further_derivatives, state_of_motion};
 use straightline_simulation::html::four_digits;
@@ -28,8 +28,8 @@ use straightline_simulation::motion::Motion;
 use straightline_simulation::optimize::{self, Sampled};
 use straightline_simulation::plant::Plant;
 use straightline_simulation::plot::{Line, Plot};
-use straightline_simulation::simulate;
 use straightline_simulation::table::Table;
+use straightline_simulation::{contact as in_contact, simulate};
 
 /// Size of a plot in pixels.
 const PLOT: (u32, u32) = (900, 340);
@@ -116,10 +116,10 @@ fn robot(path: &Path, args: &ModelArgs, moved: bool) -> Result<(Description, Opt
     let source = read(path)?;
     let mut diagnostics = Diagnostics::reporting(&options.reporting);
     let description = description::read(&source, &mut diagnostics);
-    scene::check_options(&options, &mut diagnostics);
+    check_options(&options, &mut diagnostics);
     let model = description.as_ref().and_then(|d| built_in_full(d, &options, &mut diagnostics));
     if let (Some(model), true) = (&model, moved) {
-        singular::demand_inertia_for("a simulation is", model, Inertia::WithDrives, &mut diagnostics);
+        demand_inertia_for("a simulation is", model, Inertia::WithDrives, &mut diagnostics);
     }
     print::diagnostics(&diagnostics, Severity::Warning);
     let model = model.filter(|_| !diagnostics.has_errors()).map(|model| model.cast());

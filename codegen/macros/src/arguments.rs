@@ -3,10 +3,9 @@
 use crate::scene::InlineScene;
 use proc_macro2::{Span, TokenTree};
 use straightline_codegen::certify::Effort;
-use straightline_codegen::description::messages::did_you_mean;
+use straightline_codegen::choices::{Choice, Lanes};
+use straightline_codegen::diagnostic::wording::did_you_mean;
 use straightline_codegen::diagnostic::{Level, Levels};
-use straightline_codegen::emit::Lanes;
-use straightline_codegen::words::Choice;
 use straightline_codegen::Options;
 use syn::parse::{Parse, ParseStream};
 use syn::punctuated::Punctuated;

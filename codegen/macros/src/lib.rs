@@ -12,8 +12,11 @@ use quote::{quote, quote_spanned};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use straightline_codegen::expansion::{associated_items, examine, expand, needs_a_module, Expansion, Refusal, SceneOf};
-use straightline_codegen::{stubs, Function, Generated, Options};
+use straightline_codegen::fronts::expansion::{
+    associated_items, examine, expand, needs_a_module, Expansion, Refusal, SceneOf,
+};
+use straightline_codegen::fronts::stubs;
+use straightline_codegen::{Function, Generated, Options};
 use syn::{parse_macro_input, DeriveInput, Error};
 
 /// Gives a type the dynamics of a robot as associated constants and functions; see the package `straightline`.

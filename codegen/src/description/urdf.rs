@@ -9,6 +9,7 @@ use super::{
     messages, Angle, AngleUnit, Description, Format, Inertial, Joint, JointDrive, JointFrameNotation, JointLimits,
     JointType, Link, Notation, Pose, Rotation, Value,
 };
+use crate::diagnostic::wording::closest;
 use crate::diagnostic::{Diagnostics, Source};
 use roxmltree::{Attribute, Document, Node, ParsingOptions};
 use std::borrow::Cow;
@@ -267,7 +268,7 @@ fn skip(reader: &mut Reader, owner: &str, node: Node, known: &[&str]) {
     ];
     let name = node.tag_name().name();
     if !HARMLESS.contains(&name) && node.tag_name().namespace().is_none() {
-        if let Some(known) = messages::closest(name, known.iter().copied()).filter(|k| k.len() > 3) {
+        if let Some(known) = closest(name, known.iter().copied()).filter(|k| k.len() > 3) {
             reader.complain(&tag(node), messages::misspelt_element(owner, name, known));
             return;
         }

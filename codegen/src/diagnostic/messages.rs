@@ -3,7 +3,7 @@
 use super::codes::{self, Code};
 use super::levels::{Level, ALL_WARNINGS};
 use super::{Diagnostic, Severity};
-use crate::description::messages::{cut, did_you_mean};
+use crate::diagnostic::wording::{cut, did_you_mean};
 
 type D = Diagnostic;
 

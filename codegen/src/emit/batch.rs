@@ -2,6 +2,7 @@
 
 use super::body::ALLOW;
 use super::{function, Item, Style};
+use crate::choices::Lanes;
 use crate::identifier::upper_camel_case;
 use std::fmt::Write;
 use straightline_graph::expr::{Graph, Port, Section};
@@ -9,17 +10,6 @@ use straightline_graph::schedule::Schedule;
 
 /// The drivers' source, pasted as it is where generated code depends on `core` alone.
 const BATCH: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/core/src/batch.rs"));
-
-/// The functions over lanes and batches beside the plain ones: where the drivers of the batches come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Lanes {
-    /// Pasted into the output, which depends on `core` alone: batches use the vector instructions that the crate is compiled
-    /// for, and one thread.
-    Standalone,
-    /// The package `straightline`: the vector instructions of the machine at run time (its feature `std`), several threads
-    /// (its feature `rayon`).
-    Runtime,
-}
 
 /// The function over lanes, and what runs it on batches.
 pub fn lanes(

@@ -1,8 +1,8 @@
 //! The generated file: header, constants of the robot, functions, and the sine-cosine kernel they call.
 
-use super::batch::{self, Lanes};
 use super::body::ALLOW;
-use super::{fused, number, FunctionText, Scalar, Style};
+use super::{batch, fused, number, FunctionText, Scalar, Style};
+use crate::choices::Lanes;
 use crate::function::Function;
 use crate::identifier::{comment, string_literals};
 use crate::report::waterfall::signed;

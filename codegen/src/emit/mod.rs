@@ -5,19 +5,26 @@
 
 pub mod batch;
 mod body;
+pub mod c_package;
+pub mod contact;
+mod doc;
+pub mod error_bound;
 mod file;
 pub mod fused;
+pub mod generated;
 mod limbs;
 mod names;
 pub mod parameter;
+pub mod staged;
+mod style;
 
-pub use batch::Lanes;
 pub use body::{function, FunctionText};
 pub use file::{file, kernel, preamble, scalar_module, Item, Provenance, GENERIC};
+pub use generated::Generated;
 pub use names::Names;
 
 use straightline_graph::expr::Port;
-pub use straightline_graph::{element, element_of, Scalar};
+use straightline_graph::{element, Scalar};
 
 /// How a function is written: over one state or over lanes of states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,10 +2,18 @@
 
 use super::{number, FunctionText, Scalar};
 use crate::description::drives::Number;
+use crate::emit;
+use crate::equations::Robot;
 use crate::identifier::doc;
-use crate::readback::DriveNumbers;
+use crate::options::Options;
+use crate::program::equivalence::Disagreement;
+use crate::program::parameter::checked_parameter;
+use crate::program::written::{DriveNumbers, Written, WrittenParameter};
+use crate::scene::free_drive::FreeDrive;
+use crate::scene::Parameter;
 use std::fmt::Write;
 use straightline_core::Dd;
+use straightline_graph::schedule::schedule;
 
 /// The error type and the check that all bodies of a file share.
 pub fn check(scalar: Scalar) -> String {
@@ -220,4 +228,45 @@ fn rounded(x: Dd, scalar: Scalar) -> f64 {
         Scalar::F64 => x.to_f64(),
         Scalar::F32 => f64::from(x.to_f32()),
     }
+}
+
+/// The types of those run-time parameters that something takes, with what they share.
+pub(crate) fn parameter_types(
+    robot: &Robot,
+    options: &Options,
+    takes: &dyn Fn(&Parameter) -> bool,
+    written: &mut Vec<WrittenParameter>,
+) -> Result<String, Disagreement> {
+    let parameters = options.scene.parameters.iter().filter(|p| p.is_of(&robot.model) && takes(p));
+    let mut types = String::new();
+    for p in parameters {
+        let graph = checked_parameter(robot, p, options)?;
+        let (schedule, name) = (schedule(&graph, options.limits), p.input_name());
+        let drive = FreeDrive::new(p, &robot.model);
+        let doc = match &drive {
+            None => "The parameters about the origins, and in the axes, of the frames that the equations use.",
+            Some(_) => "The numbers of the drive that the equations use.",
+        };
+        let private = format!("{name}_parameters");
+        let constructor = emit::function(&graph, &schedule, &private, doc, options.style(), &|_| String::new());
+        let program = Written { name: private, graph, scalar: options.scalar, generic: false, lanes: false };
+        let scalars = p.scalars(&robot.model);
+        let (text, numbers) = match drive {
+            None => {
+                let frame = p.frame().unwrap_or_default();
+                (emit::parameter::body(&name, &p.type_name(), frame, scalars, &constructor, options.scalar), None)
+            }
+            Some(drive) => {
+                let numbers = DriveNumbers { nominal: drive.values(&drive.nominal()), numbers: drive.numbers };
+                let names = (&name[..], &p.type_name()[..], p.name());
+                (emit::parameter::drive(names, &numbers, &constructor, options.scalar), Some(numbers))
+            }
+        };
+        written.push(WrittenParameter { type_name: p.type_name(), program, numbers });
+        types.push_str(&text);
+    }
+    let is_there = |drive: bool| written.iter().any(|p| p.numbers.is_some() == drive);
+    let checks = [(false, emit::parameter::check as fn(Scalar) -> String), (true, emit::parameter::check_drive)];
+    let checks = checks.into_iter().filter(|(drive, _)| is_there(*drive)).map(|(_, text)| text(options.scalar));
+    Ok(checks.collect::<String>() + &types)
 }

@@ -6,7 +6,7 @@ use crate::description::{
     messages, Description, Format, Joint, JointDrive, JointFrameNotation, JointLimits, JointType, Value,
 };
 use crate::diagnostic::{Diagnostics, Place};
-use crate::singular::{singular_joints, Inertia};
+use crate::model::singular::{singular_joints, Inertia};
 use std::collections::HashMap;
 use straightline_core::joint::Measure;
 use straightline_core::model::{Coulomb, JointEffects, Limits, Model};

@@ -34,8 +34,11 @@ pub(crate) mod drives;
 mod flexible;
 pub(crate) mod geometry;
 mod joint_frames;
+pub mod limbs;
 mod mass_centres;
 pub(crate) mod merge;
+pub mod singular;
+pub mod states;
 
 use self::flexible::Carrier;
 use crate::description::flexible::{Flexible, Support};

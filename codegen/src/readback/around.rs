@@ -3,16 +3,18 @@
 use super::items::{Item, Items, Sort};
 use super::run::Known;
 use super::tokens::{self as t, Kind, Words};
-use super::{DriveNumbers, Stop};
-use crate::compile::Generated;
+use super::Stop;
+use crate::choices::Lanes;
 use crate::description::drives::{Must, Number};
-use crate::emit::{self, Lanes, Scalar};
+use crate::emit::Generated;
 use crate::identifier::string_literals;
-use crate::stable::fnv_1a;
+use crate::options::stable::fnv_1a;
+use crate::program::written::DriveNumbers;
 use rustc_hash::FxHashMap;
 use straightline_core::model::Limits;
 use straightline_core::Dd;
 use straightline_graph::expr::Port;
+use straightline_graph::Scalar;
 
 /// The sources of what is pasted.
 const TRIG: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/core/src/trig.rs"));
@@ -308,7 +310,7 @@ impl Around<'_, '_, '_> {
             let (n, m) = (count(&mut of_states.iter().copied()), count(&mut outputs.iter()));
             let body = if fused { format!("{name}_in_lanes::<N, FUSED>") } else { format!("{name}_lanes") };
             let text = format!(
-                "impl batch::Program<{s}, {n}, {m}> for {type_name}{any} {{
+                "impl batch::Written<{s}, {n}, {m}> for {type_name}{any} {{
                     #[inline(always)]
                     fn run<const N: usize, const FUSED: bool>(&self, x: &[[{s}; N]; {n}], y: &mut [[{s}; N]; {m}]) {{
                         let (mut x, mut y) = (x.as_slice(), y.as_mut_slice());
@@ -695,7 +697,7 @@ fn is_rounded_up(found: f64, bound: f64) -> bool {
 
 /// The first number of what is given, which arrays begin with.
 fn first_of<'a>(mut given: impl Iterator<Item = &'a Port>) -> String {
-    given.find(|p| !p.is_empty()).map_or("0.0".to_string(), |p| emit::element(p, 0))
+    given.find(|p| !p.is_empty()).map_or("0.0".to_string(), |p| straightline_graph::element(p, 0))
 }
 
 /// `[[f64; 7]; 6]`

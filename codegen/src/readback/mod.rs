@@ -15,110 +15,17 @@ mod run;
 mod tokens;
 mod values;
 
-use crate::compile::Generated;
-use crate::description::drives::Number;
 use crate::diagnostic::{Diagnostic, Diagnostics};
-use crate::emit::Scalar;
+use crate::emit::Generated;
+use crate::program::written::Written;
 use around::Around;
 use items::{Extent, Items, Sort, Type};
 use run::{count_of, Run, Thing};
 use rustc_hash::FxHashMap;
 use std::fmt;
-use straightline_core::Dd;
 use straightline_graph::expr::{Graph, Port};
 use tokens::{Kind, Words};
 use values::{Format, Value, Values};
-
-/// A function that a text is to have.
-#[derive(Clone, Debug)]
-pub struct Program {
-    /// Its name.
-    pub name: String,
-    /// What it computes.
-    pub graph: Graph,
-    /// Its scalar type.
-    pub scalar: Scalar,
-    /// Whether it takes any scalar.
-    pub generic: bool,
-    /// Whether there is one over lanes beside it, in the file's scalar, and batches.
-    pub lanes: bool,
-}
-
-/// The type of a run-time parameter, and the program of its constructor.
-#[derive(Clone, Debug)]
-pub struct ParameterProgram {
-    /// The name of the type.
-    pub type_name: String,
-    /// The private function.
-    pub program: Program,
-    /// Of a drive, its free numbers.
-    pub numbers: Option<DriveNumbers>,
-}
-
-/// The free numbers of a drive.
-#[derive(Clone, Debug)]
-pub struct DriveNumbers {
-    /// What they are, with their values in the robot file.
-    pub numbers: Vec<Number>,
-    /// What functions take for the values of the robot file.
-    pub nominal: Vec<Dd>,
-}
-
-/// A stage: a type around stored values.
-#[derive(Clone, Debug)]
-pub struct StageProgram {
-    /// The name of the type.
-    pub type_name: String,
-    /// The name of its values where others take them.
-    pub values: String,
-    /// What it stores.
-    pub program: Program,
-}
-
-/// The programs of a staged form.
-#[derive(Clone, Debug)]
-pub struct StagedPrograms {
-    /// The stages that store something, the rarest first.
-    pub stages: Vec<StageProgram>,
-    /// The functions, each with the stage whose method it is.
-    pub functions: Vec<(usize, Program)>,
-}
-
-/// The programs of a contact mode.
-#[derive(Clone, Debug)]
-pub struct ModePrograms {
-    /// Its module.
-    pub identifier: String,
-    /// Its constrained and its free coordinates.
-    pub coordinates: [Vec<String>; 2],
-    /// Its functions.
-    pub functions: Vec<Program>,
-}
-
-/// All programs that a text is to have.
-#[derive(Clone, Debug, Default)]
-pub struct Programs {
-    /// The functions of the robot, and the bounds of their errors.
-    pub functions: Vec<Program>,
-    /// Run-time parameters.
-    pub parameters: Vec<ParameterProgram>,
-    /// The staged form.
-    pub staged: Option<StagedPrograms>,
-    /// Contact modes, in order.
-    pub modes: Vec<ModePrograms>,
-}
-
-impl Programs {
-    /// All of them.
-    pub fn all(&self) -> impl Iterator<Item = &Program> {
-        let staged = self.staged.iter().flat_map(|staged| {
-            let stages = staged.stages.iter().map(|stage| &stage.program);
-            stages.chain(staged.functions.iter().map(|(_, program)| program))
-        });
-        let modes = self.modes.iter().flat_map(|mode| &mode.functions);
-        self.functions.iter().chain(self.parameters.iter().map(|p| &p.program)).chain(staged).chain(modes)
-    }
-}
 
 /// Where a text is not what it was to be.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -283,7 +190,7 @@ impl<'g> Part<'g> {
         part
     }
 
-    fn want(&mut self, path: &[&str], program: &'g Program, public: bool, words: &mut Words) {
+    fn want(&mut self, path: &[&str], program: &'g Written, public: bool, words: &mut Words) {
         let path: Vec<u32> = self.module.iter().chain(path).map(|m| words.number(m)).collect();
         let format = if program.generic { Format::Any } else { Format::from(program.scalar) };
         let wanted = self.wanted_in(program, format, words);
@@ -301,7 +208,7 @@ impl<'g> Part<'g> {
         self.wanted.push(Wanted { path, public, word: words.number(&name), name, lanes: true, ..wanted });
     }
 
-    fn wanted_in_name(&self, program: &'g Program, format: Format) -> Wanted<'g> {
+    fn wanted_in_name(&self, program: &'g Written, format: Format) -> Wanted<'g> {
         let Graph { inputs, outputs, .. } = &program.graph;
         Wanted {
             path: Vec::new(),
@@ -318,7 +225,7 @@ impl<'g> Part<'g> {
     }
 
     /// The results of a program in a format.
-    fn wanted_in(&mut self, program: &'g Program, format: Format, words: &mut Words) -> Wanted<'g> {
+    fn wanted_in(&mut self, program: &'g Written, format: Format, words: &mut Words) -> Wanted<'g> {
         let mut given = Vec::new();
         for port in &program.graph.inputs {
             let name = words.number(&port.name);

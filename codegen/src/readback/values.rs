@@ -3,9 +3,9 @@
 //! Signs stand beside the numbers, as a change of sign is exact: (−a)·b is −(a·b), a − b is a + (−b), bit for bit, and so may factors and
 //! terms of one operation change places. Nothing else is taken as equal: (a + b) + c is not a + (b + c).
 
-use crate::emit::Scalar;
 use rustc_hash::FxHashMap;
 use straightline_graph::expr::{Binary, Graph, NodeId, Op, Unary, Width};
+use straightline_graph::Scalar;
 
 /// In which format a value is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

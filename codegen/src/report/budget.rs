@@ -2,16 +2,16 @@
 
 use super::errors::ErrorReport;
 use super::waterfall::robot_in;
-use crate::compile::{checked, Options, Program};
 use crate::diagnostic::Diagnostics;
-use crate::emit::{element_of, Scalar};
 use crate::function::Function;
-use crate::scene::messages as say;
-use crate::scene::{Budget, Coulomb, Effects, Gravity, MaxError, Misfit, Scene, Zero};
+use crate::options::Options;
+use crate::program::{checked, Program};
+use crate::scene::{messages as say, Budget, Coulomb, Effects, Gravity, MaxError, Misfit, Scene, Zero};
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::expr::{NodeId, Op};
+use straightline_graph::{element_of, Scalar};
 
 /// Of the things that could be held, so many are named.
 const REMEDIES: usize = 3;

@@ -1,13 +1,7 @@
 //! Certified bounds of errors, as they stand in the generated file and in reports.
 
-use crate::emit::{number, Scalar};
-use std::fmt::Write;
 use straightline_graph::certify::Certificate;
 use straightline_graph::expr::Port;
-
-/// Why programs by exact rules alone have no bounds: their exact values are not those of the robot.
-pub(crate) const ROUNDED: &str =
-    "its constants are rounded one by one, as the generic runtime holds them: what that does to the robot is not bounded";
 
 /// Certified bounds of a function's errors, or why there are none.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +31,7 @@ pub struct OutputErrors {
     pub magnitudes: Vec<f64>,
 }
 
+/// Numbers as a nested array, rounded up to four digits.
 impl ErrorReport {
     /// From a certificate over these ranges.
     pub fn new(outputs: &[Port], ranges: Vec<String>, certificate: Certificate) -> Self {
@@ -62,50 +57,6 @@ impl ErrorReport {
     /// The bounds of all results, in their order.
     pub fn bounds(&self) -> impl Iterator<Item = f64> + '_ {
         self.outputs.iter().flat_map(|o| o.bounds.iter().copied())
-    }
-
-    /// The constants of a function in the generated file.
-    pub fn constants(&self, function: &str) -> String {
-        let mut out = String::new();
-        if let Some(refused) = self.refused {
-            let _ = writeln!(out, "// No certified bound of the errors of {function}: {refused}.");
-        }
-        for output in &self.outputs {
-            let name = self.constant_name(function, output);
-            let _ = writeln!(
-                out,
-                "/// Certified bound of the errors of [`{function}`]: how far `{}` can be from the exact dynamics of the robot file.\n///\n\
-                 /// Numbers of the file are the nearest f64; angles that were taken as exact are exact.",
-                output.name
-            );
-            let _ = writeln!(out, "///\n/// It holds for all inputs in these ranges:");
-            for line in &self.ranges {
-                let _ = writeln!(out, "/// * {}", line.replace('[', "\\[").replace(']', "\\]"));
-            }
-            let kind = Port::new(&output.name, &output.shape);
-            let kind = crate::emit::array_type(&kind, crate::emit::Scalar::F64);
-            let mut bounds = output.bounds.iter();
-            let values = nested(&output.shape, &mut bounds);
-            let _ = writeln!(out, "#[allow(clippy::all)]\npub const {name}: {kind} = {values};");
-        }
-        out
-    }
-
-    /// The name of an output's constant.
-    pub fn constant_name(&self, function: &str, output: &OutputErrors) -> String {
-        let output = if self.outputs.len() == 1 { String::new() } else { format!("_{}", output.name.to_uppercase()) };
-        format!("{}{output}_ERROR_BOUND", function.to_uppercase())
-    }
-}
-
-/// Numbers as a nested array, rounded up to four digits.
-fn nested<'a>(shape: &[usize], numbers: &mut impl Iterator<Item = &'a f64>) -> String {
-    match shape.split_first() {
-        None => numbers.next().map_or(String::new(), |x| number(four_digits(*x), Scalar::F64)),
-        Some((n, rest)) => {
-            let parts: Vec<String> = (0..*n).map(|_| nested(rest, numbers)).collect();
-            format!("[{}]", parts.join(", "))
-        }
     }
 }
 

@@ -1,18 +1,19 @@
 //! What was generated, in numbers.
 
 pub mod budget;
+pub mod certificates;
 pub mod errors;
 pub mod waterfall;
 
-use crate::compile::Program;
-use crate::emit::Scalar;
-use crate::forward_method::MethodChoice;
+use crate::equations::forward_method::MethodChoice;
 use crate::function::Function;
-use crate::staged::StagedReport;
+use crate::program::staged::StagedReport;
+use crate::program::Program;
 use budget::Measures;
 use errors::ErrorReport;
 use std::collections::BTreeMap;
 use straightline_graph::expr::Counts;
+use straightline_graph::Scalar;
 use waterfall::Waterfall;
 
 /// Figures of one generated function.

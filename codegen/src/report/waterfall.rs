@@ -4,9 +4,11 @@
 //! other for the robot as its file has it, then the scene's items are added one after the other. What an item saves so
 //! depends on those before it; the sum does not.
 
-use crate::compile::{optimised, Optimisations, Options};
 use crate::diagnostic::Diagnostics;
-use crate::function::{Function, Robot};
+use crate::equations::Robot;
+use crate::function::Function;
+use crate::options::{Optimisations, Options};
+use crate::program::optimised;
 use crate::scene::{apply, Base, Coulomb, Effects, Gravity, Parameter, Part, Scene};
 use straightline_core::model::Model;
 use straightline_core::Dd;

@@ -1,20 +1,16 @@
 //! What can be wrong with a scene: by itself, beside the options, and with a robot.
 
-use super::check_contact;
 use super::contact::ContactItem;
-use super::messages::{self as say, unphysical_moments};
-use super::{Base, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Scene};
-use crate::compile::Options;
+use super::messages::unphysical_moments;
+use super::{check_contact, messages as say, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Scene};
 use crate::diagnostic::Diagnostics;
 use crate::function::Function;
 use crate::identifier::UNNAMED;
-use crate::limbs::LimbForm;
 use crate::model::geometry::principal_moments;
 use crate::model::{is_gravity, GRAVITY};
 use straightline_core::model::Model;
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
-use straightline_graph::expr::Grade;
 
 /// A principal moment may exceed the sum of the others by so much, relatively: the digits of published tensors.
 const MOMENT_DIGITS: f64 = 1e-6;
@@ -132,53 +128,6 @@ fn ranges_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
         if scene.gravity != Gravity::Input {
             places.complain("numbers.ranges.gravity", say::range_alone("gravity"), diagnostics);
         }
-    }
-}
-
-/// What reading the scene's file found, or else what the scene and the options beside it contradict each other in. Scenes from
-/// files are read into options by [`SceneFile::into_options`](super::SceneFile::into_options), which cannot contradict itself.
-pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
-    let scene = &options.scene;
-    diagnostics.extend(scene.places.complaints().clone());
-    if scene.places.complaints().has_errors() {
-        return;
-    }
-    if let Some(source) = scene.places.source() {
-        diagnostics.add_source(source);
-    }
-    for (i, scalar) in options.also.iter().enumerate() {
-        if *scalar == options.scalar || options.also[..i].contains(scalar) {
-            scene.places.complain("numbers.scalar", say::scalar_twice(scalar.name()), diagnostics);
-        }
-    }
-    if scene.gravity != Gravity::OfRobot && options.model.gravity.is_some() {
-        scene.places.complain("hold.gravity", say::said_twice("gravity"), diagnostics);
-    }
-    if scene.base == Base::Fixed && options.model.floating_base {
-        scene.places.complain("hold.base", say::said_twice("the base"), diagnostics);
-    }
-    if scene.base == Base::Moving && options.functions.iter().any(|f| f.is_forward()) {
-        scene.places.complain("hold.base", say::moving_base_forward(), diagnostics);
-    }
-    for (function, _) in scene.budgets.iter().filter(|(_, b)| b.mixed_precision) {
-        let path = format!("budget.{}.mixed_precision", function.name());
-        let in_lanes = options.limbs == LimbForm::Lanes;
-        for (with, is_asked) in
-            [("`fma`", options.fma), ("`generic`", options.generic), ("`limbs = \"lanes\"`", in_lanes)]
-        {
-            if is_asked {
-                scene.places.complain(&path, say::mixed_elsewhere(with), diagnostics);
-            }
-        }
-    }
-    if options.limbs == LimbForm::Lanes && options.grade == Grade::Exact {
-        scene.places.complain("outputs.limbs", say::limbs_exact(), diagnostics);
-    }
-    // of a file this was said when it was read, whatever functions of it are asked for
-    let is_alone = |function: &&Function| scene.places.source().is_none() && !options.functions.contains(function);
-    for function in scene.budgets.keys().filter(is_alone) {
-        let name = function.name();
-        scene.places.complain(&format!("budget.{name}"), say::budget_alone(name), diagnostics);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Every text that can be said of a scene, one function per message; what its TOML shares with robot files stands in
 //! [`crate::description::messages`]. The tests in `tests/messages/scene` hold the exact text of each.
 
-use crate::description::messages::{cut, did_you_mean, list, six_digits};
+use crate::diagnostic::wording::{cut, did_you_mean, list, six_digits};
 use crate::diagnostic::Diagnostic;
 
 /// The codes of all messages of this table.

@@ -5,20 +5,19 @@
 //! ([`Scene::outputs`]); folding and dead code do the rest.
 
 mod apply;
-mod bind;
 mod check;
 mod check_contact;
 pub mod contact;
 pub mod free_drive;
 pub mod messages;
+pub mod parameter;
 mod places;
 mod ranges;
 mod read;
 
 pub use apply::apply;
-pub use bind::{constructed, is_optional, Bound};
-pub use check::check_options;
-pub use contact::{ContactFunction, Contacts};
+pub use contact::Contacts;
+pub use parameter::Parameter;
 pub use places::Places;
 pub use ranges::{ranges_in_words, Interval, JointRanges, Ranges};
 pub use read::{read, read_partly, SceneFile, LISTS};
@@ -263,55 +262,6 @@ pub enum Coulomb {
     Sign,
     /// f q̇ / √(q̇² + w²) with the speed w \[rad/s or m/s\] at which it has reached 71 %.
     Smooth(f64),
-}
-
-/// Constants of the robot that stay inputs.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Parameter {
-    /// The ten inertial parameters of a payload in a frame.
-    Payload {
-        /// Name of the input.
-        name: String,
-        /// The frame that carries it.
-        frame: String,
-    },
-    /// The ten inertial parameters of a link, in place of the file's.
-    Link {
-        /// The link.
-        link: String,
-    },
-    /// Numbers of a drive, in place of the file's.
-    Drive {
-        /// Name of the input; the drive's where it has none.
-        name: Option<String>,
-        /// The drive.
-        drive: String,
-        /// Which numbers: names of [`Drive::numbers`].
-        numbers: Vec<String>,
-        /// The drive as written, with what the scene leaves of its effects; [`Scene::knowing`] finds it.
-        form: Option<Box<Drive>>,
-    },
-}
-
-impl Parameter {
-    /// Whether it is of that drive.
-    pub(crate) fn is_of_drive(&self, name: &str) -> bool {
-        matches!(self, Parameter::Drive { drive, .. } if drive == name)
-    }
-
-    /// Whether it is the inertia of a body.
-    pub(crate) fn is_load(&self) -> bool {
-        !matches!(self, Parameter::Drive { .. })
-    }
-
-    /// Its name as it is given: that of the payload, of the link, or of the drive.
-    pub fn name(&self) -> &str {
-        match self {
-            Parameter::Payload { name, .. } => name,
-            Parameter::Link { link } => link,
-            Parameter::Drive { name, drive, .. } => name.as_ref().unwrap_or(drive),
-        }
-    }
 }
 
 /// The greatest bounds that rounding errors of a function's results may have, in the results' units.

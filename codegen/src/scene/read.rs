@@ -2,19 +2,18 @@
 
 mod contact;
 
-use super::messages as say;
-use super::{check, Base, Budget, Coulomb, Gravity, Interval, JointRanges, MaxError, Parameter, Part, Payload, Places};
-use super::{Contacts, Ranges, Scene, Selection};
-use crate::compile::Options;
+use super::{
+    check, messages as say, Base, Budget, Contacts, Coulomb, Gravity, Interval, JointRanges, MaxError, Parameter, Part,
+    Payload, Places, Ranges, Scene, Selection,
+};
+use crate::choices::{Choice, LimbForm};
 use crate::description::reader::{Range64, Reader, LARGEST_FILE};
 use crate::description::table::{parse, Table};
 use crate::description::{messages, Value};
 use crate::diagnostic::{Diagnostics, Level, Levels, Source};
-use crate::emit::Scalar;
 use crate::function::Function;
-use crate::limbs::LimbForm;
-use crate::words::Choice;
 use straightline_graph::certify::Effort;
+use straightline_graph::Scalar;
 use toml::de::DeValue;
 
 const TOP: &[&str] = &[
@@ -69,28 +68,6 @@ enum Kind {
     Payload,
     Link,
     Drive,
-}
-
-impl SceneFile {
-    /// These options with what the file says in their place, and with its scene. Where neither names functions, a base that
-    /// moves as it is told has all but forward dynamics.
-    pub fn into_options(self, mut options: Options) -> Options {
-        if let Some(functions) = self.functions {
-            options.functions = functions;
-        } else if self.scene.base == Base::Moving && options.functions.iter().copied().eq(Function::all()) {
-            options.functions.retain(|f| *f != Function::ForwardDynamics);
-        }
-        if let [first, others @ ..] = &self.scalars[..] {
-            (options.scalar, options.also) = (*first, others.to_vec());
-        }
-        options.model.angle_tolerance = self.angle_tolerance.unwrap_or(options.model.angle_tolerance);
-        options.limbs = self.limbs.unwrap_or(options.limbs);
-        options.certify = self.certify.or(options.certify);
-        let own = std::mem::replace(&mut options.reporting.levels, self.levels);
-        options.reporting.levels.extend(&own);
-        options.scene = self.scene;
-        options
-    }
 }
 
 /// Reads a scene file. Complaints go to `diagnostics`; `None` after errors. Names are checked where the robot is known: by

@@ -4,7 +4,6 @@
 //! the reference's own.
 
 use super::{Random, State};
-use crate::emit::Scalar;
 use crate::function::DriveFunction;
 use nalgebra::{DMatrix, DVector};
 use straightline_core::drive::{Actuator, Drive, Efficiency};
@@ -14,6 +13,7 @@ use straightline_core::reference::drives::{
 };
 use straightline_core::reference::solve_symmetric;
 use straightline_core::Dd;
+use straightline_graph::Scalar;
 
 /// Gears with losses of which the reference tries all directions, at most.
 const MOST_LOSSY: usize = 10;

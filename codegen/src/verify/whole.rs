@@ -5,9 +5,10 @@
 //! results those of the scene are picked.
 
 use super::{Drive, Random, State};
-use crate::compile::{parameter_program, Options};
-use crate::emit::Scalar;
-use crate::function::{Function, Robot};
+use crate::equations::Robot;
+use crate::function::Function;
+use crate::options::Options;
+use crate::program::parameter::parameter_program;
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::{Base, Coulomb, Gravity, Parameter, Scene};
 use nalgebra::{Matrix3, Vector3};
@@ -15,6 +16,7 @@ use straightline_core::model::Model;
 use straightline_core::reference::{ExtendedPosition, MassCentreTree};
 use straightline_core::Dd;
 use straightline_graph::expr::{evaluate, Graph};
+use straightline_graph::Scalar;
 
 /// How the coordinates of a scene sit among those of the whole robot.
 pub(super) struct Coordinates {

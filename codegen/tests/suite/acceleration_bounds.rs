@@ -3,15 +3,15 @@
 
 use straightline_codegen::certify::residual::acceleration_bound;
 use straightline_codegen::certify::search;
-use straightline_codegen::compile::{compile, Optimisations, Options};
-use straightline_codegen::contact::{self, Mode};
+use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::Diagnostics;
-use straightline_codegen::emit::Scalar;
+use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
-use straightline_codegen::function::Robot;
+use straightline_codegen::function::ContactFunction;
 use straightline_codegen::model::{self, ModelOptions};
-use straightline_codegen::scene::{self, ContactFunction};
-use straightline_codegen::Source;
+use straightline_codegen::options::{Optimisations, Options};
+use straightline_codegen::program::contact::{self, Mode};
+use straightline_codegen::{scene, Scalar, Source};
 use straightline_core::Dd;
 
 const BOTH: [Scalar; 2] = [Scalar::F32, Scalar::F64];

@@ -6,10 +6,12 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use straightline_codegen::compile::{compile, program, Options};
+use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::emit::fused;
 use straightline_codegen::model::load;
+use straightline_codegen::options::Options;
+use straightline_codegen::program::program;
 use straightline_codegen::schedule::Limits;
 use straightline_codegen::{scene, Function, Robot, Scalar};
 use straightline_core::trig;

@@ -5,14 +5,14 @@
 //! the table of the README is printed by the same with `certificates::bounds_of_the_panda`, how long a humanoid takes with `certificates::time_of_a_humanoid`.
 
 use straightline_codegen::certify::{certify, search, Certificate, Effort, Interval};
-use straightline_codegen::compile::{optimised, program, Optimisations, Options};
-use straightline_codegen::emit::Scalar;
+use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph, Port};
-use straightline_codegen::function::Robot;
-use straightline_codegen::input_box::input_box;
 use straightline_codegen::model::{self, ModelOptions};
+use straightline_codegen::options::{Optimisations, Options};
+use straightline_codegen::program::input_box::input_box;
+use straightline_codegen::program::{optimised, program};
 use straightline_codegen::scene::{Interval as Range, JointRanges, Scene};
-use straightline_codegen::{Function, Source};
+use straightline_codegen::{Function, Scalar, Source};
 use straightline_core::Dd;
 
 /// Robot files, and whether the base floats.

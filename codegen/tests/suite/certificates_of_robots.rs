@@ -6,16 +6,17 @@
 
 use crate::written::{Random, Shape, Style, Written};
 use straightline_codegen::certify::{certify_with, search, Effort, Interval};
-use straightline_codegen::compile::{known, program, Options};
 use straightline_codegen::diagnostic::Source;
+use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::Graph;
-use straightline_codegen::function::Robot;
-use straightline_codegen::input_box::input_box;
-use straightline_codegen::model;
+use straightline_codegen::model::singular::{singular_joints, Inertia};
+use straightline_codegen::options::Options;
+use straightline_codegen::program::input_box::input_box;
+use straightline_codegen::program::program;
+use straightline_codegen::report::certificates::known;
 use straightline_codegen::scene::{Interval as Range, JointRanges, Scene};
-use straightline_codegen::singular::{singular_joints, Inertia};
 use straightline_codegen::verify::SecondReading;
-use straightline_codegen::{Function, Scalar};
+use straightline_codegen::{model, Function, Scalar};
 use straightline_core::model::Model;
 use straightline_core::Dd;
 

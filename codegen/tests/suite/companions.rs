@@ -1,14 +1,15 @@
 //! Bounds at the state at hand against true errors, and accelerations checked by their residual, on many robots in both formats.
 
 use straightline_codegen::certify::{certify, search, Effort, Interval};
-use straightline_codegen::compile::{companion, optimised, Optimisations, Options};
-use straightline_codegen::emit::Scalar;
+use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
-use straightline_codegen::function::Robot;
-use straightline_codegen::input_box::input_box;
 use straightline_codegen::model::{self, ModelOptions};
+use straightline_codegen::options::{Optimisations, Options};
+use straightline_codegen::program::companion::companion;
+use straightline_codegen::program::input_box::input_box;
+use straightline_codegen::program::optimised;
 use straightline_codegen::scene::{Interval as Range, JointRanges, Scene};
-use straightline_codegen::{Function, Source};
+use straightline_codegen::{Function, Scalar, Source};
 use straightline_core::Dd;
 
 const BOTH: [Scalar; 2] = [Scalar::F32, Scalar::F64];

@@ -1,18 +1,19 @@
 //! Contact modes: what they cost, what they leave out, and the generic runtime against what is generated.
 
-use straightline_codegen::compile::{compile, Generated, Options};
-use straightline_codegen::contact::{graph, Mode};
+use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::emit::Generated;
+use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{self, Grade};
-use straightline_codegen::function::Robot;
-use straightline_codegen::model;
+use straightline_codegen::function::ContactFunction;
+use straightline_codegen::options::Options;
+use straightline_codegen::program::contact::{graph, Mode};
 use straightline_codegen::scene::contact::{SurfaceItem, UserSurface};
-use straightline_codegen::scene::{self, ContactFunction};
-use straightline_core::algorithms as alg;
+use straightline_codegen::{model, scene};
 use straightline_core::algorithms::{Ltdl, Support};
 use straightline_core::contact::{Contact, Coordinate, ImplicitSurface, Object, Surface};
 use straightline_core::spatial::{Mat3, Transform, Vec3};
-use straightline_core::{Dd, Real};
+use straightline_core::{algorithms as alg, Dd, Real};
 
 fn source(robot: &str) -> Source {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions").join(robot);

@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
-use straightline_codegen::compile::{compile, Options};
-use straightline_codegen::description;
+use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
-use straightline_codegen::reference_input::mass_centre_tree;
-use straightline_codegen::scene;
+use straightline_codegen::options::Options;
+use straightline_codegen::verify::reference_input::mass_centre_tree;
+use straightline_codegen::{description, scene};
 use straightline_core::reference::drives::solve_general;
 use straightline_core::reference::{
     bias_force, functional_coordinate, mass_matrix, Component, ContactFrames, Derivatives, MassCentreTree,

@@ -1,9 +1,10 @@
 //! The inputs for a motion through many elastic stages: as many derivatives as the transmission takes, against a closed form.
 
-use straightline_codegen::compile::optimised;
+use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::evaluate;
-use straightline_codegen::function::{DriveFunction, Robot};
+use straightline_codegen::function::DriveFunction;
 use straightline_codegen::model::{load, ModelOptions};
+use straightline_codegen::program::optimised;
 use straightline_codegen::{compile, Function, Options, Source};
 use straightline_core::algorithms::inverse_orders;
 use straightline_core::Dd;

@@ -1,7 +1,7 @@
 //! What the macros stand on: files looked for, items of a type, complaints as they are shown.
 
 use std::path::{Path, PathBuf};
-use straightline_codegen::expansion::{associated_items, expand, SceneOf};
+use straightline_codegen::fronts::expansion::{associated_items, expand, SceneOf};
 use straightline_codegen::{Options, Source};
 
 const CART: &str = r#"

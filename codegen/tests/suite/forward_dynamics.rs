@@ -1,13 +1,13 @@
 //! What the compiler demands of a robot before it writes its forward dynamics, and which method it writes.
 
 use straightline_codegen::certify::Effort;
-use straightline_codegen::compile::Generated;
 use straightline_codegen::diagnostic::Diagnostics;
+use straightline_codegen::emit::Generated;
+use straightline_codegen::equations::forward_method::{MethodChoice, TOLERATED};
 use straightline_codegen::expr::Grade;
-use straightline_codegen::forward_method::{MethodChoice, TOLERATED};
+use straightline_codegen::model::singular::{singular_joints, Inertia};
 use straightline_codegen::model::{load, ModelOptions};
 use straightline_codegen::scene::read;
-use straightline_codegen::singular::{singular_joints, Inertia};
 use straightline_codegen::{compile, Function, Options, Scalar, Source};
 
 /// A chain of revolute joints in TOML: per link its joint's origin, its axis and its inertial lines.

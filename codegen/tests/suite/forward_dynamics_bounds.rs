@@ -4,13 +4,14 @@
 //! `cargo test --release -p straightline-codegen --test suite forward_dynamics_bounds:: -- --ignored --nocapture`.
 
 use straightline_codegen::certify::{certify_with, search, Certificate, Effort, Interval, Known};
-use straightline_codegen::compile::{known, optimised, program, Optimisations, Options};
 use straightline_codegen::diagnostic::Source;
+use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
-use straightline_codegen::function::Robot;
-use straightline_codegen::input_box::input_box;
 use straightline_codegen::model::{self, ModelOptions};
-use straightline_codegen::pivots;
+use straightline_codegen::options::{Optimisations, Options};
+use straightline_codegen::program::input_box::input_box;
+use straightline_codegen::program::{optimised, pivots, program};
+use straightline_codegen::report::certificates::known;
 use straightline_codegen::scene::{Interval as Range, JointRanges, Scene};
 use straightline_codegen::{Function, Scalar};
 use straightline_core::Dd;

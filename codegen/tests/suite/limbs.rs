@@ -4,16 +4,19 @@ use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 use straightline_codegen::certify::{certify, search, Effort};
-use straightline_codegen::compile::{compile, program, Options, Program};
+use straightline_codegen::choices::{Lanes, LimbForm};
+use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::Diagnostics;
-use straightline_codegen::emit::{fused, Lanes, Scalar};
+use straightline_codegen::emit::fused;
 use straightline_codegen::expr::evaluate;
-use straightline_codegen::input_box::input_box;
-use straightline_codegen::limbs::{limbs, LimbForm};
+use straightline_codegen::model::limbs::limbs;
 use straightline_codegen::model::{load, ModelOptions};
+use straightline_codegen::options::Options;
+use straightline_codegen::program::input_box::input_box;
+use straightline_codegen::program::{program, Program};
 use straightline_codegen::scene::{self, Interval, JointRanges};
 use straightline_codegen::verify::{bound, verify};
-use straightline_codegen::{Function, Robot, Source};
+use straightline_codegen::{Function, Robot, Scalar, Source};
 use straightline_core::trig;
 
 const FORCES: [Function; 4] =

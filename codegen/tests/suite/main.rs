@@ -17,6 +17,8 @@ mod expansion;
 mod flexible;
 mod forward_dynamics;
 mod forward_dynamics_bounds;
+mod joint_rooms;
+mod layers;
 mod limbs;
 mod malformed;
 mod messages;

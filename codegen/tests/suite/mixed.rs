@@ -2,14 +2,14 @@
 
 use straightline_codegen::certify::companion::{state_bound, Bits};
 use straightline_codegen::certify::{certify, mixed, search, Effort, Interval};
-use straightline_codegen::compile::{compile, program, Options};
-use straightline_codegen::emit::Scalar;
+use straightline_codegen::compile::compile;
+use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::Graph;
-use straightline_codegen::function::Robot;
-use straightline_codegen::input_box::input_box;
-use straightline_codegen::model;
+use straightline_codegen::options::Options;
+use straightline_codegen::program::input_box::input_box;
+use straightline_codegen::program::program;
 use straightline_codegen::scene::{Budget, Interval as Range, JointRanges, MaxError, Scene};
-use straightline_codegen::{Function, Source};
+use straightline_codegen::{model, Function, Scalar, Source};
 
 const FUNCTION: Function = Function::InverseDynamics;
 

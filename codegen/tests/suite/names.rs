@@ -6,9 +6,9 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
-use straightline_codegen::compile::Options;
+use straightline_codegen::choices::Lanes;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
-use straightline_codegen::emit::Lanes;
+use straightline_codegen::options::Options;
 use straightline_codegen::{compile, identifier, scene, Function, Grade, Scalar};
 
 /// What robots, links, joints, frames, parameters, contacts and modes of a case are called.

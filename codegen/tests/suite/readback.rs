@@ -5,13 +5,15 @@ use std::fmt::Write;
 use std::ops::Range;
 use std::path::Path;
 use straightline_codegen::certify::Effort;
-use straightline_codegen::compile::{Generated, Options};
+use straightline_codegen::choices::Lanes;
+use straightline_codegen::choices::LimbForm;
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
-use straightline_codegen::emit::{Lanes, Scalar};
-use straightline_codegen::limbs::LimbForm;
+use straightline_codegen::emit::Generated;
+use straightline_codegen::options::Options;
 use straightline_codegen::readback::{checked, complaint, Reader};
 use straightline_codegen::scene::{Budget, Interval, JointRanges, MaxError, Scene};
 use straightline_codegen::schedule::Limits;
+use straightline_codegen::Scalar;
 use straightline_codegen::{compile, scene, Function, Grade, Source};
 
 const ROBOTS: [&str; 13] = [

@@ -1,12 +1,13 @@
 //! Whatever is chosen among the reduced forms of a robot, its torques and its mass matrix are those of the full robot.
 
 use crate::written::{Shape, Style, Written};
-use straightline_codegen::compile::{optimised, Optimisations, Options};
 use straightline_codegen::diagnostic::Source;
+use straightline_codegen::equations::reduce::{lengths, longest_lever, reduce, Choice};
+use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph, DIVISION};
-use straightline_codegen::function::Robot;
 use straightline_codegen::model::{load, ModelOptions};
-use straightline_codegen::reduce::{lengths, longest_lever, reduce, Choice};
+use straightline_codegen::options::{Optimisations, Options};
+use straightline_codegen::program::optimised;
 use straightline_codegen::Function;
 use straightline_core::algorithms as alg;
 use straightline_core::model::Model;

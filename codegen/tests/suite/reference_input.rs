@@ -9,7 +9,7 @@ use std::path::Path;
 use straightline_codegen::description::{self, Description};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::ModelOptions;
-use straightline_codegen::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::mass_centre_tree;
 use straightline_core::reference::{
     bias_force, forward_dynamics, forward_natural_scale, frame_jacobian, frame_jacobian_bias, frame_pose,
     gravity_force, inverse_dynamics, joint_wrenches, kinetic_energy, mass_matrix, potential_energy, velocity_force,

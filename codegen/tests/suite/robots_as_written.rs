@@ -10,8 +10,11 @@ use crate::written::{Random, Shape, Style};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
-use straightline_codegen::compile::{compile, program, Generated, Options};
+use straightline_codegen::compile::compile;
+use straightline_codegen::emit::Generated;
 use straightline_codegen::expr::{evaluate, Port};
+use straightline_codegen::options::Options;
+use straightline_codegen::program::program;
 use straightline_codegen::{Function, Robot, Scalar, Source};
 use straightline_core::Dd;
 

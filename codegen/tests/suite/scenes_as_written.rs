@@ -10,8 +10,8 @@ use std::panic::AssertUnwindSafe;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::Mutex;
 use straightline_codegen::certify::Effort;
-use straightline_codegen::compile::Options;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::options::Options;
 use straightline_codegen::verify::{bound, verify};
 use straightline_codegen::{compile, scene, Scalar};
 

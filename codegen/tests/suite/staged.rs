@@ -1,9 +1,10 @@
 //! The staged form against the plain functions, on an awkward robot: a tree with a sliding joint and oblique axes.
 
-use straightline_codegen::compile::{parameter_program, program};
 use straightline_codegen::expr::{evaluate, Graph};
+use straightline_codegen::program::parameter::parameter_program;
+use straightline_codegen::program::program;
+use straightline_codegen::program::staged::programs;
 use straightline_codegen::scene::{Gravity, Parameter, Scene};
-use straightline_codegen::staged::programs;
 use straightline_codegen::{compile, model, Function, Options, Robot, Source};
 
 const ROBOT: &str = r#"

@@ -11,7 +11,7 @@ use straightline_codegen::description::drives::Noted;
 use straightline_codegen::description::flexible::{Bending, Elastic, Flexible, Support};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{self, FrameOption, ModelOptions};
-use straightline_codegen::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::mass_centre_tree;
 use straightline_core::model::JointEffects;
 
 /// A joint of a random robot in joint frames; joint j moves link j + 1.

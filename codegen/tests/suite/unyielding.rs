@@ -3,10 +3,11 @@
 
 use crate::chain::{arm, LAST_LINK};
 use nalgebra::{DMatrix, DVector};
-use straightline_codegen::compile::optimised;
+use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::evaluate;
-use straightline_codegen::function::{DriveFunction, Robot};
+use straightline_codegen::function::DriveFunction;
 use straightline_codegen::model::{load, ModelOptions};
+use straightline_codegen::program::optimised;
 use straightline_codegen::verify::verify;
 use straightline_codegen::{compile, Function, Options, Source};
 use straightline_core::algorithms::{

@@ -7,14 +7,15 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 use straightline_codegen::certify::{certify, Effort, Interval};
-use straightline_codegen::compile::{compile, program, Options, Program};
-use straightline_codegen::emit::Lanes;
+use straightline_codegen::choices::Lanes;
+use straightline_codegen::compile::compile;
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::options::Options;
+use straightline_codegen::program::{program, Program};
 use straightline_codegen::scene::{self, Budget, JointRanges, MaxError};
 use straightline_codegen::{expr, ForwardDynamicsMethod, Function, Robot, Scalar, Source};
 use straightline_core::model::{Joint, Model};
-use straightline_core::reference as chapter;
-use straightline_core::{Dd, Real};
+use straightline_core::{reference as chapter, Dd, Real};
 use straightline_generated_tests::programs;
 use straightline_generated_tests::random::Random;
 use straightline_generated_tests::reference::Robot as Data;
@@ -573,7 +574,8 @@ fn libraries(data: &Data, case: &Case, function: Function, states: &[Vec<f64>], 
     let options: &ModelOptions = &case.options.model;
     let described =
         straightline_codegen::description::read(&case.source, &mut straightline_codegen::Diagnostics::new());
-    let tree = described.and_then(|d| straightline_codegen::reference_input::mass_centre_tree(&d, options).ok());
+    let tree =
+        described.and_then(|d| straightline_codegen::verify::reference_input::mass_centre_tree(&d, options).ok());
     if let Some(tree) = tree.filter(|_| function == Function::InverseDynamics) {
         // its own truth: of a quaternion whose length is one to 1e-8, as f32 has them, both make something else
         let exact = |x: &[f64]| {

@@ -5,10 +5,11 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use straightline_codegen::compile::{compile, Options};
+use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::Source;
+use straightline_codegen::options::stable::fnv_1a;
+use straightline_codegen::options::Options;
 use straightline_codegen::scene;
-use straightline_codegen::stable::fnv_1a;
 
 /// By how a scene's file begins: the robot that it is of.
 const ROBOTS: [(&str, &str); 4] =

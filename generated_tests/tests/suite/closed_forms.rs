@@ -1,14 +1,14 @@
 //! Robots whose equations of motion are known from textbooks, against the formulas.
 
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
-use straightline_codegen::compile::{program, Options};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::options::Options;
+use straightline_codegen::program::program;
 use straightline_codegen::Function;
 use straightline_core::reference::quaternion_rotation;
-use straightline_generated_tests::compiled;
-use straightline_generated_tests::programs;
 use straightline_generated_tests::random::Random;
+use straightline_generated_tests::{compiled, programs};
 
 /// A few roundings.
 const ROUNDING: f64 = 2e-15;

@@ -1,7 +1,8 @@
 //! Several functions in one call, and matrices by columns: the same numbers as the plain functions, at other places or for
 //! fewer operations.
 
-use straightline_codegen::compile::{Options, Program};
+use straightline_codegen::options::Options;
+use straightline_codegen::program::Program;
 use straightline_codegen::scene::{Scene, Selection};
 use straightline_codegen::Function;
 use straightline_generated_tests::programs::{of_robot, options, run};

@@ -2,20 +2,19 @@
 //! and against each other on random robots with objects that move.
 
 use nalgebra::{Matrix3, Vector3};
-use straightline_codegen::compile::Options;
-use straightline_codegen::contact::{graph, Mode};
+use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::expr;
-use straightline_codegen::function::Robot as Loaded;
+use straightline_codegen::function::ContactFunction;
+use straightline_codegen::options::Options;
+use straightline_codegen::program::contact::{graph, Mode};
 use straightline_codegen::scene::contact::{ContactItem, SurfaceItem};
-use straightline_codegen::scene::{ContactFunction, Contacts, Scene};
-use straightline_core::algorithms as alg;
+use straightline_codegen::scene::{Contacts, Scene};
 use straightline_core::algorithms::{Environment, FunctionalCoordinates, Ltdl, SpringDamper, Struck, Support};
 use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion, Surface};
 use straightline_core::model::Model;
-use straightline_core::reference as chapter;
 use straightline_core::reference::{Component, ContactFrames, Derivatives, MassCentreTree};
 use straightline_core::spatial::{Mat3, MotionVector, Transform, Vec3};
-use straightline_core::{Dd, Real};
+use straightline_core::{algorithms as alg, reference as chapter, Dd, Real};
 use straightline_generated_tests::contact_cases::{cases, robot, Case};
 use straightline_generated_tests::random::{Kind, Random, RandomRobot};
 use straightline_generated_tests::written::{Shape, Style};

@@ -7,13 +7,14 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use straightline_codegen::compile::{optimised, Optimisations, Options};
+use straightline_codegen::choices::ForwardDynamicsMethod;
 use straightline_codegen::diagnostic::Source;
-use straightline_codegen::emit::Scalar;
 use straightline_codegen::expr::{evaluate, Graph};
-use straightline_codegen::function::ForwardDynamicsMethod;
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::options::{Optimisations, Options};
+use straightline_codegen::program::optimised;
 use straightline_codegen::Function;
+use straightline_codegen::Scalar;
 use straightline_core::Dd;
 use straightline_generated_tests::programs::{self, cast, program};
 use straightline_generated_tests::random::Random;

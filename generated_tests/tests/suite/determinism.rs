@@ -1,7 +1,8 @@
 //! The same input gives the same bytes: again, and on another thread.
 
-use straightline_codegen::compile::{compile, Options};
+use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::Source;
+use straightline_codegen::options::Options;
 use straightline_generated_tests::programs::{options, source};
 use straightline_generated_tests::random::{Kind, Random, RandomRobot};
 use straightline_generated_tests::reference::Robot;

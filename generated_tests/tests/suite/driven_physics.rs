@@ -4,22 +4,22 @@
 use nalgebra::{DMatrix, DVector};
 use std::fmt::Write;
 use std::process::Command;
-use straightline_codegen::compile::{compile, program, Options};
+use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
-use straightline_codegen::emit::Scalar;
+use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::Graph;
 use straightline_codegen::function::DriveFunction::{
     self, CompleteModel, Energy, ForwardDynamics, InverseDynamics, Power, StateSpace, Torques,
 };
-use straightline_codegen::function::Robot;
 use straightline_codegen::model::ModelOptions;
-use straightline_codegen::reference_input::mass_centre_tree;
+use straightline_codegen::options::Options;
+use straightline_codegen::program::program;
+use straightline_codegen::verify::reference_input::mass_centre_tree;
 use straightline_codegen::verify::verify;
-use straightline_codegen::{description as read, Function};
-use straightline_core::algorithms as alg;
+use straightline_codegen::{description as read, Function, Scalar};
 use straightline_core::model::Model;
 use straightline_core::reference::drives::{before_elastic_stage, ActuatorModel, DcMotor, ElasticStage, UnitedModel};
-use straightline_core::{reference, Dd, Real, Taylor};
+use straightline_core::{algorithms as alg, reference, Dd, Real, Taylor};
 use straightline_generated_tests::drives::{blocks, Driven};
 use straightline_generated_tests::random::Random;
 use straightline_generated_tests::reference::description;

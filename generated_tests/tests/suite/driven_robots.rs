@@ -1,10 +1,12 @@
 //! Robots with drives as a build script makes them and rustc compiles them: the bits of the interpreter, and the motion that the generic
 //! runtime finds.
 
-use straightline_codegen::compile::{compile, program, Options};
+use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::equations::Robot;
 use straightline_codegen::function::DriveFunction::{self, CompleteModel, ForwardDynamics, Torques};
-use straightline_codegen::function::Robot;
+use straightline_codegen::options::Options;
+use straightline_codegen::program::program;
 use straightline_codegen::{scene, Function};
 use straightline_core::algorithms as alg;
 use straightline_core::model::Model;

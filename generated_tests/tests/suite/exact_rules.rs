@@ -1,9 +1,9 @@
 //! Bit for bit: under the exact rules generated code is the generic runtime, and compiled code is always its program.
 
-use straightline_codegen::compile::Options;
-use straightline_codegen::emit::Scalar;
+use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::expr::Grade;
-use straightline_codegen::function::Robot as Loaded;
+use straightline_codegen::options::Options;
+use straightline_codegen::Scalar;
 use straightline_codegen::{ForwardDynamicsMethod, Function};
 use straightline_core::model::{Frame, Model};
 use straightline_core::Real;

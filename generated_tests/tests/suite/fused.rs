@@ -1,7 +1,8 @@
 //! Fused multiply-add: every sum that counts as fused is, and the results stay as exact as without.
 
-use straightline_codegen::compile::{compile, Options};
+use straightline_codegen::compile::compile;
 use straightline_codegen::emit::fused;
+use straightline_codegen::options::Options;
 use straightline_codegen::schedule::Limits;
 use straightline_codegen::Function;
 use straightline_core::{trig, Dd};

@@ -1,7 +1,8 @@
 //! Functions generic over the scalar: the bits of the program in every scalar, and derivatives by dual numbers.
 
 use straightline::{Dual, Real};
-use straightline_codegen::compile::{Options, Program};
+use straightline_codegen::options::Options;
+use straightline_codegen::program::Program;
 use straightline_codegen::Function;
 use straightline_core::Dd;
 use straightline_generated_tests::compiled;
@@ -12,7 +13,7 @@ use straightline_generated_tests::programs::{self, cast, program};
 use straightline_generated_tests::random::Random;
 use straightline_generated_tests::reference::Robot;
 
-fn program_of(robot: &str, function: Function) -> (straightline_codegen::function::Robot, Program) {
+fn program_of(robot: &str, function: Function) -> (straightline_codegen::equations::Robot, Program) {
     let robot = Robot::load(robot);
     // constant angles are cut into parts that f32 has, too
     let options = Options { generic: true, ..programs::options(&robot) };

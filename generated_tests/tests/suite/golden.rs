@@ -1,6 +1,7 @@
 //! Generated text, small enough to be read in review. `INSTA_UPDATE=always` rewrites the snapshots.
 
-use straightline_codegen::compile::{compile, Options};
+use straightline_codegen::compile::compile;
+use straightline_codegen::options::Options;
 use straightline_codegen::Function;
 use straightline_generated_tests::programs::{options, source};
 use straightline_generated_tests::reference::Robot;

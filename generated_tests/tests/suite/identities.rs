@@ -1,9 +1,10 @@
 //! Laws of mechanics that hold for every robot, on compiled code.
 
 use nalgebra::{DMatrix, DVector};
-use straightline_codegen::compile::{Options, Program};
 use straightline_codegen::diagnostic::Source;
-use straightline_codegen::function::Robot as Loaded;
+use straightline_codegen::equations::Robot as Loaded;
+use straightline_codegen::options::Options;
+use straightline_codegen::program::Program;
 use straightline_codegen::Function;
 use straightline_core::model::JointKind;
 use straightline_core::reference::quaternion_rotation;

@@ -1,7 +1,7 @@
 //! Identical limbs as lanes of one body, as rustc compiles them: values with 25 digits, and the bits of the program.
 
 use straightline::Real;
-use straightline_codegen::limbs::LimbForm;
+use straightline_codegen::choices::LimbForm;
 use straightline_codegen::{Function, Options};
 use straightline_generated_tests::compiled::limbs_generic as solo12;
 use straightline_generated_tests::compiled::limbs_humanoid as humanoid;

@@ -5,9 +5,9 @@
 //! changes any result at all, and the one of `compiled_functions_give_the_reference_values` (f64, 20 times Pinocchio's
 //! error or 1e-14), whose rate is printed: a constant changed by 1e-9 may disappear in its rounding.
 
-use straightline_codegen::compile::Program;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::expr::{self, Binary, Constant, Graph, NodeId, Op, Unary};
+use straightline_codegen::program::Program;
 use straightline_codegen::Function;
 use straightline_core::Dd;
 use straightline_generated_tests::inputs;

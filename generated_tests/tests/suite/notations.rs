@@ -1,8 +1,9 @@
 //! One robot in two notations is one robot.
 
-use straightline_codegen::compile::{program, Options};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::options::Options;
+use straightline_codegen::program::program;
 use straightline_codegen::Function;
 use straightline_generated_tests::programs;
 use straightline_generated_tests::reference::Robot;

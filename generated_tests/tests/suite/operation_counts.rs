@@ -7,10 +7,10 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use straightline_codegen::compile::Options;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::expr::Counts;
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::options::Options;
 use straightline_codegen::Function;
 use straightline_generated_tests::programs::{self, program};
 

@@ -1,6 +1,7 @@
 //! Random robots of all kinds: the optimised program against the second author.
 
-use straightline_codegen::compile::{program, Options};
+use straightline_codegen::options::Options;
+use straightline_codegen::program::program;
 use straightline_codegen::Function;
 use straightline_core::Dd;
 use straightline_generated_tests::inputs::{self, ready_to_paste};

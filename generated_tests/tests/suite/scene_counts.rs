@@ -6,8 +6,10 @@
 //! optimised program are greater, although every scene costs less than without optimisations.
 
 use std::path::Path;
-use straightline_codegen::compile::{explain, Generated, Options};
+use straightline_codegen::compile::explain;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::emit::Generated;
+use straightline_codegen::options::Options;
 use straightline_codegen::scene;
 use straightline_generated_tests::made::Made;
 

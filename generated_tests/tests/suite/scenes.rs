@@ -1,9 +1,10 @@
 //! A scene is the full program at its constants: to the bit under the exact rules, for every robot.
 
-use straightline_codegen::compile::{Options, Program};
+use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::expr::{evaluate, Grade};
-use straightline_codegen::function::Robot as Loaded;
 use straightline_codegen::model;
+use straightline_codegen::options::Options;
+use straightline_codegen::program::Program;
 use straightline_codegen::scene::{apply, Gravity, Part, Scene, Selection, Zero};
 use straightline_codegen::{Diagnostics, Function};
 use straightline_generated_tests::inputs::{self, ready_to_paste};

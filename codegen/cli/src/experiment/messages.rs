@@ -1,7 +1,7 @@
 //! Every text that can be said of an experiment file and of samples, one function per message; what its TOML shares with robot
 //! files stands in [`straightline_codegen::description::messages`].
 
-use straightline_codegen::description::messages::{cut, did_you_mean, list};
+use straightline_codegen::diagnostic::wording::{cut, did_you_mean, list};
 use straightline_codegen::diagnostic::Diagnostic;
 use straightline_core::trig::DOMAIN_F64;
 

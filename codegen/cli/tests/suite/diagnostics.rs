@@ -4,9 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use straightline_codegen::diagnostic::{codes, Diagnostics, Front, Level, Levels, Reporting, Severity, Source};
-use straightline_codegen::equivalence::{Disagreement, Plainer};
-use straightline_codegen::expansion::expand;
+use straightline_codegen::fronts::expansion::expand;
 use straightline_codegen::model::{load, ModelOptions};
+use straightline_codegen::program::equivalence::{Disagreement, Plainer};
 use straightline_codegen::{compile, Builder, Function, Options};
 
 /// An arm of which two angles have six digits, and one eleven.

@@ -5,18 +5,18 @@ use crate::in_c::{succeeds, Library};
 use std::path::Path;
 use std::process::Command;
 use straightline_cli::experiment::parameter;
-use straightline_codegen::compile::{optimised, parameter_program, Optimisations};
-use straightline_codegen::contact::{programs as contact_programs, Mode};
+use straightline_codegen::choices::Lanes;
 use straightline_codegen::description::Description;
 use straightline_codegen::diagnostic::Diagnostics;
-use straightline_codegen::emit::Lanes;
+use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
-use straightline_codegen::function::Robot;
-use straightline_codegen::scene::Parameter;
+use straightline_codegen::options::Optimisations;
+use straightline_codegen::program::contact::{programs as contact_programs, Mode};
+use straightline_codegen::program::parameter::parameter_program;
+use straightline_codegen::program::{optimised, staged};
+use straightline_codegen::scene::{self, Parameter};
 use straightline_codegen::verify::verify;
-use straightline_codegen::{
-    compile, model, scene, staged, Builder, Function, Generated, Grade, Options, Scalar, Source,
-};
+use straightline_codegen::{compile, model, Builder, Function, Generated, Grade, Options, Scalar, Source};
 use straightline_core::{Dd, Real};
 
 fn arm(drives: &str) -> Source {

@@ -251,7 +251,7 @@ impl SceneReader<'_> {
         if !table.has("contact") {
             return;
         }
-        let words = crate::scene::ContactFunction::WORDS;
+        let words = crate::function::ContactFunction::WORDS;
         let mut wanted = Vec::new();
         for name in self.reader.names_at(table, "contact", "function") {
             match words.iter().find(|w| w.0 == name.value) {

@@ -4,10 +4,11 @@
 
 use super::outcome::{Outcome, Size};
 use super::robots::{chain, file, rounded_model, Link, AXES};
-use straightline_codegen::compile::{program, Options};
+use straightline_codegen::equations::forward_method::Figures;
 use straightline_codegen::expr::evaluate;
-use straightline_codegen::forward_method::Figures;
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::options::Options;
+use straightline_codegen::program::program;
 use straightline_codegen::Function;
 use straightline_core::algorithms::{forward_dynamics_aba, forward_dynamics_ltdl, inverse_dynamics};
 use straightline_core::model::Model;

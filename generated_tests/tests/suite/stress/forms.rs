@@ -2,7 +2,7 @@
 
 use super::outcome::{Outcome, Size};
 use super::robots::Judged;
-use straightline_codegen::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::mass_centre_tree;
 use straightline_codegen::{description, Function};
 use straightline_core::{Dd, Real};
 use straightline_generated_tests::compiled;

@@ -1,8 +1,9 @@
 //! A million steps: energy, momentum, dampers, by the integrators of `straightline::integrate`.
 
 use super::outcome::{Outcome, Size};
-use straightline_codegen::compile::{program, Options};
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::options::Options;
+use straightline_codegen::program::program;
 use straightline_codegen::{expr, Function, Robot, Source};
 use straightline_core::integrate::{Compensated, State, Step};
 use straightline_core::{Dd, Real};

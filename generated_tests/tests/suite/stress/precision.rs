@@ -2,7 +2,7 @@
 
 use super::outcome::{Outcome, Size};
 use super::robots::Judged;
-use straightline_codegen::compile::Program;
+use straightline_codegen::program::Program;
 use straightline_codegen::Function;
 use straightline_core::reference::{geometry, motion, natural_scale, Joint, MassCentreTree};
 use straightline_core::Dd;

@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
-use straightline_codegen::function::Robot as Loaded;
+use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::model::ModelOptions;
-use straightline_codegen::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::mass_centre_tree;
 use straightline_codegen::{description, Function};
 use straightline_core::model::{JointKind, Model};
 use straightline_core::reference::MassCentreTree;

@@ -3,8 +3,9 @@
 use super::outcome::{Outcome, Size};
 use super::precision::{equations, in_single, torque_error, torque_error_after_cancellation, torque_error_of};
 use super::robots::{ranges, Judged};
-use straightline_codegen::compile::{optimised, program, Optimisations, Options};
 use straightline_codegen::expr::{evaluate, Graph};
+use straightline_codegen::options::{Optimisations, Options};
+use straightline_codegen::program::{optimised, program};
 use straightline_codegen::Function;
 use straightline_core::Dd;
 use straightline_generated_tests::compiled;

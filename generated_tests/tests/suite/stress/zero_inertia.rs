@@ -44,7 +44,7 @@ pub fn demands(size: Size) -> Vec<Outcome> {
         let source = file(&healed);
         let generated = compile(&source, &options).unwrap_or_else(|d| panic!("{d}"));
         let robot = Robot::new(generated.model);
-        let program = straightline_codegen::compile::program(&robot, &[], Function::ForwardDynamics, &options);
+        let program = straightline_codegen::program::program(&robot, &[], Function::ForwardDynamics, &options);
         let (mut random, n) = (Random(8), healed.len());
         let mut worst = 0.0f64;
         for _ in 0..size.pick(10, 1000) {

@@ -1,0 +1,218 @@
+//! The words by which every front names what can be chosen: functions, scalars, rules, methods.
+
+use crate::diagnostic::wording::did_you_mean;
+use crate::function::Function;
+use std::fmt;
+use straightline_graph::expr::Grade;
+use straightline_graph::Scalar;
+
+/// A choice that has words.
+pub trait Choice: Copy + PartialEq + Sized + 'static {
+    /// What is chosen, in messages.
+    const WHAT: &'static str;
+
+    /// Every word, its meaning in a sentence, and the choice it stands for.
+    fn words() -> Vec<(&'static str, &'static str, Self)>;
+
+    /// The choice that someone may mean who calls it by another name.
+    fn called(_: &str) -> Option<&'static str> {
+        None
+    }
+
+    /// The choice behind a word.
+    ///
+    /// # Errors
+    /// The word is none of [`Choice::words`].
+    fn from_word(word: &str) -> Result<Self, UnknownWord> {
+        let words = Self::words();
+        match words.iter().find(|(w, _, _)| *w == word) {
+            Some((_, _, choice)) => Ok(*choice),
+            None => Err(UnknownWord {
+                what: Self::WHAT,
+                word: word.to_string(),
+                known: words.iter().map(|(w, _, _)| *w).collect(),
+                called: Self::called(word),
+            }),
+        }
+    }
+}
+
+/// A word that names nothing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownWord {
+    /// What it should have named.
+    pub what: &'static str,
+    /// The word.
+    pub word: String,
+    /// The words that there are.
+    pub known: Vec<&'static str>,
+    /// The word of what is called so elsewhere.
+    pub called: Option<&'static str>,
+}
+
+impl fmt::Display for UnknownWord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "there is no {} `{}`", self.what, self.word.escape_default())?;
+        let called = self.called.map(|word| format!("did you mean `{word}`?"));
+        match called.or_else(|| did_you_mean(&self.word, self.known.iter().copied())) {
+            Some(hint) => write!(f, "; {hint}"),
+            None => write!(f, "; one of: {}", self.known.join(", ")),
+        }
+    }
+}
+
+impl std::error::Error for UnknownWord {}
+
+/// How forward dynamics is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ForwardDynamicsMethod {
+    /// Whichever takes fewer operations for this robot, unless it loses digits that the other keeps.
+    #[default]
+    Cheaper,
+    /// The bias force, then articulated bodies.
+    ArticulatedBody,
+    /// The bias force, the mass matrix, and its branch-sparse LᵀDL factor.
+    Factorisation,
+}
+
+/// How identical limbs are computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum LimbForm {
+    /// Each by itself, with its own constants folded: fewest operations.
+    #[default]
+    Apart,
+    /// As lanes of one body, wherever two are alike: least code.
+    Lanes,
+    /// As lanes where that is measured to be faster, otherwise apart: see [`LimbForm::of`].
+    Auto,
+}
+
+/// The functions over lanes and batches beside the plain ones: where the drivers of the batches come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Lanes {
+    /// Pasted into the output, which depends on `core` alone: batches use the vector instructions that the crate is compiled
+    /// for, and one thread.
+    Standalone,
+    /// The package `straightline`: the vector instructions of the machine at run time (its feature `std`), several threads
+    /// (its feature `rayon`).
+    Runtime,
+}
+
+impl Choice for Function {
+    const WHAT: &'static str = "function";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        Function::known().map(|f| (f.name(), f.summary(), f)).collect()
+    }
+    fn called(alias: &str) -> Option<&'static str> {
+        Function::called(alias).map(Function::name)
+    }
+}
+
+impl Choice for Scalar {
+    const WHAT: &'static str = "scalar";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        vec![("f64", "double precision", Scalar::F64), ("f32", "single precision", Scalar::F32)]
+    }
+}
+
+impl Choice for Grade {
+    const WHAT: &'static str = "set of rules";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        vec![
+            ("all", "fewest operations; rounding may differ from the generic runtime", Grade::Algebraic),
+            ("exact", "the generic runtime, bit for bit", Grade::Exact),
+        ]
+    }
+}
+
+impl Choice for ForwardDynamicsMethod {
+    const WHAT: &'static str = "method of forward dynamics";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        vec![
+            ("cheaper", "whichever takes fewer operations for this robot", ForwardDynamicsMethod::Cheaper),
+            ("articulated-body", "articulated bodies", ForwardDynamicsMethod::ArticulatedBody),
+            ("factorisation", "mass matrix and its branch-sparse factor", ForwardDynamicsMethod::Factorisation),
+        ]
+    }
+}
+
+impl Choice for LimbForm {
+    const WHAT: &'static str = "form of identical limbs";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        vec![
+            ("apart", "each by itself, with its own constants: fewest operations", LimbForm::Apart),
+            ("lanes", "as lanes of one body: least code, and least time where there are four", LimbForm::Lanes),
+            ("auto", "as lanes where that is measured to be faster, otherwise apart", LimbForm::Auto),
+        ]
+    }
+}
+
+impl Choice for Lanes {
+    const WHAT: &'static str = "home of the batches";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        vec![
+            ("standalone", "core alone; the vector instructions that the crate is compiled for", Lanes::Standalone),
+            ("runtime", "the package `straightline`: the machine's instructions, and threads", Lanes::Runtime),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_word_means_what_it_says() {
+        fn all<C: Choice + fmt::Debug>() {
+            for (word, meaning, choice) in C::words() {
+                assert_eq!(C::from_word(word), Ok(choice));
+                assert!(!meaning.is_empty());
+            }
+        }
+        all::<Function>();
+        all::<Scalar>();
+        all::<Grade>();
+        all::<ForwardDynamicsMethod>();
+        all::<LimbForm>();
+        all::<Lanes>();
+    }
+
+    #[test]
+    fn an_unknown_word_is_answered_with_the_known_ones() {
+        let error = Scalar::from_word("half").unwrap_err();
+        assert_eq!(error.to_string(), "there is no scalar `half`; one of: f64, f32");
+    }
+
+    #[test]
+    fn a_word_that_is_nearly_known_or_known_elsewhere_is_answered_with_the_one_that_is_meant() {
+        for (word, meant) in
+            [("inverse_dynamic", "inverse_dynamics"), ("RNEA", "inverse_dynamics"), ("aba", "forward_dynamics")]
+        {
+            let error = Function::from_word(word).unwrap_err();
+            assert_eq!(error.to_string(), format!("there is no function `{word}`; did you mean `{meant}`?"));
+        }
+    }
+
+    /// What is certified is proven; what agrees on many states is tested.
+    #[test]
+    fn the_documents_say_proven_of_bounds_and_tested_of_tests() {
+        for name in [
+            "README.md",
+            "ARCHITECTURE.md",
+            "CHANGELOG.md",
+            "codegen/SCENES.md",
+            "codegen/SCHEMA.md",
+            "codegen/SIMULATION.md",
+        ] {
+            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name);
+            let text = std::fs::read_to_string(path).expect("the document is there");
+            let paragraphs = text.split("\n\n").flat_map(|p| p.split("\n- ")).flat_map(|p| p.split("\n|"));
+            for paragraph in paragraphs.map(|p| p.to_lowercase().replace("provenance", "")) {
+                let words = ["proven", "proves", "prove ", "proof"];
+                let says = words.iter().any(|word| paragraph.contains(word));
+                let is_certified = ["bound", "rounding", "certif", "error"].iter().any(|word| paragraph.contains(word));
+                assert!(!says || is_certified, "{name}: {paragraph}");
+            }
+        }
+    }
+}

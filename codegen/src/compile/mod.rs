@@ -1,0 +1,142 @@
+//! The pipeline, as one function.
+
+mod prepare;
+
+pub use prepare::examine;
+
+use crate::description::{messages, Description};
+use crate::diagnostic::{Diagnostic, Diagnostics, Source};
+use crate::emit::generated::generate;
+use crate::emit::{self, Generated};
+use crate::equations::Robot;
+use crate::function::Function;
+use crate::options::stable::{fnv_1a, Stable};
+use crate::options::Options;
+use crate::program::equivalence::Disagreement;
+use crate::program::mixed::mix_precisions;
+use crate::program::staged::figures;
+use crate::program::written::Written;
+use crate::program::{checked, range, Program};
+use crate::report::budget::{self, Measures};
+use crate::report::certificates::certificates;
+use crate::report::waterfall;
+use crate::{readback, scene};
+use prepare::{prepare, Prepared};
+use straightline_core::model::Model;
+use straightline_core::Dd;
+use straightline_graph::Scalar;
+
+/// From the text of a robot file to the text of its dynamics. Where a scene skips something, the report says how much.
+///
+/// # Errors
+/// Everything that is wrong with the file or the options, at once; or the budgets that are exceeded.
+pub fn compile(source: &Source, options: &Options) -> Result<Generated, Diagnostics> {
+    compile_and_explain(source, options, !options.scene.is_empty())
+}
+
+/// The same, with a report that says what every optimisation is worth, and with the figures of the staged form: for people
+/// and programs that ask for it, because every step is compiled.
+///
+/// # Errors
+/// As [`compile`].
+pub fn explain(source: &Source, options: &Options) -> Result<Generated, Diagnostics> {
+    let mut generated = compile_and_explain(source, options, true)?;
+    if generated.report.staged.is_none() && !generated.items.is_empty() {
+        let robot = Robot::new(generated.model.clone());
+        let options = options.knowing(source);
+        let options = Options { scene: options.scene.resolved(&robot.model), ..options };
+        let figures = figures(&robot, &generated.frames, &options);
+        generated.report.staged = Some(figures.map_err(|wrong| only(wrong.error(&robot.model)))?);
+    }
+    Ok(generated)
+}
+
+fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
+    let mut generated = compile_in_one_scalar(source, options, explained)?;
+    for &scalar in &options.also {
+        let options = Options { scalar, also: Vec::new(), ..options.clone() };
+        let other = compile_in_one_scalar(source, &options, explained)?;
+        generated.text.push_str(&emit::scalar_module(scalar, &other.text));
+        generated.others.push(other);
+    }
+    readback::checked(generated)
+}
+
+fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
+    let Prepared { description, whole, model, frames, options, resolved, mut diagnostics } = prepare(source, options)?;
+    let hash = hash(source.text(), &resolved);
+    let robot = Robot::new(model);
+    let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
+    let programs = resolved.functions.iter().filter(|f| !is_empty(f));
+    let programs: Result<Vec<Program>, _> = programs.map(|f| checked(&robot, &frames, *f, &resolved)).collect();
+    let mut programs = programs.map_err(|wrong| only(no_form(&wrong, &robot.model, options.scalar, &description)))?;
+    let beyond = |program: &str, why: &str, diagnostics: &mut Diagnostics| {
+        let complaint = scene::messages::program_beyond_scalar(program, options.scalar.name(), why);
+        options.scene.places.complain("numbers.scalar", complaint, diagnostics);
+    };
+    for program in &mut programs {
+        if let Err(wrong) = mix_precisions(&robot, &frames, program, &resolved) {
+            diagnostics.push(wrong.error(&robot.model));
+        }
+        if let Some(why) = range::of_program(&robot.model, &program.graph, options.scalar) {
+            beyond(program.function.name(), &why, &mut diagnostics);
+        }
+        if let Some(plainer) = &program.plainer {
+            diagnostics.push(plainer.warning(&robot.model));
+        }
+    }
+    let measures: Vec<(Function, Measures)> =
+        programs.iter().map(|p| (p.function, Measures::of(p, options.scalar))).collect();
+    budget::check(&whole, &frames, &measures, &options, &mut diagnostics);
+    let certificates = certificates(&robot, &programs, &resolved);
+    budget::check_errors(programs.iter().zip(&certificates), &resolved, &mut diagnostics);
+    if diagnostics.has_errors() {
+        diagnostics.sort();
+        return Err(diagnostics);
+    }
+    let waterfalls = match explained {
+        true => {
+            let stops = waterfall::stops(&whole, &options.scene);
+            let of = |p: &Program| waterfall::waterfall(&stops, &frames, p.function, &resolved, p.graph.counts());
+            programs.iter().map(|p| Some(of(p))).collect()
+        }
+        false => vec![None; programs.len()],
+    };
+    let programs = programs.into_iter().zip(waterfalls).zip(certificates).map(|((p, w), c)| (p, w, c)).collect();
+    let model = robot.model.clone();
+    let generated = generate(robot, frames, programs, diagnostics, &resolved, source.path(), hash);
+    let generated = generated.map_err(|wrong| only(wrong.error(&model)))?;
+    // what has a program of its own is asked above, all else here
+    let why = |p: &Written| Some((p.name.clone(), range::of_constants(&p.graph, p.scalar)?));
+    let first = generated.programs.all().find_map(why);
+    match first {
+        None => Ok(generated),
+        Some((program, why)) => {
+            let mut diagnostics = generated.warnings;
+            beyond(&program, &why, &mut diagnostics);
+            Err(diagnostics)
+        }
+    }
+}
+
+/// What is said of a function of which no form agrees.
+fn no_form(wrong: &Disagreement, model: &Model<Dd>, scalar: Scalar, description: &Description) -> Diagnostic {
+    let Some((body, part)) = wrong.beyond_digits(model, scalar) else { return wrong.error(model) };
+    let (joint, link) = (&model.bodies[body].joint.name, &model.bodies[body].name);
+    let complaint = messages::inertia_beyond_digits(&wrong.program, scalar.name(), joint, part);
+    match description.place_of(joint, link) {
+        Some(place) => complaint.at(place),
+        None => complaint,
+    }
+}
+
+fn only(error: Diagnostic) -> Diagnostics {
+    let mut all = Diagnostics::default();
+    all.push(error);
+    all
+}
+
+/// Over everything that the output depends on.
+fn hash(text: &str, options: &Options) -> u64 {
+    fnv_1a([text, "\0", crate::VERSION, "\0", &options.stable_text()].concat().bytes())
+}

@@ -1,0 +1,565 @@
+//! A package of its own around generated code, with C functions and their header, for C, C++, Python and any language that
+//! calls C: text only, no file is touched here.
+//!
+//! Every function stands in a module of its own, so that rustc's back end can work on several at once.
+
+use crate::description::drives::Number;
+use crate::emit::{self, Generated, Item};
+use crate::function::Function;
+use crate::identifier::{comment, package_name, string_literal};
+use crate::output::MARK;
+use std::fmt::Write;
+use straightline_graph::expr::Port;
+use straightline_graph::Scalar;
+
+/// The files of the package, by their paths inside it. All C names begin with `prefix`, an identifier.
+pub fn c_package(generated: &Generated, prefix: &str) -> Vec<(String, String)> {
+    let package = Package { generated, prefix, library: format!("{}_dynamics", prefix.to_lowercase()) };
+    let mut files = vec![
+        ("Cargo.toml".to_string(), package.manifest()),
+        ("src/lib.rs".to_string(), package.library()),
+        (format!("include/{}.h", package.library), package.header()),
+        ("src/dynamics/mod.rs".to_string(), package.dynamics()),
+    ];
+    for item in &generated.items {
+        files.push((format!("src/dynamics/{}.rs", item.function.name()), package.function(item)));
+    }
+    if generated.lanes.is_some() {
+        files.push(("src/dynamics/drivers.rs".to_string(), emit::batch::drivers().to_string()));
+        files.push(("src/dispatch.rs".to_string(), DISPATCH.to_string()));
+    }
+    if package.calls_kernel() {
+        files.push((
+            "src/dynamics/trig.rs".to_string(),
+            emit::kernel(generated.lanes.is_some(), generated.style.fused).into_owned(),
+        ));
+    }
+    files
+}
+
+/// What the header says of batches.
+const BATCHES: &str = "
+/* Functions over batches: ..._batch_soa(n, ...) and ..._batch_aos(n, ...) compute n states with the vector instructions of
+ * the machine (AVX2 or AVX-512 where it has them), each state to the bits that the plain function gives. Every array
+ * holds n states. soa (structure of arrays, the faster one): component c of state s at [c * n + s]; aos (array of structures):
+ * at [s * w + c] for arrays of w numbers to a state. n may be 0. */
+";
+
+/// What chooses the vector instructions of the machine, pasted as it is.
+const DISPATCH: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/src/dispatch.rs"));
+
+/// The layouts of batches, with where component `c` of state `s` is.
+const LAYOUTS: [(&str, &str); 2] = [("soa", "[c * n + s]"), ("aos", "[s * w + c], w numbers to a state")];
+
+struct Package<'a> {
+    generated: &'a Generated,
+    prefix: &'a str,
+    library: String,
+}
+
+/// A parameter of a C function.
+struct Parameter {
+    name: String,
+    length: usize,
+    array: String,
+    is_output: bool,
+    /// Whether one value serves all states of a batch.
+    is_shared: bool,
+}
+
+impl Package<'_> {
+    fn scalar(&self) -> Scalar {
+        self.generated.scalar
+    }
+
+    fn calls_kernel(&self) -> bool {
+        self.generated.items.iter().any(|i| i.text.calls_kernel())
+            || self.generated.types.contains("use super::super::trig;")
+    }
+
+    /// The module of one function.
+    fn function(&self, item: &Item) -> String {
+        let kernel = match (item.text.calls_kernel(), self.generated.style.fused) {
+            (false, _) => "",
+            (true, false) => "use super::trig;\n",
+            (true, true) => "#[allow(unused_imports)]\nuse super::trig;\n",
+        };
+        let batch = if item.lanes.is_empty() { "" } else { "use super::batch;\n" };
+        let types: String = item
+            .inputs
+            .iter()
+            .filter_map(|p| p.wrapper.as_ref())
+            .map(|wrapper| format!("use super::{wrapper};\n"))
+            .collect();
+        let fused = if self.generated.style.fused {
+            "#[allow(unused_imports)]\nuse super::fused::{self, fma, fma_if, FUSED};\n"
+        } else {
+            ""
+        };
+        let uses = [fused, kernel, batch, &types].concat();
+        let gap = if uses.is_empty() { "" } else { "\n" };
+        let lanes = if item.lanes.is_empty() { String::new() } else { format!("\n{}", item.lanes) };
+        format!("{uses}{gap}{}{lanes}", item.text.text)
+    }
+
+    fn provenance(&self) -> String {
+        format!("straightline {} from {}; do not edit.", crate::VERSION, comment(&self.generated.provenance.source))
+    }
+
+    fn manifest(&self) -> String {
+        let (library, name) = (&self.library, package_name(&self.library));
+        format!(
+            r#"{MARK}: {provenance}
+[package]
+name = "{name}"
+version = "0.1.0"
+edition = "2021"
+publish = false
+
+[lib]
+name = "{library}"
+crate-type = ["cdylib", "staticlib", "rlib"]
+
+[profile.release]
+opt-level = 3
+panic = "abort"
+overflow-checks = false
+
+# on its own, wherever it stands
+[workspace]
+"#,
+            provenance = self.provenance(),
+        )
+    }
+
+    fn dynamics(&self) -> String {
+        let g = self.generated;
+        let mut out = emit::preamble(&g.model, &g.frames, &g.report, &g.provenance, g.scalar, &g.types);
+        if g.style.fused {
+            out.push_str(&emit::fused::module(g.style, self.calls_kernel()));
+        }
+        for item in &self.generated.items {
+            let name = item.function.name();
+            let names = match self.generated.lanes {
+                Some(_) => format!("{{{name}, {name}_batch_aos, {name}_batch_soa, {name}_lanes}}"),
+                None => name.to_string(),
+            };
+            let _ = write!(out, "\nmod {name};\npub use self::{name}::{names};\n");
+        }
+        if self.generated.lanes.is_some() {
+            out.push_str(
+                "\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod drivers;\n\
+                 /// Batches, with the vector instructions of the machine.\n\
+                 pub mod batch {\n    pub use super::drivers::*;\n    pub use crate::dispatch::{run_f32, run_f64};\n}\n",
+            );
+        }
+        if self.calls_kernel() {
+            out.push_str("\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod trig;\n");
+        }
+        out
+    }
+
+    fn parameters(&self, function: Function) -> Vec<Parameter> {
+        let item = self.generated.items.iter().find(|i| i.function == function);
+        let item = item.expect("only generated functions are exported");
+        let inputs = item.inputs.iter().map(|p| (p, false));
+        inputs
+            .chain(item.outputs.iter().map(|p| (p, true)))
+            .map(|(port, is_output)| Parameter {
+                name: port.name.clone(),
+                length: port.len(),
+                array: match &port.wrapper {
+                    Some(wrapper) => format!("dynamics::{wrapper}"),
+                    None => emit::array_type(port, self.scalar()),
+                },
+                is_output,
+                is_shared: port.wrapper.is_some(),
+            })
+            .collect()
+    }
+
+    /// `src/lib.rs`: from pointers to arrays, and nothing else.
+    fn library(&self) -> String {
+        let (prefix, scalar) = (self.prefix, self.scalar().name());
+        let joints = c_strings(self.joint_names());
+        let frames = c_strings(self.generated.frames.iter().map(String::as_str));
+        let mut out = format!(
+            r#"//! Generated by {provenance}
+//!
+//! C functions over [`dynamics`]. C knows arrays as pointers only, so turning them into references is unsafe, and it is
+//! all that happens here; the dynamics themselves are safe Rust that cannot panic.
+#![allow(non_snake_case)] // C names
+
+use core::ffi::{{c_char, c_int, CStr}};
+
+#[forbid(unsafe_code)]
+pub mod dynamics;
+{dispatch}
+/// Number of configuration coordinates.
+#[no_mangle]
+pub extern "C" fn {prefix}_nq() -> c_int {{
+    dynamics::NQ as c_int
+}}
+
+/// Number of velocity coordinates.
+#[no_mangle]
+pub extern "C" fn {prefix}_nv() -> c_int {{
+    dynamics::NV as c_int
+}}
+
+/// Number of joints.
+#[no_mangle]
+pub extern "C" fn {prefix}_joint_count() -> c_int {{
+    dynamics::JOINT_NAMES.len() as c_int
+}}
+
+/// Number of frames.
+#[no_mangle]
+pub extern "C" fn {prefix}_frame_count() -> c_int {{
+    dynamics::FRAME_NAMES.len() as c_int
+}}
+
+/// Name of joint `i`, or null.
+#[no_mangle]
+pub extern "C" fn {prefix}_joint_name(i: c_int) -> *const c_char {{
+    const NAMES: &[&CStr] = &[{joints}];
+    name(NAMES, i)
+}}
+
+/// Name of frame `i`, or null.
+#[no_mangle]
+pub extern "C" fn {prefix}_frame_name(i: c_int) -> *const c_char {{
+    const NAMES: &[&CStr] = &[{frames}];
+    name(NAMES, i)
+}}
+
+fn name(names: &[&CStr], i: c_int) -> *const c_char {{
+    usize::try_from(i).ok().and_then(|i| names.get(i)).map_or(core::ptr::null(), |n| n.as_ptr())
+}}
+"#,
+            provenance = self.provenance(),
+            dispatch = match self.generated.lanes {
+                Some(_) => "mod dispatch;\n\nuse dynamics::batch;\n",
+                None => "",
+            },
+        );
+        for body in self.bodies() {
+            let _ = write!(out, "{}", self.constructor(&body));
+        }
+        for item in &self.generated.items {
+            let function = item.function;
+            let parameters = self.parameters(function);
+            let name = function.name();
+            let list = |f: &dyn Fn(&Parameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
+            let signature = list(&|p| format!("{}: *{} {scalar}", p.name, if p.is_output { "mut" } else { "const" }));
+            let arguments = list(&|p| p.name.to_string());
+            let arrays: String = parameters
+                .iter()
+                .map(|p| {
+                    let reference = if p.is_output { "&mut *" } else { "&*" };
+                    format!("    let {0} = unsafe {{ {reference}{0}.cast::<{1}>() }};\n", p.name, p.array)
+                })
+                .collect();
+            let lengths = list(&|p| format!("`{}` {}", p.name, p.length));
+            let _ = write!(
+                out,
+                r#"
+/// {summary}
+///
+/// # Safety
+/// The pointers lead to aligned arrays of {scalar}: {lengths}; what is written overlaps nothing that is read.
+#[no_mangle]
+pub unsafe extern "C" fn {prefix}_{name}({signature}) {{
+    // SAFETY of all these: the caller's promise
+{arrays}    dynamics::{name}({arguments});
+}}
+"#,
+                summary = function.summary(),
+            );
+            if self.generated.lanes.is_some() {
+                out.push_str(&self.batches(function, &parameters));
+            }
+        }
+        out
+    }
+
+    /// The C functions over batches of one function.
+    fn batches(&self, function: Function, parameters: &[Parameter]) -> String {
+        let (prefix, scalar, name) = (self.prefix, self.scalar().name(), function.name());
+        let list = |f: &dyn Fn(&Parameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
+        let pointer = |p: &Parameter| format!("{}: *{} {scalar}", p.name, if p.is_output { "mut" } else { "const" });
+        let slices: String = parameters
+            .iter()
+            .map(|p| match (p.is_output, p.is_shared) {
+                (_, true) => format!("    let {0} = unsafe {{ &*{0}.cast::<{1}>() }};\n", p.name, p.array),
+                (true, _) => format!(
+                    "    let {0} = unsafe {{ core::slice::from_raw_parts_mut({0}, n * {1}) }};\n",
+                    p.name, p.length
+                ),
+                (false, _) => {
+                    format!("    let {0} = unsafe {{ core::slice::from_raw_parts({0}, n * {1}) }};\n", p.name, p.length)
+                }
+            })
+            .collect();
+        let lengths = list(&|p| match p.is_shared {
+            true => format!("`{}` {}", p.name, p.length),
+            false => format!("`{}` n times {}", p.name, p.length),
+        });
+        let (signature, arguments) = (list(&pointer), list(&|p| p.name.clone()));
+        let mut out = String::new();
+        for (layout, place) in LAYOUTS {
+            let _ = write!(
+                out,
+                r#"
+/// The same for `n` states: component c of state s at {place}.
+///
+/// # Safety
+/// The pointers lead to aligned arrays of {scalar}: {lengths}; what is written overlaps nothing that is read.
+#[no_mangle]
+pub unsafe extern "C" fn {prefix}_{name}_batch_{layout}(n: usize, {signature}) {{
+    if n == 0 {{
+        return;
+    }}
+    // SAFETY of all these: the caller's promise
+{slices}    let done = dynamics::{name}_batch_{layout}(n, {arguments});
+    debug_assert!(done.is_ok(), "the slices are made of n");
+}}
+"#
+            );
+        }
+        out
+    }
+
+    /// The run-time parameters that functions take: name, type and number of scalars.
+    fn bodies(&self) -> Vec<Port> {
+        let mut bodies: Vec<Port> = Vec::new();
+        for port in self.generated.items.iter().flat_map(|item| &item.inputs) {
+            if port.wrapper.is_some() && !bodies.contains(port) {
+                bodies.push(port.clone());
+            }
+        }
+        bodies
+    }
+
+    /// The free numbers of a run-time parameter that is of a drive.
+    fn drive_numbers(&self, of: &Port) -> Option<&[Number]> {
+        let parameters = &self.generated.programs.parameters;
+        let found = parameters.iter().find(|p| Some(&p.type_name) == of.wrapper.as_ref())?;
+        found.numbers.as_ref().map(|numbers| &numbers.numbers[..])
+    }
+
+    /// The C function that makes a run-time parameter.
+    fn constructor(&self, body: &Port) -> String {
+        let (prefix, scalar, name, length) = (self.prefix, self.scalar().name(), &body.name, body.len());
+        let type_name = body.wrapper.as_deref().unwrap_or_default();
+        if let Some(numbers) = self.drive_numbers(body) {
+            let each = |text: &dyn Fn(usize, &str) -> String| -> String {
+                numbers.iter().enumerate().map(|(k, n)| text(k, &n.name)).collect()
+            };
+            let arguments = each(&|_, n| format!("    {n}: {scalar},\n"));
+            let fields = each(&|_, n| format!("{n}, "));
+            let refusals = each(&|k, n| format!("        Err(e) if e.number == {n:?} => {},\n", k + 1));
+            return format!(
+                r#"
+/// A drive as the functions take it in `made`, with these numbers. Zero, or which of them no drive has, counted from 1, or one more than
+/// there are where what follows from them is not finite; `made` is untouched then.
+///
+/// # Safety
+/// The pointer leads to an aligned array of {length} {scalar}.
+#[no_mangle]
+pub unsafe extern "C" fn {prefix}_{name}_new(
+{arguments}    made: *mut {scalar},
+) -> c_int {{
+    // SAFETY: the caller's promise
+    let made = unsafe {{ &mut *made.cast::<dynamics::{type_name}>() }};
+    match dynamics::{type_name}::new(dynamics::{type_name}Numbers {{ {fields}}}) {{
+        Ok(drive) => {{
+            *made = drive;
+            0
+        }}
+{refusals}        Err(_) => {},
+    }}
+}}
+"#,
+                numbers.len() + 1
+            );
+        }
+        format!(
+            r#"
+/// A body as the functions take it in `{name}`, from mass, mass centre and inertia (xx, xy, xz, yy, yz, zz) about the mass
+/// centre. Zero, or why no body has these: 1 a number is not finite, 2 the mass is negative, 3 inertia without mass, 4 the
+/// inertia is impossible; `{name}` is untouched then.
+///
+/// # Safety
+/// The pointers lead to aligned arrays of {scalar}: `com` 3, `inertia` 6, `{name}` {length}; what is written overlaps nothing
+/// that is read.
+#[no_mangle]
+pub unsafe extern "C" fn {prefix}_{name}_new(
+    mass: {scalar},
+    com: *const {scalar},
+    inertia: *const {scalar},
+    {name}: *mut {scalar},
+) -> c_int {{
+    // SAFETY of all these: the caller's promise
+    let com = unsafe {{ *com.cast::<[{scalar}; 3]>() }};
+    let inertia = unsafe {{ *inertia.cast::<[{scalar}; 6]>() }};
+    let {name} = unsafe {{ &mut *{name}.cast::<dynamics::{type_name}>() }};
+    match dynamics::{type_name}::new(mass, com, inertia) {{
+        Ok(new) => {{
+            *{name} = new;
+            0
+        }}
+        Err(dynamics::Unphysical::NotFinite) => 1,
+        Err(dynamics::Unphysical::NegativeMass) => 2,
+        Err(dynamics::Unphysical::InertiaWithoutMass) => 3,
+        Err(dynamics::Unphysical::Inertia) => 4,
+    }}
+}}
+"#
+        )
+    }
+
+    /// The C header.
+    fn header(&self) -> String {
+        let (prefix, upper) = (self.prefix, self.prefix.to_uppercase());
+        let model = &self.generated.model;
+        let (nq, nv) = (model.nq(), model.nv());
+        let mut out = String::new();
+        let _ = write!(
+            out,
+            "/* Dynamics of {robot}.\n * Generated by {provenance}\n *\n * Joints, with their first indices into q and qd:\n",
+            robot = comment(&model.name),
+            provenance = self.provenance(),
+        );
+        for joint in self.joints() {
+            let row = joint.kind.row();
+            let kind = match joint.kind.is_single() {
+                true => format!("{} [{}]", row.name, joint.kind.units()[0]),
+                false => format!("{}: {}", row.name, row.coordinates.replace('\n', "\n *       ")),
+            };
+            let _ = writeln!(out, " *   {:>3} {:>3}  {}, {kind}", joint.iq, joint.iv, comment(&joint.name));
+        }
+        out.push_str(" * Frames:\n");
+        for (i, frame) in self.generated.frames.iter().enumerate() {
+            let _ = writeln!(out, " *   {i:>3}  {}", comment(frame));
+        }
+        let _ = write!(
+            out,
+            r#" *
+ * SI units. Arrays are dense, matrices by rows. Outputs must not overlap inputs. The functions allocate nothing,
+ * keep no state, and may be called from any thread.
+ */
+#ifndef {upper}_DYNAMICS_H
+#define {upper}_DYNAMICS_H
+
+#define {upper}_NQ {nq}
+#define {upper}_NV {nv}
+#define {upper}_JOINT_COUNT {joints}
+#define {upper}_FRAME_COUNT {frames}
+{include}
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+/* The numbers above, for programs that load the library. */
+int {prefix}_nq(void);
+int {prefix}_nv(void);
+int {prefix}_joint_count(void);
+int {prefix}_frame_count(void);
+
+/* Name of joint or frame i, 0 <= i < count; otherwise a null pointer. */
+const char *{prefix}_joint_name(int i);
+const char *{prefix}_frame_name(int i);
+"#,
+            joints = model.bodies.len(),
+            frames = self.generated.frames.len(),
+            include = if self.generated.lanes.is_some() { "\n#include <stddef.h>\n" } else { "" },
+        );
+        if self.generated.lanes.is_some() {
+            out.push_str(BATCHES);
+        }
+        let c_type = match self.scalar() {
+            Scalar::F64 => "double",
+            Scalar::F32 => "float",
+        };
+        for body in self.bodies() {
+            let (name, length) = (&body.name, body.len());
+            if let Some(numbers) = self.drive_numbers(&body) {
+                let arguments: String = numbers.iter().map(|n| format!("{c_type} {}, ", n.name)).collect();
+                let _ =
+                    writeln!(out, "\n/* A drive as the functions take it in `{name}`, made outside the control loop:");
+                for n in numbers {
+                    let _ = writeln!(
+                        out,
+                        " *   {}: {}; {:?} in the robot file",
+                        n.name,
+                        n.quantity.meaning.replace('\\', ""),
+                        n.value
+                    );
+                }
+                let _ = write!(
+                    out,
+                    " * Returns 0, or which of the numbers no drive has, counted from 1, or {} where what follows from them is not\n \
+                     * finite; made is untouched then. */\n\
+                     int {prefix}_{name}_new({arguments}{c_type} made[{length}]);\n",
+                    numbers.len() + 1
+                );
+                continue;
+            }
+            let _ = write!(
+                out,
+                "\n/* A body as the functions take it in {name}, made outside the control loop, of this mass [kg], with its mass\n \
+                 * centre [m] and its inertia about the mass centre xx, xy, xz, yy, yz, zz [kg m^2]. All zeros are no body.\n \
+                 * Returns 0, or why no body has these: 1 a number is not finite, 2 the mass is negative, 3 inertia without\n \
+                 * mass, 4 the inertia is impossible; {name} is untouched then. */\n\
+                 int {prefix}_{name}_new({c_type} mass, const {c_type} com[3], const {c_type} inertia[6], {c_type} {name}[{length}]);\n"
+            );
+        }
+        for item in &self.generated.items {
+            let doc = item.doc.replace("frame of [`FRAME_NAMES`]", "frame").replace(['`', '\\'], "");
+            out.push_str("\n/*");
+            for (i, line) in doc.lines().filter(|l| !l.is_empty()).enumerate() {
+                let line = line.strip_prefix("* ").map_or(line.to_string(), |parameter| format!("  {parameter}"));
+                let _ = write!(out, "{} {line}", if i == 0 { "" } else { "\n *" });
+            }
+            let parameters: Vec<String> = self
+                .parameters(item.function)
+                .iter()
+                .map(|p| format!("{}{c_type} {}[{}]", if p.is_output { "" } else { "const " }, p.name, p.length))
+                .collect();
+            let name = item.function.name();
+            let _ = writeln!(out, " */\nvoid {prefix}_{name}({});", parameters.join(", "));
+            if self.generated.lanes.is_some() {
+                let parameters: Vec<String> = self
+                    .parameters(item.function)
+                    .iter()
+                    .map(|p| match (p.is_output, p.is_shared) {
+                        (true, _) => format!("{c_type} *{}", p.name),
+                        (false, false) => format!("const {c_type} *{}", p.name),
+                        (false, true) => format!("const {c_type} {}[{}]", p.name, p.length),
+                    })
+                    .collect();
+                for (layout, _) in LAYOUTS {
+                    let _ = writeln!(out, "void {prefix}_{name}_batch_{layout}(size_t n, {});", parameters.join(", "));
+                }
+            }
+        }
+        out.push_str("\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n");
+        out
+    }
+
+    fn joints(&self) -> Vec<&straightline_core::model::Joint> {
+        let mut joints: Vec<_> = self.generated.model.bodies.iter().map(|b| &b.joint).collect();
+        joints.sort_by_key(|j| j.iv);
+        joints
+    }
+
+    fn joint_names(&self) -> impl Iterator<Item = &str> {
+        self.joints().into_iter().map(|j| j.name.as_str())
+    }
+}
+
+/// `c"a", c"b"`; what no C string can hold is left out.
+fn c_strings<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.map(|n| format!("c{}", string_literal(&n.replace('\0', "")))).collect::<Vec<_>>().join(", ")
+}

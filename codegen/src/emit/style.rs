@@ -1,0 +1,19 @@
+//! How functions are written.
+
+use crate::emit::Style;
+use crate::options::Options;
+
+impl Options {
+    /// How functions over lanes and the programs inside types are written.
+    pub fn style(&self) -> Style {
+        Style::plain(self.scalar).fused(self.fma).by_caller(self.fma_by_caller)
+    }
+
+    /// How plain functions are written.
+    pub fn plain_style(&self) -> Style {
+        match self.generic {
+            true => self.style().generic(),
+            false => self.style(),
+        }
+    }
+}

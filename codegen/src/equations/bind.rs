@@ -1,0 +1,242 @@
+//! A scene where it meets the equations: which inputs are left, what stands for the others, which results are wanted.
+
+use crate::equations::Robot;
+use crate::function::{higher_rate, Function};
+use crate::scene::free_drive::FreeDrive;
+use crate::scene::{Gravity, Parameter, Part, Scene, Selection};
+use straightline_core::model::{Load, Model};
+use straightline_core::reduced::ReducedModel;
+use straightline_core::spatial::{SpatialInertia, Sym3, Vec3};
+use straightline_core::{Dd, Real};
+use straightline_graph::expr::Port;
+
+/// The bodies, as a function of them sees them.
+pub struct Bound<T> {
+    /// The robot.
+    pub model: Model<T>,
+    /// Its reduced form.
+    pub reduced: ReducedModel<T>,
+    /// Its reduced form for the mass matrix.
+    pub composite: ReducedModel<T>,
+    /// The function's arguments, whole.
+    pub arguments: Vec<Vec<T>>,
+}
+
+impl Scene {
+    /// The input ports of a function: its own without those that are zero, then gravity and parameters where they are
+    /// inputs. Those of the latter that the function turns out not to need are dropped after tracing.
+    pub fn ports(&self, function: Function, model: &Model<Dd>) -> Vec<Port> {
+        let own = function.inputs(model).into_iter().filter(|p| !self.is_zero(&p.name));
+        let gravity = (self.gravity == Gravity::Input).then(|| Port::new("gravity", &[3]));
+        let parameters =
+            self.parameters.iter().map(|p| Port::wrapped(&p.input_name(), &[p.scalars(model)], &p.type_name()));
+        own.chain(gravity).chain(parameters).collect()
+    }
+
+    fn is_zero(&self, input: &str) -> bool {
+        (input == "qd" && self.zero.qd) || (input == "qdd" || higher_rate(input).is_some()) && self.zero.qdd
+    }
+
+    /// What a trace or an evaluation starts from, given what stands for [`Scene::ports`].
+    pub fn bind<T: Real>(&self, function: Function, robot: &Robot, inputs: &[Vec<T>]) -> Bound<T> {
+        let mut model: Model<T> = robot.model.cast();
+        let mut reduced = robot.reduced.map(T::constant);
+        let mut composite = robot.composite.map(T::constant);
+        let mut given = inputs.iter();
+        let whole = function.inputs(&robot.model);
+        let arguments = whole.iter().map(|port| {
+            let mut values = match self.is_zero(&port.name) {
+                true => vec![T::zero(); port.len()],
+                false => given.next().expect("a port per input").clone(),
+            };
+            if port.name == "qd" || port.name == "qdd" || higher_rate(&port.name).is_some() {
+                for joint in robot.model.bodies.iter().map(|b| &b.joint) {
+                    if self.zero.joints_at_rest.contains(&joint.name) {
+                        values[joint.iv..joint.iv + joint.kind.nv()].fill(T::zero());
+                    }
+                }
+            }
+            values
+        });
+        let arguments: Vec<Vec<T>> = arguments.collect();
+        if self.gravity == Gravity::Input {
+            let g = given.next().expect("a port for gravity");
+            model.gravity = Vec3::new(g[0], g[1], g[2]);
+            reduced.gravity = model.gravity;
+        }
+        for parameter in &self.parameters {
+            let values = given.next().expect("a port per parameter");
+            if let Some(drive) = FreeDrive::new(parameter, &robot.model) {
+                drive.put(&mut model, values);
+            }
+            let Some(body) = parameter.body(&robot.model) else { continue };
+            let (canonical, in_reduced) = (load(&values[..10]), load(&values[10..]));
+            model.bodies[body].carry(canonical);
+            for r in [&mut reduced.bodies[body], &mut composite.bodies[body]] {
+                r.mass = r.mass + in_reduced.mass;
+                r.first_moment = r.first_moment + in_reduced.first_moment;
+                r.second_moment = r.second_moment + in_reduced.second_moment;
+            }
+        }
+        Bound { model, reduced, composite, arguments }
+    }
+
+    /// The wanted results of a function, as indices into the whole of its outputs, and the blocks that they form.
+    pub fn select(&self, function: Function, model: &Model<Dd>, frames: usize) -> (Vec<usize>, Vec<Port>) {
+        let blocks = function.outputs(model, frames);
+        let selection = self.outputs.get(&function).cloned().unwrap_or_default();
+        let members = match function.members() {
+            [] if blocks.len() > 1 => return ((0..blocks.iter().map(Port::len).sum()).collect(), blocks),
+            [] => &[function],
+            members => members,
+        };
+        let (mut indices, mut ports, mut first) = (Vec::new(), Vec::new(), 0);
+        for (member, block) in members.iter().zip(&blocks) {
+            let (wanted, port) = self.select_block(*member, &selection, model, block);
+            indices.extend(wanted.into_iter().map(|k| first + k));
+            ports.push(port);
+            first += block.len();
+        }
+        (indices, ports)
+    }
+
+    /// Of the one block of results of a plain function, what a selection wants, in the order of matrices that is asked for.
+    fn select_block(
+        &self,
+        function: Function,
+        selection: &Selection,
+        model: &Model<Dd>,
+        whole: &Port,
+    ) -> (Vec<usize>, Port) {
+        let coordinates = selection.coordinates(model);
+        let (rows, columns, name) = (whole.shape[0], whole.shape.get(1).copied().unwrap_or(1), &whole.name);
+        use Function::*;
+        let (indices, shape): (Vec<usize>, Vec<usize>) = match function {
+            InverseDynamics | GravityForce | BiasForce | VelocityForce | ForwardDynamics => {
+                (coordinates.clone(), vec![coordinates.len()])
+            }
+            MassMatrix if selection.part == Part::Diagonal => {
+                (coordinates.iter().map(|i| i * columns + i).collect(), vec![coordinates.len()])
+            }
+            MassMatrix if self.by_columns => {
+                let entries = coordinates.iter().flat_map(|j| (0..rows).map(move |i| i * columns + j));
+                (entries.collect(), vec![coordinates.len(), rows])
+            }
+            MassMatrix => {
+                let entries = (0..rows).flat_map(|i| coordinates.iter().map(move |j| i * columns + j));
+                (entries.collect(), vec![rows, coordinates.len()])
+            }
+            JointWrenches => {
+                let mut joints: Vec<_> = model.bodies.iter().map(|b| &b.joint).collect();
+                joints.sort_by_key(|j| j.iv);
+                let wanted = (0..rows).filter(|i| selection.wants_joint(&joints[*i].name)).collect::<Vec<_>>();
+                let part = selection.part.of(0..6, 3);
+                let entries = wanted.iter().flat_map(|i| part.clone().map(move |k| i * 6 + k));
+                (entries.collect(), vec![wanted.len(), part.len()])
+            }
+            ForwardKinematics | FrameVelocity | FrameAcceleration | JacobianBias => {
+                let part = selection.part.of(0..columns, 3);
+                let entries = (0..rows).flat_map(|f| part.clone().map(move |k| f * columns + k));
+                (entries.collect(), vec![rows, part.len()])
+            }
+            Jacobian if self.by_columns => {
+                let (part, nv) = (&selection.part.of(0..6, 3), whole.shape[2]);
+                let column = |f: usize, j: usize| part.clone().map(move |k| (f * 6 + k) * nv + j);
+                let entries = (0..rows).flat_map(|f| coordinates.iter().flat_map(move |j| column(f, *j)));
+                (entries.collect(), vec![rows, coordinates.len(), part.len()])
+            }
+            Jacobian => {
+                let (part, nv) = (selection.part.of(0..6, 3), whole.shape[2]);
+                let row = |r: usize| coordinates.iter().map(move |j| r * nv + j);
+                let entries = (0..rows).flat_map(|f| part.clone().flat_map(move |k| row(f * 6 + k)));
+                (entries.collect(), vec![rows, part.len(), coordinates.len()])
+            }
+            Energy | CentreOfMass | Momentum | Drive(_) => ((0..whole.len()).collect(), whole.shape.clone()),
+            KinematicsAndJacobian => unreachable!("its members are selected from one by one"),
+        };
+        (indices, Port::new(name, &shape))
+    }
+
+    /// The frames of a function: its own, or those of the whole program.
+    pub fn frames_of<'a>(&'a self, function: Function, all: &'a [String]) -> &'a [String] {
+        match self.outputs.get(&function) {
+            Some(selection) if !selection.frames.is_empty() => &selection.frames,
+            _ => all,
+        }
+    }
+}
+
+impl Selection {
+    fn wants_joint(&self, name: &String) -> bool {
+        self.joints.is_empty() || self.joints.contains(name)
+    }
+
+    /// Velocity coordinates of the wanted joints, in the order in which they are named, or all.
+    fn coordinates(&self, model: &Model<Dd>) -> Vec<usize> {
+        if self.joints.is_empty() {
+            return (0..model.nv()).collect();
+        }
+        let joint = |name: &String| model.bodies.iter().map(|b| &b.joint).find(|j| j.name == *name);
+        self.joints.iter().filter_map(joint).flat_map(|j| j.iv..j.iv + j.kind.nv()).collect()
+    }
+}
+
+impl Part {
+    /// The wanted indices of a quantity whose first `linear` entries are linear.
+    fn of(self, all: std::ops::Range<usize>, linear: usize) -> std::ops::Range<usize> {
+        match self {
+            Part::Whole | Part::Diagonal => all,
+            Part::Linear => all.start..linear,
+            Part::Angular => linear..all.end,
+        }
+    }
+}
+
+fn load<T: Copy>(x: &[T]) -> Load<T> {
+    Load {
+        mass: x[0],
+        first_moment: Vec3::new(x[1], x[2], x[3]),
+        second_moment: Sym3 { xx: x[4], xy: x[5], xz: x[6], yy: x[7], yz: x[8], zz: x[9] },
+    }
+}
+
+/// What functions take of a parameter, from what its constructor takes ([`Parameter::given`]): the program of the constructor. Of a body:
+/// mass \[kg\], com\[3\] \[m\], inertia about it (xx, xy, xz, yy, yz, zz) \[kg·m²\]; of a drive: its free numbers.
+///
+/// # Panics
+/// If nothing of the robot depends on the parameter, which is refused before.
+pub fn constructed<T: Real>(robot: &Robot, parameter: &Parameter, inputs: &[Vec<T>]) -> Vec<T> {
+    match FreeDrive::new(parameter, &robot.model) {
+        Some(drive) => drive.values(&inputs[0]),
+        None => load_parameters(robot, parameter, inputs),
+    }
+}
+
+/// The ten parameters of a body given by mass, mass centre and inertia in a frame, in the two frames that the algorithms
+/// use. Inputs: mass, com\[3\], inertia about it (xx, xy, xz, yy, yz, zz).
+fn load_parameters<T: Real>(robot: &Robot, parameter: &Parameter, inputs: &[Vec<T>]) -> Vec<T> {
+    let frame = parameter.frame().and_then(|frame| robot.model.frame(frame));
+    let frame = frame.expect("frames were checked against the model");
+    let body = frame.body.expect("parameters of the world were refused");
+    let regauge = robot.reduced_frames[body].inverse();
+    let (mass, com, inertia) = (inputs[0][0], &inputs[1], &inputs[2]);
+    let tensor =
+        Sym3 { xx: inertia[0], xy: inertia[1], xz: inertia[2], yy: inertia[3], yz: inertia[4], zz: inertia[5] };
+    let in_canonical = frame.placement;
+    let in_reduced = regauge.compose(&in_canonical);
+    [in_canonical, in_reduced]
+        .into_iter()
+        .flat_map(|pose| {
+            let pose = pose.map(T::constant);
+            let c = pose.translation + pose.rotation * Vec3::new(com[0], com[1], com[2]);
+            let i = SpatialInertia::new(mass, c, tensor.rotated(&pose.rotation));
+            let (f, s) = (i.first_moment, i.second_moment);
+            [i.mass, f.x, f.y, f.z, s.xx, s.xy, s.xz, s.yy, s.yz, s.zz]
+        })
+        .collect()
+}
+
+/// Whether an input port goes when a function does not read it: gravity and parameters do, coordinates stay.
+pub fn is_optional(port: &Port) -> bool {
+    port.name == "gravity" || port.wrapper.is_some()
+}

@@ -1,0 +1,54 @@
+//! A robot in the forms that are traced.
+
+use crate::equations::reduce::{reduce, Choice};
+use std::sync::{Arc, Mutex, PoisonError};
+use straightline_core::model::Model;
+use straightline_core::reduced::ReducedModel;
+use straightline_core::spatial::Transform;
+use straightline_core::Dd;
+
+/// A robot in the forms that are traced.
+#[derive(Clone, Debug)]
+pub struct Robot {
+    /// As the robot file has it, in canonical frames.
+    pub model: Model<Dd>,
+    /// For joint torques alone.
+    pub reduced: ReducedModel<Dd>,
+    /// For the mass matrix alone.
+    pub composite: ReducedModel<Dd>,
+    /// Pose of each body's frame of the reduced forms in its canonical one.
+    pub reduced_frames: Vec<Transform<Dd>>,
+    /// The choices of reduced forms that were found for it.
+    pub found: Found,
+}
+
+impl Robot {
+    /// All forms of a robot, the reduced ones as any robot takes them.
+    pub fn new(model: Model<Dd>) -> Self {
+        let (reduced, reduced_frames) = reduce(&model, &Choice::plain(&model));
+        Robot { model, composite: reduced.clone(), reduced, reduced_frames, found: Found::default() }
+    }
+
+    /// The same robot in other reduced forms, for torques and for the mass matrix.
+    #[must_use]
+    pub fn reduced_by(&self, torques: &Choice, mass_matrix: &Choice) -> Self {
+        let (reduced, composite) = (reduce(&self.model, torques).0, reduce(&self.model, mass_matrix).0);
+        Robot { reduced, composite, ..self.clone() }
+    }
+}
+
+/// What was found for a robot, by function and scene: searched once, used by every function that shares it.
+#[derive(Clone, Debug, Default)]
+pub struct Found(Arc<Mutex<Vec<(String, Choice)>>>);
+
+impl Found {
+    pub(crate) fn or_search(&self, key: String, search: impl FnOnce() -> Choice) -> Choice {
+        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, choice)) = known().iter().find(|(k, _)| *k == key) {
+            return choice.clone();
+        }
+        let choice = search();
+        known().push((key, choice.clone()));
+        choice
+    }
+}

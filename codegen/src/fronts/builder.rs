@@ -1,0 +1,356 @@
+//! For build scripts: a robot file beside the manifest becomes a Rust file in `OUT_DIR`.
+//!
+//! In `build.rs`:
+//! ```no_run
+//! use straightline_codegen::{Builder, Function};
+//!
+//! fn main() -> Result<(), straightline_codegen::fronts::builder::Error> {
+//!     Builder::new("robots/panda.urdf")
+//!         .functions([Function::InverseDynamics, Function::MassMatrix])
+//!         .frames(["panda_hand_tcp"])
+//!         .build()?;
+//!     Ok(())
+//! }
+//! ```
+//! and where the dynamics are wanted:
+//! ```ignore
+//! pub mod panda {
+//!     include!(concat!(env!("OUT_DIR"), "/panda.rs"));
+//! }
+//! ```
+//! The build runs again when the robot file changes. Complaints name the file, the line and the column: errors end the
+//! build, warnings do not. Nothing is written outside `OUT_DIR`.
+
+use crate::choices::{ForwardDynamicsMethod, Lanes};
+use crate::compile::compile;
+use crate::diagnostic::{Diagnostics, Front, Level, Reporting, Severity, Source};
+use crate::emit::Generated;
+use crate::function::Function;
+use crate::identifier::prefix;
+use crate::options::Options;
+use crate::output::write_file_apart;
+use crate::scene::{self, Scene};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use straightline_graph::expr::Grade;
+use straightline_graph::Scalar;
+
+/// Compiles a robot file as it is, with all functions, into `$OUT_DIR/<file stem>.rs`.
+///
+/// # Errors
+/// See [`Builder::build`].
+pub fn compile_robot(robot: impl Into<PathBuf>) -> Result<Generated, Error> {
+    Builder::new(robot).build()
+}
+
+/// What to make of a robot file; see the [module](self).
+#[derive(Clone, Debug)]
+#[must_use = "nothing happens before `build`"]
+pub struct Builder {
+    robot: PathBuf,
+    scene_file: Option<PathBuf>,
+    module: Option<String>,
+    out_dir: Option<PathBuf>,
+    options: Options,
+}
+
+impl Builder {
+    /// From a robot file (URDF or TOML), relative to the package's manifest; with all functions, in f64.
+    pub fn new(robot: impl Into<PathBuf>) -> Self {
+        let reporting = Reporting { front: Front::Builder, ..Reporting::default() };
+        let options = Options { reporting, ..Options::default() };
+        Builder { robot: robot.into(), scene_file: None, module: None, out_dir: None, options }
+    }
+
+    /// These functions only.
+    pub fn functions(mut self, functions: impl IntoIterator<Item = Function>) -> Self {
+        self.options.functions = functions.into_iter().collect();
+        self.options.functions.sort_unstable();
+        self.options.functions.dedup();
+        self
+    }
+
+    /// The frames (links) of the functions that answer per frame; otherwise the tips of the robot.
+    pub fn frames(mut self, frames: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.options.frames = frames.into_iter().map(Into::into).collect();
+        self
+    }
+
+    /// The scalar type; otherwise f64.
+    pub fn scalar(mut self, scalar: Scalar) -> Self {
+        self.options.scalar = scalar;
+        self
+    }
+
+    /// Several scalar types: the first as [`Builder::scalar`], for each of the others a module `single` or `double` with the
+    /// same items.
+    pub fn scalars(mut self, scalars: impl IntoIterator<Item = Scalar>) -> Self {
+        let mut scalars = scalars.into_iter();
+        self.options.scalar = scalars.next().unwrap_or(self.options.scalar);
+        self.options.also = scalars.collect();
+        self
+    }
+
+    /// Beside every function the same over lanes of states and over batches.
+    pub fn lanes(mut self, lanes: Lanes) -> Self {
+        self.options.lanes = Some(lanes);
+        self
+    }
+
+    /// Whether plain functions take any scalar that is a `straightline::Real`: f32, f64, double-double, dual numbers, types of
+    /// your own. The code depends on the package `straightline`. Lanes, batches and stages keep [`Builder::scalar`].
+    pub fn generic(mut self, generic: bool) -> Self {
+        self.options.generic = generic;
+        self
+    }
+
+    /// Whether a·b + c is one operation, with one rounding, where the machine has it: last bits are other ones there than
+    /// elsewhere. The code needs `std`.
+    pub fn fma(mut self, fma: bool) -> Self {
+        self.options.fma = fma;
+        self
+    }
+
+    /// The weakest rewrite rules allowed; with [`Grade::Exact`] the code is the generic runtime, bit for bit.
+    pub fn rules(mut self, grade: Grade) -> Self {
+        self.options.grade = grade;
+        self
+    }
+
+    /// Bounds the rounding errors of every function, as constants beside the functions: see [`certify`](straightline_graph::certify).
+    pub fn certify(mut self, effort: straightline_graph::certify::Effort) -> Self {
+        self.options.certify = Some(effort);
+        self
+    }
+
+    /// How identical limbs are computed; otherwise each by itself.
+    pub fn limbs(mut self, form: crate::choices::LimbForm) -> Self {
+        self.options.limbs = form;
+        self
+    }
+
+    /// How forward dynamics is computed; otherwise the cheaper way for this robot.
+    pub fn forward_dynamics(mut self, method: ForwardDynamicsMethod) -> Self {
+        self.options.forward_dynamics = method;
+        self
+    }
+
+    /// Functions of more operations are cut into parts.
+    pub fn max_part_operations(mut self, operations: usize) -> Self {
+        self.options.limits.operations = operations;
+        self
+    }
+
+    /// Whether the root link moves freely in the world.
+    pub fn floating_base(mut self, floating: bool) -> Self {
+        self.options.model.floating_base = floating;
+        self
+    }
+
+    /// The joints in the order of their coordinates, all of them; otherwise depth first, as in the file.
+    pub fn joint_order(mut self, joints: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.options.model.joint_order = Some(joints.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// So near to a multiple of 30 or 45 degrees \[rad\] an angle is taken as that; 0: every angle as it is written.
+    pub fn angle_tolerance(mut self, tolerance: f64) -> Self {
+        self.options.model.angle_tolerance = tolerance;
+        self
+    }
+
+    /// Acceleration due to gravity in the world \[m/s²\]; otherwise the file's, or (0, 0, −9.81).
+    pub fn gravity(mut self, gravity: [f64; 3]) -> Self {
+        self.options.model.gravity = Some(gravity);
+        self
+    }
+
+    /// Warnings of this code are not said; `"warnings"`: none.
+    pub fn allow(self, code: impl Into<String>) -> Self {
+        self.level(code, Level::Allow)
+    }
+
+    /// Warnings of this code are said, whatever a scene or an earlier call says.
+    pub fn warn(self, code: impl Into<String>) -> Self {
+        self.level(code, Level::Warn)
+    }
+
+    /// Warnings of this code are errors; `"warnings"`: all.
+    pub fn deny(self, code: impl Into<String>) -> Self {
+        self.level(code, Level::Deny)
+    }
+
+    fn level(mut self, code: impl Into<String>, level: Level) -> Self {
+        self.options.reporting.levels.set(code, level);
+        self
+    }
+
+    /// A scene file (`SCENES.md`), relative to the package's manifest: what is wanted of the robot, and what is held. What it
+    /// says stands in place of what this builder says; the build runs again when it changes.
+    pub fn scene_file(mut self, scene: impl Into<PathBuf>) -> Self {
+        self.scene_file = Some(scene.into());
+        self
+    }
+
+    /// A scene made in code; a scene file takes its place.
+    pub fn scene(mut self, scene: Scene) -> Self {
+        self.options.scene = scene;
+        self
+    }
+
+    /// The name of the output, without `.rs`; otherwise the robot file's.
+    pub fn module(mut self, name: impl Into<String>) -> Self {
+        self.module = Some(name.into());
+        self
+    }
+
+    /// Where to write; otherwise cargo's `OUT_DIR`.
+    pub fn out_dir(mut self, directory: impl Into<PathBuf>) -> Self {
+        self.out_dir = Some(directory.into());
+        self
+    }
+
+    /// Compiles, writes the file, and tells cargo what there is to tell.
+    ///
+    /// # Errors
+    /// The robot file or the options are wrong (cargo shows each complaint with its place), or a file cannot be read
+    /// or written.
+    pub fn build(self) -> Result<Generated, Error> {
+        let variable = |name: &'static str| std::env::var_os(name).map(PathBuf::from);
+        // without cargo: relative to where we are
+        let manifest = variable("CARGO_MANIFEST_DIR").unwrap_or_default();
+        let out_dir = self.out_dir.clone().or_else(|| variable("OUT_DIR")).ok_or(Error::NoOutDir)?;
+        let Messages { cargo, person, result } = self.run(&manifest, &out_dir);
+        cargo.iter().for_each(|line| println!("{line}"));
+        eprint!("{person}");
+        result
+    }
+
+    /// What [`build`](Builder::build) does and says, without saying it.
+    #[doc(hidden)]
+    pub fn run(&self, manifest: &Path, out_dir: &Path) -> Messages {
+        let robot = manifest.join(&self.robot);
+        let scene = self.scene_file.as_ref().map(|scene| manifest.join(scene));
+        let files: Vec<&PathBuf> = [&robot].into_iter().chain(&scene).collect();
+        let mut messages = Messages {
+            cargo: files.iter().map(|file| format!("cargo::rerun-if-changed={}", file.display())).collect(),
+            person: String::new(),
+            result: Err(Error::NoOutDir),
+        };
+        messages.result = self.compile(&robot, scene.as_deref(), out_dir, &mut messages);
+        if let Err(error @ (Error::Read(..) | Error::Write(_))) = &messages.result {
+            messages.cargo.push(format!("cargo::error={error}"));
+        }
+        messages
+    }
+
+    fn compile(
+        &self,
+        robot: &Path,
+        scene: Option<&Path>,
+        out_dir: &Path,
+        messages: &mut Messages,
+    ) -> Result<Generated, Error> {
+        let read = |file: &Path, shown: &Path| {
+            let bytes = std::fs::read(file).map_err(|e| Error::Read(file.to_path_buf(), e))?;
+            Ok(Source::from_bytes(&shown.display().to_string(), bytes))
+        };
+        let source = read(robot, &self.robot)?;
+        let mut options = self.options.clone();
+        if let (Some(file), Some(shown)) = (scene, &self.scene_file) {
+            options = scene::read_partly(&read(file, shown)?).into_options(options);
+        }
+        let generated = compile(&source, &options).map_err(|diagnostics| {
+            messages.tell(&diagnostics);
+            let of_robot = diagnostics.iter().any(|d| d.place.as_ref().is_none_or(|p| *p.file == *source.path()));
+            let path = self.scene_file.as_ref().filter(|_| !of_robot).unwrap_or(&self.robot).clone();
+            Error::Robot { path, errors: diagnostics.count(Severity::Error) }
+        })?;
+        messages.tell(&generated.warnings);
+        let stem = self.robot.file_stem().unwrap_or_default().to_string_lossy();
+        let module = self.module.clone().unwrap_or_else(|| prefix(&stem));
+        if Path::new(&module).file_name().is_none_or(|name| name != module.as_str()) {
+            return Err(Error::Module(module));
+        }
+        let file = out_dir.join(format!("{module}.rs"));
+        write_file_apart(&file, &generated.text, [robot].into_iter().chain(scene)).map_err(Error::Write)?;
+        Ok(generated)
+    }
+}
+
+/// What goes where.
+#[derive(Debug)]
+#[doc(hidden)]
+pub struct Messages {
+    /// Lines on standard output, which cargo reads.
+    pub cargo: Vec<String>,
+    /// Text on standard error, which cargo shows when the build fails.
+    pub person: String,
+    /// What was made.
+    pub result: Result<Generated, Error>,
+}
+
+impl Messages {
+    fn tell(&mut self, diagnostics: &Diagnostics) {
+        for diagnostic in diagnostics.iter() {
+            let kind = match diagnostic.severity {
+                Severity::Error => "error",
+                Severity::Warning => "warning",
+                Severity::Note => continue,
+            };
+            self.cargo.push(format!("cargo::{kind}={}", diagnostic.line()));
+        }
+        // cargo shows warnings from its own lines, whether the build fails or not
+        self.person.push_str(&diagnostics.at_least(Severity::Error).render());
+    }
+}
+
+/// Why there is no output. Complaints about the robot file or the scene have been printed already.
+pub enum Error {
+    /// The robot file, the scene, or what was asked of them, is wrong.
+    Robot {
+        /// The file, as it was given.
+        path: PathBuf,
+        /// Number of errors.
+        errors: usize,
+    },
+    /// The robot file or the scene cannot be read.
+    Read(PathBuf, std::io::Error),
+    /// The output cannot be written.
+    Write(std::io::Error),
+    /// What [`Builder::module`] was told is no name of a file.
+    Module(String),
+    /// Neither cargo's `OUT_DIR` nor [`Builder::out_dir`] says where to write.
+    NoOutDir,
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Robot { path, errors: 1 } => write!(f, "{}: 1 error", path.display()),
+            Error::Robot { path, errors } => write!(f, "{}: {errors} errors", path.display()),
+            Error::Read(path, error) => write!(f, "{}: {error}", path.display()),
+            Error::Write(error) => write!(f, "{error}"),
+            Error::Module(name) => {
+                write!(f, "`{}` is no name of a module: it becomes that of a file", name.escape_default())
+            }
+            Error::NoOutDir => f.write_str("OUT_DIR is not set: outside of a build script, say where with `out_dir`"),
+        }
+    }
+}
+
+/// As [`fmt::Display`]: this is what a build script prints whose `main` returns it.
+impl fmt::Debug for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Error::Read(_, error) | Error::Write(error) => Some(error),
+            Error::Robot { .. } | Error::Module(_) | Error::NoOutDir => None,
+        }
+    }
+}

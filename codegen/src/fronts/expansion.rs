@@ -1,0 +1,248 @@
+//! What the macros expand to, as text; `straightline-macros` is a shell over this.
+
+use crate::diagnostic::{Diagnostic, Diagnostics, Front, Reporting, Severity, Source};
+use crate::emit::{array_type, batch, Generated};
+use crate::options::Options;
+use crate::{compile, scene};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use straightline_graph::expr::Port;
+use straightline_graph::Scalar;
+
+/// What became of a robot file and its scene.
+#[derive(Debug)]
+pub struct Expansion {
+    /// The files that were read: the expansion depends on them, right or wrong.
+    pub files: Vec<PathBuf>,
+    /// The dynamics, or what is wrong.
+    pub result: Result<Generated, Refusal>,
+    /// What to tell the person besides.
+    pub warnings: String,
+    /// The text of the scene, right or wrong, if there is one.
+    pub scene: Option<String>,
+}
+
+/// Why nothing was compiled.
+#[derive(Debug, Default)]
+pub struct Refusal {
+    /// What to tell the person of files and options; empty if it is the scene in the macro alone that is wrong.
+    pub message: String,
+    /// Errors of a scene that stands in the macro.
+    pub of_scene: Vec<Diagnostic>,
+}
+
+impl From<String> for Refusal {
+    fn from(message: String) -> Self {
+        Refusal { message, of_scene: Vec::new() }
+    }
+}
+
+/// Where the scene of a macro stands.
+#[derive(Clone, Debug)]
+pub enum SceneOf {
+    /// In the file of that name.
+    File(String),
+    /// In the macro, as the text of a scene file.
+    Macro(Source),
+}
+
+/// Compiles the robot file that a macro names, in the scene that it names or holds; files are looked for in these
+/// directories. What the scene says stands in place of what the options say.
+pub fn expand(robot: &str, scene: Option<&SceneOf>, directories: &[&Path], options: &Options) -> Expansion {
+    let mut files = Vec::new();
+    let opened = open(robot, scene, directories, &mut files);
+    let text = scene_text(scene, &opened);
+    match opened.map_err(|(refusal, _)| refusal).and_then(|opened| compiled(&opened, options)) {
+        Ok((warnings, generated)) => Expansion { files, result: Ok(generated), warnings, scene: text },
+        Err(refusal) => Expansion { files, result: Err(refusal), warnings: String::new(), scene: text },
+    }
+}
+
+/// The same, where the options are wrong and nothing is to be made: what else is wrong, if anything is.
+pub fn examine(
+    robot: &str,
+    scene: Option<&SceneOf>,
+    directories: &[&Path],
+    options: &Options,
+) -> (Vec<PathBuf>, Option<Refusal>, Option<String>) {
+    let mut files = Vec::new();
+    let opened = open(robot, scene, directories, &mut files);
+    let text = scene_text(scene, &opened);
+    let refusal = match opened {
+        Err((refusal, _)) => Some(refusal),
+        Ok(opened) => {
+            let found = compile::examine(&opened.robot, &opened.options(options));
+            found.has_errors().then(|| refusal(&found, opened.robot.path(), opened.within()))
+        }
+    };
+    (files, refusal, text)
+}
+
+/// The files of a macro.
+struct Opened {
+    robot: Source,
+    scene: Option<Source>,
+    is_within: bool,
+}
+
+impl Opened {
+    /// The options, with what the scene says of them.
+    fn options(&self, options: &Options) -> Options {
+        let reporting = Reporting { front: Front::Derive, ..options.reporting.clone() };
+        let options = Options { reporting, ..options.clone() };
+        match &self.scene {
+            None => options,
+            Some(source) => scene::read_partly(source).into_options(options),
+        }
+    }
+
+    /// The path of the scene, if it stands in the macro.
+    fn within(&self) -> Option<&str> {
+        self.scene.as_ref().filter(|_| self.is_within).map(Source::path)
+    }
+}
+
+/// Opens robot file and scene and notes the files; what is missing, with the scene's source if that is there.
+fn open(
+    robot: &str,
+    scene: Option<&SceneOf>,
+    directories: &[&Path],
+    files: &mut Vec<PathBuf>,
+) -> Result<Opened, (Refusal, Option<Source>)> {
+    let robot = found("robot", robot, directories, files);
+    let (scene, is_within) = match scene {
+        None => (Ok(None), false),
+        Some(SceneOf::File(name)) => (found("scene", name, directories, files).map(Some), false),
+        Some(SceneOf::Macro(source)) => (Ok(Some(source.clone())), true),
+    };
+    match (robot, scene) {
+        (Ok(robot), Ok(scene)) => Ok(Opened { robot, scene, is_within }),
+        (Err(a), Err(b)) => Err((format!("{a}\n{b}").into(), None)),
+        (Err(message), Ok(scene)) => Err((message.into(), scene)),
+        (Ok(_), Err(message)) => Err((message.into(), None)),
+    }
+}
+
+/// The text of the scene; empty if its file cannot be read.
+fn scene_text(scene: Option<&SceneOf>, opened: &Result<Opened, (Refusal, Option<Source>)>) -> Option<String> {
+    let source = match opened {
+        Ok(opened) => opened.scene.as_ref(),
+        Err((_, source)) => source.as_ref(),
+    };
+    scene.map(|_| source.map_or_else(String::new, |source| source.text().to_string()))
+}
+
+/// Warnings and dynamics, or what is wrong.
+fn compiled(opened: &Opened, options: &Options) -> Result<(String, Generated), Refusal> {
+    let robot = &opened.robot;
+    let generated = compile::compile(robot, &opened.options(options))
+        .map_err(|diagnostics| refusal(&diagnostics, robot.path(), opened.within()))?;
+    Ok((generated.warnings.at_least(Severity::Warning).render(), generated))
+}
+
+/// What is wrong with the robot file of that path and its scene, which stands `within` the macro or in another file.
+fn refusal(diagnostics: &Diagnostics, robot: &str, within: Option<&str>) -> Refusal {
+    let file = |d: &Diagnostic| d.place.as_ref().map(|place| place.file.clone());
+    let is_within = |d: &Diagnostic| within.is_some() && file(d).as_deref() == within;
+    let errors = || diagnostics.iter().filter(|d| d.severity == Severity::Error);
+    let of_scene: Vec<Diagnostic> = errors().filter(|d| is_within(d)).cloned().collect();
+    if errors().all(is_within) && !of_scene.is_empty() {
+        return Refusal { message: String::new(), of_scene };
+    }
+    let is_of_scene = |d: &Diagnostic| file(d).is_some_and(|file| *file != *robot);
+    let what = if errors().all(is_of_scene) && diagnostics.has_errors() { "scene" } else { "robot file" };
+    let rest = diagnostics.at_least(Severity::Warning).without(is_within);
+    Refusal { message: format!("the {what} is wrong\n{}", rest.render().trim_end()), of_scene }
+}
+
+/// The file of that name in the first directory that has it.
+fn found(what: &str, name: &str, directories: &[&Path], files: &mut Vec<PathBuf>) -> Result<Source, String> {
+    let tried: Vec<PathBuf> = directories.iter().map(|d| d.join(name)).collect();
+    let Some(file) = tried.iter().find_map(|path| path.canonicalize().ok()) else {
+        let mut message = format!("there is no {what} file `{}`; tried:", name.escape_default());
+        tried.iter().for_each(|path| message.push_str(&format!("\n  {}", path.display())));
+        message.push_str("\nhelp: the path counts from the package's manifest, or else from the source file");
+        return Err(message);
+    };
+    let bytes = std::fs::read(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+    files.push(file);
+    Ok(Source::from_bytes(name, bytes))
+}
+
+/// Whether there is more than constants and functions of one scalar, which are all that a type can have associated: types of
+/// parameters and stages, or further scalars.
+pub fn needs_a_module(generated: &Generated) -> bool {
+    !generated.types.is_empty() || !generated.others.is_empty()
+}
+
+/// Constants and functions of the module `dynamics` as associated items of a type.
+pub fn associated_items(generated: &Generated) -> String {
+    let Generated { model, frames, scalar, .. } = generated;
+    let joints = model.bodies.len();
+    let limited = model.bodies.iter().filter(|b| b.joint.kind.is_single()).count();
+    let numbers = format!("[{}; {limited}]", scalar.name());
+    let mut out = String::new();
+    let mut constant = |name: &str, kind: &str, doc: &str| {
+        let _ = writeln!(out, "/// {doc}\npub const {name}: {kind} = dynamics::{name};");
+    };
+    constant("NQ", "usize", "Number of configuration coordinates q.");
+    constant("NV", "usize", "Number of velocity coordinates qd, qdd, tau.");
+    constant("JOINT_NAMES", &format!("[&'static str; {joints}]"), "Joints in the order of their coordinates.");
+    constant(
+        "FRAME_NAMES",
+        &format!("[&'static str; {}]", frames.len()),
+        "Frames of the functions that answer per frame.",
+    );
+    constant("LOWER_LIMITS", &numbers, "Least coordinate of every joint \\[rad or m\\]; without a floating base.");
+    constant("UPPER_LIMITS", &numbers, "Greatest coordinate of every joint \\[rad or m\\]; without a floating base.");
+    constant("VELOCITY_LIMITS", &numbers, "Greatest speed of every joint \\[rad/s or m/s\\]; without a floating base.");
+    constant("EFFORT_LIMITS", &numbers, "Greatest drive of every joint \\[N·m or N\\]; without a floating base.");
+    if !model.drives.is_empty() {
+        let n = model.drives.len();
+        constant("NU", "usize", "Number of inputs u of the drives.");
+        constant("NX", "usize", "Number of states x of the drives.");
+        constant("DRIVE_NAMES", &format!("[&'static str; {n}]"), "Drives in the order of u.");
+        constant("DRIVE_STATES", &format!("[usize; {n}]"), "How many entries of x each drive has.");
+    }
+    for item in &generated.items {
+        let name = item.function.name();
+        constant(&format!("{}_COST", name.to_uppercase()), "dynamics::Cost", &format!("What [`Self::{name}`] costs."));
+    }
+    for (name, errors) in generated.report.functions.iter().filter_map(|(n, f)| Some((n, f.errors.as_ref()?))) {
+        for output in &errors.outputs {
+            let kind = array_type(&Port::new(&output.name, &output.shape), Scalar::F64);
+            let ranges = errors.ranges.join("; ").replace('[', "\\[").replace(']', "\\]");
+            let doc =
+                format!("Bound of the rounding errors of [`Self::{name}`], for inputs in these ranges: {ranges}.");
+            constant(&errors.constant_name(name, output), &kind, &doc);
+        }
+    }
+    for item in &generated.items {
+        let name = item.function.name();
+        let parameters = item.inputs.iter().map(|p| (p, "&")).chain(item.outputs.iter().map(|p| (p, "&mut ")));
+        let array = |p: &Port| {
+            let module = if p.wrapper.is_some() { "dynamics::" } else { "" };
+            format!("{module}{}", generated.plain_style.array_type(p))
+        };
+        let signature: Vec<String> =
+            parameters.clone().map(|(p, reference)| format!("{}: {reference}{}", p.name, array(p))).collect();
+        let arguments: Vec<&str> = parameters.map(|(p, _)| p.name.as_str()).collect();
+        for line in
+            item.doc.replace("[`FRAME_NAMES`]", "[`Self::FRAME_NAMES`]").replace("[`DRIVE_", "[`Self::DRIVE_").lines()
+        {
+            let _ = writeln!(out, "/// {line}");
+        }
+        let _ = writeln!(
+            out,
+            "{}#[inline]\npub fn {name}{}({}) {{\n    dynamics::{name}({})\n}}",
+            item.function.alias_attribute(),
+            if generated.plain_style.generic { "<T: ::straightline::Real>" } else { "" },
+            signature.join(", "),
+            arguments.join(", ")
+        );
+        if let Some(lanes) = generated.lanes {
+            out.push_str(&batch::associated(item, generated.style, lanes));
+        }
+    }
+    out
+}

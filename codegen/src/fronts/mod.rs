@@ -1,0 +1,7 @@
+//! What users call: a builder for build scripts, and what the derive macro expands to.
+
+pub mod builder;
+pub mod expansion;
+pub mod stubs;
+
+pub use builder::{compile_robot, Builder};

@@ -1,0 +1,212 @@
+//! What a macro expands to beside its errors when there is no dynamics: items of the names that there would be, so that a use of
+//! one is no further error.
+//!
+//! Where the robot cannot be read, neither the sizes of arrays nor, in a scene, the number of arguments are known. So each item
+//! has the type [`MISSING`], which is an error itself, one that was said: the compiler takes a value of that type anywhere,
+//! and whatever is done with it. Such a type comes from a constant that does not evaluate, in the projection
+//! `<Why<{ compile_error!(..) }> as Stub>::Item`; [`DEFINITION`] has what it takes. Lengths are numbers that do not evaluate.
+
+use crate::choices::Lanes;
+use crate::function::{ContactFunction, Function};
+use crate::identifier::{identifier, upper_camel_case};
+use crate::options::Options;
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use straightline_graph::Scalar;
+
+/// The name of the type of what is missing.
+pub const MISSING: &str = "__Missing";
+
+/// What the type is defined by: a macro adds `pub type __Missing = <__Why<{ compile_error!(..) }> as __Stub>::Item;`.
+pub const DEFINITION: &str = "
+#[doc(hidden)]
+pub trait __Stub {
+    type Item;
+}
+#[doc(hidden)]
+pub struct __Why<const N: usize>;
+impl __Stub for __Why<0> {
+    type Item = ();
+}
+";
+
+/// Lengths of arrays.
+const LENGTHS: [&str; 4] = ["NQ", "NV", "NU", "NX"];
+/// Further constants of a robot.
+const CONSTANTS: [&str; 8] = [
+    "JOINT_NAMES",
+    "FRAME_NAMES",
+    "LOWER_LIMITS",
+    "UPPER_LIMITS",
+    "VELOCITY_LIMITS",
+    "EFFORT_LIMITS",
+    "DRIVE_NAMES",
+    "DRIVE_STATES",
+];
+
+/// The items of the module, beside the definition of [`MISSING`]; `scene` is the text of the scene, if there is one.
+pub fn module_items(options: &Options, scene: Option<&str>) -> String {
+    let mut out = items_and_types(options, scene, "");
+    for scalar in &options.also {
+        let inner = items_and_types(options, scene, "super::");
+        let _ = writeln!(out, "pub mod {} {{\n{inner}}}", scalar.module());
+    }
+    if options.also.is_empty() && scene.is_some() {
+        // a scene may ask for another scalar
+        let other = [Scalar::F64, Scalar::F32].into_iter().find(|s| *s != options.scalar).unwrap_or(Scalar::F32);
+        let inner = items_and_types(options, scene, "super::");
+        let _ = writeln!(out, "pub mod {} {{\n{inner}}}", other.module());
+    }
+    out
+}
+
+/// The constants and functions of a type; `dynamics` is the module that holds [`MISSING`].
+pub fn associated_items(options: &Options, scene: Option<&str>) -> String {
+    constants_and_functions(options, scene, &format!("dynamics::{MISSING}"))
+}
+
+fn items_and_types(options: &Options, scene: Option<&str>, upwards: &str) -> String {
+    let missing = format!("{upwards}{MISSING}");
+    let mut out = constants_and_functions(options, scene, &missing);
+    let names = scene.map(names).unwrap_or_default();
+    let mut taken: BTreeSet<String> = BTreeSet::new();
+    let mut add_type = |out: &mut String, name: &str| {
+        if taken.insert(name.to_string()) {
+            let _ = writeln!(out, "pub type {name} = {missing};");
+        }
+    };
+    add_type(&mut out, "Cost");
+    if options.lanes.is_some() {
+        let _ = writeln!(out, "pub mod batch {{\n    pub type WrongLength = super::{missing};\n}}");
+    }
+    if scene.is_none() {
+        return out;
+    }
+    add_type(&mut out, "Unphysical");
+    add_type(&mut out, "OutOfRange");
+    for name in &names {
+        add_type(&mut out, &upper_camel_case(name));
+        add_type(&mut out, &(upper_camel_case(name) + "Numbers"));
+    }
+    let stages = ["Parameters", "Configuration", "Velocity"];
+    let stages: String = stages.iter().map(|name| format!("    pub type {name} = super::{missing};\n")).collect();
+    let _ = writeln!(out, "pub mod staged {{\n{stages}}}");
+    out.push_str("pub mod contact {\n");
+    let _ = writeln!(out, "    pub type Mode = super::{missing};");
+    let _ = writeln!(out, "    {}", length("MOST_CONSTRAINED", &format!("super::{missing}")));
+    let _ = writeln!(out, "    {}", value("forward_dynamics", &format!("super::{missing}")));
+    for name in &names {
+        let missing = format!("super::super::{missing}");
+        let mut inner = String::new();
+        for constant in ["CONSTRAINED", "FREE"] {
+            let _ = writeln!(inner, "        {}", value(constant, &missing));
+        }
+        for (function, _) in ContactFunction::WORDS {
+            let _ = writeln!(inner, "        {}", value(function, &missing));
+            let _ = writeln!(inner, "        {}", value(&format!("{function}_error_bound"), &missing));
+        }
+        let _ = writeln!(out, "    pub mod {name} {{\n{inner}    }}");
+    }
+    out.push_str("}\n");
+    out
+}
+
+fn constants_and_functions(options: &Options, scene: Option<&str>, missing: &str) -> String {
+    let mut out = String::new();
+    for name in LENGTHS {
+        let _ = writeln!(out, "{}", length(name, missing));
+    }
+    for name in CONSTANTS {
+        let _ = writeln!(out, "{}", value(name, missing));
+    }
+    for function in functions(options, scene) {
+        let name = function.name();
+        let upper = name.to_uppercase();
+        // without a scene the number of arguments is known
+        let known = scene.is_none().then(|| function.arguments()).flatten();
+        match known.filter(|_| options.generic) {
+            Some(arguments) => out.push_str(&generic(name, "T", arguments, missing)),
+            None => {
+                let _ = writeln!(out, "{}", value(name, missing));
+            }
+        }
+        for constant in [format!("{upper}_COST"), format!("{name}_error_bound"), format!("{upper}_ERROR_BOUND")] {
+            let _ = writeln!(out, "{}", value(&constant, missing));
+        }
+        for output in function.output_names().filter(|_| function.output_names().count() > 1) {
+            let _ = writeln!(out, "{}", value(&format!("{upper}_{}_ERROR_BOUND", output.to_uppercase()), missing));
+        }
+        let Some(lanes) = options.lanes else { continue };
+        match known {
+            Some(arguments) => out.push_str(&generic(&format!("{name}_lanes"), "const N: usize", arguments, missing)),
+            None => {
+                let _ = writeln!(out, "{}", value(&format!("{name}_lanes"), missing));
+            }
+        }
+        let threads: &[&str] = if lanes == Lanes::Runtime { &["", "_parallel"] } else { &[""] };
+        for (layout, threads) in ["soa", "aos"].iter().flat_map(|layout| threads.iter().map(move |t| (layout, t))) {
+            let _ = writeln!(out, "{}", value(&format!("{name}_batch_{layout}{threads}"), missing));
+        }
+    }
+    out
+}
+
+/// The functions that there may be.
+fn functions(options: &Options, scene: Option<&str>) -> Vec<Function> {
+    match scene.is_some() || options.functions.iter().copied().eq(Function::all()) {
+        true => Function::known().collect(),
+        false => options.functions.clone(),
+    }
+}
+
+fn length(name: &str, missing: &str) -> String {
+    format!("pub const {name}: usize = <{missing}>::value;")
+}
+
+fn value(name: &str, missing: &str) -> String {
+    format!("pub const {name}: {missing} = <{missing}>::value;")
+}
+
+fn generic(name: &str, parameter: &str, arguments: usize, missing: &str) -> String {
+    let arguments: Vec<String> = (0..arguments).map(|k| format!("_{k}: {missing}")).collect();
+    format!("pub fn {name}<{parameter}>({}) -> {missing} {{\n    <{missing}>::value\n}}\n", arguments.join(", "))
+}
+
+/// What a scene's text gives names to, as identifiers: parameters, contacts, modes. It need not be readable.
+fn names(text: &str) -> BTreeSet<String> {
+    let mut names = BTreeSet::new();
+    for line in text.split(['\n', ',', '{', '(']) {
+        // a parameter of a link or of a drive has their name
+        let keys = ["name", "link", "drive"];
+        let Some(rest) = keys.iter().find_map(|key| line.trim_start().strip_prefix(key)) else { continue };
+        let Some(quoted) = rest.trim_start().strip_prefix('=').map(str::trim_start) else { continue };
+        let quote = quoted.chars().next().filter(|c| ['"', '\''].contains(c));
+        if let Some(name) = quote.and_then(|quote| quoted[1..].split(quote).next()) {
+            names.extend(["body", "mode"].map(|what| identifier(name, what)));
+        }
+    }
+    names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_found_in_text_that_no_reader_takes() {
+        let text =
+            "[[parameter]\nname = \"tool 2\"\n[[mode]]\nname='left'\ncontacts = [\nparameter = { name = \"Grip\" }";
+        assert_eq!(names(text).into_iter().collect::<Vec<_>>(), ["grip", "left", "tool_2"]);
+    }
+
+    #[test]
+    fn without_a_scene_the_functions_are_those_that_are_asked_for() {
+        let options =
+            Options { functions: vec![Function::GravityForce], lanes: Some(Lanes::Runtime), ..Options::default() };
+        let items = associated_items(&options, None);
+        assert!(items.contains("pub const NQ: usize = "), "{items}");
+        assert!(items.contains("pub const gravity_force: dynamics::__Missing = "), "{items}");
+        assert!(items.contains("pub fn gravity_force_lanes<const N: usize>(_0: dynamics::__Missing, _1"), "{items}");
+        assert!(items.contains("gravity_force_batch_soa_parallel") && !items.contains("mass_matrix"), "{items}");
+    }
+}

@@ -1,0 +1,55 @@
+//! Options and scene, where they contradict each other.
+
+use crate::choices::LimbForm;
+use crate::diagnostic::Diagnostics;
+use crate::function::Function;
+use crate::options::Options;
+use crate::scene::{messages as say, Base, Gravity};
+use straightline_graph::expr::Grade;
+
+/// What reading the scene's file found, or else what the scene and the options beside it contradict each other in. Scenes from
+/// files are read into options by [`SceneFile::into_options`](super::SceneFile::into_options), which cannot contradict itself.
+pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
+    let scene = &options.scene;
+    diagnostics.extend(scene.places.complaints().clone());
+    if scene.places.complaints().has_errors() {
+        return;
+    }
+    if let Some(source) = scene.places.source() {
+        diagnostics.add_source(source);
+    }
+    for (i, scalar) in options.also.iter().enumerate() {
+        if *scalar == options.scalar || options.also[..i].contains(scalar) {
+            scene.places.complain("numbers.scalar", say::scalar_twice(scalar.name()), diagnostics);
+        }
+    }
+    if scene.gravity != Gravity::OfRobot && options.model.gravity.is_some() {
+        scene.places.complain("hold.gravity", say::said_twice("gravity"), diagnostics);
+    }
+    if scene.base == Base::Fixed && options.model.floating_base {
+        scene.places.complain("hold.base", say::said_twice("the base"), diagnostics);
+    }
+    if scene.base == Base::Moving && options.functions.iter().any(|f| f.is_forward()) {
+        scene.places.complain("hold.base", say::moving_base_forward(), diagnostics);
+    }
+    for (function, _) in scene.budgets.iter().filter(|(_, b)| b.mixed_precision) {
+        let path = format!("budget.{}.mixed_precision", function.name());
+        let in_lanes = options.limbs == LimbForm::Lanes;
+        for (with, is_asked) in
+            [("`fma`", options.fma), ("`generic`", options.generic), ("`limbs = \"lanes\"`", in_lanes)]
+        {
+            if is_asked {
+                scene.places.complain(&path, say::mixed_elsewhere(with), diagnostics);
+            }
+        }
+    }
+    if options.limbs == LimbForm::Lanes && options.grade == Grade::Exact {
+        scene.places.complain("outputs.limbs", say::limbs_exact(), diagnostics);
+    }
+    // of a file this was said when it was read, whatever functions of it are asked for
+    let is_alone = |function: &&Function| scene.places.source().is_none() && !options.functions.contains(function);
+    for function in scene.budgets.keys().filter(is_alone) {
+        let name = function.name();
+        scene.places.complain(&format!("budget.{name}"), say::budget_alone(name), diagnostics);
+    }
+}

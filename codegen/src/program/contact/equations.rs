@@ -1,0 +1,353 @@
+//! The equations of a contact mode, over any scalar.
+
+use super::{ridge, Closed, Mode};
+use crate::choices::ForwardDynamicsMethod;
+use crate::equations::bind::Bound;
+use crate::equations::Robot;
+use crate::function::{ContactFunction, Function};
+use crate::options::Options;
+use crate::scene::contact::{tool_axes, SurfaceItem};
+use std::collections::BTreeMap;
+use straightline_core::algorithms::{
+    ContactRows, Environment, FunctionalCoordinates, Ltdl, RelativeMotion, Struck, Support,
+};
+use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion, Surface};
+use straightline_core::spatial::{Mat3, MotionVector, Transform, Vec3};
+use straightline_core::{algorithms as alg, Dd, Real};
+
+/// Inputs beside the robot's own, by name.
+pub(super) type Added<T> = BTreeMap<String, Vec<T>>;
+
+/// Which of their forms equations take.
+#[derive(Clone, Copy)]
+pub(super) struct Form<T> {
+    /// By the reduced robot, where it serves.
+    pub reduced: bool,
+    /// The surfaces of objects over this scalar.
+    pub surface: fn(&SurfaceItem) -> Surface<T>,
+    /// What is added to accelerations of contact points and taken away again, as the reduced robot does with gravity.
+    pub falls: Option<T>,
+}
+
+/// A contact, how its frame moves, and what it constrains.
+struct Traced<'a, T> {
+    closed: Option<&'a Closed<'a>>,
+    contact: Contact<T>,
+    motion: RelativeMotion<T>,
+    constrained: FunctionalCoordinates<T>,
+    environment: Option<Environment<T>>,
+}
+
+/// What is left of the equations at a given q̈ and F, with H, J, the rows in which reactions act, and the masses of yielding rows; one list
+/// per output of [`residual::OUTPUTS`](straightline_graph::certify::residual::OUTPUTS).
+pub(super) fn system<T: Real>(
+    robot: &Robot,
+    options: &Options,
+    mode: &Mode,
+    bound: &Bound<T>,
+    form: Form<T>,
+    added: &Added<T>,
+    (qdd, force): (&[T], &[T]),
+) -> Vec<Vec<T>> {
+    let (q, qd, tau) = (&bound.arguments[0], &bound.arguments[1], &bound.arguments[2]);
+    let traced = contacts(robot, mode, bound, added, form);
+    let constrained = traced.iter().fold(FunctionalCoordinates::default(), |all, t| all.and(t.constrained.clone()));
+    let applied: Vec<Vec<T>> =
+        traced.iter().flat_map(|t| alg::applied_rows(&t.contact, &t.motion, &t.constrained)).collect();
+    let (supports, _) = supports(&traced, &constrained, options, added);
+    let inverse = of_robot(bound, form.reduced, Function::InverseDynamics, &[q.clone(), qd.clone(), qdd.to_vec()]);
+    let mass_matrix = of_robot(bound, form.reduced, Function::MassMatrix, std::slice::from_ref(q));
+    let residual = (0..inverse.len()).map(|i| {
+        let driven = applied.iter().zip(force).fold(tau[i], |sum, (row, f)| sum + row[i] * *f);
+        driven - inverse[i]
+    });
+    let rows = constrained.jacobian.iter().zip(&constrained.bias).zip(&supports).zip(force);
+    let missing = rows.map(|(((row, bias), support), force)| {
+        let sdd = row.iter().zip(qdd).fold(*bias, |sum, (j, x)| sum + *j * *x);
+        match *support {
+            Support::Rigid(wanted) => wanted - sdd,
+            Support::Yielding { mass, load } => -(load + mass * sdd + *force),
+        }
+    });
+    let masses = supports.iter().map(|support| match *support {
+        Support::Rigid(_) => T::zero(),
+        Support::Yielding { mass, .. } => mass,
+    });
+    let (residual, missing, masses) = (residual.collect(), missing.collect(), masses.collect());
+    vec![residual, missing, mass_matrix, constrained.jacobian.concat(), applied.concat(), masses]
+}
+
+/// A function of the robot over these arguments, by its reduced form where it has one.
+fn of_robot<T: Real>(bound: &Bound<T>, reduced: bool, function: Function, arguments: &[Vec<T>]) -> Vec<T> {
+    let method = ForwardDynamicsMethod::Factorisation;
+    let Bound { model, reduced: for_torques, composite, .. } = bound;
+    let by_reduced =
+        reduced.then(|| function.evaluate_reduced(model, for_torques, composite, method, arguments)).flatten();
+    by_reduced.unwrap_or_else(|| function.evaluate(model, &[], method, arguments))
+}
+
+/// The results of a function, one list per output.
+pub(super) fn equations<T: Real>(
+    robot: &Robot,
+    options: &Options,
+    mode: &Mode,
+    function: ContactFunction,
+    form: Form<T>,
+    bound: &Bound<T>,
+    added: &Added<T>,
+) -> Vec<Vec<T>> {
+    let (q, qd) = (&bound.arguments[0], &bound.arguments[1]);
+    let traced = contacts(robot, mode, bound, added, form);
+    let constrained = traced.iter().fold(FunctionalCoordinates::default(), |all, t| all.and(t.constrained.clone()));
+    let free = || {
+        let parts =
+            traced.iter().filter_map(|t| Some(alg::functional_coordinates(&t.contact, &t.motion, &t.closed?.free)));
+        parts.fold(FunctionalCoordinates::default(), FunctionalCoordinates::and)
+    };
+    let of_robot = |function: Function, arguments: &[Vec<T>]| of_robot(bound, form.reduced, function, arguments);
+    let mass_matrix = || of_robot(Function::MassMatrix, std::slice::from_ref(q));
+    let factor = || Ltdl::factor(&bound.model, &mass_matrix());
+    // rotors of rigid drives are struck, too
+    let whole_factor = || match bound.model.drives.is_empty() {
+        true => factor(),
+        false => alg::driven_factor(&bound.model, q, &mass_matrix()),
+    };
+    let epsilon = T::constant(Dd::from(ridge(options.scalar)));
+    let applied = || -> Option<Vec<Vec<T>>> {
+        let slides = traced.iter().any(|t| t.closed.is_some_and(|c| c.slides));
+        slides.then(|| traced.iter().flat_map(|t| alg::applied_rows(&t.contact, &t.motion, &t.constrained)).collect())
+    };
+    let list = |c: FunctionalCoordinates<T>| vec![c.value, c.rate, c.jacobian.concat(), c.bias];
+    match function {
+        ContactFunction::ConstrainedCoordinates => list(constrained),
+        ContactFunction::FreeCoordinates => list(free()),
+        ContactFunction::ForwardDynamics | ContactFunction::DrivenForwardDynamics => {
+            let bias = of_robot(Function::BiasForce, &[q.clone(), qd.clone()]);
+            let (supports, own_rates) = supports(&traced, &constrained, options, added);
+            let applied = applied();
+            let (motion, xd) = if function == ContactFunction::DrivenForwardDynamics {
+                let at = (&q[..], &qd[..], &bound.arguments[2][..], &bound.arguments[3][..]);
+                let rows = ContactRows {
+                    coordinates: &constrained,
+                    applied: applied.as_deref(),
+                    supports: &supports,
+                    ridge: epsilon,
+                };
+                let (motion, drives) = alg::driven_contact_motion(&bound.model, at, &bias, &mass_matrix(), rows);
+                (motion, vec![drives.xd])
+            } else {
+                let drive: Vec<T> = bound.arguments[2].iter().zip(bias).map(|(tau, h)| *tau - h).collect();
+                let (factor, applied) = (factor(), applied.as_deref());
+                let motion =
+                    alg::constrained_forward_dynamics(&factor, &drive, &constrained, applied, &supports, epsilon);
+                (motion, vec![])
+            };
+            let results = [vec![motion.qdd], xd].concat();
+            let results = [results, vec![motion.force, motion.sdd, motion.violation, vec![motion.pivot]]].concat();
+            [results, own_rates].concat()
+        }
+        ContactFunction::InverseDynamics => {
+            let qdd = &bound.arguments[2];
+            let inverse = of_robot(Function::InverseDynamics, &[q.clone(), qd.clone(), qdd.clone()]);
+            let wanted =
+                [vec![T::zero(); constrained.len()], added.get("sdd_free").cloned().unwrap_or_default()].concat();
+            let (tau, pivot) = alg::hybrid_inverse_dynamics(
+                &factor(),
+                &inverse,
+                qdd,
+                (&constrained, &free()),
+                &wanted,
+                &added["force"],
+                epsilon,
+            );
+            vec![tau, vec![pivot]]
+        }
+        ContactFunction::Impact => {
+            let mut struck = vec![Struck::Rigid; constrained.len()];
+            let mut places = Vec::new();
+            let mut first = 0;
+            for t in &traced {
+                if let (Some(environment), Some(closed)) = (&t.environment, t.closed) {
+                    let k = first + distance_row(&closed.constrained);
+                    let velocity = match closed.of_environment().1 {
+                        true => {
+                            places.push(k);
+                            added[&format!("{}_struck", closed.item.identifier())][0]
+                        }
+                        false => T::zero(),
+                    };
+                    struck[k] = Struck::Mass { mass: environment.struck_mass(), velocity };
+                }
+                first += t.constrained.len();
+            }
+            let applied = applied();
+            let blow = alg::impact(
+                &whole_factor(),
+                qd,
+                &constrained,
+                applied.as_deref(),
+                &struck,
+                added["restitution"][0],
+                epsilon,
+            );
+            let after = places.iter().map(|k| vec![blow.struck_velocity[*k]]).collect();
+            let results = vec![blow.dqd, blow.impulse, blow.dsd, vec![blow.energy_loss], vec![blow.pivot]];
+            [results, after].concat()
+        }
+        ContactFunction::Projection => {
+            let deviations = deviations(&traced, &constrained);
+            let is_rigid = rigid_rows(&traced);
+            let kept = |list: &[T]| list.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| *k.0).collect::<Vec<T>>();
+            let rows = constrained.jacobian.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| k.0.clone());
+            let rigid = FunctionalCoordinates {
+                value: kept(&constrained.value),
+                rate: kept(&constrained.rate),
+                jacobian: rows.collect(),
+                bias: kept(&constrained.bias),
+            };
+            let correction = match rigid.is_empty() {
+                true => vec![T::zero(); bound.model.nv()],
+                false => alg::projection(&whole_factor(), &rigid, &kept(&deviations), epsilon),
+            };
+            vec![correction, constrained.value]
+        }
+    }
+}
+
+/// What the rows stand on, and the rates of the objects' own coordinates.
+fn supports<T: Real>(
+    traced: &[Traced<T>],
+    constrained: &FunctionalCoordinates<T>,
+    options: &Options,
+    added: &Added<T>,
+) -> (Vec<Support<T>>, Vec<Vec<T>>) {
+    let stabilised = match options.scene.contacts.stabilisation {
+        Some((frequency, damping)) => {
+            let [frequency, damping] = [frequency, damping].map(|x| T::constant(Dd::from(x)));
+            let pulled = FunctionalCoordinates { value: deviations(traced, constrained), ..constrained.clone() };
+            alg::baumgarte(&pulled, frequency, damping)
+        }
+        None => vec![T::zero(); constrained.len()],
+    };
+    let mut supports: Vec<Support<T>> = stabilised.into_iter().map(Support::Rigid).collect();
+    let mut own_rates = Vec::new();
+    let mut first = 0;
+    for t in traced {
+        if let (Some(environment), Some(closed)) = (&t.environment, t.closed) {
+            let k = distance_row(&closed.constrained);
+            let s = (t.constrained.value[k], t.constrained.rate[k]);
+            let own = match environment.has_own_coordinate() {
+                true => {
+                    let own = &added[&format!("{}_own", closed.item.identifier())];
+                    let rates = environment.motion(s, (own[0], own[1]));
+                    own_rates.push(vec![rates.velocity, rates.acceleration]);
+                    (own[0], own[1])
+                }
+                false => (T::zero(), T::zero()),
+            };
+            supports[first + k] = environment.support(s, own);
+        }
+        first += t.constrained.len();
+    }
+    (supports, own_rates)
+}
+
+/// How far the rows are from where they are held: what sticks is held where that has happened, which is not known here, so that
+/// its rate alone counts.
+fn deviations<T: Real>(traced: &[Traced<T>], constrained: &FunctionalCoordinates<T>) -> Vec<T> {
+    let by_friction = traced.iter().flat_map(|t| match t.closed {
+        Some(closed) => closed.constrained.iter().map(|c| !closed.item.constrained.contains(c)).collect(),
+        None => vec![false; t.constrained.len()],
+    });
+    constrained.value.iter().zip(by_friction).map(|(s, sticks)| if sticks { T::zero() } else { *s }).collect()
+}
+
+/// Rows that are not on an object that gives way.
+fn rigid_rows<T: Real>(traced: &[Traced<T>]) -> Vec<bool> {
+    let of = |t: &Traced<T>| {
+        let yields = t.environment.as_ref().and(t.closed).map(|closed| distance_row(&closed.constrained));
+        (0..t.constrained.len()).map(|k| yields != Some(k)).collect::<Vec<bool>>()
+    };
+    traced.iter().flat_map(of).collect()
+}
+
+/// The row of the distance among the constrained coordinates of a contact.
+fn distance_row(constrained: &[Coordinate]) -> usize {
+    constrained.iter().position(|c| *c == Coordinate::Pz).expect("an object gives way along pz, as was checked")
+}
+
+/// Contacts and loops of a mode, traced.
+fn contacts<'a, T: Real>(
+    robot: &Robot,
+    mode: &'a Mode,
+    bound: &Bound<T>,
+    added: &Added<T>,
+    form: Form<T>,
+) -> Vec<Traced<'a, T>> {
+    let (q, qd) = (&bound.arguments[0], &bound.arguments[1]);
+    let frame = |name: &str| bound.model.frame(name).expect("the frames of contacts were checked").clone();
+    let mut all = Vec::new();
+    for closed in &mode.contacts {
+        let (item, name) = (closed.item, closed.item.identifier());
+        let input = |suffix: &str| &added[&format!("{name}_{suffix}")];
+        let triple = |x: &[T], k: usize| Vec3::new(x[3 * k], x[3 * k + 1], x[3 * k + 2]);
+        let (axis, second_axis) = match item.axis {
+            Some(axis) => tool_axes(axis),
+            None => (triple(input("axes"), 0), triple(input("axes"), 1)),
+        };
+        let object = match item.object {
+            Some(object) => Object::Fixed(object.over()),
+            None => {
+                let (pose, velocity, acceleration) = (input("pose"), input("velocity"), input("acceleration"));
+                let motion = |x: &[T]| MotionVector { linear: triple(x, 0), angular: triple(x, 1) };
+                Object::Moving(ObjectMotion {
+                    pose: Transform {
+                        rotation: Mat3::from_columns(triple(pose, 1), triple(pose, 2), triple(pose, 3)),
+                        translation: triple(pose, 0),
+                    },
+                    velocity: motion(velocity),
+                    acceleration: motion(acceleration),
+                })
+            }
+        };
+        let number = |x: f64| T::constant(Dd::from(x));
+        let contact = Contact {
+            name: item.name.clone(),
+            frame: frame(&item.frame),
+            axis,
+            second_axis,
+            object,
+            surface: (form.surface)(&item.surface),
+            constrained: closed.constrained.clone(),
+            free: closed.free.clone(),
+            friction: item.friction_over().filter(|_| closed.slides),
+        };
+        let placed = robot.model.frame(&item.frame).and_then(|f| {
+            let body = f.body?;
+            Some((body, robot.reduced_frames[body].inverse().compose(&f.placement).map(T::constant)))
+        });
+        let by_reduced = placed
+            .filter(|_| form.reduced && bound.reduced.serves(&bound.model))
+            .and_then(|placed| alg::reduced_relative_motion(&bound.reduced, &contact, placed, q, qd));
+        let mut motion = by_reduced.unwrap_or_else(|| alg::relative_motion(&bound.model, &contact, q, qd));
+        if let Some(g) = form.falls {
+            motion.acceleration = motion.acceleration.map(|x| (x + g) - g);
+        }
+        let constrained = alg::functional_coordinates(&contact, &motion, &contact.constrained);
+        let environment = item.environment.as_ref().map(|e| {
+            let values = match &e.values {
+                Some(values) => values.iter().map(|x| number(*x)).collect(),
+                None => input("environment").clone(),
+            };
+            e.over(&values)
+        });
+        all.push(Traced { closed: Some(closed), contact, motion, constrained, environment });
+    }
+    for a_loop in mode.loops {
+        let contact = a_loop.over(frame(&a_loop.frame), frame(&a_loop.with));
+        let motion = alg::relative_motion(&bound.model, &contact, q, qd);
+        let constrained = alg::functional_coordinates(&contact, &motion, &contact.constrained);
+        all.push(Traced { closed: None, contact, motion, constrained, environment: None });
+    }
+    all
+}

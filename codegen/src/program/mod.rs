@@ -1,0 +1,152 @@
+//! From equations to operations in order: the form with the fewest, its passes, and the checks of both.
+
+pub mod choose;
+pub mod companion;
+pub mod contact;
+pub mod demand_inertia;
+pub mod equivalence;
+pub mod input_box;
+pub mod limbs;
+pub mod mixed;
+pub mod parameter;
+pub mod pivots;
+mod plainer;
+pub mod range;
+pub mod staged;
+pub mod written;
+
+use crate::equations::bind::is_optional;
+use crate::equations::forward_method::MethodChoice;
+use crate::equations::traced::{candidate, traced};
+use crate::equations::Robot;
+use crate::function::Function;
+use crate::model::states::samples;
+use crate::options::optimisations::FOLDING;
+use crate::options::{Optimisations, Options};
+use crate::program::choose::price;
+use crate::program::equivalence::{Disagreement, Plainer};
+use straightline_graph::expr::{verify, Graph};
+use straightline_graph::pass::{dead_code, order, substitute, sums, unread_inputs};
+use straightline_graph::schedule::{schedule, Schedule};
+
+/// A program between tracing and text.
+#[derive(Clone, Debug)]
+pub struct Program {
+    /// What it computes.
+    pub function: Function,
+    /// Its operations.
+    pub graph: Graph,
+    /// Their order, and the cuts.
+    pub schedule: Schedule,
+    /// Of forward dynamics whose method was left to the compiler: which, and why.
+    pub method: Option<MethodChoice>,
+    /// Whether it has another form than it would have had, as that one was wrong.
+    pub plainer: Option<Plainer>,
+}
+
+impl Program {
+    /// Whether its constants are those of the robot, in double-double: otherwise no bound of its errors is one of the robot.
+    pub(crate) fn has_folded_constants(&self, options: &Options) -> bool {
+        options.optimisations().folding && self.plainer.as_ref().is_none_or(|plainer| plainer.without != FOLDING)
+    }
+}
+
+/// Traces and optimises one function of a robot, and checks what came out.
+///
+/// # Panics
+/// If no form of it agrees with its plain equations.
+pub fn program(robot: &Robot, frames: &[String], function: Function, options: &Options) -> Program {
+    checked(robot, frames, function, options).unwrap_or_else(|wrong| panic!("{wrong}"))
+}
+
+/// The program of a function with the fewest operations that agrees with its plain equations: see [`equivalence`].
+///
+/// # Errors
+/// What was wrong, if none does.
+pub fn checked(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+) -> Result<Program, Disagreement> {
+    let ((graph, method), plainer) = options.optimisations().first_that_agrees(|optimisations| {
+        let made = optimised_with(robot, frames, function, options, optimisations);
+        equivalence::of_function(robot, frames, function, options, optimisations, &made.0).map(|()| made)
+    })?;
+    let schedule = schedule(&graph, options.limits);
+    Ok(Program { function, graph, schedule, method, plainer })
+}
+
+/// The operations of one function of a robot, with these optimisations only.
+pub fn optimised(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+    optimisations: Optimisations,
+) -> Graph {
+    optimised_with(robot, frames, function, options, optimisations).0
+}
+
+/// The same, with the choice of the method where one was made.
+fn optimised_with(
+    robot: &Robot,
+    frames: &[String],
+    function: Function,
+    options: &Options,
+    optimisations: Optimisations,
+) -> (Graph, Option<MethodChoice>) {
+    if optimisations.limbs {
+        if let Some(graph) = limbs::program(robot, frames, function, options, optimisations) {
+            return (graph, None);
+        }
+    }
+    let optimisations = Optimisations { limbs: false, ..optimisations };
+    let check = |pass, graph| passed(pass, function.name(), graph);
+    let finished = |robot: &Robot, options: &Options, optimisations: Optimisations| {
+        let (traced, choice) = traced(robot, frames, function, options, optimisations);
+        let graph = check("dead code", dead_code(&check("traced", traced)));
+        let graph = check("unread inputs", unread_inputs(graph, is_optional));
+        let graph = match optimisations.sums {
+            true => check("dead code", dead_code(&check("sums", sums(&graph)))),
+            false => graph,
+        };
+        // joint torques gain an operation of two hundred
+        let gains = matches!(function, Function::MassMatrix | Function::ForwardDynamics);
+        let graph = match optimisations.substitutes && gains {
+            true => check("substitute", substitute(&graph, &choose::keeps_digits_of(&robot.model, &graph))),
+            false => graph,
+        };
+        // fused products want another order; forward dynamics takes 6 to 9 % longer in this one, and its digits go elsewhere
+        let ordered = optimisations.sums && !options.fma && function != Function::ForwardDynamics;
+        let graph = match ordered.then(|| samples(&robot.model, &graph)).flatten() {
+            Some(states) => check("order", order(&graph, &states)),
+            None => graph,
+        };
+        (graph, choice)
+    };
+    if !(optimisations.chosen && optimisations.reduced && robot.reduced.serves(&robot.model)) {
+        return finished(robot, options, optimisations);
+    }
+    let chosen = choose::choose(robot, frames, function, options, Optimisations { chosen: false, ..optimisations });
+    let (graph, choice) = finished(&chosen, options, optimisations);
+    // by the bodies' own parameters in their own frames, where those have more zeros; the method stays
+    let same_method = choice.map_or(options.forward_dynamics, |choice| choice.method());
+    let same_method = Options { forward_dynamics: same_method, ..options.clone() };
+    let of_bodies = Optimisations { reduced: false, ..optimisations };
+    if function.has_reduced_form() {
+        let (counts, ..) = candidate(robot, frames, function, &same_method, of_bodies);
+        if price(counts) < price(graph.counts()) {
+            return (finished(robot, &same_method, of_bodies).0, choice);
+        }
+    }
+    (graph, choice)
+}
+
+/// What a pass made, if it kept what graphs promise.
+pub(crate) fn passed(pass: &'static str, program: &str, graph: Graph) -> Graph {
+    #[cfg(feature = "internals")]
+    let graph = equivalence::sabotage::applied(pass, graph);
+    verify(&graph).unwrap_or_else(|broken| panic!("{program}: the pass `{pass}` broke the graph: {broken}"));
+    graph
+}

@@ -1,0 +1,186 @@
+//! Numbers that the scalar of generated code cannot hold.
+//!
+//! Two questions, as a number may be lost before or after it is multiplied. Of the robot file and the scene: is every number in
+//! the range of the scalar, and no mass so small that it would be zero? Of a finished program: are its constants numbers, and
+//! do its values stay in range where the exact ones do, at some states near rest? What no limit, however large, has to do with:
+//! limits beyond the range say "no limit" and are written so. A length that vanishes is dust, and vanishes.
+
+use crate::description::drives::Drive;
+use crate::description::{Description, JointDrive, Notation};
+use crate::diagnostic::{Diagnostic, Diagnostics, Place};
+use crate::model::states;
+use crate::scene::{messages as say, Parameter, Scene};
+use straightline_core::model::Model;
+use straightline_core::Dd;
+use straightline_graph::expr::{evaluate, Binary, Graph, Op, Width};
+use straightline_graph::Scalar;
+
+/// States at which a program is tried.
+const STATES: usize = 3;
+
+/// Complains about the numbers of a robot file and of a scene's payloads that the scalar cannot hold.
+pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagnostics: &mut Diagnostics) {
+    // the readers keep all numbers within 1e±60, or so small that f64 has them as zero
+    if scalar == Scalar::F64 {
+        return;
+    }
+    let mut complain = |place: &Place, what: String, value: f64, is_needed: bool| {
+        unheld(&what, value, is_needed).into_iter().for_each(|complaint| diagnostics.push(complaint.at(place)));
+    };
+    let drive = |name: &str, drive: &JointDrive, complain: &mut dyn FnMut(&Place, String, f64)| {
+        for (what, value) in [
+            ("damping", &drive.damping),
+            ("friction", &drive.friction),
+            ("rotor_inertia", &drive.rotor_inertia),
+            ("gear_ratio", &drive.gear_ratio),
+            ("armature", &drive.armature),
+            ("spring_stiffness", &drive.spring_stiffness),
+            ("spring_rest", &drive.spring_rest),
+        ] {
+            if let Some(value) = value {
+                complain(&value.place, format!("{what} of joint `{name}`"), value.value);
+            }
+        }
+    };
+    if let Some(gravity) = &description.gravity {
+        gravity.value.iter().for_each(|x| complain(&gravity.place, "gravity".to_string(), *x, false));
+    }
+    match &description.notation {
+        Notation::JointFrames(bodies) => {
+            for link in &bodies.links {
+                let (name, Some(inertial)) = (&link.name.value, &link.inertial) else { continue };
+                let j = inertial.inertia.value;
+                complain(&inertial.mass.place, format!("mass of link `{name}`"), inertial.mass.value, true);
+                for x in inertial.com.value {
+                    complain(&inertial.com.place, format!("mass centre of link `{name}`"), x, false);
+                }
+                for x in [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz] {
+                    complain(&inertial.inertia.place, format!("inertia of link `{name}`"), x, false);
+                }
+            }
+            for joint in &bodies.joints {
+                let (name, xyz) = (&joint.name.value, &joint.origin.xyz);
+                for x in xyz.value {
+                    complain(&xyz.place, format!("origin of joint `{name}`"), x, false);
+                }
+                drive(name, &joint.drive, &mut |place, what, x| complain(place, what, x, false));
+            }
+        }
+        Notation::MassCentres(chain) => {
+            for link in &chain.links {
+                let (name, j) = (&link.name.value, link.inertia.value);
+                complain(&link.mass.place, format!("mass of link `{name}`"), link.mass.value, true);
+                for x in [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz] {
+                    complain(&link.inertia.place, format!("inertia of link `{name}`"), x, false);
+                }
+                for x in link.r.value {
+                    complain(&link.r.place, format!("r of link `{name}`"), x, false);
+                }
+                let joint = &link.joint_name.value;
+                drive(joint, &link.drive, &mut |place, what, x| complain(place, what, x, false));
+            }
+        }
+    }
+    for number in description.drives.iter().chain(&scene.drives).flat_map(|drive| &drive.written.0) {
+        complain(&number.value.place, number.what.clone(), number.value.value, number.is_needed);
+    }
+    for (i, parameter) in scene.parameters.iter().enumerate() {
+        let Parameter::Drive { drive, numbers, form: Some(form), .. } = parameter else { continue };
+        // the others stand in the file
+        for number in form.numbers().iter().filter(|number| number.is_limit() && numbers.contains(&number.name)) {
+            if let Some(complaint) = unheld(&format!("{} of drive `{drive}`", number.name), number.value, false) {
+                scene.places.complain(&format!("parameter.{i}.numbers"), complaint, diagnostics);
+            }
+        }
+    }
+    for (i, payload) in scene.payloads.iter().enumerate() {
+        let numbers = [("mass", &[payload.mass][..]), ("com", &payload.com), ("inertia", &payload.inertia)];
+        for (key, values) in numbers {
+            for x in values {
+                let what = format!("{key} of payload `{}`", payload.name);
+                if let Some(complaint) = unheld(&what, *x, key == "mass") {
+                    scene.places.complain(&format!("payload.{i}.{key}"), complaint, diagnostics);
+                }
+            }
+        }
+    }
+}
+
+/// Takes limits of drives that the scalar cannot hold for what they are there: none. Those that a parameter makes free stay, to be complained
+/// about.
+pub fn leave_out_lost_limits(drives: &mut [Drive], parameters: &[Parameter], scalar: Scalar) {
+    if scalar == Scalar::F64 {
+        return;
+    }
+    for drive in drives {
+        let name = &drive.name.value;
+        let is_free = |number: &str| {
+            let frees = |p: &Parameter| matches!(p, Parameter::Drive { drive, numbers, .. } if drive == name && numbers.iter().any(|n| n == number));
+            parameters.iter().any(frees)
+        };
+        let (input, current) = (is_free("input_limit"), is_free("current_limit"));
+        drive.input_limit = drive.input_limit.filter(|x| input || (*x as f32).is_finite());
+        drive.current_limit = drive.current_limit.filter(|x| current || (*x as f32).is_finite());
+    }
+}
+
+/// What is wrong with a number in f32: it is too great, or it vanishes where it must not: a mass, a ratio, a resistance.
+fn unheld(what: &str, value: f64, is_needed: bool) -> Option<Diagnostic> {
+    let is_lost = is_needed && value != 0.0 && value.abs() < f64::from(f32::MIN_POSITIVE);
+    let is_too_great = (value as f32).is_infinite();
+    (is_lost || is_too_great).then(|| say::number_beyond_scalar(what, value, Scalar::F32.name(), is_too_great))
+}
+
+/// Why a program cannot be computed in its scalar, if that is so: a constant that is no number there, or a value that leaves the
+/// range at an ordinary state.
+pub fn of_program(model: &Model<Dd>, graph: &Graph, scalar: Scalar) -> Option<String> {
+    if let Some(why) = of_constants(graph, scalar) {
+        return Some(why);
+    }
+    // mixed precision is f64 where it has to be
+    if !graph.widths.is_empty() || scalar == Scalar::F64 {
+        return None;
+    }
+    let all = Graph { results: graph.ids().collect(), ..graph.clone() };
+    let states = states::states(model, &graph.inputs, STATES, false)?;
+    states.iter().find_map(|x| leaves(&all, x))
+}
+
+/// The first value of a program that leaves the range of f32 at these inputs, and not that of f64.
+fn leaves(graph: &Graph, inputs: &[f64]) -> Option<String> {
+    let exact: Vec<f64> = evaluate(graph, inputs);
+    let single: Vec<f32> = evaluate(graph, &inputs.iter().map(|x| *x as f32).collect::<Vec<f32>>());
+    let is_lost = |x: f64| x != 0.0 && x.abs() < f64::from(f32::MIN_POSITIVE);
+    for (k, (exact_value, value)) in exact.iter().zip(&single).enumerate() {
+        if value.is_finite() || !exact_value.is_finite() {
+            continue;
+        }
+        return match graph.ops[k] {
+            // a divisor that cancellation has made zero is another matter
+            Op::Binary(Binary::Div, _, b) if single[b.index()] == 0.0 && !is_lost(exact[b.index()]) => None,
+            Op::Binary(Binary::Div, _, b) if single[b.index()] == 0.0 => {
+                Some(format!("it divides by {:.3e}", exact[b.index()]))
+            }
+            _ if exact_value.abs() > f64::from(f32::MAX) => Some(format!("a value on the way is {exact_value:.3e}")),
+            _ => None,
+        };
+    }
+    None
+}
+
+/// Why a program cannot be written in its scalar, if a constant is no number there.
+pub fn of_constants(graph: &Graph, scalar: Scalar) -> Option<String> {
+    graph.ids().find_map(|id| {
+        let Op::Constant(c) = graph.op(id) else { return None };
+        let exact = c.value().to_f64();
+        let held = match (graph.width(id), scalar) {
+            (Width::Double, _) | (_, Scalar::F64) => exact,
+            (_, Scalar::F32) => f64::from(c.value().to_f32()),
+        };
+        match (exact.is_finite(), held.is_finite()) {
+            (false, _) => Some("a product of constants is beyond f64".to_string()),
+            (_, false) => Some(format!("a product of constants is {exact:.3e}")),
+            _ => None,
+        }
+    })
+}

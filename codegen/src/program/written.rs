@@ -1,0 +1,97 @@
+//! What a text is to compute: the programs that are written, by name.
+
+use crate::description::drives::Number;
+use straightline_core::Dd;
+use straightline_graph::expr::Graph;
+use straightline_graph::Scalar;
+
+/// A function that a text is to have.
+#[derive(Clone, Debug)]
+pub struct Written {
+    /// Its name.
+    pub name: String,
+    /// What it computes.
+    pub graph: Graph,
+    /// Its scalar type.
+    pub scalar: Scalar,
+    /// Whether it takes any scalar.
+    pub generic: bool,
+    /// Whether there is one over lanes beside it, in the file's scalar, and batches.
+    pub lanes: bool,
+}
+
+/// The type of a run-time parameter, and the program of its constructor.
+#[derive(Clone, Debug)]
+pub struct WrittenParameter {
+    /// The name of the type.
+    pub type_name: String,
+    /// The private function.
+    pub program: Written,
+    /// Of a drive, its free numbers.
+    pub numbers: Option<DriveNumbers>,
+}
+
+/// The free numbers of a drive.
+#[derive(Clone, Debug)]
+pub struct DriveNumbers {
+    /// What they are, with their values in the robot file.
+    pub numbers: Vec<Number>,
+    /// What functions take for the values of the robot file.
+    pub nominal: Vec<Dd>,
+}
+
+/// A stage: a type around stored values.
+#[derive(Clone, Debug)]
+pub struct WrittenStage {
+    /// The name of the type.
+    pub type_name: String,
+    /// The name of its values where others take them.
+    pub values: String,
+    /// What it stores.
+    pub program: Written,
+}
+
+/// The programs of a staged form.
+#[derive(Clone, Debug)]
+pub struct WrittenStages {
+    /// The stages that store something, the rarest first.
+    pub stages: Vec<WrittenStage>,
+    /// The functions, each with the stage whose method it is.
+    pub functions: Vec<(usize, Written)>,
+}
+
+/// The programs of a contact mode.
+#[derive(Clone, Debug)]
+pub struct WrittenMode {
+    /// Its module.
+    pub identifier: String,
+    /// Its constrained and its free coordinates.
+    pub coordinates: [Vec<String>; 2],
+    /// Its functions.
+    pub functions: Vec<Written>,
+}
+
+/// All programs that a text is to have.
+#[derive(Clone, Debug, Default)]
+pub struct AllWritten {
+    /// The functions of the robot, and the bounds of their errors.
+    pub functions: Vec<Written>,
+    /// Run-time parameters.
+    pub parameters: Vec<WrittenParameter>,
+    /// The staged form.
+    pub staged: Option<WrittenStages>,
+    /// Contact modes, in order.
+    pub modes: Vec<WrittenMode>,
+}
+
+impl AllWritten {
+    /// All of them.
+    pub fn all(&self) -> impl Iterator<Item = &Written> {
+        let staged = self.staged.iter().flat_map(|staged| {
+            let stages = staged.stages.iter().map(|stage| &stage.program);
+            stages.chain(staged.functions.iter().map(|(_, program)| program))
+        });
+        let modes = self.modes.iter().flat_map(|mode| &mode.functions);
+        self.functions.iter().chain(self.parameters.iter().map(|p| &p.program)).chain(staged).chain(modes)
+    }
+}
