@@ -111,7 +111,7 @@ impl Choice for Function {
 impl Choice for Scalar {
     const WHAT: &'static str = "scalar";
     fn words() -> Vec<(&'static str, &'static str, Self)> {
-        vec![("f64", "double precision", Scalar::F64), ("f32", "single precision", Scalar::F32)]
+        Scalar::ALL.iter().map(|s| (s.name(), s.description(), *s)).collect()
     }
 }
 

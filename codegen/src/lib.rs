@@ -3,6 +3,9 @@
 //! [`compile()`] is the whole pipeline as one pure function; `ARCHITECTURE.md` draws it.
 #![forbid(unsafe_code)]
 
+#[macro_use]
+extern crate straightline_graph;
+
 pub mod choices;
 pub mod compile;
 pub mod description;

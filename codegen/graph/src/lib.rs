@@ -3,9 +3,11 @@
 //! Nothing here knows what is computed.
 #![forbid(unsafe_code)]
 
+#[macro_use]
+mod number;
+
 pub mod certify;
 pub mod expr;
-mod number;
 pub mod pass;
 pub mod random;
 pub mod rounding;

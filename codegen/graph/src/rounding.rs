@@ -112,7 +112,10 @@ mod tests {
     use crate::expr::{Builder, Port, RuleSet};
 
     fn program(results: impl Fn(&mut Builder, NodeId, NodeId) -> NodeId) -> Graph {
-        let mut builder = Builder::new(RuleSet::exact(crate::expr::Folding::F64), vec![Port::new("x", &[2])]);
+        let mut builder = Builder::new(
+            RuleSet::exact(crate::expr::Folding::In(crate::number::Scalar::F64)),
+            vec![Port::new("x", &[2])],
+        );
         let (x, y) = (builder.insert(Op::Input(0)), builder.insert(Op::Input(1)));
         let result = results(&mut builder, x, y);
         builder.finish(vec![Port::new("z", &[1])], vec![result])

@@ -10,7 +10,6 @@ use crate::program::range;
 use crate::{model, scene};
 use straightline_core::model::Model;
 use straightline_core::Dd;
-use straightline_graph::Scalar;
 
 /// What is wrong with the file or the options, without compiling: all that [`compile`] would say but what only the finished
 /// programs tell, such as exceeded budgets.
@@ -50,7 +49,7 @@ pub(super) fn prepare(source: &Source, options: &Options) -> Result<Prepared, Di
     model::finish(&mut diagnostics);
     check_options(options, &mut diagnostics);
     let model = whole.clone().and_then(|whole| scene::apply(whole, &options.scene, &mut diagnostics));
-    if options.scalar == Scalar::F32 && !diagnostics.has_errors() {
+    if !diagnostics.has_errors() {
         description.iter().for_each(|d| range::of_robot(d, &options.scene, options.scalar, &mut diagnostics));
     }
     let of_frames = model.as_ref().or(whole.as_ref());

@@ -6,7 +6,7 @@ use crate::identifier::comment;
 use std::fmt::Write;
 use std::slice::from_ref;
 use straightline_graph::expr::op::Text;
-use straightline_graph::expr::{Constant, Graph, NodeId, Op, Port, Section, Unary, Width};
+use straightline_graph::expr::{Constant, Graph, NodeId, Op, Port, Precision, Section, Unary};
 use straightline_graph::schedule::{Part, Schedule};
 
 /// How long an expression may grow before it gets a name of its own.
@@ -387,10 +387,8 @@ impl Body<'_> {
             }
             Op::Constant(c) => {
                 let sign = c.is_negative() && !self.style.generic;
-                let style = match self.graph.width(id) {
-                    Width::Double => Style::plain(Scalar::F64),
-                    _ => self.style,
-                };
+                let held = self.scalar_of(id);
+                let style = if held == self.style.scalar { self.style } else { Style::plain(held) };
                 (literal(c, style), if sign { Binding::Sign } else { Binding::Atom })
             }
             _ => panic!("operands stand before their users"),
@@ -399,28 +397,22 @@ impl Body<'_> {
 
     /// The type of a node's text.
     fn scalar_of(&self, id: NodeId) -> Scalar {
-        match self.graph.width(id) {
-            Width::Double => Scalar::F64,
-            _ => self.style.scalar,
-        }
+        self.graph.precision(id, self.style.scalar).held
     }
 
-    /// The text of a node as an operand of this type; f32 becomes f64 where a program is in mixed precision.
+    /// The text of a node as an operand of this type, to which others are widened where a program is in mixed precision.
     fn operand_in(&self, id: NodeId, scalar: Scalar) -> (String, Binding) {
-        let own = self.scalar_of(id);
-        match (self.graph.op(id), own, scalar) {
-            (_, Scalar::F32, Scalar::F64) if self.style.scalar == Scalar::F32 => {
-                (format!("f64::from({})", self.typed(id)), Binding::Atom)
-            }
-            _ => self.operand(id),
+        if self.scalar_of(id) == scalar {
+            return self.operand(id);
         }
+        (format!("{}::from({})", scalar.name(), self.typed(id)), Binding::Atom)
     }
 
     /// The text of a node that says its type: what `f64::from` takes.
     fn typed(&self, id: NodeId) -> String {
         let text = self.operand(id).0;
         match self.graph.op(id) {
-            Op::Constant(_) => format!("{text}_f32"),
+            Op::Constant(_) => format!("{text}_{}", self.scalar_of(id).name()),
             _ => text,
         }
     }
@@ -428,10 +420,10 @@ impl Body<'_> {
     /// The text of an operation; one in f64 that is used in f32 is rounded.
     fn node(&self, id: NodeId) -> (String, Binding) {
         let op = self.graph.op(id);
-        match self.graph.width(id) {
-            Width::Single => self.expression(op, self.style.scalar),
-            Width::Double => self.expression(op, Scalar::F64),
-            Width::Rounded => (format!("(({}) as f32)", self.expression(op, Scalar::F64).0), Binding::Atom),
+        let Precision { computed, held } = self.graph.precision(id, self.style.scalar);
+        match computed == held {
+            true => self.expression(op, computed),
+            false => (format!("(({}) as {})", self.expression(op, computed).0, held.name()), Binding::Atom),
         }
     }
 
@@ -618,7 +610,6 @@ pub(super) fn wrapped(start: &str, items: &[String], end: &str) -> String {
 fn literal(c: Constant, style: Style) -> String {
     match (style.generic, style.scalar) {
         (true, _) => format!("number::<T>({:?}, {:?})", c.value().hi(), c.value().lo()),
-        (false, Scalar::F64) => number(c.value().to_f64(), Scalar::F64),
-        (false, Scalar::F32) => number(f64::from(c.value().to_f32()), Scalar::F32),
+        (false, scalar) => number(scalar.nearest(c.value()), scalar),
     }
 }

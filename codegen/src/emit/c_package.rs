@@ -478,10 +478,7 @@ const char *{prefix}_frame_name(int i);
         if self.generated.lanes.is_some() {
             out.push_str(BATCHES);
         }
-        let c_type = match self.scalar() {
-            Scalar::F64 => "double",
-            Scalar::F32 => "float",
-        };
+        let c_type = self.scalar().c_name();
         for body in self.bodies() {
             let (name, length) = (&body.name, body.len());
             if let Some(numbers) = self.drive_numbers(&body) {

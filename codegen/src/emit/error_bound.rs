@@ -20,10 +20,7 @@ pub(crate) fn error_bound_text(
     options: &Options,
     written: &mut Vec<Written>,
 ) -> emit::FunctionText {
-    let scalar = match graph.widths.is_empty() {
-        true => options.scalar,
-        false => Scalar::F64,
-    };
+    let scalar = graph.widest(options.scalar);
     let bound = match bound {
         Ok(bound) => bound,
         Err(why) => return emit::FunctionText::remark(&format!("No `{name}_error_bound`: {why}.")),
@@ -49,8 +46,9 @@ pub(crate) fn error_bound_text(
     if options.generic {
         let _ = write!(doc, " Of [`{name}`] in `{}`.", scalar.name());
     }
-    if !graph.widths.is_empty() {
-        doc.push_str(" In f64, of the function in f32: convert its inputs.");
+    if !graph.formats.is_empty() {
+        let (wider, scalar) = (scalar.name(), options.scalar.name());
+        let _ = write!(doc, " In {wider}, of the function in {scalar}: convert its inputs.");
     }
     let schedule = schedule(&bound, options.limits);
     let name = format!("{name}_error_bound");

@@ -84,9 +84,10 @@ pub(crate) fn generate(
         if let Some(method) = method {
             doc.push_str(&format!("\n{method}\n"));
         }
-        if !graph.widths.is_empty() {
-            let (double, all) = (certify::mixed::double_operations(graph), graph.counts().flops());
-            doc.push_str(&format!("\n{double} of its {all} operations are in f64: what its error budget takes.\n"));
+        if !graph.formats.is_empty() {
+            let wide = certify::mixed::wide_operations(graph, options.scalar);
+            let (all, wider) = (graph.counts().flops(), graph.widest(options.scalar).name());
+            doc.push_str(&format!("\n{wide} of its {all} operations are in {wider}: what its error budget takes.\n"));
         }
         let mut text = emit::function(graph, schedule, function.name(), &doc, options.plain_style(), &title);
         let figures = FunctionReport::new(&program, options.scalar, text.text.lines().count());

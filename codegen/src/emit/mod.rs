@@ -169,15 +169,11 @@ pub fn filler<'a>(inputs: impl IntoIterator<Item = &'a Port>) -> String {
 /// A number as a literal of the scalar; beyond its range the constant `INFINITY`, which means no limit where it is one, and is refused
 /// in a function ([`crate::compile()`]).
 pub(crate) fn number(x: f64, scalar: Scalar) -> String {
-    let (held, name) = match scalar {
-        Scalar::F64 => (x, "f64"),
-        Scalar::F32 => (f64::from(x as f32), "f32"),
-    };
-    match scalar {
-        _ if held.is_nan() => format!("{name}::NAN"),
-        _ if held.is_infinite() => format!("{}{name}::INFINITY", if held < 0.0 { "-" } else { "" }),
-        Scalar::F64 => format!("{x:?}"),
-        Scalar::F32 => format!("{:?}", x as f32),
+    let (held, name) = (scalar.rounded(x), scalar.name());
+    match () {
+        () if held.is_nan() => format!("{name}::NAN"),
+        () if held.is_infinite() => format!("{}{name}::INFINITY", if held < 0.0 { "-" } else { "" }),
+        () => scalar.literal(x),
     }
 }
 

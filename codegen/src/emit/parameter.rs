@@ -12,7 +12,6 @@ use crate::program::written::{DriveNumbers, Written, WrittenParameter};
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::Parameter;
 use std::fmt::Write;
-use straightline_core::Dd;
 use straightline_graph::schedule::schedule;
 
 /// The error type and the check that all bodies of a file share.
@@ -162,7 +161,7 @@ pub fn drive(
     let list = |items: Vec<String>| items.join(", ");
     let declared = fields(&|n| format!("    /// {}.\n    pub {}: {t},\n", n.quantity.meaning, n.name));
     let values = list(numbers.numbers.iter().map(|n| format!("{}: {}", n.name, number(n.value, scalar))).collect());
-    let nominal = list(numbers.nominal.iter().map(|x| number(rounded(*x, scalar), scalar)).collect());
+    let nominal = list(numbers.nominal.iter().map(|x| number(scalar.nearest(*x), scalar)).collect());
     let checks = fields(&|n| {
         let (name, must) = (&n.name, n.quantity.at_run_time);
         let condition = must.condition().replace('x', &format!("numbers.{name}"));
@@ -220,14 +219,6 @@ impl Default for {type_name} {{
     );
     out.push_str(&constructor.text.replacen("pub fn ", "fn ", 1));
     out
-}
-
-/// In the scalar of the file.
-fn rounded(x: Dd, scalar: Scalar) -> f64 {
-    match scalar {
-        Scalar::F64 => x.to_f64(),
-        Scalar::F32 => f64::from(x.to_f32()),
-    }
 }
 
 /// The types of those run-time parameters that something takes, with what they share.

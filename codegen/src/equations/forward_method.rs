@@ -171,10 +171,7 @@ fn errors(model: &Model<Dd>, scalar: Scalar, articulated: &Graph, factorised: &G
     if articulated.inputs.iter().chain(&factorised.inputs).any(|port| port.wrapper.is_some()) {
         return None;
     }
-    Some(match scalar {
-        Scalar::F64 => errors_in::<f64>(model, articulated, factorised),
-        Scalar::F32 => errors_in::<f32>(model, articulated, factorised),
-    })
+    Some(in_scalar!(scalar, T => errors_in::<T>(model, articulated, factorised)))
 }
 
 fn errors_in<T: Real + Into<f64>>(model: &Model<Dd>, articulated: &Graph, factorised: &Graph) -> [Errors; 2] {

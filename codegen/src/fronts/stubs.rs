@@ -53,7 +53,7 @@ pub fn module_items(options: &Options, scene: Option<&str>) -> String {
     }
     if options.also.is_empty() && scene.is_some() {
         // a scene may ask for another scalar
-        let other = [Scalar::F64, Scalar::F32].into_iter().find(|s| *s != options.scalar).unwrap_or(Scalar::F32);
+        let other = Scalar::ALL.iter().copied().find(|s| *s != options.scalar).unwrap_or(Scalar::F32);
         let inner = items_and_types(options, scene, "super::");
         let _ = writeln!(out, "pub mod {} {{\n{inner}}}", other.module());
     }

@@ -121,6 +121,6 @@ impl Options {
     }
 
     pub(crate) fn rules_of(&self, optimisations: Optimisations) -> RuleSet {
-        optimisations.rules(self.scalar).with_short_angles(self.generic || self.scalar == Scalar::F32)
+        optimisations.rules(self.scalar).with_short_angles(self.generic || self.scalar.is_short())
     }
 }

@@ -87,8 +87,7 @@ impl Optimisations {
         match (self.algebraic, self.folding, scalar) {
             (true, _, _) => RuleSet::all(),
             (false, true, _) => RuleSet::exact(Folding::DoubleDouble),
-            (false, false, Scalar::F64) => RuleSet::exact(Folding::F64),
-            (false, false, Scalar::F32) => RuleSet::exact(Folding::F32),
+            (false, false, scalar) => RuleSet::exact(Folding::In(scalar)),
         }
     }
 }

@@ -17,7 +17,7 @@ use straightline_core::model::Model;
 use straightline_core::reduced::ReducedModel;
 use straightline_core::Dd;
 use straightline_graph::expr::{Counts, Graph, DIVISION};
-use straightline_graph::{rounding, Scalar};
+use straightline_graph::rounding;
 
 /// After so many operations in all programs that were counted a search ends with the best so far: some tenths of a second.
 const ENOUGH: usize = 300_000;
@@ -236,10 +236,7 @@ impl Search<'_> {
             }
         };
         let pair = plain.and_then(|plain| self.error(graph, &plain).zip(Some(plain)));
-        let times = match self.options.scalar {
-            Scalar::F64 => TOLERATED,
-            Scalar::F32 => TOLERATED_SINGLE,
-        };
+        let times = if self.options.scalar.is_short() { TOLERATED_SINGLE } else { TOLERATED };
         pair.is_none_or(|(mine, plain)| (0..2).all(|k| mine[k] <= times * plain[k].lost))
     }
 
@@ -421,7 +418,7 @@ impl Ways {
 
 /// Khalil and Dombre's parameters, with sums of angles where they may be.
 fn plain(robot: &Robot, options: &Options, optimisations: Optimisations) -> Choice {
-    let adds_offsets = options.scalar == Scalar::F64;
+    let adds_offsets = !options.scalar.is_short();
     Choice { adds_angles: optimisations.angle_sums, adds_offsets, ..Choice::plain(&robot.model) }
 }
 

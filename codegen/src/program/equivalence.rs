@@ -182,10 +182,7 @@ pub(crate) fn of_function(
         let mut states = States::new(robot, options);
         return (0..STATES).try_for_each(|_| {
             let state = states.next(&ports);
-            match options.scalar {
-                Scalar::F64 => same_bits::<f64>(robot, frames, function, options, graph, &state),
-                Scalar::F32 => same_bits::<f32>(robot, frames, function, options, graph, &state),
-            }
+            in_scalar!(options.scalar, T => same_bits::<T>(robot, frames, function, options, graph, &state))
         });
     }
     let check = Check { robot, frames, function, options, graph };
@@ -240,14 +237,9 @@ impl Check<'_> {
         }
         let sizes = self.sizes(state, &found, &off, least);
         let plain = ForwardDynamicsMethod::ArticulatedBody;
-        match options.scalar {
-            Scalar::F64 => losses.add(graph, (state, &found), &sizes, |state| {
-                plain_results::<f64>(robot, frames, function, options, plain, state)
-            }),
-            Scalar::F32 => losses.add(graph, (state, &found), &sizes, |state| {
-                plain_results::<f32>(robot, frames, function, options, plain, state)
-            }),
-        }
+        in_scalar!(options.scalar, T => losses.add(graph, (state, &found), &sizes, |state| {
+            plain_results::<T>(robot, frames, function, options, plain, state)
+        }));
         Ok(())
     }
 
@@ -259,13 +251,10 @@ impl Check<'_> {
         let Check { robot, frames, function, options, .. } = *self;
         let method = ForwardDynamicsMethod::ArticulatedBody;
         let exact = plain_results::<Dd>(robot, frames, function, options, method, state);
-        let short: Vec<f64> = match options.scalar {
-            Scalar::F64 => plain_results::<f64>(robot, frames, function, options, method, state),
-            Scalar::F32 => plain_results::<f32>(robot, frames, function, options, method, state)
-                .into_iter()
-                .map(f64::from)
-                .collect(),
-        };
+        let short: Vec<f64> = in_scalar!(options.scalar, T => {
+            let results = plain_results::<T>(robot, frames, function, options, method, state);
+            results.into_iter().map(f64::from).collect()
+        });
         let most = exact.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
         // written so that NaN is not regular
         exact.iter().zip(short).all(|(exact, short)| (exact.hi() - short).abs() <= REGULAR * most)
@@ -388,7 +377,7 @@ impl Losses {
 
     fn compare(self, program: &str, graph: &Graph, scalar: Scalar, least: f64) -> Result<(), Disagreement> {
         let least = match scalar {
-            _ if !graph.widths.is_empty() => return Ok(()),
+            _ if !graph.formats.is_empty() => return Ok(()),
             scalar => least * scalar.epsilon(),
         };
         let is_worse = |k: &usize| self.program[*k] > (LOSSES * self.plain[*k]).max(least);

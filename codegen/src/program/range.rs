@@ -12,7 +12,8 @@ use crate::model::states;
 use crate::scene::{messages as say, Parameter, Scene};
 use straightline_core::model::Model;
 use straightline_core::Dd;
-use straightline_graph::expr::{evaluate, Binary, Graph, Op, Width};
+use straightline_graph::certify::search::computed_at;
+use straightline_graph::expr::{evaluate, Binary, Graph, Op};
 use straightline_graph::Scalar;
 
 /// States at which a program is tried.
@@ -21,11 +22,11 @@ const STATES: usize = 3;
 /// Complains about the numbers of a robot file and of a scene's payloads that the scalar cannot hold.
 pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagnostics: &mut Diagnostics) {
     // the readers keep all numbers within 1e±60, or so small that f64 has them as zero
-    if scalar == Scalar::F64 {
+    if !scalar.is_short() {
         return;
     }
     let mut complain = |place: &Place, what: String, value: f64, is_needed: bool| {
-        unheld(&what, value, is_needed).into_iter().for_each(|complaint| diagnostics.push(complaint.at(place)));
+        unheld(&what, value, is_needed, scalar).into_iter().for_each(|complaint| diagnostics.push(complaint.at(place)));
     };
     let drive = |name: &str, drive: &JointDrive, complain: &mut dyn FnMut(&Place, String, f64)| {
         for (what, value) in [
@@ -88,7 +89,8 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
         let Parameter::Drive { drive, numbers, form: Some(form), .. } = parameter else { continue };
         // the others stand in the file
         for number in form.numbers().iter().filter(|number| number.is_limit() && numbers.contains(&number.name)) {
-            if let Some(complaint) = unheld(&format!("{} of drive `{drive}`", number.name), number.value, false) {
+            if let Some(complaint) = unheld(&format!("{} of drive `{drive}`", number.name), number.value, false, scalar)
+            {
                 scene.places.complain(&format!("parameter.{i}.numbers"), complaint, diagnostics);
             }
         }
@@ -98,7 +100,7 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
         for (key, values) in numbers {
             for x in values {
                 let what = format!("{key} of payload `{}`", payload.name);
-                if let Some(complaint) = unheld(&what, *x, key == "mass") {
+                if let Some(complaint) = unheld(&what, *x, key == "mass", scalar) {
                     scene.places.complain(&format!("payload.{i}.{key}"), complaint, diagnostics);
                 }
             }
@@ -109,7 +111,7 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
 /// Takes limits of drives that the scalar cannot hold for what they are there: none. Those that a parameter makes free stay, to be complained
 /// about.
 pub fn leave_out_lost_limits(drives: &mut [Drive], parameters: &[Parameter], scalar: Scalar) {
-    if scalar == Scalar::F64 {
+    if !scalar.is_short() {
         return;
     }
     for drive in drives {
@@ -119,16 +121,16 @@ pub fn leave_out_lost_limits(drives: &mut [Drive], parameters: &[Parameter], sca
             parameters.iter().any(frees)
         };
         let (input, current) = (is_free("input_limit"), is_free("current_limit"));
-        drive.input_limit = drive.input_limit.filter(|x| input || (*x as f32).is_finite());
-        drive.current_limit = drive.current_limit.filter(|x| current || (*x as f32).is_finite());
+        drive.input_limit = drive.input_limit.filter(|x| input || scalar.rounded(*x).is_finite());
+        drive.current_limit = drive.current_limit.filter(|x| current || scalar.rounded(*x).is_finite());
     }
 }
 
-/// What is wrong with a number in f32: it is too great, or it vanishes where it must not: a mass, a ratio, a resistance.
-fn unheld(what: &str, value: f64, is_needed: bool) -> Option<Diagnostic> {
-    let is_lost = is_needed && value != 0.0 && value.abs() < f64::from(f32::MIN_POSITIVE);
-    let is_too_great = (value as f32).is_infinite();
-    (is_lost || is_too_great).then(|| say::number_beyond_scalar(what, value, Scalar::F32.name(), is_too_great))
+/// What is wrong with a number in this scalar: it is too great, or it vanishes where it must not: a mass, a ratio, a resistance.
+fn unheld(what: &str, value: f64, is_needed: bool, scalar: Scalar) -> Option<Diagnostic> {
+    let is_lost = is_needed && value != 0.0 && value.abs() < scalar.tiny();
+    let is_too_great = scalar.rounded(value).is_infinite();
+    (is_lost || is_too_great).then(|| say::number_beyond_scalar(what, value, scalar.name(), is_too_great))
 }
 
 /// Why a program cannot be computed in its scalar, if that is so: a constant that is no number there, or a value that leaves the
@@ -138,19 +140,19 @@ pub fn of_program(model: &Model<Dd>, graph: &Graph, scalar: Scalar) -> Option<St
         return Some(why);
     }
     // mixed precision is f64 where it has to be
-    if !graph.widths.is_empty() || scalar == Scalar::F64 {
+    if !graph.formats.is_empty() || !scalar.is_short() {
         return None;
     }
     let all = Graph { results: graph.ids().collect(), ..graph.clone() };
     let states = states::states(model, &graph.inputs, STATES, false)?;
-    states.iter().find_map(|x| leaves(&all, x))
+    states.iter().find_map(|x| leaves(&all, scalar, x))
 }
 
-/// The first value of a program that leaves the range of f32 at these inputs, and not that of f64.
-fn leaves(graph: &Graph, inputs: &[f64]) -> Option<String> {
+/// The first value of a program that leaves the range of its scalar at these inputs, and not that of f64.
+fn leaves(graph: &Graph, scalar: Scalar, inputs: &[f64]) -> Option<String> {
     let exact: Vec<f64> = evaluate(graph, inputs);
-    let single: Vec<f32> = evaluate(graph, &inputs.iter().map(|x| *x as f32).collect::<Vec<f32>>());
-    let is_lost = |x: f64| x != 0.0 && x.abs() < f64::from(f32::MIN_POSITIVE);
+    let single = computed_at(graph, scalar, inputs);
+    let is_lost = |x: f64| x != 0.0 && x.abs() < scalar.tiny();
     for (k, (exact_value, value)) in exact.iter().zip(&single).enumerate() {
         if value.is_finite() || !exact_value.is_finite() {
             continue;
@@ -161,7 +163,7 @@ fn leaves(graph: &Graph, inputs: &[f64]) -> Option<String> {
             Op::Binary(Binary::Div, _, b) if single[b.index()] == 0.0 => {
                 Some(format!("it divides by {:.3e}", exact[b.index()]))
             }
-            _ if exact_value.abs() > f64::from(f32::MAX) => Some(format!("a value on the way is {exact_value:.3e}")),
+            _ if exact_value.abs() > scalar.largest() => Some(format!("a value on the way is {exact_value:.3e}")),
             _ => None,
         };
     }
@@ -173,10 +175,7 @@ pub fn of_constants(graph: &Graph, scalar: Scalar) -> Option<String> {
     graph.ids().find_map(|id| {
         let Op::Constant(c) = graph.op(id) else { return None };
         let exact = c.value().to_f64();
-        let held = match (graph.width(id), scalar) {
-            (Width::Double, _) | (_, Scalar::F64) => exact,
-            (_, Scalar::F32) => f64::from(c.value().to_f32()),
-        };
+        let held = graph.precision(id, scalar).held.nearest(c.value());
         match (exact.is_finite(), held.is_finite()) {
             (false, _) => Some("a product of constants is beyond f64".to_string()),
             (_, false) => Some(format!("a product of constants is {exact:.3e}")),

@@ -142,7 +142,7 @@ impl Around<'_, '_, '_> {
         ];
         let scalar = self.scalar();
         for (name, values) in limits {
-            let of_scalar = |x: f64| if scalar == Scalar::F32 { f64::from(x as f32) } else { x };
+            let of_scalar = |x: f64| scalar.rounded(x);
             self.numbers(name, scalar, &[values.len()], &values, &|found, x| found == of_scalar(x))?;
         }
         for (function, figures) in &generated.report.functions {
@@ -221,10 +221,7 @@ impl Around<'_, '_, '_> {
         let (root, s, n) = (self.root, self.scalar().name(), numbers.nominal.len());
         let (all, of_numbers) = (&numbers.numbers, format!("{name}Numbers"));
         let first = &all[0].name;
-        let written = |x: Dd| match self.scalar() {
-            Scalar::F64 => format!("{:?}", x.to_f64()),
-            Scalar::F32 => format!("{:?}", x.to_f32()),
-        };
+        let written = |x: Dd| self.scalar().literal(self.scalar().nearest(x));
         let each = |text: &dyn Fn(&Number) -> String| all.iter().map(text).collect::<Vec<_>>();
         let fields: String = each(&|x| format!("pub {}: {s},", x.name)).concat();
         let values = each(&|x| format!("{}: {}", x.name, written(Dd::from(x.value)))).join(", ");
@@ -653,11 +650,7 @@ fn nested(
             Kind::Number => {
                 *at += 1;
                 let text = items.text_of(*at - 1);
-                let x = match scalar {
-                    Scalar::F64 => text.parse::<f64>().ok(),
-                    Scalar::F32 => text.parse::<f32>().ok().map(f64::from),
-                };
-                x.filter(|_| text.contains(['.', 'e']))
+                scalar.read(text).filter(|_| text.contains(['.', 'e']))
             }
             Kind::Word(t::F64 | t::F32) if items.text_of(*at) == scalar.name() => {
                 *at += 1;

@@ -4,7 +4,7 @@
 //! terms of one operation change places. Nothing else is taken as equal: (a + b) + c is not a + (b + c).
 
 use rustc_hash::FxHashMap;
-use straightline_graph::expr::{Binary, Graph, NodeId, Op, Unary, Width};
+use straightline_graph::expr::{Binary, Graph, NodeId, Op, Unary};
 use straightline_graph::Scalar;
 
 /// In which format a value is computed.
@@ -206,8 +206,9 @@ impl Values {
     pub fn results(&mut self, graph: &Graph, inputs: &[Value], format: Format) -> Vec<Value> {
         let mut values: Vec<Value> = Vec::with_capacity(graph.ops.len());
         for (i, op) in graph.ops.iter().enumerate() {
-            let width = graph.widths.get(i).copied().unwrap_or_default();
-            let computed = if width == Width::Single { format } else { Format::F64 };
+            let precision = graph.formats.get(i);
+            let computed = precision.map_or(format, |p| Format::from(p.computed));
+            let held = precision.map_or(format, |p| Format::from(p.held));
             // an operand in the format in which the operation is computed
             let operand = |id: NodeId, known: &mut Values| {
                 let value = values[id.index()];
@@ -218,7 +219,7 @@ impl Values {
             };
             let value = match *op {
                 Op::Input(k) => inputs[k as usize],
-                Op::Constant(c) => match if width == Width::Double { Format::F64 } else { format } {
+                Op::Constant(c) => match held {
                     Format::F64 => self.constant(c.value().to_f64(), Format::F64),
                     Format::F32 => self.constant(f64::from(c.value().to_f32()), Format::F32),
                     Format::Any => self.long(c.value().hi(), c.value().lo()),
@@ -247,7 +248,7 @@ impl Values {
                 Op::Cos(a) => self.sin_cos(values[a.index()]).1,
             };
             let is_operation = !matches!(op, Op::Input(_) | Op::Constant(_));
-            values.push(if width == Width::Rounded && is_operation { self.rounded(value) } else { value });
+            values.push(if computed != held && is_operation { self.rounded(value) } else { value });
         }
         graph.results.iter().map(|r| values[r.index()]).collect()
     }

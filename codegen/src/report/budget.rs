@@ -45,23 +45,16 @@ impl Measures {
     }
 }
 
-/// Bytes of machine code per operation, per sine-cosine pair that is computed alone, and per block of pairs that are computed
-/// together; in f64 and f32.
+/// Bytes of machine code of a program on x86-64, as far as known before rustc: per operation, per sine-cosine pair that is computed alone, and
+/// per block of pairs that are computed together ([`Scalar::code_bytes`]).
 ///
 /// Least squares of relative errors over ten functions each, one to a file, of Panda, UR5, HyQ with a fixed and a floating base
 /// and the simple humanoid (f64), of Panda, PUMA 560 and Solo 12 (f32), compiled by rustc 1.95.0 with `-C opt-level=3
 /// -C codegen-units=1` for x86-64 without further target features; sizes by `nm -S`, the kernel included. Estimate over measured
 /// size: 0.67 to 1.27, median 1.00, in f32 0.71 to 1.16. `opt-level = "s"`, fused operations and other processors give less.
-const F64_CODE: [f64; 3] = [11.3, 398.0, 551.0];
-const F32_CODE: [f64; 3] = [10.6, 406.0, 414.0];
-
-/// Bytes of machine code of a program on x86-64, as far as known before rustc.
 fn code_bytes(program: &Program, scalar: Scalar) -> usize {
     let Program { graph, schedule, .. } = program;
-    let [operation, alone, block] = match scalar {
-        Scalar::F64 => F64_CODE,
-        Scalar::F32 => F32_CODE,
-    };
+    let [operation, alone, block] = scalar.code_bytes();
     // a row of a loop over limbs is there once
     let live = graph.live();
     let again = |row: &&Vec<NodeId>| if graph.op(row[0]).is_counted() { row.len() - 1 } else { 0 };

@@ -31,7 +31,7 @@ pub(super) fn has(function: DriveFunction, drives: &[Drive<Dd>]) -> bool {
 
 /// States and inputs: shafts near where slack springs have them, currents within their limits.
 pub(super) fn random_inputs(model: &Model<Dd>, scalar: Scalar, state: &mut State, random: &mut Random) {
-    let narrow = |x: f64| if scalar == Scalar::F32 { f64::from(x as f32) } else { x };
+    let narrow = |x: f64| scalar.rounded(x);
     let (mut x, mut u) = (Vec::new(), Vec::new());
     for drive in &model.drives {
         let last = last_shaft(model, drive, &wide(&state.q), &wide(&state.qd)).0;

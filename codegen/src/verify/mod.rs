@@ -79,19 +79,11 @@ impl Verification {
 /// The greatest scaled error that passes: 2^13 roundings. Trees of 40 bodies stay below a hundred; the smallest wrong
 /// term that matters is far above.
 pub fn bound(scalar: Scalar) -> f64 {
-    8192.0 * unit(scalar)
+    8192.0 * scalar.unit()
 }
 
 /// A natural scale that is so small a part of what it would be if nothing cancelled, is rounding noise.
 const NOISE: f64 = 1e-6;
-
-/// Half the distance from 1 to the next number.
-fn unit(scalar: Scalar) -> f64 {
-    match scalar {
-        Scalar::F64 => f64::EPSILON / 2.0,
-        Scalar::F32 => f64::from(f32::EPSILON) / 2.0,
-    }
-}
 
 /// Compares the programs of a robot with the reference, which reads `source` on its own. `tick` is called after every
 /// state.
@@ -427,9 +419,7 @@ impl State {
             }
         }
         for x in q.iter_mut().chain(&mut qd).chain(&mut qdd).chain(&mut tau) {
-            if scalar == Scalar::F32 {
-                *x = f64::from(*x as f32);
-            }
+            *x = scalar.rounded(*x);
         }
         State { q, qd, qdd, tau, others: BTreeMap::new() }
     }

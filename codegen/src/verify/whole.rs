@@ -15,7 +15,8 @@ use nalgebra::{Matrix3, Vector3};
 use straightline_core::model::Model;
 use straightline_core::reference::{ExtendedPosition, MassCentreTree};
 use straightline_core::Dd;
-use straightline_graph::expr::{evaluate, Graph};
+use straightline_graph::certify::search::computed_at;
+use straightline_graph::expr::Graph;
 use straightline_graph::Scalar;
 
 /// How the coordinates of a scene sit among those of the whole robot.
@@ -199,7 +200,7 @@ pub(super) fn random_inputs(
     (state, tree): (&mut State, &mut MassCentreTree<Dd>),
     random: &mut Random,
 ) -> Result<(), String> {
-    let rounded = |x: f64| if scalar == Scalar::F32 { f64::from(x as f32) } else { x };
+    let rounded = |x: f64| scalar.rounded(x);
     if scene.gravity == Gravity::Input {
         let gravity: [f64; 3] = std::array::from_fn(|_| rounded(random.symmetric(10.0)));
         tree.gravity = Vector3::from(gravity.map(Dd::from));
@@ -215,7 +216,7 @@ pub(super) fn random_inputs(
         let j = (sum * (mass / 3.0)).map(rounded);
         let six = [j[(0, 0)], j[(0, 1)], j[(0, 2)], j[(1, 1)], j[(1, 2)], j[(2, 2)]];
         let inputs = [&[mass][..], &com, &six].concat();
-        state.others.insert(parameter.input_name(), made(program, scalar, &inputs));
+        state.others.insert(parameter.input_name(), computed_at(program, scalar, &inputs));
         weld(tree, frame, mass, com, j)?;
     }
     Ok(())
@@ -231,21 +232,10 @@ pub(super) fn random_drives(
     let of_file = model.clone();
     for (parameter, program) in parameters {
         let Some(drive) = FreeDrive::new(parameter, &of_file) else { continue };
-        let rounded = |x: f64| if scalar == Scalar::F32 { f64::from(x as f32) } else { x };
+        let rounded = |x: f64| scalar.rounded(x);
         let numbers: Vec<f64> = drive.random(|| 0.5 + random.symmetric(0.5)).into_iter().map(rounded).collect();
-        state.others.insert(parameter.input_name(), made(program, scalar, &numbers));
+        state.others.insert(parameter.input_name(), computed_at(program, scalar, &numbers));
         let derived = drive.derived(&numbers.iter().map(|x| Dd::from(*x)).collect::<Vec<_>>());
         model.drives.iter_mut().filter(|d| d.name == derived.name).for_each(|d| *d = derived.clone());
-    }
-}
-
-/// What a constructor makes, in the scalar that is generated.
-fn made(program: &Graph, scalar: Scalar, inputs: &[f64]) -> Vec<f64> {
-    match scalar {
-        Scalar::F64 => evaluate::<f64>(program, inputs),
-        Scalar::F32 => {
-            let inputs: Vec<f32> = inputs.iter().map(|x| *x as f32).collect();
-            evaluate::<f32>(program, &inputs).into_iter().map(f64::from).collect()
-        }
     }
 }

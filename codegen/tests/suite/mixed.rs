@@ -47,8 +47,8 @@ fn a_demanded_error_is_met_with_less_than_all_operations_in_f64() {
     let mut before = 0;
     for part in [1.0, 0.8, 0.6, 0.4] {
         let demand = vec![part * worst; single.len()];
-        let mixed = mixed::widened(&graph, &ranges, &demand, &[]).expect("no division");
-        let (double, errors) = (mixed::double_operations(&mixed), bounds(&mixed));
+        let mixed = mixed::widened(&graph, Scalar::F32, &ranges, &demand, &[]).expect("no division");
+        let (double, errors) = (mixed::wide_operations(&mixed, Scalar::F32), bounds(&mixed));
         println!("{part} of {worst:e}: {double} of {all} operations in f64");
         assert!(errors.iter().all(|e| *e <= demand[0]), "{part}: {errors:?} > {:e}", demand[0]);
         assert!(double >= before && double < all, "{part}: {double} of {all}, before {before}");
@@ -96,7 +96,7 @@ fn a_budget_by_result_is_met_result_by_result() {
 fn the_bound_at_a_state_knows_what_is_in_f64() {
     let (graph, ranges) = in_single();
     let demand: Vec<f64> = errors_in_single().iter().map(|e| 0.4 * e).collect();
-    let mixed = mixed::widened(&graph, &ranges, &demand, &[]).expect("no division");
+    let mixed = mixed::widened(&graph, Scalar::F32, &ranges, &demand, &[]).expect("no division");
     let bound = state_bound(&mixed, Scalar::F32, Bits::Plain).expect("the program is short");
     let of_single = state_bound(&graph, Scalar::F32, Bits::Plain).expect("the program is short");
     let mut less = 0;
@@ -139,7 +139,7 @@ fn the_text_computes_what_was_analysed() {
     let robot = Robot::new(generated.model.clone());
     let plain = program(&robot, &generated.frames, FUNCTION, &options).graph;
     let ranges = input_box(&plain.inputs, &options.scene, &robot.model).expect("every input has a range");
-    let mixed = mixed::widened(&plain, &ranges, &[demand; 6], &[]).expect("no division");
+    let mixed = mixed::widened(&plain, Scalar::F32, &ranges, &[demand; 6], &[]).expect("no division");
     let input: Vec<f64> = (0..18).map(|k| f64::from((0.3 + 0.17 * k as f32).sin() * 0.5)).collect();
     let expected: Vec<u32> =
         search::computed_at(&mixed, Scalar::F32, &input).into_iter().map(|x| (x as f32).to_bits()).collect();

@@ -1,6 +1,7 @@
 //! Every rule of the table: the smallest graph where it fires, and one where it must not.
 
 use straightline_codegen::expr::{rules::RULES, Builder, Folding, Grade, NodeId, Op, Port, RuleSet};
+use straightline_codegen::Scalar;
 use straightline_core::Dd;
 
 fn builder(rules: RuleSet) -> (Builder, NodeId, NodeId) {
@@ -134,7 +135,7 @@ fn no_rule_fires_where_it_must_not() {
 
 #[test]
 fn the_exact_rule_set_holds_exact_rules_only_and_all_of_them() {
-    let exact = RuleSet::exact(Folding::F64);
+    let exact = RuleSet::exact(Folding::In(Scalar::F64));
     assert!(exact.rules().iter().all(|r| r.grade == Grade::Exact));
     assert_eq!(exact.rules().len(), RULES.iter().filter(|r| r.grade == Grade::Exact).count());
 }
@@ -147,8 +148,8 @@ fn constants_fold_as_the_number_format_would() {
         let id = b.add(Op::add(x, y));
         b.as_constant(id).unwrap().value()
     };
-    assert_eq!(sum(RuleSet::exact(Folding::F64)), Dd::from(0.1 + 0.2));
-    assert_eq!(sum(RuleSet::exact(Folding::F32)), Dd::from(f64::from(0.1f32 + 0.2f32)));
+    assert_eq!(sum(RuleSet::exact(Folding::In(Scalar::F64))), Dd::from(0.1 + 0.2));
+    assert_eq!(sum(RuleSet::exact(Folding::In(Scalar::F32))), Dd::from(f64::from(0.1f32 + 0.2f32)));
     assert_eq!(sum(RuleSet::all()), Dd::from(0.1) + Dd::from(0.2));
     assert_ne!(sum(RuleSet::all()), Dd::from(0.1 + 0.2));
 }
@@ -169,7 +170,7 @@ fn exact_rules_keep_every_bit() {
         for (i, make) in ops.iter().enumerate() {
             for (sign_x, sign_y) in [(false, false), (true, false), (false, true), (true, true)] {
                 for against_constant in [false, true] {
-                    let (mut b, x, y) = builder(RuleSet::exact(Folding::F64));
+                    let (mut b, x, y) = builder(RuleSet::exact(Folding::In(Scalar::F64)));
                     let left = if sign_x { b.add(Op::neg(x)) } else { x };
                     let right = if against_constant { c(&mut b, k) } else { y };
                     let right = if sign_y { b.add(Op::neg(right)) } else { right };

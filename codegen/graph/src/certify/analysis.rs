@@ -6,7 +6,7 @@ use super::interval::{add_up, mul_up, Interval};
 use super::norms::{Bounded, Factor, GroupId, Groups};
 use super::tape::{Bound, Norm, Pen, Range, Tape};
 use crate::expr::op::Slope;
-use crate::expr::{Binary, Graph, NodeId, Op, Unary, Width};
+use crate::expr::{Binary, Graph, NodeId, Op, Precision, Unary};
 use crate::number::Scalar;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -315,32 +315,36 @@ impl<'g> Analysis<'g> {
         self.state.class_error = class_error;
     }
 
-    /// What rounding node i to its width can do.
+    /// What rounding node i to its formats can do.
     fn rounding(&mut self, i: usize, range: Range) -> Bound {
-        let magnitude = self.state.pen.mag(range);
-        let mut to = |format: &Format| {
-            let error = format.rounding(magnitude.x);
-            self.state.pen.rounding(magnitude, error, 0.5 * format.u, format.tiny)
+        let Precision { computed, held } = self.precision(i);
+        let own = self.format;
+        let pen = &mut self.state.pen;
+        let magnitude = pen.mag(range);
+        let mut to = |scalar: Scalar| {
+            let format = format_of(own, scalar);
+            pen.rounding(magnitude, format.rounding(magnitude.x), 0.5 * format.u, format.tiny)
         };
-        let double = Format::of(Scalar::F64);
-        match self.graph.width(NodeId(i as u32)) {
-            Width::Single => to(&self.format),
-            Width::Double => to(&double),
-            Width::Rounded => {
-                let (single, double) = (to(&self.format), to(&double));
-                self.state.pen.add_up(single, double)
-            }
+        let handed_on = to(held);
+        if computed == held {
+            return handed_on;
         }
+        let before = to(computed);
+        pen.add_up(handed_on, before)
     }
 
     /// u of two values that are bounded together.
     fn unit(&self, a: usize, b: usize) -> f64 {
-        let double = Format::of(Scalar::F64).u;
-        match [a, b].map(|i| self.graph.width(NodeId(i as u32))) {
-            [Width::Single, Width::Single] => self.format.u,
-            [Width::Double, Width::Double] => double,
-            _ => add_up(self.format.u, double),
+        let [x, y] = [a, b].map(|i| self.precision(i));
+        let u = |scalar: Scalar| format_of(self.format, scalar).u;
+        if x == y && !x.is_rounded() {
+            return u(x.held);
         }
+        add_up(self.format.u, u(self.graph.widest(self.format.scalar)))
+    }
+
+    fn precision(&self, i: usize) -> Precision {
+        self.graph.precision(NodeId(i as u32), self.format.scalar)
     }
 
     /// What the errors of a node's class are worth for the result of [`Analysis::error`] at hand: the node that stands for the class,
@@ -383,10 +387,7 @@ impl<'g> Analysis<'g> {
             }
             Op::Constant(c) => {
                 // the range holds both the exact and the rounded value
-                let format = match self.graph.width(NodeId(i as u32)) {
-                    Width::Double => Format::of(Scalar::F64),
-                    _ => format,
-                };
+                let format = format_of(format, self.precision(i).held);
                 let (range, error) = format.constant(c.value());
                 let error = if self.is_broken(Broken::Constants) { 0.0 } else { error };
                 (self.state.pen.constant(range), self.state.pen.number(error))
@@ -406,7 +407,7 @@ impl<'g> Analysis<'g> {
                 if !op.row().is_exact {
                     return rounded(self, value);
                 }
-                if self.graph.width(NodeId(i as u32)) != Width::Rounded {
+                if !self.precision(i).is_rounded() {
                     return Ok((value, Bound::ZERO));
                 }
                 let magnitude = self.state.pen.mag(value);
@@ -433,7 +434,7 @@ impl<'g> Analysis<'g> {
                     let most = self.state.pen.mul_up(half, square);
                     value = self.state.pen.clipped(value, most);
                 }
-                let is_single = self.graph.width(NodeId(i as u32)) == Width::Single;
+                let is_single = self.precision(i) == Precision::of(format.scalar);
                 let is_shift = op == Binary::Mul && is_single && (self.is_power_of_two(a) || self.is_power_of_two(b));
                 match (is_shift, op.row().is_exact) {
                     (true, _) => (value, self.state.pen.number(format.tiny)),
@@ -836,6 +837,15 @@ impl<'g> Analysis<'g> {
         }
         self.cones[cone].1 = nodes;
         sum
+    }
+}
+
+/// The format of a scalar, where an analysis is made in this one.
+fn format_of(own: Format, scalar: Scalar) -> Format {
+    if scalar == own.scalar {
+        own
+    } else {
+        Format::of(scalar)
     }
 }
 

@@ -24,15 +24,15 @@ pub enum Bits {
 /// # Errors
 /// If it would be so long that its own roundings count, or takes parameters in mixed precision.
 pub fn state_bound(graph: &Graph, scalar: Scalar, bits: Bits) -> Result<Graph, &'static str> {
-    if !graph.widths.is_empty() && graph.inputs.iter().any(|p| p.wrapper.is_some()) {
+    if !graph.formats.is_empty() && graph.inputs.iter().any(|p| p.wrapper.is_some()) {
         return Err("parameters that are inputs are in f32, and the bound of mixed precision is in f64");
     }
     let format = Format::of(scalar);
     let ports = graph.inputs.clone();
-    let program = match (graph.widths.is_empty(), bits) {
+    let program = match (graph.formats.is_empty(), bits) {
         (true, Bits::Plain) => Running::new(ports, format),
         (true, Bits::Fused) => Running::of_other_bits(ports, format, format),
-        (false, _) => Running::of_other_bits(ports, Format::of(Scalar::F64), format),
+        (false, _) => Running::of_other_bits(ports, Format::of(graph.widest(scalar)), format),
     };
     bound_of(program, graph)
 }

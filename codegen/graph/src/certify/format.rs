@@ -2,7 +2,7 @@
 
 use super::interval::{add_up, norm_up, Interval};
 use crate::number::Scalar;
-use straightline_core::{trig, Dd};
+use straightline_core::Dd;
 
 /// The bound of the cosine kernel, in both formats \[ulp\]: see `trig.rs`; of sums of far angles in f32 2^-32 more.
 const COSINE_KERNEL_ULPS: f64 = 0.622;
@@ -10,6 +10,8 @@ const COSINE_KERNEL_ULPS: f64 = 0.622;
 /// A binary floating-point format, with the proven error of its sine and cosine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Format {
+    /// The scalar type that has it.
+    pub scalar: Scalar,
     /// Half the distance of 1 to the next number, u = 2^-p.
     pub u: f64,
     /// The smallest normal number: numbers below it may be rounded to zero, where the machine flushes them.
@@ -25,22 +27,13 @@ pub struct Format {
 impl Format {
     /// The format of a scalar type.
     pub fn of(scalar: Scalar) -> Self {
-        match scalar {
-            Scalar::F64 => Format {
-                u: f64::EPSILON / 2.0,
-                tiny: f64::MIN_POSITIVE,
-                largest: f64::MAX,
-                trig_ulps: 0.797,
-                trig_domain: trig::DOMAIN_F64,
-            },
-            Scalar::F32 => Format {
-                u: f64::from(f32::EPSILON) / 2.0,
-                tiny: f64::from(f32::MIN_POSITIVE),
-                largest: f64::from(f32::MAX),
-                // 0.801, and the 2^-32 more of sums of far angles
-                trig_ulps: 0.806,
-                trig_domain: f64::from(trig::DOMAIN_F32),
-            },
+        Format {
+            scalar,
+            u: scalar.unit(),
+            tiny: scalar.tiny(),
+            largest: scalar.largest(),
+            trig_ulps: scalar.trig_ulps(),
+            trig_domain: scalar.trig_domain(),
         }
     }
 
@@ -82,11 +75,7 @@ impl Format {
 
     /// The constant as this format holds it.
     pub fn round(&self, c: Dd) -> f64 {
-        if self.u == f64::EPSILON / 2.0 {
-            c.to_f64()
-        } else {
-            f64::from(c.to_f32())
-        }
+        self.scalar.nearest(c)
     }
 
     /// All values between the constant and its rounding, and an upper bound of their distance.

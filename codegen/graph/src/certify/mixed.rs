@@ -1,4 +1,4 @@
-//! Mixed precision: f64 for those operations of a program in f32 that a demanded bound needs, and no others.
+//! Mixed precision: a wider format, f64, for those operations of a program in a short one, f32, that a demanded bound needs, and no others.
 //!
 //! Operations go in classes: all that share an adjoint, as a sum with its products does, are computed in f64 together and rounded once.
 //! From the bound of the program in f32, each class has a share of each result's error; class by class, what takes most off the
@@ -8,19 +8,26 @@
 //! A value in f64 is either used in f64 alone or rounded to f32 for all its users, so that each node still has one error.
 
 use super::{Analysis, Format, Interval, Refusal};
-use crate::expr::{Graph, NodeId, Op, Width};
+use crate::expr::{Graph, NodeId, Op, Precision};
 use crate::number::Scalar;
 
 /// So often a choice is made.
 const ATTEMPTS: usize = 6;
 
-/// The program in f32 with f64 where the demanded bounds, one per result, need it; `stored`: nodes whose values are handed on in f32. A
-/// program that needs none comes back as it is; if no choice meets the demand, the best one found.
+/// The program in a scalar with the [wider](Scalar::wider) one where the demanded bounds, one per result, need it; `stored`: nodes whose values
+/// are handed on in the scalar. A program that needs none comes back as it is; if no choice meets the demand, the best one found.
 ///
 /// # Errors
 /// If a value may be no number in that box.
-pub fn widened(graph: &Graph, inputs: &[Interval], demand: &[f64], stored: &[NodeId]) -> Result<Graph, Refusal> {
-    let mut analysis = Analysis::new(graph, Format::of(Scalar::F32));
+pub fn widened(
+    graph: &Graph,
+    scalar: Scalar,
+    inputs: &[Interval],
+    demand: &[f64],
+    stored: &[NodeId],
+) -> Result<Graph, Refusal> {
+    let Some(wider) = scalar.wider() else { return Ok(graph.clone()) };
+    let mut analysis = Analysis::new(graph, Format::of(scalar));
     analysis.ranges(inputs)?;
     let mut results = Vec::new();
     for k in 0..analysis.results() {
@@ -37,8 +44,8 @@ pub fn widened(graph: &Graph, inputs: &[Interval], demand: &[f64], stored: &[Nod
     let (mut aim, mut best) = (1.0, (f64::INFINITY, graph.clone()));
     for _ in 0..ATTEMPTS {
         let wide = classes.choose(&results, aim);
-        let candidate = Graph { widths: classes.widths(&wide), ..graph.clone() };
-        let mut analysis = Analysis::new(&candidate, Format::of(Scalar::F32));
+        let candidate = Graph { formats: classes.formats(&wide, [scalar, wider]), ..graph.clone() };
+        let mut analysis = Analysis::new(&candidate, Format::of(scalar));
         analysis.ranges(inputs)?;
         let beyond = (0..analysis.results()).map(|k| analysis.error(k) / results[k].demand).fold(0.0, f64::max);
         if beyond < best.0 {
@@ -52,10 +59,10 @@ pub fn widened(graph: &Graph, inputs: &[Interval], demand: &[f64], stored: &[Nod
     Ok(best.1)
 }
 
-/// How many operations are computed in f64.
-pub fn double_operations(graph: &Graph) -> usize {
+/// How many operations of a program in this scalar are computed in the wider one.
+pub fn wide_operations(graph: &Graph, scalar: Scalar) -> usize {
     let is_operation = |id: &NodeId| graph.op(*id).is_polynomial() && graph.op(*id).is_counted();
-    graph.ids().filter(|id| graph.width(*id) != Width::Single && is_operation(id)).count()
+    graph.ids().filter(|id| graph.precision(*id, scalar).computed != scalar && is_operation(id)).count()
 }
 
 /// What a result may lose, what it loses in f32, and by which classes.
@@ -99,24 +106,24 @@ impl<'g> Classes<'g> {
         Classes { graph, class, members, may: (0..n).map(can).collect(), users, stored, error }
     }
 
-    fn is_double(&self, i: usize, wide: &[bool]) -> bool {
+    fn is_wide(&self, i: usize, wide: &[bool]) -> bool {
         let kept = !self.stored[i] && !self.users[i].is_empty() && self.users[i].iter().all(|u| wide[*u]);
         kept && (wide[i] || matches!(self.graph.ops[i], Op::Constant(_)))
     }
 
-    fn widths(&self, wide: &[bool]) -> Vec<Width> {
-        let width = |i: usize| match (self.is_double(i, wide), wide[i]) {
-            (true, _) => Width::Double,
-            (false, true) => Width::Rounded,
-            (false, false) => Width::Single,
+    fn formats(&self, wide: &[bool], [scalar, wider]: [Scalar; 2]) -> Vec<Precision> {
+        let format = |i: usize| match (self.is_wide(i, wide), wide[i]) {
+            (true, _) => Precision::of(wider),
+            (false, true) => Precision { computed: wider, held: scalar },
+            (false, false) => Precision::of(scalar),
         };
-        (0..wide.len()).map(width).collect()
+        (0..wide.len()).map(format).collect()
     }
 
     /// Errors of each class, with these nodes in f64.
     fn errors(&self, wide: &[bool]) -> Vec<f64> {
         let mut errors = vec![0.0; self.class.len()];
-        for i in (0..wide.len()).filter(|i| !self.is_double(*i, wide)) {
+        for i in (0..wide.len()).filter(|i| !self.is_wide(*i, wide)) {
             errors[self.class[i]] += self.error[i];
         }
         errors
@@ -169,8 +176,7 @@ impl<'g> Classes<'g> {
                 let mut touched: Vec<usize> = touched.collect();
                 touched.sort_unstable();
                 touched.dedup();
-                let freed =
-                    touched.into_iter().filter(|i| self.is_double(*i, &candidate) && !self.is_double(*i, &wide));
+                let freed = touched.into_iter().filter(|i| self.is_wide(*i, &candidate) && !self.is_wide(*i, &wide));
                 let gain: f64 = freed.map(|i| worth[self.class[i]] * self.error[i]).sum();
                 let score = gain / cost as f64;
                 if score > best.as_ref().map_or(0.0, |(most, _)| *most) {

@@ -21,7 +21,7 @@
 //! operation, so that s = 1 + 6 n u. Products that underflow lose less than the smallest normal number; t is four of them.
 
 use super::Format;
-use crate::expr::{Binary, Builder, Folding, Graph, NodeId, Op, Port, RuleSet, Unary, Width};
+use crate::expr::{Binary, Builder, Folding, Graph, NodeId, Op, Port, RuleSet, Unary};
 use crate::number::Scalar;
 use straightline_core::Dd;
 
@@ -343,20 +343,20 @@ impl Running {
     pub fn follow(&mut self, graph: &Graph, inputs: &[Tracked]) -> Vec<Tracked> {
         let live = graph.live();
         let mut nodes: Vec<Option<Tracked>> = vec![None; graph.ops.len()];
-        let double = Format::of(Scalar::F64);
+        // that of the program in question may be another one than its scalar's, for tests
+        let of_scalar = |s: Scalar, this: &Self| if s == this.rounding.scalar { this.rounding } else { Format::of(s) };
         for (i, op) in graph.ops.iter().enumerate().filter(|(i, _)| live[*i]) {
             let of = |a: NodeId| nodes[a.index()].expect("operands stand before their users");
-            let width = graph.width(NodeId(i as u32));
-            let unit = match width {
-                Width::Single => self.rounding.u,
-                Width::Double => double.u,
-                Width::Rounded => self.rounding.u * (1.0 + 4.0 * double.u) + double.u,
+            let precision = graph.precision(NodeId(i as u32), self.rounding.scalar);
+            let [computed, held] = [precision.computed, precision.held].map(|s| of_scalar(s, self));
+            let unit = match precision.is_rounded() {
+                true => held.u * (1.0 + 4.0 * computed.u) + computed.u,
+                false => held.u,
             };
             let tracked = match *op {
                 Op::Input(k) => inputs[k as usize],
                 Op::Constant(c) => {
-                    let format = if width == Width::Double { double } else { self.rounding };
-                    let (_, error) = format.constant(c.value());
+                    let (_, error) = held.constant(c.value());
                     let value = self.b.insert(*op);
                     // rounded up to this format
                     let error = (error != 0.0).then(|| self.constant(error * (1.0 + 4.0 * self.format.u)));
@@ -364,9 +364,9 @@ impl Running {
                 }
                 Op::Unary(Unary::Neg, a) => {
                     let value = self.insert(Op::neg(of(a).value));
-                    match width {
-                        Width::Rounded => self.rounded(value, of(a).error, unit),
-                        _ => Tracked { value, ..of(a) },
+                    match precision.is_rounded() {
+                        true => self.rounded(value, of(a).error, unit),
+                        false => Tracked { value, ..of(a) },
                     }
                 }
                 Op::Binary(op @ (Binary::Add | Binary::Sub), a, b) => self.sum_in(op, of(a), of(b), unit),

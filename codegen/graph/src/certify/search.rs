@@ -4,10 +4,10 @@
 //! last place; what makes the error greater is kept. The truth is the same program in double-double.
 
 use super::Interval;
-use crate::expr::{evaluate, Graph, NodeId, Op, Width};
+use crate::expr::{evaluate, Graph, NodeId, Op, Precision};
 use crate::number::Scalar;
 use crate::random::Random;
-use straightline_core::Dd;
+use straightline_core::{Dd, Real};
 
 /// The worst that was found for one output scalar.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,14 +21,12 @@ pub struct Found {
 /// The number of the format that is nearest to x and in the range.
 fn representable(x: f64, range: Interval, scalar: Scalar) -> f64 {
     let x = x.clamp(range.lo, range.hi);
-    match scalar {
-        Scalar::F64 => x,
-        Scalar::F32 => {
-            let near = x as f32;
-            let near = if f64::from(near) > range.hi { near.next_down() } else { near };
-            let near = if f64::from(near) < range.lo { near.next_up() } else { near };
-            f64::from(near)
-        }
+    let near = scalar.rounded(x);
+    let near = if near > range.hi { -scalar.next_up(-near) } else { near };
+    if near < range.lo {
+        scalar.next_up(near)
+    } else {
+        near
     }
 }
 
@@ -41,48 +39,38 @@ pub fn errors_at(graph: &Graph, scalar: Scalar, inputs: &[f64]) -> Vec<f64> {
 
 /// What the program computes in its format.
 pub fn computed_at(graph: &Graph, scalar: Scalar, inputs: &[f64]) -> Vec<f64> {
-    match scalar {
-        Scalar::F64 => evaluate(graph, inputs),
-        Scalar::F32 if !graph.widths.is_empty() => mixed_at(graph, inputs),
-        Scalar::F32 => {
-            let inputs: Vec<f32> = inputs.iter().map(|x| *x as f32).collect();
-            evaluate::<f32>(graph, &inputs).into_iter().map(f64::from).collect()
-        }
+    if !graph.formats.is_empty() {
+        return mixed_at(graph, scalar, inputs);
     }
+    in_scalar!(scalar, T => {
+        let inputs: Vec<T> = inputs.iter().map(|x| *x as T).collect();
+        evaluate::<T>(graph, &inputs).into_iter().map(f64::from).collect()
+    })
 }
 
-/// What a program in mixed precision computes; values of f32 are held as the f64 that they are.
-fn mixed_at(graph: &Graph, inputs: &[f64]) -> Vec<f64> {
+/// What a program in mixed precision computes; values of short formats are held as the f64 that they are.
+fn mixed_at(graph: &Graph, scalar: Scalar, inputs: &[f64]) -> Vec<f64> {
     let mut values: Vec<f64> = Vec::with_capacity(graph.ops.len());
-    let single = |x: f64| x as f32;
     for (i, op) in graph.ops.iter().enumerate() {
-        let width = graph.width(NodeId(i as u32));
+        let Precision { computed, held } = graph.precision(NodeId(i as u32), scalar);
         let v = |a: NodeId| values[a.index()];
-        let arithmetic = |double: f64, single: f32| match width {
-            Width::Single => f64::from(single),
-            Width::Rounded => f64::from(double as f32),
-            Width::Double => double,
-        };
         let halves = |pair: NodeId| match graph.op(pair) {
-            Op::SinCos(a) => {
-                let terms: Vec<f32> = graph.angle_terms(a).into_iter().map(|t| single(v(t))).collect();
-                match terms[..] {
-                    [angle] => straightline_core::Real::sin_cos(angle),
-                    _ => <f32 as straightline_core::Real>::sin_cos_of_sum(&terms),
-                }
-            }
+            Op::SinCos(a) => in_scalar!(scalar, T => {
+                let terms: Vec<T> = graph.angle_terms(a).into_iter().map(|t| v(t) as T).collect();
+                let (sin, cos) = <T as Real>::sin_cos_of_sum(&terms);
+                (f64::from(sin), f64::from(cos))
+            }),
             _ => unreachable!("verified graphs have halves of pairs"),
         };
         values.push(match *op {
-            Op::Input(k) => f64::from(single(inputs[k as usize])),
-            Op::Constant(c) if width == Width::Double => c.value().to_f64(),
-            Op::Constant(c) => f64::from(c.value().to_f32()),
-            Op::Unary(op, a) => arithmetic(op.value(v(a)), op.value(single(v(a)))),
-            Op::Binary(op, a, b) => arithmetic(op.value(v(a), v(b)), op.value(single(v(a)), single(v(b)))),
+            Op::Input(k) => scalar.rounded(inputs[k as usize]),
+            Op::Constant(c) => held.nearest(c.value()),
+            Op::Unary(op, a) => held.rounded(in_scalar!(computed, T => f64::from(op.value(v(a) as T)))),
+            Op::Binary(op, a, b) => held.rounded(in_scalar!(computed, T => f64::from(op.value(v(a) as T, v(b) as T)))),
             // formed where the sine is
             Op::AngleSum(..) | Op::SinCos(_) => 0.0,
-            Op::Sin(p) => f64::from(halves(p).0),
-            Op::Cos(p) => f64::from(halves(p).1),
+            Op::Sin(p) => halves(p).0,
+            Op::Cos(p) => halves(p).1,
         });
     }
     graph.results.iter().map(|r| values[r.index()]).collect()
@@ -93,15 +81,13 @@ pub fn worst_found(graph: &Graph, scalar: Scalar, ranges: &[Interval], evaluatio
     let mut random = Random(seed);
     let outputs = graph.results.len();
     let fits = |x: Vec<f64>| -> Vec<f64> { x.iter().zip(ranges).map(|(x, r)| representable(*x, *r, scalar)).collect() };
-    // errors of f32 are seen in f64 well enough to climb; what was found is measured in double-double
+    // errors of a short format are seen in f64 well enough to climb; what was found is measured in double-double
     let errors = |inputs: &[f64]| -> Vec<f64> {
-        match scalar {
-            Scalar::F64 => errors_at(graph, scalar, inputs),
-            Scalar::F32 => {
-                let truth = evaluate::<f64>(graph, inputs);
-                computed_at(graph, scalar, inputs).iter().zip(truth).map(|(c, t)| (c - t).abs()).collect()
-            }
+        if !scalar.is_short() {
+            return errors_at(graph, scalar, inputs);
         }
+        let truth = evaluate::<f64>(graph, inputs);
+        computed_at(graph, scalar, inputs).iter().zip(truth).map(|(c, t)| (c - t).abs()).collect()
     };
     let mut best = vec![Found { error: -1.0, inputs: Vec::new() }; outputs];
     let keep = |best: &mut Vec<Found>, inputs: &[f64], errors: &[f64]| {

@@ -11,6 +11,7 @@ use straightline_core::Real;
 /// # Panics
 /// If the graph has no group of inputs of that name.
 pub fn gradient(graph: &Graph, of: &str) -> Graph {
+    graph.expect_plain("gradient");
     let seed_at = graph.inputs.iter().map(Port::len).sum::<usize>() as u32;
     let mut first = 0;
     let group = graph.inputs.iter().find_map(|port| {

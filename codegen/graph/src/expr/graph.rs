@@ -1,6 +1,7 @@
 //! Nodes, graphs, and how operations are counted.
 
 use super::op::{Binary, Counted, Kind, Row, Unary};
+use crate::number::Scalar;
 use std::hash::{Hash, Hasher};
 use straightline_core::Dd;
 
@@ -204,16 +205,26 @@ pub struct Note {
     pub section: u32,
 }
 
-/// How a value of a program in f32 is computed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Width {
-    /// In f32.
-    #[default]
-    Single,
-    /// In f64, and rounded to f32 for all that use it.
-    Rounded,
-    /// In f64, and used in f64 alone.
-    Double,
+/// The formats of a value of a program in mixed precision: one that differs from that in which it is computed is what it is rounded to, for all
+/// that use it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Precision {
+    /// In which it is computed.
+    pub computed: Scalar,
+    /// In which it is used.
+    pub held: Scalar,
+}
+
+impl Precision {
+    /// Computed and used in one format.
+    pub fn of(scalar: Scalar) -> Self {
+        Precision { computed: scalar, held: scalar }
+    }
+
+    /// Whether it is rounded to another format.
+    pub fn is_rounded(self) -> bool {
+        self.computed != self.held
+    }
 }
 
 /// Operations that are the same for several limbs: a loop over them can write each row once.
@@ -241,9 +252,10 @@ pub struct Graph {
     pub outputs: Vec<Port>,
     /// The nodes that are put out, group after group.
     pub results: Vec<NodeId>,
-    /// Of a program in mixed precision, how each value is computed; empty where all are in one format. Passes drop it.
-    pub widths: Vec<Width>,
-    /// Stretches that may be written as loops over limbs. Passes drop them.
+    /// Of a program in mixed precision, how each value is computed; empty where all are in one format. Chosen after all
+    /// [passes](crate::pass), which take no such program.
+    pub formats: Vec<Precision>,
+    /// Stretches that may be written as loops over limbs. Passes, again, come before.
     pub alike: Vec<Alike>,
 }
 
@@ -303,9 +315,26 @@ impl Graph {
         }
     }
 
-    /// How a value is computed.
-    pub fn width(&self, id: NodeId) -> Width {
-        self.widths.get(id.index()).copied().unwrap_or_default()
+    /// How a value of a program in this scalar is computed.
+    pub fn precision(&self, id: NodeId, scalar: Scalar) -> Precision {
+        self.formats.get(id.index()).copied().unwrap_or(Precision::of(scalar))
+    }
+
+    /// The widest format of a program in this scalar.
+    pub fn widest(&self, scalar: Scalar) -> Scalar {
+        if self.formats.is_empty() {
+            return scalar;
+        }
+        scalar.wider().unwrap_or(scalar)
+    }
+
+    /// For passes, which make other nodes: what is said of the present ones would be lost without a word.
+    ///
+    /// # Panics
+    /// If the program has [`Graph::formats`] or [`Graph::alike`].
+    pub(crate) fn expect_plain(&self, pass: &str) {
+        assert!(self.formats.is_empty(), "`{pass}` would lose the formats of values: mix precisions after it");
+        assert!(self.alike.is_empty(), "`{pass}` would lose the loops over limbs: write limbs out after it");
     }
 
     /// The operation of a node.

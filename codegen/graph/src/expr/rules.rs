@@ -5,6 +5,7 @@
 //! and move the rounding. With `Exact` rules alone the generated program is the generic runtime, bit for bit.
 
 use super::{Binary, Builder, NodeId, Op, Unary};
+use crate::number::Scalar;
 use straightline_core::{Dd, Real};
 
 /// What a rule promises.
@@ -19,10 +20,8 @@ pub enum Grade {
 /// In which arithmetic constants are folded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Folding {
-    /// As the f64 runtime would: every constant and every result rounded to f64.
-    F64,
-    /// As the f32 runtime would.
-    F32,
+    /// As the runtime in this scalar would: every constant and every result rounded to it.
+    In(Scalar),
     /// In double-double; rounded once, at emission.
     DoubleDouble,
 }
@@ -31,8 +30,7 @@ impl Folding {
     /// The value as this arithmetic holds it.
     pub fn round(self, x: Dd) -> Dd {
         match self {
-            Folding::F64 => Dd::from(x.to_f64()),
-            Folding::F32 => Dd::from(f64::from(x.to_f32())),
+            Folding::In(scalar) => Dd::from(scalar.nearest(x)),
             Folding::DoubleDouble => x,
         }
     }
@@ -47,8 +45,9 @@ impl Folding {
             }
         }
         match self {
-            Folding::F64 => Dd::from(value(op, a.to_f64(), b.to_f64())),
-            Folding::F32 => Dd::from(f64::from(value(op, a.to_f32(), b.to_f32()))),
+            Folding::In(scalar) => {
+                in_scalar!(scalar, T => Dd::from(f64::from(value(op, T::constant(a), T::constant(b)))))
+            }
             Folding::DoubleDouble => value(op, a, b),
         }
     }
@@ -56,14 +55,10 @@ impl Folding {
     /// Sine and cosine of a constant angle, as this arithmetic computes them.
     pub fn sin_cos(self, x: Dd) -> (Dd, Dd) {
         match self {
-            Folding::F64 => {
-                let (s, c) = Real::sin_cos(x.to_f64());
-                (Dd::from(s), Dd::from(c))
-            }
-            Folding::F32 => {
-                let (s, c) = Real::sin_cos(x.to_f32());
+            Folding::In(scalar) => in_scalar!(scalar, T => {
+                let (s, c) = Real::sin_cos(T::constant(x));
                 (Dd::from(f64::from(s)), Dd::from(f64::from(c)))
-            }
+            }),
             Folding::DoubleDouble => x.sin_cos(),
         }
     }

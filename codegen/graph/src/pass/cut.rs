@@ -21,6 +21,7 @@ pub struct Staged {
 /// Cuts `graph`; `stage_of` gives the stage of each input port, `names` the name of each stage's stored values, `blocks`
 /// how many output ports each function has. The last stage stores nothing: its inputs belong to single calls.
 pub fn cut(graph: &Graph, stage_of: &[usize], names: &[&str], blocks: &[usize]) -> Staged {
+    graph.expect_plain("cut");
     let stages = names.len();
     let last = stages - 1;
     let mut stage_of_scalar = Vec::new();

@@ -4,6 +4,7 @@ use crate::expr::{Graph, NodeId, Op};
 
 /// The graph without nodes that no result needs. Both halves of a sine-cosine pair stay beside the pair.
 pub fn dead_code(graph: &Graph) -> Graph {
+    graph.expect_plain("dead_code");
     let live = graph.live();
     let mut new_id = vec![NodeId(u32::MAX); graph.ops.len()];
     let mut kept = Graph {

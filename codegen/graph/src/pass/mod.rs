@@ -1,4 +1,7 @@
 //! Passes: each takes a graph and returns a graph that computes the same results.
+//!
+//! They make other nodes. What is said of single nodes besides their [notes](crate::expr::Note), the formats of mixed precision and loops over
+//! limbs, is therefore chosen after them, and a pass refuses a graph that has any.
 
 pub mod cut;
 mod dead_code;
@@ -12,3 +15,39 @@ pub use order::order;
 pub use substitute::substitute;
 pub use sums::{count_sums, sums};
 pub use unread_inputs::unread_inputs;
+
+#[cfg(test)]
+mod tests {
+    use crate::expr::{gradient, Alike, Builder, Graph, Op, Port, Precision, RuleSet};
+    use crate::number::Scalar;
+    use std::panic::catch_unwind;
+
+    type Pass = fn(&Graph);
+
+    const PASSES: [(&str, Pass); 6] = [
+        ("cut", |graph| drop(super::cut::cut(graph, &[0], &["all"], &[1]))),
+        ("dead_code", |graph| drop(super::dead_code(graph))),
+        ("order", |graph| drop(super::order(graph, &[]))),
+        ("substitute", |graph| drop(super::substitute(graph, &|_| true))),
+        ("sums", |graph| drop(super::sums(graph))),
+        ("gradient", |graph| drop(gradient(graph, "x"))),
+    ];
+
+    #[test]
+    fn no_pass_loses_formats_or_loops_without_a_word() {
+        let mut b = Builder::new(RuleSet::all(), vec![Port::new("x", &[1])]);
+        let x = b.insert(Op::Input(0));
+        let square = b.insert(Op::mul(x, x));
+        let plain = b.finish(vec![Port::new("y", &[1])], vec![square]);
+        let mixed = Graph { formats: vec![Precision::of(Scalar::F32); 2], ..plain.clone() };
+        let looped = Graph { alike: vec![Alike { limbs: vec![0], rows: vec![vec![square]] }], ..plain.clone() };
+        for (name, pass) in PASSES {
+            pass(&plain);
+            for (graph, lost) in [(&mixed, "formats"), (&looped, "loops")] {
+                let panic = catch_unwind(|| pass(graph)).expect_err(name);
+                let message = panic.downcast_ref::<String>().expect("a promise in words");
+                assert!(message.contains(name) && message.contains(lost), "{name}: {message}");
+            }
+        }
+    }
+}

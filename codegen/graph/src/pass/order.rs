@@ -17,6 +17,7 @@ const ALL_ORDERS: usize = 9;
 
 /// The graph with the terms of each sum in the order that rounds least at these states, given by the value of every node.
 pub fn order(graph: &Graph, states: &[Vec<f64>]) -> Graph {
+    graph.expect_plain("order");
     let uses = graph.uses();
     // which sum a partial sum, a sign or a product of one user goes to
     let mut inside = vec![false; graph.ops.len()];
@@ -172,7 +173,7 @@ mod tests {
     /// ((x₀ ± x₁) ± x₂) ± …, and the values of all its nodes.
     fn chain(values: &[f64], negative: &[bool]) -> (Graph, Vec<f64>) {
         let inputs = vec![Port::new("x", &[values.len()])];
-        let mut builder = Builder::new(RuleSet::exact(Folding::F64), inputs);
+        let mut builder = Builder::new(RuleSet::exact(Folding::In(crate::number::Scalar::F64)), inputs);
         let terms: Vec<NodeId> = (0..values.len()).map(|k| builder.insert(Op::Input(k as u32))).collect();
         let mut all = values.to_vec();
         let mut sum = terms[0];

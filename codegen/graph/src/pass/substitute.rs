@@ -53,6 +53,7 @@ type Value = [Dd; POINTS];
 /// The graph with values formed of others where that takes fewer operations and `keeps` is content with the program, its [`sums`] put
 /// together again. Of greater graphs than some thousand values: as it is.
 pub fn substitute(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Graph {
+    graph.expect_plain("substitute");
     let mut graph = graph.clone();
     if graph.ops.len() > LARGEST {
         return graph;

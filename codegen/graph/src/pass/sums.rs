@@ -26,6 +26,7 @@ const ROUNDS: usize = 6;
 
 /// The graph with its sums taken apart and put together again.
 pub fn sums(graph: &Graph) -> Graph {
+    graph.expect_plain("sums");
     let mut table = Table::read(graph);
     table.simplify();
     table.write(graph)

@@ -431,8 +431,5 @@ fn outputs(function: ContactFunction, mode: &Mode, model: &Model<Dd>) -> Vec<Por
 
 /// ε of the regularisation: what numbers of this format can bear.
 pub fn ridge(scalar: Scalar) -> f64 {
-    match scalar {
-        Scalar::F64 => 1e-12,
-        Scalar::F32 => 1e-6,
-    }
+    scalar.ridge()
 }

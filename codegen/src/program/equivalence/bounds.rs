@@ -5,7 +5,7 @@
 //! any of the bound's own rules. A bound of accelerations is asked about accelerations that are off by a known amount, too: those of
 //! other forces, one after the other, where it is hardly greater than what they are off by, and any others.
 
-use super::{inputs, rounded, Disagreement, State, States, STATES};
+use super::{inputs, Disagreement, State, States, STATES};
 use crate::equations::Robot;
 use crate::options::Options;
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ use straightline_core::Dd;
 use straightline_graph::certify::companion::OF_ERROR;
 use straightline_graph::certify::search::computed_at;
 use straightline_graph::certify::Format;
-use straightline_graph::expr::{evaluate, Graph, NodeId, Op, Port, Width};
+use straightline_graph::expr::{evaluate, Graph, NodeId, Op, Port};
 use straightline_graph::random::Random;
 use straightline_graph::rounding::backwards;
 use straightline_graph::{element_of, Scalar};
@@ -42,7 +42,7 @@ pub(crate) fn of_bound(
         let state = short(states.next(&graph.inputs), options.scalar);
         let given = as_f64(&inputs(graph, &state));
         let (found, exact) = (computed_at(graph, options.scalar, &given), evaluate(graph, &inputs(graph, &state)));
-        let bounds = computed_at(bound, scalar_of_bound(graph, options), &as_f64(&inputs(bound, &state)));
+        let bounds = computed_at(bound, graph.widest(options.scalar), &as_f64(&inputs(bound, &state)));
         let least = least_provable(graph, options.scalar, &given);
         for k in 0..found.len() {
             let off = (Dd::from(found[k]) - exact[k]).hi().abs();
@@ -158,14 +158,6 @@ fn greatest_eigenvalue(columns: &[Vec<f64>]) -> f64 {
     quotient
 }
 
-/// That of mixed precision is in f64.
-fn scalar_of_bound(graph: &Graph, options: &Options) -> Scalar {
-    match graph.widths.is_empty() {
-        true => options.scalar,
-        false => Scalar::F64,
-    }
-}
-
 /// An error of a result against its bound; a bound that is no number promises nothing.
 fn holds(name: &str, (outputs, k): (&[Port], usize), off: f64, most: f64) -> Result<(), Disagreement> {
     match off > most {
@@ -179,10 +171,7 @@ fn disagreement(name: &str, result: String, difference: f64) -> Disagreement {
 }
 
 fn short(state: State, scalar: Scalar) -> State {
-    let number = match scalar {
-        Scalar::F64 => rounded::<f64>,
-        Scalar::F32 => rounded::<f32>,
-    };
+    let number = |x: Dd| Dd::from(scalar.nearest(x));
     state.into_iter().map(|(n, x)| (n, x.into_iter().map(number).collect())).collect()
 }
 
@@ -207,11 +196,11 @@ fn least_provable(graph: &Graph, scalar: Scalar, given: &[f64]) -> Vec<f64> {
     let mut values = vec![0.0; graph.ops.len()];
     let computed = computed_at(&Graph { results: numbers.clone(), ..graph.clone() }, scalar, given);
     numbers.iter().zip(computed).for_each(|(id, x)| values[id.index()] = x);
-    let (format, double) = (Format::of(scalar), Format::of(Scalar::F64));
+    let format = Format::of(scalar);
     let own: Vec<f64> = graph
         .ids()
         .map(|id| {
-            let of_width = if graph.width(id) == Width::Double { double } else { format };
+            let of_width = Format::of(graph.precision(id, scalar).held);
             match graph.op(id) {
                 Op::Constant(c) => of_width.constant(c.value()).1,
                 // half an ulp, whatever the kernel

@@ -384,10 +384,9 @@ fn differ(graph: &Graph, found: &[Dd], truth: &[Dd], part: f64) -> Option<String
 /// An error at a state, and of accelerations that are off, that is greater than its bound.
 fn exceeded(options: &Options, graph: &Graph, bound: &Graph, states: &mut States) -> Option<String> {
     let state = states.next(&graph.inputs);
-    let single =
-        |x: Dd| if options.scalar == Scalar::F32 { Dd::from(f64::from(x.to_f32())) } else { Dd::from(x.to_f64()) };
+    let single = |x: Dd| Dd::from(options.scalar.nearest(x));
     let mut state: State = state.into_iter().map(|(n, x)| (n, x.into_iter().map(single).collect())).collect();
-    let of_bound = if graph.widths.is_empty() { options.scalar } else { Scalar::F64 };
+    let of_bound = graph.widest(options.scalar);
     let short = |graph: &Graph, state: &State| inputs(graph, state).iter().map(|x| x.to_f64()).collect::<Vec<f64>>();
     let exact = evaluate(graph, &inputs(graph, &state));
     let found = computed_at(graph, options.scalar, &short(graph, &state));
