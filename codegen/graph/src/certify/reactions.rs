@@ -1,4 +1,5 @@
-//! The small system of a contact, N φ = c − κ J H⁻¹ r, solved with bounds. The proof is in [`residual`](super::residual).
+//! The small system of a contact, N φ = c − κ J H⁻¹ r, solved with bounds. The proof is in [`residual`](super::residual); each function follows one
+//! of its equations from top to bottom, and is as long as that.
 
 use super::congruence::{gamma, remainder, Congruence, Sparse};
 use super::running::{BrokenProof, Running, Tracked};
