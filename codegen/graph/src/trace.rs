@@ -32,7 +32,7 @@ pub fn trace(
     builder.finish(outputs, results)
 }
 
-/// The same for an algorithm of which only itself knows how many results it has: they are one port, `results`.
+/// [`trace`] of an algorithm of which only itself knows how many results it has: they are one port, `results`.
 pub fn trace_all(rules: RuleSet, inputs: Vec<Port>, algorithm: impl FnOnce(&[Vec<Expr>]) -> Vec<Expr>) -> Graph {
     let (builder, results) = written(rules, inputs, algorithm);
     builder.finish(vec![Port::new("results", &[results.len()])], results)
@@ -81,12 +81,12 @@ impl Expr {
         Expr(with(|g| g.add(op)))
     }
 
-    /// Its node in the graph.
+    /// The node that stands for it in the graph that is being made.
     pub fn node(self) -> NodeId {
         self.0
     }
 
-    /// Its value, if it is a constant.
+    /// The value of what is a constant by now: given as one, or folded.
     pub fn as_constant(self) -> Option<Dd> {
         with(|g| g.as_constant(self.0)).map(|c| c.value())
     }

@@ -20,7 +20,7 @@
 //! or d_j² times such products of l_mi and of 1/d_j.
 //!
 //! Which values of a program these are is not read off it (sums of several entries are shared, and put into other orders), but seen: in
-//! double-double at random states, as `pass/substitute.rs` finds values that are the same. All are rational in the inputs, sines and
+//! double-double at random states, as `pass/substitute` finds values that are the same. All are rational in the inputs, sines and
 //! cosines: two that differ anywhere agree at a random state with probability zero.
 
 use crate::program::input_box::input_box;

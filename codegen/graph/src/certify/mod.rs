@@ -134,7 +134,7 @@ pub fn certify(graph: &Graph, scalar: Scalar, inputs: &[Interval], effort: Effor
     certify_with(graph, scalar, inputs, effort, &Known::default())
 }
 
-/// The same where something is known of exact values and adjoints.
+/// [`certify()`] where something is known of exact values and adjoints.
 ///
 /// # Errors
 /// As [`certify`].

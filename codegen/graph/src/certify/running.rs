@@ -211,7 +211,7 @@ impl Running {
         parts.iter().map(|x| self.scaled(slack, *x)).collect()
     }
 
-    /// The same value with its error settled, and another one added.
+    /// A value with its error settled, and another error added.
     pub fn widened(&mut self, x: Tracked, by: Option<NodeId>) -> Tracked {
         let error = x.error.map(|e| self.settled(e));
         Tracked { value: x.value, error: by.map(|by| self.plus(by, error)).or(error) }

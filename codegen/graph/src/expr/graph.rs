@@ -10,7 +10,7 @@ use straightline_core::Dd;
 pub struct NodeId(pub u32);
 
 impl NodeId {
-    /// As an index.
+    /// Where the node stands in [`Graph::ops`] and in all that has one entry per node.
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -30,7 +30,7 @@ impl Constant {
         Constant { hi: clear(value.hi()).to_bits(), lo: clear(value.lo()).to_bits() }
     }
 
-    /// Its value.
+    /// The value that was given, but for the sign of a zero.
     pub fn value(self) -> Dd {
         Dd::new(f64::from_bits(self.hi), f64::from_bits(self.lo))
     }

@@ -7,12 +7,14 @@
 //! # Another operation
 //!
 //! `Exp` or `Min` is one row, and a method of [`Real`] and of [`Interval`] of that name where they have none. It is then traced, folded,
-//! counted, evaluated, differentiated, scheduled, written and read back; sums, factors and values formed anew leave it as a value of its own.
+//! counted, evaluated, differentiated, scheduled and written; sums, factors and values formed anew leave it as a value of its own.
 //! What is particular to it, and where:
 //!
 //! * algebra, if it has any: a rule (`rules.rs`);
 //! * where it is defined at all, and a bound of the errors of operands that is better than derivatives give, if there is one:
 //!   `certify/analysis`; the program that bounds its error at a state: `certify/running.rs`, where the compiler asks for it;
+//! * how its text is read back: `readback` of the compiler, which has no text from this table, so that it can be wrong in one place only;
+//! * how it is counted, if not as one of those there are: [`Counted`] and [`Counts`](super::Counts);
 //! * a [`Slope`] that no other operation has: its product there, and its range in `certify/analysis`.
 
 use super::NodeId;
@@ -26,7 +28,7 @@ pub struct Row {
     pub name: &'static str,
     /// How it is written.
     pub text: Text,
-    /// As what it is counted.
+    /// What a use of it adds to [counts](super::Counts).
     pub counted: Counted,
     /// Whether its result is as exact as its operands.
     pub is_exact: bool,
@@ -34,7 +36,7 @@ pub struct Row {
     pub kind: Kind,
     /// Whether operands may change places: the same bits.
     pub commutes: bool,
-    /// Its derivatives by its operands.
+    /// The derivatives by the operands, in order.
     pub slopes: &'static [Slope],
 }
 
@@ -51,7 +53,7 @@ pub enum Text {
     Call(&'static str),
 }
 
-/// As what an operation is counted.
+/// Which of the [counts](super::Counts) an operation belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Counted {
     /// Changes of sign and signs.
@@ -145,7 +147,7 @@ macro_rules! operations {
                 &ROWS[self as usize]
             }
 
-            /// Its value.
+            /// The value on these operands, in their scalar.
             #[inline]
             pub fn value<T: Real>(self, $($operand: T),+) -> T {
                 match self {
@@ -232,6 +234,12 @@ mod tests {
         let expected = (at(STEP) - at(-STEP)) / Dd::from(2.0 * STEP);
         let found = slope.times(Dd::ONE, operands[k], operands[1 - k], value(operands)).unwrap_or(Dd::ZERO);
         (found - expected).to_f64().abs() < 1e-15
+    }
+
+    /// Graphs are vectors and hash maps of these.
+    #[test]
+    fn a_node_takes_no_more_room_than_its_constant_and_a_word() {
+        assert_eq!(size_of::<super::super::Op>(), 24);
     }
 
     #[test]

@@ -102,7 +102,7 @@ impl RuleSet {
         RuleSet { rules: RULES, folding: Folding::DoubleDouble, short_angles: false }
     }
 
-    /// The same, with [parts of angles](RuleSet::angle_parts) that keep their digits where a program runs in f32.
+    /// These rules with [parts of angles](RuleSet::angle_parts) that keep their digits where a program runs in f32.
     #[must_use]
     pub fn with_short_angles(self, short_angles: bool) -> Self {
         RuleSet { short_angles, ..self }

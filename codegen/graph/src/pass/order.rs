@@ -8,7 +8,7 @@
 //!
 //! Equal over the reals, so only where rules of grade `Algebraic` are allowed. Before: any graph that
 //! [`verify`](crate::expr::verify()) accepts. After: the same sums of the same terms, so as many operations; where a product is to be
-//! one instruction with its addition, the order of [`sums`](super::sums) has fewer of those.
+//! one instruction with its addition, the order of [`sums`](super::sums()) has fewer of those.
 
 use crate::expr::{Binary, Builder, Graph, NodeId, Op, RuleSet};
 

@@ -192,7 +192,7 @@ impl<'g> Analysis<'g> {
         self.find_ranges(inputs, false)
     }
 
-    /// The same, and all that is computed is written down, for [`Analysis::error_and_tape`].
+    /// [`Analysis::ranges`], and all that is computed is written down, for [`Analysis::error_and_tape`].
     pub(super) fn ranges_on_tape(&mut self, inputs: &[Interval]) -> Result<(), Refusal> {
         self.find_ranges(inputs, true)
     }
@@ -264,7 +264,7 @@ impl<'g> Analysis<'g> {
         self.error_bound(cone).x
     }
 
-    /// The same after [`Analysis::ranges_on_tape`], and the steps by which it is found. `samples`: parts of the box, as [`Tape::new`] takes them.
+    /// [`Analysis::error`] after [`Analysis::ranges_on_tape`], and the steps by which it is found. `samples`: parts of the box, as [`Tape::new`] takes them.
     pub(super) fn error_and_tape(&mut self, cone: usize, samples: &[&[Interval]]) -> (f64, Tape) {
         let mark = self.state.pen.mark();
         let error = self.error_bound(cone);

@@ -197,7 +197,7 @@ impl Analysis<'_> {
         })
     }
 
-    /// The same of an operation on two numbers.
+    /// [`Analysis::exact_range`] of an operation on two numbers.
     fn exact_binary(&mut self, i: usize, op: Binary, a: NodeId, b: NodeId) -> Result<(Range, Bound), Refusal> {
         let [x, y] = [a, b].map(|a| self.state.value[a.index()]);
         if op == Binary::Div && y.x.has_zero() {

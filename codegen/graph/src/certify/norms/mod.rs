@@ -31,7 +31,7 @@ pub type GroupId = u32;
 /// Which rules are tried on a group: what is left over by one is not worth all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Effort {
-    /// All.
+    /// All rules.
     All,
     /// All, of what another rule left over.
     Rest,
@@ -85,9 +85,9 @@ pub struct Way {
 /// What a way leads back to: a factor and a group, as a rule, which stands in its place.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Parts {
-    /// One.
+    /// One factor and group: the rule, without an allocation.
     One([(Factor, GroupId); 1]),
-    /// Several.
+    /// More than one, one after the other.
     Several(Vec<(Factor, GroupId)>),
 }
 
@@ -154,7 +154,7 @@ impl Groups {
         self.group_with(members, Effort::All)
     }
 
-    /// The same, with not all rules.
+    /// The group of these forms on which this effort is spent.
     fn group_with(&mut self, members: impl IntoIterator<Item = Form>, effort: Effort) -> GroupId {
         let mut members: Vec<Form> = members.into_iter().filter(|f| !f.is_empty()).map(canonical).collect();
         members.sort_unstable();

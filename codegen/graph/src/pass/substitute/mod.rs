@@ -45,7 +45,7 @@ const TWICE: usize = 600;
 /// little are left; of all others, none.
 const WORK: usize = 700_000;
 
-/// The graph with values formed of others where that takes fewer operations and `keeps` is content with the program, its [`sums`] put
+/// The graph with values formed of others where that takes fewer operations and `keeps` is content with the program, its [`sums()`] put
 /// together again. Of greater graphs than some thousand values: as it is.
 pub fn substitute(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Graph {
     graph.expect_plain("substitute");
