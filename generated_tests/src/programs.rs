@@ -2,12 +2,11 @@
 
 use crate::made::Made;
 use crate::reference::Robot;
-use straightline_codegen::compile;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::options::Options;
-use straightline_codegen::program::Program;
+use straightline_codegen::program::{self, Program};
 use straightline_codegen::{expr, Function};
 use straightline_core::{Dd, Real};
 
@@ -43,7 +42,7 @@ pub fn load(source: &Source, options: &ModelOptions) -> Loaded {
 pub fn program(robot: &Loaded, frames: &[String], function: Function, options: &Options) -> Program {
     static MADE: Made<Program> = Made::nothing();
     let key = format!("{function:?} {frames:?} {options:?} {:?}", robot.model);
-    MADE.once(key, || compile::program(robot, frames, function, options))
+    MADE.once(key, || program::program(robot, frames, function, options))
 }
 
 /// The program of a function of a robot of the reference data.

@@ -12,6 +12,7 @@
 //! | p, R, J, Jdqd | the largest component of that quantity of that frame |
 //! | velocity and acceleration of a frame | Σ \|J\| \|q̇\|; Σ \|J\| \|q̈\| plus that of Jdqd |
 
+use crate::bounds;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use straightline_codegen::Function;
@@ -168,7 +169,7 @@ impl Robot {
             Function::CentreOfMass | Function::Momentum | Function::Drive(_) => "energy",
         };
         let pinocchio = self.baseline[key]["scaled"].as_f64().expect("the baseline has every robot and function");
-        (20.0 * pinocchio).max(1e-14)
+        (20.0 * pinocchio).max(bounds::FUNCTION.most)
     }
 
     /// What a function gives in a state; `None` for what the data do not hold.

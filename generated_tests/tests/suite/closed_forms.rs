@@ -7,15 +7,13 @@ use straightline_codegen::options::Options;
 use straightline_codegen::program::program;
 use straightline_codegen::Function;
 use straightline_core::reference::quaternion_rotation;
+use straightline_generated_tests::bounds::CLOSED_FORM;
 use straightline_generated_tests::random::Random;
 use straightline_generated_tests::{compiled, programs};
 
-/// A few roundings.
-const ROUNDING: f64 = 2e-15;
-
 #[track_caller]
 fn assert_close(a: f64, b: f64, scale: f64) {
-    assert!((a - b).abs() <= ROUNDING * scale, "{a:e} is not {b:e} (scale {scale:e})");
+    assert!(a == b || CLOSED_FORM.allows((a - b).abs() / scale), "{a:e} is not {b:e} (scale {scale:e})");
 }
 
 /// tau = (J + m l²) qdd + m g l sin q

@@ -15,16 +15,11 @@ use straightline_core::model::Model;
 use straightline_core::reference::{Component, ContactFrames, Derivatives, MassCentreTree};
 use straightline_core::spatial::{Mat3, MotionVector, Transform, Vec3};
 use straightline_core::{algorithms as alg, reference as chapter, Dd, Real};
+use straightline_generated_tests::bounds::{CONTACT, CONTACT_AUTHORS, CONTACT_DATA};
 use straightline_generated_tests::contact_cases::{cases, robot, Case};
 use straightline_generated_tests::random::{Kind, Random, RandomRobot};
 use straightline_generated_tests::written::{Shape, Style};
 
-/// The data have 25 digits; H of the stretched robots of the data costs some of double-double's 31.
-const DIGITS: f64 = 1e-22;
-/// Two authors in double-double, whose unit is 1e-32: a random robot's H may be as bad as 1e4.
-const AUTHORS: f64 = 1e-24;
-/// What is asked of f64.
-const ROUNDED: f64 = 1e-12;
 const RIDGE: f64 = 1e-12;
 /// In double-double the ridge is so small that its square is not seen beside the data's digits.
 const WIDE_RIDGE: f64 = 1e-16;
@@ -152,17 +147,17 @@ fn both_authors_meet_every_case_of_the_data() {
             let narrow = runtime(&case, &loaded.model.cast::<f64>(), &contact.map(f64::constant), file, RIDGE);
             for (key, value) in &ours {
                 let error = case.scaled_error(key, value);
-                assert!(error <= DIGITS, "{key} of {}: {error:.1e}", case.id);
+                assert!(CONTACT_DATA.allows(error), "{key} of {}: {error:.1e}", case.id);
                 first = first.max(error);
             }
             for (key, value) in &theirs {
                 let error = case.scaled_error(key, value);
-                assert!(error <= DIGITS, "{key} of {} by the second author: {error:.1e}", case.id);
+                assert!(CONTACT_DATA.allows(error), "{key} of {} by the second author: {error:.1e}", case.id);
                 second = second.max(error);
             }
             for (key, value) in &narrow {
                 let error = case.scaled_error(key, value);
-                assert!(error <= ROUNDED, "{key} of {} in f64: {error:.1e}", case.id);
+                assert!(CONTACT.allows(error), "{key} of {} in f64: {error:.1e}", case.id);
                 rounded = rounded.max(error);
             }
         }
@@ -270,7 +265,7 @@ fn compare(
             (found.bias[i] - s.adjoint).abs().hi() / (speed * speed),
             found.jacobian[i].iter().zip(&row).fold(0.0, |m: f64, (a, b)| m.max((*a - *b).abs().hi())),
         ];
-        let near = errors.iter().all(|e| *e < AUTHORS * reach);
+        let near = errors.iter().all(|e| CONTACT_AUTHORS.allows(*e / reach));
         assert!(near, "{what} {i} of {robot}: s, ṡ, A, J differ by {errors:?}");
     }
 }
@@ -456,7 +451,7 @@ fn generated_contact_modes_of_random_robots_are_the_full_system_of_the_second_au
                     || format!("{what}, condition {condition:.0e}, {name}, {frame}, {chosen:?}, pivot {pivot:.1e}");
                 assert!(exact <= equations(pivot), "{exact:.1e}: {}", about());
                 let rounded = error(&rounded[at], expected, scale) * pivot;
-                assert!(rounded <= ROUNDED + f64::EPSILON * condition, "{rounded:.1e} in f64: {}", about());
+                assert!(rounded <= CONTACT.most + f64::EPSILON * condition, "{rounded:.1e} in f64: {}", about());
                 worst_rounded = worst_rounded.max(rounded);
             }
             compared += 1;

@@ -6,11 +6,9 @@ use straightline_codegen::function::DriveFunction::{
     self, CompleteModel, ForwardDynamics, InverseDynamics, StateSpace, Torques,
 };
 use straightline_core::Dd;
+use straightline_generated_tests::bounds::DRIVE;
 use straightline_generated_tests::drives::Driven;
 use straightline_generated_tests::reference::{folder, inputs, json, numbers};
-
-/// Error over scale that the values with 25 digits allow.
-const BOUND: f64 = 1e-12;
 
 fn cases(kind: &str) -> Vec<Value> {
     let file = json(&folder().join("cases").join(format!("{kind}.json")));
@@ -44,13 +42,13 @@ impl Worst {
         }
     }
 
-    fn judge(&self, bound: f64) {
+    fn judge(&self) {
         let mut text = String::new();
         for (quantity, (error, case)) in &self.0 {
             let _ = writeln!(text, "{quantity:24} {error:9.2e}  {case}");
         }
         println!("{text}");
-        assert!(self.0.len() > 1 && self.0.values().all(|(error, _)| *error <= bound), "\n{text}");
+        assert!(self.0.len() > 1 && self.0.values().all(|(error, _)| DRIVE.allows(*error)), "\n{text}");
     }
 }
 
@@ -144,7 +142,7 @@ fn dc_motors_are_those_of_the_reference() {
         let motion = driven.run(ForwardDynamics, &[("q", &q), ("qd", &qd), ("x", &x), ("u", &u)]);
         worst.note("q̈ of (20.72)", case, error(&motion[0], &star["qdd"], 0.0));
     }
-    worst.judge(BOUND);
+    worst.judge();
 }
 
 #[test]
@@ -181,7 +179,7 @@ fn linear_actuators_are_those_of_the_reference() {
         worst.note("Ĉ", case, error(&space[0], &expected["C_hat"], 0.0));
         worst.note("D̂", case, error(&space[1], &expected["D_hat"], 0.0));
     }
-    worst.judge(BOUND);
+    worst.judge();
 }
 
 #[test]
@@ -235,7 +233,7 @@ fn elastic_transmissions_are_those_of_the_reference() {
         worst.note("tau", case, error(&torques[0], &expected["tau"], tau_scale));
         worst.note("M", case, error(&torques[1], &expected["M"], least("M")));
     }
-    worst.judge(BOUND);
+    worst.judge();
 }
 
 #[test]

@@ -6,6 +6,7 @@ use straightline_codegen::options::Options;
 use straightline_codegen::schedule::Limits;
 use straightline_codegen::Function;
 use straightline_core::{trig, Dd};
+use straightline_generated_tests::bounds::FUSED;
 use straightline_generated_tests::compiled::fused_solo12 as solo12;
 use straightline_generated_tests::inputs;
 use straightline_generated_tests::programs::{self, cast, program};
@@ -86,7 +87,7 @@ fn fused_results_are_as_exact_as_the_others() {
             }
         }
         // fewer roundings, elsewhere: never much worse, and well inside the bar of the plain functions
-        assert!(worst <= 3.0 * worst_plain && worst < 1e-13, "{function:?}: {worst:e}, plain {worst_plain:e}");
+        assert!(worst <= 3.0 * worst_plain && FUSED.allows(worst), "{function:?}: {worst:e}, plain {worst_plain:e}");
         #[cfg(target_arch = "x86_64")]
         if std::is_x86_feature_detected!("fma") && !cfg!(target_feature = "fma") {
             assert!(differ > 0, "{function:?}: nothing was fused");

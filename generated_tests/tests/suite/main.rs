@@ -1,6 +1,7 @@
 //! All tests of the package in one binary: it is linked once, and what several files stand on is compiled once.
 //! A file is chosen by its name: `cargo test -p straightline-generated-tests --test suite bytes::`.
 
+mod bounds;
 mod bytes;
 mod climbs;
 mod closed_forms;

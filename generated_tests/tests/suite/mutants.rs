@@ -10,6 +10,7 @@ use straightline_codegen::expr::{self, Binary, Constant, Graph, NodeId, Op, Unar
 use straightline_codegen::program::Program;
 use straightline_codegen::Function;
 use straightline_core::Dd;
+use straightline_generated_tests::bounds::DATA;
 use straightline_generated_tests::inputs;
 use straightline_generated_tests::programs::{self, cast, program};
 use straightline_generated_tests::random::Random;
@@ -75,8 +76,6 @@ struct Sieve {
     bound: f64,
 }
 
-const EQUATIONS: f64 = 1e-23;
-
 impl Sieve {
     fn new(robot: &Robot, function: Function) -> Sieve {
         let mut states: Vec<_> = robot
@@ -95,7 +94,7 @@ impl Sieve {
     }
 
     fn equations_catch(&self, graph: &Graph) -> bool {
-        self.states.iter().any(|(x, _, expected)| expected.worst(&expr::evaluate(graph, x)).0 > EQUATIONS)
+        self.states.iter().any(|(x, _, expected)| expected.worst(&expr::evaluate(graph, x)).0 > DATA.most)
     }
 
     fn rounding_catches(&self, graph: &Graph) -> bool {

@@ -4,6 +4,7 @@ use std::fmt::Write;
 use straightline_codegen::Function;
 use straightline_core::trig::DOMAIN_F32;
 use straightline_core::Dd;
+use straightline_generated_tests::bounds::DATA;
 use straightline_generated_tests::compiled;
 use straightline_generated_tests::programs::{self, cast};
 use straightline_generated_tests::reference::{Robot, State, ROBOTS};
@@ -126,8 +127,6 @@ fn exact(robot: &Robot, inputs: &[Vec<f64>]) -> Vec<Vec<Dd>> {
 /// file's angles count as they are written here, as in the data.
 #[test]
 fn equations_have_all_digits_of_the_reference_values() {
-    // the data have 25 digits, and an output may be 1000 times smaller than its scale; double-double has 31
-    const BOUND: f64 = 1e-23;
     let mut table = Table::default();
     for robot in robots() {
         let mut options = programs::options(&robot);
@@ -136,7 +135,7 @@ fn equations_have_all_digits_of_the_reference_values() {
             let program = programs::of_robot(&robot, function, &options);
             let states = robot.states.iter().filter(|s| s.gravity.is_none() || !feels_gravity(function));
             let results = |s: &State| programs::run::<Dd>(&program, &exact(&robot, &s.inputs(function)));
-            table.row(&robot, function, BOUND, states, results);
+            table.row(&robot, function, DATA.most, states, results);
         }
     }
     table.finish("programs evaluated in double-double, angles as written");
