@@ -75,27 +75,57 @@ numbers! { ($)
     }
 }
 
-/// What is known of a number format. Numbers of it are held as the f64 that they are.
-struct Row {
+/// The columns that a user of a format may ask for.
+macro_rules! columns {
+    ($($(#[$doc:meta])* $column:ident: $type:ty,)+) => {
+        /// What is known of a number format. Numbers of it are held as the f64 that they are.
+        struct Row {
+            $($column: $type,)+
+            nearest: fn(Dd) -> f64,
+            rounded: fn(f64) -> f64,
+            next: fn(f64) -> f64,
+            literal: fn(f64) -> String,
+            read: fn(&str) -> Option<f64>,
+        }
+
+        impl Scalar {
+            $($(#[$doc])*
+            pub fn $column(self) -> $type {
+                self.row().$column
+            })+
+        }
+    };
+}
+
+columns! {
+    /// What Rust and users call it.
     name: &'static str,
+    /// What it is called in a sentence.
     description: &'static str,
+    /// The module of a generated file that has the same items in this scalar.
     module: &'static str,
+    /// What C calls it.
     c_name: &'static str,
+    /// So many bytes one takes.
     bytes: usize,
+    /// So many bits a significand has.
     significand: u32,
+    /// The distance from one to the next number.
     epsilon: f64,
+    /// The smallest normal number.
     tiny: f64,
+    /// The largest finite number.
     largest: f64,
+    /// The format in which programs in mixed precision compute what this one is too coarse for.
     wider: Option<Scalar>,
+    /// The proven error of its sine and cosine \[ulp\]: see `trig.rs`.
     trig_ulps: f64,
+    /// Sine and cosine answer up to here.
     trig_domain: f64,
+    /// What is added to the diagonal of a matrix that may be singular, relative to it: far above rounding, far below what is meant.
     ridge: f64,
+    /// Bytes of machine code on x86-64, as measured: of an operation, of a call for one sine and cosine, of one for several.
     code_bytes: [f64; 3],
-    nearest: fn(Dd) -> f64,
-    rounded: fn(f64) -> f64,
-    next: fn(f64) -> f64,
-    literal: fn(f64) -> String,
-    read: fn(&str) -> Option<f64>,
 }
 
 impl Scalar {
@@ -103,44 +133,9 @@ impl Scalar {
         &ROWS[self as usize]
     }
 
-    /// What Rust and users call it.
-    pub fn name(self) -> &'static str {
-        self.row().name
-    }
-
-    /// In words.
-    pub fn description(self) -> &'static str {
-        self.row().description
-    }
-
-    /// The module of a generated file that has the same items in this scalar.
-    pub fn module(self) -> &'static str {
-        self.row().module
-    }
-
-    /// What C calls it.
-    pub fn c_name(self) -> &'static str {
-        self.row().c_name
-    }
-
-    /// So many bytes one takes.
-    pub fn bytes(self) -> usize {
-        self.row().bytes
-    }
-
-    /// So many bits a significand has.
-    pub fn significand(self) -> u32 {
-        self.row().significand
-    }
-
     /// Whether it has fewer bits than what files are read in and states are drawn in, f64.
     pub fn is_short(self) -> bool {
         self.significand() < f64::MANTISSA_DIGITS
-    }
-
-    /// The distance from one to the next number.
-    pub fn epsilon(self) -> f64 {
-        self.row().epsilon
     }
 
     /// The greatest relative error of a rounding: half of [`Scalar::epsilon`].
@@ -148,52 +143,17 @@ impl Scalar {
         self.epsilon() / 2.0
     }
 
-    /// The smallest normal number.
-    pub fn tiny(self) -> f64 {
-        self.row().tiny
-    }
-
-    /// The largest finite number.
-    pub fn largest(self) -> f64 {
-        self.row().largest
-    }
-
-    /// The format in which programs in mixed precision compute what this one is too coarse for.
-    pub fn wider(self) -> Option<Scalar> {
-        self.row().wider
-    }
-
-    /// The proven error of its sine and cosine \[ulp\]: see `trig.rs`.
-    pub fn trig_ulps(self) -> f64 {
-        self.row().trig_ulps
-    }
-
-    /// Sine and cosine answer up to here.
-    pub fn trig_domain(self) -> f64 {
-        self.row().trig_domain
-    }
-
-    /// What is added to the diagonal of a matrix that may be singular, relative to it: far above rounding, far below what is meant.
-    pub fn ridge(self) -> f64 {
-        self.row().ridge
-    }
-
-    /// Bytes of machine code on x86-64, as measured: of an operation, of a call for one sine and cosine, of one for several.
-    pub fn code_bytes(self) -> [f64; 3] {
-        self.row().code_bytes
-    }
-
-    /// The nearest number.
+    /// The number nearest to a double-double.
     pub fn nearest(self, x: Dd) -> f64 {
         (self.row().nearest)(x)
     }
 
-    /// The nearest number.
+    /// The number nearest to an f64; infinite beyond the largest.
     pub fn rounded(self, x: f64) -> f64 {
         (self.row().rounded)(x)
     }
 
-    /// The least number that is greater than one.
+    /// The least number above this one.
     pub fn next_up(self, x: f64) -> f64 {
         (self.row().next)(x)
     }
@@ -203,7 +163,7 @@ impl Scalar {
         (self.row().literal)(x)
     }
 
-    /// The number of a literal.
+    /// The number that a literal stands for; none of what is no literal.
     pub fn read(self, text: &str) -> Option<f64> {
         (self.row().read)(text)
     }
