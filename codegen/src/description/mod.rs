@@ -227,7 +227,7 @@ impl Pose {
 }
 
 /// What a file says of how a joint moves: a word of the table of joints, or `fixed`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointType {
     /// The word.
     pub word: &'static str,
@@ -235,6 +235,8 @@ pub struct JointType {
     pub kind: Option<JointKind>,
     /// Whether its coordinate has a range, which the file then gives.
     pub has_range: bool,
+    /// The number that its kind has of its own, such as a pitch.
+    pub number: Option<f64>,
 }
 
 impl JointType {
@@ -245,9 +247,10 @@ impl JointType {
                 word: word.text,
                 kind: Some(kind),
                 has_range: word.has_range,
+                number: None,
             })
         };
-        let fixed = JointType { word: "fixed", kind: None, has_range: false };
+        let fixed = JointType { word: "fixed", kind: None, has_range: false, number: None };
         let between_links = words().filter(|t| !t.is_free()).chain((format != Format::MassCentreToml).then_some(fixed));
         between_links.chain(words().filter(|t| t.is_free())).map(|t| (t.word, t)).collect()
     }
@@ -257,7 +260,17 @@ impl JointType {
         let kind = Measure::Angle.joint();
         let word =
             kind.row().words.iter().find(|word| word.has_range == has_range).expect("there is a word for either");
-        JointType { word: word.text, kind: Some(kind), has_range }
+        JointType { word: word.text, kind: Some(kind), has_range, number: None }
+    }
+
+    /// The same with the number that its kind has of its own.
+    pub fn with_number(self, number: f64) -> JointType {
+        JointType { kind: self.kind.map(|kind| kind.with_number(number)), number: Some(number), ..self }
+    }
+
+    /// Key of the number that its kind has of its own.
+    pub fn number_key(self) -> Option<&'static str> {
+        self.kind.and_then(|kind| kind.row().number)
     }
 
     /// Whether it would let a link move freely, which no joint between links does.

@@ -139,9 +139,17 @@ fn read_inertial(reader: &mut Reader, table: &Table) -> Option<Inertial> {
 
 fn read_joint(reader: &mut Reader, mut table: Table) -> Option<Joint> {
     let name = named(reader, &mut table, "joint");
-    reader.check_keys(&table, JOINT);
+    let words = JointType::words(Format::JointFrameToml);
+    let is_written = |word: &str| matches!(table.get("kind"), Some((DeValue::String(text), _)) if text == word);
+    let number = words.iter().find(|(word, _)| is_written(word)).and_then(|(_, t)| t.number_key());
+    reader.check_keys(&table, &[JOINT, number.as_slice()].concat());
     reader.require(&table, "kind", "kind = \"revolute\"");
-    let kind = reader.word_at(&table, "kind", &JointType::words(Format::JointFrameToml));
+    let mut kind = reader.word_at(&table, "kind", &words);
+    if let (Some(kind), Some(key)) = (&mut kind, number) {
+        reader.require(&table, key, &format!("{key} = 0.01"));
+        let number = reader.real_at(&table, key, Range64::Finite).map_or(0.0, |number| number.value);
+        kind.value = kind.value.with_number(number);
+    }
     reader.require(&table, "parent", "parent = \"...\"");
     let parent = reader.name_at(&table, "parent", "link");
     reader.require(&table, "child", "child = \"...\"");

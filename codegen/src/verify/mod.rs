@@ -22,7 +22,7 @@ use crate::verify::reference_input::mass_centre_tree;
 use std::collections::BTreeMap;
 use straightline_core::joint::Measure;
 use straightline_core::model::Model;
-use straightline_core::reference::{self, Joint, MassCentreFrame, MassCentreTree};
+use straightline_core::reference::{self, MassCentreFrame, MassCentreTree};
 use straightline_core::{trig, Dd};
 use straightline_graph::expr::{evaluate, Graph};
 use straightline_graph::random::Random;
@@ -649,10 +649,9 @@ impl Truth<'_> {
             while let Some(j) = at {
                 let joint = &self.tree.links[j];
                 let of_joint: &mut [f64] = &mut uncancelled[joint.iv..joint.iv + joint.joint.nv()];
-                let terms = match joint.joint {
-                    Joint::Linear => vec![force],
-                    Joint::Revolute => vec![moment],
-                    Joint::Free => [[force; 3], [moment; 3]].concat(),
+                let terms = match shares(joint) {
+                    Some([turns, slides]) => vec![turns * moment + slides * force],
+                    None => [[force; 3], [moment; 3]].concat(),
                 };
                 of_joint.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
                 at = joint.parent;
@@ -673,15 +672,12 @@ impl Truth<'_> {
             while let Some(joint) = carrier {
                 lever += length(joint.r.as_slice());
                 let moment = mass * lever * lever + inertia;
-                let terms = match joint.joint {
-                    Joint::Linear => vec![mass],
-                    Joint::Revolute => vec![moment],
-                    Joint::Free => [[mass; 3], [moment; 3]].concat(),
+                let terms = match shares(joint) {
+                    Some([turns, slides]) => vec![turns * turns * moment + slides * slides * mass],
+                    None => [[mass; 3], [moment; 3]].concat(),
                 };
                 sums[joint.iv..].iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-                if joint.joint == Joint::Linear {
-                    lever += self.state.q[joint.iq].abs();
-                }
+                lever += shares(joint).map_or(0.0, |[_, slides]| slides * self.state.q[joint.iq].abs());
                 lever += length(joint.r_parent.as_slice());
                 carrier = joint.parent.map(|parent| &tree.links[parent]);
             }
@@ -698,13 +694,12 @@ impl Truth<'_> {
             let link = &self.tree.links[k];
             let (q, v) = (&self.state.q[link.iq..], link.iv);
             r.length += length(link.r.as_slice());
-            let joint = |rates: &[f64], turning: &mut f64, moving: &mut f64| match link.joint {
-                Joint::Revolute => {
-                    *turning += rates[v].abs();
-                    *moving += rates[v].abs() * r.length;
+            let joint = |rates: &[f64], turning: &mut f64, moving: &mut f64| match shares(link) {
+                Some([turns, slides]) => {
+                    *turning += turns * rates[v].abs();
+                    *moving += rates[v].abs() * (turns * r.length + slides);
                 }
-                Joint::Linear => *moving += rates[v].abs(),
-                Joint::Free => {
+                None => {
                     let angular = norm(&rates[v + 3..v + 6]);
                     *turning += angular;
                     *moving += norm(&rates[v..v + 3]) + angular * r.length;
@@ -712,10 +707,9 @@ impl Truth<'_> {
             };
             joint(&self.state.qd, &mut r.turning, &mut r.moving);
             joint(&self.state.qdd, &mut r.turning_rate, &mut r.moving_rate);
-            match link.joint {
-                Joint::Linear => r.length += q[0].abs(),
-                Joint::Free => base = norm(&q[..3]),
-                Joint::Revolute => {}
+            match shares(link) {
+                Some([_, slides]) => r.length += slides * q[0].abs(),
+                None => base = norm(&q[..3]),
             }
             r.length += length(link.r_parent.as_slice());
             at = link.parent;
@@ -753,15 +747,18 @@ impl Truth<'_> {
                 lever += length(joint.r.as_slice());
                 scales[j].0 += force;
                 scales[j].1 += force * lever + couple;
-                if joint.joint == Joint::Linear {
-                    lever += self.state.q[joint.iq].abs();
-                }
+                lever += shares(joint).map_or(0.0, |[_, slides]| slides * self.state.q[joint.iq].abs());
                 lever += length(joint.r_parent.as_slice());
                 at = joint.parent;
             }
         }
         scales
     }
+}
+
+/// How much the joint of a link turns and slides per unit of its coordinate; `None`: it moves freely.
+fn shares(link: &reference::MassCentreLink<Dd>) -> Option<[f64; 2]> {
+    link.joint.shares::<Dd>().map(|shares| shares.map(|share| share.to_f64().abs()))
 }
 
 fn length(v: &[Dd]) -> f64 {

@@ -294,7 +294,7 @@ fn floating_root_joint(notation: &JointFrameNotation) -> String {
 }
 
 fn reference_joint(joint: &FileJoint) -> Result<Joint, String> {
-    Joint::of_word(joint.kind.value.word)
+    Joint::of_word(joint.kind.value.word, joint.kind.value.number)
         .ok_or_else(|| format!("joint `{}` has not one degree of freedom", joint.name.value))
 }
 
@@ -538,7 +538,7 @@ fn add_mass_centres(
         tree.links.push(MassCentreLink {
             name: link.name.value.clone(),
             parent: j.checked_sub(1),
-            joint: Joint::of_word(link.kind.value.word)
+            joint: Joint::of_word(link.kind.value.word, None)
                 .ok_or_else(|| format!("joint `{}` is neither revolute nor linear", link.joint_name.value))?,
             iq: 0,
             iv: 0,

@@ -6,7 +6,7 @@ use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::options::Options;
 use straightline_codegen::program::Program;
 use straightline_codegen::Function;
-use straightline_core::model::JointKind;
+use straightline_core::joint::Measure;
 use straightline_core::reference::quaternion_rotation;
 use straightline_core::Dd;
 use straightline_generated_tests::bounds::{Bound, IDENTITY, MOVED, ORTHOGONAL, SOLVED_IDENTITY};
@@ -327,10 +327,10 @@ fn the_drive_is_the_part_of_the_joints_wrench_along_its_axis() {
             // the joint axis, z of the canonical frame, in link axes
             let row = body.link_frame.rotation.rows[2].map(|x| x.to_f64());
             let along = |v: &[f64]| row[0] * v[0] + row[1] * v[1] + row[2] * v[2];
-            let drive = match body.joint.kind {
-                JointKind::Revolute => along(&w[3..]),
-                JointKind::Prismatic => along(&w[..3]),
-                JointKind::Floating => continue,
+            let drive = match body.joint.kind.elementary() {
+                Some(Measure::Angle) => along(&w[3..]),
+                Some(Measure::Length) => along(&w[..3]),
+                None => continue,
             };
             let scale = w.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             let (a, b) = (DVector::from_element(1, tau[body.joint.iv]), DVector::from_element(1, drive));

@@ -11,6 +11,8 @@ pub struct Descriptor {
     pub name: &'static str,
     /// The words of robot files that mean it, in the order in which messages list them.
     pub words: &'static [Word],
+    /// Key of a robot file for the number that a joint of the kind has of its own, such as a pitch.
+    pub number: Option<&'static str>,
     /// What the joint does: "turns".
     pub verb: &'static str,
     /// What each velocity coordinate measures; as many as the joint has velocity coordinates.
@@ -183,6 +185,11 @@ pub fn words(dialect: Dialect) -> impl Iterator<Item = (JointKind, &'static Word
 /// The kinds, and what goes by kind: the one place that tells them apart. A row is a file and the type in it; a kind with numbers of its own, such
 /// as a pitch, has them in that type: `screw::Screw(screw: Screw = Screw::of(0.0))`.
 macro_rules! joints {
+    (% $Own:ident $Name:ident $number:ident) => { JointKind::$Name($Own::of($number)) };
+    (% $Name:ident $number:ident) => {{
+        let _ = $number;
+        JointKind::$Name
+    }};
     (@$own:ident $module:ident::$Name:ident) => { $own };
     (@$module:ident::$Name:ident) => { &$module::$Name };
     ($($(#[$about:meta])* $module:ident::$Name:ident $(($own:ident: $Own:ident = $zero:expr))?,)+) => {
@@ -203,6 +210,13 @@ macro_rules! joints {
             pub const fn row(self) -> &'static Descriptor {
                 match self {
                     $(JointKind::$Name { .. } => &$module::ROW,)+
+                }
+            }
+
+            /// The same kind with another number of its own, where it has one.
+            pub fn with_number(self, number: f64) -> JointKind {
+                match self {
+                    $(JointKind::$Name { .. } => joints!(% $($Own)? $Name number),)+
                 }
             }
 

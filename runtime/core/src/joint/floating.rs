@@ -11,6 +11,7 @@ use Measure::{Angle, Length};
 pub(super) const ROW: Descriptor = Descriptor {
     name: "floating",
     words: &[Word { text: "floating", has_range: false, dialects: Dialect::FRAMES }],
+    number: None,
     verb: "moves freely",
     measures: &[Length, Length, Length, Angle, Angle, Angle],
     neutral: &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],

@@ -12,6 +12,7 @@ pub(super) const ROW: Descriptor = Descriptor {
         Word::ranged("revolute", Dialect::ALL),
         Word { text: "continuous", has_range: false, dialects: Dialect::FRAMES },
     ],
+    number: None,
     verb: "turns",
     measures: &[Measure::Angle],
     neutral: &[0.0],

@@ -25,8 +25,8 @@ pub enum Joint {
 }
 
 impl Joint {
-    /// The joint that robot files mean by a word; `None`: it has not one degree of freedom.
-    pub fn of_word(word: &str) -> Option<Joint> {
+    /// The joint that robot files mean by a word, with the number that goes with it; `None`: it has not one degree of freedom.
+    pub fn of_word(word: &str, _number: Option<f64>) -> Option<Joint> {
         match word {
             "revolute" | "continuous" => Some(Joint::Revolute),
             "prismatic" | "linear" => Some(Joint::Linear),
