@@ -103,6 +103,8 @@ fn joint_load<T: Number>(
             let tau = s * force.dot(e) + turns * moment.dot(e);
             // F_{Sj} = F_{Rj} + s_j τ_j e_j
             // M_{Sj} = M_{Rj} + (1 − s_j) τ_j e_j                                                              (20.19)
+            // divided by 1 for these; of a joint that does both, so that reactions do no work
+            let tau = tau / (s * s + turns * turns);
             (force - e * (s * tau), moment - e * (turns * tau))
         }
     };

@@ -436,10 +436,12 @@ fn every_link_is_in_equilibrium() {
             close("Euler's equations", inertial, rotation.transpose() * moment, moments);
             // reactions do no work: F_R ⟂ e (linear), M_R ⟂ e (revolute), with (20.19)
             let e = &position[j].e;
-            match link.joint {
-                Joint::Linear => assert!(loads[j].reaction_force.dot(e).abs().hi() < 1e-28 * forces),
-                Joint::Revolute => assert!(loads[j].reaction_moment.dot(e).abs().hi() < 1e-28 * moments),
-                Joint::Free => assert_eq!(loads[j].reaction_force, Vector3::zeros()),
+            match link.joint.shares::<Dd>() {
+                Some([turns, slides]) => {
+                    let work = slides * loads[j].reaction_force.dot(e) + turns * loads[j].reaction_moment.dot(e);
+                    assert!(work.abs().hi() < 1e-28 * (slides.abs().hi() * forces + turns.abs().hi() * moments));
+                }
+                None => assert_eq!(loads[j].reaction_force, Vector3::zeros()),
             }
         }
     }
