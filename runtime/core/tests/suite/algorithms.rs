@@ -6,6 +6,7 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use straightline_core::algorithms::*;
+use straightline_core::joint::Measure;
 use straightline_core::model::{Body, Coulomb, Frame, Joint, JointEffects, JointKind, Limits, Model};
 use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::{Dd, Real};
@@ -461,13 +462,14 @@ fn the_wrench_of_a_joint_does_its_torque_along_the_axis() {
         order.sort_by_key(|body| body.joint.iv);
         for (body, w) in order.into_iter().zip(&wrenches) {
             let (iv, axis) = (body.joint.iv, body.link_frame.rotation.transpose_mul(Vec3::unit_z()));
-            match body.joint.kind {
-                JointKind::Revolute => case.agree(&[w.moment.dot(axis)], &[tau[iv]], DD),
-                JointKind::Prismatic => case.agree(&[w.force.dot(axis)], &[tau[iv]], DD),
-                JointKind::Floating => {
+            match (body.joint.kind.elementary(), body.joint.kind.is_base()) {
+                (Some(Measure::Angle), _) => case.agree(&[w.moment.dot(axis)], &[tau[iv]], DD),
+                (Some(Measure::Length), _) => case.agree(&[w.force.dot(axis)], &[tau[iv]], DD),
+                (None, true) => {
                     let both = [w.force.to_array(), w.moment.to_array()].concat();
                     case.agree(&both, &tau[iv..iv + 6], DD);
                 }
+                (None, false) => {}
             }
         }
     }
