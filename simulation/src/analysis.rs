@@ -82,7 +82,7 @@ impl Analysis {
 /// The figures of a joint over a motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointFigures {
-    /// Its name.
+    /// Name of the joint.
     pub name: String,
     /// Unit of its forces.
     pub unit: &'static str,
@@ -157,7 +157,7 @@ pub fn analyze(model: &Model<f64>, motion: &Motion, interval: f64) -> Result<Ana
     analyze_by(model, model, motion, interval)
 }
 
-/// The same with torques and joint forces from elsewhere.
+/// Analyses a motion with torques and joint forces by equations of its caller, such as generated ones.
 ///
 /// # Errors
 /// As [`analyze`].

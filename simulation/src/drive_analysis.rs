@@ -32,7 +32,7 @@ pub struct DriveAnalysis {
 /// The figures of a drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveFigures {
-    /// Its name.
+    /// Name of the drive.
     pub name: String,
     /// Greatest |u| \[V, or the input's unit\], and when \[s\].
     pub input: (f64, f64),

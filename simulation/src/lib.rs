@@ -11,6 +11,7 @@ pub mod command;
 pub mod contact;
 pub mod drive_analysis;
 pub mod drives;
+mod failure;
 pub mod html;
 pub mod motion;
 mod ode;

@@ -262,7 +262,7 @@ impl Motion {
         all
     }
 
-    /// The same on the piece from knot `k` on, also at its end.
+    /// All derivatives by the polynomials of the piece from knot `k` on, also at its end.
     pub fn derivatives_in_piece(&self, k: usize, t: f64) -> Vec<Vec<f64>> {
         let x = t - self.times[k];
         let nth = |order: usize| -> Vec<f64> {

@@ -235,7 +235,7 @@ pub fn minimise(cost: impl Fn(&[f64]) -> f64, ranges: &[(f64, f64)]) -> Result<O
     minimise_from(cost, ranges, &middle, 0.25)
 }
 
-/// The same from a point on, which the first simplex leaves by so much of each range.
+/// The minimum that is found from a point on, which the first simplex leaves by so much of each range.
 ///
 /// # Errors
 /// As [`minimise`], or no cost was found that is a finite number.

@@ -75,7 +75,7 @@ impl Plant {
         self
     }
 
-    /// The same, or with soft limits where steps are implicit.
+    /// The plant that a method integrates: with soft limits where its steps are implicit.
     pub(crate) fn solved_by(&self, method: Method) -> Cow<'_, Plant> {
         match method {
             Method::Adaptive => Cow::Borrowed(self),

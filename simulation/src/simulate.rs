@@ -7,10 +7,10 @@
 
 use crate::command::Command;
 use crate::drives::DriveEnergies;
+pub use crate::failure::Failure;
 use crate::ode::{solve, Equations, Pace, Step, Watch};
 use crate::plant::{Action, Plant};
 use crate::table::Table;
-use std::fmt;
 use std::ops::ControlFlow;
 use straightline_core::algorithms::{kinetic_energy, DrivenMotion};
 use straightline_core::joint::Descriptor;
@@ -125,7 +125,7 @@ pub struct Run {
 pub struct Stop {
     /// When \[s\].
     pub time: f64,
-    /// The joint.
+    /// Name of the joint that reached the end of its range.
     pub joint: String,
     /// The limit that it reached \[rad or m\].
     pub limit: f64,
@@ -188,7 +188,7 @@ impl Balance {
         (self.after - self.before) + self.losses + self.drives.lost() - self.work - self.drives.electrical
     }
 
-    /// The same by the energies that were turned over.
+    /// What is missing against the energies that were turned over.
     pub fn relative(&self) -> f64 {
         let scale = self
             .turnover
@@ -203,36 +203,6 @@ impl Balance {
         }
     }
 }
-
-/// Why there is no result.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Failure {
-    /// When it went wrong \[s\].
-    pub time: f64,
-    /// What the solver says.
-    pub why: String,
-    /// What may help.
-    pub help: Option<String>,
-}
-
-impl Failure {
-    pub(crate) fn new(time: f64, why: String) -> Failure {
-        Failure { time, why, help: None }
-    }
-
-    pub(crate) fn with_help(mut self, help: &str) -> Failure {
-        self.help = Some(help.to_string());
-        self
-    }
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the simulation failed at t = {:?} s: {}", self.time, self.why)
-    }
-}
-
-impl std::error::Error for Failure {}
 
 /// Simulates from q, q̇ at time zero, drives with slack springs and without currents; `progress` hears the time as it goes on.
 ///
@@ -385,7 +355,7 @@ fn row(plant: &Plant, command: &Command, t: f64, state: &[f64], held: Option<&Ac
     row_of(plant, command, (t, &state), action, driven.as_ref())
 }
 
-/// The same of what the drives are known to do.
+/// A row of the table, from what the drives are known to do.
 pub(crate) fn row_of(
     plant: &Plant,
     command: &Command,

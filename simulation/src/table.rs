@@ -26,7 +26,7 @@ impl Table {
         self.rows.iter().try_for_each(|row| self.check_row(row))
     }
 
-    /// The same of one row.
+    /// Looks for a number of one row that is not finite.
     ///
     /// # Errors
     /// As [`check`](Table::check).

@@ -149,7 +149,7 @@ pub struct Friction<T> {
 /// A contact of a frame of the robot with an object.
 #[derive(Clone, Debug)]
 pub struct Contact<T> {
-    /// Its name.
+    /// What generated modules and inputs are called by.
     pub name: String,
     /// The frame on the robot: its origin touches.
     pub frame: Frame<T>,

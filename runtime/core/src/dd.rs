@@ -6,6 +6,8 @@
 //!
 //! The bounds hold while the trailing parts are normal numbers (results from about 2⁻⁹⁶⁸) and below overflow. NaN and
 //! infinities pass through as in f64; in the last binade before overflow a result may already be infinite or NaN.
+//!
+//! Longer than 500 lines, as it is one type with its operations and nothing else.
 
 use core::fmt;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};

@@ -19,7 +19,7 @@ use alloc::vec::Vec;
 /// An actuator with its transmission.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drive<T> {
-    /// Its name.
+    /// Name in messages and in the columns of simulations.
     pub name: String,
     /// What makes the torque.
     pub actuator: Actuator<T>,

@@ -64,7 +64,7 @@ impl<T: Real, const NQ: usize, const NV: usize> State<T, NQ, NV> {
 /// A state with what rounding has cost it so far, so that many small steps add up as in twice the precision (Neumaier's sum).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Compensated<T, const NQ: usize, const NV: usize> {
-    /// The state.
+    /// As near to the sum of all changes as its scalar is.
     pub state: State<T, NQ, NV>,
     lost: State<T, NQ, NV>,
 }

@@ -47,7 +47,7 @@ pub struct Joint {
     pub iq: usize,
     /// First index into qd, qdd and tau.
     pub iv: usize,
-    /// Ranges.
+    /// Ranges of q, q̇ and τ.
     pub limits: Limits,
 }
 
@@ -171,7 +171,7 @@ pub struct Body<T> {
     pub name: String,
     /// The body it moves against; `None`: the world.
     pub parent: Option<BodyId>,
-    /// The joint.
+    /// What carries it.
     pub joint: Joint,
     /// Pose of the joint frame (q = 0) in the parent's canonical frame, or in the world.
     pub placement: Transform<T>,
@@ -213,7 +213,7 @@ impl Body<f64> {
 /// A named frame that outputs may be asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame<T> {
-    /// Its name.
+    /// What functions of frames are asked for it by.
     pub name: String,
     /// The body that carries it; `None`: the world.
     pub body: Option<BodyId>,

@@ -53,7 +53,7 @@ pub trait ContactTask<const N: usize, const G: usize> {
 pub struct Simulation<M, const N: usize> {
     /// t \[s\].
     pub time: f64,
-    /// The mode.
+    /// Which contacts are closed.
     pub mode: M,
     /// x.
     pub state: [f64; N],

@@ -71,7 +71,7 @@ pub(super) struct Seen {
     pub s: (f64, f64),
     /// Its second derivative: A for q̈ = 0, and its row of J.
     row: FunctionalCoordinates<f64>,
-    /// The same from where the object's front is.
+    /// Distance from the object's front \[m\], and its rate.
     pub gap: (f64, f64),
     normal: Vec3<f64>,
     /// Velocity along the surface \[m/s\].
@@ -90,7 +90,7 @@ impl Seen {
         Coordinate::ALL.map(|c| if c == Coordinate::Pz { 0.0 } else { now[c as usize] })
     }
 
-    /// The same when it begins to stick.
+    /// Where the coordinates of a contact that begins to stick are held: where they are along the surface.
     pub fn where_it_sticks(&self, held: [f64; 6]) -> [f64; 6] {
         let now = self.motion.position;
         let [.., pz, ax, ay, az] = held;

@@ -200,6 +200,8 @@ const TESTED: usize = 50;
 /// h |λ| at the border of the region of stability.
 const BORDER: f64 = 6.1;
 
+/// Integrates until the end or until someone who watches stops it. One loop, longer than 80 lines: stages, error, step length and the test
+/// for stiffness share their values.
 pub(super) fn integrate(
     piece: &Piece,
     watch: &mut dyn Watch,

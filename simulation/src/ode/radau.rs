@@ -162,10 +162,12 @@ impl Pattern {
 /// What stays from step to step.
 struct Stages {
     z: [Vec<f64>; 3],
-    /// The same in the basis in which the method is diagonal.
+    /// z in the basis in which the method is diagonal.
     w: [Vec<f64>; 3],
 }
 
+/// Integrates until the end or until someone who watches stops it. One loop, longer than 80 lines: acceptance, step length, Jacobian and
+/// factors are decided by one another, and what a part of it would take and give back is longer than the part.
 pub(super) fn integrate(
     piece: &Piece,
     watch: &mut dyn Watch,

@@ -14,6 +14,8 @@
 //!
 //! **Rotors on moving links** (optional): beside ½ J θ̇² the kinetic energy of a rotor has J θ̇ (a · ω) with the link's angular
 //! velocity ω and the axis a. It puts J (Nᵀ g + gᵀ N) into H*, g = aᵀ J_ω, and a gyroscopic moment J θ̇ ω × a on the link.
+//!
+//! Longer than 500 lines, as all these forms are made of the private parts of one [`Driven`].
 
 use super::actuator::{current, held_gain, inductive_voltage, input_column, input_gain, saturated, state_derivative};
 use super::factor::Ltdl;

@@ -35,7 +35,7 @@ impl<T: Real> Ltdl<T> {
         Self::factor_along(model, branches(model), mass_matrix, &[])
     }
 
-    /// The same with coordinates that do not move, by their indices: what [`solve`](Ltdl::solve) gives is zero there, and elsewhere what
+    /// Factors H where some coordinates, by their indices, do not move: what [`solve`](Ltdl::solve) gives is zero there, and elsewhere what
     /// the matrix without their rows and columns gives. They are not divided by, whatever their joints feel.
     pub fn factor_holding(model: &Model<T>, matrix: &[T], held: &[usize], is_dense: bool) -> Self {
         let mut chain = branches(model);
@@ -45,7 +45,7 @@ impl<T: Real> Ltdl<T> {
         Self::factor_along(model, chain, matrix, held)
     }
 
-    /// The same for a symmetric matrix with entries anywhere, as if all joints stood on one branch.
+    /// Factors a symmetric matrix with entries anywhere, as if all joints stood on one branch.
     pub fn factor_dense(model: &Model<T>, matrix: &[T]) -> Self {
         Self::factor_holding(model, matrix, &[], true)
     }

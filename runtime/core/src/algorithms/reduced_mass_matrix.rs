@@ -12,7 +12,8 @@ use crate::spatial::{Composite, ForceVector, Mat3, Sym3, Vec3};
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// H(q), nv × nv, row-major, symmetric, without rotors: [`mass_matrix`](super::mass_matrix) of the full robot.
+/// H(q), nv × nv, row-major, symmetric, without rotors: [`mass_matrix`](super::mass_matrix) of the full robot. Longer than 80 lines: the order of the
+/// one sweep is that of the equations.
 pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> {
     let turns = Turn::all(model, q);
     let nv = model.nv();

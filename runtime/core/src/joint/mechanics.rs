@@ -80,7 +80,7 @@ pub(crate) trait Mechanics<T: Real> {
         MotionVector { linear, angular: at.angular + *r * joint.angular }
     }
 
-    /// The same with accelerations.
+    /// ω, ε and the acceleration of the origin in world axes with those of the joint added.
     fn world_acceleration(&self, at: WorldMotion<T>, r: &Mat3<T>, coordinates: [&[T]; 3]) -> WorldMotion<T> {
         let ((omega, alpha, a), [joint, rate]) = (at, self.rates(coordinates));
         let w = r.transpose_mul(omega);

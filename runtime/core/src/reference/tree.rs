@@ -84,7 +84,7 @@ pub enum ExtendedPosition<T> {
 /// A link, described from its mass centre, with the joint that carries it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MassCentreLink<T> {
-    /// Its name.
+    /// Name of the link in the robot file.
     pub name: String,
     /// The link it moves against, an index into [`MassCentreTree::links`] that is less than its own; `None`: the base,
     /// frame 0.
@@ -137,7 +137,7 @@ impl<T: Number> MassCentreLink<T> {
 /// A frame that is fixed to a link.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MassCentreFrame<T> {
-    /// Its name.
+    /// Name of the frame in the robot file.
     pub name: String,
     /// The link that carries it; `None`: the world.
     pub link: Option<usize>,
@@ -151,7 +151,7 @@ pub struct MassCentreFrame<T> {
 #[derive(Clone, Debug, PartialEq)]
 #[doc(alias = "MassCentreChain")]
 pub struct MassCentreTree<T> {
-    /// Its name.
+    /// Name of the robot.
     pub name: String,
     /// g: acceleration due to gravity in frame 0 \[m/s²\].
     pub gravity: Vector3<T>,

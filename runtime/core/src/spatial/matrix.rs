@@ -8,7 +8,7 @@ use core::ops::{Add, Mul, Sub};
 /// A 3×3 matrix, by rows. A rotation `r_ab` turns components in frame b into components in frame a.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mat3<T> {
-    /// The rows.
+    /// From above.
     pub rows: [[T; 3]; 3],
 }
 
