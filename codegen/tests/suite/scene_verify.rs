@@ -50,7 +50,8 @@ fn held(tried: &Tried) {
     agrees(tried, BRANCHED, "[hold]\ngravity = \"input\"\njoints = { elbow = 0.4, wrist = -0.7 }");
     agrees(tried, BRANCHED, "[hold]\ngravity = [1.0, 2.0, -3.0]\njoints = { shoulder = 0.3, slide = 0.2 }");
     agrees(tried, BRANCHED, "[hold]\nbase = \"floating\"\njoints = { head = 0.4, grip = 0.05, slide = -0.1 }");
-    agrees(tried, BRANCHED, "[hold]\nbase = \"moving\"\njoints = { elbow = 1.5707963267948966 }");
+    // without forward dynamics, which is left out only where all functions are asked for
+    agrees(&Tried::All, BRANCHED, "[hold]\nbase = \"moving\"\njoints = { elbow = 1.5707963267948966 }");
     agrees(tried, &BRANCHED.replace("[robot]", "[robot]\nbase = \"floating\""), "[hold]\nbase = \"fixed\"");
 }
 
