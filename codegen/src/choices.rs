@@ -1,7 +1,7 @@
 //! The words by which every front names what can be chosen: functions, scalars, rules, methods.
 
 use crate::diagnostic::wording::did_you_mean;
-use crate::function::Function;
+use crate::function::{ForwardDynamicsMethod, Function};
 use std::fmt;
 use straightline_graph::expr::Grade;
 use straightline_graph::Scalar;
@@ -62,18 +62,6 @@ impl fmt::Display for UnknownWord {
 }
 
 impl std::error::Error for UnknownWord {}
-
-/// How forward dynamics is computed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum ForwardDynamicsMethod {
-    /// Whichever takes fewer operations for this robot, unless it loses digits that the other keeps.
-    #[default]
-    Cheaper,
-    /// The bias force, then articulated bodies.
-    ArticulatedBody,
-    /// The bias force, the mass matrix, and its branch-sparse LᵀDL factor.
-    Factorisation,
-}
 
 /// How identical limbs are computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -5,7 +5,7 @@
 //! another one. What a language or the generated file itself needs for something else gets a word more (`box` of a body becomes
 //! `box_body`); two names that become one are for the caller to refuse.
 
-use crate::function::{higher_rate, ContactFunction, Function};
+use crate::function::{ContactFunction, Function, Quantity};
 use deunicode::deunicode_with_tofu;
 
 /// An identifier has at most so many characters, without what it gets for being reserved.
@@ -399,7 +399,7 @@ pub fn is_reserved(word: &str) -> bool {
     let is_in_the_table = |word: &str| RESERVED.iter().any(|group| group.contains(&word));
     RESERVED.iter().any(|group| group.iter().any(|r| is_word(r)))
         || word.strip_suffix("_error").is_some_and(is_in_the_table)
-        || higher_rate(word).is_some()
+        || Quantity::named(word).is_some()
         || belongs_to_a_function(word)
 }
 

@@ -25,13 +25,13 @@ pub mod scene;
 #[cfg(feature = "verify")]
 pub mod verify;
 
-pub use choices::{ForwardDynamicsMethod, Lanes, LimbForm};
+pub use choices::{Lanes, LimbForm};
 pub use compile::compile;
 pub use diagnostic::{Diagnostics, Source};
 pub use emit::Generated;
 pub use equations::Robot;
 pub use fronts::{compile_robot, Builder};
-pub use function::Function;
+pub use function::{ForwardDynamicsMethod, Function};
 pub use options::Options;
 pub use straightline_graph::expr::Grade;
 pub use straightline_graph::{certify, element_of, expr, pass, rounding, schedule, trace, Scalar};

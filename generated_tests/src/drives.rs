@@ -5,7 +5,6 @@ use serde_json::Value;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
-use straightline_codegen::function::DriveFunction;
 use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::options::{Optimisations, Options};
 use straightline_codegen::program::optimised;
@@ -64,8 +63,8 @@ impl Driven {
     ///
     /// # Panics
     /// If an input is missing.
-    pub fn run<T: Real>(&self, function: DriveFunction, inputs: &[(&str, &[T])]) -> Vec<Vec<T>> {
-        blocks(&self.program(Function::Drive(function)), inputs)
+    pub fn run<T: Real>(&self, function: Function, inputs: &[(&str, &[T])]) -> Vec<Vec<T>> {
+        blocks(&self.program(function), inputs)
     }
 }
 

@@ -166,7 +166,7 @@ impl Robot {
             Function::ForwardKinematics => "fk",
             Function::Jacobian | Function::KinematicsAndJacobian => "jacobian",
             Function::JacobianBias | Function::FrameVelocity | Function::FrameAcceleration => "jdqd",
-            Function::CentreOfMass | Function::Momentum | Function::Drive(_) => "energy",
+            _ => "energy",
         };
         let pinocchio = self.baseline[key]["scaled"].as_f64().expect("the baseline has every robot and function");
         (20.0 * pinocchio).max(bounds::FUNCTION.most)
@@ -255,7 +255,7 @@ impl Robot {
                 both.scales.extend(jacobian.scales);
                 Some(both)
             }
-            Function::CentreOfMass | Function::Momentum | Function::Drive(_) => None,
+            _ => None,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What is said above every function.
 
-use crate::function::{input_doc, Function};
+use crate::function::{Function, Output, Quantity};
 use crate::identifier;
 use crate::scene::{Parameter, Part, Scene};
 use straightline_graph::expr::Port;
@@ -10,16 +10,15 @@ impl Function {
     pub fn doc(self, inputs: &[Port], scene: &Scene) -> String {
         let mut doc = format!("{}\n\n", self.summary());
         for port in inputs {
-            let known = input_doc(&port.name);
+            let known = Quantity::of(port).map(Quantity::doc);
             let of_scene = || scene.parameters.iter().find(|p| p.input_name() == port.name).map(Parameter::in_words);
             let text = known.or_else(of_scene).unwrap_or_default();
             doc.push_str(&format!("* `{}`: {text}\n", port.name));
         }
-        for (name, text) in self.output_docs() {
-            doc.push_str(&format!("* `{name}`: {text}\n"));
+        for output in self.spec().outputs {
+            doc.push_str(&format!("* `{}`: {}\n", output.name, output.doc));
         }
-        let of_matrices = [Function::MassMatrix, Function::Jacobian, Function::KinematicsAndJacobian];
-        if scene.by_columns && of_matrices.contains(&self) {
+        if scene.by_columns && self.spec().outputs.iter().any(Output::is_by_columns) {
             doc.push_str("\nThe matrix is written column after column: its first index is the column's.\n");
         }
         if let Some(selection) = scene.outputs.get(&self) {

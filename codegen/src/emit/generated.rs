@@ -7,7 +7,7 @@ use crate::emit::parameter::parameter_types;
 use crate::emit::staged::staged;
 use crate::emit::{self, Item, Provenance, Style};
 use crate::equations::Robot;
-use crate::function::Function;
+use crate::function::Judged;
 use crate::identifier::file_name;
 use crate::options::Options;
 use crate::program::companion::ROUNDED;
@@ -97,7 +97,7 @@ pub(crate) fn generate(
                 false => (Err(ROUNDED), None),
             };
             plainer.iter().for_each(|p| warnings.push(p.warning(model)));
-            let by_residual = *function == Function::ForwardDynamics;
+            let by_residual = function.spec().judged == Judged::ByResidual;
             let bound = error_bound_text(bound, (function.name(), by_residual), graph, options, &mut written.functions);
             text.text.push('\n');
             text.text.push_str(&bound.text);

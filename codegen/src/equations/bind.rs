@@ -1,10 +1,10 @@
 //! A scene where it meets the equations: which inputs are left, what stands for the others, which results are wanted.
 
 use crate::equations::Robot;
-use crate::function::{higher_rate, Function};
+use crate::function::{Extent, Family, Forms, ForwardDynamicsMethod, Function, Output, Parts, Quantity};
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::{Gravity, Parameter, Part, Scene, Selection};
-use straightline_core::model::{Load, Model};
+use straightline_core::model::{Frame, Load, Model};
 use straightline_core::reduced::ReducedModel;
 use straightline_core::spatial::{SpatialInertia, Sym3, Vec3};
 use straightline_core::{Dd, Real};
@@ -22,19 +22,35 @@ pub struct Bound<T> {
     pub arguments: Vec<Vec<T>>,
 }
 
+impl<T: Real> Bound<T> {
+    /// The forms that functions are evaluated on; by the reduced robots, if it is to be and they serve this one.
+    pub(crate) fn forms<'a>(
+        &'a self,
+        reduced: bool,
+        frames: &'a [&'a Frame<T>],
+        method: ForwardDynamicsMethod,
+    ) -> Forms<'a, T> {
+        let serves = reduced && self.reduced.serves(&self.model);
+        Forms {
+            reduced: serves.then_some([&self.reduced, &self.composite]),
+            ..Forms::plain(&self.model, frames, method)
+        }
+    }
+}
+
 impl Scene {
     /// The input ports of a function: its own without those that are zero, then gravity and parameters where they are
     /// inputs. Those of the latter that the function turns out not to need are dropped after tracing.
     pub fn ports(&self, function: Function, model: &Model<Dd>) -> Vec<Port> {
-        let own = function.inputs(model).into_iter().filter(|p| !self.is_zero(&p.name));
-        let gravity = (self.gravity == Gravity::Input).then(|| Port::new("gravity", &[3]));
+        let own = function.quantities(model).into_iter().filter(|quantity| !self.is_zero(*quantity));
+        let gravity = (self.gravity == Gravity::Input).then_some(Quantity::Gravity);
         let parameters =
             self.parameters.iter().map(|p| Port::wrapped(&p.input_name(), &[p.scalars(model)], &p.type_name()));
-        own.chain(gravity).chain(parameters).collect()
+        own.chain(gravity).map(|quantity| quantity.port(model)).chain(parameters).collect()
     }
 
-    fn is_zero(&self, input: &str) -> bool {
-        (input == "qd" && self.zero.qd) || (input == "qdd" || higher_rate(input).is_some()) && self.zero.qdd
+    fn is_zero(&self, input: Quantity) -> bool {
+        input.rate().is_some_and(|order| if order == 1 { self.zero.qd } else { self.zero.qdd })
     }
 
     /// What a trace or an evaluation starts from, given what stands for [`Scene::ports`].
@@ -43,13 +59,13 @@ impl Scene {
         let mut reduced = robot.reduced.map(T::constant);
         let mut composite = robot.composite.map(T::constant);
         let mut given = inputs.iter();
-        let whole = function.inputs(&robot.model);
-        let arguments = whole.iter().map(|port| {
-            let mut values = match self.is_zero(&port.name) {
-                true => vec![T::zero(); port.len()],
+        let whole = function.quantities(&robot.model);
+        let arguments = whole.iter().map(|quantity| {
+            let mut values = match self.is_zero(*quantity) {
+                true => vec![T::zero(); quantity.len(&robot.model)],
                 false => given.next().expect("a port per input").clone(),
             };
-            if port.name == "qd" || port.name == "qdd" || higher_rate(&port.name).is_some() {
+            if quantity.rate().is_some() {
                 for joint in robot.model.bodies.iter().map(|b| &b.joint) {
                     if self.zero.joints_at_rest.contains(&joint.name) {
                         values[joint.iv..joint.iv + joint.kind.nv()].fill(T::zero());
@@ -84,77 +100,53 @@ impl Scene {
     /// The wanted results of a function, as indices into the whole of its outputs, and the blocks that they form.
     pub fn select(&self, function: Function, model: &Model<Dd>, frames: usize) -> (Vec<usize>, Vec<Port>) {
         let blocks = function.outputs(model, frames);
+        if function.spec().family == Family::Drives {
+            return ((0..blocks.iter().map(Port::len).sum()).collect(), blocks);
+        }
         let selection = self.outputs.get(&function).cloned().unwrap_or_default();
-        let members = match function.members() {
-            [] if blocks.len() > 1 => return ((0..blocks.iter().map(Port::len).sum()).collect(), blocks),
-            [] => &[function],
-            members => members,
-        };
         let (mut indices, mut ports, mut first) = (Vec::new(), Vec::new(), 0);
-        for (member, block) in members.iter().zip(&blocks) {
-            let (wanted, port) = self.select_block(*member, &selection, model, block);
+        for (output, block) in function.spec().outputs.iter().zip(&blocks) {
+            let (wanted, shape) = self.select_block(output, &selection, model, &block.shape);
             indices.extend(wanted.into_iter().map(|k| first + k));
-            ports.push(port);
+            ports.push(Port::new(output.name, &shape));
             first += block.len();
         }
         (indices, ports)
     }
 
-    /// Of the one block of results of a plain function, what a selection wants, in the order of matrices that is asked for.
+    /// Of a block of that shape what a selection wants, axis by axis, in the order of matrices that is asked for.
     fn select_block(
         &self,
-        function: Function,
+        output: &Output,
         selection: &Selection,
         model: &Model<Dd>,
-        whole: &Port,
-    ) -> (Vec<usize>, Port) {
-        let coordinates = selection.coordinates(model);
-        let (rows, columns, name) = (whole.shape[0], whole.shape.get(1).copied().unwrap_or(1), &whole.name);
-        use Function::*;
-        let (indices, shape): (Vec<usize>, Vec<usize>) = match function {
-            InverseDynamics | GravityForce | BiasForce | VelocityForce | ForwardDynamics => {
-                (coordinates.clone(), vec![coordinates.len()])
-            }
-            MassMatrix if selection.part == Part::Diagonal => {
-                (coordinates.iter().map(|i| i * columns + i).collect(), vec![coordinates.len()])
-            }
-            MassMatrix if self.by_columns => {
-                let entries = coordinates.iter().flat_map(|j| (0..rows).map(move |i| i * columns + j));
-                (entries.collect(), vec![coordinates.len(), rows])
-            }
-            MassMatrix => {
-                let entries = (0..rows).flat_map(|i| coordinates.iter().map(move |j| i * columns + j));
-                (entries.collect(), vec![rows, coordinates.len()])
-            }
-            JointWrenches => {
-                let mut joints: Vec<_> = model.bodies.iter().map(|b| &b.joint).collect();
-                joints.sort_by_key(|j| j.iv);
-                let wanted = (0..rows).filter(|i| selection.wants_joint(&joints[*i].name)).collect::<Vec<_>>();
-                let part = selection.part.of(0..6, 3);
-                let entries = wanted.iter().flat_map(|i| part.clone().map(move |k| i * 6 + k));
-                (entries.collect(), vec![wanted.len(), part.len()])
-            }
-            ForwardKinematics | FrameVelocity | FrameAcceleration | JacobianBias => {
-                let part = selection.part.of(0..columns, 3);
-                let entries = (0..rows).flat_map(|f| part.clone().map(move |k| f * columns + k));
-                (entries.collect(), vec![rows, part.len()])
-            }
-            Jacobian if self.by_columns => {
-                let (part, nv) = (&selection.part.of(0..6, 3), whole.shape[2]);
-                let column = |f: usize, j: usize| part.clone().map(move |k| (f * 6 + k) * nv + j);
-                let entries = (0..rows).flat_map(|f| coordinates.iter().flat_map(move |j| column(f, *j)));
-                (entries.collect(), vec![rows, coordinates.len(), part.len()])
-            }
-            Jacobian => {
-                let (part, nv) = (selection.part.of(0..6, 3), whole.shape[2]);
-                let row = |r: usize| coordinates.iter().map(move |j| r * nv + j);
-                let entries = (0..rows).flat_map(|f| part.clone().flat_map(move |k| row(f * 6 + k)));
-                (entries.collect(), vec![rows, part.len(), coordinates.len()])
-            }
-            Energy | CentreOfMass | Momentum | Drive(_) => ((0..whole.len()).collect(), whole.shape.clone()),
-            KinematicsAndJacobian => unreachable!("its members are selected from one by one"),
-        };
-        (indices, Port::new(name, &shape))
+        shape: &[usize],
+    ) -> (Vec<usize>, Vec<usize>) {
+        let last = shape.len() - 1;
+        if selection.part == Part::Diagonal && output.parts == Parts::Diagonal {
+            let coordinates = selection.coordinates(model);
+            return (coordinates.iter().map(|i| i * shape[last] + i).collect(), vec![coordinates.len()]);
+        }
+        // the index of every axis, and how far apart its entries stand
+        let mut axes: Vec<(Vec<usize>, usize)> = Vec::new();
+        for (k, extent) in output.axes.iter().enumerate() {
+            let wanted = match extent {
+                // of H the columns
+                Extent::Velocities if k == last => selection.coordinates(model),
+                Extent::Joints => selection.joints(model),
+                Extent::Of(n) if output.parts == Parts::LinearAngular => selection.part.of(0..*n, 3).collect(),
+                _ => (0..shape[k]).collect(),
+            };
+            axes.push((wanted, shape[k + 1..].iter().product()));
+        }
+        if self.by_columns && output.is_by_columns() {
+            axes.swap(last - 1, last);
+        }
+        let mut indices = vec![0];
+        for (wanted, stride) in &axes {
+            indices = indices.iter().flat_map(|at| wanted.iter().map(move |k| at + k * stride)).collect();
+        }
+        (indices, axes.iter().map(|(wanted, _)| wanted.len()).collect())
     }
 
     /// The frames of a function: its own, or those of the whole program.
@@ -167,8 +159,12 @@ impl Scene {
 }
 
 impl Selection {
-    fn wants_joint(&self, name: &String) -> bool {
-        self.joints.is_empty() || self.joints.contains(name)
+    /// The wanted joints, in the order of their coordinates.
+    fn joints(&self, model: &Model<Dd>) -> Vec<usize> {
+        let mut joints: Vec<_> = model.bodies.iter().map(|b| &b.joint).collect();
+        joints.sort_by_key(|j| j.iv);
+        let is_wanted = |i: &usize| self.joints.is_empty() || self.joints.contains(&joints[*i].name);
+        (0..joints.len()).filter(is_wanted).collect()
     }
 
     /// Velocity coordinates of the wanted joints, in the order in which they are named, or all.
@@ -238,5 +234,5 @@ fn load_parameters<T: Real>(robot: &Robot, parameter: &Parameter, inputs: &[Vec<
 
 /// Whether an input port goes when a function does not read it: gravity and parameters do, coordinates stay.
 pub fn is_optional(port: &Port) -> bool {
-    port.name == "gravity" || port.wrapper.is_some()
+    Quantity::of(port) == Some(Quantity::Gravity) || port.wrapper.is_some()
 }

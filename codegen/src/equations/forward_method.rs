@@ -10,7 +10,7 @@
 //! but its sums wait for each other. Measured on x86-64 with and without AVX-512, fused and not: quadrupeds (18 coordinates) take 4
 //! to 25 % longer by a factorisation with 2 % fewer to 2 % more operations; arms of 6 and 7 joints 1 to 31 % less with 8 to 18 % fewer.
 
-use crate::choices::ForwardDynamicsMethod;
+use crate::function::ForwardDynamicsMethod;
 use crate::model::states::{settle, values, SEED};
 use std::fmt;
 use straightline_core::model::Model;

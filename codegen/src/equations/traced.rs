@@ -1,8 +1,8 @@
 //! The equations of one function as a graph, before any pass.
 
-use crate::choices::ForwardDynamicsMethod;
 use crate::equations::forward_method::MethodChoice;
 use crate::equations::Robot;
+use crate::function::ForwardDynamicsMethod;
 use crate::function::Function;
 use crate::options::{Optimisations, Options};
 use straightline_graph::expr::{Counts, Graph};

@@ -21,10 +21,11 @@
 //! The build runs again when the robot file changes. Complaints name the file, the line and the column: errors end the
 //! build, warnings do not. Nothing is written outside `OUT_DIR`.
 
-use crate::choices::{ForwardDynamicsMethod, Lanes};
+use crate::choices::Lanes;
 use crate::compile::compile;
 use crate::diagnostic::{Diagnostics, Front, Level, Reporting, Severity, Source};
 use crate::emit::Generated;
+use crate::function::ForwardDynamicsMethod;
 use crate::function::Function;
 use crate::identifier::prefix;
 use crate::options::Options;

@@ -133,8 +133,9 @@ fn constants_and_functions(options: &Options, scene: Option<&str>, missing: &str
         for constant in [format!("{upper}_COST"), format!("{name}_error_bound"), format!("{upper}_ERROR_BOUND")] {
             let _ = writeln!(out, "{}", value(&constant, missing));
         }
-        for output in function.output_names().filter(|_| function.output_names().count() > 1) {
-            let _ = writeln!(out, "{}", value(&format!("{upper}_{}_ERROR_BOUND", output.to_uppercase()), missing));
+        let outputs = function.spec().outputs;
+        for output in outputs.iter().filter(|_| outputs.len() > 1) {
+            let _ = writeln!(out, "{}", value(&format!("{upper}_{}_ERROR_BOUND", output.name.to_uppercase()), missing));
         }
         let Some(lanes) = options.lanes else { continue };
         match known {

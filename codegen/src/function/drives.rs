@@ -1,161 +1,244 @@
 //! The functions of a robot with drives: motors and other actuators, transmissions.
 
-use super::{Entry, Function};
-use straightline_core::algorithms::MOST_DERIVATIVES;
+use super::spec::Extent::{DriveStates, Drives, Of, Velocities};
+use super::spec::{Divisor, Family, Form, Output, RobotFunction, Spec};
+use super::{Forms, ForwardDynamicsMethod, Quantity};
+use straightline_core::algorithms as alg;
+use straightline_core::algorithms::{Links, MOST_DERIVATIVES};
 use straightline_core::model::Model;
-use straightline_core::{algorithms as alg, Real};
-use straightline_graph::expr::Port;
-use DriveFunction::*;
+use straightline_core::{Real, Taylor};
 
-/// A function of a robot with drives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum DriveFunction {
-    /// Inputs of the drives to motion.
-    ForwardDynamics,
-    /// Motion to inputs of the drives.
-    InverseDynamics,
-    /// Inputs of the drives to torques.
-    Torques,
-    /// H*, h* and D.
-    CompleteModel,
-    /// Ĉ and D̂.
-    StateSpace,
-    /// Where the power goes.
-    Power,
-    /// Energy that is stored in the drives.
-    Energy,
+/// The motion that the inputs of the drives make: the complete model (20.72), (20.78) of robot and drives.
+pub struct DrivenForwardDynamics;
+
+impl RobotFunction for DrivenForwardDynamics {
+    const SPEC: Spec = Spec {
+        name: "driven_forward_dynamics",
+        summary:
+            "The motion that the inputs of the drives make: the complete model (20.72), (20.78) of robot and drives.",
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::DriveState, Quantity::DriveInput],
+        outputs: &[
+            Output::new("qdd", &[Velocities], "accelerations \\[rad/s² or m/s²\\]"),
+            Output::new("xd", &[DriveStates], "derivative of the drives' state, in the order of x"),
+        ],
+        family: Family::Drives,
+        form: Form::Motion,
+        solves: true,
+        divisor: Divisor::InertiaWithDrives,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let motion = with_links(forms, inputs, |at, bias, links| alg::driven_motion(forms.model, at, bias, links));
+        [motion.qdd, motion.xd].concat()
+    }
 }
 
-pub(super) const TABLE: &[Entry] = &[
-    Entry {
-        function: Function::Drive(ForwardDynamics),
-        name: "driven_forward_dynamics",
-        summary: "The motion that the inputs of the drives make: the complete model (20.72), (20.78) of robot and drives.",
-        inputs: &["q", "qd", "x", "u"],
-        outputs: &[
-            ("qdd", "accelerations \\[rad/s² or m/s²\\]"),
-            ("xd", "derivative of the drives' state, in the order of x"),
-        ],
-    },
-    Entry {
-        function: Function::Drive(InverseDynamics),
+/// The inputs of the drives that a motion takes, whatever their limits.
+pub struct DrivenInverseDynamics;
+
+impl RobotFunction for DrivenInverseDynamics {
+    const SPEC: Spec = Spec {
         name: "driven_inverse_dynamics",
         summary: "The inputs of the drives that a motion takes, whatever their limits.",
-        inputs: &["q", "qd", "qdd"],
-        outputs: &[("u", "inputs \\[V, or as in the robot file\\]"), ("m", "torques that the actuators put out \\[N·m\\]")],
-    },
-    Entry {
-        function: Function::Drive(Torques),
+        aliases: &["feedforward", "flatness"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration],
+        outputs: &[
+            Output::new("u", &[Drives], "inputs \\[V, or as in the robot file\\]"),
+            Output::new("m", &[Drives], "torques that the actuators put out \\[N·m\\]"),
+        ],
+        family: Family::Drives,
+        inputs_depend: true,
+        form: Form::InverseDynamics,
+        ..Spec::DEFAULT
+    };
+
+    /// And every robot's drives have an inverse that takes so few derivatives.
+    fn is_of<T: Real>(model: &Model<T>) -> bool {
+        !model.drives.is_empty() && alg::inverse_orders(&model.drives).is_some()
+    }
+
+    /// Derivatives that the motion must have, and the state where it is read.
+    fn further_inputs<T: Real>(model: &Model<T>) -> Vec<Quantity> {
+        let orders = alg::inverse_orders(&model.drives).map_or(0, |o| o.of_torque);
+        let state = alg::reads_states(&model.drives).then_some(Quantity::DriveState);
+        (3..3 + orders).map(Quantity::HigherRate).chain(state).collect()
+    }
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        match alg::inverse_orders(&forms.model.drives).map_or(0, |o| o.of_torque) {
+            0 => inverse::<T, 1>(forms, inputs),
+            1..=3 => inverse::<T, 4>(forms, inputs),
+            4..=7 => inverse::<T, 8>(forms, inputs),
+            8..=15 => inverse::<T, 16>(forms, inputs),
+            _ => inverse::<T, { MOST_DERIVATIVES + 1 }>(forms, inputs),
+        }
+    }
+}
+
+/// The torques of the drives under their inputs.
+pub struct DriveTorques;
+
+impl RobotFunction for DriveTorques {
+    const SPEC: Spec = Spec {
         name: "drive_torques",
         summary: "The torques of the drives under their inputs.",
-        inputs: &["q", "qd", "x", "u"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::DriveState, Quantity::DriveInput],
         outputs: &[
-            ("tau", "generalized forces on the joints \\[N·m or N\\]"),
-            ("m", "torques that the actuators put out \\[N·m\\]"),
+            Output::new("tau", &[Velocities], "generalized forces on the joints \\[N·m or N\\]"),
+            Output::new("m", &[Drives], "torques that the actuators put out \\[N·m\\]"),
         ],
-    },
-    Entry {
-        function: Function::Drive(CompleteModel),
+        family: Family::Drives,
+        form: Form::Motion,
+        solves: true,
+        divisor: Divisor::InertiaWithDrives,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let (tau, m) = with_links(forms, inputs, |at, bias, links| alg::drive_torques(forms.model, at, bias, links));
+        [tau, m].concat()
+    }
+}
+
+/// The complete model H* q̈ + h* = D u (20.72), (20.73) without losses and limits.
+pub struct CompleteModel;
+
+impl RobotFunction for CompleteModel {
+    const SPEC: Spec = Spec {
         name: "complete_model",
-        summary: "The complete model H* q̈ + h* = D u (20.72), (20.73), without losses and limits, at the currents and shaft states of x; \
-                  of a shaft that does not give way, the row of its joint is its own equation n q̈ = T (C x + d u).",
-        inputs: &["q", "qd", "x"],
+        summary: "The complete model H* q̈ + h* = D u (20.72), (20.73), without losses and limits, at the currents and \
+shaft states of x; of a shaft that does not give way, the row of its joint is its own equation n q̈ = T (C x + d u).",
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::DriveState],
         outputs: &[
-            ("h_star", "rows of H*, symmetric but for such rows \\[kg·m², kg·m, kg\\]"),
-            ("bias", "h* \\[N·m or N\\]"),
-            ("d", "rows of D, one per velocity coordinate \\[N·m/V\\]"),
+            Output::new(
+                "h_star",
+                &[Velocities, Velocities],
+                "rows of H*, symmetric but for such rows \\[kg·m², kg·m, kg\\]",
+            ),
+            Output::new("bias", &[Velocities], "h* \\[N·m or N\\]"),
+            Output::new("d", &[Velocities, Drives], "rows of D, one per velocity coordinate \\[N·m/V\\]"),
         ],
-    },
-    Entry {
-        function: Function::Drive(StateSpace),
+        family: Family::Drives,
+        form: Form::Both,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let at = (&inputs[0][..], &inputs[1][..], &inputs[2][..]);
+        let (h, bias, d) =
+            alg::complete_model(forms.model, at, &forms.bias_force(at.0, at.1), &forms.mass_matrix(at.0));
+        [h, bias, d].concat()
+    }
+}
+
+/// The drives' state equation ẋ = Ĉ(x) + D̂(x) u (20.81), without losses and limits.
+pub struct StateSpace;
+
+impl RobotFunction for StateSpace {
+    const SPEC: Spec = Spec {
         name: "state_space",
         summary: "The drives' state equation ẋ = Ĉ(x) + D̂(x) u (20.81), without losses and limits.",
-        inputs: &["q", "qd", "x"],
-        outputs: &[("c_hat", "Ĉ, in the order of x"), ("d_hat", "rows of D̂, one per state, one column per drive")],
-    },
-    Entry {
-        function: Function::Drive(Power),
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::DriveState],
+        outputs: &[
+            Output::new("c_hat", &[DriveStates], "Ĉ, in the order of x"),
+            Output::new("d_hat", &[DriveStates, Drives], "rows of D̂, one per state, one column per drive"),
+        ],
+        family: Family::Drives,
+        form: Form::Both,
+        divisor: Divisor::InertiaWithDrives,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let at = (&inputs[0][..], &inputs[1][..], &inputs[2][..]);
+        let (c, d) = alg::state_space(forms.model, at, &forms.bias_force(at.0, at.1), &forms.mass_matrix(at.0));
+        [c, d].concat()
+    }
+}
+
+/// Where the power of the drives goes.
+pub struct DrivePower;
+
+impl RobotFunction for DrivePower {
+    const SPEC: Spec = Spec {
         name: "drive_power",
         summary: "Where the power of the drives goes.",
-        inputs: &["q", "qd", "x", "u"],
-        outputs: &[(
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::DriveState, Quantity::DriveInput],
+        outputs: &[Output::new(
             "p",
-            "\\[W\\]: electrical input, Joule heat, friction in motors, losses of gears, dampers of elastic stages, friction in joints, and (C_E − C_M) i θ̇, which is zero for a consistent motor",
+            &[Of(7)],
+            "\\[W\\]: electrical input, Joule heat, friction in motors, losses of gears, \
+dampers of elastic stages, friction in joints, and \
+(C_E − C_M) i θ̇, which is zero for a consistent motor",
         )],
-    },
-    Entry {
-        function: Function::Drive(Energy),
+        family: Family::Drives,
+        form: Form::Both,
+        solves: true,
+        divisor: Divisor::InertiaWithDrives,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        with_links(forms, inputs, |at, bias, links| alg::drive_power(forms.model, at, bias, links)).to_vec()
+    }
+}
+
+/// Energy stored in the drives, beside that of the bodies.
+pub struct DriveEnergy;
+
+impl RobotFunction for DriveEnergy {
+    const SPEC: Spec = Spec {
         name: "drive_energy",
         summary: "Energy stored in the drives, beside that of the bodies.",
-        inputs: &["q", "qd", "x"],
-        outputs: &[("e", "\\[J\\]: kinetic of rotors and gears, elastic of transmissions, magnetic of motors")],
-    },
-];
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::DriveState],
+        outputs: &[Output::new(
+            "e",
+            &[Of(3)],
+            "\\[J\\]: kinetic of rotors and gears, elastic of transmissions, magnetic of motors",
+        )],
+        family: Family::Drives,
+        ..Spec::DEFAULT
+    };
 
-pub(super) const INPUT_DOCS: &[(&str, &str)] = &[
-    (
-        "x",
-        "state of the drives, [`DRIVE_STATES`] of each: θ \\[rad\\], θ̇ \\[rad/s\\] and current \\[A\\] of a motor (without \
-         inductance no current; θ and θ̇ are read behind elastic transmissions only), a linear actuator's own; then angle \
-         and speed of shafts between elastic stages",
-    ),
-    ("u", "inputs of the drives, in the order of [`DRIVE_NAMES`] \\[V, or as in the robot file\\]"),
-];
-
-/// Which derivative of q an input is, of the third and further ones: 3 of `q3`.
-pub fn higher_rate(input: &str) -> Option<usize> {
-    let order = input.strip_prefix('q')?.parse().ok()?;
-    (input == rate_name(order) && (3..=MOST_DERIVATIVES + 2).contains(&order)).then_some(order)
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        alg::drive_energy(forms.model, (&inputs[0], &inputs[1], &inputs[2])).to_vec()
+    }
 }
 
-/// The name of the input that is so high a derivative of q.
-fn rate_name(order: usize) -> String {
-    format!("q{order}")
+/// Whether articulated bodies can solve for the motion: drives add to the diagonal of H, and nothing is lost.
+pub(crate) fn may_be_articulated<T: Real>(model: &Model<T>) -> bool {
+    alg::drives_are_diagonal(&model.drives)
+        && model.drives.iter().all(|d| d.efficiency.is_none() && d.held_joint().is_none())
 }
 
-/// What the input is, if it is such a derivative.
-pub(super) fn rate_doc(input: &str) -> Option<String> {
-    const WORDS: [&str; 7] = ["third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth"];
-    let order = higher_rate(input)?;
-    let word = WORDS.get(order - 3).map_or_else(|| format!("{order}th"), |word| word.to_string());
-    let digit = |d: char| d.to_digit(10).map_or(d, |d| ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][d as usize]);
-    let power: String = order.to_string().chars().map(digit).collect();
-    Some(format!("{word} derivatives \\[rad/s{power} or m/s{power}\\]"))
+/// q, q̇, x, u.
+type At<'a, T> = (&'a [T], &'a [T], &'a [T], &'a [T]);
+
+/// What is solved with the links' inertia by the method that serves this robot.
+fn with_links<T: Real, R>(
+    forms: &Forms<'_, T>,
+    inputs: &[Vec<T>],
+    solve: impl FnOnce(At<'_, T>, &[T], &Links<'_, T>) -> R,
+) -> R {
+    let [q, qd, x, u] = inputs else { panic!("functions that solve take q, qd, x, u") };
+    let is_articulated = forms.method != ForwardDynamicsMethod::Factorisation && may_be_articulated(forms.model);
+    let h = if is_articulated { Vec::new() } else { forms.mass_matrix(q) };
+    let links = if is_articulated { Links::Articulated } else { Links::MassMatrix(&h) };
+    solve((q, qd, x, u), &forms.bias_force(q, qd), &links)
 }
 
-impl DriveFunction {
-    /// Whether a robot has it.
-    pub(super) fn is_of<T: Real>(self, model: &Model<T>) -> bool {
-        let drives = &model.drives;
-        !drives.is_empty() && (self != InverseDynamics || alg::inverse_orders(drives).is_some())
-    }
-
-    /// Whether accelerations are solved for.
-    pub(crate) fn solves(self) -> bool {
-        matches!(self, ForwardDynamics | Torques | Power)
-    }
-
-    /// Inputs beside those of its entry: derivatives that the motion must have, and the state where it is read.
-    pub(super) fn further_inputs<T: Real>(self, model: &Model<T>) -> Vec<Port> {
-        if self != InverseDynamics {
-            return Vec::new();
-        }
-        let orders = alg::inverse_orders(&model.drives).map_or(0, |o| o.of_torque);
-        let rates = (3..3 + orders).map(|order| Port::new(&rate_name(order), &[model.nv()]));
-        let state = alg::reads_states(&model.drives).then(|| Port::new("x", &[alg::drive_states(model)]));
-        rates.chain(state).collect()
-    }
-
-    pub(super) fn shapes<T: Real>(self, model: &Model<T>) -> Vec<Vec<usize>> {
-        let (nv, nx, nu) = (model.nv(), alg::drive_states(model), model.drives.len());
-        match self {
-            ForwardDynamics => vec![vec![nv], vec![nx]],
-            InverseDynamics => vec![vec![nu], vec![nu]],
-            Torques => vec![vec![nv], vec![nu]],
-            CompleteModel => vec![vec![nv, nv], vec![nv], vec![nv, nu]],
-            StateSpace => vec![vec![nx], vec![nx, nu]],
-            Power => vec![vec![7]],
-            Energy => vec![vec![3]],
-        }
-    }
+/// The inverse problem over series of so many terms; what is too much is never wanted.
+fn inverse<T: Real, const N: usize>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+    let (rates, x) = match alg::reads_states(&forms.model.drives) {
+        true => (&inputs[1..inputs.len() - 1], &inputs[inputs.len() - 1][..]),
+        false => (&inputs[1..], &[][..]),
+    };
+    let rates: Vec<&[T]> = rates.iter().map(Vec::as_slice).collect();
+    let (u, m) = alg::driven_inverse::<T, N>(forms.model, &inputs[0], &rates, x, |model, q, qd, qdd| {
+        let reduced = forms.reduced.map(|both| both.map(|r| r.map(Taylor::fixed)));
+        let reduced = reduced.as_ref().map(|[torques, h]| [torques, h]);
+        Forms { reduced, ..Forms::plain(model, &[], forms.method) }.inverse_dynamics(q, qd, qdd)
+    });
+    [u, m].concat()
 }

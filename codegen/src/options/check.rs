@@ -29,7 +29,7 @@ pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
     if scene.base == Base::Fixed && options.model.floating_base {
         scene.places.complain("hold.base", say::said_twice("the base"), diagnostics);
     }
-    if scene.base == Base::Moving && options.functions.iter().any(|f| f.is_forward()) {
+    if scene.base == Base::Moving && options.functions.iter().any(|f| f.spec().solves) {
         scene.places.complain("hold.base", say::moving_base_forward(), diagnostics);
     }
     for (function, _) in scene.budgets.iter().filter(|(_, b)| b.mixed_precision) {

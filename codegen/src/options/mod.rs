@@ -8,10 +8,11 @@ pub mod stable;
 pub use check::check_options;
 pub use optimisations::{Forms, Optimisations};
 
-use crate::choices::{ForwardDynamicsMethod, Lanes, LimbForm};
+use crate::choices::{Lanes, LimbForm};
 use crate::description;
 use crate::description::drives::Drive;
 use crate::diagnostic::{Diagnostics, Reporting, Source};
+use crate::function::ForwardDynamicsMethod;
 use crate::function::Function;
 use crate::scene::Scene;
 use straightline_graph::certify::Effort;

@@ -6,7 +6,7 @@
 use crate::equations::reduce::{is_in_proportion, lengths, longest_lever, reduce, Choice};
 use crate::equations::traced::candidate;
 use crate::equations::Robot;
-use crate::function::{DriveFunction, Function};
+use crate::function::{Form, Function};
 use crate::model::states;
 use crate::options::stable::Stable;
 use crate::options::{Forms, Optimisations, Options};
@@ -58,7 +58,7 @@ fn chosen(
     options: &Options,
     optimisations: Optimisations,
 ) -> Robot {
-    use Function::*;
+    use Function::{BiasForce, InverseDynamics, MassMatrix};
     let search = |function: Function| {
         // the search is for torques or the mass matrix, whatever becomes of forward dynamics
         let optimisations = Optimisations { cheaper: false, ..optimisations };
@@ -67,24 +67,14 @@ fn chosen(
         let key = ((function, scene), optimisations, options.scalar).stable_text();
         robot.found.or_search(key, || improved(robot, frames, function, options, optimisations))
     };
-    match function {
-        InverseDynamics | Drive(DriveFunction::InverseDynamics) => {
-            let choice = search(InverseDynamics);
-            robot.reduced_by(&choice, &choice)
-        }
-        BiasForce | VelocityForce | GravityForce => {
-            let choice = search(BiasForce);
-            robot.reduced_by(&choice, &choice)
-        }
-        MassMatrix => {
-            let choice = search(MassMatrix);
-            robot.reduced_by(&choice, &choice)
-        }
-        Drive(DriveFunction::Energy) => robot.clone(),
-        Drive(DriveFunction::CompleteModel | DriveFunction::StateSpace | DriveFunction::Power) => {
-            robot.reduced_by(&search(BiasForce), &search(MassMatrix))
-        }
-        ForwardDynamics | Drive(DriveFunction::ForwardDynamics | DriveFunction::Torques) => {
+    let both = |choice: Choice| robot.reduced_by(&choice, &choice);
+    match function.spec().form {
+        Form::Plain => robot.clone(),
+        Form::InverseDynamics => both(search(InverseDynamics)),
+        Form::BiasForce => both(search(BiasForce)),
+        Form::MassMatrix => both(search(MassMatrix)),
+        Form::Both => robot.reduced_by(&search(BiasForce), &search(MassMatrix)),
+        Form::Motion => {
             let (torques, mass_matrix) = (search(BiasForce), search(MassMatrix));
             // articulated bodies share more with frames that turn
             let plain = plain(robot, options, optimisations);
@@ -101,7 +91,6 @@ fn chosen(
             let least = (0..robots.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).expect("there are four pairs");
             robots[least].clone()
         }
-        _ => robot.clone(),
     }
 }
 

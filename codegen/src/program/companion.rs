@@ -1,7 +1,7 @@
 //! Programs that bound rounding errors at the state at hand.
 
 use crate::equations::Robot;
-use crate::function::{ContactFunction, Function};
+use crate::function::{ContactFunction, Function, Judged};
 use crate::options::Options;
 use crate::program::contact::{self, checked_system, Mode};
 use crate::program::equivalence::{self, Disagreement, Plainer};
@@ -55,7 +55,7 @@ pub(crate) fn checked_companion(
     options: &Options,
 ) -> Result<(StateBound, Option<Plainer>), Disagreement> {
     let name = function.name();
-    if function != Function::ForwardDynamics {
+    if function.spec().judged != Judged::ByResidual {
         let bound = certify::companion::state_bound(graph, options.scalar, bits(options));
         let bound = bound.map(|bound| finished_bound(name, bound));
         bound.iter().try_for_each(|bound| equivalence::of_bound(robot, options, name, (graph, bound)))?;

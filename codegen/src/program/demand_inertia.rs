@@ -2,7 +2,7 @@
 
 use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics};
-use crate::function::{ContactFunction, DriveFunction, Function};
+use crate::function::{ContactFunction, Divisor, Function};
 use crate::model::merge::{merge, Part};
 use crate::model::singular::{singular_joints, Inertia};
 use crate::options::Options;
@@ -21,11 +21,10 @@ struct Asked {
 /// All that is asked for that divides by what joints feel: functions, their error bounds and stages, and the functions of contact modes.
 fn asked(model: &Model<Dd>, options: &Options) -> Vec<Asked> {
     let is_driven = !model.drives.is_empty();
-    let of_function = |f: &Function| match f {
-        Function::ForwardDynamics => Some(Inertia::OfLinks),
-        Function::Drive(DriveFunction::StateSpace) => Some(Inertia::WithDrives),
-        Function::Drive(f) if f.solves() => Some(Inertia::WithDrives),
-        _ => None,
+    let of_function = |f: &Function| match f.spec().divisor {
+        Divisor::Inertia => Some(Inertia::OfLinks),
+        Divisor::InertiaWithDrives => Some(Inertia::WithDrives),
+        Divisor::Nothing | Divisor::Mass => None,
     };
     let of_contact = |f: &ContactFunction| match f {
         ContactFunction::ForwardDynamics | ContactFunction::InverseDynamics => Some(Inertia::OfLinks),
@@ -94,7 +93,7 @@ pub(crate) fn demand_inertia(model: &Model<Dd>, options: &Options, diagnostics: 
 
 /// A mass centre takes some mass; what a run-time parameter brings is not known here.
 fn demand_mass(model: &Model<Dd>, options: &Options, diagnostics: &mut Diagnostics) {
-    let divides = |f: &&Function| matches!(f, Function::CentreOfMass | Function::Momentum);
+    let divides = |f: &&Function| f.spec().divisor == Divisor::Mass;
     let names: Vec<String> = options.functions.iter().filter(divides).map(|f| format!("`{}`", f.name())).collect();
     let has_mass = model.bodies.iter().any(|b| b.inertia.mass != Dd::ZERO);
     if !names.is_empty() && !has_mass && !options.scene.has_loads() {

@@ -15,12 +15,12 @@ mod bounds;
 #[cfg(feature = "internals")]
 pub(crate) mod mutants;
 
-use crate::choices::ForwardDynamicsMethod;
 use crate::diagnostic::Diagnostic;
 use crate::equations::bind::constructed;
 use crate::equations::reduce::longest_lever;
 use crate::equations::Robot;
-use crate::function::{ContactFunction, Function};
+use crate::function::ForwardDynamicsMethod;
+use crate::function::{ContactFunction, Function, Judged};
 use crate::model::drives::entries;
 use crate::model::singular::weakest_joint;
 use crate::model::states::{of_port, settle};
@@ -191,7 +191,7 @@ pub(crate) fn of_function(
     for _ in 0..STATES {
         check.at(&states.next(&ports), (&mut losses, POINT), true)?;
     }
-    if function == Function::MassMatrix {
+    if function.spec().judged == Judged::ByInertias {
         // of all results these lose most where the robot happens to stand so that an entry is small
         for _ in 0..MORE_STATES {
             check.at(&states.next(&ports), (&mut losses, POINT), false)?;
@@ -267,17 +267,17 @@ impl Check<'_> {
             let frames = scene.frames_of(self.function, self.frames).len();
             scene.select(self.function, &self.robot.model, frames).0.into_iter().eq(0..all)
         };
-        match self.function {
-            Function::ForwardDynamics if is_whole(nv) => sizes_of_accelerations(self.robot, self.options, state, off),
+        match self.function.spec().judged {
+            Judged::ByResidual if is_whole(nv) => sizes_of_accelerations(self.robot, self.options, state, off),
             // residuals have no scale of accelerations: all of them are judged by the greatest
-            Function::ForwardDynamics => vec![found.iter().map(|x| x.hi().abs()).fold(0.0, f64::max); found.len()],
-            Function::MassMatrix if is_whole(nv * nv) => sizes_of_inertias(nv, found, off, least),
+            Judged::ByResidual => vec![found.iter().map(|x| x.hi().abs()).fold(0.0, f64::max); found.len()],
+            Judged::ByInertias if is_whole(nv * nv) => sizes_of_inertias(nv, found, off, least),
             _ => off.iter().map(|x| x.size).collect(),
         }
     }
 
     fn compare(&self, mut losses: Losses) -> Result<(), Disagreement> {
-        if self.function == Function::ForwardDynamics {
+        if self.function.spec().judged == Judged::ByResidual {
             let lost = Disagreement {
                 program: self.function.name().to_string(),
                 result: element_of(&self.graph.outputs, 0),
@@ -289,13 +289,13 @@ impl Check<'_> {
             }
         }
         // a rounding of all that a result is made of is little; of a scale that is a result's own any program loses some
-        let least = match self.function {
-            Function::ForwardDynamics => {
+        let least = match self.function.spec().judged {
+            Judged::ByResidual => {
                 losses.plain = vec![losses.plain.iter().copied().fold(0.0, f64::max); losses.plain.len()];
                 LOSSES / 2.0
             }
-            Function::MassMatrix => OF_INERTIAS,
-            _ => 1.0,
+            Judged::ByInertias => OF_INERTIAS,
+            Judged::ByScale => 1.0,
         };
         losses.compare(self.function.name(), self.graph, self.options.scalar, least)
     }
@@ -453,7 +453,7 @@ fn differences(
     let mut bound = scene.bind(function, robot, &given);
     with_sizes(&mut bound.model, longest_lever(&robot.model));
     let nv = robot.model.nv();
-    if function == Function::ForwardDynamics && wanted.iter().copied().eq(0..nv) {
+    if function.spec().judged == Judged::ByResidual && wanted.iter().copied().eq(0..nv) {
         let motion = [&bound.arguments[0], &bound.arguments[1], &found.iter().copied().map(Magnitude::new).collect()];
         let takes = Function::InverseDynamics.evaluate(
             &bound.model,

@@ -19,7 +19,7 @@ use crate::equations::bind::is_optional;
 use crate::equations::forward_method::MethodChoice;
 use crate::equations::traced::{candidate, traced};
 use crate::equations::Robot;
-use crate::function::Function;
+use crate::function::{Family, Form, Function};
 use crate::model::states::samples;
 use crate::options::optimisations::FOLDING;
 use crate::options::{Optimisations, Options};
@@ -111,14 +111,12 @@ fn optimised_with(
             true => check("dead code", dead_code(&check("sums", sums(&graph)))),
             false => graph,
         };
-        // joint torques gain an operation of two hundred
-        let gains = matches!(function, Function::MassMatrix | Function::ForwardDynamics);
-        let graph = match optimisations.substitutes && gains {
+        let graph = match optimisations.substitutes && function.spec().gains_by_substitutes {
             true => check("substitute", substitute(&graph, &choose::keeps_digits_of(&robot.model, &graph))),
             false => graph,
         };
-        // fused products want another order; forward dynamics takes 6 to 9 % longer in this one, and its digits go elsewhere
-        let ordered = optimisations.sums && !options.fma && function != Function::ForwardDynamics;
+        // fused products want another order
+        let ordered = optimisations.sums && !options.fma && !function.spec().keeps_order;
         let graph = match ordered.then(|| samples(&robot.model, &graph)).flatten() {
             Some(states) => check("order", order(&graph, &states)),
             None => graph,
@@ -134,7 +132,7 @@ fn optimised_with(
     let same_method = choice.map_or(options.forward_dynamics, |choice| choice.method());
     let same_method = Options { forward_dynamics: same_method, ..options.clone() };
     let of_bodies = Optimisations { reduced: false, ..optimisations };
-    if function.has_reduced_form() {
+    if function.spec().family == Family::Robot && function.spec().form != Form::Plain {
         let (counts, ..) = candidate(robot, frames, function, &same_method, of_bodies);
         if price(counts) < price(graph.counts()) {
             return (finished(robot, &same_method, of_bodies).0, choice);

@@ -4,9 +4,9 @@
 //! [`cut`](straightline_graph::pass::cut). Around each stage's stored values stands a struct; a later stage borrows the earlier one, so that a value
 //! of a stage cannot outlive a change of what it was computed from.
 
-use crate::choices::ForwardDynamicsMethod;
 use crate::equations::bind::is_optional;
 use crate::equations::Robot;
+use crate::function::ForwardDynamicsMethod;
 use crate::function::Function;
 use crate::options::{Optimisations, Options};
 use crate::program::choose::choose;

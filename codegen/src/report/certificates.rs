@@ -1,7 +1,7 @@
 //! The bounds of rounding errors of every program.
 
 use crate::equations::Robot;
-use crate::function::Function;
+use crate::function::{Function, Judged};
 use crate::options::{Optimisations, Options};
 use crate::program::companion::ROUNDED;
 use crate::program::input_box::input_box;
@@ -24,8 +24,8 @@ pub(crate) fn certificates(robot: &Robot, programs: &[Program], options: &Option
             Err(refusal) => return Some(ErrorReport::refused(refusal.words())),
         };
         let ranges = certify::box_in_words(&p.graph.inputs, &inputs);
-        let known = match p.function {
-            Function::ForwardDynamics => known(robot, &p.graph, &inputs, options),
+        let known = match p.function.spec().judged {
+            Judged::ByResidual => known(robot, &p.graph, &inputs, options),
             _ => Known::default(),
         };
         Some(match certify::certify_with(&p.graph, options.scalar, &inputs, effort, &known) {

@@ -4,7 +4,7 @@ use super::contact::ContactItem;
 use super::messages::unphysical_moments;
 use super::{check_contact, messages as say, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Scene};
 use crate::diagnostic::Diagnostics;
-use crate::function::Function;
+use crate::function::{Extent, Family, Function, Parts};
 use crate::identifier::UNNAMED;
 use crate::model::geometry::principal_moments;
 use crate::model::{is_gravity, GRAVITY};
@@ -298,21 +298,15 @@ fn unphysical(payload: &Payload) -> Option<(&'static str, String)> {
 
 /// Whether the results of a function, or its columns, belong to joints.
 fn by_joints(function: Function) -> bool {
-    use Function::*;
-    match function {
-        InverseDynamics | GravityForce | BiasForce | VelocityForce | ForwardDynamics => true,
-        MassMatrix | JointWrenches | Jacobian | KinematicsAndJacobian => true,
-        ForwardKinematics | FrameVelocity | FrameAcceleration | JacobianBias => false,
-        Energy | CentreOfMass | Momentum | Drive(_) => false,
-    }
+    let of_joints = function.has_axis(Extent::Velocities) || function.has_axis(Extent::Joints);
+    of_joints && function.spec().family != Family::Drives
 }
 
 /// The parts that the results of a function have.
 fn parts_of(function: Function) -> &'static [Part] {
-    match function {
-        Function::MassMatrix => &[Part::Diagonal],
-        Function::JointWrenches => &[Part::Linear, Part::Angular],
-        f if f.is_per_frame() => &[Part::Linear, Part::Angular],
-        _ => &[],
+    match function.spec().outputs.first().map_or(Parts::No, |output| output.parts) {
+        Parts::No => &[],
+        Parts::Diagonal => &[Part::Diagonal],
+        Parts::LinearAngular => &[Part::Linear, Part::Angular],
     }
 }

@@ -116,10 +116,9 @@ impl Scene {
     pub fn resolved<T>(&self, model: &Model<T>) -> Scene {
         let mut scene = self.clone();
         if self.base == Base::Moving {
-            use Function::{BiasForce, GravityForce, InverseDynamics, VelocityForce};
             let joints = model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single());
             let joints: Vec<String> = joints.map(|j| j.name.clone()).collect();
-            for function in [InverseDynamics, GravityForce, BiasForce, VelocityForce] {
+            for function in Function::all().filter(|f| f.is_torque()) {
                 let selection = scene.outputs.entry(function).or_default();
                 if selection.joints.is_empty() {
                     selection.joints.clone_from(&joints);

@@ -4,7 +4,7 @@
 //! the reference's own.
 
 use super::{Random, State};
-use crate::function::DriveFunction;
+use crate::function::Function;
 use nalgebra::{DMatrix, DVector};
 use straightline_core::drive::{Actuator, Drive, Efficiency};
 use straightline_core::model::Model;
@@ -19,12 +19,12 @@ use straightline_graph::Scalar;
 const MOST_LOSSY: usize = 10;
 
 /// Whether the reference has a formulation of a function for these drives.
-pub(super) fn has(function: DriveFunction, drives: &[Drive<Dd>]) -> bool {
+pub(super) fn has(function: Function, drives: &[Drive<Dd>]) -> bool {
     let is_known = |d: &Drive<Dd>| match d.stages.is_empty() {
         true => d.shaft_inertia.is_none() || matches!(d.actuator, Actuator::Motor(_)),
         false => d.efficiency.is_none(),
     };
-    matches!(function, DriveFunction::ForwardDynamics | DriveFunction::Torques)
+    matches!(function, Function::DrivenForwardDynamics | Function::DriveTorques)
         && drives.iter().all(|d| d.rotor.is_none() && is_known(d))
         && drives.iter().filter(|d| d.efficiency.is_some()).count() <= MOST_LOSSY
 }
@@ -82,7 +82,7 @@ struct At {
 
 /// Values and natural scales of a function that [`has`], from H, h and the scale of h.
 pub(super) fn outputs(
-    function: DriveFunction,
+    function: Function,
     model: &Model<Dd>,
     h: &[Dd],
     (bias, bias_scale): (&[Dd], &[f64]),
@@ -206,7 +206,7 @@ pub(super) fn outputs(
     let qdd: Vec<Dd> = qdd.iter().copied().collect();
     let tau: Vec<Dd> = tau.iter().copied().collect();
     match function {
-        DriveFunction::Torques => ([tau, torques.0].concat(), [tau_scale, torques.1].concat()),
+        Function::DriveTorques => ([tau, torques.0].concat(), [tau_scale, torques.1].concat()),
         _ => ([qdd, rates.0].concat(), [qdd_scale, rates.1].concat()),
     }
 }

@@ -12,7 +12,7 @@ use crate::description::{self, Description, JointDrive, Notation, Value};
 use crate::diagnostic::{Diagnostics, Source};
 use crate::emit::{fused, Generated};
 use crate::equations::Robot;
-use crate::function::Function;
+use crate::function::{Family, Function};
 use crate::model::states::NO_LIMIT;
 use crate::model::{self, ModelOptions};
 use crate::options::Options;
@@ -106,9 +106,8 @@ pub fn verify(
     let (mut tree, mut added) = second_reading(source, &whole, options)?;
     whole::hold(scene, &whole, &mut tree, &mut added)?;
     let functions = Function::wanted(&options.functions, model);
-    let is_left_out = |f: &&Function| match f {
-        Function::Drive(f) => whole.nv() != model.nv() || !drives::has(*f, &model.drives),
-        _ => false,
+    let is_left_out = |f: &&Function| {
+        f.spec().family == Family::Drives && (whole.nv() != model.nv() || !drives::has(**f, &model.drives))
     };
     let left_out: Vec<&'static str> = functions.iter().filter(is_left_out).map(|f| f.name()).collect();
     let functions = functions.iter().filter(|f| !is_left_out(f));
@@ -133,11 +132,11 @@ pub fn verify(
             let frame = |name: &String| tree.frame(name).ok_or_else(|| format!("the reference has no frame `{name}`"));
             let frames: Vec<&MassCentreFrame<Dd>> = names.iter().map(frame).collect::<Result<_, _>>()?;
             let truth = Truth { tree, drives: &added, frames: &frames, state: whole_state, moving: &coordinates.v };
-            let (mut expected, mut scales) = match function {
-                Function::Drive(f) => {
+            let (mut expected, mut scales) = match function.spec().family {
+                Family::Drives => {
                     let (h, (bias, scale)) =
                         (truth.outputs(Function::MassMatrix).0, truth.outputs(Function::BiasForce));
-                    drives::outputs(*f, model, &h, (&bias, &scale), &inputs)
+                    drives::outputs(*function, model, &h, (&bias, &scale), &inputs)
                 }
                 _ => truth.outputs(*function),
             };
@@ -620,7 +619,7 @@ impl Truth<'_> {
                     .over_links(|m, inertia, r| [m * r.moving, 2.0 * m * r.length * r.moving + inertia * r.turning]);
                 (values, motion(linear, angular))
             }
-            Drive(_) => unreachable!("functions of drives are left out"),
+            _ => unreachable!("functions of drives are left out"),
         }
     }
 

@@ -6,7 +6,7 @@
 
 use super::{Drive, Random, State};
 use crate::equations::Robot;
-use crate::function::Function;
+use crate::function::{Extent, Family, Function, Spec};
 use crate::options::Options;
 use crate::program::parameter::parameter_program;
 use crate::scene::free_drive::FreeDrive;
@@ -31,6 +31,8 @@ pub(super) struct Coordinates {
     held: Vec<f64>,
     /// Number of velocity coordinates of the whole robot.
     nv: usize,
+    /// Number of its joints.
+    all_joints: usize,
 }
 
 impl Coordinates {
@@ -56,7 +58,7 @@ impl Coordinates {
                 held[joint.iq] = *value;
             }
         }
-        Ok(Coordinates { q, v, joints, held, nv: whole.nv() })
+        Ok(Coordinates { q, v, joints, held, nv: whole.nv(), all_joints: all.len() })
     }
 
     /// The whole robot's state.
@@ -72,24 +74,34 @@ impl Coordinates {
         whole
     }
 
-    /// Of a function's results for the whole robot, those of the robot of the scene, as indices.
+    /// Of a function's results for the whole robot, those of the robot of the scene, as indices. Accelerations depend on which joints
+    /// move: they are solved for these.
     pub fn results(&self, function: Function, frames: usize) -> Option<Vec<usize>> {
-        use Function::*;
-        let (n, v) = (self.nv, &self.v);
-        Some(match function {
-            InverseDynamics | GravityForce | BiasForce | VelocityForce => v.clone(),
-            MassMatrix => v.iter().flat_map(|i| v.iter().map(move |j| i * n + j)).collect(),
-            Jacobian => (0..6 * frames).flat_map(|row| v.iter().map(move |j| row * n + j)).collect(),
-            JointWrenches => self.joints.iter().flat_map(|rank| 6 * rank..6 * rank + 6).collect(),
-            KinematicsAndJacobian => {
-                let poses = 12 * frames;
-                (0..poses).chain(self.results(Jacobian, frames)?.into_iter().map(|k| poses + k)).collect()
+        let Spec { family, solves, outputs, .. } = function.spec();
+        let is_of_joints = function.has_axis(Extent::Velocities) || function.has_axis(Extent::Joints);
+        if *family == Family::Drives || *solves || !is_of_joints {
+            return None;
+        }
+        let (mut results, mut first) = (Vec::new(), 0);
+        for output in *outputs {
+            let (mut block, mut len) = (vec![0], 1);
+            for extent in output.axes {
+                let (wanted, all): (Vec<usize>, usize) = match extent {
+                    Extent::Velocities => (self.v.clone(), self.nv),
+                    Extent::Joints => (self.joints.clone(), self.all_joints),
+                    Extent::Frames => ((0..frames).collect(), frames),
+                    Extent::Of(n) => ((0..*n).collect(), *n),
+                    Extent::Positions | Extent::DriveStates | Extent::Drives => {
+                        unreachable!("no function has such results")
+                    }
+                };
+                block = block.iter().flat_map(|at| wanted.iter().map(move |k| at * all + k)).collect();
+                len *= all;
             }
-            // its results depend on which joints move: solved for these
-            ForwardDynamics => return None,
-            ForwardKinematics | FrameVelocity | FrameAcceleration | JacobianBias => return None,
-            Energy | CentreOfMass | Momentum | Drive(_) => return None,
-        })
+            results.extend(block.into_iter().map(|k| first + k));
+            first += len;
+        }
+        Some(results)
     }
 }
 

@@ -2,7 +2,6 @@
 
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::evaluate;
-use straightline_codegen::function::DriveFunction;
 use straightline_codegen::model::{load, ModelOptions};
 use straightline_codegen::program::optimised;
 use straightline_codegen::{compile, Function, Options, Source};
@@ -61,7 +60,7 @@ fn voltages_for_a_swing_behind_four_and_eight_springs_and_an_inductance_are_thos
         let robot = Robot::new(model.unwrap_or_else(|| panic!("{diagnostics}")));
         assert_eq!(inverse_orders(&robot.model.drives).expect("it has an inverse").of_torque, 2 * stages + 1);
         let options = Options::default();
-        let function = Function::Drive(DriveFunction::InverseDynamics);
+        let function = Function::DrivenInverseDynamics;
         let graph = optimised(&robot, &[], function, &options, options.optimisations());
         let omega = Dd::from(7.0);
         let (s, c) = Dd::from(0.6).sin_cos();
@@ -88,7 +87,7 @@ fn voltages_for_a_swing_behind_four_and_eight_springs_and_an_inductance_are_thos
 
 #[test]
 fn the_text_says_what_the_higher_derivatives_are() {
-    let functions = vec![Function::Drive(DriveFunction::InverseDynamics)];
+    let functions = vec![Function::DrivenInverseDynamics];
     let generated = compile(&wheel(4), &Options { functions, ..Options::default() }).unwrap_or_else(|d| panic!("{d}"));
     for line in ["* `q9`: ninth derivatives \\[rad/s⁹ or m/s⁹\\]", "* `q11`: 11th derivatives \\[rad/s¹¹ or m/s¹¹\\]"]
     {

@@ -5,7 +5,6 @@ use crate::chain::{arm, LAST_LINK};
 use nalgebra::{DMatrix, DVector};
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::evaluate;
-use straightline_codegen::function::DriveFunction;
 use straightline_codegen::model::{load, ModelOptions};
 use straightline_codegen::program::optimised;
 use straightline_codegen::verify::verify;
@@ -56,9 +55,9 @@ fn robot(source: &Source) -> Robot {
 }
 
 /// The results of a function of the drives in double-double, block by block.
-fn run(robot: &Robot, function: DriveFunction, inputs: &[(&str, &[Dd])]) -> Vec<Vec<Dd>> {
+fn run(robot: &Robot, function: Function, inputs: &[(&str, &[Dd])]) -> Vec<Vec<Dd>> {
     let options = Options::default();
-    let graph = optimised(robot, &[], Function::Drive(function), &options, options.optimisations());
+    let graph = optimised(robot, &[], function, &options, options.optimisations());
     let named = |name: &str| inputs.iter().find(|i| i.0 == name).unwrap_or_else(|| panic!("no {name}")).1;
     let arguments: Vec<Dd> = graph.inputs.iter().flat_map(|p| named(&p.name).iter().copied()).collect();
     let mut results = evaluate(&graph, &arguments).into_iter();
@@ -138,14 +137,14 @@ fn motion_and_torques_are_those_of_the_printed_equations() {
         let printed = united.printed_torques(&own, &DVector::from_column_slice(u));
         let solved = united.solve(&own, &DVector::from_column_slice(u));
         assert!(apart(printed.as_slice(), solved.tau.as_slice()) < EXACT);
-        let torques = run(&robot, DriveFunction::Torques, &inputs);
+        let torques = run(&robot, Function::DriveTorques, &inputs);
         assert!(apart(&torques[0], printed.as_slice()) < EXACT, "{last}: {torques:?} {printed:?}");
         assert!(apart(&torques[1], printed.as_slice()) < EXACT, "{last}: {torques:?} {printed:?}");
-        let motion = run(&robot, DriveFunction::ForwardDynamics, &inputs);
+        let motion = run(&robot, Function::DrivenForwardDynamics, &inputs);
         assert!(apart(&motion[0], solved.qdd.as_slice()) < EXACT, "{last}: {motion:?} {solved:?}");
         assert!(apart(&motion[1], solved.xd.as_slice()) < EXACT, "{last}: {motion:?} {solved:?}");
         let (drift, gain) = united.state_space(&own);
-        let space = run(&robot, DriveFunction::StateSpace, &inputs);
+        let space = run(&robot, Function::StateSpace, &inputs);
         assert!(apart(&space[0], drift.as_slice()) < EXACT, "{last}: {space:?} {drift:?}");
         assert!(apart(&space[1], gain.transpose().as_slice()) < EXACT, "{last}: {space:?} {gain:?}");
     }
@@ -160,10 +159,10 @@ fn a_massless_link_needs_no_inertia_where_its_shaft_does_not_give_way() {
     let (united, own) = united(&robot.model, &at);
     let State([q, qd, x, u]) = &at;
     let solved = united.solve(&own, &DVector::from_column_slice(u));
-    let motion = run(&robot, DriveFunction::ForwardDynamics, &[("q", &q[..]), ("qd", qd), ("x", x), ("u", u)]);
+    let motion = run(&robot, Function::DrivenForwardDynamics, &[("q", &q[..]), ("qd", qd), ("x", x), ("u", u)]);
     assert!(apart(&motion[0], solved.qdd.as_slice()) < EXACT && apart(&motion[1], solved.xd.as_slice()) < EXACT);
     let functions = |list: &[Function]| Options { functions: list.to_vec(), ..Options::default() };
-    let driven = Function::Drive(DriveFunction::ForwardDynamics);
+    let driven = Function::DrivenForwardDynamics;
     assert!(compile(&source, &functions(&[driven])).is_ok());
     // without the drive it does
     let errors = compile(&source, &functions(&[Function::ForwardDynamics, driven])).expect_err("H is singular");
@@ -174,7 +173,7 @@ fn a_massless_link_needs_no_inertia_where_its_shaft_does_not_give_way() {
 #[test]
 fn gears_losses_and_springs_behind_such_shafts_agree_with_the_second_author() {
     let source = arm(LAST_LINK, GEARED);
-    let functions = [DriveFunction::ForwardDynamics, DriveFunction::Torques].map(Function::Drive).to_vec();
+    let functions = [Function::DrivenForwardDynamics, Function::DriveTorques].to_vec();
     let options = Options { functions, ..Options::default() };
     let generated = compile(&source, &options).unwrap_or_else(|d| panic!("{d}"));
     let verified = verify(&source, &generated, &options, (40, 3), || ()).expect("the reference has them");
@@ -190,12 +189,12 @@ fn the_rows_of_the_complete_model_hold_and_the_inputs_follow_from_the_motion() {
         let robot = robot(&arm(LAST_LINK, drives));
         let State([q, qd, x, u]) = state(&robot.model);
         let inputs = [("q", &q[..]), ("qd", &qd), ("x", &x), ("u", &u)];
-        let motion = run(&robot, DriveFunction::ForwardDynamics, &inputs);
-        let space = run(&robot, DriveFunction::StateSpace, &inputs);
+        let motion = run(&robot, Function::DrivenForwardDynamics, &inputs);
+        let space = run(&robot, Function::StateSpace, &inputs);
         let affine = |i: usize| (0..3).fold(space[0][i], |sum, k| sum + space[1][3 * i + k] * u[k]);
         let rates: Vec<Dd> = (0..x.len()).map(affine).collect();
         assert!(apart(&rates, &motion[1]) < EXACT, "{drives}");
-        let model = run(&robot, DriveFunction::CompleteModel, &inputs);
+        let model = run(&robot, Function::CompleteModel, &inputs);
         let left = |i: usize| (0..3).fold(model[1][i], |sum, j| sum + model[0][3 * i + j] * motion[0][j]);
         let right = |i: usize| (0..3).fold(Dd::ZERO, |sum, k| sum + model[2][3 * i + k] * u[k]);
         let (left, right): (Vec<Dd>, Vec<Dd>) = (0..3).map(|i| (left(i), right(i))).unzip();
@@ -204,9 +203,9 @@ fn the_rows_of_the_complete_model_hold_and_the_inputs_follow_from_the_motion() {
     }
     let robot = robot(&arm(LAST_LINK, &DIRECT.replace("inductance = 0.01, ", "")));
     let State([q, qd, x, u]) = state(&robot.model);
-    let motion = run(&robot, DriveFunction::ForwardDynamics, &[("q", &q[..]), ("qd", &qd), ("x", &x), ("u", &u)]);
+    let motion = run(&robot, Function::DrivenForwardDynamics, &[("q", &q[..]), ("qd", &qd), ("x", &x), ("u", &u)]);
     let back =
-        run(&robot, DriveFunction::InverseDynamics, &[("q", &q[..]), ("qd", &qd), ("qdd", &motion[0]), ("x", &x)]);
+        run(&robot, Function::DrivenInverseDynamics, &[("q", &q[..]), ("qd", &qd), ("qdd", &motion[0]), ("x", &x)]);
     assert!(apart(&back[0], &u) < EXACT, "{back:?}");
 }
 

@@ -7,9 +7,9 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use straightline_codegen::choices::ForwardDynamicsMethod;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::expr::{evaluate, Graph};
+use straightline_codegen::function::ForwardDynamicsMethod;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::options::{Optimisations, Options};
 use straightline_codegen::program::optimised;

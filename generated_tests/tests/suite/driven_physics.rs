@@ -8,14 +8,14 @@ use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::Graph;
-use straightline_codegen::function::DriveFunction::{
-    self, CompleteModel, Energy, ForwardDynamics, InverseDynamics, Power, StateSpace, Torques,
-};
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::options::Options;
 use straightline_codegen::program::program;
 use straightline_codegen::verify::reference_input::mass_centre_tree;
 use straightline_codegen::verify::verify;
+use straightline_codegen::Function::{
+    CompleteModel, DriveEnergy, DrivePower, DriveTorques, DrivenForwardDynamics, DrivenInverseDynamics, StateSpace,
+};
 use straightline_codegen::{description as read, Function, Scalar};
 use straightline_core::model::Model;
 use straightline_core::reference::drives::{before_elastic_stage, ActuatorModel, DcMotor, ElasticStage, UnitedModel};
@@ -216,7 +216,7 @@ fn agree_with_the_reference(robot: &str, seed: u64, is_lossy: bool) {
 
     let all_x = x.concat();
     let at: &[(&str, &[Dd])] = &[("q", &wq), ("qd", &wqd), ("x", &all_x), ("u", &wu)];
-    let motion = driven.run(ForwardDynamics, at);
+    let motion = driven.run(DrivenForwardDynamics, at);
     let paste = format!("{robot}, seed {seed}, lossy {is_lossy}:\n{text}");
     let qdd: Vec<Dd> = truth.qdd.iter().copied().collect();
     assert!(DRIVE_AUTHORS.allows(distance(&motion[0], &qdd)), "q̈: {:e}\n{paste}", distance(&motion[0], &qdd));
@@ -231,7 +231,7 @@ fn agree_with_the_reference(robot: &str, seed: u64, is_lossy: bool) {
         }
     }
     assert!(DRIVE_AUTHORS.allows(distance(&motion[1], &xd)), "ẋ: {:e}\n{paste}", distance(&motion[1], &xd));
-    let torques = driven.run(Torques, at);
+    let torques = driven.run(DriveTorques, at);
     let tau: Vec<Dd> = (0..n).map(|k| truth.tau[k] + tau_elastic[k]).collect();
     assert!(DRIVE_AUTHORS.allows(distance(&torques[0], &tau)), "τ: {:e}\n{paste}", distance(&torques[0], &tau));
     let mut of_rigid = truth.torques.iter();
@@ -370,7 +370,7 @@ fn a_rotor_on_a_moving_link_is_a_body_of_its_own_that_is_geared() {
         assert!(distance(&model[0], &without[0]) > 1e-3);
         // the motion under a voltage comes back as that voltage
         let u = wide(&[random.between(-20.0, 20.0)]);
-        let motion = driven.run(ForwardDynamics, &[("q", &q), ("qd", &qd), ("x", &x), ("u", &u)]);
+        let motion = driven.run(DrivenForwardDynamics, &[("q", &q), ("qd", &qd), ("x", &x), ("u", &u)]);
         let forces: Vec<Dd> = (0..2)
             .map(|i| (0..2).fold(model[1][i], |sum, j| sum + model[0][2 * i + j] * motion[0][j]) - model[2][i] * u[0])
             .collect();
@@ -468,7 +468,7 @@ fn electrical_power_goes_into_heat_friction_gears_dampers_and_energy() {
     for scene in [EVERYTHING.to_string(), limited, only([false, true]), only([true, false])] {
         let driven = Driven::new(&source, &ModelOptions::default(), &scene);
         let is_elastic = driven.robot.model.drives.iter().any(|d| !d.stages.is_empty());
-        let (of_drives, of_bodies) = (driven.program(Function::Drive(Energy)), driven.program(Function::Energy));
+        let (of_drives, of_bodies) = (driven.program(DriveEnergy), driven.program(Function::Energy));
         let mut random = Random(11);
         for _ in 0..50 {
             let [q, qd, mut x, u] = state(&mut random);
@@ -476,8 +476,8 @@ fn electrical_power_goes_into_heat_friction_gears_dampers_and_energy() {
                 x.truncate(8);
             }
             let at: &[(&str, &[Dd])] = &[("q", &q), ("qd", &qd), ("x", &x), ("u", &u)];
-            let motion = driven.run(ForwardDynamics, at);
-            let power = &driven.run(Power, at)[0];
+            let motion = driven.run(DrivenForwardDynamics, at);
+            let power = &driven.run(DrivePower, at)[0];
             // energies along q + q̇ t, q̇ + q̈ t, x + ẋ t
             let along = |x: &[Dd], rate: &[Dd]| -> Vec<Taylor<Dd, 2>> {
                 x.iter().zip(rate).map(|(x, r)| Taylor::from_derivatives([*x, *r])).collect()
@@ -509,7 +509,7 @@ fn at_zero_power_a_gear_loses_nothing() {
     );
     let (q, u) = ([0.3, -0.4, 0.5], [6.0]);
     let at = |qd: &[f64; 3], driven: &Driven| {
-        driven.run::<f64>(Torques, &[("q", &q), ("qd", qd), ("x", &[0.0; 2]), ("u", &u)])[0][1]
+        driven.run::<f64>(DriveTorques, &[("q", &q), ("qd", qd), ("x", &[0.0; 2]), ("u", &u)])[0][1]
     };
     let rest = [0.5, 0.0, 0.1];
     assert_eq!(at(&rest, &ideal), at(&rest, &lossy));
@@ -545,7 +545,7 @@ stages = [{ ratio = -30.0, stiffness = 500.0, damping = 2.0, input_inertia = 1e-
 "#;
     let source = Source::new("arm.toml", ARM);
     let driven = Driven::new(&source, &ModelOptions::default(), drives);
-    let inverse = driven.program(Function::Drive(InverseDynamics));
+    let inverse = driven.program(DrivenInverseDynamics);
     let forces = driven.program(Function::InverseDynamics);
     let names: Vec<&str> = inverse.inputs.iter().map(|p| p.name.as_str()).collect();
     assert_eq!(names, ["q", "qd", "qdd", "q3", "q4", "q5", "x"]);
@@ -588,8 +588,10 @@ stages = [{ ratio = -30.0, stiffness = 500.0, damping = 2.0, input_inertia = 1e-
         (x[4], x[5]) = (now(&theta_dot), now(&current));
         let stretch = theta_wrist / Dd::from(-30.0) - derivatives[0][2];
         x[7] = Dd::from(-30.0) * (derivatives[1][2] + (now(&tau[2]) - Dd::from(500.0) * stretch) / Dd::from(2.0));
-        let motion = driven
-            .run(ForwardDynamics, &[("q", &derivatives[0]), ("qd", &derivatives[1]), ("x", &x), ("u", &answer[0])]);
+        let motion = driven.run(
+            DrivenForwardDynamics,
+            &[("q", &derivatives[0]), ("qd", &derivatives[1]), ("x", &x), ("u", &answer[0])],
+        );
         assert!(distance(&motion[0], &derivatives[2]) < 1e-23, "{:?} {:?}", motion[0], derivatives[2]);
         let expected = [now(&theta_dot.derivative()), now(&current.derivative())];
         assert!(distance(&motion[1][4..6], &expected) < 1e-22, "{:?} {expected:?}", &motion[1][4..6]);
@@ -620,7 +622,7 @@ fn drives_cost_little_beside_forward_dynamics() {
         let alone = flops(&plain, Function::ForwardDynamics);
         for (what, scene, most) in [("rigid", all("ratio = 100.0"), 115), ("elastic", all(elastic), 125)] {
             let driven = Driven { is_chosen: true, ..Driven::new(&source, &ModelOptions::default(), &scene) };
-            let with = flops(&driven, Function::Drive(ForwardDynamics));
+            let with = flops(&driven, DrivenForwardDynamics);
             println!("{robot}, {what}: {alone} -> {with}, {:+.1} %", 100.0 * (with as f64 / alone as f64 - 1.0));
             assert!(with * 100 <= alone * most, "{robot}, {what}: {alone} -> {with}");
         }
@@ -638,9 +640,9 @@ struct Simulated {
 impl Simulated {
     fn new(driven: &Driven) -> Simulated {
         Simulated {
-            forward: driven.program(Function::Drive(ForwardDynamics)),
-            power: driven.program(Function::Drive(Power)),
-            energies: [driven.program(Function::Drive(Energy)), driven.program(Function::Energy)],
+            forward: driven.program(DrivenForwardDynamics),
+            power: driven.program(DrivePower),
+            energies: [driven.program(DriveEnergy), driven.program(Function::Energy)],
             n: driven.robot.model.nv(),
         }
     }
@@ -786,7 +788,7 @@ stages = [{ ratio = 60.0, stiffness = 1e6, input_inertia = 1e-6 }]
 }
 
 /// The functions of the drives as a program of its own: bits of the results for bits of the inputs, one line per function.
-fn program_of(text: &str, functions: &[(DriveFunction, Graph)], inputs: &[(&str, &[f64])], scalar: Scalar) -> String {
+fn program_of(text: &str, functions: &[(Function, Graph)], inputs: &[(&str, &[f64])], scalar: Scalar) -> String {
     let (real, word) = match scalar {
         Scalar::F64 => ("f64", "u64"),
         Scalar::F32 => ("f32", "u32"),
@@ -808,7 +810,7 @@ fn program_of(text: &str, functions: &[(DriveFunction, Graph)], inputs: &[(&str,
             let zero = port.shape.iter().rev().fold("0.0".to_string(), |inner, n| format!("[{inner}; {n}]"));
             let _ = writeln!(calls, "    let mut y{k} = {zero};");
         }
-        let _ = writeln!(calls, "    robot::{}({});", Function::Drive(*function).name(), arguments.join(", "));
+        let _ = writeln!(calls, "    robot::{}({});", function.name(), arguments.join(", "));
         let shown: String = (0..graph.outputs.len()).map(|k| format!("y{k}.show(); ")).collect();
         let _ = writeln!(calls, "    {shown}println!();");
     }
@@ -824,19 +826,23 @@ fn rustc_makes_of_drives_what_the_interpreter_and_the_runtime_say() {
     let source = Source::new("arm.toml", ARM);
     let limited = EVERYTHING.replace("[[drive]]", "[[drive]]\nlimits = { input = 9.0, current = 6.0 }");
     let model = Driven::new(&source, &ModelOptions::default(), &limited);
-    let functions = [ForwardDynamics, InverseDynamics, Torques, CompleteModel, StateSpace, Power, Energy];
+    let functions = [
+        DrivenForwardDynamics,
+        DrivenInverseDynamics,
+        DriveTorques,
+        CompleteModel,
+        StateSpace,
+        DrivePower,
+        DriveEnergy,
+    ];
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("driven");
     std::fs::create_dir_all(&folder).expect("a folder of the tests");
     for scalar in [Scalar::F64, Scalar::F32] {
-        let options = Options {
-            functions: functions.map(Function::Drive).to_vec(),
-            scene: model.scene.clone(),
-            scalar,
-            ..Options::default()
-        };
+        let options =
+            Options { functions: functions.to_vec(), scene: model.scene.clone(), scalar, ..Options::default() };
         let generated = compile(&source, &options).unwrap_or_else(|d| panic!("{}", d.render()));
         let robot = Robot::new(generated.model.clone());
-        let graphs = functions.map(|f| (f, program(&robot, &[], Function::Drive(f), &options).graph));
+        let graphs = functions.map(|f| (f, program(&robot, &[], f, &options).graph));
         let mut random = Random(31);
         let rounded = |x: &[Dd]| x.iter().map(|x| f64::from(x.to_f64() as f32)).collect::<Vec<f64>>();
         let [q, qd, x, u] = state(&mut random).map(|x| rounded(&x));
@@ -871,7 +877,7 @@ fn rustc_makes_of_drives_what_the_interpreter_and_the_runtime_say() {
                 }
             };
             assert_eq!(compiled, interpreted, "{function:?}, {scalar:?}");
-            if *function != ForwardDynamics {
+            if *function != DrivenForwardDynamics {
                 continue;
             }
             // the generic runtime, which knows nothing of reduced forms

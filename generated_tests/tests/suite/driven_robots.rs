@@ -4,9 +4,9 @@
 use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::equations::Robot;
-use straightline_codegen::function::DriveFunction::{self, CompleteModel, ForwardDynamics, Torques};
 use straightline_codegen::options::Options;
 use straightline_codegen::program::program;
+use straightline_codegen::Function::{CompleteModel, DriveTorques, DrivenForwardDynamics};
 use straightline_codegen::{scene, Function};
 use straightline_core::algorithms as alg;
 use straightline_core::model::Model;
@@ -28,11 +28,11 @@ fn compiled(scene_text: &str) -> (Options, Robot) {
 fn compare(
     (options, robot): &(Options, Robot),
     inputs: &[(&str, &[f64])],
-    compiled: &[(DriveFunction, Vec<f64>)],
+    compiled: &[(Function, Vec<f64>)],
     what: &str,
 ) {
     for (function, values) in compiled {
-        let graph = program(robot, &[], Function::Drive(*function), options).graph;
+        let graph = program(robot, &[], function, options).graph;
         assert_eq!(*values, blocks::<f64>(&graph, inputs).concat(), "{what}, {function:?}, {inputs:?}");
     }
     let model: Model<f64> = robot.model.cast();
@@ -64,8 +64,8 @@ macro_rules! states_of {
             let (mut h, mut bias, mut d) = ([[0.0; $arm::NV]; $arm::NV], [0.0; $arm::NV], [[0.0; $arm::NU]; $arm::NV]);
             $arm::complete_model(&q, &qd, &x, &mut h, &mut bias, &mut d);
             let found = [
-                (ForwardDynamics, [&qdd[..], &xd].concat()),
-                (Torques, [tau, m].concat()),
+                (DrivenForwardDynamics, [&qdd[..], &xd].concat()),
+                (DriveTorques, [tau, m].concat()),
                 (CompleteModel, [&h.concat()[..], &bias, &d.concat()].concat()),
             ];
             let inputs: [(&str, &[f64]); 4] = [("q", &q), ("qd", &qd), ("x", &x), ("u", &u)];

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 use std::fmt::Write;
-use straightline_codegen::function::DriveFunction::{
-    self, CompleteModel, ForwardDynamics, InverseDynamics, StateSpace, Torques,
+use straightline_codegen::Function::{
+    CompleteModel, DriveTorques, DrivenForwardDynamics, DrivenInverseDynamics, StateSpace,
 };
 use straightline_core::Dd;
 use straightline_generated_tests::bounds::DRIVE;
@@ -110,10 +110,10 @@ fn dc_motors_are_those_of_the_reference() {
             };
             let at: &[(&str, &[f64])] = &[("q", &q), ("qd", &qd), ("x", &x), ("u", &u)];
             let expected = &case["expected"][key];
-            let motion = driven.run(ForwardDynamics, at);
+            let motion = driven.run(DrivenForwardDynamics, at);
             worst.note(&format!("{key} qdd"), case, error(&motion[0], &expected["qdd"], 0.0));
             worst.note(&format!("{key} xd"), case, error(&motion[1], &expected["xd"], 0.0));
-            let torques = driven.run(Torques, at);
+            let torques = driven.run(DriveTorques, at);
             // a torque is what is left of the motor's and of what its rotor takes
             let of_motors = case["motors"].as_array().expect("motors").iter().enumerate().map(|(k, m)| {
                 let n = |key: &str| number(m, key);
@@ -137,9 +137,9 @@ fn dc_motors_are_those_of_the_reference() {
         worst.note("D", case, error(&diagonal, &star["D"], 0.0));
         assert!((0..n * n).all(|k| k % (n + 1) == 0 || model[2][k] == 0.0), "D is diagonal");
         let qdd = inputs(&star["qdd_given"]);
-        let u_given = driven.run(InverseDynamics, &[("q", &q), ("qd", &qd), ("qdd", &qdd)]);
+        let u_given = driven.run(DrivenInverseDynamics, &[("q", &q), ("qd", &qd), ("qdd", &qdd)]);
         worst.note("u for a motion", case, error(&u_given[0], &star["u_for_qdd_given"], 0.0));
-        let motion = driven.run(ForwardDynamics, &[("q", &q), ("qd", &qd), ("x", &x), ("u", &u)]);
+        let motion = driven.run(DrivenForwardDynamics, &[("q", &q), ("qd", &qd), ("x", &x), ("u", &u)]);
         worst.note("q̈ of (20.72)", case, error(&motion[0], &star["qdd"], 0.0));
     }
     worst.judge();
@@ -171,9 +171,9 @@ fn linear_actuators_are_those_of_the_reference() {
             Value::Null => case,
             expected => expected,
         };
-        let motion = driven.run(ForwardDynamics, at);
+        let motion = driven.run(DrivenForwardDynamics, at);
         worst.note("xd", case, error(&motion[1], &expected["xd"], 0.0));
-        let torques = driven.run(Torques, at);
+        let torques = driven.run(DriveTorques, at);
         worst.note("tau", case, error(&torques[0], &expected["tau"], 0.0));
         let space = driven.run(StateSpace, at);
         worst.note("Ĉ", case, error(&space[0], &expected["C_hat"], 0.0));
@@ -225,11 +225,11 @@ fn elastic_transmissions_are_those_of_the_reference() {
         let least = |key: &str| {
             tau_scale / largest * numbers(&expected[key]).iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max)
         };
-        let motion = driven.run(ForwardDynamics, at);
+        let motion = driven.run(DrivenForwardDynamics, at);
         worst.note("qdd", case, error(&motion[0], &expected["qdd"], least("qdd")));
         let thetadd: Vec<f64> = motion[1].chunks(2).map(|x| x[1]).collect();
         worst.note("thetadd", case, error(&thetadd, &expected["thetadd"], least("thetadd")));
-        let torques = driven.run(Torques, at);
+        let torques = driven.run(DriveTorques, at);
         worst.note("tau", case, error(&torques[0], &expected["tau"], tau_scale));
         worst.note("M", case, error(&torques[1], &expected["M"], least("M")));
     }
@@ -241,5 +241,5 @@ fn a_robot_without_drives_has_no_function_of_drives() {
     let driven = Driven::of_reference("planar2r", &serde_json::json!(["0", "0", "-9.81"]), "");
     use straightline_codegen::Function;
     assert!(Function::of(&driven.robot.model).eq(Function::all()));
-    assert!(Function::known().any(|f| f == Function::Drive(DriveFunction::Energy)));
+    assert!(Function::known().any(|f| f == Function::DriveEnergy));
 }

@@ -1,9 +1,9 @@
 //! The equations of a contact mode, over any scalar.
 
 use super::{ridge, Closed, Mode};
-use crate::choices::ForwardDynamicsMethod;
 use crate::equations::bind::Bound;
 use crate::equations::Robot;
+use crate::function::ForwardDynamicsMethod;
 use crate::function::{ContactFunction, Function};
 use crate::options::Options;
 use crate::scene::contact::{tool_axes, SurfaceItem};
@@ -80,10 +80,7 @@ pub(super) fn system<T: Real>(
 /// A function of the robot over these arguments, by its reduced form where it has one.
 fn of_robot<T: Real>(bound: &Bound<T>, reduced: bool, function: Function, arguments: &[Vec<T>]) -> Vec<T> {
     let method = ForwardDynamicsMethod::Factorisation;
-    let Bound { model, reduced: for_torques, composite, .. } = bound;
-    let by_reduced =
-        reduced.then(|| function.evaluate_reduced(model, for_torques, composite, method, arguments)).flatten();
-    by_reduced.unwrap_or_else(|| function.evaluate(model, &[], method, arguments))
+    function.evaluate_on(&bound.forms(reduced, &[], method), arguments)
 }
 
 /// The results of a function, one list per output.

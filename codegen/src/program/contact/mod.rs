@@ -6,10 +6,10 @@
 
 mod equations;
 
-use crate::choices::ForwardDynamicsMethod;
 use crate::equations::bind::{is_optional, Bound};
 use crate::equations::Robot;
-use crate::function::{ContactFunction, DriveFunction, Function};
+use crate::function::ForwardDynamicsMethod;
+use crate::function::{ContactFunction, Function};
 use crate::identifier::module_name;
 use crate::options::{Forms, Optimisations, Options};
 use crate::program::choose::choose;
@@ -339,7 +339,7 @@ pub(crate) fn system_ports(robot: &Robot, options: &Options, mode: &Mode) -> Vec
 fn base_function(function: ContactFunction) -> Function {
     match function {
         ContactFunction::ForwardDynamics => Function::ForwardDynamics,
-        ContactFunction::DrivenForwardDynamics => Function::Drive(DriveFunction::ForwardDynamics),
+        ContactFunction::DrivenForwardDynamics => Function::DrivenForwardDynamics,
         ContactFunction::InverseDynamics => Function::InverseDynamics,
         _ => Function::BiasForce,
     }

@@ -2,10 +2,11 @@
 //! is. Right is what the generic runtime says at states of its own, and a bound is one that nothing exceeds there.
 
 use super::{inputs, of_function, plain_results, sabotage, Disagreement, State, States, ROUNDINGS};
-use crate::choices::{ForwardDynamicsMethod, LimbForm};
+use crate::choices::LimbForm;
 use crate::diagnostic::{Diagnostics, Source};
 use crate::equations::bind::constructed;
 use crate::equations::Robot;
+use crate::function::ForwardDynamicsMethod;
 use crate::function::{ContactFunction, Function};
 use crate::model::{load, ModelOptions};
 use crate::options::optimisations::FOLDING;

@@ -17,7 +17,7 @@ mod template;
 use crate::choices::LimbForm;
 use crate::equations::bind::is_optional;
 use crate::equations::Robot;
-use crate::function::Function;
+use crate::function::{Function, InLanes};
 use crate::model::limbs::{limbs, Limbs};
 use crate::options::{Optimisations, Options};
 use crate::program::choose::choose;
@@ -37,21 +37,16 @@ impl LimbForm {
     /// joints, except for gravity forces, which have few operations and take as long either way
     /// (`generated_tests/record/2026-11-21-limbs.md`).
     pub fn of<T>(self, model: &Model<T>, function: Function) -> Vec<Limbs> {
-        let mut found = if serves(function) { limbs(model) } else { Vec::new() };
+        let in_lanes = function.spec().in_lanes;
+        let mut found = if in_lanes == InLanes::Never { Vec::new() } else { limbs(model) };
         match self {
             LimbForm::Apart => found.clear(),
             LimbForm::Lanes => {}
-            LimbForm::Auto if function == Function::GravityForce => found.clear(),
+            LimbForm::Auto if in_lanes == InLanes::WhereAsked => found.clear(),
             LimbForm::Auto => found.retain(|l| l.bodies.len() >= LANES_PAY && l.bodies[0].len() >= JOINTS_PAY),
         }
         found
     }
-}
-
-/// Whether limbs add to this function nothing but a wrench on the body that carries them, and forces on their own joints.
-pub fn serves(function: Function) -> bool {
-    use Function::{BiasForce, GravityForce, InverseDynamics, VelocityForce};
-    matches!(function, InverseDynamics | GravityForce | BiasForce | VelocityForce)
 }
 
 /// The program of a function with limbs as lanes; `None` where no limbs are to be.

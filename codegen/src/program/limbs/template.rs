@@ -1,10 +1,11 @@
 //! One limb traced for all of its kind.
 
 use crate::equations::bind::Bound;
-use crate::equations::{self, Robot};
-use crate::function::Function;
+use crate::equations::Robot;
+use crate::function::{Forms, ForwardDynamicsMethod, Function, LimbSums};
 use crate::model::limbs::Limbs;
 use crate::scene::Scene;
+use std::cell::RefCell;
 use straightline_core::model::{Body, BodyId, Coulomb, JointEffects, Model};
 use straightline_core::reduced::{ReducedBody, ReducedModel};
 use straightline_core::spatial::{ForceVector, Mat3, Sym3, Vec3};
@@ -280,9 +281,12 @@ impl Folded {
             let mass = masses.reduce(|sum, m| sum + m).expect("a limb has bodies");
             Some((vector(kind, 0, first_moment()), mass))
         };
-        let mut of_all = equations::Limbs { wrench: &mut wrench, first_moment: &mut first_moment };
-        let forces = function.reduced_forces(&self.model, &self.reduced, &self.arguments, &mut of_all);
-        (forces.expect("functions that limbs serve have a reduced form"), passed_on.take())
+        let forms = Forms {
+            reduced: Some([&self.reduced, &self.reduced]),
+            limbs: Some(RefCell::new(LimbSums { wrench: &mut wrench, first_moment: &mut first_moment })),
+            ..Forms::plain(&self.model, &[], ForwardDynamicsMethod::default())
+        };
+        (function.evaluate_on(&forms, &self.arguments), passed_on.take())
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::outcome::{Outcome, Size};
 use straightline_codegen::expr::{evaluate, Graph};
-use straightline_codegen::function::DriveFunction::{Energy, ForwardDynamics, InverseDynamics};
 use straightline_codegen::model::ModelOptions;
+use straightline_codegen::Function::{DriveEnergy, DrivenForwardDynamics, DrivenInverseDynamics};
 use straightline_codegen::{Function, Source};
 use straightline_core::integrate::{Compensated, State, Step};
 use straightline_core::Dd;
@@ -44,7 +44,7 @@ fn wide(x: &[f64]) -> Vec<Dd> {
 
 /// q̈ and ẋ under voltages against the same equations in double-double.
 fn motion(driven: &Driven, states: usize, strain: f64, ratio: f64) -> [f64; 2] {
-    let program = driven.program(Function::Drive(ForwardDynamics));
+    let program = driven.program(DrivenForwardDynamics);
     let width = |name: &str| program.inputs.iter().find(|p| p.name == name).map_or(0, |p| p.len());
     let mut random = Random(2);
     let mut worst = [0.0f64; 2];
@@ -72,7 +72,7 @@ fn motion(driven: &Driven, states: usize, strain: f64, ratio: f64) -> [f64; 2] {
 
 /// q̈ → voltages → q̈ of rigid drives, over the greatest q̈.
 fn back(driven: &Driven, states: usize) -> f64 {
-    let programs = [InverseDynamics, ForwardDynamics].map(|f| driven.program(Function::Drive(f)));
+    let programs = [DrivenInverseDynamics, DrivenForwardDynamics].map(|f| driven.program(f));
     let width = programs[1].inputs.iter().find(|p| p.name == "x").map_or(0, |p| p.len());
     let mut random = Random(1);
     let mut worst = 0.0f64;
@@ -127,7 +127,7 @@ fn swinging(steps: usize) -> Vec<Outcome> {
     let scene = drives("", "stages = [{ ratio = 100.0, stiffness = 100.0, input_inertia = 9e-5 }]")
         .replace("torque_constant = 0.05", "torque_constant = 1e-12");
     let driven = driven(&scene);
-    let [forward, of_drives] = [ForwardDynamics, Energy].map(|f| driven.program(Function::Drive(f)));
+    let [forward, of_drives] = [DrivenForwardDynamics, DriveEnergy].map(|f| driven.program(f));
     let of_bodies = driven.program(Function::Energy);
     // coordinates: joints, then shafts; x holds a shaft's angle and speed per drive
     let x_of = |q: &[f64; 4], qd: &[f64; 4]| [q[2], qd[2], q[3], qd[3]];

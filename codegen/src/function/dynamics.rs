@@ -1,0 +1,164 @@
+//! Forces to motion and motion to forces: inverse and forward dynamics, and what they are made of.
+
+use super::spec::Extent::{Joints, Of, Velocities};
+use super::spec::{Divisor, Form, InLanes, Judged, Output, Parts, RobotFunction, Spec};
+use super::{Forms, ForwardDynamicsMethod, Quantity};
+use straightline_core::algorithms as alg;
+use straightline_core::spatial::Vec3;
+use straightline_core::Real;
+
+/// Inverse dynamics τ = H(q) q̈ + h(q, q̇): the drives that a motion takes.
+pub struct InverseDynamics;
+
+impl RobotFunction for InverseDynamics {
+    const SPEC: Spec = Spec {
+        name: "inverse_dynamics",
+        summary: "Inverse dynamics τ = H(q) q̈ + h(q, q̇): the drives that a motion takes.",
+        aliases: &["RNEA", "ID", "Newton-Euler", "computed torque"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration],
+        outputs: &[Output::new("tau", &[Velocities], "generalized forces \\[N·m or N\\]")],
+        form: Form::InverseDynamics,
+        in_lanes: InLanes::WhereFaster,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        forms.inverse_dynamics(&inputs[0], &inputs[1], &inputs[2])
+    }
+}
+
+/// Gravity forces g(q): the drives that hold the robot still.
+pub struct GravityForce;
+
+impl RobotFunction for GravityForce {
+    const SPEC: Spec = Spec {
+        name: "gravity_force",
+        summary: "Gravity forces g(q): the drives that hold the robot still.",
+        aliases: &["gravity compensation", "generalized gravity"],
+        inputs: &[Quantity::Configuration],
+        outputs: &[Output::new("g", &[Velocities], "generalized forces \\[N·m or N\\]")],
+        form: Form::BiasForce,
+        in_lanes: InLanes::WhereAsked,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        forms.gravity_force(&inputs[0])
+    }
+}
+
+/// Bias forces h(q, q̇): Coriolis, centrifugal and gravity forces.
+pub struct BiasForce;
+
+impl RobotFunction for BiasForce {
+    const SPEC: Spec = Spec {
+        name: "bias_force",
+        summary: "Bias forces h(q, q̇): Coriolis, centrifugal and gravity forces.",
+        aliases: &["nonlinear effects", "NLE", "Coriolis"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity],
+        outputs: &[Output::new("h", &[Velocities], "generalized forces \\[N·m or N\\]")],
+        form: Form::BiasForce,
+        in_lanes: InLanes::WhereFaster,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        forms.bias_force(&inputs[0], &inputs[1])
+    }
+}
+
+/// Velocity forces C(q, q̇) q̇: Coriolis and centrifugal forces, without gravity.
+pub struct VelocityForce;
+
+impl RobotFunction for VelocityForce {
+    const SPEC: Spec = Spec {
+        name: "velocity_force",
+        summary: "Velocity forces C(q, q̇) q̇: Coriolis and centrifugal forces, without gravity.",
+        aliases: &["Coriolis", "centrifugal"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity],
+        outputs: &[Output::new("c", &[Velocities], "generalized forces \\[N·m or N\\]")],
+        form: Form::BiasForce,
+        in_lanes: InLanes::WhereFaster,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        forms.velocity_force(&inputs[0], &inputs[1])
+    }
+}
+
+/// The mass matrix H(q), symmetric.
+pub struct MassMatrix;
+
+impl RobotFunction for MassMatrix {
+    const SPEC: Spec = Spec {
+        name: "mass_matrix",
+        summary: "The mass matrix H(q), symmetric.",
+        aliases: &["CRBA", "inertia matrix", "joint space inertia", "JSIM"],
+        inputs: &[Quantity::Configuration],
+        outputs: &[Output::new("h", &[Velocities, Velocities], "rows of H, both triangles \\[kg·m², kg·m, kg\\]")
+            .of_parts(Parts::Diagonal)],
+        form: Form::MassMatrix,
+        gains_by_substitutes: true,
+        judged: Judged::ByInertias,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        forms.mass_matrix(&inputs[0])
+    }
+}
+
+/// Forward dynamics q̈ = H(q)⁻¹ (τ − h(q, q̇)): the motion that drives make.
+pub struct ForwardDynamics;
+
+impl RobotFunction for ForwardDynamics {
+    const SPEC: Spec = Spec {
+        name: "forward_dynamics",
+        summary: "Forward dynamics q̈ = H(q)⁻¹ (τ − h(q, q̇)): the motion that drives make.",
+        aliases: &["ABA", "FD", "articulated body"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Force],
+        outputs: &[Output::new("qdd", &[Velocities], "accelerations \\[rad/s² or m/s²\\]")],
+        form: Form::Motion,
+        solves: true,
+        gains_by_substitutes: true,
+        keeps_order: true,
+        divisor: Divisor::Inertia,
+        judged: Judged::ByResidual,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let (q, bias) = (&inputs[0], forms.bias_force(&inputs[0], &inputs[1]));
+        let net: Vec<T> = inputs[2].iter().zip(&bias).map(|(tau, h)| *tau - *h).collect();
+        match forms.method {
+            ForwardDynamicsMethod::Factorisation => alg::Ltdl::factor(forms.model, &forms.mass_matrix(q)).solve(&net),
+            _ => alg::solve_articulated(forms.model, q, &net),
+        }
+    }
+}
+
+/// Forces and moments that each joint carries, drive included.
+pub struct JointWrenches;
+
+impl RobotFunction for JointWrenches {
+    const SPEC: Spec = Spec {
+        name: "joint_wrenches",
+        summary: "Forces and moments that each joint carries, drive included.",
+        aliases: &["constraint forces", "joint reactions"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration],
+        outputs: &[Output::new(
+            "w",
+            &[Joints, Of(6)],
+            "per joint, in the order of qd: force \\[N\\] (3), moment about the joint's origin \\[N·m\\] (3), \
+from parent to child, in the child link's axes",
+        )
+        .of_parts(Parts::LinearAngular)],
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let wrenches = alg::joint_wrenches(forms.model, &inputs[0], &inputs[1], &inputs[2]).into_iter();
+        wrenches.flat_map(|w| [w.force, w.moment]).flat_map(Vec3::to_array).collect()
+    }
+}

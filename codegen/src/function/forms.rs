@@ -1,0 +1,109 @@
+//! A robot in the forms that functions are evaluated on: its own parameters, and reduced ones that take fewer operations.
+
+use std::cell::RefCell;
+use straightline_core::algorithms as alg;
+use straightline_core::model::{Frame, Model};
+use straightline_core::reduced::ReducedModel;
+use straightline_core::spatial::Vec3;
+use straightline_core::Real;
+
+/// How forward dynamics is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ForwardDynamicsMethod {
+    /// Whichever takes fewer operations for this robot, unless it loses digits that the other keeps.
+    #[default]
+    Cheaper,
+    /// The bias force, then articulated bodies.
+    ArticulatedBody,
+    /// The bias force, the mass matrix, and its branch-sparse LᵀDL factor.
+    Factorisation,
+}
+
+/// A robot as functions see it.
+pub struct Forms<'a, T> {
+    /// As the robot file has it.
+    pub model: &'a Model<T>,
+    /// The reduced robot for torques and the one for the mass matrix; `None`: everything by the model.
+    pub reduced: Option<[&'a ReducedModel<T>; 2]>,
+    /// The frames that are asked for.
+    pub frames: &'a [&'a Frame<T>],
+    /// How forward dynamics is computed.
+    pub method: ForwardDynamicsMethod,
+    /// Limbs in lanes, of the reduced robot.
+    pub limbs: Option<RefCell<LimbSums<'a, T>>>,
+}
+
+/// What the bodies that stand for several limbs each pass on to those that carry them, all limbs together: see
+/// [`alg::reduced_inverse_dynamics_with_limbs`] and [`alg::reduced_gravity_force_with_limbs`].
+pub struct LimbSums<'a, T> {
+    /// Force and moment.
+    pub wrench: &'a mut alg::LimbWrenches<'a, T>,
+    /// First moment and mass.
+    pub first_moment: &'a mut alg::LimbMoments<'a, T>,
+}
+
+impl<'a, T: Real> Forms<'a, T> {
+    /// By the model alone.
+    pub fn plain(model: &'a Model<T>, frames: &'a [&'a Frame<T>], method: ForwardDynamicsMethod) -> Self {
+        Forms { model, reduced: None, frames, method, limbs: None }
+    }
+
+    fn with_limbs<R>(&self, f: impl FnOnce(&mut LimbSums<'_, T>) -> R) -> R {
+        match &self.limbs {
+            Some(limbs) => f(&mut limbs.borrow_mut()),
+            None => f(&mut LimbSums { wrench: &mut |_, _| None, first_moment: &mut |_, _| None }),
+        }
+    }
+
+    /// τ = H q̈ + h.
+    pub fn inverse_dynamics(&self, q: &[T], qd: &[T], qdd: &[T]) -> Vec<T> {
+        let Some([torques, _]) = self.reduced else { return alg::inverse_dynamics(self.model, q, qd, qdd) };
+        let rigid = self.with_limbs(|l| alg::reduced_inverse_dynamics_with_limbs(torques, [q, qd, qdd], l.wrench));
+        let passive = alg::passive_force(self.model, q, qd);
+        let rotors = alg::rotor_inertias(self.model).into_iter().zip(qdd).map(|(i, qdd)| i * *qdd);
+        rigid.into_iter().zip(rotors.zip(passive)).map(|(f, (r, p))| f + (r + p)).collect()
+    }
+
+    /// g(q).
+    pub fn gravity_force(&self, q: &[T]) -> Vec<T> {
+        match self.reduced {
+            Some([torques, _]) => {
+                self.with_limbs(|l| alg::reduced_gravity_force_with_limbs(torques, q, l.first_moment))
+            }
+            None => alg::gravity_force(self.model, q),
+        }
+    }
+
+    /// h(q, q̇).
+    pub fn bias_force(&self, q: &[T], qd: &[T]) -> Vec<T> {
+        let Some([torques, _]) = self.reduced else { return alg::bias_force(self.model, q, qd) };
+        let motion = [q, qd, &self.rest()];
+        let rigid = self.with_limbs(|l| alg::reduced_inverse_dynamics_with_limbs(torques, motion, l.wrench));
+        let passive = alg::passive_force(self.model, q, qd);
+        rigid.into_iter().zip(passive).map(|(f, p)| f + p).collect()
+    }
+
+    /// C(q, q̇) q̇.
+    pub fn velocity_force(&self, q: &[T], qd: &[T]) -> Vec<T> {
+        let Some([torques, _]) = self.reduced else { return alg::velocity_force(self.model, q, qd) };
+        let weightless = ReducedModel { gravity: Vec3::zero(), ..torques.clone() };
+        let motion = [q, qd, &self.rest()];
+        self.with_limbs(|l| alg::reduced_inverse_dynamics_with_limbs(&weightless, motion, l.wrench))
+    }
+
+    /// H(q), by rows.
+    pub fn mass_matrix(&self, q: &[T]) -> Vec<T> {
+        let Some([_, composite]) = self.reduced else { return alg::mass_matrix(self.model, q) };
+        let mut h = alg::reduced_mass_matrix(composite, q);
+        let nv = self.model.nv();
+        for (i, rotor) in alg::rotor_inertias(self.model).into_iter().enumerate() {
+            h[i * nv + i] = h[i * nv + i] + rotor;
+        }
+        h
+    }
+
+    /// q̇ = 0 or q̈ = 0.
+    pub fn rest(&self) -> Vec<T> {
+        vec![T::zero(); self.model.nv()]
+    }
+}

@@ -1,0 +1,132 @@
+//! What functions take: one row per quantity, with its name in generated code, its length and what is said of it.
+
+use super::spec::Extent;
+use straightline_core::algorithms::MOST_DERIVATIVES;
+use straightline_core::model::Model;
+use straightline_core::Real;
+use straightline_graph::expr::Port;
+
+/// A quantity that functions take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Quantity {
+    /// The configuration q.
+    Configuration,
+    /// The velocities q̇.
+    Velocity,
+    /// The accelerations q̈.
+    Acceleration,
+    /// The generalized forces τ.
+    Force,
+    /// The state of the drives.
+    DriveState,
+    /// The inputs of the drives.
+    DriveInput,
+    /// The acceleration due to gravity, where a scene makes it an input.
+    Gravity,
+    /// The third or a further derivative of q.
+    HigherRate(usize),
+}
+
+use Quantity::*;
+
+/// Name, extent, documentation.
+const TABLE: &[(Quantity, &str, Extent, &str)] = &[
+    (Configuration, "q", Extent::Positions, "configuration \\[rad or m\\]"),
+    (Velocity, "qd", Extent::Velocities, "velocities \\[rad/s or m/s\\]"),
+    (Acceleration, "qdd", Extent::Velocities, "accelerations \\[rad/s² or m/s²\\]"),
+    (Force, "tau", Extent::Velocities, "generalized forces \\[N·m or N\\]"),
+    (
+        DriveState,
+        "x",
+        Extent::DriveStates,
+        "state of the drives, [`DRIVE_STATES`] of each: θ \\[rad\\], θ̇ \\[rad/s\\] and current \\[A\\] of a motor (without \
+         inductance no current; θ and θ̇ are read behind elastic transmissions only), a linear actuator's own; then angle \
+         and speed of shafts between elastic stages",
+    ),
+    (
+        DriveInput,
+        "u",
+        Extent::Drives,
+        "inputs of the drives, in the order of [`DRIVE_NAMES`] \\[V, or as in the robot file\\]",
+    ),
+    (Gravity, "gravity", Extent::Of(3), "acceleration due to gravity in the world \\[m/s²\\]"),
+];
+
+impl Quantity {
+    /// The quantity of that name; `None` of a scene's parameters, of contacts and of the stored values of stages.
+    pub fn named(name: &str) -> Option<Quantity> {
+        let rate = || {
+            let order = name.strip_prefix('q')?.parse().ok()?;
+            let rate = HigherRate(order);
+            (name == rate.name() && (3..=MOST_DERIVATIVES + 2).contains(&order)).then_some(rate)
+        };
+        TABLE.iter().find(|row| row.1 == name).map(|row| row.0).or_else(rate)
+    }
+
+    /// That of an input.
+    pub fn of(port: &Port) -> Option<Quantity> {
+        Quantity::named(&port.name)
+    }
+
+    fn row(self) -> Option<&'static (Quantity, &'static str, Extent, &'static str)> {
+        TABLE.iter().find(|row| row.0 == self)
+    }
+
+    /// Its name in generated code: `q`, `qd`, …, `q3` of the third derivative.
+    pub fn name(self) -> String {
+        match self {
+            HigherRate(order) => format!("q{order}"),
+            _ => self.row().expect("the table has every other quantity").1.to_string(),
+        }
+    }
+
+    /// What it is, with its unit.
+    pub fn doc(self) -> String {
+        const WORDS: [&str; 7] = ["third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth"];
+        let HigherRate(order) = self else {
+            return self.row().expect("the table has every other quantity").3.to_string();
+        };
+        let word = WORDS.get(order - 3).map_or_else(|| format!("{order}th"), |word| word.to_string());
+        let digit =
+            |d: char| d.to_digit(10).map_or(d, |d| ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][d as usize]);
+        let power: String = order.to_string().chars().map(digit).collect();
+        format!("{word} derivatives \\[rad/s{power} or m/s{power}\\]")
+    }
+
+    /// How many scalars it has.
+    pub fn len<T: Real>(self, model: &Model<T>) -> usize {
+        let extent = self.row().map_or(Extent::Velocities, |row| row.2);
+        extent.len(model, 0)
+    }
+
+    /// As an input.
+    pub fn port<T: Real>(self, model: &Model<T>) -> Port {
+        Port::new(&self.name(), &[self.len(model)])
+    }
+
+    /// Which derivative of q it is; `None` if it is none, or q itself.
+    pub fn rate(self) -> Option<usize> {
+        match self {
+            Velocity => Some(1),
+            Acceleration => Some(2),
+            HigherRate(order) => Some(order),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_quantity_is_found_by_its_name() {
+        for quantity in TABLE.iter().map(|row| row.0).chain([HigherRate(3), HigherRate(MOST_DERIVATIVES + 2)]) {
+            assert_eq!(Quantity::named(&quantity.name()), Some(quantity));
+        }
+        for name in ["q2", "q03", "q", "payload", "", &format!("q{}", MOST_DERIVATIVES + 3)] {
+            assert!(Quantity::named(name).is_none_or(|q| q == Configuration), "{name}");
+        }
+        assert_eq!(HigherRate(12).doc(), "12th derivatives \\[rad/s¹² or m/s¹²\\]");
+    }
+}

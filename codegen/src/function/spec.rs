@@ -1,0 +1,219 @@
+//! The row of a function: what a user reads of it, the axes of its inputs and results, and what the compiler asks.
+
+use super::{Forms, Function, Quantity};
+use straightline_core::algorithms::drive_states;
+use straightline_core::model::Model;
+use straightline_core::Real;
+
+/// What an axis of an array counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// Position coordinates.
+    Positions,
+    /// Velocity coordinates.
+    Velocities,
+    /// Joints, in the order of their velocity coordinates.
+    Joints,
+    /// Frames that are asked for.
+    Frames,
+    /// The states of all drives.
+    DriveStates,
+    /// Drives.
+    Drives,
+    /// So many, whatever the robot.
+    Of(usize),
+}
+
+impl Extent {
+    /// How many there are for a robot and so many frames.
+    pub fn len<T: Real>(self, model: &Model<T>, frames: usize) -> usize {
+        match self {
+            Extent::Positions => model.nq(),
+            Extent::Velocities => model.nv(),
+            Extent::Joints => model.bodies.len(),
+            Extent::Frames => frames,
+            Extent::DriveStates => drive_states(model),
+            Extent::Drives => model.drives.len(),
+            Extent::Of(n) => n,
+        }
+    }
+}
+
+/// The parts that can be asked for of a block of results.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parts {
+    /// None.
+    No,
+    /// The last axis of fixed length has three linear entries, then angular ones.
+    LinearAngular,
+    /// The diagonal.
+    Diagonal,
+}
+
+/// A block of results.
+#[derive(Clone, Copy, Debug)]
+pub struct Output {
+    /// Its name in generated code.
+    pub name: &'static str,
+    /// What it is, with its unit.
+    pub doc: &'static str,
+    /// Its axes, the outermost first.
+    pub axes: &'static [Extent],
+    /// What can be asked for of it.
+    pub parts: Parts,
+}
+
+impl Output {
+    /// A block that is wanted as a whole.
+    pub(super) const fn new(name: &'static str, axes: &'static [Extent], doc: &'static str) -> Output {
+        Output { name, doc, axes, parts: Parts::No }
+    }
+
+    /// One that can be asked for in parts.
+    pub(super) const fn of_parts(self, parts: Parts) -> Output {
+        Output { parts, ..self }
+    }
+
+    /// Whether it is a matrix whose columns belong to velocity coordinates.
+    pub fn is_by_columns(&self) -> bool {
+        self.axes.len() > 1 && self.axes.last() == Some(&Extent::Velocities)
+    }
+}
+
+/// Which robots have a function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// All.
+    Robot,
+    /// All, but it is made for who names it only: several functions in one, which share what they have in common.
+    Combination,
+    /// Those with drives.
+    Drives,
+}
+
+/// What the reduced robot is to a function, by what a search for the best form counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// It does not serve.
+    Plain,
+    /// The torques of inverse dynamics.
+    InverseDynamics,
+    /// Bias forces.
+    BiasForce,
+    /// The mass matrix.
+    MassMatrix,
+    /// Bias forces and the mass matrix, each in its own form.
+    Both,
+    /// The motion that both make: whichever pair of forms takes the least.
+    Motion,
+}
+
+/// Whether identical limbs can be lanes of one body: they add a wrench on the body that carries them, and forces on their own joints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InLanes {
+    /// They cannot.
+    Never,
+    /// They can, and take as long either way (`generated_tests/record/2026-11-21-limbs.md`).
+    WhereAsked,
+    /// They can, and are faster where there are enough of them.
+    WhereFaster,
+}
+
+/// What a function divides by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Divisor {
+    /// Nothing of the robot.
+    Nothing,
+    /// The mass of the moving bodies.
+    Mass,
+    /// What joints feel of the links' inertia.
+    Inertia,
+    /// The same with that of drives.
+    InertiaWithDrives,
+}
+
+/// What the error of results is compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Judged {
+    /// The natural scale of the result.
+    ByScale,
+    /// Of a mass matrix: the inertias of its row and column.
+    ByInertias,
+    /// Of accelerations: what they leave of τ − H q̈ − h.
+    ByResidual,
+}
+
+/// Everything about a function but its equations.
+#[derive(Clone, Copy, Debug)]
+pub struct Spec {
+    /// Its name in generated code and on the command line.
+    pub name: &'static str,
+    /// What it computes, in a sentence.
+    pub summary: &'static str,
+    /// Names in use elsewhere for what it computes, or for the algorithm behind it.
+    pub aliases: &'static [&'static str],
+    /// What every robot's takes, in order.
+    pub inputs: &'static [Quantity],
+    /// Its results.
+    pub outputs: &'static [Output],
+    /// Which robots have it.
+    pub family: Family,
+    /// Whether it takes more than `inputs`, by robot.
+    pub inputs_depend: bool,
+    /// Functions that it combines, which share what they have in common.
+    pub members: &'static [Function],
+    /// What the reduced robot is to it.
+    pub form: Form,
+    /// Whether accelerations are solved for: the method of forward dynamics matters.
+    pub solves: bool,
+    /// Limbs in lanes.
+    pub in_lanes: InLanes,
+    /// Whether it gains by values formed of others that are there: torques gain an operation of two hundred.
+    pub gains_by_substitutes: bool,
+    /// Whether the order of its sums is left as it is: forward dynamics takes 6 to 9 % longer in another, and its digits go elsewhere.
+    pub keeps_order: bool,
+    /// What it divides by.
+    pub divisor: Divisor,
+    /// What its errors are compared with.
+    pub judged: Judged,
+}
+
+impl Spec {
+    /// What most functions are, to be completed.
+    pub const DEFAULT: Spec = Spec {
+        name: "",
+        summary: "",
+        aliases: &[],
+        inputs: &[],
+        outputs: &[],
+        family: Family::Robot,
+        inputs_depend: false,
+        members: &[],
+        form: Form::Plain,
+        solves: false,
+        in_lanes: InLanes::Never,
+        gains_by_substitutes: false,
+        keeps_order: false,
+        divisor: Divisor::Nothing,
+        judged: Judged::ByScale,
+    };
+}
+
+/// A function of the robot.
+pub trait RobotFunction {
+    /// Everything but its equations.
+    const SPEC: Spec;
+
+    /// Whether a robot has what it is about.
+    fn is_of<T: Real>(model: &Model<T>) -> bool {
+        Self::SPEC.family != Family::Drives || !model.drives.is_empty()
+    }
+
+    /// What a robot's takes beside [`Spec::inputs`].
+    fn further_inputs<T: Real>(_: &Model<T>) -> Vec<Quantity> {
+        Vec::new()
+    }
+
+    /// Its results, one block after the other, for inputs in order.
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T>;
+}
