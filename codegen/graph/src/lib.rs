@@ -9,7 +9,6 @@ mod number;
 pub mod certify;
 pub mod expr;
 pub mod pass;
-pub mod random;
 pub mod rounding;
 pub mod schedule;
 pub mod trace;

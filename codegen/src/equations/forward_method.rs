@@ -14,10 +14,10 @@ use crate::function::ForwardDynamicsMethod;
 use crate::model::states::{settle, values, SEED};
 use std::fmt;
 use straightline_core::model::Model;
+use straightline_core::random::Random;
 use straightline_core::{Dd, Real};
 use straightline_graph::expr::{evaluate, Graph, DIVISION};
 use straightline_graph::pass::count_sums;
-use straightline_graph::random::Random;
 use straightline_graph::Scalar;
 
 /// The factorisation may lose so many times what articulated bodies lose: about half a decimal digit, which is how far two

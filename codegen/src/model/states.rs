@@ -1,9 +1,9 @@
 //! States of a robot at which programs are tried.
 
 use straightline_core::model::{Joint, Model};
+use straightline_core::random::Random;
 use straightline_core::Dd;
 use straightline_graph::expr::{Graph, Port};
-use straightline_graph::random::Random;
 
 /// Of the numbers that states are made of.
 pub(crate) const SEED: u64 = 0x9e37_79b9_7f4a_7c15;

@@ -33,11 +33,11 @@ use std::fmt;
 use straightline_core::algorithms::Ltdl;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::model::{BodyId, Model};
+use straightline_core::random::Random;
 use straightline_core::spatial::{Sym3, Transform, Vec3};
 use straightline_core::{Dd, Real};
 use straightline_graph::expr::{evaluate, Binary, Grade, Graph, Op, Port};
 use straightline_graph::pass::cut::Staged;
-use straightline_graph::random::Random;
 use straightline_graph::{element_of, Scalar};
 
 pub(crate) use bounds::{of_acceleration_bound, of_bound};

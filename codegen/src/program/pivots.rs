@@ -27,10 +27,10 @@ use crate::program::input_box::input_box;
 use crate::scene::Scene;
 use straightline_core::algorithms::mass_matrix;
 use straightline_core::model::{Body, Model};
+use straightline_core::random::Random;
 use straightline_core::Dd;
 use straightline_graph::certify::{Analysis, Format, Interval, Known, Refusal};
 use straightline_graph::expr::{evaluate, Graph, NodeId, Port};
-use straightline_graph::random::Random;
 use straightline_graph::rounding::backwards;
 use straightline_graph::Scalar;
 

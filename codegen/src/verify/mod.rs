@@ -22,10 +22,10 @@ use crate::verify::reference_input::mass_centre_tree;
 use std::collections::BTreeMap;
 use straightline_core::joint::Measure;
 use straightline_core::model::Model;
+use straightline_core::random::Random;
 use straightline_core::reference::{self, MassCentreFrame, MassCentreTree};
 use straightline_core::{trig, Dd};
 use straightline_graph::expr::{evaluate, Graph};
-use straightline_graph::random::Random;
 use straightline_graph::schedule::Schedule;
 use straightline_graph::{element_of, Scalar};
 

@@ -32,15 +32,12 @@ const ROBOTS: [&str; 13] = [
     "ur5.urdf",
 ];
 
-/// SplitMix64.
+/// A source of numbers; its own number is the seed.
 struct Numbers(u64);
 
 impl Numbers {
     fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        straightline_core::random::split_mix_64(&mut self.0)
     }
 
     fn below(&mut self, n: usize) -> usize {

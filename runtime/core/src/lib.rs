@@ -26,6 +26,7 @@ pub mod magnitude;
 #[cfg(feature = "alloc")]
 pub mod model;
 pub mod phases;
+pub mod random;
 pub mod real;
 #[cfg(feature = "alloc")]
 pub mod reduced;

@@ -191,7 +191,7 @@ mod tests {
     use straightline_codegen::description;
     use straightline_codegen::diagnostic::{Diagnostics, Source};
     use straightline_codegen::model::{self, ModelOptions};
-    use straightline_graph::random::Random;
+    use straightline_core::random::Random;
 
     const ARM: &str = r#"
 [robot]

@@ -6,7 +6,7 @@
 use super::Interval;
 use crate::expr::{evaluate, Graph, NodeId, Op, Precision};
 use crate::number::Scalar;
-use crate::random::Random;
+use straightline_core::random::Random;
 use straightline_core::{Dd, Real};
 
 /// The worst that was found for one output scalar.

@@ -13,10 +13,10 @@ use super::analysis::Broken;
 use super::tape::{Registers, Tape, LANES};
 use super::{Analysis, Effort, Interval, Refusal};
 use crate::expr::NodeId;
-use crate::random::Random;
 use std::collections::BinaryHeap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
+use straightline_core::random::Random;
 
 /// A part of the box, and the bound of the error there.
 struct Part {

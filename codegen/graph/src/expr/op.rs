@@ -259,7 +259,7 @@ mod tests {
 
     #[test]
     fn ranges_hold_values_and_commuting_keeps_the_bits() {
-        let mut random = crate::random::Random(7);
+        let mut random = straightline_core::random::Random(7);
         for _ in 0..1000 {
             let mut any = || {
                 let (a, b) = (random.symmetric(3.0), random.symmetric(3.0));

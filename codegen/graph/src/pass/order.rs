@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn many_terms_and_all_signs_keep_their_sum() {
-        let mut random = crate::random::Random(5);
+        let mut random = straightline_core::random::Random(5);
         for n in 2..14 {
             let x: Vec<f64> = (0..n).map(|_| (random.unit() * 64.0).round() - 32.0).collect();
             let negative: Vec<bool> = (0..n).map(|k| k > 0 && random.unit() < 0.5).collect();

@@ -9,12 +9,12 @@ use super::{inputs, Disagreement, State, States, STATES};
 use crate::equations::Robot;
 use crate::options::Options;
 use std::collections::BTreeMap;
+use straightline_core::random::Random;
 use straightline_core::Dd;
 use straightline_graph::certify::companion::OF_ERROR;
 use straightline_graph::certify::search::computed_at;
 use straightline_graph::certify::Format;
 use straightline_graph::expr::{evaluate, Graph, NodeId, Op, Port};
-use straightline_graph::random::Random;
 use straightline_graph::rounding::backwards;
 use straightline_graph::{element_of, Scalar};
 

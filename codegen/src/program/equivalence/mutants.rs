@@ -23,13 +23,13 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::panic::{catch_unwind, AssertUnwindSafe};
 use std::rc::Rc;
+use straightline_core::random::Random;
 use straightline_core::Dd;
 use straightline_graph::certify::companion::OF_ERROR;
 use straightline_graph::certify::search::computed_at;
 use straightline_graph::certify::{certify, Effort};
 use straightline_graph::expr::{evaluate, verify, Binary, Constant, Graph, NodeId, Op, Unary};
 use straightline_graph::pass::cut::Staged;
-use straightline_graph::random::Random;
 use straightline_graph::{element_of, Scalar};
 
 /// Numbers as exporters write them: a right angle with fewer digits, dust, a fixed finger.

@@ -80,15 +80,12 @@ type Rate = Dual<Dd>;
 
 // ------------------------------------------------------------------------------------------------------- random robots
 
-/// SplitMix64 (Steele, Lea and Flood 2014).
+/// A source of numbers; its own number is the seed.
 struct Random(u64);
 
 impl Random {
     fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        straightline_core::random::split_mix_64(&mut self.0)
     }
     fn below(&mut self, n: usize) -> usize {
         (self.next() % n as u64) as usize

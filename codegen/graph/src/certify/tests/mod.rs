@@ -8,7 +8,7 @@ use super::tape::Registers;
 use super::{certify, subdivision, Analysis, Effort, Format, Interval};
 use crate::expr::{Binary, Builder, Graph, NodeId, Op, Port, RuleSet};
 use crate::number::Scalar;
-use crate::random::Random;
+use straightline_core::random::Random;
 use straightline_core::Dd;
 
 /// A program of `inputs` numbers with one result.

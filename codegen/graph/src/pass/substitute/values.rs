@@ -2,7 +2,7 @@
 
 use crate::expr::op::Kind;
 use crate::expr::{of_rounded_sum, values_by, Graph, Op};
-use crate::random::Random;
+use straightline_core::random::Random;
 use straightline_core::Dd;
 
 /// Random states.

@@ -7,16 +7,13 @@ use nalgebra::{Matrix3, Vector3};
 use straightline_core::reference::{unit, ExtendedPosition, Joint, MassCentreFrame, MassCentreLink, MassCentreTree};
 use straightline_core::Dd;
 
-/// Numbers from −1 to 1, the same for the same seed (SplitMix64).
+/// Numbers from −1 to 1, the same for the same seed.
 pub struct Random(pub u64);
 
 impl Random {
     /// The next 64 bits.
     pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        straightline_core::random::split_mix_64(&mut self.0)
     }
 
     /// One of `0 .. n`.
