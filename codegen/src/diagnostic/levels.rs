@@ -1,8 +1,7 @@
 //! What becomes of warnings, and in whose words: the levels that a person gives to codes, and the front that speaks.
 
-use super::codes;
 use super::messages as say;
-use super::{Diagnostic, Severity};
+use super::{codes, Diagnostic, Severity};
 use std::fmt;
 
 /// Stands for the codes of all warnings.

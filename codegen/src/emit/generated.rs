@@ -10,8 +10,7 @@ use crate::equations::Robot;
 use crate::function::Judged;
 use crate::identifier::file_name;
 use crate::options::Options;
-use crate::program::companion::ROUNDED;
-use crate::program::companion::{checked_companion, wants_companions};
+use crate::program::companion::{checked_companion, wants_companions, ROUNDED};
 use crate::program::equivalence::Disagreement;
 use crate::program::written::{AllWritten, Written};
 use crate::program::Program;
@@ -22,9 +21,8 @@ use crate::scene::{self, Parameter};
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
 use straightline_core::Dd;
-use straightline_graph::certify;
 use straightline_graph::expr::Section;
-use straightline_graph::Scalar;
+use straightline_graph::{certify, Scalar};
 
 /// What the compiler makes of a robot file.
 #[derive(Clone, Debug)]

@@ -2,8 +2,7 @@
 
 use crate::equations::forward_method::MethodChoice;
 use crate::equations::Robot;
-use crate::function::ForwardDynamicsMethod;
-use crate::function::Function;
+use crate::function::{ForwardDynamicsMethod, Function};
 use crate::options::{Optimisations, Options};
 use straightline_graph::expr::{Counts, Graph};
 use straightline_graph::pass::count_sums;

@@ -6,8 +6,7 @@
 
 use crate::equations::bind::is_optional;
 use crate::equations::Robot;
-use crate::function::ForwardDynamicsMethod;
-use crate::function::Function;
+use crate::function::{ForwardDynamicsMethod, Function};
 use crate::options::{Optimisations, Options};
 use crate::program::choose::choose;
 use crate::program::equivalence::{self, Disagreement, Plainer};

@@ -3,8 +3,7 @@
 use super::{ridge, Closed, Mode};
 use crate::equations::bind::Bound;
 use crate::equations::Robot;
-use crate::function::ForwardDynamicsMethod;
-use crate::function::{ContactFunction, Function};
+use crate::function::{ContactFunction, ForwardDynamicsMethod, Function};
 use crate::options::Options;
 use crate::scene::contact::{tool_axes, SurfaceItem};
 use std::collections::BTreeMap;

@@ -8,8 +8,7 @@ mod equations;
 
 use crate::equations::bind::{is_optional, Bound};
 use crate::equations::Robot;
-use crate::function::ForwardDynamicsMethod;
-use crate::function::{ContactFunction, Function};
+use crate::function::{ContactFunction, ForwardDynamicsMethod, Function};
 use crate::identifier::module_name;
 use crate::options::{Forms, Optimisations, Options};
 use crate::program::choose::choose;
