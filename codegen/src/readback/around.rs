@@ -307,7 +307,7 @@ impl Around<'_, '_, '_> {
             let (n, m) = (count(&mut of_states.iter().copied()), count(&mut outputs.iter()));
             let body = if fused { format!("{name}_in_lanes::<N, FUSED>") } else { format!("{name}_lanes") };
             let text = format!(
-                "impl batch::Written<{s}, {n}, {m}> for {type_name}{any} {{
+                "impl batch::Program<{s}, {n}, {m}> for {type_name}{any} {{
                     #[inline(always)]
                     fn run<const N: usize, const FUSED: bool>(&self, x: &[[{s}; N]; {n}], y: &mut [[{s}; N]; {m}]) {{
                         let (mut x, mut y) = (x.as_slice(), y.as_mut_slice());
