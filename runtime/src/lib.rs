@@ -88,3 +88,32 @@ pub use straightline_macros::{dynamics, Dynamics};
 
 #[cfg(feature = "runtime")]
 pub use straightline_core::{algorithms, model, spatial};
+
+// The code of the guide: compiled and run by `cargo test -p straightline --doc`.
+#[cfg(doctest)]
+#[doc = include_str!("../../guide/src/first.md")]
+struct GuideFirst;
+#[cfg(doctest)]
+#[doc = include_str!("../../guide/src/control-loop.md")]
+struct GuideControlLoop;
+#[cfg(doctest)]
+#[doc = include_str!("../../guide/src/output.md")]
+struct GuideOutput;
+#[cfg(doctest)]
+#[doc = include_str!("../../guide/src/scenes.md")]
+struct GuideScenes;
+#[cfg(doctest)]
+#[doc = include_str!("../../guide/src/contact.md")]
+struct GuideContact;
+#[cfg(doctest)]
+#[doc = include_str!("../../guide/src/batches.md")]
+struct GuideBatches;
+#[cfg(doctest)]
+#[doc = include_str!("../../guide/src/certificates.md")]
+struct GuideCertificates;
+#[cfg(doctest)]
+#[doc = include_str!("../../guide/src/drives.md")]
+struct GuideDrives;
+#[cfg(doctest)]
+#[doc = include_str!("../../guide/src/coming-from.md")]
+struct GuideComingFrom;

@@ -17,6 +17,7 @@ mod expansion;
 mod flexible;
 mod forward_dynamics;
 mod forward_dynamics_bounds;
+mod guide;
 mod joint_rooms;
 mod layers;
 mod limbs;

@@ -1,0 +1,222 @@
+//! The guide's reference pages are printed from the tables: functions, joints, messages.
+//!
+//! `UPDATE_EXPECTED=1 cargo test -p straightline-codegen --test suite guide::` rewrites them; read the difference.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use straightline_codegen::description;
+use straightline_codegen::function::{Extent, Family, Parts, Quantity, Spec};
+use straightline_codegen::scene;
+use straightline_codegen::Function;
+use straightline_core::joint::{Dialect, KINDS};
+
+fn package() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Compares a page with what is printed, or rewrites it.
+fn compare(page: &str, printed: &str) {
+    let path = package().join("../guide/src").join(page);
+    if std::env::var_os("UPDATE_EXPECTED").is_some() {
+        std::fs::write(&path, printed).expect("the guide can be written");
+    }
+    let written = std::fs::read_to_string(&path).unwrap_or_default();
+    let differs = written.lines().zip(printed.lines()).position(|(a, b)| a != b);
+    let line = differs.unwrap_or_else(|| written.lines().count().min(printed.lines().count()));
+    assert!(
+        written == printed,
+        "guide/src/{page}:{} is not what the tables say:\n  written: {:?}\n  printed: {:?}",
+        line + 1,
+        written.lines().nth(line),
+        printed.lines().nth(line)
+    );
+}
+
+/// As generated code names it.
+fn axis(extent: Extent) -> String {
+    match extent {
+        Extent::Positions => "NQ".to_string(),
+        Extent::Velocities => "NV".to_string(),
+        Extent::Joints => "joints".to_string(),
+        Extent::Frames => "frames".to_string(),
+        Extent::DriveStates => "NX".to_string(),
+        Extent::Drives => "NU".to_string(),
+        Extent::Of(n) => n.to_string(),
+    }
+}
+
+fn length(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::Configuration => "NQ",
+        Quantity::Velocity | Quantity::Acceleration | Quantity::Force | Quantity::HigherRate(_) => "NV",
+        Quantity::DriveState => "NX",
+        Quantity::DriveInput => "NU",
+        Quantity::Gravity => "3",
+    }
+}
+
+/// Documentation of an item as a cell of a table.
+fn cell(doc: &str) -> String {
+    doc.replace("[`", "`").replace("`]", "`").replace('|', "\\|")
+}
+
+fn functions() -> String {
+    let mut page = "# Functions\n\nPrinted from the table of functions (`Function::spec`) by the test `guide::` of the compiler.\n\n\
+Arguments stand in this order: inputs, then results, each an array by reference. NQ, NV, NX and NU count configuration coordinates, velocity\n\
+coordinates, states and inputs of drives; `frames` counts those that are asked for (otherwise the tips). `part` is what a scene can ask of a result\n\
+alone. Scenes add further arguments (gravity, run-time parameters) and leave arguments out.\n"
+        .to_string();
+    let families = [
+        (Family::Robot, "Of every robot"),
+        (Family::Combination, "Combinations, made for who names them"),
+        (Family::Drives, "Of robots with drives"),
+    ];
+    for (family, title) in families {
+        let _ = write!(page, "\n## {title}\n");
+        for function in Function::known().filter(|f| f.spec().family == family) {
+            let Spec { name, summary, aliases, inputs, outputs, inputs_depend, .. } = function.spec();
+            let _ = write!(page, "\n### `{name}`\n\n{}\n", cell(summary));
+            if !aliases.is_empty() {
+                let _ = write!(page, "Also called: {}.\n", aliases.join(", "));
+            }
+            page += "\n| argument | shape | is |\n|---|---|---|\n";
+            for quantity in *inputs {
+                let _ = writeln!(page, "| `{}` | {} | {} |", quantity.name(), length(*quantity), cell(&quantity.doc()));
+            }
+            if *inputs_depend {
+                page += "| … | | further inputs, as the robot's drives take them |\n";
+            }
+            for output in *outputs {
+                let shape: Vec<String> = output.axes.iter().map(|extent| axis(*extent)).collect();
+                let parts = match output.parts {
+                    Parts::No => "",
+                    Parts::LinearAngular => "; part `\"linear\"`, `\"angular\"`",
+                    Parts::Diagonal => "; part `\"diagonal\"`",
+                };
+                let _ = writeln!(page, "| → `{}` | {} | {}{parts} |", output.name, shape.join(" × "), cell(output.doc));
+            }
+        }
+    }
+    page
+}
+
+fn joints() -> String {
+    let mut page = "# Joints\n\nPrinted from the table of joints (`straightline_core::joint::KINDS`) by the test `guide::` of the compiler.\n\n\
+| kind | coordinates q, q̇ | unit of q, q̇, q̈, τ | at rest | words in a URDF | in TOML, joint frames | in TOML, mass centres |\n|---|---|---|---|---|---|---|\n"
+        .to_string();
+    for kind in KINDS {
+        let row = kind.row();
+        let words = |dialect: Dialect| {
+            let of = row.words.iter().filter(|word| word.dialects.contains(&dialect));
+            of.map(|word| format!("`{}`", word.text)).collect::<Vec<_>>().join(", ")
+        };
+        let neutral: Vec<String> = row.neutral.iter().map(|x| x.to_string()).collect();
+        let mut units: Vec<String> = Vec::new();
+        for measure in row.measures {
+            let these = measure.units().join(", ");
+            if !units.contains(&these) {
+                units.push(these);
+            }
+        }
+        let _ = writeln!(
+            page,
+            "| {} | {}, {} | {} | {} | {} | {} | {} |",
+            row.name,
+            kind.nq(),
+            kind.nv(),
+            units.join("; "),
+            neutral.join(", "),
+            words(Dialect::Urdf),
+            words(Dialect::JointFrames),
+            words(Dialect::MassCentres)
+        );
+    }
+    for kind in KINDS.iter().filter(|kind| !kind.row().coordinates.is_empty()) {
+        let _ = write!(page, "\nOf `{}`:\n\n```text\n{}\n```\n", kind.row().name, kind.row().coordinates.trim_end());
+    }
+    page += "\nA word with limits (`revolute`, `prismatic`) has a range that the file gives; fixed joints are merged away and have no row. A floating base is an\n\
+option of the front or a key of the robot file, no joint between bodies.\n";
+    page
+}
+
+/// A file of a robot or a scene, and what is said of it.
+fn message(folder: &Path, code: &str) -> String {
+    let mut text = format!("\n### `{code}`\n");
+    let file = |extension: &str| std::fs::read_to_string(folder.join(format!("{code}.{extension}"))).ok();
+    match (file("urdf"), file("toml")) {
+        (Some(urdf), _) => text += &format!("\n```xml\n{}\n```\n", urdf.trim_end()),
+        (None, Some(toml)) => text += &format!("\n```toml\n{}\n```\n", toml.trim_end()),
+        (None, None) => text += "\nNo file that can be printed: too large, not a text, or from code.\n",
+    }
+    let said = file("txt").unwrap_or_else(|| panic!("no text of {code}"));
+    text + &format!("\n```text\n{}\n```\n", said.trim_end())
+}
+
+fn messages() -> String {
+    let mut page = "# Every message\n\nEach message of robot files and scenes with the smallest file that causes it and all that is said of it. `straightline explain CODE` says what a code stands\n\
+for. Printed from the files of the tests of messages by the test `guide::` of the compiler; some messages take an option beside the file, which the text then\n\
+names.\n"
+        .to_string();
+    let tables = [
+        ("Robot files", "tests/messages", description::messages::CODES),
+        ("Scenes, for `codegen/tests/files/arm.toml`", "tests/scene_messages", scene::messages::CODES),
+    ];
+    for (title, folder, codes) in tables {
+        let _ = write!(page, "\n## {title}\n");
+        for code in codes {
+            page += &message(&package().join(folder), code);
+        }
+    }
+    page
+}
+
+#[test]
+fn functions_are_those_of_the_table() {
+    compare("functions.md", &functions());
+}
+
+#[test]
+fn joints_are_those_of_the_table() {
+    compare("joints.md", &joints());
+}
+
+#[test]
+fn every_message_stands_in_the_guide() {
+    compare("messages.md", &messages());
+}
+
+#[test]
+fn every_page_is_in_the_summary() {
+    let folder = package().join("../guide/src");
+    let summary = std::fs::read_to_string(folder.join("SUMMARY.md")).expect("the guide has a summary");
+    let mut pages: Vec<String> = std::fs::read_dir(&folder)
+        .expect("the guide is there")
+        .filter_map(|entry| entry.expect("the folder can be read").file_name().into_string().ok())
+        .filter(|name| name.ends_with(".md") && name != "SUMMARY.md")
+        .collect();
+    pages.sort();
+    for page in &pages {
+        assert!(summary.contains(&format!("({page})")), "{page} is not in the summary");
+    }
+    let linked = summary.matches(".md)").count();
+    assert_eq!(linked, pages.len(), "the summary names pages that are not there");
+}
+
+#[test]
+fn links_of_the_guide_lead_somewhere() {
+    let root = package().join("..");
+    let folder = root.join("guide/src");
+    let mut pages: Vec<PathBuf> =
+        std::fs::read_dir(&folder).expect("the guide is there").map(|e| e.expect("it can be read").path()).collect();
+    pages.retain(|path| path.extension().is_some_and(|e| e == "md"));
+    pages.push(root.join("README.md"));
+    for page in pages {
+        let text = std::fs::read_to_string(&page).expect("the page is a text");
+        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let target = link.split('#').next().unwrap_or("");
+            let is_file = !target.contains("://") && (target.ends_with(".md") || target.ends_with(".svg"));
+            let there = page.parent().expect("a page is in a folder").join(target);
+            assert!(!is_file || there.exists(), "{} links to {link}", page.display());
+        }
+    }
+}
