@@ -135,7 +135,7 @@ fn joints() -> String {
         let _ = write!(page, "\nOf `{}`:\n\n```text\n{}\n```\n", kind.row().name, kind.row().coordinates.trim_end());
     }
     page += "\nA word with limits (`revolute`, `prismatic`) has a range that the file gives; fixed joints are merged away and have no row. A floating base is an\n\
-option of the front or a key of the robot file, no joint between bodies.\n";
+option of the front or a key of the robot file, no joint between bodies: a joint of that word is an error that says so.\n";
     page
 }
 
