@@ -32,7 +32,7 @@ fn compare(
     what: &str,
 ) {
     for (function, values) in compiled {
-        let graph = program(robot, &[], function, options).graph;
+        let graph = program(robot, &[], *function, options).graph;
         assert_eq!(*values, blocks::<f64>(&graph, inputs).concat(), "{what}, {function:?}, {inputs:?}");
     }
     let model: Model<f64> = robot.model.cast();
