@@ -77,7 +77,7 @@ alone. Scenes add further arguments (gravity, run-time parameters) and leave arg
             let Spec { name, summary, aliases, inputs, outputs, inputs_depend, .. } = function.spec();
             let _ = write!(page, "\n### `{name}`\n\n{}\n", cell(summary));
             if !aliases.is_empty() {
-                let _ = write!(page, "Also called: {}.\n", aliases.join(", "));
+                let _ = writeln!(page, "Also called: {}.", aliases.join(", "));
             }
             page += "\n| argument | shape | is |\n|---|---|---|\n";
             for quantity in *inputs {
