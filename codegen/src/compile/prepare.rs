@@ -11,7 +11,7 @@ use crate::{model, scene};
 use straightline_core::model::Model;
 use straightline_core::Dd;
 
-/// What is wrong with the file or the options, without compiling: all that [`compile`] would say but what only the finished
+/// What is wrong with the file or the options, without compiling: all that [`compile`](super::compile()) would say but what only the finished
 /// programs tell, such as exceeded budgets.
 pub fn examine(source: &Source, options: &Options) -> Diagnostics {
     match prepare(source, options) {

@@ -53,7 +53,7 @@ pub struct Generated {
     pub report: Report,
     /// What was assumed on the way.
     pub warnings: Diagnostics,
-    /// What its text is to compute: [`readback`] compares.
+    /// What its text is to compute: [`readback`](crate::readback) compares.
     pub programs: AllWritten,
 }
 

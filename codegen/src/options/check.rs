@@ -8,7 +8,7 @@ use crate::scene::{messages as say, Base, Gravity};
 use straightline_graph::expr::Grade;
 
 /// What reading the scene's file found, or else what the scene and the options beside it contradict each other in. Scenes from
-/// files are read into options by [`SceneFile::into_options`](super::SceneFile::into_options), which cannot contradict itself.
+/// files are read into options by [`SceneFile::into_options`](crate::scene::SceneFile::into_options), which cannot contradict itself.
 pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
     let scene = &options.scene;
     diagnostics.extend(scene.places.complaints().clone());

@@ -3,7 +3,7 @@
 use straightline_graph::expr::{Folding, RuleSet};
 use straightline_graph::Scalar;
 
-/// What [`program`] does beyond writing the equations down, one by one, so that each can be weighed. Without any of them a
+/// What [`program`](crate::program) does beyond writing the equations down, one by one, so that each can be weighed. Without any of them a
 /// program is the generic runtime unrolled: equal subexpressions once, no products with zero and one, nothing that no
 /// result needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -14,9 +14,9 @@ pub struct Optimisations {
     pub algebraic: bool,
     /// The reduced robot where it serves: frames along common normals, inertial parameters regrouped.
     pub reduced: bool,
-    /// Sums with all their terms at once: [`sums`].
+    /// Sums with all their terms at once: [`sums`](straightline_graph::pass::sums()).
     pub sums: bool,
-    /// Of the forms that the reduced robot has, those with the fewest operations: [`choose`](choose()).
+    /// Of the forms that the reduced robot has, those with the fewest operations: [`choose`](crate::program::choose::choose()).
     pub chosen: bool,
     /// What is free in those forms.
     pub forms: Forms,
@@ -24,13 +24,13 @@ pub struct Optimisations {
     pub angle_sums: bool,
     /// The cheaper of the two forms of forward dynamics.
     pub cheaper: bool,
-    /// Identical limbs as lanes of one body, where the options have them so: [`limbs`].
+    /// Identical limbs as lanes of one body, where the options have them so: [`limbs`](crate::program::limbs).
     pub limbs: bool,
-    /// Values of the mass matrix, and of forward dynamics, formed of others that are there anyway: [`substitute`].
+    /// Values of the mass matrix, and of forward dynamics, formed of others that are there anyway: [`substitute`](straightline_graph::pass::substitute()).
     pub substitutes: bool,
 }
 
-/// What [`choose`](choose()) may choose, one by one, so that each can be weighed.
+/// What [`choose`](crate::program::choose::choose()) may choose, one by one, so that each can be weighed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Forms {
     /// Tips and chains of parallel joints are described in axes that do not turn.

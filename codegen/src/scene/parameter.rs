@@ -33,7 +33,7 @@ pub enum Parameter {
         drive: String,
         /// Which numbers: names of [`Drive::numbers`].
         numbers: Vec<String>,
-        /// The drive as written, with what the scene leaves of its effects; [`Scene::knowing`] finds it.
+        /// The drive as written, with what the scene leaves of its effects; [`Scene::knowing`](crate::scene::Scene::knowing) finds it.
         form: Option<Box<Drive>>,
     },
 }
