@@ -5,12 +5,13 @@
 //! that accelerates that composite by q̈_j = 1, carried down to the base and projected on every joint that it passes.
 
 use super::composite_of;
-use crate::joint::JointPose;
+use crate::joint::{JointPose, MOST_COORDINATES};
 use crate::model::{Body, Model};
 use crate::real::Real;
-use crate::spatial::Composite;
+use crate::spatial::{Composite, ForceVector};
 use alloc::vec;
 use alloc::vec::Vec;
+use core::cell::OnceCell;
 
 /// H(q), nv × nv, row-major, symmetric, \[kg·m², kg·m, kg\] as the coordinates have it. Entries of joints on different
 /// branches are structural zeros.
@@ -35,11 +36,15 @@ pub fn mass_matrix<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
             set(joint.iv + i, joint.iv + j, if i == j { with_rotor(value, body) } else { value });
         });
         let Some(parent) = body.parent else { continue };
-        let back = pose.composite_back(&composite);
-        composites[parent] = composites[parent].plus(&placed(&back, pose));
-        for k in 0..nv {
-            let column = mechanics.wrench_back(k, [&composite, &back], pose, own);
-            let mut column = pose.placed_wrench(&column);
+        let formed = OnceCell::new();
+        let back = || *formed.get_or_init(|| pose.composite_back(&composite));
+        let mut columns = [ForceVector::zero(); MOST_COORDINATES];
+        for (k, column) in columns[..nv].iter_mut().enumerate() {
+            *column = mechanics.wrench_back(k, (&composite, &back), pose, own);
+        }
+        composites[parent] = composites[parent].plus(&placed(&back(), pose));
+        for (k, column) in columns[..nv].iter().enumerate() {
+            let mut column = pose.placed_wrench(column);
             let mut ancestor = parent;
             loop {
                 T::section("column", Some(b));

@@ -161,8 +161,8 @@ impl<T: Real> Motion<T> {
         let omega = omega.named("omega", i);
         let alpha = alpha.named("alpha", i);
         let field = AccelerationField::new(omega, alpha);
-        let at = pose.to_child(self.accel + self.field.u * pose.translation);
-        let accel = mechanics.acceleration(at, [w, omega], &field.u, own);
+        let at = || pose.to_child(self.accel + self.field.u * pose.translation);
+        let accel = mechanics.acceleration(&at, [w, omega], &field.u, own);
         Motion { omega, alpha, accel: accel.named("accel", i), field }
     }
 }

@@ -66,11 +66,17 @@ pub(crate) trait Mechanics<T: Real> {
     }
 
     /// Acceleration of the body's origin: from that of the parent's point there, and ω of parent and body and U of the body, all in
-    /// the body's axes.
-    fn acceleration(&self, at: Vec3<T>, [w, omega]: [Vec3<T>; 2], _field: &Mat3<T>, coordinates: [&[T]; 3]) -> Vec3<T> {
+    /// the body's axes. `at` is formed when it is called: what is computed first stands first in programs.
+    fn acceleration(
+        &self,
+        at: &dyn Fn() -> Vec3<T>,
+        [w, omega]: [Vec3<T>; 2],
+        _field: &Mat3<T>,
+        coordinates: [&[T]; 3],
+    ) -> Vec3<T> {
         let [joint, rate] = self.rates(coordinates);
         // v̇_J + (2 ω_p + ω_J) × v_J
-        rate.linear + (w + omega).cross(joint.linear) + at
+        rate.linear + (w + omega).cross(joint.linear) + at()
     }
 
     /// ω and velocity of the origin in world axes with those of the joint added; the columns of `r` are the body's axes.
@@ -108,7 +114,7 @@ pub(crate) trait Mechanics<T: Real> {
     fn wrench_back(
         &self,
         k: usize,
-        [composite, _back]: [&Composite<T>; 2],
+        (composite, _back): (&Composite<T>, &dyn Fn() -> Composite<T>),
         pose: &JointPose<T>,
         q: &[T],
     ) -> ForceVector<T> {
@@ -199,7 +205,7 @@ mod tests {
             all.extend(numbers(&[added.angular, added.linear, linear, angular]));
             all.push(joint.along(k, q, &wrench));
             let back = pose.composite_back(&bodies);
-            let column = joint.wrench_back(k, [&bodies, &back], &pose, q);
+            let column = joint.wrench_back(k, (&bodies, &|| back), &pose, q);
             let column = pose.placed_wrench(&column);
             all.extend(numbers(&[column.moment, column.force]));
             let inertia = ArticulatedInertia::of_body(&bodies);
@@ -220,7 +226,7 @@ mod tests {
         all.extend(numbers(&[added.angular, added.linear, v.angular, v.linear, omega, alpha, a, w, e]));
         // without the field, by which a joint that slides takes the acceleration from its frame's origin
         let field = Mat3 { rows: [[0.0; 3]; 3] };
-        let own = joint.acceleration(vector(8), [vector(6), w], &field, [q, &qd, &qdd]);
+        let own = joint.acceleration(&|| vector(8), [vector(6), w], &field, [q, &qd, &qdd]);
         all.extend(numbers(&[own]));
         all
     }

@@ -50,12 +50,13 @@ impl<T: Real> Mechanics<T> for Prismatic {
 
     fn acceleration(
         &self,
-        at: Vec3<T>,
+        at: &dyn Fn() -> Vec3<T>,
         [_, omega]: [Vec3<T>; 2],
         field: &Mat3<T>,
         [q, qd, qdd]: [&[T]; 3],
     ) -> Vec3<T> {
         // the joint frame's, then U z q + 2 q̇ ω × z + q̈ z
+        let at = at();
         let along_z = field.column(2).scale(q[0]);
         let twice_qd = qd[0] + qd[0];
         let coriolis = Vec3::new(omega.y * twice_qd, -(omega.x * twice_qd), qdd[0]);
@@ -84,7 +85,7 @@ impl<T: Real> Mechanics<T> for Prismatic {
         set(0, 0, composite.mass);
     }
 
-    fn wrench_back(&self, _: usize, [composite, _]: [&Composite<T>; 2], _: &JointPose<T>, _: &[T]) -> ForceVector<T> {
+    fn wrench_back(&self, _: usize, (composite, _): (&Composite<T>, &dyn Fn() -> Composite<T>), _: &JointPose<T>, _: &[T]) -> ForceVector<T> {
         // f = M z,  n = m c × z
         let ms = composite.first_moment;
         let force = Vec3::new(T::zero(), T::zero(), composite.mass);

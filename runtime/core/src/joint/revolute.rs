@@ -55,8 +55,8 @@ impl<T: Real> Mechanics<T> for Revolute {
         (Vec3::new(w.x, w.y, w.z + qd), Vec3::new(e.x + w.y * qd, e.y - w.x * qd, e.z + qdd))
     }
 
-    fn acceleration(&self, at: Vec3<T>, _: [Vec3<T>; 2], _: &Mat3<T>, _: [&[T]; 3]) -> Vec3<T> {
-        at
+    fn acceleration(&self, at: &dyn Fn() -> Vec3<T>, _: [Vec3<T>; 2], _: &Mat3<T>, _: [&[T]; 3]) -> Vec3<T> {
+        at()
     }
 
     fn world_velocity(&self, at: MotionVector<T>, r: &Mat3<T>, [_, qd]: [&[T]; 2]) -> MotionVector<T> {
@@ -86,11 +86,12 @@ impl<T: Real> Mechanics<T> for Revolute {
     fn wrench_back(
         &self,
         _: usize,
-        [composite, back]: [&Composite<T>; 2],
+        (composite, back): (&Composite<T>, &dyn Fn() -> Composite<T>),
         _: &JointPose<T>,
         _: &[T],
     ) -> ForceVector<T> {
         // f = z × m c,  n = J z = (−Σ_xz, −Σ_yz, Σ_xx + Σ_yy)
+        let back = back();
         let (ms, s) = (back.first_moment, back.second_moment);
         let inertia = composite.second_moment.xx + composite.second_moment.yy;
         let force = Vec3::new(-ms.y, ms.x, T::zero());
