@@ -1,7 +1,7 @@
 //! Lanes and batches beside a plain function: its body over lanes, and the two functions over slices that run it.
 
 use super::body::ALLOW;
-use super::{function, Item, Style};
+use super::{function, indented, pasted, Item, Style};
 use crate::choices::Lanes;
 use crate::identifier::upper_camel_case;
 use std::fmt::Write;
@@ -259,21 +259,13 @@ pub fn associated(item: &Item, style: Style, drivers: Lanes) -> String {
     out
 }
 
-fn indented(text: &str) -> String {
-    let line = |l: &str| if l.is_empty() { "\n".to_string() } else { format!("    {l}\n") };
-    text.lines().map(line).collect()
-}
-
 /// The module `batch` of a file.
 pub fn module(drivers: Lanes) -> String {
     match drivers {
         Lanes::Runtime => "\npub use ::straightline::batch;\n".to_string(),
         Lanes::Standalone => {
             let mut out = String::from("\n/// Batches: programs in lanes over slices.\n#[allow(dead_code, clippy::all, clippy::pedantic)]\npub mod batch {\n");
-            for line in BATCH.lines() {
-                let line = if let Some(doc) = line.strip_prefix("//!") { format!("//{doc}") } else { line.to_string() };
-                let _ = writeln!(out, "{}{line}", if line.is_empty() { "" } else { "    " });
-            }
+            out.push_str(&pasted(BATCH));
             out + "}\n"
         }
     }

@@ -1,7 +1,7 @@
 //! The module `contact` as text.
 
 use crate::emit::error_bound::error_bound_text;
-use crate::emit::{self, array_type, Style};
+use crate::emit::{self, array_type, indented, Style};
 use crate::equations::Robot;
 use crate::function::ContactFunction;
 use crate::identifier::{comment, doc, string_literals, upper_camel_case};
@@ -98,7 +98,7 @@ pub fn module(
         for wrapper in wrappers {
             let _ = writeln!(inner, "    use super::super::{wrapper};");
         }
-        indent(&mut inner, &text);
+        inner.push_str(&indented(&text));
         inner.push_str("}\n");
     }
     dispatch(&mut inner, &modes, &signatures, options);
@@ -108,15 +108,9 @@ pub fn module(
          /// off. Which mode it is the caller decides: a contact closes when s reaches zero, and opens when F changes sign.\n\
          pub mod contact {\n",
     );
-    indent(&mut out, &inner);
+    out.push_str(&indented(&inner));
     out.push_str("}\n");
     Ok(ContactModule { text: out, reports, plainer, programs: written })
-}
-
-fn indent(out: &mut String, text: &str) {
-    for line in text.lines() {
-        let _ = writeln!(out, "{}{line}", if line.is_empty() { "" } else { "    " });
-    }
 }
 
 fn enumeration(out: &mut String, modes: &[Mode]) {

@@ -1,7 +1,7 @@
 //! The generated file: header, constants of the robot, functions, and the sine-cosine kernel they call.
 
 use super::body::ALLOW;
-use super::{batch, fused, number, FunctionText, Scalar, Style};
+use super::{batch, fused, indented, number, pasted, FunctionText, Scalar, Style};
 use crate::choices::Lanes;
 use crate::function::Function;
 use crate::identifier::{comment, string_literals};
@@ -79,11 +79,7 @@ pub fn file(
     }
     if with_kernel {
         out.push_str("\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod trig {\n");
-        for line in kernel(lanes.is_some(), style.fused).lines() {
-            let line = if let Some(doc) = line.strip_prefix("//!") { format!("//{doc}") } else { line.to_string() };
-            let indent = if line.is_empty() { "" } else { "    " };
-            let _ = writeln!(out, "{indent}{line}");
-        }
+        out.push_str(&pasted(&kernel(lanes.is_some(), style.fused)));
         out.push_str("}\n");
     }
     out
@@ -116,11 +112,8 @@ pub fn preamble(
 pub fn scalar_module(scalar: Scalar, text: &str) -> String {
     let is_header = |line: &&str| line.starts_with("//") && !line.starts_with("///");
     let items = text.lines().skip_while(is_header).skip_while(|line| line.is_empty());
-    let mut out = format!("\n/// The same in [`{}`].\npub mod {} {{\n", scalar.name(), scalar.module());
-    for line in items {
-        let _ = writeln!(out, "{}{line}", if line.is_empty() { "" } else { "    " });
-    }
-    out + "}\n"
+    let items = indented(&items.collect::<Vec<_>>().join("\n"));
+    format!("\n/// The same in [`{}`].\npub mod {} {{\n{items}}}\n", scalar.name(), scalar.module())
 }
 
 /// The source of the sine-cosine kernel, as a module of its own. For functions over lanes it becomes part of its callers, so

@@ -148,6 +148,18 @@ impl Style {
     }
 }
 
+/// A text in a block of its own.
+fn indented(text: &str) -> String {
+    let line = |l: &str| if l.is_empty() { "\n".to_string() } else { format!("    {l}\n") };
+    text.lines().map(line).collect()
+}
+
+/// A source file in a block of its own, where it has no documentation of its own.
+fn pasted(source: &str) -> String {
+    let line = |l: &str| l.strip_prefix("//!").map_or_else(|| l.to_string(), |doc| format!("//{doc}"));
+    indented(&source.lines().map(line).collect::<Vec<_>>().join("\n"))
+}
+
 fn shaped(port: &Port, element: String) -> String {
     port.shape.iter().rev().fold(element, |inner, n| format!("[{inner}; {n}]"))
 }

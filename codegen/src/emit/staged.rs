@@ -1,6 +1,6 @@
 //! The module `staged` as text.
 
-use crate::emit::{self, array_type};
+use crate::emit::{self, array_type, indented};
 use crate::equations::Robot;
 use crate::function::Function;
 use crate::options::Options;
@@ -81,9 +81,7 @@ fn text(
     if !wrappers.is_empty() {
         let _ = writeln!(out, "    use super::{{{}}};", wrappers.join(", "));
     }
-    for line in items.lines() {
-        let _ = writeln!(out, "{}{line}", if line.is_empty() { "" } else { "    " });
-    }
+    out.push_str(&indented(&items));
     out.push_str("}\n");
     out
 }

@@ -23,7 +23,7 @@ pub(crate) fn traced(
     function.trace(robot, frames, method, rules, options.scalar, optimisations.reduced, &options.scene)
 }
 
-/// What [`optimised`] would take for a robot in the reduced forms that it is in, the equations as traced, and the method of forward
+/// What [`optimised`](crate::program::optimised) would take for a robot in the reduced forms that it is in, the equations as traced, and the method of forward
 /// dynamics that was chosen: without writing the graph, for a search over many forms.
 pub(crate) fn candidate(
     robot: &Robot,

@@ -8,7 +8,6 @@ use straightline_core::algorithms::{Links, MOST_DERIVATIVES};
 use straightline_core::model::Model;
 use straightline_core::{Real, Taylor};
 
-/// The motion that the inputs of the drives make: the complete model (20.72), (20.78) of robot and drives.
 pub struct DrivenForwardDynamics;
 
 impl RobotFunction for DrivenForwardDynamics {
@@ -34,7 +33,6 @@ impl RobotFunction for DrivenForwardDynamics {
     }
 }
 
-/// The inputs of the drives that a motion takes, whatever their limits.
 pub struct DrivenInverseDynamics;
 
 impl RobotFunction for DrivenInverseDynamics {
@@ -76,7 +74,6 @@ impl RobotFunction for DrivenInverseDynamics {
     }
 }
 
-/// The torques of the drives under their inputs.
 pub struct DriveTorques;
 
 impl RobotFunction for DriveTorques {
@@ -101,7 +98,6 @@ impl RobotFunction for DriveTorques {
     }
 }
 
-/// The complete model H* q̈ + h* = D u (20.72), (20.73) without losses and limits.
 pub struct CompleteModel;
 
 impl RobotFunction for CompleteModel {
@@ -132,7 +128,6 @@ shaft states of x; of a shaft that does not give way, the row of its joint is it
     }
 }
 
-/// The drives' state equation ẋ = Ĉ(x) + D̂(x) u (20.81), without losses and limits.
 pub struct StateSpace;
 
 impl RobotFunction for StateSpace {
@@ -157,7 +152,6 @@ impl RobotFunction for StateSpace {
     }
 }
 
-/// Where the power of the drives goes.
 pub struct DrivePower;
 
 impl RobotFunction for DrivePower {
@@ -184,7 +178,6 @@ dampers of elastic stages, friction in joints, and \
     }
 }
 
-/// Energy stored in the drives, beside that of the bodies.
 pub struct DriveEnergy;
 
 impl RobotFunction for DriveEnergy {

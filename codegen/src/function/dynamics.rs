@@ -7,7 +7,6 @@ use straightline_core::algorithms as alg;
 use straightline_core::spatial::Vec3;
 use straightline_core::Real;
 
-/// Inverse dynamics τ = H(q) q̈ + h(q, q̇): the drives that a motion takes.
 pub struct InverseDynamics;
 
 impl RobotFunction for InverseDynamics {
@@ -27,7 +26,6 @@ impl RobotFunction for InverseDynamics {
     }
 }
 
-/// Gravity forces g(q): the drives that hold the robot still.
 pub struct GravityForce;
 
 impl RobotFunction for GravityForce {
@@ -47,7 +45,6 @@ impl RobotFunction for GravityForce {
     }
 }
 
-/// Bias forces h(q, q̇): Coriolis, centrifugal and gravity forces.
 pub struct BiasForce;
 
 impl RobotFunction for BiasForce {
@@ -67,7 +64,6 @@ impl RobotFunction for BiasForce {
     }
 }
 
-/// Velocity forces C(q, q̇) q̇: Coriolis and centrifugal forces, without gravity.
 pub struct VelocityForce;
 
 impl RobotFunction for VelocityForce {
@@ -87,7 +83,6 @@ impl RobotFunction for VelocityForce {
     }
 }
 
-/// The mass matrix H(q), symmetric.
 pub struct MassMatrix;
 
 impl RobotFunction for MassMatrix {
@@ -109,7 +104,6 @@ impl RobotFunction for MassMatrix {
     }
 }
 
-/// Forward dynamics q̈ = H(q)⁻¹ (τ − h(q, q̇)): the motion that drives make.
 pub struct ForwardDynamics;
 
 impl RobotFunction for ForwardDynamics {
@@ -138,7 +132,6 @@ impl RobotFunction for ForwardDynamics {
     }
 }
 
-/// Forces and moments that each joint carries, drive included.
 pub struct JointWrenches;
 
 impl RobotFunction for JointWrenches {

@@ -8,7 +8,6 @@ use straightline_core::model::Frame;
 use straightline_core::spatial::{MotionVector, Transform, Vec3};
 use straightline_core::Real;
 
-/// Poses of the frames in the world.
 pub struct ForwardKinematics;
 
 impl RobotFunction for ForwardKinematics {
@@ -32,7 +31,6 @@ R's columns are the frame's axes",
     }
 }
 
-/// Velocities of the frames.
 pub struct FrameVelocity;
 
 impl RobotFunction for FrameVelocity {
@@ -56,7 +54,6 @@ impl RobotFunction for FrameVelocity {
     }
 }
 
-/// Accelerations of the frames, without gravity.
 pub struct FrameAcceleration;
 
 impl RobotFunction for FrameAcceleration {
@@ -79,7 +76,6 @@ impl RobotFunction for FrameAcceleration {
     }
 }
 
-/// Geometric Jacobians J of the frames: J q̇ is the frame's velocity.
 pub struct Jacobian;
 
 impl RobotFunction for Jacobian {
@@ -103,7 +99,6 @@ of one column per velocity coordinate",
     }
 }
 
-/// J̇ q̇ of the frames: their acceleration for q̈ = 0.
 pub struct JacobianBias;
 
 impl RobotFunction for JacobianBias {
@@ -127,7 +122,6 @@ impl RobotFunction for JacobianBias {
     }
 }
 
-/// Poses and geometric Jacobians of the frames, at the cost of little more than one of them.
 pub struct KinematicsAndJacobian;
 
 impl RobotFunction for KinematicsAndJacobian {

@@ -170,8 +170,13 @@ impl Function {
         self.spec().family == Family::Robot && matches!(self.spec().form, Form::InverseDynamics | Form::BiasForce)
     }
 
+    /// Whether results, or the columns of a matrix, belong to joints.
+    pub(crate) fn is_by_joints(self) -> bool {
+        self.has_axis(Extent::Velocities) || self.has_axis(Extent::Joints)
+    }
+
     /// Whether some results belong to such things.
-    pub(crate) fn has_axis(self, extent: Extent) -> bool {
+    fn has_axis(self, extent: Extent) -> bool {
         self.spec().outputs.iter().any(|output| output.axes.contains(&extent))
     }
 

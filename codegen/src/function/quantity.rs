@@ -93,10 +93,14 @@ impl Quantity {
         format!("{word} derivatives \\[rad/s{power} or m/s{power}\\]")
     }
 
+    /// What its entries belong to.
+    pub fn extent(self) -> Extent {
+        self.row().map_or(Extent::Velocities, |row| row.2)
+    }
+
     /// How many scalars it has.
     pub fn len<T: Real>(self, model: &Model<T>) -> usize {
-        let extent = self.row().map_or(Extent::Velocities, |row| row.2);
-        extent.len(model, 0)
+        self.extent().len(model, 0)
     }
 
     /// As an input.

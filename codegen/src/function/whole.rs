@@ -7,7 +7,6 @@ use straightline_core::algorithms as alg;
 use straightline_core::spatial::Vec3;
 use straightline_core::Real;
 
-/// Kinetic and potential energy of the moving bodies.
 pub struct Energy;
 
 impl RobotFunction for Energy {
@@ -26,7 +25,6 @@ impl RobotFunction for Energy {
     }
 }
 
-/// Mass centre of the moving bodies.
 pub struct CentreOfMass;
 
 impl RobotFunction for CentreOfMass {
@@ -45,7 +43,6 @@ impl RobotFunction for CentreOfMass {
     }
 }
 
-/// Momentum of the moving bodies.
 pub struct Momentum;
 
 impl RobotFunction for Momentum {

@@ -3,10 +3,9 @@
 use crate::equations::Robot;
 use crate::function::{ContactFunction, Function, Judged};
 use crate::options::Options;
-use crate::program::contact::{self, checked_system, Mode};
+use crate::program::contact::{checked_system, Mode};
 use crate::program::equivalence::{self, Disagreement, Plainer};
 use crate::program::passed;
-use straightline_graph::certify;
 use straightline_graph::certify::companion::{state_bound, Bits};
 use straightline_graph::certify::residual::acceleration_bound;
 use straightline_graph::expr::Graph;
@@ -54,25 +53,10 @@ pub(crate) fn checked_companion(
     graph: &Graph,
     options: &Options,
 ) -> Result<(StateBound, Option<Plainer>), Disagreement> {
-    let name = function.name();
-    if function.spec().judged != Judged::ByResidual {
-        let bound = certify::companion::state_bound(graph, options.scalar, bits(options));
-        let bound = bound.map(|bound| finished_bound(name, bound));
-        bound.iter().try_for_each(|bound| equivalence::of_bound(robot, options, name, (graph, bound)))?;
-        return Ok((bound, None));
+    match function.spec().judged {
+        Judged::ByResidual => of_accelerations(robot, options, &Mode::alone(), function.name(), graph),
+        Judged::ByScale | Judged::ByInertias => of_errors(robot, options, function.name(), graph, bits(options)),
     }
-    let ((system, _), plainer) = contact::checked_system(robot, options, &contact::Mode::alone())?;
-    let bound = certify::residual::acceleration_bound(&system, &[], options.scalar);
-    let bound = bound.map(|bound| finished_bound(name, bound));
-    bound.iter().try_for_each(|bound| {
-        equivalence::of_acceleration_bound(robot, options, name, (graph, bound), Some(&system))
-    })?;
-    Ok((bound, plainer))
-}
-
-/// A bound without what no result needs.
-pub(crate) fn finished_bound(program: &str, bound: Graph) -> Graph {
-    passed("bound: dead code", program, dead_code(&passed("bound: traced", program, bound)))
 }
 
 /// The program that bounds the errors of a contact function at the state at hand, and whether the equations that it is made of are plainer
@@ -91,15 +75,43 @@ pub(crate) fn bound(
         return Ok((Err(ROUNDED), None));
     }
     let name = format!("{}::{}", mode.identifier, function.name());
-    if function != ContactFunction::ForwardDynamics {
-        let bound = state_bound(graph, options.scalar, Bits::Plain).map(|bound| finished_bound(&name, bound));
-        bound.iter().try_for_each(|bound| equivalence::of_bound(robot, options, &name, (graph, bound)))?;
-        return Ok((bound, None));
+    match function {
+        ContactFunction::ForwardDynamics => of_accelerations(robot, options, mode, &name, graph),
+        _ => of_errors(robot, options, &name, graph, Bits::Plain),
     }
+}
+
+/// The program that bounds what the operations of another one lose.
+fn of_errors(
+    robot: &Robot,
+    options: &Options,
+    name: &str,
+    graph: &Graph,
+    bits: Bits,
+) -> Result<(StateBound, Option<Plainer>), Disagreement> {
+    let bound = state_bound(graph, options.scalar, bits).map(|bound| finished_bound(name, bound));
+    bound.iter().try_for_each(|bound| equivalence::of_bound(robot, options, name, (graph, bound)))?;
+    Ok((bound, None))
+}
+
+/// The program that bounds errors of accelerations and reactions by what they leave of the equations.
+fn of_accelerations(
+    robot: &Robot,
+    options: &Options,
+    mode: &Mode,
+    name: &str,
+    graph: &Graph,
+) -> Result<(StateBound, Option<Plainer>), Disagreement> {
     let ((system, yielding), plainer) = checked_system(robot, options, mode)?;
-    let bound = acceleration_bound(&system, &yielding, options.scalar).map(|bound| finished_bound(&name, bound));
+    let bound = acceleration_bound(&system, &yielding, options.scalar).map(|bound| finished_bound(name, bound));
+    let alone = mode.is_alone().then_some(&system);
     bound
         .iter()
-        .try_for_each(|bound| equivalence::of_acceleration_bound(robot, options, &name, (graph, bound), None))?;
+        .try_for_each(|bound| equivalence::of_acceleration_bound(robot, options, name, (graph, bound), alone))?;
     Ok((bound, plainer))
+}
+
+/// A bound without what no result needs.
+fn finished_bound(program: &str, bound: Graph) -> Graph {
+    passed("bound: dead code", program, dead_code(&passed("bound: traced", program, bound)))
 }

@@ -4,7 +4,7 @@ use super::contact::ContactItem;
 use super::messages::unphysical_moments;
 use super::{check_contact, messages as say, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Scene};
 use crate::diagnostic::Diagnostics;
-use crate::function::{Extent, Family, Function, Parts};
+use crate::function::{Family, Function, Parts};
 use crate::identifier::UNNAMED;
 use crate::model::geometry::principal_moments;
 use crate::model::{is_gravity, GRAVITY};
@@ -298,8 +298,7 @@ fn unphysical(payload: &Payload) -> Option<(&'static str, String)> {
 
 /// Whether the results of a function, or its columns, belong to joints.
 fn by_joints(function: Function) -> bool {
-    let of_joints = function.has_axis(Extent::Velocities) || function.has_axis(Extent::Joints);
-    of_joints && function.spec().family != Family::Drives
+    function.is_by_joints() && function.spec().family != Family::Drives
 }
 
 /// The parts that the results of a function have.

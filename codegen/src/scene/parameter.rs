@@ -57,9 +57,7 @@ impl Parameter {
             Parameter::Drive { name, drive, .. } => name.as_ref().unwrap_or(drive),
         }
     }
-}
 
-impl Parameter {
     /// Name of the input.
     pub fn input_name(&self) -> String {
         identifier(self.name(), "body")

@@ -78,8 +78,7 @@ impl Coordinates {
     /// move: they are solved for these.
     pub fn results(&self, function: Function, frames: usize) -> Option<Vec<usize>> {
         let Spec { family, solves, outputs, .. } = function.spec();
-        let is_of_joints = function.has_axis(Extent::Velocities) || function.has_axis(Extent::Joints);
-        if *family == Family::Drives || *solves || !is_of_joints {
+        if *family == Family::Drives || *solves || !function.is_by_joints() {
             return None;
         }
         let (mut results, mut first) = (Vec::new(), 0);

@@ -5,7 +5,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use straightline_codegen::description;
-use straightline_codegen::function::{Extent, Family, Parts, Quantity, Spec};
+use straightline_codegen::function::{Extent, Family, Parts, Spec};
 use straightline_codegen::scene;
 use straightline_codegen::Function;
 use straightline_core::joint::{Dialect, KINDS};
@@ -45,16 +45,6 @@ fn axis(extent: Extent) -> String {
     }
 }
 
-fn length(quantity: Quantity) -> &'static str {
-    match quantity {
-        Quantity::Configuration => "NQ",
-        Quantity::Velocity | Quantity::Acceleration | Quantity::Force | Quantity::HigherRate(_) => "NV",
-        Quantity::DriveState => "NX",
-        Quantity::DriveInput => "NU",
-        Quantity::Gravity => "3",
-    }
-}
-
 /// Documentation of an item as a cell of a table.
 fn cell(doc: &str) -> String {
     doc.replace("[`", "`").replace("`]", "`").replace('|', "\\|")
@@ -81,7 +71,13 @@ alone. Scenes add further arguments (gravity, run-time parameters) and leave arg
             }
             page += "\n| argument | shape | is |\n|---|---|---|\n";
             for quantity in *inputs {
-                let _ = writeln!(page, "| `{}` | {} | {} |", quantity.name(), length(*quantity), cell(&quantity.doc()));
+                let _ = writeln!(
+                    page,
+                    "| `{}` | {} | {} |",
+                    quantity.name(),
+                    axis(quantity.extent()),
+                    cell(&quantity.doc())
+                );
             }
             if *inputs_depend {
                 page += "| … | | further inputs, as the robot's drives take them |\n";

@@ -1,22 +1,13 @@
 //! A kind of joint is one file and one row of a table: who needs to know something of it asks for a column, and names no kind.
 
-use std::fs::{read_dir, read_to_string};
-use std::path::{Path, PathBuf};
+use super::layers::sources;
+use std::fs::read_to_string;
+use std::path::Path;
 
 /// Where kinds are told apart.
 const ROOM: &str = "runtime/core/src/joint/";
 const ROOMS: [&str; 6] =
     ["runtime/core/src", "runtime/src", "codegen/src", "codegen/cli/src", "codegen/macros/src", "simulation/src"];
-
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in read_dir(folder).expect("a folder of sources").map(|entry| entry.expect("an entry").path()) {
-        match entry.is_dir() {
-            true => sources(&entry, found),
-            false if entry.extension().is_some_and(|e| e == "rs") => found.push(entry),
-            false => {}
-        }
-    }
-}
 
 /// Lines of product code that name a kind of joint, each with its place.
 fn kinds_named(path: &str, text: &str) -> Vec<String> {

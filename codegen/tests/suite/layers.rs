@@ -32,7 +32,8 @@ fn floor(room: &str) -> Option<usize> {
     ROOMS.iter().position(|r| *r == room)
 }
 
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+/// All files of Rust in a folder and below it.
+pub fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("the folder can be read") {
         let path = entry.expect("the folder can be read").path();
         if path.is_dir() {

@@ -85,6 +85,11 @@ impl<'a> Mode<'a> {
         Mode { identifier: String::new(), name: String::new(), contacts: Vec::new(), loops: &[] }
     }
 
+    /// Whether nothing is touched or held together.
+    pub fn is_alone(&self) -> bool {
+        self.contacts.is_empty() && self.loops.is_empty()
+    }
+
     /// Constrained coordinates as `contact.pz`.
     pub fn constrained_names(&self) -> Vec<String> {
         let of_contacts =

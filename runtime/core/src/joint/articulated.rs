@@ -19,6 +19,14 @@ pub(crate) struct FreeJoint<T> {
     pub rate: T,
 }
 
+impl<T> FreeJoint<T> {
+    /// From U and U / D, moments first, and u / D.
+    pub fn new([moment, force]: [Vec3<T>; 2], per_inertia: [Vec3<T>; 2], rate: T) -> Self {
+        let [moment_per_inertia, force_per_inertia] = per_inertia;
+        FreeJoint { moment, force, moment_per_inertia, force_per_inertia, rate }
+    }
+}
+
 /// Articulated inertia about the origin of a frame, in its axes: n = J ε + H a,  f = Hᵀ ε + M a.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ArticulatedInertia<T> {
@@ -67,14 +75,7 @@ impl<T: Real> ArticulatedInertia<T> {
             h: Mat3 { rows: [row(0, n_d.x), row(1, n_d.y), row(2, n_d.z)] },
             m: *m - symmetric_product(f_d, f),
         };
-        let joint = FreeJoint {
-            moment: n,
-            force: f,
-            moment_per_inertia: n_d,
-            force_per_inertia: f_d,
-            rate: (u * per_inertia).named("rate", b, ""),
-        };
-        (joint, freed)
+        (FreeJoint::new([n, f], [n_d, f_d], (u * per_inertia).named("rate", b, "")), freed)
     }
 
     /// In the parent's axes, about the parent's origin.

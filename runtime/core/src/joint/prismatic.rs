@@ -123,12 +123,5 @@ fn free<T: Real>(inertia: &ArticulatedInertia<T>, u: T, b: usize) -> (FreeJoint<
         h: Mat3::from_columns(h.column(0) - n.scale(f_d.x), h.column(1) - n.scale(f_d.y), Vec3::zero()),
         m: Sym3 { xx: m.xx - f_d.x * f.x, xy: m.xy - f_d.x * f.y, yy: m.yy - f_d.y * f.y, xz: o, yz: o, zz: o },
     };
-    let joint = FreeJoint {
-        moment: n,
-        force: f,
-        moment_per_inertia: n_d,
-        force_per_inertia: f_d,
-        rate: (u * per_inertia).named("rate", b, ""),
-    };
-    (joint, freed)
+    (FreeJoint::new([n, f], [n_d, f_d], (u * per_inertia).named("rate", b, "")), freed)
 }

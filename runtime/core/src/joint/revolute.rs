@@ -135,12 +135,5 @@ fn free<T: Real>(inertia: &ArticulatedInertia<T>, u: T, b: usize) -> (FreeJoint<
         },
         m: *m - symmetric_product(f_d, f),
     };
-    let joint = FreeJoint {
-        moment: n,
-        force: f,
-        moment_per_inertia: n_d,
-        force_per_inertia: f_d,
-        rate: (u * per_inertia).named("rate", b, ""),
-    };
-    (joint, freed)
+    (FreeJoint::new([n, f], [n_d, f_d], (u * per_inertia).named("rate", b, "")), freed)
 }
