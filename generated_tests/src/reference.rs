@@ -166,7 +166,14 @@ impl Robot {
             Function::ForwardKinematics => "fk",
             Function::Jacobian | Function::KinematicsAndJacobian => "jacobian",
             Function::JacobianBias | Function::FrameVelocity | Function::FrameAcceleration => "jdqd",
-            _ => "energy",
+            Function::CentreOfMass | Function::Momentum => "energy",
+            Function::DrivenForwardDynamics
+            | Function::DrivenInverseDynamics
+            | Function::DriveTorques
+            | Function::CompleteModel
+            | Function::StateSpace
+            | Function::DrivePower
+            | Function::DriveEnergy => "energy",
         };
         let pinocchio = self.baseline[key]["scaled"].as_f64().expect("the baseline has every robot and function");
         (20.0 * pinocchio).max(bounds::FUNCTION.most)
@@ -255,7 +262,14 @@ impl Robot {
                 both.scales.extend(jacobian.scales);
                 Some(both)
             }
-            _ => None,
+            Function::CentreOfMass | Function::Momentum => None,
+            Function::DrivenForwardDynamics
+            | Function::DrivenInverseDynamics
+            | Function::DriveTorques
+            | Function::CompleteModel
+            | Function::StateSpace
+            | Function::DrivePower
+            | Function::DriveEnergy => None,
         }
     }
 }

@@ -107,7 +107,13 @@ pub fn value(tree: &MassCentreTree<Dd>, frames: &[String], function: Function, i
         JacobianBias => {
             groups(speed(arg(1)).powi(2), frames().map(|f| list(&chapter::frame_jacobian_bias(tree, f, q, arg(1)))))
         }
-        _ => panic!("drives have their own test"),
+        DrivenForwardDynamics
+        | DrivenInverseDynamics
+        | DriveTorques
+        | CompleteModel
+        | StateSpace
+        | DrivePower
+        | DriveEnergy => panic!("drives have their own test"),
     }
 }
 

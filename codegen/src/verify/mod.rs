@@ -619,7 +619,13 @@ impl Truth<'_> {
                     .over_links(|m, inertia, r| [m * r.moving, 2.0 * m * r.length * r.moving + inertia * r.turning]);
                 (values, motion(linear, angular))
             }
-            _ => unreachable!("functions of drives are left out"),
+            DrivenForwardDynamics
+            | DrivenInverseDynamics
+            | DriveTorques
+            | CompleteModel
+            | StateSpace
+            | DrivePower
+            | DriveEnergy => unreachable!("functions of drives are left out"),
         }
     }
 

@@ -191,7 +191,7 @@ fn rounding_to_f32_happens_once() {
 
 #[test]
 fn decimal_text_is_read_to_2_to_the_minus_100() {
-    let error = largest("from_decimal", 600, |r| {
+    let error = largest("from_decimal", 2_000, |r| {
         let digits: String = (0..1 + r.bits() % 60).map(|_| char::from(b'0' + (r.bits() % 10) as u8)).collect();
         let point = r.bits() as usize % (digits.len() + 1);
         let sign = ["", "-", "+"][r.bits() as usize % 3];
@@ -252,13 +252,13 @@ fn what_is_not_a_decimal_number_is_refused() {
 
 #[test]
 fn text_has_thirty_correct_digits() {
-    let error = largest("Display", 400, |r| {
+    let error = largest("Display", 1_000, |r| {
         let x = r.double_double(-960, 1022);
         let (text, truth) = (x.to_string(), exact(x));
         ((decimal(&text) - &truth) / &truth).to_f64().value().abs()
     });
     assert!(error <= 1e-30);
-    let error = largest("text and back", 400, |r| {
+    let error = largest("text and back", 1_000, |r| {
         let x = r.double_double(-900, 900);
         let back = Dd::from_decimal(&x.to_string()).expect("our own text");
         relative_error(back, &exact(x))
