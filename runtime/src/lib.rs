@@ -51,6 +51,26 @@
 //! complaints about it, and about options, come as compiler errors with the file's line, all in one run, and stay the only ones:
 //! constants and functions are there in name, so that whatever uses them compiles.
 //!
+//! # Frames
+//! Every frame is a constant of the type, a [`FrameIndex`], and `pose` takes the [`Pose`] of one out of what `forward_kinematics`
+//! gives. These two types are all that the type's items take of this package without being asked to.
+//! ```
+//! # use straightline::Dynamics;
+//! #[derive(Dynamics)]
+//! #[robot("examples/arm.toml", frames("upper_arm", "forearm"), functions(forward_kinematics, frame_velocity))]
+//! struct Arm;
+//!
+//! let (q, qd) = ([0.1, 0.2, 0.3], [1.0, 0.0, 0.0]);
+//! let (mut poses, mut velocities) = ([[0.0; 12]; 2], [[0.0; 6]; 2]);
+//! Arm::forward_kinematics(&q, &mut poses);
+//! Arm::frame_velocity(&q, &qd, &mut velocities);
+//!
+//! let forearm = Arm::pose(&poses, Arm::FOREARM);
+//! let [x, y, _z] = forearm.position;
+//! let [vx, vy, ..] = velocities[Arm::FOREARM];
+//! assert!((vx + y).abs() + (vy - x).abs() < 1e-15); // v = ω × p
+//! ```
+//!
 //! # A module
 //! [`dynamics!`] takes the same and makes a module:
 //! ```
@@ -68,6 +88,7 @@
 //! * `derive` (default): the macros. They run the compiler of dynamics while your crate is built.
 //! * `std`: functions over batches use the vector instructions of the machine, found out at run time.
 //! * `rayon`: functions over batches on several threads; `std` with it.
+//! * `nalgebra`: results as types of nalgebra, `Isometry3::from(pose)` among them; its `std` or `libm` is yours to choose.
 //! * `runtime`: the generic numeric algorithms, for robots that are known only at run time; needs an allocator.
 //!
 //! Without features there is `core` only. Build scripts use `straightline_codegen::Builder`; source to commit, C libraries
@@ -81,7 +102,13 @@ extern crate std;
 pub mod batch;
 #[cfg(feature = "std")]
 mod dispatch;
+mod frame;
+#[cfg(feature = "nalgebra")]
+pub mod nalgebra;
+mod pose;
 
+pub use frame::FrameIndex;
+pub use pose::Pose;
 pub use straightline_core::{control, integrate, phases, Dd, Dual, Real};
 #[cfg(feature = "derive")]
 pub use straightline_macros::{dynamics, Dynamics};

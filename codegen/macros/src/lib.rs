@@ -12,9 +12,7 @@ use quote::{quote, quote_spanned};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use straightline_codegen::fronts::expansion::{
-    associated_items, examine, expand, needs_a_module, Expansion, Refusal, SceneOf,
-};
+use straightline_codegen::fronts::expansion::{examine, expand, needs_a_module, Expansion, Refusal, SceneOf};
 use straightline_codegen::fronts::stubs;
 use straightline_codegen::{Function, Generated, Options};
 use syn::{parse_macro_input, DeriveInput, Error};
@@ -50,15 +48,15 @@ pub fn derive_dynamics(input: TokenStream) -> TokenStream {
         },
         None => quote! { const _: () = { #[allow(dead_code)] mod dynamics { #items } #associated }; },
     };
-    let Compiled { result, scene, trackers } = compiled(&arguments);
-    let result = result.and_then(|generated| match arguments.module.is_none() && needs_a_module(&generated) {
+    let Compiled { result, scene, robot, trackers } = compiled(&arguments);
+    let result = result.and_then(|made| match arguments.module.is_none() && needs_a_module(&made.0) {
         true => Err(vec![Error::new(arguments.place(), NEEDS_A_MODULE)]),
-        false => Ok(generated),
+        false => Ok(made),
     });
     let items = match result {
-        Ok(generated) => with_module(source(&generated.text), impl_of(source(&associated_items(&generated)))),
+        Ok((generated, associated)) => with_module(source(&generated.text), impl_of(source(&associated))),
         Err(errors) => {
-            let associated = source(&stubs::associated_items(&stubbed(&arguments), scene.as_deref()));
+            let associated = source(&stubs::associated_items(&stubbed(&arguments), scene.as_deref(), &robot));
             let unknown = arguments.unknown.iter();
             let unknown = quote! { #(pub const #unknown: dynamics::__Missing = <dynamics::__Missing>::value;)* };
             let associated = impl_of(quote! { #![allow(warnings, clippy::all)] #associated #unknown });
@@ -78,9 +76,9 @@ pub fn dynamics(input: TokenStream) -> TokenStream {
     if let Some(module) = &arguments.module {
         arguments.errors.push(Error::new(module.span(), "`module` is for the derive: this is a module"));
     }
-    let Compiled { result, scene, trackers } = compiled(&arguments);
+    let Compiled { result, scene, trackers, .. } = compiled(&arguments);
     let items = match result {
-        Ok(generated) => source(&generated.text),
+        Ok((generated, _)) => source(&generated.text),
         Err(errors) => broken(&arguments, scene.as_deref(), errors),
     };
     quote! { #(#attributes)* #visibility mod #name { #items } #trackers }.into()
@@ -88,10 +86,12 @@ pub fn dynamics(input: TokenStream) -> TokenStream {
 
 /// What came out of the files that a macro names.
 struct Compiled {
-    /// The dynamics, or all that is wrong.
-    result: Result<Generated, Vec<Error>>,
+    /// The dynamics and what a type has of it, or all that is wrong.
+    result: Result<(Generated, String), Vec<Error>>,
     /// The text of the scene, if there is one.
     scene: Option<String>,
+    /// The text of the robot file, where that is wrong but there.
+    robot: String,
     /// Items by which the compiler knows the files that the expansion depends on.
     trackers: Tokens,
 }
@@ -123,7 +123,10 @@ fn compiled(arguments: &Arguments) -> Compiled {
         let path = file.to_string_lossy();
         quote! { const _: &[u8] = include_bytes!(#path); }
     });
-    Compiled { result, scene, trackers: trackers.collect() }
+    let read = || files.first().and_then(|file| std::fs::read(file).ok());
+    let robot = if result.is_err() { read().unwrap_or_default() } else { Vec::new() };
+    let robot = String::from_utf8_lossy(&robot).into_owned();
+    Compiled { result, scene, robot, trackers: trackers.collect() }
 }
 
 /// Warnings, each once however many types have the same robot: a macro has no warnings of its own.

@@ -212,17 +212,17 @@ impl Rotation {
 
 /// A pose as written.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pose {
+pub struct WrittenPose {
     /// Position \[m\].
     pub xyz: Value<[f64; 3]>,
     /// Orientation.
     pub rotation: Rotation,
 }
 
-impl Pose {
+impl WrittenPose {
     /// Frames that coincide, where the file says nothing.
-    pub fn identity(place: Place) -> Pose {
-        Pose { xyz: Value::new([0.0; 3], place.clone()), rotation: Rotation::identity(place) }
+    pub fn identity(place: Place) -> WrittenPose {
+        WrittenPose { xyz: Value::new([0.0; 3], place.clone()), rotation: Rotation::identity(place) }
     }
 }
 
@@ -296,7 +296,7 @@ pub struct Joint {
     /// The link that it moves.
     pub child: Value<String>,
     /// Pose of the joint frame, which is the child's link frame at q = 0, in the parent's link frame.
-    pub origin: Pose,
+    pub origin: WrittenPose,
     /// Axis in the joint frame, as long as it is written; \[1, 0, 0\] where a URDF says nothing.
     pub axis: Value<[f64; 3]>,
     /// Ranges.
@@ -345,7 +345,7 @@ pub struct NamedFrame {
     /// The link that carries it.
     pub link: Value<String>,
     /// Its pose in the link frame.
-    pub pose: Pose,
+    pub pose: WrittenPose,
 }
 
 /// An open chain in the chapter's notation. Frame j is fixed to link j, its origin is the link's mass centre C_j; the

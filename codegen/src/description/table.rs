@@ -1,7 +1,7 @@
 //! Walking a TOML document with places, so that one run finds all complaints.
 
 use super::reader::{Range64, Reader};
-use super::{messages, Angle, AngleUnit, JointDrive, JointLimits, Pose, Rotation, Value};
+use super::{messages, Angle, AngleUnit, JointDrive, JointLimits, Rotation, Value, WrittenPose};
 use crate::diagnostic::{Diagnostics, Source};
 use std::ops::Range;
 use straightline_core::spatial::Sym3;
@@ -425,9 +425,9 @@ impl Reader<'_> {
     }
 
     /// Position `xyz` and roll, pitch and yaw.
-    pub fn pose_at(&mut self, table: &Table) -> Pose {
+    pub fn pose_at(&mut self, table: &Table) -> WrittenPose {
         let xyz = self.vector_at(table, "xyz").unwrap_or_else(|| self.value([0.0; 3], &table.span));
-        Pose { xyz, rotation: self.rotation_at(table, "rpy") }
+        WrittenPose { xyz, rotation: self.rotation_at(table, "rpy") }
     }
 
     /// `[lower, upper]`, or `{ lower, upper, velocity, effort }`.

@@ -5,7 +5,7 @@ use super::reader::{Range64, Reader};
 use super::table::{self, Table};
 use super::{
     chapter, messages, BaseKind, Description, Format, Inertial, Joint, JointFrameNotation, JointType, Link, NamedFrame,
-    Notation, Pose, Value,
+    Notation, Value, WrittenPose,
 };
 use crate::diagnostic::{Diagnostics, Source};
 use straightline_core::spatial::Sym3;
@@ -159,7 +159,7 @@ fn read_joint(reader: &mut Reader, mut table: Table) -> Option<Joint> {
             reader.check_keys(&origin, POSE);
             reader.pose_at(&origin)
         }
-        None => Pose::identity(reader.place(&table.span)),
+        None => WrittenPose::identity(reader.place(&table.span)),
     };
     let moves = kind.as_ref().is_some_and(|k| k.value.between_links().is_some());
     if moves {

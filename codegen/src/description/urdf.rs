@@ -7,7 +7,7 @@
 use super::reader::{Range64, Reader};
 use super::{
     messages, Angle, AngleUnit, Description, Format, Inertial, Joint, JointDrive, JointFrameNotation, JointLimits,
-    JointType, Link, Notation, Pose, Rotation, Value,
+    JointType, Link, Notation, Rotation, Value, WrittenPose,
 };
 use crate::diagnostic::wording::closest;
 use crate::diagnostic::{Diagnostics, Source};
@@ -369,8 +369,8 @@ fn vector(reader: &mut Reader, what: &str, attribute: Attribute) -> Option<Value
     Some(reader.value([x.0, y.0, z.0], &span))
 }
 
-fn read_pose(reader: &mut Reader, owner: &str, node: Option<Node>, default: Node) -> Pose {
-    let mut pose = Pose::identity(reader.place(&tag(node.unwrap_or(default))));
+fn read_pose(reader: &mut Reader, owner: &str, node: Option<Node>, default: Node) -> WrittenPose {
+    let mut pose = WrittenPose::identity(reader.place(&tag(node.unwrap_or(default))));
     let Some(node) = node else { return pose };
     check_attributes(reader, owner, node, &["xyz", "rpy"]);
     if let Some(attribute) = node.attribute_node("xyz") {

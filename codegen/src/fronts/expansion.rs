@@ -2,6 +2,7 @@
 
 use crate::diagnostic::{Diagnostic, Diagnostics, Front, Reporting, Severity, Source};
 use crate::emit::{array_type, batch, Generated};
+use crate::fronts::frames;
 use crate::options::Options;
 use crate::{compile, scene};
 use std::fmt::Write;
@@ -14,8 +15,8 @@ use straightline_graph::Scalar;
 pub struct Expansion {
     /// The files that were read: the expansion depends on them, right or wrong.
     pub files: Vec<PathBuf>,
-    /// The dynamics, or what is wrong.
-    pub result: Result<Generated, Refusal>,
+    /// The dynamics, and what a type has of it; or what is wrong.
+    pub result: Result<(Generated, String), Refusal>,
     /// What to tell the person besides.
     pub warnings: String,
     /// The text of the scene, right or wrong, if there is one.
@@ -53,7 +54,9 @@ pub fn expand(robot: &str, scene: Option<&SceneOf>, directories: &[&Path], optio
     let opened = open(robot, scene, directories, &mut files);
     let text = scene_text(scene, &opened);
     match opened.map_err(|(refusal, _)| refusal).and_then(|opened| compiled(&opened, options)) {
-        Ok((warnings, generated)) => Expansion { files, result: Ok(generated), warnings, scene: text },
+        Ok((warnings, generated, associated)) => {
+            Expansion { files, result: Ok((generated, associated)), warnings, scene: text }
+        }
         Err(refusal) => Expansion { files, result: Err(refusal), warnings: String::new(), scene: text },
     }
 }
@@ -132,12 +135,14 @@ fn scene_text(scene: Option<&SceneOf>, opened: &Result<Opened, (Refusal, Option<
     scene.map(|_| source.map_or_else(String::new, |source| source.text().to_string()))
 }
 
-/// Warnings and dynamics, or what is wrong.
-fn compiled(opened: &Opened, options: &Options) -> Result<(String, Generated), Refusal> {
-    let robot = &opened.robot;
-    let generated = compile::compile(robot, &opened.options(options))
+/// Warnings, dynamics and associated items, or what is wrong.
+fn compiled(opened: &Opened, options: &Options) -> Result<(String, Generated, String), Refusal> {
+    let (robot, options) = (&opened.robot, opened.options(options));
+    let generated = compile::compile(robot, &options)
         .map_err(|diagnostics| refusal(&diagnostics, robot.path(), opened.within()))?;
-    Ok((generated.warnings.at_least(Severity::Warning).render(), generated))
+    let mut associated = associated_items(&generated);
+    associated.push_str(&frames::associated_items(&generated, &options.scene, &associated));
+    Ok((generated.warnings.at_least(Severity::Warning).render(), generated, associated))
 }
 
 /// What is wrong with the robot file of that path and its scene, which stands `within` the macro or in another file.
@@ -176,7 +181,7 @@ pub fn needs_a_module(generated: &Generated) -> bool {
 }
 
 /// Constants and functions of the module `dynamics` as associated items of a type.
-pub fn associated_items(generated: &Generated) -> String {
+fn associated_items(generated: &Generated) -> String {
     let Generated { model, frames, scalar, .. } = generated;
     let joints = model.bodies.len();
     let limited = model.bodies.iter().filter(|b| b.joint.kind.is_single()).count();

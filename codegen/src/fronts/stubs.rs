@@ -7,6 +7,7 @@
 //! `<Why<{ compile_error!(..) }> as Stub>::Item`; [`DEFINITION`] has what it takes. Lengths are numbers that do not evaluate.
 
 use crate::choices::Lanes;
+use crate::fronts::frames;
 use crate::function::{ContactFunction, Function};
 use crate::identifier::{identifier, upper_camel_case};
 use crate::options::Options;
@@ -60,9 +61,17 @@ pub fn module_items(options: &Options, scene: Option<&str>) -> String {
     out
 }
 
-/// The constants and functions of a type; `dynamics` is the module that holds [`MISSING`].
-pub fn associated_items(options: &Options, scene: Option<&str>) -> String {
-    constants_and_functions(options, scene, &format!("dynamics::{MISSING}"))
+/// The constants and functions of a type; `dynamics` is the module that holds [`MISSING`]. What `robot`, the text of the robot file,
+/// gives a name to may be a frame.
+pub fn associated_items(options: &Options, scene: Option<&str>, robot: &str) -> String {
+    let missing = format!("dynamics::{MISSING}");
+    let mut out = constants_and_functions(options, scene, &missing);
+    let mut names: BTreeSet<String> = options.frames.iter().map(|frame| frames::constant(frame)).collect();
+    names.extend(names_in(robot).map(frames::constant));
+    let is_new = |name: &String| !out.contains(&format!("pub const {name}:"));
+    let further: Vec<String> = names.into_iter().filter(is_new).chain(["pose".to_string()]).collect();
+    further.iter().for_each(|name| out.push_str(&value(name, &missing)));
+    out
 }
 
 fn items_and_types(options: &Options, scene: Option<&str>, upwards: &str) -> String {
@@ -175,18 +184,17 @@ fn generic(name: &str, parameter: &str, arguments: usize, missing: &str) -> Stri
 
 /// What a scene's text gives names to, as identifiers: parameters, contacts, modes. It need not be readable.
 fn names(text: &str) -> BTreeSet<String> {
-    let mut names = BTreeSet::new();
-    for line in text.split(['\n', ',', '{', '(']) {
-        // a parameter of a link or of a drive has their name
-        let keys = ["name", "link", "drive"];
-        let Some(rest) = keys.iter().find_map(|key| line.trim_start().strip_prefix(key)) else { continue };
-        let Some(quoted) = rest.trim_start().strip_prefix('=').map(str::trim_start) else { continue };
-        let quote = quoted.chars().next().filter(|c| ['"', '\''].contains(c));
-        if let Some(name) = quote.and_then(|quote| quoted[1..].split(quote).next()) {
-            names.extend(["body", "mode"].map(|what| identifier(name, what)));
-        }
-    }
-    names
+    names_in(text).flat_map(|name| ["body", "mode"].map(|what| identifier(name, what))).collect()
+}
+
+/// What a text, which need not be readable, gives names to: a parameter of a link or of a drive has their name.
+fn names_in(text: &str) -> impl Iterator<Item = &str> {
+    let keys = ["name", "link", "drive"];
+    keys.into_iter().flat_map(|key| text.match_indices(key).map(move |(at, key)| at + key.len())).filter_map(|end| {
+        let quoted = text[end..].trim_start().strip_prefix('=')?.trim_start();
+        let quote = quoted.chars().next().filter(|c| ['"', '\''].contains(c))?;
+        quoted[1..].split(quote).next()
+    })
 }
 
 #[cfg(test)]
@@ -204,10 +212,11 @@ mod tests {
     fn without_a_scene_the_functions_are_those_that_are_asked_for() {
         let options =
             Options { functions: vec![Function::GravityForce], lanes: Some(Lanes::Runtime), ..Options::default() };
-        let items = associated_items(&options, None);
+        let items = associated_items(&options, None, "<link name='panda hand'/>");
         assert!(items.contains("pub const NQ: usize = "), "{items}");
         assert!(items.contains("pub const gravity_force: dynamics::__Missing = "), "{items}");
         assert!(items.contains("pub fn gravity_force_lanes<const N: usize>(_0: dynamics::__Missing, _1"), "{items}");
+        assert!(items.contains("pub const PANDA_HAND: dynamics::__Missing"), "{items}");
         assert!(items.contains("gravity_force_batch_soa_parallel") && !items.contains("mass_matrix"), "{items}");
     }
 }

@@ -42,7 +42,7 @@ pub mod states;
 
 use self::flexible::Carrier;
 use crate::description::flexible::{Flexible, Support};
-use crate::description::{self, messages, Angle, Description, Notation, Pose, Rotation, Value};
+use crate::description::{self, messages, Angle, Description, Notation, Rotation, Value, WrittenPose};
 use crate::diagnostic::{Diagnostics, Place, Source};
 use geometry::{compose, vector};
 use std::collections::{BTreeMap, HashMap};
@@ -284,7 +284,7 @@ fn each_angle(description: &Description, visit: &mut dyn FnMut(&dyn Fn() -> Stri
 }
 
 /// A pose in numbers.
-fn transform(pose: &Pose, tolerance: f64) -> Transform<Dd> {
+fn transform(pose: &WrittenPose, tolerance: f64) -> Transform<Dd> {
     Transform { rotation: angle::rotation(&pose.rotation, tolerance), translation: vector(pose.xyz.value) }
 }
 
@@ -342,7 +342,7 @@ fn add_frames(assembly: &mut Assembly, options: &ModelOptions, tolerance: f64, d
         };
         let zero = Angle::zero(Place::none());
         let rpy = option.rpy.map(|value| Angle { value, ..zero.clone() });
-        let pose = Pose { xyz: Value::assumed(option.xyz), rotation: Rotation { rpy } };
+        let pose = WrittenPose { xyz: Value::assumed(option.xyz), rotation: Rotation { rpy } };
         let (body, x_body_link) = carrier.at(vector(option.xyz));
         let placement = compose(&x_body_link, &transform(&pose, tolerance));
         assembly.frames.push(Frame { name: option.name.clone(), body, placement });

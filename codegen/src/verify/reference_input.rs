@@ -11,7 +11,7 @@
 use crate::description::flexible::{Bending, Flexible, Support};
 use crate::description::{
     Angle, AngleUnit, BaseKind, Description, Inertial, Joint as FileJoint, JointFrameNotation, MassCentreNotation,
-    Notation, Pose, Rotation,
+    Notation, Rotation, WrittenPose,
 };
 use crate::diagnostic::Place;
 use crate::model::{FrameOption, ModelOptions};
@@ -143,7 +143,7 @@ impl Placed {
         Placed { rotation: Matrix3::identity(), position: Vector3::zeros() }
     }
 
-    fn read(pose: &Pose, options: &ModelOptions) -> Placed {
+    fn read(pose: &WrittenPose, options: &ModelOptions) -> Placed {
         Placed { rotation: rotation(&pose.rotation, options), position: vector(&pose.xyz.value) }
     }
 

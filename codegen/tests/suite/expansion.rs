@@ -1,7 +1,7 @@
 //! What the macros stand on: files looked for, items of a type, complaints as they are shown.
 
 use std::path::{Path, PathBuf};
-use straightline_codegen::fronts::expansion::{associated_items, expand, SceneOf};
+use straightline_codegen::fronts::expansion::{expand, SceneOf};
 use straightline_codegen::{Options, Source};
 
 const CART: &str = r#"
@@ -38,10 +38,37 @@ fn the_first_directory_that_has_the_file_counts() {
     let here = scratch("found", CART);
     let expansion = expand("cart.toml", None, &[Path::new("/nowhere"), &here], &Options::default());
     assert_eq!(expansion.files, [here.join("cart.toml")]);
-    let items = associated_items(&expansion.result.unwrap());
+    let items = expansion.result.unwrap().1;
     assert!(items.contains("pub const EFFORT_LIMITS: [f64; 1] = dynamics::EFFORT_LIMITS;"), "{items}");
     assert!(items.contains("pub fn mass_matrix(q: &[f64; 1], h: &mut [[f64; 1]; 1]) {"), "{items}");
     assert!(items.contains("#[doc(alias(\"CRBA\", "), "{items}");
+}
+
+#[test]
+fn frames_are_constants_and_pose_asks_for_poses_of_all_frames() {
+    let here = scratch("frames", CART);
+    let items = |frames: &[&str], scene: &str| {
+        std::fs::write(here.join("scene.toml"), scene).unwrap();
+        let frames = frames.iter().map(|f| f.to_string()).collect();
+        let scene = SceneOf::File("scene.toml".into());
+        let options = Options { frames, ..Options::default() };
+        expand("cart.toml", Some(&scene), &[&here], &options).result.unwrap().1
+    };
+    let pose = "pub fn pose<__T: Copy>(x: &[[__T; 12]; 2], frame: ::straightline::FrameIndex<Self>)";
+    let all = items(&["rail", "cart"], "");
+    for (name, index) in [("RAIL", 0), ("CART", 1)] {
+        let constant = "::straightline::FrameIndex<Self> = ::straightline::FrameIndex::new";
+        assert!(all.contains(&format!("pub const {name}: {constant}({index});")), "{all}");
+    }
+    assert!(all.contains(pose), "{all}");
+    for scene in [
+        "[outputs]\nforward_kinematics = { frames = [\"cart\", \"rail\"] }\n",
+        "[outputs]\nforward_kinematics = { part = \"linear\" }\n",
+        "[outputs]\nfunctions = [\"frame_velocity\"]\n",
+    ] {
+        let some = items(&["rail", "cart"], scene);
+        assert!(some.contains("pub const CART: ") && !some.contains("fn pose"), "{some}");
+    }
 }
 
 #[test]
@@ -75,7 +102,7 @@ fn a_scene_is_an_input_too_and_its_complaints_have_their_place() {
     };
     let expansion = scene("[outputs]\nmass_matrix = { part = \"diagonal\" }\n");
     assert_eq!(expansion.files, [here.join("cart.toml"), here.join("scene.toml")]);
-    let items = associated_items(&expansion.result.unwrap());
+    let items = expansion.result.unwrap().1;
     assert!(items.contains("pub fn mass_matrix(q: &[f64; 1], h: &mut [f64; 1])"), "{items}");
     assert!(!items.contains("pub fn inverse_dynamics"));
 
@@ -101,7 +128,7 @@ fn complaints_of_a_scene_in_the_macro_are_kept_apart() {
     };
     let expansion = scene("[zero]\nqd = true\n");
     assert_eq!(expansion.files, [here.join("cart.toml")]);
-    assert!(!associated_items(&expansion.result.unwrap()).contains("qd: &"));
+    assert!(!expansion.result.unwrap().1.contains("qd: &"));
     for (text, code) in [("[zero]\nqdot = true\n", "unknown-key"), ("[hold]\njoints = { slid = 0 }\n", "unknown-joint")]
     {
         let refusal = scene(text).result.unwrap_err();

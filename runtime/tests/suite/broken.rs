@@ -33,6 +33,16 @@ fn main() {
 }
 "#;
 
+/// Frames by name, of a file that is there.
+const USE_FRAMES: &str = r#"
+fn main() {
+    let mut x = [[0.0; 12]; Arm::FRAME_NAMES.len()];
+    Arm::forward_kinematics(&[0.1, -0.2, 0.3], &mut x);
+    let [px, ..] = Arm::pose(&x, Arm::FOREARM).position;
+    println!("{px} {:?}", x[Arm::FOREARM]);
+}
+"#;
+
 /// Lanes and batches.
 const USE_LANES: &str = r#"
 fn main() {
@@ -96,6 +106,7 @@ fn cases() -> Vec<Case> {
         ("missing", r#""robot/none.toml""#, USE, none(), none(), &["there is no robot file `robot/none.toml`"]),
         ("syntax", r#""robot/syntax.toml""#, USE, arm("mass = 2.5", "mass = = 2.5"), none(), &["toml-syntax"]),
         ("key", r#""robot/key.toml""#, USE, arm("mass = 2.5", "maas = 2.5"), none(), &["did you mean `mass`?"]),
+        ("frames", r#""robot/frames.toml""#, USE_FRAMES, arm("mass = 2.5", "mass = -2.5"), none(), &["negative-mass"]),
         ("mass", r#""robot/mass.toml""#, USE, arm("mass = 2.5", "mass = -2.5"), none(), &["negative-mass"]),
         (
             "inertia",

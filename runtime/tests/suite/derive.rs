@@ -3,7 +3,7 @@
 #![deny(warnings, missing_docs, clippy::all)]
 #![forbid(unsafe_code)]
 
-use straightline::Dynamics;
+use straightline::{Dynamics, FrameIndex, Pose};
 
 /// All functions, in double precision.
 #[derive(Dynamics, Clone, Copy, Debug)]
@@ -162,6 +162,11 @@ fn options_reach_the_compiler() {
     assert!(g[2].abs() > 0.5, "{g:?}");
     Two::forward_kinematics(&[0.0; 3], &mut x);
     assert_eq!(x[0][..3], [0.05, 0.1, 0.3]);
+    const FOREARM: FrameIndex<Controller<2>> = Two::FOREARM;
+    assert_eq!((Two::UPPER_ARM.get(), FOREARM.get()), (0, 1));
+    assert_eq!((Two::FRAME_NAMES[FOREARM], x[FOREARM]), ("forearm", x[1]));
+    let pose: Pose<f32> = Two::pose(&x, Two::UPPER_ARM);
+    assert_eq!((pose.position, <[f32; 12]>::from(pose)), ([0.05, 0.1, 0.3], x[0]));
     assert_eq!((Satellite::NQ, Satellite::NV), (10, 9));
 }
 
