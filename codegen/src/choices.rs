@@ -14,6 +14,14 @@ pub trait Choice: Copy + PartialEq + Sized + 'static {
     /// Every word, its meaning in a sentence, and the choice it stands for.
     fn words() -> Vec<(&'static str, &'static str, Self)>;
 
+    /// Whether the words are names of items, which macros write without quotes.
+    const IS_ITEM: bool = false;
+
+    /// Its word.
+    fn word(self) -> &'static str {
+        Self::words().iter().find(|w| w.2 == self).expect("every choice has a word").0
+    }
+
     /// The choice that someone may mean who calls it by another name.
     fn called(_: &str) -> Option<&'static str> {
         None
@@ -86,8 +94,18 @@ pub enum Lanes {
     Runtime,
 }
 
+/// By what a·b + c is computed in one rounding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fusion {
+    /// As the machine can, by `std`: the last bits depend on it.
+    Std,
+    /// By `mul_add_f64` (of f32 `mul_add_f32`) of the crate around the output, which needs `core` alone then.
+    Caller,
+}
+
 impl Choice for Function {
     const WHAT: &'static str = "function";
+    const IS_ITEM: bool = true;
     fn words() -> Vec<(&'static str, &'static str, Self)> {
         Function::known().map(|f| (f.name(), f.summary(), f)).collect()
     }
@@ -145,6 +163,20 @@ impl Choice for Lanes {
     }
 }
 
+impl Choice for Fusion {
+    const WHAT: &'static str = "way to fuse";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        vec![
+            ("std", "as the machine can, by std: the last bits depend on it then", Fusion::Std),
+            (
+                "caller",
+                "always, by `mul_add_f64` of the crate around the output, which needs core alone",
+                Fusion::Caller,
+            ),
+        ]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -163,6 +195,7 @@ mod tests {
         all::<ForwardDynamicsMethod>();
         all::<LimbForm>();
         all::<Lanes>();
+        all::<Fusion>();
     }
 
     #[test]

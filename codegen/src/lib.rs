@@ -25,7 +25,7 @@ pub mod scene;
 #[cfg(feature = "verify")]
 pub mod verify;
 
-pub use choices::{Lanes, LimbForm};
+pub use choices::{Fusion, Lanes, LimbForm};
 pub use compile::compile;
 pub use diagnostic::{Diagnostics, Source};
 pub use emit::Generated;

@@ -6,6 +6,7 @@ use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
 use straightline_codegen::model::{self, ModelOptions};
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::{Optimisations, Options};
 use straightline_codegen::program::optimised;
 use straightline_codegen::scene::{self, Scene};
@@ -29,7 +30,7 @@ impl Driven {
     /// With the complaints, if there are any errors.
     pub fn new(robot: &Source, options: &ModelOptions, scene: &str) -> Driven {
         let mut diagnostics = Diagnostics::new();
-        let file = scene::read(&Source::new("drives.toml", scene), &mut diagnostics);
+        let file = scene_file::read(&Source::new("drives.toml", scene), &mut diagnostics);
         let (model, complaints) = model::load(robot, options);
         diagnostics.extend(complaints);
         let scene = file.unwrap_or_else(|| panic!("{}\n{scene}", diagnostics.render())).scene;

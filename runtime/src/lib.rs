@@ -29,23 +29,34 @@
 //!
 //! | option | without it |
 //! |---|---|
-//! | `functions(inverse_dynamics, mass_matrix)` | all functions |
-//! | `frames("tool0")`: links that poses, velocities and Jacobians are asked for | the tips |
-//! | `scalar = "f32"`; `scalars("f64", "f32")`: for each further one a module `single` or `double` | `"f64"` |
-//! | `floating_base`: the root link moves freely | as the file says |
-//! | `joint_order("a", "b")`: all joints in the order of their coordinates | depth first, as in the file |
-//! | `generic`: functions take any [`Real`]: `f32`, `f64`, [`Dd`], [`Dual`], your own | the scalar alone |
-//! | `fma`: a·b + c in one rounding where the machine has it | the same bits everywhere |
-//! | `lanes`: beside every function the same over lanes of states and over batches ([`batch`]) | one state at a time |
-//! | `gravity(0.0, 0.0, -9.81)` \[m/s²\] | the file's, or this |
-//! | `angle_tolerance = 1e-6`: so near to a multiple of 30 or 45 degrees \[rad\] an angle is taken as that | rounding only |
-//! | `rules = "exact"`: the same bits as the generic runtime | `"all"`: fewest operations |
-//! | `forward_dynamics = "articulated-body"` or `"factorisation"` | the cheaper one |
-//! | `max_part_operations = 1000`: longer functions are cut | 12000 |
-//! | `allow("near-right-angle")`, `warn(..)`, `deny(..)`: what becomes of warnings, by their codes; `"warnings"`: of all | each is said |
-//! | `scene = "scenes/still.toml"`: what is wanted and what is held; what it says wins over other options | everything |
-//! | `scene(zero(qd = true), hold(joints = { yaw = 0.5 }))`: the same tables and keys, without a file | |
-//! | `module = "arm_dynamics"` (derive only): everything stands in that module, beside the type, too | where a scene has types of its own it is needed |
+//! | `functions(inverse_dynamics, mass_matrix)`: The functions that are generated | all |
+//! | `frames("tool")`: The frames (links) that poses, velocities and Jacobians are asked for | the robot's tips |
+//! | `scalar = "f32"`: The scalar type; of several each but the first has a module `single` or `double` with the same items: `"f64"`, `"f32"` | `"f64"` |
+//! | `lanes = "runtime"`: Beside every function the same over lanes of states and over batches, and where the drivers of batches come from: `"standalone"`, `"runtime"` | one state at a time |
+//! | `fma = "caller"`: Compute a·b + c in one rounding, and by what: `"std"`, `"caller"` | the same bits everywhere |
+//! | `generic`: Functions take any scalar that is a `straightline::Real`; the output depends on the package `straightline` | the scalar type alone |
+//! | `rules = "exact"`: Which rewrite rules may be used: `"all"`, `"exact"` | `"all"` |
+//! | `forward_dynamics = "articulated-body"`: How forward dynamics is computed: `"cheaper"`, `"articulated-body"`, `"factorisation"` | `"cheaper"` |
+//! | `limbs = "auto"`: How identical limbs are computed: `"apart"`, `"lanes"`, `"auto"` | `"apart"` |
+//! | `max_part_operations = 100`: Longer functions are cut into parts of at most so many operations | 12000 |
+//! | `certify_seconds = 0.5`: Certify bounds of errors, tighter ones, for so long per function and scalar type \[s]; bounds then depend on the machine | as long as it takes |
+//! | `certify_boxes = 40`: Certify bounds of errors, tighter ones: the ranges of each result are cut into so many boxes | 1, or as many as `certify_seconds` allows |
+//! | `certify_state`: Certify bounds of errors, and beside every function write `…_error_bound`, which bounds the errors at the state at hand | off |
+//! | `certify`: Certify a bound of the errors of every function, for the ranges of its inputs | off |
+//! | `mixed_precision = 1e-3`: Of f32, compute in f64 what it takes for certified errors up to so much, in the results' units, and nothing else | off |
+//! | `floating_base`: The root link moves freely: q begins with its position and quaternion (x y z qx qy qz qw) | as the robot file says |
+//! | `joint_order("elbow", "shoulder")`: All joints in the order of their coordinates | depth first, as in the file |
+//! | `angle_tolerance = 1e-6`: So near to a multiple of 30 or 45 degrees \[rad] an angle is taken as that; 0: every angle as it is written | 1e-15, rounding only |
+//! | `gravity(0, 0, -1.62)`: Acceleration due to gravity in the world \[m/s²] | the robot file's, or 0, 0, -9.81 |
+//! | `allow("near-right-angle")`: Say no warnings of this code (`warnings`: none); `straightline explain` lists the codes | every warning is said |
+//! | `warn("near-right-angle")`: Say warnings of this code, whatever the scene says | every warning is said |
+//! | `deny("near-right-angle")`: Warnings of this code are errors (`warnings`: all) | every warning is said |
+//! | `scene = "scenes/still.toml"`: A scene: what is wanted of the robot, and what is held; everything else is skipped | everything is wanted, nothing held |
+//! | `module = "arm_dynamics"`: The name of the module that everything stands in (of the derive, beside the type; in a build script of its file) | none; in a build script the robot file's name |
+//!
+//! Several scalars are `scalar("f64", "f32")`; a flag is switched off by `= false`. A scene can stand in the attribute itself, with the tables and
+//! keys of a file: `scene(zero(qd = true), hold(joints = { yaw = 0.5 }))`; what the attribute says of options counts before the scene. `module`
+//! is for the derive alone, and needed where a scene has types of its own.
 //!
 //! The path counts from the package's manifest, or else from the source file. The build runs again when the file changes;
 //! complaints about it, and about options, come as compiler errors with the file's line, all in one run, and stay the only ones:

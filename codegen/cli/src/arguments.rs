@@ -1,21 +1,16 @@
 //! The command line, and what it says in the library's terms.
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use crate::given::Given;
+use clap::builder::TypedValueParser;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use straightline_cli::experiment::parameter::{self, Range, Sweep};
-use straightline_codegen::certify::Effort;
-use straightline_codegen::choices::{Choice, Lanes, LimbForm};
-use straightline_codegen::diagnostic::{Diagnostic, Front, Level, Levels, Reporting};
-use straightline_codegen::expr::Grade;
 use straightline_codegen::identifier::is_prefix;
-use straightline_codegen::model::ModelOptions;
-use straightline_codegen::options::Options;
-use straightline_codegen::scene::MaxError;
-use straightline_codegen::schedule::Limits;
-use straightline_codegen::{ForwardDynamicsMethod, Function, Scalar};
+use straightline_codegen::options::table::Group;
+use straightline_codegen::options::Settings;
+use straightline_codegen::Function;
 use straightline_simulation::optimize::Objective;
 
 const EXIT_CODES: &str = "\
@@ -50,7 +45,7 @@ Examples:
   straightline generate panda.urdf -o src/panda.rs --check     # in CI: is the committed file up to date?
   straightline generate arm.urdf --scalar f32 --function inverse_dynamics --function gravity_force
   straightline generate solo12.urdf --floating-base --frame FL_FOOT --frame FR_FOOT -o solo12.rs
-  straightline generate panda.urdf --lanes --function inverse_dynamics -o src/panda.rs
+  straightline generate panda.urdf --lanes standalone --function inverse_dynamics -o src/panda.rs
 
 {EXIT_CODES}"))]
     Generate(Generate),
@@ -317,138 +312,21 @@ pub struct Export {
 }
 
 /// What is generated, and how.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "What is generated")]
-pub struct ProgramArgs {
-    /// A function to generate; may be repeated [default: all]
-    #[arg(long = "function", value_name = "NAME", value_parser = words::<Function>())]
-    functions: Vec<Function>,
-    /// A frame (link) that positions, velocities and Jacobians are asked for; may be repeated [default: the robot's tips]
-    #[arg(long = "frame", value_name = "NAME")]
-    frames: Vec<String>,
-    /// The scalar type; repeated, for each further one a module `single` or `double` [default: f64]
-    #[arg(long, value_parser = words::<Scalar>())]
-    scalar: Vec<Scalar>,
-    /// Which rewrite rules may be used
-    #[arg(long, default_value = "all", value_parser = words::<Grade>())]
-    rules: Grade,
-    /// How forward dynamics is computed
-    #[arg(long, value_name = "METHOD", default_value = "cheaper", value_parser = words::<ForwardDynamicsMethod>())]
-    forward_dynamics: ForwardDynamicsMethod,
-    /// How identical limbs are computed
-    #[arg(long, value_name = "FORM", default_value = "apart", value_parser = words::<LimbForm>())]
-    limbs: LimbForm,
-    /// Longer functions are cut into parts of at most so many operations
-    #[arg(long, value_name = "N", default_value_t = Limits::default().operations, value_parser = part_size)]
-    max_part_operations: usize,
-    /// Beside every function the same over lanes of states and over batches
-    #[arg(long, value_name = "HOME", num_args = 0..=1, require_equals = true, default_missing_value = "standalone",
-        value_parser = words::<Lanes>())]
-    lanes: Option<Lanes>,
-    /// Compute a*b + c in one rounding: as the machine can, by std (the last bits depend on it then), or by `caller`: always, by
-    /// `mul_add_f64` of the crate around the output, which needs core alone then
-    #[arg(long, value_name = "BY", num_args = 0..=1, require_equals = true, default_missing_value = "std",
-        value_parser = ["std", "caller"])]
-    fma: Option<String>,
-    /// Functions take any scalar that is a `straightline::Real`; the output depends on the package `straightline`
-    #[arg(long)]
-    pub generic: bool,
-    /// Certify a bound of the errors of every function, for the ranges of its inputs
-    #[arg(long)]
-    certify: bool,
-    /// The same with tighter bounds: the ranges of each result are cut into so many boxes
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    certify_boxes: Option<u32>,
-    /// The same, for so long per function and scalar type \[s\]; --certify-boxes limits it further
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    certify_seconds: Option<f64>,
-    /// Beside every function `…_error_bound`, which bounds the errors at the state at hand
-    #[arg(long)]
-    certify_state: bool,
-    /// Of f32, compute in f64 what it takes for proven errors up to so much, in the results' units, and nothing else
-    #[arg(long, value_name = "MAX_ERROR", value_parser = above_zero, conflicts_with = "fma")]
-    mixed_precision: Option<f64>,
-}
+pub type ProgramArgs = Given<{ Group::Program as u8 }>;
 
 /// How the robot file is read.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "How the robot file is read")]
 pub struct ModelArgs {
-    /// The root link moves freely: q begins with its position and quaternion (x y z qx qy qz qw)
-    #[arg(long)]
-    floating_base: bool,
-    /// The joints in the order of their coordinates, all of them [default: depth first, as in the file]
-    #[arg(long, value_name = "A,B,C", value_delimiter = ',')]
-    joint_order: Vec<String>,
-    /// Angles this close to a multiple of 30 or 45 degrees are taken as that [default: 1e-15, rounding only]
-    #[arg(long, value_name = "RAD", value_parser = tolerance)]
-    angle_tolerance: Option<f64>,
-    /// Take every angle as the number that is written
-    #[arg(long, conflicts_with = "angle_tolerance")]
-    literal_angles: bool,
-    /// A scene (TOML): what is wanted of the robot, and what is held; everything else is skipped
+    #[command(flatten)]
+    given: Given<{ Group::Model as u8 }>,
+    /// A scene (TOML): what is wanted of the robot, and what is held; everything else is skipped. Options given here count before its own
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
-    /// Acceleration due to gravity in the world [m/s²] [default: the file's, or 0,0,-9.81]
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector)]
-    gravity: Option<Vector>,
     #[command(flatten)]
-    reporting: ReportingArgs,
-}
-
-/// What is said.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "What is said")]
-pub struct ReportingArgs {
+    levels: Given<{ Group::Reporting as u8 }>,
     /// Say no warnings, show no progress
     #[arg(short, long)]
     quiet: bool,
-    /// Say no warnings of this code (`warnings`: none); `straightline explain` lists the codes; may be repeated
-    #[arg(long, value_name = "CODE", value_parser = |code: &str| code_at(code, Level::Allow))]
-    allow: Vec<String>,
-    /// Say warnings of this code, whatever the scene says; may be repeated
-    #[arg(long, value_name = "CODE", value_parser = |code: &str| code_at(code, Level::Warn))]
-    warn: Vec<String>,
-    /// Warnings of this code are errors (`warnings`: all); may be repeated
-    #[arg(long, value_name = "CODE", value_parser = |code: &str| code_at(code, Level::Deny))]
-    deny: Vec<String>,
-}
-
-fn code_at(code: &str, level: Level) -> Result<String, String> {
-    match Levels::complaint(code, level) {
-        None => Ok(code.to_string()),
-        Some(Diagnostic { title, help, .. }) => Err(format!("{title}; {help}")),
-    }
-}
-
-/// Three numbers; a type of its own because clap takes a list for a repeated argument.
-#[derive(Clone, Copy, Debug)]
-pub struct Vector([f64; 3]);
-
-fn words<C: Choice + Send + Sync>() -> impl TypedValueParser<Value = C> {
-    PossibleValuesParser::new(C::words().into_iter().map(|(word, meaning, _)| PossibleValue::new(word).help(meaning)))
-        .map(|word| C::from_word(&word).expect("clap passes possible values only"))
-}
-
-fn above_zero(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
-        _ => Err("a number above zero".to_string()),
-    }
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    match above_zero(text) {
-        Ok(x) if x <= Effort::MOST_SECONDS => Ok(x),
-        _ => Err(format!("seconds, above zero and up to {}", Effort::MOST_SECONDS)),
-    }
-}
-
-fn tolerance(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(x) if (0.0..=0.1).contains(&x) => Ok(x),
-        _ => Err("an angle between 0 and 0.1 rad".to_string()),
-    }
 }
 
 fn objective(text: &str) -> Result<Objective, String> {
@@ -463,124 +341,18 @@ fn interval(text: &str) -> Result<f64, String> {
     }
 }
 
-fn part_size(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(n) if n >= 100 => Ok(n),
-        _ => Err("a number of operations, at least 100".to_string()),
-    }
-}
-
-fn vector(text: &str) -> Result<Vector, String> {
-    let numbers: Option<Vec<f64>> =
-        text.split(',').map(|t| t.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
-    match numbers.as_deref() {
-        Some(&[x, y, z]) => Ok(Vector([x, y, z])),
-        _ => Err("three numbers with commas, such as 0,0,-9.81".to_string()),
-    }
-}
-
 impl ModelArgs {
-    pub fn options(&self) -> ModelOptions {
-        let defaults = ModelOptions::default();
-        ModelOptions {
-            floating_base: self.floating_base,
-            joint_order: (!self.joint_order.is_empty()).then(|| self.joint_order.clone()),
-            angle_tolerance: match (self.literal_angles, self.angle_tolerance) {
-                (true, _) => 0.0,
-                (false, tolerance) => tolerance.unwrap_or(defaults.angle_tolerance),
-            },
-            gravity: self.gravity.map(|Vector(xyz)| xyz),
-            ..defaults
-        }
-    }
-}
-
-impl ModelArgs {
-    /// What becomes of warnings.
-    pub fn reporting(&self) -> Reporting {
-        let ReportingArgs { allow, warn, deny, .. } = &self.reporting;
-        let mut levels = Levels::default();
-        for (codes, level) in [(allow, Level::Allow), (warn, Level::Warn), (deny, Level::Deny)] {
-            codes.iter().for_each(|code| levels.set(code, level));
-        }
-        Reporting { levels, front: Front::CommandLine }
+    /// The options that are given, with those of a program.
+    pub fn settings(&self, program: Option<&ProgramArgs>) -> Settings {
+        let mut settings = program.map(|program| program.settings.clone()).unwrap_or_default();
+        settings.extend(&self.given.settings);
+        settings.extend(&self.levels.settings);
+        settings
     }
 
     /// Whether warnings and progress are left out.
     pub fn is_quiet(&self) -> bool {
-        self.reporting.quiet
-    }
-
-    /// What the command line says of options that a scene gives, too.
-    pub fn insist(&self, options: &mut Options) {
-        if self.literal_angles || self.angle_tolerance.is_some() {
-            options.model.angle_tolerance = self.options().angle_tolerance;
-        }
-    }
-}
-
-impl ProgramArgs {
-    /// Whether a*b + c comes from the crate around the output.
-    pub fn fma_by_caller(&self) -> bool {
-        self.fma.as_deref() == Some("caller")
-    }
-
-    /// What the command line says of options that a scene gives, too.
-    pub fn insist(&self, options: &mut Options) {
-        if !self.functions.is_empty() {
-            options.functions.clone_from(&self.functions);
-            options.functions.sort_unstable();
-            options.functions.dedup();
-        }
-        if let [first, others @ ..] = &self.scalar[..] {
-            (options.scalar, options.also) = (*first, others.to_vec());
-        }
-        options.certify = self.effort().or(options.certify);
-        self.mix(options);
-    }
-
-    fn mix(&self, options: &mut Options) {
-        let Some(max_error) = self.mixed_precision else { return };
-        for function in &options.functions {
-            let budget = options.scene.budgets.entry(*function).or_default();
-            (budget.max_error, budget.mixed_precision) = (Some(MaxError::All(max_error)), true);
-        }
-    }
-
-    fn effort(&self) -> Option<Effort> {
-        let wanted =
-            self.certify || self.certify_boxes.is_some() || self.certify_seconds.is_some() || self.certify_state;
-        let boxes = self.certify_boxes.map(|n| n as usize);
-        wanted.then(|| Effort::new(boxes, self.certify_seconds, self.certify_state))
-    }
-
-    pub fn options(&self, model: &ModelArgs) -> Options {
-        let mut functions = self.functions.clone();
-        functions.sort_unstable();
-        functions.dedup();
-        if functions.is_empty() {
-            functions = Function::all().collect();
-        }
-        let mut options = Options {
-            functions,
-            frames: self.frames.clone(),
-            scalar: self.scalar.first().copied().unwrap_or(Scalar::F64),
-            also: self.scalar.iter().skip(1).copied().collect(),
-            lanes: self.lanes,
-            fma: self.fma.is_some(),
-            fma_by_caller: self.fma_by_caller(),
-            generic: self.generic,
-            grade: self.rules,
-            forward_dynamics: self.forward_dynamics,
-            limbs: self.limbs,
-            limits: Limits { operations: self.max_part_operations },
-            model: model.options(),
-            certify: self.effort(),
-            reporting: model.reporting(),
-            ..Options::default()
-        };
-        self.mix(&mut options);
-        options
+        self.quiet
     }
 }
 
@@ -687,7 +459,7 @@ mod tests {
         let given = "straightline generate arm.urdf --function inverse_dynamic --scaler f46 --allow near-right-angel --function RNEA --gravity 1,2";
         let complaints = CommandLine::read(given.split(' ').map(OsString::from).collect()).unwrap_err();
         let said: Vec<String> = complaints.iter().map(ToString::to_string).collect();
-        let parts = ["'inverse_dynamic'", "'--scalar'", "f64, f32", "`near-right-angle`", "'RNEA'", "0,0,-9.81"];
+        let parts = ["'inverse_dynamic'", "'--scalar'", "f64, f32", "`near-right-angle`", "'RNEA'", "0,0,-1.62"];
         assert_eq!(said.len(), parts.len(), "{said:?}");
         for part in parts {
             assert_eq!(said.iter().filter(|text| text.contains(part)).count(), 1, "{part}: {said:?}");
@@ -727,7 +499,9 @@ mod tests {
     fn gravity_may_point_down() {
         let line = CommandLine::parse_from(["straightline", "check", "a.urdf", "--gravity", "-1,0,-9.81"]);
         let Command::Check(check) = line.command else { panic!("check was asked for") };
-        assert_eq!(check.model.gravity.unwrap().0, [-1.0, 0.0, -9.81]);
+        let mut options = straightline_codegen::Options::default();
+        check.model.settings(None).apply(&mut options);
+        assert_eq!(options.model.gravity, Some([-1.0, 0.0, -9.81]));
     }
 
     #[test]
@@ -736,7 +510,7 @@ mod tests {
             (&["generate", "a", "--function", "inverse_dynamic"][..], "inverse_dynamics"),
             (&["generate", "a", "--scalar", "f16"], "f64, f32"),
             (&["generate", "a", "--lanes=8"], "standalone, runtime"),
-            (&["generate", "a", "--gravity", "1,2"], "0,0,-9.81"),
+            (&["generate", "a", "--gravity", "1,2"], "0,0,-1.62"),
             (&["generate", "a", "--check"], "--output"),
             (&["export", "a", "-o", "b"], "--c-abi"),
             (&["export", "a", "-o", "b", "--c-abi", "--prefix", "a-b"], "no digit in front"),

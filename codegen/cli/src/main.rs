@@ -6,6 +6,7 @@
 mod arguments;
 mod contact;
 mod files;
+mod given;
 mod motion;
 mod page;
 mod print;
@@ -19,7 +20,7 @@ use straightline_cli::html;
 use straightline_codegen::compile::{compile, explain};
 use straightline_codegen::diagnostic::{self, codes, Diagnostics, Severity, Source};
 use straightline_codegen::emit::{c_package as export, Generated};
-use straightline_codegen::options::{check_options, Options};
+use straightline_codegen::options::{check_options, scene_file, Options, SceneFile};
 use straightline_codegen::{description, identifier, model, output, scene, verify};
 
 /// Why a command ended early; what there is to say was said where it happened, except for [`Failure::Files`].
@@ -67,15 +68,9 @@ fn main() -> ExitCode {
 
 /// What the command line and the scene that it names say; what is wrong with the scene is said when it is used.
 fn options(program: Option<&ProgramArgs>, model: &ModelArgs) -> Result<Options, Failure> {
-    let plain = || Options { model: model.options(), reporting: model.reporting(), ..Options::default() };
-    let options = program.map_or_else(plain, |program| program.options(model));
-    let Some(path) = &model.scene else { return Ok(options) };
-    let mut options = scene::read_partly(&read(path)?).into_options(options);
-    model.insist(&mut options);
-    if let Some(program) = program {
-        program.insist(&mut options);
-    }
-    Ok(options)
+    let file = model.scene.as_deref().map(read).transpose()?;
+    let file = file.as_ref().map_or_else(SceneFile::default, scene_file::read_partly);
+    Ok(file.with(&model.settings(program), Options::default()))
 }
 
 /// Compiles, and prints errors and warnings; notes are for `check`.
@@ -200,9 +195,9 @@ fn verify(a: &Verify) -> Result<(), Failure> {
 }
 
 fn export(a: &Export) -> Result<(), Failure> {
-    if a.program.generic {
+    if options(Some(&a.program), &a.model)?.generic {
         print::error("C has no generic functions");
-        print::help("leave out --generic; --scalar says which numbers the C functions take");
+        print::help("leave out `generic`; `scalar` says which numbers the C functions take");
         return Err(Failure::Input);
     }
     let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;

@@ -188,7 +188,7 @@ pub fn notes(description: &Description, angles: &[SpecialAngle], doubtful: &[Dou
         }
     }
     if !angles.is_empty() {
-        writeln!(out, "  angles taken as exact (--literal-angles takes them as written):")?;
+        writeln!(out, "  angles taken as exact (--angle-tolerance 0 takes them as written):")?;
         for a in angles {
             writeln!(out, "    {}: {}: {} as {}, {:.1e} rad off", a.place, a.what, a.text, a.taken_as, a.deviation)?;
         }

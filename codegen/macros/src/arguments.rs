@@ -2,23 +2,22 @@
 
 use crate::scene::InlineScene;
 use proc_macro2::{Span, TokenTree};
-use straightline_codegen::certify::Effort;
-use straightline_codegen::choices::{Choice, Lanes};
-use straightline_codegen::diagnostic::wording::did_you_mean;
-use straightline_codegen::diagnostic::{Level, Levels};
-use straightline_codegen::Options;
+use straightline_codegen::diagnostic::{Diagnostic, Front};
+use straightline_codegen::options::table::{Group, Kind, Row};
+use straightline_codegen::options::{Settings, Value};
 use syn::parse::{Parse, ParseStream};
 use syn::punctuated::Punctuated;
-use syn::{parenthesized, Attribute, Error, Ident, Lit, LitInt, LitStr, Result, Token, Visibility};
+use syn::{parenthesized, token, Attribute, Error, Ident, Lit, LitBool, LitStr, Result, Token, Visibility};
 
 /// The robot file, the scene and the options, as both macros take them.
+#[derive(Default)]
 pub struct Arguments {
     /// The name of the robot file; `None` if it cannot be read.
     pub robot: Option<LitStr>,
     pub scene: Option<SceneArgument>,
     /// The module that the derive puts everything in, where the user can reach it.
     pub module: Option<Ident>,
-    pub options: Options,
+    pub settings: Settings,
     /// What is wrong with them: what could be read of the others counts nevertheless.
     pub errors: Vec<Error>,
     /// What was asked for as a function and is none.
@@ -29,7 +28,7 @@ impl Arguments {
     /// Those of which nothing can be read.
     pub fn unreadable(error: Error) -> Self {
         let errors = error.into_iter().collect();
-        Arguments { robot: None, scene: None, module: None, options: Options::default(), errors, unknown: Vec::new() }
+        Arguments { errors, ..Arguments::default() }
     }
 
     /// Where complaints about all of it stand.
@@ -65,14 +64,7 @@ impl Parse for Module {
 
 impl Parse for Arguments {
     fn parse(input: ParseStream) -> Result<Self> {
-        let mut arguments = Arguments {
-            robot: None,
-            scene: None,
-            module: None,
-            options: Options::default(),
-            errors: Vec::new(),
-            unknown: Vec::new(),
-        };
+        let mut arguments = Arguments::default();
         match input.peek(LitStr) {
             true => arguments.robot = Some(input.parse()?),
             false => {
@@ -109,126 +101,94 @@ fn skip(input: ParseStream) -> Result<()> {
     Ok(())
 }
 
-/// All options, in the order of the documentation.
-const OPTIONS: &[&str] = &[
-    "functions",
-    "frames",
-    "scalar",
-    "scalars",
-    "floating_base",
-    "joint_order",
-    "generic",
-    "fma",
-    "fma_by_caller",
-    "lanes",
-    "gravity",
-    "angle_tolerance",
-    "rules",
-    "forward_dynamics",
-    "limbs",
-    "max_part_operations",
-    "certify",
-    "certify_boxes",
-    "certify_seconds",
-    "certify_state",
-    "scene",
-    "module",
-    "allow",
-    "warn",
-    "deny",
-];
+/// How macros are spoken to.
+const FRONT: Front = Front::Derive;
 
 fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
     let key: Ident = input.parse()?;
-    let options = &mut arguments.options;
-    match key.to_string().as_str() {
-        "scene" if arguments.scene.is_some() => return Err(Error::new(key.span(), "there is a scene already")),
-        "scene" => {
+    // several scalars are a list of them
+    let name = key.to_string();
+    let name = if name == "scalars" { "scalar" } else { name.as_str() };
+    let row = Row::find(name, |row| row.called(FRONT).is_some()).map_err(|unknown| Error::new(key.span(), unknown))?;
+    match (row.group, row.name) {
+        (Group::Front, "scene") if arguments.scene.is_some() => Err(Error::new(key.span(), "there is a scene already")),
+        (Group::Front, "scene") => {
             arguments.scene = Some(if input.peek(Token![=]) {
                 SceneArgument::File(value(input)?)
             } else {
                 SceneArgument::Inline(InlineScene::parse(&key, input)?)
             });
+            Ok(())
         }
-        "module" => arguments.module = Some(value::<LitStr>(input)?.parse()?),
-        "floating_base" => options.model.floating_base = true,
-        "certify" => drop(options.certify.get_or_insert_default()),
-        "certify_state" => options.certify.get_or_insert_default().companions = true,
-        "certify_boxes" => options.certify.get_or_insert_default().boxes = count(input, Effort::MOST_BOXES)?,
-        "certify_seconds" => {
-            let given = value::<Lit>(input)?;
-            let seconds = number(&given)?;
-            if !(seconds > 0.0 && seconds <= Effort::MOST_SECONDS) {
-                return Err(Error::new(given.span(), format!("seconds, above 0 and up to {}", Effort::MOST_SECONDS)));
-            }
-            let effort = options.certify.get_or_insert_default();
-            let boxes = (effort.boxes > 1).then_some(effort.boxes);
-            *effort = Effort::new(boxes, Some(seconds), effort.companions);
+        (Group::Front, _) => {
+            arguments.module = Some(value::<LitStr>(input)?.parse()?);
+            Ok(())
         }
-        "scalar" => options.scalar = word(input)?,
-        "scalars" => {
-            let mut scalars = all(list::<LitStr>(input)?.iter().map(|name| parsed(&name.value(), name)))?.into_iter();
-            options.scalar = scalars.next().ok_or_else(|| Error::new(key.span(), "scalars(\"f64\", \"f32\")"))?;
-            options.also = scalars.collect();
-        }
-        "lanes" => options.lanes = Some(Lanes::Runtime),
-        "fma" => options.fma = true,
-        "fma_by_caller" => (options.fma, options.fma_by_caller) = (true, true),
-        "generic" => options.generic = true,
-        "rules" => options.grade = word(input)?,
-        "forward_dynamics" => options.forward_dynamics = word(input)?,
-        "limbs" => options.limbs = word(input)?,
-        "max_part_operations" => options.limits.operations = value::<LitInt>(input)?.base10_parse()?,
-        "angle_tolerance" => options.model.angle_tolerance = number(&value(input)?)?,
-        "functions" => {
-            // those that are known are wanted, whatever is wrong with the others
+        _ => {
             let mut errors = None;
-            options.functions = Vec::new();
-            for name in list::<Ident>(input)? {
-                match parsed(&name.to_string(), &name) {
-                    Ok(function) => options.functions.push(function),
-                    Err(error) => {
-                        keep(&mut errors, error);
-                        arguments.unknown.push(name);
-                    }
-                }
+            let value = value_of(row, &key, input, &mut errors, &mut arguments.unknown)?;
+            let given = arguments.settings.give(row, value, FRONT);
+            if let (None, Err(wrong)) = (&errors, given) {
+                wrong.iter().for_each(|wrong| keep(&mut errors, said(key.span(), wrong)));
             }
-            options.functions.sort_unstable();
-            options.functions.dedup();
-            errors.map_or(Ok(()), Err)?;
-        }
-        "frames" => options.frames = strings(input)?,
-        "joint_order" => options.model.joint_order = Some(strings(input)?),
-        "gravity" => {
-            let numbers = list::<Lit>(input)?.iter().map(number).collect::<Result<Vec<f64>>>()?;
-            let three = || Error::new(key.span(), "gravity takes three numbers: gravity(0.0, 0.0, -9.81)");
-            options.model.gravity = Some(numbers.try_into().map_err(|_| three())?);
-        }
-        "allow" => levels(input, options, Level::Allow)?,
-        "warn" => levels(input, options, Level::Warn)?,
-        "deny" => levels(input, options, Level::Deny)?,
-        other => {
-            let hint = did_you_mean(other, OPTIONS.iter().copied());
-            let hint = hint.unwrap_or_else(|| format!("one of: {}", OPTIONS.join(", ")));
-            return Err(Error::new(key.span(), format!("there is no option `{other}`; {hint}")));
+            errors.map_or(Ok(()), Err)
         }
     }
-    Ok(())
 }
 
-/// `("near-right-angle", "axis-length")`
-fn levels(input: ParseStream, options: &mut Options, level: Level) -> Result<()> {
-    let mut errors = None;
-    for code in list::<LitStr>(input)? {
-        match Levels::complaint(&code.value(), level) {
-            None => options.reporting.levels.set(code.value(), level),
-            Some(complaint) => {
-                let said = [complaint.title, complaint.help].join("; ");
-                keep(&mut errors, Error::new(code.span(), said));
-            }
+/// A complaint at a token.
+fn said(place: Span, wrong: &Diagnostic) -> Error {
+    Error::new(place, wrong.sentence())
+}
+
+/// The value of an option. What is wrong with single words goes to `errors`, names of items that there are not to `unknown`; words that
+/// are right count.
+fn value_of(
+    row: &Row,
+    key: &Ident,
+    input: ParseStream,
+    errors: &mut Option<Error>,
+    unknown: &mut Vec<Ident>,
+) -> Result<Value> {
+    let is_alone = !input.peek(Token![=]) && !input.peek(token::Paren);
+    let wrong_form = || said(key.span(), &row.wrong_form(FRONT));
+    let mut right = |text: String, place: Span| match row.wrong_word(&text) {
+        None => Some(text),
+        Some(wrong) => {
+            keep(errors, said(place, &wrong));
+            None
         }
-    }
-    errors.map_or(Ok(()), Err)
+    };
+    Ok(match &row.kind {
+        Kind::Flag if is_alone => true.into(),
+        Kind::Flag => value::<LitBool>(input)?.value.into(),
+        Kind::Word(_, Some(alone)) if is_alone => (*alone).into(),
+        _ if is_alone => return Err(wrong_form()),
+        Kind::Real(..) | Kind::Whole(..) => {
+            let given = value(input)?;
+            let number = number(&given)?;
+            row.wrong_number(number).into_iter().for_each(|wrong| keep(errors, said(given.span(), &wrong)));
+            number.into()
+        }
+        Kind::Vector => {
+            let numbers = list::<Lit>(input)?.iter().map(number).collect::<Result<Vec<f64>>>()?;
+            Value::Numbers(numbers)
+        }
+        Kind::Words(of) if of.is_of_items => {
+            let mut known = Vec::new();
+            for name in list::<Ident>(input)? {
+                match right(name.to_string(), name.span()) {
+                    Some(word) => known.push(word),
+                    None => unknown.push(name),
+                }
+            }
+            Value::Words(known)
+        }
+        _ => {
+            let words = if input.peek(Token![=]) { vec![value::<LitStr>(input)?] } else { list::<LitStr>(input)? };
+            Value::of_words(words.iter().filter_map(|word| right(word.value(), word.span())))
+        }
+    })
 }
 
 /// One error more.
@@ -239,32 +199,10 @@ fn keep(errors: &mut Option<Error>, error: Error) {
     }
 }
 
-/// All values, or all errors.
-fn all<T>(results: impl Iterator<Item = Result<T>>) -> Result<Vec<T>> {
-    let (mut values, mut errors) = (Vec::new(), None);
-    for result in results {
-        match result {
-            Ok(value) => values.push(value),
-            Err(error) => keep(&mut errors, error),
-        }
-    }
-    errors.map_or(Ok(values), Err)
-}
-
 /// ` = value`
 fn value<T: Parse>(input: ParseStream) -> Result<T> {
     input.parse::<Token![=]>()?;
     input.parse()
-}
-
-/// ` = 40`, from 1.
-fn count(input: ParseStream, most: usize) -> Result<usize> {
-    let literal: LitInt = value(input)?;
-    let count: usize = literal.base10_parse()?;
-    match (1..=most).contains(&count) {
-        true => Ok(count),
-        false => Err(Error::new(literal.span(), format!("a number between 1 and {most}"))),
-    }
 }
 
 /// `(a, b, c)`
@@ -274,24 +212,80 @@ fn list<T: Parse>(input: ParseStream) -> Result<Vec<T>> {
     Ok(Punctuated::<T, Token![,]>::parse_terminated(&inner)?.into_iter().collect())
 }
 
-fn strings(input: ParseStream) -> Result<Vec<String>> {
-    Ok(list::<LitStr>(input)?.iter().map(LitStr::value).collect())
-}
-
-/// ` = "word"`
-fn word<T: Choice>(input: ParseStream) -> Result<T> {
-    let text: LitStr = value(input)?;
-    parsed(&text.value(), &text)
-}
-
-fn parsed<T: Choice>(text: &str, place: &dyn quote::ToTokens) -> Result<T> {
-    T::from_word(text).map_err(|error| Error::new_spanned(place, error))
-}
-
 fn number(literal: &Lit) -> Result<f64> {
     match literal {
         Lit::Float(x) => x.base10_parse(),
         Lit::Int(x) => x.base10_parse(),
         other => Err(Error::new_spanned(other, "a number is wanted")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use straightline_codegen::options::table::TABLE;
+
+    fn arguments(options: &str) -> Arguments {
+        syn::parse_str(&format!("\"arm.toml\", {options}")).unwrap_or_else(|error| panic!("{options}: {error}"))
+    }
+
+    #[test]
+    fn every_row_of_the_table_is_a_key_or_says_why_not() {
+        for row in TABLE.iter().filter(|row| row.name != "scene") {
+            let written = row.written(FRONT);
+            let read = arguments(&written);
+            if row.called(FRONT).is_none() {
+                assert!(read.errors[0].to_string().starts_with(&format!("there is no option `{}`", row.name)));
+                continue;
+            }
+            assert!(read.errors.is_empty(), "{written}: {:?}", read.errors);
+            let mut wanted = Settings::default();
+            match row.group {
+                Group::Front => assert_eq!(read.module.expect("a module").to_string(), row.example[0]),
+                _ => wanted.give(row, row.parse(row.example, FRONT).unwrap(), FRONT).unwrap(),
+            }
+            assert_eq!(read.settings, wanted, "{written}");
+        }
+        assert!(arguments("scene = \"still.toml\"").scene.is_some());
+    }
+
+    #[test]
+    fn all_that_is_wrong_with_options_is_said_with_what_is_right() {
+        let read = arguments(
+            "lanes, lans = \"runtime\", fma = \"calller\", angle_tolerance = 0.5, certify_boxes = 1.5, gravity(1.0, 2.0), generic = 3, \
+             functions(RNEA, energy), max_part_operations = 99",
+        );
+        let said: Vec<String> = read.errors.iter().map(ToString::to_string).collect();
+        let parts = [
+            "`lanes` takes one of standalone, runtime; write `lanes = \"runtime\"`",
+            "there is no option `lans`; did you mean `lanes`?",
+            "there is no way to fuse `calller`; did you mean `caller`?",
+            "angle_tolerance: 0.5 is not between 0 and 0.1 rad",
+            "certify_boxes: 1.5 is not between 1 and 100000",
+            "`gravity` takes three numbers; write `gravity(0, 0, -1.62)`",
+            "expected boolean literal",
+            "there is no function `RNEA`; did you mean `inverse_dynamics`?",
+            "max_part_operations: 99.0 is not a whole number from 100",
+        ];
+        assert_eq!(said.len(), parts.len(), "{said:#?}");
+        for (said, part) in said.iter().zip(parts) {
+            assert!(said.contains(part), "{said} has no {part}");
+        }
+        let [unknown] = &read.unknown[..] else { panic!("one name is unknown") };
+        assert_eq!(unknown, "RNEA");
+    }
+
+    #[test]
+    fn what_is_alone_and_what_is_switched_off_means_what_it_says() {
+        let of = |text: &str| {
+            let mut options = straightline_codegen::Options::default();
+            let read = arguments(text);
+            assert!(read.errors.is_empty(), "{text}: {:?}", read.errors);
+            read.settings.apply(&mut options);
+            options.hashed()
+        };
+        assert_eq!(of("fma, generic = false"), "{fma=true;}");
+        assert_eq!(of("fma = \"caller\", scalars(\"f64\", \"f32\")"), "{also=[f32,];fma=true;fma_by_caller=true;}");
+        assert_eq!(of("certify_boxes = 3, certify = false"), "{}");
     }
 }

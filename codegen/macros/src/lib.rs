@@ -108,13 +108,13 @@ fn compiled(arguments: &Arguments) -> Compiled {
     let (files, result, scene) = match &arguments.robot {
         None => (Vec::new(), Err(arguments.errors.clone()), scene_of.map(|_| String::new())),
         Some(robot) if arguments.errors.is_empty() => {
-            let expansion = expand(&robot.value(), scene_of.as_ref(), &directories, &arguments.options);
+            let expansion = expand(&robot.value(), scene_of.as_ref(), &directories, &arguments.settings);
             let Expansion { files, result, warnings, scene } = expansion;
             say(&warnings);
             (files, result.map_err(|refusal| refused(arguments, &refusal)), scene)
         }
         Some(robot) => {
-            let (files, refusal, scene) = examine(&robot.value(), scene_of.as_ref(), &directories, &arguments.options);
+            let (files, refusal, scene) = examine(&robot.value(), scene_of.as_ref(), &directories, &arguments.settings);
             let further = refusal.map(|refusal| refused(arguments, &refusal)).unwrap_or_default();
             (files, Err(arguments.errors.iter().cloned().chain(further).collect()), scene)
         }
@@ -150,7 +150,8 @@ fn refused(arguments: &Arguments, refusal: &Refusal) -> Vec<Error> {
 
 /// The options of which stubs are made: all functions where an option is wrong, as it may be their list.
 fn stubbed(arguments: &Arguments) -> Options {
-    let mut options = arguments.options.clone();
+    let mut options = Options::default();
+    arguments.settings.apply(&mut options);
     if !arguments.errors.is_empty() {
         options.functions = Function::all().collect();
     }

@@ -5,7 +5,7 @@
 use proc_macro2::Span;
 use std::ops::Range;
 use straightline_codegen::diagnostic::{Diagnostic, Source};
-use straightline_codegen::scene::LISTS;
+use straightline_codegen::options::scene_file::LISTS;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 use syn::spanned::Spanned;
@@ -178,7 +178,8 @@ fn quoted(text: &str) -> String {
 mod tests {
     use super::*;
     use straightline_codegen::diagnostic::Diagnostics;
-    use straightline_codegen::scene::{read, Budget, Gravity, Part, SceneFile, Zero};
+    use straightline_codegen::options::scene_file::{read, SceneFile};
+    use straightline_codegen::scene::{Budget, Gravity, Part, Zero};
     use straightline_codegen::Function;
     use syn::parse::Parse;
 

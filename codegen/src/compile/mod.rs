@@ -10,7 +10,7 @@ use crate::emit::generated::generate;
 use crate::emit::{self, Generated};
 use crate::equations::Robot;
 use crate::function::Function;
-use crate::options::stable::{fnv_1a, Stable};
+use crate::options::stable::fnv_1a;
 use crate::options::Options;
 use crate::program::equivalence::Disagreement;
 use crate::program::mixed::mix_precisions;
@@ -72,7 +72,7 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let mut programs = programs.map_err(|wrong| only(no_form(&wrong, &robot.model, options.scalar, &description)))?;
     let beyond = |program: &str, why: &str, diagnostics: &mut Diagnostics| {
         let complaint = scene::messages::program_beyond_scalar(program, options.scalar.name(), why);
-        options.scene.places.complain("numbers.scalar", complaint, diagnostics);
+        options.scene.places.complain("options.scalar", complaint, diagnostics);
     };
     for program in &mut programs {
         if let Err(wrong) = mix_precisions(&robot, &frames, program, &resolved) {
@@ -138,5 +138,5 @@ fn only(error: Diagnostic) -> Diagnostics {
 
 /// Over everything that the output depends on.
 fn hash(text: &str, options: &Options) -> u64 {
-    fnv_1a([text, "\0", crate::VERSION, "\0", &options.stable_text()].concat().bytes())
+    fnv_1a([text, "\0", crate::VERSION, "\0", &options.hashed()].concat().bytes())
 }

@@ -59,12 +59,12 @@ pub(super) fn prepare(source: &Source, options: &Options) -> Result<Prepared, Di
         let complaint = scene::messages::function_not_of_robot(function.name(), model.drives.is_empty());
         let path = match options.scene.outputs.contains_key(function) {
             true => format!("outputs.{}", function.name()),
-            false => "outputs.functions".to_string(),
+            false => "options.functions".to_string(),
         };
         options.scene.places.complain(&path, complaint, &mut diagnostics);
     }
     if options.limbs == LimbForm::Lanes && model.as_ref().is_some_and(|model| model::limbs::limbs(model).is_empty()) {
-        options.scene.places.complain("outputs.limbs", scene::messages::no_identical_limbs(), &mut diagnostics);
+        options.scene.places.complain("options.limbs", scene::messages::no_identical_limbs(), &mut diagnostics);
     }
     diagnostics.sort();
     let (Some(description), Some(whole), Some(model), false) = (description, whole, model, diagnostics.has_errors())

@@ -44,6 +44,11 @@ impl Levels {
         self.list.push((code.into(), level));
     }
 
+    /// Gives each of these codes a level.
+    pub fn set_all(&mut self, codes: &[String], level: Level) {
+        codes.iter().for_each(|code| self.set(code, level));
+    }
+
     /// Adds those of `later`, which count before these.
     pub fn extend(&mut self, later: &Levels) {
         self.list.extend(later.list.iter().cloned());

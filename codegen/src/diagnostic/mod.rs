@@ -266,6 +266,12 @@ impl Diagnostic {
         self
     }
 
+    /// What is wrong and what to do, in one line.
+    pub fn sentence(&self) -> String {
+        let parts = [self.title.as_str(), self.help.as_str()];
+        parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
+    }
+
     /// With an option of the fronts, and its value unless it is switched on: where `{option}` stands in the texts, the
     /// front that speaks writes it in its own way.
     #[must_use]

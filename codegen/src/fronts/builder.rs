@@ -21,17 +21,18 @@
 //! The build runs again when the robot file changes. Complaints name the file, the line and the column: errors end the
 //! build, warnings do not. Nothing is written outside `OUT_DIR`.
 
-use crate::choices::Lanes;
+use crate::choices::{Fusion, Lanes, LimbForm};
 use crate::compile::compile;
-use crate::diagnostic::{Diagnostics, Front, Level, Reporting, Severity, Source};
+use crate::diagnostic::{Diagnostic, Diagnostics, Front, Reporting, Severity, Source};
 use crate::emit::Generated;
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::identifier::prefix;
-use crate::options::Options;
+use crate::options::{scene_file, Options, SceneFile, Settings, Value};
 use crate::output::write_file_apart;
-use crate::scene::{self, Scene};
+use crate::scene::Scene;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use straightline_graph::certify::Effort;
 use straightline_graph::expr::Grade;
 use straightline_graph::Scalar;
 
@@ -51,142 +52,142 @@ pub struct Builder {
     scene_file: Option<PathBuf>,
     module: Option<String>,
     out_dir: Option<PathBuf>,
-    options: Options,
+    scene: Scene,
+    settings: Settings,
+    wrong: Vec<Diagnostic>,
 }
 
 impl Builder {
     /// From a robot file (URDF or TOML), relative to the package's manifest; with all functions, in f64.
     pub fn new(robot: impl Into<PathBuf>) -> Self {
-        let reporting = Reporting { front: Front::Builder, ..Reporting::default() };
-        let options = Options { reporting, ..Options::default() };
-        Builder { robot: robot.into(), scene_file: None, module: None, out_dir: None, options }
+        Builder {
+            robot: robot.into(),
+            scene_file: None,
+            module: None,
+            out_dir: None,
+            scene: Scene::default(),
+            settings: Settings::default(),
+            wrong: Vec::new(),
+        }
+    }
+
+    /// Any option by its name, as `guide/src/options.md` lists them. What is wrong with it is said by [`Builder::build`].
+    pub fn option(mut self, name: &str, value: impl Into<Value>) -> Self {
+        let given = self.settings.set(name, value, Front::Builder);
+        self.wrong.extend(given.err().unwrap_or_default());
+        self
     }
 
     /// These functions only.
-    pub fn functions(mut self, functions: impl IntoIterator<Item = Function>) -> Self {
-        self.options.functions = functions.into_iter().collect();
-        self.options.functions.sort_unstable();
-        self.options.functions.dedup();
-        self
+    pub fn functions(self, functions: impl IntoIterator<Item = Function>) -> Self {
+        self.option("functions", Value::of_choices(functions))
     }
 
     /// The frames (links) of the functions that answer per frame; otherwise the tips of the robot.
-    pub fn frames(mut self, frames: impl IntoIterator<Item = impl Into<String>>) -> Self {
-        self.options.frames = frames.into_iter().map(Into::into).collect();
-        self
+    pub fn frames(self, frames: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.option("frames", Value::of_words(frames))
     }
 
     /// The scalar type; otherwise f64.
-    pub fn scalar(mut self, scalar: Scalar) -> Self {
-        self.options.scalar = scalar;
-        self
+    pub fn scalar(self, scalar: Scalar) -> Self {
+        self.option("scalar", scalar)
     }
 
     /// Several scalar types: the first as [`Builder::scalar`], for each of the others a module `single` or `double` with the
     /// same items.
-    pub fn scalars(mut self, scalars: impl IntoIterator<Item = Scalar>) -> Self {
-        let mut scalars = scalars.into_iter();
-        self.options.scalar = scalars.next().unwrap_or(self.options.scalar);
-        self.options.also = scalars.collect();
-        self
+    pub fn scalars(self, scalars: impl IntoIterator<Item = Scalar>) -> Self {
+        self.option("scalar", Value::of_choices(scalars))
     }
 
     /// Beside every function the same over lanes of states and over batches.
-    pub fn lanes(mut self, lanes: Lanes) -> Self {
-        self.options.lanes = Some(lanes);
-        self
+    pub fn lanes(self, lanes: Lanes) -> Self {
+        self.option("lanes", lanes)
     }
 
     /// Whether plain functions take any scalar that is a `straightline::Real`: f32, f64, double-double, dual numbers, types of
     /// your own. The code depends on the package `straightline`. Lanes, batches and stages keep [`Builder::scalar`].
-    pub fn generic(mut self, generic: bool) -> Self {
-        self.options.generic = generic;
-        self
+    pub fn generic(self, generic: bool) -> Self {
+        self.option("generic", generic)
     }
 
-    /// Whether a·b + c is one operation, with one rounding, where the machine has it: last bits are other ones there than
-    /// elsewhere. The code needs `std`.
-    pub fn fma(mut self, fma: bool) -> Self {
-        self.options.fma = fma;
-        self
+    /// a·b + c in one rounding: by `std`, where the machine has it, so that last bits are other ones there than elsewhere; or by the crate
+    /// around the code.
+    pub fn fma(self, by: Fusion) -> Self {
+        self.option("fma", by)
     }
 
     /// The weakest rewrite rules allowed; with [`Grade::Exact`] the code is the generic runtime, bit for bit.
-    pub fn rules(mut self, grade: Grade) -> Self {
-        self.options.grade = grade;
-        self
+    pub fn rules(self, grade: Grade) -> Self {
+        self.option("rules", grade)
     }
 
     /// Bounds the rounding errors of every function, as constants beside the functions: see [`certify`](straightline_graph::certify).
-    pub fn certify(mut self, effort: straightline_graph::certify::Effort) -> Self {
-        self.options.certify = Some(effort);
-        self
+    pub fn certify(self, effort: Effort) -> Self {
+        let certified = self.option("certify", true).option("certify_state", effort.companions);
+        let timed = match effort.time {
+            Some(time) => certified.option("certify_seconds", time.as_secs_f64()),
+            None => certified,
+        };
+        timed.option("certify_boxes", effort.boxes)
+    }
+
+    /// Of f32, computes in f64 what it takes for certified errors up to so much, in the results' units, and nothing else.
+    pub fn mixed_precision(self, max_error: f64) -> Self {
+        self.option("mixed_precision", max_error)
     }
 
     /// How identical limbs are computed; otherwise each by itself.
-    pub fn limbs(mut self, form: crate::choices::LimbForm) -> Self {
-        self.options.limbs = form;
-        self
+    pub fn limbs(self, form: LimbForm) -> Self {
+        self.option("limbs", form)
     }
 
     /// How forward dynamics is computed; otherwise the cheaper way for this robot.
-    pub fn forward_dynamics(mut self, method: ForwardDynamicsMethod) -> Self {
-        self.options.forward_dynamics = method;
-        self
+    pub fn forward_dynamics(self, method: ForwardDynamicsMethod) -> Self {
+        self.option("forward_dynamics", method)
     }
 
     /// Functions of more operations are cut into parts.
-    pub fn max_part_operations(mut self, operations: usize) -> Self {
-        self.options.limits.operations = operations;
-        self
+    pub fn max_part_operations(self, operations: usize) -> Self {
+        self.option("max_part_operations", operations)
     }
 
     /// Whether the root link moves freely in the world.
-    pub fn floating_base(mut self, floating: bool) -> Self {
-        self.options.model.floating_base = floating;
-        self
+    pub fn floating_base(self, floating: bool) -> Self {
+        self.option("floating_base", floating)
     }
 
     /// The joints in the order of their coordinates, all of them; otherwise depth first, as in the file.
-    pub fn joint_order(mut self, joints: impl IntoIterator<Item = impl Into<String>>) -> Self {
-        self.options.model.joint_order = Some(joints.into_iter().map(Into::into).collect());
-        self
+    pub fn joint_order(self, joints: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.option("joint_order", Value::of_words(joints))
     }
 
     /// So near to a multiple of 30 or 45 degrees \[rad\] an angle is taken as that; 0: every angle as it is written.
-    pub fn angle_tolerance(mut self, tolerance: f64) -> Self {
-        self.options.model.angle_tolerance = tolerance;
-        self
+    pub fn angle_tolerance(self, tolerance: f64) -> Self {
+        self.option("angle_tolerance", tolerance)
     }
 
     /// Acceleration due to gravity in the world \[m/s²\]; otherwise the file's, or (0, 0, −9.81).
-    pub fn gravity(mut self, gravity: [f64; 3]) -> Self {
-        self.options.model.gravity = Some(gravity);
-        self
+    pub fn gravity(self, gravity: [f64; 3]) -> Self {
+        self.option("gravity", gravity)
     }
 
     /// Warnings of this code are not said; `"warnings"`: none.
     pub fn allow(self, code: impl Into<String>) -> Self {
-        self.level(code, Level::Allow)
+        self.option("allow", Value::of_words([code]))
     }
 
     /// Warnings of this code are said, whatever a scene or an earlier call says.
     pub fn warn(self, code: impl Into<String>) -> Self {
-        self.level(code, Level::Warn)
+        self.option("warn", Value::of_words([code]))
     }
 
     /// Warnings of this code are errors; `"warnings"`: all.
     pub fn deny(self, code: impl Into<String>) -> Self {
-        self.level(code, Level::Deny)
+        self.option("deny", Value::of_words([code]))
     }
 
-    fn level(mut self, code: impl Into<String>, level: Level) -> Self {
-        self.options.reporting.levels.set(code, level);
-        self
-    }
-
-    /// A scene file (`SCENES.md`), relative to the package's manifest: what is wanted of the robot, and what is held. What it
-    /// says stands in place of what this builder says; the build runs again when it changes.
+    /// A scene file (`SCENES.md`), relative to the package's manifest: what is wanted of the robot, and what is held. Options
+    /// that this builder is given count before those of the file; the build runs again when it changes.
     pub fn scene_file(mut self, scene: impl Into<PathBuf>) -> Self {
         self.scene_file = Some(scene.into());
         self
@@ -194,7 +195,7 @@ impl Builder {
 
     /// A scene made in code; a scene file takes its place.
     pub fn scene(mut self, scene: Scene) -> Self {
-        self.options.scene = scene;
+        self.scene = scene;
         self
     }
 
@@ -256,10 +257,13 @@ impl Builder {
             Ok(Source::from_bytes(&shown.display().to_string(), bytes))
         };
         let source = read(robot, &self.robot)?;
-        let mut options = self.options.clone();
-        if let (Some(file), Some(shown)) = (scene, &self.scene_file) {
-            options = scene::read_partly(&read(file, shown)?).into_options(options);
-        }
+        let file = match (scene, &self.scene_file) {
+            (Some(file), Some(shown)) => scene_file::read_partly(&read(file, shown)?),
+            _ => SceneFile { scene: self.scene.clone(), ..SceneFile::default() },
+        };
+        let reporting = Reporting { front: Front::Builder, ..Reporting::default() };
+        let mut options = file.with(&self.settings, Options { reporting, ..Options::default() });
+        options.scene.places.keep_further(self.wrong.iter().cloned());
         let generated = compile(&source, &options).map_err(|diagnostics| {
             messages.tell(&diagnostics);
             let of_robot = diagnostics.iter().any(|d| d.place.as_ref().is_none_or(|p| *p.file == *source.path()));

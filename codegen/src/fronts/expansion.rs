@@ -1,10 +1,10 @@
 //! What the macros expand to, as text; `straightline-macros` is a shell over this.
 
+use crate::compile;
 use crate::diagnostic::{Diagnostic, Diagnostics, Front, Reporting, Severity, Source};
 use crate::emit::{array_type, batch, Generated};
 use crate::fronts::frames;
-use crate::options::Options;
-use crate::{compile, scene};
+use crate::options::{scene_file, Options, SceneFile, Settings};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use straightline_graph::expr::Port;
@@ -48,12 +48,12 @@ pub enum SceneOf {
 }
 
 /// Compiles the robot file that a macro names, in the scene that it names or holds; files are looked for in these
-/// directories. What the scene says stands in place of what the options say.
-pub fn expand(robot: &str, scene: Option<&SceneOf>, directories: &[&Path], options: &Options) -> Expansion {
+/// directories. What the macro says of options counts before what the scene says.
+pub fn expand(robot: &str, scene: Option<&SceneOf>, directories: &[&Path], own: &Settings) -> Expansion {
     let mut files = Vec::new();
     let opened = open(robot, scene, directories, &mut files);
     let text = scene_text(scene, &opened);
-    match opened.map_err(|(refusal, _)| refusal).and_then(|opened| compiled(&opened, options)) {
+    match opened.map_err(|(refusal, _)| refusal).and_then(|opened| compiled(&opened, own)) {
         Ok((warnings, generated, associated)) => {
             Expansion { files, result: Ok((generated, associated)), warnings, scene: text }
         }
@@ -66,7 +66,7 @@ pub fn examine(
     robot: &str,
     scene: Option<&SceneOf>,
     directories: &[&Path],
-    options: &Options,
+    own: &Settings,
 ) -> (Vec<PathBuf>, Option<Refusal>, Option<String>) {
     let mut files = Vec::new();
     let opened = open(robot, scene, directories, &mut files);
@@ -74,7 +74,7 @@ pub fn examine(
     let refusal = match opened {
         Err((refusal, _)) => Some(refusal),
         Ok(opened) => {
-            let found = compile::examine(&opened.robot, &opened.options(options));
+            let found = compile::examine(&opened.robot, &opened.options(own));
             found.has_errors().then(|| refusal(&found, opened.robot.path(), opened.within()))
         }
     };
@@ -89,14 +89,11 @@ struct Opened {
 }
 
 impl Opened {
-    /// The options, with what the scene says of them.
-    fn options(&self, options: &Options) -> Options {
-        let reporting = Reporting { front: Front::Derive, ..options.reporting.clone() };
-        let options = Options { reporting, ..options.clone() };
-        match &self.scene {
-            None => options,
-            Some(source) => scene::read_partly(source).into_options(options),
-        }
+    /// The options of the macro and of the scene.
+    fn options(&self, own: &Settings) -> Options {
+        let reporting = Reporting { front: Front::Derive, ..Reporting::default() };
+        let file = self.scene.as_ref().map_or_else(SceneFile::default, scene_file::read_partly);
+        file.with(own, Options { reporting, ..Options::default() })
     }
 
     /// The path of the scene, if it stands in the macro.
@@ -136,8 +133,8 @@ fn scene_text(scene: Option<&SceneOf>, opened: &Result<Opened, (Refusal, Option<
 }
 
 /// Warnings, dynamics and associated items, or what is wrong.
-fn compiled(opened: &Opened, options: &Options) -> Result<(String, Generated, String), Refusal> {
-    let (robot, options) = (&opened.robot, opened.options(options));
+fn compiled(opened: &Opened, own: &Settings) -> Result<(String, Generated, String), Refusal> {
+    let (robot, options) = (&opened.robot, opened.options(own));
     let generated = compile::compile(robot, &options)
         .map_err(|diagnostics| refusal(&diagnostics, robot.path(), opened.within()))?;
     let mut associated = associated_items(&generated);

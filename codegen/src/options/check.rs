@@ -8,7 +8,7 @@ use crate::scene::{messages as say, Base, Gravity};
 use straightline_graph::expr::Grade;
 
 /// What reading the scene's file found, or else what the scene and the options beside it contradict each other in. Scenes from
-/// files are read into options by [`SceneFile::into_options`](crate::scene::SceneFile::into_options), which cannot contradict itself.
+/// files are read into options by [`SceneFile::into_options`](crate::options::SceneFile::into_options), which cannot contradict itself.
 pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
     let scene = &options.scene;
     diagnostics.extend(scene.places.complaints().clone());
@@ -20,7 +20,7 @@ pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
     }
     for (i, scalar) in options.also.iter().enumerate() {
         if *scalar == options.scalar || options.also[..i].contains(scalar) {
-            scene.places.complain("numbers.scalar", say::scalar_twice(scalar.name()), diagnostics);
+            scene.places.complain("options.scalar", say::scalar_twice(scalar.name()), diagnostics);
         }
     }
     if scene.gravity != Gravity::OfRobot && options.model.gravity.is_some() {
@@ -44,7 +44,7 @@ pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
         }
     }
     if options.limbs == LimbForm::Lanes && options.grade == Grade::Exact {
-        scene.places.complain("outputs.limbs", say::limbs_exact(), diagnostics);
+        scene.places.complain("options.limbs", say::limbs_exact(), diagnostics);
     }
     // of a file this was said when it was read, whatever functions of it are asked for
     let is_alone = |function: &&Function| scene.places.source().is_none() && !options.functions.contains(function);

@@ -2,11 +2,15 @@
 
 mod check;
 pub mod optimisations;
-mod scene_file;
+pub mod scene_file;
 pub mod stable;
+pub mod table;
+pub mod value;
 
 pub use check::check_options;
 pub use optimisations::{Forms, Optimisations};
+pub use scene_file::SceneFile;
+pub use value::{Settings, Value};
 
 use crate::choices::{Lanes, LimbForm};
 use crate::description;
@@ -19,68 +23,73 @@ use straightline_graph::expr::{Grade, RuleSet};
 use straightline_graph::schedule::Limits;
 use straightline_graph::Scalar;
 
-/// What to generate, and how.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// The functions, without repetition.
-    pub functions: Vec<Function>,
-    /// The frames of the functions that answer per frame; none: the tips of the robot.
-    pub frames: Vec<String>,
-    /// The scalar type.
-    pub scalar: Scalar,
-    /// Other scalar types: for each a module with the same items ([`Scalar::module`]).
-    pub also: Vec<Scalar>,
-    /// Whether functions over lanes and batches of states stand beside the plain ones.
-    pub lanes: Option<Lanes>,
-    /// Whether a·b + c is one operation, with one rounding, where the machine has it.
-    pub fma: bool,
-    /// Whether that operation comes from the crate around the output, as `crate::mul_add_f64` (of f32 `crate::mul_add_f32`): the
-    /// output needs `core` alone then.
-    pub fma_by_caller: bool,
-    /// Whether plain functions take any scalar that is a `straightline::Real`; lanes, batches and stages keep `scalar`.
-    pub generic: bool,
-    /// The weakest rules allowed: with [`Grade::Exact`] the output is the generic runtime bit for bit.
-    pub grade: Grade,
-    /// How forward dynamics is computed.
-    pub forward_dynamics: ForwardDynamicsMethod,
-    /// How identical limbs are computed.
-    pub limbs: LimbForm,
-    /// How long one function may be.
-    pub limits: Limits,
-    /// How the robot file is read.
-    pub model: crate::model::ModelOptions,
-    /// What is wanted and what is held.
-    pub scene: Scene,
-    /// Whether rounding errors are bounded, and how much is spent on it; a budget of an error bounds them, too.
-    pub certify: Option<Effort>,
-    /// What becomes of warnings, and in whose words they are said: nothing of what is generated.
-    pub reporting: Reporting,
+/// Fields with the names that they have in the text that hashes are made of, and their defaults; behind `..` what is not of the output.
+macro_rules! options {
+    ($($(#[$doc:meta])* $field:ident $name:literal: $type:ty = $default:expr,)*
+        .. $(#[$silent_doc:meta])* $silent:ident: $silent_type:ty) => {
+        /// What to generate, and how.
+        #[derive(Clone, Debug)]
+        pub struct Options {
+            $($(#[$doc])* pub $field: $type,)*
+            $(#[$silent_doc])*
+            pub $silent: $silent_type,
+        }
+
+        impl Default for Options {
+            fn default() -> Self {
+                Options { $($field: $default,)* $silent: Default::default() }
+            }
+        }
+
+        stable::fields! {
+            Options = { $($name: $field,)* .. $silent }
+        }
+    };
 }
 
-impl Default for Options {
-    fn default() -> Self {
-        Options {
-            functions: Function::all().collect(),
-            frames: Vec::new(),
-            scalar: Scalar::F64,
-            also: Vec::new(),
-            lanes: None,
-            fma: false,
-            fma_by_caller: false,
-            generic: false,
-            grade: Grade::Algebraic,
-            forward_dynamics: ForwardDynamicsMethod::default(),
-            limbs: LimbForm::default(),
-            limits: Limits::default(),
-            model: crate::model::ModelOptions::default(),
-            scene: Scene::default(),
-            certify: None,
-            reporting: Reporting::default(),
-        }
-    }
+options! {
+    /// The functions, without repetition.
+    functions "functions": Vec<Function> = Function::all().collect(),
+    /// The frames of the functions that answer per frame; none: the tips of the robot.
+    frames "frames": Vec<String> = Vec::new(),
+    /// The scalar type.
+    scalar "scalar": Scalar = Scalar::F64,
+    /// Other scalar types: for each a module with the same items ([`Scalar::module`]).
+    also "also": Vec<Scalar> = Vec::new(),
+    /// Whether functions over lanes and batches of states stand beside the plain ones.
+    lanes "lanes": Option<Lanes> = None,
+    /// Whether a·b + c is one operation, with one rounding, where the machine has it.
+    fma "fma": bool = false,
+    /// Whether that operation comes from the crate around the output, as `crate::mul_add_f64` (of f32 `crate::mul_add_f32`): the
+    /// output needs `core` alone then.
+    fma_by_caller "fma_by_caller": bool = false,
+    /// Whether plain functions take any scalar that is a `straightline::Real`; lanes, batches and stages keep `scalar`.
+    generic "generic": bool = false,
+    /// The weakest rules allowed: with [`Grade::Exact`] the output is the generic runtime bit for bit.
+    grade "rules": Grade = Grade::Algebraic,
+    /// How forward dynamics is computed.
+    forward_dynamics "forward_dynamics": ForwardDynamicsMethod = ForwardDynamicsMethod::default(),
+    /// How identical limbs are computed.
+    limbs "limbs": LimbForm = LimbForm::default(),
+    /// How long one function may be.
+    limits "limits": Limits = Limits::default(),
+    /// How the robot file is read.
+    model "model": crate::model::ModelOptions = crate::model::ModelOptions::default(),
+    /// What is wanted and what is held.
+    scene "scene": Scene = Scene::default(),
+    /// Whether rounding errors are bounded, and how much is spent on it; a budget of an error bounds them, too.
+    certify "certify": Option<Effort> = None,
+    ..
+    /// What becomes of warnings, and in whose words they are said: nothing of what is generated.
+    reporting: Reporting
 }
 
 impl Options {
+    /// The text that hashes of generated files are made of: names and values of what is not at its default.
+    pub fn hashed(&self) -> String {
+        stable::Stable::stable_text(self)
+    }
+
     /// The same options, whose scene knows the drives of a robot file as far as it names them. What is wrong with the file is said elsewhere.
     #[must_use]
     pub fn knowing(&self, source: &Source) -> Options {

@@ -9,7 +9,7 @@ use crate::description::drives::{Actuator, Drive, Noted, Rating, Stage, Thermal}
 use crate::description::flexible::{Bending, Elastic, Flexible, Support};
 use crate::function::ContactFunction;
 use crate::model::{FrameOption, ModelOptions};
-use crate::options::{Forms, Optimisations, Options};
+use crate::options::{Forms, Optimisations};
 use crate::scene::contact::{
     ContactItem, Contacts, EnvironmentItem, EnvironmentKind, LoopItem, ModeItem, ObjectPose, SurfaceItem, UserSurface,
 };
@@ -45,7 +45,7 @@ pub(crate) trait Stable {
 }
 
 /// `name=value;`
-fn said<T: Stable>(name: &str, value: &T, out: &mut String) {
+pub(super) fn said<T: Stable>(name: &str, value: &T, out: &mut String) {
     out.push_str(name);
     out.push('=');
     value.say(out);
@@ -55,11 +55,11 @@ fn said<T: Stable>(name: &str, value: &T, out: &mut String) {
 /// Structures: `=` what differs from the default alone, `:` everything, behind `..` what is not of the output.
 macro_rules! fields {
     ($($type:ident $mode:tt { $($name:literal: $field:ident,)* $(.. $silent:ident)? })*) => {$(
-        impl Stable for $type {
+        impl $crate::options::stable::Stable for $type {
             fn say(&self, out: &mut String) {
                 let $type { $($field,)* $($silent: _)? } = self;
                 out.push('{');
-                fields!(@ $type $mode out $($name: $field,)*);
+                $crate::options::stable::fields!(@ $type $mode out $($name: $field,)*);
                 out.push('}');
             }
         }
@@ -67,13 +67,14 @@ macro_rules! fields {
     (@ $type:ident = $out:ident $($name:literal: $field:ident,)*) => {
         let default = $type::default();
         $(if *$field != default.$field {
-            said($name, $field, $out);
+            $crate::options::stable::said($name, $field, $out);
         })*
     };
     (@ $type:ident : $out:ident $($name:literal: $field:ident,)*) => {
-        $(said($name, $field, $out);)*
+        $($crate::options::stable::said($name, $field, $out);)*
     };
 }
+pub(super) use fields;
 
 /// Enumerations: the name of the variant, and what is in it.
 macro_rules! variants {
@@ -116,24 +117,6 @@ macro_rules! worded {
 }
 
 fields! {
-    Options = {
-        "functions": functions,
-        "frames": frames,
-        "scalar": scalar,
-        "also": also,
-        "lanes": lanes,
-        "fma": fma,
-        "fma_by_caller": fma_by_caller,
-        "generic": generic,
-        "rules": grade,
-        "forward_dynamics": forward_dynamics,
-        "limbs": limbs,
-        "limits": limits,
-        "model": model,
-        "scene": scene,
-        "certify": certify,
-        .. reporting
-    }
     Limits = { "operations": operations, }
     ModelOptions = {
         "floating_base": floating_base,
@@ -338,7 +321,7 @@ worded! {
 /// What every front names by words.
 impl<T: Choice> Stable for T {
     fn say(&self, out: &mut String) {
-        out.push_str(T::words().iter().find(|w| w.2 == *self).expect("every choice has a word").0);
+        out.push_str(self.word());
     }
 }
 
@@ -412,7 +395,7 @@ tuple!(A B C; 0 1 2);
 mod tests {
     use super::*;
     use crate::diagnostic::{Diagnostics, Source};
-    use crate::scene;
+    use crate::options::{scene_file, Options};
 
     const SCENE: &str = r#"
 [outputs]
@@ -454,7 +437,7 @@ environment = { kind = "elastic", stiffness = 2e4, damping = 60.0 }
 
     fn text_of(scene: &str) -> String {
         let mut complaints = Diagnostics::new();
-        let read = scene::read(&Source::new("scene.toml", scene), &mut complaints);
+        let read = scene_file::read(&Source::new("scene.toml", scene), &mut complaints);
         read.unwrap_or_else(|| panic!("{}", complaints.render())).into_options(Options::default()).stable_text()
     }
 

@@ -45,12 +45,12 @@ fn asked(model: &Model<Dd>, options: &Options) -> Vec<Asked> {
         match &functions[..] {
             [] => {}
             [one] if one == "forward_dynamics" => {
-                asked.push(Asked { inertia, words: "forward dynamics is".to_string(), path: "outputs.functions" });
+                asked.push(Asked { inertia, words: "forward dynamics is".to_string(), path: "options.functions" });
             }
             several => {
                 let names: Vec<String> = several.iter().map(|name| format!("`{name}`")).collect();
                 let words = format!("{} {}", names.join(", "), if names.len() == 1 { "is" } else { "are" });
-                asked.push(Asked { inertia, words, path: "outputs.functions" });
+                asked.push(Asked { inertia, words, path: "options.functions" });
             }
         }
         if !modes.is_empty() {
@@ -98,7 +98,7 @@ fn demand_mass(model: &Model<Dd>, options: &Options, diagnostics: &mut Diagnosti
     let has_mass = model.bodies.iter().any(|b| b.inertia.mass != Dd::ZERO);
     if !names.is_empty() && !has_mass && !options.scene.has_loads() {
         let asked = format!("{} {}", names.join(", "), if names.len() == 1 { "is" } else { "are" });
-        options.scene.places.complain("outputs.functions", messages::no_mass(&asked), diagnostics);
+        options.scene.places.complain("options.functions", messages::no_mass(&asked), diagnostics);
     }
 }
 

@@ -16,7 +16,7 @@ use straightline_core::Dd;
 const MOMENT_DIGITS: f64 = 1e-6;
 
 /// What is wrong with a scene, whatever the robot.
-pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
+pub(crate) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
     check_contact::alone(scene, diagnostics);
     let places = &scene.places;
     for (&function, selection) in &scene.outputs {

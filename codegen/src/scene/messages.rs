@@ -387,6 +387,11 @@ pub fn said_twice(what: &str) -> D {
     D::error("said-twice", format!("{what} is given by the scene and by an option beside it")).help("keep one of them")
 }
 
+/// An option that stands in two tables of a scene.
+pub fn written_twice(option: &str, other: &str) -> D {
+    D::error("said-twice", format!("`{option}` stands in [{other}] and in [options]")).help("keep one of them")
+}
+
 /// A scalar type that is asked for twice.
 pub fn scalar_twice(scalar: &str) -> D {
     D::error("scalar-twice", format!("the scalar type `{scalar}` is asked for twice")).help("name each once")

@@ -5,7 +5,7 @@
 //! ([`Scene::outputs`]); folding and dead code do the rest.
 
 mod apply;
-mod check;
+pub(crate) mod check;
 mod check_contact;
 pub mod contact;
 pub mod free_drive;
@@ -13,14 +13,12 @@ pub mod messages;
 pub mod parameter;
 mod places;
 mod ranges;
-mod read;
 
 pub use apply::apply;
 pub use contact::Contacts;
 pub use parameter::Parameter;
 pub use places::Places;
 pub use ranges::{ranges_in_words, Interval, JointRanges, Ranges};
-pub use read::{read, read_partly, SceneFile, LISTS};
 
 use crate::description::drives::Drive;
 use crate::description::flexible::{Flexible, Support};

@@ -47,13 +47,18 @@ impl Places {
     }
 
     /// The same, said by the caller.
-    pub(super) fn take_complaints(&mut self) -> Diagnostics {
+    pub(crate) fn take_complaints(&mut self) -> Diagnostics {
         std::mem::take(&mut self.complaints)
     }
 
     /// Keeps what reading the file found.
-    pub(super) fn keep(&mut self, complaints: Diagnostics) {
+    pub(crate) fn keep(&mut self, complaints: Diagnostics) {
         self.complaints = complaints;
+    }
+
+    /// Keeps further complaints, of options that were given in code.
+    pub(crate) fn keep_further(&mut self, complaints: impl IntoIterator<Item = Diagnostic>) {
+        complaints.into_iter().for_each(|complaint| self.complaints.push(complaint));
     }
 
     /// Adds a complaint about the value of that path.

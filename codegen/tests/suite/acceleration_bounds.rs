@@ -9,9 +9,10 @@ use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
 use straightline_codegen::function::ContactFunction;
 use straightline_codegen::model::{self, ModelOptions};
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::{Optimisations, Options};
 use straightline_codegen::program::contact::{self, Mode};
-use straightline_codegen::{scene, Scalar, Source};
+use straightline_codegen::{Scalar, Source};
 use straightline_core::Dd;
 
 const BOTH: [Scalar; 2] = [Scalar::F32, Scalar::F64];
@@ -37,7 +38,7 @@ fn robot(file: &str, text: Option<String>, options: &Options) -> Robot {
 
 fn options(text: &str, floating_base: bool, scalar: Scalar) -> Options {
     let mut diagnostics = Diagnostics::new();
-    let file = scene::read(&Source::new("scene.toml", text), &mut diagnostics);
+    let file = scene_file::read(&Source::new("scene.toml", text), &mut diagnostics);
     let model = ModelOptions { floating_base, ..ModelOptions::default() };
     let options = Options { model, scalar, ..Options::default() };
     file.unwrap_or_else(|| panic!("{}", diagnostics.render())).into_options(options)

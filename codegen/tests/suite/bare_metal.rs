@@ -10,10 +10,11 @@ use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::emit::fused;
 use straightline_codegen::model::load;
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
 use straightline_codegen::program::program;
 use straightline_codegen::schedule::Limits;
-use straightline_codegen::{scene, Function, Robot, Scalar};
+use straightline_codegen::{Function, Robot, Scalar};
 use straightline_core::trig;
 
 const ARM: &str = include_str!("../files/arm.toml");
@@ -27,7 +28,7 @@ fn scratch() -> PathBuf {
 
 fn text(scene_text: &str, options: Options) -> String {
     let mut diagnostics = Diagnostics::new();
-    let file = scene::read(&Source::new("scene.toml", scene_text), &mut diagnostics);
+    let file = scene_file::read(&Source::new("scene.toml", scene_text), &mut diagnostics);
     let options = file.unwrap_or_else(|| panic!("{diagnostics}")).into_options(options);
     compile(&Source::new("arm.toml", ARM), &options).unwrap_or_else(|errors| panic!("{errors}")).text
 }

@@ -6,6 +6,7 @@ use straightline_codegen::emit::Generated;
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{self, Grade};
 use straightline_codegen::function::ContactFunction;
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
 use straightline_codegen::program::contact::{graph, Mode};
 use straightline_codegen::scene::contact::{SurfaceItem, UserSurface};
@@ -22,7 +23,7 @@ fn source(robot: &str) -> Source {
 
 fn options(scene: &str) -> Options {
     let mut diagnostics = Diagnostics::new();
-    let file = scene::read(&Source::new("scene.toml", scene), &mut diagnostics);
+    let file = scene_file::read(&Source::new("scene.toml", scene), &mut diagnostics);
     file.unwrap_or_else(|| panic!("{}", diagnostics.render())).into_options(Options::default())
 }
 

@@ -7,10 +7,11 @@ use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 use straightline_codegen::compile::compile;
+use straightline_codegen::description;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
 use straightline_codegen::verify::reference_input::mass_centre_tree;
-use straightline_codegen::{description, scene};
 use straightline_core::reference::drives::solve_general;
 use straightline_core::reference::{
     bias_force, functional_coordinate, mass_matrix, Component, ContactFrames, Derivatives, MassCentreTree,
@@ -67,7 +68,7 @@ fn scene() -> String {
 /// Generated modules for a robot file in a scene.
 fn generated(name: &str, text: String, scene: &str) -> String {
     let mut diagnostics = Diagnostics::new();
-    let file = scene::read(&Source::new("scene.toml", scene), &mut diagnostics);
+    let file = scene_file::read(&Source::new("scene.toml", scene), &mut diagnostics);
     let options = file.unwrap_or_else(|| panic!("{}", diagnostics.render())).into_options(Options::default());
     compile(&Source::new(name, text), &options).unwrap_or_else(|d| panic!("{}", d.render())).text
 }

@@ -1,8 +1,10 @@
 //! What the macros stand on: files looked for, items of a type, complaints as they are shown.
 
 use std::path::{Path, PathBuf};
+use straightline_codegen::diagnostic::Front;
 use straightline_codegen::fronts::expansion::{expand, SceneOf};
-use straightline_codegen::{Options, Source};
+use straightline_codegen::options::{Settings, Value};
+use straightline_codegen::Source;
 
 const CART: &str = r#"
 [robot]
@@ -36,7 +38,7 @@ fn scratch(name: &str, text: &str) -> PathBuf {
 #[test]
 fn the_first_directory_that_has_the_file_counts() {
     let here = scratch("found", CART);
-    let expansion = expand("cart.toml", None, &[Path::new("/nowhere"), &here], &Options::default());
+    let expansion = expand("cart.toml", None, &[Path::new("/nowhere"), &here], &Settings::default());
     assert_eq!(expansion.files, [here.join("cart.toml")]);
     let items = expansion.result.unwrap().1;
     assert!(items.contains("pub const EFFORT_LIMITS: [f64; 1] = dynamics::EFFORT_LIMITS;"), "{items}");
@@ -49,9 +51,9 @@ fn frames_are_constants_and_pose_asks_for_poses_of_all_frames() {
     let here = scratch("frames", CART);
     let items = |frames: &[&str], scene: &str| {
         std::fs::write(here.join("scene.toml"), scene).unwrap();
-        let frames = frames.iter().map(|f| f.to_string()).collect();
         let scene = SceneOf::File("scene.toml".into());
-        let options = Options { frames, ..Options::default() };
+        let mut options = Settings::default();
+        options.set("frames", Value::of_words(frames.iter().copied()), Front::Derive).unwrap();
         expand("cart.toml", Some(&scene), &[&here], &options).result.unwrap().1
     };
     let pose = "pub fn pose<__T: Copy>(x: &[[__T; 12]; 2], frame: ::straightline::FrameIndex<Self>)";
@@ -74,7 +76,7 @@ fn frames_are_constants_and_pose_asks_for_poses_of_all_frames() {
 #[test]
 fn a_missing_file_is_answered_with_every_path_that_was_tried() {
     let directories = [Path::new("/nowhere"), Path::new("/nowhere/src")];
-    let expansion = expand("cart.toml", None, &directories, &Options::default());
+    let expansion = expand("cart.toml", None, &directories, &Settings::default());
     assert!(expansion.files.is_empty());
     assert_eq!(
         expansion.result.unwrap_err().message,
@@ -86,7 +88,7 @@ fn a_missing_file_is_answered_with_every_path_that_was_tried() {
 #[test]
 fn a_wrong_file_is_shown_at_the_place_and_stays_an_input() {
     let here = scratch("wrong", &CART.replace("2.0", "-2.0"));
-    let expansion = expand("cart.toml", None, &[&here], &Options::default());
+    let expansion = expand("cart.toml", None, &[&here], &Settings::default());
     assert_eq!(expansion.files, [here.join("cart.toml")]);
     let message = expansion.result.unwrap_err().message;
     assert!(message.starts_with("the robot file is wrong\nerror[negative-mass]: "), "{message}");
@@ -98,7 +100,7 @@ fn a_scene_is_an_input_too_and_its_complaints_have_their_place() {
     let here = scratch("scene", CART);
     let scene = |text: &str| {
         std::fs::write(here.join("scene.toml"), text).unwrap();
-        expand("cart.toml", Some(&SceneOf::File("scene.toml".into())), &[&here], &Options::default())
+        expand("cart.toml", Some(&SceneOf::File("scene.toml".into())), &[&here], &Settings::default())
     };
     let expansion = scene("[outputs]\nmass_matrix = { part = \"diagonal\" }\n");
     assert_eq!(expansion.files, [here.join("cart.toml"), here.join("scene.toml")]);
@@ -115,7 +117,7 @@ fn a_scene_is_an_input_too_and_its_complaints_have_their_place() {
         assert!(message.starts_with("the scene is wrong\nerror[") && message.contains(place), "{message}");
     }
     let none = SceneOf::File("none.toml".into());
-    let message = expand("cart.toml", Some(&none), &[&here], &Options::default()).result.unwrap_err().message;
+    let message = expand("cart.toml", Some(&none), &[&here], &Settings::default()).result.unwrap_err().message;
     assert!(message.starts_with("there is no scene file `none.toml`"), "{message}");
 }
 
@@ -124,7 +126,7 @@ fn complaints_of_a_scene_in_the_macro_are_kept_apart() {
     let here = scratch("within", CART);
     let scene = |text: &str| {
         let scene = SceneOf::Macro(Source::new("scene(..)", text));
-        expand("cart.toml", Some(&scene), &[&here], &Options::default())
+        expand("cart.toml", Some(&scene), &[&here], &Settings::default())
     };
     let expansion = scene("[zero]\nqd = true\n");
     assert_eq!(expansion.files, [here.join("cart.toml")]);

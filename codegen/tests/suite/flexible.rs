@@ -4,7 +4,8 @@ use straightline_codegen::description::drives::Noted;
 use straightline_codegen::description::flexible::{Elastic, Support};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{self, ModelOptions};
-use straightline_codegen::{compile, scene, Function, Options};
+use straightline_codegen::options::scene_file;
+use straightline_codegen::{compile, Function, Options};
 use straightline_core::algorithms::{forward_dynamics_aba, inverse_dynamics, jacobian, joint_wrenches, mass_matrix};
 use straightline_core::model::{JointKind, Model};
 use straightline_core::Dd;
@@ -166,7 +167,7 @@ fn an_effect_of_a_scene_makes_links_and_support_rigid_again() {
     let rigid =
         Source::new("rigid.toml", text.lines().filter(|l| !l.starts_with("flexible")).collect::<Vec<_>>().join("\n"));
     let supported = "[support]\nz = { stiffness = 1e5 }\n[effects]\nelastic_links = false\n";
-    let file = scene::read(&Source::new("s.toml", supported), &mut Diagnostics::new()).expect("a scene");
+    let file = scene_file::read(&Source::new("s.toml", supported), &mut Diagnostics::new()).expect("a scene");
     let functions = vec![Function::InverseDynamics];
     let options = Options { functions, ..Options::default() };
     let of_scene = compile(&robot, &file.into_options(options.clone())).expect("it compiles");

@@ -7,7 +7,7 @@ use straightline_codegen::equations::forward_method::{MethodChoice, TOLERATED};
 use straightline_codegen::expr::Grade;
 use straightline_codegen::model::singular::{singular_joints, Inertia};
 use straightline_codegen::model::{load, ModelOptions};
-use straightline_codegen::scene::read;
+use straightline_codegen::options::scene_file::read;
 use straightline_codegen::{compile, Function, Options, Scalar, Source};
 
 /// A chain of revolute joints in TOML: per link its joint's origin, its axis and its inertial lines.

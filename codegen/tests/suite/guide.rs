@@ -10,12 +10,12 @@ use straightline_codegen::scene;
 use straightline_codegen::Function;
 use straightline_core::joint::{Dialect, KINDS};
 
-fn package() -> PathBuf {
+pub(crate) fn package() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
 /// Compares a page with what is printed, or rewrites it.
-fn compare(page: &str, printed: &str) {
+pub(crate) fn compare(page: &str, printed: &str) {
     let path = package().join("../guide/src").join(page);
     if std::env::var_os("UPDATE_EXPECTED").is_some() {
         std::fs::write(&path, printed).expect("the guide can be written");

@@ -11,10 +11,11 @@ use straightline_codegen::emit::fused;
 use straightline_codegen::expr::evaluate;
 use straightline_codegen::model::limbs::limbs;
 use straightline_codegen::model::{load, ModelOptions};
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
 use straightline_codegen::program::input_box::input_box;
 use straightline_codegen::program::{program, Program};
-use straightline_codegen::scene::{self, Interval, JointRanges};
+use straightline_codegen::scene::{Interval, JointRanges};
 use straightline_codegen::verify::{bound, verify};
 use straightline_codegen::{Function, Robot, Scalar, Source};
 use straightline_core::trig;
@@ -239,7 +240,7 @@ fn scenes_may_tell_limbs_apart() {
     ];
     for text in scenes {
         let mut diagnostics = Diagnostics::new();
-        let file = scene::read(&Source::new("scene.toml", text), &mut diagnostics);
+        let file = scene_file::read(&Source::new("scene.toml", text), &mut diagnostics);
         let file = file.unwrap_or_else(|| panic!("{text}\n{diagnostics}"));
         agrees(&stool(), &file.into_options(options(true)));
     }

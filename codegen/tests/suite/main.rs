@@ -26,6 +26,7 @@ mod messages;
 mod mixed;
 mod mutants;
 mod names;
+mod options;
 mod ranges;
 mod readback;
 mod reduced_forms;

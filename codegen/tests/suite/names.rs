@@ -8,8 +8,9 @@ use std::path::Path;
 use std::process::Command;
 use straightline_codegen::choices::Lanes;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
-use straightline_codegen::{compile, identifier, scene, Function, Grade, Scalar};
+use straightline_codegen::{compile, identifier, Function, Grade, Scalar};
 
 /// What robots, links, joints, frames, parameters, contacts and modes of a case are called.
 #[derive(Clone, Debug)]
@@ -96,7 +97,7 @@ impl Case {
     fn text(&self) -> Result<String, Diagnostics> {
         let mut diagnostics = Diagnostics::new();
         let source = Source::new("scene.toml", self.scene_file());
-        let Some(file) = scene::read(&source, &mut diagnostics) else { return Err(diagnostics) };
+        let Some(file) = scene_file::read(&source, &mut diagnostics) else { return Err(diagnostics) };
         let options = file.into_options(self.options());
         compile(&Source::new("robot.toml", self.robot_file()), &options).map(|generated| generated.text)
     }

@@ -3,7 +3,8 @@
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::expr::Port;
 use straightline_codegen::model::ModelOptions;
-use straightline_codegen::scene::{self, Gravity, Interval, Scene};
+use straightline_codegen::options::scene_file;
+use straightline_codegen::scene::{Gravity, Interval, Scene};
 use straightline_codegen::{compile, Function, Generated, Options};
 
 const ARM: &str = include_str!("../files/arm.toml");
@@ -11,7 +12,7 @@ const ARM: &str = include_str!("../files/arm.toml");
 /// The arm in a scene with these lines, and the range of every input.
 fn arm(scene: &str, floating: bool) -> (Generated, impl Fn(&str) -> Vec<Interval>) {
     let mut diagnostics = Diagnostics::new();
-    let file = scene::read(&Source::new("scene.toml", scene), &mut diagnostics);
+    let file = scene_file::read(&Source::new("scene.toml", scene), &mut diagnostics);
     let mut options = file.unwrap_or_else(|| panic!("{diagnostics}")).into_options(Options::default());
     options.model.floating_base = floating;
     // the root link has no mass, so that afloat there is no forward dynamics

@@ -9,12 +9,13 @@ use straightline_codegen::choices::Lanes;
 use straightline_codegen::choices::LimbForm;
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
 use straightline_codegen::emit::Generated;
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
 use straightline_codegen::readback::{checked, complaint, Reader};
 use straightline_codegen::scene::{Budget, Interval, JointRanges, MaxError, Scene};
 use straightline_codegen::schedule::Limits;
 use straightline_codegen::Scalar;
-use straightline_codegen::{compile, scene, Function, Grade, Source};
+use straightline_codegen::{compile, Function, Grade, Source};
 
 const ROBOTS: [&str; 13] = [
     "chapter_6r.toml",
@@ -110,7 +111,7 @@ fn options(functions: &[Function]) -> Options {
 /// Options with what a scene says.
 fn in_scene(scene: &Source, options: Options) -> Options {
     let mut diagnostics = Diagnostics::new();
-    let read = scene::read(scene, &mut diagnostics);
+    let read = scene_file::read(scene, &mut diagnostics);
     read.unwrap_or_else(|| panic!("{}", diagnostics.render())).into_options(options)
 }
 

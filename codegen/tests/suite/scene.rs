@@ -2,6 +2,7 @@
 
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{load, ModelOptions};
+use straightline_codegen::options::scene_file;
 use straightline_codegen::scene::{self, Base, Coulomb, Effects, Gravity, Payload, Scene};
 use straightline_codegen::{compile, Function, Options};
 use straightline_core::algorithms::*;
@@ -265,7 +266,7 @@ fn every_example_compiles_for_its_robot_without_a_word() {
             _ => "solo12.urdf",
         };
         let mut diagnostics = Diagnostics::new();
-        let file = scene::read(&scene, &mut diagnostics).unwrap_or_else(|| panic!("{diagnostics}"));
+        let file = scene_file::read(&scene, &mut diagnostics).unwrap_or_else(|| panic!("{diagnostics}"));
         // of whole robots, one function is enough
         let plain = Options { functions: vec![Function::InverseDynamics], ..Options::default() };
         let options = file.into_options(plain);
@@ -310,7 +311,7 @@ fn a_scene_gives_the_same_bytes_wherever_its_file_stands() {
         let source = Source::new(&format!("{folder}/planar_2r.toml"), robot.clone());
         let file = Source::new(&format!("{folder}/scene.toml"), text.clone());
         let mut diagnostics = Diagnostics::new();
-        let file = scene::read(&file, &mut diagnostics).expect("a scene of the repository");
+        let file = scene_file::read(&file, &mut diagnostics).expect("a scene of the repository");
         let functions = vec![Function::GravityForce];
         let options = Options { functions, ..Default::default() };
         compile(&source, &file.into_options(options)).expect("it compiles").text

@@ -6,8 +6,9 @@
 
 use std::path::{Path, PathBuf};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::options::scene_file;
 use straightline_codegen::scene::messages::CODES;
-use straightline_codegen::scene::{self, Scene};
+use straightline_codegen::scene::Scene;
 use straightline_codegen::{compile, Function, Options};
 
 const ARM: &str = include_str!("../files/arm.toml");
@@ -35,7 +36,7 @@ fn said_of(code: &str) -> Diagnostics {
         }
         _ => {
             let source = Source::new(&format!("{code}.toml"), read(&format!("{code}.toml")));
-            let Some(file) = scene::read(&source, &mut diagnostics) else { return diagnostics };
+            let Some(file) = scene_file::read(&source, &mut diagnostics) else { return diagnostics };
             options = file.into_options(options);
         }
     }
@@ -95,7 +96,7 @@ fn every_text_belongs_to_a_message() {
 fn scenes_are_equal_and_print_alike_wherever_they_stand() {
     let text = "[hold]\njoints = { roll = 0.5 }\n";
     let read = |path: &str, text: &str| {
-        scene::read(&Source::new(path, text), &mut Diagnostics::new()).expect("the scene is sound").scene
+        scene_file::read(&Source::new(path, text), &mut Diagnostics::new()).expect("the scene is sound").scene
     };
     let (a, b) = (read("a.toml", text), read("deep/in/b.toml", &format!("# moved\n{text}")));
     assert_eq!(a, b);

@@ -5,8 +5,9 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::options::scene_file;
 use straightline_codegen::verify::{bound, verify};
-use straightline_codegen::{compile, scene, Function, Options};
+use straightline_codegen::{compile, Function, Options};
 
 const BRANCHED: &str = include_str!("../files/branched.toml");
 const CHAIN: &str = include_str!("../files/chain.toml");
@@ -34,7 +35,7 @@ impl Tried {
 #[track_caller]
 fn agrees(tried: &Tried, robot: &str, text: &str) {
     let (source, mut diagnostics) = (Source::new("robot.toml", robot), Diagnostics::new());
-    let file = scene::read(&Source::new("scene.toml", text), &mut diagnostics);
+    let file = scene_file::read(&Source::new("scene.toml", text), &mut diagnostics);
     let plain = Options { functions: tried.functions(), ..Options::default() };
     let options = file.unwrap_or_else(|| panic!("{diagnostics}")).into_options(plain);
     let generated = compile(&source, &options).unwrap_or_else(|errors| panic!("{text}\n{errors}"));

@@ -11,9 +11,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::Mutex;
 use straightline_codegen::certify::Effort;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
 use straightline_codegen::verify::{bound, verify};
-use straightline_codegen::{compile, scene, Scalar};
+use straightline_codegen::{compile, Scalar};
 
 /// A robot, and a scene for it.
 struct Case {
@@ -54,7 +55,7 @@ impl Case {
     fn outcome(&self) -> Outcome {
         let [robot, text] = self.sources();
         let mut diagnostics = Diagnostics::new();
-        let Some(file) = scene::read(&text, &mut diagnostics) else { return Outcome::Wrong(diagnostics.render()) };
+        let Some(file) = scene_file::read(&text, &mut diagnostics) else { return Outcome::Wrong(diagnostics.render()) };
         let options = file.into_options(self.options.clone());
         let generated = match compile(&robot, &options) {
             Ok(generated) => generated,

@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::Source;
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::stable::fnv_1a;
 use straightline_codegen::options::Options;
-use straightline_codegen::scene;
 
 /// By how a scene's file begins: the robot that it is of.
 const ROBOTS: [(&str, &str); 4] =
@@ -56,7 +56,8 @@ fn slow_proof_that_no_byte_of_a_scene_changes_unnoticed() {
         let (_, robot) =
             ROBOTS.into_iter().find(|(start, _)| name.starts_with(start)).expect("a scene of a known robot");
         let source = std::fs::read_to_string(folder.join("descriptions").join(robot)).expect("a file can be read");
-        let options = scene::read_partly(&Source::new(&format!("{name}.toml"), text)).into_options(Options::default());
+        let options =
+            scene_file::read_partly(&Source::new(&format!("{name}.toml"), text)).into_options(Options::default());
         let generated = compile(&Source::new(robot, source), &options).unwrap_or_else(|d| panic!("{}", d.render()));
         format!("{} {robot} in {name}", sum(&generated.text))
     };

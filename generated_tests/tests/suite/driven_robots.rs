@@ -4,10 +4,11 @@
 use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::equations::Robot;
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
 use straightline_codegen::program::program;
+use straightline_codegen::Function;
 use straightline_codegen::Function::{CompleteModel, DriveTorques, DrivenForwardDynamics};
-use straightline_codegen::{scene, Function};
 use straightline_core::algorithms as alg;
 use straightline_core::model::Model;
 use straightline_generated_tests::bounds::DRIVE;
@@ -17,7 +18,7 @@ use straightline_robots::{planar_2r_elastic, planar_2r_geared};
 
 /// The same robot through the compiler as a library.
 fn compiled(scene_text: &str) -> (Options, Robot) {
-    let scene = scene::read(&Source::new("drives.toml", scene_text), &mut Diagnostics::new()).expect("a scene");
+    let scene = scene_file::read(&Source::new("drives.toml", scene_text), &mut Diagnostics::new()).expect("a scene");
     let options = scene.into_options(Options { frames: vec!["tip".to_string()], ..Options::default() });
     let text = include_str!("../../../robots/descriptions/planar_2r.toml");
     let generated = compile(&Source::new("planar_2r.toml", text), &options).unwrap_or_else(|d| panic!("{d}"));

@@ -9,8 +9,8 @@ use std::path::Path;
 use straightline_codegen::compile::explain;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::emit::Generated;
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
-use straightline_codegen::scene;
 use straightline_generated_tests::made::Made;
 
 /// The Panda in a scene.
@@ -24,7 +24,7 @@ fn explained(text: &str) -> Generated {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("count_robots/panda.urdf");
     let robot = std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let file =
-        scene::read(&Source::new("scene.toml", text), &mut diagnostics).unwrap_or_else(|| panic!("{diagnostics}"));
+        scene_file::read(&Source::new("scene.toml", text), &mut diagnostics).unwrap_or_else(|| panic!("{diagnostics}"));
     let options = file.into_options(Options::default());
     explain(&Source::from_bytes("panda.urdf", robot), &options).unwrap_or_else(|d| panic!("{d}"))
 }

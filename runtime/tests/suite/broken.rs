@@ -136,7 +136,7 @@ fn cases() -> Vec<Case> {
         ),
         (
             "lanes",
-            r#""robot/none.toml", functions(gravity_force), lanes"#,
+            r#""robot/none.toml", functions(gravity_force), lanes = "runtime""#,
             USE_LANES,
             none(),
             none(),

@@ -92,7 +92,7 @@ pub struct GearedOtherwise;
 
 /// Many of them at once.
 #[derive(Dynamics)]
-#[robot("examples/arm.toml", functions(inverse_dynamics), lanes)]
+#[robot("examples/arm.toml", functions(inverse_dynamics), lanes = "runtime")]
 pub struct Arms;
 
 /// Over any scalar.

@@ -97,7 +97,7 @@ fn check_says_which_angles_are_taken_as_exact() {
     let run = straightline(&["check", ARM, robot]);
     assert_eq!((run.code, run.err.as_str()), (0, ""));
     assert!(run.out.contains("roll of the origin of joint `elbow`: 1.5707963267948966 as π/2, -6.1e-17 rad off"));
-    let literal = straightline(&["check", robot, "--literal-angles"]);
+    let literal = straightline(&["check", robot, "--angle-tolerance", "0"]);
     assert!(!literal.out.contains("taken as exact"), "{}", literal.out);
 }
 

@@ -10,6 +10,7 @@ use straightline_codegen::description::Description;
 use straightline_codegen::diagnostic::Diagnostics;
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Optimisations;
 use straightline_codegen::program::contact::{programs as contact_programs, Mode};
 use straightline_codegen::program::parameter::parameter_program;
@@ -161,7 +162,7 @@ fn options(scene_text: &str) -> Options {
     let names = FUNCTIONS.map(|name| format!("\"{name}\"")).join(", ");
     let text = format!("[outputs]\nfunctions = [{names}]\n{scene_text}");
     let mut complaints = Diagnostics::new();
-    let file = scene::read(&Source::new("scene.toml", text), &mut complaints);
+    let file = scene_file::read(&Source::new("scene.toml", text), &mut complaints);
     file.unwrap_or_else(|| panic!("{complaints}")).into_options(Options::default())
 }
 

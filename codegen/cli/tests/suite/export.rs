@@ -32,7 +32,7 @@ fn c_calls_every_function_and_gets_what_the_generic_runtime_computes() {
     succeeds(
         Command::new(env!("CARGO_BIN_EXE_straightline"))
             .args(["export", ARM, "--c-abi", "--prefix", "Arm3", "--floating-base"])
-            .args(["--frame", "forearm", "--frame", "column", "--lanes", "-o"])
+            .args(["--frame", "forearm", "--frame", "column", "--lanes", "standalone", "-o"])
             .arg(&package),
     );
     // truth: the generic algorithms in double-double

@@ -334,7 +334,7 @@ impl Case {
             add(&["--rules", r.one(&["exact", "all"])]);
         }
         if r.percent(6) {
-            add(&["--lanes"]);
+            add(&["--lanes", r.one(&["standalone", "runtime"])]);
         }
         if r.percent(4) {
             add(&["--fma"]);

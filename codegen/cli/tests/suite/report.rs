@@ -7,9 +7,10 @@ use straightline_cli::html;
 use straightline_codegen::compile::{compile, explain};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::emit::Generated;
+use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
 use straightline_codegen::report::waterfall::By;
-use straightline_codegen::scene::{self, Budget, Gravity, Parameter, Scene, Selection, Zero};
+use straightline_codegen::scene::{Budget, Gravity, Parameter, Scene, Selection, Zero};
 use straightline_codegen::{Function, Grade};
 
 const ARM: &str = include_str!("../../../tests/files/arm.toml");
@@ -41,7 +42,7 @@ fn text_of(text: &str, options: &Options) -> String {
 
 fn scene_of(text: &str) -> Scene {
     let mut diagnostics = Diagnostics::new();
-    let file = scene::read(&Source::new("scene.toml", text), &mut diagnostics);
+    let file = scene_file::read(&Source::new("scene.toml", text), &mut diagnostics);
     file.unwrap_or_else(|| panic!("{diagnostics}")).scene
 }
 

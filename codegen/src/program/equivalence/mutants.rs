@@ -182,7 +182,7 @@ impl Case {
         let file = if robot.starts_with('<') { "robot.urdf" } else { "robot.toml" };
         let source = Source::new(file, robot);
         let mut complaints = Diagnostics::new();
-        let scene = scene::read(&Source::new("scene.toml", scene), &mut complaints);
+        let scene = crate::options::scene_file::read(&Source::new("scene.toml", scene), &mut complaints);
         let options = scene.unwrap_or_else(|| panic!("{name}: {complaints}")).into_options(options).knowing(&source);
         let model = load(&source, &options.scene.model_options(&options.model)).0;
         let model = model.and_then(|model| scene::apply(model, &options.scene, &mut complaints));

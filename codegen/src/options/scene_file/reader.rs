@@ -1,41 +1,25 @@
-//! Scene files: TOML, documented in `SCENES.md`. Every complaint has its place, and all come in one run.
+//! What stands in a scene file, table by table.
 
 mod contact;
 
-use super::{
-    check, messages as say, Base, Budget, Contacts, Coulomb, Gravity, Interval, JointRanges, MaxError, Parameter, Part,
-    Payload, Places, Ranges, Scene, Selection,
-};
-use crate::choices::{Choice, LimbForm};
-use crate::description::reader::{Range64, Reader, LARGEST_FILE};
-use crate::description::table::{parse, Table};
+use super::{SceneFile, LISTS};
+use crate::description::reader::{Range64, Reader};
+use crate::description::table::Table;
 use crate::description::{messages, Value};
-use crate::diagnostic::{Diagnostics, Level, Levels, Source};
+use crate::diagnostic::{Diagnostics, Front, Source};
 use crate::function::Function;
-use straightline_graph::certify::Effort;
-use straightline_graph::Scalar;
+use crate::options::table::{Kind, Place, Row, TABLE};
+use crate::options::value;
+use crate::scene::{
+    messages as say, Base, Budget, Coulomb, Gravity, Interval, JointRanges, MaxError, Parameter, Part, Payload, Places,
+    Ranges, Scene, Selection, Zero,
+};
+use std::ops::Range;
 use toml::de::DeValue;
 
-const TOP: &[&str] = &[
-    "contact",
-    "loop",
-    "mode",
-    "stabilisation",
-    "outputs",
-    "hold",
-    "payload",
-    "zero",
-    "effects",
-    "parameter",
-    "drive",
-    "flexible",
-    "support",
-    "numbers",
-    "budget",
-    "diagnostics",
-];
-/// Those of the tables of which there may be several: `[[payload]]`.
-pub const LISTS: &[&str] = &["contact", "loop", "mode", "payload", "parameter", "drive", "flexible"];
+/// The tables of which there is one each, beside [`LISTS`].
+const TABLES: &[&str] =
+    &["stabilisation", "outputs", "hold", "zero", "effects", "support", "numbers", "budget", "options", "diagnostics"];
 const BUDGET: &[&str] =
     &["max_flops", "max_sincos", "max_live", "max_stack_bytes", "max_code_bytes", "max_error", "mixed_precision"];
 const BASES: [(&str, Base); 3] = [("fixed", Base::Fixed), ("floating", Base::Floating), ("moving", Base::Moving)];
@@ -43,88 +27,27 @@ const BASES: [(&str, Base); 3] = [("fixed", Base::Fixed), ("floating", Base::Flo
 const SMOOTH: Coulomb = Coulomb::Smooth(0.0);
 const COULOMB: [(&str, Coulomb); 3] = [("off", Coulomb::Off), ("sign", Coulomb::Sign), ("smooth", SMOOTH)];
 
-/// What a scene file says: the scene, and options of the compiler.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct SceneFile {
-    /// The scene.
-    pub scene: Scene,
-    /// The functions that are wanted; `None`: all.
-    pub functions: Option<Vec<Function>>,
-    /// The scalar types, the first one that of the file's own items; none: as the options say.
-    pub scalars: Vec<Scalar>,
-    /// So near to a special angle \[rad\] an angle of the robot file is taken as that.
-    pub angle_tolerance: Option<f64>,
-    /// How identical limbs are computed; none: as the options say.
-    pub limbs: Option<LimbForm>,
-    /// Whether rounding errors are bounded, and what is spent on it; none: as the options say.
-    pub certify: Option<Effort>,
-    /// What becomes of warnings, unless the options say otherwise.
-    pub levels: Levels,
-}
-
 /// What a `[[parameter]]` is of.
 #[derive(Clone, Copy)]
-enum Kind {
+enum Kinds {
     Payload,
     Link,
     Drive,
 }
 
-/// Reads a scene file. Complaints go to `diagnostics`; `None` after errors. Names are checked where the robot is known: by
-/// [`apply`](super::apply).
-///
-/// ```
-/// use straightline_codegen::diagnostic::{Diagnostics, Source};
-/// use straightline_codegen::scene::{read, Gravity};
-/// let text = "[hold]\ngravity = \"zero\"\njoints = { wrist = 0.5 }\n";
-/// let mut diagnostics = Diagnostics::new();
-/// let file = read(&Source::new("free_fall.toml", text), &mut diagnostics).unwrap();
-/// assert_eq!(file.scene.gravity, Gravity::Constant([0.0; 3]));
-/// assert_eq!(file.scene.locked, [("wrist".to_string(), 0.5)]);
-/// ```
-pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<SceneFile> {
-    let mut file = read_partly(source);
-    let found = file.scene.places.take_complaints();
-    let errors = found.has_errors();
-    diagnostics.extend(found);
-    (!errors).then_some(file)
+/// The names of the options that stand in a table.
+fn options_of(table: &str) -> Vec<&'static str> {
+    TABLE.iter().filter(|row| row.stands_in(table)).map(|row| row.name).collect()
 }
 
-/// What can be read of a scene file. Its complaints stay with the scene, and are said along with those of the robot, in one
-/// run; if there are errors among them, whatever compiles the scene refuses it.
-pub fn read_partly(source: &Source) -> SceneFile {
-    let mut found = Diagnostics::new();
-    found.add_source(source);
-    let mut file = read_text(source, &mut found).unwrap_or_default();
-    if found.has_errors() {
-        // modes name contacts: those that could not be read would be missed
-        file.scene.contacts = Contacts::default();
-    }
-    found.sort();
-    file.scene.places.keep(found);
-    file
-}
-
-fn read_text(source: &Source, diagnostics: &mut Diagnostics) -> Option<SceneFile> {
-    if let Some(at) = source.invalid_utf8() {
-        diagnostics.push(messages::not_utf8().at(&source.place(at..at)));
-        return None;
-    }
-    if source.text().len() > LARGEST_FILE {
-        let size = source.text().len();
-        diagnostics.push(messages::file_too_large(size, LARGEST_FILE).at(&source.place(0..0)));
-        return None;
-    }
-    let document = parse(source, diagnostics)?;
-    let top = Table { owner: "a scene".to_string(), table: document.get_ref(), span: 0..0 };
+/// Reads a scene file from its top.
+pub fn read(source: &Source, top: &Table, diagnostics: &mut Diagnostics) -> SceneFile {
     let mut scene = SceneReader {
         reader: Reader::new(source, diagnostics),
         file: SceneFile { scene: Scene { places: Places::new(source), ..Scene::default() }, ..SceneFile::default() },
     };
-    scene.read(&top);
-    let file = scene.file;
-    check::alone(&file.scene, diagnostics);
-    Some(file)
+    scene.read(top);
+    scene.file
 }
 
 /// A scene file that is being read.
@@ -135,7 +58,7 @@ struct SceneReader<'a> {
 
 impl SceneReader<'_> {
     fn read(&mut self, top: &Table) {
-        self.reader.check_keys(top, TOP);
+        self.reader.check_keys(top, &[LISTS, TABLES].concat());
         if let Some(table) = self.reader.table_at(top, "outputs", "[outputs]") {
             self.outputs(&table);
         }
@@ -164,22 +87,93 @@ impl SceneReader<'_> {
             self.budgets(&table);
         }
         if let Some(table) = self.reader.table_at(top, "diagnostics", "[diagnostics]") {
-            self.levels(&table);
+            self.reader.check_keys(&table, &options_of("diagnostics"));
+            self.options(&table, "diagnostics");
+        }
+        if let Some(table) = self.reader.table_at(top, "options", "[options]") {
+            self.own_options(&table);
         }
         self.contacts(top);
     }
 
-    /// What becomes of warnings.
-    fn levels(&mut self, table: &Table) {
-        self.reader.check_keys(table, &Level::ALL.map(Level::word));
-        for level in Level::ALL {
-            for code in self.reader.names_at(table, level.word(), "code") {
-                match Levels::complaint(&code.value, level) {
-                    Some(complaint) => self.reader.diagnostics.push(complaint.at(&code.place)),
-                    None => self.file.levels.set(code.value, level),
-                }
+    /// `[options]`: a key that stands elsewhere is told where.
+    fn own_options(&mut self, table: &Table) {
+        let known = options_of("options");
+        for key in table.table.keys().filter(|key| !known.contains(&key.get_ref().as_ref())) {
+            let complaint = messages::unknown_key(&table.owner, key.get_ref(), &known);
+            let elsewhere = TABLE.iter().find(|row| row.name == key.get_ref().as_ref()).map(|row| match row.scene {
+                Place::In(other) => format!("it stands in [{other}]"),
+                Place::Key(other) => format!("write {other}"),
+                Place::Not(why) => why.to_string(),
+                Place::Options | Place::Also(_) => unreachable!("a key of [options] is known"),
+            });
+            let complaint = elsewhere.into_iter().fold(complaint, |complaint, help| complaint.help(help));
+            self.reader.complain(&key.span(), complaint);
+        }
+        self.options(table, "options");
+    }
+
+    /// The options that stand in a table of that name.
+    fn options(&mut self, table: &Table, name: &str) {
+        for row in TABLE.iter().filter(|row| row.stands_in(name)) {
+            let Some((_, span)) = table.get(row.name) else { continue };
+            let place = self.reader.place(&span);
+            if self.file.settings.has(row.name) {
+                let Place::Also(other) = row.scene else { continue };
+                self.reader.diagnostics.push(say::written_twice(row.name, other).at(&place));
+            }
+            let Some(value) = self.option(table, row, &span) else { continue };
+            self.file.scene.places.note(format!("options.{}", row.name), &place);
+            self.file.settings.give(row, value, Front::CommandLine).expect("it was checked word by word");
+        }
+    }
+
+    /// The value of an option; `None` after a complaint that leaves nothing of it.
+    fn option(&mut self, table: &Table, row: &'static Row, span: &Range<usize>) -> Option<value::Value> {
+        let (reader, key) = (&mut self.reader, row.name);
+        let number = match &row.kind {
+            Kind::Flag => return reader.flag_at(table, key).map(|flag| flag.value.into()),
+            Kind::Vector => return reader.vector_at(table, key).map(|vector| vector.value.into()),
+            Kind::Real(..) => reader.real_at(table, key, Range64::Finite)?.value,
+            Kind::Whole(..) => reader.count_at(table, key)?.value as f64,
+            _ => return self.words(table, row),
+        };
+        match row.wrong_number(number) {
+            None => Some(number.into()),
+            Some(wrong) => {
+                reader.complain(span, wrong);
+                None
             }
         }
+    }
+
+    /// The words of an option: one as a text, several in an array. Of codes those count that are right.
+    fn words(&mut self, table: &Table, row: &'static Row) -> Option<value::Value> {
+        let (reader, key) = (&mut self.reader, row.name);
+        let is_codes = matches!(row.kind, Kind::Codes(_));
+        let (words, count) = match (table.get(key)?.0, &row.kind) {
+            (DeValue::Array(array), Kind::Words(_) | Kind::Names { .. } | Kind::Codes(_)) => {
+                (reader.names_at(table, key, if is_codes { "code" } else { key.trim_end_matches('s') }), array.len())
+            }
+            (DeValue::String(_), Kind::Words(of)) if !of.is_of_items => (vec![reader.string_at(table, key)?], 1),
+            (_, Kind::Word(..)) => (vec![reader.string_at(table, key)?], 1),
+            _ => (reader.names_at(table, key, ""), 1),
+        };
+        let mut right = Vec::new();
+        for word in words {
+            let known = |of: &value::Vocabulary| (of.words)().iter().map(|(word, _)| *word).collect::<Vec<&str>>();
+            let wrong = row.wrong_word(&word.value).map(|wrong| match &row.kind {
+                Kind::Word(of, _) | Kind::Words(of) => {
+                    messages::unknown_word(&table.what(key), &word.value, &known(of))
+                }
+                _ => wrong,
+            });
+            match wrong {
+                Some(wrong) => reader.diagnostics.push(wrong.at(&word.place)),
+                None => right.push(word.value),
+            }
+        }
+        (is_codes || right.len() == count).then_some(value::Value::Words(right))
     }
 
     /// The value, its place noted under that path.
@@ -205,32 +199,16 @@ impl SceneReader<'_> {
 
     fn outputs(&mut self, table: &Table) {
         let names: Vec<&str> = Function::known().map(Function::name).collect();
-        self.reader.check_keys(table, &[&["functions", "staged", "limbs", "matrices", "contact"], &names[..]].concat());
+        self.reader
+            .check_keys(table, &[&options_of("outputs")[..], &["staged", "matrices", "contact"], &names[..]].concat());
+        self.options(table, "outputs");
         self.file.scene.staged = self.reader.flag_at(table, "staged").is_some_and(|flag| flag.value);
-        let forms: Vec<(&str, LimbForm)> = LimbForm::words().into_iter().map(|(word, _, form)| (word, form)).collect();
-        if let Some(form) = self.reader.word_at(table, "limbs", &forms) {
-            self.file.scene.places.note("outputs.limbs", &form.place);
-            self.file.limbs = Some(form.value);
-        }
         let orders = [("by rows", false), ("by columns", true)];
         self.file.scene.by_columns = self.reader.word_at(table, "matrices", &orders).is_some_and(|order| order.value);
         self.contact_functions(table);
-        if let Some((_, span)) = table.get("functions") {
-            let place = self.reader.place(&span);
-            self.file.scene.places.note("outputs.functions", &place);
-        }
-        let mut functions: Vec<Function> = Vec::new();
-        let mut all_are_known = true;
-        for name in self.reader.names_at(table, "functions", "function") {
-            match Function::from_name(&name.value) {
-                Some(function) => functions.push(function),
-                None => {
-                    let complaint = messages::unknown_word("functions of [outputs]", &name.value, &names);
-                    self.reader.diagnostics.push(complaint.at(&name.place));
-                    all_are_known = false;
-                }
-            }
-        }
+        let whole = self.file.settings.value("functions").cloned();
+        let all_are_known = whole.is_some() || !table.has("functions");
+        let mut functions: Vec<Function> = whole.iter().flat_map(value::Value::choices).collect();
         for function in Function::known() {
             let name = function.name();
             let owner = format!("`{name}` of [outputs]");
@@ -246,10 +224,10 @@ impl SceneReader<'_> {
             self.file.scene.outputs.insert(function, Selection { joints, frames, part });
             functions.push(function);
         }
-        functions.sort_unstable();
-        functions.dedup();
-        if all_are_known && (table.has("functions") || !functions.is_empty()) {
-            self.file.functions = Some(functions);
+        if all_are_known && !functions.is_empty() {
+            let row = Row::find("functions", |_| true).expect("functions are an option");
+            let value = value::Value::of_choices(functions);
+            self.file.settings.give(row, value, Front::CommandLine).expect("functions have names");
         }
     }
 
@@ -323,7 +301,7 @@ impl SceneReader<'_> {
         let mut flag = |key: &str| self.reader.flag_at(table, key).is_some_and(|flag| flag.value);
         let (qd, qdd) = (flag("qd"), flag("qdd"));
         let joints_at_rest = self.names("zero.joints_at_rest", table, "joints_at_rest", "joint");
-        self.file.scene.zero = super::Zero { qd, qdd, joints_at_rest };
+        self.file.scene.zero = Zero { qd, qdd, joints_at_rest };
     }
 
     fn effects(&mut self, table: &Table) {
@@ -358,7 +336,7 @@ impl SceneReader<'_> {
             }
             (form, None) => form,
         };
-        self.file.scene.effects = super::Effects {
+        self.file.scene.effects = crate::scene::Effects {
             rotor_inertia,
             damping,
             coulomb,
@@ -375,10 +353,10 @@ impl SceneReader<'_> {
         let place = reader.place(&table.span);
         self.file.scene.places.note(format!("parameter.{i}"), &place);
         reader.require(&table, "kind", "kind = \"payload\"");
-        let kinds = [("payload", Kind::Payload), ("link", Kind::Link), ("drive", Kind::Drive)];
+        let kinds = [("payload", Kinds::Payload), ("link", Kinds::Link), ("drive", Kinds::Drive)];
         let Some(kind) = reader.word_at(&table, "kind", &kinds) else { return };
         let parameter = match kind.value {
-            Kind::Payload => {
+            Kinds::Payload => {
                 reader.check_keys(&table, &["kind", "name", "frame"]);
                 reader.require(&table, "name", "name = \"payload\"");
                 reader.require(&table, "frame", "frame = \"...\"");
@@ -388,13 +366,13 @@ impl SceneReader<'_> {
                 let frame = self.noted(&format!("parameter.{i}.frame"), frame);
                 name.zip(frame).map(|(name, frame)| Parameter::Payload { name, frame })
             }
-            Kind::Link => {
+            Kinds::Link => {
                 reader.check_keys(&table, &["kind", "link"]);
                 reader.require(&table, "link", "link = \"...\"");
                 let link = reader.name_at(&table, "link", "link");
                 self.noted(&format!("parameter.{i}.link"), link).map(|link| Parameter::Link { link })
             }
-            Kind::Drive => {
+            Kinds::Drive => {
                 reader.check_keys(&table, &["kind", "name", "drive", "numbers"]);
                 reader.require(&table, "drive", "drive = \"...\"");
                 reader.require(&table, "numbers", "numbers = [\"ratio\", \"rotor_inertia\"]");
@@ -410,54 +388,10 @@ impl SceneReader<'_> {
     }
 
     fn numbers(&mut self, table: &Table) {
-        let certify = ["certify", "certify_boxes", "certify_seconds", "certify_state"];
-        self.reader.check_keys(table, &[&["scalar", "angle_tolerance", "ranges"], &certify[..]].concat());
-        self.certify(table);
-        let scalars: Vec<(&str, Scalar)> = Scalar::words().into_iter().map(|(word, _, s)| (word, s)).collect();
-        self.file.scalars = match table.get("scalar") {
-            Some((DeValue::Array(_), span)) => {
-                let place = self.reader.place(&span);
-                self.file.scene.places.note("numbers.scalar", &place);
-                let words = self.reader.names_at(table, "scalar", "scalar type");
-                words.iter().filter_map(|word| self.reader.word("scalar types", word, &scalars)).collect()
-            }
-            _ => {
-                let word = self.reader.word_at(table, "scalar", &scalars);
-                word.iter().for_each(|word| self.file.scene.places.note("numbers.scalar", &word.place));
-                word.map(|word| word.value).into_iter().collect()
-            }
-        };
-        let tolerance = self.reader.real_at(table, "angle_tolerance", Range64::Finite);
-        if let Some(value) = tolerance.as_ref().filter(|t| !(0.0..=0.1).contains(&t.value)) {
-            let complaint = say::not_in_range("angle_tolerance", value.value, "between 0 and 0.1 rad");
-            self.reader.diagnostics.push(complaint.at(&value.place));
-        }
-        self.file.angle_tolerance = tolerance.map(|t| t.value);
+        self.reader.check_keys(table, &[&options_of("numbers")[..], &["ranges"]].concat());
+        self.options(table, "numbers");
         if let Some(ranges) = self.reader.table_at(table, "ranges", "[numbers.ranges]") {
             self.ranges(&ranges);
-        }
-    }
-
-    fn certify(&mut self, table: &Table) {
-        let certify = self.reader.flag_at(table, "certify").is_some_and(|flag| flag.value);
-        let companions = self.reader.flag_at(table, "certify_state").is_some_and(|flag| flag.value);
-        let boxes = self.reader.count_at(table, "certify_boxes");
-        let seconds = self.reader.real_at(table, "certify_seconds", Range64::Finite);
-        let (most_boxes, most_seconds) = (Effort::MOST_BOXES, Effort::MOST_SECONDS);
-        if let Some(n) = boxes.as_ref().filter(|n| !(1..=most_boxes).contains(&n.value)) {
-            let range = format!("between 1 and {most_boxes}");
-            let complaint = say::not_in_range("certify_boxes", n.value as f64, &range);
-            self.reader.diagnostics.push(complaint.at(&n.place));
-        }
-        let is_sound = |x: f64| x > 0.0 && x <= most_seconds;
-        if let Some(s) = seconds.as_ref().filter(|s| !is_sound(s.value)) {
-            let complaint =
-                say::not_in_range("certify_seconds", s.value, &format!("above 0 and up to {most_seconds} s"));
-            self.reader.diagnostics.push(complaint.at(&s.place));
-        }
-        if certify || companions || boxes.is_some() || seconds.is_some() {
-            let seconds = seconds.map(|s| s.value).filter(|s| is_sound(*s));
-            self.file.certify = Some(Effort::new(boxes.map(|n| n.value), seconds, companions));
         }
     }
 
@@ -569,6 +503,7 @@ impl SceneReader<'_> {
     fn budgets(&mut self, table: &Table) {
         let names: Vec<&str> = Function::known().map(Function::name).collect();
         self.reader.check_keys(table, &names);
+        let wanted: Option<Vec<Function>> = self.file.settings.value("functions").map(value::Value::choices);
         for function in Function::known() {
             let name = function.name();
             let Some(limits) = self.reader.table_at(table, name, &format!("[budget.{name}]")) else { continue };
@@ -597,7 +532,7 @@ impl SceneReader<'_> {
             let mixed_precision = self.noted(&format!("budget.{name}.mixed_precision"), mixed).is_some();
             let budget = Budget { max_error, mixed_precision, ..budget };
             self.file.scene.budgets.insert(function, budget);
-            if self.file.functions.as_ref().is_some_and(|functions| !functions.contains(&function)) {
+            if wanted.as_ref().is_some_and(|functions| !functions.contains(&function)) {
                 self.reader.complain(&limits.span, say::budget_alone(name));
             }
         }
