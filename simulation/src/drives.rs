@@ -141,7 +141,7 @@ pub fn demands(model: &Model<f64>, q: &[f64], rates: &[Vec<f64>], x: &[f64], add
         added: Load,
     ) -> Vec<Demand<f64>> {
         let rates: Vec<&[f64]> = rates.iter().map(Vec::as_slice).collect();
-        drive_demands::<f64, N>(model, q, &rates, x, |model, q, qd, qdd| match added {
+        drive_demands::<f64, N>(N, model, q, &rates, x, |model, q, qd, qdd| match added {
             Load::Motion(forces) => {
                 let motion = inverse_dynamics(model, q, qd, qdd).into_iter().zip(forces);
                 motion.map(|(tau, f)| tau + Taylor::fixed(*f)).collect()

@@ -64,13 +64,25 @@ impl RobotFunction for DrivenInverseDynamics {
     }
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        match alg::inverse_orders(&forms.model.drives).map_or(0, |o| o.of_torque) {
-            0 => inverse::<T, 1>(forms, inputs),
-            1..=3 => inverse::<T, 4>(forms, inputs),
-            4..=7 => inverse::<T, 8>(forms, inputs),
-            8..=15 => inverse::<T, 16>(forms, inputs),
-            _ => inverse::<T, { MOST_DERIVATIVES + 1 }>(forms, inputs),
-        }
+        let terms = match alg::inverse_orders(&forms.model.drives).map_or(0, |o| o.of_torque) {
+            0 => 1,
+            1..=3 => 4,
+            4..=7 => 8,
+            8..=15 => 16,
+            _ => MOST_DERIVATIVES + 1,
+        };
+        let (rates, x) = match alg::reads_states(&forms.model.drives) {
+            true => (&inputs[1..inputs.len() - 1], &inputs[inputs.len() - 1][..]),
+            false => (&inputs[1..], &[][..]),
+        };
+        let rates: Vec<&[T]> = rates.iter().map(Vec::as_slice).collect();
+        let torques = |model: &Model<Series<T>>, q: &[Series<T>], qd: &[Series<T>], qdd: &[Series<T>]| {
+            let reduced = forms.reduced.map(|both| both.map(|r| r.map(Taylor::fixed)));
+            let reduced = reduced.as_ref().map(|[torques, h]| [torques, h]);
+            Forms { reduced, ..Forms::plain(model, &[], forms.method) }.inverse_dynamics(q, qd, qdd)
+        };
+        let (u, m) = alg::driven_inverse(terms, forms.model, &inputs[0], &rates, x, torques);
+        [u, m].concat()
     }
 }
 
@@ -205,6 +217,9 @@ pub(crate) fn may_be_articulated<T: Real>(model: &Model<T>) -> bool {
         && model.drives.iter().all(|d| d.efficiency.is_none() && d.held_joint().is_none())
 }
 
+/// Series of any wanted number of terms: one type, so that the algorithms are compiled once over series and not once per order.
+type Series<T> = Taylor<T, { MOST_DERIVATIVES + 1 }>;
+
 /// q, q̇, x, u.
 type At<'a, T> = (&'a [T], &'a [T], &'a [T], &'a [T]);
 
@@ -219,19 +234,4 @@ fn with_links<T: Real, R>(
     let h = if is_articulated { Vec::new() } else { forms.mass_matrix(q) };
     let links = if is_articulated { Links::Articulated } else { Links::MassMatrix(&h) };
     solve((q, qd, x, u), &forms.bias_force(q, qd), &links)
-}
-
-/// The inverse problem over series of so many terms; what is too much is never wanted.
-fn inverse<T: Real, const N: usize>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-    let (rates, x) = match alg::reads_states(&forms.model.drives) {
-        true => (&inputs[1..inputs.len() - 1], &inputs[inputs.len() - 1][..]),
-        false => (&inputs[1..], &[][..]),
-    };
-    let rates: Vec<&[T]> = rates.iter().map(Vec::as_slice).collect();
-    let (u, m) = alg::driven_inverse::<T, N>(forms.model, &inputs[0], &rates, x, |model, q, qd, qdd| {
-        let reduced = forms.reduced.map(|both| both.map(|r| r.map(Taylor::fixed)));
-        let reduced = reduced.as_ref().map(|[torques, h]| [torques, h]);
-        Forms { reduced, ..Forms::plain(model, &[], forms.method) }.inverse_dynamics(q, qd, qdd)
-    });
-    [u, m].concat()
 }

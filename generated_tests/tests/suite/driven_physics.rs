@@ -521,7 +521,7 @@ fn at_zero_power_a_gear_loses_nothing() {
 
 /// A path of the arm's joints as series.
 fn path<const N: usize>(random: &mut Random) -> Vec<Taylor<Dd, N>> {
-    (0..3).map(|_| Taylor { coefficients: std::array::from_fn(|_| Dd::from(random.between(-1.0, 1.0))) }).collect()
+    (0..3).map(|_| Taylor::new(std::array::from_fn(|_| Dd::from(random.between(-1.0, 1.0))))).collect()
 }
 
 #[test]

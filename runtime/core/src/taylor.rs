@@ -7,30 +7,62 @@ use crate::dd::Dd;
 use crate::real::Real;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A truncated Taylor series.
+/// A truncated Taylor series. How many coefficients are computed is said at run time, so that whatever runs over series is compiled
+/// once and not per order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Taylor<T, const N: usize> {
-    /// The coefficients, that of t⁰ first.
+    /// The coefficients, that of t⁰ first; zero where they are not computed.
     pub coefficients: [T; N],
+    /// How many are computed; [`CONSTANT`] where all but the first are known to be zero.
+    terms: usize,
 }
 
+/// The terms of a constant: it takes as many as whatever it meets.
+const CONSTANT: usize = usize::MAX;
+
 impl<T: Real, const N: usize> Taylor<T, N> {
+    /// The series of these coefficients.
+    pub fn new(coefficients: [T; N]) -> Self {
+        Taylor { coefficients, terms: N }
+    }
+
     /// The series of a function with these derivatives at t = 0, the function itself first; what is not given is zero.
     pub fn from_derivatives(derivatives: impl IntoIterator<Item = T>) -> Self {
+        Taylor::truncated(N, derivatives)
+    }
+
+    /// The same of so many terms.
+    pub fn truncated(terms: usize, derivatives: impl IntoIterator<Item = T>) -> Self {
         let (mut coefficients, mut factorial) = ([T::zero(); N], Dd::ONE);
-        for (k, (slot, x)) in coefficients.iter_mut().zip(derivatives).enumerate() {
+        for (k, (slot, x)) in coefficients[..terms].iter_mut().zip(derivatives).enumerate() {
             if k > 1 {
                 factorial = factorial * Dd::from(k as f64);
             }
             // a quotient of exact numbers rounds once
             *slot = if k > 1 { x / T::constant(factorial) } else { x };
         }
-        Taylor { coefficients }
+        Taylor { coefficients, terms }
     }
 
     /// A constant.
     pub fn fixed(value: T) -> Self {
-        Taylor::from_derivatives([value])
+        let mut coefficients = [T::zero(); N];
+        coefficients[0] = value;
+        Taylor { coefficients, terms: CONSTANT }
+    }
+
+    /// The series of `terms` terms with these coefficients, one after the other of those before it.
+    fn each(terms: usize, mut coefficient: impl FnMut(&[T; N], usize) -> T) -> Self {
+        let mut coefficients = [T::zero(); N];
+        for k in 0..computed(terms) {
+            coefficients[k] = coefficient(&coefficients, k);
+        }
+        Taylor { coefficients, terms }
+    }
+
+    /// The terms of what follows from both.
+    fn with(&self, other: &Self) -> usize {
+        self.terms.min(other.terms)
     }
 
     /// The k-th derivative at t = 0.
@@ -46,10 +78,19 @@ impl<T: Real, const N: usize> Taylor<T, N> {
     #[must_use]
     pub fn derivative(&self) -> Self {
         let mut coefficients = [T::zero(); N];
-        for k in 1..N {
+        for k in 1..computed(self.terms) {
             coefficients[k - 1] = self.coefficients[k] * number(k);
         }
-        Taylor { coefficients }
+        Taylor { coefficients, terms: self.terms }
+    }
+}
+
+/// How many coefficients there are to compute.
+fn computed(terms: usize) -> usize {
+    if terms == CONSTANT {
+        1
+    } else {
+        terms
     }
 }
 
@@ -70,29 +111,29 @@ fn convolution<T: Real>(a: &[T], b: &[T], k: usize, from: usize, to: usize) -> O
 impl<T: Real, const N: usize> Add for Taylor<T, N> {
     type Output = Self;
     fn add(self, b: Self) -> Self {
-        Taylor { coefficients: core::array::from_fn(|k| self.coefficients[k] + b.coefficients[k]) }
+        Taylor::each(self.with(&b), |_, k| self.coefficients[k] + b.coefficients[k])
     }
 }
 
 impl<T: Real, const N: usize> Sub for Taylor<T, N> {
     type Output = Self;
     fn sub(self, b: Self) -> Self {
-        Taylor { coefficients: core::array::from_fn(|k| self.coefficients[k] - b.coefficients[k]) }
+        Taylor::each(self.with(&b), |_, k| self.coefficients[k] - b.coefficients[k])
     }
 }
 
 impl<T: Real, const N: usize> Neg for Taylor<T, N> {
     type Output = Self;
     fn neg(self) -> Self {
-        Taylor { coefficients: self.coefficients.map(|x| -x) }
+        Taylor::each(self.terms, |_, k| -self.coefficients[k])
     }
 }
 
 impl<T: Real, const N: usize> Mul for Taylor<T, N> {
     type Output = Self;
     fn mul(self, b: Self) -> Self {
-        let product = |k| convolution(&self.coefficients, &b.coefficients, k, 0, k).expect("a sum has a first term");
-        Taylor { coefficients: core::array::from_fn(product) }
+        let (a, terms) = (&self.coefficients, self.with(&b));
+        Taylor::each(terms, |_, k| convolution(a, &b.coefficients, k, 0, k).expect("a sum has a first term"))
     }
 }
 
@@ -100,12 +141,10 @@ impl<T: Real, const N: usize> Div for Taylor<T, N> {
     type Output = Self;
     /// y = a / b from b y = a: y_k = (a_k − Σ_{i≥1} b_i y_{k−i}) / b_0.
     fn div(self, b: Self) -> Self {
-        let mut y = [T::zero(); N];
-        for k in 0..N {
-            let rest = convolution(&b.coefficients, &y, k, 1, k);
-            y[k] = less(self.coefficients[k], rest) / b.coefficients[0];
-        }
-        Taylor { coefficients: y }
+        Taylor::each(self.with(&b), |y, k| {
+            let rest = convolution(&b.coefficients, y, k, 1, k);
+            less(self.coefficients[k], rest) / b.coefficients[0]
+        })
     }
 }
 
@@ -118,24 +157,22 @@ impl<T: Real, const N: usize> Real for Taylor<T, N> {
     fn sin_cos(self) -> (Self, Self) {
         let (mut s, mut c, mut rates) = ([T::zero(); N], [T::zero(); N], [T::zero(); N]);
         (s[0], c[0]) = self.coefficients[0].sin_cos();
-        for k in 1..N {
+        for k in 1..computed(self.terms) {
             rates[k] = self.coefficients[k] * number(k);
             let (sine, cosine) = (convolution(&rates, &c, k, 1, k), convolution(&rates, &s, k, 1, k));
             s[k] = sine.expect("k ≥ 1") / number(k);
             c[k] = -(cosine.expect("k ≥ 1") / number(k));
         }
-        (Taylor { coefficients: s }, Taylor { coefficients: c })
+        let terms = self.terms;
+        (Taylor { coefficients: s, terms }, Taylor { coefficients: c, terms })
     }
 
     /// From y² = x: 2 y_0 y_k = x_k − Σ_{0<i<k} y_i y_{k−i}.
     fn sqrt(self) -> Self {
-        let mut y = [T::zero(); N];
-        y[0] = self.coefficients[0].sqrt();
-        for k in 1..N {
-            let inner = convolution(&y, &y, k, 1, k - 1);
-            y[k] = less(self.coefficients[k], inner) / (y[0] + y[0]);
-        }
-        Taylor { coefficients: y }
+        Taylor::each(self.terms, |y, k| match k {
+            0 => self.coefficients[0].sqrt(),
+            _ => less(self.coefficients[k], convolution(y, y, k, 1, k - 1)) / (y[0] + y[0]),
+        })
     }
 
     /// Constant on either side of zero; at zero as if it stayed there.
@@ -144,9 +181,9 @@ impl<T: Real, const N: usize> Real for Taylor<T, N> {
     }
 
     fn named(self, name: &'static str, index: usize, component: &'static str) -> Self {
-        let mut coefficients = self.coefficients;
-        coefficients[0] = coefficients[0].named(name, index, component);
-        Taylor { coefficients }
+        let mut series = self;
+        series.coefficients[0] = series.coefficients[0].named(name, index, component);
+        series
     }
 
     fn section(phase: &'static str, body: Option<usize>) {

@@ -54,20 +54,22 @@ pub fn inverse_orders<T>(drives: &[Drive<T>]) -> Option<InverseOrders> {
 
 /// Inputs u and actuator torques M \[N·m\] of a motion, as [`drive_demands`].
 pub fn driven_inverse<T: Real, const N: usize>(
+    terms: usize,
     model: &Model<T>,
     q: &[T],
     rates: &[&[T]],
     x: &[T],
     torques: impl FnOnce(&Model<Taylor<T, N>>, &[Taylor<T, N>], &[Taylor<T, N>], &[Taylor<T, N>]) -> Vec<Taylor<T, N>>,
 ) -> (Vec<T>, Vec<T>) {
-    drive_demands(model, q, rates, x, torques).into_iter().map(|d| (d.input, d.torque)).unzip()
+    drive_demands(terms, model, q, rates, x, torques).into_iter().map(|d| (d.input, d.torque)).unzip()
 }
 
 /// What a motion asks of every drive: `rates` holds q̇ and all further derivatives that [`inverse_orders`] asks for, `torques` makes
-/// τ of series q, q̇, q̈. Limits are not applied: what comes out is what the motion takes.
+/// τ of series q, q̇, q̈, each of so many `terms`, at most N. Limits are not applied: what comes out is what the motion takes.
 ///
 /// `torques` is called once, with the model over series.
 pub fn drive_demands<T: Real, const N: usize>(
+    terms: usize,
     model: &Model<T>,
     q: &[T],
     rates: &[&[T]],
@@ -77,11 +79,11 @@ pub fn drive_demands<T: Real, const N: usize>(
     let over_series: Model<Taylor<T, N>> = model.map(Taylor::fixed);
     let along = |first: usize| -> Vec<Taylor<T, N>> {
         (0..model.nv())
-            .map(|i| Taylor::from_derivatives(rates[first.min(rates.len())..].iter().map(|r| r[i])))
+            .map(|i| Taylor::truncated(terms, rates[first.min(rates.len())..].iter().map(|r| r[i])))
             .collect()
     };
     let (qd, qdd) = (along(0), along(1));
-    let q = positions(model, q, &qd);
+    let q = positions(terms, model, q, &qd);
     let mut tau = torques(&over_series, &q, &qd, &qdd);
     subtract_rotors(&over_series, &q, &qd, &qdd, &mut tau);
     T::section("drives", None);
@@ -90,7 +92,7 @@ pub fn drive_demands<T: Real, const N: usize>(
     for (drive, original) in over_series.drives.iter().zip(&model.drives) {
         let own = &x[first.min(x.len())..(first + drive.states()).min(x.len())];
         first += drive.states();
-        demands.push(drive_input(&over_series, drive, original, [&q, &qd, &qdd], &tau, own));
+        demands.push(drive_input(terms, (&over_series, drive, original), [&q, &qd, &qdd], &tau, own));
     }
     demands
 }
@@ -110,11 +112,16 @@ pub struct Demand<T> {
 
 /// q as a series: its rates are q̇, but for a floating base, whose position and quaternion follow from (v, ω) in its own
 /// axes: ṗ = R v, and q̇ = ½ q ∘ (ω, 0).
-fn positions<T: Real, const N: usize>(model: &Model<T>, q: &[T], qd: &[Taylor<T, N>]) -> Vec<Taylor<T, N>> {
-    let mut series: Vec<Taylor<T, N>> = q.iter().map(|q| Taylor::fixed(*q)).collect();
+fn positions<T: Real, const N: usize>(
+    terms: usize,
+    model: &Model<T>,
+    q: &[T],
+    qd: &[Taylor<T, N>],
+) -> Vec<Taylor<T, N>> {
+    let mut series: Vec<Taylor<T, N>> = q.iter().map(|q| Taylor::truncated(terms, [*q])).collect();
     for joint in model.bodies.iter().map(|b| &b.joint) {
         let own = joint.iq..joint.iq + joint.kind.nq();
-        for k in 1..N {
+        for k in 1..terms {
             let per = T::constant(Dd::ONE / Dd::from(k as f64));
             let mut rates = [Taylor::fixed(T::zero()); MOST_COORDINATES];
             let rates = &mut rates[..own.len()];
@@ -138,9 +145,8 @@ fn subtract_rotors<S: Real>(model: &Model<S>, q: &[S], qd: &[S], qdd: &[S], tau:
 
 /// What a motion asks of one drive.
 fn drive_input<T: Real, const N: usize>(
-    model: &Model<Taylor<T, N>>,
-    drive: &Drive<Taylor<T, N>>,
-    original: &Drive<T>,
+    terms: usize,
+    (model, drive, original): (&Model<Taylor<T, N>>, &Drive<Taylor<T, N>>, &Drive<T>),
     [q, qd, qdd]: [&[Taylor<T, N>]; 3],
     tau: &[Taylor<T, N>],
     x: &[T],
@@ -172,12 +178,12 @@ fn drive_input<T: Real, const N: usize>(
                     0 => actuator_angle(original, x),
                     _ => x[drive.actuator.states() + 2 * (k - 1)],
                 };
-                let mut theta = Taylor::fixed(now);
+                let mut theta = Taylor::truncated(terms, [now]);
                 let rate = |theta: Taylor<T, N>| {
                     let slack = load - stage.stiffness * (theta / stage.ratio - behind[0]);
                     stage.ratio * (behind[1] + slack / damping)
                 };
-                for k in 1..N {
+                for k in 1..terms {
                     let per = T::constant(Dd::ONE / Dd::from(k as f64));
                     theta.coefficients[k] = rate(theta).coefficients[k - 1] * per;
                 }
