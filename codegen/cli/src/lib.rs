@@ -1,5 +1,6 @@
 //! What the command `straightline` has beside the compiler: experiments and their files, and pages.
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "simulation")]
 pub mod experiment;
 pub mod html;

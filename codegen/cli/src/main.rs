@@ -4,11 +4,18 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+#[cfg(feature = "simulation")]
 mod contact;
+#[cfg_attr(not(feature = "simulation"), allow(dead_code))]
 mod files;
 mod given;
+#[cfg_attr(not(feature = "simulation"), path = "without_simulation.rs")]
 mod motion;
+#[cfg(feature = "simulation")]
+mod motion_arguments;
+#[cfg(feature = "simulation")]
 mod page;
+#[cfg_attr(not(feature = "simulation"), allow(dead_code))]
 mod print;
 
 use arguments::{Check, Command, CommandLine, Export, Generate, ModelArgs, ProgramArgs, Report, Verify};

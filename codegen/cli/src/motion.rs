@@ -1,7 +1,8 @@
 //! The commands `simulate` and `analyze`.
 
-use crate::arguments::{Analyze, ModelArgs, Simulate};
+use crate::arguments::ModelArgs;
 use crate::files::{self, read};
+pub use crate::motion_arguments::{Analyze, Simulate};
 use crate::{contact, options, page, print, Failure};
 use anstream::stdout;
 use std::io::Write;

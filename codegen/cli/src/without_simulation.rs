@@ -1,0 +1,35 @@
+//! `simulate` and `analyze` where the feature `simulation` is not built in: they say so.
+
+use crate::arguments::ModelArgs;
+use crate::{print, Failure};
+use clap::Args;
+use std::ffi::OsString;
+
+/// Whatever follows the command.
+#[derive(Debug, Args)]
+#[command(disable_help_flag = true)]
+pub struct Simulate {
+    #[arg(hide = true, num_args = 0.., allow_hyphen_values = true, trailing_var_arg = true)]
+    _ignored: Vec<OsString>,
+}
+
+pub type Analyze = Simulate;
+
+impl Simulate {
+    /// It reads no robot.
+    pub fn model(&self) -> Option<&ModelArgs> {
+        None
+    }
+}
+
+pub fn simulate(_: &Simulate) -> Result<(), Failure> {
+    print::error("this `straightline` has no simulation: it was built without the feature `simulation`");
+    print::help(
+        "cargo install --path codegen/cli --features simulation, or parquet, which reads and writes Parquet files, too",
+    );
+    Err(Failure::Input)
+}
+
+pub fn analyze(a: &Analyze) -> Result<(), Failure> {
+    simulate(a)
+}
