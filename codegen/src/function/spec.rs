@@ -2,6 +2,7 @@
 
 use super::{Forms, Function, Quantity};
 use straightline_core::algorithms::drive_states;
+use straightline_core::magnitude::Magnitude;
 use straightline_core::model::Model;
 use straightline_core::Real;
 
@@ -141,6 +142,21 @@ pub enum Judged {
     ByInertias,
     /// Of accelerations: what they leave of τ − H q̈ − h.
     ByResidual,
+}
+
+impl Judged {
+    /// What errors of results are compared with. An inertia that is less than `least` of what it is made of counts as that: where all that a joint
+    /// moves comes to lie on its axis, what is left is rounding noise.
+    pub fn scales(self, results: &[Magnitude], least: f64) -> Vec<f64> {
+        if self != Judged::ByInertias {
+            return results.iter().map(|x| x.size).collect();
+        }
+        // √(H_ii H_jj), the Cauchy-Schwarz bound of the entry
+        let n = results.len().isqrt();
+        let of_row = |i: usize| results[i * n + i].value.hi().abs().max(least * results[i * n + i].size);
+        let roots: Vec<f64> = (0..n).map(|i| of_row(i).sqrt()).collect();
+        roots.iter().flat_map(|a| roots.iter().map(move |b| a * b)).collect()
+    }
 }
 
 /// Everything about a function but its equations.

@@ -1,5 +1,9 @@
-//! States of a robot at which programs are tried.
+//! States of a robot at which programs are tried: the one sampler. Choices between forms follow from its numbers, so that their order is part of
+//! what is generated.
 
+use crate::function::Quantity;
+use std::collections::BTreeMap;
+use straightline_core::drive::{Actuator, Drive};
 use straightline_core::model::{Joint, Model};
 use straightline_core::random::Random;
 use straightline_core::Dd;
@@ -19,6 +23,13 @@ const SLOW: f64 = 0.2;
 const RANGE: f64 = std::f64::consts::PI;
 /// A limit beyond this is none \[rad, m, rad/s or m/s\].
 pub(crate) const NO_LIMIT: f64 = 1e6;
+
+/// Most numbers of a kind that a drive's state and input are tried at: current \[A\], linear state, input \[V\].
+const CURRENT: f64 = 3.0;
+const VOLTAGE: f64 = 20.0;
+
+/// What stands for each input, by name.
+pub(crate) type State<T> = BTreeMap<String, Vec<T>>;
 
 /// A limit, or what is tried without one.
 fn within(limit: f64, other: f64) -> f64 {
@@ -41,74 +52,128 @@ pub(crate) fn states(model: &Model<Dd>, inputs: &[Port], count: usize, fast: boo
 
 /// One of these states, of one port.
 pub(crate) fn of_port(model: &Model<Dd>, port: &Port, fast: bool, random: &mut Random) -> Vec<f64> {
-    let mut x = values(model, &port.name, port.len(), 0, random);
-    let rates = port.name == "qd" && port.len() == model.nv();
-    for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| fast && rates && j.kind.is_single()) {
-        x[joint.iv] *= within(joint.limits.velocity, FAST);
-    }
-    if port.name == "qdd" && !fast {
-        x.iter_mut().for_each(|x| *x *= SLOW);
+    let mut x = values(model, port, Kind::Anywhere, random);
+    match Quantity::of(port) {
+        Some(Quantity::Velocity) if fast && port.len() == model.nv() => {
+            for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single()) {
+                x[joint.iv] *= within(joint.limits.velocity, FAST);
+            }
+        }
+        Some(Quantity::Acceleration) if !fast => x.iter_mut().for_each(|x| *x *= SLOW),
+        _ => {}
     }
     x
 }
 
-/// Values of an input port; `kind` 0: anywhere, 1: nearly stretched, 2: near right angles.
-pub(crate) fn values(model: &Model<Dd>, port: &str, len: usize, kind: usize, random: &mut Random) -> Vec<f64> {
-    match port {
-        "q" if len == model.nq() => {
-            let mut q = vec![0.0; len];
-            for joint in model.bodies.iter().map(|b| &b.joint) {
-                if let Some(first) = joint.kind.row().quaternion {
-                    let quaternion: Vec<f64> = (0..4).map(|_| random.symmetric(1.0)).collect();
-                    let norm = quaternion.iter().map(|x| x * x).sum::<f64>();
-                    let norm = straightline_core::trig::sqrt_f64(norm);
-                    (0..first).for_each(|k| q[joint.iq + k] = random.symmetric(1.0));
-                    (0..4).for_each(|k| q[joint.iq + first + k] = quaternion[k] / norm);
-                    continue;
-                }
-                for q in &mut q[joint.iq..joint.iq + joint.kind.nq()] {
-                    let (lower, upper) = (within(joint.limits.lower, -RANGE), within(joint.limits.upper, RANGE));
-                    let anywhere = lower + (upper - lower) * (0.5 + random.symmetric(0.5));
-                    let quarter = std::f64::consts::FRAC_PI_2;
-                    let near = random.symmetric(NEAR);
-                    *q = match kind {
-                        0 => anywhere,
-                        1 => near,
-                        _ => (anywhere / quarter).round() * quarter + near,
-                    }
-                    .clamp(lower.min(upper), upper.max(lower));
-                }
-            }
-            q
-        }
-        "gravity" => vec![0.3, -0.2, -9.81],
-        "qd" => (0..len).map(|_| random.symmetric(1.0)).collect(),
+/// Where a robot stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Within the limits of its joints.
+    Anywhere,
+    /// Nearly at zero.
+    Stretched,
+    /// Near multiples of a right angle.
+    RightAngled,
+}
+
+/// Values of an input port.
+pub(crate) fn values(model: &Model<Dd>, port: &Port, kind: Kind, random: &mut Random) -> Vec<f64> {
+    let len = port.len();
+    match Quantity::of(port) {
+        Some(Quantity::Configuration) if len == model.nq() => configuration(model, kind, random),
+        Some(Quantity::Gravity) => vec![0.3, -0.2, -9.81],
+        Some(Quantity::Velocity) => (0..len).map(|_| random.symmetric(1.0)).collect(),
         // drives of the size of the weights
         _ => (0..len).map(|_| random.symmetric(10.0)).collect(),
     }
 }
 
-/// Turns the shafts of elastic transmissions to where their springs are hardly stretched, as they are while a robot moves.
-pub(crate) fn settle(model: &Model<Dd>, groups: &mut [(&str, Vec<f64>)], random: &mut Random) {
-    let named = |name: &str, groups: &[(&str, Vec<f64>)]| groups.iter().find(|g| g.0 == name).map(|g| g.1.clone());
-    let (Some(q), Some(qd), Some(mut x)) = (named("q", groups), named("qd", groups), named("x", groups)) else {
-        return;
+fn configuration(model: &Model<Dd>, kind: Kind, random: &mut Random) -> Vec<f64> {
+    let mut q = vec![0.0; model.nq()];
+    for joint in model.bodies.iter().map(|b| &b.joint) {
+        if let Some(first) = joint.kind.row().quaternion {
+            let quaternion: Vec<f64> = (0..4).map(|_| random.symmetric(1.0)).collect();
+            let norm = quaternion.iter().map(|x| x * x).sum::<f64>();
+            let norm = straightline_core::trig::sqrt_f64(norm);
+            (0..first).for_each(|k| q[joint.iq + k] = random.symmetric(1.0));
+            (0..4).for_each(|k| q[joint.iq + first + k] = quaternion[k] / norm);
+            continue;
+        }
+        for q in &mut q[joint.iq..joint.iq + joint.kind.nq()] {
+            let (lower, upper) = (within(joint.limits.lower, -RANGE), within(joint.limits.upper, RANGE));
+            let anywhere = lower + (upper - lower) * (0.5 + random.symmetric(0.5));
+            let quarter = std::f64::consts::FRAC_PI_2;
+            let near = random.symmetric(NEAR);
+            *q = match kind {
+                Kind::Anywhere => anywhere,
+                Kind::Stretched => near,
+                Kind::RightAngled => (anywhere / quarter).round() * quarter + near,
+            }
+            .clamp(lower.min(upper), upper.max(lower));
+        }
+    }
+    q
+}
+
+/// Mass, centre of mass and inertia about it of a body that may be.
+pub(crate) fn body(random: &mut Random) -> [Vec<f64>; 3] {
+    let mut any = |least: f64, most: f64| least + (most - least) * random.unit();
+    let mass = any(0.1, 3.0);
+    let com = (0..3).map(|_| any(-0.2, 0.2)).collect();
+    let [xx, yy, zz] = [0; 3].map(|_| any(0.02, 0.03));
+    let [xy, xz, yz] = [0; 3].map(|_| any(-0.004, 0.004));
+    [vec![mass], com, vec![xx, xy, xz, yy, yz, zz]]
+}
+
+/// States and inputs of the drives: shafts near where slack springs have them, currents within their limits, inputs within theirs and beyond.
+pub(crate) fn of_drives(model: &Model<Dd>, q: &[f64], qd: &[f64], random: &mut Random) -> [Vec<f64>; 2] {
+    let (mut x, mut u) = (Vec::new(), Vec::new());
+    for drive in &model.drives {
+        let mut shafts = vec![last_shaft(model, drive, q, qd)];
+        for stage in drive.stages.iter().rev() {
+            let behind = shafts[shafts.len() - 1];
+            let slack = [random.symmetric(0.01), random.symmetric(0.1)];
+            shafts.push([0, 1].map(|i| (behind[i] + slack[i]) * stage.ratio.to_f64()));
+        }
+        shafts.reverse();
+        match &drive.actuator {
+            Actuator::Motor(motor) => {
+                let greatest = drive.current_limit.map_or(CURRENT, |limit| limit.to_f64().min(CURRENT));
+                x.extend(shafts[0]);
+                x.extend(motor.inductance.map(|_| random.symmetric(0.9 * greatest)));
+            }
+            Actuator::Linear(a) => x.extend(a.f.iter().map(|_| random.symmetric(1.0))),
+        }
+        x.extend(shafts.iter().take(drive.stages.len()).skip(1).flatten());
+        u.push(random.symmetric(drive.input_limit.map_or(VOLTAGE, |limit| 1.2 * limit.to_f64())));
+    }
+    [x, u]
+}
+
+/// Angle and speed of the last shaft of a drive.
+fn last_shaft(model: &Model<Dd>, drive: &Drive<Dd>, q: &[f64], qd: &[f64]) -> [f64; 2] {
+    let sum = |y: &[f64], index: fn(&Joint) -> usize| -> f64 {
+        drive.joints.iter().map(|(body, n)| n.to_f64() * y[index(&model.bodies[*body].joint)]).sum()
     };
+    [sum(q, |j| j.iq), sum(qd, |j| j.iv)]
+}
+
+/// Turns the shafts of elastic transmissions to where their springs are hardly stretched, as they are while a robot moves.
+pub(crate) fn settle(model: &Model<Dd>, ports: &[Port], values: &mut [Vec<f64>], random: &mut Random) {
+    let place = |quantity| ports.iter().position(|port| Quantity::of(port) == Some(quantity));
+    let places = [Quantity::Configuration, Quantity::Velocity, Quantity::DriveState].map(place);
+    let [Some(q), Some(qd), Some(x)] = places else { return };
     let mut first = 0;
     for drive in &model.drives {
         let own = drive.actuator.states();
-        let sum = |y: &[f64], index: fn(&Joint) -> usize| -> f64 {
-            drive.joints.iter().map(|(body, n)| n.to_f64() * y[index(&model.bodies[*body].joint)]).sum()
-        };
-        let mut shaft = [sum(&q, |j| j.iq), sum(&qd, |j| j.iv)];
+        let mut shaft = last_shaft(model, drive, &values[q], &values[qd]);
         for (k, stage) in drive.stages.iter().enumerate().rev() {
             shaft = shaft.map(|y| stage.ratio.to_f64() * (y + random.symmetric(STRETCH)));
             let at = if k == 0 { first } else { first + own + 2 * (k - 1) };
-            x[at..at + 2].copy_from_slice(&shaft);
+            values[x][at..at + 2].copy_from_slice(&shaft);
         }
         first += drive.states();
     }
-    groups.iter_mut().filter(|g| g.0 == "x").for_each(|g| g.1.clone_from(&x));
 }
 
 /// States of each kind whose values [`samples`] gives: at about rest, where weights rule, and as fast as the joints may move.

@@ -1,15 +1,30 @@
 //! The box of a program's inputs: what bounds on rounding errors are computed for.
 
+use crate::function::Quantity;
 use crate::scene::Scene;
 use straightline_core::joint::Measure;
 use straightline_core::model::Model;
 use straightline_graph::certify::{Interval, Refusal};
 use straightline_graph::expr::Port;
 
-/// Where neither the scene nor the robot file limits an input: angles within π, slides and positions within 10 m, speeds within
-/// 10 rad/s or m/s, accelerations within 100 rad/s² or m/s², forces within 1000 N·m or N, gravity within 10 m/s² per component.
-const DEFAULTS: [(&str, f64); 4] = [("qd", 10.0), ("qdd", 100.0), ("tau", 1000.0), ("gravity", 10.0)];
-const SLIDE: f64 = 10.0;
+/// Where neither the scene nor the robot file limits an input: speeds within 10 rad/s or m/s, accelerations within 100 rad/s² or m/s², forces
+/// within 1000 N·m or N, gravity within 10 m/s² per component.
+fn default_bound(quantity: Quantity) -> Option<f64> {
+    match quantity {
+        Quantity::Velocity | Quantity::Gravity => Some(10.0),
+        Quantity::Acceleration => Some(100.0),
+        Quantity::Force => Some(1000.0),
+        _ => None,
+    }
+}
+
+/// The same of coordinates: angles within π, slides and positions within 10 m.
+fn default_range(measure: Measure) -> f64 {
+    match measure {
+        Measure::Angle => std::f64::consts::PI,
+        Measure::Length => 10.0,
+    }
+}
 
 /// The box of a program's inputs in a scene, an interval per input scalar: the scene's ranges, the robot file's limits, and where
 /// there is neither, defaults.
@@ -20,15 +35,14 @@ pub fn input_box<T>(inputs: &[Port], scene: &Scene, model: &Model<T>) -> Result<
     let mut all = Vec::new();
     for port in inputs {
         let mut ranges = scene.input_ranges(port, model);
-        if port.name == "q" {
+        let quantity = Quantity::of(port).ok_or(Refusal::Unlimited)?;
+        if quantity == Quantity::Configuration {
             for joint in model.bodies.iter().map(|b| &b.joint) {
                 let own = ranges[joint.iq..].iter_mut().zip(joint.kind.measures());
-                own.for_each(|(r, measure)| {
-                    limit(r, if measure == Measure::Angle { std::f64::consts::PI } else { SLIDE })
-                });
+                own.for_each(|(r, measure)| limit(r, default_range(measure)));
             }
         } else {
-            let bound = DEFAULTS.iter().find(|(name, _)| *name == port.name).ok_or(Refusal::Unlimited)?.1;
+            let bound = default_bound(quantity).ok_or(Refusal::Unlimited)?;
             ranges.iter_mut().for_each(|r| limit(r, bound));
         }
         all.extend(ranges.into_iter().map(|r| Interval { lo: r.lower, hi: r.upper }));

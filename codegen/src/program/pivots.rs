@@ -23,6 +23,7 @@
 //! double-double at random states, as `pass/substitute` finds values that are the same. All are rational in the inputs, sines and
 //! cosines: two that differ anywhere agree at a random state with probability zero.
 
+use crate::function::Quantity;
 use crate::program::input_box::input_box;
 use crate::scene::Scene;
 use straightline_core::algorithms::mass_matrix;
@@ -61,7 +62,7 @@ impl Sizes {
             let mut ranges = input_box(&graph.inputs, scene, model)?;
             let mut first = 0;
             for port in &graph.inputs {
-                if port.name == "qdd" {
+                if Quantity::of(port) == Some(Quantity::Acceleration) {
                     ranges[first..first + port.len()].fill(Interval::ZERO);
                 }
                 first += port.len();
@@ -83,9 +84,12 @@ const MOST_JOINTS: usize = 12;
 /// joints are results.
 pub fn is_arm(model: &Model<Dd>, graph: &Graph) -> bool {
     let turns_or_slides = model.bodies.iter().all(|b| b.joint.kind.elementary().is_some());
-    let is_known = |name: &str| ["q", "qd", "tau", "gravity"].contains(&name);
+    let is_known = |port: &Port| {
+        use Quantity::{Configuration, Force, Gravity, Velocity};
+        matches!(Quantity::of(port), Some(Configuration | Velocity | Force | Gravity))
+    };
     let is_whole = graph.results.len() == model.nv() && model.nv() <= MOST_JOINTS;
-    turns_or_slides && is_whole && graph.inputs.iter().all(|p| is_known(&p.name))
+    turns_or_slides && is_whole && graph.inputs.iter().all(is_known)
 }
 
 /// What is known for inputs in a box. Nothing where it [is no arm](is_arm).
@@ -93,12 +97,13 @@ pub fn known(model: &Model<Dd>, graph: &Graph, ranges: &[Interval], sizes: &Size
     if !is_arm(model, graph) {
         return Known::default();
     }
-    let place = |name: &str| {
-        let first: usize = graph.inputs.iter().take_while(|p| p.name != name).map(Port::len).sum();
-        let count = graph.inputs.iter().find(|p| p.name == name).map_or(0, Port::len);
+    let place = |quantity: Quantity| {
+        let is_it = |port: &&Port| Quantity::of(port) == Some(quantity);
+        let first: usize = graph.inputs.iter().take_while(|port| !is_it(port)).map(Port::len).sum();
+        let count = graph.inputs.iter().find(is_it).map_or(0, Port::len);
         first..first + count
     };
-    let (q, tau) = (&ranges[place("q")], &ranges[place("tau")]);
+    let (q, tau) = (&ranges[place(Quantity::Configuration)], &ranges[place(Quantity::Force)]);
     let Some(felt) = Felt::new(model, q) else { return Known::default() };
     let sizes_of_b = sizes.bias.iter().enumerate().map(|(k, h)| h + tau.get(k).map_or(0.0, |t| t.mag()));
     let beta = sizes_of_b.zip(&felt.free).map(|(b, c)| b * c.sqrt()).sum::<f64>() * (1.0 + SLACK);
@@ -115,7 +120,7 @@ pub fn known(model: &Model<Dd>, graph: &Graph, ranges: &[Interval], sizes: &Size
         let qdd: Vec<Dd> = graph.results.iter().map(|r| of_nodes[r.index()]).collect();
         let h = match q.is_empty() {
             true => mass_matrix(model, &vec![Dd::ZERO; model.nq()]),
-            false => mass_matrix(model, &inputs[place("q")]),
+            false => mass_matrix(model, &inputs[place(Quantity::Configuration)]),
         };
         facts.push(bounds.facts(model, &h, &qdd));
         values.push(of_nodes);

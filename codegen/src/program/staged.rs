@@ -6,7 +6,7 @@
 
 use crate::equations::bind::is_optional;
 use crate::equations::Robot;
-use crate::function::{ForwardDynamicsMethod, Function};
+use crate::function::{ForwardDynamicsMethod, Function, Quantity};
 use crate::options::{Optimisations, Options};
 use crate::program::choose::choose;
 use crate::program::equivalence::{self, Disagreement, Plainer};
@@ -243,10 +243,10 @@ fn joint_program(
     let stages: Vec<Stage> =
         has_parameters.then_some(PARAMETERS).into_iter().chain([CONFIGURATION, VELOCITY, CALL]).collect();
     let first = usize::from(has_parameters);
-    let stage_of = |port: &Port| match port.name.as_str() {
+    let stage_of = |port: &Port| match Quantity::of(port) {
         _ if is_optional(port) => 0,
-        "q" => first,
-        "qd" => first + 1,
+        Some(Quantity::Configuration) => first,
+        Some(Quantity::Velocity) => first + 1,
         _ => first + 2,
     };
     let stage_of = ports.iter().map(stage_of).collect();

@@ -3,7 +3,7 @@
 use super::errors::ErrorReport;
 use super::waterfall::robot_in;
 use crate::diagnostic::Diagnostics;
-use crate::function::Function;
+use crate::function::{Function, Quantity};
 use crate::options::Options;
 use crate::program::{checked, Program};
 use crate::scene::{messages as say, Budget, Coulomb, Effects, Gravity, MaxError, Misfit, Scene, Zero};
@@ -184,13 +184,12 @@ pub fn check_errors<'a>(
 fn remedies(whole: &Model<Dd>, frames: &[String], function: Function, options: &Options) -> Vec<(String, Measures)> {
     let scene = &options.scene;
     let mut candidates: Vec<(String, Scene)> = Vec::new();
-    let inputs = function.inputs(whole);
-    let reads = |name: &str| inputs.iter().any(|p| p.name == name);
+    let inputs = function.quantities(whole);
     let with = |zero: Zero| Scene { zero, ..scene.clone() };
-    if reads("qd") && !scene.zero.qd {
+    if inputs.contains(&Quantity::Velocity) && !scene.zero.qd {
         candidates.push(("q̇ = 0".to_string(), with(Zero { qd: true, ..scene.zero.clone() })));
     }
-    if reads("qdd") && !scene.zero.qdd {
+    if inputs.contains(&Quantity::Acceleration) && !scene.zero.qdd {
         candidates.push(("q̈ = 0".to_string(), with(Zero { qdd: true, ..scene.zero.clone() })));
     }
     if scene.gravity != Gravity::Constant([0.0; 3]) {

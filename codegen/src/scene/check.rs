@@ -111,7 +111,7 @@ fn ranges_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
             places.complain(&path, say::empty_range(&what, range.lower, range.upper), diagnostics);
         }
     };
-    for (input, ranges) in scene.ranges.over_joints() {
+    for (input, ranges) in scene.ranges.over_joints().map(|(quantity, ranges)| (quantity.name(), ranges)) {
         let path = format!("numbers.ranges.{input}");
         match ranges {
             JointRanges::Limits => {}
@@ -147,7 +147,7 @@ pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnosti
     for (i, joint) in scene.zero.joints_at_rest.iter().enumerate() {
         wanted.push(("joints at rest".to_string(), format!("zero.joints_at_rest.{i}"), joint));
     }
-    for (input, ranges) in scene.ranges.over_joints() {
+    for (input, ranges) in scene.ranges.over_joints().map(|(quantity, ranges)| (quantity.name(), ranges)) {
         let JointRanges::Joints(named) = ranges else { continue };
         for (joint, _) in named {
             wanted.push((format!("ranges of `{input}`"), format!("numbers.ranges.{input}.{joint}"), joint));

@@ -4,6 +4,7 @@
 //! unlimited, and says so ([`Interval::is_bounded`]).
 
 use super::Scene;
+use crate::function::Quantity::{self, Acceleration, Configuration, Force, Gravity, Velocity};
 use straightline_core::model::{Joint, JointKind, Limits, Model};
 use straightline_graph::expr::Port;
 
@@ -67,9 +68,9 @@ pub struct Ranges {
 }
 
 impl Ranges {
-    /// The inputs over joints with their names and ranges.
-    pub fn over_joints(&self) -> [(&'static str, &JointRanges); 4] {
-        [("q", &self.q), ("qd", &self.qd), ("qdd", &self.qdd), ("tau", &self.tau)]
+    /// The inputs over joints with their ranges.
+    pub fn over_joints(&self) -> [(Quantity, &JointRanges); 4] {
+        [(Configuration, &self.q), (Velocity, &self.qd), (Acceleration, &self.qdd), (Force, &self.tau)]
     }
 }
 
@@ -92,20 +93,22 @@ impl Scene {
     /// ```
     pub fn input_ranges<T>(&self, port: &Port, model: &Model<T>) -> Vec<Interval> {
         let mut all = vec![Interval::UNLIMITED; port.len()];
-        if port.name == "gravity" {
+        let quantity = Quantity::of(port);
+        if quantity == Some(Gravity) {
             all.fill(self.ranges.gravity.unwrap_or(Interval::UNLIMITED));
         }
         let over_joints = self.ranges.over_joints();
-        let Some((name, ranges)) = over_joints.into_iter().find(|(name, _)| *name == port.name) else { return all };
+        let found = over_joints.into_iter().find(|(over_joints, _)| Some(*over_joints) == quantity);
+        let Some((quantity, ranges)) = found else { return all };
         for joint in model.bodies.iter().map(|b| &b.joint) {
-            let rests = matches!(name, "qd" | "qdd") && self.zero.joints_at_rest.contains(&joint.name);
-            let range = if rests { Interval::ZERO } else { range(name, ranges, joint) };
-            let (first, count) = match name {
-                "q" => (joint.iq, joint.kind.nq()),
+            let rests = matches!(quantity, Velocity | Acceleration) && self.zero.joints_at_rest.contains(&joint.name);
+            let range = if rests { Interval::ZERO } else { range(quantity, ranges, joint) };
+            let (first, count) = match quantity {
+                Configuration => (joint.iq, joint.kind.nq()),
                 _ => (joint.iv, joint.kind.nv()),
             };
             all[first..first + count].fill(range);
-            if let Some(quaternion) = joint.kind.row().quaternion.filter(|_| name == "q") {
+            if let Some(quaternion) = joint.kind.row().quaternion.filter(|_| quantity == Configuration) {
                 all[first + quaternion..first + count].fill(Interval::within(1.0));
             }
         }
@@ -117,13 +120,13 @@ impl Scene {
 pub fn ranges_in_words<T>(scene: &Scene, model: &Model<T>) -> Vec<String> {
     let said = scene.ranges.over_joints().into_iter().filter(|(_, ranges)| **ranges != JointRanges::Limits);
     let mut lines = Vec::new();
-    for (name, ranges) in said {
+    for (quantity, ranges) in said {
         let mut joints: Vec<&Joint> = model.bodies.iter().map(|b| &b.joint).collect();
         joints.sort_by_key(|joint| joint.iv);
         for joint in joints {
-            let at = if name == "q" { joint.iq } else { joint.iv };
-            let words = in_words(range(name, ranges, joint), unit(name, joint.kind));
-            lines.push(format!("{name}[{at}] {}: {words}", joint.name));
+            let at = if quantity == Configuration { joint.iq } else { joint.iv };
+            let words = in_words(range(quantity, ranges, joint), unit(quantity, joint.kind));
+            lines.push(format!("{}[{at}] {}: {words}", quantity.name(), joint.name));
         }
     }
     let gravity = scene.ranges.gravity.map(|range| format!("gravity: {}", in_words(range, "m/s²")));
@@ -139,18 +142,18 @@ fn in_words(range: Interval, unit: &str) -> String {
 }
 
 /// The unit of an input; of the base's velocity and force, which have two, that of the linear part.
-fn unit(name: &str, kind: JointKind) -> &'static str {
-    let index = ["q", "qd", "qdd"].iter().position(|input| *input == name);
+fn unit(quantity: Quantity, kind: JointKind) -> &'static str {
+    let index = [Configuration, Velocity, Acceleration].iter().position(|input| *input == quantity);
     kind.units()[index.unwrap_or(3)]
 }
 
-/// The range of a joint's coordinate of the input of that name.
-fn range(name: &str, ranges: &JointRanges, joint: &Joint) -> Interval {
+/// The range of a joint's coordinate of an input.
+fn range(quantity: Quantity, ranges: &JointRanges, joint: &Joint) -> Interval {
     let Limits { lower, upper, velocity, effort } = joint.limits;
-    let of_file = match name {
-        "q" => Interval { lower, upper },
-        "qd" => Interval::within(velocity),
-        "tau" => Interval::within(effort),
+    let of_file = match quantity {
+        Configuration => Interval { lower, upper },
+        Velocity => Interval::within(velocity),
+        Force => Interval::within(effort),
         _ => Interval::UNLIMITED,
     };
     match ranges {

@@ -8,7 +8,7 @@ mod equations;
 
 use crate::equations::bind::{is_optional, Bound};
 use crate::equations::Robot;
-use crate::function::{ContactFunction, ForwardDynamicsMethod, Function};
+use crate::function::{ContactFunction, ForwardDynamicsMethod, Function, Quantity};
 use crate::identifier::module_name;
 use crate::options::{Forms, Optimisations, Options};
 use crate::program::choose::choose;
@@ -234,8 +234,11 @@ pub(crate) fn optimised(
         assert!(results.iter().map(Vec::len).eq(lengths.iter().copied()), "results fit the outputs");
         results.concat()
     });
-    let unused =
-        |port: &Port| is_optional(port) || matches!(port.name.as_str(), "qd" | "x" | "u") || names.contains(&port.name);
+    let unused = |port: &Port| {
+        use Quantity::{DriveInput, DriveState, Velocity};
+        let may_rest = matches!(Quantity::of(port), Some(Velocity | DriveState | DriveInput));
+        is_optional(port) || may_rest || names.contains(&port.name)
+    };
     let graph = check("contact: dead code", dead_code(&check("contact: traced", traced)));
     let graph = check("contact: unread inputs", unread_inputs(graph, unused));
     match optimisations.sums {
@@ -284,7 +287,8 @@ pub fn system(robot: &Robot, options: &Options, mode: &Mode, optimisations: Opti
         yielding.extend(closed.constrained.iter().map(|c| gives_way && *c == Coordinate::Pz));
     }
     yielding.resize(m, false);
-    let unused = |port: &Port| is_optional(port) || port.name == "qd" || names.contains(&port.name);
+    let is_velocity = |port: &Port| Quantity::of(port) == Some(Quantity::Velocity);
+    let unused = |port: &Port| is_optional(port) || is_velocity(port) || names.contains(&port.name);
     let check = |pass, graph| passed(pass, "the equations of motion", graph);
     let graph = check("system: dead code", dead_code(&check("system: traced", traced)));
     let graph = check("system: unread inputs", unread_inputs(graph, unused));
@@ -330,7 +334,7 @@ pub(crate) fn evaluate_system<T: Real>(
 
 /// What a system judges: accelerations and reactions.
 fn solution_ports(model: &Model<Dd>, mode: &Mode) -> [Port; 2] {
-    [Port::new("qdd", &[model.nv()]), Port::new("force", &[mode.constrained_names().len()])]
+    [Quantity::Acceleration.port(model), Port::new("force", &[mode.constrained_names().len()])]
 }
 
 /// All inputs that a system may have.
@@ -403,7 +407,7 @@ fn outputs(function: ContactFunction, mode: &Mode, model: &Model<Dd>) -> Vec<Por
         ContactFunction::ConstrainedCoordinates => coordinates(m),
         ContactFunction::FreeCoordinates => coordinates(mode.free_names().len()),
         ContactFunction::ForwardDynamics | ContactFunction::DrivenForwardDynamics => [
-            vec![Port::new("qdd", &[nv])],
+            vec![Quantity::Acceleration.port(model)],
             match function {
                 ContactFunction::DrivenForwardDynamics => vec![Port::new("xd", &[drive_states(model)])],
                 _ => vec![],
@@ -417,7 +421,7 @@ fn outputs(function: ContactFunction, mode: &Mode, model: &Model<Dd>) -> Vec<Por
             per_contact("own_rate", 2, |(own, _)| own),
         ]
         .concat(),
-        ContactFunction::InverseDynamics => vec![Port::new("tau", &[nv]), Port::new("pivot", &[1])],
+        ContactFunction::InverseDynamics => vec![Quantity::Force.port(model), Port::new("pivot", &[1])],
         ContactFunction::Impact => [
             vec![
                 Port::new("dqd", &[nv]),

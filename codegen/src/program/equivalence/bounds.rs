@@ -7,6 +7,7 @@
 
 use super::{inputs, Disagreement, State, States, STATES};
 use crate::equations::Robot;
+use crate::function::Quantity;
 use crate::options::Options;
 use std::collections::BTreeMap;
 use straightline_core::random::Random;
@@ -97,15 +98,17 @@ pub(crate) fn of_acceleration_bound(
             asked(&off_by(part, &found, &mut states.random))?;
         }
         // what forces would have to be off by for accelerations to be off by so much: columns of the inverse mass matrix
-        let Some(forces) = state.get("tau") else { continue };
+        let tau = Quantity::Force.name();
+        let Some(forces) = state.get(&tau) else { continue };
         let by = Dd::from(OFF * forces.iter().map(|x| x.hi().abs()).fold(f64::MIN_POSITIVE, f64::max));
         let mut columns = Vec::new();
         for i in 0..forces.len() {
             let mut other = state.clone();
-            other.get_mut("tau").expect("it is there")[i] += by;
+            other.get_mut(&tau).expect("it is there")[i] += by;
             let other = solution(graph, evaluate(graph, &inputs(graph, &other)));
             asked(&other)?;
-            let column = other.get("qdd").zip(exact.get("qdd"));
+            let qdd = Quantity::Acceleration.name();
+            let column = other.get(&qdd).zip(exact.get(&qdd));
             columns.push(column.map_or(Vec::new(), |(x, y)| {
                 x.iter().zip(y).map(|(x, y)| ((*x - *y) / by).to_f64()).collect::<Vec<f64>>()
             }));

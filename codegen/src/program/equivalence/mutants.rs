@@ -323,7 +323,8 @@ impl Case {
     /// What is wrong with it, at states that the compiler did not look at.
     fn fault(&self, written: &Written) -> Option<String> {
         let Case { robot, frames, options, .. } = self;
-        let mut states = States { random: Random(77), ..States::new(robot, options) };
+        let mut states = States::new(robot, options);
+        states.random = Random(77);
         let plain = |function: Function, state: &State| {
             plain_results::<Dd>(robot, frames, function, options, ForwardDynamicsMethod::ArticulatedBody, state)
         };

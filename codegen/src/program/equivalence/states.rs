@@ -1,0 +1,131 @@
+//! The states at which programs and plain equations are compared.
+
+use super::State;
+use crate::equations::bind::constructed;
+use crate::equations::Robot;
+use crate::function::Quantity;
+use crate::model::states::{body, of_port, settle};
+use crate::options::Options;
+use crate::scene::free_drive::FreeDrive;
+use std::f64::consts::PI;
+use straightline_core::random::Random;
+use straightline_core::Dd;
+use straightline_graph::expr::Port;
+
+/// Near the zero configuration, where robots are tried first, coordinates and rates are within this.
+const NEAR: f64 = 1e-3;
+/// Where random numbers begin: another place than where states for choices come from.
+const SEED: u64 = 0x6a09_e667_f3bc_c908;
+
+/// Random states that the inputs allow, the same everywhere: every other one is fast.
+pub(super) struct States<'a> {
+    robot: &'a Robot,
+    options: &'a Options,
+    pub random: Random,
+    count: usize,
+}
+
+/// Where a robot stands.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Place {
+    /// Within the limits of its joints.
+    Anywhere,
+    /// Whatever the limits.
+    Beyond,
+    NearZero,
+    /// At rest, too.
+    Zero,
+}
+
+impl Place {
+    /// Coordinates or rates from anywhere, brought there.
+    fn of(self, quantity: Quantity, values: Vec<f64>, random: &mut Random) -> Vec<f64> {
+        let times = |factor: f64| values.iter().map(|x| factor * x).collect();
+        match self {
+            Place::Beyond if quantity == Quantity::Configuration => {
+                values.iter().map(|_| random.symmetric(PI)).collect()
+            }
+            Place::Anywhere | Place::Beyond => values,
+            Place::NearZero => times(NEAR),
+            Place::Zero => times(0.0),
+        }
+    }
+}
+
+impl<'a> States<'a> {
+    pub fn new(robot: &'a Robot, options: &'a Options) -> Self {
+        States { robot, options, random: Random(SEED), count: 0 }
+    }
+
+    pub fn next(&mut self, ports: &[Port]) -> State {
+        self.placed(ports, Place::Anywhere)
+    }
+
+    pub fn placed(&mut self, ports: &[Port], place: Place) -> State {
+        let model = &self.robot.model;
+        self.count += 1;
+        let fast = self.count.is_multiple_of(2);
+        let mut state = State::new();
+        let (mut plain, mut values) = (Vec::new(), Vec::new());
+        for port in ports {
+            if port.wrapper.is_some() {
+                state.insert(port.name.clone(), self.parameter(port));
+                continue;
+            }
+            values.push(self.of_port(port, fast, place));
+            plain.push(port.clone());
+        }
+        settle(model, &plain, &mut values, &mut self.random);
+        // numbers that all scalars hold
+        let short = |x: f64| Dd::from(f64::from(x as f32));
+        let names = plain.into_iter().map(|port| port.name);
+        state.extend(names.zip(values).map(|(name, x)| (name, x.into_iter().map(short).collect())));
+        // of length one in double-double, too
+        for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| !j.kind.is_single()) {
+            if let Some(q) = state.get_mut(&Quantity::Configuration.name()) {
+                let own = &mut q[joint.iq..joint.iq + joint.kind.nq()];
+                if place == Place::Zero {
+                    own.iter_mut().zip(joint.kind.row().neutral).for_each(|(q, neutral)| *q = Dd::from(*neutral));
+                }
+                joint.kind.normalise(own);
+            }
+        }
+        state
+    }
+
+    /// What functions take of a run-time parameter.
+    fn parameter(&mut self, port: &Port) -> Vec<Dd> {
+        let parameter = self.options.scene.parameters.iter().find(|p| p.input_name() == port.name);
+        let parameter = parameter.expect("a parameter per input with a type of its own");
+        let given = self.given(parameter);
+        match parameter.is_of(&self.robot.model) {
+            true => constructed(self.robot, parameter, &given),
+            false => vec![Dd::ZERO; port.len()],
+        }
+    }
+
+    fn of_port(&mut self, port: &Port, fast: bool, place: Place) -> Vec<f64> {
+        let ends = |ends: &[&str]| ends.iter().any(|end| port.name.ends_with(end));
+        if ends(&["_environment", "_struck", "restitution"]) {
+            return (0..port.len()).map(|_| 0.5 + self.random.unit()).collect();
+        }
+        if ends(&["_axes", "_pose", "_velocity", "_acceleration", "_own"]) {
+            return (0..port.len()).map(|_| self.random.symmetric(1.0)).collect();
+        }
+        let values = of_port(&self.robot.model, port, fast, &mut self.random);
+        match Quantity::of(port) {
+            Some(quantity @ (Quantity::Configuration | Quantity::Velocity)) => {
+                place.of(quantity, values, &mut self.random)
+            }
+            _ => values,
+        }
+    }
+
+    /// What the constructor of a parameter may be given.
+    pub fn given(&mut self, parameter: &crate::scene::Parameter) -> Vec<Vec<Dd>> {
+        match FreeDrive::new(parameter, &self.robot.model) {
+            Some(drive) => vec![drive.random(|| self.random.unit()).into_iter().map(Dd::from).collect()],
+            None => body(&mut self.random).map(|x| x.into_iter().map(Dd::from).collect()).into(),
+        }
+    }
+}
