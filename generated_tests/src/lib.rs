@@ -17,6 +17,5 @@ pub mod random;
 pub mod reference;
 pub mod roll_pitch_yaw;
 pub mod search;
-pub mod second_author;
 pub mod standalone;
 pub mod written;

@@ -15,7 +15,9 @@
 use crate::bounds;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use straightline_codegen::function::truth::Chapter;
 use straightline_codegen::Function;
+use straightline_core::reference::MassCentreTree;
 use straightline_core::Dd;
 
 /// The eleven robots of the data.
@@ -317,6 +319,22 @@ impl State {
 }
 
 impl Expected {
+    /// What the second author says of a function at these inputs, in the order of the function's own, with natural scales.
+    ///
+    /// # Panics
+    /// If the reference has no frame of a name asked for, or no formulation of the function.
+    pub fn by_the_second_author(
+        tree: &MassCentreTree<Dd>,
+        frames: &[String],
+        function: Function,
+        inputs: &[Vec<Dd>],
+    ) -> Expected {
+        let state = function.spec().inputs.iter().copied().zip(inputs.iter().cloned()).collect();
+        let chapter = Chapter::new(tree, &[], state).with_frames(frames).unwrap_or_else(|why| panic!("{why}"));
+        let truth = function.truth(&chapter).expect("drives have their own test");
+        Expected { scales: function.scales(&truth), values: truth.iter().map(|x| x.value).collect() }
+    }
+
     /// Components that share the largest of them as their scale.
     pub fn append_uniform(&mut self, values: Vec<Dd>) {
         let scale = largest(&values);

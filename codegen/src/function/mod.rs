@@ -9,6 +9,8 @@ mod forms;
 mod kinematics;
 mod quantity;
 mod spec;
+#[cfg(feature = "verify")]
+pub mod truth;
 mod whole;
 
 pub use contact::ContactFunction;
@@ -58,6 +60,14 @@ macro_rules! functions {
             pub fn evaluate_on<T: Real>(self, forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
                 match self {
                     $(Function::$name => $file::$name::evaluate(forms, inputs),)*
+                }
+            }
+
+            /// What it should give, by the second author; `None` where the reference has no formulation of it.
+            #[cfg(feature = "verify")]
+            pub fn truth(self, at: &truth::Chapter<'_>) -> Option<Vec<straightline_core::magnitude::Magnitude>> {
+                match self {
+                    $(Function::$name => <$file::$name as truth::Truth>::truth(at),)*
                 }
             }
         }

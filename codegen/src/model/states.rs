@@ -22,7 +22,7 @@ const SLOW: f64 = 0.2;
 /// A joint without limits is tried within ± so much.
 const RANGE: f64 = std::f64::consts::PI;
 /// A limit beyond this is none \[rad, m, rad/s or m/s\].
-pub(crate) const NO_LIMIT: f64 = 1e6;
+const NO_LIMIT: f64 = 1e6;
 
 /// Most numbers of a kind that a drive's state and input are tried at: current \[A\], linear state, input \[V\].
 const CURRENT: f64 = 3.0;

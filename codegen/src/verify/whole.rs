@@ -4,15 +4,19 @@
 //! with constant values and without rates, payloads are lumped into links by Steiner's theorem, and of the whole robot's
 //! results those of the scene are picked.
 
-use super::{Drive, Random, State};
+use super::reading::MOTION;
 use crate::equations::Robot;
-use crate::function::{Extent, Family, Function, Spec};
+use crate::function::truth::Effect;
+use crate::function::{Extent, Family, Function, Quantity, Spec};
+use crate::model::states::{body, State};
 use crate::options::Options;
 use crate::program::parameter::parameter_program;
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::{Base, Coulomb, Gravity, Parameter, Scene};
 use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
 use straightline_core::model::Model;
+use straightline_core::random::Random;
 use straightline_core::reference::{ExtendedPosition, MassCentreTree};
 use straightline_core::Dd;
 use straightline_graph::certify::search::computed_at;
@@ -61,17 +65,26 @@ impl Coordinates {
         Ok(Coordinates { q, v, joints, held, nv: whole.nv(), all_joints: all.len() })
     }
 
+    /// Whether the robot of the scene moves as the whole one.
+    pub fn are_all(&self) -> bool {
+        self.v.len() == self.nv
+    }
+
     /// The whole robot's state.
-    pub fn expand(&self, state: &State) -> State {
-        let mut whole = State { q: self.held.clone(), ..State::default() };
-        for rates in [&mut whole.qd, &mut whole.qdd, &mut whole.tau] {
-            rates.resize(self.nv, 0.0);
+    pub fn expand(&self, state: &State<f64>) -> BTreeMap<Quantity, Vec<Dd>> {
+        let mut whole = BTreeMap::new();
+        for quantity in MOTION {
+            let (mut all, places) = match quantity {
+                Quantity::Configuration => (self.held.clone(), &self.q),
+                _ => (vec![0.0; self.nv], &self.v),
+            };
+            places.iter().zip(&state[&quantity.name()]).for_each(|(at, x)| all[*at] = *x);
+            whole.insert(quantity, all);
         }
-        self.q.iter().zip(&state.q).for_each(|(at, x)| whole.q[*at] = *x);
-        for (i, at) in self.v.iter().enumerate() {
-            (whole.qd[*at], whole.qdd[*at], whole.tau[*at]) = (state.qd[i], state.qdd[i], state.tau[i]);
+        for quantity in [Quantity::DriveState, Quantity::DriveInput] {
+            whole.insert(quantity, state[&quantity.name()].clone());
         }
-        whole
+        whole.into_iter().map(|(quantity, x)| (quantity, x.into_iter().map(Dd::from).collect())).collect()
     }
 
     /// Of a function's results for the whole robot, those of the robot of the scene, as indices. Accelerations depend on which joints
@@ -109,7 +122,7 @@ pub(super) fn hold(
     scene: &Scene,
     model: &Model<Dd>,
     tree: &mut MassCentreTree<Dd>,
-    drives: &mut Vec<Drive>,
+    effects: &mut Vec<Effect>,
 ) -> Result<(), String> {
     let is_locked = |name: &str| scene.locked.iter().any(|(joint, _)| joint == name);
     let stands = |mut body: Option<usize>| {
@@ -145,14 +158,14 @@ pub(super) fn hold(
         tree.gravity = Vector3::from(gravity.map(Dd::from));
     }
     let moves = |iv: usize| model.bodies.iter().any(|b| b.joint.iv == iv && !is_locked(&b.joint.name));
-    drives.retain(|drive| moves(drive.iv));
-    for drive in drives {
+    effects.retain(|effect| moves(effect.iv));
+    for effect in effects {
         let wanted = |x: Dd, is_wanted: bool| if is_wanted { x } else { Dd::ZERO };
-        drive.inertia = wanted(drive.inertia, scene.effects.rotor_inertia);
-        drive.damping = wanted(drive.damping, scene.effects.damping);
-        drive.friction = wanted(drive.friction, scene.effects.coulomb != Coulomb::Off);
-        drive.stiffness = wanted(drive.stiffness, scene.effects.springs);
-        drive.smooth = match scene.effects.coulomb {
+        effect.inertia = wanted(effect.inertia, scene.effects.rotor_inertia);
+        effect.damping = wanted(effect.damping, scene.effects.damping);
+        effect.friction = wanted(effect.friction, scene.effects.coulomb != Coulomb::Off);
+        effect.stiffness = wanted(effect.stiffness, scene.effects.springs);
+        effect.smooth = match scene.effects.coulomb {
             Coulomb::Smooth(speed) => Some(Dd::from(speed)),
             Coulomb::Off | Coulomb::Sign => None,
         };
@@ -202,32 +215,25 @@ pub(super) fn parameter_programs(robot: &Robot, options: &Options) -> Vec<(Param
     parameters.map(|p| (p.clone(), parameter_program(robot, p, options))).collect()
 }
 
-/// Random values of what the scene has as inputs besides coordinates: into the state as the program takes them, into the
-/// tree as they are meant.
+/// What the scene has as inputs besides coordinates, into the tree as it is meant; random bodies of parameters also into the state, as the
+/// program takes them.
 pub(super) fn random_inputs(
     scene: &Scene,
     parameters: &[(Parameter, Graph)],
     scalar: Scalar,
-    (state, tree): (&mut State, &mut MassCentreTree<Dd>),
+    (state, tree): (&mut State<f64>, &mut MassCentreTree<Dd>),
     random: &mut Random,
 ) -> Result<(), String> {
     let rounded = |x: f64| scalar.rounded(x);
     if scene.gravity == Gravity::Input {
-        let gravity: [f64; 3] = std::array::from_fn(|_| rounded(random.symmetric(10.0)));
-        tree.gravity = Vector3::from(gravity.map(Dd::from));
-        state.others.insert("gravity".to_string(), gravity.to_vec());
+        tree.gravity = Vector3::from_iterator(state[&Quantity::Gravity.name()].iter().copied().map(Dd::from));
     }
     for (parameter, program) in parameters {
         let Some(frame) = parameter.frame() else { continue };
-        let mass = rounded(1.0 + random.symmetric(0.75));
-        let com: [f64; 3] = std::array::from_fn(|_| rounded(random.symmetric(0.2)));
-        // three points of equal mass: a body that can be
-        let points: [Vector3<f64>; 3] = std::array::from_fn(|_| Vector3::from_fn(|_, _| random.symmetric(0.1)));
-        let sum: Matrix3<f64> = points.iter().map(|x| Matrix3::identity() * x.dot(x) - x * x.transpose()).sum();
-        let j = (sum * (mass / 3.0)).map(rounded);
-        let six = [j[(0, 0)], j[(0, 1)], j[(0, 2)], j[(1, 1)], j[(1, 2)], j[(2, 2)]];
-        let inputs = [&[mass][..], &com, &six].concat();
-        state.others.insert(parameter.input_name(), computed_at(program, scalar, &inputs));
+        let inputs: Vec<f64> = body(random).concat().into_iter().map(rounded).collect();
+        let [mass, x, y, z, xx, xy, xz, yy, yz, zz] = inputs[..] else { unreachable!("a body has ten numbers") };
+        let (com, j) = ([x, y, z], Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz));
+        state.insert(parameter.input_name(), computed_at(program, scalar, &inputs));
         weld(tree, frame, mass, com, j)?;
     }
     Ok(())
@@ -237,7 +243,7 @@ pub(super) fn random_inputs(
 pub(super) fn random_drives(
     parameters: &[(Parameter, Graph)],
     scalar: Scalar,
-    (state, model): (&mut State, &mut Model<Dd>),
+    (state, model): (&mut State<f64>, &mut Model<Dd>),
     random: &mut Random,
 ) {
     let of_file = model.clone();
@@ -245,7 +251,7 @@ pub(super) fn random_drives(
         let Some(drive) = FreeDrive::new(parameter, &of_file) else { continue };
         let rounded = |x: f64| scalar.rounded(x);
         let numbers: Vec<f64> = drive.random(|| 0.5 + random.symmetric(0.5)).into_iter().map(rounded).collect();
-        state.others.insert(parameter.input_name(), computed_at(program, scalar, &numbers));
+        state.insert(parameter.input_name(), computed_at(program, scalar, &numbers));
         let derived = drive.derived(&numbers.iter().map(|x| Dd::from(*x)).collect::<Vec<_>>());
         model.drives.iter_mut().filter(|d| d.name == derived.name).for_each(|d| *d = derived.clone());
     }

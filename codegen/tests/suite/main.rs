@@ -41,6 +41,7 @@ mod scenes_as_written;
 mod scope;
 mod staged;
 mod sums;
+mod truth;
 mod two_readings;
 mod unyielding;
 

@@ -84,7 +84,7 @@ fn state(model: &Model<Dd>) -> State {
 }
 
 /// The second author's model of drives that are connected directly, with θ and θ̇ of motors in x.
-fn united(model: &Model<Dd>, State([q, qd, x, _]): &State) -> (UnitedModel, DVector<Dd>) {
+fn united(model: &Model<Dd>, State([q, qd, x, _]): &State) -> (UnitedModel<Dd>, DVector<Dd>) {
     let nv = model.nv();
     let mut x = x.clone();
     let (mut actuators, mut first) = (Vec::new(), 0);

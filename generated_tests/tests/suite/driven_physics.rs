@@ -42,11 +42,11 @@ fn vector(x: &[Dd]) -> DVector<Dd> {
 /// A drive, for the file and for the reference.
 struct Both {
     text: String,
-    actuator: ActuatorModel,
+    actuator: ActuatorModel<Dd>,
     eta: Option<(Dd, Dd)>,
     /// Row of ratios over the joints, of a rigid drive; of an elastic one that of its last stage.
     row: Vec<f64>,
-    stages: Vec<ElasticStage>,
+    stages: Vec<ElasticStage<Dd>>,
     state: Vec<f64>,
 }
 

@@ -8,7 +8,7 @@ use straightline_generated_tests::bounds::{of_random_robot, RANDOM_ROBOT};
 use straightline_generated_tests::inputs::{self, ready_to_paste};
 use straightline_generated_tests::programs::{self, cast};
 use straightline_generated_tests::random::{Kind, Random, RandomRobot};
-use straightline_generated_tests::second_author;
+use straightline_generated_tests::reference::Expected;
 use straightline_generated_tests::written::{Shape, Style};
 
 /// The inputs in double-double, a quaternion of length one in double-double: the functions take its length for granted.
@@ -40,7 +40,7 @@ fn check_robot(robot: &RandomRobot, name: &str, random: &mut Random, states: usi
         for _ in 0..states {
             let inputs = inputs::random(random, &loaded.model, function);
             let wide = exact(&inputs, kind);
-            let expected = second_author::value(&tree, &frames, function, &wide);
+            let expected = Expected::by_the_second_author(&tree, &frames, function, &wide);
             let (equations, i) = expected.worst(&programs::run(&equations, &wide));
             let (rounded, k) = expected.worst(&programs::run::<f64>(&program, &inputs));
             let about = || {
@@ -127,7 +127,7 @@ fn a_chain_of_a_hundred_links_agrees_with_the_second_author() {
         let program = program(&loaded, &[], function, &Options::default());
         let inputs = inputs::random(&mut random, &loaded.model, function);
         let wide = exact(&inputs, kind);
-        let expected = second_author::value(&tree, &[], function, &wide);
+        let expected = Expected::by_the_second_author(&tree, &[], function, &wide);
         let (equations, _) = expected.worst(&programs::run(&program, &wide));
         let (rounded, _) = expected.worst(&programs::run::<f64>(&program, &inputs));
         assert!(RANDOM_ROBOT.allows(equations), "{}: {equations:.1e}", function.name());

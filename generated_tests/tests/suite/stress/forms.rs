@@ -10,7 +10,7 @@ use straightline_generated_tests::compiled::generic_panda as panda;
 use straightline_generated_tests::compiled::lanes_solo12 as solo12;
 use straightline_generated_tests::programs;
 use straightline_generated_tests::random::Random;
-use straightline_generated_tests::second_author;
+use straightline_generated_tests::reference::Expected;
 
 /// Speeds from those whose squares are subnormal to huge ones, and angles beyond the domain, which give NaN in their state alone.
 fn hard_list(n: usize, state: usize, random: &mut Random) -> [Vec<f64>; 3] {
@@ -113,7 +113,7 @@ pub fn any_scalar(size: Size) -> Vec<Outcome> {
         let mut tau = [Dd::zero(); 7];
         panda::inverse_dynamics(&q, &qd, &qdd, &mut tau);
         let inputs = [q.to_vec(), qd.to_vec(), qdd.to_vec()];
-        let expected = second_author::value(&tree, &[], Function::InverseDynamics, &inputs);
+        let expected = Expected::by_the_second_author(&tree, &[], Function::InverseDynamics, &inputs);
         worst = worst.max(expected.worst(&tau).0);
     }
     let line = |what: String, value: f64, bound: f64| Outcome::new(14, "panda, generic", what, value, bound);

@@ -13,7 +13,6 @@ use straightline_generated_tests::programs;
 use straightline_generated_tests::random::Random;
 use straightline_generated_tests::reference::Robot;
 use straightline_generated_tests::search::Ranges;
-use straightline_generated_tests::second_author::rounded;
 
 /// A joint without limits is moved so far \[rad or m\].
 const RANGE: f64 = std::f64::consts::PI;
@@ -36,7 +35,7 @@ impl Judged {
         let (source, options) = (programs::source(&robot), programs::options(&robot).model);
         let described = description::read(&source, &mut Diagnostics::new()).expect("the reference's files can be read");
         let tree = mass_centre_tree(&described, &options).expect("the reference's robots are trees");
-        Judged { loaded: programs::load(&source, &options), robot, tree: rounded(&tree) }
+        Judged { loaded: programs::load(&source, &options), robot, tree: tree.map(Dd::to_f64) }
     }
 
     pub fn model(&self) -> &Model<Dd> {

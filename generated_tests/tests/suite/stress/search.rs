@@ -12,7 +12,6 @@ use straightline_generated_tests::compiled;
 use straightline_generated_tests::programs::{self, cast};
 use straightline_generated_tests::random::{Kind, Random, RandomRobot};
 use straightline_generated_tests::search::{Found, PATIENCE};
-use straightline_generated_tests::second_author::rounded;
 use straightline_generated_tests::written::{Shape, Style};
 
 /// An ulp of one: of f64 and f32.
@@ -79,7 +78,7 @@ pub fn random_arms(size: Size) -> Vec<Outcome> {
         let mut worst: Vec<f64> = (0..arms)
             .map(|seed| {
                 let robot = arm(seed + 1);
-                let (loaded, tree) = (robot.load(), rounded(&robot.reference()));
+                let (loaded, tree) = (robot.load(), robot.reference().map(Dd::to_f64));
                 let graph = program(&loaded, &[], function, &Options::default()).graph;
                 let error = |flat: &[f64]| {
                     let groups: Vec<Vec<f64>> = flat.chunks(robot.kind.joints).map(<[f64]>::to_vec).collect();

@@ -5,45 +5,46 @@
 //! connection. The matrices are inverted as they stand, without looking for symmetry. Elastic transmissions follow
 //! (20.98), (20.99), stage after stage; efficiencies are found by trying all combinations of directions.
 
+use super::Number;
 use crate::dd::Dd;
 use alloc::vec::Vec;
 use nalgebra::{DMatrix, DVector};
 
 /// ẋ = C x + f M + d u with θ̈ = T ẋ (20.74).
 #[derive(Clone, Debug)]
-pub struct ActuatorModel {
+pub struct ActuatorModel<T: Number> {
     /// C.
-    pub c: DMatrix<Dd>,
+    pub c: DMatrix<T>,
     /// f.
-    pub f: DVector<Dd>,
+    pub f: DVector<T>,
     /// d.
-    pub d: DVector<Dd>,
+    pub d: DVector<T>,
     /// T, as a column.
-    pub t: DVector<Dd>,
+    pub t: DVector<T>,
 }
 
 /// A permanent-magnet DC motor, (20.62), (20.63).
 #[derive(Clone, Copy, Debug)]
-pub struct DcMotor {
+pub struct DcMotor<T: Number> {
     /// J \[kg·m²\].
-    pub j: Dd,
+    pub j: T,
     /// C_M \[N·m/A\].
-    pub c_m: Dd,
+    pub c_m: T,
     /// C_E \[V·s/rad\].
-    pub c_e: Dd,
+    pub c_e: T,
     /// B \[N·m·s/rad\].
-    pub b: Dd,
+    pub b: T,
     /// R \[Ω\].
-    pub r: Dd,
+    pub r: T,
     /// L \[H\]; `None`: neglected (20.66).
-    pub l: Option<Dd>,
+    pub l: Option<T>,
 }
 
-impl DcMotor {
+impl<T: Number> DcMotor<T> {
     /// (20.65), or (20.67): its c_j is printed without the corrected entry −C_M C_E/(R J) − B/J in the second row.
-    pub fn model(&self) -> ActuatorModel {
+    pub fn model(&self) -> ActuatorModel<T> {
         let DcMotor { j, c_m, c_e, b, r, l } = *self;
-        let (o, one) = (Dd::ZERO, Dd::ONE);
+        let (o, one): (T, T) = (nalgebra::zero(), nalgebra::one());
         match l {
             Some(l) => ActuatorModel {
                 c: DMatrix::from_row_slice(3, 3, &[o, one, o, o, -b / j, c_m / j, o, -c_e / l, -r / l]),
@@ -63,37 +64,37 @@ impl DcMotor {
 
 /// The chain and its rigid drives in a state.
 #[derive(Clone, Debug)]
-pub struct UnitedModel {
+pub struct UnitedModel<T: Number> {
     /// H.
-    pub h_matrix: DMatrix<Dd>,
+    pub h_matrix: DMatrix<T>,
     /// h, less what acts on the joints besides.
-    pub h: DVector<Dd>,
+    pub h: DVector<T>,
     /// The actuators.
-    pub actuators: Vec<ActuatorModel>,
+    pub actuators: Vec<ActuatorModel<T>>,
     /// N: θ = N q.
-    pub ratios: DMatrix<Dd>,
+    pub ratios: DMatrix<T>,
     /// r: torque behind a gear over torque without losses, τ = Nᵀ r M.
-    pub losses: DVector<Dd>,
+    pub losses: DVector<T>,
 }
 
 /// What comes out of [`UnitedModel::solve`].
 #[derive(Clone, Debug)]
-pub struct UnitedMotion {
+pub struct UnitedMotion<T: Number> {
     /// M of the actuators.
-    pub torques: DVector<Dd>,
+    pub torques: DVector<T>,
     /// τ of the joints.
-    pub tau: DVector<Dd>,
+    pub tau: DVector<T>,
     /// q̈.
-    pub qdd: DVector<Dd>,
+    pub qdd: DVector<T>,
     /// ẋ, actuator after actuator.
-    pub xd: DVector<Dd>,
+    pub xd: DVector<T>,
 }
 
-impl UnitedModel {
+impl<T: Number> UnitedModel<T> {
     /// C = diag C_j, F = diag f_j, D = diag d_j (20.78), T = diag T_j (20.79).
-    pub fn stacked(&self) -> [DMatrix<Dd>; 4] {
+    pub fn stacked(&self) -> [DMatrix<T>; 4] {
         let (m, n) = (self.actuators.len(), self.actuators.iter().map(|a| a.f.len()).sum());
-        let zero = |rows, columns| DMatrix::from_element(rows, columns, Dd::ZERO);
+        let zero = |rows, columns| DMatrix::<T>::zeros(rows, columns);
         let [mut c, mut f, mut d, mut t] = [zero(n, n), zero(n, m), zero(n, m), zero(m, n)];
         let mut first = 0;
         for (k, a) in self.actuators.iter().enumerate() {
@@ -110,24 +111,53 @@ impl UnitedModel {
 
     /// The motion under u. The acceleration of the shafts is θ̈ = T (C x + F M + D u) and N q̈, with H q̈ + h = Nᵀ r M: one
     /// linear system for q̈ and M, which is regular where H T F of (20.80) may vanish, and H itself.
-    pub fn solve(&self, x: &DVector<Dd>, u: &DVector<Dd>) -> UnitedMotion {
+    pub fn solve_by(
+        &self,
+        x: &DVector<T>,
+        u: &DVector<T>,
+        solve: impl Fn(&DMatrix<T>, &DVector<T>) -> DVector<T>,
+    ) -> UnitedMotion<T> {
         let [c, f, d, t] = self.stacked();
         let n = &self.ratios;
         let (m, nv) = (n.nrows(), n.ncols());
         let to_joints = n.transpose() * DMatrix::from_diagonal(&self.losses);
         let free = &c * x + &d * u;
-        let mut matrix = DMatrix::from_element(nv + m, nv + m, Dd::ZERO);
+        let mut matrix = DMatrix::zeros(nv + m, nv + m);
         matrix.view_mut((0, 0), (nv, nv)).copy_from(&self.h_matrix);
         matrix.view_mut((0, nv), (nv, m)).copy_from(&-&to_joints);
         matrix.view_mut((nv, 0), (m, nv)).copy_from(n);
         matrix.view_mut((nv, nv), (m, m)).copy_from(&-(&t * &f));
-        let mut right = DVector::from_element(nv + m, Dd::ZERO);
+        let mut right = DVector::zeros(nv + m);
         right.rows_mut(0, nv).copy_from(&-&self.h);
         right.rows_mut(nv, m).copy_from(&(&t * &free));
-        let solution = solve_general(matrix, right);
+        let solution = solve(&matrix, &right);
         let (qdd, torques) = (solution.rows(0, nv).clone_owned(), solution.rows(nv, m).clone_owned());
         let tau = to_joints * &torques;
         UnitedMotion { xd: free + f * &torques, torques, tau, qdd }
+    }
+
+    /// The same in other numbers.
+    pub fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> UnitedModel<U> {
+        UnitedModel {
+            h_matrix: self.h_matrix.map(f),
+            h: self.h.map(f),
+            actuators: self.actuators.iter().map(|a| a.map(f)).collect(),
+            ratios: self.ratios.map(f),
+            losses: self.losses.map(f),
+        }
+    }
+}
+
+impl<T: Number> ActuatorModel<T> {
+    fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> ActuatorModel<U> {
+        ActuatorModel { c: self.c.map(f), f: self.f.map(f), d: self.d.map(f), t: self.t.map(f) }
+    }
+}
+
+impl UnitedModel<Dd> {
+    /// [`UnitedModel::solve_by`] elimination with pivots.
+    pub fn solve(&self, x: &DVector<Dd>, u: &DVector<Dd>) -> UnitedMotion<Dd> {
+        self.solve_by(x, u, |a, b| solve_general(a.clone(), b.clone()))
     }
 
     /// τ by (20.80), for as many drives as joints: with q̈ = N⁻¹ T ẋ and M = r⁻¹ N⁻ᵀ τ in place of T and F.
@@ -203,54 +233,54 @@ impl UnitedModel {
 
 /// A stage of an elastic transmission, Figure 20.17.
 #[derive(Clone, Copy, Debug)]
-pub struct ElasticStage {
+pub struct ElasticStage<T: Number> {
     /// N.
-    pub n: Dd,
+    pub n: T,
     /// I′ \[kg·m²\].
-    pub i1: Dd,
+    pub i1: T,
     /// I″ \[kg·m²\].
-    pub i2: Dd,
+    pub i2: T,
     /// c \[N·m/rad\].
-    pub c: Dd,
+    pub c: T,
     /// d \[N·m·s/rad\].
-    pub d: Dd,
+    pub d: T,
     /// η′ and η″ of its gear.
-    pub eta: Option<(Dd, Dd)>,
+    pub eta: Option<(T, T)>,
 }
 
-impl ElasticStage {
+impl<T: Number> ElasticStage<T> {
     /// τ by (20.99), from angle and speed before and behind the stage.
-    pub fn torque(&self, theta: (Dd, Dd), q: (Dd, Dd)) -> Dd {
+    pub fn torque(&self, theta: (T, T), q: (T, T)) -> T {
         self.c * (theta.0 / self.n - q.0) + self.d * (theta.1 / self.n - q.1)
     }
 
     /// What it takes from the shaft before it: τ/N of (20.98), over η′ in the direction of the drive and times η″ against it.
-    pub fn taken(&self, tau: Dd, speed: Dd) -> Dd {
-        let power = (tau / self.n * speed).to_f64();
+    pub fn taken(&self, tau: T, speed: T) -> T {
+        let direction = (tau / self.n * speed).sign();
         match self.eta {
-            Some((forward, _)) if power > 0.0 => tau / self.n / forward,
-            Some((_, backward)) if power < 0.0 => tau / self.n * backward,
+            Some((forward, _)) if direction == nalgebra::one() => tau / self.n / forward,
+            Some((_, backward)) if direction == -nalgebra::one::<T>() => tau / self.n * backward,
             _ => tau / self.n,
         }
     }
 
     /// I′ + I″/N² (20.98).
-    pub fn inertia(&self) -> Dd {
+    pub fn inertia(&self) -> T {
         self.i1 + self.i2 / (self.n * self.n)
     }
 }
 
 /// M and ẋ of an actuator before an elastic stage that takes `taken`: (I′ + I″/N²) θ̈ = M − taken (20.98) with θ̈ = T ẋ.
-pub fn before_elastic_stage(
-    actuator: &ActuatorModel,
-    x: &DVector<Dd>,
-    u: Dd,
-    inertia: Dd,
-    taken: Dd,
-) -> (Dd, DVector<Dd>) {
+pub fn before_elastic_stage<T: Number>(
+    actuator: &ActuatorModel<T>,
+    x: &DVector<T>,
+    u: T,
+    inertia: T,
+    taken: T,
+) -> (T, DVector<T>) {
     let free = &actuator.c * x + &actuator.d * u;
     let (t_free, t_f) = (actuator.t.dot(&free), actuator.t.dot(&actuator.f));
-    let torque = (inertia * t_free + taken) / (Dd::ONE - inertia * t_f);
+    let torque = (inertia * t_free + taken) / (nalgebra::one::<T>() - inertia * t_f);
     (torque, free + &actuator.f * torque)
 }
 

@@ -1,26 +1,46 @@
 //! The scalar of the reference: a [`Real`] that nalgebra's products accept.
 
 use crate::dd::Dd;
+use crate::magnitude::Magnitude;
 use crate::real::Real;
 use core::ops::{AddAssign, DivAssign, MulAssign, SubAssign};
 use num_traits::{One, Zero};
 
-/// A [`Real`] that nalgebra can add and multiply: f32, f64 and [`Dd`].
+/// A [`Real`] that nalgebra can add and multiply: f32, f64, [`Dd`], and [`Magnitude`], over which every formula says its natural scale, too.
 pub trait Number: Real + nalgebra::Scalar + Zero + One + AddAssign + SubAssign + MulAssign + DivAssign {}
 
 impl<T: Real + nalgebra::Scalar + Zero + One + AddAssign + SubAssign + MulAssign + DivAssign> Number for T {}
 
-impl Zero for Dd {
-    fn zero() -> Self {
-        Dd::ZERO
-    }
-    fn is_zero(&self) -> bool {
-        *self == Dd::ZERO
-    }
+macro_rules! number {
+    ($T:ident) => {
+        impl Zero for $T {
+            fn zero() -> Self {
+                Real::zero()
+            }
+            fn is_zero(&self) -> bool {
+                *self == <$T as Real>::zero()
+            }
+        }
+
+        impl One for $T {
+            fn one() -> Self {
+                Real::one()
+            }
+        }
+    };
 }
 
-impl One for Dd {
-    fn one() -> Self {
-        Dd::ONE
-    }
+number!(Dd);
+number!(Magnitude);
+
+macro_rules! assign {
+    ($($Trait:ident $name:ident $op:tt)*) => {
+        $(impl $Trait for Magnitude {
+            fn $name(&mut self, b: Self) {
+                *self = *self $op b;
+            }
+        })*
+    };
 }
+
+assign!(AddAssign add_assign + SubAssign sub_assign - MulAssign mul_assign * DivAssign div_assign /);

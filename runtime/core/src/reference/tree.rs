@@ -134,6 +134,43 @@ impl<T: Number> MassCentreLink<T> {
     }
 }
 
+impl<T: Number> MassCentreLink<T> {
+    fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> MassCentreLink<U> {
+        MassCentreLink {
+            name: self.name.clone(),
+            parent: self.parent,
+            joint: self.joint,
+            iq: self.iq,
+            iv: self.iv,
+            mass: f(self.mass),
+            inertia: self.inertia.map(f),
+            e: self.e.map(f),
+            e_parent: self.e_parent.map(f),
+            r: self.r.map(f),
+            r_parent: self.r_parent.map(f),
+            extended: match &self.extended {
+                ExtendedPosition::Matrix(extended) => ExtendedPosition::Matrix(extended.map(f)),
+                ExtendedPosition::ByVectors { r_star, r_parent_star, alpha } => ExtendedPosition::ByVectors {
+                    r_star: r_star.map(|r| r.map(f)),
+                    r_parent_star: r_parent_star.map(|r| r.map(f)),
+                    alpha: f(*alpha),
+                },
+            },
+        }
+    }
+}
+
+impl<T: Number> MassCentreFrame<T> {
+    fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> MassCentreFrame<U> {
+        MassCentreFrame {
+            name: self.name.clone(),
+            link: self.link,
+            position: self.position.map(f),
+            rotation: self.rotation.map(f),
+        }
+    }
+}
+
 /// A frame that is fixed to a link.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MassCentreFrame<T> {
@@ -179,6 +216,16 @@ impl<T: Number> MassCentreTree<T> {
             (link.iq, link.iv) = (iq, iv);
             iq += link.joint.nq();
             iv += link.joint.nv();
+        }
+    }
+
+    /// The same robot in other numbers.
+    pub fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> MassCentreTree<U> {
+        MassCentreTree {
+            name: self.name.clone(),
+            gravity: self.gravity.map(f),
+            links: self.links.iter().map(|link| link.map(f)).collect(),
+            frames: self.frames.iter().map(|frame| frame.map(f)).collect(),
         }
     }
 

@@ -1,0 +1,67 @@
+//! Forces and motion, by the second author.
+
+use super::super::dynamics::{
+    BiasForce, ForwardDynamics, GravityForce, InverseDynamics, JointWrenches, MassMatrix, VelocityForce,
+};
+use super::super::Quantity;
+use super::{list, solved, Chapter, Truth};
+use nalgebra::DVector;
+use straightline_core::magnitude::Magnitude;
+use straightline_core::reference;
+
+impl Truth for InverseDynamics {
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        let mut forces = at.with_passive(reference::inverse_dynamics(&at.tree, at.q(), at.qd(), at.qdd()));
+        for effect in at.effects {
+            forces[effect.iv] += Magnitude::new(effect.inertia) * at.qdd()[effect.iv];
+        }
+        Some(list(&forces))
+    }
+}
+
+impl Truth for GravityForce {
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        Some(list(&reference::gravity_force(&at.tree, at.q())))
+    }
+}
+
+impl Truth for BiasForce {
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        Some(list(&at.with_passive(reference::bias_force(&at.tree, at.q(), at.qd()))))
+    }
+}
+
+impl Truth for VelocityForce {
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        Some(list(&reference::velocity_force(&at.tree, at.q(), at.qd())))
+    }
+}
+
+impl Truth for MassMatrix {
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        Some(list(&at.with_rotors(reference::mass_matrix(&at.tree, at.q())).transpose()))
+    }
+}
+
+impl Truth for ForwardDynamics {
+    /// Of the joints that move.
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        let h = at.with_rotors(reference::mass_matrix(&at.tree, at.q()));
+        let bias = at.with_passive(reference::bias_force(&at.tree, at.q(), at.qd()));
+        let net = DVector::from_column_slice(at.get(Quantity::Force)) - bias;
+        let all: Vec<usize> = (0..net.len()).collect();
+        let moving = at.moving.unwrap_or(&all);
+        let (h, net) = (h.select_rows(moving).select_columns(moving), net.select_rows(moving));
+        Some(list(&solved(&h, &net, reference::solve_symmetric)))
+    }
+}
+
+impl Truth for JointWrenches {
+    /// In the order of the velocity coordinates.
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        let wrenches = reference::joint_wrenches(&at.tree, at.q(), at.qd(), at.qdd());
+        let mut order: Vec<usize> = (0..wrenches.len()).collect();
+        order.sort_by_key(|link| at.tree.links[*link].iv);
+        Some(order.into_iter().flat_map(|link| wrenches[link]).collect())
+    }
+}

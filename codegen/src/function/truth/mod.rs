@@ -1,0 +1,227 @@
+//! What every function should give: the second author's word, over numbers that know their natural scale.
+//!
+//! A truth is asked of a [`Chapter`]: the robot as the handbook chapter describes it, at a state. It is computed once, over [`Magnitude`], which gives
+//! the value in double-double and, beside it, how large the terms were that it is made of. So no natural scale is written down by hand.
+
+use super::{Quantity, RobotFunction};
+use nalgebra::{DMatrix, DVector, Vector3};
+use std::collections::BTreeMap;
+use straightline_core::magnitude::Magnitude;
+use straightline_core::model::Model;
+use straightline_core::reference::{ExtendedPosition, Joint, MassCentreFrame, MassCentreTree};
+use straightline_core::{Dd, Real};
+
+mod drives;
+mod dynamics;
+mod kinematics;
+mod whole;
+
+/// What a function should give.
+pub trait Truth: RobotFunction {
+    /// Its results, one block after the other; `None` where the reference has no formulation of it, or none for these drives: tests of their own
+    /// hold such functions to laws of physics.
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>>;
+}
+
+/// What a joint of one coordinate adds to the rigid bodies: τ = … + I q̈ + d q̇ + f sgn(q̇) + k (q − q₀).
+#[derive(Clone, Copy, Debug)]
+pub struct Effect {
+    /// Index into q.
+    pub iq: usize,
+    /// Index into q̇.
+    pub iv: usize,
+    /// I \[kg·m² or kg\].
+    pub inertia: Dd,
+    /// d \[N·m·s/rad or N·s/m\].
+    pub damping: Dd,
+    /// f \[N·m or N\].
+    pub friction: Dd,
+    /// The speed w of f q̇ / √(q̇² + w²) in place of f sgn(q̇).
+    pub smooth: Option<Dd>,
+    /// k \[N·m/rad or N/m\].
+    pub stiffness: Dd,
+    /// q₀ \[rad or m\].
+    pub rest: Dd,
+}
+
+/// A robot in the second author's terms, at a state.
+#[derive(Clone, Debug)]
+pub struct Chapter<'a> {
+    /// The robot.
+    pub tree: MassCentreTree<Magnitude>,
+    frames: Vec<MassCentreFrame<Magnitude>>,
+    effects: &'a [Effect],
+    /// The velocity coordinates that move, where others are held.
+    moving: Option<&'a [usize]>,
+    /// Whose drives are meant, with the numbers of their shafts.
+    drives: Option<&'a Model<Dd>>,
+    state: BTreeMap<Quantity, Vec<Magnitude>>,
+}
+
+impl<'a> Chapter<'a> {
+    /// A robot without frames and drives at this state; rates and forces that are not given are zero.
+    pub fn new(tree: &MassCentreTree<Dd>, effects: &'a [Effect], state: BTreeMap<Quantity, Vec<Dd>>) -> Chapter<'a> {
+        let mut sized: BTreeMap<Quantity, Vec<Magnitude>> =
+            state.into_iter().map(|(quantity, x)| (quantity, x.into_iter().map(Magnitude::new).collect())).collect();
+        for rate in [Quantity::Velocity, Quantity::Acceleration, Quantity::Force] {
+            sized.entry(rate).or_insert_with(|| vec![Magnitude::zero(); tree.nv()]);
+        }
+        let tree = with_sizes(tree);
+        // the coordinates of a free link are parts of vectors, its attitude one of a rotation
+        for link in tree.links.iter().filter(|link| link.joint == Joint::Free) {
+            for (quantity, x) in &mut sized {
+                match quantity {
+                    Quantity::Configuration => {
+                        of_length(&mut x[link.iq..link.iq + 3]);
+                        x[link.iq + 3..link.iq + 7].iter_mut().for_each(|x| *x = x.of_size(1.0));
+                    }
+                    quantity if quantity.extent() == super::Extent::Velocities => {
+                        x[link.iv..link.iv + 6].chunks_mut(3).for_each(of_length);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Chapter { tree, frames: Vec::new(), effects, moving: None, drives: None, state: sized }
+    }
+
+    /// The same with these frames asked for.
+    ///
+    /// # Errors
+    /// The reference has no frame of that name.
+    pub fn with_frames(mut self, names: &[String]) -> Result<Self, String> {
+        let frame = |name: &String| {
+            self.tree.frame(name).cloned().ok_or_else(|| format!("the reference has no frame `{name}`"))
+        };
+        self.frames = names.iter().map(frame).collect::<Result<_, _>>()?;
+        Ok(self)
+    }
+
+    /// The same where these velocity coordinates alone move.
+    #[must_use]
+    pub fn with_moving(self, moving: &'a [usize]) -> Self {
+        Chapter { moving: Some(moving), ..self }
+    }
+
+    /// The same with the drives of a model, whose joints are those of the tree.
+    #[must_use]
+    pub fn with_drives(self, model: &'a Model<Dd>) -> Self {
+        Chapter { drives: Some(model), ..self }
+    }
+
+    /// What the state has of a quantity.
+    pub fn get(&self, quantity: Quantity) -> &[Magnitude] {
+        &self.state[&quantity]
+    }
+
+    fn q(&self) -> &[Magnitude] {
+        self.get(Quantity::Configuration)
+    }
+
+    fn qd(&self) -> &[Magnitude] {
+        self.get(Quantity::Velocity)
+    }
+
+    fn qdd(&self) -> &[Magnitude] {
+        self.get(Quantity::Acceleration)
+    }
+
+    /// What `f` gives for each of the frames.
+    fn per_frame(&self, f: impl Fn(&MassCentreFrame<Magnitude>) -> Vec<Magnitude>) -> Option<Vec<Magnitude>> {
+        Some(self.frames.iter().flat_map(f).collect())
+    }
+
+    /// Forces of the bodies with what friction and springs of the joints take.
+    fn with_passive(&self, mut forces: DVector<Magnitude>) -> DVector<Magnitude> {
+        for effect in self.effects {
+            forces[effect.iv] += effect.passive(self.q()[effect.iq], self.qd()[effect.iv]);
+        }
+        forces
+    }
+
+    /// The same matrix with the inertia of the joints' rotors on its diagonal.
+    fn with_rotors(&self, mut h: DMatrix<Magnitude>) -> DMatrix<Magnitude> {
+        self.effects.iter().for_each(|effect| h[(effect.iv, effect.iv)] += Magnitude::new(effect.inertia));
+        h
+    }
+}
+
+impl Effect {
+    /// What friction and spring take.
+    fn passive(&self, q: Magnitude, qd: Magnitude) -> Magnitude {
+        let [damping, friction, stiffness, rest] =
+            [self.damping, self.friction, self.stiffness, self.rest].map(Magnitude::new);
+        let dry = match self.smooth.map(Magnitude::new) {
+            Some(speed) => friction * (qd / (qd * qd + speed * speed).sqrt()),
+            None => friction * qd.sign(),
+        };
+        damping * qd + dry + stiffness * (q - rest)
+    }
+}
+
+/// An inertia that is so small a part of what it would be if nothing cancelled, is rounding noise.
+const NOISE: f64 = 1e-6;
+
+impl super::Function {
+    /// What errors of the results of a truth are compared with.
+    pub fn scales(self, truth: &[Magnitude]) -> Vec<f64> {
+        self.spec().judged.scales(truth, NOISE)
+    }
+}
+
+/// Every number with the size of the vector, rotation or tensor that it is a part of: turned into other axes, it takes part in all components.
+fn with_sizes(tree: &MassCentreTree<Dd>) -> MassCentreTree<Magnitude> {
+    let of_vector = |v: &mut Vector3<Magnitude>| of_length(v.as_mut_slice());
+    let of_unit = |v: &mut [Magnitude]| v.iter_mut().for_each(|x| *x = x.of_size(1.0));
+    let mut tree = tree.map(Magnitude::new);
+    of_vector(&mut tree.gravity);
+    for link in &mut tree.links {
+        of_length(link.inertia.as_mut_slice());
+        [&mut link.e, &mut link.e_parent].into_iter().for_each(|e| of_unit(e.as_mut_slice()));
+        [&mut link.r, &mut link.r_parent].into_iter().for_each(of_vector);
+        match &mut link.extended {
+            ExtendedPosition::Matrix(extended) => of_unit(extended.as_mut_slice()),
+            ExtendedPosition::ByVectors { r_star, r_parent_star, .. } => {
+                [r_star, r_parent_star].into_iter().flatten().for_each(of_vector);
+            }
+        }
+    }
+    for frame in &mut tree.frames {
+        of_vector(&mut frame.position);
+        of_unit(frame.rotation.as_mut_slice());
+    }
+    tree
+}
+
+/// Components with the length of their vector as size.
+fn of_length(v: &mut [Magnitude]) {
+    let length = v.iter().map(|x| x.size).fold(0.0, f64::hypot);
+    v.iter_mut().for_each(|x| *x = x.of_size(length));
+}
+
+/// x of A x = b. It moves by A⁻¹ (δb − δA x) where A and b move: taken as a whole, as every division of an elimination would count the worst of its
+/// pivot again.
+fn solved(
+    a: &DMatrix<Magnitude>,
+    b: &DVector<Magnitude>,
+    solve: impl Fn(&DMatrix<Dd>, &DVector<Dd>) -> DVector<Dd>,
+) -> DVector<Magnitude> {
+    let n = b.len();
+    let value = a.map(|x| x.value);
+    let x = solve(&value, &b.map(|x| x.value));
+    let moved = |i: usize| (0..n).map(|j| a[(i, j)].size * x[j].to_f64()).chain([b[i].size]).fold(0.0, f64::hypot);
+    let mut sizes = vec![0.0; n];
+    for j in 0..n {
+        let unit = DVector::from_fn(n, |i, _| if i == j { Dd::ONE } else { Dd::ZERO });
+        let (column, moved) = (solve(&value, &unit), moved(j));
+        sizes.iter_mut().zip(column.iter()).for_each(|(size, c)| *size = f64::hypot(*size, c.to_f64() * moved));
+    }
+    DVector::from_fn(n, |i, _| Magnitude::new(x[i]).of_size(sizes[i]))
+}
+
+/// A matrix column by column, or a vector.
+fn list<R: nalgebra::Dim, C: nalgebra::Dim, S: nalgebra::RawStorage<Magnitude, R, C>>(
+    matrix: &nalgebra::Matrix<Magnitude, R, C, S>,
+) -> Vec<Magnitude> {
+    matrix.iter().copied().collect()
+}

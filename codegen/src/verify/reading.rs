@@ -1,0 +1,146 @@
+//! The second author's reading of a robot file: links from their mass centres, and what joints add to them.
+
+use super::reference_input::mass_centre_tree;
+use crate::description::flexible::{Bending, Support};
+use crate::description::{self, Description, JointDrive, Notation, Value};
+use crate::diagnostic::{Diagnostics, Source};
+use crate::function::truth::{Chapter, Effect};
+use crate::function::{Function, Quantity};
+use crate::model::ModelOptions;
+use crate::options::Options;
+use straightline_core::model::Model;
+use straightline_core::reference::MassCentreTree;
+use straightline_core::Dd;
+
+/// What says how a robot moves, and by what.
+pub(super) const MOTION: [Quantity; 4] =
+    [Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration, Quantity::Force];
+
+/// The robot in the reference's terms, its coordinates numbered as the model's, and what joints add to it.
+pub(super) fn second_reading(
+    source: &Source,
+    model: &Model<Dd>,
+    options: &Options,
+) -> Result<(MassCentreTree<Dd>, Vec<Effect>), String> {
+    let description = description::read(source, &mut Diagnostics::new()).ok_or("the file holds no robot")?;
+    let mut tree = mass_centre_tree(&description, &options.model)?;
+    for link in &mut tree.links {
+        let body = model.bodies.iter().find(|body| body.name == link.name);
+        let joint = &body.ok_or_else(|| format!("the model has no body `{}`", link.name))?.joint;
+        (link.iq, link.iv) = (joint.iq, joint.iv);
+    }
+    let joints = model.bodies.iter().map(|body| &body.joint).filter(|joint| joint.kind.is_single());
+    let elastic = elastic_springs(&description, &options.model);
+    let effects = joints.map(|joint| {
+        let own = elastic.iter().find(|(name, _)| *name == joint.name);
+        let effect = own.map_or_else(|| written(&description, &joint.name), |own| own.1);
+        Effect { iq: joint.iq, iv: joint.iv, ..effect }
+    });
+    Ok((tree, effects.collect()))
+}
+
+/// A joint to which nothing is added.
+const NONE: Effect = Effect {
+    iq: 0,
+    iv: 0,
+    inertia: Dd::ZERO,
+    damping: Dd::ZERO,
+    friction: Dd::ZERO,
+    smooth: None,
+    stiffness: Dd::ZERO,
+    rest: Dd::ZERO,
+};
+
+/// What the file says of a joint.
+fn written(description: &Description, joint: &str) -> Effect {
+    let none = JointDrive::default();
+    let found = match &description.notation {
+        Notation::JointFrames(bodies) => bodies.joints.iter().find(|j| j.name.value == joint).map(|j| &j.drive),
+        Notation::MassCentres(chain) => {
+            chain.links.iter().find(|l| l.joint_name.value == joint).map(|link| &link.drive)
+        }
+    };
+    let drive = found.unwrap_or(&none);
+    let number = |x: &Option<Value<f64>>| Dd::from(x.as_ref().map_or(0.0, |x| x.value));
+    let gear = Dd::from(drive.gear_ratio.as_ref().map_or(1.0, |x| x.value));
+    Effect {
+        inertia: number(&drive.armature) + gear * gear * number(&drive.rotor_inertia),
+        damping: number(&drive.damping),
+        friction: number(&drive.friction),
+        stiffness: number(&drive.spring_stiffness),
+        rest: number(&drive.spring_rest),
+        ..NONE
+    }
+}
+
+/// The springs of the joints of flexible links and of a support, by name: EI n/L, GJ n/L.
+fn elastic_springs(description: &Description, options: &ModelOptions) -> Vec<(String, Effect)> {
+    let mut springs = Vec::new();
+    if options.rigid_links {
+        return springs;
+    }
+    for (k, elastic) in options.support.iter().flat_map(|support| support.directions.iter().enumerate()) {
+        if let Some(e) = elastic {
+            let [stiffness, damping, rest] = [e.stiffness.value, e.damping.value, e.rest].map(Dd::from);
+            springs.push((format!("support_{}", Support::DIRECTIONS[k]), Effect { stiffness, damping, rest, ..NONE }));
+        }
+    }
+    for flexible in options.flexible.iter().chain(&description.flexible) {
+        let (link, count) = (&flexible.link.value, flexible.segments.value);
+        let squares = (0..3).fold(Dd::ZERO, |sum, k| {
+            let d = Dd::from(flexible.to.value[k]) - Dd::from(flexible.from[k]);
+            sum + d * d
+        });
+        let per_length = Dd::from(count as f64) / squares.sqrt();
+        let mut about: Vec<(String, f64)> = Vec::new();
+        match &flexible.bending {
+            Bending::None => {}
+            Bending::Round(x) => about.extend(["x", "y", "z"].map(|axis| (format!("bend_{axis}"), x.value))),
+            Bending::About(given) => {
+                let given = given.iter().zip(["x", "y", "z"]);
+                about.extend(given.filter_map(|(x, axis)| Some((format!("bend_{axis}"), x.as_ref()?.value))));
+            }
+        }
+        about.extend(flexible.torsion.as_ref().map(|x| ("twist".to_string(), x.value)));
+        for (label, x) in about {
+            let stiffness = Dd::from(x) * per_length;
+            let spring = Effect { stiffness, damping: stiffness * Dd::from(flexible.damping.value), ..NONE };
+            springs.extend((1..=count).map(|i| (format!("{link}_{label}{i}"), spring)));
+        }
+    }
+    springs
+}
+
+/// The second author's reading of a robot file without a scene, to be asked for the results of any function at any state.
+pub struct SecondReading {
+    tree: MassCentreTree<Dd>,
+    effects: Vec<Effect>,
+}
+
+impl SecondReading {
+    /// Reads the file again; of `model`, the compiler's own reading, it takes the places of the coordinates alone.
+    ///
+    /// # Errors
+    /// The reference does not understand the file.
+    pub fn new(source: &Source, model: &Model<Dd>, options: &Options) -> Result<SecondReading, String> {
+        let (tree, effects) = second_reading(source, model, options)?;
+        Ok(SecondReading { tree, effects })
+    }
+
+    /// The results of a function and their natural scales at (q, q̇, q̈, τ), of which every function takes what it needs.
+    ///
+    /// # Errors
+    /// The reference has no frame of that name, or no formulation of the function.
+    pub fn outputs(
+        &self,
+        function: Function,
+        frames: &[String],
+        at: [&[Dd]; 4],
+    ) -> Result<(Vec<Dd>, Vec<f64>), String> {
+        let state = MOTION.into_iter().zip(at.map(<[Dd]>::to_vec)).collect();
+        let chapter = Chapter::new(&self.tree, &self.effects, state).with_frames(frames)?;
+        let results = function.truth(&chapter).ok_or("the reference has no formulation of it")?;
+        let scales = function.scales(&results);
+        Ok((results.iter().map(|x| x.value).collect(), scales))
+    }
+}
