@@ -1,8 +1,9 @@
 //! Numbers that know how large the terms were that they are made of: what an error is to be compared with.
 //!
 //! A sum of large terms may be small, and what rounding leaves in it is of the size of the terms. [`Magnitude`] carries that size along: it
-//! is how far the value would move, to first order, if each constant and each input moved by its own size, times one part in all. An error
-//! of ε times the size is what an evaluation with unit roundoff ε is allowed.
+//! is how far the value moves if each constant and each input moves by a small part of its own size, over that part. An error
+//! of ε times the size is what an evaluation with unit roundoff ε is allowed. The part is a thousandth, not infinitesimal, so that the square of what
+//! cancels altogether, such as the moment of inertia of a mass on the axis, has a size, too.
 //!
 //! Movements add as those of independent numbers do, by the root of the sum of their squares. So vectors keep their size when they are turned: along
 //! a chain of a hundred rotations a sum of moduli would grow like 1.7¹⁰⁰.
@@ -11,6 +12,9 @@ use crate::dd::Dd;
 use crate::real::Real;
 use crate::trig::sqrt_f64;
 use core::ops::{Add, Div, Mul, Neg, Sub};
+
+/// The part of their sizes by which numbers are moved.
+const PART: f64 = 1e-3;
 
 /// A value and the size of what it is made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,8 +47,8 @@ impl Magnitude {
 fn length([a, b]: [f64; 2]) -> f64 {
     let (most, least) = if a > b { (a, b) } else { (b, a) };
     match least / most {
-        part if part > 0.0 && part <= 1.0 => most * sqrt_f64(1.0 + part * part),
-        // the lesser is nothing, or one is no number
+        part if part > 1e-5 && part <= 1.0 => most * sqrt_f64(1.0 + part * part),
+        // the lesser is next to nothing, or one is no number
         _ => most + least,
     }
 }
@@ -67,7 +71,8 @@ impl Mul for Magnitude {
     type Output = Self;
     fn mul(self, b: Self) -> Self {
         let [x, y] = [self, b].map(|v| v.value.hi().abs());
-        Magnitude::moved(self.value * b.value, [self.size * y, x * b.size])
+        // (a + δa)(b + δb) − ab = δa b + a δb + δa δb
+        Magnitude::moved(self.value * b.value, [length([self.size * y, x * b.size]), PART * self.size * b.size])
     }
 }
 
@@ -146,7 +151,10 @@ mod tests {
     #[test]
     fn a_component_that_vanishes_counts_with_its_vector() {
         let [zero, two] = [0.0, 2.0].map(|x| Magnitude::new(Dd::from(x)));
-        assert_eq!((zero.of_size(0.5) * two).size, 1.0);
+        assert!(((zero.of_size(0.5) * two).size - 1.0).abs() < 1e-5);
+        // and a square that vanishes with a thousandth of its own
+        let point = zero.of_size(2.0);
+        assert!(((point * point).size / 4e-3 - 1.0).abs() < 1e-12);
         assert_eq!((zero * two).size, 0.0);
     }
 
