@@ -1,6 +1,7 @@
 //! Integrators on generated dynamics: orders of convergence, energy, quaternions, rounding.
 
-use straightline_core::integrate::{Change, Compensated, State, Step};
+use straightline_core::integrate::{Change, Compensated, State, Step, Uneven};
+use straightline_core::joint::FLOATING_BASE;
 use straightline_robots::{planar_2r, solo12};
 
 type Arm = State<f64, 2, 2>;
@@ -148,7 +149,8 @@ fn a_base_may_stand_anywhere_among_the_joints() {
     let qd = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8];
     let (q_base, qd_base) = ([1.0, 2.0, 3.0, 0.0, 0.6, 0.0, 0.8], [0.2, 0.3, 0.4, 0.5, 0.6, 0.7]);
     let alone: [f64; 7] = Step::of(0.01).displacement(&q_base, &qd_base, 0.01);
-    let together: [f64; 9] = Step { length: 0.01, base: 1 }.displacement(&q, &qd, 0.01);
+    let together: [f64; 9] =
+        Step { length: 0.01, joints: &[Uneven { kind: FLOATING_BASE, first: 1 }] }.displacement(&q, &qd, 0.01);
     assert_eq!(together[1..8], alone);
     assert_eq!([together[0], together[8]], [0.1 * 0.01, 0.8 * 0.01]);
 }

@@ -11,11 +11,11 @@
 //! | [`Step::runge_kutta_4`] | 4 | smooth motion, most accurate for its cost |
 //! | [`Step::implicit_midpoint`] | 2 | long runs: no drift of energy |
 //!
-//! **Floating base.** Where q has one entry more than q̇, seven of them, from [`Step::base`] on, are position and quaternion
-//! (x, y, z, w) of a base whose velocity stands in q̇ in its own axes, as everywhere in Straightline. Euler and midpoint steps turn it
-//! by the Cayley map, q ∘ (1 + a)/|1 + a| squared with a = h ω/4, a rational rotation that agrees with the exponential to h³; the
-//! Runge-Kutta method integrates q̇ = ½ q ∘ ω. After every step the quaternion is brought back to length one, by Newton's
-//! iteration, without a root.
+//! **Joints whose coordinates are not sums of their rates.** Where q has more entries than q̇, [`Step::joints`] says which joints have them and
+//! where they stand; each moves as its kind does. Of a floating base seven are position and quaternion (x, y, z, w), and its velocity stands in q̇
+//! in its own axes, as everywhere in Straightline. Euler and midpoint steps turn it by the Cayley map, q ∘ (1 + a)/|1 + a| squared with a = h ω/4, a
+//! rational rotation that agrees with the exponential to h³; the Runge-Kutta method integrates q̇ = ½ q ∘ ω. After every step quaternions
+//! are brought back to length one, by Newton's iteration, without a root.
 //!
 //! ```
 //! use straightline_core::integrate::{State, Step};
@@ -30,9 +30,10 @@
 
 use crate::dd::Dd;
 use crate::joint::quaternion::inverse_length;
-use crate::joint::FLOATING_BASE;
+use crate::joint::{Descriptor, JointKind, Mechanics, FLOATING_BASE};
 use crate::real::Real;
 use core::array::from_fn;
+use core::ops::Range;
 
 /// Configuration and velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +42,22 @@ pub struct State<T, const NQ: usize, const NV: usize> {
     pub q: [T; NQ],
     /// q̇ \[rad/s or m/s\].
     pub qd: [T; NV],
+}
+
+/// A joint with other coordinates than rates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Uneven {
+    /// How it moves.
+    pub kind: JointKind,
+    /// First index of its coordinates in q.
+    pub first: usize,
+}
+
+impl Uneven {
+    /// A floating base whose coordinates begin there.
+    pub const fn floating_base(first: usize) -> Self {
+        Uneven { kind: FLOATING_BASE, first }
+    }
 }
 
 /// What one step adds to a state.
@@ -53,11 +70,19 @@ pub struct Change<T, const NQ: usize, const NV: usize> {
 }
 
 impl<T: Real, const NQ: usize, const NV: usize> State<T, NQ, NV> {
-    /// Adds a change; `base` as in [`Step::base`].
+    /// Adds a change; `base`: first index of a floating base, which is not read without one.
     pub fn add(&mut self, change: &Change<T, NQ, NV>, base: usize) {
+        self.add_over(change, &[Uneven::floating_base(base)]);
+    }
+
+    /// Adds a change; `joints` as in [`Step::joints`].
+    pub fn add_over(&mut self, change: &Change<T, NQ, NV>, joints: &[Uneven]) {
         self.q = sum(&self.q, &change.q);
         self.qd = sum(&self.qd, &change.qd);
-        normalise::<T, NQ, NV>(&mut self.q, base);
+        for range in quaternions::<NQ, NV>(joints) {
+            let inverse = inverse_length(&self.q[range.clone()]);
+            self.q[range].iter_mut().for_each(|x| *x = *x * inverse);
+        }
     }
 }
 
@@ -75,21 +100,25 @@ impl<T: Real, const NQ: usize, const NV: usize> Compensated<T, NQ, NV> {
         Compensated { state, lost: State { q: [T::zero(); NQ], qd: [T::zero(); NV] } }
     }
 
-    /// Adds a change; `base` as in [`Step::base`]. What brings a quaternion back to length one is a change like another: multiplied by
-    /// it, its entries would be rounded at every step again.
+    /// Adds a change; `base` as in [`State::add`].
     pub fn add(&mut self, change: &Change<T, NQ, NV>, base: usize) {
+        self.add_over(change, &[Uneven::floating_base(base)]);
+    }
+
+    /// Adds a change; `joints` as in [`Step::joints`]. What brings a quaternion back to length one is a change like another: multiplied by
+    /// it, its entries would be rounded at every step again.
+    pub fn add_over(&mut self, change: &Change<T, NQ, NV>, joints: &[Uneven]) {
         for (x, (lost, dx)) in self.state.q.iter_mut().zip(self.lost.q.iter_mut().zip(change.q)) {
             (*x, *lost) = two_sum(*x, *lost + dx);
         }
         for (x, (lost, dx)) in self.state.qd.iter_mut().zip(self.lost.qd.iter_mut().zip(change.qd)) {
             (*x, *lost) = two_sum(*x, *lost + dx);
         }
-        if NQ == NV {
-            return;
-        }
-        let longer = inverse_length(&self.state.q[base + 3..base + 7]) - T::one();
-        for (x, lost) in self.state.q.iter_mut().zip(self.lost.q.iter_mut()).skip(base + 3).take(4) {
-            (*x, *lost) = two_sum(*x, *lost + *x * longer);
+        for range in quaternions::<NQ, NV>(joints) {
+            let longer = inverse_length(&self.state.q[range.clone()]) - T::one();
+            for (x, lost) in self.state.q[range.clone()].iter_mut().zip(&mut self.lost.q[range]) {
+                (*x, *lost) = two_sum(*x, *lost + *x * longer);
+            }
         }
     }
 }
@@ -99,15 +128,16 @@ impl<T: Real, const NQ: usize, const NV: usize> Compensated<T, NQ, NV> {
 pub struct Step<T> {
     /// Its length h \[s\].
     pub length: T,
-    /// First index of a floating base in q and in q̇: 0 unless the joints have an order of their own. Without a floating base
-    /// (as many entries in q as in q̇) it is not read; with one, the base must lie within q.
-    pub base: usize,
+    /// The joints with other coordinates than rates, in the order of their places: a floating base, which comes first unless the joints have an
+    /// order of their own. Without any (as many entries in q as in q̇) it is not read; with some, they must lie within q.
+    pub joints: &'static [Uneven],
 }
 
 impl<T: Real> Step<T> {
     /// A step of this length \[s\]; a floating base comes first.
     pub fn of(length: T) -> Self {
-        Step { length, base: 0 }
+        const FIRST: &[Uneven] = &[Uneven::floating_base(0)];
+        Step { length, joints: FIRST }
     }
 
     /// q̇' = q̇ + h f(t, q, q̇), then q' = q ⊕ h q̇': symplectic where H is constant, as then q̇ is the momentum but for a factor.
@@ -203,44 +233,75 @@ impl<T: Real> Step<T> {
 
     /// The change of q in the time `h` at constant q̇, of a base at constant velocity in its own axes.
     pub fn displacement<const NQ: usize, const NV: usize>(&self, q: &[T; NQ], qd: &[T; NV], h: T) -> [T; NQ] {
-        let mut change = over_joints(qd, self.base);
-        change = scaled(&change, h);
-        if NQ > NV {
-            let (q, qd) = self.of_base(q, qd);
-            FLOATING_BASE.mechanics().displacement(q, qd, h, &mut change[self.base..self.base + 7]);
-        }
-        change
+        over_joints(
+            (q, qd),
+            uneven::<_, NQ, NV>(self.joints),
+            |rate| rate * h,
+            |joint, q, qd, change| {
+                joint.displacement(q, qd, h, change);
+            },
+        )
     }
 
-    /// dq/dt: q̇ itself of joints, of a base R v and ½ q ∘ ω.
+    /// dq/dt: q̇ itself of most joints, of a base R v and ½ q ∘ ω.
     fn rate<const NQ: usize, const NV: usize>(&self, q: &[T; NQ], qd: &[T; NV]) -> [T; NQ] {
-        let mut rate = over_joints(qd, self.base);
-        if NQ > NV {
-            let (q, qd) = self.of_base(q, qd);
-            FLOATING_BASE.configuration_rate(q, qd, &mut rate[self.base..self.base + 7]);
+        over_joints(
+            (q, qd),
+            uneven::<_, NQ, NV>(self.joints),
+            |rate| rate,
+            |joint, q, qd, rate| {
+                joint.configuration_rate(q, qd, rate);
+            },
+        )
+    }
+}
+
+/// The mechanics of a joint, and where its coordinates stand.
+struct Place<'a, T> {
+    first: usize,
+    row: &'static Descriptor,
+    mechanics: &'a dyn Mechanics<T>,
+}
+
+/// The joints of a robot with so many coordinates; none where there are as many as rates.
+fn uneven<'a, T: Real + 'a, const NQ: usize, const NV: usize>(
+    joints: &'a [Uneven],
+) -> impl Iterator<Item = Place<'a, T>> {
+    let joints = if NQ == NV { &[] } else { joints };
+    joints.iter().map(|Uneven { kind, first }| Place { first: *first, row: kind.row(), mechanics: kind.mechanics() })
+}
+
+/// What becomes of each rate at the entry of q that it belongs to, and of the rates of each of these joints at its own.
+fn over_joints<'a, T: Real + 'a, const NQ: usize, const NV: usize>(
+    (q, qd): (&[T; NQ], &[T; NV]),
+    joints: impl Iterator<Item = Place<'a, T>>,
+    of_rate: impl Fn(T) -> T,
+    of_joint: impl Fn(&dyn Mechanics<T>, &[T], &[T], &mut [T]),
+) -> [T; NQ] {
+    let mut all = [T::zero(); NQ];
+    let (mut iq, mut iv) = (0, 0);
+    for Place { first, row, mechanics } in joints {
+        while iq < first {
+            all[iq] = of_rate(qd[iv]);
+            (iq, iv) = (iq + 1, iv + 1);
         }
-        rate
+        let (after, beyond) = (iq + row.neutral.len(), iv + row.measures.len());
+        of_joint(mechanics, &q[iq..after], &qd[iv..beyond], &mut all[iq..after]);
+        (iq, iv) = (after, beyond);
     }
-
-    fn of_base<'a, const NQ: usize, const NV: usize>(&self, q: &'a [T; NQ], qd: &'a [T; NV]) -> (&'a [T], &'a [T]) {
-        (&q[self.base..self.base + FLOATING_BASE.nq()], &qd[self.base..self.base + FLOATING_BASE.nv()])
+    for (entry, rate) in all[iq..].iter_mut().zip(&qd[iv..]) {
+        *entry = of_rate(*rate);
     }
+    all
 }
 
-/// The entries of q̇ at those of q that they belong to; what belongs to a base is to be replaced.
-fn over_joints<T: Real, const NQ: usize, const NV: usize>(qd: &[T; NV], base: usize) -> [T; NQ] {
-    let shift = |i: usize| if NQ > NV && i >= base + 7 { i - 1 } else { i };
-    from_fn(|i| if shift(i) < NV { qd[shift(i)] } else { T::zero() })
-}
-
-/// Brings the quaternion of a base back to length one.
-fn normalise<T: Real, const NQ: usize, const NV: usize>(q: &mut [T; NQ], base: usize) {
-    if NQ == NV {
-        return;
-    }
-    let quaternion = &mut q[base + 3..base + 7];
-    let inverse = inverse_length(quaternion);
-    quaternion.iter_mut().for_each(|x| *x = *x * inverse);
+/// Where in q the quaternions of joints stand.
+fn quaternions<const NQ: usize, const NV: usize>(joints: &[Uneven]) -> impl Iterator<Item = Range<usize>> + '_ {
+    let joints = if NQ == NV { &[] } else { joints };
+    joints.iter().filter_map(|joint| {
+        let first = joint.first + joint.kind.row().quaternion?;
+        Some(first..first + 4)
+    })
 }
 
 fn sum<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {
@@ -280,4 +341,90 @@ fn solved<T: Real, const N: usize>(mut a: [[T; N]; N], mut b: [T; N]) -> [T; N] 
         }
     }
     b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::joint::quaternion::{product, quaternion_to_rotation};
+    use crate::joint::Measure;
+    use crate::spatial::{MotionVector, Transform, Vec3};
+
+    /// A made-up kind: a ball joint, whose four coordinates are a unit quaternion and whose three rates ω stand in the body's axes.
+    struct Ball;
+
+    const BALL: Descriptor = Descriptor {
+        name: "ball",
+        measures: &[Measure::Angle; 3],
+        neutral: &[0.0, 0.0, 0.0, 1.0],
+        quaternion: Some(0),
+        is_base: false,
+        ..*FLOATING_BASE.row()
+    };
+
+    fn quaternion(q: &[f64]) -> [f64; 4] {
+        q.try_into().expect("four coordinates")
+    }
+
+    impl Mechanics<f64> for Ball {
+        fn motion(&self, q: &[f64]) -> Transform<f64> {
+            Transform { rotation: quaternion_to_rotation(quaternion(q)), translation: Vec3::zero() }
+        }
+
+        fn column(&self, k: usize, _: &[f64]) -> MotionVector<f64> {
+            let unit: [f64; 3] = from_fn(|i| f64::from(u8::from(i == k)));
+            MotionVector { angular: unit.into(), linear: Vec3::zero() }
+        }
+
+        fn configuration_rate(&self, q: &[f64], qd: &[f64], rate: &mut [f64]) {
+            rate.copy_from_slice(&product(&quaternion(q), &[qd[0], qd[1], qd[2], 0.0]).map(|x| 0.5 * x));
+        }
+
+        fn displacement(&self, q: &[f64], qd: &[f64], h: f64, change: &mut [f64]) {
+            self.configuration_rate(q, qd, change);
+            change.iter_mut().for_each(|x| *x *= h);
+        }
+    }
+
+    fn places(firsts: &[usize]) -> impl Iterator<Item = Place<'static, f64>> + '_ {
+        firsts.iter().map(|first| Place { first: *first, row: &BALL, mechanics: &Ball })
+    }
+
+    /// Two ball joints between joints of one coordinate: (1, 4, 1, 4, 1) coordinates, (1, 3, 1, 3, 1) rates.
+    #[test]
+    fn joints_with_other_coordinates_than_rates_move_as_their_kind_does_wherever_they_stand() {
+        let turned = [0.5, 0.5, 0.5, 0.5];
+        let mut q = [0.0; 11];
+        q[1..5].copy_from_slice(&turned);
+        q[9] = 1.0;
+        let qd = [1.0, 0.0, 0.0, 2.0, 3.0, 4.0, 0.0, 0.0, 5.0];
+        let rate: [f64; 11] = over_joints(
+            (&q, &qd),
+            places(&[1, 6]),
+            |rate| rate,
+            |joint, q, qd, own| {
+                joint.configuration_rate(q, qd, own);
+            },
+        );
+        assert_eq!(rate, [1.0, 0.5, -0.5, 0.5, -0.5, 3.0, 2.0, 0.0, 0.0, 0.0, 5.0]);
+        let change: [f64; 11] = over_joints(
+            (&q, &qd),
+            places(&[1, 6]),
+            |rate| rate * 0.1,
+            |joint, q, qd, own| {
+                joint.displacement(q, qd, 0.1, own);
+            },
+        );
+        assert!(change.iter().zip(rate).all(|(change, rate)| (change - 0.1 * rate).abs() < 1e-16), "{change:?}");
+    }
+
+    /// As many coordinates as rates: what is said of such joints is not read.
+    #[test]
+    fn a_robot_without_such_joints_moves_by_its_rates() {
+        let step = Step { length: 0.5, joints: &[Uneven { kind: FLOATING_BASE, first: 9 }] };
+        assert_eq!(step.displacement(&[0.0; 2], &[1.0, 2.0], 0.5), [0.5, 1.0]);
+        let mut state = State { q: [0.0; 2], qd: [1.0, 2.0] };
+        state.add(&Change { q: [1.0, 1.0], qd: [0.0; 2] }, 9);
+        assert_eq!(state.q, [1.0, 1.0]);
+    }
 }
