@@ -1,0 +1,302 @@
+//! Numbers: sums, products, literals, calls that give one, and entries of arrays.
+
+use super::{Array, Ran, Run, Thing};
+use crate::readback::items::Extent;
+use crate::readback::tokens::{self as t, Kind};
+use crate::readback::values::{Format, Value};
+
+impl<'t> Run<'_, 't> {
+    /// A sum, in the format `of`; `format` is that of the function.
+    pub(super) fn number(&mut self, of: Format, format: Format) -> Ran<Value> {
+        let start = self.at;
+        let mut sum = self.product(of, format)?;
+        while let Kind::Mark(mark @ (b'+' | b'-')) = self.kind() {
+            self.at += 1;
+            let term = self.product(of, format)?;
+            sum = self.values.add(sum, if mark == b'-' { term.negated() } else { term });
+            self.demand(sum, start)?;
+        }
+        Ok(sum)
+    }
+
+    pub(super) fn product(&mut self, of: Format, format: Format) -> Ran<Value> {
+        let start = self.at;
+        let mut product = self.signed(of, format)?;
+        while let Kind::Mark(mark @ (b'*' | b'/')) = self.kind() {
+            self.at += 1;
+            let factor = self.signed(of, format)?;
+            product = match mark {
+                b'*' => self.values.mul(product, factor),
+                _ => self.values.div(product, factor),
+            };
+            self.demand(product, start)?;
+        }
+        Ok(product)
+    }
+
+    /// What the text computes, some program computes.
+    pub(super) fn demand(&self, value: Value, start: usize) -> Ran<()> {
+        if self.values.is_wanted(value) {
+            return Ok(());
+        }
+        let text =
+            &self.items.text[self.items.tokens[start].start as usize..self.items.tokens[self.at - 1].end as usize];
+        self.items.stop(start, format!("no program computes `{text}`"))
+    }
+
+    pub(super) fn signed(&mut self, of: Format, format: Format) -> Ran<Value> {
+        if self.kind() == Kind::Mark(b'-') {
+            self.at += 1;
+            return Ok(self.signed(of, format)?.negated());
+        }
+        self.atom(of, format)
+    }
+
+    pub(super) fn atom(&mut self, of: Format, format: Format) -> Ran<Value> {
+        let start = self.at;
+        let value = match self.kind() {
+            Kind::Number => match of {
+                Format::Any => return self.stop("a number of no format"),
+                of => {
+                    let x = self.literal(of)?;
+                    self.values.constant(x, of)
+                }
+            },
+            Kind::Mark(b'(') => {
+                let close = self.items.tokens[start].closes as usize;
+                let is_cast = self.ahead(1) == Kind::Mark(b'(')
+                    && self.items.kind(self.items.tokens[start + 1].closes as usize + 1) == Kind::Word(t::AS);
+                self.at += 1;
+                if is_cast && (of, format) == (Format::F32, Format::F32) {
+                    self.at += 1;
+                    let value = self.number(Format::F64, format)?;
+                    self.mark(b')')?;
+                    self.items.keyword(&mut self.at, t::AS)?;
+                    self.items.keyword(&mut self.at, t::F32)?;
+                    self.mark(b')')?;
+                    let rounded = self.values.rounded(value);
+                    self.demand(rounded, start)?;
+                    return Ok(rounded);
+                }
+                let value = self.number(of, format)?;
+                self.mark(b')')?;
+                debug_assert!(self.at == close + 1, "an expression ends at its bracket");
+                value
+            }
+            Kind::Word(name) => match self.local(name) {
+                Some(k) => match self.locals[k].thing {
+                    Thing::Number(value) => {
+                        self.at += 1;
+                        value
+                    }
+                    Thing::Wrapped(..) if format == Format::Any => return self.stop("a number of another format"),
+                    Thing::Place(_) | Thing::Wrapped(..) => {
+                        let (cell, ..) = self.cell()?;
+                        match self.cells[cell] {
+                            Value::NONE => return self.items.stop(start, "a result is read"),
+                            value => value,
+                        }
+                    }
+                    Thing::Declared(_) => return self.stop("a local without a value"),
+                    _ => return self.stop("something that is not a number"),
+                },
+                None => self.call_of_number(name, of, format)?,
+            },
+            _ => return self.stop("a number is expected here"),
+        };
+        if self.values.format(value) != of {
+            return self.items.stop(start, "a number of another format");
+        }
+        Ok(value)
+    }
+
+    /// A number as it is written, in this format.
+    pub(super) fn literal(&mut self, of: Format) -> Ran<f64> {
+        let text = self.items.text_of(self.at);
+        let (digits, suffix) = match text.split_once('_') {
+            Some((digits, suffix)) => (digits, Some(suffix)),
+            None => (text, None),
+        };
+        let is_float = digits.contains(['.', 'e']);
+        let fits = match suffix {
+            None => true,
+            Some("f32") => of == Format::F32,
+            Some("f64") => of == Format::F64,
+            Some(_) => false,
+        };
+        let number = match of {
+            Format::F32 => digits.parse::<f32>().ok().map(f64::from),
+            _ => digits.parse::<f64>().ok(),
+        };
+        match number.filter(|x| is_float && fits && x.is_finite()) {
+            Some(x) => {
+                self.at += 1;
+                Ok(x)
+            }
+            None => self.stop("a number of another kind"),
+        }
+    }
+
+    /// A call, or a path, whose value is a number.
+    pub(super) fn call_of_number(&mut self, name: u32, of: Format, format: Format) -> Ran<Value> {
+        let start = self.at;
+        match name {
+            t::FMA | t::FMA_IF => {
+                self.at += 1;
+                let told = name == t::FMA_IF;
+                if told {
+                    self.told_whether_to_fuse()?;
+                }
+                if !self.known.fused[1 + usize::from(told)] {
+                    return self.items.stop(start, "a name that stands for nothing here");
+                }
+                self.mark(b'(')?;
+                let a = self.number(of, format)?;
+                self.mark(b',')?;
+                let b = self.number(of, format)?;
+                let product = self.values.mul(a, b);
+                self.demand(product, start)?;
+                self.mark(b',')?;
+                let c = self.number(of, format)?;
+                self.mark(b')')?;
+                let sum = self.values.add(product, c);
+                self.demand(sum, start)?;
+                Ok(sum)
+            }
+            // a caller's scalar
+            t::T if format == Format::Any && self.known.generic && self.ahead(3) == Kind::Word(t::ZERO) => {
+                self.at += 1;
+                self.mark(b':')?;
+                self.mark(b':')?;
+                self.at += 1;
+                self.mark(b'(')?;
+                self.mark(b')')?;
+                Ok(self.values.long(0.0, 0.0))
+            }
+            t::T if format == Format::Any && self.known.generic && self.ahead(3) == Kind::Word(t::CONSTANT) => {
+                // T::constant(Dd::from(f64::from(body.0[3])))
+                self.at += 1;
+                self.mark(b':')?;
+                self.mark(b':')?;
+                self.at += 1;
+                self.mark(b'(')?;
+                for word in [t::DD, t::F64] {
+                    self.items.keyword(&mut self.at, word)?;
+                    self.mark(b':')?;
+                    self.mark(b':')?;
+                    self.items.keyword(&mut self.at, t::FROM)?;
+                    self.mark(b'(')?;
+                }
+                let (cell, _, mutable) = self.cell()?;
+                (0..3).try_for_each(|_| self.mark(b')'))?;
+                if mutable {
+                    return self.items.stop(start, "a constant that may change");
+                }
+                Ok(self.cells[cell])
+            }
+            t::NUMBER if format == Format::Any && self.known.generic => {
+                self.at += 1;
+                self.mark(b':')?;
+                self.mark(b':')?;
+                self.mark(b'<')?;
+                self.items.keyword(&mut self.at, t::T)?;
+                self.mark(b'>')?;
+                self.mark(b'(')?;
+                let high = self.signed_literal()?;
+                self.mark(b',')?;
+                let low = self.signed_literal()?;
+                self.mark(b')')?;
+                Ok(self.values.long(high, low))
+            }
+            // f64::from(x), of x in f32
+            t::F64 if (of, format) == (Format::F64, Format::F32) => {
+                self.at += 1;
+                self.mark(b':')?;
+                self.mark(b':')?;
+                self.items.keyword(&mut self.at, t::FROM)?;
+                self.mark(b'(')?;
+                // numbers alone would be of f64; beside a value they have its format
+                if self.begins_with_a_number() && !self.names_a_value() {
+                    return self.stop("a number of no format");
+                }
+                let value = self.number(Format::F32, format)?;
+                self.mark(b')')?;
+                let widened = self.values.widened(value);
+                self.demand(widened, start)?;
+                Ok(widened)
+            }
+            t::TRIG | t::T if self.ahead(1) == Kind::Mark(b':') => {
+                let function = self.kernel(of)?;
+                self.mark(b'(')?;
+                let a = self.number(of, format)?;
+                self.mark(b')')?;
+                let value = match function {
+                    "sqrt" => self.values.sqrt(a),
+                    "sign" => self.values.sign(a),
+                    _ => return self.items.stop(start, "a function that gives no number"),
+                };
+                self.demand(value, start)?;
+                Ok(value)
+            }
+            _ => self.stop("a name that stands for nothing here"),
+        }
+    }
+
+    pub(super) fn signed_literal(&mut self) -> Ran<f64> {
+        let negative = self.kind() == Kind::Mark(b'-');
+        self.at += usize::from(negative);
+        if self.kind() != Kind::Number {
+            return self.stop("a number is expected here");
+        }
+        let x = self.literal(Format::F64)?;
+        Ok(if negative { -x } else { x })
+    }
+
+    /// `q[3]`, `h[2][lane]`, `body.0[7]`: its cell, its format, and whether it may be written.
+    pub(super) fn cell(&mut self) -> Ran<(usize, Format, bool)> {
+        let start = self.at;
+        let name = self.word()?;
+        let Some(k) = self.local(name) else {
+            return self.items.stop(start, "a name that stands for nothing here");
+        };
+        let place = match self.locals[k].thing {
+            Thing::Place(place) => place,
+            Thing::Wrapped(_, place) => {
+                self.mark(b'.')?;
+                if self.integer()? != 0 {
+                    return self.items.stop(start, "a field that is not there");
+                }
+                place
+            }
+            _ => return self.items.stop(start, "something without indices"),
+        };
+        let Array { first, ref extents, format } = self.arrays[place.array as usize];
+        let mut cell = 0;
+        let mut at = self.at;
+        for extent in extents {
+            self.items.mark(&mut at, b'[')?;
+            match (*extent, self.items.kind(at)) {
+                (Extent::Of(n), Kind::Number) => {
+                    let index = self.items.integer(&mut at)?;
+                    if index >= n {
+                        return self.items.stop(at - 1, "an index beyond the end");
+                    }
+                    cell = cell * n + index;
+                }
+                (extent, Kind::Word(name)) => {
+                    let thing = self.local(name).map(|k| self.locals[k].thing);
+                    match (extent, thing) {
+                        (Extent::Of(n), Some(Thing::Index(index))) if index < n => cell = cell * n + index,
+                        (Extent::Lanes, Some(Thing::Lane)) => {}
+                        _ => return self.items.stop(at, "an index of another kind"),
+                    }
+                    at += 1;
+                }
+                _ => return self.items.stop(at, "an index is expected here"),
+            }
+            self.items.mark(&mut at, b']')?;
+        }
+        self.at = at;
+        Ok((first as usize + cell, format, place.mutable))
+    }
+}

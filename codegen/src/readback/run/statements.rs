@@ -1,0 +1,329 @@
+//! Statements: locals, arrays, assignments, loops and calls that fill arrays.
+
+use super::{count_of, Array, Place, Ran, Run, Thing, LONGEST};
+use crate::readback::items::{Extent, Function, Sort, Type};
+use crate::readback::tokens::{self as t, Kind};
+use crate::readback::values::{Format, Value};
+
+impl<'t> Run<'_, 't> {
+    /// `{ … }`
+    pub(super) fn block(&mut self, function: &Function, format: Format) -> Ran<()> {
+        let count = self.locals.len();
+        let end = self.items.tokens[self.at].closes as usize;
+        self.mark(b'{')?;
+        while self.at < end {
+            match self.kind() {
+                Kind::Word(t::LET) => {
+                    self.at += 1;
+                    self.let_(format)?;
+                }
+                Kind::Word(t::STATIC) => {
+                    self.at += 1;
+                    self.array_of_limbs(format, true)?;
+                }
+                Kind::Word(t::FOR) => self.for_(function, format)?,
+                Kind::Word(name) => {
+                    let is_local = self.local(name).is_some();
+                    match self.ahead(1) {
+                        Kind::Mark(b'=') => self.assign_local(name, format)?,
+                        Kind::Mark(b'[') if is_local => self.assign_place(format)?,
+                        Kind::Mark(b'(' | b':') if !is_local => self.statement_call(function, end)?,
+                        _ => return self.stop("a statement that is not known"),
+                    }
+                }
+                _ => return self.stop("a statement that is not known"),
+            }
+        }
+        for local in &self.locals[count..] {
+            let Thing::Place(Place { array, mutable: true, reference: false }) = local.thing else { continue };
+            let Array { first, ref extents, .. } = self.arrays[array as usize];
+            let cells = first as usize..first as usize + count_of(extents);
+            if self.written[cells].contains(&0) {
+                return self.items.stop(end, "an array has a number that nothing puts there");
+            }
+        }
+        self.at = end + 1;
+        self.unbind(count);
+        Ok(())
+    }
+
+    pub(super) fn assign_local(&mut self, name: u32, format: Format) -> Ran<()> {
+        let Some(k) = self.local(name) else { return self.stop("a name that stands for nothing here") };
+        let Thing::Declared(of) = self.locals[k].thing else {
+            return self.stop("a second value of a local, or of something that takes none");
+        };
+        self.at += 2;
+        let value = self.number(of, format)?;
+        // no statement declares locals on its way
+        self.locals[k].thing = Thing::Number(value);
+        self.mark(b';')
+    }
+
+    pub(super) fn assign_place(&mut self, format: Format) -> Ran<()> {
+        let start = self.at;
+        let (cell, of, mutable) = self.cell()?;
+        if !mutable {
+            return self.items.stop(start, "a value is put where none may be");
+        }
+        self.mark(b'=')?;
+        let value = self.number(of, format)?;
+        self.cells[cell] = value;
+        self.written[cell] = start as u32;
+        self.mark(b';')
+    }
+
+    /// `name_part2(q, &mut live, tau);`, or the same as the last thing of a function.
+    pub(super) fn statement_call(&mut self, function: &Function, end: usize) -> Ran<()> {
+        let start = self.at;
+        let name = self.word()?;
+        let Some(item) = self.items.named.get(&(self.module, Sort::Function, name)).copied() else {
+            return self.items.stop(start, "a call of something that is not known");
+        };
+        let mut given = Vec::new();
+        if self.kind() == Kind::Mark(b':') {
+            self.mark(b':')?;
+            self.mark(b':')?;
+            self.mark(b'<')?;
+            loop {
+                let word = self.word()?;
+                let fused_of_file = word == t::FUSED && self.known.fused[2];
+                if !(function.generics.contains(&word) || fused_of_file) {
+                    return self.items.stop(self.at - 1, "a name that stands for nothing here");
+                }
+                given.push(word);
+                if self.kind() != Kind::Mark(b',') {
+                    break;
+                }
+                self.at += 1;
+            }
+            self.mark(b'>')?;
+        }
+        let called = self.signature(item)?;
+        // what is not given follows from the arguments: the number of lanes, the scalar
+        let follows = given.is_empty() && !called.generics.contains(&t::FUSED);
+        if !follows && given != called.generics {
+            return self.items.stop(start, "other generic arguments than the function has parameters");
+        }
+        self.mark(b'(')?;
+        let mut arguments = Vec::new();
+        while self.kind() != Kind::Mark(b')') {
+            arguments.push(self.argument()?);
+            if self.kind() != Kind::Mark(b')') {
+                self.mark(b',')?;
+            }
+        }
+        self.at += 1;
+        let behind = self.at;
+        self.at = start;
+        self.call(item, &arguments)?;
+        self.at = behind;
+        if self.at < end {
+            self.mark(b';')?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn argument(&mut self) -> Ran<Thing> {
+        let mut reference = None;
+        if self.kind() == Kind::Mark(b'&') {
+            self.at += 1;
+            let mutable = self.kind() == Kind::Word(t::MUT);
+            self.at += usize::from(mutable);
+            reference = Some(mutable);
+        }
+        let start = self.at;
+        let name = self.word()?;
+        let Some(k) = self.local(name) else {
+            return self.items.stop(start, "a name that stands for nothing here");
+        };
+        match (self.locals[k].thing, reference) {
+            (Thing::Place(place), Some(mutable)) if !place.reference && (place.mutable || !mutable) => {
+                Ok(Thing::Place(Place { mutable, reference: true, ..place }))
+            }
+            (thing @ (Thing::Place(_) | Thing::Wrapped(..)), None) => Ok(thing),
+            _ => self.items.stop(start, "an argument that is not known"),
+        }
+    }
+
+    /// Behind `let`.
+    pub(super) fn let_(&mut self, format: Format) -> Ran<()> {
+        match self.kind() {
+            Kind::Mark(b'[') => {
+                self.at += 1;
+                self.pattern()?;
+                let names = std::mem::take(&mut self.names);
+                self.mark(b':')?;
+                let start = self.at;
+                let Type::Array(extents, of) = self.items.type_of(&mut self.at, format)? else {
+                    return self.items.stop(start, "an array is expected here");
+                };
+                if extents != [Extent::Of(names.len())] {
+                    return self.items.stop(start, "as many names as numbers are expected here");
+                }
+                if self.kind() == Kind::Mark(b';') {
+                    self.at += 1;
+                    names.iter().for_each(|name| self.bind(*name, Thing::Declared(of)));
+                } else {
+                    self.mark(b'=')?;
+                    let values = self.list(of, format)?;
+                    self.bind_all(&names, &values)?;
+                    self.mark(b';')?;
+                }
+                self.names = names;
+                Ok(())
+            }
+            Kind::Mark(b'(') => self.sines(format),
+            Kind::Word(t::MUT) => {
+                self.at += 1;
+                self.array_to_fill(format)
+            }
+            Kind::Word(name) => {
+                if self.ahead(1) == Kind::Mark(b':') && self.ahead(2) == Kind::Mark(b'[') {
+                    return self.array_of_limbs(format, false);
+                }
+                self.at += 1;
+                self.mark(b':')?;
+                let start = self.at;
+                let Type::Number(of) = self.items.type_of(&mut self.at, format)? else {
+                    return self.items.stop(start, "the type of a number is expected here");
+                };
+                self.mark(b';')?;
+                self.bind(name, Thing::Declared(of));
+                Ok(())
+            }
+            _ => self.stop("a local that is not known"),
+        }
+    }
+
+    /// Names up to `]`, into `self.names`.
+    pub(super) fn pattern(&mut self) -> Ran<()> {
+        self.names.clear();
+        loop {
+            let name = self.word()?;
+            if name != t::UNDERSCORE && self.names.contains(&name) {
+                return self.items.stop(self.at - 1, "a second local of that name");
+            }
+            self.names.push(name);
+            if self.kind() == Kind::Mark(b']') {
+                self.at += 1;
+                return Ok(());
+            }
+            self.mark(b',')?;
+        }
+    }
+
+    pub(super) fn bind_all(&mut self, names: &[u32], values: &[Value]) -> Ran<()> {
+        if names.len() != values.len() {
+            return self.stop("as many names as numbers are expected here");
+        }
+        for (name, value) in names.iter().zip(values) {
+            if *name != t::UNDERSCORE {
+                self.bind(*name, Thing::Number(*value));
+            }
+        }
+        Ok(())
+    }
+
+    /// `live = [q[0]; 12];`, `forces = [T::zero(); 4];`, `live = [[0.0; N]; 12];` behind `let mut`.
+    pub(super) fn array_to_fill(&mut self, format: Format) -> Ran<()> {
+        let name = self.word()?;
+        self.mark(b'=')?;
+        self.mark(b'[')?;
+        let lanes = self.kind() == Kind::Mark(b'[');
+        self.at += usize::from(lanes);
+        let start = self.at;
+        let value = self.number(format, format)?;
+        if value != self.zero(format) && self.first_given() != Some(value) {
+            return self
+                .items
+                .stop(start, "an array begins with zeros, or the first number that the function is given");
+        }
+        if lanes {
+            self.mark(b';')?;
+            self.items.keyword(&mut self.at, t::N)?;
+            self.mark(b']')?;
+        }
+        self.mark(b';')?;
+        let n = self.integer()?;
+        self.mark(b']')?;
+        self.mark(b';')?;
+        if n > self.items.text.len() {
+            return self.stop("an array that is too long");
+        }
+        let extents = [Extent::Of(n), Extent::Lanes];
+        let place = self.array(&extents[..1 + usize::from(lanes)], format, &vec![value; n], true);
+        self.bind(name, Thing::Place(Place { reference: false, ..place }));
+        Ok(())
+    }
+
+    /// `x1: [f64; 4] = [a, b, c, d];` behind `let` or `static`.
+    pub(super) fn array_of_limbs(&mut self, format: Format, is_static: bool) -> Ran<()> {
+        let name = self.word()?;
+        self.mark(b':')?;
+        let start = self.at;
+        let Type::Array(extents, of) = self.items.type_of(&mut self.at, format)? else {
+            return self.items.stop(start, "an array is expected here");
+        };
+        self.mark(b'=')?;
+        let first = self.at;
+        let values = self.list(of, format)?;
+        let is_name = |at: usize| matches!(self.items.kind(at), Kind::Word(_));
+        if is_static && (first..self.at).any(is_name) {
+            return self.items.stop(first, "what is static knows no locals");
+        }
+        if extents != [Extent::Of(values.len())] {
+            return self.items.stop(start, "an array of another length");
+        }
+        self.mark(b';')?;
+        let place = self.array(&extents, of, &values, false);
+        self.bind(name, Thing::Place(Place { reference: false, ..place }));
+        Ok(())
+    }
+
+    /// `[a, b, c]`
+    pub(super) fn list(&mut self, of: Format, format: Format) -> Ran<Vec<Value>> {
+        let mut values = Vec::new();
+        self.mark(b'[')?;
+        while self.kind() != Kind::Mark(b']') {
+            values.push(self.number(of, format)?);
+            if self.kind() != Kind::Mark(b']') {
+                self.mark(b',')?;
+            }
+        }
+        self.at += 1;
+        Ok(values)
+    }
+
+    /// `for limb in 0..4 { … }`, `for lane in 0..N { … }`
+    pub(super) fn for_(&mut self, function: &Function, format: Format) -> Ran<()> {
+        self.at += 1;
+        let name = self.word()?;
+        self.items.keyword(&mut self.at, t::IN)?;
+        let start = self.at;
+        if self.integer()? != 0 {
+            return self.items.stop(start, "a loop that does not begin at 0");
+        }
+        self.mark(b'.')?;
+        self.mark(b'.')?;
+        let count = self.locals.len();
+        if self.kind() == Kind::Word(t::N) && function.generics.contains(&t::N) {
+            self.at += 1;
+            self.bind(name, Thing::Lane);
+            self.block(function, format)?;
+            self.unbind(count);
+            return Ok(());
+        }
+        let turns = self.integer()?;
+        if !(1..=LONGEST).contains(&turns) {
+            return self.items.stop(start, "a loop of that length");
+        }
+        let body = self.at;
+        for turn in 0..turns {
+            self.at = body;
+            self.bind(name, Thing::Index(turn));
+            self.block(function, format)?;
+            self.unbind(count);
+        }
+        Ok(())
+    }
+}
