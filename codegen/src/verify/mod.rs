@@ -75,10 +75,9 @@ impl Verification {
     }
 }
 
-/// The greatest scaled error that passes: 2^13 roundings. Trees of 40 bodies stay below a hundred; the smallest wrong
-/// term that matters is far above.
+/// The greatest scaled error that passes: 2^11 roundings. A few are usual; the smallest wrong term that matters is far above.
 pub fn bound(scalar: Scalar) -> f64 {
-    8192.0 * scalar.unit()
+    2048.0 * scalar.unit()
 }
 
 /// Compares the programs of a robot with the reference, which reads `source` on its own. `tick` is called after every
@@ -200,7 +199,7 @@ impl At<'_> {
     fn truth(&self, case: &Case, function: Function) -> Result<Option<Vec<(Dd, f64)>>, String> {
         let (scene, model) = (&case.options.scene, &self.model);
         let names = scene.frames_of(function, case.frames);
-        let mut chapter = self.chapter.clone().with_frames(&names)?;
+        let mut chapter = self.chapter.clone().with_frames(names)?;
         if case.coordinates.are_all() {
             chapter = chapter.with_drives(model);
         }

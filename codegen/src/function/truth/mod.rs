@@ -159,8 +159,8 @@ impl Effect {
     }
 }
 
-/// An inertia that is so small a part of what it would be if nothing cancelled, is rounding noise.
-const NOISE: f64 = 1e-6;
+/// An inertia that is so small a part of what it is made of, is rounding noise.
+const NOISE: f64 = 1e-3;
 
 impl super::Function {
     /// What errors of the results of a truth are compared with.

@@ -14,8 +14,8 @@ impl Truth for Energy {
         for effect in at.effects {
             let [inertia, stiffness, rest] = [effect.inertia, effect.stiffness, effect.rest].map(Magnitude::new);
             let (rate, stretch) = (at.qd()[effect.iv], at.q()[effect.iq] - rest);
-            kinetic = kinetic + inertia * rate * rate * half;
-            potential = potential + stiffness * stretch * stretch * half;
+            kinetic += inertia * rate * rate * half;
+            potential += stiffness * stretch * stretch * half;
         }
         Some(vec![kinetic, potential])
     }
