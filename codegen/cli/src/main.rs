@@ -26,7 +26,7 @@ use std::process::ExitCode;
 use straightline_cli::html;
 use straightline_codegen::compile::{compile, explain};
 use straightline_codegen::diagnostic::{self, codes, Diagnostics, Severity, Source};
-use straightline_codegen::emit::{c_package as export, Generated};
+use straightline_codegen::emit::{rust::c_package as export, Generated};
 use straightline_codegen::options::{check_options, scene_file, Options, SceneFile};
 use straightline_codegen::{description, identifier, model, output, scene, verify};
 

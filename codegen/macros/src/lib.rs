@@ -12,8 +12,8 @@ use quote::{quote, quote_spanned};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use straightline_codegen::fronts::expansion::{examine, expand, needs_a_module, Expansion, Refusal, SceneOf};
-use straightline_codegen::fronts::stubs;
+use straightline_codegen::emit::rust::stubs;
+use straightline_codegen::fronts::expansion::{examine, expand, Expansion, Refusal, SceneOf};
 use straightline_codegen::{Function, Generated, Options};
 use syn::{parse_macro_input, DeriveInput, Error};
 
@@ -49,7 +49,7 @@ pub fn derive_dynamics(input: TokenStream) -> TokenStream {
         None => quote! { const _: () = { #[allow(dead_code)] mod dynamics { #items } #associated }; },
     };
     let Compiled { result, scene, robot, trackers } = compiled(&arguments);
-    let result = result.and_then(|made| match arguments.module.is_none() && needs_a_module(&made.0) {
+    let result = result.and_then(|made| match arguments.module.is_none() && made.0.needs_a_module() {
         true => Err(vec![Error::new(arguments.place(), NEEDS_A_MODULE)]),
         false => Ok(made),
     });

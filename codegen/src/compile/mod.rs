@@ -7,7 +7,7 @@ pub use prepare::examine;
 use crate::description::{messages, Description};
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
 use crate::emit::generated::generate;
-use crate::emit::{self, Generated};
+use crate::emit::Generated;
 use crate::equations::Robot;
 use crate::function::Function;
 use crate::options::stable::fnv_1a;
@@ -52,14 +52,13 @@ pub fn explain(source: &Source, options: &Options) -> Result<Generated, Diagnost
 }
 
 fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
-    let mut generated = compile_in_one_scalar(source, options, explained)?;
-    for &scalar in &options.also {
-        let options = Options { scalar, also: Vec::new(), ..options.clone() };
-        let other = compile_in_one_scalar(source, &options, explained)?;
-        generated.text.push_str(&emit::scalar_module(scalar, &other.text));
-        generated.others.push(other);
-    }
-    readback::checked(generated)
+    let generated = compile_in_one_scalar(source, options, explained)?;
+    let other = |scalar: &Scalar| {
+        let options = Options { scalar: *scalar, also: Vec::new(), ..options.clone() };
+        compile_in_one_scalar(source, &options, explained)
+    };
+    let others: Result<Vec<Generated>, _> = options.also.iter().map(other).collect();
+    readback::checked(generated.with_others(others?))
 }
 
 fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {

@@ -1,9 +1,11 @@
 //! What is said above every function.
 
-use crate::function::{Function, Output, Quantity};
+use crate::function::{ContactFunction, Function, Output, Quantity};
 use crate::identifier;
+use crate::program::contact::Mode;
 use crate::scene::{Parameter, Part, Scene};
-use straightline_graph::expr::Port;
+use std::fmt::Write;
+use straightline_graph::expr::{Graph, Port};
 
 impl Function {
     /// Its documentation in generated code, for the inputs that a scene leaves it.
@@ -37,4 +39,97 @@ impl Function {
         }
         doc
     }
+}
+
+/// What is said above a function of a contact mode.
+pub(super) fn of_contact(function: ContactFunction, (mode, scene): (&Mode, &Scene), ports: &Graph) -> String {
+    let summary = match function {
+        ContactFunction::ConstrainedCoordinates => "The constrained coordinates s^c, with s̈ = J q̈ + A, (20.86).",
+        ContactFunction::FreeCoordinates => "The free coordinates s^f, with s̈ = J q̈ + A, (20.85).",
+        ContactFunction::ForwardDynamics => {
+            "Motion and reactions in contact: H q̈ + h = τ + Jᵀ F, s̈^c = J q̈ + A, (20.88)-(20.89)."
+        }
+        ContactFunction::DrivenForwardDynamics => {
+            "Motion and reactions in contact under the inputs of the drives: H* q̈ + h* = D u + Jᵀ F, s̈^c = J q̈ + A, (20.72) with \
+             (20.88)-(20.89)."
+        }
+        ContactFunction::InverseDynamics => {
+            "Drives of a wanted motion along s^f and of wanted reactions: hybrid feed-forward. Of the motions that do it, the \
+             one nearest to `qdd` in kinetic energy is taken."
+        }
+        ContactFunction::Impact => "Impact when the contacts of the mode close, (20.90)-(20.91), (20.95)-(20.97).",
+        ContactFunction::Projection => {
+            "The correction of q, by velocity coordinate, that takes s^c away to first order and moves the least mass. Apply \
+             it, and then `impact` with restitution 0 to the velocities, against drift."
+        }
+    };
+    let of_scene = |name: &str| scene.parameters.iter().find(|p| p.input_name() == name).map(Parameter::in_words);
+    let mut doc = format!("{summary}\n\nMode `{}`.\n\n", identifier::doc(&mode.name));
+    for port in ports.inputs.iter().chain(&ports.outputs) {
+        let name = port.name.as_str();
+        let suffix = |s: &str| name.ends_with(s);
+        let text = match name {
+            "q" => "configuration \\[rad or m\\]",
+            "qd" => "velocities \\[rad/s or m/s\\]",
+            "tau" => "generalized forces \\[N·m or N\\]",
+            "x" => "state of the drives, as of `driven_forward_dynamics` of the robot",
+            "u" => "inputs of the drives \\[V, or as in the robot file\\]",
+            "xd" => "derivative of the drives' state, in the order of x",
+            "gravity" => "acceleration due to gravity in the world \\[m/s²\\]",
+            "qdd" => "accelerations \\[rad/s² or m/s²\\]",
+            "force" => "reactions F along s^c \\[N, or N·m of an axis\\]",
+            "sdd" => "s̈^c \\[m/s² or 1/s²\\]",
+            "sdd_free" => "wanted s̈^f \\[m/s² or 1/s²\\]",
+            "violation" => "s̈^c less what it should be; zero where the object gives way",
+            "pivot" => {
+                "least pivot against its diagonal entry: 1 for independent constraints, about 1e-12 for redundant ones"
+            }
+            "s" => "coordinates \\[m, or cosine\\]",
+            "sd" => "their rates \\[m/s or 1/s\\]",
+            "j" => "Jacobian, a row per coordinate",
+            "a" => "adjoint vector A \\[m/s² or 1/s²\\]",
+            "dqd" => "changes of the velocities \\[rad/s or m/s\\]",
+            "impulse" => "impulses F Δt along s^c \\[N·s or N·m·s\\]",
+            "dsd" => "changes of ṡ^c \\[m/s or 1/s\\]",
+            "energy_loss" => "kinetic energy lost by robot, rotors and struck masses \\[J\\]",
+            "restitution" => "coefficient of restitution: 0 plastic, 1 elastic",
+            "dq" => "correction by velocity coordinate \\[rad or m\\]",
+            _ if suffix("_axes") => "tool axis and an axis across it, unit vectors in the frame",
+            _ if suffix("_pose") => "the object in the world: origin \\[m\\], then its axes X, Y, Z",
+            _ if suffix("_velocity") => "of the object's origin \\[m/s\\], then angular \\[rad/s\\], world axes",
+            _ if suffix("_acceleration") => "of the object's origin \\[m/s²\\], then angular \\[rad/s²\\], world axes",
+            _ if suffix("_environment") => "numbers of the environment, in the order of the scene's documentation",
+            _ if suffix("_own") => "the object's own coordinate and its rate \\[m, m/s\\]",
+            _ if suffix("_own_rate") => "their rates \\[m/s, m/s²\\]",
+            _ if suffix("_struck") => "velocity of the struck mass along pz before \\[m/s\\]",
+            _ if suffix("_struck_after") => "its velocity after \\[m/s\\]",
+            _ => &of_scene(name).unwrap_or_default(),
+        };
+        let _ = writeln!(doc, "* `{name}`: {text}");
+    }
+    doc
+}
+
+/// The name of a function over lanes.
+pub(super) fn lanes_name(name: &str) -> String {
+    format!("{name}_lanes")
+}
+
+/// What stands above the function over lanes.
+pub(super) fn lanes_doc(name: &str) -> String {
+    format!(
+        "[`{name}`] of `N` states at once: every number there is an array here, with a number per state.\n\n\
+         Each state gets the bits that it gets alone. The body becomes part of its caller, compiled for the caller's\n\
+         instructions; 8 lanes of f64 fill an AVX-512 register, 4 an AVX one."
+    )
+}
+
+/// The same text with its links, ``[`FRAME_NAMES`]``, as they are called elsewhere.
+pub(super) fn relinked(text: &str, link: &dyn Fn(&str) -> String) -> String {
+    let mut parts = text.split("[`");
+    let first = parts.next().unwrap_or_default().to_string();
+    parts.fold(first, |out, part| match part.split_once("`]") {
+        Some((name, rest)) => out + &link(name) + rest,
+        None => out + "[`" + part,
+    })
 }

@@ -1,30 +1,29 @@
-//! The functions and constants of rounding errors as text.
+//! The functions that bound rounding errors at a state.
 
-use crate::emit::{self, number, Style};
+use crate::emit::module::Bound;
+use crate::emit::target::Target;
+use crate::emit::{Lowering, Style};
 use crate::options::Options;
+use crate::program::companion::StateBound;
 use crate::program::written::Written;
-use crate::report::errors::{four_digits, ErrorReport, OutputErrors};
+use crate::report::errors::{ErrorReport, OutputErrors};
 use std::fmt::Write;
-use straightline_graph::expr::{Graph, Port};
+use straightline_graph::expr::Graph;
 use straightline_graph::schedule::schedule;
-use straightline_graph::Scalar;
 
 /// What a caller must know of a bound at a state.
 const OF_STATE: &str = "Inputs below the normal numbers are to be given as zero where the machine reads them so.";
 
-/// The source of `…_error_bound`, or a comment that says why there is none.
-pub(crate) fn error_bound_text(
-    bound: Result<Graph, &'static str>,
+/// The function `…_error_bound`, or why there is none.
+pub(super) fn error_bound(
+    bound: StateBound,
     (name, by_residual): (&str, bool),
     graph: &Graph,
-    options: &Options,
+    (options, target): (&Options, &dyn Target),
     written: &mut Vec<Written>,
-) -> emit::FunctionText {
+) -> Bound {
     let scalar = graph.widest(options.scalar);
-    let bound = match bound {
-        Ok(bound) => bound,
-        Err(why) => return emit::FunctionText::remark(&format!("No `{name}_error_bound`: {why}.")),
-    };
+    let bound = bound.map_err(|why| format!("No `{name}_error_bound`: {why}."))?;
     let mut doc = match by_residual {
         false => format!(
             "How far the results of [`{name}`] can be from the exact values by rounding, at these inputs: certified for this state, \
@@ -50,54 +49,17 @@ pub(crate) fn error_bound_text(
         let (wider, scalar) = (scalar.name(), options.scalar.name());
         let _ = write!(doc, " In {wider}, of the function in {scalar}: convert its inputs.");
     }
-    let schedule = schedule(&bound, options.limits);
+    let lowering = Lowering { style: Style::plain(scalar), target, title: &|_| String::new() };
     let name = format!("{name}_error_bound");
-    let text = emit::function(&bound, &schedule, &name, &doc, Style::plain(scalar), &|_| String::new());
+    let routine = lowering.routine(&bound, &schedule(&bound, options.limits), &name, &doc);
     written.push(Written { name, graph: bound, scalar, generic: false, lanes: false });
-    text
+    Ok(routine)
 }
 
 impl ErrorReport {
-    /// The constants of a function in the generated file.
-    pub fn constants(&self, function: &str) -> String {
-        let mut out = String::new();
-        if let Some(refused) = self.refused {
-            let _ = writeln!(out, "// No certified bound of the errors of {function}: {refused}.");
-        }
-        for output in &self.outputs {
-            let name = self.constant_name(function, output);
-            let _ = writeln!(
-                out,
-                "/// Certified bound of the errors of [`{function}`]: how far `{}` can be from the exact dynamics of the robot file.\n///\n\
-                 /// Numbers of the file are the nearest f64; angles that were taken as exact are exact.",
-                output.name
-            );
-            let _ = writeln!(out, "///\n/// It holds for all inputs in these ranges:");
-            for line in &self.ranges {
-                let _ = writeln!(out, "/// * {}", line.replace('[', "\\[").replace(']', "\\]"));
-            }
-            let kind = Port::new(&output.name, &output.shape);
-            let kind = crate::emit::array_type(&kind, crate::emit::Scalar::F64);
-            let mut bounds = output.bounds.iter();
-            let values = nested(&output.shape, &mut bounds);
-            let _ = writeln!(out, "#[allow(clippy::all)]\npub const {name}: {kind} = {values};");
-        }
-        out
-    }
-
     /// The name of an output's constant.
     pub fn constant_name(&self, function: &str, output: &OutputErrors) -> String {
         let output = if self.outputs.len() == 1 { String::new() } else { format!("_{}", output.name.to_uppercase()) };
         format!("{}{output}_ERROR_BOUND", function.to_uppercase())
-    }
-}
-
-fn nested<'a>(shape: &[usize], numbers: &mut impl Iterator<Item = &'a f64>) -> String {
-    match shape.split_first() {
-        None => numbers.next().map_or(String::new(), |x| number(four_digits(*x), Scalar::F64)),
-        Some((n, rest)) => {
-            let parts: Vec<String> = (0..*n).map(|_| nested(rest, numbers)).collect();
-            format!("[{}]", parts.join(", "))
-        }
     }
 }

@@ -1,11 +1,14 @@
 //! What the compiler makes of a robot file: from programs to text.
 
+use super::contact::{contact, ContactModule};
+use super::doc::{lanes_doc, lanes_name};
+use super::error_bound::error_bound;
+use super::module::{Item, ModeModule, ParameterType, StagedModule};
+use super::parameter::parameter_types;
+use super::staged::staged;
+use super::{rust, Lowering, Routine, Style};
 use crate::choices::Lanes;
 use crate::diagnostic::{Diagnostic, Diagnostics};
-use crate::emit::error_bound::error_bound_text;
-use crate::emit::parameter::parameter_types;
-use crate::emit::staged::staged;
-use crate::emit::{self, Item, Provenance, Style};
 use crate::equations::Robot;
 use crate::function::Judged;
 use crate::identifier::file_name;
@@ -17,12 +20,26 @@ use crate::program::Program;
 use crate::report::errors::ErrorReport;
 use crate::report::waterfall::Waterfall;
 use crate::report::{FunctionReport, Report};
-use crate::scene::{self, Parameter};
+use crate::scene::{self, Parameter, Scene};
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
 use straightline_core::Dd;
-use straightline_graph::expr::Section;
+use straightline_graph::expr::{Graph, Section};
+use straightline_graph::schedule::Schedule;
 use straightline_graph::{certify, Scalar};
+
+/// Where a file came from, for its header.
+#[derive(Clone, Debug)]
+pub struct Provenance {
+    /// Path of the robot file, as the user wrote it.
+    pub source: String,
+    /// Hash of everything that the output depends on.
+    pub hash: u64,
+    /// What the reader of the file should know: special angles taken as exact, warnings.
+    pub remarks: Vec<String>,
+    /// The ranges of inputs that a scene states, a line each.
+    pub ranges: Vec<String>,
+}
 
 /// What the compiler makes of a robot file.
 #[derive(Clone, Debug)]
@@ -33,10 +50,14 @@ pub struct Generated {
     pub frames: Vec<String>,
     /// The source: items without inner attributes, for `include!`, a module, or a file of its own.
     pub text: String,
-    /// The types of its run-time parameters.
-    pub types: String,
     /// The functions of that source, one by one.
     pub items: Vec<Item>,
+    /// The types of its run-time parameters.
+    pub parameters: Vec<ParameterType>,
+    /// Its functions in stages, where they are asked for.
+    pub staged: Option<StagedModule>,
+    /// Its functions in contact, mode by mode.
+    pub contact: Vec<ModeModule>,
     /// The scalar type.
     pub scalar: Scalar,
     /// The same in the other scalar types that were asked for; [`Generated::text`] has them as modules.
@@ -57,6 +78,77 @@ pub struct Generated {
     pub programs: AllWritten,
 }
 
+impl Generated {
+    /// Whether a function calls the kernel of sines, cosines and roots.
+    pub fn calls_kernel(&self) -> bool {
+        self.items.iter().any(Item::calls_kernel)
+            || self.parameters.iter().any(|p| p.constructor.calls_kernel())
+            || self.staged.as_ref().is_some_and(StagedModule::calls_kernel)
+            || self.contact.iter().flat_map(|mode| &mode.items).any(Item::calls_kernel)
+    }
+
+    /// Whether there is more than constants and functions of one scalar, which are all that a type can have associated: types of
+    /// parameters and stages, or further scalars.
+    pub fn needs_a_module(&self) -> bool {
+        let has_types = !self.parameters.is_empty() || self.staged.is_some() || !self.contact.is_empty();
+        has_types || !self.others.is_empty()
+    }
+
+    /// The same in further scalar types, as modules of the text.
+    #[must_use]
+    pub fn with_others(mut self, others: Vec<Generated>) -> Generated {
+        self.text.extend(others.iter().map(rust::scalar_module));
+        Generated { others, ..self }
+    }
+}
+
+/// A function of the robot, in all its forms; what is plainer than it was to be is among the warnings.
+fn item(
+    robot: &Robot,
+    program: &Program,
+    (options, lowering): (&Options, Lowering<'_>),
+    warnings: &mut Diagnostics,
+    written: &mut Vec<Written>,
+) -> Result<Item, Disagreement> {
+    let Program { function, graph, schedule, method, .. } = program;
+    let mut doc = function.doc(&graph.inputs, &options.scene);
+    if let Some(method) = method {
+        doc.push_str(&format!("\n{method}\n"));
+    }
+    if !graph.formats.is_empty() {
+        let wide = certify::mixed::wide_operations(graph, options.scalar);
+        let (all, wider) = (graph.counts().flops(), graph.widest(options.scalar).name());
+        doc.push_str(&format!("\n{wide} of its {all} operations are in {wider}: what its error budget takes.\n"));
+    }
+    let plain = Lowering { style: options.plain_style(), ..lowering };
+    let routine = plain.routine(graph, schedule, function.name(), &doc);
+    let mut of_state = None;
+    if wants_companions(options) {
+        let (bound, plainer) = match program.has_folded_constants(options) {
+            true => checked_companion(robot, *function, graph, options)?,
+            false => (Err(ROUNDED), None),
+        };
+        plainer.iter().for_each(|p| warnings.push(p.warning(&robot.model)));
+        let names = (function.name(), function.spec().judged == Judged::ByResidual);
+        of_state = Some(error_bound(bound, names, graph, (options, lowering.target), written));
+    }
+    let lanes = options.lanes.map(|_| in_lanes(function.name(), (graph, schedule), lowering));
+    Ok(Item { function: *function, routine, bound: of_state, lanes })
+}
+
+/// The body of a function over lanes: the public function, or one that is also told whether to fuse.
+fn in_lanes(name: &str, (graph, schedule): (&Graph, &Schedule), lowering: Lowering<'_>) -> Routine {
+    let lowering = Lowering { style: lowering.style.lanes(), ..lowering };
+    let public = lanes_name(name);
+    match lowering.style.fused {
+        false => lowering.routine(graph, schedule, &public, &lanes_doc(name)),
+        true => {
+            let doc = format!("[`{public}`], fused as the caller says.");
+            lowering.routine(graph, schedule, &format!("{name}_in_lanes"), &doc).private()
+        }
+    }
+}
+
 /// The rest of the pipeline: from programs to text.
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn generate(
@@ -73,64 +165,34 @@ pub(crate) fn generate(
         Some(i) => format!("{}, body {}: {}", section.phase, i + 1, model.bodies[i].name),
         None => section.phase.to_string(),
     };
+    let lowering = Lowering { style: options.style(), target: &rust::Rust, title: &title };
     let mut items = Vec::new();
     let mut functions = BTreeMap::new();
     let mut written = AllWritten::default();
     for (program, waterfall, errors) in programs {
-        let Program { function, graph, schedule, method, .. } = &program;
-        let mut doc = function.doc(&graph.inputs, &options.scene);
-        if let Some(method) = method {
-            doc.push_str(&format!("\n{method}\n"));
-        }
-        if !graph.formats.is_empty() {
-            let wide = certify::mixed::wide_operations(graph, options.scalar);
-            let (all, wider) = (graph.counts().flops(), graph.widest(options.scalar).name());
-            doc.push_str(&format!("\n{wide} of its {all} operations are in {wider}: what its error budget takes.\n"));
-        }
-        let mut text = emit::function(graph, schedule, function.name(), &doc, options.plain_style(), &title);
-        let figures = FunctionReport::new(&program, options.scalar, text.text.lines().count());
-        if wants_companions(options) {
-            let (bound, plainer) = match program.has_folded_constants(options) {
-                true => checked_companion(&robot, *function, graph, options)?,
-                false => (Err(ROUNDED), None),
-            };
-            plainer.iter().for_each(|p| warnings.push(p.warning(model)));
-            let by_residual = function.spec().judged == Judged::ByResidual;
-            let bound = error_bound_text(bound, (function.name(), by_residual), graph, options, &mut written.functions);
-            text.text.push('\n');
-            text.text.push_str(&bound.text);
-            text.uses_sin_cos |= bound.uses_sin_cos;
-            text.uses_sqrt |= bound.uses_sqrt;
-        }
-        functions.insert(function.name(), FunctionReport { waterfall, errors, ..figures });
-        let Program { function, graph, schedule, .. } = program;
-        let (inputs, outputs) = (graph.inputs.clone(), graph.outputs.clone());
-        let mut item = Item { function, inputs, outputs, doc, text, lanes: String::new() };
-        if let Some(lanes) = options.lanes {
-            item.lanes = emit::batch::lanes(&item, (&graph, &schedule), options.style(), lanes, &title);
-        }
+        let item = item(&robot, &program, (options, lowering), &mut warnings, &mut written.functions)?;
+        let lines = lowering.target.routine(&item.routine).lines().count();
+        let figures = FunctionReport::new(&program, options.scalar, lines);
+        functions.insert(program.function.name(), FunctionReport { waterfall, errors, ..figures });
         items.push(item);
         written.functions.push(Written {
-            name: function.name().to_string(),
-            graph,
+            name: program.function.name().to_string(),
+            graph: program.graph,
             scalar: options.scalar,
             generic: options.generic,
             lanes: options.lanes.is_some(),
         });
     }
-    let crate::emit::contact::ContactModule { text: contact_text, reports: contact, plainer, programs: modes } =
-        crate::emit::contact::module(&robot, options, &title)?;
-    written.modes = modes;
+    let ContactModule { modes, reports, plainer, programs } = contact(&robot, options, lowering)?;
+    written.modes = programs;
     plainer.iter().for_each(|p| warnings.push(p.warning(model)));
-    let staged = options.scene.staged.then(|| staged(&robot, &frames, options, &title)).transpose()?;
-    let (staged_text, staged_report) = match staged {
-        Some((text, report, plainer, programs)) => {
-            written.staged = Some(programs);
-            plainer.iter().for_each(|p| warnings.push(p.warning(model)));
-            (text, Some(report))
-        }
-        None => (String::new(), None),
-    };
+    let staged = options.scene.staged.then(|| staged(&robot, &frames, options, lowering)).transpose()?;
+    let staged = staged.map(|(module, report, plainer, programs)| {
+        written.staged = Some(programs);
+        plainer.iter().for_each(|p| warnings.push(p.warning(model)));
+        (module, report)
+    });
+    let (staged, staged_report) = staged.unzip();
     let report = Report {
         robot: model.name.clone(),
         nq: model.nq(),
@@ -138,33 +200,25 @@ pub(crate) fn generate(
         scalar: options.scalar.name(),
         functions,
         staged: staged_report,
-        contact,
+        contact: reports,
     };
-    // the file's name, not its path: the same bytes on every machine
-    let name = file_name(path).to_string();
-    let remark = |d: &Diagnostic| match &d.place {
-        Some(place) => format!("{} (line {} of {})", d.title, place.line, file_name(&place.file)),
-        None => d.title.clone(),
-    };
-    let remarks = warnings.iter().map(remark).collect();
-    let ranges = scene::ranges_in_words(&options.scene, model);
-    let provenance = Provenance { source: name.clone(), hash, remarks, ranges };
+    let provenance = provenance(model, &options.scene, (path, hash), &warnings);
     let takes = |parameter: &Parameter| {
         let name = parameter.type_name();
-        let ports = || items.iter().flat_map(|item| &item.inputs);
-        ports().any(|port| port.wrapper.as_ref() == Some(&name))
-            || (staged_text.clone() + &contact_text).contains(&format!("&{name}"))
+        let of_contact = modes.iter().flat_map(|mode| &mode.items).flat_map(Item::inputs);
+        let mut ports = items.iter().flat_map(Item::inputs).chain(of_contact);
+        ports.any(|port| port.wrapper.as_ref() == Some(&name)) || staged.as_ref().is_some_and(|s| s.takes(&name))
     };
-    let generic = if options.generic { emit::GENERIC } else { "" };
-    let types = parameter_types(&robot, options, &takes, &mut written.parameters)? + &staged_text + &contact_text;
-    let before = generic.to_string() + &types;
-    let text = emit::file(model, &frames, &items, &report, &provenance, options.style(), &before, options.lanes);
-    Ok(Generated {
+    let parameters;
+    (parameters, written.parameters) = parameter_types(&robot, options, &takes, lowering)?;
+    let generated = Generated {
         model: robot.model,
         frames,
-        text,
-        types,
+        text: String::new(),
         items,
+        parameters,
+        staged,
+        contact: modes,
         scalar: options.scalar,
         others: Vec::new(),
         style: options.style(),
@@ -174,5 +228,21 @@ pub(crate) fn generate(
         report,
         warnings,
         programs: written,
-    })
+    };
+    Ok(Generated { text: rust::file(&generated), ..generated })
+}
+
+/// Where the file comes from.
+fn provenance(model: &Model<Dd>, scene: &Scene, (path, hash): (&str, u64), warnings: &Diagnostics) -> Provenance {
+    let remark = |d: &Diagnostic| match &d.place {
+        Some(place) => format!("{} (line {} of {})", d.title, place.line, file_name(&place.file)),
+        None => d.title.clone(),
+    };
+    Provenance {
+        // the file's name, not its path: the same bytes on every machine
+        source: file_name(path).to_string(),
+        hash,
+        remarks: warnings.iter().map(remark).collect(),
+        ranges: scene::ranges_in_words(scene, model),
+    }
 }

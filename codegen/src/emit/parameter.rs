@@ -1,263 +1,53 @@
-//! Types of run-time parameters, checked when they are made: the ten inertial parameters of a body, numbers of a drive.
+//! The types of run-time parameters, before they are text.
 
-use super::{number, FunctionText, Scalar};
-use crate::description::drives::Number;
-use crate::emit;
+use super::module::{ParameterOf, ParameterType};
+use super::Lowering;
 use crate::equations::Robot;
-use crate::identifier::doc;
 use crate::options::Options;
 use crate::program::equivalence::Disagreement;
 use crate::program::parameter::checked_parameter;
 use crate::program::written::{DriveNumbers, Written, WrittenParameter};
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::Parameter;
-use std::fmt::Write;
 use straightline_graph::schedule::schedule;
 
-/// The error type and the check that all bodies of a file share.
-pub fn check(scalar: Scalar) -> String {
-    CHECK.replace("f64", scalar.name())
-}
-
-const CHECK: &str = "
-/// Why inertial parameters cannot belong to a body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unphysical {
-    /// A number is not finite.
-    NotFinite,
-    /// The mass is negative.
-    NegativeMass,
-    /// There is inertia, and no mass to have it.
-    InertiaWithoutMass,
-    /// The inertia about the mass centre belongs to no distribution of mass: a principal moment is negative, or exceeds the
-    /// sum of the other two.
-    Inertia,
-}
-
-impl core::fmt::Display for Unphysical {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Unphysical::NotFinite => \"an inertial parameter is not finite\",
-            Unphysical::NegativeMass => \"a mass is negative\",
-            Unphysical::InertiaWithoutMass => \"a body without mass has inertia\",
-            Unphysical::Inertia => \"a principal moment of inertia is negative or exceeds the sum of the other two\",
-        })
-    }
-}
-
-/// A body is possible if its mass is not negative and its second moment ½ tr(J) 1 − J about the mass centre has no negative
-/// eigenvalue; a rounding error of the trace is forgiven.
-fn check_inertia(mass: f64, com: &[f64; 3], inertia: &[f64; 6]) -> Result<(), Unphysical> {
-    let [jxx, jxy, jxz, jyy, jyz, jzz] = *inertia;
-    if ![mass, com[0], com[1], com[2], jxx, jxy, jxz, jyy, jyz, jzz].iter().all(|x| x.is_finite()) {
-        return Err(Unphysical::NotFinite);
-    }
-    if mass < 0.0 {
-        return Err(Unphysical::NegativeMass);
-    }
-    if mass == 0.0 && inertia.iter().any(|x| *x != 0.0) {
-        return Err(Unphysical::InertiaWithoutMass);
-    }
-    let half = 0.5 * (jxx + jyy + jzz);
-    let slack = 16.0 * f64::EPSILON * half;
-    let (a, b, c) = (half - jxx + slack, half - jyy + slack, half - jzz + slack);
-    let (d, e, f) = (-jxy, -jxz, -jyz);
-    let minors = [a * b - d * d, a * c - e * e, b * c - f * f];
-    let determinant = a * minors[2] - d * (d * c - f * e) + e * (d * f - b * e);
-    let possible = a >= 0.0 && b >= 0.0 && c >= 0.0 && minors.iter().all(|m| *m >= 0.0);
-    if possible && determinant >= -slack * half * half {
-        Ok(())
-    } else {
-        Err(Unphysical::Inertia)
-    }
-}
-";
-
-/// The type of one parameter; `constructor` is the program that brings it into the frames of the equations.
-pub fn body(
-    name: &str,
-    type_name: &str,
-    frame: &str,
-    scalars: usize,
-    constructor: &FunctionText,
-    scalar: Scalar,
-) -> String {
-    let t = scalar.name();
-    let frame = doc(frame);
-    let mut out = String::new();
-    let _ = write!(
-        out,
-        "
-/// A body on `{frame}`, as the functions take it: made outside the control loop, checked once.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(transparent)]
-pub struct {type_name}([{t}; {scalars}]);
-
-impl {type_name} {{
-    /// No mass at all.
-    pub const NONE: {type_name} = {type_name}([0.0; {scalars}]);
-
-    /// A body of this mass \\[kg\\], with its mass centre \\[m\\] in the frame `{frame}` and this inertia about the mass centre
-    /// in the frame's axes: xx, xy, xz, yy, yz, zz \\[kg·m²\\].
-    ///
-    /// # Errors
-    /// No body has such parameters.
-    pub fn new(mass: {t}, com: [{t}; 3], inertia: [{t}; 6]) -> Result<{type_name}, Unphysical> {{
-        check_inertia(mass, &com, &inertia)?;
-        let mut parameters = [mass; {scalars}];
-        {name}_parameters(&[mass], &com, &inertia, &mut parameters);
-        Ok({type_name}(parameters))
-    }}
-}}
-
-"
-    );
-    out.push_str(&constructor.text.replacen("pub fn ", "fn ", 1));
-    out
-}
-
-/// The error type and the check that all drives of a file share.
-pub fn check_drive(scalar: Scalar) -> String {
-    CHECK_DRIVE.replace("f64", scalar.name())
-}
-
-const CHECK_DRIVE: &str = "
-/// Why numbers cannot be those of a drive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct OutOfRange {
-    /// The number.
-    pub number: &'static str,
-    /// What it must be.
-    pub must: &'static str,
-}
-
-impl core::fmt::Display for OutOfRange {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, \"`{}` must be {}\", self.number, self.must)
-    }
-}
-
-/// A number of a drive is finite and in its range.
-fn check_number(number: &'static str, x: f64, holds: bool, must: &'static str) -> Result<(), OutOfRange> {
-    match (x.is_finite(), holds) {
-        (true, true) => Ok(()),
-        (true, false) => Err(OutOfRange { number, must }),
-        (false, _) => Err(OutOfRange { number, must: \"finite\" }),
-    }
-}
-";
-
-/// The type of the numbers of a drive: name of the input, of the type and of the drive; `constructor` is the program that makes of the free
-/// numbers what functions take.
-pub fn drive(
-    (name, type_name, drive): (&str, &str, &str),
-    numbers: &DriveNumbers,
-    constructor: &FunctionText,
-    scalar: Scalar,
-) -> String {
-    let (t, scalars) = (scalar.name(), numbers.nominal.len());
-    let of_numbers = format!("{type_name}Numbers");
-    let fields = |text: &dyn Fn(&Number) -> String| numbers.numbers.iter().map(text).collect::<String>();
-    let list = |items: Vec<String>| items.join(", ");
-    let declared = fields(&|n| format!("    /// {}.\n    pub {}: {t},\n", n.quantity.meaning, n.name));
-    let values = list(numbers.numbers.iter().map(|n| format!("{}: {}", n.name, number(n.value, scalar))).collect());
-    let nominal = list(numbers.nominal.iter().map(|x| number(scalar.nearest(*x), scalar)).collect());
-    let checks = fields(&|n| {
-        let (name, must) = (&n.name, n.quantity.at_run_time);
-        let condition = must.condition().replace('x', &format!("numbers.{name}"));
-        format!("        check_number({name:?}, numbers.{name}, {condition}, {:?})?;\n", must.words().0)
-    });
-    let given = list(numbers.numbers.iter().map(|n| format!("numbers.{}", n.name)).collect());
-    let drive = doc(drive);
-    let first = &numbers.numbers[0].name;
-    let mut out = format!(
-        "
-/// Numbers of the drive `{drive}`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct {of_numbers} {{
-{declared}}}
-
-impl {of_numbers} {{
-    /// Those of the robot file.
-    pub const NOMINAL: {of_numbers} = {of_numbers} {{ {values} }};
-}}
-
-impl Default for {of_numbers} {{
-    fn default() -> {of_numbers} {{
-        {of_numbers}::NOMINAL
-    }}
-}}
-
-/// The drive `{drive}`, as the functions take it: made outside the control loop, checked once.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(transparent)]
-pub struct {type_name}([{t}; {scalars}]);
-
-impl {type_name} {{
-    /// With the numbers of the robot file.
-    pub const NOMINAL: {type_name} = {type_name}([{nominal}]);
-
-    /// With these numbers; the others are those of the robot file.
-    ///
-    /// # Errors
-    /// No drive has such numbers, or what follows from them is not finite.
-    pub fn new(numbers: {of_numbers}) -> Result<{type_name}, OutOfRange> {{
-{checks}        let mut parameters = [numbers.{first}; {scalars}];
-        {name}_parameters(&[{given}], &mut parameters);
-        check_number(\"numbers\", 0.0, parameters.iter().all(|x| x.is_finite()), \"of such sizes that what follows from them is finite\")?;
-        Ok({type_name}(parameters))
-    }}
-}}
-
-impl Default for {type_name} {{
-    fn default() -> {type_name} {{
-        {type_name}::NOMINAL
-    }}
-}}
-
-"
-    );
-    out.push_str(&constructor.text.replacen("pub fn ", "fn ", 1));
-    out
-}
-
-/// The types of those run-time parameters that something takes, with what they share.
-pub(crate) fn parameter_types(
+/// The types of those run-time parameters that something takes, and their programs.
+///
+/// # Errors
+/// A constructor that differs from its plain equations.
+pub(super) fn parameter_types(
     robot: &Robot,
     options: &Options,
     takes: &dyn Fn(&Parameter) -> bool,
-    written: &mut Vec<WrittenParameter>,
-) -> Result<String, Disagreement> {
+    lowering: Lowering<'_>,
+) -> Result<(Vec<ParameterType>, Vec<WrittenParameter>), Disagreement> {
+    let lowering = Lowering { title: &|_| String::new(), ..lowering };
     let parameters = options.scene.parameters.iter().filter(|p| p.is_of(&robot.model) && takes(p));
-    let mut types = String::new();
+    let (mut types, mut written) = (Vec::new(), Vec::new());
     for p in parameters {
         let graph = checked_parameter(robot, p, options)?;
-        let (schedule, name) = (schedule(&graph, options.limits), p.input_name());
+        let (type_name, input) = (p.type_name(), p.input_name());
         let drive = FreeDrive::new(p, &robot.model);
         let doc = match &drive {
             None => "The parameters about the origins, and in the axes, of the frames that the equations use.",
             Some(_) => "The numbers of the drive that the equations use.",
         };
-        let private = format!("{name}_parameters");
-        let constructor = emit::function(&graph, &schedule, &private, doc, options.style(), &|_| String::new());
+        let private = format!("{input}_parameters");
+        let constructor = lowering.routine(&graph, &schedule(&graph, options.limits), &private, doc).private();
         let program = Written { name: private, graph, scalar: options.scalar, generic: false, lanes: false };
-        let scalars = p.scalars(&robot.model);
-        let (text, numbers) = match drive {
-            None => {
-                let frame = p.frame().unwrap_or_default();
-                (emit::parameter::body(&name, &p.type_name(), frame, scalars, &constructor, options.scalar), None)
-            }
+        let of = match drive {
+            None => ParameterOf::Body(p.frame().unwrap_or_default().to_string()),
             Some(drive) => {
                 let numbers = DriveNumbers { nominal: drive.values(&drive.nominal()), numbers: drive.numbers };
-                let names = (&name[..], &p.type_name()[..], p.name());
-                (emit::parameter::drive(names, &numbers, &constructor, options.scalar), Some(numbers))
+                ParameterOf::Drive(p.name().to_string(), numbers)
             }
         };
-        written.push(WrittenParameter { type_name: p.type_name(), program, numbers });
-        types.push_str(&text);
+        let numbers = match &of {
+            ParameterOf::Body(_) => None,
+            ParameterOf::Drive(_, numbers) => Some(numbers.clone()),
+        };
+        written.push(WrittenParameter { type_name: type_name.clone(), program, numbers });
+        types.push(ParameterType { name: type_name, input, scalars: p.scalars(&robot.model), constructor, of });
     }
-    let is_there = |drive: bool| written.iter().any(|p| p.numbers.is_some() == drive);
-    let checks = [(false, emit::parameter::check as fn(Scalar) -> String), (true, emit::parameter::check_drive)];
-    let checks = checks.into_iter().filter(|(drive, _)| is_there(*drive)).map(|(_, text)| text(options.scalar));
-    Ok(checks.collect::<String>() + &types)
+    Ok((types, written))
 }

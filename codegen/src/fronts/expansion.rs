@@ -2,13 +2,10 @@
 
 use crate::compile;
 use crate::diagnostic::{Diagnostic, Diagnostics, Front, Reporting, Severity, Source};
-use crate::emit::{array_type, batch, Generated};
-use crate::fronts::frames;
+use crate::emit::rust::associated_items;
+use crate::emit::Generated;
 use crate::options::{scene_file, Options, SceneFile, Settings};
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use straightline_graph::expr::Port;
-use straightline_graph::Scalar;
 
 /// What became of a robot file and its scene.
 #[derive(Debug)]
@@ -137,8 +134,7 @@ fn compiled(opened: &Opened, own: &Settings) -> Result<(String, Generated, Strin
     let (robot, options) = (&opened.robot, opened.options(own));
     let generated = compile::compile(robot, &options)
         .map_err(|diagnostics| refusal(&diagnostics, robot.path(), opened.within()))?;
-    let mut associated = associated_items(&generated);
-    associated.push_str(&frames::associated_items(&generated, &options.scene, &associated));
+    let associated = associated_items(&generated, &options.scene);
     Ok((generated.warnings.at_least(Severity::Warning).render(), generated, associated))
 }
 
@@ -169,82 +165,4 @@ fn found(what: &str, name: &str, directories: &[&Path], files: &mut Vec<PathBuf>
     let bytes = std::fs::read(&file).map_err(|error| format!("{}: {error}", file.display()))?;
     files.push(file);
     Ok(Source::from_bytes(name, bytes))
-}
-
-/// Whether there is more than constants and functions of one scalar, which are all that a type can have associated: types of
-/// parameters and stages, or further scalars.
-pub fn needs_a_module(generated: &Generated) -> bool {
-    !generated.types.is_empty() || !generated.others.is_empty()
-}
-
-/// Constants and functions of the module `dynamics` as associated items of a type.
-fn associated_items(generated: &Generated) -> String {
-    let Generated { model, frames, scalar, .. } = generated;
-    let joints = model.bodies.len();
-    let limited = model.bodies.iter().filter(|b| b.joint.kind.is_single()).count();
-    let numbers = format!("[{}; {limited}]", scalar.name());
-    let mut out = String::new();
-    let mut constant = |name: &str, kind: &str, doc: &str| {
-        let _ = writeln!(out, "/// {doc}\npub const {name}: {kind} = dynamics::{name};");
-    };
-    constant("NQ", "usize", "Number of configuration coordinates q.");
-    constant("NV", "usize", "Number of velocity coordinates qd, qdd, tau.");
-    constant("JOINT_NAMES", &format!("[&'static str; {joints}]"), "Joints in the order of their coordinates.");
-    constant(
-        "FRAME_NAMES",
-        &format!("[&'static str; {}]", frames.len()),
-        "Frames of the functions that answer per frame.",
-    );
-    constant("LOWER_LIMITS", &numbers, "Least coordinate of every joint \\[rad or m\\]; without a floating base.");
-    constant("UPPER_LIMITS", &numbers, "Greatest coordinate of every joint \\[rad or m\\]; without a floating base.");
-    constant("VELOCITY_LIMITS", &numbers, "Greatest speed of every joint \\[rad/s or m/s\\]; without a floating base.");
-    constant("EFFORT_LIMITS", &numbers, "Greatest drive of every joint \\[N·m or N\\]; without a floating base.");
-    if !model.drives.is_empty() {
-        let n = model.drives.len();
-        constant("NU", "usize", "Number of inputs u of the drives.");
-        constant("NX", "usize", "Number of states x of the drives.");
-        constant("DRIVE_NAMES", &format!("[&'static str; {n}]"), "Drives in the order of u.");
-        constant("DRIVE_STATES", &format!("[usize; {n}]"), "How many entries of x each drive has.");
-    }
-    for item in &generated.items {
-        let name = item.function.name();
-        constant(&format!("{}_COST", name.to_uppercase()), "dynamics::Cost", &format!("What [`Self::{name}`] costs."));
-    }
-    for (name, errors) in generated.report.functions.iter().filter_map(|(n, f)| Some((n, f.errors.as_ref()?))) {
-        for output in &errors.outputs {
-            let kind = array_type(&Port::new(&output.name, &output.shape), Scalar::F64);
-            let ranges = errors.ranges.join("; ").replace('[', "\\[").replace(']', "\\]");
-            let doc =
-                format!("Bound of the rounding errors of [`Self::{name}`], for inputs in these ranges: {ranges}.");
-            constant(&errors.constant_name(name, output), &kind, &doc);
-        }
-    }
-    for item in &generated.items {
-        let name = item.function.name();
-        let parameters = item.inputs.iter().map(|p| (p, "&")).chain(item.outputs.iter().map(|p| (p, "&mut ")));
-        let array = |p: &Port| {
-            let module = if p.wrapper.is_some() { "dynamics::" } else { "" };
-            format!("{module}{}", generated.plain_style.array_type(p))
-        };
-        let signature: Vec<String> =
-            parameters.clone().map(|(p, reference)| format!("{}: {reference}{}", p.name, array(p))).collect();
-        let arguments: Vec<&str> = parameters.map(|(p, _)| p.name.as_str()).collect();
-        for line in
-            item.doc.replace("[`FRAME_NAMES`]", "[`Self::FRAME_NAMES`]").replace("[`DRIVE_", "[`Self::DRIVE_").lines()
-        {
-            let _ = writeln!(out, "/// {line}");
-        }
-        let _ = writeln!(
-            out,
-            "{}#[inline]\npub fn {name}{}({}) {{\n    dynamics::{name}({})\n}}",
-            item.function.alias_attribute(),
-            if generated.plain_style.generic { "<T: ::straightline::Real>" } else { "" },
-            signature.join(", "),
-            arguments.join(", ")
-        );
-        if let Some(lanes) = generated.lanes {
-            out.push_str(&batch::associated(item, generated.style, lanes));
-        }
-    }
-    out
 }

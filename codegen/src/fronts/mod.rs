@@ -2,7 +2,5 @@
 
 pub mod builder;
 pub mod expansion;
-mod frames;
-pub mod stubs;
 
 pub use builder::{compile_robot, Builder};

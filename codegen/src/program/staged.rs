@@ -76,8 +76,8 @@ enum InverseForm {
 }
 
 /// A stage and its type.
-#[derive(Clone, Copy)]
-pub(crate) struct Stage {
+#[derive(Clone, Copy, Debug)]
+pub struct Stage {
     /// Its name.
     pub type_name: &'static str,
     /// The name of its values where others take them.

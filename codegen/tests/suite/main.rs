@@ -18,7 +18,6 @@ mod flexible;
 mod forward_dynamics;
 mod forward_dynamics_bounds;
 mod guide;
-mod joint_rooms;
 mod layers;
 mod limbs;
 mod malformed;
@@ -44,6 +43,7 @@ mod sums;
 mod truth;
 mod two_readings;
 mod unyielding;
+mod words;
 
 #[path = "../../../runtime/core/tests/suite/support/compare.rs"]
 mod compare;

@@ -93,7 +93,7 @@ fn a_scene_states_them_for_all_joints_or_by_name_and_the_generated_file_says_the
 
 #[test]
 fn they_change_no_operation() {
-    let functions = |scene: &str| arm(scene, false).0.items.into_iter().map(|i| i.text.text).collect::<Vec<_>>();
+    let functions = |scene: &str| arm(scene, false).0.items.into_iter().map(|i| i.routine).collect::<Vec<_>>();
     assert_eq!(functions("[numbers.ranges]\nqd = 1e-9\n"), functions(""));
 }
 

@@ -120,8 +120,8 @@ fn calls(module: &str, generated: &Generated, state: &State, scalar: Scalar) -> 
         };
         let array =
             |port: &Port| format!("&[{}]", state.group(&port.name).iter().map(literal).collect::<Vec<_>>().join(", "));
-        let inputs: Vec<String> = item.inputs.iter().map(array).collect();
-        let shape = &item.outputs[0].shape;
+        let inputs: Vec<String> = item.inputs().iter().map(array).collect();
+        let shape = &item.outputs()[0].shape;
         let zero = shape.iter().rev().fold("0.0".to_string(), |inner, n| format!("[{inner}; {n}]"));
         let (name, flat) = (item.function.name(), ".flatten()".repeat(shape.len() - 1));
         let _ = writeln!(

@@ -209,7 +209,7 @@ fn a_base_on_a_given_motion_is_a_floating_base_without_its_own_forces() {
     let generated = compile(&Source::new("robot.toml", ROBOT), &options).unwrap_or_else(|d| panic!("{d}"));
     assert_eq!(generated.model.bodies[0].joint.kind, JointKind::Floating);
     for item in &generated.items {
-        assert_eq!(item.outputs[0].shape, [6], "{}", item.function.name());
+        assert_eq!(item.outputs()[0].shape, [6], "{}", item.function.name());
     }
 }
 

@@ -1,7 +1,8 @@
 //! Fused multiply-add: every sum that counts as fused is, and the results stay as exact as without.
 
 use straightline_codegen::compile::compile;
-use straightline_codegen::emit::fused;
+use straightline_codegen::emit::rust::Rust;
+use straightline_codegen::emit::{fused, Target};
 use straightline_codegen::options::Options;
 use straightline_codegen::schedule::Limits;
 use straightline_codegen::Function;
@@ -23,7 +24,7 @@ fn every_sum_that_counts_as_fused_is_fused() {
         for item in &generated.items {
             let program = programs::of_robot(robot, item.function, &options);
             let counts = program.graph.counts();
-            let calls = item.text.text.matches("fma(").count();
+            let calls = Rust.routine(&item.routine).matches("fma(").count();
             let fused = counts.mul + counts.add - counts.fma;
             let name = format!("{} of {}", item.function.name(), robot.name);
             match program.schedule.parts.len() {

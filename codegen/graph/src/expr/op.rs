@@ -40,6 +40,13 @@ pub struct Row {
     pub slopes: &'static [Slope],
 }
 
+impl Row {
+    /// Whether it is written as a call of a function.
+    pub const fn is_a_call(&self) -> bool {
+        matches!(self.text, Text::Call(_))
+    }
+}
+
 /// How an operation is written in languages with the usual operators; which bind the more tightly, the later they stand here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Text {

@@ -8,10 +8,8 @@ use crate::scene::Scene;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-/// A constant per frame, and `pose` where poses of all frames are computed; `associated` are the other items of the type.
-pub(super) fn associated_items(generated: &Generated, scene: &Scene, associated: &str) -> String {
-    let constants = associated.lines().filter_map(|line| line.strip_prefix("pub const "));
-    let mut taken: BTreeSet<String> = constants.filter_map(|rest| rest.split(':').next()).map(str::to_string).collect();
+/// A constant per frame, and `pose` where poses of all frames are computed; `taken` are the names of other constants.
+pub(super) fn associated(generated: &Generated, scene: &Scene, mut taken: BTreeSet<String>) -> String {
     let mut out = String::new();
     for (index, frame) in generated.frames.iter().enumerate() {
         let mut name = constant(frame);
@@ -27,7 +25,7 @@ pub(super) fn associated_items(generated: &Generated, scene: &Scene, associated:
     }
     let has_poses = generated.items.iter().any(|item| {
         let all = scene.frames_of(item.function, &generated.frames) == generated.frames;
-        item.function == Function::ForwardKinematics && all && item.outputs[0].shape == [generated.frames.len(), 12]
+        item.function == Function::ForwardKinematics && all && item.outputs()[0].shape == [generated.frames.len(), 12]
     });
     if has_poses {
         let _ = writeln!(

@@ -3,9 +3,10 @@
 //!
 //! Every function stands in a module of its own, so that rustc's back end can work on several at once.
 
+use super::file::{header, item_text, lanes_text, preamble};
+use super::{array_type, batch, fused, kernel};
 use crate::description::drives::Number;
-use crate::emit::{self, Generated, Item};
-use crate::function::Function;
+use crate::emit::{Generated, Item, Style};
 use crate::identifier::{comment, package_name, string_literal};
 use crate::output::MARK;
 use std::fmt::Write;
@@ -22,71 +23,58 @@ pub fn c_package(generated: &Generated, prefix: &str) -> Vec<(String, String)> {
         ("src/dynamics/mod.rs".to_string(), package.dynamics()),
     ];
     for item in &generated.items {
-        files.push((format!("src/dynamics/{}.rs", item.function.name()), package.function(item)));
+        files.push((format!("src/dynamics/{}.rs", item.name()), package.function(item)));
     }
     if generated.lanes.is_some() {
-        files.push(("src/dynamics/drivers.rs".to_string(), emit::batch::drivers().to_string()));
+        files.push(("src/dynamics/drivers.rs".to_string(), batch::drivers().to_string()));
         files.push(("src/dispatch.rs".to_string(), DISPATCH.to_string()));
     }
-    if package.calls_kernel() {
+    if generated.calls_kernel() {
         files.push((
             "src/dynamics/trig.rs".to_string(),
-            emit::kernel(generated.lanes.is_some(), generated.style.fused).into_owned(),
+            kernel(generated.lanes.is_some(), generated.style.fused).into_owned(),
         ));
     }
     files
 }
 
-/// What the header says of batches.
-const BATCHES: &str = "
-/* Functions over batches: ..._batch_soa(n, ...) and ..._batch_aos(n, ...) compute n states with the vector instructions of
- * the machine (AVX2 or AVX-512 where it has them), each state to the bits that the plain function gives. Every array
- * holds n states. soa (structure of arrays, the faster one): component c of state s at [c * n + s]; aos (array of structures):
- * at [s * w + c] for arrays of w numbers to a state. n may be 0. */
-";
-
 /// What chooses the vector instructions of the machine, pasted as it is.
 const DISPATCH: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/src/dispatch.rs"));
 
 /// The layouts of batches, with where component `c` of state `s` is.
-const LAYOUTS: [(&str, &str); 2] = [("soa", "[c * n + s]"), ("aos", "[s * w + c], w numbers to a state")];
+pub(super) const LAYOUTS: [(&str, &str); 2] = [("soa", "[c * n + s]"), ("aos", "[s * w + c], w numbers to a state")];
 
-struct Package<'a> {
-    generated: &'a Generated,
-    prefix: &'a str,
+pub(super) struct Package<'a> {
+    pub generated: &'a Generated,
+    pub prefix: &'a str,
     library: String,
 }
 
 /// A parameter of a C function.
-struct Parameter {
-    name: String,
-    length: usize,
+pub(super) struct Parameter {
+    pub name: String,
+    pub length: usize,
     array: String,
-    is_output: bool,
+    pub is_output: bool,
     /// Whether one value serves all states of a batch.
-    is_shared: bool,
+    pub is_shared: bool,
 }
 
 impl Package<'_> {
-    fn scalar(&self) -> Scalar {
+    pub fn scalar(&self) -> Scalar {
         self.generated.scalar
-    }
-
-    fn calls_kernel(&self) -> bool {
-        self.generated.items.iter().any(|i| i.text.calls_kernel())
-            || self.generated.types.contains("use super::super::trig;")
     }
 
     /// The module of one function.
     fn function(&self, item: &Item) -> String {
-        let kernel = match (item.text.calls_kernel(), self.generated.style.fused) {
+        let kernel = match (item.calls_kernel(), self.generated.style.fused) {
             (false, _) => "",
             (true, false) => "use super::trig;\n",
             (true, true) => "#[allow(unused_imports)]\nuse super::trig;\n",
         };
-        let batch = if item.lanes.is_empty() { "" } else { "use super::batch;\n" };
+        let batch = if item.lanes.is_none() { "" } else { "use super::batch;\n" };
         let types: String = item
-            .inputs
+            .inputs()
             .iter()
             .filter_map(|p| p.wrapper.as_ref())
             .map(|wrapper| format!("use super::{wrapper};\n"))
@@ -98,11 +86,10 @@ impl Package<'_> {
         };
         let uses = [fused, kernel, batch, &types].concat();
         let gap = if uses.is_empty() { "" } else { "\n" };
-        let lanes = if item.lanes.is_empty() { String::new() } else { format!("\n{}", item.lanes) };
-        format!("{uses}{gap}{}{lanes}", item.text.text)
+        [&uses, gap, &item_text(item), &lanes_text(item, self.generated.lanes)].concat()
     }
 
-    fn provenance(&self) -> String {
+    pub fn provenance(&self) -> String {
         format!("straightline {} from {}; do not edit.", crate::VERSION, comment(&self.generated.provenance.source))
     }
 
@@ -134,12 +121,12 @@ overflow-checks = false
 
     fn dynamics(&self) -> String {
         let g = self.generated;
-        let mut out = emit::preamble(&g.model, &g.frames, &g.report, &g.provenance, g.scalar, &g.types);
+        let mut out = header(g) + &preamble(g);
         if g.style.fused {
-            out.push_str(&emit::fused::module(g.style, self.calls_kernel()));
+            out.push_str(&fused::module(g.style, g.calls_kernel()));
         }
         for item in &self.generated.items {
-            let name = item.function.name();
+            let name = item.name();
             let names = match self.generated.lanes {
                 Some(_) => format!("{{{name}, {name}_batch_aos, {name}_batch_soa, {name}_lanes}}"),
                 None => name.to_string(),
@@ -153,24 +140,22 @@ overflow-checks = false
                  pub mod batch {\n    pub use super::drivers::*;\n    pub use crate::dispatch::{run_f32, run_f64};\n}\n",
             );
         }
-        if self.calls_kernel() {
+        if g.calls_kernel() {
             out.push_str("\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod trig;\n");
         }
         out
     }
 
-    fn parameters(&self, function: Function) -> Vec<Parameter> {
-        let item = self.generated.items.iter().find(|i| i.function == function);
-        let item = item.expect("only generated functions are exported");
-        let inputs = item.inputs.iter().map(|p| (p, false));
+    pub fn parameters(&self, item: &Item) -> Vec<Parameter> {
+        let inputs = item.inputs().iter().map(|p| (p, false));
         inputs
-            .chain(item.outputs.iter().map(|p| (p, true)))
+            .chain(item.outputs().iter().map(|p| (p, true)))
             .map(|(port, is_output)| Parameter {
                 name: port.name.clone(),
                 length: port.len(),
                 array: match &port.wrapper {
                     Some(wrapper) => format!("dynamics::{wrapper}"),
-                    None => emit::array_type(port, self.scalar()),
+                    None => array_type(port, Style::plain(self.scalar())),
                 },
                 is_output,
                 is_shared: port.wrapper.is_some(),
@@ -247,9 +232,8 @@ fn name(names: &[&CStr], i: c_int) -> *const c_char {{
             let _ = write!(out, "{}", self.constructor(&body));
         }
         for item in &self.generated.items {
-            let function = item.function;
-            let parameters = self.parameters(function);
-            let name = function.name();
+            let parameters = self.parameters(item);
+            let name = item.name();
             let list = |f: &dyn Fn(&Parameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
             let signature = list(&|p| format!("{}: *{} {scalar}", p.name, if p.is_output { "mut" } else { "const" }));
             let arguments = list(&|p| p.name.to_string());
@@ -274,18 +258,18 @@ pub unsafe extern "C" fn {prefix}_{name}({signature}) {{
 {arrays}    dynamics::{name}({arguments});
 }}
 "#,
-                summary = function.summary(),
+                summary = item.function.summary(),
             );
             if self.generated.lanes.is_some() {
-                out.push_str(&self.batches(function, &parameters));
+                out.push_str(&self.batches(name, &parameters));
             }
         }
         out
     }
 
     /// The C functions over batches of one function.
-    fn batches(&self, function: Function, parameters: &[Parameter]) -> String {
-        let (prefix, scalar, name) = (self.prefix, self.scalar().name(), function.name());
+    fn batches(&self, name: &str, parameters: &[Parameter]) -> String {
+        let (prefix, scalar) = (self.prefix, self.scalar().name());
         let list = |f: &dyn Fn(&Parameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
         let pointer = |p: &Parameter| format!("{}: *{} {scalar}", p.name, if p.is_output { "mut" } else { "const" });
         let slices: String = parameters
@@ -331,9 +315,9 @@ pub unsafe extern "C" fn {prefix}_{name}_batch_{layout}(n: usize, {signature}) {
     }
 
     /// The run-time parameters that functions take: name, type and number of scalars.
-    fn bodies(&self) -> Vec<Port> {
+    pub fn bodies(&self) -> Vec<Port> {
         let mut bodies: Vec<Port> = Vec::new();
-        for port in self.generated.items.iter().flat_map(|item| &item.inputs) {
+        for port in self.generated.items.iter().flat_map(Item::inputs) {
             if port.wrapper.is_some() && !bodies.contains(port) {
                 bodies.push(port.clone());
             }
@@ -342,7 +326,7 @@ pub unsafe extern "C" fn {prefix}_{name}_batch_{layout}(n: usize, {signature}) {
     }
 
     /// The free numbers of a run-time parameter that is of a drive.
-    fn drive_numbers(&self, of: &Port) -> Option<&[Number]> {
+    pub fn drive_numbers(&self, of: &Port) -> Option<&[Number]> {
         let parameters = &self.generated.programs.parameters;
         let found = parameters.iter().find(|p| Some(&p.type_name) == of.wrapper.as_ref())?;
         found.numbers.as_ref().map(|numbers| &numbers.numbers[..])
@@ -419,133 +403,7 @@ pub unsafe extern "C" fn {prefix}_{name}_new(
         )
     }
 
-    /// The C header.
-    fn header(&self) -> String {
-        let (prefix, upper) = (self.prefix, self.prefix.to_uppercase());
-        let model = &self.generated.model;
-        let (nq, nv) = (model.nq(), model.nv());
-        let mut out = String::new();
-        let _ = write!(
-            out,
-            "/* Dynamics of {robot}.\n * Generated by {provenance}\n *\n * Joints, with their first indices into q and qd:\n",
-            robot = comment(&model.name),
-            provenance = self.provenance(),
-        );
-        for joint in self.joints() {
-            let row = joint.kind.row();
-            let kind = match joint.kind.is_single() {
-                true => format!("{} [{}]", row.name, joint.kind.units()[0]),
-                false => format!("{}: {}", row.name, row.coordinates.replace('\n', "\n *       ")),
-            };
-            let _ = writeln!(out, " *   {:>3} {:>3}  {}, {kind}", joint.iq, joint.iv, comment(&joint.name));
-        }
-        out.push_str(" * Frames:\n");
-        for (i, frame) in self.generated.frames.iter().enumerate() {
-            let _ = writeln!(out, " *   {i:>3}  {}", comment(frame));
-        }
-        let _ = write!(
-            out,
-            r#" *
- * SI units. Arrays are dense, matrices by rows. Outputs must not overlap inputs. The functions allocate nothing,
- * keep no state, and may be called from any thread.
- */
-#ifndef {upper}_DYNAMICS_H
-#define {upper}_DYNAMICS_H
-
-#define {upper}_NQ {nq}
-#define {upper}_NV {nv}
-#define {upper}_JOINT_COUNT {joints}
-#define {upper}_FRAME_COUNT {frames}
-{include}
-#ifdef __cplusplus
-extern "C" {{
-#endif
-
-/* The numbers above, for programs that load the library. */
-int {prefix}_nq(void);
-int {prefix}_nv(void);
-int {prefix}_joint_count(void);
-int {prefix}_frame_count(void);
-
-/* Name of joint or frame i, 0 <= i < count; otherwise a null pointer. */
-const char *{prefix}_joint_name(int i);
-const char *{prefix}_frame_name(int i);
-"#,
-            joints = model.bodies.len(),
-            frames = self.generated.frames.len(),
-            include = if self.generated.lanes.is_some() { "\n#include <stddef.h>\n" } else { "" },
-        );
-        if self.generated.lanes.is_some() {
-            out.push_str(BATCHES);
-        }
-        let c_type = self.scalar().c_name();
-        for body in self.bodies() {
-            let (name, length) = (&body.name, body.len());
-            if let Some(numbers) = self.drive_numbers(&body) {
-                let arguments: String = numbers.iter().map(|n| format!("{c_type} {}, ", n.name)).collect();
-                let _ =
-                    writeln!(out, "\n/* A drive as the functions take it in `{name}`, made outside the control loop:");
-                for n in numbers {
-                    let _ = writeln!(
-                        out,
-                        " *   {}: {}; {:?} in the robot file",
-                        n.name,
-                        n.quantity.meaning.replace('\\', ""),
-                        n.value
-                    );
-                }
-                let _ = write!(
-                    out,
-                    " * Returns 0, or which of the numbers no drive has, counted from 1, or {} where what follows from them is not\n \
-                     * finite; made is untouched then. */\n\
-                     int {prefix}_{name}_new({arguments}{c_type} made[{length}]);\n",
-                    numbers.len() + 1
-                );
-                continue;
-            }
-            let _ = write!(
-                out,
-                "\n/* A body as the functions take it in {name}, made outside the control loop, of this mass [kg], with its mass\n \
-                 * centre [m] and its inertia about the mass centre xx, xy, xz, yy, yz, zz [kg m^2]. All zeros are no body.\n \
-                 * Returns 0, or why no body has these: 1 a number is not finite, 2 the mass is negative, 3 inertia without\n \
-                 * mass, 4 the inertia is impossible; {name} is untouched then. */\n\
-                 int {prefix}_{name}_new({c_type} mass, const {c_type} com[3], const {c_type} inertia[6], {c_type} {name}[{length}]);\n"
-            );
-        }
-        for item in &self.generated.items {
-            let doc = item.doc.replace("frame of [`FRAME_NAMES`]", "frame").replace(['`', '\\'], "");
-            out.push_str("\n/*");
-            for (i, line) in doc.lines().filter(|l| !l.is_empty()).enumerate() {
-                let line = line.strip_prefix("* ").map_or(line.to_string(), |parameter| format!("  {parameter}"));
-                let _ = write!(out, "{} {line}", if i == 0 { "" } else { "\n *" });
-            }
-            let parameters: Vec<String> = self
-                .parameters(item.function)
-                .iter()
-                .map(|p| format!("{}{c_type} {}[{}]", if p.is_output { "" } else { "const " }, p.name, p.length))
-                .collect();
-            let name = item.function.name();
-            let _ = writeln!(out, " */\nvoid {prefix}_{name}({});", parameters.join(", "));
-            if self.generated.lanes.is_some() {
-                let parameters: Vec<String> = self
-                    .parameters(item.function)
-                    .iter()
-                    .map(|p| match (p.is_output, p.is_shared) {
-                        (true, _) => format!("{c_type} *{}", p.name),
-                        (false, false) => format!("const {c_type} *{}", p.name),
-                        (false, true) => format!("const {c_type} {}[{}]", p.name, p.length),
-                    })
-                    .collect();
-                for (layout, _) in LAYOUTS {
-                    let _ = writeln!(out, "void {prefix}_{name}_batch_{layout}(size_t n, {});", parameters.join(", "));
-                }
-            }
-        }
-        out.push_str("\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n");
-        out
-    }
-
-    fn joints(&self) -> Vec<&straightline_core::model::Joint> {
+    pub fn joints(&self) -> Vec<&straightline_core::model::Joint> {
         let mut joints: Vec<_> = self.generated.model.bodies.iter().map(|b| &b.joint).collect();
         joints.sort_by_key(|j| j.iv);
         joints

@@ -6,8 +6,8 @@
 //! and whatever is done with it. Such a type comes from a constant that does not evaluate, in the projection
 //! `<Why<{ compile_error!(..) }> as Stub>::Item`; [`DEFINITION`] has what it takes. Lengths are numbers that do not evaluate.
 
+use super::frames;
 use crate::choices::Lanes;
-use crate::fronts::frames;
 use crate::function::{ContactFunction, Function};
 use crate::identifier::{identifier, upper_camel_case};
 use crate::options::Options;

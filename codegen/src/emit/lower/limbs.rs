@@ -13,21 +13,16 @@
 //! What differs from limb to limb is an array over limbs, what does not a local from before the loop. LLVM's loop vectoriser makes
 //! vector instructions of the body, as of functions over lanes.
 
-use super::body::{wrapped, Binding, Body, FunctionText, Plan};
-use crate::identifier::comment;
+use super::body::{Body, Plan};
+use super::Lowering;
+use crate::emit::module::{Expression, Index, Statement};
 use rustc_hash::FxHashMap;
-use std::fmt::Write;
 use straightline_graph::expr::{Alike, Graph, NodeId, Op, Section};
 use straightline_graph::schedule::Part;
 
 impl Body<'_> {
     /// The statements of a part, with loops over limbs.
-    pub(super) fn with_loops(
-        &mut self,
-        plan: &mut Plan<'_>,
-        title: &dyn Fn(Section) -> String,
-        out: &mut FunctionText,
-    ) {
+    pub(super) fn with_loops(&mut self, plan: &mut Plan<'_>, lowering: &Lowering<'_>, out: &mut Vec<Statement>) {
         let graph = self.graph;
         let stretch = graph.stretches();
         let nodes = &plan.part.nodes;
@@ -47,8 +42,8 @@ impl Body<'_> {
             let here = stretch[nodes[done].index()];
             let count = nodes[done..].iter().take_while(|id| stretch[id.index()] == here).count();
             match here {
-                None => self.run(&nodes[done..done + count], plan, title, out),
-                Some(k) => self.limb_loop(&graph.alike[k], plan, &used_across, title, out),
+                None => self.run(&nodes[done..done + count], plan, lowering, out),
+                Some(k) => self.limb_loop(&graph.alike[k], plan, &used_across, lowering, out),
             }
             done += count;
         }
@@ -59,57 +54,44 @@ impl Body<'_> {
         alike: &Alike,
         plan: &Plan<'_>,
         used_across: &[bool],
-        title: &dyn Fn(Section) -> String,
-        out: &mut FunctionText,
+        lowering: &Lowering<'_>,
+        out: &mut Vec<Statement>,
     ) {
         let limbs = alike.limbs.len();
         // an odd limb is a lane of its own beside one that nobody reads: half a vector would take longer
         let count = if limbs > 2 { limbs.next_multiple_of(2) } else { limbs };
-        let scalar = self.style.scalar_name();
-        let limb = self.names.free("limb");
-        for body in &alike.limbs {
-            let _ = writeln!(out.text, "    // {}", comment(&title(Section { phase: "limb", index: Some(*body) })));
-        }
+        let index = self.names.free("limb");
+        let title = |body: &usize| (lowering.title)(Section { phase: "limb", index: Some(*body) });
+        out.extend(alike.limbs.iter().map(|body| Statement::Comment(title(body))));
         let Loop { graph, part, outside, results } = Loop::new(self.graph, alike, used_across);
 
-        // what comes from outside
-        let mut texts: Vec<(NodeId, String)> = Vec::new();
-        for (node, of_limbs) in &outside {
-            if of_limbs.len() == 1 {
-                texts.push((*node, self.operand(of_limbs[0]).0));
-                continue;
-            }
-            let last = of_limbs.last().into_iter().cycle();
-            let padded = of_limbs.iter().chain(last).take(count);
-            let values: Vec<String> = padded.map(|id| self.operand(*id).0).collect();
-            let are_constants = of_limbs.iter().all(|id| matches!(self.graph.op(*id), Op::Constant(_)));
-            let (declared, name) =
-                match (are_constants && !self.style.generic, self.graph.notes[of_limbs[0].index()].name) {
-                    (true, _) => ("static", self.names.numbered("C")),
-                    (false, Some((quantity, index, component))) => {
-                        ("let", self.names.named(&format!("{quantity}s"), index, component))
-                    }
-                    (false, None) => ("let", self.names.numbered("x")),
-                };
-            out.text.push_str(&wrapped(&format!("    {declared} {name}: [{scalar}; {count}] = ["), &values, "];"));
-            texts.push((*node, format!("{name}[{limb}]")));
-        }
+        let values: Vec<(NodeId, Expression)> = outside
+            .iter()
+            .map(|(node, of_limbs)| match of_limbs.as_slice() {
+                [same] => (*node, self.operand(*same)),
+                of_limbs => {
+                    let array = self.array_over_limbs(of_limbs, count, out);
+                    (*node, Expression::Element(array, Index::Loop(index.clone())))
+                }
+            })
+            .collect();
         // what goes there
         let filler = self.filler(plan.part);
-        let (mut arrays, mut names): (Vec<(NodeId, String)>, Vec<String>) = (Vec::new(), Vec::new());
+        let (mut arrays, mut names) = (Vec::new(), Vec::new());
         for (node, row) in &results {
             let name = match self.graph.notes[row[0].index()].name {
-                Some((quantity, index, component)) => self.names.named(&format!("{quantity}s"), index, component),
+                Some((quantity, body, component)) => self.names.named(&format!("{quantity}s"), body, component),
                 None => self.names.numbered("y"),
             };
-            let _ = writeln!(out.text, "    let mut {name} = [{filler}; {count}];");
-            arrays.push((*node, format!("{name}[{limb}]")));
+            out.push(Statement::Room { name: name.clone(), filler: filler.clone(), count });
+            arrays.push((*node, (name.clone(), index.clone())));
             names.push(name);
         }
 
-        let (mut inner, absorbed) = Body::new(&graph, &part, self.style, std::mem::take(&mut self.names));
-        for (node, text) in texts {
-            inner.text[node.index()] = Some((text, Binding::Atom));
+        let own = std::mem::take(&mut self.names);
+        let (mut inner, absorbed) = Body::new(&graph, &part, self.scope, self.target, own);
+        for (node, value) in values {
+            inner.values[node.index()] = Some(value);
         }
         let mut uses = vec![0u32; graph.ops.len()];
         let mut crosses = vec![false; graph.ops.len()];
@@ -120,28 +102,36 @@ impl Body<'_> {
             crosses[node.index()] = uses[node.index()] > 0;
         }
         let plan_of_loop = Plan { part: &part, uses, results_of: Vec::new(), crosses, absorbed, arrays };
-        let mut text = FunctionText::remark("");
-        text.text.clear();
-        inner.run(&part.nodes, &plan_of_loop, title, &mut text);
+        let mut body = Vec::new();
+        inner.run(&part.nodes, &plan_of_loop, lowering, &mut body);
         self.names = std::mem::take(&mut inner.names);
-        let _ = writeln!(out.text, "    for {limb} in 0..{count} {{");
-        for line in text.text.lines() {
-            let _ = writeln!(out.text, "    {line}");
-        }
-        out.text.push_str("    }\n");
-        out.uses_sin_cos |= text.uses_sin_cos;
-        out.uses_sqrt |= text.uses_sqrt;
+        out.push(Statement::Limbs { index, count, body });
 
-        for ((_, row), name) in results.iter().zip(&names) {
+        for ((_, row), name) in results.iter().zip(names) {
             for (limb, id) in row.iter().enumerate() {
-                self.text[id.index()] = Some((format!("{name}[{limb}]"), Binding::Atom));
+                self.values[id.index()] = Some(Expression::Element(name.clone(), Index::Number(limb)));
                 let first = plan.results_of.partition_point(|(r, _)| r < id);
                 for (_, k) in plan.results_of[first..].iter().take_while(|(r, _)| r == id) {
                     self.store_result(*id, *k);
                 }
             }
         }
-        out.text.push_str(&std::mem::take(&mut self.statements));
+        out.append(&mut self.statements);
+    }
+
+    /// The array of what limbs take from outside, one after the other; its name.
+    fn array_over_limbs(&mut self, of_limbs: &[NodeId], count: usize, out: &mut Vec<Statement>) -> String {
+        let last = of_limbs.last().into_iter().cycle();
+        let values = of_limbs.iter().chain(last).take(count).map(|id| self.operand(*id)).collect();
+        let are_constants = of_limbs.iter().all(|id| matches!(self.graph.op(*id), Op::Constant(_)));
+        let is_constant = are_constants && !self.scope.style.generic;
+        let name = match (is_constant, self.graph.notes[of_limbs[0].index()].name) {
+            (true, _) => self.names.numbered("C"),
+            (false, Some((quantity, body, component))) => self.names.named(&format!("{quantity}s"), body, component),
+            (false, None) => self.names.numbered("x"),
+        };
+        out.push(Statement::Array { name: name.clone(), values, is_constant });
+        name
     }
 }
 

@@ -1,0 +1,176 @@
+//! Constants of a robot: in the file, and associated with a type.
+
+use super::{number, ALLOW};
+use crate::emit::Generated;
+use crate::identifier::string_literals;
+use crate::report::errors::four_digits;
+use crate::report::FunctionReport;
+use std::fmt::Write;
+use straightline_core::drive::Drive;
+use straightline_core::model::Limits;
+use straightline_graph::Scalar;
+
+/// A constant.
+pub(super) struct Constant {
+    pub name: String,
+    /// What stands above it, line by line.
+    pub doc: String,
+    kind: Kind,
+    value: String,
+}
+
+/// The type of a constant.
+enum Kind {
+    Size,
+    Sizes(usize),
+    Names(usize),
+    /// Numbers of a scalar type in an array of that shape.
+    Numbers(Scalar, Vec<usize>),
+    Cost,
+}
+
+impl Constant {
+    fn new(name: impl Into<String>, kind: Kind, value: String, doc: impl Into<String>) -> Constant {
+        Constant { name: name.into(), doc: doc.into(), kind, value }
+    }
+
+    /// The type; `module` stands before types of the file.
+    pub fn kind(&self, module: &str) -> String {
+        match &self.kind {
+            Kind::Size => "usize".to_string(),
+            Kind::Sizes(n) => format!("[usize; {n}]"),
+            // of a constant of a type the lifetime has to be said
+            Kind::Names(n) if !module.is_empty() => format!("[&'static str; {n}]"),
+            Kind::Names(n) => format!("[&str; {n}]"),
+            Kind::Numbers(scalar, shape) => {
+                shape.iter().rev().fold(scalar.name().to_string(), |inner, n| format!("[{inner}; {n}]"))
+            }
+            Kind::Cost => format!("{module}Cost"),
+        }
+    }
+
+    /// The constant in a file.
+    pub fn text(&self) -> String {
+        let allow = if matches!(self.kind, Kind::Numbers(..)) { format!("{ALLOW}\n") } else { String::new() };
+        format!("{}{allow}pub const {}: {} = {};\n", super::doc(&self.doc), self.name, self.kind(""), self.value)
+    }
+}
+
+/// Sizes, names and limits.
+pub(super) fn of_robot(generated: &Generated) -> Vec<Constant> {
+    let Generated { model, frames, scalar, .. } = generated;
+    let mut joints: Vec<_> = model.bodies.iter().map(|b| &b.joint).collect();
+    joints.sort_by_key(|j| j.iv);
+    let single: Vec<_> = joints.iter().filter(|j| j.kind.is_single()).collect();
+    let names = |names: &mut dyn Iterator<Item = &str>| format!("[{}]", string_literals(names));
+    let size = |name: &str, value: usize, doc: &str| Constant::new(name, Kind::Size, value.to_string(), doc);
+    let joint_names = names(&mut joints.iter().map(|j| j.name.as_str()));
+    let frame_names = names(&mut frames.iter().map(String::as_str));
+    let mut constants = vec![
+        size("NQ", model.nq(), "Number of configuration coordinates q."),
+        size("NV", model.nv(), "Number of velocity coordinates qd, qdd, tau."),
+        Constant::new(
+            "JOINT_NAMES",
+            Kind::Names(joints.len()),
+            joint_names,
+            "Joints in the order of their coordinates.",
+        ),
+        Constant::new(
+            "FRAME_NAMES",
+            Kind::Names(frames.len()),
+            frame_names,
+            "Frames of the functions that answer per frame.",
+        ),
+    ];
+    let list = |f: &dyn Fn(&Limits) -> f64| {
+        let numbers: Vec<String> = single.iter().map(|j| number(f(&j.limits), *scalar)).collect();
+        format!("[{}]", numbers.join(", "))
+    };
+    let floating = if single.len() < joints.len() { " (the floating base is left out)" } else { "" };
+    for (name, doc, values) in [
+        ("LOWER_LIMITS", "Least coordinate of every joint \\[rad or m\\]", list(&|l| l.lower)),
+        ("UPPER_LIMITS", "Greatest coordinate of every joint \\[rad or m\\]", list(&|l| l.upper)),
+        ("VELOCITY_LIMITS", "Greatest speed of every joint \\[rad/s or m/s\\]", list(&|l| l.velocity)),
+        ("EFFORT_LIMITS", "Greatest drive of every joint \\[N·m or N\\]", list(&|l| l.effort)),
+    ] {
+        let doc = format!("{doc}{floating}; infinite where the robot file says nothing.");
+        constants.push(Constant::new(name, Kind::Numbers(*scalar, vec![single.len()]), values, doc));
+    }
+    let n = model.drives.len();
+    if n > 0 {
+        let drive_names = names(&mut model.drives.iter().map(|d| d.name.as_str()));
+        let states: Vec<usize> = model.drives.iter().map(Drive::states).collect();
+        constants.extend([
+            size("NU", n, "Number of inputs u of the drives."),
+            size("NX", states.iter().sum(), "Number of states x of the drives."),
+            Constant::new("DRIVE_NAMES", Kind::Names(n), drive_names, "Drives in the order of u."),
+            Constant::new(
+                "DRIVE_STATES",
+                Kind::Sizes(n),
+                format!("{states:?}"),
+                "How many entries of x each drive has.",
+            ),
+        ]);
+    }
+    constants
+}
+
+/// The type of the costs.
+pub(super) const COST: &str = "
+/// Operations of a generated function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cost {
+    /// Multiplications.
+    pub mul: u32,
+    /// Additions and subtractions.
+    pub add: u32,
+    /// Instructions for both when every a * b + c is one.
+    pub fma: u32,
+    /// Divisions.
+    pub div: u32,
+    /// Pairs of sine and cosine.
+    pub sin_cos: u32,
+    /// Most values alive at once, inputs and constants not counted.
+    pub max_live: u32,
+}
+";
+
+/// The cost of a function.
+pub(super) fn cost(name: &str, f: &FunctionReport) -> Constant {
+    let value = format!(
+        "Cost {{ mul: {}, add: {}, fma: {}, div: {}, sin_cos: {}, max_live: {} }}",
+        f.mul, f.add, f.fma, f.div, f.sincos, f.max_live
+    );
+    Constant::new(format!("{}_COST", name.to_uppercase()), Kind::Cost, value, format!("What [`{name}`] costs."))
+}
+
+/// The certified bounds of a function's errors.
+pub(super) fn error_bounds(name: &str, figures: &FunctionReport) -> Vec<Constant> {
+    let bounds = figures.errors.iter().flat_map(|errors| errors.outputs.iter().map(move |output| (errors, output)));
+    bounds
+        .map(|(errors, output)| {
+            let mut doc = format!(
+                "Certified bound of the errors of [`{name}`]: how far `{}` can be from the exact dynamics of the robot file.\n\n\
+                 Numbers of the file are the nearest f64; angles that were taken as exact are exact.\n\n\
+                 It holds for all inputs in these ranges:\n",
+                output.name
+            );
+            for line in &errors.ranges {
+                let _ = writeln!(doc, "* {}", line.replace('[', "\\[").replace(']', "\\]"));
+            }
+            let value = nested(&output.shape, &mut output.bounds.iter());
+            let kind = Kind::Numbers(Scalar::F64, output.shape.clone());
+            Constant::new(errors.constant_name(name, output), kind, value, doc)
+        })
+        .collect()
+}
+
+fn nested<'a>(shape: &[usize], numbers: &mut impl Iterator<Item = &'a f64>) -> String {
+    match shape.split_first() {
+        None => numbers.next().map_or(String::new(), |x| number(four_digits(*x), Scalar::F64)),
+        Some((n, rest)) => {
+            let parts: Vec<String> = (0..*n).map(|_| nested(rest, numbers)).collect();
+            format!("[{}]", parts.join(", "))
+        }
+    }
+}

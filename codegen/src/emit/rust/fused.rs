@@ -1,0 +1,123 @@
+//! The functions that compute a·b + c in one rounding, sines and cosines among them.
+
+use crate::emit::Style;
+
+/// The module `fused` of a file whose functions are fused; with sines and cosines if there is a module `trig` beside it.
+pub fn module(style: Style, with_kernel: bool) -> String {
+    let kernel = if with_kernel { KERNEL } else { "" };
+    let operation = if style.fused_by_caller { BY_CALLER } else { BY_STD };
+    [MODULE, operation, FMA, kernel, "}\n"].concat().replace("f64", style.scalar.name())
+}
+
+const MODULE: &str = r#"
+#[allow(unused_imports)]
+use fused::{fma, fma_if, FUSED};
+"#;
+
+const BY_STD: &str = r#"
+/// a·b + c in one rounding.
+///
+/// Only where the machine has it as an instruction, never by a call: the crate is compiled for one (`-C target-cpu`,
+/// `-C target-feature=+fma`), or a batch has asked. Otherwise a·b is rounded, and the sum again.
+#[allow(dead_code, unused_imports)]
+mod fused {
+    // the instruction is not to be had from `core`
+    #[cfg(not(target_os = "none"))]
+    extern crate std;
+
+    /// Whether this crate is compiled for a machine with the instruction, and with `std`.
+    pub const FUSED: bool =
+        cfg!(all(not(target_os = "none"), any(target_feature = "fma", all(target_arch = "aarch64", target_feature = "neon"))));
+    /// Whether it is one operation whatever the machine.
+    const ALWAYS: bool = false;
+
+    #[cfg(not(target_os = "none"))]
+    #[inline(always)]
+    fn mul_add(a: f64, b: f64, c: f64) -> f64 {
+        a.mul_add(b, c)
+    }
+
+    #[cfg(target_os = "none")]
+    #[inline(always)]
+    fn mul_add(a: f64, b: f64, c: f64) -> f64 {
+        a * b + c
+    }
+"#;
+
+const BY_CALLER: &str = r#"
+/// a·b + c in one rounding, by the function `mul_add_f64(a, b, c)` of this crate: always, with the same bits on every machine.
+#[allow(dead_code, unused_imports)]
+mod fused {
+    use crate::mul_add_f64 as mul_add;
+
+    /// a·b + c is one operation.
+    pub const FUSED: bool = true;
+    /// Whether it is one operation whatever the machine.
+    const ALWAYS: bool = true;
+"#;
+
+const FMA: &str = r#"
+    #[inline(always)]
+    pub fn fma(a: f64, b: f64, c: f64) -> f64 {
+        fma_if::<FUSED>(a, b, c)
+    }
+
+    #[inline(always)]
+    pub fn fma_if<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
+        if FUSED || ALWAYS {
+            mul_add(a, b, c)
+        } else {
+            a * b + c
+        }
+    }
+"#;
+
+const KERNEL: &str = r#"
+    use super::trig;
+
+    #[inline(always)]
+    pub fn sin_cos_f64(x: f64) -> (f64, f64) {
+        sin_cos_if_f64::<FUSED>(x)
+    }
+
+    #[inline(always)]
+    pub fn sin_cos_of_sum_f64(x: [f64; 2]) -> (f64, f64) {
+        sin_cos_of_sum_if_f64::<FUSED>(x)
+    }
+
+    #[inline(always)]
+    pub fn sin_cos_if_f64<const FUSED: bool>(x: f64) -> (f64, f64) {
+        if FUSED || ALWAYS {
+            trig::sin_cos_fused_f64(x, mul_add)
+        } else {
+            trig::sin_cos_f64(x)
+        }
+    }
+
+    #[inline(always)]
+    pub fn sin_cos_of_sum_if_f64<const FUSED: bool>(x: [f64; 2]) -> (f64, f64) {
+        if FUSED || ALWAYS {
+            trig::sin_cos_of_sum_fused_f64(x, mul_add)
+        } else {
+            trig::sin_cos_of_sum_f64(x)
+        }
+    }
+
+    #[inline(always)]
+    pub fn sin_cos_lanes_f64<const N: usize>(x: [f64; N]) -> ([f64; N], [f64; N]) {
+        if FUSED || ALWAYS {
+            trig::sin_cos_lanes_fused_f64(x, mul_add)
+        } else {
+            trig::sin_cos_lanes_f64(x)
+        }
+    }
+
+    #[inline(always)]
+    pub fn sin_cos_lanes_of_sums_f64<const N: usize>(x: [[f64; 2]; N]) -> ([f64; N], [f64; N]) {
+        if FUSED || ALWAYS {
+            trig::sin_cos_lanes_of_sums_fused_f64(x, mul_add)
+        } else {
+            trig::sin_cos_lanes_of_sums_f64(x)
+        }
+    }
+"#;
