@@ -213,6 +213,9 @@ fn links_of_the_guide_lead_somewhere() {
             let is_file = !target.contains("://") && (target.ends_with(".md") || target.ends_with(".svg"));
             let there = page.parent().expect("a page is in a folder").join(target);
             assert!(!is_file || there.exists(), "{} links to {link}", page.display());
+            // the book has no files of the repository
+            let leaves_the_book = page.starts_with(&folder) && target.starts_with("..");
+            assert!(!leaves_the_book, "{} links out of the book to {link}", page.display());
         }
     }
 }
