@@ -113,6 +113,9 @@ extern crate std;
 pub mod batch;
 #[cfg(feature = "std")]
 mod dispatch;
+#[cfg(any(docsrs, test))]
+#[rustfmt::skip]
+pub mod example;
 mod frame;
 #[cfg(feature = "nalgebra")]
 pub mod nalgebra;

@@ -17,8 +17,8 @@ mod blocks;
 mod parameters;
 
 /// The sources of what is pasted.
-const TRIG: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/core/src/trig.rs"));
-const BATCH: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/core/src/batch.rs"));
+const TRIG: &str = straightline_core::sources::TRIG;
+const BATCH: &str = straightline_core::sources::BATCH;
 
 /// Checksums of what is the same in all files, in f64: what changes there has to be looked at, and written here again.
 const FIXED: &[(Sort, u32, &[u64])] = &[

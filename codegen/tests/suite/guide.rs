@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use straightline_codegen::description;
 use straightline_codegen::function::{Extent, Family, Parts, Spec};
 use straightline_codegen::scene;
-use straightline_codegen::Function;
+use straightline_codegen::{compile, Function, Options, Source};
 use straightline_core::joint::{Dialect, KINDS};
 
 pub(crate) fn package() -> PathBuf {
@@ -16,7 +16,12 @@ pub(crate) fn package() -> PathBuf {
 
 /// Compares a page with what is printed, or rewrites it.
 pub(crate) fn compare(page: &str, printed: &str) {
-    let path = package().join("../guide/src").join(page);
+    compare_file(&format!("guide/src/{page}"), printed);
+}
+
+/// The same of any file that is printed.
+fn compare_file(page: &str, printed: &str) {
+    let path = package().join("..").join(page);
     if std::env::var_os("UPDATE_EXPECTED").is_some() {
         std::fs::write(&path, printed).expect("the guide can be written");
     }
@@ -25,7 +30,7 @@ pub(crate) fn compare(page: &str, printed: &str) {
     let line = differs.unwrap_or_else(|| written.lines().count().min(printed.lines().count()));
     assert!(
         written == printed,
-        "guide/src/{page}:{} is not what the tables say:\n  written: {:?}\n  printed: {:?}",
+        "{page}:{} is not what the tables say:\n  written: {:?}\n  printed: {:?}",
         line + 1,
         written.lines().nth(line),
         printed.lines().nth(line)
@@ -216,6 +221,40 @@ fn links_of_the_guide_lead_somewhere() {
             // the book has no files of the repository
             let leaves_the_book = page.starts_with(&folder) && target.starts_with("..");
             assert!(!leaves_the_book, "{} links out of the book to {link}", page.display());
+        }
+    }
+}
+
+/// What the documentation of the package `straightline` shows beside the derive.
+#[test]
+fn the_module_that_the_documentation_shows_is_what_the_compiler_writes() {
+    let robot = std::fs::read_to_string(package().join("../runtime/examples/arm.toml")).expect("the robot is there");
+    let functions = ["inverse_dynamics", "forward_kinematics", "mass_matrix"];
+    let functions = functions.map(|name| Function::from_name(name).expect("it is a function")).to_vec();
+    let generated = compile(&Source::new("arm.toml", robot), &Options { functions, ..Options::default() });
+    let head = "//! What `straightline generate examples/arm.toml` writes of three functions, as it is: shown by the documentation alone.\n\n";
+    compare_file("runtime/src/example.rs", &format!("{head}{}", generated.expect("the robot is right").text));
+}
+
+/// A package that is published has no files of the repository around it.
+#[test]
+fn sources_include_nothing_from_outside_their_packages() {
+    let mut folders: Vec<PathBuf> =
+        ["src", "graph/src", "macros/src", "cli/src", "../runtime/src", "../runtime/core/src", "../simulation/src"]
+            .map(|folder| package().join(folder))
+            .to_vec();
+    let folder_of_tests = package().join("src/program/equivalence/mutants.rs");
+    while let Some(folder) = folders.pop() {
+        for path in std::fs::read_dir(&folder).expect("it is a folder").map(|e| e.expect("it can be read").path()) {
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let text = std::fs::read_to_string(&path).expect("sources are texts");
+            let leaves = |line: &&str| line.contains("include_str!(") && line.contains("../");
+            let is_documentation = |line: &&str| line.starts_with("#[doc = ");
+            let wrong: Vec<&str> = text.lines().filter(leaves).filter(|line| !is_documentation(line)).collect();
+            assert!(wrong.is_empty() || path == folder_of_tests, "{}: {wrong:?}", path.display());
         }
     }
 }

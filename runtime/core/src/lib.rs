@@ -32,6 +32,7 @@ pub mod real;
 pub mod reduced;
 #[cfg(feature = "reference")]
 pub mod reference;
+pub mod sources;
 pub mod spatial;
 pub mod taylor;
 pub mod trig;

@@ -11,7 +11,7 @@ use std::fmt::Write;
 use straightline_graph::expr::Port;
 
 /// The drivers' source, pasted as it is where generated code depends on `core` alone.
-const BATCH: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/core/src/batch.rs"));
+const BATCH: &str = straightline_core::sources::BATCH;
 
 /// The function over lanes, and what runs it on batches.
 pub(super) fn lanes<F>(item: &Item<F>, body: &Routine, drivers: Lanes) -> String {

@@ -39,7 +39,7 @@ pub fn c_package(generated: &Generated, prefix: &str) -> Vec<(String, String)> {
 }
 
 /// What chooses the vector instructions of the machine, pasted as it is.
-const DISPATCH: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/src/dispatch.rs"));
+const DISPATCH: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/pasted/dispatch.rs"));
 
 /// The layouts of batches, with where component `c` of state `s` is.
 pub(super) const LAYOUTS: [(&str, &str); 2] = [("soa", "[c * n + s]"), ("aos", "[s * w + c], w numbers to a state")];

@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use std::fmt::Write;
 
 /// The kernel's source, pasted as it is: generated code depends on `core` alone.
-const TRIG: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/core/src/trig.rs"));
+const TRIG: &str = straightline_core::sources::TRIG;
 
 /// Writes the file: header and items, no inner attributes, so that it can be included anywhere.
 pub fn file(generated: &Generated) -> String {
