@@ -174,57 +174,10 @@ impl<'t> Run<'_, 't> {
                 Ok(self.values.long(0.0, 0.0))
             }
             t::T if format == Format::Any && self.known.generic && self.ahead(3) == Kind::Word(t::CONSTANT) => {
-                // T::constant(Dd::from(f64::from(body.0[3])))
-                self.at += 1;
-                self.mark(b':')?;
-                self.mark(b':')?;
-                self.at += 1;
-                self.mark(b'(')?;
-                for word in [t::DD, t::F64] {
-                    self.items.keyword(&mut self.at, word)?;
-                    self.mark(b':')?;
-                    self.mark(b':')?;
-                    self.items.keyword(&mut self.at, t::FROM)?;
-                    self.mark(b'(')?;
-                }
-                let (cell, _, mutable) = self.cell()?;
-                (0..3).try_for_each(|_| self.mark(b')'))?;
-                if mutable {
-                    return self.items.stop(start, "a constant that may change");
-                }
-                Ok(self.cells[cell])
+                self.constant_of_cell(start)
             }
-            t::NUMBER if format == Format::Any && self.known.generic => {
-                self.at += 1;
-                self.mark(b':')?;
-                self.mark(b':')?;
-                self.mark(b'<')?;
-                self.items.keyword(&mut self.at, t::T)?;
-                self.mark(b'>')?;
-                self.mark(b'(')?;
-                let high = self.signed_literal()?;
-                self.mark(b',')?;
-                let low = self.signed_literal()?;
-                self.mark(b')')?;
-                Ok(self.values.long(high, low))
-            }
-            // f64::from(x), of x in f32
-            t::F64 if (of, format) == (Format::F64, Format::F32) => {
-                self.at += 1;
-                self.mark(b':')?;
-                self.mark(b':')?;
-                self.items.keyword(&mut self.at, t::FROM)?;
-                self.mark(b'(')?;
-                // numbers alone would be of f64; beside a value they have its format
-                if self.begins_with_a_number() && !self.names_a_value() {
-                    return self.stop("a number of no format");
-                }
-                let value = self.number(Format::F32, format)?;
-                self.mark(b')')?;
-                let widened = self.values.widened(value);
-                self.demand(widened, start)?;
-                Ok(widened)
-            }
+            t::NUMBER if format == Format::Any && self.known.generic => self.number_in_two(),
+            t::F64 if (of, format) == (Format::F64, Format::F32) => self.widened(start, format),
             t::TRIG | t::T if self.ahead(1) == Kind::Mark(b':') => {
                 let function = self.kernel(of)?;
                 self.mark(b'(')?;
@@ -240,6 +193,62 @@ impl<'t> Run<'_, 't> {
             }
             _ => self.stop("a name that stands for nothing here"),
         }
+    }
+
+    /// `T::constant(Dd::from(f64::from(body.0[3])))`
+    fn constant_of_cell(&mut self, start: usize) -> Ran<Value> {
+        self.at += 1;
+        self.mark(b':')?;
+        self.mark(b':')?;
+        self.at += 1;
+        self.mark(b'(')?;
+        for word in [t::DD, t::F64] {
+            self.items.keyword(&mut self.at, word)?;
+            self.mark(b':')?;
+            self.mark(b':')?;
+            self.items.keyword(&mut self.at, t::FROM)?;
+            self.mark(b'(')?;
+        }
+        let (cell, _, mutable) = self.cell()?;
+        (0..3).try_for_each(|_| self.mark(b')'))?;
+        if mutable {
+            return self.items.stop(start, "a constant that may change");
+        }
+        Ok(self.cells[cell])
+    }
+
+    /// `number::<T>(high, low)`
+    fn number_in_two(&mut self) -> Ran<Value> {
+        self.at += 1;
+        self.mark(b':')?;
+        self.mark(b':')?;
+        self.mark(b'<')?;
+        self.items.keyword(&mut self.at, t::T)?;
+        self.mark(b'>')?;
+        self.mark(b'(')?;
+        let high = self.signed_literal()?;
+        self.mark(b',')?;
+        let low = self.signed_literal()?;
+        self.mark(b')')?;
+        Ok(self.values.long(high, low))
+    }
+
+    /// `f64::from(x)`, of x in f32
+    fn widened(&mut self, start: usize, format: Format) -> Ran<Value> {
+        self.at += 1;
+        self.mark(b':')?;
+        self.mark(b':')?;
+        self.items.keyword(&mut self.at, t::FROM)?;
+        self.mark(b'(')?;
+        // numbers alone would be of f64; beside a value they have its format
+        if self.begins_with_a_number() && !self.names_a_value() {
+            return self.stop("a number of no format");
+        }
+        let value = self.number(Format::F32, format)?;
+        self.mark(b')')?;
+        let widened = self.values.widened(value);
+        self.demand(widened, start)?;
+        Ok(widened)
     }
 
     pub(super) fn signed_literal(&mut self) -> Ran<f64> {
