@@ -1,7 +1,8 @@
 //! Every text that can be said of robot files (of scenes: `scene/messages.rs`), one function per message.
 //!
 //! A message names the value, says what is wrong or what was assumed, and what to write instead. Its place is added with
-//! [`Diagnostic::at`]. The tests in `tests/messages` hold the exact text of each; [`CODES`] is the list that they cover.
+//! [`Diagnostic::at`]. The tests in `tests/messages` hold the exact text of each; [`CODES`] is the list that they cover. It is one file,
+//! however long: a message is looked for in one place.
 
 use crate::diagnostic::wording::{cut, did_you_mean, list, six_digits};
 use crate::diagnostic::Diagnostic;

@@ -1,5 +1,5 @@
 //! Every text that can be said of a scene, one function per message; what its TOML shares with robot files stands in
-//! [`crate::description::messages`]. The tests in `tests/messages/scene` hold the exact text of each.
+//! [`crate::description::messages`]. The tests in `tests/messages/scene` hold the exact text of each. It is one file, however long, as that is.
 
 use crate::diagnostic::wording::{cut, did_you_mean, list, six_digits};
 use crate::diagnostic::Diagnostic;
