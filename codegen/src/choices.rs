@@ -121,59 +121,40 @@ impl Choice for Scalar {
     }
 }
 
-impl Choice for Grade {
-    const WHAT: &'static str = "set of rules";
-    fn words() -> Vec<(&'static str, &'static str, Self)> {
-        vec![
-            ("all", "fewest operations; rounding may differ from the generic runtime", Grade::Algebraic),
-            ("exact", "the generic runtime, bit for bit", Grade::Exact),
-        ]
-    }
+/// Choices: what is chosen, and every word with its choice and its meaning.
+macro_rules! choices {
+    ($($type:ident $what:literal { $($word:literal $choice:ident $meaning:literal,)* })*) => {$(
+        impl Choice for $type {
+            const WHAT: &'static str = $what;
+            fn words() -> Vec<(&'static str, &'static str, Self)> {
+                vec![$(($word, $meaning, $type::$choice)),*]
+            }
+        }
+    )*};
 }
 
-impl Choice for ForwardDynamicsMethod {
-    const WHAT: &'static str = "method of forward dynamics";
-    fn words() -> Vec<(&'static str, &'static str, Self)> {
-        vec![
-            ("cheaper", "whichever takes fewer operations for this robot", ForwardDynamicsMethod::Cheaper),
-            ("articulated-body", "articulated bodies", ForwardDynamicsMethod::ArticulatedBody),
-            ("factorisation", "mass matrix and its branch-sparse factor", ForwardDynamicsMethod::Factorisation),
-        ]
+choices! {
+    Grade "set of rules" {
+        "all" Algebraic "fewest operations; rounding may differ from the generic runtime",
+        "exact" Exact "the generic runtime, bit for bit",
     }
-}
-
-impl Choice for LimbForm {
-    const WHAT: &'static str = "form of identical limbs";
-    fn words() -> Vec<(&'static str, &'static str, Self)> {
-        vec![
-            ("apart", "each by itself, with its own constants: fewest operations", LimbForm::Apart),
-            ("lanes", "as lanes of one body: least code, and least time where there are four", LimbForm::Lanes),
-            ("auto", "as lanes where that is measured to be faster, otherwise apart", LimbForm::Auto),
-        ]
+    ForwardDynamicsMethod "method of forward dynamics" {
+        "cheaper" Cheaper "whichever takes fewer operations for this robot",
+        "articulated-body" ArticulatedBody "articulated bodies",
+        "factorisation" Factorisation "mass matrix and its branch-sparse factor",
     }
-}
-
-impl Choice for Lanes {
-    const WHAT: &'static str = "home of the batches";
-    fn words() -> Vec<(&'static str, &'static str, Self)> {
-        vec![
-            ("standalone", "core alone; the vector instructions that the crate is compiled for", Lanes::Standalone),
-            ("runtime", "the package `straightline`: the machine's instructions, and threads", Lanes::Runtime),
-        ]
+    LimbForm "form of identical limbs" {
+        "apart" Apart "each by itself, with its own constants: fewest operations",
+        "lanes" Lanes "as lanes of one body: least code, and least time where there are four",
+        "auto" Auto "as lanes where that is measured to be faster, otherwise apart",
     }
-}
-
-impl Choice for Fusion {
-    const WHAT: &'static str = "way to fuse";
-    fn words() -> Vec<(&'static str, &'static str, Self)> {
-        vec![
-            ("std", "as the machine can, by std: the last bits depend on it then", Fusion::Std),
-            (
-                "caller",
-                "always, by `mul_add_f64` of the crate around the output, which needs core alone",
-                Fusion::Caller,
-            ),
-        ]
+    Lanes "home of the batches" {
+        "standalone" Standalone "core alone; the vector instructions that the crate is compiled for",
+        "runtime" Runtime "the package `straightline`: the machine's instructions, and threads",
+    }
+    Fusion "way to fuse" {
+        "std" Std "as the machine can, by std: the last bits depend on it then",
+        "caller" Caller "always, by `mul_add_f64` of the crate around the output, which needs core alone",
     }
 }
 

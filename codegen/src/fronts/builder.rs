@@ -78,47 +78,10 @@ impl Builder {
         self
     }
 
-    /// These functions only.
-    pub fn functions(self, functions: impl IntoIterator<Item = Function>) -> Self {
-        self.option("functions", Value::of_choices(functions))
-    }
-
-    /// The frames (links) of the functions that answer per frame; otherwise the tips of the robot.
-    pub fn frames(self, frames: impl IntoIterator<Item = impl Into<String>>) -> Self {
-        self.option("frames", Value::of_words(frames))
-    }
-
-    /// The scalar type; otherwise f64.
-    pub fn scalar(self, scalar: Scalar) -> Self {
-        self.option("scalar", scalar)
-    }
-
     /// Several scalar types: the first as [`Builder::scalar`], for each of the others a module `single` or `double` with the
     /// same items.
     pub fn scalars(self, scalars: impl IntoIterator<Item = Scalar>) -> Self {
         self.option("scalar", Value::of_choices(scalars))
-    }
-
-    /// Beside every function the same over lanes of states and over batches.
-    pub fn lanes(self, lanes: Lanes) -> Self {
-        self.option("lanes", lanes)
-    }
-
-    /// Whether plain functions take any scalar that is a `straightline::Real`: f32, f64, double-double, dual numbers, types of
-    /// your own. The code depends on the package `straightline`. Lanes, batches and stages keep [`Builder::scalar`].
-    pub fn generic(self, generic: bool) -> Self {
-        self.option("generic", generic)
-    }
-
-    /// a·b + c in one rounding: by `std`, where the machine has it, so that last bits are other ones there than elsewhere; or by the crate
-    /// around the code.
-    pub fn fma(self, by: Fusion) -> Self {
-        self.option("fma", by)
-    }
-
-    /// The weakest rewrite rules allowed; with [`Grade::Exact`] the code is the generic runtime, bit for bit.
-    pub fn rules(self, grade: Grade) -> Self {
-        self.option("rules", grade)
     }
 
     /// Bounds the rounding errors of every function, as constants beside the functions: see [`certify`](straightline_graph::certify).
@@ -129,61 +92,6 @@ impl Builder {
             None => certified,
         };
         timed.option("certify_boxes", effort.boxes)
-    }
-
-    /// Of f32, computes in f64 what it takes for certified errors up to so much, in the results' units, and nothing else.
-    pub fn mixed_precision(self, max_error: f64) -> Self {
-        self.option("mixed_precision", max_error)
-    }
-
-    /// How identical limbs are computed; otherwise each by itself.
-    pub fn limbs(self, form: LimbForm) -> Self {
-        self.option("limbs", form)
-    }
-
-    /// How forward dynamics is computed; otherwise the cheaper way for this robot.
-    pub fn forward_dynamics(self, method: ForwardDynamicsMethod) -> Self {
-        self.option("forward_dynamics", method)
-    }
-
-    /// Functions of more operations are cut into parts.
-    pub fn max_part_operations(self, operations: usize) -> Self {
-        self.option("max_part_operations", operations)
-    }
-
-    /// Whether the root link moves freely in the world.
-    pub fn floating_base(self, floating: bool) -> Self {
-        self.option("floating_base", floating)
-    }
-
-    /// The joints in the order of their coordinates, all of them; otherwise depth first, as in the file.
-    pub fn joint_order(self, joints: impl IntoIterator<Item = impl Into<String>>) -> Self {
-        self.option("joint_order", Value::of_words(joints))
-    }
-
-    /// So near to a multiple of 30 or 45 degrees \[rad\] an angle is taken as that; 0: every angle as it is written.
-    pub fn angle_tolerance(self, tolerance: f64) -> Self {
-        self.option("angle_tolerance", tolerance)
-    }
-
-    /// Acceleration due to gravity in the world \[m/s²\]; otherwise the file's, or (0, 0, −9.81).
-    pub fn gravity(self, gravity: [f64; 3]) -> Self {
-        self.option("gravity", gravity)
-    }
-
-    /// Warnings of this code are not said; `"warnings"`: none.
-    pub fn allow(self, code: impl Into<String>) -> Self {
-        self.option("allow", Value::of_words([code]))
-    }
-
-    /// Warnings of this code are said, whatever a scene or an earlier call says.
-    pub fn warn(self, code: impl Into<String>) -> Self {
-        self.option("warn", Value::of_words([code]))
-    }
-
-    /// Warnings of this code are errors; `"warnings"`: all.
-    pub fn deny(self, code: impl Into<String>) -> Self {
-        self.option("deny", Value::of_words([code]))
     }
 
     /// A scene file (`SCENES.md`), relative to the package's manifest: what is wanted of the robot, and what is held. Options
@@ -280,6 +188,59 @@ impl Builder {
         write_file_apart(&file, &generated.text, [robot].into_iter().chain(scene)).map_err(Error::Write)?;
         Ok(generated)
     }
+}
+
+/// Methods that give the option of their name a value.
+macro_rules! options {
+    ($($(#[$doc:meta])* $name:ident($value:ident: $type:ty) = $given:expr;)*) => {
+        impl Builder {$(
+            $(#[$doc])*
+            pub fn $name(self, $value: $type) -> Self {
+                self.option(stringify!($name), $given)
+            }
+        )*}
+    };
+}
+
+options! {
+    /// These functions only.
+    functions(functions: impl IntoIterator<Item = Function>) = Value::of_choices(functions);
+    /// The frames (links) of the functions that answer per frame; otherwise the tips of the robot.
+    frames(frames: impl IntoIterator<Item = impl Into<String>>) = Value::of_words(frames);
+    /// The scalar type; otherwise f64.
+    scalar(scalar: Scalar) = scalar;
+    /// Beside every function the same over lanes of states and over batches.
+    lanes(lanes: Lanes) = lanes;
+    /// Whether plain functions take any scalar that is a `straightline::Real`: f32, f64, double-double, dual numbers, types of
+    /// your own. The code depends on the package `straightline`. Lanes, batches and stages keep [`Builder::scalar`].
+    generic(generic: bool) = generic;
+    /// a·b + c in one rounding: by `std`, where the machine has it, so that last bits are other ones there than elsewhere; or by the crate
+    /// around the code.
+    fma(by: Fusion) = by;
+    /// The weakest rewrite rules allowed; with [`Grade::Exact`] the code is the generic runtime, bit for bit.
+    rules(grade: Grade) = grade;
+    /// Of f32, computes in f64 what it takes for certified errors up to so much, in the results' units, and nothing else.
+    mixed_precision(max_error: f64) = max_error;
+    /// How identical limbs are computed; otherwise each by itself.
+    limbs(form: LimbForm) = form;
+    /// How forward dynamics is computed; otherwise the cheaper way for this robot.
+    forward_dynamics(method: ForwardDynamicsMethod) = method;
+    /// Functions of more operations are cut into parts.
+    max_part_operations(operations: usize) = operations;
+    /// Whether the root link moves freely in the world.
+    floating_base(floating: bool) = floating;
+    /// The joints in the order of their coordinates, all of them; otherwise depth first, as in the file.
+    joint_order(joints: impl IntoIterator<Item = impl Into<String>>) = Value::of_words(joints);
+    /// So near to a multiple of 30 or 45 degrees \[rad\] an angle is taken as that; 0: every angle as it is written.
+    angle_tolerance(tolerance: f64) = tolerance;
+    /// Acceleration due to gravity in the world \[m/s²\]; otherwise the file's, or (0, 0, −9.81).
+    gravity(gravity: [f64; 3]) = gravity;
+    /// Warnings of this code are not said; `"warnings"`: none.
+    allow(code: impl Into<String>) = Value::of_words([code]);
+    /// Warnings of this code are said, whatever a scene or an earlier call says.
+    warn(code: impl Into<String>) = Value::of_words([code]);
+    /// Warnings of this code are errors; `"warnings"`: all.
+    deny(code: impl Into<String>) = Value::of_words([code]);
 }
 
 /// What goes where.

@@ -265,20 +265,26 @@ impl Row {
             Front::Derive if self.example.is_empty() => name.to_string(),
             Front::Derive if self.is_list() => format!("{name}({})", self.quoted(!is_item)),
             Front::Derive => format!("{name} = {}", self.quoted(!is_item)),
-            Front::Builder if self.example.is_empty() => format!(".option({name:?}, true)"),
-            Front::Builder if self.is_list() => format!(".option({name:?}, [{}])", self.quoted(true)),
-            Front::Builder => format!(".option({name:?}, {})", self.quoted(true)),
+            Front::Builder => format!(".option({name:?}, {})", self.bracketed()),
         }
     }
 
     /// Its example as a scene file writes it.
     pub fn written_in_scene(&self) -> String {
+        format!("{} = {}", self.name, self.bracketed())
+    }
+
+    fn bracketed(&self) -> String {
         match self.example {
-            [] => format!("{} = true", self.name),
-            _ if self.is_list() => format!("{} = [{}]", self.name, self.quoted(true)),
-            _ => format!("{} = {}", self.name, self.quoted(true)),
+            [] => "true".to_string(),
+            _ if self.is_list() => format!("[{}]", self.quoted(true)),
+            _ => self.quoted(true),
         }
     }
+}
+
+fn row_of(name: &str) -> &'static Row {
+    TABLE.iter().find(|row| row.name == name).expect("what was given is in the table")
 }
 
 /// Options that were given, with their values.
@@ -326,20 +332,16 @@ impl Settings {
     /// Adds others, which count before these.
     pub fn extend(&mut self, others: &Settings) {
         for (name, value) in &others.given {
-            let row = TABLE.iter().find(|row| row.name == *name).expect("what was given is in the table");
-            self.give(row, value.clone(), Front::CommandLine).expect("it was right when it was given");
+            self.give(row_of(name), value.clone(), Front::CommandLine).expect("it was right when it was given");
         }
     }
 
     /// Sets them, in the order of the table; levels of warnings in the order in which they were given.
     pub fn apply(&self, options: &mut Options) {
-        let of_groups =
-            |is_reporting: bool| TABLE.iter().filter(move |r| (r.group == Group::Reporting) == is_reporting);
-        for row in of_groups(false) {
-            self.value(row.name).into_iter().for_each(|value| (row.set)(options, value));
-        }
-        for (name, value) in &self.given {
-            of_groups(true).filter(|row| row.name == *name).for_each(|row| (row.set)(options, value));
-        }
+        let levels = TABLE.iter().position(|row| row.group == Group::Reporting);
+        let place = |name: &str| TABLE.iter().position(|row| row.name == name).min(levels);
+        let mut given: Vec<_> = self.given.iter().collect();
+        given.sort_by_key(|(name, _)| place(name));
+        given.into_iter().for_each(|(name, value)| (row_of(name).set)(options, value));
     }
 }

@@ -29,11 +29,17 @@ fn options(settings: &Settings) -> Options {
 /// Names of the methods by which a builder is given something.
 fn methods() -> BTreeSet<String> {
     let source = std::fs::read_to_string(package().join("src/fronts/builder.rs")).unwrap();
-    let names = source
-        .lines()
-        .filter_map(|line| line.strip_prefix("    pub fn "))
-        .filter(|line| line.contains("self, ") && !line.contains("&self"));
-    names.map(|line| line.split(['(', '<']).next().unwrap().to_string()).collect()
+    // written out, or as a line of the table of methods
+    let by_hand = |line: &str| line.contains("self, ") && !line.contains("&self");
+    let method = |line: &str| match line.strip_prefix("    pub fn ") {
+        Some(method) => by_hand(method).then(|| method.split(['(', '<']).next().unwrap().to_string()),
+        None => line
+            .strip_prefix("    ")
+            .filter(|line| line.contains(") = "))
+            .map(|line| line.split('(').next().unwrap().to_string()),
+    };
+    let names = source.lines().filter_map(method);
+    names.filter(|name| !name.is_empty() && name.chars().all(|c| c.is_ascii_lowercase() || c == '_')).collect()
 }
 
 #[test]
