@@ -1,7 +1,7 @@
 //! The tables `[[contact]]`, `[[loop]]`, `[[mode]]` and `[stabilisation]`.
 
 use super::SceneReader;
-use crate::description::reader::Range64;
+use crate::description::reader::Reader;
 use crate::description::table::Table;
 use crate::description::Value;
 use crate::scene::contact::{
@@ -42,20 +42,15 @@ impl SceneReader<'_> {
         if let Some(table) = self.reader.table_at(top, "stabilisation", "[stabilisation]") {
             self.reader.check_keys(&table, &["frequency", "damping"]);
             self.reader.require(&table, "frequency", "frequency = 50.0");
-            let frequency = self.reader.real_at(&table, "frequency", Range64::Finite);
-            let frequency = self.noted("stabilisation.frequency", frequency);
-            let damping = self.reader.real_at(&table, "damping", Range64::Finite);
-            let damping = self.noted("stabilisation.damping", damping).unwrap_or(1.0);
+            let frequency = self.real("stabilisation", &table, "frequency");
+            let damping = self.real("stabilisation", &table, "damping").unwrap_or(1.0);
             self.file.scene.contacts.stabilisation = frequency.map(|f| (f, damping));
         }
     }
 
     fn coordinates(&mut self, path: &str, table: &Table, key: &str) -> Vec<Coordinate> {
         let known: Vec<&str> = Coordinate::ALL.iter().map(|c| c.name()).collect();
-        if let Some((_, span)) = table.get(key) {
-            let place = self.reader.place(&span);
-            self.file.scene.places.note(path, &place);
-        }
+        table.get(key).iter().for_each(|(_, span)| self.note(path, span));
         let mut found = Vec::new();
         for name in self.reader.names_at(table, key, "coordinate") {
             match Coordinate::ALL.into_iter().find(|c| c.name() == name.value) {
@@ -70,15 +65,11 @@ impl SceneReader<'_> {
     }
 
     /// Name, its place noted, and the table under it.
-    fn named_table(&mut self, path: &str, kind: &str, table: &mut Table) -> Option<String> {
-        self.reader.require(table, "name", "name = \"...\"");
-        let name = self.reader.name_at(table, "name", kind);
-        if let Some(name) = &name {
-            table.owner = format!("{kind} `{}`", name.value);
-        }
-        let place = self.reader.place(&table.span);
-        self.file.scene.places.note(path, &place);
-        self.noted(&format!("{path}.name"), name)
+    pub(super) fn named_table(&mut self, path: &str, kind: &str, table: &mut Table) -> Option<String> {
+        let name = self.needed(path, table, "name", kind);
+        name.iter().for_each(|name| table.owner = format!("{kind} `{name}`"));
+        self.note(path, &table.span);
+        name
     }
 
     fn contact(&mut self, mut table: Table) {
@@ -88,20 +79,15 @@ impl SceneReader<'_> {
             &["name", "frame", "axis", "object", "surface", "constrained", "free", "friction", "environment"];
         self.reader.check_keys(&table, KEYS);
         for (key, example) in [
-            ("frame", "frame = \"tool\""),
             ("object", "object = { origin = [0.5, 0.0, 0.2], z = [0.0, 0.0, 1.0] }"),
             ("constrained", "constrained = [\"pz\"]"),
         ] {
             self.reader.require(&table, key, example);
         }
-        let frame = self.reader.name_at(&table, "frame", "frame");
-        let frame = self.noted(&format!("{path}.frame"), frame);
+        let frame = self.needed(&path, &table, "frame", "frame");
         let axis = match is_input(&table, "axis") {
             true => None,
-            false => {
-                let axis = self.reader.vector_at(&table, "axis");
-                Some(self.noted(&format!("{path}.axis"), axis).unwrap_or([0.0, 0.0, 1.0]))
-            }
+            false => Some(self.at(&path, &table, "axis", Reader::vector_at).unwrap_or([0.0, 0.0, 1.0])),
         };
         let object = match is_input(&table, "object") {
             true => None,
@@ -116,12 +102,10 @@ impl SceneReader<'_> {
         let friction = self.reader.table_at(&table, "friction", &table.what("friction")).and_then(|friction| {
             self.reader.check_keys(&friction, &["coefficient", "speed"]);
             self.reader.require(&friction, "coefficient", "coefficient = 0.3");
-            let coefficient = self.reader.real_at(&friction, "coefficient", Range64::Finite);
-            let coefficient = self.noted(&format!("{path}.friction.coefficient"), coefficient);
-            let speed = self.reader.real_at(&friction, "speed", Range64::Finite);
-            let speed = self.noted(&format!("{path}.friction.speed"), speed).unwrap_or(1e-3);
-            let place = self.reader.place(&friction.span);
-            self.file.scene.places.note(format!("{path}.friction"), &place);
+            let path = format!("{path}.friction");
+            let coefficient = self.real(&path, &friction, "coefficient");
+            let speed = self.real(&path, &friction, "speed").unwrap_or(1e-3);
+            self.note(&path, &friction.span);
             coefficient.map(|c| (c, speed))
         });
         let environment = self.environment(&path, &table);
@@ -141,12 +125,9 @@ impl SceneReader<'_> {
             _ => self.reader.table_at(table, "object", &table.what("object"))?,
         };
         self.reader.check_keys(&object, &["origin", "z", "x"]);
-        let place = self.reader.place(&object.span);
-        self.file.scene.places.note(format!("{path}.object"), &place);
-        let mut vector = |key: &str| {
-            let vector = self.reader.vector_at(&object, key);
-            self.noted(&format!("{path}.object.{key}"), vector)
-        };
+        let path = format!("{path}.object");
+        self.note(&path, &object.span);
+        let mut vector = |key: &str| self.at(&path, &object, key, Reader::vector_at);
         let (origin, z, x) = (vector("origin"), vector("z"), vector("x"));
         let z = z.unwrap_or([0.0, 0.0, 1.0]);
         // of the world's axes the one that is farthest from Z
@@ -170,14 +151,13 @@ impl SceneReader<'_> {
             Form::Quadric => &["kind", "matrix", "linear", "constant"],
         };
         self.reader.check_keys(&surface, keys);
-        let place = self.reader.place(&surface.span);
-        self.file.scene.places.note(format!("{path}.surface"), &place);
+        let path = format!("{path}.surface");
+        self.note(&path, &surface.span);
         match form {
             Form::Plane => SurfaceItem::Plane,
             Form::Sphere | Form::Cylinder => {
                 self.reader.require(&surface, "radius", "radius = 0.2");
-                let radius = self.reader.real_at(&surface, "radius", Range64::Finite);
-                let radius = self.noted(&format!("{path}.surface.radius"), radius).unwrap_or(1.0);
+                let radius = self.real(&path, &surface, "radius").unwrap_or(1.0);
                 let hollow = self.reader.flag_at(&surface, "hollow").is_some_and(|f| f.value);
                 match form {
                     Form::Sphere => SurfaceItem::Sphere { radius, hollow },
@@ -186,10 +166,10 @@ impl SceneReader<'_> {
             }
             Form::Quadric => {
                 self.reader.require(&surface, "matrix", "matrix = { xx = 1.0, yy = 1.0, zz = 4.0 }");
-                let matrix = self.reader.tensor_at(&surface, "matrix");
-                let matrix = matrix.map(|m| m.value).map_or([0.0; 6], |m| [m.xx, m.xy, m.xz, m.yy, m.yz, m.zz]);
-                let linear = self.reader.vector_at(&surface, "linear").map_or([0.0; 3], |v| v.value);
-                let constant = self.reader.real_at(&surface, "constant", Range64::Finite).map_or(0.0, |v| v.value);
+                let matrix = self.at(&path, &surface, "matrix", Reader::tensor_at);
+                let matrix = matrix.map_or([0.0; 6], |m| [m.xx, m.xy, m.xz, m.yy, m.yz, m.zz]);
+                let linear = self.at(&path, &surface, "linear", Reader::vector_at).unwrap_or_default();
+                let constant = self.real(&path, &surface, "constant").unwrap_or_default();
                 SurfaceItem::Quadric { matrix, linear, constant }
             }
         }
@@ -197,8 +177,8 @@ impl SceneReader<'_> {
 
     fn environment(&mut self, path: &str, table: &Table) -> Option<EnvironmentItem> {
         let environment = self.reader.table_at(table, "environment", &table.what("environment"))?;
-        let place = self.reader.place(&environment.span);
-        self.file.scene.places.note(format!("{path}.environment"), &place);
+        let path = format!("{path}.environment");
+        self.note(&path, &environment.span);
         self.reader.require(&environment, "kind", "kind = \"mass\"");
         let kind = self.reader.word_at(&environment, "kind", &EnvironmentKind::WORDS)?.value;
         if environment.has("parameters") {
@@ -210,8 +190,7 @@ impl SceneReader<'_> {
         let mut values = Vec::new();
         for key in kind.keys() {
             self.reader.require(&environment, key, &format!("{key} = 1.0"));
-            let value = self.reader.real_at(&environment, key, Range64::Finite);
-            values.push(self.noted(&format!("{path}.environment.{key}"), value).unwrap_or(1.0));
+            values.push(self.real(&path, &environment, key).unwrap_or(1.0));
         }
         Some(EnvironmentItem { kind, values: Some(values) })
     }
@@ -220,11 +199,7 @@ impl SceneReader<'_> {
         let path = format!("loop.{}", self.file.scene.contacts.loops.len());
         let name = self.named_table(&path, "loop", &mut table);
         self.reader.check_keys(&table, &["name", "frame", "with", "constrained"]);
-        let mut frame = |key: &str| {
-            self.reader.require(&table, key, &format!("{key} = \"...\""));
-            let frame = self.reader.name_at(&table, key, "frame");
-            self.noted(&format!("{path}.{key}"), frame)
-        };
+        let mut frame = |key: &str| self.needed(&path, &table, key, "frame");
         let (frame, with) = (frame("frame"), frame("with"));
         let constrained = match table.has("constrained") {
             true => self.coordinates(&format!("{path}.constrained"), &table, "constrained"),
