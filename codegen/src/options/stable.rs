@@ -119,137 +119,65 @@ macro_rules! worded {
 fields! {
     Limits = { "operations": operations, }
     ModelOptions = {
-        "floating_base": floating_base,
-        "joint_order": joint_order,
-        "angle_tolerance": angle_tolerance,
-        "gravity": gravity,
-        "frames": frames,
-        "flexible": flexible,
-        "support": support,
-        "rigid_links": rigid_links,
+        "floating_base": floating_base, "joint_order": joint_order, "angle_tolerance": angle_tolerance,
+        "gravity": gravity, "frames": frames, "flexible": flexible, "support": support, "rigid_links": rigid_links,
     }
     FrameOption : { "name": name, "link": link, "xyz": xyz, "rpy": rpy, }
     Effort : { "boxes": boxes, "time": time, "state": companions, }
     Optimisations : {
-        "folding": folding,
-        "algebraic": algebraic,
-        "reduced": reduced,
-        "sums": sums,
-        "chosen": chosen,
-        "forms": forms,
-        "angle_sums": angle_sums,
-        "cheaper": cheaper,
-        "limbs": limbs,
-        "substitutes": substitutes,
+        "folding": folding, "algebraic": algebraic, "reduced": reduced, "sums": sums, "chosen": chosen, "forms": forms,
+        "angle_sums": angle_sums, "cheaper": cheaper, "limbs": limbs, "substitutes": substitutes,
     }
     Forms : {
-        "stays": stays,
-        "origins": origins,
-        "tips": tips,
-        "parameters": parameters,
-        "rotations": rotations,
+        "stays": stays, "origins": origins, "tips": tips, "parameters": parameters, "rotations": rotations,
         "unit": unit,
     }
     Scene = {
-        "outputs": outputs,
-        "by_columns": by_columns,
-        "gravity": gravity,
-        "base": base,
-        "locked": locked,
-        "payload": payloads,
-        "drive": drives,
-        "flexible": flexible,
-        "support": support,
-        "zero": zero,
-        "effects": effects,
-        "parameter": parameters,
-        "contacts": contacts,
-        "staged": staged,
-        "budget": budgets,
-        "ranges": ranges,
-        .. places
+        "outputs": outputs, "by_columns": by_columns, "gravity": gravity, "base": base, "locked": locked,
+        "payload": payloads, "drive": drives, "flexible": flexible, "support": support, "zero": zero,
+        "effects": effects, "parameter": parameters, "contacts": contacts, "staged": staged, "budget": budgets,
+        "ranges": ranges, .. places
     }
     Selection = { "joints": joints, "frames": frames, "part": part, }
     Payload : { "name": name, "frame": frame, "mass": mass, "com": com, "inertia": inertia, }
     Zero = { "qd": qd, "qdd": qdd, "joints_at_rest": joints_at_rest, }
     Effects = {
-        "rotor_inertia": rotor_inertia,
-        "damping": damping,
-        "coulomb": coulomb,
-        "springs": springs,
-        "transmission_losses": transmission_losses,
-        "elastic_transmissions": elastic_transmissions,
+        "rotor_inertia": rotor_inertia, "damping": damping, "coulomb": coulomb, "springs": springs,
+        "transmission_losses": transmission_losses, "elastic_transmissions": elastic_transmissions,
         "elastic_links": elastic_links,
     }
     Budget = {
-        "max_flops": max_flops,
-        "max_sincos": max_sincos,
-        "max_live": max_live,
-        "max_stack_bytes": max_stack_bytes,
-        "max_code_bytes": max_code_bytes,
-        "max_error": max_error,
-        "mixed_precision": mixed_precision,
+        "max_flops": max_flops, "max_sincos": max_sincos, "max_live": max_live, "max_stack_bytes": max_stack_bytes,
+        "max_code_bytes": max_code_bytes, "max_error": max_error, "mixed_precision": mixed_precision,
     }
     Ranges = { "q": q, "qd": qd, "qdd": qdd, "tau": tau, "gravity": gravity, }
     Interval : { "lower": lower, "upper": upper, }
     Contacts = {
-        "contact": contacts,
-        "loop": loops,
-        "mode": modes,
-        "stabilisation": stabilisation,
-        "functions": functions,
+        "contact": contacts, "loop": loops, "mode": modes, "stabilisation": stabilisation, "functions": functions,
     }
     ContactItem : {
-        "name": name,
-        "frame": frame,
-        "axis": axis,
-        "object": object,
-        "surface": surface,
-        "constrained": constrained,
-        "free": free,
-        "friction": friction,
-        "environment": environment,
+        "name": name, "frame": frame, "axis": axis, "object": object, "surface": surface, "constrained": constrained,
+        "free": free, "friction": friction, "environment": environment,
     }
     ObjectPose : { "origin": origin, "z": z, "x": x, }
     EnvironmentItem : { "kind": kind, "values": values, }
     LoopItem : { "name": name, "frame": frame, "with": with, "constrained": constrained, }
     ModeItem : { "name": name, "contacts": contacts, "sticking": sticking, }
     Drive : {
-        "name": name,
-        "joints": joints,
-        "actuator": actuator,
-        "stages": stages,
-        "efficiency": efficiency,
-        "input_limit": input_limit,
-        "current_limit": current_limit,
-        "rotor": rotor,
-        "rating": rating,
-        .. written
+        "name": name, "joints": joints, "actuator": actuator, "stages": stages, "efficiency": efficiency,
+        "input_limit": input_limit, "current_limit": current_limit, "rotor": rotor, "rating": rating, .. written
     }
     Stage : {
-        "ratio": ratio,
-        "stiffness": stiffness,
-        "damping": damping,
-        "input_inertia": input_inertia,
-        "output_inertia": output_inertia,
-        "efficiency": efficiency,
+        "ratio": ratio, "stiffness": stiffness, "damping": damping, "input_inertia": input_inertia,
+        "output_inertia": output_inertia, "efficiency": efficiency,
     }
     Rating = { "speed": speed, "continuous_current": continuous_current, "thermal": thermal, }
     Thermal : {
-        "winding_housing": winding_housing,
-        "housing_ambient": housing_ambient,
-        "winding_time": winding_time,
-        "housing_time": housing_time,
-        "ambient": ambient,
-        "limit": limit,
+        "winding_housing": winding_housing, "housing_ambient": housing_ambient, "winding_time": winding_time,
+        "housing_time": housing_time, "ambient": ambient, "limit": limit,
     }
     Flexible : {
-        "link": link,
-        "from": from,
-        "to": to,
-        "segments": segments,
-        "bending": bending,
-        "torsion": torsion,
+        "link": link, "from": from, "to": to, "segments": segments, "bending": bending, "torsion": torsion,
         "damping": damping,
     }
     Support : { "at": at, "directions": directions, .. place }
@@ -263,11 +191,8 @@ variants! {
     JointRanges { "limits": Limits, "all": All(range), "joints": Joints(ranges), }
     MaxError { "all": All(most), "each": Each(most), "outputs": Outputs(most), }
     SurfaceItem {
-        "plane": Plane,
-        "sphere": Sphere { radius, hollow },
-        "cylinder": Cylinder { radius, hollow },
-        "quadric": Quadric { matrix, linear, constant },
-        "implicit": Implicit(surface),
+        "plane": Plane, "sphere": Sphere { radius, hollow }, "cylinder": Cylinder { radius, hollow },
+        "quadric": Quadric { matrix, linear, constant }, "implicit": Implicit(surface),
     }
     Bending { "none": None, "round": Round(stiffness), "about": About(axes), }
 }

@@ -14,10 +14,9 @@ use std::time::Duration;
 use straightline_graph::certify::Effort;
 use straightline_graph::expr::Grade;
 use straightline_graph::Scalar;
-use Call::As;
+use Call::{As, Not};
 use Group::{Front, Model};
 use Kind::{Codes, Names, OfFront, Real, Vector, Whole, Word, Words};
-use Place::{Also, In, Key};
 
 /// What an option takes.
 pub enum Kind {
@@ -52,21 +51,6 @@ pub enum Call {
     /// Otherwise.
     As(&'static str),
     /// Not at all, and why.
-    Not(&'static str),
-}
-
-/// Where an option stands in a scene file.
-#[derive(Clone, Copy)]
-pub enum Place {
-    /// In `[options]`.
-    Options,
-    /// There, or in this table.
-    Also(&'static str),
-    /// In this table only.
-    In(&'static str),
-    /// A key of the scene says it.
-    Key(&'static str),
-    /// Nowhere, and why.
     Not(&'static str),
 }
 
@@ -105,8 +89,12 @@ pub struct Row {
     pub macros: Call,
     /// In build scripts.
     pub builder: Call,
-    /// In scene files.
-    pub scene: Place,
+    /// In scene files: a key of its table, or of the scene.
+    pub scene: Call,
+    /// Its table in scene files.
+    pub table: &'static str,
+    /// Another table that has it, too.
+    pub also: &'static str,
     /// The names that it writes into the text that hashes are made of.
     pub hash: &'static [&'static str],
     /// Sets it.
@@ -126,7 +114,9 @@ impl Row {
         command_line: Call::Name,
         macros: Call::Name,
         builder: Call::Name,
-        scene: Place::Options,
+        scene: Call::Name,
+        table: "options",
+        also: "",
         hash: &[],
         set: |_, _| (),
     };
@@ -138,17 +128,17 @@ const LEVEL: Row = Row {
     default: "every warning is said",
     example: &["near-right-angle"],
     metavar: "CODE",
-    scene: Place::In("diagnostics"),
+    table: "diagnostics",
     ..Row::DEFAULT
 };
-const ELSEWHERE: Place = Place::Not("where something is read or written is not the scene's business");
+const ELSEWHERE: Call = Not("where something is read or written is not the scene's business");
 
 /// All options.
 #[rustfmt::skip]
 pub static TABLE: &[Row] = &[
     Row { name: "functions", kind: Words(Vocabulary::of::<Function>()), default: "all", metavar: "NAME", command_line: As("function"),
         doc: "The functions that are generated",
-        scene: In("outputs"), example: &["inverse_dynamics", "mass_matrix"], hash: &["functions"],
+        table: "outputs", example: &["inverse_dynamics", "mass_matrix"], hash: &["functions"],
         set: |options, value| {
             options.functions = value.choices();
             options.functions.sort_unstable();
@@ -159,7 +149,7 @@ pub static TABLE: &[Row] = &[
         example: &["tool"], hash: &["frames"], set: |options, value| options.frames = value.names().to_vec(), ..OF },
     Row { name: "scalar", kind: Words(Vocabulary::of::<Scalar>()), default: "f64", metavar: "SCALAR",
         doc: "The scalar type; of several each but the first has a module `single` or `double` with the same items",
-        scene: Also("numbers"), example: &["f32"], hash: &["scalar"],
+        also: "numbers", example: &["f32"], hash: &["scalar"],
         set: |options, value| if let [first, others @ ..] = &value.choices()[..] {
             (options.scalar, options.also) = (*first, others.to_vec());
         }, ..OF },
@@ -181,28 +171,28 @@ pub static TABLE: &[Row] = &[
         example: &["articulated-body"], hash: &["forward_dynamics"], set: |options, value| options.forward_dynamics = value.choice(), ..OF },
     Row { name: "limbs", kind: Word(Vocabulary::of::<LimbForm>(), None), default: "apart", metavar: "FORM",
         doc: "How identical limbs are computed",
-        scene: Also("outputs"), example: &["auto"], hash: &["limbs"], set: |options, value| options.limbs = value.choice(), ..OF },
+        also: "outputs", example: &["auto"], hash: &["limbs"], set: |options, value| options.limbs = value.choice(), ..OF },
     Row { name: "max_part_operations", kind: Whole("a whole number from 100", |n| n >= 100.0), default: "12000", metavar: "N",
         doc: "Longer functions are cut into parts of at most so many operations",
         example: &["100"], hash: &["limits", "operations"], set: |options, value| options.limits.operations = value.count(), ..OF },
     Row { name: "certify_seconds", kind: Real("above 0 and up to 86400 s", |s| s > 0.0 && s <= Effort::MOST_SECONDS), metavar: "SECONDS",
         doc: "Certify bounds of errors, tighter ones, for so long per function and scalar type [s]; bounds then depend on the machine",
-        default: "as long as it takes", scene: Also("numbers"), example: &["0.5"], hash: &["certify"],
+        default: "as long as it takes", also: "numbers", example: &["0.5"], hash: &["certify"],
         set: |options, value| {
             let effort = options.certify.get_or_insert_default();
             (effort.boxes, effort.time) = (Effort::MOST_BOXES, Some(Duration::from_secs_f64(value.number())));
         }, ..OF },
     Row { name: "certify_boxes", kind: Whole("between 1 and 100000", |n| n >= 1.0 && n <= Effort::MOST_BOXES as f64), metavar: "N",
         doc: "Certify bounds of errors, tighter ones: the ranges of each result are cut into so many boxes",
-        default: "1, or as many as `certify_seconds` allows", scene: Also("numbers"), example: &["40"], hash: &["certify"],
+        default: "1, or as many as `certify_seconds` allows", also: "numbers", example: &["40"], hash: &["certify"],
         set: |options, value| options.certify.get_or_insert_default().boxes = value.count(), ..OF },
     Row { name: "certify_state",
         doc: "Certify bounds of errors, and beside every function write `…_error_bound`, which bounds the errors at the state at hand",
-        scene: Also("numbers"), hash: &["certify"],
+        also: "numbers", hash: &["certify"],
         set: |options, value| if value.flag() { options.certify.get_or_insert_default().companions = true }, ..OF },
     Row { name: "certify", // behind the others: `false` is none of them
         doc: "Certify a bound of the errors of every function, for the ranges of its inputs",
-        scene: Also("numbers"), hash: &["certify"],
+        also: "numbers", hash: &["certify"],
         set: |options, value| options.certify = value.flag().then(|| options.certify.unwrap_or_default()), ..OF },
     Row { name: "mixed_precision", kind: Real("a number above 0", |x| x > 0.0), metavar: "MAX_ERROR",
         doc: "Of f32, compute in f64 what it takes for certified errors up to so much, in the results' units, and nothing else",
@@ -213,7 +203,7 @@ pub static TABLE: &[Row] = &[
         }, ..OF },
     Row { name: "floating_base", group: Model, default: "as the robot file says",
         doc: "The root link moves freely: q begins with its position and quaternion (x y z qx qy qz qw)",
-        scene: Key("`base = \"floating\"` in [hold]"), hash: &["model", "floating_base"],
+        scene: As("`base = \"floating\"` in [hold]"), hash: &["model", "floating_base"],
         set: |options, value| options.model.floating_base = value.flag(), ..OF },
     Row { name: "joint_order", kind: Names { commas: true }, group: Model, default: "depth first, as in the file", metavar: "A,B,C",
         doc: "All joints in the order of their coordinates",
@@ -221,11 +211,11 @@ pub static TABLE: &[Row] = &[
         set: |options, value| options.model.joint_order = Some(value.names().to_vec()), ..OF },
     Row { name: "angle_tolerance", kind: Real("between 0 and 0.1 rad", |x| (0.0..=0.1).contains(&x)), group: Model, metavar: "RAD",
         doc: "So near to a multiple of 30 or 45 degrees [rad] an angle is taken as that; 0: every angle as it is written",
-        default: "1e-15, rounding only", scene: Also("numbers"), example: &["1e-6"], hash: &["model", "angle_tolerance"],
+        default: "1e-15, rounding only", also: "numbers", example: &["1e-6"], hash: &["model", "angle_tolerance"],
         set: |options, value| options.model.angle_tolerance = value.number(), ..OF },
     Row { name: "gravity", kind: Vector, group: Model, default: "the robot file's, or 0, 0, -9.81", metavar: "X,Y,Z",
         doc: "Acceleration due to gravity in the world [m/s²]",
-        scene: Key("`gravity` in [hold]"), example: &["0", "0", "-1.62"], hash: &["model", "gravity"],
+        scene: As("`gravity` in [hold]"), example: &["0", "0", "-1.62"], hash: &["model", "gravity"],
         set: |options, value| options.model.gravity = Some(value.vector()), ..OF },
     Row { name: "allow", kind: Codes(Level::Allow),
         doc: "Say no warnings of this code (`warnings`: none); `straightline explain` lists the codes",
@@ -238,16 +228,16 @@ pub static TABLE: &[Row] = &[
         set: |options, value| options.reporting.levels.set_all(value.names(), Level::Deny), ..LEVEL },
     Row { name: "scene", kind: OfFront, group: Front, default: "everything is wanted, nothing held", metavar: "FILE", builder: As("scene_file"),
         doc: "A scene: what is wanted of the robot, and what is held; everything else is skipped",
-        example: &["scenes/still.toml"], scene: Place::Not("the file is the scene"), ..OF },
+        example: &["scenes/still.toml"], scene: Not("the file is the scene"), ..OF },
     Row { name: "module", kind: OfFront, group: Front, default: "none; in a build script the robot file's name",
         doc: "The name of the module that everything stands in (of the derive, beside the type; in a build script of its file)",
-        example: &["arm_dynamics"], command_line: Call::Not("`--output` names the file"), scene: ELSEWHERE, ..OF },
+        example: &["arm_dynamics"], command_line: Not("`--output` names the file"), scene: ELSEWHERE, ..OF },
     Row { name: "output", kind: OfFront, group: Front, default: "standard output; in a build script cargo's `OUT_DIR`", builder: As("out_dir"),
         doc: "Where to write",
-        example: &["src/arm.rs"], macros: Call::Not("a macro writes no file"), scene: ELSEWHERE, ..OF },
+        example: &["src/arm.rs"], macros: Not("a macro writes no file"), scene: ELSEWHERE, ..OF },
     Row { name: "quiet", kind: OfFront, group: Front,
         doc: "Say no warnings, show no progress",
-        macros: Call::Not("there is no progress to show; `allow(\"warnings\")` says no warnings"),
-        builder: Call::Not("there is no progress to show; `.allow(\"warnings\")` says no warnings"),
-        scene: Place::Not("`allow = [\"warnings\"]` in [diagnostics] says no warnings"), ..OF },
+        macros: Not("there is no progress to show; `allow(\"warnings\")` says no warnings"),
+        builder: Not("there is no progress to show; `.allow(\"warnings\")` says no warnings"),
+        scene: Not("`allow = [\"warnings\"]` in [diagnostics] says no warnings"), ..OF },
 ];

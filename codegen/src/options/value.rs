@@ -1,6 +1,6 @@
 //! What is given for options, and in which words: the same in every front.
 
-use super::table::{Call, Group, Kind, Place, Row, TABLE};
+use super::table::{Call, Group, Kind, Row, TABLE};
 use super::Options;
 use crate::choices::{Choice, UnknownWord};
 use crate::diagnostic::wording::did_you_mean;
@@ -151,12 +151,7 @@ impl Row {
 
     /// Whether it is a key of that table of a scene file.
     pub fn stands_in(&self, table: &str) -> bool {
-        match self.scene {
-            Place::Options => table == "options",
-            Place::Also(other) => ["options", other].contains(&table),
-            Place::In(only) => table == only,
-            Place::Key(_) | Place::Not(_) => false,
-        }
+        matches!(self.scene, Call::Name) && [self.table, self.also].contains(&table)
     }
 
     /// What is wrong with one word or name of its value.
@@ -180,14 +175,15 @@ impl Row {
 
     /// What is wrong with its value.
     pub fn wrong(&self, value: &Value, front: Front) -> Vec<Diagnostic> {
-        let of_number = |x: &[f64]| x.iter().filter_map(|x| self.wrong_number(*x)).collect();
         match (&self.kind, value) {
-            (Kind::Flag, Value::Flag(_)) | (Kind::Names { .. }, Value::Words(_)) => Vec::new(),
+            (Kind::Flag, Value::Flag(_)) => Vec::new(),
             (Kind::Word(..), Value::Words(words)) if words.len() != 1 => vec![self.wrong_form(front)],
-            (Kind::Word(..) | Kind::Words(_) | Kind::Codes(_), Value::Words(words)) => {
+            (Kind::Word(..) | Kind::Words(_) | Kind::Names { .. } | Kind::Codes(_), Value::Words(words)) => {
                 words.iter().filter_map(|word| self.wrong_word(word)).collect()
             }
-            (Kind::Real(..) | Kind::Whole(..), Value::Numbers(numbers)) if numbers.len() == 1 => of_number(numbers),
+            (Kind::Real(..) | Kind::Whole(..), Value::Numbers(x)) if x.len() == 1 => {
+                self.wrong_number(x[0]).into_iter().collect()
+            }
             (Kind::Vector, Value::Numbers(xyz)) if xyz.len() == 3 && xyz.iter().all(|x| x.is_finite()) => Vec::new(),
             _ => vec![self.wrong_form(front)],
         }

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use straightline_codegen::certify::Effort;
 use straightline_codegen::diagnostic::{Diagnostics, Front, Source};
-use straightline_codegen::options::table::{Call, Group, Kind, Place, Row, TABLE};
+use straightline_codegen::options::table::{Call, Group, Kind, Row, TABLE};
 use straightline_codegen::options::{scene_file, Settings};
 use straightline_codegen::{compile, Builder, Options};
 
@@ -83,12 +83,10 @@ fn builders_and_scenes_set_what_the_rows_set() {
             continue;
         }
         let wanted = settings(row);
-        let table = match row.scene {
-            Place::Options => "options",
-            Place::Also(table) | Place::In(table) => table,
-            Place::Key(_) | Place::Not(_) => continue,
-        };
-        for table in BTreeSet::from([table, if matches!(row.scene, Place::In(_)) { table } else { "options" }]) {
+        if !matches!(row.scene, Call::Name) {
+            continue;
+        }
+        for table in [row.table, row.also].into_iter().filter(|table| !table.is_empty()) {
             let text = format!("[{table}]\n{}\n", row.written_in_scene());
             let mut complaints = Diagnostics::new();
             let file = scene_file::read(&Source::new("scene.toml", text), &mut complaints);
@@ -226,11 +224,11 @@ a run at once.\n\n\
         let command_line = written(Front::CommandLine, row.command_line);
         let (macros, builder) = (written(Front::Derive, row.macros), written(Front::Builder, row.builder));
         let scene = match row.scene {
-            Place::Options => format!("`{}`", row.written_in_scene()),
-            Place::Also(table) => format!("`{}`, also in `[{table}]`", row.written_in_scene()),
-            Place::In(table) => format!("`{}` in `[{table}]`", row.written_in_scene()),
-            Place::Key(key) => key.replace("[hold]", "`[hold]`"),
-            Place::Not(why) => not(why),
+            Call::As(key) => key.replace("[hold]", "`[hold]`"),
+            Call::Not(why) => not(why),
+            Call::Name if row.table != "options" => format!("`{}` in `[{}]`", row.written_in_scene(), row.table),
+            Call::Name if row.also.is_empty() => format!("`{}`", row.written_in_scene()),
+            Call::Name => format!("`{}`, also in `[{}]`", row.written_in_scene(), row.also),
         };
         let _ = writeln!(page, "| `{}` | {command_line} | {macros} | {builder} | {scene} |", row.name);
     }
@@ -285,13 +283,10 @@ fn documents_have_the_options_of_the_table() {
     compare_table("runtime/src/lib.rs", "//! ", "| option | without it |", &of_macros);
     let of_scenes: Vec<String> = TABLE
         .iter()
-        .filter_map(|row| {
-            let or = match row.scene {
-                Place::Options => String::new(),
-                Place::Also(table) => format!("`[{table}]`"),
-                Place::In(_) | Place::Key(_) | Place::Not(_) => return None,
-            };
-            Some(format!("| `{}` | {or} | {} | {} |", row.written_in_scene(), explained(row), default(row)))
+        .filter(|row| row.stands_in("options"))
+        .map(|row| {
+            let or = if row.also.is_empty() { String::new() } else { format!("`[{}]`", row.also) };
+            format!("| `{}` | {or} | {} | {} |", row.written_in_scene(), explained(row), default(row))
         })
         .collect();
     compare_table("codegen/SCENES.md", "", "| key of `[options]` | or in | is | default |", &of_scenes);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use straightline_codegen::diagnostic::Front;
 use straightline_codegen::fronts::expansion::{expand, SceneOf};
-use straightline_codegen::options::table::{Group, Place, Row, TABLE};
+use straightline_codegen::options::table::{Call, Group, Row, TABLE};
 use straightline_codegen::options::{Settings, Value};
 use straightline_codegen::{compile, Builder, Options, Source};
 
@@ -107,12 +107,10 @@ fn an_option_gives_the_same_bytes_through_every_front() {
         let built = builder.option(row.name, row.parse(row.example, Front::Builder).unwrap()).run(&here, &here);
         check("a build script", &built.result.unwrap_or_else(|error| panic!("{error}: {}", built.person)).text);
 
-        let table = match row.scene {
-            Place::Options => "options",
-            Place::Also(table) | Place::In(table) => table,
-            Place::Key(_) | Place::Not(_) => continue,
-        };
-        fs::write(here.join("scene.toml"), format!("[{table}]\n{}\n", row.written_in_scene())).unwrap();
+        if !matches!(row.scene, Call::Name) {
+            continue;
+        }
+        fs::write(here.join("scene.toml"), format!("[{}]\n{}\n", row.table, row.written_in_scene())).unwrap();
         let scene = functions.iter().cloned().chain(["--scene=scene.toml".to_string()]);
         check("a scene file", &by_command_line(&here, &scene.collect::<Vec<_>>()));
         let mut others = Settings::default();

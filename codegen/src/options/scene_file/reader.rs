@@ -54,6 +54,9 @@ pub fn read(source: &Source, top: &Table, diagnostics: &mut Diagnostics) -> Scen
     scene.file
 }
 
+/// How a table is read.
+type Read<'a> = fn(&mut SceneReader<'a>, &Table);
+
 /// A scene file that is being read.
 struct SceneReader<'a> {
     reader: Reader<'a>,
@@ -63,7 +66,7 @@ struct SceneReader<'a> {
 impl<'a> SceneReader<'a> {
     fn read(&mut self, top: &Table) {
         self.reader.check_keys(top, &[LISTS, TABLES].concat());
-        let tables: [(&str, fn(&mut Self, &Table)); 8] = [
+        let tables: [(&str, Read<'a>); 8] = [
             ("outputs", Self::outputs),
             ("hold", Self::hold),
             ("zero", Self::zero),

@@ -5,7 +5,7 @@ use crate::description::messages;
 use crate::description::reader::Range64;
 use crate::description::table::Table;
 use crate::diagnostic::Front;
-use crate::options::table::{Kind, Place, Row, TABLE};
+use crate::options::table::{Call, Kind, Row, TABLE};
 use crate::options::value::{Value, Vocabulary};
 use crate::scene::messages as say;
 use std::ops::Range;
@@ -21,13 +21,12 @@ impl SceneReader<'_> {
     pub(super) fn own_options(&mut self, table: &Table) {
         let known = options_of("options");
         for key in table.table.keys().filter(|key| !known.contains(&key.get_ref().as_ref())) {
-            let complaint = messages::unknown_key(&table.owner, key.get_ref(), &known);
             let elsewhere = TABLE.iter().find(|row| row.name == key.get_ref().as_ref()).map(|row| match row.scene {
-                Place::In(other) => format!("it stands in [{other}]"),
-                Place::Key(other) => format!("write {other}"),
-                Place::Not(why) => why.to_string(),
-                Place::Options | Place::Also(_) => unreachable!("a key of [options] is known"),
+                Call::Name => format!("it stands in [{}]", row.table),
+                Call::As(other) => format!("write {other}"),
+                Call::Not(why) => why.to_string(),
             });
+            let complaint = messages::unknown_key(&table.owner, key.get_ref(), &known);
             let complaint = elsewhere.into_iter().fold(complaint, |complaint, help| complaint.help(help));
             self.reader.complain(&key.span(), complaint);
         }
@@ -40,8 +39,7 @@ impl SceneReader<'_> {
             let Some((_, span)) = table.get(row.name) else { continue };
             let place = self.reader.place(&span);
             if self.file.settings.has(row.name) {
-                let Place::Also(other) = row.scene else { continue };
-                self.reader.diagnostics.push(say::written_twice(row.name, other).at(&place));
+                self.reader.diagnostics.push(say::written_twice(row.name, row.also).at(&place));
             }
             let Some(value) = self.option(table, row, &span) else { continue };
             self.file.scene.places.note(format!("options.{}", row.name), &place);
