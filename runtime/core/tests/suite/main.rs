@@ -9,5 +9,6 @@ mod integrate;
 mod measure;
 mod reference;
 mod support;
+mod taylor;
 mod trig;
 mod two_authors;
