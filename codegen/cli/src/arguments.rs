@@ -1,10 +1,12 @@
 //! The command line, and what it says in the library's terms.
 
-use crate::given::Given;
+use crate::given::{possible, Given};
+use clap::builder::TypedValueParser;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use straightline_codegen::emit::package::PACKAGES;
 use straightline_codegen::identifier::is_prefix;
 use straightline_codegen::options::table::Group;
 use straightline_codegen::options::Settings;
@@ -243,8 +245,11 @@ pub struct Export {
     /// The directory to write: new, empty, or an earlier export, whose files are replaced; others stay
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Functions with C's calling convention, and a header (the only kind of package so far)
-    #[arg(long, required = true)]
+    /// The kind of package
+    #[arg(long = "as", value_name = "KIND", value_parser = packages(), required_unless_present = "c_abi")]
+    pub kind: Option<String>,
+    /// Short for `--as c-abi`
+    #[arg(long, conflicts_with = "kind")]
     pub c_abi: bool,
     /// How the C names begin [default: the robot's name]
     #[arg(long, value_parser = |text: &str| {
@@ -255,6 +260,11 @@ pub struct Export {
     pub program: ProgramArgs,
     #[command(flatten)]
     pub model: ModelArgs,
+}
+
+/// The kinds of packages.
+fn packages() -> impl TypedValueParser<Value = String> {
+    possible(PACKAGES.iter().map(|p| (p.name, p.doc)).collect())
 }
 
 /// What is generated, and how.

@@ -69,7 +69,8 @@ fn argument(row: &'static Row) -> Arg {
     }
 }
 
-fn possible(words: Vec<(&'static str, &'static str)>) -> impl TypedValueParser<Value = String> {
+/// One of these words, each with its meaning.
+pub fn possible(words: Vec<(&'static str, &'static str)>) -> impl TypedValueParser<Value = String> {
     PossibleValuesParser::new(words.into_iter().map(|(word, meaning)| PossibleValue::new(word).help(meaning)))
 }
 

@@ -26,7 +26,9 @@ use std::process::ExitCode;
 use straightline_cli::html;
 use straightline_codegen::compile::{compile, explain};
 use straightline_codegen::diagnostic::{self, codes, Diagnostics, Severity, Source};
-use straightline_codegen::emit::{rust::c_package as export, Generated};
+use straightline_codegen::emit::package::PACKAGES;
+use straightline_codegen::emit::rust::c_package::C_ABI;
+use straightline_codegen::emit::Generated;
 use straightline_codegen::options::{check_options, scene_file, Options, SceneFile};
 use straightline_codegen::{description, identifier, model, output, scene, verify};
 
@@ -202,18 +204,15 @@ fn verify(a: &Verify) -> Result<(), Failure> {
 }
 
 fn export(a: &Export) -> Result<(), Failure> {
-    if options(Some(&a.program), &a.model)?.generic {
-        print::error("C has no generic functions");
-        print::help("leave out `generic`; `scalar` says which numbers the C functions take");
-        return Err(Failure::Input);
-    }
     let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;
-    if !generated.others.is_empty() || generated.report.staged.is_some() {
-        print::error("a C package has one scalar type, and no stages: C could not tell a stage that is out of date");
-        print::help("say which with `--scalar`, and leave `staged` out of the scene");
+    let name = a.kind.as_deref().unwrap_or(C_ABI.name);
+    let kind = PACKAGES.iter().find(|p| p.name == name).unwrap_or(&C_ABI);
+    if let Some([wrong, help]) = (kind.refusal)(&generated) {
+        print::error(wrong);
+        print::help(help);
         return Err(Failure::Input);
     }
     let prefix = a.prefix.clone().unwrap_or_else(|| identifier::prefix(&generated.model.name));
-    output::write_directory(&a.output, &export::c_package(&generated, &prefix))?;
+    output::write_directory(&a.output, &(kind.files)(&generated, &prefix))?;
     Ok(())
 }

@@ -9,6 +9,7 @@ mod error_bound;
 pub mod generated;
 pub mod lower;
 pub mod module;
+pub mod package;
 mod parameter;
 pub mod rust;
 mod staged;

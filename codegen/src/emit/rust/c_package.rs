@@ -6,6 +6,7 @@
 use super::file::{header, item_text, lanes_text, preamble};
 use super::{array_type, batch, fused, kernel};
 use crate::description::drives::Number;
+use crate::emit::package::PackageKind;
 use crate::emit::{Generated, Item, Style};
 use crate::identifier::{comment, package_name, string_literal};
 use crate::output::MARK;
@@ -13,8 +14,27 @@ use std::fmt::Write;
 use straightline_graph::expr::Port;
 use straightline_graph::Scalar;
 
-/// The files of the package, by their paths inside it. All C names begin with `prefix`, an identifier.
-pub fn c_package(generated: &Generated, prefix: &str) -> Vec<(String, String)> {
+/// Functions with C's calling convention, and a header.
+pub const C_ABI: PackageKind = PackageKind {
+    name: "c-abi",
+    doc: "a Rust package of functions with C's calling convention, and their header",
+    refusal: |generated| {
+        if generated.plain_style.generic {
+            return Some([
+                "C has no generic functions",
+                "leave out `generic`; `scalar` says which numbers the C functions take",
+            ]);
+        }
+        (!generated.others.is_empty() || generated.staged.is_some()).then_some([
+            "a C package has one scalar type, and no stages: C could not tell a stage that is out of date",
+            "say which with `--scalar`, and leave `staged` out of the scene",
+        ])
+    },
+    files: c_package,
+};
+
+/// The files of the package; all C names begin with `prefix`.
+fn c_package(generated: &Generated, prefix: &str) -> Vec<(String, String)> {
     let package = Package { generated, prefix, library: format!("{}_dynamics", prefix.to_lowercase()) };
     let mut files = vec![
         ("Cargo.toml".to_string(), package.manifest()),

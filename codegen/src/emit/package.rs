@@ -1,0 +1,20 @@
+//! Packages of generated code for who does not write Rust: a row each.
+
+use super::rust::c_package::C_ABI;
+use super::Generated;
+
+/// A kind of package.
+#[derive(Clone, Copy)]
+pub struct PackageKind {
+    /// Its name.
+    pub name: &'static str,
+    /// What is in it.
+    pub doc: &'static str,
+    /// Why there is none of a robot: what is wrong, and what helps.
+    pub refusal: fn(&Generated) -> Option<[&'static str; 2]>,
+    /// Its files, by their paths inside it. Names that other code could have begin with the prefix, an identifier.
+    pub files: fn(&Generated, &str) -> Vec<(String, String)>,
+}
+
+/// All kinds.
+pub static PACKAGES: &[PackageKind] = &[C_ABI];
