@@ -38,7 +38,7 @@ pub const ROBOTS: [&str; 11] = [
 /// A robot with its states.
 #[derive(Debug)]
 pub struct Robot {
-    /// Its name.
+    /// The stem of its files, `states/NAME.json`.
     pub name: String,
     /// Its description.
     pub file: PathBuf,

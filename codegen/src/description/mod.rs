@@ -144,7 +144,7 @@ pub struct JointFrameNotation {
 /// A link.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link {
-    /// Its name.
+    /// What joints, frames and scenes call it; no two links share it.
     pub name: Value<String>,
     /// Mass, mass centre and inertia, where the file gives them.
     pub inertial: Option<Inertial>,
@@ -287,7 +287,7 @@ impl JointType {
 /// A joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
-    /// Its name.
+    /// What scenes, drives and messages call it; no two joints share it.
     pub name: Value<String>,
     /// How it moves.
     pub kind: Value<JointType>,
@@ -340,7 +340,7 @@ pub struct JointDrive {
 /// A named frame on a link.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedFrame {
-    /// Its name.
+    /// What `frames` and contacts call it; links are frames of their own names.
     pub name: Value<String>,
     /// The link that carries it.
     pub link: Value<String>,

@@ -10,7 +10,7 @@ use straightline_graph::Scalar;
 /// A function of straight-line code, and the private ones that it calls one after the other where it is long.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Routine {
-    /// Its name.
+    /// The identifier that callers use.
     pub name: String,
     /// What stands above it, line by line.
     pub doc: String,
@@ -119,7 +119,7 @@ pub enum Statement {
     },
     /// An array of these values.
     Array {
-        /// Its name.
+        /// The identifier of the array.
         name: String,
         /// Its values; of constants it needs no code.
         values: Vec<Expression>,
@@ -128,7 +128,7 @@ pub enum Statement {
     },
     /// An array that a loop fills.
     Room {
-        /// Its name.
+        /// The identifier of the array.
         name: String,
         /// What it holds before.
         filler: Expression,
@@ -274,7 +274,7 @@ pub struct Item<F = Function> {
 pub type Bound = Result<Routine, String>;
 
 impl<F> Item<F> {
-    /// Its name.
+    /// The identifier of the function of one state; its other forms begin with it.
     pub fn name(&self) -> &str {
         &self.routine.name
     }
@@ -299,7 +299,7 @@ impl<F> Item<F> {
 /// The type of a run-time parameter.
 #[derive(Clone, Debug)]
 pub struct ParameterType {
-    /// Its name.
+    /// The identifier of the type.
     pub name: String,
     /// What functions call the input.
     pub input: String,

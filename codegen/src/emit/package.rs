@@ -6,7 +6,7 @@ use super::Generated;
 /// A kind of package.
 #[derive(Clone, Copy)]
 pub struct PackageKind {
-    /// Its name.
+    /// The word that asks for it.
     pub name: &'static str,
     /// What is in it.
     pub doc: &'static str,

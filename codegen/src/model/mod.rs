@@ -94,7 +94,7 @@ impl Default for ModelOptions {
 /// A frame that is asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameOption {
-    /// Its name.
+    /// What functions of frames call it.
     pub name: String,
     /// The link that carries it.
     pub link: String,

@@ -78,7 +78,7 @@ enum InverseForm {
 /// A stage and its type.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage {
-    /// Its name.
+    /// The identifier of the type; the last stage, which stores nothing, has none.
     pub type_name: &'static str,
     /// The name of its values where others take them.
     pub values: &'static str,

@@ -8,7 +8,7 @@ use straightline_graph::Scalar;
 /// A function that a text is to have.
 #[derive(Clone, Debug)]
 pub struct Written {
-    /// Its name.
+    /// The identifier in the text.
     pub name: String,
     /// What it computes.
     pub graph: Graph,

@@ -31,7 +31,7 @@ pub enum Type {
 /// A parameter of a function.
 #[derive(Clone, Debug)]
 pub struct Parameter {
-    /// Its name.
+    /// The word of its identifier.
     pub name: u32,
     /// Its type.
     pub of: Type,
@@ -95,7 +95,7 @@ pub struct Item {
 pub struct Module {
     /// The module around it.
     pub parent: usize,
-    /// Its name.
+    /// The word of its identifier.
     pub name: u32,
 }
 

@@ -20,7 +20,7 @@ pub struct ErrorReport {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct OutputErrors {
-    /// Its name.
+    /// The output's name in the function's row.
     pub name: String,
     /// Its shape.
     #[cfg_attr(feature = "serde", serde(skip))]

@@ -30,7 +30,7 @@ pub struct Contacts {
 /// A contact of a frame with an object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactItem {
-    /// Its name.
+    /// What modes and messages call it.
     pub name: String,
     /// The frame of the robot.
     pub frame: String,
@@ -276,7 +276,7 @@ impl EnvironmentKind {
 /// Two frames of the robot that are held together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopItem {
-    /// Its name.
+    /// What messages call it.
     pub name: String,
     /// A frame.
     pub frame: String,
@@ -307,7 +307,7 @@ impl LoopItem {
 /// Contacts that are closed together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModeItem {
-    /// Its name.
+    /// What the scene calls it; generated code has the identifier made of it.
     pub name: String,
     /// Names of the contacts.
     pub contacts: Vec<String>,

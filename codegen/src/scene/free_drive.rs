@@ -43,7 +43,7 @@ impl<'a> FreeDrive<'a> {
         derived(&self.form.with(&self.numbers, values), self.form, (self.built(), self.model))
     }
 
-    /// Its name.
+    /// What the robot file calls the drive.
     pub fn name(&self) -> &str {
         &self.built().name
     }

@@ -193,7 +193,7 @@ pub enum Base {
 /// A body welded to a frame of the robot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Payload {
-    /// Its name.
+    /// What the scene calls it; of a run-time parameter the input's name is made of it.
     pub name: String,
     /// The frame that carries it.
     pub frame: String,

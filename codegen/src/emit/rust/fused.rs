@@ -1,12 +1,13 @@
 //! The functions that compute a·b + c in one rounding, sines and cosines among them.
 
+use super::of_scalar;
 use crate::emit::Style;
 
 /// The module `fused` of a file whose functions are fused; with sines and cosines if there is a module `trig` beside it.
 pub fn module(style: Style, with_kernel: bool) -> String {
     let kernel = if with_kernel { KERNEL } else { "" };
     let operation = if style.fused_by_caller { BY_CALLER } else { BY_STD };
-    [MODULE, operation, FMA, kernel, "}\n"].concat().replace("f64", style.scalar.name())
+    of_scalar(&[MODULE, operation, FMA, kernel, "}\n"].concat(), style.scalar)
 }
 
 const MODULE: &str = r#"
@@ -33,22 +34,22 @@ mod fused {
 
     #[cfg(not(target_os = "none"))]
     #[inline(always)]
-    fn mul_add(a: f64, b: f64, c: f64) -> f64 {
+    fn mul_add(a: {t}, b: {t}, c: {t}) -> {t} {
         a.mul_add(b, c)
     }
 
     #[cfg(target_os = "none")]
     #[inline(always)]
-    fn mul_add(a: f64, b: f64, c: f64) -> f64 {
+    fn mul_add(a: {t}, b: {t}, c: {t}) -> {t} {
         a * b + c
     }
 "#;
 
 const BY_CALLER: &str = r#"
-/// a·b + c in one rounding, by the function `mul_add_f64(a, b, c)` of this crate: always, with the same bits on every machine.
+/// a·b + c in one rounding, by the function `mul_add_{t}(a, b, c)` of this crate: always, with the same bits on every machine.
 #[allow(dead_code, unused_imports)]
 mod fused {
-    use crate::mul_add_f64 as mul_add;
+    use crate::mul_add_{t} as mul_add;
 
     /// a·b + c is one operation.
     pub const FUSED: bool = true;
@@ -58,12 +59,12 @@ mod fused {
 
 const FMA: &str = r#"
     #[inline(always)]
-    pub fn fma(a: f64, b: f64, c: f64) -> f64 {
+    pub fn fma(a: {t}, b: {t}, c: {t}) -> {t} {
         fma_if::<FUSED>(a, b, c)
     }
 
     #[inline(always)]
-    pub fn fma_if<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
+    pub fn fma_if<const FUSED: bool>(a: {t}, b: {t}, c: {t}) -> {t} {
         if FUSED || ALWAYS {
             mul_add(a, b, c)
         } else {
@@ -76,48 +77,48 @@ const KERNEL: &str = r#"
     use super::trig;
 
     #[inline(always)]
-    pub fn sin_cos_f64(x: f64) -> (f64, f64) {
-        sin_cos_if_f64::<FUSED>(x)
+    pub fn sin_cos_{t}(x: {t}) -> ({t}, {t}) {
+        sin_cos_if_{t}::<FUSED>(x)
     }
 
     #[inline(always)]
-    pub fn sin_cos_of_sum_f64(x: [f64; 2]) -> (f64, f64) {
-        sin_cos_of_sum_if_f64::<FUSED>(x)
+    pub fn sin_cos_of_sum_{t}(x: [{t}; 2]) -> ({t}, {t}) {
+        sin_cos_of_sum_if_{t}::<FUSED>(x)
     }
 
     #[inline(always)]
-    pub fn sin_cos_if_f64<const FUSED: bool>(x: f64) -> (f64, f64) {
+    pub fn sin_cos_if_{t}<const FUSED: bool>(x: {t}) -> ({t}, {t}) {
         if FUSED || ALWAYS {
-            trig::sin_cos_fused_f64(x, mul_add)
+            trig::sin_cos_fused_{t}(x, mul_add)
         } else {
-            trig::sin_cos_f64(x)
+            trig::sin_cos_{t}(x)
         }
     }
 
     #[inline(always)]
-    pub fn sin_cos_of_sum_if_f64<const FUSED: bool>(x: [f64; 2]) -> (f64, f64) {
+    pub fn sin_cos_of_sum_if_{t}<const FUSED: bool>(x: [{t}; 2]) -> ({t}, {t}) {
         if FUSED || ALWAYS {
-            trig::sin_cos_of_sum_fused_f64(x, mul_add)
+            trig::sin_cos_of_sum_fused_{t}(x, mul_add)
         } else {
-            trig::sin_cos_of_sum_f64(x)
+            trig::sin_cos_of_sum_{t}(x)
         }
     }
 
     #[inline(always)]
-    pub fn sin_cos_lanes_f64<const N: usize>(x: [f64; N]) -> ([f64; N], [f64; N]) {
+    pub fn sin_cos_lanes_{t}<const N: usize>(x: [{t}; N]) -> ([{t}; N], [{t}; N]) {
         if FUSED || ALWAYS {
-            trig::sin_cos_lanes_fused_f64(x, mul_add)
+            trig::sin_cos_lanes_fused_{t}(x, mul_add)
         } else {
-            trig::sin_cos_lanes_f64(x)
+            trig::sin_cos_lanes_{t}(x)
         }
     }
 
     #[inline(always)]
-    pub fn sin_cos_lanes_of_sums_f64<const N: usize>(x: [[f64; 2]; N]) -> ([f64; N], [f64; N]) {
+    pub fn sin_cos_lanes_of_sums_{t}<const N: usize>(x: [[{t}; 2]; N]) -> ([{t}; N], [{t}; N]) {
         if FUSED || ALWAYS {
-            trig::sin_cos_lanes_of_sums_fused_f64(x, mul_add)
+            trig::sin_cos_lanes_of_sums_fused_{t}(x, mul_add)
         } else {
-            trig::sin_cos_lanes_of_sums_f64(x)
+            trig::sin_cos_lanes_of_sums_{t}(x)
         }
     }
 "#;

@@ -145,6 +145,11 @@ fn wrapped(start: &str, items: &[String], end: &str) -> String {
     text
 }
 
+/// A text about numbers, of which `{t}` is the type.
+fn of_scalar(text: &str, scalar: Scalar) -> String {
+    text.replace("{t}", scalar.name())
+}
+
 /// A text in a block of its own.
 fn indented(text: &str) -> String {
     let line = |l: &str| if l.is_empty() { "\n".to_string() } else { format!("    {l}\n") };

@@ -1,6 +1,6 @@
 //! Types of run-time parameters, checked when they are made: the ten inertial parameters of a body, numbers of a drive.
 
-use super::{number, routine};
+use super::{number, of_scalar, routine};
 use crate::description::drives::Number;
 use crate::emit::module::{ParameterOf, ParameterType};
 use crate::emit::Style;
@@ -26,11 +26,6 @@ pub(super) fn types(parameters: &[ParameterType], style: Style) -> String {
         out.push_str(&routine(&parameter.constructor));
     }
     out
-}
-
-/// A text about a number type.
-fn of_scalar(text: &str, scalar: Scalar) -> String {
-    text.replace("{t}", scalar.name())
 }
 
 /// What all bodies of a file share: the error type and the check.
