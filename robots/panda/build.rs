@@ -32,8 +32,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     });
     let rows: Vec<_> = rows.collect();
     let text = format!("[[[f64; 3]; {}]; {}] = {rows:?};\n", motion::N, motion::SAMPLES);
-    let text =
-        format!("/// Torque in two halves, and the sum of the moduli of its terms \\[N·m\\].\nconst REFERENCE: {text}");
+    let text = format!(
+        "/// Torque in two halves, and the sum of the moduli of its terms \\[N·m\\].\nstatic REFERENCE: {text}"
+    );
     std::fs::write(Path::new(&std::env::var("OUT_DIR")?).join("reference.rs"), text)?;
     Ok(())
 }
