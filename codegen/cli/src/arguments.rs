@@ -456,7 +456,7 @@ mod tests {
             (&["generate", "a", "--lanes=8"], "standalone, runtime"),
             (&["generate", "a", "--gravity", "1,2"], "0,0,-1.62"),
             (&["generate", "a", "--check"], "--output"),
-            (&["export", "a", "-o", "b"], "--c-abi"),
+            (&["export", "a", "-o", "b"], "--as"),
             (&["export", "a", "-o", "b", "--c-abi", "--prefix", "a-b"], "no digit in front"),
         ] {
             let error = CommandLine::try_parse_from([&["straightline"], arguments].concat()).unwrap_err();
