@@ -6,9 +6,9 @@ use serde_json::Value;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::model::ModelOptions;
-use straightline_codegen::verify::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::centre_of_mass_tree;
 use straightline_core::contact::{Contact, Coordinate, Object, Surface};
-use straightline_core::reference::{at_rest, Component, ContactFrames, MassCentreTree};
+use straightline_core::reference::{at_rest, CentreOfMassTree, Component, ContactFrames};
 use straightline_core::spatial::{Mat3, Transform, Vec3};
 use straightline_core::{reference as chapter, Dd};
 
@@ -56,7 +56,7 @@ pub fn cases(kind: &str) -> Vec<Case> {
 ///
 /// # Panics
 /// If its file has errors.
-pub fn robot(name: &str) -> (Loaded, MassCentreTree<Dd>) {
+pub fn robot(name: &str) -> (Loaded, CentreOfMassTree<Dd>) {
     let path = description(name);
     let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let source = Source::new(&path.file_name().expect("a file").to_string_lossy(), text);
@@ -65,7 +65,7 @@ pub fn robot(name: &str) -> (Loaded, MassCentreTree<Dd>) {
     let mut diagnostics = Diagnostics::new();
     let description = straightline_codegen::description::read(&source, &mut diagnostics);
     assert!(!diagnostics.has_errors(), "{}", diagnostics.render());
-    let tree = mass_centre_tree(&description.expect("it has no errors"), &options).expect("it is a tree");
+    let tree = centre_of_mass_tree(&description.expect("it has no errors"), &options).expect("it is a tree");
     (loaded, tree)
 }
 
@@ -131,7 +131,7 @@ impl Case {
     }
 
     /// The frames of the reference, and its names of the components.
-    pub fn reference(&self, tree: &MassCentreTree<Dd>) -> (ContactFrames<Dd>, Vec<Component>) {
+    pub fn reference(&self, tree: &CentreOfMassTree<Dd>) -> (ContactFrames<Dd>, Vec<Component>) {
         let component = |c: &Coordinate| match c {
             Coordinate::Px => Component::Position(0),
             Coordinate::Py => Component::Position(1),

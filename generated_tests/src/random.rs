@@ -1,4 +1,4 @@
-//! Random robots, written twice: as a robot file for the compiler, and as links about their mass centres for the
+//! Random robots, written twice: as a robot file for the compiler, and as links about their centres of mass for the
 //! reference. The second way shares nothing with the compiler's reading, merging and framing of links.
 
 use crate::programs;
@@ -8,7 +8,7 @@ use std::fmt::Write;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::model::ModelOptions;
-use straightline_core::reference::{ExtendedPosition, Joint, MassCentreFrame, MassCentreLink, MassCentreTree};
+use straightline_core::reference::{CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, Joint};
 use straightline_core::Dd;
 
 pub use crate::written::Random;
@@ -89,7 +89,7 @@ fn dd(v: [f64; 3]) -> Vector3<Dd> {
     Vector3::from(v.map(Dd::from))
 }
 
-/// Mass, mass centre, and tensor about it, of links welded together, in the axes of one of them.
+/// Mass, centre of mass, and tensor about it, of links welded together, in the axes of one of them.
 struct Lump {
     mass: Dd,
     moment: Vector3<Dd>,
@@ -252,9 +252,9 @@ impl RandomRobot {
         self.order.iter().copied().filter(move |&c| self.links[c].parent == i)
     }
 
-    /// The robot about its mass centres, with gravity in the file's default direction.
-    pub fn reference(&self) -> MassCentreTree<Dd> {
-        let mut tree = MassCentreTree {
+    /// The robot about its centres of mass, with gravity in the file's default direction.
+    pub fn reference(&self) -> CentreOfMassTree<Dd> {
+        let mut tree = CentreOfMassTree {
             name: "random".to_string(),
             gravity: dd([0.0, 0.0, -9.81]),
             links: Vec::new(),
@@ -265,7 +265,7 @@ impl RandomRobot {
         let mut root = None;
         if self.kind.floating {
             let (com, inertia) = lump.about_centre();
-            tree.links.push(MassCentreLink::free(Self::name(0), lump.mass, inertia, com));
+            tree.links.push(CentreOfMassLink::free(Self::name(0), lump.mass, inertia, com));
             centres.push(com);
             root = Some(0);
         }
@@ -318,16 +318,16 @@ impl RandomRobot {
         (lump, places)
     }
 
-    fn add_frames(&self, tree: &mut MassCentreTree<Dd>, link: Option<usize>, centre: Vector3<Dd>, places: &[Place]) {
+    fn add_frames(&self, tree: &mut CentreOfMassTree<Dd>, link: Option<usize>, centre: Vector3<Dd>, places: &[Place]) {
         for (k, p, r) in places {
-            tree.frames.push(MassCentreFrame { name: Self::name(*k), link, position: p - centre, rotation: *r });
+            tree.frames.push(CentreOfMassFrame { name: Self::name(*k), link, position: p - centre, rotation: *r });
         }
     }
 
     /// Adds what moves against link `k`, which stands at (p, r) in the axes of body `parent`; depth first.
     fn add_moving(
         &self,
-        tree: &mut MassCentreTree<Dd>,
+        tree: &mut CentreOfMassTree<Dd>,
         centres: &mut Vec<Vector3<Dd>>,
         k: usize,
         parent: Option<usize>,
@@ -343,7 +343,7 @@ impl RandomRobot {
             let (joint, turn) = (p + r * dd(link.xyz), r * rotation(link.rpy));
             let centre_of_parent = parent.map_or(Vector3::zeros(), |b| centres[b]);
             let index = tree.links.len();
-            tree.links.push(MassCentreLink {
+            tree.links.push(CentreOfMassLink {
                 name: Self::name(c),
                 parent,
                 joint: if link.motion == Motion::Prismatic { Joint::Linear } else { Joint::Revolute },
@@ -367,7 +367,7 @@ impl RandomRobot {
 }
 
 impl Lump {
-    /// The mass centre, and the tensor about it.
+    /// The centre of mass, and the tensor about it.
     fn about_centre(&self) -> (Vector3<Dd>, Matrix3<Dd>) {
         let com = self.moment.map(|x| x / self.mass);
         (com, self.inertia - parallel_axis(com) * self.mass)

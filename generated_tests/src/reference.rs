@@ -17,7 +17,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use straightline_codegen::function::truth::Chapter;
 use straightline_codegen::Function;
-use straightline_core::reference::MassCentreTree;
+use straightline_core::reference::CentreOfMassTree;
 use straightline_core::Dd;
 
 /// The eleven robots of the data.
@@ -324,7 +324,7 @@ impl Expected {
     /// # Panics
     /// If the reference has no frame of a name asked for, or no formulation of the function.
     pub fn by_the_second_author(
-        tree: &MassCentreTree<Dd>,
+        tree: &CentreOfMassTree<Dd>,
         frames: &[String],
         function: Function,
         inputs: &[Vec<Dd>],

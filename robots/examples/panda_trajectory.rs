@@ -14,8 +14,8 @@ use std::time::Instant;
 use straightline_codegen::description;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::ModelOptions;
-use straightline_codegen::verify::reference_input::mass_centre_tree;
-use straightline_core::reference::{inverse_dynamics, natural_scale, MassCentreTree};
+use straightline_codegen::verify::reference_input::centre_of_mass_tree;
+use straightline_core::reference::{inverse_dynamics, natural_scale, CentreOfMassTree};
 use straightline_core::Dd;
 use straightline_robots::panda;
 
@@ -51,7 +51,7 @@ fn motion(t: f64) -> [[f64; N]; 3] {
     ]
 }
 
-fn sample(reference: &MassCentreTree<Dd>, time: f64) -> Sample {
+fn sample(reference: &CentreOfMassTree<Dd>, time: f64) -> Sample {
     let [q, qd, qdd] = motion(time);
     let mut tau = [0.0; N];
     panda::inverse_dynamics(&q, &qd, &qdd, &mut tau);
@@ -75,11 +75,11 @@ fn sample(reference: &MassCentreTree<Dd>, time: f64) -> Sample {
 }
 
 /// The reference's reading of the URDF.
-fn reference() -> Result<MassCentreTree<Dd>, Box<dyn Error>> {
+fn reference() -> Result<CentreOfMassTree<Dd>, Box<dyn Error>> {
     let source = Source::new("descriptions/panda.urdf", include_str!("../descriptions/panda.urdf"));
     let mut diagnostics = Diagnostics::new();
     let description = description::read(&source, &mut diagnostics).ok_or_else(|| diagnostics.to_string())?;
-    Ok(mass_centre_tree(&description, &ModelOptions::default())?)
+    Ok(centre_of_mass_tree(&description, &ModelOptions::default())?)
 }
 
 fn worst(samples: &[Sample], value: impl Fn(&Sample) -> f64) -> f64 {

@@ -6,7 +6,7 @@ use std::path::Path;
 use straightline_codegen::description;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::ModelOptions;
-use straightline_codegen::verify::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::centre_of_mass_tree;
 use straightline_core::reference::{inverse_dynamics, natural_scale};
 use straightline_core::Dd;
 
@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let source = Source::from_bytes(ROBOT, std::fs::read(ROBOT)?);
     let mut diagnostics = Diagnostics::new();
     let description = description::read(&source, &mut diagnostics).ok_or_else(|| diagnostics.render())?;
-    let tree = mass_centre_tree(&description, &ModelOptions::default())?;
+    let tree = centre_of_mass_tree(&description, &ModelOptions::default())?;
     let rows = (0..motion::SAMPLES).map(|sample| {
         let [q, qd, qdd] = motion::motion(sample).1.map(|v| v.map(Dd::from));
         let torques = inverse_dynamics(&tree, &q, &qd, &qdd);

@@ -5,8 +5,8 @@
 //!
 //! | function | computes |
 //! |---|---|
-//! | `inverse_dynamics(q, qd, qdd, tau)` | the drives that a motion takes, tau = H qdd + h |
-//! | `forward_dynamics(q, qd, tau, qdd)` | the motion that drives make |
+//! | `inverse_dynamics(q, qd, qdd, tau)` | the generalized forces that a motion takes, tau = H qdd + h |
+//! | `forward_dynamics(q, qd, tau, qdd)` | the motion that generalized forces cause |
 //! | `gravity_force`, `velocity_force`, `bias_force` | g, C qd, and their sum h |
 //! | `mass_matrix(q, h)` | H |
 //! | `joint_wrenches(q, qd, qdd, w)` | what the joints carry |

@@ -32,7 +32,7 @@ pub const UPPER_LIMITS: [f64; 3] = [f64::INFINITY, 2.0, 2.5];
 /// Greatest speed of every joint \[rad/s or m/s\]; infinite where the robot file says nothing.
 #[allow(clippy::all)]
 pub const VELOCITY_LIMITS: [f64; 3] = [f64::INFINITY, 3.0, 3.0];
-/// Greatest drive of every joint \[N·m or N\]; infinite where the robot file says nothing.
+/// Greatest generalized force of every joint \[N·m or N\]; infinite where the robot file says nothing.
 #[allow(clippy::all)]
 pub const EFFORT_LIMITS: [f64; 3] = [f64::INFINITY, 80.0, 40.0];
 
@@ -60,7 +60,7 @@ pub const INVERSE_DYNAMICS_COST: Cost = Cost { mul: 102, add: 92, fma: 130, div:
 pub const MASS_MATRIX_COST: Cost = Cost { mul: 42, add: 37, fma: 52, div: 0, sin_cos: 2, max_live: 17 };
 
 #[doc(alias("RNEA", "ID", "Newton-Euler", "computed torque"))]
-/// Inverse dynamics τ = H(q) q̈ + h(q, q̇): the drives that a motion takes.
+/// Inverse dynamics τ = H(q) q̈ + h(q, q̇): the generalized forces that a motion takes.
 ///
 /// * `q`: configuration \[rad or m\]
 /// * `qd`: velocities \[rad/s or m/s\]

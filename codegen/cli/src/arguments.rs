@@ -71,7 +71,7 @@ Examples:
     /// Compare the generated program with an independent formulation of the dynamics, on random states
     #[command(after_help = format!("\
 Runs the program as it is compiled, operation by operation in the scalar's arithmetic, and the dynamics of the
-handbook chapter, from mass centres, in double-double (32 digits); prints the worst error of every function,
+handbook chapter, from centres of mass, in double-double (32 digits); prints the worst error of every function,
 divided by its natural scale, the sum of the moduli of the terms that the value is made of.
 
 Examples:

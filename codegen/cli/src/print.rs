@@ -119,7 +119,7 @@ pub fn codes(codes: &[Code]) -> io::Result<()> {
 pub fn functions(word: Option<&str>) -> io::Result<()> {
     let mut out = stdout().lock();
     let mut found: Vec<Function> = Function::known().filter(|f| word.is_none_or(|word| f.is_about(word))).collect();
-    // `COM` is a name of the mass centre, and the beginning of computed torque
+    // `COM` is a name of the centre of mass, and the beginning of computed torque
     found.sort_by_key(|f| !word.is_some_and(|word| f.is_called(word)));
     for function in &found {
         writeln!(out, "{:<30}{}", function.name(), function.summary())?;

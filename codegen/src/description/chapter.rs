@@ -1,11 +1,11 @@
-//! TOML with mass centres, joint axes and joint vectors: the notation of the chapter, 20.1.2 and its appendix.
+//! TOML with centres of mass, joint axes and joint vectors: the notation of the chapter, 20.1.2 and its appendix.
 //!
 //! The schema is in `SCHEMA.md`. Links and joints without a name are called `link1`, `link2`, … and `joint1`, `joint2`, ….
 
 use super::flexible::Flexible;
 use super::reader::{Range64, Reader};
 use super::table::Table;
-use super::{Description, Format, JointType, MassCentreEnd, MassCentreLink, MassCentreNotation, Notation, Value};
+use super::{CentreOfMassEnd, CentreOfMassLink, CentreOfMassNotation, Description, Format, JointType, Notation, Value};
 use straightline_core::spatial::Sym3;
 
 const LINK: &[&str] = &[
@@ -35,8 +35,8 @@ const LINK: &[&str] = &[
     "flexible",
 ];
 
-/// Whether a document speaks of mass centres rather than joint frames.
-pub(super) fn is_mass_centre_notation(top: &Table) -> bool {
+/// Whether a document speaks of centres of mass rather than joint frames.
+pub(super) fn is_centre_of_mass_notation(top: &Table) -> bool {
     let links = top.get("link").and_then(|(links, _)| links.as_array());
     let has = |key: &str| {
         links.is_some_and(|l| l.iter().any(|t| t.get_ref().as_table().is_some_and(|t| t.contains_key(key))))
@@ -61,7 +61,7 @@ pub(super) fn read(reader: &mut Reader, top: &Table) -> Description {
             reader.check_keys(&table, &["e_next", "r_next", "r_next_star"]);
             read_end(reader, &table, tables.is_empty())
         }
-        None => MassCentreEnd { e_next: None, r_next: None, r_next_star: None },
+        None => CentreOfMassEnd { e_next: None, r_next: None, r_next_star: None },
     };
     let count = tables.len();
     let mut flexible = Vec::new();
@@ -69,23 +69,23 @@ pub(super) fn read(reader: &mut Reader, top: &Table) -> Description {
         tables.into_iter().enumerate().map(|(i, table)| read_link(reader, table, (i + 1, count), &mut flexible));
     let links = links.collect();
     Description {
-        format: Format::MassCentreToml,
+        format: Format::CentreOfMassToml,
         name: name.unwrap_or_else(|| Value::assumed("robot".to_string())),
         gravity,
         base: None,
-        notation: Notation::MassCentres(MassCentreNotation { base, links }),
+        notation: Notation::CentresOfMass(CentreOfMassNotation { base, links }),
         drives: reader.drives_at(top),
         flexible,
         ignored: Vec::new(),
     }
 }
 
-fn read_end(reader: &mut Reader, table: &Table, is_last: bool) -> MassCentreEnd {
+fn read_end(reader: &mut Reader, table: &Table, is_last: bool) -> CentreOfMassEnd {
     if !is_last {
         reader.require(table, "e_next", "e_next = [0.0, 0.0, 1.0]");
         reader.require(table, "r_next", "r_next = [-0.1, 0.0, 0.0]");
     }
-    MassCentreEnd {
+    CentreOfMassEnd {
         e_next: reader.vector_at(table, "e_next"),
         r_next: reader.vector_at(table, "r_next"),
         r_next_star: reader.vector_at(table, "r_next_star"),
@@ -97,7 +97,7 @@ fn read_link(
     mut table: Table,
     (j, count): (usize, usize),
     flexible: &mut Vec<Flexible>,
-) -> MassCentreLink {
+) -> CentreOfMassLink {
     let given = |reader: &mut Reader, table: &Table, key: &str, what: &str| {
         let name = if table.has(key) { reader.name_at(table, key, what) } else { None };
         name.unwrap_or_else(|| reader.value(format!("{what}{j}"), &table.span))
@@ -110,11 +110,11 @@ fn read_link(
     for (key, example) in [("type", "type = \"revolute\""), ("mass", "mass = 1.0"), ("J", "J = [0.1, 0.1, 0.1]")] {
         reader.require(&table, key, example);
     }
-    let kind = reader.word_at(&table, "type", &JointType::words(Format::MassCentreToml));
+    let kind = reader.word_at(&table, "type", &JointType::words(Format::CentreOfMassToml));
     let mass = reader.real_at(&table, "mass", Range64::Finite);
     let inertia = reader.tensor_at(&table, "J");
     let zero = Sym3 { xx: 0.0, xy: 0.0, xz: 0.0, yy: 0.0, yz: 0.0, zz: 0.0 };
-    MassCentreLink {
+    CentreOfMassLink {
         name,
         joint_name,
         kind: kind.unwrap_or_else(|| reader.value(JointType::turning(true), &table.span)),

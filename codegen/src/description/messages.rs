@@ -382,7 +382,7 @@ pub fn negative_limit(joint: &str, what: &str, value: f64) -> D {
 /// Mass without inertia.
 pub fn point_mass(link: &str) -> D {
     D::warning("point-mass", format!("link `{link}` has a mass and no inertia"))
-        .detail("taken as a point mass in its mass centre")
+        .detail("taken as a point mass in its centre of mass")
 }
 
 /// Inertia without mass.
@@ -404,7 +404,7 @@ pub fn triangle_inequality(link: &str, moments: [f64; 3]) -> D {
     let [a, b, c] = moments.map(six_digits);
     D::warning("triangle-inequality", format!("the inertia of link `{link}` cannot belong to a rigid body"))
         .detail(format!("{c} > {a} + {b}: a principal moment exceeds the sum of the other two; taken as written"))
-        .help("moments are taken about the mass centre; is this one about the joint, or does it hold a rotor's?")
+        .help("moments are taken about the centre of mass; is this one about the joint, or does it hold a rotor's?")
 }
 
 /// A moving link whose mass is written as zero.
@@ -449,7 +449,7 @@ pub fn inertia_beyond_digits(function: &str, scalar: &str, joint: &str, part: f6
 /// What divides by the mass of a robot that has none. `asked`: in words, what is asked for.
 pub fn no_mass(asked: &str) -> D {
     D::error("no-mass", format!("{asked} asked for, and nothing that moves has mass"))
-        .detail("the mass centre of no mass is nowhere: the equations would divide by zero")
+        .detail("the centre of mass of no mass is nowhere: the equations would divide by zero")
         .help("give the links their mass (URDF: `<inertial>`), or name the functions that are wanted without these")
 }
 

@@ -46,8 +46,8 @@ pub enum Format {
     Urdf,
     /// Joint frames in TOML, see `SCHEMA.md`.
     JointFrameToml,
-    /// Mass centres, joint axes and joint vectors in TOML, as in the chapter.
-    MassCentreToml,
+    /// Centres of mass, joint axes and joint vectors in TOML, as in the chapter.
+    CentreOfMassToml,
 }
 
 impl Format {
@@ -56,7 +56,7 @@ impl Format {
         match self {
             Format::Urdf => Dialect::Urdf,
             Format::JointFrameToml => Dialect::JointFrames,
-            Format::MassCentreToml => Dialect::MassCentres,
+            Format::CentreOfMassToml => Dialect::CentresOfMass,
         }
     }
 }
@@ -100,7 +100,7 @@ impl Description {
                 let joints = bodies.joints.iter().map(|j| (&j.name, joint));
                 joints.chain(bodies.links.iter().map(|l| (&l.name, link))).find(|n| named(*n)).map(|(n, _)| &n.place)
             }
-            Notation::MassCentres(chain) => {
+            Notation::CentresOfMass(chain) => {
                 let joints = chain.links.iter().map(|l| (&l.joint_name, joint));
                 joints.chain(chain.links.iter().map(|l| (&l.name, link))).find(|n| named(*n)).map(|(n, _)| &n.place)
             }
@@ -113,8 +113,8 @@ impl Description {
 pub enum Notation {
     /// Links and joints with frames: URDF, and TOML with joint frames.
     JointFrames(JointFrameNotation),
-    /// Mass centres, axes and vectors to the joints: the chapter's.
-    MassCentres(MassCentreNotation),
+    /// Centres of mass, axes and vectors to the joints: the chapter's.
+    CentresOfMass(CentreOfMassNotation),
 }
 
 /// A kind of element that was skipped.
@@ -146,20 +146,20 @@ pub struct JointFrameNotation {
 pub struct Link {
     /// What joints, frames and scenes call it; no two links share it.
     pub name: Value<String>,
-    /// Mass, mass centre and inertia, where the file gives them.
+    /// Mass, centre of mass and inertia, where the file gives them.
     pub inertial: Option<Inertial>,
 }
 
-/// Mass, mass centre and inertia of a link.
+/// Mass, centre of mass and inertia of a link.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inertial {
     /// Mass \[kg\].
     pub mass: Value<f64>,
-    /// Mass centre in the link frame \[m\].
+    /// Centre of mass in the link frame \[m\].
     pub com: Value<[f64; 3]>,
     /// Rotation of the axes of `inertia` against the link's.
     pub rotation: Rotation,
-    /// Inertia tensor about the mass centre, in axes turned by `rotation` \[kg·m²\].
+    /// Inertia tensor about the centre of mass, in axes turned by `rotation` \[kg·m²\].
     pub inertia: Value<Sym3<f64>>,
 }
 
@@ -251,7 +251,8 @@ impl JointType {
             })
         };
         let fixed = JointType { word: "fixed", kind: None, has_range: false, number: None };
-        let between_links = words().filter(|t| !t.is_free()).chain((format != Format::MassCentreToml).then_some(fixed));
+        let between_links =
+            words().filter(|t| !t.is_free()).chain((format != Format::CentreOfMassToml).then_some(fixed));
         between_links.chain(words().filter(|t| t.is_free())).map(|t| (t.word, t)).collect()
     }
 
@@ -348,19 +349,19 @@ pub struct NamedFrame {
     pub pose: WrittenPose,
 }
 
-/// An open chain in the chapter's notation. Frame j is fixed to link j, its origin is the link's mass centre C_j; the
+/// An open chain in the chapter's notation. Frame j is fixed to link j, its origin is the link's centre of mass C_j; the
 /// origin of frame 0, the world's, is C_0. All vectors are as written, in the frame named with each.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MassCentreNotation {
+pub struct CentreOfMassNotation {
     /// The base, link 0.
-    pub base: MassCentreEnd,
+    pub base: CentreOfMassEnd,
     /// The links 1 … n.
-    pub links: Vec<MassCentreLink>,
+    pub links: Vec<CentreOfMassLink>,
 }
 
 /// The upper end of link j: what it says of joint j+1, in frame j.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MassCentreEnd {
+pub struct CentreOfMassEnd {
     /// e_{j+1}, the axis of joint j+1; the last link has none.
     pub e_next: Option<Value<[f64; 3]>>,
     /// r_{j,j+1}, from S_{j+1} to C_j \[m\]; the last link's gives the tip, tip = C_n − r_{n,n+1}.
@@ -371,7 +372,7 @@ pub struct MassCentreEnd {
 
 /// Link j with its joint S_j.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MassCentreLink {
+pub struct CentreOfMassLink {
     /// Name of the link: `link1`, `link2`, … where the file says nothing.
     pub name: Value<String>,
     /// Name of the joint: `joint1`, `joint2`, … where the file says nothing.
@@ -391,7 +392,7 @@ pub struct MassCentreLink {
     /// α_j, the constant angle of a linear joint.
     pub alpha: Option<Angle>,
     /// The end towards joint j+1.
-    pub end: MassCentreEnd,
+    pub end: CentreOfMassEnd,
     /// Ranges.
     pub limits: JointLimits,
     /// What its drive adds.

@@ -56,7 +56,7 @@ pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Descriptio
     let document = table::parse(source, diagnostics)?;
     let top = Table { owner: "the file".to_string(), table: document.get_ref(), span: 0..0 };
     let mut reader = Reader::new(source, diagnostics);
-    if chapter::is_mass_centre_notation(&top) {
+    if chapter::is_centre_of_mass_notation(&top) {
         return Some(chapter::read(&mut reader, &top));
     }
     if !["robot", "link", "joint"].iter().any(|key| top.has(key)) {

@@ -54,7 +54,7 @@ pub(super) fn of_contact(function: ContactFunction, (mode, scene): (&Mode, &Scen
              (20.88)-(20.89)."
         }
         ContactFunction::InverseDynamics => {
-            "Drives of a wanted motion along s^f and of wanted reactions: hybrid feed-forward. Of the motions that do it, the \
+            "Generalized forces of a wanted motion along s^f and of wanted reactions: hybrid feed-forward. Of the motions that do it, the \
              one nearest to `qdd` in kinetic energy is taken."
         }
         ContactFunction::Impact => "Impact when the contacts of the mode close, (20.90)-(20.91), (20.95)-(20.97).",

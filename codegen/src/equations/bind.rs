@@ -208,7 +208,7 @@ pub fn constructed<T: Real>(robot: &Robot, parameter: &Parameter, inputs: &[Vec<
     }
 }
 
-/// The ten parameters of a body given by mass, mass centre and inertia in a frame, in the two frames that the algorithms
+/// The ten parameters of a body given by mass, centre of mass and inertia in a frame, in the two frames that the algorithms
 /// use. Inputs: mass, com\[3\], inertia about it (xx, xy, xz, yy, yz, zz).
 fn load_parameters<T: Real>(robot: &Robot, parameter: &Parameter, inputs: &[Vec<T>]) -> Vec<T> {
     let frame = parameter.frame().and_then(|frame| robot.model.frame(frame));

@@ -38,7 +38,7 @@ pub struct DrivenInverseDynamics;
 impl RobotFunction for DrivenInverseDynamics {
     const SPEC: Spec = Spec {
         name: "driven_inverse_dynamics",
-        summary: "The inputs of the drives that a motion takes, whatever their limits.",
+        summary: "The inputs of the generalized forces that a motion takes, whatever their limits.",
         aliases: &["feedforward", "flatness"],
         inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration],
         outputs: &[

@@ -12,7 +12,7 @@ pub struct InverseDynamics;
 impl RobotFunction for InverseDynamics {
     const SPEC: Spec = Spec {
         name: "inverse_dynamics",
-        summary: "Inverse dynamics τ = H(q) q̈ + h(q, q̇): the drives that a motion takes.",
+        summary: "Inverse dynamics τ = H(q) q̈ + h(q, q̇): the generalized forces that a motion takes.",
         aliases: &["RNEA", "ID", "Newton-Euler", "computed torque"],
         inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration],
         outputs: &[Output::new("tau", &[Velocities], "generalized forces \\[N·m or N\\]")],
@@ -109,7 +109,7 @@ pub struct ForwardDynamics;
 impl RobotFunction for ForwardDynamics {
     const SPEC: Spec = Spec {
         name: "forward_dynamics",
-        summary: "Forward dynamics q̈ = H(q)⁻¹ (τ − h(q, q̇)): the motion that drives make.",
+        summary: "Forward dynamics q̈ = H(q)⁻¹ (τ − h(q, q̇)): the motion that generalized forces cause.",
         aliases: &["ABA", "FD", "articulated body"],
         inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Force],
         outputs: &[Output::new("qdd", &[Velocities], "accelerations \\[rad/s² or m/s²\\]")],

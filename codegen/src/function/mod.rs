@@ -107,7 +107,7 @@ functions! {
     dynamics::JointWrenches,
     /// Kinetic and potential energy.
     whole::Energy,
-    /// The mass centre of the whole robot.
+    /// The centre of mass of the whole robot.
     #[doc(alias("COM", "center of mass"))]
     whole::CentreOfMass,
     /// Linear and angular momentum.

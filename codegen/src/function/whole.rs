@@ -30,7 +30,7 @@ pub struct CentreOfMass;
 impl RobotFunction for CentreOfMass {
     const SPEC: Spec = Spec {
         name: "centre_of_mass",
-        summary: "Mass centre of the moving bodies.",
+        summary: "Centre of mass of the moving bodies.",
         aliases: &["COM", "center of mass", "centroid"],
         inputs: &[Quantity::Configuration],
         outputs: &[Output::new("p", &[Of(3)], "its position in the world \\[m\\]")],
@@ -54,7 +54,7 @@ impl RobotFunction for Momentum {
         outputs: &[Output::new(
             "p",
             &[Of(6)],
-            "linear \\[kg·m/s\\] (3), angular about the mass centre \\[kg·m²/s\\] (3), world axes",
+            "linear \\[kg·m/s\\] (3), angular about the centre of mass \\[kg·m²/s\\] (3), world axes",
         )],
         divisor: Divisor::Mass,
         ..Spec::DEFAULT

@@ -256,7 +256,7 @@ pub(super) fn limits(
                 let help = match format {
                     Format::Urdf => "write `<limit lower=\"...\" upper=\"...\" velocity=\"...\" effort=\"...\"/>`, or type `continuous`",
                     Format::JointFrameToml => "write `limits = { lower = ..., upper = ... }`, or kind `continuous`",
-                    Format::MassCentreToml => "write `limits = [lower, upper]`",
+                    Format::CentreOfMassToml => "write `limits = [lower, upper]`",
                 };
                 diagnostics.push(messages::limits_missing(name, word, help).at(&joint.place));
             }

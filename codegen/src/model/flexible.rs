@@ -11,7 +11,7 @@
 //! the midpoint rule of the integral, and its lowest frequency is off by a part of the order of 1/n². Damping is the material's:
 //! Kelvin and Voigt, each damper its spring times a time constant.
 //!
-//! **The masses** of the bodies add up to the link's, as do their mass centres and inertias: mass, mass centre c and second moment
+//! **The masses** of the bodies add up to the link's, as do their centres of mass and inertias: mass, centre of mass c and second moment
 //! Σ = ½ tr(J) 1 − J of the link are those of a rod of equal density along the axis u, every slice of which has the same second moment
 //! across. With d = Σ u/(uᵀ Σ u), the line of the slices' centres is c + (s − s_c) d, the rod reaches √(3 uᵀΣu/m) to both sides of
 //! s_c = u · c, and a slice's moment across is Σ − (uᵀΣu) d dᵀ, which is positive semidefinite wherever Σ is. What of the rod lies
@@ -244,7 +244,7 @@ fn elastic_body(
     }
 }
 
-/// Second moment Σ about the mass centre, and Σ u.
+/// Second moment Σ about the centre of mass, and Σ u.
 fn moments(part: &Part, along: Vec3<Dd>) -> (Sym3<Dd>, Dd, Vec3<Dd>) {
     let sigma = part.inertia_com.inertia_to_second_moment();
     let of_axis = sigma * along;
@@ -257,7 +257,7 @@ fn moments(part: &Part, along: Vec3<Dd>) -> (Sym3<Dd>, Dd, Vec3<Dd>) {
     }
 }
 
-/// Where the rod of equal density begins and ends along the axis that has a link's mass, mass centre and second moment.
+/// Where the rod of equal density begins and ends along the axis that has a link's mass, centre of mass and second moment.
 fn rod(part: &Part, from: Vec3<Dd>, along: Vec3<Dd>) -> (Dd, Dd) {
     let (_, size, _) = moments(part, along);
     let middle = along.dot(part.com - from);

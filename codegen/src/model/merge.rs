@@ -8,14 +8,14 @@ use straightline_core::Dd;
 pub(crate) struct Part {
     /// \[kg\].
     pub mass: Dd,
-    /// Mass centre \[m\].
+    /// Centre of mass \[m\].
     pub com: Vec3<Dd>,
-    /// Inertia tensor about the mass centre \[kg·m²\].
+    /// Inertia tensor about the centre of mass \[kg·m²\].
     pub inertia_com: Sym3<Dd>,
 }
 
 impl Part {
-    /// Mass, mass centre and inertia about it in a frame whose pose in the body's is given.
+    /// Mass, centre of mass and inertia about it in a frame whose pose in the body's is given.
     pub fn placed(mass: Dd, com: Vec3<Dd>, inertia_com: Sym3<Dd>, x_body_part: &Transform<Dd>) -> Part {
         let inertia_com = snap_tensor(inertia_com.rotated(&x_body_part.rotation));
         Part { mass, com: point(x_body_part, com), inertia_com }
@@ -27,8 +27,8 @@ impl Part {
     }
 }
 
-/// The inertia of parts that are fixed to each other: mass centres weighed, tensors by the parallel-axis theorem
-/// J = Σ J_i + m_i (d_i·d_i 1 − d_i d_iᵀ), d_i from the common mass centre to that of part i.
+/// The inertia of parts that are fixed to each other: centres of mass weighed, tensors by the parallel-axis theorem
+/// J = Σ J_i + m_i (d_i·d_i 1 − d_i d_iᵀ), d_i from the common centre of mass to that of part i.
 pub(crate) fn merge(parts: &[Part]) -> SpatialInertia<Dd> {
     let massive: Vec<&Part> = parts.iter().filter(|p| p.mass != Dd::ZERO).collect();
     let mass = massive.iter().fold(Dd::ZERO, |sum, p| sum + p.mass);

@@ -29,13 +29,13 @@
 //! ```
 
 pub(crate) mod angle;
+mod centres_of_mass;
 mod check;
 pub(crate) mod drives;
 mod flexible;
 pub(crate) mod geometry;
 mod joint_frames;
 pub mod limbs;
-mod mass_centres;
 pub(crate) mod merge;
 pub mod singular;
 pub mod states;
@@ -160,7 +160,9 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
     check::angles(description, &ModelOptions { angle_tolerance: tolerance, ..options.clone() }, diagnostics);
     let assembly = match &description.notation {
         Notation::JointFrames(bodies) => joint_frames::assemble(bodies, description, options, tolerance, diagnostics),
-        Notation::MassCentres(chain) => mass_centres::assemble(chain, description, options, tolerance, diagnostics),
+        Notation::CentresOfMass(chain) => {
+            centres_of_mass::assemble(chain, description, options, tolerance, diagnostics)
+        }
     };
     let mut assembly = assembly?;
     if !names_are_free(&assembly, diagnostics) {
@@ -273,7 +275,7 @@ fn each_angle(description: &Description, visit: &mut dyn FnMut(&dyn Fn() -> Stri
                 rotation(&|| format!("frame `{}`", frame.name.value), &frame.pose.rotation);
             }
         }
-        Notation::MassCentres(chain) => {
+        Notation::CentresOfMass(chain) => {
             for link in &chain.links {
                 if let Some(alpha) = &link.alpha {
                     visit(&|| format!("alpha of link `{}`", link.name.value), alpha);

@@ -83,7 +83,7 @@ pub(crate) fn values(model: &Model<Dd>, port: &Port, kind: Kind, random: &mut Ra
         Some(Quantity::Configuration) if len == model.nq() => configuration(model, kind, random),
         Some(Quantity::Gravity) => vec![0.3, -0.2, -9.81],
         Some(Quantity::Velocity) => (0..len).map(|_| random.symmetric(1.0)).collect(),
-        // drives of the size of the weights
+        // generalized forces of the size of the weights
         _ => (0..len).map(|_| random.symmetric(10.0)).collect(),
     }
 }

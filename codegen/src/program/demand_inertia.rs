@@ -91,7 +91,7 @@ pub(crate) fn demand_inertia(model: &Model<Dd>, options: &Options, diagnostics: 
     }
 }
 
-/// A mass centre takes some mass; what a run-time parameter brings is not known here.
+/// A centre of mass takes some mass; what a run-time parameter brings is not known here.
 fn demand_mass(model: &Model<Dd>, options: &Options, diagnostics: &mut Diagnostics) {
     let divides = |f: &&Function| f.spec().divisor == Divisor::Mass;
     let names: Vec<String> = options.functions.iter().filter(divides).map(|f| format!("`{}`", f.name())).collect();

@@ -10,7 +10,7 @@ use straightline_graph::expr::{Graph, Port};
 use straightline_graph::pass::dead_code;
 use straightline_graph::trace::trace;
 
-/// The program of a parameter's constructor: from mass \[kg\], mass centre \[m\] and inertia about it \[kg·m²\] (xx, xy, xz,
+/// The program of a parameter's constructor: from mass \[kg\], centre of mass \[m\] and inertia about it \[kg·m²\] (xx, xy, xz,
 /// yy, yz, zz) in the parameter's frame, or from the free numbers of a drive, to the scalars that the functions take.
 pub fn parameter_program(robot: &Robot, parameter: &Parameter, options: &Options) -> Graph {
     let outputs = vec![Port::new("parameters", &[parameter.scalars(&robot.model)])];

@@ -379,7 +379,7 @@ fn least_at(
 ) -> f64 {
     let unit = |k: usize| std::array::from_fn(|i| if i == k { Interval::ONE } else { Interval::ZERO });
     let moves: Vec<Column> = match wanted {
-        // shifts first: what is left then is about mass centres
+        // shifts first: what is left then is about centres of mass
         Wanted::SecondFree => [3, 4, 5, 0, 1, 2].map(unit).to_vec(),
         _ => vec![unit(axis(first))],
     };

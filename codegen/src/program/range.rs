@@ -53,7 +53,7 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
                 let j = inertial.inertia.value;
                 complain(&inertial.mass.place, format!("mass of link `{name}`"), inertial.mass.value, true);
                 for x in inertial.com.value {
-                    complain(&inertial.com.place, format!("mass centre of link `{name}`"), x, false);
+                    complain(&inertial.com.place, format!("centre of mass of link `{name}`"), x, false);
                 }
                 for x in [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz] {
                     complain(&inertial.inertia.place, format!("inertia of link `{name}`"), x, false);
@@ -67,7 +67,7 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
                 drive(name, &joint.drive, &mut |place, what, x| complain(place, what, x, false));
             }
         }
-        Notation::MassCentres(chain) => {
+        Notation::CentresOfMass(chain) => {
             for link in &chain.links {
                 let (name, j) = (&link.name.value, link.inertia.value);
                 complain(&link.mass.place, format!("mass of link `{name}`"), link.mass.value, true);

@@ -165,7 +165,7 @@ pub fn gravity_not_in_range(value: &str, range: &str) -> D {
 pub fn unphysical_body(payload: &str, why: &str) -> D {
     D::error("unphysical-body", format!("payload `{}` cannot be a rigid body", cut(payload)))
         .detail(why)
-        .help("moments are taken about the mass centre, in the axes of the frame that carries it")
+        .help("moments are taken about the centre of mass, in the axes of the frame that carries it")
 }
 
 /// Why a tensor with these principal moments belongs to no body; `None` if it may.
@@ -378,7 +378,9 @@ pub fn over_budget(
 /// Forward dynamics where the base's motion is given.
 pub fn moving_base_forward() -> D {
     D::error("moving-base-forward", "forward dynamics of a robot whose base moves as it is told")
-        .detail("`forward_dynamics` would let the base fall: the drives of its motion are not among the inputs")
+        .detail(
+            "`forward_dynamics` would let the base fall: the generalized forces of its motion are not among the inputs",
+        )
         .help("remove it from the outputs, or write `base = \"floating\"`")
 }
 

@@ -199,9 +199,9 @@ pub struct Payload {
     pub frame: String,
     /// Mass \[kg\].
     pub mass: f64,
-    /// Mass centre in the frame \[m\].
+    /// Centre of mass in the frame \[m\].
     pub com: [f64; 3],
-    /// Inertia about its mass centre in the frame's axes: xx, xy, xz, yy, yz, zz \[kg·m²\].
+    /// Inertia about its centre of mass in the frame's axes: xx, xy, xz, yy, yz, zz \[kg·m²\].
     pub inertia: [f64; 6],
 }
 

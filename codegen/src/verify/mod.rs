@@ -20,7 +20,7 @@ use crate::scene::{Gravity, Parameter, Scene};
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
 use straightline_core::random::Random;
-use straightline_core::reference::MassCentreTree;
+use straightline_core::reference::CentreOfMassTree;
 use straightline_core::{trig, Dd};
 use straightline_graph::expr::{evaluate, Graph};
 use straightline_graph::schedule::Schedule;
@@ -139,7 +139,7 @@ struct Case<'a> {
     options: &'a Options,
     robot: Robot,
     coordinates: Coordinates,
-    tree: MassCentreTree<Dd>,
+    tree: CentreOfMassTree<Dd>,
     effects: Vec<Effect>,
     parameters: Vec<(Parameter, Graph)>,
 }

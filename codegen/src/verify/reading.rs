@@ -1,6 +1,6 @@
-//! The second author's reading of a robot file: links from their mass centres, and what joints add to them.
+//! The second author's reading of a robot file: links from their centres of mass, and what joints add to them.
 
-use super::reference_input::mass_centre_tree;
+use super::reference_input::centre_of_mass_tree;
 use crate::description::flexible::{Bending, Support};
 use crate::description::{self, Description, JointDrive, Notation, Value};
 use crate::diagnostic::{Diagnostics, Source};
@@ -9,7 +9,7 @@ use crate::function::{Function, Quantity};
 use crate::model::ModelOptions;
 use crate::options::Options;
 use straightline_core::model::Model;
-use straightline_core::reference::MassCentreTree;
+use straightline_core::reference::CentreOfMassTree;
 use straightline_core::Dd;
 
 /// What says how a robot moves, and by what.
@@ -21,9 +21,9 @@ pub(super) fn second_reading(
     source: &Source,
     model: &Model<Dd>,
     options: &Options,
-) -> Result<(MassCentreTree<Dd>, Vec<Effect>), String> {
+) -> Result<(CentreOfMassTree<Dd>, Vec<Effect>), String> {
     let description = description::read(source, &mut Diagnostics::new()).ok_or("the file holds no robot")?;
-    let mut tree = mass_centre_tree(&description, &options.model)?;
+    let mut tree = centre_of_mass_tree(&description, &options.model)?;
     for link in &mut tree.links {
         let body = model.bodies.iter().find(|body| body.name == link.name);
         let joint = &body.ok_or_else(|| format!("the model has no body `{}`", link.name))?.joint;
@@ -56,7 +56,7 @@ fn written(description: &Description, joint: &str) -> Effect {
     let none = JointDrive::default();
     let found = match &description.notation {
         Notation::JointFrames(bodies) => bodies.joints.iter().find(|j| j.name.value == joint).map(|j| &j.drive),
-        Notation::MassCentres(chain) => {
+        Notation::CentresOfMass(chain) => {
             chain.links.iter().find(|l| l.joint_name.value == joint).map(|link| &link.drive)
         }
     };
@@ -113,7 +113,7 @@ fn elastic_springs(description: &Description, options: &ModelOptions) -> Vec<(St
 
 /// The second author's reading of a robot file without a scene, to be asked for the results of any function at any state.
 pub struct SecondReading {
-    tree: MassCentreTree<Dd>,
+    tree: CentreOfMassTree<Dd>,
     effects: Vec<Effect>,
 }
 

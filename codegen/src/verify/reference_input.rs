@@ -1,22 +1,24 @@
-//! The robot file in the reference's terms: from a [`Description`] to mass centres, joint axes and joint vectors.
+//! The robot file in the reference's terms: from a [`Description`] to centres of mass, joint axes and joint vectors.
 //!
 //! A second reading of the file, independent of `crate::model`, so that `verify` tests the way from the file to the
 //! equations and not only the equations. Everything is in double-double; the numbers of the file count as the nearest
 //! f64 of their text. The description is one that was checked: what cannot be a robot gives an error without a place.
 //!
-//! Joint-frame notation (URDF, TOML): frame j of the reference has the axes of the link frame and its origin in the mass
-//! centre; links on fixed joints are lumped into the link that carries them, their inertia combined about the common
-//! mass centre; the joint frame at q = 0 is given by the file, so A⁰ is given as a matrix. Mass-centre notation: as written.
+//! Joint-frame notation (URDF, TOML): frame j of the reference has the axes of the link frame and its origin in the centre
+//! of mass; links on fixed joints are lumped into the link that carries them, their inertia combined about the common
+//! centre of mass; the joint frame at q = 0 is given by the file, so A⁰ is given as a matrix. Mass-centre notation: as written.
 
 use crate::description::{
-    Angle, AngleUnit, BaseKind, Description, Inertial, Joint as FileJoint, JointFrameNotation, MassCentreNotation,
+    Angle, AngleUnit, BaseKind, CentreOfMassNotation, Description, Inertial, Joint as FileJoint, JointFrameNotation,
     Notation, Rotation, WrittenPose,
 };
 use crate::diagnostic::Place;
 use crate::model::{FrameOption, ModelOptions};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
-use straightline_core::reference::{unit, ExtendedPosition, Joint, MassCentreFrame, MassCentreLink, MassCentreTree};
+use straightline_core::reference::{
+    unit, CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, Joint,
+};
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
 
@@ -46,10 +48,10 @@ fn radians(angle: &Angle, options: &ModelOptions) -> Dd {
 ///
 /// # Errors
 /// If the description is no tree of links.
-pub fn mass_centre_tree(description: &Description, options: &ModelOptions) -> Result<MassCentreTree<Dd>, String> {
+pub fn centre_of_mass_tree(description: &Description, options: &ModelOptions) -> Result<CentreOfMassTree<Dd>, String> {
     let stated = description.gravity.as_ref().map(|gravity| gravity.value);
     let gravity = options.gravity.or(stated).unwrap_or([0.0, 0.0, -9.81]);
-    let mut tree = MassCentreTree {
+    let mut tree = CentreOfMassTree {
         name: description.name.value.clone(),
         gravity: vector(&gravity),
         links: Vec::new(),
@@ -62,12 +64,12 @@ pub fn mass_centre_tree(description: &Description, options: &ModelOptions) -> Re
             let elastic = Elastic::of(description, options);
             add_joint_frames(&mut tree, notation, floating, (options, &elastic))?
         }
-        Notation::MassCentres(_) if !Elastic::of(description, options).is_empty() => {
+        Notation::CentresOfMass(_) if !Elastic::of(description, options).is_empty() => {
             return Err("the reference knows flexible links and supports of joint frames alone".to_string());
         }
-        Notation::MassCentres(notation) => add_mass_centres(&mut tree, notation, options)?,
+        Notation::CentresOfMass(notation) => add_centres_of_mass(&mut tree, notation, options)?,
     };
-    if let Notation::MassCentres(_) = &description.notation {
+    if let Notation::CentresOfMass(_) = &description.notation {
         add_frames(&mut tree, options)?;
     }
     number_coordinates(&mut tree, &joint_names, options);
@@ -81,13 +83,13 @@ fn turned(rpy: &[f64; 3], options: &ModelOptions) -> Matrix3<Dd> {
 }
 
 /// The frames that are asked for beyond a chapter robot's, each placed in the frame of a link.
-fn add_frames(tree: &mut MassCentreTree<Dd>, options: &ModelOptions) -> Result<(), String> {
+fn add_frames(tree: &mut CentreOfMassTree<Dd>, options: &ModelOptions) -> Result<(), String> {
     for FrameOption { name, link, xyz, rpy } in &options.frames {
         let carrier = tree.frame(link).ok_or_else(|| format!("there is no link `{link}`"))?;
         let in_link = Placed { rotation: carrier.rotation, position: carrier.position };
         let place = in_link.then(&Placed { rotation: turned(rpy, options), position: vector(xyz) });
         let link = carrier.link;
-        tree.frames.push(MassCentreFrame {
+        tree.frames.push(CentreOfMassFrame {
             name: name.clone(),
             link,
             position: place.position,
@@ -99,7 +101,7 @@ fn add_frames(tree: &mut MassCentreTree<Dd>, options: &ModelOptions) -> Result<(
 
 /// The joints' places in q and q̇: in the order that is asked for, or else in that of the links. A floating root that
 /// the order does not name comes first.
-fn number_coordinates(tree: &mut MassCentreTree<Dd>, joint_names: &[String], options: &ModelOptions) {
+fn number_coordinates(tree: &mut CentreOfMassTree<Dd>, joint_names: &[String], options: &ModelOptions) {
     let mut order: Vec<usize> = (0..tree.links.len()).collect();
     if let Some(names) = &options.joint_order {
         order.sort_by_key(|&link| names.iter().position(|name| *name == joint_names[link]));
@@ -156,7 +158,7 @@ impl Placed {
     }
 }
 
-/// A rigid part: mass, mass centre, inertia about the mass centre, in the axes of the link that carries it.
+/// A rigid part: mass, centre of mass, inertia about the centre of mass, in the axes of the link that carries it.
 struct Part {
     mass: Dd,
     centre: Vector3<Dd>,
@@ -173,7 +175,7 @@ impl Part {
         }
     }
 
-    /// The parts as one: Steiner's theorem about the common mass centre. Without mass, that is the origin.
+    /// The parts as one: Steiner's theorem about the common centre of mass. Without mass, that is the origin.
     fn lump(parts: &[Part]) -> Part {
         let mass = parts.iter().fold(Dd::ZERO, |sum, part| sum + part.mass);
         let moment = parts.iter().fold(Vector3::zeros(), |sum, part| sum + part.centre * part.mass);
@@ -213,7 +215,7 @@ struct Group {
 type Frames = Vec<(String, usize, Placed)>;
 
 fn add_joint_frames(
-    tree: &mut MassCentreTree<Dd>,
+    tree: &mut CentreOfMassTree<Dd>,
     notation: &JointFrameNotation,
     floating: bool,
     (options, elastic): (&ModelOptions, &Elastic),
@@ -231,13 +233,13 @@ fn add_joint_frames(
             if floating {
                 let root = root_link(notation)?;
                 joint_names.push(floating_root_joint(notation));
-                tree.links.push(MassCentreLink::free(root.to_string(), *mass, *inertia, *centre));
+                tree.links.push(CentreOfMassLink::free(root.to_string(), *mass, *inertia, *centre));
             }
             continue;
         };
         joint_names.push(name.clone());
         let e = unit(axis);
-        tree.links.push(MassCentreLink {
+        tree.links.push(CentreOfMassLink {
             name: child.clone(),
             parent: link_of(*parent),
             joint: *kind,
@@ -253,7 +255,7 @@ fn add_joint_frames(
         });
     }
     for (name, group, place) in frames {
-        tree.frames.push(MassCentreFrame {
+        tree.frames.push(CentreOfMassFrame {
             name,
             link: link_of(group),
             position: place.position - centre_of(group),
@@ -383,9 +385,9 @@ fn named_frames(
     Ok(frames)
 }
 
-fn add_mass_centres(
-    tree: &mut MassCentreTree<Dd>,
-    notation: &MassCentreNotation,
+fn add_centres_of_mass(
+    tree: &mut CentreOfMassTree<Dd>,
+    notation: &CentreOfMassNotation,
     options: &ModelOptions,
 ) -> Result<Vec<String>, String> {
     let mut below = &notation.base;
@@ -393,7 +395,7 @@ fn add_mass_centres(
         let missing = |what: &str| format!("the link below `{}` has no {what}", link.name.value);
         let e_parent = below.e_next.as_ref().ok_or_else(|| missing("e_next"))?;
         let r_parent = below.r_next.as_ref().ok_or_else(|| missing("r_next"))?;
-        tree.links.push(MassCentreLink {
+        tree.links.push(CentreOfMassLink {
             name: link.name.value.clone(),
             parent: j.checked_sub(1),
             joint: Joint::of_word(link.kind.value.word, None)
@@ -412,8 +414,8 @@ fn add_mass_centres(
                 alpha: link.alpha.as_ref().map_or(Dd::ZERO, |alpha| radians(alpha, options)),
             },
         });
-        // the link's own frame, in the mass centre
-        tree.frames.push(MassCentreFrame {
+        // the link's own frame, in the centre of mass
+        tree.frames.push(CentreOfMassFrame {
             name: link.name.value.clone(),
             link: Some(j),
             position: Vector3::zeros(),
@@ -423,7 +425,7 @@ fn add_mass_centres(
     }
     if let (Some(r), Some(last)) = (&below.r_next, notation.links.len().checked_sub(1)) {
         // tip = r_{c,n} − r_{n,n+1}
-        tree.frames.push(MassCentreFrame {
+        tree.frames.push(CentreOfMassFrame {
             name: "tip".to_string(),
             link: Some(last),
             position: -vector(&r.value),

@@ -17,7 +17,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
 use straightline_core::random::Random;
-use straightline_core::reference::{ExtendedPosition, MassCentreTree};
+use straightline_core::reference::{CentreOfMassTree, ExtendedPosition};
 use straightline_core::Dd;
 use straightline_graph::certify::search::computed_at;
 use straightline_graph::expr::Graph;
@@ -121,7 +121,7 @@ impl Coordinates {
 pub(super) fn hold(
     scene: &Scene,
     model: &Model<Dd>,
-    tree: &mut MassCentreTree<Dd>,
+    tree: &mut CentreOfMassTree<Dd>,
     effects: &mut Vec<Effect>,
 ) -> Result<(), String> {
     let is_locked = |name: &str| scene.locked.iter().any(|(joint, _)| joint == name);
@@ -173,10 +173,10 @@ pub(super) fn hold(
     Ok(())
 }
 
-/// Adds a body, given in a frame, to the link that carries the frame. Steiner's theorem about the common mass centre; the
-/// vectors that start or end in the mass centre follow it, and what they said of the zero of joints stays said.
+/// Adds a body, given in a frame, to the link that carries the frame. Steiner's theorem about the common centre of mass; the
+/// vectors that start or end in the centre of mass follow it, and what they said of the zero of joints stays said.
 fn weld(
-    tree: &mut MassCentreTree<Dd>,
+    tree: &mut CentreOfMassTree<Dd>,
     frame: &str,
     mass: f64,
     com: [f64; 3],
@@ -221,7 +221,7 @@ pub(super) fn random_inputs(
     scene: &Scene,
     parameters: &[(Parameter, Graph)],
     scalar: Scalar,
-    (state, tree): (&mut State<f64>, &mut MassCentreTree<Dd>),
+    (state, tree): (&mut State<f64>, &mut CentreOfMassTree<Dd>),
     random: &mut Random,
 ) -> Result<(), String> {
     let rounded = |x: f64| scalar.rounded(x);

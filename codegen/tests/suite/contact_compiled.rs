@@ -11,10 +11,10 @@ use straightline_codegen::description;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
-use straightline_codegen::verify::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::centre_of_mass_tree;
 use straightline_core::reference::drives::solve_general;
 use straightline_core::reference::{
-    bias_force, functional_coordinate, mass_matrix, Component, ContactFrames, Derivatives, MassCentreTree,
+    bias_force, functional_coordinate, mass_matrix, CentreOfMassTree, Component, ContactFrames, Derivatives,
 };
 use straightline_core::Dd;
 
@@ -216,17 +216,17 @@ struct Truth {
 }
 
 /// The robot by the second author.
-fn tree(text: &str) -> MassCentreTree<Dd> {
+fn tree(text: &str) -> CentreOfMassTree<Dd> {
     let mut diagnostics = Diagnostics::new();
     let read = description::read(&Source::new("ur5.urdf", text), &mut diagnostics).expect("a robot");
-    mass_centre_tree(&read, &Options::default().model).expect("a tree")
+    centre_of_mass_tree(&read, &Options::default().model).expect("a tree")
 }
 
 fn wide(v: [f64; 3]) -> Vector3<Dd> {
     Vector3::from(v.map(Dd::from))
 }
 
-fn coordinate(tree: &MassCentreTree<Dd>, s: &State, component: Component) -> Derivatives<Dd> {
+fn coordinate(tree: &CentreOfMassTree<Dd>, s: &State, component: Component) -> Derivatives<Dd> {
     let frames = ContactFrames {
         frame: tree.frame("tool0").expect("a frame").clone(),
         axes: [Vector3::z(), Vector3::x()].map(|v: Vector3<f64>| v.map(Dd::from)),
@@ -239,7 +239,7 @@ fn coordinate(tree: &MassCentreTree<Dd>, s: &State, component: Component) -> Der
 }
 
 /// Friction tilts the row of the distance from a plane: Ĵ = J − μ v/√(v² + w²) · J along the plane.
-fn tilted(tree: &MassCentreTree<Dd>, s: &State) -> DVector<Dd> {
+fn tilted(tree: &CentreOfMassTree<Dd>, s: &State) -> DVector<Dd> {
     let [x, y, z] = [0, 1, 2].map(|k| coordinate(tree, s, Component::Position(k)));
     let length = (x.sd * x.sd + y.sd * y.sd + Dd::from(SPEED) * Dd::from(SPEED)).sqrt();
     let share = Dd::from(MU) / length;
@@ -285,7 +285,7 @@ fn solved(h: &DMatrix<Dd>, rows: &[Row], of_robot: &DVector<Dd>, of_rows: &[Dd])
     (x.as_slice()[..n].to_vec(), x.as_slice()[n..].to_vec())
 }
 
-fn truth(tree: &MassCentreTree<Dd>, s: &State, mode: &str) -> Truth {
+fn truth(tree: &CentreOfMassTree<Dd>, s: &State, mode: &str) -> Truth {
     let (q, qd) = (s.q.map(Dd::from), s.qd.map(Dd::from));
     let h = mass_matrix(tree, &q);
     let drive = DVector::from_column_slice(&s.tau.map(Dd::from)) - bias_force(tree, &q, &qd);
@@ -328,7 +328,7 @@ fn truth(tree: &MassCentreTree<Dd>, s: &State, mode: &str) -> Truth {
 }
 
 /// Δq̇, I, Δṡ and the velocity of what is struck, with e = 0.4; the energy that goes.
-fn blow(tree: &MassCentreTree<Dd>, s: &State, mode: &str) -> (Vec<Dd>, [Dd; 4]) {
+fn blow(tree: &CentreOfMassTree<Dd>, s: &State, mode: &str) -> (Vec<Dd>, [Dd; 4]) {
     let q = s.q.map(Dd::from);
     let (h, e) = (mass_matrix(tree, &q), Dd::from(0.4));
     let row = coordinate(tree, s, Component::Position(2));

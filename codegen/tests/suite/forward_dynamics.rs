@@ -209,7 +209,7 @@ fn functions_of_drives_divide_by_the_inertia_with_drives() {
 }
 
 #[test]
-fn a_mass_centre_takes_some_mass() {
+fn a_centre_of_mass_takes_some_mass() {
     let none = chain(&[(OFF, Z, MASSLESS), (OFF, Y, MASSLESS)]);
     let options = |functions: &[Function]| Options { functions: functions.to_vec(), ..Options::default() };
     let errors = compile(&none, &options(&[Function::CentreOfMass, Function::Momentum])).expect_err("0/0");

@@ -103,7 +103,7 @@ alone. Scenes add further arguments (gravity, run-time parameters) and leave arg
 
 fn joints() -> String {
     let mut page = "# Joints\n\nPrinted from the table of joints (`straightline_core::joint::KINDS`) by the test `guide::` of the compiler.\n\n\
-| kind | coordinates q, q̇ | unit of q, q̇, q̈, τ | at rest | words in a URDF | in TOML, joint frames | in TOML, mass centres |\n|---|---|---|---|---|---|---|\n"
+| kind | coordinates q, q̇ | unit of q, q̇, q̈, τ | at rest | words in a URDF | in TOML, joint frames | in TOML, centres of mass |\n|---|---|---|---|---|---|---|\n"
         .to_string();
     for kind in KINDS {
         let row = kind.row();
@@ -129,7 +129,7 @@ fn joints() -> String {
             neutral.join(", "),
             words(Dialect::Urdf),
             words(Dialect::JointFrames),
-            words(Dialect::MassCentres)
+            words(Dialect::CentresOfMass)
         );
     }
     for kind in KINDS.iter().filter(|kind| !kind.row().coordinates.is_empty()) {

@@ -9,11 +9,11 @@ use std::path::Path;
 use straightline_codegen::description::{self, Description};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::ModelOptions;
-use straightline_codegen::verify::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::centre_of_mass_tree;
 use straightline_core::reference::{
     bias_force, forward_dynamics, forward_natural_scale, frame_jacobian, frame_jacobian_bias, frame_pose,
     gravity_force, inverse_dynamics, joint_wrenches, kinetic_energy, mass_matrix, potential_energy, velocity_force,
-    MassCentreTree,
+    CentreOfMassTree,
 };
 use straightline_core::Dd;
 
@@ -55,7 +55,7 @@ impl Worst {
     }
 }
 
-fn compare_state(worst: &mut Worst, tree: &MassCentreTree<Dd>, state: &Value) {
+fn compare_state(worst: &mut Worst, tree: &CentreOfMassTree<Dd>, state: &Value) {
     let (q, qd, qdd) = (inputs(&state["q"]), inputs(&state["qd"]), inputs(&state["qdd"]));
     let mut tree = tree.clone();
     if let Some(gravity) = state.get("gravity") {
@@ -103,7 +103,7 @@ fn the_reference_gives_the_data_of_every_robot() {
         let options = ModelOptions { floating_base, angle_tolerance: 0.0, ..ModelOptions::default() };
         let data = parse(&format!("states/{name}.json"));
         let description = read(&reference_file(&format!("robots/{file}")));
-        let mut tree = mass_centre_tree(&description, &options).expect("a tree of links");
+        let mut tree = centre_of_mass_tree(&description, &options).expect("a tree of links");
         tree.gravity = Vector3::from_column_slice(&inputs(&data["gravity"]));
         // depth first in the file's order, as the data
         let joints = data["joints"].as_array().expect("a list of joints");

@@ -125,7 +125,7 @@ fn notations_are_told_apart_by_their_text() {
         ("a", AWKWARD, Format::Urdf),
         ("a.toml", ARM, Format::JointFrameToml),
         ("a", ARM, Format::JointFrameToml),
-        ("a.toml", CHAIN, Format::MassCentreToml),
+        ("a.toml", CHAIN, Format::CentreOfMassToml),
     ] {
         let description = description::read(&Source::new(path, text), &mut Diagnostics::new()).expect("it can be read");
         assert_eq!(description.format, format, "{path}");
@@ -164,14 +164,14 @@ fn right_angles_leave_exact_zeros_and_ones() {
 }
 
 #[test]
-fn mass_centre_toml_means_what_it_says() {
+fn centre_of_mass_toml_means_what_it_says() {
     let (model, diagnostics) = model_of("chain.toml", CHAIN, &ModelOptions::default());
     assert!(diagnostics.is_empty(), "{diagnostics}");
     let names: Vec<_> = model.bodies.iter().map(|b| (b.joint.name.as_str(), b.name.as_str())).collect();
     assert_eq!(names, [("turn", "column"), ("joint2", "link2")]);
     // S_1 = −r_{0,1}
     assert_eq!(vector(model.bodies[0].placement.translation), [0.0, 0.0, 0.1]);
-    // the link frame stands in the mass centre
+    // the link frame stands in the centre of mass
     assert_eq!(model.bodies[0].link_frame.translation, model.bodies[0].inertia.com);
     let frames: Vec<&str> = model.frames.iter().map(|f| f.name.as_str()).collect();
     assert_eq!(frames, ["column", "link2", "tip"]);
@@ -306,7 +306,7 @@ fn the_next_joint_stands_where_its_vectors_say() {
     let link = &model.bodies[0].link_frame;
     let s2_in_link = link.rotation.transpose_mul(model.bodies[1].placement.translation);
     assert_eq!(vector(s2_in_link), [0.4, 0.0, 0.0]);
-    // the tip is 0.2 from the mass centre of link 2
+    // the tip is 0.2 from the centre of mass of link 2
     let tip = model.frame("tip").map(|f| f.placement.translation - model.bodies[1].inertia.com);
     assert!(tip.is_some_and(|d| (d.dot(d).sqrt() - Dd::from(0.2)).abs().to_f64() < 1e-30));
 }

@@ -5,22 +5,22 @@ use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::function::truth::Chapter;
 use straightline_codegen::function::{Family, Quantity};
 use straightline_codegen::model::ModelOptions;
-use straightline_codegen::verify::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::centre_of_mass_tree;
 use straightline_codegen::{description, Function};
 use straightline_core::random::Random;
-use straightline_core::reference::{natural_scale, Joint, MassCentreTree};
+use straightline_core::reference::{natural_scale, CentreOfMassTree, Joint};
 use straightline_core::Dd;
 
 /// A robot of `robots/descriptions` in the second author's terms.
-fn tree(file: &str, floating_base: bool) -> MassCentreTree<Dd> {
+fn tree(file: &str, floating_base: bool) -> CentreOfMassTree<Dd> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../robots/descriptions/").to_string() + file;
     let text = std::fs::read_to_string(&path).expect("a robot file");
     let description = description::read(&Source::new(file, text), &mut Diagnostics::new()).expect("a robot");
-    mass_centre_tree(&description, &ModelOptions { floating_base, ..ModelOptions::default() }).expect("a tree")
+    centre_of_mass_tree(&description, &ModelOptions { floating_base, ..ModelOptions::default() }).expect("a tree")
 }
 
 /// A random state, a quaternion of which is a turn about x.
-fn state(tree: &MassCentreTree<Dd>, random: &mut Random) -> BTreeMap<Quantity, Vec<Dd>> {
+fn state(tree: &CentreOfMassTree<Dd>, random: &mut Random) -> BTreeMap<Quantity, Vec<Dd>> {
     let mut any = |n: usize| -> Vec<Dd> { (0..n).map(|_| Dd::from(random.symmetric(2.0))).collect() };
     let mut q = any(tree.nq());
     for link in tree.links.iter().filter(|link| link.joint == Joint::Free) {

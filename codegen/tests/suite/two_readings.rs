@@ -11,7 +11,7 @@ use straightline_codegen::description::drives::Noted;
 use straightline_codegen::description::flexible::{Bending, Elastic, Flexible, Support};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{self, FrameOption, ModelOptions};
-use straightline_codegen::verify::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::centre_of_mass_tree;
 use straightline_core::model::JointEffects;
 
 /// A joint of a random robot in joint frames; joint j moves link j + 1.
@@ -246,7 +246,7 @@ fn compare_source(
     // friction is no part of this comparison
     model.bodies.iter_mut().for_each(|body| body.effects = JointEffects::none());
     let description = description::read(source, &mut Diagnostics::new()).expect("the file was read before");
-    let tree = mass_centre_tree(&description, options).expect("the file describes a tree");
+    let tree = centre_of_mass_tree(&description, options).expect("the file describes a tree");
     compare_authors(disagreement, robot, &tree, &model, random);
 }
 
@@ -301,7 +301,7 @@ fn both_readings_of_random_joint_frame_toml_agree() {
 }
 
 #[test]
-fn both_readings_of_random_mass_centre_toml_agree() {
+fn both_readings_of_random_centre_of_mass_toml_agree() {
     let mut disagreement = Disagreement::default();
     for seed in 0..60 {
         let mut random = Random(seed);
@@ -363,7 +363,7 @@ fn both_readings_of_flexible_links_and_supports_agree() {
         // what springs add is no part of this comparison
         model.bodies.iter_mut().for_each(|body| body.effects = JointEffects::none());
         let description = description::read(&source, &mut Diagnostics::new()).expect("the file was read before");
-        let tree = mass_centre_tree(&description, &options).expect("the file describes a tree");
+        let tree = centre_of_mass_tree(&description, &options).expect("the file describes a tree");
         compare_authors(&mut disagreement, &format!("flexible, seed {seed}"), &tree, &model, &mut random);
     }
     assert!(cuts > 60, "only {cuts} elastic joints");

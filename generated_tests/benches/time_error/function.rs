@@ -575,7 +575,7 @@ fn libraries(data: &Data, case: &Case, function: Function, states: &[Vec<f64>], 
     let described =
         straightline_codegen::description::read(&case.source, &mut straightline_codegen::Diagnostics::new());
     let tree =
-        described.and_then(|d| straightline_codegen::verify::reference_input::mass_centre_tree(&d, options).ok());
+        described.and_then(|d| straightline_codegen::verify::reference_input::centre_of_mass_tree(&d, options).ok());
     if let Some(tree) = tree.filter(|_| function == Function::InverseDynamics) {
         // its own truth: of a quaternion whose length is one to 1e-8, as f32 has them, both make something else
         let exact = |x: &[f64]| {

@@ -42,11 +42,11 @@ impl Motion {
 pub struct Inertial {
     /// \[kg\].
     pub mass: f64,
-    /// Mass centre in the link's frame \[m\].
+    /// Centre of mass in the link's frame \[m\].
     pub com: [f64; 3],
     /// Axes of the inertia against the link's: roll, pitch, yaw \[rad\].
     pub rpy: [f64; 3],
-    /// xx, yy, zz, xy, xz, yz about the mass centre \[kg·m²\].
+    /// xx, yy, zz, xy, xz, yz about the centre of mass \[kg·m²\].
     pub inertia: [f64; 6],
 }
 

@@ -72,7 +72,7 @@ fn the_planar_2r_arm_is_the_textbooks() {
     }
 }
 
-/// Newton and Euler for one body, about a point that is not its mass centre.
+/// Newton and Euler for one body, about a point that is not its centre of mass.
 #[test]
 fn a_free_body_obeys_newton_and_euler() {
     let urdf = r#"<robot name="body"><link name="body"><inertial><origin xyz="0.1 -0.2 0.3"/><mass value="2.5"/>
@@ -89,7 +89,7 @@ fn a_free_body_obeys_newton_and_euler() {
         let [v, w] = [0, 3].map(|k| Vector3::from_column_slice(&qd[k..k + 3]));
         let [vd, wd] = [0, 3].map(|k| Vector3::from_column_slice(&qdd[k..k + 3]));
         let g = quaternion_rotation([q[3], q[4], q[5], q[6]]).transpose() * Vector3::new(0.0, 0.0, -9.81);
-        // acceleration of the mass centre in body axes
+        // acceleration of the centre of mass in body axes
         let a = vd + w.cross(&v) + wd.cross(&c) + w.cross(&w.cross(&c));
         let force = (a - g) * m;
         let moment = j * wd + w.cross(&(j * w)) + c.cross(&force);
@@ -113,7 +113,7 @@ fn the_cylindrical_arms_mass_matrix_and_gravity_are_those_found_by_hand() {
     for _ in 0..50 {
         let q = random.list(4, 1.5);
         let (s, c) = q[3].sin_cos();
-        // mass centres in axes that turn with the column, x along the arm
+        // centres of mass in axes that turn with the column, x along the arm
         let (x2, x3, x4) = (0.05, 0.05 + 0.12 + q[2] + 0.3, 0.05 + 0.12 + q[2] + 0.3 + 0.35 + 0.06);
         let (y4, dy4, dz4) = (0.01 * c, -0.01 * s, 0.01 * c);
         let roll = Matrix3::new(1.0, 0.0, 0.0, 0.0, c, -s, 0.0, s, c);

@@ -12,7 +12,7 @@ use straightline_codegen::scene::{Contacts, Scene};
 use straightline_core::algorithms::{Environment, FunctionalCoordinates, Ltdl, SpringDamper, Struck, Support};
 use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion, Surface};
 use straightline_core::model::Model;
-use straightline_core::reference::{Component, ContactFrames, Derivatives, MassCentreTree};
+use straightline_core::reference::{CentreOfMassTree, Component, ContactFrames, Derivatives};
 use straightline_core::spatial::{Mat3, MotionVector, Transform, Vec3};
 use straightline_core::{algorithms as alg, reference as chapter, Dd, Real};
 use straightline_generated_tests::bounds::{CONTACT, CONTACT_AUTHORS, CONTACT_DATA};
@@ -93,7 +93,7 @@ fn runtime<T: Real>(
 }
 
 /// The same by the second author.
-fn second_author(case: &Case, tree: &MassCentreTree<Dd>, file: &str) -> Vec<(&'static str, Vec<Dd>)> {
+fn second_author(case: &Case, tree: &CentreOfMassTree<Dd>, file: &str) -> Vec<(&'static str, Vec<Dd>)> {
     let (frames, components) = case.reference(tree);
     let (q, qd) = (wide(&case.input("q")), wide(&case.input("qd")));
     let s: Vec<Derivatives<Dd>> =
@@ -134,7 +134,7 @@ fn second_author(case: &Case, tree: &MassCentreTree<Dd>, file: &str) -> Vec<(&'s
 #[test]
 fn both_authors_meet_every_case_of_the_data() {
     for file in ["contact", "impact", "environment", "environment_impact"] {
-        let mut known: Option<(String, (Loaded, MassCentreTree<Dd>))> = None;
+        let mut known: Option<(String, (Loaded, CentreOfMassTree<Dd>))> = None;
         let (mut first, mut second, mut rounded) = (0.0f64, 0.0f64, 0.0f64);
         for case in cases(file) {
             if known.as_ref().is_none_or(|(name, _)| *name != case.robot) {
@@ -183,7 +183,7 @@ fn across(random: &mut Random, a: &Vector3<Dd>) -> Vector3<Dd> {
 fn random_contact(
     random: &mut Random,
     robot: &Loaded,
-    tree: &MassCentreTree<Dd>,
+    tree: &CentreOfMassTree<Dd>,
     frame: &str,
 ) -> (Contact<Dd>, ContactFrames<Dd>) {
     let vector = |random: &mut Random| Vector3::from(random.three(1.0).map(Dd::from));

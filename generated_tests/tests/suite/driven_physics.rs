@@ -11,7 +11,7 @@ use straightline_codegen::expr::Graph;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::options::Options;
 use straightline_codegen::program::program;
-use straightline_codegen::verify::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::centre_of_mass_tree;
 use straightline_codegen::verify::verify;
 use straightline_codegen::Function::{
     CompleteModel, DriveEnergy, DrivePower, DriveTorques, DrivenForwardDynamics, DrivenInverseDynamics, StateSpace,
@@ -144,7 +144,7 @@ fn agree_with_the_reference(robot: &str, seed: u64, is_lossy: bool) {
     let mut random = Random(seed);
     let source = source(robot);
     let file = read::read(&source, &mut Diagnostics::new()).expect("the file is sound");
-    let tree = mass_centre_tree(&file, &ModelOptions::default()).expect("the reference understands it");
+    let tree = centre_of_mass_tree(&file, &ModelOptions::default()).expect("the reference understands it");
     let plain = Driven::new(&source, &ModelOptions::default(), "");
     let mut bodies: Vec<_> = plain.robot.model.bodies.iter().map(|b| &b.joint).collect();
     bodies.sort_by_key(|j| j.iv);

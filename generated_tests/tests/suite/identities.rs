@@ -288,7 +288,7 @@ fn orientations_are_right_handed_and_orthogonal() {
 }
 
 #[test]
-fn linear_momentum_is_mass_times_the_velocity_of_the_mass_centre() {
+fn linear_momentum_is_mass_times_the_velocity_of_the_centre_of_mass() {
     for_all_states(|s| {
         let mass: f64 = s.loaded.model.bodies.iter().map(|b| b.inertia.mass.to_f64()).sum();
         let momentum = s.call(Function::Momentum, &[&s.q, &s.qd]).rows(0, 3).into_owned();

@@ -173,7 +173,7 @@ fn every_fault_in_the_other_functions_is_caught() {
 
 /// Robot, what is written, what is written instead, and which function must notice.
 const FILE_FAULTS: &[(&str, &str, &str, Function)] = &[
-    // a product of inertia, a moment, a mass, a mass centre
+    // a product of inertia, a moment, a mass, a centre of mass
     ("panda", "ixy=\"-0.004761\"", "ixy=\"0.004761\"", Function::InverseDynamics),
     ("panda", "iyz=\"0.000229\"", "iyz=\"-0.000229\"", Function::InverseDynamics),
     ("panda", "izz=\"0.0017\"", "izz=\"0.0017000000001\"", Function::MassMatrix),

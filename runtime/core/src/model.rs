@@ -120,7 +120,7 @@ impl<T: Real> JointEffects<T> {
 }
 
 /// Inertia by its ten linear parameters about the origin of the canonical frame: what a body carries besides its own, such
-/// as a payload known at run time only. Forces are linear in it, which they are not in a mass centre.
+/// as a payload known at run time only. Forces are linear in it, which they are not in a centre of mass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load<T> {
     /// m \[kg\].

@@ -113,7 +113,7 @@ fn a_tumbling_base_keeps_energy_and_its_quaternion() {
     assert!(run.balance.relative() < 1e-9, "{:?}", run.balance);
     let length: f64 = run.q[3..7].iter().map(|x| x * x).sum();
     assert!((length - 1.0).abs() < 1e-14);
-    // the whole falls: the base's own names, and free fall of the mass centre is in the energy already
+    // the whole falls: the base's own names, and free fall of the centre of mass is in the energy already
     assert!(run.table.names.contains(&"q.root.qw".to_string()) && run.table.names.contains(&"tau.to_fore".to_string()));
 }
 

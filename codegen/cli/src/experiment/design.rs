@@ -121,14 +121,14 @@ fn mass_of(description: &Description, link: &str) -> f64 {
             let found = n.links.iter().find(|l| l.name.value == link).and_then(|l| l.inertial.as_ref());
             found.map_or(0.0, |inertial| inertial.mass.value)
         }
-        Notation::MassCentres(n) => n.links.iter().find(|l| l.name.value == link).map_or(0.0, |l| l.mass.value),
+        Notation::CentresOfMass(n) => n.links.iter().find(|l| l.name.value == link).map_or(0.0, |l| l.mass.value),
     }
 }
 
 fn drive_of(description: &Description, joint: &str) -> JointDrive {
     let found = match &description.notation {
         Notation::JointFrames(n) => n.joints.iter().find(|j| j.name.value == joint).map(|j| &j.drive),
-        Notation::MassCentres(n) => n.links.iter().find(|l| l.joint_name.value == joint).map(|l| &l.drive),
+        Notation::CentresOfMass(n) => n.links.iter().find(|l| l.joint_name.value == joint).map(|l| &l.drive),
     };
     found.cloned().unwrap_or_default()
 }

@@ -3,7 +3,7 @@
 
 use super::messages as say;
 use straightline_codegen::description::drives::Drive;
-use straightline_codegen::description::{Description, Inertial, Joint, JointDrive, MassCentreLink, Notation, Value};
+use straightline_codegen::description::{CentreOfMassLink, Description, Inertial, Joint, JointDrive, Notation, Value};
 use straightline_codegen::diagnostic::Diagnostic;
 
 /// A parameter and the values that it is to have.
@@ -76,17 +76,17 @@ pub fn with(description: &Description, path: &str, value: f64) -> Result<Descrip
             let link = n.links.iter_mut().find(|link| link.name.value == owner);
             link.and_then(|link| link.inertial.as_mut()).map(|inertial| set_mass(inertial, value))
         }
-        (Notation::MassCentres(n), "mass") => {
+        (Notation::CentresOfMass(n), "mass") => {
             let link = n.links.iter_mut().find(|link| link.name.value == owner);
-            link.map(|MassCentreLink { mass, inertia, .. }| scale(mass, &mut inertia.value, value))
+            link.map(|CentreOfMassLink { mass, inertia, .. }| scale(mass, &mut inertia.value, value))
         }
         (Notation::JointFrames(n), _) => {
             let joint = n.joints.iter_mut().find(|joint| joint.name.value == owner);
             joint.and_then(|Joint { drive, .. }| number(drive, key)).map(|number| number.value = value)
         }
-        (Notation::MassCentres(n), _) => {
+        (Notation::CentresOfMass(n), _) => {
             let link = n.links.iter_mut().find(|link| link.joint_name.value == owner);
-            link.and_then(|MassCentreLink { drive, .. }| number(drive, key)).map(|number| number.value = value)
+            link.and_then(|CentreOfMassLink { drive, .. }| number(drive, key)).map(|number| number.value = value)
         }
     };
     match found {

@@ -153,7 +153,7 @@ int main(void) {
 }
 "#;
     let Some(printed) = crate::in_c::printed(&package, "arm_dynamics", Library::StaticDebug, program) else { return };
-    // truth: m g · ∂p/∂q of the tool's mass centre, which is a frame there, by the generic algorithms
+    // truth: m g · ∂p/∂q of the tool's centre of mass, which is a frame there, by the generic algorithms
     let centre = FrameOption { name: "centre".into(), link: "forearm".into(), xyz: [0.1, 0.02, -0.05], rpy: [0.0; 3] };
     let options = ModelOptions { frames: vec![centre], ..ModelOptions::default() };
     let (model, _) = load(&Source::new(ARM, fs::read_to_string(ARM).unwrap()), &options);

@@ -101,7 +101,7 @@ const char *{prefix}_frame_name(int i);
             let _ = write!(
                 out,
                 "\n/* A body as the functions take it in {name}, made outside the control loop, of this mass [kg], with its mass\n \
-                 * centre [m] and its inertia about the mass centre xx, xy, xz, yy, yz, zz [kg m^2]. All zeros are no body.\n \
+                 * centre [m] and its inertia about the centre of mass xx, xy, xz, yy, yz, zz [kg m^2]. All zeros are no body.\n \
                  * Returns 0, or why no body has these: 1 a number is not finite, 2 the mass is negative, 3 inertia without\n \
                  * mass, 4 the inertia is impossible; {name} is untouched then. */\n\
                  int {prefix}_{name}_new({c_type} mass, const {c_type} com[3], const {c_type} inertia[6], {c_type} {name}[{length}]);\n"

@@ -390,8 +390,8 @@ pub unsafe extern "C" fn {prefix}_{name}_new(
         }
         format!(
             r#"
-/// A body as the functions take it in `{name}`, from mass, mass centre and inertia (xx, xy, xz, yy, yz, zz) about the mass
-/// centre. Zero, or why no body has these: 1 a number is not finite, 2 the mass is negative, 3 inertia without mass, 4 the
+/// A body as the functions take it in `{name}`, from mass, centre of mass and inertia (xx, xy, xz, yy, yz, zz) about the centre
+/// of mass. Zero, or why no body has these: 1 a number is not finite, 2 the mass is negative, 3 inertia without mass, 4 the
 /// inertia is impossible; `{name}` is untouched then.
 ///
 /// # Safety

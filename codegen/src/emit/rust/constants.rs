@@ -91,7 +91,7 @@ pub(super) fn of_robot(generated: &Generated) -> Vec<Constant> {
         ("LOWER_LIMITS", "Least coordinate of every joint \\[rad or m\\]", list(&|l| l.lower)),
         ("UPPER_LIMITS", "Greatest coordinate of every joint \\[rad or m\\]", list(&|l| l.upper)),
         ("VELOCITY_LIMITS", "Greatest speed of every joint \\[rad/s or m/s\\]", list(&|l| l.velocity)),
-        ("EFFORT_LIMITS", "Greatest drive of every joint \\[N·m or N\\]", list(&|l| l.effort)),
+        ("EFFORT_LIMITS", "Greatest generalized force of every joint \\[N·m or N\\]", list(&|l| l.effort)),
     ] {
         let doc = format!("{doc}{floating}; infinite where the robot file says nothing.");
         constants.push(Constant::new(name, Kind::Numbers(*scalar, vec![single.len()]), values, doc));

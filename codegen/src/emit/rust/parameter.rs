@@ -39,7 +39,7 @@ pub enum Unphysical {
     NegativeMass,
     /// There is inertia, and no mass to have it.
     InertiaWithoutMass,
-    /// The inertia about the mass centre belongs to no distribution of mass: a principal moment is negative, or exceeds the
+    /// The inertia about the centre of mass belongs to no distribution of mass: a principal moment is negative, or exceeds the
     /// sum of the other two.
     Inertia,
 }
@@ -55,7 +55,7 @@ impl core::fmt::Display for Unphysical {
     }
 }
 
-/// A body is possible if its mass is not negative and its second moment ½ tr(J) 1 − J about the mass centre has no negative
+/// A body is possible if its mass is not negative and its second moment ½ tr(J) 1 − J about the centre of mass has no negative
 /// eigenvalue; a rounding error of the trace is forgiven.
 fn check_inertia(mass: {t}, com: &[{t}; 3], inertia: &[{t}; 6]) -> Result<(), Unphysical> {
     let [jxx, jxy, jxz, jyy, jyz, jzz] = *inertia;
@@ -99,7 +99,7 @@ impl {type_name} {{
     /// No mass at all.
     pub const NONE: {type_name} = {type_name}([0.0; {scalars}]);
 
-    /// A body of this mass \\[kg\\], with its mass centre \\[m\\] in the frame `{frame}` and this inertia about the mass centre
+    /// A body of this mass \\[kg\\], with its centre of mass \\[m\\] in the frame `{frame}` and this inertia about the centre of mass
     /// in the frame's axes: xx, xy, xz, yy, yz, zz \\[kg·m²\\].
     ///
     /// # Errors

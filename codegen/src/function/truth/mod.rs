@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use std::collections::BTreeMap;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::model::Model;
-use straightline_core::reference::{ExtendedPosition, Joint, MassCentreFrame, MassCentreTree};
+use straightline_core::reference::{CentreOfMassFrame, CentreOfMassTree, ExtendedPosition, Joint};
 use straightline_core::{Dd, Real};
 
 mod drives;
@@ -48,8 +48,8 @@ pub struct Effect {
 #[derive(Clone, Debug)]
 pub struct Chapter<'a> {
     /// The robot.
-    pub tree: MassCentreTree<Magnitude>,
-    frames: Vec<MassCentreFrame<Magnitude>>,
+    pub tree: CentreOfMassTree<Magnitude>,
+    frames: Vec<CentreOfMassFrame<Magnitude>>,
     effects: &'a [Effect],
     /// The velocity coordinates that move, where others are held.
     moving: Option<&'a [usize]>,
@@ -60,7 +60,7 @@ pub struct Chapter<'a> {
 
 impl<'a> Chapter<'a> {
     /// A robot without frames and drives at this state; rates and forces that are not given are zero.
-    pub fn new(tree: &MassCentreTree<Dd>, effects: &'a [Effect], state: BTreeMap<Quantity, Vec<Dd>>) -> Chapter<'a> {
+    pub fn new(tree: &CentreOfMassTree<Dd>, effects: &'a [Effect], state: BTreeMap<Quantity, Vec<Dd>>) -> Chapter<'a> {
         let mut sized: BTreeMap<Quantity, Vec<Magnitude>> =
             state.into_iter().map(|(quantity, x)| (quantity, x.into_iter().map(Magnitude::new).collect())).collect();
         for rate in [Quantity::Velocity, Quantity::Acceleration, Quantity::Force] {
@@ -127,7 +127,7 @@ impl<'a> Chapter<'a> {
     }
 
     /// What `f` gives for each of the frames.
-    fn per_frame(&self, f: impl Fn(&MassCentreFrame<Magnitude>) -> Vec<Magnitude>) -> Option<Vec<Magnitude>> {
+    fn per_frame(&self, f: impl Fn(&CentreOfMassFrame<Magnitude>) -> Vec<Magnitude>) -> Option<Vec<Magnitude>> {
         Some(self.frames.iter().flat_map(f).collect())
     }
 
@@ -170,7 +170,7 @@ impl super::Function {
 }
 
 /// Every number with the size of the vector, rotation or tensor that it is a part of: turned into other axes, it takes part in all components.
-fn with_sizes(tree: &MassCentreTree<Dd>) -> MassCentreTree<Magnitude> {
+fn with_sizes(tree: &CentreOfMassTree<Dd>) -> CentreOfMassTree<Magnitude> {
     let of_vector = |v: &mut Vector3<Magnitude>| of_length(v.as_mut_slice());
     let of_unit = |v: &mut [Magnitude]| v.iter_mut().for_each(|x| *x = x.of_size(1.0));
     let mut tree = tree.map(Magnitude::new);

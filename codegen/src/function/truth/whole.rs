@@ -30,6 +30,6 @@ impl Truth for CentreOfMass {
 impl Truth for Momentum {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         let momentum = reference::momentum(&at.tree, at.q(), at.qd());
-        Some([list(&momentum.linear), list(&momentum.angular_about_mass_centre)].concat())
+        Some([list(&momentum.linear), list(&momentum.angular_about_centre_of_mass)].concat())
     }
 }

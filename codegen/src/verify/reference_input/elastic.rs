@@ -133,7 +133,7 @@ pub(super) fn bend(
     Ok(segments)
 }
 
-/// The pieces of a rod with the mass, mass centre and inertia of `part` between the cuts, in the same frame.
+/// The pieces of a rod with the mass, centre of mass and inertia of `part` between the cuts, in the same frame.
 fn pieces(part: &Part, begin: &Vector3<Dd>, along: &Vector3<Dd>, cuts: &[Dd]) -> Vec<Part> {
     // ∫ (u·x)² dm = ½ tr J − uᵀ J u, and ∫ (u·x) x dm beside it
     let half_trace = part.inertia.trace() / Dd::from(2.0);

@@ -2,7 +2,7 @@
 
 use super::outcome::{Outcome, Size};
 use super::robots::Judged;
-use straightline_codegen::verify::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::centre_of_mass_tree;
 use straightline_codegen::{description, Function};
 use straightline_core::{Dd, Real};
 use straightline_generated_tests::compiled;
@@ -94,7 +94,7 @@ pub fn any_scalar(size: Size) -> Vec<Outcome> {
     let judged = Judged::new("panda");
     let options = programs::options(&judged.robot).model;
     let described = description::read(&programs::source(&judged.robot), &mut Default::default()).expect("a robot file");
-    let tree = mass_centre_tree(&described, &options).expect("the reference's robots are trees");
+    let tree = centre_of_mass_tree(&described, &options).expect("the reference's robots are trees");
     let plain = compiled::robot("panda");
     let mut random = Random(14);
     let (mut other, mut worst) = (0, 0.0f64);

@@ -4,7 +4,7 @@ use super::outcome::{Outcome, Size};
 use super::robots::Judged;
 use straightline_codegen::program::Program;
 use straightline_codegen::Function;
-use straightline_core::reference::{geometry, motion, natural_scale, Joint, MassCentreTree};
+use straightline_core::reference::{geometry, motion, natural_scale, CentreOfMassTree, Joint};
 use straightline_core::Dd;
 use straightline_generated_tests::compiled;
 use straightline_generated_tests::programs::{self, cast};
@@ -23,7 +23,7 @@ pub fn torque_error(judged: &Judged, inputs: &[Vec<f64>], computed: &[f64], trut
 
 /// The same for any tree.
 pub fn torque_error_of(
-    tree: &MassCentreTree<f64>,
+    tree: &CentreOfMassTree<f64>,
     inputs: &[Vec<f64>],
     computed: &[f64],
     truth: &[Dd],
@@ -55,10 +55,10 @@ fn scaled(scales: &[f64], computed: &[f64], truth: &[Dd], unit: f64) -> f64 {
 /// The sum of the moduli of the terms of every torque: lengths of links · m · |terms of the acceleration| + |terms of the
 /// couple| over the links that a joint carries.
 ///
-/// The scale of the reference data takes a lever, and the acceleration of a mass centre, as one term. Where ten joints turn at
+/// The scale of the reference data takes a lever, and the acceleration of a centre of mass, as one term. Where ten joints turn at
 /// 100 rad/s accelerations of 1e5 m/s² can cancel to nothing at a wrist, and a search finds that; here their terms count, as
 /// everything that is added does: A_k = A_parent + (E + ω²) |r| …, E_k = E_parent + |q̈| + |q̇| |ω|.
-fn scales(tree: &MassCentreTree<f64>, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
+fn scales(tree: &CentreOfMassTree<f64>, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
     let places = geometry(tree, q);
     let motion = motion(tree, &places, qd, qdd);
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();

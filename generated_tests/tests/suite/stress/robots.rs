@@ -4,10 +4,10 @@ use std::fmt::Write;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::model::ModelOptions;
-use straightline_codegen::verify::reference_input::mass_centre_tree;
+use straightline_codegen::verify::reference_input::centre_of_mass_tree;
 use straightline_codegen::{description, Function};
 use straightline_core::model::{JointKind, Model};
-use straightline_core::reference::MassCentreTree;
+use straightline_core::reference::CentreOfMassTree;
 use straightline_core::{Dd, Real};
 use straightline_generated_tests::programs;
 use straightline_generated_tests::random::Random;
@@ -26,7 +26,7 @@ pub struct Judged {
     pub robot: Robot,
     pub loaded: Loaded,
     /// For natural scales, in f64: they need no more digits.
-    pub tree: MassCentreTree<f64>,
+    pub tree: CentreOfMassTree<f64>,
 }
 
 impl Judged {
@@ -34,7 +34,7 @@ impl Judged {
         let robot = Robot::load(name);
         let (source, options) = (programs::source(&robot), programs::options(&robot).model);
         let described = description::read(&source, &mut Diagnostics::new()).expect("the reference's files can be read");
-        let tree = mass_centre_tree(&described, &options).expect("the reference's robots are trees");
+        let tree = centre_of_mass_tree(&described, &options).expect("the reference's robots are trees");
         Judged { loaded: programs::load(&source, &options), robot, tree: tree.map(Dd::to_f64) }
     }
 

@@ -8,7 +8,7 @@ use crate::joint::JointPose;
 use crate::model::Model;
 use crate::real::Real;
 
-/// T = ½ Σ (m v_c² + ω · J_c ω) + ½ Σ I q̇² \[J\], each body about its mass centre, so that every term is a square; the
+/// T = ½ Σ (m v_c² + ω · J_c ω) + ½ Σ I q̇² \[J\], each body about its centre of mass, so that every term is a square; the
 /// second sum is over the rotors.
 pub fn kinetic_energy<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> T {
     let poses = JointPose::all(&model.bodies, q);

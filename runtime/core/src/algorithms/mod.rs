@@ -48,7 +48,7 @@
 //! | energy | [`kinetic_energy`], [`potential_energy`] |
 //! | motion under the inputs of drives | [`driven_motion`], [`complete_model`](fn@complete_model), [`state_space`](fn@state_space) |
 //! | inputs of drives for a motion | [`driven_inverse`](fn@driven_inverse) |
-//! | mass centre, momentum | [`momentum`](fn@momentum) |
+//! | centre of mass, momentum | [`momentum`](fn@momentum) |
 //! | contact coordinates, (20.83)-(20.87) | [`relative_motion`], [`functional_coordinates`] |
 //! | motion and reactions in contact, (20.88)-(20.94) | [`constrained_forward_dynamics`], [`hybrid_inverse_dynamics`], [`Environment`] |
 //! | impact, (20.90)-(20.97) | [`impact`](fn@impact) |

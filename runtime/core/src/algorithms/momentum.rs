@@ -1,4 +1,4 @@
-//! Mass centre and momentum of the whole robot, in world axes.
+//! Centre of mass and momentum of the whole robot, in world axes.
 //!
 //! First moments, linear and angular momenta are summed from the tips to the base like forces; at the base about the root
 //! body's joint, so that what stands far from the world's origin loses no digits.
@@ -16,17 +16,17 @@ use alloc::vec::Vec;
 pub struct Momentum<T> {
     /// Sum of the masses \[kg\].
     pub mass: T,
-    /// Position of the mass centre \[m\].
+    /// Position of the centre of mass \[m\].
     pub com: Vec3<T>,
-    /// Velocity of the mass centre \[m/s\].
+    /// Velocity of the centre of mass \[m/s\].
     pub com_velocity: Vec3<T>,
     /// Σ m v \[kg·m/s\].
     pub linear: Vec3<T>,
-    /// Angular momentum about the mass centre \[kg·m²/s\].
+    /// Angular momentum about the centre of mass \[kg·m²/s\].
     pub angular: Vec3<T>,
 }
 
-/// Mass centre, its velocity, and the momenta of the motion (q, qd). Divides by the mass of the moving bodies, which is
+/// Centre of mass, its velocity, and the momenta of the motion (q, qd). Divides by the mass of the moving bodies, which is
 /// positive for a robot.
 #[doc(alias("COM", "centroidal momentum", "center of mass"))]
 pub fn momentum<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Momentum<T> {

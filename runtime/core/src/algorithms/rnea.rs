@@ -4,9 +4,9 @@
 //! back: the two sweeps of the chapter's (20.23)-(20.24) and (20.46)-(20.48) (Featherstone 2008, table 5.1 is the same in
 //! 6-vectors). Gravity is the acceleration −g of the base. Two choices keep it cheap and exact:
 //!
-//! - One matrix per body, U = \[ε×\] + \[ω×\]\[ω×\], gives the acceleration of every point of it, a + U r, of the mass
-//!   centre as of the children's joints, and its entries enter the rate of the angular momentum again.
-//! - Inertia is taken about the mass centre. About the joint's origin there are large terms that cancel: on the wrist of
+//! - One matrix per body, U = \[ε×\] + \[ω×\]\[ω×\], gives the acceleration of every point of it, a + U r, of the centre
+//!   of mass as of the children's joints, and its entries enter the rate of the angular momentum again.
+//! - Inertia is taken about the centre of mass. About the joint's origin there are large terms that cancel: on the wrist of
 //!   a PUMA 560 they cost two digits.
 
 use super::effects::{passive_force, rotor_inertias};
@@ -119,7 +119,7 @@ impl<T: Real> AccelerationField<T> {
         AccelerationField { u, squares, products: Vec3::new(yz, xz, xy) }
     }
 
-    /// Rate of the angular momentum about the mass centre, J ε + ω × J ω. Written out, every entry of J meets one
+    /// Rate of the angular momentum about the centre of mass, J ε + ω × J ω. Written out, every entry of J meets one
     /// number, and those of the products of inertia are entries of U: 15 multiplications where the vectors take 24.
     fn moment(&self, alpha: Vec3<T>, inertia: &SpatialInertia<T>) -> Vec3<T> {
         let [[_, u12, u13], [u21, _, u23], [u31, u32, _]] = self.u.rows;

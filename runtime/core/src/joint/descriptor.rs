@@ -82,15 +82,15 @@ pub enum Dialect {
     Urdf,
     /// TOML with joint frames.
     JointFrames,
-    /// TOML with mass centres, the chapter's.
-    MassCentres,
+    /// TOML with centres of mass, the chapter's.
+    CentresOfMass,
 }
 
 impl Dialect {
     /// Files that describe joints by frames.
     pub const FRAMES: &'static [Dialect] = &[Dialect::Urdf, Dialect::JointFrames];
     /// All files.
-    pub const ALL: &'static [Dialect] = &[Dialect::Urdf, Dialect::JointFrames, Dialect::MassCentres];
+    pub const ALL: &'static [Dialect] = &[Dialect::Urdf, Dialect::JointFrames, Dialect::CentresOfMass];
 }
 
 impl JointKind {

@@ -8,7 +8,7 @@ use crate::spatial::{Composite, ForceVector, Mat3, MotionVector, Sym3, Transform
 
 pub(super) const ROW: Descriptor = Descriptor {
     name: "prismatic",
-    words: &[Word::ranged("linear", &[Dialect::MassCentres]), Word::ranged("prismatic", Dialect::ALL)],
+    words: &[Word::ranged("linear", &[Dialect::CentresOfMass]), Word::ranged("prismatic", Dialect::ALL)],
     number: None,
     verb: "slides",
     measures: &[Measure::Length],

@@ -5,7 +5,7 @@
 //! their derivatives are taken by the rule of Leibniz, the object's axes turning where it moves.
 
 use super::{equations_of_motion, frame_jacobian, frame_jacobian_bias, frame_pose, frame_velocity};
-use super::{MassCentreFrame, MassCentreTree, Number};
+use super::{CentreOfMassFrame, CentreOfMassTree, Number};
 use crate::dd::Dd;
 use alloc::vec::Vec;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -29,7 +29,7 @@ pub enum Component {
 #[derive(Clone, Debug)]
 pub struct ContactFrames<T: Number> {
     /// The frame of the robot.
-    pub frame: MassCentreFrame<T>,
+    pub frame: CentreOfMassFrame<T>,
     /// Tool axis and second axis in the axes of that frame.
     pub axes: [Vector3<T>; 2],
     /// Origin of the object.
@@ -57,7 +57,7 @@ pub struct Derivatives<T: Number> {
 
 /// s, ṡ, J and A of one coordinate.
 pub fn functional_coordinate<T: Number>(
-    tree: &MassCentreTree<T>,
+    tree: &CentreOfMassTree<T>,
     contact: &ContactFrames<T>,
     q: &[T],
     qd: &[T],
@@ -163,7 +163,7 @@ fn constrained_matrix<T: Number>(h: &DMatrix<T>, j: &DMatrix<T>) -> DMatrix<T> {
 
 /// q̈ and F of the constrained motion.
 pub fn constrained_motion<T: Number>(
-    tree: &MassCentreTree<T>,
+    tree: &CentreOfMassTree<T>,
     coordinates: &[Derivatives<T>],
     q: &[T],
     qd: &[T],
@@ -183,7 +183,7 @@ pub fn constrained_motion<T: Number>(
 
 /// Δq̇ and F Δt of an impact on rigid constraints; `restitution` 0 is the chapter's.
 pub fn rigid_impact<T: Number>(
-    tree: &MassCentreTree<T>,
+    tree: &CentreOfMassTree<T>,
     coordinates: &[Derivatives<T>],
     q: &[T],
     qd: &[T],
@@ -219,7 +219,7 @@ fn environment_matrix<T: Number>(h: &DMatrix<T>, coordinate: &Derivatives<T>, me
 
 /// q̈, s̈_6 and F of a robot that presses on a mass with a spring and a damper.
 pub fn environment_motion<T: Number>(
-    tree: &MassCentreTree<T>,
+    tree: &CentreOfMassTree<T>,
     coordinate: &Derivatives<T>,
     [me, k, b]: [T; 3],
     q: &[T],
@@ -243,7 +243,7 @@ pub fn environment_motion<T: Number>(
 
 /// Δq̇, Δṡ_6, F Δt and the velocity after a plastic impact on a mass that moves with `before`.
 pub fn environment_impact<T: Number>(
-    tree: &MassCentreTree<T>,
+    tree: &CentreOfMassTree<T>,
     coordinate: &Derivatives<T>,
     me: T,
     before: T,

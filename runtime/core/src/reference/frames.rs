@@ -1,9 +1,9 @@
 //! Poses, Jacobians and accelerations of frames that are fixed to links.
 //!
-//! From the linear forms Λ, Γ, Ξ, Δ of section 20.2.1, carried from the mass centre C_j to the frame's origin P by the
+//! From the linear forms Λ, Γ, Ξ, Δ of section 20.2.1, carried from the centre of mass C_j to the frame's origin P by the
 //! vector ρ = C_j P. World axes, linear part first.
 
-use super::{geometry, linear_forms, skew, LinkGeometry, MassCentreFrame, MassCentreTree, Number};
+use super::{geometry, linear_forms, skew, CentreOfMassFrame, CentreOfMassTree, LinkGeometry, Number};
 use crate::dd::Dd;
 use alloc::vec;
 use nalgebra::{DVector, Matrix3, Matrix6xX, Vector3, Vector6};
@@ -19,23 +19,23 @@ pub struct FramePose<T> {
 }
 
 /// ρ = C_j P in the external frame.
-fn offset<T: Number>(frame: &MassCentreFrame<T>, link: &LinkGeometry<T>) -> Vector3<T> {
+fn offset<T: Number>(frame: &CentreOfMassFrame<T>, link: &LinkGeometry<T>) -> Vector3<T> {
     link.rotation * frame.position
 }
 
 /// Where the frame is.
-pub fn frame_pose<T: Number>(tree: &MassCentreTree<T>, frame: &MassCentreFrame<T>, q: &[T]) -> FramePose<T> {
+pub fn frame_pose<T: Number>(tree: &CentreOfMassTree<T>, frame: &CentreOfMassFrame<T>, q: &[T]) -> FramePose<T> {
     match frame.link {
         None => FramePose { position: frame.position, rotation: frame.rotation },
         Some(j) => {
             let link = &geometry(tree, q)[j];
-            FramePose { position: link.mass_centre + offset(frame, link), rotation: link.rotation * frame.rotation }
+            FramePose { position: link.centre_of_mass + offset(frame, link), rotation: link.rotation * frame.rotation }
         }
     }
 }
 
 /// Geometric Jacobian of the frame at its origin, 6 × n.
-pub fn frame_jacobian<T: Number>(tree: &MassCentreTree<T>, frame: &MassCentreFrame<T>, q: &[T]) -> Matrix6xX<T> {
+pub fn frame_jacobian<T: Number>(tree: &CentreOfMassTree<T>, frame: &CentreOfMassFrame<T>, q: &[T]) -> Matrix6xX<T> {
     let n = tree.nv();
     let mut jacobian = Matrix6xX::zeros(n);
     if let Some(j) = frame.link {
@@ -52,8 +52,8 @@ pub fn frame_jacobian<T: Number>(tree: &MassCentreTree<T>, frame: &MassCentreFra
 
 /// J̇ q̇ of the frame: its linear and angular acceleration for q̈ = 0.
 pub fn frame_jacobian_bias<T: Number>(
-    tree: &MassCentreTree<T>,
-    frame: &MassCentreFrame<T>,
+    tree: &CentreOfMassTree<T>,
+    frame: &CentreOfMassFrame<T>,
     q: &[T],
     qd: &[T],
 ) -> Vector6<T> {
@@ -72,8 +72,8 @@ pub fn frame_jacobian_bias<T: Number>(
 
 /// Linear velocity of the frame's origin and its angular velocity: J q̇.
 pub fn frame_velocity<T: Number>(
-    tree: &MassCentreTree<T>,
-    frame: &MassCentreFrame<T>,
+    tree: &CentreOfMassTree<T>,
+    frame: &CentreOfMassFrame<T>,
     q: &[T],
     qd: &[T],
 ) -> Vector6<T> {
@@ -82,8 +82,8 @@ pub fn frame_velocity<T: Number>(
 
 /// Linear acceleration of the frame's origin and its angular acceleration: J q̈ + J̇ q̇.
 pub fn frame_acceleration<T: Number>(
-    tree: &MassCentreTree<T>,
-    frame: &MassCentreFrame<T>,
+    tree: &CentreOfMassTree<T>,
+    frame: &CentreOfMassFrame<T>,
     q: &[T],
     qd: &[T],
     qdd: &[T],

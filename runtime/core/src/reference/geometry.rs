@@ -2,7 +2,7 @@
 //!
 //! Section 20.1.2, equation (20.25) and the appendix, (20.100)–(20.111).
 
-use super::{ExtendedPosition, Joint, MassCentreLink, MassCentreTree, Number};
+use super::{CentreOfMassLink, CentreOfMassTree, ExtendedPosition, Joint, Number};
 use crate::dd::Dd;
 use alloc::vec::Vec;
 use nalgebra::{Matrix3, Vector3};
@@ -13,15 +13,15 @@ pub struct LinkGeometry<T> {
     /// A_j: from frame j to the external frame; (20.9), (20.111).
     #[doc(alias = "A_j")]
     pub rotation: Matrix3<T>,
-    /// r_{c,j}: the mass centre \[m\]; (20.25).
-    pub mass_centre: Vector3<T>,
+    /// r_{c,j}: the centre of mass \[m\]; (20.25).
+    pub centre_of_mass: Vector3<T>,
     /// e_j: the joint axis. Null for a free link.
     pub e: Vector3<T>,
-    /// r_{j,j}: from the joint (S''_j) to the mass centre \[m\].
+    /// r_{j,j}: from the joint (S''_j) to the centre of mass \[m\].
     pub r: Vector3<T>,
-    /// r'_{j,j}: from S'_j to the mass centre \[m\]; (20.8).
+    /// r'_{j,j}: from S'_j to the centre of mass \[m\]; (20.8).
     pub r_dash: Vector3<T>,
-    /// r_{j−1,j}: from S_j (S'_j) to the parent's mass centre \[m\].
+    /// r_{j−1,j}: from S_j (S'_j) to the parent's centre of mass \[m\].
     pub r_parent: Vector3<T>,
 }
 
@@ -88,7 +88,7 @@ pub fn quaternion_rotation<T: Number>(xyzw: [T; 4]) -> Matrix3<T> {
 
 /// A_{j−1,j}: from frame j to the parent's frame, at the joint's coordinate.
 #[doc(alias = "A_{j-1,j}")]
-fn relative_rotation<T: Number>(link: &MassCentreLink<T>, q: T) -> Matrix3<T> {
+fn relative_rotation<T: Number>(link: &CentreOfMassLink<T>, q: T) -> Matrix3<T> {
     // A linear joint is turned by the constant angle α_j, a revolute one by q_j.
     let (extended, alpha) = match &link.extended {
         ExtendedPosition::Matrix(extended) => (*extended, T::constant(Dd::ZERO)),
@@ -108,17 +108,17 @@ fn relative_rotation<T: Number>(link: &MassCentreLink<T>, q: T) -> Matrix3<T> {
 }
 
 /// Positions of all links at the coordinates `q`, in the order of the links.
-pub fn geometry<T: Number>(tree: &MassCentreTree<T>, q: &[T]) -> Vec<LinkGeometry<T>> {
+pub fn geometry<T: Number>(tree: &CentreOfMassTree<T>, q: &[T]) -> Vec<LinkGeometry<T>> {
     assert_eq!(q.len(), tree.nq(), "one value per position coordinate");
     let mut links: Vec<LinkGeometry<T>> = Vec::with_capacity(tree.links.len());
     for link in &tree.links {
         let here = match link.joint.shares() {
             Some([_, s]) => {
-                let (parent_rotation, parent_mass_centre) = match link.parent {
-                    Some(p) => (links[p].rotation, links[p].mass_centre),
+                let (parent_rotation, parent_centre_of_mass) = match link.parent {
+                    Some(p) => (links[p].rotation, links[p].centre_of_mass),
                     None => (Matrix3::identity(), Vector3::zeros()),
                 };
-                one_joint(link, (q[link.iq], s), &parent_rotation, &parent_mass_centre)
+                one_joint(link, (q[link.iq], s), &parent_rotation, &parent_centre_of_mass)
             }
             None => free(link, &q[link.iq..link.iq + 7]),
         };
@@ -128,10 +128,10 @@ pub fn geometry<T: Number>(tree: &MassCentreTree<T>, q: &[T]) -> Vec<LinkGeometr
 }
 
 fn one_joint<T: Number>(
-    link: &MassCentreLink<T>,
+    link: &CentreOfMassLink<T>,
     (q, s): (T, T),
     parent_rotation: &Matrix3<T>,
-    parent_mass_centre: &Vector3<T>,
+    parent_centre_of_mass: &Vector3<T>,
 ) -> LinkGeometry<T> {
     // A_j = A_{0,1} A_{1,2} … A_{j−1,j}                                                                        (20.111)
     let rotation = parent_rotation * relative_rotation(link, q);
@@ -142,17 +142,17 @@ fn one_joint<T: Number>(
     // r'_{j,j} = r_{j,j} + s_j q_j e_j                                                                          (20.8)
     let r_dash = r + e * (s * q);
     // r_{c,j} = r_{c,j−1} − r_{j−1,j} + r'_{j,j}                                                                (20.25)
-    let mass_centre = parent_mass_centre - r_parent + r_dash;
-    LinkGeometry { rotation, mass_centre, e, r, r_dash, r_parent }
+    let centre_of_mass = parent_centre_of_mass - r_parent + r_dash;
+    LinkGeometry { rotation, centre_of_mass, e, r, r_dash, r_parent }
 }
 
-fn free<T: Number>(link: &MassCentreLink<T>, q: &[T]) -> LinkGeometry<T> {
+fn free<T: Number>(link: &CentreOfMassLink<T>, q: &[T]) -> LinkGeometry<T> {
     let rotation = quaternion_rotation([q[3], q[4], q[5], q[6]]);
     let r = rotation * link.r;
     let root_point = Vector3::new(q[0], q[1], q[2]);
     LinkGeometry {
         rotation,
-        mass_centre: root_point + r,
+        centre_of_mass: root_point + r,
         e: Vector3::zeros(),
         r,
         r_dash: r,

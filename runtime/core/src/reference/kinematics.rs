@@ -1,8 +1,8 @@
-//! How the links move: velocities and accelerations of the mass centres, and their linear forms in q̇ and q̈.
+//! How the links move: velocities and accelerations of the centres of mass, and their linear forms in q̇ and q̈.
 //!
 //! Section 20.2.1, equations (20.23)–(20.43). All vectors are in the external frame.
 
-use super::{skew, LinkGeometry, MassCentreTree, Number};
+use super::{skew, CentreOfMassTree, LinkGeometry, Number};
 use alloc::vec::Vec;
 use nalgebra::{Matrix3xX, Vector3};
 
@@ -13,9 +13,9 @@ pub struct LinkMotion<T> {
     pub omega: Vector3<T>,
     /// ε_j: angular acceleration \[rad/s²\].
     pub epsilon: Vector3<T>,
-    /// v_j: velocity of the mass centre \[m/s\].
+    /// v_j: velocity of the centre of mass \[m/s\].
     pub v: Vector3<T>,
-    /// w_j: acceleration of the mass centre \[m/s²\], without gravity.
+    /// w_j: acceleration of the centre of mass \[m/s²\], without gravity.
     pub w: Vector3<T>,
 }
 
@@ -29,7 +29,7 @@ impl<T: Number> LinkMotion<T> {
 
 /// Velocities and accelerations of all links, in the order of the links.
 pub fn motion<T: Number>(
-    tree: &MassCentreTree<T>,
+    tree: &CentreOfMassTree<T>,
     geometry: &[LinkGeometry<T>],
     qd: &[T],
     qdd: &[T],
@@ -108,7 +108,7 @@ pub struct LinearForms<T: Number> {
 
 /// Λ, Γ, Ξ, Δ of all links, in the order of the links.
 pub fn linear_forms<T: Number>(
-    tree: &MassCentreTree<T>,
+    tree: &CentreOfMassTree<T>,
     geometry: &[LinkGeometry<T>],
     qd: &[T],
 ) -> Vec<LinearForms<T>> {

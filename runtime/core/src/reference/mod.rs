@@ -2,7 +2,7 @@
 //!
 //! Source: the handbook chapter *Robot Dynamics*, sections 20.1, 20.2, 20.5.2 and 20.5.3 and its appendix, equations
 //! (20.1)–(20.61), (20.83)–(20.97) and (20.100)–(20.111); equation numbers in this module are the chapter's. Its misprints are corrected where they occur,
-//! and every correction says so. Link frames sit in the mass centres, all vectors of motion and force are expressed in
+//! and every correction says so. Link frames sit in the centres of mass, all vectors of motion and force are expressed in
 //! the external immobile frame, rotations come from Rodrigues' formula, forces from D'Alembert's principle, and the
 //! equations of motion from the matrices Λ, Γ, Ξ, Δ. Nothing of [`crate::algorithms`] or [`crate::spatial`] is used:
 //! only the scalars and nalgebra's products.
@@ -19,10 +19,10 @@
 //!
 //! ```
 //! use nalgebra::{Matrix3, Vector3};
-//! use straightline_core::reference::{inverse_dynamics, ExtendedPosition, Joint, MassCentreLink, MassCentreTree};
+//! use straightline_core::reference::{inverse_dynamics, ExtendedPosition, Joint, CentreOfMassLink, CentreOfMassTree};
 //!
-//! // a pendulum about the world's z axis: 2 kg, its mass centre 0.5 m from the joint
-//! let link = MassCentreLink {
+//! // a pendulum about the world's z axis: 2 kg, its centre of mass 0.5 m from the joint
+//! let link = CentreOfMassLink {
 //!     name: "rod".into(),
 //!     parent: None,
 //!     joint: Joint::Revolute,
@@ -37,7 +37,7 @@
 //!     extended: ExtendedPosition::Matrix(Matrix3::identity()),
 //! };
 //! let gravity = Vector3::new(0.0, -10.0, 0.0);
-//! let pendulum = MassCentreTree { name: "pendulum".into(), gravity, links: vec![link], frames: vec![] };
+//! let pendulum = CentreOfMassTree { name: "pendulum".into(), gravity, links: vec![link], frames: vec![] };
 //! // τ = (J + m r²) q̈ + m g r cos q
 //! let tau = inverse_dynamics(&pendulum, &[0.0], &[0.0], &[5.0]);
 //! assert_eq!(tau[0], (0.1 + 2.0 * 0.25) * 5.0 + 2.0 * 10.0 * 0.5);
@@ -69,4 +69,4 @@ pub use geometry::{extended_joint, geometry, quaternion_rotation, rodrigues, ske
 pub use kinematics::{linear_forms, motion, LinearForms, LinkMotion};
 pub use scalar::Number;
 pub use solve::solve_symmetric;
-pub use tree::{ExtendedPosition, Joint, MassCentreFrame, MassCentreLink, MassCentreTree};
+pub use tree::{CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, Joint};

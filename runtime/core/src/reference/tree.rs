@@ -1,6 +1,6 @@
-//! The chapter's input: links described from their mass centres.
+//! The chapter's input: links described from their centres of mass.
 //!
-//! Section 20.1.2: each link has a frame fixed to it, with its origin in the mass centre C and arbitrary axes. Names of
+//! Section 20.1.2: each link has a frame fixed to it, with its origin in the centre of mass C and arbitrary axes. Names of
 //! this module: `e`, `r`, `r_star` are the projections on the link's own frame (tilde above, ẽ_j, r̃_{j,j}), `e_parent`,
 //! `r_parent`, `r_parent_star` those on the parent's frame (tilde below, e_j and r_{j−1,j}). The world is frame 0, with its
 //! origin C_0.
@@ -81,12 +81,12 @@ pub enum ExtendedPosition<T> {
     Matrix(Matrix3<T>),
 }
 
-/// A link, described from its mass centre, with the joint that carries it.
+/// A link, described from its centre of mass, with the joint that carries it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MassCentreLink<T> {
+pub struct CentreOfMassLink<T> {
     /// Name of the link in the robot file.
     pub name: String,
-    /// The link it moves against, an index into [`MassCentreTree::links`] that is less than its own; `None`: the base,
+    /// The link it moves against, an index into [`CentreOfMassTree::links`] that is less than its own; `None`: the base,
     /// frame 0.
     pub parent: Option<usize>,
     /// How it moves.
@@ -97,7 +97,7 @@ pub struct MassCentreLink<T> {
     pub iv: usize,
     /// m_j \[kg\].
     pub mass: T,
-    /// J̃_j: tensor of inertia about the mass centre, link axes \[kg·m²\]; (20.15).
+    /// J̃_j: tensor of inertia about the centre of mass, link axes \[kg·m²\]; (20.15).
     pub inertia: Matrix3<T>,
     /// ẽ_j: unit vector of the joint axis in frame j; (20.2).
     pub e: Vector3<T>,
@@ -107,17 +107,17 @@ pub struct MassCentreLink<T> {
     /// root point to C_j.
     #[doc(alias = "r_jj")]
     pub r: Vector3<T>,
-    /// r_{j−1,j} \[m\]: from the joint S_j (of a linear joint, from S'_j) to the parent's mass centre, in the parent's frame;
+    /// r_{j−1,j} \[m\]: from the joint S_j (of a linear joint, from S'_j) to the parent's centre of mass, in the parent's frame;
     /// (20.4). Null for a free link.
     pub r_parent: Vector3<T>,
     /// The orientation at q_j = 0.
     pub extended: ExtendedPosition<T>,
 }
 
-impl<T: Number> MassCentreLink<T> {
+impl<T: Number> CentreOfMassLink<T> {
     /// A link that is free in the world: q = (position of the root point, quaternion of the link's axes).
     pub fn free(name: String, mass: T, inertia: Matrix3<T>, r: Vector3<T>) -> Self {
-        MassCentreLink {
+        CentreOfMassLink {
             name,
             parent: None,
             joint: Joint::Free,
@@ -134,9 +134,9 @@ impl<T: Number> MassCentreLink<T> {
     }
 }
 
-impl<T: Number> MassCentreLink<T> {
-    fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> MassCentreLink<U> {
-        MassCentreLink {
+impl<T: Number> CentreOfMassLink<T> {
+    fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> CentreOfMassLink<U> {
+        CentreOfMassLink {
             name: self.name.clone(),
             parent: self.parent,
             joint: self.joint,
@@ -160,9 +160,9 @@ impl<T: Number> MassCentreLink<T> {
     }
 }
 
-impl<T: Number> MassCentreFrame<T> {
-    fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> MassCentreFrame<U> {
-        MassCentreFrame {
+impl<T: Number> CentreOfMassFrame<T> {
+    fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> CentreOfMassFrame<U> {
+        CentreOfMassFrame {
             name: self.name.clone(),
             link: self.link,
             position: self.position.map(f),
@@ -173,7 +173,7 @@ impl<T: Number> MassCentreFrame<T> {
 
 /// A frame that is fixed to a link.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MassCentreFrame<T> {
+pub struct CentreOfMassFrame<T> {
     /// Name of the frame in the robot file.
     pub name: String,
     /// The link that carries it; `None`: the world.
@@ -186,19 +186,19 @@ pub struct MassCentreFrame<T> {
 
 /// A robot as the chapter describes it, generalised to a tree of links.
 #[derive(Clone, Debug, PartialEq)]
-#[doc(alias = "MassCentreChain")]
-pub struct MassCentreTree<T> {
+#[doc(alias = "CentreOfMassChain")]
+pub struct CentreOfMassTree<T> {
     /// Name of the robot.
     pub name: String,
     /// g: acceleration due to gravity in frame 0 \[m/s²\].
     pub gravity: Vector3<T>,
     /// The links, parents before children.
-    pub links: Vec<MassCentreLink<T>>,
+    pub links: Vec<CentreOfMassLink<T>>,
     /// Frames that outputs may be asked for.
-    pub frames: Vec<MassCentreFrame<T>>,
+    pub frames: Vec<CentreOfMassFrame<T>>,
 }
 
-impl<T: Number> MassCentreTree<T> {
+impl<T: Number> CentreOfMassTree<T> {
     /// Number of position coordinates.
     pub fn nq(&self) -> usize {
         self.links.iter().map(|link| link.joint.nq()).sum()
@@ -220,8 +220,8 @@ impl<T: Number> MassCentreTree<T> {
     }
 
     /// The same robot in other numbers.
-    pub fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> MassCentreTree<U> {
-        MassCentreTree {
+    pub fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> CentreOfMassTree<U> {
+        CentreOfMassTree {
             name: self.name.clone(),
             gravity: self.gravity.map(f),
             links: self.links.iter().map(|link| link.map(f)).collect(),
@@ -230,7 +230,7 @@ impl<T: Number> MassCentreTree<T> {
     }
 
     /// The frame of that name.
-    pub fn frame(&self, name: &str) -> Option<&MassCentreFrame<T>> {
+    pub fn frame(&self, name: &str) -> Option<&CentreOfMassFrame<T>> {
         self.frames.iter().find(|frame| frame.name == name)
     }
 

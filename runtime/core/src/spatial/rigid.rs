@@ -70,28 +70,28 @@ impl<T: Real> Add for ForceVector<T> {
     }
 }
 
-/// Mass, mass centre and inertia of a body, in one frame.
+/// Mass, centre of mass and inertia of a body, in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpatialInertia<T> {
     /// m \[kg\].
     pub mass: T,
-    /// Mass centre \[m\].
+    /// Centre of mass \[m\].
     pub com: Vec3<T>,
     /// First moment m c \[kg·m\].
     pub first_moment: Vec3<T>,
-    /// Inertia tensor about the mass centre J_c \[kg·m²\].
+    /// Inertia tensor about the centre of mass J_c \[kg·m²\].
     pub inertia_com: Sym3<T>,
     /// Differences of the diagonal of J_c, (J_zz − J_yy, J_xx − J_zz, J_yy − J_xx) \[kg·m²\]: what ω × J ω
     /// takes of it.
     pub anisotropy_com: Vec3<T>,
-    /// Second moment about the mass centre Σ_c = ½ tr(J_c) 1 − J_c \[kg·m²\].
+    /// Second moment about the centre of mass Σ_c = ½ tr(J_c) 1 − J_c \[kg·m²\].
     pub second_moment_com: Sym3<T>,
     /// Second moment about the frame's origin Σ_o = Σ_c + m c cᵀ \[kg·m²\].
     pub second_moment: Sym3<T>,
 }
 
 impl<T: Real> SpatialInertia<T> {
-    /// From mass \[kg\], mass centre \[m\] and inertia tensor about the mass centre \[kg·m²\], in the frame's axes.
+    /// From mass \[kg\], centre of mass \[m\] and inertia tensor about the centre of mass \[kg·m²\], in the frame's axes.
     pub fn new(mass: T, com: Vec3<T>, inertia_com: Sym3<T>) -> Self {
         let first_moment = com.scale(mass);
         let second_moment_com = inertia_com.inertia_to_second_moment();

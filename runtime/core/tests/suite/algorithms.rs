@@ -507,7 +507,7 @@ fn gravity_forces_are_the_gradient_of_the_potential_energy() {
 }
 
 #[test]
-fn the_mass_centre_moves_with_the_momentum() {
+fn the_centre_of_mass_moves_with_the_momentum() {
     for case in cases() {
         let (model, q, qd) = case.moving();
         let moving = momentum(&model, &q, &qd);

@@ -10,8 +10,8 @@ use straightline_core::reference::{
     bias_force, centre_of_mass, dalembert_inverse_dynamics, equations_of_motion, extended_joint, forward_dynamics,
     forward_natural_scale, frame_jacobian, frame_jacobian_bias, frame_pose, frame_velocity, geometry, gravity_force,
     inverse_dynamics, joint_loads, joint_wrenches, kinetic_energy, linear_forms, mass_matrix, momentum, motion,
-    natural_scale, potential_energy, rodrigues, skew, unit, velocity_force, ExtendedPosition, Joint, LinkGeometry,
-    LinkMotion, MassCentreFrame, MassCentreLink, MassCentreTree,
+    natural_scale, potential_energy, rodrigues, skew, unit, velocity_force, CentreOfMassFrame, CentreOfMassLink,
+    CentreOfMassTree, ExtendedPosition, Joint, LinkGeometry, LinkMotion,
 };
 use straightline_core::Dd;
 
@@ -25,7 +25,7 @@ const ROUNDING: f64 = 2e-29;
 /// One state of a robot, with the robot as it is in this state (a state may have its own gravity).
 struct State {
     id: String,
-    tree: MassCentreTree<Dd>,
+    tree: CentreOfMassTree<Dd>,
     q: Vec<Dd>,
     qd: Vec<Dd>,
     qdd: Vec<Dd>,
@@ -136,7 +136,7 @@ fn energies_are_those_of_the_data() {
         let potential = potential_energy(tree, q);
         // V sums terms of both signs: its scale is Σ m |g| |r_c|
         let scale = geometry(tree, q).iter().zip(&tree.links).fold(Dd::ZERO, |sum, (here, link)| {
-            sum + link.mass * (tree.gravity.dot(&tree.gravity) * here.mass_centre.dot(&here.mass_centre)).sqrt()
+            sum + link.mass * (tree.gravity.dot(&tree.gravity) * here.centre_of_mass.dot(&here.centre_of_mass)).sqrt()
         });
         state.check("V", &[potential], &data["V"], &[scale]);
     }
@@ -176,7 +176,7 @@ fn the_chapters_quantities_are_those_of_the_data() {
         let loads = joint_loads(tree, q, qd, qdd);
         let rotations: Vec<Dd> = position.iter().flat_map(|link| by_rows(&link.rotation)).collect();
         state.check_group("A", &rotations, &expected["A"]);
-        state.check_group("rc", &concat(position.iter().map(|link| &link.mass_centre)), &expected["rc"]);
+        state.check_group("rc", &concat(position.iter().map(|link| &link.centre_of_mass)), &expected["rc"]);
         state.check_group("omega", &concat(motion.iter().map(|link| &link.omega)), &expected["omega"]);
         state.check_group("eps", &concat(motion.iter().map(|link| &link.epsilon)), &expected["eps"]);
         state.check_group("v", &concat(motion.iter().map(|link| &link.v)), &expected["v"]);
@@ -202,7 +202,7 @@ fn natural_scale_is_that_of_the_data() {
         state.check_group("scale of g", natural_scale(tree, q, &rest, &rest).as_slice(), &scale["g"]);
         let forward = forward_natural_scale(tree, q, qd, &inputs(&data["fd_tau"]));
         state.check("scale of fd", forward.as_slice(), &scale["fd"], &numbers(&scale["fd"]));
-        let weightless = MassCentreTree { gravity: Vector3::zeros(), ..tree.clone() };
+        let weightless = CentreOfMassTree { gravity: Vector3::zeros(), ..tree.clone() };
         state.check_group("scale of C", natural_scale(&weightless, q, qd, &rest).as_slice(), &scale["C"]);
     }
 }
@@ -216,7 +216,7 @@ struct Printing {
 type Vector = Vector3<Dd>;
 
 /// The robot with its joints frozen into their matrices at `q`, by a way of computing them, and what remains of `q`.
-fn frozen(tree: &MassCentreTree<Dd>, q: &[Dd], printing: &Printing) -> (MassCentreTree<Dd>, Vec<Dd>) {
+fn frozen(tree: &CentreOfMassTree<Dd>, q: &[Dd], printing: &Printing) -> (CentreOfMassTree<Dd>, Vec<Dd>) {
     let (mut tree, mut q) = (tree.clone(), q.to_vec());
     for link in &mut tree.links {
         let ExtendedPosition::ByVectors { r_star, r_parent_star, alpha } = &link.extended else { continue };
@@ -229,11 +229,11 @@ fn frozen(tree: &MassCentreTree<Dd>, q: &[Dd], printing: &Printing) -> (MassCent
     (tree, q)
 }
 
-/// The largest excess of drives and mass centres over the bound, over all states of a robot, when the robot and its
+/// The largest excess of drives and centres of mass over the bound, over all states of a robot, when the robot and its
 /// coordinates are changed.
 fn excess_when_changed(
     robot: &str,
-    mut change: impl FnMut(&MassCentreTree<Dd>, &[Dd]) -> (MassCentreTree<Dd>, Vec<Dd>),
+    mut change: impl FnMut(&CentreOfMassTree<Dd>, &[Dd]) -> (CentreOfMassTree<Dd>, Vec<Dd>),
 ) -> Option<f64> {
     let worst = |state: State| {
         let (tree, q) = change(&state.tree, &state.q);
@@ -272,7 +272,7 @@ fn printed_misprints_do_not_pass() {
 
 #[test]
 fn wrong_robots_do_not_pass() {
-    type Mutation = fn(&mut MassCentreTree<Dd>);
+    type Mutation = fn(&mut CentreOfMassTree<Dd>);
     let mutants: [(&str, &str, Mutation); 8] = [
         ("chapter_6r", "a mass in its 20th digit", |t| t.links[5].mass = t.links[5].mass + Dd::from(1e-20)),
         ("chapter_6r", "a length in its 20th digit", |t| t.links[1].r.y = t.links[1].r.y + Dd::from(1e-21)),
@@ -308,7 +308,7 @@ fn wrong_robots_do_not_pass() {
 // Laws of mechanics and closed forms: need no data.
 
 /// Ten random robots of every kind and one of every style of numbers as people write them, with a random state.
-fn random_states() -> impl Iterator<Item = (MassCentreTree<Dd>, [Vec<Dd>; 3])> {
+fn random_states() -> impl Iterator<Item = (CentreOfMassTree<Dd>, [Vec<Dd>; 3])> {
     let kinds = [(false, false), (false, true), (true, false), (true, true)];
     let oblique = (0..40).map(move |seed| {
         let (branched, floating) = kinds[seed % 4];
@@ -329,7 +329,7 @@ fn random_states() -> impl Iterator<Item = (MassCentreTree<Dd>, [Vec<Dd>; 3])> {
     oblique.chain(written)
 }
 
-fn assert_close(what: &str, tree: &MassCentreTree<Dd>, a: &[Dd], b: &[Dd], tolerance: f64) {
+fn assert_close(what: &str, tree: &CentreOfMassTree<Dd>, a: &[Dd], b: &[Dd], tolerance: f64) {
     assert_eq!(a.len(), b.len(), "{what}");
     let scale = largest(a).hi().max(largest(b).hi()).max(1.0);
     let error = a.iter().zip(b).map(|(a, b)| (*a - *b).abs().hi() / scale);
@@ -338,7 +338,7 @@ fn assert_close(what: &str, tree: &MassCentreTree<Dd>, a: &[Dd], b: &[Dd], toler
 }
 
 /// q after a short time at constant q̇ (first order, exact for one-degree-of-freedom joints).
-fn advanced(tree: &MassCentreTree<Dd>, q: &[Dd], qd: &[Dd], time: Dd) -> Vec<Dd> {
+fn advanced(tree: &CentreOfMassTree<Dd>, q: &[Dd], qd: &[Dd], time: Dd) -> Vec<Dd> {
     let mut q = q.to_vec();
     for link in &tree.links {
         if link.joint == Joint::Free {
@@ -480,7 +480,7 @@ fn momentum_changes_by_gravity_and_the_root_force() {
         let weight = tree.gravity * mass;
         let (mut force, mut moment) = (weight, centre_of_mass(&tree, &q).cross(&weight));
         for (j, load) in loads.iter().enumerate().filter(|&(j, _)| tree.links[j].parent.is_none()) {
-            let joint = position[j].mass_centre - position[j].r_dash;
+            let joint = position[j].centre_of_mass - position[j].r_dash;
             force += load.force;
             moment += load.moment + joint.cross(&load.force);
         }
@@ -489,7 +489,7 @@ fn momentum_changes_by_gravity_and_the_root_force() {
         let angular = rate(after.angular_about_origin, before.angular_about_origin);
         assert_close("angular momentum", &tree, angular.as_slice(), moment.as_slice(), 1e-15);
         let now = at(Dd::ZERO);
-        let moved = now.angular_about_mass_centre + centre_of_mass(&tree, &q).cross(&now.linear);
+        let moved = now.angular_about_centre_of_mass + centre_of_mass(&tree, &q).cross(&now.linear);
         assert_close("two points", &tree, moved.as_slice(), now.angular_about_origin.as_slice(), 1e-29);
     }
 }
@@ -516,9 +516,15 @@ fn jacobians_are_derivatives_of_poses() {
     }
 }
 
-/// A link that turns about z of the world or of its parent, with mass centre and next joint on its x axis.
-fn planar_link(parent: Option<usize>, mass: f64, moment: f64, to_centre: f64, parent_rest: f64) -> MassCentreLink<Dd> {
-    MassCentreLink {
+/// A link that turns about z of the world or of its parent, with centre of mass and next joint on its x axis.
+fn planar_link(
+    parent: Option<usize>,
+    mass: f64,
+    moment: f64,
+    to_centre: f64,
+    parent_rest: f64,
+) -> CentreOfMassLink<Dd> {
+    CentreOfMassLink {
         name: String::new(),
         parent,
         joint: Joint::Revolute,
@@ -537,7 +543,7 @@ fn planar_link(parent: Option<usize>, mass: f64, moment: f64, to_centre: f64, pa
 #[test]
 fn pendulum_has_its_closed_form() {
     let (mass, moment, length) = (2.0, 0.3, 0.7);
-    let tree = MassCentreTree {
+    let tree = CentreOfMassTree {
         name: "pendulum".to_string(),
         gravity: Vector3::new(0.0, -9.75, 0.0).map(Dd::from),
         links: vec![planar_link(None, mass, moment, length, 0.0)],
@@ -562,7 +568,7 @@ fn planar_arm_has_its_closed_form() {
     let d = Dd::from;
     let (m1, i1, l1, c1) = (3.0, 0.11, 0.8, 0.3);
     let (m2, i2, c2) = (1.5, 0.07, 0.45);
-    let tree = MassCentreTree {
+    let tree = CentreOfMassTree {
         name: "planar 2R".to_string(),
         gravity: Vector3::new(0.0, -9.75, 0.0).map(d),
         links: vec![planar_link(None, m1, i1, c1, 0.0), planar_link(Some(0), m2, i2, c2, l1 - c1)],
@@ -606,7 +612,7 @@ fn free_body_obeys_newton_and_euler_in_its_own_axes() {
     let moment = inertia * epsilon + omega.cross(&(inertia * omega));
     let tau = inverse_dynamics(&tree, &q, &qd, &qdd);
     assert_close("τ", &tree, tau.as_slice(), &concat([&force, &moment]), 1e-30);
-    // without force its mass centre falls
+    // without force its centre of mass falls
     let rest = vec![Dd::ZERO; 6];
     let fall = forward_dynamics(&tree, &q, &rest, &rest);
     assert_close("fall", &tree, &fall.as_slice()[..3], gravity.as_slice(), 1e-30);
@@ -659,10 +665,10 @@ fn f64_agrees_with_double_double() {
 }
 
 /// The robot in f64.
-fn rounded(tree: &MassCentreTree<Dd>) -> MassCentreTree<f64> {
+fn rounded(tree: &CentreOfMassTree<Dd>) -> CentreOfMassTree<f64> {
     let v = |v: &Vector3<Dd>| v.map(Dd::to_f64);
     let m = |m: &Matrix3<Dd>| m.map(Dd::to_f64);
-    let link = |link: &MassCentreLink<Dd>| MassCentreLink {
+    let link = |link: &CentreOfMassLink<Dd>| CentreOfMassLink {
         name: link.name.clone(),
         parent: link.parent,
         joint: link.joint,
@@ -683,13 +689,13 @@ fn rounded(tree: &MassCentreTree<Dd>) -> MassCentreTree<f64> {
             },
         },
     };
-    let frame = |frame: &MassCentreFrame<Dd>| MassCentreFrame {
+    let frame = |frame: &CentreOfMassFrame<Dd>| CentreOfMassFrame {
         name: frame.name.clone(),
         link: frame.link,
         position: v(&frame.position),
         rotation: m(&frame.rotation),
     };
-    MassCentreTree {
+    CentreOfMassTree {
         name: tree.name.clone(),
         gravity: v(&tree.gravity),
         links: tree.links.iter().map(link).collect(),

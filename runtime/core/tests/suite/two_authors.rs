@@ -1,4 +1,4 @@
-//! Two authors, one physics: the algorithms, in canonical joint frames, and the reference, in mass centres and the
+//! Two authors, one physics: the algorithms, in canonical joint frames, and the reference, in centres of mass and the
 //! external frame, agree in double-double on random chains and trees.
 
 use crate::support::compare::{compare_authors, Disagreement};
@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use straightline_core::algorithms;
 use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion, Surface};
 use straightline_core::model::{self, Body, Frame, JointKind, Limits, Model};
-use straightline_core::reference::{self, unit, Component, ContactFrames, ExtendedPosition, Joint, MassCentreTree};
+use straightline_core::reference::{self, unit, CentreOfMassTree, Component, ContactFrames, ExtendedPosition, Joint};
 use straightline_core::spatial::{Mat3, MotionVector, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::Dd;
 
@@ -33,7 +33,7 @@ fn canonical_axes(random: &mut Random, e: &Vector3<Dd>) -> Matrix3<Dd> {
 
 /// The same robot in canonical joint frames, from its geometry: the frame of link j has its origin in S_j and its z axis
 /// along e_j, and at q = 0 it is where the joint frame on the parent is.
-fn canonical(random: &mut Random, tree: &MassCentreTree<Dd>) -> Model<Dd> {
+fn canonical(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Model<Dd> {
     // of every link: axes of the canonical frame in frame j, and its origin from C_j, in frame j
     let frames: Vec<(Matrix3<Dd>, Vector3<Dd>)> = tree
         .links
@@ -74,7 +74,7 @@ fn canonical(random: &mut Random, tree: &MassCentreTree<Dd>) -> Model<Dd> {
             link_frame: Transform { rotation: mat3(&axes.transpose()), translation: Vec3::zero() },
         }
     });
-    let frame = |frame: &reference::MassCentreFrame<Dd>| {
+    let frame = |frame: &reference::CentreOfMassFrame<Dd>| {
         let (axes, origin) = frame.link.map_or_else(|| (Matrix3::identity(), Vector3::zeros()), |j| frames[j]);
         Frame {
             name: frame.name.clone(),
@@ -96,7 +96,7 @@ fn canonical(random: &mut Random, tree: &MassCentreTree<Dd>) -> Model<Dd> {
 
 /// From link axes to the parent's at q = 0: by Figure 20.3, the projections of −r_{j−1,j} and r_{j,j} on the plane
 /// perpendicular to the axis have the same direction; a linear joint is turned by α from there.
-fn at_zero(link: &reference::MassCentreLink<Dd>) -> Matrix3<Dd> {
+fn at_zero(link: &reference::CentreOfMassLink<Dd>) -> Matrix3<Dd> {
     let (r_star, r_parent_star, alpha) = match &link.extended {
         ExtendedPosition::Matrix(rotation) => return *rotation,
         ExtendedPosition::ByVectors { r_star, r_parent_star, alpha } => (r_star, r_parent_star, *alpha),
@@ -111,7 +111,7 @@ fn at_zero(link: &reference::MassCentreLink<Dd>) -> Matrix3<Dd> {
 }
 
 /// The joints get places in q and q̇ in an order of their own.
-fn shuffle_coordinates(random: &mut Random, tree: &mut MassCentreTree<Dd>) {
+fn shuffle_coordinates(random: &mut Random, tree: &mut CentreOfMassTree<Dd>) {
     let mut order: Vec<usize> = (0..tree.links.len()).collect();
     for i in (1..order.len()).rev() {
         order.swap(i, random.below(i + 1));

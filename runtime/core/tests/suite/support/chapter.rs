@@ -2,11 +2,13 @@
 #![allow(dead_code)] // every test file uses a part of it
 
 use nalgebra::{Matrix3, Vector3};
-use straightline_core::reference::{unit, ExtendedPosition, Joint, MassCentreFrame, MassCentreLink, MassCentreTree};
+use straightline_core::reference::{
+    unit, CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, Joint,
+};
 use straightline_core::Dd;
 
 /// A robot in the chapter's notation.
-pub fn chapter_robot(text: &str) -> MassCentreTree<Dd> {
+pub fn chapter_robot(text: &str) -> CentreOfMassTree<Dd> {
     let file: toml::Table = text.parse().expect("a TOML file");
     let number = |value: &toml::Value| {
         Dd::from(value.as_float().or_else(|| value.as_integer().map(|i| i as f64)).expect("a number"))
@@ -28,7 +30,7 @@ pub fn chapter_robot(text: &str) -> MassCentreTree<Dd> {
     let mut links = Vec::new();
     for (j, link) in file["link"].as_array().expect("a list of tables").iter().enumerate() {
         let link = link.as_table().expect("a table");
-        links.push(MassCentreLink {
+        links.push(CentreOfMassLink {
             name: format!("link{}", j + 1),
             parent: j.checked_sub(1),
             joint: match link["type"].as_str() {
@@ -52,13 +54,13 @@ pub fn chapter_robot(text: &str) -> MassCentreTree<Dd> {
         });
         below = link.clone();
     }
-    let tip = MassCentreFrame {
+    let tip = CentreOfMassFrame {
         name: "tip".to_string(),
         link: Some(links.len() - 1),
         position: -vector(&below["r_next"]),
         rotation: Matrix3::identity(),
     };
-    MassCentreTree {
+    CentreOfMassTree {
         name: file["name"].as_str().expect("a name").to_string(),
         gravity: vector(&file["gravity"]),
         links,

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use straightline_core::algorithms;
 use straightline_core::model::Model;
-use straightline_core::reference::{self, MassCentreTree};
+use straightline_core::reference::{self, CentreOfMassTree};
 use straightline_core::spatial::{Mat3, Vec3};
 use straightline_core::Dd;
 
@@ -75,7 +75,7 @@ fn columns(m: &Mat3<Dd>) -> Vec<Dd> {
 pub fn compare_authors(
     disagreement: &mut Disagreement,
     robot: &str,
-    tree: &MassCentreTree<Dd>,
+    tree: &CentreOfMassTree<Dd>,
     model: &Model<Dd>,
     random: &mut Random,
 ) {
@@ -83,7 +83,7 @@ pub fn compare_authors(
     let q = random_position(random, tree);
     let (qd, qdd, tau) = (random.list(n, 2.0), random.list(n, 3.0), random.list(n, 10.0));
     let rest = vec![Dd::ZERO; n];
-    let weightless = MassCentreTree { gravity: Vector3::zeros(), ..tree.clone() };
+    let weightless = CentreOfMassTree { gravity: Vector3::zeros(), ..tree.clone() };
     let d = disagreement;
 
     let scale = reference::natural_scale(tree, &q, &qd, &qdd);
@@ -151,9 +151,9 @@ pub fn compare_authors(
     let expected = reference::momentum(tree, &q, &qd);
     let computed = algorithms::momentum(model, &q, &qd);
     let com = reference::centre_of_mass(tree, &q);
-    d.compare_group("mass centre", robot, &array(&computed.com), com.as_slice());
+    d.compare_group("centre of mass", robot, &array(&computed.com), com.as_slice());
     d.compare_group("linear momentum", robot, &array(&computed.linear), expected.linear.as_slice());
-    let angular = expected.angular_about_mass_centre;
+    let angular = expected.angular_about_centre_of_mass;
     // a difference: of that about the origin and of the mass in its centre
     let least = (com.dot(&com) * expected.linear.dot(&expected.linear)).sqrt();
     let scale = angular.iter().fold(least + Dd::ONE, |sum, x| sum + x.abs());

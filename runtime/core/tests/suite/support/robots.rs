@@ -4,7 +4,9 @@
 use super::roll_pitch_yaw::rotation;
 use super::written::{Motion, Shape, Style, Written};
 use nalgebra::{Matrix3, Vector3};
-use straightline_core::reference::{unit, ExtendedPosition, Joint, MassCentreFrame, MassCentreLink, MassCentreTree};
+use straightline_core::reference::{
+    unit, CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, Joint,
+};
 use straightline_core::Dd;
 
 /// Numbers from −1 to 1, the same for the same seed.
@@ -82,8 +84,8 @@ pub struct RobotKind {
 
 /// A robot with oblique axes, full tensors, revolute and linear joints, the zero of each joint either by the chapter's
 /// vectors, with and without specificities, or given as a matrix. One frame on every link.
-pub fn random_robot(random: &mut Random, kind: RobotKind) -> MassCentreTree<Dd> {
-    let mut links: Vec<MassCentreLink<Dd>> = Vec::new();
+pub fn random_robot(random: &mut Random, kind: RobotKind) -> CentreOfMassTree<Dd> {
+    let mut links: Vec<CentreOfMassLink<Dd>> = Vec::new();
     let mut frames = Vec::new();
     for j in 0..kind.links {
         let mass = random.between(0.2, 5.0);
@@ -91,9 +93,14 @@ pub fn random_robot(random: &mut Random, kind: RobotKind) -> MassCentreTree<Dd> 
         let r = random.vector() * Dd::from(0.4);
         let name = format!("link{j}");
         let rotation = random.rotation();
-        frames.push(MassCentreFrame { name: format!("frame{j}"), link: Some(j), position: random.vector(), rotation });
+        frames.push(CentreOfMassFrame {
+            name: format!("frame{j}"),
+            link: Some(j),
+            position: random.vector(),
+            rotation,
+        });
         if kind.floating && j == 0 {
-            links.push(MassCentreLink::free(name, mass, inertia, r));
+            links.push(CentreOfMassLink::free(name, mass, inertia, r));
             continue;
         }
         let first = usize::from(kind.floating);
@@ -128,7 +135,7 @@ pub fn random_robot(random: &mut Random, kind: RobotKind) -> MassCentreTree<Dd> 
             }
         };
         let joint = if random.below(3) == 0 { Joint::Linear } else { Joint::Revolute };
-        links.push(MassCentreLink {
+        links.push(CentreOfMassLink {
             name,
             parent,
             joint,
@@ -143,20 +150,20 @@ pub fn random_robot(random: &mut Random, kind: RobotKind) -> MassCentreTree<Dd> 
             extended,
         });
     }
-    frames.push(MassCentreFrame {
+    frames.push(CentreOfMassFrame {
         name: "world".to_string(),
         link: None,
         position: random.vector(),
         rotation: random.rotation(),
     });
     let gravity = random.vector() * Dd::from(10.0);
-    let mut tree = MassCentreTree { name: format!("{kind:?}"), gravity, links, frames };
+    let mut tree = CentreOfMassTree { name: format!("{kind:?}"), gravity, links, frames };
     tree.number_coordinates();
     tree
 }
 
 /// Coordinates of the robot, the quaternion of a floating root normalised.
-pub fn random_position(random: &mut Random, tree: &MassCentreTree<Dd>) -> Vec<Dd> {
+pub fn random_position(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Vec<Dd> {
     let mut q = random.list(tree.nq(), 3.0);
     for link in tree.links.iter().filter(|link| link.joint == Joint::Free) {
         let i = link.iq + 3;
@@ -170,7 +177,7 @@ pub fn random_position(random: &mut Random, tree: &MassCentreTree<Dd>) -> Vec<Dd
 ///
 /// # Panics
 /// If a link is welded on, or a link that moves says nothing of its mass.
-pub fn written_robot(written: &Written, name: String) -> MassCentreTree<Dd> {
+pub fn written_robot(written: &Written, name: String) -> CentreOfMassTree<Dd> {
     let vector = |x: [f64; 3]| Vector3::from(x.map(Dd::from));
     let tensor = |[xx, yy, zz, xy, xz, yz]: [f64; 6]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz).map(Dd::from);
     // link 0 of a fixed base is the world
@@ -182,13 +189,13 @@ pub fn written_robot(written: &Written, name: String) -> MassCentreTree<Dd> {
         let (mass, com) = (Dd::from(inertial.mass), vector(inertial.com));
         let inertia = turned * tensor(inertial.inertia) * turned.transpose();
         if i == 0 {
-            return MassCentreLink::free(name, mass, inertia, com);
+            return CentreOfMassLink::free(name, mass, inertia, com);
         }
         assert_ne!(link.motion, Motion::Fixed, "nothing is welded");
         let parent = link.parent.checked_sub(first);
         let (e, extended) = (unit(&vector(link.axis)), rotation(link.rpy));
         let carried = parent.map_or(Vector3::zeros(), |_| vector(of(link.parent).com));
-        MassCentreLink {
+        CentreOfMassLink {
             name,
             parent,
             joint: if link.motion == Motion::Prismatic { Joint::Linear } else { Joint::Revolute },
@@ -203,21 +210,21 @@ pub fn written_robot(written: &Written, name: String) -> MassCentreTree<Dd> {
             extended: ExtendedPosition::Matrix(extended),
         }
     });
-    let links: Vec<MassCentreLink<Dd>> = links.collect();
-    let frame = |(j, link): (usize, &MassCentreLink<Dd>)| MassCentreFrame {
+    let links: Vec<CentreOfMassLink<Dd>> = links.collect();
+    let frame = |(j, link): (usize, &CentreOfMassLink<Dd>)| CentreOfMassFrame {
         name: format!("frame{j}"),
         link: Some(j),
         position: -link.r,
         rotation: Matrix3::identity(),
     };
     let frames = links.iter().enumerate().map(frame).collect();
-    let mut tree = MassCentreTree { name, gravity: vector([0.0, 0.0, -9.81]), links, frames };
+    let mut tree = CentreOfMassTree { name, gravity: vector([0.0, 0.0, -9.81]), links, frames };
     tree.number_coordinates();
     tree
 }
 
 /// Robots in every style of numbers, `seeds` of each: chains and trees with up to seven joints, some of which slide, some afloat.
-pub fn written_robots(seeds: u64) -> impl Iterator<Item = (Style, MassCentreTree<Dd>)> {
+pub fn written_robots(seeds: u64) -> impl Iterator<Item = (Style, CentreOfMassTree<Dd>)> {
     let of = |seed: u64, k: usize, style: Style| {
         let (branched, floating) = ((k + seed as usize).is_multiple_of(3), (k + seed as usize).is_multiple_of(5));
         let joints = 1 + (k * 3 + seed as usize) % 7;

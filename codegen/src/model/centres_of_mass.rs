@@ -1,6 +1,6 @@
 //! From the chapter's mass-centre notation to bodies in canonical joint frames: 20.1.2 and the appendix.
 //!
-//! Frame j is fixed to link j with its origin in the mass centre C_j; frame 0 is the world. At q_j = 0 the pose of frame j
+//! Frame j is fixed to link j with its origin in the centre of mass C_j; frame 0 is the world. At q_j = 0 the pose of frame j
 //! in frame j−1 follows from A⁰_{j−1,j} and the vectors to the joint: S_j = −r_{j−1,j} in frame j−1, and C_j = S_j + r_{j,j}.
 //! The canonical frame of joint j stands in S_j (S''_j for a linear joint) with z along e_j. Vectors are as in the file:
 //! `e`, `r`, `r_star` of link j in frame j (tilde above), `e_next`, … of link j−1 in frame j−1 (tilde below).
@@ -11,7 +11,7 @@ use super::geometry::{
 };
 use super::merge::{merge, Part};
 use super::{angle, check, Assembly, ModelOptions, MOST_LINKS};
-use crate::description::{messages, Description, MassCentreEnd, MassCentreLink, MassCentreNotation, Value};
+use crate::description::{messages, CentreOfMassEnd, CentreOfMassLink, CentreOfMassNotation, Description, Value};
 use crate::diagnostic::Diagnostics;
 use std::collections::BTreeMap;
 use straightline_core::algorithms::composing_pays;
@@ -23,7 +23,7 @@ use straightline_core::Dd;
 const PARALLEL: f64 = 1e-9;
 
 pub(super) fn assemble(
-    chain: &MassCentreNotation,
+    chain: &CentreOfMassNotation,
     description: &Description,
     options: &ModelOptions,
     tolerance: f64,
@@ -148,12 +148,12 @@ pub(super) fn assemble(
 }
 
 /// r_{j−1,j} of link `index` (counted from 0).
-fn chain_vector(base: &MassCentreEnd, links: &[MassCentreLink], index: usize) -> Option<[f64; 3]> {
+fn chain_vector(base: &CentreOfMassEnd, links: &[CentreOfMassLink], index: usize) -> Option<[f64; 3]> {
     let end = index.checked_sub(1).map_or(base, |i| &links[i].end);
     end.r_next.as_ref().map(|r| r.value)
 }
 
-fn check_link(link: &MassCentreLink, description: &Description, diagnostics: &mut Diagnostics) {
+fn check_link(link: &CentreOfMassLink, description: &Description, diagnostics: &mut Diagnostics) {
     let name = &link.name.value;
     check::inertial(name, &link.mass, &link.inertia, diagnostics);
     check::limits(&link.joint_name, link.kind.value, &link.limits, description.format, diagnostics);
@@ -173,7 +173,7 @@ fn check_link(link: &MassCentreLink, description: &Description, diagnostics: &mu
     }
 }
 
-fn slides(link: &MassCentreLink) -> bool {
+fn slides(link: &CentreOfMassLink) -> bool {
     link.kind.value.kind.is_some_and(|kind| kind.slides())
 }
 
@@ -189,8 +189,8 @@ fn slides(link: &MassCentreLink) -> bool {
 /// for good: (20.108) with α_j for q_j.
 fn joint_in_zero_position(
     end_owner: &str,
-    end: &MassCentreEnd,
-    link: &MassCentreLink,
+    end: &CentreOfMassEnd,
+    link: &CentreOfMassLink,
     tolerance: f64,
     diagnostics: &mut Diagnostics,
 ) -> Option<(Mat3<Dd>, Vec3<Dd>)> {
