@@ -262,8 +262,8 @@ fn generated(module: &'static str, case: &Case, options: &Options, function: Fun
         module,
         function: function.name().to_string(),
         scalar: options.scalar.name(),
-        inputs: item.inputs.iter().map(|p| place(&p.name)).collect(),
-        output: item.outputs[0].shape.clone(),
+        inputs: item.inputs().iter().map(|p| place(&p.name)).collect(),
+        output: item.outputs()[0].shape.clone(),
         lanes: None,
         text: made.text,
     }
