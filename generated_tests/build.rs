@@ -82,8 +82,15 @@ fn main() {
     }
     std::fs::write(out.join("compiled.rs"), modules).expect("OUT_DIR can be written");
     for (robot, kinds) in CONTACTS {
-        let text = contacts(&folder, robot, kinds);
+        let kinds = [&["surface", "elastic_base"], kinds].concat();
+        let text = contacts(&folder, robot, &kinds, Options::default());
         std::fs::write(out.join(format!("contact_{robot}.rs")), text).expect("OUT_DIR can be written");
+    }
+    let generic = Options { generic: true, lanes: Some(Lanes::Runtime), ..Options::default() };
+    let fused = Options { fma: true, lanes: Some(Lanes::Standalone), ..Options::default() };
+    for (name, options) in [("generic", generic), ("fused", fused)] {
+        let text = contacts(&folder, "planar2r", &["surface"], options);
+        std::fs::write(out.join(format!("contact_planar2r_{name}.rs")), text).expect("OUT_DIR can be written");
     }
     lanes(&out, &folder);
 }
@@ -177,7 +184,7 @@ fn lanes(out: &Path, folder: &Path) {
     }
 }
 
-/// Robots of the contact cases, and the contacts that they make there beside a surface.
+/// Robots of the contact cases, and the contacts that they make there beside a surface, a plane one and one that gives way.
 const CONTACTS: [(&str, &[&str]); 7] = [
     ("planar2r", &[]),
     ("chapter_cylindrical", &["two_surfaces", "point"]),
@@ -189,7 +196,7 @@ const CONTACTS: [(&str, &[&str]); 7] = [
 ];
 
 /// The module of a robot in contact: objects, tool axes and environments are inputs, so that one module serves all cases.
-fn contacts(folder: &Path, robot: &str, kinds: &[&str]) -> String {
+fn contacts(folder: &Path, robot: &str, kinds: &[&str], options: Options) -> String {
     use Coordinate::{Ax, Ay, Px, Py, Pz};
     let (_, file, _, frames) = ROBOTS.into_iter().find(|r| r.0 == robot).expect("a robot of the data");
     let contact = |kind: &str| ContactItem {
@@ -212,13 +219,13 @@ fn contacts(folder: &Path, robot: &str, kinds: &[&str]) -> String {
     let functions =
         vec![ContactFunction::ConstrainedCoordinates, ContactFunction::ForwardDynamics, ContactFunction::Impact];
     let contacts = Contacts {
-        contacts: ["surface", "elastic_base"].into_iter().chain(kinds.iter().copied()).map(contact).collect(),
+        contacts: kinds.iter().copied().map(contact).collect(),
         functions: Some(functions),
         ..Contacts::default()
     };
     let text = std::fs::read_to_string(folder.join(file)).expect("a robot file can be read");
     let scene = Scene { contacts, ..Scene::default() };
-    let options = Options { functions: vec![], scene, ..Options::default() };
+    let options = Options { functions: vec![], scene, ..options };
     compile(&Source::new(file, text), &options).unwrap_or_else(|d| panic!("{}", d.render())).text
 }
 

@@ -100,6 +100,10 @@ modules! {
     limbs_generic;
     /// The planar2r in the contacts of the contact cases.
     contact_planar2r;
+    /// The same in any scalar, with the drivers of the package `straightline`.
+    contact_planar2r_generic;
+    /// The same with products and sums fused, depending on `core` alone.
+    contact_planar2r_fused;
     /// The chapter_cylindrical in the contacts of the contact cases.
     contact_chapter_cylindrical;
     /// The chapter_stanford in the contacts of the contact cases.

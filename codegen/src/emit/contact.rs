@@ -2,8 +2,9 @@
 
 use super::doc::of_contact;
 use super::error_bound::error_bound;
+use super::generated::in_lanes;
 use super::module::{Item, ModeModule};
-use super::{Lowering, Style};
+use super::Lowering;
 use crate::equations::Robot;
 use crate::function::ContactFunction;
 use crate::options::Options;
@@ -32,7 +33,7 @@ pub(super) struct ContactModule {
 /// # Errors
 /// A function whose programs all differ from its plain equations.
 pub(super) fn contact(robot: &Robot, options: &Options, lowering: Lowering<'_>) -> Result<ContactModule, Disagreement> {
-    let lowering = Lowering { style: Style::plain(options.scalar), ..lowering };
+    let plain = Lowering { style: options.plain_style(), ..lowering };
     let mut out = ContactModule::default();
     for mode in &Mode::all(&options.scene) {
         let (mut items, mut functions) = (Vec::new(), Vec::new());
@@ -48,23 +49,25 @@ pub(super) fn contact(robot: &Robot, options: &Options, lowering: Lowering<'_>) 
                 counts.sqrt,
                 counts.sin_cos
             );
-            let routine = lowering.routine(&graph, &schedule(&graph, options.limits), function.name(), &doc);
+            let (name, schedule) = (function.name(), schedule(&graph, options.limits));
+            let routine = plain.routine(&graph, &schedule, name, &doc);
+            let lanes = options.lanes.map(|_| in_lanes(name, (&graph, &schedule), lowering));
             let mut of_state = None;
             if wants_companions(options) {
                 let by_residual = function == ContactFunction::ForwardDynamics;
                 let (bound, plainer) = bound(robot, options, mode, function, &graph)?;
                 out.plainer.extend(plainer);
-                let names = (function.name(), by_residual);
+                let names = (name, by_residual);
                 of_state = Some(error_bound(bound, names, &graph, (options, lowering.target), &mut functions));
             }
-            out.reports.push(ContactReport::new(&mode.identifier, function.name(), counts));
-            items.push(Item { function, routine, bound: of_state, lanes: None });
+            out.reports.push(ContactReport::new(&mode.identifier, name, counts));
+            items.push(Item { function, routine, bound: of_state, lanes });
             functions.push(Written {
-                name: function.name().to_string(),
+                name: name.to_string(),
                 graph,
                 scalar: options.scalar,
-                generic: false,
-                lanes: false,
+                generic: options.generic,
+                lanes: options.lanes.is_some(),
             });
         }
         let (constrained, free) = (mode.constrained_names(), mode.free_names());

@@ -43,26 +43,7 @@ impl Function {
 
 /// What is said above a function of a contact mode.
 pub(super) fn of_contact(function: ContactFunction, (mode, scene): (&Mode, &Scene), ports: &Graph) -> String {
-    let summary = match function {
-        ContactFunction::ConstrainedCoordinates => "The constrained coordinates s^c, with s̈ = J q̈ + A, (20.86).",
-        ContactFunction::FreeCoordinates => "The free coordinates s^f, with s̈ = J q̈ + A, (20.85).",
-        ContactFunction::ForwardDynamics => {
-            "Motion and reactions in contact: H q̈ + h = τ + Jᵀ F, s̈^c = J q̈ + A, (20.88)-(20.89)."
-        }
-        ContactFunction::DrivenForwardDynamics => {
-            "Motion and reactions in contact under the inputs of the drives: H* q̈ + h* = D u + Jᵀ F, s̈^c = J q̈ + A, (20.72) with \
-             (20.88)-(20.89)."
-        }
-        ContactFunction::InverseDynamics => {
-            "Generalized forces of a wanted motion along s^f and of wanted reactions: hybrid feed-forward. Of the motions that do it, the \
-             one nearest to `qdd` in kinetic energy is taken."
-        }
-        ContactFunction::Impact => "Impact when the contacts of the mode close, (20.90)-(20.91), (20.95)-(20.97).",
-        ContactFunction::Projection => {
-            "The correction of q, by velocity coordinate, that takes s^c away to first order and moves the least mass. Apply \
-             it, and then `impact` with restitution 0 to the velocities, against drift."
-        }
-    };
+    let summary = function.summary();
     let of_scene = |name: &str| scene.parameters.iter().find(|p| p.input_name() == name).map(Parameter::in_words);
     let mut doc = format!("{summary}\n\nMode `{}`.\n\n", identifier::doc(&mode.name));
     for port in ports.inputs.iter().chain(&ports.outputs) {

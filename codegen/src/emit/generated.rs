@@ -137,7 +137,7 @@ fn item(
 }
 
 /// The body of a function over lanes: the public function, or one that is also told whether to fuse.
-fn in_lanes(name: &str, (graph, schedule): (&Graph, &Schedule), lowering: Lowering<'_>) -> Routine {
+pub(super) fn in_lanes(name: &str, (graph, schedule): (&Graph, &Schedule), lowering: Lowering<'_>) -> Routine {
     let lowering = Lowering { style: lowering.style.lanes(), ..lowering };
     let public = lanes_name(name);
     match lowering.style.fused {

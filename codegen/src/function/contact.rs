@@ -35,4 +35,28 @@ impl ContactFunction {
     pub fn name(self) -> &'static str {
         Self::WORDS.iter().find(|w| w.1 == self).expect("every function has a name").0
     }
+
+    /// What it computes.
+    pub fn summary(self) -> &'static str {
+        match self {
+            ContactFunction::ConstrainedCoordinates => "The constrained coordinates s^c, with s̈ = J q̈ + A, (20.86).",
+            ContactFunction::FreeCoordinates => "The free coordinates s^f, with s̈ = J q̈ + A, (20.85).",
+            ContactFunction::ForwardDynamics => {
+                "Motion and reactions in contact: H q̈ + h = τ + Jᵀ F, s̈^c = J q̈ + A, (20.88)-(20.89)."
+            }
+            ContactFunction::DrivenForwardDynamics => {
+                "Motion and reactions in contact under the inputs of the drives: H* q̈ + h* = D u + Jᵀ F, s̈^c = J q̈ + A, (20.72) with \
+                 (20.88)-(20.89)."
+            }
+            ContactFunction::InverseDynamics => {
+                "Generalized forces of a wanted motion along s^f and of wanted reactions: hybrid feed-forward. Of the motions that do it, the \
+                 one nearest to `qdd` in kinetic energy is taken."
+            }
+            ContactFunction::Impact => "Impact when the contacts of the mode close, (20.90)-(20.91), (20.95)-(20.97).",
+            ContactFunction::Projection => {
+                "The correction of q, by velocity coordinate, that takes s^c away to first order and moves the least mass. Apply \
+                 it, and then `impact` with restitution 0 to the velocities, against drift."
+            }
+        }
+    }
 }

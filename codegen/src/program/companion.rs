@@ -77,7 +77,7 @@ pub(crate) fn bound(
     let name = format!("{}::{}", mode.identifier, function.name());
     match function {
         ContactFunction::ForwardDynamics => of_accelerations(robot, options, mode, &name, graph),
-        _ => of_errors(robot, options, &name, graph, Bits::Plain),
+        _ => of_errors(robot, options, &name, graph, bits(options)),
     }
 }
 

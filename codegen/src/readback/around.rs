@@ -265,6 +265,13 @@ impl Around<'_, '_, '_> {
             let text: String = (item.start..item.end).map(|at| items.text_of(at)).collect::<Vec<_>>().join(" ");
             let at_root = item.module == root;
             let is_inner = !at_root && [above(1), above(2)].contains(&root);
+            let of_a_mode = is_inner && above(2) == root && above(1) != root;
+            let lanes = self.generated.lanes;
+            let is_of_batches = |text: &str| match text {
+                "use super : : super : : batch ;" => lanes.is_some() && of_a_mode,
+                "pub use : : straightline : : batch ;" => lanes == Some(Lanes::Runtime) && at_root,
+                _ => false,
+            };
             let (depth, trig_path) = match text.as_str() {
                 "use super : : trig ;" => (1, true),
                 "use super : : super : : trig ;" => (2, true),
@@ -279,10 +286,14 @@ impl Around<'_, '_, '_> {
                 here.fused = [true; 3];
             } else if text == "use super : : fused : : { self , fma } ;" && fused && above(1) == root && !at_root {
                 here.fused = [true, true, false];
-            } else if at_root
-                && text == "pub use : : straightline : : batch ;"
-                && self.generated.lanes == Some(Lanes::Runtime)
+            } else if text == "use super : : super : : fused : : { self , fma , fma_if , FUSED } ;"
+                && fused
+                && of_a_mode
             {
+                here.fused = [true; 3];
+            } else if text == "use super : : super : : { number , Dd , Real } ;" && number && of_a_mode {
+                here.generic = true;
+            } else if is_of_batches(&text) {
             } else if !is_inner || !self.is_of_parameters(item) {
                 continue;
             }

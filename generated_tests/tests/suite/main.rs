@@ -6,6 +6,7 @@ mod bytes;
 mod climbs;
 mod closed_forms;
 mod combinations;
+mod contact_forms;
 mod contact_generated;
 mod contact_runtime;
 mod count_accuracy;

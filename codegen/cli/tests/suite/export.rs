@@ -126,6 +126,48 @@ fn names_from_the_robot_file_cannot_become_code() {
     }
 }
 
+const DESK: &str = "[outputs]\nfunctions = [\"mass_matrix\", \"bias_force\"]\ncontact = [\"constrained_coordinates\", \"forward_dynamics\"]\n\
+                    [[contact]]\nname = \"desk\"\nframe = \"forearm\"\nobject = \"input\"\nconstrained = [\"pz\"]\n";
+
+/// Truth is what motion and reactions have to fulfil: H q̈ + h = τ + Jᵀ F and J q̈ + A = 0.
+#[test]
+fn c_calls_the_functions_of_a_contact_mode() {
+    let scratch = scratch("contact");
+    let (scene, package) = (scratch.join("desk.toml"), scratch.join("arm"));
+    fs::write(&scene, DESK).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_straightline"));
+    command.args(["export", ARM, "--as", "c-abi", "--lanes", "standalone", "--fma", "--scene"]);
+    succeeds(command.arg(&scene).arg("-o").arg(&package));
+    let program = r#"#include "arm_dynamics.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+int main(void) {
+    static const double q[3] = {0.3, -0.8, 1.1}, qd[3] = {0.4, 1.2, -0.7}, tau[3] = {2.0, -3.0, 0.5};
+    static const double pose[12] = {0.1, 0.2, 0.3, 1, 0, 0, 0, 0.8, 0.6, 0, -0.6, 0.8}, still[6] = {0};
+    double h[9], bias[3], s[1], sd[1], j[3], a[1], qdd[3], f[1], sdd[1], violation[1], pivot[1];
+    double again[3], f2[1], sdd2[1], violation2[1], pivot2[1];
+    arm_mass_matrix(q, h);
+    arm_bias_force(q, qd, bias);
+    arm_contact_desk_constrained_coordinates(q, qd, pose, still, still, s, sd, j, a);
+    arm_contact_desk_forward_dynamics(q, qd, tau, pose, still, still, qdd, f, sdd, violation, pivot);
+    for (int i = 0; i < 3; i++) {
+        double left = bias[i] - tau[i] - j[i] * f[0];
+        for (int k = 0; k < 3; k++) left += h[3 * i + k] * qdd[k];
+        if (!(fabs(left) < 1e-12)) return 1;
+    }
+    if (!(fabs(j[0] * qdd[0] + j[1] * qdd[1] + j[2] * qdd[2] + a[0]) < 1e-12) || !(fabs(f[0]) > 1e-3)) return 2;
+    arm_contact_desk_forward_dynamics_batch_soa(1, q, qd, tau, pose, still, still, again, f2, sdd2, violation2, pivot2);
+    if (!(fabs(again[0] - qdd[0]) < 1e-11) || !(fabs(f2[0] - f[0]) < 1e-11)) return 3;
+    arm_contact_desk_forward_dynamics_batch_aos(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0);
+    printf("%.17g\n", f[0]);
+    return 0;
+}
+"#;
+    let Some(printed) = crate::in_c::printed(&package, "arm_dynamics", Library::SharedRelease, program) else { return };
+    assert!(printed.trim().parse::<f64>().is_ok(), "{printed}");
+}
+
 const TOOL: &str = "[outputs]\nfunctions = [\"gravity_force\"]\n\
                     [[parameter]]\nkind = \"payload\"\nname = \"tool\"\nframe = \"forearm\"\n";
 

@@ -1,6 +1,6 @@
 //! The C header of a package.
 
-use super::c_package::{Package, LAYOUTS};
+use super::c_package::{Package, Parameter, LAYOUTS};
 use crate::emit::doc::relinked;
 use crate::identifier::comment;
 use std::fmt::Write;
@@ -100,40 +100,29 @@ const char *{prefix}_frame_name(int i);
             }
             let _ = write!(
                 out,
-                "\n/* A body as the functions take it in {name}, made outside the control loop, of this mass [kg], with its mass\n \
-                 * centre [m] and its inertia about the centre of mass xx, xy, xz, yy, yz, zz [kg m^2]. All zeros are no body.\n \
+                "\n/* A body as the functions take it in {name}, made outside the control loop, of this mass [kg], with its centre\n \
+                 * of mass [m] and its inertia about the centre of mass xx, xy, xz, yy, yz, zz [kg m^2]. All zeros are no body.\n \
                  * Returns 0, or why no body has these: 1 a number is not finite, 2 the mass is negative, 3 inertia without\n \
                  * mass, 4 the inertia is impossible; {name} is untouched then. */\n\
                  int {prefix}_{name}_new({c_type} mass, const {c_type} com[3], const {c_type} inertia[6], {c_type} {name}[{length}]);\n"
             );
         }
-        for item in &self.generated.items {
-            let doc = relinked(&item.routine.doc, &|name| name.to_string());
+        for function in self.exported() {
+            let doc = relinked(&function.doc, &|name| name.to_string());
             let doc = doc.replace("frame of FRAME_NAMES", "frame").replace(['`', '\\'], "");
             out.push_str("\n/*");
             for (i, line) in doc.lines().filter(|l| !l.is_empty()).enumerate() {
                 let line = line.strip_prefix("* ").map_or(line.to_string(), |parameter| format!("  {parameter}"));
                 let _ = write!(out, "{} {line}", if i == 0 { "" } else { "\n *" });
             }
-            let parameters: Vec<String> = self
-                .parameters(item)
-                .iter()
-                .map(|p| format!("{}{c_type} {}[{}]", if p.is_output { "" } else { "const " }, p.name, p.length))
-                .collect();
-            let name = item.name();
-            let _ = writeln!(out, " */\nvoid {prefix}_{name}({});", parameters.join(", "));
+            let list =
+                |f: &dyn Fn(&Parameter) -> String| function.parameters.iter().map(f).collect::<Vec<_>>().join(", ");
+            let name = &function.c_name;
+            let _ = writeln!(out, " */\nvoid {prefix}_{name}({});", list(&|p| p.in_c(c_type)));
             if self.generated.lanes.is_some() {
-                let parameters: Vec<String> = self
-                    .parameters(item)
-                    .iter()
-                    .map(|p| match (p.is_output, p.is_shared) {
-                        (true, _) => format!("{c_type} *{}", p.name),
-                        (false, false) => format!("const {c_type} *{}", p.name),
-                        (false, true) => format!("const {c_type} {}[{}]", p.name, p.length),
-                    })
-                    .collect();
+                let parameters = list(&|p| p.of_states_in_c(c_type));
                 for (layout, _) in LAYOUTS {
-                    let _ = writeln!(out, "void {prefix}_{name}_batch_{layout}(size_t n, {});", parameters.join(", "));
+                    let _ = writeln!(out, "void {prefix}_{name}_batch_{layout}(size_t n, {parameters});");
                 }
             }
         }

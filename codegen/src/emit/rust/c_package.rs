@@ -70,6 +70,17 @@ pub(super) struct Package<'a> {
     library: String,
 }
 
+/// A function that C can call.
+pub(super) struct Exported {
+    /// Its name behind the prefix.
+    pub c_name: String,
+    /// The Rust function.
+    path: String,
+    summary: &'static str,
+    pub doc: String,
+    pub parameters: Vec<Parameter>,
+}
+
 /// A parameter of a C function.
 pub(super) struct Parameter {
     pub name: String,
@@ -78,6 +89,49 @@ pub(super) struct Parameter {
     pub is_output: bool,
     /// Whether one value serves all states of a batch.
     pub is_shared: bool,
+}
+
+impl Parameter {
+    /// The pointer as a reference to an array; one to no numbers at all may be null.
+    fn as_array(&self) -> String {
+        let Parameter { name, array, .. } = self;
+        match (self.length, self.is_output) {
+            (0, false) => format!("    let {name} = {{ let _ = {name}; &[] }};\n"),
+            (0, true) => format!("    let {name} = {{ let _ = {name}; &mut [] }};\n"),
+            (_, false) => format!("    let {name} = unsafe {{ &*{name}.cast::<{array}>() }};\n"),
+            (_, true) => format!("    let {name} = unsafe {{ &mut *{name}.cast::<{array}>() }};\n"),
+        }
+    }
+
+    /// The pointer as a slice of `n` states.
+    fn as_slice(&self) -> String {
+        let Parameter { name, length, .. } = self;
+        match (length, self.is_output) {
+            _ if self.is_shared => self.as_array(),
+            (0, _) => self.as_array(),
+            (_, true) => {
+                format!("    let {name} = unsafe {{ core::slice::from_raw_parts_mut({name}, n * {length}) }};\n")
+            }
+            (_, false) => format!("    let {name} = unsafe {{ core::slice::from_raw_parts({name}, n * {length}) }};\n"),
+        }
+    }
+
+    /// The parameter of a C declaration: an array, of no numbers at all a pointer.
+    pub fn in_c(&self, c_type: &str) -> String {
+        let (constant, name) = (if self.is_output { "" } else { "const " }, &self.name);
+        match self.length {
+            0 => format!("{constant}{c_type} *{name}"),
+            n => format!("{constant}{c_type} {name}[{n}]"),
+        }
+    }
+
+    /// The same for many states.
+    pub fn of_states_in_c(&self, c_type: &str) -> String {
+        match self.is_shared {
+            true => self.in_c(c_type),
+            false => format!("{}{c_type} *{}", if self.is_output { "" } else { "const " }, self.name),
+        }
+    }
 }
 
 impl Package<'_> {
@@ -166,26 +220,40 @@ overflow-checks = false
         out
     }
 
-    pub fn parameters(&self, item: &Item) -> Vec<Parameter> {
+    /// The functions that C can call: the robot's, then those of its contact modes.
+    pub fn exported(&self) -> Vec<Exported> {
+        let of_robot = self.generated.items.iter().map(|item| self.export(item, "", item.function.summary()));
+        let of_modes = self.generated.contact.iter().flat_map(|mode| {
+            mode.items.iter().map(|item| self.export(item, &mode.identifier, item.function.summary()))
+        });
+        of_robot.chain(of_modes).collect()
+    }
+
+    /// A function of the robot, or of a contact mode.
+    fn export<F>(&self, item: &Item<F>, mode: &str, summary: &'static str) -> Exported {
+        let (c_name, path) = match mode {
+            "" => (item.name().to_string(), format!("dynamics::{}", item.name())),
+            mode => (format!("contact_{mode}_{}", item.name()), format!("dynamics::contact::{mode}::{}", item.name())),
+        };
         let inputs = item.inputs().iter().map(|p| (p, false));
-        inputs
-            .chain(item.outputs().iter().map(|p| (p, true)))
-            .map(|(port, is_output)| Parameter {
-                name: port.name.clone(),
-                length: port.len(),
-                array: match &port.wrapper {
-                    Some(wrapper) => format!("dynamics::{wrapper}"),
-                    None => array_type(port, Style::plain(self.scalar())),
-                },
-                is_output,
-                is_shared: port.wrapper.is_some(),
-            })
-            .collect()
+        let ports = inputs.chain(item.outputs().iter().map(|p| (p, true)));
+        let parameter = |(port, is_output): (&Port, bool)| Parameter {
+            name: port.name.clone(),
+            length: port.len(),
+            array: match &port.wrapper {
+                Some(wrapper) => format!("dynamics::{wrapper}"),
+                None => array_type(port, Style::plain(self.scalar())),
+            },
+            is_output,
+            is_shared: port.wrapper.is_some(),
+        };
+        let parameters = ports.map(parameter).collect();
+        Exported { c_name, path, summary, doc: item.routine.doc.clone(), parameters }
     }
 
     /// `src/lib.rs`: from pointers to arrays, and nothing else.
     fn library(&self) -> String {
-        let (prefix, scalar) = (self.prefix, self.scalar().name());
+        let prefix = self.prefix;
         let joints = c_strings(self.joint_names());
         let frames = c_strings(self.generated.frames.iter().map(String::as_str));
         let mut out = format!(
@@ -251,60 +319,46 @@ fn name(names: &[&CStr], i: c_int) -> *const c_char {{
         for body in self.bodies() {
             let _ = write!(out, "{}", self.constructor(&body));
         }
-        for item in &self.generated.items {
-            let parameters = self.parameters(item);
-            let name = item.name();
-            let list = |f: &dyn Fn(&Parameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
-            let signature = list(&|p| format!("{}: *{} {scalar}", p.name, if p.is_output { "mut" } else { "const" }));
-            let arguments = list(&|p| p.name.to_string());
-            let arrays: String = parameters
-                .iter()
-                .map(|p| {
-                    let reference = if p.is_output { "&mut *" } else { "&*" };
-                    format!("    let {0} = unsafe {{ {reference}{0}.cast::<{1}>() }};\n", p.name, p.array)
-                })
-                .collect();
-            let lengths = list(&|p| format!("`{}` {}", p.name, p.length));
-            let _ = write!(
-                out,
-                r#"
-/// {summary}
-///
-/// # Safety
-/// The pointers lead to aligned arrays of {scalar}: {lengths}; what is written overlaps nothing that is read.
-#[no_mangle]
-pub unsafe extern "C" fn {prefix}_{name}({signature}) {{
-    // SAFETY of all these: the caller's promise
-{arrays}    dynamics::{name}({arguments});
-}}
-"#,
-                summary = item.function.summary(),
-            );
+        for function in self.exported() {
+            out.push_str(&self.wrapper(&function));
             if self.generated.lanes.is_some() {
-                out.push_str(&self.batches(name, &parameters));
+                out.push_str(&self.batches(&function));
             }
         }
         out
     }
 
-    /// The C functions over batches of one function.
-    fn batches(&self, name: &str, parameters: &[Parameter]) -> String {
+    /// The C function of one function.
+    fn wrapper(&self, function: &Exported) -> String {
         let (prefix, scalar) = (self.prefix, self.scalar().name());
+        let Exported { c_name, path, summary, parameters, .. } = function;
+        let list = |f: &dyn Fn(&Parameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
+        let signature = list(&|p| format!("{}: *{} {scalar}", p.name, if p.is_output { "mut" } else { "const" }));
+        let arguments = list(&|p| p.name.to_string());
+        let arrays: String = parameters.iter().map(Parameter::as_array).collect();
+        let lengths = list(&|p| format!("`{}` {}", p.name, p.length));
+        format!(
+            r#"
+/// {summary}
+///
+/// # Safety
+/// The pointers lead to aligned arrays of {scalar}: {lengths}; what is written overlaps nothing that is read.
+#[no_mangle]
+pub unsafe extern "C" fn {prefix}_{c_name}({signature}) {{
+    // SAFETY of all these: the caller's promise
+{arrays}    {path}({arguments});
+}}
+"#
+        )
+    }
+
+    /// The C functions over batches of one function.
+    fn batches(&self, function: &Exported) -> String {
+        let (prefix, scalar) = (self.prefix, self.scalar().name());
+        let Exported { c_name, path, parameters, .. } = function;
         let list = |f: &dyn Fn(&Parameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
         let pointer = |p: &Parameter| format!("{}: *{} {scalar}", p.name, if p.is_output { "mut" } else { "const" });
-        let slices: String = parameters
-            .iter()
-            .map(|p| match (p.is_output, p.is_shared) {
-                (_, true) => format!("    let {0} = unsafe {{ &*{0}.cast::<{1}>() }};\n", p.name, p.array),
-                (true, _) => format!(
-                    "    let {0} = unsafe {{ core::slice::from_raw_parts_mut({0}, n * {1}) }};\n",
-                    p.name, p.length
-                ),
-                (false, _) => {
-                    format!("    let {0} = unsafe {{ core::slice::from_raw_parts({0}, n * {1}) }};\n", p.name, p.length)
-                }
-            })
-            .collect();
+        let slices: String = parameters.iter().map(Parameter::as_slice).collect();
         let lengths = list(&|p| match p.is_shared {
             true => format!("`{}` {}", p.name, p.length),
             false => format!("`{}` n times {}", p.name, p.length),
@@ -320,12 +374,12 @@ pub unsafe extern "C" fn {prefix}_{name}({signature}) {{
 /// # Safety
 /// The pointers lead to aligned arrays of {scalar}: {lengths}; what is written overlaps nothing that is read.
 #[no_mangle]
-pub unsafe extern "C" fn {prefix}_{name}_batch_{layout}(n: usize, {signature}) {{
+pub unsafe extern "C" fn {prefix}_{c_name}_batch_{layout}(n: usize, {signature}) {{
     if n == 0 {{
         return;
     }}
     // SAFETY of all these: the caller's promise
-{slices}    let done = dynamics::{name}_batch_{layout}(n, {arguments});
+{slices}    let done = {path}_batch_{layout}(n, {arguments});
     debug_assert!(done.is_ok(), "the slices are made of n");
 }}
 "#
@@ -337,7 +391,8 @@ pub unsafe extern "C" fn {prefix}_{name}_batch_{layout}(n: usize, {signature}) {
     /// The run-time parameters that functions take: name, type and number of scalars.
     pub fn bodies(&self) -> Vec<Port> {
         let mut bodies: Vec<Port> = Vec::new();
-        for port in self.generated.items.iter().flat_map(Item::inputs) {
+        let of_modes = self.generated.contact.iter().flat_map(|mode| &mode.items).flat_map(Item::inputs);
+        for port in self.generated.items.iter().flat_map(Item::inputs).chain(of_modes) {
             if port.wrapper.is_some() && !bodies.contains(port) {
                 bodies.push(port.clone());
             }

@@ -1,7 +1,7 @@
 //! The module `contact` as text.
 
-use super::file::item_text;
-use super::{array_type, filler, indented};
+use super::file::{item_text, lanes_text};
+use super::{array_type, filler, indented, number_type, zero};
 use crate::emit::module::{Item, ModeModule};
 use crate::emit::Generated;
 use crate::function::ContactFunction;
@@ -22,11 +22,10 @@ pub(super) fn text(modes: &[ModeModule], generated: &Generated) -> String {
         for item in &mode.items {
             text.push('\n');
             text.push_str(&item_text(item));
+            text.push_str(&lanes_text(item, generated.lanes));
         }
         let _ = writeln!(inner, "\n/// Mode `{}`.\npub mod {} {{", doc(&mode.name), mode.identifier);
-        if mode.items.iter().any(Item::calls_kernel) {
-            inner.push_str("    use super::super::trig;\n");
-        }
+        inner.push_str(&uses(mode, generated));
         let ports = mode.items.iter().flat_map(Item::inputs);
         let mut wrappers: Vec<&String> = ports.filter_map(|p| p.wrapper.as_ref()).collect();
         wrappers.sort();
@@ -37,7 +36,7 @@ pub(super) fn text(modes: &[ModeModule], generated: &Generated) -> String {
         inner.push_str(&indented(&text));
         inner.push_str("}\n");
     }
-    dispatch(&mut inner, modes, generated);
+    dispatch(&mut inner, modes);
     let mut out = String::from(
         "\n/// The robot in contact: functions per contact mode.\n///\n\
          /// s are the functional coordinates of a contact, F the reactions along the constrained ones: positive pushes the robot\n\
@@ -46,6 +45,26 @@ pub(super) fn text(modes: &[ModeModule], generated: &Generated) -> String {
     );
     out.push_str(&indented(&inner));
     out.push_str("}\n");
+    out
+}
+
+/// What the functions of a mode use of the file.
+fn uses(mode: &ModeModule, generated: &Generated) -> String {
+    let fused = generated.style.fused;
+    let mut out = String::new();
+    if mode.items.iter().any(Item::calls_kernel) {
+        out.push_str(if fused { "    #[allow(unused_imports)]\n" } else { "" });
+        out.push_str("    use super::super::trig;\n");
+    }
+    if fused {
+        out.push_str("    #[allow(unused_imports)]\n    use super::super::fused::{self, fma, fma_if, FUSED};\n");
+    }
+    if generated.plain_style.generic {
+        out.push_str("    #[allow(unused_imports)]\n    use super::super::{number, Dd, Real};\n");
+    }
+    if generated.lanes.is_some() {
+        out.push_str("    use super::super::batch;\n");
+    }
     out
 }
 
@@ -78,7 +97,7 @@ fn constants(out: &mut String, mode: &ModeModule) {
 }
 
 /// Forward dynamics of any mode, where all take the same inputs and have results of the same kinds.
-fn dispatch(out: &mut String, modes: &[ModeModule], generated: &Generated) {
+fn dispatch(out: &mut String, modes: &[ModeModule]) {
     let of = |m: &'_ ModeModule| m.items.iter().position(|i| i.function == ContactFunction::ForwardDynamics);
     let forward: Vec<&Item<_>> = modes.iter().filter_map(|m| Some(&m.items[of(m)?])).collect();
     let (Some(first), true) = (forward.first(), forward.len() == modes.len()) else { return };
@@ -86,7 +105,8 @@ fn dispatch(out: &mut String, modes: &[ModeModule], generated: &Generated) {
         return;
     }
     let most = modes.iter().map(|m| m.constrained.len()).max().unwrap_or(0);
-    let (t, style) = (generated.scalar.name(), first.routine.style);
+    let style = first.routine.style;
+    let (t, zero, generics) = (number_type(style), zero(style), if style.generic { "<T: super::Real>" } else { "" });
     let parameter = |p: &Port| {
         let module = if p.wrapper.is_some() { "super::" } else { "" };
         format!("{}: &{module}{}, ", p.name, array_type(p, style))
@@ -99,12 +119,12 @@ fn dispatch(out: &mut String, modes: &[ModeModule], generated: &Generated) {
         out,
         "\n/// The most constrained coordinates that a mode has.\npub const MOST_CONSTRAINED: usize = {most};\n\n\
          /// `forward_dynamics` of a mode; reactions stand in the order of the mode's `CONSTRAINED`, zeros after them. Gives the\n\
-         /// least pivot.\npub fn forward_dynamics(mode: Mode, {parameters}qdd: &mut {qdd}, force: &mut [{t}; {most}]) -> {t} {{\n    \
-         let mut pivot = [0.0];\n    match mode {{\n"
+         /// least pivot.\npub fn forward_dynamics{generics}(mode: Mode, {parameters}qdd: &mut {qdd}, force: &mut [{t}; {most}]) -> {t} {{\n    \
+         let mut pivot = [{zero}];\n    match mode {{\n"
     );
     for mode in modes {
         let (m, id) = (mode.constrained.len(), &mode.identifier);
-        let forces = (0..most).map(|i| if i < m { format!("f[{i}]") } else { "0.0".to_string() });
+        let forces = (0..most).map(|i| if i < m { format!("f[{i}]") } else { zero.to_string() });
         let _ = write!(
             out,
             "        Mode::{} => {{\n            let (mut f, mut sdd, mut violation) = ([{filler}; {m}], [{filler}; {m}], [{filler}; {m}]);\n            \

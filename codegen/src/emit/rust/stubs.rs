@@ -113,6 +113,9 @@ fn items_and_types(options: &Options, scene: Option<&str>, upwards: &str) -> Str
         for (function, _) in ContactFunction::WORDS {
             let _ = writeln!(inner, "        {}", value(function, &missing));
             let _ = writeln!(inner, "        {}", value(&format!("{function}_error_bound"), &missing));
+            for batch in options.lanes.iter().flat_map(|lanes| over_states(function, *lanes)) {
+                let _ = writeln!(inner, "        {}", value(&batch, &missing));
+            }
         }
         let _ = writeln!(out, "    pub mod {name} {{\n{inner}    }}");
     }
@@ -153,12 +156,18 @@ fn constants_and_functions(options: &Options, scene: Option<&str>, missing: &str
                 let _ = writeln!(out, "{}", value(&format!("{name}_lanes"), missing));
             }
         }
-        let threads: &[&str] = if lanes == Lanes::Runtime { &["", "_parallel"] } else { &[""] };
-        for (layout, threads) in ["soa", "aos"].iter().flat_map(|layout| threads.iter().map(move |t| (layout, t))) {
-            let _ = writeln!(out, "{}", value(&format!("{name}_batch_{layout}{threads}"), missing));
+        for batch in over_states(name, lanes).skip(1) {
+            let _ = writeln!(out, "{}", value(&batch, missing));
         }
     }
     out
+}
+
+/// The function over lanes, and those over batches.
+fn over_states(name: &str, lanes: Lanes) -> impl Iterator<Item = String> + '_ {
+    let threads: &[&str] = if lanes == Lanes::Runtime { &["", "_parallel"] } else { &[""] };
+    let of_layout = move |layout| threads.iter().map(move |threads| format!("{name}_batch_{layout}{threads}"));
+    [format!("{name}_lanes")].into_iter().chain(["soa", "aos"].into_iter().flat_map(of_layout))
 }
 
 /// The functions that there may be.

@@ -3,6 +3,7 @@
 use super::{first_of, shaped, taken, Around, Read};
 use crate::choices::Lanes;
 use crate::identifier::string_literals;
+use crate::program::written::Written;
 use crate::readback::items::Sort;
 use crate::readback::Stop;
 use straightline_graph::expr::Port;
@@ -10,10 +11,22 @@ use straightline_graph::expr::Port;
 impl Around<'_, '_, '_> {
     /// What runs functions over lanes on slices.
     pub(super) fn batches(&mut self) -> Read<()> {
+        let programs = &self.generated.programs;
         let Some(drivers) = self.generated.lanes else { return Ok(()) };
-        let (root, s) = (self.root, self.scalar().name());
+        self.batches_of(self.root, &programs.functions, drivers)?;
+        for mode in &programs.modes {
+            let contact = self.module(self.root, "contact")?;
+            let module = self.module(contact, &mode.identifier)?;
+            self.batches_of(module, &mode.functions, drivers)?;
+        }
+        Ok(())
+    }
+
+    /// The same of the functions of a module.
+    fn batches_of(&mut self, root: usize, programs: &[Written], drivers: Lanes) -> Read<()> {
+        let s = self.scalar().name();
         let fused = self.generated.style.fused;
-        for program in self.generated.programs.functions.iter().filter(|p| p.lanes) {
+        for program in programs.iter().filter(|p| p.lanes) {
             let name = &program.name;
             let (inputs, outputs) = (&program.graph.inputs, &program.graph.outputs);
             let of_states: Vec<&Port> = inputs.iter().filter(|p| p.wrapper.is_none()).collect();
@@ -172,7 +185,12 @@ impl Around<'_, '_, '_> {
         if modes.is_empty() {
             return Ok(());
         }
-        let (root, s) = (self.root, self.scalar().name());
+        let root = self.root;
+        let generic = modes.iter().flat_map(|mode| &mode.functions).any(|p| p.generic);
+        let (s, zero, generics) = match generic {
+            true => ("T", "T::zero()", "<T: super::Real>"),
+            false => (self.scalar().name(), "0.0", ""),
+        };
         let contact = self.module(root, "contact")?;
         for mode in modes {
             let module = self.module(contact, &mode.identifier)?;
@@ -218,7 +236,7 @@ impl Around<'_, '_, '_> {
             .zip(&programs)
             .map(|((variant, mode), program)| {
                 let m = mode.coordinates[0].len();
-                let forces = (0..most).map(|i| if i < m { format!("f[{i}]") } else { "0.0".to_string() });
+                let forces = (0..most).map(|i| if i < m { format!("f[{i}]") } else { zero.to_string() });
                 let arguments: Vec<&str> = program
                     .graph
                     .inputs
@@ -246,8 +264,8 @@ impl Around<'_, '_, '_> {
             .collect();
         let nv = self.generated.model.nv();
         let text = format!(
-            "pub fn forward_dynamics(mode: Mode, {parameters}qdd: &mut [{s}; {nv}], force: &mut [{s}; {most}]) -> {s} {{
-                let mut pivot = [0.0];
+            "pub fn forward_dynamics{generics}(mode: Mode, {parameters}qdd: &mut [{s}; {nv}], force: &mut [{s}; {most}]) -> {s} {{
+                let mut pivot = [{zero}];
                 match mode {{ {arms} }}
                 pivot[0]
             }}"
