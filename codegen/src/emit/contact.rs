@@ -2,7 +2,6 @@
 
 use super::doc::of_contact;
 use super::error_bound::error_bound;
-use super::generated::in_lanes;
 use super::module::{Item, ModeModule};
 use super::Lowering;
 use crate::equations::Robot;
@@ -33,7 +32,6 @@ pub(super) struct ContactModule {
 /// # Errors
 /// A function whose programs all differ from its plain equations.
 pub(super) fn contact(robot: &Robot, options: &Options, lowering: Lowering<'_>) -> Result<ContactModule, Disagreement> {
-    let plain = Lowering { style: options.plain_style(), ..lowering };
     let mut out = ContactModule::default();
     for mode in &Mode::all(&options.scene) {
         let (mut items, mut functions) = (Vec::new(), Vec::new());
@@ -50,8 +48,6 @@ pub(super) fn contact(robot: &Robot, options: &Options, lowering: Lowering<'_>) 
                 counts.sin_cos
             );
             let (name, schedule) = (function.name(), schedule(&graph, options.limits));
-            let routine = plain.routine(&graph, &schedule, name, &doc);
-            let lanes = options.lanes.map(|_| in_lanes(name, (&graph, &schedule), lowering));
             let mut of_state = None;
             if wants_companions(options) {
                 let by_residual = function == ContactFunction::ForwardDynamics;
@@ -61,14 +57,8 @@ pub(super) fn contact(robot: &Robot, options: &Options, lowering: Lowering<'_>) 
                 of_state = Some(error_bound(bound, names, &graph, (options, lowering.target), &mut functions));
             }
             out.reports.push(ContactReport::new(&mode.identifier, name, counts));
-            items.push(Item { function, routine, bound: of_state, lanes });
-            functions.push(Written {
-                name: name.to_string(),
-                graph,
-                scalar: options.scalar,
-                generic: options.generic,
-                lanes: options.lanes.is_some(),
-            });
+            items.push(Item::new((function, name, &doc), (&graph, &schedule), of_state, (options, lowering)));
+            functions.push(Written::asked_for(name, graph, options));
         }
         let (constrained, free) = (mode.constrained_names(), mode.free_names());
         out.programs.push(WrittenMode {

@@ -52,7 +52,7 @@ pub(super) fn error_bound(
     let lowering = Lowering { style: Style::plain(scalar), target, title: &|_| String::new() };
     let name = format!("{name}_error_bound");
     let routine = lowering.routine(&bound, &schedule(&bound, options.limits), &name, &doc);
-    written.push(Written { name, graph: bound, scalar, generic: false, lanes: false });
+    written.push(Written::plain(&name, bound, scalar));
     Ok(routine)
 }
 

@@ -3,7 +3,7 @@
 use super::contact::{contact, ContactModule};
 use super::doc::{lanes_doc, lanes_name};
 use super::error_bound::error_bound;
-use super::module::{Item, ModeModule, ParameterType, StagedModule};
+use super::module::{Bound, Item, ModeModule, ParameterType, StagedModule};
 use super::parameter::parameter_types;
 use super::staged::staged;
 use super::{rust, Lowering, Routine, Style};
@@ -120,8 +120,6 @@ fn item(
         let (all, wider) = (graph.counts().flops(), graph.widest(options.scalar).name());
         doc.push_str(&format!("\n{wide} of its {all} operations are in {wider}: what its error budget takes.\n"));
     }
-    let plain = Lowering { style: options.plain_style(), ..lowering };
-    let routine = plain.routine(graph, schedule, function.name(), &doc);
     let mut of_state = None;
     if wants_companions(options) {
         let (bound, plainer) = match program.has_folded_constants(options) {
@@ -132,12 +130,28 @@ fn item(
         let names = (function.name(), function.spec().judged == Judged::ByResidual);
         of_state = Some(error_bound(bound, names, graph, (options, lowering.target), written));
     }
-    let lanes = options.lanes.map(|_| in_lanes(function.name(), (graph, schedule), lowering));
-    Ok(Item { function: *function, routine, bound: of_state, lanes })
+    let named = (*function, function.name(), &doc[..]);
+    Ok(Item::new(named, (graph, schedule), of_state, (options, lowering)))
+}
+
+impl<F> Item<F> {
+    /// A function with its name and documentation, in the forms that are asked for.
+    pub(super) fn new(
+        (function, name, doc): (F, &str, &str),
+        (graph, schedule): (&Graph, &Schedule),
+        bound: Option<Bound>,
+        (options, lowering): (&Options, Lowering<'_>),
+    ) -> Item<F> {
+        let plain = Lowering { style: options.plain_style(), ..lowering };
+        let routine = plain.routine(graph, schedule, name, doc);
+        let text = lowering.target.routine(&routine);
+        let lanes = options.lanes.map(|_| in_lanes(name, (graph, schedule), lowering));
+        Item { function, routine, text, bound, lanes }
+    }
 }
 
 /// The body of a function over lanes: the public function, or one that is also told whether to fuse.
-pub(super) fn in_lanes(name: &str, (graph, schedule): (&Graph, &Schedule), lowering: Lowering<'_>) -> Routine {
+fn in_lanes(name: &str, (graph, schedule): (&Graph, &Schedule), lowering: Lowering<'_>) -> Routine {
     let lowering = Lowering { style: lowering.style.lanes(), ..lowering };
     let public = lanes_name(name);
     match lowering.style.fused {
@@ -171,17 +185,10 @@ pub(crate) fn generate(
     let mut written = AllWritten::default();
     for (program, waterfall, errors) in programs {
         let item = item(&robot, &program, (options, lowering), &mut warnings, &mut written.functions)?;
-        let lines = lowering.target.routine(&item.routine).lines().count();
-        let figures = FunctionReport::new(&program, options.scalar, lines);
+        let figures = FunctionReport::new(&program, options.scalar, item.text.lines().count());
         functions.insert(program.function.name(), FunctionReport { waterfall, errors, ..figures });
         items.push(item);
-        written.functions.push(Written {
-            name: program.function.name().to_string(),
-            graph: program.graph,
-            scalar: options.scalar,
-            generic: options.generic,
-            lanes: options.lanes.is_some(),
-        });
+        written.functions.push(Written::asked_for(program.function.name(), program.graph, options));
     }
     let ContactModule { modes, reports, plainer, programs } = contact(&robot, options, lowering)?;
     written.modes = programs;

@@ -264,6 +264,8 @@ pub struct Item<F = Function> {
     pub function: F,
     /// It.
     pub routine: Routine,
+    /// It, as it is written.
+    pub text: String,
     /// What bounds its errors at a state, where that is asked for.
     pub bound: Option<Bound>,
     /// Its body over lanes, where that is asked for.

@@ -34,7 +34,7 @@ pub(super) fn parameter_types(
         };
         let private = format!("{input}_parameters");
         let constructor = lowering.routine(&graph, &schedule(&graph, options.limits), &private, doc).private();
-        let program = Written { name: private, graph, scalar: options.scalar, generic: false, lanes: false };
+        let program = Written::plain(&private, graph, options.scalar);
         let of = match drive {
             None => ParameterOf::Body(p.frame().unwrap_or_default().to_string()),
             Some(drive) => {

@@ -199,15 +199,15 @@ impl Programs {
     /// What the module is to compute.
     pub(crate) fn written(self, scalar: Scalar) -> WrittenStages {
         let storing = self.stages.len() - 1;
-        let program = |name: String, graph| Written { name, graph, scalar, generic: false, lanes: false };
+        let program = |name: &str, graph| Written::plain(name, graph, scalar);
         let stage = |(stage, graph): (&Stage, Graph)| WrittenStage {
             type_name: stage.type_name.to_string(),
             values: stage.values.to_string(),
-            program: program(format!("{}_values", stage.values), graph),
+            program: program(&format!("{}_values", stage.values), graph),
         };
         let function = |(f, (own, graph)): (Function, (usize, Graph))| {
             // what the last stage makes is called on the stage before it
-            (own.min(storing - 1), program(f.name().to_string(), graph))
+            (own.min(storing - 1), program(f.name(), graph))
         };
         WrittenStages {
             stages: self.stages[..storing].iter().zip(self.staged.stages).map(stage).collect(),

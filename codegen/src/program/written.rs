@@ -1,6 +1,7 @@
 //! What a text is to compute: the programs that are written, by name.
 
 use crate::description::drives::Number;
+use crate::options::Options;
 use straightline_core::Dd;
 use straightline_graph::expr::Graph;
 use straightline_graph::Scalar;
@@ -18,6 +19,19 @@ pub struct Written {
     pub generic: bool,
     /// Whether there is one over lanes beside it, in the file's scalar, and batches.
     pub lanes: bool,
+}
+
+impl Written {
+    /// A function in the forms that are asked for.
+    pub(crate) fn asked_for(name: &str, graph: Graph, options: &Options) -> Written {
+        let (generic, lanes) = (options.generic, options.lanes.is_some());
+        Written { generic, lanes, ..Written::plain(name, graph, options.scalar) }
+    }
+
+    /// A function of one state and one scalar type, whatever is asked for.
+    pub(crate) fn plain(name: &str, graph: Graph, scalar: Scalar) -> Written {
+        Written { name: name.to_string(), graph, scalar, generic: false, lanes: false }
+    }
 }
 
 /// The type of a run-time parameter, and the program of its constructor.

@@ -3,7 +3,7 @@
 //!
 //! Every function stands in a module of its own, so that rustc's back end can work on several at once.
 
-use super::file::{header, item_text, lanes_text, preamble};
+use super::file::{header, item_text, lanes_text, preamble, uses};
 use super::{array_type, batch, fused, kernel};
 use crate::description::drives::Number;
 use crate::emit::package::PackageKind;
@@ -141,24 +141,13 @@ impl Package<'_> {
 
     /// The module of one function.
     fn function(&self, item: &Item) -> String {
-        let kernel = match (item.calls_kernel(), self.generated.style.fused) {
-            (false, _) => "",
-            (true, false) => "use super::trig;\n",
-            (true, true) => "#[allow(unused_imports)]\nuse super::trig;\n",
-        };
-        let batch = if item.lanes.is_none() { "" } else { "use super::batch;\n" };
         let types: String = item
             .inputs()
             .iter()
             .filter_map(|p| p.wrapper.as_ref())
             .map(|wrapper| format!("use super::{wrapper};\n"))
             .collect();
-        let fused = if self.generated.style.fused {
-            "#[allow(unused_imports)]\nuse super::fused::{self, fma, fma_if, FUSED};\n"
-        } else {
-            ""
-        };
-        let uses = [fused, kernel, batch, &types].concat();
+        let uses = uses("super", item.calls_kernel(), self.generated) + &types;
         let gap = if uses.is_empty() { "" } else { "\n" };
         [&uses, gap, &item_text(item), &lanes_text(item, self.generated.lanes)].concat()
     }

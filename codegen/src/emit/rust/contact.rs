@@ -1,6 +1,6 @@
 //! The module `contact` as text.
 
-use super::file::{item_text, lanes_text};
+use super::file::{item_text, lanes_text, uses};
 use super::{array_type, filler, indented, number_type, zero};
 use crate::emit::module::{Item, ModeModule};
 use crate::emit::Generated;
@@ -25,7 +25,8 @@ pub(super) fn text(modes: &[ModeModule], generated: &Generated) -> String {
             text.push_str(&lanes_text(item, generated.lanes));
         }
         let _ = writeln!(inner, "\n/// Mode `{}`.\npub mod {} {{", doc(&mode.name), mode.identifier);
-        inner.push_str(&uses(mode, generated));
+        let calls_kernel = mode.items.iter().any(Item::calls_kernel);
+        inner.push_str(&indented(&uses("super::super", calls_kernel, generated)));
         let ports = mode.items.iter().flat_map(Item::inputs);
         let mut wrappers: Vec<&String> = ports.filter_map(|p| p.wrapper.as_ref()).collect();
         wrappers.sort();
@@ -45,26 +46,6 @@ pub(super) fn text(modes: &[ModeModule], generated: &Generated) -> String {
     );
     out.push_str(&indented(&inner));
     out.push_str("}\n");
-    out
-}
-
-/// What the functions of a mode use of the file.
-fn uses(mode: &ModeModule, generated: &Generated) -> String {
-    let fused = generated.style.fused;
-    let mut out = String::new();
-    if mode.items.iter().any(Item::calls_kernel) {
-        out.push_str(if fused { "    #[allow(unused_imports)]\n" } else { "" });
-        out.push_str("    use super::super::trig;\n");
-    }
-    if fused {
-        out.push_str("    #[allow(unused_imports)]\n    use super::super::fused::{self, fma, fma_if, FUSED};\n");
-    }
-    if generated.plain_style.generic {
-        out.push_str("    #[allow(unused_imports)]\n    use super::super::{number, Dd, Real};\n");
-    }
-    if generated.lanes.is_some() {
-        out.push_str("    use super::super::batch;\n");
-    }
     out
 }
 

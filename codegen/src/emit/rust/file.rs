@@ -1,7 +1,7 @@
 //! The generated file: header, constants of the robot, functions, and the sine-cosine kernel they call.
 
 use super::constants::{cost, error_bounds, of_robot, Constant, COST};
-use super::{batch, bound, contact, fused, indented, parameter, pasted, routine, staged};
+use super::{batch, bound, contact, fused, indented, parameter, pasted, staged};
 use crate::choices::Lanes;
 use crate::emit::module::Item;
 use crate::emit::Generated;
@@ -43,10 +43,30 @@ fn items(generated: &Generated) -> String {
     out
 }
 
+/// What functions in a module of their own use of the file, which is `above` them.
+pub(super) fn uses(above: &str, calls_kernel: bool, generated: &Generated) -> String {
+    const UNUSED: &str = "#[allow(unused_imports)]\n";
+    let fused = generated.style.fused;
+    let mut out = String::new();
+    if calls_kernel {
+        let _ = writeln!(out, "{}use {above}::trig;", if fused { UNUSED } else { "" });
+    }
+    if fused {
+        let _ = writeln!(out, "{UNUSED}use {above}::fused::{{self, fma, fma_if, FUSED}};");
+    }
+    if generated.plain_style.generic {
+        let _ = writeln!(out, "{UNUSED}use {above}::{{number, Dd, Real}};");
+    }
+    if generated.lanes.is_some() {
+        let _ = writeln!(out, "use {above}::batch;");
+    }
+    out
+}
+
 /// A function, and what bounds its errors at a state.
 pub(super) fn item_text<F>(item: &Item<F>) -> String {
     let of_state = item.bound.iter().map(|b| format!("\n{}", bound(b)));
-    routine(&item.routine) + &of_state.collect::<String>()
+    item.text.clone() + &of_state.collect::<String>()
 }
 
 /// The function over lanes, and its batches.
