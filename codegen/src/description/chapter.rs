@@ -1,12 +1,14 @@
 //! TOML with centres of mass, joint axes and joint vectors: the notation of the chapter, 20.1.2 and its appendix.
 //!
-//! The schema is in `SCHEMA.md`. Links and joints without a name are called `link1`, `link2`, … and `joint1`, `joint2`, ….
+//! The schema is in `SCHEMA.md`. Links and joints without a name are called `link1`, `link2`, … and `joint1`, `joint2`, …. A link's frame has
+//! its origin in the centre of mass; the world is the link `base`, the end of the chain the frame `tip`.
 
-use super::flexible::Flexible;
 use super::reader::{Range64, Reader};
 use super::table::Table;
-use super::{CentreOfMassEnd, CentreOfMassLink, CentreOfMassNotation, Description, Format, JointType, Notation, Value};
-use straightline_core::spatial::Sym3;
+use super::{
+    messages, Description, Format, Inertial, Joint, JointType, JointVectors, Link, NamedFrame, Placement, Rotation,
+    Value, WrittenPose,
+};
 
 const LINK: &[&str] = &[
     "name",
@@ -46,6 +48,17 @@ pub(super) fn is_centre_of_mass_notation(top: &Table) -> bool {
         && (top.has("base") || ["e", "r", "e_next", "r_next", "J"].into_iter().any(has))
 }
 
+/// The upper end of link j: what it says of joint j+1, in frame j; of the last link, of the tip.
+#[derive(Default)]
+struct End {
+    /// e_{j+1}.
+    e: Option<Value<[f64; 3]>>,
+    /// r_{j,j+1}, from S_{j+1} to C_j; tip = C_n − r_{n,n+1}.
+    r: Option<Value<[f64; 3]>>,
+    /// r*_{j,j+1}.
+    r_star: Option<Value<[f64; 3]>>,
+}
+
 /// Reads a chain. Complaints go to the reader's diagnostics.
 pub(super) fn read(reader: &mut Reader, top: &Table) -> Description {
     reader.check_keys(top, &["name", "gravity", "base", "link", "drive"]);
@@ -53,79 +66,114 @@ pub(super) fn read(reader: &mut Reader, top: &Table) -> Description {
         true => reader.name_at(top, "name", "robot"),
         false => None,
     };
-    let gravity = reader.vector_at(top, "gravity");
+    let name = name.unwrap_or_else(|| Value::assumed("robot".to_string()));
+    let mut robot = Description::new(Format::CentreOfMassToml, name);
+    robot.gravity = reader.vector_at(top, "gravity");
     reader.require(top, "base", "[base]\\ne_next = [0.0, 0.0, 1.0]\\nr_next = [-0.1, 0.0, 0.0]");
-    let tables = reader.tables_at(top, "link");
-    let base = match reader.table_at(top, "base", "[base]") {
-        Some(table) => {
-            reader.check_keys(&table, &["e_next", "r_next", "r_next_star"]);
-            read_end(reader, &table, tables.is_empty())
-        }
-        None => CentreOfMassEnd { e_next: None, r_next: None, r_next_star: None },
-    };
-    let count = tables.len();
-    let mut flexible = Vec::new();
-    let links =
-        tables.into_iter().enumerate().map(|(i, table)| read_link(reader, table, (i + 1, count), &mut flexible));
-    let links = links.collect();
-    Description {
-        format: Format::CentreOfMassToml,
-        name: name.unwrap_or_else(|| Value::assumed("robot".to_string())),
-        gravity,
-        base: None,
-        notation: Notation::CentresOfMass(CentreOfMassNotation { base, links }),
-        drives: reader.drives_at(top),
-        flexible,
-        ignored: Vec::new(),
+    let mut tables = reader.tables_at(top, "link");
+    let names: Vec<Value<String>> =
+        tables.iter_mut().zip(1..).map(|(table, j)| name_or_number(reader, table, "name", "link", j)).collect();
+    let mut end = End::default();
+    let mut below = Value::new("base".to_string(), robot.name.place.clone());
+    while names.iter().any(|name| name.value == below.value) {
+        below.value.insert(0, '_');
     }
+    if let Some(base) = reader.table_at(top, "base", "[base]") {
+        reader.check_keys(&base, &["e_next", "r_next", "r_next_star"]);
+        below.place = reader.place(&base.span);
+        end = read_end(reader, &base, tables.is_empty());
+    }
+    if tables.is_empty() {
+        reader.diagnostics.push(messages::no_links(&robot.name.value).at(&robot.name.place));
+    }
+    robot.links.push(Link { name: below.clone(), inertial: None });
+    let count = tables.len();
+    for (j, (mut table, name)) in (1..).zip(tables.into_iter().zip(names)) {
+        let joint_name = name_or_number(reader, &table, "joint_name", "joint", j);
+        table.owner = format!("link `{}`", name.value);
+        reader.check_keys(&table, LINK);
+        robot.flexible.extend(reader.flexible_at(&table, Some(&name)));
+        robot.links.push(Link { inertial: read_inertial(reader, &table), name: name.clone() });
+        let joint = read_joint(reader, &table, joint_name, end, [below, name.clone()]);
+        robot.add_joint(joint);
+        end = read_end(reader, &table, j == count);
+        below = name;
+    }
+    if count > 0 {
+        for (key, given) in [("e_next", &end.e), ("r_next_star", &end.r_star)] {
+            if let Some(given) = given {
+                reader.diagnostics.push(messages::e_next_on_last(&below.value, key).at(&given.place));
+            }
+        }
+        robot.frames.extend(end.r.map(|r| NamedFrame {
+            name: Value::new("tip".to_string(), r.place.clone()),
+            link: below,
+            pose: WrittenPose {
+                xyz: Value::new(r.value.map(|x| -x), r.place.clone()),
+                rotation: Rotation::identity(r.place),
+            },
+        }));
+    }
+    robot.drives = reader.drives_at(top);
+    robot
 }
 
-fn read_end(reader: &mut Reader, table: &Table, is_last: bool) -> CentreOfMassEnd {
+fn read_end(reader: &mut Reader, table: &Table, is_last: bool) -> End {
     if !is_last {
         reader.require(table, "e_next", "e_next = [0.0, 0.0, 1.0]");
         reader.require(table, "r_next", "r_next = [-0.1, 0.0, 0.0]");
     }
-    CentreOfMassEnd {
-        e_next: reader.vector_at(table, "e_next"),
-        r_next: reader.vector_at(table, "r_next"),
-        r_next_star: reader.vector_at(table, "r_next_star"),
+    End {
+        e: reader.vector_at(table, "e_next"),
+        r: reader.vector_at(table, "r_next"),
+        r_star: reader.vector_at(table, "r_next_star"),
     }
 }
 
-fn read_link(
+/// What a key says, or else `link3`.
+fn name_or_number(reader: &mut Reader, table: &Table, key: &str, what: &str, j: usize) -> Value<String> {
+    let name = if table.has(key) { reader.name_at(table, key, what) } else { None };
+    name.unwrap_or_else(|| reader.value(format!("{what}{j}"), &table.span))
+}
+
+fn read_inertial(reader: &mut Reader, table: &Table) -> Option<Inertial> {
+    reader.require(table, "mass", "mass = 1.0");
+    reader.require(table, "J", "J = [0.1, 0.1, 0.1]");
+    let (mass, inertia) = (reader.real_at(table, "mass", Range64::Finite), reader.tensor_at(table, "J"));
+    let place = reader.place(&table.span);
+    let com = Value::new([0.0; 3], place.clone());
+    Some(Inertial { mass: mass?, com, rotation: Rotation::identity(place), inertia: inertia? })
+}
+
+fn read_joint(
     reader: &mut Reader,
-    mut table: Table,
-    (j, count): (usize, usize),
-    flexible: &mut Vec<Flexible>,
-) -> CentreOfMassLink {
-    let given = |reader: &mut Reader, table: &Table, key: &str, what: &str| {
-        let name = if table.has(key) { reader.name_at(table, key, what) } else { None };
-        name.unwrap_or_else(|| reader.value(format!("{what}{j}"), &table.span))
-    };
-    let name = given(reader, &table, "name", "link");
-    let joint_name = given(reader, &table, "joint_name", "joint");
-    table.owner = format!("link `{}`", name.value);
-    reader.check_keys(&table, LINK);
-    flexible.extend(reader.flexible_at(&table, Some(&name)));
-    for (key, example) in [("type", "type = \"revolute\""), ("mass", "mass = 1.0"), ("J", "J = [0.1, 0.1, 0.1]")] {
-        reader.require(&table, key, example);
+    table: &Table,
+    name: Value<String>,
+    end: End,
+    [parent, child]: [Value<String>; 2],
+) -> Option<Joint> {
+    reader.require(table, "type", "type = \"revolute\"");
+    let kind = reader.word_at(table, "type", &JointType::words(Format::CentreOfMassToml));
+    let e = reader.required_vector(table, "e", "e = [0.0, 0.0, 1.0]");
+    let r = reader.required_vector(table, "r", "r = [0.1, 0.0, 0.0]");
+    let (r_star, alpha) = (reader.vector_at(table, "r_star"), reader.angle_at(table, "alpha"));
+    let (limits, drive) = (reader.limits_at(table, "limits"), reader.drive_at(table));
+    let kind = kind?;
+    match (&alpha, kind.value.kind.is_some_and(|kind| kind.slides())) {
+        (None, true) => reader.diagnostics.push(messages::alpha_missing(&name.value).at(&kind.place)),
+        (Some(alpha), false) if alpha.value != 0.0 => {
+            reader.diagnostics.push(messages::alpha_on_revolute(&name.value).at(&alpha.place));
+        }
+        _ => {}
     }
-    let kind = reader.word_at(&table, "type", &JointType::words(Format::CentreOfMassToml));
-    let mass = reader.real_at(&table, "mass", Range64::Finite);
-    let inertia = reader.tensor_at(&table, "J");
-    let zero = Sym3 { xx: 0.0, xy: 0.0, xz: 0.0, yy: 0.0, yz: 0.0, zz: 0.0 };
-    CentreOfMassLink {
-        name,
-        joint_name,
-        kind: kind.unwrap_or_else(|| reader.value(JointType::turning(true), &table.span)),
-        mass: mass.unwrap_or_else(|| reader.value(0.0, &table.span)),
-        inertia: inertia.unwrap_or_else(|| reader.value(zero, &table.span)),
-        e: reader.required_vector(&table, "e", "e = [0.0, 0.0, 1.0]"),
-        r: reader.required_vector(&table, "r", "r = [0.1, 0.0, 0.0]"),
-        r_star: reader.vector_at(&table, "r_star"),
-        alpha: reader.angle_at(&table, "alpha"),
-        end: read_end(reader, &table, j == count),
-        limits: reader.limits_at(&table, "limits"),
-        drive: reader.drive_at(&table),
-    }
+    let placement = Placement::Vectors(JointVectors {
+        e_parent: end.e?,
+        r_parent: end.r?,
+        r_parent_star: end.r_star,
+        e,
+        r,
+        r_star,
+        alpha,
+    });
+    Some(Joint { name, kind, parent, child, placement, limits, drive })
 }

@@ -1,7 +1,7 @@
 //! The robot file as written, every value with its place.
 //!
-//! Three notations are read: URDF, and in TOML joint frames and the mass-centre notation of
-//! the chapter. Nothing is computed here: angles stay in the unit they are written in, axes keep their
+//! Whatever the format, it ends in links, joints and frames; the one difference that stays is how a joint is placed
+//! ([`Placement`]), as nothing is computed here: angles stay in the unit they are written in, axes keep their
 //! length. What can be judged value by value (a number that is none, an unknown key) is judged by the readers; what needs
 //! the whole robot (tree, inertias, angles) by `crate::model`.
 
@@ -81,8 +81,14 @@ pub struct Description {
     pub gravity: Option<Value<[f64; 3]>>,
     /// The base, where the file states it.
     pub base: Option<Value<BaseKind>>,
-    /// The bodies.
-    pub notation: Notation,
+    /// The links, in the file's order.
+    pub links: Vec<Link>,
+    /// The joints, in the file's order.
+    pub joints: Vec<Joint>,
+    /// Further named frames.
+    pub frames: Vec<NamedFrame>,
+    /// A link or a joint could not be read, so that the tree has holes that were complained of already.
+    pub has_holes: bool,
     /// What drives the joints.
     pub drives: Vec<drives::Drive>,
     /// Links that bend.
@@ -92,29 +98,73 @@ pub struct Description {
 }
 
 impl Description {
-    /// Where a joint stands, or the link that it moves where the file has no such joint.
-    pub(crate) fn place_of(&self, joint: &str, link: &str) -> Option<&Place> {
-        let named = |(name, wanted): (&'_ Value<String>, &str)| name.value == wanted;
-        match &self.notation {
-            Notation::JointFrames(bodies) => {
-                let joints = bodies.joints.iter().map(|j| (&j.name, joint));
-                joints.chain(bodies.links.iter().map(|l| (&l.name, link))).find(|n| named(*n)).map(|(n, _)| &n.place)
-            }
-            Notation::CentresOfMass(chain) => {
-                let joints = chain.links.iter().map(|l| (&l.joint_name, joint));
-                joints.chain(chain.links.iter().map(|l| (&l.name, link))).find(|n| named(*n)).map(|(n, _)| &n.place)
-            }
+    /// A robot without links, of which nothing is said yet.
+    pub fn new(format: Format, name: Value<String>) -> Description {
+        Description {
+            format,
+            name,
+            gravity: None,
+            base: None,
+            links: Vec::new(),
+            joints: Vec::new(),
+            frames: Vec::new(),
+            has_holes: false,
+            drives: Vec::new(),
+            flexible: Vec::new(),
+            ignored: Vec::new(),
         }
     }
-}
 
-/// The two ways of describing bodies.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Notation {
-    /// Links and joints with frames: URDF, and TOML with joint frames.
-    JointFrames(JointFrameNotation),
-    /// Centres of mass, axes and vectors to the joints: the chapter's.
-    CentresOfMass(CentreOfMassNotation),
+    /// The link of a name.
+    pub fn link(&self, name: &str) -> Option<&Link> {
+        self.links.iter().find(|link| link.name.value == name)
+    }
+
+    /// The joint of a name.
+    pub fn joint(&self, name: &str) -> Option<&Joint> {
+        self.joints.iter().find(|joint| joint.name.value == name)
+    }
+
+    /// Every angle, and what it is called.
+    pub fn angles(&self) -> Vec<(String, &Angle)> {
+        let mut all = Vec::new();
+        for link in &self.links {
+            let of = || format!("the inertia of link `{}`", link.name.value);
+            all.extend(link.inertial.iter().flat_map(|inertial| inertial.rotation.angles(of())));
+        }
+        for Joint { name, placement, .. } in &self.joints {
+            match placement {
+                Placement::Frames { origin, .. } => {
+                    all.extend(origin.rotation.angles(format!("the origin of joint `{}`", name.value)));
+                }
+                Placement::Vectors(vectors) => {
+                    all.extend(vectors.alpha.iter().map(|alpha| (format!("alpha of joint `{}`", name.value), alpha)));
+                }
+            }
+        }
+        for frame in &self.frames {
+            all.extend(frame.pose.rotation.angles(format!("frame `{}`", frame.name.value)));
+        }
+        all
+    }
+
+    /// Where a joint stands, or the link that it moves where the file has no such joint.
+    pub(crate) fn place_of(&self, joint: &str, link: &str) -> Option<&Place> {
+        let of_link = || self.link(link).map(|link| &link.name.place);
+        self.joint(joint).map(|joint| &joint.name.place).or_else(of_link)
+    }
+
+    /// Adds what could be read of a link.
+    pub(crate) fn add_link(&mut self, link: Option<Link>) {
+        self.has_holes |= link.is_none();
+        self.links.extend(link);
+    }
+
+    /// Adds what could be read of a joint.
+    pub(crate) fn add_joint(&mut self, joint: Option<Joint>) {
+        self.has_holes |= joint.is_none();
+        self.joints.extend(joint);
+    }
 }
 
 /// A kind of element that was skipped.
@@ -126,19 +176,6 @@ pub struct Ignored {
     pub count: usize,
     /// Its first place.
     pub place: Place,
-}
-
-/// Links and joints with frames.
-#[derive(Clone, Debug, PartialEq, Default)]
-pub struct JointFrameNotation {
-    /// The links, in the file's order.
-    pub links: Vec<Link>,
-    /// The joints, in the file's order.
-    pub joints: Vec<Joint>,
-    /// Further named frames.
-    pub frames: Vec<NamedFrame>,
-    /// A link or a joint could not be read, so that the tree has holes that were complained of already.
-    pub has_holes: bool,
 }
 
 /// A link.
@@ -207,6 +244,10 @@ impl Rotation {
     /// No rotation, where the file says nothing.
     pub fn identity(place: Place) -> Rotation {
         Rotation { rpy: [Angle::zero(place.clone()), Angle::zero(place.clone()), Angle::zero(place)] }
+    }
+
+    fn angles(&self, of: String) -> impl Iterator<Item = (String, &Angle)> {
+        ["roll", "pitch", "yaw"].into_iter().map(move |name| format!("{name} of {of}")).zip(&self.rpy)
     }
 }
 
@@ -296,14 +337,55 @@ pub struct Joint {
     pub parent: Value<String>,
     /// The link that it moves.
     pub child: Value<String>,
-    /// Pose of the joint frame, which is the child's link frame at q = 0, in the parent's link frame.
-    pub origin: WrittenPose,
-    /// Axis in the joint frame, as long as it is written; \[1, 0, 0\] where a URDF says nothing.
-    pub axis: Value<[f64; 3]>,
+    /// Where it stands, and along which axis.
+    pub placement: Placement,
     /// Ranges.
     pub limits: JointLimits,
     /// What its drive adds.
     pub drive: JointDrive,
+}
+
+/// How a file says where a joint stands.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Placement {
+    /// By frames of links and joints.
+    Frames {
+        /// Pose of the joint frame, which is the child's link frame at q = 0, in the parent's link frame.
+        origin: WrittenPose,
+        /// Axis in the joint frame, as long as it is written; \[1, 0, 0\] where a URDF says nothing.
+        axis: Value<[f64; 3]>,
+    },
+    /// By vectors between the joint S_j and the origins C of the link frames, as in the chapter; of joints that move.
+    Vectors(JointVectors),
+}
+
+/// Axis and place of joint j in the frames of its links, j−1 and j. All vectors are as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointVectors {
+    /// e_j in frame j−1.
+    pub e_parent: Value<[f64; 3]>,
+    /// r_{j−1,j} in frame j−1, from S_j to C_{j−1} \[m\].
+    pub r_parent: Value<[f64; 3]>,
+    /// r*_{j−1,j}, in a specificity: replaces r_{j−1,j} in (20.101).
+    pub r_parent_star: Option<Value<[f64; 3]>>,
+    /// e_j in frame j.
+    pub e: Value<[f64; 3]>,
+    /// r_{j,j} in frame j, from S_j to C_j \[m\].
+    pub r: Value<[f64; 3]>,
+    /// r*_{j,j}, in a specificity: replaces r_{j,j} in (20.101).
+    pub r_star: Option<Value<[f64; 3]>>,
+    /// α_j, the constant angle of a linear joint.
+    pub alpha: Option<Angle>,
+}
+
+impl Placement {
+    /// Its lengths \[m\] and what they are called.
+    pub fn lengths(&self) -> Vec<(&'static str, &Value<[f64; 3]>)> {
+        match self {
+            Placement::Frames { origin, .. } => vec![("origin", &origin.xyz)],
+            Placement::Vectors(JointVectors { r_parent, r, .. }) => vec![("r_next", r_parent), ("r", r)],
+        }
+    }
 }
 
 /// Ranges of a joint, where the file gives them.
@@ -347,56 +429,6 @@ pub struct NamedFrame {
     pub link: Value<String>,
     /// Its pose in the link frame.
     pub pose: WrittenPose,
-}
-
-/// An open chain in the chapter's notation. Frame j is fixed to link j, its origin is the link's centre of mass C_j; the
-/// origin of frame 0, the world's, is C_0. All vectors are as written, in the frame named with each.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CentreOfMassNotation {
-    /// The base, link 0.
-    pub base: CentreOfMassEnd,
-    /// The links 1 … n.
-    pub links: Vec<CentreOfMassLink>,
-}
-
-/// The upper end of link j: what it says of joint j+1, in frame j.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CentreOfMassEnd {
-    /// e_{j+1}, the axis of joint j+1; the last link has none.
-    pub e_next: Option<Value<[f64; 3]>>,
-    /// r_{j,j+1}, from S_{j+1} to C_j \[m\]; the last link's gives the tip, tip = C_n − r_{n,n+1}.
-    pub r_next: Option<Value<[f64; 3]>>,
-    /// r*_{j,j+1}, in a specificity: replaces r_{j,j+1} in (20.101).
-    pub r_next_star: Option<Value<[f64; 3]>>,
-}
-
-/// Link j with its joint S_j.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CentreOfMassLink {
-    /// Name of the link: `link1`, `link2`, … where the file says nothing.
-    pub name: Value<String>,
-    /// Name of the joint: `joint1`, `joint2`, … where the file says nothing.
-    pub joint_name: Value<String>,
-    /// s_j: whether the joint is linear.
-    pub kind: Value<JointType>,
-    /// m_j \[kg\].
-    pub mass: Value<f64>,
-    /// J_j about C_j, in frame j \[kg·m²\].
-    pub inertia: Value<Sym3<f64>>,
-    /// e_j in frame j.
-    pub e: Value<[f64; 3]>,
-    /// r_{j,j} in frame j, from S_j to C_j \[m\].
-    pub r: Value<[f64; 3]>,
-    /// r*_{j,j} in frame j, in a specificity: replaces r_{j,j} in (20.101).
-    pub r_star: Option<Value<[f64; 3]>>,
-    /// α_j, the constant angle of a linear joint.
-    pub alpha: Option<Angle>,
-    /// The end towards joint j+1.
-    pub end: CentreOfMassEnd,
-    /// Ranges.
-    pub limits: JointLimits,
-    /// What its drive adds.
-    pub drive: JointDrive,
 }
 
 /// Reads a robot file; its notation is found from the text. Complaints go to `diagnostics`. After errors the description

@@ -4,8 +4,8 @@ use super::flexible::Flexible;
 use super::reader::{Range64, Reader};
 use super::table::{self, Table};
 use super::{
-    chapter, messages, BaseKind, Description, Format, Inertial, Joint, JointFrameNotation, JointType, Link, NamedFrame,
-    Notation, Value, WrittenPose,
+    chapter, messages, BaseKind, Description, Format, Inertial, Joint, JointType, Link, NamedFrame, Placement, Value,
+    WrittenPose,
 };
 use crate::diagnostic::{Diagnostics, Source};
 use straightline_core::spatial::Sym3;
@@ -64,16 +64,7 @@ pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Descriptio
         return None;
     }
     reader.check_keys(&top, &["robot", "link", "joint", "frame", "drive"]);
-    let mut description = Description {
-        format: Format::JointFrameToml,
-        name: Value::assumed("robot".to_string()),
-        gravity: None,
-        base: None,
-        notation: Notation::JointFrames(JointFrameNotation::default()),
-        drives: Vec::new(),
-        flexible: Vec::new(),
-        ignored: Vec::new(),
-    };
+    let mut description = Description::new(Format::JointFrameToml, Value::assumed("robot".to_string()));
     reader.require(&top, "robot", "[robot]\\nname = \"...\"");
     if let Some(robot) = reader.table_at(&top, "robot", "[robot]") {
         reader.check_keys(&robot, &["name", "gravity", "base"]);
@@ -85,24 +76,17 @@ pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Descriptio
         description.base =
             reader.word_at(&robot, "base", &[("fixed", BaseKind::Fixed), ("floating", BaseKind::Floating)]);
     }
-    let mut bodies = JointFrameNotation::default();
     for table in reader.tables_at(&top, "link") {
-        match read_link(&mut reader, table, &mut description.flexible) {
-            Some(link) => bodies.links.push(link),
-            None => bodies.has_holes = true,
-        }
+        let link = read_link(&mut reader, table, &mut description.flexible);
+        description.add_link(link);
     }
     for table in reader.tables_at(&top, "joint") {
-        match read_joint(&mut reader, table) {
-            Some(joint) => bodies.joints.push(joint),
-            None => bodies.has_holes = true,
-        }
+        description.add_joint(read_joint(&mut reader, table));
     }
     for table in reader.tables_at(&top, "frame") {
-        bodies.frames.extend(read_frame(&mut reader, table));
+        description.frames.extend(read_frame(&mut reader, table));
     }
     description.drives = reader.drives_at(&top);
-    description.notation = Notation::JointFrames(bodies);
     description.ignored = reader.into_ignored();
     Some(description)
 }
@@ -183,7 +167,8 @@ fn read_joint(reader: &mut Reader, mut table: Table) -> Option<Joint> {
     }
     // a kind that was complained of stands for the one with an axis and no limits, so that the axis is judged in the same run
     let kind = kind.unwrap_or_else(|| Value::new(JointType::turning(false), axis.place.clone()));
-    Some(Joint { name: name?, kind, parent: parent?, child: child?, origin, axis, limits, drive })
+    let placement = Placement::Frames { origin, axis };
+    Some(Joint { name: name?, kind, parent: parent?, child: child?, placement, limits, drive })
 }
 
 fn read_frame(reader: &mut Reader, mut table: Table) -> Option<NamedFrame> {

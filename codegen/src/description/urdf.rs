@@ -6,8 +6,8 @@
 
 use super::reader::{Range64, Reader};
 use super::{
-    messages, Angle, AngleUnit, Description, Format, Inertial, Joint, JointDrive, JointFrameNotation, JointLimits,
-    JointType, Link, Notation, Rotation, Value, WrittenPose,
+    messages, Angle, AngleUnit, Description, Format, Inertial, Joint, JointDrive, JointLimits, JointType, Link,
+    Placement, Rotation, Value, WrittenPose,
 };
 use crate::diagnostic::wording::closest;
 use crate::diagnostic::{Diagnostics, Source};
@@ -82,30 +82,16 @@ fn read_document(mut reader: Reader, document: &Document) -> Option<Description>
         }
         None => reader.value("robot".to_string(), &tag(root)),
     };
-    let mut bodies = JointFrameNotation::default();
+    let mut description = Description::new(Format::Urdf, name);
     for node in children(root) {
         match local_name(root, node) {
-            Some("link") => match read_link(&mut reader, node) {
-                Some(link) => bodies.links.push(link),
-                None => bodies.has_holes = true,
-            },
-            Some("joint") => match read_joint(&mut reader, node) {
-                Some(joint) => bodies.joints.push(joint),
-                None => bodies.has_holes = true,
-            },
+            Some("link") => description.add_link(read_link(&mut reader, node)),
+            Some("joint") => description.add_joint(read_joint(&mut reader, node)),
             _ => skip(&mut reader, "the robot", node, &["link", "joint"]),
         }
     }
-    Some(Description {
-        drives: Vec::new(),
-        flexible: Vec::new(),
-        format: Format::Urdf,
-        name,
-        gravity: None,
-        base: None,
-        notation: Notation::JointFrames(bodies),
-        ignored: reader.into_ignored(),
-    })
+    description.ignored = reader.into_ignored();
+    Some(description)
 }
 
 fn children<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
@@ -375,7 +361,8 @@ fn read_joint(reader: &mut Reader, node: Node) -> Option<Joint> {
         let help = "make the joint fixed, or remove `<mimic>` to give it a coordinate of its own";
         reader.complain(&tag(element), messages::not_supported_yet(&owner, "mimic", &follows, help));
     }
-    Some(Joint { name: name?, kind: kind?, parent: parent?, child: child?, origin, axis, limits, drive })
+    let placement = Placement::Frames { origin, axis };
+    Some(Joint { name: name?, kind: kind?, parent: parent?, child: child?, placement, limits, drive })
 }
 
 fn read_kind(reader: &mut Reader, owner: &str, attribute: Attribute) -> Option<Value<JointType>> {

@@ -1,9 +1,9 @@
 //! What needs the whole robot to be judged: tree, masses and inertias, axes, limits, angles.
 
 use super::geometry::principal_moments;
-use super::{angle, doubtful_angles, each_angle, Assembly, ModelOptions, MOST_LINKS};
+use super::{angle, doubtful_angles, Assembly, ModelOptions, MOST_LINKS};
 use crate::description::{
-    messages, Description, Format, Joint, JointDrive, JointFrameNotation, JointLimits, JointType, Value,
+    messages, Description, Format, Joint, JointDrive, JointLimits, JointType, JointVectors, Placement, Value,
 };
 use crate::diagnostic::{Diagnostics, Place};
 use crate::model::singular::{singular_joints, Inertia};
@@ -18,7 +18,7 @@ const MOMENT_DIGITS: f64 = 1e-6;
 /// A length of an axis further from 1 is worth a warning.
 const AXIS_DIGITS: f64 = 1e-3;
 
-/// The tree of links: indices into the notation's links and joints.
+/// The tree of links: indices into the description's links and joints.
 pub(super) struct Tree {
     /// The root link.
     pub root: usize,
@@ -31,8 +31,8 @@ pub(super) struct Tree {
 }
 
 /// The tree, or complaints why there is none.
-pub(super) fn tree(bodies: &JointFrameNotation, name: &Value<String>, diagnostics: &mut Diagnostics) -> Option<Tree> {
-    let links = &bodies.links;
+pub(super) fn tree(bodies: &Description, diagnostics: &mut Diagnostics) -> Option<Tree> {
+    let Description { links, name, .. } = bodies;
     if links.is_empty() {
         if !bodies.has_holes {
             diagnostics.push(messages::no_links(&name.value).at(&name.place));
@@ -192,7 +192,13 @@ pub(super) fn joint(joint: &Joint, format: Format, diagnostics: &mut Diagnostics
     if joint.kind.value.between_links().is_none() {
         return;
     }
-    axis_length(&format!("axis of joint `{name}`"), &joint.axis, diagnostics);
+    match &joint.placement {
+        Placement::Frames { axis, .. } => axis_length(&format!("axis of joint `{name}`"), axis, diagnostics),
+        Placement::Vectors(JointVectors { e_parent, e, .. }) => {
+            axis_length(&format!("`e_next` of link `{}`", joint.parent.value), e_parent, diagnostics);
+            axis_length(&format!("`e` of link `{}`", joint.child.value), e, diagnostics);
+        }
+    }
     limits(&joint.name, joint.kind.value, &joint.limits, format, diagnostics);
     drive(&joint.name, &joint.drive, diagnostics);
 }
@@ -287,12 +293,12 @@ pub(super) fn model_limits(kind: JointType, limits: &JointLimits) -> Limits {
 
 /// Angles that are near a right angle and not taken as one, and angles of a million radians.
 pub(super) fn angles(description: &Description, options: &ModelOptions, diagnostics: &mut Diagnostics) {
-    each_angle(description, &mut |what, written| {
+    for (what, written) in description.angles() {
         let greatest = angle::radians(written).to_f64();
         if greatest.abs() > angle::GREATEST_ANGLE {
-            diagnostics.push(messages::out_of_range(&what(), greatest, angle::GREATEST_ANGLE).at(&written.place));
+            diagnostics.push(messages::out_of_range(&what, greatest, angle::GREATEST_ANGLE).at(&written.place));
         }
-    });
+    }
     // who takes every angle literally does so on purpose
     let doubtful = if options.angle_tolerance > 0.0 { doubtful_angles(description, options) } else { Vec::new() };
     let farthest = doubtful.iter().max_by(|a, b| a.deviation.abs().total_cmp(&b.deviation.abs()));

@@ -29,12 +29,12 @@
 //! ```
 
 pub(crate) mod angle;
+mod bodies;
 mod centres_of_mass;
 mod check;
 pub(crate) mod drives;
 mod flexible;
 pub(crate) mod geometry;
-mod joint_frames;
 pub mod limbs;
 pub(crate) mod merge;
 pub mod singular;
@@ -42,7 +42,7 @@ pub mod states;
 
 use self::flexible::Carrier;
 use crate::description::flexible::{Flexible, Support};
-use crate::description::{self, messages, Angle, Description, Notation, Rotation, Value, WrittenPose};
+use crate::description::{self, messages, Angle, Description, Rotation, Value, WrittenPose};
 use crate::diagnostic::{Diagnostics, Place, Source};
 use geometry::{compose, vector};
 use std::collections::{BTreeMap, HashMap};
@@ -158,13 +158,7 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
     check_options(options, diagnostics);
     let tolerance = if options.angle_tolerance >= 0.0 { options.angle_tolerance } else { angle::ROUNDING };
     check::angles(description, &ModelOptions { angle_tolerance: tolerance, ..options.clone() }, diagnostics);
-    let assembly = match &description.notation {
-        Notation::JointFrames(bodies) => joint_frames::assemble(bodies, description, options, tolerance, diagnostics),
-        Notation::CentresOfMass(chain) => {
-            centres_of_mass::assemble(chain, description, options, tolerance, diagnostics)
-        }
-    };
-    let mut assembly = assembly?;
+    let mut assembly = bodies::assemble(description, options, tolerance, diagnostics)?;
     if !names_are_free(&assembly, diagnostics) {
         return None;
     }
@@ -206,38 +200,32 @@ fn names_are_free(assembly: &Assembly, diagnostics: &mut Diagnostics) -> bool {
 
 /// The angles of a description that are taken as multiples of π/4 or π/6 and are not written exactly so.
 pub fn special_angles(description: &Description, options: &ModelOptions) -> Vec<SpecialAngle> {
-    let mut found = Vec::new();
-    each_angle(description, &mut |what, angle| {
+    let special = |(what, angle): (String, &Angle)| {
         let reading = angle::read(angle, options.angle_tolerance);
-        if let Some(m) = reading.special.filter(|_| reading.deviation != 0.0) {
-            found.push(SpecialAngle {
-                place: angle.place.clone(),
-                what: what(),
-                text: angle.text.clone(),
-                taken_as: angle::name_of_twelfths(m),
-                deviation: reading.deviation,
-            });
-        }
-    });
-    found
+        reading.special.filter(|_| reading.deviation != 0.0).map(|m| SpecialAngle {
+            place: angle.place.clone(),
+            what,
+            text: angle.text.clone(),
+            taken_as: angle::name_of_twelfths(m),
+            deviation: reading.deviation,
+        })
+    };
+    description.angles().into_iter().filter_map(special).collect()
 }
 
 /// The angles of a description that are near a multiple of π/2 and are taken as they are written.
 pub fn doubtful_angles(description: &Description, options: &ModelOptions) -> Vec<DoubtfulAngle> {
-    let mut found = Vec::new();
-    each_angle(description, &mut |what, angle| {
+    let doubtful = |(what, angle): (String, &Angle)| {
         let reading = angle::read(angle, options.angle_tolerance);
-        if reading.is_doubtful() {
-            found.push(DoubtfulAngle {
-                place: angle.place.clone(),
-                what: what(),
-                text: angle.text.clone(),
-                near: angle::name_of_twelfths(6 * reading.right_angles),
-                deviation: reading.deviation,
-            });
-        }
-    });
-    found
+        reading.is_doubtful().then(|| DoubtfulAngle {
+            place: angle.place.clone(),
+            what,
+            text: angle.text.clone(),
+            near: angle::name_of_twelfths(6 * reading.right_angles),
+            deviation: reading.deviation,
+        })
+    };
+    description.angles().into_iter().filter_map(doubtful).collect()
 }
 
 /// The tolerance \[rad\] by which all of these are taken as exact: a power of ten.
@@ -251,37 +239,6 @@ pub fn angle_in_radians(angle: &Angle, tolerance: f64) -> Dd {
     match angle::read(angle, tolerance).special {
         Some(m) => Dd::PI * Dd::from(m as f64) / Dd::from(12.0),
         None => angle::radians(angle),
-    }
-}
-
-/// Every angle of a description, with a name for it.
-fn each_angle(description: &Description, visit: &mut dyn FnMut(&dyn Fn() -> String, &Angle)) {
-    let mut rotation = |owner: &dyn Fn() -> String, rotation: &Rotation| {
-        for (name, angle) in ["roll", "pitch", "yaw"].into_iter().zip(&rotation.rpy) {
-            visit(&|| format!("{name} of {}", owner()), angle);
-        }
-    };
-    match &description.notation {
-        Notation::JointFrames(bodies) => {
-            for link in &bodies.links {
-                if let Some(inertial) = &link.inertial {
-                    rotation(&|| format!("the inertia of link `{}`", link.name.value), &inertial.rotation);
-                }
-            }
-            for joint in &bodies.joints {
-                rotation(&|| format!("the origin of joint `{}`", joint.name.value), &joint.origin.rotation);
-            }
-            for frame in &bodies.frames {
-                rotation(&|| format!("frame `{}`", frame.name.value), &frame.pose.rotation);
-            }
-        }
-        Notation::CentresOfMass(chain) => {
-            for link in &chain.links {
-                if let Some(alpha) = &link.alpha {
-                    visit(&|| format!("alpha of link `{}`", link.name.value), alpha);
-                }
-            }
-        }
     }
 }
 

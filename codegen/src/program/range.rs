@@ -6,7 +6,7 @@
 //! limits beyond the range say "no limit" and are written so. A length that vanishes is dust, and vanishes.
 
 use crate::description::drives::Drive;
-use crate::description::{Description, JointDrive, Notation};
+use crate::description::{Description, JointDrive};
 use crate::diagnostic::{Diagnostic, Diagnostics, Place};
 use crate::model::states;
 use crate::scene::{messages as say, Parameter, Scene};
@@ -46,41 +46,25 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
     if let Some(gravity) = &description.gravity {
         gravity.value.iter().for_each(|x| complain(&gravity.place, "gravity".to_string(), *x, false));
     }
-    match &description.notation {
-        Notation::JointFrames(bodies) => {
-            for link in &bodies.links {
-                let (name, Some(inertial)) = (&link.name.value, &link.inertial) else { continue };
-                let j = inertial.inertia.value;
-                complain(&inertial.mass.place, format!("mass of link `{name}`"), inertial.mass.value, true);
-                for x in inertial.com.value {
-                    complain(&inertial.com.place, format!("centre of mass of link `{name}`"), x, false);
-                }
-                for x in [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz] {
-                    complain(&inertial.inertia.place, format!("inertia of link `{name}`"), x, false);
-                }
-            }
-            for joint in &bodies.joints {
-                let (name, xyz) = (&joint.name.value, &joint.origin.xyz);
-                for x in xyz.value {
-                    complain(&xyz.place, format!("origin of joint `{name}`"), x, false);
-                }
-                drive(name, &joint.drive, &mut |place, what, x| complain(place, what, x, false));
+    for link in &description.links {
+        let (name, Some(inertial)) = (&link.name.value, &link.inertial) else { continue };
+        let j = inertial.inertia.value;
+        complain(&inertial.mass.place, format!("mass of link `{name}`"), inertial.mass.value, true);
+        for x in inertial.com.value {
+            complain(&inertial.com.place, format!("centre of mass of link `{name}`"), x, false);
+        }
+        for x in [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz] {
+            complain(&inertial.inertia.place, format!("inertia of link `{name}`"), x, false);
+        }
+    }
+    for joint in &description.joints {
+        let name = &joint.name.value;
+        for (what, length) in joint.placement.lengths() {
+            for x in length.value {
+                complain(&length.place, format!("{what} of joint `{name}`"), x, false);
             }
         }
-        Notation::CentresOfMass(chain) => {
-            for link in &chain.links {
-                let (name, j) = (&link.name.value, link.inertia.value);
-                complain(&link.mass.place, format!("mass of link `{name}`"), link.mass.value, true);
-                for x in [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz] {
-                    complain(&link.inertia.place, format!("inertia of link `{name}`"), x, false);
-                }
-                for x in link.r.value {
-                    complain(&link.r.place, format!("r of link `{name}`"), x, false);
-                }
-                let joint = &link.joint_name.value;
-                drive(joint, &link.drive, &mut |place, what, x| complain(place, what, x, false));
-            }
-        }
+        drive(name, &joint.drive, &mut |place, what, x| complain(place, what, x, false));
     }
     for number in description.drives.iter().chain(&scene.drives).flat_map(|drive| &drive.written.0) {
         complain(&number.value.place, number.what.clone(), number.value.value, number.is_needed);

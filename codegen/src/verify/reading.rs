@@ -2,7 +2,7 @@
 
 use super::reference_input::centre_of_mass_tree;
 use crate::description::flexible::{Bending, Support};
-use crate::description::{self, Description, JointDrive, Notation, Value};
+use crate::description::{self, Description, Value};
 use crate::diagnostic::{Diagnostics, Source};
 use crate::function::truth::{Chapter, Effect};
 use crate::function::{Function, Quantity};
@@ -53,14 +53,7 @@ const NONE: Effect = Effect {
 
 /// What the file says of a joint.
 fn written(description: &Description, joint: &str) -> Effect {
-    let none = JointDrive::default();
-    let found = match &description.notation {
-        Notation::JointFrames(bodies) => bodies.joints.iter().find(|j| j.name.value == joint).map(|j| &j.drive),
-        Notation::CentresOfMass(chain) => {
-            chain.links.iter().find(|l| l.joint_name.value == joint).map(|link| &link.drive)
-        }
-    };
-    let drive = found.unwrap_or(&none);
+    let drive = description.joint(joint).map(|joint| joint.drive.clone()).unwrap_or_default();
     let number = |x: &Option<Value<f64>>| Dd::from(x.as_ref().map_or(0.0, |x| x.value));
     let gear = Dd::from(drive.gear_ratio.as_ref().map_or(1.0, |x| x.value));
     Effect {

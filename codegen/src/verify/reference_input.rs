@@ -4,13 +4,13 @@
 //! equations and not only the equations. Everything is in double-double; the numbers of the file count as the nearest
 //! f64 of their text. The description is one that was checked: what cannot be a robot gives an error without a place.
 //!
-//! Joint-frame notation (URDF, TOML): frame j of the reference has the axes of the link frame and its origin in the centre
-//! of mass; links on fixed joints are lumped into the link that carries them, their inertia combined about the common
-//! centre of mass; the joint frame at q = 0 is given by the file, so A⁰ is given as a matrix. Mass-centre notation: as written.
+//! Frame j of the reference has the axes of the link frame and its origin in the centre of mass; links on fixed joints are lumped
+//! into the link that carries them, their inertia combined about the common centre of mass. The file gives the joint frame at
+//! q = 0, so A⁰ is given as a matrix, or vectors as in the chapter, which are taken as written.
 
 use crate::description::{
-    Angle, AngleUnit, BaseKind, CentreOfMassNotation, Description, Inertial, Joint as FileJoint, JointFrameNotation,
-    Notation, Rotation, WrittenPose,
+    Angle, AngleUnit, BaseKind, Description, Inertial, Joint as FileJoint, JointVectors, Placement, Rotation, Value,
+    WrittenPose,
 };
 use crate::diagnostic::Place;
 use crate::model::{FrameOption, ModelOptions};
@@ -44,7 +44,7 @@ fn radians(angle: &Angle, options: &ModelOptions) -> Dd {
 }
 
 /// The robot of a description, for [`straightline_core::reference`]. Links and coordinates are in depth-first order of
-/// the file, frames are named as in the file: every link, named frames, the `tip` of a chapter robot.
+/// the file, frames are named as in the file: every link, named frames.
 ///
 /// # Errors
 /// If the description is no tree of links.
@@ -59,19 +59,7 @@ pub fn centre_of_mass_tree(description: &Description, options: &ModelOptions) ->
     };
     let stated = description.base.as_ref().is_some_and(|base| base.value == BaseKind::Floating);
     let floating = options.floating_base || stated;
-    let joint_names = match &description.notation {
-        Notation::JointFrames(notation) => {
-            let elastic = Elastic::of(description, options);
-            add_joint_frames(&mut tree, notation, floating, (options, &elastic))?
-        }
-        Notation::CentresOfMass(_) if !Elastic::of(description, options).is_empty() => {
-            return Err("the reference knows flexible links and supports of joint frames alone".to_string());
-        }
-        Notation::CentresOfMass(notation) => add_centres_of_mass(&mut tree, notation, options)?,
-    };
-    if let Notation::CentresOfMass(_) = &description.notation {
-        add_frames(&mut tree, options)?;
-    }
+    let joint_names = add_links(&mut tree, description, floating, (options, &Elastic::of(description, options)))?;
     number_coordinates(&mut tree, &joint_names, options);
     Ok(tree)
 }
@@ -80,23 +68,6 @@ pub fn centre_of_mass_tree(description: &Description, options: &ModelOptions) ->
 fn turned(rpy: &[f64; 3], options: &ModelOptions) -> Matrix3<Dd> {
     let angle = |i: usize| Angle { value: rpy[i], ..Angle::zero(Place::none()) };
     rotation(&Rotation { rpy: [angle(0), angle(1), angle(2)] }, options)
-}
-
-/// The frames that are asked for beyond a chapter robot's, each placed in the frame of a link.
-fn add_frames(tree: &mut CentreOfMassTree<Dd>, options: &ModelOptions) -> Result<(), String> {
-    for FrameOption { name, link, xyz, rpy } in &options.frames {
-        let carrier = tree.frame(link).ok_or_else(|| format!("there is no link `{link}`"))?;
-        let in_link = Placed { rotation: carrier.rotation, position: carrier.position };
-        let place = in_link.then(&Placed { rotation: turned(rpy, options), position: vector(xyz) });
-        let link = carrier.link;
-        tree.frames.push(CentreOfMassFrame {
-            name: name.clone(),
-            link,
-            position: place.position,
-            rotation: place.rotation,
-        });
-    }
-    Ok(())
 }
 
 /// The joints' places in q and q̇: in the order that is asked for, or else in that of the links. A floating root that
@@ -201,6 +172,8 @@ struct GroupJoint {
     kind: Joint,
     /// In the joint frame.
     axis: Vector3<Dd>,
+    /// Of a joint that is given so.
+    vectors: Option<JointVectors>,
 }
 
 /// A moving link of the file, or the world, while the tree is read.
@@ -214,14 +187,14 @@ struct Group {
 /// Frames fixed to a group: name, group, place in the group's link frame.
 type Frames = Vec<(String, usize, Placed)>;
 
-fn add_joint_frames(
+fn add_links(
     tree: &mut CentreOfMassTree<Dd>,
-    notation: &JointFrameNotation,
+    description: &Description,
     floating: bool,
     (options, elastic): (&ModelOptions, &Elastic),
 ) -> Result<Vec<String>, String> {
     let mut joint_names = Vec::new();
-    let (groups, frames) = rigid_groups(notation, options, elastic)?;
+    let (groups, frames) = rigid_groups(description, options, elastic)?;
     let lumped: Vec<Part> = groups.iter().map(|group| Part::lump(&group.parts)).collect();
     // the root group: the world, or the floating link
     let link_of = |group: usize| if floating { Some(group) } else { group.checked_sub(1) };
@@ -229,16 +202,30 @@ fn add_joint_frames(
     let centre_of = |group: usize| link_of(group).map_or_else(Vector3::zeros, |_| lumped[group].centre);
     for (group, part) in groups.iter().zip(&lumped) {
         let Part { mass, centre, inertia } = part;
-        let Some(GroupJoint { parent, place, name, child, kind, axis }) = &group.joint else {
+        let Some(GroupJoint { parent, place, name, child, kind, axis, vectors }) = &group.joint else {
             if floating {
-                let root = root_link(notation)?;
-                joint_names.push(floating_root_joint(notation));
+                let root = root_link(description)?;
+                joint_names.push(floating_root_joint(description));
                 tree.links.push(CentreOfMassLink::free(root.to_string(), *mass, *inertia, *centre));
             }
             continue;
         };
         joint_names.push(name.clone());
         let e = unit(axis);
+        let (e_parent, r, extended) = match vectors {
+            None => (place.rotation * e, *centre, ExtendedPosition::Matrix(place.rotation)),
+            // the place is that of S_j, in the axes of the link below
+            Some(given) => {
+                let below = |v: &[f64; 3]| place.rotation * vector(v);
+                let star = |star: &Option<Value<[f64; 3]>>, r: &Value<[f64; 3]>| star.as_ref().unwrap_or(r).value;
+                let by_vectors = ExtendedPosition::ByVectors {
+                    r_star: Some(vector(&star(&given.r_star, &given.r))),
+                    r_parent_star: Some(below(&star(&given.r_parent_star, &given.r_parent))),
+                    alpha: given.alpha.as_ref().map_or(Dd::ZERO, |alpha| radians(alpha, options)),
+                };
+                (unit(&below(&given.e_parent.value)), centre + vector(&given.r.value), by_vectors)
+            }
+        };
         tree.links.push(CentreOfMassLink {
             name: child.clone(),
             parent: link_of(*parent),
@@ -248,10 +235,10 @@ fn add_joint_frames(
             mass: *mass,
             inertia: *inertia,
             e,
-            e_parent: place.rotation * e,
-            r: *centre,
+            e_parent,
+            r,
             r_parent: centre_of(*parent) - place.position,
-            extended: ExtendedPosition::Matrix(place.rotation),
+            extended,
         });
     }
     for (name, group, place) in frames {
@@ -267,9 +254,9 @@ fn add_joint_frames(
 
 /// The name under which the joint of a floating root can be ordered: `root_joint`, with underscores before it where the
 /// file uses that name.
-fn floating_root_joint(notation: &JointFrameNotation) -> String {
+fn floating_root_joint(description: &Description) -> String {
     let mut name = "root_joint".to_string();
-    while notation.joints.iter().any(|joint| joint.name.value == name) {
+    while description.joints.iter().any(|joint| joint.name.value == name) {
         name.insert(0, '_');
     }
     name
@@ -281,9 +268,9 @@ fn reference_joint(joint: &FileJoint) -> Result<Joint, String> {
 }
 
 /// The link that no joint moves.
-fn root_link(notation: &JointFrameNotation) -> Result<&str, String> {
-    let is_child = |name: &str| notation.joints.iter().any(|joint| joint.child.value == name);
-    let mut roots = notation.links.iter().map(|link| link.name.value.as_str()).filter(|name| !is_child(name));
+fn root_link(description: &Description) -> Result<&str, String> {
+    let is_child = |name: &str| description.joints.iter().any(|joint| joint.child.value == name);
+    let mut roots = description.links.iter().map(|link| link.name.value.as_str()).filter(|name| !is_child(name));
     match (roots.next(), roots.next()) {
         (Some(root), None) => Ok(root),
         (None, _) => Err("no link is the root".to_string()),
@@ -293,14 +280,14 @@ fn root_link(notation: &JointFrameNotation) -> Result<&str, String> {
 
 /// The rigid groups of links, depth first in the file's order, and the frames of links and named frames.
 fn rigid_groups(
-    notation: &JointFrameNotation,
+    description: &Description,
     options: &ModelOptions,
     elastic: &Elastic,
 ) -> Result<(Vec<Group>, Frames), String> {
     let links: HashMap<&str, usize> =
-        notation.links.iter().enumerate().map(|(i, link)| (link.name.value.as_str(), i)).collect();
+        description.links.iter().enumerate().map(|(i, link)| (link.name.value.as_str(), i)).collect();
     let mut joints_above: HashMap<&str, Vec<usize>> = HashMap::new();
-    for (i, joint) in notation.joints.iter().enumerate() {
+    for (i, joint) in description.joints.iter().enumerate() {
         joints_above.entry(joint.parent.value.as_str()).or_default().push(i);
     }
 
@@ -308,15 +295,23 @@ fn rigid_groups(
     let mut places: HashMap<&str, Segments> = HashMap::new();
     let mut frames = Frames::new();
     // a link to visit: its name, and the joint that leads there
-    let mut open = vec![(root_link(notation)?, None)];
+    let mut open = vec![(root_link(description)?, None)];
     while let Some((name, joint)) = open.pop() {
         let (group, place) = match joint {
             None => elastic.support.map_or((0, Placed::here()), |support| stand(support, name, &mut groups)),
             Some(i) => {
-                let joint: &FileJoint = &notation.joints[i];
+                let joint: &FileJoint = &description.joints[i];
                 let above = places.get(joint.parent.value.as_str()).ok_or("a joint hangs on nothing")?;
-                let (parent, parent_place) = above.at(&vector(&joint.origin.xyz.value));
-                let place = parent_place.then(&Placed::read(&joint.origin, options));
+                let (at, axis, vectors) = match &joint.placement {
+                    Placement::Frames { origin, axis } => (Placed::read(origin, options), axis, None),
+                    Placement::Vectors(given) => {
+                        // S_j = C_{j−1} − r_{j−1,j}
+                        let position = -vector(&given.r_parent.value);
+                        (Placed { rotation: Matrix3::identity(), position }, &given.e, Some(given.clone()))
+                    }
+                };
+                let (parent, parent_place) = above.at(&at.position);
+                let place = parent_place.then(&at);
                 if joint.kind.value.kind.is_some() {
                     groups.push(Group {
                         joint: Some(GroupJoint {
@@ -325,7 +320,8 @@ fn rigid_groups(
                             name: joint.name.value.clone(),
                             child: joint.child.value.clone(),
                             kind: reference_joint(joint)?,
-                            axis: vector(&joint.axis.value),
+                            axis: vector(&axis.value),
+                            vectors,
                         }),
                         parts: Vec::new(),
                     });
@@ -336,7 +332,7 @@ fn rigid_groups(
             }
         };
         frames.push((name.to_string(), group, place));
-        let link = &notation.links[*links.get(name).ok_or_else(|| format!("there is no link `{name}`"))?];
+        let link = &description.links[*links.get(name).ok_or_else(|| format!("there is no link `{name}`"))?];
         let inertial = link.inertial.as_ref();
         let segments = match elastic.links.iter().find(|flexible| flexible.link.value == name) {
             None => {
@@ -353,28 +349,30 @@ fn rigid_groups(
         }
         // last in, first out: reversed, so that the first joint of the file is followed first
         for &i in joints_above.get(name).into_iter().flatten().rev() {
-            open.push((notation.joints[i].child.value.as_str(), Some(i)));
+            open.push((description.joints[i].child.value.as_str(), Some(i)));
         }
     }
-    if places.len() != notation.links.len() {
+    if places.len() != description.links.len() {
         return Err("some links hang on no root".to_string());
     }
-    frames.extend(named_frames(notation, options, &places)?);
+    frames.extend(named_frames(description, options, places)?);
     Ok((groups, frames))
 }
 
 /// Frames that the file or the caller names.
-fn named_frames(
-    notation: &JointFrameNotation,
+fn named_frames<'a>(
+    description: &'a Description,
     options: &ModelOptions,
-    places: &HashMap<&str, Segments>,
+    mut places: HashMap<&'a str, Segments>,
 ) -> Result<Frames, String> {
     let mut frames = Frames::new();
-    for frame in &notation.frames {
+    for frame in &description.frames {
         let link = frame.link.value.as_str();
         let carrier = places.get(link).ok_or_else(|| format!("there is no link `{link}`"))?;
         let (group, place) = carrier.at(&vector(&frame.pose.xyz.value));
-        frames.push((frame.name.value.clone(), group, place.then(&Placed::read(&frame.pose, options))));
+        let place = place.then(&Placed::read(&frame.pose, options));
+        places.insert(&frame.name.value, Segments::rigid(group, place));
+        frames.push((frame.name.value.clone(), group, place));
     }
     for FrameOption { name, link, xyz, rpy } in &options.frames {
         let carrier = places.get(link.as_str()).ok_or_else(|| format!("there is no link `{link}`"))?;
@@ -383,54 +381,4 @@ fn named_frames(
         frames.push((name.clone(), group, place.then(&in_link)));
     }
     Ok(frames)
-}
-
-fn add_centres_of_mass(
-    tree: &mut CentreOfMassTree<Dd>,
-    notation: &CentreOfMassNotation,
-    options: &ModelOptions,
-) -> Result<Vec<String>, String> {
-    let mut below = &notation.base;
-    for (j, link) in notation.links.iter().enumerate() {
-        let missing = |what: &str| format!("the link below `{}` has no {what}", link.name.value);
-        let e_parent = below.e_next.as_ref().ok_or_else(|| missing("e_next"))?;
-        let r_parent = below.r_next.as_ref().ok_or_else(|| missing("r_next"))?;
-        tree.links.push(CentreOfMassLink {
-            name: link.name.value.clone(),
-            parent: j.checked_sub(1),
-            joint: Joint::of_word(link.kind.value.word, None)
-                .ok_or_else(|| format!("joint `{}` is neither revolute nor linear", link.joint_name.value))?,
-            iq: 0,
-            iv: 0,
-            mass: Dd::from(link.mass.value),
-            inertia: tensor(&link.inertia.value),
-            e: unit(&vector(&link.e.value)),
-            e_parent: unit(&vector(&e_parent.value)),
-            r: vector(&link.r.value),
-            r_parent: vector(&r_parent.value),
-            extended: ExtendedPosition::ByVectors {
-                r_star: link.r_star.as_ref().map(|r| vector(&r.value)),
-                r_parent_star: below.r_next_star.as_ref().map(|r| vector(&r.value)),
-                alpha: link.alpha.as_ref().map_or(Dd::ZERO, |alpha| radians(alpha, options)),
-            },
-        });
-        // the link's own frame, in the centre of mass
-        tree.frames.push(CentreOfMassFrame {
-            name: link.name.value.clone(),
-            link: Some(j),
-            position: Vector3::zeros(),
-            rotation: Matrix3::identity(),
-        });
-        below = &link.end;
-    }
-    if let (Some(r), Some(last)) = (&below.r_next, notation.links.len().checked_sub(1)) {
-        // tip = r_{c,n} − r_{n,n+1}
-        tree.frames.push(CentreOfMassFrame {
-            name: "tip".to_string(),
-            link: Some(last),
-            position: -vector(&r.value),
-            rotation: Matrix3::identity(),
-        });
-    }
-    Ok(notation.links.iter().map(|link| link.joint_name.value.clone()).collect())
 }

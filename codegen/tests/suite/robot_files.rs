@@ -174,7 +174,7 @@ fn centre_of_mass_toml_means_what_it_says() {
     // the link frame stands in the centre of mass
     assert_eq!(model.bodies[0].link_frame.translation, model.bodies[0].inertia.com);
     let frames: Vec<&str> = model.frames.iter().map(|f| f.name.as_str()).collect();
-    assert_eq!(frames, ["column", "link2", "tip"]);
+    assert_eq!(frames, ["base", "column", "link2", "tip"]);
 }
 
 #[test]

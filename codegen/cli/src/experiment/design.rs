@@ -5,7 +5,7 @@
 //! in the equations as they are. What the scene leaves out stays out.
 
 use super::parameter;
-use straightline_codegen::description::{Description, JointDrive, Notation, Value};
+use straightline_codegen::description::{Description, JointDrive, Value};
 use straightline_codegen::diagnostic::Diagnostic;
 use straightline_core::algorithms::{inverse_dynamics, joint_wrenches};
 use straightline_core::model::{Coulomb, JointEffects, Load, Model};
@@ -116,21 +116,11 @@ fn change(
 }
 
 fn mass_of(description: &Description, link: &str) -> f64 {
-    match &description.notation {
-        Notation::JointFrames(n) => {
-            let found = n.links.iter().find(|l| l.name.value == link).and_then(|l| l.inertial.as_ref());
-            found.map_or(0.0, |inertial| inertial.mass.value)
-        }
-        Notation::CentresOfMass(n) => n.links.iter().find(|l| l.name.value == link).map_or(0.0, |l| l.mass.value),
-    }
+    description.link(link).and_then(|link| link.inertial.as_ref()).map_or(0.0, |inertial| inertial.mass.value)
 }
 
 fn drive_of(description: &Description, joint: &str) -> JointDrive {
-    let found = match &description.notation {
-        Notation::JointFrames(n) => n.joints.iter().find(|j| j.name.value == joint).map(|j| &j.drive),
-        Notation::CentresOfMass(n) => n.links.iter().find(|l| l.joint_name.value == joint).map(|l| &l.drive),
-    };
-    found.cloned().unwrap_or_default()
+    description.joint(joint).map(|joint| joint.drive.clone()).unwrap_or_default()
 }
 
 /// The robot as the trace sees it.

@@ -3,7 +3,7 @@
 
 use super::messages as say;
 use straightline_codegen::description::drives::Drive;
-use straightline_codegen::description::{CentreOfMassLink, Description, Inertial, Joint, JointDrive, Notation, Value};
+use straightline_codegen::description::{Description, Inertial, JointDrive, Value};
 use straightline_codegen::diagnostic::Diagnostic;
 
 /// A parameter and the values that it is to have.
@@ -71,22 +71,14 @@ pub fn with(description: &Description, path: &str, value: f64) -> Result<Descrip
     let mut description = description.clone();
     let wrong = |why: String| Box::new(say::unknown_parameter(path, &why));
     let (owner, key) = path.rsplit_once('.').ok_or_else(|| wrong("there is no `.` in it".to_string()))?;
-    let found = match (&mut description.notation, key) {
-        (Notation::JointFrames(n), "mass") => {
-            let link = n.links.iter_mut().find(|link| link.name.value == owner);
+    let found = match key {
+        "mass" => {
+            let link = description.links.iter_mut().find(|link| link.name.value == owner);
             link.and_then(|link| link.inertial.as_mut()).map(|inertial| set_mass(inertial, value))
         }
-        (Notation::CentresOfMass(n), "mass") => {
-            let link = n.links.iter_mut().find(|link| link.name.value == owner);
-            link.map(|CentreOfMassLink { mass, inertia, .. }| scale(mass, &mut inertia.value, value))
-        }
-        (Notation::JointFrames(n), _) => {
-            let joint = n.joints.iter_mut().find(|joint| joint.name.value == owner);
-            joint.and_then(|Joint { drive, .. }| number(drive, key)).map(|number| number.value = value)
-        }
-        (Notation::CentresOfMass(n), _) => {
-            let link = n.links.iter_mut().find(|link| link.joint_name.value == owner);
-            link.and_then(|CentreOfMassLink { drive, .. }| number(drive, key)).map(|number| number.value = value)
+        _ => {
+            let joint = description.joints.iter_mut().find(|joint| joint.name.value == owner);
+            joint.and_then(|joint| number(&mut joint.drive, key)).map(|number| number.value = value)
         }
     };
     match found {
@@ -131,13 +123,9 @@ pub fn is_of_drive(description: &Description, of_scene: &[Drive], path: &str) ->
     with(description, path, 1.0).is_err() && drives.into_iter().any(|drive| drive.name.value == owner)
 }
 
-fn set_mass(inertial: &mut Inertial, mass: f64) {
-    scale(&mut inertial.mass, &mut inertial.inertia.value, mass);
-}
-
-fn scale(mass: &mut Value<f64>, inertia: &mut straightline_core::spatial::Sym3<f64>, value: f64) {
+fn set_mass(Inertial { mass, inertia, .. }: &mut Inertial, value: f64) {
     let factor = if mass.value == 0.0 { 1.0 } else { value / mass.value };
-    *inertia = inertia.map(|x| x * factor);
+    inertia.value = inertia.value.map(|x| x * factor);
     mass.value = value;
 }
 

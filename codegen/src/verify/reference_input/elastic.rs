@@ -25,10 +25,6 @@ impl<'a> Elastic<'a> {
         let of_file = description.flexible.iter().filter(|f| !is_replaced(f));
         Elastic { links: of_file.chain(&options.flexible).collect(), support: options.support.as_ref() }
     }
-
-    pub fn is_empty(&self) -> bool {
-        self.links.is_empty() && self.support.is_none()
-    }
 }
 
 /// The groups that a link consists of, each from so far along the axis on, with the straight link's frame in the group's.
@@ -66,6 +62,7 @@ pub(super) fn stand(support: &Support, root: &str, groups: &mut Vec<Group>) -> (
                 name,
                 kind: if *k < 3 { Joint::Linear } else { Joint::Revolute },
                 axis: Vector3::from_fn(|row, _| if row == k % 3 { Dd::ONE } else { Dd::ZERO }),
+                vectors: None,
             }),
             parts: Vec::new(),
         });
@@ -123,7 +120,7 @@ pub(super) fn bend(
             let name = format!("{link}_{label}{}", i + 1);
             let child = if k + 1 == axes.len() { format!("{link}_segment{}", i + 1) } else { name.clone() };
             let place = parent_place.then(&in_link);
-            let joint = GroupJoint { parent, place, name, child, kind: Joint::Revolute, axis: *axis };
+            let joint = GroupJoint { parent, place, name, child, kind: Joint::Revolute, axis: *axis, vectors: None };
             groups.push(Group { joint: Some(joint), parts: Vec::new() });
             (parent, parent_place) = (groups.len() - 1, Placed { rotation: Matrix3::identity(), position: -point });
         }
