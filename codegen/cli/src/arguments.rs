@@ -6,6 +6,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use straightline_codegen::description::names_of_formats;
 use straightline_codegen::emit::package::PACKAGES;
 use straightline_codegen::identifier::is_prefix;
 use straightline_codegen::options::table::Group;
@@ -21,7 +22,7 @@ Exit codes:
   2  the command line is wrong
   3  a file could not be read or written";
 
-/// Compiles robot dynamics: from a robot file (URDF or TOML) to straight-line, allocation-free, no_std Rust.
+/// Compiles robot dynamics: from a robot file to straight-line, allocation-free, no_std Rust.
 #[derive(Debug, Parser)]
 #[command(name = "straightline", version, max_term_width = 110, after_help = format!("\
 Examples:
@@ -178,9 +179,14 @@ pub struct Explain {
     pub code: Option<String>,
 }
 
+/// What the argument `ROBOT` is.
+pub fn robot_file() -> String {
+    format!("The robot file: {}", names_of_formats())
+}
+
 #[derive(Debug, Args)]
 pub struct Generate {
-    /// The robot file: URDF or TOML
+    #[arg(help = robot_file())]
     pub robot: PathBuf,
     /// Where to write; without it, standard output
     #[arg(short, long, value_name = "FILE")]
@@ -196,7 +202,7 @@ pub struct Generate {
 
 #[derive(Debug, Args)]
 pub struct Report {
-    /// The robot file: URDF or TOML
+    #[arg(help = robot_file())]
     pub robot: PathBuf,
     /// As JSON: {"robot": …, "functions": {"inverse_dynamics": {"mul": …, "plain": …, "full": …, "savings": […]}}}
     #[arg(long)]
@@ -212,8 +218,7 @@ pub struct Report {
 
 #[derive(Debug, Args)]
 pub struct Check {
-    /// The robot files: URDF or TOML
-    #[arg(required = true, value_name = "ROBOT")]
+    #[arg(required = true, value_name = "ROBOT", help = robot_file())]
     pub robots: Vec<PathBuf>,
     #[command(flatten)]
     pub model: ModelArgs,
@@ -221,7 +226,7 @@ pub struct Check {
 
 #[derive(Debug, Args)]
 pub struct Verify {
-    /// The robot file: URDF or TOML
+    #[arg(help = robot_file())]
     pub robot: PathBuf,
     /// Number of random states: inside the limits, the base of a floating robot anywhere
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
@@ -240,7 +245,7 @@ pub struct Verify {
 
 #[derive(Debug, Args)]
 pub struct Export {
-    /// The robot file: URDF or TOML
+    #[arg(help = robot_file())]
     pub robot: PathBuf,
     /// The directory to write: new, empty, or an earlier export, whose files are replaced; others stay
     #[arg(short, long, value_name = "DIR")]

@@ -1,6 +1,6 @@
 //! What `simulate` and `analyze` are told.
 
-use crate::arguments::ModelArgs;
+use crate::arguments::{robot_file, ModelArgs};
 use clap::builder::TypedValueParser;
 use clap::Args;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use straightline_simulation::optimize::Objective;
 
 #[derive(Debug, Args)]
 pub struct Simulate {
-    /// The robot file: URDF or TOML
+    #[arg(help = robot_file())]
     pub robot: PathBuf,
     /// The experiment: TOML, or samples of torques as CSV or JSON
     #[arg(short, long, value_name = "FILE")]
@@ -32,7 +32,7 @@ pub struct Simulate {
 
 #[derive(Debug, Args)]
 pub struct Analyze {
-    /// The robot file: URDF or TOML
+    #[arg(help = robot_file())]
     pub robot: PathBuf,
     /// The motion: TOML, or samples of the joints as CSV or JSON
     #[arg(short, long, value_name = "FILE")]

@@ -4,11 +4,13 @@
 //! its origin in the centre of mass; the world is the link `base`, the end of the chain the frame `tip`.
 
 use super::reader::{Range64, Reader};
-use super::table::Table;
+use super::table::{self, Table};
 use super::{
-    messages, Description, Format, Inertial, Joint, JointType, JointVectors, Link, NamedFrame, Placement, Rotation,
+    messages, Description, FileFormat, Inertial, Joint, JointType, JointVectors, Link, NamedFrame, Placement, Rotation,
     Value, WrittenPose,
 };
+use crate::diagnostic::{Diagnostics, Source};
+use straightline_core::joint::Dialect;
 
 const LINK: &[&str] = &[
     "name",
@@ -37,8 +39,17 @@ const LINK: &[&str] = &[
     "flexible",
 ];
 
-/// Whether a document speaks of centres of mass rather than joint frames.
-pub(super) fn is_centre_of_mass_notation(top: &Table) -> bool {
+pub(super) const FORMAT: FileFormat = FileFormat {
+    name: "TOML with centres of mass",
+    extensions: &["toml"],
+    signs: "has `[base]`, or `[[link]]` with `e`, `r` or `J`",
+    sniff: |text| table::holds(text, is_chain),
+    dialect: Dialect::CentresOfMass,
+    limits: "write `limits = [lower, upper]`",
+    read,
+};
+
+fn is_chain(top: &Table) -> bool {
     let links = top.get("link").and_then(|(links, _)| links.as_array());
     let has = |key: &str| {
         links.is_some_and(|l| l.iter().any(|t| t.get_ref().as_table().is_some_and(|t| t.contains_key(key))))
@@ -59,15 +70,17 @@ struct End {
     r_star: Option<Value<[f64; 3]>>,
 }
 
-/// Reads a chain. Complaints go to the reader's diagnostics.
-pub(super) fn read(reader: &mut Reader, top: &Table) -> Description {
+fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
+    let document = table::parse(source, diagnostics)?;
+    let top = &Table::of_document(&document);
+    let reader = &mut Reader::new(source, diagnostics);
     reader.check_keys(top, &["name", "gravity", "base", "link", "drive"]);
     let name = match top.has("name") {
         true => reader.name_at(top, "name", "robot"),
         false => None,
     };
     let name = name.unwrap_or_else(|| Value::assumed("robot".to_string()));
-    let mut robot = Description::new(Format::CentreOfMassToml, name);
+    let mut robot = Description::new(&FORMAT, name);
     robot.gravity = reader.vector_at(top, "gravity");
     reader.require(top, "base", "[base]\\ne_next = [0.0, 0.0, 1.0]\\nr_next = [-0.1, 0.0, 0.0]");
     let mut tables = reader.tables_at(top, "link");
@@ -115,7 +128,7 @@ pub(super) fn read(reader: &mut Reader, top: &Table) -> Description {
         }));
     }
     robot.drives = reader.drives_at(top);
-    robot
+    Some(robot)
 }
 
 fn read_end(reader: &mut Reader, table: &Table, is_last: bool) -> End {
@@ -153,7 +166,7 @@ fn read_joint(
     [parent, child]: [Value<String>; 2],
 ) -> Option<Joint> {
     reader.require(table, "type", "type = \"revolute\"");
-    let kind = reader.word_at(table, "type", &JointType::words(Format::CentreOfMassToml));
+    let kind = reader.word_at(table, "type", &JointType::words(FORMAT.dialect));
     let e = reader.required_vector(table, "e", "e = [0.0, 0.0, 1.0]");
     let r = reader.required_vector(table, "r", "r = [0.1, 0.0, 0.0]");
     let (r_star, alpha) = (reader.vector_at(table, "r_star"), reader.angle_at(table, "alpha"));

@@ -4,6 +4,7 @@
 //! [`Diagnostic::at`]. The tests in `tests/messages` hold the exact text of each; [`CODES`] is the list that they cover. It is one file,
 //! however long: a message is looked for in one place.
 
+use super::FORMATS;
 use crate::diagnostic::wording::{cut, did_you_mean, list, six_digits};
 use crate::diagnostic::Diagnostic;
 
@@ -102,8 +103,8 @@ pub fn file_too_large(bytes: usize, limit: usize) -> D {
 
 /// A text that is neither XML nor TOML of a robot.
 pub fn unknown_format() -> D {
-    D::error("unknown-format", "this is no robot file")
-        .detail("a robot file is a URDF (XML, `<robot ...>`), or TOML with `[[link]]` tables")
+    let formats: Vec<String> = FORMATS.iter().map(|format| format!("{} ({})", format.name, format.signs)).collect();
+    D::error("unknown-format", "this is no robot file").detail(format!("robot files are: {}", formats.join("; ")))
 }
 
 /// A run of complaints was cut.

@@ -1,9 +1,8 @@
-//! The robot file as written, every value with its place.
+//! Robot files: the table of their formats, and what is read of them, every value with its place.
 //!
-//! Whatever the format, it ends in links, joints and frames; the one difference that stays is how a joint is placed
-//! ([`Placement`]), as nothing is computed here: angles stay in the unit they are written in, axes keep their
-//! length. What can be judged value by value (a number that is none, an unknown key) is judged by the readers; what needs
-//! the whole robot (tree, inertias, angles) by `crate::model`.
+//! Whatever the format, it ends in links, joints and frames ([`Description`]). Nothing is computed here: angles stay in the unit they are
+//! written in, axes keep their length. What can be judged value by value (a number that is none, an unknown key) is judged by the readers; what
+//! needs the whole robot (tree, inertias, angles) by `crate::model`.
 
 mod chapter;
 pub mod drives;
@@ -12,11 +11,48 @@ pub mod messages;
 pub mod reader;
 pub mod table;
 mod toml;
+mod tree;
 mod urdf;
 
+pub use tree::*;
+
 use crate::diagnostic::{Diagnostics, Place, Source};
-use straightline_core::joint::{self, Dialect, JointKind, Measure};
-use straightline_core::spatial::Sym3;
+use straightline_core::joint::Dialect;
+
+/// The formats of robot files. A text is of the first that recognises it, or else of the first that has the extension of its name.
+pub static FORMATS: &[&FileFormat] = &[&urdf::FORMAT, &toml::FORMAT, &chapter::FORMAT];
+
+/// A format of robot files.
+#[derive(Debug)]
+pub struct FileFormat {
+    /// As messages and documents call it.
+    pub name: &'static str,
+    /// How file names end.
+    pub extensions: &'static [&'static str],
+    /// What it is recognised by, for who reads it.
+    pub signs: &'static str,
+    /// Whether a text is of this format, by these signs.
+    pub sniff: fn(&str) -> bool,
+    /// Its words for joints, in the table of joints.
+    pub dialect: Dialect,
+    /// What to do about a joint without limits.
+    pub limits: &'static str,
+    /// Reads a file. Complaints go to the diagnostics; `None` if nothing of the robot could be read.
+    pub read: fn(&Source, &mut Diagnostics) -> Option<Description>,
+}
+
+impl PartialEq for FileFormat {
+    fn eq(&self, other: &FileFormat) -> bool {
+        self.name == other.name
+    }
+}
+
+/// Names of all formats, as in "a, b or c".
+pub fn names_of_formats() -> String {
+    let (last, others) = FORMATS.split_last().expect("there are formats");
+    let others: Vec<&str> = others.iter().map(|format| format.name).collect();
+    format!("{} or {}", others.join(", "), last.name)
+}
 
 /// A value with its place in the file.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,399 +75,7 @@ impl<T> Value<T> {
     }
 }
 
-/// The notation of a robot file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Unified Robot Description Format (XML).
-    Urdf,
-    /// Joint frames in TOML, see `SCHEMA.md`.
-    JointFrameToml,
-    /// Centres of mass, joint axes and joint vectors in TOML, as in the chapter.
-    CentreOfMassToml,
-}
-
-impl Format {
-    /// Its words for joints in the table of joints.
-    pub fn dialect(self) -> Dialect {
-        match self {
-            Format::Urdf => Dialect::Urdf,
-            Format::JointFrameToml => Dialect::JointFrames,
-            Format::CentreOfMassToml => Dialect::CentresOfMass,
-        }
-    }
-}
-
-/// How the robot stands in the world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BaseKind {
-    /// The root link is the world.
-    Fixed,
-    /// The root link moves freely.
-    Floating,
-}
-
-/// A robot file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Description {
-    /// Its notation.
-    pub format: Format,
-    /// The robot's name.
-    pub name: Value<String>,
-    /// Acceleration due to gravity in the world \[m/s²\], where the file states it.
-    pub gravity: Option<Value<[f64; 3]>>,
-    /// The base, where the file states it.
-    pub base: Option<Value<BaseKind>>,
-    /// The links, in the file's order.
-    pub links: Vec<Link>,
-    /// The joints, in the file's order.
-    pub joints: Vec<Joint>,
-    /// Further named frames.
-    pub frames: Vec<NamedFrame>,
-    /// A link or a joint could not be read, so that the tree has holes that were complained of already.
-    pub has_holes: bool,
-    /// What drives the joints.
-    pub drives: Vec<drives::Drive>,
-    /// Links that bend.
-    pub flexible: Vec<flexible::Flexible>,
-    /// What the file holds and the dynamics do not need.
-    pub ignored: Vec<Ignored>,
-}
-
-impl Description {
-    /// A robot without links, of which nothing is said yet.
-    pub fn new(format: Format, name: Value<String>) -> Description {
-        Description {
-            format,
-            name,
-            gravity: None,
-            base: None,
-            links: Vec::new(),
-            joints: Vec::new(),
-            frames: Vec::new(),
-            has_holes: false,
-            drives: Vec::new(),
-            flexible: Vec::new(),
-            ignored: Vec::new(),
-        }
-    }
-
-    /// The link of a name.
-    pub fn link(&self, name: &str) -> Option<&Link> {
-        self.links.iter().find(|link| link.name.value == name)
-    }
-
-    /// The joint of a name.
-    pub fn joint(&self, name: &str) -> Option<&Joint> {
-        self.joints.iter().find(|joint| joint.name.value == name)
-    }
-
-    /// Every angle, and what it is called.
-    pub fn angles(&self) -> Vec<(String, &Angle)> {
-        let mut all = Vec::new();
-        for link in &self.links {
-            let of = || format!("the inertia of link `{}`", link.name.value);
-            all.extend(link.inertial.iter().flat_map(|inertial| inertial.rotation.angles(of())));
-        }
-        for Joint { name, placement, .. } in &self.joints {
-            match placement {
-                Placement::Frames { origin, .. } => {
-                    all.extend(origin.rotation.angles(format!("the origin of joint `{}`", name.value)));
-                }
-                Placement::Vectors(vectors) => {
-                    all.extend(vectors.alpha.iter().map(|alpha| (format!("alpha of joint `{}`", name.value), alpha)));
-                }
-            }
-        }
-        for frame in &self.frames {
-            all.extend(frame.pose.rotation.angles(format!("frame `{}`", frame.name.value)));
-        }
-        all
-    }
-
-    /// Where a joint stands, or the link that it moves where the file has no such joint.
-    pub(crate) fn place_of(&self, joint: &str, link: &str) -> Option<&Place> {
-        let of_link = || self.link(link).map(|link| &link.name.place);
-        self.joint(joint).map(|joint| &joint.name.place).or_else(of_link)
-    }
-
-    /// Adds what could be read of a link.
-    pub(crate) fn add_link(&mut self, link: Option<Link>) {
-        self.has_holes |= link.is_none();
-        self.links.extend(link);
-    }
-
-    /// Adds what could be read of a joint.
-    pub(crate) fn add_joint(&mut self, joint: Option<Joint>) {
-        self.has_holes |= joint.is_none();
-        self.joints.extend(joint);
-    }
-}
-
-/// A kind of element that was skipped.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Ignored {
-    /// Its name, such as `visual`.
-    pub what: String,
-    /// How often it occurs.
-    pub count: usize,
-    /// Its first place.
-    pub place: Place,
-}
-
-/// A link.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Link {
-    /// What joints, frames and scenes call it; no two links share it.
-    pub name: Value<String>,
-    /// Mass, centre of mass and inertia, where the file gives them.
-    pub inertial: Option<Inertial>,
-}
-
-/// Mass, centre of mass and inertia of a link.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Inertial {
-    /// Mass \[kg\].
-    pub mass: Value<f64>,
-    /// Centre of mass in the link frame \[m\].
-    pub com: Value<[f64; 3]>,
-    /// Rotation of the axes of `inertia` against the link's.
-    pub rotation: Rotation,
-    /// Inertia tensor about the centre of mass, in axes turned by `rotation` \[kg·m²\].
-    pub inertia: Value<Sym3<f64>>,
-}
-
-/// The unit in which an angle is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AngleUnit {
-    /// Radians.
-    Radian,
-    /// Degrees.
-    Degree,
-    /// Multiples of π/2.
-    QuarterTurn,
-    /// Multiples of 2π.
-    Turn,
-}
-
-/// An angle as written.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Angle {
-    /// The number.
-    pub value: f64,
-    /// Its unit.
-    pub unit: AngleUnit,
-    /// How it is written; empty if it is left out.
-    pub text: String,
-    /// Where.
-    pub place: Place,
-}
-
-impl Angle {
-    /// No angle, where the file says nothing.
-    pub fn zero(place: Place) -> Angle {
-        Angle { value: 0.0, unit: AngleUnit::Radian, text: String::new(), place }
-    }
-}
-
-/// A rotation as written: roll, pitch and yaw, R = Rz(yaw) Ry(pitch) Rx(roll).
-#[derive(Clone, Debug, PartialEq)]
-pub struct Rotation {
-    /// Roll (about x), pitch (about y), yaw (about z).
-    pub rpy: [Angle; 3],
-}
-
-impl Rotation {
-    /// No rotation, where the file says nothing.
-    pub fn identity(place: Place) -> Rotation {
-        Rotation { rpy: [Angle::zero(place.clone()), Angle::zero(place.clone()), Angle::zero(place)] }
-    }
-
-    fn angles(&self, of: String) -> impl Iterator<Item = (String, &Angle)> {
-        ["roll", "pitch", "yaw"].into_iter().map(move |name| format!("{name} of {of}")).zip(&self.rpy)
-    }
-}
-
-/// A pose as written.
-#[derive(Clone, Debug, PartialEq)]
-pub struct WrittenPose {
-    /// Position \[m\].
-    pub xyz: Value<[f64; 3]>,
-    /// Orientation.
-    pub rotation: Rotation,
-}
-
-impl WrittenPose {
-    /// Frames that coincide, where the file says nothing.
-    pub fn identity(place: Place) -> WrittenPose {
-        WrittenPose { xyz: Value::new([0.0; 3], place.clone()), rotation: Rotation::identity(place) }
-    }
-}
-
-/// What a file says of how a joint moves: a word of the table of joints, or `fixed`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JointType {
-    /// The word.
-    pub word: &'static str,
-    /// How it moves; `None`: not at all.
-    pub kind: Option<JointKind>,
-    /// Whether its coordinate has a range, which the file then gives.
-    pub has_range: bool,
-    /// The number that its kind has of its own, such as a pitch.
-    pub number: Option<f64>,
-}
-
-impl JointType {
-    /// All words of a kind of file: joints between links, then `fixed` where the file has such joints, then free bases.
-    pub fn words(format: Format) -> Vec<(&'static str, JointType)> {
-        let words = || {
-            joint::words(format.dialect()).map(|(kind, word)| JointType {
-                word: word.text,
-                kind: Some(kind),
-                has_range: word.has_range,
-                number: None,
-            })
-        };
-        let fixed = JointType { word: "fixed", kind: None, has_range: false, number: None };
-        let between_links =
-            words().filter(|t| !t.is_free()).chain((format != Format::CentreOfMassToml).then_some(fixed));
-        between_links.chain(words().filter(|t| t.is_free())).map(|t| (t.word, t)).collect()
-    }
-
-    /// A joint that turns, with a range or without.
-    pub fn turning(has_range: bool) -> JointType {
-        let kind = Measure::Angle.joint();
-        let word =
-            kind.row().words.iter().find(|word| word.has_range == has_range).expect("there is a word for either");
-        JointType { word: word.text, kind: Some(kind), has_range, number: None }
-    }
-
-    /// The same with the number that its kind has of its own.
-    pub fn with_number(self, number: f64) -> JointType {
-        JointType { kind: self.kind.map(|kind| kind.with_number(number)), number: Some(number), ..self }
-    }
-
-    /// Key of the number that its kind has of its own.
-    pub fn number_key(self) -> Option<&'static str> {
-        self.kind.and_then(|kind| kind.row().number)
-    }
-
-    /// Whether it would let a link move freely, which no joint between links does.
-    pub fn is_free(self) -> bool {
-        self.kind.is_some_and(|kind| kind.is_base())
-    }
-
-    /// How it moves one link against another; `None`: it does not.
-    pub fn between_links(self) -> Option<JointKind> {
-        self.kind.filter(|kind| !kind.is_base())
-    }
-}
-
-/// A joint.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Joint {
-    /// What scenes, drives and messages call it; no two joints share it.
-    pub name: Value<String>,
-    /// How it moves.
-    pub kind: Value<JointType>,
-    /// The link that carries it.
-    pub parent: Value<String>,
-    /// The link that it moves.
-    pub child: Value<String>,
-    /// Where it stands, and along which axis.
-    pub placement: Placement,
-    /// Ranges.
-    pub limits: JointLimits,
-    /// What its drive adds.
-    pub drive: JointDrive,
-}
-
-/// How a file says where a joint stands.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Placement {
-    /// By frames of links and joints.
-    Frames {
-        /// Pose of the joint frame, which is the child's link frame at q = 0, in the parent's link frame.
-        origin: WrittenPose,
-        /// Axis in the joint frame, as long as it is written; \[1, 0, 0\] where a URDF says nothing.
-        axis: Value<[f64; 3]>,
-    },
-    /// By vectors between the joint S_j and the origins C of the link frames, as in the chapter; of joints that move.
-    Vectors(JointVectors),
-}
-
-/// Axis and place of joint j in the frames of its links, j−1 and j. All vectors are as written.
-#[derive(Clone, Debug, PartialEq)]
-pub struct JointVectors {
-    /// e_j in frame j−1.
-    pub e_parent: Value<[f64; 3]>,
-    /// r_{j−1,j} in frame j−1, from S_j to C_{j−1} \[m\].
-    pub r_parent: Value<[f64; 3]>,
-    /// r*_{j−1,j}, in a specificity: replaces r_{j−1,j} in (20.101).
-    pub r_parent_star: Option<Value<[f64; 3]>>,
-    /// e_j in frame j.
-    pub e: Value<[f64; 3]>,
-    /// r_{j,j} in frame j, from S_j to C_j \[m\].
-    pub r: Value<[f64; 3]>,
-    /// r*_{j,j}, in a specificity: replaces r_{j,j} in (20.101).
-    pub r_star: Option<Value<[f64; 3]>>,
-    /// α_j, the constant angle of a linear joint.
-    pub alpha: Option<Angle>,
-}
-
-impl Placement {
-    /// Its lengths \[m\] and what they are called.
-    pub fn lengths(&self) -> Vec<(&'static str, &Value<[f64; 3]>)> {
-        match self {
-            Placement::Frames { origin, .. } => vec![("origin", &origin.xyz)],
-            Placement::Vectors(JointVectors { r_parent, r, .. }) => vec![("r_next", r_parent), ("r", r)],
-        }
-    }
-}
-
-/// Ranges of a joint, where the file gives them.
-#[derive(Clone, Debug, PartialEq, Default)]
-pub struct JointLimits {
-    /// Least coordinate \[rad or m\].
-    pub lower: Option<Value<f64>>,
-    /// Greatest coordinate \[rad or m\].
-    pub upper: Option<Value<f64>>,
-    /// Greatest speed \[rad/s or m/s\].
-    pub velocity: Option<Value<f64>>,
-    /// Greatest torque or force \[N·m or N\].
-    pub effort: Option<Value<f64>>,
-}
-
-/// What the drive of a joint adds to its dynamics, where the file gives it.
-#[derive(Clone, Debug, PartialEq, Default)]
-pub struct JointDrive {
-    /// Viscous friction \[N·m·s/rad or N·s/m\].
-    pub damping: Option<Value<f64>>,
-    /// Coulomb friction \[N·m or N\].
-    pub friction: Option<Value<f64>>,
-    /// Moment of inertia of the rotor about its axis \[kg·m²\].
-    pub rotor_inertia: Option<Value<f64>>,
-    /// Rotor speed over joint speed \[1 or rad/m\]; 1 where the file says nothing.
-    pub gear_ratio: Option<Value<f64>>,
-    /// Inertia added on the joint's own coordinate \[kg·m² or kg\], in place of a rotor with its gear.
-    pub armature: Option<Value<f64>>,
-    /// Spring: stiffness \[N·m/rad or N/m\].
-    pub spring_stiffness: Option<Value<f64>>,
-    /// Spring: coordinate without force \[rad or m\].
-    pub spring_rest: Option<Value<f64>>,
-}
-
-/// A named frame on a link.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NamedFrame {
-    /// What `frames` and contacts call it; links are frames of their own names.
-    pub name: Value<String>,
-    /// The link that carries it.
-    pub link: Value<String>,
-    /// Its pose in the link frame.
-    pub pose: WrittenPose,
-}
-
-/// Reads a robot file; its notation is found from the text. Complaints go to `diagnostics`. After errors the description
+/// Reads a robot file in the format that its text has, or else its name. Complaints go to `diagnostics`. After errors the description
 /// may hold placeholders, so that [`crate::model::build`] can find further complaints; `None` if nothing could be read.
 pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     diagnostics.add_source(source);
@@ -444,18 +88,12 @@ pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Descriptio
         diagnostics.push(messages::file_too_large(text.len(), reader::LARGEST_FILE).at(&source.place(0..0)));
         return None;
     }
-    if text.trim().is_empty() {
+    let extension = source.path().rsplit('.').next().unwrap_or("").to_ascii_lowercase();
+    let is_named = |format: &&&FileFormat| !text.trim().is_empty() && format.extensions.contains(&extension.as_str());
+    let recognised = FORMATS.iter().find(|format| (format.sniff)(text));
+    let Some(format) = recognised.or_else(|| FORMATS.iter().find(is_named)) else {
         diagnostics.push(messages::unknown_format().at(&source.place(0..0)));
         return None;
-    }
-    let is_named = |extensions: &[&str]| {
-        let extension = source.path().rsplit('.').next().unwrap_or("").to_ascii_lowercase();
-        extensions.contains(&extension.as_str())
     };
-    let is_xml = text.trim_start().starts_with('<') || is_named(&["urdf", "xml", "xacro"]);
-    if is_xml && !is_named(&["toml"]) || text.trim_start().starts_with('<') {
-        urdf::read(source, diagnostics)
-    } else {
-        toml::read(source, diagnostics)
-    }
+    (format.read)(source, diagnostics)
 }

@@ -1,8 +1,8 @@
 //! Walking a TOML document with places, so that one run finds all complaints.
 
 use super::reader::{Range64, Reader};
-use super::{messages, Angle, AngleUnit, JointDrive, JointLimits, Rotation, Value, WrittenPose};
-use crate::diagnostic::{Diagnostics, Source};
+use super::{messages, Angle, AngleUnit, Inertial, JointDrive, JointLimits, Rotation, Value, WrittenPose};
+use crate::diagnostic::{Diagnostic, Diagnostics, Source};
 use std::ops::Range;
 use straightline_core::spatial::Sym3;
 use toml::de::{DeTable, DeValue};
@@ -24,10 +24,16 @@ pub struct Table<'a, 'i> {
     pub span: Span,
 }
 
+/// Whether a text is TOML, right or nearly, and its top table is as asked for.
+pub fn holds(text: &str, is_it: fn(&Table) -> bool) -> bool {
+    wrong_bracket(text).is_none() && is_it(&Table::of_document(&DeTable::parse_recoverable(text).0))
+}
+
 /// The document, or complaints about its syntax.
 pub fn parse<'i>(source: &'i Source, diagnostics: &mut Diagnostics) -> Option<Spanned<DeTable<'i>>> {
     let mut reader = Reader::new(source, diagnostics);
-    if !brackets_match(&mut reader) {
+    if let Some((span, complaint)) = wrong_bracket(source.text()) {
+        reader.complain(&span, complaint);
         return None;
     }
     let (document, errors) = DeTable::parse_recoverable(source.text());
@@ -45,12 +51,11 @@ pub fn parse<'i>(source: &'i Source, diagnostics: &mut Diagnostics) -> Option<Sp
     errors.is_empty().then_some(document)
 }
 
-/// Whether brackets match and neither they nor dotted keys nest deeply: what the parser's recursion relies on. Complains
-/// of the first that does not.
-fn brackets_match(reader: &mut Reader) -> bool {
+/// The first bracket that does not match, or bracket or dotted key that nests deeply, which the parser's recursion does not bear.
+fn wrong_bracket(text: &str) -> Option<(Span, Diagnostic)> {
     let mut open: Vec<(TokenKind, Span)> = Vec::new();
     let mut parts = 0;
-    for token in toml_parser::Source::new(reader.source.text()).lex() {
+    for token in toml_parser::Source::new(text).lex() {
         let span = token.span().start()..token.span().end();
         parts = match token.kind() {
             TokenKind::Dot => parts + 1,
@@ -62,8 +67,7 @@ fn brackets_match(reader: &mut Reader) -> bool {
             _ => parts,
         };
         if parts >= DEEPEST {
-            reader.complain(&span, messages::too_complex("parts of a dotted key", DEEPEST));
-            return false;
+            return Some((span, messages::too_complex("parts of a dotted key", DEEPEST)));
         }
         match token.kind() {
             kind @ (TokenKind::LeftCurlyBracket | TokenKind::LeftSquareBracket) => open.push((kind, span.clone())),
@@ -73,25 +77,24 @@ fn brackets_match(reader: &mut Reader) -> bool {
                     _ => TokenKind::LeftSquareBracket,
                 };
                 if open.pop().is_none_or(|(kind, _)| kind != closes) {
-                    reader.complain(&span, messages::toml_syntax("this bracket closes none"));
-                    return false;
+                    return Some((span, messages::toml_syntax("this bracket closes none")));
                 }
             }
             _ => {}
         }
         if open.len() > DEEPEST {
-            reader.complain(&span, messages::too_complex("brackets inside each other", DEEPEST));
-            return false;
+            return Some((span, messages::too_complex("brackets inside each other", DEEPEST)));
         }
     }
-    if let Some((_, span)) = open.pop() {
-        reader.complain(&span, messages::toml_syntax("this bracket is never closed"));
-        return false;
-    }
-    true
+    open.pop().map(|(_, span)| (span, messages::toml_syntax("this bracket is never closed")))
 }
 
 impl<'a, 'i> Table<'a, 'i> {
+    /// The top table.
+    pub fn of_document(document: &'a Spanned<DeTable<'i>>) -> Table<'a, 'i> {
+        Table { owner: "the file".to_string(), table: document.get_ref(), span: 0..0 }
+    }
+
     /// Value and span of a key.
     pub fn get(&self, key: &str) -> Option<(&'a DeValue<'i>, Span)> {
         self.table.get(key).map(|value| (value.get_ref(), value.span()))
@@ -422,6 +425,20 @@ impl Reader<'_> {
             Some(angles) => Rotation { rpy: angles.map(|(value, span)| self.angle(value, unit, &span)) },
             None => none,
         }
+    }
+
+    /// Mass, centre of mass and inertia of the table of a link.
+    pub fn inertial_at(&mut self, table: &Table) -> Option<Inertial> {
+        self.require(table, "mass", "mass = 1.0");
+        let mass = self.real_at(table, "mass", Range64::Finite);
+        let com = self.vector_at(table, "com").unwrap_or_else(|| self.value([0.0; 3], &table.span));
+        let rotation = self.rotation_at(table, "inertia_rpy");
+        let zero = Sym3 { xx: 0.0, xy: 0.0, xz: 0.0, yy: 0.0, yz: 0.0, zz: 0.0 };
+        let inertia = match table.has("inertia") {
+            true => self.tensor_at(table, "inertia"),
+            false => Some(self.value(zero, &table.span)),
+        };
+        Some(Inertial { mass: mass?, com, rotation, inertia: inertia? })
     }
 
     /// Position `xyz` and roll, pitch and yaw.

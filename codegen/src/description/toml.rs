@@ -4,11 +4,10 @@ use super::flexible::Flexible;
 use super::reader::{Range64, Reader};
 use super::table::{self, Table};
 use super::{
-    chapter, messages, BaseKind, Description, Format, Inertial, Joint, JointType, Link, NamedFrame, Placement, Value,
-    WrittenPose,
+    messages, BaseKind, Description, FileFormat, Joint, JointType, Link, NamedFrame, Placement, Value, WrittenPose,
 };
 use crate::diagnostic::{Diagnostics, Source};
-use straightline_core::spatial::Sym3;
+use straightline_core::joint::Dialect;
 use toml::de::DeValue;
 
 const LINK: &[&str] = &[
@@ -51,20 +50,26 @@ const AXES: [(&str, [f64; 3]); 6] = [
     ("-z", [0.0, 0.0, -1.0]),
 ];
 
-/// Reads a robot in TOML, in either notation. Complaints go to `diagnostics`; `None` if it is no TOML.
-pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
+pub(super) const FORMAT: FileFormat = FileFormat {
+    name: "TOML with joint frames",
+    extensions: &["toml"],
+    signs: "has `[robot]` or `[[joint]]`",
+    sniff: |text| table::holds(text, |top| top.has("robot") || top.has("joint")),
+    dialect: Dialect::JointFrames,
+    limits: "write `limits = { lower = ..., upper = ... }`, or kind `continuous`",
+    read,
+};
+
+fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     let document = table::parse(source, diagnostics)?;
-    let top = Table { owner: "the file".to_string(), table: document.get_ref(), span: 0..0 };
+    let top = Table::of_document(&document);
     let mut reader = Reader::new(source, diagnostics);
-    if chapter::is_centre_of_mass_notation(&top) {
-        return Some(chapter::read(&mut reader, &top));
-    }
     if !["robot", "link", "joint"].iter().any(|key| top.has(key)) {
         reader.complain(&(0..0), messages::unknown_format());
         return None;
     }
     reader.check_keys(&top, &["robot", "link", "joint", "frame", "drive"]);
-    let mut description = Description::new(Format::JointFrameToml, Value::assumed("robot".to_string()));
+    let mut description = Description::new(&FORMAT, Value::assumed("robot".to_string()));
     reader.require(&top, "robot", "[robot]\\nname = \"...\"");
     if let Some(robot) = reader.table_at(&top, "robot", "[robot]") {
         reader.check_keys(&robot, &["name", "gravity", "base"]);
@@ -104,26 +109,13 @@ fn read_link(reader: &mut Reader, mut table: Table, flexible: &mut Vec<Flexible>
     reader.check_keys(&table, LINK);
     flexible.extend(reader.flexible_at(&table, name.as_ref()));
     let has_inertial = LINK[1..LINK.len() - 1].iter().any(|key| table.has(key));
-    let inertial = if has_inertial { read_inertial(reader, &table) } else { None };
+    let inertial = if has_inertial { reader.inertial_at(&table) } else { None };
     Some(Link { name: name?, inertial })
-}
-
-fn read_inertial(reader: &mut Reader, table: &Table) -> Option<Inertial> {
-    reader.require(table, "mass", "mass = 1.0");
-    let mass = reader.real_at(table, "mass", Range64::Finite);
-    let com = reader.vector_at(table, "com").unwrap_or_else(|| reader.value([0.0; 3], &table.span));
-    let rotation = reader.rotation_at(table, "inertia_rpy");
-    let zero = Sym3 { xx: 0.0, xy: 0.0, xz: 0.0, yy: 0.0, yz: 0.0, zz: 0.0 };
-    let inertia = match table.has("inertia") {
-        true => reader.tensor_at(table, "inertia"),
-        false => Some(reader.value(zero, &table.span)),
-    };
-    Some(Inertial { mass: mass?, com, rotation, inertia: inertia? })
 }
 
 fn read_joint(reader: &mut Reader, mut table: Table) -> Option<Joint> {
     let name = named(reader, &mut table, "joint");
-    let words = JointType::words(Format::JointFrameToml);
+    let words = JointType::words(FORMAT.dialect);
     let is_written = |word: &str| matches!(table.get("kind"), Some((DeValue::String(text), _)) if text == word);
     let number = words.iter().find(|(word, _)| is_written(word)).and_then(|(_, t)| t.number_key());
     reader.check_keys(&table, &[JOINT, number.as_slice()].concat());

@@ -6,7 +6,7 @@
 
 use super::reader::{Range64, Reader};
 use super::{
-    messages, Angle, AngleUnit, Description, Format, Inertial, Joint, JointDrive, JointLimits, JointType, Link,
+    messages, Angle, AngleUnit, Description, FileFormat, Inertial, Joint, JointDrive, JointLimits, JointType, Link,
     Placement, Rotation, Value, WrittenPose,
 };
 use crate::diagnostic::wording::closest;
@@ -14,6 +14,7 @@ use crate::diagnostic::{Diagnostics, Source};
 use roxmltree::{Attribute, Document, Node, ParsingOptions};
 use std::borrow::Cow;
 use std::ops::Range;
+use straightline_core::joint::Dialect;
 use straightline_core::spatial::Sym3;
 
 mod text;
@@ -31,8 +32,17 @@ const MOST_PREFIXES: usize = 16;
 
 type Span = Range<usize>;
 
-/// Reads a URDF. Complaints go to `diagnostics`; `None` if nothing of the robot could be read.
-pub fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
+pub(super) const FORMAT: FileFormat = FileFormat {
+    name: "URDF",
+    extensions: &["urdf", "xml", "xacro"],
+    signs: "begins with `<`",
+    sniff: |text| text.trim_start().starts_with('<'),
+    dialect: Dialect::Urdf,
+    limits: "write `<limit lower=\"...\" upper=\"...\" velocity=\"...\" effort=\"...\"/>`, or type `continuous`",
+    read,
+};
+
+fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     let mut reader = Reader::new(source, diagnostics);
     let mut text = tolerant_text(&mut reader)?;
     for _ in 0..=MOST_PREFIXES {
@@ -82,7 +92,7 @@ fn read_document(mut reader: Reader, document: &Document) -> Option<Description>
         }
         None => reader.value("robot".to_string(), &tag(root)),
     };
-    let mut description = Description::new(Format::Urdf, name);
+    let mut description = Description::new(&FORMAT, name);
     for node in children(root) {
         match local_name(root, node) {
             Some("link") => description.add_link(read_link(&mut reader, node)),
@@ -367,7 +377,7 @@ fn read_joint(reader: &mut Reader, node: Node) -> Option<Joint> {
 
 fn read_kind(reader: &mut Reader, owner: &str, attribute: Attribute) -> Option<Value<JointType>> {
     let span = attribute.range_value();
-    let words = JointType::words(Format::Urdf);
+    let words = JointType::words(Dialect::Urdf);
     let kind = match attribute.value().trim() {
         word if words.iter().any(|(known, _)| *known == word) => {
             words.into_iter().find(|(known, _)| *known == word).map(|(_, kind)| kind)?

@@ -58,7 +58,7 @@ pub struct Builder {
 }
 
 impl Builder {
-    /// From a robot file (URDF or TOML), relative to the package's manifest; with all functions, in f64.
+    /// From a robot file, relative to the package's manifest; with all functions, in f64.
     pub fn new(robot: impl Into<PathBuf>) -> Self {
         Builder {
             robot: robot.into(),

@@ -3,7 +3,7 @@
 use super::geometry::principal_moments;
 use super::{angle, doubtful_angles, Assembly, ModelOptions, MOST_LINKS};
 use crate::description::{
-    messages, Description, Format, Joint, JointDrive, JointLimits, JointType, JointVectors, Placement, Value,
+    messages, Description, FileFormat, Joint, JointDrive, JointLimits, JointType, JointVectors, Placement, Value,
 };
 use crate::diagnostic::{Diagnostics, Place};
 use crate::model::singular::{singular_joints, Inertia};
@@ -184,7 +184,7 @@ pub(super) fn axis_length(what: &str, axis: &Value<[f64; 3]>, diagnostics: &mut 
 }
 
 /// One joint by itself.
-pub(super) fn joint(joint: &Joint, format: Format, diagnostics: &mut Diagnostics) {
+pub(super) fn joint(joint: &Joint, format: &FileFormat, diagnostics: &mut Diagnostics) {
     let name = &joint.name.value;
     if joint.kind.value.is_free() {
         diagnostics.push(messages::floating_joint(name).at(&joint.kind.place));
@@ -250,21 +250,16 @@ pub(super) fn limits(
     joint: &Value<String>,
     kind: JointType,
     limits: &JointLimits,
-    format: Format,
+    format: &FileFormat,
     diagnostics: &mut Diagnostics,
 ) {
     let name = &joint.value;
     if kind.has_range {
-        let same = JointType::words(format).into_iter().find(|(_, t)| t.kind == kind.kind && t.has_range);
+        let same = JointType::words(format.dialect).into_iter().find(|(_, t)| t.kind == kind.kind && t.has_range);
         let word = same.map_or(kind.word, |(word, _)| word);
         match (&limits.lower, &limits.upper) {
             (None, None) => {
-                let help = match format {
-                    Format::Urdf => "write `<limit lower=\"...\" upper=\"...\" velocity=\"...\" effort=\"...\"/>`, or type `continuous`",
-                    Format::JointFrameToml => "write `limits = { lower = ..., upper = ... }`, or kind `continuous`",
-                    Format::CentreOfMassToml => "write `limits = [lower, upper]`",
-                };
-                diagnostics.push(messages::limits_missing(name, word, help).at(&joint.place));
+                diagnostics.push(messages::limits_missing(name, word, format.limits).at(&joint.place));
             }
             (Some(lower), Some(upper)) if lower.value > upper.value => {
                 let complaint = messages::limits_reversed(name, lower.value, upper.value).at(&lower.place);

@@ -1,14 +1,15 @@
-//! The guide's reference pages are printed from the tables: functions, joints, messages.
+//! The guide's reference pages are printed from the tables: functions, joints, formats, messages.
 //!
 //! `UPDATE_EXPECTED=1 cargo test -p straightline-codegen --test suite guide::` rewrites them; read the difference.
 
+use crate::options::compare_table;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use straightline_codegen::description;
+use straightline_codegen::description::{self, FileFormat, FORMATS};
 use straightline_codegen::function::{Extent, Family, Parts, Spec};
 use straightline_codegen::scene;
 use straightline_codegen::{compile, Function, Options, Source};
-use straightline_core::joint::{Dialect, KINDS};
+use straightline_core::joint::KINDS;
 
 pub(crate) fn package() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -103,12 +104,14 @@ alone. Scenes add further arguments (gravity, run-time parameters) and leave arg
 
 fn joints() -> String {
     let mut page = "# Joints\n\nPrinted from the table of joints (`straightline_core::joint::KINDS`) by the test `guide::` of the compiler.\n\n\
-| kind | coordinates q, q̇ | unit of q, q̇, q̈, τ | at rest | words in a URDF | in TOML, joint frames | in TOML, centres of mass |\n|---|---|---|---|---|---|---|\n"
+| kind | coordinates q, q̇ | unit of q, q̇, q̈, τ | at rest |"
         .to_string();
+    FORMATS.iter().for_each(|format| page += &format!(" words in {} |", format.name));
+    page += &format!("\n|---|---|---|---|{}\n", "---|".repeat(FORMATS.len()));
     for kind in KINDS {
         let row = kind.row();
-        let words = |dialect: Dialect| {
-            let of = row.words.iter().filter(|word| word.dialects.contains(&dialect));
+        let words = |format: &&FileFormat| {
+            let of = row.words.iter().filter(|word| word.dialects.contains(&format.dialect));
             of.map(|word| format!("`{}`", word.text)).collect::<Vec<_>>().join(", ")
         };
         let neutral: Vec<String> = row.neutral.iter().map(|x| x.to_string()).collect();
@@ -121,15 +124,13 @@ fn joints() -> String {
         }
         let _ = writeln!(
             page,
-            "| {} | {}, {} | {} | {} | {} | {} | {} |",
+            "| {} | {}, {} | {} | {} | {} |",
             row.name,
             kind.nq(),
             kind.nv(),
             units.join("; "),
             neutral.join(", "),
-            words(Dialect::Urdf),
-            words(Dialect::JointFrames),
-            words(Dialect::CentresOfMass)
+            FORMATS.iter().map(words).collect::<Vec<_>>().join(" | ")
         );
     }
     for kind in KINDS.iter().filter(|kind| !kind.row().coordinates.is_empty()) {
@@ -144,10 +145,12 @@ option of the front or a key of the robot file, no joint between bodies: a joint
 fn message(folder: &Path, code: &str) -> String {
     let mut text = format!("\n### `{code}`\n");
     let file = |extension: &str| std::fs::read_to_string(folder.join(format!("{code}.{extension}"))).ok();
-    match (file("urdf"), file("toml")) {
-        (Some(urdf), _) => text += &format!("\n```xml\n{}\n```\n", urdf.trim_end()),
-        (None, Some(toml)) => text += &format!("\n```toml\n{}\n```\n", toml.trim_end()),
-        (None, None) => text += "\nNo file that can be printed: too large, not a text, or from code.\n",
+    match FORMATS.iter().flat_map(|format| format.extensions).find_map(|extension| file(extension)) {
+        Some(robot) => {
+            let language = if robot.starts_with('<') { "xml" } else { "toml" };
+            text += &format!("\n```{language}\n{}\n```\n", robot.trim_end());
+        }
+        None => text += "\nNo file that can be printed: too large, not a text, or from code.\n",
     }
     let said = file("txt").unwrap_or_else(|| panic!("no text of {code}"));
     text + &format!("\n```text\n{}\n```\n", said.trim_end())
@@ -179,6 +182,16 @@ fn functions_are_those_of_the_table() {
 #[test]
 fn joints_are_those_of_the_table() {
     compare("joints.md", &joints());
+}
+
+#[test]
+fn formats_are_those_of_the_table() {
+    let row = |format: &&FileFormat| {
+        let extensions: Vec<String> = format.extensions.iter().map(|end| format!("`.{end}`")).collect();
+        format!("| {} | {} | {} |", format.name, format.signs, extensions.join(", "))
+    };
+    let rows: Vec<String> = FORMATS.iter().map(row).collect();
+    compare_table("codegen/SCHEMA.md", "", "| format | recognised by | or else by the name |", &rows);
 }
 
 #[test]

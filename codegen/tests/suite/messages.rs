@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use straightline_codegen::description::drives::Noted;
 use straightline_codegen::description::flexible::{Elastic, Support};
 use straightline_codegen::description::messages::CODES;
+use straightline_codegen::description::FORMATS;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{load, ModelOptions};
 
@@ -56,7 +57,7 @@ fn special_case(code: &str) -> Option<(Source, ModelOptions)> {
 }
 
 fn file(code: &str) -> Option<Source> {
-    ["urdf", "toml"].iter().find_map(|extension| {
+    FORMATS.iter().flat_map(|format| format.extensions).find_map(|extension| {
         let name = format!("{code}.{extension}");
         std::fs::read(folder().join(&name)).ok().map(|bytes| Source::from_bytes(&name, bytes))
     })
@@ -78,7 +79,7 @@ fn every_message_has_its_exact_text() {
     for code in CODES {
         let (source, options) = special_case(code)
             .or_else(|| file(code).map(|source| (source, ModelOptions::default())))
-            .unwrap_or_else(|| panic!("no file messages/{code}.urdf or .toml"));
+            .unwrap_or_else(|| panic!("no file messages/{code}.*, in any format"));
         let (model, diagnostics) = load(&source, &options);
         assert_eq!(model.is_none(), diagnostics.has_errors(), "{code}: a model, or else an error\n{diagnostics}");
         assert!(diagnostics.iter().any(|d| d.code == *code), "{code}: not said, but\n{diagnostics}");

@@ -252,7 +252,7 @@ a run at once.\n\n\
 }
 
 /// Compares the lines behind a table's head with what is printed, or rewrites them; `margin` stands before each line.
-fn compare_table(file: &str, margin: &str, head: &str, printed: &[String]) {
+pub(crate) fn compare_table(file: &str, margin: &str, head: &str, printed: &[String]) {
     let path = package().join("..").join(file);
     let text = std::fs::read_to_string(&path).unwrap();
     let lines: Vec<&str> = text.lines().collect();

@@ -1,7 +1,7 @@
 //! Real and awkward robot files load, and mean what they say.
 
 use std::path::PathBuf;
-use straightline_codegen::description::{self, Format};
+use straightline_codegen::description;
 use straightline_codegen::diagnostic::{Diagnostics, Severity, Source};
 use straightline_codegen::model::{load, special_angles, FrameOption, ModelOptions};
 use straightline_core::model::{Frame, JointKind, Model};
@@ -118,17 +118,17 @@ fn what_is_skipped_is_listed() {
 }
 
 #[test]
-fn notations_are_told_apart_by_their_text() {
+fn formats_are_told_apart_by_their_text() {
     for (path, text, format) in [
-        ("a.urdf", AWKWARD, Format::Urdf),
-        ("a.toml", AWKWARD, Format::Urdf),
-        ("a", AWKWARD, Format::Urdf),
-        ("a.toml", ARM, Format::JointFrameToml),
-        ("a", ARM, Format::JointFrameToml),
-        ("a.toml", CHAIN, Format::CentreOfMassToml),
+        ("a.urdf", AWKWARD, "URDF"),
+        ("a.toml", AWKWARD, "URDF"),
+        ("a", AWKWARD, "URDF"),
+        ("a.toml", ARM, "TOML with joint frames"),
+        ("a", ARM, "TOML with joint frames"),
+        ("a.toml", CHAIN, "TOML with centres of mass"),
     ] {
         let description = description::read(&Source::new(path, text), &mut Diagnostics::new()).expect("it can be read");
-        assert_eq!(description.format, format, "{path}");
+        assert_eq!(description.format.name, format, "{path}");
     }
 }
 

@@ -1,0 +1,378 @@
+//! What every robot file ends in: links, joints and frames, and what stands beside them.
+//!
+//! The one thing that formats say in different ways is where a joint stands ([`Placement`]).
+
+use super::{drives, flexible, FileFormat, Value};
+use crate::diagnostic::Place;
+use straightline_core::joint::{self, Dialect, JointKind, Measure};
+use straightline_core::spatial::Sym3;
+
+/// How the robot stands in the world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BaseKind {
+    /// The root link is the world.
+    Fixed,
+    /// The root link moves freely.
+    Floating,
+}
+
+/// A robot file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Description {
+    /// The format that it is written in.
+    pub format: &'static FileFormat,
+    /// The robot's name.
+    pub name: Value<String>,
+    /// Acceleration due to gravity in the world \[m/s²\], where the file states it.
+    pub gravity: Option<Value<[f64; 3]>>,
+    /// The base, where the file states it.
+    pub base: Option<Value<BaseKind>>,
+    /// The links, in the file's order.
+    pub links: Vec<Link>,
+    /// The joints, in the file's order.
+    pub joints: Vec<Joint>,
+    /// Further named frames.
+    pub frames: Vec<NamedFrame>,
+    /// A link or a joint could not be read, so that the tree has holes that were complained of already.
+    pub has_holes: bool,
+    /// What drives the joints.
+    pub drives: Vec<drives::Drive>,
+    /// Links that bend.
+    pub flexible: Vec<flexible::Flexible>,
+    /// What the file holds and the dynamics do not need.
+    pub ignored: Vec<Ignored>,
+}
+
+impl Description {
+    /// A robot without links, of which nothing is said yet.
+    pub fn new(format: &'static FileFormat, name: Value<String>) -> Description {
+        Description {
+            format,
+            name,
+            gravity: None,
+            base: None,
+            links: Vec::new(),
+            joints: Vec::new(),
+            frames: Vec::new(),
+            has_holes: false,
+            drives: Vec::new(),
+            flexible: Vec::new(),
+            ignored: Vec::new(),
+        }
+    }
+
+    /// The link of a name.
+    pub fn link(&self, name: &str) -> Option<&Link> {
+        self.links.iter().find(|link| link.name.value == name)
+    }
+
+    /// The joint of a name.
+    pub fn joint(&self, name: &str) -> Option<&Joint> {
+        self.joints.iter().find(|joint| joint.name.value == name)
+    }
+
+    /// Every angle, and what it is called.
+    pub fn angles(&self) -> Vec<(String, &Angle)> {
+        let mut all = Vec::new();
+        for link in &self.links {
+            let of = || format!("the inertia of link `{}`", link.name.value);
+            all.extend(link.inertial.iter().flat_map(|inertial| inertial.rotation.angles(of())));
+        }
+        for Joint { name, placement, .. } in &self.joints {
+            match placement {
+                Placement::Frames { origin, .. } => {
+                    all.extend(origin.rotation.angles(format!("the origin of joint `{}`", name.value)));
+                }
+                Placement::Vectors(vectors) => {
+                    all.extend(vectors.alpha.iter().map(|alpha| (format!("alpha of joint `{}`", name.value), alpha)));
+                }
+            }
+        }
+        for frame in &self.frames {
+            all.extend(frame.pose.rotation.angles(format!("frame `{}`", frame.name.value)));
+        }
+        all
+    }
+
+    /// Where a joint stands, or the link that it moves where the file has no such joint.
+    pub(crate) fn place_of(&self, joint: &str, link: &str) -> Option<&Place> {
+        let of_link = || self.link(link).map(|link| &link.name.place);
+        self.joint(joint).map(|joint| &joint.name.place).or_else(of_link)
+    }
+
+    /// Adds what could be read of a link.
+    pub(crate) fn add_link(&mut self, link: Option<Link>) {
+        self.has_holes |= link.is_none();
+        self.links.extend(link);
+    }
+
+    /// Adds what could be read of a joint.
+    pub(crate) fn add_joint(&mut self, joint: Option<Joint>) {
+        self.has_holes |= joint.is_none();
+        self.joints.extend(joint);
+    }
+}
+
+/// A kind of element that was skipped.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ignored {
+    /// Its name, such as `visual`.
+    pub what: String,
+    /// How often it occurs.
+    pub count: usize,
+    /// Its first place.
+    pub place: Place,
+}
+
+/// A link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Link {
+    /// What joints, frames and scenes call it; no two links share it.
+    pub name: Value<String>,
+    /// Mass, centre of mass and inertia, where the file gives them.
+    pub inertial: Option<Inertial>,
+}
+
+/// Mass, centre of mass and inertia of a link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inertial {
+    /// Mass \[kg\].
+    pub mass: Value<f64>,
+    /// Centre of mass in the link frame \[m\].
+    pub com: Value<[f64; 3]>,
+    /// Rotation of the axes of `inertia` against the link's.
+    pub rotation: Rotation,
+    /// Inertia tensor about the centre of mass, in axes turned by `rotation` \[kg·m²\].
+    pub inertia: Value<Sym3<f64>>,
+}
+
+/// The unit in which an angle is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AngleUnit {
+    /// Radians.
+    Radian,
+    /// Degrees.
+    Degree,
+    /// Multiples of π/2.
+    QuarterTurn,
+    /// Multiples of 2π.
+    Turn,
+}
+
+/// An angle as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Angle {
+    /// The number.
+    pub value: f64,
+    /// Its unit.
+    pub unit: AngleUnit,
+    /// How it is written; empty if it is left out.
+    pub text: String,
+    /// Where.
+    pub place: Place,
+}
+
+impl Angle {
+    /// No angle, where the file says nothing.
+    pub fn zero(place: Place) -> Angle {
+        Angle { value: 0.0, unit: AngleUnit::Radian, text: String::new(), place }
+    }
+}
+
+/// A rotation as written: roll, pitch and yaw, R = Rz(yaw) Ry(pitch) Rx(roll).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rotation {
+    /// Roll (about x), pitch (about y), yaw (about z).
+    pub rpy: [Angle; 3],
+}
+
+impl Rotation {
+    /// No rotation, where the file says nothing.
+    pub fn identity(place: Place) -> Rotation {
+        Rotation { rpy: [Angle::zero(place.clone()), Angle::zero(place.clone()), Angle::zero(place)] }
+    }
+
+    fn angles(&self, of: String) -> impl Iterator<Item = (String, &Angle)> {
+        ["roll", "pitch", "yaw"].into_iter().map(move |name| format!("{name} of {of}")).zip(&self.rpy)
+    }
+}
+
+/// A pose as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WrittenPose {
+    /// Position \[m\].
+    pub xyz: Value<[f64; 3]>,
+    /// Orientation.
+    pub rotation: Rotation,
+}
+
+impl WrittenPose {
+    /// Frames that coincide, where the file says nothing.
+    pub fn identity(place: Place) -> WrittenPose {
+        WrittenPose { xyz: Value::new([0.0; 3], place.clone()), rotation: Rotation::identity(place) }
+    }
+}
+
+/// What a file says of how a joint moves: a word of the table of joints, or `fixed`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointType {
+    /// The word.
+    pub word: &'static str,
+    /// How it moves; `None`: not at all.
+    pub kind: Option<JointKind>,
+    /// Whether its coordinate has a range, which the file then gives.
+    pub has_range: bool,
+    /// The number that its kind has of its own, such as a pitch.
+    pub number: Option<f64>,
+}
+
+impl JointType {
+    /// All words of a dialect: joints between links, then `fixed` where files have such joints, then free bases.
+    pub fn words(dialect: Dialect) -> Vec<(&'static str, JointType)> {
+        let words = || {
+            joint::words(dialect).map(|(kind, word)| JointType {
+                word: word.text,
+                kind: Some(kind),
+                has_range: word.has_range,
+                number: None,
+            })
+        };
+        let fixed = JointType { word: "fixed", kind: None, has_range: false, number: None };
+        let has_fixed = Dialect::FRAMES.contains(&dialect);
+        let between_links = words().filter(|t| !t.is_free()).chain(has_fixed.then_some(fixed));
+        between_links.chain(words().filter(|t| t.is_free())).map(|t| (t.word, t)).collect()
+    }
+
+    /// A joint that turns, with a range or without.
+    pub fn turning(has_range: bool) -> JointType {
+        let kind = Measure::Angle.joint();
+        let word =
+            kind.row().words.iter().find(|word| word.has_range == has_range).expect("there is a word for either");
+        JointType { word: word.text, kind: Some(kind), has_range, number: None }
+    }
+
+    /// The same with the number that its kind has of its own.
+    pub fn with_number(self, number: f64) -> JointType {
+        JointType { kind: self.kind.map(|kind| kind.with_number(number)), number: Some(number), ..self }
+    }
+
+    /// Key of the number that its kind has of its own.
+    pub fn number_key(self) -> Option<&'static str> {
+        self.kind.and_then(|kind| kind.row().number)
+    }
+
+    /// Whether it would let a link move freely, which no joint between links does.
+    pub fn is_free(self) -> bool {
+        self.kind.is_some_and(|kind| kind.is_base())
+    }
+
+    /// How it moves one link against another; `None`: it does not.
+    pub fn between_links(self) -> Option<JointKind> {
+        self.kind.filter(|kind| !kind.is_base())
+    }
+}
+
+/// A joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// What scenes, drives and messages call it; no two joints share it.
+    pub name: Value<String>,
+    /// How it moves.
+    pub kind: Value<JointType>,
+    /// The link that carries it.
+    pub parent: Value<String>,
+    /// The link that it moves.
+    pub child: Value<String>,
+    /// Where it stands, and along which axis.
+    pub placement: Placement,
+    /// Ranges.
+    pub limits: JointLimits,
+    /// What its drive adds.
+    pub drive: JointDrive,
+}
+
+/// How a file says where a joint stands.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Placement {
+    /// By frames of links and joints.
+    Frames {
+        /// Pose of the joint frame, which is the child's link frame at q = 0, in the parent's link frame.
+        origin: WrittenPose,
+        /// Axis in the joint frame, as long as it is written; \[1, 0, 0\] where a URDF says nothing.
+        axis: Value<[f64; 3]>,
+    },
+    /// By vectors between the joint S_j and the origins C of the link frames, as in the chapter; of joints that move.
+    Vectors(JointVectors),
+}
+
+/// Axis and place of joint j in the frames of its links, j−1 and j. All vectors are as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointVectors {
+    /// e_j in frame j−1.
+    pub e_parent: Value<[f64; 3]>,
+    /// r_{j−1,j} in frame j−1, from S_j to C_{j−1} \[m\].
+    pub r_parent: Value<[f64; 3]>,
+    /// r*_{j−1,j}, in a specificity: replaces r_{j−1,j} in (20.101).
+    pub r_parent_star: Option<Value<[f64; 3]>>,
+    /// e_j in frame j.
+    pub e: Value<[f64; 3]>,
+    /// r_{j,j} in frame j, from S_j to C_j \[m\].
+    pub r: Value<[f64; 3]>,
+    /// r*_{j,j}, in a specificity: replaces r_{j,j} in (20.101).
+    pub r_star: Option<Value<[f64; 3]>>,
+    /// α_j, the constant angle of a linear joint.
+    pub alpha: Option<Angle>,
+}
+
+impl Placement {
+    /// Its lengths \[m\] and what they are called.
+    pub fn lengths(&self) -> Vec<(&'static str, &Value<[f64; 3]>)> {
+        match self {
+            Placement::Frames { origin, .. } => vec![("origin", &origin.xyz)],
+            Placement::Vectors(JointVectors { r_parent, r, .. }) => vec![("r_next", r_parent), ("r", r)],
+        }
+    }
+}
+
+/// Ranges of a joint, where the file gives them.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct JointLimits {
+    /// Least coordinate \[rad or m\].
+    pub lower: Option<Value<f64>>,
+    /// Greatest coordinate \[rad or m\].
+    pub upper: Option<Value<f64>>,
+    /// Greatest speed \[rad/s or m/s\].
+    pub velocity: Option<Value<f64>>,
+    /// Greatest torque or force \[N·m or N\].
+    pub effort: Option<Value<f64>>,
+}
+
+/// What the drive of a joint adds to its dynamics, where the file gives it.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct JointDrive {
+    /// Viscous friction \[N·m·s/rad or N·s/m\].
+    pub damping: Option<Value<f64>>,
+    /// Coulomb friction \[N·m or N\].
+    pub friction: Option<Value<f64>>,
+    /// Moment of inertia of the rotor about its axis \[kg·m²\].
+    pub rotor_inertia: Option<Value<f64>>,
+    /// Rotor speed over joint speed \[1 or rad/m\]; 1 where the file says nothing.
+    pub gear_ratio: Option<Value<f64>>,
+    /// Inertia added on the joint's own coordinate \[kg·m² or kg\], in place of a rotor with its gear.
+    pub armature: Option<Value<f64>>,
+    /// Spring: stiffness \[N·m/rad or N/m\].
+    pub spring_stiffness: Option<Value<f64>>,
+    /// Spring: coordinate without force \[rad or m\].
+    pub spring_rest: Option<Value<f64>>,
+}
+
+/// A named frame on a link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedFrame {
+    /// What `frames` and contacts call it; links are frames of their own names.
+    pub name: Value<String>,
+    /// The link that carries it.
+    pub link: Value<String>,
+    /// Its pose in the link frame.
+    pub pose: WrittenPose,
+}
