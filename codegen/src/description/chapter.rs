@@ -3,11 +3,11 @@
 //! The schema is in `SCHEMA.md`. Links and joints without a name are called `link1`, `link2`, … and `joint1`, `joint2`, …. A link's frame has
 //! its origin in the centre of mass; the world is the link `base`, the end of the chain the frame `tip`.
 
-use super::reader::{Range64, Reader};
-use super::table::{self, Table};
+use super::reader::{FileReader, Range64};
+use super::table::{self, TomlTable};
 use super::{
-    messages, Description, FileFormat, Inertial, Joint, JointType, JointVectors, Link, NamedFrame, Placement, Rotation,
-    Value, WrittenPose,
+    messages, Description, FileFormat, JointType, JointVectors, NamedFrame, Noted, Placement, Rotation,
+    WrittenInertial, WrittenJoint, WrittenLink, WrittenPose,
 };
 use crate::diagnostic::{Diagnostics, Source};
 use straightline_core::joint::Dialect;
@@ -49,7 +49,7 @@ pub(super) const FORMAT: FileFormat = FileFormat {
     read,
 };
 
-fn is_chain(top: &Table) -> bool {
+fn is_chain(top: &TomlTable) -> bool {
     let links = top.get("link").and_then(|(links, _)| links.as_array());
     let has = |key: &str| {
         links.is_some_and(|l| l.iter().any(|t| t.get_ref().as_table().is_some_and(|t| t.contains_key(key))))
@@ -63,31 +63,31 @@ fn is_chain(top: &Table) -> bool {
 #[derive(Default)]
 struct End {
     /// e_{j+1}.
-    e: Option<Value<[f64; 3]>>,
+    e: Option<Noted<[f64; 3]>>,
     /// r_{j,j+1}, from S_{j+1} to C_j; tip = C_n − r_{n,n+1}.
-    r: Option<Value<[f64; 3]>>,
+    r: Option<Noted<[f64; 3]>>,
     /// r*_{j,j+1}.
-    r_star: Option<Value<[f64; 3]>>,
+    r_star: Option<Noted<[f64; 3]>>,
 }
 
 fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     let document = table::parse(source, diagnostics)?;
-    let top = &Table::of_document(&document);
-    let reader = &mut Reader::new(source, diagnostics);
+    let top = &TomlTable::of_document(&document);
+    let reader = &mut FileReader::new(source, diagnostics);
     reader.check_keys(top, &["name", "gravity", "base", "link", "drive"]);
     let name = match top.has("name") {
         true => reader.name_at(top, "name", "robot"),
         false => None,
     };
-    let name = name.unwrap_or_else(|| Value::assumed("robot".to_string()));
+    let name = name.unwrap_or_else(|| Noted::assumed("robot".to_string()));
     let mut robot = Description::new(&FORMAT, name);
     robot.gravity = reader.vector_at(top, "gravity");
     reader.require(top, "base", "[base]\\ne_next = [0.0, 0.0, 1.0]\\nr_next = [-0.1, 0.0, 0.0]");
     let mut tables = reader.tables_at(top, "link");
-    let names: Vec<Value<String>> =
+    let names: Vec<Noted<String>> =
         tables.iter_mut().zip(1..).map(|(table, j)| name_or_number(reader, table, "name", "link", j)).collect();
     let mut end = End::default();
-    let mut below = Value::new("base".to_string(), robot.name.place.clone());
+    let mut below = Noted::new("base".to_string(), robot.name.place.clone());
     while names.iter().any(|name| name.value == below.value) {
         below.value.insert(0, '_');
     }
@@ -99,14 +99,14 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     if tables.is_empty() {
         reader.diagnostics.push(messages::no_links(&robot.name.value).at(&robot.name.place));
     }
-    robot.links.push(Link { name: below.clone(), inertial: None });
+    robot.links.push(WrittenLink { name: below.clone(), inertial: None });
     let count = tables.len();
     for (j, (mut table, name)) in (1..).zip(tables.into_iter().zip(names)) {
         let joint_name = name_or_number(reader, &table, "joint_name", "joint", j);
         table.owner = format!("link `{}`", name.value);
         reader.check_keys(&table, LINK);
         robot.flexible.extend(reader.flexible_at(&table, Some(&name)));
-        robot.links.push(Link { inertial: read_inertial(reader, &table), name: name.clone() });
+        robot.links.push(WrittenLink { inertial: read_inertial(reader, &table), name: name.clone() });
         let joint = read_joint(reader, &table, joint_name, end, [below, name.clone()]);
         robot.add_joint(joint);
         end = read_end(reader, &table, j == count);
@@ -119,10 +119,10 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
             }
         }
         robot.frames.extend(end.r.map(|r| NamedFrame {
-            name: Value::new("tip".to_string(), r.place.clone()),
+            name: Noted::new("tip".to_string(), r.place.clone()),
             link: below,
             pose: WrittenPose {
-                xyz: Value::new(r.value.map(|x| -x), r.place.clone()),
+                xyz: Noted::new(r.value.map(|x| -x), r.place.clone()),
                 rotation: Rotation::identity(r.place),
             },
         }));
@@ -131,7 +131,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     Some(robot)
 }
 
-fn read_end(reader: &mut Reader, table: &Table, is_last: bool) -> End {
+fn read_end(reader: &mut FileReader, table: &TomlTable, is_last: bool) -> End {
     if !is_last {
         reader.require(table, "e_next", "e_next = [0.0, 0.0, 1.0]");
         reader.require(table, "r_next", "r_next = [-0.1, 0.0, 0.0]");
@@ -144,27 +144,27 @@ fn read_end(reader: &mut Reader, table: &Table, is_last: bool) -> End {
 }
 
 /// What a key says, or else `link3`.
-fn name_or_number(reader: &mut Reader, table: &Table, key: &str, what: &str, j: usize) -> Value<String> {
+fn name_or_number(reader: &mut FileReader, table: &TomlTable, key: &str, what: &str, j: usize) -> Noted<String> {
     let name = if table.has(key) { reader.name_at(table, key, what) } else { None };
     name.unwrap_or_else(|| reader.value(format!("{what}{j}"), &table.span))
 }
 
-fn read_inertial(reader: &mut Reader, table: &Table) -> Option<Inertial> {
+fn read_inertial(reader: &mut FileReader, table: &TomlTable) -> Option<WrittenInertial> {
     reader.require(table, "mass", "mass = 1.0");
     reader.require(table, "J", "J = [0.1, 0.1, 0.1]");
     let (mass, inertia) = (reader.real_at(table, "mass", Range64::Finite), reader.tensor_at(table, "J"));
     let place = reader.place(&table.span);
-    let com = Value::new([0.0; 3], place.clone());
-    Some(Inertial { mass: mass?, com, rotation: Rotation::identity(place), inertia: inertia? })
+    let com = Noted::new([0.0; 3], place.clone());
+    Some(WrittenInertial { mass: mass?, com, rotation: Rotation::identity(place), inertia: inertia? })
 }
 
 fn read_joint(
-    reader: &mut Reader,
-    table: &Table,
-    name: Value<String>,
+    reader: &mut FileReader,
+    table: &TomlTable,
+    name: Noted<String>,
     end: End,
-    [parent, child]: [Value<String>; 2],
-) -> Option<Joint> {
+    [parent, child]: [Noted<String>; 2],
+) -> Option<WrittenJoint> {
     reader.require(table, "type", "type = \"revolute\"");
     let kind = reader.word_at(table, "type", &JointType::words(FORMAT.dialect));
     let e = reader.required_vector(table, "e", "e = [0.0, 0.0, 1.0]");
@@ -188,5 +188,5 @@ fn read_joint(
         r_star,
         alpha,
     });
-    Some(Joint { name, kind, parent, child, placement, limits, drive })
+    Some(WrittenJoint { name, kind, parent, child, placement, limits, drive })
 }

@@ -1,54 +1,25 @@
 //! `[[drive]]` tables: actuators and transmissions, in TOML robot files and in scenes; the schema is in `SCHEMA.md`.
 
-use super::Value;
-use crate::diagnostic::Place;
-use std::fmt;
+use super::Noted;
 use straightline_core::{Dd, Real};
 
 mod numbers;
 mod read;
 
 use numbers::*;
-pub use numbers::{Must, Number, NumberKind, QUANTITIES};
-
-/// A value with its place, which says nothing of the value: equal and printed alike wherever it stands.
-#[derive(Clone)]
-pub struct Noted<T> {
-    /// The value.
-    pub value: T,
-    /// Where it stands.
-    pub place: Place,
-}
-
-impl<T: PartialEq> PartialEq for Noted<T> {
-    fn eq(&self, other: &Noted<T>) -> bool {
-        self.value == other.value
-    }
-}
-
-impl<T: fmt::Debug> fmt::Debug for Noted<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.value.fmt(f)
-    }
-}
-
-impl<T> From<Value<T>> for Noted<T> {
-    fn from(v: Value<T>) -> Noted<T> {
-        Noted { value: v.value, place: v.place }
-    }
-}
+pub use numbers::{DriveNumber, Must, NumberKind, QUANTITIES};
 
 /// A drive as written; over another scalar, with such numbers in place of those that can be set by name.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Drive<T = f64> {
+pub struct WrittenDrive<T = f64> {
     /// Its name: that of its joint where the file says nothing.
     pub name: Noted<String>,
     /// Its joints, with the speed of the last shaft over that of each \[1 or rad/m\].
     pub joints: Vec<(Noted<String>, T)>,
     /// What makes the torque.
-    pub actuator: Actuator<T>,
+    pub actuator: WrittenActuator<T>,
     /// Stages of the transmission, from the actuator on.
-    pub stages: Vec<Stage<T>>,
+    pub stages: Vec<TransmissionStage<T>>,
     /// η′ and η″ of the gear before the joints.
     pub efficiency: Option<[T; 2]>,
     /// Greatest input \[V, or the input's unit\].
@@ -59,14 +30,14 @@ pub struct Drive<T = f64> {
     /// counts.
     pub rotor: Option<(Noted<String>, [f64; 3], T)>,
     /// What it bears.
-    pub rating: Rating,
+    pub rating: WrittenRating,
     /// The numbers of the file that equations have.
     pub written: AsWritten,
 }
 
 /// A number as it is written in a file.
 #[derive(Clone, Debug)]
-pub struct Written {
+pub struct WrittenNumber {
     /// Which it is: ``ratio of drive `one` ``.
     pub what: String,
     /// Its value.
@@ -77,7 +48,7 @@ pub struct Written {
 
 /// Numbers as they are written: no part of the drive, which may have been given others since.
 #[derive(Clone, Debug, Default)]
-pub struct AsWritten(pub Vec<Written>);
+pub struct AsWritten(pub Vec<WrittenNumber>);
 
 impl PartialEq for AsWritten {
     fn eq(&self, _: &AsWritten) -> bool {
@@ -87,18 +58,18 @@ impl PartialEq for AsWritten {
 
 /// What an actuator bears: no part of the equations.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Rating {
+pub struct WrittenRating {
     /// Greatest speed \[rad/s\].
     pub speed: Option<f64>,
     /// Greatest rms current \[A\].
     pub continuous_current: Option<f64>,
     /// How its winding heats.
-    pub thermal: Option<Thermal>,
+    pub thermal: Option<WrittenThermal>,
 }
 
 /// Thermal data of a motor.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Thermal {
+pub struct WrittenThermal {
     /// \[K/W\]
     pub winding_housing: f64,
     /// \[K/W\]
@@ -115,7 +86,7 @@ pub struct Thermal {
 
 /// What makes the torque.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Actuator<T = f64> {
+pub enum WrittenActuator<T = f64> {
     /// A DC motor.
     Motor {
         /// C_M \[N·m/A\].
@@ -148,7 +119,7 @@ pub enum Actuator<T = f64> {
 
 /// A stage of a transmission; rigid without stiffness.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stage<T = f64> {
+pub struct TransmissionStage<T = f64> {
     /// N: speed before it over speed behind it.
     pub ratio: Noted<T>,
     /// c \[N·m/rad\], on the side of the joint.
@@ -163,20 +134,20 @@ pub struct Stage<T = f64> {
     pub efficiency: Option<[T; 2]>,
 }
 
-impl Drive {
+impl WrittenDrive {
     /// Numbers that can be set by name, as far as the drive has them: of a motor its keys (`friction` as `motor_friction`), of stages
     /// `stage_2_ratio` and so on, of the drive `efficiency`, `input_limit` and `current_limit`, and `joint_ratio` of the one joint. For
     /// short, `ratio` is that of the only gear, `stiffness` and `stage_damping` those of the first elastic stage. A voltage constant that is the
     /// torque constant remains it, and so does the inertia of a rotor that turns in space remain the motor's.
-    pub fn numbers(&self) -> Vec<Number> {
+    pub fn numbers(&self) -> Vec<DriveNumber> {
         let mut copy = self.clone();
         let flat: Vec<_> = copy.flat().into_iter().map(|(quantity, stage, x)| (quantity, stage, *x)).collect();
         let (joints, rotors) = (self.joints.len(), usize::from(self.rotor.is_some()));
         let (joint_ratio, rotor) = (flat.len() - joints, flat.len() - joints - rotors);
-        let is_motor = matches!(self.actuator, Actuator::Motor { .. });
-        let mut all: Vec<Number> = Vec::new();
+        let is_motor = matches!(self.actuator, WrittenActuator::Motor { .. });
+        let mut all: Vec<DriveNumber> = Vec::new();
         let mut add =
-            |name: String, quantity, at: Vec<usize>| all.push(Number { name, quantity, value: flat[at[0]].2, at });
+            |name: String, quantity, at: Vec<usize>| all.push(DriveNumber { name, quantity, value: flat[at[0]].2, at });
         for (k, (quantity, stage, x)) in flat[..rotor].iter().enumerate() {
             let named = |name: &str| stage.map_or(name.to_string(), |stage| format!("stage_{}_{name}", stage + 1));
             let next = |quantity| flat.get(k + 1).filter(|next| next.0 == quantity && next.2 == *x).map(|_| k + 1);
@@ -223,7 +194,7 @@ impl Drive {
             let ratio = |(joint, n)| (format!("joint_ratio_{}", joint), Some(Must::NotBeZero), n);
             all.extend(self.joints.iter_mut().map(|(joint, n)| ratio((&joint.value, n))));
         }
-        if let Actuator::Linear { c, f, d, t, position } = &mut self.actuator {
+        if let WrittenActuator::Linear { c, f, d, t, position } = &mut self.actuator {
             let n = f.len();
             let entry = |(k, x)| (format!("C_{}_{}", k / n + 1, k % n + 1), None, x);
             all.extend(c.value.iter_mut().enumerate().map(entry));
@@ -233,13 +204,14 @@ impl Drive {
                 all.extend(row.iter_mut().enumerate().map(|(k, x)| (format!("{key}_{}", k + 1), None, x)));
             }
         }
-        let Rating { speed, continuous_current, thermal } = &mut self.rating;
+        let WrittenRating { speed, continuous_current, thermal } = &mut self.rating;
         let borne = [("speed_limit", speed), ("continuous_current", continuous_current)];
         let positive = |name: &str| (name.to_string(), Some(Must::BePositive));
         for (name, x) in borne.into_iter().filter_map(|(name, x)| Some((positive(name), x.as_mut()?))) {
             all.push((name.0, name.1, x));
         }
-        if let Some(Thermal { winding_housing, housing_ambient, winding_time, housing_time, ambient, limit }) = thermal
+        if let Some(WrittenThermal { winding_housing, housing_ambient, winding_time, housing_time, ambient, limit }) =
+            thermal
         {
             for (name, x) in [
                 ("winding_housing", winding_housing),
@@ -278,7 +250,7 @@ impl Drive {
                 must
             }
         };
-        let is_hot = |t: &Thermal| t.limit.is_some_and(|limit| limit <= t.ambient);
+        let is_hot = |t: &WrittenThermal| t.limit.is_some_and(|limit| limit <= t.ambient);
         Some(match must {
             Some(must) if !must.holds(value) => Err(must.words().0),
             _ if self.rating.thermal.as_ref().is_some_and(is_hot) => match name {
@@ -291,7 +263,7 @@ impl Drive {
 
     /// The same drive over another scalar, with these values of some of its numbers.
     #[must_use]
-    pub fn with<T: Real>(&self, numbers: &[Number], values: &[T]) -> Drive<T> {
+    pub fn with<T: Real>(&self, numbers: &[DriveNumber], values: &[T]) -> WrittenDrive<T> {
         let mut drive = self.over::<T>();
         let mut flat = drive.flat();
         // what is named itself does not follow
@@ -306,7 +278,7 @@ impl Drive {
 
     /// The same drive with rigid stages, or without losses.
     #[must_use]
-    pub fn in_part(&self, is_elastic: bool, is_lossy: bool) -> Drive {
+    pub fn in_part(&self, is_elastic: bool, is_lossy: bool) -> WrittenDrive {
         let mut drive = self.clone();
         for stage in &mut drive.stages {
             stage.stiffness = stage.stiffness.filter(|_| is_elastic);
@@ -317,10 +289,10 @@ impl Drive {
         drive
     }
 
-    fn over<T: Real>(&self) -> Drive<T> {
+    fn over<T: Real>(&self) -> WrittenDrive<T> {
         let t = |x: f64| T::constant(Dd::from(x));
         let both = |e: [f64; 2]| e.map(t);
-        let stage = |s: &Stage| Stage {
+        let stage = |s: &TransmissionStage| TransmissionStage {
             ratio: Noted { value: t(s.ratio.value), place: s.ratio.place.clone() },
             stiffness: s.stiffness.map(t),
             damping: s.damping.map(t),
@@ -328,21 +300,26 @@ impl Drive {
             output_inertia: t(s.output_inertia),
             efficiency: s.efficiency.map(both),
         };
-        Drive {
+        WrittenDrive {
             name: self.name.clone(),
             joints: self.joints.iter().map(|(joint, ratio)| (joint.clone(), t(*ratio))).collect(),
             actuator: match &self.actuator {
-                Actuator::Motor { torque_constant, emf_constant, resistance, inductance, rotor_inertia, friction } => {
-                    Actuator::Motor {
-                        torque_constant: t(*torque_constant),
-                        emf_constant: t(*emf_constant),
-                        resistance: t(*resistance),
-                        inductance: inductance.map(t),
-                        rotor_inertia: t(*rotor_inertia),
-                        friction: t(*friction),
-                    }
-                }
-                Actuator::Linear { c, f, d, t, position } => Actuator::Linear {
+                WrittenActuator::Motor {
+                    torque_constant,
+                    emf_constant,
+                    resistance,
+                    inductance,
+                    rotor_inertia,
+                    friction,
+                } => WrittenActuator::Motor {
+                    torque_constant: t(*torque_constant),
+                    emf_constant: t(*emf_constant),
+                    resistance: t(*resistance),
+                    inductance: inductance.map(t),
+                    rotor_inertia: t(*rotor_inertia),
+                    friction: t(*friction),
+                },
+                WrittenActuator::Linear { c, f, d, t, position } => WrittenActuator::Linear {
                     c: c.clone(),
                     f: f.clone(),
                     d: d.clone(),

@@ -1,11 +1,9 @@
 //! Links that bend, and bases that give way: `flexible` of a link, `[[flexible]]` and `[support]` of a scene; the schema is in
 //! `SCHEMA.md` and `SCENES.md`.
 
-use super::drives::Noted;
-use super::reader::{Range64, Reader};
-use super::table::Table;
-use super::{messages, Value};
-use crate::diagnostic::Place;
+use super::reader::{FileReader, Range64};
+use super::table::TomlTable;
+use super::{messages, Noted};
 use toml::de::DeValue;
 
 const FLEXIBLE: &[&str] = &["from", "to", "segments", "bending", "torsion", "damping"];
@@ -45,7 +43,7 @@ pub enum Bending {
 
 /// What a base stands on, as written: springs and dampers between the world and the root link.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Support {
+pub struct BaseSupport {
     /// The point about which the base turns, in the world \[m\].
     pub at: [f64; 3],
     /// Along x, y, z \[N/m\] and about x, y, z \[N·m/rad\], parallel with the world's axes; `None`: the base does not move so.
@@ -65,42 +63,35 @@ pub struct Elastic {
     pub rest: f64,
 }
 
-impl Support {
+impl BaseSupport {
     /// The names of the directions, which follow `support_` in the names of the joints.
     pub const DIRECTIONS: [&'static str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 }
 
-impl<T> Noted<T> {
-    /// A value that no file holds.
-    pub fn assumed(value: T) -> Noted<T> {
-        Noted { value, place: Place::none() }
-    }
-}
-
-impl Reader<'_> {
+impl FileReader<'_> {
     /// The key `flexible` of the table of a link.
-    pub fn flexible_at(&mut self, table: &Table, link: Option<&Value<String>>) -> Option<Flexible> {
+    pub fn flexible_at(&mut self, table: &TomlTable, link: Option<&Noted<String>>) -> Option<Flexible> {
         let (_, span) = table.get("flexible")?;
         let flexible = self.table_at(table, "flexible", &format!("flexible of {}", table.owner))?;
         self.check_keys(&flexible, FLEXIBLE);
         let link = self.value(link?.value.clone(), &span);
-        self.flexible(&flexible, link.into())
+        self.flexible(&flexible, link)
     }
 
     /// The tables `[[flexible]]` of a scene.
-    pub fn flexible_links_at(&mut self, top: &Table) -> Vec<Flexible> {
+    pub fn flexible_links_at(&mut self, top: &TomlTable) -> Vec<Flexible> {
         let tables = self.tables_at(top, "flexible");
-        let read = |mut table: Table| {
+        let read = |mut table: TomlTable| {
             self.require(&table, "link", "link = \"...\"");
             let link = self.name_at(&table, "link", "link")?;
             table.owner = format!("flexible link `{}`", link.value);
             self.check_keys(&table, &[&["link"], FLEXIBLE].concat());
-            self.flexible(&table, link.into())
+            self.flexible(&table, link)
         };
         tables.into_iter().filter_map(read).collect()
     }
 
-    fn flexible(&mut self, table: &Table, link: Noted<String>) -> Option<Flexible> {
+    fn flexible(&mut self, table: &TomlTable, link: Noted<String>) -> Option<Flexible> {
         self.require(table, "to", EXAMPLE);
         let from = match table.has("from") {
             true => self.vector_at(table, "from").map(|from| from.value),
@@ -108,19 +99,19 @@ impl Reader<'_> {
         };
         let to = self.vector_at(table, "to");
         let segments = match table.has("segments") {
-            true => self.count_at(table, "segments").map(Noted::from),
+            true => self.count_at(table, "segments"),
             false => Some(Noted::assumed(SEGMENTS)),
         };
         let bending = self.bending(table);
         let torsion = match table.has("torsion") {
-            true => self.real_at(table, "torsion", Range64::Finite).map(|x| Some(x.into())),
+            true => self.real_at(table, "torsion", Range64::Finite).map(Some),
             false => Some(None),
         };
-        let damping = self.real_at(table, "damping", Range64::Finite).map_or(Noted::assumed(0.0), Noted::from);
+        let damping = self.real_at(table, "damping", Range64::Finite).unwrap_or_else(|| Noted::assumed(0.0));
         Some(Flexible {
             link,
             from: from?,
-            to: to?.into(),
+            to: to?,
             segments: segments?,
             bending: bending?,
             torsion: torsion?,
@@ -129,19 +120,16 @@ impl Reader<'_> {
     }
 
     /// One number, or numbers about axes; `None` after a complaint.
-    fn bending(&mut self, table: &Table) -> Option<Bending> {
+    fn bending(&mut self, table: &TomlTable) -> Option<Bending> {
         let Some((value, span)) = table.get("bending") else { return Some(Bending::None) };
         match value {
             DeValue::Integer(_) | DeValue::Float(_) => {
-                self.real_at(table, "bending", Range64::Finite).map(|x| Bending::Round(x.into()))
+                self.real_at(table, "bending", Range64::Finite).map(Bending::Round)
             }
             DeValue::Table(inner) => {
-                let axes = Table { owner: table.what("bending"), table: inner, span };
+                let axes = TomlTable { owner: table.what("bending"), table: inner, span };
                 self.check_keys(&axes, &["x", "y", "z"]);
-                Some(Bending::About(["x", "y", "z"].map(|axis| {
-                    let stiffness = self.real_at(&axes, axis, Range64::Finite);
-                    stiffness.map(Noted::from)
-                })))
+                Some(Bending::About(["x", "y", "z"].map(|axis| self.real_at(&axes, axis, Range64::Finite))))
             }
             _ => {
                 self.wrong_type(&table.what("bending"), "a number, or `{ x = 120.0, y = 80.0 }`", value, &span);
@@ -151,24 +139,24 @@ impl Reader<'_> {
     }
 
     /// The table `[support]` of a scene.
-    pub fn support_at(&mut self, top: &Table) -> Option<Support> {
+    pub fn support_at(&mut self, top: &TomlTable) -> Option<BaseSupport> {
         let table = self.table_at(top, "support", "[support]")?;
-        self.check_keys(&table, &[&["at"], &Support::DIRECTIONS[..]].concat());
+        self.check_keys(&table, &[&["at"], &BaseSupport::DIRECTIONS[..]].concat());
         let at = self.vector_at(&table, "at").map_or([0.0; 3], |at| at.value);
-        let directions = Support::DIRECTIONS.map(|direction| {
+        let directions = BaseSupport::DIRECTIONS.map(|direction| {
             let spring = self.table_at(&table, direction, &format!("`{direction}` of [support]"))?;
             self.check_keys(&spring, &["stiffness", "damping", "rest"]);
             self.require(&spring, "stiffness", "{ stiffness = 1e5, damping = 200.0 }");
-            let stiffness = self.real_at(&spring, "stiffness", Range64::Finite)?.into();
-            let damping = self.real_at(&spring, "damping", Range64::Finite).map_or(Noted::assumed(0.0), Noted::from);
+            let stiffness = self.real_at(&spring, "stiffness", Range64::Finite)?;
+            let damping = self.real_at(&spring, "damping", Range64::Finite).unwrap_or_else(|| Noted::assumed(0.0));
             let rest = self.real_at(&spring, "rest", Range64::Finite).map_or(0.0, |rest| rest.value);
             Some(Elastic { stiffness, damping, rest })
         });
         // a spring that could not be read was complained of, and the base is not rigid for that
         let is_read =
-            directions.iter().zip(Support::DIRECTIONS).all(|(spring, key)| spring.is_some() || !table.has(key));
+            directions.iter().zip(BaseSupport::DIRECTIONS).all(|(spring, key)| spring.is_some() || !table.has(key));
         let place = Noted { value: (), place: self.place(&table.span) };
-        is_read.then_some(Support { at, directions, place })
+        is_read.then_some(BaseSupport { at, directions, place })
     }
 }
 

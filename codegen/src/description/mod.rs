@@ -17,6 +17,7 @@ mod urdf;
 pub use tree::*;
 
 use crate::diagnostic::{Diagnostics, Place, Source};
+use std::fmt;
 use straightline_core::joint::Dialect;
 
 /// The formats of robot files. A text is of the first that recognises it, or else of the first that has the extension of its name.
@@ -54,24 +55,36 @@ pub fn names_of_formats() -> String {
     format!("{} or {}", others.join(", "), last.name)
 }
 
-/// A value with its place in the file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Value<T> {
+/// A value with its place in the file, which says nothing of the value: equal and printed alike wherever it stands.
+#[derive(Clone)]
+pub struct Noted<T> {
     /// The value.
     pub value: T,
     /// Where it stands; for a value that was left out, where it would stand.
     pub place: Place,
 }
 
-impl<T> Value<T> {
+impl<T> Noted<T> {
     /// A value with its place.
-    pub fn new(value: T, place: Place) -> Value<T> {
-        Value { value, place }
+    pub fn new(value: T, place: Place) -> Noted<T> {
+        Noted { value, place }
     }
 
     /// A value that no file holds.
-    pub fn assumed(value: T) -> Value<T> {
-        Value { value, place: Place::none() }
+    pub fn assumed(value: T) -> Noted<T> {
+        Noted { value, place: Place::none() }
+    }
+}
+
+impl<T: PartialEq> PartialEq for Noted<T> {
+    fn eq(&self, other: &Noted<T>) -> bool {
+        self.value == other.value
+    }
+}
+
+impl<T: fmt::Debug> fmt::Debug for Noted<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.value.fmt(f)
     }
 }
 

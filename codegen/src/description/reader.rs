@@ -1,6 +1,6 @@
 //! What the readers share: places, complaints, numbers.
 
-use super::{messages, Ignored, Value};
+use super::{messages, Ignored, Noted};
 use crate::diagnostic::{Diagnostic, Diagnostics, Place, Source};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -11,7 +11,7 @@ pub const LARGEST_FILE: usize = 64 << 20;
 const GREATEST: f64 = 1e60;
 
 /// A file that is being read.
-pub struct Reader<'a> {
+pub struct FileReader<'a> {
     /// The file.
     pub source: &'a Source,
     /// What is said about it.
@@ -19,7 +19,7 @@ pub struct Reader<'a> {
     ignored: Vec<Ignored>,
     ignored_index: HashMap<String, usize>,
     /// Numbers of the drive that is being read, as far as equations have them.
-    pub drive_numbers: Vec<super::drives::Written>,
+    pub drive_numbers: Vec<super::drives::WrittenNumber>,
 }
 
 /// Which numbers are taken.
@@ -31,10 +31,16 @@ pub enum Range64 {
     Limit,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> FileReader<'a> {
     /// Nothing is read yet.
-    pub fn new(source: &'a Source, diagnostics: &'a mut Diagnostics) -> Reader<'a> {
-        Reader { source, diagnostics, ignored: Vec::new(), ignored_index: HashMap::new(), drive_numbers: Vec::new() }
+    pub fn new(source: &'a Source, diagnostics: &'a mut Diagnostics) -> FileReader<'a> {
+        FileReader {
+            source,
+            diagnostics,
+            ignored: Vec::new(),
+            ignored_index: HashMap::new(),
+            drive_numbers: Vec::new(),
+        }
     }
 
     /// The place of bytes of the file.
@@ -49,8 +55,8 @@ impl<'a> Reader<'a> {
     }
 
     /// A value with the bytes that say it.
-    pub fn value<T>(&self, value: T, span: &Range<usize>) -> Value<T> {
-        Value::new(value, self.place(span))
+    pub fn value<T>(&self, value: T, span: &Range<usize>) -> Noted<T> {
+        Noted::new(value, self.place(span))
     }
 
     /// Remembers that an element was skipped.
@@ -96,7 +102,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The name that `text` is, or a complaint.
-    pub fn name(&mut self, what: &str, text: &str, span: &Range<usize>) -> Option<Value<String>> {
+    pub fn name(&mut self, what: &str, text: &str, span: &Range<usize>) -> Option<Noted<String>> {
         if text.trim().is_empty() {
             self.complain(span, messages::empty_name(what));
             None

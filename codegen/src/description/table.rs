@@ -1,7 +1,7 @@
 //! Walking a TOML document with places, so that one run finds all complaints.
 
-use super::reader::{Range64, Reader};
-use super::{messages, Angle, AngleUnit, Inertial, JointDrive, JointLimits, Rotation, Value, WrittenPose};
+use super::reader::{FileReader, Range64};
+use super::{messages, Angle, AngleUnit, JointDrive, JointLimits, Noted, Rotation, WrittenInertial, WrittenPose};
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
 use std::ops::Range;
 use straightline_core::spatial::Sym3;
@@ -15,7 +15,7 @@ type Span = Range<usize>;
 const DEEPEST: usize = 16;
 
 /// A table and how complaints name it.
-pub struct Table<'a, 'i> {
+pub struct TomlTable<'a, 'i> {
     /// What it describes, in complaints: ``joint `elbow` ``.
     pub owner: String,
     /// Keys and values.
@@ -25,13 +25,13 @@ pub struct Table<'a, 'i> {
 }
 
 /// Whether a text is TOML, right or nearly, and its top table is as asked for.
-pub fn holds(text: &str, is_it: fn(&Table) -> bool) -> bool {
-    wrong_bracket(text).is_none() && is_it(&Table::of_document(&DeTable::parse_recoverable(text).0))
+pub fn holds(text: &str, is_it: fn(&TomlTable) -> bool) -> bool {
+    wrong_bracket(text).is_none() && is_it(&TomlTable::of_document(&DeTable::parse_recoverable(text).0))
 }
 
 /// The document, or complaints about its syntax.
 pub fn parse<'i>(source: &'i Source, diagnostics: &mut Diagnostics) -> Option<Spanned<DeTable<'i>>> {
-    let mut reader = Reader::new(source, diagnostics);
+    let mut reader = FileReader::new(source, diagnostics);
     if let Some((span, complaint)) = wrong_bracket(source.text()) {
         reader.complain(&span, complaint);
         return None;
@@ -89,10 +89,10 @@ fn wrong_bracket(text: &str) -> Option<(Span, Diagnostic)> {
     open.pop().map(|(_, span)| (span, messages::toml_syntax("this bracket is never closed")))
 }
 
-impl<'a, 'i> Table<'a, 'i> {
+impl<'a, 'i> TomlTable<'a, 'i> {
     /// The top table.
-    pub fn of_document(document: &'a Spanned<DeTable<'i>>) -> Table<'a, 'i> {
-        Table { owner: "the file".to_string(), table: document.get_ref(), span: 0..0 }
+    pub fn of_document(document: &'a Spanned<DeTable<'i>>) -> TomlTable<'a, 'i> {
+        TomlTable { owner: "the file".to_string(), table: document.get_ref(), span: 0..0 }
     }
 
     /// Value and span of a key.
@@ -123,9 +123,9 @@ fn type_name(value: &DeValue) -> String {
     }
 }
 
-impl Reader<'_> {
+impl FileReader<'_> {
     /// Complains of every key that is not known.
-    pub fn check_keys(&mut self, table: &Table, known: &[&str]) {
+    pub fn check_keys(&mut self, table: &TomlTable, known: &[&str]) {
         for key in table.table.keys() {
             if !known.contains(&key.get_ref().as_ref()) {
                 self.complain(&key.span(), messages::unknown_key(&table.owner, key.get_ref(), known));
@@ -134,7 +134,7 @@ impl Reader<'_> {
     }
 
     /// Complains if a key is missing.
-    pub fn require(&mut self, table: &Table, key: &str, example: &str) {
+    pub fn require(&mut self, table: &TomlTable, key: &str, example: &str) {
         if !table.has(key) {
             self.complain(&table.span, messages::missing_key(&table.owner, key, example));
         }
@@ -165,14 +165,14 @@ impl Reader<'_> {
     }
 
     /// The number of a key; `None` where there is no such key, or after a complaint.
-    pub fn real_at(&mut self, table: &Table, key: &str, range: Range64) -> Option<Value<f64>> {
+    pub fn real_at(&mut self, table: &TomlTable, key: &str, range: Range64) -> Option<Noted<f64>> {
         let (value, span) = table.get(key)?;
         let value = self.real(&table.what(key), value, &span, range)?;
         Some(self.value(value, &span))
     }
 
     /// `true` or `false`.
-    pub fn flag_at(&mut self, table: &Table, key: &str) -> Option<Value<bool>> {
+    pub fn flag_at(&mut self, table: &TomlTable, key: &str) -> Option<Noted<bool>> {
         let (value, span) = table.get(key)?;
         match value {
             DeValue::Boolean(flag) => Some(self.value(*flag, &span)),
@@ -184,7 +184,7 @@ impl Reader<'_> {
     }
 
     /// A whole number that is not negative.
-    pub fn count_at(&mut self, table: &Table, key: &str) -> Option<Value<usize>> {
+    pub fn count_at(&mut self, table: &TomlTable, key: &str) -> Option<Noted<usize>> {
         let (value, span) = table.get(key)?;
         let count = match value {
             DeValue::Integer(integer) => usize::from_str_radix(integer.as_str(), integer.radix()).ok(),
@@ -204,7 +204,7 @@ impl Reader<'_> {
     }
 
     /// An array of names of something.
-    pub fn names_at(&mut self, table: &Table, key: &str, what: &str) -> Vec<Value<String>> {
+    pub fn names_at(&mut self, table: &TomlTable, key: &str, what: &str) -> Vec<Noted<String>> {
         let Some((value, span)) = table.get(key) else { return Vec::new() };
         let DeValue::Array(array) = value else {
             self.wrong_type(&table.what(key), "an array of names", value, &span);
@@ -221,7 +221,7 @@ impl Reader<'_> {
     }
 
     /// The text of a key; `None` likewise.
-    pub fn string_at(&mut self, table: &Table, key: &str) -> Option<Value<String>> {
+    pub fn string_at(&mut self, table: &TomlTable, key: &str) -> Option<Noted<String>> {
         let (value, span) = table.get(key)?;
         match value {
             DeValue::String(text) => Some(self.value(text.to_string(), &span)),
@@ -233,19 +233,19 @@ impl Reader<'_> {
     }
 
     /// The text of a key as a name: not empty, and of characters that can be shown.
-    pub fn name_at(&mut self, table: &Table, key: &str, what: &str) -> Option<Value<String>> {
+    pub fn name_at(&mut self, table: &TomlTable, key: &str, what: &str) -> Option<Noted<String>> {
         let text = self.string_at(table, key)?;
         self.name(what, &text.value, &text.place.span)
     }
 
     /// One of a few words.
-    pub fn word_at<T: Copy>(&mut self, table: &Table, key: &str, words: &[(&str, T)]) -> Option<Value<T>> {
+    pub fn word_at<T: Copy>(&mut self, table: &TomlTable, key: &str, words: &[(&str, T)]) -> Option<Noted<T>> {
         let text = self.string_at(table, key)?;
-        self.word(&table.what(key), &text, words).map(|value| Value::new(value, text.place))
+        self.word(&table.what(key), &text, words).map(|value| Noted::new(value, text.place))
     }
 
     /// What a word stands for, or a complaint.
-    pub fn word<T: Copy>(&mut self, what: &str, text: &Value<String>, words: &[(&str, T)]) -> Option<T> {
+    pub fn word<T: Copy>(&mut self, what: &str, text: &Noted<String>, words: &[(&str, T)]) -> Option<T> {
         let known = words.iter().find(|w| w.0 == text.value);
         if known.is_none() {
             let known: Vec<&str> = words.iter().map(|w| w.0).collect();
@@ -257,7 +257,7 @@ impl Reader<'_> {
     /// So many numbers in an array; `form` says so in words.
     pub fn reals_at<const N: usize>(
         &mut self,
-        table: &Table,
+        table: &TomlTable,
         key: &str,
         form: &str,
         range: Range64,
@@ -278,7 +278,7 @@ impl Reader<'_> {
     }
 
     /// Numbers in an array; all complaints of them before `None`.
-    pub fn all_reals_at(&mut self, table: &Table, key: &str, range: Range64) -> Option<Vec<f64>> {
+    pub fn all_reals_at(&mut self, table: &TomlTable, key: &str, range: Range64) -> Option<Vec<f64>> {
         let (value, span) = table.get(key)?;
         let what = table.what(key);
         let DeValue::Array(array) = value else {
@@ -318,26 +318,26 @@ impl Reader<'_> {
     }
 
     /// Three numbers in an array.
-    pub fn vector_at(&mut self, table: &Table, key: &str) -> Option<Value<[f64; 3]>> {
+    pub fn vector_at(&mut self, table: &TomlTable, key: &str) -> Option<Noted<[f64; 3]>> {
         let (value, span) = table.get(key)?;
         let [x, y, z] = self.triple(&table.what(key), value, &span)?;
         Some(self.value([x.0, y.0, z.0], &span))
     }
 
     /// A required vector; a placeholder after a complaint.
-    pub fn required_vector(&mut self, table: &Table, key: &str, example: &str) -> Value<[f64; 3]> {
+    pub fn required_vector(&mut self, table: &TomlTable, key: &str, example: &str) -> Noted<[f64; 3]> {
         self.require(table, key, example);
         self.vector_at(table, key).unwrap_or_else(|| self.value([0.0, 0.0, 1.0], &table.span))
     }
 
     /// An inertia tensor: a table `{ xx, yy, zz, xy, xz, yz }`, three principal moments, or a 3×3 matrix.
-    pub fn tensor_at(&mut self, table: &Table, key: &str) -> Option<Value<Sym3<f64>>> {
+    pub fn tensor_at(&mut self, table: &TomlTable, key: &str) -> Option<Noted<Sym3<f64>>> {
         const FORMS: &str = "`{ xx = …, yy = …, zz = …, xy = 0, xz = 0, yz = 0 }`, three moments or a 3×3 matrix";
         let (value, span) = table.get(key)?;
         let what = table.what(key);
         let tensor = match value {
             DeValue::Table(entries) => {
-                let entries = Table { owner: what, table: entries, span: span.clone() };
+                let entries = TomlTable { owner: what, table: entries, span: span.clone() };
                 self.check_keys(&entries, &["xx", "yy", "zz", "xy", "xz", "yz"]);
                 for diagonal in ["xx", "yy", "zz"] {
                     self.require(&entries, diagonal, "{ xx = 0.1, yy = 0.1, zz = 0.1 }");
@@ -390,7 +390,7 @@ impl Reader<'_> {
     ];
 
     /// The key of an angle or a triple of angles, with its unit; a second spelling is complained of.
-    fn angle_key(&mut self, table: &Table, stem: &str) -> Option<(String, AngleUnit)> {
+    fn angle_key(&mut self, table: &TomlTable, stem: &str) -> Option<(String, AngleUnit)> {
         let mut found: Option<(String, AngleUnit)> = None;
         for (suffix, unit) in Self::UNITS {
             let key = format!("{stem}{suffix}");
@@ -410,14 +410,14 @@ impl Reader<'_> {
     }
 
     /// An angle in any unit: `alpha`, `alpha_deg`, …
-    pub fn angle_at(&mut self, table: &Table, stem: &str) -> Option<Angle> {
+    pub fn angle_at(&mut self, table: &TomlTable, stem: &str) -> Option<Angle> {
         let (key, unit) = self.angle_key(table, stem)?;
         let value = self.real_at(table, &key, Range64::Finite)?;
         Some(self.angle(value.value, unit, &value.place.span))
     }
 
     /// Roll, pitch and yaw in any unit: `rpy_deg`, …
-    pub fn rotation_at(&mut self, table: &Table, stem: &str) -> Rotation {
+    pub fn rotation_at(&mut self, table: &TomlTable, stem: &str) -> Rotation {
         let none = Rotation::identity(self.place(&table.span));
         let Some((key, unit)) = self.angle_key(table, stem) else { return none };
         let Some((value, span)) = table.get(&key) else { return none };
@@ -428,7 +428,7 @@ impl Reader<'_> {
     }
 
     /// Mass, centre of mass and inertia of the table of a link.
-    pub fn inertial_at(&mut self, table: &Table) -> Option<Inertial> {
+    pub fn inertial_at(&mut self, table: &TomlTable) -> Option<WrittenInertial> {
         self.require(table, "mass", "mass = 1.0");
         let mass = self.real_at(table, "mass", Range64::Finite);
         let com = self.vector_at(table, "com").unwrap_or_else(|| self.value([0.0; 3], &table.span));
@@ -438,17 +438,17 @@ impl Reader<'_> {
             true => self.tensor_at(table, "inertia"),
             false => Some(self.value(zero, &table.span)),
         };
-        Some(Inertial { mass: mass?, com, rotation, inertia: inertia? })
+        Some(WrittenInertial { mass: mass?, com, rotation, inertia: inertia? })
     }
 
     /// Position `xyz` and roll, pitch and yaw.
-    pub fn pose_at(&mut self, table: &Table) -> WrittenPose {
+    pub fn pose_at(&mut self, table: &TomlTable) -> WrittenPose {
         let xyz = self.vector_at(table, "xyz").unwrap_or_else(|| self.value([0.0; 3], &table.span));
         WrittenPose { xyz, rotation: self.rotation_at(table, "rpy") }
     }
 
     /// `[lower, upper]`, or `{ lower, upper, velocity, effort }`.
-    pub fn limits_at(&mut self, table: &Table, key: &str) -> JointLimits {
+    pub fn limits_at(&mut self, table: &TomlTable, key: &str) -> JointLimits {
         let Some((value, span)) = table.get(key) else { return JointLimits::default() };
         let what = table.what(key);
         match value {
@@ -465,7 +465,7 @@ impl Reader<'_> {
                 JointLimits { lower: read(0), upper: read(1), ..JointLimits::default() }
             }
             DeValue::Table(entries) => {
-                let entries = Table { owner: what, table: entries, span };
+                let entries = TomlTable { owner: what, table: entries, span };
                 self.check_keys(&entries, &["lower", "upper", "velocity", "effort"]);
                 let mut read = |key: &str| self.real_at(&entries, key, Range64::Limit);
                 JointLimits {
@@ -483,7 +483,7 @@ impl Reader<'_> {
     }
 
     /// Rotor, friction and spring of a joint, from keys of its table.
-    pub fn drive_at(&mut self, table: &Table) -> JointDrive {
+    pub fn drive_at(&mut self, table: &TomlTable) -> JointDrive {
         let mut drive = JointDrive {
             damping: self.real_at(table, "damping", Range64::Finite),
             friction: self.real_at(table, "friction", Range64::Finite),
@@ -502,10 +502,10 @@ impl Reader<'_> {
     }
 
     /// The table of that key.
-    pub fn table_at<'a, 'i>(&mut self, table: &Table<'a, 'i>, key: &str, owner: &str) -> Option<Table<'a, 'i>> {
+    pub fn table_at<'a, 'i>(&mut self, table: &TomlTable<'a, 'i>, key: &str, owner: &str) -> Option<TomlTable<'a, 'i>> {
         let (value, span) = table.get(key)?;
         match value {
-            DeValue::Table(inner) => Some(Table { owner: owner.to_string(), table: inner, span }),
+            DeValue::Table(inner) => Some(TomlTable { owner: owner.to_string(), table: inner, span }),
             _ => {
                 self.wrong_type(owner, "a table", value, &span);
                 None
@@ -514,7 +514,7 @@ impl Reader<'_> {
     }
 
     /// The tables of an array `[[key]]`.
-    pub fn tables_at<'a, 'i>(&mut self, table: &Table<'a, 'i>, key: &str) -> Vec<Table<'a, 'i>> {
+    pub fn tables_at<'a, 'i>(&mut self, table: &TomlTable<'a, 'i>, key: &str) -> Vec<TomlTable<'a, 'i>> {
         let Some((value, span)) = table.get(key) else { return Vec::new() };
         let DeValue::Array(array) = value else {
             self.wrong_type(key, &format!("`[[{key}]]` tables"), value, &span);
@@ -524,7 +524,7 @@ impl Reader<'_> {
         for (i, item) in array.iter().enumerate() {
             match item.get_ref() {
                 DeValue::Table(inner) => {
-                    tables.push(Table { owner: format!("{key} {}", i + 1), table: inner, span: item.span() });
+                    tables.push(TomlTable { owner: format!("{key} {}", i + 1), table: inner, span: item.span() });
                 }
                 other => self.wrong_type(&format!("{key} {}", i + 1), "a table", other, &item.span()),
             }

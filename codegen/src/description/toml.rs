@@ -1,10 +1,11 @@
 //! TOML with joint frames; the schema is in `SCHEMA.md`.
 
 use super::flexible::Flexible;
-use super::reader::{Range64, Reader};
-use super::table::{self, Table};
+use super::reader::{FileReader, Range64};
+use super::table::{self, TomlTable};
 use super::{
-    messages, BaseKind, Description, FileFormat, Joint, JointType, Link, NamedFrame, Placement, Value, WrittenPose,
+    messages, BaseKind, Description, FileFormat, JointType, NamedFrame, Noted, Placement, WrittenJoint, WrittenLink,
+    WrittenPose,
 };
 use crate::diagnostic::{Diagnostics, Source};
 use straightline_core::joint::Dialect;
@@ -62,14 +63,14 @@ pub(super) const FORMAT: FileFormat = FileFormat {
 
 fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     let document = table::parse(source, diagnostics)?;
-    let top = Table::of_document(&document);
-    let mut reader = Reader::new(source, diagnostics);
+    let top = TomlTable::of_document(&document);
+    let mut reader = FileReader::new(source, diagnostics);
     if !["robot", "link", "joint"].iter().any(|key| top.has(key)) {
         reader.complain(&(0..0), messages::unknown_format());
         return None;
     }
     reader.check_keys(&top, &["robot", "link", "joint", "frame", "drive"]);
-    let mut description = Description::new(&FORMAT, Value::assumed("robot".to_string()));
+    let mut description = Description::new(&FORMAT, Noted::assumed("robot".to_string()));
     reader.require(&top, "robot", "[robot]\\nname = \"...\"");
     if let Some(robot) = reader.table_at(&top, "robot", "[robot]") {
         reader.check_keys(&robot, &["name", "gravity", "base"]);
@@ -97,23 +98,23 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
 }
 
 /// The name of a table, which from here on stands in complaints about it.
-fn named(reader: &mut Reader, table: &mut Table, what: &str) -> Option<Value<String>> {
+fn named(reader: &mut FileReader, table: &mut TomlTable, what: &str) -> Option<Noted<String>> {
     reader.require(table, "name", "name = \"...\"");
     let name = reader.name_at(table, "name", what)?;
     table.owner = format!("{what} `{}`", name.value);
     Some(name)
 }
 
-fn read_link(reader: &mut Reader, mut table: Table, flexible: &mut Vec<Flexible>) -> Option<Link> {
+fn read_link(reader: &mut FileReader, mut table: TomlTable, flexible: &mut Vec<Flexible>) -> Option<WrittenLink> {
     let name = named(reader, &mut table, "link");
     reader.check_keys(&table, LINK);
     flexible.extend(reader.flexible_at(&table, name.as_ref()));
     let has_inertial = LINK[1..LINK.len() - 1].iter().any(|key| table.has(key));
     let inertial = if has_inertial { reader.inertial_at(&table) } else { None };
-    Some(Link { name: name?, inertial })
+    Some(WrittenLink { name: name?, inertial })
 }
 
-fn read_joint(reader: &mut Reader, mut table: Table) -> Option<Joint> {
+fn read_joint(reader: &mut FileReader, mut table: TomlTable) -> Option<WrittenJoint> {
     let name = named(reader, &mut table, "joint");
     let words = JointType::words(FORMAT.dialect);
     let is_written = |word: &str| matches!(table.get("kind"), Some((DeValue::String(text), _)) if text == word);
@@ -158,12 +159,12 @@ fn read_joint(reader: &mut Reader, mut table: Table) -> Option<Joint> {
         }
     }
     // a kind that was complained of stands for the one with an axis and no limits, so that the axis is judged in the same run
-    let kind = kind.unwrap_or_else(|| Value::new(JointType::turning(false), axis.place.clone()));
+    let kind = kind.unwrap_or_else(|| Noted::new(JointType::turning(false), axis.place.clone()));
     let placement = Placement::Frames { origin, axis };
-    Some(Joint { name: name?, kind, parent: parent?, child: child?, placement, limits, drive })
+    Some(WrittenJoint { name: name?, kind, parent: parent?, child: child?, placement, limits, drive })
 }
 
-fn read_frame(reader: &mut Reader, mut table: Table) -> Option<NamedFrame> {
+fn read_frame(reader: &mut FileReader, mut table: TomlTable) -> Option<NamedFrame> {
     let name = named(reader, &mut table, "frame");
     reader.check_keys(&table, FRAME);
     reader.require(&table, "link", "link = \"...\"");

@@ -2,7 +2,7 @@
 //!
 //! The one thing that formats say in different ways is where a joint stands ([`Placement`]).
 
-use super::{drives, flexible, FileFormat, Value};
+use super::{drives, flexible, FileFormat, Noted};
 use crate::diagnostic::Place;
 use straightline_core::joint::{self, Dialect, JointKind, Measure};
 use straightline_core::spatial::Sym3;
@@ -22,21 +22,21 @@ pub struct Description {
     /// The format that it is written in.
     pub format: &'static FileFormat,
     /// The robot's name.
-    pub name: Value<String>,
+    pub name: Noted<String>,
     /// Acceleration due to gravity in the world \[m/s²\], where the file states it.
-    pub gravity: Option<Value<[f64; 3]>>,
+    pub gravity: Option<Noted<[f64; 3]>>,
     /// The base, where the file states it.
-    pub base: Option<Value<BaseKind>>,
+    pub base: Option<Noted<BaseKind>>,
     /// The links, in the file's order.
-    pub links: Vec<Link>,
+    pub links: Vec<WrittenLink>,
     /// The joints, in the file's order.
-    pub joints: Vec<Joint>,
+    pub joints: Vec<WrittenJoint>,
     /// Further named frames.
     pub frames: Vec<NamedFrame>,
     /// A link or a joint could not be read, so that the tree has holes that were complained of already.
     pub has_holes: bool,
     /// What drives the joints.
-    pub drives: Vec<drives::Drive>,
+    pub drives: Vec<drives::WrittenDrive>,
     /// Links that bend.
     pub flexible: Vec<flexible::Flexible>,
     /// What the file holds and the dynamics do not need.
@@ -45,7 +45,7 @@ pub struct Description {
 
 impl Description {
     /// A robot without links, of which nothing is said yet.
-    pub fn new(format: &'static FileFormat, name: Value<String>) -> Description {
+    pub fn new(format: &'static FileFormat, name: Noted<String>) -> Description {
         Description {
             format,
             name,
@@ -62,12 +62,12 @@ impl Description {
     }
 
     /// The link of a name.
-    pub fn link(&self, name: &str) -> Option<&Link> {
+    pub fn link(&self, name: &str) -> Option<&WrittenLink> {
         self.links.iter().find(|link| link.name.value == name)
     }
 
     /// The joint of a name.
-    pub fn joint(&self, name: &str) -> Option<&Joint> {
+    pub fn joint(&self, name: &str) -> Option<&WrittenJoint> {
         self.joints.iter().find(|joint| joint.name.value == name)
     }
 
@@ -78,7 +78,7 @@ impl Description {
             let of = || format!("the inertia of link `{}`", link.name.value);
             all.extend(link.inertial.iter().flat_map(|inertial| inertial.rotation.angles(of())));
         }
-        for Joint { name, placement, .. } in &self.joints {
+        for WrittenJoint { name, placement, .. } in &self.joints {
             match placement {
                 Placement::Frames { origin, .. } => {
                     all.extend(origin.rotation.angles(format!("the origin of joint `{}`", name.value)));
@@ -101,13 +101,13 @@ impl Description {
     }
 
     /// Adds what could be read of a link.
-    pub(crate) fn add_link(&mut self, link: Option<Link>) {
+    pub(crate) fn add_link(&mut self, link: Option<WrittenLink>) {
         self.has_holes |= link.is_none();
         self.links.extend(link);
     }
 
     /// Adds what could be read of a joint.
-    pub(crate) fn add_joint(&mut self, joint: Option<Joint>) {
+    pub(crate) fn add_joint(&mut self, joint: Option<WrittenJoint>) {
         self.has_holes |= joint.is_none();
         self.joints.extend(joint);
     }
@@ -126,24 +126,24 @@ pub struct Ignored {
 
 /// A link.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Link {
+pub struct WrittenLink {
     /// What joints, frames and scenes call it; no two links share it.
-    pub name: Value<String>,
+    pub name: Noted<String>,
     /// Mass, centre of mass and inertia, where the file gives them.
-    pub inertial: Option<Inertial>,
+    pub inertial: Option<WrittenInertial>,
 }
 
 /// Mass, centre of mass and inertia of a link.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Inertial {
+pub struct WrittenInertial {
     /// Mass \[kg\].
-    pub mass: Value<f64>,
+    pub mass: Noted<f64>,
     /// Centre of mass in the link frame \[m\].
-    pub com: Value<[f64; 3]>,
+    pub com: Noted<[f64; 3]>,
     /// Rotation of the axes of `inertia` against the link's.
     pub rotation: Rotation,
     /// Inertia tensor about the centre of mass, in axes turned by `rotation` \[kg·m²\].
-    pub inertia: Value<Sym3<f64>>,
+    pub inertia: Noted<Sym3<f64>>,
 }
 
 /// The unit in which an angle is written.
@@ -201,7 +201,7 @@ impl Rotation {
 #[derive(Clone, Debug, PartialEq)]
 pub struct WrittenPose {
     /// Position \[m\].
-    pub xyz: Value<[f64; 3]>,
+    pub xyz: Noted<[f64; 3]>,
     /// Orientation.
     pub rotation: Rotation,
 }
@@ -209,7 +209,7 @@ pub struct WrittenPose {
 impl WrittenPose {
     /// Frames that coincide, where the file says nothing.
     pub fn identity(place: Place) -> WrittenPose {
-        WrittenPose { xyz: Value::new([0.0; 3], place.clone()), rotation: Rotation::identity(place) }
+        WrittenPose { xyz: Noted::new([0.0; 3], place.clone()), rotation: Rotation::identity(place) }
     }
 }
 
@@ -227,6 +227,9 @@ pub struct JointType {
 }
 
 impl JointType {
+    /// A joint that does not move.
+    pub const FIXED: JointType = JointType { word: "fixed", kind: None, has_range: false, number: None };
+
     /// All words of a dialect: joints between links, then `fixed` where files have such joints, then free bases.
     pub fn words(dialect: Dialect) -> Vec<(&'static str, JointType)> {
         let words = || {
@@ -237,9 +240,8 @@ impl JointType {
                 number: None,
             })
         };
-        let fixed = JointType { word: "fixed", kind: None, has_range: false, number: None };
         let has_fixed = Dialect::FRAMES.contains(&dialect);
-        let between_links = words().filter(|t| !t.is_free()).chain(has_fixed.then_some(fixed));
+        let between_links = words().filter(|t| !t.is_free()).chain(has_fixed.then_some(JointType::FIXED));
         between_links.chain(words().filter(|t| t.is_free())).map(|t| (t.word, t)).collect()
     }
 
@@ -274,15 +276,15 @@ impl JointType {
 
 /// A joint.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Joint {
+pub struct WrittenJoint {
     /// What scenes, drives and messages call it; no two joints share it.
-    pub name: Value<String>,
+    pub name: Noted<String>,
     /// How it moves.
-    pub kind: Value<JointType>,
+    pub kind: Noted<JointType>,
     /// The link that carries it.
-    pub parent: Value<String>,
+    pub parent: Noted<String>,
     /// The link that it moves.
-    pub child: Value<String>,
+    pub child: Noted<String>,
     /// Where it stands, and along which axis.
     pub placement: Placement,
     /// Ranges.
@@ -299,7 +301,7 @@ pub enum Placement {
         /// Pose of the joint frame, which is the child's link frame at q = 0, in the parent's link frame.
         origin: WrittenPose,
         /// Axis in the joint frame, as long as it is written; \[1, 0, 0\] where a URDF says nothing.
-        axis: Value<[f64; 3]>,
+        axis: Noted<[f64; 3]>,
     },
     /// By vectors between the joint S_j and the origins C of the link frames, as in the chapter; of joints that move.
     Vectors(JointVectors),
@@ -309,24 +311,24 @@ pub enum Placement {
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointVectors {
     /// e_j in frame j−1.
-    pub e_parent: Value<[f64; 3]>,
+    pub e_parent: Noted<[f64; 3]>,
     /// r_{j−1,j} in frame j−1, from S_j to C_{j−1} \[m\].
-    pub r_parent: Value<[f64; 3]>,
+    pub r_parent: Noted<[f64; 3]>,
     /// r*_{j−1,j}, in a specificity: replaces r_{j−1,j} in (20.101).
-    pub r_parent_star: Option<Value<[f64; 3]>>,
+    pub r_parent_star: Option<Noted<[f64; 3]>>,
     /// e_j in frame j.
-    pub e: Value<[f64; 3]>,
+    pub e: Noted<[f64; 3]>,
     /// r_{j,j} in frame j, from S_j to C_j \[m\].
-    pub r: Value<[f64; 3]>,
+    pub r: Noted<[f64; 3]>,
     /// r*_{j,j}, in a specificity: replaces r_{j,j} in (20.101).
-    pub r_star: Option<Value<[f64; 3]>>,
+    pub r_star: Option<Noted<[f64; 3]>>,
     /// α_j, the constant angle of a linear joint.
     pub alpha: Option<Angle>,
 }
 
 impl Placement {
     /// Its lengths \[m\] and what they are called.
-    pub fn lengths(&self) -> Vec<(&'static str, &Value<[f64; 3]>)> {
+    pub fn lengths(&self) -> Vec<(&'static str, &Noted<[f64; 3]>)> {
         match self {
             Placement::Frames { origin, .. } => vec![("origin", &origin.xyz)],
             Placement::Vectors(JointVectors { r_parent, r, .. }) => vec![("r_next", r_parent), ("r", r)],
@@ -338,41 +340,41 @@ impl Placement {
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct JointLimits {
     /// Least coordinate \[rad or m\].
-    pub lower: Option<Value<f64>>,
+    pub lower: Option<Noted<f64>>,
     /// Greatest coordinate \[rad or m\].
-    pub upper: Option<Value<f64>>,
+    pub upper: Option<Noted<f64>>,
     /// Greatest speed \[rad/s or m/s\].
-    pub velocity: Option<Value<f64>>,
+    pub velocity: Option<Noted<f64>>,
     /// Greatest torque or force \[N·m or N\].
-    pub effort: Option<Value<f64>>,
+    pub effort: Option<Noted<f64>>,
 }
 
 /// What the drive of a joint adds to its dynamics, where the file gives it.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct JointDrive {
     /// Viscous friction \[N·m·s/rad or N·s/m\].
-    pub damping: Option<Value<f64>>,
+    pub damping: Option<Noted<f64>>,
     /// Coulomb friction \[N·m or N\].
-    pub friction: Option<Value<f64>>,
+    pub friction: Option<Noted<f64>>,
     /// Moment of inertia of the rotor about its axis \[kg·m²\].
-    pub rotor_inertia: Option<Value<f64>>,
+    pub rotor_inertia: Option<Noted<f64>>,
     /// Rotor speed over joint speed \[1 or rad/m\]; 1 where the file says nothing.
-    pub gear_ratio: Option<Value<f64>>,
+    pub gear_ratio: Option<Noted<f64>>,
     /// Inertia added on the joint's own coordinate \[kg·m² or kg\], in place of a rotor with its gear.
-    pub armature: Option<Value<f64>>,
+    pub armature: Option<Noted<f64>>,
     /// Spring: stiffness \[N·m/rad or N/m\].
-    pub spring_stiffness: Option<Value<f64>>,
+    pub spring_stiffness: Option<Noted<f64>>,
     /// Spring: coordinate without force \[rad or m\].
-    pub spring_rest: Option<Value<f64>>,
+    pub spring_rest: Option<Noted<f64>>,
 }
 
 /// A named frame on a link.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedFrame {
     /// What `frames` and contacts call it; links are frames of their own names.
-    pub name: Value<String>,
+    pub name: Noted<String>,
     /// The link that carries it.
-    pub link: Value<String>,
+    pub link: Noted<String>,
     /// Its pose in the link frame.
     pub pose: WrittenPose,
 }

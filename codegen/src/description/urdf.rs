@@ -4,10 +4,10 @@
 //! robot or serves a simulator is skipped and listed. Rather than refuse what other readers accept, comments may hold
 //! `--`, the XML declaration may come late, and prefixes need no declaration.
 
-use super::reader::{Range64, Reader};
+use super::reader::{FileReader, Range64};
 use super::{
-    messages, Angle, AngleUnit, Description, FileFormat, Inertial, Joint, JointDrive, JointLimits, JointType, Link,
-    Placement, Rotation, Value, WrittenPose,
+    messages, Angle, AngleUnit, Description, FileFormat, JointDrive, JointLimits, JointType, Noted, Placement,
+    Rotation, WrittenInertial, WrittenJoint, WrittenLink, WrittenPose,
 };
 use crate::diagnostic::wording::closest;
 use crate::diagnostic::{Diagnostics, Source};
@@ -43,7 +43,7 @@ pub(super) const FORMAT: FileFormat = FileFormat {
 };
 
 fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
-    let mut reader = Reader::new(source, diagnostics);
+    let mut reader = FileReader::new(source, diagnostics);
     let mut text = tolerant_text(&mut reader)?;
     for _ in 0..=MOST_PREFIXES {
         let options = ParsingOptions { nodes_limit: MOST_NODES as u32, ..ParsingOptions::default() };
@@ -72,7 +72,7 @@ fn tag(node: Node) -> Span {
     start..start + 1 + node.tag_name().name().len()
 }
 
-fn read_document(mut reader: Reader, document: &Document) -> Option<Description> {
+fn read_document(mut reader: FileReader, document: &Document) -> Option<Description> {
     let root = document.root_element();
     if root.tag_name().name() != "robot" {
         reader.complain(&tag(root), messages::not_a_robot(root.tag_name().name()));
@@ -114,7 +114,7 @@ fn local_name<'a>(owner: Node, node: Node<'a, '_>) -> Option<&'a str> {
 }
 
 /// Skips an element; one that looks like one of `known` gets a warning.
-fn skip(reader: &mut Reader, owner: &str, node: Node, known: &[&str]) {
+fn skip(reader: &mut FileReader, owner: &str, node: Node, known: &[&str]) {
     const HARMLESS: &[&str] = &[
         "visual",
         "collision",
@@ -144,7 +144,7 @@ fn skip(reader: &mut Reader, owner: &str, node: Node, known: &[&str]) {
 
 /// The children of `node` with the names `names`, each at most once; others are skipped.
 fn pick<'a, 'i, const N: usize>(
-    reader: &mut Reader,
+    reader: &mut FileReader,
     owner: &str,
     node: Node<'a, 'i>,
     names: [&str; N],
@@ -162,7 +162,7 @@ fn pick<'a, 'i, const N: usize>(
 }
 
 /// Complains of attributes that an element whose numbers matter does not have; a quaternion would turn the robot.
-fn check_attributes(reader: &mut Reader, owner: &str, node: Node, known: &[&str]) {
+fn check_attributes(reader: &mut FileReader, owner: &str, node: Node, known: &[&str]) {
     for attribute in node.attributes().filter(|a| a.namespace().is_none() && !known.contains(&a.name())) {
         let span = attribute.range_qname();
         let name = attribute.name();
@@ -177,7 +177,7 @@ fn check_attributes(reader: &mut Reader, owner: &str, node: Node, known: &[&str]
 }
 
 fn required<'a, 'i>(
-    reader: &mut Reader,
+    reader: &mut FileReader,
     owner: &str,
     node: Node<'a, 'i>,
     name: &str,
@@ -190,20 +190,20 @@ fn required<'a, 'i>(
     found
 }
 
-fn name_of(reader: &mut Reader, what: &str, node: Node, attribute: &str, example: &str) -> Option<Value<String>> {
+fn name_of(reader: &mut FileReader, what: &str, node: Node, attribute: &str, example: &str) -> Option<Noted<String>> {
     let element = format!("<{}>", node.tag_name().name());
     let found = required(reader, &element, node, attribute, example)?;
     reader.name(what, found.value(), &found.range_value())
 }
 
-fn number(reader: &mut Reader, what: &str, attribute: Attribute, range: Range64) -> Option<Value<f64>> {
+fn number(reader: &mut FileReader, what: &str, attribute: Attribute, range: Range64) -> Option<Noted<f64>> {
     let span = attribute.range_value();
     let value = reader.number(what, attribute.value().trim(), &span, range)?;
     Some(reader.value(value, &span))
 }
 
 /// Three numbers, each with its text and span.
-fn triple<'a>(reader: &mut Reader, what: &str, attribute: Attribute<'a, '_>) -> Option<[(f64, &'a str, Span); 3]> {
+fn triple<'a>(reader: &mut FileReader, what: &str, attribute: Attribute<'a, '_>) -> Option<[(f64, &'a str, Span); 3]> {
     let text = attribute.value();
     let whole = attribute.range_value();
     let is_raw = reader.source.text().get(whole.clone()) == Some(text);
@@ -229,13 +229,13 @@ fn triple<'a>(reader: &mut Reader, what: &str, attribute: Attribute<'a, '_>) -> 
     Some([numbers.next()?, numbers.next()?, numbers.next()?])
 }
 
-fn vector(reader: &mut Reader, what: &str, attribute: Attribute) -> Option<Value<[f64; 3]>> {
+fn vector(reader: &mut FileReader, what: &str, attribute: Attribute) -> Option<Noted<[f64; 3]>> {
     let span = attribute.range_value();
     let [x, y, z] = triple(reader, what, attribute)?;
     Some(reader.value([x.0, y.0, z.0], &span))
 }
 
-fn read_pose(reader: &mut Reader, owner: &str, node: Option<Node>, default: Node) -> WrittenPose {
+fn read_pose(reader: &mut FileReader, owner: &str, node: Option<Node>, default: Node) -> WrittenPose {
     let mut pose = WrittenPose::identity(reader.place(&tag(node.unwrap_or(default))));
     let Some(node) = node else { return pose };
     check_attributes(reader, owner, node, &["xyz", "rpy"]);
@@ -259,15 +259,15 @@ fn read_pose(reader: &mut Reader, owner: &str, node: Option<Node>, default: Node
     pose
 }
 
-fn read_link(reader: &mut Reader, node: Node) -> Option<Link> {
+fn read_link(reader: &mut FileReader, node: Node) -> Option<WrittenLink> {
     let name = name_of(reader, "link", node, "name", "<link name=\"...\">");
     let owner = name.as_ref().map_or("a link".to_string(), |n| format!("link `{}`", n.value));
     let inertial = inertial_of(reader, &owner, node).and_then(|inertial| read_inertial(reader, &owner, inertial));
-    Some(Link { name: name?, inertial })
+    Some(WrittenLink { name: name?, inertial })
 }
 
 /// The `<inertial>` of a link; what only shows the link is skipped.
-fn inertial_of<'a, 'i>(reader: &mut Reader, owner: &str, node: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
+fn inertial_of<'a, 'i>(reader: &mut FileReader, owner: &str, node: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
     let mut found = None;
     for child in children(node) {
         match local_name(node, child) {
@@ -281,7 +281,7 @@ fn inertial_of<'a, 'i>(reader: &mut Reader, owner: &str, node: Node<'a, 'i>) -> 
     found
 }
 
-fn read_inertial(reader: &mut Reader, owner: &str, node: Node) -> Option<Inertial> {
+fn read_inertial(reader: &mut FileReader, owner: &str, node: Node) -> Option<WrittenInertial> {
     let [origin, mass, inertia] = pick(reader, owner, node, ["origin", "mass", "inertia"]);
     let pose = read_pose(reader, &format!("{owner}, inertial origin"), origin, node);
     if let Some(mass) = mass {
@@ -300,10 +300,10 @@ fn read_inertial(reader: &mut Reader, owner: &str, node: Node) -> Option<Inertia
         Some(inertia) => read_inertia(reader, owner, inertia),
         None => Some(reader.value(Sym3 { xx: 0.0, xy: 0.0, xz: 0.0, yy: 0.0, yz: 0.0, zz: 0.0 }, &tag(node))),
     };
-    Some(Inertial { mass: mass?, com: pose.xyz, rotation: pose.rotation, inertia: inertia? })
+    Some(WrittenInertial { mass: mass?, com: pose.xyz, rotation: pose.rotation, inertia: inertia? })
 }
 
-fn read_inertia(reader: &mut Reader, owner: &str, node: Node) -> Option<Value<Sym3<f64>>> {
+fn read_inertia(reader: &mut FileReader, owner: &str, node: Node) -> Option<Noted<Sym3<f64>>> {
     check_attributes(reader, owner, node, &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]);
     let mut entry = |name: &str, is_diagonal: bool| match node.attribute_node(name) {
         Some(attribute) => {
@@ -321,7 +321,7 @@ fn read_inertia(reader: &mut Reader, owner: &str, node: Node) -> Option<Value<Sy
     Some(reader.value(Sym3 { xx: xx?, xy: xy?, xz: xz?, yy: yy?, yz: yz?, zz: zz? }, &tag(node)))
 }
 
-fn read_joint(reader: &mut Reader, node: Node) -> Option<Joint> {
+fn read_joint(reader: &mut FileReader, node: Node) -> Option<WrittenJoint> {
     let name = name_of(reader, "joint", node, "name", "<joint name=\"...\" type=\"revolute\">");
     let owner = name.as_ref().map_or("a joint".to_string(), |n| format!("joint `{}`", n.value));
     let kind = required(reader, &owner, node, "type", "<joint name=\"...\" type=\"revolute\">")
@@ -372,10 +372,10 @@ fn read_joint(reader: &mut Reader, node: Node) -> Option<Joint> {
         reader.complain(&tag(element), messages::not_supported_yet(&owner, "mimic", &follows, help));
     }
     let placement = Placement::Frames { origin, axis };
-    Some(Joint { name: name?, kind: kind?, parent: parent?, child: child?, placement, limits, drive })
+    Some(WrittenJoint { name: name?, kind: kind?, parent: parent?, child: child?, placement, limits, drive })
 }
 
-fn read_kind(reader: &mut Reader, owner: &str, attribute: Attribute) -> Option<Value<JointType>> {
+fn read_kind(reader: &mut FileReader, owner: &str, attribute: Attribute) -> Option<Noted<JointType>> {
     let span = attribute.range_value();
     let words = JointType::words(Dialect::Urdf);
     let kind = match attribute.value().trim() {
@@ -397,7 +397,7 @@ fn read_kind(reader: &mut Reader, owner: &str, attribute: Attribute) -> Option<V
     Some(reader.value(kind, &span))
 }
 
-fn read_limits(reader: &mut Reader, owner: &str, node: Node) -> JointLimits {
+fn read_limits(reader: &mut FileReader, owner: &str, node: Node) -> JointLimits {
     let known = ["lower", "upper", "velocity", "effort", "acceleration", "deceleration", "jerk"];
     check_attributes(reader, owner, node, &known);
     let mut read = |name: &str| {

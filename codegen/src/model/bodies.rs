@@ -4,7 +4,7 @@ use super::flexible::{self, Carrier};
 use super::geometry::{canonical_rotation, compose, point, snap_tensor, turned, unit, vector};
 use super::merge::{merge, Part};
 use super::{angle, centres_of_mass, check, transform, Assembly, ModelOptions};
-use crate::description::{messages, BaseKind, Description, Inertial, Joint as WrittenJoint, Placement};
+use crate::description::{messages, BaseKind, Description, Placement, WrittenInertial, WrittenJoint};
 use crate::diagnostic::{Diagnostics, Place};
 use std::collections::BTreeMap;
 use straightline_core::algorithms::composing_pays;
@@ -52,7 +52,7 @@ pub(super) fn assemble(
     diagnostics: &mut Diagnostics,
 ) -> Option<Assembly> {
     for link in &description.links {
-        if let Some(Inertial { mass, inertia, .. }) = &link.inertial {
+        if let Some(WrittenInertial { mass, inertia, .. }) = &link.inertial {
             check::inertial(&link.name.value, mass, inertia, diagnostics);
         }
     }
@@ -231,7 +231,7 @@ fn new_body(
     }
 }
 
-fn part(inertial: &Inertial, x_body_link: &Transform<Dd>, tolerance: f64) -> Part {
+fn part(inertial: &WrittenInertial, x_body_link: &Transform<Dd>, tolerance: f64) -> Part {
     let r_body_inertial = compose(x_body_link, &turned(angle::rotation(&inertial.rotation, tolerance))).rotation;
     Part {
         mass: Dd::from(inertial.mass.value),

@@ -10,7 +10,7 @@ use super::bodies::Seat;
 use super::geometry::{
     about, canonical_rotation, compose, magnitude, snap_rotation, snap_vector, turned, unit, vector,
 };
-use crate::description::{messages, Joint, JointVectors, Value};
+use crate::description::{messages, JointVectors, Noted, WrittenJoint};
 use crate::diagnostic::Diagnostics;
 use straightline_core::spatial::{Mat3, Transform, Vec3};
 use straightline_core::Dd;
@@ -30,7 +30,7 @@ const PARALLEL: f64 = 1e-9;
 /// for good: (20.108) with α_j for q_j.
 pub(super) fn seat(
     vectors: &JointVectors,
-    joint: &Joint,
+    joint: &WrittenJoint,
     tolerance: f64,
     diagnostics: &mut Diagnostics,
 ) -> Option<Seat> {
@@ -67,9 +67,9 @@ pub(super) fn seat(
 /// The unit vectors e, and along the part of r (or of r*) across it: e × (r × e) / |…| = (r − (e·r) e) / |…|.
 fn across(
     owner: &str,
-    (r_key, r): (&str, &Value<[f64; 3]>),
-    (e_key, e): (&str, &Value<[f64; 3]>),
-    (star_key, star): (&str, &Option<Value<[f64; 3]>>),
+    (r_key, r): (&str, &Noted<[f64; 3]>),
+    (e_key, e): (&str, &Noted<[f64; 3]>),
+    (star_key, star): (&str, &Option<Noted<[f64; 3]>>),
     diagnostics: &mut Diagnostics,
 ) -> Option<(Vec3<Dd>, Vec3<Dd>)> {
     let e_unit = unit(vector(e.value))?;

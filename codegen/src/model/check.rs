@@ -3,7 +3,7 @@
 use super::geometry::principal_moments;
 use super::{angle, doubtful_angles, Assembly, ModelOptions, MOST_LINKS};
 use crate::description::{
-    messages, Description, FileFormat, Joint, JointDrive, JointLimits, JointType, JointVectors, Placement, Value,
+    messages, Description, FileFormat, JointDrive, JointLimits, JointType, JointVectors, Noted, Placement, WrittenJoint,
 };
 use crate::diagnostic::{Diagnostics, Place};
 use crate::model::singular::{singular_joints, Inertia};
@@ -59,7 +59,7 @@ pub(super) fn tree(bodies: &Description, diagnostics: &mut Diagnostics) -> Optio
             );
         }
     }
-    let mut find = |owner: String, link: &Value<String>, diagnostics: &mut Diagnostics| {
+    let mut find = |owner: String, link: &Noted<String>, diagnostics: &mut Diagnostics| {
         let found = link_index.get(link.value.as_str()).copied();
         if found.is_none() {
             let known = links.iter().map(|l| l.name.value.as_str());
@@ -131,7 +131,7 @@ pub(super) fn tree(bodies: &Description, diagnostics: &mut Diagnostics) -> Optio
 /// The index of each name; names that are taken are complained of.
 pub(super) fn unique<'a>(
     what: &str,
-    names: impl Iterator<Item = &'a Value<String>>,
+    names: impl Iterator<Item = &'a Noted<String>>,
     diagnostics: &mut Diagnostics,
 ) -> HashMap<&'a str, usize> {
     let mut index: HashMap<&str, (usize, &Place)> = HashMap::new();
@@ -150,7 +150,7 @@ pub(super) fn unique<'a>(
 }
 
 /// Mass and inertia of one link.
-pub(super) fn inertial(link: &str, mass: &Value<f64>, inertia: &Value<Sym3<f64>>, diagnostics: &mut Diagnostics) {
+pub(super) fn inertial(link: &str, mass: &Noted<f64>, inertia: &Noted<Sym3<f64>>, diagnostics: &mut Diagnostics) {
     let j = inertia.value;
     let is_zero = [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz].iter().all(|&x| x == 0.0);
     if mass.value < 0.0 {
@@ -171,7 +171,7 @@ pub(super) fn inertial(link: &str, mass: &Value<f64>, inertia: &Value<Sym3<f64>>
 }
 
 /// The length of an axis.
-pub(super) fn axis_length(what: &str, axis: &Value<[f64; 3]>, diagnostics: &mut Diagnostics) {
+pub(super) fn axis_length(what: &str, axis: &Noted<[f64; 3]>, diagnostics: &mut Diagnostics) {
     let greatest = axis.value.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     if greatest < 1e-100 {
         diagnostics.push(messages::zero_axis(what).at(&axis.place));
@@ -184,7 +184,7 @@ pub(super) fn axis_length(what: &str, axis: &Value<[f64; 3]>, diagnostics: &mut 
 }
 
 /// One joint by itself.
-pub(super) fn joint(joint: &Joint, format: &FileFormat, diagnostics: &mut Diagnostics) {
+pub(super) fn joint(joint: &WrittenJoint, format: &FileFormat, diagnostics: &mut Diagnostics) {
     let name = &joint.name.value;
     if joint.kind.value.is_free() {
         diagnostics.push(messages::floating_joint(name).at(&joint.kind.place));
@@ -204,7 +204,7 @@ pub(super) fn joint(joint: &Joint, format: &FileFormat, diagnostics: &mut Diagno
 }
 
 /// What the drive of a joint that moves adds.
-pub(super) fn drive(joint: &Value<String>, drive: &JointDrive, diagnostics: &mut Diagnostics) {
+pub(super) fn drive(joint: &Noted<String>, drive: &JointDrive, diagnostics: &mut Diagnostics) {
     let name = &joint.value;
     for (what, value) in [
         ("damping", &drive.damping),
@@ -232,7 +232,7 @@ pub(super) fn drive(joint: &Value<String>, drive: &JointDrive, diagnostics: &mut
 
 /// The same as the model has it: a rotor of inertia J on a gear of ratio N has ½ J (N q̇)², as if J N² sat on the joint.
 pub(super) fn model_effects(drive: &JointDrive) -> JointEffects<Dd> {
-    let or_zero = |value: &Option<Value<f64>>| value.as_ref().map_or(Dd::ZERO, |v| Dd::from(v.value));
+    let or_zero = |value: &Option<Noted<f64>>| value.as_ref().map_or(Dd::ZERO, |v| Dd::from(v.value));
     let ratio = drive.gear_ratio.as_ref().map_or(Dd::ONE, |v| Dd::from(v.value));
     let rotor_inertia = or_zero(&drive.rotor_inertia) * ratio * ratio + or_zero(&drive.armature);
     let friction = or_zero(&drive.friction);
@@ -247,7 +247,7 @@ pub(super) fn model_effects(drive: &JointDrive) -> JointEffects<Dd> {
 
 /// The limits of a joint that moves.
 pub(super) fn limits(
-    joint: &Value<String>,
+    joint: &Noted<String>,
     kind: JointType,
     limits: &JointLimits,
     format: &FileFormat,
@@ -277,7 +277,7 @@ pub(super) fn limits(
 
 /// The limits as the model has them.
 pub(super) fn model_limits(kind: JointType, limits: &JointLimits) -> Limits {
-    let or = |limit: &Option<Value<f64>>, default: f64| limit.as_ref().map_or(default, |l| l.value);
+    let or = |limit: &Option<Noted<f64>>, default: f64| limit.as_ref().map_or(default, |l| l.value);
     Limits {
         lower: if kind.has_range { or(&limits.lower, f64::NEG_INFINITY) } else { f64::NEG_INFINITY },
         upper: if kind.has_range { or(&limits.upper, f64::INFINITY) } else { f64::INFINITY },

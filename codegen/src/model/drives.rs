@@ -1,8 +1,8 @@
 //! Drives as written, on the joints of a model: rigid stages folded into the shafts beside them, names resolved, matrices of
 //! ratios inverted.
 
-use crate::description::drives::{self as written, Noted};
-use crate::description::messages;
+use crate::description::drives::{TransmissionStage, WrittenActuator, WrittenDrive, WrittenRating, WrittenThermal};
+use crate::description::{messages, Noted};
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use std::collections::BTreeSet;
 use straightline_core::drive::{Actuator, Drive, Efficiency, LinearActuator, Motor, Rating, Rotor, Stage, Thermal};
@@ -14,7 +14,7 @@ use straightline_core::{Dd, Real};
 const ZERO: f64 = 1e-24;
 
 /// Adds the drives to those of a model. Complaints go to `diagnostics`; a drive with errors is left out.
-pub(crate) fn add(drives: &[written::Drive], model: &mut Model<Dd>, diagnostics: &mut Diagnostics) {
+pub(crate) fn add(drives: &[WrittenDrive], model: &mut Model<Dd>, diagnostics: &mut Diagnostics) {
     for drive in drives {
         if model.drives.iter().any(|d| d.name == drive.name.value) {
             diagnostics.push(messages::duplicate_name("drive", &drive.name.value).at(&drive.name.place));
@@ -51,7 +51,7 @@ pub(crate) fn unyielding(drives: &[Drive<Dd>]) -> Vec<(String, Diagnostic)> {
     wrong
 }
 
-fn build(drive: &written::Drive, model: &Model<Dd>, diagnostics: &mut Diagnostics) -> Option<Drive<Dd>> {
+fn build(drive: &WrittenDrive, model: &Model<Dd>, diagnostics: &mut Diagnostics) -> Option<Drive<Dd>> {
     let owner = format!("drive `{}`", drive.name.value);
     let actuator = actuator(drive, &owner, diagnostics);
     let joints: Vec<Option<(BodyId, Dd)>> = drive
@@ -98,8 +98,8 @@ fn build(drive: &written::Drive, model: &Model<Dd>, diagnostics: &mut Diagnostic
     fold_stages(drive, &mut built, diagnostics).then_some(built)
 }
 
-fn rating(written: &written::Rating) -> Rating<Dd> {
-    let thermal = |t: &written::Thermal| Thermal {
+fn rating(written: &WrittenRating) -> Rating<Dd> {
+    let thermal = |t: &WrittenThermal| Thermal {
         winding_housing: Dd::from(t.winding_housing),
         housing_ambient: Dd::from(t.housing_ambient),
         winding_time: Dd::from(t.winding_time),
@@ -125,9 +125,9 @@ fn body(owner: &str, joint: &Noted<String>, model: &Model<Dd>, diagnostics: &mut
     found
 }
 
-fn actuator(drive: &written::Drive, owner: &str, diagnostics: &mut Diagnostics) -> Option<Actuator<Dd>> {
+fn actuator(drive: &WrittenDrive, owner: &str, diagnostics: &mut Diagnostics) -> Option<Actuator<Dd>> {
     match &drive.actuator {
-        written::Actuator::Motor { torque_constant, emf_constant, resistance, inductance, rotor_inertia, friction } => {
+        WrittenActuator::Motor { torque_constant, emf_constant, resistance, inductance, rotor_inertia, friction } => {
             Some(Actuator::Motor(Motor {
                 rotor_inertia: Dd::from(*rotor_inertia),
                 torque_constant: Dd::from(*torque_constant),
@@ -137,7 +137,7 @@ fn actuator(drive: &written::Drive, owner: &str, diagnostics: &mut Diagnostics) 
                 inductance: inductance.map(Dd::from),
             }))
         }
-        written::Actuator::Linear { c, f, d, t, position } => {
+        WrittenActuator::Linear { c, f, d, t, position } => {
             let wide = |x: &[f64]| x.iter().map(|x| Dd::from(*x)).collect::<Vec<Dd>>();
             let n = f.len();
             // whether T b is zero beside its terms
@@ -178,11 +178,11 @@ fn actuator(drive: &written::Drive, owner: &str, diagnostics: &mut Diagnostics) 
 
 /// Rigid stages become part of the shafts: what stands behind a rigid gear is described by the angle before it. What is zero in the file is
 /// left out of the equations.
-fn fold_stages(drive: &written::Drive, built: &mut Drive<Dd>, diagnostics: &mut Diagnostics) -> bool {
+fn fold_stages(drive: &WrittenDrive, built: &mut Drive<Dd>, diagnostics: &mut Diagnostics) -> bool {
     let folded = folded(&drive.with::<Dd>(&[], &[]), drive);
     for (k, stage) in folded.stages.iter().enumerate().skip(1) {
         if stage.inertia.is_none() {
-            let elastic: Vec<&written::Stage> = drive.stages.iter().filter(|s| s.stiffness.is_some()).collect();
+            let elastic: Vec<&TransmissionStage> = drive.stages.iter().filter(|s| s.stiffness.is_some()).collect();
             diagnostics.push(messages::shaft_without_inertia(&built.name).at(&elastic[k].ratio.place));
             return false;
         }
@@ -220,7 +220,7 @@ impl<T: Real> FoldedStage<T> {
 }
 
 /// `form`: the same drive as it is in the file, which says what there is.
-fn folded<T: Real>(drive: &written::Drive<T>, form: &written::Drive) -> Folded<T> {
+fn folded<T: Real>(drive: &WrittenDrive<T>, form: &WrittenDrive) -> Folded<T> {
     let sum = |a: Option<T>, b: Option<T>| match (a, b) {
         (Some(a), Some(b)) => Some(a + b),
         (a, b) => a.or(b),
@@ -278,8 +278,8 @@ pub(crate) fn stiffened(drive: &Drive<Dd>) -> Drive<Dd> {
 /// What has no name stays as it is: actuators other than motors, ratios of several joints to each other. So ratios change by one factor, and
 /// the shares of the joints' forces by its inverse, whatever other drives these joints have.
 pub(crate) fn derived<T: Real>(
-    drive: &written::Drive<T>,
-    form: &written::Drive,
+    drive: &WrittenDrive<T>,
+    form: &WrittenDrive,
     (built, model): (&Drive<Dd>, &Model<Dd>),
 ) -> Drive<T> {
     let (folded, built) = (folded(drive, form), built.map(T::constant));
@@ -290,7 +290,7 @@ pub(crate) fn derived<T: Real>(
     let joints: Vec<(BodyId, T)> = built.joints.iter().map(|(body, n)| (*body, ratio(*body).unwrap_or(*n))).collect();
     let less = built.joints[0].1 / joints[0].1;
     let actuator = match &drive.actuator {
-        written::Actuator::Motor { torque_constant, emf_constant, resistance, inductance, rotor_inertia, friction } => {
+        WrittenActuator::Motor { torque_constant, emf_constant, resistance, inductance, rotor_inertia, friction } => {
             Actuator::Motor(Motor {
                 rotor_inertia: *rotor_inertia,
                 torque_constant: *torque_constant,
@@ -300,7 +300,7 @@ pub(crate) fn derived<T: Real>(
                 inductance: *inductance,
             })
         }
-        written::Actuator::Linear { .. } => built.actuator.clone(),
+        WrittenActuator::Linear { .. } => built.actuator.clone(),
     };
     let inertia = drive.rotor.as_ref().map(|(_, _, inertia)| *inertia);
     Drive {

@@ -19,8 +19,8 @@
 
 use super::geometry::{canonical_rotation, compose, magnitude, snap_tensor, snap_vector, unit, vector};
 use super::merge::Part;
-use crate::description::flexible::{judge_number, Bending, Elastic, Flexible, Support};
-use crate::description::messages;
+use crate::description::flexible::{judge_number, BaseSupport, Bending, Elastic, Flexible};
+use crate::description::{messages, Noted};
 use crate::diagnostic::Diagnostics;
 use straightline_core::algorithms::composing_pays;
 use straightline_core::joint::Measure;
@@ -169,7 +169,7 @@ fn springs(flexible: &Flexible, along: Vec3<Dd>, diagnostics: &mut Diagnostics) 
     let is_across = |axis: Vec3<Dd>| axis.dot(along).to_f64().abs() <= ACROSS;
     let mut is_sound = true;
     let mut found = Vec::new();
-    let mut add = |what: String, label: String, axis: Vec3<Dd>, stiffness: &crate::description::drives::Noted<f64>| {
+    let mut add = |what: String, label: String, axis: Vec3<Dd>, stiffness: &Noted<f64>| {
         let good = judge_number(format!("{what} of link `{link}`"), stiffness, false, &mut |d| diagnostics.push(d));
         found.push((label, axis, Dd::from(stiffness.value)));
         good
@@ -302,7 +302,7 @@ fn spread(part: &Part, from: Vec3<Dd>, along: Vec3<Dd>, cuts: &[Dd]) -> Vec<Part
 
 /// The bodies between the world and a base on springs, each massless; the last one takes the base. The pose of the world's frame at rest
 /// in each is its `link_frame`. `None` after a complaint.
-pub(super) fn support(support: &Support, root: &str, diagnostics: &mut Diagnostics) -> Option<Vec<Body<Dd>>> {
+pub(super) fn support(support: &BaseSupport, root: &str, diagnostics: &mut Diagnostics) -> Option<Vec<Body<Dd>>> {
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(vector);
     let mut bodies: Vec<Body<Dd>> = Vec::new();
     let mut is_sound = true;
@@ -313,7 +313,7 @@ pub(super) fn support(support: &Support, root: &str, diagnostics: &mut Diagnosti
         return None;
     }
     for (k, Elastic { stiffness, damping, rest }) in given() {
-        let label = Support::DIRECTIONS[k];
+        let label = BaseSupport::DIRECTIONS[k];
         let mut complain = |d| diagnostics.push(d);
         is_sound &= judge_number(format!("stiffness of `{label}` of [support]"), stiffness, false, &mut complain);
         is_sound &= judge_number(format!("damping of `{label}` of [support]"), damping, true, &mut complain);

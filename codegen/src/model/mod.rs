@@ -41,8 +41,8 @@ pub mod singular;
 pub mod states;
 
 use self::flexible::Carrier;
-use crate::description::flexible::{Flexible, Support};
-use crate::description::{self, messages, Angle, Description, Rotation, Value, WrittenPose};
+use crate::description::flexible::{BaseSupport, Flexible};
+use crate::description::{self, messages, Angle, Description, Noted, Rotation, WrittenPose};
 use crate::diagnostic::{Diagnostics, Place, Source};
 use geometry::{compose, vector};
 use std::collections::{BTreeMap, HashMap};
@@ -71,7 +71,7 @@ pub struct ModelOptions {
     /// Links that bend, in place of what the file says of them.
     pub flexible: Vec<Flexible>,
     /// Springs and dampers below the root link.
-    pub support: Option<Support>,
+    pub support: Option<BaseSupport>,
     /// All links and the support are rigid, whatever file and options say.
     pub rigid_links: bool,
 }
@@ -301,7 +301,7 @@ fn add_frames(assembly: &mut Assembly, options: &ModelOptions, tolerance: f64, d
         };
         let zero = Angle::zero(Place::none());
         let rpy = option.rpy.map(|value| Angle { value, ..zero.clone() });
-        let pose = WrittenPose { xyz: Value::assumed(option.xyz), rotation: Rotation { rpy } };
+        let pose = WrittenPose { xyz: Noted::assumed(option.xyz), rotation: Rotation { rpy } };
         let (body, x_body_link) = carrier.at(vector(option.xyz));
         let placement = compose(&x_body_link, &transform(&pose, tolerance));
         assembly.frames.push(Frame { name: option.name.clone(), body, placement });

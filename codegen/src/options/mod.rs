@@ -14,7 +14,7 @@ pub use value::{Settings, Value};
 
 use crate::choices::{Lanes, LimbForm};
 use crate::description;
-use crate::description::drives::Drive;
+use crate::description::drives::WrittenDrive;
 use crate::diagnostic::{Diagnostics, Reporting, Source};
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::scene::Scene;
@@ -101,7 +101,7 @@ impl Options {
     }
 
     /// The same with the drives as they were read.
-    pub(crate) fn knowing_drives(&self, drives: &[Drive]) -> Options {
+    pub(crate) fn knowing_drives(&self, drives: &[WrittenDrive]) -> Options {
         Options { scene: self.scene.knowing(drives), ..self.clone() }
     }
 

@@ -5,8 +5,9 @@
 //! nor left out on purpose does not compile.
 
 use crate::choices::Choice;
-use crate::description::drives::{Actuator, Drive, Noted, Rating, Stage, Thermal};
-use crate::description::flexible::{Bending, Elastic, Flexible, Support};
+use crate::description::drives::{TransmissionStage, WrittenActuator, WrittenDrive, WrittenRating, WrittenThermal};
+use crate::description::flexible::{BaseSupport, Bending, Elastic, Flexible};
+use crate::description::Noted;
 use crate::function::ContactFunction;
 use crate::model::{FrameOption, ModelOptions};
 use crate::options::{Forms, Optimisations};
@@ -163,16 +164,16 @@ fields! {
     EnvironmentItem : { "kind": kind, "values": values, }
     LoopItem : { "name": name, "frame": frame, "with": with, "constrained": constrained, }
     ModeItem : { "name": name, "contacts": contacts, "sticking": sticking, }
-    Drive : {
+    WrittenDrive : {
         "name": name, "joints": joints, "actuator": actuator, "stages": stages, "efficiency": efficiency,
         "input_limit": input_limit, "current_limit": current_limit, "rotor": rotor, "rating": rating, .. written
     }
-    Stage : {
+    TransmissionStage : {
         "ratio": ratio, "stiffness": stiffness, "damping": damping, "input_inertia": input_inertia,
         "output_inertia": output_inertia, "efficiency": efficiency,
     }
-    Rating = { "speed": speed, "continuous_current": continuous_current, "thermal": thermal, }
-    Thermal : {
+    WrittenRating = { "speed": speed, "continuous_current": continuous_current, "thermal": thermal, }
+    WrittenThermal : {
         "winding_housing": winding_housing, "housing_ambient": housing_ambient, "winding_time": winding_time,
         "housing_time": housing_time, "ambient": ambient, "limit": limit,
     }
@@ -180,7 +181,7 @@ fields! {
         "link": link, "from": from, "to": to, "segments": segments, "bending": bending, "torsion": torsion,
         "damping": damping,
     }
-    Support : { "at": at, "directions": directions, .. place }
+    BaseSupport : { "at": at, "directions": directions, .. place }
     Elastic : { "stiffness": stiffness, "damping": damping, "rest": rest, }
 }
 
@@ -215,15 +216,22 @@ impl Stable for Parameter {
     }
 }
 
-impl Stable for Actuator {
+impl Stable for WrittenActuator {
     fn say(&self, out: &mut String) {
         match self {
-            Actuator::Motor { torque_constant, emf_constant, resistance, inductance, rotor_inertia, friction } => {
+            WrittenActuator::Motor {
+                torque_constant,
+                emf_constant,
+                resistance,
+                inductance,
+                rotor_inertia,
+                friction,
+            } => {
                 out.push_str("motor");
                 [torque_constant, emf_constant, resistance, rotor_inertia, friction].map(f64::clone).say(out);
                 inductance.say(out);
             }
-            Actuator::Linear { c, f, d, t, position } => {
+            WrittenActuator::Linear { c, f, d, t, position } => {
                 out.push_str("linear");
                 [&c.value, f, d, t].into_iter().for_each(|matrix| matrix.say(out));
                 position.say(out);

@@ -5,7 +5,7 @@
 //! do its values stay in range where the exact ones do, at some states near rest? What no limit, however large, has to do with:
 //! limits beyond the range say "no limit" and are written so. A length that vanishes is dust, and vanishes.
 
-use crate::description::drives::Drive;
+use crate::description::drives::WrittenDrive;
 use crate::description::{Description, JointDrive};
 use crate::diagnostic::{Diagnostic, Diagnostics, Place};
 use crate::model::states;
@@ -94,7 +94,7 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
 
 /// Takes limits of drives that the scalar cannot hold for what they are there: none. Those that a parameter makes free stay, to be complained
 /// about.
-pub fn leave_out_lost_limits(drives: &mut [Drive], parameters: &[Parameter], scalar: Scalar) {
+pub fn leave_out_lost_limits(drives: &mut [WrittenDrive], parameters: &[Parameter], scalar: Scalar) {
     if !scalar.is_short() {
         return;
     }

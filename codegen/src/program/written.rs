@@ -1,6 +1,6 @@
 //! What a text is to compute: the programs that are written, by name.
 
-use crate::description::drives::Number;
+use crate::description::drives::DriveNumber;
 use crate::options::Options;
 use straightline_core::Dd;
 use straightline_graph::expr::Graph;
@@ -49,7 +49,7 @@ pub struct WrittenParameter {
 #[derive(Clone, Debug)]
 pub struct DriveNumbers {
     /// What they are, with their values in the robot file.
-    pub numbers: Vec<Number>,
+    pub numbers: Vec<DriveNumber>,
     /// What functions take for the values of the robot file.
     pub nominal: Vec<Dd>,
 }

@@ -4,7 +4,7 @@
 //! joints' forces. Of these they take those that depend on what is free; a constructor derives them once.
 
 use super::Parameter;
-use crate::description::drives::{self as written, Number};
+use crate::description::drives::{DriveNumber, WrittenDrive};
 use crate::model::drives::{derived, entries};
 use straightline_core::drive::Drive;
 use straightline_core::model::Model;
@@ -12,9 +12,9 @@ use straightline_core::{Dd, Real};
 
 /// A drive of a model, and which of its numbers are free.
 pub struct FreeDrive<'a> {
-    form: &'a written::Drive,
+    form: &'a WrittenDrive,
     /// The free numbers, with what they are in the file.
-    pub numbers: Vec<Number>,
+    pub numbers: Vec<DriveNumber>,
     model: &'a Model<Dd>,
     /// Which of the model's drives it is.
     index: usize,
@@ -50,7 +50,7 @@ impl<'a> FreeDrive<'a> {
 
     /// Values near those of the file, all of which may be; `unit` gives numbers between 0 and 1.
     pub fn random(&self, mut unit: impl FnMut() -> f64) -> Vec<f64> {
-        let near = |n: &Number| match n.value {
+        let near = |n: &DriveNumber| match n.value {
             0.0 => 1e-3 * unit(),
             // no more than an efficiency may be
             x => x * (0.7 + 0.3 * unit()),

@@ -20,8 +20,8 @@ pub use parameter::Parameter;
 pub use places::Places;
 pub use ranges::{ranges_in_words, Interval, JointRanges, Ranges};
 
-use crate::description::drives::Drive;
-use crate::description::flexible::{Flexible, Support};
+use crate::description::drives::WrittenDrive;
+use crate::description::flexible::{BaseSupport, Flexible};
 use crate::diagnostic::Diagnostic;
 use crate::function::Function;
 use crate::model::ModelOptions;
@@ -45,11 +45,11 @@ pub struct Scene {
     /// Bodies welded to links.
     pub payloads: Vec<Payload>,
     /// What drives the joints, beside the robot file's own drives.
-    pub drives: Vec<Drive>,
+    pub drives: Vec<WrittenDrive>,
     /// Links that bend, in place of what the robot file says of them.
     pub flexible: Vec<Flexible>,
     /// Springs and dampers below the root link.
-    pub support: Option<Support>,
+    pub support: Option<BaseSupport>,
     /// What is known to be zero.
     pub zero: Zero,
     /// Which effects beside rigid bodies are in.
@@ -92,9 +92,9 @@ impl Scene {
 
     /// The same scene with what it has to know of the robot file's drives: of those whose numbers are parameters, how they are written.
     #[must_use]
-    pub fn knowing(&self, of_file: &[Drive]) -> Scene {
+    pub fn knowing(&self, of_file: &[WrittenDrive]) -> Scene {
         let mut scene = self.clone();
-        let all: Vec<&Drive> = of_file.iter().chain(&self.drives).collect();
+        let all: Vec<&WrittenDrive> = of_file.iter().chain(&self.drives).collect();
         for parameter in &mut scene.parameters {
             let Parameter::Drive { drive, form, .. } = parameter else { continue };
             let written = all.iter().find(|d| d.name.value == *drive);

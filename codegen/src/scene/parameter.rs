@@ -1,7 +1,7 @@
 //! Run-time parameters.
 
 use super::free_drive::FreeDrive;
-use crate::description::drives::Drive;
+use crate::description::drives::WrittenDrive;
 use crate::identifier::{doc, identifier, upper_camel_case};
 use straightline_core::model::Model;
 use straightline_core::Dd;
@@ -31,10 +31,10 @@ pub enum Parameter {
         name: Option<String>,
         /// The drive.
         drive: String,
-        /// Which numbers: names of [`Drive::numbers`].
+        /// Which numbers: names of [`WrittenDrive::numbers`].
         numbers: Vec<String>,
         /// The drive as written, with what the scene leaves of its effects; [`Scene::knowing`](crate::scene::Scene::knowing) finds it.
-        form: Option<Box<Drive>>,
+        form: Option<Box<WrittenDrive>>,
     },
 }
 

@@ -1,8 +1,8 @@
 //! The second author's reading of a robot file: links from their centres of mass, and what joints add to them.
 
 use super::reference_input::centre_of_mass_tree;
-use crate::description::flexible::{Bending, Support};
-use crate::description::{self, Description, Value};
+use crate::description::flexible::{BaseSupport, Bending};
+use crate::description::{self, Description, Noted};
 use crate::diagnostic::{Diagnostics, Source};
 use crate::function::truth::{Chapter, Effect};
 use crate::function::{Function, Quantity};
@@ -54,7 +54,7 @@ const NONE: Effect = Effect {
 /// What the file says of a joint.
 fn written(description: &Description, joint: &str) -> Effect {
     let drive = description.joint(joint).map(|joint| joint.drive.clone()).unwrap_or_default();
-    let number = |x: &Option<Value<f64>>| Dd::from(x.as_ref().map_or(0.0, |x| x.value));
+    let number = |x: &Option<Noted<f64>>| Dd::from(x.as_ref().map_or(0.0, |x| x.value));
     let gear = Dd::from(drive.gear_ratio.as_ref().map_or(1.0, |x| x.value));
     Effect {
         inertia: number(&drive.armature) + gear * gear * number(&drive.rotor_inertia),
@@ -75,7 +75,8 @@ fn elastic_springs(description: &Description, options: &ModelOptions) -> Vec<(St
     for (k, elastic) in options.support.iter().flat_map(|support| support.directions.iter().enumerate()) {
         if let Some(e) = elastic {
             let [stiffness, damping, rest] = [e.stiffness.value, e.damping.value, e.rest].map(Dd::from);
-            springs.push((format!("support_{}", Support::DIRECTIONS[k]), Effect { stiffness, damping, rest, ..NONE }));
+            let name = format!("support_{}", BaseSupport::DIRECTIONS[k]);
+            springs.push((name, Effect { stiffness, damping, rest, ..NONE }));
         }
     }
     for flexible in options.flexible.iter().chain(&description.flexible) {

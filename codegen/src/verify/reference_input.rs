@@ -9,7 +9,7 @@
 //! q = 0, so A⁰ is given as a matrix, or vectors as in the chapter, which are taken as written.
 
 use crate::description::{
-    Angle, AngleUnit, BaseKind, Description, Inertial, Joint as FileJoint, JointVectors, Placement, Rotation, Value,
+    Angle, AngleUnit, BaseKind, Description, JointVectors, Noted, Placement, Rotation, WrittenInertial, WrittenJoint,
     WrittenPose,
 };
 use crate::diagnostic::Place;
@@ -137,7 +137,7 @@ struct Part {
 }
 
 impl Part {
-    fn read(inertial: &Inertial, link: &Placed, options: &ModelOptions) -> Part {
+    fn read(inertial: &WrittenInertial, link: &Placed, options: &ModelOptions) -> Part {
         let axes = link.rotation * rotation(&inertial.rotation, options);
         Part {
             mass: Dd::from(inertial.mass.value),
@@ -217,7 +217,7 @@ fn add_links(
             // the place is that of S_j, in the axes of the link below
             Some(given) => {
                 let below = |v: &[f64; 3]| place.rotation * vector(v);
-                let star = |star: &Option<Value<[f64; 3]>>, r: &Value<[f64; 3]>| star.as_ref().unwrap_or(r).value;
+                let star = |star: &Option<Noted<[f64; 3]>>, r: &Noted<[f64; 3]>| star.as_ref().unwrap_or(r).value;
                 let by_vectors = ExtendedPosition::ByVectors {
                     r_star: Some(vector(&star(&given.r_star, &given.r))),
                     r_parent_star: Some(below(&star(&given.r_parent_star, &given.r_parent))),
@@ -262,7 +262,7 @@ fn floating_root_joint(description: &Description) -> String {
     name
 }
 
-fn reference_joint(joint: &FileJoint) -> Result<Joint, String> {
+fn reference_joint(joint: &WrittenJoint) -> Result<Joint, String> {
     Joint::of_word(joint.kind.value.word, joint.kind.value.number)
         .ok_or_else(|| format!("joint `{}` has not one degree of freedom", joint.name.value))
 }
@@ -300,7 +300,7 @@ fn rigid_groups(
         let (group, place) = match joint {
             None => elastic.support.map_or((0, Placed::here()), |support| stand(support, name, &mut groups)),
             Some(i) => {
-                let joint: &FileJoint = &description.joints[i];
+                let joint: &WrittenJoint = &description.joints[i];
                 let above = places.get(joint.parent.value.as_str()).ok_or("a joint hangs on nothing")?;
                 let (at, axis, vectors) = match &joint.placement {
                     Placement::Frames { origin, axis } => (Placed::read(origin, options), axis, None),

@@ -1,7 +1,7 @@
 //! Links cut into elastic segments, and bases on springs: against the formulas of beams, and with masses that add up.
 
-use straightline_codegen::description::drives::Noted;
-use straightline_codegen::description::flexible::{Elastic, Support};
+use straightline_codegen::description::flexible::{BaseSupport, Elastic};
+use straightline_codegen::description::Noted;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::options::scene_file;
@@ -187,7 +187,8 @@ fn supported() -> Model<f64> {
         let (stiffness, damping) = (Noted::assumed(stiffness), Noted::assumed(damping));
         Some(Elastic { stiffness, damping, rest: 0.0 })
     };
-    let support = Support { at: [0.0, 0.1, -0.2], directions: std::array::from_fn(spring), place: Noted::assumed(()) };
+    let support =
+        BaseSupport { at: [0.0, 0.1, -0.2], directions: std::array::from_fn(spring), place: Noted::assumed(()) };
     loaded(text, &ModelOptions { support: Some(support), ..ModelOptions::default() }).cast()
 }
 

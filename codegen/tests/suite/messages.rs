@@ -5,9 +5,9 @@
 //! difference.
 
 use std::path::{Path, PathBuf};
-use straightline_codegen::description::drives::Noted;
-use straightline_codegen::description::flexible::{Elastic, Support};
+use straightline_codegen::description::flexible::{BaseSupport, Elastic};
 use straightline_codegen::description::messages::CODES;
+use straightline_codegen::description::Noted;
 use straightline_codegen::description::FORMATS;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{load, ModelOptions};
@@ -48,7 +48,7 @@ fn special_case(code: &str) -> Option<(Source, ModelOptions)> {
                 "support-rigid" => [const { None }; 6],
                 _ => std::array::from_fn(|_| Some(spring.clone())),
             };
-            let support = Some(Support { at: [0.0; 3], directions, place: Noted::assumed(()) });
+            let support = Some(BaseSupport { at: [0.0; 3], directions, place: Noted::assumed(()) });
             Some((file(code)?, ModelOptions { support, ..options }))
         }
         "bad-option" => Some((file(code)?, ModelOptions { angle_tolerance: f64::NAN, ..options })),

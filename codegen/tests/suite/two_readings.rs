@@ -7,8 +7,8 @@ use crate::written::{Shape, Style, Written};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_6, PI};
 use std::fmt::Write;
 use straightline_codegen::description;
-use straightline_codegen::description::drives::Noted;
-use straightline_codegen::description::flexible::{Bending, Elastic, Flexible, Support};
+use straightline_codegen::description::flexible::{BaseSupport, Bending, Elastic, Flexible};
+use straightline_codegen::description::Noted;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{self, FrameOption, ModelOptions};
 use straightline_codegen::verify::reference_input::centre_of_mass_tree;
@@ -350,7 +350,7 @@ fn both_readings_of_flexible_links_and_supports_agree() {
         if random.below(2) == 0 {
             let spring = Elastic { stiffness: Noted::assumed(1e4), damping: Noted::assumed(1.0), rest: 0.0 };
             let directions = std::array::from_fn(|k| (k == 2 || random.below(2) == 0).then(|| spring.clone()));
-            options.support = Some(Support { at: triple(&mut random, 0.3), directions, place: Noted::assumed(()) });
+            options.support = Some(BaseSupport { at: triple(&mut random, 0.3), directions, place: Noted::assumed(()) });
         }
         let text = urdf(&mut random, &robot);
         let source = Source::new("flexible.urdf", text.clone());

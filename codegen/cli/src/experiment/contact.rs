@@ -1,8 +1,8 @@
 //! Contacts of a scene in an experiment: which of them can happen, what they hit with, and how objects move.
 
 use super::messages as say;
-use straightline_codegen::description::reader::{Range64, Reader};
-use straightline_codegen::description::table::{parse, Table};
+use straightline_codegen::description::reader::{FileReader, Range64};
+use straightline_codegen::description::table::{parse, TomlTable};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::scene::contact::{
     tool_axes, ContactItem, Contacts as Items, EnvironmentItem, ObjectPose, SurfaceItem,
@@ -26,7 +26,7 @@ pub fn read(source: &Source, model: &Model<f64>, items: &Items, diagnostics: &mu
     found.add_source(source);
     let contacts = match source.path().ends_with(".toml") {
         true => from_toml(source, model, items, &mut found),
-        false => from_tables(Reader::new(source, &mut found), None, model, items),
+        false => from_tables(FileReader::new(source, &mut found), None, model, items),
     };
     found.sort();
     let sound = !found.has_errors();
@@ -37,11 +37,11 @@ pub fn read(source: &Source, model: &Model<f64>, items: &Items, diagnostics: &mu
 fn from_toml(source: &Source, model: &Model<f64>, items: &Items, found: &mut Diagnostics) -> Option<Contacts> {
     // what is no TOML has been said already
     let document = parse(source, &mut Diagnostics::new())?;
-    let top = Table { owner: "an experiment".to_string(), table: document.get_ref(), span: 0..0 };
-    from_tables(Reader::new(source, found), Some(&top), model, items)
+    let top = TomlTable { owner: "an experiment".to_string(), table: document.get_ref(), span: 0..0 };
+    from_tables(FileReader::new(source, found), Some(&top), model, items)
 }
 
-fn from_tables(mut reader: Reader, top: Option<&Table>, model: &Model<f64>, items: &Items) -> Option<Contacts> {
+fn from_tables(mut reader: FileReader, top: Option<&TomlTable>, model: &Model<f64>, items: &Items) -> Option<Contacts> {
     let r = &mut reader;
     let known: Vec<&str> = items.contacts.iter().map(|c| c.name.as_str()).collect();
     let mut contacts =
@@ -59,7 +59,7 @@ fn from_tables(mut reader: Reader, top: Option<&Table>, model: &Model<f64>, item
         contacts.projects = r.flag_at(&table, "project").is_none_or(|flag| flag.value);
         contacts.rest_speed = number(r, &table, "rest_speed", REST_SPEED, (0.0, 1e3));
     }
-    let mut said: Vec<(String, Table)> = Vec::new();
+    let mut said: Vec<(String, TomlTable)> = Vec::new();
     for mut table in top.map_or_else(Vec::new, |top| r.tables_at(top, "contact")) {
         let keys = ["name", "restitution", "closed", "stays", "axis", "object", "environment"];
         r.check_keys(&table, &keys);
@@ -87,7 +87,7 @@ fn from_tables(mut reader: Reader, top: Option<&Table>, model: &Model<f64>, item
 }
 
 /// A number within a range, or what stands for it.
-fn number(r: &mut Reader, table: &Table, key: &str, default: f64, (low, high): (f64, f64)) -> f64 {
+fn number(r: &mut FileReader, table: &TomlTable, key: &str, default: f64, (low, high): (f64, f64)) -> f64 {
     let Some(found) = r.real_at(table, key, Range64::Finite) else { return default };
     if !(low..=high).contains(&found.value) {
         let complaint = say::not_in_range(&table.what(key), found.value, &format!("between {low:?} and {high:?}"));
@@ -97,7 +97,7 @@ fn number(r: &mut Reader, table: &Table, key: &str, default: f64, (low, high): (
 }
 
 /// A contact of the scene with what the experiment says of it.
-fn touch(r: &mut Reader, item: &ContactItem, table: Option<&Table>, model: &Model<f64>) -> Option<Touch> {
+fn touch(r: &mut FileReader, item: &ContactItem, table: Option<&TomlTable>, model: &Model<f64>) -> Option<Touch> {
     let surface = match &item.surface {
         SurfaceItem::Implicit(_) => None,
         other => other.over(),
@@ -136,14 +136,14 @@ fn touch(r: &mut Reader, item: &ContactItem, table: Option<&Table>, model: &Mode
         free: Vec::new(),
         friction: item.friction_over(),
     };
-    let flag = |r: &mut Reader, key: &str| table.and_then(|t| r.flag_at(t, key)).is_some_and(|flag| flag.value);
+    let flag = |r: &mut FileReader, key: &str| table.and_then(|t| r.flag_at(t, key)).is_some_and(|flag| flag.value);
     let (closed, stays) = (flag(r, "closed"), flag(r, "stays"));
     let restitution = table.map_or(0.0, |table| number(r, table, "restitution", 0.0, (0.0, 1.0)));
     Some(Touch { contact, environment, law, restitution, closed, stays })
 }
 
 /// Whether the experiment gives what the scene leaves open; it must, and what the scene has said it must not.
-fn given(r: &mut Reader, item: &ContactItem, table: Option<&Table>, key: &str, is_open: bool) -> bool {
+fn given(r: &mut FileReader, item: &ContactItem, table: Option<&TomlTable>, key: &str, is_open: bool) -> bool {
     let span = table.and_then(|table| table.get(key)).map(|(_, span)| span);
     match (is_open, span) {
         (true, None) => {
@@ -167,11 +167,11 @@ fn direction(v: [f64; 3]) -> bool {
 }
 
 /// How an object moves.
-fn law(r: &mut Reader, table: &Table) -> Option<Law> {
+fn law(r: &mut FileReader, table: &TomlTable) -> Option<Law> {
     let object = r.table_at(table, "object", &table.what("object"))?;
     r.check_keys(&object, &["origin", "z", "x", "velocity", "spin", "amplitude", "frequency"]);
     r.require(&object, "origin", "origin = [0.5, 0.0, 0.2]");
-    let vector = |r: &mut Reader, key: &str| r.vector_at(&object, key);
+    let vector = |r: &mut FileReader, key: &str| r.vector_at(&object, key);
     let origin = vector(r, "origin").map_or([0.0; 3], |v| v.value);
     let z = vector(r, "z").map_or([0.0, 0.0, 1.0], |v| v.value);
     let least = (0..3).min_by(|i, j| z[*i].abs().total_cmp(&z[*j].abs())).unwrap_or(0);
@@ -188,7 +188,7 @@ fn law(r: &mut Reader, table: &Table) -> Option<Law> {
 }
 
 /// The model of an object that gives way, with the scene's numbers or the experiment's.
-fn environment(r: &mut Reader, item: &EnvironmentItem, table: Option<&Table>) -> Option<Environment<f64>> {
+fn environment(r: &mut FileReader, item: &EnvironmentItem, table: Option<&TomlTable>) -> Option<Environment<f64>> {
     if let Some(values) = &item.values {
         return Some(item.over(values));
     }

@@ -5,7 +5,7 @@
 //! in the equations as they are. What the scene leaves out stays out.
 
 use super::parameter;
-use straightline_codegen::description::{Description, JointDrive, Value};
+use straightline_codegen::description::{Description, JointDrive, Noted};
 use straightline_codegen::diagnostic::Diagnostic;
 use straightline_core::algorithms::{inverse_dynamics, joint_wrenches};
 use straightline_core::model::{Coulomb, JointEffects, Load, Model};
@@ -146,7 +146,7 @@ fn with_inputs(model: &Model<Dd>, changes: &[Change], inputs: &[Expr]) -> Model<
                     changes.iter().zip(inputs).find_map(of)
                 };
                 let number =
-                    |x: &Option<Value<f64>>, none: f64| Expr::constant(Dd::from(x.as_ref().map_or(none, |x| x.value)));
+                    |x: &Option<Noted<f64>>, none: f64| Expr::constant(Dd::from(x.as_ref().map_or(none, |x| x.value)));
                 let rotor = given("rotor_inertia").unwrap_or_else(|| number(&drive.rotor_inertia, 0.0));
                 let ratio = given("gear_ratio").unwrap_or_else(|| number(&drive.gear_ratio, 1.0));
                 let effects = &mut traced.bodies[*body].effects;

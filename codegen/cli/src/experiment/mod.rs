@@ -12,8 +12,8 @@ pub mod samples;
 use self::messages as say;
 use self::samples::Columns;
 use straightline_codegen::description::messages::unknown_frame;
-use straightline_codegen::description::reader::{Range64, Reader};
-use straightline_codegen::description::table::{parse, Table};
+use straightline_codegen::description::reader::{FileReader, Range64};
+use straightline_codegen::description::table::{parse, TomlTable};
 use straightline_codegen::diagnostic::{Diagnostics, Place, Source};
 use straightline_core::algorithms::drive_states;
 use straightline_core::drive::Actuator;
@@ -257,8 +257,8 @@ fn from_toml(
     diagnostics: &mut Diagnostics,
 ) -> Option<Experiment> {
     let document = parse(source, diagnostics)?;
-    let top = Table { owner: "an experiment".to_string(), table: document.get_ref(), span: 0..0 };
-    let mut r = ExperimentReader { reader: Reader::new(source, diagnostics), model, controller_model, read_file };
+    let top = TomlTable { owner: "an experiment".to_string(), table: document.get_ref(), span: 0..0 };
+    let mut r = ExperimentReader { reader: FileReader::new(source, diagnostics), model, controller_model, read_file };
     let keys = [&["motion", "controller", "torques", "inputs", "start", "simulation"][..], &contact::TABLES].concat();
     r.reader.check_keys(&top, &keys);
     let table = |r: &mut ExperimentReader, key: &str| r.reader.table_at(&top, key, &format!("[{key}]"));
@@ -355,7 +355,7 @@ fn without_currents(model: &Model<f64>, x: &[f64], are_currents: &[bool]) -> Vec
 }
 
 struct ExperimentReader<'a> {
-    reader: Reader<'a>,
+    reader: FileReader<'a>,
     model: &'a Model<f64>,
     controller_model: &'a Model<f64>,
     read_file: ReadFile<'a>,
@@ -363,7 +363,7 @@ struct ExperimentReader<'a> {
 
 impl ExperimentReader<'_> {
     /// A number within a range, or what stands for it.
-    fn number(&mut self, table: &Table, key: &str, default: f64, (low, high): (f64, f64)) -> f64 {
+    fn number(&mut self, table: &TomlTable, key: &str, default: f64, (low, high): (f64, f64)) -> f64 {
         let Some(found) = self.reader.real_at(table, key, Range64::Finite) else { return default };
         if !(low..=high).contains(&found.value) {
             let range = format!("between {low:e} and {high:e}");
@@ -374,7 +374,7 @@ impl ExperimentReader<'_> {
     }
 
     /// One number for all, or an array of `n`. Empty after a complaint; `None` where there is no such key.
-    fn numbers(&mut self, table: &Table, key: &str, n: usize) -> Option<Vec<f64>> {
+    fn numbers(&mut self, table: &TomlTable, key: &str, n: usize) -> Option<Vec<f64>> {
         let (value, span) = table.get(key)?;
         let what = table.what(key);
         match value {
@@ -396,13 +396,13 @@ impl ExperimentReader<'_> {
     }
 
     /// Complains of angles beyond those whose sine has digits.
-    fn angles(&mut self, table: &Table, q: &[f64]) {
+    fn angles(&mut self, table: &TomlTable, q: &[f64]) {
         if let (Some((joint, angle)), Some((_, span))) = (angle_beyond_sines(self.model, q), table.get("q")) {
             self.reader.complain(&span, say::angle_beyond_sines(joint, angle));
         }
     }
 
-    fn samples(&mut self, table: &Table) -> Option<(Columns, Place)> {
+    fn samples(&mut self, table: &TomlTable) -> Option<(Columns, Place)> {
         let file = self.reader.string_at(table, "file")?;
         let source = match (self.read_file)(&file.value) {
             Ok(source) => source,
@@ -414,14 +414,14 @@ impl ExperimentReader<'_> {
         samples::read(&source, self.reader.diagnostics).map(|columns| (columns, file.place))
     }
 
-    fn torques(&mut self, table: &Table) -> Option<Samples> {
+    fn torques(&mut self, table: &TomlTable) -> Option<Samples> {
         self.reader.check_keys(table, &["file"]);
         self.reader.require(table, "file", "file = \"torques.csv\"");
         let (columns, place) = self.samples(table)?;
         torques(&columns, self.model, &place, self.reader.diagnostics)
     }
 
-    fn inputs(&mut self, table: &Table) -> Option<Inputs> {
+    fn inputs(&mut self, table: &TomlTable) -> Option<Inputs> {
         self.reader.check_keys(table, &["file"]);
         self.reader.require(table, "file", "file = \"voltages.csv\"");
         if self.model.drives.is_empty() {
@@ -433,7 +433,7 @@ impl ExperimentReader<'_> {
     }
 
     /// The state of the drives, all of it.
-    fn drive_state(&mut self, start: &Table) -> Option<Vec<f64>> {
+    fn drive_state(&mut self, start: &TomlTable) -> Option<Vec<f64>> {
         let (_, span) = start.get("x")?;
         let n = drive_states(self.model);
         if n == 0 {
@@ -450,7 +450,7 @@ impl ExperimentReader<'_> {
         Some(x)
     }
 
-    fn motion(&mut self, table: &Table, start: Option<&[f64]>) -> Option<Motion> {
+    fn motion(&mut self, table: &TomlTable, start: Option<&[f64]>) -> Option<Motion> {
         let keys = ["kind", "file", "frame", "keep_orientation", "speed", "acceleration", "point"];
         self.reader.check_keys(table, &keys);
         if floats(self.model) {
@@ -520,7 +520,7 @@ impl ExperimentReader<'_> {
                 Motion::trapezoidal(&points, &speed, &acceleration)
             }
         };
-        let complain = |reader: &mut Reader, why: String| reader.complain(&table.span, say::no_motion(&why));
+        let complain = |reader: &mut FileReader, why: String| reader.complain(&table.span, say::no_motion(&why));
         let motion = match motion {
             Ok(motion) => motion,
             Err(why @ NoMotion::TooFew) => {
@@ -539,7 +539,7 @@ impl ExperimentReader<'_> {
     }
 
     /// Greatest speeds and accelerations of a trapezoid: given, or of joints the speeds of the robot file.
-    fn speeds(&mut self, table: &Table, n: usize, in_world: bool) -> Option<(Vec<f64>, Vec<f64>)> {
+    fn speeds(&mut self, table: &TomlTable, n: usize, in_world: bool) -> Option<(Vec<f64>, Vec<f64>)> {
         let speed = self.numbers(table, "speed", n);
         let acceleration = self.numbers(table, "acceleration", n);
         let of_file = || joints(self.model).iter().map(|j| j.limits.velocity).collect::<Vec<f64>>();
@@ -560,7 +560,7 @@ impl ExperimentReader<'_> {
         (speed.len() == n && acceleration.len() == n).then_some((speed, acceleration))
     }
 
-    fn controller(&mut self, table: &Table, motion: Option<Motion>) -> Option<Command> {
+    fn controller(&mut self, table: &TomlTable, motion: Option<Motion>) -> Option<Command> {
         self.reader.check_keys(table, &["compensation", "stiffness", "damping", "saturate", "period", "amplifier"]);
         let n = self.model.nv();
         let compensation =

@@ -2,8 +2,8 @@
 //! `elbow_drive.ratio`.
 
 use super::messages as say;
-use straightline_codegen::description::drives::Drive;
-use straightline_codegen::description::{Description, Inertial, JointDrive, Value};
+use straightline_codegen::description::drives::WrittenDrive;
+use straightline_codegen::description::{Description, JointDrive, Noted, WrittenInertial};
 use straightline_codegen::diagnostic::Diagnostic;
 
 /// A parameter and the values that it is to have.
@@ -87,17 +87,17 @@ pub fn with(description: &Description, path: &str, value: f64) -> Result<Descrip
     }
 }
 
-/// The robot file or the drives of a scene with another value of a parameter: [`with`], or a number of a drive ([`Drive::numbers`]). Where a
+/// The robot file or the drives of a scene with another value of a parameter: [`with`], or a number of a drive ([`WrittenDrive::numbers`]). Where a
 /// joint and a drive of one name both have it, it is the joint's.
 ///
 /// # Errors
 /// Neither has such a parameter, or a drive cannot have that value.
 pub fn with_drives(
     description: &Description,
-    of_scene: &[Drive],
+    of_scene: &[WrittenDrive],
     path: &str,
     value: f64,
-) -> Result<(Description, Vec<Drive>), Box<Diagnostic>> {
+) -> Result<(Description, Vec<WrittenDrive>), Box<Diagnostic>> {
     let complaint = match with(description, path, value) {
         Ok(changed) => return Ok((changed, of_scene.to_vec())),
         Err(complaint) => complaint,
@@ -117,19 +117,19 @@ pub fn with_drives(
 }
 
 /// Whether a path names a number of a drive, and none of the robot's bodies and joints.
-pub fn is_of_drive(description: &Description, of_scene: &[Drive], path: &str) -> bool {
+pub fn is_of_drive(description: &Description, of_scene: &[WrittenDrive], path: &str) -> bool {
     let Some((owner, _)) = path.rsplit_once('.') else { return false };
     let drives = description.drives.iter().chain(of_scene);
     with(description, path, 1.0).is_err() && drives.into_iter().any(|drive| drive.name.value == owner)
 }
 
-fn set_mass(Inertial { mass, inertia, .. }: &mut Inertial, value: f64) {
+fn set_mass(WrittenInertial { mass, inertia, .. }: &mut WrittenInertial, value: f64) {
     let factor = if mass.value == 0.0 { 1.0 } else { value / mass.value };
     inertia.value = inertia.value.map(|x| x * factor);
     mass.value = value;
 }
 
-fn number<'a>(drive: &'a mut JointDrive, key: &str) -> Option<&'a mut Value<f64>> {
+fn number<'a>(drive: &'a mut JointDrive, key: &str) -> Option<&'a mut Noted<f64>> {
     match key {
         "damping" => drive.damping.as_mut(),
         "friction" => drive.friction.as_mut(),

@@ -1,6 +1,6 @@
 //! The numbers of drives that can be set by name, and which values they may have.
 
-use super::{Actuator, Drive};
+use super::{WrittenActuator, WrittenDrive};
 
 /// What a number of drives is.
 #[derive(Debug, PartialEq, Eq)]
@@ -46,7 +46,7 @@ quantities! {
 
 /// A number of a drive that can be set by name.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Number {
+pub struct DriveNumber {
     /// Its name: `ratio`, `stage_2_stiffness`.
     pub name: String,
     /// What it is.
@@ -57,24 +57,30 @@ pub struct Number {
     pub(super) at: Vec<usize>,
 }
 
-impl Number {
+impl DriveNumber {
     /// Whether it is a limit, which no equation has beside saturation.
     pub fn is_limit(&self) -> bool {
         [INPUT_LIMIT, CURRENT_LIMIT].contains(&self.quantity)
     }
 
     /// Whether it is another's, by whatever name.
-    pub fn is(&self, other: &Number) -> bool {
+    pub fn is(&self, other: &DriveNumber) -> bool {
         self.at[0] == other.at[0]
     }
 }
 
-impl<T> Drive<T> {
+impl<T> WrittenDrive<T> {
     /// All numbers in their order, each with the stage that it is of.
     pub(super) fn flat(&mut self) -> Vec<(&'static NumberKind, Option<usize>, &mut T)> {
         let mut all: Vec<(&'static NumberKind, Option<usize>, &mut T)> = Vec::new();
-        if let Actuator::Motor { torque_constant, emf_constant, resistance, inductance, rotor_inertia, friction } =
-            &mut self.actuator
+        if let WrittenActuator::Motor {
+            torque_constant,
+            emf_constant,
+            resistance,
+            inductance,
+            rotor_inertia,
+            friction,
+        } = &mut self.actuator
         {
             all.extend([
                 (TORQUE_CONSTANT, None, torque_constant),

@@ -1,9 +1,11 @@
 //! Drives as robot files write them.
 
-use super::{Actuator, AsWritten, Drive, Must, Noted, Rating, Stage, Thermal, Written};
-use crate::description::reader::{Range64, Reader};
-use crate::description::table::Table;
-use crate::description::{messages, Value};
+use super::{
+    AsWritten, Must, TransmissionStage, WrittenActuator, WrittenDrive, WrittenNumber, WrittenRating, WrittenThermal,
+};
+use crate::description::reader::{FileReader, Range64};
+use crate::description::table::TomlTable;
+use crate::description::{messages, Noted};
 use toml::de::DeValue;
 
 const DRIVE: &[&str] =
@@ -14,14 +16,14 @@ const ACTUATOR: &[&str] = &["C", "f", "d", "T", "position"];
 const THERMAL: &[&str] = &["winding_housing", "housing_ambient", "winding_time", "housing_time", "ambient", "limit"];
 const STAGE: &[&str] = &["ratio", "stiffness", "damping", "input_inertia", "output_inertia", "efficiency"];
 
-impl Reader<'_> {
+impl FileReader<'_> {
     /// The drives of an array of tables `[[drive]]`.
-    pub fn drives_at(&mut self, top: &Table) -> Vec<Drive> {
+    pub fn drives_at(&mut self, top: &TomlTable) -> Vec<WrittenDrive> {
         let tables = self.tables_at(top, "drive");
         tables.into_iter().filter_map(|table| self.drive(table)).collect()
     }
 
-    fn drive(&mut self, mut table: Table) -> Option<Drive> {
+    fn drive(&mut self, mut table: TomlTable) -> Option<WrittenDrive> {
         self.drive_numbers.clear();
         let named = self.name_at(&table, "name", "drive");
         let joint = self.name_at(&table, "joint", "joint");
@@ -43,7 +45,7 @@ impl Reader<'_> {
         let stages = self.stages(&table);
         let efficiency = self.efficiency(&table);
         let limits = self.table_at(&table, "limits", &format!("limits of {}", table.owner));
-        let (mut input_limit, mut current_limit, mut rating) = (None, None, Rating::default());
+        let (mut input_limit, mut current_limit, mut rating) = (None, None, WrittenRating::default());
         if let Some(limits) = limits {
             self.check_keys(&limits, &["input", "current", "continuous_current", "speed"]);
             input_limit = self.rated(&limits, "input", Must::BePositive);
@@ -73,8 +75,8 @@ impl Reader<'_> {
                 return None;
             }
         };
-        Some(Drive {
-            name: name.into(),
+        Some(WrittenDrive {
+            name,
             joints,
             actuator,
             stages: stages?,
@@ -88,20 +90,20 @@ impl Reader<'_> {
     }
 
     /// A number of a range that equations have, or a complaint.
-    fn judged(&mut self, table: &Table, key: &str, must: Must) -> Option<f64> {
+    fn judged(&mut self, table: &TomlTable, key: &str, must: Must) -> Option<f64> {
         let x = self.in_range(table, key, must)?;
         let is_needed = !must.holds(0.0);
         let value = x.value;
-        self.drive_numbers.push(Written { what: table.what(key), value: x.into(), is_needed });
+        self.drive_numbers.push(WrittenNumber { what: table.what(key), value: x, is_needed });
         Some(value)
     }
 
     /// A number of a range that no equation has, or a complaint.
-    fn rated(&mut self, table: &Table, key: &str, must: Must) -> Option<f64> {
+    fn rated(&mut self, table: &TomlTable, key: &str, must: Must) -> Option<f64> {
         self.in_range(table, key, must).map(|x| x.value)
     }
 
-    fn in_range(&mut self, table: &Table, key: &str, must: Must) -> Option<Value<f64>> {
+    fn in_range(&mut self, table: &TomlTable, key: &str, must: Must) -> Option<Noted<f64>> {
         let x = self.real_at(table, key, Range64::Finite)?;
         if must.holds(x.value) {
             return Some(x);
@@ -111,12 +113,12 @@ impl Reader<'_> {
         None
     }
 
-    fn required(&mut self, table: &Table, key: &str, example: &str, must: Must) -> Option<f64> {
+    fn required(&mut self, table: &TomlTable, key: &str, example: &str, must: Must) -> Option<f64> {
         self.require(table, key, example);
         self.judged(table, key, must)
     }
 
-    fn joints(&mut self, table: &Table, joint: Option<Value<String>>) -> Option<Vec<(Noted<String>, f64)>> {
+    fn joints(&mut self, table: &TomlTable, joint: Option<Noted<String>>) -> Option<Vec<(Noted<String>, f64)>> {
         let Some(joints) = self.table_at(table, "joints", &format!("joints of {}", table.owner)) else {
             if !table.has("joints") {
                 self.require(table, "joint", "joint = \"...\"");
@@ -125,13 +127,13 @@ impl Reader<'_> {
                 true => self.judged(table, "ratio", Must::NotBeZero)?,
                 false => 1.0,
             };
-            return Some(vec![(joint?.into(), ratio)]);
+            return Some(vec![(joint?, ratio)]);
         };
         let mut found = Vec::new();
         for key in joints.table.keys() {
             let ratio = self.judged(&joints, key.get_ref(), Must::NotBeZero);
             let name = self.name("joint", key.get_ref(), &key.span());
-            found.push((name?.into(), ratio?));
+            found.push((name?, ratio?));
         }
         // in the file's order, whatever the parser's
         found.sort_by_key(|(name, _): &(Noted<String>, f64)| name.place.span.start);
@@ -142,7 +144,7 @@ impl Reader<'_> {
         Some(found)
     }
 
-    fn motor(&mut self, table: &Table) -> Option<Actuator> {
+    fn motor(&mut self, table: &TomlTable) -> Option<WrittenActuator> {
         const EXAMPLE: &str = "motor = { torque_constant = 0.05, resistance = 1.2, rotor_inertia = 1e-5 }";
         self.require(table, "motor", EXAMPLE);
         let motor = self.table_at(table, "motor", &format!("motor of {}", table.owner))?;
@@ -157,7 +159,7 @@ impl Reader<'_> {
         let inductance = optional("inductance", Must::BePositive);
         let friction = optional("friction", Must::NotBeNegative);
         let emf_constant = optional("emf_constant", Must::NotBeNegative);
-        Some(Actuator::Motor {
+        Some(WrittenActuator::Motor {
             torque_constant: torque_constant?,
             emf_constant: emf_constant?.or(torque_constant)?,
             resistance: resistance?,
@@ -167,7 +169,7 @@ impl Reader<'_> {
         })
     }
 
-    fn thermal(&mut self, table: &Table) -> Option<Thermal> {
+    fn thermal(&mut self, table: &TomlTable) -> Option<WrittenThermal> {
         self.check_keys(table, THERMAL);
         let mut needed = |key: &str| {
             self.require(table, key, &format!("{key} = 2.0"));
@@ -182,7 +184,7 @@ impl Reader<'_> {
                 ("above the ambient temperature", "temperatures are in °C; `ambient` is 25 unless it is given");
             self.diagnostics.push(messages::drive_number(&table.what("limit"), limit.value, be, help).at(&limit.place));
         }
-        Some(Thermal {
+        Some(WrittenThermal {
             winding_housing: winding_housing?,
             housing_ambient: housing_ambient?,
             winding_time: winding_time?,
@@ -192,7 +194,7 @@ impl Reader<'_> {
         })
     }
 
-    fn actuator(&mut self, table: &Table) -> Option<Actuator> {
+    fn actuator(&mut self, table: &TomlTable) -> Option<WrittenActuator> {
         let a = self.table_at(table, "actuator", &format!("actuator of {}", table.owner))?;
         self.check_keys(&a, ACTUATOR);
         for key in &ACTUATOR[..4] {
@@ -214,26 +216,26 @@ impl Reader<'_> {
         {
             self.write_down(&a, key, row);
         }
-        let flat = Value::new(c.value.concat(), c.place);
+        let flat = Noted::new(c.value.concat(), c.place);
         self.write_down(&a, "C", &flat);
         let position = position.map(|p| p.value);
-        Some(Actuator::Linear { c: flat.into(), f: f.value, d: d.value, t: t.value, position })
+        Some(WrittenActuator::Linear { c: flat, f: f.value, d: d.value, t: t.value, position })
     }
 
-    fn write_down(&mut self, table: &Table, key: &str, row: &Value<Vec<f64>>) {
+    fn write_down(&mut self, table: &TomlTable, key: &str, row: &Noted<Vec<f64>>) {
         let (what, place) = (table.what(key), &row.place);
         let noted = |x: &f64| Noted { value: *x, place: place.clone() };
-        let written = |x: &f64| Written { what: what.clone(), value: noted(x), is_needed: false };
+        let written = |x: &f64| WrittenNumber { what: what.clone(), value: noted(x), is_needed: false };
         self.drive_numbers.extend(row.value.iter().map(written));
     }
 
-    fn row_at(&mut self, table: &Table, key: &str) -> Option<Value<Vec<f64>>> {
+    fn row_at(&mut self, table: &TomlTable, key: &str) -> Option<Noted<Vec<f64>>> {
         let (value, span) = table.get(key)?;
         let row = self.row(&table.what(key), value, &span)?;
         Some(self.value(row, &span))
     }
 
-    fn rows_at(&mut self, table: &Table, key: &str) -> Option<Value<Vec<Vec<f64>>>> {
+    fn rows_at(&mut self, table: &TomlTable, key: &str) -> Option<Noted<Vec<Vec<f64>>>> {
         let (value, span) = table.get(key)?;
         let DeValue::Array(rows) = value else {
             self.wrong_type(&table.what(key), "rows in an array", value, &span);
@@ -244,7 +246,7 @@ impl Reader<'_> {
         Some(self.value(rows?, &span))
     }
 
-    fn stages(&mut self, table: &Table) -> Option<Vec<Stage>> {
+    fn stages(&mut self, table: &TomlTable) -> Option<Vec<TransmissionStage>> {
         if let Some((value, span)) = table.get("stages").filter(|(value, _)| !value.is_array()) {
             self.wrong_type(&table.what("stages"), "an array of tables", value, &span);
             return None;
@@ -277,7 +279,7 @@ impl Reader<'_> {
                 is_good = false;
                 continue;
             };
-            stages.push(Stage {
+            stages.push(TransmissionStage {
                 ratio: Noted { value: ratio, place: self.place(&place) },
                 stiffness,
                 damping,
@@ -290,7 +292,7 @@ impl Reader<'_> {
     }
 
     /// A number for both directions, or `{ forward, backward }`.
-    fn efficiency(&mut self, table: &Table) -> Option<[f64; 2]> {
+    fn efficiency(&mut self, table: &TomlTable) -> Option<[f64; 2]> {
         let (value, _) = table.get("efficiency")?;
         if !value.is_table() {
             return self.judged(table, "efficiency", Must::BeAnEfficiency).map(|both| [both; 2]);
@@ -302,7 +304,7 @@ impl Reader<'_> {
         Some([forward?, backward?])
     }
 
-    fn rotor(&mut self, table: &Table, actuator: &Actuator) -> Option<(Noted<String>, [f64; 3], f64)> {
+    fn rotor(&mut self, table: &TomlTable, actuator: &WrittenActuator) -> Option<(Noted<String>, [f64; 3], f64)> {
         let rotor = self.table_at(table, "rotor", &format!("rotor of {}", table.owner))?;
         self.check_keys(&rotor, &["link", "axis", "inertia"]);
         self.require(&rotor, "link", "link = \"...\"");
@@ -316,9 +318,9 @@ impl Reader<'_> {
             return None;
         }
         let inertia = match (rotor.has("inertia"), actuator) {
-            (false, Actuator::Motor { rotor_inertia, .. }) => Some(*rotor_inertia),
+            (false, WrittenActuator::Motor { rotor_inertia, .. }) => Some(*rotor_inertia),
             _ => self.required(&rotor, "inertia", "inertia = 1e-5", Must::BePositive),
         };
-        Some((link?.into(), axis.value, inertia?))
+        Some((link?, axis.value, inertia?))
     }
 }

@@ -2,10 +2,10 @@
 
 use super::{Span, MOST_ATTRIBUTES, MOST_NAMESPACES, MOST_NODES};
 use crate::description::messages;
-use crate::description::reader::Reader;
+use crate::description::reader::FileReader;
 use std::borrow::Cow;
 
-pub(super) fn complain_of_xml(reader: &mut Reader, error: &roxmltree::Error) {
+pub(super) fn complain_of_xml(reader: &mut FileReader, error: &roxmltree::Error) {
     use roxmltree::Error;
     let text = reader.source.text();
     let at = match error {
@@ -42,7 +42,7 @@ pub(super) fn complain_of_xml(reader: &mut Reader, error: &roxmltree::Error) {
 }
 
 /// The text with comments blanked and a late XML declaration blanked, byte for byte as long; `None` after a complaint.
-pub(super) fn tolerant_text<'a>(reader: &mut Reader<'a>) -> Option<Cow<'a, str>> {
+pub(super) fn tolerant_text<'a>(reader: &mut FileReader<'a>) -> Option<Cow<'a, str>> {
     let source = reader.source;
     let text = source.text();
     if text.matches("xmlns").take(MOST_NAMESPACES + 1).count() > MOST_NAMESPACES {

@@ -5,7 +5,7 @@
 
 use super::file::{header, item_text, lanes_text, preamble, uses};
 use super::{array_type, batch, fused, kernel};
-use crate::description::drives::Number;
+use crate::description::drives::DriveNumber;
 use crate::emit::package::PackageKind;
 use crate::emit::{Generated, Item, Style};
 use crate::identifier::{comment, package_name, string_literal};
@@ -390,7 +390,7 @@ pub unsafe extern "C" fn {prefix}_{c_name}_batch_{layout}(n: usize, {signature})
     }
 
     /// The free numbers of a run-time parameter that is of a drive.
-    pub fn drive_numbers(&self, of: &Port) -> Option<&[Number]> {
+    pub fn drive_numbers(&self, of: &Port) -> Option<&[DriveNumber]> {
         let parameters = &self.generated.programs.parameters;
         let found = parameters.iter().find(|p| Some(&p.type_name) == of.wrapper.as_ref())?;
         found.numbers.as_ref().map(|numbers| &numbers.numbers[..])

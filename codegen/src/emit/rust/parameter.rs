@@ -1,7 +1,7 @@
 //! Types of run-time parameters, checked when they are made: the ten inertial parameters of a body, numbers of a drive.
 
 use super::{number, of_scalar, routine};
-use crate::description::drives::Number;
+use crate::description::drives::DriveNumber;
 use crate::emit::module::{ParameterOf, ParameterType};
 use crate::emit::Style;
 use crate::identifier::doc;
@@ -148,7 +148,7 @@ fn drive(parameter: &ParameterType, drive: &str, numbers: &DriveNumbers, scalar:
     let ParameterType { name: type_name, input: name, scalars, .. } = parameter;
     let t = scalar.name();
     let of_numbers = format!("{type_name}Numbers");
-    let fields = |text: &dyn Fn(&Number) -> String| numbers.numbers.iter().map(text).collect::<String>();
+    let fields = |text: &dyn Fn(&DriveNumber) -> String| numbers.numbers.iter().map(text).collect::<String>();
     let list = |items: Vec<String>| items.join(", ");
     let declared = fields(&|n| format!("    /// {}.\n    pub {}: {t},\n", n.quantity.meaning, n.name));
     let values = list(numbers.numbers.iter().map(|n| format!("{}: {}", n.name, number(n.value, scalar))).collect());

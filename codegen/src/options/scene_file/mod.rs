@@ -6,7 +6,7 @@ use super::value::Settings;
 use super::Options;
 use crate::description::messages;
 use crate::description::reader::LARGEST_FILE;
-use crate::description::table::{parse, Table};
+use crate::description::table::{parse, TomlTable};
 use crate::diagnostic::{Diagnostics, Source};
 use crate::function::Function;
 use crate::scene::{check, Base, Contacts, Scene};
@@ -93,7 +93,7 @@ fn read_text(source: &Source, diagnostics: &mut Diagnostics) -> Option<SceneFile
         return None;
     }
     let document = parse(source, diagnostics)?;
-    let top = Table { owner: "a scene".to_string(), table: document.get_ref(), span: 0..0 };
+    let top = TomlTable { owner: "a scene".to_string(), table: document.get_ref(), span: 0..0 };
     let file = reader::read(source, &top, diagnostics);
     check::alone(&file.scene, diagnostics);
     Some(file)

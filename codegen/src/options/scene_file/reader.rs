@@ -4,9 +4,9 @@ mod contact;
 mod options;
 
 use super::{SceneFile, LISTS};
-use crate::description::reader::{Range64, Reader};
-use crate::description::table::Table;
-use crate::description::Value;
+use crate::description::reader::{FileReader, Range64};
+use crate::description::table::TomlTable;
+use crate::description::Noted;
 use crate::diagnostic::{Diagnostics, Front, Source};
 use crate::function::Function;
 use crate::options::table::Row;
@@ -38,16 +38,16 @@ enum Kinds {
 }
 
 /// The keys of a table in the order of the file: they come sorted.
-fn in_order(table: &Table) -> Vec<(String, Range<usize>)> {
+fn in_order(table: &TomlTable) -> Vec<(String, Range<usize>)> {
     let mut keys: Vec<_> = table.table.keys().map(|key| (key.get_ref().to_string(), key.span())).collect();
     keys.sort_by_key(|(_, span)| span.start);
     keys
 }
 
 /// Reads a scene file from its top.
-pub fn read(source: &Source, top: &Table, diagnostics: &mut Diagnostics) -> SceneFile {
+pub fn read(source: &Source, top: &TomlTable, diagnostics: &mut Diagnostics) -> SceneFile {
     let mut scene = SceneReader {
-        reader: Reader::new(source, diagnostics),
+        reader: FileReader::new(source, diagnostics),
         file: SceneFile { scene: Scene { places: Places::new(source), ..Scene::default() }, ..SceneFile::default() },
     };
     scene.read(top);
@@ -55,16 +55,16 @@ pub fn read(source: &Source, top: &Table, diagnostics: &mut Diagnostics) -> Scen
 }
 
 /// How a table is read.
-type Read<'a> = fn(&mut SceneReader<'a>, &Table);
+type Read<'a> = fn(&mut SceneReader<'a>, &TomlTable);
 
 /// A scene file that is being read.
 struct SceneReader<'a> {
-    reader: Reader<'a>,
+    reader: FileReader<'a>,
     file: SceneFile,
 }
 
 impl<'a> SceneReader<'a> {
-    fn read(&mut self, top: &Table) {
+    fn read(&mut self, top: &TomlTable) {
         self.reader.check_keys(top, &[LISTS, TABLES].concat());
         let tables: [(&str, Read<'a>); 8] = [
             ("outputs", Self::outputs),
@@ -93,7 +93,7 @@ impl<'a> SceneReader<'a> {
         self.contacts(top);
     }
 
-    fn diagnostics(&mut self, table: &Table) {
+    fn diagnostics(&mut self, table: &TomlTable) {
         self.reader.check_keys(table, &options_of("diagnostics"));
         self.options(table, "diagnostics");
     }
@@ -108,37 +108,37 @@ impl<'a> SceneReader<'a> {
     fn at<T>(
         &mut self,
         path: &str,
-        table: &Table,
+        table: &TomlTable,
         key: &str,
-        read: impl FnOnce(&mut Reader<'a>, &Table, &str) -> Option<Value<T>>,
+        read: impl FnOnce(&mut FileReader<'a>, &TomlTable, &str) -> Option<Noted<T>>,
     ) -> Option<T> {
         let value = read(&mut self.reader, table, key)?;
         self.file.scene.places.note(format!("{path}.{key}"), &value.place);
         Some(value.value)
     }
 
-    fn real(&mut self, path: &str, table: &Table, key: &str) -> Option<f64> {
+    fn real(&mut self, path: &str, table: &TomlTable, key: &str) -> Option<f64> {
         self.at(path, table, key, |reader, table, key| reader.real_at(table, key, Range64::Finite))
     }
 
     /// A name of something, in words; there has to be one.
-    fn needed(&mut self, path: &str, table: &Table, key: &str, what: &str) -> Option<String> {
+    fn needed(&mut self, path: &str, table: &TomlTable, key: &str, what: &str) -> Option<String> {
         self.reader.require(table, key, &format!("{key} = \"...\""));
         self.at(path, table, key, |reader, table, key| reader.name_at(table, key, what))
     }
 
     /// Names in an array, their places noted under that path.
-    fn names(&mut self, path: &str, table: &Table, key: &str, what: &str) -> Vec<String> {
+    fn names(&mut self, path: &str, table: &TomlTable, key: &str, what: &str) -> Vec<String> {
         let names = self.reader.names_at(table, key, what);
         table.get(key).iter().for_each(|(_, span)| self.note(path, span));
-        let note = |(i, name): (usize, Value<String>)| {
+        let note = |(i, name): (usize, Noted<String>)| {
             self.file.scene.places.note(format!("{path}.{i}"), &name.place);
             name.value
         };
         names.into_iter().enumerate().map(note).collect()
     }
 
-    fn outputs(&mut self, table: &Table) {
+    fn outputs(&mut self, table: &TomlTable) {
         let names: Vec<&str> = Function::known().map(Function::name).collect();
         self.reader
             .check_keys(table, &[&options_of("outputs")[..], &["staged", "matrices", "contact"], &names[..]].concat());
@@ -171,7 +171,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    fn hold(&mut self, table: &Table) {
+    fn hold(&mut self, table: &TomlTable) {
         self.reader.check_keys(table, &["gravity", "base", "joints"]);
         if let Some((value, span)) = table.get("gravity") {
             self.note("hold.gravity", &span);
@@ -202,22 +202,22 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    fn payload(&mut self, mut table: Table) {
+    fn payload(&mut self, mut table: TomlTable) {
         let path = format!("payload.{}", self.file.scene.payloads.len());
         let name = self.named_table(&path, "payload", &mut table);
         self.reader.check_keys(&table, &["name", "frame", "mass", "com", "inertia"]);
         let frame = self.needed(&path, &table, "frame", "frame");
         self.reader.require(&table, "mass", "mass = 1.0");
         let mass = self.real(&path, &table, "mass");
-        let com = self.at(&path, &table, "com", Reader::vector_at).unwrap_or_default();
-        let inertia = self.at(&path, &table, "inertia", Reader::tensor_at);
+        let com = self.at(&path, &table, "com", FileReader::vector_at).unwrap_or_default();
+        let inertia = self.at(&path, &table, "inertia", FileReader::tensor_at);
         let inertia = inertia.map_or([0.0; 6], |j| [j.xx, j.xy, j.xz, j.yy, j.yz, j.zz]);
         if let (Some(name), Some(frame), Some(mass)) = (name, frame, mass) {
             self.file.scene.payloads.push(Payload { name, frame, mass, com, inertia });
         }
     }
 
-    fn zero(&mut self, table: &Table) {
+    fn zero(&mut self, table: &TomlTable) {
         self.reader.check_keys(table, &["qd", "qdd", "joints_at_rest"]);
         let mut flag = |key: &str| self.reader.flag_at(table, key).is_some_and(|flag| flag.value);
         let (qd, qdd) = (flag("qd"), flag("qdd"));
@@ -225,7 +225,7 @@ impl<'a> SceneReader<'a> {
         self.file.scene.zero = Zero { qd, qdd, joints_at_rest };
     }
 
-    fn effects(&mut self, table: &Table) {
+    fn effects(&mut self, table: &TomlTable) {
         let own = ["rotor_inertia", "damping", "coulomb", "coulomb_speed", "springs"];
         self.reader.check_keys(
             table,
@@ -264,7 +264,7 @@ impl<'a> SceneReader<'a> {
         };
     }
 
-    fn parameter(&mut self, table: Table) {
+    fn parameter(&mut self, table: TomlTable) {
         let path = format!("parameter.{}", self.file.scene.parameters.len());
         self.note(&path, &table.span);
         self.reader.require(&table, "kind", "kind = \"payload\"");
@@ -293,7 +293,7 @@ impl<'a> SceneReader<'a> {
         self.file.scene.parameters.extend(parameter);
     }
 
-    fn numbers(&mut self, table: &Table) {
+    fn numbers(&mut self, table: &TomlTable) {
         self.reader.check_keys(table, &[&options_of("numbers")[..], &["ranges"]].concat());
         self.options(table, "numbers");
         if let Some(ranges) = self.reader.table_at(table, "ranges", "[numbers.ranges]") {
@@ -301,7 +301,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    fn ranges(&mut self, table: &Table) {
+    fn ranges(&mut self, table: &TomlTable) {
         self.reader.check_keys(table, &["q", "qd", "qdd", "tau", "gravity"]);
         self.note("numbers.ranges", &table.span);
         let [q, qd, qdd, tau] = ["q", "qd", "qdd", "tau"].map(|input| self.joint_ranges(table, input));
@@ -310,7 +310,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// The range of an input: one for all joints, or a table by joint.
-    fn joint_ranges(&mut self, table: &Table, input: &str) -> JointRanges {
+    fn joint_ranges(&mut self, table: &TomlTable, input: &str) -> JointRanges {
         let path = format!("numbers.ranges.{input}");
         let Some((DeValue::Table(_), span)) = table.get(input) else {
             return self.range(table, input, &path).map_or(JointRanges::Limits, JointRanges::All);
@@ -328,7 +328,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// `[lower, upper]`, one number for both sides of zero, or `"unlimited"`.
-    fn range(&mut self, table: &Table, key: &str, path: &str) -> Option<Interval> {
+    fn range(&mut self, table: &TomlTable, key: &str, path: &str) -> Option<Interval> {
         let (value, span) = table.get(key)?;
         self.note(path, &span);
         match value {
@@ -352,7 +352,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// A number for all results, an array with one for each, or, where they may be named, a table of such by output.
-    fn max_error(&mut self, table: &Table, key: &str, path: &str, named: bool) -> Option<MaxError> {
+    fn max_error(&mut self, table: &TomlTable, key: &str, path: &str, named: bool) -> Option<MaxError> {
         let (value, span) = table.get(key)?;
         let place = self.reader.place(&span);
         self.file.scene.places.note(path, &place);
@@ -397,7 +397,7 @@ impl<'a> SceneReader<'a> {
         Some(found)
     }
 
-    fn budgets(&mut self, table: &Table) {
+    fn budgets(&mut self, table: &TomlTable) {
         let names: Vec<&str> = Function::known().map(Function::name).collect();
         self.reader.check_keys(table, &names);
         let wanted: Option<Vec<Function>> = self.file.settings.value("functions").map(value::Value::choices);
@@ -407,7 +407,7 @@ impl<'a> SceneReader<'a> {
             self.reader.check_keys(&limits, BUDGET);
             let path = format!("budget.{name}");
             self.note(&path, &limits.span);
-            let mut limit = |key: &str| self.at(&path, &limits, key, Reader::count_at);
+            let mut limit = |key: &str| self.at(&path, &limits, key, FileReader::count_at);
             let budget = Budget {
                 max_flops: limit("max_flops"),
                 max_sincos: limit("max_sincos"),

@@ -1,7 +1,7 @@
 //! Run-time parameters: their types, and the constructors that make them.
 
 use super::{Around, Read};
-use crate::description::drives::{Must, Number};
+use crate::description::drives::{DriveNumber, Must};
 use crate::program::written::DriveNumbers;
 use crate::readback::items::Sort;
 use straightline_core::Dd;
@@ -41,7 +41,7 @@ impl Around<'_, '_, '_> {
         let (all, of_numbers) = (&numbers.numbers, format!("{name}Numbers"));
         let first = &all[0].name;
         let written = |x: Dd| self.scalar().literal(self.scalar().nearest(x));
-        let each = |text: &dyn Fn(&Number) -> String| all.iter().map(text).collect::<Vec<_>>();
+        let each = |text: &dyn Fn(&DriveNumber) -> String| all.iter().map(text).collect::<Vec<_>>();
         let fields: String = each(&|x| format!("pub {}: {s},", x.name)).concat();
         let values = each(&|x| format!("{}: {}", x.name, written(Dd::from(x.value)))).join(", ");
         let given = each(&|x| format!("numbers.{}", x.name)).join(", ");

@@ -1,7 +1,7 @@
 //! What gives way of a robot: flexible links as rigid groups with springs between them, and springs below the root link.
 
 use super::{vector, Group, GroupJoint, Part, Placed};
-use crate::description::flexible::{Bending, Flexible, Support};
+use crate::description::flexible::{BaseSupport, Bending, Flexible};
 use crate::description::Description;
 use crate::model::ModelOptions;
 use nalgebra::{Matrix3, Vector3};
@@ -13,7 +13,7 @@ pub(super) struct Elastic<'a> {
     /// Links that are cut into segments.
     pub links: Vec<&'a Flexible>,
     /// Springs below the root link.
-    pub support: Option<&'a Support>,
+    pub support: Option<&'a BaseSupport>,
 }
 
 impl<'a> Elastic<'a> {
@@ -49,11 +49,11 @@ impl Segments {
 
 /// The bodies between the world and the root link `root` on springs: joint frames parallel with the world's in the support's
 /// point, link frames in the same place at rest.
-pub(super) fn stand(support: &Support, root: &str, groups: &mut Vec<Group>) -> (usize, Placed) {
+pub(super) fn stand(support: &BaseSupport, root: &str, groups: &mut Vec<Group>) -> (usize, Placed) {
     let given: Vec<usize> = (0..6).filter(|k| support.directions[*k].is_some()).collect();
     for (i, k) in given.iter().enumerate() {
         let position = if i == 0 { vector(&support.at) } else { Vector3::zeros() };
-        let name = format!("support_{}", Support::DIRECTIONS[*k]);
+        let name = format!("support_{}", BaseSupport::DIRECTIONS[*k]);
         groups.push(Group {
             joint: Some(GroupJoint {
                 parent: groups.len() - 1,

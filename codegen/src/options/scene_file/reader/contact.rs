@@ -1,9 +1,9 @@
 //! The tables `[[contact]]`, `[[loop]]`, `[[mode]]` and `[stabilisation]`.
 
 use super::SceneReader;
-use crate::description::reader::Reader;
-use crate::description::table::Table;
-use crate::description::Value;
+use crate::description::reader::FileReader;
+use crate::description::table::TomlTable;
+use crate::description::Noted;
 use crate::scene::contact::{
     ContactItem, EnvironmentItem, EnvironmentKind, LoopItem, ModeItem, ObjectPose, SurfaceItem,
 };
@@ -24,12 +24,12 @@ const FORMS: [(&str, Form); 4] =
     [("plane", Form::Plane), ("sphere", Form::Sphere), ("cylinder", Form::Cylinder), ("quadric", Form::Quadric)];
 
 /// Whether a key says `"input"`.
-fn is_input(table: &Table, key: &str) -> bool {
+fn is_input(table: &TomlTable, key: &str) -> bool {
     matches!(table.get(key), Some((DeValue::String(text), _)) if text.as_ref() == "input")
 }
 
 impl SceneReader<'_> {
-    pub(super) fn contacts(&mut self, top: &Table) {
+    pub(super) fn contacts(&mut self, top: &TomlTable) {
         for table in self.reader.tables_at(top, "contact") {
             self.contact(table);
         }
@@ -48,7 +48,7 @@ impl SceneReader<'_> {
         }
     }
 
-    fn coordinates(&mut self, path: &str, table: &Table, key: &str) -> Vec<Coordinate> {
+    fn coordinates(&mut self, path: &str, table: &TomlTable, key: &str) -> Vec<Coordinate> {
         let known: Vec<&str> = Coordinate::ALL.iter().map(|c| c.name()).collect();
         table.get(key).iter().for_each(|(_, span)| self.note(path, span));
         let mut found = Vec::new();
@@ -65,14 +65,14 @@ impl SceneReader<'_> {
     }
 
     /// Name, its place noted, and the table under it.
-    pub(super) fn named_table(&mut self, path: &str, kind: &str, table: &mut Table) -> Option<String> {
+    pub(super) fn named_table(&mut self, path: &str, kind: &str, table: &mut TomlTable) -> Option<String> {
         let name = self.needed(path, table, "name", kind);
         name.iter().for_each(|name| table.owner = format!("{kind} `{name}`"));
         self.note(path, &table.span);
         name
     }
 
-    fn contact(&mut self, mut table: Table) {
+    fn contact(&mut self, mut table: TomlTable) {
         let path = format!("contact.{}", self.file.scene.contacts.contacts.len());
         let name = self.named_table(&path, "contact", &mut table);
         const KEYS: &[&str] =
@@ -87,7 +87,7 @@ impl SceneReader<'_> {
         let frame = self.needed(&path, &table, "frame", "frame");
         let axis = match is_input(&table, "axis") {
             true => None,
-            false => Some(self.at(&path, &table, "axis", Reader::vector_at).unwrap_or([0.0, 0.0, 1.0])),
+            false => Some(self.at(&path, &table, "axis", FileReader::vector_at).unwrap_or([0.0, 0.0, 1.0])),
         };
         let object = match is_input(&table, "object") {
             true => None,
@@ -115,7 +115,7 @@ impl SceneReader<'_> {
         }
     }
 
-    fn object(&mut self, path: &str, table: &Table) -> Option<ObjectPose> {
+    fn object(&mut self, path: &str, table: &TomlTable) -> Option<ObjectPose> {
         let object = match table.get("object") {
             Some((value @ DeValue::String(_), span)) => {
                 let forms = "`{ origin = [0.5, 0.0, 0.2], z = [0.0, 0.0, 1.0], x = [1.0, 0.0, 0.0] }` or `\"input\"`";
@@ -127,7 +127,7 @@ impl SceneReader<'_> {
         self.reader.check_keys(&object, &["origin", "z", "x"]);
         let path = format!("{path}.object");
         self.note(&path, &object.span);
-        let mut vector = |key: &str| self.at(&path, &object, key, Reader::vector_at);
+        let mut vector = |key: &str| self.at(&path, &object, key, FileReader::vector_at);
         let (origin, z, x) = (vector("origin"), vector("z"), vector("x"));
         let z = z.unwrap_or([0.0, 0.0, 1.0]);
         // of the world's axes the one that is farthest from Z
@@ -137,12 +137,12 @@ impl SceneReader<'_> {
         Some(ObjectPose { origin: origin.unwrap_or_default(), z, x: x.unwrap_or(farthest) })
     }
 
-    fn surface(&mut self, path: &str, table: &Table) -> SurfaceItem {
+    fn surface(&mut self, path: &str, table: &TomlTable) -> SurfaceItem {
         let Some(surface) = self.reader.table_at(table, "surface", &table.what("surface")) else {
             return SurfaceItem::Plane;
         };
         self.reader.require(&surface, "kind", "kind = \"sphere\"");
-        let Some(Value { value: form, .. }) = self.reader.word_at(&surface, "kind", &FORMS) else {
+        let Some(Noted { value: form, .. }) = self.reader.word_at(&surface, "kind", &FORMS) else {
             return SurfaceItem::Plane;
         };
         let keys: &[&str] = match form {
@@ -166,16 +166,16 @@ impl SceneReader<'_> {
             }
             Form::Quadric => {
                 self.reader.require(&surface, "matrix", "matrix = { xx = 1.0, yy = 1.0, zz = 4.0 }");
-                let matrix = self.at(&path, &surface, "matrix", Reader::tensor_at);
+                let matrix = self.at(&path, &surface, "matrix", FileReader::tensor_at);
                 let matrix = matrix.map_or([0.0; 6], |m| [m.xx, m.xy, m.xz, m.yy, m.yz, m.zz]);
-                let linear = self.at(&path, &surface, "linear", Reader::vector_at).unwrap_or_default();
+                let linear = self.at(&path, &surface, "linear", FileReader::vector_at).unwrap_or_default();
                 let constant = self.real(&path, &surface, "constant").unwrap_or_default();
                 SurfaceItem::Quadric { matrix, linear, constant }
             }
         }
     }
 
-    fn environment(&mut self, path: &str, table: &Table) -> Option<EnvironmentItem> {
+    fn environment(&mut self, path: &str, table: &TomlTable) -> Option<EnvironmentItem> {
         let environment = self.reader.table_at(table, "environment", &table.what("environment"))?;
         let path = format!("{path}.environment");
         self.note(&path, &environment.span);
@@ -195,7 +195,7 @@ impl SceneReader<'_> {
         Some(EnvironmentItem { kind, values: Some(values) })
     }
 
-    fn a_loop(&mut self, mut table: Table) {
+    fn a_loop(&mut self, mut table: TomlTable) {
         let path = format!("loop.{}", self.file.scene.contacts.loops.len());
         let name = self.named_table(&path, "loop", &mut table);
         self.reader.check_keys(&table, &["name", "frame", "with", "constrained"]);
@@ -210,7 +210,7 @@ impl SceneReader<'_> {
         }
     }
 
-    fn mode(&mut self, mut table: Table) {
+    fn mode(&mut self, mut table: TomlTable) {
         let path = format!("mode.{}", self.file.scene.contacts.modes.len());
         let name = self.named_table(&path, "mode", &mut table);
         self.reader.check_keys(&table, &["name", "contacts", "sticking"]);
@@ -222,7 +222,7 @@ impl SceneReader<'_> {
     }
 
     /// `contact` of `[outputs]`: functions of every mode.
-    pub(super) fn contact_functions(&mut self, table: &Table) {
+    pub(super) fn contact_functions(&mut self, table: &TomlTable) {
         if !table.has("contact") {
             return;
         }

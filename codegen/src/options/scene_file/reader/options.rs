@@ -3,7 +3,7 @@
 use super::SceneReader;
 use crate::description::messages;
 use crate::description::reader::Range64;
-use crate::description::table::Table;
+use crate::description::table::TomlTable;
 use crate::diagnostic::Front;
 use crate::options::table::{Call, Kind, Row, TABLE};
 use crate::options::value::{Value, Vocabulary};
@@ -18,7 +18,7 @@ pub(super) fn options_of(table: &str) -> Vec<&'static str> {
 
 impl SceneReader<'_> {
     /// `[options]`: a key that stands elsewhere is told where.
-    pub(super) fn own_options(&mut self, table: &Table) {
+    pub(super) fn own_options(&mut self, table: &TomlTable) {
         let known = options_of("options");
         for key in table.table.keys().filter(|key| !known.contains(&key.get_ref().as_ref())) {
             let elsewhere = TABLE.iter().find(|row| row.name == key.get_ref().as_ref()).map(|row| match row.scene {
@@ -34,7 +34,7 @@ impl SceneReader<'_> {
     }
 
     /// The options that stand in a table of that name.
-    pub(super) fn options(&mut self, table: &Table, name: &str) {
+    pub(super) fn options(&mut self, table: &TomlTable, name: &str) {
         for row in TABLE.iter().filter(|row| row.stands_in(name)) {
             let Some((_, span)) = table.get(row.name) else { continue };
             let place = self.reader.place(&span);
@@ -48,7 +48,7 @@ impl SceneReader<'_> {
     }
 
     /// The value of an option; `None` after a complaint that leaves nothing of it.
-    fn option(&mut self, table: &Table, row: &'static Row, span: &Range<usize>) -> Option<Value> {
+    fn option(&mut self, table: &TomlTable, row: &'static Row, span: &Range<usize>) -> Option<Value> {
         let (reader, key) = (&mut self.reader, row.name);
         let number = match &row.kind {
             Kind::Flag => return reader.flag_at(table, key).map(|flag| flag.value.into()),
@@ -67,7 +67,7 @@ impl SceneReader<'_> {
     }
 
     /// The words of an option: one as a text, several in an array. Of codes those count that are right.
-    fn words(&mut self, table: &Table, row: &'static Row) -> Option<Value> {
+    fn words(&mut self, table: &TomlTable, row: &'static Row) -> Option<Value> {
         let (reader, key) = (&mut self.reader, row.name);
         let is_codes = matches!(row.kind, Kind::Codes(_));
         let (words, count) = match (table.get(key)?.0, &row.kind) {
