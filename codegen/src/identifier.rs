@@ -10,7 +10,7 @@ use deunicode::deunicode_with_tofu;
 
 mod reserved;
 
-use reserved::RESERVED;
+use reserved::{words, RESERVED};
 
 /// An identifier has at most so many characters, without what it gets for being reserved.
 const LONGEST: usize = 64;
@@ -58,7 +58,7 @@ pub fn identifier(name: &str, what: &str) -> String {
 /// for them. A keyword, or a type that the module would hide, gets a word more.
 pub fn module_name(name: &str, what: &str) -> String {
     let word = snake_case(name);
-    match RESERVED[..2].iter().any(|group| group.contains(&word.as_str())) {
+    match words(&RESERVED[..2]).any(|reserved| reserved == word) {
         true => format!("{word}_{what}"),
         false => word,
     }
@@ -75,16 +75,14 @@ pub fn upper_camel_case(name: &str) -> String {
 
 /// All words that are reserved one by one.
 pub fn reserved() -> impl Iterator<Item = &'static str> {
-    RESERVED.iter().copied().flatten().copied()
+    words(&RESERVED)
 }
 
 /// Whether a word of small letters, or the type made of it, means something else in generated code.
 pub fn is_reserved(word: &str) -> bool {
     let type_name = upper_camel_case(word);
-    let is_word = |r: &str| r == word || upper_camel_case(r) == type_name;
-    let is_in_the_table = |word: &str| RESERVED.iter().any(|group| group.contains(&word));
-    RESERVED.iter().any(|group| group.iter().any(|r| is_word(r)))
-        || word.strip_suffix("_error").is_some_and(is_in_the_table)
+    reserved().any(|r| r == word || upper_camel_case(r) == type_name)
+        || word.strip_suffix("_error").is_some_and(|word| reserved().any(|r| r == word))
         || Quantity::named(word).is_some()
         || belongs_to_a_function(word)
 }
@@ -243,7 +241,7 @@ mod tests {
 
     #[test]
     fn no_reserved_word_is_left_as_an_identifier() {
-        for word in RESERVED.concat() {
+        for word in reserved() {
             assert_eq!(snake_case(word), word, "reserved words are written as identifiers are");
             assert!(is_reserved(word) && !is_reserved(&identifier(word, "body")), "{word}");
             assert!(!is_reserved(&identifier(word, "mode")), "{word}");

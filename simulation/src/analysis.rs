@@ -167,8 +167,7 @@ pub fn analyze_by(
     motion: &Motion,
     interval: f64,
 ) -> Result<Analysis, Failure> {
-    let mut joints: Vec<&Joint> = model.bodies.iter().map(|b| &b.joint).collect();
-    joints.sort_by_key(|j| j.iv);
+    let joints = model.joints();
     check(motion, interval, 1 + 11 * joints.len() + 7 * model.drives.len())?;
     let instants = instants(motion, interval);
     let names = |prefixes: &[&str], ends: &[&str]| -> Vec<String> {

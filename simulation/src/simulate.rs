@@ -322,8 +322,7 @@ const ENERGY_COLUMNS: [&str; DriveEnergies::COUNT] =
     ["electrical", "joule", "motor_friction", "gear_losses", "damper_losses", "conversion"];
 
 pub(crate) fn names(plant: &Plant, command: &Command) -> Vec<String> {
-    let mut joints: Vec<_> = plant.model.bodies.iter().map(|b| &b.joint).collect();
-    joints.sort_by_key(|j| j.iv);
+    let joints = plant.model.joints();
     let named = |prefix: &str, entries: fn(&Descriptor) -> &'static [&'static str]| -> Vec<String> {
         let of = |joint: &&straightline_core::model::Joint| match joint.kind.is_single() {
             true => vec![format!("{prefix}.{}", joint.name)],

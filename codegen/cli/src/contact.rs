@@ -2,7 +2,7 @@
 
 use crate::arguments::Simulate;
 use crate::files::{self, read as read_file};
-use crate::motion::{failed, lines, print_run, write_table};
+use crate::motion::{failed, lines, print_run, undrawn, write_table};
 use crate::{print, Failure};
 use anstream::stdout;
 use std::io::Write;
@@ -61,10 +61,7 @@ pub fn finish(
             energies.lines.push(line);
         }
         let plots = [plot("distance s", "m", &["s."]), plot("reaction F", "N or N·m", &["F.", "friction."]), energies];
-        let svg = stacked(&plots, PLOTS).map_err(|why| {
-            print::error(&format!("the plot cannot be drawn: {why}"));
-            Failure::Input
-        })?;
+        let svg = stacked(&plots, PLOTS).map_err(undrawn)?;
         files::write(path, &svg)?;
     }
     let mut out = stdout().lock();

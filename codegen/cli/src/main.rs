@@ -6,6 +6,8 @@
 mod arguments;
 #[cfg(feature = "simulation")]
 mod contact;
+#[cfg(feature = "simulation")]
+mod figures;
 #[cfg_attr(not(feature = "simulation"), allow(dead_code))]
 mod files;
 mod given;
@@ -17,6 +19,8 @@ mod motion_arguments;
 mod page;
 #[cfg_attr(not(feature = "simulation"), allow(dead_code))]
 mod print;
+#[cfg(feature = "simulation")]
+mod search;
 
 use arguments::{Check, Command, CommandLine, Export, Generate, ModelArgs, ProgramArgs, Report, Verify};
 use files::read;
@@ -103,10 +107,7 @@ fn compiled_by(
             print::diagnostics(&generated.warnings, Severity::Warning);
             Ok((generated, options))
         }
-        Err(diagnostics) => {
-            print::diagnostics(&diagnostics, Severity::Warning);
-            Err(Failure::Input)
-        }
+        Err(diagnostics) => Err(print::refused(&diagnostics)),
     }
 }
 
@@ -117,9 +118,7 @@ fn explain_code(code: Option<&str>) -> Result<(), Failure> {
         Some(found) => Ok(print::codes(std::slice::from_ref(found))?),
         None => {
             let complaint = diagnostic::messages::unknown_code(code);
-            print::error(&complaint.title);
-            print::help(&complaint.help);
-            Err(Failure::Input)
+            Err(print::failure_with(complaint.title, &[complaint.help]))
         }
     }
 }
@@ -132,17 +131,14 @@ fn generate(a: &Generate) -> Result<(), Failure> {
         return Ok(());
     }
     let (file, robot) = (path.display(), a.robot.display());
+    let help = ["run the same command without --check and commit the file"];
     match std::fs::read(path) {
         Ok(old) if old == generated.text.as_bytes() => Ok(()),
         Ok(_) => {
-            print::error(&format!("{file} is stale: it is not what {robot} and these options give"));
-            print::help("run the same command without --check and commit the file");
-            Err(Failure::Input)
+            Err(print::failure_with(format!("{file} is stale: it is not what {robot} and these options give"), &help))
         }
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            print::error(&format!("{file} does not exist"));
-            print::help("run the same command without --check and commit the file");
-            Err(Failure::Input)
+            Err(print::failure_with(format!("{file} does not exist"), &help))
         }
         Err(e) => Err(io::Error::new(e.kind(), format!("{file}: {e}")).into()),
     }
@@ -177,10 +173,9 @@ fn check(a: &Check) -> Result<(), Failure> {
         }
         wrong |= diagnostics.has_errors();
     }
-    if wrong {
-        Err(Failure::Input)
-    } else {
-        Ok(())
+    match wrong {
+        true => Err(Failure::Input),
+        false => Ok(()),
     }
 }
 
@@ -190,16 +185,11 @@ fn verify(a: &Verify) -> Result<(), Failure> {
     let progress = print::bar("verifying", a.states.into());
     let verified = verify::verify(&source, &generated, &options, (a.states, a.seed), || progress.inc(1));
     progress.finish_and_clear();
-    let verification = verified.map_err(|what| {
-        print::error(&format!("{}: {what}", source.path()));
-        Failure::Input
-    })?;
+    let verification = verified.map_err(|what| print::failure(format!("{}: {what}", source.path())))?;
     if a.json { print::json(&verification) } else { print::verification(&verification) }?;
-    if verification.passes() {
-        Ok(())
-    } else {
-        print::error(&format!("an error exceeds the bound {:.1e}", verification.bound));
-        Err(Failure::Input)
+    match verification.passes() {
+        true => Ok(()),
+        false => Err(print::failure(format!("an error exceeds the bound {:.1e}", verification.bound))),
     }
 }
 
@@ -208,9 +198,7 @@ fn export(a: &Export) -> Result<(), Failure> {
     let name = a.kind.as_deref().unwrap_or(C_ABI.name);
     let kind = PACKAGES.iter().find(|p| p.name == name).unwrap_or(&C_ABI);
     if let Some([wrong, help]) = (kind.refusal)(&generated) {
-        print::error(wrong);
-        print::help(help);
-        return Err(Failure::Input);
+        return Err(print::failure_with(wrong, &[help]));
     }
     let prefix = a.prefix.clone().unwrap_or_else(|| identifier::prefix(&generated.model.name));
     output::write_directory(&a.output, &(kind.files)(&generated, &prefix))?;

@@ -1,11 +1,13 @@
 //! The page of an analysis: what a motion asks of every joint and drive, in the style of the report.
 
 use super::arguments::Analyze;
-use super::motion::{drive_remarks, lines, violations, Swept};
+use super::figures::{drive_remarks, violations};
+use super::motion::lines;
+use super::search::Swept;
 use std::path::Path;
 use straightline_cli::html::STYLE;
 use straightline_codegen::diagnostic::six_digits;
-use straightline_core::drive::Actuator;
+use straightline_core::drive::{Actuator, Drive};
 use straightline_core::model::{Joint, Model};
 use straightline_simulation::advice::Advice;
 use straightline_simulation::analysis::{Analysis, JointFigures};
@@ -84,18 +86,11 @@ fn joint_rows(found: &Analysis) -> Vec<Vec<String>> {
     let beside = |x: f64, most: f64| if x.abs() < 1e-12 * most { 0.0 } else { x };
     let row = |j: &JointFigures| {
         let speed = units(j).1;
-        vec![
-            j.name.clone(),
-            with_unit(j.peak.0, j.unit),
-            with_unit(j.peak.1, "s"),
-            with_unit(j.rms, j.unit),
-            with_unit(j.speed, speed),
-            with_unit(beside(j.power, power), "W"),
-            with_unit(beside(j.given, energy), "J"),
-            with_unit(beside(j.taken, energy), "J"),
-            with_unit(j.carried.0, "N"),
-            with_unit(j.carried.1, "N·m"),
-        ]
+        let loads = [(j.peak.0, j.unit), (j.peak.1, "s"), (j.rms, j.unit), (j.speed, speed)];
+        let powers = [(j.power, power, "W"), (j.given, energy, "J"), (j.taken, energy, "J")];
+        let powers = powers.map(|(x, most, unit)| (beside(x, most), unit));
+        let cells = loads.into_iter().chain(powers).chain([(j.carried.0, "N"), (j.carried.1, "N·m")]);
+        std::iter::once(j.name.clone()).chain(cells.map(|(x, unit)| with_unit(x, unit))).collect()
     };
     found.joints.iter().map(row).collect()
 }
@@ -131,87 +126,53 @@ fn joint_panels(figures: &JointFigures, joint: Option<&Joint>, table: &Table) ->
 
 fn drives_section(page: &mut Page, model: &Model<f64>, drives: &DriveAnalysis) {
     page.heading("Drives", "Settled: after the motion over and over again.");
-    let head = [
-        "drive",
-        "input",
-        "current",
-        "rms",
-        "speed",
-        "torque",
-        "power",
-        "taken",
-        "given back",
-        "heat",
-        "winding",
-        "settled",
-    ];
+    let head = "drive|input|current|rms|speed|torque|power|taken|given back|heat|winding|settled";
     let row = |d: &DriveFigures| {
         let of = |heat: fn(&Heating) -> f64| d.heating.as_ref().map_or("–".to_string(), |h| with_unit(heat(h), "°C"));
-        vec![
-            d.name.clone(),
-            with_unit(d.input.0, "V"),
-            with_unit(d.current.0, "A"),
-            with_unit(d.rms_current, "A"),
-            with_unit(d.speed, "rad/s"),
-            with_unit(d.torque, "N·m"),
-            with_unit(d.power, "W"),
-            with_unit(d.energy.0, "J"),
-            with_unit(d.energy.1, "J"),
-            with_unit(d.joule, "J"),
-            of(|h| h.peak),
-            of(|h| h.settled.0),
-        ]
+        let electrical = [(d.input.0, "V"), (d.current.0, "A"), (d.rms_current, "A")];
+        let mechanical = [(d.speed, "rad/s"), (d.torque, "N·m"), (d.power, "W")];
+        let energies = [(d.energy.0, "J"), (d.energy.1, "J"), (d.joule, "J")];
+        let cells = [electrical, mechanical, energies].concat().into_iter().map(|(x, unit)| with_unit(x, unit));
+        std::iter::once(d.name.clone()).chain(cells).chain([of(|h| h.peak), of(|h| h.settled.0)]).collect()
     };
-    page.table(&head, &drives.drives.iter().map(row).collect::<Vec<_>>());
-    let cards: Vec<(String, Vec<String>)> = model
-        .drives
-        .iter()
-        .zip(&drives.drives)
-        .map(|(drive, figures)| {
-            let quantities = [
-                ("u", "input", "V"),
-                ("i", "current", "A"),
-                ("electrical", "electrical power", "W"),
-                ("winding", "temperature of the winding", "°C"),
-            ];
-            let mut panels: Vec<String> = quantities
-                .into_iter()
-                .filter(|(prefix, ..)| *prefix != "winding" || figures.heating.is_some())
-                .map(|(prefix, title, unit)| {
-                    let lines = vec![over_time(&drives.table, prefix, &drive.name)];
-                    Panel { title, units: ("s", unit), lines, levels: Vec::new() }.svg()
-                })
-                .collect();
-            if let Actuator::Motor(motor) = &drive.actuator {
-                let column =
-                    |prefix: &str| drives.table.column(&format!("{prefix}.{}", drive.name)).unwrap_or_default();
-                let torques = column("i").into_iter().map(|i| motor.torque_constant * i);
-                let ran: Vec<(f64, f64)> = column("speed").into_iter().zip(torques).collect();
-                // limits far beyond what the motion takes would flatten it
-                let (reach, most) = (1.3 * figures.speed.max(1.0), 2.0 * motor.torque_constant * figures.current.0);
-                let allowed = |upper: bool| -> Vec<(f64, f64)> {
-                    let at = |k: i32| {
-                        let speed = reach * f64::from(k) / 100.0;
-                        let (least, greatest) =
-                            torque_limits(drive, speed).unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-                        (speed, if upper { greatest } else { least })
-                    };
-                    (-100..=100).map(at).filter(|(_, torque)| torque.abs() <= most).collect()
-                };
-                let continuous = drive.rating.continuous_current.map(|i| motor.torque_constant * i);
-                let levels = continuous.map_or_else(Vec::new, |torque| vec![-torque, torque]);
-                let title = "torque against speed";
-                let lines = vec![ran, allowed(true), allowed(false)];
-                panels.push(Panel { title, units: ("rad/s", "N·m"), lines, levels }.svg());
-            }
-            (drive.name.clone(), panels)
-        })
-        .collect();
+    page.table(&head.split('|').collect::<Vec<_>>(), &drives.drives.iter().map(row).collect::<Vec<_>>());
     page.heading(
         "Drive by drive",
         "Speed and torque of motors with what voltage and current allow; dashed: what is allowed for ever.",
     );
-    page.cards(&cards);
+    let of_each = model.drives.iter().zip(&drives.drives);
+    let cards = of_each.map(|(drive, figures)| (drive.name.clone(), drive_panels(drive, figures, &drives.table)));
+    page.cards(&cards.collect::<Vec<_>>());
+}
+
+fn drive_panels(drive: &Drive<f64>, figures: &DriveFigures, table: &Table) -> Vec<String> {
+    let panel = |prefix: &str, title: &str, unit: &str| {
+        let lines = vec![over_time(table, prefix, &drive.name)];
+        Panel { title, units: ("s", unit), lines, levels: Vec::new() }.svg()
+    };
+    let mut panels =
+        vec![panel("u", "input", "V"), panel("i", "current", "A"), panel("electrical", "electrical power", "W")];
+    panels.extend(figures.heating.iter().map(|_| panel("winding", "temperature of the winding", "°C")));
+    if let Actuator::Motor(motor) = &drive.actuator {
+        let column = |prefix: &str| table.column(&format!("{prefix}.{}", drive.name)).unwrap_or_default();
+        let torques = column("i").into_iter().map(|i| motor.torque_constant * i);
+        let ran: Vec<(f64, f64)> = column("speed").into_iter().zip(torques).collect();
+        // limits far beyond what the motion takes would flatten it
+        let (reach, most) = (1.3 * figures.speed.max(1.0), 2.0 * motor.torque_constant * figures.current.0);
+        let allowed = |upper: bool| -> Vec<(f64, f64)> {
+            let at = |k: i32| {
+                let speed = reach * f64::from(k) / 100.0;
+                let (least, greatest) = torque_limits(drive, speed).unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+                (speed, if upper { greatest } else { least })
+            };
+            (-100..=100).map(at).filter(|(_, torque)| torque.abs() <= most).collect()
+        };
+        let continuous = drive.rating.continuous_current.map(|i| motor.torque_constant * i);
+        let levels = continuous.map_or_else(Vec::new, |torque| vec![-torque, torque]);
+        let lines = vec![ran, allowed(true), allowed(false)];
+        panels.push(Panel { title: "torque against speed", units: ("rad/s", "N·m"), lines, levels }.svg());
+    }
+    panels
 }
 
 fn sweep_section(page: &mut Page, path: &str, found: &Analysis, swept: &[Swept]) {

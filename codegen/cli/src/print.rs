@@ -1,5 +1,6 @@
 //! What the person sees.
 
+use crate::Failure;
 use anstream::{eprintln, stdout};
 use anstyle::{AnsiColor, Style};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -32,9 +33,23 @@ pub fn error(text: &str) {
     eprintln!("{ERROR}error{ERROR:#}: {text}");
 }
 
-/// A remedy.
-pub fn help(text: &str) {
-    eprintln!("{HELP}help{HELP:#}: {text}");
+/// An error that no diagnostic says: why a command ends.
+pub fn failure(text: impl AsRef<str>) -> Failure {
+    error(text.as_ref());
+    Failure::Input
+}
+
+/// The same with remedies.
+pub fn failure_with(text: impl AsRef<str>, help: &[impl AsRef<str>]) -> Failure {
+    error(text.as_ref());
+    help.iter().for_each(|help| eprintln!("{HELP}help{HELP:#}: {}", help.as_ref()));
+    Failure::Input
+}
+
+/// What is worth a warning, and that the command ends.
+pub fn refused(all: &Diagnostics) -> Failure {
+    diagnostics(all, Severity::Warning);
+    Failure::Input
 }
 
 /// Whether warnings and progress are left out.

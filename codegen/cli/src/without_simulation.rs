@@ -23,11 +23,10 @@ impl Simulate {
 }
 
 pub fn simulate(_: &Simulate) -> Result<(), Failure> {
-    print::error("this `straightline` has no simulation: it was built without the feature `simulation`");
-    print::help(
-        "cargo install --path codegen/cli --features simulation, or parquet, which reads and writes Parquet files, too",
-    );
-    Err(Failure::Input)
+    Err(print::failure_with(
+        "this `straightline` has no simulation: it was built without the feature `simulation`",
+        &["cargo install --path codegen/cli --features simulation, or parquet, which reads and writes Parquet files, too"],
+    ))
 }
 
 pub fn analyze(a: &Analyze) -> Result<(), Failure> {

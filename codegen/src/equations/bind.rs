@@ -161,8 +161,7 @@ impl Scene {
 impl Selection {
     /// The wanted joints, in the order of their coordinates.
     fn joints(&self, model: &Model<Dd>) -> Vec<usize> {
-        let mut joints: Vec<_> = model.bodies.iter().map(|b| &b.joint).collect();
-        joints.sort_by_key(|j| j.iv);
+        let joints = model.joints();
         let is_wanted = |i: &usize| self.joints.is_empty() || self.joints.contains(&joints[*i].name);
         (0..joints.len()).filter(is_wanted).collect()
     }

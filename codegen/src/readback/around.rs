@@ -111,8 +111,7 @@ impl Around<'_, '_, '_> {
         let generated = self.generated;
         let (model, drives) = (&generated.model, &generated.model.drives);
         let root = self.root;
-        let mut joints: Vec<_> = model.bodies.iter().map(|b| &b.joint).collect();
-        joints.sort_by_key(|j| j.iv);
+        let joints = model.joints();
         let names = |names: Vec<&String>| {
             format!("[&str; {}] = [{}]", names.len(), string_literals(names.iter().map(|name| name.as_str())))
         };

@@ -241,9 +241,8 @@ fn items(whole: &Model<Dd>, scene: &Scene) -> Vec<(What, Change)> {
 
 /// The locked joints in runs of neighbours, in the order of their coordinates.
 fn locked_runs(whole: &Model<Dd>, scene: &Scene) -> Vec<Vec<String>> {
-    let mut order: Vec<_> = whole.bodies.iter().map(|b| &b.joint).collect();
-    order.sort_by_key(|j| j.iv);
     let is_locked = |name: &str| scene.locked.iter().any(|(locked, _)| locked == name);
+    let order = whole.joints();
     let runs = order.chunk_by(|a, b| is_locked(&a.name) == is_locked(&b.name));
     runs.filter(|run| is_locked(&run[0].name)).map(|run| run.iter().map(|j| j.name.clone()).collect()).collect()
 }

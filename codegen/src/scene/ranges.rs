@@ -6,6 +6,7 @@
 use super::Scene;
 use crate::function::Quantity::{self, Acceleration, Configuration, Force, Gravity, Velocity};
 use straightline_core::model::{Joint, JointKind, Limits, Model};
+use straightline_core::Dd;
 use straightline_graph::expr::Port;
 
 /// From `lower` to `upper`, both in it; infinite where there is no limit.
@@ -117,13 +118,11 @@ impl Scene {
 }
 
 /// The ranges of a scene in words, a line per joint and input; nothing where it says none.
-pub fn ranges_in_words<T>(scene: &Scene, model: &Model<T>) -> Vec<String> {
+pub fn ranges_in_words(scene: &Scene, model: &Model<Dd>) -> Vec<String> {
     let said = scene.ranges.over_joints().into_iter().filter(|(_, ranges)| **ranges != JointRanges::Limits);
     let mut lines = Vec::new();
     for (quantity, ranges) in said {
-        let mut joints: Vec<&Joint> = model.bodies.iter().map(|b| &b.joint).collect();
-        joints.sort_by_key(|joint| joint.iv);
-        for joint in joints {
+        for joint in model.joints() {
             let at = if quantity == Configuration { joint.iq } else { joint.iv };
             let words = in_words(range(quantity, ranges, joint), unit(quantity, joint.kind));
             lines.push(format!("{}[{at}] {}: {words}", quantity.name(), joint.name));

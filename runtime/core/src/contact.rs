@@ -46,11 +46,6 @@ impl Coordinate {
             Coordinate::Az => "az",
         }
     }
-
-    /// Whether it is a length; the others are cosines, and their reactions moments.
-    pub const fn is_length(self) -> bool {
-        matches!(self, Coordinate::Px | Coordinate::Py | Coordinate::Pz)
-    }
 }
 
 /// Variables of a functional coordinate: position, tool axis, second axis of the tool, in object axes.

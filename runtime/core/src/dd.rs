@@ -9,8 +9,8 @@
 //!
 //! Longer than 500 lines, as it is one type with its operations and nothing else.
 
+use crate::operators::operators;
 use core::fmt;
-use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 /// A double-double number `hi + lo`, with `hi` the f64 nearest to the sum.
 ///
@@ -356,64 +356,39 @@ impl From<f64> for Dd {
     }
 }
 
-impl Neg for Dd {
-    type Output = Dd;
-    #[inline]
-    fn neg(self) -> Dd {
-        Dd { hi: -self.hi, lo: -self.lo }
-    }
-}
-
-impl Add for Dd {
-    type Output = Dd;
-    #[inline]
-    fn add(self, b: Dd) -> Dd {
-        let (s, e) = two_sum(self.hi, b.hi);
+operators! { [] Dd:
+    Neg neg |a| Dd { hi: -a.hi, lo: -a.lo };
+    Add add |a, b| {
+        let (s, e) = two_sum(a.hi, b.hi);
         if !s.is_finite() {
             return Dd::from(s);
         }
-        let (t, f) = two_sum(self.lo, b.lo);
+        let (t, f) = two_sum(a.lo, b.lo);
         let (s, e) = fast_two_sum(s, e + t);
         let (hi, lo) = fast_two_sum(s, e + f);
         Dd { hi, lo }
-    }
-}
-
-impl Sub for Dd {
-    type Output = Dd;
-    #[inline]
-    fn sub(self, b: Dd) -> Dd {
-        self + -b
-    }
-}
-
-impl Mul for Dd {
-    type Output = Dd;
-    #[inline]
-    fn mul(self, b: Dd) -> Dd {
-        let (p, e) = two_prod(self.hi, b.hi);
+    };
+    Sub sub |a, b| a + -b;
+    Mul mul |a, b| {
+        let (p, e) = two_prod(a.hi, b.hi);
         if !p.is_finite() {
             return Dd::from(p);
         }
-        let (hi, lo) = fast_two_sum(p, e + (self.hi * b.lo + self.lo * b.hi));
+        let (hi, lo) = fast_two_sum(p, e + (a.hi * b.lo + a.lo * b.hi));
         Dd { hi, lo }
-    }
-}
-
-impl Div for Dd {
-    type Output = Dd;
-    /// Long division with three digits of 53 bits.
-    fn div(self, b: Dd) -> Dd {
-        let q1 = self.hi / b.hi;
+    };
+    // Long division with three digits of 53 bits.
+    Div div |a, b| {
+        let q1 = a.hi / b.hi;
         if !q1.is_finite() || !b.hi.is_finite() {
             return Dd::from(q1);
         }
-        let r = self - b * Dd::from(q1);
+        let r = a - b * Dd::from(q1);
         let q2 = r.hi / b.hi;
         let r = r - b * Dd::from(q2);
         let q3 = r.hi / b.hi;
         Dd::new(q1, q2) + Dd::from(q3)
-    }
+    };
 }
 
 impl fmt::Display for Dd {
@@ -502,26 +477,4 @@ impl Backwards {
     }
 }
 
-impl AddAssign for Dd {
-    fn add_assign(&mut self, b: Self) {
-        *self = *self + b;
-    }
-}
-
-impl SubAssign for Dd {
-    fn sub_assign(&mut self, b: Self) {
-        *self = *self - b;
-    }
-}
-
-impl MulAssign for Dd {
-    fn mul_assign(&mut self, b: Self) {
-        *self = *self * b;
-    }
-}
-
-impl DivAssign for Dd {
-    fn div_assign(&mut self, b: Self) {
-        *self = *self / b;
-    }
-}
+operators!(assign Dd);

@@ -11,8 +11,8 @@
 //! ```
 
 use crate::dd::Dd;
+use crate::operators::operators;
 use crate::real::Real;
-use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A value and its derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,42 +44,17 @@ impl<T: Real, const N: usize> Dual<T, N> {
     }
 }
 
-impl<T: Real, const N: usize> Add for Dual<T, N> {
-    type Output = Self;
-    fn add(self, b: Self) -> Self {
-        self.zip(b, self.value + b.value, |da, db| da + db)
-    }
-}
-
-impl<T: Real, const N: usize> Sub for Dual<T, N> {
-    type Output = Self;
-    fn sub(self, b: Self) -> Self {
-        self.zip(b, self.value - b.value, |da, db| da - db)
-    }
-}
-
-#[allow(clippy::suspicious_arithmetic_impl)] // (ab)' = a' b + a b'
-impl<T: Real, const N: usize> Mul for Dual<T, N> {
-    type Output = Self;
-    fn mul(self, b: Self) -> Self {
-        self.zip(b, self.value * b.value, |da, db| da * b.value + self.value * db)
-    }
-}
-
-#[allow(clippy::suspicious_arithmetic_impl)] // (a/b)' = (a' − (a/b) b')/b
-impl<T: Real, const N: usize> Div for Dual<T, N> {
-    type Output = Self;
-    fn div(self, b: Self) -> Self {
-        let value = self.value / b.value;
-        self.zip(b, value, |da, db| (da - value * db) / b.value)
-    }
-}
-
-impl<T: Real, const N: usize> Neg for Dual<T, N> {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Dual { value: -self.value, derivatives: self.derivatives.map(|d| -d) }
-    }
+operators! { [T: Real, const N: usize] Dual<T, N>:
+    Add add |a, b| a.zip(b, a.value + b.value, |da, db| da + db);
+    Sub sub |a, b| a.zip(b, a.value - b.value, |da, db| da - db);
+    // (ab)' = a' b + a b'
+    Mul mul |a, b| a.zip(b, a.value * b.value, |da, db| da * b.value + a.value * db);
+    // (a/b)' = (a' − (a/b) b')/b
+    Div div |a, b| {
+        let value = a.value / b.value;
+        a.zip(b, value, |da, db| (da - value * db) / b.value)
+    };
+    Neg neg |a| Dual { value: -a.value, derivatives: a.derivatives.map(|d| -d) };
 }
 
 impl<T: Real, const N: usize> Real for Dual<T, N> {

@@ -6,8 +6,8 @@
 //! own gradient.
 
 use crate::dd::Dd;
+use crate::operators::operators;
 use crate::real::Real;
-use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A value with its gradient by N variables and two derivatives by time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,55 +55,32 @@ impl<T: Real, const N: usize> Jet<T, N> {
     }
 }
 
-impl<T: Real, const N: usize> Add for Jet<T, N> {
-    type Output = Self;
-    fn add(self, b: Self) -> Self {
-        self.both(b, |x, y| x + y)
-    }
-}
-
-impl<T: Real, const N: usize> Sub for Jet<T, N> {
-    type Output = Self;
-    fn sub(self, b: Self) -> Self {
-        self.both(b, |x, y| x - y)
-    }
-}
-
-impl<T: Real, const N: usize> Mul for Jet<T, N> {
-    type Output = Self;
-    fn mul(self, b: Self) -> Self {
-        let mixed = self.rate * b.rate;
+operators! { [T: Real, const N: usize] Jet<T, N>:
+    Add add |a, b| a.both(b, |x, y| x + y);
+    Sub sub |a, b| a.both(b, |x, y| x - y);
+    Mul mul |a, b| {
+        let mixed = a.rate * b.rate;
         Jet {
-            value: self.value * b.value,
-            gradient: core::array::from_fn(|k| self.gradient[k] * b.value + self.value * b.gradient[k]),
-            rate: self.rate * b.value + self.value * b.rate,
-            second: self.second * b.value + self.value * b.second + (mixed + mixed),
+            value: a.value * b.value,
+            gradient: core::array::from_fn(|k| a.gradient[k] * b.value + a.value * b.gradient[k]),
+            rate: a.rate * b.value + a.value * b.rate,
+            second: a.second * b.value + a.value * b.second + (mixed + mixed),
         }
-    }
-}
-
-impl<T: Real, const N: usize> Div for Jet<T, N> {
-    type Output = Self;
-    fn div(self, b: Self) -> Self {
+    };
+    Div div |a, b| {
         // f = a / b: f b = a, differentiated once and twice
         let inverse = T::one() / b.value;
-        let value = self.value * inverse;
-        let rate = (self.rate - value * b.rate) * inverse;
+        let value = a.value * inverse;
+        let rate = (a.rate - value * b.rate) * inverse;
         let mixed = rate * b.rate;
         Jet {
             value,
-            gradient: core::array::from_fn(|k| (self.gradient[k] - value * b.gradient[k]) * inverse),
+            gradient: core::array::from_fn(|k| (a.gradient[k] - value * b.gradient[k]) * inverse),
             rate,
-            second: (self.second - value * b.second - (mixed + mixed)) * inverse,
+            second: (a.second - value * b.second - (mixed + mixed)) * inverse,
         }
-    }
-}
-
-impl<T: Real, const N: usize> Neg for Jet<T, N> {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Jet { value: -self.value, gradient: self.gradient.map(|g| -g), rate: -self.rate, second: -self.second }
-    }
+    };
+    Neg neg |a| Jet { value: -a.value, gradient: a.gradient.map(|g| -g), rate: -a.rate, second: -a.second };
 }
 
 impl<T: Real, const N: usize> Real for Jet<T, N> {

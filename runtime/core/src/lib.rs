@@ -25,6 +25,7 @@ pub mod joint;
 pub mod magnitude;
 #[cfg(feature = "alloc")]
 pub mod model;
+mod operators;
 pub mod phases;
 pub mod random;
 pub mod real;

@@ -9,9 +9,9 @@
 //! a chain of a hundred rotations a sum of moduli would grow like 1.7¹⁰⁰.
 
 use crate::dd::Dd;
+use crate::operators::operators;
 use crate::real::Real;
 use crate::trig::sqrt_f64;
-use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// The part of their sizes by which numbers are moved.
 const PART: f64 = 1e-3;
@@ -53,43 +53,20 @@ fn length([a, b]: [f64; 2]) -> f64 {
     }
 }
 
-impl Add for Magnitude {
-    type Output = Self;
-    fn add(self, b: Self) -> Self {
-        Magnitude::moved(self.value + b.value, [self.size, b.size])
-    }
-}
-
-impl Sub for Magnitude {
-    type Output = Self;
-    fn sub(self, b: Self) -> Self {
-        Magnitude::moved(self.value - b.value, [self.size, b.size])
-    }
-}
-
-impl Mul for Magnitude {
-    type Output = Self;
-    fn mul(self, b: Self) -> Self {
-        let [x, y] = [self, b].map(|v| v.value.hi().abs());
+operators! { [] Magnitude:
+    Add add |a, b| Magnitude::moved(a.value + b.value, [a.size, b.size]);
+    Sub sub |a, b| Magnitude::moved(a.value - b.value, [a.size, b.size]);
+    Mul mul |a, b| {
+        let [x, y] = [a, b].map(|v| v.value.hi().abs());
         // (a + δa)(b + δb) − ab = δa b + a δb + δa δb
-        Magnitude::moved(self.value * b.value, [length([self.size * y, x * b.size]), PART * self.size * b.size])
-    }
-}
-
-impl Div for Magnitude {
-    type Output = Self;
-    fn div(self, b: Self) -> Self {
-        let value = self.value / b.value;
+        Magnitude::moved(a.value * b.value, [length([a.size * y, x * b.size]), PART * a.size * b.size])
+    };
+    Div div |a, b| {
+        let value = a.value / b.value;
         let by = b.value.hi().abs();
-        Magnitude::moved(value, [self.size / by, value.hi().abs() * b.size / by])
-    }
-}
-
-impl Neg for Magnitude {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Magnitude { value: -self.value, ..self }
-    }
+        Magnitude::moved(value, [a.size / by, value.hi().abs() * b.size / by])
+    };
+    Neg neg |a| Magnitude { value: -a.value, ..a };
 }
 
 impl Real for Magnitude {

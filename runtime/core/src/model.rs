@@ -8,11 +8,11 @@
 use crate::dd::Dd;
 use crate::drive::Drive;
 pub use crate::joint::JointKind;
+use crate::operators::operators;
 use crate::real::Real;
 use crate::spatial::{SpatialInertia, Sym3, Transform, Vec3};
 use alloc::string::String;
 use alloc::vec::Vec;
-use core::ops::{Add, Sub};
 
 /// Index of a body in [`Model::bodies`].
 pub type BodyId = usize;
@@ -142,26 +142,17 @@ impl<T: Real> Load<T> {
     }
 }
 
-impl<T: Real> Add for Load<T> {
-    type Output = Load<T>;
-    fn add(self, other: Load<T>) -> Load<T> {
-        Load {
-            mass: self.mass + other.mass,
-            first_moment: self.first_moment + other.first_moment,
-            second_moment: self.second_moment + other.second_moment,
-        }
-    }
-}
-
-impl<T: Real> Sub for Load<T> {
-    type Output = Load<T>;
-    fn sub(self, other: Load<T>) -> Load<T> {
-        Load {
-            mass: self.mass - other.mass,
-            first_moment: self.first_moment - other.first_moment,
-            second_moment: self.second_moment - other.second_moment,
-        }
-    }
+operators! { [T: Real] Load<T>:
+    Add add |a, other| Load {
+        mass: a.mass + other.mass,
+        first_moment: a.first_moment + other.first_moment,
+        second_moment: a.second_moment + other.second_moment,
+    };
+    Sub sub |a, other| Load {
+        mass: a.mass - other.mass,
+        first_moment: a.first_moment - other.first_moment,
+        second_moment: a.second_moment - other.second_moment,
+    };
 }
 
 /// A moving body with the joint that carries it. Links that are fixed to it are merged in.
@@ -245,6 +236,13 @@ impl<T: Real> Model<T> {
     /// Number of velocity coordinates.
     pub fn nv(&self) -> usize {
         self.bodies.iter().map(|b| b.joint.kind.nv()).sum()
+    }
+
+    /// The joints in the order of their coordinates.
+    pub fn joints(&self) -> Vec<&Joint> {
+        let mut joints: Vec<&Joint> = self.bodies.iter().map(|b| &b.joint).collect();
+        joints.sort_by_key(|joint| joint.iv);
+        joints
     }
 
     /// Whether its base floats.

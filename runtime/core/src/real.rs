@@ -4,6 +4,7 @@
 //! model, so the same source computes with numbers and writes down equations.
 
 use crate::dd::Dd;
+use crate::trig;
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -96,82 +97,53 @@ pub trait Real:
     fn section(_phase: &'static str, _body: Option<usize>) {}
 }
 
-impl Real for f64 {
-    #[inline]
-    fn constant(value: Dd) -> Self {
-        value.to_f64()
-    }
-    #[inline]
-    fn zero() -> Self {
-        0.0
-    }
-    #[inline]
-    fn one() -> Self {
-        1.0
-    }
-    #[inline]
-    fn sin_cos(self) -> (Self, Self) {
-        crate::trig::sin_cos_f64(self)
-    }
-    #[inline(always)]
-    fn sin_cos_of_pair(sum: [Self; 2]) -> (Self, Self) {
-        crate::trig::sin_cos_of_sum_f64(sum)
-    }
-    #[inline(always)]
-    fn sin_cos_lanes<const N: usize>(angles: [Self; N]) -> ([Self; N], [Self; N]) {
-        crate::trig::sin_cos_lanes_f64(angles)
-    }
-    #[inline(always)]
-    fn sin_cos_lanes_of_pairs<const N: usize>(sums: [[Self; 2]; N]) -> ([Self; N], [Self; N]) {
-        crate::trig::sin_cos_lanes_of_sums_f64(sums)
-    }
-    #[inline]
-    fn sqrt(self) -> Self {
-        crate::trig::sqrt_f64(self)
-    }
-    #[inline]
-    fn sign(self) -> Self {
-        crate::trig::sign_f64(self)
-    }
+/// A floating-point number of the machine, by its functions in `trig.rs`.
+macro_rules! machine {
+    ($($T:ident $rounded:ident $sin_cos:ident $of_sum:ident $lanes:ident $lanes_of_sums:ident $sqrt:ident $sign:ident,)+) => {$(
+        impl Real for $T {
+            #[inline]
+            fn constant(value: Dd) -> Self {
+                value.$rounded()
+            }
+            #[inline]
+            fn zero() -> Self {
+                0.0
+            }
+            #[inline]
+            fn one() -> Self {
+                1.0
+            }
+            #[inline]
+            fn sin_cos(self) -> (Self, Self) {
+                trig::$sin_cos(self)
+            }
+            #[inline(always)]
+            fn sin_cos_of_pair(sum: [Self; 2]) -> (Self, Self) {
+                trig::$of_sum(sum)
+            }
+            #[inline(always)]
+            fn sin_cos_lanes<const N: usize>(angles: [Self; N]) -> ([Self; N], [Self; N]) {
+                trig::$lanes(angles)
+            }
+            #[inline(always)]
+            fn sin_cos_lanes_of_pairs<const N: usize>(sums: [[Self; 2]; N]) -> ([Self; N], [Self; N]) {
+                trig::$lanes_of_sums(sums)
+            }
+            #[inline]
+            fn sqrt(self) -> Self {
+                trig::$sqrt(self)
+            }
+            #[inline]
+            fn sign(self) -> Self {
+                trig::$sign(self)
+            }
+        }
+    )+};
 }
 
-impl Real for f32 {
-    #[inline]
-    fn constant(value: Dd) -> Self {
-        value.to_f32()
-    }
-    #[inline]
-    fn zero() -> Self {
-        0.0
-    }
-    #[inline]
-    fn one() -> Self {
-        1.0
-    }
-    #[inline]
-    fn sin_cos(self) -> (Self, Self) {
-        crate::trig::sin_cos_f32(self)
-    }
-    #[inline(always)]
-    fn sin_cos_of_pair(sum: [Self; 2]) -> (Self, Self) {
-        crate::trig::sin_cos_of_sum_f32(sum)
-    }
-    #[inline(always)]
-    fn sin_cos_lanes<const N: usize>(angles: [Self; N]) -> ([Self; N], [Self; N]) {
-        crate::trig::sin_cos_lanes_f32(angles)
-    }
-    #[inline(always)]
-    fn sin_cos_lanes_of_pairs<const N: usize>(sums: [[Self; 2]; N]) -> ([Self; N], [Self; N]) {
-        crate::trig::sin_cos_lanes_of_sums_f32(sums)
-    }
-    #[inline]
-    fn sqrt(self) -> Self {
-        crate::trig::sqrt_f32(self)
-    }
-    #[inline]
-    fn sign(self) -> Self {
-        crate::trig::sign_f32(self)
-    }
+machine! {
+    f64 to_f64 sin_cos_f64 sin_cos_of_sum_f64 sin_cos_lanes_f64 sin_cos_lanes_of_sums_f64 sqrt_f64 sign_f64,
+    f32 to_f32 sin_cos_f32 sin_cos_of_sum_f32 sin_cos_lanes_f32 sin_cos_lanes_of_sums_f32 sqrt_f32 sign_f32,
 }
 
 impl Real for Dd {
@@ -186,6 +158,6 @@ impl Real for Dd {
         Dd::sqrt(self)
     }
     fn sign(self) -> Self {
-        Dd::from(crate::trig::sign_f64(self.hi()))
+        Dd::from(trig::sign_f64(self.hi()))
     }
 }

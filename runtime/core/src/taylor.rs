@@ -4,8 +4,8 @@
 //! unchanged, so the derivatives of a torque along a motion come out of the recursion that gives the torque.
 
 use crate::dd::Dd;
+use crate::operators::operators;
 use crate::real::Real;
-use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A truncated Taylor series. How many coefficients are computed is said at run time, so that whatever runs over series is compiled
 /// once and not per order.
@@ -108,44 +108,21 @@ fn convolution<T: Real>(a: &[T], b: &[T], k: usize, from: usize, to: usize) -> O
     (from..=to).map(|i| a[i] * b[k - i]).reduce(|sum, x| sum + x)
 }
 
-impl<T: Real, const N: usize> Add for Taylor<T, N> {
-    type Output = Self;
-    fn add(self, b: Self) -> Self {
-        Taylor::each(self.with(&b), |_, k| self.coefficients[k] + b.coefficients[k])
-    }
-}
-
-impl<T: Real, const N: usize> Sub for Taylor<T, N> {
-    type Output = Self;
-    fn sub(self, b: Self) -> Self {
-        Taylor::each(self.with(&b), |_, k| self.coefficients[k] - b.coefficients[k])
-    }
-}
-
-impl<T: Real, const N: usize> Neg for Taylor<T, N> {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Taylor::each(self.terms, |_, k| -self.coefficients[k])
-    }
-}
-
-impl<T: Real, const N: usize> Mul for Taylor<T, N> {
-    type Output = Self;
-    fn mul(self, b: Self) -> Self {
-        let (a, terms) = (&self.coefficients, self.with(&b));
+operators! { [T: Real, const N: usize] Taylor<T, N>:
+    Add add |a, b| Taylor::each(a.with(&b), |_, k| a.coefficients[k] + b.coefficients[k]);
+    Sub sub |a, b| Taylor::each(a.with(&b), |_, k| a.coefficients[k] - b.coefficients[k]);
+    Neg neg |a| Taylor::each(a.terms, |_, k| -a.coefficients[k]);
+    Mul mul |a, b| {
+        let (a, terms) = (&a.coefficients, a.with(&b));
         Taylor::each(terms, |_, k| convolution(a, &b.coefficients, k, 0, k).expect("a sum has a first term"))
-    }
-}
-
-impl<T: Real, const N: usize> Div for Taylor<T, N> {
-    type Output = Self;
-    /// y = a / b from b y = a: y_k = (a_k − Σ_{i≥1} b_i y_{k−i}) / b_0.
-    fn div(self, b: Self) -> Self {
-        Taylor::each(self.with(&b), |y, k| {
+    };
+    // y = a / b from b y = a: y_k = (a_k − Σ_{i≥1} b_i y_{k−i}) / b_0.
+    Div div |a, b| {
+        Taylor::each(a.with(&b), |y, k| {
             let rest = convolution(&b.coefficients, y, k, 1, k);
-            less(self.coefficients[k], rest) / b.coefficients[0]
+            less(a.coefficients[k], rest) / b.coefficients[0]
         })
-    }
+    };
 }
 
 impl<T: Real, const N: usize> Real for Taylor<T, N> {

@@ -3,35 +3,30 @@
 //! The page is XHTML, so that an XML reader can check it. Names come from robot files, which anyone may have written:
 //! nothing from outside reaches the page but through `escape`.
 
-use straightline_codegen::report::errors::{four_digits, ErrorReport};
+mod matrix;
 mod tree;
 
-use std::collections::BTreeMap;
+use matrix::mass_matrix;
 use std::fmt::Write;
 use straightline_codegen::description;
 use straightline_codegen::diagnostic::{Diagnostic, Diagnostics, Severity, Source};
 use straightline_codegen::emit::Generated;
-use straightline_codegen::equations::Robot;
-use straightline_codegen::function::Function;
 use straightline_codegen::identifier::file_name;
 use straightline_codegen::model::{self, SpecialAngle};
 use straightline_codegen::options::Options;
-use straightline_codegen::program::optimised;
 use straightline_codegen::program::staged::{Remaining, StagedReport};
+use straightline_codegen::report::errors::{four_digits, ErrorReport};
 use straightline_codegen::report::waterfall::{items_of, signed, By, Waterfall};
 use straightline_codegen::report::{FunctionReport, Report};
 use straightline_codegen::scene::{Base, Scene};
 use straightline_core::joint;
 use straightline_core::model::Model;
 use straightline_core::Dd;
-use straightline_graph::expr::{Counts, Graph, Op};
-use tree::{symbol, text_width, tree};
+use straightline_graph::expr::Counts;
+use tree::{symbol, tree};
 
 /// The style of all pages.
 pub const STYLE: &str = include_str!("page.css");
-/// In a greater mass matrix single entries have no words.
-const ENTRIES_WITH_WORDS: usize = 60;
-
 /// Tree and matrix stand side by side if they are together no wider \[px\].
 const SIDE_BY_SIDE: f64 = 1000.0;
 
@@ -94,10 +89,7 @@ pub(super) fn escape(text: &str) -> String {
 
 fn header(out: &mut String, generated: &Generated, whole: &Model<Dd>, options: &Options) {
     let (model, report) = (&generated.model, &generated.report);
-    let base = match model.floats() {
-        true => "floating",
-        false => "fixed",
-    };
+    let base = if model.floats() { "floating" } else { "fixed" };
     let g = model.gravity.to_array().map(|x| x.to_f64());
     let gravity = match options.scene.gravity {
         straightline_codegen::scene::Gravity::Input => "an input".to_string(),
@@ -174,129 +166,6 @@ fn kinematics(whole: &Model<Dd>, scene: &Scene, model: &Model<Dd>) -> (String, f
     }
     let (drawing, width) = tree(&drawn, &locked, &carries);
     let _ = writeln!(out, "</ul>\n<div class=\"figure\">\n{drawing}</div>");
-    (out, width)
-}
-
-/// On how many coordinates each entry of a program depends; `None` for an entry that is always zero.
-fn dependences(graph: &Graph) -> Vec<Option<usize>> {
-    let mut q = 0..0;
-    let mut next = 0;
-    for port in &graph.inputs {
-        if port.name == "q" {
-            q = next..next + port.len();
-        }
-        next += port.len();
-    }
-    let words = q.len().div_ceil(64);
-    let mut sets: Vec<Vec<u64>> = Vec::with_capacity(graph.ops.len());
-    for op in &graph.ops {
-        let mut set = vec![0; words];
-        if let Op::Input(k) = op {
-            if q.contains(&(*k as usize)) {
-                let k = *k as usize - q.start;
-                set[k / 64] |= 1 << (k % 64);
-            }
-        }
-        for a in op.operands() {
-            set.iter_mut().zip(&sets[a.index()]).for_each(|(s, a)| *s |= a);
-        }
-        sets.push(set);
-    }
-    let is_zero = |op: Op| matches!(op, Op::Constant(c) if c.is(0.0));
-    let count = |set: &[u64]| set.iter().map(|w| w.count_ones() as usize).sum();
-    graph.results.iter().map(|r| (!is_zero(graph.op(*r))).then(|| count(&sets[r.index()]))).collect()
-}
-
-/// The section of the mass matrix, and the width of the drawing.
-fn mass_matrix(generated: &Generated, options: &Options) -> (String, f64) {
-    let model = &generated.model;
-    // whole, also where the scene wants a part of it
-    let scene = Scene { outputs: BTreeMap::new(), ..options.scene.clone() };
-    let robot = Robot::new(model.clone());
-    let options = Options { scene, ..options.clone() };
-    let graph = optimised(&robot, &[], Function::MassMatrix, &options, options.optimisations());
-    let entries = dependences(&graph);
-    let nv = model.nv();
-    let mut names = vec![String::new(); nv];
-    for joint in model.bodies.iter().map(|b| &b.joint) {
-        for (k, name) in names[joint.iv..joint.iv + joint.kind.nv()].iter_mut().enumerate() {
-            *name = match joint.kind.row().entries[1].get(k) {
-                // "vx" as "v x", "wx" as "ω x"
-                Some(entry) => format!("{} {}", joint.name, entry.replace('v', "v ").replace('w', "ω ")),
-                None => joint.name.clone(),
-            };
-        }
-    }
-    let class = |entry: Option<usize>| match entry {
-        None => "z",
-        Some(0) => "c",
-        Some(1) => "d1",
-        Some(2..=3) => "d2",
-        Some(4..=6) => "d3",
-        Some(_) => "d4",
-    };
-    let number = |class_name: &str| entries.iter().filter(|e| class(**e) == class_name).count();
-    let mut out = format!(
-        "<h2>Mass matrix</h2>\n<p class=\"lead\">Which entries of H ({nv} × {nv}) are zero, and on how many coordinates the others \
-         depend. Joints on different branches do not meet: their entry is zero and takes no operation.</p>\n<ul class=\"legend\">\n"
-    );
-    for (key, swatch, words) in [
-        ("z", "c-z", "zero"),
-        ("c", "c-c", "constant"),
-        ("d1", "c-1", "1 coordinate"),
-        ("d2", "c-2", "2 or 3"),
-        ("d3", "c-3", "4 to 6"),
-        ("d4", "c-4", "7 and more"),
-    ] {
-        if number(key) > 0 {
-            let _ = writeln!(
-                out,
-                "<li><span class=\"swatch {swatch}\"></span>{words}: {} of {}</li>",
-                number(key),
-                nv * nv
-            );
-        }
-    }
-    let cell = (600 / nv.max(1)).clamp(6, 26) as f64;
-    let font = (cell * 0.85).min(12.0);
-    let shown: Vec<String> = names.iter().map(|n| n.chars().take(40).collect()).collect();
-    let margin = shown.iter().map(|n| text_width(n, font)).fold(0.0, f64::max) + 12.0;
-    let (width, height) = (margin + nv as f64 * cell + 4.0, margin + nv as f64 * cell + 4.0);
-    let _ = writeln!(
-        out,
-        "</ul>\n<div class=\"figure\">\n<svg viewBox=\"0 0 {width:.0} {height:.0}\" width=\"{width:.0}\" style=\"max-width:100%\" role=\"img\" aria-label=\"sparsity of the mass matrix\">"
-    );
-    for (i, name) in shown.iter().enumerate() {
-        let at = margin + (i as f64 + 0.5) * cell;
-        let shown = escape(name);
-        let _ = writeln!(
-            out,
-            "<text font-size=\"{font:.1}\" text-anchor=\"end\" x=\"{:.1}\" y=\"{:.1}\">{shown}</text><text font-size=\"{font:.1}\" transform=\"translate({:.1} {:.1}) rotate(-90)\">{shown}</text>",
-            margin - 6.0,
-            at + font * 0.36,
-            at + font * 0.36,
-            margin - 6.0
-        );
-    }
-    for (k, entry) in entries.iter().enumerate() {
-        let (i, j) = (k / nv, k % nv);
-        let words = match entry {
-            _ if nv > ENTRIES_WITH_WORDS => String::new(),
-            None => format!("<title>{}, {}: zero</title>", escape(&names[i]), escape(&names[j])),
-            Some(0) => format!("<title>{}, {}: constant</title>", escape(&names[i]), escape(&names[j])),
-            Some(n) => format!("<title>{}, {}: depends on {n}</title>", escape(&names[i]), escape(&names[j])),
-        };
-        let _ = writeln!(
-            out,
-            "<rect class=\"{}\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" rx=\"2\">{words}</rect>",
-            class(*entry),
-            margin + j as f64 * cell + 0.75,
-            margin + i as f64 * cell + 0.75,
-            cell - 1.5,
-            cell - 1.5
-        );
-    }
-    out.push_str("</svg>\n</div>\n");
     (out, width)
 }
 

@@ -25,9 +25,87 @@ struct Node {
     children: Vec<usize>,
 }
 
+/// Where everything stands.
+struct Layout {
+    nodes: Vec<Node>,
+    roots: Vec<usize>,
+    width: f64,
+    height: f64,
+}
+
+impl Layout {
+    /// Columns of this width.
+    fn new(model: &Model<Dd>, column: f64) -> Layout {
+        let n = model.bodies.len();
+        let mut nodes: Vec<Node> = (0..n).map(|_| Node { x: 0.0, row: 0, children: Vec::new() }).collect();
+        for i in 0..n {
+            if let Some(p) = model.bodies[i].parent {
+                nodes[p].children.push(i);
+                nodes[i].row = nodes[p].row + 1;
+            }
+        }
+        // columns in depth-first order; a stack, because trees may be deep
+        let roots: Vec<usize> = (0..n).filter(|i| model.bodies[*i].parent.is_none()).collect();
+        let mut stack: Vec<usize> = roots.iter().rev().copied().collect();
+        let mut columns = 0;
+        while let Some(i) = stack.pop() {
+            if nodes[i].children.is_empty() {
+                nodes[i].x = MARGIN + columns as f64 * column;
+                columns += 1;
+            }
+            stack.extend(nodes[i].children.iter().rev());
+        }
+        // parents come before their children
+        for i in (0..n).rev() {
+            if let (Some(a), Some(b)) = (nodes[i].children.first(), nodes[i].children.last()) {
+                nodes[i].x = (nodes[*a].x + nodes[*b].x) / 2.0;
+            }
+        }
+        let rows = nodes.iter().map(|node| node.row + 1).max().unwrap_or(0);
+        Layout { nodes, roots, width: columns as f64 * column, height: rows as f64 * ROW + 0.5 * ROW + 6.0 }
+    }
+
+    /// The world, above the roots.
+    fn world(&self, out: &mut String) {
+        let ends = self.roots.iter().map(|i| self.nodes[*i].x);
+        let (left, right) = ends.fold((f64::MAX, f64::MIN), |(l, r), x| (l.min(x), r.max(x)));
+        let (left, right) = (left.min(right) - 16.0, right.max(left) + 16.0);
+        let _ = writeln!(out, "<path class=\"ground\" d=\"M{left:.1} 20H{right:.1}\"/>");
+        let mut x = left + 2.0;
+        while x <= right {
+            let _ = writeln!(out, "<path class=\"ground\" style=\"stroke-width:1\" d=\"M{x:.1} 20l6 -7\"/>");
+            x += 8.0;
+        }
+        let _ = writeln!(out, "<text class=\"small\" x=\"{:.1}\" y=\"20\" font-size=\"12\">world</text>", right + 12.0);
+    }
+
+    /// Bodies: from their joint to the joints that they carry.
+    fn links(&self, out: &mut String, is_free: impl Fn(usize) -> bool) {
+        for &i in &self.roots {
+            let class = if is_free(i) { "free" } else { "link" };
+            let _ = writeln!(out, "<path class=\"{class}\" d=\"M{:.1} 22V{:.1}\"/>", self.nodes[i].x, y(0));
+        }
+        for node in &self.nodes {
+            let (x, y0) = (node.x, y(node.row));
+            for c in &node.children {
+                let to = &self.nodes[*c];
+                let (bus, below) = (y0 + ROW * 0.62, y(to.row));
+                let _ = writeln!(out, "<path class=\"link\" d=\"M{x:.1} {y0:.1}V{bus:.1}H{:.1}V{below:.1}\"/>", to.x);
+            }
+            if node.children.is_empty() {
+                let _ = writeln!(out, "<path class=\"link\" d=\"M{x:.1} {y0:.1}V{:.1}\"/>", y0 + ROW * 0.45);
+            }
+        }
+    }
+}
+
+/// The height of a row.
+fn y(row: usize) -> f64 {
+    (row + 1) as f64 * ROW
+}
+
 /// The tree as SVG, and its width \[px\]. Joints for which `held` says so do not move in the scene; `notes` adds words to a body's name.
 pub(super) fn tree(model: &Model<Dd>, held: &dyn Fn(usize) -> bool, notes: &dyn Fn(usize) -> String) -> (String, f64) {
-    let n = model.bodies.len();
     let words = |i: usize| {
         let body = &model.bodies[i];
         let coordinates = match (held(i), body.joint.kind.nq()) {
@@ -37,85 +115,28 @@ pub(super) fn tree(model: &Model<Dd>, held: &dyn Fn(usize) -> bool, notes: &dyn 
         };
         (cut(&body.joint.name), format!("{}{coordinates}{}", cut(&body.name), notes(i)))
     };
-    let longest = (0..n).map(|i| {
+    let longest = (0..model.bodies.len()).map(|i| {
         let (joint, body) = words(i);
         text_width(&joint, JOINT_FONT * 1.1).max(text_width(&body, BODY_FONT))
     });
-    let column = longest.fold(60.0, f64::max) + 2.0 * MARGIN;
-    let mut nodes: Vec<Node> = (0..n).map(|_| Node { x: 0.0, row: 0, children: Vec::new() }).collect();
-    for i in 0..n {
-        if let Some(p) = model.bodies[i].parent {
-            nodes[p].children.push(i);
-            nodes[i].row = nodes[p].row + 1;
-        }
-    }
-    // columns in depth-first order; a stack, because trees may be deep
-    let roots: Vec<usize> = (0..n).filter(|i| model.bodies[*i].parent.is_none()).collect();
-    let mut stack: Vec<usize> = roots.iter().rev().copied().collect();
-    let mut columns = 0;
-    while let Some(i) = stack.pop() {
-        if nodes[i].children.is_empty() {
-            nodes[i].x = MARGIN + columns as f64 * column;
-            columns += 1;
-        }
-        stack.extend(nodes[i].children.iter().rev());
-    }
-    // parents come before their children
-    for i in (0..n).rev() {
-        if let (Some(a), Some(b)) = (nodes[i].children.first(), nodes[i].children.last()) {
-            nodes[i].x = (nodes[*a].x + nodes[*b].x) / 2.0;
-        }
-    }
-    let rows = nodes.iter().map(|node| node.row + 1).max().unwrap_or(0);
-    let (width, height) = (columns as f64 * column, rows as f64 * ROW + 0.5 * ROW + 6.0);
-    let y = |row: usize| (row + 1) as f64 * ROW;
-
+    let layout = Layout::new(model, longest.fold(60.0, f64::max) + 2.0 * MARGIN);
+    let (width, height) = (layout.width, layout.height);
     let mut out = format!(
         "<svg viewBox=\"0 0 {width:.0} {height:.0}\" width=\"{width:.0}\" style=\"max-width:100%;min-width:{:.0}px\" role=\"img\" aria-label=\"kinematic tree\">\n",
         width * 0.72
     );
-    // the world
-    let (left, right) = roots.iter().fold((f64::MAX, f64::MIN), |(l, r), i| (l.min(nodes[*i].x), r.max(nodes[*i].x)));
-    let (left, right) = (left.min(right) - 16.0, right.max(left) + 16.0);
-    let _ = writeln!(out, "<path class=\"ground\" d=\"M{left:.1} 20H{right:.1}\"/>");
-    let mut x = left + 2.0;
-    while x <= right {
-        let _ = writeln!(out, "<path class=\"ground\" style=\"stroke-width:1\" d=\"M{x:.1} 20l6 -7\"/>");
-        x += 8.0;
-    }
-    let _ = writeln!(out, "<text class=\"small\" x=\"{:.1}\" y=\"20\" font-size=\"12\">world</text>", right + 12.0);
-    // bodies: from their joint to the joints that they carry
-    for i in roots {
-        let class = if model.bodies[i].joint.kind.is_base() && !held(i) { "free" } else { "link" };
-        let _ = writeln!(out, "<path class=\"{class}\" d=\"M{:.1} 22V{:.1}\"/>", nodes[i].x, y(0));
-    }
-    for node in &nodes {
-        let (x, y0) = (node.x, y(node.row));
-        for c in &node.children {
-            let to = &nodes[*c];
-            let bus = y0 + ROW * 0.62;
-            let _ = writeln!(out, "<path class=\"link\" d=\"M{x:.1} {y0:.1}V{bus:.1}H{:.1}V{:.1}\"/>", to.x, y(to.row));
-        }
-        if node.children.is_empty() {
-            let _ = writeln!(out, "<path class=\"link\" d=\"M{x:.1} {y0:.1}V{:.1}\"/>", y0 + ROW * 0.45);
-        }
-    }
-    for (i, node) in nodes.iter().enumerate() {
+    layout.world(&mut out);
+    layout.links(&mut out, |i| model.bodies[i].joint.kind.is_base() && !held(i));
+    for (i, node) in layout.nodes.iter().enumerate() {
         let (x, y0) = (node.x, y(node.row));
         let kind = if held(i) { None } else { Some(model.bodies[i].joint.kind) };
         let (joint, body) = words(i);
         let full = format!("{}, {}", model.bodies[i].joint.name, model.bodies[i].name);
+        let (full, joint, body) = (escape(&full), escape(&joint), escape(&body));
+        let (symbol, beside, above, below) = (symbol(kind, x, y0), x + 16.0, y0 - 1.0, y0 + 13.0);
         let _ = writeln!(
             out,
-            "<g><title>{}</title>{}<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"{JOINT_FONT}\" font-weight=\"600\">{}</text><text class=\"small\" x=\"{:.1}\" y=\"{:.1}\" font-size=\"{BODY_FONT}\">{}</text></g>",
-            escape(&full),
-            symbol(kind, x, y0),
-            x + 16.0,
-            y0 - 1.0,
-            escape(&joint),
-            x + 16.0,
-            y0 + 13.0,
-            escape(&body)
+            "<g><title>{full}</title>{symbol}<text x=\"{beside:.1}\" y=\"{above:.1}\" font-size=\"{JOINT_FONT}\" font-weight=\"600\">{joint}</text><text class=\"small\" x=\"{beside:.1}\" y=\"{below:.1}\" font-size=\"{BODY_FONT}\">{body}</text></g>"
         );
     }
     out.push_str("</svg>\n");

@@ -26,7 +26,7 @@ impl Package<'_> {
             robot = comment(&model.name),
             provenance = self.provenance(),
         );
-        for joint in self.joints() {
+        for joint in model.joints() {
             let row = joint.kind.row();
             let kind = match joint.kind.is_single() {
                 true => format!("{} [{}]", row.name, joint.kind.units()[0]),

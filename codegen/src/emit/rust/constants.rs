@@ -59,8 +59,7 @@ impl Constant {
 /// Sizes, names and limits.
 pub(super) fn of_robot(generated: &Generated) -> Vec<Constant> {
     let Generated { model, frames, scalar, .. } = generated;
-    let mut joints: Vec<_> = model.bodies.iter().map(|b| &b.joint).collect();
-    joints.sort_by_key(|j| j.iv);
+    let joints = model.joints();
     let single: Vec<_> = joints.iter().filter(|j| j.kind.is_single()).collect();
     let names = |names: &mut dyn Iterator<Item = &str>| format!("[{}]", string_literals(names));
     let size = |name: &str, value: usize, doc: &str| Constant::new(name, Kind::Size, value.to_string(), doc);

@@ -45,11 +45,6 @@ impl<T: Real> Ltdl<T> {
         Self::factor_along(model, chain, matrix, held)
     }
 
-    /// Factors a symmetric matrix with entries anywhere, as if all joints stood on one branch.
-    pub fn factor_dense(model: &Model<T>, matrix: &[T]) -> Self {
-        Self::factor_holding(model, matrix, &[], true)
-    }
-
     fn factor_along(model: &Model<T>, branches: Branches, mass_matrix: &[T], held: &[usize]) -> Self {
         let nv = model.nv();
         let Branches { coordinates, bodies, parents } = branches;

@@ -2,7 +2,7 @@
 
 use super::JointPose;
 use crate::real::Real;
-use crate::spatial::{Composite, ForceVector, Mat3, MotionVector, Sym3, Vec3};
+use crate::spatial::{symmetric_product, Composite, ForceVector, Mat3, MotionVector, Sym3, Vec3};
 
 /// A coordinate of a joint that its drive alone holds: what q̈ = 1 takes, and what it does.
 #[derive(Clone, Debug)]
@@ -151,9 +151,4 @@ impl<T: Real> ArticulatedInertia<T> {
 fn skew<T: Real>(v: Vec3<T>) -> Mat3<T> {
     let o = T::zero();
     Mat3 { rows: [[o, -v.z, v.y], [v.z, o, -v.x], [-v.y, v.x, o]] }
-}
-
-/// a bᵀ of two parallel vectors.
-pub(crate) fn symmetric_product<T: Real>(a: Vec3<T>, b: Vec3<T>) -> Sym3<T> {
-    Sym3 { xx: a.x * b.x, xy: a.x * b.y, xz: a.x * b.z, yy: a.y * b.y, yz: a.y * b.z, zz: a.z * b.z }
 }

@@ -1,10 +1,10 @@
 //! A joint that slides along z by q.
 
-use super::articulated::{symmetric_product, ArticulatedInertia, FreeJoint};
+use super::articulated::{ArticulatedInertia, FreeJoint};
 use super::mechanics::WorldMotion;
 use super::{Descriptor, JointPose, Measure, Mechanics, Dialect, Word};
 use crate::real::Real;
-use crate::spatial::{Composite, ForceVector, Mat3, MotionVector, Sym3, Transform, Vec3};
+use crate::spatial::{symmetric_product, Composite, ForceVector, Mat3, MotionVector, Sym3, Transform, Vec3};
 
 pub(super) const ROW: Descriptor = Descriptor {
     name: "prismatic",

@@ -2,6 +2,7 @@
 
 use crate::dd::Dd;
 use crate::magnitude::Magnitude;
+use crate::operators::operators;
 use crate::real::Real;
 use core::ops::{AddAssign, DivAssign, MulAssign, SubAssign};
 use num_traits::{One, Zero};
@@ -33,14 +34,4 @@ macro_rules! number {
 number!(Dd);
 number!(Magnitude);
 
-macro_rules! assign {
-    ($($Trait:ident $name:ident $op:tt)*) => {
-        $(impl $Trait for Magnitude {
-            fn $name(&mut self, b: Self) {
-                *self = *self $op b;
-            }
-        })*
-    };
-}
-
-assign!(AddAssign add_assign + SubAssign sub_assign - MulAssign mul_assign * DivAssign div_assign /);
+operators!(assign Magnitude);

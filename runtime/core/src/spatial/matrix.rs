@@ -2,8 +2,9 @@
 
 use super::Vec3;
 use crate::dd::Dd;
+use crate::operators::operators;
 use crate::real::Real;
-use core::ops::{Add, Mul, Sub};
+use core::ops::Mul;
 
 /// A 3×3 matrix, by rows. A rotation `r_ab` turns components in frame b into components in frame a.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,11 +77,9 @@ impl<T: Real> Mul<Vec3<T>> for Mat3<T> {
     }
 }
 
-impl<T: Real> Mul for Mat3<T> {
-    type Output = Mat3<T>;
-    fn mul(self, b: Mat3<T>) -> Mat3<T> {
-        Mat3::from_columns(self * b.column(0), self * b.column(1), self * b.column(2))
-    }
+operators! { [T: Real] Mat3<T>:
+    Mul mul |a, b| Mat3::from_columns(a * b.column(0), a * b.column(1), a * b.column(2));
+    Add add |a, b| Mat3::from_columns(a.column(0) + b.column(0), a.column(1) + b.column(1), a.column(2) + b.column(2));
 }
 
 /// A symmetric 3×3 matrix: an inertia tensor or a second moment.
@@ -187,37 +186,13 @@ impl<T: Real> Mul<Vec3<T>> for Sym3<T> {
     }
 }
 
-impl<T: Real> Add for Mat3<T> {
-    type Output = Self;
-    fn add(self, b: Self) -> Self {
-        Mat3::from_columns(self.column(0) + b.column(0), self.column(1) + b.column(1), self.column(2) + b.column(2))
-    }
-}
-
-impl<T: Real> Add for Sym3<T> {
-    type Output = Self;
-    fn add(self, b: Self) -> Self {
-        Sym3 {
-            xx: self.xx + b.xx,
-            xy: self.xy + b.xy,
-            xz: self.xz + b.xz,
-            yy: self.yy + b.yy,
-            yz: self.yz + b.yz,
-            zz: self.zz + b.zz,
-        }
-    }
-}
-
-impl<T: Real> Sub for Sym3<T> {
-    type Output = Self;
-    fn sub(self, b: Self) -> Self {
-        Sym3 {
-            xx: self.xx - b.xx,
-            xy: self.xy - b.xy,
-            xz: self.xz - b.xz,
-            yy: self.yy - b.yy,
-            yz: self.yz - b.yz,
-            zz: self.zz - b.zz,
-        }
-    }
+operators! { [T: Real] Sym3<T>:
+    Add add |a, b| Sym3 {
+        xx: a.xx + b.xx, xy: a.xy + b.xy, xz: a.xz + b.xz,
+        yy: a.yy + b.yy, yz: a.yz + b.yz, zz: a.zz + b.zz,
+    };
+    Sub sub |a, b| Sym3 {
+        xx: a.xx - b.xx, xy: a.xy - b.xy, xz: a.xz - b.xz,
+        yy: a.yy - b.yy, yz: a.yz - b.yz, zz: a.zz - b.zz,
+    };
 }

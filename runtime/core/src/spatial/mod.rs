@@ -11,5 +11,6 @@ mod vector;
 
 pub(crate) use composite::Composite;
 pub use matrix::{Mat3, Sym3};
+pub(crate) use rigid::symmetric_product;
 pub use rigid::{ForceVector, MotionVector, SpatialInertia, Transform};
 pub use vector::Vec3;

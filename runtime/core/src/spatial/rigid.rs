@@ -1,8 +1,8 @@
 //! Poses, twists, wrenches and inertias.
 
 use super::{Mat3, Sym3, Vec3};
+use crate::operators::operators;
 use crate::real::Real;
-use core::ops::Add;
 
 /// The pose of a frame b in a frame a.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,11 +63,8 @@ impl<T: Real> ForceVector<T> {
     }
 }
 
-impl<T: Real> Add for ForceVector<T> {
-    type Output = Self;
-    fn add(self, b: Self) -> Self {
-        ForceVector { moment: self.moment + b.moment, force: self.force + b.force }
-    }
+operators! { [T: Real] ForceVector<T>:
+    Add add |a, b| ForceVector { moment: a.moment + b.moment, force: a.force + b.force };
 }
 
 /// Mass, centre of mass and inertia of a body, in one frame.
@@ -95,7 +92,7 @@ impl<T: Real> SpatialInertia<T> {
     pub fn new(mass: T, com: Vec3<T>, inertia_com: Sym3<T>) -> Self {
         let first_moment = com.scale(mass);
         let second_moment_com = inertia_com.inertia_to_second_moment();
-        let second_moment = second_moment_com + outer(com, first_moment);
+        let second_moment = second_moment_com + symmetric_product(com, first_moment);
         let j = inertia_com;
         SpatialInertia {
             mass,
@@ -128,6 +125,6 @@ impl<T: Real> SpatialInertia<T> {
 }
 
 /// The symmetric product a bᵀ of two parallel vectors.
-fn outer<T: Real>(a: Vec3<T>, b: Vec3<T>) -> Sym3<T> {
+pub(crate) fn symmetric_product<T: Real>(a: Vec3<T>, b: Vec3<T>) -> Sym3<T> {
     Sym3 { xx: a.x * b.x, xy: a.x * b.y, xz: a.x * b.z, yy: a.y * b.y, yz: a.y * b.z, zz: a.z * b.z }
 }

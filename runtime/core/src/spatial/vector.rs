@@ -1,7 +1,7 @@
 //! 3-vectors.
 
+use crate::operators::operators;
 use crate::real::Real;
-use core::ops::{Add, Neg, Sub};
 
 /// A 3-vector; the frame it is expressed in stands in the name of the variable.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,23 +79,8 @@ impl<T> From<[T; 3]> for Vec3<T> {
     }
 }
 
-impl<T: Real> Add for Vec3<T> {
-    type Output = Self;
-    fn add(self, b: Self) -> Self {
-        Vec3::new(self.x + b.x, self.y + b.y, self.z + b.z)
-    }
-}
-
-impl<T: Real> Sub for Vec3<T> {
-    type Output = Self;
-    fn sub(self, b: Self) -> Self {
-        Vec3::new(self.x - b.x, self.y - b.y, self.z - b.z)
-    }
-}
-
-impl<T: Real> Neg for Vec3<T> {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Vec3::new(-self.x, -self.y, -self.z)
-    }
+operators! { [T: Real] Vec3<T>:
+    Add add |a, b| Vec3::new(a.x + b.x, a.y + b.y, a.z + b.z);
+    Sub sub |a, b| Vec3::new(a.x - b.x, a.y - b.y, a.z - b.z);
+    Neg neg |a| Vec3::new(-a.x, -a.y, -a.z);
 }
