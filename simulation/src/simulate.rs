@@ -101,7 +101,7 @@ impl Settings {
 }
 
 /// What came out.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Run {
     /// `t`, then per joint `q.`, `qd.`, `tau.` and, under a controller, `error.` (reference less measured), then `energy`, `work`
     /// and `losses` \[J\]; of a robot with drives per drive `u.` (after limits), `i.`, `speed.` and `m.` of its actuator before these.
@@ -151,15 +151,7 @@ pub struct Balance {
 impl Run {
     /// Before the first row; the energies and the last state come when it has ended.
     pub(crate) fn beginning(names: Vec<String>) -> Run {
-        Run {
-            table: Table { names, rows: Vec::new() },
-            q: Vec::new(),
-            qd: Vec::new(),
-            stop: None,
-            balance: Balance::default(),
-            steps: 0,
-            evaluations: 0,
-        }
+        Run { table: Table { names, rows: Vec::new() }, ..Run::default() }
     }
 
     /// # Errors

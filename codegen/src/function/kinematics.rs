@@ -8,6 +8,21 @@ use straightline_core::model::Frame;
 use straightline_core::spatial::{MotionVector, Transform, Vec3};
 use straightline_core::Real;
 
+const POSES: Output = Output::new(
+    "x",
+    &[Frames, Of(12)],
+    "per frame of [`FRAME_NAMES`]: position p \\[m\\] (3), then orientation R by rows (9); \
+R's columns are the frame's axes",
+)
+.of_parts(Parts::LinearAngular);
+const JACOBIANS: Output = Output::new(
+    "j",
+    &[Frames, Of(6), Velocities],
+    "per frame: 6 rows (3 linear at the frame's origin, 3 angular; world axes) \
+of one column per velocity coordinate",
+)
+.of_parts(Parts::LinearAngular);
+
 pub struct ForwardKinematics;
 
 impl RobotFunction for ForwardKinematics {
@@ -16,13 +31,7 @@ impl RobotFunction for ForwardKinematics {
         summary: "Poses of the frames in the world.",
         aliases: &["FK", "direct kinematics"],
         inputs: &[Quantity::Configuration],
-        outputs: &[Output::new(
-            "x",
-            &[Frames, Of(12)],
-            "per frame of [`FRAME_NAMES`]: position p \\[m\\] (3), then orientation R by rows (9); \
-R's columns are the frame's axes",
-        )
-        .of_parts(Parts::LinearAngular)],
+        outputs: &[POSES],
         ..Spec::DEFAULT
     };
 
@@ -84,13 +93,7 @@ impl RobotFunction for Jacobian {
         summary: "Geometric Jacobians J of the frames: J q̇ is the frame's velocity.",
         aliases: &["geometric Jacobian"],
         inputs: &[Quantity::Configuration],
-        outputs: &[Output::new(
-            "j",
-            &[Frames, Of(6), Velocities],
-            "per frame: 6 rows (3 linear at the frame's origin, 3 angular; world axes) \
-of one column per velocity coordinate",
-        )
-        .of_parts(Parts::LinearAngular)],
+        outputs: &[JACOBIANS],
         ..Spec::DEFAULT
     };
 
@@ -130,22 +133,7 @@ impl RobotFunction for KinematicsAndJacobian {
         summary: "Poses and geometric Jacobians of the frames, at the cost of little more than one of them.",
         aliases: &["FK", "geometric Jacobian"],
         inputs: &[Quantity::Configuration],
-        outputs: &[
-            Output::new(
-                "x",
-                &[Frames, Of(12)],
-                "per frame of [`FRAME_NAMES`]: position p \\[m\\] (3), then orientation R by rows (9); \
-R's columns are the frame's axes",
-            )
-            .of_parts(Parts::LinearAngular),
-            Output::new(
-                "j",
-                &[Frames, Of(6), Velocities],
-                "per frame: 6 rows (3 linear at the frame's origin, 3 angular; world axes) \
-of one column per velocity coordinate",
-            )
-            .of_parts(Parts::LinearAngular),
-        ],
+        outputs: &[POSES, JACOBIANS],
         family: Family::Combination,
         members: &[Function::ForwardKinematics, Function::Jacobian],
         ..Spec::DEFAULT

@@ -16,6 +16,7 @@ mod contact;
 mod disagreement;
 mod losses;
 #[cfg(feature = "internals")]
+#[path = "../../tests/internals/mutants.rs"]
 pub(crate) mod mutants;
 #[cfg(feature = "internals")]
 pub(crate) mod sabotage;

@@ -189,7 +189,7 @@ struct Facts {
 }
 
 impl Bounds<'_> {
-    /// From H and q̈ at a state.
+    /// From H and q̈ at a state. One piece: elimination, inverse and adjoints share all of their values.
     fn facts(&self, model: &Model<Dd>, h: &[Dd], qdd: &[Dd]) -> Facts {
         let (n, held, free, inertia) = (model.nv(), &self.felt.held, &self.felt.free, self.inertia);
         let within = |x: f64| Interval::around_zero(x * (1.0 + SLACK));

@@ -28,21 +28,35 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
     let mut complain = |place: &Place, what: String, value: f64, is_needed: bool| {
         unheld(&what, value, is_needed, scalar).into_iter().for_each(|complaint| diagnostics.push(complaint.at(place)));
     };
-    let drive = |name: &str, drive: &JointDrive, complain: &mut dyn FnMut(&Place, String, f64)| {
-        for (what, value) in [
-            ("damping", &drive.damping),
-            ("friction", &drive.friction),
-            ("rotor_inertia", &drive.rotor_inertia),
-            ("gear_ratio", &drive.gear_ratio),
-            ("armature", &drive.armature),
-            ("spring_stiffness", &drive.spring_stiffness),
-            ("spring_rest", &drive.spring_rest),
-        ] {
-            if let Some(value) = value {
-                complain(&value.place, format!("{what} of joint `{name}`"), value.value);
-            }
+    of_bodies(description, &mut complain);
+    for number in description.drives.iter().chain(&scene.drives).flat_map(|drive| &drive.written.0) {
+        complain(&number.value.place, number.what.clone(), number.value.value, number.is_needed);
+    }
+    of_scene(scene, scalar, diagnostics);
+}
+
+/// Takes a number with its place, what it is, and whether it must not vanish.
+type Number<'a> = &'a mut dyn FnMut(&Place, String, f64, bool);
+
+/// The numbers of a joint besides its place.
+fn of_joint(name: &str, drive: &JointDrive, number: Number) {
+    for (what, value) in [
+        ("damping", &drive.damping),
+        ("friction", &drive.friction),
+        ("rotor_inertia", &drive.rotor_inertia),
+        ("gear_ratio", &drive.gear_ratio),
+        ("armature", &drive.armature),
+        ("spring_stiffness", &drive.spring_stiffness),
+        ("spring_rest", &drive.spring_rest),
+    ] {
+        if let Some(value) = value {
+            number(&value.place, format!("{what} of joint `{name}`"), value.value, false);
         }
-    };
+    }
+}
+
+/// Gravity, and the numbers of links and joints.
+fn of_bodies(description: &Description, complain: Number) {
     if let Some(gravity) = &description.gravity {
         gravity.value.iter().for_each(|x| complain(&gravity.place, "gravity".to_string(), *x, false));
     }
@@ -64,11 +78,12 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
                 complain(&length.place, format!("{what} of joint `{name}`"), x, false);
             }
         }
-        drive(name, &joint.drive, &mut |place, what, x| complain(place, what, x, false));
+        of_joint(name, &joint.drive, complain);
     }
-    for number in description.drives.iter().chain(&scene.drives).flat_map(|drive| &drive.written.0) {
-        complain(&number.value.place, number.what.clone(), number.value.value, number.is_needed);
-    }
+}
+
+/// The limits of drives that a parameter makes free, and the payloads.
+fn of_scene(scene: &Scene, scalar: Scalar, diagnostics: &mut Diagnostics) {
     for (i, parameter) in scene.parameters.iter().enumerate() {
         let Parameter::Drive { drive, numbers, form: Some(form), .. } = parameter else { continue };
         // the others stand in the file

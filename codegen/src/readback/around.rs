@@ -332,9 +332,7 @@ fn nested(
             }
             Kind::Word(t::F64 | t::F32) if items.text_of(*at) == scalar.name() => {
                 *at += 1;
-                items.mark(at, b':')?;
-                items.mark(at, b':')?;
-                items.keyword(at, t::INFINITY)?;
+                items.these(at, ": : INFINITY")?;
                 Some(f64::INFINITY)
             }
             _ => None,

@@ -160,6 +160,17 @@ impl<'t> Items<'t> {
         self.stop(*at, "another word is expected here")
     }
 
+    /// Takes these words and marks, which spaces part.
+    pub fn these(&self, at: &mut usize, expected: &str) -> Parsed<()> {
+        for text in expected.split(' ') {
+            if self.text_of(*at) != text {
+                return self.stop(*at, format!("`{text}` is expected here"));
+            }
+            *at += 1;
+        }
+        Ok(())
+    }
+
     /// Takes any word.
     pub fn word(&self, at: &mut usize) -> Parsed<u32> {
         match self.kind(*at) {

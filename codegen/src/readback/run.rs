@@ -257,11 +257,33 @@ impl<'a, 't> Run<'a, 't> {
     }
 
     fn mark(&mut self, mark: u8) -> Ran<()> {
-        if self.kind() == Kind::Mark(mark) {
-            self.at += 1;
-            return Ok(());
+        match self.takes(mark) {
+            true => Ok(()),
+            false => self.items.mark(&mut self.at, mark),
         }
-        self.items.mark(&mut self.at, mark)
+    }
+
+    fn these(&mut self, expected: &str) -> Ran<()> {
+        self.items.these(&mut self.at, expected)
+    }
+
+    /// Takes this mark, if it stands here.
+    fn takes(&mut self, mark: u8) -> bool {
+        let is_here = self.kind() == Kind::Mark(mark);
+        self.at += usize::from(is_here);
+        is_here
+    }
+
+    /// What stands between commas, up to this mark.
+    fn listed<X>(&mut self, close: u8, mut each: impl FnMut(&mut Self) -> Ran<X>) -> Ran<Vec<X>> {
+        let mut all = Vec::new();
+        while !self.takes(close) {
+            all.push(each(self)?);
+            if self.kind() != Kind::Mark(close) {
+                self.mark(b',')?;
+            }
+        }
+        Ok(all)
     }
 
     fn word(&mut self) -> Ran<u32> {

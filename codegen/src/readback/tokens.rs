@@ -45,8 +45,8 @@ macro_rules! words {
 words! {
     LET = "let", MUT = "mut", FOR = "for", IN = "in", FN = "fn", PUB = "pub", CONST = "const", STATIC = "static", USE = "use",
     MOD = "mod", STRUCT = "struct", ENUM = "enum", IMPL = "impl", SUPER = "super", AS = "as", UNDERSCORE = "_",
-    F32 = "f32", F64 = "f64", USIZE = "usize", BOOL = "bool", T = "T", REAL = "Real", DD = "Dd", FROM = "from",
-    ZERO = "zero", CONSTANT = "constant", NUMBER = "number", INFINITY = "INFINITY",
+    F32 = "f32", F64 = "f64", USIZE = "usize", BOOL = "bool", T = "T", REAL = "Real",
+    ZERO = "zero", CONSTANT = "constant", NUMBER = "number",
     N = "N", FUSED = "FUSED", FMA = "fma", FMA_IF = "fma_if", FUSED_MODULE = "fused", TRIG = "trig", BATCH = "batch",
     COST = "Cost", UNPHYSICAL = "Unphysical", CHECK_INERTIA = "check_inertia",
     OUT_OF_RANGE = "OutOfRange", CHECK_NUMBER = "check_number",

@@ -161,6 +161,8 @@ pub fn items_of(whole: &Model<Dd>, scene: &Scene) -> Vec<String> {
 
 /// Takes an item of the second scene over to the first.
 type Change = Box<dyn Fn(&mut Scene, &Scene)>;
+/// Takes an effect from a scene.
+type Switch = fn(&mut Effects, &Effects);
 
 /// The items of a scene in the order of the waterfall.
 fn items(whole: &Model<Dd>, scene: &Scene) -> Vec<(What, Change)> {
@@ -199,31 +201,18 @@ fn items(whole: &Model<Dd>, scene: &Scene) -> Vec<(What, Change)> {
         let what = format!("{} at rest", joints(&scene.zero.joints_at_rest));
         item(what, Box::new(|now, s| now.zero.joints_at_rest.clone_from(&s.zero.joints_at_rest)));
     }
-    let Effects { rotor_inertia, damping, coulomb, springs, transmission_losses, elastic_transmissions, .. } =
-        scene.effects;
-    if !rotor_inertia {
-        item("no rotor inertia".to_string(), Box::new(|now, _| now.effects.rotor_inertia = false));
-    }
-    if !damping {
-        item("no viscous friction".to_string(), Box::new(|now, _| now.effects.damping = false));
-    }
-    match coulomb {
-        Coulomb::Sign => {}
-        Coulomb::Off => {
-            item("no Coulomb friction".to_string(), Box::new(|now, s| now.effects.coulomb = s.effects.coulomb))
-        }
-        Coulomb::Smooth(_) => {
-            item("smooth Coulomb friction".to_string(), Box::new(|now, s| now.effects.coulomb = s.effects.coulomb));
-        }
-    }
-    if !springs {
-        item("no springs".to_string(), Box::new(|now, _| now.effects.springs = false));
-    }
-    if !transmission_losses {
-        item("no losses in transmissions".to_string(), Box::new(|now, _| now.effects.transmission_losses = false));
-    }
-    if !elastic_transmissions {
-        item("rigid transmissions".to_string(), Box::new(|now, _| now.effects.elastic_transmissions = false));
+    let effects = &scene.effects;
+    let switched: [(bool, &str, Switch); 7] = [
+        (!effects.rotor_inertia, "no rotor inertia", |now, _| now.rotor_inertia = false),
+        (!effects.damping, "no viscous friction", |now, _| now.damping = false),
+        (effects.coulomb == Coulomb::Off, "no Coulomb friction", |now, s| now.coulomb = s.coulomb),
+        (matches!(effects.coulomb, Coulomb::Smooth(_)), "smooth Coulomb friction", |now, s| now.coulomb = s.coulomb),
+        (!effects.springs, "no springs", |now, _| now.springs = false),
+        (!effects.transmission_losses, "no losses in transmissions", |now, _| now.transmission_losses = false),
+        (!effects.elastic_transmissions, "rigid transmissions", |now, _| now.elastic_transmissions = false),
+    ];
+    for (_, what, change) in switched.into_iter().filter(|(is_so, ..)| *is_so) {
+        item(what.to_string(), Box::new(move |now, s| change(&mut now.effects, &s.effects)));
     }
     for (i, parameter) in scene.parameters.iter().enumerate() {
         let what = match parameter {

@@ -8,7 +8,7 @@ use crate::function::{Family, Function, Parts};
 use crate::identifier::UNNAMED;
 use crate::model::geometry::principal_moments;
 use crate::model::{is_gravity, GRAVITY};
-use straightline_core::model::Model;
+use straightline_core::model::{BodyId, Model};
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
 
@@ -18,26 +18,55 @@ const MOMENT_DIGITS: f64 = 1e-6;
 /// What is wrong with a scene, whatever the robot.
 pub(crate) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
     check_contact::alone(scene, diagnostics);
-    let places = &scene.places;
+    outputs_alone(scene, diagnostics);
+    ranges_alone(scene, diagnostics);
+    held_alone(scene, diagnostics);
+    if let Coulomb::Smooth(speed) = scene.effects.coulomb {
+        // its square must not vanish beside one
+        if !(1e-9..=1e9).contains(&speed) {
+            let complaint = say::not_in_range("coulomb_speed", speed, "between 1e-9 and 1e9");
+            scene.places.complain("effects.coulomb_speed", complaint, diagnostics);
+        }
+    }
+    for (i, payload) in scene.payloads.iter().enumerate() {
+        let mut complain =
+            |key: &str, complaint| scene.places.complain(&format!("payload.{i}.{key}"), complaint, diagnostics);
+        if scene.payloads[..i].iter().any(|other| other.name == payload.name) {
+            complain("name", say::payload_name_twice(&payload.name));
+        }
+        if let Some((key, why)) = unphysical(payload) {
+            complain(key, say::unphysical_body(&payload.name, &why));
+        }
+    }
+    parameters_alone(scene, diagnostics);
+}
+
+/// Selections that a function does not have.
+fn outputs_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
     for (&function, selection) in &scene.outputs {
         let name = function.name();
-        let path = |key: &str| format!("outputs.{name}.{key}");
+        let mut complain =
+            |key: &str, complaint| scene.places.complain(&format!("outputs.{name}.{key}"), complaint, diagnostics);
         for (key, wanted, possible) in [
             ("joints", &selection.joints, by_joints as fn(Function) -> bool),
             ("frames", &selection.frames, Function::is_per_frame),
         ] {
             if !wanted.is_empty() && !possible(function) {
                 let others: Vec<&str> = Function::known().filter(|f| possible(*f)).map(Function::name).collect();
-                places.complain(&path(key), say::not_a_selection(name, key, &others), diagnostics);
+                complain(key, say::not_a_selection(name, key, &others));
             }
         }
         let parts = parts_of(function);
         if selection.part != Part::Whole && !parts.contains(&selection.part) {
             let words: Vec<&str> = parts.iter().map(|p| p.word()).collect();
-            places.complain(&path("part"), say::no_such_part(name, selection.part.word(), &words), diagnostics);
+            complain("part", say::no_such_part(name, selection.part.word(), &words));
         }
     }
-    ranges_alone(scene, diagnostics);
+}
+
+/// Joints with two values, and values that none has.
+fn held_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
+    let places = &scene.places;
     for (i, (joint, value)) in scene.locked.iter().enumerate() {
         let path = format!("hold.joints.{joint}");
         if scene.locked[..i].iter().any(|(other, _)| other == joint) {
@@ -54,21 +83,11 @@ pub(crate) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
             places.complain("hold.gravity", complaint, diagnostics);
         }
     }
-    if let Coulomb::Smooth(speed) = scene.effects.coulomb {
-        // its square must not vanish beside one
-        if !(1e-9..=1e9).contains(&speed) {
-            let complaint = say::not_in_range("coulomb_speed", speed, "between 1e-9 and 1e9");
-            places.complain("effects.coulomb_speed", complaint, diagnostics);
-        }
-    }
-    for (i, payload) in scene.payloads.iter().enumerate() {
-        if scene.payloads[..i].iter().any(|other| other.name == payload.name) {
-            places.complain(&format!("payload.{i}.name"), say::payload_name_twice(&payload.name), diagnostics);
-        }
-        if let Some((key, why)) = unphysical(payload) {
-            places.complain(&format!("payload.{i}.{key}"), say::unphysical_body(&payload.name, &why), diagnostics);
-        }
-    }
+}
+
+/// Parameters whose names, or types, are taken.
+fn parameters_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
+    let places = &scene.places;
     let of_contacts: Vec<String> = scene.contacts.contacts.iter().flat_map(ContactItem::port_names).collect();
     for (i, parameter) in scene.parameters.iter().enumerate() {
         let (name, input, path) = (parameter.name(), parameter.input_name(), format!("parameter.{i}"));
@@ -183,19 +202,21 @@ pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnosti
     check_contact::against(model, scene, held, diagnostics);
 }
 
+/// The body that a frame moves with in this scene.
+pub(super) fn carrier(model: &Model<Dd>, held: &[bool], frame: &str) -> Option<BodyId> {
+    let mut body = model.frame(frame)?.body;
+    while let Some(id) = body.filter(|id| held[*id]) {
+        body = model.bodies[id].parent;
+    }
+    body
+}
+
 /// The names of frames and links.
 fn frames(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnostics: &mut Diagnostics) {
     let places = &scene.places;
     let unknown =
         |owner: &str, name: &str| say::unknown_frame(owner, name, model.frames.iter().map(|f| f.name.as_str()));
-    // the body that a frame moves with in this scene
-    let carrier = |name: &str| {
-        let mut body = model.frame(name)?.body;
-        while let Some(id) = body.filter(|id| held[*id]) {
-            body = model.bodies[id].parent;
-        }
-        body
-    };
+    let carrier = |name: &str| carrier(model, held, name);
     for (function, selection) in &scene.outputs {
         for (i, frame) in selection.frames.iter().enumerate().filter(|(_, f)| model.frame(f).is_none()) {
             let path = format!("outputs.{}.frames.{i}", function.name());

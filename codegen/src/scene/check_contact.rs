@@ -1,8 +1,9 @@
 //! What can be wrong with the contacts of a scene: by themselves, and with a robot.
 
-use super::contact::{ContactItem, EnvironmentKind, SurfaceItem};
+use super::check::carrier;
+use super::contact::{ContactItem, Contacts, EnvironmentKind, SurfaceItem};
 use super::{messages as say, Scene};
-use crate::diagnostic::Diagnostics;
+use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::identifier::{identifier, module_name, upper_camel_case, UNNAMED};
 use straightline_core::contact::Coordinate;
 use straightline_core::model::Model;
@@ -10,6 +11,9 @@ use straightline_core::Dd;
 
 /// A direction of this length or less is none.
 const SHORT: f64 = 1e-9;
+
+/// Takes a complaint with the path of what it is about.
+type Complain<'a> = &'a mut dyn FnMut(String, Diagnostic);
 
 fn cross([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
     [b * z - c * y, c * x - a * z, a * y - b * x]
@@ -27,6 +31,33 @@ fn repeated(coordinates: &[Coordinate]) -> Option<Coordinate> {
 pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
     let (all, places) = (&scene.contacts, &scene.places);
     let mut complain = |path: String, complaint| places.complain(&path, complaint, diagnostics);
+    names(all, &mut complain);
+    for (i, item) in all.contacts.iter().enumerate() {
+        contact(i, item, &mut complain);
+        friction_and_environment(i, item, &mut complain);
+    }
+    for (i, a_loop) in all.loops.iter().enumerate() {
+        let owner = format!("loop `{}`", a_loop.name);
+        if a_loop.constrained.is_empty() {
+            complain(format!("loop.{i}.constrained"), say::no_coordinate(&owner));
+        }
+        if let Some(coordinate) = repeated(&a_loop.constrained) {
+            complain(format!("loop.{i}.constrained"), say::coordinate_twice(&a_loop.name, coordinate.name()));
+        }
+    }
+    modes(all, &mut complain);
+    if let Some((frequency, damping)) = all.stabilisation {
+        for (key, value) in [("frequency", frequency), ("damping", damping)] {
+            if !(1e-9..=1e6).contains(&value) {
+                let complaint = say::not_in_range(&format!("{key} of [stabilisation]"), value, "between 1e-9 and 1e6");
+                complain(format!("stabilisation.{key}"), complaint);
+            }
+        }
+    }
+}
+
+/// Names that make no identifier of their own.
+fn names(all: &Contacts, complain: Complain) {
     type Named = fn(&str, &str) -> String;
     let groups: [(&str, Named, Vec<&str>); 3] = [
         ("contact", identifier, all.contacts.iter().map(|c| c.name.as_str()).collect()),
@@ -43,55 +74,51 @@ pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
             }
         }
     }
-    for (i, contact) in all.contacts.iter().enumerate() {
-        let (path, name) = (format!("contact.{i}"), &contact.name);
-        if let Some(axis) = contact.axis.filter(|a| length(*a) <= SHORT) {
-            complain(format!("{path}.axis"), say::no_direction(&format!("axis of contact `{name}`"), axis));
-        }
-        if let Some(object) = contact.object {
-            let what = |key: &str| format!("{key} of the object of contact `{name}`");
-            if length(object.z) <= SHORT {
-                complain(format!("{path}.object.z"), say::no_direction(&what("z"), object.z));
-            } else if length(cross(object.z, object.x)) <= 1e-6 * length(object.z) * length(object.x) {
-                complain(format!("{path}.object.x"), say::no_direction(&what("x, perpendicular to z,"), object.x));
-            }
-        }
-        let (constrained, free) = (&contact.constrained, &contact.free);
-        let both = constrained.iter().find(|c| free.contains(c)).copied();
-        if constrained.is_empty() {
-            complain(format!("{path}.constrained"), say::no_coordinate(&format!("contact `{name}`")));
-        }
-        for (key, wrong) in [("constrained", repeated(constrained)), ("free", repeated(free)), ("free", both)] {
-            if let Some(coordinate) = wrong {
-                complain(format!("{path}.{key}"), say::coordinate_twice(name, coordinate.name()));
-            }
-        }
-        match &contact.surface {
-            SurfaceItem::Sphere { radius, .. } | SurfaceItem::Cylinder { radius, .. } => {
-                if !(1e-9..=1e9).contains(radius) {
-                    let what = format!("radius of contact `{name}`");
-                    let complaint = say::not_in_range(&what, *radius, "between 1e-9 and 1e9 m");
-                    complain(format!("{path}.surface.radius"), complaint);
-                }
-            }
-            SurfaceItem::Quadric { matrix, linear, .. } => {
-                if matrix.iter().chain(linear).all(|x| *x == 0.0) {
-                    complain(format!("{path}.surface"), say::no_surface(name));
-                }
-            }
-            SurfaceItem::Plane | SurfaceItem::Implicit(_) => {}
-        }
-        friction_and_environment(i, contact, &mut complain);
+}
+
+/// A contact without its environment.
+fn contact(i: usize, contact: &ContactItem, complain: Complain) {
+    let (path, name) = (format!("contact.{i}"), &contact.name);
+    if let Some(axis) = contact.axis.filter(|a| length(*a) <= SHORT) {
+        complain(format!("{path}.axis"), say::no_direction(&format!("axis of contact `{name}`"), axis));
     }
-    for (i, a_loop) in all.loops.iter().enumerate() {
-        let owner = format!("loop `{}`", a_loop.name);
-        if a_loop.constrained.is_empty() {
-            complain(format!("loop.{i}.constrained"), say::no_coordinate(&owner));
-        }
-        if let Some(coordinate) = repeated(&a_loop.constrained) {
-            complain(format!("loop.{i}.constrained"), say::coordinate_twice(&a_loop.name, coordinate.name()));
+    if let Some(object) = contact.object {
+        let what = |key: &str| format!("{key} of the object of contact `{name}`");
+        if length(object.z) <= SHORT {
+            complain(format!("{path}.object.z"), say::no_direction(&what("z"), object.z));
+        } else if length(cross(object.z, object.x)) <= 1e-6 * length(object.z) * length(object.x) {
+            complain(format!("{path}.object.x"), say::no_direction(&what("x, perpendicular to z,"), object.x));
         }
     }
+    let (constrained, free) = (&contact.constrained, &contact.free);
+    let both = constrained.iter().find(|c| free.contains(c)).copied();
+    if constrained.is_empty() {
+        complain(format!("{path}.constrained"), say::no_coordinate(&format!("contact `{name}`")));
+    }
+    for (key, wrong) in [("constrained", repeated(constrained)), ("free", repeated(free)), ("free", both)] {
+        if let Some(coordinate) = wrong {
+            complain(format!("{path}.{key}"), say::coordinate_twice(name, coordinate.name()));
+        }
+    }
+    match &contact.surface {
+        SurfaceItem::Sphere { radius, .. } | SurfaceItem::Cylinder { radius, .. } => {
+            if !(1e-9..=1e9).contains(radius) {
+                let what = format!("radius of contact `{name}`");
+                let complaint = say::not_in_range(&what, *radius, "between 1e-9 and 1e9 m");
+                complain(format!("{path}.surface.radius"), complaint);
+            }
+        }
+        SurfaceItem::Quadric { matrix, linear, .. } => {
+            if matrix.iter().chain(linear).all(|x| *x == 0.0) {
+                complain(format!("{path}.surface"), say::no_surface(name));
+            }
+        }
+        SurfaceItem::Plane | SurfaceItem::Implicit(_) => {}
+    }
+}
+
+/// Modes with contacts that are not there, that cannot stick, or without any.
+fn modes(all: &Contacts, complain: Complain) {
     for (i, mode) in all.modes.iter().enumerate() {
         let find = |name: &String| all.contacts.iter().find(|c| c.name == *name);
         let known = || all.contacts.iter().map(|c| c.name.as_str());
@@ -110,21 +137,9 @@ pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
             complain(format!("mode.{i}.contacts"), say::empty_mode(&mode.name));
         }
     }
-    if let Some((frequency, damping)) = all.stabilisation {
-        for (key, value) in [("frequency", frequency), ("damping", damping)] {
-            if !(1e-9..=1e6).contains(&value) {
-                let complaint = say::not_in_range(&format!("{key} of [stabilisation]"), value, "between 1e-9 and 1e6");
-                complain(format!("stabilisation.{key}"), complaint);
-            }
-        }
-    }
 }
 
-fn friction_and_environment(
-    i: usize,
-    contact: &ContactItem,
-    complain: &mut impl FnMut(String, crate::diagnostic::Diagnostic),
-) {
+fn friction_and_environment(i: usize, contact: &ContactItem, complain: Complain) {
     use Coordinate::{Px, Py, Pz};
     let (path, name) = (format!("contact.{i}"), &contact.name);
     let holds = |c: Coordinate| contact.constrained.contains(&c);
@@ -162,14 +177,7 @@ fn friction_and_environment(
 /// With a robot; `held` says which of its bodies do not move against their parents.
 pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnostics: &mut Diagnostics) {
     let (all, places) = (&scene.contacts, &scene.places);
-    // the body that a frame moves with in this scene
-    let carrier = |name: &str| {
-        let mut body = model.frame(name)?.body;
-        while let Some(id) = body.filter(|id| held[*id]) {
-            body = model.bodies[id].parent;
-        }
-        body
-    };
+    let carrier = |name: &str| carrier(model, held, name);
     let mut check = |path: String, owner: &str, frame: &str, must_move: bool| {
         let complaint = match (model.frame(frame), carrier(frame)) {
             (None, _) => say::unknown_frame(owner, frame, model.frames.iter().map(|f| f.name.as_str())),

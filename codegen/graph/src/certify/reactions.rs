@@ -46,6 +46,7 @@ impl Contact<'_> {
         rows.iter().map(|row| (0..n).map(|k| entry(row, k)).collect()).collect()
     }
 
+    /// N φ = right, and what φ does to accelerations. One piece: the steps of the proof share all of their values.
     pub fn reactions(&self, p: &mut Running, h: &Congruence) -> Reactions {
         let (n, m) = (h.d.len(), self.missing.len());
         let d: Vec<Tracked> = h.d.iter().map(|d| Running::exact(*d)).collect();
@@ -200,7 +201,7 @@ struct Solved {
     smallest: NodeId,
 }
 
-/// Of |right|; 1/`scales` are the units of φ.
+/// Of |right|; 1/`scales` are the units of φ. One piece, as [`Contact::reactions`].
 fn solve(p: &mut Running, matrix: &[Vec<Tracked>], right: &[NodeId], scales: &[NodeId]) -> Solved {
     let m = matrix.len();
     let values: Vec<NodeId> = matrix.iter().flatten().map(|x| x.value).collect();

@@ -1,9 +1,10 @@
 //! The C header of a package.
 
-use super::c_package::{Package, Parameter, LAYOUTS};
+use super::c_package::{Exported, Package, Parameter, LAYOUTS};
 use crate::emit::doc::relinked;
 use crate::identifier::comment;
 use std::fmt::Write;
+use straightline_graph::expr::Port;
 
 /// What the header says of batches.
 const BATCHES: &str = "
@@ -73,32 +74,38 @@ const char *{prefix}_frame_name(int i);
         if self.generated.lanes.is_some() {
             out.push_str(BATCHES);
         }
-        let c_type = self.scalar().c_name();
-        for body in self.bodies() {
-            let (name, length) = (&body.name, body.len());
-            if let Some(numbers) = self.drive_numbers(&body) {
-                let arguments: String = numbers.iter().map(|n| format!("{c_type} {}, ", n.name)).collect();
-                let _ =
-                    writeln!(out, "\n/* A drive as the functions take it in `{name}`, made outside the control loop:");
-                for n in numbers {
-                    let _ = writeln!(
-                        out,
-                        " *   {}: {}; {:?} in the robot file",
-                        n.name,
-                        n.quantity.meaning.replace('\\', ""),
-                        n.value
-                    );
-                }
-                let _ = write!(
+        self.bodies().iter().for_each(|body| self.constructor_in_c(&mut out, body));
+        self.exported().iter().for_each(|function| self.declaration(&mut out, function));
+        out.push_str("\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n");
+        out
+    }
+
+    /// What makes a run-time parameter.
+    fn constructor_in_c(&self, out: &mut String, body: &Port) {
+        let (prefix, c_type) = (self.prefix, self.scalar().c_name());
+        let (name, length) = (&body.name, body.len());
+        if let Some(numbers) = self.drive_numbers(body) {
+            let arguments: String = numbers.iter().map(|n| format!("{c_type} {}, ", n.name)).collect();
+            let _ = writeln!(out, "\n/* A drive as the functions take it in `{name}`, made outside the control loop:");
+            for n in numbers {
+                let _ = writeln!(
+                    out,
+                    " *   {}: {}; {:?} in the robot file",
+                    n.name,
+                    n.quantity.meaning.replace('\\', ""),
+                    n.value
+                );
+            }
+            let _ = write!(
                     out,
                     " * Returns 0, or which of the numbers no drive has, counted from 1, or {} where what follows from them is not\n \
                      * finite; made is untouched then. */\n\
                      int {prefix}_{name}_new({arguments}{c_type} made[{length}]);\n",
                     numbers.len() + 1
                 );
-                continue;
-            }
-            let _ = write!(
+            return;
+        }
+        let _ = write!(
                 out,
                 "\n/* A body as the functions take it in {name}, made outside the control loop, of this mass [kg], with its centre\n \
                  * of mass [m] and its inertia about the centre of mass xx, xy, xz, yy, yz, zz [kg m^2]. All zeros are no body.\n \
@@ -106,27 +113,26 @@ const char *{prefix}_frame_name(int i);
                  * mass, 4 the inertia is impossible; {name} is untouched then. */\n\
                  int {prefix}_{name}_new({c_type} mass, const {c_type} com[3], const {c_type} inertia[6], {c_type} {name}[{length}]);\n"
             );
+    }
+
+    /// A function, and its batches.
+    fn declaration(&self, out: &mut String, function: &Exported) {
+        let (prefix, c_type) = (self.prefix, self.scalar().c_name());
+        let doc = relinked(&function.doc, &|name| name.to_string());
+        let doc = doc.replace("frame of FRAME_NAMES", "frame").replace(['`', '\\'], "");
+        out.push_str("\n/*");
+        for (i, line) in doc.lines().filter(|l| !l.is_empty()).enumerate() {
+            let line = line.strip_prefix("* ").map_or(line.to_string(), |parameter| format!("  {parameter}"));
+            let _ = write!(out, "{} {line}", if i == 0 { "" } else { "\n *" });
         }
-        for function in self.exported() {
-            let doc = relinked(&function.doc, &|name| name.to_string());
-            let doc = doc.replace("frame of FRAME_NAMES", "frame").replace(['`', '\\'], "");
-            out.push_str("\n/*");
-            for (i, line) in doc.lines().filter(|l| !l.is_empty()).enumerate() {
-                let line = line.strip_prefix("* ").map_or(line.to_string(), |parameter| format!("  {parameter}"));
-                let _ = write!(out, "{} {line}", if i == 0 { "" } else { "\n *" });
-            }
-            let list =
-                |f: &dyn Fn(&Parameter) -> String| function.parameters.iter().map(f).collect::<Vec<_>>().join(", ");
-            let name = &function.c_name;
-            let _ = writeln!(out, " */\nvoid {prefix}_{name}({});", list(&|p| p.in_c(c_type)));
-            if self.generated.lanes.is_some() {
-                let parameters = list(&|p| p.of_states_in_c(c_type));
-                for (layout, _) in LAYOUTS {
-                    let _ = writeln!(out, "void {prefix}_{name}_batch_{layout}(size_t n, {parameters});");
-                }
+        let list = |f: &dyn Fn(&Parameter) -> String| function.parameters.iter().map(f).collect::<Vec<_>>().join(", ");
+        let name = &function.c_name;
+        let _ = writeln!(out, " */\nvoid {prefix}_{name}({});", list(&|p| p.in_c(c_type)));
+        if self.generated.lanes.is_some() {
+            let parameters = list(&|p| p.of_states_in_c(c_type));
+            for (layout, _) in LAYOUTS {
+                let _ = writeln!(out, "void {prefix}_{name}_batch_{layout}(size_t n, {parameters});");
             }
         }
-        out.push_str("\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n");
-        out
     }
 }

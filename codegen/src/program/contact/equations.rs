@@ -82,6 +82,17 @@ fn of_robot<T: Real>(bound: &Bound<T>, reduced: bool, function: Function, argume
     function.evaluate_on(&bound.forms(reduced, &[], method), arguments)
 }
 
+/// What the equations of all functions have in common.
+struct Given<'a, T> {
+    options: &'a Options,
+    bound: &'a Bound<T>,
+    reduced: bool,
+    added: &'a Added<T>,
+    traced: Vec<Traced<'a, T>>,
+    constrained: FunctionalCoordinates<T>,
+    epsilon: T,
+}
+
 /// The results of a function, one list per output.
 pub(super) fn equations<T: Real>(
     robot: &Robot,
@@ -92,121 +103,140 @@ pub(super) fn equations<T: Real>(
     bound: &Bound<T>,
     added: &Added<T>,
 ) -> Vec<Vec<T>> {
-    let (q, qd) = (&bound.arguments[0], &bound.arguments[1]);
     let traced = contacts(robot, mode, bound, added, form);
     let constrained = traced.iter().fold(FunctionalCoordinates::default(), |all, t| all.and(t.constrained.clone()));
-    let free = || {
-        let parts =
-            traced.iter().filter_map(|t| Some(alg::functional_coordinates(&t.contact, &t.motion, &t.closed?.free)));
-        parts.fold(FunctionalCoordinates::default(), FunctionalCoordinates::and)
-    };
-    let of_robot = |function: Function, arguments: &[Vec<T>]| of_robot(bound, form.reduced, function, arguments);
-    let mass_matrix = || of_robot(Function::MassMatrix, std::slice::from_ref(q));
-    let factor = || Ltdl::factor(&bound.model, &mass_matrix());
-    // rotors of rigid drives are struck, too
-    let whole_factor = || match bound.model.drives.is_empty() {
-        true => factor(),
-        false => alg::driven_factor(&bound.model, q, &mass_matrix()),
-    };
     let epsilon = T::constant(Dd::from(ridge(options.scalar)));
-    let applied = || -> Option<Vec<Vec<T>>> {
-        let slides = traced.iter().any(|t| t.closed.is_some_and(|c| c.slides));
-        slides.then(|| traced.iter().flat_map(|t| alg::applied_rows(&t.contact, &t.motion, &t.constrained)).collect())
-    };
+    let given = Given { options, bound, reduced: form.reduced, added, traced, constrained, epsilon };
     let list = |c: FunctionalCoordinates<T>| vec![c.value, c.rate, c.jacobian.concat(), c.bias];
     match function {
-        ContactFunction::ConstrainedCoordinates => list(constrained),
-        ContactFunction::FreeCoordinates => list(free()),
-        ContactFunction::ForwardDynamics | ContactFunction::DrivenForwardDynamics => {
-            let bias = of_robot(Function::BiasForce, &[q.clone(), qd.clone()]);
-            let (supports, own_rates) = supports(&traced, &constrained, options, added);
-            let applied = applied();
-            let (motion, xd) = if function == ContactFunction::DrivenForwardDynamics {
-                let at = (&q[..], &qd[..], &bound.arguments[2][..], &bound.arguments[3][..]);
-                let rows = ContactRows {
-                    coordinates: &constrained,
-                    applied: applied.as_deref(),
-                    supports: &supports,
-                    ridge: epsilon,
+        ContactFunction::ConstrainedCoordinates => list(given.constrained),
+        ContactFunction::FreeCoordinates => list(given.free()),
+        ContactFunction::ForwardDynamics => given.forward_dynamics(false),
+        ContactFunction::DrivenForwardDynamics => given.forward_dynamics(true),
+        ContactFunction::InverseDynamics => given.inverse_dynamics(),
+        ContactFunction::Impact => given.impact(),
+        ContactFunction::Projection => given.projection(),
+    }
+}
+
+impl<T: Real> Given<'_, T> {
+    fn q(&self) -> &Vec<T> {
+        &self.bound.arguments[0]
+    }
+
+    fn qd(&self) -> &Vec<T> {
+        &self.bound.arguments[1]
+    }
+
+    fn of_robot(&self, function: Function, arguments: &[Vec<T>]) -> Vec<T> {
+        of_robot(self.bound, self.reduced, function, arguments)
+    }
+
+    fn mass_matrix(&self) -> Vec<T> {
+        self.of_robot(Function::MassMatrix, std::slice::from_ref(self.q()))
+    }
+
+    fn factor(&self) -> Ltdl<T> {
+        Ltdl::factor(&self.bound.model, &self.mass_matrix())
+    }
+
+    /// With the rotors of rigid drives, which are struck, too.
+    fn whole_factor(&self) -> Ltdl<T> {
+        match self.bound.model.drives.is_empty() {
+            true => self.factor(),
+            false => alg::driven_factor(&self.bound.model, self.q(), &self.mass_matrix()),
+        }
+    }
+
+    fn free(&self) -> FunctionalCoordinates<T> {
+        let of = |t: &Traced<T>| Some(alg::functional_coordinates(&t.contact, &t.motion, &t.closed?.free));
+        self.traced.iter().filter_map(of).fold(FunctionalCoordinates::default(), FunctionalCoordinates::and)
+    }
+
+    /// The rows in which reactions act, if those are others.
+    fn applied(&self) -> Option<Vec<Vec<T>>> {
+        let slides = self.traced.iter().any(|t| t.closed.is_some_and(|c| c.slides));
+        let of = |t: &Traced<T>| alg::applied_rows(&t.contact, &t.motion, &t.constrained);
+        slides.then(|| self.traced.iter().flat_map(of).collect())
+    }
+
+    fn forward_dynamics(&self, is_driven: bool) -> Vec<Vec<T>> {
+        let Given { bound, constrained, epsilon, .. } = self;
+        let bias = self.of_robot(Function::BiasForce, &[self.q().clone(), self.qd().clone()]);
+        let (supports, own_rates) = supports(&self.traced, constrained, self.options, self.added);
+        let applied = self.applied();
+        let applied = applied.as_deref();
+        let (motion, xd) = if is_driven {
+            let at = (&self.q()[..], &self.qd()[..], &bound.arguments[2][..], &bound.arguments[3][..]);
+            let rows = ContactRows { coordinates: constrained, applied, supports: &supports, ridge: *epsilon };
+            let (motion, drives) = alg::driven_contact_motion(&bound.model, at, &bias, &self.mass_matrix(), rows);
+            (motion, vec![drives.xd])
+        } else {
+            let drive: Vec<T> = bound.arguments[2].iter().zip(bias).map(|(tau, h)| *tau - h).collect();
+            let factor = self.factor();
+            let motion = alg::constrained_forward_dynamics(&factor, &drive, constrained, applied, &supports, *epsilon);
+            (motion, vec![])
+        };
+        let results = vec![motion.force, motion.sdd, motion.violation, vec![motion.pivot]];
+        [vec![motion.qdd], xd, results, own_rates].concat()
+    }
+
+    fn inverse_dynamics(&self) -> Vec<Vec<T>> {
+        let Given { bound, constrained, epsilon, added, .. } = self;
+        let qdd = &bound.arguments[2];
+        let inverse = self.of_robot(Function::InverseDynamics, &[self.q().clone(), self.qd().clone(), qdd.clone()]);
+        let sdd_free = added.get("sdd_free").cloned().unwrap_or_default();
+        let wanted = [vec![T::zero(); constrained.len()], sdd_free].concat();
+        let (factor, rows) = (self.factor(), (constrained, &self.free()));
+        let (tau, pivot) =
+            alg::hybrid_inverse_dynamics(&factor, &inverse, qdd, rows, &wanted, &added["force"], *epsilon);
+        vec![tau, vec![pivot]]
+    }
+
+    fn impact(&self) -> Vec<Vec<T>> {
+        let Given { constrained, epsilon, added, .. } = self;
+        let mut struck = vec![Struck::Rigid; constrained.len()];
+        let mut places = Vec::new();
+        let mut first = 0;
+        for t in &self.traced {
+            if let (Some(environment), Some(closed)) = (&t.environment, t.closed) {
+                let k = first + distance_row(&closed.constrained);
+                let velocity = match closed.of_environment().1 {
+                    true => {
+                        places.push(k);
+                        added[&format!("{}_struck", closed.item.identifier())][0]
+                    }
+                    false => T::zero(),
                 };
-                let (motion, drives) = alg::driven_contact_motion(&bound.model, at, &bias, &mass_matrix(), rows);
-                (motion, vec![drives.xd])
-            } else {
-                let drive: Vec<T> = bound.arguments[2].iter().zip(bias).map(|(tau, h)| *tau - h).collect();
-                let (factor, applied) = (factor(), applied.as_deref());
-                let motion =
-                    alg::constrained_forward_dynamics(&factor, &drive, &constrained, applied, &supports, epsilon);
-                (motion, vec![])
-            };
-            let results = [vec![motion.qdd], xd].concat();
-            let results = [results, vec![motion.force, motion.sdd, motion.violation, vec![motion.pivot]]].concat();
-            [results, own_rates].concat()
-        }
-        ContactFunction::InverseDynamics => {
-            let qdd = &bound.arguments[2];
-            let inverse = of_robot(Function::InverseDynamics, &[q.clone(), qd.clone(), qdd.clone()]);
-            let wanted =
-                [vec![T::zero(); constrained.len()], added.get("sdd_free").cloned().unwrap_or_default()].concat();
-            let (tau, pivot) = alg::hybrid_inverse_dynamics(
-                &factor(),
-                &inverse,
-                qdd,
-                (&constrained, &free()),
-                &wanted,
-                &added["force"],
-                epsilon,
-            );
-            vec![tau, vec![pivot]]
-        }
-        ContactFunction::Impact => {
-            let mut struck = vec![Struck::Rigid; constrained.len()];
-            let mut places = Vec::new();
-            let mut first = 0;
-            for t in &traced {
-                if let (Some(environment), Some(closed)) = (&t.environment, t.closed) {
-                    let k = first + distance_row(&closed.constrained);
-                    let velocity = match closed.of_environment().1 {
-                        true => {
-                            places.push(k);
-                            added[&format!("{}_struck", closed.item.identifier())][0]
-                        }
-                        false => T::zero(),
-                    };
-                    struck[k] = Struck::Mass { mass: environment.struck_mass(), velocity };
-                }
-                first += t.constrained.len();
+                struck[k] = Struck::Mass { mass: environment.struck_mass(), velocity };
             }
-            let applied = applied();
-            let blow = alg::impact(
-                &whole_factor(),
-                qd,
-                &constrained,
-                applied.as_deref(),
-                &struck,
-                added["restitution"][0],
-                epsilon,
-            );
-            let after = places.iter().map(|k| vec![blow.struck_velocity[*k]]).collect();
-            let results = vec![blow.dqd, blow.impulse, blow.dsd, vec![blow.energy_loss], vec![blow.pivot]];
-            [results, after].concat()
+            first += t.constrained.len();
         }
-        ContactFunction::Projection => {
-            let deviations = deviations(&traced, &constrained);
-            let is_rigid = rigid_rows(&traced);
-            let kept = |list: &[T]| list.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| *k.0).collect::<Vec<T>>();
-            let rows = constrained.jacobian.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| k.0.clone());
-            let rigid = FunctionalCoordinates {
-                value: kept(&constrained.value),
-                rate: kept(&constrained.rate),
-                jacobian: rows.collect(),
-                bias: kept(&constrained.bias),
-            };
-            let correction = match rigid.is_empty() {
-                true => vec![T::zero(); bound.model.nv()],
-                false => alg::projection(&whole_factor(), &rigid, &kept(&deviations), epsilon),
-            };
-            vec![correction, constrained.value]
-        }
+        let applied = self.applied();
+        let (factor, restitution) = (self.whole_factor(), added["restitution"][0]);
+        let blow = alg::impact(&factor, self.qd(), constrained, applied.as_deref(), &struck, restitution, *epsilon);
+        let after = places.iter().map(|k| vec![blow.struck_velocity[*k]]).collect();
+        let results = vec![blow.dqd, blow.impulse, blow.dsd, vec![blow.energy_loss], vec![blow.pivot]];
+        [results, after].concat()
+    }
+
+    fn projection(self) -> Vec<Vec<T>> {
+        let Given { constrained, traced, .. } = &self;
+        let deviations = deviations(traced, constrained);
+        let is_rigid = rigid_rows(traced);
+        let kept = |list: &[T]| list.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| *k.0).collect::<Vec<T>>();
+        let rows = constrained.jacobian.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| k.0.clone());
+        let rigid = FunctionalCoordinates {
+            value: kept(&constrained.value),
+            rate: kept(&constrained.rate),
+            jacobian: rows.collect(),
+            bias: kept(&constrained.bias),
+        };
+        let correction = match rigid.is_empty() {
+            true => vec![T::zero(); self.bound.model.nv()],
+            false => alg::projection(&self.whole_factor(), &rigid, &kept(&deviations), self.epsilon),
+        };
+        vec![correction, self.constrained.value]
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{first_of, shaped, taken, Around, Read};
 use crate::choices::Lanes;
 use crate::identifier::string_literals;
-use crate::program::written::Written;
+use crate::program::written::{Written, WrittenMode};
 use crate::readback::items::Sort;
 use crate::readback::Stop;
 use straightline_graph::expr::Port;
@@ -24,90 +24,92 @@ impl Around<'_, '_, '_> {
 
     /// The same of the functions of a module.
     fn batches_of(&mut self, root: usize, programs: &[Written], drivers: Lanes) -> Read<()> {
-        let s = self.scalar().name();
-        let fused = self.generated.style.fused;
         for program in programs.iter().filter(|p| p.lanes) {
-            let name = &program.name;
-            let (inputs, outputs) = (&program.graph.inputs, &program.graph.outputs);
-            let of_states: Vec<&Port> = inputs.iter().filter(|p| p.wrapper.is_none()).collect();
-            let shared: Vec<(&str, &str)> =
-                inputs.iter().filter_map(|p| Some((p.name.as_str(), p.wrapper.as_deref()?))).collect();
-            let type_name: String = name
-                .split('_')
-                .map(|word| {
-                    word.chars().take(1).map(|c| c.to_ascii_uppercase()).chain(word.chars().skip(1)).collect::<String>()
-                })
-                .chain(["Program".to_string()])
-                .collect();
-            let fields: String = shared.iter().map(|(name, of)| format!("{name}: &'a {of},")).collect();
-            let (declared, any) = match shared.is_empty() {
-                true => (format!("struct {type_name};"), ""),
-                false => (format!("struct {type_name}<'a> {{ {fields} }}"), "<'_>"),
-            };
-            self.is(root, Sort::Struct, &type_name, &declared)?;
-            let arguments: String = inputs
-                .iter()
-                .map(|p| if p.wrapper.is_some() { format!("self.{},", p.name) } else { taken(p, "", "x") + "," })
-                .chain(outputs.iter().map(|p| taken(p, "_mut", "y") + ","))
-                .collect();
-            let count = |ports: &mut dyn Iterator<Item = &Port>| ports.map(Port::len).sum::<usize>();
-            let (n, m) = (count(&mut of_states.iter().copied()), count(&mut outputs.iter()));
-            let body = if fused { format!("{name}_in_lanes::<N, FUSED>") } else { format!("{name}_lanes") };
-            let text = format!(
-                "impl batch::Program<{s}, {n}, {m}> for {type_name}{any} {{
-                    #[inline(always)]
-                    fn run<const N: usize, const FUSED: bool>(&self, x: &[[{s}; N]; {n}], y: &mut [[{s}; N]; {m}]) {{
-                        let (mut x, mut y) = (x.as_slice(), y.as_mut_slice());
-                        {body}({arguments});
-                    }}
-                }}"
-            );
-            self.is(root, Sort::ImplOf, &type_name, &text)?;
-            let parameters: String = inputs
-                .iter()
-                .map(|p| format!(", {}: &{}", p.name, p.wrapper.clone().unwrap_or(format!("[{s}]"))))
-                .chain(outputs.iter().map(|p| format!(", {}: &mut [{s}]", p.name)))
-                .collect();
-            let checks: String = of_states
-                .iter()
-                .copied()
-                .chain(outputs)
-                .map(|p| format!("batch::check(\"{0}\", {0}, n, {1})?;", p.name, p.len()))
-                .collect();
-            let made = match shared.is_empty() {
-                true => type_name.clone(),
-                false => {
-                    format!("{type_name} {{ {} }}", shared.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", "))
-                }
-            };
+            let made = self.program_of_batches(root, program)?;
             for (layout, suffix) in [("soa", ""), ("aos", ""), ("soa", "_parallel"), ("aos", "_parallel")] {
-                if !suffix.is_empty() && drivers == Lanes::Standalone {
-                    continue;
-                }
-                let slices = |ports: &[&Port]| {
-                    let of = |p: &&Port| match layout {
-                        "soa" => p.name.clone(),
-                        _ => format!("({}, {})", p.name, p.len()),
-                    };
-                    ports.iter().map(of).collect::<Vec<_>>().join(", ")
-                };
-                let (x, y) = (slices(&of_states), slices(&outputs.iter().collect::<Vec<_>>()));
-                let function = format!("{name}_batch_{layout}{suffix}");
-                let text = format!(
-                    "pub fn {function}(n: usize{parameters}) -> Result<(), batch::WrongLength> {{
-                        {checks}
-                        batch::run{suffix}_{s}(batch::{layout}(&{made}, n, [{x}], [{y}]));
-                        Ok(())
-                    }}"
-                );
-                self.is(root, Sort::Function, &function, &text)?;
-                let item = self.item(root, Sort::Function, &function)?;
-                if item.threads == suffix.is_empty() {
-                    return Err(Stop::at(self.items.text.len(), format!("`{function}` stands where it should not")));
+                if suffix.is_empty() || drivers != Lanes::Standalone {
+                    self.batch(root, program, (layout, suffix), &made)?;
                 }
             }
         }
         Ok(())
+    }
+
+    /// What the batches of a function run; how it is made.
+    fn program_of_batches(&mut self, root: usize, program: &Written) -> Read<String> {
+        let (s, name) = (self.scalar().name(), &program.name);
+        let (inputs, outputs) = (&program.graph.inputs, &program.graph.outputs);
+        let shared: Vec<(&str, &str)> =
+            inputs.iter().filter_map(|p| Some((p.name.as_str(), p.wrapper.as_deref()?))).collect();
+        let capital = |word: &str| {
+            word.chars().take(1).map(|c| c.to_ascii_uppercase()).chain(word.chars().skip(1)).collect::<String>()
+        };
+        let type_name = name.split('_').map(capital).collect::<String>() + "Program";
+        let fields: String = shared.iter().map(|(name, of)| format!("{name}: &'a {of},")).collect();
+        let names = shared.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+        let (declared, any, made) = match shared.is_empty() {
+            true => (format!("struct {type_name};"), "", type_name.clone()),
+            false => (format!("struct {type_name}<'a> {{ {fields} }}"), "<'_>", format!("{type_name} {{ {names} }}")),
+        };
+        self.is(root, Sort::Struct, &type_name, &declared)?;
+        let arguments: String = inputs
+            .iter()
+            .map(|p| if p.wrapper.is_some() { format!("self.{},", p.name) } else { taken(p, "", "x") + "," })
+            .chain(outputs.iter().map(|p| taken(p, "_mut", "y") + ","))
+            .collect();
+        let n: usize = inputs.iter().filter(|p| p.wrapper.is_none()).map(Port::len).sum();
+        let m: usize = outputs.iter().map(Port::len).sum();
+        let body = match self.generated.style.fused {
+            true => format!("{name}_in_lanes::<N, FUSED>"),
+            false => format!("{name}_lanes"),
+        };
+        let text = format!(
+            "impl batch::Program<{s}, {n}, {m}> for {type_name}{any} {{
+                #[inline(always)]
+                fn run<const N: usize, const FUSED: bool>(&self, x: &[[{s}; N]; {n}], y: &mut [[{s}; N]; {m}]) {{
+                    let (mut x, mut y) = (x.as_slice(), y.as_mut_slice());
+                    {body}({arguments});
+                }}
+            }}"
+        );
+        self.is(root, Sort::ImplOf, &type_name, &text)?;
+        Ok(made)
+    }
+
+    /// A function over slices, which runs `made`.
+    fn batch(&mut self, root: usize, program: &Written, (layout, suffix): (&str, &str), made: &str) -> Read<()> {
+        let s = self.scalar().name();
+        let (inputs, outputs) = (&program.graph.inputs, &program.graph.outputs);
+        let of_states: Vec<&Port> = inputs.iter().filter(|p| p.wrapper.is_none()).collect();
+        let parameters: String = inputs
+            .iter()
+            .map(|p| format!(", {}: &{}", p.name, p.wrapper.clone().unwrap_or(format!("[{s}]"))))
+            .chain(outputs.iter().map(|p| format!(", {}: &mut [{s}]", p.name)))
+            .collect();
+        let check = |p: &Port| format!("batch::check(\"{0}\", {0}, n, {1})?;", p.name, p.len());
+        let checks: String = of_states.iter().copied().chain(outputs).map(check).collect();
+        let slices = |ports: &[&Port]| {
+            let of = |p: &&Port| match layout {
+                "soa" => p.name.clone(),
+                _ => format!("({}, {})", p.name, p.len()),
+            };
+            ports.iter().map(of).collect::<Vec<_>>().join(", ")
+        };
+        let (x, y) = (slices(&of_states), slices(&outputs.iter().collect::<Vec<_>>()));
+        let function = format!("{}_batch_{layout}{suffix}", program.name);
+        let text = format!(
+            "pub fn {function}(n: usize{parameters}) -> Result<(), batch::WrongLength> {{
+                {checks}
+                batch::run{suffix}_{s}(batch::{layout}(&{made}, n, [{x}], [{y}]));
+                Ok(())
+            }}"
+        );
+        self.is(root, Sort::Function, &function, &text)?;
+        let item = self.item(root, Sort::Function, &function)?;
+        match item.threads == suffix.is_empty() {
+            true => Err(Stop::at(self.items.text.len(), format!("`{function}` stands where it should not"))),
+            false => Ok(()),
+        }
     }
 
     /// Types of stages around their values, and the methods that they serve.
@@ -185,13 +187,7 @@ impl Around<'_, '_, '_> {
         if modes.is_empty() {
             return Ok(());
         }
-        let root = self.root;
-        let generic = modes.iter().flat_map(|mode| &mode.functions).any(|p| p.generic);
-        let (s, zero, generics) = match generic {
-            true => ("T", "T::zero()", "<T: super::Real>"),
-            false => (self.scalar().name(), "0.0", ""),
-        };
-        let contact = self.module(root, "contact")?;
+        let contact = self.module(self.root, "contact")?;
         for mode in modes {
             let module = self.module(contact, &mode.identifier)?;
             for (name, names) in ["CONSTRAINED", "FREE"].iter().zip(&mode.coordinates) {
@@ -211,9 +207,18 @@ impl Around<'_, '_, '_> {
             return Err(Stop::at(self.items.text.len(), "as many modes as the scene has are expected"));
         }
         let word = self.words.number("forward_dynamics");
-        if self.items.find(contact, Sort::Function, word).is_none() {
-            return Ok(());
+        match self.items.find(contact, Sort::Function, word) {
+            Some(_) => self.forward_dynamics_of(contact, modes, &variants),
+            None => Ok(()),
         }
+    }
+
+    /// Forward dynamics in one of the modes, which have these variants.
+    fn forward_dynamics_of(&mut self, contact: usize, modes: &[WrittenMode], variants: &[String]) -> Read<()> {
+        let (s, zero, generics) = match modes.iter().flat_map(|mode| &mode.functions).any(|p| p.generic) {
+            true => ("T", "T::zero()", "<T: super::Real>"),
+            false => (self.scalar().name(), "0.0", ""),
+        };
         let forward = |k: usize| modes[k].functions.iter().find(|p| p.name == "forward_dynamics");
         let programs: Option<Vec<_>> = (0..modes.len()).map(forward).collect();
         let Some(programs) = programs else {

@@ -45,8 +45,7 @@ impl<'t> Run<'_, 't> {
     }
 
     pub(super) fn signed(&mut self, of: Format, format: Format) -> Ran<Value> {
-        if self.kind() == Kind::Mark(b'-') {
-            self.at += 1;
+        if self.takes(b'-') {
             return Ok(self.signed(of, format)?.negated());
         }
         self.atom(of, format)
@@ -70,10 +69,7 @@ impl<'t> Run<'_, 't> {
                 if is_cast && (of, format) == (Format::F32, Format::F32) {
                     self.at += 1;
                     let value = self.number(Format::F64, format)?;
-                    self.mark(b')')?;
-                    self.items.keyword(&mut self.at, t::AS)?;
-                    self.items.keyword(&mut self.at, t::F32)?;
-                    self.mark(b')')?;
+                    self.these(") as f32 )")?;
                     let rounded = self.values.rounded(value);
                     self.demand(rounded, start)?;
                     return Ok(rounded);
@@ -165,12 +161,7 @@ impl<'t> Run<'_, 't> {
             }
             // a caller's scalar
             t::T if format == Format::Any && self.known.generic && self.ahead(3) == Kind::Word(t::ZERO) => {
-                self.at += 1;
-                self.mark(b':')?;
-                self.mark(b':')?;
-                self.at += 1;
-                self.mark(b'(')?;
-                self.mark(b')')?;
+                self.these("T : : zero ( )")?;
                 Ok(self.values.long(0.0, 0.0))
             }
             t::T if format == Format::Any && self.known.generic && self.ahead(3) == Kind::Word(t::CONSTANT) => {
@@ -197,20 +188,9 @@ impl<'t> Run<'_, 't> {
 
     /// `T::constant(Dd::from(f64::from(body.0[3])))`
     fn constant_of_cell(&mut self, start: usize) -> Ran<Value> {
-        self.at += 1;
-        self.mark(b':')?;
-        self.mark(b':')?;
-        self.at += 1;
-        self.mark(b'(')?;
-        for word in [t::DD, t::F64] {
-            self.items.keyword(&mut self.at, word)?;
-            self.mark(b':')?;
-            self.mark(b':')?;
-            self.items.keyword(&mut self.at, t::FROM)?;
-            self.mark(b'(')?;
-        }
+        self.these("T : : constant ( Dd : : from ( f64 : : from (")?;
         let (cell, _, mutable) = self.cell()?;
-        (0..3).try_for_each(|_| self.mark(b')'))?;
+        self.these(") ) )")?;
         if mutable {
             return self.items.stop(start, "a constant that may change");
         }
@@ -219,13 +199,7 @@ impl<'t> Run<'_, 't> {
 
     /// `number::<T>(high, low)`
     fn number_in_two(&mut self) -> Ran<Value> {
-        self.at += 1;
-        self.mark(b':')?;
-        self.mark(b':')?;
-        self.mark(b'<')?;
-        self.items.keyword(&mut self.at, t::T)?;
-        self.mark(b'>')?;
-        self.mark(b'(')?;
+        self.these("number : : < T > (")?;
         let high = self.signed_literal()?;
         self.mark(b',')?;
         let low = self.signed_literal()?;
@@ -235,11 +209,7 @@ impl<'t> Run<'_, 't> {
 
     /// `f64::from(x)`, of x in f32
     fn widened(&mut self, start: usize, format: Format) -> Ran<Value> {
-        self.at += 1;
-        self.mark(b':')?;
-        self.mark(b':')?;
-        self.items.keyword(&mut self.at, t::FROM)?;
-        self.mark(b'(')?;
+        self.these("f64 : : from (")?;
         // numbers alone would be of f64; beside a value they have its format
         if self.begins_with_a_number() && !self.names_a_value() {
             return self.stop("a number of no format");
@@ -252,8 +222,7 @@ impl<'t> Run<'_, 't> {
     }
 
     pub(super) fn signed_literal(&mut self) -> Ran<f64> {
-        let negative = self.kind() == Kind::Mark(b'-');
-        self.at += usize::from(negative);
+        let negative = self.takes(b'-');
         if self.kind() != Kind::Number {
             return self.stop("a number is expected here");
         }

@@ -34,21 +34,14 @@ impl<'t> Run<'_, 't> {
             return self.items.stop(start, "sine and cosine of another number of angles");
         }
         self.mark(b'(')?;
-        let mut angles = Vec::new();
-        if lanes {
-            self.mark(b'[')?;
-            while self.kind() != Kind::Mark(b']') {
-                angles.push(self.angle(sums, format)?);
-                if self.kind() != Kind::Mark(b']') {
-                    self.mark(b',')?;
-                }
+        let angles = match lanes {
+            true => {
+                self.mark(b'[')?;
+                self.listed(b']', |run| run.angle(sums, format))?
             }
-            self.at += 1;
-        } else {
-            angles.push(self.angle(sums, format)?);
-        }
-        self.mark(b')')?;
-        self.mark(b';')?;
+            false => vec![self.angle(sums, format)?],
+        };
+        self.these(") ;")?;
         let (sines, cosines): (Vec<Value>, Vec<Value>) = angles.iter().map(|a| self.values.sin_cos(*a)).unzip();
         if halves[0].iter().any(|name| *name != t::UNDERSCORE && halves[1].contains(name)) {
             return self.items.stop(start, "a second local of that name");
@@ -105,8 +98,7 @@ impl<'t> Run<'_, 't> {
     pub(super) fn kernel(&mut self, format: Format) -> Ran<&'t str> {
         let start = self.at;
         let module = self.word()?;
-        self.mark(b':')?;
-        self.mark(b':')?;
+        self.these(": :")?;
         let at = self.at;
         self.word()?;
         let name = self.items.text_of(at);
@@ -128,26 +120,17 @@ impl<'t> Run<'_, 't> {
         if module != t::FUSED_MODULE {
             return Ok(function);
         }
-        // `sin_cos_if_f64::<FUSED>` is told whether to fuse
-        let told = |function: &str| matches!(function, "sin_cos_if" | "sin_cos_of_sum_if");
-        let function = match function {
-            "sin_cos_if" => "sin_cos",
-            "sin_cos_of_sum_if" => "sin_cos_of_sum",
-            "sin_cos" | "sin_cos_of_sum" | "sin_cos_lanes" | "sin_cos_lanes_of_sums" => function,
-            _ => return self.items.stop(start, "a function that is not known"),
-        };
-        if told(name.strip_suffix(suffix).unwrap_or_default()) {
-            self.told_whether_to_fuse()?;
+        match function {
+            // `sin_cos_if_f64::<FUSED>` is told whether to fuse
+            "sin_cos_if" => self.told_whether_to_fuse().map(|()| "sin_cos"),
+            "sin_cos_of_sum_if" => self.told_whether_to_fuse().map(|()| "sin_cos_of_sum"),
+            "sin_cos" | "sin_cos_of_sum" | "sin_cos_lanes" | "sin_cos_lanes_of_sums" => Ok(function),
+            _ => self.items.stop(start, "a function that is not known"),
         }
-        Ok(function)
     }
 
     /// `::<FUSED>`
     pub(super) fn told_whether_to_fuse(&mut self) -> Ran<()> {
-        self.mark(b':')?;
-        self.mark(b':')?;
-        self.mark(b'<')?;
-        self.items.keyword(&mut self.at, t::FUSED)?;
-        self.mark(b'>')
+        self.these(": : < FUSED >")
     }
 }

@@ -81,22 +81,15 @@ impl<'t> Run<'_, 't> {
         };
         let mut given = Vec::new();
         if self.kind() == Kind::Mark(b':') {
-            self.mark(b':')?;
-            self.mark(b':')?;
-            self.mark(b'<')?;
-            loop {
-                let word = self.word()?;
-                let fused_of_file = word == t::FUSED && self.known.fused[2];
-                if !(function.generics.contains(&word) || fused_of_file) {
-                    return self.items.stop(self.at - 1, "a name that stands for nothing here");
+            self.these(": : <")?;
+            given = self.listed(b'>', |run| {
+                let word = run.word()?;
+                let fused_of_file = word == t::FUSED && run.known.fused[2];
+                match function.generics.contains(&word) || fused_of_file {
+                    true => Ok(word),
+                    false => run.items.stop(run.at - 1, "a name that stands for nothing here"),
                 }
-                given.push(word);
-                if self.kind() != Kind::Mark(b',') {
-                    break;
-                }
-                self.at += 1;
-            }
-            self.mark(b'>')?;
+            })?;
         }
         let called = self.signature(item)?;
         // what is not given follows from the arguments: the number of lanes, the scalar
@@ -105,14 +98,7 @@ impl<'t> Run<'_, 't> {
             return self.items.stop(start, "other generic arguments than the function has parameters");
         }
         self.mark(b'(')?;
-        let mut arguments = Vec::new();
-        while self.kind() != Kind::Mark(b')') {
-            arguments.push(self.argument()?);
-            if self.kind() != Kind::Mark(b')') {
-                self.mark(b',')?;
-            }
-        }
-        self.at += 1;
+        let arguments = self.listed(b')', Self::argument)?;
         let behind = self.at;
         self.at = start;
         self.call(item, &arguments)?;
@@ -125,8 +111,7 @@ impl<'t> Run<'_, 't> {
 
     pub(super) fn argument(&mut self) -> Ran<Thing> {
         let mut reference = None;
-        if self.kind() == Kind::Mark(b'&') {
-            self.at += 1;
+        if self.takes(b'&') {
             let mutable = self.kind() == Kind::Word(t::MUT);
             self.at += usize::from(mutable);
             reference = Some(mutable);
@@ -160,8 +145,7 @@ impl<'t> Run<'_, 't> {
                 if extents != [Extent::Of(names.len())] {
                     return self.items.stop(start, "as many names as numbers are expected here");
                 }
-                if self.kind() == Kind::Mark(b';') {
-                    self.at += 1;
+                if self.takes(b';') {
                     names.iter().for_each(|name| self.bind(*name, Thing::Declared(of)));
                 } else {
                     self.mark(b'=')?;
@@ -204,8 +188,7 @@ impl<'t> Run<'_, 't> {
                 return self.items.stop(self.at - 1, "a second local of that name");
             }
             self.names.push(name);
-            if self.kind() == Kind::Mark(b']') {
-                self.at += 1;
+            if self.takes(b']') {
                 return Ok(());
             }
             self.mark(b',')?;
@@ -227,10 +210,8 @@ impl<'t> Run<'_, 't> {
     /// `live = [q[0]; 12];`, `forces = [T::zero(); 4];`, `live = [[0.0; N]; 12];` behind `let mut`.
     pub(super) fn array_to_fill(&mut self, format: Format) -> Ran<()> {
         let name = self.word()?;
-        self.mark(b'=')?;
-        self.mark(b'[')?;
-        let lanes = self.kind() == Kind::Mark(b'[');
-        self.at += usize::from(lanes);
+        self.these("= [")?;
+        let lanes = self.takes(b'[');
         let start = self.at;
         let value = self.number(format, format)?;
         if value != self.zero(format) && self.first_given() != Some(value) {
@@ -239,14 +220,11 @@ impl<'t> Run<'_, 't> {
                 .stop(start, "an array begins with zeros, or the first number that the function is given");
         }
         if lanes {
-            self.mark(b';')?;
-            self.items.keyword(&mut self.at, t::N)?;
-            self.mark(b']')?;
+            self.these("; N ]")?;
         }
         self.mark(b';')?;
         let n = self.integer()?;
-        self.mark(b']')?;
-        self.mark(b';')?;
+        self.these("] ;")?;
         if n > self.items.text.len() {
             return self.stop("an array that is too long");
         }
@@ -282,16 +260,8 @@ impl<'t> Run<'_, 't> {
 
     /// `[a, b, c]`
     pub(super) fn list(&mut self, of: Format, format: Format) -> Ran<Vec<Value>> {
-        let mut values = Vec::new();
         self.mark(b'[')?;
-        while self.kind() != Kind::Mark(b']') {
-            values.push(self.number(of, format)?);
-            if self.kind() != Kind::Mark(b']') {
-                self.mark(b',')?;
-            }
-        }
-        self.at += 1;
-        Ok(values)
+        self.listed(b']', |run| run.number(of, format))
     }
 
     /// `for limb in 0..4 { … }`, `for lane in 0..N { … }`
@@ -303,8 +273,7 @@ impl<'t> Run<'_, 't> {
         if self.integer()? != 0 {
             return self.items.stop(start, "a loop that does not begin at 0");
         }
-        self.mark(b'.')?;
-        self.mark(b'.')?;
+        self.these(". .")?;
         let count = self.locals.len();
         if self.kind() == Kind::Word(t::N) && function.generics.contains(&t::N) {
             self.at += 1;

@@ -5,6 +5,7 @@ use super::step::Step;
 use super::{Lanes, Registers, Tape, LANES};
 
 impl Tape {
+    /// Computes all steps. One piece: a table of an arm per kind of step.
     pub(super) fn run(&self, boxes: &[&[Interval]], registers: &mut Registers) {
         const NONE: (Lanes, Lanes) = ([0.0; LANES], [0.0; LANES]);
         registers.ends.resize(self.steps.len().max(registers.ends.len()), NONE);

@@ -104,7 +104,7 @@ fn legged(legs: usize) -> String {
 }
 
 /// Robot and drives as a user has them.
-const PLANAR: &str = include_str!("../../../../robots/descriptions/planar_2r.toml");
+const PLANAR: &str = include_str!("../../../robots/descriptions/planar_2r.toml");
 const DRIVES: &str = r#"
 [[drive]]
 joint = "joint1"
