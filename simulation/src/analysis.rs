@@ -270,6 +270,18 @@ fn figures(joint: &Joint, j: usize, n: usize, table: &Table, wrenches: &Table) -
     }
 }
 
+/// Where something begins that is not so `before` and is so `after`: bisection.
+pub(crate) fn beginning(mut before: f64, mut after: f64, is_so: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..if before < after { 50 } else { 0 } {
+        let middle = 0.5 * (before + after);
+        match is_so(middle) {
+            true => after = middle,
+            false => before = middle,
+        }
+    }
+    after
+}
+
 /// The limits of a joint that the motion exceeds.
 fn violations(
     (model, equations): (&Model<f64>, &dyn Equations),
@@ -306,20 +318,8 @@ fn violations(
         let rows = &table.rows;
         let first = rows.iter().position(|row| beyond(row[1 + column]))?;
         let worst = rows.iter().map(|row| row[1 + column]).max_by(|a, b| (sign * a).total_cmp(&(sign * b)))?;
-        // where it begins: bisection between the last instant within and the first beyond
-        let mut time = rows[first][0];
-        if first > 0 {
-            let (mut within, mut after) = (rows[first - 1][0], time);
-            for _ in 0..50 {
-                let middle = 0.5 * (within + after);
-                if beyond(value(what, middle)) {
-                    after = middle
-                } else {
-                    within = middle
-                }
-            }
-            time = after;
-        }
+        let within = rows[first.saturating_sub(1)][0];
+        let time = beginning(within, rows[first][0], |t| beyond(value(what, t)));
         Some(Violation { time, joint: joint.name.clone(), what, limit, worst })
     });
     found.collect()

@@ -7,7 +7,7 @@
 //!
 //! with the Joule heat P = R i² of the winding at its rated temperature; resistances and time constants as data sheets give them.
 
-use crate::analysis::Violation;
+use crate::analysis::{beginning, Violation};
 use crate::drives::{demands, further_derivatives, slack_state, without_dampers, Load};
 use crate::motion::Motion;
 use crate::quadrature::integral;
@@ -305,31 +305,16 @@ fn violations(
         ("current", drive.current_limit, |d| d.current.abs()),
         ("motor speed", drive.rating.speed, |d| d.speed.abs()),
     ];
-    let violation = |time: f64, what: &'static str, limit: f64, worst: f64| Violation {
-        time,
-        joint: drive.name.clone(),
-        what,
-        limit,
-        worst,
-    };
+    let joint = || drive.name.clone();
+    let violation = |time, what, limit, worst| Violation { time, joint: joint(), what, limit, worst };
     let mut found = Vec::new();
     for (what, limit, quantity) in sides {
         let Some(limit) = limit else { continue };
         let beyond = |y: f64| y - limit > 1e-12 * limit;
         let Some(first) = rows.iter().position(|row| beyond(quantity(&row[k]))) else { continue };
         let worst = rows.iter().map(|row| quantity(&row[k])).fold(0.0, f64::max);
-        // where it begins: bisection between the last instant within and the first beyond
-        let mut time = times[first];
-        if first > 0 && times[first - 1] < time {
-            let mut within = times[first - 1];
-            for _ in 0..50 {
-                let middle = 0.5 * (within + time);
-                match beyond(quantity(&at(k, middle))) {
-                    true => time = middle,
-                    false => within = middle,
-                }
-            }
-        }
+        let within = times[first.saturating_sub(1)];
+        let time = beginning(within, times[first], |t| beyond(quantity(&at(k, t))));
         found.push(violation(time, what, limit, worst));
     }
     if let Some(limit) = drive.rating.continuous_current {

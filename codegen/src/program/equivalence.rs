@@ -22,7 +22,7 @@ pub(crate) mod mutants;
 pub(crate) mod sabotage;
 mod states;
 
-use crate::equations::bind::constructed;
+use crate::equations::bind::{constructed, Bound};
 use crate::equations::reduce::longest_lever;
 use crate::equations::Robot;
 use crate::function::{ForwardDynamicsMethod, Function, Judged};
@@ -87,15 +87,15 @@ pub(crate) fn of_function(
     graph: &Graph,
 ) -> Result<(), Disagreement> {
     let ports = options.scene.ports(function, &robot.model);
+    let plain = Plain { robot, frames, function, options };
+    let mut states = States::new(robot, options);
     if !optimisations.folding {
-        let mut states = States::new(robot, options);
         return (0..STATES).try_for_each(|_| {
             let state = states.next(&ports);
-            in_scalar!(options.scalar, T => same_bits::<T>(robot, frames, function, options, graph, &state))
+            in_scalar!(options.scalar, T => plain.has_same_bits::<T>(graph, &state))
         });
     }
-    let check = Check { robot, frames, function, options, graph };
-    let mut states = States::new(robot, options);
+    let check = Check { plain, graph };
     let mut losses = Losses::new(graph);
     for _ in 0..STATES {
         check.at(&states.next(&ports), (&mut losses, POINT), true)?;
@@ -125,12 +125,18 @@ pub(crate) fn of_function(
     Ok(())
 }
 
-/// The program of a function beside its plain equations.
-struct Check<'a> {
+/// The plain equations of a function.
+#[derive(Clone, Copy)]
+struct Plain<'a> {
     robot: &'a Robot,
     frames: &'a [String],
     function: Function,
     options: &'a Options,
+}
+
+/// The program of a function beside its plain equations.
+struct Check<'a> {
+    plain: Plain<'a>,
     graph: &'a Graph,
 }
 
@@ -138,17 +144,14 @@ impl Check<'_> {
     /// At one more state: what it loses to rounding, where an inertia counts as such a part of what it is made of at least, and, if
     /// `by_equations`, whether it is right.
     fn at(&self, state: &State, (losses, least): (&mut Losses, f64), by_equations: bool) -> Result<(), Disagreement> {
-        let Check { robot, frames, function, options, graph } = *self;
+        let Check { plain, graph } = *self;
         let found = evaluate(graph, &inputs(graph, state));
-        let off = differences(robot, frames, function, options, state, &found);
+        let off = plain.differences(state, &found);
         if by_equations {
-            compare(function.name(), &graph.outputs, &off, AGREE)?;
+            compare(plain.function.name(), &graph.outputs, &off, AGREE)?;
         }
         let sizes = self.sizes(state, &found, &off, least);
-        let plain = ForwardDynamicsMethod::ArticulatedBody;
-        in_scalar!(options.scalar, T => losses.add(graph, (state, &found), &sizes, |state| {
-            plain_results::<T>(robot, frames, function, options, plain, state)
-        }));
+        in_scalar!(plain.options.scalar, T => losses.add(graph, (state, &found), &sizes, |state| plain.results::<T>(state)));
         Ok(())
     }
 
@@ -157,12 +160,9 @@ impl Check<'_> {
         if !self.graph.ops.iter().any(|op| matches!(op, Op::Binary(Binary::Div, ..))) {
             return true;
         }
-        let Check { robot, frames, function, options, .. } = *self;
-        let method = ForwardDynamicsMethod::ArticulatedBody;
-        let exact = plain_results::<Dd>(robot, frames, function, options, method, state);
-        let short: Vec<f64> = in_scalar!(options.scalar, T => {
-            let results = plain_results::<T>(robot, frames, function, options, method, state);
-            results.into_iter().map(f64::from).collect()
+        let exact = self.plain.results::<Dd>(state);
+        let short: Vec<f64> = in_scalar!(self.plain.options.scalar, T => {
+            self.plain.results::<T>(state).into_iter().map(f64::from).collect()
         });
         let most = exact.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
         // written so that NaN is not regular
@@ -171,13 +171,14 @@ impl Check<'_> {
 
     /// What losses are compared with.
     fn sizes(&self, state: &State, found: &[Dd], off: &[Magnitude], least: f64) -> Vec<f64> {
-        let (nv, scene) = (self.robot.model.nv(), &self.options.scene);
+        let Plain { robot, frames, function, options } = self.plain;
+        let (nv, scene) = (robot.model.nv(), &options.scene);
         let is_whole = |all: usize| {
-            let frames = scene.frames_of(self.function, self.frames).len();
-            scene.select(self.function, &self.robot.model, frames).0.into_iter().eq(0..all)
+            let frames = scene.frames_of(function, frames).len();
+            scene.select(function, &robot.model, frames).0.into_iter().eq(0..all)
         };
-        match self.function.spec().judged {
-            Judged::ByResidual if is_whole(nv) => sizes_of_accelerations(self.robot, self.options, state, off),
+        match function.spec().judged {
+            Judged::ByResidual if is_whole(nv) => sizes_of_accelerations(robot, options, state, off),
             // residuals have no scale of accelerations: all of them are judged by the greatest
             Judged::ByResidual => vec![found.iter().map(|x| x.hi().abs()).fold(0.0, f64::max); found.len()],
             judged @ Judged::ByInertias if is_whole(nv * nv) => {
@@ -189,19 +190,20 @@ impl Check<'_> {
     }
 
     fn compare(&self, mut losses: Losses) -> Result<(), Disagreement> {
-        if self.function.spec().judged == Judged::ByResidual {
+        let Plain { robot, function, options, .. } = self.plain;
+        if function.spec().judged == Judged::ByResidual {
             let lost = Disagreement {
-                program: self.function.name().to_string(),
+                program: function.name().to_string(),
                 result: element_of(&self.graph.outputs, 0),
                 difference: losses.of_greatest,
                 plain: Some(losses.of_greatest),
             };
-            if lost.beyond_digits(&self.robot.model, self.options.scalar).is_some() {
+            if lost.beyond_digits(&robot.model, options.scalar).is_some() {
                 return Err(lost);
             }
         }
         // a rounding of all that a result is made of is little; of a scale that is a result's own any program loses some
-        let least = match self.function.spec().judged {
+        let least = match function.spec().judged {
             Judged::ByResidual => {
                 losses.plain = vec![losses.plain.iter().copied().fold(0.0, f64::max); losses.plain.len()];
                 LOSSES / 2.0
@@ -209,27 +211,67 @@ impl Check<'_> {
             Judged::ByInertias => OF_INERTIAS,
             Judged::ByScale => 1.0,
         };
-        losses.compare(self.function.name(), self.graph, self.options.scalar, least)
+        losses.compare(function.name(), self.graph, options.scalar, least)
     }
 }
 
-/// The results that are wanted of a function, by the generic runtime in this scalar.
-fn plain_results<T: Real>(
-    robot: &Robot,
-    frames: &[String],
-    function: Function,
-    options: &Options,
-    method: ForwardDynamicsMethod,
-    state: &State,
-) -> Vec<T> {
-    let scene = &options.scene;
-    let frames = scene.frames_of(function, frames);
-    let (wanted, _) = scene.select(function, &robot.model, frames.len());
-    let bound = scene.bind(function, robot, &of_ports(&scene.ports(function, &robot.model), state, T::constant));
-    let frames: Vec<_> =
-        frames.iter().map(|f| bound.model.frame(f).expect("frames were checked against the model")).collect();
-    let all = function.evaluate(&bound.model, &frames, method, &bound.arguments);
-    wanted.iter().map(|k| all[*k]).collect()
+impl Plain<'_> {
+    /// The results that are wanted, by the generic runtime in this scalar.
+    fn results<T: Real>(self, state: &State) -> Vec<T> {
+        self.results_by(ForwardDynamicsMethod::ArticulatedBody, state)
+    }
+
+    fn results_by<T: Real>(self, method: ForwardDynamicsMethod, state: &State) -> Vec<T> {
+        let (bound, wanted) = self.bound(state, T::constant);
+        self.all(&bound, method, &wanted)
+    }
+
+    /// The robot with what stands for its inputs, and which results are wanted.
+    fn bound<T: Real>(self, state: &State, number: fn(Dd) -> T) -> (Bound<T>, Vec<usize>) {
+        let Plain { robot, frames, function, options: Options { scene, .. } } = self;
+        let (wanted, _) = scene.select(function, &robot.model, scene.frames_of(function, frames).len());
+        let given = of_ports(&scene.ports(function, &robot.model), state, number);
+        (scene.bind(function, robot, &given), wanted)
+    }
+
+    fn all<T: Real>(self, bound: &Bound<T>, method: ForwardDynamicsMethod, wanted: &[usize]) -> Vec<T> {
+        let frames = self.options.scene.frames_of(self.function, self.frames).iter();
+        let frames: Vec<_> =
+            frames.map(|f| bound.model.frame(f).expect("frames were checked against the model")).collect();
+        let all = self.function.evaluate(&bound.model, &frames, method, &bound.arguments);
+        wanted.iter().map(|k| all[*k]).collect()
+    }
+
+    /// What a program found, less what the plain equations say, with their natural scale.
+    fn differences(self, state: &State, found: &[Dd]) -> Vec<Magnitude> {
+        let (mut bound, wanted) = self.bound(state, Magnitude::new);
+        with_sizes(&mut bound.model, longest_lever(&self.robot.model));
+        let (nv, method) = (self.robot.model.nv(), ForwardDynamicsMethod::ArticulatedBody);
+        if self.function.spec().judged == Judged::ByResidual && wanted.iter().copied().eq(0..nv) {
+            let qdd = found.iter().copied().map(Magnitude::new).collect();
+            let motion = [&bound.arguments[0], &bound.arguments[1], &qdd].map(Vec::clone);
+            let takes = Function::InverseDynamics.evaluate(&bound.model, &[], method, &motion);
+            return takes.into_iter().zip(&bound.arguments[2]).map(|(takes, tau)| takes - *tau).collect();
+        }
+        let plain = self.all(&bound, method, &wanted);
+        found.iter().zip(plain).map(|(found, plain)| difference(*found, plain)).collect()
+    }
+
+    /// With exact rules a program is the generic runtime, bit for bit.
+    fn has_same_bits<T: Real + PartialEq + Into<f64>>(self, graph: &Graph, state: &State) -> Result<(), Disagreement> {
+        let plain = self.results_by::<T>(self.options.forward_dynamics, state);
+        let rounded: Vec<T> = inputs(graph, state).into_iter().map(T::constant).collect();
+        let found = evaluate(graph, &rounded);
+        let off = |(found, plain): (T, T)| {
+            let same = found == plain;
+            let [a, b]: [f64; 2] = [found.into(), plain.into()];
+            // neither is a number
+            let value = if same || (a.is_nan() && b.is_nan()) { 0.0 } else { a - b };
+            Magnitude { value: Dd::from(value), size: 0.0 }
+        };
+        let off: Vec<Magnitude> = found.into_iter().zip(plain).map(off).collect();
+        compare(self.function.name(), &graph.outputs, &off, AGREE)
+    }
 }
 
 /// Results that differ by more than a part of their sizes, if any.
@@ -252,64 +294,10 @@ fn compare(program: &str, outputs: &[Port], differences: &[Magnitude], agree: f6
     }
 }
 
-/// What a program found, less what the plain equations say, with their natural scale.
-fn differences(
-    robot: &Robot,
-    frames: &[String],
-    function: Function,
-    options: &Options,
-    state: &State,
-    found: &[Dd],
-) -> Vec<Magnitude> {
-    let scene = &options.scene;
-    let frames = scene.frames_of(function, frames);
-    let (wanted, _) = scene.select(function, &robot.model, frames.len());
-    let given = of_ports(&scene.ports(function, &robot.model), state, Magnitude::new);
-    let mut bound = scene.bind(function, robot, &given);
-    with_sizes(&mut bound.model, longest_lever(&robot.model));
-    let nv = robot.model.nv();
-    if function.spec().judged == Judged::ByResidual && wanted.iter().copied().eq(0..nv) {
-        let motion = [&bound.arguments[0], &bound.arguments[1], &found.iter().copied().map(Magnitude::new).collect()];
-        let takes = Function::InverseDynamics.evaluate(
-            &bound.model,
-            &[],
-            ForwardDynamicsMethod::ArticulatedBody,
-            &motion.map(Vec::clone),
-        );
-        return takes.into_iter().zip(&bound.arguments[2]).map(|(takes, tau)| takes - *tau).collect();
-    }
-    let frames: Vec<_> =
-        frames.iter().map(|f| bound.model.frame(f).expect("frames were checked against the model")).collect();
-    let all = function.evaluate(&bound.model, &frames, ForwardDynamicsMethod::ArticulatedBody, &bound.arguments);
-    wanted.iter().zip(found).map(|(k, found)| difference(*found, all[*k])).collect()
-}
-
 fn difference(found: Dd, plain: Magnitude) -> Magnitude {
     // where the plain equations divide by zero, so may the program
     let both = [found, plain.value].iter().all(|x| !x.hi().is_finite());
     Magnitude { value: if both { Dd::ZERO } else { found - plain.value }, size: plain.size }
-}
-
-/// With exact rules a program is the generic runtime, bit for bit.
-fn same_bits<T: Real + PartialEq + Into<f64>>(
-    robot: &Robot,
-    frames: &[String],
-    function: Function,
-    options: &Options,
-    graph: &Graph,
-    state: &State,
-) -> Result<(), Disagreement> {
-    let plain = plain_results::<T>(robot, frames, function, options, options.forward_dynamics, state);
-    let rounded: Vec<T> = inputs(graph, state).into_iter().map(T::constant).collect();
-    let found = evaluate(graph, &rounded);
-    let off = |(found, plain): (T, T)| {
-        let same = found == plain;
-        let [a, b]: [f64; 2] = [found.into(), plain.into()];
-        // neither is a number
-        let value = if same || (a.is_nan() && b.is_nan()) { 0.0 } else { a - b };
-        Magnitude { value: Dd::from(value), size: 0.0 }
-    };
-    compare(function.name(), &graph.outputs, &found.into_iter().zip(plain).map(off).collect::<Vec<_>>(), AGREE)
 }
 
 /// Whether stages, one after the other, say what the plain equations of each function say.
@@ -339,7 +327,7 @@ pub(crate) fn of_stages(
         }
         for (function, (_, graph)) in functions.iter().zip(&staged.functions) {
             let found = evaluate(graph, &inputs(graph, &state));
-            let off = differences(robot, frames, *function, options, &state, &found);
+            let off = Plain { robot, frames, function: *function, options }.differences(&state, &found);
             compare(&format!("staged::{}", function.name()), &graph.outputs, &off, agreeing(options))?;
         }
     }

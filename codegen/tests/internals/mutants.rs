@@ -1,12 +1,12 @@
 //! Programs of every kind with one pass broken on purpose, and forms of the robot with one wrong number: what is written is right, or nothing
 //! is. Right is what the generic runtime says at states of its own, and a bound is one that nothing exceeds there.
 
-use super::{inputs, of_function, plain_results, sabotage, Disagreement, State, States, ROUNDINGS};
+use super::{inputs, of_function, sabotage, Disagreement, Plain, State, States, ROUNDINGS};
 use crate::choices::LimbForm;
 use crate::diagnostic::{Diagnostics, Source};
 use crate::equations::bind::constructed;
 use crate::equations::Robot;
-use crate::function::{ContactFunction, ForwardDynamicsMethod, Function};
+use crate::function::{ContactFunction, Function};
 use crate::model::{load, ModelOptions};
 use crate::options::optimisations::FOLDING;
 use crate::options::Options;
@@ -325,9 +325,7 @@ impl Case {
         let Case { robot, frames, options, .. } = self;
         let mut states = States::new(robot, options);
         states.random = Random(77);
-        let plain = |function: Function, state: &State| {
-            plain_results::<Dd>(robot, frames, function, options, ForwardDynamicsMethod::ArticulatedBody, state)
-        };
+        let plain = |function: Function, state: &State| Plain { robot, frames, function, options }.results::<Dd>(state);
         for _ in 0..5 {
             let fault = match written {
                 Written::Function(function, graph, part) => {
