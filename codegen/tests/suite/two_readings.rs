@@ -224,6 +224,12 @@ fn random_options(random: &mut Random, joints: Vec<String>, floating: bool) -> M
     options
 }
 
+fn random_support(random: &mut Random) -> BaseSupport {
+    let spring = Elastic { stiffness: Noted::assumed(1e4), damping: Noted::assumed(1.0), rest: 0.0 };
+    let directions = std::array::from_fn(|k| (k == 2 || random.below(2) == 0).then(|| spring.clone()));
+    BaseSupport { at: triple(random, 0.3), directions, place: Noted::assumed(()) }
+}
+
 fn compare_file(
     disagreement: &mut Disagreement,
     robot: &str,
@@ -308,7 +314,13 @@ fn both_readings_of_random_centre_of_mass_toml_agree() {
         let links = 1 + random.below(9);
         let text = chapter_toml(&mut random, links);
         let joints = (1..=links).map(|j| format!("joint{j}")).collect();
-        let options = random_options(&mut random, joints, false);
+        let mut options = random_options(&mut random, joints, false);
+        // on springs, or with a frame on the end of the chain
+        match seed % 3 {
+            0 => (options.support, options.joint_order) = (Some(random_support(&mut random)), None),
+            1 => options.frames[0].link = "tip".to_string(),
+            _ => {}
+        }
         compare_file(&mut disagreement, &format!("chapter, seed {seed}"), text, &options, &mut random);
     }
     disagreement.judge();
@@ -348,9 +360,7 @@ fn both_readings_of_flexible_links_and_supports_agree() {
             });
         }
         if random.below(2) == 0 {
-            let spring = Elastic { stiffness: Noted::assumed(1e4), damping: Noted::assumed(1.0), rest: 0.0 };
-            let directions = std::array::from_fn(|k| (k == 2 || random.below(2) == 0).then(|| spring.clone()));
-            options.support = Some(BaseSupport { at: triple(&mut random, 0.3), directions, place: Noted::assumed(()) });
+            options.support = Some(random_support(&mut random));
         }
         let text = urdf(&mut random, &robot);
         let source = Source::new("flexible.urdf", text.clone());
