@@ -1,9 +1,12 @@
 //! States of a robot at which programs are tried: the one sampler. Choices between forms follow from its numbers, so that their order is part of
 //! what is generated.
 
+#[cfg(feature = "verify")]
+pub(crate) mod drives;
+
 use crate::function::Quantity;
 use std::collections::BTreeMap;
-use straightline_core::drive::{Actuator, Drive};
+use straightline_core::drive::Drive;
 use straightline_core::model::{Joint, Model};
 use straightline_core::random::Random;
 use straightline_core::Dd;
@@ -23,10 +26,6 @@ const SLOW: f64 = 0.2;
 const RANGE: f64 = std::f64::consts::PI;
 /// A limit beyond this is none \[rad, m, rad/s or m/s\].
 const NO_LIMIT: f64 = 1e6;
-
-/// Most numbers of a kind that a drive's state and input are tried at: current \[A\], linear state, input \[V\].
-const CURRENT: f64 = 3.0;
-const VOLTAGE: f64 = 20.0;
 
 /// What stands for each input, by name.
 pub(crate) type State<T> = BTreeMap<String, Vec<T>>;
@@ -123,31 +122,6 @@ pub(crate) fn body(random: &mut Random) -> [Vec<f64>; 3] {
     let [xx, yy, zz] = [0; 3].map(|_| any(0.02, 0.03));
     let [xy, xz, yz] = [0; 3].map(|_| any(-0.004, 0.004));
     [vec![mass], com, vec![xx, xy, xz, yy, yz, zz]]
-}
-
-/// States and inputs of the drives: shafts near where slack springs have them, currents within their limits, inputs within theirs and beyond.
-pub(crate) fn of_drives(model: &Model<Dd>, q: &[f64], qd: &[f64], random: &mut Random) -> [Vec<f64>; 2] {
-    let (mut x, mut u) = (Vec::new(), Vec::new());
-    for drive in &model.drives {
-        let mut shafts = vec![last_shaft(model, drive, q, qd)];
-        for stage in drive.stages.iter().rev() {
-            let behind = shafts[shafts.len() - 1];
-            let slack = [random.symmetric(0.01), random.symmetric(0.1)];
-            shafts.push([0, 1].map(|i| (behind[i] + slack[i]) * stage.ratio.to_f64()));
-        }
-        shafts.reverse();
-        match &drive.actuator {
-            Actuator::Motor(motor) => {
-                let greatest = drive.current_limit.map_or(CURRENT, |limit| limit.to_f64().min(CURRENT));
-                x.extend(shafts[0]);
-                x.extend(motor.inductance.map(|_| random.symmetric(0.9 * greatest)));
-            }
-            Actuator::Linear(a) => x.extend(a.f.iter().map(|_| random.symmetric(1.0))),
-        }
-        x.extend(shafts.iter().take(drive.stages.len()).skip(1).flatten());
-        u.push(random.symmetric(drive.input_limit.map_or(VOLTAGE, |limit| 1.2 * limit.to_f64())));
-    }
-    [x, u]
 }
 
 /// Angle and speed of the last shaft of a drive.

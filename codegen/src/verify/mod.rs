@@ -13,7 +13,7 @@ use crate::equations::Robot;
 use crate::function::truth::{Chapter, Effect};
 use crate::function::{Function, Quantity};
 use crate::model;
-use crate::model::states::{of_drives, of_port, State};
+use crate::model::states::{drives::of_drives, of_port, State};
 use crate::options::Options;
 use crate::program::{program, Program};
 use crate::scene::{Gravity, Parameter, Scene};
