@@ -11,8 +11,8 @@ use straightline_codegen::function::ContactFunction;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::options::Options;
 use straightline_codegen::scene::contact::{ContactItem, EnvironmentItem, EnvironmentKind, SurfaceItem};
-use straightline_codegen::scene::{Contacts, Parameter, Scene};
-use straightline_codegen::schedule::Limits;
+use straightline_codegen::scene::{Parameter, Scene, SceneContacts};
+use straightline_codegen::schedule::ScheduleLimits;
 use straightline_codegen::{Function, Scalar};
 use straightline_core::contact::Coordinate;
 
@@ -115,7 +115,7 @@ fn lanes(out: &Path, folder: &Path) {
                 Options {
                     functions: vec![InverseDynamics, MassMatrix, ForwardDynamics, Jacobian],
                     frames: vec!["FL_FOOT".to_string(), "HR_FOOT".to_string()],
-                    limits: Limits { operations: 900 },
+                    limits: ScheduleLimits { operations: 900 },
                     model: ModelOptions { floating_base: true, ..ModelOptions::default() },
                     lanes: Some(Lanes::Runtime),
                     ..Options::default()
@@ -149,7 +149,7 @@ fn lanes(out: &Path, folder: &Path) {
     ];
     let fused = Options {
         functions: vec![InverseDynamics, ForwardDynamics],
-        limits: Limits { operations: 900 },
+        limits: ScheduleLimits { operations: 900 },
         model: ModelOptions { floating_base: true, ..ModelOptions::default() },
         lanes: Some(Lanes::Runtime),
         fma: true,
@@ -157,7 +157,7 @@ fn lanes(out: &Path, folder: &Path) {
     };
     let generic = Options {
         functions: vec![InverseDynamics, Function::GravityForce, MassMatrix],
-        limits: Limits { operations: 250 },
+        limits: ScheduleLimits { operations: 250 },
         lanes: Some(Lanes::Runtime),
         generic: true,
         ..Options::default()
@@ -218,10 +218,10 @@ fn contacts(folder: &Path, robot: &str, kinds: &[&str], options: Options) -> Str
     };
     let functions =
         vec![ContactFunction::ConstrainedCoordinates, ContactFunction::ForwardDynamics, ContactFunction::Impact];
-    let contacts = Contacts {
+    let contacts = SceneContacts {
         contacts: kinds.iter().copied().map(contact).collect(),
         functions: Some(functions),
-        ..Contacts::default()
+        ..SceneContacts::default()
     };
     let text = std::fs::read_to_string(folder.join(file)).expect("a robot file can be read");
     let scene = Scene { contacts, ..Scene::default() };

@@ -6,7 +6,7 @@ use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::options::Options;
-use straightline_codegen::program::{self, Program};
+use straightline_codegen::program::{self, TracedProgram};
 use straightline_codegen::{expr, Function};
 use straightline_core::{Dd, Real};
 
@@ -39,19 +39,19 @@ pub fn load(source: &Source, options: &ModelOptions) -> Loaded {
 }
 
 /// The program of a function of a robot in no other form than [`load`] gives it.
-pub fn program(robot: &Loaded, frames: &[String], function: Function, options: &Options) -> Program {
-    static MADE: Made<Program> = Made::nothing();
+pub fn program(robot: &Loaded, frames: &[String], function: Function, options: &Options) -> TracedProgram {
+    static MADE: Made<TracedProgram> = Made::nothing();
     let key = format!("{function:?} {frames:?} {options:?} {:?}", robot.model);
     MADE.once(key, || program::program(robot, frames, function, options))
 }
 
 /// The program of a function of a robot of the reference data.
-pub fn of_robot(robot: &Robot, function: Function, options: &Options) -> Program {
+pub fn of_robot(robot: &Robot, function: Function, options: &Options) -> TracedProgram {
     program(&load(&source(robot), &options.model), &options.frames, function, options)
 }
 
 /// The results of a program for groups of inputs.
-pub fn run<T: Real>(program: &Program, inputs: &[Vec<T>]) -> Vec<T> {
+pub fn run<T: Real>(program: &TracedProgram, inputs: &[Vec<T>]) -> Vec<T> {
     expr::evaluate(&program.graph, &inputs.concat())
 }
 

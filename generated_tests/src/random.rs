@@ -8,7 +8,9 @@ use std::fmt::Write;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::model::ModelOptions;
-use straightline_core::reference::{CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, Joint};
+use straightline_core::reference::{
+    CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint,
+};
 use straightline_core::Dd;
 
 pub use crate::written::Random;
@@ -346,7 +348,7 @@ impl RandomRobot {
             tree.links.push(CentreOfMassLink {
                 name: Self::name(c),
                 parent,
-                joint: if link.motion == Motion::Prismatic { Joint::Linear } else { Joint::Revolute },
+                joint: if link.motion == Motion::Prismatic { ReferenceJoint::Linear } else { ReferenceJoint::Revolute },
                 iq: 0,
                 iv: 0,
                 mass: lump.mass,

@@ -26,14 +26,14 @@ const LINE: RGBColor = RGBColor(31, 119, 180);
 const GRID: RGBColor = RGBColor(225, 225, 225);
 
 /// The six coordinates of the tool against an object, in the order px, py, pz, ax, ay, az.
-struct Coordinates {
+struct ToolCoordinates {
     s: [f64; 6],
     sd: [f64; 6],
     j: [[f64; N]; 6],
 }
 
 /// What a contact does with q̈ and F, and the rates of the object's own coordinate.
-struct Motion {
+struct ContactMotion {
     qdd: [f64; N],
     /// Along pz, or where that is free, the largest.
     force: f64,
@@ -41,12 +41,12 @@ struct Motion {
 }
 
 /// The generated functions of one mode, in one form for all modes.
-trait Mode {
+trait ModeFunctions {
     const NAME: &'static str;
     /// Whether pz is constrained, and its reaction must push.
     const UNILATERAL: bool = true;
-    fn coordinates(q: &[f64; N], qd: &[f64; N]) -> Coordinates;
-    fn motion(q: &[f64; N], qd: &[f64; N], tau: &[f64; N], own: &[f64; 2]) -> Motion;
+    fn coordinates(q: &[f64; N], qd: &[f64; N]) -> ToolCoordinates;
+    fn motion(q: &[f64; N], qd: &[f64; N], tau: &[f64; N], own: &[f64; 2]) -> ContactMotion;
     /// Change of q̇ when the contact closes, and the energy that is lost.
     fn impact(q: &[f64; N], qd: &[f64; N]) -> ([f64; N], f64);
     /// Wanted position along px, py, pz \[m\] at a time \[s\], of a task that starts 5 cm above.
@@ -63,11 +63,11 @@ macro_rules! mode {
     ($type:ident, $mode:ident, $m:literal, |$q:ident, $qd:ident, $tau:ident, $own:ident| $motion:block,
      |$q2:ident, $qd2:ident| $impact:block, unilateral: $unilateral:literal, wanted: $wanted:expr) => {
         struct $type;
-        impl Mode for $type {
+        impl ModeFunctions for $type {
             const NAME: &'static str = stringify!($mode);
             const UNILATERAL: bool = $unilateral;
-            fn coordinates(q: &[f64; N], qd: &[f64; N]) -> Coordinates {
-                let mut all = Coordinates { s: [0.0; 6], sd: [0.0; 6], j: [[0.0; N]; 6] };
+            fn coordinates(q: &[f64; N], qd: &[f64; N]) -> ToolCoordinates {
+                let mut all = ToolCoordinates { s: [0.0; 6], sd: [0.0; 6], j: [[0.0; N]; 6] };
                 let (mut s, mut sd, mut j, mut a) = ([0.0; $m], [0.0; $m], [[0.0; N]; $m], [0.0; $m]);
                 $mode::constrained_coordinates(q, qd, &mut s, &mut sd, &mut j, &mut a);
                 for (i, name) in $mode::CONSTRAINED.iter().enumerate() {
@@ -83,7 +83,7 @@ macro_rules! mode {
                 }
                 all
             }
-            fn motion($q: &[f64; N], $qd: &[f64; N], $tau: &[f64; N], $own: &[f64; 2]) -> Motion $motion
+            fn motion($q: &[f64; N], $qd: &[f64; N], $tau: &[f64; N], $own: &[f64; 2]) -> ContactMotion $motion
             fn impact($q2: &[f64; N], $qd2: &[f64; N]) -> ([f64; N], f64) $impact
             fn wanted(time: f64) -> [f64; 3] {
                 ($wanted)(time)
@@ -102,7 +102,7 @@ mode!(Writing, pen, 1,
     |q, qd, tau, _own| {
         let (mut qdd, mut f, mut sdd, mut v, mut p) = ([0.0; N], [0.0], [0.0], [0.0], [0.0]);
         pen::forward_dynamics(q, qd, tau, &mut qdd, &mut f, &mut sdd, &mut v, &mut p);
-        Motion { qdd, force: f[0], own_rate: [0.0; 2] }
+        ContactMotion { qdd, force: f[0], own_rate: [0.0; 2] }
     },
     |q, qd| {
         let (mut dqd, mut i, mut d, mut loss, mut p) = ([0.0; N], [0.0], [0.0], [0.0], [0.0]);
@@ -122,7 +122,7 @@ mode!(Assembly, peg, 4,
         let (mut qdd, mut f, mut sdd, mut v, mut p) = ([0.0; N], [0.0; 4], [0.0; 4], [0.0; 4], [0.0]);
         peg::forward_dynamics(q, qd, tau, &mut qdd, &mut f, &mut sdd, &mut v, &mut p);
         let force = (f[0] * f[0] + f[1] * f[1]).sqrt();
-        Motion { qdd, force, own_rate: [0.0; 2] }
+        ContactMotion { qdd, force, own_rate: [0.0; 2] }
     },
     |q, qd| {
         let (mut dqd, mut i, mut d, mut loss, mut p) = ([0.0; N], [0.0; 4], [0.0; 4], [0.0], [0.0]);
@@ -140,7 +140,7 @@ mode!(Pressing, wall, 1,
     |q, qd, tau, _own| {
         let (mut qdd, mut f, mut sdd, mut v, mut p) = ([0.0; N], [0.0], [0.0], [0.0], [0.0]);
         wall::forward_dynamics(q, qd, tau, &mut qdd, &mut f, &mut sdd, &mut v, &mut p);
-        Motion { qdd, force: f[0], own_rate: [0.0; 2] }
+        ContactMotion { qdd, force: f[0], own_rate: [0.0; 2] }
     },
     |q, qd| {
         let (mut dqd, mut i, mut d) = ([0.0; N], [0.0], [0.0]);
@@ -155,7 +155,7 @@ mode!(Hammering, nail, 1,
     |q, qd, tau, own| {
         let (mut qdd, mut f, mut sdd, mut v, mut p, mut e) = ([0.0; N], [0.0], [0.0], [0.0], [0.0], [0.0; 2]);
         nail::forward_dynamics(q, qd, tau, own, &mut qdd, &mut f, &mut sdd, &mut v, &mut p, &mut e);
-        Motion { qdd, force: f[0], own_rate: e }
+        ContactMotion { qdd, force: f[0], own_rate: e }
     },
     // a spring in front: no impact
     |_q, _qd| { ([0.0; N], 0.0) },
@@ -184,8 +184,8 @@ fn split(x: &[f64; STATE]) -> ([f64; N], [f64; N], [f64; 2]) {
     (std::array::from_fn(|i| x[i]), std::array::from_fn(|i| x[N + i]), [x[2 * N], x[2 * N + 1]])
 }
 
-impl<M: Mode> Task<M> {
-    fn tau(&self, time: f64, q: &[f64; N], qd: &[f64; N], c: &Coordinates) -> [f64; N] {
+impl<M: ModeFunctions> Task<M> {
+    fn tau(&self, time: f64, q: &[f64; N], qd: &[f64; N], c: &ToolCoordinates) -> [f64; N] {
         let mut tau = [0.0; N];
         ur5::bias_force(q, qd, &mut tau);
         let [x, y, z] = M::wanted(time);
@@ -198,7 +198,7 @@ impl<M: Mode> Task<M> {
         tau
     }
 
-    fn motion(&self, phase: Phase, time: f64, x: &[f64; STATE]) -> (Motion, Coordinates) {
+    fn motion(&self, phase: Phase, time: f64, x: &[f64; STATE]) -> (ContactMotion, ToolCoordinates) {
         let (q, qd, own) = split(x);
         let c = M::coordinates(&q, &qd);
         let tau = self.tau(time, &q, &qd, &c);
@@ -207,14 +207,14 @@ impl<M: Mode> Task<M> {
             Phase::Free => {
                 let mut qdd = [0.0; N];
                 ur5::forward_dynamics(&q, &qd, &tau, &mut qdd);
-                Motion { qdd, force: 0.0, own_rate: [0.0; 2] }
+                ContactMotion { qdd, force: 0.0, own_rate: [0.0; 2] }
             }
         };
         (motion, c)
     }
 }
 
-impl<M: Mode> ContactTask<STATE, 2> for Task<M> {
+impl<M: ModeFunctions> ContactTask<STATE, 2> for Task<M> {
     type Mode = Phase;
 
     fn rate(&mut self, phase: Phase, time: f64, x: &[f64; STATE]) -> [f64; STATE] {
@@ -255,10 +255,10 @@ impl<M: Mode> ContactTask<STATE, 2> for Task<M> {
 }
 
 /// What is drawn at one time: distance \[m\], reaction \[N\], kinetic energy \[J\].
-type Sample = (f64, [f64; 3]);
+type ContactSample = (f64, [f64; 3]);
 
 /// q with the tool on the axis of the object, 5 cm above it, by Newton's method from a guess.
-fn start<M: Mode>(guess: [f64; N], axes: &mut [f64; 3]) -> Result<[f64; N], String> {
+fn start<M: ModeFunctions>(guess: [f64; N], axes: &mut [f64; 3]) -> Result<[f64; N], String> {
     let mut q = guess;
     // of the turn about the normal what the guess has
     axes[2] = M::coordinates(&q, &[0.0; N]).s[5].clamp(-0.7, 0.7);
@@ -296,7 +296,7 @@ fn solve(mut a: [[f64; 6]; 6], mut b: [f64; 6]) -> [f64; 6] {
     b
 }
 
-fn simulate<M: Mode>(guess: [f64; N]) -> Result<Vec<Sample>, Box<dyn Error>> {
+fn simulate<M: ModeFunctions>(guess: [f64; N]) -> Result<Vec<ContactSample>, Box<dyn Error>> {
     let mut task = Task::<M> { axes: [0.0; 3], events: vec![], mode: std::marker::PhantomData };
     let q = start::<M>(guess, &mut task.axes)?;
     let state = std::array::from_fn(|i| if i < N { q[i] } else { 0.0 });
@@ -323,7 +323,7 @@ fn simulate<M: Mode>(guess: [f64; N]) -> Result<Vec<Sample>, Box<dyn Error>> {
     Ok(samples)
 }
 
-fn draw(tasks: &[(&str, Vec<Sample>)], path: &Path) -> Result<(), Box<dyn Error>> {
+fn draw(tasks: &[(&str, Vec<ContactSample>)], path: &Path) -> Result<(), Box<dyn Error>> {
     let root = SVGBackend::new(path, (1200, 1000)).into_drawing_area();
     root.fill(&WHITE)?;
     let label = ("sans-serif", 13).into_font().color(&INK);

@@ -8,7 +8,9 @@
 
 use plotters::prelude::*;
 use std::error::Error;
-use straightline::control::{computed_torque, feed_forward, gravity_compensation, Gains, Limits, Measured, Reference};
+use straightline::control::{
+    computed_torque, feed_forward, gravity_compensation, Gains, Measured, Reference, TorqueLimits,
+};
 use straightline::integrate::{State, Step};
 use straightline_robots::panda;
 
@@ -25,7 +27,7 @@ const TO: [f64; 7] = [0.9, 0.2, 0.4, -1.3, 0.3, 2.2, -0.2];
 /// Milliseconds that are looked at.
 const STEPS: u32 = 1600;
 /// What the drives of a Panda can do \[N·m\]: <https://frankaemika.github.io/docs/control_parameters.html>.
-const LIMITS: Limits<f64, 7> = Limits { greatest: [87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0] };
+const LIMITS: TorqueLimits<f64, 7> = TorqueLimits { greatest: [87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0] };
 /// Of torques \[N·m/rad\], \[N·m·s/rad\]: at 1 kHz damping d is stable below
 /// inertia / h, also for the light wrist and for the upper arm about its own axis, where joints 1 and 3 align.
 const JOINT_GAINS: Gains<f64, 7> = Gains {
@@ -48,10 +50,10 @@ fn reference(t: f64) -> Reference<f64, 7> {
     }
 }
 
-type Law = fn(&Reference<f64, 7>, &Measured<f64, 7>) -> [f64; 7];
+type ControlLaw = fn(&Reference<f64, 7>, &Measured<f64, 7>) -> [f64; 7];
 
 /// The controllers, by what they know of the dynamics.
-const LAWS: [(&str, Law); 4] = [
+const LAWS: [(&str, ControlLaw); 4] = [
     ("no compensation", |wanted, measured| JOINT_GAINS.answer(wanted, measured)),
     ("gravity", |wanted, measured| gravity_compensation(wanted, measured, &JOINT_GAINS, panda::gravity_force)),
     ("feed-forward", |wanted, measured| feed_forward(wanted, measured, &JOINT_GAINS, panda::inverse_dynamics)),
@@ -61,7 +63,7 @@ const LAWS: [(&str, Law); 4] = [
 ];
 
 /// What the driven arm is, and the controller does not know.
-struct Truth {
+struct TrueArm {
     name: &'static str,
     /// Mass of the tool \[kg\].
     tool: f64,
@@ -69,14 +71,14 @@ struct Truth {
     forearm: f64,
 }
 
-const TRUTHS: [Truth; 3] = [
-    Truth { name: "exact model", tool: 0.0, forearm: 1.0 },
-    Truth { name: "1 kg tool unknown", tool: 1.0, forearm: 1.0 },
-    Truth { name: "1 kg tool, forearm 20 % heavier", tool: 1.0, forearm: 1.2 },
+const TRUTHS: [TrueArm; 3] = [
+    TrueArm { name: "exact model", tool: 0.0, forearm: 1.0 },
+    TrueArm { name: "1 kg tool unknown", tool: 1.0, forearm: 1.0 },
+    TrueArm { name: "1 kg tool, forearm 20 % heavier", tool: 1.0, forearm: 1.2 },
 ];
 
 /// Errors of all joints \[rad\] after every millisecond.
-fn track(law: Law, truth: &Truth) -> Result<Vec<[f64; 7]>, plant::Unphysical> {
+fn track(law: ControlLaw, truth: &TrueArm) -> Result<Vec<[f64; 7]>, plant::Unphysical> {
     let tool = plant::Tool::new(truth.tool, [0.0, 0.0, 0.05], [0.0; 6])?;
     // `panda_link5` of the robot file, times what it is heavier
     let inertia = [0.035549, -0.002117, -0.004037, 0.029474, 0.000229, 0.008627].map(|j| j * truth.forearm);
@@ -166,7 +168,7 @@ mod tests {
     use super::*;
 
     /// The greatest errors of the controllers \[rad\].
-    fn greatest(truth: &Truth) -> [f64; 4] {
+    fn greatest(truth: &TrueArm) -> [f64; 4] {
         LAWS.map(|(_, law)| figures(&track(law, truth).unwrap()).0)
     }
 

@@ -27,7 +27,7 @@ const DURATION: f64 = 1.6;
 const SAMPLES: usize = 400;
 
 /// What was computed at one time.
-struct Sample {
+struct TrajectorySample {
     time: f64,
     /// Joint torques by generated code \[N·m\].
     tau: [f64; N],
@@ -51,7 +51,7 @@ fn motion(t: f64) -> [[f64; N]; 3] {
     ]
 }
 
-fn sample(reference: &CentreOfMassTree<Dd>, time: f64) -> Sample {
+fn sample(reference: &CentreOfMassTree<Dd>, time: f64) -> TrajectorySample {
     let [q, qd, qdd] = motion(time);
     let mut tau = [0.0; N];
     panda::inverse_dynamics(&q, &qd, &qdd, &mut tau);
@@ -66,7 +66,7 @@ fn sample(reference: &CentreOfMassTree<Dd>, time: f64) -> Sample {
     };
     let [q1, qd1, qdd1] = single.map(|v| v.map(f64::from));
     let scale = natural_scale(reference, &wide(&q), &wide(&qd), &wide(&qdd));
-    Sample {
+    TrajectorySample {
         time,
         tau,
         error: [error(&q, &qd, &qdd, &tau), error(&q1, &qd1, &qdd1, &tau_single.map(f64::from))],
@@ -82,11 +82,11 @@ fn reference() -> Result<CentreOfMassTree<Dd>, Box<dyn Error>> {
     Ok(centre_of_mass_tree(&description, &ModelOptions::default())?)
 }
 
-fn worst(samples: &[Sample], value: impl Fn(&Sample) -> f64) -> f64 {
+fn worst(samples: &[TrajectorySample], value: impl Fn(&TrajectorySample) -> f64) -> f64 {
     samples.iter().map(value).fold(0.0, f64::max)
 }
 
-fn print_table(samples: &[Sample]) {
+fn print_table(samples: &[TrajectorySample]) {
     println!("{:<15} {:>12}   {:>21}   {:>21}", "", "", "f64", "f32");
     println!(
         "{:<15} {:>12}   {:>11} {:>9}   {:>11} {:>9}",
@@ -134,7 +134,7 @@ const COLOURS: [RGBColor; N] = [
 const INK: RGBColor = RGBColor(0x22, 0x22, 0x22);
 const GRID: RGBColor = RGBColor(0xe6, 0xe6, 0xe6);
 
-fn draw(samples: &[Sample], path: &Path) -> Result<(), Box<dyn Error>> {
+fn draw(samples: &[TrajectorySample], path: &Path) -> Result<(), Box<dyn Error>> {
     let root = SVGBackend::new(path, (960, 760)).into_drawing_area();
     root.fill(&WHITE)?;
     let (torques, errors) = root.split_vertically(450);
@@ -173,7 +173,7 @@ fn draw(samples: &[Sample], path: &Path) -> Result<(), Box<dyn Error>> {
     )?;
 
     // judged joint by joint against the scale of the torque; the worst joint is drawn
-    let scaled = |s: &Sample, k: usize| (0..N).map(|i| s.error[k][i] / s.scale[i]).fold(0.0, f64::max);
+    let scaled = |s: &TrajectorySample, k: usize| (0..N).map(|i| s.error[k][i] / s.scale[i]).fold(0.0, f64::max);
     let mut chart = ChartBuilder::on(&errors)
         .caption("Worst joint's error against the reference, scaled by the moduli of the torque's terms", title)
         .margin(12)
@@ -226,7 +226,7 @@ where
 
 fn main() -> Result<(), Box<dyn Error>> {
     let reference = reference()?;
-    let samples: Vec<Sample> =
+    let samples: Vec<TrajectorySample> =
         (0..=SAMPLES).map(|k| sample(&reference, k as f64 * DURATION / SAMPLES as f64)).collect();
     println!(
         "Panda, quintic of {DURATION} s from rest to rest, {} samples: generated code against the reference\n",

@@ -5,7 +5,7 @@ use crate::motion::Motion;
 use crate::plant::{angle_beyond_sines, joint_friction};
 use crate::quadrature::integral;
 use crate::simulate::{Failure, MOST_NUMBERS};
-use crate::table::Table;
+use crate::table::DataTable;
 use straightline_core::algorithms::{inverse_dynamics, joint_wrenches, kinetic_energy, potential_energy};
 use straightline_core::model::{Joint, Model};
 use straightline_core::spatial::ForceVector;
@@ -14,10 +14,10 @@ use straightline_core::spatial::ForceVector;
 #[derive(Clone, Debug)]
 pub struct Analysis {
     /// `t`, then per joint `q.`, `qd.`, `qdd.`, `tau.`, `power.`.
-    pub table: Table,
+    pub table: DataTable,
     /// `t`, then per joint `force.` and `moment.` with `.x`, `.y`, `.z`: what the joint exerts on its link, in the link's axes, about
     /// the joint's origin.
-    pub wrenches: Table,
+    pub wrenches: DataTable,
     /// Per joint.
     pub joints: Vec<JointFigures>,
     /// Every limit that is exceeded, where it is first, the earliest first.
@@ -119,14 +119,14 @@ pub struct Violation {
 }
 
 /// Where the forces of a motion come from: the generic runtime of a model, or a generated program.
-pub trait Equations {
+pub trait ForceSource {
     /// Joint torques or forces \[N·m or N\].
     fn torques(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64>;
     /// What every joint exerts on its link: force \[N\], then moment about the joint's origin \[N·m\], in the link's axes.
     fn wrenches(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<[f64; 6]>;
 }
 
-impl Equations for Model<f64> {
+impl ForceSource for Model<f64> {
     fn torques(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
         inverse_dynamics(self, q, qd, qdd)
     }
@@ -163,7 +163,7 @@ pub fn analyze(model: &Model<f64>, motion: &Motion, interval: f64) -> Result<Ana
 /// As [`analyze`].
 pub fn analyze_by(
     model: &Model<f64>,
-    equations: &dyn Equations,
+    equations: &dyn ForceSource,
     motion: &Motion,
     interval: f64,
 ) -> Result<Analysis, Failure> {
@@ -175,8 +175,8 @@ pub fn analyze_by(
         let lists: Vec<Vec<String>> = prefixes.iter().map(of).collect();
         std::iter::once("t".to_string()).chain(lists.into_iter().flatten()).collect()
     };
-    let mut table = Table { names: names(&["q", "qd", "qdd", "tau", "power"], &[""]), rows: Vec::new() };
-    let mut wrenches = Table { names: names(&["force", "moment"], &[".x", ".y", ".z"]), rows: Vec::new() };
+    let mut table = DataTable { names: names(&["q", "qd", "qdd", "tau", "power"], &[""]), rows: Vec::new() };
+    let mut wrenches = DataTable { names: names(&["force", "moment"], &[".x", ".y", ".z"]), rows: Vec::new() };
     for &(piece, t) in &instants {
         let (q, qd, qdd) = motion.in_piece(piece, t);
         if let Some((joint, q)) = angle_beyond_sines(model, &q) {
@@ -242,7 +242,7 @@ fn instants(motion: &Motion, interval: f64) -> Vec<(usize, f64)> {
     motion.times.windows(2).enumerate().flat_map(piece).collect()
 }
 
-fn figures(joint: &Joint, j: usize, n: usize, table: &Table, wrenches: &Table) -> JointFigures {
+fn figures(joint: &Joint, j: usize, n: usize, table: &DataTable, wrenches: &DataTable) -> JointFigures {
     let rows = &table.rows;
     let times: Vec<f64> = rows.iter().map(|row| row[0]).collect();
     let (qd, tau, power) =
@@ -284,11 +284,11 @@ pub(crate) fn beginning(mut before: f64, mut after: f64, is_so: impl Fn(f64) -> 
 
 /// The limits of a joint that the motion exceeds.
 fn violations(
-    (model, equations): (&Model<f64>, &dyn Equations),
+    (model, equations): (&Model<f64>, &dyn ForceSource),
     motion: &Motion,
     joint: &Joint,
     (j, n): (usize, usize),
-    table: &Table,
+    table: &DataTable,
 ) -> Vec<Violation> {
     let limits = joint.limits;
     let value = |what: &str, t: f64| {

@@ -1,6 +1,6 @@
 //! What drives a simulated robot: torques over time, inputs of its drives, or a controller.
 
-use crate::drives::{demands, without_dampers, Inputs, Load};
+use crate::drives::{demands, without_dampers, ForcesOnJoints, Inputs};
 use crate::motion::Motion;
 use crate::plant::{Action, Plant};
 use straightline_core::algorithms::{gravity_force, inverse_dynamics};
@@ -184,13 +184,13 @@ impl Controller {
         let answer = self.answer((&r, &rates[0]), (q, qd));
         let still = || vec![vec![0.0; qd.len()]; rates.len()];
         let asked = match self.compensation {
-            Compensation::None => demands(&model, q, &still(), x, Load::Only(&answer)),
-            Compensation::Gravity => demands(&model, q, &still(), x, Load::Motion(&answer)),
-            Compensation::FeedForward => demands(&model, &r, &rates, x, Load::Motion(&answer)),
+            Compensation::None => demands(&model, q, &still(), x, ForcesOnJoints::Only(&answer)),
+            Compensation::Gravity => demands(&model, q, &still(), x, ForcesOnJoints::Motion(&answer)),
+            Compensation::FeedForward => demands(&model, &r, &rates, x, ForcesOnJoints::Motion(&answer)),
             Compensation::ComputedTorque => {
                 rates[0] = qd.to_vec();
                 rates[1].iter_mut().zip(&answer).for_each(|(rdd, answer)| *rdd += answer);
-                demands(&model, q, &rates, x, Load::Motion(&vec![0.0; qd.len()]))
+                demands(&model, q, &rates, x, ForcesOnJoints::Motion(&vec![0.0; qd.len()]))
             }
         };
         let of = |d: straightline_core::algorithms::Demand<f64>| match d.current {

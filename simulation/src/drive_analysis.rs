@@ -8,10 +8,10 @@
 //! with the Joule heat P = R i² of the winding at its rated temperature; resistances and time constants as data sheets give them.
 
 use crate::analysis::{beginning, Violation};
-use crate::drives::{demands, further_derivatives, slack_state, without_dampers, Load};
+use crate::drives::{demands, further_derivatives, slack_state, without_dampers, ForcesOnJoints};
 use crate::motion::Motion;
 use crate::quadrature::integral;
-use crate::table::Table;
+use crate::table::DataTable;
 use straightline_core::algorithms::Demand;
 use straightline_core::drive::{Actuator, Drive, Thermal};
 use straightline_core::model::Model;
@@ -20,7 +20,7 @@ use straightline_core::model::Model;
 #[derive(Clone, Debug)]
 pub struct DriveAnalysis {
     /// `t`, then per drive `u.`, `i.`, `speed.` and `m.` of its actuator, `electrical.` \[W\], `joule.` \[W\] and `winding.` \[°C\].
-    pub table: Table,
+    pub table: DataTable,
     /// Per drive.
     pub drives: Vec<DriveFigures>,
     /// Limits that are exceeded, where they are first.
@@ -137,7 +137,7 @@ pub fn analyze(model: &Model<f64>, motion: &Motion, instants: &[(usize, f64)]) -
     let ask = |mut rates: Vec<Vec<f64>>| -> Vec<Instant> {
         let q = rates.remove(0);
         let x = slack_state(&undamped, &q, &rates[0]);
-        let asked = demands(&undamped, &q, &rates, &x, Load::Motion(&vec![0.0; model.nv()]));
+        let asked = demands(&undamped, &q, &rates, &x, ForcesOnJoints::Motion(&vec![0.0; model.nv()]));
         model.drives.iter().zip(&asked).map(|(drive, demand)| Instant::new(drive, demand)).collect()
     };
     let rows: Vec<Vec<Instant>> =
@@ -166,7 +166,7 @@ pub fn analyze(model: &Model<f64>, motion: &Motion, instants: &[(usize, f64)]) -
         ];
         std::iter::once(times[i]).chain(columns.iter().flat_map(|c| (0..n).map(c))).collect()
     };
-    let table = Table { names, rows: rows.iter().enumerate().map(row).collect() };
+    let table = DataTable { names, rows: rows.iter().enumerate().map(row).collect() };
     let drives = (0..n).map(|k| figures(&model.drives[k], &times, &rows, k, &windings[k])).collect();
     let at = |k: usize, t: f64| ask(motion.derivatives(t)).swap_remove(k);
     let mut violations: Vec<Violation> =

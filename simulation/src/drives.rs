@@ -132,21 +132,27 @@ pub fn without_dampers(model: &Model<f64>) -> Model<f64> {
 ///
 /// # Panics
 /// If [`further_derivatives`] is `None`.
-pub fn demands(model: &Model<f64>, q: &[f64], rates: &[Vec<f64>], x: &[f64], added: Load) -> Vec<Demand<f64>> {
+pub fn demands(
+    model: &Model<f64>,
+    q: &[f64],
+    rates: &[Vec<f64>],
+    x: &[f64],
+    added: ForcesOnJoints,
+) -> Vec<Demand<f64>> {
     fn over<const N: usize>(
         model: &Model<f64>,
         q: &[f64],
         rates: &[Vec<f64>],
         x: &[f64],
-        added: Load,
+        added: ForcesOnJoints,
     ) -> Vec<Demand<f64>> {
         let rates: Vec<&[f64]> = rates.iter().map(Vec::as_slice).collect();
         drive_demands::<f64, N>(N, model, q, &rates, x, |model, q, qd, qdd| match added {
-            Load::Motion(forces) => {
+            ForcesOnJoints::Motion(forces) => {
                 let motion = inverse_dynamics(model, q, qd, qdd).into_iter().zip(forces);
                 motion.map(|(tau, f)| tau + Taylor::fixed(*f)).collect()
             }
-            Load::Only(forces) => forces.iter().map(|f| Taylor::fixed(*f)).collect(),
+            ForcesOnJoints::Only(forces) => forces.iter().map(|f| Taylor::fixed(*f)).collect(),
         })
     }
     let x = if reads_states(&model.drives) { x } else { &[] };
@@ -161,7 +167,7 @@ pub fn demands(model: &Model<f64>, q: &[f64], rates: &[Vec<f64>], x: &[f64], add
 
 /// The forces that drives are to put on the joints \[N·m or N\].
 #[derive(Clone, Copy, Debug)]
-pub enum Load<'a> {
+pub enum ForcesOnJoints<'a> {
     /// Those of the motion, and these.
     Motion(&'a [f64]),
     /// These alone.
@@ -199,5 +205,5 @@ pub fn state_of_motion(model: &Model<f64>, motion: &crate::motion::Motion, t: f6
     let undamped = without_dampers(model);
     let slack = slack_state(model, &q, &rates[0]);
     let none = vec![0.0; model.nv()];
-    Some(state_of_demands(model, &demands(&undamped, &q, &rates, &slack, Load::Motion(&none))))
+    Some(state_of_demands(model, &demands(&undamped, &q, &rates, &slack, ForcesOnJoints::Motion(&none))))
 }

@@ -177,7 +177,7 @@ pub fn descend(cost: impl Fn(&[f64]) -> (f64, Vec<f64>), ranges: &[(f64, f64)]) 
     };
     let asked = Cell::new(0);
     // the library asks for the value and for the gradient of the same point, one after the other
-    let last: RefCell<Option<Known>> = RefCell::new(None);
+    let last: RefCell<Option<KnownPoint>> = RefCell::new(None);
     let of_unbounded = |z: &[f64]| {
         let mut last = last.borrow_mut();
         if let Some((_, found)) = last.as_ref().filter(|(at, _)| at == z) {
@@ -194,7 +194,7 @@ pub fn descend(cost: impl Fn(&[f64]) -> (f64, Vec<f64>), ranges: &[(f64, f64)]) 
     let solver = LBFGS::new(MoreThuenteLineSearch::new(), 7);
     let solver = solver.with_tolerance_grad(1e-9 * first.abs().max(1e-9)).map_err(|error| error.to_string())?;
     let configured = |state: argmin::core::IterState<_, _, _, _, _, _>| state.param(start.clone()).max_iters(STEPS);
-    let run = Executor::new(Slope(&of_unbounded), solver).configure(configured).run();
+    let run = Executor::new(CostSlope(&of_unbounded), solver).configure(configured).run();
     // where the line search finds no way on there may be a kink: then the start counts, and another method goes on
     let Ok(run) = run else { return Ok(Optimum { point: inside(&start), cost: first, evaluations: asked.get() }) };
     let (state, evaluations) = (run.state, asked.get());
@@ -203,14 +203,14 @@ pub fn descend(cost: impl Fn(&[f64]) -> (f64, Vec<f64>), ranges: &[(f64, f64)]) 
 }
 
 /// A point, and the cost there with its gradient.
-type Known = (Vec<f64>, (f64, Vec<f64>));
+type KnownPoint = (Vec<f64>, (f64, Vec<f64>));
 
 /// A cost with its gradient.
 type WithGradient<'a> = dyn Fn(&[f64]) -> (f64, Vec<f64>) + 'a;
 
-struct Slope<'a>(&'a WithGradient<'a>);
+struct CostSlope<'a>(&'a WithGradient<'a>);
 
-impl CostFunction for Slope<'_> {
+impl CostFunction for CostSlope<'_> {
     type Param = Vec<f64>;
     type Output = f64;
     fn cost(&self, point: &Vec<f64>) -> Result<f64, Error> {
@@ -218,7 +218,7 @@ impl CostFunction for Slope<'_> {
     }
 }
 
-impl Gradient for Slope<'_> {
+impl Gradient for CostSlope<'_> {
     type Param = Vec<f64>;
     type Gradient = Vec<f64>;
     fn gradient(&self, point: &Vec<f64>) -> Result<Vec<f64>, Error> {
@@ -273,7 +273,7 @@ pub fn minimise_from(
         };
         let simplex = std::iter::once(best.point.clone()).chain((0..ranges.len()).map(corner)).collect();
         let solver = NelderMead::new(simplex).with_sd_tolerance(1e-12).map_err(|error| error.to_string())?;
-        let run = Executor::new(Cost(&of_cube), solver).configure(|state| state.max_iters(ITERATIONS)).run();
+        let run = Executor::new(MotionCost(&of_cube), solver).configure(|state| state.max_iters(ITERATIONS)).run();
         let state = run.map_err(|error| error.to_string())?.state;
         let (Some(point), found) = (state.get_best_param(), state.get_best_cost()) else { break };
         let gain = best.cost - found;
@@ -293,9 +293,9 @@ pub fn minimise_from(
     }
 }
 
-struct Cost<'a>(&'a dyn Fn(&[f64]) -> f64);
+struct MotionCost<'a>(&'a dyn Fn(&[f64]) -> f64);
 
-impl CostFunction for Cost<'_> {
+impl CostFunction for MotionCost<'_> {
     type Param = Vec<f64>;
     type Output = f64;
     fn cost(&self, point: &Vec<f64>) -> Result<f64, Error> {

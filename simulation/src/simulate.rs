@@ -8,9 +8,9 @@
 use crate::command::Command;
 use crate::drives::DriveEnergies;
 pub use crate::failure::Failure;
-use crate::ode::{solve, Equations, Pace, Step, Watch};
+use crate::ode::{solve, AcceptedStep, Equations, Pace, Watch};
 use crate::plant::{Action, Plant};
-use crate::table::Table;
+use crate::table::DataTable;
 use std::ops::ControlFlow;
 use straightline_core::algorithms::{kinetic_energy, DrivenMotion};
 use straightline_core::joint::Descriptor;
@@ -105,7 +105,7 @@ impl Settings {
 pub struct Run {
     /// `t`, then per joint `q.`, `qd.`, `tau.` and, under a controller, `error.` (reference less measured), then `energy`, `work`
     /// and `losses` \[J\]; of a robot with drives per drive `u.` (after limits), `i.`, `speed.` and `m.` of its actuator before these.
-    pub table: Table,
+    pub table: DataTable,
     /// The last configuration.
     pub q: Vec<f64>,
     /// The last velocity.
@@ -151,7 +151,7 @@ pub struct Balance {
 impl Run {
     /// Before the first row; the energies and the last state come when it has ended.
     pub(crate) fn beginning(names: Vec<String>) -> Run {
-        Run { table: Table { names, rows: Vec::new() }, ..Run::default() }
+        Run { table: DataTable { names, rows: Vec::new() }, ..Run::default() }
     }
 
     /// # Errors
@@ -240,7 +240,7 @@ pub fn simulate_from(
         let (first, last) = (wanted.partition_point(|t| *t <= start), wanted.partition_point(|t| *t < end));
         let times = [wanted.get(first..last).unwrap_or_default(), &[end]].concat();
         let stops_at_limits = settings.stops_at_limits;
-        let mut watch = Looks { plant, times: &times, next: 0, stops_at_limits, seen: Vec::new(), stop: None };
+        let mut watch = StateWatch { plant, times: &times, next: 0, stops_at_limits, seen: Vec::new(), stop: None };
         let solved = solve(&system, &mut watch, (start, end), &state, settings, &pace)?;
         for (t, y) in watch.seen.iter().chain(&watch.stop) {
             if is_among(&wanted, *t, settings.duration) || watch.stop.as_ref().is_some_and(|stop| stop.0 == *t) {
@@ -404,7 +404,7 @@ impl Equations for System<'_> {
 }
 
 /// Keeps the states at wanted times, and ends where a joint reaches the end of its range.
-struct Looks<'a> {
+struct StateWatch<'a> {
     plant: &'a Plant,
     times: &'a [f64],
     next: usize,
@@ -415,9 +415,9 @@ struct Looks<'a> {
     stop: Option<(f64, Vec<f64>)>,
 }
 
-impl Watch for Looks<'_> {
-    fn step(&mut self, step: &Step) -> ControlFlow<()> {
-        let Step { t_before, t, y_before, y, within } = *step;
+impl Watch for StateWatch<'_> {
+    fn step(&mut self, step: &AcceptedStep) -> ControlFlow<()> {
+        let AcceptedStep { t_before, t, y_before, y, within } = *step;
         let mut end = t;
         let inside = |y: &[f64]| distance(self.plant, y) > 0.0;
         let leaves = self.stops_at_limits && inside(y_before) && !inside(y);

@@ -4,14 +4,14 @@ use std::fmt::Write;
 
 /// Columns of equal length with names; the first is time \[s\].
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Table {
+pub struct DataTable {
     /// Names, such as `t` and `q.shoulder`.
     pub names: Vec<String>,
     /// Rows of as many numbers as there are names.
     pub rows: Vec<Vec<f64>>,
 }
 
-impl Table {
+impl DataTable {
     /// The column of that name.
     pub fn column(&self, name: &str) -> Option<Vec<f64>> {
         let k = self.names.iter().position(|n| n == name)?;

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use straightline_codegen::description::names_of_formats;
 use straightline_codegen::emit::package::PACKAGES;
 use straightline_codegen::identifier::is_prefix;
-use straightline_codegen::options::table::Group;
-use straightline_codegen::options::Settings;
+use straightline_codegen::options::table::OptionGroup;
+use straightline_codegen::options::GivenOptions;
 use straightline_codegen::Function;
 
 pub use crate::motion::{Analyze, Simulate};
@@ -35,11 +35,11 @@ Examples:
 {EXIT_CODES}"))]
 pub struct CommandLine {
     #[command(subcommand)]
-    pub command: Command,
+    pub command: CliCommand,
 }
 
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub enum CliCommand {
     /// Write the dynamics of a robot as Rust source
     #[command(after_help = format!("\
 Examples:
@@ -60,7 +60,7 @@ Examples:
   straightline report panda.urdf --html panda.html
 
 {EXIT_CODES}"))]
-    Report(Report),
+    Report(ReportArguments),
     /// Read robot files and say what is wrong, doubtful or worth knowing in them
     #[command(after_help = format!("\
 Examples:
@@ -68,7 +68,7 @@ Examples:
   straightline check robots/*.urdf --angle-tolerance 1e-4
 
 {EXIT_CODES}"))]
-    Check(Check),
+    Check(CheckArguments),
     /// Compare the generated program with an independent formulation of the dynamics, on random states
     #[command(after_help = format!("\
 Runs the program as it is compiled, operation by operation in the scalar's arithmetic, and the dynamics of the
@@ -137,32 +137,32 @@ Examples:
     Explain(Explain),
 }
 
-impl Command {
+impl CliCommand {
     /// How the command reads robots, if it does.
     pub fn model(&self) -> Option<&ModelArgs> {
         Some(match self {
-            Command::Generate(a) => &a.model,
-            Command::Report(a) => &a.model,
-            Command::Check(a) => &a.model,
-            Command::Verify(a) => &a.model,
-            Command::Simulate(a) => return a.model(),
-            Command::Analyze(a) => return a.model(),
-            Command::Export(a) => &a.model,
-            Command::Functions(_) | Command::Explain(_) => return None,
+            CliCommand::Generate(a) => &a.model,
+            CliCommand::Report(a) => &a.model,
+            CliCommand::Check(a) => &a.model,
+            CliCommand::Verify(a) => &a.model,
+            CliCommand::Simulate(a) => return a.model(),
+            CliCommand::Analyze(a) => return a.model(),
+            CliCommand::Export(a) => &a.model,
+            CliCommand::Functions(_) | CliCommand::Explain(_) => return None,
         })
     }
 
     /// What it does, in a word.
     pub fn doing(&self) -> &'static str {
         match self {
-            Command::Generate(_) => "generating",
-            Command::Report(_) => "reporting",
-            Command::Check(_) => "checking",
-            Command::Verify(_) => "verifying",
-            Command::Simulate(_) => "simulating",
-            Command::Analyze(_) => "analysing",
-            Command::Export(_) => "exporting",
-            Command::Functions(_) | Command::Explain(_) => "looking up",
+            CliCommand::Generate(_) => "generating",
+            CliCommand::Report(_) => "reporting",
+            CliCommand::Check(_) => "checking",
+            CliCommand::Verify(_) => "verifying",
+            CliCommand::Simulate(_) => "simulating",
+            CliCommand::Analyze(_) => "analysing",
+            CliCommand::Export(_) => "exporting",
+            CliCommand::Functions(_) | CliCommand::Explain(_) => "looking up",
         }
     }
 }
@@ -201,7 +201,7 @@ pub struct Generate {
 }
 
 #[derive(Debug, Args)]
-pub struct Report {
+pub struct ReportArguments {
     #[arg(help = robot_file())]
     pub robot: PathBuf,
     /// As JSON: {"robot": …, "functions": {"inverse_dynamics": {"mul": …, "plain": …, "full": …, "savings": […]}}}
@@ -217,7 +217,7 @@ pub struct Report {
 }
 
 #[derive(Debug, Args)]
-pub struct Check {
+pub struct CheckArguments {
     #[arg(required = true, value_name = "ROBOT", help = robot_file())]
     pub robots: Vec<PathBuf>,
     #[command(flatten)]
@@ -273,18 +273,18 @@ fn packages() -> impl TypedValueParser<Value = String> {
 }
 
 /// What is generated, and how.
-pub type ProgramArgs = Given<{ Group::Program as u8 }>;
+pub type ProgramArgs = Given<{ OptionGroup::Program as u8 }>;
 
 /// How the robot file is read.
 #[derive(Debug, Args)]
 pub struct ModelArgs {
     #[command(flatten)]
-    given: Given<{ Group::Model as u8 }>,
+    given: Given<{ OptionGroup::Model as u8 }>,
     /// A scene (TOML): what is wanted of the robot, and what is held; everything else is skipped. Options given here count before its own
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
     #[command(flatten)]
-    levels: Given<{ Group::Reporting as u8 }>,
+    levels: Given<{ OptionGroup::Reporting as u8 }>,
     /// Say no warnings, show no progress
     #[arg(short, long)]
     quiet: bool,
@@ -292,7 +292,7 @@ pub struct ModelArgs {
 
 impl ModelArgs {
     /// The options that are given, with those of a program.
-    pub fn settings(&self, program: Option<&ProgramArgs>) -> Settings {
+    pub fn settings(&self, program: Option<&ProgramArgs>) -> GivenOptions {
         let mut settings = program.map(|program| program.settings.clone()).unwrap_or_default();
         settings.extend(&self.given.settings);
         settings.extend(&self.levels.settings);
@@ -447,7 +447,7 @@ mod tests {
     #[test]
     fn gravity_may_point_down() {
         let line = CommandLine::parse_from(["straightline", "check", "a.urdf", "--gravity", "-1,0,-9.81"]);
-        let Command::Check(check) = line.command else { panic!("check was asked for") };
+        let CliCommand::Check(check) = line.command else { panic!("check was asked for") };
         let mut options = straightline_codegen::Options::default();
         check.model.settings(None).apply(&mut options);
         assert_eq!(options.model.gravity, Some([-1.0, 0.0, -9.81]));

@@ -3,13 +3,13 @@
 use crate::arguments::Simulate;
 use crate::files::{self, read as read_file};
 use crate::motion::{failed, lines, print_run, undrawn, write_table};
-use crate::{print, Failure};
+use crate::{print, CommandFailure};
 use anstream::stdout;
 use std::io::Write;
 use std::path::Path;
 use straightline_cli::experiment;
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
-use straightline_codegen::scene::contact::Contacts as Items;
+use straightline_codegen::scene::contact::SceneContacts as Items;
 use straightline_core::model::Model;
 use straightline_simulation::contact::{ContactRun, Contacts};
 use straightline_simulation::plant::Plant;
@@ -22,12 +22,12 @@ const PLOTS: (u32, u32) = (900, 900);
 const MOST_LINES: usize = 40;
 
 /// The contacts of a scene as an experiment has them.
-pub fn read(path: &Path, model: &Model<f64>, items: &Items) -> Result<Contacts, Failure> {
+pub fn read(path: &Path, model: &Model<f64>, items: &Items) -> Result<Contacts, CommandFailure> {
     let source = read_file(path)?;
     let mut diagnostics = Diagnostics::new();
     let contacts = experiment::contact::read(&source, model, items, &mut diagnostics);
     print::diagnostics(&diagnostics, Severity::Warning);
-    contacts.ok_or(Failure::Input)
+    contacts.ok_or(CommandFailure::Input)
 }
 
 /// Writes and prints what came out.
@@ -36,7 +36,7 @@ pub fn finish(
     plant: &Plant,
     contacts: &Contacts,
     run: Result<ContactRun, Stopped>,
-) -> Result<(), Failure> {
+) -> Result<(), CommandFailure> {
     let ContactRun { run, events, drift } = run.map_err(|failure| failed(&failure))?;
     if let Some(path) = &a.output {
         write_table(path, &run.table)?;

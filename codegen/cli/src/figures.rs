@@ -1,7 +1,7 @@
 //! The figures of an analysis as text.
 
 use crate::search::Swept;
-use crate::Failure;
+use crate::CommandFailure;
 use anstream::stdout;
 use std::io::Write;
 use straightline_cli::experiment::parameter;
@@ -94,7 +94,7 @@ pub fn print_analysis(
     motion: &Motion,
     found: &Analysis,
     advice: &[Vec<Advice>],
-) -> Result<(), Failure> {
+) -> Result<(), CommandFailure> {
     let mut out = stdout().lock();
     writeln!(out, "{}: {} s, {} instants\n", model.name, motion.duration(), found.table.rows.len())?;
     let names = model.bodies.iter().map(|b| &b.joint.name).chain(model.drives.iter().map(|d| &d.name));
@@ -124,7 +124,7 @@ pub fn print_analysis(
     Ok(())
 }
 
-pub fn print_sweep(sweep: &parameter::Sweep, swept: &[Swept]) -> Result<(), Failure> {
+pub fn print_sweep(sweep: &parameter::Sweep, swept: &[Swept]) -> Result<(), CommandFailure> {
     let mut out = stdout().lock();
     let has_drives = swept.iter().any(|(_, found)| found.drives.is_some());
     let of_drives = if has_drives { format!("{:>16}{:>12}", "electrical [J]", "heat [J]") } else { String::new() };

@@ -1,6 +1,6 @@
 //! Files of a command: what it has read it does not write, and nothing twice.
 
-use crate::Failure;
+use crate::CommandFailure;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -16,7 +16,7 @@ pub fn note(path: &Path) {
 }
 
 /// The text of a file.
-pub fn read(path: &Path) -> Result<Source, Failure> {
+pub fn read(path: &Path) -> Result<Source, CommandFailure> {
     note(path);
     let shown = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|e| io::Error::new(e.kind(), format!("{shown}: {e}")))?;
@@ -24,7 +24,7 @@ pub fn read(path: &Path) -> Result<Source, Failure> {
 }
 
 /// Writes a file, whole or not at all.
-pub fn write(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), Failure> {
+pub fn write(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), CommandFailure> {
     let mut taken = TAKEN.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let is_file = std::fs::metadata(path).is_ok_and(|m| m.is_file());
     output::write_file_apart(path, text, taken.iter().filter(|_| is_file))?;

@@ -4,44 +4,44 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use straightline_codegen::diagnostic::Front;
-use straightline_codegen::options::table::{Group, Kind, Row, TABLE};
-use straightline_codegen::options::Settings;
+use straightline_codegen::options::table::{OptionGroup, OptionKind, OptionRow, TABLE};
+use straightline_codegen::options::GivenOptions;
 
 const FRONT: Front = Front::CommandLine;
 
-/// The options of a [`Group`] that are given.
+/// The options of a [`OptionGroup`] that are given.
 #[derive(Clone, Debug, Default)]
 pub struct Given<const GROUP: u8> {
-    pub settings: Settings,
+    pub settings: GivenOptions,
 }
 
 impl<const GROUP: u8> Given<GROUP> {
-    fn rows() -> impl Iterator<Item = &'static Row> {
+    fn rows() -> impl Iterator<Item = &'static OptionRow> {
         TABLE.iter().filter(|row| row.group as u8 == GROUP && row.is_value(FRONT))
     }
 }
 
 fn heading(group: u8) -> &'static str {
-    let of = |of: Group| of as u8 == group;
+    let of = |of: OptionGroup| of as u8 == group;
     match group {
-        _ if of(Group::Program) => "What is generated",
-        _ if of(Group::Model) => "How the robot file is read",
+        _ if of(OptionGroup::Program) => "What is generated",
+        _ if of(OptionGroup::Model) => "How the robot file is read",
         _ => "What is said",
     }
 }
 
 /// What an argument's text consists of.
-fn parts<'a>(row: &Row, text: &'a str) -> Vec<&'a str> {
+fn parts<'a>(row: &OptionRow, text: &'a str) -> Vec<&'a str> {
     match row.kind {
-        Kind::Vector => text.split(',').collect(),
+        OptionKind::Vector => text.split(',').collect(),
         _ => vec![text],
     }
 }
 
 /// The argument of an option.
-fn argument(row: &'static Row) -> Arg {
+fn argument(row: &'static OptionRow) -> Arg {
     let name = row.called(FRONT).expect("the row has an argument");
-    let is_list = matches!(row.kind, Kind::Words(_) | Kind::Names { commas: false } | Kind::Codes(_));
+    let is_list = matches!(row.kind, OptionKind::Words(_) | OptionKind::Names { commas: false } | OptionKind::Codes(_));
     let repeated = if is_list { "; may be repeated" } else { "" };
     let default = if row.default == "off" { String::new() } else { format!(" [default: {}]", row.default) };
     let arg = Arg::new(row.name)
@@ -56,16 +56,18 @@ fn argument(row: &'static Row) -> Arg {
     let optional =
         |arg: Arg, value: &'static str| arg.num_args(0..=1).require_equals(true).default_missing_value(value);
     match &row.kind {
-        Kind::Flag => optional(arg, "true").value_parser(["true", "false"]).hide_possible_values(true),
-        Kind::Word(of, alone) => {
+        OptionKind::Flag => optional(arg, "true").value_parser(["true", "false"]).hide_possible_values(true),
+        OptionKind::Word(of, alone) => {
             let arg = arg.value_parser(possible((of.words)()));
             alone.iter().fold(arg, |arg, alone| optional(arg, alone))
         }
-        Kind::Words(of) => arg.value_parser(possible((of.words)())),
-        Kind::Names { commas: false } => arg,
-        Kind::Names { commas: true } => arg.value_delimiter(','),
-        Kind::Vector => arg.allow_hyphen_values(true).value_parser(right),
-        Kind::Codes(_) | Kind::Real(..) | Kind::Whole(..) | Kind::OfFront => arg.value_parser(right),
+        OptionKind::Words(of) => arg.value_parser(possible((of.words)())),
+        OptionKind::Names { commas: false } => arg,
+        OptionKind::Names { commas: true } => arg.value_delimiter(','),
+        OptionKind::Vector => arg.allow_hyphen_values(true).value_parser(right),
+        OptionKind::Codes(_) | OptionKind::Real(..) | OptionKind::Whole(..) | OptionKind::OfFront => {
+            arg.value_parser(right)
+        }
     }
 }
 

@@ -22,7 +22,9 @@ mod print;
 #[cfg(feature = "simulation")]
 mod search;
 
-use arguments::{Check, Command, CommandLine, Export, Generate, ModelArgs, ProgramArgs, Report, Verify};
+use arguments::{
+    CheckArguments, CliCommand, CommandLine, Export, Generate, ModelArgs, ProgramArgs, ReportArguments, Verify,
+};
 use files::read;
 use std::io;
 use std::path::Path;
@@ -36,17 +38,17 @@ use straightline_codegen::emit::Generated;
 use straightline_codegen::options::{check_options, scene_file, Options, SceneFile};
 use straightline_codegen::{description, identifier, model, output, scene, verify};
 
-/// Why a command ended early; what there is to say was said where it happened, except for [`Failure::Files`].
-enum Failure {
+/// Why a command ended early; what there is to say was said where it happened, except for [`CommandFailure::Files`].
+enum CommandFailure {
     /// The robot file is wrong, or a check failed.
     Input,
     /// A file could not be read or written.
     Files(io::Error),
 }
 
-impl From<io::Error> for Failure {
+impl From<io::Error> for CommandFailure {
     fn from(error: io::Error) -> Self {
-        Failure::Files(error)
+        CommandFailure::Files(error)
     }
 }
 
@@ -57,22 +59,22 @@ fn main() -> ExitCode {
     print::be_quiet(command.model().is_some_and(ModelArgs::is_quiet));
     print::watch(command.doing());
     let done = match command {
-        Command::Generate(a) => generate(&a),
-        Command::Report(a) => report(&a),
-        Command::Check(a) => check(&a),
-        Command::Verify(a) => verify(&a),
-        Command::Export(a) => export(&a),
-        Command::Simulate(a) => motion::simulate(&a),
-        Command::Analyze(a) => motion::analyze(&a),
-        Command::Functions(a) => print::functions(a.word.as_deref()).map_err(Failure::Files),
-        Command::Explain(a) => explain_code(a.code.as_deref()),
+        CliCommand::Generate(a) => generate(&a),
+        CliCommand::Report(a) => report(&a),
+        CliCommand::Check(a) => check(&a),
+        CliCommand::Verify(a) => verify(&a),
+        CliCommand::Export(a) => export(&a),
+        CliCommand::Simulate(a) => motion::simulate(&a),
+        CliCommand::Analyze(a) => motion::analyze(&a),
+        CliCommand::Functions(a) => print::functions(a.word.as_deref()).map_err(CommandFailure::Files),
+        CliCommand::Explain(a) => explain_code(a.code.as_deref()),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(Failure::Input) => ExitCode::from(1),
+        Err(CommandFailure::Input) => ExitCode::from(1),
         // the reader of a pipe had enough: not a failure of ours
-        Err(Failure::Files(error)) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
-        Err(Failure::Files(error)) => {
+        Err(CommandFailure::Files(error)) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
+        Err(CommandFailure::Files(error)) => {
             print::error(&error.to_string());
             ExitCode::from(3)
         }
@@ -80,14 +82,14 @@ fn main() -> ExitCode {
 }
 
 /// What the command line and the scene that it names say; what is wrong with the scene is said when it is used.
-fn options(program: Option<&ProgramArgs>, model: &ModelArgs) -> Result<Options, Failure> {
+fn options(program: Option<&ProgramArgs>, model: &ModelArgs) -> Result<Options, CommandFailure> {
     let file = model.scene.as_deref().map(read).transpose()?;
     let file = file.as_ref().map_or_else(SceneFile::default, scene_file::read_partly);
     Ok(file.with(&model.settings(program), Options::default()))
 }
 
 /// Compiles, and prints errors and warnings; notes are for `check`.
-fn compiled(robot: &Path, program: &ProgramArgs, model: &ModelArgs) -> Result<(Generated, Options), Failure> {
+fn compiled(robot: &Path, program: &ProgramArgs, model: &ModelArgs) -> Result<(Generated, Options), CommandFailure> {
     compiled_by(compile, robot, program, model)
 }
 
@@ -96,7 +98,7 @@ fn compiled_by(
     robot: &Path,
     program: &ProgramArgs,
     model: &ModelArgs,
-) -> Result<(Generated, Options), Failure> {
+) -> Result<(Generated, Options), CommandFailure> {
     let options = options(Some(program), model)?;
     let source = read(robot)?;
     let progress = print::spinner(&format!("compiling {}", source.path()));
@@ -112,7 +114,7 @@ fn compiled_by(
 }
 
 /// What a code stands for, or all codes.
-fn explain_code(code: Option<&str>) -> Result<(), Failure> {
+fn explain_code(code: Option<&str>) -> Result<(), CommandFailure> {
     let Some(code) = code else { return Ok(print::codes(codes::ALL)?) };
     match codes::find(code) {
         Some(found) => Ok(print::codes(std::slice::from_ref(found))?),
@@ -123,7 +125,7 @@ fn explain_code(code: Option<&str>) -> Result<(), Failure> {
     }
 }
 
-fn generate(a: &Generate) -> Result<(), Failure> {
+fn generate(a: &Generate) -> Result<(), CommandFailure> {
     let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;
     let Some(path) = &a.output else { return Ok(print::text(&generated.text)?) };
     if !a.check {
@@ -144,7 +146,7 @@ fn generate(a: &Generate) -> Result<(), Failure> {
     }
 }
 
-fn report(a: &Report) -> Result<(), Failure> {
+fn report(a: &ReportArguments) -> Result<(), CommandFailure> {
     let (generated, options) = compiled_by(explain, &a.robot, &a.program, &a.model)?;
     if let Some(path) = &a.html {
         files::write(path, &html::page(&read(&a.robot)?, &options, &generated))?;
@@ -153,7 +155,7 @@ fn report(a: &Report) -> Result<(), Failure> {
     Ok(if a.json { print::json(&generated.report) } else { print::report(&generated.report) }?)
 }
 
-fn check(a: &Check) -> Result<(), Failure> {
+fn check(a: &CheckArguments) -> Result<(), CommandFailure> {
     let options = options(None, &a.model)?;
     let model_options = options.scene.model_options(&options.model);
     let mut wrong = false;
@@ -174,12 +176,12 @@ fn check(a: &Check) -> Result<(), Failure> {
         wrong |= diagnostics.has_errors();
     }
     match wrong {
-        true => Err(Failure::Input),
+        true => Err(CommandFailure::Input),
         false => Ok(()),
     }
 }
 
-fn verify(a: &Verify) -> Result<(), Failure> {
+fn verify(a: &Verify) -> Result<(), CommandFailure> {
     let (generated, options) = compiled(&a.robot, &a.program, &a.model)?;
     let source = read(&a.robot)?;
     let progress = print::bar("verifying", a.states.into());
@@ -193,7 +195,7 @@ fn verify(a: &Verify) -> Result<(), Failure> {
     }
 }
 
-fn export(a: &Export) -> Result<(), Failure> {
+fn export(a: &Export) -> Result<(), CommandFailure> {
     let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;
     let name = a.kind.as_deref().unwrap_or(C_ABI.name);
     let kind = PACKAGES.iter().find(|p| p.name == name).unwrap_or(&C_ABI);

@@ -5,7 +5,7 @@ use crate::figures::{print_analysis, print_sweep};
 use crate::files::{self, read};
 pub use crate::motion_arguments::{Analyze, Simulate};
 use crate::search::{optimized, swept};
-use crate::{contact, options, page, print, Failure};
+use crate::{contact, options, page, print, CommandFailure};
 use anstream::stdout;
 use std::io::Write;
 use std::path::Path;
@@ -25,7 +25,7 @@ use straightline_simulation::drives::state_of_motion;
 use straightline_simulation::motion::Motion;
 use straightline_simulation::plant::Plant;
 use straightline_simulation::plot::{Line, Plot};
-use straightline_simulation::table::Table;
+use straightline_simulation::table::DataTable;
 use straightline_simulation::{contact as in_contact, simulate};
 
 /// Size of a plot in pixels.
@@ -44,7 +44,7 @@ pub fn built(description: &Description, options: &Options, diagnostics: &mut Dia
 }
 
 /// The robot of a file; to be `moved` by forces, its joints have to feel some inertia.
-fn robot(path: &Path, args: &ModelArgs, moved: bool) -> Result<(Description, Options, Model<f64>), Failure> {
+fn robot(path: &Path, args: &ModelArgs, moved: bool) -> Result<(Description, Options, Model<f64>), CommandFailure> {
     let options = options(None, args)?;
     let source = read(path)?;
     let mut diagnostics = Diagnostics::reporting(&options.reporting);
@@ -56,7 +56,7 @@ fn robot(path: &Path, args: &ModelArgs, moved: bool) -> Result<(Description, Opt
     }
     print::diagnostics(&diagnostics, Severity::Warning);
     let model = model.filter(|_| !diagnostics.has_errors()).map(|model| model.cast());
-    description.zip(model).map(|(d, model)| (d, options, model)).ok_or(Failure::Input)
+    description.zip(model).map(|(d, model)| (d, options, model)).ok_or(CommandFailure::Input)
 }
 
 fn experiment(
@@ -64,7 +64,7 @@ fn experiment(
     model: &Model<f64>,
     controller_model: &Model<f64>,
     are_torques: bool,
-) -> Result<Experiment, Failure> {
+) -> Result<Experiment, CommandFailure> {
     let source = match parquet::is_parquet(path) {
         false => read(path)?,
         true => {
@@ -81,21 +81,21 @@ fn experiment(
     let mut diagnostics = Diagnostics::new();
     let experiment = experiment::read(&source, model, controller_model, are_torques, &beside, &mut diagnostics);
     print::diagnostics(&diagnostics, Severity::Warning);
-    experiment.ok_or(Failure::Input)
+    experiment.ok_or(CommandFailure::Input)
 }
 
-pub fn complained(complaint: Box<Diagnostic>) -> Failure {
+pub fn complained(complaint: Box<Diagnostic>) -> CommandFailure {
     let mut diagnostics = Diagnostics::new();
     diagnostics.push(*complaint);
     print::refused(&diagnostics)
 }
 
-fn unreadable(path: &Path, why: &str) -> Failure {
+fn unreadable(path: &Path, why: &str) -> CommandFailure {
     print::failure(format!("{}: {why}", path.display()))
 }
 
 /// Writes a table as CSV, or as JSON or Parquet where the file's name says so.
-pub fn write_table(path: &Path, table: &Table) -> Result<(), Failure> {
+pub fn write_table(path: &Path, table: &DataTable) -> Result<(), CommandFailure> {
     if parquet::is_parquet(path) {
         files::write(path, &parquet::bytes(table).map_err(|why| unreadable(path, &why))?)?;
         return Ok(());
@@ -115,7 +115,7 @@ pub fn write_table(path: &Path, table: &Table) -> Result<(), Failure> {
 }
 
 /// The columns whose names begin so, as lines over time.
-pub fn lines<'a>(table: &'a Table, prefix: &str) -> Vec<Line<'a>> {
+pub fn lines<'a>(table: &'a DataTable, prefix: &str) -> Vec<Line<'a>> {
     let of = |(k, name): (usize, &'a String)| {
         let name = name.strip_prefix(prefix)?;
         Some(Line { name, points: table.rows.iter().map(|row| (row[0], row[k])).collect() })
@@ -123,7 +123,7 @@ pub fn lines<'a>(table: &'a Table, prefix: &str) -> Vec<Line<'a>> {
     table.names.iter().enumerate().filter_map(of).collect()
 }
 
-pub fn undrawn(why: String) -> Failure {
+pub fn undrawn(why: String) -> CommandFailure {
     print::failure(format!("the plot cannot be drawn: {why}"))
 }
 
@@ -142,7 +142,7 @@ fn start(plant: &Plant, experiment: &Experiment) -> Vec<f64> {
     x.map_or_else(|| plant.state(q, qd), |x| plant.state_with(q, qd, &x))
 }
 
-pub fn simulate(a: &Simulate) -> Result<(), Failure> {
+pub fn simulate(a: &Simulate) -> Result<(), CommandFailure> {
     let (_, options, model) = robot(&a.robot, &a.model, true)?;
     let controller_model = match &a.controller_robot {
         None => model.clone(),
@@ -203,17 +203,17 @@ pub fn simulate(a: &Simulate) -> Result<(), Failure> {
     print_run(&plant, &run)
 }
 
-pub fn failed(failure: &simulate::Failure) -> Failure {
+pub fn failed(failure: &simulate::Failure) -> CommandFailure {
     print::failure_with(failure.to_string(), failure.help.as_slice())
 }
 
 /// Why a motion has no figures.
-pub fn not_analysed(failure: &simulate::Failure) -> Failure {
+pub fn not_analysed(failure: &simulate::Failure) -> CommandFailure {
     let text = format!("the motion cannot be analysed: at t = {:?} s {}", failure.time, failure.why);
     print::failure_with(text, failure.help.as_slice())
 }
 
-pub fn print_run(plant: &Plant, run: &simulate::Run) -> Result<(), Failure> {
+pub fn print_run(plant: &Plant, run: &simulate::Run) -> Result<(), CommandFailure> {
     let mut out = stdout().lock();
     let balance = run.balance;
     let last = run.table.rows.last().map_or(0.0, |row| row[0]);
@@ -243,7 +243,7 @@ pub fn print_run(plant: &Plant, run: &simulate::Run) -> Result<(), Failure> {
     Ok(())
 }
 
-pub fn analyze(a: &Analyze) -> Result<(), Failure> {
+pub fn analyze(a: &Analyze) -> Result<(), CommandFailure> {
     let (description, options, model) = robot(&a.robot, &a.model, false)?;
     let Some(motion) = experiment(&a.motion, &model, &model, false)?.motion else {
         let text = format!("{} prescribes no motion", a.motion.display());
@@ -271,8 +271,8 @@ pub fn analyze(a: &Analyze) -> Result<(), Failure> {
     }
 }
 
-fn joined(found: &Analysis) -> Table {
-    let beside = |table: Table, other: &Table| Table {
+fn joined(found: &Analysis) -> DataTable {
+    let beside = |table: DataTable, other: &DataTable| DataTable {
         names: [&table.names[..], &other.names[1..]].concat(),
         rows: table.rows.iter().zip(&other.rows).map(|(a, b)| [&a[..], &b[1..]].concat()).collect(),
     };

@@ -4,7 +4,7 @@ use crate::arguments::{robot_file, ModelArgs};
 use clap::builder::TypedValueParser;
 use clap::Args;
 use std::path::PathBuf;
-use straightline_cli::experiment::parameter::{self, Range, Sweep};
+use straightline_cli::experiment::parameter::{self, ParameterRange, Sweep};
 use straightline_simulation::optimize::Objective;
 
 #[derive(Debug, Args)]
@@ -51,7 +51,7 @@ pub struct Analyze {
     pub sweep: Option<Sweep>,
     /// Look for the best value of a number of the robot file within this range; may be repeated
     #[arg(long, value_name = "PATH=FROM:TO", value_parser = parameter::parse_range)]
-    pub optimize: Vec<Range>,
+    pub optimize: Vec<ParameterRange>,
     /// What the best values make least, limits kept: energy given at the joints, rms or peak of their forces; of drives the electrical
     /// energy that they take, or their Joule heat
     #[arg(long, value_name = "WHAT", default_value = "rms", value_parser = objective, requires = "optimize")]

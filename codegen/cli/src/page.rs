@@ -15,7 +15,7 @@ use straightline_simulation::drive_analysis::{torque_limits, DriveAnalysis, Driv
 use straightline_simulation::html::{four_digits, Page};
 use straightline_simulation::motion::Motion;
 use straightline_simulation::panel::Panel;
-use straightline_simulation::table::Table;
+use straightline_simulation::table::DataTable;
 
 /// A number with its unit.
 fn with_unit(x: f64, unit: &str) -> String {
@@ -96,12 +96,12 @@ fn joint_rows(found: &Analysis) -> Vec<Vec<String>> {
 }
 
 /// The column `prefix.name` over time; empty if there is none.
-fn over_time(table: &Table, prefix: &str, name: &str) -> Vec<(f64, f64)> {
+fn over_time(table: &DataTable, prefix: &str, name: &str) -> Vec<(f64, f64)> {
     let line = lines(table, &format!("{prefix}.")).into_iter().find(|line| line.name == name);
     line.map_or_else(Vec::new, |line| line.points)
 }
 
-fn joint_panels(figures: &JointFigures, joint: Option<&Joint>, table: &Table) -> Vec<String> {
+fn joint_panels(figures: &JointFigures, joint: Option<&Joint>, table: &DataTable) -> Vec<String> {
     let (position, speed) = units(figures);
     let of = |prefix: &str| over_time(table, prefix, &figures.name);
     let finite = |levels: &[f64]| levels.iter().copied().filter(|x| x.is_finite()).collect::<Vec<f64>>();
@@ -145,7 +145,7 @@ fn drives_section(page: &mut Page, model: &Model<f64>, drives: &DriveAnalysis) {
     page.cards(&cards.collect::<Vec<_>>());
 }
 
-fn drive_panels(drive: &Drive<f64>, figures: &DriveFigures, table: &Table) -> Vec<String> {
+fn drive_panels(drive: &Drive<f64>, figures: &DriveFigures, table: &DataTable) -> Vec<String> {
     let panel = |prefix: &str, title: &str, unit: &str| {
         let lines = vec![over_time(table, prefix, &drive.name)];
         Panel { title, units: ("s", unit), lines, levels: Vec::new() }.svg()

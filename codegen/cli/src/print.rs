@@ -1,6 +1,6 @@
 //! What the person sees.
 
-use crate::Failure;
+use crate::CommandFailure;
 use anstream::{eprintln, stdout};
 use anstyle::{AnsiColor, Style};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -34,22 +34,22 @@ pub fn error(text: &str) {
 }
 
 /// An error that no diagnostic says: why a command ends.
-pub fn failure(text: impl AsRef<str>) -> Failure {
+pub fn failure(text: impl AsRef<str>) -> CommandFailure {
     error(text.as_ref());
-    Failure::Input
+    CommandFailure::Input
 }
 
 /// The same with remedies.
-pub fn failure_with(text: impl AsRef<str>, help: &[impl AsRef<str>]) -> Failure {
+pub fn failure_with(text: impl AsRef<str>, help: &[impl AsRef<str>]) -> CommandFailure {
     error(text.as_ref());
     help.iter().for_each(|help| eprintln!("{HELP}help{HELP:#}: {}", help.as_ref()));
-    Failure::Input
+    CommandFailure::Input
 }
 
 /// What is worth a warning, and that the command ends.
-pub fn refused(all: &Diagnostics) -> Failure {
+pub fn refused(all: &Diagnostics) -> CommandFailure {
     diagnostics(all, Severity::Warning);
-    Failure::Input
+    CommandFailure::Input
 }
 
 /// Whether warnings and progress are left out.

@@ -1,7 +1,7 @@
 //! Robots with other numbers than their files have: sweeps over one of them, and searches for the best ones.
 
 use crate::motion::{built, built_in_full, complained, not_analysed, Analyze};
-use crate::{print, Failure};
+use crate::{print, CommandFailure};
 use anstream::stdout;
 use std::io::Write;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -21,27 +21,27 @@ use straightline_simulation::simulate;
 const MOST_SEARCHED: usize = 50_000;
 
 /// The generated programs of a robot with some of its numbers as run-time parameters.
-fn design(description: &Description, options: &Options, paths: &[&str]) -> Result<Design, Failure> {
+fn design(description: &Description, options: &Options, paths: &[&str]) -> Result<Design, CommandFailure> {
     let build = |d: &Description| built_in_full(d, options, &mut Diagnostics::new());
     Design::new(description, &build, paths).map_err(complained)
 }
 
 /// Generated programs at these values of their parameters.
-struct At<'a>(&'a Design, Vec<f64>);
+struct ProgramsAt<'a>(&'a Design, Vec<f64>);
 
 /// The generated programs for parameters of which some are numbers of drives: torques of the joints do not depend on these.
-struct Programs {
+struct MotionPrograms {
     design: Design,
     /// Which of all parameters the programs take.
     kept: Vec<usize>,
 }
 
-impl Programs {
-    fn new(description: &Description, options: &Options, paths: &[&str]) -> Result<Programs, Failure> {
+impl MotionPrograms {
+    fn new(description: &Description, options: &Options, paths: &[&str]) -> Result<MotionPrograms, CommandFailure> {
         let is_kept = |k: &usize| !parameter::is_of_drive(description, &options.scene.drives, paths[*k]);
         let kept: Vec<usize> = (0..paths.len()).filter(is_kept).collect();
         let design = design(description, options, &kept.iter().map(|k| paths[*k]).collect::<Vec<_>>())?;
-        Ok(Programs { design, kept })
+        Ok(MotionPrograms { design, kept })
     }
 
     /// The values that the programs take.
@@ -49,8 +49,8 @@ impl Programs {
         self.kept.iter().map(|k| values[*k]).collect()
     }
 
-    fn at(&self, values: &[f64]) -> At<'_> {
-        At(&self.design, self.kept(values))
+    fn at(&self, values: &[f64]) -> ProgramsAt<'_> {
+        ProgramsAt(&self.design, self.kept(values))
     }
 }
 
@@ -67,7 +67,7 @@ fn changed(
     Ok((description, options))
 }
 
-impl analysis::Equations for At<'_> {
+impl analysis::ForceSource for ProgramsAt<'_> {
     fn torques(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
         self.0.torques(q, qd, qdd, &self.1)
     }
@@ -78,7 +78,12 @@ impl analysis::Equations for At<'_> {
 }
 
 /// The robot file with these values of the parameters that are optimised; what is wrong is printed.
-fn with(a: &Analyze, description: &Description, options: &Options, values: &[f64]) -> Result<Model<f64>, Failure> {
+fn with(
+    a: &Analyze,
+    description: &Description,
+    options: &Options,
+    values: &[f64],
+) -> Result<Model<f64>, CommandFailure> {
     let (mut description, mut options) = (description.clone(), options.clone());
     let mut diagnostics = Diagnostics::new();
     for (range, value) in a.optimize.iter().zip(values) {
@@ -90,7 +95,7 @@ fn with(a: &Analyze, description: &Description, options: &Options, values: &[f64
     let model = if diagnostics.has_errors() { None } else { built(&description, &options, &mut diagnostics) };
     model.ok_or_else(|| {
         print::diagnostics(&diagnostics, Severity::Error);
-        Failure::Input
+        CommandFailure::Input
     })
 }
 
@@ -101,7 +106,7 @@ struct Search<'a> {
     options: &'a Options,
     motion: &'a Motion,
     model: Model<f64>,
-    programs: Programs,
+    programs: MotionPrograms,
     /// The instants of the motion with q, q̇ and q̈.
     states: Vec<(f64, [Vec<f64>; 3])>,
     /// Greatest forces of the joints, in the order of their coordinates.
@@ -115,7 +120,7 @@ pub fn optimized(
     description: &Description,
     options: &Options,
     motion: &Motion,
-) -> Result<(), Failure> {
+) -> Result<(), CommandFailure> {
     let search = Search::new(asked, description, options, motion)?;
     let progress = print::spinner("optimising");
     let found = search.best();
@@ -130,7 +135,7 @@ impl<'a> Search<'a> {
         description: &'a Description,
         options: &'a Options,
         motion: &'a Motion,
-    ) -> Result<Search<'a>, Failure> {
+    ) -> Result<Search<'a>, CommandFailure> {
         // both ends of all ranges must be robots, so that everything between them is one
         let ends = |end: fn(&(f64, f64)) -> f64| asked.optimize.iter().map(|r| end(&r.ends)).collect::<Vec<f64>>();
         with(asked, description, options, &ends(|e| e.0))?;
@@ -144,8 +149,8 @@ impl<'a> Search<'a> {
             return Err(print::failure_with(text, &[help]));
         }
         let paths: Vec<&str> = asked.optimize.iter().map(|range| range.path.as_str()).collect();
-        let programs = Programs::new(description, options, &paths)?;
-        let model = built(description, options, &mut Diagnostics::new()).ok_or(Failure::Input)?;
+        let programs = MotionPrograms::new(description, options, &paths)?;
+        let model = built(description, options, &mut Diagnostics::new()).ok_or(CommandFailure::Input)?;
         if asked.minimize.is_of_drives() && (model.drives.is_empty() || further_derivatives(&model).is_none()) {
             let text =
                 "what drives take cannot be minimised: the robot has no drives whose inputs follow from its motion";
@@ -212,7 +217,7 @@ impl<'a> Search<'a> {
         found.map_or(f64::INFINITY, |found| self.asked.minimize.with_limits(&found, &self.efforts))
     }
 
-    fn print(&self, (downhill, best): (Best, Best)) -> Result<(), Failure> {
+    fn print(&self, (downhill, best): (Best, Best)) -> Result<(), CommandFailure> {
         let Analyze { optimize: asked, minimize, interval, .. } = self.asked;
         let as_written = analysis::analyze(&self.model, self.motion, *interval).map_err(|f| not_analysed(&f))?;
         let as_written = minimize.with_limits(&as_written, &self.efforts);
@@ -242,7 +247,7 @@ pub fn swept(
     sweep: &parameter::Sweep,
     motion: &Motion,
     interval: f64,
-) -> Result<Vec<Swept>, Failure> {
+) -> Result<Vec<Swept>, CommandFailure> {
     let mut models = Vec::new();
     for &value in &sweep.values {
         let (changed, in_scene) = changed(description, options, &sweep.path, value).map_err(complained)?;
@@ -250,11 +255,11 @@ pub fn swept(
         let Some(model) = built(&changed, &in_scene, &mut diagnostics) else {
             print::error(&format!("{} = {value}:", sweep.path));
             print::diagnostics(&diagnostics, Severity::Error);
-            return Err(Failure::Input);
+            return Err(CommandFailure::Input);
         };
         models.push((value, model));
     }
-    let programs = Programs::new(description, options, &[&sweep.path])?;
+    let programs = MotionPrograms::new(description, options, &[&sweep.path])?;
     let bar = print::bar("sweeping", models.len() as u64);
     let (next, results) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let workers = std::thread::available_parallelism().map_or(1, usize::from).min(models.len());

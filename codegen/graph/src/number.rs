@@ -17,7 +17,7 @@ macro_rules! numbers {
             $($(#[$doc])* $Name,)+
         }
 
-        const ROWS: &[Row] = &[$(Row {
+        const ROWS: &[NumberRow] = &[$(NumberRow {
             name: $name,
             description: $description,
             module: $module,
@@ -79,7 +79,7 @@ numbers! { ($)
 macro_rules! columns {
     ($($(#[$doc:meta])* $column:ident: $type:ty,)+) => {
         /// What is known of a number format. Numbers of it are held as the f64 that they are.
-        struct Row {
+        struct NumberRow {
             $($column: $type,)+
             nearest: fn(Dd) -> f64,
             rounded: fn(f64) -> f64,
@@ -129,7 +129,7 @@ columns! {
 }
 
 impl Scalar {
-    fn row(self) -> &'static Row {
+    fn row(self) -> &'static NumberRow {
         &ROWS[self as usize]
     }
 

@@ -109,10 +109,10 @@ pub fn backwards<T: Real + PartialEq>(graph: &Graph, values: &[T], adjoints: &mu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::expr::{Builder, Port, RuleSet};
+    use crate::expr::{GraphBuilder, Port, RuleSet};
 
-    fn program(results: impl Fn(&mut Builder, NodeId, NodeId) -> NodeId) -> Graph {
-        let mut builder = Builder::new(
+    fn program(results: impl Fn(&mut GraphBuilder, NodeId, NodeId) -> NodeId) -> Graph {
+        let mut builder = GraphBuilder::new(
             RuleSet::exact(crate::expr::Folding::In(crate::number::Scalar::F64)),
             vec![Port::new("x", &[2])],
         );

@@ -3,20 +3,20 @@
 //! The graph under construction belongs to the thread: operators have nowhere else to find it. [`trace`] opens one, and
 //! closes it again even when the algorithm panics.
 
-use crate::expr::{Builder, Graph, NodeId, Op, Port, RuleSet, Section};
+use crate::expr::{Graph, GraphBuilder, NodeId, Op, Port, RuleSet, Section};
 use std::cell::RefCell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use straightline_core::{Dd, Real};
 
 thread_local! {
-    static BUILDER: RefCell<Option<Builder>> = const { RefCell::new(None) };
+    static BUILDER: RefCell<Option<GraphBuilder>> = const { RefCell::new(None) };
 }
 
 /// A node of the graph that this thread is tracing.
 #[derive(Clone, Copy, Debug)]
 pub struct Expr(NodeId);
 
-fn with<R>(f: impl FnOnce(&mut Builder) -> R) -> R {
+fn with<R>(f: impl FnOnce(&mut GraphBuilder) -> R) -> R {
     BUILDER.with_borrow_mut(|b| f(b.as_mut().expect("expressions are only made inside `trace`")))
 }
 
@@ -42,8 +42,8 @@ fn written(
     rules: RuleSet,
     inputs: Vec<Port>,
     algorithm: impl FnOnce(&[Vec<Expr>]) -> Vec<Expr>,
-) -> (Builder, Vec<NodeId>) {
-    let mut builder = Builder::new(rules, inputs.clone());
+) -> (GraphBuilder, Vec<NodeId>) {
+    let mut builder = GraphBuilder::new(rules, inputs.clone());
     let mut next = 0;
     let mut arguments: Vec<Vec<Expr>> = Vec::with_capacity(inputs.len());
     for port in &inputs {
@@ -54,7 +54,7 @@ fn written(
 }
 
 /// What `algorithm` adds to a graph that is being made, and what it returns.
-pub(crate) fn continued<R>(builder: Builder, algorithm: impl FnOnce() -> R) -> (Builder, R) {
+pub(crate) fn continued<R>(builder: GraphBuilder, algorithm: impl FnOnce() -> R) -> (GraphBuilder, R) {
     struct Close;
     impl Drop for Close {
         fn drop(&mut self) {

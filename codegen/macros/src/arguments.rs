@@ -3,8 +3,8 @@
 use crate::scene::InlineScene;
 use proc_macro2::{Span, TokenTree};
 use straightline_codegen::diagnostic::{Diagnostic, Front};
-use straightline_codegen::options::table::{Group, Kind, Row};
-use straightline_codegen::options::{Settings, Value};
+use straightline_codegen::options::table::{OptionGroup, OptionKind, OptionRow};
+use straightline_codegen::options::{GivenOptions, OptionValue};
 use syn::parse::{Parse, ParseStream};
 use syn::punctuated::Punctuated;
 use syn::{parenthesized, token, Attribute, Error, Ident, Lit, LitBool, LitStr, Result, Token, Visibility};
@@ -17,7 +17,7 @@ pub struct Arguments {
     pub scene: Option<SceneArgument>,
     /// The module that the derive puts everything in, where the user can reach it.
     pub module: Option<Ident>,
-    pub settings: Settings,
+    pub settings: GivenOptions,
     /// What is wrong with them: what could be read of the others counts nevertheless.
     pub errors: Vec<Error>,
     /// What was asked for as a function and is none.
@@ -44,21 +44,21 @@ pub enum SceneArgument {
 }
 
 /// `pub mod panda = "panda.urdf", …`
-pub struct Module {
+pub struct ModuleList {
     pub attributes: Vec<Attribute>,
     pub visibility: Visibility,
     pub name: Ident,
     pub arguments: Arguments,
 }
 
-impl Parse for Module {
+impl Parse for ModuleList {
     fn parse(input: ParseStream) -> Result<Self> {
         let attributes = input.call(Attribute::parse_outer)?;
         let visibility = input.parse()?;
         input.parse::<Token![mod]>()?;
         let name = input.parse()?;
         input.parse::<Token![=]>()?;
-        Ok(Module { attributes, visibility, name, arguments: input.parse()? })
+        Ok(ModuleList { attributes, visibility, name, arguments: input.parse()? })
     }
 }
 
@@ -109,10 +109,13 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
     // several scalars are a list of them
     let name = key.to_string();
     let name = if name == "scalars" { "scalar" } else { name.as_str() };
-    let row = Row::find(name, |row| row.called(FRONT).is_some()).map_err(|unknown| Error::new(key.span(), unknown))?;
+    let row =
+        OptionRow::find(name, |row| row.called(FRONT).is_some()).map_err(|unknown| Error::new(key.span(), unknown))?;
     match (row.group, row.name) {
-        (Group::Front, "scene") if arguments.scene.is_some() => Err(Error::new(key.span(), "there is a scene already")),
-        (Group::Front, "scene") => {
+        (OptionGroup::Front, "scene") if arguments.scene.is_some() => {
+            Err(Error::new(key.span(), "there is a scene already"))
+        }
+        (OptionGroup::Front, "scene") => {
             arguments.scene = Some(if input.peek(Token![=]) {
                 SceneArgument::File(value(input)?)
             } else {
@@ -120,7 +123,7 @@ fn option(input: ParseStream, arguments: &mut Arguments) -> Result<()> {
             });
             Ok(())
         }
-        (Group::Front, _) => {
+        (OptionGroup::Front, _) => {
             arguments.module = Some(value::<LitStr>(input)?.parse()?);
             Ok(())
         }
@@ -144,12 +147,12 @@ fn said(place: Span, wrong: &Diagnostic) -> Error {
 /// The value of an option. What is wrong with single words goes to `errors`, names of items that there are not to `unknown`; words that
 /// are right count.
 fn value_of(
-    row: &Row,
+    row: &OptionRow,
     key: &Ident,
     input: ParseStream,
     errors: &mut Option<Error>,
     unknown: &mut Vec<Ident>,
-) -> Result<Value> {
+) -> Result<OptionValue> {
     let is_alone = !input.peek(Token![=]) && !input.peek(token::Paren);
     let wrong_form = || said(key.span(), &row.wrong_form(FRONT));
     let mut right = |text: String, place: Span| match row.wrong_word(&text) {
@@ -160,21 +163,21 @@ fn value_of(
         }
     };
     Ok(match &row.kind {
-        Kind::Flag if is_alone => true.into(),
-        Kind::Flag => value::<LitBool>(input)?.value.into(),
-        Kind::Word(_, Some(alone)) if is_alone => (*alone).into(),
+        OptionKind::Flag if is_alone => true.into(),
+        OptionKind::Flag => value::<LitBool>(input)?.value.into(),
+        OptionKind::Word(_, Some(alone)) if is_alone => (*alone).into(),
         _ if is_alone => return Err(wrong_form()),
-        Kind::Real(..) | Kind::Whole(..) => {
+        OptionKind::Real(..) | OptionKind::Whole(..) => {
             let given = value(input)?;
             let number = number(&given)?;
             row.wrong_number(number).into_iter().for_each(|wrong| keep(errors, said(given.span(), &wrong)));
             number.into()
         }
-        Kind::Vector => {
+        OptionKind::Vector => {
             let numbers = list::<Lit>(input)?.iter().map(number).collect::<Result<Vec<f64>>>()?;
-            Value::Numbers(numbers)
+            OptionValue::Numbers(numbers)
         }
-        Kind::Words(of) if of.is_of_items => {
+        OptionKind::Words(of) if of.is_of_items => {
             let mut known = Vec::new();
             for name in list::<Ident>(input)? {
                 match right(name.to_string(), name.span()) {
@@ -182,11 +185,11 @@ fn value_of(
                     None => unknown.push(name),
                 }
             }
-            Value::Words(known)
+            OptionValue::Words(known)
         }
         _ => {
             let words = if input.peek(Token![=]) { vec![value::<LitStr>(input)?] } else { list::<LitStr>(input)? };
-            Value::of_words(words.iter().filter_map(|word| right(word.value(), word.span())))
+            OptionValue::of_words(words.iter().filter_map(|word| right(word.value(), word.span())))
         }
     })
 }
@@ -239,9 +242,9 @@ mod tests {
                 continue;
             }
             assert!(read.errors.is_empty(), "{written}: {:?}", read.errors);
-            let mut wanted = Settings::default();
+            let mut wanted = GivenOptions::default();
             match row.group {
-                Group::Front => assert_eq!(read.module.expect("a module").to_string(), row.example[0]),
+                OptionGroup::Front => assert_eq!(read.module.expect("a module").to_string(), row.example[0]),
                 _ => wanted.give(row, row.parse(row.example, FRONT).unwrap(), FRONT).unwrap(),
             }
             assert_eq!(read.settings, wanted, "{written}");

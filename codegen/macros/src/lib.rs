@@ -5,7 +5,7 @@
 mod arguments;
 mod scene;
 
-use arguments::{Arguments, Module, SceneArgument};
+use arguments::{Arguments, ModuleList, SceneArgument};
 use proc_macro::TokenStream;
 use proc_macro2::TokenStream as Tokens;
 use quote::{quote, quote_spanned};
@@ -72,7 +72,7 @@ const NEEDS_A_MODULE: &str = "the scene has types or scalars of its own, which n
 /// Makes a module of the dynamics of a robot; see the package `straightline`.
 #[proc_macro]
 pub fn dynamics(input: TokenStream) -> TokenStream {
-    let Module { attributes, visibility, name, mut arguments } = parse_macro_input!(input as Module);
+    let ModuleList { attributes, visibility, name, mut arguments } = parse_macro_input!(input as ModuleList);
     if let Some(module) = &arguments.module {
         arguments.errors.push(Error::new(module.span(), "`module` is for the derive: this is a module"));
     }

@@ -179,21 +179,21 @@ mod tests {
     use super::*;
     use straightline_codegen::diagnostic::Diagnostics;
     use straightline_codegen::options::scene_file::{read, SceneFile};
-    use straightline_codegen::scene::{Budget, Gravity, Part, Zero};
+    use straightline_codegen::scene::{Budget, Gravity, ResultPart, Zero};
     use straightline_codegen::Function;
     use syn::parse::Parse;
 
-    struct Parsed(InlineScene);
+    struct ParsedScene(InlineScene);
 
-    impl Parse for Parsed {
+    impl Parse for ParsedScene {
         fn parse(input: ParseStream) -> Result<Self> {
             let keyword = input.parse()?;
-            InlineScene::parse(&keyword, input).map(Parsed)
+            InlineScene::parse(&keyword, input).map(ParsedScene)
         }
     }
 
     fn scene(text: &str) -> InlineScene {
-        syn::parse_str::<Parsed>(text).unwrap_or_else(|error| panic!("{text}: {error}")).0
+        syn::parse_str::<ParsedScene>(text).unwrap_or_else(|error| panic!("{text}: {error}")).0
     }
 
     fn understood(text: &str) -> SceneFile {
@@ -219,7 +219,7 @@ mod tests {
         let payloads: Vec<(&str, f64)> = scene.payloads.iter().map(|p| (p.name.as_str(), p.mass)).collect();
         assert_eq!(payloads, [("tool", 2.0), ("cam\"era", 0.1)]);
         assert_eq!(scene.zero, Zero { qd: true, ..Zero::default() });
-        assert_eq!(scene.outputs[&Function::MassMatrix].part, Part::Diagonal);
+        assert_eq!(scene.outputs[&Function::MassMatrix].part, ResultPart::Diagonal);
         assert_eq!(scene.outputs[&Function::MassMatrix].joints, ["a b"]);
         assert!(scene.staged);
         assert_eq!(scene.budgets[&Function::GravityForce], Budget { max_flops: Some(400), ..Budget::default() });
@@ -247,7 +247,7 @@ mod tests {
             (r#"scene(payload(name = "tool", frame = "hand", mass = -"1"))"#, ""),
         ] {
             if piece.is_empty() {
-                assert!(syn::parse_str::<Parsed>(text).is_err(), "{text}");
+                assert!(syn::parse_str::<ParsedScene>(text).is_err(), "{text}");
                 continue;
             }
             let scene = scene(text);

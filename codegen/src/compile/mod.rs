@@ -15,8 +15,8 @@ use crate::options::Options;
 use crate::program::equivalence::Disagreement;
 use crate::program::mixed::mix_precisions;
 use crate::program::staged::figures;
-use crate::program::written::Written;
-use crate::program::{checked, range, Program};
+use crate::program::written::WrittenFunction;
+use crate::program::{checked, range, TracedProgram};
 use crate::report::budget::{self, Measures};
 use crate::report::certificates::certificates;
 use crate::report::waterfall;
@@ -67,7 +67,7 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let robot = Robot::new(model);
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
     let programs = resolved.functions.iter().filter(|f| !is_empty(f));
-    let programs: Result<Vec<Program>, _> = programs.map(|f| checked(&robot, &frames, *f, &resolved)).collect();
+    let programs: Result<Vec<TracedProgram>, _> = programs.map(|f| checked(&robot, &frames, *f, &resolved)).collect();
     let mut programs = programs.map_err(|wrong| only(no_form(&wrong, &robot.model, options.scalar, &description)))?;
     let beyond = |program: &str, why: &str, diagnostics: &mut Diagnostics| {
         let complaint = scene::messages::program_beyond_scalar(program, options.scalar.name(), why);
@@ -96,7 +96,7 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let waterfalls = match explained {
         true => {
             let stops = waterfall::stops(&whole, &options.scene);
-            let of = |p: &Program| waterfall::waterfall(&stops, &frames, p.function, &resolved, p.graph.counts());
+            let of = |p: &TracedProgram| waterfall::waterfall(&stops, &frames, p.function, &resolved, p.graph.counts());
             programs.iter().map(|p| Some(of(p))).collect()
         }
         false => vec![None; programs.len()],
@@ -106,7 +106,7 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let generated = generate(robot, frames, programs, diagnostics, &resolved, source.path(), hash);
     let generated = generated.map_err(|wrong| only(wrong.error(&model)))?;
     // what has a program of its own is asked above, all else here
-    let why = |p: &Written| Some((p.name.clone(), range::of_constants(&p.graph, p.scalar)?));
+    let why = |p: &WrittenFunction| Some((p.name.clone(), range::of_constants(&p.graph, p.scalar)?));
     let first = generated.programs.all().find_map(why);
     match first {
         None => Ok(generated),

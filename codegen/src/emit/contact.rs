@@ -10,7 +10,7 @@ use crate::options::Options;
 use crate::program::companion::{bound, wants_companions};
 use crate::program::contact::{programs, Mode, ModeProgram};
 use crate::program::equivalence::{Disagreement, Plainer};
-use crate::program::written::{Written, WrittenMode};
+use crate::program::written::{WrittenFunction, WrittenMode};
 use crate::report::ContactReport;
 use straightline_graph::schedule::schedule;
 
@@ -58,7 +58,7 @@ pub(super) fn contact(robot: &Robot, options: &Options, lowering: Lowering<'_>) 
             }
             out.reports.push(ContactReport::new(&mode.identifier, name, counts));
             items.push(Item::new((function, name, &doc), (&graph, &schedule), of_state, (options, lowering)));
-            functions.push(Written::asked_for(name, graph, options));
+            functions.push(WrittenFunction::asked_for(name, graph, options));
         }
         let (constrained, free) = (mode.constrained_names(), mode.free_names());
         out.programs.push(WrittenMode {

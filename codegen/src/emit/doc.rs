@@ -3,7 +3,7 @@
 use crate::function::{ContactFunction, Function, Output, Quantity};
 use crate::identifier;
 use crate::program::contact::Mode;
-use crate::scene::{Parameter, Part, Scene};
+use crate::scene::{Parameter, ResultPart, Scene};
 use std::fmt::Write;
 use straightline_graph::expr::{Graph, Port};
 
@@ -31,10 +31,10 @@ impl Function {
                 }
             }
             match selection.part {
-                Part::Whole => {}
-                Part::Linear => doc.push_str("\nOnly the linear part: positions, linear rows, forces.\n"),
-                Part::Angular => doc.push_str("\nOnly the angular part: orientations, angular rows, moments.\n"),
-                Part::Diagonal => doc.push_str("\nOnly the diagonal.\n"),
+                ResultPart::Whole => {}
+                ResultPart::Linear => doc.push_str("\nOnly the linear part: positions, linear rows, forces.\n"),
+                ResultPart::Angular => doc.push_str("\nOnly the angular part: orientations, angular rows, moments.\n"),
+                ResultPart::Diagonal => doc.push_str("\nOnly the diagonal.\n"),
             }
         }
         doc

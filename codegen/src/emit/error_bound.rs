@@ -1,11 +1,11 @@
 //! The functions that bound rounding errors at a state.
 
-use crate::emit::module::Bound;
+use crate::emit::module::StateCertificate;
 use crate::emit::target::Target;
 use crate::emit::{Lowering, Style};
 use crate::options::Options;
 use crate::program::companion::StateBound;
-use crate::program::written::Written;
+use crate::program::written::WrittenFunction;
 use crate::report::errors::{ErrorReport, OutputErrors};
 use std::fmt::Write;
 use straightline_graph::expr::Graph;
@@ -20,8 +20,8 @@ pub(super) fn error_bound(
     (name, by_residual): (&str, bool),
     graph: &Graph,
     (options, target): (&Options, &dyn Target),
-    written: &mut Vec<Written>,
-) -> Bound {
+    written: &mut Vec<WrittenFunction>,
+) -> StateCertificate {
     let scalar = graph.widest(options.scalar);
     let bound = bound.map_err(|why| format!("No `{name}_error_bound`: {why}."))?;
     let mut doc = match by_residual {
@@ -52,7 +52,7 @@ pub(super) fn error_bound(
     let lowering = Lowering { style: Style::plain(scalar), target, title: &|_| String::new() };
     let name = format!("{name}_error_bound");
     let routine = lowering.routine(&bound, &schedule(&bound, options.limits), &name, &doc);
-    written.push(Written::plain(&name, bound, scalar));
+    written.push(WrittenFunction::plain(&name, bound, scalar));
     Ok(routine)
 }
 

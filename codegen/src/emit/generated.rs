@@ -3,7 +3,7 @@
 use super::contact::{contact, ContactModule};
 use super::doc::{lanes_doc, lanes_name};
 use super::error_bound::error_bound;
-use super::module::{Bound, Item, ModeModule, ParameterType, StagedModule};
+use super::module::{Item, ModeModule, ParameterType, StagedModule, StateCertificate};
 use super::parameter::parameter_types;
 use super::staged::staged;
 use super::{rust, Lowering, Routine, Style};
@@ -15,8 +15,8 @@ use crate::identifier::file_name;
 use crate::options::Options;
 use crate::program::companion::{checked_companion, wants_companions, ROUNDED};
 use crate::program::equivalence::Disagreement;
-use crate::program::written::{AllWritten, Written};
-use crate::program::Program;
+use crate::program::written::{AllWritten, WrittenFunction};
+use crate::program::TracedProgram;
 use crate::report::errors::ErrorReport;
 use crate::report::waterfall::Waterfall;
 use crate::report::{FunctionReport, Report};
@@ -105,12 +105,12 @@ impl Generated {
 /// A function of the robot, in all its forms; what is plainer than it was to be is among the warnings.
 fn item(
     robot: &Robot,
-    program: &Program,
+    program: &TracedProgram,
     (options, lowering): (&Options, Lowering<'_>),
     warnings: &mut Diagnostics,
-    written: &mut Vec<Written>,
+    written: &mut Vec<WrittenFunction>,
 ) -> Result<Item, Disagreement> {
-    let Program { function, graph, schedule, method, .. } = program;
+    let TracedProgram { function, graph, schedule, method, .. } = program;
     let mut doc = function.doc(&graph.inputs, &options.scene);
     if let Some(method) = method {
         doc.push_str(&format!("\n{method}\n"));
@@ -139,7 +139,7 @@ impl<F> Item<F> {
     pub(super) fn new(
         (function, name, doc): (F, &str, &str),
         (graph, schedule): (&Graph, &Schedule),
-        bound: Option<Bound>,
+        bound: Option<StateCertificate>,
         (options, lowering): (&Options, Lowering<'_>),
     ) -> Item<F> {
         let plain = Lowering { style: options.plain_style(), ..lowering };
@@ -168,7 +168,7 @@ fn in_lanes(name: &str, (graph, schedule): (&Graph, &Schedule), lowering: Loweri
 pub(crate) fn generate(
     robot: Robot,
     frames: Vec<String>,
-    programs: Vec<(Program, Option<Waterfall>, Option<ErrorReport>)>,
+    programs: Vec<(TracedProgram, Option<Waterfall>, Option<ErrorReport>)>,
     mut warnings: Diagnostics,
     options: &Options,
     path: &str,
@@ -188,7 +188,7 @@ pub(crate) fn generate(
         let figures = FunctionReport::new(&program, options.scalar, item.text.lines().count());
         functions.insert(program.function.name(), FunctionReport { waterfall, errors, ..figures });
         items.push(item);
-        written.functions.push(Written::asked_for(program.function.name(), program.graph, options));
+        written.functions.push(WrittenFunction::asked_for(program.function.name(), program.graph, options));
     }
     let ContactModule { modes, reports, plainer, programs } = contact(&robot, options, lowering)?;
     written.modes = programs;

@@ -2,7 +2,7 @@
 
 use super::Style;
 use crate::function::{ContactFunction, Function};
-use crate::program::staged::Stage;
+use crate::program::staged::StageType;
 use crate::program::written::DriveNumbers;
 use straightline_graph::expr::{Binary, Constant, Port, Unary};
 use straightline_graph::Scalar;
@@ -21,7 +21,7 @@ pub struct Routine {
     /// The inputs and outputs of its program, of which it may have some only.
     pub ports: Ports,
     /// What it takes, in order.
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<RoutineParameter>,
     /// What it does.
     pub body: Vec<Statement>,
     /// What it calls ([`Statement::Part`]).
@@ -50,7 +50,7 @@ pub struct Ports {
 
 /// A parameter of a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Parameter {
+pub enum RoutineParameter {
     /// An input of the program, by its place among them.
     Input {
         /// The place.
@@ -267,13 +267,13 @@ pub struct Item<F = Function> {
     /// It, as it is written.
     pub text: String,
     /// What bounds its errors at a state, where that is asked for.
-    pub bound: Option<Bound>,
+    pub bound: Option<StateCertificate>,
     /// Its body over lanes, where that is asked for.
     pub lanes: Option<Routine>,
 }
 
 /// What bounds errors at a state, or why there is none.
-pub type Bound = Result<Routine, String>;
+pub type StateCertificate = Result<Routine, String>;
 
 impl<F> Item<F> {
     /// The identifier of the function of one state; its other forms begin with it.
@@ -326,7 +326,7 @@ pub enum ParameterOf {
 #[derive(Clone, Debug)]
 pub struct StagedModule {
     /// The stages, the last of which stores nothing.
-    pub stages: Vec<Stage>,
+    pub stages: Vec<StageType>,
     /// What computes the values of the others.
     pub values: Vec<Routine>,
     /// The functions, each with the stage whose method it is.

@@ -6,7 +6,7 @@ use crate::equations::Robot;
 use crate::options::Options;
 use crate::program::equivalence::Disagreement;
 use crate::program::parameter::checked_parameter;
-use crate::program::written::{DriveNumbers, Written, WrittenParameter};
+use crate::program::written::{DriveNumbers, WrittenFunction, WrittenParameter};
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::Parameter;
 use straightline_graph::schedule::schedule;
@@ -34,7 +34,7 @@ pub(super) fn parameter_types(
         };
         let private = format!("{input}_parameters");
         let constructor = lowering.routine(&graph, &schedule(&graph, options.limits), &private, doc).private();
-        let program = Written::plain(&private, graph, options.scalar);
+        let program = WrittenFunction::plain(&private, graph, options.scalar);
         let of = match drive {
             None => ParameterOf::Body(p.frame().unwrap_or_default().to_string()),
             Some(drive) => {

@@ -3,7 +3,7 @@
 use crate::equations::Robot;
 use crate::function::{Extent, Family, Forms, ForwardDynamicsMethod, Function, Output, Parts, Quantity};
 use crate::scene::free_drive::FreeDrive;
-use crate::scene::{Gravity, Parameter, Part, Scene, Selection};
+use crate::scene::{Gravity, Parameter, ResultPart, Scene, Selection};
 use straightline_core::model::{Frame, Load, Model};
 use straightline_core::reduced::ReducedModel;
 use straightline_core::spatial::{SpatialInertia, Sym3, Vec3};
@@ -11,7 +11,7 @@ use straightline_core::{Dd, Real};
 use straightline_graph::expr::Port;
 
 /// The bodies, as a function of them sees them.
-pub struct Bound<T> {
+pub struct BoundRobot<T> {
     /// The robot.
     pub model: Model<T>,
     /// Its reduced form.
@@ -22,7 +22,7 @@ pub struct Bound<T> {
     pub arguments: Vec<Vec<T>>,
 }
 
-impl<T: Real> Bound<T> {
+impl<T: Real> BoundRobot<T> {
     /// The forms that functions are evaluated on; by the reduced robots, if it is to be and they serve this one.
     pub(crate) fn forms<'a>(
         &'a self,
@@ -54,7 +54,7 @@ impl Scene {
     }
 
     /// What a trace or an evaluation starts from, given what stands for [`Scene::ports`].
-    pub fn bind<T: Real>(&self, function: Function, robot: &Robot, inputs: &[Vec<T>]) -> Bound<T> {
+    pub fn bind<T: Real>(&self, function: Function, robot: &Robot, inputs: &[Vec<T>]) -> BoundRobot<T> {
         let mut model: Model<T> = robot.model.cast();
         let mut reduced = robot.reduced.map(T::constant);
         let mut composite = robot.composite.map(T::constant);
@@ -94,7 +94,7 @@ impl Scene {
                 r.second_moment = r.second_moment + in_reduced.second_moment;
             }
         }
-        Bound { model, reduced, composite, arguments }
+        BoundRobot { model, reduced, composite, arguments }
     }
 
     /// The wanted results of a function, as indices into the whole of its outputs, and the blocks that they form.
@@ -123,7 +123,7 @@ impl Scene {
         shape: &[usize],
     ) -> (Vec<usize>, Vec<usize>) {
         let last = shape.len() - 1;
-        if selection.part == Part::Diagonal && output.parts == Parts::Diagonal {
+        if selection.part == ResultPart::Diagonal && output.parts == Parts::Diagonal {
             let coordinates = selection.coordinates(model);
             return (coordinates.iter().map(|i| i * shape[last] + i).collect(), vec![coordinates.len()]);
         }
@@ -176,13 +176,13 @@ impl Selection {
     }
 }
 
-impl Part {
+impl ResultPart {
     /// The wanted indices of a quantity whose first `linear` entries are linear.
     fn of(self, all: std::ops::Range<usize>, linear: usize) -> std::ops::Range<usize> {
         match self {
-            Part::Whole | Part::Diagonal => all,
-            Part::Linear => all.start..linear,
-            Part::Angular => linear..all.end,
+            ResultPart::Whole | ResultPart::Diagonal => all,
+            ResultPart::Linear => all.start..linear,
+            ResultPart::Angular => linear..all.end,
         }
     }
 }

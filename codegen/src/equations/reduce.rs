@@ -29,7 +29,7 @@ const NO_DUST: f64 = 1e-6;
 
 /// What is free in a reduced form; torques depend on none of it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
+pub struct FreeTerms {
     /// Bodies that are described in the axes before their joint's turn: [`ReducedBody::stays`].
     pub stays: Vec<bool>,
     /// Bodies whose moment is formed by ε_z: [`ReducedBody::by_axis_acceleration`].
@@ -66,12 +66,12 @@ pub struct Choice {
     pub unit: Dd,
 }
 
-impl Choice {
+impl FreeTerms {
     /// Khalil and Dombre's parameters, metres, no frame before its turn.
     pub fn plain(model: &Model<Dd>) -> Self {
         let n = model.bodies.len();
         let none = vec![false; n];
-        Choice {
+        FreeTerms {
             stays: none.clone(),
             by_axis_acceleration: none.clone(),
             by_accelerations: [0; 2].map(|_| none.clone()),
@@ -92,7 +92,7 @@ impl Choice {
 
     /// A hash of all that is chosen.
     pub(crate) fn fingerprint(&self) -> u64 {
-        let Choice {
+        let FreeTerms {
             stays,
             by_axis_acceleration,
             by_accelerations,
@@ -137,7 +137,7 @@ fn norm(v: Vec3<Dd>) -> f64 {
 }
 
 /// The reduced robot, and the pose of each of its frames in the body's canonical frame.
-pub fn reduce(model: &Model<Dd>, choice: &Choice) -> (ReducedModel<Dd>, Vec<Transform<Dd>>) {
+pub fn reduce(model: &Model<Dd>, choice: &FreeTerms) -> (ReducedModel<Dd>, Vec<Transform<Dd>>) {
     let identity = || vec![Transform::identity(); model.bodies.len()];
     if model.bodies.iter().any(|body| ReducedJoint::of(body.joint.kind).is_none()) {
         let none = ReducedModel { bodies: Vec::new(), gravity: model.gravity, per_unit: Dd::ONE, adds_angles: false };

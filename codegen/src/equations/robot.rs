@@ -1,6 +1,6 @@
 //! A robot in the forms that are traced.
 
-use crate::equations::reduce::{reduce, Choice};
+use crate::equations::reduce::{reduce, FreeTerms};
 use std::sync::{Arc, Mutex, PoisonError};
 use straightline_core::model::Model;
 use straightline_core::reduced::ReducedModel;
@@ -25,13 +25,13 @@ pub struct Robot {
 impl Robot {
     /// All forms of a robot, the reduced ones as any robot takes them.
     pub fn new(model: Model<Dd>) -> Self {
-        let (reduced, reduced_frames) = reduce(&model, &Choice::plain(&model));
+        let (reduced, reduced_frames) = reduce(&model, &FreeTerms::plain(&model));
         Robot { model, composite: reduced.clone(), reduced, reduced_frames, found: Found::default() }
     }
 
     /// The same robot in other reduced forms, for torques and for the mass matrix.
     #[must_use]
-    pub fn reduced_by(&self, torques: &Choice, mass_matrix: &Choice) -> Self {
+    pub fn reduced_by(&self, torques: &FreeTerms, mass_matrix: &FreeTerms) -> Self {
         let (reduced, composite) = (reduce(&self.model, torques).0, reduce(&self.model, mass_matrix).0);
         Robot { reduced, composite, ..self.clone() }
     }
@@ -39,10 +39,10 @@ impl Robot {
 
 /// What was found for a robot, by function and scene: searched once, used by every function that shares it.
 #[derive(Clone, Debug, Default)]
-pub struct Found(Arc<Mutex<Vec<(String, Choice)>>>);
+pub struct Found(Arc<Mutex<Vec<(String, FreeTerms)>>>);
 
 impl Found {
-    pub(crate) fn or_search(&self, key: String, search: impl FnOnce() -> Choice) -> Choice {
+    pub(crate) fn or_search(&self, key: String, search: impl FnOnce() -> FreeTerms) -> FreeTerms {
         let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, choice)) = known().iter().find(|(k, _)| *k == key) {
             return choice.clone();

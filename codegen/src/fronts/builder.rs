@@ -27,7 +27,7 @@ use crate::diagnostic::{Diagnostic, Diagnostics, Front, Reporting, Severity, Sou
 use crate::emit::Generated;
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::identifier::prefix;
-use crate::options::{scene_file, Options, SceneFile, Settings, Value};
+use crate::options::{scene_file, GivenOptions, OptionValue, Options, SceneFile};
 use crate::output::write_file_apart;
 use crate::scene::Scene;
 use std::fmt;
@@ -53,7 +53,7 @@ pub struct Builder {
     module: Option<String>,
     out_dir: Option<PathBuf>,
     scene: Scene,
-    settings: Settings,
+    settings: GivenOptions,
     wrong: Vec<Diagnostic>,
 }
 
@@ -66,13 +66,13 @@ impl Builder {
             module: None,
             out_dir: None,
             scene: Scene::default(),
-            settings: Settings::default(),
+            settings: GivenOptions::default(),
             wrong: Vec::new(),
         }
     }
 
     /// Any option by its name, as `guide/src/options.md` lists them. What is wrong with it is said by [`Builder::build`].
-    pub fn option(mut self, name: &str, value: impl Into<Value>) -> Self {
+    pub fn option(mut self, name: &str, value: impl Into<OptionValue>) -> Self {
         let given = self.settings.set(name, value, Front::Builder);
         self.wrong.extend(given.err().unwrap_or_default());
         self
@@ -81,7 +81,7 @@ impl Builder {
     /// Several scalar types: the first as [`Builder::scalar`], for each of the others a module `single` or `double` with the
     /// same items.
     pub fn scalars(self, scalars: impl IntoIterator<Item = Scalar>) -> Self {
-        self.option("scalar", Value::of_choices(scalars))
+        self.option("scalar", OptionValue::of_choices(scalars))
     }
 
     /// Bounds the rounding errors of every function, as constants beside the functions: see [`certify`](straightline_graph::certify).
@@ -204,9 +204,9 @@ macro_rules! options {
 
 options! {
     /// These functions only.
-    functions(functions: impl IntoIterator<Item = Function>) = Value::of_choices(functions);
+    functions(functions: impl IntoIterator<Item = Function>) = OptionValue::of_choices(functions);
     /// The frames (links) of the functions that answer per frame; otherwise the tips of the robot.
-    frames(frames: impl IntoIterator<Item = impl Into<String>>) = Value::of_words(frames);
+    frames(frames: impl IntoIterator<Item = impl Into<String>>) = OptionValue::of_words(frames);
     /// The scalar type; otherwise f64.
     scalar(scalar: Scalar) = scalar;
     /// Beside every function the same over lanes of states and over batches.
@@ -230,17 +230,17 @@ options! {
     /// Whether the root link moves freely in the world.
     floating_base(floating: bool) = floating;
     /// The joints in the order of their coordinates, all of them; otherwise depth first, as in the file.
-    joint_order(joints: impl IntoIterator<Item = impl Into<String>>) = Value::of_words(joints);
+    joint_order(joints: impl IntoIterator<Item = impl Into<String>>) = OptionValue::of_words(joints);
     /// So near to a multiple of 30 or 45 degrees \[rad\] an angle is taken as that; 0: every angle as it is written.
     angle_tolerance(tolerance: f64) = tolerance;
     /// Acceleration due to gravity in the world \[m/s²\]; otherwise the file's, or (0, 0, −9.81).
     gravity(gravity: [f64; 3]) = gravity;
     /// Warnings of this code are not said; `"warnings"`: none.
-    allow(code: impl Into<String>) = Value::of_words([code]);
+    allow(code: impl Into<String>) = OptionValue::of_words([code]);
     /// Warnings of this code are said, whatever a scene or an earlier call says.
-    warn(code: impl Into<String>) = Value::of_words([code]);
+    warn(code: impl Into<String>) = OptionValue::of_words([code]);
     /// Warnings of this code are errors; `"warnings"`: all.
-    deny(code: impl Into<String>) = Value::of_words([code]);
+    deny(code: impl Into<String>) = OptionValue::of_words([code]);
 }
 
 /// What goes where.

@@ -4,7 +4,7 @@ use crate::compile;
 use crate::diagnostic::{Diagnostic, Diagnostics, Front, Reporting, Severity, Source};
 use crate::emit::rust::associated_items;
 use crate::emit::Generated;
-use crate::options::{scene_file, Options, SceneFile, Settings};
+use crate::options::{scene_file, GivenOptions, Options, SceneFile};
 use std::path::{Path, PathBuf};
 
 /// What became of a robot file and its scene.
@@ -46,7 +46,7 @@ pub enum SceneOf {
 
 /// Compiles the robot file that a macro names, in the scene that it names or holds; files are looked for in these
 /// directories. What the macro says of options counts before what the scene says.
-pub fn expand(robot: &str, scene: Option<&SceneOf>, directories: &[&Path], own: &Settings) -> Expansion {
+pub fn expand(robot: &str, scene: Option<&SceneOf>, directories: &[&Path], own: &GivenOptions) -> Expansion {
     let mut files = Vec::new();
     let opened = open(robot, scene, directories, &mut files);
     let text = scene_text(scene, &opened);
@@ -63,7 +63,7 @@ pub fn examine(
     robot: &str,
     scene: Option<&SceneOf>,
     directories: &[&Path],
-    own: &Settings,
+    own: &GivenOptions,
 ) -> (Vec<PathBuf>, Option<Refusal>, Option<String>) {
     let mut files = Vec::new();
     let opened = open(robot, scene, directories, &mut files);
@@ -87,7 +87,7 @@ struct Opened {
 
 impl Opened {
     /// The options of the macro and of the scene.
-    fn options(&self, own: &Settings) -> Options {
+    fn options(&self, own: &GivenOptions) -> Options {
         let reporting = Reporting { front: Front::Derive, ..Reporting::default() };
         let file = self.scene.as_ref().map_or_else(SceneFile::default, scene_file::read_partly);
         file.with(own, Options { reporting, ..Options::default() })
@@ -130,7 +130,7 @@ fn scene_text(scene: Option<&SceneOf>, opened: &Result<Opened, (Refusal, Option<
 }
 
 /// Warnings, dynamics and associated items, or what is wrong.
-fn compiled(opened: &Opened, own: &Settings) -> Result<(String, Generated, String), Refusal> {
+fn compiled(opened: &Opened, own: &GivenOptions) -> Result<(String, Generated, String), Refusal> {
     let (robot, options) = (&opened.robot, opened.options(own));
     let generated = compile::compile(robot, &options)
         .map_err(|diagnostics| refusal(&diagnostics, robot.path(), opened.within()))?;

@@ -221,13 +221,13 @@ pub(crate) fn may_be_articulated<T: Real>(model: &Model<T>) -> bool {
 type Series<T> = Taylor<T, { MOST_DERIVATIVES + 1 }>;
 
 /// q, q̇, x, u.
-type At<'a, T> = (&'a [T], &'a [T], &'a [T], &'a [T]);
+type DrivenState<'a, T> = (&'a [T], &'a [T], &'a [T], &'a [T]);
 
 /// What is solved with the links' inertia by the method that serves this robot.
 fn with_links<T: Real, R>(
     forms: &Forms<'_, T>,
     inputs: &[Vec<T>],
-    solve: impl FnOnce(At<'_, T>, &[T], &Links<'_, T>) -> R,
+    solve: impl FnOnce(DrivenState<'_, T>, &[T], &Links<'_, T>) -> R,
 ) -> R {
     let [q, qd, x, u] = inputs else { panic!("functions that solve take q, qd, x, u") };
     let is_articulated = forms.method != ForwardDynamicsMethod::Factorisation && may_be_articulated(forms.model);

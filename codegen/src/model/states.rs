@@ -28,7 +28,7 @@ const RANGE: f64 = std::f64::consts::PI;
 const NO_LIMIT: f64 = 1e6;
 
 /// What stands for each input, by name.
-pub(crate) type State<T> = BTreeMap<String, Vec<T>>;
+pub(crate) type InputState<T> = BTreeMap<String, Vec<T>>;
 
 /// A limit, or what is tried without one.
 fn within(limit: f64, other: f64) -> f64 {

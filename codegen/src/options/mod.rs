@@ -8,9 +8,9 @@ pub mod table;
 pub mod value;
 
 pub use check::check_options;
-pub use optimisations::{Forms, Optimisations};
+pub use optimisations::{FormChoices, Optimisations};
 pub use scene_file::SceneFile;
-pub use value::{Settings, Value};
+pub use value::{GivenOptions, OptionValue};
 
 use crate::choices::{Lanes, LimbForm};
 use crate::description;
@@ -20,7 +20,7 @@ use crate::function::{ForwardDynamicsMethod, Function};
 use crate::scene::Scene;
 use straightline_graph::certify::Effort;
 use straightline_graph::expr::{Grade, RuleSet};
-use straightline_graph::schedule::Limits;
+use straightline_graph::schedule::ScheduleLimits;
 use straightline_graph::Scalar;
 
 /// Fields with the names that they have in the text that hashes are made of, and their defaults; behind `..` what is not of the output.
@@ -72,7 +72,7 @@ options! {
     /// How identical limbs are computed.
     limbs "limbs": LimbForm = LimbForm::default(),
     /// How long one function may be.
-    limits "limits": Limits = Limits::default(),
+    limits "limits": ScheduleLimits = ScheduleLimits::default(),
     /// How the robot file is read.
     model "model": crate::model::ModelOptions = crate::model::ModelOptions::default(),
     /// What is wanted and what is held.
@@ -116,7 +116,7 @@ impl Options {
             reduced: algebraic,
             sums: algebraic,
             chosen: algebraic,
-            forms: if algebraic { Forms::ALL } else { Forms::default() },
+            forms: if algebraic { FormChoices::ALL } else { FormChoices::default() },
             angle_sums: algebraic,
             cheaper,
             limbs: algebraic && self.limbs != LimbForm::Apart,

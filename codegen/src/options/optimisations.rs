@@ -19,7 +19,7 @@ pub struct Optimisations {
     /// Of the forms that the reduced robot has, those with the fewest operations: [`choose`](crate::program::choose::choose()).
     pub chosen: bool,
     /// What is free in those forms.
-    pub forms: Forms,
+    pub forms: FormChoices,
     /// Among those forms ones with sums of angles, whose rounding errors go into the reduction of the angle.
     pub angle_sums: bool,
     /// The cheaper of the two forms of forward dynamics.
@@ -32,7 +32,7 @@ pub struct Optimisations {
 
 /// What [`choose`](crate::program::choose::choose()) may choose, one by one, so that each can be weighed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Forms {
+pub struct FormChoices {
     /// Tips and chains of parallel joints are described in axes that do not turn.
     pub stays: bool,
     /// Origins are at either foot of the common normals.
@@ -47,10 +47,10 @@ pub struct Forms {
     pub unit: bool,
 }
 
-impl Forms {
+impl FormChoices {
     /// All of them.
-    pub const ALL: Forms =
-        Forms { stays: true, origins: true, tips: true, parameters: true, rotations: true, unit: true };
+    pub const ALL: FormChoices =
+        FormChoices { stays: true, origins: true, tips: true, parameters: true, rotations: true, unit: true };
 }
 
 impl Optimisations {
@@ -69,7 +69,7 @@ impl Optimisations {
         step("reduced robot: frames and inertial parameters", self.reduced, |o| o.reduced = true);
         step("sums with all their terms at once", self.sums, |o| o.sums = true);
         step("forms of the reduced robot chosen by counting", self.chosen, |o| {
-            (o.chosen, o.forms) = (true, Forms::ALL)
+            (o.chosen, o.forms) = (true, FormChoices::ALL)
         });
         step("angles of parallel joints added", self.chosen && self.angle_sums, |o| o.angle_sums = true);
         step("the cheaper form of forward dynamics", self.cheaper, |o| o.cheaper = true);

@@ -6,24 +6,25 @@
 
 use crate::choices::Choice;
 use crate::description::drives::{TransmissionStage, WrittenActuator, WrittenDrive, WrittenRating, WrittenThermal};
-use crate::description::flexible::{BaseSupport, Bending, Elastic, Flexible};
+use crate::description::flexible::{BaseSupport, Bending, Flexible, SpringDamper};
 use crate::description::Noted;
 use crate::function::ContactFunction;
 use crate::model::{FrameOption, ModelOptions};
-use crate::options::{Forms, Optimisations};
+use crate::options::{FormChoices, Optimisations};
 use crate::scene::contact::{
-    ContactItem, Contacts, EnvironmentItem, EnvironmentKind, LoopItem, ModeItem, ObjectPose, SurfaceItem, UserSurface,
+    ContactItem, EnvironmentItem, EnvironmentKind, LoopItem, ModeItem, ObjectPose, SceneContacts, SurfaceItem,
+    UserSurface,
 };
 use crate::scene::{
-    Base, Budget, Coulomb, Effects, Gravity, Interval, JointRanges, MaxError, Parameter, Part, Payload, Ranges, Scene,
-    Selection, Zero,
+    Base, Budget, CoulombForm, Effects, Gravity, InputRange, JointRanges, MaxError, Parameter, Payload, Ranges,
+    ResultPart, Scene, Selection, Zero,
 };
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::time::Duration;
 use straightline_core::contact::Coordinate;
 use straightline_graph::certify::Effort;
-use straightline_graph::schedule::Limits;
+use straightline_graph::schedule::ScheduleLimits;
 
 /// A hash of bytes that is the same in every version and on every machine: FNV-1a.
 pub fn fnv_1a(bytes: impl IntoIterator<Item = u8>) -> u64 {
@@ -118,7 +119,7 @@ macro_rules! worded {
 }
 
 fields! {
-    Limits = { "operations": operations, }
+    ScheduleLimits = { "operations": operations, }
     ModelOptions = {
         "floating_base": floating_base, "joint_order": joint_order, "angle_tolerance": angle_tolerance,
         "gravity": gravity, "frames": frames, "flexible": flexible, "support": support, "rigid_links": rigid_links,
@@ -129,7 +130,7 @@ fields! {
         "folding": folding, "algebraic": algebraic, "reduced": reduced, "sums": sums, "chosen": chosen, "forms": forms,
         "angle_sums": angle_sums, "cheaper": cheaper, "limbs": limbs, "substitutes": substitutes,
     }
-    Forms : {
+    FormChoices : {
         "stays": stays, "origins": origins, "tips": tips, "parameters": parameters, "rotations": rotations,
         "unit": unit,
     }
@@ -152,8 +153,8 @@ fields! {
         "max_code_bytes": max_code_bytes, "max_error": max_error, "mixed_precision": mixed_precision,
     }
     Ranges = { "q": q, "qd": qd, "qdd": qdd, "tau": tau, "gravity": gravity, }
-    Interval : { "lower": lower, "upper": upper, }
-    Contacts = {
+    InputRange : { "lower": lower, "upper": upper, }
+    SceneContacts = {
         "contact": contacts, "loop": loops, "mode": modes, "stabilisation": stabilisation, "functions": functions,
     }
     ContactItem : {
@@ -182,13 +183,13 @@ fields! {
         "damping": damping,
     }
     BaseSupport : { "at": at, "directions": directions, .. place }
-    Elastic : { "stiffness": stiffness, "damping": damping, "rest": rest, }
+    SpringDamper : { "stiffness": stiffness, "damping": damping, "rest": rest, }
 }
 
 variants! {
     Gravity { "of_robot": OfRobot, "constant": Constant(vector), "input": Input, }
     Base { "of_robot": OfRobot, "fixed": Fixed, "floating": Floating, "moving": Moving, }
-    Coulomb { "off": Off, "sign": Sign, "smooth": Smooth(speed), }
+    CoulombForm { "off": Off, "sign": Sign, "smooth": Smooth(speed), }
     JointRanges { "limits": Limits, "all": All(range), "joints": Joints(ranges), }
     MaxError { "all": All(most), "each": Each(most), "outputs": Outputs(most), }
     SurfaceItem {
@@ -244,7 +245,7 @@ printed! { bool usize f64 Duration }
 
 worded! {
     String: text => &format!("{text:?}");
-    Part: part => part.word();
+    ResultPart: part => part.word();
     ContactFunction: function => function.name();
     Coordinate: coordinate => coordinate.name();
     EnvironmentKind: kind => EnvironmentKind::WORDS.iter().find(|w| w.1 == *kind).expect("every kind has a word").0;

@@ -1,6 +1,6 @@
 //! What is given for options, and in which words: the same in every front.
 
-use super::table::{Call, Group, Kind, Row, TABLE};
+use super::table::{Call, OptionGroup, OptionKind, OptionRow, TABLE};
 use super::Options;
 use crate::choices::{Choice, UnknownWord};
 use crate::diagnostic::wording::did_you_mean;
@@ -9,7 +9,7 @@ use crate::scene::messages::not_in_range;
 
 /// The value of an option, as it is given.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Value {
+pub enum OptionValue {
     /// Yes or no.
     Flag(bool),
     /// Words or names.
@@ -18,24 +18,24 @@ pub enum Value {
     Numbers(Vec<f64>),
 }
 
-impl Value {
+impl OptionValue {
     /// Several words or names.
-    pub fn of_words(words: impl IntoIterator<Item = impl Into<String>>) -> Value {
-        Value::Words(words.into_iter().map(Into::into).collect())
+    pub fn of_words(words: impl IntoIterator<Item = impl Into<String>>) -> OptionValue {
+        OptionValue::Words(words.into_iter().map(Into::into).collect())
     }
 
     /// Several choices.
-    pub fn of_choices<C: Choice>(choices: impl IntoIterator<Item = C>) -> Value {
-        Value::of_words(choices.into_iter().map(C::word))
+    pub fn of_choices<C: Choice>(choices: impl IntoIterator<Item = C>) -> OptionValue {
+        OptionValue::of_words(choices.into_iter().map(C::word))
     }
 
     pub(super) fn flag(&self) -> bool {
-        *self == Value::Flag(true)
+        *self == OptionValue::Flag(true)
     }
 
     pub(super) fn names(&self) -> &[String] {
         match self {
-            Value::Words(words) => words,
+            OptionValue::Words(words) => words,
             _ => &[],
         }
     }
@@ -50,7 +50,7 @@ impl Value {
 
     fn numbers(&self) -> &[f64] {
         match self {
-            Value::Numbers(numbers) => numbers,
+            OptionValue::Numbers(numbers) => numbers,
             _ => &[],
         }
     }
@@ -71,8 +71,8 @@ impl Value {
 
 macro_rules! from {
     ($($type:ty: $x:ident => $value:expr;)*) => {$(
-        impl From<$type> for Value {
-            fn from($x: $type) -> Value {
+        impl From<$type> for OptionValue {
+            fn from($x: $type) -> OptionValue {
                 $value
             }
         }
@@ -80,18 +80,18 @@ macro_rules! from {
 }
 
 from! {
-    bool: x => Value::Flag(x);
-    f64: x => Value::Numbers(vec![x]);
-    usize: x => Value::Numbers(vec![x as f64]);
-    i32: x => Value::Numbers(vec![x.into()]);
-    [f64; 3]: x => Value::Numbers(x.to_vec());
-    &str: x => Value::of_words([x]);
-    Vec<String>: x => Value::Words(x);
+    bool: x => OptionValue::Flag(x);
+    f64: x => OptionValue::Numbers(vec![x]);
+    usize: x => OptionValue::Numbers(vec![x as f64]);
+    i32: x => OptionValue::Numbers(vec![x.into()]);
+    [f64; 3]: x => OptionValue::Numbers(x.to_vec());
+    &str: x => OptionValue::of_words([x]);
+    Vec<String>: x => OptionValue::Words(x);
 }
 
-impl<C: Choice> From<C> for Value {
-    fn from(choice: C) -> Value {
-        Value::of_choices([choice])
+impl<C: Choice> From<C> for OptionValue {
+    fn from(choice: C) -> OptionValue {
+        OptionValue::of_choices([choice])
     }
 }
 
@@ -115,12 +115,12 @@ impl Vocabulary {
     }
 }
 
-impl Row {
+impl OptionRow {
     /// The option of that name that every front can be given.
     ///
     /// # Errors
     /// There is none; the names that `is_known` lets through are suggested.
-    pub fn find(name: &str, is_known: impl Fn(&Row) -> bool) -> Result<&'static Row, String> {
+    pub fn find(name: &str, is_known: impl Fn(&OptionRow) -> bool) -> Result<&'static OptionRow, String> {
         let known = || TABLE.iter().filter(|row| is_known(row));
         known().find(|row| row.name == name).ok_or_else(|| {
             let names: Vec<&str> = known().map(|row| row.name).collect();
@@ -146,7 +146,7 @@ impl Row {
 
     /// Whether it has a value that is given through the table in that front.
     pub fn is_value(&self, front: Front) -> bool {
-        self.group != Group::Front && self.called(front).is_some()
+        self.group != OptionGroup::Front && self.called(front).is_some()
     }
 
     /// Whether it is a key of that table of a scene file.
@@ -157,34 +157,37 @@ impl Row {
     /// What is wrong with one word or name of its value.
     pub fn wrong_word(&self, word: &str) -> Option<Diagnostic> {
         match &self.kind {
-            Kind::Word(of, _) | Kind::Words(of) => {
+            OptionKind::Word(of, _) | OptionKind::Words(of) => {
                 (of.unknown)(word).map(|unknown| Diagnostic::error("unknown-word", unknown.to_string()))
             }
-            Kind::Codes(level) => Levels::complaint(word, *level),
+            OptionKind::Codes(level) => Levels::complaint(word, *level),
             _ => None,
         }
     }
 
     /// What is wrong with a number that is its value.
     pub fn wrong_number(&self, number: f64) -> Option<Diagnostic> {
-        let (Kind::Real(range, holds) | Kind::Whole(range, holds)) = &self.kind else { return None };
-        let is_whole = matches!(self.kind, Kind::Real(..)) || number.fract() == 0.0;
+        let (OptionKind::Real(range, holds) | OptionKind::Whole(range, holds)) = &self.kind else { return None };
+        let is_whole = matches!(self.kind, OptionKind::Real(..)) || number.fract() == 0.0;
         let is_right = holds(number) && number.is_finite() && is_whole;
         (!is_right).then(|| not_in_range(self.name, number, range))
     }
 
     /// What is wrong with its value.
-    pub fn wrong(&self, value: &Value, front: Front) -> Vec<Diagnostic> {
+    pub fn wrong(&self, value: &OptionValue, front: Front) -> Vec<Diagnostic> {
         match (&self.kind, value) {
-            (Kind::Flag, Value::Flag(_)) => Vec::new(),
-            (Kind::Word(..), Value::Words(words)) if words.len() != 1 => vec![self.wrong_form(front)],
-            (Kind::Word(..) | Kind::Words(_) | Kind::Names { .. } | Kind::Codes(_), Value::Words(words)) => {
-                words.iter().filter_map(|word| self.wrong_word(word)).collect()
-            }
-            (Kind::Real(..) | Kind::Whole(..), Value::Numbers(x)) if x.len() == 1 => {
+            (OptionKind::Flag, OptionValue::Flag(_)) => Vec::new(),
+            (OptionKind::Word(..), OptionValue::Words(words)) if words.len() != 1 => vec![self.wrong_form(front)],
+            (
+                OptionKind::Word(..) | OptionKind::Words(_) | OptionKind::Names { .. } | OptionKind::Codes(_),
+                OptionValue::Words(words),
+            ) => words.iter().filter_map(|word| self.wrong_word(word)).collect(),
+            (OptionKind::Real(..) | OptionKind::Whole(..), OptionValue::Numbers(x)) if x.len() == 1 => {
                 self.wrong_number(x[0]).into_iter().collect()
             }
-            (Kind::Vector, Value::Numbers(xyz)) if xyz.len() == 3 && xyz.iter().all(|x| x.is_finite()) => Vec::new(),
+            (OptionKind::Vector, OptionValue::Numbers(xyz)) if xyz.len() == 3 && xyz.iter().all(|x| x.is_finite()) => {
+                Vec::new()
+            }
             _ => vec![self.wrong_form(front)],
         }
     }
@@ -192,17 +195,17 @@ impl Row {
     /// What the option takes, where it is given something else.
     pub fn wrong_form(&self, front: Front) -> Diagnostic {
         let takes = match &self.kind {
-            Kind::Flag => "`true` or `false`".to_string(),
-            Kind::Word(of, _) | Kind::Words(of) => {
-                let one = if matches!(self.kind, Kind::Word(..)) { "one of" } else { "some of" };
+            OptionKind::Flag => "`true` or `false`".to_string(),
+            OptionKind::Word(of, _) | OptionKind::Words(of) => {
+                let one = if matches!(self.kind, OptionKind::Word(..)) { "one of" } else { "some of" };
                 let words: Vec<&str> = (of.words)().iter().map(|(word, _)| *word).collect();
                 format!("{one} {}", words.join(", "))
             }
-            Kind::Names { .. } => "names".to_string(),
-            Kind::Codes(_) => "codes of warnings".to_string(),
-            Kind::Real(range, _) | Kind::Whole(range, _) => format!("a number: {range}"),
-            Kind::Vector => "three numbers".to_string(),
-            Kind::OfFront => "a text".to_string(),
+            OptionKind::Names { .. } => "names".to_string(),
+            OptionKind::Codes(_) => "codes of warnings".to_string(),
+            OptionKind::Real(range, _) | OptionKind::Whole(range, _) => format!("a number: {range}"),
+            OptionKind::Vector => "three numbers".to_string(),
+            OptionKind::OfFront => "a text".to_string(),
         };
         let title = format!("`{}` takes {takes}", self.name);
         Diagnostic::error("wrong-type", title).help(format!("write `{}`", self.written(front)))
@@ -212,12 +215,12 @@ impl Row {
     ///
     /// # Errors
     /// What is wrong with them.
-    pub fn parse(&self, words: &[&str], front: Front) -> Result<Value, Vec<Diagnostic>> {
+    pub fn parse(&self, words: &[&str], front: Front) -> Result<OptionValue, Vec<Diagnostic>> {
         let numbers = || words.iter().map(|word| word.trim().parse().ok()).collect::<Option<Vec<f64>>>();
         let value = match &self.kind {
-            Kind::Flag => words.first().map_or(Some(true), |word| word.parse().ok()).map(Value::Flag),
-            _ if self.is_number() => numbers().map(Value::Numbers),
-            _ => Some(Value::of_words(words.iter().copied())),
+            OptionKind::Flag => words.first().map_or(Some(true), |word| word.parse().ok()).map(OptionValue::Flag),
+            _ if self.is_number() => numbers().map(OptionValue::Numbers),
+            _ => Some(OptionValue::of_words(words.iter().copied())),
         };
         let value = value.ok_or_else(|| vec![self.wrong_form(front)])?;
         let wrong = self.wrong(&value, front);
@@ -230,12 +233,13 @@ impl Row {
 
     /// Whether its value is numbers.
     pub fn is_number(&self) -> bool {
-        matches!(self.kind, Kind::Vector | Kind::Real(..) | Kind::Whole(..))
+        matches!(self.kind, OptionKind::Vector | OptionKind::Real(..) | OptionKind::Whole(..))
     }
 
     /// Whether its example is a list: in brackets.
     fn is_list(&self) -> bool {
-        matches!(self.kind, Kind::Vector | Kind::Names { .. } | Kind::Codes(_)) || self.example.len() > 1
+        matches!(self.kind, OptionKind::Vector | OptionKind::Names { .. } | OptionKind::Codes(_))
+            || self.example.len() > 1
     }
 
     /// Its example: words in quotes.
@@ -247,13 +251,13 @@ impl Row {
     /// Its example as a front writes it.
     pub fn written(&self, front: Front) -> String {
         let name = self.called(front).unwrap_or(self.name);
-        let is_item = matches!(&self.kind, Kind::Words(of) if of.is_of_items);
+        let is_item = matches!(&self.kind, OptionKind::Words(of) if of.is_of_items);
         match front {
             Front::CommandLine => {
                 let flag = format!("--{}", name.replace('_', "-"));
                 let values = match &self.kind {
                     _ if self.example.is_empty() => return flag,
-                    Kind::Vector | Kind::Names { commas: true } => vec![self.example.join(",")],
+                    OptionKind::Vector | OptionKind::Names { commas: true } => vec![self.example.join(",")],
                     _ => self.example.iter().map(ToString::to_string).collect(),
                 };
                 values.iter().map(|value| format!("{flag}={value}")).collect::<Vec<_>>().join(" ")
@@ -279,39 +283,39 @@ impl Row {
     }
 }
 
-fn row_of(name: &str) -> &'static Row {
+fn row_of(name: &str) -> &'static OptionRow {
     TABLE.iter().find(|row| row.name == name).expect("what was given is in the table")
 }
 
 /// Options that were given, with their values.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Settings {
-    given: Vec<(&'static str, Value)>,
+pub struct GivenOptions {
+    given: Vec<(&'static str, OptionValue)>,
 }
 
-impl Settings {
+impl GivenOptions {
     /// Gives an option a value, in place of an earlier one; levels of warnings are added.
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn give(&mut self, row: &'static Row, value: Value, front: Front) -> Result<(), Vec<Diagnostic>> {
+    pub fn give(&mut self, row: &'static OptionRow, value: OptionValue, front: Front) -> Result<(), Vec<Diagnostic>> {
         let wrong = row.wrong(&value, front);
         if !wrong.is_empty() {
             return Err(wrong);
         }
-        if !matches!(row.kind, Kind::Codes(_)) {
+        if !matches!(row.kind, OptionKind::Codes(_)) {
             self.given.retain(|(name, _)| *name != row.name);
         }
         self.given.push((row.name, value));
         Ok(())
     }
 
-    /// Gives the option of that name a value, as [`Settings::give`] does.
+    /// Gives the option of that name a value, as [`GivenOptions::give`] does.
     ///
     /// # Errors
     /// What is wrong with it, or that there is none.
-    pub fn set(&mut self, name: &str, value: impl Into<Value>, front: Front) -> Result<(), Vec<Diagnostic>> {
-        let row = Row::find(name, |row| row.is_value(front));
+    pub fn set(&mut self, name: &str, value: impl Into<OptionValue>, front: Front) -> Result<(), Vec<Diagnostic>> {
+        let row = OptionRow::find(name, |row| row.is_value(front));
         let row = row.map_err(|unknown| vec![Diagnostic::error("unknown-key", unknown)])?;
         self.give(row, value.into(), front)
     }
@@ -321,12 +325,12 @@ impl Settings {
         self.value(name).is_some()
     }
 
-    pub(super) fn value(&self, name: &str) -> Option<&Value> {
+    pub(super) fn value(&self, name: &str) -> Option<&OptionValue> {
         self.given.iter().find(|(given, _)| *given == name).map(|(_, value)| value)
     }
 
     /// Adds others, which count before these.
-    pub fn extend(&mut self, others: &Settings) {
+    pub fn extend(&mut self, others: &GivenOptions) {
         for (name, value) in &others.given {
             self.give(row_of(name), value.clone(), Front::CommandLine).expect("it was right when it was given");
         }
@@ -334,7 +338,7 @@ impl Settings {
 
     /// Sets them, in the order of the table; levels of warnings in the order in which they were given.
     pub fn apply(&self, options: &mut Options) {
-        let levels = TABLE.iter().position(|row| row.group == Group::Reporting);
+        let levels = TABLE.iter().position(|row| row.group == OptionGroup::Reporting);
         let place = |name: &str| TABLE.iter().position(|row| row.name == name).min(levels);
         let mut given: Vec<_> = self.given.iter().collect();
         given.sort_by_key(|(name, _)| place(name));

@@ -3,14 +3,14 @@
 //! Which description of a body is cheaper depends on what else needs the same products, so it is not decided by a rule
 //! but by counting the finished program. Bodies at the same depth of the tree (the thighs of a quadruped) choose alike.
 
-use crate::equations::reduce::{is_in_proportion, lengths, longest_lever, reduce, Choice};
+use crate::equations::reduce::{is_in_proportion, lengths, longest_lever, reduce, FreeTerms};
 use crate::equations::traced::candidate;
 use crate::equations::Robot;
 use crate::function::{Form, Function};
 use crate::model::states;
 use crate::options::stable::Stable;
-use crate::options::{Forms, Optimisations, Options};
-use crate::scene::{Contacts, Gravity, Scene};
+use crate::options::{FormChoices, Optimisations, Options};
+use crate::scene::{Gravity, Scene, SceneContacts};
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use std::hash::{Hash, Hasher};
 use straightline_core::model::Model;
@@ -63,11 +63,11 @@ fn chosen(
         // the search is for torques or the mass matrix, whatever becomes of forward dynamics
         let optimisations = Optimisations { cheaper: false, ..optimisations };
         // contacts leave torques and H as they are
-        let scene = Scene { contacts: Contacts::default(), ..options.scene.clone() };
+        let scene = Scene { contacts: SceneContacts::default(), ..options.scene.clone() };
         let key = ((function, scene), optimisations, options.scalar).stable_text();
         robot.found.or_search(key, || improved(robot, frames, function, options, optimisations))
     };
-    let both = |choice: Choice| robot.reduced_by(&choice, &choice);
+    let both = |choice: FreeTerms| robot.reduced_by(&choice, &choice);
     match function.spec().form {
         Form::Plain => robot.clone(),
         Form::InverseDynamics => both(search(InverseDynamics)),
@@ -138,7 +138,7 @@ struct PlainError {
 }
 
 /// A search for one function, and what was tried.
-struct Search<'a> {
+struct FormSearch<'a> {
     /// Its reduced forms are those that were tried last.
     robot: Robot,
     frames: &'a [String],
@@ -156,15 +156,15 @@ struct Search<'a> {
     plain_error: Option<Option<[PlainError; 2]>>,
 }
 
-impl Search<'_> {
+impl FormSearch<'_> {
     /// By which hash the reduced robot of a choice is known.
-    fn hash(&mut self, choice: &Choice) -> u64 {
+    fn hash(&mut self, choice: &FreeTerms) -> u64 {
         let known = self.reduced.get(&choice.fingerprint()).copied();
         known.unwrap_or_else(|| self.set(choice))
     }
 
     /// The reduced robot of a choice is looked at from here on, and known by this hash.
-    fn set(&mut self, choice: &Choice) -> u64 {
+    fn set(&mut self, choice: &FreeTerms) -> u64 {
         let reduced = reduce(&self.robot.model, choice).0;
         let hash = fingerprint(&reduced);
         self.reduced.insert(choice.fingerprint(), hash);
@@ -174,7 +174,7 @@ impl Search<'_> {
     }
 
     /// What a choice costs, if it is worth a look: it was not tried before, is cheaper than that, and keeps its digits.
-    fn attempt(&mut self, choice: &Choice, least: Price) -> Option<Price> {
+    fn attempt(&mut self, choice: &FreeTerms, least: Price) -> Option<Price> {
         let known = self.reduced.get(&choice.fingerprint());
         if known.is_some_and(|hash| self.tried.contains_key(hash)) {
             return None;
@@ -207,7 +207,7 @@ impl Search<'_> {
             Some(known) => known.clone(),
             None => {
                 let (composite, reduced) = (self.robot.composite.clone(), self.robot.reduced.clone());
-                self.set(&Choice::plain(&self.robot.model));
+                self.set(&FreeTerms::plain(&self.robot.model));
                 let (_, plain) = self.counted();
                 let of_bodies = Optimisations { reduced: false, ..self.optimisations };
                 let (_, of_bodies, _) = candidate(&self.robot, self.frames, self.function, self.options, of_bodies);
@@ -242,7 +242,7 @@ impl Search<'_> {
     }
 
     /// Greedy: every choice at every depth, kept where it saves, until none does or enough was tried; of the choices the first ones.
-    fn descend(&mut self, from: (Choice, Price), enough: usize, ways: &Ways, among: usize) -> (Choice, Price) {
+    fn descend(&mut self, from: (FreeTerms, Price), enough: usize, ways: &Ways, among: usize) -> (FreeTerms, Price) {
         let (mut best, mut least) = from;
         loop {
             let before = least;
@@ -257,9 +257,9 @@ impl Search<'_> {
                     return (best, least);
                 }
             }
-            let units = ways.units(&self.robot, &best).into_iter().map(|unit| Choice { unit, ..best.clone() });
-            let other_angles = Choice { adds_angles: !best.adds_angles, ..best.clone() };
-            let whole: Vec<Choice> = units.chain(ways.angle_sums.then_some(other_angles)).collect();
+            let units = ways.units(&self.robot, &best).into_iter().map(|unit| FreeTerms { unit, ..best.clone() });
+            let other_angles = FreeTerms { adds_angles: !best.adds_angles, ..best.clone() };
+            let whole: Vec<FreeTerms> = units.chain(ways.angle_sums.then_some(other_angles)).collect();
             for changed in whole {
                 if let Some(price) = self.attempt(&changed, least) {
                     (best, least) = (changed, price);
@@ -272,7 +272,7 @@ impl Search<'_> {
     }
 
     /// Greedy again from neighbours of the best, one change away and hardly dearer; origins first, which move many parameters at once.
-    fn around(&mut self, mut best: (Choice, Price), enough: usize, ways: &Ways) -> (Choice, Price) {
+    fn around(&mut self, mut best: (FreeTerms, Price), enough: usize, ways: &Ways) -> (FreeTerms, Price) {
         let mut left: FxHashSet<u64> = FxHashSet::default();
         'better: loop {
             // whether it is no origin, what it costs, and which change at which depth it is
@@ -326,11 +326,11 @@ fn fingerprint(reduced: &ReducedModel<Dd>) -> u64 {
 }
 
 /// A change of one body's form; made again, it is taken back.
-type Move = Box<dyn Fn(&mut Choice, usize)>;
+type FormMove = Box<dyn Fn(&mut FreeTerms, usize)>;
 
 /// All changes, and how many of them, the first ones, may save much.
-fn moves(options: &Options, forms: Forms, function: Function) -> (Vec<Move>, usize) {
-    type Flags = fn(&mut Choice) -> &mut Vec<bool>;
+fn moves(options: &Options, forms: FormChoices, function: Function) -> (Vec<FormMove>, usize) {
+    type Flags = fn(&mut FreeTerms) -> &mut Vec<bool>;
     // the frames in which parameters are given would have to be known where they are made
     let frames = !options.scene.has_loads();
     // ways to form moments, of which H has none
@@ -356,10 +356,10 @@ fn moves(options: &Options, forms: Forms, function: Function) -> (Vec<Move>, usi
         (rotations, |c| &mut c.turns_sums),
         (rotations, |c| &mut c.other_acceleration),
     ];
-    let flip = |(_, flag): (bool, Flags)| Box::new(move |c: &mut Choice, i: usize| flag(c)[i] ^= true) as Move;
-    let mut moves: Vec<Move> = all.into_iter().filter(|(free, _)| *free).map(flip).collect();
+    let flip = |(_, flag): (bool, Flags)| Box::new(move |c: &mut FreeTerms, i: usize| flag(c)[i] ^= true) as FormMove;
+    let mut moves: Vec<FormMove> = all.into_iter().filter(|(free, _)| *free).map(flip).collect();
     for (kind, component) in (0..9).map(|k| (k / 3, k % 3)).filter(|_| forms.parameters) {
-        moves.push(Box::new(move |c: &mut Choice, i: usize| {
+        moves.push(Box::new(move |c: &mut FreeTerms, i: usize| {
             let vanishes = &mut c.vanish_at_parent[kind][i];
             *vanishes = if *vanishes == Some(component) { None } else { Some(component) };
         }));
@@ -371,7 +371,7 @@ fn moves(options: &Options, forms: Forms, function: Function) -> (Vec<Move>, usi
 
 /// What may change.
 struct Ways {
-    moves: Vec<Move>,
+    moves: Vec<FormMove>,
     /// So many of them, the first ones, may save much.
     major: usize,
     /// Which of them moves origins.
@@ -388,17 +388,17 @@ impl Ways {
         self.depth.iter().copied().max().unwrap_or(0)
     }
 
-    fn moved(&self, choice: &Choice, change: &Move, depth: usize) -> Choice {
+    fn moved(&self, choice: &FreeTerms, change: &FormMove, depth: usize) -> FreeTerms {
         let mut changed = choice.clone();
         (0..self.depth.len()).filter(|i| self.depth[*i] == depth).for_each(|i| change(&mut changed, i));
         changed
     }
 
-    fn units(&self, robot: &Robot, choice: &Choice) -> Vec<Dd> {
+    fn units(&self, robot: &Robot, choice: &FreeTerms) -> Vec<Dd> {
         if self.fixed_unit {
             return Vec::new();
         }
-        let metres = reduce(&robot.model, &Choice { unit: Dd::ONE, ..choice.clone() }).0;
+        let metres = reduce(&robot.model, &FreeTerms { unit: Dd::ONE, ..choice.clone() }).0;
         let mut units = lengths(&metres, longest_lever(&robot.model));
         units.truncate(UNITS);
         units
@@ -406,9 +406,9 @@ impl Ways {
 }
 
 /// Khalil and Dombre's parameters, with sums of angles where they may be.
-fn plain(robot: &Robot, options: &Options, optimisations: Optimisations) -> Choice {
+fn plain(robot: &Robot, options: &Options, optimisations: Optimisations) -> FreeTerms {
     let adds_offsets = !options.scalar.is_short();
-    Choice { adds_angles: optimisations.angle_sums, adds_offsets, ..Choice::plain(&robot.model) }
+    FreeTerms { adds_angles: optimisations.angle_sums, adds_offsets, ..FreeTerms::plain(&robot.model) }
 }
 
 /// The cheapest form that greedy steps lead to, from the plain form and, for a robot of few joints, from neighbours of what
@@ -419,13 +419,13 @@ fn improved(
     function: Function,
     options: &Options,
     optimisations: Optimisations,
-) -> Choice {
+) -> FreeTerms {
     let (reduced, bodies) = (&robot.reduced, &robot.reduced.bodies);
     let plain = plain(robot, options, optimisations);
     let forms = optimisations.forms;
     let stays = (0..bodies.len()).map(|i| forms.stays && reduced.may_stay(i)).collect();
-    let first = Choice { stays, ..plain.clone() };
-    let mut search = Search {
+    let first = FreeTerms { stays, ..plain.clone() };
+    let mut search = FormSearch {
         robot: robot.clone(),
         frames,
         function,

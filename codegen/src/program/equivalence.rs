@@ -22,7 +22,7 @@ pub(crate) mod mutants;
 pub(crate) mod sabotage;
 mod states;
 
-use crate::equations::bind::{constructed, Bound};
+use crate::equations::bind::{constructed, BoundRobot};
 use crate::equations::reduce::longest_lever;
 use crate::equations::Robot;
 use crate::function::{ForwardDynamicsMethod, Function, Judged};
@@ -41,7 +41,7 @@ pub(crate) use bounds::{of_acceleration_bound, of_bound};
 pub(crate) use contact::{of_contact, of_system};
 pub use disagreement::{Disagreement, Plainer};
 use losses::{sizes_of_accelerations, Losses};
-use states::{Place, States};
+use states::{StatePlace, States};
 
 /// Results agree to so much of their natural scale; double-double has 5e-32.
 const AGREE: f64 = 1e-24;
@@ -72,7 +72,7 @@ fn agreeing(options: &Options) -> f64 {
 }
 
 /// A state: what stands for each input port, by name.
-type State = crate::model::states::State<Dd>;
+type PortState = crate::model::states::InputState<Dd>;
 
 /// Whether a function's program, made by these optimisations, says what its plain equations say.
 ///
@@ -87,7 +87,7 @@ pub(crate) fn of_function(
     graph: &Graph,
 ) -> Result<(), Disagreement> {
     let ports = options.scene.ports(function, &robot.model);
-    let plain = Plain { robot, frames, function, options };
+    let plain = PlainEquations { robot, frames, function, options };
     let mut states = States::new(robot, options);
     if !optimisations.folding {
         return (0..STATES).try_for_each(|_| {
@@ -108,13 +108,13 @@ pub(crate) fn of_function(
         // where plain entries are almost rounding noise they hide what others lose: by themselves
         let mut losses = Losses::new(graph);
         for _ in 0..STATES {
-            check.at(&states.placed(&ports, Place::Beyond), (&mut losses, NOISE), false)?;
+            check.at(&states.placed(&ports, StatePlace::Beyond), (&mut losses, NOISE), false)?;
         }
         check.compare(losses)?;
     }
     check.compare(losses)?;
     // where users begin much is zero: that may hide what is lost elsewhere, and the other way round
-    for place in [Place::NearZero, Place::Zero] {
+    for place in [StatePlace::NearZero, StatePlace::Zero] {
         let state = states.placed(&ports, place);
         if check.is_regular(&state) {
             let mut losses = Losses::new(graph);
@@ -127,7 +127,7 @@ pub(crate) fn of_function(
 
 /// The plain equations of a function.
 #[derive(Clone, Copy)]
-struct Plain<'a> {
+struct PlainEquations<'a> {
     robot: &'a Robot,
     frames: &'a [String],
     function: Function,
@@ -136,14 +136,19 @@ struct Plain<'a> {
 
 /// The program of a function beside its plain equations.
 struct Check<'a> {
-    plain: Plain<'a>,
+    plain: PlainEquations<'a>,
     graph: &'a Graph,
 }
 
 impl Check<'_> {
     /// At one more state: what it loses to rounding, where an inertia counts as such a part of what it is made of at least, and, if
     /// `by_equations`, whether it is right.
-    fn at(&self, state: &State, (losses, least): (&mut Losses, f64), by_equations: bool) -> Result<(), Disagreement> {
+    fn at(
+        &self,
+        state: &PortState,
+        (losses, least): (&mut Losses, f64),
+        by_equations: bool,
+    ) -> Result<(), Disagreement> {
         let Check { plain, graph } = *self;
         let found = evaluate(graph, &inputs(graph, state));
         let off = plain.differences(state, &found);
@@ -156,7 +161,7 @@ impl Check<'_> {
     }
 
     /// Whether the plain equations have digits there: stretched, a chain of point masses may have a mass matrix without inverse.
-    fn is_regular(&self, state: &State) -> bool {
+    fn is_regular(&self, state: &PortState) -> bool {
         if !self.graph.ops.iter().any(|op| matches!(op, Op::Binary(Binary::Div, ..))) {
             return true;
         }
@@ -170,8 +175,8 @@ impl Check<'_> {
     }
 
     /// What losses are compared with.
-    fn sizes(&self, state: &State, found: &[Dd], off: &[Magnitude], least: f64) -> Vec<f64> {
-        let Plain { robot, frames, function, options } = self.plain;
+    fn sizes(&self, state: &PortState, found: &[Dd], off: &[Magnitude], least: f64) -> Vec<f64> {
+        let PlainEquations { robot, frames, function, options } = self.plain;
         let (nv, scene) = (robot.model.nv(), &options.scene);
         let is_whole = |all: usize| {
             let frames = scene.frames_of(function, frames).len();
@@ -190,7 +195,7 @@ impl Check<'_> {
     }
 
     fn compare(&self, mut losses: Losses) -> Result<(), Disagreement> {
-        let Plain { robot, function, options, .. } = self.plain;
+        let PlainEquations { robot, function, options, .. } = self.plain;
         if function.spec().judged == Judged::ByResidual {
             let lost = Disagreement {
                 program: function.name().to_string(),
@@ -215,26 +220,26 @@ impl Check<'_> {
     }
 }
 
-impl Plain<'_> {
+impl PlainEquations<'_> {
     /// The results that are wanted, by the generic runtime in this scalar.
-    fn results<T: Real>(self, state: &State) -> Vec<T> {
+    fn results<T: Real>(self, state: &PortState) -> Vec<T> {
         self.results_by(ForwardDynamicsMethod::ArticulatedBody, state)
     }
 
-    fn results_by<T: Real>(self, method: ForwardDynamicsMethod, state: &State) -> Vec<T> {
+    fn results_by<T: Real>(self, method: ForwardDynamicsMethod, state: &PortState) -> Vec<T> {
         let (bound, wanted) = self.bound(state, T::constant);
         self.all(&bound, method, &wanted)
     }
 
     /// The robot with what stands for its inputs, and which results are wanted.
-    fn bound<T: Real>(self, state: &State, number: fn(Dd) -> T) -> (Bound<T>, Vec<usize>) {
-        let Plain { robot, frames, function, options: Options { scene, .. } } = self;
+    fn bound<T: Real>(self, state: &PortState, number: fn(Dd) -> T) -> (BoundRobot<T>, Vec<usize>) {
+        let PlainEquations { robot, frames, function, options: Options { scene, .. } } = self;
         let (wanted, _) = scene.select(function, &robot.model, scene.frames_of(function, frames).len());
         let given = of_ports(&scene.ports(function, &robot.model), state, number);
         (scene.bind(function, robot, &given), wanted)
     }
 
-    fn all<T: Real>(self, bound: &Bound<T>, method: ForwardDynamicsMethod, wanted: &[usize]) -> Vec<T> {
+    fn all<T: Real>(self, bound: &BoundRobot<T>, method: ForwardDynamicsMethod, wanted: &[usize]) -> Vec<T> {
         let frames = self.options.scene.frames_of(self.function, self.frames).iter();
         let frames: Vec<_> =
             frames.map(|f| bound.model.frame(f).expect("frames were checked against the model")).collect();
@@ -243,7 +248,7 @@ impl Plain<'_> {
     }
 
     /// What a program found, less what the plain equations say, with their natural scale.
-    fn differences(self, state: &State, found: &[Dd]) -> Vec<Magnitude> {
+    fn differences(self, state: &PortState, found: &[Dd]) -> Vec<Magnitude> {
         let (mut bound, wanted) = self.bound(state, Magnitude::new);
         with_sizes(&mut bound.model, longest_lever(&self.robot.model));
         let (nv, method) = (self.robot.model.nv(), ForwardDynamicsMethod::ArticulatedBody);
@@ -258,7 +263,11 @@ impl Plain<'_> {
     }
 
     /// With exact rules a program is the generic runtime, bit for bit.
-    fn has_same_bits<T: Real + PartialEq + Into<f64>>(self, graph: &Graph, state: &State) -> Result<(), Disagreement> {
+    fn has_same_bits<T: Real + PartialEq + Into<f64>>(
+        self,
+        graph: &Graph,
+        state: &PortState,
+    ) -> Result<(), Disagreement> {
         let plain = self.results_by::<T>(self.options.forward_dynamics, state);
         let rounded: Vec<T> = inputs(graph, state).into_iter().map(T::constant).collect();
         let found = evaluate(graph, &rounded);
@@ -327,7 +336,7 @@ pub(crate) fn of_stages(
         }
         for (function, (_, graph)) in functions.iter().zip(&staged.functions) {
             let found = evaluate(graph, &inputs(graph, &state));
-            let off = Plain { robot, frames, function: *function, options }.differences(&state, &found);
+            let off = PlainEquations { robot, frames, function: *function, options }.differences(&state, &found);
             compare(&format!("staged::{}", function.name()), &graph.outputs, &off, agreeing(options))?;
         }
     }
@@ -388,11 +397,11 @@ fn of_drive(
     Ok(())
 }
 
-fn inputs(graph: &Graph, state: &State) -> Vec<Dd> {
+fn inputs(graph: &Graph, state: &PortState) -> Vec<Dd> {
     graph.inputs.iter().flat_map(|p| state[&p.name].clone()).collect()
 }
 
-fn of_ports<T>(ports: &[Port], state: &State, number: fn(Dd) -> T) -> Vec<Vec<T>> {
+fn of_ports<T>(ports: &[Port], state: &PortState, number: fn(Dd) -> T) -> Vec<Vec<T>> {
     ports.iter().map(|p| state[&p.name].iter().copied().map(number).collect()).collect()
 }
 

@@ -4,7 +4,7 @@ use crate::function::Quantity;
 use crate::scene::Scene;
 use straightline_core::joint::Measure;
 use straightline_core::model::Model;
-use straightline_graph::certify::{Interval, Refusal};
+use straightline_graph::certify::{Interval, NoCertificate};
 use straightline_graph::expr::Port;
 
 /// Where neither the scene nor the robot file limits an input: speeds within 10 rad/s or m/s, accelerations within 100 rad/s² or m/s², forces
@@ -31,18 +31,18 @@ fn default_range(measure: Measure) -> f64 {
 ///
 /// # Errors
 /// If an input is neither (an inertial parameter).
-pub fn input_box<T>(inputs: &[Port], scene: &Scene, model: &Model<T>) -> Result<Vec<Interval>, Refusal> {
+pub fn input_box<T>(inputs: &[Port], scene: &Scene, model: &Model<T>) -> Result<Vec<Interval>, NoCertificate> {
     let mut all = Vec::new();
     for port in inputs {
         let mut ranges = scene.input_ranges(port, model);
-        let quantity = Quantity::of(port).ok_or(Refusal::Unlimited)?;
+        let quantity = Quantity::of(port).ok_or(NoCertificate::Unlimited)?;
         if quantity == Quantity::Configuration {
             for joint in model.bodies.iter().map(|b| &b.joint) {
                 let own = ranges[joint.iq..].iter_mut().zip(joint.kind.measures());
                 own.for_each(|(r, measure)| limit(r, default_range(measure)));
             }
         } else {
-            let bound = default_bound(quantity).ok_or(Refusal::Unlimited)?;
+            let bound = default_bound(quantity).ok_or(NoCertificate::Unlimited)?;
             ranges.iter_mut().for_each(|r| limit(r, bound));
         }
         all.extend(ranges.into_iter().map(|r| Interval { lo: r.lower, hi: r.upper }));
@@ -51,7 +51,7 @@ pub fn input_box<T>(inputs: &[Port], scene: &Scene, model: &Model<T>) -> Result<
 }
 
 /// Infinite ends become this far from zero, or from the other end.
-fn limit(range: &mut crate::scene::Interval, bound: f64) {
+fn limit(range: &mut crate::scene::InputRange, bound: f64) {
     if range.lower == f64::NEG_INFINITY {
         range.lower = (-bound).min(range.upper - bound);
     }

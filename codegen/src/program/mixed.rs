@@ -4,7 +4,7 @@ use crate::equations::Robot;
 use crate::options::{Optimisations, Options};
 use crate::program::equivalence::{self, Disagreement};
 use crate::program::input_box::input_box;
-use crate::program::{passed, Program};
+use crate::program::{passed, TracedProgram};
 use straightline_graph::certify;
 use straightline_graph::expr::NodeId;
 
@@ -15,7 +15,7 @@ use straightline_graph::expr::NodeId;
 pub(crate) fn mix_precisions(
     robot: &Robot,
     frames: &[String],
-    program: &mut Program,
+    program: &mut TracedProgram,
     options: &Options,
 ) -> Result<(), Disagreement> {
     let budget = options.scene.budgets.get(&program.function).filter(|b| b.mixed_precision);

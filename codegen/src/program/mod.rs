@@ -31,7 +31,7 @@ use straightline_graph::schedule::{schedule, Schedule};
 
 /// A program between tracing and text.
 #[derive(Clone, Debug)]
-pub struct Program {
+pub struct TracedProgram {
     /// What it computes.
     pub function: Function,
     /// Its operations.
@@ -44,7 +44,7 @@ pub struct Program {
     pub plainer: Option<Plainer>,
 }
 
-impl Program {
+impl TracedProgram {
     /// Whether its constants are those of the robot, in double-double: otherwise no bound of its errors is one of the robot.
     pub(crate) fn has_folded_constants(&self, options: &Options) -> bool {
         options.optimisations().folding && self.plainer.as_ref().is_none_or(|plainer| plainer.without != FOLDING)
@@ -55,7 +55,7 @@ impl Program {
 ///
 /// # Panics
 /// If no form of it agrees with its plain equations.
-pub fn program(robot: &Robot, frames: &[String], function: Function, options: &Options) -> Program {
+pub fn program(robot: &Robot, frames: &[String], function: Function, options: &Options) -> TracedProgram {
     checked(robot, frames, function, options).unwrap_or_else(|wrong| panic!("{wrong}"))
 }
 
@@ -68,13 +68,13 @@ pub fn checked(
     frames: &[String],
     function: Function,
     options: &Options,
-) -> Result<Program, Disagreement> {
+) -> Result<TracedProgram, Disagreement> {
     let ((graph, method), plainer) = options.optimisations().first_that_agrees(|optimisations| {
         let made = optimised_with(robot, frames, function, options, optimisations);
         equivalence::of_function(robot, frames, function, options, optimisations, &made.0).map(|()| made)
     })?;
     let schedule = schedule(&graph, options.limits);
-    Ok(Program { function, graph, schedule, method, plainer })
+    Ok(TracedProgram { function, graph, schedule, method, plainer })
 }
 
 /// The operations of one function of a robot, with these optimisations only.

@@ -30,7 +30,7 @@ use straightline_core::algorithms::mass_matrix;
 use straightline_core::model::{Body, Model};
 use straightline_core::random::Random;
 use straightline_core::Dd;
-use straightline_graph::certify::{Analysis, Format, Interval, Known, Refusal};
+use straightline_graph::certify::{ErrorAnalysis, FloatFormat, Interval, KnownSystem, NoCertificate};
 use straightline_graph::expr::{evaluate, Graph, NodeId, Port};
 use straightline_graph::rounding::backwards;
 use straightline_graph::Scalar;
@@ -57,7 +57,7 @@ impl Sizes {
     ///
     /// # Errors
     /// If an input has no range.
-    pub fn of(mass_matrix: &Graph, torques: &Graph, scene: &Scene, model: &Model<Dd>) -> Result<Sizes, Refusal> {
+    pub fn of(mass_matrix: &Graph, torques: &Graph, scene: &Scene, model: &Model<Dd>) -> Result<Sizes, NoCertificate> {
         let magnitudes = |graph: &Graph| {
             let mut ranges = input_box(&graph.inputs, scene, model)?;
             let mut first = 0;
@@ -67,7 +67,7 @@ impl Sizes {
                 }
                 first += port.len();
             }
-            let mut analysis = Analysis::new(graph, Format::of(Scalar::F64));
+            let mut analysis = ErrorAnalysis::new(graph, FloatFormat::of(Scalar::F64));
             analysis.ranges(&ranges)?;
             Ok(graph.results.iter().map(|r| analysis.range(*r).mag()).collect::<Vec<f64>>())
         };
@@ -93,9 +93,9 @@ pub fn is_arm(model: &Model<Dd>, graph: &Graph) -> bool {
 }
 
 /// What is known for inputs in a box. Nothing where it [is no arm](is_arm).
-pub fn known(model: &Model<Dd>, graph: &Graph, ranges: &[Interval], sizes: &Sizes) -> Known {
+pub fn known(model: &Model<Dd>, graph: &Graph, ranges: &[Interval], sizes: &Sizes) -> KnownSystem {
     if !is_arm(model, graph) {
-        return Known::default();
+        return KnownSystem::default();
     }
     let place = |quantity: Quantity| {
         let is_it = |port: &&Port| Quantity::of(port) == Some(quantity);
@@ -104,7 +104,7 @@ pub fn known(model: &Model<Dd>, graph: &Graph, ranges: &[Interval], sizes: &Size
         first..first + count
     };
     let (q, tau) = (&ranges[place(Quantity::Configuration)], &ranges[place(Quantity::Force)]);
-    let Some(felt) = Felt::new(model, q) else { return Known::default() };
+    let Some(felt) = Felt::new(model, q) else { return KnownSystem::default() };
     let sizes_of_b = sizes.bias.iter().enumerate().map(|(k, h)| h + tau.get(k).map_or(0.0, |t| t.mag()));
     let beta = sizes_of_b.zip(&felt.free).map(|(b, c)| b * c.sqrt()).sum::<f64>() * (1.0 + SLACK);
     let bounds = Bounds { felt, inertia: &sizes.inertia, beta };
@@ -125,7 +125,7 @@ pub fn known(model: &Model<Dd>, graph: &Graph, ranges: &[Interval], sizes: &Size
         facts.push(bounds.facts(model, &h, &qdd));
         values.push(of_nodes);
     }
-    let mut known = Known::default();
+    let mut known = KnownSystem::default();
     let of_values: Vec<&Vec<(Dd, Interval)>> = facts.iter().map(|f| &f.values).collect();
     for (id, fact, negative) in agreements(graph, &values, &of_values) {
         let range = of_values[0][fact].1;
@@ -290,13 +290,13 @@ impl Felt {
         for (id, body) in bodies.iter().enumerate() {
             let alone = inertia_of(body)[axis(body)][axis(body)].lo;
             let carried = bodies.iter().filter(|b| b.parent == Some(id));
-            let held = carried.map(|child| least(body, child, q, Wanted::First)).fold(alone, f64::max);
+            let held = carried.map(|child| least(body, child, q, WantedJoints::First)).fold(alone, f64::max);
             let rotor = body.effects.rotor_inertia.map_or(0.0, Dd::to_f64);
             felt.held[body.joint.iv] = (held + rotor) * (1.0 - SLACK);
             let free = match body.parent {
                 None => held,
-                Some(p) if bodies[p].parent.is_none() => least(&bodies[p], body, q, Wanted::SecondOnJoint),
-                Some(p) => least(&bodies[p], body, q, Wanted::SecondFree),
+                Some(p) if bodies[p].parent.is_none() => least(&bodies[p], body, q, WantedJoints::SecondOnJoint),
+                Some(p) => least(&bodies[p], body, q, WantedJoints::SecondFree),
             };
             let is_positive = felt.held[body.joint.iv] > 0.0 && free + rotor > 0.0;
             is_positive.then_some(())?;
@@ -308,7 +308,7 @@ impl Felt {
 
 /// Which of two joints, and how the first body moves.
 #[derive(Clone, Copy, PartialEq)]
-enum Wanted {
+enum WantedJoints {
     /// The first, with the other free.
     First,
     /// The second, with the first free.
@@ -318,7 +318,7 @@ enum Wanted {
 }
 
 type Column = [Interval; 6];
-type Inertia = [[Interval; 6]; 6];
+type BodyInertia = [[Interval; 6]; 6];
 
 fn interval(x: Dd) -> Interval {
     Interval::new(x.hi().next_down(), x.hi().next_up())
@@ -334,7 +334,7 @@ fn axis(body: &Body<Dd>) -> usize {
 }
 
 /// The 6 × 6 inertia of a body about the origin of its frame, of twists (ω, v).
-fn inertia_of(body: &Body<Dd>) -> Inertia {
+fn inertia_of(body: &Body<Dd>) -> BodyInertia {
     let total = body.total_about_origin();
     let (m, s) = (total.first_moment, total.second_moment);
     let trace = s.xx + s.yy + s.zz;
@@ -354,7 +354,7 @@ fn inertia_of(body: &Body<Dd>) -> Inertia {
 }
 
 /// What a joint feels at least of two bodies, the second carried by the first, for all positions of the second joint.
-fn least(first: &Body<Dd>, second: &Body<Dd>, q: &[Interval], wanted: Wanted) -> f64 {
+fn least(first: &Body<Dd>, second: &Body<Dd>, q: &[Interval], wanted: WantedJoints) -> f64 {
     let range = q.get(second.joint.iq).copied().unwrap_or(Interval::ZERO);
     let turn = std::f64::consts::TAU * (1.0 + SLACK);
     let turns = second.joint.kind.turns() && range.width() > turn;
@@ -372,22 +372,22 @@ fn least(first: &Body<Dd>, second: &Body<Dd>, q: &[Interval], wanted: Wanted) ->
 fn least_at(
     first: &Body<Dd>,
     second: &Body<Dd>,
-    inertias: &[Inertia; 2],
+    inertias: &[BodyInertia; 2],
     q: Interval,
-    wanted: Wanted,
+    wanted: WantedJoints,
     cuts: usize,
 ) -> f64 {
     let unit = |k: usize| std::array::from_fn(|i| if i == k { Interval::ONE } else { Interval::ZERO });
     let moves: Vec<Column> = match wanted {
         // shifts first: what is left then is about centres of mass
-        Wanted::SecondFree => [3, 4, 5, 0, 1, 2].map(unit).to_vec(),
+        WantedJoints::SecondFree => [3, 4, 5, 0, 1, 2].map(unit).to_vec(),
         _ => vec![unit(axis(first))],
     };
-    let pose = Pose::of(second, q);
+    let pose = BodyPose::of(second, q);
     // motions of the first body, and of the second on it, as twists of both; the wanted one last
     let mut twists: Vec<[Column; 2]> = moves.iter().map(|v| [*v, pose.carried(v)]).collect();
     twists.push([[Interval::ZERO; 6], unit(axis(second))]);
-    if wanted == Wanted::First {
+    if wanted == WantedJoints::First {
         twists.reverse();
     }
     let n = twists.len();
@@ -426,7 +426,14 @@ fn least_at(
     }
 }
 
-fn cut(first: &Body<Dd>, second: &Body<Dd>, inertias: &[Inertia; 2], q: Interval, wanted: Wanted, cuts: usize) -> f64 {
+fn cut(
+    first: &Body<Dd>,
+    second: &Body<Dd>,
+    inertias: &[BodyInertia; 2],
+    q: Interval,
+    wanted: WantedJoints,
+    cuts: usize,
+) -> f64 {
     if cuts == 0 {
         return 0.0;
     }
@@ -436,21 +443,21 @@ fn cut(first: &Body<Dd>, second: &Body<Dd>, inertias: &[Inertia; 2], q: Interval
 }
 
 /// Pose of a body's frame in that of the one before it.
-struct Pose {
+struct BodyPose {
     rotation: [[Interval; 3]; 3],
     translation: [Interval; 3],
 }
 
-impl Pose {
-    fn of(body: &Body<Dd>, q: Interval) -> Pose {
+impl BodyPose {
+    fn of(body: &Body<Dd>, q: Interval) -> BodyPose {
         let r = body.placement.rotation.rows.map(|row| row.map(interval));
         let p = body.placement.translation.to_array().map(interval);
         if body.joint.kind.slides() {
-            return Pose { rotation: r, translation: [0, 1, 2].map(|i| p[i] + r[i][2] * q) };
+            return BodyPose { rotation: r, translation: [0, 1, 2].map(|i| p[i] + r[i][2] * q) };
         }
         let (s, c) = q.sin_cos();
         // R R_z(q)
-        Pose { rotation: r.map(|[x, y, z]| [x * c + y * s, y * c - x * s, z]), translation: p }
+        BodyPose { rotation: r.map(|[x, y, z]| [x * c + y * s, y * c - x * s, z]), translation: p }
     }
 
     /// The twist of a frame that is fixed to a body of that twist.

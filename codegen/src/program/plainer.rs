@@ -1,7 +1,7 @@
 //! The form of a program with the fewest operations that agrees with the plain equations.
 
 use crate::options::optimisations::FOLDING;
-use crate::options::{Forms, Optimisations};
+use crate::options::{FormChoices, Optimisations};
 use crate::program::equivalence::{Disagreement, Plainer};
 
 impl Optimisations {
@@ -19,7 +19,9 @@ impl Optimisations {
         step("identical limbs as lanes of one body", |o| o.limbs = false);
         step("values formed of others that are there", |o| o.substitutes = false);
         step("sums with all their terms at once", |o| o.sums = false);
-        step("forms of the reduced robot", |o| (o.chosen, o.forms, o.angle_sums) = (false, Forms::default(), false));
+        step("forms of the reduced robot", |o| {
+            (o.chosen, o.forms, o.angle_sums) = (false, FormChoices::default(), false)
+        });
         step("the reduced robot", |o| o.reduced = false);
         step("algebraic rules and the cheaper form of forward dynamics", |o| *o = o.plain());
         step(FOLDING, |o| o.folding = false);

@@ -11,7 +11,7 @@ use crate::options::{Optimisations, Options};
 use crate::program::choose::choose;
 use crate::program::equivalence::{self, Disagreement, Plainer};
 use crate::program::passed;
-use crate::program::written::{Written, WrittenStage, WrittenStages};
+use crate::program::written::{WrittenFunction, WrittenStage, WrittenStages};
 use std::collections::BTreeMap;
 use straightline_core::Real;
 use straightline_graph::expr::{Counts, Graph, Port};
@@ -77,7 +77,7 @@ enum InverseForm {
 
 /// A stage and its type.
 #[derive(Clone, Copy, Debug)]
-pub struct Stage {
+pub struct StageType {
     /// The identifier of the type; the last stage, which stores nothing, has none.
     pub type_name: &'static str,
     /// The name of its values where others take them.
@@ -86,19 +86,19 @@ pub struct Stage {
     pub doc: &'static str,
 }
 
-const PARAMETERS: Stage =
-    Stage { type_name: "Parameters", values: "parameters", doc: "What depends on run-time parameters alone." };
-const CONFIGURATION: Stage = Stage {
+const PARAMETERS: StageType =
+    StageType { type_name: "Parameters", values: "parameters", doc: "What depends on run-time parameters alone." };
+const CONFIGURATION: StageType = StageType {
     type_name: "Configuration",
     values: "configuration",
     doc: "What depends on the configuration q: made once per q, it serves every function of q.",
 };
-const VELOCITY: Stage = Stage {
+const VELOCITY: StageType = StageType {
     type_name: "Velocity",
     values: "velocity",
     doc: "What depends on q and q̇: made once per q̇, it serves inverse dynamics for many q̈ and forward dynamics for many tau.",
 };
-const CALL: Stage = Stage { type_name: "", values: "", doc: "" };
+const CALL: StageType = StageType { type_name: "", values: "", doc: "" };
 
 /// The programs of a staged form.
 pub struct Programs {
@@ -106,7 +106,7 @@ pub struct Programs {
     pub functions: Vec<Function>,
     /// The stages and the functions.
     pub staged: Staged,
-    pub(crate) stages: Vec<Stage>,
+    pub(crate) stages: Vec<StageType>,
     form: (InverseForm, ForwardDynamicsMethod),
 }
 
@@ -199,8 +199,8 @@ impl Programs {
     /// What the module is to compute.
     pub(crate) fn written(self, scalar: Scalar) -> WrittenStages {
         let storing = self.stages.len() - 1;
-        let program = |name: &str, graph| Written::plain(name, graph, scalar);
-        let stage = |(stage, graph): (&Stage, Graph)| WrittenStage {
+        let program = |name: &str, graph| WrittenFunction::plain(name, graph, scalar);
+        let stage = |(stage, graph): (&StageType, Graph)| WrittenStage {
             type_name: stage.type_name.to_string(),
             values: stage.values.to_string(),
             program: program(&format!("{}_values", stage.values), graph),
@@ -231,7 +231,7 @@ fn joint_program(
     (options, optimisations): (&Options, Optimisations),
     functions: &[Function],
     (inverse, forward): (InverseForm, ForwardDynamicsMethod),
-) -> (Graph, Vec<usize>, Vec<Stage>) {
+) -> (Graph, Vec<usize>, Vec<StageType>) {
     let scene = &options.scene;
     let mut ports: Vec<Port> = Vec::new();
     for port in functions.iter().flat_map(|f| scene.ports(*f, &robot.model)) {
@@ -240,7 +240,7 @@ fn joint_program(
         }
     }
     let has_parameters = ports.iter().any(is_optional);
-    let stages: Vec<Stage> =
+    let stages: Vec<StageType> =
         has_parameters.then_some(PARAMETERS).into_iter().chain([CONFIGURATION, VELOCITY, CALL]).collect();
     let first = usize::from(has_parameters);
     let stage_of = |port: &Port| match Quantity::of(port) {
@@ -288,7 +288,7 @@ fn joint_program(
 pub(crate) fn report(programs: &Programs) -> StagedReport {
     let Programs { functions, staged, stages, form } = programs;
     let has = |function: Function| functions.contains(&function);
-    let of = |stage: &Stage, graph: &Graph| {
+    let of = |stage: &StageType, graph: &Graph| {
         let Counts { mul, add, div, sqrt, sin_cos, .. } = graph.counts();
         StageReport { name: stage.type_name, mul, add, div, sqrt, sincos: sin_cos, stored: graph.results.len() }
     };

@@ -8,7 +8,7 @@ use straightline_graph::Scalar;
 
 /// A function that a text is to have.
 #[derive(Clone, Debug)]
-pub struct Written {
+pub struct WrittenFunction {
     /// The identifier in the text.
     pub name: String,
     /// What it computes.
@@ -21,16 +21,16 @@ pub struct Written {
     pub lanes: bool,
 }
 
-impl Written {
+impl WrittenFunction {
     /// A function in the forms that are asked for.
-    pub(crate) fn asked_for(name: &str, graph: Graph, options: &Options) -> Written {
+    pub(crate) fn asked_for(name: &str, graph: Graph, options: &Options) -> WrittenFunction {
         let (generic, lanes) = (options.generic, options.lanes.is_some());
-        Written { generic, lanes, ..Written::plain(name, graph, options.scalar) }
+        WrittenFunction { generic, lanes, ..WrittenFunction::plain(name, graph, options.scalar) }
     }
 
     /// A function of one state and one scalar type, whatever is asked for.
-    pub(crate) fn plain(name: &str, graph: Graph, scalar: Scalar) -> Written {
-        Written { name: name.to_string(), graph, scalar, generic: false, lanes: false }
+    pub(crate) fn plain(name: &str, graph: Graph, scalar: Scalar) -> WrittenFunction {
+        WrittenFunction { name: name.to_string(), graph, scalar, generic: false, lanes: false }
     }
 }
 
@@ -40,7 +40,7 @@ pub struct WrittenParameter {
     /// The name of the type.
     pub type_name: String,
     /// The private function.
-    pub program: Written,
+    pub program: WrittenFunction,
     /// Of a drive, its free numbers.
     pub numbers: Option<DriveNumbers>,
 }
@@ -62,7 +62,7 @@ pub struct WrittenStage {
     /// The name of its values where others take them.
     pub values: String,
     /// What it stores.
-    pub program: Written,
+    pub program: WrittenFunction,
 }
 
 /// The programs of a staged form.
@@ -71,7 +71,7 @@ pub struct WrittenStages {
     /// The stages that store something, the rarest first.
     pub stages: Vec<WrittenStage>,
     /// The functions, each with the stage whose method it is.
-    pub functions: Vec<(usize, Written)>,
+    pub functions: Vec<(usize, WrittenFunction)>,
 }
 
 /// The programs of a contact mode.
@@ -82,14 +82,14 @@ pub struct WrittenMode {
     /// Its constrained and its free coordinates.
     pub coordinates: [Vec<String>; 2],
     /// Its functions.
-    pub functions: Vec<Written>,
+    pub functions: Vec<WrittenFunction>,
 }
 
 /// All programs that a text is to have.
 #[derive(Clone, Debug, Default)]
 pub struct AllWritten {
     /// The functions of the robot, and the bounds of their errors.
-    pub functions: Vec<Written>,
+    pub functions: Vec<WrittenFunction>,
     /// Run-time parameters.
     pub parameters: Vec<WrittenParameter>,
     /// The staged form.
@@ -100,7 +100,7 @@ pub struct AllWritten {
 
 impl AllWritten {
     /// All of them.
-    pub fn all(&self) -> impl Iterator<Item = &Written> {
+    pub fn all(&self) -> impl Iterator<Item = &WrittenFunction> {
         let staged = self.staged.iter().flat_map(|staged| {
             let stages = staged.stages.iter().map(|stage| &stage.program);
             stages.chain(staged.functions.iter().map(|(_, program)| program))

@@ -1,9 +1,9 @@
 //! What stands around the functions: constants, parameters, stages, modes, batches, and what is pasted.
 
-use super::items::{Item, Items, Sort};
-use super::run::Known;
-use super::tokens::{self as t, Kind, Words};
-use super::Stop;
+use super::items::{Items, Sort, TextItem};
+use super::run::KnownNames;
+use super::tokens::{self as t, TokenKind, Words};
+use super::ReadingStop;
 use crate::choices::Lanes;
 use crate::emit::Generated;
 use crate::identifier::string_literals;
@@ -39,7 +39,7 @@ const FIXED: &[(Sort, u32, &[u64])] = &[
     ),
 ];
 
-type Read<X> = Result<X, Stop>;
+type BlockReading<X> = Result<X, ReadingStop>;
 
 /// A text, and what is to stand in it.
 pub struct Around<'a, 't, 'g> {
@@ -52,7 +52,7 @@ pub struct Around<'a, 't, 'g> {
 
 impl Around<'_, '_, '_> {
     /// Reads all of it: which names each module makes known.
-    pub fn read(mut self) -> Read<FxHashMap<usize, Known>> {
+    pub fn read(mut self) -> BlockReading<FxHashMap<usize, KnownNames>> {
         self.constants()?;
         self.parameters()?;
         self.batches()?;
@@ -67,16 +67,16 @@ impl Around<'_, '_, '_> {
     }
 
     /// An item that has to be there.
-    fn item(&mut self, module: usize, sort: Sort, name: &str) -> Read<&Item> {
+    fn item(&mut self, module: usize, sort: Sort, name: &str) -> BlockReading<&TextItem> {
         let word = self.words.number(name);
         match self.items.find(module, sort, word) {
             Some(item) => Ok(item),
-            None => Err(Stop::at(self.items.text.len(), format!("`{name}` is missing"))),
+            None => Err(ReadingStop::at(self.items.text.len(), format!("`{name}` is missing"))),
         }
     }
 
     /// An item is this, word by word.
-    fn is(&mut self, module: usize, sort: Sort, name: &str, expected: &str) -> Read<()> {
+    fn is(&mut self, module: usize, sort: Sort, name: &str, expected: &str) -> BlockReading<()> {
         let (start, end) = {
             let item = self.item(module, sort, name)?;
             item.claimed.set(true);
@@ -85,8 +85,8 @@ impl Around<'_, '_, '_> {
         self.words_are(start, end, expected)
     }
 
-    fn words_are(&mut self, start: usize, end: usize, expected: &str) -> Read<()> {
-        let tokens = t::tokens(expected, self.words).map_err(|(_, what)| Stop::at(0, what))?;
+    fn words_are(&mut self, start: usize, end: usize, expected: &str) -> BlockReading<()> {
+        let tokens = t::tokens(expected, self.words).map_err(|(_, what)| ReadingStop::at(0, what))?;
         let mut at = start;
         for token in &tokens[..tokens.len() - 1] {
             let text = &expected[token.start as usize..token.end as usize];
@@ -101,13 +101,15 @@ impl Around<'_, '_, '_> {
         }
     }
 
-    fn module(&mut self, parent: usize, name: &str) -> Read<usize> {
+    fn module(&mut self, parent: usize, name: &str) -> BlockReading<usize> {
         let word = self.words.number(name);
-        self.items.inner(parent, word).ok_or_else(|| Stop::at(self.items.text.len(), format!("`{name}` is missing")))
+        self.items
+            .inner(parent, word)
+            .ok_or_else(|| ReadingStop::at(self.items.text.len(), format!("`{name}` is missing")))
     }
 
     /// Numbers of the robot, costs of the functions, bounds of their errors.
-    fn constants(&mut self) -> Read<()> {
+    fn constants(&mut self) -> BlockReading<()> {
         let generated = self.generated;
         let (model, drives) = (&generated.model, &generated.model.drives);
         let root = self.root;
@@ -169,14 +171,14 @@ impl Around<'_, '_, '_> {
         shape: &[usize],
         values: &[f64],
         agrees: &dyn Fn(f64, f64) -> bool,
-    ) -> Read<()> {
+    ) -> BlockReading<()> {
         let (start, end) = {
             let item = self.item(self.root, Sort::Constant, name)?;
             item.claimed.set(true);
             (item.start, item.end)
         };
         let items = self.items;
-        let equals = (start..end).find(|at| items.kind(*at) == Kind::Mark(b'=')).unwrap_or(start);
+        let equals = (start..end).find(|at| items.kind(*at) == TokenKind::Mark(b'=')).unwrap_or(start);
         let array = shape.iter().rev().fold(scalar.name().to_string(), |inner, n| format!("[{inner}; {n}]"));
         self.words_are(start, equals, &format!("pub const {name}: {array}"))?;
         let mut at = equals + 1;
@@ -189,7 +191,7 @@ impl Around<'_, '_, '_> {
     }
 
     /// What is the same in all files.
-    fn fixed(&mut self) -> Read<()> {
+    fn fixed(&mut self) -> BlockReading<()> {
         let items = self.items;
         for (sort, name, sums) in FIXED {
             let Some(item) = items.find(self.root, *sort, *name) else { continue };
@@ -209,7 +211,7 @@ impl Around<'_, '_, '_> {
     }
 
     /// Of an item, as if it were in f64.
-    fn checksum(&self, item: &Item) -> u64 {
+    fn checksum(&self, item: &TextItem) -> u64 {
         let other = match self.scalar() {
             Scalar::F64 => "f32",
             Scalar::F32 => "f64",
@@ -223,9 +225,9 @@ impl Around<'_, '_, '_> {
     }
 
     /// A module is its source, but for comments and how strongly it is inlined, or the source up to some item.
-    fn pasted(&self, item: &Item, source: &str) -> Read<()> {
+    fn pasted(&self, item: &TextItem, source: &str) -> BlockReading<()> {
         let items = self.items;
-        let open = (item.start..item.end).find(|at| items.kind(*at) == Kind::Mark(b'{')).unwrap_or(item.start);
+        let open = (item.start..item.end).find(|at| items.kind(*at) == TokenKind::Mark(b'{')).unwrap_or(item.start);
         let (from, to) = (items.tokens[open].end as usize, items.tokens[item.end - 1].start as usize);
         fn lines(text: &str) -> impl Iterator<Item = &str> {
             let is_code = |line: &&str| !line.is_empty() && !line.starts_with("//");
@@ -239,7 +241,7 @@ impl Around<'_, '_, '_> {
         for line in lines(&items.text[from..to]) {
             if expected.next() != Some(line) {
                 let at = if line == "#[inline]" { from } else { line.as_ptr() as usize - items.text.as_ptr() as usize };
-                return Err(Stop::at(at, "a line of a pasted module is not that of its source"));
+                return Err(ReadingStop::at(at, "a line of a pasted module is not that of its source"));
             }
             taken += 1;
         }
@@ -250,14 +252,14 @@ impl Around<'_, '_, '_> {
     }
 
     /// Imports; what they make known.
-    fn uses(&mut self) -> Read<FxHashMap<usize, Known>> {
+    fn uses(&mut self) -> BlockReading<FxHashMap<usize, KnownNames>> {
         let items = self.items;
         let root = self.root;
         let has = |name| items.find(root, Sort::Given, name).is_some();
         let (trig, fused) = (has(t::TRIG), has(t::FUSED_MODULE));
         let number = items.find(root, Sort::Function, t::NUMBER).is_some();
-        let mut known: FxHashMap<usize, Known> = FxHashMap::default();
-        let of_root = Known { trig, fused: [fused, false, false], generic: false };
+        let mut known: FxHashMap<usize, KnownNames> = FxHashMap::default();
+        let of_root = KnownNames { trig, fused: [fused, false, false], generic: false };
         known.insert(root, of_root);
         for item in items.all.iter().filter(|item| item.sort == Sort::Use) {
             let above = |n: usize| (0..n).fold(item.module, |m, _| items.modules[m].parent);
@@ -302,11 +304,11 @@ impl Around<'_, '_, '_> {
     }
 
     /// `use super::{Tool, Workpiece};`, `use super::super::Tool;`
-    fn is_of_parameters(&self, item: &Item) -> bool {
+    fn is_of_parameters(&self, item: &TextItem) -> bool {
         let parameters = &self.generated.programs.parameters;
         (item.start + 1..item.end).all(|at| match self.items.kind(at) {
-            Kind::Mark(mark) => matches!(mark, b':' | b',' | b'{' | b'}' | b';'),
-            Kind::Word(t::SUPER) => true,
+            TokenKind::Mark(mark) => matches!(mark, b':' | b',' | b'{' | b'}' | b';'),
+            TokenKind::Word(t::SUPER) => true,
             _ => parameters.iter().any(|p| p.type_name == self.items.text_of(at)),
         })
     }
@@ -318,19 +320,19 @@ fn nested(
     at: &mut usize,
     shape: &[usize],
     scalar: Scalar,
-    each: &mut dyn FnMut(usize, f64) -> Read<()>,
-) -> Read<()> {
+    each: &mut dyn FnMut(usize, f64) -> BlockReading<()>,
+) -> BlockReading<()> {
     let Some((n, rest)) = shape.split_first() else {
         let start = *at;
-        let negative = items.kind(*at) == Kind::Mark(b'-');
+        let negative = items.kind(*at) == TokenKind::Mark(b'-');
         *at += usize::from(negative);
         let x = match items.kind(*at) {
-            Kind::Number => {
+            TokenKind::Number => {
                 *at += 1;
                 let text = items.text_of(*at - 1);
                 scalar.read(text).filter(|_| text.contains(['.', 'e']))
             }
-            Kind::Word(t::F64 | t::F32) if items.text_of(*at) == scalar.name() => {
+            TokenKind::Word(t::F64 | t::F32) if items.text_of(*at) == scalar.name() => {
                 *at += 1;
                 items.these(at, ": : INFINITY")?;
                 Some(f64::INFINITY)

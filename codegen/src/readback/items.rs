@@ -1,14 +1,14 @@
 //! The items of a text: modules, functions with their signatures, and what else there is, each to be claimed once by what knows it.
 
-use super::tokens::{self as t, Kind, Token, Words};
-use super::values::Format;
-use super::Stop;
+use super::tokens::{self as t, Token, TokenKind, Words};
+use super::values::TextFormat;
+use super::ReadingStop;
 use rustc_hash::FxHashMap;
 use std::cell::Cell;
 
 /// How many there are in a dimension of an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Extent {
+pub enum TextExtent {
     /// So many.
     Of(usize),
     /// One per lane.
@@ -19,9 +19,9 @@ pub enum Extent {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Type {
     /// A number.
-    Number(Format),
+    Number(TextFormat),
     /// An array of numbers, extents outermost first.
-    Array(Vec<Extent>, Format),
+    Array(Vec<TextExtent>, TextFormat),
     /// A type by its name.
     Named(u32),
     /// A reference, mutable or not.
@@ -30,7 +30,7 @@ pub enum Type {
 
 /// A parameter of a function.
 #[derive(Clone, Debug)]
-pub struct Parameter {
+pub struct TextParameter {
     /// The word of its identifier.
     pub name: u32,
     /// Its type.
@@ -41,11 +41,11 @@ pub struct Parameter {
 
 /// A function's signature and where its body is.
 #[derive(Clone, Debug)]
-pub struct Function {
+pub struct TextFunction {
     /// Constant parameters `N` and `FUSED`, in order, or `T`.
     pub generics: Vec<u32>,
     /// Its parameters.
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<TextParameter>,
     /// Token of the brace that opens the body.
     pub body: usize,
 }
@@ -73,7 +73,7 @@ pub enum Sort {
 
 /// An item.
 #[derive(Clone, Debug)]
-pub struct Item {
+pub struct TextItem {
     /// The module in which it stands.
     pub module: usize,
     /// What it is.
@@ -92,7 +92,7 @@ pub struct Item {
 
 /// A module: its parent, and its name.
 #[derive(Clone, Copy, Debug)]
-pub struct Module {
+pub struct TextModule {
     /// The module around it.
     pub parent: usize,
     /// The word of its identifier.
@@ -107,20 +107,20 @@ pub struct Items<'t> {
     /// Its tokens.
     pub tokens: Vec<Token>,
     /// Its modules; the first is the text itself.
-    pub modules: Vec<Module>,
+    pub modules: Vec<TextModule>,
     /// Its items.
-    pub all: Vec<Item>,
+    pub all: Vec<TextItem>,
     /// Items with names, by module, sort and name.
     pub named: FxHashMap<(usize, Sort, u32), usize>,
 }
 
-type Parsed<X> = Result<X, Stop>;
+type ParsedItems<X> = Result<X, ReadingStop>;
 
 impl<'t> Items<'t> {
     /// The items of a text.
-    pub fn read(text: &'t str, words: &mut Words) -> Parsed<Items<'t>> {
-        let tokens = t::tokens(text, words).map_err(|(at, what)| Stop::at(at, what))?;
-        let modules = vec![Module { parent: 0, name: t::UNDERSCORE }];
+    pub fn read(text: &'t str, words: &mut Words) -> ParsedItems<Items<'t>> {
+        let tokens = t::tokens(text, words).map_err(|(at, what)| ReadingStop::at(at, what))?;
+        let modules = vec![TextModule { parent: 0, name: t::UNDERSCORE }];
         let mut items = Items { text, tokens, modules, all: Vec::new(), named: FxHashMap::default() };
         let end = items.tokens.len() - 1;
         items.module(0, 0, end, false)?;
@@ -128,7 +128,7 @@ impl<'t> Items<'t> {
     }
 
     /// The token at a place.
-    pub fn kind(&self, at: usize) -> Kind {
+    pub fn kind(&self, at: usize) -> TokenKind {
         self.tokens[at].kind
     }
 
@@ -138,13 +138,13 @@ impl<'t> Items<'t> {
     }
 
     /// A complaint about a token.
-    pub fn stop<X>(&self, at: usize, what: impl Into<String>) -> Parsed<X> {
-        Err(Stop::at(self.tokens[at].start as usize, what))
+    pub fn stop<X>(&self, at: usize, what: impl Into<String>) -> ParsedItems<X> {
+        Err(ReadingStop::at(self.tokens[at].start as usize, what))
     }
 
     /// Takes this mark.
-    pub fn mark(&self, at: &mut usize, mark: u8) -> Parsed<()> {
-        if self.kind(*at) == Kind::Mark(mark) {
+    pub fn mark(&self, at: &mut usize, mark: u8) -> ParsedItems<()> {
+        if self.kind(*at) == TokenKind::Mark(mark) {
             *at += 1;
             return Ok(());
         }
@@ -152,8 +152,8 @@ impl<'t> Items<'t> {
     }
 
     /// Takes this word.
-    pub fn keyword(&self, at: &mut usize, word: u32) -> Parsed<()> {
-        if self.kind(*at) == Kind::Word(word) {
+    pub fn keyword(&self, at: &mut usize, word: u32) -> ParsedItems<()> {
+        if self.kind(*at) == TokenKind::Word(word) {
             *at += 1;
             return Ok(());
         }
@@ -161,7 +161,7 @@ impl<'t> Items<'t> {
     }
 
     /// Takes these words and marks, which spaces part.
-    pub fn these(&self, at: &mut usize, expected: &str) -> Parsed<()> {
+    pub fn these(&self, at: &mut usize, expected: &str) -> ParsedItems<()> {
         for text in expected.split(' ') {
             if self.text_of(*at) != text {
                 return self.stop(*at, format!("`{text}` is expected here"));
@@ -172,9 +172,9 @@ impl<'t> Items<'t> {
     }
 
     /// Takes any word.
-    pub fn word(&self, at: &mut usize) -> Parsed<u32> {
+    pub fn word(&self, at: &mut usize) -> ParsedItems<u32> {
         match self.kind(*at) {
-            Kind::Word(word) => {
+            TokenKind::Word(word) => {
                 *at += 1;
                 Ok(word)
             }
@@ -183,8 +183,8 @@ impl<'t> Items<'t> {
     }
 
     /// Takes a whole number.
-    pub fn integer(&self, at: &mut usize) -> Parsed<usize> {
-        let is_number = self.kind(*at) == Kind::Number;
+    pub fn integer(&self, at: &mut usize) -> ParsedItems<usize> {
+        let is_number = self.kind(*at) == TokenKind::Number;
         match self.text_of(*at).parse().ok().filter(|_| is_number) {
             Some(n) => {
                 *at += 1;
@@ -195,14 +195,14 @@ impl<'t> Items<'t> {
     }
 
     /// Behind attributes that change no meaning.
-    fn attributes(&self, mut at: usize) -> Parsed<usize> {
-        while self.kind(at) == Kind::Mark(b'#') {
+    fn attributes(&self, mut at: usize) -> ParsedItems<usize> {
+        while self.kind(at) == TokenKind::Mark(b'#') {
             at += 1;
-            if self.kind(at) != Kind::Mark(b'[') {
+            if self.kind(at) != TokenKind::Mark(b'[') {
                 return self.stop(at, "an attribute of the file");
             }
             match self.kind(at + 1) {
-                Kind::Word(t::ALLOW | t::DOC | t::INLINE | t::DERIVE | t::REPR | t::MUST_USE) => {}
+                TokenKind::Word(t::ALLOW | t::DOC | t::INLINE | t::DERIVE | t::REPR | t::MUST_USE) => {}
                 _ => return self.stop(at + 1, "an attribute that is not known"),
             }
             at = self.tokens[at].closes as usize + 1;
@@ -211,62 +211,62 @@ impl<'t> Items<'t> {
     }
 
     /// The items of a module between two tokens.
-    fn module(&mut self, module: usize, start: usize, end: usize, threads: bool) -> Parsed<()> {
+    fn module(&mut self, module: usize, start: usize, end: usize, threads: bool) -> ParsedItems<()> {
         let mut at = start;
         while at < end {
             at = self.attributes(at)?;
             let start = at;
-            if self.kind(at) == Kind::Word(t::PUB) {
+            if self.kind(at) == TokenKind::Word(t::PUB) {
                 at += 1;
             }
             let (sort, name) = match self.kind(at) {
-                Kind::Word(t::USE) => (Sort::Use, t::UNDERSCORE),
-                Kind::Word(t::MOD) => {
+                TokenKind::Word(t::USE) => (Sort::Use, t::UNDERSCORE),
+                TokenKind::Word(t::MOD) => {
                     let mut inner = at + 1;
                     let name = self.word(&mut inner)?;
                     let open = inner;
                     self.mark(&mut inner, b'{')?;
                     at = self.tokens[open].closes as usize + 1;
                     if self.is_root(module) && matches!(name, t::TRIG | t::BATCH | t::FUSED_MODULE) {
-                        self.push(Item::new(module, Sort::Given, name, start, at, threads))?;
+                        self.push(TextItem::new(module, Sort::Given, name, start, at, threads))?;
                     } else {
-                        self.modules.push(Module { parent: module, name });
+                        self.modules.push(TextModule { parent: module, name });
                         self.module(self.modules.len() - 1, inner, at - 1, threads)?;
                     }
                     continue;
                 }
-                Kind::Word(t::CONST) => (Sort::Constant, self.word(&mut (at + 1))?),
-                Kind::Word(t::STRUCT) => (Sort::Struct, self.word(&mut (at + 1))?),
-                Kind::Word(t::ENUM) => (Sort::Enum, self.word(&mut (at + 1))?),
-                Kind::Word(t::FN) => (Sort::Function, self.word(&mut (at + 1))?),
-                Kind::Word(t::IMPL) => {
+                TokenKind::Word(t::CONST) => (Sort::Constant, self.word(&mut (at + 1))?),
+                TokenKind::Word(t::STRUCT) => (Sort::Struct, self.word(&mut (at + 1))?),
+                TokenKind::Word(t::ENUM) => (Sort::Enum, self.word(&mut (at + 1))?),
+                TokenKind::Word(t::FN) => (Sort::Function, self.word(&mut (at + 1))?),
+                TokenKind::Word(t::IMPL) => {
                     at += 1;
-                    if self.kind(at) == Kind::Mark(b'<') {
+                    if self.kind(at) == TokenKind::Mark(b'<') {
                         at = self.behind_generics(at)?;
                     }
                     // the last word of the path, or the one behind `for`
                     let (mut name, mut sort) = (t::UNDERSCORE, Sort::Impl);
-                    while self.kind(at) != Kind::Mark(b'{') {
+                    while self.kind(at) != TokenKind::Mark(b'{') {
                         match self.kind(at) {
-                            Kind::Word(t::FOR) => sort = Sort::ImplOf,
-                            Kind::Word(word) => name = word,
-                            Kind::Mark(b'<') => {
+                            TokenKind::Word(t::FOR) => sort = Sort::ImplOf,
+                            TokenKind::Word(word) => name = word,
+                            TokenKind::Mark(b'<') => {
                                 at = self.behind_generics(at)?;
                                 continue;
                             }
-                            Kind::Mark(b':') => {}
+                            TokenKind::Mark(b':') => {}
                             _ => return self.stop(at, "an `impl` that is not known"),
                         }
                         at += 1;
                     }
                     (sort, name)
                 }
-                Kind::Mark(b':') => {
-                    let is_ours = self.kind(at + 2) == Kind::Word(t::STRAIGHTLINE)
-                        && self.kind(at + 5) == Kind::Word(t::WITH_THREADS)
+                TokenKind::Mark(b':') => {
+                    let is_ours = self.kind(at + 2) == TokenKind::Word(t::STRAIGHTLINE)
+                        && self.kind(at + 5) == TokenKind::Word(t::WITH_THREADS)
                         && [(1, b':'), (3, b':'), (4, b':'), (6, b'!'), (7, b'{')]
                             .iter()
-                            .all(|(k, mark)| self.kind(at + k) == Kind::Mark(*mark));
+                            .all(|(k, mark)| self.kind(at + k) == TokenKind::Mark(*mark));
                     if !is_ours || threads || start != at {
                         return self.stop(at, "a macro that is not known");
                     }
@@ -279,18 +279,18 @@ impl<'t> Items<'t> {
             };
             // to the brace that closes it, or to the semicolon
             at = self.end_of_item(at, sort)?;
-            self.push(Item::new(module, sort, name, start, at, threads))?;
+            self.push(TextItem::new(module, sort, name, start, at, threads))?;
         }
         Ok(())
     }
 
     /// Whether a module is the text itself, or the same in another scalar.
     fn is_root(&self, module: usize) -> bool {
-        let Module { parent, name } = self.modules[module];
+        let TextModule { parent, name } = self.modules[module];
         module == 0 || parent == 0 && matches!(name, t::SINGLE | t::DOUBLE)
     }
 
-    fn push(&mut self, item: Item) -> Parsed<()> {
+    fn push(&mut self, item: TextItem) -> ParsedItems<()> {
         let key = (item.module, item.sort, item.name);
         let number = self.all.len();
         if item.sort != Sort::Use && self.named.insert(key, number).is_some() {
@@ -300,27 +300,27 @@ impl<'t> Items<'t> {
         Ok(())
     }
 
-    fn end_of_item(&self, mut at: usize, sort: Sort) -> Parsed<usize> {
+    fn end_of_item(&self, mut at: usize, sort: Sort) -> ParsedItems<usize> {
         let braces_end = !matches!(sort, Sort::Use | Sort::Constant);
         loop {
             match self.kind(at) {
-                Kind::End => return self.stop(at, "an item without end"),
-                Kind::Mark(b';') => return Ok(at + 1),
-                Kind::Mark(b'{') if braces_end => return Ok(self.tokens[at].closes as usize + 1),
-                Kind::Mark(b'(' | b'[' | b'{') => at = self.tokens[at].closes as usize + 1,
-                Kind::Mark(b')' | b']' | b'}') => return self.stop(at, "an item without end"),
+                TokenKind::End => return self.stop(at, "an item without end"),
+                TokenKind::Mark(b';') => return Ok(at + 1),
+                TokenKind::Mark(b'{') if braces_end => return Ok(self.tokens[at].closes as usize + 1),
+                TokenKind::Mark(b'(' | b'[' | b'{') => at = self.tokens[at].closes as usize + 1,
+                TokenKind::Mark(b')' | b']' | b'}') => return self.stop(at, "an item without end"),
                 _ => at += 1,
             }
         }
     }
 
-    fn behind_generics(&self, mut at: usize) -> Parsed<usize> {
+    fn behind_generics(&self, mut at: usize) -> ParsedItems<usize> {
         let mut depth = 0;
         loop {
             match self.kind(at) {
-                Kind::Mark(b'<') => depth += 1,
-                Kind::Mark(b'>') => depth -= 1,
-                Kind::End => return self.stop(at, "`>` is missing here"),
+                TokenKind::Mark(b'<') => depth += 1,
+                TokenKind::Mark(b'>') => depth -= 1,
+                TokenKind::End => return self.stop(at, "`>` is missing here"),
                 _ => {}
             }
             at += 1;
@@ -331,7 +331,7 @@ impl<'t> Items<'t> {
     }
 
     /// An item by its name.
-    pub fn find(&self, module: usize, sort: Sort, name: u32) -> Option<&Item> {
+    pub fn find(&self, module: usize, sort: Sort, name: u32) -> Option<&TextItem> {
         self.named.get(&(module, sort, name)).map(|k| &self.all[*k])
     }
 
@@ -341,13 +341,13 @@ impl<'t> Items<'t> {
     }
 
     /// The signature of a function.
-    pub fn function(&self, item: &Item, format: Format) -> Parsed<Function> {
-        let mut at = item.start + usize::from(self.kind(item.start) == Kind::Word(t::PUB)) + 2;
+    pub fn function(&self, item: &TextItem, format: TextFormat) -> ParsedItems<TextFunction> {
+        let mut at = item.start + usize::from(self.kind(item.start) == TokenKind::Word(t::PUB)) + 2;
         let mut generics = Vec::new();
         let mut format = format;
-        if self.kind(at) == Kind::Mark(b'<') {
+        if self.kind(at) == TokenKind::Mark(b'<') {
             at += 1;
-            while self.kind(at) != Kind::Mark(b'>') {
+            while self.kind(at) != TokenKind::Mark(b'>') {
                 match self.word(&mut at)? {
                     t::CONST => {
                         let name = self.word(&mut at)?;
@@ -362,11 +362,11 @@ impl<'t> Items<'t> {
                         self.mark(&mut at, b':')?;
                         self.keyword(&mut at, t::REAL)?;
                         generics.push(t::T);
-                        format = Format::Any;
+                        format = TextFormat::Any;
                     }
                     _ => return self.stop(at - 1, "a type parameter that is not known"),
                 }
-                if self.kind(at) != Kind::Mark(b'>') {
+                if self.kind(at) != TokenKind::Mark(b'>') {
                     self.mark(&mut at, b',')?;
                 }
             }
@@ -374,7 +374,7 @@ impl<'t> Items<'t> {
         }
         let end = self.tokens[at].closes as usize;
         self.mark(&mut at, b'(')?;
-        let mut parameters: Vec<Parameter> = Vec::new();
+        let mut parameters: Vec<TextParameter> = Vec::new();
         while at < end {
             let name = self.word(&mut at)?;
             let used = !self.text_of(at - 1).starts_with('_');
@@ -383,54 +383,54 @@ impl<'t> Items<'t> {
             }
             self.mark(&mut at, b':')?;
             let of = self.type_of(&mut at, format)?;
-            parameters.push(Parameter { name, of, used });
+            parameters.push(TextParameter { name, of, used });
             if at < end {
                 self.mark(&mut at, b',')?;
             }
         }
         at += 1;
-        if self.kind(at) != Kind::Mark(b'{') {
+        if self.kind(at) != TokenKind::Mark(b'{') {
             return self.stop(at, "a function of another kind");
         }
-        Ok(Function { generics, parameters, body: at })
+        Ok(TextFunction { generics, parameters, body: at })
     }
 
     /// Takes a type; `T` is the format of a generic function.
-    pub fn type_of(&self, at: &mut usize, format: Format) -> Parsed<Type> {
+    pub fn type_of(&self, at: &mut usize, format: TextFormat) -> ParsedItems<Type> {
         match self.kind(*at) {
-            Kind::Mark(b'&') => {
+            TokenKind::Mark(b'&') => {
                 *at += 1;
-                let mutable = self.kind(*at) == Kind::Word(t::MUT);
+                let mutable = self.kind(*at) == TokenKind::Word(t::MUT);
                 *at += usize::from(mutable);
                 Ok(Type::To(mutable, Box::new(self.type_of(at, format)?)))
             }
-            Kind::Mark(b'[') => {
+            TokenKind::Mark(b'[') => {
                 *at += 1;
                 let inner = self.type_of(at, format)?;
                 self.mark(at, b';')?;
                 let extent = match self.kind(*at) {
-                    Kind::Word(t::N) => {
+                    TokenKind::Word(t::N) => {
                         *at += 1;
-                        Extent::Lanes
+                        TextExtent::Lanes
                     }
-                    _ => Extent::Of(self.integer(at)?),
+                    _ => TextExtent::Of(self.integer(at)?),
                 };
                 self.mark(at, b']')?;
                 match inner {
                     Type::Number(format) => Ok(Type::Array(vec![extent], format)),
-                    Type::Array(mut extents, format) if extent != Extent::Lanes => {
+                    Type::Array(mut extents, format) if extent != TextExtent::Lanes => {
                         extents.insert(0, extent);
                         Ok(Type::Array(extents, format))
                     }
                     _ => self.stop(*at - 1, "an array of something that is not a number"),
                 }
             }
-            Kind::Word(word) => {
+            TokenKind::Word(word) => {
                 *at += 1;
                 Ok(match word {
-                    t::F64 => Type::Number(Format::F64),
-                    t::F32 => Type::Number(Format::F32),
-                    t::T if format == Format::Any => Type::Number(Format::Any),
+                    t::F64 => Type::Number(TextFormat::F64),
+                    t::F32 => Type::Number(TextFormat::F32),
+                    t::T if format == TextFormat::Any => Type::Number(TextFormat::Any),
                     word => Type::Named(word),
                 })
             }
@@ -439,8 +439,8 @@ impl<'t> Items<'t> {
     }
 }
 
-impl Item {
-    fn new(module: usize, sort: Sort, name: u32, start: usize, end: usize, threads: bool) -> Item {
-        Item { module, sort, name, start, end, threads, claimed: Cell::new(false) }
+impl TextItem {
+    fn new(module: usize, sort: Sort, name: u32, start: usize, end: usize, threads: bool) -> TextItem {
+        TextItem { module, sort, name, start, end, threads, claimed: Cell::new(false) }
     }
 }

@@ -17,15 +17,15 @@ mod values;
 
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::emit::Generated;
-use crate::program::written::Written;
+use crate::program::written::WrittenFunction;
 use around::Around;
-use items::{Extent, Items, Sort, Type};
-use run::{count_of, Run, Thing};
+use items::{Items, Sort, TextExtent, Type};
+use run::{count_of, Execution, Thing};
 use rustc_hash::FxHashMap;
 use std::fmt;
 use straightline_graph::expr::{Graph, Port};
-use tokens::{Kind, Words};
-use values::{Format, Value, Values};
+use tokens::{TokenKind, Words};
+use values::{TextFormat, TextValue, Values};
 
 /// Where a text is not what it was to be.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,11 +49,11 @@ impl fmt::Display for Mismatch {
 
 /// Where reading ends, in bytes from the text's first, and why.
 #[derive(Clone, Debug)]
-struct Stop(Box<(usize, String)>);
+struct ReadingStop(Box<(usize, String)>);
 
-impl Stop {
-    fn at(at: usize, what: impl Into<String>) -> Stop {
-        Stop(Box::new((at, what.into())))
+impl ReadingStop {
+    fn at(at: usize, what: impl Into<String>) -> ReadingStop {
+        ReadingStop(Box::new((at, what.into())))
     }
 }
 
@@ -62,7 +62,7 @@ impl Stop {
 /// # Errors
 /// The first place where they disagree.
 pub fn check(generated: &Generated) -> Result<(), Mismatch> {
-    Reader::new(generated).check(&generated.text)
+    TextReader::new(generated).check(&generated.text)
 }
 
 /// The text, or an internal error: what disagrees with its programs is no text for anybody.
@@ -94,43 +94,43 @@ pub fn complaint(mismatch: &Mismatch) -> Diagnostic {
 }
 
 /// A function of the text, and what it is to compute.
-struct Wanted<'g> {
+struct WantedFunction<'g> {
     path: Vec<u32>,
     name: String,
     word: u32,
     inputs: &'g [Port],
     outputs: &'g [Port],
-    given: Vec<Value>,
-    results: Vec<Value>,
-    format: Format,
+    given: Vec<TextValue>,
+    results: Vec<TextValue>,
+    format: TextFormat,
     lanes: bool,
     public: bool,
 }
 
 /// What reads texts of the same programs.
-pub struct Reader<'g> {
+pub struct TextReader<'g> {
     generated: &'g Generated,
     words: Words,
     /// Per scalar type: its module, its values, its functions.
-    parts: Vec<Part<'g>>,
+    parts: Vec<TextPart<'g>>,
 }
 
-struct Part<'g> {
+struct TextPart<'g> {
     generated: &'g Generated,
     module: Option<&'static str>,
     values: Values,
-    wanted: Vec<Wanted<'g>>,
+    wanted: Vec<WantedFunction<'g>>,
 }
 
-impl<'g> Reader<'g> {
+impl<'g> TextReader<'g> {
     /// For the text of this, or others in its place.
-    pub fn new(generated: &'g Generated) -> Reader<'g> {
+    pub fn new(generated: &'g Generated) -> TextReader<'g> {
         let mut words = Words::new();
-        let mut parts = vec![Part::new(generated, None, &mut words)];
+        let mut parts = vec![TextPart::new(generated, None, &mut words)];
         for other in &generated.others {
-            parts.push(Part::new(other, Some(other.scalar.module()), &mut words));
+            parts.push(TextPart::new(other, Some(other.scalar.module()), &mut words));
         }
-        Reader { generated, words, parts }
+        TextReader { generated, words, parts }
     }
 
     /// Checks a text.
@@ -139,7 +139,7 @@ impl<'g> Reader<'g> {
     /// The first place where it is not what it was to be.
     pub fn check(&mut self, text: &str) -> Result<(), Mismatch> {
         let mut function = String::new();
-        self.read(text, &mut function).map_err(|Stop(stop)| {
+        self.read(text, &mut function).map_err(|ReadingStop(stop)| {
             let (at, what) = *stop;
             let before = &text[..at.min(text.len())];
             let start = before.rfind('\n').map_or(0, |k| k + 1);
@@ -152,7 +152,7 @@ impl<'g> Reader<'g> {
         })
     }
 
-    fn read(&mut self, text: &str, function: &mut String) -> Result<(), Stop> {
+    fn read(&mut self, text: &str, function: &mut String) -> Result<(), ReadingStop> {
         let items = Items::read(text, &mut self.words)?;
         for part in &mut self.parts {
             part.read(&items, &mut self.words, function)?;
@@ -165,9 +165,9 @@ impl<'g> Reader<'g> {
     }
 }
 
-impl<'g> Part<'g> {
-    fn new(generated: &'g Generated, module: Option<&'static str>, words: &mut Words) -> Part<'g> {
-        let mut part = Part { generated, module, values: Values::default(), wanted: Vec::new() };
+impl<'g> TextPart<'g> {
+    fn new(generated: &'g Generated, module: Option<&'static str>, words: &mut Words) -> TextPart<'g> {
+        let mut part = TextPart { generated, module, values: Values::default(), wanted: Vec::new() };
         let programs = &generated.programs;
         for program in &programs.functions {
             part.want(&[], program, true, words);
@@ -190,27 +190,27 @@ impl<'g> Part<'g> {
         part
     }
 
-    fn want(&mut self, path: &[&str], program: &'g Written, public: bool, words: &mut Words) {
+    fn want(&mut self, path: &[&str], program: &'g WrittenFunction, public: bool, words: &mut Words) {
         let path: Vec<u32> = self.module.iter().chain(path).map(|m| words.number(m)).collect();
-        let format = if program.generic { Format::Any } else { Format::from(program.scalar) };
+        let format = if program.generic { TextFormat::Any } else { TextFormat::from(program.scalar) };
         let wanted = self.wanted_in(program, format, words);
         let (given, results) = (wanted.given.clone(), wanted.results.clone());
-        self.wanted.push(Wanted { path: path.clone(), public, ..wanted });
+        self.wanted.push(WantedFunction { path: path.clone(), public, ..wanted });
         if !program.lanes {
             return;
         }
-        let of_lanes = Format::from(self.generated.scalar);
+        let of_lanes = TextFormat::from(self.generated.scalar);
         let wanted = match of_lanes == format {
-            true => Wanted { given, results, ..self.wanted_in_name(program, format) },
+            true => WantedFunction { given, results, ..self.wanted_in_name(program, format) },
             false => self.wanted_in(program, of_lanes, words),
         };
         let name = format!("{}_lanes", program.name);
-        self.wanted.push(Wanted { path, public, word: words.number(&name), name, lanes: true, ..wanted });
+        self.wanted.push(WantedFunction { path, public, word: words.number(&name), name, lanes: true, ..wanted });
     }
 
-    fn wanted_in_name(&self, program: &'g Written, format: Format) -> Wanted<'g> {
+    fn wanted_in_name(&self, program: &'g WrittenFunction, format: TextFormat) -> WantedFunction<'g> {
         let Graph { inputs, outputs, .. } = &program.graph;
-        Wanted {
+        WantedFunction {
             path: Vec::new(),
             name: program.name.clone(),
             word: 0,
@@ -225,7 +225,7 @@ impl<'g> Part<'g> {
     }
 
     /// The results of a program in a format.
-    fn wanted_in(&mut self, program: &'g Written, format: Format, words: &mut Words) -> Wanted<'g> {
+    fn wanted_in(&mut self, program: &'g WrittenFunction, format: TextFormat, words: &mut Words) -> WantedFunction<'g> {
         let mut given = Vec::new();
         for port in &program.graph.inputs {
             let name = words.number(&port.name);
@@ -233,12 +233,12 @@ impl<'g> Part<'g> {
         }
         let results = self.values.results(&program.graph, &given, format);
         let word = words.number(&program.name);
-        Wanted { word, given, results, ..self.wanted_in_name(program, format) }
+        WantedFunction { word, given, results, ..self.wanted_in_name(program, format) }
     }
 
     /// Reads this part of a text.
-    fn read(&mut self, items: &Items, words: &mut Words, function: &mut String) -> Result<(), Stop> {
-        let nothing = |name: &str| Stop::at(items.text.len(), format!("`{name}` is missing"));
+    fn read(&mut self, items: &Items, words: &mut Words, function: &mut String) -> Result<(), ReadingStop> {
+        let nothing = |name: &str| ReadingStop::at(items.text.len(), format!("`{name}` is missing"));
         let root = match self.module {
             Some(module) => items.inner(0, words.number(module)).ok_or_else(|| nothing(module))?,
             None => 0,
@@ -246,7 +246,7 @@ impl<'g> Part<'g> {
         function.clear();
         let around = Around { items, words, generated: self.generated, root };
         let known = around.read()?;
-        let plain = Format::from(self.generated.scalar);
+        let plain = TextFormat::from(self.generated.scalar);
         let mut signatures = FxHashMap::default();
         for wanted in &self.wanted {
             function.clone_from(&wanted.name);
@@ -262,28 +262,28 @@ impl<'g> Part<'g> {
                 .copied()
                 .ok_or_else(|| nothing(&wanted.name))?;
             // functions of bounds may be in another scalar than the file
-            let own = if wanted.format == Format::Any { plain } else { wanted.format };
+            let own = if wanted.format == TextFormat::Any { plain } else { wanted.format };
             self.values.forget();
             let count = words.len();
             let known = known.get(&module).copied().unwrap_or_default();
-            let mut run = Run::new(items, &mut self.values, &mut signatures, count, (module, known, own));
+            let mut run = Execution::new(items, &mut self.values, &mut signatures, count, (module, known, own));
             wanted.compare(&mut run, item, items, words)?;
         }
         Ok(())
     }
 }
 
-impl Wanted<'_> {
+impl WantedFunction<'_> {
     /// Runs the function of the text, and compares its results.
-    fn compare(&self, run: &mut Run, item: usize, items: &Items, words: &mut Words) -> Result<(), Stop> {
+    fn compare(&self, run: &mut Execution, item: usize, items: &Items, words: &mut Words) -> Result<(), ReadingStop> {
         let signature = run.signature(item)?;
         let start = items.all[item].start;
-        if self.public && items.kind(start) != Kind::Word(tokens::PUB) {
+        if self.public && items.kind(start) != TokenKind::Word(tokens::PUB) {
             return items.stop(start, "a function that nobody can call");
         }
         let generics: &[u32] = match (self.lanes, self.format) {
             (true, _) => &[tokens::N],
-            (false, Format::Any) => &[tokens::T],
+            (false, TextFormat::Any) => &[tokens::T],
             (false, _) => &[],
         };
         if signature.generics != generics {
@@ -301,11 +301,11 @@ impl Wanted<'_> {
             if !named {
                 return items.stop(start, format!("the parameter `{}` is expected in its place", port.name));
             }
-            let mut extents: Vec<Extent> = port.shape.iter().map(|n| Extent::Of(*n)).collect();
+            let mut extents: Vec<TextExtent> = port.shape.iter().map(|n| TextExtent::Of(*n)).collect();
             let of = match &port.wrapper {
                 Some(wrapper) => Type::Named(words.number(wrapper)),
                 None => {
-                    extents.extend(self.lanes.then_some(Extent::Lanes));
+                    extents.extend(self.lanes.then_some(TextExtent::Lanes));
                     Type::Array(extents.clone(), self.format)
                 }
             };
@@ -313,7 +313,7 @@ impl Wanted<'_> {
                 return items.stop(start, format!("the parameter `{}` is to have another type", port.name));
             }
             let numbers = match is_output {
-                true => vec![Value::NONE; port.len()],
+                true => vec![TextValue::NONE; port.len()],
                 false => {
                     let (own, rest) = given.split_at(port.len());
                     given = rest;
@@ -339,10 +339,10 @@ impl Wanted<'_> {
                     continue;
                 }
                 let what = match *found {
-                    Value::NONE => format!("result {k} of `{}` is never put out", port.name),
+                    TextValue::NONE => format!("result {k} of `{}` is never put out", port.name),
                     _ => format!("result {k} of `{}` is to be another value", port.name),
                 };
-                return items.stop(if *found == Value::NONE { start } else { *token as usize }, what);
+                return items.stop(if *found == TextValue::NONE { start } else { *token as usize }, what);
             }
         }
         Ok(())

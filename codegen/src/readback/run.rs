@@ -4,10 +4,10 @@
 //! loop over lanes for one lane that stands for all, a call binds parameters by their place. Types are compared, so that no number
 //! changes its format unnoticed.
 
-use super::items::{Extent, Function, Items, Type};
-use super::tokens::{self as t, Kind};
-use super::values::{Format, Value, Values};
-use super::Stop;
+use super::items::{Items, TextExtent, TextFunction, Type};
+use super::tokens::{self as t, TokenKind};
+use super::values::{TextFormat, TextValue, Values};
+use super::ReadingStop;
 use rustc_hash::FxHashMap;
 use std::rc::Rc;
 
@@ -20,11 +20,11 @@ const DEEPEST: usize = 4;
 /// So many turns may a loop over limbs take.
 const LONGEST: usize = 1 << 12;
 
-type Ran<X> = Result<X, Stop>;
+type Ran<X> = Result<X, ReadingStop>;
 
 /// An array, by itself or behind a reference.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct ArrayPlace {
     array: u32,
     mutable: bool,
     reference: bool,
@@ -34,13 +34,13 @@ pub struct Place {
 #[derive(Clone, Copy, Debug)]
 pub enum Thing {
     /// A number.
-    Number(Value),
+    Number(TextValue),
     /// A local that waits for its number.
-    Declared(Format),
+    Declared(TextFormat),
     /// Numbers in an array.
-    Place(Place),
+    Place(ArrayPlace),
     /// A reference to a type of that name around an array.
-    Wrapped(u32, Place),
+    Wrapped(u32, ArrayPlace),
     /// Which limb.
     Index(usize),
     /// Which lane.
@@ -50,8 +50,8 @@ pub enum Thing {
 #[derive(Clone, Debug)]
 struct Array {
     first: u32,
-    extents: Vec<Extent>,
-    format: Format,
+    extents: Vec<TextExtent>,
+    format: TextFormat,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +63,7 @@ struct Local {
 
 /// Names that modules make known.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Known {
+pub struct KnownNames {
     /// The module `trig`.
     pub trig: bool,
     /// The module `fused`, and its functions `fma` and `fma_if`.
@@ -73,17 +73,17 @@ pub struct Known {
 }
 
 /// A run through functions of a text.
-pub struct Run<'a, 't> {
+pub struct Execution<'a, 't> {
     items: &'a Items<'t>,
     values: &'a mut Values,
-    functions: &'a mut FxHashMap<usize, Rc<Function>>,
-    known: Known,
+    functions: &'a mut FxHashMap<usize, Rc<TextFunction>>,
+    known: KnownNames,
     module: usize,
     /// The format of functions that are not generic.
-    plain: Format,
+    plain: TextFormat,
     at: usize,
     depth: usize,
-    cells: Vec<Value>,
+    cells: Vec<TextValue>,
     written: Vec<u32>,
     arrays: Vec<Array>,
     locals: Vec<Local>,
@@ -96,16 +96,16 @@ pub struct Run<'a, 't> {
     names: Vec<u32>,
 }
 
-impl<'a, 't> Run<'a, 't> {
+impl<'a, 't> Execution<'a, 't> {
     /// Before a call.
     pub fn new(
         items: &'a Items<'t>,
         values: &'a mut Values,
-        functions: &'a mut FxHashMap<usize, Rc<Function>>,
+        functions: &'a mut FxHashMap<usize, Rc<TextFunction>>,
         words: usize,
-        (module, known, plain): (usize, Known, Format),
-    ) -> Run<'a, 't> {
-        Run {
+        (module, known, plain): (usize, KnownNames, TextFormat),
+    ) -> Execution<'a, 't> {
+        Execution {
             items,
             values,
             functions,
@@ -126,16 +126,22 @@ impl<'a, 't> Run<'a, 't> {
     }
 
     /// An array of these numbers, which a function may be given.
-    pub fn array(&mut self, extents: &[Extent], format: Format, numbers: &[Value], mutable: bool) -> Place {
+    pub fn array(
+        &mut self,
+        extents: &[TextExtent],
+        format: TextFormat,
+        numbers: &[TextValue],
+        mutable: bool,
+    ) -> ArrayPlace {
         let first = self.cells.len() as u32;
         self.cells.extend_from_slice(numbers);
         self.written.resize(self.cells.len(), 0);
         self.arrays.push(Array { first, extents: extents.to_vec(), format });
-        Place { array: self.arrays.len() as u32 - 1, mutable, reference: true }
+        ArrayPlace { array: self.arrays.len() as u32 - 1, mutable, reference: true }
     }
 
     /// What stands in an array now, and which token put each number there.
-    pub fn numbers(&self, place: Place) -> (&[Value], &[u32]) {
+    pub fn numbers(&self, place: ArrayPlace) -> (&[TextValue], &[u32]) {
         let array = &self.arrays[place.array as usize];
         let range = array.first as usize..array.first as usize + count_of(&array.extents);
         (&self.cells[range.clone()], &self.written[range])
@@ -168,7 +174,7 @@ impl<'a, 't> Run<'a, 't> {
         }
         self.depth += 1;
         self.at = function.body;
-        let format = if function.generics.contains(&t::T) { Format::Any } else { self.plain };
+        let format = if function.generics.contains(&t::T) { TextFormat::Any } else { self.plain };
         self.block(&function, format)?;
         self.depth -= 1;
         self.unbind(count);
@@ -177,7 +183,7 @@ impl<'a, 't> Run<'a, 't> {
     }
 
     /// The signature of a function of the text.
-    pub fn signature(&mut self, item: usize) -> Ran<Rc<Function>> {
+    pub fn signature(&mut self, item: usize) -> Ran<Rc<TextFunction>> {
         if let Some(function) = self.functions.get(&item) {
             return Ok(function.clone());
         }
@@ -220,18 +226,18 @@ impl<'a, 't> Run<'a, 't> {
         (self.named[name as usize] as usize).checked_sub(1).filter(|k| *k >= self.own)
     }
 
-    fn kind(&self) -> Kind {
+    fn kind(&self) -> TokenKind {
         self.items.tokens[self.at].kind
     }
 
-    fn ahead(&self, by: usize) -> Kind {
+    fn ahead(&self, by: usize) -> TokenKind {
         self.items.tokens[self.at + by].kind
     }
 
     /// Whether a number stands here that does not say its format.
     fn begins_with_a_number(&self) -> bool {
-        let at = self.at + usize::from(self.kind() == Kind::Mark(b'-'));
-        self.items.tokens[at].kind == Kind::Number && !self.items.text_of(at).ends_with("_f32")
+        let at = self.at + usize::from(self.kind() == TokenKind::Mark(b'-'));
+        self.items.tokens[at].kind == TokenKind::Number && !self.items.text_of(at).ends_with("_f32")
     }
 
     /// Whether there is a name before the bracket closes that is open here.
@@ -239,10 +245,10 @@ impl<'a, 't> Run<'a, 't> {
         let mut open = 1;
         for token in &self.items.tokens[self.at..] {
             match token.kind {
-                Kind::Word(_) => return true,
-                Kind::Mark(b'(') => open += 1,
-                Kind::Mark(b')') => open -= 1,
-                Kind::End => return false,
+                TokenKind::Word(_) => return true,
+                TokenKind::Mark(b'(') => open += 1,
+                TokenKind::Mark(b')') => open -= 1,
+                TokenKind::End => return false,
                 _ => {}
             }
             if open == 0 {
@@ -269,7 +275,7 @@ impl<'a, 't> Run<'a, 't> {
 
     /// Takes this mark, if it stands here.
     fn takes(&mut self, mark: u8) -> bool {
-        let is_here = self.kind() == Kind::Mark(mark);
+        let is_here = self.kind() == TokenKind::Mark(mark);
         self.at += usize::from(is_here);
         is_here
     }
@@ -279,7 +285,7 @@ impl<'a, 't> Run<'a, 't> {
         let mut all = Vec::new();
         while !self.takes(close) {
             all.push(each(self)?);
-            if self.kind() != Kind::Mark(close) {
+            if self.kind() != TokenKind::Mark(close) {
                 self.mark(b',')?;
             }
         }
@@ -296,10 +302,10 @@ impl<'a, 't> Run<'a, 't> {
 }
 
 /// How many numbers an array has per lane.
-pub fn count_of(extents: &[Extent]) -> usize {
-    let of = |extent: &Extent| match extent {
-        Extent::Of(n) => *n,
-        Extent::Lanes => 1,
+pub fn count_of(extents: &[TextExtent]) -> usize {
+    let of = |extent: &TextExtent| match extent {
+        TextExtent::Of(n) => *n,
+        TextExtent::Lanes => 1,
     };
     extents.iter().map(of).product()
 }

@@ -4,7 +4,7 @@ use rustc_hash::FxHashMap;
 
 /// What stands at a place of the text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum TokenKind {
     /// An identifier or keyword, by its number.
     Word(u32),
     /// A number as it is written.
@@ -23,7 +23,7 @@ pub enum Kind {
 #[derive(Clone, Copy, Debug)]
 pub struct Token {
     /// What it is.
-    pub kind: Kind,
+    pub kind: TokenKind,
     /// First byte.
     pub start: u32,
     /// Behind its last byte.
@@ -36,8 +36,8 @@ macro_rules! words {
     ($($name:ident = $text:literal,)*) => {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms)]
         #[derive(Clone, Copy)]
-        enum Known { $($name,)* }
-        $(#[doc = concat!("`", $text, "`")] pub const $name: u32 = Known::$name as u32;)*
+        enum KnownTokens { $($name,)* }
+        $(#[doc = concat!("`", $text, "`")] pub const $name: u32 = KnownTokens::$name as u32;)*
         const KNOWN: &[&str] = &[$($text,)*];
     };
 }
@@ -82,7 +82,7 @@ impl Words {
     }
 }
 
-/// The tokens of a text, an [`Kind::End`] behind them; or the place and what is wrong there.
+/// The tokens of a text, an [`TokenKind::End`] behind them; or the place and what is wrong there.
 pub fn tokens(text: &str, words: &mut Words) -> Result<Vec<Token>, (usize, &'static str)> {
     let bytes = text.as_bytes();
     let mut tokens: Vec<Token> = Vec::with_capacity(bytes.len() / 4);
@@ -106,11 +106,11 @@ pub fn tokens(text: &str, words: &mut Words) -> Result<Vec<Token>, (usize, &'sta
                 while at < bytes.len() && is_word(bytes[at]) {
                     at += 1;
                 }
-                Kind::Word(words.number(&text[start..at]))
+                TokenKind::Word(words.number(&text[start..at]))
             }
             b'0'..=b'9' => {
                 at = number(bytes, at);
-                Kind::Number
+                TokenKind::Number
             }
             b'"' => {
                 at += 1;
@@ -121,24 +121,24 @@ pub fn tokens(text: &str, words: &mut Words) -> Result<Vec<Token>, (usize, &'sta
                     return Err((start, "a string without end"));
                 }
                 at += 1;
-                Kind::Text
+                TokenKind::Text
             }
             b'\'' => {
                 at += 1;
                 while at < bytes.len() && is_word(bytes[at]) {
                     at += 1;
                 }
-                Kind::Life
+                TokenKind::Life
             }
             mark if mark.is_ascii_graphic() => {
                 at += 1;
-                Kind::Mark(mark)
+                TokenKind::Mark(mark)
             }
             _ => return Err((at, "a character that is none of the language")),
         };
         match kind {
-            Kind::Mark(b'(' | b'[' | b'{') => open.push(tokens.len()),
-            Kind::Mark(mark @ (b')' | b']' | b'}')) => {
+            TokenKind::Mark(b'(' | b'[' | b'{') => open.push(tokens.len()),
+            TokenKind::Mark(mark @ (b')' | b']' | b'}')) => {
                 let opened = open.pop().ok_or((start, "a bracket that nothing opens"))?;
                 let expected = match bytes[tokens[opened].start as usize] {
                     b'(' => b')',
@@ -158,7 +158,7 @@ pub fn tokens(text: &str, words: &mut Words) -> Result<Vec<Token>, (usize, &'sta
         return Err((tokens[opened].start as usize, "a bracket that nothing closes"));
     }
     let end = bytes.len() as u32;
-    tokens.push(Token { kind: Kind::End, start: end, end, closes: 0 });
+    tokens.push(Token { kind: TokenKind::End, start: end, end, closes: 0 });
     Ok(tokens)
 }
 
@@ -199,7 +199,11 @@ mod tests {
 
     fn pieces(text: &str) -> Vec<String> {
         let tokens = tokens(text, &mut Words::new()).unwrap();
-        tokens.iter().filter(|t| t.kind != Kind::End).map(|t| text[t.start as usize..t.end as usize].into()).collect()
+        tokens
+            .iter()
+            .filter(|t| t.kind != TokenKind::End)
+            .map(|t| text[t.start as usize..t.end as usize].into())
+            .collect()
     }
 
     #[test]

@@ -9,7 +9,7 @@ use straightline_graph::Scalar;
 
 /// In which format a value is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub enum TextFormat {
     /// Double precision.
     F64,
     /// Single precision.
@@ -18,25 +18,25 @@ pub enum Format {
     Any,
 }
 
-impl From<Scalar> for Format {
-    fn from(scalar: Scalar) -> Format {
+impl From<Scalar> for TextFormat {
+    fn from(scalar: Scalar) -> TextFormat {
         match scalar {
-            Scalar::F64 => Format::F64,
-            Scalar::F32 => Format::F32,
+            Scalar::F64 => TextFormat::F64,
+            Scalar::F32 => TextFormat::F32,
         }
     }
 }
 
 /// A value and its sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Value(u32);
+pub struct TextValue(u32);
 
-impl Value {
+impl TextValue {
     /// No value.
-    pub const NONE: Value = Value(u32::MAX);
+    pub const NONE: TextValue = TextValue(u32::MAX);
 
-    fn new(number: u32, negative: bool) -> Value {
-        Value(number << 1 | u32::from(negative))
+    fn new(number: u32, negative: bool) -> TextValue {
+        TextValue(number << 1 | u32::from(negative))
     }
 
     fn number(self) -> u32 {
@@ -48,13 +48,13 @@ impl Value {
     }
 
     /// With the other sign.
-    pub fn negated(self) -> Value {
-        Value(self.0 ^ 1)
+    pub fn negated(self) -> TextValue {
+        TextValue(self.0 ^ 1)
     }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-enum What {
+enum ValueKind {
     Input,
     Constant,
     Long,
@@ -72,7 +72,7 @@ enum What {
 
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 struct Key {
-    what: What,
+    what: ValueKind,
     format: u8,
     a: u32,
     b: u32,
@@ -82,13 +82,13 @@ struct Key {
 #[derive(Clone, Debug, Default)]
 pub struct Values {
     known: FxHashMap<Key, u32>,
-    formats: Vec<Format>,
+    formats: Vec<TextFormat>,
     /// How many of them the programs have: others are the text's alone.
     wanted: usize,
 }
 
 impl Values {
-    fn get(&mut self, what: What, format: Format, a: u32, b: u32) -> u32 {
+    fn get(&mut self, what: ValueKind, format: TextFormat, a: u32, b: u32) -> u32 {
         let key = Key { what, format: format as u8, a, b };
         let next = self.formats.len() as u32;
         let number = *self.known.entry(key).or_insert(next);
@@ -104,7 +104,7 @@ impl Values {
     }
 
     /// Whether some program computes this.
-    pub fn is_wanted(&self, value: Value) -> bool {
+    pub fn is_wanted(&self, value: TextValue) -> bool {
         (value.number() as usize) < self.wanted
     }
 
@@ -118,111 +118,111 @@ impl Values {
     }
 
     /// The format of a value.
-    pub fn format(&self, value: Value) -> Format {
+    pub fn format(&self, value: TextValue) -> TextFormat {
         self.formats[value.number() as usize]
     }
 
     /// Scalar `index` of the input of that name.
-    pub fn input(&mut self, name: u32, index: usize, format: Format) -> Value {
-        Value::new(self.get(What::Input, format, name, index as u32), false)
+    pub fn input(&mut self, name: u32, index: usize, format: TextFormat) -> TextValue {
+        TextValue::new(self.get(ValueKind::Input, format, name, index as u32), false)
     }
 
     /// A number.
-    pub fn constant(&mut self, x: f64, format: Format) -> Value {
+    pub fn constant(&mut self, x: f64, format: TextFormat) -> TextValue {
         let bits = x.abs().to_bits();
-        Value::new(self.get(What::Constant, format, (bits >> 32) as u32, bits as u32), x.is_sign_negative())
+        TextValue::new(self.get(ValueKind::Constant, format, (bits >> 32) as u32, bits as u32), x.is_sign_negative())
     }
 
     /// A number in two parts, of a caller's format.
-    pub fn long(&mut self, high: f64, low: f64) -> Value {
+    pub fn long(&mut self, high: f64, low: f64) -> TextValue {
         let negative = high < 0.0;
         let [high, low] = if negative { [-high, -low] } else { [high, low] };
-        let [a, b] = [high + 0.0, low + 0.0].map(|x| self.constant(x, Format::F64).0);
-        Value::new(self.get(What::Long, Format::Any, a, b), negative)
+        let [a, b] = [high + 0.0, low + 0.0].map(|x| self.constant(x, TextFormat::F64).0);
+        TextValue::new(self.get(ValueKind::Long, TextFormat::Any, a, b), negative)
     }
 
     /// a + b.
-    pub fn add(&mut self, a: Value, b: Value) -> Value {
+    pub fn add(&mut self, a: TextValue, b: TextValue) -> TextValue {
         let format = self.format(a);
-        Value::new(self.get(What::Add, format, a.min(b).0, a.max(b).0), false)
+        TextValue::new(self.get(ValueKind::Add, format, a.min(b).0, a.max(b).0), false)
     }
 
-    fn product(&mut self, what: What, a: Value, b: Value) -> Value {
+    fn product(&mut self, what: ValueKind, a: TextValue, b: TextValue) -> TextValue {
         let format = self.format(a);
-        Value::new(self.get(what, format, a.number(), b.number()), a.is_negative() != b.is_negative())
+        TextValue::new(self.get(what, format, a.number(), b.number()), a.is_negative() != b.is_negative())
     }
 
     /// a · b.
-    pub fn mul(&mut self, a: Value, b: Value) -> Value {
+    pub fn mul(&mut self, a: TextValue, b: TextValue) -> TextValue {
         let [first, second] = if a.number() <= b.number() { [a, b] } else { [b, a] };
-        self.product(What::Mul, first, second)
+        self.product(ValueKind::Mul, first, second)
     }
 
     /// a / b.
-    pub fn div(&mut self, a: Value, b: Value) -> Value {
-        self.product(What::Div, a, b)
+    pub fn div(&mut self, a: TextValue, b: TextValue) -> TextValue {
+        self.product(ValueKind::Div, a, b)
     }
 
     /// √a.
-    pub fn sqrt(&mut self, a: Value) -> Value {
+    pub fn sqrt(&mut self, a: TextValue) -> TextValue {
         let format = self.format(a);
-        Value::new(self.get(What::Sqrt, format, a.0, 0), false)
+        TextValue::new(self.get(ValueKind::Sqrt, format, a.0, 0), false)
     }
 
     /// −1, 0 or 1.
-    pub fn sign(&mut self, a: Value) -> Value {
+    pub fn sign(&mut self, a: TextValue) -> TextValue {
         let format = self.format(a);
-        Value::new(self.get(What::Sign, format, a.0, 0), false)
+        TextValue::new(self.get(ValueKind::Sign, format, a.0, 0), false)
     }
 
     /// An angle, the sum of these in this order: what sine and cosine take.
-    pub fn angle(&mut self, terms: impl IntoIterator<Item = Value>) -> Value {
-        let mut angle = Value::NONE;
+    pub fn angle(&mut self, terms: impl IntoIterator<Item = TextValue>) -> TextValue {
+        let mut angle = TextValue::NONE;
         for term in terms {
             let format = self.format(term);
-            angle = Value::new(self.get(What::Angle, format, angle.0, term.0), false);
+            angle = TextValue::new(self.get(ValueKind::Angle, format, angle.0, term.0), false);
         }
         angle
     }
 
     /// Sine and cosine of an angle.
-    pub fn sin_cos(&mut self, angle: Value) -> (Value, Value) {
+    pub fn sin_cos(&mut self, angle: TextValue) -> (TextValue, TextValue) {
         let format = self.format(angle);
-        let mut of = |what| Value::new(self.get(what, format, angle.0, 0), false);
-        (of(What::Sin), of(What::Cos))
+        let mut of = |what| TextValue::new(self.get(what, format, angle.0, 0), false);
+        (of(ValueKind::Sin), of(ValueKind::Cos))
     }
 
     /// In f64 what was in f32.
-    pub fn widened(&mut self, a: Value) -> Value {
-        Value::new(self.get(What::Widened, Format::F64, a.number(), 0), a.is_negative())
+    pub fn widened(&mut self, a: TextValue) -> TextValue {
+        TextValue::new(self.get(ValueKind::Widened, TextFormat::F64, a.number(), 0), a.is_negative())
     }
 
     /// In f32 what was in f64.
-    pub fn rounded(&mut self, a: Value) -> Value {
-        Value::new(self.get(What::Rounded, Format::F32, a.number(), 0), a.is_negative())
+    pub fn rounded(&mut self, a: TextValue) -> TextValue {
+        TextValue::new(self.get(ValueKind::Rounded, TextFormat::F32, a.number(), 0), a.is_negative())
     }
 
     /// The results of a graph for these inputs.
-    pub fn results(&mut self, graph: &Graph, inputs: &[Value], format: Format) -> Vec<Value> {
-        let mut values: Vec<Value> = Vec::with_capacity(graph.ops.len());
+    pub fn results(&mut self, graph: &Graph, inputs: &[TextValue], format: TextFormat) -> Vec<TextValue> {
+        let mut values: Vec<TextValue> = Vec::with_capacity(graph.ops.len());
         for (i, op) in graph.ops.iter().enumerate() {
             let precision = graph.formats.get(i);
-            let computed = precision.map_or(format, |p| Format::from(p.computed));
-            let held = precision.map_or(format, |p| Format::from(p.held));
+            let computed = precision.map_or(format, |p| TextFormat::from(p.computed));
+            let held = precision.map_or(format, |p| TextFormat::from(p.held));
             // an operand in the format in which the operation is computed
             let operand = |id: NodeId, known: &mut Values| {
                 let value = values[id.index()];
                 match (known.format(value), computed) {
-                    (Format::F32, Format::F64) => known.widened(value),
+                    (TextFormat::F32, TextFormat::F64) => known.widened(value),
                     _ => value,
                 }
             };
             let value = match *op {
                 Op::Input(k) => inputs[k as usize],
                 Op::Constant(c) => match held {
-                    Format::F64 => self.constant(c.value().to_f64(), Format::F64),
-                    Format::F32 => self.constant(f64::from(c.value().to_f32()), Format::F32),
-                    Format::Any => self.long(c.value().hi(), c.value().lo()),
+                    TextFormat::F64 => self.constant(c.value().to_f64(), TextFormat::F64),
+                    TextFormat::F32 => self.constant(f64::from(c.value().to_f32()), TextFormat::F32),
+                    TextFormat::Any => self.long(c.value().hi(), c.value().lo()),
                 },
                 Op::Unary(op, a) => {
                     let a = operand(a, self);
@@ -242,7 +242,7 @@ impl Values {
                     }
                 }
                 // formed where its sine is
-                Op::AngleSum(..) => Value::NONE,
+                Op::AngleSum(..) => TextValue::NONE,
                 Op::SinCos(a) => self.angle(graph.angle_terms(a).into_iter().map(|term| values[term.index()])),
                 Op::Sin(a) => self.sin_cos(values[a.index()]).0,
                 Op::Cos(a) => self.sin_cos(values[a.index()]).1,

@@ -5,8 +5,8 @@ use super::waterfall::robot_in;
 use crate::diagnostic::Diagnostics;
 use crate::function::{Function, Quantity};
 use crate::options::Options;
-use crate::program::{checked, Program};
-use crate::scene::{messages as say, Budget, Coulomb, Effects, Gravity, MaxError, Misfit, Scene, Zero};
+use crate::program::{checked, TracedProgram};
+use crate::scene::{messages as say, Budget, CoulombForm, Effects, Gravity, MaxError, Misfit, Scene, Zero};
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
 use straightline_core::Dd;
@@ -33,7 +33,7 @@ pub struct Measures {
 
 impl Measures {
     /// Of a program in that scalar.
-    pub fn of(program: &Program, scalar: Scalar) -> Measures {
+    pub fn of(program: &TracedProgram, scalar: Scalar) -> Measures {
         let (counts, schedule) = (program.graph.counts(), &program.schedule);
         Measures {
             flops: counts.flops(),
@@ -52,8 +52,8 @@ impl Measures {
 /// and the simple humanoid (f64), of Panda, PUMA 560 and Solo 12 (f32), compiled by rustc 1.95.0 with `-C opt-level=3
 /// -C codegen-units=1` for x86-64 without further target features; sizes by `nm -S`, the kernel included. Estimate over measured
 /// size: 0.67 to 1.27, median 1.00, in f32 0.71 to 1.16. `opt-level = "s"`, fused operations and other processors give less.
-fn code_bytes(program: &Program, scalar: Scalar) -> usize {
-    let Program { graph, schedule, .. } = program;
+fn code_bytes(program: &TracedProgram, scalar: Scalar) -> usize {
+    let TracedProgram { graph, schedule, .. } = program;
     let [operation, alone, block] = scalar.code_bytes();
     // a row of a loop over limbs is there once
     let live = graph.live();
@@ -145,7 +145,7 @@ pub fn check(
 
 /// Complains of every bound of rounding errors that is greater than the scene allows, and of demanded bounds that do not exist.
 pub fn check_errors<'a>(
-    bounds: impl Iterator<Item = (&'a Program, &'a Option<ErrorReport>)>,
+    bounds: impl Iterator<Item = (&'a TracedProgram, &'a Option<ErrorReport>)>,
     options: &Options,
     diagnostics: &mut Diagnostics,
 ) {
@@ -195,7 +195,8 @@ fn remedies(whole: &Model<Dd>, frames: &[String], function: Function, options: &
     if scene.gravity != Gravity::Constant([0.0; 3]) {
         candidates.push(("no gravity".to_string(), Scene { gravity: Gravity::Constant([0.0; 3]), ..scene.clone() }));
     }
-    let off = Effects { rotor_inertia: false, damping: false, coulomb: Coulomb::Off, springs: false, ..scene.effects };
+    let off =
+        Effects { rotor_inertia: false, damping: false, coulomb: CoulombForm::Off, springs: false, ..scene.effects };
     if scene.effects != off {
         candidates
             .push(("no friction, rotor inertia and springs".to_string(), Scene { effects: off, ..scene.clone() }));

@@ -5,14 +5,14 @@ use crate::function::{Function, Judged};
 use crate::options::{Optimisations, Options};
 use crate::program::companion::ROUNDED;
 use crate::program::input_box::input_box;
-use crate::program::{optimised, pivots, Program};
+use crate::program::{optimised, pivots, TracedProgram};
 use crate::report::errors::ErrorReport;
-use straightline_graph::certify::{self, Effort, Known};
+use straightline_graph::certify::{self, Effort, KnownSystem};
 use straightline_graph::expr::Graph;
 
 /// The bounds of rounding errors of every program, where they are asked for.
-pub(crate) fn certificates(robot: &Robot, programs: &[Program], options: &Options) -> Vec<Option<ErrorReport>> {
-    let of = |p: &Program| {
+pub(crate) fn certificates(robot: &Robot, programs: &[TracedProgram], options: &Options) -> Vec<Option<ErrorReport>> {
+    let of = |p: &TracedProgram| {
         let budgeted = options.scene.budgets.get(&p.function).is_some_and(|b| b.max_error.is_some());
         let effort = options.certify.or(budgeted.then(Effort::default))?;
         let outputs = &p.graph.outputs;
@@ -26,7 +26,7 @@ pub(crate) fn certificates(robot: &Robot, programs: &[Program], options: &Option
         let ranges = certify::box_in_words(&p.graph.inputs, &inputs);
         let known = match p.function.spec().judged {
             Judged::ByResidual => known(robot, &p.graph, &inputs, options),
-            _ => Known::default(),
+            _ => KnownSystem::default(),
         };
         Some(match certify::certify_with(&p.graph, options.scalar, &inputs, effort, &known) {
             Ok(certificate) => ErrorReport::new(outputs, ranges, certificate),
@@ -37,14 +37,14 @@ pub(crate) fn certificates(robot: &Robot, programs: &[Program], options: &Option
 }
 
 /// What mechanics knows of the values of forward dynamics: [`pivots`].
-pub fn known(robot: &Robot, graph: &Graph, inputs: &[certify::Interval], options: &Options) -> Known {
+pub fn known(robot: &Robot, graph: &Graph, inputs: &[certify::Interval], options: &Options) -> KnownSystem {
     if !pivots::is_arm(&robot.model, graph) {
-        return Known::default();
+        return KnownSystem::default();
     }
     let all = options.optimisations();
     let plain = Optimisations { chosen: false, limbs: false, substitutes: false, ..all };
     let of = |function| optimised(robot, &[], function, options, plain);
     let (mass_matrix, torques) = (of(Function::MassMatrix), of(Function::InverseDynamics));
     let sizes = pivots::Sizes::of(&mass_matrix, &torques, &options.scene, &robot.model);
-    sizes.map_or_else(|_| Known::default(), |sizes| pivots::known(&robot.model, graph, inputs, &sizes))
+    sizes.map_or_else(|_| KnownSystem::default(), |sizes| pivots::known(&robot.model, graph, inputs, &sizes))
 }

@@ -8,7 +8,7 @@ pub mod waterfall;
 use crate::equations::forward_method::MethodChoice;
 use crate::function::Function;
 use crate::program::staged::StagedReport;
-use crate::program::Program;
+use crate::program::TracedProgram;
 use budget::Measures;
 use errors::ErrorReport;
 use std::collections::BTreeMap;
@@ -79,7 +79,7 @@ impl ContactReport {
 
 impl FunctionReport {
     /// From a program and its number of lines.
-    pub fn new(program: &Program, scalar: Scalar, lines: usize) -> Self {
+    pub fn new(program: &TracedProgram, scalar: Scalar, lines: usize) -> Self {
         let Counts { mul, add, fma, div, sqrt, tail, sin_cos } = program.graph.counts();
         let Measures { stack_bytes, code_bytes, live, .. } = Measures::of(program, scalar);
         FunctionReport {

@@ -9,7 +9,7 @@ use crate::equations::Robot;
 use crate::function::Function;
 use crate::options::{Optimisations, Options};
 use crate::program::optimised;
-use crate::scene::{apply, Base, Coulomb, Effects, Gravity, Parameter, Part, Scene};
+use crate::scene::{apply, Base, CoulombForm, Effects, Gravity, Parameter, ResultPart, Scene};
 use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::expr::Counts;
@@ -71,47 +71,53 @@ pub fn signed(change: i64) -> String {
 
 /// A scene on the way from none to the whole one.
 #[derive(Debug)]
-pub struct Stop {
+pub struct SceneStop {
     /// What was added last.
-    what: What,
+    what: ItemKind,
     scene: Scene,
     robot: Robot,
 }
 
 /// What a scene's item says.
 #[derive(Clone, Debug)]
-enum What {
+enum ItemKind {
     Text(String),
     /// The results that are wanted, in the words of each function.
     Selection,
 }
 
 /// The stops of a scene for a robot, `whole` as its file has it: first the empty scene, last the scene itself.
-pub fn stops(whole: &Model<Dd>, scene: &Scene) -> Vec<Stop> {
+pub fn stops(whole: &Model<Dd>, scene: &Scene) -> Vec<SceneStop> {
     // drives belong to the robot, wherever they are written
     let mut now = Scene { places: scene.places.clone(), drives: scene.drives.clone(), ..Scene::default() };
-    let mut stops: Vec<Stop> = robot_in(whole, &now)
-        .map(|(robot, scene)| Stop { what: What::Text(String::new()), scene, robot })
+    let mut stops: Vec<SceneStop> = robot_in(whole, &now)
+        .map(|(robot, scene)| SceneStop { what: ItemKind::Text(String::new()), scene, robot })
         .into_iter()
         .collect();
     for (what, change) in items(whole, scene) {
         change(&mut now, scene);
         // a part of a sound scene is sound; if it were not, its step would count with the next
-        stops.extend(robot_in(whole, &now).map(|(robot, scene)| Stop { what, scene, robot }));
+        stops.extend(robot_in(whole, &now).map(|(robot, scene)| SceneStop { what, scene, robot }));
     }
     stops
 }
 
 /// The waterfall of a function. `frames` are those of the final program, `last` its counts.
-pub fn waterfall(stops: &[Stop], frames: &[String], function: Function, options: &Options, last: Counts) -> Waterfall {
+pub fn waterfall(
+    stops: &[SceneStop],
+    frames: &[String],
+    function: Function,
+    options: &Options,
+    last: Counts,
+) -> Waterfall {
     // frames that only the scene names are those of every stop
     let frames = if frames.is_empty() { options.scene.frames_of(function, frames) } else { frames };
     // a robot may have a function only as its scene has it, as where drives of several joints are left with one
-    let stops: Vec<&Stop> = stops.iter().filter(|stop| function.is_of(&stop.robot.model)).collect();
+    let stops: Vec<&SceneStop> = stops.iter().filter(|stop| function.is_of(&stop.robot.model)).collect();
     if stops.is_empty() {
         return Waterfall { plain: last, full: last, savings: Vec::new() };
     }
-    let counts = |stop: &Stop, optimisations| {
+    let counts = |stop: &SceneStop, optimisations| {
         let options = Options { scene: stop.scene.clone(), ..options.clone() };
         optimised(&stop.robot, frames, function, &options, optimisations).counts()
     };
@@ -134,8 +140,8 @@ pub fn waterfall(stops: &[Stop], frames: &[String], function: Function, options:
     }
     for (i, stop) in stops.iter().enumerate().skip(1) {
         let what = match &stop.what {
-            What::Text(text) => text.clone(),
-            What::Selection => selection(function, &stop.scene),
+            ItemKind::Text(text) => text.clone(),
+            ItemKind::Selection => selection(function, &stop.scene),
         };
         let after = if i + 1 == stops.len() { last } else { counts(stop, all) };
         step(&what, By::Scene, after);
@@ -153,21 +159,23 @@ pub fn robot_in(whole: &Model<Dd>, scene: &Scene) -> Option<(Robot, Scene)> {
 /// The items of a scene in words, those of its selected outputs by function.
 pub fn items_of(whole: &Model<Dd>, scene: &Scene) -> Vec<String> {
     let words = |(what, _)| match what {
-        What::Text(text) => vec![text],
-        What::Selection => scene.outputs.keys().map(|f| format!("{}: {}", f.name(), selection(*f, scene))).collect(),
+        ItemKind::Text(text) => vec![text],
+        ItemKind::Selection => {
+            scene.outputs.keys().map(|f| format!("{}: {}", f.name(), selection(*f, scene))).collect()
+        }
     };
     items(whole, scene).into_iter().flat_map(words).collect()
 }
 
 /// Takes an item of the second scene over to the first.
-type Change = Box<dyn Fn(&mut Scene, &Scene)>;
+type SceneChange = Box<dyn Fn(&mut Scene, &Scene)>;
 /// Takes an effect from a scene.
 type Switch = fn(&mut Effects, &Effects);
 
 /// The items of a scene in the order of the waterfall.
-fn items(whole: &Model<Dd>, scene: &Scene) -> Vec<(What, Change)> {
-    let mut items: Vec<(What, Change)> = Vec::new();
-    let mut item = |what: String, change: Change| items.push((What::Text(what), change));
+fn items(whole: &Model<Dd>, scene: &Scene) -> Vec<(ItemKind, SceneChange)> {
+    let mut items: Vec<(ItemKind, SceneChange)> = Vec::new();
+    let mut item = |what: String, change: SceneChange| items.push((ItemKind::Text(what), change));
     match scene.base {
         Base::Fixed => item("base fixed".to_string(), Box::new(|now, s| now.base = s.base)),
         Base::Moving => item("base on a given motion".to_string(), Box::new(|now, s| now.base = s.base)),
@@ -205,8 +213,10 @@ fn items(whole: &Model<Dd>, scene: &Scene) -> Vec<(What, Change)> {
     let switched: [(bool, &str, Switch); 7] = [
         (!effects.rotor_inertia, "no rotor inertia", |now, _| now.rotor_inertia = false),
         (!effects.damping, "no viscous friction", |now, _| now.damping = false),
-        (effects.coulomb == Coulomb::Off, "no Coulomb friction", |now, s| now.coulomb = s.coulomb),
-        (matches!(effects.coulomb, Coulomb::Smooth(_)), "smooth Coulomb friction", |now, s| now.coulomb = s.coulomb),
+        (effects.coulomb == CoulombForm::Off, "no Coulomb friction", |now, s| now.coulomb = s.coulomb),
+        (matches!(effects.coulomb, CoulombForm::Smooth(_)), "smooth Coulomb friction", |now, s| {
+            now.coulomb = s.coulomb
+        }),
         (!effects.springs, "no springs", |now, _| now.springs = false),
         (!effects.transmission_losses, "no losses in transmissions", |now, _| now.transmission_losses = false),
         (!effects.elastic_transmissions, "rigid transmissions", |now, _| now.elastic_transmissions = false),
@@ -223,7 +233,7 @@ fn items(whole: &Model<Dd>, scene: &Scene) -> Vec<(What, Change)> {
         item(what, Box::new(move |now, s| now.parameters.push(s.parameters[i].clone())));
     }
     if !scene.outputs.is_empty() {
-        items.push((What::Selection, Box::new(|now, s| now.outputs.clone_from(&s.outputs))));
+        items.push((ItemKind::Selection, Box::new(|now, s| now.outputs.clone_from(&s.outputs))));
     }
     items
 }
@@ -256,10 +266,10 @@ fn selection(function: Function, scene: &Scene) -> String {
         words.push(format!("frames {}", selection.frames.join(", ")));
     }
     match selection.part {
-        Part::Whole => {}
-        Part::Linear => words.push("the linear part".to_string()),
-        Part::Angular => words.push("the angular part".to_string()),
-        Part::Diagonal => words.push("the diagonal".to_string()),
+        ResultPart::Whole => {}
+        ResultPart::Linear => words.push("the linear part".to_string()),
+        ResultPart::Angular => words.push("the angular part".to_string()),
+        ResultPart::Diagonal => words.push("the diagonal".to_string()),
     }
     format!("only {}", words.join(", "))
 }

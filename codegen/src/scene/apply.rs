@@ -3,7 +3,7 @@
 //! Everything is in double-double, and zeros and ones of rotations stay exact, so that a robot with a locked joint has the
 //! same simple form as if its file had a fixed joint there.
 
-use super::{check, Base, Coulomb, Effects, Gravity, Parameter, Scene};
+use super::{check, Base, CoulombForm, Effects, Gravity, Parameter, Scene};
 use crate::description::{Angle, AngleUnit};
 use crate::diagnostic::{Diagnostics, Place};
 use crate::model::geometry::{about, compose, turned, vector};
@@ -199,9 +199,9 @@ fn wanted_effects(of_robot: &JointEffects<Dd>, wanted: &Effects) -> JointEffects
         rotor_inertia: of_robot.rotor_inertia.filter(|_| wanted.rotor_inertia),
         damping: if wanted.damping { of_robot.damping } else { Dd::ZERO },
         coulomb: match (force, wanted.coulomb) {
-            (None, _) | (_, Coulomb::Off) => model::Coulomb::Off,
-            (Some(force), Coulomb::Sign) => model::Coulomb::Sign(force),
-            (Some(force), Coulomb::Smooth(speed)) => model::Coulomb::Smooth { force, speed: Dd::from(speed) },
+            (None, _) | (_, CoulombForm::Off) => model::Coulomb::Off,
+            (Some(force), CoulombForm::Sign) => model::Coulomb::Sign(force),
+            (Some(force), CoulombForm::Smooth(speed)) => model::Coulomb::Smooth { force, speed: Dd::from(speed) },
         },
         stiffness: if wanted.springs { of_robot.stiffness } else { Dd::ZERO },
         spring_rest: if wanted.springs { of_robot.spring_rest } else { Dd::ZERO },

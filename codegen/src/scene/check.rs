@@ -2,7 +2,10 @@
 
 use super::contact::ContactItem;
 use super::messages::unphysical_moments;
-use super::{check_contact, messages as say, Coulomb, Gravity, Interval, JointRanges, Parameter, Part, Payload, Scene};
+use super::{
+    check_contact, messages as say, CoulombForm, Gravity, InputRange, JointRanges, Parameter, Payload, ResultPart,
+    Scene,
+};
 use crate::diagnostic::Diagnostics;
 use crate::function::{Family, Function, Parts};
 use crate::identifier::UNNAMED;
@@ -21,7 +24,7 @@ pub(crate) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
     outputs_alone(scene, diagnostics);
     ranges_alone(scene, diagnostics);
     held_alone(scene, diagnostics);
-    if let Coulomb::Smooth(speed) = scene.effects.coulomb {
+    if let CoulombForm::Smooth(speed) = scene.effects.coulomb {
         // its square must not vanish beside one
         if !(1e-9..=1e9).contains(&speed) {
             let complaint = say::not_in_range("coulomb_speed", speed, "between 1e-9 and 1e9");
@@ -57,7 +60,7 @@ fn outputs_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
             }
         }
         let parts = parts_of(function);
-        if selection.part != Part::Whole && !parts.contains(&selection.part) {
+        if selection.part != ResultPart::Whole && !parts.contains(&selection.part) {
             let words: Vec<&str> = parts.iter().map(|p| p.word()).collect();
             complain("part", say::no_such_part(name, selection.part.word(), &words));
         }
@@ -125,7 +128,7 @@ fn parameters_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
 /// Ranges without a value, and of what is no input.
 fn ranges_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
     let places = &scene.places;
-    let mut check = |path: String, what: String, range: Interval| {
+    let mut check = |path: String, what: String, range: InputRange| {
         if !range.is_sound() {
             places.complain(&path, say::empty_range(&what, range.lower, range.upper), diagnostics);
         }
@@ -323,10 +326,10 @@ fn by_joints(function: Function) -> bool {
 }
 
 /// The parts that the results of a function have.
-fn parts_of(function: Function) -> &'static [Part] {
+fn parts_of(function: Function) -> &'static [ResultPart] {
     match function.spec().outputs.first().map_or(Parts::No, |output| output.parts) {
         Parts::No => &[],
-        Parts::Diagonal => &[Part::Diagonal],
-        Parts::LinearAngular => &[Part::Linear, Part::Angular],
+        Parts::Diagonal => &[ResultPart::Diagonal],
+        Parts::LinearAngular => &[ResultPart::Linear, ResultPart::Angular],
     }
 }

@@ -1,7 +1,7 @@
 //! What can be wrong with the contacts of a scene: by themselves, and with a robot.
 
 use super::check::carrier;
-use super::contact::{ContactItem, Contacts, EnvironmentKind, SurfaceItem};
+use super::contact::{ContactItem, EnvironmentKind, SceneContacts, SurfaceItem};
 use super::{messages as say, Scene};
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::identifier::{identifier, module_name, upper_camel_case, UNNAMED};
@@ -57,7 +57,7 @@ pub(super) fn alone(scene: &Scene, diagnostics: &mut Diagnostics) {
 }
 
 /// Names that make no identifier of their own.
-fn names(all: &Contacts, complain: Complain) {
+fn names(all: &SceneContacts, complain: Complain) {
     type Named = fn(&str, &str) -> String;
     let groups: [(&str, Named, Vec<&str>); 3] = [
         ("contact", identifier, all.contacts.iter().map(|c| c.name.as_str()).collect()),
@@ -118,7 +118,7 @@ fn contact(i: usize, contact: &ContactItem, complain: Complain) {
 }
 
 /// Modes with contacts that are not there, that cannot stick, or without any.
-fn modes(all: &Contacts, complain: Complain) {
+fn modes(all: &SceneContacts, complain: Complain) {
     for (i, mode) in all.modes.iter().enumerate() {
         let find = |name: &String| all.contacts.iter().find(|c| c.name == *name);
         let known = || all.contacts.iter().map(|c| c.name.as_str());

@@ -14,7 +14,7 @@ use straightline_graph::trace::Expr;
 
 /// All contacts of a scene. The default has none, and nothing of a contact is generated.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Contacts {
+pub struct SceneContacts {
     /// Contacts with objects.
     pub contacts: Vec<ContactItem>,
     /// Loops: frames of the robot that are held together, in every mode.
@@ -315,7 +315,7 @@ pub struct ModeItem {
     pub sticking: Vec<String>,
 }
 
-impl Contacts {
+impl SceneContacts {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.contacts.is_empty() && self.loops.is_empty() && self.modes.is_empty()

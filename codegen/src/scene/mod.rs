@@ -15,10 +15,10 @@ mod places;
 mod ranges;
 
 pub use apply::apply;
-pub use contact::Contacts;
+pub use contact::SceneContacts;
 pub use parameter::Parameter;
 pub use places::Places;
-pub use ranges::{ranges_in_words, Interval, JointRanges, Ranges};
+pub use ranges::{ranges_in_words, InputRange, JointRanges, Ranges};
 
 use crate::description::drives::WrittenDrive;
 use crate::description::flexible::{BaseSupport, Flexible};
@@ -57,7 +57,7 @@ pub struct Scene {
     /// What stays an input of the generated functions.
     pub parameters: Vec<Parameter>,
     /// What the robot touches.
-    pub contacts: Contacts,
+    pub contacts: SceneContacts,
     /// Whether the staged form is generated beside the plain functions.
     pub staged: bool,
     /// What a function may cost at most.
@@ -135,12 +135,12 @@ pub struct Selection {
     /// Frames, by name.
     pub frames: Vec<String>,
     /// Which part of each result.
-    pub part: Part,
+    pub part: ResultPart,
 }
 
 /// A part of a result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Part {
+pub enum ResultPart {
     /// All of it.
     #[default]
     Whole,
@@ -152,14 +152,18 @@ pub enum Part {
     Diagonal,
 }
 
-impl Part {
+impl ResultPart {
     /// Every part with its word in scene files.
-    pub const WORDS: [(&str, Part); 4] =
-        [("whole", Part::Whole), ("linear", Part::Linear), ("angular", Part::Angular), ("diagonal", Part::Diagonal)];
+    pub const WORDS: [(&str, ResultPart); 4] = [
+        ("whole", ResultPart::Whole),
+        ("linear", ResultPart::Linear),
+        ("angular", ResultPart::Angular),
+        ("diagonal", ResultPart::Diagonal),
+    ];
 
     /// Its word in scene files.
     pub fn word(self) -> &'static str {
-        Part::WORDS.iter().find(|w| w.1 == self).map_or("", |w| w.0)
+        ResultPart::WORDS.iter().find(|w| w.1 == self).map_or("", |w| w.0)
     }
 }
 
@@ -224,7 +228,7 @@ pub struct Effects {
     /// Viscous friction and dampers.
     pub damping: bool,
     /// Coulomb friction.
-    pub coulomb: Coulomb,
+    pub coulomb: CoulombForm,
     /// Joint springs.
     pub springs: bool,
     /// Losses of gears, by efficiencies.
@@ -240,7 +244,7 @@ impl Default for Effects {
         Effects {
             rotor_inertia: true,
             damping: true,
-            coulomb: Coulomb::Sign,
+            coulomb: CoulombForm::Sign,
             springs: true,
             transmission_losses: true,
             elastic_transmissions: true,
@@ -251,7 +255,7 @@ impl Default for Effects {
 
 /// The form of Coulomb friction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Coulomb {
+pub enum CoulombForm {
     /// Left out.
     Off,
     /// f sgn(q̇), zero at rest.

@@ -1,7 +1,7 @@
 //! The values that inputs can have: what bounds on rounding errors are computed for.
 //!
 //! Ranges change no equation. Where a scene says nothing they are the limits of the robot file; what neither limits is
-//! unlimited, and says so ([`Interval::is_bounded`]).
+//! unlimited, and says so ([`InputRange::is_bounded`]).
 
 use super::Scene;
 use crate::function::Quantity::{self, Acceleration, Configuration, Force, Gravity, Velocity};
@@ -11,22 +11,22 @@ use straightline_graph::expr::Port;
 
 /// From `lower` to `upper`, both in it; infinite where there is no limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interval {
+pub struct InputRange {
     /// The least value.
     pub lower: f64,
     /// The greatest value.
     pub upper: f64,
 }
 
-impl Interval {
+impl InputRange {
     /// Every number.
-    pub const UNLIMITED: Interval = Interval { lower: f64::NEG_INFINITY, upper: f64::INFINITY };
+    pub const UNLIMITED: InputRange = InputRange { lower: f64::NEG_INFINITY, upper: f64::INFINITY };
     /// Zero alone.
-    pub const ZERO: Interval = Interval { lower: 0.0, upper: 0.0 };
+    pub const ZERO: InputRange = InputRange { lower: 0.0, upper: 0.0 };
 
     /// From −`bound` to `bound`.
-    pub fn within(bound: f64) -> Interval {
-        Interval { lower: -bound, upper: bound }
+    pub fn within(bound: f64) -> InputRange {
+        InputRange { lower: -bound, upper: bound }
     }
 
     /// Whether both ends are finite.
@@ -47,9 +47,9 @@ pub enum JointRanges {
     #[default]
     Limits,
     /// The same for all joints.
-    All(Interval),
+    All(InputRange),
     /// Of these joints, by name; of the others as [`JointRanges::Limits`].
-    Joints(Vec<(String, Interval)>),
+    Joints(Vec<(String, InputRange)>),
 }
 
 /// The values that inputs can have. For a floating base the range of q is that of its position \[m\] (quaternions are unit
@@ -65,7 +65,7 @@ pub struct Ranges {
     /// Generalized forces \[N·m or N\].
     pub tau: JointRanges,
     /// Each component of gravity where it is an input \[m/s²\].
-    pub gravity: Option<Interval>,
+    pub gravity: Option<InputRange>,
 }
 
 impl Ranges {
@@ -76,7 +76,7 @@ impl Ranges {
 }
 
 impl Scene {
-    /// The range of every scalar of an input port, in its order; [`Interval::UNLIMITED`] where nothing limits it.
+    /// The range of every scalar of an input port, in its order; [`InputRange::UNLIMITED`] where nothing limits it.
     ///
     /// ```
     /// use straightline_codegen::expr::Port;
@@ -92,25 +92,25 @@ impl Scene {
     /// assert_eq!(scene.input_ranges(&Port::new("q", &[1]), &model), [Interval { lower: -1.0, upper: 2.0 }]);
     /// assert_eq!(scene.input_ranges(&Port::new("qdd", &[1]), &model), [Interval::within(50.0)]);
     /// ```
-    pub fn input_ranges<T>(&self, port: &Port, model: &Model<T>) -> Vec<Interval> {
-        let mut all = vec![Interval::UNLIMITED; port.len()];
+    pub fn input_ranges<T>(&self, port: &Port, model: &Model<T>) -> Vec<InputRange> {
+        let mut all = vec![InputRange::UNLIMITED; port.len()];
         let quantity = Quantity::of(port);
         if quantity == Some(Gravity) {
-            all.fill(self.ranges.gravity.unwrap_or(Interval::UNLIMITED));
+            all.fill(self.ranges.gravity.unwrap_or(InputRange::UNLIMITED));
         }
         let over_joints = self.ranges.over_joints();
         let found = over_joints.into_iter().find(|(over_joints, _)| Some(*over_joints) == quantity);
         let Some((quantity, ranges)) = found else { return all };
         for joint in model.bodies.iter().map(|b| &b.joint) {
             let rests = matches!(quantity, Velocity | Acceleration) && self.zero.joints_at_rest.contains(&joint.name);
-            let range = if rests { Interval::ZERO } else { range(quantity, ranges, joint) };
+            let range = if rests { InputRange::ZERO } else { range(quantity, ranges, joint) };
             let (first, count) = match quantity {
                 Configuration => (joint.iq, joint.kind.nq()),
                 _ => (joint.iv, joint.kind.nv()),
             };
             all[first..first + count].fill(range);
             if let Some(quaternion) = joint.kind.row().quaternion.filter(|_| quantity == Configuration) {
-                all[first + quaternion..first + count].fill(Interval::within(1.0));
+                all[first + quaternion..first + count].fill(InputRange::within(1.0));
             }
         }
         all
@@ -133,10 +133,10 @@ pub fn ranges_in_words(scene: &Scene, model: &Model<Dd>) -> Vec<String> {
     lines
 }
 
-fn in_words(range: Interval, unit: &str) -> String {
+fn in_words(range: InputRange, unit: &str) -> String {
     match range {
-        Interval::UNLIMITED => "unlimited".to_string(),
-        Interval { lower, upper } => format!("{lower:?} to {upper:?} {unit}"),
+        InputRange::UNLIMITED => "unlimited".to_string(),
+        InputRange { lower, upper } => format!("{lower:?} to {upper:?} {unit}"),
     }
 }
 
@@ -147,13 +147,13 @@ fn unit(quantity: Quantity, kind: JointKind) -> &'static str {
 }
 
 /// The range of a joint's coordinate of an input.
-fn range(quantity: Quantity, ranges: &JointRanges, joint: &Joint) -> Interval {
+fn range(quantity: Quantity, ranges: &JointRanges, joint: &Joint) -> InputRange {
     let Limits { lower, upper, velocity, effort } = joint.limits;
     let of_file = match quantity {
-        Configuration => Interval { lower, upper },
-        Velocity => Interval::within(velocity),
-        Force => Interval::within(effort),
-        _ => Interval::UNLIMITED,
+        Configuration => InputRange { lower, upper },
+        Velocity => InputRange::within(velocity),
+        Force => InputRange::within(effort),
+        _ => InputRange::UNLIMITED,
     };
     match ranges {
         JointRanges::Limits => of_file,

@@ -13,9 +13,9 @@ use crate::equations::Robot;
 use crate::function::truth::{Chapter, Effect};
 use crate::function::{Function, Quantity};
 use crate::model;
-use crate::model::states::{drives::of_drives, of_port, State};
+use crate::model::states::{drives::of_drives, of_port, InputState};
 use crate::options::Options;
-use crate::program::{program, Program};
+use crate::program::{program, TracedProgram};
 use crate::scene::{Gravity, Parameter, Scene};
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
@@ -114,7 +114,7 @@ pub fn verify(
     let mut worst: BTreeMap<&'static str, Worst> = BTreeMap::new();
     for state in 0..states {
         let at = case.at(state % 2 == 1, &mut random)?;
-        for Program { function, graph, schedule, .. } in &programs {
+        for TracedProgram { function, graph, schedule, .. } in &programs {
             let values = run((graph, schedule), &at.inputs, options);
             let truth = at.truth(&case, *function)?.expect("whether there is a truth does not depend on the state");
             assert_eq!(values.len(), truth.len(), "{}", function.name());
@@ -147,7 +147,7 @@ struct Case<'a> {
 /// It at a state.
 struct At<'a> {
     /// As programs take it.
-    inputs: State<f64>,
+    inputs: InputState<f64>,
     /// With the numbers that drives have there.
     model: Model<Dd>,
     chapter: Chapter<'a>,
@@ -174,7 +174,7 @@ impl<'a> Case<'a> {
     fn at(&self, fast: bool, random: &mut Random) -> Result<At<'_>, String> {
         let (options, scene) = (self.options, &self.options.scene);
         let (mut model, mut tree) = (self.model.clone(), self.tree.clone());
-        let mut inputs = State::new();
+        let mut inputs = InputState::new();
         let gravity = (scene.gravity == Gravity::Input).then_some(Quantity::Gravity);
         for port in MOTION.into_iter().chain(gravity).map(|quantity| quantity.port(&model)) {
             let values = of_port(&model, &port, fast, random);
@@ -215,7 +215,7 @@ impl At<'_> {
 }
 
 /// Zeros where the scene knows of them.
-fn set_zeros(scene: &Scene, model: &Model<Dd>, inputs: &mut State<f64>) {
+fn set_zeros(scene: &Scene, model: &Model<Dd>, inputs: &mut InputState<f64>) {
     for (quantity, is_zero) in [(Quantity::Velocity, scene.zero.qd), (Quantity::Acceleration, scene.zero.qdd)] {
         let rates = inputs.get_mut(&quantity.name()).expect("every state has rates");
         if is_zero {
@@ -244,7 +244,7 @@ fn scaled(value: f64, expected: Dd, scale: f64) -> f64 {
 }
 
 /// The program's outputs in its own arithmetic; of one that fuses, as on a machine with the instruction.
-fn run((graph, schedule): (&Graph, &Schedule), inputs: &State<f64>, options: &Options) -> Vec<f64> {
+fn run((graph, schedule): (&Graph, &Schedule), inputs: &InputState<f64>, options: &Options) -> Vec<f64> {
     let inputs = graph.inputs.iter().flat_map(|port| &inputs[&port.name]).copied();
     let program = (graph, schedule);
     match (options.scalar, options.fma) {

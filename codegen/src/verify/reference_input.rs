@@ -17,7 +17,7 @@ use crate::model::{FrameOption, ModelOptions};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 use straightline_core::reference::{
-    unit, CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, Joint,
+    unit, CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint,
 };
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
@@ -130,16 +130,16 @@ impl Placed {
 }
 
 /// A rigid part: mass, centre of mass, inertia about the centre of mass, in the axes of the link that carries it.
-struct Part {
+struct RigidPart {
     mass: Dd,
     centre: Vector3<Dd>,
     inertia: Matrix3<Dd>,
 }
 
-impl Part {
-    fn read(inertial: &WrittenInertial, link: &Placed, options: &ModelOptions) -> Part {
+impl RigidPart {
+    fn read(inertial: &WrittenInertial, link: &Placed, options: &ModelOptions) -> RigidPart {
         let axes = link.rotation * rotation(&inertial.rotation, options);
-        Part {
+        RigidPart {
             mass: Dd::from(inertial.mass.value),
             centre: link.position + link.rotation * vector(&inertial.com.value),
             inertia: axes * tensor(&inertial.inertia.value) * axes.transpose(),
@@ -147,16 +147,16 @@ impl Part {
     }
 
     /// The parts as one: Steiner's theorem about the common centre of mass. Without mass, that is the origin.
-    fn lump(parts: &[Part]) -> Part {
+    fn lump(parts: &[RigidPart]) -> RigidPart {
         let mass = parts.iter().fold(Dd::ZERO, |sum, part| sum + part.mass);
         let moment = parts.iter().fold(Vector3::zeros(), |sum, part| sum + part.centre * part.mass);
         let centre = if mass == Dd::ZERO { Vector3::zeros() } else { moment.map(|x| x / mass) };
-        let about_centre = |part: &Part| {
+        let about_centre = |part: &RigidPart| {
             let d = part.centre - centre;
             part.inertia + (Matrix3::identity() * d.dot(&d) - d * d.transpose()) * part.mass
         };
         let inertia = parts.iter().fold(Matrix3::zeros(), |sum, part| sum + about_centre(part));
-        Part { mass, centre, inertia }
+        RigidPart { mass, centre, inertia }
     }
 }
 
@@ -169,7 +169,7 @@ struct GroupJoint {
     name: String,
     /// The link that it moves.
     child: String,
-    kind: Joint,
+    kind: ReferenceJoint,
     /// In the joint frame.
     axis: Vector3<Dd>,
     /// Of a joint that is given so.
@@ -181,7 +181,7 @@ struct Group {
     /// `None` for the root group.
     joint: Option<GroupJoint>,
     /// What is rigidly joined to it, in its link frame.
-    parts: Vec<Part>,
+    parts: Vec<RigidPart>,
 }
 
 /// Frames fixed to a group: name, group, place in the group's link frame.
@@ -195,13 +195,13 @@ fn add_links(
 ) -> Result<Vec<String>, String> {
     let mut joint_names = Vec::new();
     let (groups, frames) = rigid_groups(description, options, elastic)?;
-    let lumped: Vec<Part> = groups.iter().map(|group| Part::lump(&group.parts)).collect();
+    let lumped: Vec<RigidPart> = groups.iter().map(|group| RigidPart::lump(&group.parts)).collect();
     // the root group: the world, or the floating link
     let link_of = |group: usize| if floating { Some(group) } else { group.checked_sub(1) };
     // from the link frame's origin to C; frame 0 has its origin in the world's
     let centre_of = |group: usize| link_of(group).map_or_else(Vector3::zeros, |_| lumped[group].centre);
     for (group, part) in groups.iter().zip(&lumped) {
-        let Part { mass, centre, inertia } = part;
+        let RigidPart { mass, centre, inertia } = part;
         let Some(GroupJoint { parent, place, name, child, kind, axis, vectors }) = &group.joint else {
             if floating {
                 let root = root_link(description)?;
@@ -262,8 +262,8 @@ fn floating_root_joint(description: &Description) -> String {
     name
 }
 
-fn reference_joint(joint: &WrittenJoint) -> Result<Joint, String> {
-    Joint::of_word(joint.kind.value.word, joint.kind.value.number)
+fn reference_joint(joint: &WrittenJoint) -> Result<ReferenceJoint, String> {
+    ReferenceJoint::of_word(joint.kind.value.word, joint.kind.value.number)
         .ok_or_else(|| format!("joint `{}` has not one degree of freedom", joint.name.value))
 }
 
@@ -336,11 +336,11 @@ fn rigid_groups(
         let inertial = link.inertial.as_ref();
         let segments = match elastic.links.iter().find(|flexible| flexible.link.value == name) {
             None => {
-                groups[group].parts.extend(inertial.map(|inertial| Part::read(inertial, &place, options)));
+                groups[group].parts.extend(inertial.map(|inertial| RigidPart::read(inertial, &place, options)));
                 Segments::rigid(group, place)
             }
             Some(flexible) => {
-                let part = inertial.map(|inertial| Part::read(inertial, &Placed::here(), options));
+                let part = inertial.map(|inertial| RigidPart::read(inertial, &Placed::here(), options));
                 bend(flexible, (group, place), part, &mut groups)?
             }
         };

@@ -8,11 +8,11 @@ use super::reading::MOTION;
 use crate::equations::Robot;
 use crate::function::truth::Effect;
 use crate::function::{Extent, Family, Function, Quantity, Spec};
-use crate::model::states::{body, State};
+use crate::model::states::{body, InputState};
 use crate::options::Options;
 use crate::program::parameter::parameter_program;
 use crate::scene::free_drive::FreeDrive;
-use crate::scene::{Base, Coulomb, Gravity, Parameter, Scene};
+use crate::scene::{Base, CoulombForm, Gravity, Parameter, Scene};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
@@ -71,7 +71,7 @@ impl Coordinates {
     }
 
     /// The whole robot's state.
-    pub fn expand(&self, state: &State<f64>) -> BTreeMap<Quantity, Vec<Dd>> {
+    pub fn expand(&self, state: &InputState<f64>) -> BTreeMap<Quantity, Vec<Dd>> {
         let mut whole = BTreeMap::new();
         for quantity in MOTION {
             let (mut all, places) = match quantity {
@@ -163,11 +163,11 @@ pub(super) fn hold(
         let wanted = |x: Dd, is_wanted: bool| if is_wanted { x } else { Dd::ZERO };
         effect.inertia = wanted(effect.inertia, scene.effects.rotor_inertia);
         effect.damping = wanted(effect.damping, scene.effects.damping);
-        effect.friction = wanted(effect.friction, scene.effects.coulomb != Coulomb::Off);
+        effect.friction = wanted(effect.friction, scene.effects.coulomb != CoulombForm::Off);
         effect.stiffness = wanted(effect.stiffness, scene.effects.springs);
         effect.smooth = match scene.effects.coulomb {
-            Coulomb::Smooth(speed) => Some(Dd::from(speed)),
-            Coulomb::Off | Coulomb::Sign => None,
+            CoulombForm::Smooth(speed) => Some(Dd::from(speed)),
+            CoulombForm::Off | CoulombForm::Sign => None,
         };
     }
     Ok(())
@@ -221,7 +221,7 @@ pub(super) fn random_inputs(
     scene: &Scene,
     parameters: &[(Parameter, Graph)],
     scalar: Scalar,
-    (state, tree): (&mut State<f64>, &mut CentreOfMassTree<Dd>),
+    (state, tree): (&mut InputState<f64>, &mut CentreOfMassTree<Dd>),
     random: &mut Random,
 ) -> Result<(), String> {
     let rounded = |x: f64| scalar.rounded(x);
@@ -243,7 +243,7 @@ pub(super) fn random_inputs(
 pub(super) fn random_drives(
     parameters: &[(Parameter, Graph)],
     scalar: Scalar,
-    (state, model): (&mut State<f64>, &mut Model<Dd>),
+    (state, model): (&mut InputState<f64>, &mut Model<Dd>),
     random: &mut Random,
 ) {
     let of_file = model.clone();

@@ -1,7 +1,7 @@
 //! Programs of every kind with one pass broken on purpose, and forms of the robot with one wrong number: what is written is right, or nothing
 //! is. Right is what the generic runtime says at states of its own, and a bound is one that nothing exceeds there.
 
-use super::{inputs, of_function, sabotage, Disagreement, Plain, State, States, ROUNDINGS};
+use super::{inputs, of_function, sabotage, Disagreement, PlainEquations, PortState, States, ROUNDINGS};
 use crate::choices::LimbForm;
 use crate::diagnostic::{Diagnostics, Source};
 use crate::equations::bind::constructed;
@@ -16,7 +16,7 @@ use crate::program::input_box::input_box;
 use crate::program::mixed::mix_precisions;
 use crate::program::parameter::checked_parameter;
 use crate::program::{checked, staged};
-use crate::scene::{self, Budget, Interval, JointRanges, MaxError};
+use crate::scene::{self, Budget, InputRange, JointRanges, MaxError};
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -268,8 +268,8 @@ impl Case {
         let function = Function::InverseDynamics;
         let options = Options { scalar: Scalar::F32, functions: vec![function], ..Options::default() };
         let mut case = Case::new("mixed precision", PLANAR, "", options, &[&ORDERED, &OF_BOUND, &MIXED]);
-        case.options.scene.ranges.qd = JointRanges::All(Interval::within(0.5));
-        case.options.scene.ranges.qdd = JointRanges::All(Interval::within(1.0));
+        case.options.scene.ranges.qd = JointRanges::All(InputRange::within(0.5));
+        case.options.scene.ranges.qdd = JointRanges::All(InputRange::within(1.0));
         let single = checked(&case.robot, &[], function, &case.options).expect("it is right");
         let ranges = input_box(&single.graph.inputs, &case.options.scene, &case.robot.model).expect("there are ranges");
         let errors = certify(&single.graph, Scalar::F32, &ranges, Effort::default()).expect("no division").errors;
@@ -325,7 +325,9 @@ impl Case {
         let Case { robot, frames, options, .. } = self;
         let mut states = States::new(robot, options);
         states.random = Random(77);
-        let plain = |function: Function, state: &State| Plain { robot, frames, function, options }.results::<Dd>(state);
+        let plain = |function: Function, state: &PortState| {
+            PlainEquations { robot, frames, function, options }.results::<Dd>(state)
+        };
         for _ in 0..5 {
             let fault = match written {
                 Written::Function(function, graph, part) => {
@@ -384,9 +386,10 @@ fn differ(graph: &Graph, found: &[Dd], truth: &[Dd], part: f64) -> Option<String
 fn exceeded(options: &Options, graph: &Graph, bound: &Graph, states: &mut States) -> Option<String> {
     let state = states.next(&graph.inputs);
     let single = |x: Dd| Dd::from(options.scalar.nearest(x));
-    let mut state: State = state.into_iter().map(|(n, x)| (n, x.into_iter().map(single).collect())).collect();
+    let mut state: PortState = state.into_iter().map(|(n, x)| (n, x.into_iter().map(single).collect())).collect();
     let of_bound = graph.widest(options.scalar);
-    let short = |graph: &Graph, state: &State| inputs(graph, state).iter().map(|x| x.to_f64()).collect::<Vec<f64>>();
+    let short =
+        |graph: &Graph, state: &PortState| inputs(graph, state).iter().map(|x| x.to_f64()).collect::<Vec<f64>>();
     let exact = evaluate(graph, &inputs(graph, &state));
     let found = computed_at(graph, options.scalar, &short(graph, &state));
     let by_residual = bound.inputs.iter().any(|p| p.name == "qdd") && !graph.inputs.iter().any(|p| p.name == "qdd");

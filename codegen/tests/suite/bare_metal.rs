@@ -13,7 +13,7 @@ use straightline_codegen::model::load;
 use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
 use straightline_codegen::program::program;
-use straightline_codegen::schedule::Limits;
+use straightline_codegen::schedule::ScheduleLimits;
 use straightline_codegen::{Function, Robot, Scalar};
 use straightline_core::trig;
 
@@ -36,7 +36,7 @@ fn text(scene_text: &str, options: Options) -> String {
 /// Texts with every kind of array that holds values on their way: between parts, in stages, of parameters and of contact modes.
 fn texts() -> Vec<String> {
     let base = Options { functions: TORQUES.to_vec(), scalar: Scalar::F32, ..Options::default() };
-    let parts = Options { limits: Limits { operations: 40 }, ..base.clone() };
+    let parts = Options { limits: ScheduleLimits { operations: 40 }, ..base.clone() };
     let contact =
         "[[contact]]\nname = \"pen\"\nframe = \"hand\"\nobject = { origin = [0.5, 0.0, 0.2], z = [0.0, 0.0, 1.0] }\n\
                    constrained = [\"pz\"]\n[outputs]\ncontact = [\"forward_dynamics\"]\n";

@@ -11,7 +11,7 @@ use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::options::{Optimisations, Options};
 use straightline_codegen::program::input_box::input_box;
 use straightline_codegen::program::{optimised, program};
-use straightline_codegen::scene::{Interval as Range, JointRanges, Scene};
+use straightline_codegen::scene::{InputRange as Range, JointRanges, Scene};
 use straightline_codegen::{Function, Scalar, Source};
 use straightline_core::Dd;
 

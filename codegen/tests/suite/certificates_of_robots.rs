@@ -14,7 +14,7 @@ use straightline_codegen::options::Options;
 use straightline_codegen::program::input_box::input_box;
 use straightline_codegen::program::program;
 use straightline_codegen::report::certificates::known;
-use straightline_codegen::scene::{Interval as Range, JointRanges, Scene};
+use straightline_codegen::scene::{InputRange as Range, JointRanges, Scene};
 use straightline_codegen::verify::SecondReading;
 use straightline_codegen::{model, Function, Scalar};
 use straightline_core::model::Model;

@@ -8,7 +8,7 @@ use straightline_codegen::options::{Optimisations, Options};
 use straightline_codegen::program::companion::companion;
 use straightline_codegen::program::input_box::input_box;
 use straightline_codegen::program::optimised;
-use straightline_codegen::scene::{Interval as Range, JointRanges, Scene};
+use straightline_codegen::scene::{InputRange as Range, JointRanges, Scene};
 use straightline_codegen::{Function, Scalar, Source};
 use straightline_core::Dd;
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use straightline_codegen::diagnostic::Front;
 use straightline_codegen::fronts::expansion::{expand, SceneOf};
-use straightline_codegen::options::{Settings, Value};
+use straightline_codegen::options::{GivenOptions, OptionValue};
 use straightline_codegen::Source;
 
 const CART: &str = r#"
@@ -38,7 +38,7 @@ fn scratch(name: &str, text: &str) -> PathBuf {
 #[test]
 fn the_first_directory_that_has_the_file_counts() {
     let here = scratch("found", CART);
-    let expansion = expand("cart.toml", None, &[Path::new("/nowhere"), &here], &Settings::default());
+    let expansion = expand("cart.toml", None, &[Path::new("/nowhere"), &here], &GivenOptions::default());
     assert_eq!(expansion.files, [here.join("cart.toml")]);
     let items = expansion.result.unwrap().1;
     assert!(items.contains("pub const EFFORT_LIMITS: [f64; 1] = dynamics::EFFORT_LIMITS;"), "{items}");
@@ -52,8 +52,8 @@ fn frames_are_constants_and_pose_asks_for_poses_of_all_frames() {
     let items = |frames: &[&str], scene: &str| {
         std::fs::write(here.join("scene.toml"), scene).unwrap();
         let scene = SceneOf::File("scene.toml".into());
-        let mut options = Settings::default();
-        options.set("frames", Value::of_words(frames.iter().copied()), Front::Derive).unwrap();
+        let mut options = GivenOptions::default();
+        options.set("frames", OptionValue::of_words(frames.iter().copied()), Front::Derive).unwrap();
         expand("cart.toml", Some(&scene), &[&here], &options).result.unwrap().1
     };
     let pose = "pub fn pose<__T: Copy>(x: &[[__T; 12]; 2], frame: ::straightline::FrameIndex<Self>)";
@@ -76,7 +76,7 @@ fn frames_are_constants_and_pose_asks_for_poses_of_all_frames() {
 #[test]
 fn a_missing_file_is_answered_with_every_path_that_was_tried() {
     let directories = [Path::new("/nowhere"), Path::new("/nowhere/src")];
-    let expansion = expand("cart.toml", None, &directories, &Settings::default());
+    let expansion = expand("cart.toml", None, &directories, &GivenOptions::default());
     assert!(expansion.files.is_empty());
     assert_eq!(
         expansion.result.unwrap_err().message,
@@ -88,7 +88,7 @@ fn a_missing_file_is_answered_with_every_path_that_was_tried() {
 #[test]
 fn a_wrong_file_is_shown_at_the_place_and_stays_an_input() {
     let here = scratch("wrong", &CART.replace("2.0", "-2.0"));
-    let expansion = expand("cart.toml", None, &[&here], &Settings::default());
+    let expansion = expand("cart.toml", None, &[&here], &GivenOptions::default());
     assert_eq!(expansion.files, [here.join("cart.toml")]);
     let message = expansion.result.unwrap_err().message;
     assert!(message.starts_with("the robot file is wrong\nerror[negative-mass]: "), "{message}");
@@ -100,7 +100,7 @@ fn a_scene_is_an_input_too_and_its_complaints_have_their_place() {
     let here = scratch("scene", CART);
     let scene = |text: &str| {
         std::fs::write(here.join("scene.toml"), text).unwrap();
-        expand("cart.toml", Some(&SceneOf::File("scene.toml".into())), &[&here], &Settings::default())
+        expand("cart.toml", Some(&SceneOf::File("scene.toml".into())), &[&here], &GivenOptions::default())
     };
     let expansion = scene("[outputs]\nmass_matrix = { part = \"diagonal\" }\n");
     assert_eq!(expansion.files, [here.join("cart.toml"), here.join("scene.toml")]);
@@ -117,7 +117,7 @@ fn a_scene_is_an_input_too_and_its_complaints_have_their_place() {
         assert!(message.starts_with("the scene is wrong\nerror[") && message.contains(place), "{message}");
     }
     let none = SceneOf::File("none.toml".into());
-    let message = expand("cart.toml", Some(&none), &[&here], &Settings::default()).result.unwrap_err().message;
+    let message = expand("cart.toml", Some(&none), &[&here], &GivenOptions::default()).result.unwrap_err().message;
     assert!(message.starts_with("there is no scene file `none.toml`"), "{message}");
 }
 
@@ -126,7 +126,7 @@ fn complaints_of_a_scene_in_the_macro_are_kept_apart() {
     let here = scratch("within", CART);
     let scene = |text: &str| {
         let scene = SceneOf::Macro(Source::new("scene(..)", text));
-        expand("cart.toml", Some(&scene), &[&here], &Settings::default())
+        expand("cart.toml", Some(&scene), &[&here], &GivenOptions::default())
     };
     let expansion = scene("[zero]\nqd = true\n");
     assert_eq!(expansion.files, [here.join("cart.toml")]);

@@ -3,7 +3,7 @@
 //! The table of the record is printed by
 //! `cargo test --release -p straightline-codegen --test suite forward_dynamics_bounds:: -- --ignored --nocapture`.
 
-use straightline_codegen::certify::{certify_with, search, Certificate, Effort, Interval, Known};
+use straightline_codegen::certify::{certify_with, search, Certificate, Effort, Interval, KnownSystem};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
@@ -12,7 +12,7 @@ use straightline_codegen::options::{Optimisations, Options};
 use straightline_codegen::program::input_box::input_box;
 use straightline_codegen::program::{optimised, pivots, program};
 use straightline_codegen::report::certificates::known;
-use straightline_codegen::scene::{Interval as Range, JointRanges, Scene};
+use straightline_codegen::scene::{InputRange as Range, JointRanges, Scene};
 use straightline_codegen::{Function, Scalar};
 use straightline_core::Dd;
 
@@ -31,7 +31,7 @@ const ARMS: [(&str, [bool; 2]); 8] = [
 struct Case {
     graph: Graph,
     ranges: Vec<Interval>,
-    known: Known,
+    known: KnownSystem,
 }
 
 /// q within the limits of the robot file, |q̇| ≤ `speed`, |τ| within the file's limits.
@@ -124,7 +124,7 @@ fn what_is_known_of_values_and_adjoints_holds_everywhere_in_the_box() {
 fn intervals_alone_give_no_bound() {
     let case = case("puma560.urdf", Scalar::F64, 0.5, false);
     assert!(certificate(&case, Scalar::F64).is_some());
-    assert!(certify_with(&case.graph, Scalar::F64, &case.ranges, Effort::default(), &Known::default()).is_err());
+    assert!(certify_with(&case.graph, Scalar::F64, &case.ranges, Effort::default(), &KnownSystem::default()).is_err());
 }
 
 #[test]

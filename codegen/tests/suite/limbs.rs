@@ -14,8 +14,8 @@ use straightline_codegen::model::{load, ModelOptions};
 use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
 use straightline_codegen::program::input_box::input_box;
-use straightline_codegen::program::{program, Program};
-use straightline_codegen::scene::{Interval, JointRanges};
+use straightline_codegen::program::{program, TracedProgram};
+use straightline_codegen::scene::{InputRange, JointRanges};
 use straightline_codegen::verify::{bound, verify};
 use straightline_codegen::{Function, Robot, Scalar, Source};
 use straightline_core::trig;
@@ -145,7 +145,7 @@ fn options(floating_base: bool) -> Options {
     }
 }
 
-fn in_lanes(source: &Source, function: Function, options: &Options) -> (Robot, Program) {
+fn in_lanes(source: &Source, function: Function, options: &Options) -> (Robot, TracedProgram) {
     let (model, complaints) = load(source, &options.model);
     let robot = Robot::new(model.unwrap_or_else(|| panic!("{}", complaints.render())));
     let program = program(&robot, &[], function, options);
@@ -330,9 +330,9 @@ fn no_search_finds_an_error_above_its_bound() {
         for (source, floating) in [(stool(), true), (hand(), false)] {
             for function in [Function::InverseDynamics, Function::GravityForce] {
                 let mut options = Options { scalar, ..options(floating) };
-                options.scene.ranges.qd = JointRanges::All(Interval::within(1.0));
-                options.scene.ranges.qdd = JointRanges::All(Interval::within(2.0));
-                options.scene.ranges.q = JointRanges::All(Interval::within(1.0));
+                options.scene.ranges.qd = JointRanges::All(InputRange::within(1.0));
+                options.scene.ranges.qdd = JointRanges::All(InputRange::within(2.0));
+                options.scene.ranges.q = JointRanges::All(InputRange::within(1.0));
                 let (robot, program) = in_lanes(&source, function, &options);
                 let graph = &program.graph;
                 let ranges = input_box(&graph.inputs, &options.scene, &robot.model).expect("every input has a range");

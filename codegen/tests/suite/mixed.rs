@@ -8,7 +8,7 @@ use straightline_codegen::expr::Graph;
 use straightline_codegen::options::Options;
 use straightline_codegen::program::input_box::input_box;
 use straightline_codegen::program::program;
-use straightline_codegen::scene::{Budget, Interval as Range, JointRanges, MaxError, Scene};
+use straightline_codegen::scene::{Budget, InputRange as Range, JointRanges, MaxError, Scene};
 use straightline_codegen::{model, Function, Scalar, Source};
 
 const FUNCTION: Function = Function::InverseDynamics;
@@ -61,7 +61,7 @@ fn a_demanded_error_is_met_with_less_than_all_operations_in_f64() {
         // that f64 is spent where it counts: what a search finds shrinks too
         if part == 0.4 {
             let alone = search::worst_found(&graph, Scalar::F32, &ranges, 6_000, 3);
-            let most = |found: &[search::Found]| found.iter().map(|f| f.error).fold(0.0, f64::max);
+            let most = |found: &[search::WorstFound]| found.iter().map(|f| f.error).fold(0.0, f64::max);
             assert!(most(&found) < 0.8 * most(&alone), "{:e} {:e}", most(&found), most(&alone));
         }
     }

@@ -89,7 +89,7 @@ impl Case {
             2 => Options { lanes: Some(Lanes::Standalone), fma: true, ..base },
             3 => Options { certify: Some(Default::default()), fma: true, ..base },
             4 => Options { lanes: Some(Lanes::Standalone), scalar: Scalar::F32, ..base },
-            _ => Options { limits: straightline_codegen::schedule::Limits { operations: 40 }, ..base },
+            _ => Options { limits: straightline_codegen::schedule::ScheduleLimits { operations: 40 }, ..base },
         }
     }
 

@@ -7,20 +7,20 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use straightline_codegen::certify::Effort;
 use straightline_codegen::diagnostic::{Diagnostics, Front, Source};
-use straightline_codegen::options::table::{Call, Group, Kind, Row, TABLE};
-use straightline_codegen::options::{scene_file, Settings};
+use straightline_codegen::options::table::{Call, OptionGroup, OptionKind, OptionRow, TABLE};
+use straightline_codegen::options::{scene_file, GivenOptions};
 use straightline_codegen::{compile, Builder, Options};
 
 const ARM: &str = include_str!("../files/arm.toml");
 
-fn settings(row: &'static Row) -> Settings {
-    let mut settings = Settings::default();
+fn settings(row: &'static OptionRow) -> GivenOptions {
+    let mut settings = GivenOptions::default();
     let value = row.parse(row.example, Front::Builder).unwrap_or_else(|wrong| panic!("{}: {wrong:?}", row.name));
     settings.give(row, value, Front::Builder).unwrap();
     settings
 }
 
-fn options(settings: &Settings) -> Options {
+fn options(settings: &GivenOptions) -> Options {
     let mut options = Options::default();
     settings.apply(&mut options);
     options
@@ -44,7 +44,7 @@ fn methods() -> BTreeSet<String> {
 
 #[test]
 fn a_row_writes_the_names_into_the_hash_that_it_says() {
-    for row in TABLE.iter().filter(|row| row.group != Group::Front) {
+    for row in TABLE.iter().filter(|row| row.group != OptionGroup::Front) {
         let text = options(&settings(row)).hashed();
         for name in row.hash {
             assert!(text.contains(&format!("{name}=")), "{}: no `{name}` in {text}", row.name);
@@ -57,9 +57,9 @@ fn a_row_writes_the_names_into_the_hash_that_it_says() {
 fn names_of_options_and_ranges_are_what_they_seem() {
     let names: BTreeSet<&str> = TABLE.iter().map(|row| row.name).collect();
     assert_eq!(names.len(), TABLE.len());
-    let row = |name| Row::find(name, |_| true).unwrap_or_else(|unknown| panic!("{unknown}"));
+    let row = |name| OptionRow::find(name, |_| true).unwrap_or_else(|unknown| panic!("{unknown}"));
     let range = |name| match &row(name).kind {
-        Kind::Real(range, _) | Kind::Whole(range, _) => *range,
+        OptionKind::Real(range, _) | OptionKind::Whole(range, _) => *range,
         _ => panic!("{name} is no number"),
     };
     assert_eq!(range("certify_boxes"), format!("between 1 and {}", Effort::MOST_BOXES));
@@ -74,10 +74,11 @@ fn builders_and_scenes_set_what_the_rows_set() {
     let methods = methods();
     let own = ["option", "scene", "scene_file", "out_dir", "module", "scalars"];
     for method in methods.iter().filter(|method| !own.contains(&method.as_str())) {
-        Row::find(method, |row| row.is_value(Front::Builder)).unwrap_or_else(|_| panic!("`.{method}(..)` has no row"));
+        OptionRow::find(method, |row| row.is_value(Front::Builder))
+            .unwrap_or_else(|_| panic!("`.{method}(..)` has no row"));
     }
     for row in TABLE {
-        if row.group == Group::Front {
+        if row.group == OptionGroup::Front {
             let name = row.called(Front::Builder);
             assert!(name.is_none_or(|name| methods.contains(name)), "the builder has no `{}`", row.name);
             continue;
@@ -99,9 +100,9 @@ fn builders_and_scenes_set_what_the_rows_set() {
 fn what_a_front_is_given_counts_before_the_scene() {
     let text = "[options]\nlimbs = \"lanes\"\nrules = \"exact\"\ncertify_boxes = 40\n[numbers]\nscalar = \"f32\"\n";
     let file = scene_file::read(&Source::new("scene.toml", text), &mut Diagnostics::new()).unwrap();
-    let mut own = Settings::default();
+    let mut own = GivenOptions::default();
     for (name, word) in [("scalar", "f64"), ("limbs", "auto"), ("certify", "false")] {
-        let row = Row::find(name, |_| true).unwrap();
+        let row = OptionRow::find(name, |_| true).unwrap();
         own.give(row, row.parse(&[word], Front::Derive).unwrap(), Front::Derive).unwrap();
     }
     let options = file.with(&own, Options::default());
@@ -175,22 +176,22 @@ fn cell(text: &str) -> String {
     text.replace('|', "\\|").replace(" [", " \\[")
 }
 
-fn words(row: &Row) -> Vec<(&'static str, &'static str)> {
+fn words(row: &OptionRow) -> Vec<(&'static str, &'static str)> {
     match &row.kind {
-        Kind::Word(of, _) | Kind::Words(of) if !of.is_of_items => (of.words)(),
+        OptionKind::Word(of, _) | OptionKind::Words(of) if !of.is_of_items => (of.words)(),
         _ => Vec::new(),
     }
 }
 
 /// What a row does, and the words that it takes.
-fn explained(row: &Row) -> String {
+fn explained(row: &OptionRow) -> String {
     let words: Vec<String> = words(row).iter().map(|(word, _)| format!("`\"{word}\"`")).collect();
     let words = if words.is_empty() { String::new() } else { format!(": {}", words.join(", ")) };
     cell(&format!("{}{words}", row.doc))
 }
 
 /// Without a value: what happens then.
-fn default(row: &Row) -> String {
+fn default(row: &OptionRow) -> String {
     match words(row).iter().any(|(word, _)| *word == row.default) {
         true => format!("`\"{}\"`", row.default),
         false => cell(row.default),
@@ -235,10 +236,10 @@ a run at once.\n\n\
     page += "\n";
     whys.iter().enumerate().for_each(|(i, why)| page += &format!("{}. {why}\n", i + 1));
     for (group, title) in [
-        (Group::Program, "What is generated"),
-        (Group::Model, "How the robot file is read"),
-        (Group::Reporting, "What is said"),
-        (Group::Front, "Where something is read and written"),
+        (OptionGroup::Program, "What is generated"),
+        (OptionGroup::Model, "How the robot file is read"),
+        (OptionGroup::Reporting, "What is said"),
+        (OptionGroup::Front, "Where something is read and written"),
     ] {
         let _ = write!(page, "\n## {title}\n\n| option | is | without it |\n|---|---|---|\n");
         for row in TABLE.iter().filter(|row| row.group == group) {

@@ -4,13 +4,13 @@ use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::expr::Port;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::options::scene_file;
-use straightline_codegen::scene::{Gravity, Interval, Scene};
+use straightline_codegen::scene::{Gravity, InputRange, Scene};
 use straightline_codegen::{compile, Function, Generated, Options};
 
 const ARM: &str = include_str!("../files/arm.toml");
 
 /// The arm in a scene with these lines, and the range of every input.
-fn arm(scene: &str, floating: bool) -> (Generated, impl Fn(&str) -> Vec<Interval>) {
+fn arm(scene: &str, floating: bool) -> (Generated, impl Fn(&str) -> Vec<InputRange>) {
     let mut diagnostics = Diagnostics::new();
     let file = scene_file::read(&Source::new("scene.toml", scene), &mut diagnostics);
     let mut options = file.unwrap_or_else(|| panic!("{diagnostics}")).into_options(Options::default());
@@ -26,8 +26,8 @@ fn arm(scene: &str, floating: bool) -> (Generated, impl Fn(&str) -> Vec<Interval
     (generated, range)
 }
 
-fn between(lower: f64, upper: f64) -> Interval {
-    Interval { lower, upper }
+fn between(lower: f64, upper: f64) -> InputRange {
+    InputRange { lower, upper }
 }
 
 /// Less than 1e-30 m/s² is zero to every robot, and has no digits in double-double.
@@ -61,12 +61,12 @@ fn gravity_is_zero_or_one_that_has_digits_whoever_says_it() {
 #[test]
 fn without_a_word_they_are_the_limits_of_the_robot_file_and_what_has_none_is_unlimited() {
     let (generated, range) = arm("", false);
-    assert_eq!(range("q"), [between(-2.0, 2.0), between(0.0, 0.5), Interval::UNLIMITED]);
-    assert_eq!(range("qd"), [Interval::within(3.0), Interval::UNLIMITED, Interval::UNLIMITED]);
-    assert_eq!(range("tau"), [Interval::within(40.0), Interval::UNLIMITED, Interval::UNLIMITED]);
-    assert_eq!(range("qdd"), [Interval::UNLIMITED; 3]);
-    assert_eq!(range("gravity"), [Interval::UNLIMITED; 3]);
-    assert!(!Interval::UNLIMITED.is_bounded() && Interval::within(3.0).is_bounded());
+    assert_eq!(range("q"), [between(-2.0, 2.0), between(0.0, 0.5), InputRange::UNLIMITED]);
+    assert_eq!(range("qd"), [InputRange::within(3.0), InputRange::UNLIMITED, InputRange::UNLIMITED]);
+    assert_eq!(range("tau"), [InputRange::within(40.0), InputRange::UNLIMITED, InputRange::UNLIMITED]);
+    assert_eq!(range("qdd"), [InputRange::UNLIMITED; 3]);
+    assert_eq!(range("gravity"), [InputRange::UNLIMITED; 3]);
+    assert!(!InputRange::UNLIMITED.is_bounded() && InputRange::within(3.0).is_bounded());
     assert!(!generated.text.contains("Ranges of the inputs"));
 }
 
@@ -77,11 +77,11 @@ fn a_scene_states_them_for_all_joints_or_by_name_and_the_generated_file_says_the
          [numbers.ranges]\nq = { roll = [-7, 7.0] }\nqd = 2\nqdd = [-30.0, 40.0]\ntau = \"unlimited\"\ngravity = 9.9\n",
         false,
     );
-    assert_eq!(range("q"), [between(-2.0, 2.0), between(0.0, 0.5), Interval::within(7.0)]);
-    assert_eq!(range("qd"), [Interval::within(2.0); 3]);
+    assert_eq!(range("q"), [between(-2.0, 2.0), between(0.0, 0.5), InputRange::within(7.0)]);
+    assert_eq!(range("qd"), [InputRange::within(2.0); 3]);
     assert_eq!(range("qdd"), [between(-30.0, 40.0); 3]);
-    assert_eq!(range("tau"), [Interval::UNLIMITED; 3]);
-    assert_eq!(range("gravity"), [Interval::within(9.9); 3]);
+    assert_eq!(range("tau"), [InputRange::UNLIMITED; 3]);
+    assert_eq!(range("gravity"), [InputRange::within(9.9); 3]);
     for line in [
         "// Ranges of the inputs:\n//   q[0] shoulder: -2.0 to 2.0 rad\n//   q[1] lift: 0.0 to 0.5 m\n",
         "//   qd[1] lift: -2.0 to 2.0 m/s\n//   qd[2] roll: -2.0 to 2.0 rad/s\n",
@@ -100,10 +100,10 @@ fn they_change_no_operation() {
 #[test]
 fn joints_at_rest_are_at_zero_and_a_quaternion_is_a_unit_quaternion() {
     let (_, range) = arm("[zero]\njoints_at_rest = [\"lift\"]\n[numbers.ranges]\nqd = 2.0\n", false);
-    assert_eq!(range("qd"), [Interval::within(2.0), Interval::ZERO, Interval::within(2.0)]);
+    assert_eq!(range("qd"), [InputRange::within(2.0), InputRange::ZERO, InputRange::within(2.0)]);
     let (_, range) = arm("[numbers.ranges]\nq = { root_joint = 5.0 }\nqd = { root_joint = 4.0 }\n", true);
     let q = range("q");
-    assert_eq!((&q[..3], &q[3..7]), (&[Interval::within(5.0); 3][..], &[Interval::within(1.0); 4][..]));
+    assert_eq!((&q[..3], &q[3..7]), (&[InputRange::within(5.0); 3][..], &[InputRange::within(1.0); 4][..]));
     assert_eq!(q[7], between(-2.0, 2.0));
-    assert_eq!(range("qd")[..7], [[Interval::within(4.0); 6].as_slice(), &[Interval::within(3.0)]].concat());
+    assert_eq!(range("qd")[..7], [[InputRange::within(4.0); 6].as_slice(), &[InputRange::within(3.0)]].concat());
 }

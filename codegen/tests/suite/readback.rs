@@ -11,9 +11,9 @@ use straightline_codegen::diagnostic::{Diagnostics, Severity};
 use straightline_codegen::emit::Generated;
 use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
-use straightline_codegen::readback::{checked, complaint, Reader};
-use straightline_codegen::scene::{Budget, Interval, JointRanges, MaxError, Scene};
-use straightline_codegen::schedule::Limits;
+use straightline_codegen::readback::{checked, complaint, TextReader};
+use straightline_codegen::scene::{Budget, InputRange, JointRanges, MaxError, Scene};
+use straightline_codegen::schedule::ScheduleLimits;
 use straightline_codegen::Scalar;
 use straightline_codegen::{compile, Function, Grade, Source};
 
@@ -125,17 +125,21 @@ type Way = (&'static str, fn(Options) -> Options);
 /// Ways to write a robot's functions.
 const STYLES: [Way; 11] = [
     ("plain", |o| o),
-    ("in parts", |o| Options { limits: Limits { operations: 60 }, ..o }),
+    ("in parts", |o| Options { limits: ScheduleLimits { operations: 60 }, ..o }),
     ("exact", |o| Options { grade: Grade::Exact, ..o }),
     ("f32", |o| Options { scalar: Scalar::F32, ..o }),
-    ("generic, in parts", |o| Options { generic: true, limits: Limits { operations: 100 }, ..o }),
+    ("generic, in parts", |o| Options { generic: true, limits: ScheduleLimits { operations: 100 }, ..o }),
     ("fused", |o| Options { fma: true, ..o }),
-    ("lanes, in parts", |o| Options { lanes: Some(Lanes::Standalone), limits: Limits { operations: 100 }, ..o }),
+    ("lanes, in parts", |o| Options {
+        lanes: Some(Lanes::Standalone),
+        limits: ScheduleLimits { operations: 100 },
+        ..o
+    }),
     ("fused lanes in both scalars", |o| Options {
         lanes: Some(Lanes::Runtime),
         fma: true,
         also: vec![Scalar::F32],
-        limits: Limits { operations: 200 },
+        limits: ScheduleLimits { operations: 200 },
         ..o
     }),
     ("generic, with lanes in f32", |o| Options {
@@ -184,8 +188,8 @@ fn scene_of(text: &str, frame: &str) -> Source {
 fn in_mixed_precision(companions: bool) -> Generated {
     let robot = file("descriptions/planar_2r.toml");
     let mut options = Options { scalar: Scalar::F32, ..options(&[Function::InverseDynamics]) };
-    options.scene.ranges.qd = JointRanges::All(Interval::within(0.5));
-    options.scene.ranges.qdd = JointRanges::All(Interval::within(1.0));
+    options.scene.ranges.qd = JointRanges::All(InputRange::within(0.5));
+    options.scene.ranges.qdd = JointRanges::All(InputRange::within(1.0));
     options.certify = Some(Effort::default());
     let single = generated(&robot, &options);
     let errors = single.report.functions["inverse_dynamics"].errors.as_ref().expect("errors were bounded");
@@ -579,7 +583,7 @@ fn let_through(most: usize) -> (usize, Vec<String>) {
     let (mut count, mut missed) = (0, Vec::new());
     for (k, (name, generated)) in small_texts().iter().enumerate() {
         let mut n = Numbers(k as u64);
-        let mut reader = Reader::new(generated);
+        let mut reader = TextReader::new(generated);
         assert_eq!(reader.check(&generated.text), Ok(()), "{name}");
         // what is pasted is no less compared, but is the same in all
         let end = generated.text.find("\nmod trig {").unwrap_or(generated.text.len());
@@ -604,7 +608,7 @@ fn let_through(most: usize) -> (usize, Vec<String>) {
 fn no_pasted_kernel_with_a_word_changed_is_let_through() {
     let options = Options { lanes: Some(Lanes::Standalone), fma: true, ..options(&[Function::MassMatrix]) };
     let generated = generated(&file("descriptions/planar_2r.toml"), &options);
-    let mut reader = Reader::new(&generated);
+    let mut reader = TextReader::new(&generated);
     let mut n = Numbers(5);
     let mut count = 0;
     for start in ["\nmod trig {", "\npub mod batch {", "\nmod fused {"].map(|m| generated.text.find(m).expect(m)) {
@@ -626,7 +630,7 @@ fn what_disagrees_is_an_internal_error_with_its_line() {
     let end = statement + generated.text[statement..].find(';').expect("its end");
     generated.text.replace_range(statement..end, "tau[1] = qd[0]");
     let line = generated.text[..statement].matches('\n').count() + 1;
-    let mismatch = Reader::new(&generated).check(&generated.text).expect_err("a result is another one");
+    let mismatch = TextReader::new(&generated).check(&generated.text).expect_err("a result is another one");
     assert_eq!((mismatch.function.as_str(), mismatch.line), ("inverse_dynamics", line));
     assert_eq!(mismatch.text, "tau[1] = qd[0];");
     assert!(complaint(&mismatch).title.contains("nothing is written"));
@@ -643,7 +647,7 @@ fn what_is_not_understood_is_refused() {
     let generated = generated(&file("descriptions/planar_2r.toml"), &options(&[Function::MassMatrix]));
     let text = &generated.text;
     let open = text.find(") {\n    // ").expect("a function") + 3;
-    let mut reader = Reader::new(&generated);
+    let mut reader = TextReader::new(&generated);
     for statement in [
         "h[0][0] += 0.0;",
         "let x = 1.0;",

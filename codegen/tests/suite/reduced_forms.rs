@@ -2,7 +2,7 @@
 
 use crate::written::{Shape, Style, Written};
 use straightline_codegen::diagnostic::Source;
-use straightline_codegen::equations::reduce::{lengths, longest_lever, reduce, Choice};
+use straightline_codegen::equations::reduce::{lengths, longest_lever, reduce, FreeTerms};
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph, DIVISION};
 use straightline_codegen::model::{load, ModelOptions};
@@ -85,9 +85,9 @@ fn every_choice_is_the_robot(name: &str, model: &Model<Dd>, floating: bool, tria
     let mut random = Random(11);
     let (n, nv) = (model.bodies.len(), model.nv());
     for trial in 0..trials {
-        let (plain, _) = reduce(model, &Choice::plain(model));
+        let (plain, _) = reduce(model, &FreeTerms::plain(model));
         let units = lengths(&plain, longest_lever(model));
-        let choice = Choice {
+        let choice = FreeTerms {
             stays: random.flags(n),
             by_axis_acceleration: random.flags(n),
             by_accelerations: [random.flags(n), random.flags(n)],
@@ -130,16 +130,16 @@ fn every_choice_is_the_robot(name: &str, model: &Model<Dd>, floating: bool, tria
 #[test]
 fn the_length_that_is_the_unit_is_exactly_one() {
     let model = robot("ur5", false);
-    let (plain, _) = reduce(&model, &Choice::plain(&model));
+    let (plain, _) = reduce(&model, &FreeTerms::plain(&model));
     let unit = lengths(&plain, longest_lever(&model))[0];
-    let (reduced, _) = reduce(&model, &Choice { unit, ..Choice::plain(&model) });
+    let (reduced, _) = reduce(&model, &FreeTerms { unit, ..FreeTerms::plain(&model) });
     assert!(reduced.bodies.iter().any(|b| b.translation.to_array().iter().any(|x| x.abs() == Dd::ONE)));
 }
 
 #[test]
 fn only_what_turns_and_carries_parallel_joints_may_stay() {
     let model = robot("ur5", false);
-    let (plain, _) = reduce(&model, &Choice::plain(&model));
+    let (plain, _) = reduce(&model, &FreeTerms::plain(&model));
     let may: Vec<bool> = (0..6).map(|i| plain.may_stay(i)).collect();
     // shoulder lift and elbow carry parallel joints, the last wrist carries nothing
     assert_eq!(may, [false, true, true, false, false, true]);

@@ -1,11 +1,11 @@
 //! Every rule of the table: the smallest graph where it fires, and one where it must not.
 
-use straightline_codegen::expr::{rules::RULES, Builder, Folding, Grade, NodeId, Op, Port, RuleSet};
+use straightline_codegen::expr::{rules::RULES, Folding, Grade, GraphBuilder, NodeId, Op, Port, RuleSet};
 use straightline_codegen::Scalar;
 use straightline_core::Dd;
 
-fn builder(rules: RuleSet) -> (Builder, NodeId, NodeId) {
-    let mut b = Builder::new(rules, vec![Port::new("x", &[2])]);
+fn builder(rules: RuleSet) -> (GraphBuilder, NodeId, NodeId) {
+    let mut b = GraphBuilder::new(rules, vec![Port::new("x", &[2])]);
     let x = b.insert(Op::Input(0));
     let y = b.insert(Op::Input(1));
     (b, x, y)
@@ -14,20 +14,20 @@ fn builder(rules: RuleSet) -> (Builder, NodeId, NodeId) {
 /// A case: what is built from x and y, and what must come out.
 struct Case {
     rule: &'static str,
-    fires: fn(&mut Builder, NodeId, NodeId) -> (Op, Op),
-    stays: fn(&mut Builder, NodeId, NodeId) -> Op,
+    fires: fn(&mut GraphBuilder, NodeId, NodeId) -> (Op, Op),
+    stays: fn(&mut GraphBuilder, NodeId, NodeId) -> Op,
 }
 
-fn c(b: &mut Builder, x: f64) -> NodeId {
+fn c(b: &mut GraphBuilder, x: f64) -> NodeId {
     b.constant(Dd::from(x))
 }
 
-fn constant(b: &mut Builder, x: f64) -> Op {
+fn constant(b: &mut GraphBuilder, x: f64) -> Op {
     let id = c(b, x);
     b.op(id)
 }
 
-fn neg(b: &mut Builder, x: NodeId) -> NodeId {
+fn neg(b: &mut GraphBuilder, x: NodeId) -> NodeId {
     b.insert(Op::neg(x))
 }
 
@@ -143,7 +143,7 @@ fn the_exact_rule_set_holds_exact_rules_only_and_all_of_them() {
 #[test]
 fn constants_fold_as_the_number_format_would() {
     let sum = |rules| {
-        let mut b = Builder::new(rules, vec![]);
+        let mut b = GraphBuilder::new(rules, vec![]);
         let (x, y) = (b.constant(Dd::from(0.1)), b.constant(Dd::from(0.2)));
         let id = b.add(Op::add(x, y));
         b.as_constant(id).unwrap().value()

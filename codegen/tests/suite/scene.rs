@@ -3,7 +3,7 @@
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{load, ModelOptions};
 use straightline_codegen::options::scene_file;
-use straightline_codegen::scene::{self, Base, Coulomb, Effects, Gravity, Payload, Scene};
+use straightline_codegen::scene::{self, Base, CoulombForm, Effects, Gravity, Payload, Scene};
 use straightline_codegen::{compile, Function, Options};
 use straightline_core::algorithms::*;
 use straightline_core::model::{self, Body, Joint, JointKind, Model};
@@ -232,13 +232,13 @@ fn gravity_and_effects_are_as_the_scene_says() {
     let no_springs = of_robot(|b| (b.effects.stiffness, b.effects.spring_rest) = (Dd::ZERO, Dd::ZERO));
     assert_eq!(effects_of(Effects { springs: false, ..all }), no_springs);
     let off = of_robot(|b| b.effects.coulomb = model::Coulomb::Off);
-    assert_eq!(effects_of(Effects { coulomb: Coulomb::Off, ..all }), off);
+    assert_eq!(effects_of(Effects { coulomb: CoulombForm::Off, ..all }), off);
     let smooth = of_robot(|b| {
         if let model::Coulomb::Sign(force) = b.effects.coulomb {
             b.effects.coulomb = model::Coulomb::Smooth { force, speed: Dd::from(0.05) };
         }
     });
-    assert_eq!(effects_of(Effects { coulomb: Coulomb::Smooth(0.05), ..all }), smooth);
+    assert_eq!(effects_of(Effects { coulomb: CoulombForm::Smooth(0.05), ..all }), smooth);
     assert!(smooth.iter().any(|e| e.coulomb == model::Coulomb::Off), "a joint without friction stays without");
 
     let moon = applied(&whole, &Scene { gravity: Gravity::Constant([0.5, 0.0, -1.62]), ..Scene::default() });
@@ -291,7 +291,7 @@ fn scenes_in_code_are_checked_as_those_in_files() {
     };
     assert_eq!(codes(&locked(&[("elbow", 0.1), ("elbow", 0.2)])), ["locked-twice"]);
     assert_eq!(codes(&locked(&[("elbow", f64::NAN)])), ["not-in-range"]);
-    let smooth = Effects { coulomb: Coulomb::Smooth(f64::NAN), ..Effects::default() };
+    let smooth = Effects { coulomb: CoulombForm::Smooth(f64::NAN), ..Effects::default() };
     assert_eq!(codes(&Scene { effects: smooth, ..Scene::default() }), ["not-in-range"]);
     let gravity = Gravity::Constant([0.0, f64::INFINITY, 0.0]);
     assert_eq!(codes(&Scene { gravity, ..Scene::default() }), ["not-in-range"]);

@@ -1,12 +1,12 @@
 //! The steps of the pass over sums: the smallest graph where each fires, one where it must not, and the same results.
 
-use straightline_codegen::expr::{evaluate, verify, Binary, Builder, Counts, Graph, NodeId, Op, Port, RuleSet};
+use straightline_codegen::expr::{evaluate, verify, Binary, Counts, Graph, GraphBuilder, NodeId, Op, Port, RuleSet};
 use straightline_codegen::pass::{dead_code, sums};
 use straightline_core::Dd;
 
 /// The graph of these results over the inputs a, b, c, d, e.
-fn graph(build: impl FnOnce(&mut Builder, [NodeId; 5]) -> Vec<NodeId>) -> Graph {
-    let mut b = Builder::new(RuleSet::all(), vec![Port::new("x", &[5])]);
+fn graph(build: impl FnOnce(&mut GraphBuilder, [NodeId; 5]) -> Vec<NodeId>) -> Graph {
+    let mut b = GraphBuilder::new(RuleSet::all(), vec![Port::new("x", &[5])]);
     let inputs = std::array::from_fn(|k| b.insert(Op::Input(k as u32)));
     let results = build(&mut b, inputs);
     b.finish(vec![Port::new("y", &[results.len()])], results)

@@ -8,7 +8,7 @@ use straightline_codegen::model::ModelOptions;
 use straightline_codegen::verify::reference_input::centre_of_mass_tree;
 use straightline_codegen::{description, Function};
 use straightline_core::random::Random;
-use straightline_core::reference::{natural_scale, CentreOfMassTree, Joint};
+use straightline_core::reference::{natural_scale, CentreOfMassTree, ReferenceJoint};
 use straightline_core::Dd;
 
 /// A robot of `robots/descriptions` in the second author's terms.
@@ -23,7 +23,7 @@ fn tree(file: &str, floating_base: bool) -> CentreOfMassTree<Dd> {
 fn state(tree: &CentreOfMassTree<Dd>, random: &mut Random) -> BTreeMap<Quantity, Vec<Dd>> {
     let mut any = |n: usize| -> Vec<Dd> { (0..n).map(|_| Dd::from(random.symmetric(2.0))).collect() };
     let mut q = any(tree.nq());
-    for link in tree.links.iter().filter(|link| link.joint == Joint::Free) {
+    for link in tree.links.iter().filter(|link| link.joint == ReferenceJoint::Free) {
         q[link.iq + 3..link.iq + 7].copy_from_slice(&[0.6, 0.0, 0.0, 0.8].map(Dd::from));
     }
     let rates = [Quantity::Velocity, Quantity::Acceleration, Quantity::Force];

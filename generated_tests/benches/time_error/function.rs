@@ -11,7 +11,7 @@ use straightline_codegen::choices::Lanes;
 use straightline_codegen::compile::compile;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::options::Options;
-use straightline_codegen::program::{program, Program};
+use straightline_codegen::program::{program, TracedProgram};
 use straightline_codegen::scene::{self, Budget, JointRanges, MaxError};
 use straightline_codegen::{expr, ForwardDynamicsMethod, Function, Robot, Scalar, Source};
 use straightline_core::model::{Joint, Model};
@@ -149,7 +149,7 @@ struct Case {
     source: Source,
     options: Options,
     robot: Robot,
-    program: Program,
+    program: TracedProgram,
     ranges: Ranges,
     lengths: Vec<usize>,
     floating: bool,
@@ -200,7 +200,7 @@ impl Case {
             let of = |joint: &Joint| {
                 let index = first + if port.name == "q" { joint.iq } else { joint.iv };
                 let (lower, upper) = self.ranges.0[index];
-                (joint.name.clone(), scene::Interval { lower, upper })
+                (joint.name.clone(), scene::InputRange { lower, upper })
             };
             let joints = JointRanges::Joints(self.robot.model.bodies.iter().map(|b| of(&b.joint)).collect());
             match port.name.as_str() {

@@ -2,7 +2,7 @@
 //! fewer operations.
 
 use straightline_codegen::options::Options;
-use straightline_codegen::program::Program;
+use straightline_codegen::program::TracedProgram;
 use straightline_codegen::scene::{Scene, Selection};
 use straightline_codegen::Function;
 use straightline_generated_tests::programs::{of_robot, options, run};
@@ -10,7 +10,7 @@ use straightline_generated_tests::random::Random;
 use straightline_generated_tests::reference::{Robot, ROBOTS};
 
 /// The program of a function in a scene, and its results at an asymmetric configuration.
-fn results(robot: &Robot, function: Function, scene: Scene) -> (Program, Vec<f64>) {
+fn results(robot: &Robot, function: Function, scene: Scene) -> (TracedProgram, Vec<f64>) {
     let program = of_robot(robot, function, &Options { scene, ..options(robot) });
     let mut random = Random(7);
     let q = random.configuration(program.graph.inputs[0].len(), robot.floating);

@@ -8,7 +8,7 @@ use straightline_codegen::function::ContactFunction;
 use straightline_codegen::options::Options;
 use straightline_codegen::program::contact::{graph, Mode};
 use straightline_codegen::scene::contact::{ContactItem, SurfaceItem};
-use straightline_codegen::scene::{Contacts, Scene};
+use straightline_codegen::scene::{Scene, SceneContacts};
 use straightline_core::algorithms::{Environment, FunctionalCoordinates, Ltdl, SpringDamper, Struck, Support};
 use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion, Surface};
 use straightline_core::model::Model;
@@ -372,7 +372,7 @@ fn generated_contact_modes_of_random_robots_are_the_full_system_of_the_second_au
                 friction: None,
                 environment: None,
             };
-            let contacts = Contacts { contacts: vec![item], ..Contacts::default() };
+            let contacts = SceneContacts { contacts: vec![item], ..SceneContacts::default() };
             let options = Options { scene: Scene { contacts, ..Scene::default() }, ..Options::default() };
             let modes = Mode::all(&options.scene);
             let graph = graph(&loaded, &options, &modes[0], ContactFunction::ForwardDynamics);

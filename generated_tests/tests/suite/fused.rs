@@ -4,7 +4,7 @@ use straightline_codegen::compile::compile;
 use straightline_codegen::emit::rust::Rust;
 use straightline_codegen::emit::{fused, Target};
 use straightline_codegen::options::Options;
-use straightline_codegen::schedule::Limits;
+use straightline_codegen::schedule::ScheduleLimits;
 use straightline_codegen::Function;
 use straightline_core::{trig, Dd};
 use straightline_generated_tests::bounds::FUSED;
@@ -49,7 +49,7 @@ fn without_the_option_nothing_is_fused() {
 fn fused_results_are_as_exact_as_the_others() {
     let robot = Robot::load("solo12");
     // as in the build script
-    let options = Options { fma: true, limits: Limits { operations: 900 }, ..programs::options(&robot) };
+    let options = Options { fma: true, limits: ScheduleLimits { operations: 900 }, ..programs::options(&robot) };
     let loaded = programs::load(&programs::source(&robot), &options.model);
     type Batch = fn(usize, &[f64], &[f64], &[f64], &mut [f64]) -> Result<(), solo12::batch::WrongLength>;
     type Plain = fn(&[f64; 19], &[f64; 18], &[f64; 18], &mut [f64; 18]);

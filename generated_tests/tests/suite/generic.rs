@@ -2,7 +2,7 @@
 
 use straightline::{Dual, Real};
 use straightline_codegen::options::Options;
-use straightline_codegen::program::Program;
+use straightline_codegen::program::TracedProgram;
 use straightline_codegen::Function;
 use straightline_core::Dd;
 use straightline_generated_tests::bounds::{GRAVITY_SYMMETRY, MOTION_DERIVATIVE, TORQUE_DERIVATIVE};
@@ -14,7 +14,7 @@ use straightline_generated_tests::programs::{self, cast, program};
 use straightline_generated_tests::random::Random;
 use straightline_generated_tests::reference::Robot;
 
-fn program_of(robot: &str, function: Function) -> (straightline_codegen::equations::Robot, Program) {
+fn program_of(robot: &str, function: Function) -> (straightline_codegen::equations::Robot, TracedProgram) {
     let robot = Robot::load(robot);
     // constant angles are cut into parts that f32 has, too
     let options = Options { generic: true, ..programs::options(&robot) };

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::options::Options;
-use straightline_codegen::program::Program;
+use straightline_codegen::program::TracedProgram;
 use straightline_codegen::Function;
 use straightline_core::joint::Measure;
 use straightline_core::reference::quaternion_rotation;
@@ -63,7 +63,7 @@ impl State {
     }
 
     /// The program of a function, for derivatives in double-double.
-    fn program(&self, function: Function) -> Program {
+    fn program(&self, function: Function) -> TracedProgram {
         program(&self.loaded, &self.robot.frames, function, &Options::default())
     }
 

@@ -7,7 +7,7 @@
 
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::expr::{self, Binary, Constant, Graph, NodeId, Op, Unary};
-use straightline_codegen::program::Program;
+use straightline_codegen::program::TracedProgram;
 use straightline_codegen::Function;
 use straightline_core::Dd;
 use straightline_generated_tests::bounds::DATA;
@@ -103,7 +103,7 @@ impl Sieve {
 }
 
 /// Whether the mutant gives anything else than the program, in random states.
-fn changes_a_value(program: &Program, mutant: &Graph, states: &[Vec<Dd>]) -> bool {
+fn changes_a_value(program: &TracedProgram, mutant: &Graph, states: &[Vec<Dd>]) -> bool {
     states.iter().any(|x| {
         let (a, b) = (expr::evaluate(&program.graph, x), expr::evaluate(mutant, x));
         let size = a.iter().fold(0.0, |m: f64, v| m.max(v.to_f64().abs()));

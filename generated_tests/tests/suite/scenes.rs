@@ -4,8 +4,8 @@ use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::expr::{evaluate, Grade};
 use straightline_codegen::model;
 use straightline_codegen::options::Options;
-use straightline_codegen::program::Program;
-use straightline_codegen::scene::{apply, Gravity, Part, Scene, Selection, Zero};
+use straightline_codegen::program::TracedProgram;
+use straightline_codegen::scene::{apply, Gravity, ResultPart, Scene, Selection, Zero};
 use straightline_codegen::{Diagnostics, Function};
 use straightline_generated_tests::bounds::LOCKED;
 use straightline_generated_tests::inputs::{self, ready_to_paste};
@@ -28,7 +28,7 @@ fn in_scene(robot: &Robot, scene: &Scene) -> Loaded {
 }
 
 /// The results of a program, its inputs by name.
-fn run(program: &Program, inputs: &[(&str, Vec<f64>)]) -> Vec<f64> {
+fn run(program: &TracedProgram, inputs: &[(&str, Vec<f64>)]) -> Vec<f64> {
     let named = |name: &str| inputs.iter().find(|(n, _)| *n == name).unwrap_or_else(|| panic!("no {name}")).1.clone();
     evaluate(&program.graph, &program.graph.inputs.iter().flat_map(|p| named(&p.name)).collect::<Vec<f64>>())
 }
@@ -110,7 +110,7 @@ fn joints_at_rest_are_the_program_with_their_rates_at_zero() {
 
 #[test]
 fn selected_results_are_those_of_the_full_program() {
-    let selected = |part: Part| {
+    let selected = |part: ResultPart| {
         move |loaded: &Loaded| {
             let last = loaded.model.bodies.last().expect("a robot has bodies").joint.name.clone();
             use Function::*;
@@ -119,20 +119,20 @@ fn selected_results_are_those_of_the_full_program() {
                 let by_joint = matches!(f, Jacobian | JointWrenches | MassMatrix)
                     || matches!(f, InverseDynamics | GravityForce | BiasForce | VelocityForce | ForwardDynamics);
                 let has_part = match part {
-                    Part::Whole => true,
-                    Part::Diagonal => f == MassMatrix,
-                    Part::Linear | Part::Angular => f.is_per_frame() || f == JointWrenches,
+                    ResultPart::Whole => true,
+                    ResultPart::Diagonal => f == MassMatrix,
+                    ResultPart::Linear | ResultPart::Angular => f.is_per_frame() || f == JointWrenches,
                 };
                 Selection {
                     joints: if by_joint { vec![last.clone()] } else { Vec::new() },
-                    part: if has_part { part } else { Part::Whole },
+                    part: if has_part { part } else { ResultPart::Whole },
                     ..Selection::default()
                 }
             };
             Scene { outputs: Function::all().map(|f| (f, selection(f))).collect(), ..Scene::default() }
         }
     };
-    for part in [Part::Whole, Part::Linear, Part::Angular, Part::Diagonal] {
+    for part in [ResultPart::Whole, ResultPart::Linear, ResultPart::Angular, ResultPart::Diagonal] {
         scene_is_full_program(&format!("selected, {part:?}"), selected(part), |_, _| {});
     }
 }

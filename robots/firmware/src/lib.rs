@@ -20,7 +20,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-use straightline::control::{computed_torque, Limits, Outcome, Reference};
+use straightline::control::{computed_torque, Outcome, Reference, TorqueLimits};
 use straightline::Dynamics;
 
 /// The arm: constants and functions of its dynamics, in single precision.
@@ -67,7 +67,7 @@ pub fn control_step(
     tau: &mut [f32; Ur5::NV],
 ) -> Result<(), Fault> {
     *tau = computed_torque(wanted, measured, gains, Ur5::inverse_dynamics);
-    match (Limits { greatest: TORQUE_LIMITS }).apply(tau) {
+    match (TorqueLimits { greatest: TORQUE_LIMITS }).apply(tau) {
         Outcome::NotFinite => Err(Fault::NotFinite),
         Outcome::Within | Outcome::Saturated => Ok(()),
     }

@@ -10,7 +10,7 @@
 //! | [`drive_feed_forward`] | voltages: u(r, ṙ, r̈, …) + G (K e + D ė), through motors and elastic transmissions | Fig. 20.10a |
 //!
 //! The model is a function over arrays, such as a generated `inverse_dynamics`; robots stand on a fixed base, one coordinate per
-//! joint. [`Limits::apply`] keeps torques within what drives can do, [`MotorLimits::apply`] voltages within what a supply gives and a motor bears.
+//! joint. [`TorqueLimits::apply`] keeps torques within what drives can do, [`MotorLimits::apply`] voltages within what a supply gives and a motor bears.
 //!
 //! ```
 //! use straightline_core::control::{computed_torque, Gains, Limits, Measured, Outcome, Reference};
@@ -132,14 +132,14 @@ pub fn drive_feed_forward<T: Real, const N: usize, const M: usize>(
 
 /// The torques of a reference motion, computed off line at M instants, `period` apart, from time zero on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Table<T, const N: usize, const M: usize> {
+pub struct TorqueTable<T, const N: usize, const M: usize> {
     /// Time from row to row \[s\], positive.
     pub period: T,
     /// A row per instant \[N·m or N\].
     pub rows: [[T; N]; M],
 }
 
-impl<T: Real + PartialOrd, const N: usize, const M: usize> Table<T, N, M> {
+impl<T: Real + PartialOrd, const N: usize, const M: usize> TorqueTable<T, N, M> {
     /// The table of a motion, by its inverse dynamics at every instant.
     pub fn of(
         period: T,
@@ -151,7 +151,7 @@ impl<T: Real + PartialOrd, const N: usize, const M: usize> Table<T, N, M> {
             inverse_dynamics(&at.q, &at.qd, &at.qdd, &mut tau);
             tau
         });
-        Table { period, rows }
+        TorqueTable { period, rows }
     }
 
     /// Between rows `k` and `k + 1`, `fraction` (0 to 1) of the way; at and beyond the last row, that row.
@@ -166,7 +166,7 @@ impl<T: Real + PartialOrd, const N: usize, const M: usize> Table<T, N, M> {
 
 /// The greatest moduli that drives can do.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits<T, const N: usize> {
+pub struct TorqueLimits<T, const N: usize> {
     /// Per joint \[N·m or N\].
     pub greatest: [T; N],
 }
@@ -182,7 +182,7 @@ pub enum Outcome {
     NotFinite,
 }
 
-impl<T: Real + PartialOrd, const N: usize> Limits<T, N> {
+impl<T: Real + PartialOrd, const N: usize> TorqueLimits<T, N> {
     /// Brings torques within the limits.
     pub fn apply(&self, tau: &mut [T; N]) -> Outcome {
         // of NaN and of infinities the product with zero is NaN
@@ -231,7 +231,7 @@ impl<T: Real + PartialOrd, const M: usize> MotorLimits<T, M> {
     pub fn apply(&self, u: &mut [T; M], speeds: &[T; M]) -> Outcome {
         let emf: [T; M] = from_fn(|k| self.emf_constant[k] * speeds[k]);
         let mut driving = from_fn(|k| u[k] - emf[k]);
-        let by_current = Limits { greatest: from_fn(|k| self.resistance[k] * self.current[k]) };
+        let by_current = TorqueLimits { greatest: from_fn(|k| self.resistance[k] * self.current[k]) };
         let first = by_current.apply(&mut driving);
         if first == Outcome::NotFinite {
             *u = [T::zero(); M];
@@ -240,7 +240,7 @@ impl<T: Real + PartialOrd, const M: usize> MotorLimits<T, M> {
         if first == Outcome::Saturated {
             *u = added(&driving, &emf);
         }
-        let by_voltage = Limits { greatest: self.voltage };
+        let by_voltage = TorqueLimits { greatest: self.voltage };
         match by_voltage.apply(u) {
             Outcome::Within => first,
             second => second,

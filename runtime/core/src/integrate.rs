@@ -257,7 +257,7 @@ impl<T: Real> Step<T> {
 }
 
 /// The mechanics of a joint, and where its coordinates stand.
-struct Place<'a, T> {
+struct JointPlace<'a, T> {
     first: usize,
     row: &'static Descriptor,
     mechanics: &'a dyn Mechanics<T>,
@@ -266,21 +266,25 @@ struct Place<'a, T> {
 /// The joints of a robot with so many coordinates; none where there are as many as rates.
 fn uneven<'a, T: Real + 'a, const NQ: usize, const NV: usize>(
     joints: &'a [Uneven],
-) -> impl Iterator<Item = Place<'a, T>> {
+) -> impl Iterator<Item = JointPlace<'a, T>> {
     let joints = if NQ == NV { &[] } else { joints };
-    joints.iter().map(|Uneven { kind, first }| Place { first: *first, row: kind.row(), mechanics: kind.mechanics() })
+    joints.iter().map(|Uneven { kind, first }| JointPlace {
+        first: *first,
+        row: kind.row(),
+        mechanics: kind.mechanics(),
+    })
 }
 
 /// What becomes of each rate at the entry of q that it belongs to, and of the rates of each of these joints at its own.
 fn over_joints<'a, T: Real + 'a, const NQ: usize, const NV: usize>(
     (q, qd): (&[T; NQ], &[T; NV]),
-    joints: impl Iterator<Item = Place<'a, T>>,
+    joints: impl Iterator<Item = JointPlace<'a, T>>,
     of_rate: impl Fn(T) -> T,
     of_joint: impl Fn(&dyn Mechanics<T>, &[T], &[T], &mut [T]),
 ) -> [T; NQ] {
     let mut all = [T::zero(); NQ];
     let (mut iq, mut iv) = (0, 0);
-    for Place { first, row, mechanics } in joints {
+    for JointPlace { first, row, mechanics } in joints {
         while iq < first {
             all[iq] = of_rate(qd[iv]);
             (iq, iv) = (iq + 1, iv + 1);
@@ -386,8 +390,8 @@ mod tests {
         }
     }
 
-    fn places(firsts: &[usize]) -> impl Iterator<Item = Place<'static, f64>> + '_ {
-        firsts.iter().map(|first| Place { first: *first, row: &BALL, mechanics: &Ball })
+    fn places(firsts: &[usize]) -> impl Iterator<Item = JointPlace<'static, f64>> + '_ {
+        firsts.iter().map(|first| JointPlace { first: *first, row: &BALL, mechanics: &Ball })
     }
 
     /// Two ball joints between joints of one coordinate: (1, 4, 1, 4, 1) coordinates, (1, 3, 1, 3, 1) rates.

@@ -1,8 +1,8 @@
 //! What happens between phases: impacts, lift-offs, sticking and slipping, and what keeps constraints closed.
 
 use super::object::{let_go, SLOTS};
-use super::state::{Closed, Parts, Phases, Rows, Seen, Slip, System, GUARDS, RIDGE, SLACK};
-use super::{Event, What};
+use super::state::{Closed, ContactWorld, Phases, Rows, Seen, Slip, StateParts, GUARDS, RIDGE, SLACK};
+use super::{ContactEvent, Event};
 use crate::plant::Action;
 use straightline_core::algorithms::{
     driven_jump, impact, mass_matrix, projection, FunctionalCoordinates, Struck, Support,
@@ -20,7 +20,7 @@ struct Blow {
     lost: f64,
 }
 
-impl System<'_> {
+impl ContactWorld<'_> {
     /// Every row that is not on an object that gives way.
     fn rigid(rows: &Rows) -> FunctionalCoordinates<f64> {
         let kept: Vec<usize> = (0..rows.s.len()).filter(|i| matches!(rows.supports[*i], Support::Rigid(_))).collect();
@@ -101,7 +101,7 @@ impl System<'_> {
                 struck[i] = Struck::Mass { mass: object.struck_mass(), velocity };
             }
         }
-        let Parts { q, qd, .. } = self.parts(state);
+        let StateParts { q, qd, .. } = self.parts(state);
         let blow = impact(&self.factor(q), qd, &rows.s, Some(&rows.applied), &struck, restitution, RIDGE);
         let energy = self.energy(t, state, before);
         let given = self.power_of_objects(state, &seen, &rows, &blow.impulse);
@@ -127,7 +127,7 @@ impl System<'_> {
     }
 
     /// The robot meets an object.
-    fn strike(&self, t: f64, state: &mut [f64], phases: &mut Phases, k: usize) -> What {
+    fn strike(&self, t: f64, state: &mut [f64], phases: &mut Phases, k: usize) -> ContactEvent {
         let touch = &self.touches()[k];
         let seen = self.see(t, state, k);
         let slip = match touch.contact.friction {
@@ -142,33 +142,33 @@ impl System<'_> {
         let restitution = if bounces { touch.restitution } else { 0.0 };
         let Blow { impulse, lost } = self.blow(t, state, (phases, &after), k, restitution);
         if bounces {
-            return What::Bounces { impulse, lost };
+            return ContactEvent::Bounces { impulse, lost };
         }
         *phases = after;
-        What::Touches { impulse, lost }
+        ContactEvent::Touches { impulse, lost }
     }
 
-    fn open(&self, state: &mut [f64], seen: &Seen, phases: &mut Phases, k: usize) -> What {
+    fn open(&self, state: &mut [f64], seen: &Seen, phases: &mut Phases, k: usize) -> ContactEvent {
         if let Some(object) = &self.touches()[k].environment {
             let slots = let_go(object, seen.s, self.slots(state, k));
             self.set_slots(state, k, slots);
         }
         phases[k] = None;
-        What::LiftsOff
+        ContactEvent::LiftsOff
     }
 
-    fn stick(&self, t: f64, state: &mut [f64], phases: &mut Phases, k: usize) -> What {
+    fn stick(&self, t: f64, state: &mut [f64], phases: &mut Phases, k: usize) -> ContactEvent {
         let mut after = phases.clone();
         if let Some(closed) = &mut after[k] {
             *closed = Closed { slip: Slip::Sticks, held: self.see(t, state, k).where_it_sticks(closed.held) };
         }
         self.blow(t, state, (phases, &after), k, 0.0);
         *phases = after;
-        What::Sticks
+        ContactEvent::Sticks
     }
 
     /// A guard has fallen: its place among all.
-    pub fn fallen(&self, t: f64, state: &mut [f64], phases: &mut Phases, guard: usize) -> Option<What> {
+    pub fn fallen(&self, t: f64, state: &mut [f64], phases: &mut Phases, guard: usize) -> Option<ContactEvent> {
         let (k, which) = (guard / GUARDS, guard % GUARDS);
         let seen = self.see(t, state, k);
         let Some(closed) = &mut phases[k] else { return Some(self.strike(t, state, phases, k)) };
@@ -185,7 +185,7 @@ impl System<'_> {
             (Slip::Slow, _) => Some(self.stick(t, state, phases, k)),
             (Slip::Sticks, _) => {
                 closed.slip = Slip::Slow;
-                Some(What::Slides)
+                Some(ContactEvent::Slides)
             }
             (Slip::Smooth, _) => None,
         }
@@ -217,7 +217,7 @@ impl System<'_> {
         state: &mut Vec<f64>,
         phases: &mut Phases,
         action: &Action,
-    ) -> Option<(usize, Option<What>)> {
+    ) -> Option<(usize, Option<ContactEvent>)> {
         *state = self.plant.normalised(state);
         let seen = self.see_all(t, state);
         let moved = self.moved(state, self.rows(state, &seen, phases), action);

@@ -65,12 +65,12 @@ pub struct Event {
     /// Of which contact.
     pub contact: String,
     /// What happens.
-    pub what: What,
+    pub what: ContactEvent,
 }
 
 /// What happens at an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum What {
+pub enum ContactEvent {
     /// It closes.
     Touches {
         /// Impulse along the distance, or the greatest one \[N·s or N·m·s\].
@@ -93,14 +93,14 @@ pub enum What {
     Slides,
 }
 
-impl fmt::Display for What {
+impl fmt::Display for ContactEvent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            What::Touches { impulse, lost } => write!(f, "touches, impulse {impulse:.3e}, {lost:.3e} J lost"),
-            What::Bounces { impulse, lost } => write!(f, "bounces, impulse {impulse:.3e}, {lost:.3e} J lost"),
-            What::LiftsOff => f.write_str("lifts off"),
-            What::Sticks => f.write_str("sticks"),
-            What::Slides => f.write_str("slides"),
+            ContactEvent::Touches { impulse, lost } => write!(f, "touches, impulse {impulse:.3e}, {lost:.3e} J lost"),
+            ContactEvent::Bounces { impulse, lost } => write!(f, "bounces, impulse {impulse:.3e}, {lost:.3e} J lost"),
+            ContactEvent::LiftsOff => f.write_str("lifts off"),
+            ContactEvent::Sticks => f.write_str("sticks"),
+            ContactEvent::Slides => f.write_str("slides"),
         }
     }
 }

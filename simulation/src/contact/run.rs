@@ -2,10 +2,10 @@
 
 use super::events::objects_at_rest;
 use super::object::SLOTS;
-use super::state::{Closed, Phases, Slip, System, GUARDS};
+use super::state::{Closed, ContactWorld, Phases, Slip, GUARDS};
 use super::{Contacts, Event};
 use crate::command::Command;
-use crate::ode::{solve, Equations, Pace, Step, Watch};
+use crate::ode::{solve, AcceptedStep, Equations, Pace, Watch};
 use crate::plant::{Action, Plant};
 use crate::simulate::{self, Balance, Failure, Run, Settings, SAME};
 use std::ops::ControlFlow;
@@ -63,7 +63,7 @@ pub fn simulate_from(
     progress: &dyn Fn(f64),
 ) -> Result<ContactRun, Failure> {
     let plant = &*plant.solved_by(settings.method);
-    let system = System { plant, contacts };
+    let system = ContactWorld { plant, contacts };
     let state = plant.normalised(&[start, objects_at_rest(contacts.touches.len())].concat());
     let pace = Pace::new(settings);
     let mut going = Going { system, command, settings, progress, pace, state, phases: Vec::new(), events: Vec::new() };
@@ -124,7 +124,7 @@ fn refused(time: f64, why: String) -> Failure {
 
 /// A simulation at an instant.
 struct Going<'a> {
-    system: System<'a>,
+    system: ContactWorld<'a>,
     command: &'a Command,
     settings: &'a Settings,
     progress: &'a dyn Fn(f64),
@@ -202,7 +202,7 @@ impl Going<'_> {
         let watched = |end: f64, watches: bool, run: &mut Run| {
             Watched { going: self, held, first: &first }.solve((t, end), begins, watches, run)
         };
-        let Seen { last, fallen } = watched(end, true, run)?;
+        let SolverProgress { last, fallen } = watched(end, true, run)?;
         let Some((guard, mut time)) = fallen else {
             self.state = self.system.plant.normalised(&last);
             return Ok(Reached { time: end, has_event: false });
@@ -321,7 +321,7 @@ enum Guard {
 }
 
 /// What the solver has shown.
-struct Seen {
+struct SolverProgress {
     last: Vec<f64>,
     fallen: Option<(Guard, f64)>,
 }
@@ -369,17 +369,17 @@ impl Watched<'_, '_> {
         values
     }
 
-    fn solve(&self, times: (f64, f64), from: &[f64], watches: bool, run: &mut Run) -> Result<Seen, Failure> {
-        let mut looks = Looks { of: self, armed: Vec::new(), watches, fallen: None };
+    fn solve(&self, times: (f64, f64), from: &[f64], watches: bool, run: &mut Run) -> Result<SolverProgress, Failure> {
+        let mut looks = GuardWatch { of: self, armed: Vec::new(), watches, fallen: None };
         let solved = solve(self, &mut looks, times, from, self.going.settings, &self.going.pace)?;
         run.steps += solved.accepted;
         run.evaluations += solved.evaluations;
-        Ok(Seen { last: solved.y, fallen: looks.fallen })
+        Ok(SolverProgress { last: solved.y, fallen: looks.fallen })
     }
 }
 
 /// Looks between steps for the first guard that falls.
-struct Looks<'a, 'b, 'c> {
+struct GuardWatch<'a, 'b, 'c> {
     of: &'a Watched<'b, 'c>,
     /// Guards that have been positive.
     armed: Vec<bool>,
@@ -387,12 +387,12 @@ struct Looks<'a, 'b, 'c> {
     fallen: Option<(Guard, f64)>,
 }
 
-impl Watch for Looks<'_, '_, '_> {
-    fn step(&mut self, step: &Step) -> ControlFlow<()> {
+impl Watch for GuardWatch<'_, '_, '_> {
+    fn step(&mut self, step: &AcceptedStep) -> ControlFlow<()> {
         if !self.watches {
             return ControlFlow::Continue(());
         }
-        let Step { t_before, t, y, within, .. } = *step;
+        let AcceptedStep { t_before, t, y, within, .. } = *step;
         let now = self.of.values(t, y);
         let first_fallen = |armed: &[bool], values: &[f64]| {
             (0..values.len()).find(|i| armed.get(*i) == Some(&true) && values[*i] <= 0.0)

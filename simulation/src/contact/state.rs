@@ -51,14 +51,14 @@ pub(super) struct Closed {
 pub(super) type Phases = Vec<Option<Closed>>;
 
 /// A robot among its objects.
-pub(super) struct System<'a> {
+pub(super) struct ContactWorld<'a> {
     pub plant: &'a Plant,
     pub contacts: &'a Contacts,
 }
 
 /// A state taken apart.
 #[derive(Clone, Copy)]
-pub(super) struct Parts<'s> {
+pub(super) struct StateParts<'s> {
     pub q: &'s [f64],
     pub qd: &'s [f64],
 }
@@ -139,7 +139,7 @@ pub(super) struct Pressed {
     pub tangential: f64,
 }
 
-impl<'a> System<'a> {
+impl<'a> ContactWorld<'a> {
     pub fn nq(&self) -> usize {
         self.plant.model.nq()
     }
@@ -165,9 +165,9 @@ impl<'a> System<'a> {
     }
 
     /// The state is that of the plant, then the coordinates of the objects.
-    pub fn parts<'s>(&self, state: &'s [f64]) -> Parts<'s> {
+    pub fn parts<'s>(&self, state: &'s [f64]) -> StateParts<'s> {
         let (q, qd, ..) = self.plant.split(state);
-        Parts { q, qd }
+        StateParts { q, qd }
     }
 
     pub fn slots(&self, state: &[f64], k: usize) -> Slots {
@@ -195,7 +195,7 @@ impl<'a> System<'a> {
     }
 
     pub fn see(&self, t: f64, state: &[f64], k: usize) -> Seen {
-        let Parts { q, qd, .. } = self.parts(state);
+        let StateParts { q, qd, .. } = self.parts(state);
         let contact = self.placed(k, t);
         let motion = relative_motion(&self.plant.model, &contact, q, qd);
         let row = functional_coordinates(&contact, &motion, &[Coordinate::Pz]);
@@ -213,7 +213,7 @@ impl<'a> System<'a> {
 
     /// Rows of what is closed.
     pub fn rows(&self, state: &[f64], seen: &[Seen], phases: &Phases) -> Rows {
-        let Parts { q, qd, .. } = self.parts(state);
+        let StateParts { q, qd, .. } = self.parts(state);
         let mut rows = Rows::default();
         for (k, (seen, phase)) in seen.iter().zip(phases).enumerate() {
             let first = rows.s.len();
@@ -282,7 +282,7 @@ impl<'a> System<'a> {
 
     /// q̈ and F under what acts.
     pub fn moved(&self, state: &[f64], rows: Rows, action: &Action) -> Moved {
-        let (model, Parts { q, qd, .. }) = (&self.plant.model, self.parts(state));
+        let (model, StateParts { q, qd, .. }) = (&self.plant.model, self.parts(state));
         let bias = bias_force(model, q, qd);
         let applied = Some(rows.applied.as_slice());
         if self.plant.is_driven() {
@@ -346,7 +346,7 @@ impl<'a> System<'a> {
     /// The time derivative of the state.
     pub fn rate(&self, t: f64, state: &[f64], phases: &Phases, action: &Action, rate: &mut [f64]) {
         let state = &self.plant.normalised(state);
-        let Parts { q, qd, .. } = self.parts(state);
+        let StateParts { q, qd, .. } = self.parts(state);
         let seen = self.see_all(t, state);
         let moved = self.moved(state, self.rows(state, &seen, phases), action);
         let work = self.work();

@@ -1,7 +1,7 @@
 //! The explicit Runge-Kutta method of order 8 by Dormand and Prince with error estimates of orders 5 and 3 and interpolation of order 7:
 //! DOP853 of Hairer, Nørsett and Wanner (Solving Ordinary Differential Equations I, 1993, section II.5), with their test for stiffness.
 
-use super::{Piece, Solved, Step, Watch};
+use super::{AcceptedStep, Piece, Solved, Watch};
 use crate::simulate::Failure;
 use std::cell::OnceCell;
 
@@ -154,7 +154,7 @@ pub(super) fn integrate(
             let coefficients = dense.get_or_init(|| interpolation(piece, (t, h_now), (&y, &new), &k, &rate));
             interpolated(coefficients, &y, (at - t) / h_now)
         };
-        let step = Step { t_before: t, t: t_new, y_before: &y, y: &new, within: &within };
+        let step = AcceptedStep { t_before: t, t: t_new, y_before: &y, y: &new, within: &within };
         if watch.step(&step).is_break() {
             return Ok(piece.solved(new, accepted));
         }

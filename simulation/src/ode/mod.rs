@@ -30,11 +30,11 @@ pub(crate) trait Equations {
 /// What looks on between steps, and may end the integration.
 pub(crate) trait Watch {
     /// After a step; and once before the first one, with no time gone by.
-    fn step(&mut self, step: &Step) -> ControlFlow<()>;
+    fn step(&mut self, step: &AcceptedStep) -> ControlFlow<()>;
 }
 
 /// An accepted step.
-pub(crate) struct Step<'a> {
+pub(crate) struct AcceptedStep<'a> {
     /// From here \[s\].
     pub t_before: f64,
     /// To here \[s\].
@@ -76,7 +76,7 @@ pub(crate) fn solve(
         return Err(piece.not_finite(start));
     }
     let still = |_: f64| state.to_vec();
-    let first = Step { t_before: start, t: start, y_before: state, y: state, within: &still };
+    let first = AcceptedStep { t_before: start, t: start, y_before: state, y: state, within: &still };
     if watch.step(&first).is_break() {
         return Ok(piece.solved(state.to_vec(), 0));
     }
@@ -224,7 +224,7 @@ mod tests {
     struct Middles(Vec<(f64, Vec<f64>)>);
 
     impl Watch for Middles {
-        fn step(&mut self, step: &Step) -> ControlFlow<()> {
+        fn step(&mut self, step: &AcceptedStep) -> ControlFlow<()> {
             if step.t > step.t_before {
                 let middle = 0.4 * step.t_before + 0.6 * step.t;
                 self.0.push((middle, (step.within)(middle)));

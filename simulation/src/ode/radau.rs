@@ -5,7 +5,7 @@
 //! are left. The Jacobian is found by differences; of what it couples, only the core is factorised: a state whose rate is another
 //! state (q̇) follows from that one, and what nothing depends on (work, heat) follows from all others.
 
-use super::{root_mean_square, Piece, Solved, Step, Watch};
+use super::{root_mean_square, AcceptedStep, Piece, Solved, Watch};
 use crate::simulate::Failure;
 use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, LU};
 
@@ -47,15 +47,15 @@ struct Pattern {
 }
 
 /// ∂f/∂y, row after row.
-struct Jacobian {
+struct SystemJacobian {
     entries: Vec<f64>,
     n: usize,
     pattern: Pattern,
 }
 
-impl Jacobian {
+impl SystemJacobian {
     /// By differences; `None` where a rate is not finite.
-    fn new(piece: &Piece, t: f64, y: &[f64], rate: &[f64]) -> Option<Jacobian> {
+    fn new(piece: &Piece, t: f64, y: &[f64], rate: &[f64]) -> Option<SystemJacobian> {
         let n = y.len();
         let mut entries = vec![0.0; n * n];
         let (mut moved, mut there) = (y.to_vec(), vec![0.0; n]);
@@ -74,7 +74,7 @@ impl Jacobian {
             (0..n).for_each(|i| entries[i * n + j] = (there[i] - rate[i]) / step);
         }
         let pattern = Pattern::new(&entries, n);
-        Some(Jacobian { entries, n, pattern })
+        Some(SystemJacobian { entries, n, pattern })
     }
 
     fn at(&self, i: usize, j: usize) -> f64 {
@@ -184,7 +184,7 @@ pub(super) fn integrate(
     let carried = piece.pace.next.get().map(|h| h.min(piece.most()));
     let mut h = carried.unwrap_or_else(|| piece.first_step(5.0, tolerance, &y, &rate));
     let mut stages = Stages { z: [0; 3].map(|_| vec![0.0; n]), w: [0; 3].map(|_| vec![0.0; n]) };
-    let mut jacobian: Option<Jacobian> = None;
+    let mut jacobian: Option<SystemJacobian> = None;
     // factors with the step that they are for
     let mut factors: Option<(f64, Factor<f64>, Factor<Complex<f64>>)> = None;
     let mut is_new = false;
@@ -214,7 +214,7 @@ pub(super) fn integrate(
             Ok(())
         };
         if jacobian.is_none() {
-            jacobian = Jacobian::new(piece, t, &y, &rate);
+            jacobian = SystemJacobian::new(piece, t, &y, &rate);
             (is_new, factors) = (true, None);
         }
         let Some(j) = &jacobian else { return Err(piece.not_finite(t)) };
@@ -270,7 +270,7 @@ pub(super) fn integrate(
             let s = (at - t) / h_now;
             (0..n).map(|i| y[i] + collocation(s, [z1[i], z2[i], z3[i]])).collect()
         };
-        let step = Step { t_before: t, t: t_new, y_before: &y, y: &new, within: &within };
+        let step = AcceptedStep { t_before: t, t: t_new, y_before: &y, y: &new, within: &within };
         let is_interrupted = watch.step(&step).is_break();
         before = Some((h_now, error.max(1e-2), stages.z.clone()));
         let mut h_new = h_now / quotient;
@@ -330,7 +330,7 @@ fn newton(
     piece: &Piece,
     (t, h): (f64, f64),
     y: &[f64],
-    (jacobian, real, complex): (&Jacobian, &Factor<f64>, &Factor<Complex<f64>>),
+    (jacobian, real, complex): (&SystemJacobian, &Factor<f64>, &Factor<Complex<f64>>),
     stages: &mut Stages,
     (scale, tolerance): (&[f64], f64),
     convergence: f64,
@@ -398,7 +398,7 @@ fn error(
     piece: &Piece,
     (t, h): (f64, f64),
     (y, rate): (&[f64], &[f64]),
-    (jacobian, real): (&Jacobian, &Factor<f64>),
+    (jacobian, real): (&SystemJacobian, &Factor<f64>),
     z: &[Vec<f64>; 3],
     scale: &[f64],
     is_hard: bool,

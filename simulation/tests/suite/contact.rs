@@ -8,7 +8,7 @@ use straightline_core::contact::{Contact, Coordinate, Friction, Object, Surface}
 use straightline_core::model::{Body, Frame, Joint, JointEffects, JointKind, Limits, Model};
 use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_simulation::command::{Command, Samples};
-use straightline_simulation::contact::{simulate, ContactRun, Contacts, Law, Touch, What};
+use straightline_simulation::contact::{simulate, ContactEvent, ContactRun, Contacts, Law, Touch};
 use straightline_simulation::plant::Plant;
 use straightline_simulation::simulate::{Method, Settings};
 use Coordinate::Pz;
@@ -99,7 +99,7 @@ fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
     assert!((found - expected).abs() <= tolerance, "{what}: {found}, expected {expected}");
 }
 
-fn times(run: &ContactRun) -> Vec<(f64, &What)> {
+fn times(run: &ContactRun) -> Vec<(f64, &ContactEvent)> {
     run.events.iter().map(|e| (e.time, &e.what)).collect()
 }
 
@@ -115,13 +115,13 @@ fn a_block_that_falls_bounces_as_newton_says_and_comes_to_rest() {
     for (bounce, (time, what)) in events.iter().enumerate().take(8) {
         let before = speed * 0.5f64.powi(bounce as i32);
         close(*time, expected, 1e-9, "time of the bounce");
-        let What::Bounces { impulse, lost } = what else { panic!("{what:?}") };
+        let ContactEvent::Bounces { impulse, lost } = what else { panic!("{what:?}") };
         close(*impulse, 1.5 * MASS * before, 1e-8, "impulse");
         close(*lost, 0.5 * MASS * before * before * 0.75, 1e-8, "lost energy");
         expected += before / G;
     }
     // with half of a thousandth of a metre per second it stays
-    assert!(matches!(events.last(), Some((_, What::Touches { .. }))) && events.len() == 13, "{events:?}");
+    assert!(matches!(events.last(), Some((_, ContactEvent::Touches { .. }))) && events.len() == 13, "{events:?}");
     close(run.run.q[0], 0.3 * 1.6, 1e-9, "way along the floor");
     close(run.run.q[1], 0.0, 1e-12, "rest");
     let weight = run.run.table.column("F.floor.pz").unwrap();
@@ -139,7 +139,7 @@ fn an_elastic_floor_without_damper_throws_back_after_half_a_period() {
     let run = run(model, &one(touch), &Command::Free, (&[0.0, 0.3], &[0.0, -v]), 1.2);
     let (touches, leaves) = (0.3 / v, 0.3 / v + PI * (MASS / k).sqrt());
     let found = times(&run);
-    assert!(matches!(found[..], [(_, What::Touches { .. }), (_, What::LiftsOff)]), "{found:?}");
+    assert!(matches!(found[..], [(_, ContactEvent::Touches { .. }), (_, ContactEvent::LiftsOff)]), "{found:?}");
     close(found[0].0, touches, 1e-9, "contact");
     close(found[1].0, leaves, 1e-9, "lift-off");
     close(run.run.qd[1], v, 1e-8, "speed");
@@ -160,11 +160,11 @@ fn a_mass_that_is_struck_moves_on_after_lift_off_and_is_met_where_it_then_is() {
     let found = times(&run);
     // plastic: both go on with m v/(m + m_e), swing for half a period together, and part where the spring begins to pull
     let together = MASS * v / (MASS + me);
-    let What::Touches { impulse, lost } = *found[0].1 else { panic!("{found:?}") };
+    let ContactEvent::Touches { impulse, lost } = *found[0].1 else { panic!("{found:?}") };
     close(impulse, me * together, 1e-9, "impulse");
     close(lost, 0.5 * MASS * v * v - 0.5 * (MASS + me) * together * together, 1e-9, "lost energy");
     close(found[1].0, 0.1 + PI * ((MASS + me) / k).sqrt(), 1e-9, "lift-off");
-    assert!(matches!(found[1].1, What::LiftsOff) && found.len() == 2, "{found:?}");
+    assert!(matches!(found[1].1, ContactEvent::LiftsOff) && found.len() == 2, "{found:?}");
     close(run.run.qd[1], together, 1e-8, "speed after it");
     // the mass swings alone
     let (t, front) = (run.run.table.column("t").unwrap(), run.run.table.column("front.floor").unwrap());
@@ -190,8 +190,8 @@ fn every_environment_balances_through_contact_and_lift_off() {
         let model = block();
         let touch = Touch { environment: Some(environment), ..floor(&model) };
         let run = run(model, &one(touch), &Command::Free, (&[0.0, 0.2], &[0.0, 0.0]), 3.0);
-        let ups = run.events.iter().filter(|e| e.what == What::LiftsOff).count();
-        let downs = run.events.iter().filter(|e| matches!(e.what, What::Touches { .. })).count();
+        let ups = run.events.iter().filter(|e| e.what == ContactEvent::LiftsOff).count();
+        let downs = run.events.iter().filter(|e| matches!(e.what, ContactEvent::Touches { .. })).count();
         assert!(ups >= 1 && downs == ups + 1, "{environment:?}: {:?}", run.events);
         // it has come to rest on the springs, and what is missing of its energy is heat
         let pressed = run.run.table.column("F.floor.pz").unwrap();
@@ -216,7 +216,7 @@ fn what_slides_sticks_when_it_has_stopped_and_slides_again_when_pushed_harder_th
     let stop = 0.8 / (0.3 * G);
     let slide = 1.0 + 0.3 * MASS * G / 20.0;
     let found = times(&run);
-    assert!(matches!(found[..], [(_, What::Sticks), (_, What::Slides)]), "{found:?}");
+    assert!(matches!(found[..], [(_, ContactEvent::Sticks), (_, ContactEvent::Slides)]), "{found:?}");
     // the smooth law is weaker near rest: w/(μ g) times a small number
     close(found[0].0, stop, 1e-3, "stop");
     close(found[1].0, slide, 1e-6, "break-away");
@@ -242,7 +242,7 @@ fn a_belt_carries_a_block_along_and_pays_for_it() {
     let contacts = one(Touch { law: Some(law), ..rough(&model) });
     let run = run(model, &contacts, &Command::Free, (&[0.0, 0.0], &[0.0, 0.0]), 0.5);
     let found = times(&run);
-    assert!(matches!(found[..], [(_, What::Sticks)]), "{found:?}");
+    assert!(matches!(found[..], [(_, ContactEvent::Sticks)]), "{found:?}");
     close(found[0].0, 0.5 / (0.3 * G), 1e-3, "carried along");
     close(run.run.qd[0], 0.5, 1e-9, "speed of the belt");
     // half of the belt's work is heat
@@ -266,7 +266,7 @@ fn a_shaking_table_throws_a_block_when_it_falls_faster_than_free() {
     let w = 2.0 * PI * f;
     let leaves = (G / (a * w * w)).asin() / w;
     close(run.events[0].time, leaves, 1e-9, "lift-off at −a ω² sin ω t = −g");
-    assert_eq!(run.events[0].what, What::LiftsOff);
+    assert_eq!(run.events[0].what, ContactEvent::LiftsOff);
 }
 
 #[test]
@@ -307,7 +307,7 @@ fn two_walls_are_met_one_after_the_other() {
     let command = push(&[0.0, 0.6, 0.7, 2.0], &[4.0, 4.0, -4.0, -4.0]);
     let run = run(block(), &contacts, &command, (&[0.0, 0.1], &[0.5, 0.0]), 1.0);
     let names: Vec<(&str, bool)> =
-        run.events.iter().map(|e| (e.contact.as_str(), matches!(e.what, What::Touches { .. }))).collect();
+        run.events.iter().map(|e| (e.contact.as_str(), matches!(e.what, ContactEvent::Touches { .. }))).collect();
     assert_eq!(names, [("floor", true), ("wall", true), ("wall", false)], "{:?}", run.events);
     close(run.events[0].time, (0.2 / G).sqrt(), 1e-9, "floor");
     close(run.events[1].time, (-0.5 + (0.25f64 + 4.0 * 0.5).sqrt()) / 2.0, 1e-9, "wall: 0.5 t + t² = 0.5");

@@ -7,7 +7,7 @@ use straightline_core::drive::{Drive, Efficiency, Motor, Rotor, Stage};
 use straightline_core::model::{Frame, Model};
 use straightline_core::spatial::{Mat3, Transform, Vec3};
 use straightline_simulation::command::{Command, Samples};
-use straightline_simulation::contact::{simulate, ContactRun, Touch, What};
+use straightline_simulation::contact::{simulate, ContactEvent, ContactRun, Touch};
 use straightline_simulation::drives::Inputs;
 use straightline_simulation::plant::Plant;
 use straightline_simulation::simulate::{Method, Settings};
@@ -76,7 +76,7 @@ fn crash(drive: Drive<f64>, touch: impl Fn(Touch) -> Touch) -> ContactRun {
 fn a_rotor_behind_a_rigid_gear_is_struck_and_one_behind_a_spring_is_not() {
     let reflected = RATIO * RATIO * ROTOR;
     let rigid = crash(drive("x", LOOSE, &[(0, RATIO)]), |wall| wall);
-    let What::Touches { impulse, lost } = rigid.events[0].what else { panic!("{:?}", rigid.events) };
+    let ContactEvent::Touches { impulse, lost } = rigid.events[0].what else { panic!("{:?}", rigid.events) };
     assert!((rigid.events[0].time - 0.4).abs() < 1e-9);
     assert!((impulse - (MASS + reflected) * 0.5).abs() < 1e-9, "{impulse}");
     assert!((lost - 0.125 * (MASS + reflected)).abs() < 1e-9, "{lost}");
@@ -89,7 +89,7 @@ fn a_rotor_behind_a_rigid_gear_is_struck_and_one_behind_a_spring_is_not() {
     let mut elastic = drive("x", LOOSE, &[(0, 1.0)]);
     elastic.stages = vec![stage(RATIO, 4000.0, 0.0)];
     let soft = crash(elastic, |wall| wall);
-    let What::Touches { impulse, lost } = soft.events[0].what else { panic!("{:?}", soft.events) };
+    let ContactEvent::Touches { impulse, lost } = soft.events[0].what else { panic!("{:?}", soft.events) };
     assert!((impulse - MASS * 0.5).abs() < 1e-9, "{impulse}");
     assert!((lost - 0.125 * MASS).abs() < 1e-9, "{lost}");
     // the rotor turns on, is stopped by the spring after a quarter of its period, and then pulls the cart off the wall
@@ -97,7 +97,7 @@ fn a_rotor_behind_a_rigid_gear_is_struck_and_one_behind_a_spring_is_not() {
     let pushed = soft.run.table.column("F.plane.pz").expect("a reaction");
     let greatest = pushed.iter().fold(0.0f64, |m, f| m.max(*f));
     assert!(greatest <= 0.5 * (4000.0 * reflected).sqrt() * (1.0 + 1e-9), "{greatest}");
-    assert_eq!(soft.events[1].what, What::LiftsOff);
+    assert_eq!(soft.events[1].what, ContactEvent::LiftsOff);
     assert!((soft.events[1].time - 0.4 - 0.5 * period).abs() < 1e-8, "{:?} {period}", soft.events);
 }
 
@@ -150,7 +150,11 @@ fn a_driven_arm_in_contact_keeps_its_books() {
     ] {
         let balance = &found.run.balance;
         println!("{name}: {:?}\n  {:.1e} of {:?}", found.events, balance.relative(), balance.drives);
-        assert!(found.events.iter().any(|e| matches!(e.what, What::Touches { .. })), "{name}: {:?}", found.events);
+        assert!(
+            found.events.iter().any(|e| matches!(e.what, ContactEvent::Touches { .. })),
+            "{name}: {:?}",
+            found.events
+        );
         // every effect took part
         let d = balance.drives;
         assert!([d.joule, d.friction, d.gears, d.dampers].iter().all(|x| *x > 1e-6), "{name}: {d:?}");

@@ -5,7 +5,7 @@ use straightline_codegen::description::reader::{FileReader, Range64};
 use straightline_codegen::description::table::{parse, TomlTable};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::scene::contact::{
-    tool_axes, ContactItem, Contacts as Items, EnvironmentItem, ObjectPose, SurfaceItem,
+    tool_axes, ContactItem, EnvironmentItem, ObjectPose, SceneContacts as Items, SurfaceItem,
 };
 use straightline_core::algorithms::Environment;
 use straightline_core::contact::{Contact, Coordinate, Object};

@@ -26,7 +26,7 @@ pub struct Design {
 }
 
 /// What of the robot follows a parameter.
-enum Change {
+enum DesignChange {
     /// The link's share of each body, at the value `whole`.
     Mass { whole: f64, shares: Vec<(usize, Load<Dd>)> },
     /// An effect of the joint of a body.
@@ -93,7 +93,7 @@ fn change(
     model: &Model<Dd>,
     build: &dyn Fn(&Description) -> Option<Model<Dd>>,
     path: &str,
-) -> Result<Option<Change>, Box<Diagnostic>> {
+) -> Result<Option<DesignChange>, Box<Diagnostic>> {
     let (owner, key) = path.rsplit_once('.').unwrap_or((path, ""));
     // the same robot with this number set to two values: what differs follows it
     let at = |value: f64| parameter::with(description, path, value).map(|changed| build(&changed));
@@ -103,15 +103,17 @@ fn change(
         let bodies = whole.bodies.iter().zip(&double.bodies).enumerate();
         let shares = bodies.map(|(id, (one, two))| (id, two.total_about_origin() - one.total_about_origin()));
         let shares: Vec<(usize, Load<Dd>)> = shares.filter(|(_, load)| load.mass != Dd::ZERO).collect();
-        return Ok(Some(Change::Mass { whole: mass_of(description, owner), shares }));
+        return Ok(Some(DesignChange::Mass { whole: mass_of(description, owner), shares }));
     }
     let (some, more) = (at(1.0)?, at(2.0)?);
     let Some((some, more)) = some.zip(more) else { return Ok(None) };
     let differs = some.bodies.iter().zip(&more.bodies).any(|(a, b)| a.effects != b.effects);
     let body = model.bodies.iter().position(|body| body.joint.name == owner);
     Ok(Some(match body.filter(|_| differs) {
-        Some(body) => Change::Effect { body, key: key.to_string(), drive: Box::new(drive_of(description, owner)) },
-        None => Change::Nothing,
+        Some(body) => {
+            DesignChange::Effect { body, key: key.to_string(), drive: Box::new(drive_of(description, owner)) }
+        }
+        None => DesignChange::Nothing,
     }))
 }
 
@@ -124,23 +126,23 @@ fn drive_of(description: &Description, joint: &str) -> JointDrive {
 }
 
 /// The robot as the trace sees it.
-fn with_inputs(model: &Model<Dd>, changes: &[Change], inputs: &[Expr]) -> Model<Expr> {
+fn with_inputs(model: &Model<Dd>, changes: &[DesignChange], inputs: &[Expr]) -> Model<Expr> {
     let mut traced: Model<Expr> = model.cast();
     for (change, p) in changes.iter().zip(inputs) {
         match change {
-            Change::Nothing => {}
-            Change::Mass { whole, shares } => {
+            DesignChange::Nothing => {}
+            DesignChange::Mass { whole, shares } => {
                 // what the file's value is there already
                 let more = *p - Expr::constant(Dd::from(*whole));
                 for (id, share) in shares {
                     traced.bodies[*id].carry(share.map(|x| Expr::constant(x) * more));
                 }
             }
-            Change::Effect { body, key, drive } => {
+            DesignChange::Effect { body, key, drive } => {
                 // a rotor's inertia and its gear stand in one number
                 let given = |wanted: &str| {
-                    let of = |(change, p): (&Change, &Expr)| match change {
-                        Change::Effect { body: other, key, .. } if other == body && key == wanted => Some(*p),
+                    let of = |(change, p): (&DesignChange, &Expr)| match change {
+                        DesignChange::Effect { body: other, key, .. } if other == body && key == wanted => Some(*p),
                         _ => None,
                     };
                     changes.iter().zip(inputs).find_map(of)

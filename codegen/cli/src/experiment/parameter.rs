@@ -40,7 +40,7 @@ pub fn parse(text: &str) -> Result<Sweep, String> {
 
 /// A parameter and the range in which its best value is looked for.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Range {
+pub struct ParameterRange {
     /// `LINK.mass`, `JOINT.damping`, …
     pub path: String,
     /// From here to there, in the file's unit.
@@ -51,14 +51,14 @@ pub struct Range {
 ///
 /// # Errors
 /// What is wrong with the text.
-pub fn parse_range(text: &str) -> Result<Range, String> {
+pub fn parse_range(text: &str) -> Result<ParameterRange, String> {
     let form = || "PATH=from:to with from < to, such as elbow.spring_stiffness=0:50".to_string();
     let (path, ends) = text.split_once('=').ok_or_else(form)?;
     let (from, to) = ends.split_once(':').ok_or_else(form)?;
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(form);
     let ends = (number(from)?, number(to)?);
     match path.contains('.') && ends.0 < ends.1 {
-        true => Ok(Range { path: path.trim().to_string(), ends }),
+        true => Ok(ParameterRange { path: path.trim().to_string(), ends }),
         false => Err(form()),
     }
 }
@@ -154,7 +154,7 @@ mod tests {
         for text in ["forearm.mass", "mass=1", "a.mass=1,x", "a.mass=1:2:1", "a.mass=nan", "a.mass=1:2"] {
             assert!(parse(text).is_err(), "{text}");
         }
-        assert_eq!(parse_range("a.mass=1:3").unwrap(), Range { path: "a.mass".to_string(), ends: (1.0, 3.0) });
+        assert_eq!(parse_range("a.mass=1:3").unwrap(), ParameterRange { path: "a.mass".to_string(), ends: (1.0, 3.0) });
         for text in ["a.mass=1", "a.mass=3:1", "a.mass=1:x", "mass=1:3"] {
             assert!(parse_range(text).is_err(), "{text}");
         }

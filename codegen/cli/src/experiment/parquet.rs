@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use straightline_codegen::diagnostic::Source;
-use straightline_simulation::table::Table;
+use straightline_simulation::table::DataTable;
 
 /// Whether a file's name says that it is a Parquet file.
 pub fn is_parquet(path: &Path) -> bool {
@@ -19,7 +19,7 @@ const LEFT_OUT: &str =
 /// # Errors
 /// What is wrong with the file, or that this build does not read it.
 #[cfg(not(feature = "parquet"))]
-pub fn read(_: &Path) -> Result<Table, String> {
+pub fn read(_: &Path) -> Result<DataTable, String> {
     Err(LEFT_OUT.to_string())
 }
 
@@ -28,7 +28,7 @@ pub fn read(_: &Path) -> Result<Table, String> {
 /// # Errors
 /// What the library says, or that this build does not write it.
 #[cfg(not(feature = "parquet"))]
-pub fn bytes(_: &Table) -> Result<Vec<u8>, String> {
+pub fn bytes(_: &DataTable) -> Result<Vec<u8>, String> {
     Err(LEFT_OUT.to_string())
 }
 
@@ -49,7 +49,7 @@ pub fn source(path: &Path, shown: &str) -> Result<Source, String> {
 
 #[cfg(feature = "parquet")]
 mod known {
-    use super::{Path, Table};
+    use super::{DataTable, Path};
     use ::parquet::basic::{Compression, Repetition, Type as Physical};
     use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
     use ::parquet::data_type::{DataType, DoubleType};
@@ -64,7 +64,7 @@ mod known {
     ///
     /// # Errors
     /// What is wrong with the file.
-    pub fn read(path: &Path) -> Result<Table, String> {
+    pub fn read(path: &Path) -> Result<DataTable, String> {
         let file = std::fs::File::open(path).map_err(|error| error.to_string())?;
         let reader = SerializedFileReader::new(file).map_err(said)?;
         let schema = reader.metadata().file_metadata().schema_descr_ptr();
@@ -93,7 +93,7 @@ mod known {
         }
         let rows = columns.first().map_or(0, Vec::len);
         let rows = (0..rows).map(|i| columns.iter().map(|column| column[i]).collect()).collect();
-        Ok(Table { names, rows })
+        Ok(DataTable { names, rows })
     }
 
     fn numbers<T: DataType>(
@@ -116,11 +116,11 @@ mod known {
     ///
     /// # Errors
     /// What the library says.
-    pub fn bytes(table: &Table) -> Result<Vec<u8>, String> {
+    pub fn bytes(table: &DataTable) -> Result<Vec<u8>, String> {
         written(table).map_err(said)
     }
 
-    fn written(table: &Table) -> Result<Vec<u8>, ParquetError> {
+    fn written(table: &DataTable) -> Result<Vec<u8>, ParquetError> {
         let field = |name: &String| {
             let field = Type::primitive_type_builder(name, Physical::DOUBLE).with_repetition(Repetition::REQUIRED);
             field.build().map(Arc::new)

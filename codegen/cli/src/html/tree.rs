@@ -26,16 +26,16 @@ struct Node {
 }
 
 /// Where everything stands.
-struct Layout {
+struct TreeLayout {
     nodes: Vec<Node>,
     roots: Vec<usize>,
     width: f64,
     height: f64,
 }
 
-impl Layout {
+impl TreeLayout {
     /// Columns of this width.
-    fn new(model: &Model<Dd>, column: f64) -> Layout {
+    fn new(model: &Model<Dd>, column: f64) -> TreeLayout {
         let n = model.bodies.len();
         let mut nodes: Vec<Node> = (0..n).map(|_| Node { x: 0.0, row: 0, children: Vec::new() }).collect();
         for i in 0..n {
@@ -62,7 +62,7 @@ impl Layout {
             }
         }
         let rows = nodes.iter().map(|node| node.row + 1).max().unwrap_or(0);
-        Layout { nodes, roots, width: columns as f64 * column, height: rows as f64 * ROW + 0.5 * ROW + 6.0 }
+        TreeLayout { nodes, roots, width: columns as f64 * column, height: rows as f64 * ROW + 0.5 * ROW + 6.0 }
     }
 
     /// The world, above the roots.
@@ -119,7 +119,7 @@ pub(super) fn tree(model: &Model<Dd>, held: &dyn Fn(usize) -> bool, notes: &dyn 
         let (joint, body) = words(i);
         text_width(&joint, JOINT_FONT * 1.1).max(text_width(&body, BODY_FONT))
     });
-    let layout = Layout::new(model, longest.fold(60.0, f64::max) + 2.0 * MARGIN);
+    let layout = TreeLayout::new(model, longest.fold(60.0, f64::max) + 2.0 * MARGIN);
     let (width, height) = (layout.width, layout.height);
     let mut out = format!(
         "<svg viewBox=\"0 0 {width:.0} {height:.0}\" width=\"{width:.0}\" style=\"max-width:100%;min-width:{:.0}px\" role=\"img\" aria-label=\"kinematic tree\">\n",

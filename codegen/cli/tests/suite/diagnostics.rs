@@ -6,7 +6,7 @@ use std::process::Command;
 use straightline_codegen::diagnostic::{codes, Diagnostics, Front, Level, Levels, Reporting, Severity, Source};
 use straightline_codegen::fronts::expansion::expand;
 use straightline_codegen::model::{load, ModelOptions};
-use straightline_codegen::options::Settings;
+use straightline_codegen::options::GivenOptions;
 use straightline_codegen::program::equivalence::{Disagreement, Plainer};
 use straightline_codegen::{compile, Builder, Function, Options};
 
@@ -64,7 +64,7 @@ fn angles_near_right_ones_are_one_line_whose_tolerance_mends_all() {
 fn every_front_names_its_own_option() {
     let here = scratch("fronts");
     let options = Options { functions: vec![Function::GravityForce], ..Options::default() };
-    let derived = expand("arm.toml", None, &[&here], &Settings::default()).warnings;
+    let derived = expand("arm.toml", None, &[&here], &GivenOptions::default()).warnings;
     assert!(derived.contains("`angle_tolerance = 1e-6` takes") && derived.lines().count() == 2, "{derived}");
     let built = Builder::new(here.join("arm.toml")).functions([Function::GravityForce]).out_dir(&here).build().unwrap();
     assert!(built.warnings.render().contains("`.angle_tolerance(1e-6)` takes"), "{}", built.warnings);

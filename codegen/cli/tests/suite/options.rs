@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use straightline_codegen::diagnostic::Front;
 use straightline_codegen::fronts::expansion::{expand, SceneOf};
-use straightline_codegen::options::table::{Call, Group, Row, TABLE};
-use straightline_codegen::options::{Settings, Value};
+use straightline_codegen::options::table::{Call, OptionGroup, OptionRow, TABLE};
+use straightline_codegen::options::{GivenOptions, OptionValue};
 use straightline_codegen::{compile, Builder, Options, Source};
 
 /// Two joints, and a tip of the name that the table's examples have.
@@ -52,7 +52,7 @@ fn scratch() -> PathBuf {
 }
 
 /// What is generated, or what is said of it; of bounds that depend on the machine the hash of the inputs alone.
-fn bytes(row: &Row, text: &str) -> String {
+fn bytes(row: &OptionRow, text: &str) -> String {
     let hash = |line: &&str| line.starts_with("// Inputs' hash");
     match row.name {
         "certify_seconds" => text.lines().find(hash).expect("a hash").to_string(),
@@ -71,9 +71,9 @@ fn by_command_line(here: &Path, arguments: &[String]) -> String {
     String::from_utf8(command.stdout).unwrap()
 }
 
-fn settings(row: &'static Row, front: Front) -> Settings {
-    let mut settings = Settings::default();
-    settings.set("functions", Value::of_words([FUNCTION]), front).unwrap();
+fn settings(row: &'static OptionRow, front: Front) -> GivenOptions {
+    let mut settings = GivenOptions::default();
+    settings.set("functions", OptionValue::of_words([FUNCTION]), front).unwrap();
     settings.give(row, row.parse(row.example, front).unwrap(), front).unwrap();
     settings
 }
@@ -82,7 +82,7 @@ fn settings(row: &'static Row, front: Front) -> Settings {
 fn an_option_gives_the_same_bytes_through_every_front() {
     let here = scratch();
     let mut asked = 0;
-    for row in TABLE.iter().filter(|row| row.group != Group::Front) {
+    for row in TABLE.iter().filter(|row| row.group != OptionGroup::Front) {
         let mut options = Options::default();
         settings(row, Front::Derive).apply(&mut options);
         let wanted = compile(&Source::new("arm.toml", ARM), &options);
@@ -103,7 +103,7 @@ fn an_option_gives_the_same_bytes_through_every_front() {
         let expansion = expand("arm.toml", None, &[&here], &own);
         check("the macros", &expansion.result.unwrap_or_else(|refusal| panic!("{}", refusal.message)).0.text);
 
-        let builder = Builder::new("arm.toml").option("functions", Value::of_words([FUNCTION]));
+        let builder = Builder::new("arm.toml").option("functions", OptionValue::of_words([FUNCTION]));
         let built = builder.option(row.name, row.parse(row.example, Front::Builder).unwrap()).run(&here, &here);
         check("a build script", &built.result.unwrap_or_else(|error| panic!("{error}: {}", built.person)).text);
 
@@ -113,9 +113,9 @@ fn an_option_gives_the_same_bytes_through_every_front() {
         fs::write(here.join("scene.toml"), format!("[{}]\n{}\n", row.table, row.written_in_scene())).unwrap();
         let scene = functions.iter().cloned().chain(["--scene=scene.toml".to_string()]);
         check("a scene file", &by_command_line(&here, &scene.collect::<Vec<_>>()));
-        let mut others = Settings::default();
+        let mut others = GivenOptions::default();
         if row.name != "functions" {
-            others.set("functions", Value::of_words([FUNCTION]), Front::Derive).unwrap();
+            others.set("functions", OptionValue::of_words([FUNCTION]), Front::Derive).unwrap();
         }
         let scene = SceneOf::File("scene.toml".into());
         let expansion = expand("arm.toml", Some(&scene), &[&here], &others);

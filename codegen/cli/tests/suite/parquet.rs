@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 use straightline_cli::experiment::parquet::{bytes, read};
-use straightline_simulation::table::Table;
+use straightline_simulation::table::DataTable;
 
 const ROBOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/descriptions/planar_2r.toml");
 
@@ -34,7 +34,7 @@ fn what_was_written_is_read_to_the_last_bit() {
     let number =
         |i: usize, k: usize| (i as f64 + 0.1).sqrt() * 10f64.powi(k as i32 * 40 - 60) * if k == 1 { -1.0 } else { 1.0 };
     let rows = (0..3000).map(|i| (0..3).map(|k| number(i, k)).collect()).collect();
-    let (table, path) = (Table { names, rows }, scratch("bits.parquet"));
+    let (table, path) = (DataTable { names, rows }, scratch("bits.parquet"));
     fs::write(&path, bytes(&table).expect("it can be written")).expect("the file can be written");
     assert_eq!(read(&path).expect("it can be read"), table);
 }

@@ -7,14 +7,14 @@
 //! A value is expanded over the real numbers, so that what is found here holds for exact values; a computed one is off by its
 //! accumulated error at most, which [`analysis`](super::analysis) adds.
 
-use super::forms::{simplified, Atom, Coefficient, Form, Term};
+use super::forms::{simplified, Atom, Coefficient, FormTerm, LinearForm};
 use crate::expr::{Binary, Graph, NodeId, Op, Unary};
 use std::collections::BTreeMap;
 
 /// Factors by node, sorted.
 type Monomial = Vec<u32>;
 /// Whole multiples of monomials; none is zero.
-type Polynomial = BTreeMap<Monomial, i64>;
+type MonomialSum = BTreeMap<Monomial, i64>;
 
 /// Longer sums stay in parts.
 const LONGEST: usize = 24;
@@ -24,7 +24,7 @@ const FACTORS: usize = 8;
 const MULTIPLE: u64 = 4;
 
 /// For each node, a form of its exact value in which products have cancelled, where there is one.
-pub fn cancelled(graph: &Graph, live: &[bool]) -> Vec<Option<Form>> {
+pub fn cancelled(graph: &Graph, live: &[bool]) -> Vec<Option<LinearForm>> {
     let mut sums = Sums { graph, of: Vec::with_capacity(graph.ops.len()), nodes: BTreeMap::new() };
     let mut forms = Vec::with_capacity(graph.ops.len());
     for id in graph.ids() {
@@ -38,12 +38,12 @@ pub fn cancelled(graph: &Graph, live: &[bool]) -> Vec<Option<Form>> {
     forms
 }
 
-fn canonical(sum: &Polynomial) -> (Vec<(Monomial, i64)>, bool) {
+fn canonical(sum: &MonomialSum) -> (Vec<(Monomial, i64)>, bool) {
     let negative = sum.values().next().is_some_and(|k| *k < 0);
     (sum.iter().map(|(m, k)| (m.clone(), if negative { -k } else { *k })).collect(), negative)
 }
 
-fn add(to: &mut Polynomial, monomial: Monomial, multiple: i64) {
+fn add(to: &mut MonomialSum, monomial: Monomial, multiple: i64) {
     let sum = to.get(&monomial).copied().unwrap_or(0) + multiple;
     if sum == 0 {
         to.remove(&monomial);
@@ -61,14 +61,14 @@ fn product(a: &[u32], b: &[u32]) -> Monomial {
 struct Sums<'g> {
     graph: &'g Graph,
     /// Of each node the sum of products that it is.
-    of: Vec<Polynomial>,
+    of: Vec<MonomialSum>,
     /// Nodes by their sums, and whether the node is minus that.
     nodes: BTreeMap<Vec<(Monomial, i64)>, (u32, bool)>,
 }
 
 impl Sums<'_> {
-    fn expand(&self, id: NodeId) -> Polynomial {
-        let alone = || Polynomial::from([(vec![id.0], 1)]);
+    fn expand(&self, id: NodeId) -> MonomialSum {
+        let alone = || MonomialSum::from([(vec![id.0], 1)]);
         let joined = |a: NodeId, b: NodeId, sign: i64| {
             let mut sum = self.of[a.index()].clone();
             self.of[b.index()].iter().for_each(|(m, k)| add(&mut sum, m.clone(), sign * k));
@@ -95,7 +95,7 @@ impl Sums<'_> {
                 if a.len() + b.len() > FACTORS {
                     alone()
                 } else {
-                    Polynomial::from([(product(&a, &b), k * l)])
+                    MonomialSum::from([(product(&a, &b), k * l)])
                 }
             }
             _ => alone(),
@@ -118,8 +118,8 @@ impl Sums<'_> {
     }
 
     /// The two operands of a sum, as products where they are such.
-    fn halves(&self, id: u32) -> Polynomial {
-        let mut sum = Polynomial::new();
+    fn halves(&self, id: u32) -> MonomialSum {
+        let mut sum = MonomialSum::new();
         let mut push = |a: NodeId, sign: i64| {
             if self.is_sum(a.0) {
                 let (k, a) = self.bare(a);
@@ -150,7 +150,7 @@ impl Sums<'_> {
         }
     }
 
-    fn without_cancelling(&self, sum: &Polynomial) -> Option<Form> {
+    fn without_cancelling(&self, sum: &MonomialSum) -> Option<LinearForm> {
         for (monomial, &multiple) in sum {
             let &[a, b] = &monomial[..] else { continue };
             // of x y, y is taken apart, and x where that cancels
@@ -171,8 +171,8 @@ impl Sums<'_> {
         self.of[node as usize].len() > 1
     }
 
-    fn taken_apart(&self, sum: &Polynomial, taken: &Monomial, multiple: i64, x: u32, y: u32) -> Option<Form> {
-        let mut rest = Polynomial::new();
+    fn taken_apart(&self, sum: &MonomialSum, taken: &Monomial, multiple: i64, x: u32, y: u32) -> Option<LinearForm> {
+        let mut rest = MonomialSum::new();
         for (m, &k) in sum.iter().filter(|(m, _)| *m != taken) {
             // turned vectors: c z + s w with the sums that z and w are
             match m[..] {
@@ -198,18 +198,18 @@ impl Sums<'_> {
         if !cancels {
             return None;
         }
-        let mut form = Form::new();
+        let mut form = LinearForm::new();
         let mut repeat = |multiple: i64, coefficient: Coefficient, atom: Atom| {
-            let term = Term { coefficient, atom, negative: multiple < 0 };
+            let term = FormTerm { coefficient, atom, negative: multiple < 0 };
             (0..multiple.unsigned_abs().min(MULTIPLE)).for_each(|_| form.push(term));
             (multiple.unsigned_abs() <= MULTIPLE).then_some(())
         };
         for (k, factor) in whole {
-            let (l, Atom::Value(node)) = self.atom(&Polynomial::from([(factor, 1)]))? else { return None };
+            let (l, Atom::Value(node)) = self.atom(&MonomialSum::from([(factor, 1)]))? else { return None };
             repeat(k * l, Coefficient::Node(node), Atom::Value(x))?;
         }
         // what has a sine or cosine, by that
-        let mut turned: BTreeMap<u32, Polynomial> = BTreeMap::new();
+        let mut turned: BTreeMap<u32, MonomialSum> = BTreeMap::new();
         for (m, k) in rest {
             match m.iter().rev().find(|f| self.half(**f).is_some()) {
                 Some(&trig) => {
@@ -219,7 +219,7 @@ impl Sums<'_> {
                     add(turned.entry(trig).or_default(), others, k);
                 }
                 None => {
-                    let (l, atom) = self.atom(&Polynomial::from([(m, 1)]))?;
+                    let (l, atom) = self.atom(&MonomialSum::from([(m, 1)]))?;
                     repeat(k * l, Coefficient::One, atom)?;
                 }
             }
@@ -234,12 +234,12 @@ impl Sums<'_> {
     }
 
     /// Values of which a sum consists: one, one and a product, or all products.
-    fn atoms(&self, sum: &Polynomial) -> Option<Vec<(i64, Atom)>> {
+    fn atoms(&self, sum: &MonomialSum) -> Option<Vec<(i64, Atom)>> {
         if let Some(atom) = self.atom(sum) {
             return Some(vec![atom]);
         }
         let product =
-            |m: &Monomial, k: i64| self.atom(&Polynomial::from([(m.clone(), 1)])).map(|(sign, atom)| (k * sign, atom));
+            |m: &Monomial, k: i64| self.atom(&MonomialSum::from([(m.clone(), 1)])).map(|(sign, atom)| (k * sign, atom));
         let all_but = |(m, k): (&Monomial, &i64)| {
             let mut others = sum.clone();
             others.remove(m);
@@ -249,7 +249,7 @@ impl Sums<'_> {
     }
 
     /// The value, or half of one, that is this sum, and its sign.
-    fn atom(&self, sum: &Polynomial) -> Option<(i64, Atom)> {
+    fn atom(&self, sum: &MonomialSum) -> Option<(i64, Atom)> {
         let (mut key, negative) = canonical(sum);
         let sign = |minus: bool| if negative != minus { -1 } else { 1 };
         if let Some((node, minus)) = self.nodes.get(&key) {

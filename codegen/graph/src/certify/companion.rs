@@ -2,7 +2,7 @@
 //! proven in `running.rs`; of accelerations and reactions, which are checked by their residual, in [`residual`](super::residual).
 
 use super::running::Running;
-use super::Format;
+use super::FloatFormat;
 use crate::expr::{Graph, Port};
 use crate::number::Scalar;
 
@@ -27,12 +27,12 @@ pub fn state_bound(graph: &Graph, scalar: Scalar, bits: Bits) -> Result<Graph, &
     if !graph.formats.is_empty() && graph.inputs.iter().any(|p| p.wrapper.is_some()) {
         return Err("parameters that are inputs are in f32, and the bound of mixed precision is in f64");
     }
-    let format = Format::of(scalar);
+    let format = FloatFormat::of(scalar);
     let ports = graph.inputs.clone();
     let program = match (graph.formats.is_empty(), bits) {
         (true, Bits::Plain) => Running::new(ports, format),
         (true, Bits::Fused) => Running::of_other_bits(ports, format, format),
-        (false, _) => Running::of_other_bits(ports, Format::of(graph.widest(scalar)), format),
+        (false, _) => Running::of_other_bits(ports, FloatFormat::of(graph.widest(scalar)), format),
     };
     bound_of(program, graph)
 }

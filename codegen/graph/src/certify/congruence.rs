@@ -1,7 +1,7 @@
 //! WᵀHW = D + B of a mass matrix: what proves it definite, and bounds solutions with it. The proof is in [`residual`](super::residual).
 
 use super::running::{BrokenProof, Running, Tracked};
-use super::Format;
+use super::FloatFormat;
 use crate::expr::{NodeId, Op};
 
 /// A matrix by rows, without its diagonal, where that is one; zeros are none.
@@ -23,7 +23,7 @@ pub(super) struct Congruence {
 }
 
 /// γ of so many roundings.
-pub(super) fn gamma(count: usize, format: Format) -> f64 {
+pub(super) fn gamma(count: usize, format: FloatFormat) -> f64 {
     let u = count as f64 * format.u;
     // the constant is rounded, too
     (u / (1.0 - u)) * (1.0 + 4.0 * format.u)

@@ -9,7 +9,7 @@ const COSINE_KERNEL_ULPS: f64 = 0.622;
 
 /// A binary floating-point format, with the proven error of its sine and cosine.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Format {
+pub struct FloatFormat {
     /// The scalar type that has it.
     pub scalar: Scalar,
     /// Half the distance of 1 to the next number, u = 2^-p.
@@ -24,10 +24,10 @@ pub struct Format {
     pub trig_domain: f64,
 }
 
-impl Format {
+impl FloatFormat {
     /// The format of a scalar type.
     pub fn of(scalar: Scalar) -> Self {
-        Format {
+        FloatFormat {
             scalar,
             u: scalar.unit(),
             tiny: scalar.tiny(),
@@ -56,13 +56,13 @@ impl Format {
         if magnitude == 0.0 {
             return 0.0;
         }
-        add_up(0.5 * self.u * Format::binade(magnitude), self.tiny)
+        add_up(0.5 * self.u * FloatFormat::binade(magnitude), self.tiny)
     }
 
     /// Error of a sine or cosine whose exact value is at most `magnitude`.
     pub fn trig_error(&self, magnitude: f64) -> f64 {
         // an ulp in the binade below 2^e is 2 u 2^(e − 1)
-        add_up((self.trig_ulps * self.u).next_up() * Format::binade(magnitude.min(1.0)), self.tiny)
+        add_up((self.trig_ulps * self.u).next_up() * FloatFormat::binade(magnitude.min(1.0)), self.tiny)
     }
 
     /// √(e_s² + e_c²) of the errors of sine and cosine of one angle: one is at most √½ and comes from the sine kernel or is

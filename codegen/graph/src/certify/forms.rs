@@ -6,7 +6,7 @@
 //! [`norms`](super::norms) looks for.
 
 use super::cancel::cancelled;
-use super::format::Format;
+use super::format::FloatFormat;
 use crate::expr::op::Slope;
 use crate::expr::{Binary, Graph, NodeId, Op, Unary};
 
@@ -50,7 +50,7 @@ pub enum Coefficient {
 
 /// ± coefficient · atom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Term {
+pub struct FormTerm {
     /// What stands before the atom.
     pub coefficient: Coefficient,
     /// The atom.
@@ -59,20 +59,20 @@ pub struct Term {
     pub negative: bool,
 }
 
-impl Term {
-    fn signed(self, negative: bool) -> Term {
-        Term { negative: self.negative != negative, ..self }
+impl FormTerm {
+    fn signed(self, negative: bool) -> FormTerm {
+        FormTerm { negative: self.negative != negative, ..self }
     }
 }
 
 /// A sum of terms, sorted.
-pub type Form = Vec<Term>;
+pub type LinearForm = Vec<FormTerm>;
 
 /// A form that an atom equals up to the rounding errors of some nodes.
 #[derive(Clone, Debug, Default)]
 pub struct Flat {
     /// The terms.
-    pub form: Form,
+    pub form: LinearForm,
     /// What lies between the atom and the form.
     pub slack: Slack,
 }
@@ -116,7 +116,7 @@ pub enum Depth {
 impl Flat {
     /// A value as itself.
     fn alone(id: NodeId) -> Flat {
-        let term = Term { coefficient: Coefficient::One, atom: Atom::Value(id.0), negative: false };
+        let term = FormTerm { coefficient: Coefficient::One, atom: Atom::Value(id.0), negative: false };
         Flat { form: vec![term], slack: Slack::default() }
     }
 }
@@ -126,19 +126,19 @@ const LONGEST: usize = 32;
 
 /// The forms of all atoms of a graph.
 #[derive(Clone, Debug)]
-pub struct Forms {
+pub struct AtomForms {
     /// Of values, taken apart.
     values: Vec<Flat>,
     /// Of values, taken apart down to components of vectors that have a name.
     named: Vec<Flat>,
     /// Of exact values, what is left where products cancel.
-    cancelled: Vec<Option<Form>>,
+    cancelled: Vec<Option<LinearForm>>,
     /// Of adjoints by the chain rule, one step.
-    pub chain: Vec<Form>,
+    pub chain: Vec<LinearForm>,
     /// The node that stands for all with its adjoint, up to the sign.
     pub class: Vec<u32>,
     /// Of adjoints, taken apart.
-    adjoints: Vec<Form>,
+    adjoints: Vec<LinearForm>,
     /// Constants: a number and how far any value of it may be from that.
     constants: Vec<Option<(f64, f64)>>,
 }
@@ -152,9 +152,9 @@ fn half(graph: &Graph, id: NodeId) -> Option<Coefficient> {
     }
 }
 
-impl Forms {
+impl AtomForms {
     /// Reads a graph; `live` says which of its nodes count.
-    pub fn new(graph: &Graph, live: &[bool], format: &Format) -> Self {
+    pub fn new(graph: &Graph, live: &[bool], format: &FloatFormat) -> Self {
         let constant = |op: &Op| match op {
             Op::Constant(c) => {
                 let (range, _) = format.constant(c.value());
@@ -162,7 +162,7 @@ impl Forms {
             }
             _ => None,
         };
-        let mut forms = Forms {
+        let mut forms = AtomForms {
             values: Vec::with_capacity(graph.ops.len()),
             named: Vec::with_capacity(graph.ops.len()),
             cancelled: cancelled(graph, live),
@@ -181,7 +181,7 @@ impl Forms {
             forms.named.push(flat);
         }
         (forms.chain, forms.class) = chain_rule(graph, live);
-        forms.adjoints = vec![Form::new(); graph.ops.len()];
+        forms.adjoints = vec![LinearForm::new(); graph.ops.len()];
         for id in (0..graph.ops.len() as u32).rev().map(NodeId) {
             // users stand behind the node: their forms are there
             forms.adjoints[id.index()] = forms.adjoint(id.index());
@@ -229,24 +229,24 @@ impl Forms {
                     _ => return alone,
                 };
                 Flat {
-                    form: vec![Term { coefficient, atom: Atom::Value(other.0), negative: s != t }],
+                    form: vec![FormTerm { coefficient, atom: Atom::Value(other.0), negative: s != t }],
                     slack: Slack::of_nodes(vec![id.0]),
                 }
             }
             Op::Sin(p) => Flat {
-                form: vec![Term { coefficient: Coefficient::Sin(p.0), atom: Atom::One, negative: false }],
+                form: vec![FormTerm { coefficient: Coefficient::Sin(p.0), atom: Atom::One, negative: false }],
                 slack: Slack::default(),
             },
             Op::Cos(p) => Flat {
-                form: vec![Term { coefficient: Coefficient::Cos(p.0), atom: Atom::One, negative: false }],
+                form: vec![FormTerm { coefficient: Coefficient::Cos(p.0), atom: Atom::One, negative: false }],
                 slack: Slack::default(),
             },
             _ => alone,
         }
     }
 
-    fn adjoint(&self, i: usize) -> Form {
-        let mut form = Form::new();
+    fn adjoint(&self, i: usize) -> LinearForm {
+        let mut form = LinearForm::new();
         for t in &self.chain[i] {
             match (t.coefficient, t.atom) {
                 (Coefficient::One, Atom::Adjoint(u)) => {
@@ -255,7 +255,11 @@ impl Forms {
                 _ => form.push(*t),
             }
             if form.len() > LONGEST {
-                return vec![Term { coefficient: Coefficient::One, atom: Atom::Adjoint(i as u32), negative: false }];
+                return vec![FormTerm {
+                    coefficient: Coefficient::One,
+                    atom: Atom::Adjoint(i as u32),
+                    negative: false,
+                }];
             }
         }
         simplified(form)
@@ -267,7 +271,7 @@ impl Forms {
     }
 
     /// What an atom equals.
-    pub fn flat(&self, atom: Atom) -> (&[Term], &Slack) {
+    pub fn flat(&self, atom: Atom) -> (&[FormTerm], &Slack) {
         const NONE: &Slack = &Slack { nodes: Vec::new(), totals: Vec::new() };
         match atom {
             Atom::Value(v) => (&self.values[v as usize].form, &self.values[v as usize].slack),
@@ -286,12 +290,12 @@ impl Forms {
     }
 
     /// What is left of a sum, over exact values, where products cancel.
-    pub fn cancelled(&self, node: u32) -> Option<&Form> {
+    pub fn cancelled(&self, node: u32) -> Option<&LinearForm> {
         self.cancelled[node as usize].as_ref()
     }
 
     /// A form with its atoms of coefficient one taken apart, and the errors between.
-    pub fn flattened(&self, form: &[Term], depth: Depth) -> Flat {
+    pub fn flattened(&self, form: &[FormTerm], depth: Depth) -> Flat {
         let mut flat = Flat::default();
         for t in form {
             let exact = match t.atom {
@@ -322,9 +326,9 @@ impl Forms {
 }
 
 /// Sorted; a term and its opposite go.
-pub fn simplified(mut form: Form) -> Form {
+pub fn simplified(mut form: LinearForm) -> LinearForm {
     form.sort_unstable();
-    let mut kept: Form = Vec::with_capacity(form.len());
+    let mut kept: LinearForm = Vec::with_capacity(form.len());
     for t in form {
         match kept.last() {
             Some(last) if *last == t.signed(true) => {
@@ -337,7 +341,7 @@ pub fn simplified(mut form: Form) -> Form {
 }
 
 /// The same form with the sign of its first term turned to plus.
-pub fn canonical(form: Form) -> Form {
+pub fn canonical(form: LinearForm) -> LinearForm {
     match form.first() {
         Some(t) if t.negative => form.into_iter().map(|t| t.signed(true)).collect(),
         _ => form,
@@ -345,17 +349,17 @@ pub fn canonical(form: Form) -> Form {
 }
 
 /// −form.
-pub fn negated(form: &[Term]) -> Form {
+pub fn negated(form: &[FormTerm]) -> LinearForm {
     form.iter().map(|t| t.signed(true)).collect()
 }
 
 /// For each node, Σ over its users of partial derivative times adjoint, and the node that has the same adjoint up to its sign:
 /// the sum, say, that alone uses it.
-fn chain_rule(graph: &Graph, live: &[bool]) -> (Vec<Form>, Vec<u32>) {
+fn chain_rule(graph: &Graph, live: &[bool]) -> (Vec<LinearForm>, Vec<u32>) {
     let n = graph.ops.len();
-    let mut chain = vec![Form::new(); n];
+    let mut chain = vec![LinearForm::new(); n];
     for r in &graph.results {
-        let seed = Term { coefficient: Coefficient::One, atom: Atom::Seed(r.0), negative: false };
+        let seed = FormTerm { coefficient: Coefficient::One, atom: Atom::Seed(r.0), negative: false };
         if !chain[r.index()].contains(&seed) {
             chain[r.index()].push(seed);
         }
@@ -363,12 +367,13 @@ fn chain_rule(graph: &Graph, live: &[bool]) -> (Vec<Form>, Vec<u32>) {
     let mut same: Vec<(u32, bool)> = (0..n as u32).map(|i| (i, false)).collect();
     // users stand behind what they use
     for id in (0..n as u32).rev().map(NodeId).filter(|id| live[id.index()]) {
-        if let [Term { coefficient: Coefficient::One, atom: Atom::Adjoint(user), negative }] = chain[id.index()][..] {
+        if let [FormTerm { coefficient: Coefficient::One, atom: Atom::Adjoint(user), negative }] = chain[id.index()][..]
+        {
             same[id.index()] = (user, negative);
         }
         let (atom, sign) = (Atom::Adjoint(same[id.index()].0), same[id.index()].1);
         let mut uses = |a: NodeId, coefficient: Coefficient, negative: bool| {
-            chain[a.index()].push(Term { coefficient, atom, negative: negative != sign });
+            chain[a.index()].push(FormTerm { coefficient, atom, negative: negative != sign });
         };
         let mut by_slope = |slope: Slope, a: NodeId, other: NodeId| match slope {
             Slope::Zero => {}

@@ -7,7 +7,7 @@
 //!
 //! A value in f64 is either used in f64 alone or rounded to f32 for all its users, so that each node still has one error.
 
-use super::{Analysis, Format, Interval, Refusal};
+use super::{ErrorAnalysis, FloatFormat, Interval, NoCertificate};
 use crate::expr::{Graph, NodeId, Op, Precision};
 use crate::number::Scalar;
 
@@ -25,9 +25,9 @@ pub fn widened(
     inputs: &[Interval],
     demand: &[f64],
     stored: &[NodeId],
-) -> Result<Graph, Refusal> {
+) -> Result<Graph, NoCertificate> {
     let Some(wider) = scalar.wider() else { return Ok(graph.clone()) };
-    let mut analysis = Analysis::new(graph, Format::of(scalar));
+    let mut analysis = ErrorAnalysis::new(graph, FloatFormat::of(scalar));
     analysis.ranges(inputs)?;
     let mut results = Vec::new();
     for k in 0..analysis.results() {
@@ -35,7 +35,7 @@ pub fn widened(
         let bounds = graph.results.iter().zip(demand).filter(|(r, _)| **r == node);
         let demand = bounds.fold(f64::INFINITY, |least, (_, d)| least.min(*d));
         let error = analysis.error(k);
-        results.push(Outcome { demand, error, shares: analysis.shares(k) });
+        results.push(MixedOutcome { demand, error, shares: analysis.shares(k) });
     }
     if results.iter().all(|r| r.error <= r.demand) {
         return Ok(graph.clone());
@@ -45,7 +45,7 @@ pub fn widened(
     for _ in 0..ATTEMPTS {
         let wide = classes.choose(&results, aim);
         let candidate = Graph { formats: classes.formats(&wide, [scalar, wider]), ..graph.clone() };
-        let mut analysis = Analysis::new(&candidate, Format::of(scalar));
+        let mut analysis = ErrorAnalysis::new(&candidate, FloatFormat::of(scalar));
         analysis.ranges(inputs)?;
         let beyond = (0..analysis.results()).map(|k| analysis.error(k) / results[k].demand).fold(0.0, f64::max);
         if beyond < best.0 {
@@ -66,7 +66,7 @@ pub fn wide_operations(graph: &Graph, scalar: Scalar) -> usize {
 }
 
 /// What a result may lose, what it loses in f32, and by which classes.
-struct Outcome {
+struct MixedOutcome {
     demand: f64,
     error: f64,
     shares: Vec<(NodeId, f64)>,
@@ -89,7 +89,7 @@ struct Classes<'g> {
 }
 
 impl<'g> Classes<'g> {
-    fn new(graph: &'g Graph, analysis: &Analysis, stored_nodes: &[NodeId]) -> Self {
+    fn new(graph: &'g Graph, analysis: &ErrorAnalysis, stored_nodes: &[NodeId]) -> Self {
         let n = graph.ops.len();
         let live = graph.live();
         let mut users = vec![Vec::new(); n];
@@ -130,7 +130,7 @@ impl<'g> Classes<'g> {
     }
 
     /// The nodes to be in f64 so that each result keeps to `aim` times its demand, by the shares.
-    fn choose(&self, results: &[Outcome], aim: f64) -> Vec<bool> {
+    fn choose(&self, results: &[MixedOutcome], aim: f64) -> Vec<bool> {
         let n = self.class.len();
         let mut wide = vec![false; n];
         let whole = self.errors(&wide);

@@ -18,7 +18,7 @@
 //! # Why the bound holds
 //!
 //! **1. Perturbed program.** Let v = op(a, b) be a node, v̂ its computed value. Then v̂ = op(â, b̂) + e with |e| ≤ h, where h follows from
-//! the range V of op(â, b̂) ([`format::Format::rounding`]): half an ulp of the binade below the least power of two ≥ V, plus
+//! the range V of op(â, b̂) ([`format::FloatFormat::rounding`]): half an ulp of the binade below the least power of two ≥ V, plus
 //! the smallest normal number for underflow; for sine and cosine the bound that is proven in `trig.rs`; for a constant the distance to
 //! its rounding; 0 for sign flips, products with powers of two and inputs. A fused multiply-add drops the error of its product,
 //! which lies in the same interval. So computed = F(x, ê) and exact = F(x, 0) for one function F of inputs x and errors e.
@@ -39,8 +39,8 @@
 //!
 //! **5. Subdivision.** A bound for a box is the greatest of the bounds of boxes that cover it ([`Effort::boxes`], [`Effort::time`]).
 //!
-//! Programs with a division have a bound where the divisor stays off zero in the box; where it may not, there is none: [`Refusal`]. Of forward
-//! dynamics intervals alone know little: what mechanics knows of pivots, of what is left of H and of accelerations is given, as [`Known`]. It holds for
+//! Programs with a division have a bound where the divisor stays off zero in the box; where it may not, there is none: [`NoCertificate`]. Of forward
+//! dynamics intervals alone know little: what mechanics knows of pivots, of what is left of H and of accelerations is given, as [`KnownSystem`]. It holds for
 //! exact values and adjoints; those of the perturbed program are off by what errors add up to, found as in 3. Where that reaches a pivot,
 //! as in f32 on long arms with light tips, there is no bound for a box. There, and for the state at hand, generated programs bound the
 //! error: [`companion`], [`residual`]. A bound also proves that no value overflows and none is NaN. Coulomb friction takes the sign of a
@@ -64,8 +64,8 @@ mod tape;
 #[cfg(test)]
 mod tests;
 
-pub use analysis::{Analysis, Known, Refusal};
-pub use format::Format;
+pub use analysis::{ErrorAnalysis, KnownSystem, NoCertificate};
+pub use format::FloatFormat;
 pub use interval::Interval;
 
 use crate::expr::{Graph, Port};
@@ -130,8 +130,13 @@ impl Certificate {
 ///
 /// # Errors
 /// If a value may be no number in that box.
-pub fn certify(graph: &Graph, scalar: Scalar, inputs: &[Interval], effort: Effort) -> Result<Certificate, Refusal> {
-    certify_with(graph, scalar, inputs, effort, &Known::default())
+pub fn certify(
+    graph: &Graph,
+    scalar: Scalar,
+    inputs: &[Interval],
+    effort: Effort,
+) -> Result<Certificate, NoCertificate> {
+    certify_with(graph, scalar, inputs, effort, &KnownSystem::default())
 }
 
 /// [`certify()`] where something is known of exact values and adjoints.
@@ -143,13 +148,13 @@ pub fn certify_with(
     scalar: Scalar,
     inputs: &[Interval],
     effort: Effort,
-    known: &Known,
-) -> Result<Certificate, Refusal> {
-    let mut analysis = Analysis::new(graph, Format::of(scalar));
+    known: &KnownSystem,
+) -> Result<Certificate, NoCertificate> {
+    let mut analysis = ErrorAnalysis::new(graph, FloatFormat::of(scalar));
     analysis.know(known);
     let mut bounds = subdivision::bounds(&mut analysis, inputs, effort)?;
     // half u of a value, at least, was counted as its rounding
-    let of_the_form = (1.0 + 2.0 * OF_THE_FORM / Format::of(scalar).u).next_up();
+    let of_the_form = (1.0 + 2.0 * OF_THE_FORM / FloatFormat::of(scalar).u).next_up();
     bounds.iter_mut().for_each(|(_, error, _)| *error = interval::mul_up(*error, of_the_form));
     // of nodes, the bound of each result that is that node
     let of = |r| bounds.iter().find(|(node, _, _)| *node == r).expect("every result is a node with a bound");

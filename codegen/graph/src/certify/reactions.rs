@@ -6,7 +6,7 @@ use super::running::{BrokenProof, Running, Tracked};
 use crate::expr::{NodeId, Op};
 
 /// A contact: what is left, and its rows.
-pub(super) struct Contact<'a> {
+pub(super) struct ReactionRows<'a> {
     pub residual: &'a [Tracked],
     pub missing: &'a [Tracked],
     pub j: Vec<Vec<Tracked>>,
@@ -27,7 +27,7 @@ pub(super) struct Reactions {
     pub smallest: NodeId,
 }
 
-impl Contact<'_> {
+impl ReactionRows<'_> {
     /// J W.
     fn turned(p: &mut Running, rows: &[Vec<Tracked>], w: &Sparse) -> Vec<Vec<Option<Tracked>>> {
         let n = w.len();
@@ -57,8 +57,8 @@ impl Contact<'_> {
             true => (exact(&self.j), exact(&self.applied)),
             false => (self.j.clone(), self.applied.clone()),
         };
-        let own = Contact::turned(p, &j, &h.inverse);
-        let hat = Contact::turned(p, &applied, &h.inverse);
+        let own = ReactionRows::turned(p, &j, &h.inverse);
+        let hat = ReactionRows::turned(p, &applied, &h.inverse);
         // V̂/D, and norms by D^-½
         let scaled: Vec<Vec<Option<Tracked>>> =
             hat.iter().map(|row| row.iter().zip(&d).map(|(x, d)| x.map(|x| p.quotient(x, *d))).collect()).collect();
@@ -70,7 +70,7 @@ impl Contact<'_> {
         let off = p.over(h.contraction, h.left);
         let off = p.settled(off);
         // b = Wᵀ r
-        let turned: Vec<Option<Tracked>> = Contact::turned(p, &[self.residual.to_vec()], &h.inverse).remove(0);
+        let turned: Vec<Option<Tracked>> = ReactionRows::turned(p, &[self.residual.to_vec()], &h.inverse).remove(0);
         let residual_norm = norm(p, &turned, &h.d);
         let residual_norm = p.settled(residual_norm);
         let turned: Vec<Option<Tracked>> =
@@ -190,7 +190,7 @@ fn norm(p: &mut Running, row: &[Option<Tracked>], d: &[NodeId]) -> NodeId {
 }
 
 /// N φ = right, solved.
-struct Solved {
+struct SolvedReactions {
     /// R', by rows.
     inverse: Vec<NodeId>,
     /// |φ|, settled.
@@ -201,8 +201,8 @@ struct Solved {
     smallest: NodeId,
 }
 
-/// Of |right|; 1/`scales` are the units of φ. One piece, as [`Contact::reactions`].
-fn solve(p: &mut Running, matrix: &[Vec<Tracked>], right: &[NodeId], scales: &[NodeId]) -> Solved {
+/// Of |right|; 1/`scales` are the units of φ. One piece, as [`ReactionRows::reactions`].
+fn solve(p: &mut Running, matrix: &[Vec<Tracked>], right: &[NodeId], scales: &[NodeId]) -> SolvedReactions {
     let m = matrix.len();
     let values: Vec<NodeId> = matrix.iter().flatten().map(|x| x.value).collect();
     let inverse = dense_inverse(p, &values, m);
@@ -284,7 +284,7 @@ fn solve(p: &mut Running, matrix: &[Vec<Tracked>], right: &[NodeId], scales: &[N
     let sum = p.settled(sum);
     let smallest = p.insert(Op::div(one, sum));
     let smallest = p.scaled(1.0 - 4.0 * p.format.u, smallest);
-    Solved { inverse, bounds, loose, smallest }
+    SolvedReactions { inverse, bounds, loose, smallest }
 }
 
 /// The inverse of a matrix by elimination without exchange of rows, as good as rounding allows.

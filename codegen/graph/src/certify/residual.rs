@@ -43,9 +43,9 @@
 
 use super::companion::OF_ERROR;
 use super::congruence::Congruence;
-use super::reactions::Contact;
+use super::reactions::ReactionRows;
 use super::running::{BrokenProof, Running, Tracked};
-use super::Format;
+use super::FloatFormat;
 use crate::expr::{Graph, NodeId, Op, Port};
 use crate::number::Scalar;
 
@@ -62,7 +62,7 @@ pub const OUTPUTS: [&str; 6] = ["residual", "missing", "h", "j", "applied", "mas
 /// # Errors
 /// If it would be too long.
 pub fn acceleration_bound(system: &Graph, yielding: &[bool], scalar: Scalar) -> Result<Graph, &'static str> {
-    let program = Running::new(system.inputs.clone(), Format::of(scalar));
+    let program = Running::new(system.inputs.clone(), FloatFormat::of(scalar));
     bound_of(program, system, yielding)
 }
 
@@ -94,7 +94,7 @@ pub(super) fn bound_of(mut p: Running, system: &Graph, yielding: &[bool]) -> Res
     let mut results = Vec::new();
     let mut last = vec![eigenvalue];
     if m > 0 {
-        let contact = Contact { residual: &known, missing, j: rows(j), applied: rows(applied), mass, yielding };
+        let contact = ReactionRows { residual: &known, missing, j: rows(j), applied: rows(applied), mass, yielding };
         let reactions = contact.reactions(&mut p, &congruence);
         if !p.is_broken(BrokenProof::Reactions) {
             for i in 0..n {

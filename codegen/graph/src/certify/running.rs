@@ -20,8 +20,8 @@
 //! is [`settled`](Running::settled) by that factor first. Other bits are rounded by u |w| ≤ u (|v̂| + 2 e): a factor of 1 − 2 u more at each
 //! operation, so that s = 1 + 6 n u. Products that underflow lose less than the smallest normal number; t is four of them.
 
-use super::Format;
-use crate::expr::{Binary, Builder, Folding, Graph, NodeId, Op, Port, RuleSet, Unary};
+use super::FloatFormat;
+use crate::expr::{Binary, Folding, Graph, GraphBuilder, NodeId, Op, Port, RuleSet, Unary};
 use crate::number::Scalar;
 use straightline_core::Dd;
 
@@ -50,11 +50,11 @@ pub(super) enum BrokenProof {
 
 /// A program that is being written.
 pub(super) struct Running {
-    b: Builder,
+    b: GraphBuilder,
     /// Of its numbers.
-    pub format: Format,
+    pub format: FloatFormat,
     /// Of the program whose errors are bounded.
-    rounding: Format,
+    rounding: FloatFormat,
     other_bits: bool,
     ports: Vec<Port>,
     operations: usize,
@@ -64,9 +64,9 @@ pub(super) struct Running {
 
 impl Running {
     /// For a program that computes the same bits.
-    pub fn new(ports: Vec<Port>, format: Format) -> Self {
+    pub fn new(ports: Vec<Port>, format: FloatFormat) -> Self {
         // no rules: values are to be the same bits
-        let b = Builder::new(RuleSet::exact(Folding::DoubleDouble), ports.clone());
+        let b = GraphBuilder::new(RuleSet::exact(Folding::DoubleDouble), ports.clone());
         Running {
             b,
             format,
@@ -80,7 +80,7 @@ impl Running {
     }
 
     /// For a program that rounds in `rounding`, or better, but elsewhere than this one does in `format`, which is no coarser.
-    pub fn of_other_bits(ports: Vec<Port>, format: Format, rounding: Format) -> Self {
+    pub fn of_other_bits(ports: Vec<Port>, format: FloatFormat, rounding: FloatFormat) -> Self {
         Running { rounding, other_bits: true, ..Running::new(ports, format) }
     }
 
@@ -344,7 +344,8 @@ impl Running {
         let live = graph.live();
         let mut nodes: Vec<Option<Tracked>> = vec![None; graph.ops.len()];
         // that of the program in question may be another one than its scalar's, for tests
-        let of_scalar = |s: Scalar, this: &Self| if s == this.rounding.scalar { this.rounding } else { Format::of(s) };
+        let of_scalar =
+            |s: Scalar, this: &Self| if s == this.rounding.scalar { this.rounding } else { FloatFormat::of(s) };
         for (i, op) in graph.ops.iter().enumerate().filter(|(i, _)| live[*i]) {
             let of = |a: NodeId| nodes[a.index()].expect("operands stand before their users");
             let precision = graph.precision(NodeId(i as u32), self.rounding.scalar);

@@ -11,7 +11,7 @@ use straightline_core::{Dd, Real};
 
 /// The worst that was found for one output scalar.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct WorstFound {
     /// |computed − exact|.
     pub error: f64,
     /// At these inputs.
@@ -77,7 +77,13 @@ fn mixed_at(graph: &Graph, scalar: Scalar, inputs: &[f64]) -> Vec<f64> {
 }
 
 /// The worst errors found in a box with so many evaluations.
-pub fn worst_found(graph: &Graph, scalar: Scalar, ranges: &[Interval], evaluations: usize, seed: u64) -> Vec<Found> {
+pub fn worst_found(
+    graph: &Graph,
+    scalar: Scalar,
+    ranges: &[Interval],
+    evaluations: usize,
+    seed: u64,
+) -> Vec<WorstFound> {
     let mut random = Random(seed);
     let outputs = graph.results.len();
     let fits = |x: Vec<f64>| -> Vec<f64> { x.iter().zip(ranges).map(|(x, r)| representable(*x, *r, scalar)).collect() };
@@ -89,12 +95,12 @@ pub fn worst_found(graph: &Graph, scalar: Scalar, ranges: &[Interval], evaluatio
         let truth = evaluate::<f64>(graph, inputs);
         computed_at(graph, scalar, inputs).iter().zip(truth).map(|(c, t)| (c - t).abs()).collect()
     };
-    let mut best = vec![Found { error: -1.0, inputs: Vec::new() }; outputs];
-    let keep = |best: &mut Vec<Found>, inputs: &[f64], errors: &[f64]| {
+    let mut best = vec![WorstFound { error: -1.0, inputs: Vec::new() }; outputs];
+    let keep = |best: &mut Vec<WorstFound>, inputs: &[f64], errors: &[f64]| {
         for (found, e) in best.iter_mut().zip(errors) {
             // an error that is no number is the worst of all
             if *e > found.error || e.is_nan() {
-                *found = Found { error: if e.is_nan() { f64::INFINITY } else { *e }, inputs: inputs.to_vec() };
+                *found = WorstFound { error: if e.is_nan() { f64::INFINITY } else { *e }, inputs: inputs.to_vec() };
             }
         }
     };

@@ -11,7 +11,7 @@
 
 use super::analysis::Broken;
 use super::tape::{Registers, Tape, LANES};
-use super::{Analysis, Effort, Interval, Refusal};
+use super::{Effort, ErrorAnalysis, Interval, NoCertificate};
 use crate::expr::NodeId;
 use std::collections::BinaryHeap;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -19,39 +19,39 @@ use std::time::Instant;
 use straightline_core::random::Random;
 
 /// A part of the box, and the bound of the error there.
-struct Part {
+struct BoxPart {
     ranges: Vec<Interval>,
     error: f64,
     /// How often each input was halved.
     cuts: Vec<u32>,
 }
 
-impl Ord for Part {
-    fn cmp(&self, other: &Part) -> std::cmp::Ordering {
+impl Ord for BoxPart {
+    fn cmp(&self, other: &BoxPart) -> std::cmp::Ordering {
         self.error.total_cmp(&other.error)
     }
 }
 
-impl PartialOrd for Part {
-    fn partial_cmp(&self, other: &Part) -> Option<std::cmp::Ordering> {
+impl PartialOrd for BoxPart {
+    fn partial_cmp(&self, other: &BoxPart) -> Option<std::cmp::Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Part {
-    fn eq(&self, other: &Part) -> bool {
+impl PartialEq for BoxPart {
+    fn eq(&self, other: &BoxPart) -> bool {
         self.cmp(other).is_eq()
     }
 }
 
-impl Eq for Part {}
+impl Eq for BoxPart {}
 
 /// Node, error and magnitude of every distinct result.
 pub(super) fn bounds(
-    analysis: &mut Analysis,
+    analysis: &mut ErrorAnalysis,
     inputs: &[Interval],
     effort: Effort,
-) -> Result<Vec<(NodeId, f64, f64)>, Refusal> {
+) -> Result<Vec<(NodeId, f64, f64)>, NoCertificate> {
     let is_cut = effort.boxes > 1 && effort.time.is_none_or(|time| !time.is_zero());
     if is_cut {
         analysis.ranges_on_tape(inputs)?;
@@ -71,7 +71,8 @@ pub(super) fn bounds(
             let (whole, tape) = analysis.error_and_tape(k, &samples);
             let depends =
                 analysis.inputs_of(k).into_iter().filter(|i| inputs[*i].width() > f64::MIN_POSITIVE).collect();
-            searches.push((k, Search { tape, inputs, whole, depends, drops_a_part: analysis.is_broken(Broken::Part) }));
+            searches
+                .push((k, BoxSearch { tape, inputs, whole, depends, drops_a_part: analysis.is_broken(Broken::Part) }));
             whole
         } else {
             analysis.error(k)
@@ -113,7 +114,7 @@ pub(super) fn samples(inputs: &[Interval]) -> Vec<Vec<Interval>> {
 }
 
 /// The bounds of results, by their numbers.
-fn refined(searches: &[(usize, Search)], boxes: usize, until: Option<Instant>) -> Vec<(usize, f64)> {
+fn refined(searches: &[(usize, BoxSearch)], boxes: usize, until: Option<Instant>) -> Vec<(usize, f64)> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from).min(searches.len());
     let next = AtomicUsize::new(0);
     let work = || {
@@ -140,7 +141,7 @@ fn refined(searches: &[(usize, Search)], boxes: usize, until: Option<Instant>) -
 }
 
 /// One result in its box.
-struct Search<'a> {
+struct BoxSearch<'a> {
     tape: Tape,
     inputs: &'a [Interval],
     whole: f64,
@@ -150,7 +151,7 @@ struct Search<'a> {
     drops_a_part: bool,
 }
 
-impl Search<'_> {
+impl BoxSearch<'_> {
     /// What is gained by each input if it keeps to a quarter of its range; nothing where there is no time left.
     fn gains(&self, until: Option<Instant>, registers: &mut Registers) -> Option<Vec<f64>> {
         const QUARTERS: usize = 4;
@@ -180,7 +181,7 @@ impl Search<'_> {
     }
 
     /// The input with the most to gain, each cut halving what is left of that, among those that can be cut.
-    fn best_cut(&self, part: &Part, gains: &[f64]) -> Option<usize> {
+    fn best_cut(&self, part: &BoxPart, gains: &[f64]) -> Option<usize> {
         let gain = |c: usize| gains[c] / f64::from(1u32 << part.cuts[c].min(31));
         let can = (0..gains.len()).filter(|c| middle(part, self.depends[*c]).is_some());
         can.max_by(|a, b| gain(*a).total_cmp(&gain(*b)))
@@ -189,12 +190,12 @@ impl Search<'_> {
     /// The bound from so many boxes, or from those that there was time for.
     fn refined(&self, boxes: usize, until: Option<Instant>, registers: &mut Registers) -> f64 {
         let Some(gains) = self.gains(until, registers) else { return self.whole };
-        let whole = Part { ranges: self.inputs.to_vec(), error: self.whole, cuts: vec![0; self.depends.len()] };
+        let whole = BoxPart { ranges: self.inputs.to_vec(), error: self.whole, cuts: vec![0; self.depends.len()] };
         let mut parts = BinaryHeap::from([whole]);
         while parts.len() < boxes && !is_late(until) {
             // the worst parts, as many as are played at a time
             let count = (LANES / 2).min(boxes - parts.len()).min(parts.len());
-            let worst: Vec<Part> = (0..count).map_while(|_| parts.pop()).collect();
+            let worst: Vec<BoxPart> = (0..count).map_while(|_| parts.pop()).collect();
             let (mut cut, points): (Vec<_>, Vec<_>) =
                 worst.into_iter().map(|part| (self.best_cut(&part, &gains), part)).partition(|(c, _)| c.is_some());
             let halves: Vec<[Vec<Interval>; 2]> =
@@ -212,7 +213,7 @@ impl Search<'_> {
                 for (half, ranges) in both.into_iter().enumerate().skip(usize::from(self.drops_a_part)) {
                     // no part is worse than what it was cut from
                     let error = bounds[2 * n + half].min(part.error);
-                    parts.push(Part { ranges, error, cuts: cuts.clone() });
+                    parts.push(BoxPart { ranges, error, cuts: cuts.clone() });
                 }
             }
             if is_at_points {
@@ -228,13 +229,13 @@ fn is_late(until: Option<Instant>) -> bool {
 }
 
 /// Where an input of a part is cut, unless it is as good as a point.
-fn middle(part: &Part, i: usize) -> Option<f64> {
+fn middle(part: &BoxPart, i: usize) -> Option<f64> {
     let range = part.ranges[i];
     let middle = range.lo + 0.5 * (range.hi - range.lo);
     (range.lo < middle && middle < range.hi).then_some(middle)
 }
 
-fn halves(part: &Part, i: usize) -> [Vec<Interval>; 2] {
+fn halves(part: &BoxPart, i: usize) -> [Vec<Interval>; 2] {
     let middle = middle(part, i).expect("only inputs that can be cut are");
     let range = part.ranges[i];
     [Interval { lo: range.lo, hi: middle }, Interval { lo: middle, hi: range.hi }].map(|half| {

@@ -11,7 +11,7 @@ const ABOUT: usize = 1000;
 
 /// Adds operations to a graph: equal ones once, and simplified by the rules on the way in.
 #[derive(Debug)]
-pub struct Builder {
+pub struct GraphBuilder {
     graph: Graph,
     /// For look-ups only; never iterated, so that its order cannot reach the output.
     known: FxHashMap<Op, NodeId>,
@@ -19,11 +19,11 @@ pub struct Builder {
     section: u32,
 }
 
-impl Builder {
+impl GraphBuilder {
     /// An empty graph with these inputs.
     pub fn new(rules: RuleSet, inputs: Vec<Port>) -> Self {
         let graph = Graph { inputs, sections: vec![Section { phase: "", index: None }], ..Graph::default() };
-        Builder { graph, known: FxHashMap::with_capacity_and_hasher(ABOUT, FxBuildHasher), rules, section: 0 }
+        GraphBuilder { graph, known: FxHashMap::with_capacity_and_hasher(ABOUT, FxBuildHasher), rules, section: 0 }
     }
 
     /// The rules in force.

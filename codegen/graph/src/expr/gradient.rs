@@ -1,6 +1,6 @@
 //! The program of a gradient: from a graph with results r(x, p) to one with λᵀ ∂r/∂p, backwards through the operations.
 
-use super::{Builder, Graph, NodeId, Op, Port, RuleSet};
+use super::{Graph, GraphBuilder, NodeId, Op, Port, RuleSet};
 use crate::trace::{self, Expr};
 use straightline_core::Real;
 
@@ -22,7 +22,7 @@ pub fn gradient(graph: &Graph, of: &str) -> Graph {
     let group = group.expect("the graph has the group of inputs");
     let mut inputs = graph.inputs.clone();
     inputs.push(Port::new("seed", &[graph.results.len()]));
-    let mut b = Builder::new(RuleSet::all(), inputs);
+    let mut b = GraphBuilder::new(RuleSet::all(), inputs);
     let mut copy: Vec<Expr> = Vec::with_capacity(graph.ops.len());
     for op in &graph.ops {
         copy.push(Expr::of(b.insert(op.map(|id| copy[id.index()].node()))));

@@ -1,6 +1,6 @@
 //! Nodes, graphs, and how operations are counted.
 
-use super::op::{Binary, Counted, Kind, Row, Unary};
+use super::op::{Binary, Counted, OpKind, OpRow, Unary};
 use crate::number::Scalar;
 use std::hash::{Hash, Hasher};
 use straightline_core::Dd;
@@ -118,7 +118,7 @@ impl Op {
 
     /// What is known of an operation on numbers; none of leaves, angles and what is made of these.
     #[inline]
-    pub fn row(self) -> Option<&'static Row> {
+    pub fn row(self) -> Option<&'static OpRow> {
         match self {
             Op::Unary(op, _) => Some(op.row()),
             Op::Binary(op, ..) => Some(op.row()),
@@ -135,7 +135,7 @@ impl Op {
     /// Whether it is a polynomial of its operands.
     #[inline]
     pub fn is_polynomial(self) -> bool {
-        self.row().is_some_and(|row| row.kind == Kind::Polynomial)
+        self.row().is_some_and(|row| row.kind == OpKind::Polynomial)
     }
 
     /// Whether it is an input or a constant.

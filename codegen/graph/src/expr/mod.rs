@@ -1,7 +1,7 @@
 //! The expression graph: a hash-consed DAG of scalar operations. It knows nothing of what is computed.
 //!
 //! A [`Graph`] is a value: operations in an order in which operands stand before their users, grouped inputs, grouped
-//! outputs. What an operation is stands in the tables of [`op`]. A [`Builder`] is the only way to make one: it looks every operation up before adding it, so that equal
+//! outputs. What an operation is stands in the tables of [`op`]. A [`GraphBuilder`] is the only way to make one: it looks every operation up before adding it, so that equal
 //! operations are one node, and applies the [rules] on the way in.
 
 mod builder;
@@ -13,7 +13,7 @@ pub mod port_text;
 pub mod rules;
 mod verify;
 
-pub use builder::Builder;
+pub use builder::GraphBuilder;
 pub use gradient::gradient;
 pub use graph::{Alike, Constant, Counts, Graph, NodeId, Note, Op, Port, Precision, Section, DIVISION, TAIL};
 pub(crate) use interpret::of_rounded_sum;

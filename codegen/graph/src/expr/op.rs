@@ -23,7 +23,7 @@ use straightline_core::{Dd, Real};
 
 /// What is known of an operation on numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Row {
+pub struct OpRow {
     /// What people call it.
     pub name: &'static str,
     /// How it is written.
@@ -33,14 +33,14 @@ pub struct Row {
     /// Whether its result is as exact as its operands.
     pub is_exact: bool,
     /// What kind of function of its operands it is.
-    pub kind: Kind,
+    pub kind: OpKind,
     /// Whether operands may change places: the same bits.
     pub commutes: bool,
     /// The derivatives by the operands, in order.
     pub slopes: &'static [Slope],
 }
 
-impl Row {
+impl OpRow {
     /// Whether it is written as a call of a function.
     pub const fn is_a_call(&self) -> bool {
         matches!(self.text, Text::Call(_))
@@ -77,7 +77,7 @@ pub enum Counted {
 
 /// What kind of function of its operands an operation is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
+pub enum OpKind {
     /// A polynomial.
     Polynomial,
     /// A quotient of polynomials: with poles.
@@ -141,13 +141,13 @@ macro_rules! operations {
 
             /// What is known of it.
             #[inline]
-            pub const fn row(self) -> &'static Row {
-                const ROWS: &[Row] = &[$(Row {
+            pub const fn row(self) -> &'static OpRow {
+                const ROWS: &[OpRow] = &[$(OpRow {
                     name: stringify!($of),
                     text: Text::$text($written),
                     counted: Counted::$counted,
                     is_exact: $is_exact,
-                    kind: Kind::$kind,
+                    kind: OpKind::$kind,
                     commutes: $commutes,
                     slopes: &[$(Slope::$slope),+],
                 }),+];

@@ -4,7 +4,7 @@
 //! rules give the same bits for all finite inputs, up to the sign of a zero; `Algebraic` ones are equal over the reals
 //! and move the rounding. With `Exact` rules alone the generated program is the generic runtime, bit for bit.
 
-use super::{Binary, Builder, NodeId, Op, Unary};
+use super::{Binary, GraphBuilder, NodeId, Op, Unary};
 use crate::number::Scalar;
 use straightline_core::{Dd, Real};
 
@@ -74,7 +74,7 @@ pub struct Rule {
     /// The equation, for people.
     pub equation: &'static str,
     /// The equal node, if the rule fires on this operation.
-    pub apply: fn(&mut Builder, Op) -> Option<NodeId>,
+    pub apply: fn(&mut GraphBuilder, Op) -> Option<NodeId>,
 }
 
 impl std::fmt::Debug for Rule {
@@ -177,7 +177,7 @@ pub const RULES: &[Rule] = &[
     Rule { name: "mul-mul", grade: Grade::Algebraic, equation: "c · (d · x) = (c d) · x", apply: mul_mul },
 ];
 
-fn fold(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn fold(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     let value = |id: NodeId| b.as_constant(id).map(|c| c.value());
     let (x, y) = match op {
         Op::Unary(_, x) => (value(x)?, Dd::ZERO),
@@ -188,11 +188,11 @@ fn fold(b: &mut Builder, op: Op) -> Option<NodeId> {
     Some(b.constant(folded))
 }
 
-fn is(b: &Builder, id: NodeId, x: f64) -> bool {
+fn is(b: &GraphBuilder, id: NodeId, x: f64) -> bool {
     b.as_constant(id).is_some_and(|c| c.is(x))
 }
 
-fn add_zero(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn add_zero(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     match op {
         Op::Binary(Binary::Add, x, y) if is(b, y, 0.0) => Some(x),
         Op::Binary(Binary::Add, x, y) if is(b, x, 0.0) => Some(y),
@@ -200,7 +200,7 @@ fn add_zero(b: &mut Builder, op: Op) -> Option<NodeId> {
     }
 }
 
-fn sub_zero(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn sub_zero(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     match op {
         Op::Binary(Binary::Sub, x, y) if is(b, y, 0.0) => Some(x),
         Op::Binary(Binary::Sub, x, y) if is(b, x, 0.0) => Some(b.add(Op::neg(y))),
@@ -208,21 +208,21 @@ fn sub_zero(b: &mut Builder, op: Op) -> Option<NodeId> {
     }
 }
 
-fn sub_self(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn sub_self(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     match op {
         Op::Binary(Binary::Sub, x, y) if x == y => Some(b.constant(Dd::ZERO)),
         _ => None,
     }
 }
 
-fn mul_zero(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn mul_zero(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     match op {
         Op::Binary(Binary::Mul, x, y) if is(b, x, 0.0) || is(b, y, 0.0) => Some(b.constant(Dd::ZERO)),
         _ => None,
     }
 }
 
-fn mul_one(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn mul_one(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     match op {
         Op::Binary(Binary::Mul, x, y) if is(b, y, 1.0) => Some(x),
         Op::Binary(Binary::Mul, x, y) if is(b, x, 1.0) => Some(y),
@@ -232,7 +232,7 @@ fn mul_one(b: &mut Builder, op: Op) -> Option<NodeId> {
     }
 }
 
-fn div_one(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn div_one(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     match op {
         Op::Binary(Binary::Div, x, y) if is(b, y, 1.0) => Some(x),
         Op::Binary(Binary::Div, x, y) if is(b, y, -1.0) => Some(b.add(Op::neg(x))),
@@ -241,7 +241,7 @@ fn div_one(b: &mut Builder, op: Op) -> Option<NodeId> {
     }
 }
 
-fn neg_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn neg_neg(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     match op {
         Op::Unary(Unary::Neg, x) => match b.op(x) {
             Op::Unary(Unary::Neg, y) => Some(y),
@@ -251,7 +251,7 @@ fn neg_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
     }
 }
 
-fn add_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn add_neg(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     let Op::Binary(Binary::Add, x, y) = op else { return None };
     let ((u, s), (v, t)) = (without_sign(b, x), without_sign(b, y));
     match (s, t) {
@@ -265,7 +265,7 @@ fn add_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
     }
 }
 
-fn sub_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn sub_neg(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     let Op::Binary(Binary::Sub, x, y) = op else { return None };
     let ((u, s), (v, t)) = (without_sign(b, x), without_sign(b, y));
     match (s, t) {
@@ -280,7 +280,7 @@ fn sub_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
 }
 
 /// `x` without its sign, and whether it had one: a negation or a negative constant.
-fn without_sign(b: &mut Builder, x: NodeId) -> (NodeId, bool) {
+fn without_sign(b: &mut GraphBuilder, x: NodeId) -> (NodeId, bool) {
     match b.op(x) {
         Op::Unary(Unary::Neg, y) => (y, true),
         Op::Constant(c) if c.is_negative() => (b.constant(-c.value()), true),
@@ -288,7 +288,7 @@ fn without_sign(b: &mut Builder, x: NodeId) -> (NodeId, bool) {
     }
 }
 
-fn mul_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn mul_neg(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     let Op::Binary(Binary::Mul, x, y) = op else { return None };
     let ((x, s), (y, t)) = (without_sign(b, x), without_sign(b, y));
     if !(s || t) {
@@ -298,7 +298,7 @@ fn mul_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
     Some(if s != t { b.add(Op::neg(product)) } else { product })
 }
 
-fn div_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn div_neg(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     let Op::Binary(Binary::Div, x, y) = op else { return None };
     let ((x, s), (y, t)) = (without_sign(b, x), without_sign(b, y));
     if !(s || t) {
@@ -308,14 +308,14 @@ fn div_neg(b: &mut Builder, op: Op) -> Option<NodeId> {
     Some(if s != t { b.add(Op::neg(quotient)) } else { quotient })
 }
 
-fn commute(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn commute(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     match op {
         Op::Binary(f, x, y) if f.row().commutes && y < x => Some(b.add(Op::Binary(f, y, x))),
         _ => None,
     }
 }
 
-fn sub_flip(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn sub_flip(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     match op {
         Op::Binary(Binary::Sub, x, y) => {
             let flipped = b.find(Op::sub(y, x))?;
@@ -325,7 +325,7 @@ fn sub_flip(b: &mut Builder, op: Op) -> Option<NodeId> {
     }
 }
 
-fn mul_mul(b: &mut Builder, op: Op) -> Option<NodeId> {
+fn mul_mul(b: &mut GraphBuilder, op: Op) -> Option<NodeId> {
     let Op::Binary(Binary::Mul, x, y) = op else { return None };
     let (c, inner) = match (b.as_constant(x), b.as_constant(y)) {
         (Some(c), None) => (c, y),

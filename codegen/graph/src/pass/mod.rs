@@ -18,7 +18,7 @@ pub use unread_inputs::unread_inputs;
 
 #[cfg(test)]
 mod tests {
-    use crate::expr::{gradient, Alike, Builder, Graph, Op, Port, Precision, RuleSet};
+    use crate::expr::{gradient, Alike, Graph, GraphBuilder, Op, Port, Precision, RuleSet};
     use crate::number::Scalar;
     use std::panic::catch_unwind;
 
@@ -35,7 +35,7 @@ mod tests {
 
     #[test]
     fn no_pass_loses_formats_or_loops_without_a_word() {
-        let mut b = Builder::new(RuleSet::all(), vec![Port::new("x", &[1])]);
+        let mut b = GraphBuilder::new(RuleSet::all(), vec![Port::new("x", &[1])]);
         let x = b.insert(Op::Input(0));
         let square = b.insert(Op::mul(x, x));
         let plain = b.finish(vec![Port::new("y", &[1])], vec![square]);

@@ -10,7 +10,7 @@
 //! [`verify`](crate::expr::verify()) accepts. After: the same sums of the same terms, so as many operations; where a product is to be
 //! one instruction with its addition, the order of [`sums`](super::sums()) has fewer of those.
 
-use crate::expr::{Binary, Builder, Graph, NodeId, Op, RuleSet};
+use crate::expr::{Binary, Graph, GraphBuilder, NodeId, Op, RuleSet};
 
 /// Of so many terms all orders are compared.
 const ALL_ORDERS: usize = 9;
@@ -29,11 +29,11 @@ pub fn order(graph: &Graph, states: &[Vec<f64>]) -> Graph {
             }
         }
     }
-    let mut writer = Writer {
+    let mut writer = OrderWriter {
         graph,
         states,
         inside,
-        builder: Builder::new(RuleSet::all(), graph.inputs.clone()),
+        builder: GraphBuilder::new(RuleSet::all(), graph.inputs.clone()),
         written: vec![None; graph.ops.len()],
     };
     for id in graph.ids().filter(|id| !writer.inside[id.index()]).collect::<Vec<_>>() {
@@ -44,16 +44,16 @@ pub fn order(graph: &Graph, states: &[Vec<f64>]) -> Graph {
     writer.builder.finish(graph.outputs.clone(), results)
 }
 
-struct Writer<'a> {
+struct OrderWriter<'a> {
     graph: &'a Graph,
     states: &'a [Vec<f64>],
     /// Whether a node is written with the sum that alone uses it.
     inside: Vec<bool>,
-    builder: Builder,
+    builder: GraphBuilder,
     written: Vec<Option<NodeId>>,
 }
 
-impl Writer<'_> {
+impl OrderWriter<'_> {
     fn node(&mut self, id: NodeId) -> NodeId {
         if let Some(done) = self.written[id.index()] {
             return done;
@@ -173,7 +173,7 @@ mod tests {
     /// ((x₀ ± x₁) ± x₂) ± …, and the values of all its nodes.
     fn chain(values: &[f64], negative: &[bool]) -> (Graph, Vec<f64>) {
         let inputs = vec![Port::new("x", &[values.len()])];
-        let mut builder = Builder::new(RuleSet::exact(Folding::In(crate::number::Scalar::F64)), inputs);
+        let mut builder = GraphBuilder::new(RuleSet::exact(Folding::In(crate::number::Scalar::F64)), inputs);
         let terms: Vec<NodeId> = (0..values.len()).map(|k| builder.insert(Op::Input(k as u32))).collect();
         let mut all = values.to_vec();
         let mut sum = terms[0];

@@ -136,11 +136,11 @@ impl Flow {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::expr::{Builder, Port, RuleSet};
+    use crate::expr::{GraphBuilder, Port, RuleSet};
 
     /// n products with x₀ first, then their sum, times sin x₁ and cos x₁.
     fn products_first(n: usize) -> Graph {
-        let mut b = Builder::new(RuleSet::all(), vec![Port::new("x", &[n + 2])]);
+        let mut b = GraphBuilder::new(RuleSet::all(), vec![Port::new("x", &[n + 2])]);
         let x: Vec<NodeId> = (0..n + 2).map(|k| b.insert(Op::Input(k as u32))).collect();
         let products: Vec<NodeId> = (0..n).map(|k| b.add(Op::mul(x[0], x[k + 2]))).collect();
         let mut sum = products[0];

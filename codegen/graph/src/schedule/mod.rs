@@ -1,7 +1,7 @@
 //! The order of the operations, and how a long program is cut into functions of bounded size.
 //!
 //! rustc and LLVM take more than linear time for one huge function. So a program of
-//! more than [`Limits::operations`] is cut into parts, each at the place with the fewest values alive within reach of
+//! more than [`ScheduleLimits::operations`] is cut into parts, each at the place with the fewest values alive within reach of
 //! its size; values that cross a cut go through an array of reused slots. A program with loops over limbs stays in one part, in its
 //! own order.
 
@@ -11,23 +11,23 @@ use crate::expr::{Graph, NodeId, Op};
 
 /// How long one function may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Limits {
+pub struct ScheduleLimits {
     /// Operations (additions, multiplications, divisions, square roots; a sine-cosine pair counts as 40) in one part.
     pub operations: usize,
 }
 
-impl Default for Limits {
+impl Default for ScheduleLimits {
     fn default() -> Self {
         // Straight-line code runs once through, in whatever parts, so a cut saves no cache; what crosses it goes through memory.
         // HyQ's forward dynamics (3 400 here) takes 455 ns in two parts and 403 in one, Talos' (9 500) 1 478 in four and 1 366 in
         // one. The bound is for compile time, which is about linear up to here.
-        Limits { operations: 12_000 }
+        ScheduleLimits { operations: 12_000 }
     }
 }
 
 /// One function of a program.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Part {
+pub struct ProgramPart {
     /// What it computes, in order; neither inputs nor constants.
     pub nodes: Vec<NodeId>,
     /// Values it takes from slots.
@@ -42,7 +42,7 @@ pub struct Part {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Schedule {
     /// The functions, run one after the other.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ProgramPart>,
     /// How many slots carry values between them.
     pub slots: usize,
     /// Most values alive at once, inputs and constants not counted.
@@ -62,9 +62,9 @@ fn weight(op: Op) -> usize {
 
 /// Orders and cuts a graph. Operations keep the order in which the algorithm wrote them, unless many values would go through
 /// memory; so do programs that are cut.
-pub fn schedule(graph: &Graph, limits: Limits) -> Schedule {
+pub fn schedule(graph: &Graph, limits: ScheduleLimits) -> Schedule {
     let mut order: Vec<NodeId> = graph.ids().filter(|id| is_value(graph.op(*id))).collect();
-    let limits = if graph.alike.is_empty() { limits } else { Limits { operations: usize::MAX } };
+    let limits = if graph.alike.is_empty() { limits } else { ScheduleLimits { operations: usize::MAX } };
     if graph.alike.is_empty() && order.iter().map(|id| weight(graph.op(*id))).sum::<usize>() <= limits.operations {
         order = few_alive::improved(graph, order);
     }
@@ -101,7 +101,7 @@ pub fn schedule(graph: &Graph, limits: Limits) -> Schedule {
 
     let cuts = cuts(graph, &order, &live_after, limits);
     let part_of = |p: usize| cuts.partition_point(|c| *c <= p);
-    let mut parts = vec![Part::default(); cuts.len() + 1];
+    let mut parts = vec![ProgramPart::default(); cuts.len() + 1];
     for (p, id) in order.iter().enumerate() {
         parts[part_of(p)].nodes.push(*id);
     }
@@ -115,7 +115,7 @@ pub fn schedule(graph: &Graph, limits: Limits) -> Schedule {
 }
 
 /// Positions before which a new part begins.
-fn cuts(graph: &Graph, order: &[NodeId], live_after: &[usize], limits: Limits) -> Vec<usize> {
+fn cuts(graph: &Graph, order: &[NodeId], live_after: &[usize], limits: ScheduleLimits) -> Vec<usize> {
     let weights: Vec<usize> = order.iter().map(|id| weight(graph.op(*id))).collect();
     let mut left: usize = weights.iter().sum();
     let mut cuts = Vec::new();
@@ -156,7 +156,7 @@ fn assign_slots(
     position: &[usize],
     last_use: &[usize],
     part_of: &impl Fn(usize) -> usize,
-    parts: &mut [Part],
+    parts: &mut [ProgramPart],
 ) -> usize {
     let mut slot_of = vec![usize::MAX; graph.ops.len()];
     let mut free: Vec<usize> = Vec::new();

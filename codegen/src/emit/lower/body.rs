@@ -5,7 +5,7 @@ use super::{first_read, nodes_of, port_of, read_inputs, Lowering, Names};
 use crate::emit::module::{Expression, Statement};
 use crate::emit::target::{Scope, Target};
 use straightline_graph::expr::{Graph, NodeId, Op, Precision, Unary};
-use straightline_graph::schedule::Part;
+use straightline_graph::schedule::ProgramPart;
 use straightline_graph::Scalar;
 
 /// How long an expression may grow before it gets a name of its own.
@@ -14,7 +14,7 @@ const LINE: usize = 84;
 const TRIVIAL: usize = 24;
 
 /// The statements of one part: expressions of single use are written where they are used.
-pub(super) struct Body<'a> {
+pub(super) struct Statements<'a> {
     pub graph: &'a Graph,
     pub scope: Scope<'a>,
     pub target: &'a dyn Target,
@@ -32,7 +32,7 @@ pub(super) struct Body<'a> {
 
 /// What is known of a part before its statements are written.
 pub(super) struct Plan<'a> {
-    pub part: &'a Part,
+    pub part: &'a ProgramPart,
     pub uses: Vec<u32>,
     /// Results by their nodes, in the order of those.
     pub results_of: Vec<(NodeId, usize)>,
@@ -45,7 +45,7 @@ pub(super) struct Plan<'a> {
 }
 
 /// The statements of one part; over lanes, in a loop over them.
-pub(super) fn body(graph: &Graph, part: &Part, scope: Scope<'_>, lowering: &Lowering<'_>) -> Vec<Statement> {
+pub(super) fn body(graph: &Graph, part: &ProgramPart, scope: Scope<'_>, lowering: &Lowering<'_>) -> Vec<Statement> {
     let statements = statements(graph, part, scope, lowering);
     match scope.style.lanes {
         true => vec![Statement::Lanes(statements)],
@@ -53,10 +53,10 @@ pub(super) fn body(graph: &Graph, part: &Part, scope: Scope<'_>, lowering: &Lowe
     }
 }
 
-fn statements(graph: &Graph, part: &Part, scope: Scope<'_>, lowering: &Lowering<'_>) -> Vec<Statement> {
+fn statements(graph: &Graph, part: &ProgramPart, scope: Scope<'_>, lowering: &Lowering<'_>) -> Vec<Statement> {
     let ports = graph.inputs.iter().chain(&graph.outputs).map(|p| p.name.as_str());
     let names = Names::with_taken(ports.chain(lowering.target.reserved().iter().copied()));
-    let (mut b, absorbed) = Body::new(graph, part, scope, lowering.target, names);
+    let (mut b, absorbed) = Statements::new(graph, part, scope, lowering.target, names);
     let mut uses = vec![0u32; graph.ops.len()];
     for id in &part.nodes {
         graph.op(*id).operands().for_each(|a| uses[a.index()] += 1);
@@ -91,20 +91,20 @@ fn statements(graph: &Graph, part: &Part, scope: Scope<'_>, lowering: &Lowering<
     out
 }
 
-impl<'a> Body<'a> {
+impl<'a> Statements<'a> {
     /// Before its first statement, and which products sums take in.
     pub fn new(
         graph: &'a Graph,
-        part: &Part,
+        part: &ProgramPart,
         scope: Scope<'a>,
         target: &'a dyn Target,
         names: Names,
-    ) -> (Body<'a>, Vec<bool>) {
+    ) -> (Statements<'a>, Vec<bool>) {
         let (fused, absorbed) = match scope.style.fused {
             true => fusions(graph, part),
             false => (vec![None; graph.ops.len()], vec![false; graph.ops.len()]),
         };
-        let body = Body {
+        let body = Statements {
             graph,
             scope,
             target,
@@ -119,7 +119,7 @@ impl<'a> Body<'a> {
     }
 
     /// What an array of a part holds before its elements are computed.
-    pub fn filler(&self, part: &Part) -> Expression {
+    pub fn filler(&self, part: &ProgramPart) -> Expression {
         let (is_read, style) = (read_inputs(self.graph, nodes_of(self.graph, part)), self.scope.style);
         let has_live = !(part.loads.is_empty() || style.lanes || style.generic);
         let of_part = first_read(self.graph, &is_read, style).or_else(|| has_live.then_some(Expression::Slot(0)));

@@ -13,14 +13,14 @@
 //! What differs from limb to limb is an array over limbs, what does not a local from before the loop. LLVM's loop vectoriser makes
 //! vector instructions of the body, as of functions over lanes.
 
-use super::body::{Body, Plan};
+use super::body::{Plan, Statements};
 use super::Lowering;
 use crate::emit::module::{Expression, Index, Statement};
 use rustc_hash::FxHashMap;
 use straightline_graph::expr::{Alike, Graph, NodeId, Op, Section};
-use straightline_graph::schedule::Part;
+use straightline_graph::schedule::ProgramPart;
 
-impl Body<'_> {
+impl Statements<'_> {
     /// The statements of a part, with loops over limbs.
     pub(super) fn with_loops(&mut self, plan: &mut Plan<'_>, lowering: &Lowering<'_>, out: &mut Vec<Statement>) {
         let graph = self.graph;
@@ -89,7 +89,7 @@ impl Body<'_> {
         }
 
         let own = std::mem::take(&mut self.names);
-        let (mut inner, absorbed) = Body::new(&graph, &part, self.scope, self.target, own);
+        let (mut inner, absorbed) = Statements::new(&graph, &part, self.scope, self.target, own);
         for (node, value) in values {
             inner.values[node.index()] = Some(value);
         }
@@ -138,7 +138,7 @@ impl Body<'_> {
 /// A loop over limbs as a program of its own: rows are nodes, and so is what they take from outside.
 struct Loop {
     graph: Graph,
-    part: Part,
+    part: ProgramPart,
     /// Of nodes from outside what stands for them: a node for all limbs, or one per limb.
     outside: Vec<(NodeId, Vec<NodeId>)>,
     /// What is used behind the loop, with its row.
@@ -154,7 +154,7 @@ impl Loop {
             NodeId(inner.ops.len() as u32 - 1)
         };
         let mut known: FxHashMap<Vec<NodeId>, NodeId> = FxHashMap::default();
-        let (mut part, mut outside, mut results) = (Part::default(), Vec::new(), Vec::new());
+        let (mut part, mut outside, mut results) = (ProgramPart::default(), Vec::new(), Vec::new());
         for row in &alike.rows {
             let operands: Vec<Vec<NodeId>> = row.iter().map(|id| graph.op(*id).operands().collect()).collect();
             let mut of_op = Vec::new();

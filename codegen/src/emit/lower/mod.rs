@@ -10,12 +10,12 @@ mod names;
 
 pub use names::Names;
 
-use super::module::{Access, Expression, Parameter, Ports, Routine, Statement};
+use super::module::{Access, Expression, Ports, Routine, RoutineParameter, Statement};
 use super::target::{Scope, Target};
 use super::Style;
 use body::body;
 use straightline_graph::expr::{Graph, NodeId, Op, Port, Section};
-use straightline_graph::schedule::{Part, Schedule};
+use straightline_graph::schedule::{ProgramPart, Schedule};
 
 /// How programs become functions of a language.
 #[derive(Clone, Copy)]
@@ -34,8 +34,9 @@ impl Lowering<'_> {
         let ports = Ports { inputs: graph.inputs.clone(), outputs: graph.outputs.clone() };
         let scheduled = schedule.parts.iter().flat_map(|p| p.nodes.iter().copied());
         let is_read = read_inputs(graph, scheduled.chain(graph.results.iter().copied()));
-        let inputs = is_read.iter().enumerate().map(|(port, is_read)| Parameter::Input { port, is_read: *is_read });
-        let outputs = (0..graph.outputs.len()).map(|port| Parameter::Output { port });
+        let inputs =
+            is_read.iter().enumerate().map(|(port, is_read)| RoutineParameter::Input { port, is_read: *is_read });
+        let outputs = (0..graph.outputs.len()).map(|port| RoutineParameter::Output { port });
         let mut routine = Routine {
             name: name.to_string(),
             doc: doc.to_string(),
@@ -75,22 +76,23 @@ impl Lowering<'_> {
 }
 
 /// What a part reads and writes.
-fn parameters_of(graph: &Graph, part: &Part, slots: usize) -> Vec<Parameter> {
+fn parameters_of(graph: &Graph, part: &ProgramPart, slots: usize) -> Vec<RoutineParameter> {
     let is_read = read_inputs(graph, nodes_of(graph, part));
     let inputs = (0..is_read.len()).filter(|port| is_read[*port]);
-    let mut parameters: Vec<Parameter> = inputs.map(|port| Parameter::Input { port, is_read: true }).collect();
+    let mut parameters: Vec<RoutineParameter> =
+        inputs.map(|port| RoutineParameter::Input { port, is_read: true }).collect();
     if !(part.loads.is_empty() && part.stores.is_empty()) {
-        parameters.push(Parameter::Live { slots, is_written: !part.stores.is_empty() });
+        parameters.push(RoutineParameter::Live { slots, is_written: !part.stores.is_empty() });
     }
     let mut is_written = vec![false; graph.outputs.len()];
     part.results.iter().for_each(|r| is_written[port_of(&graph.outputs, *r).0] = true);
     let outputs = (0..is_written.len()).filter(|port| is_written[*port]);
-    parameters.extend(outputs.map(|port| Parameter::Output { port }));
+    parameters.extend(outputs.map(|port| RoutineParameter::Output { port }));
     parameters
 }
 
 /// What a part computes, and the results that it stores.
-fn nodes_of<'a>(graph: &'a Graph, part: &'a Part) -> impl Iterator<Item = NodeId> + 'a {
+fn nodes_of<'a>(graph: &'a Graph, part: &'a ProgramPart) -> impl Iterator<Item = NodeId> + 'a {
     part.nodes.iter().copied().chain(part.results.iter().map(|r| graph.results[*r]))
 }
 

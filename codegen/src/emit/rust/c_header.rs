@@ -1,6 +1,6 @@
 //! The C header of a package.
 
-use super::c_package::{Exported, Package, Parameter, LAYOUTS};
+use super::c_package::{CParameter, Exported, Package, LAYOUTS};
 use crate::emit::doc::relinked;
 use crate::identifier::comment;
 use std::fmt::Write;
@@ -125,7 +125,7 @@ const char *{prefix}_frame_name(int i);
             let line = line.strip_prefix("* ").map_or(line.to_string(), |parameter| format!("  {parameter}"));
             let _ = write!(out, "{} {line}", if i == 0 { "" } else { "\n *" });
         }
-        let list = |f: &dyn Fn(&Parameter) -> String| function.parameters.iter().map(f).collect::<Vec<_>>().join(", ");
+        let list = |f: &dyn Fn(&CParameter) -> String| function.parameters.iter().map(f).collect::<Vec<_>>().join(", ");
         let name = &function.c_name;
         let _ = writeln!(out, " */\nvoid {prefix}_{name}({});", list(&|p| p.in_c(c_type)));
         if self.generated.lanes.is_some() {

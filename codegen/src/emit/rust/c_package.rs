@@ -78,11 +78,11 @@ pub(super) struct Exported {
     path: String,
     summary: &'static str,
     pub doc: String,
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<CParameter>,
 }
 
 /// A parameter of a C function.
-pub(super) struct Parameter {
+pub(super) struct CParameter {
     pub name: String,
     pub length: usize,
     array: String,
@@ -91,10 +91,10 @@ pub(super) struct Parameter {
     pub is_shared: bool,
 }
 
-impl Parameter {
+impl CParameter {
     /// The pointer as a reference to an array; one to no numbers at all may be null.
     fn as_array(&self) -> String {
-        let Parameter { name, array, .. } = self;
+        let CParameter { name, array, .. } = self;
         match (self.length, self.is_output) {
             (0, false) => format!("    let {name} = {{ let _ = {name}; &[] }};\n"),
             (0, true) => format!("    let {name} = {{ let _ = {name}; &mut [] }};\n"),
@@ -105,7 +105,7 @@ impl Parameter {
 
     /// The pointer as a slice of `n` states.
     fn as_slice(&self) -> String {
-        let Parameter { name, length, .. } = self;
+        let CParameter { name, length, .. } = self;
         match (length, self.is_output) {
             _ if self.is_shared => self.as_array(),
             (0, _) => self.as_array(),
@@ -226,7 +226,7 @@ overflow-checks = false
         };
         let inputs = item.inputs().iter().map(|p| (p, false));
         let ports = inputs.chain(item.outputs().iter().map(|p| (p, true)));
-        let parameter = |(port, is_output): (&Port, bool)| Parameter {
+        let parameter = |(port, is_output): (&Port, bool)| CParameter {
             name: port.name.clone(),
             length: port.len(),
             array: match &port.wrapper {
@@ -321,10 +321,10 @@ fn name(names: &[&CStr], i: c_int) -> *const c_char {{
     fn wrapper(&self, function: &Exported) -> String {
         let (prefix, scalar) = (self.prefix, self.scalar().name());
         let Exported { c_name, path, summary, parameters, .. } = function;
-        let list = |f: &dyn Fn(&Parameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
+        let list = |f: &dyn Fn(&CParameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
         let signature = list(&|p| format!("{}: *{} {scalar}", p.name, if p.is_output { "mut" } else { "const" }));
         let arguments = list(&|p| p.name.to_string());
-        let arrays: String = parameters.iter().map(Parameter::as_array).collect();
+        let arrays: String = parameters.iter().map(CParameter::as_array).collect();
         let lengths = list(&|p| format!("`{}` {}", p.name, p.length));
         format!(
             r#"
@@ -345,9 +345,9 @@ pub unsafe extern "C" fn {prefix}_{c_name}({signature}) {{
     fn batches(&self, function: &Exported) -> String {
         let (prefix, scalar) = (self.prefix, self.scalar().name());
         let Exported { c_name, path, parameters, .. } = function;
-        let list = |f: &dyn Fn(&Parameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
-        let pointer = |p: &Parameter| format!("{}: *{} {scalar}", p.name, if p.is_output { "mut" } else { "const" });
-        let slices: String = parameters.iter().map(Parameter::as_slice).collect();
+        let list = |f: &dyn Fn(&CParameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
+        let pointer = |p: &CParameter| format!("{}: *{} {scalar}", p.name, if p.is_output { "mut" } else { "const" });
+        let slices: String = parameters.iter().map(CParameter::as_slice).collect();
         let lengths = list(&|p| match p.is_shared {
             true => format!("`{}` {}", p.name, p.length),
             false => format!("`{}` n times {}", p.name, p.length),

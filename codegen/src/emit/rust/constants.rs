@@ -11,16 +11,16 @@ use straightline_core::model::Limits;
 use straightline_graph::Scalar;
 
 /// A constant.
-pub(super) struct Constant {
+pub(super) struct AssociatedConstant {
     pub name: String,
     /// What stands above it, line by line.
     pub doc: String,
-    kind: Kind,
+    kind: ConstantType,
     value: String,
 }
 
 /// The type of a constant.
-enum Kind {
+enum ConstantType {
     Size,
     Sizes(usize),
     Names(usize),
@@ -29,54 +29,55 @@ enum Kind {
     Cost,
 }
 
-impl Constant {
-    fn new(name: impl Into<String>, kind: Kind, value: String, doc: impl Into<String>) -> Constant {
-        Constant { name: name.into(), doc: doc.into(), kind, value }
+impl AssociatedConstant {
+    fn new(name: impl Into<String>, kind: ConstantType, value: String, doc: impl Into<String>) -> AssociatedConstant {
+        AssociatedConstant { name: name.into(), doc: doc.into(), kind, value }
     }
 
     /// The type; `module` stands before types of the file.
     pub fn kind(&self, module: &str) -> String {
         match &self.kind {
-            Kind::Size => "usize".to_string(),
-            Kind::Sizes(n) => format!("[usize; {n}]"),
+            ConstantType::Size => "usize".to_string(),
+            ConstantType::Sizes(n) => format!("[usize; {n}]"),
             // of a constant of a type the lifetime has to be said
-            Kind::Names(n) if !module.is_empty() => format!("[&'static str; {n}]"),
-            Kind::Names(n) => format!("[&str; {n}]"),
-            Kind::Numbers(scalar, shape) => {
+            ConstantType::Names(n) if !module.is_empty() => format!("[&'static str; {n}]"),
+            ConstantType::Names(n) => format!("[&str; {n}]"),
+            ConstantType::Numbers(scalar, shape) => {
                 shape.iter().rev().fold(scalar.name().to_string(), |inner, n| format!("[{inner}; {n}]"))
             }
-            Kind::Cost => format!("{module}Cost"),
+            ConstantType::Cost => format!("{module}Cost"),
         }
     }
 
     /// The constant in a file.
     pub fn text(&self) -> String {
-        let allow = if matches!(self.kind, Kind::Numbers(..)) { format!("{ALLOW}\n") } else { String::new() };
+        let allow = if matches!(self.kind, ConstantType::Numbers(..)) { format!("{ALLOW}\n") } else { String::new() };
         format!("{}{allow}pub const {}: {} = {};\n", super::doc(&self.doc), self.name, self.kind(""), self.value)
     }
 }
 
 /// Sizes, names and limits.
-pub(super) fn of_robot(generated: &Generated) -> Vec<Constant> {
+pub(super) fn of_robot(generated: &Generated) -> Vec<AssociatedConstant> {
     let Generated { model, frames, scalar, .. } = generated;
     let joints = model.joints();
     let single: Vec<_> = joints.iter().filter(|j| j.kind.is_single()).collect();
     let names = |names: &mut dyn Iterator<Item = &str>| format!("[{}]", string_literals(names));
-    let size = |name: &str, value: usize, doc: &str| Constant::new(name, Kind::Size, value.to_string(), doc);
+    let size =
+        |name: &str, value: usize, doc: &str| AssociatedConstant::new(name, ConstantType::Size, value.to_string(), doc);
     let joint_names = names(&mut joints.iter().map(|j| j.name.as_str()));
     let frame_names = names(&mut frames.iter().map(String::as_str));
     let mut constants = vec![
         size("NQ", model.nq(), "Number of configuration coordinates q."),
         size("NV", model.nv(), "Number of velocity coordinates qd, qdd, tau."),
-        Constant::new(
+        AssociatedConstant::new(
             "JOINT_NAMES",
-            Kind::Names(joints.len()),
+            ConstantType::Names(joints.len()),
             joint_names,
             "Joints in the order of their coordinates.",
         ),
-        Constant::new(
+        AssociatedConstant::new(
             "FRAME_NAMES",
-            Kind::Names(frames.len()),
+            ConstantType::Names(frames.len()),
             frame_names,
             "Frames of the functions that answer per frame.",
         ),
@@ -93,7 +94,7 @@ pub(super) fn of_robot(generated: &Generated) -> Vec<Constant> {
         ("EFFORT_LIMITS", "Greatest generalized force of every joint \\[N·m or N\\]", list(&|l| l.effort)),
     ] {
         let doc = format!("{doc}{floating}; infinite where the robot file says nothing.");
-        constants.push(Constant::new(name, Kind::Numbers(*scalar, vec![single.len()]), values, doc));
+        constants.push(AssociatedConstant::new(name, ConstantType::Numbers(*scalar, vec![single.len()]), values, doc));
     }
     let n = model.drives.len();
     if n > 0 {
@@ -102,10 +103,10 @@ pub(super) fn of_robot(generated: &Generated) -> Vec<Constant> {
         constants.extend([
             size("NU", n, "Number of inputs u of the drives."),
             size("NX", states.iter().sum(), "Number of states x of the drives."),
-            Constant::new("DRIVE_NAMES", Kind::Names(n), drive_names, "Drives in the order of u."),
-            Constant::new(
+            AssociatedConstant::new("DRIVE_NAMES", ConstantType::Names(n), drive_names, "Drives in the order of u."),
+            AssociatedConstant::new(
                 "DRIVE_STATES",
-                Kind::Sizes(n),
+                ConstantType::Sizes(n),
                 format!("{states:?}"),
                 "How many entries of x each drive has.",
             ),
@@ -135,16 +136,21 @@ pub struct Cost {
 ";
 
 /// The cost of a function.
-pub(super) fn cost(name: &str, f: &FunctionReport) -> Constant {
+pub(super) fn cost(name: &str, f: &FunctionReport) -> AssociatedConstant {
     let value = format!(
         "Cost {{ mul: {}, add: {}, fma: {}, div: {}, sin_cos: {}, max_live: {} }}",
         f.mul, f.add, f.fma, f.div, f.sincos, f.max_live
     );
-    Constant::new(format!("{}_COST", name.to_uppercase()), Kind::Cost, value, format!("What [`{name}`] costs."))
+    AssociatedConstant::new(
+        format!("{}_COST", name.to_uppercase()),
+        ConstantType::Cost,
+        value,
+        format!("What [`{name}`] costs."),
+    )
 }
 
 /// The certified bounds of a function's errors.
-pub(super) fn error_bounds(name: &str, figures: &FunctionReport) -> Vec<Constant> {
+pub(super) fn error_bounds(name: &str, figures: &FunctionReport) -> Vec<AssociatedConstant> {
     let bounds = figures.errors.iter().flat_map(|errors| errors.outputs.iter().map(move |output| (errors, output)));
     bounds
         .map(|(errors, output)| {
@@ -158,8 +164,8 @@ pub(super) fn error_bounds(name: &str, figures: &FunctionReport) -> Vec<Constant
                 let _ = writeln!(doc, "* {}", line.replace('[', "\\[").replace(']', "\\]"));
             }
             let value = nested(&output.shape, &mut output.bounds.iter());
-            let kind = Kind::Numbers(Scalar::F64, output.shape.clone());
-            Constant::new(errors.constant_name(name, output), kind, value, doc)
+            let kind = ConstantType::Numbers(Scalar::F64, output.shape.clone());
+            AssociatedConstant::new(errors.constant_name(name, output), kind, value, doc)
         })
         .collect()
 }

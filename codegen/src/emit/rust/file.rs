@@ -1,6 +1,6 @@
 //! The generated file: header, constants of the robot, functions, and the sine-cosine kernel they call.
 
-use super::constants::{cost, error_bounds, of_robot, Constant, COST};
+use super::constants::{cost, error_bounds, of_robot, AssociatedConstant, COST};
 use super::{batch, bound, contact, fused, indented, parameter, pasted, staged};
 use crate::choices::Lanes;
 use crate::emit::module::Item;
@@ -78,7 +78,7 @@ pub(super) fn lanes_text<F>(item: &Item<F>, drivers: Option<Lanes>) -> String {
 /// All that stands between the header and the functions: the robot's constants, the functions' costs and bounds, types of parameters,
 /// stages and contact modes.
 pub(super) fn preamble(generated: &Generated) -> String {
-    let mut out: String = of_robot(generated).iter().map(Constant::text).collect();
+    let mut out: String = of_robot(generated).iter().map(AssociatedConstant::text).collect();
     let functions = &generated.report.functions;
     if !functions.is_empty() {
         out.push_str(COST);
@@ -88,7 +88,7 @@ pub(super) fn preamble(generated: &Generated) -> String {
         if let Some(refused) = figures.errors.as_ref().and_then(|errors| errors.refused) {
             let _ = writeln!(out, "// No certified bound of the errors of {name}: {refused}.");
         }
-        out.extend(error_bounds(name, figures).iter().map(Constant::text));
+        out.extend(error_bounds(name, figures).iter().map(AssociatedConstant::text));
     }
     if generated.plain_style.generic {
         out.push_str(GENERIC);

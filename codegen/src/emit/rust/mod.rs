@@ -18,7 +18,7 @@ pub use associated::associated_items;
 pub use file::{file, kernel, scalar_module};
 pub use routine::Rust;
 
-use super::module::{Bound, Routine};
+use super::module::{Routine, StateCertificate};
 use super::{Style, Target};
 use straightline_graph::element;
 use straightline_graph::expr::{Constant, Port};
@@ -33,7 +33,7 @@ fn routine(routine: &Routine) -> String {
 }
 
 /// A bound of errors at a state, or a comment that says why there is none.
-fn bound(bound: &Bound) -> String {
+fn bound(bound: &StateCertificate) -> String {
     match bound {
         Ok(bound) => routine(bound),
         Err(why) => format!("// {why}\n"),

@@ -1,7 +1,7 @@
 //! Functions of straight-line code in Rust.
 
 use super::{array_type, doc, element_type, generics, kernel_path, literal, number_type, wrapped, zero, ALLOW};
-use crate::emit::module::{Access, Expression, Index, Parameter, Routine, Statement};
+use crate::emit::module::{Access, Expression, Index, Routine, RoutineParameter, Statement};
 use crate::emit::target::{Binding, Scope, Target};
 use crate::emit::Style;
 use crate::identifier::comment;
@@ -176,17 +176,17 @@ fn head(routine: &Routine) -> String {
     format!("{ALLOW}{inline}\n{word} {name}{}({}) {{\n", generics(*style), parameters.join(", "))
 }
 
-fn parameter(routine: &Routine, parameter: &Parameter) -> String {
+fn parameter(routine: &Routine, parameter: &RoutineParameter) -> String {
     let (style, ports) = (routine.style, &routine.ports);
     match parameter {
-        Parameter::Input { port, is_read } => {
+        RoutineParameter::Input { port, is_read } => {
             let (port, underscore) = (&ports.inputs[*port], if *is_read { "" } else { "_" });
             format!("{underscore}{}: &{}", port.name, array_type(port, style))
         }
-        Parameter::Live { slots, is_written } => {
+        RoutineParameter::Live { slots, is_written } => {
             format!("live: &{}[{}; {slots}]", if *is_written { "mut " } else { "" }, element_type(style))
         }
-        Parameter::Output { port } => {
+        RoutineParameter::Output { port } => {
             let port = &ports.outputs[*port];
             format!("{}: &mut {}", port.name, array_type(port, style))
         }
@@ -196,10 +196,10 @@ fn parameter(routine: &Routine, parameter: &Parameter) -> String {
 /// `name_part2(q, &mut live, tau);`
 fn call_of_part(routine: &Routine, k: usize) -> String {
     let (part, ports) = (&routine.parts[k], &routine.ports);
-    let argument = |p: &Parameter| match p {
-        Parameter::Input { port, .. } => ports.inputs[*port].name.clone(),
-        Parameter::Live { is_written, .. } => format!("&{}live", if *is_written { "mut " } else { "" }),
-        Parameter::Output { port } => ports.outputs[*port].name.clone(),
+    let argument = |p: &RoutineParameter| match p {
+        RoutineParameter::Input { port, .. } => ports.inputs[*port].name.clone(),
+        RoutineParameter::Live { is_written, .. } => format!("&{}live", if *is_written { "mut " } else { "" }),
+        RoutineParameter::Output { port } => ports.outputs[*port].name.clone(),
     };
     let arguments: Vec<String> = part.parameters.iter().map(argument).collect();
     let generic = if routine.style.lanes && routine.style.fused { "::<N, FUSED>" } else { "" };

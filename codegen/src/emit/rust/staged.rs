@@ -4,7 +4,7 @@ use super::{array_type, filler, indented, routine};
 use crate::emit::module::StagedModule;
 use crate::emit::{Routine, Style};
 use crate::function::Function;
-use crate::program::staged::Stage;
+use crate::program::staged::StageType;
 use std::fmt::Write;
 use std::iter::once;
 use straightline_graph::expr::Port;
@@ -49,7 +49,7 @@ pub(super) fn text(module: &StagedModule, style: Style) -> String {
 }
 
 /// The struct of a stage, its constructor, and the methods that it serves.
-fn stage_type(stages: &[Stage], s: usize, program: &Routine, methods: &str) -> String {
+fn stage_type(stages: &[StageType], s: usize, program: &Routine, methods: &str) -> String {
     let stage = &stages[s];
     let (inputs, style) = (&program.ports.inputs, program.style);
     let stored: usize = program.ports.outputs.iter().map(Port::len).sum();
@@ -102,7 +102,7 @@ fn stage_type(stages: &[Stage], s: usize, program: &Routine, methods: &str) -> S
 
 /// How stage `s`, as `receiver`, reaches the stored values or the input of that name. While stage `s` is being made its
 /// receiver is the stage before it.
-fn reach(stages: &[Stage], s: usize, name: &str, receiver: &str) -> String {
+fn reach(stages: &[StageType], s: usize, name: &str, receiver: &str) -> String {
     match stages.iter().position(|stage| stage.values == name && !name.is_empty()) {
         // from the stage before `s` down to stage `k`
         Some(k) => {
@@ -114,7 +114,7 @@ fn reach(stages: &[Stage], s: usize, name: &str, receiver: &str) -> String {
 }
 
 /// A method of stage `s` that calls the function's private program.
-fn method(function: Function, program: &Routine, stages: &[Stage], s: usize) -> String {
+fn method(function: Function, program: &Routine, stages: &[StageType], s: usize) -> String {
     let (ports, style) = (&program.ports, program.style);
     let own = ports.inputs.iter().filter(|p| !stages.iter().any(|e| e.values == p.name));
     let parameters = own.map(|p| format!(", {}: &{}", p.name, array_type(p, style)));

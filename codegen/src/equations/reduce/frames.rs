@@ -7,7 +7,7 @@ use super::*;
 ///
 /// From the tips to the base: x along the common normal to the axis of the first child with the most descendants, the
 /// origin at the normal's foot.
-pub(super) fn choose_frames(model: &Model<Dd>, lever: f64, choice: &Choice) -> Vec<Transform<Dd>> {
+pub(super) fn choose_frames(model: &Model<Dd>, lever: f64, choice: &FreeTerms) -> Vec<Transform<Dd>> {
     let n = model.bodies.len();
     let mut size = vec![1usize; n];
     for i in (0..n).rev() {

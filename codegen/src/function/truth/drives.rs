@@ -58,7 +58,7 @@ fn is_formulated(drives: &[Drive<Dd>]) -> bool {
 }
 
 /// What the inputs make.
-struct Motion {
+struct InputMotion {
     qdd: Vec<Magnitude>,
     /// Of the joints.
     tau: Vec<Magnitude>,
@@ -68,7 +68,7 @@ struct Motion {
     rates: Vec<Magnitude>,
 }
 
-fn motion(at: &Chapter<'_>) -> Option<Motion> {
+fn motion(at: &Chapter<'_>) -> Option<InputMotion> {
     let model = at.drives.filter(|model| is_formulated(&model.drives))?;
     let (x, u) = (at.get(Quantity::DriveState), at.get(Quantity::DriveInput));
     let bodies = at.with_rotors(reference::mass_matrix(&at.tree, at.q()));
@@ -83,7 +83,7 @@ fn motion(at: &Chapter<'_>) -> Option<Motion> {
             rigid.push(shaft);
             continue;
         }
-        let found = Elastic::new(drive, &shaft, own);
+        let found = ElasticDriveState::new(drive, &shaft, own);
         if let Some(gears) = drive.shaft_inertia {
             h_matrix += &shaft.row * shaft.row.transpose() * Magnitude::new(gears);
         }
@@ -102,7 +102,7 @@ fn motion(at: &Chapter<'_>) -> Option<Motion> {
         torques.push(torque);
         rates.extend(own);
     }
-    Some(Motion { qdd: list(&qdd), tau, torques, rates })
+    Some(InputMotion { qdd: list(&qdd), tau, torques, rates })
 }
 
 /// q̈ of H q̈ + h = Nᵀ r M, and M and ẋ of each rigid drive.
@@ -219,15 +219,15 @@ impl Shaft {
 }
 
 /// An elastic drive at a state.
-struct Elastic {
+struct ElasticDriveState {
     /// What it exerts on its joints, over their ratios.
     torque: Magnitude,
     actuator_torque: Magnitude,
     rates: Vec<Magnitude>,
 }
 
-impl Elastic {
-    fn new(drive: &Drive<Dd>, shaft: &Shaft, x: &[Magnitude]) -> Elastic {
+impl ElasticDriveState {
+    fn new(drive: &Drive<Dd>, shaft: &Shaft, x: &[Magnitude]) -> ElasticDriveState {
         let own = drive.actuator.states();
         let start = match &drive.actuator {
             Actuator::Motor(_) => [x[0], x[1]],
@@ -261,6 +261,6 @@ impl Elastic {
         for k in 1..stages.len() {
             rates.extend([shafts[k][1], (torques[k - 1] - taken[k]) / stages[k].inertia()]);
         }
-        Elastic { torque: torques[torques.len() - 1], actuator_torque, rates }
+        ElasticDriveState { torque: torques[torques.len() - 1], actuator_torque, rates }
     }
 }

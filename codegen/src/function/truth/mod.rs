@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use std::collections::BTreeMap;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::model::Model;
-use straightline_core::reference::{CentreOfMassFrame, CentreOfMassTree, ExtendedPosition, Joint};
+use straightline_core::reference::{CentreOfMassFrame, CentreOfMassTree, ExtendedPosition, ReferenceJoint};
 use straightline_core::{Dd, Real};
 
 mod drives;
@@ -68,7 +68,7 @@ impl<'a> Chapter<'a> {
         }
         let tree = with_sizes(tree);
         // the coordinates of a free link are parts of vectors, its attitude one of a rotation
-        for link in tree.links.iter().filter(|link| link.joint == Joint::Free) {
+        for link in tree.links.iter().filter(|link| link.joint == ReferenceJoint::Free) {
             for (quantity, x) in &mut sized {
                 match quantity {
                     Quantity::Configuration => {

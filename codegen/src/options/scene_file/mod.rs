@@ -2,14 +2,14 @@
 
 mod reader;
 
-use super::value::Settings;
+use super::value::GivenOptions;
 use super::Options;
 use crate::description::messages;
 use crate::description::reader::LARGEST_FILE;
 use crate::description::table::{parse, TomlTable};
 use crate::diagnostic::{Diagnostics, Source};
 use crate::function::Function;
-use crate::scene::{check, Base, Contacts, Scene};
+use crate::scene::{check, Base, Scene, SceneContacts};
 
 /// Those of the tables of which there may be several: `[[payload]]`.
 pub const LISTS: &[&str] = &["contact", "loop", "mode", "payload", "parameter", "drive", "flexible"];
@@ -20,19 +20,19 @@ pub struct SceneFile {
     /// The scene.
     pub scene: Scene,
     /// The options.
-    pub settings: Settings,
+    pub settings: GivenOptions,
 }
 
 impl SceneFile {
     /// These options with what the file says in their place, and with its scene. Levels of warnings that they have count before
     /// those of the file.
     pub fn into_options(self, options: Options) -> Options {
-        self.with(&Settings::default(), options)
+        self.with(&GivenOptions::default(), options)
     }
 
     /// The same, where `own` counts before what the file says. Where neither names functions, a base that moves as it is told has all but
     /// forward dynamics.
-    pub fn with(mut self, own: &Settings, mut options: Options) -> Options {
+    pub fn with(mut self, own: &GivenOptions, mut options: Options) -> Options {
         self.settings.extend(own);
         let levels = std::mem::take(&mut options.reporting.levels);
         let is_moving = self.scene.base == Base::Moving;
@@ -75,7 +75,7 @@ pub fn read_partly(source: &Source) -> SceneFile {
     let mut file = read_text(source, &mut found).unwrap_or_default();
     if found.has_errors() {
         // modes name contacts: those that could not be read would be missed
-        file.scene.contacts = Contacts::default();
+        file.scene.contacts = SceneContacts::default();
     }
     found.sort();
     file.scene.places.keep(found);

@@ -9,11 +9,11 @@ use crate::description::table::TomlTable;
 use crate::description::Noted;
 use crate::diagnostic::{Diagnostics, Front, Source};
 use crate::function::Function;
-use crate::options::table::Row;
+use crate::options::table::OptionRow;
 use crate::options::value;
 use crate::scene::{
-    messages as say, Base, Budget, Coulomb, Gravity, Interval, JointRanges, MaxError, Parameter, Part, Payload, Places,
-    Ranges, Scene, Selection, Zero,
+    messages as say, Base, Budget, CoulombForm, Gravity, InputRange, JointRanges, MaxError, Parameter, Payload, Places,
+    Ranges, ResultPart, Scene, Selection, Zero,
 };
 use options::options_of;
 use std::ops::Range;
@@ -26,8 +26,8 @@ const BUDGET: &[&str] =
     &["max_flops", "max_sincos", "max_live", "max_stack_bytes", "max_code_bytes", "max_error", "mixed_precision"];
 const BASES: [(&str, Base); 3] = [("fixed", Base::Fixed), ("floating", Base::Floating), ("moving", Base::Moving)];
 /// A place in the list of effects: that its speed is still to be read.
-const SMOOTH: Coulomb = Coulomb::Smooth(0.0);
-const COULOMB: [(&str, Coulomb); 3] = [("off", Coulomb::Off), ("sign", Coulomb::Sign), ("smooth", SMOOTH)];
+const SMOOTH: CoulombForm = CoulombForm::Smooth(0.0);
+const COULOMB: [(&str, CoulombForm); 3] = [("off", CoulombForm::Off), ("sign", CoulombForm::Sign), ("smooth", SMOOTH)];
 
 /// What a `[[parameter]]` is of.
 #[derive(Clone, Copy)]
@@ -55,7 +55,7 @@ pub fn read(source: &Source, top: &TomlTable, diagnostics: &mut Diagnostics) -> 
 }
 
 /// How a table is read.
-type Read<'a> = fn(&mut SceneReader<'a>, &TomlTable);
+type TableReading<'a> = fn(&mut SceneReader<'a>, &TomlTable);
 
 /// A scene file that is being read.
 struct SceneReader<'a> {
@@ -66,7 +66,7 @@ struct SceneReader<'a> {
 impl<'a> SceneReader<'a> {
     fn read(&mut self, top: &TomlTable) {
         self.reader.check_keys(top, &[LISTS, TABLES].concat());
-        let tables: [(&str, Read<'a>); 8] = [
+        let tables: [(&str, TableReading<'a>); 8] = [
             ("outputs", Self::outputs),
             ("hold", Self::hold),
             ("zero", Self::zero),
@@ -149,7 +149,7 @@ impl<'a> SceneReader<'a> {
         self.contact_functions(table);
         let whole = self.file.settings.value("functions").cloned();
         let all_are_known = whole.is_some() || !table.has("functions");
-        let mut functions: Vec<Function> = whole.iter().flat_map(value::Value::choices).collect();
+        let mut functions: Vec<Function> = whole.iter().flat_map(value::OptionValue::choices).collect();
         for function in Function::known() {
             let name = function.name();
             let owner = format!("`{name}` of [outputs]");
@@ -159,14 +159,15 @@ impl<'a> SceneReader<'a> {
             self.note(&path, &wanted.span);
             let joints = self.names(&format!("{path}.joints"), &wanted, "joints", "joint");
             let frames = self.names(&format!("{path}.frames"), &wanted, "frames", "frame");
-            let part = self.at(&path, &wanted, "part", |reader, table, key| reader.word_at(table, key, &Part::WORDS));
+            let part =
+                self.at(&path, &wanted, "part", |reader, table, key| reader.word_at(table, key, &ResultPart::WORDS));
             let part = part.unwrap_or_default();
             self.file.scene.outputs.insert(function, Selection { joints, frames, part });
             functions.push(function);
         }
         if all_are_known && !functions.is_empty() {
-            let row = Row::find("functions", |_| true).expect("functions are an option");
-            let value = value::Value::of_choices(functions);
+            let row = OptionRow::find("functions", |_| true).expect("functions are an option");
+            let value = value::OptionValue::of_choices(functions);
             self.file.settings.give(row, value, Front::CommandLine).expect("functions have names");
         }
     }
@@ -238,13 +239,13 @@ impl<'a> SceneReader<'a> {
         let form = self.reader.word_at(table, "coulomb", &COULOMB);
         let speed = self.reader.real_at(table, "coulomb_speed", Range64::Finite);
         let coulomb = match (form.as_ref().map(|f| f.value).unwrap_or_default(), &speed) {
-            (Coulomb::Smooth(_), Some(speed)) => Coulomb::Smooth(speed.value),
-            (Coulomb::Smooth(_), None) => {
+            (CoulombForm::Smooth(_), Some(speed)) => CoulombForm::Smooth(speed.value),
+            (CoulombForm::Smooth(_), None) => {
                 // a speed that could not be read was complained of
                 if let Some(form) = form.filter(|_| !table.has("coulomb_speed")) {
                     self.reader.diagnostics.push(say::coulomb_speed_missing().at(&form.place));
                 }
-                Coulomb::Sign
+                CoulombForm::Sign
             }
             (form, Some(speed)) => {
                 self.reader.diagnostics.push(say::coulomb_speed_alone().at(&speed.place));
@@ -328,20 +329,20 @@ impl<'a> SceneReader<'a> {
     }
 
     /// `[lower, upper]`, one number for both sides of zero, or `"unlimited"`.
-    fn range(&mut self, table: &TomlTable, key: &str, path: &str) -> Option<Interval> {
+    fn range(&mut self, table: &TomlTable, key: &str, path: &str) -> Option<InputRange> {
         let (value, span) = table.get(key)?;
         self.note(path, &span);
         match value {
             DeValue::String(_) => {
-                self.reader.word_at(table, key, &[("unlimited", Interval::UNLIMITED)]).map(|word| word.value)
+                self.reader.word_at(table, key, &[("unlimited", InputRange::UNLIMITED)]).map(|word| word.value)
             }
             DeValue::Array(_) => {
                 let [lower, upper] =
                     self.reader.reals_at(table, key, "two numbers, least and greatest", Range64::Limit)?;
-                Some(Interval { lower, upper })
+                Some(InputRange { lower, upper })
             }
             DeValue::Integer(_) | DeValue::Float(_) => {
-                self.reader.real_at(table, key, Range64::Limit).map(|bound| Interval::within(bound.value))
+                self.reader.real_at(table, key, Range64::Limit).map(|bound| InputRange::within(bound.value))
             }
             _ => {
                 let forms = "`[-1.0, 2.0]`, `2.0` for both sides of zero, or `\"unlimited\"`";
@@ -400,7 +401,7 @@ impl<'a> SceneReader<'a> {
     fn budgets(&mut self, table: &TomlTable) {
         let names: Vec<&str> = Function::known().map(Function::name).collect();
         self.reader.check_keys(table, &names);
-        let wanted: Option<Vec<Function>> = self.file.settings.value("functions").map(value::Value::choices);
+        let wanted: Option<Vec<Function>> = self.file.settings.value("functions").map(value::OptionValue::choices);
         for function in Function::known() {
             let name = function.name();
             let Some(limits) = self.reader.table_at(table, name, &format!("[budget.{name}]")) else { continue };

@@ -1,7 +1,7 @@
 //! The equations of a contact mode, over any scalar.
 
-use super::{ridge, Closed, Mode};
-use crate::equations::bind::Bound;
+use super::{ridge, ClosedContact, Mode};
+use crate::equations::bind::BoundRobot;
 use crate::equations::Robot;
 use crate::function::{ContactFunction, ForwardDynamicsMethod, Function};
 use crate::options::Options;
@@ -19,7 +19,7 @@ pub(super) type Added<T> = BTreeMap<String, Vec<T>>;
 
 /// Which of their forms equations take.
 #[derive(Clone, Copy)]
-pub(super) struct Form<T> {
+pub(super) struct EquationForm<T> {
     /// By the reduced robot, where it serves.
     pub reduced: bool,
     /// The surfaces of objects over this scalar.
@@ -29,8 +29,8 @@ pub(super) struct Form<T> {
 }
 
 /// A contact, how its frame moves, and what it constrains.
-struct Traced<'a, T> {
-    closed: Option<&'a Closed<'a>>,
+struct TracedContact<'a, T> {
+    closed: Option<&'a ClosedContact<'a>>,
     contact: Contact<T>,
     motion: RelativeMotion<T>,
     constrained: FunctionalCoordinates<T>,
@@ -43,8 +43,8 @@ pub(super) fn system<T: Real>(
     robot: &Robot,
     options: &Options,
     mode: &Mode,
-    bound: &Bound<T>,
-    form: Form<T>,
+    bound: &BoundRobot<T>,
+    form: EquationForm<T>,
     added: &Added<T>,
     (qdd, force): (&[T], &[T]),
 ) -> Vec<Vec<T>> {
@@ -77,18 +77,18 @@ pub(super) fn system<T: Real>(
 }
 
 /// A function of the robot over these arguments, by its reduced form where it has one.
-fn of_robot<T: Real>(bound: &Bound<T>, reduced: bool, function: Function, arguments: &[Vec<T>]) -> Vec<T> {
+fn of_robot<T: Real>(bound: &BoundRobot<T>, reduced: bool, function: Function, arguments: &[Vec<T>]) -> Vec<T> {
     let method = ForwardDynamicsMethod::Factorisation;
     function.evaluate_on(&bound.forms(reduced, &[], method), arguments)
 }
 
 /// What the equations of all functions have in common.
-struct Given<'a, T> {
+struct CommonEquations<'a, T> {
     options: &'a Options,
-    bound: &'a Bound<T>,
+    bound: &'a BoundRobot<T>,
     reduced: bool,
     added: &'a Added<T>,
-    traced: Vec<Traced<'a, T>>,
+    traced: Vec<TracedContact<'a, T>>,
     constrained: FunctionalCoordinates<T>,
     epsilon: T,
 }
@@ -99,14 +99,14 @@ pub(super) fn equations<T: Real>(
     options: &Options,
     mode: &Mode,
     function: ContactFunction,
-    form: Form<T>,
-    bound: &Bound<T>,
+    form: EquationForm<T>,
+    bound: &BoundRobot<T>,
     added: &Added<T>,
 ) -> Vec<Vec<T>> {
     let traced = contacts(robot, mode, bound, added, form);
     let constrained = traced.iter().fold(FunctionalCoordinates::default(), |all, t| all.and(t.constrained.clone()));
     let epsilon = T::constant(Dd::from(ridge(options.scalar)));
-    let given = Given { options, bound, reduced: form.reduced, added, traced, constrained, epsilon };
+    let given = CommonEquations { options, bound, reduced: form.reduced, added, traced, constrained, epsilon };
     let list = |c: FunctionalCoordinates<T>| vec![c.value, c.rate, c.jacobian.concat(), c.bias];
     match function {
         ContactFunction::ConstrainedCoordinates => list(given.constrained),
@@ -119,7 +119,7 @@ pub(super) fn equations<T: Real>(
     }
 }
 
-impl<T: Real> Given<'_, T> {
+impl<T: Real> CommonEquations<'_, T> {
     fn q(&self) -> &Vec<T> {
         &self.bound.arguments[0]
     }
@@ -149,19 +149,19 @@ impl<T: Real> Given<'_, T> {
     }
 
     fn free(&self) -> FunctionalCoordinates<T> {
-        let of = |t: &Traced<T>| Some(alg::functional_coordinates(&t.contact, &t.motion, &t.closed?.free));
+        let of = |t: &TracedContact<T>| Some(alg::functional_coordinates(&t.contact, &t.motion, &t.closed?.free));
         self.traced.iter().filter_map(of).fold(FunctionalCoordinates::default(), FunctionalCoordinates::and)
     }
 
     /// The rows in which reactions act, if those are others.
     fn applied(&self) -> Option<Vec<Vec<T>>> {
         let slides = self.traced.iter().any(|t| t.closed.is_some_and(|c| c.slides));
-        let of = |t: &Traced<T>| alg::applied_rows(&t.contact, &t.motion, &t.constrained);
+        let of = |t: &TracedContact<T>| alg::applied_rows(&t.contact, &t.motion, &t.constrained);
         slides.then(|| self.traced.iter().flat_map(of).collect())
     }
 
     fn forward_dynamics(&self, is_driven: bool) -> Vec<Vec<T>> {
-        let Given { bound, constrained, epsilon, .. } = self;
+        let CommonEquations { bound, constrained, epsilon, .. } = self;
         let bias = self.of_robot(Function::BiasForce, &[self.q().clone(), self.qd().clone()]);
         let (supports, own_rates) = supports(&self.traced, constrained, self.options, self.added);
         let applied = self.applied();
@@ -182,7 +182,7 @@ impl<T: Real> Given<'_, T> {
     }
 
     fn inverse_dynamics(&self) -> Vec<Vec<T>> {
-        let Given { bound, constrained, epsilon, added, .. } = self;
+        let CommonEquations { bound, constrained, epsilon, added, .. } = self;
         let qdd = &bound.arguments[2];
         let inverse = self.of_robot(Function::InverseDynamics, &[self.q().clone(), self.qd().clone(), qdd.clone()]);
         let sdd_free = added.get("sdd_free").cloned().unwrap_or_default();
@@ -194,7 +194,7 @@ impl<T: Real> Given<'_, T> {
     }
 
     fn impact(&self) -> Vec<Vec<T>> {
-        let Given { constrained, epsilon, added, .. } = self;
+        let CommonEquations { constrained, epsilon, added, .. } = self;
         let mut struck = vec![Struck::Rigid; constrained.len()];
         let mut places = Vec::new();
         let mut first = 0;
@@ -221,7 +221,7 @@ impl<T: Real> Given<'_, T> {
     }
 
     fn projection(self) -> Vec<Vec<T>> {
-        let Given { constrained, traced, .. } = &self;
+        let CommonEquations { constrained, traced, .. } = &self;
         let deviations = deviations(traced, constrained);
         let is_rigid = rigid_rows(traced);
         let kept = |list: &[T]| list.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| *k.0).collect::<Vec<T>>();
@@ -242,7 +242,7 @@ impl<T: Real> Given<'_, T> {
 
 /// What the rows stand on, and the rates of the objects' own coordinates.
 fn supports<T: Real>(
-    traced: &[Traced<T>],
+    traced: &[TracedContact<T>],
     constrained: &FunctionalCoordinates<T>,
     options: &Options,
     added: &Added<T>,
@@ -280,7 +280,7 @@ fn supports<T: Real>(
 
 /// How far the rows are from where they are held: what sticks is held where that has happened, which is not known here, so that
 /// its rate alone counts.
-fn deviations<T: Real>(traced: &[Traced<T>], constrained: &FunctionalCoordinates<T>) -> Vec<T> {
+fn deviations<T: Real>(traced: &[TracedContact<T>], constrained: &FunctionalCoordinates<T>) -> Vec<T> {
     let by_friction = traced.iter().flat_map(|t| match t.closed {
         Some(closed) => closed.constrained.iter().map(|c| !closed.item.constrained.contains(c)).collect(),
         None => vec![false; t.constrained.len()],
@@ -289,8 +289,8 @@ fn deviations<T: Real>(traced: &[Traced<T>], constrained: &FunctionalCoordinates
 }
 
 /// Rows that are not on an object that gives way.
-fn rigid_rows<T: Real>(traced: &[Traced<T>]) -> Vec<bool> {
-    let of = |t: &Traced<T>| {
+fn rigid_rows<T: Real>(traced: &[TracedContact<T>]) -> Vec<bool> {
+    let of = |t: &TracedContact<T>| {
         let yields = t.environment.as_ref().and(t.closed).map(|closed| distance_row(&closed.constrained));
         (0..t.constrained.len()).map(|k| yields != Some(k)).collect::<Vec<bool>>()
     };
@@ -306,10 +306,10 @@ fn distance_row(constrained: &[Coordinate]) -> usize {
 fn contacts<'a, T: Real>(
     robot: &Robot,
     mode: &'a Mode,
-    bound: &Bound<T>,
+    bound: &BoundRobot<T>,
     added: &Added<T>,
-    form: Form<T>,
-) -> Vec<Traced<'a, T>> {
+    form: EquationForm<T>,
+) -> Vec<TracedContact<'a, T>> {
     let (q, qd) = (&bound.arguments[0], &bound.arguments[1]);
     let frame = |name: &str| bound.model.frame(name).expect("the frames of contacts were checked").clone();
     let mut all = Vec::new();
@@ -367,13 +367,13 @@ fn contacts<'a, T: Real>(
             };
             e.over(&values)
         });
-        all.push(Traced { closed: Some(closed), contact, motion, constrained, environment });
+        all.push(TracedContact { closed: Some(closed), contact, motion, constrained, environment });
     }
     for a_loop in mode.loops {
         let contact = a_loop.over(frame(&a_loop.frame), frame(&a_loop.with));
         let motion = alg::relative_motion(&bound.model, &contact, q, qd);
         let constrained = alg::functional_coordinates(&contact, &motion, &contact.constrained);
-        all.push(Traced { closed: None, contact, motion, constrained, environment: None });
+        all.push(TracedContact { closed: None, contact, motion, constrained, environment: None });
     }
     all
 }

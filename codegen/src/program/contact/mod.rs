@@ -6,17 +6,17 @@
 
 mod equations;
 
-use crate::equations::bind::{is_optional, Bound};
+use crate::equations::bind::{is_optional, BoundRobot};
 use crate::equations::Robot;
 use crate::function::{ContactFunction, ForwardDynamicsMethod, Function, Quantity};
 use crate::identifier::module_name;
-use crate::options::{Forms, Optimisations, Options};
+use crate::options::{FormChoices, Optimisations, Options};
 use crate::program::choose::choose;
 use crate::program::equivalence::{self, Disagreement, Plainer};
 use crate::program::passed;
 use crate::scene::contact::{ContactItem, EnvironmentKind, LoopItem, ModeItem, SurfaceItem};
 use crate::scene::Scene;
-use equations::{Added, Form};
+use equations::{Added, EquationForm};
 use straightline_core::algorithms::drive_states;
 use straightline_core::contact::Coordinate;
 use straightline_core::model::Model;
@@ -35,14 +35,14 @@ pub struct Mode<'a> {
     /// Its name in the scene.
     pub name: String,
     /// Its contacts, in order.
-    pub contacts: Vec<Closed<'a>>,
+    pub contacts: Vec<ClosedContact<'a>>,
     /// The loops of the robot, which every mode has.
     pub loops: &'a [LoopItem],
 }
 
 /// A contact that is closed in a mode.
 #[derive(Clone, Debug)]
-pub struct Closed<'a> {
+pub struct ClosedContact<'a> {
     /// The contact.
     pub item: &'a ContactItem,
     /// What it constrains in this mode.
@@ -64,7 +64,7 @@ impl<'a> Mode<'a> {
             let item = contacts.contacts.iter().find(|c| c.name == *name).expect("the contacts of modes were checked");
             let sticks = mode.sticking.contains(name);
             let also = |c: &Coordinate| sticks && matches!(c, Coordinate::Px | Coordinate::Py);
-            Closed {
+            ClosedContact {
                 item,
                 constrained: Coordinate::ALL.into_iter().filter(|c| item.constrained.contains(c) || also(c)).collect(),
                 free: item.free.iter().copied().filter(|c| !also(c)).collect(),
@@ -104,7 +104,7 @@ impl<'a> Mode<'a> {
     }
 }
 
-impl Closed<'_> {
+impl ClosedContact<'_> {
     /// Whether its object has a coordinate of its own, and whether a mass is there to be struck.
     fn of_environment(&self) -> (bool, bool) {
         use EnvironmentKind::{BothSides, Cushioned, Mass, TwoMasses};
@@ -162,8 +162,8 @@ fn checked(
 }
 
 /// Over expressions every surface is there.
-fn traced_form(optimisations: Optimisations) -> Form<Expr> {
-    Form { reduced: optimisations.reduced, surface: SurfaceItem::traced, falls: None }
+fn traced_form(optimisations: Optimisations) -> EquationForm<Expr> {
+    EquationForm { reduced: optimisations.reduced, surface: SurfaceItem::traced, falls: None }
 }
 
 /// The results of one function of a mode by the robot's own parameters, over any scalar, without a graph: `given` stands for the inputs of
@@ -190,7 +190,7 @@ fn plainly<T: Real>(
     function: ContactFunction,
     given: &dyn Fn(&Port) -> Vec<T>,
     prepare: &dyn Fn(&mut Model<T>) -> Option<T>,
-) -> Option<(Bound<T>, Form<T>, Added<T>)> {
+) -> Option<(BoundRobot<T>, EquationForm<T>, Added<T>)> {
     if mode.contacts.iter().any(|c| c.item.surface.over::<T>().is_none()) {
         return None;
     }
@@ -199,7 +199,7 @@ fn plainly<T: Real>(
     let mut bound = options.scene.bind(own, robot, &inputs);
     let falls = prepare(&mut bound.model);
     let added = added_ports(function, mode, &robot.model).into_iter().map(|p| (p.name.clone(), given(&p))).collect();
-    let form = Form { reduced: false, surface: |s: &SurfaceItem| s.over().expect("asked for above"), falls };
+    let form = EquationForm { reduced: false, surface: |s: &SurfaceItem| s.over().expect("asked for above"), falls };
     Some((bound, form, added))
 }
 
@@ -252,7 +252,7 @@ fn chosen(robot: &Robot, options: &Options, optimisations: Optimisations) -> Opt
     let factorised = Options { forward_dynamics: ForwardDynamicsMethod::Factorisation, ..options.clone() };
     (optimisations.chosen && optimisations.reduced).then(|| {
         // contact frames are described in the frames that any robot takes
-        let forms = Forms { origins: false, tips: false, ..optimisations.forms };
+        let forms = FormChoices { origins: false, tips: false, ..optimisations.forms };
         let optimisations = Optimisations { chosen: false, forms, ..optimisations };
         choose(robot, &[], Function::ForwardDynamics, &factorised, optimisations)
     })
@@ -300,7 +300,7 @@ pub fn system(robot: &Robot, options: &Options, mode: &Mode, optimisations: Opti
 }
 
 /// A system with its flags of rows that yield.
-pub(crate) type System = (Graph, Vec<bool>);
+pub(crate) type YieldingSystem = (Graph, Vec<bool>);
 
 /// [`system`] in the form with the fewest operations that agrees with its plain equations.
 ///
@@ -310,7 +310,7 @@ pub(crate) fn checked_system(
     robot: &Robot,
     options: &Options,
     mode: &Mode,
-) -> Result<(System, Option<Plainer>), Disagreement> {
+) -> Result<(YieldingSystem, Option<Plainer>), Disagreement> {
     let plain = || system(robot, options, mode, options.optimisations().plain()).0;
     options.optimisations().first_that_agrees(|optimisations| {
         let made = system(robot, options, mode, optimisations);

@@ -5,7 +5,7 @@
 //! any of the bound's own rules. A bound of accelerations is asked about accelerations that are off by a known amount, too: those of
 //! other forces, one after the other, where it is hardly greater than what they are off by, and any others.
 
-use super::{inputs, Disagreement, State, States, STATES};
+use super::{inputs, Disagreement, PortState, States, STATES};
 use crate::equations::Robot;
 use crate::function::Quantity;
 use crate::options::Options;
@@ -14,7 +14,7 @@ use straightline_core::random::Random;
 use straightline_core::Dd;
 use straightline_graph::certify::companion::OF_ERROR;
 use straightline_graph::certify::search::computed_at;
-use straightline_graph::certify::Format;
+use straightline_graph::certify::FloatFormat;
 use straightline_graph::expr::{evaluate, Graph, NodeId, Op, Port};
 use straightline_graph::rounding::backwards;
 use straightline_graph::{element_of, Scalar};
@@ -76,9 +76,9 @@ pub(crate) fn of_acceleration_bound(
         }
         let found = computed_at(graph, options.scalar, &as_f64(&inputs(graph, &state)));
         let found = solution(graph, found.into_iter().map(Dd::from).collect());
-        let asked = |solution: &State| {
+        let asked = |solution: &PortState| {
             let solution = short(solution.clone(), options.scalar);
-            let given: State = state.iter().chain(&solution).map(|(n, x)| (n.clone(), x.clone())).collect();
+            let given: PortState = state.iter().chain(&solution).map(|(n, x)| (n.clone(), x.clone())).collect();
             let bounds = computed_at(bound, options.scalar, &as_f64(&inputs(bound, &given)));
             let bounds = by_port(&bound.outputs, bounds);
             for port in &graph.outputs {
@@ -116,7 +116,7 @@ pub(crate) fn of_acceleration_bound(
         let is_square = columns.iter().all(|c| c.len() == forces.len());
         let Some(system) = system.filter(|_| is_square) else { continue };
         let short_found = short(found, options.scalar);
-        let given: State = state.iter().chain(&short_found).map(|(n, x)| (n.clone(), x.clone())).collect();
+        let given: PortState = state.iter().chain(&short_found).map(|(n, x)| (n.clone(), x.clone())).collect();
         let least = least_provable(system, options.scalar, &as_f64(&inputs(system, &given)));
         let most = &of_found[&format!("qdd{OF_ERROR}")];
         for (k, most) in most.iter().enumerate() {
@@ -136,7 +136,7 @@ pub(crate) fn of_acceleration_bound(
 }
 
 /// All numbers off by up to a part of the greatest of their port.
-fn off_by(part: f64, solution: &State, random: &mut Random) -> State {
+fn off_by(part: f64, solution: &PortState, random: &mut Random) -> PortState {
     let off = |x: &Vec<Dd>, random: &mut Random| {
         let most = x.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
         x.iter().map(|x| *x + Dd::from(part * most * random.symmetric(1.0))).collect()
@@ -173,7 +173,7 @@ fn disagreement(name: &str, result: String, difference: f64) -> Disagreement {
     Disagreement { program: format!("{name}_error_bound"), result, difference, plain: None }
 }
 
-fn short(state: State, scalar: Scalar) -> State {
+fn short(state: PortState, scalar: Scalar) -> PortState {
     let number = |x: Dd| Dd::from(scalar.nearest(x));
     state.into_iter().map(|(n, x)| (n, x.into_iter().map(number).collect())).collect()
 }
@@ -188,7 +188,7 @@ fn by_port<T>(ports: &[Port], results: Vec<T>) -> BTreeMap<String, Vec<T>> {
     ports.iter().map(|port| (port.name.clone(), results.by_ref().take(port.len()).collect())).collect()
 }
 
-fn solution(graph: &Graph, results: Vec<Dd>) -> State {
+fn solution(graph: &Graph, results: Vec<Dd>) -> PortState {
     by_port(&graph.outputs, results)
 }
 
@@ -199,11 +199,11 @@ fn least_provable(graph: &Graph, scalar: Scalar, given: &[f64]) -> Vec<f64> {
     let mut values = vec![0.0; graph.ops.len()];
     let computed = computed_at(&Graph { results: numbers.clone(), ..graph.clone() }, scalar, given);
     numbers.iter().zip(computed).for_each(|(id, x)| values[id.index()] = x);
-    let format = Format::of(scalar);
+    let format = FloatFormat::of(scalar);
     let own: Vec<f64> = graph
         .ids()
         .map(|id| {
-            let of_width = Format::of(graph.precision(id, scalar).held);
+            let of_width = FloatFormat::of(graph.precision(id, scalar).held);
             match graph.op(id) {
                 Op::Constant(c) => of_width.constant(c.value()).1,
                 // half an ulp, whatever the kernel

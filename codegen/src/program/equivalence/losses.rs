@@ -1,6 +1,6 @@
 //! What a program loses to rounding, beside what the plain equations lose.
 
-use super::{inputs, of_ports, Disagreement, State, LOSSES};
+use super::{inputs, of_ports, Disagreement, PortState, LOSSES};
 use crate::equations::Robot;
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::options::Options;
@@ -11,7 +11,12 @@ use straightline_graph::expr::{evaluate, Graph};
 use straightline_graph::{element_of, Scalar};
 
 /// Natural scales of accelerations: |H⁻¹| times those of the forces that make them, given with what the equations of motion are off by.
-pub(super) fn sizes_of_accelerations(robot: &Robot, options: &Options, state: &State, off: &[Magnitude]) -> Vec<f64> {
+pub(super) fn sizes_of_accelerations(
+    robot: &Robot,
+    options: &Options,
+    state: &PortState,
+    off: &[Magnitude],
+) -> Vec<f64> {
     let ports = options.scene.ports(Function::ForwardDynamics, &robot.model);
     let bound = options.scene.bind(Function::ForwardDynamics, robot, &of_ports(&ports, state, |x| x));
     let h = Function::MassMatrix.evaluate(&bound.model, &[], ForwardDynamicsMethod::ArticulatedBody, &bound.arguments);
@@ -44,11 +49,11 @@ impl Losses {
     pub fn add<T: Real + Into<f64>>(
         &mut self,
         graph: &Graph,
-        (state, found): (&State, &[Dd]),
+        (state, found): (&PortState, &[Dd]),
         sizes: &[f64],
-        plain: impl Fn(&State) -> Vec<T>,
+        plain: impl Fn(&PortState) -> Vec<T>,
     ) {
-        let rounded: State =
+        let rounded: PortState =
             state.iter().map(|(n, x)| (n.clone(), x.iter().map(|x| rounded::<T>(*x)).collect())).collect();
         let wide = inputs(graph, &rounded);
         let exact = match rounded == *state {

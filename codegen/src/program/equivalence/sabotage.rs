@@ -5,11 +5,11 @@ use std::cell::RefCell;
 use straightline_graph::expr::Graph;
 
 type Break = Box<dyn FnMut(&str, Graph) -> Graph>;
-type Form = Box<dyn FnMut(Robot) -> Robot>;
+type SabotageForm = Box<dyn FnMut(Robot) -> Robot>;
 
 thread_local! {
     static BREAK: RefCell<Option<Break>> = const { RefCell::new(None) };
-    static FORM: RefCell<Option<Form>> = const { RefCell::new(None) };
+    static FORM: RefCell<Option<SabotageForm>> = const { RefCell::new(None) };
 }
 
 /// Runs `work` while every chosen form of the robot goes through `broken`.

@@ -1,6 +1,6 @@
 //! The states at which programs and plain equations are compared.
 
-use super::State;
+use super::PortState;
 use crate::equations::bind::constructed;
 use crate::equations::Robot;
 use crate::function::Quantity;
@@ -27,7 +27,7 @@ pub(super) struct States<'a> {
 
 /// Where a robot stands.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Place {
+pub(super) enum StatePlace {
     /// Within the limits of its joints.
     Anywhere,
     /// Whatever the limits.
@@ -37,17 +37,17 @@ pub(super) enum Place {
     Zero,
 }
 
-impl Place {
+impl StatePlace {
     /// Coordinates or rates from anywhere, brought there.
     fn of(self, quantity: Quantity, values: Vec<f64>, random: &mut Random) -> Vec<f64> {
         let times = |factor: f64| values.iter().map(|x| factor * x).collect();
         match self {
-            Place::Beyond if quantity == Quantity::Configuration => {
+            StatePlace::Beyond if quantity == Quantity::Configuration => {
                 values.iter().map(|_| random.symmetric(PI)).collect()
             }
-            Place::Anywhere | Place::Beyond => values,
-            Place::NearZero => times(NEAR),
-            Place::Zero => times(0.0),
+            StatePlace::Anywhere | StatePlace::Beyond => values,
+            StatePlace::NearZero => times(NEAR),
+            StatePlace::Zero => times(0.0),
         }
     }
 }
@@ -57,15 +57,15 @@ impl<'a> States<'a> {
         States { robot, options, random: Random(SEED), count: 0 }
     }
 
-    pub fn next(&mut self, ports: &[Port]) -> State {
-        self.placed(ports, Place::Anywhere)
+    pub fn next(&mut self, ports: &[Port]) -> PortState {
+        self.placed(ports, StatePlace::Anywhere)
     }
 
-    pub fn placed(&mut self, ports: &[Port], place: Place) -> State {
+    pub fn placed(&mut self, ports: &[Port], place: StatePlace) -> PortState {
         let model = &self.robot.model;
         self.count += 1;
         let fast = self.count.is_multiple_of(2);
-        let mut state = State::new();
+        let mut state = PortState::new();
         let (mut plain, mut values) = (Vec::new(), Vec::new());
         for port in ports {
             if port.wrapper.is_some() {
@@ -84,7 +84,7 @@ impl<'a> States<'a> {
         for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| !j.kind.is_single()) {
             if let Some(q) = state.get_mut(&Quantity::Configuration.name()) {
                 let own = &mut q[joint.iq..joint.iq + joint.kind.nq()];
-                if place == Place::Zero {
+                if place == StatePlace::Zero {
                     own.iter_mut().zip(joint.kind.row().neutral).for_each(|(q, neutral)| *q = Dd::from(*neutral));
                 }
                 joint.kind.normalise(own);
@@ -104,7 +104,7 @@ impl<'a> States<'a> {
         }
     }
 
-    fn of_port(&mut self, port: &Port, fast: bool, place: Place) -> Vec<f64> {
+    fn of_port(&mut self, port: &Port, fast: bool, place: StatePlace) -> Vec<f64> {
         let ends = |ends: &[&str]| ends.iter().any(|end| port.name.ends_with(end));
         if ends(&["_environment", "_struck", "restitution"]) {
             return (0..port.len()).map(|_| 0.5 + self.random.unit()).collect();

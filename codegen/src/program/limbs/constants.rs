@@ -5,12 +5,12 @@
 
 use super::template::{same, LaneValue, Template};
 use straightline_core::Dd;
-use straightline_graph::expr::{Builder, NodeId, Op, RuleSet};
+use straightline_graph::expr::{GraphBuilder, NodeId, Op, RuleSet};
 
 /// The template with such constants formed, and known ones where they are the same for all limbs.
 pub(super) fn folded(template: Template, rules: RuleSet) -> Template {
     let Template { graph, mut lanes, first_lane, .. } = template;
-    let mut builder = Builder::new(rules, graph.inputs.clone());
+    let mut builder = GraphBuilder::new(rules, graph.inputs.clone());
     // of nodes that are constants of the limbs of a kind those
     let mut known: Vec<Option<(usize, Vec<Dd>)>> = Vec::with_capacity(graph.ops.len());
     let mut node: Vec<NodeId> = Vec::with_capacity(graph.ops.len());
@@ -66,7 +66,7 @@ fn combined<'a>(
 
 /// The node of constants of the limbs of a kind.
 fn constant(
-    builder: &mut Builder,
+    builder: &mut GraphBuilder,
     lanes: &mut Vec<(usize, LaneValue)>,
     first_lane: usize,
     kind: usize,

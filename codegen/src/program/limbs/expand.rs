@@ -10,7 +10,7 @@ use straightline_graph::expr::{Alike, Constant, Graph, NodeId, Note, Op, Port, S
 
 /// Where a node of the template is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Place {
+enum NodePlace {
     /// Once, before the limbs.
     Before,
     /// By the limbs of a kind.
@@ -21,16 +21,16 @@ enum Place {
 
 /// What a node of the template became.
 #[derive(Clone, Debug)]
-enum Written {
+enum Expanded {
     Once(NodeId),
     PerLimb(Vec<NodeId>),
 }
 
-struct Writer<'a> {
+struct ExpansionWriter<'a> {
     graph: &'a Graph,
     template: &'a Template,
     out: Graph,
-    written: Vec<Option<Written>>,
+    written: Vec<Option<Expanded>>,
     /// For look-ups only.
     sections: FxHashMap<Section, u32>,
 }
@@ -47,7 +47,7 @@ pub(super) fn written_out(
     let (wanted, outputs) = scene.select(function, model, 0);
     let places = places(graph, template);
     let inputs: Vec<Port> = graph.inputs[..graph.inputs.len() - 2].to_vec();
-    let mut writer = Writer {
+    let mut writer = ExpansionWriter {
         graph,
         template,
         out: Graph { inputs, outputs, ..Graph::default() },
@@ -63,17 +63,17 @@ pub(super) fn written_out(
     // what a limb takes of inputs and constants may stand before them
     let is_leaf = |id: NodeId| matches!(graph.op(id), Op::Input(_) | Op::Constant(_));
     let (leaves, others): (Vec<NodeId>, Vec<NodeId>) =
-        graph.ids().partition(|id| is_leaf(*id) && places[id.index()] == Place::Before);
+        graph.ids().partition(|id| is_leaf(*id) && places[id.index()] == NodePlace::Before);
     for id in leaves.into_iter().chain(others) {
         match places[id.index()] {
-            Place::Before => writer.once(id),
-            Place::Limb(kind) if is_early(id) => drop(writer.per_limb(id, kind)),
+            NodePlace::Before => writer.once(id),
+            NodePlace::Limb(kind) if is_early(id) => drop(writer.per_limb(id, kind)),
             _ => {}
         }
     }
     for kind in 0..template.first_bodies.len() {
         let mut rows = Vec::new();
-        for id in graph.ids().filter(|id| places[id.index()] == Place::Limb(kind)) {
+        for id in graph.ids().filter(|id| places[id.index()] == NodePlace::Limb(kind)) {
             let more = writer.per_limb(id, kind);
             if !matches!(graph.op(id), Op::Input(_)) {
                 rows.extend(more);
@@ -83,7 +83,7 @@ pub(super) fn written_out(
             writer.out.alike.push(Alike { limbs: template.first_bodies[kind].clone(), rows });
         }
     }
-    for id in graph.ids().filter(|id| places[id.index()] == Place::Behind) {
+    for id in graph.ids().filter(|id| places[id.index()] == NodePlace::Behind) {
         writer.once(id);
     }
     let of = coordinates(model, &template.bodies);
@@ -96,19 +96,19 @@ pub(super) fn written_out(
 }
 
 /// Where each node is computed.
-fn places(graph: &Graph, template: &Template) -> Vec<Place> {
-    let mut places: Vec<Place> = Vec::with_capacity(graph.ops.len());
+fn places(graph: &Graph, template: &Template) -> Vec<NodePlace> {
+    let mut places: Vec<NodePlace> = Vec::with_capacity(graph.ops.len());
     for id in graph.ids() {
         let op = graph.op(id);
         let own = match op {
             Op::Input(k) if k as usize >= template.first_lane => {
-                Place::Limb(template.lanes[k as usize - template.first_lane].0)
+                NodePlace::Limb(template.lanes[k as usize - template.first_lane].0)
             }
-            Op::Input(k) if k as usize >= template.first_sum => Place::Behind,
-            _ => Place::Before,
+            Op::Input(k) if k as usize >= template.first_sum => NodePlace::Behind,
+            _ => NodePlace::Before,
         };
         let place = op.operands().map(|a| places[a.index()]).fold(own, |a, b| match (a, b) {
-            (Place::Before, other) | (other, Place::Before) => other,
+            (NodePlace::Before, other) | (other, NodePlace::Before) => other,
             (a, b) => {
                 assert!(a == b, "what limbs pass on reaches no other limb");
                 a
@@ -135,7 +135,7 @@ fn angles(graph: &Graph) -> Vec<bool> {
     angles
 }
 
-impl Writer<'_> {
+impl ExpansionWriter<'_> {
     fn push(&mut self, op: Op, note: Note, limb: usize) -> NodeId {
         let section = self.graph.sections[note.section as usize];
         let body = |i: usize| self.template.bodies[i].1[limb.min(self.template.bodies[i].1.len() - 1)];
@@ -159,8 +159,8 @@ impl Writer<'_> {
     /// Node `id` of the template as limb `limb` has it.
     fn of_limb(&self, id: NodeId, limb: usize) -> NodeId {
         match self.written[id.index()].as_ref().expect("operands are written before their users") {
-            Written::Once(node) => *node,
-            Written::PerLimb(nodes) => nodes[limb],
+            Expanded::Once(node) => *node,
+            Expanded::PerLimb(nodes) => nodes[limb],
         }
     }
 
@@ -175,7 +175,7 @@ impl Writer<'_> {
                 self.push(op, note, 0)
             }
         };
-        self.written[id.index()] = Some(Written::Once(node));
+        self.written[id.index()] = Some(Expanded::Once(node));
     }
 
     /// Writes what each limb computes, with both halves of a sine-cosine pair beside it; the rows.
@@ -186,7 +186,7 @@ impl Writer<'_> {
         if let Op::Input(lane) = self.graph.op(id) {
             let lane = lane as usize - self.template.first_lane;
             let nodes = (0..self.template.count(kind)).map(|limb| self.lane(lane, limb, id)).collect();
-            self.written[id.index()] = Some(Written::PerLimb(nodes));
+            self.written[id.index()] = Some(Expanded::PerLimb(nodes));
             return Vec::new();
         }
         let halves = (id.0 + 1..id.0 + 3).map(NodeId);
@@ -201,7 +201,7 @@ impl Writer<'_> {
             }
         }
         for (member, row) in together.iter().zip(&rows) {
-            self.written[member.index()] = Some(Written::PerLimb(row.clone()));
+            self.written[member.index()] = Some(Expanded::PerLimb(row.clone()));
         }
         rows
     }

@@ -1,6 +1,6 @@
 //! One limb traced for all of its kind.
 
-use crate::equations::bind::Bound;
+use crate::equations::bind::BoundRobot;
 use crate::equations::Robot;
 use crate::function::{Forms, ForwardDynamicsMethod, Function, LimbSums};
 use crate::model::limbs::Limbs;
@@ -111,12 +111,12 @@ pub(super) fn same(a: Dd, b: Dd) -> bool {
 }
 
 /// The values that differ from limb to limb, in the order in which they came up.
-struct Lanes<'a> {
+struct LimbValues<'a> {
     inputs: &'a [Expr],
     values: Vec<(usize, Vec<Expr>)>,
 }
 
-impl Lanes<'_> {
+impl LimbValues<'_> {
     /// What stands for these values of the limbs of a kind: one of them where they are the same.
     fn value(&mut self, kind: usize, of_limbs: &[Expr]) -> Expr {
         let equal = |a: &Expr, b: &Expr| {
@@ -153,8 +153,8 @@ pub(super) fn template(robot: &Robot, function: Function, scene: &Scene, limbs: 
     let graph = trace_all(rules, own.iter().cloned().chain(more).collect(), |inputs| {
         let (own, more) = inputs.split_at(own.len());
         let bound = scene.bind(function, robot, own);
-        let mut table = Lanes { inputs: &more[1], values: Vec::new() };
-        let folded = Folded::new(&bound, &bodies, &mut table);
+        let mut table = LimbValues { inputs: &more[1], values: Vec::new() };
+        let folded = TemplateRobot::new(&bound, &bodies, &mut table);
         let (mut results, passed_on) = folded.forces(function, &bound, &bodies, limbs, &more[0]);
         for (kind, input, value) in passed_on {
             sums.push(Sum { kind, input, result: results.len() });
@@ -195,16 +195,20 @@ fn bodies<T>(model: &Model<T>, limbs: &[Limbs]) -> Vec<(Option<usize>, Vec<BodyI
 }
 
 /// The robot of the template.
-struct Folded {
+struct TemplateRobot {
     model: Model<Expr>,
     reduced: ReducedModel<Expr>,
     arguments: Vec<Vec<Expr>>,
 }
 
-impl Folded {
-    fn new(bound: &Bound<Expr>, bodies: &[(Option<usize>, Vec<BodyId>)], table: &mut Lanes<'_>) -> Folded {
+impl TemplateRobot {
+    fn new(
+        bound: &BoundRobot<Expr>,
+        bodies: &[(Option<usize>, Vec<BodyId>)],
+        table: &mut LimbValues<'_>,
+    ) -> TemplateRobot {
         let place = |i: BodyId| bodies.iter().position(|(_, b)| b[0] == i).expect("a limb's carrier is no limb's");
-        let mut folded = Folded {
+        let mut folded = TemplateRobot {
             model: Model { bodies: Vec::new(), ..bound.model.clone() },
             reduced: ReducedModel { bodies: Vec::new(), ..bound.reduced.clone() },
             arguments: vec![Vec::new(); bound.arguments.len()],
@@ -250,7 +254,7 @@ impl Folded {
     fn forces(
         &self,
         function: Function,
-        bound: &Bound<Expr>,
+        bound: &BoundRobot<Expr>,
         bodies: &[(Option<usize>, Vec<BodyId>)],
         limbs: &[Limbs],
         sums: &[Expr],

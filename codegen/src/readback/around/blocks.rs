@@ -1,16 +1,16 @@
 //! What stands around functions: batches over lanes, stages, contact modes.
 
-use super::{first_of, shaped, taken, Around, Read};
+use super::{first_of, shaped, taken, Around, BlockReading};
 use crate::choices::Lanes;
 use crate::identifier::string_literals;
-use crate::program::written::{Written, WrittenMode};
+use crate::program::written::{WrittenFunction, WrittenMode};
 use crate::readback::items::Sort;
-use crate::readback::Stop;
+use crate::readback::ReadingStop;
 use straightline_graph::expr::Port;
 
 impl Around<'_, '_, '_> {
     /// What runs functions over lanes on slices.
-    pub(super) fn batches(&mut self) -> Read<()> {
+    pub(super) fn batches(&mut self) -> BlockReading<()> {
         let programs = &self.generated.programs;
         let Some(drivers) = self.generated.lanes else { return Ok(()) };
         self.batches_of(self.root, &programs.functions, drivers)?;
@@ -23,7 +23,7 @@ impl Around<'_, '_, '_> {
     }
 
     /// The same of the functions of a module.
-    fn batches_of(&mut self, root: usize, programs: &[Written], drivers: Lanes) -> Read<()> {
+    fn batches_of(&mut self, root: usize, programs: &[WrittenFunction], drivers: Lanes) -> BlockReading<()> {
         for program in programs.iter().filter(|p| p.lanes) {
             let made = self.program_of_batches(root, program)?;
             for (layout, suffix) in [("soa", ""), ("aos", ""), ("soa", "_parallel"), ("aos", "_parallel")] {
@@ -36,7 +36,7 @@ impl Around<'_, '_, '_> {
     }
 
     /// What the batches of a function run; how it is made.
-    fn program_of_batches(&mut self, root: usize, program: &Written) -> Read<String> {
+    fn program_of_batches(&mut self, root: usize, program: &WrittenFunction) -> BlockReading<String> {
         let (s, name) = (self.scalar().name(), &program.name);
         let (inputs, outputs) = (&program.graph.inputs, &program.graph.outputs);
         let shared: Vec<(&str, &str)> =
@@ -77,7 +77,13 @@ impl Around<'_, '_, '_> {
     }
 
     /// A function over slices, which runs `made`.
-    fn batch(&mut self, root: usize, program: &Written, (layout, suffix): (&str, &str), made: &str) -> Read<()> {
+    fn batch(
+        &mut self,
+        root: usize,
+        program: &WrittenFunction,
+        (layout, suffix): (&str, &str),
+        made: &str,
+    ) -> BlockReading<()> {
         let s = self.scalar().name();
         let (inputs, outputs) = (&program.graph.inputs, &program.graph.outputs);
         let of_states: Vec<&Port> = inputs.iter().filter(|p| p.wrapper.is_none()).collect();
@@ -107,13 +113,13 @@ impl Around<'_, '_, '_> {
         self.is(root, Sort::Function, &function, &text)?;
         let item = self.item(root, Sort::Function, &function)?;
         match item.threads == suffix.is_empty() {
-            true => Err(Stop::at(self.items.text.len(), format!("`{function}` stands where it should not"))),
+            true => Err(ReadingStop::at(self.items.text.len(), format!("`{function}` stands where it should not"))),
             false => Ok(()),
         }
     }
 
     /// Types of stages around their values, and the methods that they serve.
-    pub(super) fn stages(&mut self) -> Read<()> {
+    pub(super) fn stages(&mut self) -> BlockReading<()> {
         let Some(staged) = &self.generated.programs.staged else { return Ok(()) };
         let (root, s) = (self.root, self.scalar().name());
         let module = self.module(root, "staged")?;
@@ -182,7 +188,7 @@ impl Around<'_, '_, '_> {
     }
 
     /// The modes of contact, and what calls one of them.
-    pub(super) fn modes(&mut self) -> Read<()> {
+    pub(super) fn modes(&mut self) -> BlockReading<()> {
         let modes = &self.generated.programs.modes;
         if modes.is_empty() {
             return Ok(());
@@ -204,7 +210,7 @@ impl Around<'_, '_, '_> {
         self.is(contact, Sort::Enum, "Mode", &format!("pub enum Mode {{ {}, }}", variants.join(", ")))?;
         let distinct = variants.iter().enumerate().all(|(k, v)| !variants[..k].contains(v));
         if variants.len() != modes.len() || !distinct {
-            return Err(Stop::at(self.items.text.len(), "as many modes as the scene has are expected"));
+            return Err(ReadingStop::at(self.items.text.len(), "as many modes as the scene has are expected"));
         }
         let word = self.words.number("forward_dynamics");
         match self.items.find(contact, Sort::Function, word) {
@@ -214,7 +220,7 @@ impl Around<'_, '_, '_> {
     }
 
     /// Forward dynamics in one of the modes, which have these variants.
-    fn forward_dynamics_of(&mut self, contact: usize, modes: &[WrittenMode], variants: &[String]) -> Read<()> {
+    fn forward_dynamics_of(&mut self, contact: usize, modes: &[WrittenMode], variants: &[String]) -> BlockReading<()> {
         let (s, zero, generics) = match modes.iter().flat_map(|mode| &mode.functions).any(|p| p.generic) {
             true => ("T", "T::zero()", "<T: super::Real>"),
             false => (self.scalar().name(), "0.0", ""),
@@ -222,7 +228,7 @@ impl Around<'_, '_, '_> {
         let forward = |k: usize| modes[k].functions.iter().find(|p| p.name == "forward_dynamics");
         let programs: Option<Vec<_>> = (0..modes.len()).map(forward).collect();
         let Some(programs) = programs else {
-            return Err(Stop::at(self.items.text.len(), "forward dynamics of a mode is missing"));
+            return Err(ReadingStop::at(self.items.text.len(), "forward dynamics of a mode is missing"));
         };
         let most = modes.iter().map(|m| m.coordinates[0].len()).max().unwrap_or(0);
         self.is(contact, Sort::Constant, "MOST_CONSTRAINED", &format!("pub const MOST_CONSTRAINED: usize = {most};"))?;

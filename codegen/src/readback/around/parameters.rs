@@ -1,6 +1,6 @@
 //! Run-time parameters: their types, and the constructors that make them.
 
-use super::{Around, Read};
+use super::{Around, BlockReading};
 use crate::description::drives::{DriveNumber, Must};
 use crate::program::written::DriveNumbers;
 use crate::readback::items::Sort;
@@ -9,7 +9,7 @@ use straightline_graph::expr::Port;
 
 impl Around<'_, '_, '_> {
     /// Types of run-time parameters.
-    pub(super) fn parameters(&mut self) -> Read<()> {
+    pub(super) fn parameters(&mut self) -> BlockReading<()> {
         let (root, s) = (self.root, self.scalar().name());
         for parameter in &self.generated.programs.parameters {
             let (name, function) = (&parameter.type_name, &parameter.program.name);
@@ -36,7 +36,7 @@ impl Around<'_, '_, '_> {
     }
 
     /// The types around the free numbers of a drive.
-    pub(super) fn drive(&mut self, name: &str, function: &str, numbers: &DriveNumbers) -> Read<()> {
+    pub(super) fn drive(&mut self, name: &str, function: &str, numbers: &DriveNumbers) -> BlockReading<()> {
         let (root, s, n) = (self.root, self.scalar().name(), numbers.nominal.len());
         let (all, of_numbers) = (&numbers.numbers, format!("{name}Numbers"));
         let first = &all[0].name;

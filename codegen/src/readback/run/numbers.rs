@@ -1,16 +1,16 @@
 //! Numbers: sums, products, literals, calls that give one, and entries of arrays.
 
-use super::{Array, Ran, Run, Thing};
-use crate::readback::items::Extent;
-use crate::readback::tokens::{self as t, Kind};
-use crate::readback::values::{Format, Value};
+use super::{Array, Execution, Ran, Thing};
+use crate::readback::items::TextExtent;
+use crate::readback::tokens::{self as t, TokenKind};
+use crate::readback::values::{TextFormat, TextValue};
 
-impl<'t> Run<'_, 't> {
+impl<'t> Execution<'_, 't> {
     /// A sum, in the format `of`; `format` is that of the function.
-    pub(super) fn number(&mut self, of: Format, format: Format) -> Ran<Value> {
+    pub(super) fn number(&mut self, of: TextFormat, format: TextFormat) -> Ran<TextValue> {
         let start = self.at;
         let mut sum = self.product(of, format)?;
-        while let Kind::Mark(mark @ (b'+' | b'-')) = self.kind() {
+        while let TokenKind::Mark(mark @ (b'+' | b'-')) = self.kind() {
             self.at += 1;
             let term = self.product(of, format)?;
             sum = self.values.add(sum, if mark == b'-' { term.negated() } else { term });
@@ -19,10 +19,10 @@ impl<'t> Run<'_, 't> {
         Ok(sum)
     }
 
-    pub(super) fn product(&mut self, of: Format, format: Format) -> Ran<Value> {
+    pub(super) fn product(&mut self, of: TextFormat, format: TextFormat) -> Ran<TextValue> {
         let start = self.at;
         let mut product = self.signed(of, format)?;
-        while let Kind::Mark(mark @ (b'*' | b'/')) = self.kind() {
+        while let TokenKind::Mark(mark @ (b'*' | b'/')) = self.kind() {
             self.at += 1;
             let factor = self.signed(of, format)?;
             product = match mark {
@@ -35,7 +35,7 @@ impl<'t> Run<'_, 't> {
     }
 
     /// What the text computes, some program computes.
-    pub(super) fn demand(&self, value: Value, start: usize) -> Ran<()> {
+    pub(super) fn demand(&self, value: TextValue, start: usize) -> Ran<()> {
         if self.values.is_wanted(value) {
             return Ok(());
         }
@@ -44,31 +44,31 @@ impl<'t> Run<'_, 't> {
         self.items.stop(start, format!("no program computes `{text}`"))
     }
 
-    pub(super) fn signed(&mut self, of: Format, format: Format) -> Ran<Value> {
+    pub(super) fn signed(&mut self, of: TextFormat, format: TextFormat) -> Ran<TextValue> {
         if self.takes(b'-') {
             return Ok(self.signed(of, format)?.negated());
         }
         self.atom(of, format)
     }
 
-    pub(super) fn atom(&mut self, of: Format, format: Format) -> Ran<Value> {
+    pub(super) fn atom(&mut self, of: TextFormat, format: TextFormat) -> Ran<TextValue> {
         let start = self.at;
         let value = match self.kind() {
-            Kind::Number => match of {
-                Format::Any => return self.stop("a number of no format"),
+            TokenKind::Number => match of {
+                TextFormat::Any => return self.stop("a number of no format"),
                 of => {
                     let x = self.literal(of)?;
                     self.values.constant(x, of)
                 }
             },
-            Kind::Mark(b'(') => {
+            TokenKind::Mark(b'(') => {
                 let close = self.items.tokens[start].closes as usize;
-                let is_cast = self.ahead(1) == Kind::Mark(b'(')
-                    && self.items.kind(self.items.tokens[start + 1].closes as usize + 1) == Kind::Word(t::AS);
+                let is_cast = self.ahead(1) == TokenKind::Mark(b'(')
+                    && self.items.kind(self.items.tokens[start + 1].closes as usize + 1) == TokenKind::Word(t::AS);
                 self.at += 1;
-                if is_cast && (of, format) == (Format::F32, Format::F32) {
+                if is_cast && (of, format) == (TextFormat::F32, TextFormat::F32) {
                     self.at += 1;
-                    let value = self.number(Format::F64, format)?;
+                    let value = self.number(TextFormat::F64, format)?;
                     self.these(") as f32 )")?;
                     let rounded = self.values.rounded(value);
                     self.demand(rounded, start)?;
@@ -79,17 +79,17 @@ impl<'t> Run<'_, 't> {
                 debug_assert!(self.at == close + 1, "an expression ends at its bracket");
                 value
             }
-            Kind::Word(name) => match self.local(name) {
+            TokenKind::Word(name) => match self.local(name) {
                 Some(k) => match self.locals[k].thing {
                     Thing::Number(value) => {
                         self.at += 1;
                         value
                     }
-                    Thing::Wrapped(..) if format == Format::Any => return self.stop("a number of another format"),
+                    Thing::Wrapped(..) if format == TextFormat::Any => return self.stop("a number of another format"),
                     Thing::Place(_) | Thing::Wrapped(..) => {
                         let (cell, ..) = self.cell()?;
                         match self.cells[cell] {
-                            Value::NONE => return self.items.stop(start, "a result is read"),
+                            TextValue::NONE => return self.items.stop(start, "a result is read"),
                             value => value,
                         }
                     }
@@ -107,7 +107,7 @@ impl<'t> Run<'_, 't> {
     }
 
     /// A number as it is written, in this format.
-    pub(super) fn literal(&mut self, of: Format) -> Ran<f64> {
+    pub(super) fn literal(&mut self, of: TextFormat) -> Ran<f64> {
         let text = self.items.text_of(self.at);
         let (digits, suffix) = match text.split_once('_') {
             Some((digits, suffix)) => (digits, Some(suffix)),
@@ -116,12 +116,12 @@ impl<'t> Run<'_, 't> {
         let is_float = digits.contains(['.', 'e']);
         let fits = match suffix {
             None => true,
-            Some("f32") => of == Format::F32,
-            Some("f64") => of == Format::F64,
+            Some("f32") => of == TextFormat::F32,
+            Some("f64") => of == TextFormat::F64,
             Some(_) => false,
         };
         let number = match of {
-            Format::F32 => digits.parse::<f32>().ok().map(f64::from),
+            TextFormat::F32 => digits.parse::<f32>().ok().map(f64::from),
             _ => digits.parse::<f64>().ok(),
         };
         match number.filter(|x| is_float && fits && x.is_finite()) {
@@ -134,7 +134,7 @@ impl<'t> Run<'_, 't> {
     }
 
     /// A call, or a path, whose value is a number.
-    pub(super) fn call_of_number(&mut self, name: u32, of: Format, format: Format) -> Ran<Value> {
+    pub(super) fn call_of_number(&mut self, name: u32, of: TextFormat, format: TextFormat) -> Ran<TextValue> {
         let start = self.at;
         match name {
             t::FMA | t::FMA_IF => {
@@ -160,16 +160,19 @@ impl<'t> Run<'_, 't> {
                 Ok(sum)
             }
             // a caller's scalar
-            t::T if format == Format::Any && self.known.generic && self.ahead(3) == Kind::Word(t::ZERO) => {
+            t::T if format == TextFormat::Any && self.known.generic && self.ahead(3) == TokenKind::Word(t::ZERO) => {
                 self.these("T : : zero ( )")?;
                 Ok(self.values.long(0.0, 0.0))
             }
-            t::T if format == Format::Any && self.known.generic && self.ahead(3) == Kind::Word(t::CONSTANT) => {
+            t::T if format == TextFormat::Any
+                && self.known.generic
+                && self.ahead(3) == TokenKind::Word(t::CONSTANT) =>
+            {
                 self.constant_of_cell(start)
             }
-            t::NUMBER if format == Format::Any && self.known.generic => self.number_in_two(),
-            t::F64 if (of, format) == (Format::F64, Format::F32) => self.widened(start, format),
-            t::TRIG | t::T if self.ahead(1) == Kind::Mark(b':') => {
+            t::NUMBER if format == TextFormat::Any && self.known.generic => self.number_in_two(),
+            t::F64 if (of, format) == (TextFormat::F64, TextFormat::F32) => self.widened(start, format),
+            t::TRIG | t::T if self.ahead(1) == TokenKind::Mark(b':') => {
                 let function = self.kernel(of)?;
                 self.mark(b'(')?;
                 let a = self.number(of, format)?;
@@ -187,7 +190,7 @@ impl<'t> Run<'_, 't> {
     }
 
     /// `T::constant(Dd::from(f64::from(body.0[3])))`
-    fn constant_of_cell(&mut self, start: usize) -> Ran<Value> {
+    fn constant_of_cell(&mut self, start: usize) -> Ran<TextValue> {
         self.these("T : : constant ( Dd : : from ( f64 : : from (")?;
         let (cell, _, mutable) = self.cell()?;
         self.these(") ) )")?;
@@ -198,7 +201,7 @@ impl<'t> Run<'_, 't> {
     }
 
     /// `number::<T>(high, low)`
-    fn number_in_two(&mut self) -> Ran<Value> {
+    fn number_in_two(&mut self) -> Ran<TextValue> {
         self.these("number : : < T > (")?;
         let high = self.signed_literal()?;
         self.mark(b',')?;
@@ -208,13 +211,13 @@ impl<'t> Run<'_, 't> {
     }
 
     /// `f64::from(x)`, of x in f32
-    fn widened(&mut self, start: usize, format: Format) -> Ran<Value> {
+    fn widened(&mut self, start: usize, format: TextFormat) -> Ran<TextValue> {
         self.these("f64 : : from (")?;
         // numbers alone would be of f64; beside a value they have its format
         if self.begins_with_a_number() && !self.names_a_value() {
             return self.stop("a number of no format");
         }
-        let value = self.number(Format::F32, format)?;
+        let value = self.number(TextFormat::F32, format)?;
         self.mark(b')')?;
         let widened = self.values.widened(value);
         self.demand(widened, start)?;
@@ -223,15 +226,15 @@ impl<'t> Run<'_, 't> {
 
     pub(super) fn signed_literal(&mut self) -> Ran<f64> {
         let negative = self.takes(b'-');
-        if self.kind() != Kind::Number {
+        if self.kind() != TokenKind::Number {
             return self.stop("a number is expected here");
         }
-        let x = self.literal(Format::F64)?;
+        let x = self.literal(TextFormat::F64)?;
         Ok(if negative { -x } else { x })
     }
 
     /// `q[3]`, `h[2][lane]`, `body.0[7]`: its cell, its format, and whether it may be written.
-    pub(super) fn cell(&mut self) -> Ran<(usize, Format, bool)> {
+    pub(super) fn cell(&mut self) -> Ran<(usize, TextFormat, bool)> {
         let start = self.at;
         let name = self.word()?;
         let Some(k) = self.local(name) else {
@@ -254,18 +257,18 @@ impl<'t> Run<'_, 't> {
         for extent in extents {
             self.items.mark(&mut at, b'[')?;
             match (*extent, self.items.kind(at)) {
-                (Extent::Of(n), Kind::Number) => {
+                (TextExtent::Of(n), TokenKind::Number) => {
                     let index = self.items.integer(&mut at)?;
                     if index >= n {
                         return self.items.stop(at - 1, "an index beyond the end");
                     }
                     cell = cell * n + index;
                 }
-                (extent, Kind::Word(name)) => {
+                (extent, TokenKind::Word(name)) => {
                     let thing = self.local(name).map(|k| self.locals[k].thing);
                     match (extent, thing) {
-                        (Extent::Of(n), Some(Thing::Index(index))) if index < n => cell = cell * n + index,
-                        (Extent::Lanes, Some(Thing::Lane)) => {}
+                        (TextExtent::Of(n), Some(Thing::Index(index))) if index < n => cell = cell * n + index,
+                        (TextExtent::Lanes, Some(Thing::Lane)) => {}
                         _ => return self.items.stop(at, "an index of another kind"),
                     }
                     at += 1;

@@ -1,14 +1,14 @@
 //! Sines and cosines, many at a time, and their kernels.
 
-use super::{Ran, Run};
-use crate::readback::tokens::{self as t, Kind};
-use crate::readback::values::{Format, Value};
+use super::{Execution, Ran};
+use crate::readback::tokens::{self as t, TokenKind};
+use crate::readback::values::{TextFormat, TextValue};
 
-impl<'t> Run<'_, 't> {
+impl<'t> Execution<'_, 't> {
     /// `(s, c) = trig::sin_cos_f64(q[2]);` and its like for several angles, behind `let`.
-    pub(super) fn sines(&mut self, format: Format) -> Ran<()> {
+    pub(super) fn sines(&mut self, format: TextFormat) -> Ran<()> {
         self.mark(b'(')?;
-        let several = self.kind() == Kind::Mark(b'[');
+        let several = self.kind() == TokenKind::Mark(b'[');
         let mut halves = [Vec::new(), Vec::new()];
         for (k, half) in halves.iter_mut().enumerate() {
             if several {
@@ -42,7 +42,7 @@ impl<'t> Run<'_, 't> {
             false => vec![self.angle(sums, format)?],
         };
         self.these(") ;")?;
-        let (sines, cosines): (Vec<Value>, Vec<Value>) = angles.iter().map(|a| self.values.sin_cos(*a)).unzip();
+        let (sines, cosines): (Vec<TextValue>, Vec<TextValue>) = angles.iter().map(|a| self.values.sin_cos(*a)).unzip();
         if halves[0].iter().any(|name| *name != t::UNDERSCORE && halves[1].contains(name)) {
             return self.items.stop(start, "a second local of that name");
         }
@@ -52,26 +52,26 @@ impl<'t> Run<'_, 't> {
         Ok(())
     }
 
-    /// The first number of [`Run::given`].
-    pub(super) fn first_given(&self) -> Option<Value> {
+    /// The first number of [`Execution::given`].
+    pub(super) fn first_given(&self) -> Option<TextValue> {
         self.cells.get(self.arrays[self.given? as usize].first as usize).copied()
     }
 
-    pub(super) fn zero(&mut self, format: Format) -> Value {
+    pub(super) fn zero(&mut self, format: TextFormat) -> TextValue {
         match format {
-            Format::Any => self.values.long(0.0, 0.0),
+            TextFormat::Any => self.values.long(0.0, 0.0),
             format => self.values.constant(0.0, format),
         }
     }
 
     /// An angle, alone or as a sum with what its rounding lost.
-    pub(super) fn angle(&mut self, sums: bool, format: Format) -> Ran<Value> {
+    pub(super) fn angle(&mut self, sums: bool, format: TextFormat) -> Ran<TextValue> {
         if !sums {
             let value = self.number(format, format)?;
             return Ok(self.values.angle([value]));
         }
         let start = self.at;
-        if self.kind() == Kind::Mark(b'[') {
+        if self.kind() == TokenKind::Mark(b'[') {
             let pair = self.list(format, format)?;
             let zero = self.zero(format);
             return match pair.as_slice() {
@@ -83,7 +83,7 @@ impl<'t> Run<'_, 't> {
             return self.items.stop(start, "a sum of angles is expected here");
         }
         self.mark(b'(')?;
-        if format == Format::Any {
+        if format == TextFormat::Any {
             self.mark(b'&')?;
         }
         let terms = self.list(format, format)?;
@@ -95,7 +95,7 @@ impl<'t> Run<'_, 't> {
     }
 
     /// Takes the path of a function of the kernel in this format: its name without the format.
-    pub(super) fn kernel(&mut self, format: Format) -> Ran<&'t str> {
+    pub(super) fn kernel(&mut self, format: TextFormat) -> Ran<&'t str> {
         let start = self.at;
         let module = self.word()?;
         self.these(": :")?;
@@ -103,15 +103,15 @@ impl<'t> Run<'_, 't> {
         self.word()?;
         let name = self.items.text_of(at);
         let suffix = match format {
-            Format::F64 => "_f64",
-            Format::F32 => "_f32",
-            Format::Any => "",
+            TextFormat::F64 => "_f64",
+            TextFormat::F32 => "_f32",
+            TextFormat::Any => "",
         };
         let known = match module {
             _ if self.local(module).is_some() => false,
-            t::TRIG => self.known.trig && format != Format::Any,
-            t::FUSED_MODULE => self.known.fused[0] && format != Format::Any,
-            t::T => self.known.generic && format == Format::Any,
+            t::TRIG => self.known.trig && format != TextFormat::Any,
+            t::FUSED_MODULE => self.known.fused[0] && format != TextFormat::Any,
+            t::T => self.known.generic && format == TextFormat::Any,
             _ => false,
         };
         let Some(function) = name.strip_suffix(suffix).filter(|_| known) else {

@@ -1,33 +1,33 @@
 //! Statements: locals, arrays, assignments, loops and calls that fill arrays.
 
-use super::{count_of, Array, Place, Ran, Run, Thing, LONGEST};
-use crate::readback::items::{Extent, Function, Sort, Type};
-use crate::readback::tokens::{self as t, Kind};
-use crate::readback::values::{Format, Value};
+use super::{count_of, Array, ArrayPlace, Execution, Ran, Thing, LONGEST};
+use crate::readback::items::{Sort, TextExtent, TextFunction, Type};
+use crate::readback::tokens::{self as t, TokenKind};
+use crate::readback::values::{TextFormat, TextValue};
 
-impl<'t> Run<'_, 't> {
+impl<'t> Execution<'_, 't> {
     /// `{ … }`
-    pub(super) fn block(&mut self, function: &Function, format: Format) -> Ran<()> {
+    pub(super) fn block(&mut self, function: &TextFunction, format: TextFormat) -> Ran<()> {
         let count = self.locals.len();
         let end = self.items.tokens[self.at].closes as usize;
         self.mark(b'{')?;
         while self.at < end {
             match self.kind() {
-                Kind::Word(t::LET) => {
+                TokenKind::Word(t::LET) => {
                     self.at += 1;
                     self.let_(format)?;
                 }
-                Kind::Word(t::STATIC) => {
+                TokenKind::Word(t::STATIC) => {
                     self.at += 1;
                     self.array_of_limbs(format, true)?;
                 }
-                Kind::Word(t::FOR) => self.for_(function, format)?,
-                Kind::Word(name) => {
+                TokenKind::Word(t::FOR) => self.for_(function, format)?,
+                TokenKind::Word(name) => {
                     let is_local = self.local(name).is_some();
                     match self.ahead(1) {
-                        Kind::Mark(b'=') => self.assign_local(name, format)?,
-                        Kind::Mark(b'[') if is_local => self.assign_place(format)?,
-                        Kind::Mark(b'(' | b':') if !is_local => self.statement_call(function, end)?,
+                        TokenKind::Mark(b'=') => self.assign_local(name, format)?,
+                        TokenKind::Mark(b'[') if is_local => self.assign_place(format)?,
+                        TokenKind::Mark(b'(' | b':') if !is_local => self.statement_call(function, end)?,
                         _ => return self.stop("a statement that is not known"),
                     }
                 }
@@ -35,7 +35,7 @@ impl<'t> Run<'_, 't> {
             }
         }
         for local in &self.locals[count..] {
-            let Thing::Place(Place { array, mutable: true, reference: false }) = local.thing else { continue };
+            let Thing::Place(ArrayPlace { array, mutable: true, reference: false }) = local.thing else { continue };
             let Array { first, ref extents, .. } = self.arrays[array as usize];
             let cells = first as usize..first as usize + count_of(extents);
             if self.written[cells].contains(&0) {
@@ -47,7 +47,7 @@ impl<'t> Run<'_, 't> {
         Ok(())
     }
 
-    pub(super) fn assign_local(&mut self, name: u32, format: Format) -> Ran<()> {
+    pub(super) fn assign_local(&mut self, name: u32, format: TextFormat) -> Ran<()> {
         let Some(k) = self.local(name) else { return self.stop("a name that stands for nothing here") };
         let Thing::Declared(of) = self.locals[k].thing else {
             return self.stop("a second value of a local, or of something that takes none");
@@ -59,7 +59,7 @@ impl<'t> Run<'_, 't> {
         self.mark(b';')
     }
 
-    pub(super) fn assign_place(&mut self, format: Format) -> Ran<()> {
+    pub(super) fn assign_place(&mut self, format: TextFormat) -> Ran<()> {
         let start = self.at;
         let (cell, of, mutable) = self.cell()?;
         if !mutable {
@@ -73,14 +73,14 @@ impl<'t> Run<'_, 't> {
     }
 
     /// `name_part2(q, &mut live, tau);`, or the same as the last thing of a function.
-    pub(super) fn statement_call(&mut self, function: &Function, end: usize) -> Ran<()> {
+    pub(super) fn statement_call(&mut self, function: &TextFunction, end: usize) -> Ran<()> {
         let start = self.at;
         let name = self.word()?;
         let Some(item) = self.items.named.get(&(self.module, Sort::Function, name)).copied() else {
             return self.items.stop(start, "a call of something that is not known");
         };
         let mut given = Vec::new();
-        if self.kind() == Kind::Mark(b':') {
+        if self.kind() == TokenKind::Mark(b':') {
             self.these(": : <")?;
             given = self.listed(b'>', |run| {
                 let word = run.word()?;
@@ -112,7 +112,7 @@ impl<'t> Run<'_, 't> {
     pub(super) fn argument(&mut self) -> Ran<Thing> {
         let mut reference = None;
         if self.takes(b'&') {
-            let mutable = self.kind() == Kind::Word(t::MUT);
+            let mutable = self.kind() == TokenKind::Word(t::MUT);
             self.at += usize::from(mutable);
             reference = Some(mutable);
         }
@@ -123,7 +123,7 @@ impl<'t> Run<'_, 't> {
         };
         match (self.locals[k].thing, reference) {
             (Thing::Place(place), Some(mutable)) if !place.reference && (place.mutable || !mutable) => {
-                Ok(Thing::Place(Place { mutable, reference: true, ..place }))
+                Ok(Thing::Place(ArrayPlace { mutable, reference: true, ..place }))
             }
             (thing @ (Thing::Place(_) | Thing::Wrapped(..)), None) => Ok(thing),
             _ => self.items.stop(start, "an argument that is not known"),
@@ -131,9 +131,9 @@ impl<'t> Run<'_, 't> {
     }
 
     /// Behind `let`.
-    pub(super) fn let_(&mut self, format: Format) -> Ran<()> {
+    pub(super) fn let_(&mut self, format: TextFormat) -> Ran<()> {
         match self.kind() {
-            Kind::Mark(b'[') => {
+            TokenKind::Mark(b'[') => {
                 self.at += 1;
                 self.pattern()?;
                 let names = std::mem::take(&mut self.names);
@@ -142,7 +142,7 @@ impl<'t> Run<'_, 't> {
                 let Type::Array(extents, of) = self.items.type_of(&mut self.at, format)? else {
                     return self.items.stop(start, "an array is expected here");
                 };
-                if extents != [Extent::Of(names.len())] {
+                if extents != [TextExtent::Of(names.len())] {
                     return self.items.stop(start, "as many names as numbers are expected here");
                 }
                 if self.takes(b';') {
@@ -156,13 +156,13 @@ impl<'t> Run<'_, 't> {
                 self.names = names;
                 Ok(())
             }
-            Kind::Mark(b'(') => self.sines(format),
-            Kind::Word(t::MUT) => {
+            TokenKind::Mark(b'(') => self.sines(format),
+            TokenKind::Word(t::MUT) => {
                 self.at += 1;
                 self.array_to_fill(format)
             }
-            Kind::Word(name) => {
-                if self.ahead(1) == Kind::Mark(b':') && self.ahead(2) == Kind::Mark(b'[') {
+            TokenKind::Word(name) => {
+                if self.ahead(1) == TokenKind::Mark(b':') && self.ahead(2) == TokenKind::Mark(b'[') {
                     return self.array_of_limbs(format, false);
                 }
                 self.at += 1;
@@ -195,7 +195,7 @@ impl<'t> Run<'_, 't> {
         }
     }
 
-    pub(super) fn bind_all(&mut self, names: &[u32], values: &[Value]) -> Ran<()> {
+    pub(super) fn bind_all(&mut self, names: &[u32], values: &[TextValue]) -> Ran<()> {
         if names.len() != values.len() {
             return self.stop("as many names as numbers are expected here");
         }
@@ -208,7 +208,7 @@ impl<'t> Run<'_, 't> {
     }
 
     /// `live = [q[0]; 12];`, `forces = [T::zero(); 4];`, `live = [[0.0; N]; 12];` behind `let mut`.
-    pub(super) fn array_to_fill(&mut self, format: Format) -> Ran<()> {
+    pub(super) fn array_to_fill(&mut self, format: TextFormat) -> Ran<()> {
         let name = self.word()?;
         self.these("= [")?;
         let lanes = self.takes(b'[');
@@ -228,14 +228,14 @@ impl<'t> Run<'_, 't> {
         if n > self.items.text.len() {
             return self.stop("an array that is too long");
         }
-        let extents = [Extent::Of(n), Extent::Lanes];
+        let extents = [TextExtent::Of(n), TextExtent::Lanes];
         let place = self.array(&extents[..1 + usize::from(lanes)], format, &vec![value; n], true);
-        self.bind(name, Thing::Place(Place { reference: false, ..place }));
+        self.bind(name, Thing::Place(ArrayPlace { reference: false, ..place }));
         Ok(())
     }
 
     /// `x1: [f64; 4] = [a, b, c, d];` behind `let` or `static`.
-    pub(super) fn array_of_limbs(&mut self, format: Format, is_static: bool) -> Ran<()> {
+    pub(super) fn array_of_limbs(&mut self, format: TextFormat, is_static: bool) -> Ran<()> {
         let name = self.word()?;
         self.mark(b':')?;
         let start = self.at;
@@ -245,27 +245,27 @@ impl<'t> Run<'_, 't> {
         self.mark(b'=')?;
         let first = self.at;
         let values = self.list(of, format)?;
-        let is_name = |at: usize| matches!(self.items.kind(at), Kind::Word(_));
+        let is_name = |at: usize| matches!(self.items.kind(at), TokenKind::Word(_));
         if is_static && (first..self.at).any(is_name) {
             return self.items.stop(first, "what is static knows no locals");
         }
-        if extents != [Extent::Of(values.len())] {
+        if extents != [TextExtent::Of(values.len())] {
             return self.items.stop(start, "an array of another length");
         }
         self.mark(b';')?;
         let place = self.array(&extents, of, &values, false);
-        self.bind(name, Thing::Place(Place { reference: false, ..place }));
+        self.bind(name, Thing::Place(ArrayPlace { reference: false, ..place }));
         Ok(())
     }
 
     /// `[a, b, c]`
-    pub(super) fn list(&mut self, of: Format, format: Format) -> Ran<Vec<Value>> {
+    pub(super) fn list(&mut self, of: TextFormat, format: TextFormat) -> Ran<Vec<TextValue>> {
         self.mark(b'[')?;
         self.listed(b']', |run| run.number(of, format))
     }
 
     /// `for limb in 0..4 { … }`, `for lane in 0..N { … }`
-    pub(super) fn for_(&mut self, function: &Function, format: Format) -> Ran<()> {
+    pub(super) fn for_(&mut self, function: &TextFunction, format: TextFormat) -> Ran<()> {
         self.at += 1;
         let name = self.word()?;
         self.items.keyword(&mut self.at, t::IN)?;
@@ -275,7 +275,7 @@ impl<'t> Run<'_, 't> {
         }
         self.these(". .")?;
         let count = self.locals.len();
-        if self.kind() == Kind::Word(t::N) && function.generics.contains(&t::N) {
+        if self.kind() == TokenKind::Word(t::N) && function.generics.contains(&t::N) {
             self.at += 1;
             self.bind(name, Thing::Lane);
             self.block(function, format)?;

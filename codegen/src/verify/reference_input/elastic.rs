@@ -1,11 +1,11 @@
 //! What gives way of a robot: flexible links as rigid groups with springs between them, and springs below the root link.
 
-use super::{vector, Group, GroupJoint, Part, Placed};
+use super::{vector, Group, GroupJoint, Placed, RigidPart};
 use crate::description::flexible::{BaseSupport, Bending, Flexible};
 use crate::description::Description;
 use crate::model::ModelOptions;
 use nalgebra::{Matrix3, Vector3};
-use straightline_core::reference::{unit, Joint};
+use straightline_core::reference::{unit, ReferenceJoint};
 use straightline_core::Dd;
 
 /// What gives way of a robot.
@@ -60,7 +60,7 @@ pub(super) fn stand(support: &BaseSupport, root: &str, groups: &mut Vec<Group>) 
                 place: Placed { rotation: Matrix3::identity(), position },
                 child: if i + 1 == given.len() { root.to_string() } else { name.clone() },
                 name,
-                kind: if *k < 3 { Joint::Linear } else { Joint::Revolute },
+                kind: if *k < 3 { ReferenceJoint::Linear } else { ReferenceJoint::Revolute },
                 axis: Vector3::from_fn(|row, _| if row == k % 3 { Dd::ONE } else { Dd::ZERO }),
                 vectors: None,
             }),
@@ -75,7 +75,7 @@ pub(super) fn stand(support: &BaseSupport, root: &str, groups: &mut Vec<Group>) 
 pub(super) fn bend(
     flexible: &Flexible,
     (group, place): (usize, Placed),
-    part: Option<Part>,
+    part: Option<RigidPart>,
     groups: &mut Vec<Group>,
 ) -> Result<Segments, String> {
     let (begin, end) = (vector(&flexible.from), vector(&flexible.to.value));
@@ -104,7 +104,7 @@ pub(super) fn bend(
         None => Vec::new(),
     }
     .into_iter();
-    let moved = |part: Part, place: &Placed| Part {
+    let moved = |part: RigidPart, place: &Placed| RigidPart {
         mass: part.mass,
         centre: place.position + place.rotation * part.centre,
         inertia: place.rotation * part.inertia * place.rotation.transpose(),
@@ -120,7 +120,8 @@ pub(super) fn bend(
             let name = format!("{link}_{label}{}", i + 1);
             let child = if k + 1 == axes.len() { format!("{link}_segment{}", i + 1) } else { name.clone() };
             let place = parent_place.then(&in_link);
-            let joint = GroupJoint { parent, place, name, child, kind: Joint::Revolute, axis: *axis, vectors: None };
+            let joint =
+                GroupJoint { parent, place, name, child, kind: ReferenceJoint::Revolute, axis: *axis, vectors: None };
             groups.push(Group { joint: Some(joint), parts: Vec::new() });
             (parent, parent_place) = (groups.len() - 1, Placed { rotation: Matrix3::identity(), position: -point });
         }
@@ -131,7 +132,7 @@ pub(super) fn bend(
 }
 
 /// The pieces of a rod with the mass, centre of mass and inertia of `part` between the cuts, in the same frame.
-fn pieces(part: &Part, begin: &Vector3<Dd>, along: &Vector3<Dd>, cuts: &[Dd]) -> Vec<Part> {
+fn pieces(part: &RigidPart, begin: &Vector3<Dd>, along: &Vector3<Dd>, cuts: &[Dd]) -> Vec<RigidPart> {
     // ∫ (u·x)² dm = ½ tr J − uᵀ J u, and ∫ (u·x) x dm beside it
     let half_trace = part.inertia.trace() / Dd::from(2.0);
     let with_axis = along * half_trace - part.inertia * along;
@@ -152,7 +153,7 @@ fn pieces(part: &Part, begin: &Vector3<Dd>, along: &Vector3<Dd>, cuts: &[Dd]) ->
         let (length, middle) = (pair[1] - pair[0], (pair[0] + pair[1]) / Dd::from(2.0));
         let share = length / (half + half);
         let mass = part.mass * share;
-        Part {
+        RigidPart {
             mass,
             centre: part.centre + slope * (middle - centre),
             inertia: across * share + of_line * (mass * length * length / Dd::from(12.0)),

@@ -11,7 +11,7 @@ use straightline_codegen::expr::{evaluate, gradient, Graph};
 use straightline_codegen::options::Options;
 use straightline_codegen::program::input_box::input_box;
 use straightline_codegen::program::program;
-use straightline_codegen::scene::{Interval as Range, JointRanges, Scene};
+use straightline_codegen::scene::{InputRange as Range, JointRanges, Scene};
 use straightline_codegen::{Function, Scalar};
 use straightline_core::model::JointKind;
 use straightline_core::Dd;

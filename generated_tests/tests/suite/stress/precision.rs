@@ -2,9 +2,9 @@
 
 use super::outcome::{Outcome, Size};
 use super::robots::Judged;
-use straightline_codegen::program::Program;
+use straightline_codegen::program::TracedProgram;
 use straightline_codegen::Function;
-use straightline_core::reference::{geometry, motion, natural_scale, CentreOfMassTree, Joint};
+use straightline_core::reference::{geometry, motion, natural_scale, CentreOfMassTree, ReferenceJoint};
 use straightline_core::Dd;
 use straightline_generated_tests::compiled;
 use straightline_generated_tests::programs::{self, cast};
@@ -12,7 +12,7 @@ use straightline_generated_tests::random::Random;
 use straightline_generated_tests::reference::Expected;
 
 /// The equations of a function of a robot, to be run in double-double.
-pub fn equations(judged: &Judged, function: Function) -> Program {
+pub fn equations(judged: &Judged, function: Function) -> TracedProgram {
     programs::of_robot(&judged.robot, function, &programs::options(&judged.robot))
 }
 
@@ -73,9 +73,9 @@ fn scales(tree: &CentreOfMassTree<f64>, q: &[f64], qd: &[f64], qdd: &[f64]) -> V
         };
         a += turning(parent_omega, e) * norm(places[k].r_parent.as_slice());
         match link.joint {
-            Joint::Revolute => e += qdd[link.iv].abs() + qd[link.iv].abs() * parent_omega,
-            Joint::Linear => a += qdd[link.iv].abs() + 2.0 * parent_omega * qd[link.iv].abs(),
-            Joint::Free => {
+            ReferenceJoint::Revolute => e += qdd[link.iv].abs() + qd[link.iv].abs() * parent_omega,
+            ReferenceJoint::Linear => a += qdd[link.iv].abs() + 2.0 * parent_omega * qd[link.iv].abs(),
+            ReferenceJoint::Free => {
                 let (rates, v) = (&qdd[link.iv..link.iv + 6], &qd[link.iv..link.iv + 3]);
                 a += norm(&rates[..3]) + omega * norm(v);
                 e += norm(&rates[3..]);
@@ -95,9 +95,9 @@ fn scales(tree: &CentreOfMassTree<f64>, q: &[f64], qd: &[f64], qdd: &[f64]) -> V
             lever += norm(places[j].r_dash.as_slice());
             let moment = lever * force + couple;
             let of_coordinate = |i: usize| match joint.joint {
-                Joint::Linear => force,
-                Joint::Revolute => moment,
-                Joint::Free => [force, moment][i / 3],
+                ReferenceJoint::Linear => force,
+                ReferenceJoint::Revolute => moment,
+                ReferenceJoint::Free => [force, moment][i / 3],
             };
             (0..joint.joint.nv()).for_each(|i| scale[joint.iv + i] += of_coordinate(i));
             lever += norm(places[j].r_parent.as_slice());

@@ -8,7 +8,7 @@
 //! along Ĵ = J − μ v_t/√(v_t² + w²) · J_t instead of J; one on a [yielding](super::Environment) object feels what the object does.
 //! Reactions are positive along their coordinates: on a surface a positive one pushes the robot off.
 
-use super::contact_system::{ContactSystem, Row};
+use super::contact_system::{ContactRow, ContactSystem};
 use super::factor::Ltdl;
 use super::functional::{FunctionalCoordinates, RelativeMotion};
 use crate::contact::{Contact, Coordinate};
@@ -58,7 +58,7 @@ pub fn constrained_forward_dynamics<T: Real>(
     supports: &[Support<T>],
     ridge: T,
 ) -> ConstrainedMotion<T> {
-    let rows: Vec<Row<T>> = supports.iter().map(row_of).collect();
+    let rows: Vec<ContactRow<T>> = supports.iter().map(row_of).collect();
     let system = ContactSystem::new(factor, &constrained.jacobian, applied, &rows, ridge);
     let half = factor.half(drive);
     // s̈ without reactions
@@ -79,10 +79,10 @@ pub fn constrained_forward_dynamics<T: Real>(
     ConstrainedMotion { violation: violation.collect(), qdd, force, sdd, pivot: system.pivot }
 }
 
-fn row_of<T: Real>(support: &Support<T>) -> Row<T> {
+fn row_of<T: Real>(support: &Support<T>) -> ContactRow<T> {
     match *support {
-        Support::Rigid(_) => Row::Rigid,
-        Support::Yielding { mass, .. } => Row::Yielding(mass),
+        Support::Rigid(_) => ContactRow::Rigid,
+        Support::Yielding { mass, .. } => ContactRow::Yielding(mass),
     }
 }
 
@@ -105,7 +105,7 @@ pub fn projection<T: Real>(
     residual: &[T],
     ridge: T,
 ) -> Vec<T> {
-    let rows: Vec<Row<T>> = residual.iter().map(|_| Row::Rigid).collect();
+    let rows: Vec<ContactRow<T>> = residual.iter().map(|_| ContactRow::Rigid).collect();
     let system = ContactSystem::new(factor, &constrained.jacobian, None, &rows, ridge);
     let multipliers = system.solve(&residual.iter().map(|s| -*s).collect::<Vec<T>>());
     let rest = alloc::vec![T::zero(); constrained.jacobian.first().map_or(0, Vec::len)];
@@ -127,7 +127,7 @@ pub fn hybrid_inverse_dynamics<T: Real>(
     ridge: T,
 ) -> (Vec<T>, T) {
     let all = constrained.clone().and(free.clone());
-    let rows: Vec<Row<T>> = wanted.iter().map(|_| Row::Rigid).collect();
+    let rows: Vec<ContactRow<T>> = wanted.iter().map(|_| ContactRow::Rigid).collect();
     let system = ContactSystem::new(factor, &all.jacobian, None, &rows, ridge);
     let missing = all.jacobian.iter().zip(&all.bias).zip(wanted).map(|((j, a), w)| *w - *a - dot(j, qdd));
     let multipliers = system.solve(&missing.collect::<Vec<T>>());

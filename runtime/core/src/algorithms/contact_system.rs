@@ -19,7 +19,7 @@ use alloc::vec::Vec;
 /// What a row of the system stands for, with reactions F and the inverse mass G:
 /// `inertia` (G F)_i + (`compliance` + ridge) F_i = right side.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Row<T> {
+pub(super) enum ContactRow<T> {
     /// (G F)_i is given.
     Rigid,
     /// F_i gives way: m (G F)_i + F_i is given, with m ≥ 0 \[kg\].
@@ -63,13 +63,19 @@ fn dot<T: Real>(a: &[T], b: &[T]) -> T {
 
 impl<T: Real> ContactSystem<T> {
     /// From the rows of J and those in which reactions act, where they are others; `ridge` is ε.
-    pub fn new(factor: &Ltdl<T>, jacobian: &[Vec<T>], applied: Option<&[Vec<T>]>, rows: &[Row<T>], ridge: T) -> Self {
+    pub fn new(
+        factor: &Ltdl<T>,
+        jacobian: &[Vec<T>],
+        applied: Option<&[Vec<T>]>,
+        rows: &[ContactRow<T>],
+        ridge: T,
+    ) -> Self {
         T::section("inverse mass of the contact", None);
         let m = jacobian.len();
         let own: Vec<Vec<T>> = jacobian.iter().map(|row| factor.half(row)).collect();
         let scaled: Vec<Vec<T>> = own.iter().map(|y| factor.scaled(y)).collect();
         let half = applied.map_or(own, |rows| rows.iter().map(|row| factor.half(row)).collect());
-        let symmetric = applied.is_none() && rows.iter().all(|r| matches!(r, Row::Rigid));
+        let symmetric = applied.is_none() && rows.iter().all(|r| matches!(r, ContactRow::Rigid));
         let mut inverse_mass = vec![vec![T::zero(); m]; m];
         for i in 0..m {
             for j in 0..m {
@@ -82,8 +88,8 @@ impl<T: Real> ContactSystem<T> {
         let floor = ridge * ridge * factor.mobility();
         for (i, row) in rows.iter().enumerate() {
             match row {
-                Row::Rigid => ridged[i][i] = matrix[i][i] + (ridge * matrix[i][i] + floor),
-                Row::Yielding(mass) => {
+                ContactRow::Rigid => ridged[i][i] = matrix[i][i] + (ridge * matrix[i][i] + floor),
+                ContactRow::Yielding(mass) => {
                     matrix[i].iter_mut().for_each(|g| *g = *mass * *g);
                     matrix[i][i] = matrix[i][i] + T::one();
                     ridged[i].clone_from(&matrix[i]);

@@ -58,11 +58,11 @@ pub(super) struct Driven<'a, T> {
     q: &'a [T],
     drives: &'a [Drive<T>],
     states: Vec<DriveState<T>>,
-    spins: Vec<Option<Spin<T>>>,
+    spins: Vec<Option<RotorSpin<T>>>,
 }
 
 /// A rotor on a moving link.
-struct Spin<T> {
+struct RotorSpin<T> {
     /// g: a · ω per velocity coordinate.
     g: Vec<T>,
     /// a · ω of the link.
@@ -74,7 +74,7 @@ struct Spin<T> {
 }
 
 /// What a motion is, of all shafts.
-pub(super) struct Motion<T> {
+pub(super) struct ShaftMotion<T> {
     /// φ̈ of every drive's last shaft.
     pub phi: Vec<T>,
     /// J a · ω̇ of every rotor on a moving link.
@@ -93,7 +93,7 @@ impl<'a, T: Real> Driven<'a, T> {
             DriveState::new(model, drive, q, qd, own, *u)
         });
         let states = states.collect();
-        let spins = drives.iter().map(|d| d.rotor.map(|r| Spin::new(model, &r, q, qd))).collect();
+        let spins = drives.iter().map(|d| d.rotor.map(|r| RotorSpin::new(model, &r, q, qd))).collect();
         Driven { model, q, drives, states, spins }
     }
 
@@ -178,7 +178,7 @@ impl<'a, T: Real> Driven<'a, T> {
     }
 
     /// φ̈ of the last shafts and J a · ω̇.
-    pub(super) fn motion(&self, qdd: &[T]) -> Motion<T> {
+    pub(super) fn motion(&self, qdd: &[T]) -> ShaftMotion<T> {
         let phi = (0..self.drives.len()).map(|k| sum(self.row(k).map(|(i, n)| n * qdd[i])));
         let spin = |k: usize| match (&self.spins[k], &self.drives[k].rotor) {
             (Some(spin), Some(rotor)) => {
@@ -187,7 +187,7 @@ impl<'a, T: Real> Driven<'a, T> {
             _ => T::zero(),
         };
         let put = vec![T::zero(); self.drives.len()];
-        Motion { phi: phi.collect(), spin: (0..self.drives.len()).map(spin).collect(), put }
+        ShaftMotion { phi: phi.collect(), spin: (0..self.drives.len()).map(spin).collect(), put }
     }
 
     /// The joints whose acceleration is known: drive, velocity coordinate, ratio.
@@ -281,7 +281,7 @@ impl<'a, T: Real> Driven<'a, T> {
     }
 
     /// ẋ of a drive for its part of the state, given the motion of the shafts.
-    fn state_derivative(&self, k: usize, x: &[T], u: T, motion: &Motion<T>) -> Vec<T> {
+    fn state_derivative(&self, k: usize, x: &[T], u: T, motion: &ShaftMotion<T>) -> Vec<T> {
         let (drive, state) = (&self.drives[k], &self.states[k]);
         let (acceleration, torque) = (self.actuator_acceleration(k, motion), self.actuator_torque(k, motion));
         let mut rates = state_derivative(drive, x, (state.actuator_speed, acceleration), torque, u);
@@ -293,7 +293,7 @@ impl<'a, T: Real> Driven<'a, T> {
     }
 }
 
-impl<T: Real> Spin<T> {
+impl<T: Real> RotorSpin<T> {
     fn new(model: &Model<T>, rotor: &Rotor<T>, q: &[T], qd: &[T]) -> Self {
         let frame = axis_frame(rotor);
         let nv = model.nv();
@@ -303,7 +303,7 @@ impl<T: Real> Spin<T> {
         let column = |i: usize| Vec3::new(j[3 * nv + i], j[4 * nv + i], j[5 * nv + i]);
         let omega = super::frame_velocity(model, q, qd, &frame).angular;
         let across = omega.cross(axis);
-        Spin {
+        RotorSpin {
             g: (0..nv).map(|i| axis.dot(column(i))).collect(),
             along: axis.dot(omega),
             bias: axis.dot(jacobian_bias(model, q, qd, &frame).angular),
@@ -320,7 +320,7 @@ pub(super) fn rotor_forces<T: Real>(
     rotor: &Rotor<T>,
     (q, qd, qdd): (&[T], &[T], &[T]),
 ) -> Vec<T> {
-    let spin = Spin::new(model, rotor, q, qd);
+    let spin = RotorSpin::new(model, rotor, q, qd);
     let speed = last_shaft(model, drive, qd, |joint| joint.1);
     let acceleration = last_shaft(model, drive, qdd, |joint| joint.1);
     let along = spin.bias + sum(spin.g.iter().zip(qdd).map(|(g, qdd)| *g * *qdd));
@@ -461,7 +461,7 @@ impl<T: Real> Driven<'_, T> {
     }
 
     /// θ̈ of an actuator's shaft.
-    fn actuator_acceleration(&self, k: usize, motion: &Motion<T>) -> T {
+    fn actuator_acceleration(&self, k: usize, motion: &ShaftMotion<T>) -> T {
         match self.drives[k].stages.is_empty() {
             true => motion.phi[k],
             false => self.states[k].shaft_acceleration(&self.drives[k], 0, motion.spin[k]),
@@ -469,7 +469,7 @@ impl<T: Real> Driven<'_, T> {
     }
 
     /// M that an actuator puts out.
-    fn actuator_torque(&self, k: usize, motion: &Motion<T>) -> T {
+    fn actuator_torque(&self, k: usize, motion: &ShaftMotion<T>) -> T {
         let (drive, state) = (&self.drives[k], &self.states[k]);
         if drive.held_joint().is_some() {
             let carried = self.carried(k, motion);
@@ -482,12 +482,12 @@ impl<T: Real> Driven<'_, T> {
     }
 
     /// The torque before the gears of a shaft that does not give way, losses in them.
-    fn carried(&self, k: usize, motion: &Motion<T>) -> T {
+    fn carried(&self, k: usize, motion: &ShaftMotion<T>) -> T {
         motion.put[k] * taking(self.drives[k].efficiency, motion.put[k], (self.states[k].speed, None))
     }
 
     /// What goes on in a drive, with its part of the state and its losses.
-    fn flow(&self, k: usize, x: &[T], u: T, motion: &Motion<T>, losses: T) -> DriveFlow<T> {
+    fn flow(&self, k: usize, x: &[T], u: T, motion: &ShaftMotion<T>, losses: T) -> DriveFlow<T> {
         let (drive, state, o) = (&self.drives[k], &self.states[k], T::zero());
         let speed = state.actuator_speed;
         let torque = self.actuator_torque(k, motion);
@@ -584,7 +584,7 @@ pub fn state_space<T: Real>(
         true => driven.put(&times(&h_star, qdd), right),
         false => vec![T::zero(); m],
     };
-    let motion = Motion { put: put(&qdd, &right), ..driven.motion(&qdd) };
+    let motion = ShaftMotion { put: put(&qdd, &right), ..driven.motion(&qdd) };
     let gains = driven.input_matrix();
     let column = |k: usize| (0..nv).map(|i| gains[i * m + k]).collect::<Vec<T>>();
     // motions of the shafts per unit of each input
@@ -594,9 +594,9 @@ pub fn state_space<T: Real>(
             known[i] = held_gain(&drives[k].actuator).unwrap_or_else(T::zero) / n;
         }
         let qdd = driven.solve_but(&factor, &h_star, &known, &column(k));
-        Motion { put: put(&qdd, &column(k)), ..driven.motion_per_input(&qdd) }
+        ShaftMotion { put: put(&qdd, &column(k)), ..driven.motion_per_input(&qdd) }
     };
-    let per_input: Vec<Motion<T>> = (0..m).map(per_input).collect();
+    let per_input: Vec<ShaftMotion<T>> = (0..m).map(per_input).collect();
     let (mut drift, mut gain): (Vec<T>, Vec<T>) = (Vec::new(), Vec::new());
     for (k, drive) in drives.iter().enumerate() {
         let own = &x[drift.len()..drift.len() + drive.states()];
@@ -631,17 +631,17 @@ impl<T: Real> Driven<'_, T> {
     }
 
     /// As [`Driven::motion`], of a difference of accelerations.
-    pub(super) fn motion_per_input(&self, qdd: &[T]) -> Motion<T> {
+    pub(super) fn motion_per_input(&self, qdd: &[T]) -> ShaftMotion<T> {
         let motion = self.motion(qdd);
         let spin = motion.spin.into_iter().enumerate().map(|(k, x)| match (&self.spins[k], &self.drives[k].rotor) {
             (Some(spin), Some(rotor)) => x - rotor.inertia * spin.bias,
             _ => x,
         });
-        Motion { spin: spin.collect(), ..motion }
+        ShaftMotion { spin: spin.collect(), ..motion }
     }
 
     /// ∂ẋ of drive k per input l, whose motion of the shafts is `motion`.
-    fn state_per_input(&self, k: usize, l: usize, motion: &Motion<T>) -> Vec<T> {
+    fn state_per_input(&self, k: usize, l: usize, motion: &ShaftMotion<T>) -> Vec<T> {
         let (drive, state) = (&self.drives[k], &self.states[k]);
         let (own, o) = (k == l, T::zero());
         let gain = if own { input_gain(&drive.actuator) } else { o };

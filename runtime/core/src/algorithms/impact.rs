@@ -9,7 +9,7 @@
 //! solution; it is the mass's own velocity that changes, and after a plastic impact it is the contact's. With friction the
 //! impulse is tilted as the reaction of a contact that slides all through the impact.
 
-use super::contact_system::{ContactSystem, Row};
+use super::contact_system::{ContactRow, ContactSystem};
 use super::factor::Ltdl;
 use super::functional::FunctionalCoordinates;
 use crate::dd::Dd;
@@ -58,11 +58,11 @@ pub fn impact<T: Real>(
     restitution: T,
     ridge: T,
 ) -> Impact<T> {
-    let rows: Vec<Row<T>> = struck
+    let rows: Vec<ContactRow<T>> = struck
         .iter()
         .map(|s| match *s {
-            Struck::Rigid => Row::Rigid,
-            Struck::Mass { mass, .. } => Row::Yielding(mass),
+            Struck::Rigid => ContactRow::Rigid,
+            Struck::Mass { mass, .. } => ContactRow::Yielding(mass),
         })
         .collect();
     let system = ContactSystem::new(factor, &constrained.jacobian, applied, &rows, ridge);

@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 
 /// The moving bodies of a robot as one, in world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Momentum<T> {
+pub struct CentroidalMomentum<T> {
     /// Sum of the masses \[kg\].
     pub mass: T,
     /// Position of the centre of mass \[m\].
@@ -29,7 +29,7 @@ pub struct Momentum<T> {
 /// Centre of mass, its velocity, and the momenta of the motion (q, qd). Divides by the mass of the moving bodies, which is
 /// positive for a robot.
 #[doc(alias("COM", "centroidal momentum", "center of mass"))]
-pub fn momentum<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Momentum<T> {
+pub fn momentum<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> CentroidalMomentum<T> {
     let poses = JointPose::all(&model.bodies, q);
     let velocities = body_velocities(model, &poses, [q, qd]);
     let anchor = anchor(&poses);
@@ -59,7 +59,7 @@ pub fn momentum<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Momentum<T> {
     T::section("momentum", None);
     let per_mass = T::one() / mass;
     let com_anchor = first_moment.scale(per_mass);
-    Momentum {
+    CentroidalMomentum {
         mass,
         com: anchor + com_anchor,
         com_velocity: total.force.scale(per_mass),

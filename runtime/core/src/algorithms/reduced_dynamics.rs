@@ -67,9 +67,9 @@ pub fn reduced_inverse_dynamics_with_limbs<T: Real>(
 }
 
 /// How all bodies move: the sweep from the base to the tips.
-fn motions<T: Real>(model: &ReducedModel<T>, q: &[T], qd: &[T], qdd: &[T]) -> (Vec<Turn<T>>, Vec<Link<T>>) {
-    let mut links: Vec<Link<T>> = Vec::with_capacity(model.bodies.len());
-    let world = Link::world(model.gravity);
+fn motions<T: Real>(model: &ReducedModel<T>, q: &[T], qd: &[T], qdd: &[T]) -> (Vec<Turn<T>>, Vec<DescribedMotion<T>>) {
+    let mut links: Vec<DescribedMotion<T>> = Vec::with_capacity(model.bodies.len());
+    let world = DescribedMotion::world(model.gravity);
     let turns = Turn::all(model, q);
     for (i, body) in model.bodies.iter().enumerate() {
         T::section("forward", Some(i));
@@ -211,7 +211,7 @@ struct Spin<T> {
 }
 
 /// How a body moves, in the axes in which it is described.
-struct Link<T> {
+struct DescribedMotion<T> {
     spin: Spin<T>,
     /// Acceleration of the origin less gravity.
     accel: Vec3<T>,
@@ -302,10 +302,10 @@ impl<T: Real> Spin<T> {
     }
 }
 
-impl<T: Real> Link<T> {
+impl<T: Real> DescribedMotion<T> {
     fn world(gravity: Vec3<T>) -> Self {
         let rest = Spin::zero();
-        Link { spin: rest, accel: -gravity, arm: Vec3::zero(), base: (rest, T::zero(), T::zero()) }
+        DescribedMotion { spin: rest, accel: -gravity, arm: Vec3::zero(), base: (rest, T::zero(), T::zero()) }
     }
 
     fn child(
@@ -317,7 +317,8 @@ impl<T: Real> Link<T> {
         [q, qd, qdd]: [&[T]; 3],
     ) -> Self {
         let iv = body.iv;
-        let at_rest = |spin, accel: Vec3<T>, arm| Link { spin, accel, arm, base: (spin, T::zero(), T::zero()) };
+        let at_rest =
+            |spin, accel: Vec3<T>, arm| DescribedMotion { spin, accel, arm, base: (spin, T::zero(), T::zero()) };
         match body.kind {
             ReducedJoint::Turn => {
                 let at_joint = turn.parent_to_base(body, self.accel + self.spin.u * arm);
@@ -345,7 +346,7 @@ impl<T: Real> Link<T> {
                         Spin::new(omega, alpha.named("alpha", i))
                     }
                 };
-                Link { spin, accel, arm, base: (base, rate, rate_rate) }
+                DescribedMotion { spin, accel, arm, base: (base, rate, rate_rate) }
             }
             ReducedJoint::Slide => {
                 let q = q[body.iq];

@@ -84,7 +84,7 @@ fn generalized_forces<T: Real>(model: &Model<T>, q: &[T], wrenches: &[ForceVecto
 }
 
 /// How one body moves, in its own axes.
-struct Motion<T> {
+struct BodyMotion<T> {
     /// ω \[rad/s\].
     omega: Vec3<T>,
     /// ε \[rad/s²\].
@@ -133,7 +133,7 @@ impl<T: Real> AccelerationField<T> {
     }
 }
 
-impl<T: Real> Motion<T> {
+impl<T: Real> BodyMotion<T> {
     /// The wrench about the origin that this motion takes of a load: m a + U (m c), and vee(U Σ − (U Σ)ᵀ) + m c × a.
     fn wrench_of(&self, load: &Load<T>) -> ForceVector<T> {
         let (u, s) = (self.field.u, load.second_moment.to_matrix());
@@ -149,7 +149,7 @@ impl<T: Real> Motion<T> {
     /// The world, at rest but for gravity.
     fn of_world(gravity: Vec3<T>) -> Self {
         let (omega, alpha) = (Vec3::zero(), Vec3::zero());
-        Motion { omega, alpha, accel: -gravity, field: AccelerationField::new(omega, alpha) }
+        BodyMotion { omega, alpha, accel: -gravity, field: AccelerationField::new(omega, alpha) }
     }
 
     /// The motion of `body`, which joint `pose` carries, from that of its parent.
@@ -163,7 +163,7 @@ impl<T: Real> Motion<T> {
         let field = AccelerationField::new(omega, alpha);
         let at = || pose.to_child(self.accel + self.field.u * pose.translation);
         let accel = mechanics.acceleration(&at, [w, omega], &field.u, own);
-        Motion { omega, alpha, accel: accel.named("accel", i), field }
+        BodyMotion { omega, alpha, accel: accel.named("accel", i), field }
     }
 }
 
@@ -176,8 +176,8 @@ fn transmitted_wrenches<T: Real>(
     gravity: Vec3<T>,
 ) -> Vec<ForceVector<T>> {
     let poses = JointPose::all(&model.bodies, q);
-    let world = Motion::of_world(gravity);
-    let mut motions: Vec<Motion<T>> = Vec::with_capacity(model.bodies.len());
+    let world = BodyMotion::of_world(gravity);
+    let mut motions: Vec<BodyMotion<T>> = Vec::with_capacity(model.bodies.len());
     for (i, body) in model.bodies.iter().enumerate() {
         T::section("forward", Some(i));
         let parent = body.parent.map_or(&world, |p| &motions[p]);

@@ -5,7 +5,7 @@
 //! their derivatives are taken by the rule of Leibniz, the object's axes turning where it moves.
 
 use super::{equations_of_motion, frame_jacobian, frame_jacobian_bias, frame_pose, frame_velocity};
-use super::{CentreOfMassFrame, CentreOfMassTree, Number};
+use super::{CentreOfMassFrame, CentreOfMassTree, ReferenceReal};
 use crate::dd::Dd;
 use alloc::vec::Vec;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -27,7 +27,7 @@ pub enum Component {
 
 /// A frame of the robot and an object that moves by a law.
 #[derive(Clone, Debug)]
-pub struct ContactFrames<T: Number> {
+pub struct ContactFrames<T: ReferenceReal> {
     /// The frame of the robot.
     pub frame: CentreOfMassFrame<T>,
     /// Tool axis and second axis in the axes of that frame.
@@ -44,7 +44,7 @@ pub struct ContactFrames<T: Number> {
 
 /// A coordinate with what (20.84) needs of it.
 #[derive(Clone, Debug)]
-pub struct Derivatives<T: Number> {
+pub struct Derivatives<T: ReferenceReal> {
     /// s.
     pub s: T,
     /// ṡ.
@@ -56,7 +56,7 @@ pub struct Derivatives<T: Number> {
 }
 
 /// s, ṡ, J and A of one coordinate.
-pub fn functional_coordinate<T: Number>(
+pub fn functional_coordinate<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     contact: &ContactFrames<T>,
     q: &[T],
@@ -124,7 +124,7 @@ pub fn functional_coordinate<T: Number>(
 
 /// x of a x = b by elimination, rows in the order given: for the systems of this module, whose leading minors do not vanish
 /// as H is positive definite and the rows of J are independent.
-fn solve<T: Number>(mut a: DMatrix<T>, mut b: DVector<T>) -> DVector<T> {
+fn solve<T: ReferenceReal>(mut a: DMatrix<T>, mut b: DVector<T>) -> DVector<T> {
     let n = b.len();
     for k in 0..n {
         for i in k + 1..n {
@@ -147,12 +147,12 @@ fn solve<T: Number>(mut a: DMatrix<T>, mut b: DVector<T>) -> DVector<T> {
     b
 }
 
-fn rows<T: Number>(coordinates: &[Derivatives<T>], n: usize) -> DMatrix<T> {
+fn rows<T: ReferenceReal>(coordinates: &[Derivatives<T>], n: usize) -> DMatrix<T> {
     DMatrix::from_fn(coordinates.len(), n, |i, j| coordinates[i].jacobian[j])
 }
 
 /// (H −Jᵀ; J 0).
-fn constrained_matrix<T: Number>(h: &DMatrix<T>, j: &DMatrix<T>) -> DMatrix<T> {
+fn constrained_matrix<T: ReferenceReal>(h: &DMatrix<T>, j: &DMatrix<T>) -> DMatrix<T> {
     let (n, m) = (h.nrows(), j.nrows());
     let mut a = DMatrix::zeros(n + m, n + m);
     a.view_mut((0, 0), (n, n)).copy_from(h);
@@ -162,7 +162,7 @@ fn constrained_matrix<T: Number>(h: &DMatrix<T>, j: &DMatrix<T>) -> DMatrix<T> {
 }
 
 /// q̈ and F of the constrained motion.
-pub fn constrained_motion<T: Number>(
+pub fn constrained_motion<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     coordinates: &[Derivatives<T>],
     q: &[T],
@@ -182,7 +182,7 @@ pub fn constrained_motion<T: Number>(
 }
 
 /// Δq̇ and F Δt of an impact on rigid constraints; `restitution` 0 is the chapter's.
-pub fn rigid_impact<T: Number>(
+pub fn rigid_impact<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     coordinates: &[Derivatives<T>],
     q: &[T],
@@ -202,7 +202,7 @@ pub fn rigid_impact<T: Number>(
 }
 
 /// (H 0 −Jᵀ; −J 1 0; 0 m_e 1) for the unknowns of q, s_6 and F.
-fn environment_matrix<T: Number>(h: &DMatrix<T>, coordinate: &Derivatives<T>, me: T) -> DMatrix<T> {
+fn environment_matrix<T: ReferenceReal>(h: &DMatrix<T>, coordinate: &Derivatives<T>, me: T) -> DMatrix<T> {
     let n = h.nrows();
     let one: T = nalgebra::one();
     let mut a = DMatrix::zeros(n + 2, n + 2);
@@ -218,7 +218,7 @@ fn environment_matrix<T: Number>(h: &DMatrix<T>, coordinate: &Derivatives<T>, me
 }
 
 /// q̈, s̈_6 and F of a robot that presses on a mass with a spring and a damper.
-pub fn environment_motion<T: Number>(
+pub fn environment_motion<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     coordinate: &Derivatives<T>,
     [me, k, b]: [T; 3],
@@ -242,7 +242,7 @@ pub fn environment_motion<T: Number>(
 }
 
 /// Δq̇, Δṡ_6, F Δt and the velocity after a plastic impact on a mass that moves with `before`.
-pub fn environment_impact<T: Number>(
+pub fn environment_impact<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     coordinate: &Derivatives<T>,
     me: T,
@@ -262,6 +262,6 @@ pub fn environment_impact<T: Number>(
 }
 
 /// A frame that is at rest: what an immobile object has for its motion.
-pub fn at_rest<T: Number>() -> [Vector3<T>; 4] {
+pub fn at_rest<T: ReferenceReal>() -> [Vector3<T>; 4] {
     [Vector3::from_element(T::constant(Dd::ZERO)); 4]
 }

@@ -5,14 +5,14 @@
 //! connection. The matrices are inverted as they stand, without looking for symmetry. Elastic transmissions follow
 //! (20.98), (20.99), stage after stage; efficiencies are found by trying all combinations of directions.
 
-use super::Number;
+use super::ReferenceReal;
 use crate::dd::Dd;
 use alloc::vec::Vec;
 use nalgebra::{DMatrix, DVector};
 
 /// ẋ = C x + f M + d u with θ̈ = T ẋ (20.74).
 #[derive(Clone, Debug)]
-pub struct ActuatorModel<T: Number> {
+pub struct ActuatorModel<T: ReferenceReal> {
     /// C.
     pub c: DMatrix<T>,
     /// f.
@@ -25,7 +25,7 @@ pub struct ActuatorModel<T: Number> {
 
 /// A permanent-magnet DC motor, (20.62), (20.63).
 #[derive(Clone, Copy, Debug)]
-pub struct DcMotor<T: Number> {
+pub struct DcMotor<T: ReferenceReal> {
     /// J \[kg·m²\].
     pub j: T,
     /// C_M \[N·m/A\].
@@ -40,7 +40,7 @@ pub struct DcMotor<T: Number> {
     pub l: Option<T>,
 }
 
-impl<T: Number> DcMotor<T> {
+impl<T: ReferenceReal> DcMotor<T> {
     /// (20.65), or (20.67): its c_j is printed without the corrected entry −C_M C_E/(R J) − B/J in the second row.
     pub fn model(&self) -> ActuatorModel<T> {
         let DcMotor { j, c_m, c_e, b, r, l } = *self;
@@ -64,7 +64,7 @@ impl<T: Number> DcMotor<T> {
 
 /// The chain and its rigid drives in a state.
 #[derive(Clone, Debug)]
-pub struct UnitedModel<T: Number> {
+pub struct UnitedModel<T: ReferenceReal> {
     /// H.
     pub h_matrix: DMatrix<T>,
     /// h, less what acts on the joints besides.
@@ -79,7 +79,7 @@ pub struct UnitedModel<T: Number> {
 
 /// What comes out of [`UnitedModel::solve`].
 #[derive(Clone, Debug)]
-pub struct UnitedMotion<T: Number> {
+pub struct UnitedMotion<T: ReferenceReal> {
     /// M of the actuators.
     pub torques: DVector<T>,
     /// τ of the joints.
@@ -90,7 +90,7 @@ pub struct UnitedMotion<T: Number> {
     pub xd: DVector<T>,
 }
 
-impl<T: Number> UnitedModel<T> {
+impl<T: ReferenceReal> UnitedModel<T> {
     /// C = diag C_j, F = diag f_j, D = diag d_j (20.78), T = diag T_j (20.79).
     pub fn stacked(&self) -> [DMatrix<T>; 4] {
         let (m, n) = (self.actuators.len(), self.actuators.iter().map(|a| a.f.len()).sum());
@@ -137,7 +137,7 @@ impl<T: Number> UnitedModel<T> {
     }
 
     /// The same in other numbers.
-    pub fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> UnitedModel<U> {
+    pub fn map<U: ReferenceReal>(&self, f: impl Fn(T) -> U + Copy) -> UnitedModel<U> {
         UnitedModel {
             h_matrix: self.h_matrix.map(f),
             h: self.h.map(f),
@@ -148,8 +148,8 @@ impl<T: Number> UnitedModel<T> {
     }
 }
 
-impl<T: Number> ActuatorModel<T> {
-    fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> ActuatorModel<U> {
+impl<T: ReferenceReal> ActuatorModel<T> {
+    fn map<U: ReferenceReal>(&self, f: impl Fn(T) -> U + Copy) -> ActuatorModel<U> {
         ActuatorModel { c: self.c.map(f), f: self.f.map(f), d: self.d.map(f), t: self.t.map(f) }
     }
 }
@@ -233,7 +233,7 @@ impl UnitedModel<Dd> {
 
 /// A stage of an elastic transmission, Figure 20.17.
 #[derive(Clone, Copy, Debug)]
-pub struct ElasticStage<T: Number> {
+pub struct ElasticStage<T: ReferenceReal> {
     /// N.
     pub n: T,
     /// I′ \[kg·m²\].
@@ -248,7 +248,7 @@ pub struct ElasticStage<T: Number> {
     pub eta: Option<(T, T)>,
 }
 
-impl<T: Number> ElasticStage<T> {
+impl<T: ReferenceReal> ElasticStage<T> {
     /// τ by (20.99), from angle and speed before and behind the stage.
     pub fn torque(&self, theta: (T, T), q: (T, T)) -> T {
         self.c * (theta.0 / self.n - q.0) + self.d * (theta.1 / self.n - q.1)
@@ -271,7 +271,7 @@ impl<T: Number> ElasticStage<T> {
 }
 
 /// M and ẋ of an actuator before an elastic stage that takes `taken`: (I′ + I″/N²) θ̈ = M − taken (20.98) with θ̈ = T ẋ.
-pub fn before_elastic_stage<T: Number>(
+pub fn before_elastic_stage<T: ReferenceReal>(
     actuator: &ActuatorModel<T>,
     x: &DVector<T>,
     u: T,

@@ -5,7 +5,7 @@
 
 use super::{
     geometry, linear_forms, motion, skew, solve_symmetric, CentreOfMassTree, LinearForms, LinkGeometry, LinkMotion,
-    Number,
+    ReferenceReal,
 };
 use crate::dd::Dd;
 use alloc::vec;
@@ -31,7 +31,7 @@ pub struct JointLoad<T> {
 }
 
 /// r_k^{(j)} = S_j C_k: from joint j (S'_j of a linear one) to the centre of mass of link k, which j carries.
-fn lever<T: Number>(tree: &CentreOfMassTree<T>, position: &[LinkGeometry<T>], j: usize, k: usize) -> Vector3<T> {
+fn lever<T: ReferenceReal>(tree: &CentreOfMassTree<T>, position: &[LinkGeometry<T>], j: usize, k: usize) -> Vector3<T> {
     // r_k^{(j)} = Σ_{p=j}^{k−1} (r'_{p,p} − r_{p,p+1}) + r'_{k,k}                                               (20.49)
     let mut sum = position[k].r_dash;
     let mut next = k;
@@ -44,12 +44,12 @@ fn lever<T: Number>(tree: &CentreOfMassTree<T>, position: &[LinkGeometry<T>], j:
 }
 
 /// The links that joint j carries.
-fn carried<T: Number>(tree: &CentreOfMassTree<T>, j: usize) -> impl Iterator<Item = usize> + '_ {
+fn carried<T: ReferenceReal>(tree: &CentreOfMassTree<T>, j: usize) -> impl Iterator<Item = usize> + '_ {
     (j..tree.links.len()).filter(move |&k| tree.carries(j, k))
 }
 
 /// −F_{kI} − G_k = m_k (w_k − g): what has to be applied at C_k; (20.44), (20.46).
-fn applied_force<T: Number>(tree: &CentreOfMassTree<T>, k: usize, motion: &LinkMotion<T>) -> Vector3<T> {
+fn applied_force<T: ReferenceReal>(tree: &CentreOfMassTree<T>, k: usize, motion: &LinkMotion<T>) -> Vector3<T> {
     // F_{kI} = −m_k w_k                                                                                        (20.44)
     let inertial = -motion.w * tree.links[k].mass;
     // G_k = m_k g                                                                                              (20.46)
@@ -58,7 +58,7 @@ fn applied_force<T: Number>(tree: &CentreOfMassTree<T>, k: usize, motion: &LinkM
 }
 
 /// −M_{kI}: the couple that has to be applied to link k; (20.45).
-fn applied_couple<T: Number>(
+fn applied_couple<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     k: usize,
     position: &LinkGeometry<T>,
@@ -74,13 +74,13 @@ fn applied_couple<T: Number>(
 
 /// Forces and moments in all joints, in the order of the links.
 #[doc(alias = "reactions")]
-pub fn joint_loads<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], qdd: &[T]) -> Vec<JointLoad<T>> {
+pub fn joint_loads<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], qdd: &[T]) -> Vec<JointLoad<T>> {
     let position = geometry(tree, q);
     let motion = motion(tree, &position, qd, qdd);
     (0..tree.links.len()).map(|j| joint_load(tree, &position, &motion, j)).collect()
 }
 
-fn joint_load<T: Number>(
+fn joint_load<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     position: &[LinkGeometry<T>],
     motion: &[LinkMotion<T>],
@@ -113,7 +113,7 @@ fn joint_load<T: Number>(
 
 /// Force \[N\] and moment \[N·m\] that the parent exerts on the link through each joint, drive included, in the order of
 /// the links: about the joint point of the link (S''_j of a linear joint, the root point of a free link), in link axes.
-pub fn joint_wrenches<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], qdd: &[T]) -> Vec<[T; 6]> {
+pub fn joint_wrenches<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], qdd: &[T]) -> Vec<[T; 6]> {
     let position = geometry(tree, q);
     joint_loads(tree, q, qd, qdd)
         .iter()
@@ -130,7 +130,12 @@ pub fn joint_wrenches<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], 
 
 /// The generalized forces τ of a motion, directly from D'Alembert's sums (20.50), (20.51), without H and h.
 #[doc(alias = "direct dynamics")]
-pub fn dalembert_inverse_dynamics<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], qdd: &[T]) -> DVector<T> {
+pub fn dalembert_inverse_dynamics<T: ReferenceReal>(
+    tree: &CentreOfMassTree<T>,
+    q: &[T],
+    qd: &[T],
+    qdd: &[T],
+) -> DVector<T> {
     let position = geometry(tree, q);
     let motion = motion(tree, &position, qd, qdd);
     let mut tau = DVector::zeros(tree.nv());
@@ -168,7 +173,7 @@ pub fn dalembert_inverse_dynamics<T: Number>(tree: &CentreOfMassTree<T>, q: &[T]
 
 /// H and h of τ = H q̈ + h.
 #[derive(Clone, Debug, PartialEq)]
-pub struct EquationsOfMotion<T: Number> {
+pub struct EquationsOfMotion<T: ReferenceReal> {
     /// H: inertial matrix, n × n.
     #[doc(alias = "inertial matrix")]
     pub mass_matrix: DMatrix<T>,
@@ -177,7 +182,7 @@ pub struct EquationsOfMotion<T: Number> {
 }
 
 /// What one link contributes to the rows of H and h of every joint that carries it.
-struct LinkTerms<T: Number> {
+struct LinkTerms<T: ReferenceReal> {
     /// m_k Ξ^k
     force_matrix: Matrix3xX<T>,
     /// m_k (Δ^k − g)
@@ -188,7 +193,7 @@ struct LinkTerms<T: Number> {
     couple: Vector3<T>,
 }
 
-fn link_terms<T: Number>(
+fn link_terms<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     k: usize,
     position: &LinkGeometry<T>,
@@ -207,7 +212,7 @@ fn link_terms<T: Number>(
 }
 
 /// H and h at a state, by the linear forms.
-pub fn equations_of_motion<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> EquationsOfMotion<T> {
+pub fn equations_of_motion<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> EquationsOfMotion<T> {
     let n = tree.nv();
     let position = geometry(tree, q);
     let forms = linear_forms(tree, &position, qd);
@@ -248,37 +253,37 @@ pub fn equations_of_motion<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &
     EquationsOfMotion { mass_matrix, bias_force }
 }
 
-fn rest<T: Number>(tree: &CentreOfMassTree<T>) -> Vec<T> {
+fn rest<T: ReferenceReal>(tree: &CentreOfMassTree<T>) -> Vec<T> {
     vec![T::constant(Dd::ZERO); tree.nv()]
 }
 
 /// H(q), the inertial matrix \[kg·m², kg·m, kg\].
 #[doc(alias = "inertial matrix")]
-pub fn mass_matrix<T: Number>(tree: &CentreOfMassTree<T>, q: &[T]) -> DMatrix<T> {
+pub fn mass_matrix<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T]) -> DMatrix<T> {
     equations_of_motion(tree, q, &rest(tree)).mass_matrix
 }
 
 /// h(q, q̇) = C(q, q̇) q̇ + g(q) \[N·m or N\].
-pub fn bias_force<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> DVector<T> {
+pub fn bias_force<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> DVector<T> {
     equations_of_motion(tree, q, qd).bias_force
 }
 
 /// g(q): h at rest \[N·m or N\].
-pub fn gravity_force<T: Number>(tree: &CentreOfMassTree<T>, q: &[T]) -> DVector<T> {
+pub fn gravity_force<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T]) -> DVector<T> {
     equations_of_motion(tree, q, &rest(tree)).bias_force
 }
 
 /// C(q, q̇) q̇: h without gravity \[N·m or N\].
 #[doc(alias = "centrifugal")]
 #[doc(alias = "Coriolis")]
-pub fn velocity_force<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> DVector<T> {
+pub fn velocity_force<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> DVector<T> {
     let weightless = CentreOfMassTree { gravity: Vector3::zeros(), ..tree.clone() };
     equations_of_motion(&weightless, q, qd).bias_force
 }
 
 /// The generalized forces τ of a motion \[N·m or N\].
 #[doc(alias = "direct dynamics")]
-pub fn inverse_dynamics<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], qdd: &[T]) -> DVector<T> {
+pub fn inverse_dynamics<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], qdd: &[T]) -> DVector<T> {
     let EquationsOfMotion { mass_matrix, bias_force } = equations_of_motion(tree, q, qd);
     // τ = H q̈ + h                                                                                              (20.59)
     mass_matrix * DVector::from_column_slice(qdd) + bias_force
@@ -286,7 +291,7 @@ pub fn inverse_dynamics<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]
 
 /// The accelerations q̈ that the generalized forces τ cause.
 #[doc(alias = "inverse dynamics of the chapter")]
-pub fn forward_dynamics<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], tau: &[T]) -> DVector<T> {
+pub fn forward_dynamics<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], tau: &[T]) -> DVector<T> {
     let EquationsOfMotion { mass_matrix, bias_force } = equations_of_motion(tree, q, qd);
     // q̈ = H⁻¹(q) (τ − h(q, q̇))                                                                                 (20.61)
     solve_symmetric(&mass_matrix, &(DVector::from_column_slice(tau) - bias_force))
@@ -296,7 +301,7 @@ pub fn forward_dynamics<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]
 ///
 /// |r_k^{(j)}| m_k |w_k − g| + |J̃_k ε̃_k + ω̃_k × J̃_k ω̃_k| over the links k that a rotation moves, m_k |w_k − g| over
 /// those that a translation moves.
-pub fn natural_scale<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], qdd: &[T]) -> DVector<T> {
+pub fn natural_scale<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], qdd: &[T]) -> DVector<T> {
     let position = geometry(tree, q);
     let motion = motion(tree, &position, qd, qdd);
     let norm = |v: &Vector3<T>| v.dot(v).sqrt();
@@ -323,7 +328,7 @@ pub fn natural_scale<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], q
 
 /// For every component of q̈ = H⁻¹(τ − h) what rounding is judged against: |H⁻¹| (|τ| + scale of h + |H| |q̈|), with the
 /// moduli of all entries.
-pub fn forward_natural_scale<T: Number>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], tau: &[T]) -> DVector<T> {
+pub fn forward_natural_scale<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T], tau: &[T]) -> DVector<T> {
     let n = tree.nv();
     let modulus = |x: T| (x * x).sqrt();
     let mass_matrix = mass_matrix(tree, q);

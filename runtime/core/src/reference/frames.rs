@@ -3,7 +3,7 @@
 //! From the linear forms Λ, Γ, Ξ, Δ of section 20.2.1, carried from the centre of mass C_j to the frame's origin P by the
 //! vector ρ = C_j P. World axes, linear part first.
 
-use super::{geometry, linear_forms, skew, CentreOfMassFrame, CentreOfMassTree, LinkGeometry, Number};
+use super::{geometry, linear_forms, skew, CentreOfMassFrame, CentreOfMassTree, LinkGeometry, ReferenceReal};
 use crate::dd::Dd;
 use alloc::vec;
 use nalgebra::{DVector, Matrix3, Matrix6xX, Vector3, Vector6};
@@ -19,12 +19,12 @@ pub struct FramePose<T> {
 }
 
 /// ρ = C_j P in the external frame.
-fn offset<T: Number>(frame: &CentreOfMassFrame<T>, link: &LinkGeometry<T>) -> Vector3<T> {
+fn offset<T: ReferenceReal>(frame: &CentreOfMassFrame<T>, link: &LinkGeometry<T>) -> Vector3<T> {
     link.rotation * frame.position
 }
 
 /// Where the frame is.
-pub fn frame_pose<T: Number>(tree: &CentreOfMassTree<T>, frame: &CentreOfMassFrame<T>, q: &[T]) -> FramePose<T> {
+pub fn frame_pose<T: ReferenceReal>(tree: &CentreOfMassTree<T>, frame: &CentreOfMassFrame<T>, q: &[T]) -> FramePose<T> {
     match frame.link {
         None => FramePose { position: frame.position, rotation: frame.rotation },
         Some(j) => {
@@ -35,7 +35,11 @@ pub fn frame_pose<T: Number>(tree: &CentreOfMassTree<T>, frame: &CentreOfMassFra
 }
 
 /// Geometric Jacobian of the frame at its origin, 6 × n.
-pub fn frame_jacobian<T: Number>(tree: &CentreOfMassTree<T>, frame: &CentreOfMassFrame<T>, q: &[T]) -> Matrix6xX<T> {
+pub fn frame_jacobian<T: ReferenceReal>(
+    tree: &CentreOfMassTree<T>,
+    frame: &CentreOfMassFrame<T>,
+    q: &[T],
+) -> Matrix6xX<T> {
     let n = tree.nv();
     let mut jacobian = Matrix6xX::zeros(n);
     if let Some(j) = frame.link {
@@ -51,7 +55,7 @@ pub fn frame_jacobian<T: Number>(tree: &CentreOfMassTree<T>, frame: &CentreOfMas
 }
 
 /// J̇ q̇ of the frame: its linear and angular acceleration for q̈ = 0.
-pub fn frame_jacobian_bias<T: Number>(
+pub fn frame_jacobian_bias<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     frame: &CentreOfMassFrame<T>,
     q: &[T],
@@ -71,7 +75,7 @@ pub fn frame_jacobian_bias<T: Number>(
 }
 
 /// Linear velocity of the frame's origin and its angular velocity: J q̇.
-pub fn frame_velocity<T: Number>(
+pub fn frame_velocity<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     frame: &CentreOfMassFrame<T>,
     q: &[T],
@@ -81,7 +85,7 @@ pub fn frame_velocity<T: Number>(
 }
 
 /// Linear acceleration of the frame's origin and its angular acceleration: J q̈ + J̇ q̇.
-pub fn frame_acceleration<T: Number>(
+pub fn frame_acceleration<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     frame: &CentreOfMassFrame<T>,
     q: &[T],

@@ -2,7 +2,7 @@
 //!
 //! Section 20.1.2, equation (20.25) and the appendix, (20.100)–(20.111).
 
-use super::{CentreOfMassLink, CentreOfMassTree, ExtendedPosition, Joint, Number};
+use super::{CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint, ReferenceReal};
 use crate::dd::Dd;
 use alloc::vec::Vec;
 use nalgebra::{Matrix3, Vector3};
@@ -26,14 +26,14 @@ pub struct LinkGeometry<T> {
 }
 
 /// `v / |v|`. The null vector gives NaN.
-pub fn unit<T: Number>(v: &Vector3<T>) -> Vector3<T> {
+pub fn unit<T: ReferenceReal>(v: &Vector3<T>) -> Vector3<T> {
     let norm = v.dot(v).sqrt();
     v.map(|x| x / norm)
 }
 
 /// The matrix a̲ that performs the vector product, a̲ b = a × b.
 #[doc(alias = "underline")]
-pub fn skew<T: Number>(a: &Vector3<T>) -> Matrix3<T> {
+pub fn skew<T: ReferenceReal>(a: &Vector3<T>) -> Matrix3<T> {
     let o: T = nalgebra::zero();
     //     ⎡  0   −a_z   a_y ⎤
     // a̲ = ⎢ a_z    0   −a_x ⎥                                                                              (20.56)
@@ -44,7 +44,7 @@ pub fn skew<T: Number>(a: &Vector3<T>) -> Matrix3<T> {
 /// A⁰_{j−1,j} of the extended joint. `e_parent` and `r_parent` in the parent's frame, `e` and `r` in frame j; in a
 /// specificity, the r vectors are the r* vectors.
 #[doc(alias = "extended position")]
-pub fn extended_joint<T: Number>(
+pub fn extended_joint<T: ReferenceReal>(
     e_parent: &Vector3<T>,
     r_parent: &Vector3<T>,
     e: &Vector3<T>,
@@ -64,7 +64,7 @@ pub fn extended_joint<T: Number>(
 
 /// The vector `v0` rotated about the unit vector `e` by the angle `q` \[rad\].
 #[doc(alias = "finite rotation")]
-pub fn rodrigues<T: Number>(v0: &Vector3<T>, e: &Vector3<T>, q: T) -> Vector3<T> {
+pub fn rodrigues<T: ReferenceReal>(v0: &Vector3<T>, e: &Vector3<T>, q: T) -> Vector3<T> {
     let (sin, cos) = q.sin_cos();
     let one: T = nalgebra::one();
     // corrected: (e · V⁰) e, printed (e × V⁰) e
@@ -76,7 +76,7 @@ pub fn rodrigues<T: Number>(v0: &Vector3<T>, e: &Vector3<T>, q: T) -> Vector3<T>
 ///
 /// The quaternion is normalised first, as the reference data are. Not in the chapter: Rodrigues' formula with
 /// (x, y, z) = e sin(q/2), w = cos(q/2).
-pub fn quaternion_rotation<T: Number>(xyzw: [T; 4]) -> Matrix3<T> {
+pub fn quaternion_rotation<T: ReferenceReal>(xyzw: [T; 4]) -> Matrix3<T> {
     let [x, y, z, w] = xyzw;
     let one: T = nalgebra::one();
     let two = one + one;
@@ -88,7 +88,7 @@ pub fn quaternion_rotation<T: Number>(xyzw: [T; 4]) -> Matrix3<T> {
 
 /// A_{j−1,j}: from frame j to the parent's frame, at the joint's coordinate.
 #[doc(alias = "A_{j-1,j}")]
-fn relative_rotation<T: Number>(link: &CentreOfMassLink<T>, q: T) -> Matrix3<T> {
+fn relative_rotation<T: ReferenceReal>(link: &CentreOfMassLink<T>, q: T) -> Matrix3<T> {
     // A linear joint is turned by the constant angle α_j, a revolute one by q_j.
     let (extended, alpha) = match &link.extended {
         ExtendedPosition::Matrix(extended) => (*extended, T::constant(Dd::ZERO)),
@@ -99,7 +99,7 @@ fn relative_rotation<T: Number>(link: &CentreOfMassLink<T>, q: T) -> Matrix3<T> 
         }
     };
     let [turns, _] = link.joint.shares().expect("a free link has no extended position");
-    let angle = if link.joint == Joint::Linear { alpha } else { q * turns };
+    let angle = if link.joint == ReferenceJoint::Linear { alpha } else { q * turns };
     // A⁰_{j−1,j} = [V⁰_{j1} V⁰_{j2} V⁰_{j3}]                                                                   (20.107)
     let v0 = |k: usize| extended.column(k).into_owned();
     let v = |k: usize| rodrigues(&v0(k), &link.e_parent, angle);
@@ -108,7 +108,7 @@ fn relative_rotation<T: Number>(link: &CentreOfMassLink<T>, q: T) -> Matrix3<T> 
 }
 
 /// Positions of all links at the coordinates `q`, in the order of the links.
-pub fn geometry<T: Number>(tree: &CentreOfMassTree<T>, q: &[T]) -> Vec<LinkGeometry<T>> {
+pub fn geometry<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T]) -> Vec<LinkGeometry<T>> {
     assert_eq!(q.len(), tree.nq(), "one value per position coordinate");
     let mut links: Vec<LinkGeometry<T>> = Vec::with_capacity(tree.links.len());
     for link in &tree.links {
@@ -127,7 +127,7 @@ pub fn geometry<T: Number>(tree: &CentreOfMassTree<T>, q: &[T]) -> Vec<LinkGeome
     links
 }
 
-fn one_joint<T: Number>(
+fn one_joint<T: ReferenceReal>(
     link: &CentreOfMassLink<T>,
     (q, s): (T, T),
     parent_rotation: &Matrix3<T>,
@@ -146,7 +146,7 @@ fn one_joint<T: Number>(
     LinkGeometry { rotation, centre_of_mass, e, r, r_dash, r_parent }
 }
 
-fn free<T: Number>(link: &CentreOfMassLink<T>, q: &[T]) -> LinkGeometry<T> {
+fn free<T: ReferenceReal>(link: &CentreOfMassLink<T>, q: &[T]) -> LinkGeometry<T> {
     let rotation = quaternion_rotation([q[3], q[4], q[5], q[6]]);
     let r = rotation * link.r;
     let root_point = Vector3::new(q[0], q[1], q[2]);

@@ -2,7 +2,7 @@
 //!
 //! Section 20.2.1, equations (20.23)–(20.43). All vectors are in the external frame.
 
-use super::{skew, CentreOfMassTree, LinkGeometry, Number};
+use super::{skew, CentreOfMassTree, LinkGeometry, ReferenceReal};
 use alloc::vec::Vec;
 use nalgebra::{Matrix3xX, Vector3};
 
@@ -19,7 +19,7 @@ pub struct LinkMotion<T> {
     pub w: Vector3<T>,
 }
 
-impl<T: Number> LinkMotion<T> {
+impl<T: ReferenceReal> LinkMotion<T> {
     /// The base, which rests.
     fn rest() -> Self {
         let o = Vector3::zeros();
@@ -28,7 +28,7 @@ impl<T: Number> LinkMotion<T> {
 }
 
 /// Velocities and accelerations of all links, in the order of the links.
-pub fn motion<T: Number>(
+pub fn motion<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     geometry: &[LinkGeometry<T>],
     qd: &[T],
@@ -48,7 +48,7 @@ pub fn motion<T: Number>(
     links
 }
 
-fn one_joint<T: Number>(
+fn one_joint<T: ReferenceReal>(
     [turns, s]: [T; 2],
     position: &LinkGeometry<T>,
     parent: &LinkMotion<T>,
@@ -75,7 +75,7 @@ fn one_joint<T: Number>(
     LinkMotion { omega, epsilon, v, w }
 }
 
-fn free<T: Number>(position: &LinkGeometry<T>, qd: &[T], qdd: &[T]) -> LinkMotion<T> {
+fn free<T: ReferenceReal>(position: &LinkGeometry<T>, qd: &[T], qdd: &[T]) -> LinkMotion<T> {
     let LinkGeometry { rotation, r, .. } = position;
     let root_velocity = rotation * Vector3::new(qd[0], qd[1], qd[2]);
     // ω_0 = A_0 ω̃_0,  and as ω × ω = 0:  ε_0 = A_0 dω̃_0/dt
@@ -93,7 +93,7 @@ fn free<T: Number>(position: &LinkGeometry<T>, qd: &[T], qdd: &[T]) -> LinkMotio
 
 /// The linear forms of one link's motion: ω = Λ q̇, v = Ξ q̇, ε = Λ q̈ + Γ, w = Ξ q̈ + Δ; (20.32)–(20.39).
 #[derive(Clone, Debug, PartialEq)]
-pub struct LinearForms<T: Number> {
+pub struct LinearForms<T: ReferenceReal> {
     /// Λ^j, 3 × n.
     pub lambda: Matrix3xX<T>,
     /// Γ^j, 3 × 1.
@@ -107,7 +107,7 @@ pub struct LinearForms<T: Number> {
 }
 
 /// Λ, Γ, Ξ, Δ of all links, in the order of the links.
-pub fn linear_forms<T: Number>(
+pub fn linear_forms<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     geometry: &[LinkGeometry<T>],
     qd: &[T],
@@ -127,12 +127,12 @@ pub fn linear_forms<T: Number>(
 }
 
 /// The base rests: Λ⁰ = 0, Γ⁰ = 0, Ξ⁰ = 0, Δ⁰ = 0.
-fn base_forms<T: Number>(n: usize) -> LinearForms<T> {
+fn base_forms<T: ReferenceReal>(n: usize) -> LinearForms<T> {
     let o = Vector3::zeros();
     LinearForms { lambda: Matrix3xX::zeros(n), gamma: o, xi: Matrix3xX::zeros(n), delta: o, omega: o }
 }
 
-fn one_joint_forms<T: Number>(
+fn one_joint_forms<T: ReferenceReal>(
     [turns, s]: [T; 2],
     position: &LinkGeometry<T>,
     parent: &LinearForms<T>,
@@ -176,7 +176,12 @@ fn one_joint_forms<T: Number>(
     LinearForms { lambda, gamma, xi, delta, omega }
 }
 
-fn free_forms<T: Number>(position: &LinkGeometry<T>, base: LinearForms<T>, iv: usize, qd: &[T]) -> LinearForms<T> {
+fn free_forms<T: ReferenceReal>(
+    position: &LinkGeometry<T>,
+    base: LinearForms<T>,
+    iv: usize,
+    qd: &[T],
+) -> LinearForms<T> {
     let LinkGeometry { rotation, r, .. } = position;
     let root_velocity = rotation * Vector3::new(qd[0], qd[1], qd[2]);
     let omega = rotation * Vector3::new(qd[3], qd[4], qd[5]);

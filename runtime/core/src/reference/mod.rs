@@ -8,7 +8,7 @@
 //! only the scalars and nalgebra's products.
 //!
 //! Two generalisations, both marked where they occur: the chain becomes a tree (the index j − 1 becomes the parent of j,
-//! a sum over k = j … n a sum over the links that joint j carries), and the first link may float ([`Joint::Free`]).
+//! a sum over k = j … n a sum over the links that joint j carries), and the first link may float ([`ReferenceJoint::Free`]).
 //!
 //! The chapter calls *direct dynamics* what is called inverse dynamics today, and the reverse; names here are today's,
 //! and the chapter's are aliases for the search.
@@ -63,10 +63,10 @@ pub use dynamics::{
     gravity_force, inverse_dynamics, joint_loads, joint_wrenches, mass_matrix, natural_scale, velocity_force,
     EquationsOfMotion, JointLoad,
 };
-pub use energy::{centre_of_mass, kinetic_energy, momentum, potential_energy, Momentum};
+pub use energy::{centre_of_mass, kinetic_energy, momentum, potential_energy, ReferenceMomentum};
 pub use frames::{frame_acceleration, frame_jacobian, frame_jacobian_bias, frame_pose, frame_velocity, FramePose};
 pub use geometry::{extended_joint, geometry, quaternion_rotation, rodrigues, skew, unit, LinkGeometry};
 pub use kinematics::{linear_forms, motion, LinearForms, LinkMotion};
-pub use scalar::Number;
+pub use scalar::ReferenceReal;
 pub use solve::solve_symmetric;
-pub use tree::{CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, Joint};
+pub use tree::{CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint};

@@ -8,9 +8,9 @@ use core::ops::{AddAssign, DivAssign, MulAssign, SubAssign};
 use num_traits::{One, Zero};
 
 /// A [`Real`] that nalgebra can add and multiply: f32, f64, [`Dd`], and [`Magnitude`], over which every formula says its natural scale, too.
-pub trait Number: Real + nalgebra::Scalar + Zero + One + AddAssign + SubAssign + MulAssign + DivAssign {}
+pub trait ReferenceReal: Real + nalgebra::Scalar + Zero + One + AddAssign + SubAssign + MulAssign + DivAssign {}
 
-impl<T: Real + nalgebra::Scalar + Zero + One + AddAssign + SubAssign + MulAssign + DivAssign> Number for T {}
+impl<T: Real + nalgebra::Scalar + Zero + One + AddAssign + SubAssign + MulAssign + DivAssign> ReferenceReal for T {}
 
 macro_rules! number {
     ($T:ident) => {

@@ -1,6 +1,6 @@
 //! Dense solution of a symmetric positive definite system, for q̈ = H⁻¹(τ − h).
 
-use super::Number;
+use super::ReferenceReal;
 use nalgebra::{DMatrix, DVector};
 
 /// `x` of `a x = b` by `a = L D Lᵀ`, for a symmetric positive definite `a`; only the lower triangle is read.
@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 /// The pivots d_j are quotients of leading principal minors, so they are positive for a positive definite `a`, and no
 /// exchange of rows is needed; a singular `a` gives infinities or NaN.
 #[doc(alias = "Cholesky")]
-pub fn solve_symmetric<T: Number>(a: &DMatrix<T>, b: &DVector<T>) -> DVector<T> {
+pub fn solve_symmetric<T: ReferenceReal>(a: &DMatrix<T>, b: &DVector<T>) -> DVector<T> {
     let n = b.len();
     assert_eq!(a.shape(), (n, n), "a square matrix of the order of the right-hand side");
     let mut l = a.clone();

@@ -5,14 +5,14 @@
 //! `r_parent`, `r_parent_star` those on the parent's frame (tilde below, e_j and r_{j−1,j}). The world is frame 0, with its
 //! origin C_0.
 
-use super::Number;
+use super::ReferenceReal;
 use alloc::string::String;
 use alloc::vec::Vec;
 use nalgebra::{Matrix3, Vector3};
 
 /// How a link moves against its parent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Joint {
+pub enum ReferenceJoint {
     /// s_j = 0: turns about e_j by q_j \[rad\].
     Revolute,
     /// s_j = 1: slides along e_j by q_j \[m\].
@@ -24,12 +24,12 @@ pub enum Joint {
     Free,
 }
 
-impl Joint {
+impl ReferenceJoint {
     /// The joint that robot files mean by a word, with the number that goes with it; `None`: it has not one degree of freedom.
-    pub fn of_word(word: &str, _number: Option<f64>) -> Option<Joint> {
+    pub fn of_word(word: &str, _number: Option<f64>) -> Option<ReferenceJoint> {
         match word {
-            "revolute" | "continuous" => Some(Joint::Revolute),
-            "prismatic" | "linear" => Some(Joint::Linear),
+            "revolute" | "continuous" => Some(ReferenceJoint::Revolute),
+            "prismatic" | "linear" => Some(ReferenceJoint::Linear),
             _ => None,
         }
     }
@@ -37,17 +37,17 @@ impl Joint {
     /// (1 − s_j, s_j) with the indicator s_j of (20.6), 0 for a revolute joint, 1 for a linear one: how much a joint turns and how much it
     /// slides per unit of its coordinate. A free link has none.
     #[doc(alias = "s_j")]
-    pub fn shares<T: Number>(self) -> Option<[T; 2]> {
+    pub fn shares<T: ReferenceReal>(self) -> Option<[T; 2]> {
         match self {
-            Joint::Revolute => Some([nalgebra::one(), nalgebra::zero()]),
-            Joint::Linear => Some([nalgebra::zero(), nalgebra::one()]),
-            Joint::Free => None,
+            ReferenceJoint::Revolute => Some([nalgebra::one(), nalgebra::zero()]),
+            ReferenceJoint::Linear => Some([nalgebra::zero(), nalgebra::one()]),
+            ReferenceJoint::Free => None,
         }
     }
 
     /// Number of position coordinates.
     pub const fn nq(self) -> usize {
-        if matches!(self, Joint::Free) {
+        if matches!(self, ReferenceJoint::Free) {
             7
         } else {
             1
@@ -56,7 +56,7 @@ impl Joint {
 
     /// Number of velocity coordinates.
     pub const fn nv(self) -> usize {
-        if matches!(self, Joint::Free) {
+        if matches!(self, ReferenceJoint::Free) {
             6
         } else {
             1
@@ -90,7 +90,7 @@ pub struct CentreOfMassLink<T> {
     /// frame 0.
     pub parent: Option<usize>,
     /// How it moves.
-    pub joint: Joint,
+    pub joint: ReferenceJoint,
     /// First index into q.
     pub iq: usize,
     /// First index into q̇, q̈ and τ.
@@ -114,13 +114,13 @@ pub struct CentreOfMassLink<T> {
     pub extended: ExtendedPosition<T>,
 }
 
-impl<T: Number> CentreOfMassLink<T> {
+impl<T: ReferenceReal> CentreOfMassLink<T> {
     /// A link that is free in the world: q = (position of the root point, quaternion of the link's axes).
     pub fn free(name: String, mass: T, inertia: Matrix3<T>, r: Vector3<T>) -> Self {
         CentreOfMassLink {
             name,
             parent: None,
-            joint: Joint::Free,
+            joint: ReferenceJoint::Free,
             iq: 0,
             iv: 0,
             mass,
@@ -134,8 +134,8 @@ impl<T: Number> CentreOfMassLink<T> {
     }
 }
 
-impl<T: Number> CentreOfMassLink<T> {
-    fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> CentreOfMassLink<U> {
+impl<T: ReferenceReal> CentreOfMassLink<T> {
+    fn map<U: ReferenceReal>(&self, f: impl Fn(T) -> U + Copy) -> CentreOfMassLink<U> {
         CentreOfMassLink {
             name: self.name.clone(),
             parent: self.parent,
@@ -160,8 +160,8 @@ impl<T: Number> CentreOfMassLink<T> {
     }
 }
 
-impl<T: Number> CentreOfMassFrame<T> {
-    fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> CentreOfMassFrame<U> {
+impl<T: ReferenceReal> CentreOfMassFrame<T> {
+    fn map<U: ReferenceReal>(&self, f: impl Fn(T) -> U + Copy) -> CentreOfMassFrame<U> {
         CentreOfMassFrame {
             name: self.name.clone(),
             link: self.link,
@@ -198,7 +198,7 @@ pub struct CentreOfMassTree<T> {
     pub frames: Vec<CentreOfMassFrame<T>>,
 }
 
-impl<T: Number> CentreOfMassTree<T> {
+impl<T: ReferenceReal> CentreOfMassTree<T> {
     /// Number of position coordinates.
     pub fn nq(&self) -> usize {
         self.links.iter().map(|link| link.joint.nq()).sum()
@@ -220,7 +220,7 @@ impl<T: Number> CentreOfMassTree<T> {
     }
 
     /// The same robot in other numbers.
-    pub fn map<U: Number>(&self, f: impl Fn(T) -> U + Copy) -> CentreOfMassTree<U> {
+    pub fn map<U: ReferenceReal>(&self, f: impl Fn(T) -> U + Copy) -> CentreOfMassTree<U> {
         CentreOfMassTree {
             name: self.name.clone(),
             gravity: self.gravity.map(f),

@@ -11,7 +11,7 @@ use straightline_core::reference::{
     forward_natural_scale, frame_jacobian, frame_jacobian_bias, frame_pose, frame_velocity, geometry, gravity_force,
     inverse_dynamics, joint_loads, joint_wrenches, kinetic_energy, linear_forms, mass_matrix, momentum, motion,
     natural_scale, potential_energy, rodrigues, skew, unit, velocity_force, CentreOfMassFrame, CentreOfMassLink,
-    CentreOfMassTree, ExtendedPosition, Joint, LinkGeometry, LinkMotion,
+    CentreOfMassTree, ExtendedPosition, LinkGeometry, LinkMotion, ReferenceJoint,
 };
 use straightline_core::Dd;
 
@@ -222,7 +222,7 @@ fn frozen(tree: &CentreOfMassTree<Dd>, q: &[Dd], printing: &Printing) -> (Centre
         let ExtendedPosition::ByVectors { r_star, r_parent_star, alpha } = &link.extended else { continue };
         let r_parent = r_parent_star.unwrap_or(link.r_parent);
         let a0 = (printing.extended)(&link.e_parent, &r_parent, &link.e, &r_star.unwrap_or(link.r));
-        let angle = if link.joint == Joint::Linear { *alpha } else { std::mem::take(&mut q[link.iq]) };
+        let angle = if link.joint == ReferenceJoint::Linear { *alpha } else { std::mem::take(&mut q[link.iq]) };
         let v = |k: usize| (printing.rotate)(&a0.column(k).into_owned(), &link.e_parent, angle);
         link.extended = ExtendedPosition::Matrix(Matrix3::from_columns(&[v(0), v(1), v(2)]));
     }
@@ -341,7 +341,7 @@ fn assert_close(what: &str, tree: &CentreOfMassTree<Dd>, a: &[Dd], b: &[Dd], tol
 fn advanced(tree: &CentreOfMassTree<Dd>, q: &[Dd], qd: &[Dd], time: Dd) -> Vec<Dd> {
     let mut q = q.to_vec();
     for link in &tree.links {
-        if link.joint == Joint::Free {
+        if link.joint == ReferenceJoint::Free {
             // ṗ = R v, and the quaternion's derivative is half its product with (ω, 0)
             let rotation = geometry(tree, &q)[0].rotation;
             let v = rotation * Vector3::new(qd[link.iv], qd[link.iv + 1], qd[link.iv + 2]);
@@ -527,7 +527,7 @@ fn planar_link(
     CentreOfMassLink {
         name: String::new(),
         parent,
-        joint: Joint::Revolute,
+        joint: ReferenceJoint::Revolute,
         iq: 0,
         iv: 0,
         mass: Dd::from(mass),

@@ -8,7 +8,9 @@ use nalgebra::{Matrix3, Vector3};
 use straightline_core::algorithms;
 use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion, Surface};
 use straightline_core::model::{self, Body, Frame, JointKind, Limits, Model};
-use straightline_core::reference::{self, unit, CentreOfMassTree, Component, ContactFrames, ExtendedPosition, Joint};
+use straightline_core::reference::{
+    self, unit, CentreOfMassTree, Component, ContactFrames, ExtendedPosition, ReferenceJoint,
+};
 use straightline_core::spatial::{Mat3, MotionVector, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::Dd;
 
@@ -39,17 +41,17 @@ fn canonical(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Model<Dd> {
         .links
         .iter()
         .map(|link| match link.joint {
-            Joint::Free => (Matrix3::identity(), -link.r),
-            Joint::Revolute | Joint::Linear => (canonical_axes(random, &link.e), -link.r),
+            ReferenceJoint::Free => (Matrix3::identity(), -link.r),
+            ReferenceJoint::Revolute | ReferenceJoint::Linear => (canonical_axes(random, &link.e), -link.r),
         })
         .collect();
     let bodies = tree.links.iter().zip(&frames).map(|(link, (axes, origin))| {
         let kind = match link.joint {
-            Joint::Revolute => JointKind::Revolute,
-            Joint::Linear => JointKind::Prismatic,
-            Joint::Free => JointKind::Floating,
+            ReferenceJoint::Revolute => JointKind::Revolute,
+            ReferenceJoint::Linear => JointKind::Prismatic,
+            ReferenceJoint::Free => JointKind::Floating,
         };
-        let placement = if link.joint == Joint::Free {
+        let placement = if link.joint == ReferenceJoint::Free {
             Transform::identity()
         } else {
             let (parent_axes, parent_origin) =
@@ -105,7 +107,7 @@ fn at_zero(link: &reference::CentreOfMassLink<Dd>) -> Matrix3<Dd> {
     let triad = |x: Vector3<Dd>, e: &Vector3<Dd>| Matrix3::from_columns(&[x, e.cross(&x), *e]);
     let here = triad(across(r_star.unwrap_or(link.r), &link.e), &link.e);
     let there = triad(across(-r_parent_star.unwrap_or(link.r_parent), &link.e_parent), &link.e_parent);
-    let (sin, cos) = if link.joint == Joint::Linear { alpha.sin_cos() } else { (Dd::ZERO, Dd::ONE) };
+    let (sin, cos) = if link.joint == ReferenceJoint::Linear { alpha.sin_cos() } else { (Dd::ZERO, Dd::ONE) };
     let (o, l) = (Dd::ZERO, Dd::ONE);
     there * Matrix3::new(cos, -sin, o, sin, cos, o, o, o, l) * here.transpose()
 }

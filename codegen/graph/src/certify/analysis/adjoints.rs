@@ -1,14 +1,14 @@
 //! Adjoints of a result, and how far those of the perturbed program may be from the exact ones.
 
-use super::super::forms::{Atom, Coefficient, Term};
+use super::super::forms::{Atom, Coefficient, FormTerm};
 use super::super::interval::Interval;
 use super::super::norms::Bounded;
-use super::super::tape::{Bound, Pen, Range};
-use super::state::State;
-use super::{Analysis, Broken};
+use super::super::tape::{Enclosure, Pen, UpperBound};
+use super::state::BoxState;
+use super::{Broken, ErrorAnalysis};
 use crate::expr::{Binary, NodeId, Op};
 
-impl Analysis<'_> {
+impl ErrorAnalysis<'_> {
     /// Adjoints of all nodes for a result; those of nodes that it does not need stay zero.
     pub(super) fn adjoints(&mut self, cone: usize) {
         let result = self.cones[cone].0;
@@ -20,7 +20,7 @@ impl Analysis<'_> {
             let sums = self.adjoint_sums[n as usize].take().expect("live nodes have adjoints");
             let (chain, apart) = &sums;
             let mut adjoint = if self.is_broken(Broken::ChainRule) && chain.form.len() > 1 {
-                self.part(&chain.form[1..], Range::ZERO)
+                self.part(&chain.form[1..], Enclosure::ZERO)
             } else {
                 self.enclosure(chain)
             };
@@ -46,15 +46,15 @@ impl Analysis<'_> {
 
     /// How far an adjoint of the perturbed program may be from that of the exact one, from those of its users:
     /// |c̃ ã − c a| ≤ |c̃| |ã − a| + |a| |c̃ − c|.
-    fn adjoint_off(&mut self, chain: &Bounded) -> Bound {
-        let mut sum = Bound::ZERO;
+    fn adjoint_off(&mut self, chain: &Bounded) -> UpperBound {
+        let mut sum = UpperBound::ZERO;
         for t in &*chain.form {
             let (Atom::Adjoint(_) | Atom::Seed(_)) = t.atom else { unreachable!("adjoints come from adjoints") };
-            let of_user = self.state.term(self.graph, &Term { coefficient: Coefficient::One, ..*t });
-            let alone = Term { coefficient: t.coefficient, atom: Atom::One, negative: false };
+            let of_user = self.state.term(self.graph, &FormTerm { coefficient: Coefficient::One, ..*t });
+            let alone = FormTerm { coefficient: t.coefficient, atom: Atom::One, negative: false };
             let coefficient = self.state.term(self.graph, &alone);
             let coefficient_off = self.coefficient_off(t.coefficient);
-            let State { pen, adjoint_off, .. } = &mut self.state;
+            let BoxState { pen, adjoint_off, .. } = &mut self.state;
             if let Atom::Adjoint(u) = t.atom {
                 let coefficient = pen.mag(coefficient);
                 let part = pen.mul_up(coefficient, adjoint_off[u as usize]);
@@ -68,16 +68,16 @@ impl Analysis<'_> {
     }
 
     /// How far a coefficient of the perturbed program may be from the exact one.
-    fn coefficient_off(&mut self, coefficient: Coefficient) -> Bound {
+    fn coefficient_off(&mut self, coefficient: Coefficient) -> UpperBound {
         let kernel = self.format.trig_error(1.0);
-        let State { pen, value, total_error, .. } = &mut self.state;
+        let BoxState { pen, value, total_error, .. } = &mut self.state;
         let off = |n: u32| total_error[n as usize];
         let reciprocal = |b: NodeId, pen: &mut Pen| {
-            let reciprocal = pen.over(Range::ONE, value[b.index()]);
+            let reciprocal = pen.over(Enclosure::ONE, value[b.index()]);
             pen.mag(reciprocal)
         };
         match coefficient {
-            Coefficient::One => Bound::ZERO,
+            Coefficient::One => UpperBound::ZERO,
             Coefficient::Node(n) => off(n),
             Coefficient::Sin(p) | Coefficient::Cos(p) => {
                 let kernel = pen.number(kernel);

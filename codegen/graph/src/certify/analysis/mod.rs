@@ -6,19 +6,19 @@ mod ranges;
 mod sharing;
 mod state;
 
-use super::format::Format;
-use super::forms::{Atom, Coefficient, Forms, Term};
+use super::format::FloatFormat;
+use super::forms::{Atom, AtomForms, Coefficient, FormTerm};
 use super::interval::{mul_up, Interval};
 use super::norms::{Bounded, GroupId, Groups};
-use super::tape::{Bound, Norm, Range, Tape};
+use super::tape::{Enclosure, Norm, Tape, UpperBound};
 use crate::expr::{Binary, Graph, NodeId, Op};
 use rustc_hash::FxHashMap;
 use sharing::Sharing;
-use state::State;
+use state::BoxState;
 
 /// What is known of a program for forward dynamics, beyond what its operations say.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Known {
+pub struct KnownSystem {
     /// Ranges of exact values.
     pub values: Vec<(NodeId, Interval)>,
     /// Of a result and a value: the exact adjoint is at most so much.
@@ -26,10 +26,10 @@ pub struct Known {
 }
 
 /// A graph that is being analysed in a format; what does not depend on the box is found once.
-pub struct Analysis<'g> {
+pub struct ErrorAnalysis<'g> {
     graph: &'g Graph,
-    format: Format,
-    forms: Forms,
+    format: FloatFormat,
+    forms: AtomForms,
     groups: Groups,
     /// Per node, the form of a sum with its groups.
     sums: Vec<Option<Bounded>>,
@@ -43,7 +43,7 @@ pub struct Analysis<'g> {
     sharing: Sharing,
     /// Nodes that each result needs, users first.
     cones: Vec<(NodeId, Vec<u32>)>,
-    state: State,
+    state: BoxState,
     /// Per node, what is known of its exact value.
     known: Vec<Option<Interval>>,
     /// Of a result and a node, at most so much is the exact adjoint.
@@ -75,7 +75,7 @@ pub(super) enum Broken {
 
 /// Why a result has no certificate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
+pub enum NoCertificate {
     /// An input has no range, as the inertial parameters of a payload that is an input.
     Unlimited,
     /// A divisor, or what stands under a root, may vanish in the box.
@@ -86,23 +86,23 @@ pub enum Refusal {
     Overflow,
 }
 
-impl Refusal {
+impl NoCertificate {
     /// In words.
     pub fn words(self) -> &'static str {
         match self {
-            Refusal::Unlimited => "an input has no range",
-            Refusal::Division => "a divisor or the argument of a root may vanish",
-            Refusal::Sign => "the sign of a computed value may be wrong",
-            Refusal::Overflow => "a value may overflow, or an angle leave the domain of sine and cosine",
+            NoCertificate::Unlimited => "an input has no range",
+            NoCertificate::Division => "a divisor or the argument of a root may vanish",
+            NoCertificate::Sign => "the sign of a computed value may be wrong",
+            NoCertificate::Overflow => "a value may overflow, or an angle leave the domain of sine and cosine",
         }
     }
 }
 
-impl<'g> Analysis<'g> {
+impl<'g> ErrorAnalysis<'g> {
     /// Reads a graph.
-    pub fn new(graph: &'g Graph, format: Format) -> Self {
+    pub fn new(graph: &'g Graph, format: FloatFormat) -> Self {
         let live = graph.live();
-        let forms = Forms::new(graph, &live, &format);
+        let forms = AtomForms::new(graph, &live, &format);
         let mut groups = Groups::default();
         let mut sums = vec![None; graph.ops.len()];
         let mut cancelled = vec![None; graph.ops.len()];
@@ -110,7 +110,7 @@ impl<'g> Analysis<'g> {
         let mut adjoint_sums = vec![None; graph.ops.len()];
         let sharing = Sharing::new(graph, &live, &forms, &mut groups);
         let is_plain = |id: NodeId| !matches!(graph.op(id), Op::Constant(_) | Op::Sin(_) | Op::Cos(_) | Op::Input(_));
-        let one = |id: NodeId| Term { coefficient: Coefficient::One, atom: Atom::Value(id.0), negative: false };
+        let one = |id: NodeId| FormTerm { coefficient: Coefficient::One, atom: Atom::Value(id.0), negative: false };
         for id in graph.ids().filter(|id| live[id.index()]) {
             let i = id.index();
             match graph.op(id) {
@@ -133,16 +133,16 @@ impl<'g> Analysis<'g> {
         results.dedup();
         let cones = results.into_iter().map(|r| (r, cone(graph, r))).collect();
         let n = graph.ops.len();
-        let state = State {
-            value: vec![Range::ZERO; n],
-            error: vec![Bound::ZERO; n],
-            total_error: vec![Bound::ZERO; n],
-            sin_cos: vec![[(Range::ZERO, Range::ZERO); 2]; n],
-            adjoint: vec![Range::ZERO; n],
-            adjoint_off: vec![Bound::ZERO; n],
-            ..State::default()
+        let state = BoxState {
+            value: vec![Enclosure::ZERO; n],
+            error: vec![UpperBound::ZERO; n],
+            total_error: vec![UpperBound::ZERO; n],
+            sin_cos: vec![[(Enclosure::ZERO, Enclosure::ZERO); 2]; n],
+            adjoint: vec![Enclosure::ZERO; n],
+            adjoint_off: vec![UpperBound::ZERO; n],
+            ..BoxState::default()
         };
-        Analysis {
+        ErrorAnalysis {
             graph,
             format,
             forms,
@@ -162,7 +162,7 @@ impl<'g> Analysis<'g> {
     }
 
     /// What is known of exact values and adjoints, wherever it is known from.
-    pub(super) fn know(&mut self, known: &Known) {
+    pub(super) fn know(&mut self, known: &KnownSystem) {
         self.known.resize(self.graph.ops.len(), None);
         for (id, range) in &known.values {
             let at = &mut self.known[id.index()];
@@ -188,16 +188,16 @@ impl<'g> Analysis<'g> {
     ///
     /// # Errors
     /// If a value can be no number.
-    pub fn ranges(&mut self, inputs: &[Interval]) -> Result<(), Refusal> {
+    pub fn ranges(&mut self, inputs: &[Interval]) -> Result<(), NoCertificate> {
         self.find_ranges(inputs, false)
     }
 
-    /// [`Analysis::ranges`], and all that is computed is written down, for [`Analysis::error_and_tape`].
-    pub(super) fn ranges_on_tape(&mut self, inputs: &[Interval]) -> Result<(), Refusal> {
+    /// [`ErrorAnalysis::ranges`], and all that is computed is written down, for [`ErrorAnalysis::error_and_tape`].
+    pub(super) fn ranges_on_tape(&mut self, inputs: &[Interval]) -> Result<(), NoCertificate> {
         self.find_ranges(inputs, true)
     }
 
-    /// What the errors of a node's class are worth for the result of [`Analysis::error`] at hand: the node that stands for the class,
+    /// What the errors of a node's class are worth for the result of [`ErrorAnalysis::error`] at hand: the node that stands for the class,
     /// and its greatest adjoint times its errors.
     pub fn shares(&mut self, cone: usize) -> Vec<(NodeId, f64)> {
         self.adjoints(cone);
@@ -206,7 +206,7 @@ impl<'g> Analysis<'g> {
         let share = |n: &u32| mul_up(state.adjoint[*n as usize].x.mag(), state.class_error[*n as usize].x);
         let shares = nodes.iter().map(|n| (NodeId(*n), share(n))).filter(|(_, share)| *share > 0.0).collect();
         for &n in &nodes {
-            self.state.adjoint[n as usize] = Range::ZERO;
+            self.state.adjoint[n as usize] = Enclosure::ZERO;
         }
         self.cones[cone].1 = nodes;
         shares
@@ -222,7 +222,7 @@ impl<'g> Analysis<'g> {
         self.state.error[id.index()].x
     }
 
-    /// The range of a node's value, over the box of [`Analysis::ranges`].
+    /// The range of a node's value, over the box of [`ErrorAnalysis::ranges`].
     pub fn range(&self, id: NodeId) -> Interval {
         self.state.value[id.index()].x
     }
@@ -259,12 +259,12 @@ impl<'g> Analysis<'g> {
         inputs.collect()
     }
 
-    /// The greatest error of a distinct result, over the box of [`Analysis::ranges`].
+    /// The greatest error of a distinct result, over the box of [`ErrorAnalysis::ranges`].
     pub fn error(&mut self, cone: usize) -> f64 {
         self.error_bound(cone).x
     }
 
-    /// [`Analysis::error`] after [`Analysis::ranges_on_tape`], and the steps by which it is found. `samples`: parts of the box, as [`Tape::new`] takes them.
+    /// [`ErrorAnalysis::error`] after [`ErrorAnalysis::ranges_on_tape`], and the steps by which it is found. `samples`: parts of the box, as [`Tape::new`] takes them.
     pub(super) fn error_and_tape(&mut self, cone: usize, samples: &[&[Interval]]) -> (f64, Tape) {
         let mark = self.state.pen.mark();
         let error = self.error_bound(cone);
@@ -275,10 +275,10 @@ impl<'g> Analysis<'g> {
         (error.x, tape)
     }
 
-    fn error_bound(&mut self, cone: usize) -> Bound {
+    fn error_bound(&mut self, cone: usize) -> UpperBound {
         self.adjoints(cone);
         let nodes = std::mem::take(&mut self.cones[cone].1);
-        let mut sum = Bound::ZERO;
+        let mut sum = UpperBound::ZERO;
         let mut grouped: Vec<usize> = Vec::new();
         for &n in &nodes {
             let class = n as usize;
@@ -295,7 +295,7 @@ impl<'g> Analysis<'g> {
         for team in grouped {
             let group = self.sharing.teams[team].1;
             let classes = &self.sharing.teams[team].0;
-            let mut one_by_one = Bound::ZERO;
+            let mut one_by_one = UpperBound::ZERO;
             let mut errors = Norm::ZERO;
             for c in classes {
                 one_by_one = self.state.add_share(one_by_one, *c);
@@ -318,7 +318,7 @@ impl<'g> Analysis<'g> {
             sum = self.state.pen.add_up(sum, least);
         }
         for &n in &nodes {
-            self.state.adjoint[n as usize] = Range::ZERO;
+            self.state.adjoint[n as usize] = Enclosure::ZERO;
         }
         self.cones[cone].1 = nodes;
         sum

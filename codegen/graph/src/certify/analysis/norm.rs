@@ -1,21 +1,21 @@
 //! Ranges of forms and norms of their groups, by the rules of [`norms`](super::super::norms).
 
-use super::super::forms::{Atom, Term};
-use super::super::norms::{Bounded, Factor, GroupId, Way};
-use super::super::tape::{Bound, Norm, Range};
-use super::state::State;
-use super::{Analysis, Broken};
+use super::super::forms::{Atom, FormTerm};
+use super::super::norms::{Bounded, GroupFactor, GroupId, Way};
+use super::super::tape::{Enclosure, Norm, UpperBound};
+use super::state::BoxState;
+use super::{Broken, ErrorAnalysis};
 
 /// Ways to bound a norm stay if they come so near to the best one where they are first tried.
 const WORTHWHILE: f64 = 1.5;
 
-impl Analysis<'_> {
+impl ErrorAnalysis<'_> {
     /// A form's range: parts of one angle by their norm where that is less.
-    pub(super) fn enclosure(&mut self, form: &Bounded) -> Range {
-        let mut sum = Range::ZERO;
+    pub(super) fn enclosure(&mut self, form: &Bounded) -> Enclosure {
+        let mut sum = Enclosure::ZERO;
         let mut start = 0;
         for (pair, end, group) in &form.turns {
-            let mut part = self.part(&form.form[start..*end], Range::ZERO);
+            let mut part = self.part(&form.form[start..*end], Enclosure::ZERO);
             start = *end;
             if !part.x.is_zero() {
                 let norm = self.norm(*group);
@@ -29,7 +29,7 @@ impl Analysis<'_> {
             sum = self.state.pen.add(sum, part);
         }
         for (end, values, atoms) in &form.dots {
-            let mut part = self.part(&form.form[start..*end], Range::ZERO);
+            let mut part = self.part(&form.form[start..*end], Enclosure::ZERO);
             start = *end;
             if !part.x.is_zero() {
                 let (values, atoms) = (self.norm(*values), self.norm(*atoms));
@@ -42,7 +42,7 @@ impl Analysis<'_> {
     }
 
     /// A sum, and some terms.
-    pub(super) fn part(&mut self, terms: &[Term], mut sum: Range) -> Range {
+    pub(super) fn part(&mut self, terms: &[FormTerm], mut sum: Enclosure) -> Enclosure {
         for t in terms {
             let term = self.state.term(self.graph, t);
             sum = self.state.pen.add(sum, term);
@@ -57,10 +57,10 @@ impl Analysis<'_> {
     }
 
     /// An upper bound of the norm of a group.
-    pub(super) fn norm(&mut self, id: GroupId) -> Bound {
+    pub(super) fn norm(&mut self, id: GroupId) -> UpperBound {
         let k = id as usize;
         if self.state.norm.len() <= k {
-            self.state.norm.resize(self.groups.groups.len().max(k + 1), (0, Bound::ZERO));
+            self.state.norm.resize(self.groups.groups.len().max(k + 1), (0, UpperBound::ZERO));
         }
         // a round is either a box's or a result's, and asks for no group of the other kind
         let known = self.state.norm[k];
@@ -70,7 +70,7 @@ impl Analysis<'_> {
         let current = if self.groups.groups[k].of_adjoints { self.state.result_round } else { self.state.box_round };
         let mut ends = Norm::ZERO;
         for m in self.groups.members(id) {
-            let mut sum = Range::ZERO;
+            let mut sum = Enclosure::ZERO;
             for t in m {
                 let term = self.state.term(self.graph, t);
                 sum = self.state.pen.add(sum, term);
@@ -126,28 +126,28 @@ impl Analysis<'_> {
     }
 
     /// The bound of a way, and whether it is all of it: what is no better than the best one is not looked at further.
-    fn by_way(&mut self, way: &Way, best: Bound) -> (Bound, bool) {
+    fn by_way(&mut self, way: &Way, best: UpperBound) -> (UpperBound, bool) {
         let mut slack = Norm::ZERO;
         for s in way.slack.iter() {
-            let State { error, total_error, pen, .. } = &mut self.state;
-            let rounding = s.nodes.iter().fold(Bound::ZERO, |s, n| pen.add_up(s, error[*n as usize]));
+            let BoxState { error, total_error, pen, .. } = &mut self.state;
+            let rounding = s.nodes.iter().fold(UpperBound::ZERO, |s, n| pen.add_up(s, error[*n as usize]));
             let all = s.totals.iter().fold(rounding, |s, n| pen.add_up(s, total_error[*n as usize]));
             pen.add_square(&mut slack, all);
         }
         let mut bound = self.state.pen.root(slack);
         for (factor, inner) in way.parts.iter() {
             let factor = match factor {
-                Factor::Turn(pair) => {
+                GroupFactor::Turn(pair) => {
                     let stretch = self.stretch(*pair);
                     self.state.pen.number(stretch)
                 }
-                Factor::Matrix(x) => self.state.pen.number(*x),
-                Factor::Coefficient(c) => {
-                    let alone = Term { coefficient: *c, atom: Atom::One, negative: false };
+                GroupFactor::Matrix(x) => self.state.pen.number(*x),
+                GroupFactor::Coefficient(c) => {
+                    let alone = FormTerm { coefficient: *c, atom: Atom::One, negative: false };
                     let value = self.state.term(self.graph, &alone);
                     self.state.pen.mag(value)
                 }
-                Factor::Values(group) => self.norm(*group),
+                GroupFactor::Values(group) => self.norm(*group),
             };
             let inner = self.norm(*inner);
             let part = self.state.pen.mul_up(factor, inner);

@@ -1,17 +1,17 @@
 //! Ranges of all values over a box, and the rounding errors of all of them.
 
-use super::super::format::Format;
+use super::super::format::FloatFormat;
 use super::super::forms::Atom;
 use super::super::interval::{add_up, Interval};
-use super::super::tape::{Bound, Pen, Range};
-use super::state::State;
-use super::{Analysis, Broken, Refusal};
+use super::super::tape::{Enclosure, Pen, UpperBound};
+use super::state::BoxState;
+use super::{Broken, ErrorAnalysis, NoCertificate};
 use crate::expr::op::Slope;
 use crate::expr::{Binary, NodeId, Op, Precision, Unary};
 use crate::number::Scalar;
 
-impl Analysis<'_> {
-    pub(super) fn find_ranges(&mut self, inputs: &[Interval], writes: bool) -> Result<(), Refusal> {
+impl ErrorAnalysis<'_> {
+    pub(super) fn find_ranges(&mut self, inputs: &[Interval], writes: bool) -> Result<(), NoCertificate> {
         self.state.pen.start(writes);
         self.state.round += 1;
         self.state.box_round = self.state.round;
@@ -38,7 +38,7 @@ impl Analysis<'_> {
                 range = pen.intersect(range, computed);
             }
             if range.x.mag().is_nan() || range.x.mag() >= self.format.largest {
-                return Err(Refusal::Overflow);
+                return Err(NoCertificate::Overflow);
             }
             self.state.value[i] = range;
             self.state.error[i] = error;
@@ -48,12 +48,12 @@ impl Analysis<'_> {
     }
 
     /// How far the errors of its operands take a value from the exact one. Ranges hold both.
-    fn carried_error(&mut self, i: usize) -> Bound {
-        let State { total_error, value, pen, .. } = &mut self.state;
+    fn carried_error(&mut self, i: usize) -> UpperBound {
+        let BoxState { total_error, value, pen, .. } = &mut self.state;
         let error = |a: NodeId| total_error[a.index()];
         let value = |a: NodeId| value[a.index()];
         match self.graph.ops[i] {
-            Op::Input(_) | Op::Constant(_) => Bound::ZERO,
+            Op::Input(_) | Op::Constant(_) => UpperBound::ZERO,
             Op::SinCos(a) | Op::Sin(a) | Op::Cos(a) => error(a),
             Op::AngleSum(a, b) => pen.add_up(error(a), error(b)),
             // |â/b̂ − a/b| ≤ (|â − a| + |a/b| |b̂ − b|) / |b̂|
@@ -62,7 +62,7 @@ impl Analysis<'_> {
                 let quotient = pen.mag(quotient);
                 let shifted = pen.mul_up(quotient, error(b));
                 let sum = pen.add_up(error(a), shifted);
-                let reciprocal = pen.over(Range::ONE, value(b));
+                let reciprocal = pen.over(Enclosure::ONE, value(b));
                 let reciprocal = pen.mag(reciprocal);
                 pen.mul_up(sum, reciprocal)
             }
@@ -80,7 +80,7 @@ impl Analysis<'_> {
 
     /// The errors of all nodes that share an adjoint, added up.
     fn class_errors(&mut self) {
-        let mut class_error = vec![Bound::ZERO; self.graph.ops.len()];
+        let mut class_error = vec![UpperBound::ZERO; self.graph.ops.len()];
         let mut error = self.state.error.clone();
         for k in 0..self.sharing.products.len() {
             // |x c| + |y s| ≤ ‖(x, y)‖ ‖(c, s)‖, each product rounded by u of itself at most
@@ -94,7 +94,7 @@ impl Analysis<'_> {
             let together = pen.add_up(rounding, least);
             let apart = pen.add_up(error[a], error[b]);
             if together.x < apart.x {
-                (error[a], error[b]) = (pen.least(together, apart), Bound::ZERO);
+                (error[a], error[b]) = (pen.least(together, apart), UpperBound::ZERO);
             }
         }
         for (i, e) in error.into_iter().enumerate().filter(|(_, e)| e.x > 0.0) {
@@ -105,7 +105,7 @@ impl Analysis<'_> {
     }
 
     /// What rounding node i to its formats can do.
-    fn rounding(&mut self, i: usize, range: Range) -> Bound {
+    fn rounding(&mut self, i: usize, range: Enclosure) -> UpperBound {
         let Precision { computed, held } = self.precision(i);
         let own = self.format;
         let pen = &mut self.state.pen;
@@ -137,10 +137,10 @@ impl Analysis<'_> {
     }
 
     /// The range of an operation on computed operands, before its own rounding, and the bound of that.
-    fn exact_range(&mut self, i: usize, inputs: &[Interval]) -> Result<(Range, Bound), Refusal> {
+    fn exact_range(&mut self, i: usize, inputs: &[Interval]) -> Result<(Enclosure, UpperBound), NoCertificate> {
         let format = self.format;
         let v = |this: &Self, a: NodeId| this.state.value[a.index()];
-        let rounded = |this: &mut Self, x: Range| Ok((x, this.rounding(i, x)));
+        let rounded = |this: &mut Self, x: Enclosure| Ok((x, this.rounding(i, x)));
         Ok(match self.graph.ops[i] {
             Op::Input(k) => {
                 let x = inputs[k as usize];
@@ -159,20 +159,20 @@ impl Analysis<'_> {
             Op::Unary(Unary::Sign, a) => {
                 let sign = v(self, a).x.sign();
                 if sign.has_zero() && !matches!(self.graph.op(a), Op::Input(_)) {
-                    return Err(Refusal::Sign);
+                    return Err(NoCertificate::Sign);
                 }
-                (self.state.pen.constant(sign), Bound::ZERO)
+                (self.state.pen.constant(sign), UpperBound::ZERO)
             }
             Op::Unary(op, a) => {
                 if op == Unary::Sqrt && v(self, a).x.lo <= 0.0 {
-                    return Err(Refusal::Division);
+                    return Err(NoCertificate::Division);
                 }
                 let value = self.state.pen.unary(op, v(self, a));
                 if !op.row().is_exact {
                     return rounded(self, value);
                 }
                 if !self.precision(i).is_rounded() {
-                    return Ok((value, Bound::ZERO));
+                    return Ok((value, UpperBound::ZERO));
                 }
                 let magnitude = self.state.pen.mag(value);
                 let error = format.rounding(magnitude.x);
@@ -180,28 +180,34 @@ impl Analysis<'_> {
             }
             Op::Binary(op, a, b) => return self.exact_binary(i, op, a, b),
             // formed exactly: what rounding loses goes into the reduction
-            Op::AngleSum(a, b) => (self.state.pen.add(v(self, a), v(self, b)), Bound::ZERO),
+            Op::AngleSum(a, b) => (self.state.pen.add(v(self, a), v(self, b)), UpperBound::ZERO),
             Op::SinCos(a) => {
                 let angle = v(self, a);
                 if angle.x.mag() > format.trig_domain {
-                    return Err(Refusal::Overflow);
+                    return Err(NoCertificate::Overflow);
                 }
                 let pen = &mut self.state.pen;
                 let (sin, cos) = pen.sin_cos(angle);
                 let e = pen.number(format.trig_error(1.0));
                 self.state.sin_cos[i] = [(sin, cos), (pen.widened(sin, e), pen.widened(cos, e))];
-                (angle, Bound::ZERO)
+                (angle, UpperBound::ZERO)
             }
             Op::Sin(p) => self.half(self.state.sin_cos[p.index()][0].0),
             Op::Cos(p) => self.half(self.state.sin_cos[p.index()][0].1),
         })
     }
 
-    /// [`Analysis::exact_range`] of an operation on two numbers.
-    fn exact_binary(&mut self, i: usize, op: Binary, a: NodeId, b: NodeId) -> Result<(Range, Bound), Refusal> {
+    /// [`ErrorAnalysis::exact_range`] of an operation on two numbers.
+    fn exact_binary(
+        &mut self,
+        i: usize,
+        op: Binary,
+        a: NodeId,
+        b: NodeId,
+    ) -> Result<(Enclosure, UpperBound), NoCertificate> {
         let [x, y] = [a, b].map(|a| self.state.value[a.index()]);
         if op == Binary::Div && y.x.has_zero() {
-            return Err(Refusal::Division);
+            return Err(NoCertificate::Division);
         }
         if op == Binary::Mul && a == b {
             let square = self.state.pen.square(x);
@@ -223,14 +229,14 @@ impl Analysis<'_> {
         let is_shift = op == Binary::Mul && is_plain && (self.is_power_of_two(a) || self.is_power_of_two(b));
         let error = match (is_shift, op.row().is_exact) {
             (true, _) => self.state.pen.number(self.format.tiny),
-            (false, true) => Bound::ZERO,
+            (false, true) => UpperBound::ZERO,
             (false, false) => self.rounding(i, value),
         };
         Ok((value, error))
     }
 
     /// A sine or cosine, and its error.
-    fn half(&mut self, exact: Range) -> (Range, Bound) {
+    fn half(&mut self, exact: Enclosure) -> (Enclosure, UpperBound) {
         let magnitude = self.state.pen.mag(exact);
         let error = self.format.trig_error(magnitude.x);
         let unit = (self.format.trig_ulps * self.format.u).next_up();
@@ -248,25 +254,25 @@ impl Analysis<'_> {
     }
 
     /// The range of a sum, from that of its operands and from its form.
-    fn sum(&mut self, i: usize, direct: Range) -> Range {
+    fn sum(&mut self, i: usize, direct: Enclosure) -> Enclosure {
         let sum = self.sums[i].take().expect("sums have forms");
         let enclosure = self.enclosure(&sum);
         self.sums[i] = Some(sum);
         let (_, slack) = self.forms.flat(Atom::Value(i as u32));
-        let State { error, pen, .. } = &mut self.state;
+        let BoxState { error, pen, .. } = &mut self.state;
         let others = slack.nodes.iter().filter(|n| **n as usize != i);
-        let slack = others.fold(Bound::ZERO, |s, n| pen.add_up(s, error[*n as usize]));
+        let slack = others.fold(UpperBound::ZERO, |s, n| pen.add_up(s, error[*n as usize]));
         let enclosure = pen.widened(enclosure, slack);
         pen.intersect(direct, enclosure)
     }
 }
 
 /// The format of a scalar, where an analysis is made in this one.
-fn format_of(own: Format, scalar: Scalar) -> Format {
+fn format_of(own: FloatFormat, scalar: Scalar) -> FloatFormat {
     if scalar == own.scalar {
         own
     } else {
-        Format::of(scalar)
+        FloatFormat::of(scalar)
     }
 }
 
@@ -275,15 +281,15 @@ fn format_of(own: Format, scalar: Scalar) -> Format {
 fn carried(
     pen: &mut Pen,
     slope: Slope,
-    error: Bound,
-    [operand, other]: [Range; 2],
-    value: &dyn Fn(&mut Pen) -> Range,
-) -> Bound {
+    error: UpperBound,
+    [operand, other]: [Enclosure; 2],
+    value: &dyn Fn(&mut Pen) -> Enclosure,
+) -> UpperBound {
     let slope = match slope {
-        Slope::Zero => return Bound::ZERO,
+        Slope::Zero => return UpperBound::ZERO,
         Slope::One | Slope::MinusOne => return error,
         Slope::Other => other,
-        Slope::Reciprocal => pen.over(Range::ONE, other),
+        Slope::Reciprocal => pen.over(Enclosure::ONE, other),
         Slope::MinusQuotient => {
             let value = value(pen);
             pen.over(value, operand)
@@ -291,7 +297,7 @@ fn carried(
         Slope::HalfReciprocal => {
             let value = value(pen);
             let both = pen.add(value, value);
-            pen.over(Range::ONE, both)
+            pen.over(Enclosure::ONE, both)
         }
     };
     let slope = pen.mag(slope);

@@ -1,6 +1,6 @@
 //! Errors that share an adjoint, and adjoints that share a norm.
 
-use super::super::forms::{Atom, Coefficient, Forms, Term};
+use super::super::forms::{Atom, AtomForms, Coefficient, FormTerm};
 use super::super::norms::{GroupId, Groups};
 use crate::expr::{Binary, Graph, Op};
 use std::sync::Arc;
@@ -20,7 +20,7 @@ pub(super) struct Sharing {
 }
 
 impl Sharing {
-    pub(super) fn new(graph: &Graph, live: &[bool], forms: &Forms, groups: &mut Groups) -> Self {
+    pub(super) fn new(graph: &Graph, live: &[bool], forms: &AtomForms, groups: &mut Groups) -> Self {
         let n = graph.ops.len();
         let class: Vec<usize> = forms.class.iter().map(|c| *c as usize).collect();
         let mut candidates: Vec<Vec<usize>> = Vec::new();
@@ -39,7 +39,7 @@ impl Sharing {
             let bounded = groups.bounded(forms.chain[i].clone());
             for (_, _, group) in &bounded.turns {
                 let alone = groups.members(*group).map(|m| match m[..] {
-                    [Term { coefficient: Coefficient::One, atom: Atom::Adjoint(u), .. }] => Some(class[u as usize]),
+                    [FormTerm { coefficient: Coefficient::One, atom: Atom::Adjoint(u), .. }] => Some(class[u as usize]),
                     _ => None,
                 });
                 if let Some(pair) = alone.collect::<Option<Vec<usize>>>() {
@@ -62,7 +62,7 @@ impl Sharing {
                 continue;
             }
             let adjoint = |c: &usize| {
-                vec![Term { coefficient: Coefficient::One, atom: Atom::Adjoint(*c as u32), negative: false }]
+                vec![FormTerm { coefficient: Coefficient::One, atom: Atom::Adjoint(*c as u32), negative: false }]
             };
             let group = groups.group(classes.iter().map(adjoint));
             classes.iter().for_each(|c| team[*c] = Some(teams.len()));
@@ -89,12 +89,12 @@ impl Sharing {
 fn turning_products(
     graph: &Graph,
     live: &[bool],
-    forms: &Forms,
+    forms: &AtomForms,
     class: &[usize],
     groups: &mut Groups,
 ) -> Vec<(usize, usize, u32, GroupId)> {
     // by adjoint and pair, those with the sine and those with the cosine
-    type Products = [Vec<(usize, Term)>; 2];
+    type Products = [Vec<(usize, FormTerm)>; 2];
     let mut turning: std::collections::BTreeMap<(usize, u32), Products> = std::collections::BTreeMap::new();
     for i in (0..live.len()).filter(|i| live[*i] && matches!(graph.ops[*i], Op::Binary(Binary::Mul, ..))) {
         if let ([t], _) = forms.flat(Atom::Value(i as u32)) {
@@ -108,7 +108,7 @@ fn turning_products(
     let mut products = Vec::new();
     for ((_, pair), [sines, cosines]) in turning {
         for ((a, x), (b, y)) in sines.iter().zip(&cosines) {
-            let bare = |t: &Term| vec![Term { coefficient: Coefficient::One, ..*t }];
+            let bare = |t: &FormTerm| vec![FormTerm { coefficient: Coefficient::One, ..*t }];
             products.push((*a, *b, pair, groups.group([bare(x), bare(y)])));
         }
     }

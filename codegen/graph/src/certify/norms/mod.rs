@@ -20,7 +20,7 @@
 
 mod ways;
 
-use super::forms::{canonical, simplified, Atom, Coefficient, Form, Slack, Term};
+use super::forms::{canonical, simplified, Atom, Coefficient, FormTerm, LinearForm, Slack};
 use rustc_hash::{FxBuildHasher, FxHashMap};
 use std::hash::BuildHasher;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ pub type GroupId = u32;
 
 /// Which rules are tried on a group: what is left over by one is not worth all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Effort {
+pub enum RuleEffort {
     /// All rules.
     All,
     /// All, of what another rule left over.
@@ -43,11 +43,11 @@ pub enum Effort {
 
 /// A group of forms, and what it can be led back to.
 #[derive(Clone, Debug)]
-pub struct Group {
+pub struct FormGroup {
     /// Where its members stand: the first, and behind the last.
     members: (u32, u32),
     /// Which rules may be tried.
-    pub effort: Effort,
+    pub effort: RuleEffort,
     /// Whether adjoints are in it, so that its norm is another for each result.
     pub of_adjoints: bool,
     /// The members with the groups of their parts, once they are wanted; none if no member has such parts.
@@ -60,7 +60,7 @@ pub struct Group {
 
 /// What stands before the group that is left.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Factor {
+pub enum GroupFactor {
     /// T of a pair.
     Turn(u32),
     /// The norm of a matrix.
@@ -75,7 +75,7 @@ pub enum Factor {
 #[derive(Clone, Debug)]
 pub struct Way {
     /// Factors, and the groups that are left.
-    pub parts: Parts,
+    pub parts: WayParts,
     /// What does not belong to them, one form per member.
     pub rest: GroupId,
     /// Errors between the members and their forms, for each member.
@@ -84,20 +84,20 @@ pub struct Way {
 
 /// What a way leads back to: a factor and a group, as a rule, which stands in its place.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Parts {
+pub enum WayParts {
     /// One factor and group: the rule, without an allocation.
-    One([(Factor, GroupId); 1]),
+    One([(GroupFactor, GroupId); 1]),
     /// More than one, one after the other.
-    Several(Vec<(Factor, GroupId)>),
+    Several(Vec<(GroupFactor, GroupId)>),
 }
 
-impl std::ops::Deref for Parts {
-    type Target = [(Factor, GroupId)];
+impl std::ops::Deref for WayParts {
+    type Target = [(GroupFactor, GroupId)];
 
     fn deref(&self) -> &Self::Target {
         match self {
-            Parts::One(part) => part,
-            Parts::Several(parts) => parts,
+            WayParts::One(part) => part,
+            WayParts::Several(parts) => parts,
         }
     }
 }
@@ -106,7 +106,7 @@ impl std::ops::Deref for Parts {
 #[derive(Clone, Debug, Default)]
 pub struct Bounded {
     /// The terms: those of the turns, those of the scalar products, the others.
-    pub form: Box<[Term]>,
+    pub form: Box<[FormTerm]>,
     /// Pair, where its terms end, and the group of their atoms.
     pub turns: Vec<(u32, usize, GroupId)>,
     /// Scalar products: where their terms end, and the groups of their coefficients and of their atoms.
@@ -124,9 +124,9 @@ impl Bounded {
 #[derive(Clone, Debug, Default)]
 pub struct Groups {
     /// All groups.
-    pub groups: Vec<Group>,
+    pub groups: Vec<FormGroup>,
     /// Terms of all members, one behind the other: there are many, most of one term.
-    terms: Vec<Term>,
+    terms: Vec<FormTerm>,
     /// Where each member ends.
     ends: Vec<u32>,
     /// The first group of each hash; for look-ups only.
@@ -136,7 +136,7 @@ pub struct Groups {
 }
 
 /// The pair of a turning term, and whether its coefficient is the sine.
-fn turn(t: &Term) -> Option<(u32, bool)> {
+fn turn(t: &FormTerm) -> Option<(u32, bool)> {
     match t.coefficient {
         Coefficient::Sin(p) => Some((p, true)),
         Coefficient::Cos(p) => Some((p, false)),
@@ -144,19 +144,19 @@ fn turn(t: &Term) -> Option<(u32, bool)> {
     }
 }
 
-fn bare(t: &Term) -> Term {
-    Term { coefficient: Coefficient::One, ..*t }
+fn bare(t: &FormTerm) -> FormTerm {
+    FormTerm { coefficient: Coefficient::One, ..*t }
 }
 
 impl Groups {
     /// The group of these forms; signs and order do not matter.
-    pub fn group(&mut self, members: impl IntoIterator<Item = Form>) -> GroupId {
-        self.group_with(members, Effort::All)
+    pub fn group(&mut self, members: impl IntoIterator<Item = LinearForm>) -> GroupId {
+        self.group_with(members, RuleEffort::All)
     }
 
     /// The group of these forms on which this effort is spent.
-    fn group_with(&mut self, members: impl IntoIterator<Item = Form>, effort: Effort) -> GroupId {
-        let mut members: Vec<Form> = members.into_iter().filter(|f| !f.is_empty()).map(canonical).collect();
+    fn group_with(&mut self, members: impl IntoIterator<Item = LinearForm>, effort: RuleEffort) -> GroupId {
+        let mut members: Vec<LinearForm> = members.into_iter().filter(|f| !f.is_empty()).map(canonical).collect();
         members.sort_unstable();
         let hash = FxBuildHasher.hash_one((&members, effort));
         let mut same_hash = self.known.get(&hash).copied();
@@ -176,12 +176,12 @@ impl Groups {
             self.ends.push(self.terms.len() as u32);
         }
         let members = (first, self.ends.len() as u32);
-        self.groups.push(Group { members, effort, of_adjoints, bounded: None, ways: None, next });
+        self.groups.push(FormGroup { members, effort, of_adjoints, bounded: None, ways: None, next });
         id
     }
 
     /// The members of a group, each with a first term of positive sign, sorted.
-    pub fn members(&self, id: GroupId) -> impl ExactSizeIterator<Item = &[Term]> + Clone {
+    pub fn members(&self, id: GroupId) -> impl ExactSizeIterator<Item = &[FormTerm]> + Clone {
         let (first, end) = self.groups[id as usize].members;
         (first as usize..end as usize).map(|k| {
             let start = if k == 0 { 0 } else { self.ends[k - 1] as usize };
@@ -196,12 +196,12 @@ impl Groups {
     }
 
     /// Copies of the members, while groups are added.
-    fn forms(&self, id: GroupId) -> Vec<Form> {
-        self.members(id).map(<[Term]>::to_vec).collect()
+    fn forms(&self, id: GroupId) -> Vec<LinearForm> {
+        self.members(id).map(<[FormTerm]>::to_vec).collect()
     }
 
     /// A form with the groups of its angles.
-    pub fn bounded(&mut self, form: Form) -> Bounded {
+    pub fn bounded(&mut self, form: LinearForm) -> Bounded {
         let mut turns: Vec<(u32, Vec<usize>)> = Vec::new();
         for (k, t) in form.iter().enumerate() {
             if let Some((pair, _)) = turn(t) {
@@ -212,7 +212,7 @@ impl Groups {
             }
         }
         let turns = turns.into_iter().filter(|(_, terms)| terms.len() > 1).map(|(pair, terms)| {
-            let part = |sine: bool| -> Form {
+            let part = |sine: bool| -> LinearForm {
                 let wanted = terms.iter().map(|k| &form[*k]).filter(|t| turn(t) == Some((pair, sine)));
                 simplified(wanted.map(bare).collect())
             };
@@ -253,7 +253,7 @@ impl Groups {
     }
 
     /// The team of the adjoint of a term that has a value before it, or nothing.
-    fn weighted(&self, t: &Term) -> Option<u32> {
+    fn weighted(&self, t: &FormTerm) -> Option<u32> {
         match (t.coefficient, t.atom) {
             (Coefficient::Node(_) | Coefficient::One, Atom::Adjoint(a)) => self.team.get(a as usize).copied()?,
             _ => None,
@@ -261,7 +261,7 @@ impl Groups {
     }
 
     /// The team, the node of the value, and the adjoint of a term of value and adjoint.
-    fn scaled(&self, t: &Term) -> Option<(u32, u32, Atom)> {
+    fn scaled(&self, t: &FormTerm) -> Option<(u32, u32, Atom)> {
         match (t.coefficient, t.atom) {
             (Coefficient::Node(v), Atom::Adjoint(a)) => Some((self.team.get(a as usize).copied()??, v, t.atom)),
             _ => None,
@@ -271,9 +271,9 @@ impl Groups {
     /// The members with the groups of their parts, found once.
     pub fn bound_members(&mut self, id: GroupId) {
         if self.groups[id as usize].bounded.is_none() {
-            let has_two = |m: &[Term], of: &dyn Fn(&Term) -> bool| m.iter().filter(|t| of(t)).count() > 1;
+            let has_two = |m: &[FormTerm], of: &dyn Fn(&FormTerm) -> bool| m.iter().filter(|t| of(t)).count() > 1;
             let may_have_parts =
-                |m: &[Term]| has_two(m, &|t| turn(t).is_some()) || has_two(m, &|t| self.weighted(t).is_some());
+                |m: &[FormTerm]| has_two(m, &|t| turn(t).is_some()) || has_two(m, &|t| self.weighted(t).is_some());
             let mut bounded = Vec::new();
             if self.members(id).any(may_have_parts) {
                 bounded.extend(self.forms(id).into_iter().map(|m| self.bounded(m)));
@@ -286,11 +286,11 @@ impl Groups {
     }
 }
 
-fn value_of(coefficient: Coefficient) -> Term {
+fn value_of(coefficient: Coefficient) -> FormTerm {
     let atom = match coefficient {
         Coefficient::Node(v) => Atom::Value(v),
         Coefficient::One => Atom::One,
         _ => unreachable!("made for values"),
     };
-    Term { coefficient: Coefficient::One, atom, negative: false }
+    FormTerm { coefficient: Coefficient::One, atom, negative: false }
 }

@@ -1,7 +1,9 @@
 //! The rules by which a group is led back to others.
 
-use super::super::forms::{negated, simplified, Atom, Coefficient, Depth, Flat, Form, Forms, Slack, Term};
-use super::{bare, turn, value_of, Effort, Factor, GroupId, Groups, Parts, Way};
+use super::super::forms::{
+    negated, simplified, Atom, AtomForms, Coefficient, Depth, Flat, FormTerm, LinearForm, Slack,
+};
+use super::{bare, turn, value_of, GroupFactor, GroupId, Groups, RuleEffort, Way, WayParts};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -18,21 +20,21 @@ impl Groups {
     /// The ways of a group, found once.
     ///
     /// `size` says how large a term is in the first box; it only decides which of many ways are worth a try.
-    pub fn find_ways(&mut self, id: GroupId, forms: &Forms, size: &dyn Fn(&Term) -> f64) {
+    pub fn find_ways(&mut self, id: GroupId, forms: &AtomForms, size: &dyn Fn(&FormTerm) -> f64) {
         if self.groups[id as usize].ways.is_none() {
             let ways = self.all_ways(id, forms, size);
             self.groups[id as usize].ways = Some(ways);
         }
     }
 
-    fn all_ways(&mut self, id: GroupId, forms: &Forms, size: &dyn Fn(&Term) -> f64) -> Vec<Way> {
+    fn all_ways(&mut self, id: GroupId, forms: &AtomForms, size: &dyn Fn(&FormTerm) -> f64) -> Vec<Way> {
         let effort = self.groups[id as usize].effort;
-        if effort == Effort::Ends || self.members(id).len() > LARGEST {
+        if effort == RuleEffort::Ends || self.members(id).len() > LARGEST {
             return Vec::new();
         }
         let members = self.forms(id);
-        if effort == Effort::Columns {
-            let members: Vec<&Form> = members.iter().collect();
+        if effort == RuleEffort::Columns {
+            let members: Vec<&LinearForm> = members.iter().collect();
             return self.columns(id, &members, &Arc::from([])).into_iter().collect();
         }
         let mut ways = Vec::new();
@@ -56,7 +58,13 @@ impl Groups {
     }
 
     /// The ways of a group whose members have these forms.
-    fn ways_of_flat(&mut self, id: GroupId, flats: &[Flat], forms: &Forms, size: &dyn Fn(&Term) -> f64) -> Vec<Way> {
+    fn ways_of_flat(
+        &mut self,
+        id: GroupId,
+        flats: &[Flat],
+        forms: &AtomForms,
+        size: &dyn Fn(&FormTerm) -> f64,
+    ) -> Vec<Way> {
         let slack: Arc<[Slack]> = flats.iter().map(|f| &f.slack).filter(|s| !s.is_empty()).cloned().collect();
         let mut angles: Vec<(usize, u32)> = Vec::new();
         for flat in flats {
@@ -75,12 +83,12 @@ impl Groups {
         let mut ways = Vec::new();
         for &(_, pair) in angles.iter().rev().take(ANGLES) {
             for kept in 0..3 {
-                let is_kept_by = |kept: usize, t: &Term| {
+                let is_kept_by = |kept: usize, t: &FormTerm| {
                     turn(t).is_some()
                         || (kept == 1 && t.coefficient == Coefficient::One)
                         || (kept == 2 && is_linear(t, forms))
                 };
-                let keeps = |t: &Term| is_kept_by(kept, t);
+                let keeps = |t: &FormTerm| is_kept_by(kept, t);
                 let is_as_before = |earlier: usize| {
                     let mut terms = flats.iter().flat_map(|f| &f.form);
                     terms.all(|t| is_kept_by(earlier, t) == keeps(t))
@@ -91,7 +99,7 @@ impl Groups {
                 // a member whose other terms are larger is kept for them
                 let is_small = |flat: &Flat| {
                     let largest = |own: bool| {
-                        let is_own = |t: &&Term| turn(t).is_some_and(|(p, _)| p == pair);
+                        let is_own = |t: &&FormTerm| turn(t).is_some_and(|(p, _)| p == pair);
                         let terms = flat.form.iter().filter(|t| is_own(t) == own && keeps(t));
                         terms.fold(0.0f64, |most, t| most.max(size(t)))
                     };
@@ -108,9 +116,9 @@ impl Groups {
                 }
             }
         }
-        let any = |_: &Term| true;
-        ways.extend(self.matrix(id, flats, &slack, forms, &any, Effort::Columns));
-        if self.groups[id as usize].effort == Effort::All {
+        let any = |_: &FormTerm| true;
+        ways.extend(self.matrix(id, flats, &slack, forms, &any, RuleEffort::Columns));
+        if self.groups[id as usize].effort == RuleEffort::All {
             // one vector of adjoints after the other
             let linear = flats.iter().flat_map(|f| &f.form).filter(|t| is_linear(t, forms));
             let mut teams: Vec<u32> = linear.filter_map(|t| self.weighted(t)).collect();
@@ -118,15 +126,15 @@ impl Groups {
             teams.dedup();
             for team in teams {
                 let of_adjoints = Arc::clone(&self.team);
-                let in_team = move |t: &Term| match t.atom {
+                let in_team = move |t: &FormTerm| match t.atom {
                     Atom::Adjoint(a) => of_adjoints.get(a as usize) == Some(&Some(team)),
                     _ => false,
                 };
-                ways.extend(self.matrix(id, flats, &slack, forms, &in_team, Effort::Rest));
+                ways.extend(self.matrix(id, flats, &slack, forms, &in_team, RuleEffort::Rest));
             }
         }
         ways.extend(self.scaling(flats));
-        let flat_members: Vec<&Form> = flats.iter().map(|f| &f.form).collect();
+        let flat_members: Vec<&LinearForm> = flats.iter().map(|f| &f.form).collect();
         ways.extend(self.columns(id, &flat_members, &slack));
         ways
     }
@@ -138,20 +146,20 @@ impl Groups {
         pair: u32,
         flats: &[Flat],
         slack: &Arc<[Slack]>,
-        keeps: &dyn Fn(&Term) -> bool,
+        keeps: &dyn Fn(&FormTerm) -> bool,
         small: &[bool],
     ) -> Option<Way> {
-        let mut inner: Vec<Form> = Vec::new();
-        let mut rests: Vec<Form> = Vec::new();
-        let mut turned: Vec<(Form, Form)> = Vec::new();
+        let mut inner: Vec<LinearForm> = Vec::new();
+        let mut rests: Vec<LinearForm> = Vec::new();
+        let mut turned: Vec<(LinearForm, LinearForm)> = Vec::new();
         for (k, flat) in flats.iter().enumerate() {
-            let part = |sine: bool| -> Form {
+            let part = |sine: bool| -> LinearForm {
                 simplified(flat.form.iter().filter(|t| turn(t) == Some((pair, sine))).map(bare).collect())
             };
             let (a, b) = (part(false), part(true));
             if (a.is_empty() && b.is_empty()) || small.get(k) == Some(&true) {
-                let kept = |t: &&Term| keeps(t) && turn(t).is_none_or(|(p, _)| p != pair);
-                let (main, rest): (Vec<&Term>, Vec<&Term>) = flat.form.iter().partition(kept);
+                let kept = |t: &&FormTerm| keeps(t) && turn(t).is_none_or(|(p, _)| p != pair);
+                let (main, rest): (Vec<&FormTerm>, Vec<&FormTerm>) = flat.form.iter().partition(kept);
                 inner.push(main.into_iter().copied().collect());
                 rests.push(rest.into_iter().copied().collect());
             } else {
@@ -165,14 +173,15 @@ impl Groups {
                 continue;
             }
             let (a, b) = turned[i].clone();
-            let minus = |f: &Form| simplified(negated(f));
-            let mates = |(c, d): &(Form, Form)| (*c == b && *d == minus(&a)) || (*c == minus(&b) && *d == a);
+            let minus = |f: &LinearForm| simplified(negated(f));
+            let mates =
+                |(c, d): &(LinearForm, LinearForm)| (*c == b && *d == minus(&a)) || (*c == minus(&b) && *d == a);
             if let Some(j) = (i + 1..turned.len()).find(|j| !done[*j] && mates(&turned[*j])) {
                 done[j] = true;
             }
             inner.extend([a, b]);
         }
-        self.way(id, Factor::Turn(pair), inner, rests, slack, Effort::Columns)
+        self.way(id, GroupFactor::Turn(pair), inner, rests, slack, RuleEffort::Columns)
     }
 
     /// The rule `matrix`: all terms with constant coefficients, of some atoms.
@@ -181,11 +190,11 @@ impl Groups {
         id: GroupId,
         flats: &[Flat],
         slack: &Arc<[Slack]>,
-        forms: &Forms,
-        is_column: &dyn Fn(&Term) -> bool,
-        effort: Effort,
+        forms: &AtomForms,
+        is_column: &dyn Fn(&FormTerm) -> bool,
+        effort: RuleEffort,
     ) -> Option<Way> {
-        let is_column = |t: &Term| is_linear(t, forms) && is_column(t);
+        let is_column = |t: &FormTerm| is_linear(t, forms) && is_column(t);
         let mut atoms: Vec<Atom> = Vec::new();
         for t in flats.iter().flat_map(|f| &f.form).filter(|t| is_column(t)) {
             if !atoms.contains(&t.atom) {
@@ -198,7 +207,7 @@ impl Groups {
         let mut rests = Vec::new();
         let mut rows = Vec::new();
         for flat in flats {
-            let (linear, rest): (Vec<&Term>, Vec<&Term>) = flat.form.iter().partition(|t| is_column(t));
+            let (linear, rest): (Vec<&FormTerm>, Vec<&FormTerm>) = flat.form.iter().partition(|t| is_column(t));
             rests.push(rest.into_iter().copied().collect());
             let mut row = vec![(0.0f64, 0.0f64); atoms.len()];
             for t in linear {
@@ -213,14 +222,15 @@ impl Groups {
             }
             rows.push(row);
         }
-        let inner = atoms.into_iter().map(|atom| vec![Term { coefficient: Coefficient::One, atom, negative: false }]);
+        let inner =
+            atoms.into_iter().map(|atom| vec![FormTerm { coefficient: Coefficient::One, atom, negative: false }]);
         let inner = inner.collect();
-        self.way(id, Factor::Matrix(spectral_norm(&rows)), inner, rests, slack, effort)
+        self.way(id, GroupFactor::Matrix(spectral_norm(&rows)), inner, rests, slack, effort)
     }
 
     /// The rule `columns`: terms of several members with one coefficient are that coefficient times a vector.
-    fn columns(&mut self, id: GroupId, members: &[&Form], slack: &Arc<[Slack]>) -> Option<Way> {
-        let mut columns: BTreeMap<Coefficient, Vec<(usize, Term)>> = BTreeMap::new();
+    fn columns(&mut self, id: GroupId, members: &[&LinearForm], slack: &Arc<[Slack]>) -> Option<Way> {
+        let mut columns: BTreeMap<Coefficient, Vec<(usize, FormTerm)>> = BTreeMap::new();
         for (m, member) in members.iter().enumerate() {
             for t in *member {
                 if let Coefficient::Node(_) = t.coefficient {
@@ -233,32 +243,32 @@ impl Groups {
         if columns.is_empty() {
             return None;
         }
-        let mut rests: Vec<Form> = members.iter().map(|m| (*m).clone()).collect();
+        let mut rests: Vec<LinearForm> = members.iter().map(|m| (*m).clone()).collect();
         let mut parts = Vec::new();
         for (coefficient, terms) in columns {
-            let mut forms = vec![Form::new(); members.len()];
+            let mut forms = vec![LinearForm::new(); members.len()];
             for (m, t) in &terms {
                 forms[*m].push(bare(t));
                 rests[*m].retain(|u| u != t);
             }
             let group = self.group(forms.into_iter().map(simplified));
-            parts.push((Factor::Coefficient(coefficient), group));
+            parts.push((GroupFactor::Coefficient(coefficient), group));
         }
         if parts.iter().any(|(_, group)| *group == id) {
             return None;
         }
-        let rest = self.group_with(rests, Effort::Ends);
-        Some(Way { parts: Parts::Several(parts), rest, slack: Arc::clone(slack) })
+        let rest = self.group_with(rests, RuleEffort::Ends);
+        Some(Way { parts: WayParts::Several(parts), rest, slack: Arc::clone(slack) })
     }
 
     fn way(
         &mut self,
         id: GroupId,
-        factor: Factor,
-        inner: Vec<Form>,
-        rests: Vec<Form>,
+        factor: GroupFactor,
+        inner: Vec<LinearForm>,
+        rests: Vec<LinearForm>,
         slack: &Arc<[Slack]>,
-        effort: Effort,
+        effort: RuleEffort,
     ) -> Option<Way> {
         let inner = self.group(inner);
         if inner == id || self.members(inner).len() == 0 {
@@ -268,14 +278,14 @@ impl Groups {
         if rest == id {
             return None;
         }
-        Some(Way { parts: Parts::One([(factor, inner)]), rest, slack: Arc::clone(slack) })
+        Some(Way { parts: WayParts::One([(factor, inner)]), rest, slack: Arc::clone(slack) })
     }
 
     /// The rule `scaling`: adjoints of one vector with values before them, as the derivatives by sine and cosine have them.
     fn scaling(&mut self, flats: &[Flat]) -> Option<Way> {
         // team: (member, value, adjoint, sign)
         let mut teams: BTreeMap<u32, Vec<(usize, u32, Atom, bool)>> = BTreeMap::new();
-        let mut rests: Vec<Form> = vec![Form::new(); flats.len()];
+        let mut rests: Vec<LinearForm> = vec![LinearForm::new(); flats.len()];
         for (m, flat) in flats.iter().enumerate() {
             for t in &flat.form {
                 match self.scaled(t) {
@@ -294,18 +304,18 @@ impl Groups {
             atoms.sort_unstable();
             atoms.dedup();
             // entries of the matrix before the adjoints
-            let values: Vec<Form> = match (&terms[..], &atoms[..]) {
+            let values: Vec<LinearForm> = match (&terms[..], &atoms[..]) {
                 // m₁ = x u + y v, m₂ = ±(x v − y u): ‖(x, y)‖ ‖(u, v)‖
                 ([a, b, c, d], [_, _]) if is_complex_product([a, b, c, d]) => vec![plain(a.1), plain(b.1)],
                 _ => terms.iter().map(|t| plain(t.1)).collect(),
             };
             let atoms =
-                atoms.into_iter().map(|atom| vec![Term { coefficient: Coefficient::One, atom, negative: false }]);
+                atoms.into_iter().map(|atom| vec![FormTerm { coefficient: Coefficient::One, atom, negative: false }]);
             let (values, atoms) = (self.group(values), self.group(atoms.collect::<Vec<_>>()));
-            parts.push((Factor::Values(values), atoms));
+            parts.push((GroupFactor::Values(values), atoms));
         }
-        let rest = self.group_with(rests, Effort::Columns);
-        Some(Way { parts: Parts::Several(parts), rest, slack: Arc::from([]) })
+        let rest = self.group_with(rests, RuleEffort::Columns);
+        Some(Way { parts: WayParts::Several(parts), rest, slack: Arc::from([]) })
     }
 }
 
@@ -322,7 +332,7 @@ fn is_complex_product([a, b, c, d]: [&(usize, u32, Atom, bool); 4]) -> bool {
 }
 
 /// Whether the coefficient is a constant, and the atom can be taken apart.
-fn is_linear(t: &Term, forms: &Forms) -> bool {
+fn is_linear(t: &FormTerm, forms: &AtomForms) -> bool {
     let constant = match t.coefficient {
         Coefficient::One => true,
         Coefficient::Node(c) => forms.constant(c).is_some(),

@@ -21,29 +21,29 @@ use super::interval::Interval;
 use pen::Mark;
 pub(super) use pen::{Norm, Pen};
 use rustc_hash::FxHashMap;
-use step::Step;
+use step::TapeStep;
 
 /// An enclosure of a number, and the step that computes it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Range {
+pub(super) struct Enclosure {
     pub x: Interval,
     at: u32,
 }
 
 /// An upper bound of a number ≥ 0, and the step that computes it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bound {
+pub(super) struct UpperBound {
     pub x: f64,
     at: u32,
 }
 
-impl Range {
-    pub const ZERO: Range = Range { x: Interval::ZERO, at: ZERO };
-    pub const ONE: Range = Range { x: Interval::ONE, at: ONE };
+impl Enclosure {
+    pub const ZERO: Enclosure = Enclosure { x: Interval::ZERO, at: ZERO };
+    pub const ONE: Enclosure = Enclosure { x: Interval::ONE, at: ONE };
 }
 
-impl Bound {
-    pub const ZERO: Bound = Bound { x: 0.0, at: ZERO };
+impl UpperBound {
+    pub const ZERO: UpperBound = UpperBound { x: 0.0, at: ZERO };
 
     /// Whether it was written down at that mark, or later.
     pub fn is_since(self, mark: Mark) -> bool {
@@ -59,24 +59,24 @@ const ONE: u32 = 1;
 pub(super) const LANES: usize = 8;
 
 /// One number per box.
-pub(super) type Lanes = [f64; LANES];
+pub(super) type BoxLanes = [f64; LANES];
 
 /// The steps of one result's bound.
 #[derive(Clone, Debug)]
 pub(super) struct Tape {
-    steps: Vec<Step>,
+    steps: Vec<TapeStep>,
     constants: Vec<Interval>,
 }
 
 /// What steps have computed: lower and upper ends.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Registers {
-    ends: Vec<(Lanes, Lanes)>,
+    ends: Vec<(BoxLanes, BoxLanes)>,
 }
 
 impl Tape {
     /// The steps that a bound needs. `samples`: parts of the box. Of a minimum that is the same operand in all of them, the others go.
-    pub fn new(pen: &Pen, bound: Bound, samples: &[&[Interval]]) -> Tape {
+    pub fn new(pen: &Pen, bound: UpperBound, samples: &[&[Interval]]) -> Tape {
         let mut tape = Tape { steps: Vec::new(), constants: pen.constants.clone() };
         if !pen.writes {
             return tape;
@@ -105,12 +105,12 @@ impl Tape {
                 for l in 0..boxes.len() {
                     let at = |k: u32| (ends[k as usize].0[l], ends[k as usize].1[l]);
                     match *step {
-                        Step::Least(a, b) => {
+                        TapeStep::Least(a, b) => {
                             matters[i][0] |= at(a).1 < at(b).1;
                             matters[i][1] |= at(b).1 < at(a).1;
                         }
-                        Step::Clipped(a, _) => matters[i][1] |= at(i as u32) != at(a),
-                        Step::Intersection(a, b) => {
+                        TapeStep::Clipped(a, _) => matters[i][1] |= at(i as u32) != at(a),
+                        TapeStep::Intersection(a, b) => {
                             matters[i][0] |= at(i as u32) != at(b);
                             matters[i][1] |= at(i as u32) != at(a);
                         }
@@ -122,15 +122,15 @@ impl Tape {
         let mut same: Vec<u32> = (0..self.steps.len() as u32).collect();
         for (i, step) in self.steps.iter().enumerate() {
             match (*step, matters[i]) {
-                (Step::Least(_, b) | Step::Intersection(_, b), [false, true]) => same[i] = same[b as usize],
-                (Step::Least(a, _) | Step::Intersection(a, _) | Step::Clipped(a, _), [_, false]) => {
+                (TapeStep::Least(_, b) | TapeStep::Intersection(_, b), [false, true]) => same[i] = same[b as usize],
+                (TapeStep::Least(a, _) | TapeStep::Intersection(a, _) | TapeStep::Clipped(a, _), [_, false]) => {
                     same[i] = same[a as usize];
                 }
                 _ => {}
             }
         }
         let Some(result) = same.last() else { return };
-        let steps: Vec<Step> = self.steps.iter().map(|s| s.map(|a| same[a as usize])).collect();
+        let steps: Vec<TapeStep> = self.steps.iter().map(|s| s.map(|a| same[a as usize])).collect();
         let mut is_needed = vec![false; steps.len()];
         is_needed[*result as usize] = true;
         for i in (0..=*result as usize).rev() {
@@ -143,7 +143,7 @@ impl Tape {
     }
 
     /// The bounds in these boxes; infinite where nothing is known.
-    pub fn bounds(&self, boxes: &[&[Interval]], registers: &mut Registers) -> Lanes {
+    pub fn bounds(&self, boxes: &[&[Interval]], registers: &mut Registers) -> BoxLanes {
         self.run(boxes, registers);
         let Some(last) = registers.ends[..self.steps.len()].last() else { return [f64::INFINITY; LANES] };
         let mut bounds = last.1;
@@ -164,15 +164,15 @@ impl Tape {
 }
 
 /// Steps with their former indices, in order, with one for equal ones; operands by the indices among them.
-fn compacted(steps: impl Iterator<Item = (u32, Step)>, constants: &[Interval]) -> Vec<Step> {
-    let mut kept: Vec<Step> = Vec::new();
+fn compacted(steps: impl Iterator<Item = (u32, TapeStep)>, constants: &[Interval]) -> Vec<TapeStep> {
+    let mut kept: Vec<TapeStep> = Vec::new();
     let mut places: Vec<u32> = Vec::new();
-    let mut known: FxHashMap<Step, u32> = FxHashMap::default();
+    let mut known: FxHashMap<TapeStep, u32> = FxHashMap::default();
     let mut numbers: FxHashMap<(u64, u64), u32> = FxHashMap::default();
     for (at, step) in steps {
         let mut step = step.map(|a| places[a as usize]);
         // equal constants by the first of them
-        if let Step::Constant(k) = &mut step {
+        if let TapeStep::Constant(k) = &mut step {
             let x = constants[*k as usize];
             *k = *numbers.entry((x.lo.to_bits(), x.hi.to_bits())).or_insert(*k);
         }

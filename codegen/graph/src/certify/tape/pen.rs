@@ -1,8 +1,8 @@
 //! What computes ranges and bounds, and writes down how.
 
 use super::super::interval::{add_up, mul_up, Interval};
-use super::step::Step;
-use super::{Bound, Range, ZERO};
+use super::step::TapeStep;
+use super::{Enclosure, UpperBound, ZERO};
 use crate::expr::{Binary, Unary};
 
 /// What is so much above another bound in the whole box is not expected to be the least in any part.
@@ -16,7 +16,7 @@ pub(in crate::certify) struct Mark(pub(super) usize);
 #[derive(Clone, Debug, Default)]
 pub(in crate::certify) struct Pen {
     pub(super) writes: bool,
-    pub(super) steps: Vec<Step>,
+    pub(super) steps: Vec<TapeStep>,
     pub(super) constants: Vec<Interval>,
 }
 
@@ -40,7 +40,7 @@ impl Pen {
     }
 
     #[inline]
-    fn write(&mut self, step: Step) -> u32 {
+    fn write(&mut self, step: TapeStep) -> u32 {
         if !self.writes {
             return ZERO;
         }
@@ -53,7 +53,7 @@ impl Pen {
             return ZERO;
         }
         let index = self.index(x);
-        self.write(Step::Constant(index))
+        self.write(TapeStep::Constant(index))
     }
 
     fn index(&mut self, x: Interval) -> u32 {
@@ -67,183 +67,186 @@ impl Pen {
         index as u32
     }
 
-    pub fn input(&mut self, k: u32, x: Interval) -> Range {
-        Range { x, at: self.write(Step::Input(k)) }
+    pub fn input(&mut self, k: u32, x: Interval) -> Enclosure {
+        Enclosure { x, at: self.write(TapeStep::Input(k)) }
     }
 
     /// A range that does not depend on the box.
-    pub fn constant(&mut self, x: Interval) -> Range {
-        Range { x, at: self.write_constant(x) }
+    pub fn constant(&mut self, x: Interval) -> Enclosure {
+        Enclosure { x, at: self.write_constant(x) }
     }
 
     /// A bound that does not depend on the box.
-    pub fn number(&mut self, x: f64) -> Bound {
+    pub fn number(&mut self, x: f64) -> UpperBound {
         if x == 0.0 {
-            return Bound::ZERO;
+            return UpperBound::ZERO;
         }
-        Bound { x, at: self.write_constant(Interval::point(x)) }
+        UpperBound { x, at: self.write_constant(Interval::point(x)) }
     }
 
-    pub fn neg(&mut self, a: Range) -> Range {
+    pub fn neg(&mut self, a: Enclosure) -> Enclosure {
         if a.x.is_zero() {
             return a;
         }
-        Range { x: -a.x, at: self.write(Step::Neg(a.at)) }
+        Enclosure { x: -a.x, at: self.write(TapeStep::Neg(a.at)) }
     }
 
     #[inline]
-    pub fn add(&mut self, a: Range, b: Range) -> Range {
+    pub fn add(&mut self, a: Enclosure, b: Enclosure) -> Enclosure {
         if a.x.is_zero() {
             return b;
         }
         if b.x.is_zero() {
             return a;
         }
-        Range { x: a.x + b.x, at: self.write(Step::Add(a.at, b.at)) }
+        Enclosure { x: a.x + b.x, at: self.write(TapeStep::Add(a.at, b.at)) }
     }
 
-    pub fn sub(&mut self, a: Range, b: Range) -> Range {
+    pub fn sub(&mut self, a: Enclosure, b: Enclosure) -> Enclosure {
         let minus = self.neg(b);
         self.add(a, minus)
     }
 
     #[inline]
-    pub fn mul(&mut self, a: Range, b: Range) -> Range {
+    pub fn mul(&mut self, a: Enclosure, b: Enclosure) -> Enclosure {
         if a.x.is_zero() || b.x == Interval::ONE {
             return a;
         }
         if b.x.is_zero() || a.x == Interval::ONE {
             return b;
         }
-        Range { x: a.x * b.x, at: self.write(Step::Mul(a.at, b.at)) }
+        Enclosure { x: a.x * b.x, at: self.write(TapeStep::Mul(a.at, b.at)) }
     }
 
-    pub fn square(&mut self, a: Range) -> Range {
-        Range { x: a.x.square(), at: self.write(Step::Square(a.at)) }
+    pub fn square(&mut self, a: Enclosure) -> Enclosure {
+        Enclosure { x: a.x.square(), at: self.write(TapeStep::Square(a.at)) }
     }
 
-    pub fn over(&mut self, a: Range, b: Range) -> Range {
+    pub fn over(&mut self, a: Enclosure, b: Enclosure) -> Enclosure {
         self.binary(Binary::Div, a, b)
     }
 
-    pub fn sqrt(&mut self, a: Range) -> Range {
+    pub fn sqrt(&mut self, a: Enclosure) -> Enclosure {
         self.unary(Unary::Sqrt, a)
     }
 
-    pub fn unary(&mut self, op: Unary, a: Range) -> Range {
+    pub fn unary(&mut self, op: Unary, a: Enclosure) -> Enclosure {
         match op {
             Unary::Neg => self.neg(a),
-            op => Range { x: op.range(a.x), at: self.write(Step::Unary(op, a.at)) },
+            op => Enclosure { x: op.range(a.x), at: self.write(TapeStep::Unary(op, a.at)) },
         }
     }
 
-    pub fn binary(&mut self, op: Binary, a: Range, b: Range) -> Range {
+    pub fn binary(&mut self, op: Binary, a: Enclosure, b: Enclosure) -> Enclosure {
         match op {
             Binary::Add => self.add(a, b),
             Binary::Sub => self.sub(a, b),
             Binary::Mul => self.mul(a, b),
-            op => Range { x: op.range(a.x, b.x), at: self.write(Step::Binary(op, a.at, b.at)) },
+            op => Enclosure { x: op.range(a.x, b.x), at: self.write(TapeStep::Binary(op, a.at, b.at)) },
         }
     }
 
-    pub fn sin_cos(&mut self, a: Range) -> (Range, Range) {
+    pub fn sin_cos(&mut self, a: Enclosure) -> (Enclosure, Enclosure) {
         let (sin, cos) = a.x.sin_cos();
-        (Range { x: sin, at: self.write(Step::Sine(a.at)) }, Range { x: cos, at: self.write(Step::Cosine(a.at)) })
+        (
+            Enclosure { x: sin, at: self.write(TapeStep::Sine(a.at)) },
+            Enclosure { x: cos, at: self.write(TapeStep::Cosine(a.at)) },
+        )
     }
 
-    pub fn widened(&mut self, a: Range, h: Bound) -> Range {
+    pub fn widened(&mut self, a: Enclosure, h: UpperBound) -> Enclosure {
         if h.x == 0.0 {
             return a;
         }
-        Range { x: a.x.widened(h.x), at: self.write(Step::Widened(a.at, h.at)) }
+        Enclosure { x: a.x.widened(h.x), at: self.write(TapeStep::Widened(a.at, h.at)) }
     }
 
-    pub fn clipped(&mut self, a: Range, magnitude: Bound) -> Range {
+    pub fn clipped(&mut self, a: Enclosure, magnitude: UpperBound) -> Enclosure {
         if magnitude.x > FAR * a.x.mag() {
             return a;
         }
-        Range { x: a.x.clipped(magnitude.x), at: self.write(Step::Clipped(a.at, magnitude.at)) }
+        Enclosure { x: a.x.clipped(magnitude.x), at: self.write(TapeStep::Clipped(a.at, magnitude.at)) }
     }
 
-    pub fn intersect(&mut self, a: Range, b: Range) -> Range {
+    pub fn intersect(&mut self, a: Enclosure, b: Enclosure) -> Enclosure {
         let wide = Interval { lo: a.x.lo - FAR * a.x.mag(), hi: a.x.hi + FAR * a.x.mag() };
         if b.x.lo < wide.lo && wide.hi < b.x.hi {
             return a;
         }
-        Range { x: a.x.intersect(b.x), at: self.write(Step::Intersection(a.at, b.at)) }
+        Enclosure { x: a.x.intersect(b.x), at: self.write(TapeStep::Intersection(a.at, b.at)) }
     }
 
-    pub fn mag(&mut self, a: Range) -> Bound {
+    pub fn mag(&mut self, a: Enclosure) -> UpperBound {
         if a.x.is_zero() {
-            return Bound::ZERO;
+            return UpperBound::ZERO;
         }
-        Bound { x: a.x.mag(), at: self.write(Step::Magnitude(a.at)) }
+        UpperBound { x: a.x.mag(), at: self.write(TapeStep::Magnitude(a.at)) }
     }
 
     #[inline]
-    pub fn add_up(&mut self, a: Bound, b: Bound) -> Bound {
+    pub fn add_up(&mut self, a: UpperBound, b: UpperBound) -> UpperBound {
         if a.x == 0.0 {
             return b;
         }
         if b.x == 0.0 {
             return a;
         }
-        Bound { x: add_up(a.x, b.x), at: self.write(Step::Sum(a.at, b.at)) }
+        UpperBound { x: add_up(a.x, b.x), at: self.write(TapeStep::Sum(a.at, b.at)) }
     }
 
     #[inline]
-    pub fn mul_up(&mut self, a: Bound, b: Bound) -> Bound {
+    pub fn mul_up(&mut self, a: UpperBound, b: UpperBound) -> UpperBound {
         if a.x == 0.0 || b.x == 0.0 {
-            return Bound::ZERO;
+            return UpperBound::ZERO;
         }
-        Bound { x: mul_up(a.x, b.x), at: self.write(Step::Product(a.at, b.at)) }
+        UpperBound { x: mul_up(a.x, b.x), at: self.write(TapeStep::Product(a.at, b.at)) }
     }
 
-    pub fn least(&mut self, a: Bound, b: Bound) -> Bound {
+    pub fn least(&mut self, a: UpperBound, b: UpperBound) -> UpperBound {
         if a.x > FAR * b.x {
             return b;
         }
         if b.x > FAR * a.x {
             return a;
         }
-        Bound { x: a.x.min(b.x), at: self.write(Step::Least(a.at, b.at)) }
+        UpperBound { x: a.x.min(b.x), at: self.write(TapeStep::Least(a.at, b.at)) }
     }
 
-    /// √(a² + …) of what is added one by one to [`Bound::ZERO`].
-    pub fn add_square(&mut self, norm: &mut Norm, a: Bound) {
+    /// √(a² + …) of what is added one by one to [`UpperBound::ZERO`].
+    pub fn add_square(&mut self, norm: &mut Norm, a: UpperBound) {
         if a.x != 0.0 {
-            let square = Bound { x: (a.x * a.x).next_up(), at: self.write(Step::Product(a.at, a.at)) };
+            let square = UpperBound { x: (a.x * a.x).next_up(), at: self.write(TapeStep::Product(a.at, a.at)) };
             norm.sum = self.add_up(norm.sum, square);
             norm.last = a;
             norm.count += 1;
         }
     }
 
-    pub fn root(&mut self, norm: Norm) -> Bound {
+    pub fn root(&mut self, norm: Norm) -> UpperBound {
         match norm.count {
             0 | 1 => norm.last,
-            _ => Bound { x: norm.sum.x.sqrt().next_up(), at: self.write(Step::RootOfBound(norm.sum.at)) },
+            _ => UpperBound { x: norm.sum.x.sqrt().next_up(), at: self.write(TapeStep::RootOfBound(norm.sum.at)) },
         }
     }
 
     /// `error`: what rounding numbers up to `magnitude` loses, `factor` times their binade and `tiny`.
-    pub fn rounding(&mut self, magnitude: Bound, error: f64, factor: f64, tiny: f64) -> Bound {
+    pub fn rounding(&mut self, magnitude: UpperBound, error: f64, factor: f64, tiny: f64) -> UpperBound {
         if !self.writes || magnitude.x == 0.0 {
-            return Bound { x: error, at: ZERO };
+            return UpperBound { x: error, at: ZERO };
         }
         let constant = self.index(Interval { lo: factor, hi: tiny });
-        Bound { x: error, at: self.write(Step::Rounding(magnitude.at, constant)) }
+        UpperBound { x: error, at: self.write(TapeStep::Rounding(magnitude.at, constant)) }
     }
 }
 
 /// A sum of squares.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::certify) struct Norm {
-    sum: Bound,
-    last: Bound,
+    sum: UpperBound,
+    last: UpperBound,
     count: usize,
 }
 
 impl Norm {
-    pub const ZERO: Norm = Norm { sum: Bound::ZERO, last: Bound::ZERO, count: 0 };
+    pub const ZERO: Norm = Norm { sum: UpperBound::ZERO, last: UpperBound::ZERO, count: 0 };
 }

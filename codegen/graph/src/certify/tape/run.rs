@@ -1,42 +1,42 @@
 //! The steps for several boxes at a time. The loop over them is one long function: an arm for each kind of step.
 
 use super::super::interval::Interval;
-use super::step::Step;
-use super::{Lanes, Registers, Tape, LANES};
+use super::step::TapeStep;
+use super::{BoxLanes, Registers, Tape, LANES};
 
 impl Tape {
     /// Computes all steps. One piece: a table of an arm per kind of step.
     pub(super) fn run(&self, boxes: &[&[Interval]], registers: &mut Registers) {
-        const NONE: (Lanes, Lanes) = ([0.0; LANES], [0.0; LANES]);
+        const NONE: (BoxLanes, BoxLanes) = ([0.0; LANES], [0.0; LANES]);
         registers.ends.resize(self.steps.len().max(registers.ends.len()), NONE);
         for (i, step) in self.steps.iter().enumerate() {
             let (known, rest) = registers.ends.split_at_mut(i);
             let out = &mut rest[0];
             let at = |k: u32| &known[k as usize];
             match *step {
-                Step::Input(k) => {
+                TapeStep::Input(k) => {
                     for l in 0..LANES {
                         let x = boxes[l.min(boxes.len() - 1)][k as usize];
                         (out.0[l], out.1[l]) = (x.lo, x.hi);
                     }
                 }
-                Step::Constant(k) => {
+                TapeStep::Constant(k) => {
                     let x = self.constants[k as usize];
                     *out = ([x.lo; LANES], [x.hi; LANES]);
                 }
-                Step::Neg(a) => {
+                TapeStep::Neg(a) => {
                     let (lo, hi) = at(a);
                     for l in 0..LANES {
                         (out.0[l], out.1[l]) = (-hi[l], -lo[l]);
                     }
                 }
-                Step::Add(a, b) => {
+                TapeStep::Add(a, b) => {
                     let (a, b) = (at(a), at(b));
                     for l in 0..LANES {
                         (out.0[l], out.1[l]) = (down(a.0[l] + b.0[l]), up(a.1[l] + b.1[l]));
                     }
                 }
-                Step::Mul(a, b) => {
+                TapeStep::Mul(a, b) => {
                     let (a, b) = (at(a), at(b));
                     for l in 0..LANES {
                         let ends = [a.0[l] * b.0[l], a.0[l] * b.1[l], a.1[l] * b.0[l], a.1[l] * b.1[l]];
@@ -44,8 +44,8 @@ impl Tape {
                         out.1[l] = up(most(most(ends[0], ends[1]), most(ends[2], ends[3])));
                     }
                 }
-                Step::Square(a) => each(out, at(a), |x| x.square()),
-                Step::Binary(op, a, b) => {
+                TapeStep::Square(a) => each(out, at(a), |x| x.square()),
+                TapeStep::Binary(op, a, b) => {
                     let b = at(b);
                     let mut l = 0;
                     each(out, at(a), |x| {
@@ -53,16 +53,16 @@ impl Tape {
                         op.range(x, Interval { lo: b.0[l - 1], hi: b.1[l - 1] })
                     });
                 }
-                Step::Unary(op, a) => each(out, at(a), |x| op.range(x)),
-                Step::Sine(a) => each(out, at(a), |x| x.sin_cos().0),
-                Step::Cosine(a) => each(out, at(a), |x| x.sin_cos().1),
-                Step::Widened(a, h) => {
+                TapeStep::Unary(op, a) => each(out, at(a), |x| op.range(x)),
+                TapeStep::Sine(a) => each(out, at(a), |x| x.sin_cos().0),
+                TapeStep::Cosine(a) => each(out, at(a), |x| x.sin_cos().1),
+                TapeStep::Widened(a, h) => {
                     let (a, h) = (at(a), at(h));
                     for l in 0..LANES {
                         (out.0[l], out.1[l]) = (down(a.0[l] - h.1[l]), up(a.1[l] + h.1[l]));
                     }
                 }
-                Step::Clipped(a, x) => {
+                TapeStep::Clipped(a, x) => {
                     let (a, x) = (at(a), at(x));
                     for l in 0..LANES {
                         let (lo, hi) = (most(a.0[l], -x.1[l]), least(a.1[l], x.1[l]));
@@ -71,7 +71,7 @@ impl Tape {
                         out.1[l] = if is_empty { a.1[l] } else { hi };
                     }
                 }
-                Step::Intersection(a, b) => {
+                TapeStep::Intersection(a, b) => {
                     let (a, b) = (at(a), at(b));
                     for l in 0..LANES {
                         let (lo, hi) = (most(a.0[l], b.0[l]), least(a.1[l], b.1[l]));
@@ -80,42 +80,42 @@ impl Tape {
                         out.1[l] = if is_empty { a.1[l] } else { hi };
                     }
                 }
-                Step::Magnitude(a) => {
+                TapeStep::Magnitude(a) => {
                     let a = at(a);
                     for l in 0..LANES {
                         out.1[l] = most(-a.0[l], a.1[l]);
                     }
                     out.0 = [0.0; LANES];
                 }
-                Step::Sum(a, b) => {
+                TapeStep::Sum(a, b) => {
                     let (a, b) = (at(a), at(b));
                     for l in 0..LANES {
                         out.1[l] = up(a.1[l] + b.1[l]);
                     }
                     out.0 = [0.0; LANES];
                 }
-                Step::Product(a, b) => {
+                TapeStep::Product(a, b) => {
                     let (a, b) = (at(a), at(b));
                     for l in 0..LANES {
                         out.1[l] = up(a.1[l] * b.1[l]);
                     }
                     out.0 = [0.0; LANES];
                 }
-                Step::RootOfBound(a) => {
+                TapeStep::RootOfBound(a) => {
                     let a = at(a);
                     for l in 0..LANES {
                         out.1[l] = up(a.1[l].sqrt());
                     }
                     out.0 = [0.0; LANES];
                 }
-                Step::Least(a, b) => {
+                TapeStep::Least(a, b) => {
                     let (a, b) = (at(a), at(b));
                     for l in 0..LANES {
                         out.1[l] = least(a.1[l], b.1[l]);
                     }
                     out.0 = [0.0; LANES];
                 }
-                Step::Rounding(a, k) => {
+                TapeStep::Rounding(a, k) => {
                     let (a, k) = (at(a), self.constants[k as usize]);
                     for l in 0..LANES {
                         out.1[l] = up(k.lo * binade(a.1[l]) + k.hi);
@@ -127,7 +127,7 @@ impl Tape {
     }
 }
 
-pub(super) fn each(out: &mut (Lanes, Lanes), a: &(Lanes, Lanes), mut f: impl FnMut(Interval) -> Interval) {
+pub(super) fn each(out: &mut (BoxLanes, BoxLanes), a: &(BoxLanes, BoxLanes), mut f: impl FnMut(Interval) -> Interval) {
     for l in 0..LANES {
         let x = f(Interval { lo: a.0[l], hi: a.1[l] });
         (out.0[l], out.1[l]) = (x.lo, x.hi);

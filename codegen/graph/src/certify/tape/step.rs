@@ -4,7 +4,7 @@ use crate::expr::{Binary, Unary};
 
 /// One operation; operands are indices of earlier steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Step {
+pub(super) enum TapeStep {
     /// Of the box.
     Input(u32),
     /// By its index.
@@ -34,9 +34,9 @@ pub(super) enum Step {
     Rounding(u32, u32),
 }
 
-impl Step {
+impl TapeStep {
     pub(super) fn operands(self) -> impl Iterator<Item = u32> {
-        use Step::*;
+        use TapeStep::*;
         let (a, b) = match self {
             Input(_) | Constant(_) => (None, None),
             Neg(a) | Square(a) | Unary(_, a) | Sine(a) | Cosine(a) | Magnitude(a) | RootOfBound(a) | Rounding(a, _) => {
@@ -55,8 +55,8 @@ impl Step {
         a.into_iter().chain(b)
     }
 
-    pub(super) fn map(self, f: impl Fn(u32) -> u32) -> Step {
-        use Step::*;
+    pub(super) fn map(self, f: impl Fn(u32) -> u32) -> TapeStep {
+        use TapeStep::*;
         match self {
             Input(_) | Constant(_) => self,
             Neg(a) => Neg(f(a)),

@@ -4,14 +4,14 @@ use super::super::companion;
 use super::super::residual::{bound_of, OUTPUTS};
 use super::super::running::{BrokenProof, Running};
 use super::super::search::{computed_at, errors_at, worst_found};
-use super::super::{Format, Interval};
+use super::super::{FloatFormat, Interval};
 use super::{products_that_cancel, program, sine, square_of_sum, sum_of_two, tenth, turns, CANCELLING, WIDE};
-use crate::expr::{Binary, Builder, Graph, NodeId, Op, Port, RuleSet};
+use crate::expr::{Binary, Graph, GraphBuilder, NodeId, Op, Port, RuleSet};
 use crate::number::Scalar;
 use straightline_core::Dd;
 
 /// Whether the bound at the state where a search finds the worst error lies below that error.
-fn is_violated_at_a_state(graph: &Graph, ranges: &[Interval], format: Format) -> bool {
+fn is_violated_at_a_state(graph: &Graph, ranges: &[Interval], format: FloatFormat) -> bool {
     let bound = companion::bound_of(Running::new(graph.inputs.clone(), format), graph).expect("the program is short");
     let found = worst_found(graph, Scalar::F32, ranges, 20_000, 3).remove(0);
     found.error > computed_at(&bound, Scalar::F32, &found.inputs)[0]
@@ -19,7 +19,7 @@ fn is_violated_at_a_state(graph: &Graph, ranges: &[Interval], format: Format) ->
 
 #[test]
 fn a_bound_at_a_state_holds_and_with_broken_numbers_does_not() {
-    let format = Format::of(Scalar::F32);
+    let format = FloatFormat::of(Scalar::F32);
     let unit = [Interval::new(-0.9, 0.9); 2];
     for (name, graph, ranges) in [
         ("sum", sum_of_two(), &unit[..]),
@@ -31,8 +31,8 @@ fn a_bound_at_a_state_holds_and_with_broken_numbers_does_not() {
     ] {
         assert!(!is_violated_at_a_state(&graph, ranges, format), "{name}");
     }
-    assert!(is_violated_at_a_state(&sum_of_two(), &unit, Format { u: 0.5 * format.u, ..format }), "rounding");
-    assert!(is_violated_at_a_state(&sine(), &unit[..1], Format { trig_ulps: 0.3, ..format }), "sine");
+    assert!(is_violated_at_a_state(&sum_of_two(), &unit, FloatFormat { u: 0.5 * format.u, ..format }), "rounding");
+    assert!(is_violated_at_a_state(&sine(), &unit[..1], FloatFormat { trig_ulps: 0.3, ..format }), "sine");
 }
 
 /// 1/(x₀ x₁ − x₂ x₃) x₄.
@@ -47,7 +47,7 @@ fn quotient() -> Graph {
 /// Of one coordinate with one rigid contact: H = x₀ x₁ − x₂ x₃, J = x₄ x₅ − x₆ x₇, forces x₈ and a bias x₉.
 fn one_coordinate() -> Graph {
     let ports = vec![Port::new("x", &[10]), Port::new("qdd", &[1]), Port::new("force", &[1])];
-    let mut b = Builder::new(RuleSet::all(), ports);
+    let mut b = GraphBuilder::new(RuleSet::all(), ports);
     let x: Vec<NodeId> = (0..12).map(|k| b.insert(Op::Input(k))).collect();
     let mut difference = |k: usize| {
         let (p, q) = (b.add(Op::mul(x[k], x[k + 1])), b.add(Op::mul(x[k + 2], x[k + 3])));
@@ -66,7 +66,7 @@ fn one_coordinate() -> Graph {
 /// Whether a bound of q̈ or F lies below an error, at states where H and J are differences of nearly equal numbers.
 fn is_violated_by_solutions(broken: Option<BrokenProof>) -> bool {
     let system = one_coordinate();
-    let mut p = Running::new(system.inputs.clone(), Format::of(Scalar::F32));
+    let mut p = Running::new(system.inputs.clone(), FloatFormat::of(Scalar::F32));
     p.broken = broken;
     let bound = bound_of(p, &system, &[false]).expect("the program is short");
     let mut seed = 1u64;
@@ -121,7 +121,7 @@ fn bounds_of_solutions_hold_and_without_one_of_their_parts_do_not() {
 
 #[test]
 fn quotients_roots_and_signs_have_bounds_at_a_state_or_none() {
-    let format = Format::of(Scalar::F32);
+    let format = FloatFormat::of(Scalar::F32);
     let ranges = [1.0, 1.0, 1.0, 1.0, 1.0].map(|x| Interval::new(x, x + 0.01));
     let holds = |graph: &Graph, broken: Option<BrokenProof>| {
         let mut p = Running::new(graph.inputs.clone(), format);
@@ -164,7 +164,7 @@ fn quotients_roots_and_signs_have_bounds_at_a_state_or_none() {
 #[test]
 fn fused_sums_keep_to_the_bound_for_other_bits() {
     let graph = turns();
-    let p = Running::of_other_bits(graph.inputs.clone(), Format::of(Scalar::F32), Format::of(Scalar::F32));
+    let p = Running::of_other_bits(graph.inputs.clone(), FloatFormat::of(Scalar::F32), FloatFormat::of(Scalar::F32));
     let bound = companion::bound_of(p, &graph).expect("the program is short");
     for seed in 0..200 {
         let found = worst_found(&graph, Scalar::F32, &WIDE, 20, seed).remove(0);

@@ -5,27 +5,27 @@ mod at_a_state;
 use super::analysis::Broken;
 use super::search::{computed_at, errors_at, worst_found};
 use super::tape::Registers;
-use super::{certify, subdivision, Analysis, Effort, Format, Interval};
-use crate::expr::{Binary, Builder, Graph, NodeId, Op, Port, RuleSet};
+use super::{certify, subdivision, Effort, ErrorAnalysis, FloatFormat, Interval};
+use crate::expr::{Binary, Graph, GraphBuilder, NodeId, Op, Port, RuleSet};
 use crate::number::Scalar;
 use straightline_core::random::Random;
 use straightline_core::Dd;
 
 /// A program of `inputs` numbers with one result.
-fn program(inputs: usize, equation: impl FnOnce(&mut Builder, &[NodeId]) -> NodeId) -> Graph {
-    let mut b = Builder::new(RuleSet::all(), vec![Port::new("x", &[inputs])]);
+fn program(inputs: usize, equation: impl FnOnce(&mut GraphBuilder, &[NodeId]) -> NodeId) -> Graph {
+    let mut b = GraphBuilder::new(RuleSet::all(), vec![Port::new("x", &[inputs])]);
     let x: Vec<NodeId> = (0..inputs as u32).map(|k| b.insert(Op::Input(k))).collect();
     let result = equation(&mut b, &x);
     b.finish(vec![Port::new("y", &[1])], vec![result])
 }
 
-fn sin_cos(b: &mut Builder, angle: NodeId) -> (NodeId, NodeId) {
+fn sin_cos(b: &mut GraphBuilder, angle: NodeId) -> (NodeId, NodeId) {
     let pair = b.add(Op::SinCos(angle));
     (b.add(Op::Sin(pair)), b.add(Op::Cos(pair)))
 }
 
 /// x cos q − y sin q, y cos q + x sin q.
-fn turned(b: &mut Builder, x: NodeId, y: NodeId, q: NodeId) -> (NodeId, NodeId) {
+fn turned(b: &mut GraphBuilder, x: NodeId, y: NodeId, q: NodeId) -> (NodeId, NodeId) {
     let (s, c) = sin_cos(b, q);
     let mut product = |a, f| b.add(Op::mul(a, f));
     let (xc, ys, yc, xs) = (product(x, c), product(y, s), product(y, c), product(x, s));
@@ -79,8 +79,8 @@ fn products_that_cancel() -> Graph {
 const WIDE: [Interval; 7] = [Interval { lo: -0.7, hi: 0.7 }; 7];
 
 /// The bound and the greatest magnitude of the result.
-fn bound(graph: &Graph, format: Format, ranges: &[Interval], broken: Option<Broken>) -> (f64, f64) {
-    let mut analysis = Analysis::new(graph, format);
+fn bound(graph: &Graph, format: FloatFormat, ranges: &[Interval], broken: Option<Broken>) -> (f64, f64) {
+    let mut analysis = ErrorAnalysis::new(graph, format);
     analysis.broken = broken;
     analysis.ranges(ranges).expect("the program is sound in its box");
     (analysis.error(0), analysis.range(graph.results[0]).mag())
@@ -108,7 +108,7 @@ fn a_search_comes_near_the_bound_of_each_rule_and_not_above() {
     ];
     for (name, graph, ranges, most) in cases {
         for scalar in [Scalar::F32, Scalar::F64] {
-            let (bound, _) = bound(&graph, Format::of(scalar), ranges, None);
+            let (bound, _) = bound(&graph, FloatFormat::of(scalar), ranges, None);
             let found = worst_found(&graph, scalar, ranges, 20_000, 7).remove(0);
             assert!(found.error <= bound, "{name}: {:e} > {bound:e} at {:?}", found.error, found.inputs);
             assert!(bound <= most * found.error, "{name}, {scalar:?}: {bound:e} is far above {:e}", found.error);
@@ -119,13 +119,13 @@ fn a_search_comes_near_the_bound_of_each_rule_and_not_above() {
 
 #[test]
 fn a_bound_with_a_broken_rule_is_violated() {
-    let format = Format::of(Scalar::F32);
+    let format = FloatFormat::of(Scalar::F32);
     // not to a power of two, above which half an ulp doubles
     let unit = [Interval::new(-0.9, 0.9); 2];
     let fraction = [Interval::new(0.0, 0.9)];
-    let small_u = Format { u: 0.5 * format.u, ..format };
+    let small_u = FloatFormat { u: 0.5 * format.u, ..format };
     assert!(is_violated(&sum_of_two(), &unit, bound(&sum_of_two(), small_u, &unit, None)), "rounding");
-    let small_trig = Format { trig_ulps: 0.4, ..format };
+    let small_trig = FloatFormat { trig_ulps: 0.4, ..format };
     assert!(is_violated(&sine(), &unit[..1], bound(&sine(), small_trig, &unit[..1], None)), "sine");
     let broken = |graph: Graph, ranges: &[Interval], what: Broken| {
         assert!(!is_violated(&graph, ranges, bound(&graph, format, ranges, None)), "{what:?} when sound");
@@ -175,8 +175,8 @@ fn what_is_played_for_a_part_is_what_an_analysis_of_it_finds() {
         ("cancelling", products_that_cancel(), &CANCELLING),
     ];
     for (name, graph, ranges) in cases {
-        let format = Format::of(Scalar::F32);
-        let mut analysis = Analysis::new(&graph, format);
+        let format = FloatFormat::of(Scalar::F32);
+        let mut analysis = ErrorAnalysis::new(&graph, format);
         analysis.ranges_on_tape(ranges).expect("the program is sound in its box");
         let samples = subdivision::samples(ranges);
         let samples: Vec<&[Interval]> = samples.iter().map(Vec::as_slice).collect();
@@ -204,7 +204,7 @@ fn what_is_played_for_a_part_is_what_an_analysis_of_it_finds() {
 fn parts_cover_the_box() {
     let effort = Effort { boxes: 16, ..Effort::default() };
     let of = |graph: &Graph, ranges: &[Interval], broken: Option<Broken>| {
-        let mut analysis = Analysis::new(graph, Format::of(Scalar::F32));
+        let mut analysis = ErrorAnalysis::new(graph, FloatFormat::of(Scalar::F32));
         analysis.broken = broken;
         let (_, error, magnitude) =
             subdivision::bounds(&mut analysis, ranges, effort).expect("it is sound in its box")[0];
@@ -212,7 +212,7 @@ fn parts_cover_the_box() {
     };
     let (operations, ranges) = all_operations();
     for (graph, ranges) in [(operations, &ranges[..]), (turns(), &WIDE), (products_that_cancel(), &CANCELLING)] {
-        let whole = bound(&graph, Format::of(Scalar::F32), ranges, None);
+        let whole = bound(&graph, FloatFormat::of(Scalar::F32), ranges, None);
         let cut = of(&graph, ranges, None);
         assert!(cut.0 <= whole.0 && cut.1 == whole.1);
         assert!(!is_violated(&graph, ranges, cut));
@@ -232,7 +232,7 @@ fn parts_cover_the_box() {
 fn one_turn_of_an_angle_stands_for_all() {
     let effort = Effort { boxes: 64, ..Effort::default() };
     let of = |graph: &Graph, ranges: &[Interval], broken: Option<Broken>| {
-        let mut analysis = Analysis::new(graph, Format::of(Scalar::F32));
+        let mut analysis = ErrorAnalysis::new(graph, FloatFormat::of(Scalar::F32));
         analysis.broken = broken;
         let (_, error, magnitude) =
             subdivision::bounds(&mut analysis, ranges, effort).expect("it is sound in its box")[0];
@@ -279,7 +279,7 @@ fn bounds_from_boxes_are_the_same_every_time() {
 
 #[test]
 fn a_turned_vector_keeps_its_norm() {
-    let (_, magnitude) = bound(&turns(), Format::of(Scalar::F32), &WIDE, None);
+    let (_, magnitude) = bound(&turns(), FloatFormat::of(Scalar::F32), &WIDE, None);
     // √2 · 0.7, and a few roundings
     assert!((0.9899..0.99).contains(&magnitude), "{magnitude}");
 }
@@ -293,7 +293,7 @@ const CANCELLING: [Interval; 4] = [
 
 #[test]
 fn products_that_cancel_leave_no_range_behind() {
-    let (_, magnitude) = bound(&products_that_cancel(), Format::of(Scalar::F32), &CANCELLING, None);
+    let (_, magnitude) = bound(&products_that_cancel(), FloatFormat::of(Scalar::F32), &CANCELLING, None);
     // 1.8 · 0.1, and roundings of products up to 16; without cancelling 33
     assert!((0.18..0.1801).contains(&magnitude), "{magnitude}");
 }
@@ -301,13 +301,14 @@ fn products_that_cancel_leave_no_range_behind() {
 #[test]
 fn what_may_be_no_number_has_no_bound() {
     let quotient = program(2, |b, x| b.add(Op::div(x[0], x[1])));
-    let refused = |ranges: &[Interval]| Analysis::new(&quotient, Format::of(Scalar::F32)).ranges(ranges).err();
-    assert_eq!(refused(&[Interval::ONE, Interval::new(-1.0, 1.0)]), Some(super::Refusal::Division));
+    let refused =
+        |ranges: &[Interval]| ErrorAnalysis::new(&quotient, FloatFormat::of(Scalar::F32)).ranges(ranges).err();
+    assert_eq!(refused(&[Interval::ONE, Interval::new(-1.0, 1.0)]), Some(super::NoCertificate::Division));
     assert_eq!(refused(&[Interval::ONE, Interval::new(0.5, 1.0)]), None);
     let huge = [Interval::point(1e30), Interval::new(1e-10, 1.0)];
-    assert_eq!(refused(&huge), Some(super::Refusal::Overflow));
-    let angle = Analysis::new(&sine(), Format::of(Scalar::F32)).ranges(&[Interval::new(0.0, 6e4)]).err();
-    assert_eq!(angle, Some(super::Refusal::Overflow), "beyond the domain of sine and cosine");
+    assert_eq!(refused(&huge), Some(super::NoCertificate::Overflow));
+    let angle = ErrorAnalysis::new(&sine(), FloatFormat::of(Scalar::F32)).ranges(&[Interval::new(0.0, 6e4)]).err();
+    assert_eq!(angle, Some(super::NoCertificate::Overflow), "beyond the domain of sine and cosine");
 }
 
 #[test]

@@ -28,9 +28,9 @@ mod values;
 use super::{count_sums, dead_code, sums};
 use crate::expr::{Binary, Counts, Graph};
 use net::Net;
-use search::Search;
+use search::EqualitySearch;
 use straightline_core::Dd;
-use values::{is_atom, values, Value, POINTS};
+use values::{is_atom, values, Residue, POINTS};
 
 /// Two values that agree so well are equal; double-double has 1e-31, of the greatest term. Less well agree those of programs whose constants
 /// differ by 1e20: a term that is missed there may be all that another state has.
@@ -68,7 +68,7 @@ fn round(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
     let before = results(graph);
     let mut live = net.live(graph);
     let mut work = 0;
-    for found in Search::new(graph).moves() {
+    for found in EqualitySearch::new(graph).moves() {
         // moves taken before may have left no use of it
         if work > WORK || !found.becomes.iter().any(|b| live[b.value]) {
             continue;
@@ -87,7 +87,7 @@ fn round(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
 }
 
 /// The results at the random states; none where roots and signs stand for inputs, whose order is that of the graph.
-fn results(graph: &Graph) -> Option<Vec<Value>> {
+fn results(graph: &Graph) -> Option<Vec<Residue>> {
     let has_atoms = graph.ops.iter().any(is_atom);
     (!has_atoms).then(|| {
         let values = values(graph);
@@ -96,9 +96,10 @@ fn results(graph: &Graph) -> Option<Vec<Value>> {
 }
 
 /// Whether another program has the same results.
-fn is_unchanged(before: &Option<Vec<Value>>, graph: &Graph) -> bool {
+fn is_unchanged(before: &Option<Vec<Residue>>, graph: &Graph) -> bool {
     let Some(before) = before else { return true };
-    let same = |(a, b): (&Value, &Value)| (0..POINTS).all(|k| (a[k] - b[k]).abs().hi() <= UNCHANGED * a[k].abs().hi());
+    let same =
+        |(a, b): (&Residue, &Residue)| (0..POINTS).all(|k| (a[k] - b[k]).abs().hi() <= UNCHANGED * a[k].abs().hi());
     results(graph).is_some_and(|after| before.iter().zip(&after).all(same))
 }
 
@@ -109,22 +110,22 @@ fn price(counts: Counts) -> usize {
 
 /// How two values make one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Form {
+enum PairForm {
     Sum,
     Difference,
     Product,
 }
 
-impl Form {
+impl PairForm {
     fn op(self) -> Binary {
         match self {
-            Form::Sum => Binary::Add,
-            Form::Difference => Binary::Sub,
-            Form::Product => Binary::Mul,
+            PairForm::Sum => Binary::Add,
+            PairForm::Difference => Binary::Sub,
+            PairForm::Product => Binary::Mul,
         }
     }
 
-    fn of(self, x: &Value, y: &Value) -> Value {
+    fn of(self, x: &Residue, y: &Residue) -> Residue {
         let op = self.op();
         std::array::from_fn(|k| op.value(x[k], y[k]))
     }
@@ -144,28 +145,28 @@ enum Operand {
 struct Becomes {
     value: usize,
     x: usize,
-    y: Option<(Form, Operand)>,
+    y: Option<(PairForm, Operand)>,
     negative: bool,
 }
 
 /// Two values that make one that is not there yet.
-type Pair = (usize, usize, Form);
+type NewPair = (usize, usize, PairForm);
 
 /// A change of the graph.
-struct Move {
+struct GraphChange {
     gain: usize,
-    pair: Option<Pair>,
+    pair: Option<NewPair>,
     becomes: Vec<Becomes>,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::expr::{Binary, Builder, NodeId, Op, Port, RuleSet};
+    use crate::expr::{Binary, GraphBuilder, NodeId, Op, Port, RuleSet};
 
     /// The program of some results of four inputs, before and after.
-    fn programs(results: impl Fn(&mut Builder, [NodeId; 4]) -> Vec<NodeId>) -> [Graph; 2] {
-        let mut builder = Builder::new(RuleSet::all(), vec![Port::new("x", &[4])]);
+    fn programs(results: impl Fn(&mut GraphBuilder, [NodeId; 4]) -> Vec<NodeId>) -> [Graph; 2] {
+        let mut builder = GraphBuilder::new(RuleSet::all(), vec![Port::new("x", &[4])]);
         let x = [0, 1, 2, 3].map(|k| builder.insert(Op::Input(k)));
         let results = results(&mut builder, x);
         let before = builder.finish(vec![Port::new("z", &[results.len()])], results);
@@ -244,11 +245,11 @@ mod tests {
     #[test]
     fn no_value_becomes_the_difference_of_greater_ones() {
         let [graph, _] = programs(|b, [x, y, ..]| vec![b.add(Op::mul(x, y))]);
-        let search = Search::new(&graph);
+        let search = EqualitySearch::new(&graph);
         let product = graph.results[0].index();
         let times = |k: f64| search.values[product].map(|v| v * Dd::from(k));
-        assert!(search.keeps(product, Form::Difference, &times(2.0), &times(1.0)));
-        assert!(!search.keeps(product, Form::Difference, &times(1001.0), &times(1000.0)));
-        assert!(search.keeps(product, Form::Product, &times(1000.0), &times(0.001)));
+        assert!(search.keeps(product, PairForm::Difference, &times(2.0), &times(1.0)));
+        assert!(!search.keeps(product, PairForm::Difference, &times(1001.0), &times(1000.0)));
+        assert!(search.keeps(product, PairForm::Product, &times(1000.0), &times(0.001)));
     }
 }

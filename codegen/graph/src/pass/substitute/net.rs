@@ -1,6 +1,6 @@
 //! Operations in any order, while some become others.
 
-use super::{Move, Operand};
+use super::{GraphChange, Operand};
 use crate::expr::{Constant, Graph, NodeId, Note, Op};
 use rustc_hash::FxHashMap;
 
@@ -12,7 +12,7 @@ pub(super) struct Net {
 }
 
 impl Net {
-    pub(super) fn with(&self, found: &Move) -> Net {
+    pub(super) fn with(&self, found: &GraphChange) -> Net {
         let mut net = self.clone();
         let section = self.notes[found.becomes[0].value].section;
         let push = |net: &mut Net, op: Op| {

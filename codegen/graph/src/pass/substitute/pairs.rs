@@ -1,8 +1,8 @@
 //! Values by what they are at the first point.
 
 use super::search::WINDOW;
-use super::values::Value;
-use super::{Form, Pair};
+use super::values::Residue;
+use super::{NewPair, PairForm};
 use crate::expr::{Graph, Op};
 use rustc_hash::FxHashMap;
 
@@ -31,16 +31,22 @@ impl Filter {
 }
 
 /// Values of pairs, found by what they are at the first point.
-pub(super) struct Pairs {
+pub(super) struct PairTable {
     known: Filter,
-    entries: FxHashMap<u64, Vec<Pair>>,
+    entries: FxHashMap<u64, Vec<NewPair>>,
 }
 
-impl Pairs {
+impl PairTable {
     /// Those that are wanted.
-    pub(super) fn new(graph: &Graph, numbers: &[usize], free: &[bool], values: &[Value], wanted: &Filter) -> Pairs {
+    pub(super) fn new(
+        graph: &Graph,
+        numbers: &[usize],
+        free: &[bool],
+        values: &[Residue],
+        wanted: &Filter,
+    ) -> PairTable {
         let is_constant = |i: usize| matches!(graph.ops[i], Op::Constant(_));
-        let mut entries: FxHashMap<u64, Vec<Pair>> = FxHashMap::default();
+        let mut entries: FxHashMap<u64, Vec<NewPair>> = FxHashMap::default();
         for (k, &i) in numbers.iter().enumerate() {
             for &j in &numbers[k..] {
                 if !(free[i] || free[j] || j - i <= WINDOW) || (is_constant(i) && is_constant(j)) {
@@ -48,11 +54,11 @@ impl Pairs {
                 }
                 let (x, y) = (values[i][0].hi(), values[j][0].hi());
                 let is_one_lost = is_one_lost(&values[i], &values[j]);
-                for (form, z) in [(Form::Product, x * y), (Form::Sum, x + y), (Form::Difference, x - y)] {
-                    if form != Form::Product && is_one_lost {
+                for (form, z) in [(PairForm::Product, x * y), (PairForm::Sum, x + y), (PairForm::Difference, x - y)] {
+                    if form != PairForm::Product && is_one_lost {
                         break;
                     }
-                    if wanted.may_have(key(z)) && (i != j || form != Form::Difference) {
+                    if wanted.may_have(key(z)) && (i != j || form != PairForm::Difference) {
                         entries.entry(key(z)).or_default().push((i, j, form));
                     }
                 }
@@ -60,16 +66,16 @@ impl Pairs {
         }
         let mut known = Filter::new(8 * entries.len());
         entries.keys().for_each(|key| known.insert(*key));
-        Pairs { known, entries }
+        PairTable { known, entries }
     }
 
-    pub(super) fn find(&self, x: f64) -> impl Iterator<Item = Pair> + '_ {
+    pub(super) fn find(&self, x: f64) -> impl Iterator<Item = NewPair> + '_ {
         keys(x).filter(|k| self.known.may_have(*k)).filter_map(|k| self.entries.get(&k)).flatten().copied()
     }
 }
 
 /// Whether one of two is too small for the key of their sum: that is the other's.
-pub(super) fn is_one_lost(x: &Value, y: &Value) -> bool {
+pub(super) fn is_one_lost(x: &Residue, y: &Residue) -> bool {
     let [x, y] = [x, y].map(|v| v[0].hi().abs());
     x.min(y) < 1e-9 * x.max(y)
 }

@@ -1,9 +1,9 @@
 //! Which values are equal to which.
 
-use super::pairs::{is_one_lost, key, keys, Filter, Pairs};
-use super::values::{is_atom, values, Value, POINTS};
-use super::{Becomes, Form, Move, Operand, Pair, EQUAL};
-use crate::expr::op::Kind;
+use super::pairs::{is_one_lost, key, keys, Filter, PairTable};
+use super::values::{is_atom, values, Residue, POINTS};
+use super::{Becomes, GraphChange, NewPair, Operand, PairForm, EQUAL};
+use crate::expr::op::OpKind;
 use crate::expr::{Binary, Graph, NodeId, Op, Unary};
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
@@ -17,12 +17,12 @@ pub(super) const WINDOW: usize = 80;
 const GREATER: f64 = 4.0;
 
 /// How v is taken apart: v − x, v + x and v / x are what is looked for.
-const WAYS: [Form; 3] = [Form::Difference, Form::Sum, Form::Product];
+const WAYS: [PairForm; 3] = [PairForm::Difference, PairForm::Sum, PairForm::Product];
 
 /// Which values are equal to which.
-pub(super) struct Search<'g> {
+pub(super) struct EqualitySearch<'g> {
     pub(super) graph: &'g Graph,
-    pub(super) values: Vec<Value>,
+    pub(super) values: Vec<Residue>,
     pub(super) uses: Vec<u32>,
     /// What may be an operand, in the order of the graph.
     pub(super) numbers: Vec<usize>,
@@ -35,7 +35,7 @@ pub(super) struct Search<'g> {
     pub(super) singles: FxHashMap<u64, Vec<u32>>,
 }
 
-impl<'g> Search<'g> {
+impl<'g> EqualitySearch<'g> {
     pub(super) fn new(graph: &'g Graph) -> Self {
         let n = graph.ops.len();
         let live = graph.live();
@@ -52,7 +52,7 @@ impl<'g> Search<'g> {
         let numbers: Vec<usize> = (0..n).filter(is_number).collect();
         let is_free = |op: &Op| matches!(op, Op::Input(_) | Op::Constant(_) | Op::Sin(_) | Op::Cos(_));
         let free: Vec<bool> = graph.ops.iter().map(is_free).collect();
-        let may_be_no_number = |i: &usize| graph.ops[*i].row().is_some_and(|row| row.kind != Kind::Polynomial);
+        let may_be_no_number = |i: &usize| graph.ops[*i].row().is_some_and(|row| row.kind != OpKind::Polynomial);
         let atoms: Vec<usize> = (0..n).filter(may_be_no_number).collect();
         let words = atoms.len().div_ceil(64);
         let mut quotients = vec![0; n * words];
@@ -71,16 +71,16 @@ impl<'g> Search<'g> {
         }
         let mut known = Filter::new(64 * singles.len());
         singles.keys().for_each(|key| known.insert(*key));
-        Search { graph, values, uses, numbers, free, quotients, words, known, singles }
+        EqualitySearch { graph, values, uses, numbers, free, quotients, words, known, singles }
     }
 
     /// What v − x, v + x or v / x is at the first point, to be found.
-    fn rest(&self, v: usize, x: usize, way: Form) -> f64 {
+    fn rest(&self, v: usize, x: usize, way: PairForm) -> f64 {
         let [v, x] = [v, x].map(|i| self.values[i][0].hi());
         match way {
-            Form::Difference => v - x,
-            Form::Sum => v + x,
-            Form::Product => v / x,
+            PairForm::Difference => v - x,
+            PairForm::Sum => v + x,
+            PairForm::Product => v / x,
         }
     }
 
@@ -106,7 +106,7 @@ impl<'g> Search<'g> {
     }
 
     /// The pairs that some value is formed of, and maybe others.
-    fn pairs(&self, candidates: &[usize]) -> Pairs {
+    fn pairs(&self, candidates: &[usize]) -> PairTable {
         let mut later = vec![false; self.graph.ops.len()];
         let mut wanted = Filter::new(6 * WINDOW * candidates.len());
         for &v in candidates {
@@ -117,20 +117,21 @@ impl<'g> Search<'g> {
                 }
             }
         }
-        Pairs::new(self.graph, &self.numbers, &self.free, &self.values, &wanted)
+        PairTable::new(self.graph, &self.numbers, &self.free, &self.values, &wanted)
     }
 
     /// All moves that save an operation, the best first; of those, the first.
-    pub(super) fn moves(&self) -> Vec<Move> {
+    pub(super) fn moves(&self) -> Vec<GraphChange> {
         let mut moves = Vec::new();
-        let mut by_pair: BTreeMap<Pair, BTreeMap<usize, (usize, Becomes)>> = BTreeMap::new();
+        let mut by_pair: BTreeMap<NewPair, BTreeMap<usize, (usize, Becomes)>> = BTreeMap::new();
         let mut later = vec![false; self.graph.ops.len()];
         let sums: Vec<usize> = self.numbers.iter().copied().filter(|v| self.is_formed(*v)).collect();
         let candidates: Vec<usize> = sums.iter().copied().filter(|v| self.freed(*v, &[]) > 1).collect();
         let pairs = self.pairs(&candidates);
         for &v in &sums {
             let target = &self.values[v];
-            let mut add = |gain: usize, becomes: Becomes| moves.push(Move { gain, pair: None, becomes: vec![becomes] });
+            let mut add =
+                |gain: usize, becomes: Becomes| moves.push(GraphChange { gain, pair: None, becomes: vec![becomes] });
             let equal = self.found(target[0].hi()).filter(|u| *u != v);
             let equal: Vec<(usize, bool)> =
                 equal.filter_map(|u| sign(target, &self.values[u], target).map(|negative| (u, negative))).collect();
@@ -156,7 +157,7 @@ impl<'g> Search<'g> {
                     }
                 }
                 for way in WAYS {
-                    if way != Form::Product && is_one_lost(target, own) {
+                    if way != PairForm::Product && is_one_lost(target, own) {
                         continue;
                     }
                     let rest = self.rest(v, x, way);
@@ -189,7 +190,7 @@ impl<'g> Search<'g> {
             let gain: usize = of.values().map(|(gain, _)| gain).sum();
             if gain > 1 {
                 let becomes = of.into_values().map(|(_, becomes)| becomes).collect();
-                moves.push(Move { gain: gain - 1, pair: Some(pair), becomes });
+                moves.push(GraphChange { gain: gain - 1, pair: Some(pair), becomes });
             }
         }
         moves.retain(|m| m.gain > 0);
@@ -209,45 +210,47 @@ impl<'g> Search<'g> {
     }
 
     /// How v is formed of x and y, if `y` is what the way to it asks for: the form, and whether all signs are turned.
-    fn form(&self, v: usize, way: Form, x: &Value, y: &Value) -> Option<(Form, bool)> {
+    fn form(&self, v: usize, way: PairForm, x: &Residue, y: &Residue) -> Option<(PairForm, bool)> {
         let target = &self.values[v];
-        let negative = |form: Form, scale: &Value| sign(target, &form.of(x, y), scale);
+        let negative = |form: PairForm, scale: &Residue| sign(target, &form.of(x, y), scale);
         let scale = greater(target, x);
         let form = match way {
-            Form::Product => (Form::Product, negative(Form::Product, target)?),
+            PairForm::Product => (PairForm::Product, negative(PairForm::Product, target)?),
             // v = x + y or x − y
-            Form::Difference => match negative(Form::Sum, &scale) {
-                Some(false) => (Form::Sum, false),
-                _ => (negative(Form::Difference, &scale) == Some(false)).then_some((Form::Difference, false))?,
+            PairForm::Difference => match negative(PairForm::Sum, &scale) {
+                Some(false) => (PairForm::Sum, false),
+                _ => {
+                    (negative(PairForm::Difference, &scale) == Some(false)).then_some((PairForm::Difference, false))?
+                }
             },
             // v = y − x or −y − x
-            Form::Sum => match negative(Form::Difference, &scale) {
-                Some(true) => (Form::Difference, true),
-                _ => (negative(Form::Sum, &scale) == Some(true)).then_some((Form::Sum, true))?,
+            PairForm::Sum => match negative(PairForm::Difference, &scale) {
+                Some(true) => (PairForm::Difference, true),
+                _ => (negative(PairForm::Sum, &scale) == Some(true)).then_some((PairForm::Sum, true))?,
             },
         };
         self.keeps(v, form.0, x, y).then_some(form)
     }
 
     /// The same where y is a pair that is not there yet.
-    fn form_of_pair(&self, v: usize, way: Form, x: &Value, (y, z, f): Pair) -> Option<(Form, bool)> {
+    fn form_of_pair(&self, v: usize, way: PairForm, x: &Residue, (y, z, f): NewPair) -> Option<(PairForm, bool)> {
         let (a, b, target) = (&self.values[y], &self.values[z], &self.values[v]);
         let made = f.of(a, b);
         let form = self.form(v, way, x, &made)?;
         // its own terms may not be greater than what it makes or v is
         let greatest = |k: usize| made[k].abs().hi().max(target[k].abs().hi());
         let cancels = |k: usize| a[k].abs().hi().max(b[k].abs().hi()) > GREATER * greatest(k);
-        (f == Form::Product || !(0..POINTS).any(cancels)).then_some(form)
+        (f == PairForm::Product || !(0..POINTS).any(cancels)).then_some(form)
     }
 
     /// Whether a sum has no greater terms than the operation that it replaces.
-    pub(super) fn keeps(&self, v: usize, form: Form, x: &Value, y: &Value) -> bool {
+    pub(super) fn keeps(&self, v: usize, form: PairForm, x: &Residue, y: &Residue) -> bool {
         let size = |i: usize, k: usize| self.values[i][k].abs().hi();
         let most = |k: usize| match self.graph.ops[v] {
             Op::Binary(Binary::Add | Binary::Sub, a, b) => size(v, k).max(size(a.index(), k)).max(size(b.index(), k)),
             _ => size(v, k),
         };
-        form == Form::Product || (0..POINTS).all(|k| x[k].abs().hi().max(y[k].abs().hi()) <= GREATER * most(k))
+        form == PairForm::Product || (0..POINTS).all(|k| x[k].abs().hi().max(y[k].abs().hi()) <= GREATER * most(k))
     }
 
     /// So many operations are needed no more if v is formed of these.
@@ -278,33 +281,33 @@ impl<'g> Search<'g> {
 }
 
 /// v = c x, x + c or −(x − c), for a constant.
-pub(super) fn constant(v: &Value, x: &Value) -> Option<(Form, Dd, bool)> {
+pub(super) fn constant(v: &Residue, x: &Residue) -> Option<(PairForm, Dd, bool)> {
     let [a, b] = [0, 1].map(|k| (v[k].hi(), x[k].hi()));
     let about = |x: f64, y: f64| (x - y).abs() <= 1e-9 * x.abs();
     if about(a.0 / a.1, b.0 / b.1) {
         let c = v[0] / x[0];
-        let made: Value = x.map(|x| x * c);
-        return sign(v, &made, v).map(|negative| (Form::Product, c, negative));
+        let made: Residue = x.map(|x| x * c);
+        return sign(v, &made, v).map(|negative| (PairForm::Product, c, negative));
     }
     if about(a.0 - a.1, b.0 - b.1) {
         let c = v[0] - x[0];
-        let made: Value = x.map(|x| x + c);
-        return (sign(v, &made, &greater(v, x)) == Some(false)).then_some((Form::Sum, c, false));
+        let made: Residue = x.map(|x| x + c);
+        return (sign(v, &made, &greater(v, x)) == Some(false)).then_some((PairForm::Sum, c, false));
     }
     if about(a.0 + a.1, b.0 + b.1) {
         let c = v[0] + x[0];
-        let made: Value = x.map(|x| x - c);
-        return (sign(v, &made, &greater(v, x)) == Some(true)).then_some((Form::Difference, c, true));
+        let made: Residue = x.map(|x| x - c);
+        return (sign(v, &made, &greater(v, x)) == Some(true)).then_some((PairForm::Difference, c, true));
     }
     None
 }
 
-pub(super) fn greater(a: &Value, b: &Value) -> Value {
+pub(super) fn greater(a: &Residue, b: &Residue) -> Residue {
     std::array::from_fn(|k| if a[k].abs().hi() > b[k].abs().hi() { a[k] } else { b[k] })
 }
 
 /// Whether a = −b; none if they differ in more than the sign.
-pub(super) fn sign(a: &Value, b: &Value, scale: &Value) -> Option<bool> {
+pub(super) fn sign(a: &Residue, b: &Residue, scale: &Residue) -> Option<bool> {
     let equal = |turned: bool| {
         (0..POINTS).all(|k| {
             let difference = if turned { a[k] + b[k] } else { a[k] - b[k] };

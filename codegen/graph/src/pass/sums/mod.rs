@@ -16,11 +16,11 @@ mod pairs;
 mod steps;
 mod writer;
 
-use crate::expr::{Binary, Builder, Constant, Counts, Graph, NodeId, Op, RuleSet, Unary, TAIL};
+use crate::expr::{Binary, Constant, Counts, Graph, GraphBuilder, NodeId, Op, RuleSet, Unary, TAIL};
 use rustc_hash::FxHashMap;
 use std::rc::Rc;
 use straightline_core::Dd;
-use writer::Writer;
+use writer::SumWriter;
 
 /// More rounds have not been seen to help; this only bounds the time.
 const ROUNDS: usize = 6;
@@ -28,7 +28,7 @@ const ROUNDS: usize = 6;
 /// The graph with its sums taken apart and put together again.
 pub fn sums(graph: &Graph) -> Graph {
     graph.expect_plain("sums");
-    let mut table = Table::read(graph);
+    let mut table = SumTable::read(graph);
     table.simplify();
     table.write(graph)
 }
@@ -36,7 +36,7 @@ pub fn sums(graph: &Graph) -> Graph {
 /// What [`sums`] would take: the same counts, without writing the graph. Only what it can change is counted: products and
 /// sums, and pairs of sine and cosine.
 pub fn count_sums(graph: &Graph) -> Counts {
-    let mut table = Table::read(graph);
+    let mut table = SumTable::read(graph);
     table.simplify();
     table.counts()
 }
@@ -65,7 +65,7 @@ impl Term {
 
 /// Signs stand outside: of products, of constants, and of sums, whose first term is positive when they are made.
 #[derive(Clone, Debug, PartialEq)]
-enum Value {
+enum SignedValue {
     Constant(Constant),
     Product(usize, usize),
     Sum(Vec<Term>),
@@ -77,8 +77,8 @@ enum Value {
 
 /// A graph as sums of many terms.
 #[derive(Clone)]
-struct Table {
-    values: Vec<Value>,
+struct SumTable {
+    values: Vec<SignedValue>,
     results: Vec<Term>,
     /// Where a value came from: the node whose name and place it has.
     origin: Vec<Option<NodeId>>,
@@ -94,9 +94,9 @@ struct Table {
 /// How often each value is used, and the values that are, operands before users.
 type Uses = (Vec<u32>, Vec<usize>);
 
-impl Table {
-    fn read(graph: &Graph) -> Table {
-        let mut table = Table {
+impl SumTable {
+    fn read(graph: &Graph) -> SumTable {
+        let mut table = SumTable {
             values: Vec::with_capacity(graph.ops.len()),
             results: Vec::new(),
             origin: Vec::with_capacity(graph.ops.len()),
@@ -113,12 +113,12 @@ impl Table {
                 Op::Unary(Unary::Neg, a) => t(a).signed(true),
                 Op::Constant(c) => table.constant(c.value()),
                 Op::Binary(Binary::Mul, a, b) => table.product(t(a), t(b), Some(id)),
-                Op::Binary(Binary::Add, a, b) => table.push(Value::Sum(vec![t(a), t(b)]), Some(id)),
-                Op::Binary(Binary::Sub, a, b) => table.push(Value::Sum(vec![t(a), t(b).signed(true)]), Some(id)),
+                Op::Binary(Binary::Add, a, b) => table.push(SignedValue::Sum(vec![t(a), t(b)]), Some(id)),
+                Op::Binary(Binary::Sub, a, b) => table.push(SignedValue::Sum(vec![t(a), t(b).signed(true)]), Some(id)),
                 op => {
                     let mut operands = [None; 2];
                     op.operands().zip(&mut operands).for_each(|(a, place)| *place = Some(t(a)));
-                    table.push(Value::Other(op, operands), Some(id))
+                    table.push(SignedValue::Other(op, operands), Some(id))
                 }
             };
             term_of[id.index()] = term;
@@ -144,7 +144,7 @@ impl Table {
         }
     }
 
-    fn push(&mut self, value: Value, origin: Option<NodeId>) -> Term {
+    fn push(&mut self, value: SignedValue, origin: Option<NodeId>) -> Term {
         self.uses = None;
         self.values.push(value);
         self.origin.push(origin);
@@ -157,7 +157,7 @@ impl Table {
         if let Some(value) = self.constants.get(&key) {
             return Term::new(*value, negative);
         }
-        let value = self.push(Value::Constant(key), None).value();
+        let value = self.push(SignedValue::Constant(key), None).value();
         self.constants.insert(key, value);
         Term::new(value, negative)
     }
@@ -169,13 +169,13 @@ impl Table {
         if let Some(value) = self.products.get(&key) {
             return Term::new(*value, negative);
         }
-        let value = self.push(Value::Product(key.0, key.1), origin).value();
+        let value = self.push(SignedValue::Product(key.0, key.1), origin).value();
         self.products.insert(key, value);
         Term::new(value, negative)
     }
 
     fn resolved(&self, mut term: Term) -> Term {
-        while let Value::Same(t) = self.values[term.value()] {
+        while let SignedValue::Same(t) = self.values[term.value()] {
             term = t.signed(term.is_negative());
         }
         term
@@ -184,11 +184,11 @@ impl Table {
     /// Operand `k` of a value.
     fn operand(&self, value: usize, k: usize) -> Option<Term> {
         let term = match &self.values[value] {
-            Value::Constant(_) => None,
-            Value::Product(a, b) => [*a, *b].get(k).map(|v| Term::new(*v, false)),
-            Value::Sum(terms) => terms.get(k).copied(),
-            Value::Same(t) => (k == 0).then_some(*t),
-            Value::Other(_, operands) => operands.get(k).copied().flatten(),
+            SignedValue::Constant(_) => None,
+            SignedValue::Product(a, b) => [*a, *b].get(k).map(|v| Term::new(*v, false)),
+            SignedValue::Sum(terms) => terms.get(k).copied(),
+            SignedValue::Same(t) => (k == 0).then_some(*t),
+            SignedValue::Other(_, operands) => operands.get(k).copied().flatten(),
         };
         term.map(|t| self.resolved(t))
     }
@@ -204,7 +204,7 @@ impl Table {
     }
 
     fn is_product(&self, t: Term) -> bool {
-        matches!(self.values[t.value()], Value::Product(..))
+        matches!(self.values[t.value()], SignedValue::Product(..))
     }
 
     /// How often each value is used by what the results need, and those values, operands before users.
@@ -228,17 +228,17 @@ impl Table {
             'values: while let Some((value, first)) = stack.pop() {
                 let two: [Term; 2];
                 let operands: &[Term] = match &self.values[value] {
-                    Value::Sum(terms) => terms,
-                    Value::Product(a, b) => {
+                    SignedValue::Sum(terms) => terms,
+                    SignedValue::Product(a, b) => {
                         two = [a, b].map(|v| Term::new(*v, false));
                         &two
                     }
-                    Value::Other(_, operands) => {
+                    SignedValue::Other(_, operands) => {
                         two = operands.map(|t| t.unwrap_or(Term(0)));
                         &two[..operands.iter().flatten().count()]
                     }
-                    Value::Same(t) => std::slice::from_ref(t),
-                    Value::Constant(_) => &[],
+                    SignedValue::Same(t) => std::slice::from_ref(t),
+                    SignedValue::Constant(_) => &[],
                 };
                 for (k, t) in operands.iter().enumerate().skip(first) {
                     let operand = self.resolved(*t).value();
@@ -246,7 +246,7 @@ impl Table {
                     if uses[operand] > 1 {
                         continue;
                     }
-                    if matches!(self.values[operand], Value::Constant(_) | Value::Other(_, [None, None])) {
+                    if matches!(self.values[operand], SignedValue::Constant(_) | SignedValue::Other(_, [None, None])) {
                         order.push(operand);
                         continue;
                     }
@@ -259,7 +259,7 @@ impl Table {
         (uses, order)
     }
 
-    fn set(&mut self, v: usize, value: Value) {
+    fn set(&mut self, v: usize, value: SignedValue) {
         if self.values[v] != value {
             self.uses = None;
             self.values[v] = value;
@@ -267,7 +267,7 @@ impl Table {
         }
     }
 
-    /// As [`Graph::counts`] of what [`Table::write`] makes: n products of one user and a rest are n fused instructions.
+    /// As [`Graph::counts`] of what [`SumTable::write`] makes: n products of one user and a rest are n fused instructions.
     fn counts(&mut self) -> Counts {
         let found = self.uses();
         let (uses, order) = &*found;
@@ -275,25 +275,26 @@ impl Table {
         let mut fused = 0;
         for v in order.iter().copied() {
             match &self.values[v] {
-                Value::Product(..) => counts.mul += 1,
-                Value::Sum(_) => {
+                SignedValue::Product(..) => counts.mul += 1,
+                SignedValue::Sum(_) => {
                     let terms = || (0..).map_while(|k| self.operand(v, k));
                     let additions = terms().count() - 1;
                     let products = terms().filter(|t| uses[t.value()] == 1 && self.is_product(*t)).count();
                     counts.add += additions;
                     fused += products.min(additions);
                 }
-                Value::Other(Op::SinCos(_), [Some(angle), _]) => {
+                SignedValue::Other(Op::SinCos(_), [Some(angle), _]) => {
                     counts.sin_cos += 1;
-                    let sum = matches!(self.values[self.resolved(*angle).value()], Value::Other(Op::AngleSum(..), _));
+                    let sum =
+                        matches!(self.values[self.resolved(*angle).value()], SignedValue::Other(Op::AngleSum(..), _));
                     counts.tail += usize::from(sum);
                 }
-                Value::Other(Op::AngleSum(..), _) => {
+                SignedValue::Other(Op::AngleSum(..), _) => {
                     counts.add += 1;
                     counts.tail += TAIL;
                 }
-                Value::Other(op, _) => op.row().into_iter().for_each(|row| counts.count(row.counted)),
-                Value::Constant(_) | Value::Same(_) => {}
+                SignedValue::Other(op, _) => op.row().into_iter().for_each(|row| counts.count(row.counted)),
+                SignedValue::Constant(_) | SignedValue::Same(_) => {}
             }
         }
         counts.fma = counts.mul + counts.add - fused;
@@ -305,17 +306,17 @@ impl Table {
         // in the order of the original; what has a single user goes to it
         let mut roots: Vec<(NodeId, usize)> = order
             .iter()
-            .filter(|v| uses[**v] > 1 || !matches!(self.values[**v], Value::Product(..) | Value::Sum(_)))
+            .filter(|v| uses[**v] > 1 || !matches!(self.values[**v], SignedValue::Product(..) | SignedValue::Sum(_)))
             .filter_map(|v| self.origin[*v].map(|id| (id, *v)))
             .collect();
         let results = graph.results.iter().zip(&self.results).map(|(id, t)| (*id, self.resolved(*t).value()));
         roots.extend(results);
         roots.sort_unstable();
-        let mut writer = Writer {
+        let mut writer = SumWriter {
             table: self,
             graph,
             uses,
-            builder: Builder::new(RuleSet::all(), graph.inputs.clone()),
+            builder: GraphBuilder::new(RuleSet::all(), graph.inputs.clone()),
             written: vec![None; self.values.len()],
         };
         for (id, value) in roots {

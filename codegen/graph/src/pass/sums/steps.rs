@@ -1,25 +1,25 @@
 //! The steps: flatten, factor, share.
 
 use super::pairs::Pairs;
-use super::{Table, Term, Value};
+use super::{SignedValue, SumTable, Term};
 use rustc_hash::{FxHashMap, FxHasher};
 use std::cmp::Reverse;
 use std::hash::{Hash, Hasher};
 use straightline_core::Dd;
 
-impl Table {
+impl SumTable {
     /// Sums without another user dissolve in the sum that uses them; constants of a sum become one, multiples of a value one, opposites go.
     pub(super) fn flatten(&mut self) {
         let found = self.uses();
         let (uses, order) = &*found;
         let mut flat: Vec<Term> = Vec::new();
         for v in order.iter().copied() {
-            let Value::Sum(terms) = &self.values[v] else { continue };
+            let SignedValue::Sum(terms) = &self.values[v] else { continue };
             flat.clear();
             for t in terms.iter().map(|t| self.resolved(*t)) {
                 match &self.values[t.value()] {
                     // already flat itself: it stands before its user
-                    Value::Sum(inner) if uses[t.value()] == 1 => {
+                    SignedValue::Sum(inner) if uses[t.value()] == 1 => {
                         flat.extend(inner.iter().map(|u| self.resolved(*u).signed(t.is_negative())));
                     }
                     _ => flat.push(t),
@@ -36,7 +36,7 @@ impl Table {
         let mut constant = Dd::ZERO;
         let mut kept: Vec<Term> = Vec::with_capacity(terms.len());
         for t in terms.iter().copied() {
-            if let Value::Constant(c) = self.values[t.value()] {
+            if let SignedValue::Constant(c) = self.values[t.value()] {
                 constant = if t.is_negative() { constant - c.value() } else { constant + c.value() };
             } else if let Some(opposite) = kept.iter().position(|u| *u == t.signed(true)) {
                 kept.remove(opposite);
@@ -48,7 +48,7 @@ impl Table {
             let c = self.constant(constant);
             kept.push(c);
         }
-        let value = if kept.len() == 1 { Value::Same(kept[0]) } else { Value::Sum(kept) };
+        let value = if kept.len() == 1 { SignedValue::Same(kept[0]) } else { SignedValue::Sum(kept) };
         self.set(v, value);
     }
 
@@ -62,25 +62,25 @@ impl Table {
         let mut other: Vec<Term> = Vec::new();
         for v in found.1.iter().copied() {
             match &self.values[v] {
-                Value::Product(..) => {
+                SignedValue::Product(..) => {
                     let [a, b] = self.factors(v);
                     let negative = a.is_negative() != b.is_negative();
                     let (a, b) = (a.value().min(b.value()), a.value().max(b.value()));
                     let value = match self.products.get(&(a, b)) {
-                        Some(&value) => Value::Same(Term::new(value, negative)),
+                        Some(&value) => SignedValue::Same(Term::new(value, negative)),
                         None if negative => {
-                            let value = self.push(Value::Product(a, b), self.origin[v]);
+                            let value = self.push(SignedValue::Product(a, b), self.origin[v]);
                             self.products.insert((a, b), value.value());
-                            Value::Same(value.signed(true))
+                            SignedValue::Same(value.signed(true))
                         }
                         None => {
                             self.products.insert((a, b), v);
-                            Value::Product(a, b)
+                            SignedValue::Product(a, b)
                         }
                     };
                     self.set(v, value);
                 }
-                Value::Sum(_) => {
+                SignedValue::Sum(_) => {
                     let negative = self.canonical(v, &mut key);
                     let mut hasher = FxHasher::default();
                     key.hash(&mut hasher);
@@ -89,15 +89,15 @@ impl Table {
                         Some(&(u, turned)) => {
                             self.canonical(u, &mut other);
                             if key == other {
-                                self.set(v, Value::Same(Term::new(u, turned != negative)));
+                                self.set(v, SignedValue::Same(Term::new(u, turned != negative)));
                             }
                         }
                         None => {
                             sums.insert(hash, (v, negative));
-                            let Value::Sum(terms) = &self.values[v] else { unreachable!("seen above") };
+                            let SignedValue::Sum(terms) = &self.values[v] else { unreachable!("seen above") };
                             if terms.iter().any(|t| self.resolved(*t) != *t) {
                                 let terms = self.terms(v);
-                                self.set(v, Value::Sum(terms));
+                                self.set(v, SignedValue::Sum(terms));
                             }
                         }
                     }
@@ -151,7 +151,7 @@ impl Table {
         if self.is_product(t) && uses.get(t.value()) == Some(&1) {
             let [a, b] = self.factors(t.value());
             for (c, x) in [(a, b), (b, a)] {
-                if let Value::Constant(factor) = self.values[c.value()] {
+                if let SignedValue::Constant(factor) = self.values[c.value()] {
                     let negative = c.is_negative() != x.is_negative();
                     return (Term::new(x.value(), t.is_negative() != negative), Some(factor.value()));
                 }
@@ -168,7 +168,7 @@ impl Table {
         let used = |t: Term| uses.get(t.value()).copied().unwrap_or(0);
         let mut doubled = false;
         for v in order.iter().copied() {
-            let Value::Sum(terms) = &self.values[v] else { continue };
+            let SignedValue::Sum(terms) = &self.values[v] else { continue };
             let is_twice = |k: &usize| {
                 let t = terms[*k];
                 used(t) == 2 && self.is_product(t) && terms[*k + 1..].contains(&t)
@@ -178,8 +178,8 @@ impl Table {
             let mut terms: Vec<Term> = terms.iter().copied().filter(|t| *t != twice).collect();
             let [a, b] = self.factors(twice.value());
             let (once, twofold) = if used(a) > used(b) { (b, a) } else { (a, b) };
-            let sum = self.push(Value::Sum(vec![twofold, twofold]), None);
-            let product = self.push(Value::Product(once.value(), sum.value()), None);
+            let sum = self.push(SignedValue::Sum(vec![twofold, twofold]), None);
+            let product = self.push(SignedValue::Product(once.value(), sum.value()), None);
             terms.push(product.signed(twice.is_negative() != once.is_negative()));
             self.set_sum(v, &terms);
             doubled = true;
@@ -199,7 +199,7 @@ impl Table {
             let (uses, order) = &*found;
             let mut factored = false;
             for v in order.iter().copied() {
-                let Value::Sum(terms) = &self.values[v] else { continue };
+                let SignedValue::Sum(terms) = &self.values[v] else { continue };
                 members.clear();
                 for (k, t) in terms.iter().enumerate() {
                     if uses.get(t.value()) == Some(&1) && self.is_product(*t) {
@@ -224,9 +224,9 @@ impl Table {
                 let others: Vec<Term> = best.iter().map(|(_, k)| other(*k)).collect();
                 let is_rest = |k: &usize| best.iter().all(|(_, member)| member != k);
                 let mut rest: Vec<Term> = (0..terms.len()).filter(is_rest).map(|k| terms[k]).collect();
-                let inner = self.push(Value::Sum(Vec::new()), None);
+                let inner = self.push(SignedValue::Sum(Vec::new()), None);
                 self.set_sum(inner.value(), &others);
-                rest.push(self.push(Value::Product(factor, inner.value()), None));
+                rest.push(self.push(SignedValue::Product(factor, inner.value()), None));
                 self.set_sum(v, &rest);
                 factored = true;
             }
@@ -243,7 +243,7 @@ impl Table {
         let found = self.uses();
         let mut pairs = Pairs::default();
         for v in found.1.iter().copied() {
-            if let Value::Sum(_) = self.values[v] {
+            if let SignedValue::Sum(_) = self.values[v] {
                 pairs.insert(v, &self.terms(v));
             }
         }
@@ -253,7 +253,7 @@ impl Table {
             let exact = sums.iter().copied().find(|v| self.operand(*v, 2).is_none());
             let shared = match exact {
                 Some(v) => Term::new(v, !self.terms(v).contains(&a)),
-                None => self.push(Value::Sum(vec![a, b]), None),
+                None => self.push(SignedValue::Sum(vec![a, b]), None),
             };
             for v in sums.into_iter().filter(|v| *v != shared.value()) {
                 let mut terms = self.terms(v);
@@ -271,10 +271,10 @@ impl Table {
                 }
                 if terms.len() == 1 {
                     // the very pair once more
-                    self.set(v, Value::Same(terms[0]));
+                    self.set(v, SignedValue::Same(terms[0]));
                 } else {
                     pairs.insert(v, &terms);
-                    self.set(v, Value::Sum(terms));
+                    self.set(v, SignedValue::Sum(terms));
                 }
             }
             if exact.is_none() {

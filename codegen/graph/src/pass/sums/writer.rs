@@ -1,34 +1,34 @@
 //! Back to a graph.
 
-use super::{Table, Term, Value};
-use crate::expr::{Builder, Graph, NodeId, Note, Op};
+use super::{SignedValue, SumTable, Term};
+use crate::expr::{Graph, GraphBuilder, NodeId, Note, Op};
 
 /// Back to a graph.
-pub(super) struct Writer<'a> {
-    pub(super) table: &'a Table,
+pub(super) struct SumWriter<'a> {
+    pub(super) table: &'a SumTable,
     pub(super) graph: &'a Graph,
     pub(super) uses: Vec<u32>,
-    pub(super) builder: Builder,
+    pub(super) builder: GraphBuilder,
     /// The node of a value, and whether it is the value's negative.
     pub(super) written: Vec<Option<(NodeId, bool)>>,
 }
 
-impl Writer<'_> {
+impl SumWriter<'_> {
     /// The node of a value, and whether it is the value's negative.
     pub(super) fn value(&mut self, value: usize) -> (NodeId, bool) {
         if let Some(done) = self.written[value] {
             return done;
         }
         let written = match &self.table.values[value] {
-            Value::Constant(c) => (self.builder.insert(Op::Constant(*c)), false),
-            Value::Product(..) => {
+            SignedValue::Constant(c) => (self.builder.insert(Op::Constant(*c)), false),
+            SignedValue::Product(..) => {
                 let [a, b] = self.table.factors(value);
                 let ((a, s), (b, t)) = (self.term(a), self.term(b));
                 (self.builder.insert(Op::mul(a.min(b), a.max(b))), s != t)
             }
-            Value::Sum(_) => self.sum(&self.table.terms(value)),
-            Value::Same(_) => unreachable!("terms are resolved"),
-            Value::Other(op, operands) => {
+            SignedValue::Sum(_) => self.sum(&self.table.terms(value)),
+            SignedValue::Same(_) => unreachable!("terms are resolved"),
+            SignedValue::Other(op, operands) => {
                 let operands: Vec<NodeId> = operands.iter().flatten().map(|t| self.signed(*t)).collect();
                 let mut given = operands.into_iter();
                 let op = op.map(|_| given.next().expect("as many operands as before"));
@@ -59,7 +59,7 @@ impl Writer<'_> {
     /// The node of a term, negated if need be.
     pub(super) fn signed(&mut self, term: Term) -> NodeId {
         let term = self.table.resolved(term);
-        if let Value::Constant(c) = &self.table.values[term.value()] {
+        if let SignedValue::Constant(c) = &self.table.values[term.value()] {
             let c = c.value();
             return self.builder.constant(if term.is_negative() { -c } else { c });
         }
@@ -87,7 +87,7 @@ impl Writer<'_> {
         let lead = left.iter().position(|t| !t.1);
         let turned = lead.is_none();
         let (mut sum, _) = left.remove(lead.unwrap_or(0));
-        let mut add = |builder: &mut Builder, (node, negative): (NodeId, bool)| {
+        let mut add = |builder: &mut GraphBuilder, (node, negative): (NodeId, bool)| {
             sum = builder.insert(match negative != turned {
                 true => Op::sub(sum, node),
                 false => Op::add(sum, node),

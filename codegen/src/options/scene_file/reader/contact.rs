@@ -13,15 +13,19 @@ use toml::de::DeValue;
 
 /// The forms that a surface can have.
 #[derive(Clone, Copy)]
-enum Form {
+enum SurfaceForm {
     Plane,
     Sphere,
     Cylinder,
     Quadric,
 }
 
-const FORMS: [(&str, Form); 4] =
-    [("plane", Form::Plane), ("sphere", Form::Sphere), ("cylinder", Form::Cylinder), ("quadric", Form::Quadric)];
+const FORMS: [(&str, SurfaceForm); 4] = [
+    ("plane", SurfaceForm::Plane),
+    ("sphere", SurfaceForm::Sphere),
+    ("cylinder", SurfaceForm::Cylinder),
+    ("quadric", SurfaceForm::Quadric),
+];
 
 /// Whether a key says `"input"`.
 fn is_input(table: &TomlTable, key: &str) -> bool {
@@ -146,25 +150,25 @@ impl SceneReader<'_> {
             return SurfaceItem::Plane;
         };
         let keys: &[&str] = match form {
-            Form::Plane => &["kind"],
-            Form::Sphere | Form::Cylinder => &["kind", "radius", "hollow"],
-            Form::Quadric => &["kind", "matrix", "linear", "constant"],
+            SurfaceForm::Plane => &["kind"],
+            SurfaceForm::Sphere | SurfaceForm::Cylinder => &["kind", "radius", "hollow"],
+            SurfaceForm::Quadric => &["kind", "matrix", "linear", "constant"],
         };
         self.reader.check_keys(&surface, keys);
         let path = format!("{path}.surface");
         self.note(&path, &surface.span);
         match form {
-            Form::Plane => SurfaceItem::Plane,
-            Form::Sphere | Form::Cylinder => {
+            SurfaceForm::Plane => SurfaceItem::Plane,
+            SurfaceForm::Sphere | SurfaceForm::Cylinder => {
                 self.reader.require(&surface, "radius", "radius = 0.2");
                 let radius = self.real(&path, &surface, "radius").unwrap_or(1.0);
                 let hollow = self.reader.flag_at(&surface, "hollow").is_some_and(|f| f.value);
                 match form {
-                    Form::Sphere => SurfaceItem::Sphere { radius, hollow },
+                    SurfaceForm::Sphere => SurfaceItem::Sphere { radius, hollow },
                     _ => SurfaceItem::Cylinder { radius, hollow },
                 }
             }
-            Form::Quadric => {
+            SurfaceForm::Quadric => {
                 self.reader.require(&surface, "matrix", "matrix = { xx = 1.0, yy = 1.0, zz = 4.0 }");
                 let matrix = self.at(&path, &surface, "matrix", FileReader::tensor_at);
                 let matrix = matrix.map_or([0.0; 6], |m| [m.xx, m.xy, m.xz, m.yy, m.yz, m.zz]);

@@ -5,8 +5,8 @@ use crate::description::messages;
 use crate::description::reader::Range64;
 use crate::description::table::TomlTable;
 use crate::diagnostic::Front;
-use crate::options::table::{Call, Kind, Row, TABLE};
-use crate::options::value::{Value, Vocabulary};
+use crate::options::table::{Call, OptionKind, OptionRow, TABLE};
+use crate::options::value::{OptionValue, Vocabulary};
 use crate::scene::messages as say;
 use std::ops::Range;
 use toml::de::DeValue;
@@ -48,13 +48,13 @@ impl SceneReader<'_> {
     }
 
     /// The value of an option; `None` after a complaint that leaves nothing of it.
-    fn option(&mut self, table: &TomlTable, row: &'static Row, span: &Range<usize>) -> Option<Value> {
+    fn option(&mut self, table: &TomlTable, row: &'static OptionRow, span: &Range<usize>) -> Option<OptionValue> {
         let (reader, key) = (&mut self.reader, row.name);
         let number = match &row.kind {
-            Kind::Flag => return reader.flag_at(table, key).map(|flag| flag.value.into()),
-            Kind::Vector => return reader.vector_at(table, key).map(|vector| vector.value.into()),
-            Kind::Real(..) => reader.real_at(table, key, Range64::Finite)?.value,
-            Kind::Whole(..) => reader.count_at(table, key)?.value as f64,
+            OptionKind::Flag => return reader.flag_at(table, key).map(|flag| flag.value.into()),
+            OptionKind::Vector => return reader.vector_at(table, key).map(|vector| vector.value.into()),
+            OptionKind::Real(..) => reader.real_at(table, key, Range64::Finite)?.value,
+            OptionKind::Whole(..) => reader.count_at(table, key)?.value as f64,
             _ => return self.words(table, row),
         };
         match row.wrong_number(number) {
@@ -67,22 +67,22 @@ impl SceneReader<'_> {
     }
 
     /// The words of an option: one as a text, several in an array. Of codes those count that are right.
-    fn words(&mut self, table: &TomlTable, row: &'static Row) -> Option<Value> {
+    fn words(&mut self, table: &TomlTable, row: &'static OptionRow) -> Option<OptionValue> {
         let (reader, key) = (&mut self.reader, row.name);
-        let is_codes = matches!(row.kind, Kind::Codes(_));
+        let is_codes = matches!(row.kind, OptionKind::Codes(_));
         let (words, count) = match (table.get(key)?.0, &row.kind) {
-            (DeValue::Array(array), Kind::Words(_) | Kind::Names { .. } | Kind::Codes(_)) => {
+            (DeValue::Array(array), OptionKind::Words(_) | OptionKind::Names { .. } | OptionKind::Codes(_)) => {
                 (reader.names_at(table, key, if is_codes { "code" } else { key.trim_end_matches('s') }), array.len())
             }
-            (DeValue::String(_), Kind::Words(of)) if !of.is_of_items => (vec![reader.string_at(table, key)?], 1),
-            (_, Kind::Word(..)) => (vec![reader.string_at(table, key)?], 1),
+            (DeValue::String(_), OptionKind::Words(of)) if !of.is_of_items => (vec![reader.string_at(table, key)?], 1),
+            (_, OptionKind::Word(..)) => (vec![reader.string_at(table, key)?], 1),
             _ => (reader.names_at(table, key, ""), 1),
         };
         let mut right = Vec::new();
         for word in words {
             let known = |of: &Vocabulary| (of.words)().iter().map(|(word, _)| *word).collect::<Vec<&str>>();
             let wrong = row.wrong_word(&word.value).map(|wrong| match &row.kind {
-                Kind::Word(of, _) | Kind::Words(of) => {
+                OptionKind::Word(of, _) | OptionKind::Words(of) => {
                     messages::unknown_word(&table.what(key), &word.value, &known(of))
                 }
                 _ => wrong,
@@ -92,6 +92,6 @@ impl SceneReader<'_> {
                 None => right.push(word.value),
             }
         }
-        (is_codes || right.len() == count).then_some(Value::Words(right))
+        (is_codes || right.len() == count).then_some(OptionValue::Words(right))
     }
 }

@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use straightline_core::reference::{
-    unit, CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, Joint,
+    unit, CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint,
 };
 use straightline_core::Dd;
 
@@ -34,8 +34,8 @@ pub fn chapter_robot(text: &str) -> CentreOfMassTree<Dd> {
             name: format!("link{}", j + 1),
             parent: j.checked_sub(1),
             joint: match link["type"].as_str() {
-                Some("revolute") => Joint::Revolute,
-                Some("linear") => Joint::Linear,
+                Some("revolute") => ReferenceJoint::Revolute,
+                Some("linear") => ReferenceJoint::Linear,
                 other => panic!("unknown joint type {other:?}"),
             },
             iq: j,

@@ -5,7 +5,7 @@ use super::roll_pitch_yaw::rotation;
 use super::written::{Motion, Shape, Style, Written};
 use nalgebra::{Matrix3, Vector3};
 use straightline_core::reference::{
-    unit, CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, Joint,
+    unit, CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint,
 };
 use straightline_core::Dd;
 
@@ -134,7 +134,7 @@ pub fn random_robot(random: &mut Random, kind: RobotKind) -> CentreOfMassTree<Dd
                 (r, r_parent, extended * e, ExtendedPosition::Matrix(extended))
             }
         };
-        let joint = if random.below(3) == 0 { Joint::Linear } else { Joint::Revolute };
+        let joint = if random.below(3) == 0 { ReferenceJoint::Linear } else { ReferenceJoint::Revolute };
         links.push(CentreOfMassLink {
             name,
             parent,
@@ -165,7 +165,7 @@ pub fn random_robot(random: &mut Random, kind: RobotKind) -> CentreOfMassTree<Dd
 /// Coordinates of the robot, the quaternion of a floating root normalised.
 pub fn random_position(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Vec<Dd> {
     let mut q = random.list(tree.nq(), 3.0);
-    for link in tree.links.iter().filter(|link| link.joint == Joint::Free) {
+    for link in tree.links.iter().filter(|link| link.joint == ReferenceJoint::Free) {
         let i = link.iq + 3;
         let norm = q[i..i + 4].iter().fold(Dd::ZERO, |sum, &x| sum + x * x).sqrt();
         q[i..i + 4].iter_mut().for_each(|x| *x /= norm);
@@ -198,7 +198,7 @@ pub fn written_robot(written: &Written, name: String) -> CentreOfMassTree<Dd> {
         CentreOfMassLink {
             name,
             parent,
-            joint: if link.motion == Motion::Prismatic { Joint::Linear } else { Joint::Revolute },
+            joint: if link.motion == Motion::Prismatic { ReferenceJoint::Linear } else { ReferenceJoint::Revolute },
             iq: 0,
             iv: 0,
             mass,
