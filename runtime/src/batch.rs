@@ -6,7 +6,7 @@
 #[cfg(feature = "rayon")]
 use straightline_core::batch::Divisible;
 pub use straightline_core::batch::{
-    aos, check, rows, rows_mut, soa, take, take_mut, Aos, Job, Machine, PlainMachine, Program, Soa, WrongLength,
+    aos, check, rows, rows_mut, soa, take, take_mut, Aos, Job, Machine, Plain, Program, Soa, WrongLength,
 };
 
 #[cfg(feature = "std")]

@@ -6,7 +6,7 @@
 //! memory takes a pointer, which may be any.
 #![allow(unsafe_code)] // the calls into functions for other instructions, and prefetching; nothing else here is unsafe
 
-use crate::batch::{Job, Machine, PlainMachine};
+use crate::batch::{Job, Machine, Plain};
 
 /// Lanes of a block of f64 for the instructions that this crate is compiled for.
 const LANES_F64: usize = if cfg!(target_feature = "avx512f") { 8 } else { 4 };
@@ -40,7 +40,7 @@ fn run<const AVX512: usize, const AVX2: usize, const OTHER: usize>(job: impl Job
             return unsafe { avx2::<AVX2>(job) };
         }
     }
-    job.run::<OTHER, FUSED, PlainMachine>();
+    job.run::<OTHER, FUSED, Plain>();
 }
 
 /// Reads ahead.

@@ -47,14 +47,14 @@ pub struct BaseSupport {
     /// The point about which the base turns, in the world \[m\].
     pub at: [f64; 3],
     /// Along x, y, z \[N/m\] and about x, y, z \[N·m/rad\], parallel with the world's axes; `None`: the base does not move so.
-    pub directions: [Option<SpringDamper>; 6],
+    pub directions: [Option<WrittenSpring>; 6],
     /// Where it stands.
     pub place: Noted<()>,
 }
 
 /// A spring and a damper.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SpringDamper {
+pub struct WrittenSpring {
     /// \[N/m or N·m/rad\]
     pub stiffness: Noted<f64>,
     /// \[N·s/m or N·m·s/rad\]
@@ -150,7 +150,7 @@ impl FileReader<'_> {
             let stiffness = self.real_at(&spring, "stiffness", Range64::Finite)?;
             let damping = self.real_at(&spring, "damping", Range64::Finite).unwrap_or_else(|| Noted::assumed(0.0));
             let rest = self.real_at(&spring, "rest", Range64::Finite).map_or(0.0, |rest| rest.value);
-            Some(SpringDamper { stiffness, damping, rest })
+            Some(WrittenSpring { stiffness, damping, rest })
         });
         // a spring that could not be read was complained of, and the base is not rigid for that
         let is_read =

@@ -4,6 +4,7 @@ use super::flexible::{self, Carrier};
 use super::geometry::{canonical_rotation, compose, point, snap_tensor, turned, unit, vector};
 use super::merge::{merge, Part};
 use super::{angle, centres_of_mass, check, transform, Assembly, ModelOptions};
+use crate::description::flexible::Flexible;
 use crate::description::{messages, BaseKind, Description, Placement, WrittenInertial, WrittenJoint};
 use crate::diagnostic::{Diagnostics, Place};
 use std::collections::BTreeMap;
@@ -45,6 +46,19 @@ impl Seat {
     }
 }
 
+/// The bodies so far, while links are added from the root to the tips.
+struct Growing<'a> {
+    description: &'a Description,
+    tolerance: f64,
+    bodies: Vec<Body<Dd>>,
+    /// Of each body, where the joint that carries it stands in the file.
+    joint_places: Vec<Place>,
+    /// Of each body, what the links on it add to its inertia.
+    parts: Vec<Vec<Part>>,
+    /// What carries each link.
+    carriers: Vec<Carrier>,
+}
+
 pub(super) fn assemble(
     description: &Description,
     options: &ModelOptions,
@@ -65,128 +79,147 @@ pub(super) fn assemble(
     if diagnostics.has_errors() {
         return None;
     }
+    let mut growing = Growing {
+        description,
+        tolerance,
+        bodies: Vec::new(),
+        joint_places: Vec::new(),
+        parts: Vec::new(),
+        carriers: vec![Carrier::rigid(None, Transform::identity()); description.links.len()],
+    };
     let is_floating = floats(description, options, diagnostics);
-
-    let mut bodies: Vec<Body<Dd>> = Vec::new();
-    let mut joint_places: Vec<Place> = Vec::new();
-    let mut parts: Vec<Vec<Part>> = Vec::new();
-    let mut carriers = vec![Carrier::rigid(None, Transform::identity()); description.links.len()];
     let names: Vec<&str> = description.links.iter().map(|link| link.name.value.as_str()).collect();
     let flexible = match options.rigid_links {
         true => Vec::new(),
         false => flexible::chosen(&description.flexible, &options.flexible, &names, diagnostics),
     };
-    if is_floating {
-        let root = &description.links[tree.root].name;
-        let joint =
-            Joint { name: root_joint_name(description), kind: FLOATING_BASE, iq: 0, iv: 0, limits: Limits::default() };
-        bodies.push(new_body(&root.value, None, joint, Transform::identity(), Transform::identity()));
-        joint_places.push(root.place.clone());
-        parts.push(Vec::new());
-        carriers[tree.root] = Carrier::rigid(Some(0), Transform::identity());
-    }
-    match options.support.as_ref().filter(|_| !options.rigid_links) {
-        Some(support) if is_floating => {
-            diagnostics.push(messages::support_floats().at(&support.place.place));
-        }
-        Some(support) => {
-            let elastic = flexible::support(support, names[tree.root], diagnostics)?;
-            let base = elastic.last().map(|body| body.link_frame)?;
-            carriers[tree.root] = Carrier::rigid(Some(elastic.len() - 1), base);
-            for body in elastic {
-                bodies.push(body);
-                joint_places.push(support.place.place.clone());
-                parts.push(Vec::new());
-            }
-        }
-        None => {}
-    }
+    growing.add_root(tree.root, is_floating, options, diagnostics)?;
     let mut open: Vec<usize> = vec![tree.root];
     // depth first, the joints of a link in the order of the file: a stack takes them in reverse
     let mut above: Vec<Option<usize>> = vec![None; description.links.len()];
-    while let Some(link_index) = open.pop() {
+    while let Some(link) = open.pop() {
         let mut held_at = Vec3::zero();
-        if let Some(j) = above[link_index] {
-            let joint = &description.joints[j];
-            let seat = &seats[j];
-            held_at = seat.in_link;
-            let parent = carriers[tree.parent_of[j]].at(seat.in_parent.translation);
-            let x_parent_joint = compose(&parent.1, &seat.in_parent);
-            let (body, x_body_link) = match joint.kind.value.between_links() {
-                None => (parent.0, x_parent_joint),
-                Some(kind) => {
-                    let placement = compose(&x_parent_joint, &seat.canonical);
-                    let model_joint = Joint {
-                        name: joint.name.value.clone(),
-                        kind,
-                        iq: 0,
-                        iv: 0,
-                        limits: check::model_limits(joint.kind.value, &joint.limits),
-                    };
-                    let effects = check::model_effects(&joint.drive);
-                    let body = new_body(&joint.child.value, parent.0, model_joint, placement, seat.link_frame);
-                    bodies.push(Body { effects, ..body });
-                    joint_places.push(joint.name.place.clone());
-                    parts.push(Vec::new());
-                    (Some(bodies.len() - 1), seat.link_frame)
-                }
-            };
-            carriers[link_index] = Carrier::rigid(body, x_body_link);
+        if let Some(j) = above[link] {
+            held_at = seats[j].in_link;
+            growing.carriers[link] = growing.add_joint(&description.joints[j], &seats[j], tree.parent_of[j]);
         }
-        let (body, x_body_link) = carriers[link_index].first();
-        let inertial = description.links[link_index].inertial.as_ref();
-        match flexible.iter().find(|flexible| flexible.link.value == names[link_index]) {
-            None => {
-                if let (Some(body), Some(inertial)) = (body, inertial) {
-                    parts[body].push(part(inertial, &x_body_link, tolerance));
-                }
-            }
-            Some(flexible) => {
-                let whole = inertial.map(|inertial| part(inertial, &Transform::identity(), tolerance));
-                let (carrier, next) = ((body, x_body_link), bodies.len());
-                if let Some(cut) = flexible::cut(flexible, carrier, held_at, whole, next, diagnostics) {
-                    if let (Some(body), Some(first)) = (body, cut.first) {
-                        let Part { mass, com, inertia_com } = first;
-                        parts[body].push(Part::placed(mass, com, inertia_com, &x_body_link));
-                    }
-                    for (body, part) in cut.bodies {
-                        bodies.push(body);
-                        joint_places.push(flexible.link.place.clone());
-                        parts.push(part.into_iter().collect());
-                    }
-                    carriers[link_index] = cut.carrier;
-                }
-            }
-        }
-        for &j in tree.joints_of[link_index].iter().rev() {
+        let bends = flexible.iter().copied().find(|flexible| flexible.link.value == names[link]);
+        growing.add_link(link, held_at, bends, diagnostics);
+        for &j in tree.joints_of[link].iter().rev() {
             above[tree.child_of[j]] = Some(j);
             open.push(tree.child_of[j]);
         }
     }
-    for (body, parts) in bodies.iter_mut().zip(&parts) {
-        body.inertia = merge(parts);
-    }
-    if diagnostics.has_errors() {
-        return None;
-    }
-    zero_masses(description, &bodies, &carriers, diagnostics);
+    growing.finish(diagnostics)
+}
 
-    let mut links = BTreeMap::new();
-    let mut frames = Vec::new();
-    for (link, carrier) in description.links.iter().zip(carriers) {
-        let (body, placement) = carrier.first();
-        links.insert(link.name.value.clone(), carrier);
-        frames.push(Frame { name: link.name.value.clone(), body, placement });
+impl Growing<'_> {
+    /// Adds a body with what is on it, and the place of its joint; its index.
+    fn push(&mut self, body: Body<Dd>, place: &Place, parts: Vec<Part>) -> BodyId {
+        self.bodies.push(body);
+        self.joint_places.push(place.clone());
+        self.parts.push(parts);
+        self.bodies.len() - 1
     }
-    let mut carried = Vec::new();
-    for frame in &description.frames {
-        let (body, x_body_link) = links.get(&frame.link.value)?.at(vector(frame.pose.xyz.value));
-        let placement = compose(&x_body_link, &transform(&frame.pose, tolerance));
-        frames.push(Frame { name: frame.name.value.clone(), body, placement });
-        carried.push((frame.name.value.clone(), Carrier::rigid(body, placement)));
+
+    /// Adds the joints between the world and the root link: none, a free one, or the springs of a support.
+    fn add_root(
+        &mut self,
+        root: usize,
+        is_floating: bool,
+        options: &ModelOptions,
+        diagnostics: &mut Diagnostics,
+    ) -> Option<()> {
+        let name = &self.description.links[root].name;
+        if is_floating {
+            let own = root_joint_name(self.description);
+            let joint = Joint { name: own, kind: FLOATING_BASE, iq: 0, iv: 0, limits: Limits::default() };
+            let body = new_body(&name.value, None, joint, Transform::identity(), Transform::identity());
+            let body = self.push(body, &name.place, Vec::new());
+            self.carriers[root] = Carrier::rigid(Some(body), Transform::identity());
+        }
+        match options.support.as_ref().filter(|_| !options.rigid_links) {
+            Some(support) if is_floating => {
+                diagnostics.push(messages::support_floats().at(&support.place.place));
+            }
+            Some(support) => {
+                let elastic = flexible::support(support, &name.value, diagnostics)?;
+                let base = elastic.last().map(|body| body.link_frame)?;
+                self.carriers[root] = Carrier::rigid(Some(elastic.len() - 1), base);
+                for body in elastic {
+                    self.push(body, &support.place.place, Vec::new());
+                }
+            }
+            None => {}
+        }
+        Some(())
     }
-    links.extend(carried);
-    Some(Assembly { bodies, joint_places, frames, links })
+
+    /// Adds a joint on a link, with its body if it moves; what carries its child.
+    fn add_joint(&mut self, joint: &WrittenJoint, seat: &Seat, parent: usize) -> Carrier {
+        let parent = self.carriers[parent].at(seat.in_parent.translation);
+        let x_parent_joint = compose(&parent.1, &seat.in_parent);
+        let Some(kind) = joint.kind.value.between_links() else {
+            return Carrier::rigid(parent.0, x_parent_joint);
+        };
+        let placement = compose(&x_parent_joint, &seat.canonical);
+        let limits = check::model_limits(joint.kind.value, &joint.limits);
+        let model_joint = Joint { name: joint.name.value.clone(), kind, iq: 0, iv: 0, limits };
+        let body = new_body(&joint.child.value, parent.0, model_joint, placement, seat.link_frame);
+        let body = Body { effects: check::model_effects(&joint.drive), ..body };
+        Carrier::rigid(Some(self.push(body, &joint.name.place, Vec::new())), seat.link_frame)
+    }
+
+    /// Adds a link to the body that carries it, or the bodies that it is cut into where it bends.
+    fn add_link(&mut self, link: usize, held_at: Vec3<Dd>, bends: Option<&Flexible>, diagnostics: &mut Diagnostics) {
+        let (body, x_body_link) = self.carriers[link].first();
+        let inertial = self.description.links[link].inertial.as_ref();
+        let Some(flexible) = bends else {
+            if let (Some(body), Some(inertial)) = (body, inertial) {
+                self.parts[body].push(part(inertial, &x_body_link, self.tolerance));
+            }
+            return;
+        };
+        let whole = inertial.map(|inertial| part(inertial, &Transform::identity(), self.tolerance));
+        let (carrier, next) = ((body, x_body_link), self.bodies.len());
+        let Some(cut) = flexible::cut(flexible, carrier, held_at, whole, next, diagnostics) else { return };
+        if let (Some(body), Some(first)) = (body, cut.first) {
+            let Part { mass, com, inertia_com } = first;
+            self.parts[body].push(Part::placed(mass, com, inertia_com, &x_body_link));
+        }
+        for (body, part) in cut.bodies {
+            self.push(body, &flexible.link.place, part.into_iter().collect());
+        }
+        self.carriers[link] = cut.carrier;
+    }
+
+    /// The bodies with all that is on them, and the frames of links and those that the file names.
+    fn finish(mut self, diagnostics: &mut Diagnostics) -> Option<Assembly> {
+        let Growing { description, tolerance, .. } = self;
+        for (body, parts) in self.bodies.iter_mut().zip(&self.parts) {
+            body.inertia = merge(parts);
+        }
+        if diagnostics.has_errors() {
+            return None;
+        }
+        zero_masses(description, &self.bodies, &self.carriers, diagnostics);
+        let mut links = BTreeMap::new();
+        let mut frames = Vec::new();
+        for (link, carrier) in description.links.iter().zip(self.carriers) {
+            let (body, placement) = carrier.first();
+            links.insert(link.name.value.clone(), carrier);
+            frames.push(Frame { name: link.name.value.clone(), body, placement });
+        }
+        let mut carried = Vec::new();
+        for frame in &description.frames {
+            let (body, x_body_link) = links.get(&frame.link.value)?.at(vector(frame.pose.xyz.value));
+            let placement = compose(&x_body_link, &transform(&frame.pose, tolerance));
+            frames.push(Frame { name: frame.name.value.clone(), body, placement });
+            carried.push((frame.name.value.clone(), Carrier::rigid(body, placement)));
+        }
+        links.extend(carried);
+        Some(Assembly { bodies: self.bodies, joint_places: self.joint_places, frames, links })
+    }
 }
 
 /// Whether the base floats, by file or option.

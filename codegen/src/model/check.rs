@@ -98,14 +98,28 @@ pub(super) fn tree(bodies: &Description, diagnostics: &mut Diagnostics) -> Optio
         let names: Vec<&str> = roots.iter().map(|&l| links[l].name.value.as_str()).collect();
         diagnostics.push(messages::two_roots(&names).at(&links[roots[1]].name.place));
     }
+    let root = roots.first().copied();
+    let tree = Tree { root: root.unwrap_or(0), joints_of, parent_of, child_of };
+    cycles(bodies, &tree, &roots, &joint_above, diagnostics);
+    root.map(|_| tree)
+}
+
+/// Complains of each cycle of joints.
+fn cycles(
+    bodies: &Description,
+    tree: &Tree,
+    roots: &[usize],
+    joint_above: &[Option<usize>],
+    diagnostics: &mut Diagnostics,
+) {
     // what no root carries, hangs on a cycle
-    let mut reached = vec![false; links.len()];
-    let mut open = roots.clone();
+    let mut reached = vec![false; joint_above.len()];
+    let mut open = roots.to_vec();
     while let Some(link) = open.pop() {
         reached[link] = true;
-        open.extend(joints_of[link].iter().map(|&j| child_of[j]));
+        open.extend(tree.joints_of[link].iter().map(|&j| tree.child_of[j]));
     }
-    for start in 0..links.len() {
+    for start in 0..reached.len() {
         if reached[start] {
             continue;
         }
@@ -115,17 +129,15 @@ pub(super) fn tree(bodies: &Description, diagnostics: &mut Diagnostics) -> Optio
             reached[link] = true;
             let Some(joint) = joint_above[link] else { break };
             path.push(joint);
-            link = parent_of[joint];
+            link = tree.parent_of[joint];
         }
         // the walk ends on the cycle itself, or on what an earlier walk has seen
-        let Some(first) = path.iter().position(|&j| child_of[j] == link) else { continue };
+        let Some(first) = path.iter().position(|&j| tree.child_of[j] == link) else { continue };
         let mut names: Vec<&str> = path[first..].iter().map(|&j| bodies.joints[j].name.value.as_str()).collect();
         names.reverse();
         let place = path[first..].iter().map(|&j| &bodies.joints[j].name.place).min_by_key(|p| p.span.start);
-        diagnostics.push(messages::cycle(&names).at(place.unwrap_or(&name.place)));
+        diagnostics.push(messages::cycle(&names).at(place.unwrap_or(&bodies.name.place)));
     }
-    let root = *roots.first()?;
-    Some(Tree { root, joints_of, parent_of, child_of })
 }
 
 /// The index of each name; names that are taken are complained of.

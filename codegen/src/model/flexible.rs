@@ -19,7 +19,7 @@
 
 use super::geometry::{canonical_rotation, compose, magnitude, snap_tensor, snap_vector, unit, vector};
 use super::merge::Part;
-use crate::description::flexible::{judge_number, BaseSupport, Bending, Flexible, SpringDamper};
+use crate::description::flexible::{judge_number, BaseSupport, Bending, Flexible, WrittenSpring};
 use crate::description::{messages, Noted};
 use crate::diagnostic::Diagnostics;
 use straightline_core::algorithms::composing_pays;
@@ -312,7 +312,7 @@ pub(super) fn support(support: &BaseSupport, root: &str, diagnostics: &mut Diagn
         diagnostics.push(messages::support_rigid().at(&support.place.place));
         return None;
     }
-    for (k, SpringDamper { stiffness, damping, rest }) in given() {
+    for (k, WrittenSpring { stiffness, damping, rest }) in given() {
         let label = BaseSupport::DIRECTIONS[k];
         let mut complain = |d| diagnostics.push(d);
         is_sound &= judge_number(format!("stiffness of `{label}` of [support]"), stiffness, false, &mut complain);

@@ -6,7 +6,7 @@
 
 use crate::choices::Choice;
 use crate::description::drives::{TransmissionStage, WrittenActuator, WrittenDrive, WrittenRating, WrittenThermal};
-use crate::description::flexible::{BaseSupport, Bending, Flexible, SpringDamper};
+use crate::description::flexible::{BaseSupport, Bending, Flexible, WrittenSpring};
 use crate::description::Noted;
 use crate::function::ContactFunction;
 use crate::model::{FrameOption, ModelOptions};
@@ -183,7 +183,7 @@ fields! {
         "damping": damping,
     }
     BaseSupport : { "at": at, "directions": directions, .. place }
-    SpringDamper : { "stiffness": stiffness, "damping": damping, "rest": rest, }
+    WrittenSpring : { "stiffness": stiffness, "damping": damping, "rest": rest, }
 }
 
 variants! {

@@ -80,7 +80,7 @@ impl Scene {
     ///
     /// ```
     /// use straightline_codegen::expr::Port;
-    /// use straightline_codegen::scene::{Interval, JointRanges, Scene};
+    /// use straightline_codegen::scene::{InputRange, JointRanges, Scene};
     /// use straightline_core::model::Model;
     /// # use straightline_codegen::{compile, diagnostic::Source, Options};
     /// # let text = "[robot]\nname = \"a\"\n[[link]]\nname = \"w\"\n[[link]]\nname = \"b\"\nmass = 1.0\n\
@@ -88,9 +88,9 @@ impl Scene {
     /// #     axis = \"z\"\nlimits = { lower = -1.0, upper = 2.0, velocity = 3.0, effort = 4.0 }\n";
     /// # let model = compile(&Source::new("a.toml", text), &Options::default()).unwrap().model;
     /// let mut scene = Scene::default();
-    /// scene.ranges.qdd = JointRanges::All(Interval::within(50.0));
-    /// assert_eq!(scene.input_ranges(&Port::new("q", &[1]), &model), [Interval { lower: -1.0, upper: 2.0 }]);
-    /// assert_eq!(scene.input_ranges(&Port::new("qdd", &[1]), &model), [Interval::within(50.0)]);
+    /// scene.ranges.qdd = JointRanges::All(InputRange::within(50.0));
+    /// assert_eq!(scene.input_ranges(&Port::new("q", &[1]), &model), [InputRange { lower: -1.0, upper: 2.0 }]);
+    /// assert_eq!(scene.input_ranges(&Port::new("qdd", &[1]), &model), [InputRange::within(50.0)]);
     /// ```
     pub fn input_ranges<T>(&self, port: &Port, model: &Model<T>) -> Vec<InputRange> {
         let mut all = vec![InputRange::UNLIMITED; port.len()];

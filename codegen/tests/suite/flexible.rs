@@ -1,6 +1,6 @@
 //! Links cut into elastic segments, and bases on springs: against the formulas of beams, and with masses that add up.
 
-use straightline_codegen::description::flexible::{BaseSupport, SpringDamper};
+use straightline_codegen::description::flexible::{BaseSupport, WrittenSpring};
 use straightline_codegen::description::Noted;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{self, ModelOptions};
@@ -185,7 +185,7 @@ fn supported() -> Model<f64> {
     let spring = |k: usize| {
         let (stiffness, damping) = if k < 3 { (4e4 + 1e3 * k as f64, 90.0) } else { (2e3 + 50.0 * k as f64, 4.0) };
         let (stiffness, damping) = (Noted::assumed(stiffness), Noted::assumed(damping));
-        Some(SpringDamper { stiffness, damping, rest: 0.0 })
+        Some(WrittenSpring { stiffness, damping, rest: 0.0 })
     };
     let support =
         BaseSupport { at: [0.0, 0.1, -0.2], directions: std::array::from_fn(spring), place: Noted::assumed(()) };

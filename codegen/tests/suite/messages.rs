@@ -5,7 +5,7 @@
 //! difference.
 
 use std::path::{Path, PathBuf};
-use straightline_codegen::description::flexible::{BaseSupport, SpringDamper};
+use straightline_codegen::description::flexible::{BaseSupport, WrittenSpring};
 use straightline_codegen::description::messages::CODES;
 use straightline_codegen::description::Noted;
 use straightline_codegen::description::FORMATS;
@@ -43,7 +43,7 @@ fn special_case(code: &str) -> Option<(Source, ModelOptions)> {
         "joint-order-missing" => Some((file(code)?, order(&["elbow"]))),
         "floating-by-option" => Some((file(code)?, ModelOptions { floating_base: true, ..options })),
         "support-rigid" | "support-floats" => {
-            let spring = SpringDamper { stiffness: Noted::assumed(1e5), damping: Noted::assumed(0.0), rest: 0.0 };
+            let spring = WrittenSpring { stiffness: Noted::assumed(1e5), damping: Noted::assumed(0.0), rest: 0.0 };
             let directions = match code {
                 "support-rigid" => [const { None }; 6],
                 _ => std::array::from_fn(|_| Some(spring.clone())),

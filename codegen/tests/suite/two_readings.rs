@@ -7,7 +7,7 @@ use crate::written::{Shape, Style, Written};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_6, PI};
 use std::fmt::Write;
 use straightline_codegen::description;
-use straightline_codegen::description::flexible::{BaseSupport, Bending, Flexible, SpringDamper};
+use straightline_codegen::description::flexible::{BaseSupport, Bending, Flexible, WrittenSpring};
 use straightline_codegen::description::Noted;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::model::{self, FrameOption, ModelOptions};
@@ -225,7 +225,7 @@ fn random_options(random: &mut Random, joints: Vec<String>, floating: bool) -> M
 }
 
 fn random_support(random: &mut Random) -> BaseSupport {
-    let spring = SpringDamper { stiffness: Noted::assumed(1e4), damping: Noted::assumed(1.0), rest: 0.0 };
+    let spring = WrittenSpring { stiffness: Noted::assumed(1e4), damping: Noted::assumed(1.0), rest: 0.0 };
     let directions = std::array::from_fn(|k| (k == 2 || random.below(2) == 0).then(|| spring.clone()));
     BaseSupport { at: triple(random, 0.3), directions, place: Noted::assumed(()) }
 }

@@ -1,4 +1,5 @@
-//! What belongs to one room is named in no other: kinds of joints in theirs, the text of a language in its own. And no name is two types'.
+//! What belongs to one room is named in no other: kinds of joints in theirs, the text of a language in its own. No name is two types', and
+//! what is long says why.
 
 use super::layers::sources;
 use std::collections::BTreeMap;
@@ -34,6 +35,17 @@ const ROOMS: [&str; 6] =
 /// Types that may share their name: only one of both is ever compiled, with the feature `simulation` of the command or without.
 const ALTERNATIVES: [&str; 2] = ["Analyze", "Simulate"];
 
+/// The sources of rooms with their paths, but for the generated example.
+fn product(rooms: &[&str]) -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace");
+    let mut files = Vec::new();
+    rooms.iter().for_each(|room| sources(&root.join(room), &mut files));
+    files.retain(|file| !file.ends_with("runtime/src/example.rs"));
+    files.sort();
+    let path = |file: &Path| file.strip_prefix(root).expect("in the workspace").to_string_lossy().replace('\\', "/");
+    files.iter().map(|file| (path(file), read_to_string(file).expect("a text"))).collect()
+}
+
 /// Whether a word stands in a string that begins on this line.
 fn is_in_a_string(line: &str, word: &str) -> bool {
     line.find(word).is_some_and(|at| line[..at].matches('"').count() % 2 == 1)
@@ -49,14 +61,8 @@ fn named(word: &Word, path: &str, text: &str) -> Vec<String> {
 
 #[test]
 fn what_belongs_to_a_room_is_named_in_no_other() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace");
-    let mut files = Vec::new();
-    ROOMS.iter().for_each(|room| sources(&root.join(room), &mut files));
-    files.sort();
     let mut complaints = Vec::new();
-    for file in &files {
-        let path = file.strip_prefix(root).expect("a path in the workspace").to_string_lossy().replace('\\', "/");
-        let text = read_to_string(file).expect("a text");
+    for (path, text) in product(&ROOMS) {
         for word in WORDS.iter().filter(|word| !word.homes.iter().any(|home| path.starts_with(home))) {
             complaints.extend(named(word, &path, &text).into_iter().map(|place| format!("{place}\n  {}", word.remedy)));
         }
@@ -85,16 +91,9 @@ fn declared(text: &str) -> impl Iterator<Item = &str> {
 
 #[test]
 fn no_two_types_have_one_name() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace");
-    let mut files = Vec::new();
-    ROOMS.iter().chain(&["codegen/graph/src"]).for_each(|room| sources(&root.join(room), &mut files));
-    // generated, of types of its own
-    files.retain(|file| !file.ends_with("runtime/src/example.rs"));
-    files.sort();
     let mut places: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for file in &files {
-        let path = file.strip_prefix(root).expect("a path in the workspace").to_string_lossy().replace('\\', "/");
-        for name in declared(&read_to_string(file).expect("a text")).filter(|name| !ALTERNATIVES.contains(name)) {
+    for (path, text) in product(&[&ROOMS[..], &["codegen/graph/src"]].concat()) {
+        for name in declared(&text).filter(|name| !name.is_empty() && !ALTERNATIVES.contains(name)) {
             places.entry(name.to_string()).or_default().push(path.clone());
         }
     }
@@ -109,4 +108,59 @@ fn types_are_found_where_they_are_declared() {
     let text = "pub struct A<T>(T);\n    pub(crate) enum B { C }\n// struct D;\nlet e = structure;\ntrait F {}\n\
                 #[cfg(test)]\nmod tests {\n    struct G;\n}\n";
     assert_eq!(declared(text).collect::<Vec<_>>(), ["A", "B", "F"]);
+}
+
+/// Functions of more than 80 lines that do not say why, each with its line and length.
+fn long_functions(text: &str) -> Vec<(usize, usize)> {
+    let lines: Vec<&str> = text.split("#[cfg(test)]\nmod ").next().unwrap_or("").lines().collect();
+    let is_head = |line: &str| {
+        let words = line.trim_start().split(' ').take(4).collect::<Vec<_>>();
+        let at = words.iter().position(|word| *word == "fn");
+        at.is_some_and(|at| words[..at].iter().all(|w| w.starts_with("pub") || ["const", "unsafe"].contains(w)))
+    };
+    let mut found = Vec::new();
+    // a head in a text that is written stands behind a line of that text
+    for head in (0..lines.len()).filter(|k| is_head(lines[*k]) && (*k == 0 || !lines[k - 1].ends_with('\\'))) {
+        let indent = lines[head].len() - lines[head].trim_start().len();
+        let end = format!("{}}}", " ".repeat(indent));
+        let Some(length) = lines[head..].iter().position(|line| *line == end) else { continue };
+        let above = lines[..head]
+            .iter()
+            .rev()
+            .take_while(|line| ["///", "#["].iter().any(|m| line.trim_start().starts_with(m)));
+        if length + 1 > 80 && !above.into_iter().any(|line| REASONS.iter().any(|reason| line.contains(reason))) {
+            found.push((head + 1, length + 1));
+        }
+    }
+    found
+}
+
+/// How a function says why it is longer than 80 lines.
+const REASONS: [&str; 2] = ["80 lines", "One piece"];
+/// How a file says why it is longer than 500 lines.
+const REASONS_OF_FILES: [&str; 2] = ["500 lines", "one file"];
+/// What cannot say why: the text of `trig.rs`, comments included, goes into generated code.
+const PASTED: [&str; 1] = ["runtime/core/src/trig.rs"];
+
+#[test]
+fn what_is_long_says_why() {
+    let mut complaints = Vec::new();
+    for (path, text) in product(&[&ROOMS[..], &["codegen/graph/src"]].concat()) {
+        complaints
+            .extend(long_functions(&text).iter().map(|(line, n)| format!("{path}:{line}: a function of {n} lines")));
+        let mut head = text.lines().take_while(|line| line.starts_with("//!"));
+        let says_why = head.any(|line| REASONS_OF_FILES.iter().any(|reason| line.contains(reason)));
+        if text.lines().count() > 500 && !says_why && !PASTED.contains(&path.as_str()) {
+            complaints.push(format!("{path}: {} lines", text.lines().count()));
+        }
+    }
+    assert!(complaints.is_empty(), "split it into steps with names, or say why not:\n{}", complaints.join("\n"));
+}
+
+#[test]
+fn long_functions_are_found() {
+    let long = format!("impl X {{\n    pub fn f() {{\n{}    }}\n}}\n", "        g();\n".repeat(79));
+    assert_eq!(long_functions(&long), [(2, 81)]);
+    assert_eq!(long_functions(&long.replace("        g();\n    }", "    }")), []);
+    assert_eq!(long_functions(&long.replace("    pub fn", "    /// One piece: it is a table.\n    pub fn")), []);
 }

@@ -24,9 +24,9 @@ pub trait Machine {
 
 /// A machine that is asked for nothing but computing.
 #[derive(Clone, Copy, Debug)]
-pub struct PlainMachine;
+pub struct Plain;
 
-impl Machine for PlainMachine {
+impl Machine for Plain {
     #[inline(always)]
     fn prefetch<T>(_: *const T) {}
     #[inline(always)]
@@ -91,13 +91,13 @@ pub const FUSED: bool = cfg!(any(target_feature = "fma", all(target_arch = "aarc
 /// Runs a batch of f64 with the instructions that this crate is compiled for.
 #[inline]
 pub fn run_f64(job: impl Job) {
-    job.run::<LANES_F64, FUSED, PlainMachine>();
+    job.run::<LANES_F64, FUSED, Plain>();
 }
 
 /// Runs a batch of f32 with the instructions that this crate is compiled for.
 #[inline]
 pub fn run_f32(job: impl Job) {
-    job.run::<LANES_F32, FUSED, PlainMachine>();
+    job.run::<LANES_F32, FUSED, Plain>();
 }
 
 /// Bytes that memory hands over together.

@@ -13,14 +13,14 @@
 //! joint. [`TorqueLimits::apply`] keeps torques within what drives can do, [`MotorLimits::apply`] voltages within what a supply gives and a motor bears.
 //!
 //! ```
-//! use straightline_core::control::{computed_torque, Gains, Limits, Measured, Outcome, Reference};
+//! use straightline_core::control::{computed_torque, Gains, Measured, Outcome, Reference, TorqueLimits};
 //! // a mass of 2 kg on a slide
 //! let inverse_dynamics = |_q: &[f64; 1], _qd: &[f64; 1], qdd: &[f64; 1], tau: &mut [f64; 1]| tau[0] = 2.0 * qdd[0];
 //! let wanted = Reference { q: [1.0], qd: [0.0], qdd: [3.0] };
 //! let measured = Measured { q: [0.5], qd: [0.0] };
 //! let mut tau = computed_torque(&wanted, &measured, &Gains { stiffness: [100.0], damping: [20.0] }, inverse_dynamics);
 //! assert_eq!(tau, [2.0 * (3.0 + 100.0 * 0.5)]);
-//! assert_eq!(Limits { greatest: [50.0] }.apply(&mut tau), Outcome::Saturated);
+//! assert_eq!(TorqueLimits { greatest: [50.0] }.apply(&mut tau), Outcome::Saturated);
 //! assert_eq!(tau, [50.0]);
 //! ```
 

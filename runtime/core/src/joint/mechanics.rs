@@ -160,9 +160,9 @@ mod tests {
     use std::vec::Vec;
 
     /// A joint of which nothing is known but its pose and its motion subspace.
-    struct Plain(JointKind);
+    struct PosedJoint(JointKind);
 
-    impl Mechanics<f64> for Plain {
+    impl Mechanics<f64> for PosedJoint {
         fn motion(&self, q: &[f64]) -> Transform<f64> {
             self.0.mechanics().motion(q)
         }
@@ -237,7 +237,7 @@ mod tests {
             let mut q = kind.row().neutral.to_vec();
             q.iter_mut().enumerate().for_each(|(k, q)| *q += 0.4 - 0.15 * k as f64);
             kind.normalise(&mut q);
-            let (own, plain) = (answers(kind.mechanics(), *kind, &q), answers(&Plain(*kind), *kind, &q));
+            let (own, plain) = (answers(kind.mechanics(), *kind, &q), answers(&PosedJoint(*kind), *kind, &q));
             assert_eq!(own.len(), plain.len());
             for (i, (own, plain)) in own.iter().zip(&plain).enumerate() {
                 assert!((own - plain).abs() < 1e-14, "{}: answer {i} is {own}, not {plain}", kind.row().name);

@@ -19,13 +19,13 @@
 //!
 //! ```
 //! use nalgebra::{Matrix3, Vector3};
-//! use straightline_core::reference::{inverse_dynamics, ExtendedPosition, Joint, CentreOfMassLink, CentreOfMassTree};
+//! use straightline_core::reference::{inverse_dynamics, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint};
 //!
 //! // a pendulum about the world's z axis: 2 kg, its centre of mass 0.5 m from the joint
 //! let link = CentreOfMassLink {
 //!     name: "rod".into(),
 //!     parent: None,
-//!     joint: Joint::Revolute,
+//!     joint: ReferenceJoint::Revolute,
 //!     iq: 0,
 //!     iv: 0,
 //!     mass: 2.0,

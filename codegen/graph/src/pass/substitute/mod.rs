@@ -30,7 +30,7 @@ use crate::expr::{Binary, Counts, Graph};
 use net::Net;
 use search::EqualitySearch;
 use straightline_core::Dd;
-use values::{is_atom, values, Residue, POINTS};
+use values::{is_atom, values, AtPoints, POINTS};
 
 /// Two values that agree so well are equal; double-double has 1e-31, of the greatest term. Less well agree those of programs whose constants
 /// differ by 1e20: a term that is missed there may be all that another state has.
@@ -87,7 +87,7 @@ fn round(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
 }
 
 /// The results at the random states; none where roots and signs stand for inputs, whose order is that of the graph.
-fn results(graph: &Graph) -> Option<Vec<Residue>> {
+fn results(graph: &Graph) -> Option<Vec<AtPoints>> {
     let has_atoms = graph.ops.iter().any(is_atom);
     (!has_atoms).then(|| {
         let values = values(graph);
@@ -96,10 +96,10 @@ fn results(graph: &Graph) -> Option<Vec<Residue>> {
 }
 
 /// Whether another program has the same results.
-fn is_unchanged(before: &Option<Vec<Residue>>, graph: &Graph) -> bool {
+fn is_unchanged(before: &Option<Vec<AtPoints>>, graph: &Graph) -> bool {
     let Some(before) = before else { return true };
     let same =
-        |(a, b): (&Residue, &Residue)| (0..POINTS).all(|k| (a[k] - b[k]).abs().hi() <= UNCHANGED * a[k].abs().hi());
+        |(a, b): (&AtPoints, &AtPoints)| (0..POINTS).all(|k| (a[k] - b[k]).abs().hi() <= UNCHANGED * a[k].abs().hi());
     results(graph).is_some_and(|after| before.iter().zip(&after).all(same))
 }
 
@@ -125,7 +125,7 @@ impl PairForm {
         }
     }
 
-    fn of(self, x: &Residue, y: &Residue) -> Residue {
+    fn of(self, x: &AtPoints, y: &AtPoints) -> AtPoints {
         let op = self.op();
         std::array::from_fn(|k| op.value(x[k], y[k]))
     }

@@ -1,7 +1,7 @@
 //! Values by what they are at the first point.
 
 use super::search::WINDOW;
-use super::values::Residue;
+use super::values::AtPoints;
 use super::{NewPair, PairForm};
 use crate::expr::{Graph, Op};
 use rustc_hash::FxHashMap;
@@ -42,7 +42,7 @@ impl PairTable {
         graph: &Graph,
         numbers: &[usize],
         free: &[bool],
-        values: &[Residue],
+        values: &[AtPoints],
         wanted: &Filter,
     ) -> PairTable {
         let is_constant = |i: usize| matches!(graph.ops[i], Op::Constant(_));
@@ -75,7 +75,7 @@ impl PairTable {
 }
 
 /// Whether one of two is too small for the key of their sum: that is the other's.
-pub(super) fn is_one_lost(x: &Residue, y: &Residue) -> bool {
+pub(super) fn is_one_lost(x: &AtPoints, y: &AtPoints) -> bool {
     let [x, y] = [x, y].map(|v| v[0].hi().abs());
     x.min(y) < 1e-9 * x.max(y)
 }

@@ -1,7 +1,7 @@
 //! Which values are equal to which.
 
 use super::pairs::{is_one_lost, key, keys, Filter, PairTable};
-use super::values::{is_atom, values, Residue, POINTS};
+use super::values::{is_atom, values, AtPoints, POINTS};
 use super::{Becomes, GraphChange, NewPair, Operand, PairForm, EQUAL};
 use crate::expr::op::OpKind;
 use crate::expr::{Binary, Graph, NodeId, Op, Unary};
@@ -22,7 +22,7 @@ const WAYS: [PairForm; 3] = [PairForm::Difference, PairForm::Sum, PairForm::Prod
 /// Which values are equal to which.
 pub(super) struct EqualitySearch<'g> {
     pub(super) graph: &'g Graph,
-    pub(super) values: Vec<Residue>,
+    pub(super) values: Vec<AtPoints>,
     pub(super) uses: Vec<u32>,
     /// What may be an operand, in the order of the graph.
     pub(super) numbers: Vec<usize>,
@@ -210,9 +210,9 @@ impl<'g> EqualitySearch<'g> {
     }
 
     /// How v is formed of x and y, if `y` is what the way to it asks for: the form, and whether all signs are turned.
-    fn form(&self, v: usize, way: PairForm, x: &Residue, y: &Residue) -> Option<(PairForm, bool)> {
+    fn form(&self, v: usize, way: PairForm, x: &AtPoints, y: &AtPoints) -> Option<(PairForm, bool)> {
         let target = &self.values[v];
-        let negative = |form: PairForm, scale: &Residue| sign(target, &form.of(x, y), scale);
+        let negative = |form: PairForm, scale: &AtPoints| sign(target, &form.of(x, y), scale);
         let scale = greater(target, x);
         let form = match way {
             PairForm::Product => (PairForm::Product, negative(PairForm::Product, target)?),
@@ -233,7 +233,7 @@ impl<'g> EqualitySearch<'g> {
     }
 
     /// The same where y is a pair that is not there yet.
-    fn form_of_pair(&self, v: usize, way: PairForm, x: &Residue, (y, z, f): NewPair) -> Option<(PairForm, bool)> {
+    fn form_of_pair(&self, v: usize, way: PairForm, x: &AtPoints, (y, z, f): NewPair) -> Option<(PairForm, bool)> {
         let (a, b, target) = (&self.values[y], &self.values[z], &self.values[v]);
         let made = f.of(a, b);
         let form = self.form(v, way, x, &made)?;
@@ -244,7 +244,7 @@ impl<'g> EqualitySearch<'g> {
     }
 
     /// Whether a sum has no greater terms than the operation that it replaces.
-    pub(super) fn keeps(&self, v: usize, form: PairForm, x: &Residue, y: &Residue) -> bool {
+    pub(super) fn keeps(&self, v: usize, form: PairForm, x: &AtPoints, y: &AtPoints) -> bool {
         let size = |i: usize, k: usize| self.values[i][k].abs().hi();
         let most = |k: usize| match self.graph.ops[v] {
             Op::Binary(Binary::Add | Binary::Sub, a, b) => size(v, k).max(size(a.index(), k)).max(size(b.index(), k)),
@@ -281,33 +281,33 @@ impl<'g> EqualitySearch<'g> {
 }
 
 /// v = c x, x + c or −(x − c), for a constant.
-pub(super) fn constant(v: &Residue, x: &Residue) -> Option<(PairForm, Dd, bool)> {
+pub(super) fn constant(v: &AtPoints, x: &AtPoints) -> Option<(PairForm, Dd, bool)> {
     let [a, b] = [0, 1].map(|k| (v[k].hi(), x[k].hi()));
     let about = |x: f64, y: f64| (x - y).abs() <= 1e-9 * x.abs();
     if about(a.0 / a.1, b.0 / b.1) {
         let c = v[0] / x[0];
-        let made: Residue = x.map(|x| x * c);
+        let made: AtPoints = x.map(|x| x * c);
         return sign(v, &made, v).map(|negative| (PairForm::Product, c, negative));
     }
     if about(a.0 - a.1, b.0 - b.1) {
         let c = v[0] - x[0];
-        let made: Residue = x.map(|x| x + c);
+        let made: AtPoints = x.map(|x| x + c);
         return (sign(v, &made, &greater(v, x)) == Some(false)).then_some((PairForm::Sum, c, false));
     }
     if about(a.0 + a.1, b.0 + b.1) {
         let c = v[0] + x[0];
-        let made: Residue = x.map(|x| x - c);
+        let made: AtPoints = x.map(|x| x - c);
         return (sign(v, &made, &greater(v, x)) == Some(true)).then_some((PairForm::Difference, c, true));
     }
     None
 }
 
-pub(super) fn greater(a: &Residue, b: &Residue) -> Residue {
+pub(super) fn greater(a: &AtPoints, b: &AtPoints) -> AtPoints {
     std::array::from_fn(|k| if a[k].abs().hi() > b[k].abs().hi() { a[k] } else { b[k] })
 }
 
 /// Whether a = −b; none if they differ in more than the sign.
-pub(super) fn sign(a: &Residue, b: &Residue, scale: &Residue) -> Option<bool> {
+pub(super) fn sign(a: &AtPoints, b: &AtPoints, scale: &AtPoints) -> Option<bool> {
     let equal = |turned: bool| {
         (0..POINTS).all(|k| {
             let difference = if turned { a[k] + b[k] } else { a[k] - b[k] };
