@@ -29,7 +29,7 @@ impl DataTable {
     /// Looks for a number of one row that is not finite.
     ///
     /// # Errors
-    /// As [`check`](Table::check).
+    /// As [`check`](DataTable::check).
     pub(crate) fn check_row(&self, row: &[f64]) -> Result<(), (f64, String)> {
         match row.iter().position(|x| !x.is_finite()) {
             None => Ok(()),

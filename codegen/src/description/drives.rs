@@ -186,7 +186,7 @@ impl WrittenDrive {
         all
     }
 
-    /// What can be set beside its [`numbers`](Drive::numbers), but is no parameter at run time: `joint_ratio_elbow` of each of several joints,
+    /// What can be set beside its [`numbers`](WrittenDrive::numbers), but is no parameter at run time: `joint_ratio_elbow` of each of several joints,
     /// entries of an actuator's matrices (`C_1_2`, `f_1`, `d_1`, `T_1`, `position_1`), and what the actuator bears.
     fn others(&mut self) -> Vec<(String, Option<Must>, &mut f64)> {
         let mut all: Vec<(String, Option<Must>, &mut f64)> = Vec::new();
@@ -227,7 +227,7 @@ impl WrittenDrive {
         all
     }
 
-    /// The names of everything that [`set`](Drive::set) sets.
+    /// The names of everything that [`set`](WrittenDrive::set) sets.
     pub fn names(&self) -> Vec<String> {
         let numbers = self.numbers().into_iter().map(|number| number.name);
         numbers.chain(self.clone().others().into_iter().map(|(name, ..)| name)).collect()

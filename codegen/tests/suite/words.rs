@@ -118,17 +118,16 @@ fn long_functions(text: &str) -> Vec<(usize, usize)> {
         let at = words.iter().position(|word| *word == "fn");
         at.is_some_and(|at| words[..at].iter().all(|w| w.starts_with("pub") || ["const", "unsafe"].contains(w)))
     };
+    // a head in a text that is written stands behind a line of that text, or has its braces doubled
+    let is_written = |k: usize| lines[k].ends_with("{{") || k > 0 && lines[k - 1].ends_with('\\');
+    let is_said = |line: &&str| ["///", "#["].iter().any(|mark| line.trim_start().starts_with(mark));
     let mut found = Vec::new();
-    // a head in a text that is written stands behind a line of that text
-    for head in (0..lines.len()).filter(|k| is_head(lines[*k]) && (*k == 0 || !lines[k - 1].ends_with('\\'))) {
+    for head in (0..lines.len()).filter(|k| is_head(lines[*k]) && !is_written(*k)) {
         let indent = lines[head].len() - lines[head].trim_start().len();
         let end = format!("{}}}", " ".repeat(indent));
         let Some(length) = lines[head..].iter().position(|line| *line == end) else { continue };
-        let above = lines[..head]
-            .iter()
-            .rev()
-            .take_while(|line| ["///", "#["].iter().any(|m| line.trim_start().starts_with(m)));
-        if length + 1 > 80 && !above.into_iter().any(|line| REASONS.iter().any(|reason| line.contains(reason))) {
+        let mut above = lines[..head].iter().rev().take_while(|line| is_said(line));
+        if length + 1 > 80 && !above.any(|line| REASONS.iter().any(|reason| line.contains(reason))) {
             found.push((head + 1, length + 1));
         }
     }
