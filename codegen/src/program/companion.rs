@@ -104,10 +104,9 @@ fn of_accelerations(
 ) -> Result<(StateBound, Option<Plainer>), Disagreement> {
     let ((system, yielding), plainer) = checked_system(robot, options, mode)?;
     let bound = acceleration_bound(&system, &yielding, options.scalar).map(|bound| finished_bound(name, bound));
-    let alone = mode.is_alone().then_some(&system);
     bound
         .iter()
-        .try_for_each(|bound| equivalence::of_acceleration_bound(robot, options, name, (graph, bound), alone))?;
+        .try_for_each(|bound| equivalence::of_acceleration_bound(robot, options, name, (graph, bound), &system))?;
     Ok((bound, plainer))
 }
 

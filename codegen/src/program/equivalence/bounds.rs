@@ -21,10 +21,15 @@ use straightline_graph::{element_of, Scalar};
 
 /// What is known of a bound to first order it may fall below by so much.
 const FIRST_ORDER: f64 = 0.99;
-/// Forces are off by so much of the greatest: by far more than rounding, by less than the forces.
-const OFF: f64 = 1.0 / 1024.0;
+/// Forces are off by so much of the greatest, to either side: by far more than rounding, by less than the forces.
+const OFF: [f64; 2] = [-1.0 / 1048576.0, 1.0 / 1024.0];
 /// Accelerations and reactions are off in any direction by such parts of the greatest.
-const ANYWHERE: [f64; 4] = [0.3, 1e-2, 1e-5, 0.3];
+const ANYWHERE: [f64; 4] = [FAR, 1e-2, 1e-5, FAR];
+/// From there on bounds are great: by this part a solution is far from what is found.
+const FAR: f64 = 0.3;
+/// The greatest bound of what is found is such a part of it at most, or so many ulps, where a format is short.
+const SMALL: f64 = 1.0 / 1024.0;
+const LOST: f64 = 1048576.0;
 /// So many steps towards the smallest eigenvalue: every step gives an upper bound of it.
 const STEPS: usize = 20;
 
@@ -54,7 +59,7 @@ pub(crate) fn of_bound(
 }
 
 /// Whether a program that bounds how far accelerations and reactions are from the exact ones does so for those that `graph` finds, and for
-/// others; `system`, of a robot without contacts: the equations that they are judged by.
+/// others; `system`: the equations that they are judged by.
 ///
 /// # Errors
 /// As [`of_bound`].
@@ -63,7 +68,7 @@ pub(crate) fn of_acceleration_bound(
     options: &Options,
     name: &str,
     (graph, bound): (&Graph, &Graph),
-    system: Option<&Graph>,
+    system: &Graph,
 ) -> Result<(), Disagreement> {
     let mut states = States::new(robot, options);
     for _ in 0..STATES {
@@ -76,63 +81,138 @@ pub(crate) fn of_acceleration_bound(
         }
         let found = computed_at(graph, options.scalar, &as_f64(&inputs(graph, &state)));
         let found = solution(graph, found.into_iter().map(Dd::from).collect());
-        let asked = |solution: &PortState| {
-            let solution = short(solution.clone(), options.scalar);
-            let given: PortState = state.iter().chain(&solution).map(|(n, x)| (n.clone(), x.clone())).collect();
-            let bounds = computed_at(bound, options.scalar, &as_f64(&inputs(bound, &given)));
-            let bounds = by_port(&bound.outputs, bounds);
-            for port in &graph.outputs {
-                let (Some(bounds), Some(solution)) =
-                    (bounds.get(&format!("{}{OF_ERROR}", port.name)), solution.get(&port.name))
-                else {
-                    continue;
-                };
-                for (k, (most, (x, exact))) in bounds.iter().zip(solution.iter().zip(&exact[&port.name])).enumerate() {
-                    holds(name, (std::slice::from_ref(port), k), (*x - *exact).hi().abs(), *most)?;
-                }
-            }
-            Ok(bounds)
-        };
-        let of_found = asked(&found)?;
+        let at = AccelerationBound { name, graph, bound, scalar: options.scalar, state, exact, found };
+        let of_found = at.asked(&at.found)?;
         for part in ANYWHERE {
-            asked(&off_by(part, &found, &mut states.random))?;
-        }
-        // what forces would have to be off by for accelerations to be off by so much: columns of the inverse mass matrix
-        let tau = Quantity::Force.name();
-        let Some(forces) = state.get(&tau) else { continue };
-        let by = Dd::from(OFF * forces.iter().map(|x| x.hi().abs()).fold(f64::MIN_POSITIVE, f64::max));
-        let mut columns = Vec::new();
-        for i in 0..forces.len() {
-            let mut other = state.clone();
-            other.get_mut(&tau).expect("it is there")[i] += by;
-            let other = solution(graph, evaluate(graph, &inputs(graph, &other)));
-            asked(&other)?;
-            let qdd = Quantity::Acceleration.name();
-            let column = other.get(&qdd).zip(exact.get(&qdd));
-            columns.push(column.map_or(Vec::new(), |(x, y)| {
-                x.iter().zip(y).map(|(x, y)| ((*x - *y) / by).to_f64()).collect::<Vec<f64>>()
-            }));
-        }
-        let is_square = columns.iter().all(|c| c.len() == forces.len());
-        let Some(system) = system.filter(|_| is_square) else { continue };
-        let short_found = short(found, options.scalar);
-        let given: PortState = state.iter().chain(&short_found).map(|(n, x)| (n.clone(), x.clone())).collect();
-        let least = least_provable(system, options.scalar, &as_f64(&inputs(system, &given)));
-        let most = &of_found[&format!("qdd{OF_ERROR}")];
-        for (k, most) in most.iter().enumerate() {
-            // |H⁻¹| times what the residual may be off by
-            let least: f64 = columns.iter().zip(&least).map(|(column, off)| column[k].abs() * off).sum();
-            holds(name, (&graph.outputs, k), FIRST_ORDER * least, *most)?;
-        }
-        if let Some(smallest) = of_found.get("smallest_eigenvalue").map(|x| x[0]) {
-            let most = 1.0 / greatest_eigenvalue(&columns);
-            if smallest > most {
-                let result = "the smallest eigenvalue of the mass matrix".to_string();
-                return Err(disagreement(name, result, smallest / most));
+            let of_other = at.asked(&off_by(part, &at.found, &mut states.random))?;
+            if part >= FAR {
+                of_found.iter().try_for_each(|(port, bounds)| at.is_small((port, bounds), &of_other[port]))?;
             }
         }
+        let Some(columns) = at.of_forces()? else { continue };
+        at.is_provable(system, &of_found, &columns)?;
+        at.is_definite(&of_found, &columns)?;
     }
     Ok(())
+}
+
+/// A bound of accelerations and reactions at a state.
+struct AccelerationBound<'a> {
+    name: &'a str,
+    graph: &'a Graph,
+    bound: &'a Graph,
+    scalar: Scalar,
+    state: PortState,
+    exact: PortState,
+    /// In the function's own scalar.
+    found: PortState,
+}
+
+/// By ports: what results change by per change of a force.
+type Column = BTreeMap<String, Vec<f64>>;
+
+impl AccelerationBound<'_> {
+    /// What it says of a solution, which is right.
+    fn asked(&self, solution: &PortState) -> Result<BTreeMap<String, Vec<f64>>, Disagreement> {
+        let given = self.given(solution);
+        let bounds = computed_at(self.bound, self.scalar, &as_f64(&inputs(self.bound, &given)));
+        let bounds = by_port(&self.bound.outputs, bounds);
+        for port in &self.graph.outputs {
+            let Some((bounds, solution)) = self.of(&bounds, port).zip(given.get(&port.name)) else { continue };
+            for (k, (most, (x, exact))) in bounds.iter().zip(solution.iter().zip(&self.exact[&port.name])).enumerate() {
+                holds(self.name, (std::slice::from_ref(port), k), (*x - *exact).hi().abs(), *most)?;
+            }
+        }
+        Ok(bounds)
+    }
+
+    /// The inputs of what judges a solution.
+    fn given(&self, solution: &PortState) -> PortState {
+        self.state.clone().into_iter().chain(short(solution.clone(), self.scalar)).collect()
+    }
+
+    fn of<'b>(&self, bounds: &'b BTreeMap<String, Vec<f64>>, port: &Port) -> Option<&'b Vec<f64>> {
+        bounds.get(&format!("{}{OF_ERROR}", port.name))
+    }
+
+    /// Whether bounds of what is found are far below both what it is and what bounds it far from there: one that takes a wrong part for what
+    /// is left of the equations is great where nothing is left, and too small where the two are nearly the same.
+    fn is_small(&self, (port, bounds): (&String, &[f64]), of_other: &[f64]) -> Result<(), Disagreement> {
+        let Some(found) = port.strip_suffix(OF_ERROR).and_then(|port| self.found.get(port)) else { return Ok(()) };
+        let greatest = |x: &mut dyn Iterator<Item = f64>| x.fold(0.0, f64::max);
+        let size = greatest(&mut found.iter().map(|x| x.hi().abs())).max(greatest(&mut of_other.iter().copied()));
+        let part = greatest(&mut bounds.iter().copied()) / size;
+        let most = (LOST * FloatFormat::of(self.scalar).u).max(SMALL);
+        match part > most {
+            true => Err(disagreement(self.name, format!("the size of `{port}`"), part / most)),
+            false => Ok(()),
+        }
+    }
+
+    /// What it says of solutions for other forces, and what accelerations and reactions change by with each: without contact the columns of
+    /// the inverse mass matrix. None where no forces are given.
+    fn of_forces(&self) -> Result<Option<Vec<Column>>, Disagreement> {
+        let tau = Quantity::Force.name();
+        let Some(forces) = self.state.get(&tau) else { return Ok(None) };
+        let most = forces.iter().map(|x| x.hi().abs()).fold(f64::MIN_POSITIVE, f64::max);
+        let mut columns = Vec::new();
+        for i in 0..forces.len() {
+            let mut column = Column::new();
+            for off in OFF {
+                let by = Dd::from(off * most);
+                let mut other = self.state.clone();
+                other.get_mut(&tau).expect("it is there")[i] += by;
+                let other = solution(self.graph, evaluate(self.graph, &inputs(self.graph, &other)));
+                self.asked(&other)?;
+                let change = |(port, x): (String, Vec<Dd>)| {
+                    let change = x.iter().zip(&self.exact[&port]).map(|(x, exact)| ((*x - *exact) / by).to_f64());
+                    let change = change.collect();
+                    (port, change)
+                };
+                column = other.into_iter().map(change).collect();
+            }
+            columns.push(column);
+        }
+        Ok(Some(columns))
+    }
+
+    /// Whether it is at least what can be proven: what the equations of motion at what is found may be off by, times the columns.
+    fn is_provable(
+        &self,
+        system: &Graph,
+        of_found: &BTreeMap<String, Vec<f64>>,
+        columns: &[Column],
+    ) -> Result<(), Disagreement> {
+        // these equations come first
+        let least = least_provable(system, self.scalar, &as_f64(&inputs(system, &self.given(&self.found))));
+        for port in &self.graph.outputs {
+            let Some(bounds) = self.of(of_found, port) else { continue };
+            for (k, most) in bounds.iter().enumerate() {
+                let least: f64 =
+                    columns.iter().zip(&least).map(|(column, off)| column[&port.name][k].abs() * off).sum();
+                holds(self.name, (std::slice::from_ref(port), k), FIRST_ORDER * least, *most)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the smallest eigenvalue of the mass matrix, which is known without contact, is at least what it says.
+    fn is_definite(&self, of_found: &BTreeMap<String, Vec<f64>>, columns: &[Column]) -> Result<(), Disagreement> {
+        let [port] = &self.graph.outputs[..] else { return Ok(()) };
+        let inverse: Vec<&[f64]> = columns.iter().map(|column| &column[&port.name][..]).collect();
+        let is_square = inverse.iter().all(|column| column.len() == inverse.len());
+        let Some(smallest) = of_found.get("smallest_eigenvalue").map(|x| x[0]).filter(|_| is_square) else {
+            return Ok(());
+        };
+        let most = 1.0 / greatest_eigenvalue(&inverse);
+        match smallest > most {
+            true => {
+                let result = "the smallest eigenvalue of the mass matrix".to_string();
+                Err(disagreement(self.name, result, smallest / most))
+            }
+            false => Ok(()),
+        }
+    }
 }
 
 /// All numbers off by up to a part of the greatest of their port.
@@ -145,7 +225,7 @@ fn off_by(part: f64, solution: &PortState, random: &mut Random) -> PortState {
 }
 
 /// Of a symmetric matrix, from below.
-fn greatest_eigenvalue(columns: &[Vec<f64>]) -> f64 {
+fn greatest_eigenvalue(columns: &[&[f64]]) -> f64 {
     let mut x = vec![1.0; columns.len()];
     let mut quotient = 0.0;
     for _ in 0..STEPS {
