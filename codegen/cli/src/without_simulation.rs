@@ -1,7 +1,7 @@
 //! `simulate` and `analyze` where the feature `simulation` is not built in: they say so.
 
 use crate::arguments::ModelArgs;
-use crate::{print, Failure};
+use crate::{print, CommandFailure};
 use clap::Args;
 use std::ffi::OsString;
 
@@ -22,13 +22,13 @@ impl Simulate {
     }
 }
 
-pub fn simulate(_: &Simulate) -> Result<(), Failure> {
+pub fn simulate(_: &Simulate) -> Result<(), CommandFailure> {
     Err(print::failure_with(
         "this `straightline` has no simulation: it was built without the feature `simulation`",
         &["cargo install --path codegen/cli --features simulation, or parquet, which reads and writes Parquet files, too"],
     ))
 }
 
-pub fn analyze(a: &Analyze) -> Result<(), Failure> {
+pub fn analyze(a: &Analyze) -> Result<(), CommandFailure> {
     simulate(a)
 }
