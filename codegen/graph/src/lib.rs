@@ -14,4 +14,4 @@ pub mod schedule;
 pub mod trace;
 
 pub use expr::port_text::{element, element_of};
-pub use number::Scalar;
+pub use number::{EveryScalar, Scalar};

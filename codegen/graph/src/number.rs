@@ -2,7 +2,20 @@
 //!
 //! Another one is a row, with the type that computes in it: a [`Real`] with the constants and conversions that f32 has.
 
+use straightline_core::magnitude::Magnitude;
 use straightline_core::{trig, Dd, Real};
+
+macro_rules! operators {
+    ($($Op:ident $op:ident $by:tt),+) => {
+        $(impl std::ops::$Op for EveryScalar {
+            type Output = Self;
+            fn $op(self, b: Self) -> Self {
+                let a = self;
+                every!(a b => a $by b)
+            }
+        })+
+    };
+}
 
 /// Numbers by the types that compute in them. What these types say of themselves stands in no row.
 macro_rules! numbers {
@@ -38,6 +51,95 @@ macro_rules! numbers {
             literal: |x| format!("{:?}", x as $type),
             read: |text| text.parse::<$type>().ok().map(f64::from),
         }),+];
+
+        /// A number in every scalar, and in double-double with its size: what is computed in all of them is compiled once.
+        #[allow(non_snake_case)]
+        #[derive(Clone, Copy, Debug)]
+        pub struct EveryScalar {
+            $($Name: $type,)+
+            /// In double-double.
+            pub wide: Magnitude,
+        }
+
+        impl EveryScalar {
+            /// With another size.
+            #[must_use]
+            pub fn of_size(self, size: f64) -> Self {
+                EveryScalar { wide: self.wide.of_size(size), ..self }
+            }
+
+            /// That number in double-double, zero in all scalars.
+            pub fn wide_alone(value: Dd) -> Self {
+                EveryScalar { wide: Magnitude::new(value), ..Self::zero() }
+            }
+
+            /// The number in a scalar.
+            pub fn in_scalar(self, scalar: Scalar) -> f64 {
+                match scalar {
+                    $(Scalar::$Name => self.$Name.into(),)+
+                }
+            }
+        }
+
+        /// The same expression of numbers of these names in every scalar.
+        macro_rules! every {
+            ($d($d x:ident)+ => $d value:expr) => {
+                EveryScalar {
+                    $($Name: {
+                        $d(let $d x = $d x.$Name;)+
+                        $d value
+                    },)+
+                    wide: {
+                        $d(let $d x = $d x.wide;)+
+                        $d value
+                    },
+                }
+            };
+        }
+
+        impl Real for EveryScalar {
+            fn constant(value: Dd) -> Self {
+                EveryScalar { $($Name: Real::constant(value),)+ wide: Real::constant(value) }
+            }
+
+            fn sin_cos(self) -> (Self, Self) {
+                let x = self;
+                // by name: machine numbers have a method of their own that is called so
+                (every!(x => Real::sin_cos(x).0), every!(x => Real::sin_cos(x).1))
+            }
+
+            fn sin_cos_of_pair([sum, tail]: [Self; 2]) -> (Self, Self) {
+                let sin = every!(sum tail => Real::sin_cos_of_pair([sum, tail]).0);
+                (sin, every!(sum tail => Real::sin_cos_of_pair([sum, tail]).1))
+            }
+
+            fn sin_cos_of_sum(angles: &[Self]) -> (Self, Self) {
+                $(#[allow(non_snake_case)]
+                let $Name = <$type>::sin_cos_of_sum(&angles.iter().map(|x| x.$Name).collect::<Vec<_>>());)+
+                let wide = Magnitude::sin_cos_of_sum(&angles.iter().map(|x| x.wide).collect::<Vec<_>>());
+                (EveryScalar { $($Name: $Name.0,)+ wide: wide.0 }, EveryScalar { $($Name: $Name.1,)+ wide: wide.1 })
+            }
+
+            fn sqrt(self) -> Self {
+                let x = self;
+                every!(x => Real::sqrt(x))
+            }
+
+            fn sign(self) -> Self {
+                let x = self;
+                every!(x => Real::sign(x))
+            }
+        }
+
+        impl std::ops::Neg for EveryScalar {
+            type Output = Self;
+            fn neg(self) -> Self {
+                let x = self;
+                every!(x => -x)
+            }
+        }
+
+        operators!(Add add +, Sub sub -, Mul mul *, Div div /);
 
         impl Scalar {
             /// All of them.
@@ -172,6 +274,7 @@ impl Scalar {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use straightline_core::random::Random;
 
     #[test]
     fn a_row_is_that_of_its_type() {
@@ -185,6 +288,31 @@ mod tests {
             assert_eq!(scalar.read(&scalar.literal(0.1)), Some(scalar.rounded(0.1)), "{scalar:?}");
             assert_eq!(scalar.read(scalar.name()), None);
             assert_eq!(scalar.name(), in_scalar!(scalar, T => std::any::type_name::<T>()));
+        }
+    }
+    /// All that a scalar does.
+    fn computed<T: Real>(a: Dd, b: Dd) -> Vec<T> {
+        let [a, b] = [a, b].map(T::constant);
+        let pairs = [a.sin_cos(), T::sin_cos_of_sum(&[a, b]), T::sin_cos_of_pair([b, a])];
+        let ([u, v], [w, x]) = T::sin_cos_lanes_of_pairs([[a, b], [b, a]]);
+        let own = [a + b, a - b, a * b, a / b, -a, a.sqrt(), b.sqrt(), a.sign(), b.sign(), u, v, w, x];
+        pairs.into_iter().flat_map(|(s, c)| [s, c]).chain(own).collect()
+    }
+
+    #[test]
+    fn every_scalar_is_each_of_them() {
+        let mut random = Random(3);
+        for _ in 0..1000 {
+            let [a, b] = [1.0, 40.0].map(|size| Dd::from(random.symmetric(size)) + Dd::from(random.symmetric(1e-17)));
+            let every = computed::<EveryScalar>(a, b);
+            let bits = |x: Vec<f64>| x.into_iter().map(f64::to_bits).collect::<Vec<u64>>();
+            for scalar in Scalar::ALL.iter().copied() {
+                let alone = in_scalar!(scalar, T => computed::<T>(a, b).into_iter().map(f64::from).collect());
+                assert_eq!(bits(every.iter().map(|x| x.in_scalar(scalar)).collect()), bits(alone), "{scalar:?}");
+            }
+            for (every, wide) in every.into_iter().zip(computed::<Magnitude>(a, b)) {
+                assert_eq!(format!("{:?}", every.wide), format!("{wide:?}"));
+            }
         }
     }
 }

@@ -33,9 +33,9 @@ use straightline_core::magnitude::Magnitude;
 use straightline_core::model::Model;
 use straightline_core::spatial::{Sym3, Transform, Vec3};
 use straightline_core::{Dd, Real};
-use straightline_graph::element_of;
 use straightline_graph::expr::{evaluate, Binary, Grade, Graph, Op, Port};
 use straightline_graph::pass::cut::Staged;
+use straightline_graph::{element_of, EveryScalar};
 
 pub(crate) use bounds::{of_acceleration_bound, of_bound};
 pub(crate) use contact::{of_contact, of_system};
@@ -92,7 +92,7 @@ pub(crate) fn of_function(
     if !optimisations.folding {
         return (0..STATES).try_for_each(|_| {
             let state = states.next(&ports);
-            in_scalar!(options.scalar, T => plain.has_same_bits::<T>(graph, &state))
+            plain.has_same_bits(graph, &state)
         });
     }
     let check = Check { plain, graph };
@@ -156,7 +156,7 @@ impl Check<'_> {
             compare(plain.function.name(), &graph.outputs, &off, AGREE)?;
         }
         let sizes = self.sizes(state, &found, &off, least);
-        in_scalar!(plain.options.scalar, T => losses.add(graph, (state, &found), &sizes, |state| plain.results::<T>(state)));
+        losses.add((graph, plain.options.scalar), (state, &found), &sizes, |state| plain.results(state));
         Ok(())
     }
 
@@ -165,13 +165,11 @@ impl Check<'_> {
         if !self.graph.ops.iter().any(|op| matches!(op, Op::Binary(Binary::Div, ..))) {
             return true;
         }
-        let exact = self.plain.results::<Dd>(state);
-        let short: Vec<f64> = in_scalar!(self.plain.options.scalar, T => {
-            self.plain.results::<T>(state).into_iter().map(f64::from).collect()
-        });
-        let most = exact.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
+        let plain = self.plain.results(state);
+        let most = plain.iter().map(|x| x.wide.value.hi().abs()).fold(0.0, f64::max);
         // written so that NaN is not regular
-        exact.iter().zip(short).all(|(exact, short)| (exact.hi() - short).abs() <= REGULAR * most)
+        let is_near = |x: EveryScalar| x.wide.value.hi() - x.in_scalar(self.plain.options.scalar);
+        plain.into_iter().all(|x| is_near(x).abs() <= REGULAR * most)
     }
 
     /// What losses are compared with.
@@ -221,25 +219,25 @@ impl Check<'_> {
 }
 
 impl PlainEquations<'_> {
-    /// The results that are wanted, by the generic runtime in this scalar.
-    fn results<T: Real>(self, state: &PortState) -> Vec<T> {
+    /// The results that are wanted, by the generic runtime.
+    fn results(self, state: &PortState) -> Vec<EveryScalar> {
         self.results_by(ForwardDynamicsMethod::ArticulatedBody, state)
     }
 
-    fn results_by<T: Real>(self, method: ForwardDynamicsMethod, state: &PortState) -> Vec<T> {
-        let (bound, wanted) = self.bound(state, T::constant);
+    fn results_by(self, method: ForwardDynamicsMethod, state: &PortState) -> Vec<EveryScalar> {
+        let (bound, wanted) = self.bound(state);
         self.all(&bound, method, &wanted)
     }
 
     /// The robot with what stands for its inputs, and which results are wanted.
-    fn bound<T: Real>(self, state: &PortState, number: fn(Dd) -> T) -> (BoundRobot<T>, Vec<usize>) {
+    fn bound(self, state: &PortState) -> (BoundRobot<EveryScalar>, Vec<usize>) {
         let PlainEquations { robot, frames, function, options: Options { scene, .. } } = self;
         let (wanted, _) = scene.select(function, &robot.model, scene.frames_of(function, frames).len());
-        let given = of_ports(&scene.ports(function, &robot.model), state, number);
+        let given = of_ports(&scene.ports(function, &robot.model), state);
         (scene.bind(function, robot, &given), wanted)
     }
 
-    fn all<T: Real>(self, bound: &BoundRobot<T>, method: ForwardDynamicsMethod, wanted: &[usize]) -> Vec<T> {
+    fn all(self, bound: &BoundRobot<EveryScalar>, method: ForwardDynamicsMethod, wanted: &[usize]) -> Vec<EveryScalar> {
         let frames = self.options.scene.frames_of(self.function, self.frames).iter();
         let frames: Vec<_> =
             frames.map(|f| bound.model.frame(f).expect("frames were checked against the model")).collect();
@@ -249,36 +247,30 @@ impl PlainEquations<'_> {
 
     /// What a program found, less what the plain equations say, with their natural scale.
     fn differences(self, state: &PortState, found: &[Dd]) -> Vec<Magnitude> {
-        let (mut bound, wanted) = self.bound(state, Magnitude::new);
+        let (mut bound, wanted) = self.bound(state);
         with_sizes(&mut bound.model, longest_lever(&self.robot.model));
         let (nv, method) = (self.robot.model.nv(), ForwardDynamicsMethod::ArticulatedBody);
         if self.function.spec().judged == Judged::ByResidual && wanted.iter().copied().eq(0..nv) {
-            let qdd = found.iter().copied().map(Magnitude::new).collect();
+            let qdd = found.iter().copied().map(Real::constant).collect();
             let motion = [&bound.arguments[0], &bound.arguments[1], &qdd].map(Vec::clone);
             let takes = Function::InverseDynamics.evaluate(&bound.model, &[], method, &motion);
-            return takes.into_iter().zip(&bound.arguments[2]).map(|(takes, tau)| takes - *tau).collect();
+            return takes.into_iter().zip(&bound.arguments[2]).map(|(takes, tau)| (takes - *tau).wide).collect();
         }
         let plain = self.all(&bound, method, &wanted);
-        found.iter().zip(plain).map(|(found, plain)| difference(*found, plain)).collect()
+        found.iter().zip(plain).map(|(found, plain)| difference(*found, plain.wide)).collect()
     }
 
     /// With exact rules a program is the generic runtime, bit for bit.
-    fn has_same_bits<T: Real + PartialEq + Into<f64>>(
-        self,
-        graph: &Graph,
-        state: &PortState,
-    ) -> Result<(), Disagreement> {
-        let plain = self.results_by::<T>(self.options.forward_dynamics, state);
-        let rounded: Vec<T> = inputs(graph, state).into_iter().map(T::constant).collect();
-        let found = evaluate(graph, &rounded);
-        let off = |(found, plain): (T, T)| {
-            let same = found == plain;
-            let [a, b]: [f64; 2] = [found.into(), plain.into()];
+    fn has_same_bits(self, graph: &Graph, state: &PortState) -> Result<(), Disagreement> {
+        let plain = self.results_by(self.options.forward_dynamics, state);
+        let given: Vec<EveryScalar> = inputs(graph, state).into_iter().map(Real::constant).collect();
+        let off = |(found, plain): (EveryScalar, EveryScalar)| {
+            let [found, plain] = [found, plain].map(|x| x.in_scalar(self.options.scalar));
             // neither is a number
-            let value = if same || (a.is_nan() && b.is_nan()) { 0.0 } else { a - b };
+            let value = if found == plain || (found.is_nan() && plain.is_nan()) { 0.0 } else { found - plain };
             Magnitude { value: Dd::from(value), size: 0.0 }
         };
-        let off: Vec<Magnitude> = found.into_iter().zip(plain).map(off).collect();
+        let off: Vec<Magnitude> = evaluate(graph, &given).into_iter().zip(plain).map(off).collect();
         compare(self.function.name(), &graph.outputs, &off, AGREE)
     }
 }
@@ -361,9 +353,9 @@ pub(crate) fn of_parameter(
             Some(drive) if state == 0 => vec![drive.nominal()],
             _ => states.given(parameter),
         };
-        let wide: Vec<Vec<Magnitude>> = body.iter().map(|x| x.iter().copied().map(Magnitude::new).collect()).collect();
+        let wide: Vec<Vec<EveryScalar>> = body.iter().map(|x| every_scalar(x)).collect();
         let off = evaluate(graph, &body.concat()).into_iter().zip(constructed(robot, parameter, &wide));
-        let off: Vec<Magnitude> = off.map(|(found, plain)| difference(found, plain)).collect();
+        let off: Vec<Magnitude> = off.map(|(found, plain)| difference(found, plain.wide)).collect();
         if let Some(drive) = &drive {
             compare(&parameter.input_name(), &graph.outputs, &off, agreeing(options))?;
             of_drive(parameter, drive, &body[0], (state == 0).then_some(&robot.model))?;
@@ -401,22 +393,27 @@ fn inputs(graph: &Graph, state: &PortState) -> Vec<Dd> {
     graph.inputs.iter().flat_map(|p| state[&p.name].clone()).collect()
 }
 
-fn of_ports<T>(ports: &[Port], state: &PortState, number: fn(Dd) -> T) -> Vec<Vec<T>> {
-    ports.iter().map(|p| state[&p.name].iter().copied().map(number).collect()).collect()
+fn of_ports(ports: &[Port], state: &PortState) -> Vec<Vec<EveryScalar>> {
+    ports.iter().map(|p| every_scalar(&state[&p.name])).collect()
+}
+
+/// The plain equations are compiled over this scalar alone: it has what they say in double-double and in the scalar that is generated.
+fn every_scalar(x: &[Dd]) -> Vec<EveryScalar> {
+    x.iter().copied().map(Real::constant).collect()
 }
 
 /// Gives every number of a robot the size of the vector, rotation or tensor that it is a part of: turned into other axes, it takes part in
 /// all components. Origins count as [`POINT`] of the longest lever at least: other forms of the robot have them elsewhere.
-fn with_sizes(model: &mut Model<Magnitude>, lever: f64) {
-    let of_vector = |v: &mut Vec3<Magnitude>| {
-        let size = v.to_array().iter().map(|x| x.size).fold(0.0, f64::hypot);
+fn with_sizes(model: &mut Model<EveryScalar>, lever: f64) {
+    let of_vector = |v: &mut Vec3<EveryScalar>| {
+        let size = v.to_array().iter().map(|x| x.wide.size).fold(0.0, f64::hypot);
         *v = v.map(|x| x.of_size(size));
     };
-    let of_tensor = |s: &mut Sym3<Magnitude>| {
-        let size = [s.xx, s.xy, s.xz, s.yy, s.yz, s.zz].iter().map(|x| x.size).fold(0.0, f64::hypot);
+    let of_tensor = |s: &mut Sym3<EveryScalar>| {
+        let size = [s.xx, s.xy, s.xz, s.yy, s.yz, s.zz].iter().map(|x| x.wide.size).fold(0.0, f64::hypot);
         *s = s.map(|x| x.of_size(size));
     };
-    let of_pose = |x: &mut Transform<Magnitude>| {
+    let of_pose = |x: &mut Transform<EveryScalar>| {
         x.rotation = x.rotation.map(|r| r.of_size(1.0));
         x.translation = x.translation.map(|r| r.of_size(POINT * lever));
         of_vector(&mut x.translation);
@@ -428,7 +425,7 @@ fn with_sizes(model: &mut Model<Magnitude>, lever: f64) {
         [&mut i.com, &mut i.first_moment, &mut i.anisotropy_com].into_iter().for_each(of_vector);
         [&mut i.inertia_com, &mut i.second_moment_com, &mut i.second_moment].into_iter().for_each(of_tensor);
         // differences of moments that cancel
-        let size = i.inertia_com.xx.size;
+        let size = i.inertia_com.xx.wide.size;
         i.anisotropy_com = i.anisotropy_com.map(|x| x.of_size(size));
         if let Some(load) = &mut body.load {
             of_vector(&mut load.first_moment);

@@ -1,7 +1,7 @@
 //! Programs of every kind with one pass broken on purpose, and forms of the robot with one wrong number: what is written is right, or nothing
 //! is. Right is what the generic runtime says at states of its own, and a bound is one that nothing exceeds there.
 
-use super::{inputs, of_function, sabotage, Disagreement, PlainEquations, PortState, States, ROUNDINGS};
+use super::{every_scalar, inputs, of_function, sabotage, Disagreement, PlainEquations, PortState, States, ROUNDINGS};
 use crate::choices::LimbForm;
 use crate::diagnostic::{Diagnostics, Source};
 use crate::equations::bind::constructed;
@@ -27,9 +27,9 @@ use straightline_core::Dd;
 use straightline_graph::certify::companion::OF_ERROR;
 use straightline_graph::certify::search::computed_at;
 use straightline_graph::certify::{certify, Effort};
-use straightline_graph::expr::{evaluate, verify, Binary, Constant, Graph, NodeId, Op, Unary};
+use straightline_graph::expr::{evaluate, verify, Binary, Constant, Graph, NodeId, Op, Port, Unary};
 use straightline_graph::pass::cut::Staged;
-use straightline_graph::{element_of, Scalar};
+use straightline_graph::{element_of, EveryScalar, Scalar};
 
 /// Numbers as exporters write them: a right angle with fewer digits, dust, a fixed finger.
 const ARM: &str = r#"<robot name="arm"><link name="base"/>
@@ -326,7 +326,7 @@ impl Case {
         let mut states = States::new(robot, options);
         states.random = Random(77);
         let plain = |function: Function, state: &PortState| {
-            PlainEquations { robot, frames, function, options }.results::<Dd>(state)
+            wide(PlainEquations { robot, frames, function, options }.results(state))
         };
         for _ in 0..5 {
             let fault = match written {
@@ -337,11 +337,11 @@ impl Case {
                 Written::Mode(k, function, graph) => {
                     let mode = &Mode::all(&options.scene)[*k];
                     let state = states.next(&contact::ports(robot, options, mode, *function));
-                    let truth =
-                        contact::evaluate(robot, options, mode, *function, &|p| state[&p.name].clone(), &|_| None);
+                    let given = |p: &Port| every_scalar(&state[&p.name]);
+                    let truth = contact::evaluate(robot, options, mode, *function, &given, &|_| None);
                     let truth = truth.expect("planes are over every scalar");
                     // what is solved for in contact may be hard to tell
-                    differ(graph, &evaluate(graph, &inputs(graph, &state)), &truth, 1e-15)
+                    differ(graph, &evaluate(graph, &inputs(graph, &state)), &wide(truth), 1e-15)
                 }
                 Written::Stages(functions, staged) => {
                     let ports: Vec<_> = functions.iter().flat_map(|f| options.scene.ports(*f, &robot.model)).collect();
@@ -357,7 +357,9 @@ impl Case {
                 Written::Parameter(k, graph) => {
                     let parameter = &options.scene.parameters[*k];
                     let given = states.given(parameter);
-                    differ(graph, &evaluate(graph, &given.concat()), &constructed(robot, parameter, &given), 1e-19)
+                    let every: Vec<Vec<EveryScalar>> = given.iter().map(|x| every_scalar(x)).collect();
+                    let truth = wide(constructed(robot, parameter, &every));
+                    differ(graph, &evaluate(graph, &given.concat()), &truth, 1e-19)
                 }
                 Written::Bound { graph, bound } => exceeded(options, graph, bound, &mut states),
             };
@@ -367,6 +369,10 @@ impl Case {
         }
         None
     }
+}
+
+fn wide(x: Vec<EveryScalar>) -> Vec<Dd> {
+    x.into_iter().map(|x| x.wide.value).collect()
 }
 
 /// Results that are not those of the generic runtime.

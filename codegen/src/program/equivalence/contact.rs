@@ -1,6 +1,6 @@
 //! Programs of contact modes, against the plain equations of the same mode.
 
-use super::{agreeing, compare, difference, inputs, with_sizes, Disagreement, States, STATES};
+use super::{agreeing, compare, difference, every_scalar, inputs, with_sizes, Disagreement, States, STATES};
 use crate::equations::reduce::longest_lever;
 use crate::equations::Robot;
 use crate::function::ContactFunction;
@@ -10,6 +10,7 @@ use straightline_core::magnitude::Magnitude;
 use straightline_core::model::Model;
 use straightline_core::Dd;
 use straightline_graph::expr::{evaluate, Graph, Port};
+use straightline_graph::{EveryScalar, Scalar};
 
 /// What is solved for counts as so many times what it loses in f64, over the rounding of f64: another form may lose more.
 const SOLVED: f64 = 1e3;
@@ -34,25 +35,20 @@ pub(crate) fn of_contact(
     let (prepare, lever) = (falling(robot), longest_lever(&robot.model));
     for _ in 0..STATES {
         let state = states.next(&ports);
-        let given = |port: &Port| state[&port.name].iter().copied().map(Magnitude::new).collect();
+        let given = |port: &Port| every_scalar(&state[&port.name]);
         let by_numbers = contact::evaluate(robot, options, mode, function, &given, &prepare);
-        let short = |port: &Port| state[&port.name].iter().map(|x| x.to_f64()).collect();
-        let in_f64 = contact::evaluate::<f64>(robot, options, mode, function, &short, &|_| None);
-        let of_another = |port: &Port| state[&port.name].clone();
-        let of_another = contact::evaluate::<Dd>(robot, options, mode, function, &of_another, &|model| {
+        let of_another = contact::evaluate(robot, options, mode, function, &given, &|model| {
             nudge(model, lever);
             None
         });
-        let (truth, in_f64) = by_numbers.zip(in_f64).unwrap_or_else(|| {
+        let truth = by_numbers.unwrap_or_else(|| {
             let plain = plain();
-            let wide: Vec<Magnitude> = inputs(&plain, &state).into_iter().map(Magnitude::new).collect();
-            let short: Vec<f64> = inputs(&plain, &state).into_iter().map(Dd::to_f64).collect();
-            (evaluate(&plain, &wide), evaluate(&plain, &short))
+            evaluate(&plain, &every_scalar(&inputs(&plain, &state)))
         });
         let found = evaluate(graph, &inputs(graph, &state));
-        let most = solved_size(&truth, &in_f64, of_another.as_deref());
-        let off: Vec<Magnitude> = found.into_iter().zip(truth).map(|(found, plain)| difference(found, plain)).collect();
-        let off: Vec<Magnitude> = off.into_iter().map(|x| Magnitude { size: x.size.min(most), ..x }).collect();
+        let most = solved_size(&truth, of_another.as_deref());
+        let off = found.into_iter().zip(truth).map(|(found, plain)| difference(found, plain.wide));
+        let off: Vec<Magnitude> = off.map(|x| Magnitude { size: x.size.min(most), ..x }).collect();
         let name = format!("{}::{}", mode.identifier, function.name());
         compare(&name, &graph.outputs, &off, agreeing(options))?;
     }
@@ -62,11 +58,12 @@ pub(crate) fn of_contact(
 /// How large results may count that are solved for. [`Magnitude`] takes the worst of every pivot, one after the other, and tells nothing where
 /// there are many; what the same equations lose in f64, at inputs that are hardly rounded, is what they are made of, or what they change by for
 /// `another` robot, as next to nothing that is not zero keeps its digits in f64. All results count together: some are zero by their equations.
-fn solved_size(truth: &[Magnitude], in_f64: &[f64], another: Option<&[Dd]>) -> f64 {
+fn solved_size(truth: &[EveryScalar], another: Option<&[EveryScalar]>) -> f64 {
     let size = |k: usize| {
-        let off = |x: Dd, by: f64| (truth[k].value - x).hi().abs() / by;
-        let changed = another.map_or(0.0, |another| off(another[k], NUDGE));
-        truth[k].value.hi().abs() + off(Dd::from(in_f64[k]), f64::EPSILON) + changed
+        let value = truth[k].wide.value;
+        let off = |x: Dd, by: f64| (value - x).hi().abs() / by;
+        let changed = another.map_or(0.0, |another| off(another[k].wide.value, NUDGE));
+        value.hi().abs() + off(Dd::from(truth[k].in_scalar(Scalar::F64)), f64::EPSILON) + changed
     };
     let sizes: Vec<f64> = (0..truth.len()).map(size).collect();
     match sizes.iter().all(|x| x.is_finite()) {
@@ -76,11 +73,11 @@ fn solved_size(truth: &[Magnitude], in_f64: &[f64], another: Option<&[Dd]>) -> f
 }
 
 /// Another robot, by far less than its numbers are known: axes and origins, of which forms of a robot keep so much.
-fn nudge(model: &mut Model<Dd>, lever: f64) {
+fn nudge(model: &mut Model<EveryScalar>, lever: f64) {
     let mut sign = 1.0;
-    let mut nudged = |x: Dd, size: f64| {
+    let mut nudged = |x: EveryScalar, size: f64| {
         sign = -sign;
-        x + Dd::from(sign * NUDGE * size)
+        x + EveryScalar::wide_alone(Dd::from(sign * NUDGE * size))
     };
     let places =
         model.bodies.iter_mut().map(|b| &mut b.placement).chain(model.frames.iter_mut().map(|f| &mut f.placement));
@@ -91,12 +88,12 @@ fn nudge(model: &mut Model<Dd>, lever: f64) {
 }
 
 /// Numbers of their natural sizes, and what is added to accelerations of contact points and taken away again.
-fn falling(robot: &Robot) -> impl Fn(&mut Model<Magnitude>) -> Option<Magnitude> {
+fn falling(robot: &Robot) -> impl Fn(&mut Model<EveryScalar>) -> Option<EveryScalar> {
     let lever = longest_lever(&robot.model);
     move |model| {
         with_sizes(model, lever);
         // every component of a vector has its length as size
-        Some(Magnitude::new(Dd::from(model.gravity.x.size)))
+        Some(EveryScalar::wide_alone(Dd::from(model.gravity.x.wide.size)))
     }
 }
 
@@ -121,15 +118,15 @@ pub(crate) fn of_system(
     };
     for _ in 0..STATES {
         let state = states.next(&ports);
-        let given = |port: &Port| state[&port.name].iter().copied().map(Magnitude::new).collect();
+        let given = |port: &Port| every_scalar(&state[&port.name]);
         let by_numbers = contact::evaluate_system(robot, options, mode, &given, &prepare);
         let truth = by_numbers.unwrap_or_else(|| {
             let plain = plain();
-            let inputs: Vec<Magnitude> = inputs(&plain, &state).into_iter().map(Magnitude::new).collect();
-            evaluate(&plain, &inputs)
+            evaluate(&plain, &every_scalar(&inputs(&plain, &state)))
         });
         let found = evaluate(graph, &inputs(graph, &state));
-        let off: Vec<Magnitude> = found.into_iter().zip(truth).map(|(found, plain)| difference(found, plain)).collect();
+        let off = found.into_iter().zip(truth).map(|(found, plain)| difference(found, plain.wide));
+        let off: Vec<Magnitude> = off.collect();
         compare(&name, &graph.outputs, &off, agreeing(options))?;
     }
     Ok(())

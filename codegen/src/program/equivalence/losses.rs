@@ -1,6 +1,6 @@
 //! What a program loses to rounding, beside what the plain equations lose.
 
-use super::{inputs, of_ports, Disagreement, PortState, LOSSES};
+use super::{every_scalar, inputs, of_ports, Disagreement, PortState, LOSSES};
 use crate::equations::Robot;
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::options::Options;
@@ -8,7 +8,7 @@ use straightline_core::algorithms::Ltdl;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::{Dd, Real};
 use straightline_graph::expr::{evaluate, Graph};
-use straightline_graph::{element_of, Scalar};
+use straightline_graph::{element_of, EveryScalar, Scalar};
 
 /// Natural scales of accelerations: |H⁻¹| times those of the forces that make them, given with what the equations of motion are off by.
 pub(super) fn sizes_of_accelerations(
@@ -18,15 +18,15 @@ pub(super) fn sizes_of_accelerations(
     off: &[Magnitude],
 ) -> Vec<f64> {
     let ports = options.scene.ports(Function::ForwardDynamics, &robot.model);
-    let bound = options.scene.bind(Function::ForwardDynamics, robot, &of_ports(&ports, state, |x| x));
+    let bound = options.scene.bind(Function::ForwardDynamics, robot, &of_ports(&ports, state));
     let h = Function::MassMatrix.evaluate(&bound.model, &[], ForwardDynamicsMethod::ArticulatedBody, &bound.arguments);
     let factor = Ltdl::factor(&bound.model, &h);
     let mut sizes = vec![0.0; off.len()];
     for (j, force) in off.iter().enumerate() {
-        let mut unit = vec![Dd::ZERO; off.len()];
-        unit[j] = Dd::ONE;
+        let mut unit = vec![EveryScalar::zero(); off.len()];
+        unit[j] = EveryScalar::one();
         let column = factor.solve(&unit);
-        sizes.iter_mut().zip(column).for_each(|(size, x)| *size += x.hi().abs() * force.size);
+        sizes.iter_mut().zip(column).for_each(|(size, x)| *size += x.wide.value.hi().abs() * force.size);
     }
     sizes
 }
@@ -46,32 +46,33 @@ impl Losses {
     }
 
     /// At one more state, rounded to the scalar; `found`: the results there in double-double.
-    pub fn add<T: Real + Into<f64>>(
+    pub fn add(
         &mut self,
-        graph: &Graph,
+        (graph, scalar): (&Graph, Scalar),
         (state, found): (&PortState, &[Dd]),
         sizes: &[f64],
-        plain: impl Fn(&PortState) -> Vec<T>,
+        plain: impl Fn(&PortState) -> Vec<EveryScalar>,
     ) {
         let rounded: PortState =
-            state.iter().map(|(n, x)| (n.clone(), x.iter().map(|x| rounded::<T>(*x)).collect())).collect();
+            state.iter().map(|(n, x)| (n.clone(), x.iter().map(|x| Dd::from(scalar.nearest(*x))).collect())).collect();
         let wide = inputs(graph, &rounded);
         let exact = match rounded == *state {
             true => found.to_vec(),
             false => evaluate(graph, &wide),
         };
-        let found = evaluate(graph, &wide.into_iter().map(T::constant).collect::<Vec<T>>());
-        let plain = plain(&rounded);
+        let in_scalar = |x: Vec<EveryScalar>| x.into_iter().map(|x| x.in_scalar(scalar)).collect::<Vec<f64>>();
+        let found = in_scalar(evaluate(graph, &every_scalar(&wide)));
+        let plain = in_scalar(plain(&rounded));
         let greatest = exact.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
         let mut lost: f64 = 0.0;
         for (plain, exact) in plain.iter().zip(&exact).filter(|_| greatest > 0.0) {
-            let off = (Dd::from((*plain).into()) - *exact).hi().abs() / greatest;
+            let off = (Dd::from(*plain) - *exact).hi().abs() / greatest;
             lost = if off.is_nan() { f64::INFINITY } else { lost.max(off) };
         }
         self.of_greatest = self.of_greatest.min(lost);
         for (k, exact) in exact.into_iter().enumerate().filter(|(k, _)| sizes[*k] > 0.0) {
-            let lost = |x: T| {
-                let off = (Dd::from(x.into()) - exact).hi().abs() / sizes[k];
+            let lost = |x: f64| {
+                let off = (Dd::from(x) - exact).hi().abs() / sizes[k];
                 if off.is_nan() {
                     f64::INFINITY
                 } else {
@@ -99,9 +100,4 @@ impl Losses {
             }),
         }
     }
-}
-
-/// The nearest number of a scalar.
-fn rounded<T: Real + Into<f64>>(x: Dd) -> Dd {
-    Dd::from(T::constant(x).into())
 }
