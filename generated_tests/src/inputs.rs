@@ -1,21 +1,28 @@
 //! Random inputs of generated functions.
 
 use crate::random::Random;
-use straightline_codegen::Function;
+use straightline_codegen::function::{Function, Quantity};
 use straightline_core::model::Model;
 use straightline_core::Dd;
 
-/// Random inputs of a function, in the order of its ports; the quaternion of a floating base has length one.
+/// Random inputs of a function, in the order of its ports; quaternions have length one.
 pub fn random(random: &mut Random, model: &Model<Dd>, function: Function) -> Vec<Vec<f64>> {
-    let floating = model.floats();
-    function
-        .inputs(model)
-        .iter()
-        .map(|port| match port.name.as_str() {
-            "q" => random.configuration(port.len(), floating),
-            _ => random.list(port.len(), 2.0),
-        })
-        .collect()
+    let of_port = |quantity: Quantity| match quantity {
+        Quantity::Configuration => configuration(random, model),
+        quantity => random.list(quantity.len(model), 2.0),
+    };
+    function.quantities(model).into_iter().map(of_port).collect()
+}
+
+fn configuration(random: &mut Random, model: &Model<Dd>) -> Vec<f64> {
+    let mut q = random.list(model.nq(), 3.0);
+    for joint in model.bodies.iter().map(|body| &body.joint) {
+        let Some(first) = joint.kind.row().quaternion else { continue };
+        let quaternion = &mut q[joint.iq + first..][..4];
+        let norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
+        quaternion.iter_mut().for_each(|x| *x /= norm);
+    }
+    q
 }
 
 /// Inputs as Rust, ready to paste into a test.

@@ -17,6 +17,7 @@ use straightline_simulation::drives::further_derivatives;
 use straightline_simulation::motion::Motion;
 use straightline_simulation::optimize::{self, Optimum as Best, Sampled};
 use straightline_simulation::simulate;
+
 /// A search takes about a minute at so many instants.
 const MOST_SEARCHED: usize = 50_000;
 

@@ -16,6 +16,7 @@ mod urdf;
 
 pub use tree::*;
 
+use crate::diagnostic::wording::one_of;
 use crate::diagnostic::{Diagnostics, Place, Source};
 use std::fmt;
 use straightline_core::joint::Dialect;
@@ -50,9 +51,7 @@ impl PartialEq for FileFormat {
 
 /// Names of all formats, as in "a, b or c".
 pub fn names_of_formats() -> String {
-    let (last, others) = FORMATS.split_last().expect("there are formats");
-    let others: Vec<&str> = others.iter().map(|format| format.name).collect();
-    format!("{} or {}", others.join(", "), last.name)
+    one_of(&FORMATS.iter().map(|format| format.name).collect::<Vec<_>>())
 }
 
 /// A value with its place in the file, which says nothing of the value: equal and printed alike wherever it stands.

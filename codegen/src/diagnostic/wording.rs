@@ -2,15 +2,17 @@
 
 /// `did you mean …?`, if there are candidates close to `word`.
 pub fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
-    let nearest = nearest(word, candidates);
-    let (last, rest) = nearest.split_last()?;
-    let quoted = |c: &&str| format!("`{}`", cut(c));
-    Some(match rest.is_empty() {
-        true => format!("did you mean {}?", quoted(last)),
-        false => {
-            format!("did you mean {} or {}?", rest.iter().map(quoted).collect::<Vec<_>>().join(", "), quoted(last))
-        }
-    })
+    let nearest: Vec<String> = nearest(word, candidates).iter().map(|c| format!("`{}`", cut(c))).collect();
+    (!nearest.is_empty()).then(|| format!("did you mean {}?", one_of(&nearest)))
+}
+
+/// As in "a, b or c".
+pub fn one_of(words: &[impl AsRef<str>]) -> String {
+    let words: Vec<&str> = words.iter().map(AsRef::as_ref).collect();
+    match words.split_last() {
+        Some((last, others)) if !others.is_empty() => format!("{} or {last}", others.join(", ")),
+        _ => words.concat(),
+    }
 }
 
 /// The candidate next to `word`, if it is close.

@@ -31,7 +31,7 @@ pub struct GravityForce;
 impl RobotFunction for GravityForce {
     const SPEC: Spec = Spec {
         name: "gravity_force",
-        summary: "Gravity forces g(q): the drives that hold the robot still.",
+        summary: "Gravity forces g(q): the generalized forces that hold the robot still.",
         aliases: &["gravity compensation", "generalized gravity"],
         inputs: &[Quantity::Configuration],
         outputs: &[Output::new("g", &[Velocities], "generalized forces \\[N·m or N\\]")],

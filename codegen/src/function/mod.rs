@@ -86,10 +86,10 @@ functions! {
     kinematics::Jacobian,
     /// J̇q̇ of the frames.
     kinematics::JacobianBias,
-    /// Motion to drives.
+    /// Motion to generalized forces.
     #[doc(alias("RNEA", "Newton-Euler"))]
     dynamics::InverseDynamics,
-    /// The drives that hold the robot still.
+    /// The generalized forces that hold the robot still.
     dynamics::GravityForce,
     /// h of τ = H q̈ + h.
     #[doc(alias("Coriolis", "nonlinear effects"))]
@@ -100,7 +100,7 @@ functions! {
     /// H of τ = H q̈ + h.
     #[doc(alias("CRBA", "inertia matrix"))]
     dynamics::MassMatrix,
-    /// Drives to motion.
+    /// Generalized forces to motion.
     #[doc(alias("ABA", "articulated body"))]
     dynamics::ForwardDynamics,
     /// What the joints carry.
