@@ -13,9 +13,17 @@ fn a_broken_pass_never_reaches_the_text() {
 }
 
 #[test]
+#[ignore = "slow proof: a thousand mutants"]
+fn slow_proof_a_thousand_broken_passes_never_reach_the_text() {
+    internals::broken_passes_never_reach_the_text(2);
+}
+
+/// `MUTANTS=30 cargo test --release -p straightline-codegen --test suite mutants:: -- --ignored --nocapture`
+#[test]
 #[ignore = "minutes: thousands of mutants"]
 fn thousands_of_broken_passes_never_reach_the_text() {
-    internals::thousands_of_broken_passes_never_reach_the_text();
+    let count = std::env::var("MUTANTS").ok().and_then(|x| x.parse().ok());
+    internals::broken_passes_never_reach_the_text(count.unwrap_or(20));
 }
 
 #[test]
