@@ -33,8 +33,14 @@ impl Filter {
 /// Values of pairs, found by what they are at the first point.
 pub(super) struct PairTable {
     known: Filter,
-    entries: FxHashMap<u64, Vec<NewPair>>,
+    /// Each with the next one of its key: a list per key, without a place of its own for every one of many.
+    entries: Vec<(NewPair, u32)>,
+    /// The first and the last entry of a key.
+    ends: FxHashMap<u64, [u32; 2]>,
 }
+
+/// After the last entry of a key.
+const NONE: u32 = u32::MAX;
 
 impl PairTable {
     /// Those that are wanted.
@@ -46,7 +52,7 @@ impl PairTable {
         wanted: &Filter,
     ) -> PairTable {
         let is_constant = |i: usize| matches!(graph.ops[i], Op::Constant(_));
-        let mut entries: FxHashMap<u64, Vec<NewPair>> = FxHashMap::default();
+        let mut table = PairTable { known: Filter::new(0), entries: Vec::new(), ends: FxHashMap::default() };
         for (k, &i) in numbers.iter().enumerate() {
             for &j in &numbers[k..] {
                 if !(free[i] || free[j] || j - i <= WINDOW) || (is_constant(i) && is_constant(j)) {
@@ -59,18 +65,32 @@ impl PairTable {
                         break;
                     }
                     if wanted.may_have(key(z)) && (i != j || form != PairForm::Difference) {
-                        entries.entry(key(z)).or_default().push((i, j, form));
+                        table.insert(key(z), (i, j, form));
                     }
                 }
             }
         }
-        let mut known = Filter::new(8 * entries.len());
-        entries.keys().for_each(|key| known.insert(*key));
-        PairTable { known, entries }
+        table.known = Filter::new(8 * table.ends.len());
+        table.ends.keys().for_each(|key| table.known.insert(*key));
+        table
+    }
+
+    fn insert(&mut self, key: u64, pair: NewPair) {
+        let at = self.entries.len() as u32;
+        self.entries.push((pair, NONE));
+        let ends = self.ends.entry(key).or_insert([at; 2]);
+        if ends[1] != at {
+            self.entries[ends[1] as usize].1 = at;
+            ends[1] = at;
+        }
     }
 
     pub(super) fn find(&self, x: f64) -> impl Iterator<Item = NewPair> + '_ {
-        keys(x).filter(|k| self.known.may_have(*k)).filter_map(|k| self.entries.get(&k)).flatten().copied()
+        let firsts = keys(x).filter(|k| self.known.may_have(*k)).filter_map(|k| self.ends.get(&k));
+        let entry = |at: u32| self.entries.get(at as usize);
+        firsts
+            .flat_map(move |[first, _]| std::iter::successors(entry(*first), move |(_, next)| entry(*next)))
+            .map(|e| e.0)
     }
 }
 
