@@ -181,26 +181,16 @@ impl SumTable {
         term
     }
 
-    /// Operand `k` of a value.
-    fn operand(&self, value: usize, k: usize) -> Option<Term> {
-        let term = match &self.values[value] {
-            SignedValue::Constant(_) => None,
-            SignedValue::Product(a, b) => [*a, *b].get(k).map(|v| Term::new(*v, false)),
-            SignedValue::Sum(terms) => terms.get(k).copied(),
-            SignedValue::Same(t) => (k == 0).then_some(*t),
-            SignedValue::Other(_, operands) => operands.get(k).copied().flatten(),
-        };
-        term.map(|t| self.resolved(t))
-    }
-
     /// Both factors of a product.
     fn factors(&self, product: usize) -> [Term; 2] {
-        [0, 1].map(|k| self.operand(product, k).expect("a product has two factors"))
+        let SignedValue::Product(a, b) = self.values[product] else { unreachable!("a product has two factors") };
+        [a, b].map(|v| self.resolved(Term::new(v, false)))
     }
 
     /// The terms of a sum.
-    fn terms(&self, sum: usize) -> Vec<Term> {
-        (0..).map_while(|k| self.operand(sum, k)).collect()
+    fn terms(&self, sum: usize) -> impl Iterator<Item = Term> + '_ {
+        let SignedValue::Sum(terms) = &self.values[sum] else { unreachable!("a sum has terms") };
+        terms.iter().map(|t| self.resolved(*t))
     }
 
     fn is_product(&self, t: Term) -> bool {
@@ -277,9 +267,8 @@ impl SumTable {
             match &self.values[v] {
                 SignedValue::Product(..) => counts.mul += 1,
                 SignedValue::Sum(_) => {
-                    let terms = || (0..).map_while(|k| self.operand(v, k));
-                    let additions = terms().count() - 1;
-                    let products = terms().filter(|t| uses[t.value()] == 1 && self.is_product(*t)).count();
+                    let additions = self.terms(v).count() - 1;
+                    let products = self.terms(v).filter(|t| uses[t.value()] == 1 && self.is_product(*t)).count();
                     counts.add += additions;
                     fused += products.min(additions);
                 }

@@ -96,7 +96,7 @@ impl SumTable {
                             sums.insert(hash, (v, negative));
                             let SignedValue::Sum(terms) = &self.values[v] else { unreachable!("seen above") };
                             if terms.iter().any(|t| self.resolved(*t) != *t) {
-                                let terms = self.terms(v);
+                                let terms = self.terms(v).collect();
                                 self.set(v, SignedValue::Sum(terms));
                             }
                         }
@@ -110,7 +110,7 @@ impl SumTable {
     /// The terms of a sum, sorted, the first positive; and whether all signs were turned for that.
     fn canonical(&self, sum: usize, key: &mut Vec<Term>) -> bool {
         key.clear();
-        key.extend((0..).map_while(|k| self.operand(sum, k)));
+        key.extend(self.terms(sum));
         key.sort_unstable();
         let negative = key[0].is_negative();
         key.iter_mut().for_each(|t| *t = t.signed(negative));
@@ -244,19 +244,19 @@ impl SumTable {
         let mut pairs = Pairs::default();
         for v in found.1.iter().copied() {
             if let SignedValue::Sum(_) = self.values[v] {
-                pairs.insert(v, &self.terms(v));
+                pairs.insert(v, &self.terms(v).collect::<Vec<_>>());
             }
         }
         while let Some((best, sums)) = pairs.most_frequent() {
             let (a, b, opposite) = best;
             let (a, b) = (Term::new(a, false), Term::new(b, opposite));
-            let exact = sums.iter().copied().find(|v| self.operand(*v, 2).is_none());
+            let exact = sums.iter().copied().find(|v| self.terms(*v).count() == 2);
             let shared = match exact {
-                Some(v) => Term::new(v, !self.terms(v).contains(&a)),
+                Some(v) => Term::new(v, !self.terms(v).any(|t| t == a)),
                 None => self.push(SignedValue::Sum(vec![a, b]), None),
             };
             for v in sums.into_iter().filter(|v| *v != shared.value()) {
-                let mut terms = self.terms(v);
+                let mut terms: Vec<Term> = self.terms(v).collect();
                 pairs.remove(v, &terms);
                 for negative in [false, true] {
                     let (a, b) = (a.signed(negative), b.signed(negative));

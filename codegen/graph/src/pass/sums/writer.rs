@@ -26,7 +26,7 @@ impl SumWriter<'_> {
                 let ((a, s), (b, t)) = (self.term(a), self.term(b));
                 (self.builder.insert(Op::mul(a.min(b), a.max(b))), s != t)
             }
-            SignedValue::Sum(_) => self.sum(&self.table.terms(value)),
+            SignedValue::Sum(_) => self.sum(&self.table.terms(value).collect::<Vec<_>>()),
             SignedValue::Same(_) => unreachable!("terms are resolved"),
             SignedValue::Other(op, operands) => {
                 let operands: Vec<NodeId> = operands.iter().flatten().map(|t| self.signed(*t)).collect();
