@@ -6,8 +6,22 @@ use std::cmp::Reverse;
 use std::collections::hash_map::Entry;
 use std::collections::BTreeSet;
 
-/// Two values, and whether their signs differ.
-type Pair = (usize, usize, bool);
+/// Two values, the lower one first, and whether their signs differ, in one word: compared as the three would be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) struct Pair(u64);
+
+impl Pair {
+    /// Up to a common sign.
+    fn new(a: Term, b: Term) -> Pair {
+        let (low, high) = (a.value().min(b.value()) as u64, a.value().max(b.value()) as u64);
+        Pair(low << 33 | high << 1 | u64::from(a.is_negative() != b.is_negative()))
+    }
+
+    /// The lower value with a plus, and the other one.
+    pub(super) fn terms(self) -> [Term; 2] {
+        [Term::new((self.0 >> 33) as usize, false), Term::new((self.0 as u32 >> 1) as usize, self.0 & 1 == 1)]
+    }
+}
 
 /// In which sums each pair of terms stands.
 #[derive(Default)]
@@ -76,13 +90,8 @@ impl Pairs {
 fn pairs_of(terms: &[Term], pairs: &mut Vec<Pair>) {
     pairs.clear();
     for (i, a) in terms.iter().enumerate() {
-        pairs.extend(terms[i + 1..].iter().map(|b| pair(*a, *b)));
+        pairs.extend(terms[i + 1..].iter().map(|b| Pair::new(*a, *b)));
     }
     pairs.sort_unstable();
     pairs.dedup();
-}
-
-/// The unordered pair up to a common sign: whether the signs differ.
-pub(super) fn pair(a: Term, b: Term) -> Pair {
-    (a.value().min(b.value()), a.value().max(b.value()), a.is_negative() != b.is_negative())
 }

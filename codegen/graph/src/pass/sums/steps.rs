@@ -248,8 +248,7 @@ impl SumTable {
             }
         }
         while let Some((best, sums)) = pairs.most_frequent() {
-            let (a, b, opposite) = best;
-            let (a, b) = (Term::new(a, false), Term::new(b, opposite));
+            let [a, b] = best.terms();
             let exact = sums.iter().copied().find(|v| self.terms(*v).count() == 2);
             let shared = match exact {
                 Some(v) => Term::new(v, !self.terms(v).any(|t| t == a)),
