@@ -290,6 +290,7 @@ mod tests {
             assert_eq!(scalar.name(), in_scalar!(scalar, T => std::any::type_name::<T>()));
         }
     }
+
     /// All that a scalar does.
     fn computed<T: Real>(a: Dd, b: Dd) -> Vec<T> {
         let [a, b] = [a, b].map(T::constant);

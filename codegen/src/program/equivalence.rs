@@ -168,8 +168,8 @@ impl Check<'_> {
         let plain = self.plain.results(state);
         let most = plain.iter().map(|x| x.wide.value.hi().abs()).fold(0.0, f64::max);
         // written so that NaN is not regular
-        let is_near = |x: EveryScalar| x.wide.value.hi() - x.in_scalar(self.plain.options.scalar);
-        plain.into_iter().all(|x| is_near(x).abs() <= REGULAR * most)
+        let lost = |x: EveryScalar| (x.wide.value.hi() - x.in_scalar(self.plain.options.scalar)).abs();
+        plain.into_iter().all(|x| lost(x) <= REGULAR * most)
     }
 
     /// What losses are compared with.
@@ -268,7 +268,7 @@ impl PlainEquations<'_> {
             let [found, plain] = [found, plain].map(|x| x.in_scalar(self.options.scalar));
             // neither is a number
             let value = if found == plain || (found.is_nan() && plain.is_nan()) { 0.0 } else { found - plain };
-            Magnitude { value: Dd::from(value), size: 0.0 }
+            Magnitude { value: Dd::from(value), size: found.abs().max(plain.abs()) }
         };
         let off: Vec<Magnitude> = evaluate(graph, &given).into_iter().zip(plain).map(off).collect();
         compare(self.function.name(), &graph.outputs, &off, AGREE)
