@@ -156,7 +156,7 @@ impl Check<'_> {
             compare(plain.function.name(), &graph.outputs, &off, AGREE)?;
         }
         let sizes = self.sizes(state, &found, &off, least);
-        losses.add((graph, plain.options.scalar), (state, &found), &sizes, |state| plain.results(state));
+        losses.add((graph, plain.options.scalar), state, &sizes, |state| plain.results(state));
         Ok(())
     }
 
@@ -353,8 +353,7 @@ pub(crate) fn of_parameter(
             Some(drive) if state == 0 => vec![drive.nominal()],
             _ => states.given(parameter),
         };
-        let wide: Vec<Vec<EveryScalar>> = body.iter().map(|x| every_scalar(x)).collect();
-        let off = evaluate(graph, &body.concat()).into_iter().zip(constructed(robot, parameter, &wide));
+        let off = evaluate(graph, &body.concat()).into_iter().zip(plainly_constructed(robot, parameter, &body));
         let off: Vec<Magnitude> = off.map(|(found, plain)| difference(found, plain.wide)).collect();
         if let Some(drive) = &drive {
             compare(&parameter.input_name(), &graph.outputs, &off, agreeing(options))?;
@@ -395,6 +394,12 @@ fn inputs(graph: &Graph, state: &PortState) -> Vec<Dd> {
 
 fn of_ports(ports: &[Port], state: &PortState) -> Vec<Vec<EveryScalar>> {
     ports.iter().map(|p| every_scalar(&state[&p.name])).collect()
+}
+
+/// What the constructor of a run-time parameter makes of these, by the plain equations.
+fn plainly_constructed(robot: &Robot, parameter: &crate::scene::Parameter, given: &[Vec<Dd>]) -> Vec<EveryScalar> {
+    let given: Vec<Vec<EveryScalar>> = given.iter().map(|x| every_scalar(x)).collect();
+    constructed(robot, parameter, &given)
 }
 
 /// The plain equations are compiled over this scalar alone: it has what they say in double-double and in the scalar that is generated.

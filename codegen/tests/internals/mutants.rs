@@ -1,10 +1,12 @@
 //! Programs of every kind with one pass broken on purpose, and forms of the robot with one wrong number: what is written is right, or nothing
 //! is. Right is what the generic runtime says at states of its own, and a bound is one that nothing exceeds there.
 
-use super::{every_scalar, inputs, of_function, sabotage, Disagreement, PlainEquations, PortState, States, ROUNDINGS};
+use super::{
+    every_scalar, inputs, of_function, plainly_constructed, sabotage, Disagreement, PlainEquations, PortState, States,
+    ROUNDINGS,
+};
 use crate::choices::LimbForm;
 use crate::diagnostic::{Diagnostics, Source};
-use crate::equations::bind::constructed;
 use crate::equations::Robot;
 use crate::function::{ContactFunction, Function};
 use crate::model::{load, ModelOptions};
@@ -357,8 +359,7 @@ impl Case {
                 Written::Parameter(k, graph) => {
                     let parameter = &options.scene.parameters[*k];
                     let given = states.given(parameter);
-                    let every: Vec<Vec<EveryScalar>> = given.iter().map(|x| every_scalar(x)).collect();
-                    let truth = wide(constructed(robot, parameter, &every));
+                    let truth = wide(plainly_constructed(robot, parameter, &given));
                     differ(graph, &evaluate(graph, &given.concat()), &truth, 1e-19)
                 }
                 Written::Bound { graph, bound } => exceeded(options, graph, bound, &mut states),

@@ -45,34 +45,29 @@ impl Losses {
         Losses { program: none.clone(), plain: none, of_greatest: f64::INFINITY }
     }
 
-    /// At one more state, rounded to the scalar; `found`: the results there in double-double.
+    /// At one more state, rounded to the scalar.
     pub fn add(
         &mut self,
         (graph, scalar): (&Graph, Scalar),
-        (state, found): (&PortState, &[Dd]),
+        state: &PortState,
         sizes: &[f64],
         plain: impl Fn(&PortState) -> Vec<EveryScalar>,
     ) {
         let rounded: PortState =
             state.iter().map(|(n, x)| (n.clone(), x.iter().map(|x| Dd::from(scalar.nearest(*x))).collect())).collect();
-        let wide = inputs(graph, &rounded);
-        let exact = match rounded == *state {
-            true => found.to_vec(),
-            false => evaluate(graph, &wide),
-        };
-        let in_scalar = |x: Vec<EveryScalar>| x.into_iter().map(|x| x.in_scalar(scalar)).collect::<Vec<f64>>();
-        let found = in_scalar(evaluate(graph, &every_scalar(&wide)));
-        let plain = in_scalar(plain(&rounded));
+        let found = evaluate(graph, &every_scalar(&inputs(graph, &rounded)));
+        let plain = plain(&rounded);
+        let exact: Vec<Dd> = found.iter().map(|x| x.wide.value).collect();
         let greatest = exact.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
         let mut lost: f64 = 0.0;
         for (plain, exact) in plain.iter().zip(&exact).filter(|_| greatest > 0.0) {
-            let off = (Dd::from(*plain) - *exact).hi().abs() / greatest;
+            let off = (Dd::from(plain.in_scalar(scalar)) - *exact).hi().abs() / greatest;
             lost = if off.is_nan() { f64::INFINITY } else { lost.max(off) };
         }
         self.of_greatest = self.of_greatest.min(lost);
         for (k, exact) in exact.into_iter().enumerate().filter(|(k, _)| sizes[*k] > 0.0) {
-            let lost = |x: f64| {
-                let off = (Dd::from(x) - exact).hi().abs() / sizes[k];
+            let lost = |x: EveryScalar| {
+                let off = (Dd::from(x.in_scalar(scalar)) - exact).hi().abs() / sizes[k];
                 if off.is_nan() {
                     f64::INFINITY
                 } else {

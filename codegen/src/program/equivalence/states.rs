@@ -1,7 +1,6 @@
 //! The states at which programs and plain equations are compared.
 
-use super::{every_scalar, PortState};
-use crate::equations::bind::constructed;
+use super::{plainly_constructed, PortState};
 use crate::equations::Robot;
 use crate::function::Quantity;
 use crate::model::states::{body, of_port, settle};
@@ -11,7 +10,6 @@ use std::f64::consts::PI;
 use straightline_core::random::Random;
 use straightline_core::Dd;
 use straightline_graph::expr::Port;
-use straightline_graph::EveryScalar;
 
 /// Near the zero configuration, where robots are tried first, coordinates and rates are within this.
 const NEAR: f64 = 1e-3;
@@ -100,10 +98,7 @@ impl<'a> States<'a> {
         let parameter = parameter.expect("a parameter per input with a type of its own");
         let given = self.given(parameter);
         match parameter.is_of(&self.robot.model) {
-            true => {
-                let given: Vec<Vec<EveryScalar>> = given.iter().map(|x| every_scalar(x)).collect();
-                constructed(self.robot, parameter, &given).into_iter().map(|x| x.wide.value).collect()
-            }
+            true => plainly_constructed(self.robot, parameter, &given).into_iter().map(|x| x.wide.value).collect(),
             false => vec![Dd::ZERO; port.len()],
         }
     }
