@@ -106,11 +106,13 @@ Examples:
     Analyze(Analyze),
     /// Write a self-contained package for other languages
     #[command(after_help = format!("\
-The directory becomes a Rust package without dependencies; `cargo build --release` in it gives a shared and a static
-library, and include/ holds the C header, usable from C and C++.
+With `--c-abi` the directory becomes a Rust package without dependencies; `cargo build --release` in it gives a shared
+and a static library, and include/ holds the C header, usable from C and C++. With `--c99` it holds a source and a
+header in C99 that need no library and compute the same bits, and a header for C++11.
 
 Examples:
   straightline export panda.urdf -o panda-c --c-abi && cargo build --release --manifest-path panda-c/Cargo.toml
+  straightline export panda.urdf -o panda-c99 --c99 --scalar f32 && cc -std=c99 -O2 -c panda-c99/panda_dynamics.c
   straightline export hyq.urdf -o hyq-c --c-abi --floating-base --prefix hyq --frame lf_foot --frame rf_foot
 
 {EXIT_CODES}"))]
@@ -251,11 +253,14 @@ pub struct Export {
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// The kind of package
-    #[arg(long = "as", value_name = "KIND", value_parser = packages(), required_unless_present = "c_abi")]
+    #[arg(long = "as", value_name = "KIND", value_parser = packages(), required_unless_present_any = ["c_abi", "c99"])]
     pub kind: Option<String>,
     /// Short for `--as c-abi`
-    #[arg(long, conflicts_with = "kind")]
+    #[arg(long, conflicts_with_all = ["kind", "c99"])]
     pub c_abi: bool,
+    /// Short for `--as c99`
+    #[arg(long, conflicts_with = "kind")]
+    pub c99: bool,
     /// How the C names begin [default: the robot's name]
     #[arg(long, value_parser = |text: &str| {
         is_prefix(text).then(|| text.to_string()).ok_or("up to 64 letters, digits and _ only, and no digit in front")
@@ -462,6 +467,8 @@ mod tests {
             (&["generate", "a", "--gravity", "1,2"], "0,0,-1.62"),
             (&["generate", "a", "--check"], "--output"),
             (&["export", "a", "-o", "b"], "--as"),
+            (&["export", "a", "-o", "b", "--c-abi", "--c99"], "--c99"),
+            (&["export", "a", "-o", "b", "--c99", "--as", "c99"], "--as"),
             (&["export", "a", "-o", "b", "--c-abi", "--prefix", "a-b"], "no digit in front"),
         ] {
             let error = CommandLine::try_parse_from([&["straightline"], arguments].concat()).unwrap_err();

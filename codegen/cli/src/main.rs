@@ -32,6 +32,7 @@ use std::process::ExitCode;
 use straightline_cli::html;
 use straightline_codegen::compile::{compile, explain};
 use straightline_codegen::diagnostic::{self, codes, Diagnostics, Severity, Source};
+use straightline_codegen::emit::c99::C99_SOURCE;
 use straightline_codegen::emit::package::PACKAGES;
 use straightline_codegen::emit::rust::c_package::C_ABI;
 use straightline_codegen::emit::Generated;
@@ -197,7 +198,8 @@ fn verify(a: &Verify) -> Result<(), CommandFailure> {
 
 fn export(a: &Export) -> Result<(), CommandFailure> {
     let (generated, _) = compiled(&a.robot, &a.program, &a.model)?;
-    let name = a.kind.as_deref().unwrap_or(C_ABI.name);
+    let short = if a.c99 { C99_SOURCE.name } else { C_ABI.name };
+    let name = a.kind.as_deref().unwrap_or(short);
     let kind = PACKAGES.iter().find(|p| p.name == name).unwrap_or(&C_ABI);
     if let Some([wrong, help]) = (kind.refusal)(&generated) {
         return Err(print::failure_with(wrong, &[help]));

@@ -21,6 +21,7 @@ macro_rules! operators {
 macro_rules! numbers {
     (($d:tt) $($(#[$doc:meta])* $Name:ident($type:ty) {
         name: $name:literal, description: $description:literal, module: $module:literal, c_name: $c_name:literal,
+        c_suffix: $c_suffix:literal,
         wider: $wider:expr, trig_ulps: $trig_ulps:literal, trig_domain: $trig_domain:expr, ridge: $ridge:literal,
         code_bytes: $code_bytes:expr $(,)?
     })+) => {
@@ -35,6 +36,7 @@ macro_rules! numbers {
             description: $description,
             module: $module,
             c_name: $c_name,
+            c_suffix: $c_suffix,
             bytes: size_of::<$type>(),
             significand: <$type>::MANTISSA_DIGITS,
             epsilon: <$type>::EPSILON as f64,
@@ -166,12 +168,13 @@ macro_rules! numbers {
 numbers! { ($)
     /// Double precision.
     F64(f64) {
-        name: "f64", description: "double precision", module: "double", c_name: "double", wider: None,
+        name: "f64", description: "double precision", module: "double", c_name: "double", c_suffix: "", wider: None,
         trig_ulps: 0.797, trig_domain: trig::DOMAIN_F64, ridge: 1e-12, code_bytes: [11.3, 398.0, 551.0],
     }
     /// Single precision.
     F32(f32) {
-        name: "f32", description: "single precision", module: "single", c_name: "float", wider: Some(Scalar::F64),
+        name: "f32", description: "single precision", module: "single", c_name: "float", c_suffix: "F",
+        wider: Some(Scalar::F64),
         // 0.801, and the 2^-32 more of sums of far angles
         trig_ulps: 0.806, trig_domain: trig::DOMAIN_F32, ridge: 1e-6, code_bytes: [10.6, 406.0, 414.0],
     }
@@ -208,6 +211,8 @@ columns! {
     module: &'static str,
     /// What C calls it.
     c_name: &'static str,
+    /// What stands behind a constant of it in C.
+    c_suffix: &'static str,
     /// So many bytes one takes.
     bytes: usize,
     /// So many bits a significand has.

@@ -3,6 +3,7 @@
 //! Programs are [lowered](lower) to functions of statements and expressions ([`module`]), which know no language; a [`Target`] writes
 //! them. Rust is the first ([`rust`]), with all that stands around functions in a Rust file.
 
+pub mod c99;
 mod contact;
 mod doc;
 mod error_bound;

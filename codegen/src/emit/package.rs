@@ -1,5 +1,6 @@
 //! Packages of generated code for who does not write Rust: a row each.
 
+use super::c99::C99_SOURCE;
 use super::rust::c_package::C_ABI;
 use super::Generated;
 
@@ -17,4 +18,4 @@ pub struct PackageKind {
 }
 
 /// All kinds.
-pub static PACKAGES: &[PackageKind] = &[C_ABI];
+pub static PACKAGES: &[PackageKind] = &[C_ABI, C99_SOURCE];

@@ -5,6 +5,7 @@ mod acceleration_bounds;
 mod as_written;
 mod bare_metal;
 mod builder;
+mod c99;
 mod certificates;
 mod certificates_of_robots;
 mod chain;

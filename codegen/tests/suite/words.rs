@@ -16,7 +16,7 @@ struct Word {
     remedy: &'static str,
 }
 
-const WORDS: [Word; 2] = [
+const WORDS: [Word; 3] = [
     Word {
         is_named: |line| line.contains("JointKind::"),
         homes: &["runtime/core/src/joint/"],
@@ -27,6 +27,11 @@ const WORDS: [Word; 2] = [
         // what reads the text back has nothing from those who write it
         homes: &["codegen/src/emit/rust/", "codegen/src/readback/"],
         remedy: "Rust is written outside its room; make a `Routine`, and let the target write it",
+    },
+    Word {
+        is_named: |line| ["#if", "#include", "#define", "void {", "uint32_t", "const {c_type}"].iter().any(|word| is_in_a_string(line, word)),
+        homes: &["codegen/src/emit/c99/", "codegen/src/readback/"],
+        remedy: "C is written outside its room; make a `Routine`, or a part of the `Interface`, and let them write it",
     },
 ];
 const ROOMS: [&str; 6] =
@@ -76,6 +81,8 @@ fn what_is_named_elsewhere_is_told_with_its_line() {
     assert_eq!(named(&WORDS[0], "a.rs", text), ["a.rs:2: let turns = kind == JointKind::Revolute;"]);
     let text = "pub fn write() {\n    out.push_str(\"pub fn x() {}\");\n";
     assert_eq!(named(&WORDS[1], "a.rs", text), ["a.rs:2: out.push_str(\"pub fn x() {}\");"]);
+    let text = "// \"#include <math.h>\"\nout.push_str(\"#include <math.h>\");\nlet uint32_t = 3;\n";
+    assert_eq!(named(&WORDS[2], "a.rs", text), ["a.rs:2: out.push_str(\"#include <math.h>\");"]);
 }
 
 /// The types that lines of code declare.

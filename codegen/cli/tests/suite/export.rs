@@ -211,3 +211,48 @@ int main(void) {
     }
     assert_eq!(printed.lines().count(), 3);
 }
+
+/// In C99 the same functions: the bits of the library that cargo builds, without cargo and without a library.
+#[test]
+fn a_package_in_c99_computes_the_bits_of_the_library() {
+    let scratch = scratch("c99");
+    let (rust, c99) = (scratch.join("rust"), scratch.join("c99"));
+    for (kind, package) in [("--c-abi", &rust), ("--c99", &c99)] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_straightline"));
+        let functions = ["--function", "inverse_dynamics", "--function", "forward_dynamics"];
+        succeeds(command.args(["export", ARM, kind, "--prefix", "Arm3"]).args(functions).arg("-o").arg(package));
+    }
+    let program = r#"#include "arm3_dynamics.h"
+#include <stdio.h>
+int main(void) {
+    static const double q[3] = {0.3, -0.8, 1.1}, qd[3] = {0.4, 1.2, -0.7}, tau[3] = {2.0, -3.0, 0.5};
+    double out[3], qdd[3];
+    Arm3_forward_dynamics(q, qd, tau, qdd);
+    Arm3_inverse_dynamics(q, qd, qdd, out);
+    for (int i = 0; i < 3; i++) printf("%a %a\n", qdd[i], out[i]);
+    printf("%s %d\n", Arm3_joint_name(2), Arm3_nq());
+    return 0;
+}
+"#;
+    let Some(of_rust) = crate::in_c::printed(&rust, "arm3_dynamics", Library::SharedRelease, program) else { return };
+    let (main, built) = (scratch.join("main.c"), scratch.join("main"));
+    fs::write(&main, program).unwrap();
+    let source = c99.join("arm3_dynamics.c");
+    succeeds(Command::new("cc").args(["-O2", "-I"]).arg(&c99).arg("-o").args([&built, &main, &source]));
+    assert_eq!(succeeds(&mut Command::new(&built)), of_rust);
+    // one of them is not the other
+    let broken = fs::read_to_string(&source).unwrap().replacen(" + (", " - (", 12);
+    fs::write(&source, broken).unwrap();
+    succeeds(Command::new("cc").args(["-O2", "-I"]).arg(&c99).arg("-o").args([&built, &main, &source]));
+    assert_ne!(succeeds(&mut Command::new(&built)), of_rust);
+}
+
+#[test]
+fn what_c99_has_not_is_refused_and_nothing_is_written() {
+    let package = scratch("c99-refused").join("package");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_straightline"));
+    let output = command.args(["export", ARM, "--c99", "--fma", "-o"]).arg(&package).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(1) && text.contains("libm") && text.contains("leave out `fma`"), "{text}");
+    assert!(!package.exists());
+}

@@ -138,13 +138,13 @@ impl Must {
         }
     }
 
-    /// The same in Rust, of a variable `x` that is finite.
-    pub fn condition(self) -> &'static str {
+    /// The same as comparisons of a number that is finite, all of which must hold: how, and with what.
+    pub fn comparisons(self) -> &'static [(&'static str, f64)] {
         match self {
-            Must::BePositive => "x > 0.0",
-            Must::NotBeNegative => "x >= 0.0",
-            Must::NotBeZero => "x != 0.0",
-            Must::BeAnEfficiency => "x > 0.0 && x <= 1.0",
+            Must::BePositive => &[(">", 0.0)],
+            Must::NotBeNegative => &[(">=", 0.0)],
+            Must::NotBeZero => &[("!=", 0.0)],
+            Must::BeAnEfficiency => &[(">", 0.0), ("<=", 1.0)],
         }
     }
 

@@ -5,10 +5,10 @@
 
 use super::file::{header, item_text, lanes_text, preamble, uses};
 use super::{array_type, batch, fused, kernel};
-use crate::description::drives::DriveNumber;
+use crate::emit::c99::interface::{CParameter, Exported, Interface, LAYOUTS};
 use crate::emit::package::PackageKind;
 use crate::emit::{Generated, Item, Style};
-use crate::identifier::{comment, package_name, string_literal};
+use crate::identifier::{package_name, string_literal};
 use crate::output::MARK;
 use std::fmt::Write;
 use straightline_graph::expr::Port;
@@ -35,11 +35,11 @@ pub const C_ABI: PackageKind = PackageKind {
 
 /// The files of the package; all C names begin with `prefix`.
 fn c_package(generated: &Generated, prefix: &str) -> Vec<(String, String)> {
-    let package = Package { generated, prefix, library: format!("{}_dynamics", prefix.to_lowercase()) };
+    let package = Interface::new(generated, prefix);
     let mut files = vec![
         ("Cargo.toml".to_string(), package.manifest()),
-        ("src/lib.rs".to_string(), package.library()),
-        (format!("include/{}.h", package.library), package.header()),
+        ("src/lib.rs".to_string(), package.library_source()),
+        (format!("include/{}.h", package.library), package.header(&package.exported(), "")),
         ("src/dynamics/mod.rs".to_string(), package.dynamics()),
     ];
     for item in &generated.items {
@@ -61,40 +61,28 @@ fn c_package(generated: &Generated, prefix: &str) -> Vec<(String, String)> {
 /// What chooses the vector instructions of the machine, pasted as it is.
 const DISPATCH: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/pasted/dispatch.rs"));
 
-/// The layouts of batches, with where component `c` of state `s` is.
-pub(super) const LAYOUTS: [(&str, &str); 2] = [("soa", "[c * n + s]"), ("aos", "[s * w + c], w numbers to a state")];
-
-pub(super) struct Package<'a> {
-    pub generated: &'a Generated,
-    pub prefix: &'a str,
-    library: String,
-}
-
-/// A function that C can call.
-pub(super) struct Exported {
-    /// Its name behind the prefix.
-    pub c_name: String,
-    /// The Rust function.
-    path: String,
-    summary: &'static str,
-    pub doc: String,
-    pub parameters: Vec<CParameter>,
-}
-
-/// A parameter of a C function.
-pub(super) struct CParameter {
-    pub name: String,
-    pub length: usize,
-    array: String,
-    pub is_output: bool,
-    /// Whether one value serves all states of a batch.
-    pub is_shared: bool,
+impl Exported {
+    /// The path of the Rust function.
+    fn path(&self) -> String {
+        match &self.mode {
+            None => format!("dynamics::{}", self.name),
+            Some(mode) => format!("dynamics::contact::{mode}::{}", self.name),
+        }
+    }
 }
 
 impl CParameter {
+    /// The type of the Rust array.
+    fn array(&self, scalar: Scalar) -> String {
+        match &self.port.wrapper {
+            Some(wrapper) => format!("dynamics::{wrapper}"),
+            None => array_type(&self.port, Style::plain(scalar)),
+        }
+    }
+
     /// The pointer as a reference to an array; one to no numbers at all may be null.
-    fn as_array(&self) -> String {
-        let CParameter { name, array, .. } = self;
+    fn as_array(&self, scalar: Scalar) -> String {
+        let (name, array) = (&self.name, self.array(scalar));
         match (self.length, self.is_output) {
             (0, false) => format!("    let {name} = {{ let _ = {name}; &[] }};\n"),
             (0, true) => format!("    let {name} = {{ let _ = {name}; &mut [] }};\n"),
@@ -104,41 +92,20 @@ impl CParameter {
     }
 
     /// The pointer as a slice of `n` states.
-    fn as_slice(&self) -> String {
+    fn as_slice(&self, scalar: Scalar) -> String {
         let CParameter { name, length, .. } = self;
         match (length, self.is_output) {
-            _ if self.is_shared => self.as_array(),
-            (0, _) => self.as_array(),
+            _ if self.is_shared => self.as_array(scalar),
+            (0, _) => self.as_array(scalar),
             (_, true) => {
                 format!("    let {name} = unsafe {{ core::slice::from_raw_parts_mut({name}, n * {length}) }};\n")
             }
             (_, false) => format!("    let {name} = unsafe {{ core::slice::from_raw_parts({name}, n * {length}) }};\n"),
         }
     }
-
-    /// The parameter of a C declaration: an array, of no numbers at all a pointer.
-    pub fn in_c(&self, c_type: &str) -> String {
-        let (constant, name) = (if self.is_output { "" } else { "const " }, &self.name);
-        match self.length {
-            0 => format!("{constant}{c_type} *{name}"),
-            n => format!("{constant}{c_type} {name}[{n}]"),
-        }
-    }
-
-    /// The same for many states.
-    pub fn of_states_in_c(&self, c_type: &str) -> String {
-        match self.is_shared {
-            true => self.in_c(c_type),
-            false => format!("{}{c_type} *{}", if self.is_output { "" } else { "const " }, self.name),
-        }
-    }
 }
 
-impl Package<'_> {
-    pub fn scalar(&self) -> Scalar {
-        self.generated.scalar
-    }
-
+impl Interface<'_> {
     /// The module of one function.
     fn function(&self, item: &Item) -> String {
         let types: String = item
@@ -150,10 +117,6 @@ impl Package<'_> {
         let uses = uses("super", item.calls_kernel(), self.generated) + &types;
         let gap = if uses.is_empty() { "" } else { "\n" };
         [&uses, gap, &item_text(item), &lanes_text(item, self.generated.lanes)].concat()
-    }
-
-    pub fn provenance(&self) -> String {
-        format!("straightline {} from {}; do not edit.", crate::VERSION, comment(&self.generated.provenance.source))
     }
 
     fn manifest(&self) -> String {
@@ -209,39 +172,8 @@ overflow-checks = false
         out
     }
 
-    /// The functions that C can call: the robot's, then those of its contact modes.
-    pub fn exported(&self) -> Vec<Exported> {
-        let of_robot = self.generated.items.iter().map(|item| self.export(item, "", item.function.summary()));
-        let of_modes = self.generated.contact.iter().flat_map(|mode| {
-            mode.items.iter().map(|item| self.export(item, &mode.identifier, item.function.summary()))
-        });
-        of_robot.chain(of_modes).collect()
-    }
-
-    /// A function of the robot, or of a contact mode.
-    fn export<F>(&self, item: &Item<F>, mode: &str, summary: &'static str) -> Exported {
-        let (c_name, path) = match mode {
-            "" => (item.name().to_string(), format!("dynamics::{}", item.name())),
-            mode => (format!("contact_{mode}_{}", item.name()), format!("dynamics::contact::{mode}::{}", item.name())),
-        };
-        let inputs = item.inputs().iter().map(|p| (p, false));
-        let ports = inputs.chain(item.outputs().iter().map(|p| (p, true)));
-        let parameter = |(port, is_output): (&Port, bool)| CParameter {
-            name: port.name.clone(),
-            length: port.len(),
-            array: match &port.wrapper {
-                Some(wrapper) => format!("dynamics::{wrapper}"),
-                None => array_type(port, Style::plain(self.scalar())),
-            },
-            is_output,
-            is_shared: port.wrapper.is_some(),
-        };
-        let parameters = ports.map(parameter).collect();
-        Exported { c_name, path, summary, doc: item.routine.doc.clone(), parameters }
-    }
-
     /// `src/lib.rs`: from pointers to arrays, and nothing else.
-    fn library(&self) -> String {
+    fn library_source(&self) -> String {
         let prefix = self.prefix;
         let joints = c_strings(self.generated.model.joints().iter().map(|j| j.name.as_str()));
         let frames = c_strings(self.generated.frames.iter().map(String::as_str));
@@ -320,11 +252,12 @@ fn name(names: &[&CStr], i: c_int) -> *const c_char {{
     /// The C function of one function.
     fn wrapper(&self, function: &Exported) -> String {
         let (prefix, scalar) = (self.prefix, self.scalar().name());
-        let Exported { c_name, path, summary, parameters, .. } = function;
-        let list = |f: &dyn Fn(&CParameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
+        let Exported { c_name, summary, parameters, .. } = function;
+        let path = function.path();
+        let list = |f: &dyn Fn(&CParameter) -> String| function.list(f);
         let signature = list(&|p| format!("{}: *{} {scalar}", p.name, if p.is_output { "mut" } else { "const" }));
         let arguments = list(&|p| p.name.to_string());
-        let arrays: String = parameters.iter().map(CParameter::as_array).collect();
+        let arrays: String = parameters.iter().map(|p| p.as_array(self.scalar())).collect();
         let lengths = list(&|p| format!("`{}` {}", p.name, p.length));
         format!(
             r#"
@@ -344,10 +277,11 @@ pub unsafe extern "C" fn {prefix}_{c_name}({signature}) {{
     /// The C functions over batches of one function.
     fn batches(&self, function: &Exported) -> String {
         let (prefix, scalar) = (self.prefix, self.scalar().name());
-        let Exported { c_name, path, parameters, .. } = function;
-        let list = |f: &dyn Fn(&CParameter) -> String| parameters.iter().map(f).collect::<Vec<_>>().join(", ");
+        let Exported { c_name, parameters, .. } = function;
+        let path = function.path();
+        let list = |f: &dyn Fn(&CParameter) -> String| function.list(f);
         let pointer = |p: &CParameter| format!("{}: *{} {scalar}", p.name, if p.is_output { "mut" } else { "const" });
-        let slices: String = parameters.iter().map(CParameter::as_slice).collect();
+        let slices: String = parameters.iter().map(|p| p.as_slice(self.scalar())).collect();
         let lengths = list(&|p| match p.is_shared {
             true => format!("`{}` {}", p.name, p.length),
             false => format!("`{}` n times {}", p.name, p.length),
@@ -375,25 +309,6 @@ pub unsafe extern "C" fn {prefix}_{c_name}_batch_{layout}(n: usize, {signature})
             );
         }
         out
-    }
-
-    /// The run-time parameters that functions take: name, type and number of scalars.
-    pub fn bodies(&self) -> Vec<Port> {
-        let mut bodies: Vec<Port> = Vec::new();
-        let of_modes = self.generated.contact.iter().flat_map(|mode| &mode.items).flat_map(Item::inputs);
-        for port in self.generated.items.iter().flat_map(Item::inputs).chain(of_modes) {
-            if port.wrapper.is_some() && !bodies.contains(port) {
-                bodies.push(port.clone());
-            }
-        }
-        bodies
-    }
-
-    /// The free numbers of a run-time parameter that is of a drive.
-    pub fn drive_numbers(&self, of: &Port) -> Option<&[DriveNumber]> {
-        let parameters = &self.generated.programs.parameters;
-        let found = parameters.iter().find(|p| Some(&p.type_name) == of.wrapper.as_ref())?;
-        found.numbers.as_ref().map(|numbers| &numbers.numbers[..])
     }
 
     /// The C function that makes a run-time parameter.

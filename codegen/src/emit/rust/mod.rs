@@ -2,7 +2,6 @@
 
 mod associated;
 mod batch;
-mod c_header;
 pub mod c_package;
 mod constants;
 mod contact;

@@ -155,7 +155,8 @@ fn drive(parameter: &ParameterType, drive: &str, numbers: &DriveNumbers, scalar:
     let nominal = list(numbers.nominal.iter().map(|x| number(scalar.nearest(*x), scalar)).collect());
     let checks = fields(&|n| {
         let (name, must) = (&n.name, n.quantity.at_run_time);
-        let condition = must.condition().replace('x', &format!("numbers.{name}"));
+        let comparisons = must.comparisons().iter().map(|(how, with)| format!("numbers.{name} {how} {with:?}"));
+        let condition = comparisons.collect::<Vec<_>>().join(" && ");
         format!("        check_number({name:?}, numbers.{name}, {condition}, {:?})?;\n", must.words().0)
     });
     let given = list(numbers.numbers.iter().map(|n| format!("numbers.{}", n.name)).collect());
