@@ -301,13 +301,14 @@ static robot_angle_f32 robot_next_angle_f32(robot_angle_f32 before, float x)
     return angle;
 }
 
-/*== sin_cos_of_sum_f32 */
+/*== turn_f32 */
 /* Sine and cosine of an angle. */
 typedef struct {
     float sine;
     float cosine;
 } robot_turn_f32;
 
+/*== sin_cos_of_sum_f32 */
 /* Within 0.771 ulp for |x| <= 51471, NaN beyond. */
 static robot_turn_f32 robot_sin_cos_of_sum_f32(robot_angle_f32 angle)
 {
@@ -364,6 +365,52 @@ static robot_turn_f32 robot_sin_cos_of_sum_f32(robot_angle_f32 angle)
 static robot_turn_f32 robot_sin_cos_f32(float x)
 {
     return robot_sin_cos_of_sum_f32(robot_first_angle_f32(x));
+}
+
+/*== short_kernel_f32 */
+/* Of y + k * pi/2, |y| <= pi/4: polynomials in y^2, an odd k exchanges the two, further quarter turns change signs. */
+static robot_turn_f32 robot_short_kernel_f32(float y, float shifted)
+{
+    const uint32_t quadrant = robot_to_bits_f32(shifted);
+    const float z = y * y;
+    const float s3 = -0.0001949454F;
+    const float s2 = 0.00833197F + (z * s3);
+    const float s1 = -0.16666651F + (z * s2);
+    const float c4 = 2.4437297e-5F;
+    const float c3 = -0.0013887358F + (z * c4);
+    const float c2 = 0.041666646F + (z * c3);
+    const float c1 = -0.5F + (z * c2);
+    const float sin_y = y + ((y * z) * s1);
+    const float cos_y = 1.0F + (z * c1);
+    const bool odd = (quadrant & UINT32_C(1)) != UINT32_C(0);
+    const bool half_turn = (quadrant & UINT32_C(2)) != UINT32_C(0);
+    const float sine = odd ? cos_y : sin_y;
+    const float cosine = odd ? -sin_y : cos_y;
+    robot_turn_f32 turn;
+    turn.sine = half_turn ? -sine : sine;
+    turn.cosine = half_turn ? -cosine : cosine;
+    return turn;
+}
+
+/*== short_sin_cos_f32 */
+/* Within 9.3e-8 for |x| <= 402; beyond, numbers without meaning. pi/2 in two parts. */
+static robot_turn_f32 robot_short_sin_cos_f32(float x)
+{
+    const float round = 12582912.0F; /* 1.5 * 2^23 */
+    const float shifted = (x * 0.63661975F) + round;
+    const float k = shifted - round;
+    return robot_short_kernel_f32((x - (k * 1.5703125F)) - (k * 0.0004838268F), shifted);
+}
+
+/*== short_sin_cos_of_sum_f32 */
+/* The same of a sum. */
+static robot_turn_f32 robot_short_sin_cos_of_sum_f32(robot_angle_f32 angle)
+{
+    const float round = 12582912.0F; /* 1.5 * 2^23 */
+    const float x = angle.sum;
+    const float shifted = (x * 0.63661975F) + round;
+    const float k = shifted - round;
+    return robot_short_kernel_f32((x - (k * 1.5703125F)) - ((k * 0.0004838268F) - angle.tail), shifted);
 }
 
 /*== sqrt_f32 */

@@ -1,5 +1,9 @@
 //! The words by which every front names what can be chosen: functions, scalars, rules, methods.
 
+pub mod machine;
+
+pub use machine::{Memory, TargetMachine};
+
 use crate::diagnostic::wording::did_you_mean;
 use crate::function::{ForwardDynamicsMethod, Function};
 use std::fmt;
@@ -152,6 +156,10 @@ choices! {
         "standalone" Standalone "core alone; the vector instructions that the crate is compiled for",
         "runtime" Runtime "the package `straightline`: the machine's instructions, and threads",
     }
+    Memory "memory" {
+        "flash" Flash "fetching takes time: fewest bytes, sines by calls",
+        "tcm" Tcm "fetching takes none: fewest cycles, sines in place",
+    }
     Fusion "way to fuse" {
         "std" Std "as the machine can, by std: the last bits depend on it then",
         "caller" Caller "always, by `mul_add_f64` of the crate around the output, which needs core alone",
@@ -177,6 +185,8 @@ mod tests {
         all::<LimbForm>();
         all::<Lanes>();
         all::<Fusion>();
+        all::<TargetMachine>();
+        all::<Memory>();
     }
 
     #[test]

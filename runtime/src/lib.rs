@@ -38,6 +38,8 @@
 //! | `rules = "exact"`: Which rewrite rules may be used: `"all"`, `"exact"` | `"all"` |
 //! | `forward_dynamics = "articulated-body"`: How forward dynamics is computed: `"cheaper"`, `"articulated-body"`, `"factorisation"` | `"cheaper"` |
 //! | `limbs = "auto"`: How identical limbs are computed: `"apart"`, `"lanes"`, `"auto"` | `"apart"` |
+//! | `target = "cortex-m4f"`: The machine that code is made for: short sines in f32 where it computes one angle at a time, and an order for its registers: `"cortex-m0plus"`, `"cortex-m3"`, `"cortex-m4f"`, `"cortex-m7"`, `"cortex-m33"`, `"rv32imac"`, `"rv32imafc"`, `"aarch64"`, `"x86-64-v3"` | any machine |
+//! | `memory = "tcm"`: The memory that code runs from on the machine of `target`: `"flash"`, `"tcm"` | `"flash"` |
 //! | `max_part_operations = 100`: Longer functions are cut into parts of at most so many operations | 12000 |
 //! | `certify_seconds = 0.5`: Certify bounds of errors, tighter ones, for so long per function and scalar type \[s]; bounds then depend on the machine | as long as it takes |
 //! | `certify_boxes = 40`: Certify bounds of errors, tighter ones: the ranges of each result are cut into so many boxes | 1, or as many as `certify_seconds` allows |

@@ -3,7 +3,16 @@
 //! Another one is a row, with the type that computes in it: a [`Real`] with the constants and conversions that f32 has.
 
 use straightline_core::magnitude::Magnitude;
-use straightline_core::{trig, Dd, Real};
+use straightline_core::{short_sines, trig, Dd, Real};
+
+/// Sines and cosines with an absolute error, for small angles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShortSines {
+    /// |computed − exact| is at most this.
+    pub error: f64,
+    /// For angles up to here \[rad\].
+    pub domain: f64,
+}
 
 macro_rules! operators {
     ($($Op:ident $op:ident $by:tt),+) => {
@@ -22,7 +31,7 @@ macro_rules! numbers {
     (($d:tt) $($(#[$doc:meta])* $Name:ident($type:ty) {
         name: $name:literal, description: $description:literal, module: $module:literal, c_name: $c_name:literal,
         c_suffix: $c_suffix:literal,
-        wider: $wider:expr, trig_ulps: $trig_ulps:literal, trig_domain: $trig_domain:expr, ridge: $ridge:literal,
+        wider: $wider:expr, trig_ulps: $trig_ulps:literal, trig_domain: $trig_domain:expr, short_sines: $short:expr, ridge: $ridge:literal,
         code_bytes: $code_bytes:expr $(,)?
     })+) => {
         /// The scalar type of generated code.
@@ -45,6 +54,7 @@ macro_rules! numbers {
             wider: $wider,
             trig_ulps: $trig_ulps,
             trig_domain: $trig_domain as f64,
+            short_sines: $short,
             ridge: $ridge,
             code_bytes: $code_bytes,
             nearest: |x| <$type as Real>::constant(x).into(),
@@ -122,6 +132,13 @@ macro_rules! numbers {
                 (EveryScalar { $($Name: $Name.0,)+ wide: wide.0 }, EveryScalar { $($Name: $Name.1,)+ wide: wide.1 })
             }
 
+            fn short_sin_cos_of_sum(angles: &[Self]) -> (Self, Self) {
+                $(#[allow(non_snake_case)]
+                let $Name = <$type>::short_sin_cos_of_sum(&angles.iter().map(|x| x.$Name).collect::<Vec<_>>());)+
+                let wide = Magnitude::short_sin_cos_of_sum(&angles.iter().map(|x| x.wide).collect::<Vec<_>>());
+                (EveryScalar { $($Name: $Name.0,)+ wide: wide.0 }, EveryScalar { $($Name: $Name.1,)+ wide: wide.1 })
+            }
+
             fn sqrt(self) -> Self {
                 let x = self;
                 every!(x => Real::sqrt(x))
@@ -169,14 +186,15 @@ numbers! { ($)
     /// Double precision.
     F64(f64) {
         name: "f64", description: "double precision", module: "double", c_name: "double", c_suffix: "", wider: None,
-        trig_ulps: 0.797, trig_domain: trig::DOMAIN_F64, ridge: 1e-12, code_bytes: [11.3, 398.0, 551.0],
+        trig_ulps: 0.797, trig_domain: trig::DOMAIN_F64, short_sines: None, ridge: 1e-12, code_bytes: [11.3, 398.0, 551.0],
     }
     /// Single precision.
     F32(f32) {
         name: "f32", description: "single precision", module: "single", c_name: "float", c_suffix: "F",
         wider: Some(Scalar::F64),
         // 0.801, and the 2^-32 more of sums of far angles
-        trig_ulps: 0.806, trig_domain: trig::DOMAIN_F32, ridge: 1e-6, code_bytes: [10.6, 406.0, 414.0],
+        trig_ulps: 0.806, trig_domain: trig::DOMAIN_F32,
+        short_sines: Some(ShortSines { error: short_sines::ERROR_F32, domain: short_sines::DOMAIN_F32 as f64 }), ridge: 1e-6, code_bytes: [10.6, 406.0, 414.0],
     }
 }
 
@@ -229,6 +247,8 @@ columns! {
     trig_ulps: f64,
     /// Sine and cosine answer up to here.
     trig_domain: f64,
+    /// What is proven of its [short sines](straightline_core::short_sines), if it has any.
+    short_sines: Option<ShortSines>,
     /// What is added to the diagonal of a matrix that may be singular, relative to it: far above rounding, far below what is meant.
     ridge: f64,
     /// Bytes of machine code on x86-64, as measured: of an operation, of a call for one sine and cosine, of one for several.
@@ -299,7 +319,8 @@ mod tests {
     /// All that a scalar does.
     fn computed<T: Real>(a: Dd, b: Dd) -> Vec<T> {
         let [a, b] = [a, b].map(T::constant);
-        let pairs = [a.sin_cos(), T::sin_cos_of_sum(&[a, b]), T::sin_cos_of_pair([b, a])];
+        let short = T::short_sin_cos_of_sum(&[b, a]);
+        let pairs = [a.sin_cos(), T::sin_cos_of_sum(&[a, b]), T::sin_cos_of_pair([b, a]), short];
         let ([u, v], [w, x]) = T::sin_cos_lanes_of_pairs([[a, b], [b, a]]);
         let own = [a + b, a - b, a * b, a / b, -a, a.sqrt(), b.sqrt(), a.sign(), b.sign(), u, v, w, x];
         pairs.into_iter().flat_map(|(s, c)| [s, c]).chain(own).collect()

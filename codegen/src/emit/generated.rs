@@ -7,7 +7,7 @@ use super::module::{Item, ModeModule, ParameterType, StagedModule, StateCertific
 use super::parameter::parameter_types;
 use super::staged::staged;
 use super::{rust, Lowering, Routine, Style};
-use crate::choices::Lanes;
+use crate::choices::{Lanes, Memory, TargetMachine};
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::equations::Robot;
 use crate::function::Judged;
@@ -68,6 +68,10 @@ pub struct Generated {
     pub plain_style: Style,
     /// Whether functions over lanes and batches stand beside the plain ones.
     pub lanes: Option<Lanes>,
+    /// The machine that it is made for.
+    pub target: Option<TargetMachine>,
+    /// The memory that it runs from there.
+    pub memory: Memory,
     /// Where it came from.
     pub provenance: Provenance,
     /// Its figures.
@@ -231,6 +235,8 @@ pub(crate) fn generate(
         style: options.style(),
         plain_style: options.plain_style(),
         lanes: options.lanes,
+        target: options.target,
+        memory: options.memory,
         provenance,
         report,
         warnings,

@@ -4,7 +4,7 @@ use super::Style;
 use crate::function::{ContactFunction, Function};
 use crate::program::staged::StageType;
 use crate::program::written::DriveNumbers;
-use straightline_graph::expr::{Binary, Constant, Port, Unary};
+use straightline_graph::expr::{Binary, Constant, Port, Sines, Unary};
 use straightline_graph::Scalar;
 
 /// A function of straight-line code, and the private ones that it calls one after the other where it is long.
@@ -108,8 +108,10 @@ pub enum Statement {
         /// The value.
         value: Expression,
     },
-    /// Sines and cosines of angles, each a sum of terms, by one call; locals for those that are used.
+    /// Sines and cosines of angles, each a sum of terms, by one call of a kernel; locals for those that are used. Short ones are of one angle.
     SinCos {
+        /// The kernel.
+        kernel: Sines,
         /// Locals of the sines.
         sines: Vec<Option<String>>,
         /// Locals of the cosines.
@@ -238,9 +240,9 @@ impl Statement {
 }
 
 impl Routine {
-    /// Whether it calls the kernel of sines, cosines and roots.
+    /// Whether it calls the kernel of precise sines, of cosines and roots.
     pub fn calls_kernel(&self) -> bool {
-        let mut is_pair = |s: &Statement| matches!(s, Statement::SinCos { .. });
+        let mut is_pair = |s: &Statement| matches!(s, Statement::SinCos { kernel: Sines::Precise, .. });
         let mut is_call = |e: &Expression| match e {
             Expression::Unary(op, _) => op.row().is_a_call(),
             Expression::Binary(op, ..) => op.row().is_a_call(),
@@ -248,6 +250,13 @@ impl Routine {
         };
         let here = !self.style.generic && self.body.iter().any(|s| s.any(&mut is_pair, &mut is_call));
         here || self.parts.iter().any(Routine::calls_kernel)
+    }
+
+    /// Whether it calls the kernel of short sines.
+    pub fn calls_short_sines(&self) -> bool {
+        let mut is_pair = |s: &Statement| matches!(s, Statement::SinCos { kernel: Sines::Short, .. });
+        self.body.iter().any(|s| s.any(&mut is_pair, &mut |_| false))
+            || self.parts.iter().any(Routine::calls_short_sines)
     }
 
     /// The same for its own output alone.
@@ -291,10 +300,18 @@ impl<F> Item<F> {
         &self.routine.ports.outputs
     }
 
-    /// Whether one of its forms calls the kernel of sines, cosines and roots.
+    /// Whether one of its forms calls the kernel of precise sines, of cosines and roots.
     pub fn calls_kernel(&self) -> bool {
-        let bound = self.bound.iter().flatten();
-        [&self.routine].into_iter().chain(bound).chain(&self.lanes).any(Routine::calls_kernel)
+        self.forms().any(Routine::calls_kernel)
+    }
+
+    /// Whether one of its forms calls the kernel of short sines.
+    pub fn calls_short_sines(&self) -> bool {
+        self.forms().any(Routine::calls_short_sines)
+    }
+
+    fn forms(&self) -> impl Iterator<Item = &Routine> {
+        [&self.routine].into_iter().chain(self.bound.iter().flatten()).chain(&self.lanes)
     }
 }
 

@@ -22,7 +22,7 @@ pub(super) fn staged(
 ) -> Result<(StagedModule, StagedReport, Option<Plainer>, WrittenStages), Disagreement> {
     let (programs, plainer) = programs(robot, frames, options)?;
     let private = |graph: &Graph, name: &str, doc: &str| {
-        lowering.routine(graph, &schedule(graph, options.limits), name, doc).private()
+        lowering.routine(graph, &schedule(graph, options.limits, options.registers()), name, doc).private()
     };
     let storing = programs.stages.iter().take(programs.stages.len() - 1).zip(&programs.staged.stages);
     let values = storing.map(|(stage, graph)| {

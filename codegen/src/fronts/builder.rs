@@ -21,7 +21,7 @@
 //! The build runs again when the robot file changes. Complaints name the file, the line and the column: errors end the
 //! build, warnings do not. Nothing is written outside `OUT_DIR`.
 
-use crate::choices::{Fusion, Lanes, LimbForm};
+use crate::choices::{Fusion, Lanes, LimbForm, Memory, TargetMachine};
 use crate::compile::compile;
 use crate::diagnostic::{Diagnostic, Diagnostics, Front, Reporting, Severity, Source};
 use crate::emit::Generated;
@@ -225,6 +225,10 @@ options! {
     limbs(form: LimbForm) = form;
     /// How forward dynamics is computed; otherwise the cheaper way for this robot.
     forward_dynamics(method: ForwardDynamicsMethod) = method;
+    /// The machine that the code is made for; otherwise any.
+    target(machine: TargetMachine) = machine;
+    /// The memory that it runs from there; otherwise flash.
+    memory(memory: Memory) = memory;
     /// Functions of more operations are cut into parts.
     max_part_operations(operations: usize) = operations;
     /// Whether the root link moves freely in the world.

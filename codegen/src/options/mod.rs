@@ -12,7 +12,7 @@ pub use optimisations::{FormChoices, Optimisations};
 pub use scene_file::SceneFile;
 pub use value::{GivenOptions, OptionValue};
 
-use crate::choices::{Lanes, LimbForm};
+use crate::choices::{Lanes, LimbForm, Memory, TargetMachine};
 use crate::description;
 use crate::description::drives::WrittenDrive;
 use crate::diagnostic::{Diagnostics, Reporting, Source};
@@ -71,6 +71,10 @@ options! {
     forward_dynamics "forward_dynamics": ForwardDynamicsMethod = ForwardDynamicsMethod::default(),
     /// How identical limbs are computed.
     limbs "limbs": LimbForm = LimbForm::default(),
+    /// The machine that code is made for; none: any.
+    target "target": Option<TargetMachine> = None,
+    /// The memory that it runs from there.
+    memory "memory": Memory = Memory::default(),
     /// How long one function may be.
     limits "limits": ScheduleLimits = ScheduleLimits::default(),
     /// How the robot file is read.
@@ -103,6 +107,19 @@ impl Options {
     /// The same with the drives as they were read.
     pub(crate) fn knowing_drives(&self, drives: &[WrittenDrive]) -> Options {
         Options { scene: self.scene.knowing(drives), ..self.clone() }
+    }
+
+    /// Whether the sines of a function are short ones, if its angles are small: a machine that computes one angle at a time, and numbers of one
+    /// format without fused operations, so that one kernel serves all forms of the function.
+    pub fn wants_short_sines(&self, function: Function) -> bool {
+        let is_mixed = self.scene.budgets.get(&function).is_some_and(|budget| budget.mixed_precision);
+        let is_plain = !(self.fma || self.generic || self.lanes.is_some() || is_mixed);
+        self.target.is_some_and(|machine| machine.row().is_scalar) && is_plain && self.grade == Grade::Algebraic
+    }
+
+    /// How many numbers the registers of the machine hold, if it is known.
+    pub fn registers(&self) -> Option<usize> {
+        self.target.and_then(|machine| machine.row().registers)
     }
 
     /// The optimisations that these options allow.

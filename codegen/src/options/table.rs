@@ -6,7 +6,7 @@
 
 use super::value::{OptionValue, Vocabulary};
 use super::Options;
-use crate::choices::{Fusion, Lanes, LimbForm};
+use crate::choices::{Fusion, Lanes, LimbForm, Memory, TargetMachine};
 use crate::diagnostic::Level;
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::scene::MaxError;
@@ -172,6 +172,12 @@ pub static TABLE: &[OptionRow] = &[
     OptionRow { name: "limbs", kind: Word(Vocabulary::of::<LimbForm>(), None), default: "apart", metavar: "FORM",
         doc: "How identical limbs are computed",
         also: "outputs", example: &["auto"], hash: &["limbs"], set: |options, value| options.limbs = value.choice(), ..OF },
+    OptionRow { name: "target", kind: Word(Vocabulary::of::<TargetMachine>(), None), default: "any machine", metavar: "MACHINE",
+        doc: "The machine that code is made for: short sines in f32 where it computes one angle at a time, and an order for its registers",
+        example: &["cortex-m4f"], hash: &["target"], set: |options, value| options.target = Some(value.choice()), ..OF },
+    OptionRow { name: "memory", kind: Word(Vocabulary::of::<Memory>(), None), default: "flash", metavar: "MEMORY",
+        doc: "The memory that code runs from on the machine of `target`",
+        example: &["tcm"], hash: &["memory"], set: |options, value| options.memory = value.choice(), ..OF },
     OptionRow { name: "max_part_operations", kind: Whole("a whole number from 100", |n| n >= 100.0), default: "12000", metavar: "N",
         doc: "Longer functions are cut into parts of at most so many operations",
         example: &["100"], hash: &["limits", "operations"], set: |options, value| options.limits.operations = value.count(), ..OF },

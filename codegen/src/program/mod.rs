@@ -12,6 +12,7 @@ pub mod parameter;
 pub mod pivots;
 mod plainer;
 pub mod range;
+mod sines;
 pub mod staged;
 pub mod written;
 
@@ -70,10 +71,11 @@ pub fn checked(
     options: &Options,
 ) -> Result<TracedProgram, Disagreement> {
     let ((graph, method), plainer) = options.optimisations().first_that_agrees(|optimisations| {
-        let made = optimised_with(robot, frames, function, options, optimisations);
+        let (graph, method) = optimised_with(robot, frames, function, options, optimisations);
+        let made = (sines::with_sines(graph, function, &robot.model, options), method);
         equivalence::of_function(robot, frames, function, options, optimisations, &made.0).map(|()| made)
     })?;
-    let schedule = schedule(&graph, options.limits);
+    let schedule = schedule(&graph, options.limits, options.registers());
     Ok(TracedProgram { function, graph, schedule, method, plainer })
 }
 

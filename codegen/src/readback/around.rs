@@ -18,6 +18,7 @@ mod parameters;
 
 /// The sources of what is pasted.
 const TRIG: &str = straightline_core::sources::TRIG;
+const SHORT_SINES: &str = straightline_core::sources::SHORT_SINES;
 const BATCH: &str = straightline_core::sources::BATCH;
 
 /// Checksums of what is the same in all files, in f64: what changes there has to be looked at, and written here again.
@@ -202,7 +203,7 @@ impl Around<'_, '_, '_> {
             }
             item.claimed.set(true);
         }
-        for (name, source) in [(t::TRIG, TRIG), (t::BATCH, BATCH)] {
+        for (name, source) in [(t::TRIG, TRIG), (t::SHORT_SINES, SHORT_SINES), (t::BATCH, BATCH)] {
             let Some(item) = items.find(self.root, Sort::Given, name) else { continue };
             self.pasted(item, source)?;
             item.claimed.set(true);
@@ -231,7 +232,7 @@ impl Around<'_, '_, '_> {
         let (from, to) = (items.tokens[open].end as usize, items.tokens[item.end - 1].start as usize);
         fn lines(text: &str) -> impl Iterator<Item = &str> {
             let is_code = |line: &&str| !line.is_empty() && !line.starts_with("//");
-            let same = |line| if line == "#[inline(always)]" { "#[inline]" } else { line };
+            let same = |line| if matches!(line, "#[inline(always)]" | "#[inline(never)]") { "#[inline]" } else { line };
             text.lines().map(str::trim).filter(is_code).map(same)
         }
         // what fused functions alone need may be left out
@@ -256,10 +257,10 @@ impl Around<'_, '_, '_> {
         let items = self.items;
         let root = self.root;
         let has = |name| items.find(root, Sort::Given, name).is_some();
-        let (trig, fused) = (has(t::TRIG), has(t::FUSED_MODULE));
+        let (trig, short_sines, fused) = (has(t::TRIG), has(t::SHORT_SINES), has(t::FUSED_MODULE));
         let number = items.find(root, Sort::Function, t::NUMBER).is_some();
         let mut known: FxHashMap<usize, KnownNames> = FxHashMap::default();
-        let of_root = KnownNames { trig, fused: [fused, false, false], generic: false };
+        let of_root = KnownNames { trig, short_sines, fused: [fused, false, false], generic: false };
         known.insert(root, of_root);
         for item in items.all.iter().filter(|item| item.sort == Sort::Use) {
             let above = |n: usize| (0..n).fold(item.module, |m, _| items.modules[m].parent);

@@ -66,6 +66,8 @@ struct Local {
 pub struct KnownNames {
     /// The module `trig`.
     pub trig: bool,
+    /// The module `short_sines`.
+    pub short_sines: bool,
     /// The module `fused`, and its functions `fma` and `fma_if`.
     pub fused: [bool; 3],
     /// The trait `Real`, the type `Dd`, and `number`.

@@ -47,7 +47,7 @@ words! {
     MOD = "mod", STRUCT = "struct", ENUM = "enum", IMPL = "impl", SUPER = "super", AS = "as", UNDERSCORE = "_",
     F32 = "f32", F64 = "f64", USIZE = "usize", BOOL = "bool", T = "T", REAL = "Real",
     ZERO = "zero", CONSTANT = "constant", NUMBER = "number",
-    N = "N", FUSED = "FUSED", FMA = "fma", FMA_IF = "fma_if", FUSED_MODULE = "fused", TRIG = "trig", BATCH = "batch",
+    N = "N", FUSED = "FUSED", FMA = "fma", FMA_IF = "fma_if", FUSED_MODULE = "fused", TRIG = "trig", SHORT_SINES = "short_sines", BATCH = "batch",
     COST = "Cost", UNPHYSICAL = "Unphysical", CHECK_INERTIA = "check_inertia",
     OUT_OF_RANGE = "OutOfRange", CHECK_NUMBER = "check_number",
     ALLOW = "allow", DOC = "doc", DERIVE = "derive", INLINE = "inline", MUST_USE = "must_use", REPR = "repr",

@@ -4,7 +4,7 @@
 //! terms of one operation change places. Nothing else is taken as equal: (a + b) + c is not a + (b + c).
 
 use rustc_hash::FxHashMap;
-use straightline_graph::expr::{Binary, Graph, NodeId, Op, Unary};
+use straightline_graph::expr::{Binary, Graph, NodeId, Op, Sines, Unary};
 use straightline_graph::Scalar;
 
 /// In which format a value is computed.
@@ -185,10 +185,10 @@ impl Values {
         angle
     }
 
-    /// Sine and cosine of an angle.
-    pub fn sin_cos(&mut self, angle: TextValue) -> (TextValue, TextValue) {
+    /// Sine and cosine of an angle, by this kernel.
+    pub fn sin_cos(&mut self, angle: TextValue, sines: Sines) -> (TextValue, TextValue) {
         let format = self.format(angle);
-        let mut of = |what| TextValue::new(self.get(what, format, angle.0, 0), false);
+        let mut of = |what| TextValue::new(self.get(what, format, angle.0, sines as u32), false);
         (of(ValueKind::Sin), of(ValueKind::Cos))
     }
 
@@ -244,8 +244,8 @@ impl Values {
                 // formed where its sine is
                 Op::AngleSum(..) => TextValue::NONE,
                 Op::SinCos(a) => self.angle(graph.angle_terms(a).into_iter().map(|term| values[term.index()])),
-                Op::Sin(a) => self.sin_cos(values[a.index()]).0,
-                Op::Cos(a) => self.sin_cos(values[a.index()]).1,
+                Op::Sin(a) => self.sin_cos(values[a.index()], graph.sines).0,
+                Op::Cos(a) => self.sin_cos(values[a.index()], graph.sines).1,
             };
             let is_operation = !matches!(op, Op::Input(_) | Op::Constant(_));
             values.push(if computed != held && is_operation { self.rounded(value) } else { value });

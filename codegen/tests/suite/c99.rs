@@ -325,6 +325,16 @@ fn parameters_contacts_and_bounds_have_the_bits_of_their_programs() {
 }
 
 #[test]
+fn short_sines_have_the_bits_of_their_program() {
+    let target = Some(TargetMachine::CORTEX_M4F);
+    for name in ["panda.urdf", "ur5.urdf"] {
+        let package = Package::new(name, &robot(name), &Options { target, ..in_scalar(Scalar::F32) });
+        assert!(package.text().contains("short_sin_cos_f32(") && !package.text().contains(" dyn_sin_cos_f32("));
+        package.is_right(100);
+    }
+}
+
+#[test]
 fn mixed_precision_has_the_bits_of_its_program() {
     let mut options = Options { scalar: Scalar::F32, functions: vec![Function::InverseDynamics], ..Options::default() };
     options.scene.ranges.qd = JointRanges::All(InputRange::within(0.5));

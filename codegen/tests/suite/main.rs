@@ -21,6 +21,7 @@ mod forward_dynamics_bounds;
 mod guide;
 mod layers;
 mod limbs;
+mod machines;
 mod malformed;
 mod messages;
 mod mixed;

@@ -33,6 +33,7 @@ pub mod real;
 pub mod reduced;
 #[cfg(feature = "reference")]
 pub mod reference;
+pub mod short_sines;
 pub mod sources;
 pub mod spatial;
 pub mod taylor;

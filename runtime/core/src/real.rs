@@ -4,7 +4,7 @@
 //! model, so the same source computes with numbers and writes down equations.
 
 use crate::dd::Dd;
-use crate::trig;
+use crate::{short_sines, trig};
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -45,6 +45,12 @@ pub trait Real:
             [angle] => angle.sin_cos(),
             angles => Self::sin_cos_of_pair(Self::sum_of_angles(angles)),
         }
+    }
+
+    /// As [`Real::sin_cos_of_sum`], by the [short sines](crate::short_sines) where the format has them.
+    #[inline(always)]
+    fn short_sin_cos_of_sum(angles: &[Self]) -> (Self, Self) {
+        Self::sin_cos_of_sum(angles)
     }
 
     /// [`Real::sin_cos`] of several angles: the same bits, faster where numbers have vector instructions.
@@ -99,7 +105,7 @@ pub trait Real:
 
 /// A floating-point number of the machine, by its functions in `trig.rs`.
 macro_rules! machine {
-    ($($T:ident $rounded:ident $sin_cos:ident $of_sum:ident $lanes:ident $lanes_of_sums:ident $sqrt:ident $sign:ident,)+) => {$(
+    ($($T:ident $rounded:ident $sin_cos:ident $of_sum:ident $lanes:ident $lanes_of_sums:ident $sqrt:ident $sign:ident $($short:ident)?,)+) => {$(
         impl Real for $T {
             #[inline]
             fn constant(value: Dd) -> Self {
@@ -129,6 +135,12 @@ macro_rules! machine {
             fn sin_cos_lanes_of_pairs<const N: usize>(sums: [[Self; 2]; N]) -> ([Self; N], [Self; N]) {
                 trig::$lanes_of_sums(sums)
             }
+            $(fn $short(angles: &[Self]) -> (Self, Self) {
+                match angles {
+                    [angle] => short_sines::sin_cos_f32(*angle),
+                    angles => short_sines::sin_cos_of_sum_f32(Self::sum_of_angles(angles)),
+                }
+            })?
             #[inline]
             fn sqrt(self) -> Self {
                 trig::$sqrt(self)
@@ -143,7 +155,7 @@ macro_rules! machine {
 
 machine! {
     f64 to_f64 sin_cos_f64 sin_cos_of_sum_f64 sin_cos_lanes_f64 sin_cos_lanes_of_sums_f64 sqrt_f64 sign_f64,
-    f32 to_f32 sin_cos_f32 sin_cos_of_sum_f32 sin_cos_lanes_f32 sin_cos_lanes_of_sums_f32 sqrt_f32 sign_f32,
+    f32 to_f32 sin_cos_f32 sin_cos_of_sum_f32 sin_cos_lanes_f32 sin_cos_lanes_of_sums_f32 sqrt_f32 sign_f32 short_sin_cos_of_sum,
 }
 
 impl Real for Dd {

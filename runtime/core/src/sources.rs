@@ -3,5 +3,7 @@
 
 /// [`crate::trig`].
 pub const TRIG: &str = include_str!("trig.rs");
+/// [`crate::short_sines`].
+pub const SHORT_SINES: &str = include_str!("short_sines.rs");
 /// [`crate::batch`].
 pub const BATCH: &str = include_str!("batch.rs");

@@ -27,7 +27,7 @@ pub fn state_bound(graph: &Graph, scalar: Scalar, bits: Bits) -> Result<Graph, &
     if !graph.formats.is_empty() && graph.inputs.iter().any(|p| p.wrapper.is_some()) {
         return Err("parameters that are inputs are in f32, and the bound of mixed precision is in f64");
     }
-    let format = FloatFormat::of(scalar);
+    let format = FloatFormat::of_program(graph, scalar);
     let ports = graph.inputs.clone();
     let program = match (graph.formats.is_empty(), bits) {
         (true, Bits::Plain) => Running::new(ports, format),
@@ -43,5 +43,6 @@ pub(super) fn bound_of(mut p: Running, graph: &Graph) -> Result<Graph, &'static 
     let errors = p.follow(graph, &inputs).into_iter().map(|r| r.error.unwrap_or(zero)).collect::<Vec<_>>();
     let errors = p.all_settled(&errors);
     let outputs = graph.outputs.iter().map(|p| Port::new(&format!("{}{OF_ERROR}", p.name), &p.shape)).collect();
-    p.finish(outputs, errors).ok_or("its own roundings would count")
+    let bound = p.finish(outputs, errors).ok_or("its own roundings would count")?;
+    Ok(Graph { sines: graph.sines, ..bound })
 }

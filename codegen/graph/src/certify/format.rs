@@ -1,7 +1,8 @@
 //! What rounding to a number format can do: the standard model with the binade of the result.
 
 use super::interval::{add_up, norm_up, Interval};
-use crate::number::Scalar;
+use crate::expr::{Graph, Sines};
+use crate::number::{Scalar, ShortSines};
 use straightline_core::Dd;
 
 /// The bound of the cosine kernel, in both formats \[ulp\]: see `trig.rs`; of sums of far angles in f32 2^-32 more.
@@ -20,6 +21,8 @@ pub struct FloatFormat {
     pub largest: f64,
     /// Error of sine and cosine \[ulp\]: see `trig.rs`.
     pub trig_ulps: f64,
+    /// Error of sine and cosine besides, whatever their size.
+    pub trig_absolute: f64,
     /// Sine and cosine answer up to here.
     pub trig_domain: f64,
 }
@@ -33,8 +36,25 @@ impl FloatFormat {
             tiny: scalar.tiny(),
             largest: scalar.largest(),
             trig_ulps: scalar.trig_ulps(),
+            trig_absolute: 0.0,
             trig_domain: scalar.trig_domain(),
         }
+    }
+
+    /// The format of a scalar type, with the sines of this program.
+    pub fn of_program(graph: &Graph, scalar: Scalar) -> Self {
+        let short = scalar.short_sines().filter(|_| graph.sines == Sines::Short);
+        match short {
+            None => FloatFormat::of(scalar),
+            Some(ShortSines { error, domain }) => {
+                FloatFormat { trig_ulps: 0.0, trig_absolute: error, trig_domain: domain, ..FloatFormat::of(scalar) }
+            }
+        }
+    }
+
+    /// What of the error of a sine or cosine grows with its size \[u\], and what does not.
+    pub fn trig_parts(&self) -> (f64, f64) {
+        ((self.trig_ulps * self.u).next_up(), add_up(self.trig_absolute, self.tiny))
     }
 
     /// The least power of two that is at least x > 0.
@@ -62,12 +82,17 @@ impl FloatFormat {
     /// Error of a sine or cosine whose exact value is at most `magnitude`.
     pub fn trig_error(&self, magnitude: f64) -> f64 {
         // an ulp in the binade below 2^e is 2 u 2^(e − 1)
-        add_up((self.trig_ulps * self.u).next_up() * FloatFormat::binade(magnitude.min(1.0)), self.tiny)
+        let (unit, absolute) = self.trig_parts();
+        add_up(unit * FloatFormat::binade(magnitude.min(1.0)), absolute)
     }
 
     /// √(e_s² + e_c²) of the errors of sine and cosine of one angle: one is at most √½ and comes from the sine kernel or is
     /// at least √½ and comes from the cosine kernel; both lie below 1, where an ulp is at most 2u.
     pub fn pair_error(&self) -> f64 {
+        if self.trig_absolute > 0.0 {
+            let each = self.trig_error(1.0);
+            return norm_up([each, each]);
+        }
         let sine = (self.trig_ulps * self.u).next_up();
         let cosine = (COSINE_KERNEL_ULPS * self.u).next_up();
         add_up(norm_up([sine, cosine]), 2.0 * self.tiny)

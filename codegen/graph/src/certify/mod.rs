@@ -150,7 +150,7 @@ pub fn certify_with(
     effort: Effort,
     known: &KnownSystem,
 ) -> Result<Certificate, NoCertificate> {
-    let mut analysis = ErrorAnalysis::new(graph, FloatFormat::of(scalar));
+    let mut analysis = ErrorAnalysis::new(graph, FloatFormat::of_program(graph, scalar));
     analysis.know(known);
     let mut bounds = subdivision::bounds(&mut analysis, inputs, effort)?;
     // half u of a value, at least, was counted as its rounding

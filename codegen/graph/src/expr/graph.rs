@@ -257,6 +257,18 @@ pub struct Graph {
     pub formats: Vec<Precision>,
     /// Stretches that may be written as loops over limbs. Passes, again, come before.
     pub alike: Vec<Alike>,
+    /// By which kernel its sines and cosines are computed. Passes, again, come before.
+    pub sines: Sines,
+}
+
+/// A kernel of sines and cosines.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sines {
+    /// Every digit, in the whole domain: `straightline_core::trig`.
+    #[default]
+    Precise,
+    /// An absolute error, for angles that are known to be small: `straightline_core::short_sines`.
+    Short,
 }
 
 /// Operation counts. Sign flips and signs are free; `sin_cos` counts angles. The sum of two angles is an addition; what keeps
@@ -335,6 +347,7 @@ impl Graph {
     pub(crate) fn expect_plain(&self, pass: &str) {
         assert!(self.formats.is_empty(), "`{pass}` would lose the formats of values: mix precisions after it");
         assert!(self.alike.is_empty(), "`{pass}` would lose the loops over limbs: write limbs out after it");
+        assert!(self.sines == Sines::Precise, "`{pass}` would lose the kernel of sines: choose it after it");
     }
 
     /// The operation of a node.

@@ -1,6 +1,6 @@
 //! Runs a graph over any scalar.
 
-use super::{Graph, NodeId, Op};
+use super::{Graph, NodeId, Op, Sines};
 use straightline_core::Real;
 
 /// The results of a graph for these inputs (group after group), as many as the graph has results.
@@ -8,7 +8,11 @@ use straightline_core::Real;
 /// # Panics
 /// If the number of inputs is not the graph's.
 pub fn evaluate<T: Real>(graph: &Graph, inputs: &[T]) -> Vec<T> {
-    evaluate_by(graph, inputs, |_, _| None, T::sin_cos_of_sum)
+    let sin_cos = match graph.sines {
+        Sines::Precise => T::sin_cos_of_sum,
+        Sines::Short => T::short_sin_cos_of_sum,
+    };
+    evaluate_by(graph, inputs, |_, _| None, sin_cos)
 }
 
 /// [`evaluate`] where some operations are computed otherwise: `other` gives the value of a node from those before it, or

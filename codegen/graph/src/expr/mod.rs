@@ -15,7 +15,7 @@ mod verify;
 
 pub use builder::GraphBuilder;
 pub use gradient::gradient;
-pub use graph::{Alike, Constant, Counts, Graph, NodeId, Note, Op, Port, Precision, Section, DIVISION, TAIL};
+pub use graph::{Alike, Constant, Counts, Graph, NodeId, Note, Op, Port, Precision, Section, Sines, DIVISION, TAIL};
 pub(crate) use interpret::of_rounded_sum;
 pub use interpret::{evaluate, evaluate_by, values, values_by};
 pub use op::{Binary, Unary};

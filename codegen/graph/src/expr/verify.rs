@@ -1,6 +1,6 @@
 //! What every graph must be, checked between passes.
 
-use super::{Graph, NodeId, Op};
+use super::{Graph, NodeId, Op, Sines};
 
 /// Checks that operands stand before users, that inputs and results exist, that only `Sin` and `Cos` use a `SinCos`,
 /// that there is a result per output scalar and a note per node, and that rows for several limbs have the same operation for each.
@@ -49,6 +49,9 @@ pub fn verify(graph: &Graph) -> Result<(), String> {
         if row.len() != limbs || !row.iter().all(is_alike) {
             return Err(format!("the row {row:?} is not the same operation for {limbs} limbs"));
         }
+    }
+    if graph.sines == Sines::Short && !graph.formats.is_empty() {
+        return Err("short sines in mixed precision".to_string());
     }
     let outputs: usize = graph.outputs.iter().map(|p| p.len()).sum();
     if graph.results.len() != outputs {

@@ -1,7 +1,7 @@
 //! Passes: each takes a graph and returns a graph that computes the same results.
 //!
-//! They make other nodes. What is said of single nodes besides their [notes](crate::expr::Note), the formats of mixed precision and loops over
-//! limbs, is therefore chosen after them, and a pass refuses a graph that has any.
+//! They make other nodes. What is said of single nodes besides their [notes](crate::expr::Note), the formats of mixed precision, loops over
+//! limbs and the kernel of sines, is therefore chosen after them, and a pass refuses a graph that has any.
 
 pub mod cut;
 mod dead_code;
@@ -18,7 +18,7 @@ pub use unread_inputs::unread_inputs;
 
 #[cfg(test)]
 mod tests {
-    use crate::expr::{gradient, Alike, Graph, GraphBuilder, Op, Port, Precision, RuleSet};
+    use crate::expr::{gradient, Alike, Graph, GraphBuilder, Op, Port, Precision, RuleSet, Sines};
     use crate::number::Scalar;
     use std::panic::catch_unwind;
 
@@ -34,16 +34,17 @@ mod tests {
     ];
 
     #[test]
-    fn no_pass_loses_formats_or_loops_without_a_word() {
+    fn no_pass_loses_formats_loops_or_sines_without_a_word() {
         let mut b = GraphBuilder::new(RuleSet::all(), vec![Port::new("x", &[1])]);
         let x = b.insert(Op::Input(0));
         let square = b.insert(Op::mul(x, x));
         let plain = b.finish(vec![Port::new("y", &[1])], vec![square]);
         let mixed = Graph { formats: vec![Precision::of(Scalar::F32); 2], ..plain.clone() };
         let looped = Graph { alike: vec![Alike { limbs: vec![0], rows: vec![vec![square]] }], ..plain.clone() };
+        let short = Graph { sines: Sines::Short, ..plain.clone() };
         for (name, pass) in PASSES {
             pass(&plain);
-            for (graph, lost) in [(&mixed, "formats"), (&looped, "loops")] {
+            for (graph, lost) in [(&mixed, "formats"), (&looped, "loops"), (&short, "sines")] {
                 let panic = catch_unwind(|| pass(graph)).expect_err(name);
                 let message = panic.downcast_ref::<String>().expect("a promise in words");
                 assert!(message.contains(name) && message.contains(lost), "{name}: {message}");

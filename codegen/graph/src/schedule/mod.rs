@@ -61,12 +61,12 @@ fn weight(op: Op) -> usize {
 }
 
 /// Orders and cuts a graph. Operations keep the order in which the algorithm wrote them, unless many values would go through
-/// memory; so do programs that are cut.
-pub fn schedule(graph: &Graph, limits: ScheduleLimits) -> Schedule {
+/// memory; so do programs that are cut. How many numbers the registers hold is told where the machine is known.
+pub fn schedule(graph: &Graph, limits: ScheduleLimits, registers: Option<usize>) -> Schedule {
     let mut order: Vec<NodeId> = graph.ids().filter(|id| is_value(graph.op(*id))).collect();
     let limits = if graph.alike.is_empty() { limits } else { ScheduleLimits { operations: usize::MAX } };
     if graph.alike.is_empty() && order.iter().map(|id| weight(graph.op(*id))).sum::<usize>() <= limits.operations {
-        order = few_alive::improved(graph, order);
+        order = few_alive::improved(graph, order, registers);
     }
     let position = {
         let mut position = vec![usize::MAX; graph.ops.len()];

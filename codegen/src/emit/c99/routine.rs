@@ -9,7 +9,7 @@ use crate::emit::module::{Access, Expression, Index, Routine, RoutineParameter, 
 use crate::emit::target::{Binding, Scope, Target};
 use std::collections::BTreeMap;
 use straightline_graph::expr::op::Text;
-use straightline_graph::expr::Port;
+use straightline_graph::expr::{Port, Sines};
 use straightline_graph::Scalar;
 
 /// How long a line of numbers may be.
@@ -173,14 +173,14 @@ impl C99<'_> {
                 values.iter().map(|(name, slot)| line(format!("const {scalar} {name} = live[{slot}];"))).collect()
             }
             Statement::Keep { slot, value } => line(format!("live[{slot}] = {};", expression(value))),
-            Statement::SinCos { sines, cosines, angles } => {
+            Statement::SinCos { kernel, sines, cosines, angles } => {
                 let turn = turn(routine);
                 let half = |name: &Option<String>, half: &str| match name {
                     Some(name) => line(format!("const {scalar} {name} = {turn}.{half};")),
                     None => String::new(),
                 };
                 let pairs = sines.iter().zip(cosines).zip(angles).map(|((sine, cosine), terms)| {
-                    line(format!("{turn} = {};", self.sin_cos(terms, scope)))
+                    line(format!("{turn} = {};", self.sin_cos(*kernel, terms, scope)))
                         + &half(sine, "sine")
                         + &half(cosine, "cosine")
                 });
@@ -203,15 +203,19 @@ impl C99<'_> {
     }
 
     /// The kernel's call for one angle; a sum goes through with what its rounding lost.
-    fn sin_cos(&self, terms: &[Expression], scope: Scope<'_>) -> String {
+    fn sin_cos(&self, kernel: Sines, terms: &[Expression], scope: Scope<'_>) -> String {
         let expression = |e: &Expression| self.expression(e, scope);
+        let [of_one, of_sum] = match kernel {
+            Sines::Precise => ["sin_cos", "sin_cos_of_sum"],
+            Sines::Short => ["short_sin_cos", "short_sin_cos_of_sum"],
+        };
         match terms {
-            [angle] => self.call("sin_cos", &[expression(angle)], scope),
+            [angle] => self.call(of_one, &[expression(angle)], scope),
             terms => {
                 let first = self.call("first_angle", &[expression(&terms[0])], scope);
                 let sum =
                     terms[1..].iter().fold(first, |sum, term| self.call("next_angle", &[sum, expression(term)], scope));
-                self.call("sin_cos_of_sum", &[sum], scope)
+                self.call(of_sum, &[sum], scope)
             }
         }
     }

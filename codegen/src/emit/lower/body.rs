@@ -4,7 +4,7 @@ use super::fused::{fusions, Fused};
 use super::{first_read, nodes_of, port_of, read_inputs, Lowering, Names};
 use crate::emit::module::{Expression, Statement};
 use crate::emit::target::{Scope, Target};
-use straightline_graph::expr::{Graph, NodeId, Op, Precision, Unary};
+use straightline_graph::expr::{Graph, NodeId, Op, Precision, Sines, Unary};
 use straightline_graph::schedule::ProgramPart;
 use straightline_graph::Scalar;
 
@@ -278,10 +278,11 @@ impl<'a> Statements<'a> {
         }
         // the loop around the body has the lanes; a call fills the widest vectors there are, more at once would not stay in registers
         let style = self.scope.style;
-        let most = if style.lanes { 1 } else { 64 / style.scalar.bytes() };
+        let kernel = self.graph.sines;
+        let most = if style.lanes || kernel == Sines::Short { 1 } else { 64 / style.scalar.bytes() };
         for ((angles, sines), cosines) in angles.chunks(most).zip(sines.chunks(most)).zip(cosines.chunks(most)) {
             let (sines, cosines, angles) = (sines.to_vec(), cosines.to_vec(), angles.to_vec());
-            self.statements.push(Statement::SinCos { sines, cosines, angles });
+            self.statements.push(Statement::SinCos { kernel, sines, cosines, angles });
         }
     }
 

@@ -3,7 +3,8 @@
 //!
 //! Every function stands in a module of its own, so that rustc's back end can work on several at once.
 
-use super::file::{header, item_text, lanes_text, preamble, uses};
+use super::file::{header, item_text, lanes_text, preamble, short_sines, uses};
+use super::routine::SHORT_SINES;
 use super::{array_type, batch, fused, kernel};
 use crate::emit::c99::interface::{CParameter, Exported, Interface, LAYOUTS};
 use crate::emit::package::PackageKind;
@@ -54,6 +55,9 @@ fn c_package(generated: &Generated, prefix: &str) -> Vec<(String, String)> {
             "src/dynamics/trig.rs".to_string(),
             kernel(generated.lanes.is_some(), generated.style.fused).into_owned(),
         ));
+    }
+    if generated.items.iter().any(Item::calls_short_sines) {
+        files.push((format!("src/dynamics/{SHORT_SINES}.rs"), short_sines(generated.memory)));
     }
     files
 }
@@ -114,7 +118,8 @@ impl Interface<'_> {
             .filter_map(|p| p.wrapper.as_ref())
             .map(|wrapper| format!("use super::{wrapper};\n"))
             .collect();
-        let uses = uses("super", item.calls_kernel(), self.generated) + &types;
+        let short = if item.calls_short_sines() { format!("use super::{SHORT_SINES};\n") } else { String::new() };
+        let uses = uses("super", item.calls_kernel(), self.generated) + &short + &types;
         let gap = if uses.is_empty() { "" } else { "\n" };
         [&uses, gap, &item_text(item), &lanes_text(item, self.generated.lanes)].concat()
     }
@@ -168,6 +173,9 @@ overflow-checks = false
         }
         if g.calls_kernel() {
             out.push_str("\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod trig;\n");
+        }
+        if g.items.iter().any(Item::calls_short_sines) {
+            let _ = write!(out, "\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod {SHORT_SINES};\n");
         }
         out
     }

@@ -1,8 +1,9 @@
 //! The generated file: header, constants of the robot, functions, and the sine-cosine kernel they call.
 
 use super::constants::{cost, error_bounds, of_robot, AssociatedConstant, COST};
+use super::routine::SHORT_SINES;
 use super::{batch, bound, contact, fused, indented, parameter, pasted, staged};
-use crate::choices::Lanes;
+use crate::choices::{Lanes, Memory};
 use crate::emit::module::Item;
 use crate::emit::Generated;
 use crate::identifier::comment;
@@ -40,7 +41,21 @@ fn items(generated: &Generated) -> String {
         out.push_str(&pasted(&kernel(generated.lanes.is_some(), generated.style.fused)));
         out.push_str("}\n");
     }
+    if generated.items.iter().any(Item::calls_short_sines) {
+        let _ = write!(out, "\n#[allow(dead_code, clippy::all, clippy::pedantic)]\nmod {SHORT_SINES} {{\n");
+        out.push_str(&pasted(&short_sines(generated.memory)));
+        out.push_str("}\n");
+    }
     out
+}
+
+/// The source of the short sines, as a module of its own.
+pub fn short_sines(memory: Memory) -> String {
+    let inlined = match memory {
+        Memory::Flash => "#[inline(never)]",
+        Memory::Tcm => "#[inline(always)]",
+    };
+    straightline_core::sources::SHORT_SINES.replace("#[inline]", inlined)
 }
 
 /// What functions in a module of their own use of the file, which is `above` them.

@@ -7,18 +7,21 @@ use crate::emit::Style;
 use crate::identifier::comment;
 use std::fmt::Write;
 use straightline_graph::element;
-use straightline_graph::expr::Port;
+use straightline_graph::expr::{Port, Sines};
 use straightline_graph::Scalar;
 
 /// How many locals one declaration may hold.
 const DECLARATION: usize = 64;
+
+/// The module of short sines.
+pub(super) const SHORT_SINES: &str = "short_sines";
 
 /// Rust that depends on `core` alone, for readers: code that a person would defend in review.
 pub struct Rust;
 
 impl Target for Rust {
     fn reserved(&self) -> &'static [&'static str] {
-        &["live", "trig", "lane", "fma", "fma_if", "fused", "number"]
+        &["live", "trig", SHORT_SINES, "lane", "fma", "fma_if", "fused", "number"]
     }
 
     fn atom(&self, expression: &Expression, scope: Scope<'_>) -> (String, Binding) {
@@ -80,8 +83,12 @@ impl Target for Rust {
             Statement::Keep { slot, value } => {
                 line(format!("{} = {};", expression(&Expression::Slot(*slot)), expression(value)))
             }
-            Statement::SinCos { sines, cosines, angles } => {
+            Statement::SinCos { kernel: Sines::Precise, sines, cosines, angles } => {
                 indented(self.sin_cos([sines, cosines], angles, scope), level)
+            }
+            Statement::SinCos { kernel: Sines::Short, sines, cosines, angles } => {
+                let pairs = sines.iter().zip(cosines).zip(angles);
+                pairs.map(|((sin, cos), angle)| line(self.short_sines([sin, cos], angle, scope))).collect()
             }
             Statement::Array { name, values, is_constant } => {
                 let (word, number) = (if *is_constant { "static" } else { "let" }, number_type(style));
@@ -115,6 +122,18 @@ impl Rust {
     fn a_loop(&self, index: &str, count: &str, body: &[Statement], routine: &Routine, level: usize) -> String {
         let (indent, body) = ("    ".repeat(level), self.statements(body, routine, level + 1));
         format!("{indent}for {index} in 0..{count} {{\n{body}{indent}}}\n")
+    }
+
+    /// Sine and cosine of an angle by the kernel of short ones.
+    fn short_sines(&self, halves: [&Option<String>; 2], angle: &[Expression], scope: Scope<'_>) -> String {
+        let [sin, cos] = halves.map(|name| name.as_deref().unwrap_or("_"));
+        let (module, scalar) = (SHORT_SINES, scope.style.scalar.name());
+        let terms = angle.iter().map(|e| self.expression(e, scope)).collect::<Vec<_>>().join(", ");
+        let call = match angle {
+            [_] => format!("sin_cos_{scalar}({terms})"),
+            _ => format!("sin_cos_of_sum_{scalar}({module}::sum_of_angles_{scalar}([{terms}]))"),
+        };
+        format!("let ({sin}, {cos}) = {module}::{call};")
     }
 
     /// Sines and cosines of some angles by one call of the kernel.

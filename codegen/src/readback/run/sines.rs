@@ -3,6 +3,7 @@
 use super::{Execution, Ran};
 use crate::readback::tokens::{self as t, TokenKind};
 use crate::readback::values::{TextFormat, TextValue};
+use straightline_graph::expr::Sines;
 
 impl<'t> Execution<'_, 't> {
     /// `(s, c) = trig::sin_cos_f64(q[2]);` and its like for several angles, behind `let`.
@@ -22,6 +23,10 @@ impl<'t> Execution<'_, 't> {
         }
         self.mark(b'=')?;
         let start = self.at;
+        let sines = match self.kind() {
+            TokenKind::Word(t::SHORT_SINES) => Sines::Short,
+            _ => Sines::Precise,
+        };
         let function = self.kernel(format)?;
         let (lanes, sums) = match function {
             "sin_cos" => (false, false),
@@ -42,7 +47,8 @@ impl<'t> Execution<'_, 't> {
             false => vec![self.angle(sums, format)?],
         };
         self.these(") ;")?;
-        let (sines, cosines): (Vec<TextValue>, Vec<TextValue>) = angles.iter().map(|a| self.values.sin_cos(*a)).unzip();
+        let (sines, cosines): (Vec<TextValue>, Vec<TextValue>) =
+            angles.iter().map(|a| self.values.sin_cos(*a, sines)).unzip();
         if halves[0].iter().any(|name| *name != t::UNDERSCORE && halves[1].contains(name)) {
             return self.items.stop(start, "a second local of that name");
         }
@@ -110,6 +116,7 @@ impl<'t> Execution<'_, 't> {
         let known = match module {
             _ if self.local(module).is_some() => false,
             t::TRIG => self.known.trig && format != TextFormat::Any,
+            t::SHORT_SINES => self.known.short_sines && format != TextFormat::Any,
             t::FUSED_MODULE => self.known.fused[0] && format != TextFormat::Any,
             t::T => self.known.generic && format == TextFormat::Any,
             _ => false,

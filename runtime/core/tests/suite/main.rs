@@ -8,6 +8,7 @@ mod dual;
 mod integrate;
 mod measure;
 mod reference;
+mod short_sines;
 mod support;
 mod taylor;
 mod trig;

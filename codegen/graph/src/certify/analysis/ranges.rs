@@ -239,8 +239,8 @@ impl ErrorAnalysis<'_> {
     fn half(&mut self, exact: Enclosure) -> (Enclosure, UpperBound) {
         let magnitude = self.state.pen.mag(exact);
         let error = self.format.trig_error(magnitude.x);
-        let unit = (self.format.trig_ulps * self.format.u).next_up();
-        (exact, self.state.pen.rounding(magnitude, error, unit, self.format.tiny))
+        let (unit, absolute) = self.format.trig_parts();
+        (exact, self.state.pen.rounding(magnitude, error, unit, absolute))
     }
 
     fn is_power_of_two(&self, id: NodeId) -> bool {

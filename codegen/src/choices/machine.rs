@@ -1,0 +1,180 @@
+//! Machines that code can be made for: a row each.
+//!
+//! A row changes how the same numbers are computed, never which numbers they should be: the kernel of sines, and the order of operations.
+//! Bits stay equal on all machines for one set of options.
+
+use super::Choice;
+
+/// What is known of a machine.
+pub struct MachineRow {
+    /// The word that asks for it.
+    pub name: &'static str,
+    /// What it is, in a sentence.
+    pub doc: &'static str,
+    /// What rustc calls the platform.
+    pub triple: &'static str,
+    /// What rustc calls the processor, for `-C target-cpu`.
+    pub cpu: &'static str,
+    /// What rustc is told besides where code runs from flash: fewer instructions, of which each takes longer.
+    pub for_flash: &'static [&'static str],
+    /// How many numbers of single precision its registers hold; none without a floating-point unit.
+    pub registers: Option<usize>,
+    /// Whether it computes one angle at a time, so that short sines pay.
+    pub is_scalar: bool,
+}
+
+/// Multiply-accumulate that rounds the product, which LLVM leaves out on processors where it takes as long as the two.
+const MULTIPLY_ACCUMULATE: &[&str] = &["-C target-feature=-slowfpvmlx"];
+
+/// Machines, with the constants that stand for them.
+macro_rules! machines {
+    ($($(#[$about:meta])* $NAME:ident { $($row:tt)* })+) => {
+        impl TargetMachine {
+            $($(#[$about])*
+            pub const $NAME: TargetMachine = TargetMachine(&MachineRow { $($row)* });)+
+
+            /// All of them.
+            pub const ALL: &'static [TargetMachine] = &[$(TargetMachine::$NAME),+];
+        }
+    };
+}
+
+machines! {
+    /// Arm Cortex-M0+: no floating-point unit.
+    CORTEX_M0PLUS {
+        name: "cortex-m0plus",
+        doc: "Arm Cortex-M0+: no floating-point unit",
+        triple: "thumbv6m-none-eabi",
+        cpu: "cortex-m0plus",
+        for_flash: &[],
+        registers: None,
+        is_scalar: true,
+    }
+    /// Arm Cortex-M3: no floating-point unit.
+    CORTEX_M3 {
+        name: "cortex-m3",
+        doc: "Arm Cortex-M3: no floating-point unit",
+        triple: "thumbv7m-none-eabi",
+        cpu: "cortex-m3",
+        for_flash: &[],
+        registers: None,
+        is_scalar: true,
+    }
+    /// Arm Cortex-M4 with a floating-point unit of single precision.
+    CORTEX_M4F {
+        name: "cortex-m4f",
+        doc: "Arm Cortex-M4 with a floating-point unit of single precision",
+        triple: "thumbv7em-none-eabihf",
+        cpu: "cortex-m4",
+        for_flash: MULTIPLY_ACCUMULATE,
+        registers: Some(32),
+        is_scalar: true,
+    }
+    /// Arm Cortex-M7.
+    CORTEX_M7 {
+        name: "cortex-m7",
+        doc: "Arm Cortex-M7",
+        triple: "thumbv7em-none-eabihf",
+        cpu: "cortex-m7",
+        for_flash: &[],
+        registers: Some(32),
+        is_scalar: true,
+    }
+    /// Arm Cortex-M33 with a floating-point unit of single precision.
+    CORTEX_M33 {
+        name: "cortex-m33",
+        doc: "Arm Cortex-M33 with a floating-point unit of single precision",
+        triple: "thumbv8m.main-none-eabihf",
+        cpu: "cortex-m33",
+        for_flash: MULTIPLY_ACCUMULATE,
+        registers: Some(32),
+        is_scalar: true,
+    }
+    /// RISC-V of 32 bits without a floating-point unit.
+    RV32IMAC {
+        name: "rv32imac",
+        doc: "RISC-V of 32 bits without a floating-point unit",
+        triple: "riscv32imac-unknown-none-elf",
+        cpu: "generic-rv32",
+        for_flash: &[],
+        registers: None,
+        is_scalar: true,
+    }
+    /// RISC-V of 32 bits with a floating-point unit of single precision.
+    RV32IMAFC {
+        name: "rv32imafc",
+        doc: "RISC-V of 32 bits with a floating-point unit of single precision",
+        triple: "riscv32imafc-unknown-none-elf",
+        cpu: "generic-rv32",
+        for_flash: &[],
+        registers: Some(32),
+        is_scalar: true,
+    }
+    /// Arm of 64 bits, with vectors of 128 bits.
+    AARCH64 {
+        name: "aarch64",
+        doc: "Arm of 64 bits, with vectors of 128 bits",
+        triple: "aarch64-unknown-none",
+        cpu: "generic",
+        for_flash: &[],
+        registers: Some(32),
+        is_scalar: false,
+    }
+    /// x86 of 64 bits with AVX2.
+    X86_64_V3 {
+        name: "x86-64-v3",
+        doc: "x86 of 64 bits with AVX2",
+        triple: "x86_64-unknown-linux-gnu",
+        cpu: "x86-64-v3",
+        for_flash: &[],
+        registers: Some(16),
+        is_scalar: false,
+    }
+}
+
+/// A machine that code is made for.
+#[derive(Clone, Copy)]
+pub struct TargetMachine(&'static MachineRow);
+
+impl TargetMachine {
+    /// What is known of it.
+    pub fn row(self) -> &'static MachineRow {
+        self.0
+    }
+
+    /// What rustc is told beside `--target`.
+    pub fn flags(self, memory: Memory) -> Vec<String> {
+        let of_memory = if memory == Memory::Flash { self.0.for_flash } else { &[] };
+        let cpu = format!("-C target-cpu={}", self.0.cpu);
+        [cpu].into_iter().chain(of_memory.iter().map(|flag| (*flag).to_string())).collect()
+    }
+}
+
+impl PartialEq for TargetMachine {
+    fn eq(&self, other: &TargetMachine) -> bool {
+        self.0.name == other.0.name
+    }
+}
+
+impl std::fmt::Debug for TargetMachine {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.0.name)
+    }
+}
+
+impl Choice for TargetMachine {
+    const WHAT: &'static str = "machine";
+    fn words() -> Vec<(&'static str, &'static str, Self)> {
+        TargetMachine::ALL.iter().map(|machine| (machine.0.name, machine.0.doc, *machine)).collect()
+    }
+}
+
+/// The memory that code runs from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Memory {
+    /// Fetching takes time: the fewest bytes.
+    #[default]
+    Flash,
+    /// Fetching takes none: the least time of the instructions themselves.
+    Tcm,
+}
