@@ -267,6 +267,7 @@ static uint32_t robot_to_bits_f32(float x)
     return both.bits;
 }
 
+/*== from_bits_f32 */
 static float robot_from_bits_f32(uint32_t bits)
 {
     robot_bits_f32 both;

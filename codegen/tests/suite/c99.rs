@@ -7,7 +7,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use straightline_codegen::certify::{search, Effort};
-use straightline_codegen::choices::{Lanes, LimbForm};
+use straightline_codegen::choices::{Lanes, LimbForm, TargetMachine};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::emit::c99::{C99_SOURCE, KERNEL};
 use straightline_codegen::emit::package::PackageKind;
@@ -328,8 +328,9 @@ fn parameters_contacts_and_bounds_have_the_bits_of_their_programs() {
 fn short_sines_have_the_bits_of_their_program() {
     let target = Some(TargetMachine::CORTEX_M4F);
     for name in ["panda.urdf", "ur5.urdf"] {
-        let package = Package::new(name, &robot(name), &Options { target, ..in_scalar(Scalar::F32) });
-        assert!(package.text().contains("short_sin_cos_f32(") && !package.text().contains(" dyn_sin_cos_f32("));
+        let package =
+            Package::new(&format!("c99-short-{name}"), &robot(name), &Options { target, ..in_scalar(Scalar::F32) });
+        assert!(package.text().contains("_short_sin_cos_f32(") && !package.text().contains("robot_sin_cos_f32("));
         package.is_right(100);
     }
 }
