@@ -37,7 +37,7 @@ use straightline_codegen::emit::package::PACKAGES;
 use straightline_codegen::emit::rust::c_package::C_ABI;
 use straightline_codegen::emit::Generated;
 use straightline_codegen::options::{check_options, scene_file, Options, SceneFile};
-use straightline_codegen::{description, identifier, model, output, scene, verify};
+use straightline_codegen::{description, identifier, model, output, readback, scene, verify};
 
 /// Why a command ended early; what there is to say was said where it happened, except for [`CommandFailure::Files`].
 enum CommandFailure {
@@ -205,6 +205,7 @@ fn export(a: &Export) -> Result<(), CommandFailure> {
         return Err(print::failure_with(wrong, &[help]));
     }
     let prefix = a.prefix.clone().unwrap_or_else(|| identifier::prefix(&generated.model.name));
-    output::write_directory(&a.output, &(kind.files)(&generated, &prefix))?;
+    let files = readback::checked_package(kind, &generated, &prefix).map_err(|wrong| print::refused(&wrong))?;
+    output::write_directory(&a.output, &files)?;
     Ok(())
 }

@@ -16,6 +16,7 @@ use straightline_codegen::emit::Generated;
 use straightline_codegen::expr::{Graph, Port};
 use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
+use straightline_codegen::readback::checked_package;
 use straightline_codegen::scene::{Budget, InputRange, JointRanges, MaxError};
 use straightline_codegen::schedule::ScheduleLimits;
 use straightline_codegen::{compile, Function, Scalar};
@@ -90,7 +91,8 @@ impl Package {
     fn of(name: &str, generated: Generated, prefix: &str) -> Package {
         assert_eq!((C99_SOURCE.refusal)(&generated), None);
         let folder = Folder::new(name);
-        for (file, text) in (C99_SOURCE.files)(&generated, prefix) {
+        let files = checked_package(&C99_SOURCE, &generated, prefix).unwrap_or_else(|errors| panic!("{errors}"));
+        for (file, text) in files {
             std::fs::write(folder.file(&file), text).expect("it can be written");
         }
         let source = folder.file(&format!("{}_dynamics.c", prefix.to_lowercase()));
@@ -280,7 +282,8 @@ fn slow_proof_many_random_robots_have_the_bits_of_their_programs() {
 fn long_functions_in_parts_and_limbs_in_loops_have_the_bits_of_their_programs() {
     let limits = ScheduleLimits { operations: 150 };
     for scalar in [Scalar::F64, Scalar::F32] {
-        let mut options = Options { limits, limbs: LimbForm::Lanes, ..in_scalar(scalar) };
+        let functions = vec![Function::InverseDynamics, Function::ForwardDynamics];
+        let mut options = Options { limits, limbs: LimbForm::Lanes, functions, ..in_scalar(scalar) };
         options.model.floating_base = true;
         let package = Package::new(&format!("c99-limbs-{}", scalar.name()), &robot("hyq.urdf"), &options);
         let text = package.text();
@@ -306,10 +309,7 @@ const SCENE: &str = "[outputs]\nfunctions = [\"gravity_force\", \"forward_dynami
 #[test]
 fn parameters_contacts_and_bounds_have_the_bits_of_their_programs() {
     for scalar in [Scalar::F64, Scalar::F32] {
-        let effort = Effort { companions: true, ..Effort::default() };
-        // bounds at a state are long: of one scalar
-        let certify = (scalar == Scalar::F64).then_some(effort);
-        let options = Options { scalar, certify, ..Options::default() };
+        let options = Options { scalar, ..Options::default() };
         let package = Package::new(
             &format!("c99-scene-{}", scalar.name()),
             &Source::new("arm.toml", ARM),
@@ -319,9 +319,14 @@ fn parameters_contacts_and_bounds_have_the_bits_of_their_programs() {
         for name in ["robot_contact_writing_impact(", "int robot_why_new("] {
             assert!(text.contains(name), "{name}: {text}");
         }
-        assert_eq!(text.contains("void robot_gravity_force_error_bound("), scalar == Scalar::F64);
         package.is_right(100);
     }
+    let effort = Effort { companions: true, ..Effort::default() };
+    let functions = vec![Function::GravityForce, Function::InverseDynamics];
+    let options = Options { certify: Some(effort), functions, ..Options::default() };
+    let package = Package::new("c99-bounds", &Source::new("arm.toml", ARM), &options);
+    assert!(package.text().contains("void robot_gravity_force_error_bound("), "{}", package.text());
+    package.is_right(100);
 }
 
 #[test]
@@ -789,10 +794,10 @@ fn the_rules_that_are_claimed_are_kept() {
     if !is_there("cppcheck") {
         return;
     }
-    let mut options = options_of(SCENE, Options { limits: ScheduleLimits { operations: 200 }, ..Options::default() });
-    options.certify = Some(Effort { companions: true, ..Effort::default() });
+    let scene = SCENE.replace(", \"forward_dynamics\"]\ncontact", "]\ncontact").replace(", \"impact\"", "");
+    let options = options_of(&scene, Options { limits: ScheduleLimits { operations: 200 }, ..Options::default() });
     let arm = Package::new("c99-misra", &Source::new("arm.toml", ARM), &options);
-    let limbs = Options { limbs: LimbForm::Lanes, ..in_scalar(Scalar::F32) };
+    let limbs = Options { limbs: LimbForm::Lanes, functions: vec![Function::BiasForce], ..in_scalar(Scalar::F32) };
     let legs = Package::new("c99-misra-limbs", &robot("hyq.urdf"), &limbs);
     for package in [&arm, &legs] {
         let found = violations(&package.source);

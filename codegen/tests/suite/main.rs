@@ -6,6 +6,7 @@ mod as_written;
 mod bare_metal;
 mod builder;
 mod c99;
+mod c99_readback;
 mod certificates;
 mod certificates_of_robots;
 mod chain;
