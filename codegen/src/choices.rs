@@ -107,6 +107,15 @@ pub enum Fusion {
     Caller,
 }
 
+/// How programs in fixed point multiply.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum FixedProducts {
+    /// By the high half of products of 64 bits, which the machine has.
+    Wide,
+    /// From products of 16 bits each, as the machine has no more than 32 bits of a product.
+    Halves,
+}
+
 impl Choice for Function {
     const WHAT: &'static str = "function";
     const IS_ITEM: bool = true;
@@ -160,6 +169,10 @@ choices! {
         "flash" Flash "fetching takes time: fewest bytes, sines by calls",
         "tcm" Tcm "fetching takes none: fewest cycles, sines in place",
     }
+    FixedProducts "way to multiply words" {
+        "mulh" Wide "the high half of a product of 64 bits, one instruction on rv32im, Cortex-M3 and M4",
+        "muls" Halves "products of 16 bits each, for Cortex-M0 and M0+; words are halved where the error allows it",
+    }
     Fusion "way to fuse" {
         "std" Std "as the machine can, by std: the last bits depend on it then",
         "caller" Caller "always, by `mul_add_f64` of the crate around the output, which needs core alone",
@@ -184,6 +197,7 @@ mod tests {
         all::<ForwardDynamicsMethod>();
         all::<LimbForm>();
         all::<Lanes>();
+        all::<FixedProducts>();
         all::<Fusion>();
         all::<TargetMachine>();
         all::<Memory>();

@@ -34,7 +34,7 @@ pub use fronts::{compile_robot, Builder};
 pub use function::{ForwardDynamicsMethod, Function};
 pub use options::Options;
 pub use straightline_graph::expr::Grade;
-pub use straightline_graph::{certify, element_of, expr, pass, rounding, schedule, trace, Scalar};
+pub use straightline_graph::{certify, element_of, expr, fixed, pass, rounding, schedule, trace, Scalar};
 
 /// What the tests break inside the compiler. As unit tests they would be a second build of it, as long as the first.
 #[cfg(feature = "internals")]

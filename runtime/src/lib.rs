@@ -41,6 +41,8 @@
 //! | `target = "cortex-m4f"`: The machine that code is made for: short sines in f32 where it computes one angle at a time, and an order for its registers: `"cortex-m0plus"`, `"cortex-m3"`, `"cortex-m4f"`, `"cortex-m7"`, `"cortex-m33"`, `"rv32imac"`, `"rv32imafc"`, `"aarch64"`, `"x86-64-v3"` | any machine |
 //! | `memory = "tcm"`: The memory that code runs from on the machine of `target`: `"flash"`, `"tcm"` | `"flash"` |
 //! | `max_part_operations = 100`: Longer functions are cut into parts of at most so many operations | 12000 |
+//! | `fixed = "muls"`: A module `fixed` with the same functions over integers of 32 bits, for machines without floating point, and how these multiply: `"mulh"`, `"muls"` | floating point alone |
+//! | `fixed_error = 1e-4`: The greatest certified error of results in fixed point, as a part of the greatest magnitude of their array | 1e-6 |
 //! | `certify_seconds = 0.5`: Certify bounds of errors, tighter ones, for so long per function and scalar type \[s]; bounds then depend on the machine | as long as it takes |
 //! | `certify_boxes = 40`: Certify bounds of errors, tighter ones: the ranges of each result are cut into so many boxes | 1, or as many as `certify_seconds` allows |
 //! | `certify_state`: Certify bounds of errors, and beside every function write `…_error_bound`, which bounds the errors at the state at hand | off |
@@ -154,6 +156,9 @@ struct GuideBatches;
 #[cfg(doctest)]
 #[doc = include_str!("../../guide/src/certificates.md")]
 struct GuideCertificates;
+#[cfg(doctest)]
+#[doc = include_str!("../../guide/src/fixed-point.md")]
+struct GuideFixedPoint;
 #[cfg(doctest)]
 #[doc = include_str!("../../guide/src/drives.md")]
 struct GuideDrives;

@@ -8,6 +8,7 @@ mod number;
 
 pub mod certify;
 pub mod expr;
+pub mod fixed;
 pub mod pass;
 pub mod rounding;
 pub mod schedule;

@@ -13,6 +13,7 @@ use crate::function::Function;
 use crate::options::stable::fnv_1a;
 use crate::options::Options;
 use crate::program::equivalence::Disagreement;
+use crate::program::fixed::fixed_functions;
 use crate::program::mixed::mix_precisions;
 use crate::program::staged::figures;
 use crate::program::written::WrittenFunction;
@@ -54,7 +55,7 @@ pub fn explain(source: &Source, options: &Options) -> Result<Generated, Diagnost
 fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
     let generated = compile_in_one_scalar(source, options, explained)?;
     let other = |scalar: &Scalar| {
-        let options = Options { scalar: *scalar, also: Vec::new(), ..options.clone() };
+        let options = Options { scalar: *scalar, also: Vec::new(), fixed: None, ..options.clone() };
         compile_in_one_scalar(source, &options, explained)
     };
     let others: Result<Vec<Generated>, _> = options.also.iter().map(other).collect();
@@ -89,6 +90,7 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     budget::check(&whole, &frames, &measures, &options, &mut diagnostics);
     let certificates = certificates(&robot, &programs, &resolved);
     budget::check_errors(programs.iter().zip(&certificates), &resolved, &mut diagnostics);
+    let fixed = fixed_functions(&robot, &programs, &resolved, &mut diagnostics);
     if diagnostics.has_errors() {
         diagnostics.sort();
         return Err(diagnostics);
@@ -109,7 +111,7 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let why = |p: &WrittenFunction| Some((p.name.clone(), range::of_constants(&p.graph, p.scalar)?));
     let first = generated.programs.all().find_map(why);
     match first {
-        None => Ok(generated),
+        None => Ok(generated.with_fixed(fixed)),
         Some((program, why)) => {
             let mut diagnostics = generated.warnings;
             beyond(&program, &why, &mut diagnostics);

@@ -15,6 +15,7 @@ use crate::identifier::file_name;
 use crate::options::Options;
 use crate::program::companion::{checked_companion, wants_companions, ROUNDED};
 use crate::program::equivalence::Disagreement;
+use crate::program::fixed::FixedFunction;
 use crate::program::written::{AllWritten, WrittenFunction};
 use crate::program::TracedProgram;
 use crate::report::errors::ErrorReport;
@@ -62,6 +63,8 @@ pub struct Generated {
     pub scalar: Scalar,
     /// The same in the other scalar types that were asked for; [`Generated::text`] has them as modules.
     pub others: Vec<Generated>,
+    /// The same over integers, where that is asked for; [`Generated::text`] has them as the module `fixed`.
+    pub fixed: Vec<FixedFunction>,
     /// How its functions over lanes are written.
     pub style: Style,
     /// How its plain functions are written.
@@ -94,7 +97,8 @@ impl Generated {
     /// Whether there is more than constants and functions of one scalar, which are all that a type can have associated: types of
     /// parameters and stages, or further scalars.
     pub fn needs_a_module(&self) -> bool {
-        let has_types = !self.parameters.is_empty() || self.staged.is_some() || !self.contact.is_empty();
+        let has_types =
+            !self.fixed.is_empty() || !self.parameters.is_empty() || self.staged.is_some() || !self.contact.is_empty();
         has_types || !self.others.is_empty()
     }
 
@@ -103,6 +107,15 @@ impl Generated {
     pub fn with_others(mut self, others: Vec<Generated>) -> Generated {
         self.text.extend(others.iter().map(rust::scalar_module));
         Generated { others, ..self }
+    }
+
+    /// The same in fixed point, as a module of the text.
+    #[must_use]
+    pub(crate) fn with_fixed(mut self, fixed: Vec<FixedFunction>) -> Generated {
+        if !fixed.is_empty() {
+            self.text.push_str(&rust::fixed_module(&fixed));
+        }
+        Generated { fixed, ..self }
     }
 }
 
@@ -232,6 +245,7 @@ pub(crate) fn generate(
         contact: modes,
         scalar: options.scalar,
         others: Vec::new(),
+        fixed: Vec::new(),
         style: options.style(),
         plain_style: options.plain_style(),
         lanes: options.lanes,

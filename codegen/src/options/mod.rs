@@ -12,7 +12,7 @@ pub use optimisations::{FormChoices, Optimisations};
 pub use scene_file::SceneFile;
 pub use value::{GivenOptions, OptionValue};
 
-use crate::choices::{Lanes, LimbForm, Memory, TargetMachine};
+use crate::choices::{FixedProducts, Lanes, LimbForm, Memory, TargetMachine};
 use crate::description;
 use crate::description::drives::WrittenDrive;
 use crate::diagnostic::{Diagnostics, Reporting, Source};
@@ -83,6 +83,10 @@ options! {
     scene "scene": Scene = Scene::default(),
     /// Whether rounding errors are bounded, and how much is spent on it; a budget of an error bounds them, too.
     certify "certify": Option<Effort> = None,
+    /// Whether a module `fixed` has the same functions over integers, and how these multiply.
+    fixed "fixed": Option<FixedProducts> = None,
+    /// The greatest error of a result there, as a part of the greatest magnitude in its port.
+    fixed_error "fixed_error": f64 = 1e-6,
     ..
     /// What becomes of warnings, and in whose words they are said: nothing of what is generated.
     reporting: Reporting

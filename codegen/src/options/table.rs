@@ -6,7 +6,7 @@
 
 use super::value::{OptionValue, Vocabulary};
 use super::Options;
-use crate::choices::{Fusion, Lanes, LimbForm, Memory, TargetMachine};
+use crate::choices::{FixedProducts, Fusion, Lanes, LimbForm, Memory, TargetMachine};
 use crate::diagnostic::Level;
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::scene::MaxError;
@@ -181,6 +181,12 @@ pub static TABLE: &[OptionRow] = &[
     OptionRow { name: "max_part_operations", kind: Whole("a whole number from 100", |n| n >= 100.0), default: "12000", metavar: "N",
         doc: "Longer functions are cut into parts of at most so many operations",
         example: &["100"], hash: &["limits", "operations"], set: |options, value| options.limits.operations = value.count(), ..OF },
+    OptionRow { name: "fixed", kind: Word(Vocabulary::of::<FixedProducts>(), Some("mulh")), default: "floating point alone", metavar: "PRODUCTS",
+        doc: "A module `fixed` with the same functions over integers of 32 bits, for machines without floating point, and how these multiply",
+        also: "numbers", example: &["muls"], hash: &["fixed"], set: |options, value| options.fixed = Some(value.choice()), ..OF },
+    OptionRow { name: "fixed_error", kind: Real("above 0 and below 1", |x| x > 0.0 && x < 1.0), default: "1e-6", metavar: "PART",
+        doc: "The greatest certified error of results in fixed point, as a part of the greatest magnitude of their array",
+        also: "numbers", example: &["1e-4"], hash: &["fixed_error"], set: |options, value| options.fixed_error = value.number(), ..OF },
     OptionRow { name: "certify_seconds", kind: Real("above 0 and up to 86400 s", |s| s > 0.0 && s <= Effort::MOST_SECONDS), metavar: "SECONDS",
         doc: "Certify bounds of errors, tighter ones, for so long per function and scalar type [s]; bounds then depend on the machine",
         default: "as long as it takes", also: "numbers", example: &["0.5"], hash: &["certify"],

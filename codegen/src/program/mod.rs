@@ -5,6 +5,7 @@ pub mod companion;
 pub mod contact;
 pub mod demand_inertia;
 pub mod equivalence;
+pub mod fixed;
 pub mod input_box;
 pub mod limbs;
 pub mod mixed;

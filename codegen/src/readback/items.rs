@@ -227,7 +227,8 @@ impl<'t> Items<'t> {
                     let open = inner;
                     self.mark(&mut inner, b'{')?;
                     at = self.tokens[open].closes as usize + 1;
-                    if self.is_root(module) && matches!(name, t::TRIG | t::SHORT_SINES | t::BATCH | t::FUSED_MODULE) {
+                    let is_given = matches!(name, t::TRIG | t::SHORT_SINES | t::BATCH | t::FUSED_MODULE | t::FIXED);
+                    if self.is_root(module) && is_given {
                         self.push(TextItem::new(module, Sort::Given, name, start, at, threads))?;
                     } else {
                         self.modules.push(TextModule { parent: module, name });

@@ -11,6 +11,7 @@
 
 mod around;
 pub mod c99;
+mod fixed;
 mod items;
 mod run;
 mod tokens;
@@ -181,6 +182,7 @@ impl<'g> TextReader<'g> {
         for part in &mut self.parts {
             part.read(&items, &mut self.words, function)?;
         }
+        fixed::read(&items, &mut self.words, &self.generated.fixed, function)?;
         function.clear();
         match items.all.iter().find(|item| !item.claimed.get()) {
             Some(item) => items.stop(item.start, "an item that nothing asked for"),

@@ -51,7 +51,7 @@ words! {
     COST = "Cost", UNPHYSICAL = "Unphysical", CHECK_INERTIA = "check_inertia",
     OUT_OF_RANGE = "OutOfRange", CHECK_NUMBER = "check_number",
     ALLOW = "allow", DOC = "doc", DERIVE = "derive", INLINE = "inline", MUST_USE = "must_use", REPR = "repr",
-    SINGLE = "single", DOUBLE = "double", STRAIGHTLINE = "straightline", WITH_THREADS = "with_threads",
+    FIXED = "fixed", SINGLE = "single", DOUBLE = "double", STRAIGHTLINE = "straightline", WITH_THREADS = "with_threads",
 }
 
 /// Numbers of words.
@@ -84,9 +84,47 @@ impl Words {
 
 /// The tokens of a text, an [`TokenKind::End`] behind them; or the place and what is wrong there.
 pub fn tokens(text: &str, words: &mut Words) -> Result<Vec<Token>, (usize, &'static str)> {
+    let mut open: Vec<usize> = Vec::new();
+    lexed(text, words, |tokens, kind, start| {
+        match kind {
+            TokenKind::Mark(b'(' | b'[' | b'{') => open.push(tokens.len()),
+            TokenKind::Mark(mark @ (b')' | b']' | b'}')) => {
+                let opened = open.pop().ok_or((start, "a bracket that nothing opens"))?;
+                let expected = match text.as_bytes()[tokens[opened].start as usize] {
+                    b'(' => b')',
+                    b'[' => b']',
+                    _ => b'}',
+                };
+                if mark != expected {
+                    return Err((start, "a bracket that closes another kind"));
+                }
+                tokens[opened].closes = tokens.len() as u32;
+            }
+            _ => {}
+        }
+        Ok(())
+    })
+    .and_then(|tokens| match open.pop() {
+        Some(opened) => Err((tokens[opened].start as usize, "a bracket that nothing closes")),
+        None => Ok(tokens),
+    })
+}
+
+/// The tokens of a part of a text, whose brackets may be closed elsewhere.
+pub fn tokens_of_part(text: &str, words: &mut Words) -> Result<Vec<Token>, (usize, &'static str)> {
+    let mut tokens = lexed(text, words, |_, _, _| Ok(()))?;
+    tokens.pop();
+    Ok(tokens)
+}
+
+/// The tokens of a text, of each of which is `seen` what stands before it.
+fn lexed(
+    text: &str,
+    words: &mut Words,
+    mut seen: impl FnMut(&mut [Token], TokenKind, usize) -> Result<(), (usize, &'static str)>,
+) -> Result<Vec<Token>, (usize, &'static str)> {
     let bytes = text.as_bytes();
     let mut tokens: Vec<Token> = Vec::with_capacity(bytes.len() / 4);
-    let mut open: Vec<usize> = Vec::new();
     let mut at = 0;
     while at < bytes.len() {
         let start = at;
@@ -136,26 +174,8 @@ pub fn tokens(text: &str, words: &mut Words) -> Result<Vec<Token>, (usize, &'sta
             }
             _ => return Err((at, "a character that is none of the language")),
         };
-        match kind {
-            TokenKind::Mark(b'(' | b'[' | b'{') => open.push(tokens.len()),
-            TokenKind::Mark(mark @ (b')' | b']' | b'}')) => {
-                let opened = open.pop().ok_or((start, "a bracket that nothing opens"))?;
-                let expected = match bytes[tokens[opened].start as usize] {
-                    b'(' => b')',
-                    b'[' => b']',
-                    _ => b'}',
-                };
-                if mark != expected {
-                    return Err((start, "a bracket that closes another kind"));
-                }
-                tokens[opened].closes = tokens.len() as u32;
-            }
-            _ => {}
-        }
+        seen(&mut tokens, kind, start)?;
         tokens.push(Token { kind, start: start as u32, end: at as u32, closes: 0 });
-    }
-    if let Some(opened) = open.pop() {
-        return Err((tokens[opened].start as usize, "a bracket that nothing closes"));
     }
     let end = bytes.len() as u32;
     tokens.push(Token { kind: TokenKind::End, start: end, end, closes: 0 });

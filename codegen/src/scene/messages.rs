@@ -41,6 +41,9 @@ pub const CODES: &[&str] = &[
     "error-budget-count",
     "over-budget",
     "error-over-budget",
+    "fixed-range-missing",
+    "fixed-impossible",
+    "fixed-error",
     "error-unbounded",
     "moving-base-forward",
     "said-twice",
@@ -417,6 +420,44 @@ pub fn program_beyond_scalar(function: &str, scalar: &str, why: &str) -> D {
             "f32" => "generate in f64, and look whether the units are kg and m",
             _ => "no scalar type holds that; look whether the units are kg and m",
         })
+}
+
+/// A function in fixed point whose input has no range.
+pub fn fixed_range_missing(function: &str, port: &str, what: &str) -> D {
+    D::error("fixed-range-missing", format!("`{function}` in fixed point: {what} has no range"))
+        .detail("binary points follow from the ranges of all inputs, so that nothing overflows")
+        .help(match port {
+            "q" | "qd" | "tau" => format!("give the joint a limit, or write `{port} = ..` in [numbers.ranges]"),
+            "qdd" | "gravity" => format!("write `{port} = ..` in [numbers.ranges]"),
+            _ => "hold what it is of, or choose other functions".to_string(),
+        })
+}
+
+/// A function that has no form in fixed point.
+pub fn fixed_impossible(function: &str, why: &str, help: &str) -> D {
+    D::error("fixed-impossible", format!("`{function}` has no form in fixed point: {why}")).help(help)
+}
+
+/// An error that fixed point does not keep to.
+pub fn fixed_error(function: &str, demanded: f64, least: f64) -> D {
+    D::error(
+        "fixed-error",
+        format!(
+            "`{function}` in fixed point keeps to a part of {} of full scale, not to {demanded:?}",
+            six_digits(least)
+        ),
+    )
+    .help("ask for less with `fixed_error`, or narrow the ranges of its inputs")
+}
+
+/// Words that are not the program.
+pub fn fixed_disagrees(function: &str, what: &str) -> D {
+    D::error(
+        "internal-error",
+        format!("`{function}` in fixed point is not the program that was compiled; nothing is written"),
+    )
+    .detail(what)
+    .help("this is an error of straightline, not of your files: please report it, with the robot file, the scene and the options")
 }
 
 /// A range without a value.

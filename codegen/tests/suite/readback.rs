@@ -5,8 +5,8 @@ use std::fmt::Write;
 use std::ops::Range;
 use std::path::Path;
 use straightline_codegen::certify::Effort;
-use straightline_codegen::choices::Lanes;
 use straightline_codegen::choices::LimbForm;
+use straightline_codegen::choices::{FixedProducts, Lanes};
 use straightline_codegen::diagnostic::{Diagnostics, Severity};
 use straightline_codegen::emit::Generated;
 use straightline_codegen::options::scene_file;
@@ -63,7 +63,7 @@ fn file(name: &str) -> Source {
 }
 
 /// `limbs` limbs of `joints` joints each on a trunk that turns: axes along x, y, z or oblique, every fourth joint slides.
-fn random_robot(seed: u64, limbs: usize, joints: usize) -> Source {
+pub fn random_robot(seed: u64, limbs: usize, joints: usize) -> Source {
     let mut n = Numbers(seed);
     let kinds: Vec<(usize, bool)> = (0..joints).map(|_| (n.below(4), n.below(4) == 0)).collect();
     let mut text = String::from("<robot name=\"random\"><link name=\"base\"/>");
@@ -118,6 +118,12 @@ fn in_scene(scene: &Source, options: Options) -> Options {
 /// What comes out was compared on the way: an error would be a text that is not its programs'.
 fn generated(robot: &Source, options: &Options) -> Generated {
     compile(robot, options).unwrap_or_else(|diagnostics| panic!("{}: {}", robot.path(), diagnostics.render()))
+}
+
+/// With a module over integers.
+fn in_fixed_point(mut options: Options, products: FixedProducts) -> Options {
+    options.scene.ranges.qdd = JointRanges::All(InputRange::within(10.0));
+    Options { fixed: Some(products), fixed_error: 1e-4, ..options }
 }
 
 type Way = (&'static str, fn(Options) -> Options);
@@ -210,6 +216,10 @@ fn small_texts() -> Vec<(String, Generated)> {
     for (k, (style, of)) in STYLES.into_iter().enumerate() {
         let robot = random_robot(k as u64, 1, 2);
         texts.push((style.to_string(), generated(&robot, &of(options(&functions)))));
+    }
+    for (k, products) in [FixedProducts::Wide, FixedProducts::Halves].into_iter().enumerate() {
+        let options = in_fixed_point(options(&functions), products);
+        texts.push((format!("fixed point, {products:?}"), generated(&random_robot(20 + k as u64, 1, 2), &options)));
     }
     for (k, (style, of)) in OF_LIMBS.into_iter().enumerate() {
         let text = generated(&random_robot(k as u64, 3, 2), &of(options(&functions[..1])));

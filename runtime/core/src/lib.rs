@@ -19,6 +19,7 @@ pub mod dd;
 #[cfg(feature = "alloc")]
 pub mod drive;
 pub mod dual;
+pub mod fixed;
 pub mod integrate;
 pub mod jet;
 pub mod joint;

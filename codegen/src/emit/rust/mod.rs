@@ -6,6 +6,7 @@ pub mod c_package;
 mod constants;
 mod contact;
 mod file;
+mod fixed;
 mod frames;
 pub mod fused;
 mod parameter;
@@ -15,6 +16,7 @@ pub mod stubs;
 
 pub use associated::associated_items;
 pub use file::{file, kernel, scalar_module};
+pub use fixed::fixed_module;
 pub use routine::Rust;
 
 use super::module::{Routine, StateCertificate};

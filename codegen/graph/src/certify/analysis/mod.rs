@@ -48,6 +48,8 @@ pub struct ErrorAnalysis<'g> {
     known: Vec<Option<Interval>>,
     /// Of a result and a node, at most so much is the exact adjoint.
     known_adjoints: FxHashMap<(u32, u32), f64>,
+    /// Per node, the greatest local error, where it does not follow from the format: [`ErrorAnalysis::with_errors`].
+    given: Option<Vec<f64>>,
     /// A rule that is wrong on purpose: tests must notice.
     #[cfg(test)]
     pub(super) broken: Option<Broken>,
@@ -156,9 +158,37 @@ impl<'g> ErrorAnalysis<'g> {
             state,
             known: Vec::new(),
             known_adjoints: FxHashMap::default(),
+            given: None,
             #[cfg(test)]
             broken: None,
         }
+    }
+
+    /// Reads a graph that is computed in whatever way: its node k is off by at most `errors[k]` from the operation on computed operands. Of
+    /// constants and inputs it is what their conversion loses; sums of angles are formed exactly, and a sine or cosine has what the way to it
+    /// loses among its errors, which are all below 2^-20.
+    ///
+    /// The proof of [`certify`](super) holds for any errors: what it takes of a format are bounds of local errors, which stand here instead.
+    pub fn with_errors(graph: &'g Graph, errors: Vec<f64>) -> Self {
+        assert_eq!(errors.len(), graph.ops.len(), "an error per node");
+        // only what turns of computed sines and cosines stretch is taken of it
+        let format = FloatFormat { u: 2f64.powi(-20), trig_ulps: 1.0, ..FloatFormat::of(crate::number::Scalar::F64) };
+        ErrorAnalysis { given: Some(errors), ..ErrorAnalysis::new(graph, format) }
+    }
+
+    /// How much a result of [`ErrorAnalysis::ranges`] can move with each node, at most, relative to it; 0 where it does not depend on it.
+    pub fn sensitivities(&mut self, cone: usize) -> Vec<f64> {
+        self.adjoints(cone);
+        let nodes = std::mem::take(&mut self.cones[cone].1);
+        let mut all = vec![0.0; self.graph.ops.len()];
+        for &n in &nodes {
+            all[n as usize] = self.state.adjoint[n as usize].x.mag();
+        }
+        for &n in &nodes {
+            self.state.adjoint[n as usize] = Enclosure::ZERO;
+        }
+        self.cones[cone].1 = nodes;
+        all
     }
 
     /// What is known of exact values and adjoints, wherever it is known from.
@@ -304,7 +334,7 @@ impl<'g> ErrorAnalysis<'g> {
                 }
             }
             let mut errors = self.state.pen.root(errors);
-            if self.sharing.halves[team] {
+            if self.sharing.halves[team] && self.given.is_none() {
                 let pair = self.state.pen.number(self.format.pair_error());
                 errors = self.state.pen.least(errors, pair);
             }

@@ -16,9 +16,13 @@ impl ErrorAnalysis<'_> {
         self.state.round += 1;
         self.state.box_round = self.state.round;
         for i in 0..self.graph.ops.len() {
-            let (exact, error) = self.exact_range(i, inputs)?;
+            let (exact, mut error) = self.exact_range(i, inputs)?;
+            if let Some(given) = &self.given {
+                error = self.state.pen.number(given[i]);
+            }
             let is_constant = matches!(self.graph.ops[i], Op::Constant(_));
-            let mut range = if is_constant { exact } else { self.state.pen.widened(exact, error) };
+            let mut range =
+                if is_constant && self.given.is_none() { exact } else { self.state.pen.widened(exact, error) };
             let carried = self.carried_error(i);
             self.state.total_error[i] = self.state.pen.add_up(carried, error);
             if let Some(form) = self.cancelled[i].take() {
@@ -82,7 +86,9 @@ impl ErrorAnalysis<'_> {
     fn class_errors(&mut self) {
         let mut class_error = vec![UpperBound::ZERO; self.graph.ops.len()];
         let mut error = self.state.error.clone();
-        for k in 0..self.sharing.products.len() {
+        // what follows takes errors that grow with values
+        let products = if self.given.is_some() { 0 } else { self.sharing.products.len() };
+        for k in 0..products {
             // |x c| + |y s| ≤ ‖(x, y)‖ ‖(c, s)‖, each product rounded by u of itself at most
             let (a, b, pair, group) = self.sharing.products[k];
             let norm = self.norm(group);
