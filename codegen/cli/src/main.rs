@@ -30,14 +30,14 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 use straightline_cli::html;
-use straightline_codegen::compile::{compile, explain};
+use straightline_codegen::compile::{checked_package, compile, explain};
 use straightline_codegen::diagnostic::{self, codes, Diagnostics, Severity, Source};
 use straightline_codegen::emit::c99::C99_SOURCE;
 use straightline_codegen::emit::package::PACKAGES;
 use straightline_codegen::emit::rust::c_package::C_ABI;
 use straightline_codegen::emit::Generated;
 use straightline_codegen::options::{check_options, scene_file, Options, SceneFile};
-use straightline_codegen::{description, identifier, model, output, readback, scene, verify};
+use straightline_codegen::{description, identifier, model, output, scene, verify};
 
 /// Why a command ended early; what there is to say was said where it happened, except for [`CommandFailure::Files`].
 enum CommandFailure {
@@ -205,7 +205,7 @@ fn export(a: &Export) -> Result<(), CommandFailure> {
         return Err(print::failure_with(wrong, &[help]));
     }
     let prefix = a.prefix.clone().unwrap_or_else(|| identifier::prefix(&generated.model.name));
-    let files = readback::checked_package(kind, &generated, &prefix).map_err(|wrong| print::refused(&wrong))?;
+    let files = checked_package(kind, &generated, &prefix).map_err(|wrong| print::refused(&wrong))?;
     output::write_directory(&a.output, &files)?;
     Ok(())
 }

@@ -6,7 +6,9 @@ pub use prepare::examine;
 
 use crate::description::{messages, Description};
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
+use crate::emit::c99::C99_SOURCE;
 use crate::emit::generated::generate;
+use crate::emit::package::PackageKind;
 use crate::emit::Generated;
 use crate::equations::Robot;
 use crate::function::Function;
@@ -18,6 +20,7 @@ use crate::program::mixed::mix_precisions;
 use crate::program::staged::figures;
 use crate::program::written::WrittenFunction;
 use crate::program::{checked, range, TracedProgram};
+use crate::readback::c99::CReader;
 use crate::report::budget::{self, Measures};
 use crate::report::certificates::certificates;
 use crate::report::waterfall;
@@ -50,6 +53,24 @@ pub fn explain(source: &Source, options: &Options) -> Result<Generated, Diagnost
         generated.report.staged = Some(figures.map_err(|wrong| only(wrong.error(&robot.model)))?);
     }
     Ok(generated)
+}
+
+/// The files of a package, whose names in other languages begin with the prefix: C99 is read back as every text is; of others the text is
+/// that of [`Generated::text`], which was.
+///
+/// # Errors
+/// That the package is not what was compiled, which is an error of ours.
+pub fn checked_package(
+    kind: &PackageKind,
+    generated: &Generated,
+    prefix: &str,
+) -> Result<Vec<(String, String)>, Diagnostics> {
+    let files = (kind.files)(generated, prefix);
+    if kind.name == C99_SOURCE.name {
+        let read = CReader::new(generated, prefix).check(&files);
+        read.map_err(|mismatch| only(readback::complaint(&mismatch)))?;
+    }
+    Ok(files)
 }
 
 fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {

@@ -18,8 +18,6 @@ mod tokens;
 mod values;
 
 use crate::diagnostic::{Diagnostic, Diagnostics};
-use crate::emit::c99::C99_SOURCE;
-use crate::emit::package::PackageKind;
 use crate::emit::Generated;
 use crate::program::written::WrittenFunction;
 use around::Around;
@@ -82,27 +80,6 @@ pub fn checked(generated: Generated) -> Result<Generated, Diagnostics> {
             Err(diagnostics)
         }
     }
-}
-
-/// The files of a package, or an internal error: what disagrees with its programs is no package for anybody. Packages with Rust inside have
-/// its text, which was read.
-///
-/// # Errors
-/// The first place where they disagree, with a request to report it.
-pub fn checked_package(
-    kind: &PackageKind,
-    generated: &Generated,
-    prefix: &str,
-) -> Result<Vec<(String, String)>, Diagnostics> {
-    let files = (kind.files)(generated, prefix);
-    if kind.name == C99_SOURCE.name {
-        c99::CReader::new(generated, prefix).check(&files).map_err(|mismatch| {
-            let mut diagnostics = Diagnostics::new();
-            diagnostics.push(complaint(&mismatch));
-            diagnostics
-        })?;
-    }
-    Ok(files)
 }
 
 /// A mismatch as a complaint.

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use straightline_codegen::certify::{search, Effort};
 use straightline_codegen::choices::{Lanes, LimbForm, TargetMachine};
+use straightline_codegen::compile::checked_package;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::emit::c99::{C99_SOURCE, KERNEL};
 use straightline_codegen::emit::package::PackageKind;
@@ -16,7 +17,6 @@ use straightline_codegen::emit::Generated;
 use straightline_codegen::expr::{Graph, Port};
 use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
-use straightline_codegen::readback::checked_package;
 use straightline_codegen::scene::{Budget, InputRange, JointRanges, MaxError};
 use straightline_codegen::schedule::ScheduleLimits;
 use straightline_codegen::{compile, Function, Scalar};
@@ -530,7 +530,7 @@ fn constructors_compute_their_programs() {
 
 /// A checksum of what the kernel makes of a million numbers, the same steps in Rust and in C.
 macro_rules! checksum_of_kernel {
-    ($name:ident, $t:ty, $bits:ty, $sin_cos:ident, $of_sum:ident, $sum:ident, $sqrt:ident, $sign:ident, $domain:expr) => {
+    ($name:ident, $t:ty, $bits:ty, $sin_cos:ident, $of_sum:ident, $sum:ident, $sqrt:ident, $sign:ident, $domain:expr $(, $short:expr)?) => {
         fn $name(count: usize) -> u64 {
             let mut random = Random(5);
             let mut hash = 0xcbf2_9ce4_8422_2325u64;
@@ -564,6 +564,9 @@ macro_rules! checksum_of_kernel {
                 // of a sum that is none, only that it is none is said
                 take(if s.is_nan() { 1.0 } else { s });
                 take(if c.is_nan() { 1.0 } else { c });
+                $(let (s, c) = $short(x);
+                take(if s.is_nan() { 1.0 } else { s });
+                take(if c.is_nan() { 1.0 } else { c });)?
                 take(trig::$sqrt(x));
                 take(trig::$sign(x));
             }
@@ -591,7 +594,8 @@ checksum_of_kernel!(
     sum_of_angles_f32,
     sqrt_f32,
     sign_f32,
-    trig::DOMAIN_F32
+    trig::DOMAIN_F32,
+    straightline_core::short_sines::sin_cos_f32
 );
 
 /// The same in C, behind the kernel.
@@ -627,6 +631,7 @@ int main(void) {
         const robot_turn_NAME of_sum = robot_sin_cos_of_sum_NAME(sum);
         take(of_sum.sine == of_sum.sine ? of_sum.sine : 1);
         take(of_sum.cosine == of_sum.cosine ? of_sum.cosine : 1);
+        SHORT
         take(robot_sqrt_NAME(x));
         take(robot_sign_NAME(x));
     }
@@ -635,7 +640,10 @@ int main(void) {
 }
 "#;
     let bits = format!("uint{}_t", 8 * scalar.bytes());
+    let short = "const robot_turn_f32 brief = robot_short_sin_cos_f32(x);\n        take(brief.sine == brief.sine ? brief.sine : 1);\n        \
+                 take(brief.cosine == brief.cosine ? brief.cosine : 1);";
     let words = [
+        ("SHORT", if scalar == Scalar::F32 { short.to_string() } else { String::new() }),
         ("NAME", scalar.name().to_string()),
         ("DOMAIN", scalar.literal(domain) + scalar.c_suffix()),
         ("MIN", min),

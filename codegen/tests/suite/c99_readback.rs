@@ -5,13 +5,14 @@ use std::ops::Range;
 use std::path::Path;
 use straightline_codegen::certify::Effort;
 use straightline_codegen::choices::{LimbForm, TargetMachine};
+use straightline_codegen::compile::checked_package;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::emit::c99::C99_SOURCE;
 use straightline_codegen::emit::Generated;
 use straightline_codegen::options::scene_file;
 use straightline_codegen::options::Options;
 use straightline_codegen::readback::c99::CReader;
-use straightline_codegen::readback::{checked_package, complaint};
+use straightline_codegen::readback::complaint;
 use straightline_codegen::scene::{Budget, InputRange, JointRanges, MaxError};
 use straightline_codegen::schedule::ScheduleLimits;
 use straightline_codegen::{compile, Function, Scalar};
@@ -149,6 +150,7 @@ fn changed(text: &str, words: &[Range<usize>], random: &mut Random) -> Option<(S
             let other = if digit.is_ascii_digit() { (digit - b'0' + 1) % 10 + b'0' } else { b'1' };
             with(&[&word[..place], &char::from(other).to_string(), &word[place + 1..]].concat())
         }
+        2 if text[next.clone()] == *word => return None,
         2 => [&text[..range.start], &text[next.clone()], " ", word, &text[next.end..]].concat(),
         _ if is_name(word) => with(&of_kind(|w| w.starts_with(|c: char| c.is_ascii_alphabetic()), random)?),
         _ if is_number(word) => with(&of_kind(|w| w.starts_with(|c: char| c.is_ascii_digit()), random)?),
