@@ -155,6 +155,7 @@ pub const ALL: &[Code] = &[
     code("said-by-the-scene", Error, "What a scene says, and an experiment may not."),
     code("said-twice", Error, "What the scene and an option beside it both say."),
     code("scalar-twice", Error, "A scalar type that is asked for twice."),
+    code("self-test-fused", Error, "A self-test of functions whose bits differ from machine to machine."),
     code("shaft-without-inertia", Error, "A shaft between two springs that has no inertia."),
     code("singular-joint", Warning, "A joint that feels no inertia."),
     code("specificity", Error, "A vector that is parallel with the joint axis and cannot define the zero of the coordinate."),

@@ -16,6 +16,7 @@ use crate::options::Options;
 use crate::program::companion::{checked_companion, wants_companions, ROUNDED};
 use crate::program::equivalence::Disagreement;
 use crate::program::fixed::FixedFunction;
+use crate::program::self_test::SelfTest;
 use crate::program::written::{AllWritten, WrittenFunction};
 use crate::program::TracedProgram;
 use crate::report::errors::ErrorReport;
@@ -235,6 +236,7 @@ pub(crate) fn generate(
     };
     let parameters;
     (parameters, written.parameters) = parameter_types(&robot, options, &takes, lowering)?;
+    written.self_test = options.self_test.then(|| SelfTest::new(&written, &options.scene, model, options.scalar));
     let generated = Generated {
         model: robot.model,
         frames,

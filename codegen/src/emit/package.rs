@@ -17,5 +17,9 @@ pub struct PackageKind {
     pub files: fn(&Generated, &str) -> Vec<(String, String)>,
 }
 
+/// Why packages of C refuse a self-test.
+pub(super) const NO_SELF_TEST: [&str; 2] =
+    ["a package of C has no self-test", "leave out `self_test`; a file of Rust has it (`straightline generate`)"];
+
 /// All kinds.
 pub static PACKAGES: &[PackageKind] = &[C_ABI, C99_SOURCE];

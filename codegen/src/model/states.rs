@@ -124,6 +124,9 @@ pub(crate) fn body(random: &mut Random) -> [Vec<f64>; 3] {
     [vec![mass], com, vec![xx, xy, xz, yy, yz, zz]]
 }
 
+/// One such body: mass, centre of mass, and inertia about it (xx, xy, xz, yy, yz, zz).
+pub(crate) const BODY: [f64; 10] = [1.5, 0.02, -0.03, 0.05, 0.021, 0.001, -0.002, 0.024, 0.0015, 0.028];
+
 /// Angle and speed of the last shaft of a drive.
 fn last_shaft(model: &Model<Dd>, drive: &Drive<Dd>, q: &[f64], qd: &[f64]) -> [f64; 2] {
     let sum = |y: &[f64], index: fn(&Joint) -> usize| -> f64 {

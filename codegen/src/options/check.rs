@@ -43,6 +43,9 @@ pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
             }
         }
     }
+    if options.self_test && options.fma {
+        scene.places.complain("options.self_test", say::self_test_fused(), diagnostics);
+    }
     if options.limbs == LimbForm::Lanes && options.grade == Grade::Exact {
         scene.places.complain("options.limbs", say::limbs_exact(), diagnostics);
     }

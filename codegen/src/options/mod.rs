@@ -75,6 +75,8 @@ options! {
     target "target": Option<TargetMachine> = None,
     /// The memory that it runs from there.
     memory "memory": Memory = Memory::default(),
+    /// Whether `self_test` stands beside the functions.
+    self_test "self_test": bool = false,
     /// How long one function may be.
     limits "limits": ScheduleLimits = ScheduleLimits::default(),
     /// How the robot file is read.

@@ -13,6 +13,7 @@ pub mod parameter;
 pub mod pivots;
 mod plainer;
 pub mod range;
+pub mod self_test;
 mod sines;
 pub mod staged;
 pub mod written;

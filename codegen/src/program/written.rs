@@ -2,6 +2,7 @@
 
 use crate::description::drives::DriveNumber;
 use crate::options::Options;
+use crate::program::self_test::SelfTest;
 use straightline_core::Dd;
 use straightline_graph::expr::Graph;
 use straightline_graph::Scalar;
@@ -19,18 +20,20 @@ pub struct WrittenFunction {
     pub generic: bool,
     /// Whether there is one over lanes beside it, in the file's scalar, and batches.
     pub lanes: bool,
+    /// Whether it was asked for: it bounds no errors of another one, stores nothing for a stage, and makes no parameter.
+    pub is_asked_for: bool,
 }
 
 impl WrittenFunction {
     /// A function in the forms that are asked for.
     pub(crate) fn asked_for(name: &str, graph: Graph, options: &Options) -> WrittenFunction {
         let (generic, lanes) = (options.generic, options.lanes.is_some());
-        WrittenFunction { generic, lanes, ..WrittenFunction::plain(name, graph, options.scalar) }
+        WrittenFunction { generic, lanes, is_asked_for: true, ..WrittenFunction::plain(name, graph, options.scalar) }
     }
 
     /// A function of one state and one scalar type, whatever is asked for.
     pub(crate) fn plain(name: &str, graph: Graph, scalar: Scalar) -> WrittenFunction {
-        WrittenFunction { name: name.to_string(), graph, scalar, generic: false, lanes: false }
+        WrittenFunction { name: name.to_string(), graph, scalar, generic: false, lanes: false, is_asked_for: false }
     }
 }
 
@@ -96,9 +99,19 @@ pub struct AllWritten {
     pub staged: Option<WrittenStages>,
     /// Contact modes, in order.
     pub modes: Vec<WrittenMode>,
+    /// What tests these functions on a machine, where that is asked for.
+    pub self_test: Option<SelfTest>,
 }
 
 impl AllWritten {
+    /// The functions of the robot, and of its contact modes with the mode's module, that were asked for.
+    pub fn asked_for(&self) -> impl Iterator<Item = (Option<&str>, &WrittenFunction)> {
+        let of_robot = self.functions.iter().map(|function| (None, function));
+        let of_modes =
+            self.modes.iter().flat_map(|mode| mode.functions.iter().map(|f| (Some(mode.identifier.as_str()), f)));
+        of_robot.chain(of_modes).filter(|(_, function)| function.is_asked_for)
+    }
+
     /// All of them.
     pub fn all(&self) -> impl Iterator<Item = &WrittenFunction> {
         let staged = self.staged.iter().flat_map(|staged| {

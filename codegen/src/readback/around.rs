@@ -15,6 +15,7 @@ use straightline_graph::Scalar;
 
 mod blocks;
 mod parameters;
+mod self_test;
 
 /// The sources of what is pasted.
 const TRIG: &str = straightline_core::sources::TRIG;
@@ -59,6 +60,7 @@ impl Around<'_, '_, '_> {
         self.batches()?;
         self.stages()?;
         self.modes()?;
+        self.self_test()?;
         self.fixed()?;
         self.uses()
     }

@@ -36,6 +36,7 @@ pub const CODES: &[&str] = &[
     "mixed-alone",
     "mixed-elsewhere",
     "limbs-exact",
+    "self-test-fused",
     "no-identical-limbs",
     "error-budget-output",
     "error-budget-count",
@@ -299,6 +300,15 @@ pub fn mixed_elsewhere(with: &str) -> D {
     D::error("mixed-elsewhere", format!("`mixed_precision` together with {with}"))
         .detail("it computes parts of functions in f32 in f64, operation by operation")
         .help(format!("choose one of the two: remove `mixed_precision`, or {with}"))
+}
+
+/// Expected bits where machines have others.
+pub fn self_test_fused() -> D {
+    D::error("self-test-fused", "`self_test` together with `fma`".to_string())
+        .detail(
+            "whether a·b + c is rounded once or twice differs from machine to machine, and so do the bits to expect",
+        )
+        .help("choose one of the two: remove `self_test`, or `fma`")
 }
 
 /// Identical limbs as lanes where rules keep every bit.

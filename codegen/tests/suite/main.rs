@@ -42,6 +42,7 @@ mod scene_messages;
 mod scene_verify;
 mod scenes_as_written;
 mod scope;
+mod self_test;
 mod staged;
 mod sums;
 mod truth;

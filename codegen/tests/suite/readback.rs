@@ -129,7 +129,7 @@ fn in_fixed_point(mut options: Options, products: FixedProducts) -> Options {
 type Way = (&'static str, fn(Options) -> Options);
 
 /// Ways to write a robot's functions.
-const STYLES: [Way; 11] = [
+const STYLES: [Way; 12] = [
     ("plain", |o| o),
     ("in parts", |o| Options { limits: ScheduleLimits { operations: 60 }, ..o }),
     ("exact", |o| Options { grade: Grade::Exact, ..o }),
@@ -155,6 +155,7 @@ const STYLES: [Way; 11] = [
         ..o
     }),
     ("fused stages", |o| Options { scene: Scene { staged: true, ..o.scene }, fma: true, ..o }),
+    ("f32, with a self-test", |o| Options { scalar: Scalar::F32, self_test: true, ..o }),
     ("bounds at a state", |o| Options { certify: Some(Effort { companions: true, ..Effort::default() }), ..o }),
 ];
 

@@ -1,7 +1,7 @@
 //! Constants and functions of a module as associated items of a type.
 
 use super::constants::{cost, error_bounds, of_robot};
-use super::{array_type, batch, doc, frames};
+use super::{array_type, batch, doc, frames, self_test};
 use crate::emit::doc::relinked;
 use crate::emit::module::Item;
 use crate::emit::{Generated, Style};
@@ -37,6 +37,7 @@ pub fn associated_items(generated: &Generated, scene: &Scene) -> String {
             out.push_str(&batch::associated(item, generated.style, lanes));
         }
     }
+    out.extend(self_test::associated(generated));
     out + &frames::associated(generated, scene, taken)
 }
 

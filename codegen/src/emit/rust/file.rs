@@ -2,7 +2,7 @@
 
 use super::constants::{cost, error_bounds, of_robot, AssociatedConstant, COST};
 use super::routine::SHORT_SINES;
-use super::{batch, bound, contact, fused, indented, parameter, pasted, staged};
+use super::{batch, bound, contact, fused, indented, parameter, pasted, self_test, staged};
 use crate::choices::{Lanes, Memory};
 use crate::emit::module::Item;
 use crate::emit::Generated;
@@ -33,6 +33,7 @@ fn items(generated: &Generated) -> String {
         out.push_str(&item_text(item));
         out.push_str(&lanes_text(item, generated.lanes));
     }
+    out.extend(self_test::text(generated));
     if let Some(lanes) = generated.lanes {
         out.push_str(&batch::module(lanes));
     }

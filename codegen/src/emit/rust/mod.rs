@@ -11,6 +11,7 @@ mod frames;
 pub mod fused;
 mod parameter;
 mod routine;
+mod self_test;
 mod staged;
 pub mod stubs;
 

@@ -45,6 +45,9 @@ const CONSTANTS: [&str; 8] = [
     "DRIVE_STATES",
 ];
 
+/// The functions of a self-test.
+const SELF_TEST: [&str; 2] = ["self_test", "self_test_hashes"];
+
 /// The items of the module, beside the definition of [`MISSING`]; `scene` is the text of the scene, if there is one.
 pub fn module_items(options: &Options, scene: Option<&str>) -> String {
     let mut out = items_and_types(options, scene, "");
@@ -130,6 +133,9 @@ fn constants_and_functions(options: &Options, scene: Option<&str>, missing: &str
     }
     for name in CONSTANTS {
         let _ = writeln!(out, "{}", value(name, missing));
+    }
+    if options.self_test || scene.is_some() {
+        SELF_TEST.iter().for_each(|name| out.extend([value(name, missing), "\n".to_string()]));
     }
     for function in functions(options, scene) {
         let name = function.name();
