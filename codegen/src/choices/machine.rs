@@ -15,6 +15,8 @@ pub struct MachineRow {
     pub triple: &'static str,
     /// What rustc calls the processor, for `-C target-cpu`.
     pub cpu: &'static str,
+    /// What rustc is told besides so that it keeps the order of the text, where that was measured to pay.
+    pub for_order: &'static [&'static str],
     /// What rustc is told besides where code runs from flash: fewer instructions, of which each takes longer.
     pub for_flash: &'static [&'static str],
     /// How many numbers of single precision its registers hold; none without a floating-point unit.
@@ -25,6 +27,9 @@ pub struct MachineRow {
 
 /// Multiply-accumulate that rounds the product, which LLVM leaves out on processors where it takes as long as the two.
 const MULTIPLY_ACCUMULATE: &[&str] = &["-C target-feature=-slowfpvmlx"];
+
+/// The scheduler of LLVM moves operations for their latencies, and values into memory; the order of the text is made for the registers.
+const KEPT_ORDER: &[&str] = &["-C llvm-args=-enable-misched=false"];
 
 /// Machines, with the constants that stand for them.
 macro_rules! machines {
@@ -46,6 +51,7 @@ machines! {
         doc: "Arm Cortex-M0+: no floating-point unit",
         triple: "thumbv6m-none-eabi",
         cpu: "cortex-m0plus",
+        for_order: &[],
         for_flash: &[],
         registers: None,
         is_scalar: true,
@@ -56,6 +62,7 @@ machines! {
         doc: "Arm Cortex-M3: no floating-point unit",
         triple: "thumbv7m-none-eabi",
         cpu: "cortex-m3",
+        for_order: &[],
         for_flash: &[],
         registers: None,
         is_scalar: true,
@@ -66,6 +73,7 @@ machines! {
         doc: "Arm Cortex-M4 with a floating-point unit of single precision",
         triple: "thumbv7em-none-eabihf",
         cpu: "cortex-m4",
+        for_order: KEPT_ORDER,
         for_flash: MULTIPLY_ACCUMULATE,
         registers: Some(32),
         is_scalar: true,
@@ -76,6 +84,7 @@ machines! {
         doc: "Arm Cortex-M7",
         triple: "thumbv7em-none-eabihf",
         cpu: "cortex-m7",
+        for_order: &[],
         for_flash: &[],
         registers: Some(32),
         is_scalar: true,
@@ -86,6 +95,7 @@ machines! {
         doc: "Arm Cortex-M33 with a floating-point unit of single precision",
         triple: "thumbv8m.main-none-eabihf",
         cpu: "cortex-m33",
+        for_order: &[],
         for_flash: MULTIPLY_ACCUMULATE,
         registers: Some(32),
         is_scalar: true,
@@ -96,6 +106,7 @@ machines! {
         doc: "RISC-V of 32 bits without a floating-point unit",
         triple: "riscv32imac-unknown-none-elf",
         cpu: "generic-rv32",
+        for_order: &[],
         for_flash: &[],
         registers: None,
         is_scalar: true,
@@ -106,6 +117,7 @@ machines! {
         doc: "RISC-V of 32 bits with a floating-point unit of single precision",
         triple: "riscv32imafc-unknown-none-elf",
         cpu: "generic-rv32",
+        for_order: &[],
         for_flash: &[],
         registers: Some(32),
         is_scalar: true,
@@ -116,6 +128,7 @@ machines! {
         doc: "Arm of 64 bits, with vectors of 128 bits",
         triple: "aarch64-unknown-none",
         cpu: "generic",
+        for_order: &[],
         for_flash: &[],
         registers: Some(32),
         is_scalar: false,
@@ -126,6 +139,7 @@ machines! {
         doc: "x86 of 64 bits with AVX2",
         triple: "x86_64-unknown-linux-gnu",
         cpu: "x86-64-v3",
+        for_order: &[],
         for_flash: &[],
         registers: Some(16),
         is_scalar: false,
@@ -146,7 +160,8 @@ impl TargetMachine {
     pub fn flags(self, memory: Memory) -> Vec<String> {
         let of_memory = if memory == Memory::Flash { self.0.for_flash } else { &[] };
         let cpu = format!("-C target-cpu={}", self.0.cpu);
-        [cpu].into_iter().chain(of_memory.iter().map(|flag| (*flag).to_string())).collect()
+        let besides = self.0.for_order.iter().chain(of_memory);
+        [cpu].into_iter().chain(besides.map(|flag| (*flag).to_string())).collect()
     }
 }
 

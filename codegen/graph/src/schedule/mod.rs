@@ -5,9 +5,11 @@
 //! its size; values that cross a cut go through an array of reused slots. A program with loops over limbs stays in one part, in its
 //! own order.
 
+mod annealing;
 mod few_alive;
+mod spills;
 
-use crate::expr::{Graph, NodeId, Op};
+use crate::expr::{Graph, NodeId, Op, Sines};
 
 /// How long one function may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +38,8 @@ pub struct ProgramPart {
     pub stores: Vec<(NodeId, usize)>,
     /// Which results (indices into [`Graph::results`]) it puts out.
     pub results: Vec<usize>,
+    /// Whether text keeps each operation where it stands here, as the order is made for the registers of a machine.
+    pub keeps_order: bool,
 }
 
 /// A program in its final order.
@@ -61,12 +65,19 @@ fn weight(op: Op) -> usize {
 }
 
 /// Orders and cuts a graph. Operations keep the order in which the algorithm wrote them, unless many values would go through
-/// memory; so do programs that are cut. How many numbers the registers hold is told where the machine is known.
+/// memory; so do programs that are cut. How many numbers the registers hold is told where the machine is known; the order is then
+/// searched for them, where angles are computed one at a time.
 pub fn schedule(graph: &Graph, limits: ScheduleLimits, registers: Option<usize>) -> Schedule {
     let mut order: Vec<NodeId> = graph.ids().filter(|id| is_value(graph.op(*id))).collect();
+    let mut keeps_order = false;
     let limits = if graph.alike.is_empty() { limits } else { ScheduleLimits { operations: usize::MAX } };
     if graph.alike.is_empty() && order.iter().map(|id| weight(graph.op(*id))).sum::<usize>() <= limits.operations {
         order = few_alive::improved(graph, order, registers);
+        // calls of several angles stay together
+        let registers = registers.filter(|_| graph.sines == Sines::Short);
+        if let Some(better) = registers.and_then(|registers| annealing::annealed(graph, &order, registers)) {
+            (order, keeps_order) = (better, true);
+        }
     }
     let position = {
         let mut position = vec![usize::MAX; graph.ops.len()];
@@ -101,7 +112,7 @@ pub fn schedule(graph: &Graph, limits: ScheduleLimits, registers: Option<usize>)
 
     let cuts = cuts(graph, &order, &live_after, limits);
     let part_of = |p: usize| cuts.partition_point(|c| *c <= p);
-    let mut parts = vec![ProgramPart::default(); cuts.len() + 1];
+    let mut parts = vec![ProgramPart { keeps_order, ..ProgramPart::default() }; cuts.len() + 1];
     for (p, id) in order.iter().enumerate() {
         parts[part_of(p)].nodes.push(*id);
     }

@@ -40,6 +40,8 @@ pub(super) struct Plan<'a> {
     pub crosses: Vec<bool>,
     /// Products that sums take in.
     pub absorbed: Vec<bool>,
+    /// What keeps its place in the order: it is not written where it is used.
+    pub stays: Vec<bool>,
     /// Of a loop over limbs what goes into arrays, by its nodes, in the order of those: the array, and the loop's index.
     pub arrays: Vec<(NodeId, (String, String))>,
 }
@@ -75,7 +77,8 @@ fn statements(graph: &Graph, part: &ProgramPart, scope: Scope<'_>, lowering: &Lo
         }
         out.push(Statement::Load(named));
     }
-    let mut plan = Plan { part, uses, results_of, crosses, absorbed, arrays: Vec::new() };
+    let stays = keep_their_places(graph, part, &uses);
+    let mut plan = Plan { part, uses, results_of, crosses, absorbed, stays, arrays: Vec::new() };
     if scope.style.lanes || graph.alike.is_empty() {
         b.run(&part.nodes, &plan, lowering, &mut out);
     } else {
@@ -89,6 +92,24 @@ fn statements(graph: &Graph, part: &ProgramPart, scope: Scope<'_>, lowering: &Lo
     }
     out.append(&mut b.statements);
     out
+}
+
+/// In a part that keeps its order, the values that something else stands behind, before their one user.
+fn keep_their_places(graph: &Graph, part: &ProgramPart, uses: &[u32]) -> Vec<bool> {
+    let mut stays = vec![false; graph.ops.len()];
+    if !part.keeps_order {
+        return stays;
+    }
+    let mut last_user = vec![0; graph.ops.len()];
+    for (p, id) in part.nodes.iter().enumerate() {
+        graph.op(*id).operands().for_each(|a| last_user[a.index()] = p);
+    }
+    for (p, id) in part.nodes.iter().enumerate() {
+        let user = last_user[id.index()];
+        let is_for_user = |n: &NodeId| uses[n.index()] <= 1 && last_user[n.index()] <= user;
+        stays[id.index()] = user > p && !part.nodes[p + 1..user].iter().all(is_for_user);
+    }
+    stays
 }
 
 impl<'a> Statements<'a> {
@@ -165,10 +186,10 @@ impl<'a> Statements<'a> {
         // a sign before a name is written wherever it is used; an operation is not
         let is_sign = matches!(op, Op::Unary(Unary::Neg, _)) && !crosses;
         let is_fused = || value.any(&mut |e| matches!(e, Expression::Fused { .. }));
-        let stays = (is_sign && length() < TRIVIAL && !is_fused())
+        let is_inlined = (is_sign && length() < TRIVIAL && !is_fused())
             || is_result_only()
-            || (alone && !is_named && length() < LINE * 2 / 3);
-        if stays {
+            || (alone && !is_named && !plan.stays[id.index()] && length() < LINE * 2 / 3);
+        if is_inlined {
             self.values[id.index()] = Some(value);
             return;
         }

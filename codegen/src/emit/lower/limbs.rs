@@ -101,7 +101,15 @@ impl Statements<'_> {
         for (node, _) in &results {
             crosses[node.index()] = uses[node.index()] > 0;
         }
-        let plan_of_loop = Plan { part: &part, uses, results_of: Vec::new(), crosses, absorbed, arrays };
+        let plan_of_loop = Plan {
+            part: &part,
+            uses,
+            results_of: Vec::new(),
+            crosses,
+            absorbed,
+            stays: vec![false; graph.ops.len()],
+            arrays,
+        };
         let mut body = Vec::new();
         inner.run(&part.nodes, &plan_of_loop, lowering, &mut body);
         self.names = std::mem::take(&mut inner.names);

@@ -1,0 +1,292 @@
+//! What a program takes on a machine of few registers beside its operations: loads, stores and copies of an order.
+//!
+//! The model is what LLVM makes of straight-line text whose order it keeps:
+//!
+//! * a product of single use is computed with the sum that takes it, in the register of the other term, which is copied before if it is
+//!   needed again;
+//! * a constant is loaded where it is needed, and again if its register was taken;
+//! * an input is loaded once, where it is first needed; of an array the first four that are needed are loaded together. From then on it is
+//!   a value like any other;
+//! * a value that leaves the registers is stored once and loaded again where it is needed (which ones leave: Belady 1966, constants
+//!   rather than others); a call leaves half of the registers.
+
+use crate::expr::{Binary, Graph, NodeId, Op};
+
+/// How many neighbours of an array are loaded together.
+const TOGETHER: usize = 4;
+
+/// What is computed or loaded in one go.
+#[derive(Default)]
+pub(super) struct Step {
+    /// The operations, in order; none of a load.
+    pub nodes: Vec<NodeId>,
+    /// The nodes whose values it takes, once each.
+    reads: Vec<usize>,
+    /// Those of them that take a register from where they are made to where they are last used: all but constants.
+    pub values: Vec<usize>,
+    /// The values that it makes for others.
+    pub makes: Vec<usize>,
+    /// Whether it is a call.
+    pub is_call: bool,
+    /// The value whose register the result takes.
+    accumulator: Option<usize>,
+}
+
+/// A program as steps that may change places.
+pub(super) struct Steps {
+    /// The steps, in no order.
+    pub steps: Vec<Step>,
+    /// Of every node the steps that take its value.
+    pub users: Vec<Vec<usize>>,
+    /// Of every step those that stand before it.
+    pub before: Vec<Vec<usize>>,
+    /// Of every step those that stand behind it.
+    pub behind: Vec<Vec<usize>>,
+    is_constant: Vec<bool>,
+    step_of: Vec<usize>,
+}
+
+impl Steps {
+    pub fn new(graph: &Graph, written: &[NodeId]) -> Steps {
+        let host = hosts(graph, written);
+        let mut made = Steps {
+            steps: Vec::new(),
+            users: vec![Vec::new(); graph.ops.len()],
+            before: Vec::new(),
+            behind: Vec::new(),
+            is_constant: graph.ops.iter().map(|op| matches!(op, Op::Constant(_))).collect(),
+            step_of: vec![usize::MAX; graph.ops.len()],
+        };
+        for id in written.iter().filter(|id| host[id.index()].is_none()) {
+            match graph.op(*id) {
+                // a half belongs to its pair, which stands before it
+                Op::Sin(pair) | Op::Cos(pair) => {
+                    let step = made.step_of[pair.index()];
+                    made.steps[step].nodes.push(*id);
+                    made.steps[step].makes.push(id.index());
+                    made.step_of[id.index()] = step;
+                }
+                _ => made.push(step(graph, *id, &host)),
+            }
+        }
+        made.push_loads(graph);
+        made.connect();
+        made
+    }
+
+    fn push(&mut self, step: Step) {
+        let makes = step.nodes.iter().map(|id| id.index()).chain(step.makes.iter().copied());
+        makes.for_each(|node| self.step_of[node] = self.steps.len());
+        self.steps.push(step);
+    }
+
+    /// A step for the first inputs of each port that are needed beside calls, and one for each of the others.
+    fn push_loads(&mut self, graph: &Graph) {
+        let mut is_read = vec![false; graph.ops.len()];
+        self.steps.iter().filter(|step| !step.is_call).flat_map(|step| &step.reads).for_each(|a| is_read[*a] = true);
+        let mut inputs: Vec<(usize, usize)> = Vec::new();
+        for (node, op) in graph.ops.iter().enumerate().filter(|(node, _)| is_read[*node]) {
+            if let Op::Input(k) = op {
+                inputs.push((*k as usize, node));
+            }
+        }
+        inputs.sort_unstable();
+        let (mut end, mut rest) = (0, inputs.as_slice());
+        for port in &graph.inputs {
+            end += port.len();
+            let (of_port, behind) = rest.split_at(rest.partition_point(|(k, _)| *k < end));
+            rest = behind;
+            let (together, alone) = of_port.split_at(of_port.len().min(TOGETHER));
+            for load in std::iter::once(together).chain(alone.chunks(1)).filter(|load| !load.is_empty()) {
+                self.push(Step { makes: load.iter().map(|(_, node)| *node).collect(), ..Step::default() });
+            }
+        }
+    }
+
+    fn connect(&mut self) {
+        let count = self.steps.len();
+        (self.before, self.behind) = (vec![Vec::new(); count], vec![Vec::new(); count]);
+        for (k, step) in self.steps.iter_mut().enumerate() {
+            step.values = step.reads.iter().copied().filter(|a| !self.is_constant[*a]).collect();
+            for a in &step.reads {
+                self.users[*a].push(k);
+                let maker = self.step_of[*a];
+                if maker != usize::MAX && !self.before[k].contains(&maker) {
+                    self.before[k].push(maker);
+                    self.behind[maker].push(k);
+                }
+            }
+        }
+        for step in &mut self.steps {
+            step.makes.retain(|node| !self.users[*node].is_empty());
+        }
+    }
+
+    /// The steps of these operations in their order, each where its last operation stands, each load before the first that takes it.
+    pub fn order(&self, nodes: &[NodeId]) -> Vec<usize> {
+        let ends = nodes.iter().filter_map(|id| {
+            let step = self.step_of[id.index()];
+            let end =
+                if self.steps[step].is_call { self.steps[step].nodes.first() } else { self.steps[step].nodes.last() };
+            (end == Some(id)).then_some(step)
+        });
+        self.with_loads_late(ends)
+    }
+
+    /// The same order, each load before the first step that takes it: where the text reads it first.
+    pub fn with_loads_late(&self, order: impl IntoIterator<Item = usize>) -> Vec<usize> {
+        let mut placed = vec![false; self.steps.len()];
+        let mut late = Vec::with_capacity(self.steps.len());
+        for step in order.into_iter().filter(|step| !self.steps[*step].nodes.is_empty()) {
+            for load in self.before[step].iter().filter(|before| self.steps[**before].nodes.is_empty()) {
+                if !std::mem::replace(&mut placed[*load], true) {
+                    late.push(*load);
+                }
+            }
+            late.push(step);
+        }
+        late
+    }
+
+    /// The operations of these steps.
+    pub fn nodes(&self, order: &[usize]) -> Vec<NodeId> {
+        order.iter().flat_map(|step| self.steps[*step].nodes.iter().copied()).collect()
+    }
+
+    /// Loads, stores and copies that an order takes with so many registers, results not counted.
+    pub fn traffic(&self, order: &[usize], registers: usize) -> usize {
+        Registers::new(self, order, registers).run(order)
+    }
+}
+
+/// Of every product of single use the sum that takes it in: of two products of a sum the last one.
+fn hosts(graph: &Graph, written: &[NodeId]) -> Vec<Option<NodeId>> {
+    let uses = graph.uses();
+    let mut host = vec![None; graph.ops.len()];
+    for id in written {
+        if let Op::Binary(Binary::Add | Binary::Sub, a, b) = graph.op(*id) {
+            let is_taken =
+                |term: &NodeId| uses[term.index()] == 1 && matches!(graph.op(*term), Op::Binary(Binary::Mul, ..));
+            if let Some(product) = [b, a].into_iter().find(is_taken) {
+                host[product.index()] = Some(*id);
+            }
+        }
+    }
+    host
+}
+
+/// The step that an operation ends.
+fn step(graph: &Graph, id: NodeId, host: &[Option<NodeId>]) -> Step {
+    let mut step = Step { is_call: matches!(graph.op(id), Op::SinCos(_)), ..Step::default() };
+    let mut accumulator = None;
+    for a in graph.op(id).operands() {
+        if host[a.index()] == Some(id) {
+            step.nodes.push(a);
+            step.reads.extend(graph.op(a).operands().map(NodeId::index));
+        } else if step.is_call {
+            // what a call takes of the inputs it does not keep
+            let kept = graph.angle_terms(a).into_iter().filter(|term| !matches!(graph.op(*term), Op::Input(_)));
+            step.reads.extend(kept.map(NodeId::index));
+        } else {
+            accumulator = Some(a.index()).filter(|_| !matches!(graph.op(a), Op::Constant(_)));
+            step.reads.push(a.index());
+        }
+    }
+    step.accumulator = accumulator.filter(|_| !step.nodes.is_empty());
+    step.nodes.push(id);
+    if !step.is_call {
+        step.makes.push(id.index());
+    }
+    step.reads.sort_unstable();
+    step.reads.dedup();
+    step
+}
+
+/// Registers while a program runs.
+struct Registers<'a> {
+    of: &'a Steps,
+    most: usize,
+    /// Of every node the positions where it is needed, the next one last.
+    uses: Vec<Vec<usize>>,
+    /// The nodes that are in registers.
+    held: Vec<usize>,
+    is_held: Vec<bool>,
+    is_stored: Vec<bool>,
+    traffic: usize,
+}
+
+impl<'a> Registers<'a> {
+    fn new(of: &'a Steps, order: &[usize], most: usize) -> Registers<'a> {
+        let mut position = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(p, step)| position[*step] = p);
+        let mut uses = of.users.clone();
+        for of_node in &mut uses {
+            of_node.iter_mut().for_each(|user| *user = position[*user]);
+            of_node.sort_unstable_by_key(|p| std::cmp::Reverse(*p));
+        }
+        let (is_held, is_stored) = (vec![false; uses.len()], vec![false; uses.len()]);
+        Registers { of, most, uses, held: Vec::new(), is_held, is_stored, traffic: 0 }
+    }
+
+    fn run(mut self, order: &[usize]) -> usize {
+        for (p, k) in order.iter().enumerate() {
+            let step = &self.of.steps[*k];
+            for a in &step.reads {
+                if !self.is_held[*a] {
+                    self.traffic += 1;
+                    if !step.is_call {
+                        self.hold(*a, p, &step.reads);
+                    }
+                }
+            }
+            for a in &step.reads {
+                self.uses[*a].pop();
+            }
+            if step.nodes.is_empty() {
+                self.traffic += step.makes.len();
+            }
+            self.traffic += usize::from(step.accumulator.is_some_and(|a| !self.uses[a].is_empty()));
+            let (uses, is_held) = (&self.uses, &mut self.is_held);
+            self.held.retain(|a| {
+                is_held[*a] = !uses[*a].is_empty();
+                is_held[*a]
+            });
+            while step.is_call && self.held.len() > kept_by_calls(self.most) {
+                self.leave(p, &[]);
+            }
+            for node in &step.makes {
+                self.hold(*node, p, &[]);
+            }
+        }
+        self.traffic
+    }
+
+    fn hold(&mut self, node: usize, p: usize, needed: &[usize]) {
+        while self.held.len() >= self.most {
+            self.leave(p, needed);
+        }
+        self.held.push(node);
+        self.is_held[node] = true;
+    }
+
+    /// Frees the register that is needed last; one that takes no store is free where it is needed half as far ahead.
+    fn leave(&mut self, p: usize, needed: &[usize]) {
+        let far = |k: &usize| {
+            let node = self.held[*k];
+            let ahead = self.uses[node].last().expect("a value that is held is needed") - p;
+            let is_free = self.of.is_constant[node] || self.is_stored[node];
+            (if is_free { 2 * ahead } else { ahead }, is_free)
+        };
+        let last = (0..self.held.len()).filter(|k| !needed.contains(&self.held[*k])).max_by_key(far);
+        let node = self.held.swap_remove(last.expect("there are more registers than operands"));
+        self.is_held[node] = false;
+        if !self.of.is_constant[node] && !std::mem::replace(&mut self.is_stored[node], true) {
+            self.traffic += 1;
+        }
+    }
+}
+
+/// How many of so many registers a call leaves as they are.
+pub(super) fn kept_by_calls(registers: usize) -> usize {
+    registers.div_ceil(2)
+}
