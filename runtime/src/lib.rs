@@ -143,6 +143,9 @@ struct GuideFirst;
 #[doc = include_str!("../../guide/src/control-loop.md")]
 struct GuideControlLoop;
 #[cfg(doctest)]
+#[doc = include_str!("../../guide/src/firmware.md")]
+struct GuideFirmware;
+#[cfg(doctest)]
 #[doc = include_str!("../../guide/src/output.md")]
 struct GuideOutput;
 #[cfg(doctest)]

@@ -188,7 +188,7 @@ impl<T: Real + PartialOrd, const N: usize> TorqueLimits<T, N> {
         // of NaN and of infinities the product with zero is NaN
         let is_finite = |x: &T| *x * T::zero() == T::zero();
         if !tau.iter().all(is_finite) {
-            *tau = [T::zero(); N];
+            stop(tau);
             return Outcome::NotFinite;
         }
         let mut outcome = Outcome::Within;
@@ -234,7 +234,7 @@ impl<T: Real + PartialOrd, const M: usize> MotorLimits<T, M> {
         let by_current = TorqueLimits { greatest: from_fn(|k| self.resistance[k] * self.current[k]) };
         let first = by_current.apply(&mut driving);
         if first == Outcome::NotFinite {
-            *u = [T::zero(); M];
+            stop(u);
             return first;
         }
         if first == Outcome::Saturated {
@@ -246,6 +246,11 @@ impl<T: Real + PartialOrd, const M: usize> MotorLimits<T, M> {
             second => second,
         }
     }
+}
+
+/// All torques or voltages zero, one after the other: a loop that does not become a call of `memset`, which firmware may not have.
+pub fn stop<T: Real, const N: usize>(tau: &mut [T; N]) {
+    tau.iter_mut().for_each(|tau| *tau = core::hint::black_box(T::zero()));
 }
 
 fn added<T: Real, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {

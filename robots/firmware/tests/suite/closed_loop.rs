@@ -1,12 +1,12 @@
 //! The firmware's step at 1 kHz in single precision, in a loop with a simulated arm in double precision.
 
 use straightline::integrate::{State, Step};
-use straightline_firmware_example::{control_step, Gains, Measured, Wanted, TORQUE_LIMITS};
-use straightline_robots::ur5;
+use straightline_firmware_example::arm::{control_step, Gains, Measured, Wanted, TORQUE_LIMITS};
+use straightline_robots::panda;
 
-const GAINS: Gains = Gains { stiffness: [400.0; 6], damping: [40.0; 6] };
-const FROM: [f64; 6] = [0.0, -1.2, 1.4, -0.3, 0.5, 0.2];
-const TO: [f64; 6] = [1.0, -0.5, 0.7, 0.4, -0.3, 1.0];
+const GAINS: Gains = Gains { stiffness: [400.0; 7], damping: [40.0; 7] };
+const FROM: [f64; 7] = [0.0, -0.9, 0.3, -2.3, -0.3, 1.9, 0.2];
+const TO: [f64; 7] = [0.8, -0.3, -0.4, -1.6, 0.4, 1.2, 1.0];
 /// Time of the motion \[s\].
 const TIME: f64 = 1.2;
 
@@ -25,18 +25,18 @@ fn wanted(t: f64) -> Wanted {
 #[test]
 fn the_arm_follows_a_fast_motion_within_a_milliradian() {
     // starts a little off
-    let mut state = State { q: FROM.map(|q| q + 0.02), qd: [0.0; 6] };
+    let mut state = State { q: FROM.map(|q| q + 0.02), qd: [0.0; 7] };
     let step = Step::of(2.5e-4);
     let (mut worst, mut greatest) = (0.0f64, 0.0f64);
     for millisecond in 0..1500 {
         let t = f64::from(millisecond) * 1e-3;
-        let (reference, mut tau) = (wanted(t), [0.0; 6]);
+        let (reference, mut tau) = (wanted(t), [0.0; 7]);
         let measured = Measured { q: state.q.map(|x| x as f32), qd: state.qd.map(|x| x as f32) };
         control_step(&GAINS, &reference, &measured, &mut tau).unwrap();
         assert!(tau.iter().zip(TORQUE_LIMITS).all(|(tau, limit)| tau.abs() <= limit));
         let drive = tau.map(f64::from);
         for _ in 0..4 {
-            let change = step.runge_kutta_4(0.0, &state, |_, q, qd, qdd| ur5::forward_dynamics(q, qd, &drive, qdd));
+            let change = step.runge_kutta_4(0.0, &state, |_, q, qd, qdd| panda::forward_dynamics(q, qd, &drive, qdd));
             state.add(&change, 0);
         }
         let now = wanted(t + 1e-3);

@@ -2,4 +2,6 @@
 //! A file is chosen by its name: `cargo test -p straightline-firmware-example --test suite no_panic::`.
 
 mod closed_loop;
+mod cross;
+mod device;
 mod no_panic;

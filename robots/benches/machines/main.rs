@@ -1,0 +1,343 @@
+//! What functions cost on a microcontroller: instructions, flash, stack, and the bits of their results.
+//!
+//! `cargo bench -p straightline-robots --bench machines` compiles the robots' functions in single precision for the machines of [`MACHINES`],
+//! runs them in an emulator and compares with `machines.tsv`: it fails where a function takes over 1 % more instructions, or where a machine
+//! computes other bits than the others. `MACHINES_UPDATE=1` writes that file anew. Instructions are exact, sines included; an emulator knows no cycles.
+//! Flash is the function with its constants, without the sines that functions share; loads and stores are those of the function's text,
+//! saving registers included; both, and the stack, are read off the object, with the sines' own stack added. The toolchain is that of
+//! `robots/firmware/toolchain`; without it the bench says so and succeeds.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use straightline_codegen::choices::{Memory, TargetMachine};
+use straightline_codegen::diagnostic::Source;
+use straightline_codegen::options::Options;
+use straightline_codegen::{compile, Function, Scalar};
+
+/// States that every function is run for.
+const STATES: u64 = 200;
+/// On machines that take a hundred times as long.
+const FEW_STATES: u64 = 40;
+/// More than that is worse.
+const TOLERANCE: f64 = 0.01;
+
+/// The robots: file, tolerance of its right angles, whether it floats.
+const ROBOTS: [(&str, f64, bool); 4] =
+    [("panda", 1e-15, false), ("ur5", 1e-10, false), ("puma560", 1e-15, false), ("solo12", 1e-15, true)];
+
+const FUNCTIONS: [Function; 4] =
+    [Function::InverseDynamics, Function::GravityForce, Function::MassMatrix, Function::ForwardDynamics];
+
+/// The machines that are emulated, the memory that code is made for, and the emulator.
+const MACHINES: [(TargetMachine, Memory, Emulator); 5] = [
+    (TargetMachine::CORTEX_M4F, Memory::Flash, Emulator::Arm("mps2-an386", "mps2.x")),
+    (TargetMachine::CORTEX_M4F, Memory::Tcm, Emulator::Arm("mps2-an386", "mps2.x")),
+    (TargetMachine::CORTEX_M0PLUS, Memory::Flash, Emulator::Arm("microbit", "microbit.x")),
+    (TargetMachine::RV32IMAC, Memory::Flash, Emulator::User("qemu-riscv32")),
+    (TargetMachine::RV32IMAFC, Memory::Flash, Emulator::User("qemu-riscv32")),
+];
+
+/// What runs the programs of a machine.
+#[derive(Clone, Copy)]
+enum Emulator {
+    /// A board, and the layout of its memory.
+    Arm(&'static str, &'static str),
+    /// A program of Linux.
+    User(&'static str),
+}
+
+/// What is known of a function on a machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Figures {
+    instructions: u64,
+    flash: u64,
+    stack: u64,
+    loads_and_stores: u64,
+}
+
+fn main() -> ExitCode {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let cross = std::env::var_os("STRAIGHTLINE_CROSS").map_or_else(|| here.join("../target/cross"), PathBuf::from);
+    if !cross.join("complete").exists() {
+        println!(
+            "skipped: there is no toolchain for microcontrollers ({}); robots/firmware/toolchain makes it",
+            cross.display()
+        );
+        return ExitCode::SUCCESS;
+    }
+    let folder = std::env::temp_dir().join(format!("straightline-machines-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder for programs");
+    let cross = std::fs::canonicalize(cross).expect("it is there");
+    let result = measured(&Bench { here, cross, folder: folder.clone() });
+    std::fs::remove_dir_all(&folder).expect("the folder can be removed");
+    result
+}
+
+fn measured(bench: &Bench) -> ExitCode {
+    let Some(plugin) = bench.plugin() else {
+        println!("skipped: there is no C compiler for the emulator's counter");
+        return ExitCode::SUCCESS;
+    };
+    let mut found: BTreeMap<String, Figures> = BTreeMap::new();
+    let mut bits: BTreeMap<u64, String> = BTreeMap::new();
+    let mut differ = false;
+    for (machine, memory, emulator) in MACHINES {
+        let states = if machine.row().registers.is_some() { STATES } else { FEW_STATES };
+        let program = bench.program(machine, memory, emulator, states);
+        let (output, counts) = bench.run(&program, emulator, &plugin);
+        let expected = bits.entry(states).or_insert_with(|| bench.on_the_host(machine, memory, states));
+        if *expected != output {
+            println!("{machine:?}, {memory:?}: other bits than the host's\n{output}\n{expected}");
+            differ = true;
+        }
+        let objects = bench.objects(&program);
+        for (name, instructions) in counts {
+            let own = objects.get(&name).copied().unwrap_or_default();
+            let memory = if memory == Memory::Flash { "flash" } else { "tcm" };
+            let figures = Figures { instructions: instructions / states, ..own };
+            found.insert(format!("{}\t{memory}\t{name}", machine.row().name), figures);
+        }
+    }
+    let record = bench.here.join("benches/machines.tsv");
+    let head = format!(
+        "# machine, memory, function: instructions, bytes of flash, bytes of stack, loads and stores; {}\n",
+        bench.compiler()
+    );
+    if std::env::var_os("MACHINES_UPDATE").is_some() {
+        let mut text = head;
+        for (name, f) in &found {
+            writeln!(text, "{name}\t{}\t{}\t{}\t{}", f.instructions, f.flash, f.stack, f.loads_and_stores)
+                .expect("a string takes text");
+        }
+        std::fs::write(&record, text).expect("the record can be written");
+        return if differ { ExitCode::FAILURE } else { ExitCode::SUCCESS };
+    }
+    let text = std::fs::read_to_string(&record).expect("the record stands beside this bench");
+    let same_compiler = text.starts_with(&head);
+    if !same_compiler {
+        println!("the record is of another compiler than {}: figures only", bench.compiler());
+    }
+    let recorded: BTreeMap<&str, u64> = text
+        .lines()
+        .filter_map(|line| {
+            let name = line.splitn(4, '\t').take(3).map(str::len).sum::<usize>() + 2;
+            let instructions = line.get(name..)?.trim().split('\t').next()?.parse().ok()?;
+            Some((&line[..name], instructions))
+        })
+        .collect();
+    let mut worse = false;
+    println!("| machine | memory | function | recorded | instructions | flash B | stack B | loads and stores |\n|---|---|---|---|---|---|---|---|");
+    for (name, f) in &found {
+        let before = recorded.get(name.as_str()).copied();
+        worse |= before.is_none_or(|before| f.instructions as f64 > before as f64 * (1.0 + TOLERANCE));
+        let before = before.map_or("-".to_string(), |n| n.to_string());
+        println!(
+            "| {} | {before} | {} | {} | {} | {} |",
+            name.replace('\t', " | "),
+            f.instructions,
+            f.flash,
+            f.stack,
+            f.loads_and_stores
+        );
+    }
+    if worse && same_compiler {
+        println!("more instructions than recorded: if it pays elsewhere, record it by MACHINES_UPDATE=1");
+    }
+    match differ || (worse && same_compiler) {
+        true => ExitCode::FAILURE,
+        false => ExitCode::SUCCESS,
+    }
+}
+
+struct Bench<'a> {
+    here: &'a Path,
+    cross: PathBuf,
+    folder: PathBuf,
+}
+
+impl Bench<'_> {
+    fn compiler(&self) -> String {
+        let output = Command::new(self.cross.join("rustc")).arg("--version").output().expect("rustc runs");
+        String::from_utf8_lossy(&output.stdout).trim().to_string()
+    }
+
+    /// The counter of instructions; none without a C compiler.
+    fn plugin(&self) -> Option<PathBuf> {
+        let library = self.folder.join("count.so");
+        let source = self.here.join("benches/machines/count.c");
+        let done =
+            Command::new("cc").args(["-O2", "-shared", "-fPIC", "-o"]).arg(&library).arg(source).status().ok()?;
+        done.success().then_some(library)
+    }
+
+    /// The modules of all robots, and what runs them.
+    fn source(&self, machine: TargetMachine, memory: Memory, states: u64, startup: &str) -> String {
+        let mut text = format!("#![allow(warnings)]\n{startup}const STATES: u64 = {states};\n");
+        let mut lines = String::new();
+        for (robot, tolerance, floats) in ROBOTS {
+            let name = format!("{robot}.urdf");
+            let file = std::fs::read_to_string(self.here.join("descriptions").join(&name)).expect("the robot is there");
+            let mut options = Options {
+                functions: FUNCTIONS.to_vec(),
+                scalar: Scalar::F32,
+                target: Some(machine),
+                memory,
+                ..Options::default()
+            };
+            (options.model.angle_tolerance, options.model.floating_base) = (tolerance, floats);
+            let generated = compile(&Source::new(&name, file), &options).unwrap_or_else(|errors| panic!("{errors}"));
+            writeln!(text, "pub mod {robot} {{\n{}}}", generated.text).expect("a string takes text");
+            writeln!(lines, "    run! {{ {robot} }}").expect("a string takes text");
+        }
+        let calls: String = ROBOTS.iter().map(|(robot, ..)| format!("    harness::{robot}();\n")).collect();
+        let harness = include_str!("harness.rs").replace("    ROBOTS\n", &lines).replace("STATES", "super::STATES");
+        text + &harness + &format!("fn run() {{\n{calls}}}\n")
+    }
+
+    fn program(&self, machine: TargetMachine, memory: Memory, emulator: Emulator, states: u64) -> PathBuf {
+        let device = self.here.join("firmware/device");
+        let startup = device.join("src/startup.rs").display().to_string();
+        let source = self.source(machine, memory, states, "#![no_std]\n#![no_main]\n").replace("STARTUP", &startup);
+        let file = self.folder.join("machine.rs");
+        std::fs::write(&file, source).expect("a file can be written");
+        let program = self.folder.join("machine.elf");
+        let mut rustc = Command::new(self.cross.join("rustc"));
+        rustc.args([
+            "--edition=2021",
+            "--crate-name=machine",
+            "-Copt-level=3",
+            "-Cpanic=abort",
+            "-Ccodegen-units=1",
+            "--cap-lints=allow",
+        ]);
+        rustc.args(["--target", machine.row().triple]);
+        machine.flags(memory).iter().for_each(|flag| {
+            rustc.args(flag.split(' '));
+        });
+        if let Emulator::Arm(_, layout) = emulator {
+            rustc.arg(format!("-Clink-arg=-T{}", device.join("memory").join(layout).display()));
+        }
+        let output = rustc.arg("-o").args([&program, &file]).output().expect("rustc runs");
+        assert!(output.status.success(), "{machine:?}: {}", String::from_utf8_lossy(&output.stderr));
+        program
+    }
+
+    /// What a program prints, and how many instructions each function took in all.
+    fn run(&self, program: &Path, emulator: Emulator, plugin: &Path) -> (String, Vec<(String, u64)>) {
+        let mut qemu = match emulator {
+            Emulator::Arm(board, _) => {
+                let mut qemu = Command::new(self.cross.join("qemu-system-arm"));
+                qemu.args([
+                    "-M",
+                    board,
+                    "-nographic",
+                    "-monitor",
+                    "none",
+                    "-serial",
+                    "none",
+                    "-chardev",
+                    "stdio,id=s0",
+                ]);
+                qemu.args(["-semihosting-config", "enable=on,target=native,chardev=s0", "-kernel"]).arg(program);
+                qemu
+            }
+            Emulator::User(name) => Command::new(self.cross.join(name)),
+        };
+        let names: Vec<(String, String)> =
+            ROBOTS.iter().flat_map(|(robot, ..)| FUNCTIONS.map(|f| mangled(robot, f.name()))).collect();
+        let roots: String = names.iter().map(|(_, symbol)| format!(",root={symbol}")).collect();
+        qemu.arg("-plugin").arg(format!("{}{roots}", plugin.display()));
+        if let Emulator::User(_) = emulator {
+            qemu.arg(program);
+        }
+        let output = qemu.output().expect("the emulator runs");
+        let (lines, counts) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        assert!(output.status.success(), "{lines}\n{counts}");
+        let of = |symbol: &str| {
+            let line = counts.lines().find(|line| line.ends_with(&format!(" {symbol}")));
+            let count = line.and_then(|line| line.split(' ').next()).and_then(|n| n.parse().ok());
+            count.unwrap_or_else(|| panic!("{symbol} was not counted: {counts}"))
+        };
+        (lines.into_owned(), names.iter().map(|(name, symbol)| (name.clone(), of(symbol))).collect())
+    }
+
+    /// The same program on this machine: what it prints.
+    fn on_the_host(&self, machine: TargetMachine, memory: Memory, states: u64) -> String {
+        let startup = "mod startup { pub fn say(name: &str, number: u32) { println!(\"{name} {number:08x}\"); } }\nfn main() { run() }\n";
+        let source = self.source(machine, memory, states, "").replace("#[path = \"STARTUP\"]\nmod startup;\n", startup);
+        let (file, program) = (self.folder.join("host.rs"), self.folder.join("host"));
+        std::fs::write(&file, source).expect("a file can be written");
+        let mut rustc = Command::new(self.cross.join("rustc"));
+        let output =
+            rustc.args(["--edition=2021", "-Copt-level=2", "--cap-lints=allow", "-o"]).args([&program, &file]).output();
+        let output = output.expect("rustc runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8_lossy(&Command::new(program).output().expect("it runs").stdout).into_owned()
+    }
+
+    /// Flash, stack, and loads and stores of every function, where the disassembler knows the machine.
+    fn objects(&self, program: &Path) -> BTreeMap<String, Figures> {
+        let output = Command::new(self.cross.join("arm-none-eabi-objdump")).args(["-d", "-t"]).arg(program).output();
+        let text = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
+        let mut of_symbols: BTreeMap<&str, Figures> = BTreeMap::new();
+        let mut current = "";
+        for line in text.lines() {
+            // `00002ae0 <name>:` or `00002ae0 g     F .text  00000204 name`
+            if let Some(name) = line.strip_suffix(">:").and_then(|line| line.split_once('<')) {
+                current = name.1;
+            } else if let Some((_, size)) = line.split_once(" F .text\t") {
+                let mut words = size.split_whitespace();
+                if let (Some(size), Some(name)) = (words.next(), words.last()) {
+                    of_symbols.entry(name).or_default().flash = u64::from_str_radix(size, 16).unwrap_or(0);
+                }
+            } else {
+                let mut words = line.split('\t').skip(2);
+                let (Some(operation), operands) = (words.next(), words.next().unwrap_or("")) else { continue };
+                let figures = of_symbols.entry(current).or_default();
+                let is_access =
+                    ["vldr", "vstr", "ldr", "str", "vldm", "vstm", "ldm", "stm", "vpush", "vpop", "push", "pop"];
+                figures.loads_and_stores +=
+                    u64::from(is_access.iter().any(|access| operation.trim().starts_with(access)));
+                figures.stack += set_aside(operation.trim(), operands);
+            }
+        }
+        let of_sines =
+            of_symbols.iter().filter(|(name, _)| name.contains("short_sines")).map(|(_, f)| f.stack).max().unwrap_or(0);
+        let names = ROBOTS.iter().flat_map(|(robot, ..)| FUNCTIONS.map(|f| mangled(robot, f.name())));
+        let figures = names.filter_map(|(name, symbol)| {
+            let (_, found) = of_symbols.iter().find(|(of, _)| of.contains(&symbol) && !of.contains("harness"))?;
+            Some((name, Figures { stack: found.stack + of_sines, ..*found }))
+        });
+        figures.collect()
+    }
+}
+
+/// `panda::inverse_dynamics`, and what is in its symbol.
+fn mangled(robot: &str, function: &str) -> (String, String) {
+    (format!("{robot}::{function}"), format!("{}{robot}{}{function}", robot.len(), function.len()))
+}
+
+/// Bytes of stack that an instruction takes.
+fn set_aside(operation: &str, operands: &str) -> u64 {
+    let listed = || operands.split_once('{').map_or("", |(_, list)| list.trim_end_matches('}'));
+    let number = |register: &str| register.trim().trim_start_matches(['d', 's']).parse::<u64>().unwrap_or(0);
+    let registers: u64 = match () {
+        () if operation.starts_with("vpush") => {
+            let count = listed()
+                .split(',')
+                .map(|r| r.split_once('-').map_or(1, |(a, b)| number(b) - number(a) + 1))
+                .sum::<u64>();
+            2 * count
+        }
+        () if operation.starts_with("push") || (operation.starts_with("stmdb") && operands.starts_with("sp!")) => {
+            listed().split(',').count() as u64
+        }
+        () => 0,
+    };
+    let below = operation.starts_with("sub") && operands.starts_with("sp");
+    let bytes =
+        operands.split_once('#').map_or("", |(_, n)| n.split(|c: char| !c.is_ascii_digit()).next().unwrap_or(""));
+    4 * registers + if below { bytes.parse().unwrap_or(0) } else { 0 }
+}
