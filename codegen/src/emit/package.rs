@@ -17,6 +17,10 @@ pub struct PackageKind {
     pub files: fn(&Generated, &str) -> Vec<(String, String)>,
 }
 
+/// Why packages have no functions in fixed point.
+pub(super) const NO_FIXED: [&str; 2] =
+    ["packages have no functions in fixed point", "leave out `fixed`; `generate` writes them in Rust"];
+
 /// Why packages of C refuse a self-test.
 pub(super) const NO_SELF_TEST: [&str; 2] =
     ["a package of C has no self-test", "leave out `self_test`; a file of Rust has it (`straightline generate`)"];

@@ -7,7 +7,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use straightline_codegen::certify::{search, Effort};
-use straightline_codegen::choices::{Lanes, LimbForm, TargetMachine};
+use straightline_codegen::choices::{FixedProducts, Lanes, LimbForm, TargetMachine};
 use straightline_codegen::compile::checked_package;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::emit::c99::{C99_SOURCE, KERNEL};
@@ -746,15 +746,21 @@ fn what_c99_cannot_have_is_refused_with_a_remedy() {
     let base = || Options { functions: vec![Function::GravityForce], ..Options::default() };
     let refusal = |kind: &PackageKind, options: Options| (kind.refusal)(&of(options));
     let staged = options_of("[outputs]\nfunctions = [\"gravity_force\"]\nstaged = true\n", base());
+    let mut fixed = Options { fixed: Some(FixedProducts::Wide), ..base() };
+    fixed.scene.ranges.q = JointRanges::All(InputRange::within(2.0));
     for (options, word) in [
         (Options { generic: true, ..base() }, "`generic`"),
         (Options { fma: true, ..base() }, "`fma`"),
         (Options { lanes: Some(Lanes::Standalone), ..base() }, "`lanes`"),
         (Options { also: vec![Scalar::F32], ..base() }, "`--scalar`"),
         (staged, "`staged`"),
+        (Options { self_test: true, ..base() }, "`self_test`"),
+        (fixed, "`fixed`"),
     ] {
-        let [_, help] = refusal(&C99_SOURCE, options).unwrap_or_else(|| panic!("{word} is not refused"));
+        let [_, help] = refusal(&C99_SOURCE, options.clone()).unwrap_or_else(|| panic!("{word} is not refused"));
         assert!(help.contains(word), "{help}");
+        let is_of_both = ["`generic`", "`--scalar`", "`staged`", "`self_test`", "`fixed`"].contains(&word);
+        assert_eq!(refusal(&C_ABI, options).is_some(), is_of_both, "{word}");
     }
     assert_eq!(refusal(&C99_SOURCE, base()), None);
     assert_eq!(refusal(&C_ABI, Options { fma: true, ..base() }), None);

@@ -95,6 +95,8 @@ fn a_text_with_short_sines_is_read_back() {
         } else {
             "#[inline(always)]\n    #[must_use]"
         };
+        let multiply_accumulate = generated.text.contains("-C target-feature=-slowfpvmlx\n");
+        assert_eq!(multiply_accumulate, memory == Memory::Flash, "the head says what rustc is to be told");
         assert!(generated.text.contains(inlined) && !generated.text.contains("mod trig"), "{memory:?}");
         for (word, other) in [
             ("short_sines::sin_cos_f32(q[1])", "short_sines::sin_cos_f32(q[2])"),

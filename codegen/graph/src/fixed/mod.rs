@@ -5,7 +5,7 @@
 //! shifted and results lose little. What comes out is a [program of words](words), whose interpreter gives the bits that any machine gives.
 //!
 //! # Why nothing overflows
-//! Ranges are those of the *computed* values ([`ErrorAnalysis::with_errors`]: exact values and what all errors before them add up to). Each is
+//! Ranges are those of the *computed* values ([`ErrorAnalysis::with_errors`](crate::certify::ErrorAnalysis::with_errors): exact values and what all errors before them add up to). Each is
 //! below 2^31 − 1 at its value's point, and at every point that a value is shifted to. Words wrap in reductions of angles alone.
 //!
 //! # Why the errors hold

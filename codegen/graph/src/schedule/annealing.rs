@@ -28,7 +28,7 @@ pub(super) fn annealed(graph: &Graph, order: &[NodeId], registers: usize) -> Opt
     if before == steps.traffic(&start, usize::MAX) {
         return None;
     }
-    let mut search = Search::new(&steps, start, registers - MOMENTS.0);
+    let mut search = OrderSearch::new(&steps, start, registers - MOMENTS.0);
     let mut best = (before, None);
     let moves = (MOVES.0 * steps.steps.len()).min(MOVES.1);
     for look in 0..LOOKS {
@@ -45,7 +45,7 @@ pub(super) fn annealed(graph: &Graph, order: &[NodeId], registers: usize) -> Opt
     best.1
 }
 
-struct Search<'a> {
+struct OrderSearch<'a> {
     steps: &'a Steps,
     registers: isize,
     order: Vec<usize>,
@@ -59,12 +59,12 @@ struct Search<'a> {
     random: u64,
 }
 
-impl<'a> Search<'a> {
-    fn new(steps: &'a Steps, order: Vec<usize>, registers: usize) -> Search<'a> {
+impl<'a> OrderSearch<'a> {
+    fn new(steps: &'a Steps, order: Vec<usize>, registers: usize) -> OrderSearch<'a> {
         let mut position = vec![0; order.len()];
         order.iter().enumerate().for_each(|(p, step)| position[*step] = p);
         let alive = alive(steps, &order);
-        Search {
+        OrderSearch {
             steps,
             registers: registers as isize,
             order,
@@ -244,7 +244,7 @@ mod tests {
     fn what_a_move_changes_is_what_counting_again_finds() {
         let (graph, written) = waiting(40);
         let steps = Steps::new(&graph, &written);
-        let mut search = Search::new(&steps, steps.order(&written), 8);
+        let mut search = OrderSearch::new(&steps, steps.order(&written), 8);
         let start = search.alive.clone();
         for k in 0..2000 {
             search.step(HOT);

@@ -17,7 +17,7 @@ const TOGETHER: usize = 4;
 
 /// What is computed or loaded in one go.
 #[derive(Default)]
-pub(super) struct Step {
+pub(super) struct MachineStep {
     /// The operations, in order; none of a load.
     pub nodes: Vec<NodeId>,
     /// The nodes whose values it takes, once each.
@@ -35,7 +35,7 @@ pub(super) struct Step {
 /// A program as steps that may change places.
 pub(super) struct Steps {
     /// The steps, in no order.
-    pub steps: Vec<Step>,
+    pub steps: Vec<MachineStep>,
     /// Of every node the steps that take its value.
     pub users: Vec<Vec<usize>>,
     /// Of every step those that stand before it.
@@ -74,7 +74,7 @@ impl Steps {
         made
     }
 
-    fn push(&mut self, step: Step) {
+    fn push(&mut self, step: MachineStep) {
         let makes = step.nodes.iter().map(|id| id.index()).chain(step.makes.iter().copied());
         makes.for_each(|node| self.step_of[node] = self.steps.len());
         self.steps.push(step);
@@ -98,7 +98,10 @@ impl Steps {
             rest = behind;
             let (together, alone) = of_port.split_at(of_port.len().min(TOGETHER));
             for load in std::iter::once(together).chain(alone.chunks(1)).filter(|load| !load.is_empty()) {
-                self.push(Step { makes: load.iter().map(|(_, node)| *node).collect(), ..Step::default() });
+                self.push(MachineStep {
+                    makes: load.iter().map(|(_, node)| *node).collect(),
+                    ..MachineStep::default()
+                });
             }
         }
     }
@@ -155,7 +158,7 @@ impl Steps {
 
     /// Loads, stores and copies that an order takes with so many registers, results not counted.
     pub fn traffic(&self, order: &[usize], registers: usize) -> usize {
-        Registers::new(self, order, registers).run(order)
+        HeldValues::new(self, order, registers).run(order)
     }
 }
 
@@ -176,8 +179,8 @@ fn hosts(graph: &Graph, written: &[NodeId]) -> Vec<Option<NodeId>> {
 }
 
 /// The step that an operation ends.
-fn step(graph: &Graph, id: NodeId, host: &[Option<NodeId>]) -> Step {
-    let mut step = Step { is_call: matches!(graph.op(id), Op::SinCos(_)), ..Step::default() };
+fn step(graph: &Graph, id: NodeId, host: &[Option<NodeId>]) -> MachineStep {
+    let mut step = MachineStep { is_call: matches!(graph.op(id), Op::SinCos(_)), ..MachineStep::default() };
     let mut accumulator = None;
     for a in graph.op(id).operands() {
         if host[a.index()] == Some(id) {
@@ -203,7 +206,7 @@ fn step(graph: &Graph, id: NodeId, host: &[Option<NodeId>]) -> Step {
 }
 
 /// Registers while a program runs.
-struct Registers<'a> {
+struct HeldValues<'a> {
     of: &'a Steps,
     most: usize,
     /// Of every node the positions where it is needed, the next one last.
@@ -215,8 +218,8 @@ struct Registers<'a> {
     traffic: usize,
 }
 
-impl<'a> Registers<'a> {
-    fn new(of: &'a Steps, order: &[usize], most: usize) -> Registers<'a> {
+impl<'a> HeldValues<'a> {
+    fn new(of: &'a Steps, order: &[usize], most: usize) -> HeldValues<'a> {
         let mut position = vec![0; order.len()];
         order.iter().enumerate().for_each(|(p, step)| position[*step] = p);
         let mut uses = of.users.clone();
@@ -225,7 +228,7 @@ impl<'a> Registers<'a> {
             of_node.sort_unstable_by_key(|p| std::cmp::Reverse(*p));
         }
         let (is_held, is_stored) = (vec![false; uses.len()], vec![false; uses.len()]);
-        Registers { of, most, uses, held: Vec::new(), is_held, is_stored, traffic: 0 }
+        HeldValues { of, most, uses, held: Vec::new(), is_held, is_stored, traffic: 0 }
     }
 
     fn run(mut self, order: &[usize]) -> usize {

@@ -3,7 +3,7 @@
 use super::constants::{cost, error_bounds, of_robot, AssociatedConstant, COST};
 use super::routine::SHORT_SINES;
 use super::{batch, bound, contact, fused, indented, parameter, pasted, self_test, staged};
-use crate::choices::{Lanes, Memory};
+use crate::choices::{Choice, Lanes, Memory};
 use crate::emit::module::Item;
 use crate::emit::Generated;
 use crate::identifier::comment;
@@ -165,6 +165,11 @@ pub(super) fn header(generated: &Generated) -> String {
         comment(&provenance.source)
     );
     let _ = writeln!(out, "// Inputs' hash: {:016x}", provenance.hash);
+    if let Some(machine) = generated.target {
+        let (name, memory) = (machine.row().name, generated.memory.word());
+        let flags = machine.flags(generated.memory).join(" ");
+        let _ = writeln!(out, "// For {name}, code in {memory}: rustc with --target {} {flags}", machine.row().triple);
+    }
     let _ = writeln!(out, "//");
     let base = if floating { "floating base" } else { "fixed base" };
     let _ = writeln!(
