@@ -95,7 +95,7 @@ fn the_scan_sees_what_it_looks_for() {
 #[test]
 fn the_scan_sees_what_it_looks_for_on_a_microcontroller() {
     if let Some(rustc) = cross::program("rustc") {
-        sees_what_it_looks_for("bad-m4", rustc.into(), Some("thumbv7em-none-eabihf"));
+        sees_what_it_looks_for("bad_m4", rustc.into(), Some("thumbv7em-none-eabihf"));
     }
 }
 
@@ -113,7 +113,10 @@ fn sees_what_it_looks_for(name: &str, rustc: std::ffi::OsString, target: Option<
         rustc.args(["--target", target]);
     }
     let status = rustc
-        .args(["--crate-type=rlib", "--crate-name=bad"])
+        // a name of its own: rustc writes more than the object, and tests run side by side
+        .args(["--crate-type=rlib", "--crate-name"])
+        .arg(name)
+        .arg(format!("--out-dir={}", scratch("").display()))
         .args(FLAGS)
         .arg(format!("--emit=obj={}", object.display()))
         .arg(&source)
