@@ -1,11 +1,16 @@
 //! Forces to motion and motion to forces: inverse and forward dynamics, and what they are made of.
 
 use super::spec::Extent::{Joints, Of, Velocities};
-use super::spec::{Divisor, Form, InLanes, Judged, Output, Parts, RobotFunction, Spec};
-use super::{Forms, ForwardDynamicsMethod, Quantity};
+use super::spec::{Divisor, Family, Form, InLanes, Judged, Output, Parts, RobotFunction, Spec};
+use super::{Forms, ForwardDynamicsMethod, Function, Quantity};
 use straightline_core::algorithms as alg;
 use straightline_core::spatial::Vec3;
 use straightline_core::Real;
+
+const GRAVITY_FORCE: Output = Output::new("g", &[Velocities], "generalized forces \\[N·m or N\\]");
+const MASS_MATRIX: Output =
+    Output::new("h", &[Velocities, Velocities], "rows of H, both triangles \\[kg·m², kg·m, kg\\]")
+        .of_parts(Parts::Diagonal);
 
 pub struct InverseDynamics;
 
@@ -34,7 +39,7 @@ impl RobotFunction for GravityForce {
         summary: "Gravity forces g(q): the generalized forces that hold the robot still.",
         aliases: &["gravity compensation", "generalized gravity"],
         inputs: &[Quantity::Configuration],
-        outputs: &[Output::new("g", &[Velocities], "generalized forces \\[N·m or N\\]")],
+        outputs: &[GRAVITY_FORCE],
         form: Form::BiasForce,
         in_lanes: InLanes::WhereAsked,
         ..Spec::DEFAULT
@@ -91,8 +96,7 @@ impl RobotFunction for MassMatrix {
         summary: "The mass matrix H(q), symmetric.",
         aliases: &["CRBA", "inertia matrix", "joint space inertia", "JSIM"],
         inputs: &[Quantity::Configuration],
-        outputs: &[Output::new("h", &[Velocities, Velocities], "rows of H, both triangles \\[kg·m², kg·m, kg\\]")
-            .of_parts(Parts::Diagonal)],
+        outputs: &[MASS_MATRIX],
         form: Form::MassMatrix,
         gains_by_substitutes: true,
         judged: Judged::ByInertias,
@@ -101,6 +105,28 @@ impl RobotFunction for MassMatrix {
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
         forms.mass_matrix(&inputs[0])
+    }
+}
+
+pub struct MassMatrixAndGravityForce;
+
+impl RobotFunction for MassMatrixAndGravityForce {
+    const SPEC: Spec = Spec {
+        name: "mass_matrix_and_gravity_force",
+        summary: "The mass matrix H(q) and the gravity forces g(q), which share sines and composite bodies.",
+        aliases: &["CRBA with gravity compensation"],
+        inputs: &[Quantity::Configuration],
+        outputs: &[MASS_MATRIX, GRAVITY_FORCE],
+        family: Family::Combination,
+        members: &[Function::MassMatrix, Function::GravityForce],
+        form: Form::Both,
+        gains_by_substitutes: true,
+        judged: Judged::ByInertias,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        [forms.mass_matrix(&inputs[0]), forms.gravity_force(&inputs[0])].concat()
     }
 }
 

@@ -115,6 +115,9 @@ functions! {
     whole::Momentum,
     /// Poses and Jacobians of the frames.
     kinematics::KinematicsAndJacobian,
+    /// H and g.
+    #[doc(alias("CRBA"))]
+    dynamics::MassMatrixAndGravityForce,
     /// Inputs of the drives to motion.
     drives::DrivenForwardDynamics,
     /// Motion to inputs of the drives.

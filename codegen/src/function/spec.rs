@@ -138,7 +138,7 @@ pub enum Divisor {
 pub enum Judged {
     /// The natural scale of the result.
     ByScale,
-    /// Of a mass matrix: the inertias of its row and column.
+    /// Of a mass matrix: the inertias of its row and column. Of forces behind it, their natural scale.
     ByInertias,
     /// Of accelerations: what they leave of τ − H q̈ − h.
     ByResidual,
@@ -151,11 +151,12 @@ impl Judged {
         if self != Judged::ByInertias {
             return results.iter().map(|x| x.size).collect();
         }
-        // √(H_ii H_jj), the Cauchy-Schwarz bound of the entry
+        // √(H_ii H_jj), the Cauchy-Schwarz bound of the entry; n² of them, and fewer than 2 n + 1 others
         let n = results.len().isqrt();
         let of_row = |i: usize| results[i * n + i].value.hi().abs().max(least * results[i * n + i].size);
         let roots: Vec<f64> = (0..n).map(|i| of_row(i).sqrt()).collect();
-        roots.iter().flat_map(|a| roots.iter().map(move |b| a * b)).collect()
+        let of_entries = roots.iter().flat_map(|a| roots.iter().map(move |b| a * b));
+        of_entries.chain(results[n * n..].iter().map(|x| x.size)).collect()
     }
 }
 

@@ -73,22 +73,21 @@ fn chosen(
         Form::InverseDynamics => both(search(InverseDynamics)),
         Form::BiasForce => both(search(BiasForce)),
         Form::MassMatrix => both(search(MassMatrix)),
-        Form::Both => robot.reduced_by(&search(BiasForce), &search(MassMatrix)),
-        Form::Motion => {
+        Form::Both | Form::Motion => {
             let (torques, mass_matrix) = (search(BiasForce), search(MassMatrix));
+            let mut pairs = vec![(&torques, &mass_matrix), (&torques, &torques), (&mass_matrix, &mass_matrix)];
             // articulated bodies share more with frames that turn
             let plain = plain(robot, options, optimisations);
-            let pairs =
-                [(&torques, &mass_matrix), (&torques, &torques), (&mass_matrix, &mass_matrix), (&plain, &plain)];
-            let robots = pairs.map(|(t, h)| robot.reduced_by(t, h));
+            pairs.extend((function.spec().form == Form::Motion).then_some((&plain, &plain)));
+            let robots: Vec<Robot> = pairs.into_iter().map(|(t, h)| robot.reduced_by(t, h)).collect();
             // one of the pairs, with the method that it gets, not a step on the way to something else
             let cost = |r: &Robot| {
                 let (counts, _, method) = candidate(r, frames, function, options, optimisations);
                 let other = (counts.flops() + DIVISION * (counts.div + counts.sqrt)) as f64;
                 method.map_or(other, |m| m.weight()) + (PAIR * counts.sin_cos + counts.tail) as f64
             };
-            let costs = robots.each_ref().map(cost);
-            let least = (0..robots.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).expect("there are four pairs");
+            let costs: Vec<f64> = robots.iter().map(cost).collect();
+            let least = (0..robots.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).expect("there are pairs");
             robots[least].clone()
         }
     }

@@ -175,16 +175,15 @@ impl Check<'_> {
     /// What losses are compared with.
     fn sizes(&self, state: &PortState, found: &[Dd], off: &[Magnitude], least: f64) -> Vec<f64> {
         let PlainEquations { robot, frames, function, options } = self.plain;
-        let (nv, scene) = (robot.model.nv(), &options.scene);
-        let is_whole = |all: usize| {
-            let frames = scene.frames_of(function, frames).len();
-            scene.select(function, &robot.model, frames).0.into_iter().eq(0..all)
-        };
+        let scene = &options.scene;
+        let frames = scene.frames_of(function, frames).len();
+        let all: usize = function.outputs(&robot.model, frames).iter().map(Port::len).sum();
+        let is_whole = scene.select(function, &robot.model, frames).0.into_iter().eq(0..all);
         match function.spec().judged {
-            Judged::ByResidual if is_whole(nv) => sizes_of_accelerations(robot, options, state, off),
+            Judged::ByResidual if is_whole => sizes_of_accelerations(robot, options, state, off),
             // residuals have no scale of accelerations: all of them are judged by the greatest
             Judged::ByResidual => vec![found.iter().map(|x| x.hi().abs()).fold(0.0, f64::max); found.len()],
-            judged @ Judged::ByInertias if is_whole(nv * nv) => {
+            judged @ Judged::ByInertias if is_whole => {
                 let sized = |(value, off): (&Dd, &Magnitude)| Magnitude { value: *value, size: off.size };
                 judged.scales(&found.iter().zip(off).map(sized).collect::<Vec<_>>(), least)
             }

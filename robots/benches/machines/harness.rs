@@ -30,7 +30,7 @@ mod harness {
             #[inline(never)]
             pub fn $robot() {
                 use super::$robot as robot;
-                let (mut numbers, mut hash) = (Numbers(7), [0x811c_9dc5u32; 4]);
+                let (mut numbers, mut hash) = (Numbers(7), [0x811c_9dc5u32; 5]);
                 for state in 0..STATES {
                     let (mut q, mut qd, mut qdd) = ([0.0; robot::NQ], [0.0; robot::NV], [0.0; robot::NV]);
                     numbers.fill(3.0, &mut q);
@@ -52,6 +52,8 @@ mod harness {
                     hash[2] = h.iter().fold(hash[2], |hash, row| hashed(hash, row));
                     black_box::<fn(&_, &_, &_, &mut _)>(robot::forward_dynamics)(&q, &qd, &qdd, &mut y);
                     hash[3] = hashed(hash[3], &y);
+                    black_box::<fn(&_, &mut _, &mut _)>(robot::mass_matrix_and_gravity_force)(&q, &mut h, &mut y);
+                    hash[4] = h.iter().fold(hashed(hash[4], &y), |hash, row| hashed(hash, row));
                 }
                 hash.iter().for_each(|hash| super::startup::say(stringify!($robot), *hash));
             }

@@ -27,8 +27,13 @@ const TOLERANCE: f64 = 0.01;
 const ROBOTS: [(&str, f64, bool); 4] =
     [("panda", 1e-15, false), ("ur5", 1e-10, false), ("puma560", 1e-15, false), ("solo12", 1e-15, true)];
 
-const FUNCTIONS: [Function; 4] =
-    [Function::InverseDynamics, Function::GravityForce, Function::MassMatrix, Function::ForwardDynamics];
+const FUNCTIONS: [Function; 5] = [
+    Function::InverseDynamics,
+    Function::GravityForce,
+    Function::MassMatrix,
+    Function::ForwardDynamics,
+    Function::MassMatrixAndGravityForce,
+];
 
 /// The machines that are emulated, the memory that code is made for, and the emulator.
 const MACHINES: [(TargetMachine, Memory, Emulator); 5] = [

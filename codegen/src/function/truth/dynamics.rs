@@ -1,7 +1,8 @@
 //! Forces and motion, by the second author.
 
 use super::super::dynamics::{
-    BiasForce, ForwardDynamics, GravityForce, InverseDynamics, JointWrenches, MassMatrix, VelocityForce,
+    BiasForce, ForwardDynamics, GravityForce, InverseDynamics, JointWrenches, MassMatrix, MassMatrixAndGravityForce,
+    VelocityForce,
 };
 use super::super::Quantity;
 use super::{list, solved, Chapter, Truth};
@@ -40,6 +41,12 @@ impl Truth for VelocityForce {
 impl Truth for MassMatrix {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         Some(list(&at.with_rotors(reference::mass_matrix(&at.tree, at.q())).transpose()))
+    }
+}
+
+impl Truth for MassMatrixAndGravityForce {
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        Some([MassMatrix::truth(at)?, GravityForce::truth(at)?].concat())
     }
 }
 
