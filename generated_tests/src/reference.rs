@@ -16,6 +16,7 @@ use crate::bounds;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use straightline_codegen::function::truth::Chapter;
+use straightline_codegen::function::Quantity;
 use straightline_codegen::Function;
 use straightline_core::reference::CentreOfMassTree;
 use straightline_core::Dd;
@@ -156,6 +157,9 @@ impl Robot {
     /// The largest scaled error that a function may have: 20 times that of Pinocchio 4.1 on the same states, or 1e-14,
     /// whichever is larger.
     pub fn bound(&self, function: Function) -> f64 {
+        if let members @ [_, ..] = function.spec().members {
+            return members.iter().map(|member| self.bound(*member)).fold(0.0, f64::max);
+        }
         let key = match function {
             Function::InverseDynamics => "id",
             Function::BiasForce => "nle",
@@ -163,19 +167,12 @@ impl Robot {
             Function::VelocityForce => "coriolis",
             Function::MassMatrix => "crba",
             Function::ForwardDynamics => "aba",
-            Function::Energy => "energy",
             Function::JointWrenches => "wrench",
             Function::ForwardKinematics => "fk",
-            Function::Jacobian | Function::KinematicsAndJacobian => "jacobian",
+            Function::Jacobian => "jacobian",
             Function::JacobianBias | Function::FrameVelocity | Function::FrameAcceleration => "jdqd",
-            Function::CentreOfMass | Function::Momentum => "energy",
-            Function::DrivenForwardDynamics
-            | Function::DrivenInverseDynamics
-            | Function::DriveTorques
-            | Function::CompleteModel
-            | Function::StateSpace
-            | Function::DrivePower
-            | Function::DriveEnergy => "energy",
+            // sums over the bodies; of others the data hold nothing
+            _ => "energy",
         };
         let pinocchio = self.baseline[key]["scaled"].as_f64().expect("the baseline has every robot and function");
         (20.0 * pinocchio).max(bounds::FUNCTION.most)
@@ -183,6 +180,15 @@ impl Robot {
 
     /// What a function gives in a state; `None` for what the data do not hold.
     pub fn expected(&self, state: &State, function: Function) -> Option<Expected> {
+        if let members @ [_, ..] = function.spec().members {
+            let mut all = Expected { values: vec![], scales: vec![] };
+            for member in members {
+                let Expected { values, scales } = self.expected(state, *member)?;
+                all.values.extend(values);
+                all.scales.extend(scales);
+            }
+            return Some(all);
+        }
         let data = &state.data;
         // a field that is left out stands there as null
         let field = |what: &str| data.get(what).filter(|value| !value.is_null());
@@ -257,21 +263,7 @@ impl Robot {
                 }
                 Some(expected)
             }
-            Function::KinematicsAndJacobian => {
-                let mut both = self.expected(state, Function::ForwardKinematics)?;
-                let jacobian = self.expected(state, Function::Jacobian)?;
-                both.values.extend(jacobian.values);
-                both.scales.extend(jacobian.scales);
-                Some(both)
-            }
-            Function::CentreOfMass | Function::Momentum => None,
-            Function::DrivenForwardDynamics
-            | Function::DrivenInverseDynamics
-            | Function::DriveTorques
-            | Function::CompleteModel
-            | Function::StateSpace
-            | Function::DrivePower
-            | Function::DriveEnergy => None,
+            _ => None,
         }
     }
 }
@@ -294,18 +286,14 @@ impl State {
 
     /// The inputs of a function, in the order of its ports.
     pub fn inputs(&self, function: Function) -> Vec<Vec<f64>> {
-        use Function::*;
-        let last = match function {
-            ForwardDynamics => Some(&self.fd_tau),
-            InverseDynamics | JointWrenches | FrameAcceleration => Some(&self.qdd),
-            _ => None,
+        let of = |quantity: &Quantity| match quantity {
+            Quantity::Configuration => self.q.clone(),
+            Quantity::Velocity => self.qd.clone(),
+            Quantity::Acceleration => self.qdd.clone(),
+            Quantity::Force => self.fd_tau.clone(),
+            other => panic!("{}: the data hold no {other:?}", function.name()),
         };
-        let position_only = matches!(
-            function,
-            ForwardKinematics | Jacobian | KinematicsAndJacobian | GravityForce | MassMatrix | CentreOfMass
-        );
-        let middle = (!position_only).then_some(&self.qd);
-        [Some(&self.q), middle, last].into_iter().flatten().cloned().collect()
+        function.spec().inputs.iter().map(of).collect()
     }
 
     /// The inputs as Rust, ready to paste into a test.

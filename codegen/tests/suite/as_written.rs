@@ -8,6 +8,7 @@ use std::sync::Mutex;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
+use straightline_codegen::function::Family;
 use straightline_codegen::model::singular::{singular_joints, Inertia};
 use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::options::{Optimisations, Options};
@@ -241,7 +242,8 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
     };
     let second = SecondReading::new(source, &model, &options);
     let second = second.unwrap_or_else(|why| panic!("what the compiler takes the second author refuses: {why}"));
-    let mut functions: Vec<Function> = Function::all().chain([Function::KinematicsAndJacobian]).collect();
+    let of_bodies = |f: &Function| matches!(f.spec().family, Family::Robot | Family::Combination);
+    let mut functions: Vec<Function> = Function::known().filter(of_bodies).collect();
     if !singular_joints(&model, Inertia::OfLinks).is_empty() {
         functions.retain(|f| *f != Function::ForwardDynamics);
     }

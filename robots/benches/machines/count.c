@@ -41,8 +41,9 @@ static void translated(qemu_plugin_id_t id, struct qemu_plugin_tb *tb)
     struct stretch *s = malloc(sizeof *s);
     (void)id;
     s->of = symbol == NULL || strstr(symbol, "harness") != NULL ? -2 : -1;
-    for (int k = 0; s->of == -1 && k < known; k++)
-        if (strstr(symbol, roots[k]) != NULL)
+    /* the longest: one function's name may begin another's */
+    for (int k = 0; s->of != -2 && k < known; k++)
+        if (strstr(symbol, roots[k]) != NULL && (s->of == -1 || strlen(roots[k]) > strlen(roots[s->of])))
             s->of = k;
     s->instructions = qemu_plugin_tb_n_insns(tb);
     qemu_plugin_register_vcpu_tb_exec_cb(tb, run, 0, s);

@@ -7,6 +7,9 @@
 //! saving registers included; both, and the stack, are read off the object, with the sines' own stack added. The toolchain is that of
 //! `robots/firmware/toolchain`; without it the bench says so and succeeds.
 
+mod c99;
+mod looped;
+
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -14,7 +17,7 @@ use std::process::{Command, ExitCode};
 use straightline_codegen::choices::{Memory, TargetMachine};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::options::Options;
-use straightline_codegen::{compile, Function, Scalar};
+use straightline_codegen::{compile, Function, Generated, Scalar};
 
 /// States that every function is run for.
 const STATES: u64 = 200;
@@ -37,20 +40,19 @@ const FUNCTIONS: [Function; 5] = [
 
 /// The machines that are emulated, the memory that code is made for, and the emulator.
 const MACHINES: [(TargetMachine, Memory, Emulator); 5] = [
-    (TargetMachine::CORTEX_M4F, Memory::Flash, Emulator::Arm("mps2-an386", "mps2.x")),
-    (TargetMachine::CORTEX_M4F, Memory::Tcm, Emulator::Arm("mps2-an386", "mps2.x")),
-    (TargetMachine::CORTEX_M0PLUS, Memory::Flash, Emulator::Arm("microbit", "microbit.x")),
-    (TargetMachine::RV32IMAC, Memory::Flash, Emulator::User("qemu-riscv32")),
-    (TargetMachine::RV32IMAFC, Memory::Flash, Emulator::User("qemu-riscv32")),
+    (TargetMachine::CORTEX_M4F, Memory::Flash, CORTEX_M4F_BOARD),
+    (TargetMachine::CORTEX_M4F, Memory::Tcm, CORTEX_M4F_BOARD),
+    (TargetMachine::CORTEX_M0PLUS, Memory::Flash, Emulator { name: "microbit", layout: Some("microbit.x") }),
+    (TargetMachine::RV32IMAC, Memory::Flash, Emulator { name: "riscv32", layout: None }),
+    (TargetMachine::RV32IMAFC, Memory::Flash, Emulator { name: "riscv32", layout: None }),
 ];
+const CORTEX_M4F_BOARD: Emulator = Emulator { name: "mps2", layout: Some("mps2.x") };
 
-/// What runs the programs of a machine.
+/// What runs the programs of a machine: `run-NAME` of the toolchain, and of a board the layout of its memory.
 #[derive(Clone, Copy)]
-enum Emulator {
-    /// A board, and the layout of its memory.
-    Arm(&'static str, &'static str),
-    /// A program of Linux.
-    User(&'static str),
+struct Emulator {
+    name: &'static str,
+    layout: Option<&'static str>,
 }
 
 /// What is known of a function on a machine.
@@ -88,22 +90,35 @@ fn measured(bench: &Bench) -> ExitCode {
     let mut found: BTreeMap<String, Figures> = BTreeMap::new();
     let mut bits: BTreeMap<u64, String> = BTreeMap::new();
     let mut differ = false;
+    let functions: Vec<(String, String)> =
+        ROBOTS.iter().flat_map(|(robot, ..)| FUNCTIONS.map(|f| mangled(robot, f.name()))).collect();
     for (machine, memory, emulator) in MACHINES {
         let states = if machine.row().registers.is_some() { STATES } else { FEW_STATES };
-        let program = bench.program(machine, memory, emulator, states);
-        let (output, counts) = bench.run(&program, emulator, &plugin);
+        let source = bench.source(machine, memory, states, "#![no_std]\n#![no_main]\n");
+        let program = bench.linked(machine, memory, emulator, &source, &[]);
+        let (output, counts) = bench.run(&program, emulator, &plugin, &functions);
         let expected = bits.entry(states).or_insert_with(|| bench.on_the_host(machine, memory, states));
         if *expected != output {
             println!("{machine:?}, {memory:?}: other bits than the host's\n{output}\n{expected}");
             differ = true;
         }
-        let objects = bench.objects(&program);
+        let objects = bench.figures_of(&program, &functions);
         for (name, instructions) in counts {
             let own = objects.get(&name).copied().unwrap_or_default();
             let memory = if memory == Memory::Flash { "flash" } else { "tcm" };
             let figures = Figures { instructions: instructions / states, ..own };
             found.insert(format!("{}\t{memory}\t{name}", machine.row().name), figures);
         }
+    }
+    let (output, of_c99) = bench.c99(CORTEX_M4F_BOARD, &plugin);
+    if bits.get(&STATES) != Some(&output) {
+        println!("C99, cortex-m4f: other bits than the host's Rust\n{output}");
+        differ = true;
+    }
+    found.extend(of_c99.into_iter().map(|(name, figures)| (format!("cortex-m4f\tflash\t{name}"), figures)));
+    let looped = bench.looped(CORTEX_M4F_BOARD, &plugin);
+    for (robot, [_, figures]) in &looped {
+        found.insert(format!("cortex-m4f\tflash\t{robot}::inverse_dynamics, loop in C"), *figures);
     }
     let record = bench.here.join("benches/machines.tsv");
     let head = format!(
@@ -147,6 +162,11 @@ fn measured(bench: &Bench) -> ExitCode {
             f.loads_and_stores
         );
     }
+    println!("\n| inverse dynamics, Cortex-M4F, flash | generated | loop in C | times |\n|---|---|---|---|");
+    for (robot, [own, other]) in &looped {
+        let [own, other] = [own, other].map(|figures| figures.instructions);
+        println!("| {robot} | {own} | {other} | {:.2} |", other as f64 / own as f64);
+    }
     if worse && same_compiler {
         println!("more instructions than recorded: if it pays elsewhere, record it by MACHINES_UPDATE=1");
     }
@@ -177,34 +197,45 @@ impl Bench<'_> {
         done.success().then_some(library)
     }
 
-    /// The modules of all robots, and what runs them.
-    fn source(&self, machine: TargetMachine, memory: Memory, states: u64, startup: &str) -> String {
-        let mut text = format!("#![allow(warnings)]\n{startup}const STATES: u64 = {states};\n");
-        let mut lines = String::new();
-        for (robot, tolerance, floats) in ROBOTS {
-            let name = format!("{robot}.urdf");
-            let file = std::fs::read_to_string(self.here.join("descriptions").join(&name)).expect("the robot is there");
-            let mut options = Options {
-                functions: FUNCTIONS.to_vec(),
-                scalar: Scalar::F32,
-                target: Some(machine),
-                memory,
-                ..Options::default()
-            };
-            (options.model.angle_tolerance, options.model.floating_base) = (tolerance, floats);
-            let generated = compile(&Source::new(&name, file), &options).unwrap_or_else(|errors| panic!("{errors}"));
-            writeln!(text, "pub mod {robot} {{\n{}}}", generated.text).expect("a string takes text");
-            writeln!(lines, "    run! {{ {robot} }}").expect("a string takes text");
-        }
-        let calls: String = ROBOTS.iter().map(|(robot, ..)| format!("    harness::{robot}();\n")).collect();
-        let harness = include_str!("harness.rs").replace("    ROBOTS\n", &lines).replace("STATES", "super::STATES");
-        text + &harness + &format!("fn run() {{\n{calls}}}\n")
+    /// What is made of a robot for a machine.
+    fn compiled(&self, robot: &str, machine: TargetMachine, memory: Memory) -> Generated {
+        let (_, tolerance, floats) = ROBOTS.into_iter().find(|(name, ..)| *name == robot).expect("a robot of the list");
+        let name = format!("{robot}.urdf");
+        let file = std::fs::read_to_string(self.here.join("descriptions").join(&name)).expect("the robot is there");
+        let mut options = Options {
+            functions: FUNCTIONS.to_vec(),
+            scalar: Scalar::F32,
+            target: Some(machine),
+            memory,
+            ..Options::default()
+        };
+        (options.model.angle_tolerance, options.model.floating_base) = (tolerance, floats);
+        compile(&Source::new(&name, file), &options).unwrap_or_else(|errors| panic!("{errors}"))
     }
 
-    fn program(&self, machine: TargetMachine, memory: Memory, emulator: Emulator, states: u64) -> PathBuf {
+    /// The modules of all robots, and what runs them.
+    fn source(&self, machine: TargetMachine, memory: Memory, states: u64, head: &str) -> String {
+        let mut text = format!("{head}#![allow(warnings)]\n");
+        let mut runs = String::new();
+        for (robot, ..) in ROBOTS {
+            let generated = self.compiled(robot, machine, memory);
+            writeln!(text, "pub mod {robot} {{\n{}}}", generated.text).expect("a string takes text");
+            writeln!(runs, "    run! {{ {robot} }}").expect("a string takes text");
+        }
+        text + &harness(&runs, "", states)
+    }
+
+    /// A program for a machine, with these objects.
+    fn linked(
+        &self,
+        machine: TargetMachine,
+        memory: Memory,
+        emulator: Emulator,
+        source: &str,
+        objects: &[PathBuf],
+    ) -> PathBuf {
         let device = self.here.join("firmware/device");
-        let startup = device.join("src/startup.rs").display().to_string();
-        let source = self.source(machine, memory, states, "#![no_std]\n#![no_main]\n").replace("STARTUP", &startup);
+        let source = source.replace("STARTUP", &device.join("src/startup.rs").display().to_string());
         let file = self.folder.join("machine.rs");
         std::fs::write(&file, source).expect("a file can be written");
         let program = self.folder.join("machine.elf");
@@ -221,43 +252,27 @@ impl Bench<'_> {
         machine.flags(memory).iter().for_each(|flag| {
             rustc.args(flag.split(' '));
         });
-        if let Emulator::Arm(_, layout) = emulator {
+        if let Some(layout) = emulator.layout {
             rustc.arg(format!("-Clink-arg=-T{}", device.join("memory").join(layout).display()));
         }
+        rustc.args(objects.iter().map(|object| format!("-Clink-arg={}", object.display())));
         let output = rustc.arg("-o").args([&program, &file]).output().expect("rustc runs");
         assert!(output.status.success(), "{machine:?}: {}", String::from_utf8_lossy(&output.stderr));
         program
     }
 
-    /// What a program prints, and how many instructions each function took in all.
-    fn run(&self, program: &Path, emulator: Emulator, plugin: &Path) -> (String, Vec<(String, u64)>) {
-        let mut qemu = match emulator {
-            Emulator::Arm(board, _) => {
-                let mut qemu = Command::new(self.cross.join("qemu-system-arm"));
-                qemu.args([
-                    "-M",
-                    board,
-                    "-nographic",
-                    "-monitor",
-                    "none",
-                    "-serial",
-                    "none",
-                    "-chardev",
-                    "stdio,id=s0",
-                ]);
-                qemu.args(["-semihosting-config", "enable=on,target=native,chardev=s0", "-kernel"]).arg(program);
-                qemu
-            }
-            Emulator::User(name) => Command::new(self.cross.join(name)),
-        };
-        let names: Vec<(String, String)> =
-            ROBOTS.iter().flat_map(|(robot, ..)| FUNCTIONS.map(|f| mangled(robot, f.name()))).collect();
-        let roots: String = names.iter().map(|(_, symbol)| format!(",root={symbol}")).collect();
-        qemu.arg("-plugin").arg(format!("{}{roots}", plugin.display()));
-        if let Emulator::User(_) = emulator {
-            qemu.arg(program);
-        }
-        let output = qemu.output().expect("the emulator runs");
+    /// What a program prints, and how many instructions each of these functions took in all; by their names, with what is in their symbols.
+    fn run(
+        &self,
+        program: &Path,
+        emulator: Emulator,
+        plugin: &Path,
+        functions: &[(String, String)],
+    ) -> (String, Vec<(String, u64)>) {
+        let roots: String = functions.iter().map(|(_, symbol)| format!(",root={symbol}")).collect();
+        let mut run = Command::new(self.cross.join(format!("run-{}", emulator.name)));
+        let output = run.arg(program).arg("-plugin").arg(format!("{}{roots}", plugin.display())).output();
+        let output = output.expect("the emulator runs");
         let (lines, counts) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
         assert!(output.status.success(), "{lines}\n{counts}");
         let of = |symbol: &str| {
@@ -265,7 +280,7 @@ impl Bench<'_> {
             let count = line.and_then(|line| line.split(' ').next()).and_then(|n| n.parse().ok());
             count.unwrap_or_else(|| panic!("{symbol} was not counted: {counts}"))
         };
-        (lines.into_owned(), names.iter().map(|(name, symbol)| (name.clone(), of(symbol))).collect())
+        (lines.into_owned(), functions.iter().map(|(name, symbol)| (name.clone(), of(symbol))).collect())
     }
 
     /// The same program on this machine: what it prints.
@@ -283,7 +298,7 @@ impl Bench<'_> {
     }
 
     /// Flash, stack, and loads and stores of every function, where the disassembler knows the machine.
-    fn objects(&self, program: &Path) -> BTreeMap<String, Figures> {
+    fn figures_of(&self, program: &Path, functions: &[(String, String)]) -> BTreeMap<String, Figures> {
         let output = Command::new(self.cross.join("arm-none-eabi-objdump")).args(["-d", "-t"]).arg(program).output();
         let text = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
         let mut of_symbols: BTreeMap<&str, Figures> = BTreeMap::new();
@@ -310,13 +325,21 @@ impl Bench<'_> {
         }
         let of_sines =
             of_symbols.iter().filter(|(name, _)| name.contains("short_sines")).map(|(_, f)| f.stack).max().unwrap_or(0);
-        let names = ROBOTS.iter().flat_map(|(robot, ..)| FUNCTIONS.map(|f| mangled(robot, f.name())));
-        let figures = names.filter_map(|(name, symbol)| {
-            let (_, found) = of_symbols.iter().find(|(of, _)| of.contains(&symbol) && !of.contains("harness"))?;
-            Some((name, Figures { stack: found.stack + of_sines, ..*found }))
+        let figures = functions.iter().filter_map(|(name, symbol)| {
+            // the shortest: one function's name may begin another's
+            let all = of_symbols.iter().filter(|(of, _)| of.contains(symbol) && !of.contains("harness"));
+            let (_, found) = all.min_by_key(|(of, _)| of.len())?;
+            Some((name.clone(), Figures { stack: found.stack + of_sines, ..*found }))
         });
         figures.collect()
     }
+}
+
+/// What runs these robots.
+fn harness(runs: &str, externs: &str, states: u64) -> String {
+    let calls: String = ROBOTS.iter().map(|(robot, ..)| format!("    harness::{robot}();\n")).collect();
+    let text = include_str!("harness.rs").replace("    ROBOTS\n", runs).replace("    EXTERNS\n", externs);
+    format!("{}\nfn run() {{\n{calls}}}\n", text.replace("STATES", &states.to_string()))
 }
 
 /// `panda::inverse_dynamics`, and what is in its symbol.

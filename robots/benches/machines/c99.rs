@@ -1,0 +1,94 @@
+//! The package of C99 on a microcontroller: the same functions through the C compiler for it, with the bits that the host's Rust gives.
+
+use super::{harness, Bench, Emulator, Figures, FUNCTIONS, ROBOTS, STATES};
+use std::fmt::Write;
+use std::path::PathBuf;
+use std::process::Command;
+use straightline_codegen::choices::{Memory, TargetMachine};
+use straightline_codegen::emit::c99::C99_SOURCE;
+use straightline_codegen::Generated;
+
+/// The processor's own; the source itself keeps products and sums apart.
+const FLAGS: [&str; 9] = [
+    "-std=c99",
+    "-O2",
+    "-mcpu=cortex-m4",
+    "-mthumb",
+    "-mfloat-abi=hard",
+    "-mfpu=fpv4-sp-d16",
+    "-ffreestanding",
+    "-Wall",
+    "-Werror",
+];
+
+impl Bench<'_> {
+    /// What the functions of the packages say, and their figures by their names.
+    pub(super) fn c99(&self, emulator: Emulator, plugin: &std::path::Path) -> (String, Vec<(String, Figures)>) {
+        let (machine, memory) = (TargetMachine::CORTEX_M4F, Memory::Flash);
+        let mut text = "#![no_std]\n#![no_main]\n#![allow(warnings)]\n".to_string();
+        let (mut runs, mut objects, mut functions) = (String::new(), Vec::new(), Vec::new());
+        for (robot, ..) in ROBOTS {
+            let generated = self.compiled(robot, machine, memory);
+            objects.push(self.object_of_c99(robot, &generated));
+            text.push_str(&module(robot, &generated));
+            writeln!(runs, "    run! {{ {robot} }}").expect("a string takes text");
+            functions
+                .extend(FUNCTIONS.map(|f| (format!("{robot}::{} in C99", f.name()), format!("{robot}_{}", f.name()))));
+        }
+        let source = text + &harness(&runs, "", STATES);
+        let program = self.linked(machine, memory, emulator, &source, &objects);
+        let (output, counts) = self.run(&program, emulator, plugin, &functions);
+        let own = self.figures_of(&program, &functions);
+        let figures = counts.into_iter().map(|(name, instructions)| {
+            let own = own.get(&name).copied().unwrap_or_default();
+            (name, Figures { instructions: instructions / STATES, ..own })
+        });
+        (output, figures.collect())
+    }
+
+    fn object_of_c99(&self, robot: &str, generated: &Generated) -> PathBuf {
+        for (name, text) in (C99_SOURCE.files)(generated, robot) {
+            std::fs::write(self.folder.join(name), text).expect("a file can be written");
+        }
+        let [source, object] = ["c", "o"].map(|ending| self.folder.join(format!("{robot}_dynamics.{ending}")));
+        let mut compiler = Command::new(self.cross.join("arm-none-eabi-gcc"));
+        let output =
+            compiler.args(FLAGS).args(["-c", "-o"]).args([&object, &source]).output().expect("a C compiler runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        object
+    }
+}
+
+/// A module with the names and types of generated Rust, whose functions are those of the package.
+fn module(robot: &str, generated: &Generated) -> String {
+    let model = &generated.model;
+    let (mut externs, mut functions) = (String::new(), String::new());
+    for function in FUNCTIONS {
+        let name = function.name();
+        let list = |of: &dyn Fn(String, &str, bool) -> String| -> String {
+            let ports = [(function.inputs(model), false), (function.outputs(model, 0), true)];
+            let all = ports.iter().flat_map(|(ports, is_output)| ports.iter().map(move |port| (port, *is_output)));
+            let one = |(port, is_output): (&straightline_codegen::expr::Port, bool)| {
+                let array = port.shape.iter().rev().fold("f32".to_string(), |inner, n| format!("[{inner}; {n}]"));
+                of(array, &port.name, is_output)
+            };
+            all.map(one).collect()
+        };
+        let pointers =
+            list(&|_, name, is_output| format!("{name}: *{} f32, ", if is_output { "mut" } else { "const" }));
+        let references =
+            list(&|array, name, is_output| format!("{name}: &{}{array}, ", if is_output { "mut " } else { "" }));
+        let handed = list(&|_, name, is_output| match is_output {
+            true => format!("core::ptr::from_mut({name}).cast(), "),
+            false => format!("{name}.as_ptr(), "),
+        });
+        writeln!(externs, "        fn {robot}_{name}({pointers});").expect("a string takes text");
+        // SAFETY of the call: the header of the package has arrays of these shapes
+        writeln!(functions, "    pub fn {name}({references}) {{ unsafe {{ {robot}_{name}({handed}) }} }}")
+            .expect("a string takes text");
+    }
+    let (nq, nv) = (model.nq(), model.nv());
+    format!(
+        "pub mod {robot} {{\n    pub const NQ: usize = {nq};\n    pub const NV: usize = {nv};\n    extern \"C\" {{\n{externs}    }}\n{functions}}}\n"
+    )
+}
