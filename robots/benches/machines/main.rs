@@ -9,6 +9,7 @@
 
 mod c99;
 mod looped;
+mod self_tests;
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -97,7 +98,8 @@ fn measured(bench: &Bench) -> ExitCode {
         let source = bench.source(machine, memory, states, "#![no_std]\n#![no_main]\n");
         let program = bench.linked(machine, memory, emulator, &source, &[]);
         let (output, counts) = bench.run(&program, emulator, &plugin, &functions);
-        let expected = bits.entry(states).or_insert_with(|| bench.on_the_host(machine, memory, states));
+        let expected =
+            bits.entry(states).or_insert_with(|| bench.on_the_host(&bench.source(machine, memory, states, "")));
         if *expected != output {
             println!("{machine:?}, {memory:?}: other bits than the host's\n{output}\n{expected}");
             differ = true;
@@ -110,6 +112,7 @@ fn measured(bench: &Bench) -> ExitCode {
             found.insert(format!("{}\t{memory}\t{name}", machine.row().name), figures);
         }
     }
+    differ |= !bench.self_tests_agree();
     let (output, of_c99) = bench.c99(CORTEX_M4F_BOARD, &plugin);
     if bits.get(&STATES) != Some(&output) {
         println!("C99, cortex-m4f: other bits than the host's Rust\n{output}");
@@ -197,20 +200,28 @@ impl Bench<'_> {
         done.success().then_some(library)
     }
 
-    /// What is made of a robot for a machine.
-    fn compiled(&self, robot: &str, machine: TargetMachine, memory: Memory) -> Generated {
+    fn options(&self, robot: &str, target: TargetMachine, memory: Memory) -> Options {
         let (_, tolerance, floats) = ROBOTS.into_iter().find(|(name, ..)| *name == robot).expect("a robot of the list");
-        let name = format!("{robot}.urdf");
-        let file = std::fs::read_to_string(self.here.join("descriptions").join(&name)).expect("the robot is there");
         let mut options = Options {
             functions: FUNCTIONS.to_vec(),
             scalar: Scalar::F32,
-            target: Some(machine),
+            target: Some(target),
             memory,
             ..Options::default()
         };
         (options.model.angle_tolerance, options.model.floating_base) = (tolerance, floats);
-        compile(&Source::new(&name, file), &options).unwrap_or_else(|errors| panic!("{errors}"))
+        options
+    }
+
+    fn of_options(&self, robot: &str, options: &Options) -> Generated {
+        let name = format!("{robot}.urdf");
+        let file = std::fs::read_to_string(self.here.join("descriptions").join(&name)).expect("the robot is there");
+        compile(&Source::new(&name, file), options).unwrap_or_else(|errors| panic!("{errors}"))
+    }
+
+    /// What is made of a robot for a machine.
+    fn compiled(&self, robot: &str, machine: TargetMachine, memory: Memory) -> Generated {
+        self.of_options(robot, &self.options(robot, machine, memory))
     }
 
     /// The modules of all robots, and what runs them.
@@ -284,9 +295,9 @@ impl Bench<'_> {
     }
 
     /// The same program on this machine: what it prints.
-    fn on_the_host(&self, machine: TargetMachine, memory: Memory, states: u64) -> String {
+    fn on_the_host(&self, source: &str) -> String {
         let startup = "mod startup { pub fn say(name: &str, number: u32) { println!(\"{name} {number:08x}\"); } }\nfn main() { run() }\n";
-        let source = self.source(machine, memory, states, "").replace("#[path = \"STARTUP\"]\nmod startup;\n", startup);
+        let source = source.replace("#[path = \"STARTUP\"]\nmod startup;\n", startup);
         let (file, program) = (self.folder.join("host.rs"), self.folder.join("host"));
         std::fs::write(&file, source).expect("a file can be written");
         let mut rustc = Command::new(self.cross.join("rustc"));

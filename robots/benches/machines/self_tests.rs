@@ -1,0 +1,68 @@
+//! Self-tests on every machine: the hashes of ten thousand evaluations of each function, which are the same on all of them.
+
+use super::{Bench, Emulator, CORTEX_M4F_BOARD, MACHINES, ROBOTS};
+use std::fmt::Write;
+use std::process::Command;
+use straightline_codegen::choices::{Memory, TargetMachine};
+use straightline_codegen::options::Options;
+
+const EVALUATIONS: u32 = 10_000;
+
+/// The machines that are emulated besides.
+const FURTHER: [(TargetMachine, Memory, Emulator); 2] = [
+    (TargetMachine::CORTEX_M7, Memory::Tcm, Emulator { name: "mps2-m7", ..CORTEX_M4F_BOARD }),
+    (TargetMachine::AARCH64, Memory::Flash, Emulator { name: "aarch64", layout: None }),
+];
+
+impl Bench<'_> {
+    /// Whether all machines say the same, and that it is what the generated file expects.
+    pub(super) fn self_tests_agree(&self) -> bool {
+        let machines = || MACHINES.into_iter().chain(FURTHER);
+        let (mut agree, mut hashes) = (true, 0);
+        // robot by robot: a small machine has room for one
+        for (robot, ..) in ROBOTS {
+            // one text for all machines: that of the first
+            let source = self.self_test(robot, MACHINES[0].0, MACHINES[0].1);
+            let expected = self.on_the_host(&source);
+            hashes += expected.lines().count();
+            if expected.is_empty() || expected.lines().any(|line| line.starts_with("fails")) {
+                println!("the self-test of {robot} fails on the host:\n{expected}");
+                agree = false;
+            }
+            for (machine, memory, emulator) in machines() {
+                let source = format!("#![no_std]\n#![no_main]\n{source}");
+                let program = self.linked(machine, memory, emulator, &source, &[]);
+                let mut run = Command::new(self.cross.join(format!("run-{}", emulator.name)));
+                let output = run.arg(program).output().expect("the emulator runs");
+                let found = String::from_utf8_lossy(&output.stdout);
+                if !output.status.success() || found != expected {
+                    println!("self-test of {robot} on {machine:?}, {memory:?}:\n{found}\non the host:\n{expected}");
+                    agree = false;
+                }
+            }
+        }
+        println!("{hashes} hashes of {EVALUATIONS} evaluations on {} machines and the host", machines().count());
+        agree
+    }
+
+    /// A robot with all functions and its self-test, and what says its hashes.
+    fn self_test(&self, robot: &str, machine: TargetMachine, memory: Memory) -> String {
+        let options = self.options(robot, machine, memory);
+        let functions = Options::default().functions;
+        let generated = self.of_options(robot, &Options { functions, self_test: true, ..options });
+        let mut text = "#![allow(warnings)]\n#[path = \"STARTUP\"]\nmod startup;\n".to_string();
+        writeln!(text, "pub mod {robot} {{\n{}}}", generated.text).expect("a string takes text");
+        text + &format!(
+            "fn run() {{
+    if let Err(function) = {robot}::self_test() {{
+        startup::say(\"fails\", 0);
+        startup::say(function, 0);
+    }}
+    for (function, hash) in {robot}::self_test_hashes({EVALUATIONS}) {{
+        startup::say(function, (hash >> 32) as u32 ^ hash as u32);
+    }}
+}}
+"
+        )
+    }
+}
