@@ -4,4 +4,5 @@
 mod closed_loop;
 mod cross;
 mod device;
+mod frameworks;
 mod no_panic;

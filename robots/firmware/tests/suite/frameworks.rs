@@ -1,0 +1,32 @@
+//! The sketches for embassy and RTIC are linked for their microcontroller, and the controller is in them.
+
+use crate::cross;
+use std::path::Path;
+use std::process::Command;
+
+#[test]
+#[ignore = "slow proof: embassy, RTIC and the compiler of dynamics are built"]
+fn slow_proof_sketches_for_frameworks_are_linked() {
+    let Some(nm) = cross::program("arm-none-eabi-nm") else { return };
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let target = here.join("../../target/frameworks");
+    for name in ["embassy", "rtic"] {
+        let folder = here.join("frameworks").join(name);
+        let cargo = |arguments: &[&str]| {
+            let mut cargo = cross::cargo().expect("there is a toolchain");
+            cargo.args(arguments).args(["--locked", "--quiet"]).current_dir(&folder).env("CARGO_TARGET_DIR", &target);
+            cargo.status().unwrap().success()
+        };
+        if !cargo(&["fetch"]) {
+            eprintln!("skipped: what {name} depends on cannot be fetched");
+            continue;
+        }
+        assert!(cargo(&["build", "--release"]), "{name}");
+        let program = target.join(format!("thumbv7em-none-eabihf/release/straightline-{name}-sketch"));
+        let symbols = Command::new(&nm).args(["--defined-only"]).arg(program).output().unwrap();
+        let symbols = String::from_utf8(symbols.stdout).unwrap();
+        for wanted in ["3arm12control_step", "short_sines", " Reset"] {
+            assert!(symbols.contains(wanted), "{name}: {wanted} is not there");
+        }
+    }
+}
