@@ -85,6 +85,16 @@ pub enum LimbForm {
     Lanes,
     /// As lanes where that is measured to be faster, otherwise apart: see [`LimbForm::of`].
     Auto,
+    /// As turns of one loop, wherever two are alike, with a row of constants each: least code where there are no vectors. The same
+    /// operations as [`LimbForm::Lanes`].
+    Rolled,
+}
+
+impl LimbForm {
+    /// Whether it is nothing without limbs that are alike.
+    pub fn needs_limbs(self) -> bool {
+        matches!(self, LimbForm::Lanes | LimbForm::Rolled)
+    }
 }
 
 /// The functions over lanes and batches beside the plain ones: where the drivers of the batches come from.
@@ -160,6 +170,7 @@ choices! {
         "apart" Apart "each by itself, with its own constants: fewest operations",
         "lanes" Lanes "as lanes of one body: least code, and least time where there are four",
         "auto" Auto "as lanes where that is measured to be faster, otherwise apart",
+        "rolled" Rolled "one loop over them with a row of constants each: least code on microcontrollers",
     }
     Lanes "home of the batches" {
         "standalone" Standalone "core alone; the vector instructions that the crate is compiled for",

@@ -37,7 +37,7 @@
 //! | `generic`: Functions take any scalar that is a `straightline::Real`; the output depends on the package `straightline` | the scalar type alone |
 //! | `rules = "exact"`: Which rewrite rules may be used: `"all"`, `"exact"` | `"all"` |
 //! | `forward_dynamics = "articulated-body"`: How forward dynamics is computed: `"cheaper"`, `"articulated-body"`, `"factorisation"` | `"cheaper"` |
-//! | `limbs = "auto"`: How identical limbs are computed: `"apart"`, `"lanes"`, `"auto"` | `"apart"` |
+//! | `limbs = "auto"`: How identical limbs are computed: `"apart"`, `"lanes"`, `"auto"`, `"rolled"` | `"apart"` |
 //! | `target = "cortex-m4f"`: The machine that code is made for: short sines in f32 where it computes one angle at a time, and an order for its registers: `"cortex-m0plus"`, `"cortex-m3"`, `"cortex-m4f"`, `"cortex-m7"`, `"cortex-m33"`, `"rv32imac"`, `"rv32imafc"`, `"aarch64"`, `"x86-64-v3"` | any machine |
 //! | `memory = "tcm"`: The memory that code runs from on the machine of `target`: `"flash"`, `"tcm"` | `"flash"` |
 //! | `self_test`: Write `self_test()` beside the functions, which compares what a machine computes with what the compiler expects, to the bit | off |

@@ -1,6 +1,6 @@
 //! A robot in its scene, and options that fit it: all that is read and checked before anything is computed.
 
-use crate::choices::LimbForm;
+use crate::choices::Choice;
 use crate::description::{self, messages, Description};
 use crate::diagnostic::{Diagnostics, Source};
 use crate::function::Function;
@@ -63,8 +63,9 @@ pub(super) fn prepare(source: &Source, options: &Options) -> Result<Prepared, Di
         };
         options.scene.places.complain(&path, complaint, &mut diagnostics);
     }
-    if options.limbs == LimbForm::Lanes && model.as_ref().is_some_and(|model| model::limbs::limbs(model).is_empty()) {
-        options.scene.places.complain("options.limbs", scene::messages::no_identical_limbs(), &mut diagnostics);
+    if options.limbs.needs_limbs() && model.as_ref().is_some_and(|model| model::limbs::limbs(model).is_empty()) {
+        let complaint = scene::messages::no_identical_limbs(options.limbs.word());
+        options.scene.places.complain("options.limbs", complaint, &mut diagnostics);
     }
     diagnostics.sort();
     let (Some(description), Some(whole), Some(model), false) = (description, whole, model, diagnostics.has_errors())

@@ -146,6 +146,24 @@ pub enum Statement {
         /// The value.
         value: Expression,
     },
+    /// An array of as many rows as a loop over limbs has turns.
+    Table {
+        /// The identifier of the array.
+        name: String,
+        /// The rows, one per limb; of constants they need no code.
+        rows: Vec<Vec<Expression>>,
+        /// Whether they are constants.
+        is_constant: bool,
+    },
+    /// A result in a loop over limbs.
+    StoreOfLimb {
+        /// The output.
+        port: usize,
+        /// The number.
+        at: Stride,
+        /// Its value.
+        value: Expression,
+    },
     /// The same for every lane.
     Lanes(Vec<Statement>),
     /// The same for every limb.
@@ -154,6 +172,8 @@ pub enum Statement {
         index: String,
         /// How many.
         count: usize,
+        /// Whether compilers are kept from writing it out, as they would.
+        is_hidden: bool,
         /// What is done.
         body: Vec<Statement>,
     },
@@ -174,6 +194,13 @@ pub enum Expression {
         port: usize,
         /// The number, counted through its array.
         at: usize,
+    },
+    /// In a loop over limbs a number of input `port`.
+    InputOfLimb {
+        /// The input.
+        port: usize,
+        /// The number.
+        at: Stride,
     },
     /// A value that parts hand on.
     Slot(usize),
@@ -207,6 +234,26 @@ pub enum Index {
     Number(usize),
     /// That of the loop with this index.
     Loop(String),
+    /// In the row of the loop with this index, of rows of so many numbers, this one.
+    Row {
+        /// The loop's index.
+        index: String,
+        /// How many numbers a row has.
+        length: usize,
+        /// Which one.
+        entry: usize,
+    },
+}
+
+/// In an array the place of each turn of a loop.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stride {
+    /// Of the first turn.
+    pub first: usize,
+    /// From one turn to the next.
+    pub step: usize,
+    /// The loop's index.
+    pub index: String,
 }
 
 impl Expression {
@@ -230,7 +277,8 @@ impl Statement {
                 Statement::Set(_, value) | Statement::Store { value, .. } | Statement::Keep { value, .. } => {
                     value.any(of)
                 }
-                Statement::Put { value, .. } => value.any(of),
+                Statement::Put { value, .. } | Statement::StoreOfLimb { value, .. } => value.any(of),
+                Statement::Table { rows, .. } => rows.iter().flatten().any(|value| value.any(of)),
                 Statement::SinCos { angles, .. } => angles.iter().flatten().any(|term| term.any(of)),
                 Statement::Array { values, .. } => values.iter().any(|value| value.any(of)),
                 Statement::Lanes(body) | Statement::Limbs { body, .. } => body.iter().any(|s| s.any(is_so, of)),

@@ -1,6 +1,6 @@
 //! Options and scene, where they contradict each other.
 
-use crate::choices::LimbForm;
+use crate::choices::Choice;
 use crate::diagnostic::Diagnostics;
 use crate::function::Function;
 use crate::options::Options;
@@ -34,9 +34,9 @@ pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
     }
     for (function, _) in scene.budgets.iter().filter(|(_, b)| b.mixed_precision) {
         let path = format!("budget.{}.mixed_precision", function.name());
-        let in_lanes = options.limbs == LimbForm::Lanes;
+        let form = format!("`limbs = \"{}\"`", options.limbs.word());
         for (with, is_asked) in
-            [("`fma`", options.fma), ("`generic`", options.generic), ("`limbs = \"lanes\"`", in_lanes)]
+            [("`fma`", options.fma), ("`generic`", options.generic), (&form[..], options.limbs.needs_limbs())]
         {
             if is_asked {
                 scene.places.complain(&path, say::mixed_elsewhere(with), diagnostics);
@@ -46,8 +46,8 @@ pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
     if options.self_test && options.fma {
         scene.places.complain("options.self_test", say::self_test_fused(), diagnostics);
     }
-    if options.limbs == LimbForm::Lanes && options.grade == Grade::Exact {
-        scene.places.complain("options.limbs", say::limbs_exact(), diagnostics);
+    if options.limbs.needs_limbs() && options.grade == Grade::Exact {
+        scene.places.complain("options.limbs", say::limbs_exact(options.limbs.word()), diagnostics);
     }
     // of a file this was said when it was read, whatever functions of it are asked for
     let is_alone = |function: &&Function| scene.places.source().is_none() && !options.functions.contains(function);

@@ -7,6 +7,7 @@ use crate::function::{Function, Quantity};
 use crate::options::Options;
 use crate::program::{checked, TracedProgram};
 use crate::scene::{messages as say, Budget, CoulombForm, Effects, Gravity, MaxError, Misfit, Scene, Zero};
+use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
 use straightline_core::Dd;
@@ -62,8 +63,11 @@ fn code_bytes(program: &TracedProgram, scalar: Scalar) -> usize {
     let again: usize = rows.map(|row| again(&row)).sum();
     let mut bytes = operation * (graph.counts().flops() - again) as f64;
     let section = |id: &NodeId| graph.notes[id.index()].section;
+    let others: FxHashSet<NodeId> =
+        graph.alike.iter().flat_map(|a| &a.rows).flat_map(|row| row[1..].iter().copied()).collect();
+    let is_pair = |id: &&NodeId| matches!(graph.op(**id), Op::SinCos(_)) && !others.contains(*id);
     for run in schedule.parts.iter().flat_map(|part| part.nodes.chunk_by(|a, b| section(a) == section(b))) {
-        bytes += match run.iter().filter(|id| matches!(graph.op(**id), Op::SinCos(_))).count() {
+        bytes += match run.iter().filter(is_pair).count() {
             0 => 0.0,
             1 => alone,
             _ => block,

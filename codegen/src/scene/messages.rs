@@ -311,9 +311,9 @@ pub fn self_test_fused() -> D {
         .help("choose one of the two: remove `self_test`, or `fma`")
 }
 
-/// Identical limbs as lanes where rules keep every bit.
-pub fn limbs_exact() -> D {
-    D::error("limbs-exact", "`limbs = \"lanes\"` together with `rules = \"exact\"`".to_string())
+/// Identical limbs in one loop where rules keep every bit.
+pub fn limbs_exact(form: &str) -> D {
+    D::error("limbs-exact", format!("`limbs = \"{form}\"` together with `rules = \"exact\"`"))
         .detail(
             "by exact rules the output is the generic runtime bit for bit, and that adds up limbs one after the other",
         )
@@ -321,8 +321,8 @@ pub fn limbs_exact() -> D {
 }
 
 /// Identical limbs of a robot that has none.
-pub fn no_identical_limbs() -> D {
-    D::error("no-identical-limbs", "`limbs = \"lanes\"`, but no two limbs of the robot are alike".to_string())
+pub fn no_identical_limbs(form: &str) -> D {
+    D::error("no-identical-limbs", format!("`limbs = \"{form}\"`, but no two limbs of the robot are alike"))
         .detail("limbs are alike that hang on the same link and have the same kinds of joints in the same order; numbers may differ")
         .help("remove `limbs`, or say `limbs = \"auto\"`: lanes where there are any")
 }

@@ -295,6 +295,16 @@ fn long_functions_in_parts_and_limbs_in_loops_have_the_bits_of_their_programs() 
         );
         package.is_right(20);
     }
+    // rolled: a row of constants per leg, and short sines in the loop
+    for scalar in [Scalar::F64, Scalar::F32] {
+        let functions = vec![Function::InverseDynamics, Function::GravityForce];
+        let target = Some(TargetMachine::CORTEX_M4F);
+        let mut options = Options { limbs: LimbForm::Rolled, functions, target, ..in_scalar(scalar) };
+        options.model.floating_base = true;
+        let package = Package::new(&format!("c99-rolled-{}", scalar.name()), &robot("hyq.urdf"), &options);
+        assert!(package.text().contains("tau[8U + (3U * limb)] = "), "{}", package.text());
+        package.is_right(20);
+    }
     // angles of parallel joints are sums
     let package = Package::new("c99-ur5", &robot("ur5.urdf"), &Options { limits, ..in_scalar(Scalar::F32) });
     assert!(package.text().contains("robot_next_angle_f32(robot_first_angle_f32(q[1]), q[2])"), "{}", package.text());
@@ -813,7 +823,9 @@ fn the_rules_that_are_claimed_are_kept() {
     let arm = Package::new("c99-misra", &Source::new("arm.toml", ARM), &options);
     let limbs = Options { limbs: LimbForm::Lanes, functions: vec![Function::BiasForce], ..in_scalar(Scalar::F32) };
     let legs = Package::new("c99-misra-limbs", &robot("hyq.urdf"), &limbs);
-    for package in [&arm, &legs] {
+    let rolled = Options { limbs: LimbForm::Rolled, ..limbs };
+    let rolled = Package::new("c99-misra-rolled", &robot("hyq.urdf"), &rolled);
+    for package in [&arm, &legs, &rolled] {
         let found = violations(&package.source);
         assert!(found.iter().any(|line| line.contains("misra-c2012-19.2")), "the addon found nothing: {found:?}");
         let other: Vec<&String> =

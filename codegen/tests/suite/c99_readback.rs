@@ -67,6 +67,7 @@ fn kinds() -> Vec<(&'static str, Generated)> {
     vec![
         ("parts", generated(&robot("descriptions/ur5.urdf"), &parts)),
         ("limbs", generated(&robot("descriptions/hyq.urdf"), &limbs)),
+        ("limbs, rolled", generated(&robot("descriptions/hyq.urdf"), &Options { limbs: LimbForm::Rolled, ..limbs })),
         ("scene", generated(&arm, &in_scene(&scene, Options { scalar: Scalar::F32, ..Options::default() }))),
         ("bounds", generated(&arm, &Options { functions: vec![Function::GravityForce], ..certified })),
         ("drives", generated(&robot("descriptions/planar_2r.toml"), &in_scene(&drives, Options::default()))),

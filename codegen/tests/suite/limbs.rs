@@ -20,14 +20,14 @@ use straightline_codegen::verify::{bound, verify};
 use straightline_codegen::{Function, Robot, Scalar, Source};
 use straightline_core::trig;
 
-const FORCES: [Function; 4] =
+pub const FORCES: [Function; 4] =
     [Function::InverseDynamics, Function::GravityForce, Function::BiasForce, Function::VelocityForce];
 
 /// Numbers from −1 to 1.
-struct Numbers(u64);
+pub struct Numbers(pub u64);
 
 impl Numbers {
-    fn next(&mut self) -> f64 {
+    pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         // short literals, and numbers that f32 has as well
         ((self.0 >> 44) as f64 / 524_288.0 - 1.0) as f32 as f64
@@ -40,7 +40,7 @@ impl Numbers {
 
 /// How limbs differ.
 #[derive(Clone, Copy, PartialEq)]
-enum Differ {
+pub enum Differ {
     /// Left ones are mirrored right ones.
     Mirrored,
     /// In every number.
@@ -48,7 +48,7 @@ enum Differ {
 }
 
 /// A link with mass and all products of inertia.
-fn link(name: &str, n: &mut Numbers, sign: f64) -> String {
+pub fn link(name: &str, n: &mut Numbers, sign: f64) -> String {
     let ([x, y, z], [a, b, c]) = (n.triple(0.1), n.triple(0.002));
     format!(
         "<link name=\"{name}\"><inertial><origin xyz=\"{x} {} {z}\"/><mass value=\"{}\"/><inertia ixx=\"0.021\" \
@@ -63,7 +63,7 @@ fn link(name: &str, n: &mut Numbers, sign: f64) -> String {
 
 /// Limbs `name0`, `name1`, … on a link, of joints of these kinds about axes that are parallel to none, but every third parallel to
 /// the one before it.
-fn limbs_on(carrier: &str, name: &str, count: usize, kinds: &[&str], differ: Differ, seed: u64) -> String {
+pub fn limbs_on(carrier: &str, name: &str, count: usize, kinds: &[&str], differ: Differ, seed: u64) -> String {
     let mut text = String::new();
     for limb in 0..count {
         let mut n = Numbers(if differ == Differ::Mirrored { seed } else { seed + limb as u64 });
@@ -99,24 +99,24 @@ fn limbs_on(carrier: &str, name: &str, count: usize, kinds: &[&str], differ: Dif
     text
 }
 
-fn robot(links: &[String]) -> Source {
+pub fn robot(links: &[String]) -> Source {
     Source::new("robot.urdf", format!("<robot name=\"limbs\">{}</robot>", links.concat()))
 }
 
 /// A body with three legs of two joints: for many scenes.
-fn stool() -> Source {
+pub fn stool() -> Source {
     let base = link("base", &mut Numbers(13), 1.0);
     robot(&[base, limbs_on("base", "leg", 3, &["revolute"; 2], Differ::InAll, 17)])
 }
 
 /// A body with four mirrored legs.
-fn quadruped() -> Source {
+pub fn quadruped() -> Source {
     let base = link("base", &mut Numbers(3), 1.0);
     robot(&[base, limbs_on("base", "leg", 4, &["revolute"; 3], Differ::Mirrored, 5)])
 }
 
 /// An arm with a hand of three fingers that differ in all numbers and slide, too, beside one of another kind.
-fn hand() -> Source {
+pub fn hand() -> Source {
     let base = "<link name=\"base\"/>".to_string();
     let arm = limbs_on("base", "arm", 1, &["revolute", "prismatic", "revolute"], Differ::InAll, 7);
     let fingers =
@@ -125,18 +125,18 @@ fn hand() -> Source {
 }
 
 /// Two kinds of limbs on one body, five and two.
-fn crab() -> Source {
+pub fn crab() -> Source {
     let base = link("base", &mut Numbers(29), 1.0);
     let legs = limbs_on("base", "leg", 5, &["revolute", "revolute"], Differ::InAll, 31);
     robot(&[base, legs, limbs_on("base", "claw", 2, &["revolute", "prismatic", "revolute"], Differ::Mirrored, 41)])
 }
 
 /// Limbs on the world.
-fn table() -> Source {
+pub fn table() -> Source {
     robot(&["<link name=\"base\"/>".to_string(), limbs_on("base", "arm", 3, &["revolute"; 3], Differ::InAll, 53)])
 }
 
-fn options(floating_base: bool) -> Options {
+pub fn options(floating_base: bool) -> Options {
     Options {
         functions: FORCES.to_vec(),
         limbs: LimbForm::Lanes,
@@ -154,7 +154,7 @@ fn in_lanes(source: &Source, function: Function, options: &Options) -> (Robot, T
 }
 
 #[track_caller]
-fn agrees(source: &Source, options: &Options) {
+pub fn agrees(source: &Source, options: &Options) {
     let generated = compile(source, options).unwrap_or_else(|errors| panic!("{errors}"));
     let verification = verify(source, &generated, options, (10, 7), || ()).expect("the reference reads the file");
     assert_eq!(verification.functions.len(), generated.items.len());
@@ -258,6 +258,9 @@ fn compiled_lanes_have_the_bits_of_their_program() {
         ("crab", crab(), Options { scalar: Scalar::F32, ..options(true) }),
         ("hand", hand(), options(false)),
         ("fused_quadruped", quadruped(), Options { fma: true, ..options(true) }),
+        ("rolled_quadruped", quadruped(), Options { limbs: LimbForm::Rolled, ..options(true) }),
+        ("rolled_crab", crab(), Options { limbs: LimbForm::Rolled, scalar: Scalar::F32, ..options(true) }),
+        ("rolled_fused_hand", hand(), Options { limbs: LimbForm::Rolled, fma: true, ..options(false) }),
     ];
     for (name, source, options) in cases.into_iter().filter(|(_, _, o)| fused || !o.fma) {
         let options = Options { functions: vec![Function::InverseDynamics], lanes: Some(Lanes::Standalone), ..options };
@@ -266,7 +269,7 @@ fn compiled_lanes_have_the_bits_of_their_program() {
         let mut n = Numbers(61);
         let states: Vec<Vec<f64>> = (0..8).map(|_| (0..nq + 2 * nv).map(|_| 2.0 * n.next()).collect()).collect();
         let text = compile(&source, &options).unwrap_or_else(|errors| panic!("{errors}")).text;
-        assert!(text.contains("for limb in 0.."), "{name} is written as a loop");
+        assert!(text.contains("for limb in "), "{name} is written as a loop");
         let main = format!(
             "mod robot {{\n{text}\n}}\nfn main() {{\n    for x in {states:?} {{\n        let x = x.map(|x: f64| x as {scalar});\n        \
              let (q, qd, qdd) = (&x[..{nq}], &x[{nq}..{}], &x[{}..]);\n        let mut tau = [0.0; {nv}];\n        \

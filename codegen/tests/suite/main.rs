@@ -36,6 +36,7 @@ mod reduced_forms;
 mod reference_input;
 mod robot_files;
 mod robots_as_written;
+mod rolled;
 mod rules;
 mod scene;
 mod scene_messages;

@@ -1,6 +1,6 @@
 //! The package of C99 on a microcontroller: the same functions through the C compiler for it, with the bits that the host's Rust gives.
 
-use super::{harness, Bench, Emulator, Figures, FUNCTIONS, ROBOTS, STATES};
+use super::{harness, names, Bench, Emulator, Figures, FUNCTIONS, ROBOTS, STATES};
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::Command;
@@ -35,7 +35,7 @@ impl Bench<'_> {
             functions
                 .extend(FUNCTIONS.map(|f| (format!("{robot}::{} in C99", f.name()), format!("{robot}_{}", f.name()))));
         }
-        let source = text + &harness(&runs, "", STATES);
+        let source = text + &harness(&names(), &runs, "", STATES);
         let program = self.linked(machine, memory, emulator, &source, &objects);
         let (output, counts) = self.run(&program, emulator, plugin, &functions);
         let own = self.figures_of(&program, &functions);

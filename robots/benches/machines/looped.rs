@@ -1,6 +1,6 @@
 //! What generated code is compared with: inverse dynamics as a loop over bodies in C (`looped.c`), on the same machine, with the same results.
 
-use super::{harness, mangled, Bench, Emulator, Figures, ROBOTS, STATES};
+use super::{harness, mangled, names, Bench, Emulator, Figures, ROBOTS, STATES};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -38,7 +38,7 @@ impl Bench<'_> {
             writeln!(runs, "    compare! {{ {robot}, {robot}_looped }}").expect("a string takes text");
             objects.push(self.object(robot, &generated.model));
         }
-        let text = text + &harness(&runs, &externs, STATES);
+        let text = text + &harness(&names(), &runs, &externs, STATES);
         let program = self.linked(machine, memory, emulator, &text, &objects);
         let symbols: Vec<(String, String)> = ROBOTS
             .iter()

@@ -3,12 +3,13 @@
 //! `cargo bench -p straightline-robots --bench machines` compiles the robots' functions in single precision for the machines of [`MACHINES`],
 //! runs them in an emulator and compares with `machines.tsv`: it fails where a function takes over 1 % more instructions, or where a machine
 //! computes other bits than the others. `MACHINES_UPDATE=1` writes that file anew. Instructions are exact, sines included; an emulator knows no cycles.
-//! Flash is the function with its constants, without the sines that functions share; loads and stores are those of the function's text,
+//! Flash is the function with its constants and tables, without the sines that functions share; loads and stores are those of the function's text,
 //! saving registers included; both, and the stack, are read off the object, with the sines' own stack added. The toolchain is that of
 //! `robots/firmware/toolchain`; without it the bench says so and succeeds.
 
 mod c99;
 mod looped;
+mod rolled;
 mod self_tests;
 
 use std::collections::BTreeMap;
@@ -111,6 +112,9 @@ fn measured(bench: &Bench) -> ExitCode {
             let figures = Figures { instructions: instructions / states, ..own };
             found.insert(format!("{}\t{memory}\t{name}", machine.row().name), figures);
         }
+        let (is_the_same, of_rolled) = bench.rolled((machine, memory), emulator, states, &plugin);
+        differ |= !is_the_same;
+        found.extend(of_rolled);
     }
     differ |= !bench.self_tests_agree();
     let (output, of_c99) = bench.c99(CORTEX_M4F_BOARD, &plugin);
@@ -233,7 +237,7 @@ impl Bench<'_> {
             writeln!(text, "pub mod {robot} {{\n{}}}", generated.text).expect("a string takes text");
             writeln!(runs, "    run! {{ {robot} }}").expect("a string takes text");
         }
-        text + &harness(&runs, "", states)
+        text + &harness(&names(), &runs, "", states)
     }
 
     /// A program for a machine, with these objects.
@@ -313,7 +317,7 @@ impl Bench<'_> {
         let output = Command::new(self.cross.join("arm-none-eabi-objdump")).args(["-d", "-t"]).arg(program).output();
         let text = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
         let mut of_symbols: BTreeMap<&str, Figures> = BTreeMap::new();
-        let mut current = "";
+        let (mut current, mut tables) = ("", Vec::new());
         for line in text.lines() {
             // `00002ae0 <name>:` or `00002ae0 g     F .text  00000204 name`
             if let Some(name) = line.strip_suffix(">:").and_then(|line| line.split_once('<')) {
@@ -322,6 +326,12 @@ impl Bench<'_> {
                 let mut words = size.split_whitespace();
                 if let (Some(size), Some(name)) = (words.next(), words.last()) {
                     of_symbols.entry(name).or_default().flash = u64::from_str_radix(size, 16).unwrap_or(0);
+                }
+            } else if let Some((_, size)) = line.split_once(" O ").and_then(|(_, table)| table.split_once('\t')) {
+                // tables of constants are objects by themselves
+                let mut words = size.split_whitespace();
+                if let (Some(size), Some(name)) = (words.next(), words.last()) {
+                    tables.push((name, u64::from_str_radix(size, 16).unwrap_or(0)));
                 }
             } else {
                 let mut words = line.split('\t').skip(2);
@@ -340,15 +350,21 @@ impl Bench<'_> {
             // the shortest: one function's name may begin another's
             let all = of_symbols.iter().filter(|(of, _)| of.contains(symbol) && !of.contains("harness"));
             let (_, found) = all.min_by_key(|(of, _)| of.len())?;
-            Some((name.clone(), Figures { stack: found.stack + of_sines, ..*found }))
+            let of_tables: u64 = tables.iter().filter(|(of, _)| of.contains(symbol)).map(|(_, size)| size).sum();
+            let (flash, stack) = (found.flash + of_tables, found.stack + of_sines);
+            Some((name.clone(), Figures { flash, stack, ..*found }))
         });
         figures.collect()
     }
 }
 
+fn names() -> Vec<&'static str> {
+    ROBOTS.iter().map(|(robot, ..)| *robot).collect()
+}
+
 /// What runs these robots.
-fn harness(runs: &str, externs: &str, states: u64) -> String {
-    let calls: String = ROBOTS.iter().map(|(robot, ..)| format!("    harness::{robot}();\n")).collect();
+fn harness(robots: &[&str], runs: &str, externs: &str, states: u64) -> String {
+    let calls: String = robots.iter().map(|robot| format!("    harness::{robot}();\n")).collect();
     let text = include_str!("harness.rs").replace("    ROBOTS\n", runs).replace("    EXTERNS\n", externs);
     format!("{}\nfn run() {{\n{calls}}}\n", text.replace("STATES", &states.to_string()))
 }

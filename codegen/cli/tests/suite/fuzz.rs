@@ -349,7 +349,7 @@ impl Case {
             add(&["--max-part-operations", r.one(&["100", "1000", "0", "99999999999"])]);
         }
         if r.percent(3) {
-            add(&["--limbs", r.one(&["lanes", "apart", "auto"])]);
+            add(&["--limbs", r.one(&["lanes", "apart", "auto", "rolled"])]);
         }
         if r.percent(3) {
             add(&["--frame", r.one(&["forearm", "tool0", "nowhere", ""])]);

@@ -235,6 +235,8 @@ pub struct Alike {
     /// One operation for all limbs: of every limb its node, which has the same kind of operation. Rows stand behind those that they
     /// use, and all of them behind one another.
     pub rows: Vec<Vec<NodeId>>,
+    /// Whether the loop is for one limb after the other, not for vectors of them: it leaves nothing behind but what is used there.
+    pub is_rolled: bool,
 }
 
 /// A program of scalar operations.

@@ -40,7 +40,10 @@ mod tests {
         let square = b.insert(Op::mul(x, x));
         let plain = b.finish(vec![Port::new("y", &[1])], vec![square]);
         let mixed = Graph { formats: vec![Precision::of(Scalar::F32); 2], ..plain.clone() };
-        let looped = Graph { alike: vec![Alike { limbs: vec![0], rows: vec![vec![square]] }], ..plain.clone() };
+        let looped = Graph {
+            alike: vec![Alike { limbs: vec![0], rows: vec![vec![square]], is_rolled: false }],
+            ..plain.clone()
+        };
         let short = Graph { sines: Sines::Short, ..plain.clone() };
         for (name, pass) in PASSES {
             pass(&plain);

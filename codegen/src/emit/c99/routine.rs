@@ -5,7 +5,7 @@
 
 use super::{c_comment, C_INDENT};
 use crate::emit::lower::Names;
-use crate::emit::module::{Access, Expression, Index, Routine, RoutineParameter, Statement};
+use crate::emit::module::{Access, Expression, Index, Routine, RoutineParameter, Statement, Stride};
 use crate::emit::target::{Binding, Scope, Target};
 use std::collections::BTreeMap;
 use straightline_graph::expr::op::Text;
@@ -40,9 +40,13 @@ impl Target for C99<'_> {
             }
             Expression::Local(name) => name.clone(),
             Expression::Input { port, at } => format!("{}[{at}]", scope.ports.inputs[*port].name),
+            Expression::InputOfLimb { port, at } => strided(&scope.ports.inputs[*port].name, at),
             Expression::Slot(k) => format!("live[{k}]"),
             Expression::Element(array, Index::Number(k)) => format!("{array}[{k}]"),
             Expression::Element(array, Index::Loop(index)) => format!("{array}[{index}]"),
+            Expression::Element(array, Index::Row { index, length, entry }) => {
+                strided(array, &Stride { first: *entry, step: *length, index: index.clone() })
+            }
             Expression::Widened(scalar, inner) | Expression::Rounded(scalar, inner) => {
                 let inner = self.operand(inner, Binding::Atom, scope);
                 return (format!("({}){inner}", scalar.c_name()), Binding::Sign);
@@ -192,9 +196,18 @@ impl C99<'_> {
                 let start = format!("{indent}{storage} {scalar} {name}[{}] = {{", values.len());
                 wrapped(&start, &values, "};", &indent)
             }
+            Statement::Table { name, rows, is_constant } => {
+                let storage = if *is_constant { "static const" } else { "const" };
+                let values: Vec<String> = rows.iter().flatten().map(expression).collect();
+                let start = format!("{indent}{storage} {scalar} {name}[{}] = {{", values.len());
+                wrapped(&start, &values, "};", &indent)
+            }
+            Statement::StoreOfLimb { port, at, value } => {
+                line(format!("{} = {};", strided(&scope.ports.outputs[*port].name, at), expression(value)))
+            }
             Statement::Room { name, count, .. } => line(format!("{scalar} {name}[{count}];")),
             Statement::Put { array, index, value } => line(format!("{array}[{index}] = {};", expression(value))),
-            Statement::Limbs { index, count, body } => {
+            Statement::Limbs { index, count, body, .. } => {
                 let body = self.statements(body, routine, level + 1);
                 format!("{indent}for (uint32_t {index} = 0U; {index} < {count}U; {index}++) {{\n{body}{indent}}}\n")
             }
@@ -231,6 +244,12 @@ impl C99<'_> {
         let arguments: Vec<String> = part.parameters.iter().map(argument).collect();
         format!("{}_{}{}({});", self.prefix, self.module, part.name, arguments.join(", "))
     }
+}
+
+/// `q[7U + (3U * limb)]`
+fn strided(array: &str, Stride { first, step, index }: &Stride) -> String {
+    let turns = if *step == 1 { index.clone() } else { format!("({step}U * {index})") };
+    format!("{array}[{first}U + {turns}]")
 }
 
 /// The macro before parts of functions.

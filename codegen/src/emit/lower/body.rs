@@ -2,7 +2,7 @@
 
 use super::fused::{fusions, Fused};
 use super::{first_read, nodes_of, port_of, read_inputs, Lowering, Names};
-use crate::emit::module::{Expression, Statement};
+use crate::emit::module::{Expression, Statement, Stride};
 use crate::emit::target::{Scope, Target};
 use straightline_graph::expr::{Graph, NodeId, Op, Precision, Sines, Unary};
 use straightline_graph::schedule::ProgramPart;
@@ -42,8 +42,17 @@ pub(super) struct Plan<'a> {
     pub absorbed: Vec<bool>,
     /// What keeps its place in the order: it is not written where it is used.
     pub stays: Vec<bool>,
-    /// Of a loop over limbs what goes into arrays, by its nodes, in the order of those: the array, and the loop's index.
-    pub arrays: Vec<(NodeId, (String, String))>,
+    /// Of a loop over limbs where its values go, by their nodes, in the order of those.
+    pub left: Vec<(NodeId, Left)>,
+}
+
+/// Where a value of a loop over limbs goes.
+#[derive(Clone)]
+pub(super) enum Left {
+    /// Into this array, at this index.
+    InArray(String, String),
+    /// To this output.
+    PutOut(usize, Stride),
 }
 
 /// The statements of one part; over lanes, in a loop over them.
@@ -78,7 +87,7 @@ fn statements(graph: &Graph, part: &ProgramPart, scope: Scope<'_>, lowering: &Lo
         out.push(Statement::Load(named));
     }
     let stays = keep_their_places(graph, part, &uses);
-    let mut plan = Plan { part, uses, results_of, crosses, absorbed, stays, arrays: Vec::new() };
+    let mut plan = Plan { part, uses, results_of, crosses, absorbed, stays, left: Vec::new() };
     if scope.style.lanes || graph.alike.is_empty() {
         b.run(&part.nodes, &plan, lowering, &mut out);
     } else {
@@ -209,10 +218,12 @@ impl<'a> Statements<'a> {
             let (slot, value) = (plan.part.stores[i].1, self.operand(id));
             self.statements.push(Statement::Keep { slot, value });
         }
-        if let Ok(i) = plan.arrays.binary_search_by_key(&id, |(n, _)| *n) {
-            let (array, index) = plan.arrays[i].1.clone();
+        if let Ok(i) = plan.left.binary_search_by_key(&id, |(n, _)| *n) {
             let value = self.operand(id);
-            self.statements.push(Statement::Put { array, index, value });
+            self.statements.push(match plan.left[i].1.clone() {
+                Left::InArray(array, index) => Statement::Put { array, index, value },
+                Left::PutOut(port, at) => Statement::StoreOfLimb { port, at, value },
+            });
         }
     }
 
@@ -310,7 +321,8 @@ impl<'a> Statements<'a> {
     /// The local of one half of a pair, if it is used.
     fn half(&mut self, pair: NodeId, half: Op, plan: &Plan<'_>) -> Option<String> {
         let id = (pair.0 + 1..pair.0 + 3).map(NodeId).find(|h| self.graph.ops.get(h.index()) == Some(&half));
-        let is_kept = |id: NodeId| plan.part.stores.iter().any(|(s, _)| *s == id);
+        let is_left = |id: NodeId| plan.left.iter().any(|(n, _)| *n == id);
+        let is_kept = |id: NodeId| plan.part.stores.iter().any(|(s, _)| *s == id) || is_left(id);
         let id = id.filter(|id| plan.uses[id.index()] > 0 || is_kept(*id))?;
         let name = self.fresh_name(id);
         self.values[id.index()] = Some(Expression::Local(name.clone()));

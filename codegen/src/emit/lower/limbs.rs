@@ -11,9 +11,10 @@
 //! ```
 //!
 //! What differs from limb to limb is an array over limbs, what does not a local from before the loop. LLVM's loop vectoriser makes
-//! vector instructions of the body, as of functions over lanes.
+//! vector instructions of the body, as of functions over lanes. Rolled loops (`rolled.rs`) have a row of constants per limb instead.
 
-use super::body::{Plan, Statements};
+use super::body::{Left, Plan, Statements};
+use super::rolled::{is_short, Table};
 use super::Lowering;
 use crate::emit::module::{Expression, Index, Statement};
 use rustc_hash::FxHashMap;
@@ -33,6 +34,7 @@ impl Statements<'_> {
                 used_across[a.index()] = true;
             }
         }
+        let is_operand = used_across.clone();
         plan.results_of.iter().for_each(|(id, _)| used_across[id.index()] |= stretch[id.index()].is_some());
         for id in nodes.iter().filter(|id| stretch[id.index()].is_none()) {
             plan.crosses[id.index()] |= used_across[id.index()];
@@ -43,7 +45,7 @@ impl Statements<'_> {
             let count = nodes[done..].iter().take_while(|id| stretch[id.index()] == here).count();
             match here {
                 None => self.run(&nodes[done..done + count], plan, lowering, out),
-                Some(k) => self.limb_loop(&graph.alike[k], plan, &used_across, lowering, out),
+                Some(k) => self.limb_loop(&graph.alike[k], plan, (&used_across, &is_operand), lowering, out),
             }
             done += count;
         }
@@ -53,40 +55,21 @@ impl Statements<'_> {
         &mut self,
         alike: &Alike,
         plan: &Plan<'_>,
-        used_across: &[bool],
+        (used_across, is_operand): (&[bool], &[bool]),
         lowering: &Lowering<'_>,
         out: &mut Vec<Statement>,
     ) {
         let limbs = alike.limbs.len();
         // an odd limb is a lane of its own beside one that nobody reads: half a vector would take longer
-        let count = if limbs > 2 { limbs.next_multiple_of(2) } else { limbs };
+        let count = if limbs > 2 && !alike.is_rolled { limbs.next_multiple_of(2) } else { limbs };
         let index = self.names.free("limb");
         let title = |body: &usize| (lowering.title)(Section { phase: "limb", index: Some(*body) });
         out.extend(alike.limbs.iter().map(|body| Statement::Comment(title(body))));
         let Loop { graph, part, outside, results } = Loop::new(self.graph, alike, used_across);
 
-        let values: Vec<(NodeId, Expression)> = outside
-            .iter()
-            .map(|(node, of_limbs)| match of_limbs.as_slice() {
-                [same] => (*node, self.operand(*same)),
-                of_limbs => {
-                    let array = self.array_over_limbs(of_limbs, count, out);
-                    (*node, Expression::Element(array, Index::Loop(index.clone())))
-                }
-            })
-            .collect();
-        // what goes there
-        let filler = self.filler(plan.part);
-        let (mut arrays, mut names) = (Vec::new(), Vec::new());
-        for (node, row) in &results {
-            let name = match self.graph.notes[row[0].index()].name {
-                Some((quantity, body, component)) => self.names.named(&format!("{quantity}s"), body, component),
-                None => self.names.numbered("y"),
-            };
-            out.push(Statement::Room { name: name.clone(), filler: filler.clone(), count });
-            arrays.push((*node, (name.clone(), index.clone())));
-            names.push(name);
-        }
+        let turns = Turns { index, count, is_rolled: alike.is_rolled };
+        let values = self.taken_by_limbs(&outside, &turns, out);
+        let (left, names) = self.left_behind(&results, &turns, plan, is_operand, out);
 
         let own = std::mem::take(&mut self.names);
         let (mut inner, absorbed) = Statements::new(&graph, &part, self.scope, self.target, own);
@@ -108,14 +91,15 @@ impl Statements<'_> {
             crosses,
             absorbed,
             stays: vec![false; graph.ops.len()],
-            arrays,
+            left,
         };
         let mut body = Vec::new();
         inner.run(&part.nodes, &plan_of_loop, lowering, &mut body);
         self.names = std::mem::take(&mut inner.names);
-        out.push(Statement::Limbs { index, count, body });
+        let is_hidden = alike.is_rolled && is_short(alike);
+        out.push(Statement::Limbs { index: turns.index, count, is_hidden, body });
 
-        for ((_, row), name) in results.iter().zip(names) {
+        for ((_, row), name) in results.iter().zip(names).filter_map(|(result, name)| Some((result, name?))) {
             for (limb, id) in row.iter().enumerate() {
                 self.values[id.index()] = Some(Expression::Element(name.clone(), Index::Number(limb)));
                 let first = plan.results_of.partition_point(|(r, _)| r < id);
@@ -125,6 +109,61 @@ impl Statements<'_> {
             }
         }
         out.append(&mut self.statements);
+    }
+
+    /// What stands in a loop for what limbs take from outside; arrays of it, and the table of constants, come before the loop.
+    fn taken_by_limbs(
+        &mut self,
+        outside: &[(NodeId, Vec<NodeId>)],
+        turns: &Turns,
+        out: &mut Vec<Statement>,
+    ) -> Vec<(NodeId, Expression)> {
+        let table = turns.is_rolled.then(|| Table::new(self, outside));
+        let mut values: Vec<(NodeId, Expression)> = Vec::new();
+        for (node, of_limbs) in outside {
+            let in_place = table.as_ref().and_then(|table| table.value(self, of_limbs, &turns.index));
+            let value = match (in_place, of_limbs.as_slice()) {
+                (Some(value), _) => value,
+                (None, [same]) => self.operand(*same),
+                (None, of_limbs) => {
+                    let array = self.array_over_limbs(of_limbs, turns.count, out);
+                    Expression::Element(array, Index::Loop(turns.index.clone()))
+                }
+            };
+            values.push((*node, value));
+        }
+        out.extend(table.and_then(Table::statement));
+        values
+    }
+
+    /// Where what is used behind a loop goes, and of what goes into arrays their names; there is room for them before the loop.
+    fn left_behind(
+        &mut self,
+        results: &[(NodeId, Vec<NodeId>)],
+        turns: &Turns,
+        plan: &Plan<'_>,
+        is_operand: &[bool],
+        out: &mut Vec<Statement>,
+    ) -> (Vec<(NodeId, Left)>, Vec<Option<String>>) {
+        let filler = self.filler(plan.part);
+        let (mut left, mut names) = (Vec::new(), Vec::new());
+        for (node, row) in results {
+            let is_result_alone = turns.is_rolled && !row.iter().any(|id| is_operand[id.index()]);
+            let place = self.put_out(row, plan, &turns.index).filter(|_| is_result_alone);
+            if let Some((port, at)) = place {
+                left.push((*node, Left::PutOut(port, at)));
+                names.push(None);
+                continue;
+            }
+            let name = match self.graph.notes[row[0].index()].name {
+                Some((quantity, body, component)) => self.names.named(&format!("{quantity}s"), body, component),
+                None => self.names.numbered("y"),
+            };
+            out.push(Statement::Room { name: name.clone(), filler: filler.clone(), count: turns.count });
+            left.push((*node, Left::InArray(name.clone(), turns.index.clone())));
+            names.push(Some(name));
+        }
+        (left, names)
     }
 
     /// The array of what limbs take from outside, one after the other; its name.
@@ -143,6 +182,13 @@ impl Statements<'_> {
     }
 }
 
+/// How a loop over limbs turns.
+struct Turns {
+    index: String,
+    count: usize,
+    is_rolled: bool,
+}
+
 /// A loop over limbs as a program of its own: rows are nodes, and so is what they take from outside.
 struct Loop {
     graph: Graph,
@@ -155,7 +201,8 @@ struct Loop {
 
 impl Loop {
     fn new(graph: &Graph, alike: &Alike, used_across: &[bool]) -> Loop {
-        let mut inner = Graph { sections: graph.sections.clone(), inputs: graph.inputs.clone(), ..Graph::default() };
+        let (sections, inputs) = (graph.sections.clone(), graph.inputs.clone());
+        let mut inner = Graph { sections, inputs, sines: graph.sines, ..Graph::default() };
         let push = |inner: &mut Graph, op: Op, note| {
             inner.ops.push(op);
             inner.notes.push(note);

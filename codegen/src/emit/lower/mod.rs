@@ -7,6 +7,7 @@ mod body;
 pub mod fused;
 mod limbs;
 mod names;
+mod rolled;
 
 pub use names::Names;
 

@@ -1,7 +1,7 @@
 //! Functions of straight-line code in Rust.
 
 use super::{array_type, doc, element_type, generics, kernel_path, literal, number_type, wrapped, zero, ALLOW};
-use crate::emit::module::{Access, Expression, Index, Routine, RoutineParameter, Statement};
+use crate::emit::module::{Access, Expression, Index, Routine, RoutineParameter, Statement, Stride};
 use crate::emit::target::{Binding, Scope, Target};
 use crate::emit::Style;
 use crate::identifier::comment;
@@ -35,9 +35,11 @@ impl Target for Rust {
             }
             Expression::Local(name) => name.clone(),
             Expression::Input { port, at } => place(&scope.ports.inputs[*port], *at, style),
+            Expression::InputOfLimb { port, at } => strided(&scope.ports.inputs[*port], at),
             Expression::Slot(k) => format!("live[{k}]{}", lane(style)),
             Expression::Element(array, Index::Number(k)) => format!("{array}[{k}]"),
             Expression::Element(array, Index::Loop(index)) => format!("{array}[{index}]"),
+            Expression::Element(array, Index::Row { index, entry, .. }) => format!("{array}[{index}][{entry}]"),
             Expression::Fused { factors: [a, b], is_negated, term, is_subtracted } => {
                 let signed = |e: &Expression, minus: bool| match minus {
                     true => format!("-{}", self.operand(e, Binding::Atom, scope)),
@@ -100,8 +102,25 @@ impl Target for Rust {
                 line(format!("let mut {name} = [{}; {count}];", expression(filler)))
             }
             Statement::Put { array, index, value } => line(format!("{array}[{index}] = {};", expression(value))),
-            Statement::Lanes(body) => self.a_loop("lane", "N", body, routine, level),
-            Statement::Limbs { index, count, body } => self.a_loop(index, &count.to_string(), body, routine, level),
+            Statement::Table { name, rows, is_constant } => {
+                let (word, number) = (if *is_constant { "static" } else { "let" }, number_type(style));
+                let numbers = |row: &Vec<Expression>| row.iter().map(expression).collect::<Vec<_>>().join(", ");
+                let of_type = format!("[[{number}; {}]; {}]", rows.first().map_or(0, Vec::len), rows.len());
+                let lines: String = rows.iter().map(|row| format!("{indent}    [{}],\n", numbers(row))).collect();
+                format!("{indent}{word} {name}: {of_type} = [\n{lines}{indent}];\n")
+            }
+            Statement::StoreOfLimb { port, at, value } => {
+                line(format!("{} = {};", strided(&scope.ports.outputs[*port], at), expression(value)))
+            }
+            Statement::Lanes(body) => self.a_loop("lane", "0..N", body, routine, level),
+            Statement::Limbs { index, count, is_hidden: false, body } => {
+                self.a_loop(index, &format!("0..{count}"), body, routine, level)
+            }
+            Statement::Limbs { index, count, is_hidden: true, body } => {
+                let turns = format!("(0..{count}).take(core::hint::black_box({count}))");
+                line("// a compiler that knew the number of turns would write them out".to_string())
+                    + &self.a_loop(index, &turns, body, routine, level)
+            }
         }
     }
 
@@ -119,9 +138,9 @@ impl Target for Rust {
 }
 
 impl Rust {
-    fn a_loop(&self, index: &str, count: &str, body: &[Statement], routine: &Routine, level: usize) -> String {
+    fn a_loop(&self, index: &str, turns: &str, body: &[Statement], routine: &Routine, level: usize) -> String {
         let (indent, body) = ("    ".repeat(level), self.statements(body, routine, level + 1));
-        format!("{indent}for {index} in 0..{count} {{\n{body}{indent}}}\n")
+        format!("{indent}for {index} in {turns} {{\n{body}{indent}}}\n")
     }
 
     /// Sine and cosine of an angle by the kernel of short ones.
@@ -261,6 +280,15 @@ fn place(port: &Port, k: usize, style: Style) -> String {
         (Some(_), true) => format!("T::constant(Dd::from(f64::from({})))", element(port, k)),
         (Some(_), false) => element(port, k),
         (None, _) => element(port, k) + lane(style),
+    }
+}
+
+/// The place of a number of a port in a loop over limbs, which counts through an array of one extent.
+fn strided(port: &Port, Stride { first, step, index }: &Stride) -> String {
+    let turns = if *step == 1 { index.clone() } else { format!("{step} * {index}") };
+    match first {
+        0 => format!("{}[{turns}]", port.name),
+        first => format!("{}[{first} + {turns}]", port.name),
     }
 }
 

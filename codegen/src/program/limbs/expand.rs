@@ -35,14 +35,14 @@ struct ExpansionWriter<'a> {
     sections: FxHashMap<Section, u32>,
 }
 
-/// The program of a function of all limbs. In order: what no limb changes, with the sines of all angles; kind by kind the limbs;
-/// then the rest of the robot with the sums of what they pass on.
+/// The program of a function of all limbs. In order: what no limb changes, with the sines of all angles, where limbs are lanes;
+/// kind by kind the limbs; then the rest of the robot with the sums of what they pass on.
 pub(super) fn written_out(
     graph: &Graph,
     template: &Template,
     model: &Model<Dd>,
     scene: &Scene,
-    function: Function,
+    (function, is_rolled): (Function, bool),
 ) -> Graph {
     let (wanted, outputs) = scene.select(function, model, 0);
     let places = places(graph, template);
@@ -54,11 +54,11 @@ pub(super) fn written_out(
         written: vec![None; graph.ops.len()],
         sections: FxHashMap::default(),
     };
-    // angles, their sums, and their sines and cosines, of limbs too: the calls take several at once
+    // angles, their sums, and their sines and cosines, of limbs too: the calls take several at once. A rolled loop has its own
     let angles = angles(graph);
     let is_early = |id: NodeId| match graph.op(id) {
         Op::Input(k) => template.of_inputs(k as usize),
-        _ => angles[id.index()],
+        _ => angles[id.index()] && !is_rolled,
     };
     // what a limb takes of inputs and constants may stand before them
     let is_leaf = |id: NodeId| matches!(graph.op(id), Op::Input(_) | Op::Constant(_));
@@ -80,7 +80,7 @@ pub(super) fn written_out(
             }
         }
         if !rows.is_empty() {
-            writer.out.alike.push(Alike { limbs: template.first_bodies[kind].clone(), rows });
+            writer.out.alike.push(Alike { limbs: template.first_bodies[kind].clone(), rows, is_rolled });
         }
     }
     for id in graph.ids().filter(|id| places[id.index()] == NodePlace::Behind) {

@@ -8,6 +8,8 @@
 //! is executed, with a note which of them are the same for all limbs ([`Alike`](straightline_graph::expr::Alike)): those become a loop over
 //! limbs, which compilers turn into vector instructions.
 //!
+//! Rolled, the loop takes one limb a turn and holds the sines of its angles too; else the same operations, bit for bit.
+//!
 //! Mirrored limbs need nothing more: their numbers differ by signs, and a sign is part of a number.
 
 mod constants;
@@ -41,7 +43,7 @@ impl LimbForm {
         let mut found = if in_lanes == InLanes::Never { Vec::new() } else { limbs(model) };
         match self {
             LimbForm::Apart => found.clear(),
-            LimbForm::Lanes => {}
+            LimbForm::Lanes | LimbForm::Rolled => {}
             LimbForm::Auto if in_lanes == InLanes::WhereAsked => found.clear(),
             LimbForm::Auto => found.retain(|l| l.bodies.len() >= LANES_PAY && l.bodies[0].len() >= JOINTS_PAY),
         }
@@ -82,6 +84,7 @@ pub(crate) fn program(
     }
     template.drop_unread(&chosen.model, &wanted);
     let folded = check("limbs: folded constants", template.graph.clone());
-    let graph = expand::written_out(&folded, &template, &chosen.model, &options.scene, function);
+    let is_rolled = options.limbs == LimbForm::Rolled;
+    let graph = expand::written_out(&folded, &template, &chosen.model, &options.scene, (function, is_rolled));
     Some(check("limbs: unread inputs", unread_inputs(check("limbs: written out", graph), is_optional)))
 }

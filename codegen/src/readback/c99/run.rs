@@ -291,7 +291,7 @@ impl<'a, 't> CRun<'a, 't> {
         self.mark(";")
     }
 
-    /// `x[3]`, `x[limb]`: the number's place, its format, and whether it may be put there.
+    /// `x[3]`, `x[limb]`, `x[7U + (3U * limb)]`: the number's place, its format, and whether it may be put there.
     fn cell(&mut self) -> CRan<(usize, TextFormat, bool)> {
         let start = self.at;
         let name = self.text.name(&mut self.at)?;
@@ -299,18 +299,43 @@ impl<'a, 't> CRun<'a, 't> {
             return self.text.stop(start, "a name that stands for no array");
         };
         self.mark("[")?;
-        let k = match self.locals.get(self.token()) {
-            Some(CThing::Index(turn)) => {
-                self.at += 1;
-                *turn
-            }
-            _ => self.text.integer(&mut self.at, "")?,
-        };
+        let k = self.index()?;
         self.mark("]")?;
         match k < array.length {
             true => Ok((array.first + k, array.format, mutable)),
             false => self.text.stop(start, "a number behind the end of its array"),
         }
+    }
+
+    /// `3`, `limb`, `7U + limb`, `7U + (3U * limb)`
+    fn index(&mut self) -> CRan<usize> {
+        if let Some(turn) = self.turn() {
+            return Ok(turn);
+        }
+        if !self.token().ends_with('U') {
+            return self.text.integer(&mut self.at, "");
+        }
+        let first = self.text.integer(&mut self.at, "U")?;
+        self.mark("+")?;
+        let step = match self.takes("(") {
+            true => Some(self.text.integer(&mut self.at, "U")?),
+            false => None,
+        };
+        if step.is_some() {
+            self.mark("*")?;
+        }
+        let Some(turn) = self.turn() else { return self.stop("the index of a loop is expected here") };
+        if step.is_some() {
+            self.mark(")")?;
+        }
+        Ok(first.saturating_add(step.unwrap_or(1).saturating_mul(turn)))
+    }
+
+    /// Takes the index of a loop, if it stands here: which turn it is.
+    fn turn(&mut self) -> Option<usize> {
+        let Some(CThing::Index(turn)) = self.locals.get(self.token()).copied() else { return None };
+        self.at += 1;
+        Some(turn)
     }
 
     /// `arm_mass_matrix_part2(q, live, h);`

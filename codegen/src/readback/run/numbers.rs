@@ -233,7 +233,7 @@ impl<'t> Execution<'_, 't> {
         Ok(if negative { -x } else { x })
     }
 
-    /// `q[3]`, `h[2][lane]`, `body.0[7]`: its cell, its format, and whether it may be written.
+    /// `q[3]`, `h[2][lane]`, `body.0[7]`, `qd[6 + 3 * limb]`: its cell, its format, and whether it may be written.
     pub(super) fn cell(&mut self) -> Ran<(usize, TextFormat, bool)> {
         let start = self.at;
         let name = self.word()?;
@@ -256,28 +256,64 @@ impl<'t> Execution<'_, 't> {
         let mut at = self.at;
         for extent in extents {
             self.items.mark(&mut at, b'[')?;
-            match (*extent, self.items.kind(at)) {
-                (TextExtent::Of(n), TokenKind::Number) => {
-                    let index = self.items.integer(&mut at)?;
+            match *extent {
+                TextExtent::Of(n) => {
+                    let index = self.index(&mut at)?;
                     if index >= n {
                         return self.items.stop(at - 1, "an index beyond the end");
                     }
                     cell = cell * n + index;
                 }
-                (extent, TokenKind::Word(name)) => {
-                    let thing = self.local(name).map(|k| self.locals[k].thing);
-                    match (extent, thing) {
-                        (TextExtent::Of(n), Some(Thing::Index(index))) if index < n => cell = cell * n + index,
-                        (TextExtent::Lanes, Some(Thing::Lane)) => {}
-                        _ => return self.items.stop(at, "an index of another kind"),
-                    }
+                TextExtent::Lanes => {
+                    let TokenKind::Word(name) = self.items.kind(at) else {
+                        return self.items.stop(at, "an index is expected here");
+                    };
+                    let Some(Thing::Lane) = self.local(name).map(|k| self.locals[k].thing) else {
+                        return self.items.stop(at, "an index of another kind");
+                    };
                     at += 1;
                 }
-                _ => return self.items.stop(at, "an index is expected here"),
             }
             self.items.mark(&mut at, b']')?;
         }
         self.at = at;
         Ok((first as usize + cell, format, place.mutable))
+    }
+
+    /// `3`, `limb`, `3 * limb`, `7 + limb`, `7 + 3 * limb`
+    fn index(&self, at: &mut usize) -> Ran<usize> {
+        let is_number = |at: usize| self.items.kind(at) == TokenKind::Number;
+        if !is_number(*at) {
+            return self.turn(at);
+        }
+        let first = self.items.integer(at)?;
+        match self.items.kind(*at) {
+            TokenKind::Mark(b'*') => {
+                *at += 1;
+                Ok(first.saturating_mul(self.turn(at)?))
+            }
+            TokenKind::Mark(b'+') => {
+                *at += 1;
+                let mut step = 1;
+                if is_number(*at) {
+                    step = self.items.integer(at)?;
+                    self.items.mark(at, b'*')?;
+                }
+                Ok(first.saturating_add(step.saturating_mul(self.turn(at)?)))
+            }
+            _ => Ok(first),
+        }
+    }
+
+    /// The index of a loop over limbs: which turn it is.
+    fn turn(&self, at: &mut usize) -> Ran<usize> {
+        let TokenKind::Word(name) = self.items.kind(*at) else {
+            return self.items.stop(*at, "an index is expected here");
+        };
+        let Some(Thing::Index(turn)) = self.local(name).map(|k| self.locals[k].thing) else {
+            return self.items.stop(*at, "an index of another kind");
+        };
+        *at += 1;
+        Ok(turn)
     }
 }

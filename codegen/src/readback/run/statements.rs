@@ -234,7 +234,7 @@ impl<'t> Execution<'_, 't> {
         Ok(())
     }
 
-    /// `x1: [f64; 4] = [a, b, c, d];` behind `let` or `static`.
+    /// `x1: [f64; 4] = [a, b, c, d];` or `C1: [[f64; 2]; 4] = [[a, b], …];` behind `let` or `static`.
     pub(super) fn array_of_limbs(&mut self, format: TextFormat, is_static: bool) -> Ran<()> {
         let name = self.word()?;
         self.mark(b':')?;
@@ -244,12 +244,19 @@ impl<'t> Execution<'_, 't> {
         };
         self.mark(b'=')?;
         let first = self.at;
-        let values = self.list(of, format)?;
+        let (values, found) = match extents[..] {
+            [_, _] => self.rows(of, format)?,
+            _ => {
+                let values = self.list(of, format)?;
+                let found = vec![TextExtent::Of(values.len())];
+                (values, found)
+            }
+        };
         let is_name = |at: usize| matches!(self.items.kind(at), TokenKind::Word(_));
         if is_static && (first..self.at).any(is_name) {
             return self.items.stop(first, "what is static knows no locals");
         }
-        if extents != [TextExtent::Of(values.len())] {
+        if extents != found {
             return self.items.stop(start, "an array of another length");
         }
         self.mark(b';')?;
@@ -258,24 +265,38 @@ impl<'t> Execution<'_, 't> {
         Ok(())
     }
 
+    /// `[[a, b], [c, d]]`, and the extents of that.
+    fn rows(&mut self, of: TextFormat, format: TextFormat) -> Ran<(Vec<TextValue>, Vec<TextExtent>)> {
+        let start = self.at;
+        self.mark(b'[')?;
+        let rows = self.listed(b']', |run| run.list(of, format))?;
+        let length = rows.first().map_or(0, Vec::len);
+        if rows.iter().any(|row| row.len() != length) {
+            return self.items.stop(start, "rows of other lengths");
+        }
+        let extents = vec![TextExtent::Of(rows.len()), TextExtent::Of(length)];
+        Ok((rows.concat(), extents))
+    }
+
     /// `[a, b, c]`
     pub(super) fn list(&mut self, of: TextFormat, format: TextFormat) -> Ran<Vec<TextValue>> {
         self.mark(b'[')?;
         self.listed(b']', |run| run.number(of, format))
     }
 
-    /// `for limb in 0..4 { … }`, `for lane in 0..N { … }`
+    /// `for limb in 0..4 { … }`, `for limb in (0..4).take(core::hint::black_box(4)) { … }`, `for lane in 0..N { … }`
     pub(super) fn for_(&mut self, function: &TextFunction, format: TextFormat) -> Ran<()> {
         self.at += 1;
         let name = self.word()?;
         self.items.keyword(&mut self.at, t::IN)?;
         let start = self.at;
+        let is_hidden = self.takes(b'(');
         if self.integer()? != 0 {
             return self.items.stop(start, "a loop that does not begin at 0");
         }
         self.these(". .")?;
         let count = self.locals.len();
-        if self.kind() == TokenKind::Word(t::N) && function.generics.contains(&t::N) {
+        if !is_hidden && self.kind() == TokenKind::Word(t::N) && function.generics.contains(&t::N) {
             self.at += 1;
             self.bind(name, Thing::Lane);
             self.block(function, format)?;
@@ -283,6 +304,13 @@ impl<'t> Execution<'_, 't> {
             return Ok(());
         }
         let turns = self.integer()?;
+        if is_hidden {
+            self.these(") . take ( core : : hint : : black_box (")?;
+            if self.integer()? != turns {
+                return self.items.stop(start, "a loop of two lengths");
+            }
+            self.these(") )")?;
+        }
         if !(1..=LONGEST).contains(&turns) {
             return self.items.stop(start, "a loop of that length");
         }
