@@ -59,16 +59,11 @@ impl FixedValues {
                 WordOp::Add(..) => self.operation("wrapping_add", &operands, 0, false),
                 WordOp::Sub(..) => self.operation("wrapping_sub", &operands, 0, false),
                 WordOp::Neg(_) => self.operation("wrapping_neg", &operands, 0, false),
-                WordOp::Mul(Product::Wide, ..) => self.operation("wide", &operands, 0, false),
-                WordOp::Mul(Product::Full, ..) => self.operation("full", &operands, 0, false),
-                WordOp::Mul(Product::Half, ..) => self.operation("half", &operands, 0, false),
-                WordOp::Mul(Product::Short, ..) => self.operation("short", &operands, 0, false),
-                WordOp::Mul(Product::Long(by), ..) => self.operation("long", &operands, by, false),
+                WordOp::Mul(product @ Product::Long(by), ..) => self.operation(product.name(), &operands, by, false),
+                WordOp::Mul(product, ..) => self.operation(product.name(), &operands, 0, false),
                 WordOp::Left(_, by) => self.operation("<<", &operands, by, false),
                 WordOp::Right(_, by) => self.operation(">>", &operands, by, false),
-                WordOp::SinCos(_, by, turns) => {
-                    self.operation(if program.wide { "sin_cos_wide" } else { "sin_cos_full" }, &operands, by, turns)
-                }
+                WordOp::SinCos(_, by, turns) => self.operation(program.sines.sine_name(), &operands, by, turns),
                 WordOp::Sin(_) => self.operation("sin", &operands, 0, false),
                 WordOp::Cos(_) => self.operation("cos", &operands, 0, false),
             };
@@ -198,8 +193,8 @@ impl FixedReader<'_, '_> {
         locals: &FxHashMap<String, usize>,
     ) -> FixedReading<usize> {
         const SUMS: [(&str, usize); 3] = [("wrapping_add", 2), ("wrapping_sub", 2), ("wrapping_neg", 1)];
-        const PRODUCTS: [&str; 5] = ["wide", "full", "half", "short", "long"];
-        const SINES: [&str; 2] = ["sin_cos_wide", "sin_cos_full"];
+        const PRODUCTS: [&str; 6] = ["wide", "exact", "full", "half", "short", "long"];
+        const SINES: [&str; 3] = ["sin_cos_wide", "sin_cos_exact", "sin_cos_full"];
         let (path, at) = (self.items.text_of(self.at), self.at);
         if !matches!(path, "i32" | "words") {
             let operand = self.operand(inputs, values, locals)?;

@@ -8,6 +8,7 @@
 //! `robots/firmware/toolchain`; without it the bench says so and succeeds.
 
 mod c99;
+mod fixed;
 mod looped;
 mod rolled;
 mod self_tests;
@@ -123,6 +124,9 @@ fn measured(bench: &Bench) -> ExitCode {
         differ = true;
     }
     found.extend(of_c99.into_iter().map(|(name, figures)| (format!("cortex-m4f\tflash\t{name}"), figures)));
+    let (of_fixed, agree) = bench.fixed(&plugin);
+    differ |= !agree;
+    found.extend(of_fixed);
     let looped = bench.looped(CORTEX_M4F_BOARD, &plugin);
     for (robot, [_, figures]) in &looped {
         found.insert(format!("cortex-m4f\tflash\t{robot}::inverse_dynamics, loop in C"), *figures);

@@ -50,6 +50,8 @@ pub(super) struct Priced {
 pub(super) struct WordMachine {
     /// Whether it has the high half of products of 32 bits.
     pub wide: bool,
+    /// The products of its sines.
+    pub sines: Product,
 }
 
 impl WordMachine {
@@ -58,6 +60,7 @@ impl WordMachine {
         match product {
             Product::Wide => 1.0,
             Product::Long(_) => 5.0,
+            Product::Exact => 17.0,
             Product::Full => 12.0,
             Product::Half => 7.0,
             Product::Short => 3.0,
@@ -68,14 +71,14 @@ impl WordMachine {
     fn products(self) -> &'static [Product] {
         match self.wide {
             true => &[Product::Wide],
-            false => &[Product::Full, Product::Half, Product::Short],
+            false => &[Product::Exact, Product::Full, Product::Half, Product::Short],
         }
     }
 
     /// The error of a sine or cosine of an angle that turns at most so far \[rad\], and whether it has to be reduced.
     pub fn sine(self, angle: Interval) -> (f64, bool) {
         let reduced = f64::from(REDUCED - 2) * unit(31);
-        let kernel = if self.wide { WIDE_ERROR } else { FULL_ERROR };
+        let kernel = if self.sines == Product::Full { FULL_ERROR } else { WIDE_ERROR };
         if angle.mag() <= reduced - 2f64.powi(-14) {
             return (kernel * unit(31), false);
         }
@@ -210,7 +213,7 @@ impl Known<'_> {
             let whole = |error: f64| ([factor, Aligned::Constant(exact)], error + off * magnitude);
             let halved = short.map(|(w, off)| ([factor, Aligned::Constant(w)], off * magnitude));
             let ways: Vec<([Aligned; 2], f64)> = match kind {
-                Product::Wide | Product::Long(_) | Product::Full => vec![whole(0.0)],
+                Product::Wide | Product::Long(_) | Product::Exact | Product::Full => vec![whole(0.0)],
                 Product::Half => {
                     let ([a, c], error) = whole(lower);
                     halved.into_iter().chain([([c, a], error)]).collect()

@@ -137,7 +137,7 @@ pub(super) fn lowered(known: &Known, points: &Points, ranges: &[Interval]) -> Op
     let program = WordProgram {
         inputs: graph.inputs.clone(),
         outputs: graph.outputs.clone(),
-        wide: known.machine.wide,
+        sines: known.machine.sines,
         ..WordProgram::default()
     };
     let lowered = Lowered {

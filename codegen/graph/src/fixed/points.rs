@@ -8,7 +8,7 @@
 
 use super::costs::{natural, Known, WordMachine};
 use super::lower::{lowered, Lowered, Points};
-use super::words::WordProgram;
+use super::words::{Product, WordProgram};
 use crate::certify::interval::Interval;
 use crate::certify::{ErrorAnalysis, NoCertificate};
 use crate::expr::{Binary, Graph, NodeId, Op, Unary};
@@ -106,7 +106,25 @@ fn relative(outputs: &[crate::expr::Port], errors: &[f64], magnitudes: &[f64]) -
 /// Why there is none.
 pub fn fixed(graph: &Graph, inputs: &[Interval], demand: FixedDemand) -> Result<FixedProgram, NoFixedForm> {
     refuse_operations(graph)?;
-    let mut search = PointSearch::new(graph, inputs, demand)?;
+    // the cheapest sines that serve
+    let sines: &[Product] = if demand.wide { &[Product::Wide] } else { &[Product::Full, Product::Exact] };
+    let mut found = Err(NoFixedForm::Angle);
+    for sines in sines {
+        found = with_sines(graph, inputs, demand, *sines);
+        if !matches!(found, Err(NoFixedForm::Error(_))) {
+            break;
+        }
+    }
+    found
+}
+
+fn with_sines(
+    graph: &Graph,
+    inputs: &[Interval],
+    demand: FixedDemand,
+    sines: Product,
+) -> Result<FixedProgram, NoFixedForm> {
+    let mut search = PointSearch::new(graph, inputs, demand, sines)?;
     let finest = search.program(2f64.powi(WEIGHTS))?;
     if finest.worst() > demand.error {
         return Err(NoFixedForm::Error(finest.worst()));
@@ -158,7 +176,7 @@ struct PointSearch<'g> {
 }
 
 impl<'g> PointSearch<'g> {
-    fn new(graph: &'g Graph, inputs: &'g [Interval], demand: FixedDemand) -> Result<Self, NoFixedForm> {
+    fn new(graph: &'g Graph, inputs: &'g [Interval], demand: FixedDemand, sines: Product) -> Result<Self, NoFixedForm> {
         let live = graph.live();
         let mut users = vec![Vec::new(); graph.ops.len()];
         for id in graph.ids().filter(|id| live[id.index()]) {
@@ -171,8 +189,8 @@ impl<'g> PointSearch<'g> {
         let mut ports = vec![Vec::new(); graph.ops.len()];
         let of_results = graph.outputs.iter().enumerate().flat_map(|(k, port)| vec![k; port.len()]);
         graph.results.iter().zip(of_results).for_each(|(r, port)| ports[r.index()].push(port));
-        let known =
-            Known { graph, machine: WordMachine { wide: demand.wide }, magnitude: Vec::new(), natural: Vec::new() };
+        let machine = WordMachine { wide: demand.wide, sines };
+        let known = Known { graph, machine, magnitude: Vec::new(), natural: Vec::new() };
         let mut search = PointSearch {
             known,
             box_of_inputs: inputs,

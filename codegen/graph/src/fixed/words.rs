@@ -16,12 +16,15 @@ impl WordId {
 }
 
 /// How a product of two words is computed. All are the high half of the product, rounded down: see `straightline_core::fixed`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Product {
     /// In one instruction, where the machine has it.
+    #[default]
     Wide,
     /// Shifted to the right by so many bits, fewer than 32.
     Long(u32),
+    /// From four products of halves.
+    Exact,
     /// From three products of halves.
     Full,
     /// Without the lower half of the second word.
@@ -36,6 +39,7 @@ impl Product {
         match self {
             Product::Wide => "wide",
             Product::Long(_) => "long",
+            Product::Exact => "exact",
             Product::Full => "full",
             Product::Half => "half",
             Product::Short => "short",
@@ -47,16 +51,30 @@ impl Product {
         match self {
             Product::Wide => kernel::wide(a, b),
             Product::Long(by) => kernel::long(a, b, by),
+            Product::Exact => kernel::exact(a, b),
             Product::Full => kernel::full(a, b),
             Product::Half => kernel::half(a, b),
             Product::Short => kernel::short(a, b),
         }
     }
 
+    /// The function in `straightline_core::fixed` of sines and cosines with such products.
+    ///
+    /// # Panics
+    /// There is none without the lower half of a word.
+    pub fn sine_name(self) -> &'static str {
+        match self {
+            Product::Wide => "sin_cos_wide",
+            Product::Exact => "sin_cos_exact",
+            Product::Full => "sin_cos_full",
+            Product::Long(_) | Product::Half | Product::Short => unreachable!("sines have whole products"),
+        }
+    }
+
     /// By how many units of its last place it is below the product of the words, at most, but for halves that it leaves out.
     pub fn loss(self) -> f64 {
         match self {
-            Product::Wide | Product::Long(_) => 1.0,
+            Product::Wide | Product::Long(_) | Product::Exact => 1.0,
             // two shifts, and the product of the lower halves
             Product::Full => 3.0,
             Product::Half => 1.0,
@@ -68,7 +86,7 @@ impl Product {
     /// Whether it leaves out the lower half of its first and of its second word.
     pub fn leaves_out(self) -> [bool; 2] {
         match self {
-            Product::Wide | Product::Long(_) | Product::Full => [false, false],
+            Product::Wide | Product::Long(_) | Product::Exact | Product::Full => [false, false],
             Product::Half => [false, true],
             Product::Short => [true, true],
         }
@@ -130,8 +148,8 @@ pub struct WordProgram {
     pub outputs: Vec<Port>,
     /// The words that are put out, group after group.
     pub results: Vec<WordId>,
-    /// How products are computed in sines and cosines.
-    pub wide: bool,
+    /// How products are computed in sines and cosines: [`Product::Wide`], [`Product::Exact`] or [`Product::Full`].
+    pub sines: Product,
 }
 
 /// The word that left 32 bits, and the value that it should have had.
@@ -151,14 +169,16 @@ impl WordProgram {
     pub fn sin_cos(&self, angle: i32, bits: u32, turns: bool) -> (i32, i32) {
         macro_rules! at {
             ($($bits:literal)*) => {
-                match (bits, self.wide, turns) {
+                match (bits, self.sines, turns) {
                     $(
-                        ($bits, true, true) => kernel::sin_cos_wide::<$bits, true>(angle),
-                        ($bits, true, false) => kernel::sin_cos_wide::<$bits, false>(angle),
-                        ($bits, false, true) => kernel::sin_cos_full::<$bits, true>(angle),
-                        ($bits, false, false) => kernel::sin_cos_full::<$bits, false>(angle),
+                        ($bits, Product::Wide, true) => kernel::sin_cos_wide::<$bits, true>(angle),
+                        ($bits, Product::Wide, false) => kernel::sin_cos_wide::<$bits, false>(angle),
+                        ($bits, Product::Exact, true) => kernel::sin_cos_exact::<$bits, true>(angle),
+                        ($bits, Product::Exact, false) => kernel::sin_cos_exact::<$bits, false>(angle),
+                        ($bits, Product::Full, true) => kernel::sin_cos_full::<$bits, true>(angle),
+                        ($bits, Product::Full, false) => kernel::sin_cos_full::<$bits, false>(angle),
                     )*
-                    _ => unreachable!("angles have a point from 24 to 31"),
+                    _ => unreachable!("angles have a point from 24 to 31, and sines whole products"),
                 }
             };
         }

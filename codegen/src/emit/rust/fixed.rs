@@ -127,9 +127,8 @@ fn function(made: &FixedFunction) -> String {
                 continue;
             }
             WordOp::SinCos(a, bits, turns) => {
-                let kind = if words.wide { "wide" } else { "full" };
-                let name = names.temporary();
-                let _ = writeln!(text, "    let {name} = words::sin_cos_{kind}::<{bits}, {turns}>({});", v(a));
+                let (name, sines) = (names.temporary(), words.sines.sine_name());
+                let _ = writeln!(text, "    let {name} = words::{sines}::<{bits}, {turns}>({});", v(a));
                 called.push(name);
                 continue;
             }
