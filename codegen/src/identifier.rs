@@ -21,7 +21,8 @@ const LONGEST_SHOWN: usize = 200;
 pub const UNNAMED: &str = "unnamed";
 
 /// What the generated file puts behind the name of a function.
-const BEHIND_FUNCTIONS: [&str; 8] = ["part", "lanes", "in_lanes", "batch", "error_bound", "values", "program", "cost"];
+const BEHIND_FUNCTIONS: [&str; 9] =
+    ["part", "lanes", "in_lanes", "batch", "error_bound", "values", "program", "cost", "figures"];
 
 /// A name as a word of small letters, digits and `_`: `left hand-2` becomes `left_hand_2`. It may be reserved; as a beginning of
 /// longer identifiers it will do.

@@ -15,6 +15,7 @@ pub mod equations;
 pub mod fronts;
 pub mod function;
 pub mod identifier;
+pub mod machine_code;
 pub mod model;
 pub mod options;
 pub mod output;

@@ -40,6 +40,7 @@
 //! | `limbs = "auto"`: How identical limbs are computed: `"apart"`, `"lanes"`, `"auto"`, `"rolled"` | `"apart"` |
 //! | `target = "cortex-m4f"`: The machine that code is made for: short sines in f32 where it computes one angle at a time, and an order for its registers: `"cortex-m0plus"`, `"cortex-m3"`, `"cortex-m4f"`, `"cortex-m7"`, `"cortex-m33"`, `"rv32imac"`, `"rv32imafc"`, `"aarch64"`, `"x86-64-v3"` | any machine |
 //! | `memory = "tcm"`: The memory that code runs from on the machine of `target`: `"flash"`, `"tcm"` | `"flash"` |
+//! | `figures`: Beside every function a constant of its instructions, flash, stack and cycles on the machine of `target`, read off the machine code that rustc makes | off |
 //! | `self_test`: Write `self_test()` beside the functions, which compares what a machine computes with what the compiler expects, to the bit | off |
 //! | `max_part_operations = 100`: Longer functions are cut into parts of at most so many operations | 12000 |
 //! | `fixed = "muls"`: A module `fixed` with the same functions over integers of 32 bits, for machines without floating point, and how these multiply: `"mulh"`, `"muls"` | floating point alone |

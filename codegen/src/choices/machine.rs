@@ -23,7 +23,74 @@ pub struct MachineRow {
     pub registers: Option<usize>,
     /// Whether it computes one angle at a time, so that short sines pay.
     pub is_scalar: bool,
+    /// How its machine code is read; none: it is not.
+    pub code: Option<InstructionSet>,
+    /// Instructions that functions of the compiler's library take for a number, on average; none are known of a library that is not here.
+    pub library: &'static [(&'static str, f64)],
+    /// A model of its cycles; none where its manual gives no times of instructions.
+    pub cycles: Option<CycleModel>,
 }
+
+/// How machine code is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InstructionSet {
+    /// Arm's of 16 and 32 bits.
+    Thumb,
+    /// RISC-V of 32 bits, with compressed instructions.
+    RiscV,
+    /// Arm's of 64-bit processors.
+    Arm64,
+}
+
+/// Cycles per instruction. It is a model: instructions wait for nothing but themselves.
+///
+/// Integers take one cycle, a load or store of n words 1 + n.
+#[derive(Clone, Copy, Debug)]
+pub struct CycleModel {
+    /// Of an operation of the floating-point unit.
+    pub float: f64,
+    /// Of a multiply-accumulate.
+    pub multiply_accumulate: f64,
+    /// Of a division.
+    pub division: f64,
+    /// Of a square root.
+    pub square_root: f64,
+    /// More of a jump that is taken, a call, a return.
+    pub taken: f64,
+    /// Bytes that flash gives in a cycle, to code that is not in its cache.
+    pub flash_bytes_per_cycle: f64,
+}
+
+/// Cortex-M4 Technical Reference Manual (Arm 100166), tables 3-1 and 7-1; of the 1 to 3 cycles that filling the pipeline takes, 2. Flash as in an
+/// STM32G474 at 170 MHz (RM0440): 8 bytes, and four wait states.
+const CYCLES_OF_CORTEX_M4: CycleModel = CycleModel {
+    float: 1.0,
+    multiply_accumulate: 3.0,
+    division: 14.0,
+    square_root: 14.0,
+    taken: 2.0,
+    flash_bytes_per_cycle: 8.0 / 5.0,
+};
+
+/// Of a library that was not measured nothing is known.
+const NOT_MEASURED: &[(&str, f64)] = &[];
+
+/// Averages that give the instructions of `robots/benches/machines.tsv` (rustc 1.95.0) by least squares of relative errors; divisions are too few there
+/// to tell, so that one counts as two products. Filling memory is of six arrays of 36 to 48 bytes.
+const OF_CORTEX_M0PLUS: &[(&str, f64)] = &[
+    ("__aeabi_fadd", 99.0),
+    ("__aeabi_fsub", 115.0),
+    ("__aeabi_fmul", 112.0),
+    ("__aeabi_fdiv", 224.0),
+    ("__aeabi_memclr4", 134.0),
+];
+/// The same.
+const OF_RV32IMAC: &[(&str, f64)] =
+    &[("__addsf3", 62.0), ("__subsf3", 68.0), ("__mulsf3", 48.0), ("__divsf3", 96.0), ("memset", 74.0)];
+/// Of the same arrays, where there is a floating-point unit.
+const OF_CORTEX_M4F: &[(&str, f64)] = &[("__aeabi_memclr4", 36.8)];
+/// The same.
+const OF_RV32IMAFC: &[(&str, f64)] = &[("memset", 42.8)];
 
 /// Multiply-accumulate that rounds the product, which LLVM leaves out on processors where it takes as long as the two.
 const MULTIPLY_ACCUMULATE: &[&str] = &["-C target-feature=-slowfpvmlx"];
@@ -55,6 +122,9 @@ machines! {
         for_flash: &[],
         registers: None,
         is_scalar: true,
+        code: Some(InstructionSet::Thumb),
+        library: OF_CORTEX_M0PLUS,
+        cycles: None,
     }
     /// Arm Cortex-M3: no floating-point unit.
     CORTEX_M3 {
@@ -66,6 +136,9 @@ machines! {
         for_flash: &[],
         registers: None,
         is_scalar: true,
+        code: Some(InstructionSet::Thumb),
+        library: NOT_MEASURED,
+        cycles: None,
     }
     /// Arm Cortex-M4 with a floating-point unit of single precision.
     CORTEX_M4F {
@@ -77,6 +150,9 @@ machines! {
         for_flash: MULTIPLY_ACCUMULATE,
         registers: Some(32),
         is_scalar: true,
+        code: Some(InstructionSet::Thumb),
+        library: OF_CORTEX_M4F,
+        cycles: Some(CYCLES_OF_CORTEX_M4),
     }
     /// Arm Cortex-M7.
     CORTEX_M7 {
@@ -88,6 +164,9 @@ machines! {
         for_flash: &[],
         registers: Some(32),
         is_scalar: true,
+        code: Some(InstructionSet::Thumb),
+        library: NOT_MEASURED,
+        cycles: None,
     }
     /// Arm Cortex-M33 with a floating-point unit of single precision.
     CORTEX_M33 {
@@ -99,6 +178,9 @@ machines! {
         for_flash: MULTIPLY_ACCUMULATE,
         registers: Some(32),
         is_scalar: true,
+        code: Some(InstructionSet::Thumb),
+        library: NOT_MEASURED,
+        cycles: None,
     }
     /// RISC-V of 32 bits without a floating-point unit.
     RV32IMAC {
@@ -110,6 +192,9 @@ machines! {
         for_flash: &[],
         registers: None,
         is_scalar: true,
+        code: Some(InstructionSet::RiscV),
+        library: OF_RV32IMAC,
+        cycles: None,
     }
     /// RISC-V of 32 bits with a floating-point unit of single precision.
     RV32IMAFC {
@@ -121,6 +206,9 @@ machines! {
         for_flash: &[],
         registers: Some(32),
         is_scalar: true,
+        code: Some(InstructionSet::RiscV),
+        library: OF_RV32IMAFC,
+        cycles: None,
     }
     /// Arm of 64 bits, with vectors of 128 bits.
     AARCH64 {
@@ -132,6 +220,9 @@ machines! {
         for_flash: &[],
         registers: Some(32),
         is_scalar: false,
+        code: Some(InstructionSet::Arm64),
+        library: NOT_MEASURED,
+        cycles: None,
     }
     /// x86 of 64 bits with AVX2.
     X86_64_V3 {
@@ -143,6 +234,9 @@ machines! {
         for_flash: &[],
         registers: Some(16),
         is_scalar: false,
+        code: None,
+        library: NOT_MEASURED,
+        cycles: None,
     }
 }
 

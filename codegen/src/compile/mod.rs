@@ -1,5 +1,6 @@
 //! The pipeline, as one function.
 
+mod figures;
 mod prepare;
 
 pub use prepare::examine;
@@ -25,6 +26,7 @@ use crate::report::budget::{self, Measures};
 use crate::report::certificates::certificates;
 use crate::report::waterfall;
 use crate::{readback, scene};
+use figures::{with_figures, Compilation};
 use prepare::{prepare, Prepared};
 use straightline_core::model::Model;
 use straightline_core::Dd;
@@ -132,7 +134,11 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let why = |p: &WrittenFunction| Some((p.name.clone(), range::of_constants(&p.graph, p.scalar)?));
     let first = generated.programs.all().find_map(why);
     match first {
-        None => Ok(generated.with_fixed(fixed)),
+        None => {
+            let compilation =
+                Compilation { source, options: &options, whole: &whole, frames: &generated.frames.clone() };
+            Ok(with_figures(generated, &compilation)?.with_fixed(fixed))
+        }
         Some((program, why)) => {
             let mut diagnostics = generated.warnings;
             beyond(&program, &why, &mut diagnostics);

@@ -12,6 +12,7 @@ use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::equations::Robot;
 use crate::function::Judged;
 use crate::identifier::file_name;
+use crate::machine_code::MachineFigures;
 use crate::options::Options;
 use crate::program::companion::{checked_companion, wants_companions, ROUNDED};
 use crate::program::equivalence::Disagreement;
@@ -76,6 +77,8 @@ pub struct Generated {
     pub target: Option<TargetMachine>,
     /// The memory that it runs from there.
     pub memory: Memory,
+    /// The rustc that figures of machine code are of, where they stand in the text.
+    pub rustc: Option<String>,
     /// Where it came from.
     pub provenance: Provenance,
     /// Its figures.
@@ -108,6 +111,23 @@ impl Generated {
     pub fn with_others(mut self, others: Vec<Generated>) -> Generated {
         self.text.extend(others.iter().map(rust::scalar_module));
         Generated { others, ..self }
+    }
+
+    /// The same with figures of machine code per function, which the text has as constants where the compiler is said.
+    #[must_use]
+    pub(crate) fn with_figures(
+        mut self,
+        figures: Vec<(&'static str, MachineFigures)>,
+        rustc: Option<String>,
+    ) -> Generated {
+        for (name, figures) in figures {
+            self.report.functions.entry(name).and_modify(|f| f.machine = Some(figures));
+        }
+        self.rustc = rustc;
+        match self.rustc.is_some() {
+            true => Generated { text: rust::file(&self), ..self },
+            false => self,
+        }
     }
 
     /// The same in fixed point, as a module of the text.
@@ -253,6 +273,7 @@ pub(crate) fn generate(
         lanes: options.lanes,
         target: options.target,
         memory: options.memory,
+        rustc: None,
         provenance,
         report,
         warnings,

@@ -21,6 +21,12 @@ pub struct PackageKind {
 pub(super) const NO_FIXED: [&str; 2] =
     ["packages have no functions in fixed point", "leave out `fixed`; `generate` writes them in Rust"];
 
+/// Why packages have no figures of machine code.
+pub(super) const NO_FIGURES: [&str; 2] = [
+    "figures of machine code are of the Rust text by itself, not of a package",
+    "leave out `figures`; a file of Rust has them (`straightline generate`)",
+];
+
 /// Why packages of C refuse a self-test.
 pub(super) const NO_SELF_TEST: [&str; 2] =
     ["a package of C has no self-test", "leave out `self_test`; a file of Rust has it (`straightline generate`)"];

@@ -36,7 +36,7 @@ const STATES: usize = 6;
 /// A form of forward dynamics in figures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Figures {
+pub struct MethodFigures {
     /// Multiplications and additions.
     pub operations: usize,
     /// Divisions and square roots.
@@ -46,10 +46,10 @@ pub struct Figures {
     pub error: Option<f64>,
 }
 
-impl Figures {
+impl MethodFigures {
     fn new(graph: &Graph, error: Option<f64>) -> Self {
         let counts = count_sums(graph);
-        Figures { operations: counts.mul + counts.add, divisions: counts.div + counts.sqrt, error }
+        MethodFigures { operations: counts.mul + counts.add, divisions: counts.div + counts.sqrt, error }
     }
 
     /// What it takes, in operations.
@@ -65,9 +65,9 @@ pub struct MethodChoice {
     /// Whether articulated bodies were chosen.
     pub articulated_bodies: bool,
     /// The articulated bodies.
-    pub articulated: Figures,
+    pub articulated: MethodFigures,
     /// The factorisation of H; `None`: too large to be tried.
-    pub factorisation: Option<Figures>,
+    pub factorisation: Option<MethodFigures>,
 }
 
 impl MethodChoice {
@@ -123,14 +123,14 @@ impl fmt::Display for MethodChoice {
 /// Chooses between two programs of the same function; with the factorisation only where there is one.
 pub fn choose(model: &Model<Dd>, scalar: Scalar, articulated: &Graph, factorised: Option<&Graph>) -> MethodChoice {
     let Some(factorised) = factorised else {
-        let articulated = Figures::new(articulated, None);
+        let articulated = MethodFigures::new(articulated, None);
         return MethodChoice { articulated_bodies: true, articulated, factorisation: None };
     };
     let errors = errors(model, scalar, articulated, factorised);
     let keeps_digits = errors.as_ref().is_none_or(|[a, f]| f.keeps_digits_of(a, scalar));
     let [of_articulated, of_factorised] = errors.map_or([None; 2], |errors| errors.map(|e| Some(e.worst)));
-    let articulated = Figures::new(articulated, of_articulated);
-    let factorisation = Figures::new(factorised, of_factorised);
+    let articulated = MethodFigures::new(articulated, of_articulated);
+    let factorisation = MethodFigures::new(factorised, of_factorised);
     let cheaper = factorisation.cost() < (1.0 - WORTH) * articulated.cost();
     MethodChoice { articulated_bodies: !(cheaper && keeps_digits), articulated, factorisation: Some(factorisation) }
 }

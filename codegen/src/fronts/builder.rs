@@ -229,6 +229,8 @@ options! {
     target(machine: TargetMachine) = machine;
     /// The memory that it runs from there; otherwise flash.
     memory(memory: Memory) = memory;
+    /// Whether constants say what each function takes on that machine, read off the machine code that rustc makes.
+    figures(figures: bool) = figures;
     /// Functions of more operations are cut into parts.
     max_part_operations(operations: usize) = operations;
     /// Whether the root link moves freely in the world.

@@ -22,7 +22,7 @@ pub(super) static RESERVED: [&str; 6] = [
      q5 q6 q7 q8 q9 restitution s sd sdd sdd_free smallest_contact_eigenvalue smallest_eigenvalue tau tv u v \
      violation w x xd",
     // what else the file, its modules and its types are written with
-    "batch check_inertia check_number com configuration contact cost dd drivers dynamics fma fma_if fused inertia \
+    "batch check_inertia check_number com configuration contact cost dd drivers dynamics figures fma fma_if fused inertia \
      lane limb live mass mode mul_add_f32 mul_add_f64 n none number numbers out_of_range parameters real self_test \
      self_test_hashes self_tests short_sines single some \
      staged t trig unphysical values velocity y",

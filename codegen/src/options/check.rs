@@ -1,6 +1,6 @@
 //! Options and scene, where they contradict each other.
 
-use crate::choices::Choice;
+use crate::choices::{Choice, Lanes};
 use crate::diagnostic::Diagnostics;
 use crate::function::Function;
 use crate::options::Options;
@@ -43,6 +43,7 @@ pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
             }
         }
     }
+    check_figures(options, diagnostics);
     if options.self_test && options.fma {
         scene.places.complain("options.self_test", say::self_test_fused(), diagnostics);
     }
@@ -54,5 +55,41 @@ pub fn check_options(options: &Options, diagnostics: &mut Diagnostics) {
     for function in scene.budgets.keys().filter(is_alone) {
         let name = function.name();
         scene.places.complain(&format!("budget.{name}"), say::budget_alone(name), diagnostics);
+    }
+}
+
+/// Figures of machine code need a machine, and a text that needs nothing else.
+fn check_figures(options: &Options, diagnostics: &mut Diagnostics) {
+    let places = &options.scene.places;
+    let with = [
+        ("`generic`", options.generic),
+        ("`fma`", options.fma),
+        ("`lanes = \"runtime\"`", options.lanes == Some(Lanes::Runtime)),
+    ];
+    let ask = |path: &str, what: &str, needs_machine: bool, diagnostics: &mut Diagnostics| match options.target {
+        None if needs_machine => places.complain(path, say::target_missing(what), diagnostics),
+        None => {}
+        Some(_) => with.iter().filter(|(_, is_asked)| *is_asked).for_each(|(with, _)| {
+            places.complain(path, say::figures_elsewhere(what, with), diagnostics);
+        }),
+    };
+    if options.figures {
+        ask("options.figures", "figures", true, diagnostics);
+    }
+    for (function, budget) in &options.scene.budgets {
+        let limits = [
+            ("max_instructions", budget.max_instructions, true),
+            ("max_flash_bytes", budget.max_flash_bytes, true),
+            ("max_stack_bytes", budget.max_stack_bytes, false),
+        ];
+        let unread = options.target.filter(|machine| budget.max_instructions.is_some() && machine.row().code.is_none());
+        if let Some(machine) = unread {
+            let (name, key) = (function.name(), "max_instructions");
+            let why = format!("that of {} is not read", machine.row().name);
+            places.complain(&format!("budget.{name}.{key}"), say::figure_unknown(name, key, &why), diagnostics);
+        }
+        for (key, _, needs_machine) in limits.into_iter().filter(|(_, most, _)| most.is_some()) {
+            ask(&format!("budget.{}.{key}", function.name()), key, needs_machine, diagnostics);
+        }
     }
 }

@@ -17,7 +17,7 @@ use crate::description;
 use crate::description::drives::WrittenDrive;
 use crate::diagnostic::{Diagnostics, Reporting, Source};
 use crate::function::{ForwardDynamicsMethod, Function};
-use crate::scene::Scene;
+use crate::scene::{Budget, Scene};
 use straightline_graph::certify::Effort;
 use straightline_graph::expr::{Grade, RuleSet};
 use straightline_graph::schedule::ScheduleLimits;
@@ -75,6 +75,8 @@ options! {
     target "target": Option<TargetMachine> = None,
     /// The memory that it runs from there.
     memory "memory": Memory = Memory::default(),
+    /// Whether constants beside every function say what it takes there, read off the machine code that rustc makes.
+    figures "figures": bool = false,
     /// Whether `self_test` stands beside the functions.
     self_test "self_test": bool = false,
     /// How long one function may be.
@@ -121,6 +123,22 @@ impl Options {
         let is_mixed = self.scene.budgets.get(&function).is_some_and(|budget| budget.mixed_precision);
         let is_plain = !(self.fma || self.generic || self.lanes.is_some() || is_mixed);
         self.target.is_some_and(|machine| machine.row().is_scalar) && is_plain && self.grade == Grade::Algebraic
+    }
+
+    /// The functions whose machine code is asked for: by `figures`, or by budgets that count on it.
+    pub fn measured(&self) -> impl Iterator<Item = Function> + '_ {
+        let by_budget = |b: &Budget| {
+            b.max_instructions.is_some()
+                || b.max_flash_bytes.is_some()
+                || self.measures_stack() && b.max_stack_bytes.is_some()
+        };
+        let is_measured = move |f: &&Function| self.figures || self.scene.budgets.get(f).is_some_and(by_budget);
+        self.functions.iter().filter(move |f| self.target.is_some() && is_measured(f)).copied()
+    }
+
+    /// Whether `max_stack_bytes` means the stack of machine code: where the machine is known and its code is read.
+    pub fn measures_stack(&self) -> bool {
+        self.target.is_some_and(|machine| machine.row().code.is_some())
     }
 
     /// How many numbers the registers of the machine hold, if it is known.

@@ -150,7 +150,8 @@ fields! {
     }
     Budget = {
         "max_flops": max_flops, "max_sincos": max_sincos, "max_live": max_live, "max_stack_bytes": max_stack_bytes,
-        "max_code_bytes": max_code_bytes, "max_error": max_error, "mixed_precision": mixed_precision,
+        "max_code_bytes": max_code_bytes, "max_instructions": max_instructions, "max_flash_bytes": max_flash_bytes,
+        "max_error": max_error, "mixed_precision": mixed_precision,
     }
     Ranges = { "q": q, "qd": qd, "qdd": qdd, "tau": tau, "gravity": gravity, }
     InputRange : { "lower": lower, "upper": upper, }

@@ -25,6 +25,7 @@ const BATCH: &str = straightline_core::sources::BATCH;
 /// Checksums of what is the same in all files, in f64: what changes there has to be looked at, and written here again.
 const FIXED: &[(Sort, u32, &[u64])] = &[
     (Sort::Struct, t::COST, &[0x1148_c8bd_9c9e_a6a9]),
+    (Sort::Struct, t::FIGURES, &[0xc1da_69d8_b79b_bf5a]),
     (Sort::Enum, t::UNPHYSICAL, &[0x9c18_e7bc_b078_e440]),
     (Sort::ImplOf, t::UNPHYSICAL, &[0x516a_84d1_a60c_e6cc]),
     (Sort::Function, t::CHECK_INERTIA, &[0x0c81_c665_d150_516d]),
@@ -156,6 +157,15 @@ impl Around<'_, '_, '_> {
                 figures.mul, figures.add, figures.fma, figures.div, figures.sincos, figures.max_live
             );
             self.is(root, Sort::Constant, &name, &cost)?;
+            if let (Some(machine), true) = (&figures.machine, generated.rustc.is_some()) {
+                let name = format!("{}_FIGURES", function.to_uppercase());
+                let known = |figure: Result<u32, &str>| figure.map_or("None".to_string(), |n| format!("Some({n})"));
+                let value = format!(
+                    "pub const {name}: Figures = Figures {{ instructions: {}, flash_bytes: {}, shared_flash_bytes: {}, stack_bytes: {}, model_cycles: {} }};",
+                    known(machine.instructions), machine.flash_bytes, machine.shared_flash_bytes, known(machine.stack_bytes), known(machine.model_cycles)
+                );
+                self.is(root, Sort::Constant, &name, &value)?;
+            }
             if let Some(errors) = &figures.errors {
                 for output in &errors.outputs {
                     let name = errors.constant_name(function, output);

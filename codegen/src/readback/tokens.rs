@@ -48,7 +48,7 @@ words! {
     F32 = "f32", F64 = "f64", USIZE = "usize", BOOL = "bool", T = "T", REAL = "Real",
     ZERO = "zero", CONSTANT = "constant", NUMBER = "number",
     N = "N", FUSED = "FUSED", FMA = "fma", FMA_IF = "fma_if", FUSED_MODULE = "fused", TRIG = "trig", SHORT_SINES = "short_sines", BATCH = "batch",
-    COST = "Cost", UNPHYSICAL = "Unphysical", CHECK_INERTIA = "check_inertia",
+    COST = "Cost", FIGURES = "Figures", UNPHYSICAL = "Unphysical", CHECK_INERTIA = "check_inertia",
     OUT_OF_RANGE = "OutOfRange", CHECK_NUMBER = "check_number",
     ALLOW = "allow", DOC = "doc", DERIVE = "derive", INLINE = "inline", MUST_USE = "must_use", REPR = "repr",
     FIXED = "fixed", SINGLE = "single", DOUBLE = "double", STRAIGHTLINE = "straightline", WITH_THREADS = "with_threads",

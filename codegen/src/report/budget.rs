@@ -4,6 +4,7 @@ use super::errors::ErrorReport;
 use super::waterfall::robot_in;
 use crate::diagnostic::Diagnostics;
 use crate::function::{Function, Quantity};
+use crate::machine_code::MachineFigures;
 use crate::options::Options;
 use crate::program::{checked, TracedProgram};
 use crate::scene::{messages as say, Budget, CoulombForm, Effects, Gravity, MaxError, Misfit, Scene, Zero};
@@ -16,6 +17,9 @@ use straightline_graph::{element_of, Scalar};
 
 /// Of the things that could be held, so many are named.
 const REMEDIES: usize = 3;
+
+/// The limit that means the machine code's stack where its machine is known.
+const STACK: &str = "max_stack_bytes";
 
 /// What a program costs, in the terms of budgets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,7 +104,7 @@ const LIMITS: [Limit; 5] = [
         words: ("keeps", "value alive at once", "values alive at once"),
     },
     Limit {
-        key: "max_stack_bytes",
+        key: STACK,
         most: |b| b.max_stack_bytes,
         takes: |m| m.stack_bytes,
         words: ("takes", "byte of stack for its values", "bytes of stack for its values"),
@@ -124,7 +128,10 @@ pub fn check(
     let places = &options.scene.places;
     for (function, measures) in programs {
         let Some(budget) = options.scene.budgets.get(function) else { continue };
-        let exceeded = |limit: &&Limit| (limit.most)(budget).is_some_and(|most| (limit.takes)(measures) > most);
+        // where the machine is known its machine code says more
+        let counts = |limit: &&Limit| !options.measures_stack() || limit.key != STACK;
+        let exceeded =
+            |limit: &&Limit| counts(limit) && (limit.most)(budget).is_some_and(|most| (limit.takes)(measures) > most);
         let exceeded: Vec<&Limit> = LIMITS.iter().filter(exceeded).collect();
         if exceeded.is_empty() {
             continue;
@@ -132,19 +139,91 @@ pub fn check(
         let remedies = remedies(whole, frames, *function, options);
         for limit in exceeded {
             let (takes, most) = ((limit.takes)(measures), (limit.most)(budget).expect("the limit is exceeded"));
-            let mut savings: Vec<(usize, &str)> = remedies
-                .iter()
-                .map(|(what, with)| (takes.saturating_sub((limit.takes)(with)), what.as_str()))
-                .filter(|(saved, _)| *saved > 0)
-                .collect();
-            // the greatest first, of equal ones as they come
-            savings.sort_by_key(|(saved, _)| std::cmp::Reverse(*saved));
-            savings.truncate(REMEDIES);
+            let with = remedies.iter().map(|(what, with)| ((limit.takes)(with), what.as_str()));
+            let savings = savings(takes, with);
             let name = function.name();
             let message = say::over_budget(name, limit.words, (takes, most), limit.key, &savings);
             places.complain(&format!("budget.{name}.{}", limit.key), message, diagnostics);
         }
     }
+}
+
+/// What saves most, the greatest first, of equal ones as they come.
+fn savings<'a>(takes: usize, with: impl Iterator<Item = (usize, &'a str)>) -> Vec<(usize, &'a str)> {
+    let saved = with.map(|(with, what)| (takes.saturating_sub(with), what));
+    let mut savings: Vec<(usize, &str)> = saved.filter(|(saved, _)| *saved > 0).collect();
+    savings.sort_by_key(|(saved, _)| std::cmp::Reverse(*saved));
+    savings.truncate(REMEDIES);
+    savings
+}
+
+/// A limit of a budget that machine code is compared with.
+struct MachineLimit {
+    key: &'static str,
+    most: fn(&Budget) -> Option<usize>,
+    takes: fn(&MachineFigures) -> Result<u32, &'static str>,
+    /// As those of [`Limit`].
+    words: (&'static str, &'static str, &'static str),
+}
+
+const MACHINE_LIMITS: [MachineLimit; 3] = [
+    MachineLimit {
+        key: "max_instructions",
+        most: |b| b.max_instructions,
+        takes: |m| m.instructions,
+        words: ("takes", "instruction", "instructions"),
+    },
+    MachineLimit {
+        key: "max_flash_bytes",
+        most: |b| b.max_flash_bytes,
+        takes: |m| Ok(m.flash_bytes),
+        words: ("takes", "byte of flash", "bytes of flash"),
+    },
+    MachineLimit {
+        key: STACK,
+        most: |b| b.max_stack_bytes,
+        takes: |m| m.stack_bytes,
+        words: ("takes", "byte of stack", "bytes of stack"),
+    },
+];
+
+/// Complains of every budget that machine code exceeds, or of which it says nothing. `remedies` are measured as it is.
+pub fn check_machine_code(
+    figures: &[(Function, MachineFigures)],
+    remedies: &dyn Fn(Function) -> Vec<(String, MachineFigures)>,
+    options: &Options,
+    diagnostics: &mut Diagnostics,
+) {
+    for (function, figures) in figures {
+        let (Some(budget), name) = (options.scene.budgets.get(function), function.name()) else { continue };
+        let mut measured = None;
+        for limit in MACHINE_LIMITS.iter().filter(|limit| options.measures_stack() || limit.key != STACK) {
+            let message = match ((limit.most)(budget), (limit.takes)(figures)) {
+                (Some(most), Ok(takes)) if takes as usize > most => {
+                    let remedies = measured.get_or_insert_with(|| remedies(*function));
+                    let with = remedies
+                        .iter()
+                        .filter_map(|(what, with)| Some(((limit.takes)(with).ok()? as usize, what.as_str())));
+                    let savings = savings(takes as usize, with);
+                    say::over_budget(name, limit.words, (takes as usize, most), limit.key, &savings)
+                }
+                (Some(_), Err(why)) => say::figure_unknown(name, limit.key, why),
+                _ => continue,
+            };
+            options.scene.places.complain(&format!("budget.{name}.{}", limit.key), message, diagnostics);
+        }
+    }
+}
+
+/// Of what the scene could hold, what saves the most operations: so much is worth a run of rustc.
+pub fn promising(whole: &Model<Dd>, frames: &[String], function: Function, options: &Options) -> Vec<(String, Scene)> {
+    let candidates = candidates(whole, function, options).into_iter();
+    let mut counted: Vec<(usize, (String, Scene))> = candidates
+        .filter_map(|(what, scene)| Some((in_scene(whole, frames, function, &scene, options)?.flops, (what, scene))))
+        .collect();
+    counted.sort_by_key(|(flops, _)| *flops);
+    counted.truncate(REMEDIES);
+    counted.into_iter().map(|(_, candidate)| candidate).collect()
 }
 
 /// Complains of every bound of rounding errors that is greater than the scene allows, and of demanded bounds that do not exist.
@@ -186,6 +265,28 @@ pub fn check_errors<'a>(
 
 /// What the scene could hold besides, with what a function would cost then.
 fn remedies(whole: &Model<Dd>, frames: &[String], function: Function, options: &Options) -> Vec<(String, Measures)> {
+    let candidates = candidates(whole, function, options).into_iter();
+    let with = |(what, scene)| Some((what, in_scene(whole, frames, function, &scene, options)?));
+    candidates.filter_map(with).collect()
+}
+
+/// What a function would cost in a scene.
+fn in_scene(
+    whole: &Model<Dd>,
+    frames: &[String],
+    function: Function,
+    scene: &Scene,
+    options: &Options,
+) -> Option<Measures> {
+    let (robot, scene) = robot_in(whole, &Scene { budgets: BTreeMap::new(), ..scene.clone() })?;
+    let options = Options { scene, ..options.clone() };
+    // what has no right form in that scene is no advice
+    let program = checked(&robot, frames, function, &options).ok()?;
+    Some(Measures::of(&program, options.scalar))
+}
+
+/// What the scene could hold besides.
+fn candidates(whole: &Model<Dd>, function: Function, options: &Options) -> Vec<(String, Scene)> {
     let scene = &options.scene;
     let mut candidates: Vec<(String, Scene)> = Vec::new();
     let inputs = function.quantities(whole);
@@ -213,12 +314,5 @@ fn remedies(whole: &Model<Dd>, frames: &[String], function: Function, options: &
         let locked = scene.locked.iter().cloned().chain([(joint.name.clone(), 0.0)]).collect();
         candidates.push((format!("joint {} locked", joint.name), Scene { locked, ..scene.clone() }));
     }
-    let measured = candidates.into_iter().filter_map(|(what, scene)| {
-        let (robot, scene) = robot_in(whole, &Scene { budgets: BTreeMap::new(), ..scene })?;
-        let options = Options { scene, ..options.clone() };
-        // what has no right form in that scene is no advice
-        let program = checked(&robot, frames, function, &options).ok()?;
-        Some((what, Measures::of(&program, options.scalar)))
-    });
-    measured.collect()
+    candidates
 }

@@ -7,6 +7,7 @@ pub mod waterfall;
 
 use crate::equations::forward_method::MethodChoice;
 use crate::function::Function;
+use crate::machine_code::MachineFigures;
 use crate::program::staged::StagedReport;
 use crate::program::TracedProgram;
 use budget::Measures;
@@ -46,6 +47,9 @@ pub struct FunctionReport {
     pub stack_bytes: usize,
     /// Bytes of machine code, estimated for x86-64.
     pub code_bytes: usize,
+    /// What it takes on its machine, where that is asked for.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub machine: Option<MachineFigures>,
     /// Of forward dynamics: which method was chosen, and why.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub method: Option<MethodChoice>,
@@ -96,6 +100,7 @@ impl FunctionReport {
             lines,
             stack_bytes,
             code_bytes,
+            machine: None,
             method: program.method,
             errors: None,
             waterfall: None,

@@ -41,6 +41,10 @@ pub const CODES: &[&str] = &[
     "error-budget-output",
     "error-budget-count",
     "over-budget",
+    "target-missing",
+    "figures-elsewhere",
+    "figure-unknown",
+    "no-machine-code",
     "error-over-budget",
     "fixed-range-missing",
     "fixed-impossible",
@@ -386,6 +390,32 @@ pub fn over_budget(
         true => d.help(format!("nothing that the scene could hold saves any; raise `{key}`")),
         false => d.help(format!("what would save most: {}; or raise `{key}`", savings.join(", "))),
     }
+}
+
+/// Figures of machine code without a machine.
+pub fn target_missing(what: &str) -> D {
+    D::error("target-missing", format!("`{what}` is read off machine code, and no machine is named"))
+        .help("name it by the option `target`, as in `target = \"cortex-m4f\"`")
+}
+
+/// Figures of machine code that needs more than `core`.
+pub fn figures_elsewhere(what: &str, with: &str) -> D {
+    D::error("figures-elsewhere", format!("`{what}` beside {with}"))
+        .detail(
+            "figures are read off the machine code of a text that needs `core` alone, whose functions are of numbers",
+        )
+        .help("leave out one of them")
+}
+
+/// A budget of what machine code does not say.
+pub fn figure_unknown(function: &str, key: &str, why: &str) -> D {
+    D::error("figure-unknown", format!("`{key}` of `{function}` cannot be compared with its machine code: {why}"))
+        .help(format!("leave out `{key}`"))
+}
+
+/// No machine code, and what to do.
+pub fn no_machine_code(why: &str, remedy: String) -> D {
+    D::error("no-machine-code", format!("figures are read off machine code, and there is none: {why}")).help(remedy)
 }
 
 /// Forward dynamics where the base's motion is given.

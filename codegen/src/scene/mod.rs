@@ -327,10 +327,15 @@ pub struct Budget {
     pub max_sincos: Option<usize>,
     /// Values alive at once.
     pub max_live: Option<usize>,
-    /// Bytes of stack for values, as far as known before rustc: live values, and what is handed from part to part.
+    /// Bytes of stack: of the machine code where its machine is known, otherwise for values, as far as known before rustc: live values, and
+    /// what is handed from part to part.
     pub max_stack_bytes: Option<usize>,
     /// Bytes of machine code, estimated.
     pub max_code_bytes: Option<usize>,
+    /// Instructions per call on the machine that code is made for, read off its machine code.
+    pub max_instructions: Option<usize>,
+    /// Bytes of flash there.
+    pub max_flash_bytes: Option<usize>,
     /// The greatest bounds of rounding errors.
     pub max_error: Option<MaxError>,
     /// Whether a function in f32 may compute in f64 what `max_error` takes.

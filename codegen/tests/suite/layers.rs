@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The ground first.
-const ROOMS: [&str; 17] = [
+const ROOMS: [&str; 18] = [
     "function",
     "identifier",
     "output",
@@ -16,6 +16,7 @@ const ROOMS: [&str; 17] = [
     "description",
     "model",
     "choices",
+    "machine_code",
     "scene",
     "options",
     "equations",

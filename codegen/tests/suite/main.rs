@@ -16,6 +16,7 @@ mod contact_compiled;
 mod effects;
 mod elastic_inverse;
 mod expansion;
+mod figures;
 mod fixed;
 mod flexible;
 mod forward_dynamics;

@@ -56,6 +56,21 @@ fn check_tells_a_fresh_file_from_a_stale_one() {
 }
 
 #[test]
+fn figures_without_a_compiler_or_a_machine_end_with_1_and_say_what_to_do() {
+    let arguments = ["generate", ARM, "--scalar", "f32", "--target", "cortex-m4f", "--figures"];
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_straightline")).args(arguments).env("RUSTC", "/nowhere/rustc").output();
+    let output = output.unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{said}");
+    assert!(said.contains("error[no-machine-code]") && said.contains("`/nowhere/rustc` cannot be run"), "{said}");
+    assert!(said.contains("help: install rustc, or name it by the environment variable RUSTC"), "{said}");
+    let without = straightline(&["generate", ARM, "--figures"]);
+    assert_eq!((without.code, without.out.as_str()), (1, ""));
+    assert!(without.err.contains("error[target-missing]: `figures` is read off machine code"), "{}", without.err);
+}
+
+#[test]
 fn a_wrong_robot_file_ends_with_1_and_writes_nothing() {
     let directory = scratch("wrong");
     let robot = directory.join("arm.toml");

@@ -12,7 +12,7 @@ mod source;
 pub use kernel::KERNEL;
 pub use routine::C99;
 
-use super::package::{PackageKind, NO_FIXED, NO_SELF_TEST};
+use super::package::{PackageKind, NO_FIGURES, NO_FIXED, NO_SELF_TEST};
 use super::Generated;
 use crate::identifier::comment;
 use interface::Interface;
@@ -31,6 +31,7 @@ pub const C99_SOURCE: PackageKind = PackageKind {
         ]),
         () if generated.programs.self_test.is_some() => Some(NO_SELF_TEST),
         () if !generated.fixed.is_empty() => Some(NO_FIXED),
+        () if generated.rustc.is_some() => Some(NO_FIGURES),
         () if !generated.others.is_empty() || generated.staged.is_some() => Some([
             "a C package has one scalar type, and no stages: C could not tell a stage that is out of date",
             "say which with `--scalar`, and leave `staged` out of the scene",

@@ -7,7 +7,7 @@ use super::file::{header, item_text, lanes_text, preamble, short_sines, uses};
 use super::routine::SHORT_SINES;
 use super::{array_type, batch, fused, kernel};
 use crate::emit::c99::interface::{CParameter, Exported, Interface, LAYOUTS};
-use crate::emit::package::{PackageKind, NO_FIXED, NO_SELF_TEST};
+use crate::emit::package::{PackageKind, NO_FIGURES, NO_FIXED, NO_SELF_TEST};
 use crate::emit::{Generated, Item, Style};
 use crate::identifier::{package_name, string_literal};
 use crate::output::MARK;
@@ -31,6 +31,9 @@ pub const C_ABI: PackageKind = PackageKind {
         }
         if !generated.fixed.is_empty() {
             return Some(NO_FIXED);
+        }
+        if generated.rustc.is_some() {
+            return Some(NO_FIGURES);
         }
         (!generated.others.is_empty() || generated.staged.is_some()).then_some([
             "a C package has one scalar type, and no stages: C could not tell a stage that is out of date",

@@ -1,8 +1,9 @@
 //! Constants of a robot: in the file, and associated with a type.
 
 use super::{number, ALLOW};
+use crate::choices::Choice;
 use crate::emit::Generated;
-use crate::identifier::string_literals;
+use crate::identifier::{comment, string_literals};
 use crate::report::errors::four_digits;
 use crate::report::FunctionReport;
 use std::fmt::Write;
@@ -27,6 +28,7 @@ enum ConstantType {
     /// Numbers of a scalar type in an array of that shape.
     Numbers(Scalar, Vec<usize>),
     Cost,
+    Figures,
 }
 
 impl AssociatedConstant {
@@ -46,6 +48,7 @@ impl AssociatedConstant {
                 shape.iter().rev().fold(scalar.name().to_string(), |inner, n| format!("[{inner}; {n}]"))
             }
             ConstantType::Cost => format!("{module}Cost"),
+            ConstantType::Figures => format!("{module}Figures"),
         }
     }
 
@@ -147,6 +150,46 @@ pub(super) fn cost(name: &str, f: &FunctionReport) -> AssociatedConstant {
         value,
         format!("What [`{name}`] costs."),
     )
+}
+
+/// The type of the figures of machine code.
+pub(super) const FIGURES: &str = "
+/// What a generated function takes on the machine that it is made for, read off its machine code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Figures {
+    /// Instructions per call on the longest path, callees included; of functions of the compiler's library averages.
+    pub instructions: Option<u32>,
+    /// Bytes of flash, without those that it shares.
+    pub flash_bytes: u32,
+    /// Bytes of flash that it shares with other functions: the kernel of sines, and constants.
+    pub shared_flash_bytes: u32,
+    /// Bytes of stack at its deepest, callees included but for functions of the compiler's library.
+    pub stack_bytes: Option<u32>,
+    /// Cycles per call by a model in which instructions wait for nothing but themselves and the memory that they are in.
+    pub model_cycles: Option<u32>,
+}
+";
+
+/// The figures of a function, where they are asked for.
+pub(super) fn figures(name: &str, f: &FunctionReport, generated: &Generated) -> Option<AssociatedConstant> {
+    let (figures, rustc, machine) = (f.machine.as_ref()?, generated.rustc.as_ref()?, generated.target?);
+    let optional = |figure: Result<u32, &'static str>| figure.map_or("None".to_string(), |n| format!("Some({n})"));
+    let value = format!(
+        "Figures {{ instructions: {}, flash_bytes: {}, shared_flash_bytes: {}, stack_bytes: {}, model_cycles: {} }}",
+        optional(figures.instructions),
+        figures.flash_bytes,
+        figures.shared_flash_bytes,
+        optional(figures.stack_bytes),
+        optional(figures.model_cycles)
+    );
+    let (machine, memory, rustc) = (machine.row().name, generated.memory.word(), comment(rustc));
+    let mut doc = format!("What [`{name}`] takes on {machine}, code in {memory}, compiled by {rustc}.");
+    let all =
+        [("instructions", figures.instructions), ("stack", figures.stack_bytes), ("cycles", figures.model_cycles)];
+    for (what, why) in all.iter().filter_map(|(what, figure)| Some((what, figure.err()?))) {
+        let _ = write!(doc, "\n\nNothing is said of {what}: {why}.");
+    }
+    Some(AssociatedConstant::new(format!("{}_FIGURES", name.to_uppercase()), ConstantType::Figures, value, doc))
 }
 
 /// The certified bounds of a function's errors.

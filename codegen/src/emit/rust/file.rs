@@ -1,6 +1,6 @@
 //! The generated file: header, constants of the robot, functions, and the sine-cosine kernel they call.
 
-use super::constants::{cost, error_bounds, of_robot, AssociatedConstant, COST};
+use super::constants::{cost, error_bounds, figures, of_robot, AssociatedConstant, COST, FIGURES};
 use super::routine::SHORT_SINES;
 use super::{batch, bound, contact, fused, indented, parameter, pasted, self_test, staged};
 use crate::choices::{Choice, Lanes, Memory};
@@ -99,12 +99,16 @@ pub(super) fn preamble(generated: &Generated) -> String {
     if !functions.is_empty() {
         out.push_str(COST);
     }
-    for (name, figures) in functions {
-        out.push_str(&cost(name, figures).text());
-        if let Some(refused) = figures.errors.as_ref().and_then(|errors| errors.refused) {
+    if generated.rustc.is_some() {
+        out.push_str(FIGURES);
+    }
+    for (name, found) in functions {
+        out.push_str(&cost(name, found).text());
+        out.extend(figures(name, found, generated).iter().map(AssociatedConstant::text));
+        if let Some(refused) = found.errors.as_ref().and_then(|errors| errors.refused) {
             let _ = writeln!(out, "// No certified bound of the errors of {name}: {refused}.");
         }
-        out.extend(error_bounds(name, figures).iter().map(AssociatedConstant::text));
+        out.extend(error_bounds(name, found).iter().map(AssociatedConstant::text));
     }
     if generated.plain_style.generic {
         out.push_str(GENERIC);
@@ -126,6 +130,28 @@ pub fn scalar_module(generated: &Generated) -> String {
     let scalar = generated.scalar;
     let items = indented(items(generated).trim_start_matches('\n'));
     format!("\n/// The same in [`{}`].\npub mod {} {{\n{items}}}\n", scalar.name(), scalar.module())
+}
+
+/// What symbols of functions begin with in [`measurable`] crates.
+const SYMBOL: &str = "straightline_";
+
+/// The symbol of a function there.
+pub fn symbol(function: &str) -> String {
+    format!("{SYMBOL}{function}")
+}
+
+/// A crate of a file, whose functions of these names have symbols that can be found in its machine code.
+pub fn measurable(text: &str, functions: &[&str]) -> String {
+    let mut out = String::from("#![no_std]\n");
+    for line in text.lines() {
+        let name = line.strip_prefix("pub fn ").and_then(|rest| rest.split_once('(')).map(|(name, _)| name);
+        if let Some(name) = name.filter(|name| functions.contains(name)) {
+            let _ = writeln!(out, "#[export_name = \"{}\"]", symbol(name));
+        }
+        out.push_str(line);
+        out.push('\n');
+    }
+    out
 }
 
 /// The source of the sine-cosine kernel, as a module of its own. For functions over lanes it becomes part of its callers, so

@@ -16,7 +16,7 @@ mod staged;
 pub mod stubs;
 
 pub use associated::associated_items;
-pub use file::{file, kernel, scalar_module};
+pub use file::{file, kernel, measurable, scalar_module, symbol};
 pub use fixed::fixed_module;
 pub use routine::Rust;
 

@@ -88,6 +88,9 @@ fn items_and_types(options: &Options, scene: Option<&str>, upwards: &str) -> Str
         }
     };
     add_type(&mut out, "Cost");
+    if options.figures || scene.is_some() {
+        add_type(&mut out, "Figures");
+    }
     if options.lanes.is_some() {
         let _ = writeln!(out, "pub mod batch {{\n    pub type WrongLength = super::{missing};\n}}");
     }
@@ -147,6 +150,9 @@ fn constants_and_functions(options: &Options, scene: Option<&str>, missing: &str
             None => {
                 let _ = writeln!(out, "{}", value(name, missing));
             }
+        }
+        if options.figures || scene.is_some() {
+            let _ = writeln!(out, "{}", value(&format!("{upper}_FIGURES"), missing));
         }
         for constant in [format!("{upper}_COST"), format!("{name}_error_bound"), format!("{upper}_ERROR_BOUND")] {
             let _ = writeln!(out, "{}", value(&constant, missing));

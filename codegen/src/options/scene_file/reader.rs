@@ -22,8 +22,17 @@ use toml::de::DeValue;
 /// The tables of which there is one each, beside [`LISTS`].
 const TABLES: &[&str] =
     &["stabilisation", "outputs", "hold", "zero", "effects", "support", "numbers", "budget", "options", "diagnostics"];
-const BUDGET: &[&str] =
-    &["max_flops", "max_sincos", "max_live", "max_stack_bytes", "max_code_bytes", "max_error", "mixed_precision"];
+const BUDGET: &[&str] = &[
+    "max_flops",
+    "max_sincos",
+    "max_live",
+    "max_stack_bytes",
+    "max_code_bytes",
+    "max_instructions",
+    "max_flash_bytes",
+    "max_error",
+    "mixed_precision",
+];
 const BASES: [(&str, Base); 3] = [("fixed", Base::Fixed), ("floating", Base::Floating), ("moving", Base::Moving)];
 /// A place in the list of effects: that its speed is still to be read.
 const SMOOTH: CoulombForm = CoulombForm::Smooth(0.0);
@@ -415,6 +424,8 @@ impl<'a> SceneReader<'a> {
                 max_live: limit("max_live"),
                 max_stack_bytes: limit("max_stack_bytes"),
                 max_code_bytes: limit("max_code_bytes"),
+                max_instructions: limit("max_instructions"),
+                max_flash_bytes: limit("max_flash_bytes"),
                 max_error: None,
                 mixed_precision: false,
             };
