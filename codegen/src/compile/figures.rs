@@ -71,7 +71,7 @@ fn measured(
     options: &Options,
 ) -> Result<(RustCompiler, Vec<(Function, MachineFigures)>), ObjectError> {
     let machine = options.target.expect("who asks for figures names a machine");
-    let rustc = RustCompiler::find(options.reporting.rustc.as_deref())?;
+    let rustc = RustCompiler::find(options.rustc.as_deref())?;
     let names: Vec<&str> = functions.iter().map(|f| f.name()).collect();
     let code = machine_code(&rustc, &measurable(text, &names), machine, options.memory)?;
     let symbols: Vec<String> = names.iter().map(|name| symbol(name)).collect();

@@ -2,7 +2,6 @@
 
 use super::messages as say;
 use super::{codes, Diagnostic, Severity};
-use std::ffi::OsString;
 use std::fmt;
 
 /// Stands for the codes of all warnings.
@@ -137,8 +136,6 @@ pub struct Reporting {
     pub levels: Levels,
     /// In whose words.
     pub front: Front,
-    /// The rustc that figures of machine code are measured with; none: the one that the environment variable `RUSTC` names, or else `rustc`.
-    pub rustc: Option<OsString>,
 }
 
 impl fmt::Display for Level {

@@ -18,6 +18,7 @@ use crate::description::drives::WrittenDrive;
 use crate::diagnostic::{Diagnostics, Reporting, Source};
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::scene::{Budget, Scene};
+use std::ffi::OsString;
 use straightline_graph::certify::Effort;
 use straightline_graph::expr::{Grade, RuleSet};
 use straightline_graph::schedule::ScheduleLimits;
@@ -26,23 +27,22 @@ use straightline_graph::Scalar;
 /// Fields with the names that they have in the text that hashes are made of, and their defaults; behind `..` what is not of the output.
 macro_rules! options {
     ($($(#[$doc:meta])* $field:ident $name:literal: $type:ty = $default:expr,)*
-        .. $(#[$silent_doc:meta])* $silent:ident: $silent_type:ty) => {
+        .. $($(#[$silent_doc:meta])* $silent:ident: $silent_type:ty),+) => {
         /// What to generate, and how.
         #[derive(Clone, Debug)]
         pub struct Options {
             $($(#[$doc])* pub $field: $type,)*
-            $(#[$silent_doc])*
-            pub $silent: $silent_type,
+            $($(#[$silent_doc])* pub $silent: $silent_type,)+
         }
 
         impl Default for Options {
             fn default() -> Self {
-                Options { $($field: $default,)* $silent: Default::default() }
+                Options { $($field: $default,)* $($silent: Default::default(),)+ }
             }
         }
 
         stable::fields! {
-            Options = { $($name: $field,)* .. $silent }
+            Options = { $($name: $field,)* .. $($silent),+ }
         }
     };
 }
@@ -93,7 +93,9 @@ options! {
     fixed_error "fixed_error": f64 = 1e-6,
     ..
     /// What becomes of warnings, and in whose words they are said: nothing of what is generated.
-    reporting: Reporting
+    reporting: Reporting,
+    /// The rustc that figures of machine code are measured with; none: the one that the environment variable `RUSTC` names, or else `rustc`.
+    rustc: Option<OsString>
 }
 
 impl Options {

@@ -56,10 +56,10 @@ pub(super) fn said<T: Stable>(name: &str, value: &T, out: &mut String) {
 
 /// Structures: `=` what differs from the default alone, `:` everything, behind `..` what is not of the output.
 macro_rules! fields {
-    ($($type:ident $mode:tt { $($name:literal: $field:ident,)* $(.. $silent:ident)? })*) => {$(
+    ($($type:ident $mode:tt { $($name:literal: $field:ident,)* $(.. $($silent:ident),+)? })*) => {$(
         impl $crate::options::stable::Stable for $type {
             fn say(&self, out: &mut String) {
-                let $type { $($field,)* $($silent: _)? } = self;
+                let $type { $($field,)* $($($silent: _),+)? } = self;
                 out.push('{');
                 $crate::options::stable::fields!(@ $type $mode out $($name: $field,)*);
                 out.push('}');

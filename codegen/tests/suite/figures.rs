@@ -316,11 +316,11 @@ fn a_budget_holds_at_the_measured_figure_and_fails_one_below() {
 #[test]
 fn without_rustc_or_its_target_there_is_a_remedy_and_no_folder_is_left() {
     let mut options = on(TargetMachine::CORTEX_M4F);
-    options.reporting.rustc = Some("/nowhere/rustc".into());
+    options.rustc = Some("/nowhere/rustc".into());
     let text = compile(&arm(), &options).expect_err("no compiler").render();
     assert!(text.contains("error[no-machine-code]") && text.contains("`/nowhere/rustc` cannot be run"), "{text}");
     // a program that is no compiler
-    options.reporting.rustc = Some("true".into());
+    options.rustc = Some("true".into());
     let text = compile(&arm(), &options).expect_err("no compiler").render();
     assert!(text.contains("`true` cannot be run: `--version` says"), "{text}");
     let error = ObjectError::NoTarget("thumbv7em-none-eabihf");

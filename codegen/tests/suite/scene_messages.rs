@@ -44,7 +44,7 @@ fn said_of(code: &str) -> Diagnostics {
         "said-twice" => options.model.gravity = Some([0.0, 0.0, -1.62]),
         "base-locked" => options.model.floating_base = true,
         "mixed-elsewhere" => options.generic = true,
-        "no-machine-code" => options.reporting.rustc = Some("/nowhere/rustc".into()),
+        "no-machine-code" => options.rustc = Some("/nowhere/rustc".into()),
         "self-test-fused" => options.fma = true,
         "limbs-exact" => options.grade = straightline_codegen::Grade::Exact,
         _ => {}

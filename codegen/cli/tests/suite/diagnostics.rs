@@ -176,7 +176,7 @@ fn a_plainer_form_is_always_said() {
     let said = |level: Option<Level>| {
         let mut levels = Levels::default();
         level.into_iter().for_each(|level| levels.set("warnings", level));
-        let mut diagnostics = Diagnostics::reporting(&Reporting { levels, front: Front::Builder, rustc: None });
+        let mut diagnostics = Diagnostics::reporting(&Reporting { levels, front: Front::Builder });
         diagnostics.push(warning());
         // as `-q` says it
         let shown = diagnostics.at_least(Severity::Error);
@@ -207,6 +207,6 @@ fn a_plainer_form_is_always_said() {
 fn a_level_of_an_unknown_code_is_an_error_of_the_library_too() {
     let mut levels = Levels::default();
     levels.set("nonsense", Level::Allow);
-    let diagnostics = Diagnostics::reporting(&Reporting { levels, front: Front::Builder, rustc: None });
+    let diagnostics = Diagnostics::reporting(&Reporting { levels, front: Front::Builder });
     assert_eq!(diagnostics.count(Severity::Error), 1);
 }

@@ -4,7 +4,7 @@
 
 use super::outcome::{Outcome, Size};
 use super::robots::{chain, file, rounded_model, Link, AXES};
-use straightline_codegen::equations::forward_method::Figures;
+use straightline_codegen::equations::forward_method::MethodFigures;
 use straightline_codegen::expr::evaluate;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::options::Options;
@@ -156,7 +156,7 @@ fn chosen(n: usize, states: usize) -> Outcome {
         }
     }
     let form = if method.articulated_bodies { "articulated bodies" } else { "the factorisation" };
-    let errors = |f: Figures| f.error.map_or("not tried".to_string(), |e| format!("{:.0} u", e / UNITS[0]));
+    let errors = |f: MethodFigures| f.error.map_or("not tried".to_string(), |e| format!("{:.0} u", e / UNITS[0]));
     let other = match method.factorisation {
         Some(factorisation) => {
             format!("worst seen {}, of the factorisation {}", errors(method.articulated), errors(factorisation))
