@@ -81,6 +81,8 @@ pub struct OptionRow {
     pub default: &'static str,
     /// A value that is not the default.
     pub example: &'static [&'static str],
+    /// Another option without which it is refused, and a value of it.
+    pub needs: Option<(&'static str, &'static str)>,
     /// What stands for its value in the help of the command line.
     pub metavar: &'static str,
     /// On the command line.
@@ -110,6 +112,7 @@ impl OptionRow {
         doc: "",
         default: "off",
         example: &[],
+        needs: None,
         metavar: "",
         command_line: Call::Name,
         macros: Call::Name,
@@ -180,7 +183,7 @@ pub static TABLE: &[OptionRow] = &[
         example: &["tcm"], hash: &["memory"], set: |options, value| options.memory = value.choice(), ..OF },
     OptionRow { name: "figures",
         doc: "Beside every function a constant of its instructions, flash, stack and cycles on the machine of `target`, read off the machine code that rustc makes",
-        hash: &["figures"], set: |options, value| options.figures = value.flag(), ..OF },
+        needs: Some(("target", "x86-64-v3")), hash: &["figures"], set: |options, value| options.figures = value.flag(), ..OF },
     OptionRow { name: "self_test",
         doc: "Write `self_test()` beside the functions, which compares what a machine computes with what the compiler expects, to the bit",
         hash: &["self_test"], set: |options, value| options.self_test = value.flag(), ..OF },
