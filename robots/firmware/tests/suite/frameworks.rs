@@ -15,13 +15,17 @@ fn slow_proof_sketches_for_frameworks_are_linked() {
         let cargo = |arguments: &[&str]| {
             let mut cargo = cross::cargo().expect("there is a toolchain");
             cargo.args(arguments).args(["--locked", "--quiet"]).current_dir(&folder).env("CARGO_TARGET_DIR", &target);
-            cargo.status().unwrap().success()
+            let output = cargo.output().unwrap();
+            (output.status.success(), String::from_utf8_lossy(&output.stderr).into_owned())
         };
-        if !cargo(&["fetch"]) {
-            eprintln!("skipped: what {name} depends on cannot be fetched");
+        let (is_fetched, said) = cargo(&["fetch"]);
+        if !is_fetched {
+            assert!(!said.contains("lock file"), "{name}: its Cargo.lock is of other dependencies\n{said}");
+            eprintln!("skipped: what {name} depends on cannot be fetched\n{said}");
             continue;
         }
-        assert!(cargo(&["build", "--release"]), "{name}");
+        let (is_built, said) = cargo(&["build", "--release"]);
+        assert!(is_built, "{name}\n{said}");
         let program = target.join(format!("thumbv7em-none-eabihf/release/straightline-{name}-sketch"));
         let symbols = Command::new(&nm).args(["--defined-only"]).arg(program).output().unwrap();
         let symbols = String::from_utf8(symbols.stdout).unwrap();
