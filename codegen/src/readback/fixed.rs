@@ -193,7 +193,7 @@ impl FixedReader<'_, '_> {
         locals: &FxHashMap<String, usize>,
     ) -> FixedReading<usize> {
         const SUMS: [(&str, usize); 3] = [("wrapping_add", 2), ("wrapping_sub", 2), ("wrapping_neg", 1)];
-        const PRODUCTS: [&str; 6] = ["wide", "exact", "full", "half", "short", "long"];
+        const PRODUCTS: [&str; 7] = ["wide", "exact", "full", "half", "short", "uneven", "long"];
         const SINES: [&str; 3] = ["sin_cos_wide", "sin_cos_exact", "sin_cos_full"];
         let (path, at) = (self.items.text_of(self.at), self.at);
         if !matches!(path, "i32" | "words") {

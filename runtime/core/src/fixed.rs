@@ -7,7 +7,7 @@
 //! # Products
 //! Of two words with the points f and g a product has the point f + g − 32. [`wide`] is the high half of the product of 64 bits, which is one
 //! instruction where there is one (`mulh`, `smull`); [`long`] keeps lower bits, for a few more. The others are made of products of halves for machines that multiply 32 bits to 32
-//! bits only: [`exact`], which is the same number, [`full`] without the product of both lower halves, [`half`] without the lower half of its second operand, [`short`] without that of both. All of them are rounded
+//! bits only: [`exact`], which is the same number, [`full`] without the product of both lower halves, [`half`] without the lower half of its second operand, [`short`] without that of both, [`uneven`] of 24 bits and 8. All of them are rounded
 //! down. In units of the last place: [`wide`] and [`exact`] lose less than 1, [`full`] less than 3.
 //!
 //! # Sine and cosine
@@ -66,6 +66,13 @@ pub const fn half(a: i32, b: i32) -> i32 {
 #[must_use]
 pub const fn short(a: i32, b: i32) -> i32 {
     (a >> 16).wrapping_mul(b >> 16)
+}
+
+/// The product of the upper 24 bits of `a` and the upper 8 of `b`.
+#[inline(always)]
+#[must_use]
+pub const fn uneven(a: i32, b: i32) -> i32 {
+    (a >> 8).wrapping_mul(b >> 24)
 }
 
 /// Kernels answer for |r| up to here, in 2^-31: π/4 + 2^-7.

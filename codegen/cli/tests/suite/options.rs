@@ -86,7 +86,8 @@ fn an_option_gives_the_same_bytes_through_every_front() {
     let here = scratch();
     let mut asked = 0;
     // machine code of the one machine that needs no other compiler than the tests' own
-    let can_be_made = |row: &&OptionRow| row.name != "figures" || cfg!(all(target_arch = "x86_64", target_os = "linux"));
+    let can_be_made =
+        |row: &&OptionRow| row.name != "figures" || cfg!(all(target_arch = "x86_64", target_os = "linux"));
     for row in TABLE.iter().filter(|row| row.group != OptionGroup::Front).filter(can_be_made) {
         let mut options = Options::default();
         settings(row, Front::Derive).apply(&mut options);

@@ -63,7 +63,7 @@ impl WordMachine {
             Product::Exact => 17.0,
             Product::Full => 12.0,
             Product::Half => 7.0,
-            Product::Short => 3.0,
+            Product::Short | Product::Uneven => 3.0,
         }
     }
 
@@ -71,7 +71,7 @@ impl WordMachine {
     fn products(self) -> &'static [Product] {
         match self.wide {
             true => &[Product::Wide],
-            false => &[Product::Exact, Product::Full, Product::Half, Product::Short],
+            false => &[Product::Exact, Product::Full, Product::Half, Product::Short, Product::Uneven],
         }
     }
 
@@ -203,27 +203,29 @@ impl Known<'_> {
         };
         let at = bits + 32 - point - left;
         let (exact, off) = word(c.value(), at)?;
-        let short = word(c.value(), at - 16).filter(|(w, _)| i16::try_from(*w).is_ok()).map(|(w, off)| (w << 16, off));
-        let factor = Aligned::Node(a, left);
-        let lower = 65536.0 * unit(point + left) * c.value().to_f64().abs();
         let last = unit(bits);
         let ways = self.machine.products().iter().flat_map(|kind| {
             let cost = self.machine.product(*kind) + f64::from(left > 0);
             let loss = kind.loss() * last;
-            let whole = |error: f64| ([factor, Aligned::Constant(exact)], error + off * magnitude);
-            let halved = short.map(|(w, off)| ([factor, Aligned::Constant(w)], off * magnitude));
-            let ways: Vec<([Aligned; 2], f64)> = match kind {
-                Product::Wide | Product::Long(_) | Product::Exact | Product::Full => vec![whole(0.0)],
-                Product::Half => {
-                    let ([a, c], error) = whole(lower);
-                    halved.into_iter().chain([([c, a], error)]).collect()
-                }
-                Product::Short => halved.into_iter().map(|(factors, error)| (factors, error + lower)).collect(),
-            };
-            ways.into_iter().map(move |(factors, error)| Priced {
-                way: WordWay::Product(*kind, factors, 0),
-                cost,
-                error: error + loss,
+            let orders: &[bool] = if kind.leaves_out() == [0, 0] { &[true] } else { &[true, false] };
+            orders.iter().filter_map(move |value_first| {
+                let [of_value, of_constant] = match (kind.leaves_out(), value_first) {
+                    ([first, second], true) => [first, second],
+                    ([first, second], false) => [second, first],
+                };
+                // a constant is rounded to what is read of it
+                let (word, off) = match of_constant {
+                    0 => (exact, off),
+                    out => {
+                        let (short, off) = word(c.value(), at - out as i32)?;
+                        (i32::try_from(i64::from(short) << out).ok()?, off)
+                    }
+                };
+                let value = if of_value == 0 { 0.0 } else { 2f64.powi(of_value as i32) * unit(point + left) };
+                let error = off * magnitude + value * c.value().to_f64().abs();
+                let factors = [Aligned::Node(a, left), Aligned::Constant(word)];
+                let factors = if *value_first { factors } else { [factors[1], factors[0]] };
+                Some(Priced { way: WordWay::Product(*kind, factors, 0), cost, error: error + loss })
             })
         });
         Self::least(weight, ways.chain(long))
@@ -275,16 +277,20 @@ impl Known<'_> {
         let after = beyond.max(0) as u32;
         let shifts = [left_a > 0, left_b > 0, after > 0].into_iter().filter(|s| *s).count() as f64;
         let factors = [Aligned::Node(a, left_a), Aligned::Node(b, left_b)];
-        let lower = |of: usize| {
+        let lower = |of: usize, out: u32| {
             let (other, point) = if of == 0 { (b, pa + left_a) } else { (a, pb + left_b) };
-            65536.0 * unit(point) * self.magnitude[other.index()]
+            if out == 0 {
+                return 0.0;
+            }
+            2f64.powi(out as i32) * unit(point) * self.magnitude[other.index()]
         };
         let rounding = if after > 0 { unit(bits) } else { 0.0 };
         let last = unit(bits + beyond.max(0));
         let ways = self.machine.products().iter().flat_map(|kind| {
-            let orders: &[[usize; 2]] = if *kind == Product::Half { &[[0, 1], [1, 0]] } else { &[[0, 1]] };
+            let [first, second] = kind.leaves_out();
+            let orders: &[[usize; 2]] = if first != second { &[[0, 1], [1, 0]] } else { &[[0, 1]] };
             orders.iter().map(move |order| {
-                let left_out = order.iter().zip(kind.leaves_out()).filter(|(_, out)| *out).map(|(of, _)| lower(*of));
+                let left_out = order.iter().zip(kind.leaves_out()).map(|(of, out)| lower(*of, out));
                 Priced {
                     way: WordWay::Product(*kind, order.map(|k| factors[k]), after),
                     cost: self.machine.product(*kind) + shifts,

@@ -31,6 +31,8 @@ pub enum Product {
     Half,
     /// Without the lower half of both.
     Short,
+    /// Of the upper 24 bits of the first word and the upper 8 of the second.
+    Uneven,
 }
 
 impl Product {
@@ -43,6 +45,7 @@ impl Product {
             Product::Full => "full",
             Product::Half => "half",
             Product::Short => "short",
+            Product::Uneven => "uneven",
         }
     }
 
@@ -55,6 +58,7 @@ impl Product {
             Product::Full => kernel::full(a, b),
             Product::Half => kernel::half(a, b),
             Product::Short => kernel::short(a, b),
+            Product::Uneven => kernel::uneven(a, b),
         }
     }
 
@@ -67,11 +71,13 @@ impl Product {
             Product::Wide => "sin_cos_wide",
             Product::Exact => "sin_cos_exact",
             Product::Full => "sin_cos_full",
-            Product::Long(_) | Product::Half | Product::Short => unreachable!("sines have whole products"),
+            Product::Long(_) | Product::Half | Product::Short | Product::Uneven => {
+                unreachable!("sines have whole products")
+            }
         }
     }
 
-    /// By how many units of its last place it is below the product of the words, at most, but for halves that it leaves out.
+    /// By how many units of its last place it is below the product of the words, at most, but for bits that it leaves out.
     pub fn loss(self) -> f64 {
         match self {
             Product::Wide | Product::Long(_) | Product::Exact => 1.0,
@@ -79,16 +85,17 @@ impl Product {
             Product::Full => 3.0,
             Product::Half => 1.0,
             // the product of what both leave out
-            Product::Short => 1.0,
+            Product::Short | Product::Uneven => 1.0,
         }
     }
 
-    /// Whether it leaves out the lower half of its first and of its second word.
-    pub fn leaves_out(self) -> [bool; 2] {
+    /// How many of the lowest bits of its first and of its second word it leaves out.
+    pub fn leaves_out(self) -> [u32; 2] {
         match self {
-            Product::Wide | Product::Long(_) | Product::Exact | Product::Full => [false, false],
-            Product::Half => [false, true],
-            Product::Short => [true, true],
+            Product::Wide | Product::Long(_) | Product::Exact | Product::Full => [0, 0],
+            Product::Half => [0, 16],
+            Product::Short => [16, 16],
+            Product::Uneven => [8, 24],
         }
     }
 }
