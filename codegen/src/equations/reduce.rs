@@ -6,7 +6,7 @@
 use rustc_hash::FxHasher;
 use std::hash::{Hash, Hasher};
 use straightline_core::model::{Body, BodyId, Model};
-use straightline_core::reduced::{ReducedBody, ReducedJoint, ReducedModel};
+use straightline_core::reduced::{Meeting, ReducedBody, ReducedJoint, ReducedModel};
 use straightline_core::spatial::{Mat3, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::{Dd, Real};
 
@@ -64,6 +64,8 @@ pub struct FreeTerms {
     pub adds_offsets: bool,
     /// The unit of length \[m\], for a robot that does not slide.
     pub unit: Dd,
+    /// [`ReducedModel::meeting`].
+    pub meeting: Meeting,
 }
 
 impl FreeTerms {
@@ -87,6 +89,7 @@ impl FreeTerms {
             adds_angles: false,
             adds_offsets: false,
             unit: Dd::ONE,
+            meeting: Meeting::default(),
         }
     }
 
@@ -108,11 +111,12 @@ impl FreeTerms {
             adds_angles,
             adds_offsets,
             unit,
+            meeting,
         } = self;
         let mut hasher = FxHasher::default();
         (stays, by_axis_acceleration, by_accelerations, regrouped, doubled, vanish_at_parent).hash(&mut hasher);
         (axial_balances, other_acceleration, turns_sums, turned_tips, shifted_tips).hash(&mut hasher);
-        (origin_at_parent, adds_angles, adds_offsets).hash(&mut hasher);
+        (origin_at_parent, adds_angles, adds_offsets, meeting).hash(&mut hasher);
         (unit.hi().to_bits(), unit.lo().to_bits()).hash(&mut hasher);
         hasher.finish()
     }
@@ -140,7 +144,8 @@ fn norm(v: Vec3<Dd>) -> f64 {
 pub fn reduce(model: &Model<Dd>, choice: &FreeTerms) -> (ReducedModel<Dd>, Vec<Transform<Dd>>) {
     let identity = || vec![Transform::identity(); model.bodies.len()];
     if model.bodies.iter().any(|body| ReducedJoint::of(body.joint.kind).is_none()) {
-        let none = ReducedModel { bodies: Vec::new(), gravity: model.gravity, per_unit: Dd::ONE, adds_angles: false };
+        let (per_unit, meeting) = (Dd::ONE, Meeting::default());
+        let none = ReducedModel { bodies: Vec::new(), gravity: model.gravity, per_unit, adds_angles: false, meeting };
         return (none, identity());
     }
     let lever = longest_lever(model);
@@ -155,8 +160,8 @@ pub fn reduce(model: &Model<Dd>, choice: &FreeTerms) -> (ReducedModel<Dd>, Vec<T
         let balances = [0, 1].map(|k| choice.axial_balances[k][i]);
         regroup(&mut bodies, i, lever, [0, 1, 2].map(|k| choice.vanish_at_parent[k][i]), balances);
     }
-    let adds_angles = choice.adds_angles;
-    let mut reduced = ReducedModel { bodies, gravity: model.gravity, per_unit: Dd::ONE, adds_angles };
+    let (adds_angles, meeting) = (choice.adds_angles, choice.meeting);
+    let mut reduced = ReducedModel { bodies, gravity: model.gravity, per_unit: Dd::ONE, adds_angles, meeting };
     for i in 0..reduced.bodies.len() {
         reduced.bodies[i].stays = choice.stays[i] && reduced.may_stay(i);
         let body = &mut reduced.bodies[i];

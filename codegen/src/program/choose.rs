@@ -316,7 +316,7 @@ fn fingerprint(reduced: &ReducedModel<Dd>) -> u64 {
         body.by_accelerations.hash(&mut hasher);
         body.phase.is_some().hash(&mut hasher);
     }
-    reduced.adds_angles.hash(&mut hasher);
+    (reduced.adds_angles, reduced.meeting).hash(&mut hasher);
     let _ = reduced.map(|x| {
         (x.hi().to_bits(), x.lo().to_bits()).hash(&mut hasher);
         x

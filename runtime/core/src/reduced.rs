@@ -100,6 +100,17 @@ pub struct ReducedBody<T> {
     pub doubled: [bool; 2],
 }
 
+/// How many joints from the base, at most, the motions of a joint meet the wrenches of a joint behind it, in derivatives of inverse dynamics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Meeting {
+    /// For the mass matrix.
+    pub mass_matrix: usize,
+    /// For derivatives of the torque of the joint behind.
+    pub lower: usize,
+    /// For derivatives by the joint behind.
+    pub upper: usize,
+}
+
 /// A robot reduced to what its joint torques depend on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReducedModel<T> {
@@ -112,6 +123,8 @@ pub struct ReducedModel<T> {
     pub per_unit: T,
     /// The angles of a chain of parallel joints are added, as if exactly, instead of by the addition theorem.
     pub adds_angles: bool,
+    /// Where fields and wrenches meet in derivatives.
+    pub meeting: Meeting,
 }
 
 impl<T: Real> ReducedModel<T> {
@@ -159,6 +172,7 @@ impl<T: Real> ReducedModel<T> {
             gravity: self.gravity.map(&mut f),
             per_unit: f(self.per_unit),
             adds_angles: self.adds_angles,
+            meeting: self.meeting,
         }
     }
 }

@@ -67,7 +67,12 @@ pub fn reduced_inverse_dynamics_with_limbs<T: Real>(
 }
 
 /// How all bodies move: the sweep from the base to the tips.
-fn motions<T: Real>(model: &ReducedModel<T>, q: &[T], qd: &[T], qdd: &[T]) -> (Vec<Turn<T>>, Vec<DescribedMotion<T>>) {
+pub(super) fn motions<T: Real>(
+    model: &ReducedModel<T>,
+    q: &[T],
+    qd: &[T],
+    qdd: &[T],
+) -> (Vec<Turn<T>>, Vec<DescribedMotion<T>>) {
     let mut links: Vec<DescribedMotion<T>> = Vec::with_capacity(model.bodies.len());
     let world = DescribedMotion::world(model.gravity);
     let turns = Turn::all(model, q);
@@ -199,24 +204,24 @@ impl<T: Real> CarriedMotion<T> {
 
 /// ω, ε and U of one rigid body, in some axes.
 #[derive(Clone, Copy)]
-struct Spin<T> {
-    omega: Vec3<T>,
+pub(super) struct Spin<T> {
+    pub omega: Vec3<T>,
     alpha: Vec3<T>,
     /// U = \[ε×\] + \[ω×\]\[ω×\].
-    u: Mat3<T>,
+    pub u: Mat3<T>,
     /// U₃₃ − U₂₂, U₁₁ − U₃₃, U₂₂ − U₁₁.
-    differences: Vec3<T>,
+    pub differences: Vec3<T>,
     /// ω_x ω_y.
-    xy: T,
+    pub xy: T,
 }
 
 /// How a body moves, in the axes in which it is described.
-struct DescribedMotion<T> {
-    spin: Spin<T>,
+pub(super) struct DescribedMotion<T> {
+    pub spin: Spin<T>,
     /// Acceleration of the origin less gravity.
-    accel: Vec3<T>,
+    pub accel: Vec3<T>,
     /// From the parent's origin to this one, in the axes of the parent's description.
-    arm: Vec3<T>,
+    pub arm: Vec3<T>,
     /// The motion of the base axes, and the sum of the rates of the chain's joints and of the rates' rates.
     base: (Spin<T>, T, T),
 }
@@ -372,7 +377,7 @@ impl<T: Real> DescribedMotion<T> {
     }
 
     /// Force and moment about the origin that this motion takes of the body alone.
-    fn wrench(&self, body: &ReducedBody<T>, turn: &Turn<T>) -> ForceVector<T> {
+    pub fn wrench(&self, body: &ReducedBody<T>, turn: &Turn<T>) -> ForceVector<T> {
         let ms = turn.own_to_described(body, body.first_moment);
         let own = &body.second_moment;
         let s = match turn.angle {

@@ -99,7 +99,7 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
 }
 
 /// In the axes in which the body is described.
-fn of_body<T: Real>(body: &ReducedBody<T>, turn: &Turn<T>) -> Composite<T> {
+pub(super) fn of_body<T: Real>(body: &ReducedBody<T>, turn: &Turn<T>) -> Composite<T> {
     let own = Composite { mass: body.mass, first_moment: body.first_moment, second_moment: body.second_moment };
     match turn.angle {
         Some(angle) if body.stays => own.turned(angle),
@@ -124,7 +124,7 @@ fn in_metres<T: Real>(composite: &Composite<T>, per_unit: T) -> Composite<T> {
 }
 
 /// E S Eᵀ. Where E is dense, E (S − S_zz 1) Eᵀ + S_zz 1, its last entry from the trace, which no rotation changes.
-fn rotated<T: Real>(e: &Mat3<T>, s: Sym3<T>, permutes: bool) -> Sym3<T> {
+pub(super) fn rotated<T: Real>(e: &Mat3<T>, s: Sym3<T>, permutes: bool) -> Sym3<T> {
     if permutes {
         return s.rotated(e);
     }

@@ -31,6 +31,11 @@ impl<T: Real> Mat3<T> {
         Mat3 { rows: [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]] }
     }
 
+    /// a bᵀ.
+    pub fn outer(a: Vec3<T>, b: Vec3<T>) -> Self {
+        Mat3::from_columns(a.scale(b.x), a.scale(b.y), a.scale(b.z))
+    }
+
     /// Column `j`.
     pub fn column(&self, j: usize) -> Vec3<T> {
         Vec3::new(self.rows[0][j], self.rows[1][j], self.rows[2][j])
