@@ -34,6 +34,8 @@ const ROBOTS: [(&str, &str, bool, &[&str]); 11] = [
 /// Robots that are compiled under the exact rules too, and in single precision.
 const EXACT: [&str; 4] = ["chapter_stanford", "chapter_oblique", "panda", "solo12"];
 const SINGLE: [&str; 4] = ["planar2r", "chapter_oblique", "panda", "solo12"];
+/// Robots whose derivatives are compiled too.
+const DERIVATIVES: [&str; 3] = ["planar2r", "panda", "solo12"];
 
 fn main() {
     let out = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
@@ -54,22 +56,32 @@ fn main() {
                 model: ModelOptions { floating_base: floating, ..ModelOptions::default() },
                 ..Options::default()
             };
-            let generated = compile(&source, &options).unwrap_or_else(|d| panic!("{}", d.render()));
             let exact = if grade == Grade::Exact { "_exact" } else { "" };
             let module = format!("{robot}_{}{exact}", scalar.name());
-            std::fs::write(out.join(format!("{module}.rs")), &generated.text).expect("OUT_DIR can be written");
-            let _ = writeln!(
-                modules,
-                "/// `{file}`, {}, {grade:?} rules.\n#[allow(clippy::all)]\npub mod {module} {{\n    \
-                 include!(concat!(env!(\"OUT_DIR\"), \"/{module}.rs\"));\n}}",
-                scalar.name(),
-            );
+            // derivatives in a module of their own
+            let functions: [(String, Vec<Function>); 2] = [
+                (module.clone(), Function::all().collect()),
+                (format!("{module}_derivatives"), vec![Function::InverseDynamicsDerivatives]),
+            ];
+            let mut calls = String::new();
+            for (module, functions) in functions.into_iter().take(1 + usize::from(DERIVATIVES.contains(&robot))) {
+                let options = Options { functions: functions.clone(), ..options.clone() };
+                let generated = compile(&source, &options).unwrap_or_else(|d| panic!("{}", d.render()));
+                std::fs::write(out.join(format!("{module}.rs")), &generated.text).expect("OUT_DIR can be written");
+                let _ = writeln!(
+                    modules,
+                    "/// `{file}`, {}, {grade:?} rules.\n#[allow(clippy::all)]\npub mod {module} {{\n    \
+                     include!(concat!(env!(\"OUT_DIR\"), \"/{module}.rs\"));\n}}",
+                    scalar.name(),
+                );
+                calls.push_str(&calls_of(&module, &generated, &functions));
+            }
             let table = &mut tables.iter_mut().find(|(s, _)| *s == scalar).expect("both scalars have a table").1;
             let _ = writeln!(
                 table,
                 "    Compiled {{\n        robot: {robot:?},\n        exact: {},\n        functions: &[\n{}        ],\n    }},",
                 grade == Grade::Exact,
-                functions(&module, &generated)
+                calls
             );
         }
     }
@@ -244,20 +256,24 @@ fn variants(robot: &str) -> Vec<(Scalar, Grade)> {
 }
 
 /// Table entries that call the functions of a module with inputs and outputs of any length.
-fn functions(module: &str, generated: &Generated) -> String {
+fn calls_of(module: &str, generated: &Generated, functions: &[Function]) -> String {
     let mut text = String::new();
-    for function in Function::all() {
-        let outputs = function.outputs(&generated.model, generated.frames.len());
-        let output = outputs.first().expect("a function of rigid bodies has one block of results");
-        let arguments: Vec<String> =
-            (0..function.inputs(&generated.model).len()).map(|i| format!("array(&x[{i}])")).collect();
-        let zero = output.shape.iter().rev().fold("0.0".to_string(), |inner, n| format!("[{inner}; {n}]"));
+    for function in functions {
+        let arguments = function.inputs(&generated.model).len();
+        let mut arguments: Vec<String> = (0..arguments).map(|i| format!("array(&x[{i}])")).collect();
         let name = function.name();
+        let _ = writeln!(text, "            ({name:?}, |x| {{");
+        let outputs = function.outputs(&generated.model, generated.frames.len());
+        for (i, output) in outputs.iter().enumerate() {
+            let zero = output.shape.iter().rev().fold("0.0".to_string(), |inner, n| format!("[{inner}; {n}]"));
+            let _ = writeln!(text, "                let mut y{i} = {zero};");
+            arguments.push(format!("&mut y{i}"));
+        }
+        let all: Vec<String> = (0..outputs.len()).map(|i| format!("Flatten::flatten(&y{i})")).collect();
+        let (arguments, all) = (arguments.join(", "), all.join(", "));
         let _ = writeln!(
             text,
-            "            ({name:?}, |x| {{\n                let mut y = {zero};\n                \
-             {module}::{name}({}, &mut y);\n                Flatten::flatten(&y)\n            }}),",
-            arguments.join(", ")
+            "                {module}::{name}({arguments});\n                [{all}].concat()\n            }}),"
         );
     }
     text

@@ -17,6 +17,11 @@ pub struct Compiled<T: 'static> {
 pub type Call<T> = fn(&[Vec<T>]) -> Vec<T>;
 
 impl<T> Compiled<T> {
+    /// Whether a function was compiled.
+    pub fn has(&self, function: Function) -> bool {
+        self.functions.iter().any(|(name, _)| *name == function.name())
+    }
+
     /// Runs a function.
     pub fn call(&self, function: Function, inputs: &[Vec<T>]) -> Vec<T> {
         let found = self.functions.iter().find(|(name, _)| *name == function.name());

@@ -9,6 +9,7 @@
 pub mod bounds;
 pub mod compiled;
 pub mod contact_cases;
+pub mod derivative_data;
 pub mod drives;
 pub mod inputs;
 pub mod made;

@@ -126,6 +126,7 @@ pub const ALL: &[Code] = &[
     code("no-machine-code", Error, "Figures of machine code that cannot be made."),
     code("no-mass", Error, "What divides by the mass of a robot that has none."),
     code("no-motion", Error, "Points that make no motion."),
+    code("no-such-result", Error, "A result that a function does not have."),
     code("no-such-part", Error, "A part that the results of a function do not have."),
     code("no-surface", Error, "A quadric without a gradient."),
     code("not-a-number", Error, "Text where a number is wanted."),

@@ -17,7 +17,8 @@ impl Function {
             let text = known.or_else(of_scene).unwrap_or_default();
             doc.push_str(&format!("* `{}`: {text}\n", port.name));
         }
-        for output in self.spec().outputs {
+        let is_wanted = |output: &&Output| scene.outputs.get(&self).is_none_or(|s| s.has(output.name));
+        for output in self.spec().outputs.iter().filter(is_wanted) {
             doc.push_str(&format!("* `{}`: {}\n", output.name, output.doc));
         }
         if scene.by_columns && self.spec().outputs.iter().any(Output::is_by_columns) {

@@ -106,6 +106,10 @@ impl Scene {
         let selection = self.outputs.get(&function).cloned().unwrap_or_default();
         let (mut indices, mut ports, mut first) = (Vec::new(), Vec::new(), 0);
         for (output, block) in function.spec().outputs.iter().zip(&blocks) {
+            if !selection.has(output.name) {
+                first += block.len();
+                continue;
+            }
             let (wanted, shape) = self.select_block(output, &selection, model, &block.shape);
             indices.extend(wanted.into_iter().map(|k| first + k));
             ports.push(Port::new(output.name, &shape));

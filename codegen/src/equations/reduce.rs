@@ -143,10 +143,10 @@ fn norm(v: Vec3<Dd>) -> f64 {
 /// The reduced robot, and the pose of each of its frames in the body's canonical frame.
 pub fn reduce(model: &Model<Dd>, choice: &FreeTerms) -> (ReducedModel<Dd>, Vec<Transform<Dd>>) {
     let identity = || vec![Transform::identity(); model.bodies.len()];
+    let FreeTerms { adds_angles, meeting, .. } = *choice;
+    let empty = ReducedModel { bodies: Vec::new(), gravity: model.gravity, per_unit: Dd::ONE, adds_angles, meeting };
     if model.bodies.iter().any(|body| ReducedJoint::of(body.joint.kind).is_none()) {
-        let (per_unit, meeting) = (Dd::ONE, Meeting::default());
-        let none = ReducedModel { bodies: Vec::new(), gravity: model.gravity, per_unit, adds_angles: false, meeting };
-        return (none, identity());
+        return (empty, identity());
     }
     let lever = longest_lever(model);
     let regauge = choose_frames(model, lever, choice);
@@ -160,8 +160,7 @@ pub fn reduce(model: &Model<Dd>, choice: &FreeTerms) -> (ReducedModel<Dd>, Vec<T
         let balances = [0, 1].map(|k| choice.axial_balances[k][i]);
         regroup(&mut bodies, i, lever, [0, 1, 2].map(|k| choice.vanish_at_parent[k][i]), balances);
     }
-    let (adds_angles, meeting) = (choice.adds_angles, choice.meeting);
-    let mut reduced = ReducedModel { bodies, gravity: model.gravity, per_unit: Dd::ONE, adds_angles, meeting };
+    let mut reduced = ReducedModel { bodies, ..empty };
     for i in 0..reduced.bodies.len() {
         reduced.bodies[i].stays = choice.stays[i] && reduced.may_stay(i);
         let body = &mut reduced.bodies[i];

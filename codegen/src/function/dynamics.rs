@@ -98,7 +98,7 @@ impl RobotFunction for MassMatrix {
         inputs: &[Quantity::Configuration],
         outputs: &[MASS_MATRIX],
         form: Form::MassMatrix,
-        gains_by_substitutes: true,
+        substituted_up_to: 3000,
         judged: Judged::ByInertias,
         ..Spec::DEFAULT
     };
@@ -120,7 +120,7 @@ impl RobotFunction for MassMatrixAndGravityForce {
         family: Family::Combination,
         members: &[Function::MassMatrix, Function::GravityForce],
         form: Form::Both,
-        gains_by_substitutes: true,
+        substituted_up_to: 3000,
         judged: Judged::ByInertias,
         ..Spec::DEFAULT
     };
@@ -141,7 +141,7 @@ impl RobotFunction for ForwardDynamics {
         outputs: &[Output::new("qdd", &[Velocities], "accelerations \\[rad/s² or m/s²\\]")],
         form: Form::Motion,
         solves: true,
-        gains_by_substitutes: true,
+        substituted_up_to: 3000,
         keeps_order: true,
         divisor: Divisor::Inertia,
         judged: Judged::ByResidual,

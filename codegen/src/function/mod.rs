@@ -3,6 +3,7 @@
 
 mod aliases;
 mod contact;
+mod derivatives;
 mod drives;
 mod dynamics;
 mod forms;
@@ -118,6 +119,9 @@ functions! {
     /// H and g.
     #[doc(alias("CRBA"))]
     dynamics::MassMatrixAndGravityForce,
+    /// Inverse dynamics with its derivatives.
+    #[doc(alias("RNEA derivatives", "linearisation"))]
+    derivatives::InverseDynamicsDerivatives,
     /// Inputs of the drives to motion.
     drives::DrivenForwardDynamics,
     /// Motion to inputs of the drives.
@@ -147,7 +151,7 @@ impl Function {
 
     /// All that a robot has. Combinations are made for whoever names them.
     pub fn of<T: Real>(model: &Model<T>) -> impl Iterator<Item = Function> + '_ {
-        Function::known().filter(|f| f.is_of(model) && f.spec().family != Family::Combination)
+        Function::known().filter(|f| f.is_of(model) && !f.spec().family.is_by_name())
     }
 
     /// Those that are meant by a list: [`Function::all`] stands for all that the robot has.

@@ -88,8 +88,20 @@ pub enum Family {
     Robot,
     /// All, but it is made for who names it only: several functions in one, which share what they have in common.
     Combination,
+    /// All, but it is made for who names it only: derivatives of other functions.
+    Derivatives,
     /// Those with drives.
     Drives,
+}
+
+impl Family {
+    /// Whether it is made for who names it only.
+    pub fn is_by_name(self) -> bool {
+        match self {
+            Family::Combination | Family::Derivatives => true,
+            Family::Robot | Family::Drives => false,
+        }
+    }
 }
 
 /// What the reduced robot is to a function, by what a search for the best form counts.
@@ -103,6 +115,8 @@ pub enum Form {
     BiasForce,
     /// The mass matrix.
     MassMatrix,
+    /// The derivatives of inverse dynamics, in a form of their own.
+    Derivatives,
     /// Bias forces and the mass matrix, each in its own form.
     Both,
     /// The motion that both make: whichever pair of forms takes the least.
@@ -140,6 +154,8 @@ pub enum Judged {
     ByScale,
     /// Of a mass matrix: the inertias of its row and column. Of forces behind it, their natural scale.
     ByInertias,
+    /// Of derivatives: their natural scale, of which plain equations in dual numbers lose less than a rounding where they happen to be short.
+    ByDerivatives,
     /// Of accelerations: what they leave of τ − H q̈ − h.
     ByResidual,
 }
@@ -185,8 +201,8 @@ pub struct Spec {
     pub solves: bool,
     /// Limbs in lanes.
     pub in_lanes: InLanes,
-    /// Whether it gains by values formed of others that are there: torques gain an operation of two hundred.
-    pub gains_by_substitutes: bool,
+    /// Values of the greatest program that gains by values formed of others that are there; torques gain an operation of two hundred.
+    pub substituted_up_to: usize,
     /// Whether the order of its sums is left as it is: forward dynamics takes 6 to 9 % longer in another, and its digits go elsewhere.
     pub keeps_order: bool,
     /// What it divides by.
@@ -209,7 +225,7 @@ impl Spec {
         form: Form::Plain,
         solves: false,
         in_lanes: InLanes::Never,
-        gains_by_substitutes: false,
+        substituted_up_to: 0,
         keeps_order: false,
         divisor: Divisor::Nothing,
         judged: Judged::ByScale,

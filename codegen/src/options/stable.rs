@@ -140,7 +140,7 @@ fields! {
         "effects": effects, "parameter": parameters, "contacts": contacts, "staged": staged, "budget": budgets,
         "ranges": ranges, .. places
     }
-    Selection = { "joints": joints, "frames": frames, "part": part, }
+    Selection = { "joints": joints, "frames": frames, "part": part, "results": results, }
     Payload : { "name": name, "frame": frame, "mass": mass, "com": com, "inertia": inertia, }
     Zero = { "qd": qd, "qdd": qdd, "joints_at_rest": joints_at_rest, }
     Effects = {

@@ -3,13 +3,15 @@
 //! Which description of a body is cheaper depends on what else needs the same products, so it is not decided by a rule
 //! but by counting the finished program. Bodies at the same depth of the tree (the thighs of a quadruped) choose alike.
 
-use crate::equations::reduce::{is_in_proportion, lengths, longest_lever, reduce, FreeTerms};
+mod ways;
+
+use crate::equations::reduce::{is_in_proportion, reduce, FreeTerms};
 use crate::equations::traced::candidate;
 use crate::equations::Robot;
 use crate::function::{Form, Function};
 use crate::model::states;
 use crate::options::stable::Stable;
-use crate::options::{FormChoices, Optimisations, Options};
+use crate::options::{Optimisations, Options};
 use crate::scene::{Gravity, Scene, SceneContacts};
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use std::hash::{Hash, Hasher};
@@ -18,6 +20,7 @@ use straightline_core::reduced::ReducedModel;
 use straightline_core::Dd;
 use straightline_graph::expr::{Counts, Graph, DIVISION};
 use straightline_graph::rounding;
+use ways::{moves, Ways};
 
 /// After so many operations in all programs that were counted a search ends with the best so far: some tenths of a second.
 const ENOUGH: usize = 300_000;
@@ -33,8 +36,6 @@ const TOLERATED_SINGLE: f64 = 1.25;
 const TOLERATED_LOCALLY: f64 = 1.1;
 /// At so many states that is estimated.
 const STATES: usize = 4;
-/// Units of length that are tried, the most frequent ones.
-const UNITS: usize = 24;
 
 /// The robot in the reduced forms for this function: for torques those that serve inverse dynamics or the bias
 /// force best.
@@ -65,7 +66,7 @@ fn chosen(
         // contacts leave torques and H as they are
         let scene = Scene { contacts: SceneContacts::default(), ..options.scene.clone() };
         let key = ((function, scene), optimisations, options.scalar).stable_text();
-        robot.found.or_search(key, || improved(robot, frames, function, options, optimisations))
+        robot.found.or_search(key, || improved(robot, frames, function, options, optimisations, &[]))
     };
     let both = |choice: FreeTerms| robot.reduced_by(&choice, &choice);
     match function.spec().form {
@@ -73,6 +74,10 @@ fn chosen(
         Form::InverseDynamics => both(search(InverseDynamics)),
         Form::BiasForce => both(search(BiasForce)),
         Form::MassMatrix => both(search(MassMatrix)),
+        Form::Derivatives => {
+            let known = [search(InverseDynamics), search(MassMatrix)];
+            both(improved(robot, frames, function, options, optimisations, &known))
+        }
         Form::Both | Form::Motion => {
             let (torques, mass_matrix) = (search(BiasForce), search(MassMatrix));
             let mut pairs = vec![(&torques, &mass_matrix), (&torques, &torques), (&mass_matrix, &mass_matrix)];
@@ -240,6 +245,23 @@ impl FormSearch<'_> {
         states(false).zip(states(true)).map(|(slow, fast)| [slow, fast])
     }
 
+    /// Greedy: where fields and wrenches meet, by themselves; the frames hardly matter for that.
+    fn met(&mut self, from: (FreeTerms, Price), ways: &Ways) -> (FreeTerms, Price) {
+        let mut best = from;
+        loop {
+            let before = best.1;
+            for meeting in ways.meetings(best.0.meeting) {
+                let changed = FreeTerms { meeting, ..best.0.clone() };
+                if let Some(price) = self.attempt(&changed, best.1) {
+                    best = (changed, price);
+                }
+            }
+            if best.1 == before {
+                return best;
+            }
+        }
+    }
+
     /// Greedy: every choice at every depth, kept where it saves, until none does or enough was tried; of the choices the first ones.
     fn descend(&mut self, from: (FreeTerms, Price), enough: usize, ways: &Ways, among: usize) -> (FreeTerms, Price) {
         let (mut best, mut least) = from;
@@ -258,7 +280,8 @@ impl FormSearch<'_> {
             }
             let units = ways.units(&self.robot, &best).into_iter().map(|unit| FreeTerms { unit, ..best.clone() });
             let other_angles = FreeTerms { adds_angles: !best.adds_angles, ..best.clone() };
-            let whole: Vec<FreeTerms> = units.chain(ways.angle_sums.then_some(other_angles)).collect();
+            let meetings = ways.meetings(best.meeting).into_iter().map(|meeting| FreeTerms { meeting, ..best.clone() });
+            let whole: Vec<FreeTerms> = units.chain(ways.angle_sums.then_some(other_angles)).chain(meetings).collect();
             for changed in whole {
                 if let Some(price) = self.attempt(&changed, least) {
                     (best, least) = (changed, price);
@@ -324,86 +347,6 @@ fn fingerprint(reduced: &ReducedModel<Dd>) -> u64 {
     hasher.finish()
 }
 
-/// A change of one body's form; made again, it is taken back.
-type FormMove = Box<dyn Fn(&mut FreeTerms, usize)>;
-
-/// All changes, and how many of them, the first ones, may save much.
-fn moves(options: &Options, forms: FormChoices, function: Function) -> (Vec<FormMove>, usize) {
-    type Flags = fn(&mut FreeTerms) -> &mut Vec<bool>;
-    // the frames in which parameters are given would have to be known where they are made
-    let frames = !options.scene.has_loads();
-    // ways to form moments, of which H has none
-    let rotations = forms.rotations && function != Function::MassMatrix;
-    let all: [(bool, Flags); 13] = [
-        (forms.stays, |c| &mut c.stays),
-        (forms.origins && frames, |c| &mut c.origin_at_parent),
-        (forms.tips && frames, |c| &mut c.turned_tips[0]),
-        (forms.tips && frames, |c| &mut c.turned_tips[1]),
-        (forms.tips && frames, |c| &mut c.turned_tips[2]),
-        (forms.tips && frames, |c| &mut c.shifted_tips[0]),
-        (forms.tips && frames, |c| &mut c.shifted_tips[1]),
-        (forms.parameters, |c| &mut c.regrouped),
-        (rotations, |c| &mut c.by_axis_acceleration),
-        (rotations, |c| &mut c.by_accelerations[0]),
-        (rotations, |c| &mut c.by_accelerations[1]),
-        (rotations, |c| &mut c.doubled[0]),
-        (rotations, |c| &mut c.doubled[1]),
-    ];
-    let minor: [(bool, Flags); 4] = [
-        (forms.parameters, |c| &mut c.axial_balances[0]),
-        (forms.parameters, |c| &mut c.axial_balances[1]),
-        (rotations, |c| &mut c.turns_sums),
-        (rotations, |c| &mut c.other_acceleration),
-    ];
-    let flip = |(_, flag): (bool, Flags)| Box::new(move |c: &mut FreeTerms, i: usize| flag(c)[i] ^= true) as FormMove;
-    let mut moves: Vec<FormMove> = all.into_iter().filter(|(free, _)| *free).map(flip).collect();
-    for (kind, component) in (0..9).map(|k| (k / 3, k % 3)).filter(|_| forms.parameters) {
-        moves.push(Box::new(move |c: &mut FreeTerms, i: usize| {
-            let vanishes = &mut c.vanish_at_parent[kind][i];
-            *vanishes = if *vanishes == Some(component) { None } else { Some(component) };
-        }));
-    }
-    let major = moves.len();
-    moves.extend(minor.into_iter().filter(|(free, _)| *free).map(flip));
-    (moves, major)
-}
-
-/// What may change.
-struct Ways {
-    moves: Vec<FormMove>,
-    /// So many of them, the first ones, may save much.
-    major: usize,
-    /// Which of them moves origins.
-    origins: Option<usize>,
-    /// How many joints stand before each body.
-    depth: Vec<usize>,
-    fixed_unit: bool,
-    /// Whether angles of parallel joints may be added.
-    angle_sums: bool,
-}
-
-impl Ways {
-    fn deepest(&self) -> usize {
-        self.depth.iter().copied().max().unwrap_or(0)
-    }
-
-    fn moved(&self, choice: &FreeTerms, change: &FormMove, depth: usize) -> FreeTerms {
-        let mut changed = choice.clone();
-        (0..self.depth.len()).filter(|i| self.depth[*i] == depth).for_each(|i| change(&mut changed, i));
-        changed
-    }
-
-    fn units(&self, robot: &Robot, choice: &FreeTerms) -> Vec<Dd> {
-        if self.fixed_unit {
-            return Vec::new();
-        }
-        let metres = reduce(&robot.model, &FreeTerms { unit: Dd::ONE, ..choice.clone() }).0;
-        let mut units = lengths(&metres, longest_lever(&robot.model));
-        units.truncate(UNITS);
-        units
-    }
-}
-
 /// Khalil and Dombre's parameters, with sums of angles where they may be.
 fn plain(robot: &Robot, options: &Options, optimisations: Optimisations) -> FreeTerms {
     let adds_offsets = !options.scalar.is_short();
@@ -418,6 +361,7 @@ fn improved(
     function: Function,
     options: &Options,
     optimisations: Optimisations,
+    known: &[FreeTerms],
 ) -> FreeTerms {
     let (reduced, bodies) = (&robot.reduced, &robot.reduced.bodies);
     let plain = plain(robot, options, optimisations);
@@ -443,13 +387,15 @@ fn improved(
     let fixed_unit = !forms.unit || options.scene.gravity == Gravity::Input || options.scene.has_loads();
     let origins = (forms.origins && !options.scene.has_loads()).then_some(usize::from(forms.stays));
     let ((moves, major), angle_sums) = (moves(options, forms, function), optimisations.angle_sums);
-    let ways = Ways { moves, major, origins, depth, fixed_unit, angle_sums };
+    let meets = function.spec().form == Form::Derivatives;
+    let ways = Ways { moves, major, origins, depth, fixed_unit, angle_sums, meets };
     let mut best = (plain, NEVER);
-    for choice in [first, best.0.clone()] {
-        if let Some(price) = search.attempt(&choice, best.1) {
-            best = (choice, price);
+    for choice in [first, best.0.clone()].iter().chain(known) {
+        if let Some(price) = search.attempt(choice, best.1) {
+            best = (choice.clone(), price);
         }
     }
+    best = search.met(best, &ways);
     best = search.descend(best, ENOUGH, &ways, ways.major);
     let enough = if search.work > ENOUGH { search.work } else { search.work + MORE };
     // what saves little by itself comes later, so that it is not in the way of what saves much

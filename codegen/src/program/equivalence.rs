@@ -211,6 +211,7 @@ impl Check<'_> {
                 LOSSES / 2.0
             }
             Judged::ByInertias => OF_INERTIAS,
+            Judged::ByDerivatives => LOSSES,
             Judged::ByScale => 1.0,
         };
         losses.compare(function.name(), self.graph, options.scalar, least)

@@ -115,8 +115,9 @@ fn optimised_with(
             true => check("dead code", dead_code(&check("sums", sums(&graph)))),
             false => graph,
         };
-        let graph = match optimisations.substitutes && function.spec().gains_by_substitutes {
-            true => check("substitute", substitute(&graph, &choose::keeps_digits_of(&robot.model, &graph))),
+        let largest = function.spec().substituted_up_to;
+        let graph = match optimisations.substitutes && largest > 0 {
+            true => check("substitute", substitute(&graph, largest, &choose::keeps_digits_of(&robot.model, &graph))),
             false => graph,
         };
         // fused products want another order

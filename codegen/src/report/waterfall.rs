@@ -265,6 +265,9 @@ fn selection(function: Function, scene: &Scene) -> String {
     if !selection.frames.is_empty() {
         words.push(format!("frames {}", selection.frames.join(", ")));
     }
+    if !selection.results.is_empty() {
+        words.push(format!("the results {}", selection.results.join(", ")));
+    }
     match selection.part {
         ResultPart::Whole => {}
         ResultPart::Linear => words.push("the linear part".to_string()),

@@ -60,6 +60,10 @@ fn outputs_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
             }
         }
         let parts = parts_of(function);
+        let results: Vec<&str> = function.spec().outputs.iter().map(|output| output.name).collect();
+        for (i, result) in selection.results.iter().enumerate().filter(|(_, r)| !results.contains(&r.as_str())) {
+            complain(&format!("results.{i}"), say::no_such_result(name, result, &results));
+        }
         if selection.part != ResultPart::Whole && !parts.contains(&selection.part) {
             let words: Vec<&str> = parts.iter().map(|p| p.word()).collect();
             complain("part", say::no_such_part(name, selection.part.word(), &words));

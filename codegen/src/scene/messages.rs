@@ -11,6 +11,7 @@ pub const CODES: &[&str] = &[
     "unknown-moving-link",
     "not-a-selection",
     "no-such-part",
+    "no-such-result",
     "locked-joint-wanted",
     "locked-twice",
     "base-locked",
@@ -125,6 +126,16 @@ pub fn no_such_part(function: &str, part: &str, parts: &[&str]) -> D {
     match parts {
         [] => d.help("remove `part`: they come whole"),
         _ => d.help(format!("it has {}", list(parts))),
+    }
+}
+
+/// A result that a function does not have.
+pub fn no_such_result(function: &str, result: &str, results: &[&str]) -> D {
+    let title = format!("`{function}` has no result `{}`", cut(result));
+    let d = D::error("no-such-result", title);
+    match results {
+        [one] => d.help(format!("it has `{one}` alone")),
+        _ => hinted(d, result, results.iter().copied()),
     }
 }
 

@@ -136,6 +136,15 @@ pub struct Selection {
     pub frames: Vec<String>,
     /// Which part of each result.
     pub part: ResultPart,
+    /// Blocks of results, by name.
+    pub results: Vec<String>,
+}
+
+impl Selection {
+    /// Whether a block of results is wanted.
+    pub fn has(&self, result: &str) -> bool {
+        self.results.is_empty() || self.results.iter().any(|name| name == result)
+    }
 }
 
 /// A part of a result.

@@ -242,7 +242,7 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
     };
     let second = SecondReading::new(source, &model, &options);
     let second = second.unwrap_or_else(|why| panic!("what the compiler takes the second author refuses: {why}"));
-    let of_bodies = |f: &Function| matches!(f.spec().family, Family::Robot | Family::Combination);
+    let of_bodies = |f: &Function| f.spec().family != Family::Drives;
     let mut functions: Vec<Function> = Function::known().filter(of_bodies).collect();
     if !singular_joints(&model, Inertia::OfLinks).is_empty() {
         functions.retain(|f| *f != Function::ForwardDynamics);

@@ -65,6 +65,7 @@ alone. Scenes add further arguments (gravity, run-time parameters) and leave arg
     let families = [
         (Family::Robot, "Of every robot"),
         (Family::Combination, "Combinations, made for who names them"),
+        (Family::Derivatives, "Derivatives, made for who names them"),
         (Family::Drives, "Of robots with drives"),
     ];
     for (family, title) in families {

@@ -10,6 +10,8 @@ mod contact_forms;
 mod contact_generated;
 mod contact_runtime;
 mod count_accuracy;
+mod derivative_counts;
+mod derivative_states;
 mod determinism;
 mod driven_physics;
 mod driven_robots;

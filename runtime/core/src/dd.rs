@@ -477,4 +477,4 @@ impl Backwards {
     }
 }
 
-operators!(assign Dd);
+operators!(assign [] Dd);

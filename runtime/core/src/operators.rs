@@ -12,15 +12,18 @@ macro_rules! operators {
             }
         }
     };
-    (assign $Type:ty) => {
-        $crate::operators::operators!(assign $Type: AddAssign add_assign +, SubAssign sub_assign -, MulAssign mul_assign *, DivAssign div_assign /);
+    (assign [$($generics:tt)*] $Type:ty) => {
+        $crate::operators::operators!(assign [$($generics)*] $Type: AddAssign add_assign +, SubAssign sub_assign -, MulAssign mul_assign *, DivAssign div_assign /);
     };
-    (assign $Type:ty: $($Op:ident $op:ident $by:tt),+) => {
-        $(impl core::ops::$Op for $Type {
+    (assign $generics:tt $Type:ty: $($Op:ident $op:ident $by:tt),+) => {
+        $($crate::operators::operators!(assign_one $generics $Type, $Op $op $by);)+
+    };
+    (assign_one [$($generics:tt)*] $Type:ty, $Op:ident $op:ident $by:tt) => {
+        impl<$($generics)*> core::ops::$Op for $Type {
             fn $op(&mut self, b: Self) {
                 *self = *self $by b;
             }
-        })+
+        }
     };
     ($generics:tt $Type:ty: $($Op:ident $op:ident |$a:ident $(, $b:ident)?| $value:expr;)+) => {
         $($crate::operators::operators!(@ $generics $Type, $Op $op |$a $(, $b)?| $value);)+

@@ -28,7 +28,7 @@ mod tests {
         ("cut", |graph| drop(super::cut::cut(graph, &[0], &["all"], &[1]))),
         ("dead_code", |graph| drop(super::dead_code(graph))),
         ("order", |graph| drop(super::order(graph, &[]))),
-        ("substitute", |graph| drop(super::substitute(graph, &|_| true))),
+        ("substitute", |graph| drop(super::substitute(graph, 3000, &|_| true))),
         ("sums", |graph| drop(super::sums(graph))),
         ("gradient", |graph| drop(gradient(graph, "x"))),
     ];

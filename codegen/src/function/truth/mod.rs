@@ -11,6 +11,7 @@ use straightline_core::model::Model;
 use straightline_core::reference::{CentreOfMassFrame, CentreOfMassTree, ExtendedPosition, ReferenceJoint};
 use straightline_core::{Dd, Real};
 
+mod derivatives;
 mod drives;
 mod dynamics;
 mod kinematics;
@@ -148,10 +149,10 @@ impl<'a> Chapter<'a> {
 
 impl Effect {
     /// What friction and spring take.
-    fn passive(&self, q: Magnitude, qd: Magnitude) -> Magnitude {
+    fn passive<T: Real>(&self, q: T, qd: T) -> T {
         let [damping, friction, stiffness, rest] =
-            [self.damping, self.friction, self.stiffness, self.rest].map(Magnitude::new);
-        let dry = match self.smooth.map(Magnitude::new) {
+            [self.damping, self.friction, self.stiffness, self.rest].map(T::constant);
+        let dry = match self.smooth.map(T::constant) {
             Some(speed) => friction * (qd / (qd * qd + speed * speed).sqrt()),
             None => friction * qd.sign(),
         };

@@ -163,7 +163,7 @@ impl<'a> SceneReader<'a> {
             let name = function.name();
             let owner = format!("`{name}` of [outputs]");
             let Some(wanted) = self.reader.table_at(table, name, &owner) else { continue };
-            self.reader.check_keys(&wanted, &["joints", "frames", "part"]);
+            self.reader.check_keys(&wanted, &["joints", "frames", "part", "results"]);
             let path = format!("outputs.{name}");
             self.note(&path, &wanted.span);
             let joints = self.names(&format!("{path}.joints"), &wanted, "joints", "joint");
@@ -171,7 +171,8 @@ impl<'a> SceneReader<'a> {
             let part =
                 self.at(&path, &wanted, "part", |reader, table, key| reader.word_at(table, key, &ResultPart::WORDS));
             let part = part.unwrap_or_default();
-            self.file.scene.outputs.insert(function, Selection { joints, frames, part });
+            let results = self.names(&format!("{path}.results"), &wanted, "results", "result");
+            self.file.scene.outputs.insert(function, Selection { joints, frames, part, results });
             functions.push(function);
         }
         if all_are_known && !functions.is_empty() {

@@ -107,7 +107,7 @@ pub use impact::{impact, Impact, Struck};
 pub use jacobian::{jacobian, jacobian_bias};
 pub use kinematics::{forward_kinematics, frame_acceleration, frame_velocity};
 pub use momentum::{momentum, CentroidalMomentum};
-pub use reduced_derivatives::{reduced_inverse_dynamics_derivatives, InverseDynamicsDerivatives};
+pub use reduced_derivatives::{reduced_inverse_dynamics_derivatives, DerivativeBlocks};
 pub use reduced_dynamics::{reduced_inverse_dynamics, reduced_inverse_dynamics_with_limbs, LimbWrenches};
 pub use reduced_gravity::{reduced_gravity_force, reduced_gravity_force_with_limbs, LimbMoments};
 pub use reduced_mass_matrix::reduced_mass_matrix;

@@ -35,7 +35,7 @@ use subtree::Subtree;
 
 /// Inverse dynamics with its derivatives; matrices nv × nv, row-major, a row per torque.
 #[derive(Clone, Debug, PartialEq)]
-pub struct InverseDynamicsDerivatives<T> {
+pub struct DerivativeBlocks<T> {
     /// ∂τ/∂q, along the tangent of joints with a quaternion: of a floating base, body-fixed increments.
     pub dtau_dq: Vec<T>,
     /// ∂τ/∂q̇.
@@ -46,10 +46,10 @@ pub struct InverseDynamicsDerivatives<T> {
     pub tau: Vec<T>,
 }
 
-impl<T: Real> InverseDynamicsDerivatives<T> {
+impl<T: Real> DerivativeBlocks<T> {
     pub(super) fn zero(nv: usize) -> Self {
         let matrix = vec![T::zero(); nv * nv];
-        InverseDynamicsDerivatives {
+        DerivativeBlocks {
             dtau_dq: matrix.clone(),
             dtau_dqd: matrix.clone(),
             mass_matrix: matrix,
@@ -59,7 +59,7 @@ impl<T: Real> InverseDynamicsDerivatives<T> {
 }
 
 /// A motion of the robot, with the ways of vectors and levers between its bodies.
-struct Sweep<'a, T> {
+struct MotionSweep<'a, T> {
     model: &'a ReducedModel<T>,
     turns: Vec<Turn<T>>,
     links: Vec<DescribedMotion<T>>,
@@ -67,7 +67,7 @@ struct Sweep<'a, T> {
     qd: &'a [T],
 }
 
-impl<T: Real> Sweep<'_, T> {
+impl<T: Real> MotionSweep<'_, T> {
     fn body(&self, i: BodyId) -> &ReducedBody<T> {
         &self.model.bodies[i]
     }
@@ -79,7 +79,7 @@ impl<T: Real> Sweep<'_, T> {
     }
 
     /// The way back.
-    fn from_parent(&self, i: BodyId, v: Vec3<T>) -> Vec3<T> {
+    fn to_child(&self, i: BodyId, v: Vec3<T>) -> Vec3<T> {
         let (body, turn) = (self.body(i), &self.turns[i]);
         let base = turn.parent_to_base(body, v);
         if body.stays {
@@ -116,11 +116,11 @@ impl<T: Real> Sweep<'_, T> {
 pub fn reduced_inverse_dynamics_derivatives<T: Real>(
     model: &ReducedModel<T>,
     [q, qd, qdd]: [&[T]; 3],
-) -> InverseDynamicsDerivatives<T> {
+) -> DerivativeBlocks<T> {
     let (turns, links) = motions(model, q, qd, qdd);
-    let sweep = Sweep { model, turns, links, q, qd };
+    let sweep = MotionSweep { model, turns, links, q, qd };
     let nv = model.nv();
-    let mut all = InverseDynamicsDerivatives::zero(nv);
+    let mut all = DerivativeBlocks::zero(nv);
     let subtrees = Subtree::all(&sweep, &mut all.tau);
     let mut fields = Fields::new(&sweep);
     for i in (0..model.bodies.len()).rev() {

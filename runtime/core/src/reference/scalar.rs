@@ -1,6 +1,7 @@
 //! The scalar of the reference: a [`Real`] that nalgebra's products accept.
 
 use crate::dd::Dd;
+use crate::dual::Dual;
 use crate::magnitude::Magnitude;
 use crate::operators::operators;
 use crate::real::Real;
@@ -13,8 +14,8 @@ pub trait ReferenceReal: Real + nalgebra::Scalar + Zero + One + AddAssign + SubA
 impl<T: Real + nalgebra::Scalar + Zero + One + AddAssign + SubAssign + MulAssign + DivAssign> ReferenceReal for T {}
 
 macro_rules! number {
-    ($T:ident) => {
-        impl Zero for $T {
+    ([$($parameters:tt)*] $T:ty) => {
+        impl<$($parameters)*> Zero for $T {
             fn zero() -> Self {
                 Real::zero()
             }
@@ -23,7 +24,7 @@ macro_rules! number {
             }
         }
 
-        impl One for $T {
+        impl<$($parameters)*> One for $T {
             fn one() -> Self {
                 Real::one()
             }
@@ -31,7 +32,9 @@ macro_rules! number {
     };
 }
 
-number!(Dd);
-number!(Magnitude);
+number!([] Dd);
+number!([] Magnitude);
+number!([T: Real + PartialEq, const N: usize] Dual<T, N>);
 
-operators!(assign Magnitude);
+operators!(assign [] Magnitude);
+operators!(assign [T: Real, const N: usize] Dual<T, N>);

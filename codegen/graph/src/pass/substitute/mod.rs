@@ -37,8 +37,6 @@ use values::{is_atom, values, AtPoints, POINTS};
 const EQUAL: f64 = 1e-28;
 /// So little of it a result may change.
 const UNCHANGED: f64 = 1e-27;
-/// Values of the greatest graph that is searched; it takes some tenths of a second.
-const LARGEST: usize = 3000;
 /// Values of the greatest graph that is searched once more: that finds little in great ones.
 const TWICE: usize = 600;
 /// Values that are looked at while moves are tried, in one round: of a program whose values agree by the thousand, the moves that gain
@@ -46,11 +44,11 @@ const TWICE: usize = 600;
 const WORK: usize = 700_000;
 
 /// The graph with values formed of others where that takes fewer operations and `keeps` is content with the program, its [`sums()`] put
-/// together again. Of greater graphs than some thousand values: as it is.
-pub fn substitute(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Graph {
+/// together again. A graph of more than so many values stays as it is: of some thousand it takes some tenths of a second.
+pub fn substitute(graph: &Graph, largest: usize, keeps: &dyn Fn(&Graph) -> bool) -> Graph {
     graph.expect_plain("substitute");
     let mut graph = graph.clone();
-    if graph.ops.len() > LARGEST {
+    if graph.ops.len() > largest {
         return graph;
     }
     for _ in 0..if graph.ops.len() > TWICE { 1 } else { 2 } {
@@ -170,7 +168,7 @@ mod tests {
         let x = [0, 1, 2, 3].map(|k| builder.insert(Op::Input(k)));
         let results = results(&mut builder, x);
         let before = builder.finish(vec![Port::new("z", &[results.len()])], results);
-        let after = substitute(&before, &|_| true);
+        let after = substitute(&before, 3000, &|_| true);
         crate::expr::verify(&after).expect("a pass keeps what graphs promise");
         let x = [0.7, -1.3, 2.9, 0.4].map(Dd::from);
         let [a, b] = [&before, &after].map(|graph| crate::expr::evaluate(graph, &x));

@@ -2,7 +2,7 @@
 
 use super::column::Column;
 use super::subtree::Subtree;
-use super::{InverseDynamicsDerivatives, Sweep};
+use super::{DerivativeBlocks, MotionSweep};
 use crate::joint::quaternion::rotated_back;
 use crate::joint::FLOATING_BASE;
 use crate::model::BodyId;
@@ -10,7 +10,7 @@ use crate::real::Real;
 use crate::spatial::{Composite, Vec3};
 
 /// Gravity and the velocity of the origin in the base's axes, in the model's unit of length.
-fn gravity_and_velocity<T: Real>(sweep: &Sweep<'_, T>, base: BodyId) -> [Vec3<T>; 2] {
+fn gravity_and_velocity<T: Real>(sweep: &MotionSweep<'_, T>, base: BodyId) -> [Vec3<T>; 2] {
     let (body, model) = (sweep.body(base), sweep.model);
     let [k, iv] = [body.iq + 3, body.iv];
     let (q, qd) = (sweep.q, sweep.qd);
@@ -23,10 +23,10 @@ fn gravity_and_velocity<T: Real>(sweep: &Sweep<'_, T>, base: BodyId) -> [Vec3<T>
 /// The base's acceleration is v̇ + ω × v − g in its own axes, so that torques change with its orientation by −δθ × (−g) alone, with v by ω × δv, with ω by
 /// δω × v and the field δω × r.
 pub(super) fn rows_and_columns<T: Real>(
-    sweep: &Sweep<'_, T>,
+    sweep: &MotionSweep<'_, T>,
     (i, base): (BodyId, BodyId),
     column: &Column<T>,
-    all: &mut InverseDynamicsDerivatives<T>,
+    all: &mut DerivativeBlocks<T>,
 ) {
     let (nv, unit) = (sweep.model.nv(), sweep.model.per_unit);
     let (row, first) = (sweep.body(i).iv, sweep.body(base).iv);
@@ -55,10 +55,10 @@ pub(super) fn rows_and_columns<T: Real>(
 
 /// Of the base with itself.
 pub(super) fn own_block<T: Real>(
-    sweep: &Sweep<'_, T>,
+    sweep: &MotionSweep<'_, T>,
     base: BodyId,
     subtree: &Subtree<T>,
-    all: &mut InverseDynamicsDerivatives<T>,
+    all: &mut DerivativeBlocks<T>,
 ) {
     let (nv, unit, iv) = (sweep.model.nv(), sweep.model.per_unit, sweep.body(base).iv);
     let (m, h, s) = (subtree.composite.mass, subtree.composite.first_moment, subtree.composite.second_moment);

@@ -1,7 +1,7 @@
 //! The wrenches that belong to one joint: of the momentum of its unit rate, and of what its position and its rate change.
 
 use super::subtree::Subtree;
-use super::Sweep;
+use super::MotionSweep;
 use crate::model::BodyId;
 use crate::real::Real;
 use crate::reduced::ReducedJoint;
@@ -22,7 +22,7 @@ pub(super) struct Column<T> {
 
 impl<T: Real> Column<T> {
     /// At the joint's own origin, in the axes in which its body is described.
-    pub fn new(sweep: &Sweep<'_, T>, i: BodyId, subtree: &Subtree<T>) -> Self {
+    pub fn new(sweep: &MotionSweep<'_, T>, i: BodyId, subtree: &Subtree<T>) -> Self {
         match sweep.body(i).kind {
             ReducedJoint::Turn => Column::of_turn(sweep, i, subtree),
             ReducedJoint::Slide => Column::of_slide(sweep, i, subtree),
@@ -31,7 +31,7 @@ impl<T: Real> Column<T> {
     }
 
     /// y = z × r, ẏ = (ω × z) × r + z × ṙ, ÿ = U' r + 2 (ω × z) × r° + z × r̈ with U' = U \[z×\] − \[z×\] U beside what is relative to the body.
-    fn of_turn(sweep: &Sweep<'_, T>, i: BodyId, subtree: &Subtree<T>) -> Self {
+    fn of_turn(sweep: &MotionSweep<'_, T>, i: BodyId, subtree: &Subtree<T>) -> Self {
         let link = &sweep.links[i];
         let (w, a) = (link.spin.omega, link.accel);
         let [[_, _, u13], [_, _, u23], [u31, u32, _]] = link.spin.u.rows;
@@ -42,10 +42,8 @@ impl<T: Real> Column<T> {
         let two = |x: T| x + x;
         let (wx, wy, wz) = (two(w.x), two(w.y), two(w.z));
         let f = subtree.wrench;
-        let momentum = ForceVector {
-            force: Vec3::new(-h.y, h.x, T::zero()),
-            moment: Vec3::new(-s.xz, -s.yz, s.xx + s.yy),
-        };
+        let momentum =
+            ForceVector { force: Vec3::new(-h.y, h.x, T::zero()), moment: Vec3::new(-s.xz, -s.yz, s.xx + s.yy) };
         let along = two(n[0][0] + n[1][1]);
         let convected = Vec3::new(
             wy * s.xx - wx * s.xy - two(n[2][0]),
@@ -87,7 +85,7 @@ impl<T: Real> Column<T> {
     }
 
     /// y = z, ẏ = ω × z, ÿ = U z.
-    fn of_slide(sweep: &Sweep<'_, T>, i: BodyId, subtree: &Subtree<T>) -> Self {
+    fn of_slide(sweep: &MotionSweep<'_, T>, i: BodyId, subtree: &Subtree<T>) -> Self {
         let spin = &sweep.links[i].spin;
         let (w, field) = (spin.omega, spin.u.column(2));
         let (m, h, o) = (subtree.composite.mass, subtree.composite.first_moment, T::zero());
@@ -113,7 +111,7 @@ impl<T: Real> Column<T> {
     }
 
     /// About the origin of the parent of `below`, from that of `below`.
-    pub fn to_parent(&self, sweep: &Sweep<'_, T>, below: BodyId) -> Self {
+    pub fn to_parent(&self, sweep: &MotionSweep<'_, T>, below: BodyId) -> Self {
         let momentum = sweep.wrench_to_parent(below, &self.momentum);
         let arm_rate = sweep.arm_rate(below);
         Column {

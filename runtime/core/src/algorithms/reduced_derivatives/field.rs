@@ -1,7 +1,7 @@
 //! The motion that a joint gives to points, linear in the point: y = z × r + b, its rate, and what its second rate is to a column.
 
 use super::column::Column;
-use super::Sweep;
+use super::MotionSweep;
 use crate::model::BodyId;
 use crate::real::Real;
 use crate::reduced::ReducedJoint;
@@ -25,7 +25,7 @@ pub(super) struct Field<T> {
 
 impl<T: Real> Field<T> {
     /// At the joint's own origin.
-    fn new(sweep: &Sweep<'_, T>, j: BodyId) -> Self {
+    fn new(sweep: &MotionSweep<'_, T>, j: BodyId) -> Self {
         let link = &sweep.links[j];
         let (w, a, o) = (link.spin.omega, link.accel, Vec3::zero());
         // ω × z and U z
@@ -53,9 +53,9 @@ impl<T: Real> Field<T> {
     }
 
     /// About the origin of a body, from that of its parent.
-    fn to_child(&self, sweep: &Sweep<'_, T>, child: BodyId) -> Self {
+    fn to_child(&self, sweep: &MotionSweep<'_, T>, child: BodyId) -> Self {
         let (arm, arm_rate) = (sweep.links[child].arm, sweep.arm_rate(child));
-        let turned = |v| sweep.from_parent(child, v);
+        let turned = |v| sweep.to_child(child, v);
         let twice = self.turn_rate + self.turn_rate;
         Field {
             turn: turned(self.turn),
@@ -92,13 +92,13 @@ pub(super) struct Fields<T> {
 }
 
 impl<T: Real> Fields<T> {
-    pub fn new(sweep: &Sweep<'_, T>) -> Self {
+    pub fn new(sweep: &MotionSweep<'_, T>) -> Self {
         let count = sweep.model.bodies.len();
         Fields { known: vec![vec![None; count]; count] }
     }
 
     /// The field of joint `j` about the origin of a body that it carries.
-    pub fn at(&mut self, sweep: &Sweep<'_, T>, j: BodyId, body: BodyId) -> Field<T> {
+    pub fn at(&mut self, sweep: &MotionSweep<'_, T>, j: BodyId, body: BodyId) -> Field<T> {
         if let Some(known) = &self.known[j][body] {
             return known.clone();
         }

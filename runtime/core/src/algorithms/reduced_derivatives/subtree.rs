@@ -1,7 +1,7 @@
 //! All that a body carries, about its origin: moments of its points, the same of their velocities relative to the body, and the wrench of the motion.
 
 use super::super::reduced_mass_matrix::{of_body, rotated};
-use super::Sweep;
+use super::MotionSweep;
 use crate::model::BodyId;
 use crate::real::Real;
 use crate::reduced::ReducedJoint;
@@ -22,7 +22,7 @@ pub(super) struct Subtree<T> {
 
 impl<T: Real> Subtree<T> {
     /// Of all bodies; torques on the way.
-    pub fn all(sweep: &Sweep<'_, T>, tau: &mut [T]) -> Vec<Self> {
+    pub fn all(sweep: &MotionSweep<'_, T>, tau: &mut [T]) -> Vec<Self> {
         let own = |i: BodyId| Subtree::own(sweep, i);
         let mut all: Vec<Self> = (0..sweep.model.bodies.len()).map(own).collect();
         for i in (0..all.len()).rev() {
@@ -49,7 +49,7 @@ impl<T: Real> Subtree<T> {
         all
     }
 
-    fn own(sweep: &Sweep<'_, T>, i: BodyId) -> Self {
+    fn own(sweep: &MotionSweep<'_, T>, i: BodyId) -> Self {
         let (body, turn) = (sweep.body(i), &sweep.turns[i]);
         let o = [T::zero(); 3];
         Subtree {
@@ -61,7 +61,7 @@ impl<T: Real> Subtree<T> {
     }
 
     /// About the origin of the body's parent, relative to it, in its axes.
-    fn to_parent(&self, sweep: &Sweep<'_, T>, i: BodyId) -> Self {
+    fn to_parent(&self, sweep: &MotionSweep<'_, T>, i: BodyId) -> Self {
         let (body, turn, arm) = (sweep.body(i), &sweep.turns[i], sweep.links[i].arm);
         let (mut composite, mut spread, mut drift) = (self.composite, self.spread, self.drift);
         if let (Some((sin, cos)), false) = (turn.angle, body.stays) {
@@ -103,4 +103,3 @@ impl<T: Real> Subtree<T> {
         }
     }
 }
-

@@ -1,0 +1,105 @@
+//! Derivatives of inverse dynamics.
+
+use super::spec::Extent::Velocities;
+use super::spec::{Family, Form, Judged, Output, RobotFunction, Spec};
+use super::{Forms, Quantity};
+use straightline_core::algorithms::{self as alg, DerivativeBlocks};
+use straightline_core::model::Model;
+use straightline_core::{Dual, Real};
+
+const SQUARE: &[super::Extent] = &[Velocities, Velocities];
+
+pub struct InverseDynamicsDerivatives;
+
+impl RobotFunction for InverseDynamicsDerivatives {
+    const SPEC: Spec = Spec {
+        name: "inverse_dynamics_derivatives",
+        summary: "Inverse dynamics τ with its derivatives ∂τ/∂q, ∂τ/∂q̇ and H = ∂τ/∂q̈.",
+        aliases: &["RNEA derivatives", "computeRNEADerivatives", "linearised inverse dynamics"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration],
+        outputs: &[
+            Output::new(
+                "dtau_dq",
+                SQUARE,
+                "rows of ∂τ/∂q \\[N·m/rad, N/m\\]; of a floating base by increments of its pose in its own axes",
+            ),
+            Output::new("dtau_dqd", SQUARE, "rows of ∂τ/∂q̇ \\[N·m·s/rad, N·s/m\\]"),
+            Output::new("h", SQUARE, "rows of H = ∂τ/∂q̈, both triangles \\[kg·m², kg·m, kg\\]"),
+            Output::new("tau", &[Velocities], "generalized forces \\[N·m or N\\]"),
+        ],
+        family: Family::Derivatives,
+        form: Form::Derivatives,
+        substituted_up_to: 9000,
+        judged: Judged::ByDerivatives,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let all = forms.inverse_dynamics_derivatives([&inputs[0], &inputs[1], &inputs[2]]);
+        [all.dtau_dq, all.dtau_dqd, all.mass_matrix, all.tau].concat()
+    }
+}
+
+impl<T: Real> Forms<'_, T> {
+    /// τ = H q̈ + h and its derivatives.
+    pub fn inverse_dynamics_derivatives(&self, motion: [&[T]; 3]) -> DerivativeBlocks<T> {
+        let Some([torques, _]) = self.reduced else { return by_directions(self.model, motion) };
+        let mut all = alg::reduced_inverse_dynamics_derivatives(torques, motion);
+        let nv = self.model.nv();
+        let rotors = alg::rotor_inertias(self.model);
+        let passive = alg::passive_force(self.model, motion[0], motion[1]);
+        let [by_q, by_qd] = passive_slopes(self.model, motion[0], motion[1]);
+        for i in 0..nv {
+            let add = |to: &mut T, more: T| *to = *to + more;
+            add(&mut all.mass_matrix[i * nv + i], rotors[i]);
+            add(&mut all.dtau_dq[i * nv + i], by_q[i]);
+            add(&mut all.dtau_dqd[i * nv + i], by_qd[i]);
+            add(&mut all.tau[i], rotors[i] * motion[2][i] + passive[i]);
+        }
+        all
+    }
+}
+
+/// Of friction and springs of each joint, which know its own coordinate alone: by q, and by q̇.
+fn passive_slopes<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> [Vec<T>; 2] {
+    let wide = model.map(Dual::<T, 2>::fixed);
+    let seeded = |x: &[T], k: usize| x.iter().map(|x| Dual::variable(*x, k)).collect::<Vec<_>>();
+    let forces = alg::passive_force(&wide, &seeded(q, 0), &seeded(qd, 1));
+    [0, 1].map(|k| forces.iter().map(|force| force.derivatives[k]).collect())
+}
+
+/// The derivatives of a robot as its file has it, one direction after the other in dual numbers.
+fn by_directions<T: Real>(model: &Model<T>, [q, qd, qdd]: [&[T]; 3]) -> DerivativeBlocks<T> {
+    let nv = model.nv();
+    let wide = model.map(Dual::<T, 1>::fixed);
+    let fixed = |x: &[T]| x.iter().map(|x| Dual::fixed(*x)).collect::<Vec<_>>();
+    let column = |q: &[Dual<T, 1>], qd: &[Dual<T, 1>]| alg::inverse_dynamics(&wide, q, qd, &fixed(qdd));
+    let (mut dtau_dq, mut dtau_dqd) = (vec![T::zero(); nv * nv], vec![T::zero(); nv * nv]);
+    for k in 0..nv {
+        let of_q = column(&along(model, q, k), &fixed(qd));
+        let mut rates = fixed(qd);
+        rates[k] = Dual::variable(qd[k], 0);
+        let of_qd = column(&fixed(q), &rates);
+        for i in 0..nv {
+            (dtau_dq[i * nv + k], dtau_dqd[i * nv + k]) = (of_q[i].derivatives[0], of_qd[i].derivatives[0]);
+        }
+    }
+    let (mass_matrix, tau) = (alg::mass_matrix(model, q), alg::inverse_dynamics(model, q, qd, qdd));
+    DerivativeBlocks { dtau_dq, dtau_dqd, mass_matrix, tau }
+}
+
+/// The configuration as it moves with velocity coordinate `k` alone: joints with quaternions along their tangent.
+fn along<T: Real>(model: &Model<T>, q: &[T], k: usize) -> Vec<Dual<T, 1>> {
+    let mut moving: Vec<Dual<T, 1>> = q.iter().map(|x| Dual::fixed(*x)).collect();
+    for joint in model.bodies.iter().map(|body| &body.joint) {
+        let (places, coordinates) = (joint.iq..joint.iq + joint.kind.nq(), joint.iv..joint.iv + joint.kind.nv());
+        if !coordinates.contains(&k) {
+            continue;
+        }
+        let unit: Vec<T> = coordinates.map(|c| if c == k { T::one() } else { T::zero() }).collect();
+        let mut rate = vec![T::zero(); places.len()];
+        joint.kind.configuration_rate(joint.coordinates(q), &unit, &mut rate);
+        moving[places].iter_mut().zip(rate).for_each(|(x, rate)| x.derivatives[0] = rate);
+    }
+    moving
+}

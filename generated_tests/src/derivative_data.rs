@@ -1,0 +1,139 @@
+//! The reference data of `reference/derivatives/`: eight robots, eight states each, derivatives with 25 digits.
+//!
+//! An error is judged by the greatest entry of its block; of a block of zeros absolutely.
+
+use crate::reference::{description, folder, inputs, json, numbers};
+use serde_json::Value;
+use std::path::PathBuf;
+use straightline_codegen::options::Options;
+use straightline_codegen::{model, Function};
+use straightline_core::Dd;
+
+/// The robots of the data.
+pub const ROBOTS: [&str; 8] =
+    ["planar2r", "chapter_cylindrical", "chapter_6r", "puma560", "ur5", "panda", "solo12", "hyq"];
+
+/// A robot with its states.
+#[derive(Debug)]
+pub struct DerivativeRobot {
+    /// The stem of its files.
+    pub name: String,
+    /// Its description.
+    pub file: PathBuf,
+    /// Whether its root link is free.
+    pub floating: bool,
+    /// Its states.
+    pub states: Vec<DerivativeState>,
+    baseline: Value,
+}
+
+/// A state with all that is expected in it.
+#[derive(Debug)]
+pub struct DerivativeState {
+    /// Such as `panda/7`.
+    pub id: String,
+    /// Such as `random` or `gravity_tilted`.
+    pub kind: String,
+    /// Acceleration due to gravity.
+    pub gravity: [f64; 3],
+    data: Value,
+}
+
+/// A block of results: its name in the data, and its values.
+#[derive(Clone, Debug)]
+pub struct ExpectedBlock {
+    /// As in the data.
+    pub name: &'static str,
+    /// By rows.
+    pub values: Vec<Dd>,
+}
+
+/// A function in the data: its group there, its inputs in order, its blocks in order with their names in Pinocchio's record.
+struct DataOf {
+    function: Function,
+    group: &'static str,
+    inputs: &'static [&'static str],
+    blocks: &'static [(&'static str, &'static str)],
+}
+
+const DATA: &[DataOf] = &[DataOf {
+    function: Function::InverseDynamicsDerivatives,
+    group: "inverse_dynamics_derivatives",
+    inputs: &["q", "qd", "qdd"],
+    blocks: &[("dtau_dq", "dtau_dq"), ("dtau_dqd", "dtau_dqd"), ("H", "H"), ("tau", "tau")],
+}];
+
+fn data_of(function: Function) -> &'static DataOf {
+    DATA.iter().find(|data| data.function == function).expect("the data hold the function")
+}
+
+/// The functions that the data hold.
+pub fn functions() -> impl Iterator<Item = Function> {
+    DATA.iter().map(|data| data.function)
+}
+
+impl DerivativeRobot {
+    /// The robot of that name with all its states.
+    ///
+    /// # Panics
+    /// If the data are not what they are said to be.
+    pub fn load(name: &str) -> DerivativeRobot {
+        let folder = folder().join("derivatives");
+        let file = json(&folder.join(format!("{name}.json")));
+        let states = file["states"].as_array().expect("a list").iter().map(|data| {
+            let text = |key: &str| data[key].as_str().expect("a string").to_string();
+            let gravity = inputs(&data["gravity"]).try_into().expect("three numbers");
+            DerivativeState { id: text("id"), kind: text("kind"), gravity, data: data.clone() }
+        });
+        DerivativeRobot {
+            name: name.to_string(),
+            file: description(name),
+            floating: file["floating"].as_bool().expect("true or false"),
+            states: states.collect(),
+            baseline: json(&folder.join("baseline_pinocchio_derivatives.json"))["robots"][name].clone(),
+        }
+    }
+
+    /// How it is compiled.
+    pub fn options(&self) -> Options {
+        let model = model::ModelOptions { floating_base: self.floating, ..model::ModelOptions::default() };
+        Options { model, ..Options::default() }
+    }
+
+    /// What Pinocchio 4.1 loses of each block of a function, at most over these states.
+    pub fn baseline(&self, function: Function) -> Vec<f64> {
+        let of = |name: &str| self.baseline[name].as_f64().expect("the record has every block");
+        data_of(function).blocks.iter().map(|(_, name)| of(name)).collect()
+    }
+}
+
+impl DerivativeState {
+    /// The inputs of a function.
+    pub fn inputs(&self, function: Function) -> Vec<Vec<f64>> {
+        data_of(function).inputs.iter().map(|name| inputs(&self.data[*name])).collect()
+    }
+
+    /// Its blocks of results.
+    pub fn expected(&self, function: Function) -> Vec<ExpectedBlock> {
+        let DataOf { group, blocks, .. } = data_of(function);
+        let of = |name: &'static str| ExpectedBlock { name, values: numbers(&self.data[*group][name]) };
+        blocks.iter().map(|(name, _)| of(name)).collect()
+    }
+}
+
+impl ExpectedBlock {
+    /// The greatest error over the greatest entry.
+    pub fn error<T: Copy + Into<Dd>>(&self, results: &[T]) -> f64 {
+        assert_eq!(results.len(), self.values.len(), "{}", self.name);
+        let greatest = self.values.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
+        let off = |(a, b): (&T, &Dd)| ((*a).into() - *b).to_f64().abs();
+        // what is no number is as wrong as can be
+        let worst = results.iter().zip(&self.values).map(off).fold(0.0, |m: f64, x| if x <= m { m } else { x });
+        let worst = if worst.is_nan() { f64::INFINITY } else { worst };
+        if greatest > 0.0 {
+            worst / greatest
+        } else {
+            worst
+        }
+    }
+}

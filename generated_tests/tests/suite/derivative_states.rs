@@ -1,0 +1,144 @@
+//! Derivatives against values with 25 digits: all robots and states of the data, in double-double, f64 and f32.
+
+use std::fmt::Write;
+use straightline_codegen::diagnostic::Source;
+use straightline_codegen::options::Options;
+use straightline_codegen::scene::Gravity;
+use straightline_codegen::{Function, Scalar};
+use straightline_core::{Dd, Real};
+use straightline_generated_tests::bounds::DATA;
+use straightline_generated_tests::compiled;
+use straightline_generated_tests::derivative_data::{functions, DerivativeRobot, DerivativeState, ROBOTS};
+use straightline_generated_tests::programs::{self, cast};
+
+/// Of the greatest entry of a block, in f64 and in f32; or what Pinocchio loses, if that is more.
+const BOUND: f64 = 1e-15;
+const BOUND_F32: f64 = 1e-6;
+
+fn results<T: Real>(robot: &DerivativeRobot, function: Function, options: &Options, state: &DerivativeState) -> Vec<T> {
+    let text = std::fs::read_to_string(&robot.file).expect("the file is there");
+    let source = Source::new(&robot.file.file_name().expect("a file has a name").to_string_lossy(), text);
+    // one program for all states with a gravity of their own
+    let mut options = options.clone();
+    let mut inputs = cast::<T>(&state.inputs(function));
+    if state.kind == "gravity_tilted" {
+        options.scene.gravity = Gravity::Input;
+        inputs.extend(cast::<T>(&[state.gravity.to_vec()]));
+    }
+    // a quaternion has length one in all digits, as in the data
+    if robot.floating {
+        let length = inputs[0][3..7].iter().fold(T::zero(), |sum, x| sum + *x * *x).sqrt();
+        inputs[0][3..7].iter_mut().for_each(|x| *x = *x / length);
+    }
+    let program = programs::program(&programs::load(&source, &options.model), &[], function, &options);
+    programs::run::<T>(&program, &inputs)
+}
+
+/// Each robot, function and block with its worst error; fails where one is beyond its bound.
+fn table<T: Real + Into<Dd>>(claim: &str, options: impl Fn(&DerivativeRobot) -> Options, bound: impl Fn(f64) -> f64) {
+    let (mut rows, mut failures) = (String::new(), String::new());
+    for robot in ROBOTS.map(DerivativeRobot::load) {
+        for function in functions() {
+            let mut worst: Vec<(f64, String)> = vec![(0.0, String::new()); robot.baseline(function).len()];
+            for state in &robot.states {
+                let results = results::<T>(&robot, function, &options(&robot), state);
+                let mut first = 0;
+                for (block, worst) in state.expected(function).iter().zip(&mut worst) {
+                    let error = block.error(&results[first..first + block.values.len()]);
+                    first += block.values.len();
+                    if error > worst.0 {
+                        *worst = (error, format!("{} {}", block.name, state.id));
+                    }
+                }
+                assert_eq!(first, results.len(), "{}: blocks of {}", robot.name, function.name());
+            }
+            for ((error, place), baseline) in worst.iter().zip(robot.baseline(function)) {
+                let most = bound(baseline);
+                let row = format!("{:<20} {error:9.1e} {most:9.1e} {baseline:9.1e}  {place}", robot.name);
+                let _ = writeln!(rows, "{row}");
+                if *error > most {
+                    let _ = writeln!(failures, "{row}");
+                }
+            }
+        }
+    }
+    println!("{claim}\n{:<20} {:>9} {:>9} {:>9}  worst in\n{rows}", "robot", "error", "bound", "Pinocchio");
+    assert!(failures.is_empty(), "{claim}\n{failures}");
+}
+
+#[test]
+fn derivatives_are_those_of_the_data_to_their_last_digits() {
+    // in the data angles count as they are written
+    let options = |robot: &DerivativeRobot| {
+        let mut options = robot.options();
+        options.model.angle_tolerance = 0.0;
+        options
+    };
+    table::<Dd>("double-double", options, |_| DATA.most);
+}
+
+#[test]
+fn derivatives_in_f64_lose_no_more_than_pinocchio() {
+    table::<f64>("f64", DerivativeRobot::options, |pinocchio| pinocchio.max(BOUND));
+}
+
+/// Inputs of f32 are others than those of the data: beside the same program in double-double.
+#[test]
+fn derivatives_in_f32_keep_six_digits() {
+    for robot in ROBOTS.map(DerivativeRobot::load) {
+        let options = Options { scalar: Scalar::F32, ..robot.options() };
+        for function in functions() {
+            // angles of 1e6 have no digit of a turn left in f32
+            for state in robot.states.iter().filter(|s| s.kind != "far_angle_1e6" && s.kind != "gravity_tilted") {
+                let text = std::fs::read_to_string(&robot.file).expect("the file is there");
+                let source = Source::new(&robot.file.file_name().expect("a name").to_string_lossy(), text);
+                let program = programs::program(&programs::load(&source, &options.model), &[], function, &options);
+                let short: Vec<Vec<f64>> =
+                    state.inputs(function).iter().map(|x| x.iter().map(|x| f64::from(*x as f32)).collect()).collect();
+                let exact = programs::run::<Dd>(&program, &cast(&short));
+                let found = programs::run::<f32>(&program, &cast(&short));
+                let mut first = 0;
+                for mut block in state.expected(function) {
+                    let own = first..first + block.values.len();
+                    first = own.end;
+                    block.values = exact[own.clone()].to_vec();
+                    let error = block.error(&found[own].iter().map(|x| f64::from(*x)).collect::<Vec<_>>());
+                    assert!(error <= BOUND_F32, "{} {} in {}: {error:e}", robot.name, block.name, state.id);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn compiled_derivatives_are_those_of_the_data() {
+    let mut asked = 0;
+    for robot in ROBOTS.map(DerivativeRobot::load) {
+        let compiled = compiled::robot(&robot.name);
+        for function in functions().filter(|f| compiled.has(*f)) {
+            for state in robot.states.iter().filter(|state| state.kind != "gravity_tilted") {
+                let results = compiled.call(function, &state.inputs(function));
+                let mut first = 0;
+                for (block, pinocchio) in state.expected(function).iter().zip(robot.baseline(function)) {
+                    let error = block.error(&results[first..first + block.values.len()]);
+                    first += block.values.len();
+                    assert!(error <= pinocchio.max(BOUND), "{} {} in {}: {error:e}", robot.name, block.name, state.id);
+                    asked += 1;
+                }
+            }
+        }
+    }
+    assert!(asked >= 2 * 7 * 4, "{asked}");
+}
+
+/// A program with one sign wrong is seen.
+#[test]
+fn a_wrong_sign_is_found() {
+    let robot = DerivativeRobot::load("panda");
+    let state = &robot.states[0];
+    let function = Function::InverseDynamicsDerivatives;
+    let mut wrong = results::<f64>(&robot, function, &robot.options(), state);
+    wrong[8] = -wrong[8];
+    let blocks = state.expected(function);
+    assert!(blocks[0].error(&wrong[..blocks[0].values.len()]) > 1e-6);
+}
