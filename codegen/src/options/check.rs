@@ -4,7 +4,7 @@ use crate::choices::{Choice, Lanes};
 use crate::diagnostic::Diagnostics;
 use crate::function::Function;
 use crate::options::Options;
-use crate::scene::{messages as say, Base, Gravity};
+use crate::scene::{messages as say, Base, Budget, Gravity};
 use straightline_graph::expr::Grade;
 
 /// What reading the scene's file found, or else what the scene and the options beside it contradict each other in. Scenes from
@@ -77,19 +77,14 @@ fn check_figures(options: &Options, diagnostics: &mut Diagnostics) {
         ask("options.figures", "figures", true, diagnostics);
     }
     for (function, budget) in &options.scene.budgets {
-        let limits = [
-            ("max_instructions", budget.max_instructions, true),
-            ("max_flash_bytes", budget.max_flash_bytes, true),
-            ("max_stack_bytes", budget.max_stack_bytes, false),
-        ];
         let unread = options.target.filter(|machine| budget.max_instructions.is_some() && machine.row().code.is_none());
         if let Some(machine) = unread {
             let (name, key) = (function.name(), "max_instructions");
             let why = format!("that of {} is not read", machine.row().name);
             places.complain(&format!("budget.{name}.{key}"), say::figure_unknown(name, key, &why), diagnostics);
         }
-        for (key, _, needs_machine) in limits.into_iter().filter(|(_, most, _)| most.is_some()) {
-            ask(&format!("budget.{}.{key}", function.name()), key, needs_machine, diagnostics);
+        for (key, _) in budget.of_machine_code().into_iter().filter(|(_, most)| most.is_some()) {
+            ask(&format!("budget.{}.{key}", function.name()), key, key != Budget::STACK, diagnostics);
         }
     }
 }

@@ -129,11 +129,8 @@ impl Options {
 
     /// The functions whose machine code is asked for: by `figures`, or by budgets that count on it.
     pub fn measured(&self) -> impl Iterator<Item = Function> + '_ {
-        let by_budget = |b: &Budget| {
-            b.max_instructions.is_some()
-                || b.max_flash_bytes.is_some()
-                || self.measures_stack() && b.max_stack_bytes.is_some()
-        };
+        let counts = |key: &str| key != Budget::STACK || self.measures_stack();
+        let by_budget = move |b: &Budget| b.of_machine_code().iter().any(|(key, most)| most.is_some() && counts(key));
         let is_measured = move |f: &&Function| self.figures || self.scene.budgets.get(f).is_some_and(by_budget);
         self.functions.iter().filter(move |f| self.target.is_some() && is_measured(f)).copied()
     }

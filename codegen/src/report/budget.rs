@@ -18,9 +18,6 @@ use straightline_graph::{element_of, Scalar};
 /// Of the things that could be held, so many are named.
 const REMEDIES: usize = 3;
 
-/// The limit that means the machine code's stack where its machine is known.
-const STACK: &str = "max_stack_bytes";
-
 /// What a program costs, in the terms of budgets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Measures {
@@ -80,40 +77,69 @@ fn code_bytes(program: &TracedProgram, scalar: Scalar) -> usize {
     bytes.round() as usize
 }
 
-/// A limit of a budget.
-struct Limit {
+/// A limit of a budget, on measures of a kind.
+struct Limit<M> {
     key: &'static str,
     most: fn(&Budget) -> Option<usize>,
-    takes: fn(&Measures) -> usize,
+    /// Or why that is not known.
+    takes: fn(&M) -> Result<usize, &'static str>,
     /// What comes before the number, after one, and after any other: `takes 567 operations`.
     words: (&'static str, &'static str, &'static str),
 }
 
-const LIMITS: [Limit; 5] = [
-    Limit { key: "max_flops", most: |b| b.max_flops, takes: |m| m.flops, words: ("takes", "operation", "operations") },
+/// What programs are compared with.
+const LIMITS: [Limit<Measures>; 5] = [
+    Limit {
+        key: "max_flops",
+        most: |b| b.max_flops,
+        takes: |m| Ok(m.flops),
+        words: ("takes", "operation", "operations"),
+    },
     Limit {
         key: "max_sincos",
         most: |b| b.max_sincos,
-        takes: |m| m.sincos,
+        takes: |m| Ok(m.sincos),
         words: ("takes", "sine-cosine pair", "sine-cosine pairs"),
     },
     Limit {
         key: "max_live",
         most: |b| b.max_live,
-        takes: |m| m.live,
+        takes: |m| Ok(m.live),
         words: ("keeps", "value alive at once", "values alive at once"),
     },
     Limit {
-        key: STACK,
+        key: Budget::STACK,
         most: |b| b.max_stack_bytes,
-        takes: |m| m.stack_bytes,
+        takes: |m| Ok(m.stack_bytes),
         words: ("takes", "byte of stack for its values", "bytes of stack for its values"),
     },
     Limit {
         key: "max_code_bytes",
         most: |b| b.max_code_bytes,
-        takes: |m| m.code_bytes,
+        takes: |m| Ok(m.code_bytes),
         words: ("takes about", "byte of code", "bytes of code"),
+    },
+];
+
+/// What machine code is compared with.
+const MACHINE_LIMITS: [Limit<MachineFigures>; 3] = [
+    Limit {
+        key: "max_instructions",
+        most: |b| b.max_instructions,
+        takes: |m| m.instructions.map(|n| n as usize),
+        words: ("takes", "instruction", "instructions"),
+    },
+    Limit {
+        key: "max_flash_bytes",
+        most: |b| b.max_flash_bytes,
+        takes: |m| Ok(m.flash_bytes as usize),
+        words: ("takes", "byte of flash", "bytes of flash"),
+    },
+    Limit {
+        key: Budget::STACK,
+        most: |b| b.max_stack_bytes,
+        takes: |m| m.stack_bytes.map(|n| n as usize),
+        words: ("takes", "byte of stack", "bytes of stack"),
     },
 ];
 
@@ -125,25 +151,46 @@ pub fn check(
     options: &Options,
     diagnostics: &mut Diagnostics,
 ) {
-    let places = &options.scene.places;
-    for (function, measures) in programs {
-        let Some(budget) = options.scene.budgets.get(function) else { continue };
-        // where the machine is known its machine code says more
-        let counts = |limit: &&Limit| !options.measures_stack() || limit.key != STACK;
-        let exceeded =
-            |limit: &&Limit| counts(limit) && (limit.most)(budget).is_some_and(|most| (limit.takes)(measures) > most);
-        let exceeded: Vec<&Limit> = LIMITS.iter().filter(exceeded).collect();
-        if exceeded.is_empty() {
-            continue;
-        }
-        let remedies = remedies(whole, frames, *function, options);
-        for limit in exceeded {
-            let (takes, most) = ((limit.takes)(measures), (limit.most)(budget).expect("the limit is exceeded"));
-            let with = remedies.iter().map(|(what, with)| ((limit.takes)(with), what.as_str()));
-            let savings = savings(takes, with);
-            let name = function.name();
-            let message = say::over_budget(name, limit.words, (takes, most), limit.key, &savings);
-            places.complain(&format!("budget.{name}.{}", limit.key), message, diagnostics);
+    // where the machine is known its machine code says more
+    let counts = |limit: &&Limit<Measures>| !options.measures_stack() || limit.key != Budget::STACK;
+    let limits: Vec<&Limit<Measures>> = LIMITS.iter().filter(counts).collect();
+    compare(&limits, programs, &|function| remedies(whole, frames, function, options), options, diagnostics);
+}
+
+/// Complains of every budget that machine code exceeds, or of which it says nothing. `remedies` are measured as it is.
+pub fn check_machine_code(
+    figures: &[(Function, MachineFigures)],
+    remedies: &dyn Fn(Function) -> Vec<(String, MachineFigures)>,
+    options: &Options,
+    diagnostics: &mut Diagnostics,
+) {
+    let counts = |limit: &&Limit<MachineFigures>| options.measures_stack() || limit.key != Budget::STACK;
+    let limits: Vec<&Limit<MachineFigures>> = MACHINE_LIMITS.iter().filter(counts).collect();
+    compare(&limits, figures, remedies, options, diagnostics);
+}
+
+/// Complains of every limit that a function exceeds, with what would save most, or of which nothing is known.
+fn compare<M>(
+    limits: &[&Limit<M>],
+    measured: &[(Function, M)],
+    remedies: &dyn Fn(Function) -> Vec<(String, M)>,
+    options: &Options,
+    diagnostics: &mut Diagnostics,
+) {
+    for (function, measures) in measured {
+        let (Some(budget), name) = (options.scene.budgets.get(function), function.name()) else { continue };
+        let mut tried = None;
+        for limit in limits {
+            let message = match ((limit.most)(budget), (limit.takes)(measures)) {
+                (Some(most), Ok(takes)) if takes > most => {
+                    let remedies = tried.get_or_insert_with(|| remedies(*function));
+                    let with = remedies.iter().filter_map(|(what, with)| Some(((limit.takes)(with).ok()?, &what[..])));
+                    say::over_budget(name, limit.words, (takes, most), limit.key, &savings(takes, with))
+                }
+                (Some(_), Err(why)) => say::figure_unknown(name, limit.key, why),
+                _ => continue,
+            };
+            options.scene.places.complain(&format!("budget.{name}.{}", limit.key), message, diagnostics);
         }
     }
 }
@@ -155,64 +202,6 @@ fn savings<'a>(takes: usize, with: impl Iterator<Item = (usize, &'a str)>) -> Ve
     savings.sort_by_key(|(saved, _)| std::cmp::Reverse(*saved));
     savings.truncate(REMEDIES);
     savings
-}
-
-/// A limit of a budget that machine code is compared with.
-struct MachineLimit {
-    key: &'static str,
-    most: fn(&Budget) -> Option<usize>,
-    takes: fn(&MachineFigures) -> Result<u32, &'static str>,
-    /// As those of [`Limit`].
-    words: (&'static str, &'static str, &'static str),
-}
-
-const MACHINE_LIMITS: [MachineLimit; 3] = [
-    MachineLimit {
-        key: "max_instructions",
-        most: |b| b.max_instructions,
-        takes: |m| m.instructions,
-        words: ("takes", "instruction", "instructions"),
-    },
-    MachineLimit {
-        key: "max_flash_bytes",
-        most: |b| b.max_flash_bytes,
-        takes: |m| Ok(m.flash_bytes),
-        words: ("takes", "byte of flash", "bytes of flash"),
-    },
-    MachineLimit {
-        key: STACK,
-        most: |b| b.max_stack_bytes,
-        takes: |m| m.stack_bytes,
-        words: ("takes", "byte of stack", "bytes of stack"),
-    },
-];
-
-/// Complains of every budget that machine code exceeds, or of which it says nothing. `remedies` are measured as it is.
-pub fn check_machine_code(
-    figures: &[(Function, MachineFigures)],
-    remedies: &dyn Fn(Function) -> Vec<(String, MachineFigures)>,
-    options: &Options,
-    diagnostics: &mut Diagnostics,
-) {
-    for (function, figures) in figures {
-        let (Some(budget), name) = (options.scene.budgets.get(function), function.name()) else { continue };
-        let mut measured = None;
-        for limit in MACHINE_LIMITS.iter().filter(|limit| options.measures_stack() || limit.key != STACK) {
-            let message = match ((limit.most)(budget), (limit.takes)(figures)) {
-                (Some(most), Ok(takes)) if takes as usize > most => {
-                    let remedies = measured.get_or_insert_with(|| remedies(*function));
-                    let with = remedies
-                        .iter()
-                        .filter_map(|(what, with)| Some(((limit.takes)(with).ok()? as usize, what.as_str())));
-                    let savings = savings(takes as usize, with);
-                    say::over_budget(name, limit.words, (takes as usize, most), limit.key, &savings)
-                }
-                (Some(_), Err(why)) => say::figure_unknown(name, limit.key, why),
-                _ => continue,
-            };
-            options.scene.places.complain(&format!("budget.{name}.{}", limit.key), message, diagnostics);
-        }
-    }
 }
 
 /// Of what the scene could hold, what saves the most operations: so much is worth a run of rustc.

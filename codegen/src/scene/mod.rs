@@ -350,3 +350,17 @@ pub struct Budget {
     /// Whether a function in f32 may compute in f64 what `max_error` takes.
     pub mixed_precision: bool,
 }
+
+impl Budget {
+    /// The limit that means the stack of machine code where its machine is known.
+    pub const STACK: &'static str = "max_stack_bytes";
+
+    /// The limits that machine code is compared with, by their keys.
+    pub fn of_machine_code(&self) -> [(&'static str, Option<usize>); 3] {
+        [
+            ("max_instructions", self.max_instructions),
+            ("max_flash_bytes", self.max_flash_bytes),
+            (Budget::STACK, self.max_stack_bytes),
+        ]
+    }
+}
