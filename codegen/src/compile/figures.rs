@@ -19,7 +19,6 @@ pub(super) struct Compilation<'a> {
     /// As they were given.
     pub options: &'a Options,
     pub whole: &'a Model<Dd>,
-    pub frames: &'a [String],
 }
 
 /// The same with figures, where they or budgets of them are asked for.
@@ -48,7 +47,7 @@ pub(super) fn with_figures(generated: Generated, compilation: &Compilation<'_>) 
         }
     };
     let remedies = |function: Function| {
-        let candidates = budget::promising(compilation.whole, compilation.frames, function, options);
+        let candidates = budget::promising(compilation.whole, &generated.frames, function, options);
         candidates
             .into_iter()
             .filter_map(|(what, scene)| Some((what, compilation.in_scene(function, scene)?)))

@@ -135,8 +135,7 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let first = generated.programs.all().find_map(why);
     match first {
         None => {
-            let compilation =
-                Compilation { source, options: &options, whole: &whole, frames: &generated.frames.clone() };
+            let compilation = Compilation { source, options: &options, whole: &whole };
             Ok(with_figures(generated, &compilation)?.with_fixed(fixed))
         }
         Some((program, why)) => {

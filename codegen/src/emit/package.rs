@@ -17,18 +17,35 @@ pub struct PackageKind {
     pub files: fn(&Generated, &str) -> Vec<(String, String)>,
 }
 
-/// Why packages have no functions in fixed point.
-pub(super) const NO_FIXED: [&str; 2] =
+/// Why there is no package of C of what Rust alone has.
+pub(super) fn rust_alone(generated: &Generated) -> Option<[&'static str; 2]> {
+    match () {
+        () if generated.plain_style.generic => Some(NO_GENERIC),
+        () if generated.programs.self_test.is_some() => Some(NO_SELF_TEST),
+        () if !generated.fixed.is_empty() => Some(NO_FIXED),
+        () if generated.rustc.is_some() => Some(NO_FIGURES),
+        () if !generated.others.is_empty() || generated.staged.is_some() => Some(ONE_SCALAR),
+        () => None,
+    }
+}
+
+const NO_GENERIC: [&str; 2] =
+    ["C has no generic functions", "leave out `generic`; `scalar` says which numbers the C functions take"];
+
+const ONE_SCALAR: [&str; 2] = [
+    "a C package has one scalar type, and no stages: C could not tell a stage that is out of date",
+    "say which with `--scalar`, and leave `staged` out of the scene",
+];
+
+const NO_FIXED: [&str; 2] =
     ["packages have no functions in fixed point", "leave out `fixed`; `generate` writes them in Rust"];
 
-/// Why packages have no figures of machine code.
-pub(super) const NO_FIGURES: [&str; 2] = [
+const NO_FIGURES: [&str; 2] = [
     "figures of machine code are of the Rust text by itself, not of a package",
     "leave out `figures`; a file of Rust has them (`straightline generate`)",
 ];
 
-/// Why packages of C refuse a self-test.
-pub(super) const NO_SELF_TEST: [&str; 2] =
+const NO_SELF_TEST: [&str; 2] =
     ["a package of C has no self-test", "leave out `self_test`; a file of Rust has it (`straightline generate`)"];
 
 /// All kinds.

@@ -93,6 +93,15 @@ pub(super) fn unit(bits: i32) -> f64 {
     2f64.powi(-bits)
 }
 
+/// What so many of the lowest bits of a word at a point are worth, at most.
+fn left_out(bits: u32, point: i32) -> f64 {
+    if bits == 0 {
+        0.0
+    } else {
+        unit(point - bits as i32)
+    }
+}
+
 /// The greatest point at which a value within `magnitude` is a word.
 pub(super) fn natural(magnitude: f64) -> i32 {
     let most = magnitude * (1.0 + MARGIN);
@@ -207,12 +216,8 @@ impl Known<'_> {
         let ways = self.machine.products().iter().flat_map(|kind| {
             let cost = self.machine.product(*kind) + f64::from(left > 0);
             let loss = kind.loss() * last;
-            let orders: &[bool] = if kind.leaves_out() == [0, 0] { &[true] } else { &[true, false] };
-            orders.iter().filter_map(move |value_first| {
-                let [of_value, of_constant] = match (kind.leaves_out(), value_first) {
-                    ([first, second], true) => [first, second],
-                    ([first, second], false) => [second, first],
-                };
+            kind.orders().iter().filter_map(move |order| {
+                let [of_value, of_constant] = order.map(|k| kind.leaves_out()[k]);
                 // a constant is rounded to what is read of it
                 let (word, off) = match of_constant {
                     0 => (exact, off),
@@ -221,11 +226,10 @@ impl Known<'_> {
                         (i32::try_from(i64::from(short) << out).ok()?, off)
                     }
                 };
-                let value = if of_value == 0 { 0.0 } else { 2f64.powi(of_value as i32) * unit(point + left) };
-                let error = off * magnitude + value * c.value().to_f64().abs();
+                let error = off * magnitude + left_out(of_value, point + left) * c.value().to_f64().abs();
                 let factors = [Aligned::Node(a, left), Aligned::Constant(word)];
-                let factors = if *value_first { factors } else { [factors[1], factors[0]] };
-                Some(Priced { way: WordWay::Product(*kind, factors, 0), cost, error: error + loss })
+                let way = WordWay::Product(*kind, order.map(|k| factors[k]), 0);
+                Some(Priced { way, cost, error: error + loss })
             })
         });
         Self::least(weight, ways.chain(long))
@@ -279,17 +283,12 @@ impl Known<'_> {
         let factors = [Aligned::Node(a, left_a), Aligned::Node(b, left_b)];
         let lower = |of: usize, out: u32| {
             let (other, point) = if of == 0 { (b, pa + left_a) } else { (a, pb + left_b) };
-            if out == 0 {
-                return 0.0;
-            }
-            2f64.powi(out as i32) * unit(point) * self.magnitude[other.index()]
+            left_out(out, point) * self.magnitude[other.index()]
         };
         let rounding = if after > 0 { unit(bits) } else { 0.0 };
         let last = unit(bits + beyond.max(0));
         let ways = self.machine.products().iter().flat_map(|kind| {
-            let [first, second] = kind.leaves_out();
-            let orders: &[[usize; 2]] = if first != second { &[[0, 1], [1, 0]] } else { &[[0, 1]] };
-            orders.iter().map(move |order| {
+            kind.orders().iter().map(move |order| {
                 let left_out = order.iter().zip(kind.leaves_out()).map(|(of, out)| lower(*of, out));
                 Priced {
                     way: WordWay::Product(*kind, order.map(|k| factors[k]), after),

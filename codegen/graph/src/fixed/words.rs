@@ -98,6 +98,16 @@ impl Product {
             Product::Uneven => [8, 24],
         }
     }
+
+    /// The orders of two operands that make different products of them: which operand is the first word, and which the second.
+    pub fn orders(self) -> &'static [[usize; 2]] {
+        let [first, second] = self.leaves_out();
+        if first == second {
+            &[[0, 1]]
+        } else {
+            &[[0, 1], [1, 0]]
+        }
+    }
 }
 
 /// An operation on words. Operands stand before their users.

@@ -12,7 +12,7 @@ mod source;
 pub use kernel::KERNEL;
 pub use routine::C99;
 
-use super::package::{PackageKind, NO_FIGURES, NO_FIXED, NO_SELF_TEST};
+use super::package::{rust_alone, PackageKind};
 use super::Generated;
 use crate::identifier::comment;
 use interface::Interface;
@@ -24,27 +24,18 @@ const C_INDENT: &str = "    ";
 pub const C99_SOURCE: PackageKind = PackageKind {
     name: "c99",
     doc: "a C99 source without libraries, its header, and one for C++",
-    refusal: |generated| match () {
-        () if generated.plain_style.generic => Some([
-            "C has no generic functions",
-            "leave out `generic`; `scalar` says which numbers the C functions take",
-        ]),
-        () if generated.programs.self_test.is_some() => Some(NO_SELF_TEST),
-        () if !generated.fixed.is_empty() => Some(NO_FIXED),
-        () if generated.rustc.is_some() => Some(NO_FIGURES),
-        () if !generated.others.is_empty() || generated.staged.is_some() => Some([
-            "a C package has one scalar type, and no stages: C could not tell a stage that is out of date",
-            "say which with `--scalar`, and leave `staged` out of the scene",
-        ]),
-        () if generated.style.fused => Some([
-            "C99 has a·b + c in one rounding in the library libm alone, which a package of C99 does without",
-            "leave out `fma`; `--as c-abi` has it",
-        ]),
-        () if generated.lanes.is_some() => Some([
-            "a package of C99 has no functions over lanes and batches",
-            "leave out `lanes`, and call a function once per state; `--as c-abi` has them",
-        ]),
-        () => None,
+    refusal: |generated| {
+        rust_alone(generated).or(match () {
+            () if generated.style.fused => Some([
+                "C99 has a·b + c in one rounding in the library libm alone, which a package of C99 does without",
+                "leave out `fma`; `--as c-abi` has it",
+            ]),
+            () if generated.lanes.is_some() => Some([
+                "a package of C99 has no functions over lanes and batches",
+                "leave out `lanes`, and call a function once per state; `--as c-abi` has them",
+            ]),
+            () => None,
+        })
     },
     files,
 };

@@ -7,7 +7,7 @@ use super::file::{header, item_text, lanes_text, preamble, short_sines, uses};
 use super::routine::SHORT_SINES;
 use super::{array_type, batch, fused, kernel};
 use crate::emit::c99::interface::{CParameter, Exported, Interface, LAYOUTS};
-use crate::emit::package::{PackageKind, NO_FIGURES, NO_FIXED, NO_SELF_TEST};
+use crate::emit::package::{rust_alone, PackageKind};
 use crate::emit::{Generated, Item, Style};
 use crate::identifier::{package_name, string_literal};
 use crate::output::MARK;
@@ -19,27 +19,7 @@ use straightline_graph::Scalar;
 pub const C_ABI: PackageKind = PackageKind {
     name: "c-abi",
     doc: "a Rust package of functions with C's calling convention, and their header",
-    refusal: |generated| {
-        if generated.plain_style.generic {
-            return Some([
-                "C has no generic functions",
-                "leave out `generic`; `scalar` says which numbers the C functions take",
-            ]);
-        }
-        if generated.programs.self_test.is_some() {
-            return Some(NO_SELF_TEST);
-        }
-        if !generated.fixed.is_empty() {
-            return Some(NO_FIXED);
-        }
-        if generated.rustc.is_some() {
-            return Some(NO_FIGURES);
-        }
-        (!generated.others.is_empty() || generated.staged.is_some()).then_some([
-            "a C package has one scalar type, and no stages: C could not tell a stage that is out of date",
-            "say which with `--scalar`, and leave `staged` out of the scene",
-        ])
-    },
+    refusal: rust_alone,
     files: c_package,
 };
 
