@@ -74,19 +74,12 @@ impl<T: Real> MotionSweep<'_, T> {
 
     /// From the axes in which a body is described to those in which its parent is.
     fn to_parent(&self, i: BodyId, v: Vec3<T>) -> Vec3<T> {
-        let (body, turn) = (self.body(i), &self.turns[i]);
-        turn.base_to_parent(body, turn.described_to_base(body, v))
+        self.turns[i].described_to_parent(self.body(i), v)
     }
 
     /// The way back.
     fn to_child(&self, i: BodyId, v: Vec3<T>) -> Vec3<T> {
-        let (body, turn) = (self.body(i), &self.turns[i]);
-        let base = turn.parent_to_base(body, v);
-        if body.stays {
-            base
-        } else {
-            turn.base_to_own(base)
-        }
+        self.turns[i].parent_to_described(self.body(i), v)
     }
 
     /// A wrench about a body's origin, about that of its parent in its axes.

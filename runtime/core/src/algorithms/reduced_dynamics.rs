@@ -39,18 +39,9 @@ pub fn reduced_inverse_dynamics_with_limbs<T: Real>(
         let own = links[i].wrench(body, &turns[i]);
         let moment = (own.moment + carried[i].moment).named("moment", i);
         let force = (own.force + carried[i].force).named("force", i);
-        match body.kind {
-            ReducedJoint::Turn => tau[body.iv] = moment.z,
-            ReducedJoint::Slide => tau[body.iv] = force.z,
-            ReducedJoint::Free => {
-                let force = force.scale(model.per_unit);
-                for (k, x) in force.to_array().into_iter().chain(moment.to_array()).enumerate() {
-                    tau[body.iv + k] = x;
-                }
-            }
-        }
+        along_joint(model, body, &ForceVector { moment, force }, &mut |k, x| tau[k] = x);
         if let Some(p) = body.parent {
-            let to_parent = |v| turns[i].base_to_parent(body, turns[i].described_to_base(body, v));
+            let to_parent = |v| turns[i].described_to_parent(body, v);
             let (f, n) = (to_parent(force), to_parent(moment));
             let arm = links[i].arm;
             let passed_on = || ForceVector { moment: n + arm.cross(f), force: f };
@@ -64,6 +55,23 @@ pub fn reduced_inverse_dynamics_with_limbs<T: Real>(
         }
     }
     tau
+}
+
+/// The generalized forces that a wrench on a body is to its joint, by velocity coordinate.
+pub(super) fn along_joint<T: Real>(
+    model: &ReducedModel<T>,
+    body: &ReducedBody<T>,
+    w: &ForceVector<T>,
+    set: &mut dyn FnMut(usize, T),
+) {
+    match body.kind {
+        ReducedJoint::Turn => set(body.iv, w.moment.z),
+        ReducedJoint::Slide => set(body.iv, w.force.z),
+        ReducedJoint::Free => {
+            let both = w.force.scale(model.per_unit).to_array().into_iter().chain(w.moment.to_array());
+            both.enumerate().for_each(|(k, x)| set(body.iv + k, x));
+        }
+    }
 }
 
 /// How all bodies move: the sweep from the base to the tips.
@@ -145,7 +153,7 @@ pub(super) fn carried_motion<T: Real>(
         if body.kind == ReducedJoint::Free {
             origin = Vec3::new(q[body.iq], q[body.iq + 1], q[body.iq + 2]);
         }
-        lever = links[i].arm + turn.base_to_parent(body, turn.described_to_base(body, lever));
+        lever = links[i].arm + turn.described_to_parent(body, lever);
         next = body.parent;
     }
     path.reverse();
@@ -172,14 +180,7 @@ impl<T: Real> CarriedMotion<T> {
         let (mut n, mut f) = (direction, in_metres);
         let (mut linear, mut angular) = (vec![T::zero(); self.nv], vec![T::zero(); self.nv]);
         for (body, turn, r) in &self.path {
-            let down = |v| {
-                let base = turn.parent_to_base(body, v);
-                if body.stays {
-                    base
-                } else {
-                    turn.base_to_own(base)
-                }
-            };
+            let down = |v| turn.parent_to_described(body, v);
             (n, f) = (down(n), down(f));
             let iv = body.iv;
             match body.kind {

@@ -4,6 +4,7 @@
 //! same. A composite of bodies that [stay](ReducedBody::stays) is put together in the base axes of their chain: there the
 //! constants turn, and no composite.
 
+use super::reduced_dynamics::along_joint;
 use super::reduced_turn::Turn;
 use crate::joint::FLOATING_BASE;
 use crate::real::Real;
@@ -74,14 +75,7 @@ pub fn reduced_mass_matrix<T: Real>(model: &ReducedModel<T>, q: &[T]) -> Vec<T> 
             let force = turn.base_to_parent(body, wrench.force);
             let moment = turn.base_to_parent(body, wrench.moment) + arm_of(below).cross(force);
             let over = &model.bodies[ancestor];
-            match over.kind {
-                ReducedJoint::Turn => set(iv, over.iv, moment.z),
-                ReducedJoint::Slide => set(iv, over.iv, force.z),
-                ReducedJoint::Free => {
-                    let both = force.scale(model.per_unit).to_array().into_iter().chain(moment.to_array());
-                    both.enumerate().for_each(|(k, x)| set(iv, over.iv + k, x));
-                }
-            }
+            along_joint(model, over, &ForceVector { moment, force }, &mut |k, x| set(iv, k, x));
             let turned = |v| turns[ancestor].described_to_base(over, v);
             let moment = match over.kind {
                 // q z × F

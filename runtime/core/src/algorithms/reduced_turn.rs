@@ -98,6 +98,21 @@ impl<T: Real> Turn<T> {
         }
     }
 
+    /// From the axes in which the body is described to those in which its parent is.
+    pub fn described_to_parent(&self, body: &ReducedBody<T>, v: Vec3<T>) -> Vec3<T> {
+        self.base_to_parent(body, self.described_to_base(body, v))
+    }
+
+    /// The way back.
+    pub fn parent_to_described(&self, body: &ReducedBody<T>, v: Vec3<T>) -> Vec3<T> {
+        let base = self.parent_to_base(body, v);
+        if body.stays {
+            base
+        } else {
+            self.base_to_own(base)
+        }
+    }
+
     /// A constant vector of the body, in the axes in which it is described.
     pub fn own_to_described(&self, body: &ReducedBody<T>, v: Vec3<T>) -> Vec3<T> {
         match self.angle {

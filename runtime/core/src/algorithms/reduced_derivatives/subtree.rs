@@ -1,5 +1,6 @@
 //! All that a body carries, about its origin: moments of its points, the same of their velocities relative to the body, and the wrench of the motion.
 
+use super::super::reduced_dynamics::along_joint;
 use super::super::reduced_mass_matrix::{of_body, rotated};
 use super::MotionSweep;
 use crate::model::BodyId;
@@ -28,16 +29,7 @@ impl<T: Real> Subtree<T> {
         for i in (0..all.len()).rev() {
             T::section("backward", Some(i));
             let body = sweep.body(i);
-            let w = all[i].wrench;
-            match body.kind {
-                ReducedJoint::Turn => tau[body.iv] = w.moment.z,
-                ReducedJoint::Slide => tau[body.iv] = w.force.z,
-                ReducedJoint::Free => {
-                    let force = w.force.scale(sweep.model.per_unit);
-                    let both = force.to_array().into_iter().chain(w.moment.to_array());
-                    both.enumerate().for_each(|(k, x)| tau[body.iv + k] = x);
-                }
-            }
+            along_joint(sweep.model, body, &all[i].wrench, &mut |k, x| tau[k] = x);
             let Some(parent) = body.parent else { continue };
             let carried = all[i].to_parent(sweep, i);
             let onto = &mut all[parent];
