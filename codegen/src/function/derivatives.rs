@@ -44,17 +44,17 @@ impl<T: Real> Forms<'_, T> {
     /// τ = H q̈ + h and its derivatives.
     pub fn inverse_dynamics_derivatives(&self, motion: [&[T]; 3]) -> DerivativeBlocks<T> {
         let Some([torques, _]) = self.reduced else { return by_directions(self.model, motion) };
-        let mut all = alg::reduced_inverse_dynamics_derivatives(torques, motion);
+        let rigid = alg::reduced_inverse_dynamics_derivatives(torques, motion);
+        let mut all = DerivativeBlocks {
+            mass_matrix: self.with_rotors(rigid.mass_matrix),
+            tau: self.with_effects(rigid.tau, motion),
+            ..rigid
+        };
         let nv = self.model.nv();
-        let rotors = alg::rotor_inertias(self.model);
-        let passive = alg::passive_force(self.model, motion[0], motion[1]);
         let [by_q, by_qd] = passive_slopes(self.model, motion[0], motion[1]);
-        for i in 0..nv {
-            let add = |to: &mut T, more: T| *to = *to + more;
-            add(&mut all.mass_matrix[i * nv + i], rotors[i]);
-            add(&mut all.dtau_dq[i * nv + i], by_q[i]);
-            add(&mut all.dtau_dqd[i * nv + i], by_qd[i]);
-            add(&mut all.tau[i], rotors[i] * motion[2][i] + passive[i]);
+        for (i, (by_q, by_qd)) in by_q.into_iter().zip(by_qd).enumerate() {
+            all.dtau_dq[i * nv + i] = all.dtau_dq[i * nv + i] + by_q;
+            all.dtau_dqd[i * nv + i] = all.dtau_dqd[i * nv + i] + by_qd;
         }
         all
     }

@@ -59,9 +59,23 @@ impl<'a, T: Real> Forms<'a, T> {
     pub fn inverse_dynamics(&self, q: &[T], qd: &[T], qdd: &[T]) -> Vec<T> {
         let Some([torques, _]) = self.reduced else { return alg::inverse_dynamics(self.model, q, qd, qdd) };
         let rigid = self.with_limbs(|l| alg::reduced_inverse_dynamics_with_limbs(torques, [q, qd, qdd], l.wrench));
+        self.with_effects(rigid, [q, qd, qdd])
+    }
+
+    /// Forces of the bodies with those that rotors, friction and springs of the joints take.
+    pub(super) fn with_effects(&self, rigid: Vec<T>, [q, qd, qdd]: [&[T]; 3]) -> Vec<T> {
         let passive = alg::passive_force(self.model, q, qd);
         let rotors = alg::rotor_inertias(self.model).into_iter().zip(qdd).map(|(i, qdd)| i * *qdd);
         rigid.into_iter().zip(rotors.zip(passive)).map(|(f, (r, p))| f + (r + p)).collect()
+    }
+
+    /// The mass matrix of the bodies with the inertia of the joints' rotors.
+    pub(super) fn with_rotors(&self, mut h: Vec<T>) -> Vec<T> {
+        let nv = self.model.nv();
+        for (i, rotor) in alg::rotor_inertias(self.model).into_iter().enumerate() {
+            h[i * nv + i] = h[i * nv + i] + rotor;
+        }
+        h
     }
 
     /// g(q).
@@ -94,12 +108,7 @@ impl<'a, T: Real> Forms<'a, T> {
     /// H(q), by rows.
     pub fn mass_matrix(&self, q: &[T]) -> Vec<T> {
         let Some([_, composite]) = self.reduced else { return alg::mass_matrix(self.model, q) };
-        let mut h = alg::reduced_mass_matrix(composite, q);
-        let nv = self.model.nv();
-        for (i, rotor) in alg::rotor_inertias(self.model).into_iter().enumerate() {
-            h[i * nv + i] = h[i * nv + i] + rotor;
-        }
-        h
+        self.with_rotors(alg::reduced_mass_matrix(composite, q))
     }
 
     /// q̇ = 0 or q̈ = 0.

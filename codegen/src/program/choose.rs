@@ -60,14 +60,15 @@ fn chosen(
     optimisations: Optimisations,
 ) -> Robot {
     use Function::{BiasForce, InverseDynamics, MassMatrix};
-    let search = |function: Function| {
+    let search_from = |function: Function, known: &[FreeTerms]| {
         // the search is for torques or the mass matrix, whatever becomes of forward dynamics
         let optimisations = Optimisations { cheaper: false, ..optimisations };
         // contacts leave torques and H as they are
         let scene = Scene { contacts: SceneContacts::default(), ..options.scene.clone() };
         let key = ((function, scene), optimisations, options.scalar).stable_text();
-        robot.found.or_search(key, || improved(robot, frames, function, options, optimisations, &[]))
+        robot.found.or_search(key, || improved(robot, frames, function, options, optimisations, known))
     };
+    let search = |function| search_from(function, &[]);
     let both = |choice: FreeTerms| robot.reduced_by(&choice, &choice);
     match function.spec().form {
         Form::Plain => robot.clone(),
@@ -76,7 +77,7 @@ fn chosen(
         Form::MassMatrix => both(search(MassMatrix)),
         Form::Derivatives => {
             let known = [search(InverseDynamics), search(MassMatrix)];
-            both(improved(robot, frames, function, options, optimisations, &known))
+            both(search_from(function, &known))
         }
         Form::Both | Form::Motion => {
             let (torques, mass_matrix) = (search(BiasForce), search(MassMatrix));
