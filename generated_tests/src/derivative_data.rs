@@ -2,10 +2,12 @@
 //!
 //! An error is judged by the greatest entry of its block; of a block of zeros absolutely.
 
+use crate::programs;
 use crate::reference::{description, folder, inputs, json, numbers};
 use serde_json::Value;
 use std::path::PathBuf;
 use straightline_codegen::options::Options;
+use straightline_codegen::program::TracedProgram;
 use straightline_codegen::{model, Function};
 use straightline_core::Dd;
 
@@ -94,6 +96,11 @@ impl DerivativeRobot {
         }
     }
 
+    /// The program of a function.
+    pub fn program(&self, function: Function, options: &Options) -> TracedProgram {
+        programs::program(&programs::load(&programs::file(&self.file), &options.model), &[], function, options)
+    }
+
     /// How it is compiled.
     pub fn options(&self) -> Options {
         let model = model::ModelOptions { floating_base: self.floating, ..model::ModelOptions::default() };
@@ -113,11 +120,21 @@ impl DerivativeState {
         data_of(function).inputs.iter().map(|name| inputs(&self.data[*name])).collect()
     }
 
-    /// Its blocks of results.
-    pub fn expected(&self, function: Function) -> Vec<ExpectedBlock> {
+    /// Its blocks, each with the results of a function that belong to it.
+    ///
+    /// # Panics
+    /// If there are not as many results.
+    pub fn blocks<'r, T>(&self, function: Function, mut results: &'r [T]) -> Vec<(ExpectedBlock, &'r [T])> {
         let DataOf { group, blocks, .. } = data_of(function);
-        let of = |name: &'static str| ExpectedBlock { name, values: numbers(&self.data[*group][name]) };
-        blocks.iter().map(|(name, _)| of(name)).collect()
+        let mut all = Vec::new();
+        for (name, _) in *blocks {
+            let expected = ExpectedBlock { name, values: numbers(&self.data[*group][*name]) };
+            let (own, others) = results.split_at(expected.values.len());
+            results = others;
+            all.push((expected, own));
+        }
+        assert!(results.is_empty(), "{}: more results than the data have", function.name());
+        all
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::made::Made;
 use crate::reference::Robot;
+use std::path::Path;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::model::{self, ModelOptions};
@@ -12,8 +13,13 @@ use straightline_core::{Dd, Real};
 
 /// The file of a robot of the reference data.
 pub fn source(robot: &Robot) -> Source {
-    let text = std::fs::read_to_string(&robot.file).unwrap_or_else(|e| panic!("{}: {e}", robot.file.display()));
-    Source::new(&robot.file.file_name().expect("a file has a name").to_string_lossy(), text)
+    file(&robot.file)
+}
+
+/// A robot file, by its name without folders.
+pub fn file(path: &Path) -> Source {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    Source::new(&path.file_name().expect("a file has a name").to_string_lossy(), text)
 }
 
 /// How a robot of the reference data is compiled.

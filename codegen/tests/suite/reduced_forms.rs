@@ -5,6 +5,7 @@ use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::reduce::{lengths, longest_lever, reduce, FreeTerms};
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph, DIVISION};
+use straightline_codegen::function::ForwardDynamicsMethod;
 use straightline_codegen::model::{load, ModelOptions};
 use straightline_codegen::options::{Optimisations, Options};
 use straightline_codegen::program::optimised;
@@ -12,7 +13,7 @@ use straightline_codegen::Function;
 use straightline_core::algorithms as alg;
 use straightline_core::model::{Body, JointEffects, Model};
 use straightline_core::reduced::{Meeting, ReducedModel};
-use straightline_core::{Dd, Dual};
+use straightline_core::Dd;
 
 /// Arms with parallel and right-angled joints, and a robot with a floating base and four legs.
 const ROBOTS: [(&str, bool); 4] = [("ur5", false), ("panda", false), ("puma560", false), ("solo12", true)];
@@ -138,49 +139,15 @@ fn derivatives_are_those_of_the_robot(model: &Model<Dd>, reduced: &ReducedModel<
         bodies: model.bodies.iter().map(|b| Body { effects: JointEffects::none(), ..b.clone() }).collect(),
         ..model.clone()
     };
-    let wide = rigid.map(Dual::<Dd, 1>::fixed);
-    let fixed = |x: &[Dd]| x.iter().map(|x| Dual::<Dd, 1>::fixed(*x)).collect::<Vec<_>>();
-    let derivative = |q: &[Dual<Dd, 1>], qd: &[Dual<Dd, 1>]| {
-        let tau = alg::inverse_dynamics(&wide, q, qd, &fixed(motion[2]));
-        tau.into_iter().map(|tau| tau.derivatives[0]).collect::<Vec<Dd>>()
-    };
-    let (mut by_q, mut by_qd) = (vec![Dd::ZERO; nv * nv], vec![Dd::ZERO; nv * nv]);
-    for column in 0..nv {
-        let (mut q, mut qd) = (fixed(motion[0]), fixed(motion[1]));
-        qd[column].derivatives[0] = Dd::ONE;
-        seed(model, &mut q, column);
-        let of_q = derivative(&q, &fixed(motion[1]));
-        let of_qd = derivative(&fixed(motion[0]), &qd);
-        for row in 0..nv {
-            (by_q[row * nv + column], by_qd[row * nv + column]) = (of_q[row], of_qd[row]);
-        }
-    }
+    let method = ForwardDynamicsMethod::ArticulatedBody;
+    let plain = Function::InverseDynamicsDerivatives.evaluate(&rigid, &[], method, &motion.map(<[Dd]>::to_vec));
+    let (by_q, by_qd) = plain[..2 * nv * nv].split_at(nv * nv);
     let found = alg::reduced_inverse_dynamics_derivatives(reduced, motion);
     let [q, qd, qdd] = motion;
     assert_equal(&found.tau, &alg::reduced_inverse_dynamics(reduced, q, qd, qdd), &format!("tau, {what}"));
     assert_equal(&found.mass_matrix, &alg::reduced_mass_matrix(reduced, q), &format!("H, {what}"));
-    assert_equal(&found.dtau_dqd, &by_qd, &format!("by qd, {what}"));
-    assert_equal(&found.dtau_dq, &by_q, &format!("by q, {what}"));
-}
-
-/// The derivative of q along a direction of the tangent.
-fn seed(model: &Model<Dd>, q: &mut [Dual<Dd, 1>], column: usize) {
-    let body = model.bodies.iter().rfind(|b| b.joint.iv <= column).expect("a joint has the column");
-    let (iq, k) = (body.joint.iq, column - body.joint.iv);
-    let value: Vec<Dd> = q.iter().map(|x| x.value).collect();
-    if body.joint.kind.is_single() {
-        q[iq].derivatives[0] = Dd::ONE;
-        return;
-    }
-    let [x, y, z, w] = [3, 4, 5, 6].map(|k| value[iq + k] * Dd::HALF);
-    // ½ (u, w) (e, 0) = ½ (w e + u × e, −u · e); torques know nothing of the position
-    let along = match k {
-        0..3 => [Dd::ZERO; 4],
-        3 => [w, z, -y, -x],
-        4 => [-z, w, x, -y],
-        _ => [y, -x, w, -z],
-    };
-    along.iter().enumerate().for_each(|(i, d)| q[iq + 3 + i].derivatives[0] = *d);
+    assert_equal(&found.dtau_dqd, by_qd, &format!("by qd, {what}"));
+    assert_equal(&found.dtau_dq, by_q, &format!("by q, {what}"));
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! Operations of ∂τ/∂q, ∂τ/∂q̇ and H in one call, beside what the best published way takes without H.
 
 use std::path::Path;
-use straightline_codegen::diagnostic::Source;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::options::Options;
 use straightline_codegen::scene::{Scene, Selection};
@@ -38,9 +37,8 @@ const LARGE: [CountsOf; 4] = [
 
 fn count(of: &CountsOf) -> usize {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(of.file);
-    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let model = ModelOptions { floating_base: of.floating, ..ModelOptions::default() };
-    let robot = programs::load(&Source::new(of.file, text), &model);
+    let robot = programs::load(&programs::file(&path), &model);
     let function = Function::InverseDynamicsDerivatives;
     let results = ["dtau_dq", "dtau_dqd", "h"].map(String::from).to_vec();
     let scene = Scene {

@@ -1,7 +1,6 @@
 //! Derivatives against values with 25 digits: all robots and states of the data, in double-double, f64 and f32.
 
 use std::fmt::Write;
-use straightline_codegen::diagnostic::Source;
 use straightline_codegen::options::Options;
 use straightline_codegen::scene::Gravity;
 use straightline_codegen::{Function, Scalar};
@@ -16,8 +15,6 @@ const BOUND: f64 = 1e-15;
 const BOUND_F32: f64 = 1e-6;
 
 fn results<T: Real>(robot: &DerivativeRobot, function: Function, options: &Options, state: &DerivativeState) -> Vec<T> {
-    let text = std::fs::read_to_string(&robot.file).expect("the file is there");
-    let source = Source::new(&robot.file.file_name().expect("a file has a name").to_string_lossy(), text);
     // one program for all states with a gravity of their own
     let mut options = options.clone();
     let mut inputs = cast::<T>(&state.inputs(function));
@@ -30,8 +27,7 @@ fn results<T: Real>(robot: &DerivativeRobot, function: Function, options: &Optio
         let length = inputs[0][3..7].iter().fold(T::zero(), |sum, x| sum + *x * *x).sqrt();
         inputs[0][3..7].iter_mut().for_each(|x| *x = *x / length);
     }
-    let program = programs::program(&programs::load(&source, &options.model), &[], function, &options);
-    programs::run::<T>(&program, &inputs)
+    programs::run::<T>(&robot.program(function, &options), &inputs)
 }
 
 /// Each robot, function and block with its worst error; fails where one is beyond its bound.
@@ -42,15 +38,12 @@ fn table<T: Real + Into<Dd>>(claim: &str, options: impl Fn(&DerivativeRobot) -> 
             let mut worst: Vec<(f64, String)> = vec![(0.0, String::new()); robot.baseline(function).len()];
             for state in &robot.states {
                 let results = results::<T>(&robot, function, &options(&robot), state);
-                let mut first = 0;
-                for (block, worst) in state.expected(function).iter().zip(&mut worst) {
-                    let error = block.error(&results[first..first + block.values.len()]);
-                    first += block.values.len();
+                for ((block, own), worst) in state.blocks(function, &results).into_iter().zip(&mut worst) {
+                    let error = block.error(own);
                     if error > worst.0 {
                         *worst = (error, format!("{} {}", block.name, state.id));
                     }
                 }
-                assert_eq!(first, results.len(), "{}: blocks of {}", robot.name, function.name());
             }
             for ((error, place), baseline) in worst.iter().zip(robot.baseline(function)) {
                 let most = bound(baseline);
@@ -90,19 +83,16 @@ fn derivatives_in_f32_keep_six_digits() {
         for function in functions() {
             // angles of 1e6 have no digit of a turn left in f32
             for state in robot.states.iter().filter(|s| s.kind != "far_angle_1e6" && s.kind != "gravity_tilted") {
-                let text = std::fs::read_to_string(&robot.file).expect("the file is there");
-                let source = Source::new(&robot.file.file_name().expect("a name").to_string_lossy(), text);
-                let program = programs::program(&programs::load(&source, &options.model), &[], function, &options);
+                let program = robot.program(function, &options);
                 let short: Vec<Vec<f64>> =
                     state.inputs(function).iter().map(|x| x.iter().map(|x| f64::from(*x as f32)).collect()).collect();
                 let exact = programs::run::<Dd>(&program, &cast(&short));
-                let found = programs::run::<f32>(&program, &cast(&short));
-                let mut first = 0;
-                for mut block in state.expected(function) {
-                    let own = first..first + block.values.len();
-                    first = own.end;
-                    block.values = exact[own.clone()].to_vec();
-                    let error = block.error(&found[own].iter().map(|x| f64::from(*x)).collect::<Vec<_>>());
+                let found: Vec<f64> =
+                    programs::run::<f32>(&program, &cast(&short)).into_iter().map(f64::from).collect();
+                let exact = state.blocks(function, &exact);
+                for ((mut block, found), (_, exact)) in state.blocks(function, &found).into_iter().zip(exact) {
+                    block.values = exact.to_vec();
+                    let error = block.error(found);
                     assert!(error <= BOUND_F32, "{} {} in {}: {error:e}", robot.name, block.name, state.id);
                 }
             }
@@ -118,10 +108,9 @@ fn compiled_derivatives_are_those_of_the_data() {
         for function in functions().filter(|f| compiled.has(*f)) {
             for state in robot.states.iter().filter(|state| state.kind != "gravity_tilted") {
                 let results = compiled.call(function, &state.inputs(function));
-                let mut first = 0;
-                for (block, pinocchio) in state.expected(function).iter().zip(robot.baseline(function)) {
-                    let error = block.error(&results[first..first + block.values.len()]);
-                    first += block.values.len();
+                let blocks = state.blocks(function, &results);
+                for ((block, own), pinocchio) in blocks.into_iter().zip(robot.baseline(function)) {
+                    let error = block.error(own);
                     assert!(error <= pinocchio.max(BOUND), "{} {} in {}: {error:e}", robot.name, block.name, state.id);
                     asked += 1;
                 }
@@ -139,6 +128,6 @@ fn a_wrong_sign_is_found() {
     let function = Function::InverseDynamicsDerivatives;
     let mut wrong = results::<f64>(&robot, function, &robot.options(), state);
     wrong[8] = -wrong[8];
-    let blocks = state.expected(function);
-    assert!(blocks[0].error(&wrong[..blocks[0].values.len()]) > 1e-6);
+    let (block, own) = &state.blocks(function, &wrong)[0];
+    assert!(block.error(own) > 1e-6);
 }
