@@ -58,12 +58,34 @@ struct DataOf {
     blocks: &'static [(&'static str, &'static str)],
 }
 
-const DATA: &[DataOf] = &[DataOf {
-    function: Function::InverseDynamicsDerivatives,
-    group: "inverse_dynamics_derivatives",
-    inputs: &["q", "qd", "qdd"],
-    blocks: &[("dtau_dq", "dtau_dq"), ("dtau_dqd", "dtau_dqd"), ("H", "H"), ("tau", "tau")],
-}];
+const HVP: &str = "hvp (f64 differences of analytic gradient)";
+
+const DATA: &[DataOf] = &[
+    DataOf {
+        function: Function::InverseDynamicsDerivatives,
+        group: "inverse_dynamics_derivatives",
+        inputs: &["q", "qd", "qdd"],
+        blocks: &[("dtau_dq", "dtau_dq"), ("dtau_dqd", "dtau_dqd"), ("H", "H"), ("tau", "tau")],
+    },
+    DataOf {
+        function: Function::InverseDynamicsJvp,
+        group: "inverse_dynamics_products",
+        inputs: &["q", "qd", "qdd", "direction_q", "direction_qd", "direction_qdd"],
+        blocks: &[("jvp", "jvp")],
+    },
+    DataOf {
+        function: Function::InverseDynamicsVjp,
+        group: "inverse_dynamics_products",
+        inputs: &["q", "qd", "qdd", "multiplier"],
+        blocks: &[("vjp_q", "vjp"), ("vjp_qd", "vjp"), ("vjp_qdd", "vjp")],
+    },
+    DataOf {
+        function: Function::InverseDynamicsHvp,
+        group: "inverse_dynamics_products",
+        inputs: &["q", "qd", "qdd", "direction_q", "direction_qd", "direction_qdd", "multiplier"],
+        blocks: &[("hvp_q", HVP), ("hvp_qd", HVP), ("hvp_qdd", HVP)],
+    },
+];
 
 fn data_of(function: Function) -> &'static DataOf {
     DATA.iter().find(|data| data.function == function).expect("the data hold the function")
@@ -117,7 +139,9 @@ impl DerivativeRobot {
 impl DerivativeState {
     /// The inputs of a function.
     pub fn inputs(&self, function: Function) -> Vec<Vec<f64>> {
-        data_of(function).inputs.iter().map(|name| inputs(&self.data[*name])).collect()
+        let DataOf { inputs: names, group, .. } = data_of(function);
+        let of = |name: &&str| self.data.get(*name).unwrap_or_else(|| &self.data[*group][*name]);
+        names.iter().map(|name| inputs(of(name))).collect()
     }
 
     /// Its blocks, each with the results of a function that belong to it.

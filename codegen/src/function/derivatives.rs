@@ -1,10 +1,11 @@
-//! Derivatives of inverse dynamics.
+//! Derivatives of inverse dynamics: matrices, and products with directions and multipliers.
 
 use super::spec::Extent::Velocities;
 use super::spec::{Family, Form, Judged, Output, RobotFunction, Spec};
 use super::{Forms, Quantity};
 use straightline_core::algorithms::{self as alg, DerivativeBlocks};
 use straightline_core::model::Model;
+use straightline_core::reverse::{Recorded, Recording};
 use straightline_core::{Dual, Real};
 
 const SQUARE: &[super::Extent] = &[Velocities, Velocities];
@@ -40,7 +41,137 @@ impl RobotFunction for InverseDynamicsDerivatives {
     }
 }
 
+pub struct InverseDynamicsJvp;
+
+impl RobotFunction for InverseDynamicsJvp {
+    const SPEC: Spec = Spec {
+        name: "inverse_dynamics_jvp",
+        summary: "The derivative of inverse dynamics along a direction: ∂τ/∂q u + ∂τ/∂q̇ w + H a.",
+        aliases: &["JVP", "directional derivative", "tangent"],
+        inputs: &[
+            Quantity::Configuration,
+            Quantity::Velocity,
+            Quantity::Acceleration,
+            Quantity::ConfigurationDirection,
+            Quantity::VelocityDirection,
+            Quantity::AccelerationDirection,
+        ],
+        outputs: &[Output::new("jvp", &[Velocities], "how fast generalized forces change \\[N·m or N\\]")],
+        family: Family::Derivatives,
+        form: Form::InverseDynamics,
+        substituted_up_to: 9000,
+        judged: Judged::ByDerivatives,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let motion = moving(forms.model, inputs);
+        forms.over(Dual::fixed, |forms| {
+            let forces = forms.inverse_dynamics(&motion[0], &motion[1], &motion[2]);
+            forces.into_iter().map(|force| force.derivatives[0]).collect()
+        })
+    }
+}
+
+pub struct InverseDynamicsVjp;
+
+impl RobotFunction for InverseDynamicsVjp {
+    const SPEC: Spec = Spec {
+        name: "inverse_dynamics_vjp",
+        summary: "Multipliers times the derivatives of inverse dynamics: (∂τ/∂q)ᵀ λ, (∂τ/∂q̇)ᵀ λ and H λ.",
+        aliases: &["VJP", "adjoint", "gradient of torques", "backpropagation"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration, Quantity::Multiplier],
+        outputs: &[
+            Output::new(
+                "vjp_q",
+                &[Velocities],
+                "(∂τ/∂q)ᵀ λ; of a floating base by increments of its pose in its own axes",
+            ),
+            Output::new("vjp_qd", &[Velocities], "(∂τ/∂q̇)ᵀ λ"),
+            Output::new("vjp_qdd", &[Velocities], "H λ"),
+        ],
+        family: Family::Derivatives,
+        form: Form::InverseDynamics,
+        substituted_up_to: 9000,
+        judged: Judged::ByDerivatives,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        weighed_slopes(forms, [0, 1, 2].map(|k| &inputs[k][..]), &inputs[3])
+    }
+}
+
+pub struct InverseDynamicsHvp;
+
+impl RobotFunction for InverseDynamicsHvp {
+    const SPEC: Spec = Spec {
+        name: "inverse_dynamics_hvp",
+        summary: "How multipliers times the derivatives of inverse dynamics change along a direction: the Hessian of λ·τ times it.",
+        aliases: &["HVP", "Hessian-vector product", "second-order derivatives"],
+        inputs: &[
+            Quantity::Configuration,
+            Quantity::Velocity,
+            Quantity::Acceleration,
+            Quantity::ConfigurationDirection,
+            Quantity::VelocityDirection,
+            Quantity::AccelerationDirection,
+            Quantity::Multiplier,
+        ],
+        outputs: &[
+            Output::new(
+                "hvp_q",
+                &[Velocities],
+                "of (∂τ/∂q)ᵀ λ; of a floating base of its components along body-fixed directions, which turn with it",
+            ),
+            Output::new("hvp_qd", &[Velocities], "of (∂τ/∂q̇)ᵀ λ"),
+            Output::new("hvp_qdd", &[Velocities], "of H λ"),
+        ],
+        family: Family::Derivatives,
+        form: Form::InverseDynamics,
+        substituted_up_to: 9000,
+        judged: Judged::ByDerivatives,
+        ..Spec::DEFAULT
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let motion = moving(forms.model, inputs);
+        let multiplier: Vec<Dual<T, 1>> = inputs[6].iter().map(|x| Dual::fixed(*x)).collect();
+        let motion = motion.each_ref().map(|x| &x[..]);
+        let slopes = forms.over(Dual::fixed, |forms| weighed_slopes(forms, motion, &multiplier));
+        slopes.into_iter().map(|slope| slope.derivatives[0]).collect()
+    }
+}
+
+/// q, q̇ and q̈ as they move along a direction, which stands behind them in the inputs.
+fn moving<T: Real>(model: &Model<T>, inputs: &[Vec<T>]) -> [Vec<Dual<T, 1>>; 3] {
+    let rates = configuration_rates(model, &inputs[0], &inputs[3]);
+    let along = |x: &[T], rate: &[T]| -> Vec<Dual<T, 1>> {
+        x.iter().zip(rate).map(|(x, rate)| Dual { value: *x, derivatives: [*rate] }).collect()
+    };
+    [along(&inputs[0], &rates), along(&inputs[1], &inputs[4]), along(&inputs[2], &inputs[5])]
+}
+
+/// (∂τ/∂q)ᵀ λ, (∂τ/∂q̇)ᵀ λ and H λ, backwards through the equations.
+fn weighed_slopes<T: Real>(forms: &Forms<'_, T>, motion: [&[T]; 3], multiplier: &[T]) -> Vec<T> {
+    let recording = Recording::new();
+    let [q, qd, qdd] = motion.map(|x| x.iter().map(|x| recording.variable(*x)).collect::<Vec<_>>());
+    let forces = forms.over(Recorded::fixed, |forms| forms.inverse_dynamics(&q, &qd, &qdd));
+    let weighed: Vec<_> = forces.into_iter().zip(multiplier.iter().copied()).collect();
+    let slopes = recording.gradient(&weighed);
+    let [by_q, by_qd, by_qdd] = [q, qd, qdd].map(|x| x.into_iter().map(|x| slopes.by(x)).collect::<Vec<T>>());
+    [along_tangent(forms.model, motion[0], &by_q), by_qd, by_qdd].concat()
+}
+
 impl<T: Real> Forms<'_, T> {
+    /// The same robot over another scalar, without frames and limbs in lanes.
+    fn over<U: Real, R>(&self, f: impl Fn(T) -> U + Copy, run: impl FnOnce(&Forms<'_, U>) -> R) -> R {
+        let model = self.model.map(f);
+        let reduced = self.reduced.map(|forms| forms.map(|form| form.map(f)));
+        let reduced = reduced.as_ref().map(|[torques, composite]| [torques, composite]);
+        run(&Forms { model: &model, reduced, frames: &[], method: self.method, limbs: None })
+    }
+
     /// τ = H q̈ + h and its derivatives.
     pub fn inverse_dynamics_derivatives(&self, motion: [&[T]; 3]) -> DerivativeBlocks<T> {
         let Some([torques, _]) = self.reduced else { return by_directions(self.model, motion) };
@@ -88,7 +219,26 @@ fn by_directions<T: Real>(model: &Model<T>, [q, qd, qdd]: [&[T]; 3]) -> Derivati
     DerivativeBlocks { dtau_dq, dtau_dqd, mass_matrix, tau }
 }
 
-/// The configuration as it moves with velocity coordinate `k` alone: joints with quaternions along their tangent.
+/// dq/dt at these velocities: joints with quaternions along their tangent.
+fn configuration_rates<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
+    let mut rates = vec![T::zero(); q.len()];
+    for joint in model.bodies.iter().map(|body| &body.joint) {
+        let own = &mut rates[joint.iq..joint.iq + joint.kind.nq()];
+        joint.kind.configuration_rate(joint.coordinates(q), joint.rates(qd), own);
+    }
+    rates
+}
+
+/// Derivatives by q as those by increments along the tangent.
+fn along_tangent<T: Real>(model: &Model<T>, q: &[T], by_q: &[T]) -> Vec<T> {
+    let column = |k: usize| {
+        let rates = along(model, q, k).into_iter().map(|x| x.derivatives[0]);
+        rates.zip(by_q).fold(T::zero(), |sum, (rate, slope)| sum + rate * *slope)
+    };
+    (0..model.nv()).map(column).collect()
+}
+
+/// The configuration as it moves with velocity coordinate `k` alone.
 fn along<T: Real>(model: &Model<T>, q: &[T], k: usize) -> Vec<Dual<T, 1>> {
     let mut moving: Vec<Dual<T, 1>> = q.iter().map(|x| Dual::fixed(*x)).collect();
     for joint in model.bodies.iter().map(|body| &body.joint) {

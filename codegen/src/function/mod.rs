@@ -122,6 +122,15 @@ functions! {
     /// Inverse dynamics with its derivatives.
     #[doc(alias("RNEA derivatives", "linearisation"))]
     derivatives::InverseDynamicsDerivatives,
+    /// Its derivative along a direction.
+    #[doc(alias("JVP", "forward mode"))]
+    derivatives::InverseDynamicsJvp,
+    /// Multipliers times its derivatives.
+    #[doc(alias("VJP", "reverse mode", "adjoint"))]
+    derivatives::InverseDynamicsVjp,
+    /// How multipliers times its derivatives change along a direction.
+    #[doc(alias("HVP", "Hessian-vector product", "second order"))]
+    derivatives::InverseDynamicsHvp,
     /// Inputs of the drives to motion.
     drives::DrivenForwardDynamics,
     /// Motion to inputs of the drives.

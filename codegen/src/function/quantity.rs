@@ -23,33 +23,69 @@ pub enum Quantity {
     DriveInput,
     /// The acceleration due to gravity, where a scene makes it an input.
     Gravity,
+    /// A direction in which q moves, of its tangent.
+    ConfigurationDirection,
+    /// A direction of q̇.
+    VelocityDirection,
+    /// A direction of q̈.
+    AccelerationDirection,
+    /// Multipliers of generalized forces.
+    Multiplier,
     /// The third or a further derivative of q.
     HigherRate(usize),
 }
 
 use Quantity::*;
 
-/// Name, extent, documentation.
-const TABLE: &[(Quantity, &str, Extent, &str)] = &[
-    (Configuration, "q", Extent::Positions, "configuration \\[rad or m\\]"),
-    (Velocity, "qd", Extent::Velocities, "velocities \\[rad/s or m/s\\]"),
-    (Acceleration, "qdd", Extent::Velocities, "accelerations \\[rad/s² or m/s²\\]"),
-    (Force, "tau", Extent::Velocities, "generalized forces \\[N·m or N\\]"),
-    (
+/// What is known of a quantity.
+struct QuantityRow {
+    of: Quantity,
+    /// Its name in generated code.
+    name: &'static str,
+    /// What its entries belong to.
+    extent: Extent,
+    /// What it is, with its unit.
+    doc: &'static str,
+    /// Within what it is taken to stay where nobody says: of bounds of errors alone.
+    bound: Option<f64>,
+}
+
+const fn row(of: Quantity, name: &'static str, extent: Extent, bound: Option<f64>, doc: &'static str) -> QuantityRow {
+    QuantityRow { of, name, extent, doc, bound }
+}
+
+const TABLE: &[QuantityRow] = &[
+    row(Configuration, "q", Extent::Positions, None, "configuration \\[rad or m\\]"),
+    row(Velocity, "qd", Extent::Velocities, Some(10.0), "velocities \\[rad/s or m/s\\]"),
+    row(Acceleration, "qdd", Extent::Velocities, Some(100.0), "accelerations \\[rad/s² or m/s²\\]"),
+    row(Force, "tau", Extent::Velocities, Some(1000.0), "generalized forces \\[N·m or N\\]"),
+    row(
         DriveState,
         "x",
         Extent::DriveStates,
+        None,
         "state of the drives, [`DRIVE_STATES`] of each: θ \\[rad\\], θ̇ \\[rad/s\\] and current \\[A\\] of a motor (without \
          inductance no current; θ and θ̇ are read behind elastic transmissions only), a linear actuator's own; then angle \
          and speed of shafts between elastic stages",
     ),
-    (
+    row(
         DriveInput,
         "u",
         Extent::Drives,
+        None,
         "inputs of the drives, in the order of [`DRIVE_NAMES`] \\[V, or as in the robot file\\]",
     ),
-    (Gravity, "gravity", Extent::Of(3), "acceleration due to gravity in the world \\[m/s²\\]"),
+    row(
+        ConfigurationDirection,
+        "direction_q",
+        Extent::Velocities,
+        Some(1.0),
+        "direction of q, along its tangent \\[rad or m\\]",
+    ),
+    row(VelocityDirection, "direction_qd", Extent::Velocities, Some(1.0), "direction of q̇ \\[rad/s or m/s\\]"),
+    row(AccelerationDirection, "direction_qdd", Extent::Velocities, Some(1.0), "direction of q̈ \\[rad/s² or m/s²\\]"),
+    row(Multiplier, "multiplier", Extent::Velocities, Some(1.0), "λ: multipliers of the generalized forces"),
+    row(Gravity, "gravity", Extent::Of(3), Some(10.0), "acceleration due to gravity in the world \\[m/s²\\]"),
 ];
 
 impl Quantity {
@@ -60,7 +96,12 @@ impl Quantity {
             let rate = HigherRate(order);
             (name == rate.name() && (3..=MOST_DERIVATIVES + 2).contains(&order)).then_some(rate)
         };
-        TABLE.iter().find(|row| row.1 == name).map(|row| row.0).or_else(rate)
+        TABLE.iter().find(|row| row.name == name).map(|row| row.of).or_else(rate)
+    }
+
+    /// Those that have an entry per velocity coordinate, but for higher rates.
+    pub fn of_velocities() -> impl Iterator<Item = Quantity> {
+        TABLE.iter().filter(|row| row.extent == Extent::Velocities).map(|row| row.of)
     }
 
     /// That of an input.
@@ -68,15 +109,15 @@ impl Quantity {
         Quantity::named(&port.name)
     }
 
-    fn row(self) -> Option<&'static (Quantity, &'static str, Extent, &'static str)> {
-        TABLE.iter().find(|row| row.0 == self)
+    fn row(self) -> Option<&'static QuantityRow> {
+        TABLE.iter().find(|row| row.of == self)
     }
 
     /// Its name in generated code: `q`, `qd`, …, `q3` of the third derivative.
     pub fn name(self) -> String {
         match self {
             HigherRate(order) => format!("q{order}"),
-            _ => self.row().expect("the table has every other quantity").1.to_string(),
+            _ => self.row().expect("the table has every other quantity").name.to_string(),
         }
     }
 
@@ -84,7 +125,7 @@ impl Quantity {
     pub fn doc(self) -> String {
         const WORDS: [&str; 7] = ["third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth"];
         let HigherRate(order) = self else {
-            return self.row().expect("the table has every other quantity").3.to_string();
+            return self.row().expect("the table has every other quantity").doc.to_string();
         };
         let word = WORDS.get(order - 3).map_or_else(|| format!("{order}th"), |word| word.to_string());
         let digit =
@@ -95,7 +136,12 @@ impl Quantity {
 
     /// What its entries belong to.
     pub fn extent(self) -> Extent {
-        self.row().map_or(Extent::Velocities, |row| row.2)
+        self.row().map_or(Extent::Velocities, |row| row.extent)
+    }
+
+    /// Within what bounds of errors take it to stay where neither a scene nor the robot file says; none: they have to.
+    pub fn default_bound(self) -> Option<f64> {
+        self.row().and_then(|row| row.bound)
     }
 
     /// How many scalars it has.
@@ -125,7 +171,7 @@ mod tests {
 
     #[test]
     fn every_quantity_is_found_by_its_name() {
-        for quantity in TABLE.iter().map(|row| row.0).chain([HigherRate(3), HigherRate(MOST_DERIVATIVES + 2)]) {
+        for quantity in TABLE.iter().map(|row| row.of).chain([HigherRate(3), HigherRate(MOST_DERIVATIVES + 2)]) {
             assert_eq!(Quantity::named(&quantity.name()), Some(quantity));
         }
         for name in ["q2", "q03", "q", "payload", "", &format!("q{}", MOST_DERIVATIVES + 3)] {

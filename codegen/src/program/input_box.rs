@@ -7,18 +7,7 @@ use straightline_core::model::Model;
 use straightline_graph::certify::{Interval, NoCertificate};
 use straightline_graph::expr::Port;
 
-/// Where neither the scene nor the robot file limits an input: speeds within 10 rad/s or m/s, accelerations within 100 rad/s² or m/s², forces
-/// within 1000 N·m or N, gravity within 10 m/s² per component.
-fn default_bound(quantity: Quantity) -> Option<f64> {
-    match quantity {
-        Quantity::Velocity | Quantity::Gravity => Some(10.0),
-        Quantity::Acceleration => Some(100.0),
-        Quantity::Force => Some(1000.0),
-        _ => None,
-    }
-}
-
-/// The same of coordinates: angles within π, slides and positions within 10 m.
+/// Where neither the scene nor the robot file limits a coordinate: angles within π, slides and positions within 10 m.
 fn default_range(measure: Measure) -> f64 {
     match measure {
         Measure::Angle => std::f64::consts::PI,
@@ -42,7 +31,7 @@ pub fn input_box<T>(inputs: &[Port], scene: &Scene, model: &Model<T>) -> Result<
                 own.for_each(|(r, measure)| limit(r, default_range(measure)));
             }
         } else {
-            let bound = default_bound(quantity).ok_or(NoCertificate::Unlimited)?;
+            let bound = quantity.default_bound().ok_or(NoCertificate::Unlimited)?;
             ranges.iter_mut().for_each(|r| limit(r, bound));
         }
         all.extend(ranges.into_iter().map(|r| Interval { lo: r.lower, hi: r.upper }));

@@ -137,7 +137,8 @@ fn optimised_with(
     let same_method = choice.map_or(options.forward_dynamics, |choice| choice.method());
     let same_method = Options { forward_dynamics: same_method, ..options.clone() };
     let of_bodies = Optimisations { reduced: false, ..optimisations };
-    if function.spec().family == Family::Robot && function.spec().form != Form::Plain {
+    let has_bodies_form = matches!(function.spec().family, Family::Robot | Family::Derivatives);
+    if has_bodies_form && !matches!(function.spec().form, Form::Plain | Form::Derivatives) {
         let (counts, ..) = candidate(robot, frames, function, &same_method, of_bodies);
         if price(counts) < price(graph.counts()) {
             return (finished(robot, &same_method, of_bodies).0, choice);

@@ -31,7 +31,7 @@ pub mod reference_input;
 mod whole;
 
 pub use reading::SecondReading;
-use reading::{second_reading, MOTION};
+use reading::{motion, second_reading};
 use whole::Coordinates;
 
 /// Worst error of a function.
@@ -176,7 +176,7 @@ impl<'a> Case<'a> {
         let (mut model, mut tree) = (self.model.clone(), self.tree.clone());
         let mut inputs = InputState::new();
         let gravity = (scene.gravity == Gravity::Input).then_some(Quantity::Gravity);
-        for port in MOTION.into_iter().chain(gravity).map(|quantity| quantity.port(&model)) {
+        for port in motion().chain(gravity).map(|quantity| quantity.port(&model)) {
             let values = of_port(&model, &port, fast, random);
             inputs.insert(port.name, values);
         }

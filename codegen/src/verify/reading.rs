@@ -13,8 +13,9 @@ use straightline_core::reference::CentreOfMassTree;
 use straightline_core::Dd;
 
 /// What says how a robot moves, and by what.
-pub(super) const MOTION: [Quantity; 4] =
-    [Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration, Quantity::Force];
+pub(super) fn motion() -> impl Iterator<Item = Quantity> {
+    [Quantity::Configuration].into_iter().chain(Quantity::of_velocities())
+}
 
 /// The robot in the reference's terms, its coordinates numbered as the model's, and what joints add to it.
 pub(super) fn second_reading(
@@ -131,7 +132,7 @@ impl SecondReading {
         frames: &[String],
         at: [&[Dd]; 4],
     ) -> Result<(Vec<Dd>, Vec<f64>), String> {
-        let state = MOTION.into_iter().zip(at.map(<[Dd]>::to_vec)).collect();
+        let state = motion().zip(at.map(<[Dd]>::to_vec)).collect();
         let chapter = Chapter::new(&self.tree, &self.effects, state).with_frames(frames)?;
         let results = function.truth(&chapter).ok_or("the reference has no formulation of it")?;
         let scales = function.scales(&results);

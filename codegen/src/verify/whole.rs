@@ -4,7 +4,7 @@
 //! with constant values and without rates, payloads are lumped into links by Steiner's theorem, and of the whole robot's
 //! results those of the scene are picked.
 
-use super::reading::MOTION;
+use super::reading::motion;
 use crate::equations::Robot;
 use crate::function::truth::Effect;
 use crate::function::{Extent, Family, Function, Quantity, Spec};
@@ -73,7 +73,7 @@ impl Coordinates {
     /// The whole robot's state.
     pub fn expand(&self, state: &InputState<f64>) -> BTreeMap<Quantity, Vec<Dd>> {
         let mut whole = BTreeMap::new();
-        for quantity in MOTION {
+        for quantity in motion() {
             let (mut all, places) = match quantity {
                 Quantity::Configuration => (self.held.clone(), &self.q),
                 _ => (vec![0.0; self.nv], &self.v),

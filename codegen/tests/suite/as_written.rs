@@ -96,15 +96,19 @@ pub enum Outcome {
     Judged(Vec<Failure>, usize),
 }
 
-/// A state: q, q̇, q̈, τ. Numbers that f32 holds, so that all formats are asked the same; a quaternion is of length one.
-pub struct State([Vec<Dd>; 4]);
+/// What functions of robots without drives take.
+const INPUTS: [&str; 8] = ["q", "qd", "qdd", "tau", "direction_q", "direction_qd", "direction_qdd", "multiplier"];
+
+/// A state: the numbers of each of the inputs. Numbers that f32 holds, so that all formats are asked the same; a quaternion
+/// is of length one.
+pub struct State([Vec<Dd>; INPUTS.len()]);
 
 impl State {
     /// Small or any angles, slow or fast.
     pub fn new(model: &Model<Dd>, random: &mut Random, kind: usize) -> State {
         let nv = model.nv();
         let (near, fast) = (kind & 1 == 0, kind & 2 != 0);
-        let mut state: [Vec<f64>; 4] = [vec![0.0; model.nq()], vec![0.0; nv], vec![0.0; nv], vec![0.0; nv]];
+        let mut state = INPUTS.map(|name| vec![0.0; if name == "q" { model.nq() } else { nv }]);
         let mut quaternion = None;
         for joint in model.bodies.iter().map(|b| &b.joint) {
             match joint.kind {
@@ -123,6 +127,7 @@ impl State {
                 of_kind[joint.iv..joint.iv + joint.kind.nv()].fill_with(|| random.between(-size, size));
             }
         }
+        state[4..].iter_mut().flatten().for_each(|x| *x = random.between(-1.0, 1.0));
         if kind == 4 {
             // at rest in the zero configuration, as robots are first tried
             state[0].iter_mut().for_each(|x| *x = 0.0);
@@ -143,7 +148,7 @@ impl State {
 
     /// The numbers of an input.
     pub fn group(&self, name: &str) -> &[Dd] {
-        let k = ["q", "qd", "qdd", "tau"].iter().position(|n| *n == name);
+        let k = INPUTS.iter().position(|n| *n == name);
         &self.0[k.expect("functions of robots without drives have no other inputs")]
     }
 

@@ -26,8 +26,8 @@ fn state(tree: &CentreOfMassTree<Dd>, random: &mut Random) -> BTreeMap<Quantity,
     for link in tree.links.iter().filter(|link| link.joint == ReferenceJoint::Free) {
         q[link.iq + 3..link.iq + 7].copy_from_slice(&[0.6, 0.0, 0.0, 0.8].map(Dd::from));
     }
-    let rates = [Quantity::Velocity, Quantity::Acceleration, Quantity::Force];
-    rates.map(|rate| (rate, any(tree.nv()))).into_iter().chain([(Quantity::Configuration, q)]).collect()
+    let rates = Quantity::of_velocities().map(|rate| (rate, any(tree.nv()))).collect::<Vec<_>>();
+    rates.into_iter().chain([(Quantity::Configuration, q)]).collect()
 }
 
 #[test]

@@ -50,6 +50,30 @@ fn count(of: &CountsOf) -> usize {
     counts.flops()
 }
 
+/// Products beside inverse dynamics: along a direction, backwards, and of second order.
+#[test]
+fn products_take_two_and_a_half_times_inverse_dynamics_and_those_of_second_order_six_times() {
+    let robots = [("ur5", false), ("puma560", false), ("panda", false), ("solo12", true), ("hyq", true)];
+    for (name, floating_base) in robots {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../robots/descriptions/{name}.urdf"));
+        let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        let model = ModelOptions { floating_base, ..ModelOptions::default() };
+        let robot = programs::load(&Source::new(name, text), &model);
+        let options = Options { model, ..Options::default() };
+        let flops = |function| program(&robot, &[], function, &options).graph.counts().flops() as f64;
+        let whole = flops(Function::InverseDynamics);
+        for (function, most) in [
+            (Function::InverseDynamicsJvp, 2.6),
+            (Function::InverseDynamicsVjp, 2.6),
+            (Function::InverseDynamicsHvp, 6.5),
+        ] {
+            let times = flops(function) / whole;
+            println!("{name:<16} {:<24} {times:5.2} times", function.name());
+            assert!(times <= most, "{} of {name}: {times} times, {most} at most", function.name());
+        }
+    }
+}
+
 fn hold(robots: &[CountsOf]) {
     for of in robots {
         let found = count(of);

@@ -13,6 +13,8 @@ use straightline_generated_tests::programs::{self, cast};
 /// Of the greatest entry of a block, in f64 and in f32; or what Pinocchio loses, if that is more.
 const BOUND: f64 = 1e-15;
 const BOUND_F32: f64 = 1e-6;
+/// The same of second derivatives in f32, which take six times the operations.
+const BOUND_F32_SECOND: f64 = 4e-6;
 
 fn results<T: Real>(robot: &DerivativeRobot, function: Function, options: &Options, state: &DerivativeState) -> Vec<T> {
     // one program for all states with a gravity of their own
@@ -93,7 +95,8 @@ fn derivatives_in_f32_keep_six_digits() {
                 for ((mut block, found), (_, exact)) in state.blocks(function, &found).into_iter().zip(exact) {
                     block.values = exact.to_vec();
                     let error = block.error(found);
-                    assert!(error <= BOUND_F32, "{} {} in {}: {error:e}", robot.name, block.name, state.id);
+                    let most = if block.name.starts_with("hvp") { BOUND_F32_SECOND } else { BOUND_F32 };
+                    assert!(error <= most, "{} {} in {}: {error:e}", robot.name, block.name, state.id);
                 }
             }
         }

@@ -57,6 +57,9 @@ operators! { [T: Real, const N: usize] Dual<T, N>:
     Neg neg |a| Dual { value: -a.value, derivatives: a.derivatives.map(|d| -d) };
 }
 
+/// Of so many angles at most a sum is formed by the scalar of the values.
+const MOST_ANGLES: usize = 32;
+
 impl<T: Real, const N: usize> Real for Dual<T, N> {
     fn constant(value: Dd) -> Self {
         Dual::fixed(T::constant(value))
@@ -65,6 +68,20 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
     fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = self.value.sin_cos();
         (self.chain(sin, cos), self.chain(cos, -sin))
+    }
+
+    /// Of the values as their scalar has it: one that writes equations down has an operation for it. Of more than 32 angles step by step.
+    fn sin_cos_of_sum(angles: &[Self]) -> (Self, Self) {
+        let mut values = [T::zero(); MOST_ANGLES];
+        let Some(values) = values.get_mut(..angles.len()) else {
+            return Self::sin_cos_of_pair(Self::sum_of_angles(angles));
+        };
+        values.iter_mut().zip(angles).for_each(|(value, angle)| *value = angle.value);
+        let (sin, cos) = T::sin_cos_of_sum(values);
+        // for its derivatives
+        let angle =
+            angles.iter().skip(1).fold(angles[0], |sum, angle| Dual { derivatives: (sum + *angle).derivatives, ..sum });
+        (angle.chain(sin, cos), angle.chain(cos, -sin))
     }
 
     fn sin_cos_of_pair([sum, tail]: [Self; 2]) -> (Self, Self) {

@@ -34,6 +34,8 @@ pub mod real;
 pub mod reduced;
 #[cfg(feature = "reference")]
 pub mod reference;
+#[cfg(feature = "alloc")]
+pub mod reverse;
 pub mod short_sines;
 pub mod sources;
 pub mod spatial;

@@ -1,21 +1,25 @@
 //! Derivatives of inverse dynamics, by the second author in dual numbers.
 
-use super::super::derivatives::InverseDynamicsDerivatives;
+use super::super::derivatives::{
+    InverseDynamicsDerivatives, InverseDynamicsHvp, InverseDynamicsJvp, InverseDynamicsVjp,
+};
 use super::super::dynamics::{InverseDynamics, MassMatrix};
+use super::super::Quantity;
 use super::{Chapter, Truth};
 use straightline_core::magnitude::Magnitude;
-use straightline_core::reference::{self, ReferenceJoint};
+use straightline_core::reference::{self, CentreOfMassTree, ReferenceJoint, ReferenceReal};
 use straightline_core::{Dd, Dual, Real};
 
-type Moving = Dual<Magnitude, 1>;
+/// A direction in which q, q̇ and q̈ move: of q along its tangent.
+type Direction<T> = [Vec<T>; 3];
 
 impl Truth for InverseDynamicsDerivatives {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         let nv = at.qd().len();
-        let columns: [Vec<Vec<Magnitude>>; 2] = [
-            (0..nv).map(|k| column(at, &along(at, k), &fixed(at.qd()))).collect(),
-            (0..nv).map(|k| column(at, &fixed(at.q()), &unit(at.qd(), k))).collect(),
-        ];
+        let columns = [0, 1].map(|block| {
+            let column = |k: usize| slopes(at, &at.tree, motion(at), &unit(nv, block, k));
+            (0..nv).map(column).collect::<Vec<_>>()
+        });
         let rows = columns.into_iter().flat_map(|columns| {
             let rows = (0..nv).flat_map(|i| columns.iter().map(|column| column[i]).collect::<Vec<_>>());
             rows.collect::<Vec<_>>()
@@ -25,54 +29,110 @@ impl Truth for InverseDynamicsDerivatives {
     }
 }
 
-fn fixed(x: &[Magnitude]) -> Vec<Moving> {
-    x.iter().map(|x| Dual::fixed(*x)).collect()
+impl Truth for InverseDynamicsJvp {
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        Some(slopes(at, &at.tree, motion(at), &direction(at)))
+    }
 }
 
-fn unit(x: &[Magnitude], k: usize) -> Vec<Moving> {
-    let mut moving = fixed(x);
-    moving[k] = Dual::variable(x[k], 0);
-    moving
+impl Truth for InverseDynamicsVjp {
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        Some(weighed_slopes(at, &at.tree, motion(at), at.get(Quantity::Multiplier)))
+    }
 }
 
-/// How forces change along a direction of q and q̇.
-fn column(at: &Chapter<'_>, q: &[Moving], qd: &[Moving]) -> Vec<Magnitude> {
-    let tree = at.tree.map(Dual::fixed);
-    let mut forces = reference::inverse_dynamics(&tree, q, qd, &fixed(at.qdd()));
+impl Truth for InverseDynamicsHvp {
+    /// The gradient at a state that moves along the direction.
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        let tree = at.tree.map(Dual::<Magnitude, 1>::fixed);
+        let moving = moving(&at.tree, motion(at), &direction(at));
+        let multiplier: Vec<_> = at.get(Quantity::Multiplier).iter().map(|x| Dual::fixed(*x)).collect();
+        let slopes = weighed_slopes(at, &tree, moving.each_ref().map(|x| &x[..]), &multiplier);
+        Some(slopes.into_iter().map(|slope| slope.derivatives[0]).collect())
+    }
+}
+
+fn motion<'a>(at: &'a Chapter<'_>) -> [&'a [Magnitude]; 3] {
+    [at.q(), at.qd(), at.qdd()]
+}
+
+fn direction(at: &Chapter<'_>) -> Direction<Magnitude> {
+    [Quantity::ConfigurationDirection, Quantity::VelocityDirection, Quantity::AccelerationDirection]
+        .map(|quantity| at.get(quantity).to_vec())
+}
+
+/// Coordinate `k` of q, q̇ or q̈ alone.
+fn unit<T: Real>(nv: usize, block: usize, k: usize) -> Direction<T> {
+    let mut direction = [0; 3].map(|_| vec![T::zero(); nv]);
+    direction[block][k] = T::one();
+    direction
+}
+
+/// The derivatives of Σ λ τ by every coordinate of q, q̇ and q̈, one direction after the other.
+fn weighed_slopes<T: ReferenceReal>(
+    at: &Chapter<'_>,
+    tree: &CentreOfMassTree<T>,
+    motion: [&[T]; 3],
+    multiplier: &[T],
+) -> Vec<T> {
+    let nv = motion[1].len();
+    let slope = |block: usize, k: usize| {
+        let column = slopes(at, tree, motion, &unit(nv, block, k));
+        column.into_iter().zip(multiplier).fold(<T as Real>::zero(), |sum, (slope, weight)| sum + slope * *weight)
+    };
+    (0..3).flat_map(|block| (0..nv).map(move |k| (block, k))).map(|(block, k)| slope(block, k)).collect()
+}
+
+/// How forces change along a direction.
+fn slopes<T: ReferenceReal>(
+    at: &Chapter<'_>,
+    tree: &CentreOfMassTree<T>,
+    motion: [&[T]; 3],
+    direction: &Direction<T>,
+) -> Vec<T> {
+    let [q, qd, qdd] = moving(tree, motion, direction);
+    let mut forces = reference::inverse_dynamics(&tree.map(Dual::fixed), &q, &qd, &qdd);
     for effect in at.effects {
         forces[effect.iv] += effect.passive(q[effect.iq], qd[effect.iv]);
+        forces[effect.iv] += Dual::constant(effect.inertia) * qdd[effect.iv];
     }
     forces.iter().map(|force| force.derivatives[0]).collect()
 }
 
-/// The configuration as it moves with velocity coordinate `k` alone. A free link's position p moves by R v, its attitude by ½ (u, w) (ω, 0).
-fn along(at: &Chapter<'_>, k: usize) -> Vec<Moving> {
-    let mut q = fixed(at.q());
-    let (zero, half) = (Magnitude::zero(), Magnitude::constant(Dd::HALF));
-    for link in &at.tree.links {
+/// A motion as it moves along a direction.
+fn moving<T: ReferenceReal>(
+    tree: &CentreOfMassTree<T>,
+    motion: [&[T]; 3],
+    direction: &Direction<T>,
+) -> [Vec<Dual<T, 1>>; 3] {
+    let rates = configuration_rates(tree, motion[0], &direction[0]);
+    let along =
+        |x: &[T], rates: &[T]| x.iter().zip(rates).map(|(x, rate)| Dual { value: *x, derivatives: [*rate] }).collect();
+    [along(motion[0], &rates), along(motion[1], &direction[1]), along(motion[2], &direction[2])]
+}
+
+/// dq/dt at these velocities. The position of a free link moves by R v, its attitude by ½ (u, w) (ω, 0).
+fn configuration_rates<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> Vec<T> {
+    let mut rates = vec![<T as Real>::zero(); q.len()];
+    let half = T::constant(Dd::HALF);
+    for link in &tree.links {
         if link.joint != ReferenceJoint::Free {
-            if link.iv == k {
-                q[link.iq] = Dual::variable(at.q()[link.iq], 0);
-            }
+            rates[link.iq] = qd[link.iv];
             continue;
         }
-        let Some(direction) = k.checked_sub(link.iv).filter(|direction| *direction < 6) else { continue };
-        let [x, y, z, w] = [3, 4, 5, 6].map(|k| at.q()[link.iq + k]);
-        let rates = match direction {
-            // columns of the rotation
-            0 => [Magnitude::one() - (y * y + z * z) / half, (x * y + z * w) / half, (x * z - y * w) / half],
-            1 => [(x * y - z * w) / half, Magnitude::one() - (x * x + z * z) / half, (y * z + x * w) / half],
-            2 => [(x * z + y * w) / half, (y * z - x * w) / half, Magnitude::one() - (x * x + y * y) / half],
-            _ => [zero; 3],
-        };
-        let turning = match direction {
-            3 => [w, z, -y, -x],
-            4 => [-z, w, x, -y],
-            5 => [y, -x, w, -z],
-            _ => [zero; 4],
-        };
-        let all = rates.into_iter().chain(turning.map(|x| x * half));
-        all.enumerate().for_each(|(i, rate)| q[link.iq + i].derivatives[0] = rate);
+        let [x, y, z, w] = [3, 4, 5, 6].map(|k| q[link.iq + k]);
+        let [vx, vy, vz, ox, oy, oz] = [0, 1, 2, 3, 4, 5].map(|k| qd[link.iv + k]);
+        let one = <T as Real>::one();
+        let own = [
+            (one - (y * y + z * z) / half) * vx + (x * y - z * w) / half * vy + (x * z + y * w) / half * vz,
+            (x * y + z * w) / half * vx + (one - (x * x + z * z) / half) * vy + (y * z - x * w) / half * vz,
+            (x * z - y * w) / half * vx + (y * z + x * w) / half * vy + (one - (x * x + y * y) / half) * vz,
+            (w * ox + y * oz - z * oy) * half,
+            (w * oy + z * ox - x * oz) * half,
+            (w * oz + x * oy - y * ox) * half,
+            -(x * ox + y * oy + z * oz) * half,
+        ];
+        rates[link.iq..link.iq + 7].copy_from_slice(&own);
     }
-    q
+    rates
 }

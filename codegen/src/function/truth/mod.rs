@@ -60,11 +60,11 @@ pub struct Chapter<'a> {
 }
 
 impl<'a> Chapter<'a> {
-    /// A robot without frames and drives at this state; rates and forces that are not given are zero.
+    /// A robot without frames and drives at this state; what is not given of rates, forces and directions is zero.
     pub fn new(tree: &CentreOfMassTree<Dd>, effects: &'a [Effect], state: BTreeMap<Quantity, Vec<Dd>>) -> Chapter<'a> {
         let mut sized: BTreeMap<Quantity, Vec<Magnitude>> =
             state.into_iter().map(|(quantity, x)| (quantity, x.into_iter().map(Magnitude::new).collect())).collect();
-        for rate in [Quantity::Velocity, Quantity::Acceleration, Quantity::Force] {
+        for rate in Quantity::of_velocities() {
             sized.entry(rate).or_insert_with(|| vec![Magnitude::zero(); tree.nv()]);
         }
         let tree = with_sizes(tree);
