@@ -8,6 +8,7 @@ use crate::function::truth::{Chapter, Effect};
 use crate::function::{Function, Quantity};
 use crate::model::ModelOptions;
 use crate::options::Options;
+use std::collections::BTreeMap;
 use straightline_core::model::Model;
 use straightline_core::reference::CentreOfMassTree;
 use straightline_core::Dd;
@@ -122,7 +123,7 @@ impl SecondReading {
         Ok(SecondReading { tree, effects })
     }
 
-    /// The results of a function and their natural scales at (q, q̇, q̈, τ), of which every function takes what it needs.
+    /// The results of a function and their natural scales at a state; rates, forces and directions that are not given are zero.
     ///
     /// # Errors
     /// The reference has no frame of that name, or no formulation of the function.
@@ -130,9 +131,8 @@ impl SecondReading {
         &self,
         function: Function,
         frames: &[String],
-        at: [&[Dd]; 4],
+        state: BTreeMap<Quantity, Vec<Dd>>,
     ) -> Result<(Vec<Dd>, Vec<f64>), String> {
-        let state = motion().zip(at.map(<[Dd]>::to_vec)).collect();
         let chapter = Chapter::new(&self.tree, &self.effects, state).with_frames(frames)?;
         let results = function.truth(&chapter).ok_or("the reference has no formulation of it")?;
         let scales = function.scales(&results);

@@ -1,6 +1,7 @@
 //! The judge of robots as they are written: every function, in f64 and f32, beside its plain program.
 
 use super::written::{Shape, Style, Written};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::panic::{catch_unwind, AssertUnwindSafe};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -9,6 +10,7 @@ use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
 use straightline_codegen::function::Family;
+use straightline_codegen::function::Quantity::{self, Acceleration, Configuration, Force, Velocity};
 use straightline_codegen::model::singular::{singular_joints, Inertia};
 use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::options::{Optimisations, Options};
@@ -96,19 +98,16 @@ pub enum Outcome {
     Judged(Vec<Failure>, usize),
 }
 
-/// What functions of robots without drives take.
-const INPUTS: [&str; 8] = ["q", "qd", "qdd", "tau", "direction_q", "direction_qd", "direction_qdd", "multiplier"];
-
-/// A state: the numbers of each of the inputs. Numbers that f32 holds, so that all formats are asked the same; a quaternion
-/// is of length one.
-pub struct State([Vec<Dd>; INPUTS.len()]);
+/// A state: the numbers of what functions of robots without drives take. Numbers that f32 holds, so that all formats are
+/// asked the same; a quaternion is of length one.
+pub struct State(BTreeMap<Quantity, Vec<Dd>>);
 
 impl State {
     /// Small or any angles, slow or fast.
     pub fn new(model: &Model<Dd>, random: &mut Random, kind: usize) -> State {
         let nv = model.nv();
         let (near, fast) = (kind & 1 == 0, kind & 2 != 0);
-        let mut state = INPUTS.map(|name| vec![0.0; if name == "q" { model.nq() } else { nv }]);
+        let mut state: [Vec<f64>; 4] = [vec![0.0; model.nq()], vec![0.0; nv], vec![0.0; nv], vec![0.0; nv]];
         let mut quaternion = None;
         for joint in model.bodies.iter().map(|b| &b.joint) {
             match joint.kind {
@@ -127,7 +126,6 @@ impl State {
                 of_kind[joint.iv..joint.iv + joint.kind.nv()].fill_with(|| random.between(-size, size));
             }
         }
-        state[4..].iter_mut().flatten().for_each(|x| *x = random.between(-1.0, 1.0));
         if kind == 4 {
             // at rest in the zero configuration, as robots are first tried
             state[0].iter_mut().for_each(|x| *x = 0.0);
@@ -143,13 +141,20 @@ impl State {
             let norm = state[0][at..at + 4].iter().fold(Dd::ZERO, |sum, x| sum + *x * *x).sqrt();
             state[0][at..at + 4].iter_mut().for_each(|x| *x /= norm);
         }
-        State(state)
+        let [q, qd, qdd, tau] = state;
+        let mut named = BTreeMap::from([(Configuration, q), (Velocity, qd), (Acceleration, qdd), (Force, tau)]);
+        let mut own = Random(random.0);
+        for further in Quantity::of_velocities() {
+            let numbers = || (0..nv).map(|_| Dd::from(f64::from(own.between(-1.0, 1.0) as f32))).collect();
+            named.entry(further).or_insert_with(numbers);
+        }
+        State(named)
     }
 
     /// The numbers of an input.
     pub fn group(&self, name: &str) -> &[Dd] {
-        let k = INPUTS.iter().position(|n| *n == name);
-        &self.0[k.expect("functions of robots without drives have no other inputs")]
+        let quantity = Quantity::named(name).and_then(|quantity| self.0.get(&quantity));
+        quantity.expect("functions of robots without drives take no other quantities")
     }
 
     /// The inputs of a program.
@@ -199,7 +204,7 @@ pub fn by_steps(file: &File, scalar: Scalar, function: Function) -> String {
     let Ok(second) = SecondReading::new(&file.source, &model, &options) else { return String::new() };
     let mut random = Random(99);
     let states: Vec<State> = (0..6).map(|kind| State::new(&model, &mut random, kind)).collect();
-    let of_state = |s: &State| second.outputs(function, &file.frames, s.0.each_ref().map(|x| &x[..]));
+    let of_state = |s: &State| second.outputs(function, &file.frames, s.0.clone());
     let Ok(truths) = states.iter().map(of_state).collect::<Result<Vec<_>, _>>() else { return String::new() };
     let loaded = Robot::new(model);
     let mut steps = vec![("the equations as they are", Optimisations::default())];
@@ -264,7 +269,7 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
         }
         let truths: Vec<(Vec<Dd>, Vec<f64>)> = states
             .iter()
-            .map(|s| second.outputs(function, frames, s.0.each_ref().map(|x| &x[..])).expect("a reading has its tips"))
+            .map(|s| second.outputs(function, frames, s.0.clone()).expect("a reading has its tips"))
             .collect();
         for scalar in scalars {
             let options = Options { scalar, ..options.clone() };
@@ -290,7 +295,7 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
                 let at = worst.expect("there are states");
                 let (error, result) = errors[at];
                 if error > TIMES * plain.max(least) {
-                    let state = states[at].0.iter().map(|x| x.iter().map(|x| x.to_f64()).collect()).collect();
+                    let state = states[at].0.values().map(|x| x.iter().map(|x| x.to_f64()).collect()).collect();
                     failures.push(Failure { scalar, function, result, state, error, plain, of_equations });
                 }
             };

@@ -5,10 +5,12 @@
 //! `cargo test --release -p straightline-codegen --test suite certificates_of_robots:: -- --ignored --nocapture`
 
 use crate::written::{Random, Shape, Style, Written};
+use std::collections::BTreeMap;
 use straightline_codegen::certify::{certify_with, search, Effort, Interval};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::Graph;
+use straightline_codegen::function::Quantity;
 use straightline_codegen::model::singular::{singular_joints, Inertia};
 use straightline_codegen::options::Options;
 use straightline_codegen::program::input_box::input_box;
@@ -81,18 +83,15 @@ struct Case<'a> {
 impl Case<'_> {
     /// |computed − exact| of all results, less what the truth may lose; infinite where one is no number.
     fn errors(&self, inputs: &[f64]) -> Vec<f64> {
-        let zeros = |n: usize| vec![Dd::ZERO; n];
-        let (nq, nv) = (self.model.nq(), self.model.nv());
-        let mut state = [zeros(nq), zeros(nv), zeros(nv), zeros(nv)];
+        let mut state = BTreeMap::from([(Quantity::Configuration, vec![Dd::ZERO; self.model.nq()])]);
         let mut first = 0;
         for port in &self.graph.inputs {
-            let k = ["q", "qd", "qdd", "tau"].iter().position(|n| *n == port.name).expect("no other inputs");
             let of = &inputs[first..first + port.len()];
-            state[k] = of.iter().map(|x| Dd::from(*x)).collect();
+            let quantity = Quantity::of(port).expect("functions without contacts take quantities");
+            state.insert(quantity, of.iter().map(|x| Dd::from(*x)).collect());
             first += port.len();
         }
-        let at = state.each_ref().map(|x| &x[..]);
-        let (truth, scales) = self.second.outputs(self.function, &[], at).expect("no frames are asked for");
+        let (truth, scales) = self.second.outputs(self.function, &[], state).expect("no frames are asked for");
         let computed = search::computed_at(&self.graph, self.scalar, inputs);
         let errors = computed.iter().zip(&truth).map(|(c, t)| (Dd::from(*c) - *t).to_f64().abs());
         let of = |(error, scale): (f64, &f64)| match error.is_nan() {

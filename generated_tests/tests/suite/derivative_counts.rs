@@ -1,6 +1,7 @@
 //! Operations of ∂τ/∂q, ∂τ/∂q̇ and H in one call, beside what the best published way takes without H.
 
 use std::path::Path;
+use straightline_codegen::diagnostic::Source;
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::options::Options;
 use straightline_codegen::scene::{Scene, Selection};
