@@ -85,6 +85,12 @@ const DATA: &[DataOf] = &[
         inputs: &["q", "qd", "qdd", "direction_q", "direction_qd", "direction_qdd", "multiplier"],
         blocks: &[("hvp_q", HVP), ("hvp_qd", HVP), ("hvp_qdd", HVP)],
     },
+    DataOf {
+        function: Function::ForwardDynamicsDerivatives,
+        group: "forward_dynamics_derivatives",
+        inputs: &["q", "qd", "tau"],
+        blocks: &[("qdd", "qdd"), ("dqdd_dq", "dqdd_dq"), ("dqdd_dqd", "dqdd_dqd"), ("h_inverse", "h_inverse")],
+    },
 ];
 
 fn data_of(function: Function) -> &'static DataOf {

@@ -10,13 +10,13 @@
 //! but its sums wait for each other. Measured on x86-64 with and without AVX-512, fused and not: quadrupeds (18 coordinates) take 4
 //! to 25 % longer by a factorisation with 2 % fewer to 2 % more operations; arms of 6 and 7 joints 1 to 31 % less with 8 to 18 % fewer.
 
-use crate::function::ForwardDynamicsMethod;
+use crate::function::{Family, ForwardDynamicsMethod, Function};
 use crate::model::states::{settle, values, Kind, SEED};
 use std::fmt;
 use straightline_core::model::Model;
 use straightline_core::random::Random;
 use straightline_core::{Dd, Real};
-use straightline_graph::expr::{evaluate, Graph, DIVISION};
+use straightline_graph::expr::{evaluate, Graph, Port, DIVISION};
 use straightline_graph::pass::count_sums;
 use straightline_graph::Scalar;
 
@@ -25,6 +25,8 @@ use straightline_graph::Scalar;
 pub const TOLERATED: f64 = 3.0;
 /// The same of each acceleration by itself, as a heavy link may hide what the light ones lose; or one rounding of it.
 const TOLERATED_OF_ONE: f64 = 8.0;
+/// The same of derivatives and each of their blocks, of which it takes about half of the operations: a decimal digit.
+const TOLERATED_OF_DERIVATIVES: f64 = 16.0;
 /// The factorisation has to save this part of the operations of articulated bodies.
 pub const WORTH: f64 = 0.05;
 /// Beyond so many velocity coordinates the factorisation is not tried: it takes about n³/6 products more on one branch.
@@ -121,13 +123,29 @@ impl fmt::Display for MethodChoice {
 }
 
 /// Chooses between two programs of the same function; with the factorisation only where there is one.
-pub fn choose(model: &Model<Dd>, scalar: Scalar, articulated: &Graph, factorised: Option<&Graph>) -> MethodChoice {
+pub fn choose(
+    model: &Model<Dd>,
+    function: Function,
+    scalar: Scalar,
+    articulated: &Graph,
+    factorised: Option<&Graph>,
+) -> MethodChoice {
     let Some(factorised) = factorised else {
         let articulated = MethodFigures::new(articulated, None);
         return MethodChoice { articulated_bodies: true, articulated, factorisation: None };
     };
-    let errors = errors(model, scalar, articulated, factorised);
-    let keeps_digits = errors.as_ref().is_none_or(|[a, f]| f.keeps_digits_of(a, scalar));
+    let is_derivative = function.spec().family == Family::Derivatives;
+    // entries of a matrix go together: an entry that happens to be small is nothing by itself
+    let together: Vec<usize> = match is_derivative {
+        true => articulated.outputs.iter().map(Port::len).collect(),
+        false => vec![1; articulated.results.len()],
+    };
+    let errors = errors(model, scalar, (articulated, factorised), &together);
+    let tolerated = match is_derivative {
+        true => [TOLERATED_OF_DERIVATIVES; 2],
+        false => [TOLERATED, TOLERATED_OF_ONE],
+    };
+    let keeps_digits = errors.as_ref().is_none_or(|[a, f]| f.keeps_digits_of(a, scalar, tolerated));
     let [of_articulated, of_factorised] = errors.map_or([None; 2], |errors| errors.map(|e| Some(e.worst)));
     let articulated = MethodFigures::new(articulated, of_articulated);
     let factorisation = MethodFigures::new(factorised, of_factorised);
@@ -140,15 +158,17 @@ pub fn choose(model: &Model<Dd>, scalar: Scalar, articulated: &Graph, factorised
 struct Errors {
     /// The worst error, over the greatest acceleration of its state.
     worst: f64,
-    /// Of each acceleration the worst error, as it is, and the greatest value.
+    /// Of each acceleration, or block of derivatives, the worst error, as it is, and the greatest value.
     each: Vec<[f64; 2]>,
 }
 
 impl Errors {
-    fn add<T: Real + Into<f64>>(&mut self, found: Vec<T>, exact: Vec<Dd>) {
+    fn add<T: Real + Into<f64>>(&mut self, found: Vec<T>, exact: Vec<Dd>, together: &[usize]) {
         let scale = exact.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
-        self.each.resize(exact.len(), [0.0; 2]);
-        for ((x, truth), [worst, greatest]) in found.into_iter().zip(exact).zip(&mut self.each) {
+        self.each.resize(together.len(), [0.0; 2]);
+        let group = together.iter().enumerate().flat_map(|(k, n)| std::iter::repeat_n(k, *n));
+        for ((x, truth), k) in found.into_iter().zip(exact).zip(group) {
+            let [worst, greatest] = &mut self.each[k];
             let error = (Dd::from(x.into()) - truth).to_f64().abs();
             // what is no number, is as wrong as can be
             let error = if error.is_finite() { error } else { f64::INFINITY };
@@ -158,23 +178,26 @@ impl Errors {
         }
     }
 
-    fn keeps_digits_of(&self, other: &Errors, scalar: Scalar) -> bool {
-        let keeps = |([f, greatest], [a, _]): (&[f64; 2], &[f64; 2])| {
-            *f <= TOLERATED_OF_ONE * a.max(scalar.epsilon() * greatest)
-        };
-        self.worst <= TOLERATED * other.worst && self.each.iter().zip(&other.each).all(keeps)
+    fn keeps_digits_of(&self, other: &Errors, scalar: Scalar, [of_all, of_one]: [f64; 2]) -> bool {
+        let keeps = |([f, greatest], [a, _]): (&[f64; 2], &[f64; 2])| *f <= of_one * a.max(scalar.epsilon() * greatest);
+        self.worst <= of_all * other.worst && self.each.iter().zip(&other.each).all(keeps)
     }
 }
 
 /// What both programs lose; `None` where a run-time parameter is an input: there is no one robot to try.
-fn errors(model: &Model<Dd>, scalar: Scalar, articulated: &Graph, factorised: &Graph) -> Option<[Errors; 2]> {
+fn errors(model: &Model<Dd>, scalar: Scalar, forms: (&Graph, &Graph), together: &[usize]) -> Option<[Errors; 2]> {
+    let (articulated, factorised) = forms;
     if articulated.inputs.iter().chain(&factorised.inputs).any(|port| port.wrapper.is_some()) {
         return None;
     }
-    Some(in_scalar!(scalar, T => errors_in::<T>(model, articulated, factorised)))
+    Some(in_scalar!(scalar, T => errors_in::<T>(model, forms, together)))
 }
 
-fn errors_in<T: Real + Into<f64>>(model: &Model<Dd>, articulated: &Graph, factorised: &Graph) -> [Errors; 2] {
+fn errors_in<T: Real + Into<f64>>(
+    model: &Model<Dd>,
+    (articulated, factorised): (&Graph, &Graph),
+    together: &[usize],
+) -> [Errors; 2] {
     let mut errors = [Errors::default(), Errors::default()];
     let mut random = Random(SEED);
     let kinds = [Kind::Anywhere, Kind::Stretched, Kind::RightAngled];
@@ -186,7 +209,7 @@ fn errors_in<T: Real + Into<f64>>(model: &Model<Dd>, articulated: &Graph, factor
         let rounded: Vec<T> = inputs.into_iter().flatten().map(|x| T::constant(Dd::from(x))).collect();
         let wide: Vec<Dd> = rounded.iter().map(|x| Dd::from((*x).into())).collect();
         for (graph, errors) in [articulated, factorised].into_iter().zip(&mut errors) {
-            errors.add(evaluate(graph, &rounded), evaluate(graph, &wide));
+            errors.add(evaluate(graph, &rounded), evaluate(graph, &wide), together);
         }
     }
     errors

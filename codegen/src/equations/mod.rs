@@ -62,7 +62,7 @@ impl Function {
                 let articulated = trace_with(ForwardDynamicsMethod::ArticulatedBody);
                 let factorised = (robot.model.nv() <= forward_method::MOST_FOR_FACTORISATION)
                     .then(|| trace_with(ForwardDynamicsMethod::Factorisation));
-                let choice = forward_method::choose(&robot.model, scalar, &articulated, factorised.as_ref());
+                let choice = forward_method::choose(&robot.model, self, scalar, &articulated, factorised.as_ref());
                 let graph = match factorised {
                     Some(factorised) if !choice.articulated_bodies => factorised,
                     _ => articulated,

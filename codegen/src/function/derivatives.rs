@@ -8,7 +8,7 @@ use straightline_core::model::Model;
 use straightline_core::reverse::{Recorded, Recording};
 use straightline_core::{Dual, Real};
 
-const SQUARE: &[super::Extent] = &[Velocities, Velocities];
+pub(super) const SQUARE: &[super::Extent] = &[Velocities, Velocities];
 
 pub struct InverseDynamicsDerivatives;
 
@@ -145,15 +145,17 @@ impl RobotFunction for InverseDynamicsHvp {
 
 /// q, q̇ and q̈ as they move along a direction, which stands behind them in the inputs.
 fn moving<T: Real>(model: &Model<T>, inputs: &[Vec<T>]) -> [Vec<Dual<T, 1>>; 3] {
-    let rates = configuration_rates(model, &inputs[0], &inputs[3]);
-    let along = |x: &[T], rate: &[T]| -> Vec<Dual<T, 1>> {
-        x.iter().zip(rate).map(|(x, rate)| Dual { value: *x, derivatives: [*rate] }).collect()
-    };
-    [along(&inputs[0], &rates), along(&inputs[1], &inputs[4]), along(&inputs[2], &inputs[5])]
+    let rates = rates_along(model, &inputs[0], &inputs[3]);
+    [with_rates(&inputs[0], &rates), with_rates(&inputs[1], &inputs[4]), with_rates(&inputs[2], &inputs[5])]
+}
+
+/// Numbers that move at these rates.
+pub(super) fn with_rates<T: Real>(x: &[T], rates: &[T]) -> Vec<Dual<T, 1>> {
+    x.iter().zip(rates).map(|(x, rate)| Dual { value: *x, derivatives: [*rate] }).collect()
 }
 
 /// (∂τ/∂q)ᵀ λ, (∂τ/∂q̇)ᵀ λ and H λ, backwards through the equations.
-fn weighed_slopes<T: Real>(forms: &Forms<'_, T>, motion: [&[T]; 3], multiplier: &[T]) -> Vec<T> {
+pub(super) fn weighed_slopes<T: Real>(forms: &Forms<'_, T>, motion: [&[T]; 3], multiplier: &[T]) -> Vec<T> {
     let recording = Recording::new();
     let [q, qd, qdd] = motion.map(|x| x.iter().map(|x| recording.variable(*x)).collect::<Vec<_>>());
     let forces = forms.over(Recorded::fixed, |forms| forms.inverse_dynamics(&q, &qd, &qdd));
@@ -165,7 +167,7 @@ fn weighed_slopes<T: Real>(forms: &Forms<'_, T>, motion: [&[T]; 3], multiplier: 
 
 impl<T: Real> Forms<'_, T> {
     /// The same robot over another scalar, without frames and limbs in lanes.
-    fn over<U: Real, R>(&self, f: impl Fn(T) -> U + Copy, run: impl FnOnce(&Forms<'_, U>) -> R) -> R {
+    pub(super) fn over<U: Real, R>(&self, f: impl Fn(T) -> U + Copy, run: impl FnOnce(&Forms<'_, U>) -> R) -> R {
         let model = self.model.map(f);
         let reduced = self.reduced.map(|forms| forms.map(|form| form.map(f)));
         let reduced = reduced.as_ref().map(|[torques, composite]| [torques, composite]);
@@ -220,7 +222,7 @@ fn by_directions<T: Real>(model: &Model<T>, [q, qd, qdd]: [&[T]; 3]) -> Derivati
 }
 
 /// dq/dt at these velocities: joints with quaternions along their tangent.
-fn configuration_rates<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
+pub(super) fn rates_along<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
     let mut rates = vec![T::zero(); q.len()];
     for joint in model.bodies.iter().map(|body| &body.joint) {
         let own = &mut rates[joint.iq..joint.iq + joint.kind.nq()];

@@ -156,6 +156,11 @@ impl RobotFunction for ForwardDynamics {
             _ => alg::solve_articulated(forms.model, q, &net),
         }
     }
+
+    fn residual<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>], found: &[T]) -> Vec<T> {
+        let takes = forms.inverse_dynamics(&inputs[0], &inputs[1], found);
+        takes.into_iter().zip(&inputs[2]).map(|(takes, tau)| takes - *tau).collect()
+    }
 }
 
 pub struct JointWrenches;

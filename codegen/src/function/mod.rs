@@ -7,6 +7,7 @@ mod derivatives;
 mod drives;
 mod dynamics;
 mod forms;
+mod forward_derivatives;
 mod kinematics;
 mod quantity;
 mod spec;
@@ -61,6 +62,13 @@ macro_rules! functions {
             pub fn evaluate_on<T: Real>(self, forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
                 match self {
                     $(Function::$name => $file::$name::evaluate(forms, inputs),)*
+                }
+            }
+
+            /// What results leave of the equations that they solve, one block after the other; empty of functions that solve none.
+            pub fn residual<T: Real>(self, forms: &Forms<'_, T>, inputs: &[Vec<T>], found: &[T]) -> Vec<T> {
+                match self {
+                    $(Function::$name => $file::$name::residual(forms, inputs, found),)*
                 }
             }
 
@@ -131,6 +139,20 @@ functions! {
     /// How multipliers times its derivatives change along a direction.
     #[doc(alias("HVP", "Hessian-vector product", "second order"))]
     derivatives::InverseDynamicsHvp,
+    /// Forward dynamics with its derivatives.
+    #[doc(alias("ABA derivatives", "linearisation", "inverse mass matrix"))]
+    forward_derivatives::ForwardDynamicsDerivatives,
+    /// Its derivatives where accelerations are known.
+    forward_derivatives::ForwardDynamicsDerivativesAtMotion,
+    /// Its derivative along a direction.
+    #[doc(alias("JVP", "forward mode"))]
+    forward_derivatives::ForwardDynamicsJvp,
+    /// Multipliers times its derivatives.
+    #[doc(alias("VJP", "reverse mode", "adjoint"))]
+    forward_derivatives::ForwardDynamicsVjp,
+    /// How multipliers times its derivatives change along a direction.
+    #[doc(alias("HVP", "Hessian-vector product", "second order"))]
+    forward_derivatives::ForwardDynamicsHvp,
     /// Inputs of the drives to motion.
     drives::DrivenForwardDynamics,
     /// Motion to inputs of the drives.

@@ -29,7 +29,9 @@ pub enum Quantity {
     VelocityDirection,
     /// A direction of q̈.
     AccelerationDirection,
-    /// Multipliers of generalized forces.
+    /// A direction of τ.
+    ForceDirection,
+    /// Multipliers of generalized forces, or of accelerations.
     Multiplier,
     /// The third or a further derivative of q.
     HigherRate(usize),
@@ -84,7 +86,8 @@ const TABLE: &[QuantityRow] = &[
     ),
     row(VelocityDirection, "direction_qd", Extent::Velocities, Some(1.0), "direction of q̇ \\[rad/s or m/s\\]"),
     row(AccelerationDirection, "direction_qdd", Extent::Velocities, Some(1.0), "direction of q̈ \\[rad/s² or m/s²\\]"),
-    row(Multiplier, "multiplier", Extent::Velocities, Some(1.0), "λ: multipliers of the generalized forces"),
+    row(ForceDirection, "direction_tau", Extent::Velocities, Some(1.0), "direction of τ \\[N·m or N\\]"),
+    row(Multiplier, "multiplier", Extent::Velocities, Some(1.0), "λ: multipliers of the generalized forces or accelerations"),
     row(Gravity, "gravity", Extent::Of(3), Some(10.0), "acceleration due to gravity in the world \\[m/s²\\]"),
 ];
 

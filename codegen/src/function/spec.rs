@@ -158,6 +158,8 @@ pub enum Judged {
     ByDerivatives,
     /// Of accelerations: what they leave of τ − H q̈ − h.
     ByResidual,
+    /// Of derivatives of accelerations: what they leave of the equations that they solve, column by column.
+    ByColumns,
 }
 
 impl Judged {
@@ -249,4 +251,9 @@ pub trait RobotFunction {
 
     /// Its results, one block after the other, for inputs in order.
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T>;
+
+    /// What results leave of the equations that they solve, one block after the other: forces. Of [`Judged::ByResidual`] and [`Judged::ByColumns`].
+    fn residual<T: Real>(_: &Forms<'_, T>, _inputs: &[Vec<T>], _found: &[T]) -> Vec<T> {
+        Vec::new()
+    }
 }

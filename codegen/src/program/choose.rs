@@ -59,7 +59,7 @@ fn chosen(
     options: &Options,
     optimisations: Optimisations,
 ) -> Robot {
-    use Function::{BiasForce, InverseDynamics, MassMatrix};
+    use Function::{BiasForce, InverseDynamics, InverseDynamicsDerivatives, MassMatrix};
     let search_from = |function: Function, known: &[FreeTerms]| {
         // the search is for torques or the mass matrix, whatever becomes of forward dynamics
         let optimisations = Optimisations { cheaper: false, ..optimisations };
@@ -77,7 +77,9 @@ fn chosen(
         Form::MassMatrix => both(search(MassMatrix)),
         Form::Derivatives => {
             let known = [search(InverseDynamics), search(MassMatrix)];
-            both(search_from(function, &known))
+            // what is solved for afterwards is the same in any form
+            let torques = if function.spec().solves { InverseDynamicsDerivatives } else { function };
+            both(search_from(torques, &known))
         }
         Form::Both | Form::Motion => {
             let (torques, mass_matrix) = (search(BiasForce), search(MassMatrix));

@@ -55,7 +55,7 @@ pub(crate) fn checked_companion(
 ) -> Result<(StateBound, Option<Plainer>), Disagreement> {
     match function.spec().judged {
         Judged::ByResidual => of_accelerations(robot, options, &Mode::alone(), function.name(), graph),
-        Judged::ByScale | Judged::ByInertias | Judged::ByDerivatives => {
+        Judged::ByScale | Judged::ByInertias | Judged::ByDerivatives | Judged::ByColumns => {
             of_errors(robot, options, function.name(), graph, bits(options))
         }
     }

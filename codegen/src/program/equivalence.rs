@@ -25,7 +25,7 @@ mod states;
 use crate::equations::bind::{constructed, BoundRobot};
 use crate::equations::reduce::longest_lever;
 use crate::equations::Robot;
-use crate::function::{ForwardDynamicsMethod, Function, Judged};
+use crate::function::{Family, Forms, ForwardDynamicsMethod, Function, Judged, Spec};
 use crate::model::drives::entries;
 use crate::options::{Optimisations, Options};
 use crate::scene::free_drive::FreeDrive;
@@ -40,7 +40,7 @@ use straightline_graph::{element_of, EveryScalar};
 pub(crate) use bounds::{of_acceleration_bound, of_bound};
 pub(crate) use contact::{of_contact, of_system};
 pub use disagreement::{Disagreement, Plainer};
-use losses::{sizes_of_accelerations, Losses};
+use losses::Losses;
 use states::{StatePlace, States};
 
 /// Results agree to so much of their natural scale; double-double has 5e-32.
@@ -180,7 +180,7 @@ impl Check<'_> {
         let all: usize = function.outputs(&robot.model, frames).iter().map(Port::len).sum();
         let is_whole = scene.select(function, &robot.model, frames).0.into_iter().eq(0..all);
         match function.spec().judged {
-            Judged::ByResidual if is_whole => sizes_of_accelerations(robot, options, state, off),
+            Judged::ByResidual | Judged::ByColumns if is_whole => self.plain.sizes_of_solutions(state, off),
             // residuals have no scale of accelerations: all of them are judged by the greatest
             Judged::ByResidual => vec![found.iter().map(|x| x.hi().abs()).fold(0.0, f64::max); found.len()],
             judged @ Judged::ByInertias if is_whole => {
@@ -193,7 +193,8 @@ impl Check<'_> {
 
     fn compare(&self, mut losses: Losses) -> Result<(), Disagreement> {
         let PlainEquations { robot, function, options, .. } = self.plain;
-        if function.spec().judged == Judged::ByResidual {
+        let Spec { judged, solves, family, .. } = function.spec();
+        if *judged == Judged::ByResidual || *solves && *family == Family::Derivatives {
             let lost = Disagreement {
                 program: function.name().to_string(),
                 result: element_of(&self.graph.outputs, 0),
@@ -206,7 +207,7 @@ impl Check<'_> {
         }
         // a rounding of all that a result is made of is little; of a scale that is a result's own any program loses some
         let least = match function.spec().judged {
-            Judged::ByResidual => {
+            Judged::ByResidual | Judged::ByColumns => {
                 losses.plain = vec![losses.plain.iter().copied().fold(0.0, f64::max); losses.plain.len()];
                 LOSSES / 2.0
             }
@@ -249,12 +250,13 @@ impl PlainEquations<'_> {
     fn differences(self, state: &PortState, found: &[Dd]) -> Vec<Magnitude> {
         let (mut bound, wanted) = self.bound(state);
         with_sizes(&mut bound.model, longest_lever(&self.robot.model));
-        let (nv, method) = (self.robot.model.nv(), ForwardDynamicsMethod::ArticulatedBody);
-        if self.function.spec().judged == Judged::ByResidual && wanted.iter().copied().eq(0..nv) {
-            let qdd = found.iter().copied().map(Real::constant).collect();
-            let motion = [&bound.arguments[0], &bound.arguments[1], &qdd].map(Vec::clone);
-            let takes = Function::InverseDynamics.evaluate(&bound.model, &[], method, &motion);
-            return takes.into_iter().zip(&bound.arguments[2]).map(|(takes, tau)| (takes - *tau).wide).collect();
+        let method = ForwardDynamicsMethod::ArticulatedBody;
+        let is_solved = matches!(self.function.spec().judged, Judged::ByResidual | Judged::ByColumns);
+        let all: usize = self.function.outputs(&self.robot.model, 0).iter().map(Port::len).sum();
+        if is_solved && wanted.iter().copied().eq(0..all) {
+            let found: Vec<EveryScalar> = found.iter().copied().map(Real::constant).collect();
+            let left = self.function.residual(&Forms::plain(&bound.model, &[], method), &bound.arguments, &found);
+            return left.into_iter().map(|x| x.wide).collect();
         }
         let plain = self.all(&bound, method, &wanted);
         found.iter().zip(plain).map(|(found, plain)| difference(*found, plain.wide)).collect()

@@ -25,7 +25,7 @@ pub(crate) fn certificates(robot: &Robot, programs: &[TracedProgram], options: &
         };
         let ranges = certify::box_in_words(&p.graph.inputs, &inputs);
         let known = match p.function.spec().judged {
-            Judged::ByResidual => known(robot, &p.graph, &inputs, options),
+            Judged::ByResidual | Judged::ByColumns => known(robot, &p.graph, &inputs, options),
             _ => KnownSystem::default(),
         };
         Some(match certify::certify_with(&p.graph, options.scalar, &inputs, effort, &known) {

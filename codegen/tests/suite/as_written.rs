@@ -54,13 +54,14 @@ impl Case {
 
     fn wants(&self, scalar: Scalar, function: Function) -> bool {
         use Function::{BiasForce, ForwardDynamics, GravityForce, InverseDynamics, MassMatrix, VelocityForce};
+        let derivative = function.spec().family == Family::Derivatives;
         let group = match function {
             InverseDynamics => Some(0),
             MassMatrix => Some(1),
             BiasForce | GravityForce | VelocityForce => Some(2),
             // which takes two of the searches
             ForwardDynamics => Some(3),
-            _ => None,
+            _ => derivative.then(|| if function.spec().solves { 3 } else { 1 }),
         };
         self.part.is_none_or(|k| {
             let in_turn = group.is_none_or(|group| [0, 1, 2, 0, 1, 2, 3][k / 2 % 7] == group);
@@ -255,7 +256,7 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
     let of_bodies = |f: &Function| f.spec().family != Family::Drives;
     let mut functions: Vec<Function> = Function::known().filter(of_bodies).collect();
     if !singular_joints(&model, Inertia::OfLinks).is_empty() {
-        functions.retain(|f| *f != Function::ForwardDynamics);
+        functions.retain(|f| !f.spec().solves);
     }
     let mut random = Random(99);
     let states: Vec<State> = (0..6).map(|kind| State::new(&model, &mut random, kind)).collect();

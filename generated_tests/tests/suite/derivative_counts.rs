@@ -1,4 +1,4 @@
-//! Operations of ∂τ/∂q, ∂τ/∂q̇ and H in one call, beside what the best published way takes without H.
+//! Operations of ∂τ/∂q, ∂τ/∂q̇ and H in one call, and of ∂q̈/∂q, ∂q̈/∂q̇ and H⁻¹, beside what the best published way takes.
 
 use std::path::Path;
 use straightline_codegen::diagnostic::Source;
@@ -9,46 +9,64 @@ use straightline_codegen::Function;
 use straightline_generated_tests::programs::{self, program};
 
 /// Additions and multiplications that a robot may take, what it takes, and what CasADi takes of Pinocchio's analytic derivatives after
-/// common subexpressions (research record of 2026-11-22); of a neighbouring robot where marked.
-struct CountsOf {
-    file: &'static str,
-    floating: bool,
+/// common subexpressions (research record of 2026-11-22; without H, and with divisions), of some a neighbouring robot.
+#[derive(Clone, Copy)]
+struct CountsBeside {
     most: usize,
     record: usize,
     casadi: Option<usize>,
 }
 
-const fn of(file: &'static str, most: usize, record: usize, casadi: Option<usize>) -> CountsOf {
-    CountsOf { file, floating: false, most, record, casadi }
+struct CountsOf {
+    file: &'static str,
+    floating: bool,
+    inverse: CountsBeside,
+    forward: Option<CountsBeside>,
+}
+
+const fn counts(most: usize, record: usize, casadi: Option<usize>) -> CountsBeside {
+    CountsBeside { most, record, casadi }
+}
+
+const fn of(file: &'static str, inverse: CountsBeside, forward: CountsBeside) -> CountsOf {
+    CountsOf { file, floating: false, inverse, forward: Some(forward) }
 }
 
 const ARMS: [CountsOf; 4] = [
-    of("../robots/descriptions/ur5.urdf", 764, 704, Some(4960)),
-    of("../robots/descriptions/puma560.urdf", 1104, 1062, Some(4794)),
-    of("count_robots/iiwa7.urdf", 1689, 1644, Some(6508)),
-    of("../robots/descriptions/panda.urdf", 2388, 2338, Some(6804)),
+    of("../robots/descriptions/ur5.urdf", counts(764, 704, Some(4960)), counts(1610, 1473, Some(7049))),
+    of("../robots/descriptions/puma560.urdf", counts(1104, 1062, Some(4794)), counts(2125, 2036, Some(6676))),
+    of("count_robots/iiwa7.urdf", counts(1689, 1644, Some(6508)), counts(3560, 3273, None)),
+    of("../robots/descriptions/panda.urdf", counts(2388, 2338, Some(6804)), counts(4510, 4268, Some(9837))),
 ];
 
 const LARGE: [CountsOf; 4] = [
-    of("count_robots/general_6r.urdf", 3127, 3109, None),
-    CountsOf { floating: true, ..of("../robots/descriptions/solo12.urdf", 4030, 3940, None) },
-    CountsOf { floating: true, ..of("../robots/descriptions/hyq.urdf", 6450, 6422, Some(17080)) },
-    CountsOf { floating: true, ..of("../robots/descriptions/simple_humanoid.urdf", 17000, 16644, None) },
+    of("count_robots/general_6r.urdf", counts(3127, 3109, None), counts(4715, 4559, None)),
+    CountsOf {
+        floating: true,
+        ..of("../robots/descriptions/solo12.urdf", counts(4030, 3940, None), counts(19400, 18190, None))
+    },
+    CountsOf {
+        floating: true,
+        ..of("../robots/descriptions/hyq.urdf", counts(6450, 6422, Some(17080)), counts(22200, 21043, Some(37698)))
+    },
+    CountsOf {
+        file: "../robots/descriptions/simple_humanoid.urdf",
+        floating: true,
+        inverse: counts(17000, 16644, None),
+        forward: None,
+    },
 ];
 
-fn count(of: &CountsOf) -> usize {
+fn count(of: &CountsOf, function: Function, results: &[&str]) -> usize {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(of.file);
     let model = ModelOptions { floating_base: of.floating, ..ModelOptions::default() };
     let robot = programs::load(&programs::file(&path), &model);
-    let function = Function::InverseDynamicsDerivatives;
-    let results = ["dtau_dq", "dtau_dqd", "h"].map(String::from).to_vec();
+    let results = results.iter().map(|name| name.to_string()).collect();
     let scene = Scene {
         outputs: [(function, Selection { results, ..Selection::default() })].into_iter().collect(),
         ..Scene::default()
     };
-    let counts = program(&robot, &[], function, &Options { model, scene, ..Options::default() }).graph.counts();
-    assert_eq!(counts.div, 0, "{}", of.file);
-    counts.flops()
+    program(&robot, &[], function, &Options { model, scene, ..Options::default() }).graph.counts().flops()
 }
 
 /// Products beside inverse dynamics: along a direction, backwards, and of second order.
@@ -77,12 +95,16 @@ fn products_take_two_and_a_half_times_inverse_dynamics_and_those_of_second_order
 
 fn hold(robots: &[CountsOf]) {
     for of in robots {
-        let found = count(of);
         let name = Path::new(of.file).file_stem().expect("a file has a name").to_string_lossy();
-        let beside = of.casadi.map_or(String::new(), |casadi| format!(", CasADi {casadi}"));
-        println!("{name:<16} {found:6} of {}{beside}", of.most);
-        assert!(found <= of.most, "{name}: {found} operations, {} at most", of.most);
-        assert_eq!(found, of.record, "{name}: another count than on record");
+        let inverse = (Function::InverseDynamicsDerivatives, &["dtau_dq", "dtau_dqd", "h"][..], of.inverse);
+        let forward = of.forward.map(|counts| (Function::ForwardDynamicsDerivatives, &[][..], counts));
+        for (function, results, CountsBeside { most, record, casadi }) in [inverse].into_iter().chain(forward) {
+            let found = count(of, function, results);
+            let beside = casadi.map_or(String::new(), |casadi| format!(", CasADi {casadi}"));
+            println!("{name:<16} {:<32} {found:6} of {most}{beside}", function.name());
+            assert!(found <= most, "{} of {name}: {found} operations, {most} at most", function.name());
+            assert_eq!(found, record, "{} of {name}: another count than on record", function.name());
+        }
     }
 }
 

@@ -11,7 +11,7 @@ use straightline_core::reference::{self, CentreOfMassTree, ReferenceJoint, Refer
 use straightline_core::{Dd, Dual, Real};
 
 /// A direction in which q, q̇ and q̈ move: of q along its tangent.
-type Direction<T> = [Vec<T>; 3];
+pub(super) type Direction<T> = [Vec<T>; 3];
 
 impl Truth for InverseDynamicsDerivatives {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
@@ -62,14 +62,14 @@ fn direction(at: &Chapter<'_>) -> Direction<Magnitude> {
 }
 
 /// Coordinate `k` of q, q̇ or q̈ alone.
-fn unit<T: Real>(nv: usize, block: usize, k: usize) -> Direction<T> {
+pub(super) fn unit<T: Real>(nv: usize, block: usize, k: usize) -> Direction<T> {
     let mut direction = [0; 3].map(|_| vec![T::zero(); nv]);
     direction[block][k] = T::one();
     direction
 }
 
 /// The derivatives of Σ λ τ by every coordinate of q, q̇ and q̈, one direction after the other.
-fn weighed_slopes<T: ReferenceReal>(
+pub(super) fn weighed_slopes<T: ReferenceReal>(
     at: &Chapter<'_>,
     tree: &CentreOfMassTree<T>,
     motion: [&[T]; 3],
@@ -84,7 +84,7 @@ fn weighed_slopes<T: ReferenceReal>(
 }
 
 /// How forces change along a direction.
-fn slopes<T: ReferenceReal>(
+pub(super) fn slopes<T: ReferenceReal>(
     at: &Chapter<'_>,
     tree: &CentreOfMassTree<T>,
     motion: [&[T]; 3],
@@ -100,7 +100,7 @@ fn slopes<T: ReferenceReal>(
 }
 
 /// A motion as it moves along a direction.
-fn moving<T: ReferenceReal>(
+pub(super) fn moving<T: ReferenceReal>(
     tree: &CentreOfMassTree<T>,
     motion: [&[T]; 3],
     direction: &Direction<T>,

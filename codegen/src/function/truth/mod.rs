@@ -14,6 +14,7 @@ use straightline_core::{Dd, Real};
 mod derivatives;
 mod drives;
 mod dynamics;
+mod forward_derivatives;
 mod kinematics;
 mod whole;
 

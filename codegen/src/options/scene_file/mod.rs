@@ -39,7 +39,7 @@ impl SceneFile {
         options.scene = self.scene;
         self.settings.apply(&mut options);
         if is_moving && !self.settings.has("functions") && options.functions.iter().copied().eq(Function::all()) {
-            options.functions.retain(|f| *f != Function::ForwardDynamics);
+            options.functions.retain(|f| !f.spec().solves);
         }
         options.reporting.levels.extend(&levels);
         options

@@ -1,34 +1,34 @@
 //! What a program loses to rounding, beside what the plain equations lose.
 
-use super::{every_scalar, inputs, of_ports, Disagreement, PortState, LOSSES};
-use crate::equations::Robot;
-use crate::function::{ForwardDynamicsMethod, Function};
-use crate::options::Options;
-use straightline_core::algorithms::Ltdl;
+use super::{every_scalar, inputs, Disagreement, PlainEquations, PortState, LOSSES};
+use straightline_core::algorithms as alg;
 use straightline_core::magnitude::Magnitude;
-use straightline_core::{Dd, Real};
+use straightline_core::Dd;
 use straightline_graph::expr::{evaluate, Graph};
 use straightline_graph::{element_of, EveryScalar, Scalar};
 
-/// Natural scales of accelerations: |H⁻¹| times those of the forces that make them, given with what the equations of motion are off by.
-pub(super) fn sizes_of_accelerations(
-    robot: &Robot,
-    options: &Options,
-    state: &PortState,
-    off: &[Magnitude],
-) -> Vec<f64> {
-    let ports = options.scene.ports(Function::ForwardDynamics, &robot.model);
-    let bound = options.scene.bind(Function::ForwardDynamics, robot, &of_ports(&ports, state));
-    let h = Function::MassMatrix.evaluate(&bound.model, &[], ForwardDynamicsMethod::ArticulatedBody, &bound.arguments);
-    let factor = Ltdl::factor(&bound.model, &h);
-    let mut sizes = vec![0.0; off.len()];
-    for (j, force) in off.iter().enumerate() {
-        let mut unit = vec![EveryScalar::zero(); off.len()];
-        unit[j] = EveryScalar::one();
-        let column = factor.solve(&unit);
-        sizes.iter_mut().zip(column).for_each(|(size, x)| *size += x.wide.value.hi().abs() * force.size);
+impl PlainEquations<'_> {
+    /// Natural scales of what is solved for: |H⁻¹| times those of the forces that make them, given with what the equations are off by; of matrices
+    /// column by column.
+    pub(super) fn sizes_of_solutions(self, state: &PortState, off: &[Magnitude]) -> Vec<f64> {
+        let (bound, _) = self.bound(state);
+        let nv = self.robot.model.nv();
+        let h = alg::mass_matrix(&bound.model, &bound.arguments[0]);
+        let inverse: Vec<f64> =
+            alg::Ltdl::factor(&bound.model, &h).inverse().into_iter().map(|x| x.wide.value.hi().abs()).collect();
+        let blocks = self.function.outputs(&self.robot.model, 0);
+        let (mut sizes, mut forces) = (Vec::new(), off.iter().map(|x| x.size).collect::<Vec<_>>());
+        for block in blocks {
+            let others = forces.split_off(block.len());
+            let columns = block.len() / nv.max(1);
+            let entry = |k: usize| {
+                (0..nv).map(|j| inverse[k / columns * nv + j] * forces[j * columns + k % columns]).sum::<f64>()
+            };
+            sizes.extend((0..block.len()).map(entry));
+            forces = others;
+        }
+        sizes
     }
-    sizes
 }
 
 /// What a program and the plain equations lose to rounding: of each result the worst of some states, over its natural scale.

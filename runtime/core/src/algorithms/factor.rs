@@ -80,6 +80,21 @@ impl<T: Real> Ltdl<T> {
         self.finish(self.half(right))
     }
 
+    /// H⁻¹, nv × nv, row-major, of a matrix whose coordinates all move: one triangle by substitution, the other as it is symmetric.
+    pub fn inverse(&self) -> Vec<T> {
+        let nv = self.coordinates.len();
+        let mut inverse = vec![T::zero(); nv * nv];
+        for k in 0..nv {
+            let unit: Vec<T> = (0..nv).map(|i| if i == self.coordinates[k] { T::one() } else { T::zero() }).collect();
+            let column = self.finish_up_to(k, self.half(&unit));
+            for i in 0..=k {
+                let (i, k) = (self.coordinates[i], self.coordinates[k]);
+                (inverse[i * nv + k], inverse[k * nv + i]) = (column[i], column[i]);
+            }
+        }
+        inverse
+    }
+
     /// (H x)_i of the coordinates i that do not move: what moves the others as x says puts on them.
     pub(super) fn on_held<'a>(&'a self, x: &'a [T]) -> impl Iterator<Item = (usize, T)> + 'a {
         let along = move |row: &[T]| row.iter().zip(x).fold(T::zero(), |sum, (h, x)| sum + *h * *x);
@@ -105,9 +120,15 @@ impl<T: Real> Ltdl<T> {
 
     /// x with L x = D⁻¹ y, nv numbers by velocity coordinate.
     pub(super) fn finish(&self, y: Vec<T>) -> Vec<T> {
+        let last = y.len().saturating_sub(1);
+        self.finish_up_to(last, y)
+    }
+
+    /// The same of the rows up to the one given; the others are left as they were.
+    fn finish_up_to(&self, last: usize, y: Vec<T>) -> Vec<T> {
         let mut x = y;
         let mut solution = x.clone();
-        for i in 0..x.len() {
+        for i in (0..x.len()).take(last + 1) {
             x[i] = x[i] * self.inverse_pivots[i];
             for j in up(&self.parents, i) {
                 x[i] = x[i] - self.lower[i][j] * x[j];

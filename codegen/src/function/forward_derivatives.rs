@@ -1,0 +1,297 @@
+//! Derivatives of forward dynamics. q̈ obeys H q̈ + h = τ, so that its derivatives are those of inverse dynamics at q̈, solved for:
+//! ∂q̈/∂x = −H⁻¹ ∂τ/∂x, and none of them goes through the solution.
+
+use super::derivatives::{rates_along, weighed_slopes, with_rates, SQUARE};
+use super::spec::Extent::Velocities;
+use super::spec::{Divisor, Family, Form, Judged, Output, RobotFunction, Spec};
+use super::{Forms, ForwardDynamicsMethod, Quantity};
+use straightline_core::algorithms as alg;
+use straightline_core::{Dual, Real};
+
+const BY_POSITION: Output = Output::new(
+    "dqdd_dq",
+    SQUARE,
+    "rows of ∂q̈/∂q at constant τ \\[1/s²; with sliding joints also 1/(m·s²), m/s²\\]; of a floating base by increments of its pose in its own axes",
+);
+const BY_VELOCITY: Output =
+    Output::new("dqdd_dqd", SQUARE, "rows of ∂q̈/∂q̇ at constant τ \\[1/s; with sliding joints also 1/(m·s), m/s\\]");
+const INVERSE: Output =
+    Output::new("h_inverse", SQUARE, "rows of H⁻¹ = ∂q̈/∂τ, both triangles \\[1/(kg·m²), 1/(kg·m), 1/kg\\]");
+
+/// What all of them have in common.
+const SOLVED: Spec = Spec {
+    family: Family::Derivatives,
+    form: Form::Derivatives,
+    solves: true,
+    substituted_up_to: 9000,
+    divisor: Divisor::Inertia,
+    judged: Judged::ByColumns,
+    ..Spec::DEFAULT
+};
+
+pub struct ForwardDynamicsDerivatives;
+
+impl RobotFunction for ForwardDynamicsDerivatives {
+    const SPEC: Spec = Spec {
+        name: "forward_dynamics_derivatives",
+        summary: "Forward dynamics q̈ with its derivatives ∂q̈/∂q, ∂q̈/∂q̇ and H⁻¹ = ∂q̈/∂τ.",
+        aliases: &["ABA derivatives", "computeABADerivatives", "linearised forward dynamics", "computeMinverse"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Force],
+        outputs: &[
+            Output::new("qdd", &[Velocities], "accelerations \\[rad/s² or m/s²\\]"),
+            BY_POSITION,
+            BY_VELOCITY,
+            INVERSE,
+        ],
+        ..SOLVED
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let solution = Solution::new(forms, &inputs[0]);
+        let qdd = solution.acceleration([&inputs[0], &inputs[1], &inputs[2]]);
+        let derivatives = solution.derivatives([&inputs[0], &inputs[1], &qdd]);
+        [qdd, derivatives].concat()
+    }
+
+    fn residual<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>], found: &[T]) -> Vec<T> {
+        let (qdd, derivatives) = found.split_at(inputs[1].len());
+        let takes = forms.inverse_dynamics(&inputs[0], &inputs[1], qdd);
+        let off = takes.into_iter().zip(&inputs[2]).map(|(takes, tau)| takes - *tau).collect();
+        [off, left_by_columns(forms, [&inputs[0], &inputs[1], qdd], derivatives)].concat()
+    }
+}
+
+pub struct ForwardDynamicsDerivativesAtMotion;
+
+impl RobotFunction for ForwardDynamicsDerivativesAtMotion {
+    const SPEC: Spec = Spec {
+        name: "forward_dynamics_derivatives_at_motion",
+        summary: "Derivatives ∂q̈/∂q, ∂q̈/∂q̇ and H⁻¹ = ∂q̈/∂τ of forward dynamics where q̈ is known.",
+        aliases: &["derivatives from accelerations"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration],
+        outputs: &[BY_POSITION, BY_VELOCITY, INVERSE],
+        ..SOLVED
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        Solution::new(forms, &inputs[0]).derivatives([&inputs[0], &inputs[1], &inputs[2]])
+    }
+
+    fn residual<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>], found: &[T]) -> Vec<T> {
+        left_by_columns(forms, [&inputs[0], &inputs[1], &inputs[2]], found)
+    }
+}
+
+pub struct ForwardDynamicsJvp;
+
+impl RobotFunction for ForwardDynamicsJvp {
+    const SPEC: Spec = Spec {
+        name: "forward_dynamics_jvp",
+        summary: "The derivative of forward dynamics along a direction: ∂q̈/∂q u + ∂q̈/∂q̇ w + H⁻¹ t.",
+        aliases: &["JVP", "directional derivative", "tangent"],
+        inputs: &[
+            Quantity::Configuration,
+            Quantity::Velocity,
+            Quantity::Force,
+            Quantity::ConfigurationDirection,
+            Quantity::VelocityDirection,
+            Quantity::ForceDirection,
+        ],
+        outputs: &[Output::new("jvp", &[Velocities], "how fast accelerations change \\[rad/s² or m/s²\\]")],
+        form: Form::Motion,
+        ..SOLVED
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let solution = Solution::new(forms, &inputs[0]);
+        let qdd = solution.acceleration([&inputs[0], &inputs[1], &inputs[2]]);
+        solution.acceleration_rate(inputs, &qdd)
+    }
+
+    fn residual<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>], found: &[T]) -> Vec<T> {
+        let qdd = Solution::new(forms, &inputs[0]).acceleration([&inputs[0], &inputs[1], &inputs[2]]);
+        let takes = torque_rate(forms, inputs, &with_rates(&qdd, found));
+        takes.into_iter().zip(&inputs[5]).map(|(takes, rate)| takes - *rate).collect()
+    }
+}
+
+pub struct ForwardDynamicsVjp;
+
+impl RobotFunction for ForwardDynamicsVjp {
+    const SPEC: Spec = Spec {
+        name: "forward_dynamics_vjp",
+        summary: "Multipliers times the derivatives of forward dynamics: (∂q̈/∂q)ᵀ λ, (∂q̈/∂q̇)ᵀ λ and H⁻¹ λ.",
+        aliases: &["VJP", "adjoint", "gradient of accelerations", "backpropagation"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Force, Quantity::Multiplier],
+        outputs: &[
+            Output::new(
+                "vjp_q",
+                &[Velocities],
+                "(∂q̈/∂q)ᵀ λ; of a floating base by increments of its pose in its own axes",
+            ),
+            Output::new("vjp_qd", &[Velocities], "(∂q̈/∂q̇)ᵀ λ"),
+            Output::new("vjp_tau", &[Velocities], "H⁻¹ λ"),
+        ],
+        form: Form::Motion,
+        judged: Judged::ByDerivatives,
+        ..SOLVED
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let solution = Solution::new(forms, &inputs[0]);
+        let qdd = solution.acceleration([&inputs[0], &inputs[1], &inputs[2]]);
+        let by_force = solution.of(&inputs[3]);
+        let slopes = weighed_slopes(forms, [&inputs[0], &inputs[1], &qdd], &by_force);
+        let others = slopes.into_iter().take(2 * by_force.len()).map(|slope| -slope).collect();
+        [others, by_force].concat()
+    }
+}
+
+pub struct ForwardDynamicsHvp;
+
+impl RobotFunction for ForwardDynamicsHvp {
+    const SPEC: Spec = Spec {
+        name: "forward_dynamics_hvp",
+        summary: "How multipliers times the derivatives of forward dynamics change along a direction: the Hessian of λ·q̈ times it.",
+        aliases: &["HVP", "Hessian-vector product", "second-order derivatives"],
+        inputs: &[
+            Quantity::Configuration,
+            Quantity::Velocity,
+            Quantity::Force,
+            Quantity::ConfigurationDirection,
+            Quantity::VelocityDirection,
+            Quantity::ForceDirection,
+            Quantity::Multiplier,
+        ],
+        outputs: &[
+            Output::new(
+                "hvp_q",
+                &[Velocities],
+                "of (∂q̈/∂q)ᵀ λ; of a floating base of its components along body-fixed directions, which turn with it",
+            ),
+            Output::new("hvp_qd", &[Velocities], "of (∂q̈/∂q̇)ᵀ λ"),
+            Output::new("hvp_tau", &[Velocities], "of H⁻¹ λ"),
+        ],
+        form: Form::Motion,
+        judged: Judged::ByDerivatives,
+        ..SOLVED
+    };
+
+    /// (∂q̈/∂q)ᵀ λ = −Kᵀ μ, (∂q̈/∂q̇)ᵀ λ = −Dᵀ μ and μ = H⁻¹ λ, where q̈ and μ move with the rest: H μ = λ stays.
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let solution = Solution::new(forms, &inputs[0]);
+        let qdd = solution.acceleration([&inputs[0], &inputs[1], &inputs[2]]);
+        let moving = {
+            let rates = solution.acceleration_rate(inputs, &qdd);
+            [moving_state(forms, inputs).to_vec(), vec![with_rates(&qdd, &rates)]].concat()
+        };
+        let (nv, by_force) = (qdd.len(), solution.of(&inputs[6]));
+        let slopes = |rate: &[T]| -> Vec<T> {
+            let multiplier = with_rates(&by_force, rate);
+            let motion = [0, 1, 2].map(|k| &moving[k][..]);
+            let slopes = forms.over(Dual::fixed, |forms| weighed_slopes(forms, motion, &multiplier));
+            slopes.into_iter().map(|slope| -slope.derivatives[0]).collect()
+        };
+        let rate = solution.of(&slopes(&forms.rest())[2 * nv..]);
+        let others = slopes(&rate).into_iter().take(2 * nv).collect();
+        [others, rate].concat()
+    }
+}
+
+/// q and q̇ as they move along the direction that stands behind them and τ in the inputs.
+fn moving_state<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> [Vec<Dual<T, 1>>; 2] {
+    let rates = rates_along(forms.model, &inputs[0], &inputs[3]);
+    [with_rates(&inputs[0], &rates), with_rates(&inputs[1], &inputs[4])]
+}
+
+/// How torques change along that direction, if accelerations change like this.
+fn torque_rate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>], qdd: &[Dual<T, 1>]) -> Vec<T> {
+    let [q, qd] = moving_state(forms, inputs);
+    forms.over(Dual::fixed, |forms| {
+        let forces = forms.inverse_dynamics(&q, &qd, qdd);
+        forces.into_iter().map(|force| force.derivatives[0]).collect()
+    })
+}
+
+/// What H X + ∂τ/∂q, H Y + ∂τ/∂q̇ and H Z − 1 leave.
+fn left_by_columns<T: Real>(forms: &Forms<'_, T>, motion: [&[T]; 3], found: &[T]) -> Vec<T> {
+    let nv = motion[1].len();
+    let at = forms.inverse_dynamics_derivatives(motion);
+    let unit: Vec<T> = (0..nv * nv).map(|k| if k % (nv + 1) == 0 { -T::one() } else { T::zero() }).collect();
+    let of = |(found, right): (&[T], Vec<T>)| {
+        let entry = |k: usize| {
+            let (i, j) = (k / nv, k % nv);
+            (0..nv).fold(right[k], |sum, l| sum + at.mass_matrix[i * nv + l] * found[l * nv + j])
+        };
+        (0..nv * nv).map(entry).collect::<Vec<T>>()
+    };
+    found.chunks(nv * nv).zip([at.dtau_dq, at.dtau_dqd, unit]).flat_map(of).collect()
+}
+
+/// What solves H x = b for any b.
+struct Solution<'a, 'b, T> {
+    forms: &'a Forms<'b, T>,
+    q: &'a [T],
+    /// Of the factorisation; `None`: by articulated bodies.
+    factor: Option<alg::Ltdl<T>>,
+}
+
+impl<'a, 'b, T: Real> Solution<'a, 'b, T> {
+    fn new(forms: &'a Forms<'b, T>, q: &'a [T]) -> Self {
+        let factor = match forms.method {
+            ForwardDynamicsMethod::Factorisation => Some(alg::Ltdl::factor(forms.model, &forms.mass_matrix(q))),
+            _ => None,
+        };
+        Solution { forms, q, factor }
+    }
+
+    fn of(&self, right: &[T]) -> Vec<T> {
+        match &self.factor {
+            Some(factor) => factor.solve(right),
+            None => alg::solve_articulated(self.forms.model, self.q, right),
+        }
+    }
+
+    /// H⁻¹ by rows.
+    fn inverse(&self) -> Vec<T> {
+        let nv = self.forms.model.nv();
+        match &self.factor {
+            Some(factor) => factor.inverse(),
+            None => {
+                let unit = |k: usize| (0..nv).map(|i| if i == k { T::one() } else { T::zero() }).collect::<Vec<T>>();
+                by_rows(&(0..nv).map(|k| self.of(&unit(k))).collect::<Vec<_>>())
+            }
+        }
+    }
+
+    /// q̈ of q, q̇ and τ.
+    fn acceleration(&self, [q, qd, tau]: [&[T]; 3]) -> Vec<T> {
+        let bias = self.forms.bias_force(q, qd);
+        let net: Vec<T> = tau.iter().zip(bias).map(|(tau, h)| *tau - h).collect();
+        self.of(&net)
+    }
+
+    /// How it changes along the direction behind these inputs.
+    fn acceleration_rate(&self, inputs: &[Vec<T>], qdd: &[T]) -> Vec<T> {
+        let held: Vec<Dual<T, 1>> = qdd.iter().map(|x| Dual::fixed(*x)).collect();
+        let takes = torque_rate(self.forms, inputs, &held);
+        let left: Vec<T> = inputs[5].iter().zip(takes).map(|(rate, takes)| *rate - takes).collect();
+        self.of(&left)
+    }
+
+    /// ∂q̈/∂q, ∂q̈/∂q̇ and H⁻¹ of a motion, by rows.
+    fn derivatives(&self, motion: [&[T]; 3]) -> Vec<T> {
+        let nv = motion[1].len();
+        let of_torques = self.forms.inverse_dynamics_derivatives(motion);
+        let solved = |slopes: Vec<T>| {
+            let column = |k: usize| (0..nv).map(|i| -slopes[i * nv + k]).collect::<Vec<T>>();
+            by_rows(&(0..nv).map(|k| self.of(&column(k))).collect::<Vec<_>>())
+        };
+        [solved(of_torques.dtau_dq), solved(of_torques.dtau_dqd), self.inverse()].concat()
+    }
+}
+
+/// A square matrix by rows, from its columns.
+fn by_rows<T: Copy>(columns: &[Vec<T>]) -> Vec<T> {
+    (0..columns.len()).flat_map(|i| columns.iter().map(move |column| column[i])).collect()
+}
