@@ -91,6 +91,24 @@ const DATA: &[DataOf] = &[
         inputs: &["q", "qd", "tau"],
         blocks: &[("qdd", "qdd"), ("dqdd_dq", "dqdd_dq"), ("dqdd_dqd", "dqdd_dqd"), ("h_inverse", "h_inverse")],
     },
+    DataOf {
+        function: Function::GravityDerivative,
+        group: "gravity_derivative",
+        inputs: &["q"],
+        blocks: &[("dg_dq", "dg_dq"), ("g", "tau")],
+    },
+    DataOf {
+        function: Function::BiasDerivatives,
+        group: "bias_derivatives",
+        inputs: &["q", "qd"],
+        blocks: &[("dh_dq", "dh_dq"), ("dh_dqd", "dh_dqd"), ("h", "tau")],
+    },
+    DataOf {
+        function: Function::CoriolisTransposeForce,
+        group: "coriolis",
+        inputs: &["q", "qd"],
+        blocks: &[("coriolis_transpose_force", "C^T qd")],
+    },
 ];
 
 fn data_of(function: Function) -> &'static DataOf {
@@ -148,6 +166,11 @@ impl DerivativeState {
         let DataOf { inputs: names, group, .. } = data_of(function);
         let of = |name: &&str| self.data.get(*name).unwrap_or_else(|| &self.data[*group][*name]);
         names.iter().map(|name| inputs(of(name))).collect()
+    }
+
+    /// What the data have of the Coriolis matrix: C q̇, and Ḣ by rows.
+    pub fn coriolis(&self) -> [ExpectedBlock; 2] {
+        ["C_qd", "Hdot"].map(|name| ExpectedBlock { name, values: numbers(&self.data["coriolis"][name]) })
     }
 
     /// Its blocks, each with the results of a function that belong to it.

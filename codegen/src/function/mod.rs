@@ -2,6 +2,7 @@
 //! ([`RobotFunction`]); here is the list, in the order in which functions stand in generated files.
 
 mod aliases;
+mod bias_derivatives;
 mod contact;
 mod derivatives;
 mod drives;
@@ -153,6 +154,17 @@ functions! {
     /// How multipliers times its derivatives change along a direction.
     #[doc(alias("HVP", "Hessian-vector product", "second order"))]
     forward_derivatives::ForwardDynamicsHvp,
+    /// g with its derivative.
+    #[doc(alias("gravity Hessian"))]
+    bias_derivatives::GravityDerivative,
+    /// h with its derivatives.
+    bias_derivatives::BiasDerivatives,
+    /// C of Ḣ = C + Cᵀ, and Ḣ.
+    #[doc(alias("Coriolis", "Christoffel"))]
+    bias_derivatives::CoriolisMatrix,
+    /// Cᵀ q̇.
+    #[doc(alias("momentum observer"))]
+    bias_derivatives::CoriolisTransposeForce,
     /// Inputs of the drives to motion.
     drives::DrivenForwardDynamics,
     /// Motion to inputs of the drives.

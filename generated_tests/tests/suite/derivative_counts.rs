@@ -118,3 +118,16 @@ fn derivatives_of_arms_take_fewer_operations_than_ever_published() {
 fn slow_proof_that_derivatives_of_large_robots_take_few_operations() {
     hold(&LARGE);
 }
+
+/// Operations on record of what is at rest, without accelerations, or by velocities alone.
+#[test]
+fn derivatives_of_gravity_and_bias_forces_and_coriolis_matrices_take_what_is_on_record() {
+    use Function::{BiasDerivatives, CoriolisMatrix, CoriolisTransposeForce, GravityDerivative};
+    let functions = [GravityDerivative, BiasDerivatives, CoriolisMatrix, CoriolisTransposeForce];
+    let records = [[34, 671, 307, 302], [42, 1012, 464, 258], [130, 1617, 782, 383], [200, 2300, 1148, 524]];
+    for (of, record) in ARMS.iter().zip(records) {
+        let found = functions.map(|function| count(of, function, &[]));
+        println!("{:<40} {found:?}", of.file);
+        assert_eq!(found, record, "{}", of.file);
+    }
+}

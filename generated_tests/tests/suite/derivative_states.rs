@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 use straightline_codegen::options::Options;
-use straightline_codegen::scene::Gravity;
+use straightline_codegen::scene::{CoulombForm, Gravity};
 use straightline_codegen::{Function, Scalar};
-use straightline_core::{Dd, Real};
+use straightline_core::{Dd, Dual, Real};
 use straightline_generated_tests::bounds::DATA;
 use straightline_generated_tests::compiled;
 use straightline_generated_tests::derivative_data::{functions, DerivativeRobot, DerivativeState, ROBOTS};
@@ -36,9 +36,19 @@ fn most_f32(function: Function, block: &str, pinocchio: f64) -> f64 {
 }
 
 fn results<T: Real>(robot: &DerivativeRobot, function: Function, options: &Options, state: &DerivativeState) -> Vec<T> {
+    results_at(robot, function, options, state, state.inputs(function))
+}
+
+fn results_at<T: Real>(
+    robot: &DerivativeRobot,
+    function: Function,
+    options: &Options,
+    state: &DerivativeState,
+    inputs: Vec<Vec<f64>>,
+) -> Vec<T> {
     // one program for all states with a gravity of their own
     let mut options = options.clone();
-    let mut inputs = cast::<T>(&state.inputs(function));
+    let mut inputs = cast::<T>(&inputs);
     if state.kind == "gravity_tilted" {
         options.scene.gravity = Gravity::Input;
         inputs.extend(cast::<T>(&[state.gravity.to_vec()]));
@@ -48,7 +58,10 @@ fn results<T: Real>(robot: &DerivativeRobot, function: Function, options: &Optio
         let length = inputs[0][3..7].iter().fold(T::zero(), |sum, x| sum + *x * *x).sqrt();
         inputs[0][3..7].iter_mut().for_each(|x| *x = *x / length);
     }
-    programs::run::<T>(&robot.program(function, &options), &inputs)
+    let program = robot.program(function, &options);
+    // gravity where it is read
+    inputs.truncate(program.graph.inputs.len());
+    programs::run::<T>(&program, &inputs)
 }
 
 /// Each robot, function and block with its worst error; fails where one is beyond its bound.
@@ -98,6 +111,73 @@ fn derivatives_are_those_of_the_data_to_their_last_digits() {
 #[test]
 fn derivatives_in_f64_lose_no_more_than_pinocchio() {
     table::<f64>("f64", DerivativeRobot::options, most);
+}
+
+/// Ḣ is given, and C by its product with q̇: the data leave open which C it is.
+fn hold_coriolis_matrix<T: Real + Into<Dd>>(options: impl Fn(&DerivativeRobot) -> Options, most: f64) {
+    let function = Function::CoriolisMatrix;
+    for robot in ROBOTS.map(DerivativeRobot::load) {
+        for state in &robot.states {
+            let inputs = state.inputs(Function::BiasDerivatives);
+            let qd = cast::<T>(&inputs)[1].clone();
+            let results = results_at::<T>(&robot, function, &options(&robot), state, inputs);
+            let (c, h_dot) = results.split_at(qd.len() * qd.len());
+            let row = |row: &[T]| row.iter().zip(&qd).fold(T::zero(), |sum, (c, rate)| sum + *c * *rate);
+            let product: Vec<T> = c.chunks(qd.len()).map(row).collect();
+            let [c_qd, rate] = state.coriolis();
+            for (block, own) in [(c_qd, &product[..]), (rate, h_dot)] {
+                let error = block.error(own);
+                assert!(error <= most, "{} in {}: {error:e}", block.name, state.id);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_coriolis_matrix_times_velocities_and_the_rate_of_the_mass_matrix_are_those_of_the_data() {
+    let exact = |robot: &DerivativeRobot| {
+        let mut options = robot.options();
+        options.model.angle_tolerance = 0.0;
+        options
+    };
+    hold_coriolis_matrix::<Dd>(exact, DATA.most);
+    hold_coriolis_matrix::<f64>(DerivativeRobot::options, 3.0 * BOUND);
+}
+
+/// Of robots with a fixed base, whose velocities are rates of coordinates: D + Dᵀ = 2 Ḣ, K − Kᵀ = ½ d/dt (D − Dᵀ) along the motion, and K is symmetric at
+/// rest; D without damping, K and D = ∂τ/∂q, ∂τ/∂q̇. The rate of D is that of its program in dual numbers.
+#[test]
+fn derivatives_have_the_symmetries_of_lagrangian_mechanics() {
+    let half = Dd::from(0.5);
+    for robot in ROBOTS.map(DerivativeRobot::load).into_iter().filter(|robot| !robot.floating) {
+        let mut options = robot.options();
+        (options.scene.effects.damping, options.scene.effects.coulomb) = (false, CoulombForm::Off);
+        let program = |function| robot.program(function, &options);
+        let [of_motion, of_bias, of_inertia] =
+            [Function::InverseDynamicsDerivatives, Function::BiasDerivatives, Function::CoriolisMatrix].map(program);
+        for state in robot.states.iter().filter(|state| state.kind != "gravity_tilted") {
+            let inputs = cast::<Dd>(&state.inputs(Function::InverseDynamicsDerivatives));
+            let [q, qd, qdd] = [0, 1, 2].map(|k| &inputs[k][..]);
+            let (nv, rest) = (qd.len(), vec![Dd::ZERO; qd.len()]);
+            let along = |x: &[Dd], rate: &[Dd]| -> Vec<Dual<Dd, 1>> {
+                x.iter().zip(rate).map(|(x, rate)| Dual { value: *x, derivatives: [*rate] }).collect()
+            };
+            let k = programs::run(&of_motion, &inputs);
+            let at_rest = programs::run(&of_motion, &[q.to_vec(), rest.clone(), rest]);
+            let d = programs::run(&of_bias, &[along(q, qd), along(qd, qdd)]).split_off(nv * nv);
+            let h_dot = programs::run(&of_inertia, &[q.to_vec(), qd.to_vec()]).split_off(nv * nv);
+            let greatest = |x: &[Dd]| x.iter().map(|x| x.to_f64().abs()).fold(1e-3, f64::max);
+            for (i, j) in (0..nv).flat_map(|i| (0..nv).map(move |j| (i * nv + j, j * nv + i))) {
+                let hold = |off: Dd, scale: f64, identity: &str| {
+                    assert!(off.to_f64().abs() <= 1e-24 * scale, "{identity} in {}: {off:?}", state.id);
+                };
+                hold(d[i].value + d[j].value - (h_dot[i] + h_dot[i]), greatest(&h_dot), "D + Dᵀ = 2 Ḣ");
+                let rate = (d[i].derivatives[0] - d[j].derivatives[0]) * half;
+                hold(k[i] - k[j] - rate, greatest(&k[..nv * nv]), "K − Kᵀ = ½ d/dt (D − Dᵀ)");
+                hold(at_rest[i] - at_rest[j], greatest(&at_rest[..nv * nv]), "K is symmetric at rest");
+            }
+        }
+    }
 }
 
 /// Inputs of f32 are others than those of the data: beside the same program in double-double.

@@ -112,7 +112,7 @@ pub(super) fn moving<T: ReferenceReal>(
 }
 
 /// dq/dt at these velocities. The position of a free link moves by R v, its attitude by ½ (u, w) (ω, 0).
-fn configuration_rates<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> Vec<T> {
+pub(super) fn configuration_rates<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> Vec<T> {
     let mut rates = vec![<T as Real>::zero(); q.len()];
     let half = T::constant(Dd::HALF);
     for link in &tree.links {

@@ -11,6 +11,7 @@ use straightline_core::model::Model;
 use straightline_core::reference::{CentreOfMassFrame, CentreOfMassTree, ExtendedPosition, ReferenceJoint};
 use straightline_core::{Dd, Real};
 
+mod bias_derivatives;
 mod derivatives;
 mod drives;
 mod dynamics;

@@ -58,6 +58,7 @@ mod aba;
 mod actuator;
 mod constraint;
 mod contact_system;
+mod coriolis;
 mod crba;
 mod driven;
 mod driven_contact;
@@ -86,6 +87,7 @@ pub use constraint::{
     applied_rows, baumgarte, constrained_forward_dynamics, hybrid_inverse_dynamics, projection, ConstrainedMotion,
     Support,
 };
+pub use coriolis::{coriolis_matrix, coriolis_transpose_force};
 pub use crba::mass_matrix;
 pub use driven::{
     complete_model, drive_energy, drive_power, drive_states, drive_torques, driven_motion, drives_are_diagonal,
