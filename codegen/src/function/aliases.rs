@@ -51,6 +51,6 @@ mod tests {
             assert_eq!(Function::called(alias).map(Function::name), Some(name));
         }
         let about: Vec<&str> = Function::known().filter(|f| f.is_about("coriolis")).map(Function::name).collect();
-        assert_eq!(about, ["bias_force", "velocity_force"]);
+        assert_eq!(about, ["bias_force", "velocity_force", "coriolis_matrix", "coriolis_transpose_force"]);
     }
 }
