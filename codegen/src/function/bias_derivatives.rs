@@ -2,20 +2,11 @@
 
 use super::derivatives::{along, SQUARE};
 use super::spec::Extent::Velocities;
-use super::spec::{Family, Form, Judged, Output, RobotFunction, Spec};
+use super::spec::{Form, Output, RobotFunction, Spec};
 use super::{Forms, Quantity};
 use straightline_core::algorithms as alg;
-use straightline_core::reduced::ReducedJoint;
+use straightline_core::reduced::{ReducedJoint, ReducedModel};
 use straightline_core::{Dual, Real};
-
-/// What all of them have in common.
-const DERIVED: Spec = Spec {
-    family: Family::Derivatives,
-    form: Form::Derivatives,
-    substituted_up_to: 9000,
-    judged: Judged::ByDerivatives,
-    ..Spec::DEFAULT
-};
 
 pub struct GravityDerivative;
 
@@ -33,7 +24,7 @@ impl RobotFunction for GravityDerivative {
             ),
             Output::new("g", &[Velocities], "generalized forces \\[N·m or N\\]"),
         ],
-        ..DERIVED
+        ..Spec::DERIVED
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
@@ -46,8 +37,8 @@ impl RobotFunction for GravityDerivative {
             return [(0..nv * nv).map(entry).collect(), alg::gravity_force(model, q)].concat();
         };
         let mut all = alg::reduced_inverse_dynamics_derivatives(torques, [q, &rest, &rest]);
-        // the Hessian of potential energy, where velocities are rates of coordinates
-        if torques.bodies.iter().all(|body| body.kind != ReducedJoint::Free) {
+        // the Hessian of potential energy
+        if rates_are_of_coordinates(torques) {
             for (i, j) in (0..nv).flat_map(|i| (0..i).map(move |j| (i, j))) {
                 all.dtau_dq[j * nv + i] = all.dtau_dq[i * nv + j];
             }
@@ -73,7 +64,7 @@ impl RobotFunction for BiasDerivatives {
             Output::new("dh_dqd", SQUARE, "rows of ∂h/∂q̇ \\[N·m·s/rad, N·s/m\\]"),
             Output::new("h", &[Velocities], "generalized forces \\[N·m or N\\]"),
         ],
-        ..DERIVED
+        ..Spec::DERIVED
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
@@ -94,15 +85,14 @@ impl RobotFunction for CoriolisMatrix {
             Output::new("c", SQUARE, "rows of C \\[N·m·s/rad, N·s/m\\]: C q̇ are velocity forces, Ḣ − 2 C is skew"),
             Output::new("h_dot", SQUARE, "rows of Ḣ = dH/dt along q̇, both triangles \\[kg·m²/s, kg·m/s, kg/s\\]"),
         ],
-        ..DERIVED
+        ..Spec::DERIVED
     };
 
     /// Where velocities are rates of coordinates C = ½ ∂h/∂q̇, which is linear in q̇: ∂h/∂q̇ at half of it.
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
         let (q, qd) = (&inputs[0], &inputs[1]);
         let nv = qd.len();
-        let reduced = forms.reduced.map(|[torques, _]| torques);
-        let c = match reduced.filter(|form| form.bodies.iter().all(|body| body.kind != ReducedJoint::Free)) {
+        let c = match forms.reduced.map(|[torques, _]| torques).filter(|form| rates_are_of_coordinates(form)) {
             Some(torques) => {
                 let half: Vec<T> = qd.iter().map(|rate| *rate * T::constant(straightline_core::Dd::HALF)).collect();
                 alg::reduced_inverse_dynamics_derivatives(torques, [q, &half, &forms.rest()]).dtau_dqd
@@ -126,10 +116,15 @@ impl RobotFunction for CoriolisTransposeForce {
         inputs: &[Quantity::Configuration, Quantity::Velocity],
         outputs: &[Output::new("f", &[Velocities], "generalized forces \\[N·m or N\\]")],
         form: Form::Plain,
-        ..DERIVED
+        ..Spec::DERIVED
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
         alg::coriolis_transpose_force(forms.model, &inputs[0], &inputs[1])
     }
+}
+
+/// Whether velocities are the rates of coordinates, as without a floating base.
+fn rates_are_of_coordinates<T>(form: &ReducedModel<T>) -> bool {
+    form.bodies.iter().all(|body| body.kind != ReducedJoint::Free)
 }

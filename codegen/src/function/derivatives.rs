@@ -1,7 +1,7 @@
 //! Derivatives of inverse dynamics: matrices, and products with directions and multipliers.
 
 use super::spec::Extent::Velocities;
-use super::spec::{Family, Form, Judged, Output, RobotFunction, Spec};
+use super::spec::{Form, Output, RobotFunction, Spec};
 use super::{Forms, Quantity};
 use straightline_core::algorithms::{self as alg, DerivativeBlocks};
 use straightline_core::model::Model;
@@ -28,11 +28,7 @@ impl RobotFunction for InverseDynamicsDerivatives {
             Output::new("h", SQUARE, "rows of H = ∂τ/∂q̈, both triangles \\[kg·m², kg·m, kg\\]"),
             Output::new("tau", &[Velocities], "generalized forces \\[N·m or N\\]"),
         ],
-        family: Family::Derivatives,
-        form: Form::Derivatives,
-        substituted_up_to: 9000,
-        judged: Judged::ByDerivatives,
-        ..Spec::DEFAULT
+        ..Spec::DERIVED
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
@@ -57,11 +53,8 @@ impl RobotFunction for InverseDynamicsJvp {
             Quantity::AccelerationDirection,
         ],
         outputs: &[Output::new("jvp", &[Velocities], "how fast generalized forces change \\[N·m or N\\]")],
-        family: Family::Derivatives,
         form: Form::InverseDynamics,
-        substituted_up_to: 9000,
-        judged: Judged::ByDerivatives,
-        ..Spec::DEFAULT
+        ..Spec::DERIVED
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
@@ -90,11 +83,8 @@ impl RobotFunction for InverseDynamicsVjp {
             Output::new("vjp_qd", &[Velocities], "(∂τ/∂q̇)ᵀ λ"),
             Output::new("vjp_qdd", &[Velocities], "H λ"),
         ],
-        family: Family::Derivatives,
         form: Form::InverseDynamics,
-        substituted_up_to: 9000,
-        judged: Judged::ByDerivatives,
-        ..Spec::DEFAULT
+        ..Spec::DERIVED
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
@@ -127,11 +117,8 @@ impl RobotFunction for InverseDynamicsHvp {
             Output::new("hvp_qd", &[Velocities], "of (∂τ/∂q̇)ᵀ λ"),
             Output::new("hvp_qdd", &[Velocities], "of H λ"),
         ],
-        family: Family::Derivatives,
         form: Form::InverseDynamics,
-        substituted_up_to: 9000,
-        judged: Judged::ByDerivatives,
-        ..Spec::DEFAULT
+        ..Spec::DERIVED
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
@@ -143,8 +130,8 @@ impl RobotFunction for InverseDynamicsHvp {
     }
 }
 
-/// q, q̇ and q̈ as they move along a direction, which stands behind them in the inputs.
-fn moving<T: Real>(model: &Model<T>, inputs: &[Vec<T>]) -> [Vec<Dual<T, 1>>; 3] {
+/// q, q̇ and what stands behind them in the inputs, as they move along the direction behind it.
+pub(super) fn moving<T: Real>(model: &Model<T>, inputs: &[Vec<T>]) -> [Vec<Dual<T, 1>>; 3] {
     let rates = rates_along(model, &inputs[0], &inputs[3]);
     [with_rates(&inputs[0], &rates), with_rates(&inputs[1], &inputs[4]), with_rates(&inputs[2], &inputs[5])]
 }
@@ -222,7 +209,7 @@ fn by_directions<T: Real>(model: &Model<T>, [q, qd, qdd]: [&[T]; 3]) -> Derivati
 }
 
 /// dq/dt at these velocities: joints with quaternions along their tangent.
-pub(super) fn rates_along<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
+fn rates_along<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
     let mut rates = vec![T::zero(); q.len()];
     for joint in model.bodies.iter().map(|body| &body.joint) {
         let own = &mut rates[joint.iq..joint.iq + joint.kind.nq()];

@@ -1,8 +1,9 @@
 //! Forces to motion and motion to forces: inverse and forward dynamics, and what they are made of.
 
+use super::solution::{net_force, Solution};
 use super::spec::Extent::{Joints, Of, Velocities};
 use super::spec::{Divisor, Family, Form, InLanes, Judged, Output, Parts, RobotFunction, Spec};
-use super::{Forms, ForwardDynamicsMethod, Function, Quantity};
+use super::{Forms, Function, Quantity};
 use straightline_core::algorithms as alg;
 use straightline_core::spatial::Vec3;
 use straightline_core::Real;
@@ -149,12 +150,8 @@ impl RobotFunction for ForwardDynamics {
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        let (q, bias) = (&inputs[0], forms.bias_force(&inputs[0], &inputs[1]));
-        let net: Vec<T> = inputs[2].iter().zip(&bias).map(|(tau, h)| *tau - *h).collect();
-        match forms.method {
-            ForwardDynamicsMethod::Factorisation => alg::Ltdl::factor(forms.model, &forms.mass_matrix(q)).solve(&net),
-            _ => alg::solve_articulated(forms.model, q, &net),
-        }
+        let net = net_force(forms, inputs);
+        Solution::new(forms, &inputs[0]).of(&net)
     }
 
     fn residual<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>], found: &[T]) -> Vec<T> {

@@ -1,11 +1,12 @@
 //! Derivatives of forward dynamics. q̈ obeys H q̈ + h = τ, so that its derivatives are those of inverse dynamics at q̈, solved for:
 //! ∂q̈/∂x = −H⁻¹ ∂τ/∂x, and none of them goes through the solution.
 
-use super::derivatives::{rates_along, weighed_slopes, with_rates, SQUARE};
+use super::derivatives::{moving, weighed_slopes, with_rates, SQUARE};
+use super::dynamics::ForwardDynamics;
+use super::solution::{by_rows, Solution};
 use super::spec::Extent::Velocities;
-use super::spec::{Divisor, Family, Form, Judged, Output, RobotFunction, Spec};
-use super::{Forms, ForwardDynamicsMethod, Quantity};
-use straightline_core::algorithms as alg;
+use super::spec::{Divisor, Form, Judged, Output, RobotFunction, Spec};
+use super::{Forms, Quantity};
 use straightline_core::{Dual, Real};
 
 const BY_POSITION: Output = Output::new(
@@ -19,15 +20,7 @@ const INVERSE: Output =
     Output::new("h_inverse", SQUARE, "rows of H⁻¹ = ∂q̈/∂τ, both triangles \\[1/(kg·m²), 1/(kg·m), 1/kg\\]");
 
 /// What all of them have in common.
-const SOLVED: Spec = Spec {
-    family: Family::Derivatives,
-    form: Form::Derivatives,
-    solves: true,
-    substituted_up_to: 9000,
-    divisor: Divisor::Inertia,
-    judged: Judged::ByColumns,
-    ..Spec::DEFAULT
-};
+const SOLVED: Spec = Spec { solves: true, divisor: Divisor::Inertia, judged: Judged::ByColumns, ..Spec::DERIVED };
 
 pub struct ForwardDynamicsDerivatives;
 
@@ -47,16 +40,14 @@ impl RobotFunction for ForwardDynamicsDerivatives {
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        let solution = Solution::new(forms, &inputs[0]);
-        let qdd = solution.acceleration([&inputs[0], &inputs[1], &inputs[2]]);
+        let (solution, qdd) = Solution::with_acceleration(forms, inputs);
         let derivatives = solution.derivatives([&inputs[0], &inputs[1], &qdd]);
         [qdd, derivatives].concat()
     }
 
     fn residual<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>], found: &[T]) -> Vec<T> {
         let (qdd, derivatives) = found.split_at(inputs[1].len());
-        let takes = forms.inverse_dynamics(&inputs[0], &inputs[1], qdd);
-        let off = takes.into_iter().zip(&inputs[2]).map(|(takes, tau)| takes - *tau).collect();
+        let off = ForwardDynamics::residual(forms, inputs, qdd);
         [off, left_by_columns(forms, [&inputs[0], &inputs[1], qdd], derivatives)].concat()
     }
 }
@@ -103,13 +94,12 @@ impl RobotFunction for ForwardDynamicsJvp {
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        let solution = Solution::new(forms, &inputs[0]);
-        let qdd = solution.acceleration([&inputs[0], &inputs[1], &inputs[2]]);
+        let (solution, qdd) = Solution::with_acceleration(forms, inputs);
         solution.acceleration_rate(inputs, &qdd)
     }
 
     fn residual<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>], found: &[T]) -> Vec<T> {
-        let qdd = Solution::new(forms, &inputs[0]).acceleration([&inputs[0], &inputs[1], &inputs[2]]);
+        let (_, qdd) = Solution::with_acceleration(forms, inputs);
         let takes = torque_rate(forms, inputs, &with_rates(&qdd, found));
         takes.into_iter().zip(&inputs[5]).map(|(takes, rate)| takes - *rate).collect()
     }
@@ -138,8 +128,7 @@ impl RobotFunction for ForwardDynamicsVjp {
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        let solution = Solution::new(forms, &inputs[0]);
-        let qdd = solution.acceleration([&inputs[0], &inputs[1], &inputs[2]]);
+        let (solution, qdd) = Solution::with_acceleration(forms, inputs);
         let by_force = solution.of(&inputs[3]);
         let slopes = weighed_slopes(forms, [&inputs[0], &inputs[1], &qdd], &by_force);
         let others = slopes.into_iter().take(2 * by_force.len()).map(|slope| -slope).collect();
@@ -179,16 +168,16 @@ impl RobotFunction for ForwardDynamicsHvp {
 
     /// (∂q̈/∂q)ᵀ λ = −Kᵀ μ, (∂q̈/∂q̇)ᵀ λ = −Dᵀ μ and μ = H⁻¹ λ, where q̈ and μ move with the rest: H μ = λ stays.
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        let solution = Solution::new(forms, &inputs[0]);
-        let qdd = solution.acceleration([&inputs[0], &inputs[1], &inputs[2]]);
+        let (solution, qdd) = Solution::with_acceleration(forms, inputs);
         let moving = {
             let rates = solution.acceleration_rate(inputs, &qdd);
-            [moving_state(forms, inputs).to_vec(), vec![with_rates(&qdd, &rates)]].concat()
+            let [q, qd, _] = moving(forms.model, inputs);
+            [q, qd, with_rates(&qdd, &rates)]
         };
         let (nv, by_force) = (qdd.len(), solution.of(&inputs[6]));
         let slopes = |rate: &[T]| -> Vec<T> {
             let multiplier = with_rates(&by_force, rate);
-            let motion = [0, 1, 2].map(|k| &moving[k][..]);
+            let motion = moving.each_ref().map(|x| &x[..]);
             let slopes = forms.over(Dual::fixed, |forms| weighed_slopes(forms, motion, &multiplier));
             slopes.into_iter().map(|slope| -slope.derivatives[0]).collect()
         };
@@ -198,15 +187,9 @@ impl RobotFunction for ForwardDynamicsHvp {
     }
 }
 
-/// q and q̇ as they move along the direction that stands behind them and τ in the inputs.
-fn moving_state<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> [Vec<Dual<T, 1>>; 2] {
-    let rates = rates_along(forms.model, &inputs[0], &inputs[3]);
-    [with_rates(&inputs[0], &rates), with_rates(&inputs[1], &inputs[4])]
-}
-
-/// How torques change along that direction, if accelerations change like this.
+/// How torques change along the direction behind q, q̇ and τ in the inputs, if accelerations change like this.
 fn torque_rate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>], qdd: &[Dual<T, 1>]) -> Vec<T> {
-    let [q, qd] = moving_state(forms, inputs);
+    let [q, qd, _] = moving(forms.model, inputs);
     forms.over(Dual::fixed, |forms| {
         let forces = forms.inverse_dynamics(&q, &qd, qdd);
         forces.into_iter().map(|force| force.derivatives[0]).collect()
@@ -228,49 +211,7 @@ fn left_by_columns<T: Real>(forms: &Forms<'_, T>, motion: [&[T]; 3], found: &[T]
     found.chunks(nv * nv).zip([at.dtau_dq, at.dtau_dqd, unit]).flat_map(of).collect()
 }
 
-/// What solves H x = b for any b.
-struct Solution<'a, 'b, T> {
-    forms: &'a Forms<'b, T>,
-    q: &'a [T],
-    /// Of the factorisation; `None`: by articulated bodies.
-    factor: Option<alg::Ltdl<T>>,
-}
-
-impl<'a, 'b, T: Real> Solution<'a, 'b, T> {
-    fn new(forms: &'a Forms<'b, T>, q: &'a [T]) -> Self {
-        let factor = match forms.method {
-            ForwardDynamicsMethod::Factorisation => Some(alg::Ltdl::factor(forms.model, &forms.mass_matrix(q))),
-            _ => None,
-        };
-        Solution { forms, q, factor }
-    }
-
-    fn of(&self, right: &[T]) -> Vec<T> {
-        match &self.factor {
-            Some(factor) => factor.solve(right),
-            None => alg::solve_articulated(self.forms.model, self.q, right),
-        }
-    }
-
-    /// H⁻¹ by rows.
-    fn inverse(&self) -> Vec<T> {
-        let nv = self.forms.model.nv();
-        match &self.factor {
-            Some(factor) => factor.inverse(),
-            None => {
-                let unit = |k: usize| (0..nv).map(|i| if i == k { T::one() } else { T::zero() }).collect::<Vec<T>>();
-                by_rows(&(0..nv).map(|k| self.of(&unit(k))).collect::<Vec<_>>())
-            }
-        }
-    }
-
-    /// q̈ of q, q̇ and τ.
-    fn acceleration(&self, [q, qd, tau]: [&[T]; 3]) -> Vec<T> {
-        let bias = self.forms.bias_force(q, qd);
-        let net: Vec<T> = tau.iter().zip(bias).map(|(tau, h)| *tau - h).collect();
-        self.of(&net)
-    }
-
+impl<T: Real> Solution<'_, '_, T> {
     /// How it changes along the direction behind these inputs.
     fn acceleration_rate(&self, inputs: &[Vec<T>], qdd: &[T]) -> Vec<T> {
         let held: Vec<Dual<T, 1>> = qdd.iter().map(|x| Dual::fixed(*x)).collect();
@@ -289,9 +230,4 @@ impl<'a, 'b, T: Real> Solution<'a, 'b, T> {
         };
         [solved(of_torques.dtau_dq), solved(of_torques.dtau_dqd), self.inverse()].concat()
     }
-}
-
-/// A square matrix by rows, from its columns.
-fn by_rows<T: Copy>(columns: &[Vec<T>]) -> Vec<T> {
-    (0..columns.len()).flat_map(|i| columns.iter().map(move |column| column[i])).collect()
 }

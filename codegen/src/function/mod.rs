@@ -11,6 +11,7 @@ mod forms;
 mod forward_derivatives;
 mod kinematics;
 mod quantity;
+mod solution;
 mod spec;
 #[cfg(feature = "verify")]
 pub mod truth;

@@ -163,6 +163,11 @@ pub enum Judged {
 }
 
 impl Judged {
+    /// Whether errors show in the equations that results solve.
+    pub fn is_by_equations(self) -> bool {
+        matches!(self, Judged::ByResidual | Judged::ByColumns)
+    }
+
     /// What errors of results are compared with. An inertia that is less than `least` of what it is made of counts as that: where all that a joint
     /// moves comes to lie on its axis, what is left is rounding noise.
     pub fn scales(self, results: &[Magnitude], least: f64) -> Vec<f64> {
@@ -231,6 +236,15 @@ impl Spec {
         keeps_order: false,
         divisor: Divisor::Nothing,
         judged: Judged::ByScale,
+    };
+
+    /// What derivatives of forces are, to be completed.
+    pub const DERIVED: Spec = Spec {
+        family: Family::Derivatives,
+        form: Form::Derivatives,
+        substituted_up_to: 9000,
+        judged: Judged::ByDerivatives,
+        ..Spec::DEFAULT
     };
 }
 

@@ -180,7 +180,7 @@ impl Check<'_> {
         let all: usize = function.outputs(&robot.model, frames).iter().map(Port::len).sum();
         let is_whole = scene.select(function, &robot.model, frames).0.into_iter().eq(0..all);
         match function.spec().judged {
-            Judged::ByResidual | Judged::ByColumns if is_whole => self.plain.sizes_of_solutions(state, off),
+            judged if judged.is_by_equations() && is_whole => self.plain.sizes_of_solutions(state, off),
             // residuals have no scale of accelerations: all of them are judged by the greatest
             Judged::ByResidual => vec![found.iter().map(|x| x.hi().abs()).fold(0.0, f64::max); found.len()],
             judged @ Judged::ByInertias if is_whole => {
@@ -193,8 +193,8 @@ impl Check<'_> {
 
     fn compare(&self, mut losses: Losses) -> Result<(), Disagreement> {
         let PlainEquations { robot, function, options, .. } = self.plain;
-        let Spec { judged, solves, family, .. } = function.spec();
-        if *judged == Judged::ByResidual || *solves && *family == Family::Derivatives {
+        let Spec { solves, family, .. } = function.spec();
+        if *solves && *family != Family::Drives {
             let lost = Disagreement {
                 program: function.name().to_string(),
                 result: element_of(&self.graph.outputs, 0),
@@ -251,7 +251,7 @@ impl PlainEquations<'_> {
         let (mut bound, wanted) = self.bound(state);
         with_sizes(&mut bound.model, longest_lever(&self.robot.model));
         let method = ForwardDynamicsMethod::ArticulatedBody;
-        let is_solved = matches!(self.function.spec().judged, Judged::ByResidual | Judged::ByColumns);
+        let is_solved = self.function.spec().judged.is_by_equations();
         let all: usize = self.function.outputs(&self.robot.model, 0).iter().map(Port::len).sum();
         if is_solved && wanted.iter().copied().eq(0..all) {
             let found: Vec<EveryScalar> = found.iter().copied().map(Real::constant).collect();

@@ -1,7 +1,7 @@
 //! The bounds of rounding errors of every program.
 
 use crate::equations::Robot;
-use crate::function::{Function, Judged};
+use crate::function::Function;
 use crate::options::{Optimisations, Options};
 use crate::program::companion::ROUNDED;
 use crate::program::input_box::input_box;
@@ -24,9 +24,9 @@ pub(crate) fn certificates(robot: &Robot, programs: &[TracedProgram], options: &
             Err(refusal) => return Some(ErrorReport::refused(refusal.words())),
         };
         let ranges = certify::box_in_words(&p.graph.inputs, &inputs);
-        let known = match p.function.spec().judged {
-            Judged::ByResidual | Judged::ByColumns => known(robot, &p.graph, &inputs, options),
-            _ => KnownSystem::default(),
+        let known = match p.function.spec().judged.is_by_equations() {
+            true => known(robot, &p.graph, &inputs, options),
+            false => KnownSystem::default(),
         };
         Some(match certify::certify_with(&p.graph, options.scalar, &inputs, effort, &known) {
             Ok(certificate) => ErrorReport::new(outputs, ranges, certificate),

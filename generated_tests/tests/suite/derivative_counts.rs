@@ -66,7 +66,9 @@ fn count(of: &CountsOf, function: Function, results: &[&str]) -> usize {
         outputs: [(function, Selection { results, ..Selection::default() })].into_iter().collect(),
         ..Scene::default()
     };
-    program(&robot, &[], function, &Options { model, scene, ..Options::default() }).graph.counts().flops()
+    let counts = program(&robot, &[], function, &Options { model, scene, ..Options::default() }).graph.counts();
+    assert!(counts.div == 0 || function.spec().solves, "{} of {} divides", function.name(), of.file);
+    counts.flops()
 }
 
 /// Products beside inverse dynamics: along a direction, backwards, and of second order.

@@ -3,7 +3,7 @@
 use super::super::bias_derivatives::{BiasDerivatives, CoriolisMatrix, CoriolisTransposeForce, GravityDerivative};
 use super::super::dynamics::{BiasForce, GravityForce};
 use super::derivatives::{configuration_rates, moving, slopes, unit};
-use super::{list, Chapter, Truth};
+use super::{by_rows, list, Chapter, Truth};
 use nalgebra::{DMatrix, DVector, Matrix3};
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference::{self, CentreOfMassFrame};
@@ -15,7 +15,7 @@ impl Truth for GravityDerivative {
         let tree = at.tree.map(Dual::<Magnitude, 1>::fixed);
         let column = |k: usize| {
             let [q, ..] = moving(&at.tree, [at.q(), at.qd(), at.qdd()], &unit(nv, 0, k));
-            reference::gravity_force(&tree, &q).map(|force| force.derivatives[0])
+            list(&reference::gravity_force(&tree, &q).map(|force| force.derivatives[0]))
         };
         let columns: Vec<_> = (0..nv).map(column).collect();
         Some([by_rows(&columns), GravityForce::truth(at)?].concat())
@@ -28,7 +28,7 @@ impl Truth for BiasDerivatives {
         let held = vec![Magnitude::zero(); nv];
         let block = |block: usize| {
             let column = |k| slopes(at, &at.tree, [at.q(), at.qd(), &held], &unit(nv, block, k));
-            by_rows(&(0..nv).map(|k| DVector::from_vec(column(k))).collect::<Vec<_>>())
+            by_rows(&(0..nv).map(column).collect::<Vec<_>>())
         };
         Some([block(0), block(1), BiasForce::truth(at)?].concat())
     }
@@ -84,9 +84,4 @@ fn along_motion(at: &Chapter<'_>) -> (reference::CentreOfMassTree<Dual<Magnitude
 fn mass_matrix_rate(at: &Chapter<'_>) -> DMatrix<Magnitude> {
     let (tree, q) = along_motion(at);
     reference::mass_matrix(&tree, &q).map(|x| x.derivatives[0])
-}
-
-/// A square matrix by rows, from its columns.
-fn by_rows(columns: &[DVector<Magnitude>]) -> Vec<Magnitude> {
-    (0..columns.len()).flat_map(|i| columns.iter().map(move |column| column[i])).collect()
 }

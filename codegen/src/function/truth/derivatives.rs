@@ -5,7 +5,7 @@ use super::super::derivatives::{
 };
 use super::super::dynamics::{InverseDynamics, MassMatrix};
 use super::super::Quantity;
-use super::{Chapter, Truth};
+use super::{by_rows, Chapter, Truth};
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference::{self, CentreOfMassTree, ReferenceJoint, ReferenceReal};
 use straightline_core::{Dd, Dual, Real};
@@ -16,16 +16,11 @@ pub(super) type Direction<T> = [Vec<T>; 3];
 impl Truth for InverseDynamicsDerivatives {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         let nv = at.qd().len();
-        let columns = [0, 1].map(|block| {
+        let [by_q, by_qd] = [0, 1].map(|block| {
             let column = |k: usize| slopes(at, &at.tree, motion(at), &unit(nv, block, k));
-            (0..nv).map(column).collect::<Vec<_>>()
+            by_rows(&(0..nv).map(column).collect::<Vec<_>>())
         });
-        let rows = columns.into_iter().flat_map(|columns| {
-            let rows = (0..nv).flat_map(|i| columns.iter().map(|column| column[i]).collect::<Vec<_>>());
-            rows.collect::<Vec<_>>()
-        });
-        let others = [MassMatrix::truth(at)?, InverseDynamics::truth(at)?];
-        Some(rows.chain(others.into_iter().flatten()).collect())
+        Some([by_q, by_qd, MassMatrix::truth(at)?, InverseDynamics::truth(at)?].concat())
     }
 }
 

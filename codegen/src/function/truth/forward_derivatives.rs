@@ -7,7 +7,7 @@ use super::super::forward_derivatives::{
 };
 use super::super::Quantity;
 use super::derivatives::{moving, slopes, unit, weighed_slopes, Direction};
-use super::{solved, Chapter, Truth};
+use super::{by_rows, solved, Chapter, Truth};
 use nalgebra::{DMatrix, DVector};
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference;
@@ -109,12 +109,8 @@ impl<'a, 'b> MovingJoints<'a, 'b> {
             };
             self.of_moving(&self.solved(&right))
         };
-        let by_rows = |block: usize| {
-            let columns: Vec<_> = self.moving.iter().map(|k| column(block, *k)).collect();
-            let row = |i: usize| columns.iter().map(move |column| column[i]).collect::<Vec<_>>();
-            (0..self.moving.len()).flat_map(row).collect::<Vec<_>>()
-        };
-        (0..3).flat_map(by_rows).collect()
+        let rows = |block: usize| by_rows(&self.moving.iter().map(|k| column(block, *k)).collect::<Vec<_>>());
+        (0..3).flat_map(rows).collect()
     }
 
     /// Along the direction of the state.

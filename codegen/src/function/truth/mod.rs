@@ -222,6 +222,12 @@ fn solved(
     DVector::from_fn(n, |i, _| Magnitude::new(x[i]).of_size(sizes[i]))
 }
 
+/// A matrix by rows, from its columns.
+fn by_rows(columns: &[Vec<Magnitude>]) -> Vec<Magnitude> {
+    let rows = columns.first().map_or(0, Vec::len);
+    (0..rows).flat_map(|i| columns.iter().map(move |column| column[i])).collect()
+}
+
 /// A matrix column by column, or a vector.
 fn list<R: nalgebra::Dim, C: nalgebra::Dim, S: nalgebra::RawStorage<Magnitude, R, C>>(
     matrix: &nalgebra::Matrix<Magnitude, R, C, S>,

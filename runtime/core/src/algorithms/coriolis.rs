@@ -15,6 +15,7 @@
 //! as a whole cancels, and is never added.
 
 use super::composite_of;
+use super::crba::placed;
 use super::velocity::body_velocities;
 use crate::joint::JointPose;
 use crate::model::{BodyId, Model};
@@ -47,9 +48,10 @@ pub fn coriolis_matrix<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
             loop {
                 let over = &model.bodies[body].joint;
                 for l in 0..over.kind.nv() {
-                    let (place, field) = (over.iv + l, over.kind.mechanics().column(l, over.coordinates(q)));
-                    c[place * nv + at] = power(&field, &column.of_rate);
+                    let (place, mechanics, own) = (over.iv + l, over.kind.mechanics(), over.coordinates(q));
+                    c[place * nv + at] = mechanics.along(l, own, &column.of_rate);
                     if body != b {
+                        let field = mechanics.column(l, own);
                         let rate = turned_with(motion.velocities[body].angular, &field);
                         c[at * nv + place] = power(&rate, &column.momentum) + field.angular.dot(column.convected);
                     }
@@ -126,10 +128,7 @@ impl<T: Real> CoriolisSweep<T> {
             let (pose, composite) = (&poses[b], composites[b]);
             let moving = relative[b] + composite.wrench_of(&joints[b]);
             relative[parent] = relative[parent] + pose.wrench_to_parent(&moving);
-            let back = pose.composite_back(&composite);
-            let moments = (pose.placement * back.first_moment, pose.placed(back.second_moment));
-            let placed = Composite::moved(back.mass, moments, pose.translation);
-            composites[parent] = composites[parent].plus(&placed);
+            composites[parent] = composites[parent].plus(&placed(&pose.composite_back(&composite), pose));
         }
         CoriolisSweep { poses, velocities, joints, composites, relative }
     }

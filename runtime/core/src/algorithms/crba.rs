@@ -68,7 +68,7 @@ fn with_rotor<T: Real>(inertia: T, body: &Body<T>) -> T {
 }
 
 /// In the parent's axes, about the parent's origin.
-fn placed<T: Real>(composite: &Composite<T>, joint: &JointPose<T>) -> Composite<T> {
+pub(super) fn placed<T: Real>(composite: &Composite<T>, joint: &JointPose<T>) -> Composite<T> {
     let moments = (joint.placement * composite.first_moment, joint.placed(composite.second_moment));
     Composite::moved(composite.mass, moments, joint.translation)
 }

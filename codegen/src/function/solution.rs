@@ -1,0 +1,60 @@
+//! What solves H x = b for any b, by the method that was chosen: forward dynamics and its derivatives.
+
+use super::{Forms, ForwardDynamicsMethod};
+use straightline_core::algorithms as alg;
+use straightline_core::Real;
+
+/// What solves H x = b for any b.
+pub(super) struct Solution<'a, 'b, T> {
+    pub(super) forms: &'a Forms<'b, T>,
+    q: &'a [T],
+    /// Of the factorisation; `None`: by articulated bodies.
+    factor: Option<alg::Ltdl<T>>,
+}
+
+impl<'a, 'b, T: Real> Solution<'a, 'b, T> {
+    pub(super) fn new(forms: &'a Forms<'b, T>, q: &'a [T]) -> Self {
+        let factor = match forms.method {
+            ForwardDynamicsMethod::Factorisation => Some(alg::Ltdl::factor(forms.model, &forms.mass_matrix(q))),
+            _ => None,
+        };
+        Solution { forms, q, factor }
+    }
+
+    pub(super) fn of(&self, right: &[T]) -> Vec<T> {
+        match &self.factor {
+            Some(factor) => factor.solve(right),
+            None => alg::solve_articulated(self.forms.model, self.q, right),
+        }
+    }
+
+    /// H⁻¹ by rows.
+    pub(super) fn inverse(&self) -> Vec<T> {
+        let nv = self.forms.model.nv();
+        match &self.factor {
+            Some(factor) => factor.inverse(),
+            None => {
+                let unit = |k: usize| (0..nv).map(|i| if i == k { T::one() } else { T::zero() }).collect::<Vec<T>>();
+                by_rows(&(0..nv).map(|k| self.of(&unit(k))).collect::<Vec<_>>())
+            }
+        }
+    }
+
+    /// With q̈ of q, q̇ and τ, the first three inputs.
+    pub(super) fn with_acceleration(forms: &'a Forms<'b, T>, inputs: &'a [Vec<T>]) -> (Self, Vec<T>) {
+        let solution = Solution::new(forms, &inputs[0]);
+        let qdd = solution.of(&net_force(forms, inputs));
+        (solution, qdd)
+    }
+}
+
+/// τ − h of q, q̇ and τ, the first three inputs.
+pub(super) fn net_force<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+    let bias = forms.bias_force(&inputs[0], &inputs[1]);
+    inputs[2].iter().zip(bias).map(|(tau, h)| *tau - h).collect()
+}
+
+/// A square matrix by rows, from its columns.
+pub(super) fn by_rows<T: Copy>(columns: &[Vec<T>]) -> Vec<T> {
+    (0..columns.len()).flat_map(|i| columns.iter().map(move |column| column[i])).collect()
+}
