@@ -11,9 +11,11 @@ use straightline_codegen::program::TracedProgram;
 use straightline_codegen::{model, Function};
 use straightline_core::Dd;
 
-/// The robots of the data.
-pub const ROBOTS: [&str; 8] =
-    ["planar2r", "chapter_cylindrical", "chapter_6r", "puma560", "ur5", "panda", "solo12", "hyq"];
+/// The robots of the data that stand on the ground.
+pub const ARMS: &[&str] = &["planar2r", "chapter_cylindrical", "chapter_6r", "puma560", "ur5", "panda"];
+
+/// Those whose root is free.
+pub const LEGGED: &[&str] = &["solo12", "hyq"];
 
 /// A robot with its states.
 #[derive(Debug)]
@@ -26,6 +28,8 @@ pub struct DerivativeRobot {
     pub floating: bool,
     /// Its states.
     pub states: Vec<DerivativeState>,
+    /// That of the data on frames.
+    frame: String,
     baseline: Value,
 }
 
@@ -109,6 +113,38 @@ const DATA: &[DataOf] = &[
         inputs: &["q", "qd"],
         blocks: &[("coriolis_transpose_force", "C^T qd")],
     },
+    DataOf {
+        function: Function::FrameDerivatives,
+        group: "frame_derivatives",
+        inputs: &["q", "qd", "qdd"],
+        blocks: &[("dv_dq", "dv_dq"), ("da_dq", "da_dq"), ("da_dqd", "da_dqd"), ("dv_dqd", "J"), ("Jdot", "Jdot")],
+    },
+    DataOf {
+        function: Function::CentreOfMassJacobian,
+        group: "centroidal",
+        inputs: &["q"],
+        blocks: &[("com_jacobian", "com_jacobian")],
+    },
+    DataOf { function: Function::CentroidalMap, group: "centroidal", inputs: &["q"], blocks: &[("A", "A")] },
+    DataOf {
+        function: Function::CentroidalMapRate,
+        group: "centroidal",
+        inputs: &["q", "qd"],
+        blocks: &[("A", "A"), ("Adot", "Adot")],
+    },
+    DataOf {
+        function: Function::CentroidalDerivatives,
+        group: "centroidal",
+        inputs: &["q", "qd", "qdd"],
+        blocks: &[
+            ("h", "h_G"),
+            ("hdot", "hdot_G"),
+            ("dh_dq", "dhG_dq"),
+            ("dhdot_dq", "dhdotG_dq"),
+            ("dhdot_dqd", "dhdotG_dqd"),
+            ("A", "A"),
+        ],
+    },
 ];
 
 fn data_of(function: Function) -> &'static DataOf {
@@ -138,13 +174,15 @@ impl DerivativeRobot {
             file: description(name),
             floating: file["floating"].as_bool().expect("true or false"),
             states: states.collect(),
+            frame: file["frame"].as_str().expect("a name").to_string(),
             baseline: json(&folder.join("baseline_pinocchio_derivatives.json"))["robots"][name].clone(),
         }
     }
 
     /// The program of a function.
     pub fn program(&self, function: Function, options: &Options) -> TracedProgram {
-        programs::program(&programs::load(&programs::file(&self.file), &options.model), &[], function, options)
+        let frames = if function.is_per_frame() { vec![self.frame.clone()] } else { Vec::new() };
+        programs::program(&programs::load(&programs::file(&self.file), &options.model), &frames, function, options)
     }
 
     /// How it is compiled.

@@ -132,7 +132,7 @@ impl RobotFunction for InverseDynamicsHvp {
 
 /// q, q̇ and what stands behind them in the inputs, as they move along the direction behind it.
 pub(super) fn moving<T: Real>(model: &Model<T>, inputs: &[Vec<T>]) -> [Vec<Dual<T, 1>>; 3] {
-    let rates = rates_along(model, &inputs[0], &inputs[3]);
+    let rates = model.configuration_rate(&inputs[0], &inputs[3]);
     [with_rates(&inputs[0], &rates), with_rates(&inputs[1], &inputs[4]), with_rates(&inputs[2], &inputs[5])]
 }
 
@@ -206,16 +206,6 @@ fn by_directions<T: Real>(model: &Model<T>, [q, qd, qdd]: [&[T]; 3]) -> Derivati
     }
     let (mass_matrix, tau) = (alg::mass_matrix(model, q), alg::inverse_dynamics(model, q, qd, qdd));
     DerivativeBlocks { dtau_dq, dtau_dqd, mass_matrix, tau }
-}
-
-/// dq/dt at these velocities: joints with quaternions along their tangent.
-fn rates_along<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
-    let mut rates = vec![T::zero(); q.len()];
-    for joint in model.bodies.iter().map(|body| &body.joint) {
-        let own = &mut rates[joint.iq..joint.iq + joint.kind.nq()];
-        joint.kind.configuration_rate(joint.coordinates(q), joint.rates(qd), own);
-    }
-    rates
 }
 
 /// Derivatives by q as those by increments along the tangent.

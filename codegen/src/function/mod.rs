@@ -10,6 +10,7 @@ mod dynamics;
 mod forms;
 mod forward_derivatives;
 mod kinematics;
+mod motion_derivatives;
 mod quantity;
 mod solution;
 mod spec;
@@ -166,6 +167,19 @@ functions! {
     /// Cᵀ q̇.
     #[doc(alias("momentum observer"))]
     bias_derivatives::CoriolisTransposeForce,
+    /// Velocities and accelerations of the frames: their derivatives, and J̇.
+    #[doc(alias("Jdot", "linearisation"))]
+    motion_derivatives::FrameDerivatives,
+    /// The Jacobian of the centre of mass.
+    #[doc(alias("COM Jacobian"))]
+    motion_derivatives::CentreOfMassJacobian,
+    /// A of h = A q̇.
+    #[doc(alias("centroidal momentum matrix", "CMM"))]
+    motion_derivatives::CentroidalMap,
+    /// A, and Ȧ of ḣ = A q̈ + Ȧ q̇.
+    motion_derivatives::CentroidalMapRate,
+    /// h, ḣ and their derivatives.
+    motion_derivatives::CentroidalDerivatives,
     /// Inputs of the drives to motion.
     drives::DrivenForwardDynamics,
     /// Motion to inputs of the drives.

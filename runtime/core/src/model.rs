@@ -12,6 +12,7 @@ use crate::operators::operators;
 use crate::real::Real;
 use crate::spatial::{SpatialInertia, Sym3, Transform, Vec3};
 use alloc::string::String;
+use alloc::vec;
 use alloc::vec::Vec;
 
 /// Index of a body in [`Model::bodies`].
@@ -236,6 +237,16 @@ impl<T: Real> Model<T> {
     /// Number of velocity coordinates.
     pub fn nv(&self) -> usize {
         self.bodies.iter().map(|b| b.joint.kind.nv()).sum()
+    }
+
+    /// dq/dt at these velocities: q̇ itself of most joints, of a floating base R v and ½ q ∘ ω.
+    pub fn configuration_rate(&self, q: &[T], qd: &[T]) -> Vec<T> {
+        let mut rates = vec![T::zero(); q.len()];
+        for joint in self.bodies.iter().map(|body| &body.joint) {
+            let own = &mut rates[joint.iq..joint.iq + joint.kind.nq()];
+            joint.kind.configuration_rate(joint.coordinates(q), joint.rates(qd), own);
+        }
+        rates
     }
 
     /// The joints in the order of their coordinates.

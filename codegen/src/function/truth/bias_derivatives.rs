@@ -2,7 +2,7 @@
 
 use super::super::bias_derivatives::{BiasDerivatives, CoriolisMatrix, CoriolisTransposeForce, GravityDerivative};
 use super::super::dynamics::{BiasForce, GravityForce};
-use super::derivatives::{configuration_rates, moving, slopes, unit};
+use super::derivatives::{moving, slopes, unit};
 use super::{by_rows, list, Chapter, Truth};
 use nalgebra::{DMatrix, DVector, Matrix3};
 use straightline_core::magnitude::Magnitude;
@@ -39,7 +39,7 @@ impl Truth for CoriolisMatrix {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         let nv = at.qd().len();
         let mut c = DMatrix::from_element(nv, nv, Magnitude::zero());
-        let (tree, q) = along_motion(at);
+        let (tree, [q, _]) = at.along_motion();
         for (k, link) in at.tree.links.iter().enumerate() {
             let centre = CentreOfMassFrame {
                 name: String::new(),
@@ -74,14 +74,7 @@ impl Truth for CoriolisTransposeForce {
     }
 }
 
-/// The robot at q, which moves with q̇.
-fn along_motion(at: &Chapter<'_>) -> (reference::CentreOfMassTree<Dual<Magnitude, 1>>, Vec<Dual<Magnitude, 1>>) {
-    let rates = configuration_rates(&at.tree, at.q(), at.qd());
-    let q = at.q().iter().zip(rates).map(|(x, rate)| Dual { value: *x, derivatives: [rate] });
-    (at.tree.map(Dual::fixed), q.collect())
-}
-
 fn mass_matrix_rate(at: &Chapter<'_>) -> DMatrix<Magnitude> {
-    let (tree, q) = along_motion(at);
+    let (tree, [q, _]) = at.along_motion();
     reference::mass_matrix(&tree, &q).map(|x| x.derivatives[0])
 }

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::model::Model;
 use straightline_core::reference::{CentreOfMassFrame, CentreOfMassTree, ExtendedPosition, ReferenceJoint};
-use straightline_core::{Dd, Real};
+use straightline_core::{Dd, Dual, Real};
 
 mod bias_derivatives;
 mod derivatives;
@@ -17,6 +17,7 @@ mod drives;
 mod dynamics;
 mod forward_derivatives;
 mod kinematics;
+mod motion_derivatives;
 mod whole;
 
 /// What a function should give.
@@ -129,6 +130,14 @@ impl<'a> Chapter<'a> {
         self.get(Quantity::Acceleration)
     }
 
+    /// The same robot in dual numbers, where q moves with q̇ and q̇ with q̈.
+    fn along_motion(&self) -> (CentreOfMassTree<Dual<Magnitude, 1>>, [Vec<Dual<Magnitude, 1>>; 2]) {
+        let held = vec![Magnitude::zero(); self.qdd().len()];
+        let direction = [self.qd().to_vec(), self.qdd().to_vec(), held];
+        let [q, qd, _] = derivatives::moving(&self.tree, [self.q(), self.qd(), self.qdd()], &direction);
+        (self.tree.map(Dual::fixed), [q, qd])
+    }
+
     /// What `f` gives for each of the frames.
     fn per_frame(&self, f: impl Fn(&CentreOfMassFrame<Magnitude>) -> Vec<Magnitude>) -> Option<Vec<Magnitude>> {
         Some(self.frames.iter().flat_map(f).collect())
@@ -229,8 +238,8 @@ fn by_rows(columns: &[Vec<Magnitude>]) -> Vec<Magnitude> {
 }
 
 /// A matrix column by column, or a vector.
-fn list<R: nalgebra::Dim, C: nalgebra::Dim, S: nalgebra::RawStorage<Magnitude, R, C>>(
-    matrix: &nalgebra::Matrix<Magnitude, R, C, S>,
-) -> Vec<Magnitude> {
+fn list<T: nalgebra::Scalar + Copy, R: nalgebra::Dim, C: nalgebra::Dim, S: nalgebra::RawStorage<T, R, C>>(
+    matrix: &nalgebra::Matrix<T, R, C, S>,
+) -> Vec<T> {
     matrix.iter().copied().collect()
 }

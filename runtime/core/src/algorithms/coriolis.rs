@@ -29,13 +29,7 @@ use alloc::vec::Vec;
 pub fn coriolis_matrix<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
     let nv = model.nv();
     let motion = CoriolisSweep::new(model, q, qd);
-    let mut spreads = vec![Mat3 { rows: [[T::zero(); 3]; 3] }; model.bodies.len()];
-    for b in (0..model.bodies.len()).rev() {
-        T::section("spread", Some(b));
-        if let Some(parent) = model.bodies[b].parent {
-            spreads[parent] = spreads[parent] + motion.spread_to_parent(b, &spreads[b]);
-        }
-    }
+    let spreads = motion.spreads(model);
     let mut c = vec![T::zero(); nv * nv];
     for (b, body) in model.bodies.iter().enumerate() {
         let joint = &body.joint;
@@ -102,18 +96,18 @@ fn power<T: Real>(twist: &MotionVector<T>, wrench: &ForceVector<T>) -> T {
 }
 
 /// A motion, and of each body all that it carries, about its origin in its axes.
-struct CoriolisSweep<T> {
-    poses: Vec<JointPose<T>>,
-    velocities: Vec<MotionVector<T>>,
+pub(super) struct CoriolisSweep<T> {
+    pub poses: Vec<JointPose<T>>,
+    pub velocities: Vec<MotionVector<T>>,
     /// What the joint alone moves, in the body's axes.
     joints: Vec<MotionVector<T>>,
-    composites: Vec<Composite<T>>,
+    pub composites: Vec<Composite<T>>,
     /// ∫ r° dm and ∫ r × r° dm, r° the velocity relative to the body.
     relative: Vec<ForceVector<T>>,
 }
 
 impl<T: Real> CoriolisSweep<T> {
-    fn new(model: &Model<T>, q: &[T], qd: &[T]) -> Self {
+    pub fn new(model: &Model<T>, q: &[T], qd: &[T]) -> Self {
         let poses = JointPose::all(&model.bodies, q);
         let velocities = body_velocities(model, &poses, [q, qd]);
         let rest = MotionVector { angular: Vec3::zero(), linear: Vec3::zero() };
@@ -131,6 +125,23 @@ impl<T: Real> CoriolisSweep<T> {
             composites[parent] = composites[parent].plus(&placed(&pose.composite_back(&composite), pose));
         }
         CoriolisSweep { poses, velocities, joints, composites, relative }
+    }
+
+    /// ∫ r° rᵀ dm of what each body carries.
+    pub fn spreads(&self, model: &Model<T>) -> Vec<Mat3<T>> {
+        let mut spreads = vec![Mat3 { rows: [[T::zero(); 3]; 3] }; model.bodies.len()];
+        for b in (0..model.bodies.len()).rev() {
+            T::section("spread", Some(b));
+            if let Some(parent) = model.bodies[b].parent {
+                spreads[parent] = spreads[parent] + self.spread_to_parent(b, &spreads[b]);
+            }
+        }
+        spreads
+    }
+
+    /// ∫ u dm of what a body carries, u the velocity against its origin.
+    pub fn drift(&self, b: BodyId) -> Vec3<T> {
+        self.velocities[b].angular.cross(self.composites[b].first_moment) + self.relative[b].force
     }
 
     /// ∫ r° rᵀ dm of what a body carries, about the origin of its parent, relative to it, in its axes.
@@ -153,10 +164,10 @@ impl<T: Real> CoriolisSweep<T> {
     }
 
     /// Of a coordinate of a body's joint with this twist.
-    fn column(&self, b: BodyId, twist: &MotionVector<T>, spread: &Mat3<T>) -> CoriolisColumn<T> {
+    pub fn column(&self, b: BodyId, twist: &MotionVector<T>, spread: &Mat3<T>) -> CoriolisColumn<T> {
         let (composite, omega, w) = (&self.composites[b], self.velocities[b].angular, twist.angular);
-        // ∫ u dm and ∫ u rᵀ dm
-        let drift = omega.cross(composite.first_moment) + self.relative[b].force;
+        // beside it ∫ u rᵀ dm
+        let drift = self.drift(b);
         let moving = *spread + self.turning(b, omega);
         let trace = w.scale(spread.rows[0][0] + spread.rows[1][1] + spread.rows[2][2]);
         let rate = composite.wrench_of(&turned_with(omega, twist));
@@ -167,13 +178,16 @@ impl<T: Real> CoriolisSweep<T> {
         }
     }
 
+    /// The velocity of a body's origin against its parent's, in the parent's axes.
+    pub fn origin_rate(&self, (b, parent): (BodyId, BodyId)) -> Vec3<T> {
+        self.velocities[parent].angular.cross(arm(&self.poses[b])) + self.poses[b].to_parent(self.joints[b].linear)
+    }
+
     /// About the origin of a body's parent, in its axes.
     fn column_to_parent(&self, (b, parent): (BodyId, BodyId), column: &CoriolisColumn<T>) -> CoriolisColumn<T> {
-        let (pose, parent_omega) = (&self.poses[b], self.velocities[parent].angular);
+        let pose = &self.poses[b];
         let momentum = pose.wrench_to_parent(&column.momentum);
-        // the velocity of the body's origin against its parent's, which turns
-        let turning = parent_omega.cross(arm(pose));
-        let own = turning + pose.to_parent(self.joints[b].linear);
+        let own = self.origin_rate((b, parent));
         CoriolisColumn {
             momentum,
             of_rate: pose.wrench_to_parent(&column.of_rate),
@@ -191,11 +205,11 @@ fn arm<T: Real>(pose: &JointPose<T>) -> Vec3<T> {
 }
 
 /// What belongs to one coordinate, on its way inwards.
-struct CoriolisColumn<T> {
+pub(super) struct CoriolisColumn<T> {
     /// ∫ y dm and ∫ r × y dm.
-    momentum: ForceVector<T>,
+    pub momentum: ForceVector<T>,
     /// ∫ ẏ dm and ∫ r × ẏ dm.
-    of_rate: ForceVector<T>,
+    pub of_rate: ForceVector<T>,
     /// ∫ u × y dm, u the velocity against the origin.
-    convected: Vec3<T>,
+    pub convected: Vec3<T>,
 }

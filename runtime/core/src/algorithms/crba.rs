@@ -67,6 +67,17 @@ fn with_rotor<T: Real>(inertia: T, body: &Body<T>) -> T {
     body.effects.rotor_inertia.map_or(inertia, |rotor| inertia + rotor)
 }
 
+/// What each body carries and is, about its origin in its axes.
+pub(super) fn composites<T: Real>(model: &Model<T>, poses: &[JointPose<T>]) -> Vec<Composite<T>> {
+    let mut composites: Vec<Composite<T>> = model.bodies.iter().map(composite_of).collect();
+    for (b, body) in model.bodies.iter().enumerate().rev() {
+        T::section("composite", Some(b));
+        let Some(parent) = body.parent else { continue };
+        composites[parent] = composites[parent].plus(&placed(&poses[b].composite_back(&composites[b]), &poses[b]));
+    }
+    composites
+}
+
 /// In the parent's axes, about the parent's origin.
 pub(super) fn placed<T: Real>(composite: &Composite<T>, joint: &JointPose<T>) -> Composite<T> {
     let moments = (joint.placement * composite.first_moment, joint.placed(composite.second_moment));

@@ -41,6 +41,7 @@
 //! |---|---|
 //! | pose, velocity, acceleration of a frame | [`forward_kinematics`], [`frame_velocity`], [`frame_acceleration`] |
 //! | Jacobian and J̇q̇ | [`jacobian`](fn@jacobian), [`jacobian_bias`] |
+//! | derivatives of the motion of a frame, J̇ | [`frame_derivatives`](fn@frame_derivatives) |
 //! | tau of a motion | [`inverse_dynamics`], [`bias_force`], [`gravity_force`], [`velocity_force`] |
 //! | reactions in the joints | [`joint_wrenches`] |
 //! | H(q) | [`mass_matrix`] |
@@ -49,6 +50,7 @@
 //! | motion under the inputs of drives | [`driven_motion`], [`complete_model`](fn@complete_model), [`state_space`](fn@state_space) |
 //! | inputs of drives for a motion | [`driven_inverse`](fn@driven_inverse) |
 //! | centre of mass, momentum | [`momentum`](fn@momentum) |
+//! | what moves both | [`centre_of_mass_jacobian`], [`centroidal_map`], [`centroidal_dynamics_derivatives`] |
 //! | contact coordinates, (20.83)-(20.87) | [`relative_motion`], [`functional_coordinates`] |
 //! | motion and reactions in contact, (20.88)-(20.94) | [`constrained_forward_dynamics`], [`hybrid_inverse_dynamics`], [`Environment`] |
 //! | impact, (20.90)-(20.97) | [`impact`](fn@impact) |
@@ -56,6 +58,7 @@
 
 mod aba;
 mod actuator;
+mod centroidal;
 mod constraint;
 mod contact_system;
 mod coriolis;
@@ -67,6 +70,7 @@ mod effects;
 mod energy;
 mod environment;
 mod factor;
+mod frame_derivatives;
 mod functional;
 mod impact;
 mod jacobian;
@@ -83,6 +87,10 @@ mod velocity;
 
 pub use crate::joint::composing_pays;
 pub use aba::{forward_dynamics_aba, solve_articulated};
+pub use centroidal::{
+    centre_of_mass_jacobian, centroidal_derivatives, centroidal_dynamics_derivatives, centroidal_map, CentroidalBlocks,
+    CentroidalDynamicsBlocks,
+};
 pub use constraint::{
     applied_rows, baumgarte, constrained_forward_dynamics, hybrid_inverse_dynamics, projection, ConstrainedMotion,
     Support,
@@ -101,6 +109,7 @@ pub use effects::{passive_force, rotor_inertias};
 pub use energy::{kinetic_energy, potential_energy};
 pub use environment::{Environment, EnvironmentMotion, SpringDamper};
 pub use factor::{forward_dynamics_ltdl, Ltdl};
+pub use frame_derivatives::{frame_derivatives, FrameDerivativeBlocks};
 pub use functional::{
     constrained_coordinates, functional_coordinates, reduced_relative_motion, relative_motion, FunctionalCoordinates,
     RelativeMotion,

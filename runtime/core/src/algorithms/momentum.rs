@@ -74,7 +74,7 @@ pub(super) fn anchor<T: Real>(poses: &[JointPose<T>]) -> Vec3<T> {
 }
 
 /// From the anchor to the joint of root body `i`: zero for the first, which every robot but a forest stops at.
-fn from_anchor<T: Real>(poses: &[JointPose<T>], i: usize) -> Vec3<T> {
+pub(super) fn from_anchor<T: Real>(poses: &[JointPose<T>], i: usize) -> Vec3<T> {
     if i == 0 {
         Vec3::zero()
     } else {

@@ -1,0 +1,149 @@
+//! Derivatives of the motion of frames, and of the robot as a whole: centre of mass and centroidal momentum.
+
+use super::spec::Extent::{Frames, Of, Velocities};
+use super::spec::{Divisor, Form, Output, RobotFunction, Spec};
+use super::{Extent, Forms, Quantity};
+use straightline_core::algorithms as alg;
+use straightline_core::Real;
+
+const PER_FRAME: &[Extent] = &[Frames, Of(6), Velocities];
+const SIX_ROWS: &[Extent] = &[Of(6), Velocities];
+const MAP: Output = Output::new(
+    "a",
+    SIX_ROWS,
+    "rows of A: linear \\[kg, kg·m\\] (3), angular about the centre of mass \\[kg·m, kg·m²\\] (3), world axes, of one column per velocity \
+coordinate",
+);
+
+pub struct FrameDerivatives;
+
+impl RobotFunction for FrameDerivatives {
+    const SPEC: Spec = Spec {
+        name: "frame_derivatives",
+        summary: "Derivatives of the velocities and accelerations of the frames, with their Jacobians J and J̇.",
+        aliases: &["getFrameAccelerationDerivatives", "computeJointJacobiansTimeVariation", "Jdot"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration],
+        outputs: &[
+            Output::new(
+                "dv_dq",
+                PER_FRAME,
+                "per frame: 6 rows (3 linear of the origin, which moves along, 3 angular; world axes) of ∂v/∂q \\[1/s; of the origin by a turn m/s\\]; \
+of a floating base by increments of its pose in its own axes",
+            ),
+            Output::new("da_dq", PER_FRAME, "per frame: the same of ∂a/∂q at constant q̇ and q̈ \\[1/s²; m/s²\\]"),
+            Output::new("da_dqd", PER_FRAME, "per frame: the same of ∂a/∂q̇ = ∂v/∂q + J̇ \\[1/s; m/s\\]"),
+            Output::new("j", PER_FRAME, "per frame: the same of J = ∂v/∂q̇ = ∂a/∂q̈ \\[1; m\\]"),
+            Output::new("j_dot", PER_FRAME, "per frame: the same of J̇ along the motion \\[1/s; m/s\\]"),
+        ],
+        form: Form::Plain,
+        ..Spec::DERIVED
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let motion = [&inputs[0][..], &inputs[1], &inputs[2]];
+        let all: Vec<_> = forms.frames.iter().map(|f| alg::frame_derivatives(forms.model, motion, f)).collect();
+        let block =
+            |of: fn(&alg::FrameDerivativeBlocks<T>) -> &Vec<T>| all.iter().flat_map(of).copied().collect::<Vec<T>>();
+        [
+            block(|of| &of.dv_dq),
+            block(|of| &of.da_dq),
+            block(|of| &of.da_dqd),
+            block(|of| &of.jacobian),
+            block(|of| &of.jacobian_rate),
+        ]
+        .concat()
+    }
+}
+
+pub struct CentreOfMassJacobian;
+
+impl RobotFunction for CentreOfMassJacobian {
+    const SPEC: Spec = Spec {
+        name: "centre_of_mass_jacobian",
+        summary: "The Jacobian of the centre of mass of the moving bodies.",
+        aliases: &["COM Jacobian", "jacobianCenterOfMass", "center of mass"],
+        inputs: &[Quantity::Configuration],
+        outputs: &[Output::new(
+            "j",
+            &[Of(3), Velocities],
+            "rows of J, world axes \\[m/rad, m/m\\]: J q̇ is the velocity of the centre of mass",
+        )],
+        form: Form::Plain,
+        divisor: Divisor::Mass,
+        ..Spec::DERIVED
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        alg::centre_of_mass_jacobian(forms.model, &inputs[0])
+    }
+}
+
+pub struct CentroidalMap;
+
+impl RobotFunction for CentroidalMap {
+    const SPEC: Spec = Spec {
+        name: "centroidal_map",
+        summary: "The centroidal momentum map A(q): h = A q̇ is the momentum about the centre of mass.",
+        aliases: &["centroidal momentum matrix", "CMM", "computeCentroidalMap", "ccrba"],
+        inputs: &[Quantity::Configuration],
+        outputs: &[MAP],
+        form: Form::Plain,
+        divisor: Divisor::Mass,
+        ..Spec::DERIVED
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        alg::centroidal_map(forms.model, &inputs[0])
+    }
+}
+
+pub struct CentroidalMapRate;
+
+impl RobotFunction for CentroidalMapRate {
+    const SPEC: Spec = Spec {
+        name: "centroidal_map_rate",
+        summary: "The centroidal momentum map A(q) and its rate Ȧ(q, q̇): ḣ = A q̈ + Ȧ q̇.",
+        aliases: &["centroidal momentum matrix", "computeCentroidalMapTimeVariation", "dccrba"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity],
+        outputs: &[MAP, Output::new("a_dot", SIX_ROWS, "rows of Ȧ, as those of A \\[kg/s, kg·m/s, kg·m²/s\\]")],
+        form: Form::Plain,
+        divisor: Divisor::Mass,
+        ..Spec::DERIVED
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let all = alg::centroidal_derivatives(forms.model, &inputs[0], &inputs[1]);
+        [all.map, all.rate].concat()
+    }
+}
+
+pub struct CentroidalDerivatives;
+
+impl RobotFunction for CentroidalDerivatives {
+    const SPEC: Spec = Spec {
+        name: "centroidal_derivatives",
+        summary: "Centroidal momentum h and its rate ḣ with their derivatives by q, q̇ and q̈.",
+        aliases: &["computeCentroidalDynamicsDerivatives", "centroidal dynamics"],
+        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration],
+        outputs: &[
+            Output::new("h", &[Of(6)], "linear \\[kg·m/s\\] (3), angular about the centre of mass \\[kg·m²/s\\] (3), world axes"),
+            Output::new("h_dot", &[Of(6)], "its rate, without gravity: linear \\[N\\] (3), angular \\[N·m\\] (3)"),
+            Output::new(
+                "dh_dq",
+                SIX_ROWS,
+                "rows of ∂h/∂q, the centre of mass moving along; of a floating base by increments of its pose in its own axes",
+            ),
+            Output::new("dhdot_dq", SIX_ROWS, "rows of ∂ḣ/∂q at constant q̇ and q̈"),
+            Output::new("dhdot_dqd", SIX_ROWS, "rows of ∂ḣ/∂q̇ = ∂h/∂q + Ȧ"),
+            MAP,
+        ],
+        form: Form::Plain,
+        divisor: Divisor::Mass,
+        ..Spec::DERIVED
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let all = alg::centroidal_dynamics_derivatives(forms.model, [&inputs[0], &inputs[1], &inputs[2]]);
+        [all.momentum, all.momentum_rate, all.dh_dq, all.dhdot_dq, all.dhdot_dqd, all.map].concat()
+    }
+}

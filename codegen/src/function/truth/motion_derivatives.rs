@@ -1,0 +1,100 @@
+//! Derivatives of the motion of frames and of the robot as a whole, by the second author in dual numbers.
+
+use super::super::motion_derivatives::{
+    CentreOfMassJacobian, CentroidalDerivatives, CentroidalMap, CentroidalMapRate, FrameDerivatives,
+};
+use super::derivatives::{moving, unit};
+use super::{by_rows, list, Chapter, Truth};
+use straightline_core::magnitude::Magnitude;
+use straightline_core::reference::{self, CentreOfMassTree, ReferenceReal};
+use straightline_core::Dual;
+
+type Moving = Dual<Magnitude, 1>;
+
+impl Truth for FrameDerivatives {
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        let tree = at.tree.map(Moving::fixed);
+        let moved = |name: &str| tree.frame(name).expect("frames are those of the tree").clone();
+        let block = |of: &dyn Fn(&reference::CentreOfMassFrame<Moving>) -> Vec<Magnitude>| {
+            at.per_frame(|frame| of(&moved(&frame.name)))
+        };
+        let velocity = |[q, qd, _]: &[Vec<Moving>; 3], frame: &_| list(&reference::frame_velocity(&tree, frame, q, qd));
+        let acceleration =
+            |[q, qd, qdd]: &[Vec<Moving>; 3], frame: &_| list(&reference::frame_acceleration(&tree, frame, q, qd, qdd));
+        let (along, [q, _]) = at.along_motion();
+        let rate =
+            |frame: &_| list(&reference::frame_jacobian(&along, frame, &q).map(|x| x.derivatives[0]).transpose());
+        let blocks = [
+            block(&|frame| slopes(at, 0, |motion| velocity(motion, frame)))?,
+            block(&|frame| slopes(at, 0, |motion| acceleration(motion, frame)))?,
+            block(&|frame| slopes(at, 1, |motion| acceleration(motion, frame)))?,
+            at.per_frame(|frame| list(&reference::frame_jacobian(&at.tree, frame, at.q()).transpose()))?,
+            block(&|frame| rate(frame))?,
+        ];
+        Some(blocks.concat())
+    }
+}
+
+impl Truth for CentreOfMassJacobian {
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        let tree = at.tree.map(Moving::fixed);
+        Some(slopes(at, 0, |[q, ..]| list(&reference::centre_of_mass(&tree, q))))
+    }
+}
+
+impl Truth for CentroidalMap {
+    /// Column by column the momentum of a unit velocity.
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        let nv = at.qd().len();
+        let column = |k: usize| momentum(&at.tree, at.q(), &unit::<Magnitude>(nv, 1, k)[1]);
+        Some(by_rows(&(0..nv).map(column).collect::<Vec<_>>()))
+    }
+}
+
+impl Truth for CentroidalMapRate {
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        let nv = at.qd().len();
+        let (tree, [q, _]) = at.along_motion();
+        let column = |k: usize| {
+            let rates = momentum(&tree, &q, &unit::<Moving>(nv, 1, k)[1]).into_iter();
+            rates.map(|x| x.derivatives[0]).collect::<Vec<_>>()
+        };
+        Some([CentroidalMap::truth(at)?, by_rows(&(0..nv).map(column).collect::<Vec<_>>())].concat())
+    }
+}
+
+impl Truth for CentroidalDerivatives {
+    /// Momentum along the motion, which moves along a coordinate.
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        let (tree, [q, qd]) = at.along_motion();
+        let (h, h_dot): (Vec<_>, Vec<_>) =
+            momentum(&tree, &q, &qd).into_iter().map(|x| (x.value, x.derivatives[0])).unzip();
+        let once = at.tree.map(Moving::fixed);
+        let dh_dq = slopes(at, 0, |[q, qd, _]| momentum(&once, q, qd));
+        let twice = tree.map(Dual::<Moving, 1>::fixed);
+        let rate = |[q, qd, qdd]: &[Vec<Moving>; 3]| {
+            let motion = [&q[..], qd, qdd];
+            let [q, qd, _] = moving(&once, motion, &[qd.clone(), qdd.clone(), qdd.clone()]);
+            momentum(&twice, &q, &qd).into_iter().map(|x| x.derivatives[0]).collect::<Vec<_>>()
+        };
+        let [by_q, by_qd] = [0, 1].map(|block| slopes(at, block, rate));
+        Some([h, h_dot, dh_dq, by_q, by_qd, CentroidalMap::truth(at)?].concat())
+    }
+}
+
+/// Linear momentum and angular momentum about the centre of mass.
+fn momentum<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> Vec<T> {
+    let momentum = reference::momentum(tree, q, qd);
+    let parts = [momentum.linear, momentum.angular_about_centre_of_mass];
+    parts.iter().flat_map(|part| part.iter().copied()).collect()
+}
+
+/// How what `f` says of a motion changes with each coordinate of q, or of q̇: by rows.
+fn slopes(at: &Chapter<'_>, block: usize, f: impl Fn(&[Vec<Moving>; 3]) -> Vec<Moving>) -> Vec<Magnitude> {
+    let nv = at.qd().len();
+    let column = |k: usize| {
+        let motion = moving(&at.tree, [at.q(), at.qd(), at.qdd()], &unit(nv, block, k));
+        f(&motion).into_iter().map(|x| x.derivatives[0]).collect::<Vec<_>>()
+    };
+    by_rows(&(0..nv).map(column).collect::<Vec<_>>())
+}
