@@ -259,7 +259,7 @@ fn variants(robot: &str) -> Vec<(Scalar, Grade)> {
 fn calls_of(module: &str, generated: &Generated, functions: &[Function]) -> String {
     let mut text = String::new();
     for function in functions {
-        let arguments = function.inputs(&generated.model).len();
+        let arguments = function.inputs(&generated.model, generated.frames.len()).len();
         let mut arguments: Vec<String> = (0..arguments).map(|i| format!("array(&x[{i}])")).collect();
         let name = function.name();
         let _ = writeln!(text, "            ({name:?}, |x| {{");

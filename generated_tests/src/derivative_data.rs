@@ -120,6 +120,12 @@ const DATA: &[DataOf] = &[
         blocks: &[("dv_dq", "dv_dq"), ("da_dq", "da_dq"), ("da_dqd", "da_dqd"), ("dv_dqd", "J"), ("Jdot", "Jdot")],
     },
     DataOf {
+        function: Function::JacobianHessianProduct,
+        group: "jacobian_hessian_product",
+        inputs: &["q", "wrench"],
+        blocks: &[("JT_f", "J"), ("dJTf_dq", "dJTf_dq")],
+    },
+    DataOf {
         function: Function::CentreOfMassJacobian,
         group: "centroidal",
         inputs: &["q"],

@@ -9,7 +9,7 @@ use straightline_core::Dd;
 pub fn random(random: &mut Random, model: &Model<Dd>, function: Function) -> Vec<Vec<f64>> {
     let of_port = |quantity: Quantity| match quantity {
         Quantity::Configuration => configuration(random, model),
-        quantity => random.list(quantity.len(model), 2.0),
+        quantity => random.list(quantity.len(model, 0), 2.0),
     };
     function.quantities(model).into_iter().map(of_port).collect()
 }

@@ -454,6 +454,13 @@ pub fn no_mass(asked: &str) -> D {
         .help("give the links their mass (URDF: `<inertial>`), or name the functions that are wanted without these")
 }
 
+/// The centre of mass of what a joint moves, where that has none.
+pub fn no_mass_behind(function: &str, joint: &str) -> D {
+    D::error("no-mass", format!("`{function}` is asked for, and nothing that joint `{joint}` moves has mass"))
+        .detail("the centre of mass of no mass is nowhere: the equations would divide by zero")
+        .help("give the links behind the joint their mass (URDF: `<inertial>`), or lock the joint (`[hold] joints`)")
+}
+
 /// What divides by what joints feel, of a robot with a joint that feels what run-time parameters bring and nothing else.
 pub fn inertia_by_parameters(asked: &str, joint: &str, parameters: &str) -> D {
     D::warning("inertia-by-parameters", format!("joint `{joint}` feels no inertia but that of {parameters}"))

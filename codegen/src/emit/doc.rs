@@ -36,6 +36,7 @@ impl Function {
                 ResultPart::Linear => doc.push_str("\nOnly the linear part: positions, linear rows, forces.\n"),
                 ResultPart::Angular => doc.push_str("\nOnly the angular part: orientations, angular rows, moments.\n"),
                 ResultPart::Diagonal => doc.push_str("\nOnly the diagonal.\n"),
+                ResultPart::Rows(rows) => doc.push_str(&format!("\nOnly the rows {}.\n", rows.words().join(", "))),
             }
         }
         doc

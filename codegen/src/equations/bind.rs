@@ -1,7 +1,7 @@
 //! A scene where it meets the equations: which inputs are left, what stands for the others, which results are wanted.
 
 use crate::equations::Robot;
-use crate::function::{Extent, Family, Forms, ForwardDynamicsMethod, Function, Output, Parts, Quantity};
+use crate::function::{Extent, Family, Forms, ForwardDynamicsMethod, Function, Output, Parts, Quantity, Rows};
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::{Gravity, Parameter, ResultPart, Scene, Selection};
 use straightline_core::model::{Frame, Load, Model};
@@ -28,11 +28,13 @@ impl<T: Real> BoundRobot<T> {
         &'a self,
         reduced: bool,
         frames: &'a [&'a Frame<T>],
+        rows: Rows,
         method: ForwardDynamicsMethod,
     ) -> Forms<'a, T> {
         let serves = reduced && self.reduced.serves(&self.model);
         Forms {
             reduced: serves.then_some([&self.reduced, &self.composite]),
+            rows,
             ..Forms::plain(&self.model, frames, method)
         }
     }
@@ -40,13 +42,14 @@ impl<T: Real> BoundRobot<T> {
 
 impl Scene {
     /// The input ports of a function: its own without those that are zero, then gravity and parameters where they are
-    /// inputs. Those of the latter that the function turns out not to need are dropped after tracing.
-    pub fn ports(&self, function: Function, model: &Model<Dd>) -> Vec<Port> {
+    /// inputs. Those of the latter that the function turns out not to need are dropped after tracing. `frames` are those of the whole program.
+    pub fn ports(&self, function: Function, model: &Model<Dd>, frames: &[String]) -> Vec<Port> {
         let own = function.quantities(model).into_iter().filter(|quantity| !self.is_zero(*quantity));
         let gravity = (self.gravity == Gravity::Input).then_some(Quantity::Gravity);
         let parameters =
             self.parameters.iter().map(|p| Port::wrapped(&p.input_name(), &[p.scalars(model)], &p.type_name()));
-        own.chain(gravity).map(|quantity| quantity.port(model)).chain(parameters).collect()
+        let frames = self.frames_of(function, frames).len();
+        own.chain(gravity).map(|quantity| quantity.port(model, frames)).chain(parameters).collect()
     }
 
     fn is_zero(&self, input: Quantity) -> bool {
@@ -62,7 +65,7 @@ impl Scene {
         let whole = function.quantities(&robot.model);
         let arguments = whole.iter().map(|quantity| {
             let mut values = match self.is_zero(*quantity) {
-                true => vec![T::zero(); quantity.len(&robot.model)],
+                true => vec![T::zero(); quantity.len(&robot.model, 0)],
                 false => given.next().expect("a port per input").clone(),
             };
             if quantity.rate().is_some() {
@@ -138,7 +141,7 @@ impl Scene {
                 // of H the columns
                 Extent::Velocities if k == last => selection.coordinates(model),
                 Extent::Joints => selection.joints(model),
-                Extent::Of(n) if output.parts == Parts::LinearAngular => selection.part.of(0..*n, 3).collect(),
+                Extent::Of(n) if output.parts == Parts::LinearAngular => selection.part.of(0..*n, 3),
                 _ => (0..shape[k]).collect(),
             };
             axes.push((wanted, shape[k + 1..].iter().product()));
@@ -151,6 +154,16 @@ impl Scene {
             indices = indices.iter().flat_map(|at| wanted.iter().map(move |k| at + k * stride)).collect();
         }
         (indices, axes.iter().map(|(wanted, _)| wanted.len()).collect())
+    }
+
+    /// The rows of a function's tasks.
+    pub fn rows_of(&self, function: Function) -> Rows {
+        match self.outputs.get(&function).map(|selection| selection.part) {
+            Some(ResultPart::Linear) => Rows::LINEAR,
+            Some(ResultPart::Angular) => Rows::ANGULAR,
+            Some(ResultPart::Rows(rows)) => rows,
+            Some(ResultPart::Whole | ResultPart::Diagonal) | None => Rows::ALL,
+        }
     }
 
     /// The frames of a function: its own, or those of the whole program.
@@ -182,11 +195,12 @@ impl Selection {
 
 impl ResultPart {
     /// The wanted indices of a quantity whose first `linear` entries are linear.
-    fn of(self, all: std::ops::Range<usize>, linear: usize) -> std::ops::Range<usize> {
+    fn of(self, all: std::ops::Range<usize>, linear: usize) -> Vec<usize> {
         match self {
-            ResultPart::Whole | ResultPart::Diagonal => all,
-            ResultPart::Linear => all.start..linear,
-            ResultPart::Angular => linear..all.end,
+            ResultPart::Whole | ResultPart::Diagonal => all.collect(),
+            ResultPart::Linear => (all.start..linear).collect(),
+            ResultPart::Angular => (linear..all.end).collect(),
+            ResultPart::Rows(rows) => rows.places().collect(),
         }
     }
 }

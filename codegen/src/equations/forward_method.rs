@@ -10,7 +10,7 @@
 //! but its sums wait for each other. Measured on x86-64 with and without AVX-512, fused and not: quadrupeds (18 coordinates) take 4
 //! to 25 % longer by a factorisation with 2 % fewer to 2 % more operations; arms of 6 and 7 joints 1 to 31 % less with 8 to 18 % fewer.
 
-use crate::function::{Family, ForwardDynamicsMethod, Function};
+use crate::function::{ForwardDynamicsMethod, Function};
 use crate::model::states::{settle, values, Kind, SEED};
 use std::fmt;
 use straightline_core::model::Model;
@@ -134,7 +134,7 @@ pub fn choose(
         let articulated = MethodFigures::new(articulated, None);
         return MethodChoice { articulated_bodies: true, articulated, factorisation: None };
     };
-    let is_derivative = function.spec().family == Family::Derivatives;
+    let is_derivative = function.spec().family.is_of_blocks();
     // entries of a matrix go together: an entry that happens to be small is nothing by itself
     let together: Vec<usize> = match is_derivative {
         true => articulated.outputs.iter().map(Port::len).collect(),

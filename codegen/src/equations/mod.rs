@@ -30,7 +30,7 @@ impl Function {
         let bound = scene.bind(self, robot, inputs);
         let frame = |name: &String| bound.model.frame(name).expect("frames were checked against the model");
         let frames: Vec<&Frame<Expr>> = frames.iter().map(frame).collect();
-        self.evaluate_on(&bound.forms(reduced, &frames, method), &bound.arguments)
+        self.evaluate_on(&bound.forms(reduced, &frames, scene.rows_of(self), method), &bound.arguments)
     }
 
     /// Its equations for a robot in a scene, and for [`ForwardDynamicsMethod::Cheaper`] which form of forward dynamics that
@@ -47,16 +47,22 @@ impl Function {
         reduced: bool,
         scene: &Scene,
     ) -> (Graph, Option<MethodChoice>) {
+        let ports = scene.ports(self, &robot.model, frames);
         let frames = scene.frames_of(self, frames);
         let (wanted, outputs) = scene.select(self, &robot.model, frames.len());
         let trace_with = |method| {
-            trace(rules, scene.ports(self, &robot.model), outputs.clone(), |inputs| {
+            trace(rules, ports.clone(), outputs.clone(), |inputs| {
                 let results = self.equations(robot, frames, method, reduced, scene, inputs);
                 wanted.iter().map(|k| results[*k]).collect()
             })
         };
-        let has_two_forms =
-            self.spec().solves && (self.spec().family != Family::Drives || may_be_articulated(&robot.model));
+        let has_two_forms = self.spec().solves
+            && match self.spec().family {
+                Family::Drives => may_be_articulated(&robot.model),
+                // rows of Jacobians need the factor
+                Family::Tasks => false,
+                Family::Robot | Family::Combination | Family::Derivatives => true,
+            };
         match method {
             ForwardDynamicsMethod::Cheaper if has_two_forms => {
                 let articulated = trace_with(ForwardDynamicsMethod::ArticulatedBody);

@@ -158,7 +158,7 @@ impl<T: Real> Forms<'_, T> {
         let model = self.model.map(f);
         let reduced = self.reduced.map(|forms| forms.map(|form| form.map(f)));
         let reduced = reduced.as_ref().map(|[torques, composite]| [torques, composite]);
-        run(&Forms { model: &model, reduced, frames: &[], method: self.method, limbs: None })
+        run(&Forms { model: &model, reduced, frames: &[], rows: self.rows, method: self.method, limbs: None })
     }
 
     /// τ = H q̈ + h and its derivatives.

@@ -9,11 +9,14 @@ mod drives;
 mod dynamics;
 mod forms;
 mod forward_derivatives;
+mod frame_forces;
 mod kinematics;
 mod motion_derivatives;
 mod quantity;
+mod rows;
 mod solution;
 mod spec;
+mod tasks;
 #[cfg(feature = "verify")]
 pub mod truth;
 mod whole;
@@ -21,6 +24,7 @@ mod whole;
 pub use contact::ContactFunction;
 pub(crate) use drives::may_be_articulated;
 pub use forms::{Forms, ForwardDynamicsMethod, LimbSums};
+pub use rows::Rows;
 pub use quantity::Quantity;
 pub use spec::{Divisor, Extent, Family, Form, InLanes, Judged, Output, Parts, RobotFunction, Spec};
 
@@ -173,6 +177,12 @@ functions! {
     /// The Jacobian of the centre of mass.
     #[doc(alias("COM Jacobian"))]
     motion_derivatives::CentreOfMassJacobian,
+    /// Masses and centres of mass behind each joint.
+    #[doc(alias("subtree COM"))]
+    motion_derivatives::SubtreeCentresOfMass,
+    /// Jᵀ f with its derivative.
+    #[doc(alias("kinematic Hessian", "geometric stiffness"))]
+    frame_forces::JacobianHessianProduct,
     /// A of h = A q̇.
     #[doc(alias("centroidal momentum matrix", "CMM"))]
     motion_derivatives::CentroidalMap,
@@ -180,6 +190,12 @@ functions! {
     motion_derivatives::CentroidalMapRate,
     /// h, ḣ and their derivatives.
     motion_derivatives::CentroidalDerivatives,
+    /// Λ, μ and p of the frames.
+    #[doc(alias("Khatib", "task space"))]
+    tasks::OperationalSpaceDynamics,
+    /// A step towards poses of the frames.
+    #[doc(alias("IK"))]
+    tasks::InverseKinematicsStep,
     /// Inputs of the drives to motion.
     drives::DrivenForwardDynamics,
     /// Motion to inputs of the drives.
@@ -235,9 +251,10 @@ impl Function {
         self.spec().summary
     }
 
-    /// Whether its outputs are asked for per frame.
+    /// Whether its outputs, or what they are made of, are asked for per frame.
     pub fn is_per_frame(self) -> bool {
-        self.has_axis(Extent::Frames)
+        let Spec { inputs, .. } = self.spec();
+        self.has_axis(Extent::Frames) || inputs.iter().any(|quantity| quantity.axes().contains(&Extent::Frames))
     }
 
     /// Whether it is a generalized force of the bodies, one number per velocity coordinate.
@@ -266,9 +283,9 @@ impl Function {
         self.spec().inputs.iter().copied().chain(self.further_inputs(model)).collect()
     }
 
-    /// The same with names and shapes.
-    pub fn inputs<T: Real>(self, model: &Model<T>) -> Vec<Port> {
-        self.quantities(model).into_iter().map(|quantity| quantity.port(model)).collect()
+    /// The same with names and shapes, for so many frames.
+    pub fn inputs<T: Real>(self, model: &Model<T>, frames: usize) -> Vec<Port> {
+        self.quantities(model).into_iter().map(|quantity| quantity.port(model, frames)).collect()
     }
 
     /// Its blocks of results for a robot and so many frames.

@@ -1,6 +1,6 @@
 //! Derivatives of the motion of frames, and of the robot as a whole: centre of mass and centroidal momentum.
 
-use super::spec::Extent::{Frames, Of, Velocities};
+use super::spec::Extent::{Frames, Joints, Of, Velocities};
 use super::spec::{Divisor, Form, Output, RobotFunction, Spec};
 use super::{Extent, Forms, Quantity};
 use straightline_core::algorithms as alg;
@@ -75,6 +75,37 @@ impl RobotFunction for CentreOfMassJacobian {
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
         alg::centre_of_mass_jacobian(forms.model, &inputs[0])
+    }
+}
+
+pub struct SubtreeCentresOfMass;
+
+impl RobotFunction for SubtreeCentresOfMass {
+    const SPEC: Spec = Spec {
+        name: "subtree_centres_of_mass",
+        summary: "What each joint carries, its link included: masses, centres of mass and their Jacobians.",
+        aliases: &["subtree COM", "jacobianSubtreeCenterOfMass", "center of mass", "subtree_com"],
+        inputs: &[Quantity::Configuration],
+        outputs: &[
+            Output::new("mass", &[Joints], "per joint: mass \\[kg\\]"),
+            Output::new("p", &[Joints, Of(3)], "per joint: position of the centre of mass in the world \\[m\\]"),
+            Output::new(
+                "j",
+                &[Joints, Of(3), Velocities],
+                "per joint: rows of J, world axes \\[m/rad, m/m\\]: J q̇ is the velocity of that centre",
+            ),
+        ],
+        form: Form::Plain,
+        divisor: Divisor::MassOfEach,
+        ..Spec::DERIVED
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        let all = alg::subtrees(forms.model, &inputs[0]);
+        let mut results: Vec<T> = all.iter().map(|subtree| subtree.mass).collect();
+        results.extend(all.iter().flat_map(|subtree| subtree.centre.to_array()));
+        results.extend(all.into_iter().flat_map(|subtree| subtree.jacobian));
+        results
     }
 }
 

@@ -33,6 +33,16 @@ pub enum Quantity {
     ForceDirection,
     /// Multipliers of generalized forces, or of accelerations.
     Multiplier,
+    /// Forces and moments at frames.
+    Wrench,
+    /// How far frames are from where they shall be.
+    PoseError,
+    /// How much the rows of a task weigh.
+    TaskWeight,
+    /// The damping of a task.
+    Damping,
+    /// How strongly redundancy is spent on torques.
+    TorqueGain,
     /// The third or a further derivative of q.
     HigherRate(usize),
 }
@@ -44,27 +54,37 @@ struct QuantityRow {
     of: Quantity,
     /// Its name in generated code.
     name: &'static str,
-    /// What its entries belong to.
-    extent: Extent,
+    /// Its axes, the outermost first.
+    axes: &'static [Extent],
     /// What it is, with its unit.
     doc: &'static str,
     /// Within what it is taken to stay where nobody says: of bounds of errors alone.
     bound: Option<f64>,
 }
 
-const fn row(of: Quantity, name: &'static str, extent: Extent, bound: Option<f64>, doc: &'static str) -> QuantityRow {
-    QuantityRow { of, name, extent, doc, bound }
+const fn row(
+    of: Quantity,
+    name: &'static str,
+    axes: &'static [Extent],
+    bound: Option<f64>,
+    doc: &'static str,
+) -> QuantityRow {
+    QuantityRow { of, name, axes, doc, bound }
 }
 
+const BY_VELOCITIES: &[Extent] = &[Extent::Velocities];
+const PER_FRAME: &[Extent] = &[Extent::Frames, Extent::Of(6)];
+const ONE: &[Extent] = &[Extent::Of(1)];
+
 const TABLE: &[QuantityRow] = &[
-    row(Configuration, "q", Extent::Positions, None, "configuration \\[rad or m\\]"),
-    row(Velocity, "qd", Extent::Velocities, Some(10.0), "velocities \\[rad/s or m/s\\]"),
-    row(Acceleration, "qdd", Extent::Velocities, Some(100.0), "accelerations \\[rad/s² or m/s²\\]"),
-    row(Force, "tau", Extent::Velocities, Some(1000.0), "generalized forces \\[N·m or N\\]"),
+    row(Configuration, "q", &[Extent::Positions], None, "configuration \\[rad or m\\]"),
+    row(Velocity, "qd", BY_VELOCITIES, Some(10.0), "velocities \\[rad/s or m/s\\]"),
+    row(Acceleration, "qdd", BY_VELOCITIES, Some(100.0), "accelerations \\[rad/s² or m/s²\\]"),
+    row(Force, "tau", BY_VELOCITIES, Some(1000.0), "generalized forces \\[N·m or N\\]"),
     row(
         DriveState,
         "x",
-        Extent::DriveStates,
+        &[Extent::DriveStates],
         None,
         "state of the drives, [`DRIVE_STATES`] of each: θ \\[rad\\], θ̇ \\[rad/s\\] and current \\[A\\] of a motor (without \
          inductance no current; θ and θ̇ are read behind elastic transmissions only), a linear actuator's own; then angle \
@@ -73,22 +93,57 @@ const TABLE: &[QuantityRow] = &[
     row(
         DriveInput,
         "u",
-        Extent::Drives,
+        &[Extent::Drives],
         None,
         "inputs of the drives, in the order of [`DRIVE_NAMES`] \\[V, or as in the robot file\\]",
     ),
     row(
         ConfigurationDirection,
         "direction_q",
-        Extent::Velocities,
+        BY_VELOCITIES,
         Some(1.0),
         "direction of q, along its tangent \\[rad or m\\]",
     ),
-    row(VelocityDirection, "direction_qd", Extent::Velocities, Some(1.0), "direction of q̇ \\[rad/s or m/s\\]"),
-    row(AccelerationDirection, "direction_qdd", Extent::Velocities, Some(1.0), "direction of q̈ \\[rad/s² or m/s²\\]"),
-    row(ForceDirection, "direction_tau", Extent::Velocities, Some(1.0), "direction of τ \\[N·m or N\\]"),
-    row(Multiplier, "multiplier", Extent::Velocities, Some(1.0), "λ: multipliers of the generalized forces or accelerations"),
-    row(Gravity, "gravity", Extent::Of(3), Some(10.0), "acceleration due to gravity in the world \\[m/s²\\]"),
+    row(VelocityDirection, "direction_qd", BY_VELOCITIES, Some(1.0), "direction of q̇ \\[rad/s or m/s\\]"),
+    row(AccelerationDirection, "direction_qdd", BY_VELOCITIES, Some(1.0), "direction of q̈ \\[rad/s² or m/s²\\]"),
+    row(ForceDirection, "direction_tau", BY_VELOCITIES, Some(1.0), "direction of τ \\[N·m or N\\]"),
+    row(Multiplier, "multiplier", BY_VELOCITIES, Some(1.0), "λ: multipliers of the generalized forces or accelerations"),
+    row(Gravity, "gravity", &[Extent::Of(3)], Some(10.0), "acceleration due to gravity in the world \\[m/s²\\]"),
+    row(
+        Wrench,
+        "wrench",
+        PER_FRAME,
+        Some(100.0),
+        "per frame: force at its origin \\[N\\] (3), moment \\[N·m\\] (3), world axes",
+    ),
+    row(
+        PoseError,
+        "error",
+        PER_FRAME,
+        Some(1.0),
+        "per frame: from where it is to where it shall be, of the origin \\[m\\] (3), and the rotation vector \\[rad\\] (3), world axes",
+    ),
+    row(
+        TaskWeight,
+        "weight",
+        PER_FRAME,
+        Some(1.0),
+        "per frame: how much each row of the error weighs; a row with 0 is left to itself",
+    ),
+    row(
+        Damping,
+        "damping",
+        ONE,
+        Some(1.0),
+        "λ: λ² is added to the diagonal of J H⁻¹ Jᵀ \\[1/kg; 1/(kg·m²)\\]; 0: none",
+    ),
+    row(
+        TorqueGain,
+        "torque_gain",
+        ONE,
+        Some(1.0),
+        "how far the step follows the descent of holding torques where the task leaves freedom; 0: not at all",
+    ),
 ];
 
 impl Quantity {
@@ -104,7 +159,7 @@ impl Quantity {
 
     /// Those that have an entry per velocity coordinate, but for higher rates.
     pub fn of_velocities() -> impl Iterator<Item = Quantity> {
-        TABLE.iter().filter(|row| row.extent == Extent::Velocities).map(|row| row.of)
+        TABLE.iter().filter(|row| row.axes == BY_VELOCITIES).map(|row| row.of)
     }
 
     /// That of an input.
@@ -137,9 +192,14 @@ impl Quantity {
         format!("{word} derivatives \\[rad/s{power} or m/s{power}\\]")
     }
 
-    /// What its entries belong to.
-    pub fn extent(self) -> Extent {
-        self.row().map_or(Extent::Velocities, |row| row.extent)
+    /// Those that say what is asked of frames.
+    pub fn of_tasks() -> impl Iterator<Item = Quantity> {
+        TABLE.iter().filter(|row| row.axes == PER_FRAME || row.axes == ONE).map(|row| row.of)
+    }
+
+    /// Its axes, the outermost first.
+    pub fn axes(self) -> &'static [Extent] {
+        self.row().map_or(BY_VELOCITIES, |row| row.axes)
     }
 
     /// Within what bounds of errors take it to stay where neither a scene nor the robot file says; none: they have to.
@@ -147,14 +207,15 @@ impl Quantity {
         self.row().and_then(|row| row.bound)
     }
 
-    /// How many scalars it has.
-    pub fn len<T: Real>(self, model: &Model<T>) -> usize {
-        self.extent().len(model, 0)
+    /// How many scalars it has, for so many frames.
+    pub fn len<T: Real>(self, model: &Model<T>, frames: usize) -> usize {
+        self.axes().iter().map(|extent| extent.len(model, frames)).product()
     }
 
-    /// As an input.
-    pub fn port<T: Real>(self, model: &Model<T>) -> Port {
-        Port::new(&self.name(), &[self.len(model)])
+    /// As an input, for so many frames.
+    pub fn port<T: Real>(self, model: &Model<T>, frames: usize) -> Port {
+        let shape: Vec<usize> = self.axes().iter().map(|extent| extent.len(model, frames)).collect();
+        Port::new(&self.name(), &shape)
     }
 
     /// Which derivative of q it is; `None` if it is none, or q itself.

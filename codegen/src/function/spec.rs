@@ -45,8 +45,10 @@ impl Extent {
 pub enum Parts {
     /// None.
     No,
-    /// The last axis of fixed length has three linear entries, then angular ones.
+    /// Axes of fixed length have three linear entries, then angular ones.
     LinearAngular,
+    /// None of its own: those of the task that it is made of.
+    OfTask,
     /// The diagonal.
     Diagonal,
 }
@@ -90,6 +92,8 @@ pub enum Family {
     Combination,
     /// All, but it is made for who names it only: derivatives of other functions.
     Derivatives,
+    /// All, but it is made for who names it only: what is asked of frames, and how the robot does it.
+    Tasks,
     /// Those with drives.
     Drives,
 }
@@ -98,9 +102,14 @@ impl Family {
     /// Whether it is made for who names it only.
     pub fn is_by_name(self) -> bool {
         match self {
-            Family::Combination | Family::Derivatives => true,
+            Family::Combination | Family::Derivatives | Family::Tasks => true,
             Family::Robot | Family::Drives => false,
         }
+    }
+
+    /// Whether results are matrices, whose entries go together.
+    pub fn is_of_blocks(self) -> bool {
+        matches!(self, Family::Derivatives | Family::Tasks)
     }
 }
 
@@ -141,6 +150,8 @@ pub enum Divisor {
     Nothing,
     /// The mass of the moving bodies.
     Mass,
+    /// The mass that each joint carries.
+    MassOfEach,
     /// What joints feel of the links' inertia.
     Inertia,
     /// The same with that of drives.

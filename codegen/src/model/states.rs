@@ -22,6 +22,10 @@ const STRETCH: f64 = 1e-3;
 const FAST: f64 = 10.0;
 /// Accelerations at about rest, as a part of others.
 const SLOW: f64 = 0.2;
+/// Frames are so far \[m, rad\] from where they shall be.
+const ERROR: f64 = 0.3;
+/// The least damping of tasks.
+const DAMPING: f64 = 0.1;
 /// A joint without limits is tried within ± so much.
 const RANGE: f64 = std::f64::consts::PI;
 /// A limit beyond this is none \[rad, m, rad/s or m/s\].
@@ -82,6 +86,9 @@ pub(crate) fn values(model: &Model<Dd>, port: &Port, kind: Kind, random: &mut Ra
         Some(Quantity::Configuration) if len == model.nq() => configuration(model, kind, random),
         Some(Quantity::Gravity) => vec![0.3, -0.2, -9.81],
         Some(Quantity::Velocity) => (0..len).map(|_| random.symmetric(1.0)).collect(),
+        Some(Quantity::PoseError) => (0..len).map(|_| random.symmetric(ERROR)).collect(),
+        Some(Quantity::TaskWeight | Quantity::TorqueGain) => (0..len).map(|_| 0.5 + 0.5 * random.unit()).collect(),
+        Some(Quantity::Damping) => (0..len).map(|_| DAMPING * (1.0 + random.unit())).collect(),
         // generalized forces of the size of the weights
         _ => (0..len).map(|_| random.symmetric(10.0)).collect(),
     }

@@ -246,7 +246,7 @@ printed! { bool usize f64 Duration }
 
 worded! {
     String: text => &format!("{text:?}");
-    ResultPart: part => part.word();
+    ResultPart: part => &part.word();
     ContactFunction: function => function.name();
     Coordinate: coordinate => coordinate.name();
     EnvironmentKind: kind => EnvironmentKind::WORDS.iter().find(|w| w.1 == *kind).expect("every kind has a word").0;

@@ -7,7 +7,7 @@ use crate::model::merge::{merge, Part};
 use crate::model::singular::{singular_joints, Inertia};
 use crate::options::Options;
 use crate::program::contact::Mode;
-use straightline_core::model::Model;
+use straightline_core::model::{BodyId, Model};
 use straightline_core::spatial::{Sym3, Vec3};
 use straightline_core::Dd;
 
@@ -24,7 +24,7 @@ fn asked(model: &Model<Dd>, options: &Options) -> Vec<Asked> {
     let of_function = |f: &Function| match f.spec().divisor {
         Divisor::Inertia => Some(Inertia::OfLinks),
         Divisor::InertiaWithDrives => Some(Inertia::WithDrives),
-        Divisor::Nothing | Divisor::Mass => None,
+        Divisor::Nothing | Divisor::Mass | Divisor::MassOfEach => None,
     };
     let of_contact = |f: &ContactFunction| match f {
         ContactFunction::ForwardDynamics | ContactFunction::InverseDynamics => Some(Inertia::OfLinks),
@@ -100,6 +100,20 @@ fn demand_mass(model: &Model<Dd>, options: &Options, diagnostics: &mut Diagnosti
         let asked = format!("{} {}", names.join(", "), if names.len() == 1 { "is" } else { "are" });
         options.scene.places.complain("options.functions", messages::no_mass(&asked), diagnostics);
     }
+    let of_each = options.functions.iter().filter(|f| f.spec().divisor == Divisor::MassOfEach);
+    for function in of_each.filter(|_| !options.scene.has_loads()) {
+        for id in (0..model.bodies.len()).filter(|id| carries_no_mass(model, *id)) {
+            let joint = &model.bodies[id].joint.name;
+            let complaint = messages::no_mass_behind(function.name(), joint);
+            place(complaint, joint, Some(("options.functions", options)), diagnostics);
+        }
+    }
+}
+
+/// Whether nothing that a joint moves has mass.
+pub fn carries_no_mass(model: &Model<Dd>, joint: BodyId) -> bool {
+    let carried = |body: BodyId| std::iter::successors(Some(body), |b| model.bodies[*b].parent).any(|b| b == joint);
+    model.bodies.iter().enumerate().all(|(b, body)| body.inertia.mass == Dd::ZERO || !carried(b))
 }
 
 /// The same of a robot alone, of what is `asked` for in words ("a simulation is").

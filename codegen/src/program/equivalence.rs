@@ -86,7 +86,7 @@ pub(crate) fn of_function(
     optimisations: Optimisations,
     graph: &Graph,
 ) -> Result<(), Disagreement> {
-    let ports = options.scene.ports(function, &robot.model);
+    let ports = options.scene.ports(function, &robot.model, frames);
     let plain = PlainEquations { robot, frames, function, options };
     let mut states = States::new(robot, options);
     if !optimisations.folding {
@@ -234,7 +234,7 @@ impl PlainEquations<'_> {
     fn bound(self, state: &PortState) -> (BoundRobot<EveryScalar>, Vec<usize>) {
         let PlainEquations { robot, frames, function, options: Options { scene, .. } } = self;
         let (wanted, _) = scene.select(function, &robot.model, scene.frames_of(function, frames).len());
-        let given = of_ports(&scene.ports(function, &robot.model), state);
+        let given = of_ports(&scene.ports(function, &robot.model, frames), state);
         (scene.bind(function, robot, &given), wanted)
     }
 
@@ -242,7 +242,9 @@ impl PlainEquations<'_> {
         let frames = self.options.scene.frames_of(self.function, self.frames).iter();
         let frames: Vec<_> =
             frames.map(|f| bound.model.frame(f).expect("frames were checked against the model")).collect();
-        let all = self.function.evaluate(&bound.model, &frames, method, &bound.arguments);
+        let rows = self.options.scene.rows_of(self.function);
+        let forms = Forms { rows, ..Forms::plain(&bound.model, &frames, method) };
+        let all = self.function.evaluate_on(&forms, &bound.arguments);
         wanted.iter().map(|k| all[*k]).collect()
     }
 
@@ -316,7 +318,7 @@ pub(crate) fn of_stages(
 ) -> Result<(), Disagreement> {
     let mut states = States::new(robot, options);
     let mut ports: Vec<Port> = Vec::new();
-    for port in functions.iter().flat_map(|f| options.scene.ports(*f, &robot.model)) {
+    for port in functions.iter().flat_map(|f| options.scene.ports(*f, &robot.model, frames)) {
         if !ports.contains(&port) {
             ports.push(port);
         }

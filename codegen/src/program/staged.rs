@@ -234,7 +234,7 @@ fn joint_program(
 ) -> (Graph, Vec<usize>, Vec<StageType>) {
     let scene = &options.scene;
     let mut ports: Vec<Port> = Vec::new();
-    for port in functions.iter().flat_map(|f| scene.ports(*f, &robot.model)) {
+    for port in functions.iter().flat_map(|f| scene.ports(*f, &robot.model, frames)) {
         if !ports.contains(&port) {
             ports.push(port);
         }
@@ -258,7 +258,7 @@ fn joint_program(
         let argument =
             |name: &String| inputs[names.iter().position(|n| n == name).expect("ports are the union")].clone();
         let equations = |function: Function| {
-            let own: Vec<Vec<Expr>> = scene.ports(function, &robot.model).iter().map(|p| argument(&p.name)).collect();
+            let own: Vec<Vec<Expr>> = scene.ports(function, &robot.model, frames).iter().map(|p| argument(&p.name)).collect();
             let frames = scene.frames_of(function, frames);
             function.equations(robot, frames, forward, optimisations.reduced, scene, &own)
         };
@@ -269,7 +269,7 @@ fn joint_program(
                 let nv = bias.len();
                 // what the scene knows to be at rest is so here, too
                 let own: Vec<Vec<Expr>> =
-                    scene.ports(*function, &robot.model).iter().map(|p| argument(&p.name)).collect();
+                    scene.ports(*function, &robot.model, frames).iter().map(|p| argument(&p.name)).collect();
                 let qdd = scene.bind(*function, robot, &own).arguments[2].clone();
                 Expr::section("inverse dynamics, H q̈ + h", None);
                 let row = |i: usize| (0..nv).fold(bias[i], |sum, j| sum + h[i * nv + j] * qdd[j]);

@@ -273,6 +273,7 @@ fn selection(function: Function, scene: &Scene) -> String {
         ResultPart::Linear => words.push("the linear part".to_string()),
         ResultPart::Angular => words.push("the angular part".to_string()),
         ResultPart::Diagonal => words.push("the diagonal".to_string()),
+        ResultPart::Rows(rows) => words.push(format!("the rows {}", rows.words().join(", "))),
     }
     format!("only {}", words.join(", "))
 }

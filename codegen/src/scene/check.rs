@@ -7,7 +7,7 @@ use super::{
     Scene,
 };
 use crate::diagnostic::Diagnostics;
-use crate::function::{Family, Function, Parts};
+use crate::function::{Extent, Family, Function, Output, Parts, Rows};
 use crate::identifier::UNNAMED;
 use crate::model::geometry::principal_moments;
 use crate::model::{is_gravity, GRAVITY};
@@ -64,9 +64,16 @@ fn outputs_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
         for (i, result) in selection.results.iter().enumerate().filter(|(_, r)| !results.contains(&r.as_str())) {
             complain(&format!("results.{i}"), say::no_such_result(name, result, &results));
         }
-        if selection.part != ResultPart::Whole && !parts.contains(&selection.part) {
-            let words: Vec<&str> = parts.iter().map(|p| p.word()).collect();
-            complain("part", say::no_such_part(name, selection.part.word(), &words));
+        let is_known = match selection.part {
+            ResultPart::Whole => true,
+            ResultPart::Rows(_) => has_rows(function),
+            part => parts.contains(&part),
+        };
+        if !is_known {
+            let mut words: Vec<String> = parts.iter().map(|p| p.word()).collect();
+            words.extend(has_rows(function).then(|| Rows::WORDS.map(str::to_string)).into_iter().flatten());
+            let words: Vec<&str> = words.iter().map(String::as_str).collect();
+            complain("part", say::no_such_part(name, &selection.part.word(), &words));
         }
     }
 }
@@ -334,6 +341,17 @@ fn parts_of(function: Function) -> &'static [ResultPart] {
     match function.spec().outputs.first().map_or(Parts::No, |output| output.parts) {
         Parts::No => &[],
         Parts::Diagonal => &[ResultPart::Diagonal],
-        Parts::LinearAngular => &[ResultPart::Linear, ResultPart::Angular],
+        Parts::LinearAngular | Parts::OfTask => &[ResultPart::Linear, ResultPart::Angular],
     }
+}
+
+/// Whether the rows of its six-vectors can be asked for one by one.
+fn has_rows(function: Function) -> bool {
+    let is_of_rows = |output: &Output| match output.parts {
+        Parts::No | Parts::OfTask => true,
+        Parts::Diagonal => false,
+        Parts::LinearAngular => output.axes.iter().all(|extent| !matches!(extent, Extent::Of(n) if *n != 6)),
+    };
+    let outputs = function.spec().outputs;
+    outputs.first().is_some_and(|output| output.parts != Parts::No) && outputs.iter().all(is_of_rows)
 }

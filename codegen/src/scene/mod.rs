@@ -23,7 +23,7 @@ pub use ranges::{ranges_in_words, InputRange, JointRanges, Ranges};
 use crate::description::drives::WrittenDrive;
 use crate::description::flexible::{BaseSupport, Flexible};
 use crate::diagnostic::Diagnostic;
-use crate::function::Function;
+use crate::function::{Function, Rows};
 use crate::model::ModelOptions;
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
@@ -159,10 +159,12 @@ pub enum ResultPart {
     Angular,
     /// Of the mass matrix the diagonal.
     Diagonal,
+    /// Of what has six rows, linear ones first, these.
+    Rows(Rows),
 }
 
 impl ResultPart {
-    /// Every part with its word in scene files.
+    /// Every part that has a word in scene files; rows have one each.
     pub const WORDS: [(&str, ResultPart); 4] = [
         ("whole", ResultPart::Whole),
         ("linear", ResultPart::Linear),
@@ -170,9 +172,12 @@ impl ResultPart {
         ("diagonal", ResultPart::Diagonal),
     ];
 
-    /// Its word in scene files.
-    pub fn word(self) -> &'static str {
-        ResultPart::WORDS.iter().find(|w| w.1 == self).map_or("", |w| w.0)
+    /// Its word in scene files, or those of its rows.
+    pub fn word(self) -> String {
+        match self {
+            ResultPart::Rows(rows) => rows.words().join(", "),
+            _ => ResultPart::WORDS.iter().find(|w| w.1 == self).map_or("", |w| w.0).to_string(),
+        }
     }
 }
 

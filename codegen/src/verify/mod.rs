@@ -22,7 +22,7 @@ use straightline_core::model::Model;
 use straightline_core::random::Random;
 use straightline_core::reference::CentreOfMassTree;
 use straightline_core::{trig, Dd};
-use straightline_graph::expr::{evaluate, Graph};
+use straightline_graph::expr::{evaluate, Graph, Port};
 use straightline_graph::schedule::Schedule;
 use straightline_graph::{element_of, Scalar};
 
@@ -170,13 +170,29 @@ impl<'a> Case<'a> {
         Ok(Case { model, frames, options, robot, coordinates, tree, effects, parameters })
     }
 
+    /// What is asked of frames by the functions that are asked for.
+    fn tasks(&self) -> Vec<Port> {
+        let mut ports: Vec<Port> = Vec::new();
+        for function in &self.options.functions {
+            let frames = self.options.scene.frames_of(*function, self.frames).len();
+            let asked = Quantity::of_tasks().filter(|task| function.spec().inputs.contains(task));
+            for port in asked.map(|task| task.port(self.model, frames)) {
+                if ports.iter().all(|other| other.name != port.name) {
+                    ports.push(port);
+                }
+            }
+        }
+        ports
+    }
+
     /// At a random state: at about rest, or fast.
     fn at(&self, fast: bool, random: &mut Random) -> Result<At<'_>, String> {
         let (options, scene) = (self.options, &self.options.scene);
         let (mut model, mut tree) = (self.model.clone(), self.tree.clone());
         let mut inputs = InputState::new();
         let gravity = (scene.gravity == Gravity::Input).then_some(Quantity::Gravity);
-        for port in motion().chain(gravity).map(|quantity| quantity.port(&model)) {
+        let ports = motion().chain(gravity).map(|quantity| quantity.port(&model, 0));
+        for port in ports.chain(self.tasks()).collect::<Vec<_>>() {
             let values = of_port(&model, &port, fast, random);
             inputs.insert(port.name, values);
         }
@@ -199,7 +215,7 @@ impl At<'_> {
     fn truth(&self, case: &Case, function: Function) -> Result<Option<Vec<(Dd, f64)>>, String> {
         let (scene, model) = (&case.options.scene, &self.model);
         let names = scene.frames_of(function, case.frames);
-        let mut chapter = self.chapter.clone().with_frames(names)?;
+        let mut chapter = self.chapter.clone().with_frames(names)?.with_rows(scene.rows_of(function));
         if case.coordinates.are_all() {
             chapter = chapter.with_drives(model);
         }

@@ -51,12 +51,18 @@ const NONE: Effect = Effect {
     smooth: None,
     stiffness: Dd::ZERO,
     rest: Dd::ZERO,
+    range: [None; 2],
+    effort: None,
 };
 
 /// What the file says of a joint.
 fn written(description: &Description, joint: &str) -> Effect {
     let drive = description.joint(joint).map(|joint| joint.drive.clone()).unwrap_or_default();
     let number = |x: &Option<Noted<f64>>| Dd::from(x.as_ref().map_or(0.0, |x| x.value));
+    let joint = description.joint(joint);
+    let limits = joint.map(|joint| joint.limits.clone()).unwrap_or_default();
+    let limit = |x: &Option<Noted<f64>>| x.as_ref().map(|x| x.value).filter(|x| x.is_finite()).map(Dd::from);
+    let has_range = joint.is_some_and(|joint| joint.kind.value.has_range);
     let gear = Dd::from(drive.gear_ratio.as_ref().map_or(1.0, |x| x.value));
     Effect {
         inertia: number(&drive.armature) + gear * gear * number(&drive.rotor_inertia),
@@ -64,6 +70,8 @@ fn written(description: &Description, joint: &str) -> Effect {
         friction: number(&drive.friction),
         stiffness: number(&drive.spring_stiffness),
         rest: number(&drive.spring_rest),
+        range: [&limits.lower, &limits.upper].map(|x| limit(x).filter(|_| has_range)),
+        effort: limit(&limits.effort).map(|x| x.abs()).filter(|x| *x > Dd::ZERO),
         ..NONE
     }
 }

@@ -81,8 +81,8 @@ impl Coordinates {
             places.iter().zip(&state[&quantity.name()]).for_each(|(at, x)| all[*at] = *x);
             whole.insert(quantity, all);
         }
-        for quantity in [Quantity::DriveState, Quantity::DriveInput] {
-            whole.insert(quantity, state[&quantity.name()].clone());
+        for quantity in [Quantity::DriveState, Quantity::DriveInput].into_iter().chain(Quantity::of_tasks()) {
+            whole.extend(state.get(&quantity.name()).map(|x| (quantity, x.clone())));
         }
         whole.into_iter().map(|(quantity, x)| (quantity, x.into_iter().map(Dd::from).collect())).collect()
     }

@@ -333,7 +333,7 @@ impl Case {
         for _ in 0..5 {
             let fault = match written {
                 Written::Function(function, graph, part) => {
-                    let state = states.next(&options.scene.ports(*function, &robot.model));
+                    let state = states.next(&options.scene.ports(*function, &robot.model, frames));
                     differ(graph, &evaluate(graph, &inputs(graph, &state)), &plain(*function, &state), *part)
                 }
                 Written::Mode(k, function, graph) => {
@@ -346,7 +346,7 @@ impl Case {
                     differ(graph, &evaluate(graph, &inputs(graph, &state)), &wide(truth), 1e-15)
                 }
                 Written::Stages(functions, staged) => {
-                    let ports: Vec<_> = functions.iter().flat_map(|f| options.scene.ports(*f, &robot.model)).collect();
+                    let ports: Vec<_> = functions.iter().flat_map(|f| options.scene.ports(*f, &robot.model, frames)).collect();
                     let mut state = states.next(&ports);
                     for stage in &staged.stages {
                         let values = evaluate(stage, &inputs(stage, &state));

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
-use straightline_codegen::function::Family;
+use straightline_codegen::function::{Divisor, Family};
 use straightline_codegen::function::Quantity::{self, Acceleration, Configuration, Force, Velocity};
 use straightline_codegen::model::singular::{singular_joints, Inertia};
 use straightline_codegen::model::{self, ModelOptions};
@@ -26,6 +26,8 @@ use super::written::Random;
 const TIMES: f64 = 20.0;
 /// The plain program loses an ulp of natural scale, even where the few states that are tried show less.
 const ULP: f64 = 1.0;
+/// So many frames robots have at most.
+const MOST_FRAMES: usize = 32;
 /// The same of the equations themselves, run in double-double.
 const EQUATIONS: f64 = 1e-25;
 
@@ -54,7 +56,7 @@ impl Case {
 
     fn wants(&self, scalar: Scalar, function: Function) -> bool {
         use Function::{BiasForce, ForwardDynamics, GravityForce, InverseDynamics, MassMatrix, VelocityForce};
-        let derivative = function.spec().family == Family::Derivatives;
+        let derivative = function.spec().family.is_of_blocks();
         let group = match function {
             InverseDynamics => Some(0),
             MassMatrix => Some(1),
@@ -149,6 +151,11 @@ impl State {
             let numbers = || (0..nv).map(|_| Dd::from(f64::from(own.between(-1.0, 1.0) as f32))).collect();
             named.entry(further).or_insert_with(numbers);
         }
+        // of as many frames as a robot may be asked of
+        for task in Quantity::of_tasks() {
+            let numbers = (0..6 * MOST_FRAMES).map(|_| Dd::from(f64::from(own.between(0.1, 1.0) as f32)));
+            named.insert(task, numbers.collect());
+        }
         State(named)
     }
 
@@ -160,7 +167,7 @@ impl State {
 
     /// The inputs of a program.
     pub fn inputs<T: Real>(&self, graph: &Graph) -> Vec<T> {
-        graph.inputs.iter().flat_map(|port| self.group(&port.name)).map(|x| T::constant(*x)).collect()
+        graph.inputs.iter().flat_map(|port| &self.group(&port.name)[..port.len()]).map(|x| T::constant(*x)).collect()
     }
 }
 
@@ -256,7 +263,7 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
     let of_bodies = |f: &Function| f.spec().family != Family::Drives;
     let mut functions: Vec<Function> = Function::known().filter(of_bodies).collect();
     if !singular_joints(&model, Inertia::OfLinks).is_empty() {
-        functions.retain(|f| !f.spec().solves);
+        functions.retain(|f| !f.spec().solves && f.spec().divisor != Divisor::MassOfEach);
     }
     let mut random = Random(99);
     let states: Vec<State> = (0..6).map(|kind| State::new(&model, &mut random, kind)).collect();

@@ -66,6 +66,7 @@ alone. Scenes add further arguments (gravity, run-time parameters) and leave arg
         (Family::Robot, "Of every robot"),
         (Family::Combination, "Combinations, made for who names them"),
         (Family::Derivatives, "Derivatives, made for who names them"),
+        (Family::Tasks, "Tasks of frames, made for who names them"),
         (Family::Drives, "Of robots with drives"),
     ];
     for (family, title) in families {
@@ -82,7 +83,7 @@ alone. Scenes add further arguments (gravity, run-time parameters) and leave arg
                     page,
                     "| `{}` | {} | {} |",
                     quantity.name(),
-                    axis(quantity.extent()),
+                    quantity.axes().iter().map(|extent| axis(*extent)).collect::<Vec<_>>().join(" × "),
                     cell(&quantity.doc())
                 );
             }
@@ -94,6 +95,7 @@ alone. Scenes add further arguments (gravity, run-time parameters) and leave arg
                 let parts = match output.parts {
                     Parts::No => "",
                     Parts::LinearAngular => "; part `\"linear\"`, `\"angular\"`",
+                    Parts::OfTask => "; part of the task `\"linear\"`, `\"angular\"`",
                     Parts::Diagonal => "; part `\"diagonal\"`",
                 };
                 let _ = writeln!(page, "| → `{}` | {} | {}{parts} |", output.name, shape.join(" × "), cell(output.doc));

@@ -47,6 +47,7 @@ mod scope;
 mod self_test;
 mod staged;
 mod sums;
+mod tasks;
 mod truth;
 mod two_readings;
 mod unyielding;

@@ -27,7 +27,8 @@ fn state(tree: &CentreOfMassTree<Dd>, random: &mut Random) -> BTreeMap<Quantity,
         q[link.iq + 3..link.iq + 7].copy_from_slice(&[0.6, 0.0, 0.0, 0.8].map(Dd::from));
     }
     let rates = Quantity::of_velocities().map(|rate| (rate, any(tree.nv()))).collect::<Vec<_>>();
-    rates.into_iter().chain([(Quantity::Configuration, q)]).collect()
+    let tasks = Quantity::of_tasks().map(|task| (task, any(6))).collect::<Vec<_>>();
+    rates.into_iter().chain(tasks).chain([(Quantity::Configuration, q)]).collect()
 }
 
 #[test]

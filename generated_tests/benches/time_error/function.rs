@@ -164,7 +164,7 @@ impl Case {
         let source = programs::source(data);
         let robot = programs::load(&source, &options.model);
         let program = program(&robot, &options.frames, function, &options);
-        let inputs = function.inputs(&robot.model);
+        let inputs = function.inputs(&robot.model, 0);
         let ranges = inputs.iter().flat_map(|p| ranges(&robot.model, &p.name, p.len())).collect();
         let lengths = inputs.iter().map(|p| p.len()).collect();
         let fewer = |count: usize| (count * 49 / (robot.model.nv() * robot.model.nv()).max(49)).max(LEAST);
@@ -196,7 +196,7 @@ impl Case {
     fn stated_ranges(&self, function: Function) -> scene::Ranges {
         let mut stated = scene::Ranges::default();
         let mut first = 0;
-        for (port, len) in function.inputs(&self.robot.model).iter().zip(&self.lengths) {
+        for (port, len) in function.inputs(&self.robot.model, 0).iter().zip(&self.lengths) {
             let of = |joint: &Joint| {
                 let index = first + if port.name == "q" { joint.iq } else { joint.iv };
                 let (lower, upper) = self.ranges.0[index];
@@ -253,7 +253,7 @@ fn error(computed: &[f64], truth: &[Dd]) -> f64 {
 fn generated(module: &'static str, case: &Case, options: &Options, function: Function) -> Generated {
     let made = compile(&case.source, options).unwrap_or_else(|d| panic!("{d}"));
     let item = &made.items[0];
-    let places = function.inputs(&case.robot.model);
+    let places = function.inputs(&case.robot.model, 0);
     let place = |name: &str| {
         let before: usize = places.iter().take_while(|p| p.name != name).map(|p| p.len()).sum();
         (before, places.iter().find(|p| p.name == name).map_or(0, |p| p.len()))

@@ -34,7 +34,7 @@ fn run(program: &TracedProgram, inputs: &[(&str, Vec<f64>)]) -> Vec<f64> {
 }
 
 fn named(function: Function, loaded: &Loaded, random: &mut Random) -> Vec<(&'static str, Vec<f64>)> {
-    let names = function.inputs(&loaded.model).into_iter().map(|p| match p.name.as_str() {
+    let names = function.inputs(&loaded.model, 0).into_iter().map(|p| match p.name.as_str() {
         "q" => "q",
         "qd" => "qd",
         "qdd" => "qdd",

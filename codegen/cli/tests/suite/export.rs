@@ -44,7 +44,7 @@ fn c_calls_every_function_and_gets_what_the_generic_runtime_computes() {
     let mut calls = String::new();
     let mut truth = Vec::new();
     for function in Function::all() {
-        let inputs = function.inputs(&model);
+        let inputs = function.inputs(&model, frames.len());
         let numbers: Vec<Vec<Dd>> =
             inputs.iter().map(|p| state(&p.name)[..p.len()].iter().map(|x| Dd::from(*x)).collect()).collect();
         let method = ForwardDynamicsMethod::Factorisation;

@@ -64,19 +64,26 @@ impl Truth for ForwardDynamicsHvp {
 }
 
 /// The joints that move, of which accelerations are solved for.
-struct MovingJoints<'a, 'b> {
+pub(super) struct MovingJoints<'a, 'b> {
     at: &'a Chapter<'b>,
-    moving: Vec<usize>,
-    h: DMatrix<Magnitude>,
+    /// Their velocity coordinates.
+    pub moving: Vec<usize>,
+    /// H of them.
+    pub h: DMatrix<Magnitude>,
 }
 
 impl<'a, 'b> MovingJoints<'a, 'b> {
-    fn new(at: &'a Chapter<'b>) -> Self {
+    pub fn new(at: &'a Chapter<'b>) -> Self {
         let all: Vec<usize> = (0..at.qd().len()).collect();
         let moving = at.moving.unwrap_or(&all).to_vec();
         let h = at.with_rotors(reference::mass_matrix(&at.tree, at.q()));
         let h = h.select_rows(&moving).select_columns(&moving);
         MovingJoints { at, moving, h }
+    }
+
+    /// H⁻¹ b, of the joints that move alone.
+    pub fn response(&self, right: &DVector<Magnitude>) -> DVector<Magnitude> {
+        solved(&self.h, right, reference::solve_symmetric::<Dd>)
     }
 
     /// H⁻¹ b of the joints that move, and zeros.

@@ -3,7 +3,7 @@
 //! A truth is asked of a [`Chapter`]: the robot as the handbook chapter describes it, at a state. It is computed once, over [`Magnitude`], which gives
 //! the value in double-double and, beside it, how large the terms were that it is made of. So no natural scale is written down by hand.
 
-use super::{Quantity, RobotFunction};
+use super::{Extent, Quantity, RobotFunction, Rows};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::collections::BTreeMap;
 use straightline_core::magnitude::Magnitude;
@@ -17,7 +17,9 @@ mod drives;
 mod dynamics;
 mod forward_derivatives;
 mod kinematics;
+mod frame_forces;
 mod motion_derivatives;
+mod tasks;
 mod whole;
 
 /// What a function should give.
@@ -27,7 +29,7 @@ pub trait Truth: RobotFunction {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>>;
 }
 
-/// What a joint of one coordinate adds to the rigid bodies: τ = … + I q̈ + d q̇ + f sgn(q̇) + k (q − q₀).
+/// What a joint of one coordinate adds to the rigid bodies, τ = … + I q̈ + d q̇ + f sgn(q̇) + k (q − q₀), and how far it and its drive may go.
 #[derive(Clone, Copy, Debug)]
 pub struct Effect {
     /// Index into q.
@@ -46,6 +48,10 @@ pub struct Effect {
     pub stiffness: Dd,
     /// q₀ \[rad or m\].
     pub rest: Dd,
+    /// Its least and greatest coordinate \[rad or m\], where they are limited.
+    pub range: [Option<Dd>; 2],
+    /// The greatest force \[N·m or N\] of its drive, where that is limited.
+    pub effort: Option<Dd>,
 }
 
 /// A robot in the second author's terms, at a state.
@@ -54,6 +60,8 @@ pub struct Chapter<'a> {
     /// The robot.
     pub tree: CentreOfMassTree<Magnitude>,
     frames: Vec<CentreOfMassFrame<Magnitude>>,
+    /// The rows of tasks that are asked for.
+    rows: Rows,
     effects: &'a [Effect],
     /// The velocity coordinates that move, where others are held.
     moving: Option<&'a [usize]>,
@@ -71,6 +79,9 @@ impl<'a> Chapter<'a> {
             sized.entry(rate).or_insert_with(|| vec![Magnitude::zero(); tree.nv()]);
         }
         let tree = with_sizes(tree);
+        for task in [Quantity::Wrench, Quantity::PoseError] {
+            sized.entry(task).and_modify(|x| x.chunks_mut(3).for_each(of_length));
+        }
         // the coordinates of a free link are parts of vectors, its attitude one of a rotation
         for link in tree.links.iter().filter(|link| link.joint == ReferenceJoint::Free) {
             for (quantity, x) in &mut sized {
@@ -79,14 +90,14 @@ impl<'a> Chapter<'a> {
                         of_length(&mut x[link.iq..link.iq + 3]);
                         x[link.iq + 3..link.iq + 7].iter_mut().for_each(|x| *x = x.of_size(1.0));
                     }
-                    quantity if quantity.extent() == super::Extent::Velocities => {
+                    quantity if quantity.axes() == [Extent::Velocities] => {
                         x[link.iv..link.iv + 6].chunks_mut(3).for_each(of_length);
                     }
                     _ => {}
                 }
             }
         }
-        Chapter { tree, frames: Vec::new(), effects, moving: None, drives: None, state: sized }
+        Chapter { tree, frames: Vec::new(), rows: Rows::ALL, effects, moving: None, drives: None, state: sized }
     }
 
     /// The same with these frames asked for.
@@ -98,7 +109,20 @@ impl<'a> Chapter<'a> {
             self.tree.frame(name).cloned().ok_or_else(|| format!("the reference has no frame `{name}`"))
         };
         self.frames = names.iter().map(frame).collect::<Result<_, _>>()?;
+        for task in Quantity::of_tasks() {
+            let numbers = match task.axes() {
+                [Extent::Frames, Extent::Of(n)] => n * names.len(),
+                _ => 1,
+            };
+            self.state.entry(task).or_insert_with(|| vec![Magnitude::zero(); numbers]);
+        }
         Ok(self)
+    }
+
+    /// The same with these rows of tasks asked for.
+    #[must_use]
+    pub fn with_rows(self, rows: Rows) -> Self {
+        Chapter { rows, ..self }
     }
 
     /// The same where these velocity coordinates alone move.
@@ -147,6 +171,14 @@ impl<'a> Chapter<'a> {
     fn with_passive(&self, mut forces: DVector<Magnitude>) -> DVector<Magnitude> {
         for effect in self.effects {
             forces[effect.iv] += effect.passive(self.q()[effect.iq], self.qd()[effect.iv]);
+        }
+        forces
+    }
+
+    /// Forces of the bodies at rest with what springs of the joints take.
+    fn with_passive_at_rest(&self, mut forces: DVector<Magnitude>) -> DVector<Magnitude> {
+        for effect in self.effects {
+            forces[effect.iv] += effect.passive(self.q()[effect.iq], Magnitude::zero());
         }
         forces
     }

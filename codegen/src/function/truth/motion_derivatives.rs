@@ -2,12 +2,13 @@
 
 use super::super::motion_derivatives::{
     CentreOfMassJacobian, CentroidalDerivatives, CentroidalMap, CentroidalMapRate, FrameDerivatives,
+    SubtreeCentresOfMass,
 };
 use super::derivatives::{moving, unit};
 use super::{by_rows, list, Chapter, Truth};
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference::{self, CentreOfMassTree, ReferenceReal};
-use straightline_core::Dual;
+use straightline_core::{Dual, Real};
 
 type Moving = Dual<Magnitude, 1>;
 
@@ -40,6 +41,33 @@ impl Truth for CentreOfMassJacobian {
         let tree = at.tree.map(Moving::fixed);
         Some(slopes(at, 0, |[q, ..]| list(&reference::centre_of_mass(&tree, q))))
     }
+}
+
+impl Truth for SubtreeCentresOfMass {
+    /// Σ m r / Σ m of the links behind each joint.
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        let mut order: Vec<usize> = (0..at.tree.links.len()).collect();
+        order.sort_by_key(|link| at.tree.links[*link].iv);
+        let mass = |joint: usize| behind(&at.tree, joint).fold(Magnitude::zero(), |sum, k| sum + at.tree.links[k].mass);
+        let moving = at.tree.map(Moving::fixed);
+        let centres: Vec<_> = order.iter().flat_map(|joint| centre(&at.tree, *joint, at.q())).collect();
+        let jacobians = order.iter().flat_map(|joint| slopes(at, 0, |[q, ..]| centre(&moving, *joint, q)));
+        Some(order.iter().map(|joint| mass(*joint)).chain(centres).chain(jacobians).collect())
+    }
+}
+
+/// The links that a joint moves, by the number of its own.
+fn behind<T: ReferenceReal>(tree: &CentreOfMassTree<T>, joint: usize) -> impl Iterator<Item = usize> + '_ {
+    let is_behind = move |link: usize| std::iter::successors(Some(link), |k| tree.links[*k].parent).any(|k| k == joint);
+    (0..tree.links.len()).filter(move |link| is_behind(*link))
+}
+
+/// Their centre of mass.
+fn centre<T: ReferenceReal>(tree: &CentreOfMassTree<T>, joint: usize, q: &[T]) -> Vec<T> {
+    let links = reference::geometry(tree, q);
+    let mass = behind(tree, joint).fold(<T as Real>::zero(), |sum, k| sum + tree.links[k].mass);
+    let sum = |row: usize| behind(tree, joint).fold(<T as Real>::zero(), |sum, k| sum + tree.links[k].mass * links[k].centre_of_mass[row]);
+    (0..3).map(|row| sum(row) / mass).collect()
 }
 
 impl Truth for CentroidalMap {
@@ -90,7 +118,7 @@ fn momentum<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> 
 }
 
 /// How what `f` says of a motion changes with each coordinate of q, or of q̇: by rows.
-fn slopes(at: &Chapter<'_>, block: usize, f: impl Fn(&[Vec<Moving>; 3]) -> Vec<Moving>) -> Vec<Magnitude> {
+pub(super) fn slopes(at: &Chapter<'_>, block: usize, f: impl Fn(&[Vec<Moving>; 3]) -> Vec<Moving>) -> Vec<Magnitude> {
     let nv = at.qd().len();
     let column = |k: usize| {
         let motion = moving(&at.tree, [at.q(), at.qd(), at.qdd()], &unit(nv, block, k));

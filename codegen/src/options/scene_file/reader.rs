@@ -8,7 +8,7 @@ use crate::description::reader::{FileReader, Range64};
 use crate::description::table::TomlTable;
 use crate::description::Noted;
 use crate::diagnostic::{Diagnostics, Front, Source};
-use crate::function::Function;
+use crate::function::{Function, Rows};
 use crate::options::table::OptionRow;
 use crate::options::value;
 use crate::scene::{
@@ -168,9 +168,7 @@ impl<'a> SceneReader<'a> {
             self.note(&path, &wanted.span);
             let joints = self.names(&format!("{path}.joints"), &wanted, "joints", "joint");
             let frames = self.names(&format!("{path}.frames"), &wanted, "frames", "frame");
-            let part =
-                self.at(&path, &wanted, "part", |reader, table, key| reader.word_at(table, key, &ResultPart::WORDS));
-            let part = part.unwrap_or_default();
+            let part = self.part(&path, &wanted);
             let results = self.names(&format!("{path}.results"), &wanted, "results", "result");
             self.file.scene.outputs.insert(function, Selection { joints, frames, part, results });
             functions.push(function);
@@ -179,6 +177,25 @@ impl<'a> SceneReader<'a> {
             let row = OptionRow::find("functions", |_| true).expect("functions are an option");
             let value = value::OptionValue::of_choices(functions);
             self.file.settings.give(row, value, Front::CommandLine).expect("functions have names");
+        }
+    }
+
+    /// A word, or a list of rows; no rows mean all.
+    fn part(&mut self, path: &str, table: &TomlTable) -> ResultPart {
+        if !matches!(table.get("part"), Some((DeValue::Array(_), _))) {
+            let word = |reader: &mut FileReader<'a>, table: &TomlTable, key: &str| {
+                reader.word_at(table, key, &ResultPart::WORDS)
+            };
+            return self.at(path, table, "part", word).unwrap_or_default();
+        }
+        let names = self.reader.names_at(table, "part", "row");
+        table.get("part").iter().for_each(|(_, span)| self.note(&format!("{path}.part"), span));
+        let words: Vec<(&str, usize)> = Rows::WORDS.into_iter().enumerate().map(|(k, word)| (word, k)).collect();
+        let rows: Vec<usize> =
+            names.iter().filter_map(|name| self.reader.word(&table.what("part"), name, &words)).collect();
+        match &rows[..] {
+            [] => ResultPart::Whole,
+            rows => ResultPart::Rows(Rows::of(rows.iter().copied())),
         }
     }
 

@@ -142,7 +142,7 @@ pub fn programs(robot: &Robot, options: &Options, mode: &Mode) -> Result<Vec<Mod
 
 /// The inputs that a function of a mode may have.
 pub(crate) fn ports(robot: &Robot, options: &Options, mode: &Mode, function: ContactFunction) -> Vec<Port> {
-    let own = options.scene.ports(base_function(function), &robot.model);
+    let own = options.scene.ports(base_function(function), &robot.model, &[]);
     own.into_iter().chain(added_ports(function, mode, &robot.model)).collect()
 }
 
@@ -195,7 +195,7 @@ fn plainly<T: Real>(
         return None;
     }
     let own = base_function(function);
-    let inputs: Vec<Vec<T>> = options.scene.ports(own, &robot.model).iter().map(given).collect();
+    let inputs: Vec<Vec<T>> = options.scene.ports(own, &robot.model, &[]).iter().map(given).collect();
     let mut bound = options.scene.bind(own, robot, &inputs);
     let falls = prepare(&mut bound.model);
     let added = added_ports(function, mode, &robot.model).into_iter().map(|p| (p.name.clone(), given(&p))).collect();
@@ -220,7 +220,7 @@ pub(crate) fn optimised(
     let chosen = chosen(robot, options, optimisations);
     let robot = chosen.as_ref().unwrap_or(robot);
     let base = base_function(function);
-    let own = options.scene.ports(base, &robot.model);
+    let own = options.scene.ports(base, &robot.model, &[]);
     let added = added_ports(function, mode, &robot.model);
     let names: Vec<String> = added.iter().map(|p| p.name.clone()).collect();
     let inputs: Vec<Port> = own.iter().cloned().chain(added).collect();
@@ -265,7 +265,7 @@ pub fn system(robot: &Robot, options: &Options, mode: &Mode, optimisations: Opti
     let chosen = chosen(robot, options, optimisations);
     let robot = chosen.as_ref().unwrap_or(robot);
     let (nv, m) = (robot.model.nv(), mode.constrained_names().len());
-    let own = options.scene.ports(Function::ForwardDynamics, &robot.model);
+    let own = options.scene.ports(Function::ForwardDynamics, &robot.model, &[]);
     let added = added_ports(ContactFunction::ForwardDynamics, mode, &robot.model);
     let names: Vec<String> = added.iter().map(|p| p.name.clone()).collect();
     let solution = solution_ports(&robot.model, mode).into_iter().filter(|p| !p.is_empty());
@@ -334,7 +334,7 @@ pub(crate) fn evaluate_system<T: Real>(
 
 /// What a system judges: accelerations and reactions.
 fn solution_ports(model: &Model<Dd>, mode: &Mode) -> [Port; 2] {
-    [Quantity::Acceleration.port(model), Port::new("force", &[mode.constrained_names().len()])]
+    [Quantity::Acceleration.port(model, 0), Port::new("force", &[mode.constrained_names().len()])]
 }
 
 /// All inputs that a system may have.
@@ -407,7 +407,7 @@ fn outputs(function: ContactFunction, mode: &Mode, model: &Model<Dd>) -> Vec<Por
         ContactFunction::ConstrainedCoordinates => coordinates(m),
         ContactFunction::FreeCoordinates => coordinates(mode.free_names().len()),
         ContactFunction::ForwardDynamics | ContactFunction::DrivenForwardDynamics => [
-            vec![Quantity::Acceleration.port(model)],
+            vec![Quantity::Acceleration.port(model, 0)],
             match function {
                 ContactFunction::DrivenForwardDynamics => vec![Port::new("xd", &[drive_states(model)])],
                 _ => vec![],
@@ -421,7 +421,7 @@ fn outputs(function: ContactFunction, mode: &Mode, model: &Model<Dd>) -> Vec<Por
             per_contact("own_rate", 2, |(own, _)| own),
         ]
         .concat(),
-        ContactFunction::InverseDynamics => vec![Quantity::Force.port(model), Port::new("pivot", &[1])],
+        ContactFunction::InverseDynamics => vec![Quantity::Force.port(model, 0), Port::new("pivot", &[1])],
         ContactFunction::Impact => [
             vec![
                 Port::new("dqd", &[nv]),

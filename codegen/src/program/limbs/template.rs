@@ -144,7 +144,7 @@ impl LimbValues<'_> {
 /// Traces a function of a robot with these limbs, by its reduced form.
 pub(super) fn template(robot: &Robot, function: Function, scene: &Scene, limbs: &[Limbs], rules: RuleSet) -> Template {
     let bodies = bodies(&robot.model, limbs);
-    let own = scene.ports(function, &robot.model);
+    let own = scene.ports(function, &robot.model, &[]);
     let first_sum: usize = own.iter().map(Port::len).sum();
     let first_lane = first_sum + 6 * limbs.len();
     let most = NUMBERS * bodies.iter().filter(|(kind, _)| kind.is_some()).count();

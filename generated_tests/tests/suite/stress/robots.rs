@@ -50,7 +50,7 @@ impl Judged {
     /// Flat inputs in groups, the quaternion of length one.
     pub fn groups(&self, function: Function, flat: &[f64]) -> Vec<Vec<f64>> {
         let mut rest = flat;
-        let ports = function.inputs(self.model());
+        let ports = function.inputs(self.model(), 0);
         let mut groups: Vec<Vec<f64>> = ports
             .iter()
             .map(|port| {
@@ -79,7 +79,7 @@ impl Judged {
 /// The limits of a function's inputs, one after the other.
 pub fn ranges(model: &Model<Dd>, function: Function) -> Ranges {
     let mut ranges = Vec::new();
-    for port in function.inputs(model) {
+    for port in function.inputs(model, 0) {
         let mut group = vec![(0.0, 0.0); port.len()];
         for joint in model.bodies.iter().map(|b| &b.joint) {
             let or = |limit: f64, other: f64| if limit.is_finite() { limit } else { other };

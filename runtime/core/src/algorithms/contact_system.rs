@@ -41,7 +41,7 @@ pub(super) struct ContactSystem<T> {
 }
 
 /// L U of a small matrix, no exchange of rows; for a symmetric one U = D Lᵀ.
-struct Solver<T> {
+pub(super) struct Solver<T> {
     lower: Vec<Vec<T>>,
     upper: Vec<Vec<T>>,
     inverse_pivots: Vec<T>,
@@ -96,7 +96,7 @@ impl<T: Real> ContactSystem<T> {
                 }
             }
         }
-        let (solver, pivot) = Solver::new(ridged, symmetric, ridge);
+        let (solver, pivot) = Solver::new(ridged, symmetric, Some(ridge));
         ContactSystem { half, scaled, inverse_mass, matrix, solver, pivot }
     }
 
@@ -132,19 +132,21 @@ impl<T: Real> ContactSystem<T> {
 }
 
 impl<T: Real> Solver<T> {
-    fn new(mut a: Vec<Vec<T>>, symmetric: bool, ridge: T) -> (Self, T) {
+    /// With the least pivot against its diagonal entry. With a `ridge` ε pivots are never below ε/2 of it.
+    pub fn new(mut a: Vec<Vec<T>>, symmetric: bool, ridge: Option<T>) -> (Self, T) {
         let m = a.len();
         let diagonal: Vec<T> = (0..m).map(|i| a[i][i]).collect();
         let (mut inverse_pivots, mut least) = (Vec::with_capacity(m), T::one());
         let mut lower = vec![vec![T::zero(); m]; m];
         for k in 0..m {
             // the first is the diagonal itself
-            let pivot = if k == 0 {
-                a[0][0]
-            } else {
-                let pivot = greater(a[k][k], diagonal[k] * ridge * T::constant(Dd::HALF));
-                least = lesser(least, pivot / diagonal[k]);
-                pivot
+            let pivot = match ridge {
+                Some(ridge) if k > 0 => {
+                    let pivot = greater(a[k][k], diagonal[k] * ridge * T::constant(Dd::HALF));
+                    least = lesser(least, pivot / diagonal[k]);
+                    pivot
+                }
+                _ => a[k][k],
             };
             let inverse = T::one() / pivot;
             inverse_pivots.push(inverse);
@@ -162,7 +164,28 @@ impl<T: Real> Solver<T> {
         (Solver { lower, upper, inverse_pivots }, least)
     }
 
-    fn solve(&self, right: &[T]) -> Vec<T> {
+    /// The inverse of a symmetric matrix: one triangle by substitution, the other as it is symmetric.
+    pub fn inverse(&self) -> Vec<Vec<T>> {
+        let m = self.inverse_pivots.len();
+        let mut inverse = vec![vec![T::zero(); m]; m];
+        for k in 0..m {
+            // rows above k of L⁻¹ e_k are zero, and x above k is known
+            let mut x: Vec<T> = vec![T::zero(); m];
+            x[k] = T::one();
+            for i in k + 1..m {
+                x[i] = (k..i).fold(T::zero(), |sum, j| sum - self.lower[i][j] * x[j]);
+            }
+            for i in (k..m).rev() {
+                let right = (i + 1..m).fold(x[i], |sum, j| sum - self.upper[i][j] * x[j]);
+                x[i] = right * self.inverse_pivots[i];
+                (inverse[i][k], inverse[k][i]) = (x[i], x[i]);
+            }
+        }
+        inverse
+    }
+
+    /// x of these right sides.
+    pub fn solve(&self, right: &[T]) -> Vec<T> {
         let (m, mut x) = (right.len(), right.to_vec());
         for i in 0..m {
             for k in 0..i {

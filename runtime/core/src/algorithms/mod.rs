@@ -42,6 +42,8 @@
 //! | pose, velocity, acceleration of a frame | [`forward_kinematics`], [`frame_velocity`], [`frame_acceleration`] |
 //! | Jacobian and J̇q̇ | [`jacobian`](fn@jacobian), [`jacobian_bias`] |
 //! | derivatives of the motion of a frame, J̇ | [`frame_derivatives`](fn@frame_derivatives) |
+//! | Jᵀ f and its derivative | [`jacobian_hessian_product`] |
+//! | dynamics of a task, inverse kinematics | [`OperationalSpace`], [`inverse_kinematics_step`] |
 //! | tau of a motion | [`inverse_dynamics`], [`bias_force`], [`gravity_force`], [`velocity_force`] |
 //! | reactions in the joints | [`joint_wrenches`] |
 //! | H(q) | [`mass_matrix`] |
@@ -50,6 +52,7 @@
 //! | motion under the inputs of drives | [`driven_motion`], [`complete_model`](fn@complete_model), [`state_space`](fn@state_space) |
 //! | inputs of drives for a motion | [`driven_inverse`](fn@driven_inverse) |
 //! | centre of mass, momentum | [`momentum`](fn@momentum) |
+//! | mass and centre of mass behind each joint | [`subtrees`] |
 //! | what moves both | [`centre_of_mass_jacobian`], [`centroidal_map`], [`centroidal_dynamics_derivatives`] |
 //! | contact coordinates, (20.83)-(20.87) | [`relative_motion`], [`functional_coordinates`] |
 //! | motion and reactions in contact, (20.88)-(20.94) | [`constrained_forward_dynamics`], [`hybrid_inverse_dynamics`], [`Environment`] |
@@ -73,15 +76,19 @@ mod factor;
 mod frame_derivatives;
 mod functional;
 mod impact;
+mod inverse_kinematics;
 mod jacobian;
+mod jacobian_hessian;
 mod kinematics;
 mod momentum;
+mod operational_space;
 mod reduced_derivatives;
 mod reduced_dynamics;
 mod reduced_gravity;
 mod reduced_mass_matrix;
 mod reduced_turn;
 mod rnea;
+mod subtree;
 mod transmission;
 mod velocity;
 
@@ -115,13 +122,17 @@ pub use functional::{
     RelativeMotion,
 };
 pub use impact::{impact, Impact, Struck};
+pub use inverse_kinematics::{inverse_kinematics_step, StepLimits, WeightedTask};
 pub use jacobian::{jacobian, jacobian_bias};
+pub use jacobian_hessian::{jacobian_hessian_product, ForceOnFrame};
 pub use kinematics::{forward_kinematics, frame_acceleration, frame_velocity};
 pub use momentum::{momentum, CentroidalMomentum};
+pub use operational_space::{OperationalSpace, TaskRows};
 pub use reduced_derivatives::{reduced_inverse_dynamics_derivatives, DerivativeBlocks};
 pub use reduced_dynamics::{reduced_inverse_dynamics, reduced_inverse_dynamics_with_limbs, LimbWrenches};
 pub use reduced_gravity::{reduced_gravity_force, reduced_gravity_force_with_limbs, LimbMoments};
 pub use reduced_mass_matrix::reduced_mass_matrix;
+pub use subtree::{subtrees, Subtree};
 pub use rnea::{bias_force, gravity_force, inverse_dynamics, joint_wrenches, velocity_force};
 
 use crate::model::Body;
