@@ -1,7 +1,7 @@
 //! A scene where it meets the equations: which inputs are left, what stands for the others, which results are wanted.
 
 use crate::equations::Robot;
-use crate::function::{Extent, Family, Forms, ForwardDynamicsMethod, Function, Output, Parts, Quantity, Rows};
+use crate::function::{Extent, Family, Forms, ForwardDynamicsMethod, Function, Output, Parts, Quantity, SelectedRows};
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::{Gravity, Parameter, ResultPart, Scene, Selection};
 use straightline_core::model::{Frame, Load, Model};
@@ -28,7 +28,7 @@ impl<T: Real> BoundRobot<T> {
         &'a self,
         reduced: bool,
         frames: &'a [&'a Frame<T>],
-        rows: Rows,
+        rows: SelectedRows,
         method: ForwardDynamicsMethod,
     ) -> Forms<'a, T> {
         let serves = reduced && self.reduced.serves(&self.model);
@@ -157,12 +157,12 @@ impl Scene {
     }
 
     /// The rows of a function's tasks.
-    pub fn rows_of(&self, function: Function) -> Rows {
+    pub fn rows_of(&self, function: Function) -> SelectedRows {
         match self.outputs.get(&function).map(|selection| selection.part) {
-            Some(ResultPart::Linear) => Rows::LINEAR,
-            Some(ResultPart::Angular) => Rows::ANGULAR,
+            Some(ResultPart::Linear) => SelectedRows::LINEAR,
+            Some(ResultPart::Angular) => SelectedRows::ANGULAR,
             Some(ResultPart::Rows(rows)) => rows,
-            Some(ResultPart::Whole | ResultPart::Diagonal) | None => Rows::ALL,
+            Some(ResultPart::Whole | ResultPart::Diagonal) | None => SelectedRows::ALL,
         }
     }
 

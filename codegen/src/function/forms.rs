@@ -1,6 +1,6 @@
 //! A robot in the forms that functions are evaluated on: its own parameters, and reduced ones that take fewer operations.
 
-use super::Rows;
+use super::SelectedRows;
 use std::cell::RefCell;
 use straightline_core::algorithms as alg;
 use straightline_core::model::{Frame, Model};
@@ -29,7 +29,7 @@ pub struct Forms<'a, T> {
     /// The frames that are asked for.
     pub frames: &'a [&'a Frame<T>],
     /// The rows of tasks that are asked for.
-    pub rows: Rows,
+    pub rows: SelectedRows,
     /// How forward dynamics is computed.
     pub method: ForwardDynamicsMethod,
     /// Limbs in lanes, of the reduced robot.
@@ -48,7 +48,7 @@ pub struct LimbSums<'a, T> {
 impl<'a, T: Real> Forms<'a, T> {
     /// By the model alone.
     pub fn plain(model: &'a Model<T>, frames: &'a [&'a Frame<T>], method: ForwardDynamicsMethod) -> Self {
-        Forms { model, reduced: None, frames, rows: Rows::ALL, method, limbs: None }
+        Forms { model, reduced: None, frames, rows: SelectedRows::ALL, method, limbs: None }
     }
 
     fn with_limbs<R>(&self, f: impl FnOnce(&mut LimbSums<'_, T>) -> R) -> R {

@@ -24,8 +24,8 @@ mod whole;
 pub use contact::ContactFunction;
 pub(crate) use drives::may_be_articulated;
 pub use forms::{Forms, ForwardDynamicsMethod, LimbSums};
-pub use rows::Rows;
 pub use quantity::Quantity;
+pub use rows::SelectedRows;
 pub use spec::{Divisor, Extent, Family, Form, InLanes, Judged, Output, Parts, RobotFunction, Spec};
 
 use straightline_core::model::{Frame, Model};

@@ -2,23 +2,23 @@
 
 /// Which of three linear and three angular rows are asked for, in this order, along world axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Rows {
+pub struct SelectedRows {
     wanted: [bool; 6],
 }
 
-impl Rows {
+impl SelectedRows {
     /// All.
-    pub const ALL: Rows = Rows { wanted: [true; 6] };
+    pub const ALL: SelectedRows = SelectedRows { wanted: [true; 6] };
     /// Those along the world's axes.
-    pub const LINEAR: Rows = Rows { wanted: [true, true, true, false, false, false] };
+    pub const LINEAR: SelectedRows = SelectedRows { wanted: [true, true, true, false, false, false] };
     /// Those about the world's axes.
-    pub const ANGULAR: Rows = Rows { wanted: [false, false, false, true, true, true] };
+    pub const ANGULAR: SelectedRows = SelectedRows { wanted: [false, false, false, true, true, true] };
     /// Their words in scene files, in order.
     pub const WORDS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
     /// These, by their places.
-    pub fn of(places: impl IntoIterator<Item = usize>) -> Rows {
-        let mut rows = Rows { wanted: [false; 6] };
+    pub fn of(places: impl IntoIterator<Item = usize>) -> SelectedRows {
+        let mut rows = SelectedRows { wanted: [false; 6] };
         places.into_iter().for_each(|k| rows.wanted[k] = true);
         rows
     }
@@ -30,6 +30,6 @@ impl Rows {
 
     /// Their words, in order.
     pub fn words(self) -> Vec<&'static str> {
-        self.places().map(|k| Rows::WORDS[k]).collect()
+        self.places().map(|k| SelectedRows::WORDS[k]).collect()
     }
 }

@@ -3,7 +3,7 @@
 use super::derivatives::weighed_slopes;
 use super::spec::Extent::{Frames, Of, Velocities};
 use super::spec::{Divisor, Family, Form, Judged, Output, Parts, RobotFunction, Spec};
-use super::{Forms, Quantity, Rows};
+use super::{Forms, Quantity, SelectedRows};
 use straightline_core::algorithms::{self as alg, Ltdl, OperationalSpace, StepLimits, TaskRows, WeightedTask};
 use straightline_core::model::{Frame, Limits};
 use straightline_core::spatial::{MotionVector, Vec3};
@@ -71,7 +71,11 @@ impl RobotFunction for OperationalSpaceDynamics {
             let rest = vec![T::zero(); bias.len()];
             let inverse = task.inverse();
             let null_space = task.null_space(&inverse);
-            blocks[0].extend(spread(rows, &task.inertia.iter().map(|row| spread_one(rows, row)).collect::<Vec<_>>(), 6));
+            blocks[0].extend(spread(
+                rows,
+                &task.inertia.iter().map(|row| spread_one(rows, row)).collect::<Vec<_>>(),
+                6,
+            ));
             blocks[1].extend(spread_one(rows, &task.force(&velocity, &bias)));
             blocks[2].extend(spread_one(rows, &task.force(&gravity, &rest)));
             blocks[3].extend((0..nv).flat_map(|i| spread_one(rows, &inverse[i])));
@@ -126,7 +130,10 @@ impl RobotFunction for InverseKinematicsStep {
 /// limits of its drives (section 20.5.1). A joint without a limit counts with its torque \[N·m or N\] where none has one, otherwise not; nor does a base.
 fn slope_of_holding_torques<T: Real>(forms: &Forms<'_, T>, q: &[T]) -> Vec<T> {
     let (rest, nv) = (forms.rest(), forms.model.nv());
-    let weights = torque_weights(forms.model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single()).map(|j| (j.iv, j.limits)), nv);
+    let weights = torque_weights(
+        forms.model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single()).map(|j| (j.iv, j.limits)),
+        nv,
+    );
     let torques = forms.inverse_dynamics(q, &rest, &rest);
     let weighed: Vec<T> = torques.into_iter().zip(weights).map(|(tau, w)| tau * T::constant(w)).collect();
     weighed_slopes(forms, [q, &rest, &rest], &weighed).into_iter().take(nv).collect()
@@ -171,12 +178,12 @@ fn six<T: Real>(motion: MotionVector<T>) -> Vec<T> {
 }
 
 /// Numbers of the rows that are asked for among six, the others zero.
-fn spread_one<T: Real>(rows: Rows, x: &[T]) -> Vec<T> {
+fn spread_one<T: Real>(rows: SelectedRows, x: &[T]) -> Vec<T> {
     spread(rows, &x.iter().map(|x| vec![*x]).collect::<Vec<_>>(), 1)
 }
 
 /// The same of rows of so many numbers.
-fn spread<T: Real>(rows: Rows, x: &[Vec<T>], len: usize) -> Vec<T> {
+fn spread<T: Real>(rows: SelectedRows, x: &[Vec<T>], len: usize) -> Vec<T> {
     let mut all = vec![vec![T::zero(); len]; 6];
     rows.places().zip(x).for_each(|(k, x)| all[k].clone_from(x));
     all.concat()

@@ -258,7 +258,8 @@ fn joint_program(
         let argument =
             |name: &String| inputs[names.iter().position(|n| n == name).expect("ports are the union")].clone();
         let equations = |function: Function| {
-            let own: Vec<Vec<Expr>> = scene.ports(function, &robot.model, frames).iter().map(|p| argument(&p.name)).collect();
+            let own: Vec<Vec<Expr>> =
+                scene.ports(function, &robot.model, frames).iter().map(|p| argument(&p.name)).collect();
             let frames = scene.frames_of(function, frames);
             function.equations(robot, frames, forward, optimisations.reduced, scene, &own)
         };

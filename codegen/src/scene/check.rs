@@ -7,7 +7,7 @@ use super::{
     Scene,
 };
 use crate::diagnostic::Diagnostics;
-use crate::function::{Extent, Family, Function, Output, Parts, Rows};
+use crate::function::{Extent, Family, Function, Output, Parts, SelectedRows};
 use crate::identifier::UNNAMED;
 use crate::model::geometry::principal_moments;
 use crate::model::{is_gravity, GRAVITY};
@@ -71,7 +71,7 @@ fn outputs_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
         };
         if !is_known {
             let mut words: Vec<String> = parts.iter().map(|p| p.word()).collect();
-            words.extend(has_rows(function).then(|| Rows::WORDS.map(str::to_string)).into_iter().flatten());
+            words.extend(has_rows(function).then(|| SelectedRows::WORDS.map(str::to_string)).into_iter().flatten());
             let words: Vec<&str> = words.iter().map(String::as_str).collect();
             complain("part", say::no_such_part(name, &selection.part.word(), &words));
         }

@@ -23,7 +23,7 @@ pub use ranges::{ranges_in_words, InputRange, JointRanges, Ranges};
 use crate::description::drives::WrittenDrive;
 use crate::description::flexible::{BaseSupport, Flexible};
 use crate::diagnostic::Diagnostic;
-use crate::function::{Function, Rows};
+use crate::function::{Function, SelectedRows};
 use crate::model::ModelOptions;
 use std::collections::BTreeMap;
 use straightline_core::model::Model;
@@ -160,7 +160,7 @@ pub enum ResultPart {
     /// Of the mass matrix the diagonal.
     Diagonal,
     /// Of what has six rows, linear ones first, these.
-    Rows(Rows),
+    Rows(SelectedRows),
 }
 
 impl ResultPart {

@@ -346,7 +346,8 @@ impl Case {
                     differ(graph, &evaluate(graph, &inputs(graph, &state)), &wide(truth), 1e-15)
                 }
                 Written::Stages(functions, staged) => {
-                    let ports: Vec<_> = functions.iter().flat_map(|f| options.scene.ports(*f, &robot.model, frames)).collect();
+                    let ports: Vec<_> =
+                        functions.iter().flat_map(|f| options.scene.ports(*f, &robot.model, frames)).collect();
                     let mut state = states.next(&ports);
                     for stage in &staged.stages {
                         let values = evaluate(stage, &inputs(stage, &state));

@@ -9,7 +9,7 @@ use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::options::Options;
 use straightline_codegen::program::program;
 use straightline_codegen::scene::{ResultPart, Selection};
-use straightline_codegen::{function::Rows, Function};
+use straightline_codegen::{function::SelectedRows, Function};
 use straightline_core::{Dd, Real};
 
 /// Double-double keeps so much of identities between matrices of well-conditioned tasks.
@@ -48,7 +48,7 @@ impl Asked {
     /// With these rows of the task alone.
     fn with_rows(&self, function: Function, places: &[usize]) -> Graph {
         let mut options = self.options.clone();
-        let part = ResultPart::Rows(Rows::of(places.iter().copied()));
+        let part = ResultPart::Rows(SelectedRows::of(places.iter().copied()));
         options.scene.outputs.insert(function, Selection { part, ..Selection::default() });
         program(&self.robot, &self.frame, function, &options).graph
     }
@@ -115,13 +115,9 @@ fn the_operational_space_obeys_its_identities_and_the_equations_of_motion() {
     for asked in robots() {
         let nv = asked.nv();
         let space = asked.graph(Function::OperationalSpaceDynamics);
-        let [jacobian, bias, inertia, motion] = [
-            Function::Jacobian,
-            Function::JacobianBias,
-            Function::MassMatrix,
-            Function::ForwardDynamics,
-        ]
-        .map(|function| asked.graph(function));
+        let [jacobian, bias, inertia, motion] =
+            [Function::Jacobian, Function::JacobianBias, Function::MassMatrix, Function::ForwardDynamics]
+                .map(|function| asked.graph(function));
         let mut random = Random(3);
         for _ in 0..3 {
             let q = asked.configuration(&mut random);
@@ -155,7 +151,10 @@ fn a_task_of_two_rows_is_exact_and_one_of_six_is_damped() {
     let two = asked.with_rows(Function::OperationalSpaceDynamics, &[0, 1]);
     let (q, qd) = ([0.4, 0.9], [0.3, -0.7]);
     let found = blocks(&two, &run::<Dd>(&two, &[&q, &qd, &[0.0]]));
-    assert_eq!(two.outputs.iter().map(|p| p.shape.clone()).collect::<Vec<_>>(), [vec![1, 2, 2], vec![1, 2], vec![1, 2], vec![1, 2, 2], vec![1, 2, 2]]);
+    assert_eq!(
+        two.outputs.iter().map(|p| p.shape.clone()).collect::<Vec<_>>(),
+        [vec![1, 2, 2], vec![1, 2], vec![1, 2], vec![1, 2, 2], vec![1, 2, 2]]
+    );
     let j = matrix(6, &run::<Dd>(&asked.graph(Function::Jacobian), &[&q])).rows(0, 2).into_owned();
     let h = matrix(2, &run::<Dd>(&asked.graph(Function::MassMatrix), &[&q]));
     // of a square Jacobian Λ = J⁻ᵀ H J⁻¹
@@ -200,7 +199,8 @@ fn the_first_subtree_is_the_robot() {
     for asked in robots().into_iter().take(3) {
         let (nv, joints) = (asked.nv(), asked.robot.model.bodies.len());
         let [all, centre, jacobian] =
-            [Function::SubtreeCentresOfMass, Function::CentreOfMass, Function::CentreOfMassJacobian].map(|f| asked.graph(f));
+            [Function::SubtreeCentresOfMass, Function::CentreOfMass, Function::CentreOfMassJacobian]
+                .map(|f| asked.graph(f));
         let q = asked.configuration(&mut Random(5));
         let found = blocks(&all, &run::<Dd>(&all, &[&q]));
         let mass: f64 = asked.robot.model.bodies.iter().map(|b| b.inertia.mass.to_f64()).sum();
@@ -317,7 +317,12 @@ fn inverse_kinematics_arrives_from_random_starts_within_the_limits() {
             total += steps;
         }
         let first = attempts.iter().filter(|attempt| **attempt == 1).count();
-        println!("{}: {first} of 20 from the first start, at most {:?} starts, {} steps on average", asked.name, attempts.iter().max(), total / 20);
+        println!(
+            "{}: {first} of 20 from the first start, at most {:?} starts, {} steps on average",
+            asked.name,
+            attempts.iter().max(),
+            total / 20
+        );
         assert!(first as f64 >= least * 20.0, "{}: {attempts:?}", asked.name);
     }
 }
@@ -335,8 +340,7 @@ fn redundancy_is_spent_on_less_torque() {
     };
     let target = run::<f64>(&pose, &[&[0.3, 0.4, -0.6, -1.2, 0.8, 1.9, 0.5]]);
     let start = vec![0.2, 0.5, -0.4, -1.4, 0.6, 2.0, 0.4];
-    let [without, with] =
-        [0.0, 0.2].map(|gain| iterate(&asked, [&step, &pose], &target, start.clone(), gain));
+    let [without, with] = [0.0, 0.2].map(|gain| iterate(&asked, [&step, &pose], &target, start.clone(), gain));
     assert!(without.steps.is_some(), "it arrives without");
     let left = error(&run::<f64>(&pose, &[&with.q]), &target).iter().map(|x| x.abs()).fold(0.0, f64::max);
     println!("holding effort {} without, {} with, off by {left:e}", effort(&without.q), effort(&with.q));

@@ -156,11 +156,8 @@ fn derivatives_of_frames_and_of_centroidal_momentum_take_what_is_on_record() {
 /// What is asked of a frame, and what each joint carries.
 #[test]
 fn tasks_and_subtrees_take_what_is_on_record() {
-    use Function::{
-        InverseKinematicsStep, JacobianHessianProduct, OperationalSpaceDynamics, SubtreeCentresOfMass,
-    };
-    let functions =
-        [JacobianHessianProduct, SubtreeCentresOfMass, OperationalSpaceDynamics, InverseKinematicsStep];
+    use Function::{InverseKinematicsStep, JacobianHessianProduct, OperationalSpaceDynamics, SubtreeCentresOfMass};
+    let functions = [JacobianHessianProduct, SubtreeCentresOfMass, OperationalSpaceDynamics, InverseKinematicsStep];
     let records = [[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]];
     hold_records(functions, records);
 }

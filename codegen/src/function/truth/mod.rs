@@ -3,7 +3,7 @@
 //! A truth is asked of a [`Chapter`]: the robot as the handbook chapter describes it, at a state. It is computed once, over [`Magnitude`], which gives
 //! the value in double-double and, beside it, how large the terms were that it is made of. So no natural scale is written down by hand.
 
-use super::{Extent, Quantity, RobotFunction, Rows};
+use super::{Extent, Quantity, RobotFunction, SelectedRows};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::collections::BTreeMap;
 use straightline_core::magnitude::Magnitude;
@@ -16,8 +16,8 @@ mod derivatives;
 mod drives;
 mod dynamics;
 mod forward_derivatives;
-mod kinematics;
 mod frame_forces;
+mod kinematics;
 mod motion_derivatives;
 mod tasks;
 mod whole;
@@ -61,7 +61,7 @@ pub struct Chapter<'a> {
     pub tree: CentreOfMassTree<Magnitude>,
     frames: Vec<CentreOfMassFrame<Magnitude>>,
     /// The rows of tasks that are asked for.
-    rows: Rows,
+    rows: SelectedRows,
     effects: &'a [Effect],
     /// The velocity coordinates that move, where others are held.
     moving: Option<&'a [usize]>,
@@ -97,7 +97,7 @@ impl<'a> Chapter<'a> {
                 }
             }
         }
-        Chapter { tree, frames: Vec::new(), rows: Rows::ALL, effects, moving: None, drives: None, state: sized }
+        Chapter { tree, frames: Vec::new(), rows: SelectedRows::ALL, effects, moving: None, drives: None, state: sized }
     }
 
     /// The same with these frames asked for.
@@ -121,7 +121,7 @@ impl<'a> Chapter<'a> {
 
     /// The same with these rows of tasks asked for.
     #[must_use]
-    pub fn with_rows(self, rows: Rows) -> Self {
+    pub fn with_rows(self, rows: SelectedRows) -> Self {
         Chapter { rows, ..self }
     }
 

@@ -66,7 +66,9 @@ fn behind<T: ReferenceReal>(tree: &CentreOfMassTree<T>, joint: usize) -> impl It
 fn centre<T: ReferenceReal>(tree: &CentreOfMassTree<T>, joint: usize, q: &[T]) -> Vec<T> {
     let links = reference::geometry(tree, q);
     let mass = behind(tree, joint).fold(<T as Real>::zero(), |sum, k| sum + tree.links[k].mass);
-    let sum = |row: usize| behind(tree, joint).fold(<T as Real>::zero(), |sum, k| sum + tree.links[k].mass * links[k].centre_of_mass[row]);
+    let sum = |row: usize| {
+        behind(tree, joint).fold(<T as Real>::zero(), |sum, k| sum + tree.links[k].mass * links[k].centre_of_mass[row])
+    };
     (0..3).map(|row| sum(row) / mass).collect()
 }
 

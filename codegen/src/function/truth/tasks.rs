@@ -20,7 +20,8 @@ impl Truth for OperationalSpaceDynamics {
             let (jacobian, rows) = rows_of(at, frame, &joints.moving);
             let (m, n) = jacobian.shape();
             // H⁻¹ Jᵀ
-            let response: Vec<DVector<Magnitude>> = (0..m).map(|k| joints.response(&jacobian.row(k).transpose())).collect();
+            let response: Vec<DVector<Magnitude>> =
+                (0..m).map(|k| joints.response(&jacobian.row(k).transpose())).collect();
             let damping = at.get(Quantity::Damping)[0];
             let mut feels = DMatrix::from_fn(m, m, |i, j| jacobian.row(i).transpose().dot(&response[j]));
             (0..m).for_each(|k| feels[(k, k)] += damping * damping);
@@ -89,7 +90,11 @@ impl Truth for InverseKinematicsStep {
 }
 
 /// The rows of a frame's Jacobian that are asked for, of the joints that move, and their places among six.
-fn rows_of(at: &Chapter<'_>, frame: &CentreOfMassFrame<Magnitude>, moving: &[usize]) -> (DMatrix<Magnitude>, Vec<usize>) {
+fn rows_of(
+    at: &Chapter<'_>,
+    frame: &CentreOfMassFrame<Magnitude>,
+    moving: &[usize],
+) -> (DMatrix<Magnitude>, Vec<usize>) {
     let rows: Vec<usize> = at.rows.places().collect();
     let whole = reference::frame_jacobian(&at.tree, frame, at.q());
     (DMatrix::from_fn(rows.len(), moving.len(), |i, j| whole[(rows[i], moving[j])]), rows)
@@ -120,7 +125,8 @@ fn descent(at: &Chapter<'_>, joints: &MovingJoints<'_, '_>) -> DVector<Magnitude
     let mut torques = reference::gravity_force(&at.tree, at.q());
     torques = at.with_passive_at_rest(torques);
     let moves = |iv: usize| joints.moving.contains(&iv);
-    let efforts: Vec<&Effect> = at.effects.iter().filter(|effect| moves(effect.iv) && effect.effort.is_some()).collect();
+    let efforts: Vec<&Effect> =
+        at.effects.iter().filter(|effect| moves(effect.iv) && effect.effort.is_some()).collect();
     let mut weighed = rest.clone();
     for link in at.tree.links.iter().filter(|link| link.joint != ReferenceJoint::Free && moves(link.iv)) {
         let own = efforts.iter().find(|effect| effect.iv == link.iv).and_then(|effect| effect.effort);

@@ -8,7 +8,7 @@ use crate::description::reader::{FileReader, Range64};
 use crate::description::table::TomlTable;
 use crate::description::Noted;
 use crate::diagnostic::{Diagnostics, Front, Source};
-use crate::function::{Function, Rows};
+use crate::function::{Function, SelectedRows};
 use crate::options::table::OptionRow;
 use crate::options::value;
 use crate::scene::{
@@ -190,12 +190,13 @@ impl<'a> SceneReader<'a> {
         }
         let names = self.reader.names_at(table, "part", "row");
         table.get("part").iter().for_each(|(_, span)| self.note(&format!("{path}.part"), span));
-        let words: Vec<(&str, usize)> = Rows::WORDS.into_iter().enumerate().map(|(k, word)| (word, k)).collect();
+        let words: Vec<(&str, usize)> =
+            SelectedRows::WORDS.into_iter().enumerate().map(|(k, word)| (word, k)).collect();
         let rows: Vec<usize> =
             names.iter().filter_map(|name| self.reader.word(&table.what("part"), name, &words)).collect();
         match &rows[..] {
             [] => ResultPart::Whole,
-            rows => ResultPart::Rows(Rows::of(rows.iter().copied())),
+            rows => ResultPart::Rows(SelectedRows::of(rows.iter().copied())),
         }
     }
 

@@ -3,7 +3,7 @@
 use super::{ridge, ClosedContact, Mode};
 use crate::equations::bind::BoundRobot;
 use crate::equations::Robot;
-use crate::function::{Rows, ContactFunction, ForwardDynamicsMethod, Function};
+use crate::function::{ContactFunction, ForwardDynamicsMethod, Function, SelectedRows};
 use crate::options::Options;
 use crate::scene::contact::{tool_axes, SurfaceItem};
 use std::collections::BTreeMap;
@@ -79,7 +79,7 @@ pub(super) fn system<T: Real>(
 /// A function of the robot over these arguments, by its reduced form where it has one.
 fn of_robot<T: Real>(bound: &BoundRobot<T>, reduced: bool, function: Function, arguments: &[Vec<T>]) -> Vec<T> {
     let method = ForwardDynamicsMethod::Factorisation;
-    function.evaluate_on(&bound.forms(reduced, &[], Rows::ALL, method), arguments)
+    function.evaluate_on(&bound.forms(reduced, &[], SelectedRows::ALL, method), arguments)
 }
 
 /// What the equations of all functions have in common.

@@ -132,8 +132,8 @@ pub use reduced_derivatives::{reduced_inverse_dynamics_derivatives, DerivativeBl
 pub use reduced_dynamics::{reduced_inverse_dynamics, reduced_inverse_dynamics_with_limbs, LimbWrenches};
 pub use reduced_gravity::{reduced_gravity_force, reduced_gravity_force_with_limbs, LimbMoments};
 pub use reduced_mass_matrix::reduced_mass_matrix;
-pub use subtree::{subtrees, Subtree};
 pub use rnea::{bias_force, gravity_force, inverse_dynamics, joint_wrenches, velocity_force};
+pub use subtree::{subtrees, CarriedMass};
 
 use crate::model::Body;
 use crate::spatial::Composite;

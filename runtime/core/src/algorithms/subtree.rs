@@ -20,7 +20,7 @@ use alloc::vec::Vec;
 
 /// What a joint carries, its link included.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Subtree<T> {
+pub struct CarriedMass<T> {
     /// Its mass \[kg\].
     pub mass: T,
     /// Its centre of mass \[m\].
@@ -31,7 +31,7 @@ pub struct Subtree<T> {
 
 /// What each joint carries, in the order of the velocity coordinates. Divides by its mass, which is positive where every joint moves some.
 #[doc(alias("jacobianSubtreeCenterOfMass", "subtree_com"))]
-pub fn subtrees<T: Real>(model: &Model<T>, q: &[T]) -> Vec<Subtree<T>> {
+pub fn subtrees<T: Real>(model: &Model<T>, q: &[T]) -> Vec<CarriedMass<T>> {
     let (nv, poses) = (model.nv(), JointPose::all(&model.bodies, q));
     let (composites, world) = (composites(model, &poses), world_poses(model, q));
     // the momentum of all behind a coordinate, per unit of its velocity
@@ -64,11 +64,14 @@ pub fn subtrees<T: Real>(model: &Model<T>, q: &[T]) -> Vec<Subtree<T>> {
         for &inner in path_to(model, Some(b)).iter().rev() {
             let (joint, pose) = (&model.bodies[inner].joint, &world[inner]);
             for k in 0..joint.kind.nv() {
-                set(joint.iv + k, joint.kind.mechanics().world_column(k, joint.coordinates(q), &pose.rotation, lever).0);
+                set(
+                    joint.iv + k,
+                    joint.kind.mechanics().world_column(k, joint.coordinates(q), &pose.rotation, lever).0,
+                );
             }
             lever = lever + pose.lever;
         }
-        Subtree { mass, centre, jacobian }
+        CarriedMass { mass, centre, jacobian }
     };
     order.into_iter().map(subtree).collect()
 }
