@@ -18,7 +18,8 @@ pub(super) static RESERVED: [&str; 6] = [
      restrict short signed sizeof small static_assert static_cast stderr stdin stdout switch template this \
      thread_local throw typedef typeid typename unix unsigned using void volatile wchar_t xor xor_eq",
     // inputs and results of the robot's functions
-    "a ad bias c c_hat d d_hat dq dqd dsd e energy_loss f force g gravity h h_star impulse j m p pivot q qd qdd q3 q4 \
+    "a ad bias c c_hat d d_hat djtf_dq dq dqd dsd e energy_loss f force g gravity h h_star impulse j j_bar jt_f lambda m \
+     mu null_space p pivot q qd qdd q3 q4 \
      q5 q6 q7 q8 q9 restitution s sd sdd sdd_free smallest_contact_eigenvalue smallest_eigenvalue tau tv u v \
      violation w x xd",
     // what else the file, its modules and its types are written with
