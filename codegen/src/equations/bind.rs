@@ -1,7 +1,7 @@
 //! A scene where it meets the equations: which inputs are left, what stands for the others, which results are wanted.
 
 use crate::equations::Robot;
-use crate::function::{Extent, Family, Forms, ForwardDynamicsMethod, Function, Output, Parts, Quantity, SelectedRows};
+use crate::function::{Extent, Forms, ForwardDynamicsMethod, Function, Output, Parts, Quantity, SelectedRows};
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::{Gravity, Parameter, ResultPart, Scene, Selection};
 use straightline_core::model::{Frame, Load, Model};
@@ -103,7 +103,7 @@ impl Scene {
     /// The wanted results of a function, as indices into the whole of its outputs, and the blocks that they form.
     pub fn select(&self, function: Function, model: &Model<Dd>, frames: usize) -> (Vec<usize>, Vec<Port>) {
         let blocks = function.outputs(model, frames);
-        if function.spec().family == Family::Drives {
+        if function.spec().family.is_of_drives() {
             return ((0..blocks.iter().map(Port::len).sum()).collect(), blocks);
         }
         let selection = self.outputs.get(&function).cloned().unwrap_or_default();

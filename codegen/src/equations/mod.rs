@@ -9,7 +9,7 @@ pub(crate) mod traced;
 pub use robot::Robot;
 
 use crate::equations::forward_method::MethodChoice;
-use crate::function::{may_be_articulated, Family, ForwardDynamicsMethod, Function};
+use crate::function::{may_be_articulated, ForwardDynamicsMethod, Function};
 use crate::scene::Scene;
 use straightline_core::model::Frame;
 use straightline_graph::expr::{Graph, RuleSet};
@@ -58,7 +58,7 @@ impl Function {
         };
         let has_two_forms = self.spec().solves
             && match self.spec().family {
-                Family::Drives => may_be_articulated(&robot.model),
+                Family::Drives | Family::DriveDerivatives => may_be_articulated(&robot.model),
                 // rows of Jacobians need the factor
                 Family::Tasks => false,
                 Family::Robot | Family::Combination | Family::Derivatives => true,

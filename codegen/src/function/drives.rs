@@ -224,7 +224,7 @@ type Series<T> = Taylor<T, { MOST_DERIVATIVES + 1 }>;
 type DrivenState<'a, T> = (&'a [T], &'a [T], &'a [T], &'a [T]);
 
 /// What is solved with the links' inertia by the method that serves this robot.
-fn with_links<T: Real, R>(
+pub(super) fn with_links<T: Real, R>(
     forms: &Forms<'_, T>,
     inputs: &[Vec<T>],
     solve: impl FnOnce(DrivenState<'_, T>, &[T], &Links<'_, T>) -> R,

@@ -5,6 +5,7 @@ mod aliases;
 mod bias_derivatives;
 mod contact;
 mod derivatives;
+mod driven_derivatives;
 mod drives;
 mod dynamics;
 mod forms;
@@ -210,6 +211,9 @@ functions! {
     drives::DrivePower,
     /// Energy that is stored in the drives.
     drives::DriveEnergy,
+    /// The motion that inputs of the drives make, with its derivatives.
+    #[doc(alias("linearisation"))]
+    driven_derivatives::DrivenForwardDynamicsDerivatives,
 }
 
 impl Function {

@@ -96,20 +96,27 @@ pub enum Family {
     Tasks,
     /// Those with drives.
     Drives,
+    /// Those with drives, but it is made for who names it only: derivatives of their functions.
+    DriveDerivatives,
 }
 
 impl Family {
     /// Whether it is made for who names it only.
     pub fn is_by_name(self) -> bool {
         match self {
-            Family::Combination | Family::Derivatives | Family::Tasks => true,
+            Family::Combination | Family::Derivatives | Family::Tasks | Family::DriveDerivatives => true,
             Family::Robot | Family::Drives => false,
         }
     }
 
     /// Whether results are matrices, whose entries go together.
     pub fn is_of_blocks(self) -> bool {
-        matches!(self, Family::Derivatives | Family::Tasks)
+        matches!(self, Family::Derivatives | Family::Tasks | Family::DriveDerivatives)
+    }
+
+    /// Whether it is about drives, which some robots have.
+    pub fn is_of_drives(self) -> bool {
+        matches!(self, Family::Drives | Family::DriveDerivatives)
     }
 }
 
@@ -266,7 +273,7 @@ pub trait RobotFunction {
 
     /// Whether a robot has what it is about.
     fn is_of<T: Real>(model: &Model<T>) -> bool {
-        Self::SPEC.family != Family::Drives || !model.drives.is_empty()
+        !Self::SPEC.family.is_of_drives() || !model.drives.is_empty()
     }
 
     /// What a robot's takes beside [`Spec::inputs`].

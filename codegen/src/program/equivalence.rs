@@ -25,7 +25,7 @@ mod states;
 use crate::equations::bind::{constructed, BoundRobot};
 use crate::equations::reduce::longest_lever;
 use crate::equations::Robot;
-use crate::function::{Family, Forms, ForwardDynamicsMethod, Function, Judged, Spec};
+use crate::function::{Forms, ForwardDynamicsMethod, Function, Judged, Spec};
 use crate::model::drives::entries;
 use crate::options::{Optimisations, Options};
 use crate::scene::free_drive::FreeDrive;
@@ -194,7 +194,7 @@ impl Check<'_> {
     fn compare(&self, mut losses: Losses) -> Result<(), Disagreement> {
         let PlainEquations { robot, function, options, .. } = self.plain;
         let Spec { solves, family, .. } = function.spec();
-        if *solves && *family != Family::Drives {
+        if *solves && !family.is_of_drives() {
             let lost = Disagreement {
                 program: function.name().to_string(),
                 result: element_of(&self.graph.outputs, 0),

@@ -7,7 +7,7 @@ use super::{
     Scene,
 };
 use crate::diagnostic::Diagnostics;
-use crate::function::{Extent, Family, Function, Output, Parts, SelectedRows};
+use crate::function::{Extent, Function, Output, Parts, SelectedRows};
 use crate::identifier::UNNAMED;
 use crate::model::geometry::principal_moments;
 use crate::model::{is_gravity, GRAVITY};
@@ -333,7 +333,7 @@ fn unphysical(payload: &Payload) -> Option<(&'static str, String)> {
 
 /// Whether the results of a function, or its columns, belong to joints.
 fn by_joints(function: Function) -> bool {
-    function.is_by_joints() && function.spec().family != Family::Drives
+    function.is_by_joints() && !function.spec().family.is_of_drives()
 }
 
 /// The parts that the results of a function have.

@@ -7,7 +7,7 @@
 use super::reading::motion;
 use crate::equations::Robot;
 use crate::function::truth::Effect;
-use crate::function::{Extent, Family, Function, Quantity, Spec};
+use crate::function::{Extent, Function, Quantity, Spec};
 use crate::model::states::{body, InputState};
 use crate::options::Options;
 use crate::program::parameter::parameter_program;
@@ -91,7 +91,7 @@ impl Coordinates {
     /// move: they are solved for these.
     pub fn results(&self, function: Function, frames: usize) -> Option<Vec<usize>> {
         let Spec { family, solves, outputs, .. } = function.spec();
-        if *family == Family::Drives || *solves || !function.is_by_joints() {
+        if family.is_of_drives() || *solves || !function.is_by_joints() {
             return None;
         }
         let (mut results, mut first) = (Vec::new(), 0);

@@ -10,7 +10,7 @@ use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
 use straightline_codegen::function::Quantity::{self, Acceleration, Configuration, Force, Velocity};
-use straightline_codegen::function::{Divisor, Family};
+use straightline_codegen::function::Divisor;
 use straightline_codegen::model::singular::{singular_joints, Inertia};
 use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::options::{Optimisations, Options};
@@ -260,7 +260,7 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
     };
     let second = SecondReading::new(source, &model, &options);
     let second = second.unwrap_or_else(|why| panic!("what the compiler takes the second author refuses: {why}"));
-    let of_bodies = |f: &Function| f.spec().family != Family::Drives;
+    let of_bodies = |f: &Function| !f.spec().family.is_of_drives();
     let mut functions: Vec<Function> = Function::known().filter(of_bodies).collect();
     if !singular_joints(&model, Inertia::OfLinks).is_empty() {
         functions.retain(|f| !f.spec().solves && f.spec().divisor != Divisor::MassOfEach);

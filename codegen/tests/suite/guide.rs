@@ -68,6 +68,7 @@ alone. Scenes add further arguments (gravity, run-time parameters) and leave arg
         (Family::Derivatives, "Derivatives, made for who names them"),
         (Family::Tasks, "Tasks of frames, made for who names them"),
         (Family::Drives, "Of robots with drives"),
+        (Family::DriveDerivatives, "Derivatives of robots with drives, made for who names them"),
     ];
     for (family, title) in families {
         let _ = write!(page, "\n## {title}\n");

@@ -25,13 +25,13 @@ use straightline_generated_tests::drives::{blocks, Driven};
 use straightline_generated_tests::random::Random;
 use straightline_generated_tests::reference::description;
 
-fn source(robot: &str) -> Source {
+pub(super) fn source(robot: &str) -> Source {
     let path = description(robot);
     let text = std::fs::read_to_string(&path).expect("the robot file is there");
     Source::new(&path.file_name().expect("a file").to_string_lossy(), text)
 }
 
-fn wide(x: &[f64]) -> Vec<Dd> {
+pub(super) fn wide(x: &[f64]) -> Vec<Dd> {
     x.iter().map(|x| Dd::from(*x)).collect()
 }
 
@@ -40,14 +40,14 @@ fn vector(x: &[Dd]) -> DVector<Dd> {
 }
 
 /// A drive, for the file and for the reference.
-struct Both {
-    text: String,
+pub(super) struct Both {
+    pub(super) text: String,
     actuator: ActuatorModel<Dd>,
     eta: Option<(Dd, Dd)>,
     /// Row of ratios over the joints, of a rigid drive; of an elastic one that of its last stage.
     row: Vec<f64>,
     stages: Vec<ElasticStage<Dd>>,
-    state: Vec<f64>,
+    pub(super) state: Vec<f64>,
 }
 
 fn efficiency(random: &mut Random) -> ([f64; 2], Option<(Dd, Dd)>) {
@@ -56,7 +56,7 @@ fn efficiency(random: &mut Random) -> ([f64; 2], Option<(Dd, Dd)>) {
 }
 
 /// A motor of either order or a linear actuator; rigid or elastic; on one joint.
-fn random_drive(random: &mut Random, k: usize, joints: &[String], is_lossy: bool) -> Both {
+pub(super) fn random_drive(random: &mut Random, k: usize, joints: &[String], is_lossy: bool) -> Both {
     let kind = random.below(5);
     let mut text = format!("[[drive]]\njoint = \"{}\"\n", joints[k]);
     let is_elastic = kind >= 3;
@@ -133,7 +133,7 @@ fn random_drive(random: &mut Random, k: usize, joints: &[String], is_lossy: bool
 }
 
 /// |a − b| over the largest of both lists.
-fn distance(a: &[Dd], b: &[Dd]) -> f64 {
+pub(super) fn distance(a: &[Dd], b: &[Dd]) -> f64 {
     assert_eq!(a.len(), b.len());
     let scale = a.iter().chain(b).map(|x| x.to_f64().abs()).fold(1e-300, f64::max);
     let errors = a.iter().zip(b).map(|(a, b)| (*a - *b).to_f64().abs() / scale);

@@ -13,6 +13,7 @@ mod count_accuracy;
 mod derivative_counts;
 mod derivative_states;
 mod determinism;
+mod driven_derivatives;
 mod driven_physics;
 mod driven_robots;
 mod drives;

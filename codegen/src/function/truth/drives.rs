@@ -3,6 +3,7 @@
 //! The numbers of the drives are those of the model, where rigid stages are folded into the shafts beside them; what is done with them is
 //! the reference's own.
 
+use super::super::driven_derivatives::DrivenForwardDynamicsDerivatives;
 use super::super::drives::{
     CompleteModel, DriveEnergy, DrivePower, DriveTorques, DrivenForwardDynamics, DrivenInverseDynamics, StateSpace,
 };
@@ -45,7 +46,7 @@ macro_rules! without_a_formulation {
     };
 }
 
-without_a_formulation!(DrivenInverseDynamics CompleteModel StateSpace DrivePower DriveEnergy);
+without_a_formulation!(DrivenInverseDynamics CompleteModel StateSpace DrivePower DriveEnergy DrivenForwardDynamicsDerivatives);
 
 /// Whether the reference has a formulation for these drives.
 fn is_formulated(drives: &[Drive<Dd>]) -> bool {
