@@ -9,7 +9,7 @@ pub(crate) mod traced;
 pub use robot::Robot;
 
 use crate::equations::forward_method::MethodChoice;
-use crate::function::{may_be_articulated, ForwardDynamicsMethod, Function};
+use crate::function::{may_be_articulated, Family, ForwardDynamicsMethod, Function};
 use crate::scene::Scene;
 use straightline_core::model::Frame;
 use straightline_graph::expr::{Graph, RuleSet};
