@@ -33,6 +33,12 @@ pub enum Quantity {
     ForceDirection,
     /// Multipliers of generalized forces, or of accelerations.
     Multiplier,
+    /// A displacement of q, of its tangent.
+    Displacement,
+    /// Another configuration.
+    SecondConfiguration,
+    /// The length of a step of time.
+    TimeStep,
     /// The third or a further derivative of q.
     HigherRate(usize),
 }
@@ -50,15 +56,26 @@ struct QuantityRow {
     doc: &'static str,
     /// Within what it is taken to stay where nobody says: of bounds of errors alone.
     bound: Option<f64>,
+    /// Within what programs are tried.
+    tried: f64,
 }
 
+/// Programs are tried with weights as generalized forces; other quantities that are not said otherwise are drawn alike.
+const TRIED: f64 = 10.0;
+
 const fn row(of: Quantity, name: &'static str, extent: Extent, bound: Option<f64>, doc: &'static str) -> QuantityRow {
-    QuantityRow { of, name, extent, doc, bound }
+    QuantityRow { of, name, extent, doc, bound, tried: TRIED }
+}
+
+impl QuantityRow {
+    const fn tried(self, tried: f64) -> QuantityRow {
+        QuantityRow { tried, ..self }
+    }
 }
 
 const TABLE: &[QuantityRow] = &[
     row(Configuration, "q", Extent::Positions, None, "configuration \\[rad or m\\]"),
-    row(Velocity, "qd", Extent::Velocities, Some(10.0), "velocities \\[rad/s or m/s\\]"),
+    row(Velocity, "qd", Extent::Velocities, Some(10.0), "velocities \\[rad/s or m/s\\]").tried(1.0),
     row(Acceleration, "qdd", Extent::Velocities, Some(100.0), "accelerations \\[rad/s² or m/s²\\]"),
     row(Force, "tau", Extent::Velocities, Some(1000.0), "generalized forces \\[N·m or N\\]"),
     row(
@@ -88,6 +105,15 @@ const TABLE: &[QuantityRow] = &[
     row(AccelerationDirection, "direction_qdd", Extent::Velocities, Some(1.0), "direction of q̈ \\[rad/s² or m/s²\\]"),
     row(ForceDirection, "direction_tau", Extent::Velocities, Some(1.0), "direction of τ \\[N·m or N\\]"),
     row(Multiplier, "multiplier", Extent::Velocities, Some(1.0), "λ: multipliers of the generalized forces or accelerations"),
+    row(
+        Displacement,
+        "v",
+        Extent::Velocities,
+        Some(1.0),
+        "displacement of q, of its tangent \\[rad or m\\]; of a floating base a body twist, linear and angular",
+    ),
+    row(SecondConfiguration, "q1", Extent::Positions, None, "another configuration \\[rad or m\\]"),
+    row(TimeStep, "dt", Extent::Of(1), Some(0.01), "length of the step \\[s\\]").tried(0.01),
     row(Gravity, "gravity", Extent::Of(3), Some(10.0), "acceleration due to gravity in the world \\[m/s²\\]"),
 ];
 
@@ -105,6 +131,16 @@ impl Quantity {
     /// Those that have an entry per velocity coordinate, but for higher rates.
     pub fn of_velocities() -> impl Iterator<Item = Quantity> {
         TABLE.iter().filter(|row| row.extent == Extent::Velocities).map(|row| row.of)
+    }
+
+    /// The configurations.
+    pub fn of_positions() -> impl Iterator<Item = Quantity> {
+        TABLE.iter().filter(|row| row.extent == Extent::Positions).map(|row| row.of)
+    }
+
+    /// Whether it is a configuration.
+    pub fn is_configuration(self) -> bool {
+        self.extent() == Extent::Positions
     }
 
     /// That of an input.
@@ -145,6 +181,11 @@ impl Quantity {
     /// Within what bounds of errors take it to stay where neither a scene nor the robot file says; none: they have to.
     pub fn default_bound(self) -> Option<f64> {
         self.row().and_then(|row| row.bound)
+    }
+
+    /// Within what programs are tried, unless the robot says more.
+    pub fn tried(self) -> f64 {
+        self.row().map_or(TRIED, |row| row.tried)
     }
 
     /// How many scalars it has.

@@ -14,6 +14,8 @@ use straightline_graph::expr::{Graph, Port};
 
 /// Of the numbers that states are made of.
 pub(crate) const SEED: u64 = 0x9e37_79b9_7f4a_7c15;
+/// What is no quantity of the robot is tried within ± so much.
+const TRIED: f64 = 10.0;
 /// How near \[rad or m\].
 const NEAR: f64 = 0.02;
 /// How far \[rad, rad/s\] springs of transmissions are stretched.
@@ -79,11 +81,12 @@ pub(crate) enum Kind {
 pub(crate) fn values(model: &Model<Dd>, port: &Port, kind: Kind, random: &mut Random) -> Vec<f64> {
     let len = port.len();
     match Quantity::of(port) {
-        Some(Quantity::Configuration) if len == model.nq() => configuration(model, kind, random),
+        Some(quantity) if quantity.is_configuration() && len == model.nq() => configuration(model, kind, random),
         Some(Quantity::Gravity) => vec![0.3, -0.2, -9.81],
-        Some(Quantity::Velocity) => (0..len).map(|_| random.symmetric(1.0)).collect(),
-        // generalized forces of the size of the weights
-        _ => (0..len).map(|_| random.symmetric(10.0)).collect(),
+        quantity => {
+            let within = quantity.map_or(TRIED, Quantity::tried);
+            (0..len).map(|_| random.symmetric(within)).collect()
+        }
     }
 }
 

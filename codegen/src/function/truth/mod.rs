@@ -18,6 +18,8 @@ mod dynamics;
 mod forward_derivatives;
 mod kinematics;
 mod motion_derivatives;
+mod steps;
+mod tangent;
 mod whole;
 
 /// What a function should give.
@@ -70,12 +72,15 @@ impl<'a> Chapter<'a> {
         for rate in Quantity::of_velocities() {
             sized.entry(rate).or_insert_with(|| vec![Magnitude::zero(); tree.nv()]);
         }
+        let here = sized[&Quantity::Configuration].clone();
+        sized.entry(Quantity::SecondConfiguration).or_insert(here);
+        sized.entry(Quantity::TimeStep).or_insert_with(|| vec![Magnitude::zero()]);
         let tree = with_sizes(tree);
         // the coordinates of a free link are parts of vectors, its attitude one of a rotation
         for link in tree.links.iter().filter(|link| link.joint == ReferenceJoint::Free) {
             for (quantity, x) in &mut sized {
                 match quantity {
-                    Quantity::Configuration => {
+                    quantity if quantity.is_configuration() => {
                         of_length(&mut x[link.iq..link.iq + 3]);
                         x[link.iq + 3..link.iq + 7].iter_mut().for_each(|x| *x = x.of_size(1.0));
                     }

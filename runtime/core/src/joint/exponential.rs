@@ -78,7 +78,7 @@ impl<T: Real> OfSquare<T> {
 const FAR: f64 = 4.0;
 
 /// A turn by a rotation vector w of any length.
-pub(super) struct Turn<T> {
+pub(super) struct FreeTurn<T> {
     /// sin(|w|/2)/|w|.
     half_sine: T,
     /// cos(|w|/2).
@@ -89,7 +89,7 @@ pub(super) struct Turn<T> {
     c5: T,
 }
 
-impl<T: Real> Turn<T> {
+impl<T: Real> FreeTurn<T> {
     fn new(w: Vec3<T>) -> Self {
         let (one, half, far) = (T::one(), T::constant(Dd::HALF), constant::<T>(FAR));
         let square = w.dot(w);
@@ -112,7 +112,7 @@ impl<T: Real> Turn<T> {
         let c4 = (half - c2) * inverse;
         let c5 = (T::constant(Dd::ONE / Dd::from(6.0)) - c3) * inverse;
         let either = |near: T, far: T| is_near * near + is_far * far;
-        Turn {
+        FreeTurn {
             half_sine: either(half * half_angle.c[1], half_sine),
             half_cosine: either(half_angle.c[0], cos),
             c2: either(near.c[2], c2),
@@ -135,12 +135,9 @@ impl<T: Real> Turn<T> {
     }
 }
 
-/// A pose that a body has moved to: position, and unit quaternion (x, y, z, w).
-type Pose<T> = (Vec3<T>, [T; 4]);
-
-/// exp of a twist: where it moves a body in unit time.
-pub(super) fn exponential<T: Real>([rho, w]: [Vec3<T>; 2]) -> Pose<T> {
-    let turn = Turn::new(w);
+/// exp of a twist: where it moves a body in unit time, as position and unit quaternion (x, y, z, w).
+pub(super) fn exponential<T: Real>([rho, w]: [Vec3<T>; 2]) -> (Vec3<T>, [T; 4]) {
+    let turn = FreeTurn::new(w);
     let [_, c2, c3] = turn.coefficients();
     let across = w.cross(rho);
     let position = rho + across.scale(c2.value) + w.cross(across).scale(c3.value);
@@ -182,9 +179,8 @@ fn cotangent_part<T: Real>(w: Vec3<T>) -> OfSquare<T> {
 
 /// log: the twist, with an angle of at most π, that moves a body from one pose to another. Quaternions may have any length but zero, and
 /// either sign.
-pub(super) fn logarithm<T: Real>(from: Pose<T>, to: Pose<T>) -> [Vec3<T>; 2] {
+pub(super) fn logarithm<T: Real>((p0, q0): (Vec3<T>, [T; 4]), (p1, q1): (Vec3<T>, [T; 4])) -> [Vec3<T>; 2] {
     let dot = |a: &[T; 4], b: &[T; 4]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
-    let ((p0, q0), (p1, q1)) = (from, to);
     let [square0, square1] = [&q0, &q1].map(|q| dot(q, q));
     let [inverse0, inverse1] = [square0, square1].map(|square| T::one() / square.sqrt());
     let cosine = dot(&q0, &q1);
@@ -243,7 +239,7 @@ impl<T: Real> TwistMap<T> {
 
     /// How exp of a twist, in its own axes, moves with the pose before it, Ad(exp(−v)), and with the twist, J_r(v).
     pub(super) fn of_exponential(v: [Vec3<T>; 2]) -> [Self; 2] {
-        let [c1, c2, c3] = Turn::new(v[1]).coefficients();
+        let [c1, c2, c3] = FreeTurn::new(v[1]).coefficients();
         [TwistMap::new(v, T::one(), c1.minus(), c2), TwistMap::new(v, T::one(), c2.minus(), c3)]
     }
 
