@@ -28,6 +28,8 @@ pub struct DerivativeRobot {
     pub floating: bool,
     /// Its states.
     pub states: Vec<DerivativeState>,
+    /// Displacements of a robot with a free root: of random length, small, tiny, none, near half a turn and beyond.
+    pub displacements: Vec<DerivativeState>,
     /// That of the data on frames.
     frame: String,
     baseline: Value,
@@ -131,6 +133,12 @@ const DATA: &[DataOf] = &[
         inputs: &["q"],
         blocks: &[("com_jacobian", "com_jacobian")],
     },
+    DataOf {
+        function: Function::StepDerivatives,
+        group: "step_derivatives",
+        inputs: &["q", "qd", "tau", "dt"],
+        blocks: &[("q_next", "step x+"), ("qd_next", "step x+"), ("A", "step A"), ("B", "step B")],
+    },
     DataOf { function: Function::CentroidalMap, group: "centroidal", inputs: &["q"], blocks: &[("A", "A")] },
     DataOf {
         function: Function::CentroidalMapRate,
@@ -153,11 +161,44 @@ const DATA: &[DataOf] = &[
     },
 ];
 
+/// Those of displacements, which have cases of their own.
+const OF_DISPLACEMENTS: &[DataOf] = &[
+    DataOf {
+        function: Function::Integrate,
+        group: "integrate",
+        inputs: &["q", "v"],
+        blocks: &[("q_plus_v", "integrate")],
+    },
+    DataOf {
+        function: Function::Difference,
+        group: "integrate",
+        inputs: &["q", "q1"],
+        blocks: &[("difference", "difference")],
+    },
+    DataOf {
+        function: Function::IntegrateDerivatives,
+        group: "integrate",
+        inputs: &["q", "v"],
+        blocks: &[("dintegrate_dq", "dintegrate_dq"), ("dintegrate_dv", "dintegrate_dv")],
+    },
+    DataOf {
+        function: Function::DifferenceDerivatives,
+        group: "integrate",
+        inputs: &["q", "q1"],
+        blocks: &[("ddifference_dq0", "ddifference_dq0"), ("ddifference_dq1", "ddifference_dq1")],
+    },
+];
+
 fn data_of(function: Function) -> &'static DataOf {
-    DATA.iter().find(|data| data.function == function).expect("the data hold the function")
+    DATA.iter().chain(OF_DISPLACEMENTS).find(|data| data.function == function).expect("the data hold the function")
 }
 
-/// The functions that the data hold.
+/// The functions of displacements.
+pub fn of_displacements() -> impl Iterator<Item = Function> {
+    OF_DISPLACEMENTS.iter().map(|data| data.function)
+}
+
+/// The functions that the data hold of every state.
 pub fn functions() -> impl Iterator<Item = Function> {
     DATA.iter().map(|data| data.function)
 }
@@ -170,6 +211,16 @@ impl DerivativeRobot {
     pub fn load(name: &str) -> DerivativeRobot {
         let folder = folder().join("derivatives");
         let file = json(&folder.join(format!("{name}.json")));
+        let displacements = file["integrate"].as_array().into_iter().flatten().enumerate().map(|(k, case)| {
+            let kind = case["kind"].as_str().expect("a string").to_string();
+            DerivativeState {
+                id: format!("{name}/displacement {k}"),
+                kind,
+                gravity: [0.0; 3],
+                data: serde_json::json!({ "integrate": case }),
+            }
+        });
+        let displacements = displacements.collect();
         let states = file["states"].as_array().expect("a list").iter().map(|data| {
             let text = |key: &str| data[key].as_str().expect("a string").to_string();
             let gravity = inputs(&data["gravity"]).try_into().expect("three numbers");
@@ -180,6 +231,7 @@ impl DerivativeRobot {
             file: description(name),
             floating: file["floating"].as_bool().expect("true or false"),
             states: states.collect(),
+            displacements,
             frame: file["frame"].as_str().expect("a name").to_string(),
             baseline: json(&folder.join("baseline_pinocchio_derivatives.json"))["robots"][name].clone(),
         }

@@ -115,8 +115,11 @@ pub fn numbers(value: &Value) -> Vec<Dd> {
 
 /// Inputs, which are exact f64 values.
 pub fn inputs(value: &Value) -> Vec<f64> {
-    let parse = |x: &Value| x.as_str().expect("a decimal string").parse().expect("a number");
-    value.as_array().expect("a list").iter().map(parse).collect()
+    match value {
+        Value::String(text) => vec![text.parse().expect("a number")],
+        Value::Array(items) => items.iter().flat_map(inputs).collect(),
+        other => panic!("inputs of the reference data are strings, not {other}"),
+    }
 }
 
 fn strings(value: &Value) -> Vec<String> {

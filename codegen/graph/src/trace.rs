@@ -153,6 +153,13 @@ impl Real for Expr {
                 let (s, c) = g.rules().folding().sin_cos(known);
                 return (Expr(g.constant(s)), Expr(g.constant(c)));
             };
+            // what was computed, as at a later stage of a step, is rounded already: added as numbers are
+            if free.iter().any(|x| !matches!(g.op(*x), Op::Input(_))) {
+                let offset = (known.hi() != 0.0).then(|| g.constant(known));
+                let angle = rest.iter().copied().chain(offset).fold(*first, |sum, x| g.add(Op::add(sum, x)));
+                let pair = g.add(Op::SinCos(angle));
+                return (Expr(g.add(Op::Sin(pair))), Expr(g.add(Op::Cos(pair))));
+            }
             let parts: Vec<NodeId> = g.rules().angle_parts(known).into_iter().map(|c| g.constant(c)).collect();
             let angle = rest.iter().chain(&parts).fold(*first, |sum, x| g.insert(Op::AngleSum(sum, *x)));
             let pair = g.add(Op::SinCos(angle));

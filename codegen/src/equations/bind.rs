@@ -4,7 +4,7 @@ use crate::equations::Robot;
 use crate::function::{Extent, Forms, ForwardDynamicsMethod, Function, Output, Parts, Quantity, SelectedRows};
 use crate::scene::free_drive::FreeDrive;
 use crate::scene::{Gravity, Parameter, ResultPart, Scene, Selection};
-use straightline_core::model::{Frame, Load, Model};
+use straightline_core::model::{Frame, Joint, Load, Model};
 use straightline_core::reduced::ReducedModel;
 use straightline_core::spatial::{SpatialInertia, Sym3, Vec3};
 use straightline_core::{Dd, Real};
@@ -140,6 +140,8 @@ impl Scene {
             let wanted = match extent {
                 // of H the columns
                 Extent::Velocities if k == last => selection.coordinates(model),
+                Extent::Positions if k == last => selection.positions(model),
+                Extent::State if k == last => selection.state(model),
                 Extent::Joints => selection.joints(model),
                 Extent::Of(n) if output.parts == Parts::LinearAngular => selection.part.of(0..*n, 3),
                 _ => (0..shape[k]).collect(),
@@ -188,8 +190,27 @@ impl Selection {
         if self.joints.is_empty() {
             return (0..model.nv()).collect();
         }
+        self.named(model).flat_map(|j| j.iv..j.iv + j.kind.nv()).collect()
+    }
+
+    /// The same of position coordinates.
+    fn positions(&self, model: &Model<Dd>) -> Vec<usize> {
+        if self.joints.is_empty() {
+            return (0..model.nq()).collect();
+        }
+        self.named(model).flat_map(|j| j.iq..j.iq + j.kind.nq()).collect()
+    }
+
+    /// Of the state by its tangent: increments of q of the wanted joints, then their velocities.
+    fn state(&self, model: &Model<Dd>) -> Vec<usize> {
+        let own = self.coordinates(model);
+        own.iter().copied().chain(own.iter().map(|k| model.nv() + k)).collect()
+    }
+
+    /// The joints in the order in which they are named.
+    fn named<'a>(&'a self, model: &'a Model<Dd>) -> impl Iterator<Item = &'a Joint> {
         let joint = |name: &String| model.bodies.iter().map(|b| &b.joint).find(|j| j.name == *name);
-        self.joints.iter().filter_map(joint).flat_map(|j| j.iv..j.iv + j.kind.nv()).collect()
+        self.joints.iter().filter_map(joint)
     }
 }
 

@@ -221,7 +221,7 @@ impl<T: Real> Solution<'_, '_, T> {
     }
 
     /// ∂q̈/∂q, ∂q̈/∂q̇ and H⁻¹ of a motion, by rows.
-    fn derivatives(&self, motion: [&[T]; 3]) -> Vec<T> {
+    pub(super) fn derivatives(&self, motion: [&[T]; 3]) -> Vec<T> {
         let nv = motion[1].len();
         let of_torques = self.forms.inverse_dynamics_derivatives(motion);
         let solved = |slopes: Vec<T>| {

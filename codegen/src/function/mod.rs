@@ -17,6 +17,8 @@ mod quantity;
 mod rows;
 mod solution;
 mod spec;
+mod steps;
+mod tangent;
 mod tasks;
 #[cfg(feature = "verify")]
 pub mod truth;
@@ -197,6 +199,31 @@ functions! {
     /// A step towards poses of the frames.
     #[doc(alias("IK"))]
     tasks::InverseKinematicsStep,
+    /// Where a displacement leads.
+    #[doc(alias("retraction", "exponential map", "oplus"))]
+    tangent::Integrate,
+    /// The displacement between configurations.
+    #[doc(alias("logarithm", "ominus"))]
+    tangent::Difference,
+    /// How where a displacement leads depends on both.
+    tangent::IntegrateDerivatives,
+    /// How the displacement between configurations depends on them.
+    tangent::DifferenceDerivatives,
+    /// Tangents carried along a displacement.
+    #[doc(alias("parallel transport"))]
+    tangent::IntegrateTransport,
+    /// A step of time, by Euler's semi-implicit method.
+    #[doc(alias("symplectic Euler"))]
+    steps::SemiImplicitStep,
+    /// A step of time, by Runge and Kutta's method.
+    #[doc(alias("RK4"))]
+    steps::RungeKuttaStep,
+    /// Euler's semi-implicit step with its derivatives.
+    #[doc(alias("linearisation", "discrete dynamics"))]
+    steps::StepDerivatives,
+    /// Runge and Kutta's step with its derivatives.
+    #[doc(alias("linearisation", "RK4"))]
+    steps::StepDerivativesRk4,
     /// Inputs of the drives to motion.
     drives::DrivenForwardDynamics,
     /// Motion to inputs of the drives.
@@ -268,7 +295,9 @@ impl Function {
 
     /// Whether results, or the columns of a matrix, belong to joints.
     pub(crate) fn is_by_joints(self) -> bool {
-        self.has_axis(Extent::Velocities) || self.has_axis(Extent::Joints)
+        [Extent::Velocities, Extent::Joints, Extent::Positions, Extent::State]
+            .into_iter()
+            .any(|axis| self.has_axis(axis))
     }
 
     /// Whether some results belong to such things.

@@ -43,6 +43,12 @@ pub enum Quantity {
     Damping,
     /// How strongly redundancy is spent on torques.
     TorqueGain,
+    /// A displacement of q, of its tangent.
+    Displacement,
+    /// Another configuration.
+    SecondConfiguration,
+    /// The length of a step of time.
+    TimeStep,
     /// The third or a further derivative of q.
     HigherRate(usize),
 }
@@ -60,7 +66,12 @@ struct QuantityRow {
     doc: &'static str,
     /// Within what it is taken to stay where nobody says: of bounds of errors alone.
     bound: Option<f64>,
+    /// Within what programs are tried.
+    tried: (f64, f64),
 }
+
+/// Programs are tried with weights as generalized forces; other quantities that are not said otherwise are drawn alike.
+const TRIED: (f64, f64) = (-10.0, 10.0);
 
 const fn row(
     of: Quantity,
@@ -69,7 +80,13 @@ const fn row(
     bound: Option<f64>,
     doc: &'static str,
 ) -> QuantityRow {
-    QuantityRow { of, name, axes, doc, bound }
+    QuantityRow { of, name, axes, doc, bound, tried: TRIED }
+}
+
+impl QuantityRow {
+    const fn tried(self, least: f64, most: f64) -> QuantityRow {
+        QuantityRow { tried: (least, most), ..self }
+    }
 }
 
 const BY_VELOCITIES: &[Extent] = &[Extent::Velocities];
@@ -78,7 +95,7 @@ const ONE: &[Extent] = &[Extent::Of(1)];
 
 const TABLE: &[QuantityRow] = &[
     row(Configuration, "q", &[Extent::Positions], None, "configuration \\[rad or m\\]"),
-    row(Velocity, "qd", BY_VELOCITIES, Some(10.0), "velocities \\[rad/s or m/s\\]"),
+    row(Velocity, "qd", BY_VELOCITIES, Some(10.0), "velocities \\[rad/s or m/s\\]").tried(-1.0, 1.0),
     row(Acceleration, "qdd", BY_VELOCITIES, Some(100.0), "accelerations \\[rad/s² or m/s²\\]"),
     row(Force, "tau", BY_VELOCITIES, Some(1000.0), "generalized forces \\[N·m or N\\]"),
     row(
@@ -122,28 +139,41 @@ const TABLE: &[QuantityRow] = &[
         PER_FRAME,
         Some(1.0),
         "per frame: from where it is to where it shall be, of the origin \\[m\\] (3), and the rotation vector \\[rad\\] (3), world axes",
-    ),
+    )
+    .tried(-0.3, 0.3),
     row(
         TaskWeight,
         "row_weight",
         PER_FRAME,
         Some(1.0),
         "per frame: how much each row of the error weighs; a row with 0 is left to itself",
-    ),
+    )
+    .tried(0.5, 1.0),
     row(
         Damping,
         "task_damping",
         ONE,
         Some(1.0),
         "λ: λ² is added to the diagonal of J H⁻¹ Jᵀ \\[1/kg; 1/(kg·m²)\\]; 0: none",
-    ),
+    )
+    .tried(0.1, 0.2),
     row(
         TorqueGain,
         "torque_gain",
         ONE,
         Some(1.0),
         "how far the step follows the descent of holding torques where the task leaves freedom; 0: not at all",
+    )
+    .tried(0.5, 1.0),
+    row(
+        Displacement,
+        "v",
+        BY_VELOCITIES,
+        Some(1.0),
+        "displacement of q, of its tangent \\[rad or m\\]; of a floating base a body twist, linear and angular",
     ),
+    row(SecondConfiguration, "q1", &[Extent::Positions], None, "another configuration \\[rad or m\\]"),
+    row(TimeStep, "dt", ONE, Some(0.01), "length of the step \\[s\\]").tried(-0.01, 0.01),
 ];
 
 impl Quantity {
@@ -160,6 +190,16 @@ impl Quantity {
     /// Those that have an entry per velocity coordinate, but for higher rates.
     pub fn of_velocities() -> impl Iterator<Item = Quantity> {
         TABLE.iter().filter(|row| row.axes == BY_VELOCITIES).map(|row| row.of)
+    }
+
+    /// The configurations.
+    pub fn of_positions() -> impl Iterator<Item = Quantity> {
+        TABLE.iter().filter(|row| row.axes == [Extent::Positions]).map(|row| row.of)
+    }
+
+    /// Whether it is a configuration.
+    pub fn is_configuration(self) -> bool {
+        self.axes() == [Extent::Positions]
     }
 
     /// That of an input.
@@ -194,7 +234,7 @@ impl Quantity {
 
     /// Those that say what is asked of frames.
     pub fn of_tasks() -> impl Iterator<Item = Quantity> {
-        TABLE.iter().filter(|row| row.axes == PER_FRAME || row.axes == ONE).map(|row| row.of)
+        TABLE.iter().filter(|row| row.axes == PER_FRAME || matches!(row.of, Damping | TorqueGain)).map(|row| row.of)
     }
 
     /// Its axes, the outermost first.
@@ -205,6 +245,11 @@ impl Quantity {
     /// Within what bounds of errors take it to stay where neither a scene nor the robot file says; none: they have to.
     pub fn default_bound(self) -> Option<f64> {
         self.row().and_then(|row| row.bound)
+    }
+
+    /// Within what programs are tried, unless the robot says more.
+    pub fn tried(self) -> (f64, f64) {
+        self.row().map_or(TRIED, |row| row.tried)
     }
 
     /// How many scalars it has, for so many frames.

@@ -17,6 +17,8 @@ pub enum Extent {
     Joints,
     /// Frames that are asked for.
     Frames,
+    /// The state by its tangent: increments of q, then q̇.
+    State,
     /// The states of all drives.
     DriveStates,
     /// Drives.
@@ -31,6 +33,7 @@ impl Extent {
         match self {
             Extent::Positions => model.nq(),
             Extent::Velocities => model.nv(),
+            Extent::State => 2 * model.nv(),
             Extent::Joints => model.bodies.len(),
             Extent::Frames => frames,
             Extent::DriveStates => drive_states(model),
@@ -79,7 +82,7 @@ impl Output {
 
     /// Whether it is a matrix whose columns belong to velocity coordinates.
     pub fn is_by_columns(&self) -> bool {
-        self.axes.len() > 1 && self.axes.last() == Some(&Extent::Velocities)
+        self.axes.len() > 1 && matches!(self.axes.last(), Some(Extent::Velocities | Extent::State))
     }
 }
 

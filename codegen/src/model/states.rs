@@ -14,6 +14,8 @@ use straightline_graph::expr::{Graph, Port};
 
 /// Of the numbers that states are made of.
 pub(crate) const SEED: u64 = 0x9e37_79b9_7f4a_7c15;
+/// What is no quantity of the robot is tried within ± so much.
+const TRIED: f64 = 10.0;
 /// How near \[rad or m\].
 const NEAR: f64 = 0.02;
 /// How far \[rad, rad/s\] springs of transmissions are stretched.
@@ -22,10 +24,6 @@ const STRETCH: f64 = 1e-3;
 const FAST: f64 = 10.0;
 /// Accelerations at about rest, as a part of others.
 const SLOW: f64 = 0.2;
-/// Frames are so far \[m, rad\] from where they shall be.
-const ERROR: f64 = 0.3;
-/// The least damping of tasks.
-const DAMPING: f64 = 0.1;
 /// A joint without limits is tried within ± so much.
 const RANGE: f64 = std::f64::consts::PI;
 /// A limit beyond this is none \[rad, m, rad/s or m/s\].
@@ -83,14 +81,12 @@ pub(crate) enum Kind {
 pub(crate) fn values(model: &Model<Dd>, port: &Port, kind: Kind, random: &mut Random) -> Vec<f64> {
     let len = port.len();
     match Quantity::of(port) {
-        Some(Quantity::Configuration) if len == model.nq() => configuration(model, kind, random),
+        Some(quantity) if quantity.is_configuration() && len == model.nq() => configuration(model, kind, random),
         Some(Quantity::Gravity) => vec![0.3, -0.2, -9.81],
-        Some(Quantity::Velocity) => (0..len).map(|_| random.symmetric(1.0)).collect(),
-        Some(Quantity::PoseError) => (0..len).map(|_| random.symmetric(ERROR)).collect(),
-        Some(Quantity::TaskWeight | Quantity::TorqueGain) => (0..len).map(|_| 0.5 + 0.5 * random.unit()).collect(),
-        Some(Quantity::Damping) => (0..len).map(|_| DAMPING * (1.0 + random.unit())).collect(),
-        // generalized forces of the size of the weights
-        _ => (0..len).map(|_| random.symmetric(10.0)).collect(),
+        quantity => {
+            let (least, most) = quantity.map_or((-TRIED, TRIED), Quantity::tried);
+            (0..len).map(|_| 0.5 * (least + most) + random.symmetric(0.5 * (most - least))).collect()
+        }
     }
 }
 

@@ -76,7 +76,7 @@ fn input_ranges(graph: &Graph, robot: &Robot, options: &Options) -> Result<Vec<I
     for port in &graph.inputs {
         let ranges = options.scene.input_ranges(port, &robot.model);
         if let Some(k) = (0..port.len()).find(|k| !ranges[*k].is_bounded() && reads(first + k)) {
-            let is_configuration = Quantity::of(port) == Some(Quantity::Configuration);
+            let is_configuration = Quantity::of(port).is_some_and(Quantity::is_configuration);
             let of_joint = |j: &&straightline_core::model::Joint| match is_configuration {
                 true => (j.iq..j.iq + j.kind.nq()).contains(&k),
                 false => (j.iv..j.iv + j.kind.nv()).contains(&k),

@@ -25,7 +25,7 @@ pub fn input_box<T>(inputs: &[Port], scene: &Scene, model: &Model<T>) -> Result<
     for port in inputs {
         let mut ranges = scene.input_ranges(port, model);
         let quantity = Quantity::of(port).ok_or(NoCertificate::Unlimited)?;
-        if quantity == Quantity::Configuration {
+        if quantity.is_configuration() {
             for joint in model.bodies.iter().map(|b| &b.joint) {
                 let own = ranges[joint.iq..].iter_mut().zip(joint.kind.measures());
                 own.for_each(|(r, measure)| limit(r, default_range(measure)));

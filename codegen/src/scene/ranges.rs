@@ -94,7 +94,9 @@ impl Scene {
     /// ```
     pub fn input_ranges<T>(&self, port: &Port, model: &Model<T>) -> Vec<InputRange> {
         let mut all = vec![InputRange::UNLIMITED; port.len()];
-        let quantity = Quantity::of(port);
+        // any configuration is in the ranges of q
+        let named = |quantity: Quantity| if quantity.is_configuration() { Configuration } else { quantity };
+        let quantity = Quantity::of(port).map(named);
         if quantity == Some(Gravity) {
             all.fill(self.ranges.gravity.unwrap_or(InputRange::UNLIMITED));
         }

@@ -15,7 +15,8 @@ use straightline_core::Dd;
 
 /// What says how a robot moves, and by what.
 pub(super) fn motion() -> impl Iterator<Item = Quantity> {
-    [Quantity::Configuration].into_iter().chain(Quantity::of_velocities())
+    let others = [Quantity::SecondConfiguration, Quantity::TimeStep];
+    [Quantity::Configuration].into_iter().chain(Quantity::of_velocities()).chain(others)
 }
 
 /// The robot in the reference's terms, its coordinates numbered as the model's, and what joints add to it.

@@ -74,9 +74,13 @@ impl Coordinates {
     pub fn expand(&self, state: &InputState<f64>) -> BTreeMap<Quantity, Vec<Dd>> {
         let mut whole = BTreeMap::new();
         for quantity in motion() {
-            let (mut all, places) = match quantity {
-                Quantity::Configuration => (self.held.clone(), &self.q),
-                _ => (vec![0.0; self.nv], &self.v),
+            let (mut all, places) = match quantity.axes() {
+                [Extent::Positions] => (self.held.clone(), &self.q),
+                [Extent::Velocities] => (vec![0.0; self.nv], &self.v),
+                _ => {
+                    whole.insert(quantity, state[&quantity.name()].clone());
+                    continue;
+                }
             };
             places.iter().zip(&state[&quantity.name()]).for_each(|(at, x)| all[*at] = *x);
             whole.insert(quantity, all);
@@ -103,7 +107,12 @@ impl Coordinates {
                     Extent::Joints => (self.joints.clone(), self.all_joints),
                     Extent::Frames => ((0..frames).collect(), frames),
                     Extent::Of(n) => ((0..*n).collect(), *n),
-                    Extent::Positions | Extent::DriveStates | Extent::Drives => {
+                    Extent::Positions => (self.q.clone(), self.held.len()),
+                    Extent::State => {
+                        let rates = self.v.iter().map(|k| self.nv + k);
+                        (self.v.iter().copied().chain(rates).collect(), 2 * self.nv)
+                    }
+                    Extent::DriveStates | Extent::Drives => {
                         unreachable!("no function has such results")
                     }
                 };

@@ -9,8 +9,10 @@ use std::sync::Mutex;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
-use straightline_codegen::function::Quantity::{self, Acceleration, Configuration, Force, Velocity};
 use straightline_codegen::function::Divisor;
+use straightline_codegen::function::Quantity::{
+    self, Acceleration, Configuration, Force, SecondConfiguration, TimeStep, Velocity,
+};
 use straightline_codegen::model::singular::{singular_joints, Inertia};
 use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::options::{Optimisations, Options};
@@ -156,6 +158,15 @@ impl State {
             let numbers = (0..6 * MOST_FRAMES).map(|_| Dd::from(f64::from(own.between(0.1, 1.0) as f32)));
             named.insert(task, numbers.collect());
         }
+        // a turn and a step from there
+        let q1 =
+            straightline_core::algorithms::integrate(model, &named[&Configuration], &named[&Quantity::Displacement]);
+        // in all formats, but for a quaternion of length one
+        let is_turn = |k: usize| quaternion.is_some_and(|at| (at..at + 4).contains(&k));
+        let short = |(k, x): (usize, Dd)| if is_turn(k) { x } else { Dd::from(f64::from(x.to_f64() as f32)) };
+        let q1 = q1.into_iter().enumerate().map(short).collect();
+        named.insert(SecondConfiguration, q1);
+        named.insert(TimeStep, vec![Dd::from(f64::from(own.between(1e-3, 1e-2) as f32))]);
         State(named)
     }
 

@@ -43,6 +43,7 @@ fn axis(extent: Extent) -> String {
     match extent {
         Extent::Positions => "NQ".to_string(),
         Extent::Velocities => "NV".to_string(),
+        Extent::State => "2 NV".to_string(),
         Extent::Joints => "joints".to_string(),
         Extent::Frames => "frames".to_string(),
         Extent::DriveStates => "NX".to_string(),

@@ -46,6 +46,7 @@ mod scenes_as_written;
 mod scope;
 mod self_test;
 mod staged;
+mod steps;
 mod sums;
 mod tasks;
 mod truth;

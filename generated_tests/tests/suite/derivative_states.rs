@@ -7,7 +7,9 @@ use straightline_codegen::{Function, Scalar};
 use straightline_core::{Dd, Dual, Real};
 use straightline_generated_tests::bounds::DATA;
 use straightline_generated_tests::compiled;
-use straightline_generated_tests::derivative_data::{functions, DerivativeRobot, DerivativeState, ARMS, LEGGED};
+use straightline_generated_tests::derivative_data::{
+    functions, of_displacements, DerivativeRobot, DerivativeState, ARMS, LEGGED,
+};
 use straightline_generated_tests::programs::{self, cast};
 
 /// Of the greatest entry of a block, in f64 and in f32; or what Pinocchio loses, if that is more.
@@ -151,6 +153,57 @@ fn hold_coriolis_matrix<T: Real + Into<Dd>>(options: impl Fn(&DerivativeRobot) -
 fn the_coriolis_matrix_times_velocities_and_the_rate_of_the_mass_matrix_are_those_of_the_data() {
     hold_coriolis_matrix::<Dd>(as_written, DATA.most);
     hold_coriolis_matrix::<f64>(DerivativeRobot::options, 3.0 * BOUND);
+}
+
+/// A few roundings: an exponential of an angle and a square root.
+const DISPLACED: f64 = 9.0;
+
+/// Displacements of any size, whose quaternions count as they are written.
+fn hold_displacements<T: Real + Into<Dd>>(most: f64) {
+    let mut asked = 0;
+    for robot in LEGGED.iter().map(|name| DerivativeRobot::load(name)) {
+        for function in of_displacements() {
+            let program = robot.program(function, &as_written(&robot));
+            for state in &robot.displacements {
+                let found = programs::run::<T>(&program, &cast::<T>(&state.inputs(function)));
+                for (block, own) in state.blocks(function, &found) {
+                    let error = block.error(own);
+                    assert!(error <= most, "{} in {} ({}): {error:e}", block.name, state.id, state.kind);
+                    asked += 1;
+                }
+            }
+        }
+    }
+    assert_eq!(asked, 2 * 16 * 6);
+}
+
+#[test]
+fn displacements_and_their_derivatives_are_those_of_the_data() {
+    hold_displacements::<Dd>(DATA.most);
+    hold_displacements::<f64>(DISPLACED * f64::EPSILON);
+}
+
+/// What carries one tangent along is the matrix that carries all.
+#[test]
+fn transport_is_the_product_with_the_derivatives() {
+    for robot in LEGGED.iter().map(|name| DerivativeRobot::load(name)) {
+        let program = |function| robot.program(function, &robot.options());
+        let [maps, transport] = [Function::IntegrateDerivatives, Function::IntegrateTransport].map(program);
+        for state in &robot.displacements {
+            let mut inputs = cast::<Dd>(&state.inputs(Function::IntegrateDerivatives));
+            let maps = programs::run(&maps, &inputs);
+            let nv = inputs[1].len();
+            let direction: Vec<Dd> = (0..nv).map(|k| Dd::from(0.7 - 0.3 * k as f64)).collect();
+            let product = |row: &[Dd]| row.iter().zip(&direction).fold(Dd::ZERO, |sum, (x, y)| sum + *x * *y);
+            let expected: Vec<Dd> = maps.chunks(nv).map(product).collect();
+            inputs.push(direction.clone());
+            let found = programs::run(&transport, &inputs);
+            assert_eq!(found.len(), 2 * nv);
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((*found - expected).to_f64().abs() < 1e-28, "{}: {found:?}, {expected:?}", state.id);
+            }
+        }
+    }
 }
 
 /// Of robots with a fixed base, whose velocities are rates of coordinates: D + Dᵀ = 2 Ḣ, K − Kᵀ = ½ d/dt (D − Dᵀ) along the motion, and K is symmetric at

@@ -74,9 +74,14 @@ pub(super) struct MovingJoints<'a, 'b> {
 
 impl<'a, 'b> MovingJoints<'a, 'b> {
     pub fn new(at: &'a Chapter<'b>) -> Self {
+        MovingJoints::at(at, at.q())
+    }
+
+    /// At another configuration.
+    pub fn at(at: &'a Chapter<'b>, q: &[Magnitude]) -> Self {
         let all: Vec<usize> = (0..at.qd().len()).collect();
         let moving = at.moving.unwrap_or(&all).to_vec();
-        let h = at.with_rotors(reference::mass_matrix(&at.tree, at.q()));
+        let h = at.with_rotors(reference::mass_matrix(&at.tree, q));
         let h = h.select_rows(&moving).select_columns(&moving);
         MovingJoints { at, moving, h }
     }
@@ -87,7 +92,7 @@ impl<'a, 'b> MovingJoints<'a, 'b> {
     }
 
     /// H⁻¹ b of the joints that move, and zeros.
-    fn solved(&self, right: &[Magnitude]) -> Vec<Magnitude> {
+    pub(super) fn solved(&self, right: &[Magnitude]) -> Vec<Magnitude> {
         let own = DVector::from_vec(self.of_moving(right));
         let mut whole = vec![Magnitude::zero(); self.at.qd().len()];
         let x = solved(&self.h, &own, reference::solve_symmetric::<Dd>);
@@ -95,18 +100,32 @@ impl<'a, 'b> MovingJoints<'a, 'b> {
         whole
     }
 
-    fn of_moving(&self, x: &[Magnitude]) -> Vec<Magnitude> {
+    /// How many velocity coordinates there are, with those of joints that are held.
+    pub(super) fn all(&self) -> usize {
+        self.at.qd().len()
+    }
+
+    pub(super) fn of_moving(&self, x: &[Magnitude]) -> Vec<Magnitude> {
         self.moving.iter().map(|i| x[*i]).collect()
     }
 
-    fn acceleration(&self, at: &Chapter<'_>) -> Vec<Magnitude> {
-        let bias = at.with_passive(reference::bias_force(&at.tree, at.q(), at.qd()));
+    pub(super) fn acceleration(&self, at: &Chapter<'_>) -> Vec<Magnitude> {
+        self.acceleration_of(at.q(), at.qd())
+    }
+
+    /// Of another motion, under the forces of the state.
+    pub(super) fn acceleration_of(&self, q: &[Magnitude], qd: &[Magnitude]) -> Vec<Magnitude> {
+        let at = self.at;
+        let mut bias = reference::bias_force(&at.tree, q, qd);
+        for effect in at.effects {
+            bias[effect.iv] += effect.passive(q[effect.iq], qd[effect.iv]);
+        }
         let net: Vec<Magnitude> = at.get(Quantity::Force).iter().zip(bias.iter()).map(|(tau, h)| *tau - *h).collect();
         self.solved(&net)
     }
 
     /// ∂q̈/∂q, ∂q̈/∂q̇ and H⁻¹ by rows.
-    fn derivatives(&self, qdd: &[Magnitude]) -> Vec<Magnitude> {
+    pub(super) fn derivatives(&self, qdd: &[Magnitude]) -> Vec<Magnitude> {
         let (at, nv) = (self.at, self.at.qd().len());
         let motion = [at.q(), at.qd(), qdd];
         let column = |block: usize, k: usize| -> Vec<Magnitude> {

@@ -19,6 +19,8 @@ mod forward_derivatives;
 mod frame_forces;
 mod kinematics;
 mod motion_derivatives;
+mod steps;
+mod tangent;
 mod tasks;
 mod whole;
 
@@ -78,6 +80,9 @@ impl<'a> Chapter<'a> {
         for rate in Quantity::of_velocities() {
             sized.entry(rate).or_insert_with(|| vec![Magnitude::zero(); tree.nv()]);
         }
+        let here = sized[&Quantity::Configuration].clone();
+        sized.entry(Quantity::SecondConfiguration).or_insert(here);
+        sized.entry(Quantity::TimeStep).or_insert_with(|| vec![Magnitude::zero()]);
         let tree = with_sizes(tree);
         for task in [Quantity::Wrench, Quantity::PoseError] {
             sized.entry(task).and_modify(|x| x.chunks_mut(3).for_each(of_length));
@@ -86,7 +91,7 @@ impl<'a> Chapter<'a> {
         for link in tree.links.iter().filter(|link| link.joint == ReferenceJoint::Free) {
             for (quantity, x) in &mut sized {
                 match quantity {
-                    Quantity::Configuration => {
+                    quantity if quantity.is_configuration() => {
                         of_length(&mut x[link.iq..link.iq + 3]);
                         x[link.iq + 3..link.iq + 7].iter_mut().for_each(|x| *x = x.of_size(1.0));
                     }

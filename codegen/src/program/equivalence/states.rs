@@ -41,9 +41,7 @@ impl StatePlace {
     fn of(self, quantity: Quantity, values: Vec<f64>, random: &mut Random) -> Vec<f64> {
         let times = |factor: f64| values.iter().map(|x| factor * x).collect();
         match self {
-            StatePlace::Beyond if quantity == Quantity::Configuration => {
-                values.iter().map(|_| random.symmetric(PI)).collect()
-            }
+            StatePlace::Beyond if quantity.is_configuration() => values.iter().map(|_| random.symmetric(PI)).collect(),
             StatePlace::Anywhere | StatePlace::Beyond => values,
             StatePlace::NearZero => times(NEAR),
             StatePlace::Zero => times(0.0),
@@ -81,7 +79,8 @@ impl<'a> States<'a> {
         state.extend(names.zip(values).map(|(name, x)| (name, x.into_iter().map(short).collect())));
         // of length one in double-double, too
         for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| !j.kind.is_single()) {
-            if let Some(q) = state.get_mut(&Quantity::Configuration.name()) {
+            for name in Quantity::of_positions().map(Quantity::name) {
+                let Some(q) = state.get_mut(&name) else { continue };
                 let own = &mut q[joint.iq..joint.iq + joint.kind.nq()];
                 if place == StatePlace::Zero {
                     own.iter_mut().zip(joint.kind.row().neutral).for_each(|(q, neutral)| *q = Dd::from(*neutral));
@@ -113,7 +112,7 @@ impl<'a> States<'a> {
         }
         let values = of_port(&self.robot.model, port, fast, &mut self.random);
         match Quantity::of(port) {
-            Some(quantity @ (Quantity::Configuration | Quantity::Velocity)) => {
+            Some(quantity) if quantity.is_configuration() || quantity == Quantity::Velocity => {
                 place.of(quantity, values, &mut self.random)
             }
             _ => values,

@@ -48,6 +48,7 @@
 //! | reactions in the joints | [`joint_wrenches`] |
 //! | H(q) | [`mass_matrix`] |
 //! | motion under a tau | [`forward_dynamics_aba`], [`forward_dynamics_ltdl`] |
+//! | q ⊕ v, its inverse and their derivatives | [`integrate`], [`difference`], [`integrate_maps`], [`difference_maps`] |
 //! | energy | [`kinetic_energy`], [`potential_energy`] |
 //! | motion under the inputs of drives | [`driven_motion`], [`complete_model`](fn@complete_model), [`state_space`](fn@state_space) |
 //! | inputs of drives for a motion | [`driven_inverse`](fn@driven_inverse) |
@@ -89,6 +90,7 @@ mod reduced_mass_matrix;
 mod reduced_turn;
 mod rnea;
 mod subtree;
+mod tangent;
 mod transmission;
 mod velocity;
 
@@ -134,6 +136,9 @@ pub use reduced_gravity::{reduced_gravity_force, reduced_gravity_force_with_limb
 pub use reduced_mass_matrix::reduced_mass_matrix;
 pub use rnea::{bias_force, gravity_force, inverse_dynamics, joint_wrenches, velocity_force};
 pub use subtree::{subtrees, CarriedMass};
+pub use tangent::{
+    difference, difference_maps, displacement_rate, displacement_rate_maps, integrate, integrate_maps, TangentMap,
+};
 
 use crate::model::Body;
 use crate::spatial::Composite;

@@ -1,8 +1,9 @@
 //! The root body, free in the world.
 
 use super::articulated::ArticulatedInertia;
-use super::quaternion::{product, quaternion_to_rotation, rotated};
-use super::{Descriptor, Measure, Mechanics, Dialect, Word};
+use super::exponential::{exponential, logarithm};
+use super::quaternion::{product, quaternion_to_rotation, rotated, rotated_back};
+use super::{Descriptor, Dialect, Measure, Mechanics, TwistMap, Word};
 use crate::dd::Dd;
 use crate::real::Real;
 use crate::spatial::{Composite, ForceVector, MotionVector, Transform, Vec3};
@@ -31,6 +32,15 @@ pub(super) struct Floating;
 
 fn orientation<T: Real>(q: &[T]) -> [T; 4] {
     [q[3], q[4], q[5], q[6]]
+}
+
+fn position<T: Real>(q: &[T]) -> Vec3<T> {
+    Vec3::new(q[0], q[1], q[2])
+}
+
+/// Linear and angular part.
+fn twist<T: Real>(v: &[T]) -> [Vec3<T>; 2] {
+    [Vec3::new(v[0], v[1], v[2]), Vec3::new(v[3], v[4], v[5])]
 }
 
 impl<T: Real> Mechanics<T> for Floating {
@@ -101,6 +111,36 @@ impl<T: Real> Mechanics<T> for Floating {
             (w * c + x * b - y * a) * half,
             -(x * a + y * b + z * c) * half,
         ]);
+    }
+
+    /// M exp v; of a quaternion of length one, whatever that of q.
+    fn integrate(&self, q: &[T], v: &[T], to: &mut [T]) {
+        let quaternion = orientation(q);
+        let inverse = T::one() / quaternion.iter().fold(T::zero(), |sum, x| sum + *x * *x).sqrt();
+        let [x, y, z, w] = quaternion.map(|x| x * inverse);
+        let (moved, turned) = exponential(twist(v));
+        let moved = position(q) + rotated_back([-x, -y, -z, w], moved);
+        to[..3].copy_from_slice(&moved.to_array());
+        to[3..].copy_from_slice(&product(&[x, y, z, w], &turned));
+    }
+
+    fn difference(&self, q: &[T], q1: &[T], v: &mut [T]) {
+        let [linear, angular] = logarithm((position(q), orientation(q)), (position(q1), orientation(q1)));
+        v[..3].copy_from_slice(&linear.to_array());
+        v[3..].copy_from_slice(&angular.to_array());
+    }
+
+    fn integrate_maps(&self, v: &[T]) -> Option<[TwistMap<T>; 2]> {
+        Some(TwistMap::of_exponential(twist(v)))
+    }
+
+    fn difference_maps(&self, v: &[T]) -> Option<[TwistMap<T>; 2]> {
+        Some(TwistMap::of_logarithm(twist(v)))
+    }
+
+    fn displacement_rate(&self, u: &[T], qd: &[T]) -> Option<[TwistMap<T>; 2]> {
+        let u = twist(u);
+        Some([TwistMap::rate_of_logarithm(u), TwistMap::slope_of_rate(u, twist(qd))])
     }
 
     /// Turned by the Cayley map, q ∘ (1 + a)/|1 + a| squared with a = h ω/4.

@@ -5,7 +5,7 @@
 //! fewer operations.
 
 use super::articulated::{ArticulatedInertia, FreeJoint};
-use super::JointPose;
+use super::{JointPose, TwistMap};
 use crate::real::Real;
 use crate::spatial::{Composite, ForceVector, Mat3, MotionVector, Transform, Vec3};
 
@@ -143,6 +143,31 @@ pub(crate) trait Mechanics<T: Real> {
     /// dq/dt.
     fn configuration_rate(&self, _q: &[T], qd: &[T], rate: &mut [T]) {
         rate.copy_from_slice(qd);
+    }
+
+    /// q ⊕ v: where the displacement v, of the tangent at q, leads.
+    fn integrate(&self, q: &[T], v: &[T], to: &mut [T]) {
+        to.iter_mut().zip(q.iter().zip(v)).for_each(|(to, (q, v))| *to = *q + *v);
+    }
+
+    /// The displacement v with q ⊕ v = q₁, the shortest one.
+    fn difference(&self, q: &[T], q1: &[T], v: &mut [T]) {
+        v.iter_mut().zip(q1.iter().zip(q)).for_each(|(v, (q1, q))| *v = *q1 - *q);
+    }
+
+    /// How q ⊕ v, in its own tangent, moves with q and with v; `None`: as they do, coordinate by coordinate.
+    fn integrate_maps(&self, _v: &[T]) -> Option<[TwistMap<T>; 2]> {
+        None
+    }
+
+    /// How v of q ⊕ v = q₁ moves with q and with q₁; `None`: as they do, against the one and with the other.
+    fn difference_maps(&self, _v: &[T]) -> Option<[TwistMap<T>; 2]> {
+        None
+    }
+
+    /// What makes u̇ of q̇ where q ⊕ u moves with q̇, up to the fourth power of u; how that depends on u; `None`: they are the same.
+    fn displacement_rate(&self, _u: &[T], _qd: &[T]) -> Option<[TwistMap<T>; 2]> {
+        None
     }
 
     /// The change of q in the time `h` at constant q̇.

@@ -12,6 +12,7 @@
 #[macro_use]
 mod descriptor;
 mod articulated;
+mod exponential;
 mod mechanics;
 mod pose;
 pub(crate) mod quaternion;
@@ -19,6 +20,7 @@ pub(crate) mod quaternion;
 #[cfg(feature = "alloc")]
 pub(crate) use articulated::{ArticulatedInertia, FreeJoint};
 pub use descriptor::{words, Descriptor, Dialect, Measure, Word, FLOATING_BASE, KINDS, MOST_COORDINATES};
+pub(crate) use exponential::TwistMap;
 pub(crate) use mechanics::Mechanics;
 #[cfg(feature = "alloc")]
 pub use pose::composing_pays;

@@ -44,6 +44,7 @@
 //! ```
 
 mod contact;
+mod displacement;
 pub mod drives;
 mod dynamics;
 mod energy;
@@ -58,6 +59,7 @@ pub use contact::{
     at_rest, constrained_motion, environment_impact, environment_motion, functional_coordinate, rigid_impact,
     Component, ContactFrames, Derivatives,
 };
+pub use displacement::{displaced, displacement, increment};
 pub use dynamics::{
     bias_force, dalembert_inverse_dynamics, equations_of_motion, forward_dynamics, forward_natural_scale,
     gravity_force, inverse_dynamics, joint_loads, joint_wrenches, mass_matrix, natural_scale, velocity_force,

@@ -10,6 +10,7 @@ mod measure;
 mod reference;
 mod short_sines;
 mod support;
+mod tangent;
 mod taylor;
 mod trig;
 mod two_authors;

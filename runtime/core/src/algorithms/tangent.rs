@@ -1,0 +1,96 @@
+//! Displacements of a configuration along its tangent, and how tangents are carried along them.
+//!
+//! q ⊕ v adds v to the coordinates of most joints; a floating base it moves by the exponential of the body twist v = (linear, angular), M exp v, through any angle.
+//! `difference` is the inverse, through at most half a turn. Derivatives by q are by increments of the tangent (a base: of its
+//! pose in its own axes), and so are those of configurations.
+
+use crate::joint::TwistMap;
+use crate::model::{Joint, Model};
+use crate::spatial::Vec3;
+use crate::Real;
+use alloc::vec;
+use alloc::vec::Vec;
+
+fn joints<T>(model: &Model<T>) -> impl Iterator<Item = &Joint> {
+    model.bodies.iter().map(|body| &body.joint)
+}
+
+/// q ⊕ v. Quaternions are taken as of length one, whatever their length but zero, and come out so.
+pub fn integrate<T: Real>(model: &Model<T>, q: &[T], v: &[T]) -> Vec<T> {
+    let mut to = vec![T::zero(); q.len()];
+    for joint in joints(model) {
+        let own = &mut to[joint.iq..joint.iq + joint.kind.nq()];
+        joint.kind.mechanics().integrate(joint.coordinates(q), joint.rates(v), own);
+    }
+    to
+}
+
+/// v of q ⊕ v = q₁, the shortest one: a base turns by at most π. Quaternions q and −q are the same.
+pub fn difference<T: Real>(model: &Model<T>, q: &[T], q1: &[T]) -> Vec<T> {
+    let mut v = vec![T::zero(); model.nv()];
+    for joint in joints(model) {
+        let own = &mut v[joint.iv..joint.iv + joint.kind.nv()];
+        joint.kind.mechanics().difference(joint.coordinates(q), joint.coordinates(q1), own);
+    }
+    v
+}
+
+/// A linear map of the tangent: joint by joint, the same number on the diagonal for most.
+#[derive(Clone, Debug)]
+pub struct TangentMap<T> {
+    others: T,
+    twists: Vec<(usize, TwistMap<T>)>,
+}
+
+impl<T: Real> TangentMap<T> {
+    /// The products with the columns of a matrix by rows, `columns` of them; of a vector with one.
+    pub fn times(&self, matrix: &[T], columns: usize) -> Vec<T> {
+        let mut product: Vec<T> = matrix.iter().map(|x| self.others * *x).collect();
+        for (first, map) in &self.twists {
+            for k in 0..columns {
+                let entry = |i: usize| matrix[(first + i) * columns + k];
+                let [linear, angular] = map.apply([0, 3].map(|i| Vec3::new(entry(i), entry(i + 1), entry(i + 2))));
+                let moved = linear.to_array().into_iter().chain(angular.to_array());
+                moved.enumerate().for_each(|(i, x)| product[(first + i) * columns + k] = x);
+            }
+        }
+        product
+    }
+
+    /// By rows, for so many velocity coordinates.
+    pub fn matrix(&self, nv: usize) -> Vec<T> {
+        let unit: Vec<T> = (0..nv * nv).map(|k| if k % (nv + 1) == 0 { T::one() } else { T::zero() }).collect();
+        self.times(&unit, nv)
+    }
+}
+
+/// Two maps of a robot from those of its joints.
+fn maps<T: Real>(
+    model: &Model<T>,
+    others: [T; 2],
+    of_joint: impl Fn(&Joint) -> Option<[TwistMap<T>; 2]>,
+) -> [TangentMap<T>; 2] {
+    let own = |k: usize| joints(model).filter_map(|joint| Some((joint.iv, of_joint(joint)?[k]))).collect();
+    [0, 1].map(|k| TangentMap { others: others[k], twists: own(k) })
+}
+
+/// How q ⊕ v moves, in its own tangent, with q and with v: Ad(exp(−v)) and J_r(v) of a base, 1 of other joints.
+pub fn integrate_maps<T: Real>(model: &Model<T>, v: &[T]) -> [TangentMap<T>; 2] {
+    maps(model, [T::one(); 2], |joint| joint.kind.mechanics().integrate_maps(joint.rates(v)))
+}
+
+/// How v of q ⊕ v = q₁ moves with q and with q₁: −J_r⁻¹(−v) and J_r⁻¹(v) of a base, ∓ 1 of other joints.
+pub fn difference_maps<T: Real>(model: &Model<T>, v: &[T]) -> [TangentMap<T>; 2] {
+    maps(model, [-T::one(), T::one()], |joint| joint.kind.mechanics().difference_maps(joint.rates(v)))
+}
+
+/// u̇ where q ⊕ u, q held, moves with q̇: J_r⁻¹(u) q̇ of a base up to the square of ad, of which the next term is ad⁴/720.
+pub fn displacement_rate<T: Real>(model: &Model<T>, u: &[T], qd: &[T]) -> Vec<T> {
+    displacement_rate_maps(model, u, qd)[0].times(qd, 1)
+}
+
+/// How [`displacement_rate`] changes with q̇ and with u.
+pub fn displacement_rate_maps<T: Real>(model: &Model<T>, u: &[T], qd: &[T]) -> [TangentMap<T>; 2] {
+    let of_joint = |joint: &Joint| joint.kind.mechanics().displacement_rate(joint.rates(u), joint.rates(qd));
+    maps(model, [T::one(), T::zero()], of_joint)
+}
