@@ -135,8 +135,10 @@ impl Scene {
         let mut axes: Vec<(Vec<usize>, usize)> = Vec::new();
         for (k, extent) in output.axes.iter().enumerate() {
             let wanted = match extent {
-                // of H the columns
-                Extent::Velocities if k == last => selection.coordinates(model),
+                // of H the columns, of a regressor the rows
+                Extent::Velocities if !output.axes[k + 1..].contains(&Extent::Velocities) => {
+                    selection.coordinates(model)
+                }
                 Extent::Joints => selection.joints(model),
                 Extent::Of(n) if output.parts == Parts::LinearAngular => selection.part.of(0..*n, 3).collect(),
                 _ => (0..shape[k]).collect(),

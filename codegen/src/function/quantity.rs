@@ -33,6 +33,8 @@ pub enum Quantity {
     ForceDirection,
     /// Multipliers of generalized forces, or of accelerations.
     Multiplier,
+    /// The parameters of links and joints, as a robot file has them.
+    LinkParameters,
     /// The third or a further derivative of q.
     HigherRate(usize),
 }
@@ -88,6 +90,14 @@ const TABLE: &[QuantityRow] = &[
     row(AccelerationDirection, "direction_qdd", Extent::Velocities, Some(1.0), "direction of q̈ \\[rad/s² or m/s²\\]"),
     row(ForceDirection, "direction_tau", Extent::Velocities, Some(1.0), "direction of τ \\[N·m or N\\]"),
     row(Multiplier, "multiplier", Extent::Velocities, Some(1.0), "λ: multipliers of the generalized forces or accelerations"),
+    row(
+        LinkParameters,
+        "link_parameters",
+        Extent::LinkParameters,
+        Some(10.0),
+        "m \\[kg\\], m c (3) \\[kg·m\\], I about the link's origin (xx, xy, xz, yy, yz, zz) \\[kg·m²\\] of the link behind every joint with what is \
+         fixed to it, in the axes of the link and the order of [`JOINT_NAMES`]; then what a scene adds of joints, kind by kind",
+    ),
     row(Gravity, "gravity", Extent::Of(3), Some(10.0), "acceleration due to gravity in the world \\[m/s²\\]"),
 ];
 

@@ -64,14 +64,14 @@ impl Truth for ForwardDynamicsHvp {
 }
 
 /// The joints that move, of which accelerations are solved for.
-struct MovingJoints<'a, 'b> {
+pub(super) struct MovingJoints<'a, 'b> {
     at: &'a Chapter<'b>,
     moving: Vec<usize>,
     h: DMatrix<Magnitude>,
 }
 
 impl<'a, 'b> MovingJoints<'a, 'b> {
-    fn new(at: &'a Chapter<'b>) -> Self {
+    pub fn new(at: &'a Chapter<'b>) -> Self {
         let all: Vec<usize> = (0..at.qd().len()).collect();
         let moving = at.moving.unwrap_or(&all).to_vec();
         let h = at.with_rotors(reference::mass_matrix(&at.tree, at.q()));
@@ -80,7 +80,7 @@ impl<'a, 'b> MovingJoints<'a, 'b> {
     }
 
     /// H⁻¹ b of the joints that move, and zeros.
-    fn solved(&self, right: &[Magnitude]) -> Vec<Magnitude> {
+    pub fn solved(&self, right: &[Magnitude]) -> Vec<Magnitude> {
         let own = DVector::from_vec(self.of_moving(right));
         let mut whole = vec![Magnitude::zero(); self.at.qd().len()];
         let x = solved(&self.h, &own, reference::solve_symmetric::<Dd>);
@@ -88,7 +88,7 @@ impl<'a, 'b> MovingJoints<'a, 'b> {
         whole
     }
 
-    fn of_moving(&self, x: &[Magnitude]) -> Vec<Magnitude> {
+    pub fn of_moving(&self, x: &[Magnitude]) -> Vec<Magnitude> {
         self.moving.iter().map(|i| x[*i]).collect()
     }
 

@@ -18,6 +18,7 @@ mod dynamics;
 mod forward_derivatives;
 mod kinematics;
 mod motion_derivatives;
+mod regressors;
 mod whole;
 
 /// What a function should give.
@@ -59,6 +60,8 @@ pub struct Chapter<'a> {
     moving: Option<&'a [usize]>,
     /// Whose drives are meant, with the numbers of their shafts.
     drives: Option<&'a Model<Dd>>,
+    /// The robot whose base parameters are meant.
+    robot: Option<&'a Model<Dd>>,
     state: BTreeMap<Quantity, Vec<Magnitude>>,
 }
 
@@ -86,7 +89,7 @@ impl<'a> Chapter<'a> {
                 }
             }
         }
-        Chapter { tree, frames: Vec::new(), effects, moving: None, drives: None, state: sized }
+        Chapter { tree, frames: Vec::new(), effects, moving: None, drives: None, robot: None, state: sized }
     }
 
     /// The same with these frames asked for.
@@ -111,6 +114,12 @@ impl<'a> Chapter<'a> {
     #[must_use]
     pub fn with_drives(self, model: &'a Model<Dd>) -> Self {
         Chapter { drives: Some(model), ..self }
+    }
+
+    /// The same with the base parameters of a model, whose bodies are links of the tree, by their names.
+    #[must_use]
+    pub fn with_base_parameters(self, model: &'a Model<Dd>) -> Self {
+        Chapter { robot: Some(model), ..self }
     }
 
     /// What the state has of a quantity.
