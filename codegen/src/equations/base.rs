@@ -13,7 +13,7 @@ use crate::equations::reduce::longest_lever;
 use crate::scene::{Gravity, Scene};
 use straightline_core::algorithms as alg;
 use straightline_core::base_parameters::{
-    BaseParameter, BaseParameterKind, BaseParameters, JointParameter, PER_BODY,
+    BaseParameter, BaseParameterKind, BaseParameterSets, JointParameter, PER_BODY,
 };
 use straightline_core::model::{BodyId, Load, Model};
 use straightline_core::random::Random;
@@ -34,12 +34,12 @@ const DUST: f64 = 1e-24;
 const KEPT_FIRST: [usize; PER_BODY] = [4, 7, 5, 6, 8, 1, 2, 3, 9, 0];
 
 /// The base parameters of a robot whose reduced frames have these poses in its canonical ones, and what its scene makes inputs.
-pub(crate) fn find(model: &Model<Dd>, frames: &[Transform<Dd>], scene: &Scene) -> BaseParameters {
+pub(crate) fn find(model: &Model<Dd>, frames: &[Transform<Dd>], scene: &Scene) -> BaseParameterSets {
     let joint_parameters = model.base_parameters.joint_parameters.clone();
-    let search = Search { model, frames, states: states(model, scene.gravity == Gravity::Input), joint_parameters };
+    let search = BaseSearch { model, frames, states: states(model, scene.gravity == Gravity::Input), joint_parameters };
     let of_forces = search.grouped(&search.by_energies(), &search.joint_parameters);
     let of_support = search.grouped(&search.by_support(), &[]);
-    BaseParameters {
+    BaseParameterSets {
         of_forces: search.with_rows(of_forces, &|model, motion| alg::torque_regressor(model, motion), model.nv()),
         of_support: search.with_rows(of_support, &|model, motion| alg::base_wrench_regressor(model, motion), 6),
         of_scene: of_scene(model, scene),
@@ -51,7 +51,8 @@ pub(crate) fn find(model: &Model<Dd>, frames: &[Transform<Dd>], scene: &Scene) -
 fn of_scene(model: &Model<Dd>, scene: &Scene) -> Vec<BaseParameter> {
     let mut found = Vec::new();
     for parameter in &scene.parameters {
-        let Some((frame, body)) = parameter.frame().and_then(|f| model.frame(f)).and_then(|f| Some((f, f.body?))) else {
+        let Some((frame, body)) = parameter.frame().and_then(|f| model.frame(f)).and_then(|f| Some((f, f.body?)))
+        else {
             continue;
         };
         let path = std::iter::successors(Some(body), |b| model.bodies[*b].parent).map(|b| &model.bodies[b].joint);
@@ -77,7 +78,8 @@ fn states(model: &Model<Dd>, any_gravity: bool) -> Vec<SampledMotion> {
         let mut motion = [model.nq(), model.nv(), model.nv()].map(|n| vec![Dd::ZERO; n]);
         for joint in model.bodies.iter().map(|body| &body.joint) {
             let unit = if joint.kind.slides() { lever } else { 1.0 };
-            let mut put = |to: &mut [Dd], bound: f64| to.iter_mut().for_each(|x| *x = Dd::from(random.symmetric(bound)));
+            let mut put =
+                |to: &mut [Dd], bound: f64| to.iter_mut().for_each(|x| *x = Dd::from(random.symmetric(bound)));
             put(&mut motion[0][joint.iq..joint.iq + joint.kind.nq()], 3.0 * unit);
             put(&mut motion[1][joint.iv..joint.iv + joint.kind.nv()], unit);
             put(&mut motion[2][joint.iv..joint.iv + joint.kind.nv()], unit);
@@ -98,14 +100,14 @@ struct Dependence {
     dependent: Vec<(usize, Vec<(usize, Dd)>)>,
 }
 
-struct Search<'a> {
+struct BaseSearch<'a> {
     model: &'a Model<Dd>,
     frames: &'a [Transform<Dd>],
     states: Vec<SampledMotion>,
     joint_parameters: Vec<JointParameter>,
 }
 
-impl Search<'_> {
+impl BaseSearch<'_> {
     /// What generalized forces tell apart of each body, with what its joint adds.
     fn by_energies(&self) -> Vec<Dependence> {
         let lever = Dd::from(longest_lever(self.model));
@@ -215,19 +217,20 @@ impl Search<'_> {
     /// The parameters that are left, with all that is grouped with them.
     fn grouped(&self, dependences: &[Dependence], joint_parameters: &[JointParameter]) -> Vec<BaseParameter> {
         let Self { model, .. } = self;
-        let (places, lever) = (Places::new(model), longest_lever(model));
+        let (places, lever) = (FilePlaces::new(model), longest_lever(model));
         let with_energy: Vec<JointParameter> = joint_parameters.iter().copied().filter(|k| has_energy(*k)).collect();
         // of every body the ten parameters in its reduced frame, and those of its joint, as sums of what the file has
-        let mut forms: Vec<Vec<LinearForm>> = (0..model.bodies.len())
+        let mut forms: Vec<Vec<ParameterSum>> = (0..model.bodies.len())
             .map(|b| {
                 let to_reduced = self.settled(&self.frames[b].inverse().compose(&model.bodies[b].link_frame));
                 let of_link = link_units().map(|unit| unit.seen_from(&to_reduced).to_array());
                 let own = (0..PER_BODY).map(|entry| {
-                    let mut form = LinearForm::new();
+                    let mut form = ParameterSum::new();
                     (0..PER_BODY).for_each(|c| form.add(places.of_link(b, c), of_link[c][entry]));
                     form
                 });
-                let of_joint = with_energy.iter().map(|kind| LinearForm::of(places.of_joint(joint_parameters, *kind, b)));
+                let of_joint =
+                    with_energy.iter().map(|kind| ParameterSum::of(places.of_joint(joint_parameters, *kind, b)));
                 own.chain(of_joint.filter(|_| model.bodies[b].joint.kind.is_single())).collect()
             })
             .collect();
@@ -258,7 +261,12 @@ impl Search<'_> {
             for entry in kept {
                 let unit = Load::unit(entry).seen_from(&self.frames[b]);
                 let kind = BaseParameterKind::Inertia { entry, unit };
-                found.push(BaseParameter { body: b, kind, rows: Vec::new(), terms: forms[b][entry].terms(&places, lever, entry) });
+                found.push(BaseParameter {
+                    body: b,
+                    kind,
+                    rows: Vec::new(),
+                    terms: forms[b][entry].terms(&places, lever, entry),
+                });
             }
         }
         for kind in joint_parameters {
@@ -289,7 +297,8 @@ impl Search<'_> {
         found.iter_mut().for_each(|parameter| parameter.rows = (0..rows).collect());
         let columns = found.len();
         let mut greatest = vec![0.0_f64; rows * columns];
-        let base = BaseParameters { of_forces: found.clone(), of_support: found.clone(), ..BaseParameters::default() };
+        let base =
+            BaseParameterSets { of_forces: found.clone(), of_support: found.clone(), ..BaseParameterSets::default() };
         for SampledMotion { motion, gravity } in &self.states[..TRIED] {
             let model = Model { gravity: *gravity, base_parameters: base.clone(), ..self.model.clone() };
             let y = regressor(&model, motion.each_ref().map(|x| &x[..]));
@@ -381,21 +390,21 @@ fn order(entry: usize) -> i32 {
 }
 
 /// Where parameters of the file stand in one list.
-struct Places {
+struct FilePlaces {
     /// The rank of each body's joint.
     rank: Vec<usize>,
     /// Bodies with joints of one coordinate, in the order of the joints.
     single: Vec<BodyId>,
 }
 
-impl Places {
-    fn new(model: &Model<Dd>) -> Places {
+impl FilePlaces {
+    fn new(model: &Model<Dd>) -> FilePlaces {
         let mut order: Vec<BodyId> = (0..model.bodies.len()).collect();
         order.sort_by_key(|b| model.bodies[*b].joint.iv);
         let mut rank = vec![0; order.len()];
         order.iter().enumerate().for_each(|(k, b)| rank[*b] = k);
         let single = order.into_iter().filter(|b| model.bodies[*b].joint.kind.is_single()).collect();
-        Places { rank, single }
+        FilePlaces { rank, single }
     }
 
     fn of_link(&self, body: BodyId, entry: usize) -> usize {
@@ -411,15 +420,15 @@ impl Places {
 
 /// A sum of parameters of the file with factors, and how large the terms of each factor were.
 #[derive(Clone, Default)]
-struct LinearForm(std::collections::BTreeMap<usize, (Dd, f64)>);
+struct ParameterSum(std::collections::BTreeMap<usize, (Dd, f64)>);
 
-impl LinearForm {
+impl ParameterSum {
     fn new() -> Self {
-        LinearForm::default()
+        ParameterSum::default()
     }
 
     fn of(place: usize) -> Self {
-        LinearForm([(place, (Dd::ONE, 1.0))].into_iter().collect())
+        ParameterSum([(place, (Dd::ONE, 1.0))].into_iter().collect())
     }
 
     fn add(&mut self, place: usize, factor: Dd) {
@@ -431,7 +440,7 @@ impl LinearForm {
         *own = (own.0 + factor, own.1.max(size));
     }
 
-    fn add_scaled(&mut self, other: &LinearForm, factor: Dd) {
+    fn add_scaled(&mut self, other: &ParameterSum, factor: Dd) {
         if factor != Dd::ZERO {
             let times = factor.to_f64().abs();
             other.0.iter().for_each(|(place, (x, size))| self.add_sized(*place, *x * factor, size * times));
@@ -439,7 +448,7 @@ impl LinearForm {
     }
 
     /// Its terms, without those that are what rounding left: of terms that cancel, or of powers of the lever.
-    fn terms(&self, places: &Places, lever: f64, entry: usize) -> Vec<(usize, Dd)> {
+    fn terms(&self, places: &FilePlaces, lever: f64, entry: usize) -> Vec<(usize, Dd)> {
         let least = |place: usize, size: f64| match place < PER_BODY * places.rank.len() && entry < PER_BODY {
             true => size.max(lever.powi(order(entry) - order(place % PER_BODY))),
             false => size,

@@ -5,10 +5,10 @@
 //! o and k of the joint.
 
 use super::{Extent, Function};
+use std::fmt::Write;
 use straightline_core::base_parameters::{BaseParameter, PER_BODY};
 use straightline_core::model::Model;
 use straightline_core::Dd;
-use std::fmt::Write;
 
 /// So many terms of a name are written out, the greatest ones; of the others their number is said.
 const TERMS: usize = 12;

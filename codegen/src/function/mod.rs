@@ -20,8 +20,8 @@ mod spec;
 pub mod truth;
 mod whole;
 
-pub use contact::ContactFunction;
 pub use base_parameters::{base_parameter_lists, BaseParameterList};
+pub use contact::ContactFunction;
 pub(crate) use drives::may_be_articulated;
 pub use forms::{Forms, ForwardDynamicsMethod, LimbSums};
 pub use quantity::Quantity;
@@ -280,7 +280,7 @@ impl Function {
     }
 
     /// Whether it is about bodies that a scene makes inputs.
-    pub(crate) fn is_of_scene_parameters(self) -> bool {
+    pub fn is_of_scene_parameters(self) -> bool {
         self.has_axis(Extent::SceneParameters)
     }
 

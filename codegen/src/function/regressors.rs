@@ -1,7 +1,7 @@
 //! Regressors, and the base parameters that their columns belong to.
 
-use super::spec::Extent::{self, Of, RegressorEntries, Velocities};
 use super::solution::Solution;
+use super::spec::Extent::{self, Of, RegressorEntries, Velocities};
 use super::spec::{Divisor, Form, Judged, Output, RobotFunction, Spec};
 use super::{Forms, Quantity};
 use straightline_core::algorithms as alg;
@@ -14,8 +14,7 @@ const PER_VELOCITY: &[Extent] = &[Velocities, Extent::BaseParameters];
 const PER_SCENE_PARAMETER: &[Extent] = &[Velocities, Extent::SceneParameters];
 
 /// What all regressors have in common.
-const REGRESSOR: Spec =
-    Spec { form: Form::Regressor, judged: Judged::ByScale, ..Spec::DERIVED };
+const REGRESSOR: Spec = Spec { form: Form::Regressor, judged: Judged::ByScale, ..Spec::DERIVED };
 
 impl<T: Real> Forms<'_, T> {
     /// Y of the bodies, in this gravity.

@@ -135,7 +135,8 @@ impl Around<'_, '_, '_> {
             plain.push(("DRIVE_NAMES", names(drives.iter().map(|d| &d.name).collect())));
             plain.push(("DRIVE_STATES", format!("[usize; {}] = {states:?}", states.len())));
         }
-        let mut plain: Vec<(String, String)> = plain.into_iter().map(|(name, value)| (name.to_string(), value)).collect();
+        let mut plain: Vec<(String, String)> =
+            plain.into_iter().map(|(name, value)| (name.to_string(), value)).collect();
         let functions: Vec<Function> = generated.items.iter().map(|item| item.function).collect();
         let lists = base_parameter_lists(model, &functions);
         for list in &lists {

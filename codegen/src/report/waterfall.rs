@@ -89,7 +89,12 @@ enum ItemKind {
 /// The stops of a scene for a robot, `whole` as its file has it: first the empty scene, last the scene itself.
 pub fn stops(whole: &Model<Dd>, scene: &Scene) -> Vec<SceneStop> {
     // drives belong to the robot, wherever they are written, and columns to a regressor
-    let mut now = Scene { places: scene.places.clone(), drives: scene.drives.clone(), regressor: scene.regressor.clone(), ..Scene::default() };
+    let mut now = Scene {
+        places: scene.places.clone(),
+        drives: scene.drives.clone(),
+        regressor: scene.regressor.clone(),
+        ..Scene::default()
+    };
     let mut stops: Vec<SceneStop> = robot_in(whole, &now)
         .map(|(robot, scene)| SceneStop { what: ItemKind::Text(String::new()), scene, robot })
         .into_iter()

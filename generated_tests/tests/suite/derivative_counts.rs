@@ -157,7 +157,8 @@ fn derivatives_of_frames_and_of_centroidal_momentum_take_what_is_on_record() {
 #[test]
 fn regressors_in_base_parameters_take_few_operations() {
     use Function::{GravityRegressor, MomentumRegressor, TorqueRegressor};
-    let hyq = CountsOf { floating: true, ..of("../robots/descriptions/hyq.urdf", counts(0, 0, None), counts(0, 0, None)) };
+    let hyq =
+        CountsOf { floating: true, ..of("../robots/descriptions/hyq.urdf", counts(0, 0, None), counts(0, 0, None)) };
     for (of, most) in [(&ARMS[0], 855), (&ARMS[3], 1147), (&hyq, 3475)] {
         let found = [TorqueRegressor, GravityRegressor, MomentumRegressor].map(|function| count(of, function, &[]));
         println!("{:<40} {found:?} of {most}", of.file);

@@ -16,7 +16,7 @@ pub const PER_BODY: usize = 10;
 
 /// The base parameters of a robot: those of its bodies in the order of the bodies, then those of its joints.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct BaseParameters {
+pub struct BaseParameterSets {
     /// What generalized forces tell apart.
     pub of_forces: Vec<BaseParameter>,
     /// What the wrench on the support tells apart, or that of a floating base.

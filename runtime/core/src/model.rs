@@ -5,7 +5,7 @@
 //! about its own z, every linear joint slides along it, and what a link frame of the robot file looks like is left to
 //! [`Body::link_frame`]. A floating base keeps the root link's own frame.
 
-use crate::base_parameters::BaseParameters;
+use crate::base_parameters::BaseParameterSets;
 use crate::dd::Dd;
 use crate::drive::Drive;
 pub use crate::joint::JointKind;
@@ -228,7 +228,7 @@ pub struct Model<T> {
     /// What drives the joints, in the order of the inputs u.
     pub drives: Vec<Drive<T>>,
     /// The parameters that columns of regressors belong to; empty where nobody looked for them.
-    pub base_parameters: BaseParameters,
+    pub base_parameters: BaseParameterSets,
 }
 
 impl<T: Real> Model<T> {

@@ -64,7 +64,14 @@ fn pendulum(links: usize) -> Model<f64> {
     }
     let end = Transform { rotation: Mat3::identity(), translation: Vec3::new(1.0, 0.0, 0.0) };
     let frames = vec![Frame { name: "end".into(), body: Some(links - 1), placement: end }];
-    Model { name: "pendulum".into(), bodies, gravity: Vec3::new(0.0, 0.0, -G), frames, drives: vec![], base_parameters: Default::default() }
+    Model {
+        name: "pendulum".into(),
+        bodies,
+        gravity: Vec3::new(0.0, 0.0, -G),
+        frames,
+        drives: vec![],
+        base_parameters: Default::default(),
+    }
 }
 
 fn floor(model: &Model<f64>) -> Touch {

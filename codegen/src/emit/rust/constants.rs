@@ -124,8 +124,7 @@ pub(super) fn of_robot(generated: &Generated) -> Vec<AssociatedConstant> {
 fn of_base_parameters(generated: &Generated) -> Vec<AssociatedConstant> {
     let functions: Vec<Function> = generated.items.iter().map(|item| item.function).collect();
     let mut constants = Vec::new();
-    for BaseParameterList { prefix, what, names, values, places } in
-        base_parameter_lists(&generated.model, &functions)
+    for BaseParameterList { prefix, what, names, values, places } in base_parameter_lists(&generated.model, &functions)
     {
         let n = names.len();
         let (count, all) = (format!("{prefix}_PARAMETER_COUNT"), format!("{prefix}_PARAMETER_NAMES"));
@@ -133,7 +132,8 @@ fn of_base_parameters(generated: &Generated) -> Vec<AssociatedConstant> {
             count,
             ConstantType::Size,
             n.to_string(),
-            format!("Number of the combinations of inertial parameters that {what} tells apart.").replace("forces tells", "forces tell"),
+            format!("Number of the combinations of inertial parameters that {what} tells apart.")
+                .replace("forces tells", "forces tell"),
         );
         let doc = "What each of them is: m, mx, my, mz (mass, first moment) and Ixx, Ixy, Ixz, Iyy, Iyz, Izz (inertia) about the link's origin, in the axes of the \
                    link; J, d, f, o, k (rotor inertia, damping, Coulomb friction, offset, stiffness) of the joint; each of the link and joint of that \
@@ -155,7 +155,10 @@ fn of_base_parameters(generated: &Generated) -> Vec<AssociatedConstant> {
                 format!("{prefix}_REGRESSOR_{word}"),
                 ConstantType::Sizes(list.len()),
                 format!("{list:?}"),
-                format!("{} of the entries of the regressor that are not zero everywhere, column by column.", ["Rows", "Columns"][k]),
+                format!(
+                    "{} of the entries of the regressor that are not zero everywhere, column by column.",
+                    ["Rows", "Columns"][k]
+                ),
             ));
         }
     }

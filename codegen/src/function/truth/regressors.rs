@@ -4,19 +4,19 @@
 //! the axes and at (±ℓ, ±ℓ) between two of them, first moments are half the difference of two points by ℓ, second moments the second differences by ℓ².
 
 use super::super::regressors::{
-    BaseParameters, BaseWrenchRegressor, EnergyRegressor, GravityRegressor, MomentumRegressor, ParameterDerivatives, SupportParameters,
-    TorqueRegressor, TorqueRegressorEntries,
+    BaseParameters, BaseWrenchRegressor, EnergyRegressor, GravityRegressor, MomentumRegressor, ParameterDerivatives,
+    SupportParameters, TorqueRegressor, TorqueRegressorEntries,
 };
 use super::forward_derivatives::MovingJoints;
 use super::{by_rows, Chapter, Truth};
 use nalgebra::{DVector, Matrix3, Vector3};
+use std::collections::BTreeMap;
 use straightline_core::base_parameters::{BaseParameter, BaseParameterKind, JointParameter, PER_BODY};
 use straightline_core::magnitude::Magnitude;
 use straightline_core::model::{BodyId, Coulomb};
 use straightline_core::reference::{self, CentreOfMassFrame};
 use straightline_core::spatial::Vec3;
 use straightline_core::{Dd, Real};
-use std::collections::BTreeMap;
 
 impl Truth for TorqueRegressor {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
@@ -240,11 +240,7 @@ fn joint_motion(at: &Chapter<'_>, body: BodyId) -> Option<[Magnitude; 3]> {
 }
 
 /// By rows, with what joints of these kinds add.
-fn with_joints(
-    at: &Chapter<'_>,
-    mut columns: Vec<Vec<Magnitude>>,
-    kinds: &[JointParameter],
-) -> Option<Vec<Magnitude>> {
+fn with_joints(at: &Chapter<'_>, mut columns: Vec<Vec<Magnitude>>, kinds: &[JointParameter]) -> Option<Vec<Magnitude>> {
     let robot = at.robot?;
     for (column, parameter) in columns.iter_mut().zip(&robot.base_parameters.of_forces) {
         let BaseParameterKind::Joint(kind) = parameter.kind else { continue };

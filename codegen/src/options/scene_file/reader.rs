@@ -16,13 +16,24 @@ use crate::scene::{
     Ranges, ResultPart, Scene, Selection, Zero,
 };
 use options::options_of;
-use straightline_core::base_parameters::JointParameter;
 use std::ops::Range;
+use straightline_core::base_parameters::JointParameter;
 use toml::de::DeValue;
 
 /// The tables of which there is one each, beside [`LISTS`].
-const TABLES: &[&str] =
-    &["stabilisation", "outputs", "hold", "zero", "effects", "regressor", "support", "numbers", "budget", "options", "diagnostics"];
+const TABLES: &[&str] = &[
+    "stabilisation",
+    "outputs",
+    "hold",
+    "zero",
+    "effects",
+    "regressor",
+    "support",
+    "numbers",
+    "budget",
+    "options",
+    "diagnostics",
+];
 const BUDGET: &[&str] = &[
     "max_flops",
     "max_sincos",

@@ -128,8 +128,8 @@ pub use reduced_gravity::{reduced_gravity_force, reduced_gravity_force_with_limb
 pub use reduced_mass_matrix::reduced_mass_matrix;
 pub use reduced_regressor::reduced_inertial_regressor;
 pub use regressor::{
-    base_wrench_regressor, energy_regressor, gravity_regressor, inertial_regressor, momentum_regressor, put_joint_columns,
-    support_wrenches, torque_regressor, unit_energies,
+    base_wrench_regressor, energy_regressor, gravity_regressor, inertial_regressor, momentum_regressor,
+    put_joint_columns, support_wrenches, torque_regressor, unit_energies,
 };
 pub use rnea::{bias_force, gravity_force, inverse_dynamics, joint_wrenches, velocity_force};
 

@@ -39,12 +39,7 @@ pub fn momentum_regressor<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T
 }
 
 /// The columns of what joints add on their own coordinates, of these kinds.
-pub fn put_joint_columns<T: Real>(
-    model: &Model<T>,
-    [q, qd, qdd]: [&[T]; 3],
-    kinds: &[JointParameter],
-    y: &mut [T],
-) {
+pub fn put_joint_columns<T: Real>(model: &Model<T>, [q, qd, qdd]: [&[T]; 3], kinds: &[JointParameter], y: &mut [T]) {
     let columns = &model.base_parameters.of_forces;
     for (k, parameter) in columns.iter().enumerate() {
         let BaseParameterKind::Joint(kind) = parameter.kind else { continue };

@@ -872,8 +872,15 @@ fn a_pendulum_swings_as_in_the_textbook() {
         load: None,
     };
     let gravity = Vec3::new(0.0, 0.0, -g).map(d);
-    let model =
-        Model { name: "pendulum".into(), bodies: vec![body], gravity, frames: vec![], drives: vec![], base_parameters: Default::default() }.cast::<f64>();
+    let model = Model {
+        name: "pendulum".into(),
+        bodies: vec![body],
+        gravity,
+        frames: vec![],
+        drives: vec![],
+        base_parameters: Default::default(),
+    }
+    .cast::<f64>();
     let (q, qd, qdd) = (0.7, -1.5, 2.0);
     let expected = (inertia + mass * length * length) * qdd + mass * g * length * f64::sin(q);
     let tau = inverse_dynamics(&model, &[q], &[qd], &[qdd])[0];
