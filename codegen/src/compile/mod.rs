@@ -88,7 +88,7 @@ fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> R
 fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
     let Prepared { description, whole, model, frames, options, resolved, mut diagnostics } = prepare(source, options)?;
     let hash = hash(source.text(), &resolved);
-    let robot = Robot::new(model);
+    let robot = Robot::new(model).knowing_base_parameters(&resolved.functions, &resolved.scene);
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
     let programs = resolved.functions.iter().filter(|f| !is_empty(f));
     let programs: Result<Vec<TracedProgram>, _> = programs.map(|f| checked(&robot, &frames, *f, &resolved)).collect();

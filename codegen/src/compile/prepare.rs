@@ -3,7 +3,7 @@
 use crate::choices::Choice;
 use crate::description::{self, messages, Description};
 use crate::diagnostic::{Diagnostics, Source};
-use crate::function::Function;
+use crate::function::{Extent, Function};
 use crate::options::{check_options, Options};
 use crate::program::demand_inertia::demand_inertia;
 use crate::program::range;
@@ -55,13 +55,23 @@ pub(super) fn prepare(source: &Source, options: &Options) -> Result<Prepared, Di
     let of_frames = model.as_ref().or(whole.as_ref());
     let frames = of_frames.map(|m| choose_frames(m, &options.frames, &mut diagnostics)).unwrap_or_default();
     let functions = of_frames.map(|m| Function::wanted(&options.functions, m)).unwrap_or_default();
+    let path_of = |function: &Function| match options.scene.outputs.contains_key(function) {
+        true => format!("outputs.{}", function.name()),
+        false => "options.functions".to_string(),
+    };
     for (function, model) in functions.iter().filter_map(|f| Some((f, of_frames?))).filter(|(f, m)| !f.is_of(*m)) {
         let complaint = scene::messages::function_not_of_robot(function.name(), model.drives.is_empty());
-        let path = match options.scene.outputs.contains_key(function) {
-            true => format!("outputs.{}", function.name()),
-            false => "options.functions".to_string(),
-        };
-        options.scene.places.complain(&path, complaint, &mut diagnostics);
+        options.scene.places.complain(&path_of(function), complaint, &mut diagnostics);
+    }
+    let loads = of_frames.is_some_and(|m| options.scene.parameters.iter().any(|p| p.is_load() && p.is_of(m)));
+    for function in functions.iter().filter(|function| function.is_of_scene_parameters() && !loads) {
+        let complaint = scene::messages::function_not_of_scene(function.name());
+        options.scene.places.complain(&path_of(function), complaint, &mut diagnostics);
+    }
+    let has_columns = |function: &Function| function.has_axis(Extent::BaseParameters);
+    if !options.scene.regressor.is_empty() && !functions.is_empty() && !functions.iter().any(has_columns) {
+        let names: Vec<&str> = Function::known().filter(has_columns).map(Function::name).collect();
+        options.scene.places.complain("regressor", scene::messages::regressor_unused(&names), &mut diagnostics);
     }
     if options.limbs.needs_limbs() && model.as_ref().is_some_and(|model| model::limbs::limbs(model).is_empty()) {
         let complaint = scene::messages::no_identical_limbs(options.limbs.word());

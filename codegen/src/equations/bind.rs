@@ -138,8 +138,10 @@ impl Scene {
         let mut axes: Vec<(Vec<usize>, usize)> = Vec::new();
         for (k, extent) in output.axes.iter().enumerate() {
             let wanted = match extent {
-                // of H the columns
-                Extent::Velocities if k == last => selection.coordinates(model),
+                // of H the columns, of a regressor the rows
+                Extent::Velocities if !output.axes[k + 1..].contains(&Extent::Velocities) => {
+                    selection.coordinates(model)
+                }
                 Extent::Positions if k == last => selection.positions(model),
                 Extent::State if k == last => selection.state(model),
                 Extent::Joints => selection.joints(model),

@@ -1,5 +1,6 @@
 //! The equations of every function: from a robot in a scene to expressions.
 
+mod base;
 pub mod bind;
 pub mod forward_method;
 pub mod reduce;

@@ -1,6 +1,9 @@
 //! A robot in the forms that are traced.
 
+use crate::equations::base;
 use crate::equations::reduce::{reduce, FreeTerms};
+use crate::function::Function;
+use crate::scene::Scene;
 use std::sync::{Arc, Mutex, PoisonError};
 use straightline_core::model::Model;
 use straightline_core::reduced::ReducedModel;
@@ -27,6 +30,18 @@ impl Robot {
     pub fn new(model: Model<Dd>) -> Self {
         let (reduced, reduced_frames) = reduce(&model, &FreeTerms::plain(&model));
         Robot { model, composite: reduced.clone(), reduced, reduced_frames, found: Found::default() }
+    }
+
+    /// The same robot with its base parameters where one of these functions is about them and they are not known yet: in the frames of the plain reduced form.
+    #[must_use]
+    pub fn knowing_base_parameters(self, functions: &[Function], scene: &Scene) -> Self {
+        let known = &self.model.base_parameters;
+        let is_known = !known.of_forces.is_empty();
+        if is_known || !functions.iter().any(|function| function.is_of_base_parameters()) {
+            return self;
+        }
+        let found = base::find(&self.model, &self.reduced_frames, scene);
+        Robot { model: Model { base_parameters: found, ..self.model }, ..self }
     }
 
     /// The same robot in other reduced forms, for torques and for the mass matrix.

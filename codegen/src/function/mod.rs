@@ -2,6 +2,7 @@
 //! ([`RobotFunction`]); here is the list, in the order in which functions stand in generated files.
 
 mod aliases;
+mod base_parameters;
 mod bias_derivatives;
 mod contact;
 mod derivatives;
@@ -14,6 +15,7 @@ mod frame_forces;
 mod kinematics;
 mod motion_derivatives;
 mod quantity;
+mod regressors;
 mod rows;
 mod solution;
 mod spec;
@@ -24,6 +26,7 @@ mod tasks;
 pub mod truth;
 mod whole;
 
+pub use base_parameters::{base_parameter_lists, BaseParameterList};
 pub use contact::ContactFunction;
 pub(crate) use drives::may_be_articulated;
 pub use forms::{Forms, ForwardDynamicsMethod, LimbSums};
@@ -224,6 +227,27 @@ functions! {
     /// Runge and Kutta's step with its derivatives.
     #[doc(alias("linearisation", "RK4"))]
     steps::StepDerivativesRk4,
+    /// Y of τ = Y β.
+    #[doc(alias("identification", "dynamic parameters"))]
+    regressors::TorqueRegressor,
+    /// Its entries that are not zero.
+    #[doc(alias("sparse regressor"))]
+    regressors::TorqueRegressorEntries,
+    /// Y of g = Y β.
+    regressors::GravityRegressor,
+    /// Y of H q̇ = Y β.
+    regressors::MomentumRegressor,
+    /// Y of T and V.
+    regressors::EnergyRegressor,
+    /// Y of the wrench on the support.
+    regressors::BaseWrenchRegressor,
+    /// β of the inertial parameters of the links.
+    #[doc(alias("identifiable parameters"))]
+    regressors::BaseParameters,
+    /// The same of what the wrench on the support depends on.
+    regressors::SupportParameters,
+    /// Derivatives by payloads and links that are inputs.
+    regressors::ParameterDerivatives,
     /// Inputs of the drives to motion.
     drives::DrivenForwardDynamics,
     /// Motion to inputs of the drives.
@@ -301,8 +325,20 @@ impl Function {
     }
 
     /// Whether some results belong to such things.
-    fn has_axis(self, extent: Extent) -> bool {
+    pub(crate) fn has_axis(self, extent: Extent) -> bool {
         self.spec().outputs.iter().any(|output| output.axes.contains(&extent))
+    }
+
+    /// Whether it is about bodies that a scene makes inputs.
+    pub fn is_of_scene_parameters(self) -> bool {
+        self.has_axis(Extent::SceneParameters)
+    }
+
+    /// Whether inputs or results belong to base parameters.
+    pub fn is_of_base_parameters(self) -> bool {
+        let Spec { inputs, outputs, .. } = self.spec();
+        let mut extents = inputs.iter().flat_map(|q| q.axes()).chain(outputs.iter().flat_map(|o| o.axes)).copied();
+        extents.any(Extent::is_of_base_parameters)
     }
 
     /// Number of its arguments in generated code without a scene, if that does not depend on the robot.

@@ -49,6 +49,8 @@ pub enum Quantity {
     SecondConfiguration,
     /// The length of a step of time.
     TimeStep,
+    /// The parameters of links and joints, as a robot file has them.
+    LinkParameters,
     /// The third or a further derivative of q.
     HigherRate(usize),
 }
@@ -174,6 +176,14 @@ const TABLE: &[QuantityRow] = &[
     ),
     row(SecondConfiguration, "q1", &[Extent::Positions], None, "another configuration \\[rad or m\\]"),
     row(TimeStep, "dt", ONE, Some(0.01), "length of the step \\[s\\]").tried(-0.01, 0.01),
+    row(
+        LinkParameters,
+        "link_parameters",
+        &[Extent::LinkParameters],
+        Some(10.0),
+        "m \\[kg\\], m c (3) \\[kg·m\\], I about the link's origin (xx, xy, xz, yy, yz, zz) \\[kg·m²\\] of the link behind every joint with what is \
+         fixed to it, in the axes of the link and the order of [`JOINT_NAMES`]; then what a scene adds of joints, kind by kind",
+    ),
 ];
 
 impl Quantity {

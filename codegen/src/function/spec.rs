@@ -2,6 +2,7 @@
 
 use super::{Forms, Function, Quantity};
 use straightline_core::algorithms::drive_states;
+use straightline_core::base_parameters::PER_BODY;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::model::Model;
 use straightline_core::Real;
@@ -23,6 +24,16 @@ pub enum Extent {
     DriveStates,
     /// Drives.
     Drives,
+    /// Base parameters: what generalized forces tell apart.
+    BaseParameters,
+    /// What the wrench on the support tells apart.
+    SupportParameters,
+    /// Entries of the regressor of generalized forces that are not zero everywhere, column by column.
+    RegressorEntries,
+    /// Ten parameters of the link behind every joint, then those of joints that a scene adds.
+    LinkParameters,
+    /// Ten parameters of every body that a scene makes an input.
+    SceneParameters,
     /// So many, whatever the robot.
     Of(usize),
 }
@@ -38,8 +49,28 @@ impl Extent {
             Extent::Frames => frames,
             Extent::DriveStates => drive_states(model),
             Extent::Drives => model.drives.len(),
+            Extent::BaseParameters => model.base_parameters.of_forces.len(),
+            Extent::SupportParameters => model.base_parameters.of_support.len(),
+            Extent::RegressorEntries => model.base_parameters.of_forces.iter().map(|p| p.rows.len()).sum(),
+            Extent::LinkParameters => {
+                let single = model.bodies.iter().filter(|body| body.joint.kind.is_single()).count();
+                PER_BODY * model.bodies.len() + model.base_parameters.joint_parameters.len() * single
+            }
+            Extent::SceneParameters => model.base_parameters.of_scene.len(),
             Extent::Of(n) => n,
         }
+    }
+
+    /// Whether it counts base parameters, or what they are made of.
+    pub fn is_of_base_parameters(self) -> bool {
+        matches!(
+            self,
+            Extent::BaseParameters
+                | Extent::SupportParameters
+                | Extent::RegressorEntries
+                | Extent::LinkParameters
+                | Extent::SceneParameters
+        )
     }
 }
 
@@ -136,6 +167,8 @@ pub enum Form {
     MassMatrix,
     /// The derivatives of inverse dynamics, in a form of their own.
     Derivatives,
+    /// Regressors, in a form of their own, whose frames are those that base parameters are given in.
+    Regressor,
     /// Bias forces and the mass matrix, each in its own form.
     Both,
     /// The motion that both make: whichever pair of forms takes the least.

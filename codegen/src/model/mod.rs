@@ -176,6 +176,7 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
         gravity: vector(gravity),
         frames: assembly.frames,
         drives: Vec::new(),
+        base_parameters: Default::default(),
     };
     if !diagnostics.has_errors() {
         check::singular(&model, &assembly.joint_places, diagnostics);

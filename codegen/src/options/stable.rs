@@ -22,6 +22,7 @@ use crate::scene::{
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::time::Duration;
+use straightline_core::base_parameters::JointParameter;
 use straightline_core::contact::Coordinate;
 use straightline_graph::certify::Effort;
 use straightline_graph::schedule::ScheduleLimits;
@@ -138,7 +139,7 @@ fields! {
         "outputs": outputs, "by_columns": by_columns, "gravity": gravity, "base": base, "locked": locked,
         "payload": payloads, "drive": drives, "flexible": flexible, "support": support, "zero": zero,
         "effects": effects, "parameter": parameters, "contacts": contacts, "staged": staged, "budget": budgets,
-        "ranges": ranges, .. places
+        "ranges": ranges, "regressor": regressor, .. places
     }
     Selection = { "joints": joints, "frames": frames, "part": part, "results": results, }
     Payload : { "name": name, "frame": frame, "mass": mass, "com": com, "inertia": inertia, }
@@ -247,6 +248,7 @@ printed! { bool usize f64 Duration }
 worded! {
     String: text => &format!("{text:?}");
     ResultPart: part => &part.word();
+    JointParameter: parameter => parameter.word();
     ContactFunction: function => function.name();
     Coordinate: coordinate => coordinate.name();
     EnvironmentKind: kind => EnvironmentKind::WORDS.iter().find(|w| w.1 == *kind).expect("every kind has a word").0;

@@ -72,6 +72,7 @@ fn chosen(
     let both = |choice: FreeTerms| robot.reduced_by(&choice, &choice);
     match function.spec().form {
         Form::Plain => robot.clone(),
+        Form::Regressor => both(search(function)),
         Form::InverseDynamics => both(search(InverseDynamics)),
         Form::BiasForce => both(search(BiasForce)),
         Form::MassMatrix => both(search(MassMatrix)),
@@ -387,10 +388,12 @@ fn improved(
         depth[i] = body.parent.map_or(0, |p| depth[p] + 1);
     }
     // the unit would have to be known where gravity or parameters are made
-    let fixed_unit = !forms.unit || options.scene.gravity == Gravity::Input || options.scene.has_loads();
-    let origins = (forms.origins && !options.scene.has_loads()).then_some(usize::from(forms.stays));
+    let is_regressor = function.spec().form == Form::Regressor;
+    let has_known_frames = options.scene.has_loads() || is_regressor;
+    let fixed_unit = !forms.unit || options.scene.gravity == Gravity::Input || has_known_frames;
+    let origins = (forms.origins && !has_known_frames).then_some(usize::from(forms.stays));
     let ((moves, major), angle_sums) = (moves(options, forms, function), optimisations.angle_sums);
-    let meets = function.spec().form == Form::Derivatives;
+    let meets = matches!(function.spec().form, Form::Derivatives | Form::Regressor);
     let ways = Ways { moves, major, origins, depth, fixed_unit, angle_sums, meets };
     let mut best = (plain, NEVER);
     for choice in [first, best.0.clone()].iter().chain(known) {

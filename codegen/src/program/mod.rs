@@ -72,6 +72,7 @@ pub fn checked(
     function: Function,
     options: &Options,
 ) -> Result<TracedProgram, Disagreement> {
+    let robot = &robot.clone().knowing_base_parameters(&[function], &options.scene);
     let ((graph, method), plainer) = options.optimisations().first_that_agrees(|optimisations| {
         let (graph, method) = optimised_with(robot, frames, function, options, optimisations);
         let made = (sines::with_sines(graph, function, &robot.model, options), method);
@@ -89,6 +90,7 @@ pub fn optimised(
     options: &Options,
     optimisations: Optimisations,
 ) -> Graph {
+    let robot = &robot.clone().knowing_base_parameters(&[function], &options.scene);
     optimised_with(robot, frames, function, options, optimisations).0
 }
 
@@ -138,7 +140,7 @@ fn optimised_with(
     let same_method = Options { forward_dynamics: same_method, ..options.clone() };
     let of_bodies = Optimisations { reduced: false, ..optimisations };
     let has_bodies_form = matches!(function.spec().family, Family::Robot | Family::Derivatives);
-    if has_bodies_form && !matches!(function.spec().form, Form::Plain | Form::Derivatives) {
+    if has_bodies_form && !matches!(function.spec().form, Form::Plain | Form::Derivatives | Form::Regressor) {
         let (counts, ..) = candidate(robot, frames, function, &same_method, of_bodies);
         if price(counts) < price(graph.counts()) {
             return (finished(robot, &same_method, of_bodies).0, choice);

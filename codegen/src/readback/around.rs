@@ -6,6 +6,7 @@ use super::tokens::{self as t, TokenKind, Words};
 use super::ReadingStop;
 use crate::choices::Lanes;
 use crate::emit::Generated;
+use crate::function::{base_parameter_lists, BaseParameterList, Function};
 use crate::identifier::string_literals;
 use crate::options::stable::fnv_1a;
 use rustc_hash::FxHashMap;
@@ -134,8 +135,21 @@ impl Around<'_, '_, '_> {
             plain.push(("DRIVE_NAMES", names(drives.iter().map(|d| &d.name).collect())));
             plain.push(("DRIVE_STATES", format!("[usize; {}] = {states:?}", states.len())));
         }
+        let mut plain: Vec<(String, String)> =
+            plain.into_iter().map(|(name, value)| (name.to_string(), value)).collect();
+        let functions: Vec<Function> = generated.items.iter().map(|item| item.function).collect();
+        let lists = base_parameter_lists(model, &functions);
+        for list in &lists {
+            let own = |name: &str| format!("{}_{name}", list.prefix);
+            let of = |k: usize| list.places.iter().map(|place| place[k]).collect::<Vec<usize>>();
+            let sizes = |x: Vec<usize>| format!("[usize; {}] = {x:?}", x.len());
+            plain.push((own("PARAMETER_COUNT"), format!("usize = {}", list.names.len())));
+            plain.push((own("PARAMETER_NAMES"), names(list.names.iter().collect())));
+            plain.push((own("REGRESSOR_ROWS"), sizes(of(0))));
+            plain.push((own("REGRESSOR_COLUMNS"), sizes(of(1))));
+        }
         for (name, value) in plain {
-            self.is(root, Sort::Constant, name, &format!("pub const {name}: {value};"))?;
+            self.is(root, Sort::Constant, &name, &format!("pub const {name}: {value};"))?;
         }
         let single: Vec<&Limits> = joints.iter().filter(|j| j.kind.is_single()).map(|j| &j.limits).collect();
         let of = |number: fn(&Limits) -> f64| single.iter().map(|l| number(l)).collect::<Vec<f64>>();
@@ -149,6 +163,10 @@ impl Around<'_, '_, '_> {
         for (name, values) in limits {
             let of_scalar = |x: f64| scalar.rounded(x);
             self.numbers(name, scalar, &[values.len()], &values, &|found, x| found == of_scalar(x))?;
+        }
+        for BaseParameterList { prefix, values, .. } in &lists {
+            let name = format!("{prefix}_PARAMETERS");
+            self.numbers(&name, scalar, &[values.len()], values, &|found, x| found == scalar.rounded(x))?;
         }
         for (function, figures) in &generated.report.functions {
             let name = format!("{}_COST", function.to_uppercase());

@@ -88,8 +88,13 @@ enum ItemKind {
 
 /// The stops of a scene for a robot, `whole` as its file has it: first the empty scene, last the scene itself.
 pub fn stops(whole: &Model<Dd>, scene: &Scene) -> Vec<SceneStop> {
-    // drives belong to the robot, wherever they are written
-    let mut now = Scene { places: scene.places.clone(), drives: scene.drives.clone(), ..Scene::default() };
+    // drives belong to the robot, wherever they are written, and columns to a regressor
+    let mut now = Scene {
+        places: scene.places.clone(),
+        drives: scene.drives.clone(),
+        regressor: scene.regressor.clone(),
+        ..Scene::default()
+    };
     let mut stops: Vec<SceneStop> = robot_in(whole, &now)
         .map(|(robot, scene)| SceneStop { what: ItemKind::Text(String::new()), scene, robot })
         .into_iter()
@@ -100,6 +105,11 @@ pub fn stops(whole: &Model<Dd>, scene: &Scene) -> Vec<SceneStop> {
         stops.extend(robot_in(whole, &now).map(|(robot, scene)| SceneStop { what, scene, robot }));
     }
     stops
+}
+
+/// Whether there is such a function at a stop.
+fn has_function(function: Function, stop: &SceneStop) -> bool {
+    function.is_of(&stop.robot.model) && (!function.is_of_scene_parameters() || stop.scene.has_loads())
 }
 
 /// The waterfall of a function. `frames` are those of the final program, `last` its counts.
@@ -113,7 +123,7 @@ pub fn waterfall(
     // frames that only the scene names are those of every stop
     let frames = if frames.is_empty() { options.scene.frames_of(function, frames) } else { frames };
     // a robot may have a function only as its scene has it, as where drives of several joints are left with one
-    let stops: Vec<&SceneStop> = stops.iter().filter(|stop| function.is_of(&stop.robot.model)).collect();
+    let stops: Vec<&SceneStop> = stops.iter().filter(|stop| has_function(function, stop)).collect();
     if stops.is_empty() {
         return Waterfall { plain: last, full: last, savings: Vec::new() };
     }

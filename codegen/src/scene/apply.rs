@@ -10,6 +10,7 @@ use crate::model::geometry::{about, compose, turned, vector};
 use crate::model::merge::{merge, Part};
 use crate::model::{angle, drives};
 use straightline_core::algorithms::composing_pays;
+use straightline_core::base_parameters::JointParameter;
 use straightline_core::drive::{Drive, Rotor};
 use straightline_core::model::{self, Body, BodyId, Frame, JointEffects, Model};
 use straightline_core::spatial::{SpatialInertia, Sym3, Transform, Vec3};
@@ -43,7 +44,15 @@ pub fn apply(model: Model<Dd>, scene: &Scene, diagnostics: &mut Diagnostics) -> 
     }
     for body in &mut model.bodies {
         body.effects = wanted_effects(&body.effects, &scene.effects);
+        // friction that is to be found has its form, too
+        let finds_friction = scene.regressor.contains(&JointParameter::Coulomb);
+        if let (true, model::Coulomb::Off, CoulombForm::Smooth(speed)) =
+            (finds_friction, body.effects.coulomb, scene.effects.coulomb)
+        {
+            body.effects.coulomb = model::Coulomb::Smooth { force: Dd::ZERO, speed: Dd::from(speed) };
+        }
     }
+    model.base_parameters.joint_parameters.clone_from(&scene.regressor);
     for drive in &mut model.drives {
         if !scene.effects.elastic_transmissions {
             *drive = drives::stiffened(drive);

@@ -70,6 +70,8 @@ pub const CODES: &[&str] = &[
     "contact-on-world",
     "loop-on-one-body",
     "function-not-of-robot",
+    "function-not-of-scene",
+    "regressor-unused",
     "number-beyond-scalar",
     "program-beyond-scalar",
 ];
@@ -612,6 +614,20 @@ pub fn loop_on_one_body(owner: &str) -> D {
     D::error("loop-on-one-body", format!("{owner}: both frames belong to the same body"))
         .detail("no joint between them can move")
         .help("name frames of two bodies")
+}
+
+/// A function of bodies that are inputs, where none is.
+pub fn function_not_of_scene(function: &str) -> D {
+    D::error("function-not-of-scene", format!("this scene has no function `{function}`"))
+        .detail("it is about payloads and links whose inertia is an input, and there is none")
+        .help("add one, as in `[[parameter]] kind = \"payload\" name = \"gripper\" frame = \"tool\"`")
+}
+
+/// Columns of regressors where none is made.
+pub fn regressor_unused(functions: &[&str]) -> D {
+    D::error("regressor-unused", "no function has these columns")
+        .detail(format!("they belong to {}, which are made where they are named", list(functions)))
+        .help("name one, as in `functions = [\"torque_regressor\"]` under `[outputs]`, or leave `[regressor]` out")
 }
 
 /// A function about something that the robot does not have.

@@ -26,6 +26,7 @@ use crate::diagnostic::Diagnostic;
 use crate::function::{Function, SelectedRows};
 use crate::model::ModelOptions;
 use std::collections::BTreeMap;
+use straightline_core::base_parameters::JointParameter;
 use straightline_core::model::Model;
 use straightline_graph::expr::Port;
 
@@ -54,6 +55,8 @@ pub struct Scene {
     pub zero: Zero,
     /// Which effects beside rigid bodies are in.
     pub effects: Effects,
+    /// What of joints has columns in regressors, beside the bodies.
+    pub regressor: Vec<JointParameter>,
     /// What stays an input of the generated functions.
     pub parameters: Vec<Parameter>,
     /// What the robot touches.

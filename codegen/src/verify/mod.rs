@@ -215,7 +215,8 @@ impl At<'_> {
     fn truth(&self, case: &Case, function: Function) -> Result<Option<Vec<(Dd, f64)>>, String> {
         let (scene, model) = (&case.options.scene, &self.model);
         let names = scene.frames_of(function, case.frames);
-        let mut chapter = self.chapter.clone().with_frames(names)?.with_rows(scene.rows_of(function));
+        let chapter = self.chapter.clone().with_frames(names)?.with_rows(scene.rows_of(function));
+        let mut chapter = chapter.with_base_parameters(model);
         if case.coordinates.are_all() {
             chapter = chapter.with_drives(model);
         }

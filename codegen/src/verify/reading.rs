@@ -4,6 +4,7 @@ use super::reference_input::centre_of_mass_tree;
 use crate::description::flexible::{BaseSupport, Bending};
 use crate::description::{self, Description, Noted};
 use crate::diagnostic::{Diagnostics, Source};
+use crate::equations::Robot;
 use crate::function::truth::{Chapter, Effect};
 use crate::function::{Function, Quantity};
 use crate::model::ModelOptions;
@@ -118,18 +119,21 @@ fn elastic_springs(description: &Description, options: &ModelOptions) -> Vec<(St
 
 /// The second author's reading of a robot file without a scene, to be asked for the results of any function at any state.
 pub struct SecondReading {
+    /// The compiler's own reading, for the directions that base parameters are.
+    model: Model<Dd>,
     tree: CentreOfMassTree<Dd>,
     effects: Vec<Effect>,
 }
 
 impl SecondReading {
-    /// Reads the file again; of `model`, the compiler's own reading, it takes the places of the coordinates alone.
+    /// Reads the file again; of `model`, the compiler's own reading, it takes the places of the coordinates, and what base parameters are.
     ///
     /// # Errors
     /// The reference does not understand the file.
     pub fn new(source: &Source, model: &Model<Dd>, options: &Options) -> Result<SecondReading, String> {
         let (tree, effects) = second_reading(source, model, options)?;
-        Ok(SecondReading { tree, effects })
+        let robot = Robot::new(model.clone()).knowing_base_parameters(&[Function::TorqueRegressor], &options.scene);
+        Ok(SecondReading { model: robot.model, tree, effects })
     }
 
     /// The results of a function and their natural scales at a state; rates, forces and directions that are not given are zero.
@@ -143,6 +147,7 @@ impl SecondReading {
         state: BTreeMap<Quantity, Vec<Dd>>,
     ) -> Result<(Vec<Dd>, Vec<f64>), String> {
         let chapter = Chapter::new(&self.tree, &self.effects, state).with_frames(frames)?;
+        let chapter = chapter.with_base_parameters(&self.model);
         let results = function.truth(&chapter).ok_or("the reference has no formulation of it")?;
         let scales = function.scales(&results);
         Ok((results.iter().map(|x| x.value).collect(), scales))

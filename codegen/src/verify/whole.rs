@@ -37,6 +37,8 @@ pub(super) struct Coordinates {
     nv: usize,
     /// Number of its joints.
     all_joints: usize,
+    /// How many there are of what does not depend on which joints move.
+    others: [(Extent, usize); 5],
 }
 
 impl Coordinates {
@@ -62,7 +64,15 @@ impl Coordinates {
                 held[joint.iq] = *value;
             }
         }
-        Ok(Coordinates { q, v, joints, held, nv: whole.nv(), all_joints: all.len() })
+        let of_base = [
+            Extent::BaseParameters,
+            Extent::SupportParameters,
+            Extent::RegressorEntries,
+            Extent::LinkParameters,
+            Extent::SceneParameters,
+        ];
+        let others = of_base.map(|extent| (extent, extent.len(model, 0)));
+        Ok(Coordinates { q, v, joints, held, nv: whole.nv(), all_joints: all.len(), others })
     }
 
     /// Whether the robot of the scene moves as the whole one.
@@ -112,8 +122,10 @@ impl Coordinates {
                         let rates = self.v.iter().map(|k| self.nv + k);
                         (self.v.iter().copied().chain(rates).collect(), 2 * self.nv)
                     }
-                    Extent::DriveStates | Extent::Drives => {
-                        unreachable!("no function has such results")
+                    other => {
+                        let known = self.others.iter().find(|(extent, _)| extent == other);
+                        let n = known.expect("no function has other results").1;
+                        ((0..n).collect(), n)
                     }
                 };
                 block = block.iter().flat_map(|at| wanted.iter().map(move |k| at * all + k)).collect();

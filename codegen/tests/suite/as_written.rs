@@ -271,7 +271,11 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
     };
     let second = SecondReading::new(source, &model, &options);
     let second = second.unwrap_or_else(|why| panic!("what the compiler takes the second author refuses: {why}"));
-    let of_bodies = |f: &Function| !f.spec().family.is_of_drives();
+    // without a scene no body is an input, and what forces are of the links' parameters is a law, which `regressors::` asks
+    let of_bodies = |f: &Function| {
+        let of_scene = f.is_of_scene_parameters() || f.spec().inputs.contains(&Quantity::LinkParameters);
+        !f.spec().family.is_of_drives() && !of_scene
+    };
     let mut functions: Vec<Function> = Function::known().filter(of_bodies).collect();
     if !singular_joints(&model, Inertia::OfLinks).is_empty() {
         functions.retain(|f| !f.spec().solves && f.spec().divisor != Divisor::MassOfEach);

@@ -42,6 +42,11 @@ fn compare_file(page: &str, printed: &str) {
 fn axis(extent: Extent) -> String {
     match extent {
         Extent::Positions => "NQ".to_string(),
+        Extent::BaseParameters => "BASE_PARAMETER_COUNT".to_string(),
+        Extent::SupportParameters => "SUPPORT_PARAMETER_COUNT".to_string(),
+        Extent::RegressorEntries => "entries".to_string(),
+        Extent::LinkParameters => "10 per link".to_string(),
+        Extent::SceneParameters => "10 per body".to_string(),
         Extent::Velocities => "NV".to_string(),
         Extent::State => "2 NV".to_string(),
         Extent::Joints => "joints".to_string(),

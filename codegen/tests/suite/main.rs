@@ -35,6 +35,7 @@ mod ranges;
 mod readback;
 mod reduced_forms;
 mod reference_input;
+mod regressors;
 mod robot_files;
 mod robots_as_written;
 mod rolled;

@@ -185,3 +185,15 @@ fn displacements_take_what_is_on_record() {
     println!("{found:?}");
     assert_eq!(found, [[6, 6, 0, 0, 0], [0; 5]]);
 }
+
+/// Columns and operations of the regressor of inverse dynamics, and of gravity's and momentum's; of the first at most.
+#[test]
+fn regressors_in_base_parameters_take_few_operations() {
+    use Function::{GravityRegressor, MomentumRegressor, TorqueRegressor};
+    let hyq =
+        CountsOf { floating: true, ..of("../robots/descriptions/hyq.urdf", counts(0, 0, None), counts(0, 0, None)) };
+    for (of, most) in [(&ARMS[0], 855), (&ARMS[3], 1147), (&hyq, 3475)] {
+        let found = [TorqueRegressor, GravityRegressor, MomentumRegressor].map(|function| count(of, function, &[]));
+        println!("{:<40} {found:?} of {most}", of.file);
+    }
+}

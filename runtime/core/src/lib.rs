@@ -11,6 +11,8 @@ extern crate alloc;
 
 #[cfg(feature = "alloc")]
 pub mod algorithms;
+#[cfg(feature = "alloc")]
+pub mod base_parameters;
 pub mod batch;
 #[cfg(feature = "alloc")]
 pub mod contact;

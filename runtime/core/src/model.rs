@@ -5,6 +5,7 @@
 //! about its own z, every linear joint slides along it, and what a link frame of the robot file looks like is left to
 //! [`Body::link_frame`]. A floating base keeps the root link's own frame.
 
+use crate::base_parameters::BaseParameterSets;
 use crate::dd::Dd;
 use crate::drive::Drive;
 pub use crate::joint::JointKind;
@@ -226,6 +227,8 @@ pub struct Model<T> {
     pub frames: Vec<Frame<T>>,
     /// What drives the joints, in the order of the inputs u.
     pub drives: Vec<Drive<T>>,
+    /// The parameters that columns of regressors belong to; empty where nobody looked for them.
+    pub base_parameters: BaseParameterSets,
 }
 
 impl<T: Real> Model<T> {
@@ -292,6 +295,7 @@ impl<T: Real> Model<T> {
                 .map(|x| Frame { name: x.name.clone(), body: x.body, placement: x.placement.map(&mut f) })
                 .collect(),
             drives: self.drives.iter().map(|d| d.map(&mut f)).collect(),
+            base_parameters: self.base_parameters.clone(),
         }
     }
 }

@@ -33,7 +33,14 @@ pub fn at(rotation: Mat3<f64>, x: f64) -> Transform<f64> {
 pub fn cart() -> Model<f64> {
     let along_x = Mat3 { rows: [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
     let bodies = vec![body("cart", None, JointKind::Prismatic, 0, at(along_x, 0.0))];
-    Model { name: "cart".into(), bodies, gravity: Vec3::new(0.0, 0.0, -9.81), frames: vec![], drives: vec![] }
+    Model {
+        name: "cart".into(),
+        bodies,
+        gravity: Vec3::new(0.0, 0.0, -9.81),
+        frames: vec![],
+        drives: vec![],
+        base_parameters: Default::default(),
+    }
 }
 
 /// Three joints about skew axes, with rotors, friction and springs.
@@ -54,7 +61,14 @@ pub fn arm() -> Model<f64> {
         };
     }
     let tip = Frame { name: "tip".into(), body: Some(2), placement: at(Mat3::identity(), 0.4) };
-    Model { name: "arm".into(), bodies, gravity: Vec3::new(0.0, 0.0, -9.81), frames: vec![tip], drives: vec![] }
+    Model {
+        name: "arm".into(),
+        bodies,
+        gravity: Vec3::new(0.0, 0.0, -9.81),
+        frames: vec![tip],
+        drives: vec![],
+        base_parameters: Default::default(),
+    }
 }
 
 /// A motor that drives these joints by these ratios, without anything else.

@@ -46,6 +46,7 @@ fn block() -> Model<f64> {
         gravity: Vec3::new(0.0, 0.0, -G),
         frames: vec![Frame { name: "sole".into(), body: Some(1), placement: Transform::identity() }],
         drives: vec![],
+        base_parameters: Default::default(),
     }
 }
 
@@ -63,7 +64,14 @@ fn pendulum(links: usize) -> Model<f64> {
     }
     let end = Transform { rotation: Mat3::identity(), translation: Vec3::new(1.0, 0.0, 0.0) };
     let frames = vec![Frame { name: "end".into(), body: Some(links - 1), placement: end }];
-    Model { name: "pendulum".into(), bodies, gravity: Vec3::new(0.0, 0.0, -G), frames, drives: vec![] }
+    Model {
+        name: "pendulum".into(),
+        bodies,
+        gravity: Vec3::new(0.0, 0.0, -G),
+        frames,
+        drives: vec![],
+        base_parameters: Default::default(),
+    }
 }
 
 fn floor(model: &Model<f64>) -> Touch {

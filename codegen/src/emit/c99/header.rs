@@ -3,6 +3,7 @@
 use super::c_comment;
 use super::interface::{CParameter, Exported, Interface, LAYOUTS};
 use crate::emit::doc::relinked;
+use crate::function::base_parameter_lists;
 use std::fmt::Write;
 use straightline_graph::expr::Port;
 
@@ -35,6 +36,14 @@ impl Interface<'_> {
             };
             let _ = writeln!(out, " *   {:>3} {:>3}  {}, {kind}", joint.iq, joint.iv, c_comment(&joint.name));
         }
+        let of_robot: Vec<_> = self.generated.items.iter().map(|item| item.function).collect();
+        let lists = base_parameter_lists(model, &of_robot);
+        for list in &lists {
+            let _ = writeln!(out, " * Base parameters of {}, with their values:", list.what);
+            for (i, (name, value)) in list.names.iter().zip(&list.values).enumerate() {
+                let _ = writeln!(out, " *   {i:>3}  {} = {value:e}", c_comment(name));
+            }
+        }
         out.push_str(" * Frames:\n");
         for (i, frame) in self.generated.frames.iter().enumerate() {
             let _ = writeln!(out, " *   {i:>3}  {}", c_comment(frame));
@@ -52,7 +61,7 @@ impl Interface<'_> {
 #define {upper}_NV {nv}
 #define {upper}_JOINT_COUNT {joints}
 #define {upper}_FRAME_COUNT {frames}
-{include}
+{counts}{include}
 #ifdef __cplusplus
 extern "C" {{
 #endif
@@ -69,6 +78,10 @@ const char *{prefix}_frame_name(int i);
 "#,
             joints = model.bodies.len(),
             frames = self.generated.frames.len(),
+            counts = lists
+                .iter()
+                .map(|list| format!("#define {upper}_{}_PARAMETER_COUNT {}\n", list.prefix, list.names.len()))
+                .collect::<String>(),
             include = if self.generated.lanes.is_some() { "\n#include <stddef.h>\n" } else { "" },
         );
         if self.generated.lanes.is_some() {

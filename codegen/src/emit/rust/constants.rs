@@ -3,6 +3,7 @@
 use super::{number, ALLOW};
 use crate::choices::Choice;
 use crate::emit::Generated;
+use crate::function::{base_parameter_lists, BaseParameterList, Function};
 use crate::identifier::{comment, string_literals};
 use crate::report::errors::four_digits;
 use crate::report::FunctionReport;
@@ -114,6 +115,52 @@ pub(super) fn of_robot(generated: &Generated) -> Vec<AssociatedConstant> {
                 "How many entries of x each drive has.",
             ),
         ]);
+    }
+    constants.extend(of_base_parameters(generated));
+    constants
+}
+
+/// How many base parameters there are, their names and values, and where they stand in the regressor.
+fn of_base_parameters(generated: &Generated) -> Vec<AssociatedConstant> {
+    let functions: Vec<Function> = generated.items.iter().map(|item| item.function).collect();
+    let mut constants = Vec::new();
+    for BaseParameterList { prefix, what, names, values, places } in base_parameter_lists(&generated.model, &functions)
+    {
+        let n = names.len();
+        let (count, all) = (format!("{prefix}_PARAMETER_COUNT"), format!("{prefix}_PARAMETER_NAMES"));
+        let size = AssociatedConstant::new(
+            count,
+            ConstantType::Size,
+            n.to_string(),
+            format!("Number of the combinations of inertial parameters that {what} tells apart.")
+                .replace("forces tells", "forces tell"),
+        );
+        let doc = "What each of them is: m, mx, my, mz (mass, first moment) and Ixx, Ixy, Ixz, Iyy, Iyz, Izz (inertia) about the link's origin, in the axes of the \
+                   link; J, d, f, o, k (rotor inertia, damping, Coulomb friction, offset, stiffness) of the joint; each of the link and joint of that \
+                   number, counted from 1 in the order of [`JOINT_NAMES`], the link with all that is fixed to it. Four digits of factors; \
+                   the generated functions have all.";
+        let literals = format!("[{}]", string_literals(names.iter().map(String::as_str)));
+        let names = AssociatedConstant::new(all, ConstantType::Names(n), literals, doc);
+        let numbers: Vec<String> = values.iter().map(|x| number(*x, generated.scalar)).collect();
+        let values = AssociatedConstant::new(
+            format!("{prefix}_PARAMETERS"),
+            ConstantType::Numbers(generated.scalar, vec![n]),
+            format!("[{}]", numbers.join(", ")),
+            "Their values \\[kg, kg·m, kg·m²; of joints as their parameters\\], without bodies that are inputs.",
+        );
+        constants.extend([size, names, values]);
+        for (k, word) in ["ROWS", "COLUMNS"].into_iter().enumerate() {
+            let list: Vec<usize> = places.iter().map(|place| place[k]).collect();
+            constants.push(AssociatedConstant::new(
+                format!("{prefix}_REGRESSOR_{word}"),
+                ConstantType::Sizes(list.len()),
+                format!("{list:?}"),
+                format!(
+                    "{} of the entries of the regressor that are not zero everywhere, column by column.",
+                    ["Rows", "Columns"][k]
+                ),
+            ));
+        }
     }
     constants
 }

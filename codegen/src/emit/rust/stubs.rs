@@ -32,9 +32,9 @@ impl __Stub for __Why<0> {
 ";
 
 /// Lengths of arrays.
-const LENGTHS: [&str; 4] = ["NQ", "NV", "NU", "NX"];
+const LENGTHS: [&str; 6] = ["NQ", "NV", "NU", "NX", "BASE_PARAMETER_COUNT", "SUPPORT_PARAMETER_COUNT"];
 /// Further constants of a robot.
-const CONSTANTS: [&str; 8] = [
+const CONSTANTS: [&str; 16] = [
     "JOINT_NAMES",
     "FRAME_NAMES",
     "LOWER_LIMITS",
@@ -43,6 +43,14 @@ const CONSTANTS: [&str; 8] = [
     "EFFORT_LIMITS",
     "DRIVE_NAMES",
     "DRIVE_STATES",
+    "BASE_PARAMETER_NAMES",
+    "BASE_PARAMETERS",
+    "BASE_REGRESSOR_ROWS",
+    "BASE_REGRESSOR_COLUMNS",
+    "SUPPORT_PARAMETER_NAMES",
+    "SUPPORT_PARAMETERS",
+    "SUPPORT_REGRESSOR_ROWS",
+    "SUPPORT_REGRESSOR_COLUMNS",
 ];
 
 /// The functions of a self-test.

@@ -92,7 +92,7 @@ impl<'a, 'b> MovingJoints<'a, 'b> {
     }
 
     /// H⁻¹ b of the joints that move, and zeros.
-    pub(super) fn solved(&self, right: &[Magnitude]) -> Vec<Magnitude> {
+    pub fn solved(&self, right: &[Magnitude]) -> Vec<Magnitude> {
         let own = DVector::from_vec(self.of_moving(right));
         let mut whole = vec![Magnitude::zero(); self.at.qd().len()];
         let x = solved(&self.h, &own, reference::solve_symmetric::<Dd>);
@@ -105,7 +105,7 @@ impl<'a, 'b> MovingJoints<'a, 'b> {
         self.at.qd().len()
     }
 
-    pub(super) fn of_moving(&self, x: &[Magnitude]) -> Vec<Magnitude> {
+    pub fn of_moving(&self, x: &[Magnitude]) -> Vec<Magnitude> {
         self.moving.iter().map(|i| x[*i]).collect()
     }
 

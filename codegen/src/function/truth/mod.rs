@@ -19,6 +19,7 @@ mod forward_derivatives;
 mod frame_forces;
 mod kinematics;
 mod motion_derivatives;
+mod regressors;
 mod steps;
 mod tangent;
 mod tasks;
@@ -69,6 +70,8 @@ pub struct Chapter<'a> {
     moving: Option<&'a [usize]>,
     /// Whose drives are meant, with the numbers of their shafts.
     drives: Option<&'a Model<Dd>>,
+    /// The robot whose base parameters are meant.
+    robot: Option<&'a Model<Dd>>,
     state: BTreeMap<Quantity, Vec<Magnitude>>,
 }
 
@@ -102,7 +105,8 @@ impl<'a> Chapter<'a> {
                 }
             }
         }
-        Chapter { tree, frames: Vec::new(), rows: SelectedRows::ALL, effects, moving: None, drives: None, state: sized }
+        let rows = SelectedRows::ALL;
+        Chapter { tree, frames: Vec::new(), rows, effects, moving: None, drives: None, robot: None, state: sized }
     }
 
     /// The same with these frames asked for.
@@ -140,6 +144,12 @@ impl<'a> Chapter<'a> {
     #[must_use]
     pub fn with_drives(self, model: &'a Model<Dd>) -> Self {
         Chapter { drives: Some(model), ..self }
+    }
+
+    /// The same with the base parameters of a model, whose bodies are links of the tree, by their names.
+    #[must_use]
+    pub fn with_base_parameters(self, model: &'a Model<Dd>) -> Self {
+        Chapter { robot: Some(model), ..self }
     }
 
     /// What the state has of a quantity.

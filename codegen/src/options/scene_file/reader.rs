@@ -17,11 +17,23 @@ use crate::scene::{
 };
 use options::options_of;
 use std::ops::Range;
+use straightline_core::base_parameters::JointParameter;
 use toml::de::DeValue;
 
 /// The tables of which there is one each, beside [`LISTS`].
-const TABLES: &[&str] =
-    &["stabilisation", "outputs", "hold", "zero", "effects", "support", "numbers", "budget", "options", "diagnostics"];
+const TABLES: &[&str] = &[
+    "stabilisation",
+    "outputs",
+    "hold",
+    "zero",
+    "effects",
+    "regressor",
+    "support",
+    "numbers",
+    "budget",
+    "options",
+    "diagnostics",
+];
 const BUDGET: &[&str] = &[
     "max_flops",
     "max_sincos",
@@ -75,11 +87,12 @@ struct SceneReader<'a> {
 impl<'a> SceneReader<'a> {
     fn read(&mut self, top: &TomlTable) {
         self.reader.check_keys(top, &[LISTS, TABLES].concat());
-        let tables: [(&str, TableReading<'a>); 8] = [
+        let tables: [(&str, TableReading<'a>); 9] = [
             ("outputs", Self::outputs),
             ("hold", Self::hold),
             ("zero", Self::zero),
             ("effects", Self::effects),
+            ("regressor", Self::regressor),
             ("numbers", Self::numbers),
             ("budget", Self::budgets),
             ("diagnostics", Self::diagnostics),
@@ -291,6 +304,16 @@ impl<'a> SceneReader<'a> {
             elastic_transmissions,
             elastic_links,
         };
+    }
+
+    /// What of joints has columns, beside the bodies.
+    fn regressor(&mut self, table: &TomlTable) {
+        self.note("regressor", &table.span);
+        self.reader.check_keys(table, &JointParameter::ALL.map(|(_, key, _)| key));
+        for (parameter, key, _) in JointParameter::ALL {
+            let is_wanted = self.reader.flag_at(table, key).is_some_and(|flag| flag.value);
+            self.file.scene.regressor.extend(is_wanted.then_some(parameter));
+        }
     }
 
     fn parameter(&mut self, table: TomlTable) {

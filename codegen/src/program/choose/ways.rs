@@ -2,7 +2,7 @@
 
 use crate::equations::reduce::{lengths, longest_lever, reduce, FreeTerms};
 use crate::equations::Robot;
-use crate::function::Function;
+use crate::function::{Form, Function};
 use crate::options::{FormChoices, Options};
 use straightline_core::reduced::Meeting;
 use straightline_core::Dd;
@@ -17,7 +17,10 @@ pub(super) type FormMove = Box<dyn Fn(&mut FreeTerms, usize)>;
 pub(super) fn moves(options: &Options, forms: FormChoices, function: Function) -> (Vec<FormMove>, usize) {
     type Flags = fn(&mut FreeTerms) -> &mut Vec<bool>;
     // the frames in which parameters are given would have to be known where they are made
-    let frames = !options.scene.has_loads();
+    let is_regressor = function.spec().form == Form::Regressor;
+    let frames = !options.scene.has_loads() && !is_regressor;
+    // a regressor is of all distributions of the same mass
+    let parameters = forms.parameters && !is_regressor;
     // ways to form moments, of which H has none
     let rotations = forms.rotations && function != Function::MassMatrix;
     let all: [(bool, Flags); 13] = [
@@ -28,7 +31,7 @@ pub(super) fn moves(options: &Options, forms: FormChoices, function: Function) -
         (forms.tips && frames, |c| &mut c.turned_tips[2]),
         (forms.tips && frames, |c| &mut c.shifted_tips[0]),
         (forms.tips && frames, |c| &mut c.shifted_tips[1]),
-        (forms.parameters, |c| &mut c.regrouped),
+        (parameters, |c| &mut c.regrouped),
         (rotations, |c| &mut c.by_axis_acceleration),
         (rotations, |c| &mut c.by_accelerations[0]),
         (rotations, |c| &mut c.by_accelerations[1]),
@@ -36,14 +39,14 @@ pub(super) fn moves(options: &Options, forms: FormChoices, function: Function) -
         (rotations, |c| &mut c.doubled[1]),
     ];
     let minor: [(bool, Flags); 4] = [
-        (forms.parameters, |c| &mut c.axial_balances[0]),
-        (forms.parameters, |c| &mut c.axial_balances[1]),
+        (parameters, |c| &mut c.axial_balances[0]),
+        (parameters, |c| &mut c.axial_balances[1]),
         (rotations, |c| &mut c.turns_sums),
         (rotations, |c| &mut c.other_acceleration),
     ];
     let flip = |(_, flag): (bool, Flags)| Box::new(move |c: &mut FreeTerms, i: usize| flag(c)[i] ^= true) as FormMove;
     let mut moves: Vec<FormMove> = all.into_iter().filter(|(free, _)| *free).map(flip).collect();
-    for (kind, component) in (0..9).map(|k| (k / 3, k % 3)).filter(|_| forms.parameters) {
+    for (kind, component) in (0..9).map(|k| (k / 3, k % 3)).filter(|_| parameters) {
         moves.push(Box::new(move |c: &mut FreeTerms, i: usize| {
             let vanishes = &mut c.vanish_at_parent[kind][i];
             *vanishes = if *vanishes == Some(component) { None } else { Some(component) };

@@ -276,9 +276,14 @@ impl<'g> CAround<'g> {
     pub fn header(&self, header: &CText<'_>, source: &CText<'_>, functions: &Definitions<'_>) -> CReading<()> {
         let (u, g) = (&self.upper, self.generated);
         let mut at = 0;
+        let of_robot: Vec<_> = g.items.iter().map(|item| item.function).collect();
+        let counts: String = crate::function::base_parameter_lists(&g.model, &of_robot)
+            .iter()
+            .map(|list| format!("#define {u}_{}_PARAMETER_COUNT {} ", list.prefix, list.names.len()))
+            .collect();
         let head = format!(
             "#ifndef {u}_DYNAMICS_H #define {u}_DYNAMICS_H #define {u}_NQ {} #define {u}_NV {} #define {u}_JOINT_COUNT {} \
-             #define {u}_FRAME_COUNT {} #ifdef __cplusplus extern \"C\" {{ #endif",
+             #define {u}_FRAME_COUNT {} {counts} #ifdef __cplusplus extern \"C\" {{ #endif",
             g.model.nq(),
             g.model.nv(),
             g.model.bodies.len(),

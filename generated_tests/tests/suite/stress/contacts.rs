@@ -44,6 +44,7 @@ fn robot(bodies: Vec<Body<f64>>, frames: Vec<(usize, Transform<f64>)>, gravity: 
         gravity,
         frames: frames.into_iter().enumerate().map(frame).collect(),
         drives: vec![],
+        base_parameters: Default::default(),
     }
 }
 

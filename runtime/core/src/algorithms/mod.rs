@@ -30,6 +30,7 @@
 //!     gravity: Vec3::new(0.0, 0.0, -10.0),
 //!     frames: vec![],
 //!     drives: vec![],
+//!     base_parameters: Default::default(),
 //! };
 //! let (q, qd, qdd) = ([0.0], [3.0], [4.0]);
 //! assert_eq!(mass_matrix(&pendulum, &q), [0.5]); // m l²
@@ -54,6 +55,7 @@
 //! | inputs of drives for a motion | [`driven_inverse`](fn@driven_inverse) |
 //! | centre of mass, momentum | [`momentum`](fn@momentum) |
 //! | mass and centre of mass behind each joint | [`subtrees`] |
+//! | forces, momentum, energy and the support's wrench per unit of the parameters | [`torque_regressor`], [`gravity_regressor`], [`momentum_regressor`], [`energy_regressor`], [`base_wrench_regressor`] |
 //! | what moves both | [`centre_of_mass_jacobian`], [`centroidal_map`], [`centroidal_dynamics_derivatives`] |
 //! | contact coordinates, (20.83)-(20.87) | [`relative_motion`], [`functional_coordinates`] |
 //! | motion and reactions in contact, (20.88)-(20.94) | [`constrained_forward_dynamics`], [`hybrid_inverse_dynamics`], [`Environment`] |
@@ -87,7 +89,9 @@ mod reduced_derivatives;
 mod reduced_dynamics;
 mod reduced_gravity;
 mod reduced_mass_matrix;
+mod reduced_regressor;
 mod reduced_turn;
+mod regressor;
 mod rnea;
 mod subtree;
 mod tangent;
@@ -134,6 +138,11 @@ pub use reduced_derivatives::{reduced_inverse_dynamics_derivatives, DerivativeBl
 pub use reduced_dynamics::{reduced_inverse_dynamics, reduced_inverse_dynamics_with_limbs, LimbWrenches};
 pub use reduced_gravity::{reduced_gravity_force, reduced_gravity_force_with_limbs, LimbMoments};
 pub use reduced_mass_matrix::reduced_mass_matrix;
+pub use reduced_regressor::reduced_inertial_regressor;
+pub use regressor::{
+    base_wrench_regressor, energy_regressor, gravity_regressor, inertial_regressor, momentum_regressor,
+    put_joint_columns, support_wrenches, torque_regressor, unit_energies,
+};
 pub use rnea::{bias_force, gravity_force, inverse_dynamics, joint_wrenches, velocity_force};
 pub use subtree::{subtrees, CarriedMass};
 pub use tangent::{

@@ -59,16 +59,16 @@ impl<T: Real> DerivativeBlocks<T> {
 }
 
 /// A motion of the robot, with the ways of vectors and levers between its bodies.
-struct MotionSweep<'a, T> {
-    model: &'a ReducedModel<T>,
-    turns: Vec<Turn<T>>,
-    links: Vec<DescribedMotion<T>>,
-    q: &'a [T],
-    qd: &'a [T],
+pub(super) struct MotionSweep<'a, T> {
+    pub model: &'a ReducedModel<T>,
+    pub turns: Vec<Turn<T>>,
+    pub links: Vec<DescribedMotion<T>>,
+    pub q: &'a [T],
+    pub qd: &'a [T],
 }
 
 impl<T: Real> MotionSweep<'_, T> {
-    fn body(&self, i: BodyId) -> &ReducedBody<T> {
+    pub fn body(&self, i: BodyId) -> &ReducedBody<T> {
         &self.model.bodies[i]
     }
 
@@ -78,12 +78,12 @@ impl<T: Real> MotionSweep<'_, T> {
     }
 
     /// The way back.
-    fn to_child(&self, i: BodyId, v: Vec3<T>) -> Vec3<T> {
+    pub fn to_child(&self, i: BodyId, v: Vec3<T>) -> Vec3<T> {
         self.turns[i].parent_to_described(self.body(i), v)
     }
 
     /// A wrench about a body's origin, about that of its parent in its axes.
-    fn wrench_to_parent(&self, i: BodyId, w: &ForceVector<T>) -> ForceVector<T> {
+    pub fn wrench_to_parent(&self, i: BodyId, w: &ForceVector<T>) -> ForceVector<T> {
         let force = self.to_parent(i, w.force);
         ForceVector { moment: self.to_parent(i, w.moment) + self.links[i].arm.cross(force), force }
     }
@@ -100,7 +100,7 @@ impl<T: Real> MotionSweep<'_, T> {
     }
 
     /// A body and those that carry it, the nearest first.
-    fn path(&self, i: BodyId) -> Vec<BodyId> {
+    pub fn path(&self, i: BodyId) -> Vec<BodyId> {
         core::iter::successors(Some(i), |b| self.body(*b).parent).collect()
     }
 }

@@ -84,7 +84,7 @@ fn generalized_forces<T: Real>(model: &Model<T>, q: &[T], wrenches: &[ForceVecto
 }
 
 /// How one body moves, in its own axes.
-struct BodyMotion<T> {
+pub(super) struct BodyMotion<T> {
     /// ω \[rad/s\].
     omega: Vec3<T>,
     /// ε \[rad/s²\].
@@ -135,7 +135,7 @@ impl<T: Real> AccelerationField<T> {
 
 impl<T: Real> BodyMotion<T> {
     /// The wrench about the origin that this motion takes of a load: m a + U (m c), and vee(U Σ − (U Σ)ᵀ) + m c × a.
-    fn wrench_of(&self, load: &Load<T>) -> ForceVector<T> {
+    pub fn wrench_of(&self, load: &Load<T>) -> ForceVector<T> {
         let (u, s) = (self.field.u, load.second_moment.to_matrix());
         let us = u * s;
         let spin =
@@ -167,6 +167,23 @@ impl<T: Real> BodyMotion<T> {
     }
 }
 
+/// Where all bodies stand against their parents, and how they move: the sweep from the base to the tips.
+pub(super) fn motions<T: Real>(
+    model: &Model<T>,
+    motion: [&[T]; 3],
+    gravity: Vec3<T>,
+) -> (Vec<JointPose<T>>, Vec<BodyMotion<T>>) {
+    let poses = JointPose::all(&model.bodies, motion[0]);
+    let world = BodyMotion::of_world(gravity);
+    let mut motions: Vec<BodyMotion<T>> = Vec::with_capacity(model.bodies.len());
+    for (i, body) in model.bodies.iter().enumerate() {
+        T::section("forward", Some(i));
+        let parent = body.parent.map_or(&world, |p| &motions[p]);
+        motions.push(parent.of_child(i, body, &poses[i], motion));
+    }
+    (poses, motions)
+}
+
 /// The wrench through each joint onto its child, by body: about the origin and in the axes of the canonical frame.
 fn transmitted_wrenches<T: Real>(
     model: &Model<T>,
@@ -175,14 +192,7 @@ fn transmitted_wrenches<T: Real>(
     qdd: &[T],
     gravity: Vec3<T>,
 ) -> Vec<ForceVector<T>> {
-    let poses = JointPose::all(&model.bodies, q);
-    let world = BodyMotion::of_world(gravity);
-    let mut motions: Vec<BodyMotion<T>> = Vec::with_capacity(model.bodies.len());
-    for (i, body) in model.bodies.iter().enumerate() {
-        T::section("forward", Some(i));
-        let parent = body.parent.map_or(&world, |p| &motions[p]);
-        motions.push(parent.of_child(i, body, &poses[i], [q, qd, qdd]));
-    }
+    let (poses, motions) = motions(model, [q, qd, qdd], gravity);
 
     // −(G + F_I) = m (w_c − g) = m a + U (m c)                  (20.44), (20.46)
     // −M_I = J ε + ω × J ω, and about the joint + c × F         (20.45), (20.48)

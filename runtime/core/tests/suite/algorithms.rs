@@ -212,6 +212,7 @@ fn random_robot(seed: u64) -> Model<Dd> {
         gravity: random.vector().scale(Dd::from(9.81)),
         frames,
         drives: vec![],
+        base_parameters: Default::default(),
     }
 }
 
@@ -871,8 +872,15 @@ fn a_pendulum_swings_as_in_the_textbook() {
         load: None,
     };
     let gravity = Vec3::new(0.0, 0.0, -g).map(d);
-    let model =
-        Model { name: "pendulum".into(), bodies: vec![body], gravity, frames: vec![], drives: vec![] }.cast::<f64>();
+    let model = Model {
+        name: "pendulum".into(),
+        bodies: vec![body],
+        gravity,
+        frames: vec![],
+        drives: vec![],
+        base_parameters: Default::default(),
+    }
+    .cast::<f64>();
     let (q, qd, qdd) = (0.7, -1.5, 2.0);
     let expected = (inertia + mass * length * length) * qdd + mass * g * length * f64::sin(q);
     let tau = inverse_dynamics(&model, &[q], &[qd], &[qdd])[0];

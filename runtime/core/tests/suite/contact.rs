@@ -54,6 +54,7 @@ fn chain(n: usize) -> Model<f64> {
         gravity: Vec3::new(0.0, -GRAVITY, 0.0),
         frames: vec![Frame { name: "tip".into(), body: Some(n - 1), placement: at(1.0, 0.0, 0.0) }],
         drives: vec![],
+        base_parameters: Default::default(),
     }
 }
 
@@ -405,6 +406,7 @@ fn foot() -> Model<f64> {
         gravity: Vec3::new(0.0, 0.0, -GRAVITY),
         frames: (0..4).map(corner).collect(),
         drives: vec![],
+        base_parameters: Default::default(),
     }
 }
 

@@ -93,6 +93,7 @@ fn canonical(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Model<Dd> {
         gravity: vec3(&tree.gravity),
         frames: tree.frames.iter().map(frame).collect(),
         drives: vec![],
+        base_parameters: Default::default(),
     }
 }
 

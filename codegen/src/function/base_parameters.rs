@@ -1,0 +1,106 @@
+//! Base parameters as they are said: their names and values.
+//!
+//! A name is the sum that the parameter is, with numbers where lengths and angles are numbers: `Izz2 + 0.31*my3 + 0.0961*m3`. Figures are of links, counted from 1
+//! in the order of the joints: m, mx, my, mz of the first moment, Ixx … Izz of the inertia about the link's origin, all in the link's own axes; J, d, f,
+//! o and k of the joint.
+
+use super::{Extent, Function};
+use std::fmt::Write;
+use straightline_core::base_parameters::{BaseParameter, PER_BODY};
+use straightline_core::model::Model;
+use straightline_core::Dd;
+
+/// So many terms of a name are written out, the greatest ones; of the others their number is said.
+const TERMS: usize = 12;
+/// Of the ten parameters of a link.
+const SYMBOLS: [&str; PER_BODY] = ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
+
+/// Base parameters that a file has constants of.
+pub struct BaseParameterList {
+    /// What the names of the constants begin with.
+    pub prefix: &'static str,
+    /// What tells them apart, in words.
+    pub what: &'static str,
+    /// Their names.
+    pub names: Vec<String>,
+    /// Their values for the robot, without what a scene makes an input.
+    pub values: Vec<f64>,
+    /// Rows and columns of the entries of the regressor that are not zero everywhere, column by column.
+    pub places: Vec<[usize; 2]>,
+}
+
+/// Those of a robot that some of these functions are about.
+pub fn base_parameter_lists(model: &Model<Dd>, functions: &[Function]) -> Vec<BaseParameterList> {
+    let of = model.link_parameters();
+    let list = |prefix: &'static str, what: &'static str, parameters: &[BaseParameter]| BaseParameterList {
+        prefix,
+        what,
+        names: parameters.iter().map(|parameter| name(model, parameter)).collect(),
+        values: parameters.iter().map(|parameter| parameter.value(&of).to_f64()).collect(),
+        places: parameters.iter().enumerate().flat_map(|(k, p)| p.rows.iter().map(move |row| [*row, k])).collect(),
+    };
+    let is_wanted = |extents: &[Extent]| functions.iter().any(|f| extents.iter().any(|extent| f.has_axis(*extent)));
+    let base = &model.base_parameters;
+    let mut lists = Vec::new();
+    if is_wanted(&[Extent::BaseParameters, Extent::RegressorEntries]) {
+        lists.push(list("BASE", "generalized forces", &base.of_forces));
+    }
+    if is_wanted(&[Extent::SupportParameters]) {
+        lists.push(list("SUPPORT", "the wrench on the support", &base.of_support));
+    }
+    lists
+}
+
+/// The sum that a parameter is, its own body's terms first, the greatest factors before others.
+fn name(model: &Model<Dd>, parameter: &BaseParameter) -> String {
+    let own = &model.bodies[parameter.body].joint;
+    let rank = model.joints().iter().position(|joint| joint.iv == own.iv).unwrap_or(0);
+    let mut terms: Vec<(bool, f64, String)> = parameter
+        .terms
+        .iter()
+        .map(|(place, factor)| {
+            let (link, symbol) = symbol(model, *place);
+            (link != rank, factor.to_f64(), format!("{symbol}{}", link + 1))
+        })
+        .collect();
+    let order = |a: &(bool, f64, String), b: &(bool, f64, String)| {
+        a.0.cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())).then(a.2.cmp(&b.2))
+    };
+    terms.sort_by(order);
+    let mut out = String::new();
+    for (k, (_, factor, symbol)) in terms.iter().take(TERMS).enumerate() {
+        let sign = match (k, *factor < 0.0) {
+            (0, false) => "",
+            (0, true) => "-",
+            (_, false) => " + ",
+            (_, true) => " - ",
+        };
+        let size = factor.abs();
+        let _ = match size == 1.0 {
+            true => write!(out, "{sign}{symbol}"),
+            false => write!(out, "{sign}{}*{symbol}", four_digits(size)),
+        };
+    }
+    if terms.len() > TERMS {
+        let _ = write!(out, " + {} more", terms.len() - TERMS);
+    }
+    out
+}
+
+/// A factor to four digits.
+fn four_digits(x: f64) -> String {
+    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
+    format!("{rounded}")
+}
+
+/// Of a number of the file: the rank of its link or joint, and its symbol.
+fn symbol(model: &Model<Dd>, place: usize) -> (usize, &'static str) {
+    let links = PER_BODY * model.bodies.len();
+    if place < links {
+        return (place / PER_BODY, SYMBOLS[place % PER_BODY]);
+    }
+    let joints = model.joints();
+    let single: Vec<usize> = (0..joints.len()).filter(|k| joints[*k].kind.is_single()).collect();
+    let (kind, joint) = ((place - links) / single.len(), (place - links) % single.len());
+    (single[joint], model.base_parameters.joint_parameters[kind].symbol())
+}
