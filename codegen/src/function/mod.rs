@@ -18,7 +18,8 @@ mod spec;
 pub mod truth;
 mod whole;
 
-pub use contact::ContactFunction;
+pub use contact::{ContactExtent, ContactFunction, ContactPort, ContactSpec, InModes, PerContact};
+pub(crate) use derivatives::along;
 pub(crate) use drives::may_be_articulated;
 pub use forms::{Forms, ForwardDynamicsMethod, LimbSums};
 pub use quantity::Quantity;
