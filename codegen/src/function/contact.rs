@@ -105,27 +105,24 @@ const QDD: ContactPort = ContactPort::new("qdd", &[VELOCITIES], "accelerations \
 const FORCE: ContactPort =
     ContactPort::new("force", &[Constrained], "reactions F along s^c \\[N, or N·m of an axis\\]");
 const SDD: ContactPort = ContactPort::new("sdd", &[Constrained], "s̈^c \\[m/s² or 1/s²\\]");
-const VIOLATION: ContactPort = ContactPort::new(
-    "violation",
-    &[Constrained],
-    "s̈^c less what it should be; zero where the object gives way",
-);
+const VIOLATION: ContactPort =
+    ContactPort::new("violation", &[Constrained], "s̈^c less what it should be; zero where the object gives way");
 const PIVOT: ContactPort = ContactPort::new(
     "pivot",
     ONE,
     "least pivot against its diagonal entry: 1 for independent constraints, about 1e-12 for redundant ones",
 );
-const OWN: ContactPort = ContactPort::new("{}_own", TWO, "the object's own coordinate and its rate \\[m, m/s\\]")
-    .per(WithOwnCoordinate);
-const OWN_RATE: ContactPort = ContactPort::new("{}_own_rate", TWO, "their rates \\[m/s, m/s²\\]").per(WithOwnCoordinate);
+const OWN: ContactPort =
+    ContactPort::new("{}_own", TWO, "the object's own coordinate and its rate \\[m, m/s\\]").per(WithOwnCoordinate);
+const OWN_RATE: ContactPort =
+    ContactPort::new("{}_own_rate", TWO, "their rates \\[m/s, m/s²\\]").per(WithOwnCoordinate);
 const STRUCK: ContactPort =
     ContactPort::new("{}_struck", ONE, "velocity of the struck mass along pz before \\[m/s\\]").per(WithMass);
 const STRUCK_AFTER: ContactPort =
     ContactPort::new("{}_struck_after", ONE, "its velocity after \\[m/s\\]").per(WithMass);
 const RESTITUTION: ContactPort =
     ContactPort::new("restitution", ONE, "coefficient of restitution: 0 plastic, 1 elastic");
-const IMPULSE: ContactPort =
-    ContactPort::new("impulse", &[Constrained], "impulses F Δt along s^c \\[N·s or N·m·s\\]");
+const IMPULSE: ContactPort = ContactPort::new("impulse", &[Constrained], "impulses F Δt along s^c \\[N·s or N·m·s\\]");
 const COORDINATES: [ContactPort; 2] = [
     ContactPort::new("s", &[Constrained], "coordinates \\[m, or cosine\\]"),
     ContactPort::new("sd", &[Constrained], "their rates \\[m/s or 1/s\\]"),

@@ -5,6 +5,7 @@
 use crate::data::{inputs, numbers, reference_file};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use std::collections::BTreeMap;
+use straightline_codegen::compile::compile;
 use straightline_codegen::description;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::equations::Robot;
@@ -13,13 +14,17 @@ use straightline_codegen::function::ContactFunction;
 use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::options::{scene_file, Options};
 use straightline_codegen::program::contact::{graph, ClosedContact, Mode};
-use straightline_codegen::scene::contact::{tool_axes, EnvironmentKind, SurfaceItem};
+use straightline_codegen::scene::{
+    self,
+    contact::{tool_axes, EnvironmentKind, SurfaceItem},
+};
 use straightline_codegen::verify::reference_input::centre_of_mass_tree;
 use straightline_core::contact::Coordinate;
 use straightline_core::random::Random;
 use straightline_core::reference::drives::solve_general;
 use straightline_core::reference::{
-    bias_force, functional_coordinate, mass_matrix, CentreOfMassTree, Component, ContactFrames, Derivatives, ReferenceReal,
+    bias_force, functional_coordinate, mass_matrix, CentreOfMassTree, Component, ContactFrames, Derivatives,
+    ReferenceReal,
 };
 use straightline_core::spatial::Vec3;
 use straightline_core::{Dd, Dual, Real};
@@ -30,7 +35,12 @@ type State<T> = BTreeMap<String, Vec<T>>;
 /// Errors of the greatest entry of a block, in double-double and in f64, where p is the least pivot: reactions keep (ε/p)² of their ridge ε, and lose the
 /// digits that p costs.
 fn allowed(pivot: f64) -> [f64; 2] {
-    [1e-22 + 1e2 * (1e-12 / pivot) * (1e-12 / pivot), 1e-11 / pivot]
+    [1e-22 + 1e4 * (1e-12 / pivot) * (1e-12 / pivot), 1e-13 / pivot]
+}
+
+fn source(file: &str) -> Source {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions").join(file);
+    Source::new(file, std::fs::read_to_string(path).expect("a robot file"))
 }
 
 /// A robot in a scene.
@@ -42,14 +52,16 @@ struct Case {
 
 impl Case {
     fn new(file: &str, floating_base: bool, scene: &str) -> Case {
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions").join(file);
-        let source = Source::new(file, std::fs::read_to_string(path).expect("a robot file"));
+        let source = source(file);
         let mut diagnostics = Diagnostics::new();
         let read = scene_file::read(&Source::new("scene.toml", scene), &mut diagnostics);
         // angles as they are written, for both authors
         let model = ModelOptions { floating_base, angle_tolerance: 0.0, ..ModelOptions::default() };
-        let options = read.unwrap_or_else(|| panic!("{}", diagnostics.render())).into_options(Options { model, ..Options::default() });
-        let robot = Robot::new(model::load(&source, &options.model).0.expect("a robot"));
+        let options = read
+            .unwrap_or_else(|| panic!("{}", diagnostics.render()))
+            .into_options(Options { model, ..Options::default() });
+        let model = model::load(&source, &options.model).0.expect("a robot");
+        let robot = Robot::new(scene::apply(model, &options.scene, &mut diagnostics).expect("a scene of this robot"));
         let description = description::read(&source, &mut diagnostics).expect("a robot");
         let tree = centre_of_mass_tree(&description, &options.model).expect("a tree");
         Case { robot, tree, options }
@@ -127,7 +139,11 @@ fn number<T: Real>(x: f64) -> T {
     T::constant(Dd::from(x))
 }
 
-fn frames_of<T: ReferenceReal>(tree: &CentreOfMassTree<T>, closed: &ClosedContact, state: &State<T>) -> ContactFrames<T> {
+fn frames_of<T: ReferenceReal>(
+    tree: &CentreOfMassTree<T>,
+    closed: &ClosedContact,
+    state: &State<T>,
+) -> ContactFrames<T> {
     let name = closed.item.identifier();
     let (axis, second): (Vec3<T>, Vec3<T>) = tool_axes(closed.item.axis.expect("axes are given"));
     let input = |what: &str| state[&format!("{name}_{what}")].clone();
@@ -234,7 +250,13 @@ struct System<T: ReferenceReal> {
 }
 
 /// (H −Ĵᵀ; m J or J, 1 or 0) of q̈ and F, or of Δq̇ and I.
-fn system<T: ReferenceReal>(tree: &CentreOfMassTree<T>, case: &Case, mode: &Mode, state: &State<T>, is_impact: bool) -> System<T> {
+fn system<T: ReferenceReal>(
+    tree: &CentreOfMassTree<T>,
+    case: &Case,
+    mode: &Mode,
+    state: &State<T>,
+    is_impact: bool,
+) -> System<T> {
     let (q, qd) = (&state["q"], &state["qd"]);
     let h = mass_matrix(tree, q);
     let rows = rows(tree, mode, state);
@@ -257,7 +279,9 @@ fn system<T: ReferenceReal>(tree: &CentreOfMassTree<T>, case: &Case, mode: &Mode
             a[(n + i, n + i)] = one;
         }
         b[n + i] = match (is_impact, yields) {
-            (true, _) => -((one + state["restitution"][0]) * weight * (row.s.sd - yields.map_or(number(0.0), |(_, v)| v))),
+            (true, _) => {
+                -((one + state["restitution"][0]) * weight * (row.s.sd - yields.map_or(number(0.0), |(_, v)| v)))
+            }
             (false, Some((mass, load))) => -(load + mass * row.s.adjoint),
             (false, None) => {
                 let wanted = case.options.scene.contacts.stabilisation.map(|(frequency, damping)| {
@@ -413,7 +437,8 @@ fn hold(case: &Case, function: ContactFunction, states: usize) {
             let state = case.state(mode, &mut random);
             let truth = Truth::new(case, mode, &state, function == ContactFunction::ImpactDerivatives);
             let expected = expected(&truth);
-            let narrow: State<f64> = state.iter().map(|(k, x)| (k.clone(), x.iter().map(|x| x.to_f64()).collect())).collect();
+            let narrow: State<f64> =
+                state.iter().map(|(k, x)| (k.clone(), x.iter().map(|x| x.to_f64()).collect())).collect();
             let (wide, narrow) = (run::<Dd>(&program, &state), run::<f64>(&program, &narrow));
             let (mut seen, pivot) = (0, wide["pivot"][0].hi());
             least = least.min(pivot);
@@ -494,12 +519,25 @@ fn derivatives_of_a_contact_of_an_arm_are_those_of_the_full_system() {
     scene += "[[mode]]\nname = \"sticking\"\ncontacts = [\"rough\"]\nsticking = [\"rough\"]\n";
     scene += "[[mode]]\nname = \"two on masses\"\ncontacts = [\"elbow\", \"mass\"]\n";
     scene += &contact("elbow", "forearm_link", &held("two_masses", &format!("{front}, front_mass = 0.25")));
-    for name in ["plane", "moved", "peg", "weld", "ball", "rod", "rough", "elastic", "mass", "cushioned", "two_masses", "both_sides"] {
+    for name in [
+        "plane",
+        "moved",
+        "peg",
+        "weld",
+        "ball",
+        "rod",
+        "rough",
+        "elastic",
+        "mass",
+        "cushioned",
+        "two_masses",
+        "both_sides",
+    ] {
         scene += &format!("[[mode]]\nname = \"{name}\"\ncontacts = [\"{name}\"]\n");
     }
     let case = Case::new("ur5.urdf", false, &scene);
     for function in BOTH {
-        hold(&case, function, 2);
+        hold(&case, function, 1);
     }
 }
 
@@ -507,7 +545,8 @@ fn derivatives_of_a_contact_of_an_arm_are_those_of_the_full_system() {
 #[test]
 fn derivatives_know_the_stabilisation() {
     let held = format!("{OBJECT}\nconstrained = [\"px\", \"pz\", \"ax\"]");
-    let scene = format!("[outputs]\nfunctions = []\n{}[stabilisation]\nfrequency = 40.0\n", contact("pen", "tool0", &held));
+    let scene =
+        format!("[outputs]\nfunctions = []\n{}[stabilisation]\nfrequency = 40.0\n", contact("pen", "tool0", &held));
     let case = Case::new("ur5.urdf", false, &scene);
     hold(&case, ContactFunction::ForwardDynamicsDerivatives, 2);
 }
@@ -522,16 +561,20 @@ fn standing() -> String {
         scene += &contact(name, &format!("{name}_FOOT"), ground);
     }
     let list = |names: &[&str]| names.iter().map(|n| format!("\"{n}\"")).collect::<Vec<_>>().join(", ");
-    for (name, closed, sticking) in
-        [("all", &STANDING[..], &STANDING[..]), ("two", &STANDING[1..3], &STANDING[1..3]), ("sliding", &STANDING[..2], &STANDING[..1])]
-    {
-        scene += &format!("[[mode]]\nname = \"{name}\"\ncontacts = [{}]\nsticking = [{}]\n", list(closed), list(sticking));
+    for (name, closed, sticking) in [
+        ("all", &STANDING[..], &STANDING[..]),
+        ("two", &STANDING[1..3], &STANDING[1..3]),
+        ("sliding", &STANDING[..2], &STANDING[..1]),
+    ] {
+        scene +=
+            &format!("[[mode]]\nname = \"{name}\"\ncontacts = [{}]\nsticking = [{}]\n", list(closed), list(sticking));
     }
     scene
 }
 
 #[test]
-fn derivatives_of_a_robot_on_its_feet_are_those_of_the_full_system() {
+#[ignore = "slow proof: programs of some ten thousand operations are searched"]
+fn slow_proof_that_derivatives_of_a_robot_on_its_feet_are_those_of_the_full_system() {
     let case = Case::new("solo12.urdf", true, &standing());
     for function in BOTH {
         hold(&case, function, 1);
@@ -545,7 +588,8 @@ fn derivatives_by_forces_keep_the_constraints() {
     let (n, mut random) = (case.nv(), Random(5));
     for mode in &case.modes() {
         let state = case.state(mode, &mut random);
-        let found = run::<Dd>(&graph(&case.robot, &case.options, mode, ContactFunction::ForwardDynamicsDerivatives), &state);
+        let found =
+            run::<Dd>(&graph(&case.robot, &case.options, mode, ContactFunction::ForwardDynamicsDerivatives), &state);
         let rows = rows(&case.tree, mode, &state);
         let h = mass_matrix(&case.tree, &state["q"]);
         let (by, force_by, pivot) = (&found["dqdd_dtau"], &found["dforce_dtau"], found["pivot"][0].hi());
@@ -558,7 +602,8 @@ fn derivatives_by_forces_keep_the_constraints() {
             }
             for i in 0..n {
                 let left = (0..n).fold(Dd::ZERO, |sum, j| sum + h[(i, j)] * by[j * n + k]);
-                let pushed = rows.iter().enumerate().fold(left, |sum, (r, row)| sum - row.applied[i] * force_by[r * n + k]);
+                let pushed =
+                    rows.iter().enumerate().fold(left, |sum, (r, row)| sum - row.applied[i] * force_by[r * n + k]);
                 let one = if i == k { Dd::ONE } else { Dd::ZERO };
                 assert!((pushed - one).abs().hi() <= 1e-22 * most, "{}: {i} {k} {pushed:?}", mode.name);
                 asymmetry = asymmetry.max((by[i * n + k] - by[k * n + i]).abs().hi() / most);
@@ -569,28 +614,54 @@ fn derivatives_by_forces_keep_the_constraints() {
     }
 }
 
-/// Where the second author has no formulation: differences of the motion in double-double, of an arm whose hand is held to its own elbow while it slides.
+/// Where the second author has no formulation: differences of the motion in double-double, of an arm whose hand is held to its own elbow while it slides,
+/// and of one whose drives have rotors that turn in space with its links.
 #[test]
 fn derivatives_are_differences_of_the_motion() {
-    let arm = format!(
-        "[outputs]\nfunctions = []\n[[loop]]\nname = \"rod\"\nframe = \"tool0\"\nwith = \"upper_arm_link\"\nconstrained = [\"px\", \"pz\", \"ay\"]\n\
-         [stabilisation]\nfrequency = 15.0\n{}",
-        contact("pen", "forearm_link", &format!("{OBJECT}\nconstrained = [\"pz\"]\nfriction = {{ coefficient = 0.3, speed = 0.125 }}"))
+    let sliding = contact(
+        "pen",
+        "forearm_link",
+        &format!("{OBJECT}\nconstrained = [\"pz\"]\nfriction = {{ coefficient = 0.3, speed = 0.125 }}"),
     );
-    let case = Case::new("ur5.urdf", false, &arm);
+    let held = "[[loop]]\nname = \"rod\"\nframe = \"tool0\"\nwith = \"upper_arm_link\"\nconstrained = [\"px\", \"pz\", \"ay\"]\n\
+                [stabilisation]\nfrequency = 15.0\n";
+    let drives: String = [("elbow_joint", "upper_arm_link"), ("wrist_1_joint", "forearm_link")]
+        .map(|(joint, link)| {
+            format!(
+                "[[drive]]\njoint = \"{joint}\"\nratio = 50.0\nmotor = {{ torque_constant = 0.05, resistance = 1.2, rotor_inertia = 1e-4 }}\n\
+                 rotor = {{ link = \"{link}\", axis = [0.3, 0.1, 0.9], inertia = 2e-3 }}\n"
+            )
+        })
+        .concat();
+    for (more, functions) in [(held.to_string(), &DIFFERENCES[..]), (drives, &DIFFERENCES[1..])] {
+        let scene = format!("[outputs]\nfunctions = []\n{sliding}{more}");
+        hold_differences(&Case::new("ur5.urdf", false, &scene), functions);
+    }
+}
+
+/// Derivatives, what they are of, and by what.
+type Difference = (ContactFunction, ContactFunction, &'static [&'static str]);
+
+const DIFFERENCES: [Difference; 2] = [
+    (ContactFunction::ForwardDynamicsDerivatives, ContactFunction::ForwardDynamics, &["q", "qd", "tau"]),
+    (ContactFunction::ImpactDerivatives, ContactFunction::Impact, &["q", "qd"]),
+];
+
+fn hold_differences(case: &Case, functions: &[Difference]) {
     let (modes, mut random) = (case.modes(), Random(3));
     let mode = &modes[0];
     let state = case.state(mode, &mut random);
-    for (of_derivatives, of_motion, names) in [
-        (ContactFunction::ForwardDynamicsDerivatives, ContactFunction::ForwardDynamics, vec!["q", "qd", "tau"]),
-        (ContactFunction::ImpactDerivatives, ContactFunction::Impact, vec!["q", "qd"]),
-    ] {
+    for &(of_derivatives, of_motion, names) in functions {
         let [derivatives, motion] = [of_derivatives, of_motion].map(|f| graph(&case.robot, &case.options, mode, f));
         let found = run::<Dd>(&derivatives, &state);
         let is_impact = of_motion == ContactFunction::Impact;
-        let ports = if is_impact { [("dqd", "dqd_after_d"), ("impulse", "dimpulse_d")] } else { [("qdd", "dqdd_d"), ("force", "dforce_d")] };
+        let ports = if is_impact {
+            [("dqd", "dqd_after_d"), ("impulse", "dimpulse_d")]
+        } else {
+            [("qdd", "dqdd_d"), ("force", "dforce_d")]
+        };
         let step = Dd::from(1e-9);
-        for name in names {
+        for &name in names {
             for k in 0..case.nv() {
                 let [ahead, behind] = [step, -step].map(|by| {
                     let mut state = state.clone();
@@ -640,12 +711,15 @@ fn derivatives_on_a_plane_are_those_of_the_data() {
             let across = Vector3::new(-z[1], z[0], Dd::ZERO);
             let x = across / across.dot(&across).sqrt();
             let y = z.cross(&x);
-            let pose: Vec<Dd> = [inputs(&of["origin"]), x.as_slice().to_vec(), y.as_slice().to_vec(), z.as_slice().to_vec()].concat();
-            let mut given: State<Dd> = ["q", "qd", "tau", "gravity"].map(|key| (key.to_string(), inputs(&state[key]))).into();
+            let pose: Vec<Dd> =
+                [inputs(&of["origin"]), x.as_slice().to_vec(), y.as_slice().to_vec(), z.as_slice().to_vec()].concat();
+            let mut given: State<Dd> =
+                ["q", "qd", "tau", "gravity"].map(|key| (key.to_string(), inputs(&state[key]))).into();
             given.insert("plane_pose".into(), pose);
             given.insert("plane_velocity".into(), vec![Dd::ZERO; 6]);
             given.insert("plane_acceleration".into(), vec![Dd::ZERO; 6]);
-            let narrow: State<f64> = given.iter().map(|(k, x)| (k.clone(), x.iter().map(|x| x.to_f64()).collect())).collect();
+            let narrow: State<f64> =
+                given.iter().map(|(k, x)| (k.clone(), x.iter().map(|x| x.to_f64()).collect())).collect();
             let (wide, narrow) = (run::<Dd>(&program, &given), run::<f64>(&program, &narrow));
             for (block, ours) in [
                 ("qdd", "qdd"),
@@ -664,13 +738,59 @@ fn derivatives_on_a_plane_are_those_of_the_data() {
                     let off = [wide[ours][i], Dd::from(narrow[ours][i])].map(|x| (x - *expected).abs().hi() / size);
                     let place = format!("{name} {} {block}[{i}]", state["id"]);
                     if off[0].is_nan() || off[1].is_nan() || off[0] > DATA || off[1] > DATA_F64 {
-                        failures.push(format!("{place}: {} for {}, {off:.1e?}", wide[ours][i].hi(), expected.hi()));
+                        failures.push(format!(
+                            "{place}: {} for {}, {:.1e}, {:.1e}",
+                            wide[ours][i].hi(),
+                            expected.hi(),
+                            off[0],
+                            off[1]
+                        ));
                     }
                     worst = [worst[0].max(off[0]), worst[1].max(off[1])];
                 }
             }
         }
-        println!("{name}: {} operations, {worst:.1e?} of the greatest entry of a block", program.counts().flops());
+        let operations = program.counts().flops();
+        println!(
+            "{name}: {operations} operations, {:.1e} and in f64 {:.1e} of the greatest entries",
+            worst[0], worst[1]
+        );
         assert!(failures.is_empty(), "{} are off:\n{}", failures.len(), failures[..failures.len().min(40)].join("\n"));
     }
 }
+
+/// Operations on record, of a table under the hand of an arm and of a quadruped on all feet and on two.
+#[test]
+fn derivatives_of_contact_modes_take_what_is_on_record() {
+    let table = |frame: &str| {
+        contact("table", frame, "object = { origin = [0.5, 0.1, 0.2], z = [0.0, 0.0, 1.0] }\nconstrained = [\"pz\"]")
+    };
+    let names = ["FL", "FR", "HL", "HR"];
+    let ground = "object = { origin = [0.0, 0.0, 0.0], z = [0.0, 0.0, 1.0] }\nconstrained = [\"px\", \"py\", \"pz\"]";
+    let feet: String = names.iter().map(|name| contact(name, &format!("{name}_FOOT"), ground)).collect();
+    let standing = format!(
+        "{feet}[[mode]]\nname = \"standing\"\ncontacts = {names:?}\n[[mode]]\nname = \"trot\"\ncontacts = [\"FL\", \"HR\"]\n"
+    );
+    for (file, floating_base, scene, record) in [
+        ("ur5.urdf", false, table("tool0"), RECORD_UR5),
+        ("panda.urdf", false, table("panda_hand_tcp"), RECORD_PANDA),
+        ("solo12.urdf", true, standing, RECORD_SOLO12),
+    ] {
+        let scene = format!(
+            "[outputs]\nfunctions = []\ncontact = [\"forward_dynamics_derivatives\", \"impact_derivatives\"]\n{scene}"
+        );
+        let mut diagnostics = Diagnostics::new();
+        let read = scene_file::read(&Source::new("scene.toml", scene), &mut diagnostics).expect("a scene");
+        let model = ModelOptions { floating_base, ..ModelOptions::default() };
+        let options = read.into_options(Options { model, ..Options::default() });
+        let generated = compile(&source(file), &options).unwrap_or_else(|d| panic!("{}", d.render()));
+        let found: Vec<usize> = generated.report.contact.iter().map(|c| c.counts.flops()).collect();
+        println!("{file:<12} {found:?}");
+        assert_eq!(found, record, "{file}: another count than on record");
+    }
+}
+
+/// Of motion and of impact, by mode.
+const RECORD_UR5: &[usize] = &[2592, 1338];
+const RECORD_PANDA: &[usize] = &[5789, 2846];
+const RECORD_SOLO12: &[usize] = &[73739, 45666, 37959, 20010];

@@ -178,7 +178,8 @@ impl<T: Real> CommonEquations<'_, T> {
     }
 
     fn free(&self) -> FunctionalCoordinates<T> {
-        let of = |t: &TracedContact<T>| Some(alg::functional_coordinates(&t.contact, &t.motion, &t.footing.closed?.free));
+        let of =
+            |t: &TracedContact<T>| Some(alg::functional_coordinates(&t.contact, &t.motion, &t.footing.closed?.free));
         self.traced.iter().filter_map(of).fold(FunctionalCoordinates::default(), FunctionalCoordinates::and)
     }
 

@@ -258,7 +258,8 @@ pub(crate) fn optimised(
         let (given, added) = inputs.split_at(own.len());
         let given = options.scene.bind(base, robot, given);
         let added = names.iter().cloned().zip(added.iter().cloned()).collect();
-        let results = equations::equations(robot, options, mode, function, traced_form(function, optimisations), &given, &added);
+        let results =
+            equations::equations(robot, options, mode, function, traced_form(function, optimisations), &given, &added);
         assert!(results.iter().map(Vec::len).eq(lengths.iter().copied()), "results fit the outputs");
         results.concat()
     });

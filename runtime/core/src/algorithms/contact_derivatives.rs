@@ -91,10 +91,11 @@ impl<'a, T: Real> ContactFactors<'a, T> {
 
     /// ∂F of L⁻ᵀ b and g.
     fn reactions(&self, half: &[T], g: &[T]) -> Vec<T> {
-        let right = self.system.response(half).into_iter().zip(g).zip(&self.rows).map(|((by_force, g), row)| match *row {
-            ContactRow::Rigid => *g - by_force,
-            ContactRow::Yielding(mass) => *g - mass * by_force,
-        });
+        let right =
+            self.system.response(half).into_iter().zip(g).zip(&self.rows).map(|((by_force, g), row)| match *row {
+                ContactRow::Rigid => *g - by_force,
+                ContactRow::Yielding(mass) => *g - mass * by_force,
+            });
         self.system.solve_one_of_many(&right.collect::<Vec<T>>())
     }
 
