@@ -91,7 +91,7 @@ pub fn is_reserved(word: &str) -> bool {
 /// Whether it is a function, or what the file has of one: `energy_lanes`, `energy_part12`.
 fn belongs_to_a_function(word: &str) -> bool {
     let plain = Function::known().map(Function::name);
-    let mut functions = plain.chain(ContactFunction::WORDS.iter().map(|(name, _)| *name));
+    let mut functions = plain.chain(ContactFunction::ALL.iter().map(|f| f.name()));
     functions.any(|function| match word.strip_prefix(function) {
         Some("") => true,
         Some(rest) => rest.strip_prefix('_').is_some_and(|rest| BEHIND_FUNCTIONS.iter().any(|b| rest.starts_with(b))),

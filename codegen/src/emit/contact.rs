@@ -5,7 +5,7 @@ use super::error_bound::error_bound;
 use super::module::{Item, ModeModule};
 use super::Lowering;
 use crate::equations::Robot;
-use crate::function::ContactFunction;
+use crate::function::Judged;
 use crate::options::Options;
 use crate::program::companion::{bound, wants_companions};
 use crate::program::contact::{programs, Mode, ModeProgram};
@@ -50,7 +50,7 @@ pub(super) fn contact(robot: &Robot, options: &Options, lowering: Lowering<'_>) 
             let (name, schedule) = (function.name(), schedule(&graph, options.limits, options.registers()));
             let mut of_state = None;
             if wants_companions(options) {
-                let by_residual = function == ContactFunction::ForwardDynamics;
+                let by_residual = function.spec().judged == Judged::ByResidual;
                 let (bound, plainer) = bound(robot, options, mode, function, &graph)?;
                 out.plainer.extend(plainer);
                 let names = (name, by_residual);

@@ -1,6 +1,6 @@
 //! What is said above every function.
 
-use crate::function::{ContactFunction, Function, Output, Quantity};
+use crate::function::{ContactFunction, ContactPort, Function, Output, PerContact, Quantity};
 use crate::identifier;
 use crate::program::contact::Mode;
 use crate::scene::{Parameter, ResultPart, Scene};
@@ -51,46 +51,36 @@ pub(super) fn of_contact(function: ContactFunction, (mode, scene): (&Mode, &Scen
     for port in ports.inputs.iter().chain(&ports.outputs) {
         let name = port.name.as_str();
         let suffix = |s: &str| name.ends_with(s);
+        let own = documented(function, mode, name);
         let text = match name {
             "q" => "configuration \\[rad or m\\]",
             "qd" => "velocities \\[rad/s or m/s\\]",
             "tau" => "generalized forces \\[N·m or N\\]",
             "x" => "state of the drives, as of `driven_forward_dynamics` of the robot",
             "u" => "inputs of the drives \\[V, or as in the robot file\\]",
-            "xd" => "derivative of the drives' state, in the order of x",
             "gravity" => "acceleration due to gravity in the world \\[m/s²\\]",
             "qdd" => "accelerations \\[rad/s² or m/s²\\]",
-            "force" => "reactions F along s^c \\[N, or N·m of an axis\\]",
-            "sdd" => "s̈^c \\[m/s² or 1/s²\\]",
-            "sdd_free" => "wanted s̈^f \\[m/s² or 1/s²\\]",
-            "violation" => "s̈^c less what it should be; zero where the object gives way",
-            "pivot" => {
-                "least pivot against its diagonal entry: 1 for independent constraints, about 1e-12 for redundant ones"
-            }
-            "s" => "coordinates \\[m, or cosine\\]",
-            "sd" => "their rates \\[m/s or 1/s\\]",
-            "j" => "Jacobian, a row per coordinate",
-            "a" => "adjoint vector A \\[m/s² or 1/s²\\]",
-            "dqd" => "changes of the velocities \\[rad/s or m/s\\]",
-            "impulse" => "impulses F Δt along s^c \\[N·s or N·m·s\\]",
-            "dsd" => "changes of ṡ^c \\[m/s or 1/s\\]",
-            "energy_loss" => "kinetic energy lost by robot, rotors and struck masses \\[J\\]",
-            "restitution" => "coefficient of restitution: 0 plastic, 1 elastic",
-            "dq" => "correction by velocity coordinate \\[rad or m\\]",
+            _ if own.is_some() => own.unwrap_or_default(),
             _ if suffix("_axes") => "tool axis and an axis across it, unit vectors in the frame",
             _ if suffix("_pose") => "the object in the world: origin \\[m\\], then its axes X, Y, Z",
             _ if suffix("_velocity") => "of the object's origin \\[m/s\\], then angular \\[rad/s\\], world axes",
             _ if suffix("_acceleration") => "of the object's origin \\[m/s²\\], then angular \\[rad/s²\\], world axes",
             _ if suffix("_environment") => "numbers of the environment, in the order of the scene's documentation",
-            _ if suffix("_own") => "the object's own coordinate and its rate \\[m, m/s\\]",
-            _ if suffix("_own_rate") => "their rates \\[m/s, m/s²\\]",
-            _ if suffix("_struck") => "velocity of the struck mass along pz before \\[m/s\\]",
-            _ if suffix("_struck_after") => "its velocity after \\[m/s\\]",
             _ => &of_scene(name).unwrap_or_default(),
         };
         let _ = writeln!(doc, "* `{name}`: {text}");
     }
     doc
+}
+
+/// What the row of a function says of one of its inputs or results in a mode.
+fn documented(function: ContactFunction, mode: &Mode, name: &str) -> Option<&'static str> {
+    let contacts: Vec<String> = mode.contacts.iter().map(|c| c.item.identifier()).collect();
+    let is_named = |port: &&ContactPort| match port.per {
+        PerContact::No => port.name == name,
+        _ => contacts.iter().any(|contact| port.name_for(contact) == name),
+    };
+    function.spec().inputs.iter().chain(function.spec().outputs).find(is_named).map(|port| port.doc)
 }
 
 /// The name of a function over lanes.

@@ -5,7 +5,9 @@ use super::spec::{Form, Output, RobotFunction, Spec};
 use super::{Forms, Quantity};
 use straightline_core::algorithms::{self as alg, DerivativeBlocks};
 use straightline_core::model::Model;
+use straightline_core::reduced::ReducedModel;
 use straightline_core::reverse::{Recorded, Recording};
+use straightline_core::spatial::Vec3;
 use straightline_core::{Dual, Real};
 
 pub(super) const SQUARE: &[super::Extent] = &[Velocities, Velocities];
@@ -180,6 +182,26 @@ impl<T: Real> Forms<'_, T> {
     }
 }
 
+impl<T: Real> Forms<'_, T> {
+    /// ∂(H x)/∂q of an x that is held, by rows: what inverse dynamics does at rest, without gravity.
+    pub(crate) fn inertial_slopes(&self, q: &[T], x: &[T]) -> Vec<T> {
+        if let Some([torques, _]) = self.reduced {
+            let weightless = ReducedModel { gravity: Vec3::zero(), ..torques.clone() };
+            return alg::reduced_inverse_dynamics_derivatives(&weightless, [q, &self.rest(), x]).dtau_dq;
+        }
+        let nv = self.model.nv();
+        let wide = self.model.map(Dual::<T, 1>::fixed);
+        let mut slopes = vec![T::zero(); nv * nv];
+        for k in 0..nv {
+            let h = alg::mass_matrix(&wide, &along(self.model, q, k));
+            for (i, row) in h.chunks(nv).enumerate() {
+                slopes[i * nv + k] = row.iter().zip(x).fold(T::zero(), |sum, (h, x)| sum + h.derivatives[0] * *x);
+            }
+        }
+        slopes
+    }
+}
+
 /// Of friction and springs of each joint, which know its own coordinate alone: by q, and by q̇.
 fn passive_slopes<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> [Vec<T>; 2] {
     let wide = model.map(Dual::<T, 2>::fixed);
@@ -218,7 +240,7 @@ fn along_tangent<T: Real>(model: &Model<T>, q: &[T], by_q: &[T]) -> Vec<T> {
 }
 
 /// The configuration as it moves with velocity coordinate `k` alone.
-pub(super) fn along<T: Real>(model: &Model<T>, q: &[T], k: usize) -> Vec<Dual<T, 1>> {
+pub(crate) fn along<T: Real>(model: &Model<T>, q: &[T], k: usize) -> Vec<Dual<T, 1>> {
     let mut moving: Vec<Dual<T, 1>> = q.iter().map(|x| Dual::fixed(*x)).collect();
     for joint in model.bodies.iter().map(|body| &body.joint) {
         let (places, coordinates) = (joint.iq..joint.iq + joint.kind.nq(), joint.iv..joint.iv + joint.kind.nv());

@@ -27,7 +27,8 @@ pub mod truth;
 mod whole;
 
 pub use base_parameters::{base_parameter_lists, BaseParameterList};
-pub use contact::ContactFunction;
+pub use contact::{ContactExtent, ContactFunction, ContactPort, ContactSpec, InModes, PerContact};
+pub(crate) use derivatives::along;
 pub(crate) use drives::may_be_articulated;
 pub use forms::{Forms, ForwardDynamicsMethod, LimbSums};
 pub use quantity::Quantity;

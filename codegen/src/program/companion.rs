@@ -77,8 +77,8 @@ pub(crate) fn bound(
         return Ok((Err(ROUNDED), None));
     }
     let name = format!("{}::{}", mode.identifier, function.name());
-    match function {
-        ContactFunction::ForwardDynamics => of_accelerations(robot, options, mode, &name, graph),
+    match function.spec().judged {
+        Judged::ByResidual => of_accelerations(robot, options, mode, &name, graph),
         _ => of_errors(robot, options, &name, graph, bits(options)),
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::description::messages;
 use crate::diagnostic::{Diagnostic, Diagnostics};
-use crate::function::{ContactFunction, Divisor, Function};
+use crate::function::{ContactFunction, Divisor, Function, InModes};
 use crate::model::merge::{merge, Part};
 use crate::model::singular::{singular_joints, Inertia};
 use crate::options::Options;
@@ -21,16 +21,15 @@ struct Asked {
 /// All that is asked for that divides by what joints feel: functions, their error bounds and stages, and the functions of contact modes.
 fn asked(model: &Model<Dd>, options: &Options) -> Vec<Asked> {
     let is_driven = !model.drives.is_empty();
-    let of_function = |f: &Function| match f.spec().divisor {
+    let of_divisor = |divisor: Divisor| match divisor {
         Divisor::Inertia => Some(Inertia::OfLinks),
         Divisor::InertiaWithDrives => Some(Inertia::WithDrives),
         Divisor::Nothing | Divisor::Mass | Divisor::MassOfEach => None,
     };
-    let of_contact = |f: &ContactFunction| match f {
-        ContactFunction::ForwardDynamics | ContactFunction::InverseDynamics => Some(Inertia::OfLinks),
-        ContactFunction::DrivenForwardDynamics => is_driven.then_some(Inertia::WithDrives),
-        ContactFunction::Impact | ContactFunction::Projection => Some(Inertia::WithDrives),
-        ContactFunction::ConstrainedCoordinates | ContactFunction::FreeCoordinates => None,
+    let of_function = |f: &Function| of_divisor(f.spec().divisor);
+    let of_contact = |f: &ContactFunction| {
+        let is_there = is_driven || f.spec().modes != InModes::OfDrivenRobots;
+        of_divisor(f.spec().divisor).filter(|_| is_there)
     };
     let contacts = match Mode::all(&options.scene).is_empty() {
         true => Vec::new(),

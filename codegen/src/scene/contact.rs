@@ -1,6 +1,6 @@
 //! Contacts of a scene: what the robot touches, which coordinates are constrained there, and in which modes.
 
-use crate::function::ContactFunction;
+use crate::function::{ContactFunction, PerContact};
 use crate::identifier::snake_case;
 use std::fmt;
 use std::rc::Rc;
@@ -9,7 +9,7 @@ use straightline_core::algorithms::{Environment, SpringDamper};
 use straightline_core::contact::{Contact, Coordinate, Friction, ImplicitSurface, Normal, Object, Surface};
 use straightline_core::model::Frame;
 use straightline_core::spatial::{Mat3, Sym3, Transform, Vec3};
-use straightline_core::{Dd, Real};
+use straightline_core::{Dd, Dual, Real};
 use straightline_graph::trace::Expr;
 
 /// All contacts of a scene. The default has none, and nothing of a contact is generated.
@@ -23,7 +23,7 @@ pub struct SceneContacts {
     pub modes: Vec<ModeItem>,
     /// Baumgarte's stabilisation: frequency \[rad/s\] and damping ratio.
     pub stabilisation: Option<(f64, f64)>,
-    /// The functions that are generated for each mode; `None`: all.
+    /// The functions that are generated for each mode; `None`: all but those that are made for who names them.
     pub functions: Option<Vec<ContactFunction>>,
 }
 
@@ -98,15 +98,23 @@ pub enum SurfaceItem {
 #[derive(Clone)]
 pub struct UserSurface {
     name: String,
-    value: Arc<Traced>,
+    value: Arc<SurfaceOver<Expr>>,
+    moving: Arc<SurfaceOver<Dual<Expr, 1>>>,
 }
 
-type Traced = dyn Fn(Vec3<Normal<Expr>>) -> Normal<Expr> + Send + Sync;
+/// A surface over one scalar.
+type SurfaceOver<T> = dyn Fn(Vec3<Normal<T>>) -> Normal<T> + Send + Sync;
 
 impl UserSurface {
     /// From a function over any scalar. The name tells surfaces apart, in the hash of the output too.
     pub fn new(name: impl Into<String>, surface: impl ImplicitSurface + Send + Sync + 'static) -> Self {
-        UserSurface { name: name.into(), value: Arc::new(move |p| surface.value(p)) }
+        let surface = Arc::new(surface);
+        let other = surface.clone();
+        UserSurface {
+            name: name.into(),
+            value: Arc::new(move |p| surface.value(p)),
+            moving: Arc::new(move |p| other.value(p)),
+        }
     }
 
     /// What tells it from others.
@@ -133,6 +141,17 @@ impl SurfaceItem {
         match self {
             SurfaceItem::Implicit(user) => {
                 let value = user.value.clone();
+                Surface::Implicit(Rc::new(move |p| value(p)))
+            }
+            other => other.over().expect("only a user's surface has a scalar of its own"),
+        }
+    }
+
+    /// The same over expressions that move.
+    pub fn traced_moving(&self) -> Surface<Dual<Expr, 1>> {
+        match self {
+            SurfaceItem::Implicit(user) => {
+                let value = user.moving.clone();
                 Surface::Implicit(Rc::new(move |p| value(p)))
             }
             other => other.over().expect("only a user's surface has a scalar of its own"),
@@ -336,14 +355,16 @@ impl SceneContacts {
 
     /// The functions that are wanted, in order.
     pub fn wanted(&self) -> Vec<ContactFunction> {
-        let all = ContactFunction::WORDS.iter().map(|w| w.1);
-        all.filter(|f| self.functions.as_ref().is_none_or(|wanted| wanted.contains(f))).collect()
+        let is_wanted = |f: &ContactFunction| match &self.functions {
+            Some(wanted) => wanted.contains(f),
+            None => !f.spec().is_by_name,
+        };
+        ContactFunction::ALL.iter().copied().filter(is_wanted).collect()
     }
 }
 
-/// What stands behind a contact's name in the names of its inputs and results.
-const PORTS: [&str; 9] =
-    ["axes", "pose", "velocity", "acceleration", "environment", "own", "own_rate", "struck", "struck_after"];
+/// What stands behind a contact's name in the names of the inputs that are its own.
+const PORTS: [&str; 5] = ["axes", "pose", "velocity", "acceleration", "environment"];
 
 impl ContactItem {
     /// Its friction over a scalar.
@@ -360,6 +381,10 @@ impl ContactItem {
     /// The names that inputs and results of its own have, as far as its modes have them.
     pub fn port_names(&self) -> impl Iterator<Item = String> {
         let name = self.identifier();
-        PORTS.iter().map(move |what| format!("{name}_{what}"))
+        let of_functions = ContactFunction::ports().filter(|port| port.per != PerContact::No).map({
+            let name = name.clone();
+            move |port| port.name_for(&name)
+        });
+        PORTS.iter().map(move |what| format!("{name}_{what}")).chain(of_functions)
     }
 }

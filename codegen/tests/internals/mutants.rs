@@ -135,6 +135,15 @@ object = { origin = [0.5, 0.1, 0.2], z = [0.1, 0.2, 1.0] }
 constrained = ["px", "pz"]
 free = ["py"]
 "#;
+const RUBBING: &str = r#"
+[[contact]]
+name = "pen"
+frame = "pen"
+object = { origin = [0.5, 0.1, 0.2], z = [0.1, 0.2, 1.0] }
+constrained = ["pz"]
+friction = { coefficient = 0.3, speed = 0.125 }
+environment = { kind = "two_masses", mass = 0.5, stiffness = 5e2, damping = 4.0, front_stiffness = 8e2, front_damping = 3.0, front_mass = 0.1 }
+"#;
 const BOOT: &str = "[[parameter]]\nkind = \"payload\"\nname = \"tool\"\nframe = \"b\"\n";
 
 const OF_FUNCTIONS: [&str; 6] = ["traced", "dead code", "unread inputs", "sums", "substitute", "order"];
@@ -203,6 +212,7 @@ impl Case {
         let held = format!("[hold]\njoints = {{ three = 0.3 }}\n[outputs]\n{BOOT}");
         let pressing = format!("[outputs]\nfunctions = [\"driven_forward_dynamics\", \"driven_inverse_dynamics\"]\ncontact = [\"driven_forward_dynamics\", \"impact\"]\n{TABLE}{YIELDING}{DRIVES}");
         let drawing = format!("[outputs]\nfunctions = [\"gravity_force\"]\ncontact = [\"constrained_coordinates\", \"forward_dynamics\", \"inverse_dynamics\", \"projection\"]\n{PEN}");
+        let rubbing = format!("[outputs]\nfunctions = [\"gravity_force\"]\ncontact = [\"forward_dynamics_derivatives\", \"impact_derivatives\"]\n{RUBBING}");
         let sliding = format!("[outputs]\nfunctions = [\"gravity_force\"]\ncontact = [\"forward_dynamics\"]\n{TABLE}");
         let limbs = Options { limbs: LimbForm::Lanes, ..of(&[InverseDynamics, GravityForce]) };
         vec![
@@ -223,6 +233,7 @@ impl Case {
                 &[&PLAIN, &["substitute"], &OF_PARAMETER],
             ),
             Case::new("contact", &with_tip, &drawing, Options::default(), &[&ORDERED, &OF_CONTACT]),
+            Case::new("derivatives in contact", &with_tip, &rubbing, Options::default(), &[&ORDERED, &OF_CONTACT]),
             Case::new("drives", PLANAR, &pressing, Options::default(), &[&ORDERED, &OF_CONTACT]),
             Case::new(
                 "stages",

@@ -13,6 +13,7 @@ mod chain;
 mod companions;
 mod contact;
 mod contact_compiled;
+mod contact_derivatives;
 mod effects;
 mod elastic_inverse;
 mod expansion;

@@ -111,7 +111,8 @@ fn scene_of(robot: &Written, random: &mut Random) -> String {
     }
     let touches = random.one_in(4);
     if touches {
-        text += "contact = [\"constrained_coordinates\", \"forward_dynamics\", \"inverse_dynamics\", \"impact\", \"projection\"]\n";
+        text += "contact = [\"constrained_coordinates\", \"forward_dynamics\", \"inverse_dynamics\", \"impact\", \"projection\", \
+                 \"forward_dynamics_derivatives\", \"impact_derivatives\"]\n";
     }
     let zero = random.one_of(&["", "", "", "qd = true\n", "qdd = true\n"]);
     if !zero.is_empty() && !touches {

@@ -38,7 +38,8 @@ const PAYLOAD: &str =
     "[outputs]\nstaged = true\n[[parameter]]\nkind = \"payload\"\nname = \"tool\"\nframe = \"panda_hand\"\n";
 
 const CONTACT: &str = "[[contact]]\nname = \"pen\"\nframe = \"panda_hand\"\nconstrained = [\"pz\"]\n\
-                       object = { origin = [0.5, 0.0, 0.2], z = [0.0, 0.0, 1.0] }\n[outputs]\ncontact = [\"forward_dynamics\", \"impact\"]\n";
+                       object = { origin = [0.5, 0.0, 0.2], z = [0.0, 0.0, 1.0] }\n[outputs]\ncontact = [\"forward_dynamics\", \"impact\", \
+                       \"forward_dynamics_derivatives\"]\n";
 
 /// Texts of robots with every kind of input: angles, quaternions, parameters, states of drives, and in contact, in both scalars.
 fn texts() -> Vec<(&'static str, Generated)> {

@@ -124,7 +124,7 @@ fn items_and_types(options: &Options, scene: Option<&str>, upwards: &str) -> Str
         for constant in ["CONSTRAINED", "FREE"] {
             let _ = writeln!(inner, "        {}", value(constant, &missing));
         }
-        for (function, _) in ContactFunction::WORDS {
+        for function in ContactFunction::ALL.iter().map(|f| f.name()) {
             let _ = writeln!(inner, "        {}", value(function, &missing));
             let _ = writeln!(inner, "        {}", value(&format!("{function}_error_bound"), &missing));
             for batch in options.lanes.iter().flat_map(|lanes| over_states(function, *lanes)) {

@@ -3,7 +3,7 @@
 use super::{ridge, ClosedContact, Mode};
 use crate::equations::bind::BoundRobot;
 use crate::equations::Robot;
-use crate::function::{ContactFunction, ForwardDynamicsMethod, Function, SelectedRows};
+use crate::function::{ContactFunction, ForwardDynamicsMethod, Function, PerContact, SelectedRows};
 use crate::options::Options;
 use crate::scene::contact::{tool_axes, SurfaceItem};
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use straightline_core::algorithms::{
 };
 use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion, Surface};
 use straightline_core::spatial::{Mat3, MotionVector, Transform, Vec3};
-use straightline_core::{algorithms as alg, Dd, Real};
+use straightline_core::{algorithms as alg, Dd, Dual, Real};
 
 /// Inputs beside the robot's own, by name.
 pub(super) type Added<T> = BTreeMap<String, Vec<T>>;
@@ -22,19 +22,39 @@ pub(super) type Added<T> = BTreeMap<String, Vec<T>>;
 pub(super) struct EquationForm<T> {
     /// By the reduced robot, where it serves.
     pub reduced: bool,
+    /// There frames of contacts move by the recursion of bias forces.
+    pub is_carried: bool,
     /// The surfaces of objects over this scalar.
     pub surface: fn(&SurfaceItem) -> Surface<T>,
     /// What is added to accelerations of contact points and taken away again, as the reduced robot does with gravity.
     pub falls: Option<T>,
 }
 
+/// The forms of equations, and of their derivatives over dual numbers.
+#[derive(Clone, Copy)]
+pub(super) struct FormsOfContacts<T> {
+    pub own: EquationForm<T>,
+    pub moving: EquationForm<Dual<T, 1>>,
+}
+
 /// A contact, how its frame moves, and what it constrains.
-struct TracedContact<'a, T> {
-    closed: Option<&'a ClosedContact<'a>>,
-    contact: Contact<T>,
-    motion: RelativeMotion<T>,
-    constrained: FunctionalCoordinates<T>,
-    environment: Option<Environment<T>>,
+pub(super) struct TracedContact<'a, T> {
+    pub contact: Contact<T>,
+    pub motion: RelativeMotion<T>,
+    pub footing: Footing<'a, T>,
+}
+
+/// What a contact constrains, and what it stands on; of a loop nothing is `closed`.
+#[derive(Clone)]
+pub(super) struct Footing<'a, T> {
+    pub closed: Option<&'a ClosedContact<'a>>,
+    pub constrained: FunctionalCoordinates<T>,
+    pub environment: Option<Environment<T>>,
+}
+
+/// All that is constrained.
+pub(super) fn together<T: Real>(footings: &[&Footing<T>]) -> FunctionalCoordinates<T> {
+    footings.iter().fold(FunctionalCoordinates::default(), |all, f| all.and(f.constrained.clone()))
 }
 
 /// What is left of the equations at a given q̈ and F, with H, J, the rows in which reactions act, and the masses of yielding rows; one list
@@ -50,10 +70,11 @@ pub(super) fn system<T: Real>(
 ) -> Vec<Vec<T>> {
     let (q, qd, tau) = (&bound.arguments[0], &bound.arguments[1], &bound.arguments[2]);
     let traced = contacts(robot, mode, bound, added, form);
-    let constrained = traced.iter().fold(FunctionalCoordinates::default(), |all, t| all.and(t.constrained.clone()));
+    let footings: Vec<&Footing<T>> = traced.iter().map(|t| &t.footing).collect();
+    let constrained = together(&footings);
     let applied: Vec<Vec<T>> =
-        traced.iter().flat_map(|t| alg::applied_rows(&t.contact, &t.motion, &t.constrained)).collect();
-    let (supports, _) = supports(&traced, &constrained, options, added);
+        traced.iter().flat_map(|t| alg::applied_rows(&t.contact, &t.motion, &t.footing.constrained)).collect();
+    let (supports, _) = supports(&footings, &constrained, options, added);
     let inverse = of_robot(bound, form.reduced, Function::InverseDynamics, &[q.clone(), qd.clone(), qdd.to_vec()]);
     let mass_matrix = of_robot(bound, form.reduced, Function::MassMatrix, std::slice::from_ref(q));
     let residual = (0..inverse.len()).map(|i| {
@@ -83,14 +104,16 @@ fn of_robot<T: Real>(bound: &BoundRobot<T>, reduced: bool, function: Function, a
 }
 
 /// What the equations of all functions have in common.
-struct CommonEquations<'a, T> {
-    options: &'a Options,
-    bound: &'a BoundRobot<T>,
-    reduced: bool,
-    added: &'a Added<T>,
-    traced: Vec<TracedContact<'a, T>>,
-    constrained: FunctionalCoordinates<T>,
-    epsilon: T,
+pub(super) struct CommonEquations<'a, T> {
+    pub robot: &'a Robot,
+    pub mode: &'a Mode<'a>,
+    pub options: &'a Options,
+    pub bound: &'a BoundRobot<T>,
+    pub form: FormsOfContacts<T>,
+    pub added: &'a Added<T>,
+    pub traced: Vec<TracedContact<'a, T>>,
+    pub constrained: FunctionalCoordinates<T>,
+    pub epsilon: T,
 }
 
 /// The results of a function, one list per output.
@@ -99,14 +122,14 @@ pub(super) fn equations<T: Real>(
     options: &Options,
     mode: &Mode,
     function: ContactFunction,
-    form: EquationForm<T>,
+    form: FormsOfContacts<T>,
     bound: &BoundRobot<T>,
     added: &Added<T>,
 ) -> Vec<Vec<T>> {
-    let traced = contacts(robot, mode, bound, added, form);
-    let constrained = traced.iter().fold(FunctionalCoordinates::default(), |all, t| all.and(t.constrained.clone()));
+    let traced = contacts(robot, mode, bound, added, form.own);
+    let constrained = together(&traced.iter().map(|t| &t.footing).collect::<Vec<_>>());
     let epsilon = T::constant(Dd::from(ridge(options.scalar)));
-    let given = CommonEquations { options, bound, reduced: form.reduced, added, traced, constrained, epsilon };
+    let given = CommonEquations { robot, mode, options, bound, form, added, traced, constrained, epsilon };
     let list = |c: FunctionalCoordinates<T>| vec![c.value, c.rate, c.jacobian.concat(), c.bias];
     match function {
         ContactFunction::ConstrainedCoordinates => list(given.constrained),
@@ -116,32 +139,38 @@ pub(super) fn equations<T: Real>(
         ContactFunction::InverseDynamics => given.inverse_dynamics(),
         ContactFunction::Impact => given.impact(),
         ContactFunction::Projection => given.projection(),
+        ContactFunction::ForwardDynamicsDerivatives => given.forward_dynamics_derivatives(),
+        ContactFunction::ImpactDerivatives => given.impact_derivatives(),
     }
 }
 
 impl<T: Real> CommonEquations<'_, T> {
-    fn q(&self) -> &Vec<T> {
+    pub fn q(&self) -> &Vec<T> {
         &self.bound.arguments[0]
     }
 
-    fn qd(&self) -> &Vec<T> {
+    pub fn qd(&self) -> &Vec<T> {
         &self.bound.arguments[1]
     }
 
-    fn of_robot(&self, function: Function, arguments: &[Vec<T>]) -> Vec<T> {
-        of_robot(self.bound, self.reduced, function, arguments)
+    pub fn of_robot(&self, function: Function, arguments: &[Vec<T>]) -> Vec<T> {
+        of_robot(self.bound, self.form.own.reduced, function, arguments)
+    }
+
+    pub fn footings(&self) -> Vec<&Footing<'_, T>> {
+        self.traced.iter().map(|t| &t.footing).collect()
     }
 
     fn mass_matrix(&self) -> Vec<T> {
         self.of_robot(Function::MassMatrix, std::slice::from_ref(self.q()))
     }
 
-    fn factor(&self) -> Ltdl<T> {
+    pub fn factor(&self) -> Ltdl<T> {
         Ltdl::factor(&self.bound.model, &self.mass_matrix())
     }
 
     /// With the rotors of rigid drives, which are struck, too.
-    fn whole_factor(&self) -> Ltdl<T> {
+    pub fn whole_factor(&self) -> Ltdl<T> {
         match self.bound.model.drives.is_empty() {
             true => self.factor(),
             false => alg::driven_factor(&self.bound.model, self.q(), &self.mass_matrix()),
@@ -149,21 +178,22 @@ impl<T: Real> CommonEquations<'_, T> {
     }
 
     fn free(&self) -> FunctionalCoordinates<T> {
-        let of = |t: &TracedContact<T>| Some(alg::functional_coordinates(&t.contact, &t.motion, &t.closed?.free));
+        let of =
+            |t: &TracedContact<T>| Some(alg::functional_coordinates(&t.contact, &t.motion, &t.footing.closed?.free));
         self.traced.iter().filter_map(of).fold(FunctionalCoordinates::default(), FunctionalCoordinates::and)
     }
 
     /// The rows in which reactions act, if those are others.
-    fn applied(&self) -> Option<Vec<Vec<T>>> {
-        let slides = self.traced.iter().any(|t| t.closed.is_some_and(|c| c.slides));
-        let of = |t: &TracedContact<T>| alg::applied_rows(&t.contact, &t.motion, &t.constrained);
+    pub fn applied(&self) -> Option<Vec<Vec<T>>> {
+        let slides = self.traced.iter().any(|t| t.footing.closed.is_some_and(|c| c.slides));
+        let of = |t: &TracedContact<T>| alg::applied_rows(&t.contact, &t.motion, &t.footing.constrained);
         slides.then(|| self.traced.iter().flat_map(of).collect())
     }
 
     fn forward_dynamics(&self, is_driven: bool) -> Vec<Vec<T>> {
         let CommonEquations { bound, constrained, epsilon, .. } = self;
         let bias = self.of_robot(Function::BiasForce, &[self.q().clone(), self.qd().clone()]);
-        let (supports, own_rates) = supports(&self.traced, constrained, self.options, self.added);
+        let (supports, own_rates) = supports(&self.footings(), constrained, self.options, self.added);
         let applied = self.applied();
         let applied = applied.as_deref();
         let (motion, xd) = if is_driven {
@@ -195,23 +225,7 @@ impl<T: Real> CommonEquations<'_, T> {
 
     fn impact(&self) -> Vec<Vec<T>> {
         let CommonEquations { constrained, epsilon, added, .. } = self;
-        let mut struck = vec![Struck::Rigid; constrained.len()];
-        let mut places = Vec::new();
-        let mut first = 0;
-        for t in &self.traced {
-            if let (Some(environment), Some(closed)) = (&t.environment, t.closed) {
-                let k = first + distance_row(&closed.constrained);
-                let velocity = match closed.of_environment().1 {
-                    true => {
-                        places.push(k);
-                        added[&format!("{}_struck", closed.item.identifier())][0]
-                    }
-                    false => T::zero(),
-                };
-                struck[k] = Struck::Mass { mass: environment.struck_mass(), velocity };
-            }
-            first += t.constrained.len();
-        }
+        let (struck, places) = self.struck();
         let applied = self.applied();
         let (factor, restitution) = (self.whole_factor(), added["restitution"][0]);
         let blow = alg::impact(&factor, self.qd(), constrained, applied.as_deref(), &struck, restitution, *epsilon);
@@ -220,10 +234,33 @@ impl<T: Real> CommonEquations<'_, T> {
         [results, after].concat()
     }
 
+    /// What the rows hit, and those of masses whose velocities are given.
+    pub fn struck(&self) -> (Vec<Struck<T>>, Vec<usize>) {
+        let mut struck = vec![Struck::Rigid; self.constrained.len()];
+        let mut places = Vec::new();
+        let mut first = 0;
+        for t in self.footings() {
+            if let (Some(environment), Some(closed)) = (&t.environment, t.closed) {
+                let k = first + distance_row(&closed.constrained);
+                let velocity = match closed.has(PerContact::WithMass) {
+                    true => {
+                        places.push(k);
+                        self.added[&format!("{}_struck", closed.item.identifier())][0]
+                    }
+                    false => T::zero(),
+                };
+                struck[k] = Struck::Mass { mass: environment.struck_mass(), velocity };
+            }
+            first += t.constrained.len();
+        }
+        (struck, places)
+    }
+
     fn projection(self) -> Vec<Vec<T>> {
-        let CommonEquations { constrained, traced, .. } = &self;
-        let deviations = deviations(traced, constrained);
-        let is_rigid = rigid_rows(traced);
+        let CommonEquations { constrained, .. } = &self;
+        let footings = self.footings();
+        let deviations = deviations(&footings, constrained);
+        let is_rigid = rigid_rows(&footings);
         let kept = |list: &[T]| list.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| *k.0).collect::<Vec<T>>();
         let rows = constrained.jacobian.iter().zip(&is_rigid).filter(|k| *k.1).map(|k| k.0.clone());
         let rigid = FunctionalCoordinates {
@@ -241,8 +278,8 @@ impl<T: Real> CommonEquations<'_, T> {
 }
 
 /// What the rows stand on, and the rates of the objects' own coordinates.
-fn supports<T: Real>(
-    traced: &[TracedContact<T>],
+pub(super) fn supports<T: Real>(
+    footings: &[&Footing<T>],
     constrained: &FunctionalCoordinates<T>,
     options: &Options,
     added: &Added<T>,
@@ -250,7 +287,7 @@ fn supports<T: Real>(
     let stabilised = match options.scene.contacts.stabilisation {
         Some((frequency, damping)) => {
             let [frequency, damping] = [frequency, damping].map(|x| T::constant(Dd::from(x)));
-            let pulled = FunctionalCoordinates { value: deviations(traced, constrained), ..constrained.clone() };
+            let pulled = FunctionalCoordinates { value: deviations(footings, constrained), ..constrained.clone() };
             alg::baumgarte(&pulled, frequency, damping)
         }
         None => vec![T::zero(); constrained.len()],
@@ -258,7 +295,7 @@ fn supports<T: Real>(
     let mut supports: Vec<Support<T>> = stabilised.into_iter().map(Support::Rigid).collect();
     let mut own_rates = Vec::new();
     let mut first = 0;
-    for t in traced {
+    for t in footings {
         if let (Some(environment), Some(closed)) = (&t.environment, t.closed) {
             let k = distance_row(&closed.constrained);
             let s = (t.constrained.value[k], t.constrained.rate[k]);
@@ -280,8 +317,8 @@ fn supports<T: Real>(
 
 /// How far the rows are from where they are held: what sticks is held where that has happened, which is not known here, so that
 /// its rate alone counts.
-fn deviations<T: Real>(traced: &[TracedContact<T>], constrained: &FunctionalCoordinates<T>) -> Vec<T> {
-    let by_friction = traced.iter().flat_map(|t| match t.closed {
+fn deviations<T: Real>(footings: &[&Footing<T>], constrained: &FunctionalCoordinates<T>) -> Vec<T> {
+    let by_friction = footings.iter().flat_map(|t| match t.closed {
         Some(closed) => closed.constrained.iter().map(|c| !closed.item.constrained.contains(c)).collect(),
         None => vec![false; t.constrained.len()],
     });
@@ -289,12 +326,12 @@ fn deviations<T: Real>(traced: &[TracedContact<T>], constrained: &FunctionalCoor
 }
 
 /// Rows that are not on an object that gives way.
-fn rigid_rows<T: Real>(traced: &[TracedContact<T>]) -> Vec<bool> {
-    let of = |t: &TracedContact<T>| {
+fn rigid_rows<T: Real>(footings: &[&Footing<T>]) -> Vec<bool> {
+    let of = |t: &&Footing<T>| {
         let yields = t.environment.as_ref().and(t.closed).map(|closed| distance_row(&closed.constrained));
         (0..t.constrained.len()).map(|k| yields != Some(k)).collect::<Vec<bool>>()
     };
-    traced.iter().flat_map(of).collect()
+    footings.iter().flat_map(of).collect()
 }
 
 /// The row of the distance among the constrained coordinates of a contact.
@@ -303,7 +340,7 @@ fn distance_row(constrained: &[Coordinate]) -> usize {
 }
 
 /// Contacts and loops of a mode, traced.
-fn contacts<'a, T: Real>(
+pub(super) fn contacts<'a, T: Real>(
     robot: &Robot,
     mode: &'a Mode,
     bound: &BoundRobot<T>,
@@ -336,7 +373,6 @@ fn contacts<'a, T: Real>(
                 })
             }
         };
-        let number = |x: f64| T::constant(Dd::from(x));
         let contact = Contact {
             name: item.name.clone(),
             frame: frame(&item.frame),
@@ -353,27 +389,31 @@ fn contacts<'a, T: Real>(
             Some((body, robot.reduced_frames[body].inverse().compose(&f.placement).map(T::constant)))
         });
         let by_reduced = placed
-            .filter(|_| form.reduced && bound.reduced.serves(&bound.model))
+            .filter(|_| form.reduced && form.is_carried && bound.reduced.serves(&bound.model))
             .and_then(|placed| alg::reduced_relative_motion(&bound.reduced, &contact, placed, q, qd));
         let mut motion = by_reduced.unwrap_or_else(|| alg::relative_motion(&bound.model, &contact, q, qd));
         if let Some(g) = form.falls {
             motion.acceleration = motion.acceleration.map(|x| (x + g) - g);
         }
         let constrained = alg::functional_coordinates(&contact, &motion, &contact.constrained);
-        let environment = item.environment.as_ref().map(|e| {
-            let values = match &e.values {
-                Some(values) => values.iter().map(|x| number(*x)).collect(),
-                None => input("environment").clone(),
-            };
-            e.over(&values)
-        });
-        all.push(TracedContact { closed: Some(closed), contact, motion, constrained, environment });
+        let footing = Footing { closed: Some(closed), constrained, environment: environment(closed, added) };
+        all.push(TracedContact { contact, motion, footing });
     }
     for a_loop in mode.loops {
         let contact = a_loop.over(frame(&a_loop.frame), frame(&a_loop.with));
         let motion = alg::relative_motion(&bound.model, &contact, q, qd);
         let constrained = alg::functional_coordinates(&contact, &motion, &contact.constrained);
-        all.push(TracedContact { closed: None, contact, motion, constrained, environment: None });
+        all.push(TracedContact { contact, motion, footing: Footing { closed: None, constrained, environment: None } });
     }
     all
+}
+
+/// The object of a contact, if it gives way.
+pub(super) fn environment<T: Real>(closed: &ClosedContact, added: &Added<T>) -> Option<Environment<T>> {
+    let item = closed.item.environment.as_ref()?;
+    let values = match &item.values {
+        Some(values) => values.iter().map(|x| T::constant(Dd::from(*x))).collect(),
+        None => added[&format!("{}_environment", closed.item.identifier())].clone(),
+    };
+    Some(item.over(&values))
 }

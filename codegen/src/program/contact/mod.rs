@@ -4,11 +4,14 @@
 //! branches. Everything about one mode is traced into one program per function, with the reduced robot where it serves: the
 //! motion of a contact's frame shares the recursion of the bias force.
 
+mod derivatives;
 mod equations;
 
 use crate::equations::bind::{is_optional, BoundRobot};
 use crate::equations::Robot;
-use crate::function::{ContactFunction, ForwardDynamicsMethod, Function, Quantity};
+use crate::function::{
+    ContactExtent, ContactFunction, ContactPort, ForwardDynamicsMethod, Function, InModes, PerContact, Quantity,
+};
 use crate::identifier::module_name;
 use crate::options::{FormChoices, Optimisations, Options};
 use crate::program::choose::choose;
@@ -16,11 +19,10 @@ use crate::program::equivalence::{self, Disagreement, Plainer};
 use crate::program::passed;
 use crate::scene::contact::{ContactItem, EnvironmentKind, LoopItem, ModeItem, SurfaceItem};
 use crate::scene::Scene;
-use equations::{Added, EquationForm};
-use straightline_core::algorithms::drive_states;
+use equations::{Added, EquationForm, FormsOfContacts};
 use straightline_core::contact::Coordinate;
 use straightline_core::model::Model;
-use straightline_core::{Dd, Real};
+use straightline_core::{Dd, Dual, Real};
 use straightline_graph::certify::residual::OUTPUTS;
 use straightline_graph::expr::{Graph, Port};
 use straightline_graph::pass::{dead_code, sums, unread_inputs};
@@ -98,6 +100,17 @@ impl<'a> Mode<'a> {
         of_contacts.chain(of_loops).collect()
     }
 
+    /// An input or a block of results that a function has in this mode, of a contact.
+    fn port(&self, port: &ContactPort, contact: &str, model: &Model<Dd>) -> Port {
+        let length = |extent: &ContactExtent| match *extent {
+            ContactExtent::Robot(extent) => extent.len(model, 0),
+            ContactExtent::Constrained => self.constrained_names().len(),
+            ContactExtent::Free => self.free_names().len(),
+            ContactExtent::Masses => self.contacts.iter().filter(|c| c.has(PerContact::WithMass)).count(),
+        };
+        Port::new(&port.name_for(contact), &port.axes.iter().map(length).collect::<Vec<_>>())
+    }
+
     /// Free coordinates likewise.
     pub fn free_names(&self) -> Vec<String> {
         self.contacts.iter().flat_map(|c| c.free.iter().map(|k| format!("{}.{}", c.item.name, k.name()))).collect()
@@ -105,11 +118,15 @@ impl<'a> Mode<'a> {
 }
 
 impl ClosedContact<'_> {
-    /// Whether its object has a coordinate of its own, and whether a mass is there to be struck.
-    fn of_environment(&self) -> (bool, bool) {
+    /// Whether its object has what such inputs and results are about.
+    fn has(&self, per: PerContact) -> bool {
         use EnvironmentKind::{BothSides, Cushioned, Mass, TwoMasses};
         let kind = self.item.environment.as_ref().map(|e| e.kind);
-        (matches!(kind, Some(Cushioned | TwoMasses | BothSides)), matches!(kind, Some(Mass | TwoMasses)))
+        match per {
+            PerContact::No => true,
+            PerContact::WithOwnCoordinate => matches!(kind, Some(Cushioned | TwoMasses | BothSides)),
+            PerContact::WithMass => matches!(kind, Some(Mass | TwoMasses)),
+        }
     }
 }
 
@@ -132,17 +149,17 @@ pub fn programs(robot: &Robot, options: &Options, mode: &Mode) -> Result<Vec<Mod
     let wanted = options.scene.contacts.wanted();
     let has_free = !mode.free_names().is_empty();
     let is_driven = !robot.model.drives.is_empty();
-    let wanted = wanted.into_iter().filter(|f| match f {
-        ContactFunction::FreeCoordinates => has_free,
-        ContactFunction::DrivenForwardDynamics => is_driven,
-        _ => true,
+    let wanted = wanted.into_iter().filter(|f| match f.spec().modes {
+        InModes::WithFreeCoordinates => has_free,
+        InModes::OfDrivenRobots => is_driven,
+        InModes::All => true,
     });
     wanted.map(|function| checked(robot, options, mode, function)).collect()
 }
 
 /// The inputs that a function of a mode may have.
 pub(crate) fn ports(robot: &Robot, options: &Options, mode: &Mode, function: ContactFunction) -> Vec<Port> {
-    let own = options.scene.ports(base_function(function), &robot.model, &[]);
+    let own = options.scene.ports(function.spec().base, &robot.model, &[]);
     own.into_iter().chain(added_ports(function, mode, &robot.model)).collect()
 }
 
@@ -162,8 +179,13 @@ fn checked(
 }
 
 /// Over expressions every surface is there.
-fn traced_form(optimisations: Optimisations) -> EquationForm<Expr> {
-    EquationForm { reduced: optimisations.reduced, surface: SurfaceItem::traced, falls: None }
+fn traced_form(function: ContactFunction, optimisations: Optimisations) -> FormsOfContacts<Expr> {
+    let (reduced, falls) = (optimisations.reduced, None);
+    let is_carried = function.spec().form == Function::ForwardDynamics;
+    FormsOfContacts {
+        own: EquationForm { reduced, is_carried, surface: SurfaceItem::traced, falls },
+        moving: EquationForm { reduced, is_carried, surface: SurfaceItem::traced_moving, falls: None },
+    }
 }
 
 /// The results of one function of a mode by the robot's own parameters, over any scalar, without a graph: `given` stands for the inputs of
@@ -190,17 +212,23 @@ fn plainly<T: Real>(
     function: ContactFunction,
     given: &dyn Fn(&Port) -> Vec<T>,
     prepare: &dyn Fn(&mut Model<T>) -> Option<T>,
-) -> Option<(BoundRobot<T>, EquationForm<T>, Added<T>)> {
+) -> Option<(BoundRobot<T>, FormsOfContacts<T>, Added<T>)> {
     if mode.contacts.iter().any(|c| c.item.surface.over::<T>().is_none()) {
         return None;
     }
-    let own = base_function(function);
+    let own = function.spec().base;
     let inputs: Vec<Vec<T>> = options.scene.ports(own, &robot.model, &[]).iter().map(given).collect();
     let mut bound = options.scene.bind(own, robot, &inputs);
     let falls = prepare(&mut bound.model);
     let added = added_ports(function, mode, &robot.model).into_iter().map(|p| (p.name.clone(), given(&p))).collect();
-    let form = EquationForm { reduced: false, surface: |s: &SurfaceItem| s.over().expect("asked for above"), falls };
-    Some((bound, form, added))
+    let own = plain_form(falls);
+    Some((bound, FormsOfContacts { own, moving: plain_form(falls.map(Dual::fixed)) }, added))
+}
+
+/// By the robot's own parameters, where surfaces are to be had over this scalar.
+fn plain_form<T: Real>(falls: Option<T>) -> EquationForm<T> {
+    let surface = |s: &SurfaceItem| s.over().expect("asked for before");
+    EquationForm { reduced: false, is_carried: false, surface, falls }
 }
 
 /// The operations of one function of a mode.
@@ -217,9 +245,9 @@ pub(crate) fn optimised(
     optimisations: Optimisations,
 ) -> Graph {
     let check = |pass, graph| passed(pass, function.name(), graph);
-    let chosen = chosen(robot, options, optimisations);
+    let chosen = chosen(robot, options, function.spec().form, optimisations);
     let robot = chosen.as_ref().unwrap_or(robot);
-    let base = base_function(function);
+    let base = function.spec().base;
     let own = options.scene.ports(base, &robot.model, &[]);
     let added = added_ports(function, mode, &robot.model);
     let names: Vec<String> = added.iter().map(|p| p.name.clone()).collect();
@@ -230,7 +258,8 @@ pub(crate) fn optimised(
         let (given, added) = inputs.split_at(own.len());
         let given = options.scene.bind(base, robot, given);
         let added = names.iter().cloned().zip(added.iter().cloned()).collect();
-        let results = equations::equations(robot, options, mode, function, traced_form(optimisations), &given, &added);
+        let results =
+            equations::equations(robot, options, mode, function, traced_form(function, optimisations), &given, &added);
         assert!(results.iter().map(Vec::len).eq(lengths.iter().copied()), "results fit the outputs");
         results.concat()
     });
@@ -247,14 +276,17 @@ pub(crate) fn optimised(
     }
 }
 
-/// The robot in the form that takes the fewest operations, of those in which contacts can be described.
-fn chosen(robot: &Robot, options: &Options, optimisations: Optimisations) -> Option<Robot> {
+/// The robot in the form that takes a function the fewest operations, of those in which contacts can be described.
+fn chosen(robot: &Robot, options: &Options, function: Function, optimisations: Optimisations) -> Option<Robot> {
     let factorised = Options { forward_dynamics: ForwardDynamicsMethod::Factorisation, ..options.clone() };
     (optimisations.chosen && optimisations.reduced).then(|| {
-        // contact frames are described in the frames that any robot takes
-        let forms = FormChoices { origins: false, tips: false, ..optimisations.forms };
+        let forms = match function {
+            // contact frames are described in the frames that any robot takes
+            Function::ForwardDynamics => FormChoices { origins: false, tips: false, ..optimisations.forms },
+            _ => optimisations.forms,
+        };
         let optimisations = Optimisations { chosen: false, forms, ..optimisations };
-        choose(robot, &[], Function::ForwardDynamics, &factorised, optimisations)
+        choose(robot, &[], function, &factorised, optimisations)
     })
 }
 
@@ -262,7 +294,7 @@ fn chosen(robot: &Robot, options: &Options, optimisations: Optimisations) -> Opt
 /// [`acceleration_bound`](straightline_graph::certify::residual::acceleration_bound) takes, with the flags of rows that yield. The other inputs are those of
 /// forward dynamics. A mode without contacts is the robot alone.
 pub fn system(robot: &Robot, options: &Options, mode: &Mode, optimisations: Optimisations) -> (Graph, Vec<bool>) {
-    let chosen = chosen(robot, options, optimisations);
+    let chosen = chosen(robot, options, Function::ForwardDynamics, optimisations);
     let robot = chosen.as_ref().unwrap_or(robot);
     let (nv, m) = (robot.model.nv(), mode.constrained_names().len());
     let own = options.scene.ports(Function::ForwardDynamics, &robot.model, &[]);
@@ -279,8 +311,8 @@ pub fn system(robot: &Robot, options: &Options, mode: &Mode, optimisations: Opti
         let given = options.scene.bind(Function::ForwardDynamics, robot, given);
         let added = names.iter().cloned().zip(added.iter().cloned()).collect();
         let force = solution.get(1).map_or(&[][..], |f| &f[..]);
-        equations::system(robot, options, mode, &given, traced_form(optimisations), &added, (&solution[0], force))
-            .concat()
+        let form = traced_form(ContactFunction::ForwardDynamics, optimisations).own;
+        equations::system(robot, options, mode, &given, form, &added, (&solution[0], force)).concat()
     });
     for closed in &mode.contacts {
         let gives_way = closed.item.environment.is_some();
@@ -329,7 +361,7 @@ pub(crate) fn evaluate_system<T: Real>(
     let function = ContactFunction::ForwardDynamics;
     let (bound, form, added) = plainly(robot, options, mode, function, given, prepare)?;
     let [qdd, force] = solution_ports(&robot.model, mode).map(|p| if p.is_empty() { Vec::new() } else { given(&p) });
-    Some(equations::system(robot, options, mode, &bound, form, &added, (&qdd, &force)).concat())
+    Some(equations::system(robot, options, mode, &bound, form.own, &added, (&qdd, &force)).concat())
 }
 
 /// What a system judges: accelerations and reactions.
@@ -341,20 +373,6 @@ fn solution_ports(model: &Model<Dd>, mode: &Mode) -> [Port; 2] {
 pub(crate) fn system_ports(robot: &Robot, options: &Options, mode: &Mode) -> Vec<Port> {
     let own = ports(robot, options, mode, ContactFunction::ForwardDynamics);
     own.into_iter().chain(solution_ports(&robot.model, mode).into_iter().filter(|p| !p.is_empty())).collect()
-}
-
-/// The function of the robot whose inputs a contact function has.
-fn base_function(function: ContactFunction) -> Function {
-    match function {
-        ContactFunction::ForwardDynamics => Function::ForwardDynamics,
-        ContactFunction::DrivenForwardDynamics => Function::DrivenForwardDynamics,
-        ContactFunction::InverseDynamics => Function::InverseDynamics,
-        _ => Function::BiasForce,
-    }
-}
-
-fn is_forward(function: ContactFunction) -> bool {
-    matches!(function, ContactFunction::ForwardDynamics | ContactFunction::DrivenForwardDynamics)
 }
 
 /// What it takes beside.
@@ -373,22 +391,11 @@ fn added_ports(function: ContactFunction, mode: &Mode, model: &Model<Dd>) -> Vec
         if let Some(environment) = item.environment.as_ref().filter(|e| e.values.is_none()) {
             ports.push(Port::new(&format!("{name}_environment"), &[environment.kind.keys().len()]));
         }
-        let (own, struck) = closed.of_environment();
-        if own && is_forward(function) {
-            ports.push(Port::new(&format!("{name}_own"), &[2]));
-        }
-        if struck && function == ContactFunction::Impact {
-            ports.push(Port::new(&format!("{name}_struck"), &[1]));
-        }
+        let own = function.spec().inputs.iter().filter(|port| port.per != PerContact::No && closed.has(port.per));
+        ports.extend(own.map(|port| mode.port(port, &name, model)));
     }
-    match function {
-        ContactFunction::InverseDynamics => {
-            ports.push(Port::new("sdd_free", &[mode.free_names().len()]));
-            ports.push(Port::new("force", &[mode.constrained_names().len()]));
-        }
-        ContactFunction::Impact => ports.push(Port::new("restitution", &[1])),
-        _ => {}
-    }
+    let once = function.spec().inputs.iter().filter(|port| port.per == PerContact::No);
+    ports.extend(once.map(|port| mode.port(port, "", model)));
     debug_assert!(model.nv() > 0);
     ports.retain(|p| !p.is_empty());
     ports
@@ -396,45 +403,14 @@ fn added_ports(function: ContactFunction, mode: &Mode, model: &Model<Dd>) -> Vec
 
 /// What it puts out.
 fn outputs(function: ContactFunction, mode: &Mode, model: &Model<Dd>) -> Vec<Port> {
-    let (nv, m) = (model.nv(), mode.constrained_names().len());
-    let coordinates =
-        |m: usize| vec![Port::new("s", &[m]), Port::new("sd", &[m]), Port::new("j", &[m, nv]), Port::new("a", &[m])];
-    let per_contact = |suffix: &str, len: usize, wanted: fn((bool, bool)) -> bool| -> Vec<Port> {
-        let contacts = mode.contacts.iter().filter(move |c| wanted(c.of_environment()));
-        contacts.map(|c| Port::new(&format!("{}_{suffix}", c.item.identifier()), &[len])).collect()
+    let of = |port: &ContactPort| match port.per {
+        PerContact::No => vec![mode.port(port, "", model)],
+        per => {
+            let contacts = mode.contacts.iter().filter(|c| c.has(per));
+            contacts.map(|c| mode.port(port, &c.item.identifier(), model)).collect()
+        }
     };
-    match function {
-        ContactFunction::ConstrainedCoordinates => coordinates(m),
-        ContactFunction::FreeCoordinates => coordinates(mode.free_names().len()),
-        ContactFunction::ForwardDynamics | ContactFunction::DrivenForwardDynamics => [
-            vec![Quantity::Acceleration.port(model, 0)],
-            match function {
-                ContactFunction::DrivenForwardDynamics => vec![Port::new("xd", &[drive_states(model)])],
-                _ => vec![],
-            },
-            vec![
-                Port::new("force", &[m]),
-                Port::new("sdd", &[m]),
-                Port::new("violation", &[m]),
-                Port::new("pivot", &[1]),
-            ],
-            per_contact("own_rate", 2, |(own, _)| own),
-        ]
-        .concat(),
-        ContactFunction::InverseDynamics => vec![Quantity::Force.port(model, 0), Port::new("pivot", &[1])],
-        ContactFunction::Impact => [
-            vec![
-                Port::new("dqd", &[nv]),
-                Port::new("impulse", &[m]),
-                Port::new("dsd", &[m]),
-                Port::new("energy_loss", &[1]),
-                Port::new("pivot", &[1]),
-            ],
-            per_contact("struck_after", 1, |(_, struck)| struck),
-        ]
-        .concat(),
-        ContactFunction::Projection => vec![Port::new("dq", &[nv]), Port::new("s", &[m])],
-    }
+    function.spec().outputs.iter().flat_map(of).collect()
 }
 
 /// ε of the regularisation: what numbers of this format can bear.

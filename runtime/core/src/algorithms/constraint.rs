@@ -60,6 +60,17 @@ pub fn constrained_forward_dynamics<T: Real>(
 ) -> ConstrainedMotion<T> {
     let rows: Vec<ContactRow<T>> = supports.iter().map(row_of).collect();
     let system = ContactSystem::new(factor, &constrained.jacobian, applied, &rows, ridge);
+    motion_of(&system, factor, drive, constrained, supports)
+}
+
+/// The same with the system of the contacts at hand.
+pub(super) fn motion_of<T: Real>(
+    system: &ContactSystem<T>,
+    factor: &Ltdl<T>,
+    drive: &[T],
+    constrained: &FunctionalCoordinates<T>,
+    supports: &[Support<T>],
+) -> ConstrainedMotion<T> {
     let half = factor.half(drive);
     // s̈ without reactions
     let free: Vec<T> = system.response(&half).into_iter().zip(&constrained.bias).map(|(x, a)| x + *a).collect();
@@ -79,7 +90,7 @@ pub fn constrained_forward_dynamics<T: Real>(
     ConstrainedMotion { violation: violation.collect(), qdd, force, sdd, pivot: system.pivot }
 }
 
-fn row_of<T: Real>(support: &Support<T>) -> ContactRow<T> {
+pub(super) fn row_of<T: Real>(support: &Support<T>) -> ContactRow<T> {
     match *support {
         Support::Rigid(_) => ContactRow::Rigid,
         Support::Yielding { mass, .. } => ContactRow::Yielding(mass),
@@ -146,19 +157,24 @@ pub fn applied_rows<T: Real>(
     constrained: &FunctionalCoordinates<T>,
 ) -> Vec<Vec<T>> {
     let mut rows = constrained.jacobian.clone();
+    let Some((k, tilt)) = friction_tilt(contact, motion) else { return rows };
+    for (i, entry) in rows[k].iter_mut().enumerate() {
+        let along = tilt.iter().zip(&motion.jacobian).fold(T::zero(), |sum, (d, row)| sum + *d * row[i]);
+        *entry = *entry - along;
+    }
+    rows
+}
+
+/// Of a contact that slides the place of its distance among the constrained coordinates, and μ v_t/√(v_t² + w²).
+pub(super) fn friction_tilt<T: Real>(contact: &Contact<T>, motion: &RelativeMotion<T>) -> Option<(usize, [T; 3])> {
     let (Some(friction), Some(k)) = (contact.friction, contact.constrained.iter().position(|c| *c == Coordinate::Pz))
     else {
-        return rows;
+        return None;
     };
     T::section("friction", None);
     let n = contact.surface.normal(motion.position);
     let v = motion.velocity;
     let slip: Vec3<T> = v - n.scale(n.dot(v));
     let speed = (slip.dot(slip) + friction.speed * friction.speed).sqrt();
-    let tilt = slip.scale(friction.coefficient / speed).to_array();
-    for (i, entry) in rows[k].iter_mut().enumerate() {
-        let along = tilt.iter().zip(&motion.jacobian).fold(T::zero(), |sum, (d, row)| sum + *d * row[i]);
-        *entry = *entry - along;
-    }
-    rows
+    Some((k, slip.scale(friction.coefficient / speed).to_array()))
 }

@@ -85,6 +85,16 @@ pub fn driven_factor<T: Real>(model: &Model<T>, q: &[T], mass_matrix: &[T]) -> L
     driven.factor(&h)
 }
 
+/// H* − H, nv × nv, without losses: what the drives add to the mass matrix for impacts and projections.
+pub fn drive_inertia<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
+    let (states, inputs) = (vec![T::zero(); super::drive_states(model)], vec![T::zero(); model.drives.len()]);
+    let rest = vec![T::zero(); model.nv()];
+    let driven = Driven::new(model, &model.drives, (q, &rest, &states, &inputs));
+    let mut added = vec![T::zero(); model.nv() * model.nv()];
+    driven.add_inertias(&mut added, &vec![T::one(); model.drives.len()]);
+    added
+}
+
 /// What a jump Δq̇ does to the states of the drives: shafts of rigid drives jump with the joints, those of elastic ones only as far
 /// as their rotors turn with a link in space. By entry of x. Shafts that do not give way do not jump, but what they hold against may reach
 /// their other states: `held` is the impulse H Δq̇ − Ĵᵀ I that the joints take beside contacts, which is read for those alone.

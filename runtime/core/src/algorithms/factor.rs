@@ -124,8 +124,13 @@ impl<T: Real> Ltdl<T> {
         self.finish_up_to(last, y)
     }
 
+    /// The velocity coordinates in the order of the rows, from the base outwards.
+    pub(super) fn rows(&self) -> &[usize] {
+        &self.coordinates
+    }
+
     /// The same of the rows up to the one given; the others are left as they were.
-    fn finish_up_to(&self, last: usize, y: Vec<T>) -> Vec<T> {
+    pub(super) fn finish_up_to(&self, last: usize, y: Vec<T>) -> Vec<T> {
         let mut x = y;
         let mut solution = x.clone();
         for i in (0..x.len()).take(last + 1) {

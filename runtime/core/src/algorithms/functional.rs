@@ -87,46 +87,13 @@ pub fn functional_coordinates<T: Real>(
     coordinates: &[Coordinate],
 ) -> FunctionalCoordinates<T> {
     T::section("functional coordinates", None);
-    let variables = |k: usize, x: Vec3<T>, rate: Vec3<T>, second: Vec3<T>| {
-        Vec3::new(
-            Functional::variable(k, x.x, rate.x, second.x),
-            Functional::variable(k + 1, x.y, rate.y, second.y),
-            Functional::variable(k + 2, x.z, rate.z, second.z),
-        )
-    };
-    // an axis u of the frame: u̇ = ω × u,  ü = ε × u + ω × u̇
-    let (omega, epsilon) = (motion.angular_velocity, motion.angular_acceleration);
-    let axis = |k: usize, u: Vec3<T>| {
-        let u = motion.rotation * u;
-        let rate = omega.cross(u);
-        (variables(k, u, rate, epsilon.cross(u) + omega.cross(rate)), u)
-    };
-    let p = variables(0, motion.position, motion.velocity, motion.acceleration);
-    let (a, a_value) = axis(3, contact.axis);
-    let (b, b_value) = axis(6, contact.second_axis);
-    let (distance, normal) = contact.surface.distance_and_normal(p);
-    let tangential = |x: Functional<T>, n: Functional<T>| x - a.dot(normal) * n;
-
+    let place = PlaceOnSurface::new(contact, motion);
     let mut found = FunctionalCoordinates::default();
     for coordinate in coordinates {
-        let s = match coordinate {
-            Coordinate::Px => p.x,
-            Coordinate::Py => p.y,
-            Coordinate::Pz => distance,
-            Coordinate::Ax => tangential(a.x, normal.x),
-            Coordinate::Ay => tangential(a.y, normal.y),
-            Coordinate::Az => b.y,
-        };
-        let part = |k: usize| Vec3::new(s.gradient[k], s.gradient[k + 1], s.gradient[k + 2]);
-        // δu = δφ × u: ∂s/∂u · δu = (u × ∂s/∂u) · δφ
-        let (along, about) = (part(0), a_value.cross(part(3)) + b_value.cross(part(6)));
-        let weights: [T; 6] = {
-            let ([x, y, z], [u, v, w]) = (along.to_array(), about.to_array());
-            [x, y, z, u, v, w]
-        };
+        let s = place.coordinate(*coordinate);
         let nv = motion.jacobian[0].len();
         let entry = |i: usize| {
-            let terms = weights.iter().zip(&motion.jacobian).map(|(w, row)| *w * row[i]);
+            let terms = s.weights.iter().zip(&motion.jacobian).map(|(w, row)| *w * row[i]);
             terms.fold(T::zero(), |sum, x| sum + x)
         };
         found.value.push(s.value);
@@ -135,6 +102,71 @@ pub fn functional_coordinates<T: Real>(
         found.bias.push(s.second);
     }
     found
+}
+
+/// One functional coordinate, before the robot's own come in.
+pub(super) struct WeighedCoordinate<T> {
+    /// s.
+    pub value: T,
+    /// ṡ.
+    pub rate: T,
+    /// s̈ at the accelerations of the motion.
+    pub second: T,
+    /// ∂ṡ/∂(ṗ, ω): ṡ is this times ṗ and ω.
+    pub weights: [T; 6],
+}
+
+/// Where the frame of a contact is on its surface: what all of its coordinates have in common.
+pub(super) struct PlaceOnSurface<T> {
+    p: Vec3<Functional<T>>,
+    a: Vec3<Functional<T>>,
+    b: Vec3<Functional<T>>,
+    /// The two axes alone.
+    axes: [Vec3<T>; 2],
+    distance: Functional<T>,
+    normal: Vec3<Functional<T>>,
+}
+
+impl<T: Real> PlaceOnSurface<T> {
+    pub fn new(contact: &Contact<T>, motion: &RelativeMotion<T>) -> Self {
+        let variables = |k: usize, x: Vec3<T>, rate: Vec3<T>, second: Vec3<T>| {
+            Vec3::new(
+                Functional::variable(k, x.x, rate.x, second.x),
+                Functional::variable(k + 1, x.y, rate.y, second.y),
+                Functional::variable(k + 2, x.z, rate.z, second.z),
+            )
+        };
+        // an axis u of the frame: u̇ = ω × u,  ü = ε × u + ω × u̇
+        let (omega, epsilon) = (motion.angular_velocity, motion.angular_acceleration);
+        let axis = |k: usize, u: Vec3<T>| {
+            let u = motion.rotation * u;
+            let rate = omega.cross(u);
+            (variables(k, u, rate, epsilon.cross(u) + omega.cross(rate)), u)
+        };
+        let p = variables(0, motion.position, motion.velocity, motion.acceleration);
+        let (a, a_value) = axis(3, contact.axis);
+        let (b, b_value) = axis(6, contact.second_axis);
+        let (distance, normal) = contact.surface.distance_and_normal(p);
+        PlaceOnSurface { p, a, b, axes: [a_value, b_value], distance, normal }
+    }
+
+    pub fn coordinate(&self, coordinate: Coordinate) -> WeighedCoordinate<T> {
+        let PlaceOnSurface { p, a, b, axes: [a_value, b_value], distance, normal } = self;
+        let tangential = |x: Functional<T>, n: Functional<T>| x - a.dot(*normal) * n;
+        let s = match coordinate {
+            Coordinate::Px => p.x,
+            Coordinate::Py => p.y,
+            Coordinate::Pz => *distance,
+            Coordinate::Ax => tangential(a.x, normal.x),
+            Coordinate::Ay => tangential(a.y, normal.y),
+            Coordinate::Az => b.y,
+        };
+        let part = |k: usize| Vec3::new(s.gradient[k], s.gradient[k + 1], s.gradient[k + 2]);
+        // δu = δφ × u: ∂s/∂u · δu = (u × ∂s/∂u) · δφ
+        let (along, about) = (part(0), a_value.cross(part(3)) + b_value.cross(part(6)));
+        let ([x, y, z], [u, v, w]) = (along.to_array(), about.to_array());
+        WeighedCoordinate { value: s.value, rate: s.rate, second: s.second, weights: [x, y, z, u, v, w] }
+    }
 }
 
 /// s^c of a contact on the generic runtime.   (20.86)
@@ -148,13 +180,13 @@ pub fn constrained_coordinates<T: Real>(
 }
 
 /// What a frame of the robot, or an object, does in the world.
-struct InWorld<T> {
-    pose: Transform<T>,
-    velocity: MotionVector<T>,
-    /// For q̈ = 0.
-    acceleration: MotionVector<T>,
-    /// 6 rows of nv, linear first; none for what the robot does not move.
-    jacobian: Option<Vec<T>>,
+pub(super) struct InWorld<T> {
+    pub pose: Transform<T>,
+    pub velocity: MotionVector<T>,
+    /// For q̈ = 0, or at the accelerations that are meant.
+    pub acceleration: MotionVector<T>,
+    /// 6 rows of nv, linear first; none for what the robot does not move, or where it is not asked for.
+    pub jacobian: Option<Vec<T>>,
 }
 
 fn frame_in_world<T: Real>(model: &Model<T>, frame: &Frame<T>, q: &[T], qd: &[T]) -> InWorld<T> {
@@ -168,9 +200,7 @@ fn frame_in_world<T: Real>(model: &Model<T>, frame: &Frame<T>, q: &[T], qd: &[T]
 
 /// The motion of a contact's frame against its object.
 pub fn relative_motion<T: Real>(model: &Model<T>, contact: &Contact<T>, q: &[T], qd: &[T]) -> RelativeMotion<T> {
-    let nv = model.nv();
     let robot = frame_in_world(model, &contact.frame, q, qd);
-    let robot_rows = robot.jacobian.as_ref().expect("a frame of the robot has a Jacobian");
     let object = match &contact.object {
         Object::Fixed(pose) => Err(*pose),
         Object::Moving(ObjectMotion { pose, velocity, acceleration }) => {
@@ -178,13 +208,20 @@ pub fn relative_motion<T: Real>(model: &Model<T>, contact: &Contact<T>, q: &[T],
         }
         Object::OnRobot(frame) => Ok(frame_in_world(model, frame, q, qd)),
     };
+    between(&robot, &object)
+}
+
+/// The motion of a frame against an object, which may be at rest in a pose.
+pub(super) fn between<T: Real>(robot: &InWorld<T>, object: &Result<InWorld<T>, Transform<T>>) -> RelativeMotion<T> {
+    let robot_rows = robot.jacobian.as_deref().unwrap_or(&[]);
+    let nv = robot_rows.len() / 6;
     let pose = object.as_ref().map_or_else(|fixed| *fixed, |moving| moving.pose);
     let lever = robot.pose.translation - pose.translation;
     let mut difference = MotionVector { angular: robot.velocity.angular, linear: robot.velocity.linear };
     let mut acceleration = MotionVector { angular: robot.acceleration.angular, linear: robot.acceleration.linear };
     let in_object = |v: Vec3<T>| pose.rotation.transpose_mul(v);
     let mut spin = None;
-    if let Ok(object) = &object {
+    if let Ok(object) = object {
         let (w, e) = (object.velocity.angular, object.acceleration.angular);
         // v − v_o − ω_o × d,  ω − ω_o
         difference.linear = difference.linear - object.velocity.linear - w.cross(lever);
@@ -208,7 +245,7 @@ pub fn relative_motion<T: Real>(model: &Model<T>, contact: &Contact<T>, q: &[T],
     let mut jacobian = [(); 6].map(|()| vec![T::zero(); nv]);
     for i in 0..nv {
         let (mut v, mut w) = (column(robot_rows, i, 0), column(robot_rows, i, 3));
-        if let Ok(InWorld { jacobian: Some(rows), .. }) = &object {
+        if let Ok(InWorld { jacobian: Some(rows), .. }) = object {
             let w_object = column(rows, i, 3);
             v = v - column(rows, i, 0) - w_object.cross(lever);
             w = w - w_object;

@@ -58,14 +58,28 @@ pub fn impact<T: Real>(
     restitution: T,
     ridge: T,
 ) -> Impact<T> {
-    let rows: Vec<ContactRow<T>> = struck
-        .iter()
-        .map(|s| match *s {
-            Struck::Rigid => ContactRow::Rigid,
-            Struck::Mass { mass, .. } => ContactRow::Yielding(mass),
-        })
-        .collect();
+    let rows: Vec<ContactRow<T>> = struck.iter().map(row_struck).collect();
     let system = ContactSystem::new(factor, &constrained.jacobian, applied, &rows, ridge);
+    blow_of(&system, factor, qd, constrained, (applied, struck), restitution)
+}
+
+/// The row of what a contact hits.
+pub(super) fn row_struck<T: Real>(struck: &Struck<T>) -> ContactRow<T> {
+    match *struck {
+        Struck::Rigid => ContactRow::Rigid,
+        Struck::Mass { mass, .. } => ContactRow::Yielding(mass),
+    }
+}
+
+/// The same with the system of the contacts at hand.
+pub(super) fn blow_of<T: Real>(
+    system: &ContactSystem<T>,
+    factor: &Ltdl<T>,
+    qd: &[T],
+    constrained: &FunctionalCoordinates<T>,
+    (applied, struck): (Option<&[Vec<T>]>, &[Struck<T>]),
+    restitution: T,
+) -> Impact<T> {
     let relative: Vec<T> = constrained
         .rate
         .iter()

@@ -60,12 +60,16 @@
 //! | contact coordinates, (20.83)-(20.87) | [`relative_motion`], [`functional_coordinates`] |
 //! | motion and reactions in contact, (20.88)-(20.94) | [`constrained_forward_dynamics`], [`hybrid_inverse_dynamics`], [`Environment`] |
 //! | impact, (20.90)-(20.97) | [`impact`](fn@impact) |
+//! | how contacts and their forces change with q and q̇ | [`ContactSweep`], [`HeldWrenches`] |
+//! | derivatives of motion and reactions in contact, and of impacts | [`ContactFactors`] |
 //! | motion and reactions in contact under the inputs of drives | [`driven_contact_motion`] |
 
 mod aba;
 mod actuator;
 mod centroidal;
 mod constraint;
+mod contact_derivatives;
+mod contact_motion;
 mod contact_system;
 mod coriolis;
 mod crba;
@@ -108,13 +112,15 @@ pub use constraint::{
     applied_rows, baumgarte, constrained_forward_dynamics, hybrid_inverse_dynamics, projection, ConstrainedMotion,
     Support,
 };
+pub use contact_derivatives::{ContactFactors, MotionChange};
+pub use contact_motion::{ContactSweep, HeldWrenches, MovedContact, Moving};
 pub use coriolis::{coriolis_matrix, coriolis_transpose_force};
 pub use crba::mass_matrix;
 pub use driven::{
     complete_model, drive_energy, drive_power, drive_states, drive_torques, driven_motion, drives_are_diagonal,
     state_space, DriveFlow, DrivenMotion, Links,
 };
-pub use driven_contact::{driven_contact_motion, driven_factor, driven_jump, ContactRows};
+pub use driven_contact::{drive_inertia, driven_contact_motion, driven_factor, driven_jump, ContactRows};
 pub use driven_inverse::{
     drive_demands, driven_inverse, inverse_orders, reads_states, Demand, InverseOrders, MOST_DERIVATIVES,
 };

@@ -4,6 +4,7 @@ use super::SceneReader;
 use crate::description::reader::FileReader;
 use crate::description::table::TomlTable;
 use crate::description::Noted;
+use crate::function::ContactFunction;
 use crate::scene::contact::{
     ContactItem, EnvironmentItem, EnvironmentKind, LoopItem, ModeItem, ObjectPose, SurfaceItem,
 };
@@ -230,13 +231,12 @@ impl SceneReader<'_> {
         if !table.has("contact") {
             return;
         }
-        let words = crate::function::ContactFunction::WORDS;
         let mut wanted = Vec::new();
         for name in self.reader.names_at(table, "contact", "function") {
-            match words.iter().find(|w| w.0 == name.value) {
-                Some((_, function)) => wanted.push(*function),
+            match ContactFunction::from_name(&name.value) {
+                Some(function) => wanted.push(function),
                 None => {
-                    let known: Vec<&str> = words.iter().map(|w| w.0).collect();
+                    let known: Vec<&str> = ContactFunction::ALL.iter().map(|f| f.name()).collect();
                     let complaint = say::unknown_contact_function(&name.value, &known);
                     self.reader.diagnostics.push(complaint.at(&name.place));
                 }
