@@ -50,7 +50,7 @@ fn case(file: &str, scalar: Scalar, speed: f64, chosen: bool) -> Case {
         false => optimised(&robot, &[], Function::ForwardDynamics, &options, plain),
     };
     let ranges = input_box(&graph.inputs, &options.scene, &robot.model).expect("every input has a range");
-    let known = known(&robot, &graph, &ranges, &options);
+    let known = known(&robot, Function::ForwardDynamics, &graph, &ranges, &options);
     Case { graph, ranges, known }
 }
 

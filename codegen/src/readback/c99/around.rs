@@ -285,6 +285,18 @@ impl<'g> CAround<'g> {
             g.frames.len()
         );
         header.these(&mut at, &head)?;
+        for (function, figures) in &g.report.functions {
+            for of in &figures.entries {
+                let name = format!("{u}_{}_{}", function.to_uppercase(), of.output.to_uppercase());
+                for (what, numbers) in [("ROW_STARTS", &of.row_starts), ("COLUMNS", &of.columns)] {
+                    // no array of C is empty
+                    let numbers = if numbers.is_empty() { &vec![0] } else { numbers };
+                    let list = format!("{numbers:?}").replace(['[', ']'], "");
+                    let text = format!("static const int {name}_{what}[{}] = {{{list}}};", numbers.len());
+                    header.these(&mut at, &text)?;
+                }
+            }
+        }
         let mut declared: BTreeSet<&str> = BTreeSet::new();
         while at < header.len() && header.token(at) != "#" {
             let start = at;
