@@ -65,54 +65,57 @@ impl Case {
     }
 
     /// Searches for errors above their bounds; the worst found of each result.
-    fn search(&self, scalar: Scalar, bounds: &[f64], evaluations: usize) -> Vec<f64> {
+    fn search(&self, scalar: Scalar, bounds: &[f64], evaluations: usize, failures: &mut Vec<String>) -> Vec<f64> {
         let found = search::worst_found(&self.graph, scalar, &self.ranges, evaluations, 5);
-        for (k, (found, bound)) in found.iter().zip(bounds).enumerate() {
-            assert!(found.error <= *bound, "{k} in {scalar:?}: {:e} > {bound:e} at {:?}", found.error, found.inputs);
+        for (k, (found, bound)) in found.iter().zip(bounds).enumerate().filter(|(_, (f, bound))| f.error > **bound) {
+            failures.push(format!("{k} in {scalar:?}: {:e} > {bound:e} at {:?}", found.error, found.inputs));
         }
         found.iter().map(|found| found.error).collect()
     }
 
-    /// The greatest absolute value of each result, and of each matrix's greatest singular value, that a climb finds in the box.
+    /// The greatest absolute value of each result that a climb finds in the box, and of each output the greatest singular value, of vectors the size.
     fn steepest(&self, steps: usize) -> (Vec<f64>, Vec<f64>) {
         let mut random = Random(3);
-        let n = self.graph.results.len();
-        let (mut most, mut at) = (vec![0.0f64; n], vec![Vec::new(); n]);
-        let mut norms = vec![0.0f64; self.graph.outputs.len()];
-        let mut ask = |inputs: Vec<f64>, most: &mut Vec<f64>, at: &mut Vec<Vec<f64>>, with_norms: bool| {
-            let results = evaluate::<f64>(&self.graph, &inputs);
-            for k in 0..n {
-                if results[k].abs() > most[k] || at[k].is_empty() {
-                    (most[k], at[k]) = (results[k].abs(), inputs.clone());
-                }
-            }
+        let all = |inputs: &[f64]| {
+            let signed = evaluate::<f64>(&self.graph, inputs);
+            let mut all: Vec<f64> = signed.iter().map(|x| x.abs()).collect();
             let mut first = 0;
-            for (norm, port) in norms.iter_mut().zip(&self.graph.outputs).filter(|_| with_norms) {
-                if port.shape.len() == 2 {
-                    *norm = norm.max(singular_value(&results[first..first + port.len()], port.shape[1]));
-                }
+            for port in &self.graph.outputs {
+                all.push(singular_value(&signed[first..first + port.len()], port.shape.last().copied().unwrap_or(1)));
                 first += port.len();
             }
+            all
         };
         let place = |random: &mut Random, r: &Interval| match random.below(4) {
             0 => r.lo,
             1 => r.hi,
             _ => r.lo + random.unit() * (r.hi - r.lo),
         };
-        for _ in 0..steps / 4 {
-            let inputs = self.ranges.iter().map(|r| place(&mut random, r)).collect();
-            ask(inputs, &mut most, &mut at, true);
-        }
+        let mut best: Vec<(f64, Vec<f64>)> = Vec::new();
         for step in 0..steps {
-            let mut inputs = at[step % n].clone();
-            for _ in 0..1 + random.below(3) {
-                let i = random.below(inputs.len());
-                let r = self.ranges[i];
-                let moved = inputs[i] + (r.hi - r.lo) * random.symmetric(1.0) * (-6.0 * random.unit()).exp();
-                inputs[i] = moved.clamp(r.lo, r.hi);
+            let inputs: Vec<f64> = match step < steps / 4 {
+                true => self.ranges.iter().map(|r| place(&mut random, r)).collect(),
+                false => {
+                    let mut inputs = best[step % best.len()].1.clone();
+                    for _ in 0..1 + random.below(3) {
+                        let i = random.below(inputs.len());
+                        let r = self.ranges[i];
+                        let moved = inputs[i] + (r.hi - r.lo) * random.symmetric(1.0) * (-6.0 * random.unit()).exp();
+                        inputs[i] = moved.clamp(r.lo, r.hi);
+                    }
+                    inputs
+                }
+            };
+            let found = all(&inputs);
+            if best.is_empty() {
+                best = found.iter().map(|x| (*x, inputs.clone())).collect();
             }
-            ask(inputs, &mut most, &mut at, step % 8 == 0);
+            for (best, found) in best.iter_mut().zip(found).filter(|(best, found)| *found > best.0) {
+                *best = (found, inputs.clone());
+            }
         }
+        let mut most: Vec<f64> = best.into_iter().map(|(x, _)| x).collect();
+        let norms = most.split_off(self.graph.results.len());
         (most, norms)
     }
 }
@@ -141,14 +144,16 @@ fn words(numbers: &[f64]) -> String {
 /// RoboPrec has about 2.5e5 for the Panda in f32, and 5e-4 in f64.
 #[test]
 fn derivatives_of_inverse_dynamics_have_bounds_that_say_something_and_no_search_finds_more() {
-    for (file, most) in [("panda.urdf", [7.6e-4, 7.6e-4, 7.6e-4, 4.2e-4]), ("ur5.urdf", [1e-3; 4])] {
+    let mut failures = Vec::new();
+    for (file, most) in [("panda.urdf", [2.6e-4, 3.5e-5, 1.4e-5, 1.7e-4]), ("ur5.urdf", [3.5e-5, 1.2e-5, 5e-6, 3.4e-5])]
+    {
         let function = Function::InverseDynamicsDerivatives;
         for (scalar, finer) in [(Scalar::F32, 1.0), (Scalar::F64, 2f64.powi(29))] {
             let case = case(file, function, scalar, true);
             let start = std::time::Instant::now();
             let certificate = case.certificate(scalar).expect("nothing is divided by");
             let time = start.elapsed().as_secs_f64();
-            let found = case.search(scalar, &certificate.errors, 4_000);
+            let found = case.search(scalar, &certificate.errors, 4_000, &mut failures);
             let bounds = case.greatest(&certificate.errors);
             println!(
                 "{file}, {}, {time:.2} s: K, D, H, τ at most {}; found {}",
@@ -156,19 +161,20 @@ fn derivatives_of_inverse_dynamics_have_bounds_that_say_something_and_no_search_
                 words(&bounds),
                 words(&case.greatest(&found))
             );
-            for (bound, most) in bounds.iter().zip(most) {
-                assert!(*bound <= most / finer * 1.05, "{file}, {scalar:?}: {bound:e}");
-            }
+            let too_great = bounds.iter().zip(most).filter(|(bound, most)| **bound > most / finer * 1.05);
+            failures.extend(too_great.map(|(bound, _)| format!("{file}, {scalar:?}: {bound:e}")));
         }
     }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
 /// No derivative in the box is above its bound, and cut boxes bring bounds near the greatest that is found.
 #[test]
 fn torques_change_no_faster_than_their_lipschitz_constants() {
-    for (file, boxes, near) in [("planar2r.urdf", 200, 1.3), ("ur5.urdf", 60, 5.0), ("panda.urdf", 60, 12.0)] {
+    let mut failures = Vec::new();
+    for (file, boxes, near) in [("planar2r.urdf", 200, 1.02), ("ur5.urdf", 60, 10.0), ("panda.urdf", 60, 20.0)] {
         let case = case(file, Function::InverseDynamicsDerivatives, Scalar::F64, false);
-        let (found, norms) = case.steepest(20_000);
+        let (found, norms) = case.steepest(4_000);
         let of = |boxes| {
             let effort = Effort { boxes, ..Effort::default() };
             magnitudes(&case.graph, Scalar::F64, &case.ranges, effort, &case.known).expect("nothing is divided by")
@@ -179,22 +185,30 @@ fn torques_change_no_faster_than_their_lipschitz_constants() {
             let own = first..first + port.len();
             first = own.end;
             for k in own.clone() {
-                assert!(found[k] <= cut[k] && cut[k] <= whole[k], "{file} {}: {:e} {:e}", port.name, found[k], cut[k]);
+                if found[k] > cut[k] || cut[k] > whole[k] {
+                    failures.push(format!("{file} {}: {:e} {:e} {:e}", port.name, found[k], cut[k], whole[k]));
+                }
             }
             if port.shape.len() == 2 {
                 let bounds = [&whole, &cut].map(|all| greatest_singular_value(&all[own.clone()], port.shape[1]));
                 println!("{file}, {}: norm {norm:.3e}, at most {}", port.name, words(&bounds));
-                assert!(norm <= bounds[1] && bounds[1] <= near * norm, "{file} {}: {norm:e} {bounds:?}", port.name);
+                if norm > bounds[1] || bounds[1] > near * norm {
+                    failures.push(format!("{file} {}: {norm:e} {bounds:?}", port.name));
+                }
             }
         }
     }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
 /// Derivatives of accelerations, over the same box: what mechanics knows of the equations that each column solves.
 #[test]
 fn derivatives_of_forward_dynamics_have_bounds_over_a_box() {
+    let mut failures = Vec::new();
     for function in [Function::ForwardDynamicsDerivativesAtMotion, Function::ForwardDynamicsDerivatives] {
-        for (file, in_f32) in [("planar2r.urdf", true), ("ur5.urdf", true), ("panda.urdf", false)] {
+        for (file, in_f32) in
+            [("planar2r.urdf", true), ("chapter_stanford.toml", true), ("puma560.urdf", true), ("ur5.urdf", true)]
+        {
             for scalar in [Scalar::F64, Scalar::F32] {
                 let case = case(file, function, scalar, false);
                 let start = std::time::Instant::now();
@@ -202,14 +216,15 @@ fn derivatives_of_forward_dynamics_have_bounds_over_a_box() {
                 let time = start.elapsed().as_secs_f64();
                 let Some(certificate) = certificate else {
                     println!("{file}, {}, {}: none", function.name(), scalar.name());
-                    assert!(scalar == Scalar::F32 && !in_f32, "{file}, {} in {scalar:?} has no bound", function.name());
+                    if scalar == Scalar::F64 || in_f32 {
+                        failures.push(format!("{file}, {} in {scalar:?} has no bound", function.name()));
+                    }
                     continue;
                 };
-                let found = case.search(scalar, &certificate.errors, 500);
+                let found = case.search(scalar, &certificate.errors, 500, &mut failures);
                 let (steepest, _) = case.steepest(500);
-                for (k, (found, most)) in steepest.iter().zip(&certificate.magnitudes).enumerate() {
-                    assert!(found <= most, "{file}, {}: {k}, {found:e} > {most:e}", function.name());
-                }
+                let beyond = steepest.iter().zip(&certificate.magnitudes).filter(|(found, most)| found > most);
+                failures.extend(beyond.map(|(f, most)| format!("{file}, {}: {f:e} > {most:e}", function.name())));
                 println!(
                     "{file}, {}, {}, {} coordinates, {time:.2} s: at most {}; found {}; magnitudes {}; found {}",
                     function.name(),
@@ -223,4 +238,5 @@ fn derivatives_of_forward_dynamics_have_bounds_over_a_box() {
             }
         }
     }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }

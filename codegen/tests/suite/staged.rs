@@ -7,7 +7,7 @@ use straightline_codegen::program::staged::programs;
 use straightline_codegen::scene::{Gravity, Parameter, Scene, Selection};
 use straightline_codegen::{compile, model, Function, Options, Robot, Source};
 
-pub(crate) const ROBOT: &str = r#"
+const ROBOT: &str = r#"
 [robot]
 name = "crane"
 [[link]]
@@ -63,7 +63,7 @@ axis = "x"
 origin = { xyz = [-0.3, 0.1, 1.2], rpy = [0.0, 0.0, 0.7] }
 "#;
 
-pub(crate) fn robot() -> Robot {
+fn robot() -> Robot {
     let (model, diagnostics) = model::load(&Source::new("crane.toml", ROBOT), &Default::default());
     Robot::new(model.unwrap_or_else(|| panic!("{diagnostics}")))
 }

@@ -80,10 +80,10 @@ const char *{prefix}_frame_name(int i);
         if self.generated.lanes.is_some() {
             out.push_str(BATCHES);
         }
-        self.entries_in_c(&mut out);
         out.push_str(further);
         self.bodies().iter().for_each(|body| self.constructor_in_c(&mut out, body));
         functions.iter().for_each(|function| self.declaration(&mut out, function));
+        self.entries_in_c(&mut out);
         out.push_str("\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n");
         out
     }
