@@ -108,6 +108,18 @@ pub enum Lanes {
     Runtime,
 }
 
+/// Which entries of matrices are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum WrittenEntries {
+    /// All.
+    #[default]
+    All,
+    /// All, and beside them constants that say which can be non-zero.
+    Patterns,
+    /// Those that can be non-zero, of symmetric matrices one triangle, packed, with the same constants.
+    Nonzeros,
+}
+
 /// By what a·b + c is computed in one rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fusion {
@@ -176,6 +188,11 @@ choices! {
         "standalone" Standalone "core alone; the vector instructions that the crate is compiled for",
         "runtime" Runtime "the package `straightline`: the machine's instructions, and threads",
     }
+    WrittenEntries "way to write matrices" {
+        "all" All "every entry",
+        "patterns" Patterns "every entry, and constants that say which can be non-zero: where rows begin, and columns",
+        "nonzeros" Nonzeros "the entries that can be non-zero, of symmetric matrices the lower triangle, row by row, with the same constants",
+    }
     Memory "memory" {
         "flash" Flash "fetching takes time: fewest bytes, sines by calls",
         "tcm" Tcm "fetching takes none: fewest cycles, sines in place",
@@ -208,6 +225,7 @@ mod tests {
         all::<ForwardDynamicsMethod>();
         all::<LimbForm>();
         all::<Lanes>();
+        all::<WrittenEntries>();
         all::<FixedProducts>();
         all::<Fusion>();
         all::<TargetMachine>();

@@ -111,8 +111,12 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let measures: Vec<(Function, Measures)> =
         programs.iter().map(|p| (p.function, Measures::of(p, options.scalar))).collect();
     budget::check(&whole, &frames, &measures, &options, &mut diagnostics);
-    let certificates = certificates(&robot, &programs, &resolved);
+    let mut certificates = certificates(&robot, &programs, &resolved);
     budget::check_errors(programs.iter().zip(&certificates), &resolved, &mut diagnostics);
+    for (program, errors) in programs.iter_mut().zip(&mut certificates) {
+        program.choose_entries(&resolved);
+        errors.iter_mut().for_each(|errors| errors.keep_outputs(&program.graph.outputs, &program.entries));
+    }
     let fixed = fixed_functions(&robot, &programs, &resolved, &mut diagnostics);
     if diagnostics.has_errors() {
         diagnostics.sort();

@@ -1,8 +1,11 @@
 //! What is said above every function.
 
+use crate::choices::WrittenEntries;
 use crate::function::{ContactFunction, ContactPort, Function, Output, PerContact, Quantity};
 use crate::identifier;
+use crate::options::Options;
 use crate::program::contact::Mode;
+use crate::program::nonzeros::NonzeroEntries;
 use crate::scene::{Parameter, ResultPart, Scene};
 use std::fmt::Write;
 use straightline_graph::expr::{Graph, Port};
@@ -41,6 +44,26 @@ impl Function {
         }
         doc
     }
+}
+
+/// What is said of the entries of matrices that can be non-zero.
+pub(super) fn of_entries(function: Function, entries: &[NonzeroEntries], options: &Options) -> String {
+    let mut doc = String::new();
+    for of in entries {
+        let [(starts, ..), (columns, ..)] = of.constants(function.name());
+        let output = &of.output;
+        let _ = match options.entries {
+            WrittenEntries::Nonzeros => {
+                let lower = if of.is_triangle { " of the lower triangle (the matrix is symmetric)" } else { "" };
+                writeln!(
+                    doc,
+                    "\nOf `{output}` the entries{lower} that can be non-zero, row by row: [`{starts}`], [`{columns}`]."
+                )
+            }
+            _ => writeln!(doc, "\nWhich entries of `{output}` can be non-zero: [`{starts}`], [`{columns}`]."),
+        };
+    }
+    doc
 }
 
 /// What is said above a function of a contact mode.

@@ -63,3 +63,11 @@ impl ErrorReport {
         format!("{}{output}_ERROR_BOUND", function.to_uppercase())
     }
 }
+
+impl OutputErrors {
+    /// The names of the constants of Lipschitz bounds: of the entries, and of the norm.
+    pub fn lipschitz_names(&self, function: &str) -> [String; 2] {
+        let name = format!("{}_{}_LIPSCHITZ", function.to_uppercase(), self.name.to_uppercase());
+        [name.clone(), format!("{name}_NORM")]
+    }
+}

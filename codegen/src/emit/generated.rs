@@ -1,22 +1,23 @@
 //! What the compiler makes of a robot file: from programs to text.
 
 use super::contact::{contact, ContactModule};
-use super::doc::{lanes_doc, lanes_name};
+use super::doc::{self, lanes_doc, lanes_name};
 use super::error_bound::error_bound;
 use super::module::{Item, ModeModule, ParameterType, StagedModule, StateCertificate};
 use super::parameter::parameter_types;
 use super::staged::staged;
 use super::{rust, Lowering, Routine, Style};
-use crate::choices::{Lanes, Memory, TargetMachine};
+use crate::choices::{Lanes, Memory, TargetMachine, WrittenEntries};
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::equations::Robot;
-use crate::function::Judged;
+use crate::function::{Function, Judged};
 use crate::identifier::file_name;
 use crate::machine_code::MachineFigures;
 use crate::options::Options;
 use crate::program::companion::{checked_companion, wants_companions, ROUNDED};
 use crate::program::equivalence::Disagreement;
 use crate::program::fixed::FixedFunction;
+use crate::program::nonzeros::NonzeroEntries;
 use crate::program::self_test::SelfTest;
 use crate::program::written::{AllWritten, WrittenFunction};
 use crate::program::TracedProgram;
@@ -158,6 +159,7 @@ fn item(
         let (all, wider) = (graph.counts().flops(), graph.widest(options.scalar).name());
         doc.push_str(&format!("\n{wide} of its {all} operations are in {wider}: what its error budget takes.\n"));
     }
+    doc.push_str(&doc::of_entries(*function, &program.entries, options));
     let mut of_state = None;
     if wants_companions(options) {
         let (bound, plainer) = match program.has_folded_constants(options) {
@@ -221,6 +223,10 @@ pub(crate) fn generate(
     let mut items = Vec::new();
     let mut functions = BTreeMap::new();
     let mut written = AllWritten::default();
+    let entries: BTreeMap<Function, Vec<NonzeroEntries>> = match options.entries {
+        WrittenEntries::Nonzeros => programs.iter().map(|(p, ..)| (p.function, p.entries.clone())).collect(),
+        WrittenEntries::All | WrittenEntries::Patterns => BTreeMap::new(),
+    };
     for (program, waterfall, errors) in programs {
         let item = item(&robot, &program, (options, lowering), &mut warnings, &mut written.functions)?;
         let figures = FunctionReport::new(&program, options.scalar, item.text.lines().count());
@@ -231,7 +237,7 @@ pub(crate) fn generate(
     let ContactModule { modes, reports, plainer, programs } = contact(&robot, options, lowering)?;
     written.modes = programs;
     plainer.iter().for_each(|p| warnings.push(p.warning(model)));
-    let staged = options.scene.staged.then(|| staged(&robot, &frames, options, lowering)).transpose()?;
+    let staged = options.scene.staged.then(|| staged(&robot, &frames, &entries, (options, lowering))).transpose()?;
     let staged = staged.map(|(module, report, plainer, programs)| {
         written.staged = Some(programs);
         plainer.iter().for_each(|p| warnings.push(p.warning(model)));

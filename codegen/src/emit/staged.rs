@@ -3,24 +3,32 @@
 use super::module::StagedModule;
 use super::{Lowering, Routine};
 use crate::equations::Robot;
+use crate::function::Function;
 use crate::options::Options;
 use crate::program::equivalence::{Disagreement, Plainer};
+use crate::program::nonzeros::{packed, NonzeroEntries};
 use crate::program::staged::{programs, report, StagedReport};
 use crate::program::written::WrittenStages;
+use std::collections::BTreeMap;
 use straightline_graph::expr::{Graph, Port};
 use straightline_graph::schedule::schedule;
 
-/// The module `staged`, its figures, what is plainer, and its programs.
+/// The module `staged`, its figures, what is plainer, and its programs; of functions with `entries` these alone are put out.
 ///
 /// # Errors
 /// As [`programs`].
 pub(super) fn staged(
     robot: &Robot,
     frames: &[String],
-    options: &Options,
-    lowering: Lowering<'_>,
+    entries: &BTreeMap<Function, Vec<NonzeroEntries>>,
+    (options, lowering): (&Options, Lowering<'_>),
 ) -> Result<(StagedModule, StagedReport, Option<Plainer>, WrittenStages), Disagreement> {
-    let (programs, plainer) = programs(robot, frames, options)?;
+    let (mut programs, plainer) = programs(robot, frames, options)?;
+    for (function, (_, graph)) in programs.functions.iter().zip(&mut programs.staged.functions) {
+        if let Some(entries) = entries.get(function) {
+            *graph = packed(graph, entries);
+        }
+    }
     let private = |graph: &Graph, name: &str, doc: &str| {
         lowering.routine(graph, &schedule(graph, options.limits, options.registers()), name, doc).private()
     };

@@ -21,7 +21,9 @@ impl RobotFunction for GravityDerivative {
                 "dg_dq",
                 SQUARE,
                 "rows of ∂g/∂q \\[N·m/rad, N/m\\], symmetric; of a floating base by increments of its pose in its own axes, and not symmetric there",
-            ),
+            )
+            .symmetric()
+            .slope("g", Quantity::Configuration),
             Output::new("g", &[Velocities], "generalized forces \\[N·m or N\\]"),
         ],
         ..Spec::DERIVED
@@ -60,8 +62,10 @@ impl RobotFunction for BiasDerivatives {
                 "dh_dq",
                 SQUARE,
                 "rows of ∂h/∂q \\[N·m/rad, N/m\\]; of a floating base by increments of its pose in its own axes",
-            ),
-            Output::new("dh_dqd", SQUARE, "rows of ∂h/∂q̇ \\[N·m·s/rad, N·s/m\\]"),
+            )
+            .slope_with_friction("h", Quantity::Configuration),
+            Output::new("dh_dqd", SQUARE, "rows of ∂h/∂q̇ \\[N·m·s/rad, N·s/m\\]")
+                .slope_with_friction("h", Quantity::Velocity),
             Output::new("h", &[Velocities], "generalized forces \\[N·m or N\\]"),
         ],
         ..Spec::DERIVED
@@ -83,7 +87,8 @@ impl RobotFunction for CoriolisMatrix {
         inputs: &[Quantity::Configuration, Quantity::Velocity],
         outputs: &[
             Output::new("c", SQUARE, "rows of C \\[N·m·s/rad, N·s/m\\]: C q̇ are velocity forces, Ḣ − 2 C is skew"),
-            Output::new("h_dot", SQUARE, "rows of Ḣ = dH/dt along q̇, both triangles \\[kg·m²/s, kg·m/s, kg/s\\]"),
+            Output::new("h_dot", SQUARE, "rows of Ḣ = dH/dt along q̇, both triangles \\[kg·m²/s, kg·m/s, kg/s\\]")
+                .symmetric(),
         ],
         ..Spec::DERIVED
     };

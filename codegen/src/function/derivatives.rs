@@ -25,9 +25,13 @@ impl RobotFunction for InverseDynamicsDerivatives {
                 "dtau_dq",
                 SQUARE,
                 "rows of ∂τ/∂q \\[N·m/rad, N/m\\]; of a floating base by increments of its pose in its own axes",
-            ),
-            Output::new("dtau_dqd", SQUARE, "rows of ∂τ/∂q̇ \\[N·m·s/rad, N·s/m\\]"),
-            Output::new("h", SQUARE, "rows of H = ∂τ/∂q̈, both triangles \\[kg·m², kg·m, kg\\]"),
+            )
+            .slope_with_friction("τ", Quantity::Configuration),
+            Output::new("dtau_dqd", SQUARE, "rows of ∂τ/∂q̇ \\[N·m·s/rad, N·s/m\\]")
+                .slope_with_friction("τ", Quantity::Velocity),
+            Output::new("h", SQUARE, "rows of H = ∂τ/∂q̈, both triangles \\[kg·m², kg·m, kg\\]")
+                .symmetric()
+                .slope_with_friction("τ", Quantity::Acceleration),
             Output::new("tau", &[Velocities], "generalized forces \\[N·m or N\\]"),
         ],
         ..Spec::DERIVED

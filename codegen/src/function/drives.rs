@@ -123,7 +123,8 @@ shaft states of x; of a shaft that does not give way, the row of its joint is it
                 "h_star",
                 &[Velocities, Velocities],
                 "rows of H*, symmetric but for such rows \\[kg·m², kg·m, kg\\]",
-            ),
+            )
+            .symmetric(),
             Output::new("bias", &[Velocities], "h* \\[N·m or N\\]"),
             Output::new("d", &[Velocities, Drives], "rows of D, one per velocity coordinate \\[N·m/V\\]"),
         ],

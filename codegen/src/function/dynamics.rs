@@ -11,7 +11,8 @@ use straightline_core::Real;
 const GRAVITY_FORCE: Output = Output::new("g", &[Velocities], "generalized forces \\[N·m or N\\]");
 const MASS_MATRIX: Output =
     Output::new("h", &[Velocities, Velocities], "rows of H, both triangles \\[kg·m², kg·m, kg\\]")
-        .of_parts(Parts::Diagonal);
+        .of_parts(Parts::Diagonal)
+        .symmetric();
 
 pub struct InverseDynamics;
 

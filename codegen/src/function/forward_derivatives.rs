@@ -13,11 +13,15 @@ const BY_POSITION: Output = Output::new(
     "dqdd_dq",
     SQUARE,
     "rows of ∂q̈/∂q at constant τ \\[1/s²; with sliding joints also 1/(m·s²), m/s²\\]; of a floating base by increments of its pose in its own axes",
-);
+)
+.slope_with_friction("q̈", Quantity::Configuration);
 const BY_VELOCITY: Output =
-    Output::new("dqdd_dqd", SQUARE, "rows of ∂q̈/∂q̇ at constant τ \\[1/s; with sliding joints also 1/(m·s), m/s\\]");
+    Output::new("dqdd_dqd", SQUARE, "rows of ∂q̈/∂q̇ at constant τ \\[1/s; with sliding joints also 1/(m·s), m/s\\]")
+        .slope_with_friction("q̈", Quantity::Velocity);
 const INVERSE: Output =
-    Output::new("h_inverse", SQUARE, "rows of H⁻¹ = ∂q̈/∂τ, both triangles \\[1/(kg·m²), 1/(kg·m), 1/kg\\]");
+    Output::new("h_inverse", SQUARE, "rows of H⁻¹ = ∂q̈/∂τ, both triangles \\[1/(kg·m²), 1/(kg·m), 1/kg\\]")
+        .symmetric()
+        .slope_with_friction("q̈", Quantity::Force);
 
 /// What all of them have in common.
 const SOLVED: Spec = Spec { solves: true, divisor: Divisor::Inertia, judged: Judged::ByColumns, ..Spec::DERIVED };

@@ -33,7 +33,7 @@ pub(crate) use drives::may_be_articulated;
 pub use forms::{Forms, ForwardDynamicsMethod, LimbSums};
 pub use quantity::Quantity;
 pub use rows::SelectedRows;
-pub use spec::{Divisor, Extent, Family, Form, InLanes, Judged, Output, Parts, RobotFunction, Spec};
+pub use spec::{Divisor, Extent, Family, Form, InLanes, Judged, Output, Parts, RobotFunction, SlopeOf, Spec};
 
 use straightline_core::model::{Frame, Model};
 use straightline_core::Real;

@@ -29,10 +29,14 @@ impl RobotFunction for FrameDerivatives {
                 PER_FRAME,
                 "per frame: 6 rows (3 linear of the origin, which moves along, 3 angular; world axes) of ∂v/∂q \\[1/s; of the origin by a turn m/s\\]; \
 of a floating base by increments of its pose in its own axes",
-            ),
-            Output::new("da_dq", PER_FRAME, "per frame: the same of ∂a/∂q at constant q̇ and q̈ \\[1/s²; m/s²\\]"),
-            Output::new("da_dqd", PER_FRAME, "per frame: the same of ∂a/∂q̇ = ∂v/∂q + J̇ \\[1/s; m/s\\]"),
-            Output::new("j", PER_FRAME, "per frame: the same of J = ∂v/∂q̇ = ∂a/∂q̈ \\[1; m\\]"),
+            )
+            .slope("v", Quantity::Configuration),
+            Output::new("da_dq", PER_FRAME, "per frame: the same of ∂a/∂q at constant q̇ and q̈ \\[1/s²; m/s²\\]")
+                .slope("a", Quantity::Configuration),
+            Output::new("da_dqd", PER_FRAME, "per frame: the same of ∂a/∂q̇ = ∂v/∂q + J̇ \\[1/s; m/s\\]")
+                .slope("a", Quantity::Velocity),
+            Output::new("j", PER_FRAME, "per frame: the same of J = ∂v/∂q̇ = ∂a/∂q̈ \\[1; m\\]")
+                .slope("v", Quantity::Velocity),
             Output::new("j_dot", PER_FRAME, "per frame: the same of J̇ along the motion \\[1/s; m/s\\]"),
         ],
         form: Form::Plain,
@@ -163,9 +167,12 @@ impl RobotFunction for CentroidalDerivatives {
                 "dh_dq",
                 SIX_ROWS,
                 "rows of ∂h/∂q, the centre of mass moving along; of a floating base by increments of its pose in its own axes",
-            ),
-            Output::new("dhdot_dq", SIX_ROWS, "rows of ∂ḣ/∂q at constant q̇ and q̈"),
-            Output::new("dhdot_dqd", SIX_ROWS, "rows of ∂ḣ/∂q̇ = ∂h/∂q + Ȧ"),
+            )
+            .slope("h", Quantity::Configuration),
+            Output::new("dhdot_dq", SIX_ROWS, "rows of ∂ḣ/∂q at constant q̇ and q̈")
+                .slope("ḣ", Quantity::Configuration),
+            Output::new("dhdot_dqd", SIX_ROWS, "rows of ∂ḣ/∂q̇ = ∂h/∂q + Ȧ")
+                .slope("ḣ", Quantity::Velocity),
             MAP,
         ],
         form: Form::Plain,

@@ -273,6 +273,11 @@ impl Quantity {
         Port::new(&self.name(), &shape)
     }
 
+    /// Whether many of it are asked about at one motion: directions and multipliers.
+    pub fn is_of_call(self) -> bool {
+        matches!(self, ConfigurationDirection | VelocityDirection | AccelerationDirection | ForceDirection | Multiplier)
+    }
+
     /// Which derivative of q it is; `None` if it is none, or q itself.
     pub fn rate(self) -> Option<usize> {
         match self {

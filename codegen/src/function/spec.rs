@@ -87,6 +87,17 @@ pub enum Parts {
     Diagonal,
 }
 
+/// What a block of derivatives is the derivative of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SlopeOf {
+    /// Of what, as it is written.
+    pub of: &'static str,
+    /// By which quantity.
+    pub by: Quantity,
+    /// Whether dry friction is in it, so that it jumps where a joint reverses.
+    pub feels_friction: bool,
+}
+
 /// A block of results.
 #[derive(Clone, Copy, Debug)]
 pub struct Output {
@@ -98,17 +109,36 @@ pub struct Output {
     pub axes: &'static [Extent],
     /// What can be asked for of it.
     pub parts: Parts,
+    /// Of derivatives: of what.
+    pub slope: Option<SlopeOf>,
+    /// Whether it is a symmetric matrix, on some robots at least: the program says on which.
+    pub is_symmetric: bool,
 }
 
 impl Output {
     /// A block that is wanted as a whole.
     pub(super) const fn new(name: &'static str, axes: &'static [Extent], doc: &'static str) -> Output {
-        Output { name, doc, axes, parts: Parts::No }
+        Output { name, doc, axes, parts: Parts::No, slope: None, is_symmetric: false }
     }
 
     /// One that can be asked for in parts.
     pub(super) const fn of_parts(self, parts: Parts) -> Output {
         Output { parts, ..self }
+    }
+
+    /// The derivative of something by a quantity.
+    pub(super) const fn slope(self, of: &'static str, by: Quantity) -> Output {
+        Output { slope: Some(SlopeOf { of, by, feels_friction: false }), ..self }
+    }
+
+    /// The same of forces, or of accelerations, in which friction of joints is.
+    pub(super) const fn slope_with_friction(self, of: &'static str, by: Quantity) -> Output {
+        Output { slope: Some(SlopeOf { of, by, feels_friction: true }), ..self }
+    }
+
+    /// A symmetric matrix.
+    pub(super) const fn symmetric(self) -> Output {
+        Output { is_symmetric: true, ..self }
     }
 
     /// Whether it is a matrix whose columns belong to velocity coordinates.

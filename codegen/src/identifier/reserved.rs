@@ -24,7 +24,7 @@ pub(super) static RESERVED: [&str; 6] = [
      violation w x xd",
     // what else the file, its modules and its types are written with
     "batch check_inertia check_number com configuration contact cost dd drivers dynamics figures fma fma_if fused inertia \
-     lane limb live mass mode mul_add_f32 mul_add_f64 n none number numbers out_of_range parameters real self_test \
+     lane limb live mass mode motion mul_add_f32 mul_add_f64 n none number numbers out_of_range parameters real self_test \
      self_test_hashes self_tests short_sines single some \
      staged t trig unphysical values velocity y",
     // types, traits and variants of Rust's preludes, in this writing

@@ -12,7 +12,7 @@ pub use optimisations::{FormChoices, Optimisations};
 pub use scene_file::SceneFile;
 pub use value::{GivenOptions, OptionValue};
 
-use crate::choices::{FixedProducts, Lanes, LimbForm, Memory, TargetMachine};
+use crate::choices::{FixedProducts, Lanes, LimbForm, Memory, TargetMachine, WrittenEntries};
 use crate::description;
 use crate::description::drives::WrittenDrive;
 use crate::diagnostic::{Diagnostics, Reporting, Source};
@@ -71,6 +71,8 @@ options! {
     forward_dynamics "forward_dynamics": ForwardDynamicsMethod = ForwardDynamicsMethod::default(),
     /// How identical limbs are computed.
     limbs "limbs": LimbForm = LimbForm::default(),
+    /// Which entries of matrices are written.
+    entries "entries": WrittenEntries = WrittenEntries::default(),
     /// The machine that code is made for; none: any.
     target "target": Option<TargetMachine> = None,
     /// The memory that it runs from there.

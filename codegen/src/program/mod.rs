@@ -9,6 +9,7 @@ pub mod fixed;
 pub mod input_box;
 pub mod limbs;
 pub mod mixed;
+pub mod nonzeros;
 pub mod parameter;
 pub mod pivots;
 mod plainer;
@@ -28,6 +29,7 @@ use crate::options::optimisations::FOLDING;
 use crate::options::{Optimisations, Options};
 use crate::program::choose::price;
 use crate::program::equivalence::{Disagreement, Plainer};
+use crate::program::nonzeros::NonzeroEntries;
 use straightline_graph::expr::{verify, Graph};
 use straightline_graph::pass::{dead_code, order, substitute, sums, unread_inputs};
 use straightline_graph::schedule::{schedule, Schedule};
@@ -45,6 +47,8 @@ pub struct TracedProgram {
     pub method: Option<MethodChoice>,
     /// Whether it has another form than it would have had, as that one was wrong.
     pub plainer: Option<Plainer>,
+    /// Which entries of its matrix results can be non-zero, where that is written beside it.
+    pub entries: Vec<NonzeroEntries>,
 }
 
 impl TracedProgram {
@@ -79,7 +83,7 @@ pub fn checked(
         equivalence::of_function(robot, frames, function, options, optimisations, &made.0).map(|()| made)
     })?;
     let schedule = schedule(&graph, options.limits, options.registers());
-    Ok(TracedProgram { function, graph, schedule, method, plainer })
+    Ok(TracedProgram { function, graph, schedule, method, plainer, entries: Vec::new() })
 }
 
 /// The operations of one function of a robot, with these optimisations only.

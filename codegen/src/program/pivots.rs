@@ -19,15 +19,26 @@
 //! √(c_k H_jj) as (H⁻¹)_kk = Σ (L⁻¹)_kj²/d_j; −(H⁻¹)_ki q̈_j − (H⁻¹)_kj q̈_i of A_ij, as the inverse of what is left is a part of H⁻¹; and d_m
 //! or d_j² times such products of l_mi and of 1/d_j.
 //!
+//! Derivatives of accelerations solve the same equations for other right sides: H ∂q̈/∂q_c = −K_c with K = ∂τ/∂q, H ∂q̈/∂q̇_c = −D_c, and H⁻¹ for
+//! unit vectors. So all of this holds of each column x with its own b and β, entries of K and D at most so large as their program says of the
+//! box, with |q̈_k| ≤ √c_k β where these are found on the way. Then x depends on q̈ besides: with g_m = ∂x_k/∂q̈_m = −Σ_i (H⁻¹)_ki ∂K_ic/∂q̈_m,
+//! adjoints of b, y and A of the equations for q̈ are those above with w = H⁻¹ g in place of a row of H⁻¹, |w_j| ≤ √c_j Σ √c_m |g_m|, and that of
+//! q̈_j is (L⁻ᵀ g)_j, at most √H_jj Σ √c_m |g_m|.
+//!
 //! Which values of a program these are is not read off it (sums of several entries are shared, and put into other orders), but seen: in
 //! double-double at random states, as `pass/substitute` finds values that are the same. All are rational in the inputs, sines and
 //! cosines: two that differ anywhere agree at a random state with probability zero.
 
-use crate::function::Quantity;
+mod columns;
+mod felt;
+
+use crate::function::{Function, Quantity};
 use crate::program::input_box::input_box;
 use crate::scene::Scene;
+use columns::{columns_of, ColumnAt, ColumnBounds, SolvedFor};
+use felt::Felt;
 use straightline_core::algorithms::mass_matrix;
-use straightline_core::model::{Body, Model};
+use straightline_core::model::Model;
 use straightline_core::random::Random;
 use straightline_core::Dd;
 use straightline_graph::certify::{ErrorAnalysis, FloatFormat, Interval, KnownSystem, NoCertificate};
@@ -41,73 +52,114 @@ const STATES: usize = 3;
 const EQUAL: f64 = 1e-20;
 /// What rounding in double-double and in f64 can take from a bound.
 const SLACK: f64 = 1e-9;
-/// Parts of the angle between two bodies.
-const PARTS: usize = 256;
 
 /// What is known of a box of inputs, by velocity coordinate.
-pub struct Sizes {
+pub struct Sizes<'a> {
     /// At least H_kk.
     pub inertia: Vec<f64>,
     /// At least |h_k|.
     pub bias: Vec<f64>,
+    /// A program of the derivatives of joint forces, whose accelerations are to be bounded first.
+    pub slopes: Option<(&'a Graph, &'a Scene)>,
 }
 
-impl Sizes {
-    /// From programs of H and of the joint forces of a motion.
+impl<'a> Sizes<'a> {
+    /// From programs of H and of the joint forces of a motion, and of the derivatives of these where they matter.
     ///
     /// # Errors
     /// If an input has no range.
-    pub fn of(mass_matrix: &Graph, torques: &Graph, scene: &Scene, model: &Model<Dd>) -> Result<Sizes, NoCertificate> {
+    pub fn of(
+        mass_matrix: &Graph,
+        torques: &Graph,
+        slopes: Option<&'a Graph>,
+        scene: &'a Scene,
+        model: &Model<Dd>,
+    ) -> Result<Sizes<'a>, NoCertificate> {
+        let rest = vec![Interval::ZERO; model.nv()];
         let magnitudes = |graph: &Graph| {
-            let mut ranges = input_box(&graph.inputs, scene, model)?;
-            let mut first = 0;
-            for port in &graph.inputs {
-                if Quantity::of(port) == Some(Quantity::Acceleration) {
-                    ranges[first..first + port.len()].fill(Interval::ZERO);
-                }
-                first += port.len();
-            }
             let mut analysis = ErrorAnalysis::new(graph, FloatFormat::of(Scalar::F64));
-            analysis.ranges(&ranges)?;
+            analysis.ranges(&with_accelerations(graph, scene, model, Some(&rest))?)?;
             Ok(graph.results.iter().map(|r| analysis.range(*r).mag()).collect::<Vec<f64>>())
         };
         let n = model.nv();
         let entries = magnitudes(mass_matrix)?;
-        Ok(Sizes { inertia: (0..n).map(|k| entries[k * n + k]).collect(), bias: magnitudes(torques)? })
+        let inertia = (0..n).map(|k| entries[k * n + k]).collect();
+        Ok(Sizes { inertia, bias: magnitudes(torques)?, slopes: slopes.map(|graph| (graph, scene)) })
     }
+}
+
+/// The box of a program's inputs, with these ranges of accelerations where they are given.
+fn with_accelerations(
+    graph: &Graph,
+    scene: &Scene,
+    model: &Model<Dd>,
+    accelerations: Option<&[Interval]>,
+) -> Result<Vec<Interval>, NoCertificate> {
+    let mut ranges = input_box(&graph.inputs, scene, model)?;
+    let mut first = 0;
+    for port in &graph.inputs {
+        if let (Some(Quantity::Acceleration), Some(given)) = (Quantity::of(port), accelerations) {
+            ranges[first..first + port.len()].copy_from_slice(given);
+        }
+        first += port.len();
+    }
+    Ok(ranges)
 }
 
 /// Joints of the greatest robot that is looked at: beyond, errors add up to more than is left of H, and the search for values is long.
 const MOST_JOINTS: usize = 12;
 
-/// Whether something is known of this program: all joints turn or slide, no inertia is an input, and all accelerations of a few
-/// joints are results.
-pub fn is_arm(model: &Model<Dd>, graph: &Graph) -> bool {
+/// Whether something is known of this program: all joints turn or slide, no inertia is an input, and results are accelerations of a few
+/// joints, or their derivatives.
+pub fn is_arm(model: &Model<Dd>, function: Function, graph: &Graph) -> bool {
     let turns_or_slides = model.bodies.iter().all(|b| b.joint.kind.elementary().is_some());
     let is_known = |port: &Port| {
-        use Quantity::{Configuration, Force, Gravity, Velocity};
-        matches!(Quantity::of(port), Some(Configuration | Velocity | Force | Gravity))
+        use Quantity::{Acceleration, Configuration, Force, Gravity, Velocity};
+        matches!(Quantity::of(port), Some(Configuration | Velocity | Acceleration | Force | Gravity))
     };
-    let is_whole = graph.results.len() == model.nv() && model.nv() <= MOST_JOINTS;
+    let is_whole = model.nv() <= MOST_JOINTS && columns_of(function, graph, model.nv()).is_some();
     turns_or_slides && is_whole && graph.inputs.iter().all(is_known)
 }
 
+/// Where a quantity stands among the inputs of a program.
+fn place(graph: &Graph, quantity: Quantity) -> std::ops::Range<usize> {
+    let is_it = |port: &&Port| Quantity::of(port) == Some(quantity);
+    let first: usize = graph.inputs.iter().take_while(|port| !is_it(port)).map(Port::len).sum();
+    let count = graph.inputs.iter().find(is_it).map_or(0, Port::len);
+    first..first + count
+}
+
 /// What is known for inputs in a box. Nothing where it [is no arm](is_arm).
-pub fn known(model: &Model<Dd>, graph: &Graph, ranges: &[Interval], sizes: &Sizes) -> KnownSystem {
-    if !is_arm(model, graph) {
+pub fn known(
+    model: &Model<Dd>,
+    function: Function,
+    graph: &Graph,
+    ranges: &[Interval],
+    sizes: &Sizes<'_>,
+) -> KnownSystem {
+    if !is_arm(model, function, graph) {
         return KnownSystem::default();
     }
-    let place = |quantity: Quantity| {
-        let is_it = |port: &&Port| Quantity::of(port) == Some(quantity);
-        let first: usize = graph.inputs.iter().take_while(|port| !is_it(port)).map(Port::len).sum();
-        let count = graph.inputs.iter().find(is_it).map_or(0, Port::len);
-        first..first + count
-    };
-    let (q, tau) = (&ranges[place(Quantity::Configuration)], &ranges[place(Quantity::Force)]);
-    let Some(felt) = Felt::new(model, q) else { return KnownSystem::default() };
+    all_known(model, function, graph, ranges, sizes).unwrap_or_default()
+}
+
+fn all_known(
+    model: &Model<Dd>,
+    function: Function,
+    graph: &Graph,
+    ranges: &[Interval],
+    sizes: &Sizes<'_>,
+) -> Option<KnownSystem> {
+    let results = columns_of(function, graph, model.nv())?;
+    let (q, tau) = (&ranges[place(graph, Quantity::Configuration)], &ranges[place(graph, Quantity::Force)]);
+    let felt = Felt::new(model, q)?;
     let sizes_of_b = sizes.bias.iter().enumerate().map(|(k, h)| h + tau.get(k).map_or(0.0, |t| t.mag()));
     let beta = sizes_of_b.zip(&felt.free).map(|(b, c)| b * c.sqrt()).sum::<f64>() * (1.0 + SLACK);
-    let bounds = Bounds { felt, inertia: &sizes.inertia, beta };
+    let given = graph.inputs.iter().any(|port| Quantity::of(port) == Some(Quantity::Acceleration));
+    let accelerations = felt.free.iter().map(|c| Interval::around_zero(c.sqrt() * beta * (1.0 + SLACK))).collect();
+    let accelerations = if given { None } else { Some(accelerations) };
+    let columns = ColumnBounds::new(model, &results, (beta, &felt.free), (sizes, accelerations))?;
+    let bounds = Bounds { felt, inertia: &sizes.inertia };
     let count: usize = graph.inputs.iter().map(Port::len).sum();
     let mut probe = graph.clone();
     probe.results = graph.ids().collect();
@@ -117,12 +169,12 @@ pub fn known(model: &Model<Dd>, graph: &Graph, ranges: &[Interval], sizes: &Size
     for _ in 0..STATES {
         let inputs: Vec<Dd> = (0..count).map(|_| Dd::from(random.symmetric(2.0))).collect();
         let of_nodes = evaluate(&probe, &inputs);
-        let qdd: Vec<Dd> = graph.results.iter().map(|r| of_nodes[r.index()]).collect();
         let h = match q.is_empty() {
             true => mass_matrix(model, &vec![Dd::ZERO; model.nq()]),
-            false => mass_matrix(model, &inputs[place(Quantity::Configuration)]),
+            false => mass_matrix(model, &inputs[place(graph, Quantity::Configuration)]),
         };
-        facts.push(bounds.facts(model, &h, &qdd));
+        let solved = columns.at(model, graph, (&inputs, &of_nodes), (&h, &results))?;
+        facts.push(bounds.facts(model, &h, &solved, &results));
         values.push(of_nodes);
     }
     let mut known = KnownSystem::default();
@@ -138,20 +190,21 @@ pub fn known(model: &Model<Dd>, graph: &Graph, ranges: &[Interval], sizes: &Size
             known.adjoints.push((*result, id, of_result[0][fact].1.mag()));
         }
     }
-    known
+    Some(known)
 }
 
 /// Which nodes have the number of a fact, or its opposite, at all states.
 fn agreements(graph: &Graph, of_nodes: &[Vec<Dd>], facts: &[&Vec<(Dd, Interval)>]) -> Vec<(NodeId, usize, bool)> {
+    let mut by_size: Vec<(f64, usize)> =
+        facts[0].iter().enumerate().map(|(k, (w, _))| (w.to_f64().abs(), k)).filter(|(w, _)| *w != 0.0).collect();
+    by_size.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut found = Vec::new();
     for id in graph.ids() {
         let v = of_nodes[0][id.index()].to_f64();
-        for (k, (w, _)) in facts[0].iter().enumerate() {
-            let w = w.to_f64();
-            if w == 0.0 || (v.abs() - w.abs()).abs() > 1e-12 * w.abs() {
-                continue;
-            }
-            let negative = (v < 0.0) != (w < 0.0);
+        let start = by_size.partition_point(|(w, _)| *w < v.abs() * (1.0 - 2e-12));
+        let near = by_size[start..].iter().take_while(|(w, _)| *w <= v.abs() * (1.0 + 2e-12));
+        for &(_, k) in near {
+            let negative = (v < 0.0) != (facts[0][k].0.to_f64() < 0.0);
             let agrees = of_nodes.iter().zip(facts).all(|(v, facts)| {
                 let (v, w) = (v[id.index()], facts[k].0);
                 let w = if negative { -w } else { w };
@@ -178,7 +231,6 @@ pub fn adjoints(graph: &Graph, values: &[Dd], result: NodeId) -> Vec<Dd> {
 struct Bounds<'a> {
     felt: Felt,
     inertia: &'a [f64],
-    beta: f64,
 }
 
 /// Numbers at a state, and their ranges at all of them.
@@ -188,20 +240,40 @@ struct Facts {
     adjoints: Vec<Vec<(Dd, Interval)>>,
 }
 
+/// How a result depends on the equations for a column: the adjoint of b with its bound relative to √c, and that of x where it is used again,
+/// with its bound relative to √H.
+struct Influence<'a> {
+    column: &'a ColumnAt,
+    of_right: Vec<Dd>,
+    of_solution: Vec<Dd>,
+    most: f64,
+}
+
+fn within(x: f64) -> Interval {
+    Interval::around_zero(x * (1.0 + SLACK))
+}
+
+/// Neighbours, whose sums are accelerations about parallel axes.
+fn runs(n: usize) -> impl Iterator<Item = std::ops::RangeInclusive<usize>> {
+    (0..n).flat_map(move |i| (i..n).map(move |j| i..=j))
+}
+
 impl Bounds<'_> {
-    /// From H and q̈ at a state. One piece: elimination, inverse and adjoints share all of their values.
-    fn facts(&self, model: &Model<Dd>, h: &[Dd], qdd: &[Dd]) -> Facts {
-        let (n, held, free, inertia) = (model.nv(), &self.felt.held, &self.felt.free, self.inertia);
-        let within = |x: f64| Interval::around_zero(x * (1.0 + SLACK));
-        let root = |k: usize| free[k].sqrt();
+    /// From H and the columns that are solved for at a state. One piece: elimination, inverse and adjoints share all of their values.
+    fn facts(&self, model: &Model<Dd>, h: &[Dd], columns: &[ColumnAt], results: &[(usize, SolvedFor)]) -> Facts {
+        let (n, held, inertia) = (model.nv(), &self.felt.held, self.inertia);
+        let root = |k: usize| self.felt.free[k].sqrt();
         let mut a = h.to_vec();
-        let mut y: Vec<Dd> = (0..n).map(|i| (0..n).fold(Dd::ZERO, |sum, j| sum + h[i * n + j] * qdd[j])).collect();
+        let row = |x: &[Dd], i: usize| (0..n).fold(Dd::ZERO, |sum, j| sum + h[i * n + j] * x[j]);
+        let mut ys: Vec<Vec<Dd>> = columns.iter().map(|c| (0..n).map(|i| row(&c.x, i)).collect()).collect();
         // sums of accelerations about parallel axes are values of their own
         let mut values: Vec<(Dd, Interval)> = Vec::new();
-        let runs = || (0..n).flat_map(|i| (i..n).map(move |j| i..=j));
-        for run in runs() {
-            let sum = run.clone().fold(Dd::ZERO, |sum, j| sum + qdd[j]);
-            values.push((sum, within(run.map(|j| root(j) * self.beta).sum())));
+        for column in columns {
+            let (x, beta) = (&column.x, column.beta);
+            for run in runs(n).filter(|run| column.of == SolvedFor::Acceleration || run.clone().count() == 1) {
+                let sum = run.clone().fold(Dd::ZERO, |sum, j| sum + x[j]);
+                values.push((sum, within(run.map(|j| root(j) * beta).sum())));
+            }
         }
         let mut left: Vec<usize> = (0..n).collect();
         let mut pivots = vec![Dd::ZERO; n];
@@ -218,7 +290,7 @@ impl Bounds<'_> {
             let pivot = a[k * n + k];
             pivots[k] = pivot;
             values.push((Dd::ONE / pivot, Interval::new((1.0 - SLACK) / inertia[k], (1.0 + SLACK) / held[k])));
-            values.push((y[k], within(inertia[k].sqrt() * self.beta)));
+            values.extend(columns.iter().zip(&ys).map(|(c, y)| (y[k], within(inertia[k].sqrt() * c.beta))));
             left.retain(|i| *i != k);
             for &i in &left {
                 let factor = a[i * n + k] / pivot;
@@ -228,8 +300,10 @@ impl Bounds<'_> {
                     let product = factor * a[k * n + j];
                     a[i * n + j] -= product;
                 }
-                let product = factor * y[k];
-                y[i] -= product;
+                for y in &mut ys {
+                    let product = factor * y[k];
+                    y[i] -= product;
+                }
             }
         }
         // rows of L⁻¹ from the base outwards, H⁻¹ = L⁻¹ D⁻¹ L⁻ᵀ
@@ -245,229 +319,68 @@ impl Bounds<'_> {
         }
         let of_inverse =
             |k: usize, j: usize| (0..n).fold(Dd::ZERO, |sum, m| sum + inverse[k][m] * inverse[j][m] / pivots[m]);
-        let most = |k: usize, j: usize| root(k) * root(j);
-        let fastest = |j: usize| root(j) * self.beta;
-        let adjoints = (0..n).map(|k| {
-            let row: Vec<Dd> = (0..n).map(|j| of_inverse(k, j)).collect();
-            let mut all = Vec::new();
-            for run in runs() {
-                let sum = run.clone().fold(Dd::ZERO, |sum, j| sum + row[j]);
-                all.push((sum, within(run.map(|j| most(k, j)).sum())));
-            }
-            for j in 0..n {
-                all.push((inverse[k][j], within((free[k] * inertia[j]).sqrt())));
-                let (product, size) = (row[j] * qdd[j], most(k, j) * fastest(j));
-                all.push((product, within(size)));
-                all.push((product * pivots[j] * pivots[j], within(size * inertia[j] * inertia[j])));
-                for i in 0..j {
-                    let (sum, size) =
-                        (row[i] * qdd[j] + row[j] * qdd[i], most(k, i) * fastest(j) + most(k, j) * fastest(i));
-                    all.push((sum, within(size)));
-                    all.push((sum * pivots[j], within(size * inertia[j])));
-                    all.push((sum * pivots[i], within(size * inertia[i])));
-                }
-            }
-            all
+        let rows: Vec<Vec<Dd>> = (0..n).map(|k| (0..n).map(|j| of_inverse(k, j)).collect()).collect();
+        let find = |of: SolvedFor| columns.iter().find(|c| c.of == of);
+        let adjoints = results.iter().map(|(k, of)| {
+            let Some(column) = find(*of) else { return Vec::new() };
+            let own =
+                Influence { column, of_right: rows[*k].clone(), of_solution: inverse[*k].clone(), most: root(*k) };
+            let through =
+                find(SolvedFor::Acceleration).filter(|_| !column.of_accelerations.is_empty()).map(|column_of_qdd| {
+                    // g, w = H⁻¹ g and L⁻ᵀ g
+                    let g: Vec<Dd> = (0..n)
+                        .map(|m| (0..n).fold(Dd::ZERO, |sum, i| sum - rows[*k][i] * column.of_accelerations[i * n + m]))
+                        .collect();
+                    let times = |matrix: &dyn Fn(usize, usize) -> Dd| -> Vec<Dd> {
+                        (0..n).map(|j| (0..n).fold(Dd::ZERO, |sum, m| sum + matrix(j, m) * g[m])).collect()
+                    };
+                    Influence {
+                        column: column_of_qdd,
+                        of_right: times(&|j, m| rows[j][m]),
+                        of_solution: times(&|j, m| inverse[m][j]),
+                        most: root(*k) * column.most_of_accelerations,
+                    }
+                });
+            self.of_result(&std::iter::once(own).chain(through).collect::<Vec<_>>(), &pivots)
         });
         let adjoints = adjoints.collect();
         Facts { values, adjoints }
     }
-}
 
-/// What joints feel at least, and how easily they move at most.
-struct Felt {
-    /// Θ.
-    held: Vec<f64>,
-    /// c.
-    free: Vec<f64>,
-}
-
-impl Felt {
-    /// None if a joint may feel nothing of the bodies next to it.
-    fn new(model: &Model<Dd>, q: &[Interval]) -> Option<Felt> {
-        let bodies = &model.bodies;
-        let mut felt = Felt { held: vec![0.0; model.nv()], free: vec![0.0; model.nv()] };
-        for (id, body) in bodies.iter().enumerate() {
-            let alone = inertia_of(body)[axis(body)][axis(body)].lo;
-            let carried = bodies.iter().filter(|b| b.parent == Some(id));
-            let held = carried.map(|child| least(body, child, q, WantedJoints::First)).fold(alone, f64::max);
-            let rotor = body.effects.rotor_inertia.map_or(0.0, Dd::to_f64);
-            felt.held[body.joint.iv] = (held + rotor) * (1.0 - SLACK);
-            let free = match body.parent {
-                None => held,
-                Some(p) if bodies[p].parent.is_none() => least(&bodies[p], body, q, WantedJoints::SecondOnJoint),
-                Some(p) => least(&bodies[p], body, q, WantedJoints::SecondFree),
-            };
-            let is_positive = felt.held[body.joint.iv] > 0.0 && free + rotor > 0.0;
-            is_positive.then_some(())?;
-            felt.free[body.joint.iv] = (1.0 + SLACK) / (free + rotor);
-        }
-        Some(felt)
-    }
-}
-
-/// Which of two joints, and how the first body moves.
-#[derive(Clone, Copy, PartialEq)]
-enum WantedJoints {
-    /// The first, with the other free.
-    First,
-    /// The second, with the first free.
-    SecondOnJoint,
-    /// The second, with the first body free in space.
-    SecondFree,
-}
-
-type Column = [Interval; 6];
-type BodyInertia = [[Interval; 6]; 6];
-
-fn interval(x: Dd) -> Interval {
-    Interval::new(x.hi().next_down(), x.hi().next_up())
-}
-
-/// The component of a twist (ω, v) that a joint moves.
-fn axis(body: &Body<Dd>) -> usize {
-    if body.joint.kind.slides() {
-        5
-    } else {
-        2
-    }
-}
-
-/// The 6 × 6 inertia of a body about the origin of its frame, of twists (ω, v).
-fn inertia_of(body: &Body<Dd>) -> BodyInertia {
-    let total = body.total_about_origin();
-    let (m, s) = (total.first_moment, total.second_moment);
-    let trace = s.xx + s.yy + s.zz;
-    let j = [[trace - s.xx, -s.xy, -s.xz], [-s.xy, trace - s.yy, -s.yz], [-s.xz, -s.yz, trace - s.zz]];
-    // ω · (m c × v)
-    let c = [[Dd::ZERO, -m.z, m.y], [m.z, Dd::ZERO, -m.x], [-m.y, m.x, Dd::ZERO]];
-    let mut inertia = [[Interval::ZERO; 6]; 6];
-    for a in 0..3 {
-        for b in 0..3 {
-            inertia[a][b] = interval(j[a][b]);
-            inertia[a][3 + b] = interval(c[a][b]);
-            inertia[3 + b][a] = interval(c[a][b]);
-        }
-        inertia[3 + a][3 + a] = interval(total.mass);
-    }
-    inertia
-}
-
-/// What a joint feels at least of two bodies, the second carried by the first, for all positions of the second joint.
-fn least(first: &Body<Dd>, second: &Body<Dd>, q: &[Interval], wanted: WantedJoints) -> f64 {
-    let range = q.get(second.joint.iq).copied().unwrap_or(Interval::ZERO);
-    let turn = std::f64::consts::TAU * (1.0 + SLACK);
-    let turns = second.joint.kind.turns() && range.width() > turn;
-    let range = if turns { Interval::new(0.0, turn) } else { range };
-    let inertias = [inertia_of(first), inertia_of(second)];
-    let step = (range.hi - range.lo) / PARTS as f64;
-    let part = |k: usize| {
-        let lo = range.lo + step * k as f64;
-        Interval::new(lo, if k + 1 == PARTS { range.hi } else { range.lo + step * (k + 1) as f64 })
-    };
-    (0..PARTS).map(|k| least_at(first, second, &inertias, part(k), wanted, 8)).fold(f64::INFINITY, f64::min)
-}
-
-/// The same for positions in a range, which is cut so often if nothing is known of the whole.
-fn least_at(
-    first: &Body<Dd>,
-    second: &Body<Dd>,
-    inertias: &[BodyInertia; 2],
-    q: Interval,
-    wanted: WantedJoints,
-    cuts: usize,
-) -> f64 {
-    let unit = |k: usize| std::array::from_fn(|i| if i == k { Interval::ONE } else { Interval::ZERO });
-    let moves: Vec<Column> = match wanted {
-        // shifts first: what is left then is about centres of mass
-        WantedJoints::SecondFree => [3, 4, 5, 0, 1, 2].map(unit).to_vec(),
-        _ => vec![unit(axis(first))],
-    };
-    let pose = BodyPose::of(second, q);
-    // motions of the first body, and of the second on it, as twists of both; the wanted one last
-    let mut twists: Vec<[Column; 2]> = moves.iter().map(|v| [*v, pose.carried(v)]).collect();
-    twists.push([[Interval::ZERO; 6], unit(axis(second))]);
-    if wanted == WantedJoints::First {
-        twists.reverse();
-    }
-    let n = twists.len();
-    let mut h = vec![vec![Interval::ZERO; n]; n];
-    for (i, a) in twists.iter().enumerate() {
-        for (j, b) in twists.iter().enumerate() {
-            for body in 0..2 {
-                for (r, row) in inertias[body].iter().enumerate() {
-                    for (c, m) in row.iter().enumerate() {
-                        h[i][j] = h[i][j] + a[body][r] * (*m * b[body][c]);
-                    }
-                }
+    /// The adjoints of one result, of all equations that it depends on.
+    fn of_result(&self, influences: &[Influence<'_>], pivots: &[Dd]) -> Vec<(Dd, Interval)> {
+        let (n, inertia) = (pivots.len(), self.inertia);
+        let root = |k: usize| self.felt.free[k].sqrt();
+        let mut all = Vec::new();
+        for Influence { of_right, of_solution, most, .. } in influences {
+            for run in runs(n) {
+                let sum = run.clone().fold(Dd::ZERO, |sum, j| sum + of_right[j]);
+                all.push((sum, within(run.map(|j| most * root(j)).sum())));
+            }
+            for j in 0..n {
+                all.push((of_solution[j], within(most * inertia[j].sqrt())));
             }
         }
-    }
-    for k in 0..n - 1 {
-        let pivot = h[k][k];
-        if pivot.lo <= 0.0 {
-            return cut(first, second, inertias, q, wanted, cuts);
-        }
-        for i in k + 1..n {
-            for j in k + 1..=i {
-                let taken = match i == j {
-                    true => h[i][k].square().over(pivot),
-                    false => (h[i][k] * h[j][k]).over(pivot),
-                };
-                h[i][j] = h[i][j] - taken;
-                h[j][i] = h[i][j];
-            }
-        }
-    }
-    match h[n - 1][n - 1] {
-        // not to lose much
-        last if last.lo > 0.6 * last.hi || cuts == 0 => last.lo.max(0.0),
-        _ => cut(first, second, inertias, q, wanted, cuts),
-    }
-}
-
-fn cut(
-    first: &Body<Dd>,
-    second: &Body<Dd>,
-    inertias: &[BodyInertia; 2],
-    q: Interval,
-    wanted: WantedJoints,
-    cuts: usize,
-) -> f64 {
-    if cuts == 0 {
-        return 0.0;
-    }
-    let middle = 0.5 * (q.lo + q.hi);
-    let of = |part| least_at(first, second, inertias, part, wanted, cuts - 1);
-    of(Interval::new(q.lo, middle)).min(of(Interval::new(middle, q.hi)))
-}
-
-/// Pose of a body's frame in that of the one before it.
-struct BodyPose {
-    rotation: [[Interval; 3]; 3],
-    translation: [Interval; 3],
-}
-
-impl BodyPose {
-    fn of(body: &Body<Dd>, q: Interval) -> BodyPose {
-        let r = body.placement.rotation.rows.map(|row| row.map(interval));
-        let p = body.placement.translation.to_array().map(interval);
-        if body.joint.kind.slides() {
-            return BodyPose { rotation: r, translation: [0, 1, 2].map(|i| p[i] + r[i][2] * q) };
-        }
-        let (s, c) = q.sin_cos();
-        // R R_z(q)
-        BodyPose { rotation: r.map(|[x, y, z]| [x * c + y * s, y * c - x * s, z]), translation: p }
-    }
-
-    /// The twist of a frame that is fixed to a body of that twist.
-    fn carried(&self, twist: &Column) -> Column {
-        let [wx, wy, wz, vx, vy, vz] = *twist;
-        let [x, y, z] = self.translation;
-        let v = [vx + (wy * z - wz * y), vy + (wz * x - wx * z), vz + (wx * y - wy * x)];
-        let turned = |u: [Interval; 3], i: usize| {
-            self.rotation[0][i] * u[0] + self.rotation[1][i] * u[1] + self.rotation[2][i] * u[2]
+        // of entries of A: of all equations together
+        let together = |i: usize, j: usize| {
+            influences.iter().fold((Dd::ZERO, 0.0), |(sum, size), of| {
+                let x = &of.column.x;
+                let (product, most) = (of.of_right[i] * x[j], of.most * root(i) * root(j) * of.column.beta);
+                (sum + product, size + most)
+            })
         };
-        std::array::from_fn(|i| if i < 3 { turned([wx, wy, wz], i) } else { turned(v, i - 3) })
+        for j in 0..n {
+            let (product, size) = together(j, j);
+            all.push((product, within(size)));
+            all.push((product * pivots[j] * pivots[j], within(size * inertia[j] * inertia[j])));
+            for i in 0..j {
+                let ((one, of_one), (other, of_other)) = (together(i, j), together(j, i));
+                let (sum, size) = (one + other, of_one + of_other);
+                all.push((sum, within(size)));
+                all.push((sum * pivots[j], within(size * inertia[j])));
+                all.push((sum * pivots[i], within(size * inertia[i])));
+            }
+        }
+        all
     }
 }

@@ -98,6 +98,12 @@ const VELOCITY: StageType = StageType {
     values: "velocity",
     doc: "What depends on q and q̇: made once per q̇, it serves inverse dynamics for many q̈ and forward dynamics for many tau.",
 };
+const MOTION: StageType = StageType {
+    type_name: "Motion",
+    values: "motion",
+    doc:
+        "What depends on a motion: q, q̇, and q̈ or tau. Made once per motion, it serves products along many directions.",
+};
 const CALL: StageType = StageType { type_name: "", values: "", doc: "" };
 
 /// The programs of a staged form.
@@ -149,7 +155,11 @@ fn optimised(robot: &Robot, frames: &[String], options: &Options, optimisations:
     let cuts = |robot: &Robot, form| {
         let (graph, stage_of, stages) = joint_program(robot, frames, (options, optimisations), &functions, form);
         let names: Vec<&str> = stages.iter().map(|s| s.values).collect();
-        let blocks: Vec<usize> = functions.iter().map(|f| f.outputs(&robot.model, frames.len()).len()).collect();
+        let blocks_of = |f: &Function| {
+            let frames = options.scene.frames_of(*f, frames).len();
+            options.scene.select(*f, &robot.model, frames).1.len()
+        };
+        let blocks: Vec<usize> = functions.iter().map(blocks_of).collect();
         let mut pieces = cut(&graph, &stage_of, &names, &blocks);
         let mut found = Vec::new();
         if optimisations.sums {
@@ -240,13 +250,21 @@ fn joint_program(
         }
     }
     let has_parameters = ports.iter().any(is_optional);
-    let stages: Vec<StageType> =
-        has_parameters.then_some(PARAMETERS).into_iter().chain([CONFIGURATION, VELOCITY, CALL]).collect();
+    // a motion is a stage of its own where something is asked of it again and again
+    let has_directions = ports.iter().filter_map(Quantity::of).any(Quantity::is_of_call);
+    let stages: Vec<StageType> = has_parameters
+        .then_some(PARAMETERS)
+        .into_iter()
+        .chain([CONFIGURATION, VELOCITY])
+        .chain(has_directions.then_some(MOTION))
+        .chain([CALL])
+        .collect();
     let first = usize::from(has_parameters);
     let stage_of = |port: &Port| match Quantity::of(port) {
         _ if is_optional(port) => 0,
         Some(Quantity::Configuration) => first,
         Some(Quantity::Velocity) => first + 1,
+        Some(quantity) if has_directions && quantity.is_of_call() => first + 3,
         _ => first + 2,
     };
     let stage_of = ports.iter().map(stage_of).collect();

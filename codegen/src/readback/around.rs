@@ -184,10 +184,25 @@ impl Around<'_, '_, '_> {
                 );
                 self.is(root, Sort::Constant, &name, &value)?;
             }
+            for of in &figures.entries {
+                let name = format!("{}_{}", function.to_uppercase(), of.output.to_uppercase());
+                for (what, numbers) in [("ROW_STARTS", &of.row_starts), ("COLUMNS", &of.columns)] {
+                    let name = format!("{name}_{what}");
+                    let text = format!("pub const {name}: [usize; {}] = {numbers:?};", numbers.len());
+                    self.is(root, Sort::Constant, &name, &text)?;
+                }
+            }
             if let Some(errors) = &figures.errors {
                 for output in &errors.outputs {
                     let name = errors.constant_name(function, output);
                     self.numbers(&name, Scalar::F64, &output.shape, &output.bounds, &is_rounded_up)?;
+                    if let Some(slopes) = output.slopes.as_ref().filter(|slopes| slopes.refused.is_none()) {
+                        let [of_entries, of_norm] = output.lipschitz_names(function);
+                        self.numbers(&of_entries, Scalar::F64, &output.shape, &slopes.entries, &is_rounded_up)?;
+                        if let Some(norm) = slopes.norm {
+                            self.numbers(&of_norm, Scalar::F64, &[], &[norm], &is_rounded_up)?;
+                        }
+                    }
                 }
             }
         }

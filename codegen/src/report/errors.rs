@@ -1,5 +1,8 @@
 //! Certified bounds of errors, as they stand in the generated file and in reports.
 
+use crate::function::SlopeOf;
+use crate::program::nonzeros::NonzeroEntries;
+use straightline_graph::certify::slopes::greatest_singular_value;
 use straightline_graph::certify::Certificate;
 use straightline_graph::expr::Port;
 
@@ -29,6 +32,40 @@ pub struct OutputErrors {
     pub bounds: Vec<f64>,
     /// The absolute value of each scalar is at most this.
     pub magnitudes: Vec<f64>,
+    /// Of derivatives: how fast what they are of can change.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub slopes: Option<LipschitzBounds>,
+}
+
+/// How fast a function can change with one of its inputs over a box.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct LipschitzBounds {
+    /// Of what, as it is written.
+    pub of: &'static str,
+    /// By which input, by its name.
+    pub by: String,
+    /// Each entry of the derivative is at most so large, in the order of the output.
+    pub entries: Vec<f64>,
+    /// Of one matrix: its greatest singular value is at most this.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub norm: Option<f64>,
+    /// Why there are none.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub refused: Option<&'static str>,
+}
+
+impl LipschitzBounds {
+    /// Of a derivative whose entries in an array of that shape are at most so large.
+    pub fn new(slope: SlopeOf, shape: &[usize], entries: Vec<f64>) -> Self {
+        let norm = (shape.len() == 2).then(|| greatest_singular_value(&entries, shape[1]));
+        LipschitzBounds { of: slope.of, by: slope.by.name(), entries, norm, refused: None }
+    }
+
+    /// None, and why.
+    pub fn refused(slope: SlopeOf, why: &'static str) -> Self {
+        LipschitzBounds { of: slope.of, by: slope.by.name(), entries: Vec::new(), norm: None, refused: Some(why) }
+    }
 }
 
 /// Numbers as a nested array, rounded up to four digits.
@@ -44,6 +81,7 @@ impl ErrorReport {
                 shape: port.shape.clone(),
                 bounds: certificate.errors[of.clone()].to_vec(),
                 magnitudes: certificate.magnitudes[of].to_vec(),
+                slopes: None,
             }
         });
         ErrorReport { ranges, outputs: outputs.collect(), refused: None }
@@ -52,6 +90,24 @@ impl ErrorReport {
     /// No bounds, and why.
     pub fn refused(why: &'static str) -> Self {
         ErrorReport { ranges: Vec::new(), outputs: Vec::new(), refused: Some(why) }
+    }
+
+    /// Keeps the bounds of what is put out, where that is some entries of a matrix alone.
+    pub(crate) fn keep_outputs(&mut self, outputs: &[Port], entries: &[NonzeroEntries]) {
+        for (output, port) in self.outputs.iter_mut().zip(outputs).filter(|(output, port)| output.shape != port.shape) {
+            let places =
+                entries.iter().find(|of| of.output == port.name).map(NonzeroEntries::places).unwrap_or_default();
+            let kept = |all: &[f64]| places.iter().map(|k| all[*k]).collect::<Vec<f64>>();
+            output.shape.clone_from(&port.shape);
+            (output.bounds, output.magnitudes) = (kept(&output.bounds), kept(&output.magnitudes));
+            let slopes = output.slopes.iter_mut().filter(|slopes| slopes.refused.is_none());
+            slopes.for_each(|slopes| slopes.entries = kept(&slopes.entries));
+        }
+    }
+
+    /// What all results can be at most, in their order.
+    pub fn magnitudes(&self) -> Vec<f64> {
+        self.outputs.iter().flat_map(|o| o.magnitudes.iter().copied()).collect()
     }
 
     /// The bounds of all results, in their order.

@@ -8,6 +8,7 @@ pub mod waterfall;
 use crate::equations::forward_method::MethodChoice;
 use crate::function::Function;
 use crate::machine_code::MachineFigures;
+use crate::program::nonzeros::NonzeroEntries;
 use crate::program::staged::StagedReport;
 use crate::program::TracedProgram;
 use budget::Measures;
@@ -56,6 +57,9 @@ pub struct FunctionReport {
     /// Bounds of its rounding errors, where they were asked for.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub errors: Option<ErrorReport>,
+    /// Which entries of its matrix results can be non-zero, where that is written beside it.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
+    pub entries: Vec<NonzeroEntries>,
     /// How it came to these counts: where it was asked for, and where a scene skips something.
     #[cfg_attr(feature = "serde", serde(flatten, skip_serializing_if = "Option::is_none"))]
     pub waterfall: Option<Waterfall>,
@@ -103,6 +107,7 @@ impl FunctionReport {
             machine: None,
             method: program.method,
             errors: None,
+            entries: program.entries.clone(),
             waterfall: None,
         }
     }

@@ -187,7 +187,7 @@ fn search_all(robots: &[Source], evaluations: usize) -> usize {
                 let graph = program(&robot, &[], function, &options).graph;
                 let ranges = input_box(&graph.inputs, &options.scene, &model).expect("every input has a range");
                 let facts = match function {
-                    Function::ForwardDynamics => known(&robot, &graph, &ranges, &options),
+                    Function::ForwardDynamics => known(&robot, function, &graph, &ranges, &options),
                     _ => Default::default(),
                 };
                 let Ok(certificate) = certify_with(&graph, scalar, &ranges, Effort::default(), &facts) else {

@@ -36,6 +36,10 @@ struct Case {
 
 /// q within the limits of the robot file, |q̇| ≤ `speed`, |τ| within the file's limits.
 fn case(file: &str, scalar: Scalar, speed: f64, chosen: bool) -> Case {
+    case_of(Function::ForwardDynamics, file, scalar, speed, chosen)
+}
+
+fn case_of(function: Function, file: &str, scalar: Scalar, speed: f64, chosen: bool) -> Case {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions").join(file);
     let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let (loaded, complaints) = model::load(&Source::new(file, text), &ModelOptions::default());
@@ -46,11 +50,11 @@ fn case(file: &str, scalar: Scalar, speed: f64, chosen: bool) -> Case {
     // without the search for the cheapest form, which takes long
     let plain = Optimisations { chosen: false, ..options.optimisations() };
     let graph = match chosen {
-        true => program(&robot, &[], Function::ForwardDynamics, &options).graph,
-        false => optimised(&robot, &[], Function::ForwardDynamics, &options, plain),
+        true => program(&robot, &[], function, &options).graph,
+        false => optimised(&robot, &[], function, &options, plain),
     };
     let ranges = input_box(&graph.inputs, &options.scene, &robot.model).expect("every input has a range");
-    let known = known(&robot, &graph, &ranges, &options);
+    let known = known(&robot, function, &graph, &ranges, &options);
     Case { graph, ranges, known }
 }
 
@@ -86,35 +90,48 @@ fn slow_proof_that_every_arm_has_bounds_of_its_accelerations_and_no_search_finds
 #[test]
 fn what_is_known_of_values_and_adjoints_holds_everywhere_in_the_box() {
     for (file, _) in ARMS {
-        let case = case(file, Scalar::F64, 2.0, false);
-        let (values, adjoints) = (case.known.values.len(), case.known.adjoints.len());
-        assert!(values > 5 && adjoints > values, "{file}: {values} and {adjoints}");
-        let mut probe = case.graph.clone();
-        probe.results = case.graph.ids().collect();
-        let mut seed = 5u64;
-        let mut unit = || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 11) as f64 / (1u64 << 53) as f64
+        hold_everywhere(file, &case(file, Scalar::F64, 2.0, false), 8);
+    }
+}
+
+/// The same of the derivatives of accelerations, found on the way or given.
+#[test]
+fn what_is_known_of_derivatives_holds_everywhere_in_the_box() {
+    for function in [Function::ForwardDynamicsDerivatives, Function::ForwardDynamicsDerivativesAtMotion] {
+        for file in ["planar2r.urdf", "chapter_stanford.toml", "puma560.urdf"] {
+            hold_everywhere(file, &case_of(function, file, Scalar::F64, 2.0, false), 4);
+        }
+    }
+}
+
+fn hold_everywhere(file: &str, case: &Case, states: usize) {
+    let (values, adjoints) = (case.known.values.len(), case.known.adjoints.len());
+    assert!(values > 5 && adjoints > values, "{file}: {values} and {adjoints}");
+    let mut probe = case.graph.clone();
+    probe.results = case.graph.ids().collect();
+    let mut seed = 5u64;
+    let mut unit = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1u64 << 53) as f64
+    };
+    for _ in 0..states {
+        let place = |r: &Interval| match unit() {
+            x if x < 0.1 => r.lo,
+            x if x < 0.2 => r.hi,
+            x if x < 0.3 => 0.0f64.clamp(r.lo, r.hi),
+            _ => r.lo + unit() * (r.hi - r.lo),
         };
-        for _ in 0..8 {
-            let place = |r: &Interval| match unit() {
-                x if x < 0.1 => r.lo,
-                x if x < 0.2 => r.hi,
-                x if x < 0.3 => 0.0f64.clamp(r.lo, r.hi),
-                _ => r.lo + unit() * (r.hi - r.lo),
-            };
-            let inputs: Vec<f64> = case.ranges.iter().map(place).collect();
-            let at = evaluate::<Dd>(&probe, &inputs.iter().map(|x| Dd::from(*x)).collect::<Vec<_>>());
-            for (id, range) in &case.known.values {
-                let x = at[id.index()].to_f64();
-                assert!(range.lo <= x && x <= range.hi, "{file}: {x:e} is not in {range:?} at {inputs:?}");
-            }
-            for result in &case.graph.results {
-                let of = pivots::adjoints(&case.graph, &at, *result);
-                for (_, id, most) in case.known.adjoints.iter().filter(|(r, _, _)| r == result) {
-                    let x = of[id.index()].to_f64().abs();
-                    assert!(x <= *most, "{file}: {x:e} > {most:e} at {inputs:?}");
-                }
+        let inputs: Vec<f64> = case.ranges.iter().map(place).collect();
+        let at = evaluate::<Dd>(&probe, &inputs.iter().map(|x| Dd::from(*x)).collect::<Vec<_>>());
+        for (id, range) in &case.known.values {
+            let x = at[id.index()].to_f64();
+            assert!(range.lo <= x && x <= range.hi, "{file}: {x:e} is not in {range:?} at {inputs:?}");
+        }
+        for result in &case.graph.results {
+            let of = pivots::adjoints(&case.graph, &at, *result);
+            for (_, id, most) in case.known.adjoints.iter().filter(|(r, _, _)| r == result) {
+                let x = of[id.index()].to_f64().abs();
+                assert!(x <= *most, "{file}: {x:e} > {most:e} at {inputs:?}");
             }
         }
     }

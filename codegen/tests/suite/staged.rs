@@ -4,7 +4,7 @@ use straightline_codegen::expr::{evaluate, Graph};
 use straightline_codegen::program::parameter::parameter_program;
 use straightline_codegen::program::program;
 use straightline_codegen::program::staged::programs;
-use straightline_codegen::scene::{Gravity, Parameter, Scene};
+use straightline_codegen::scene::{Gravity, Parameter, Scene, Selection};
 use straightline_codegen::{compile, model, Function, Options, Robot, Source};
 
 const ROBOT: &str = r#"
@@ -86,15 +86,19 @@ fn state() -> Values {
             })
             .collect::<Vec<f64>>()
     };
-    let vectors = ["q", "qd", "qdd", "tau"].map(|name| (name.to_string(), next(4)));
-    let mut values: Values = vectors.into();
+    let names =
+        ["q", "qd", "qdd", "tau", "direction_q", "direction_qd", "direction_qdd", "direction_tau", "multiplier"];
+    let mut values: Values = names.map(|name| (name.to_string(), next(4))).into();
     values.push(("gravity".into(), vec![0.3, -0.2, -9.7]));
     values
 }
 
 fn staged_equals_plain(scene: Scene) {
+    staged_functions_equal_plain(Options { scene, ..Options::default() });
+}
+
+fn staged_functions_equal_plain(options: Options) {
     let (robot, frames) = (robot(), vec!["trolley".to_string(), "counterweight".to_string()]);
-    let options = Options { scene, ..Options::default() };
     let staged = programs(&robot, &frames, &options).expect("they agree with their equations").0;
     let mut values = state();
     for parameter in &options.scene.parameters {
@@ -143,6 +147,35 @@ fn a_second_call_costs_a_third_at_most_and_gravity_and_h_nothing() {
     assert!(left(Function::InverseDynamics).flops() * 100 <= full * 35);
     assert_eq!(left(Function::GravityForce).flops() + left(Function::MassMatrix).flops(), 0);
     assert_eq!(left(Function::ForwardDynamics).sin_cos, 0);
+}
+
+/// Of derivatives, too; a scene that leaves some of their blocks out leaves out nothing else. Products along directions begin where the motion is known.
+#[test]
+fn derivatives_in_stages_are_the_plain_ones() {
+    use Function::*;
+    let matrices = vec![InverseDynamics, InverseDynamicsDerivatives, ForwardDynamicsDerivatives, CoriolisMatrix];
+    staged_functions_equal_plain(Options { functions: matrices.clone(), ..Options::default() });
+    let results = vec!["dtau_dq".to_string(), "h".to_string()];
+    let selection = Selection { results, ..Selection::default() };
+    let outputs = [(InverseDynamicsDerivatives, selection)].into_iter().collect();
+    let scene = Scene { outputs, ..Scene::default() };
+    staged_functions_equal_plain(Options { functions: matrices, scene, ..Options::default() });
+
+    let functions = vec![InverseDynamics, InverseDynamicsJvp, InverseDynamicsVjp, ForwardDynamicsJvp];
+    let options = Options { functions, ..Options::default() };
+    staged_functions_equal_plain(options.clone());
+    let (made, _) = programs(&robot(), &[], &options).expect("they agree with their equations");
+    let names: Vec<&str> = made.staged.stages.iter().map(|stage| stage.outputs[0].name.as_str()).collect();
+    assert_eq!(names, ["configuration", "velocity", "motion"]);
+    // another direction takes less than all of it
+    let plain = program(&robot(), &[], InverseDynamicsJvp, &options).graph.counts().flops();
+    let along = made.functions.iter().position(|f| *f == InverseDynamicsJvp).expect("it was asked for");
+    let left = made.staged.functions[along].1.counts().flops();
+    assert!(left * 10 <= plain * 8, "{left} of {plain}");
+    let scene = Scene { staged: true, ..Scene::default() };
+    let generated = compile(&Source::new("crane.toml", ROBOT), &Options { scene, ..options });
+    let text = generated.unwrap_or_else(|d| panic!("{d}")).text;
+    assert!(text.contains("pub struct Motion<'a>"));
 }
 
 #[test]

@@ -59,6 +59,7 @@ mod reactions;
 pub mod residual;
 mod running;
 pub mod search;
+pub mod slopes;
 mod subdivision;
 mod tape;
 #[cfg(test)]

@@ -9,7 +9,7 @@
 //!
 //! A part is only ever replaced by two that cover it, and its bound holds for both. So the greatest bound of all parts is one for the box.
 
-use super::analysis::Broken;
+use super::analysis::{Broken, OfResult};
 use super::tape::{Registers, Tape, LANES};
 use super::{Effort, ErrorAnalysis, Interval, NoCertificate};
 use crate::expr::NodeId;
@@ -18,17 +18,17 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 use straightline_core::random::Random;
 
-/// A part of the box, and the bound of the error there.
+/// A part of the box, and the bound there.
 struct BoxPart {
     ranges: Vec<Interval>,
-    error: f64,
+    bound: f64,
     /// How often each input was halved.
     cuts: Vec<u32>,
 }
 
 impl Ord for BoxPart {
     fn cmp(&self, other: &BoxPart) -> std::cmp::Ordering {
-        self.error.total_cmp(&other.error)
+        self.bound.total_cmp(&other.bound)
     }
 }
 
@@ -46,12 +46,33 @@ impl PartialEq for BoxPart {
 
 impl Eq for BoxPart {}
 
-/// Node, error and magnitude of every distinct result.
+/// Node, error and magnitude of every distinct result; the magnitude is that in the whole box.
 pub(super) fn bounds(
     analysis: &mut ErrorAnalysis,
     inputs: &[Interval],
     effort: Effort,
 ) -> Result<Vec<(NodeId, f64, f64)>, NoCertificate> {
+    let errors = refined_bounds(analysis, inputs, effort, OfResult::Error)?;
+    let of = |(node, error)| (node, error, analysis.range(node).mag());
+    Ok(errors.into_iter().map(of).collect())
+}
+
+/// Node and magnitude of every distinct result.
+pub(super) fn magnitudes(
+    analysis: &mut ErrorAnalysis,
+    inputs: &[Interval],
+    effort: Effort,
+) -> Result<Vec<(NodeId, f64)>, NoCertificate> {
+    refined_bounds(analysis, inputs, effort, OfResult::Magnitude)
+}
+
+/// Node and bound of every distinct result.
+fn refined_bounds(
+    analysis: &mut ErrorAnalysis,
+    inputs: &[Interval],
+    effort: Effort,
+    bounded: OfResult,
+) -> Result<Vec<(NodeId, f64)>, NoCertificate> {
     let is_cut = effort.boxes > 1 && effort.time.is_none_or(|time| !time.is_zero());
     if is_cut {
         analysis.ranges_on_tape(inputs)?;
@@ -66,22 +87,23 @@ pub(super) fn bounds(
     let mut searches = Vec::new();
     for k in 0..analysis.results() {
         let node = analysis.result(k);
-        let magnitude = analysis.range(node).mag();
-        let error = if is_cut {
-            let (whole, tape) = analysis.error_and_tape(k, &samples);
-            let depends =
-                analysis.inputs_of(k).into_iter().filter(|i| inputs[*i].width() > f64::MIN_POSITIVE).collect();
-            searches
-                .push((k, BoxSearch { tape, inputs, whole, depends, drops_a_part: analysis.is_broken(Broken::Part) }));
-            whole
-        } else {
-            analysis.error(k)
+        let bound = match (is_cut, bounded) {
+            (false, OfResult::Error) => analysis.error(k),
+            (false, OfResult::Magnitude) => analysis.range(node).mag(),
+            (true, _) => {
+                let (whole, tape) = analysis.bound_and_tape(bounded, k, &samples);
+                let depends =
+                    analysis.inputs_of(k).into_iter().filter(|i| inputs[*i].width() > f64::MIN_POSITIVE).collect();
+                let drops_a_part = analysis.is_broken(Broken::Part);
+                searches.push((k, BoxSearch { tape, inputs, whole, depends, drops_a_part }));
+                whole
+            }
         };
-        all.push((node, error, magnitude));
+        all.push((node, bound));
     }
     let until = effort.time.map(|time| Instant::now() + time);
-    for (k, error) in refined(&searches, effort.boxes, until) {
-        all[k].1 = all[k].1.min(error);
+    for (k, bound) in refined(&searches, effort.boxes, until) {
+        all[k].1 = all[k].1.min(bound);
     }
     Ok(all)
 }
@@ -190,7 +212,7 @@ impl BoxSearch<'_> {
     /// The bound from so many boxes, or from those that there was time for.
     fn refined(&self, boxes: usize, until: Option<Instant>, registers: &mut Registers) -> f64 {
         let Some(gains) = self.gains(until, registers) else { return self.whole };
-        let whole = BoxPart { ranges: self.inputs.to_vec(), error: self.whole, cuts: vec![0; self.depends.len()] };
+        let whole = BoxPart { ranges: self.inputs.to_vec(), bound: self.whole, cuts: vec![0; self.depends.len()] };
         let mut parts = BinaryHeap::from([whole]);
         while parts.len() < boxes && !is_late(until) {
             // the worst parts, as many as are played at a time
@@ -212,15 +234,15 @@ impl BoxSearch<'_> {
                 cuts[c.expect("they have one")] += 1;
                 for (half, ranges) in both.into_iter().enumerate().skip(usize::from(self.drops_a_part)) {
                     // no part is worse than what it was cut from
-                    let error = bounds[2 * n + half].min(part.error);
-                    parts.push(BoxPart { ranges, error, cuts: cuts.clone() });
+                    let bound = bounds[2 * n + half].min(part.bound);
+                    parts.push(BoxPart { ranges, bound, cuts: cuts.clone() });
                 }
             }
             if is_at_points {
                 break;
             }
         }
-        parts.peek().map_or(0.0, |worst| worst.error)
+        parts.peek().map_or(0.0, |worst| worst.bound)
     }
 }
 

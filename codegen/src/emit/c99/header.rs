@@ -15,6 +15,12 @@ const BATCHES: &str = "
  * at [s * w + c] for arrays of w numbers to a state. n may be 0. */
 ";
 
+/// Numbers with commas, on lines of bounded length.
+fn join(numbers: &[usize]) -> String {
+    let lines = numbers.chunks(24).map(|line| line.iter().map(usize::to_string).collect::<Vec<_>>().join(", "));
+    lines.collect::<Vec<_>>().join(",\n    ")
+}
+
 impl Interface<'_> {
     /// The C header of these functions, with further declarations before them.
     pub fn header(&self, functions: &[Exported], further: &str) -> String {
@@ -90,8 +96,34 @@ const char *{prefix}_frame_name(int i);
         out.push_str(further);
         self.bodies().iter().for_each(|body| self.constructor_in_c(&mut out, body));
         functions.iter().for_each(|function| self.declaration(&mut out, function));
+        self.entries_in_c(&mut out);
         out.push_str("\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n");
         out
+    }
+
+    /// Which entries of matrix results can be non-zero.
+    fn entries_in_c(&self, out: &mut String) {
+        let upper = self.prefix.to_uppercase();
+        let of_functions = &self.generated.report.functions;
+        for (function, of) in
+            of_functions.iter().flat_map(|(name, found)| found.entries.iter().map(move |of| (name, of)))
+        {
+            for (name, numbers, doc) in of.constants(function) {
+                let doc = relinked(&doc, &|name| self.linked(name)).replace('`', "");
+                // an array of C has an element at least
+                let list = if numbers.is_empty() { "0".to_string() } else { join(numbers) };
+                let length = numbers.len().max(1);
+                let _ = write!(out, "\n/* {doc} */\nstatic const int {upper}_{name}[{length}] = {{{list}}};\n");
+            }
+        }
+    }
+
+    /// The name of an item in C where a text links to it.
+    fn linked(&self, name: &str) -> String {
+        match name.ends_with("_ROW_STARTS") || name.ends_with("_COLUMNS") {
+            true => format!("{}_{name}", self.prefix.to_uppercase()),
+            false => name.to_string(),
+        }
     }
 
     /// What makes a run-time parameter.
@@ -132,7 +164,7 @@ const char *{prefix}_frame_name(int i);
     /// A function, and its batches.
     fn declaration(&self, out: &mut String, function: &Exported) {
         let (prefix, c_type) = (self.prefix, function.scalar.c_name());
-        let doc = relinked(&function.doc, &|name| name.to_string());
+        let doc = relinked(&function.doc, &|name| self.linked(name));
         let doc = doc.replace("frame of FRAME_NAMES", "frame").replace("ask `is_nan()`", "compare with itself");
         let doc = doc.replace(['`', '\\'], "");
         out.push_str("\n/*");

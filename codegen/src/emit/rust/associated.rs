@@ -1,6 +1,6 @@
 //! Constants and functions of a module as associated items of a type.
 
-use super::constants::{cost, error_bounds, figures, of_robot};
+use super::constants::{cost, entries, error_bounds, figures, of_robot};
 use super::{array_type, batch, doc, frames, self_test};
 use crate::emit::doc::relinked;
 use crate::emit::module::Item;
@@ -15,7 +15,8 @@ pub fn associated_items(generated: &Generated, scene: &Scene) -> String {
     let (mut out, mut taken) = (String::new(), BTreeSet::new());
     let of_functions = generated.report.functions.iter().flat_map(|(name, found)| {
         let bounds = error_bounds(name, found);
-        [cost(name, found)].into_iter().chain(figures(name, found, generated)).chain(bounds)
+        let entries = entries(name, found);
+        [cost(name, found)].into_iter().chain(figures(name, found, generated)).chain(entries).chain(bounds)
     });
     for constant in of_robot(generated).into_iter().chain(of_functions) {
         let (name, kind) = (&constant.name, constant.kind("dynamics::"));

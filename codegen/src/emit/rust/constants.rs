@@ -5,7 +5,7 @@ use crate::choices::Choice;
 use crate::emit::Generated;
 use crate::function::{base_parameter_lists, BaseParameterList, Function};
 use crate::identifier::{comment, string_literals};
-use crate::report::errors::four_digits;
+use crate::report::errors::{four_digits, ErrorReport, OutputErrors};
 use crate::report::FunctionReport;
 use std::fmt::Write;
 use straightline_core::drive::Drive;
@@ -243,7 +243,7 @@ pub(super) fn figures(name: &str, f: &FunctionReport, generated: &Generated) -> 
 pub(super) fn error_bounds(name: &str, figures: &FunctionReport) -> Vec<AssociatedConstant> {
     let bounds = figures.errors.iter().flat_map(|errors| errors.outputs.iter().map(move |output| (errors, output)));
     bounds
-        .map(|(errors, output)| {
+        .flat_map(|(errors, output)| {
             let mut doc = format!(
                 "Certified bound of the errors of [`{name}`]: how far `{}` can be from the exact dynamics of the robot file.\n\n\
                  Numbers of the file are the nearest f64; angles that were taken as exact are exact.\n\n\
@@ -255,9 +255,47 @@ pub(super) fn error_bounds(name: &str, figures: &FunctionReport) -> Vec<Associat
             }
             let value = nested(&output.shape, &mut output.bounds.iter());
             let kind = ConstantType::Numbers(Scalar::F64, output.shape.clone());
-            AssociatedConstant::new(errors.constant_name(name, output), kind, value, doc)
+            let bound = AssociatedConstant::new(errors.constant_name(name, output), kind, value, doc);
+            std::iter::once(bound).chain(lipschitz(name, errors, output))
         })
         .collect()
+}
+
+/// Which entries of a function's matrix results can be non-zero.
+pub(super) fn entries(name: &str, figures: &FunctionReport) -> Vec<AssociatedConstant> {
+    let constants = figures.entries.iter().flat_map(|of| of.constants(name));
+    let constant = |(name, numbers, doc): (String, &[usize], String)| {
+        AssociatedConstant::new(name, ConstantType::Sizes(numbers.len()), format!("{numbers:?}"), doc)
+    };
+    constants.map(constant).collect()
+}
+
+/// Certified Lipschitz constants of what an output is the derivative of.
+fn lipschitz(name: &str, errors: &ErrorReport, output: &OutputErrors) -> Vec<AssociatedConstant> {
+    let Some(slopes) = output.slopes.as_ref().filter(|slopes| slopes.refused.is_none()) else { return Vec::new() };
+    let (of, by) = (slopes.of, &slopes.by);
+    let mut ranges = String::from("\n\nIt holds for all inputs in these ranges:\n");
+    for line in &errors.ranges {
+        let _ = writeln!(ranges, "* {}", line.replace('[', "\\[").replace(']', "\\]"));
+    }
+    let [of_entries, of_norm] = output.lipschitz_names(name);
+    let doc = format!(
+        "Certified bound of how fast {of} can change with `{by}`: no entry of `{}` of [`{name}`] is greater in size. \
+         Of a floating base by increments of its pose.{ranges}",
+        output.name
+    );
+    let numbers = |shape: &[usize]| ConstantType::Numbers(Scalar::F64, shape.to_vec());
+    let value = nested(&output.shape, &mut slopes.entries.iter());
+    let mut constants = vec![AssociatedConstant::new(of_entries, numbers(&output.shape), value, doc)];
+    if let Some(norm) = slopes.norm {
+        let doc = format!(
+            "Certified Lipschitz constant of {of} by `{by}` in Euclidean norms, coordinates in their units: \
+             ‖Δ{of}‖ ≤ this · ‖Δ`{by}`‖, all else held. No matrix whose entries keep to [`{}`] has a greater singular value.{ranges}",
+            constants[0].name
+        );
+        constants.push(AssociatedConstant::new(of_norm, numbers(&[]), nested(&[], &mut [norm].iter()), doc));
+    }
+    constants
 }
 
 fn nested<'a>(shape: &[usize], numbers: &mut impl Iterator<Item = &'a f64>) -> String {

@@ -1,6 +1,6 @@
 //! The generated file: header, constants of the robot, functions, and the sine-cosine kernel they call.
 
-use super::constants::{cost, error_bounds, figures, of_robot, AssociatedConstant, COST, FIGURES};
+use super::constants::{cost, entries, error_bounds, figures, of_robot, AssociatedConstant, COST, FIGURES};
 use super::routine::SHORT_SINES;
 use super::{batch, bound, contact, fused, indented, parameter, pasted, self_test, staged};
 use crate::choices::{Choice, Lanes, Memory};
@@ -105,8 +105,15 @@ pub(super) fn preamble(generated: &Generated) -> String {
     for (name, found) in functions {
         out.push_str(&cost(name, found).text());
         out.extend(figures(name, found, generated).iter().map(AssociatedConstant::text));
+        out.extend(entries(name, found).iter().map(AssociatedConstant::text));
         if let Some(refused) = found.errors.as_ref().and_then(|errors| errors.refused) {
             let _ = writeln!(out, "// No certified bound of the errors of {name}: {refused}.");
+        }
+        for slopes in found.errors.iter().flat_map(|errors| &errors.outputs).filter_map(|output| output.slopes.as_ref())
+        {
+            if let Some(refused) = slopes.refused {
+                let _ = writeln!(out, "// No Lipschitz constant of {} by {}: {refused}.", slopes.of, slopes.by);
+            }
         }
         out.extend(error_bounds(name, found).iter().map(AssociatedConstant::text));
     }

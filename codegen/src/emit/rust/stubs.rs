@@ -7,7 +7,7 @@
 //! `<Why<{ compile_error!(..) }> as Stub>::Item`; [`DEFINITION`] has what it takes. Lengths are numbers that do not evaluate.
 
 use super::frames;
-use crate::choices::Lanes;
+use crate::choices::{Lanes, WrittenEntries};
 use crate::function::{ContactFunction, Function};
 use crate::identifier::{identifier, upper_camel_case};
 use crate::options::Options;
@@ -111,7 +111,7 @@ fn items_and_types(options: &Options, scene: Option<&str>, upwards: &str) -> Str
         add_type(&mut out, &upper_camel_case(name));
         add_type(&mut out, &(upper_camel_case(name) + "Numbers"));
     }
-    let stages = ["Parameters", "Configuration", "Velocity"];
+    let stages = ["Parameters", "Configuration", "Velocity", "Motion"];
     let stages: String = stages.iter().map(|name| format!("    pub type {name} = super::{missing};\n")).collect();
     let _ = writeln!(out, "pub mod staged {{\n{stages}}}");
     out.push_str("pub mod contact {\n");
@@ -168,6 +168,15 @@ fn constants_and_functions(options: &Options, scene: Option<&str>, missing: &str
         let outputs = function.spec().outputs;
         for output in outputs.iter().filter(|_| outputs.len() > 1) {
             let _ = writeln!(out, "{}", value(&format!("{upper}_{}_ERROR_BOUND", output.name.to_uppercase()), missing));
+        }
+        for output in outputs {
+            let name = format!("{upper}_{}", output.name.to_uppercase());
+            let has_slopes = output.slope.is_some() && (options.certify.is_some() || scene.is_some());
+            let has_entries = output.is_by_columns() && (options.entries != WrittenEntries::All || scene.is_some());
+            let slopes = ["LIPSCHITZ", "LIPSCHITZ_NORM"].into_iter().filter(|_| has_slopes);
+            for suffix in slopes.chain(["ROW_STARTS", "COLUMNS"].into_iter().filter(|_| has_entries)) {
+                let _ = writeln!(out, "{}", value(&format!("{name}_{suffix}"), missing));
+            }
         }
         let Some(lanes) = options.lanes else { continue };
         match known {

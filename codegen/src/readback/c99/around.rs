@@ -291,7 +291,7 @@ impl<'g> CAround<'g> {
         );
         header.these(&mut at, &head)?;
         let mut declared: BTreeSet<&str> = BTreeSet::new();
-        while at < header.len() && header.token(at) != "#" {
+        while at < header.len() && !["#", "static"].contains(&header.token(at)) {
             let start = at;
             while at < header.len() && header.token(at) != "(" {
                 at += 1;
@@ -312,11 +312,28 @@ impl<'g> CAround<'g> {
         if let Some((name, _)) = functions.iter().find(is_missing) {
             return header.stop(at, format!("`{name}` is not declared"));
         }
+        self.entries(header, &mut at)?;
         header.these(&mut at, "#ifdef __cplusplus } #endif #endif")?;
         match at == header.len() {
             true => Ok(()),
             false => header.stop(at, "something behind the end"),
         }
+    }
+
+    /// Which entries of matrix results can be non-zero.
+    fn entries(&self, header: &CText<'_>, at: &mut usize) -> CReading<()> {
+        for (function, figures) in &self.generated.report.functions {
+            for of in &figures.entries {
+                let name = format!("{}_{}_{}", self.upper, function.to_uppercase(), of.output.to_uppercase());
+                for (what, numbers) in [("ROW_STARTS", &of.row_starts), ("COLUMNS", &of.columns)] {
+                    // no array of C is empty
+                    let numbers = if numbers.is_empty() { &[0][..] } else { numbers };
+                    let list = format!("{numbers:?}").replace(['[', ']'], "");
+                    header.these(at, &format!("static const int {name}_{what}[{}] = {{{list}}};", numbers.len()))?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The header for C++ hands every argument on in its place.

@@ -75,6 +75,15 @@ pub(super) enum Broken {
     HalfTurn,
 }
 
+/// What is bounded of a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum OfResult {
+    /// How far the computed value is from the exact one.
+    Error,
+    /// Either of them as an absolute value.
+    Magnitude,
+}
+
 /// Why a result has no certificate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoCertificate {
@@ -222,7 +231,7 @@ impl<'g> ErrorAnalysis<'g> {
         self.find_ranges(inputs, false)
     }
 
-    /// [`ErrorAnalysis::ranges`], and all that is computed is written down, for [`ErrorAnalysis::error_and_tape`].
+    /// [`ErrorAnalysis::ranges`], and all that is computed is written down, for [`ErrorAnalysis::bound_and_tape`].
     pub(super) fn ranges_on_tape(&mut self, inputs: &[Interval]) -> Result<(), NoCertificate> {
         self.find_ranges(inputs, true)
     }
@@ -294,15 +303,22 @@ impl<'g> ErrorAnalysis<'g> {
         self.error_bound(cone).x
     }
 
-    /// [`ErrorAnalysis::error`] after [`ErrorAnalysis::ranges_on_tape`], and the steps by which it is found. `samples`: parts of the box, as [`Tape::new`] takes them.
-    pub(super) fn error_and_tape(&mut self, cone: usize, samples: &[&[Interval]]) -> (f64, Tape) {
+    /// What is bounded of a result after [`ErrorAnalysis::ranges_on_tape`], and the steps by which it is found. `samples`: parts of the box, as
+    /// [`Tape::new`] takes them.
+    pub(super) fn bound_and_tape(&mut self, bounded: OfResult, cone: usize, samples: &[&[Interval]]) -> (f64, Tape) {
         let mark = self.state.pen.mark();
-        let error = self.error_bound(cone);
-        let tape = Tape::new(&self.state.pen, error, samples);
+        let bound = match bounded {
+            OfResult::Error => self.error_bound(cone),
+            OfResult::Magnitude => {
+                let value = self.state.value[self.cones[cone].0.index()];
+                self.state.pen.mag(value)
+            }
+        };
+        let tape = Tape::new(&self.state.pen, bound, samples);
         self.state.pen.forget(mark);
         // norms of values that only this result has asked for are written anew for the next one
         self.state.norm.iter_mut().filter(|(_, norm)| norm.is_since(mark)).for_each(|(round, _)| *round = 0);
-        (error.x, tape)
+        (bound.x, tape)
     }
 
     fn error_bound(&mut self, cone: usize) -> UpperBound {

@@ -2,7 +2,7 @@
 
 mod at_a_state;
 
-use super::analysis::Broken;
+use super::analysis::{Broken, OfResult};
 use super::search::{computed_at, errors_at, worst_found};
 use super::tape::Registers;
 use super::{certify, subdivision, Effort, ErrorAnalysis, FloatFormat, Interval};
@@ -180,7 +180,7 @@ fn what_is_played_for_a_part_is_what_an_analysis_of_it_finds() {
         analysis.ranges_on_tape(ranges).expect("the program is sound in its box");
         let samples = subdivision::samples(ranges);
         let samples: Vec<&[Interval]> = samples.iter().map(Vec::as_slice).collect();
-        let (whole, tape) = analysis.error_and_tape(0, &samples);
+        let (whole, tape) = analysis.bound_and_tape(OfResult::Error, 0, &samples);
         assert_eq!(whole, bound(&graph, format, ranges, None).0, "{name}: writing changes nothing");
         let mut random = Random(5);
         for depth in 0..40 {
