@@ -22,7 +22,9 @@ pub(super) fn staged(
 ) -> Result<(StagedModule, StagedReport, Option<Plainer>, WrittenStages), Disagreement> {
     let (programs, plainer) = programs(robot, frames, options)?;
     let private = |graph: &Graph, name: &str, doc: &str| {
-        lowering.routine(graph, &schedule(graph, options.limits, options.registers()), name, doc).private()
+        lowering
+            .routine(graph, &schedule(graph, options.limits, options.schedule_machine().as_ref()), name, doc)
+            .private()
     };
     let storing = programs.stages.iter().take(programs.stages.len() - 1).zip(&programs.staged.stages);
     let values = storing.map(|(stage, graph)| {

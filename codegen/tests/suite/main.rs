@@ -15,6 +15,7 @@ mod contact;
 mod contact_compiled;
 mod effects;
 mod elastic_inverse;
+mod estimates;
 mod expansion;
 mod figures;
 mod fixed;
