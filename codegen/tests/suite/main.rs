@@ -32,6 +32,7 @@ mod mixed;
 mod mutants;
 mod names;
 mod options;
+mod outlining;
 mod ranges;
 mod readback;
 mod reduced_forms;

@@ -61,9 +61,9 @@ pub struct ProgramEstimate {
     pub cycles: usize,
 }
 
-/// Instructions of a call of the kernel of an angle, and of a sum: its own, multiply-accumulates among them, constants that it loads, and bytes
-/// with these.
-const KERNELS: [[usize; 4]; 2] = [[41, 10, 11, 196], [42, 9, 11, 200]];
+/// Instructions of a call of the kernel of an angle, and of a sum: its own, multiply-accumulates among them, words that it loads and stores, and
+/// bytes with its constants.
+const KERNELS: [[usize; 4]; 2] = [[41, 10, 15, 196], [42, 9, 15, 200]];
 /// Bytes of stack of a kernel.
 const STACK_OF_KERNEL: usize = 8;
 /// Zeros that a function of the compiler's library fills in if there are more together, and the instructions of its call and in it on average (of
@@ -126,7 +126,7 @@ fn counted(graph: &Graph, code: &LoweredCode, found: &AllocatedCode, machine: &S
             + floats as f64 * (model.float - 1.0)
             + divisions as f64 * (model.division - 1.0)
             + roots as f64 * (model.square_root - 1.0)
-            + (memory + of_kernels(2) + frame.words) as f64
+            + (memory + of_kernels(2) + 2 * frame.words) as f64
             + (2 * (calls[0] + calls[1]) + 1 + jumps) as f64 * model.taken;
         match machine.is_in_flash {
             true => all.max((bytes + of_kernels(3)) as f64 / model.flash_bytes_per_cycle),
@@ -207,5 +207,152 @@ impl StackFrame {
             frame.bytes += 4;
         }
         frame
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::expr::{GraphBuilder, Port, RuleSet, Sines};
+    use straightline_core::Dd;
+
+    const FLASH: ScheduleMachine =
+        ScheduleMachine { registers: 32, accumulates: true, is_in_flash: true, cycles: Some(CYCLES) };
+    const CYCLES: CycleModel = CycleModel {
+        float: 1.0,
+        multiply_accumulate: 3.0,
+        division: 14.0,
+        square_root: 14.0,
+        taken: 2.0,
+        flash_bytes_per_cycle: 1.6,
+    };
+
+    fn inputs(count: usize) -> (GraphBuilder, Vec<NodeId>) {
+        let mut b = GraphBuilder::new(RuleSet::all(), vec![Port::new("x", &[count])]);
+        let x = (0..count).map(|k| b.insert(Op::Input(k as u32))).collect();
+        (b, x)
+    }
+
+    fn finished(b: GraphBuilder, results: Vec<NodeId>) -> Graph {
+        let port = Port::new("y", &[results.len()]);
+        Graph { sines: Sines::Short, ..b.finish(vec![port], results) }
+    }
+
+    fn order(graph: &Graph) -> Vec<NodeId> {
+        graph.ids().filter(|id| !graph.op(*id).is_leaf()).collect()
+    }
+
+    fn estimated(graph: &Graph, machine: ScheduleMachine) -> ProgramEstimate {
+        estimate(graph, &order(graph), &machine)
+    }
+
+    #[test]
+    fn a_sum_with_a_product_is_what_a_person_would_write() {
+        let (mut b, x) = inputs(3);
+        let product = b.insert(Op::mul(x[0], x[1]));
+        let sum = b.insert(Op::add(x[2], product));
+        let graph = finished(b, vec![sum]);
+        // push, mov r7; three loads, vmla, store; pop
+        let found = estimated(&graph, FLASH);
+        assert_eq!((found.instructions, found.flash_bytes, found.stack_bytes, found.waiting), (8, 26, 8, 0));
+        // 8, two more for the multiply-accumulate, a word each of three loads, a store and two times two, two for the return
+        let in_memory = ScheduleMachine { is_in_flash: false, ..FLASH };
+        assert_eq!(estimated(&graph, in_memory).cycles, 8 + 2 + 4 + 4 + 2);
+        let apart = ScheduleMachine { accumulates: false, ..FLASH };
+        assert_eq!(estimated(&graph, apart).instructions, 9);
+    }
+
+    #[test]
+    fn the_register_of_a_sum_is_copied_if_its_term_is_needed_again() {
+        let count = |is_needed_again: bool| {
+            let (mut b, x) = inputs(4);
+            let first = b.insert(Op::mul(x[0], x[1]));
+            let product = b.insert(Op::mul(x[2], x[3]));
+            let sum = b.insert(Op::add(first, product));
+            let other = if is_needed_again { first } else { x[0] };
+            let last = b.insert(Op::mul(x[0], other));
+            estimated(&finished(b, vec![sum, last]), FLASH).instructions
+        };
+        // loads, operations, stores, and what stands around them
+        assert_eq!((count(false), count(true)), (4 + 3 + 2 + 3, 4 + 4 + 2 + 3));
+    }
+
+    /// Products of neighbours, all made before the first of their sums.
+    fn waiting(count: usize, constant: Option<f64>) -> Graph {
+        let (mut b, x) = inputs(count + 1);
+        let factor = |b: &mut GraphBuilder, k: usize| match constant {
+            Some(c) => b.constant(Dd::from(c)),
+            None => x[k + 1],
+        };
+        let products: Vec<NodeId> = (0..count)
+            .map(|k| {
+                let factor = factor(&mut b, k);
+                b.insert(Op::mul(x[k], factor))
+            })
+            .collect();
+        let squares: Vec<NodeId> = products.iter().map(|product| b.insert(Op::mul(*product, *product))).collect();
+        finished(b, squares)
+    }
+
+    #[test]
+    fn what_the_registers_do_not_hold_is_stored_once_and_loaded_once() {
+        assert_eq!(estimated(&waiting(30, None), FLASH).waiting, 0);
+        for count in [40, 60, 100] {
+            let found = estimated(&waiting(count, None), FLASH);
+            // as many products as there are registers stay, all but a few that inputs pass through
+            let least = 2 * (count - 32);
+            assert!((least..=least + 14).contains(&found.waiting), "{count}: {}", found.waiting);
+            assert!(found.stack_bytes >= 4 * (count - 32));
+        }
+    }
+
+    #[test]
+    fn a_constant_is_made_again_and_never_stored() {
+        // the constant is needed at the beginning, and again when all registers have been taken
+        let (mut b, x) = inputs(60);
+        let c = b.constant(Dd::from(0.3));
+        let first = b.insert(Op::mul(x[0], c));
+        let others: Vec<NodeId> = (1..40).map(|k| b.insert(Op::mul(x[k], x[k + 1]))).collect();
+        let mut sum = first;
+        for other in &others {
+            let product = b.insert(Op::mul(*other, sum));
+            sum = b.insert(Op::add(product, *other));
+        }
+        let last = b.insert(Op::mul(sum, c));
+        let graph = finished(b, vec![last]);
+        let code = lowered(&graph, &order(&graph), &FLASH);
+        let found = RegisterAllocation::of(&code.lines, code.ranges, 32);
+        assert_eq!(found.constants, 2, "{found:?}");
+    }
+
+    #[test]
+    fn what_a_call_leaves_alone_is_saved_and_what_it_does_not_waits() {
+        let graph = |count: usize| {
+            let (mut b, x) = inputs(count + 1);
+            let products: Vec<NodeId> = (0..count).map(|k| b.insert(Op::mul(x[k], x[k + 1]))).collect();
+            let pair = b.insert(Op::SinCos(x[0]));
+            let sine = b.insert(Op::Sin(pair));
+            let results = products.iter().map(|product| b.insert(Op::mul(*product, sine))).collect();
+            finished(b, results)
+        };
+        let [few, many] = [8, 24].map(|count| estimated(&graph(count), FLASH));
+        assert_eq!(few.waiting, 0);
+        // even registers first: eight values lie in as many pairs; r4 for the results, r7 and the return address with a word to align; the kernel's own
+        assert_eq!(few.stack_bytes, 8 * 8 + 4 * 4 + STACK_OF_KERNEL);
+        assert!((16..=20).contains(&many.waiting), "{}", many.waiting);
+        // the kernel is counted as often as it is called
+        let alone = ScheduleMachine { is_in_flash: false, ..FLASH };
+        assert!(estimated(&graph(8), alone).flash_bytes > few.flash_bytes + 100);
+    }
+
+    #[test]
+    fn constants_that_an_instruction_holds_take_no_place_behind_it() {
+        let bytes = |c: f64| estimated(&waiting(4, Some(c)), FLASH).flash_bytes;
+        for c in [1.0, -0.5, 2.0, 31.0, 0.125, 1.9375] {
+            assert_eq!(bytes(0.1) - bytes(c), 4, "{c}");
+        }
+        for c in [32.0, 0.0625, 1.03125, 1e-3] {
+            assert_eq!(bytes(0.1), bytes(c), "{c}");
+        }
     }
 }
