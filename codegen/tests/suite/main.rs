@@ -17,7 +17,11 @@ mod contact_derivatives;
 mod derivative_bounds;
 mod effects;
 mod elastic_inverse;
+<<<<<<< HEAD
 mod entries;
+=======
+mod estimates;
+>>>>>>> w-machines
 mod expansion;
 mod figures;
 mod fixed;
@@ -34,6 +38,7 @@ mod mixed;
 mod mutants;
 mod names;
 mod options;
+mod outlining;
 mod ranges;
 mod readback;
 mod reduced_forms;
