@@ -3,6 +3,7 @@
 use crate::drives::{demands, without_dampers, ForcesOnJoints, Inputs};
 use crate::motion::Motion;
 use crate::plant::{Action, Plant};
+use std::collections::VecDeque;
 use straightline_core::algorithms::{gravity_force, inverse_dynamics};
 use straightline_core::model::Model;
 
@@ -132,19 +133,50 @@ pub struct Controller {
     pub stiffness: Vec<f64>,
     /// D per joint: \[N·m·s/rad or N·s/m\], of computed torque \[1/s\].
     pub damping: Vec<f64>,
+    /// Gains of every joint to every other one over time, in place of both: n rows of 2n, [`GainProposal::schedule`](crate::gains::GainProposal).
+    pub feedback: Option<Samples>,
     /// Whether forces stay within the joints' effort limits. Drives have limits of their own, which always hold.
     pub saturates: bool,
     /// Whether it commands motors by currents; otherwise by voltages.
     pub gives_currents: bool,
     /// Time from one computation to the next \[s\], forces held in between; `None`: continuous.
     pub period: Option<f64>,
+    /// Periods that pass before what was computed acts; until then what is computed first does.
+    pub delay: usize,
+}
+
+/// Actions on their way from a computer to the robot.
+#[derive(Debug)]
+pub(crate) struct Delayed {
+    waiting: VecDeque<Action>,
+    periods: usize,
+}
+
+impl Delayed {
+    /// As a command says.
+    pub(crate) fn of(command: &Command) -> Delayed {
+        let periods = match command {
+            Command::Controller(controller) => controller.delay,
+            _ => 0,
+        };
+        Delayed { waiting: VecDeque::new(), periods }
+    }
+
+    /// What acts when this was computed.
+    pub(crate) fn next(&mut self, computed: Action) -> Action {
+        while self.waiting.len() < self.periods {
+            self.waiting.push_back(computed.clone());
+        }
+        self.waiting.push_back(computed.clone());
+        self.waiting.pop_front().unwrap_or(computed)
+    }
 }
 
 impl Controller {
     /// Generalized forces \[N·m or N\] at time `t` \[s\] and state (q, q̇); none on passive joints.
     pub fn torques(&self, t: f64, q: &[f64], qd: &[f64]) -> Vec<f64> {
         let (r, rd, rdd) = self.motion.at(t);
-        let answer = self.answer((&r, &rd), (q, qd));
+        let answer = self.answer(t, (&r, &rd), (q, qd));
         let added = |tau: Vec<f64>| tau.iter().zip(&answer).map(|(a, b)| a + b).collect::<Vec<f64>>();
         let mut tau = match self.compensation {
             Compensation::None => answer,
@@ -163,9 +195,17 @@ impl Controller {
     }
 
     /// K e + D ė, of passive joints nothing.
-    fn answer(&self, (r, rd): (&[f64], &[f64]), (q, qd): (&[f64], &[f64])) -> Vec<f64> {
-        let of = |i: usize| self.stiffness[i] * (r[i] - q[i]) + self.damping[i] * (rd[i] - qd[i]);
-        let mut answer = (0..q.len()).map(of).collect::<Vec<f64>>();
+    fn answer(&self, t: f64, (r, rd): (&[f64], &[f64]), (q, qd): (&[f64], &[f64])) -> Vec<f64> {
+        let less = |(a, b): (&f64, &f64)| a - b;
+        let errors: Vec<f64> = r.iter().zip(q).map(less).chain(rd.iter().zip(qd).map(less)).collect();
+        let n = q.len();
+        let mut answer: Vec<f64> = match &self.feedback {
+            None => (0..n).map(|i| self.stiffness[i] * errors[i] + self.damping[i] * errors[n + i]).collect(),
+            Some(feedback) => {
+                let gains = feedback.at(t);
+                gains.chunks(2 * n).map(|row| row.iter().zip(&errors).map(|(k, e)| k * e).sum()).collect()
+            }
+        };
         self.leave_passive(&mut answer);
         answer
     }
@@ -181,7 +221,7 @@ impl Controller {
         let model = without_dampers(&self.model);
         let mut rates = self.motion.derivatives(t);
         let r = rates.remove(0);
-        let answer = self.answer((&r, &rates[0]), (q, qd));
+        let answer = self.answer(t, (&r, &rates[0]), (q, qd));
         let still = || vec![vec![0.0; qd.len()]; rates.len()];
         let asked = match self.compensation {
             Compensation::None => demands(&model, q, &still(), x, ForcesOnJoints::Only(&answer)),

@@ -12,6 +12,7 @@ pub mod contact;
 pub mod drive_analysis;
 pub mod drives;
 mod failure;
+pub mod gains;
 pub mod html;
 pub mod motion;
 mod ode;

@@ -5,7 +5,7 @@
 //! range is located as a root between steps. Every run ends: what would take too many steps or too much memory is refused, and no number of
 //! a result is anything but finite.
 
-use crate::command::Command;
+use crate::command::{Command, Delayed};
 use crate::drives::DriveEnergies;
 pub use crate::failure::Failure;
 use crate::ode::{solve, AcceptedStep, Equations, Pace, Watch};
@@ -232,9 +232,10 @@ pub fn simulate_from(
     let corners = pieces(command, period, settings.duration);
     let row = |t: f64, state: &[f64], held: Option<&Action>| row(plant, command, t, state, held);
     run.push(row(0.0, &state, None))?;
+    let mut delayed = Delayed::of(command);
     for piece in corners.windows(2) {
         let (start, end) = (piece[0], piece[1]);
-        let held = period.map(|_| command.action(plant, start, &state));
+        let held = period.map(|_| delayed.next(command.action(plant, start, &state)));
         let system = System { plant, command, held: held.as_ref(), progress };
         // rows are ascending; a controller's pieces are many
         let (first, last) = (wanted.partition_point(|t| *t <= start), wanted.partition_point(|t| *t < end));

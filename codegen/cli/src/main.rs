@@ -10,6 +10,8 @@ mod contact;
 mod figures;
 #[cfg_attr(not(feature = "simulation"), allow(dead_code))]
 mod files;
+#[cfg(feature = "simulation")]
+mod gains;
 mod given;
 #[cfg_attr(not(feature = "simulation"), path = "without_simulation.rs")]
 mod motion;

@@ -5,7 +5,7 @@ use crate::figures::{print_analysis, print_sweep};
 use crate::files::{self, read};
 pub use crate::motion_arguments::{Analyze, Simulate};
 use crate::search::{optimized, swept};
-use crate::{contact, options, page, print, CommandFailure};
+use crate::{contact, gains, options, page, print, CommandFailure};
 use anstream::stdout;
 use std::io::Write;
 use std::path::Path;
@@ -245,7 +245,8 @@ pub fn print_run(plant: &Plant, run: &simulate::Run) -> Result<(), CommandFailur
 
 pub fn analyze(a: &Analyze) -> Result<(), CommandFailure> {
     let (description, options, model) = robot(&a.robot, &a.model, false)?;
-    let Some(motion) = experiment(&a.motion, &model, &model, false)?.motion else {
+    let experiment = experiment(&a.motion, &model, &model, false)?;
+    let Some(motion) = experiment.motion.clone() else {
         let text = format!("{} prescribes no motion", a.motion.display());
         return Err(print::failure_with(text, &["write a table [motion]"]));
     };
@@ -258,10 +259,14 @@ pub fn analyze(a: &Analyze) -> Result<(), CommandFailure> {
         Some(sweep) => swept(&description, &options, sweep, &motion, a.interval)?,
     };
     let advice = advised(&model, &motion, a.interval, &found);
+    let proposed = gains::proposed(a, &model, &motion, &experiment)?;
     if let Some(path) = &a.html {
-        files::write(path, &page::page(a, &model, &motion, (&found, &advice), &swept))?;
+        files::write(path, &page::page(a, &model, &motion, (&found, &advice), &swept, proposed.as_ref()))?;
     }
     print_analysis(&model, &motion, &found, &advice)?;
+    if let Some(proposed) = &proposed {
+        gains::print(proposed, a)?;
+    }
     if let Some(sweep) = &a.sweep {
         print_sweep(sweep, &swept)?;
     }

@@ -43,6 +43,10 @@ pub struct Analyze {
     /// Where to write a page with tables and plots
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
+    /// Propose feedback gains, as the table [gains] of the motion's file says or by default, and write those of LQR over time here: CSV,
+    /// JSON or Parquet, as its name ends
+    #[arg(long, value_name = "FILE")]
+    pub gains: Option<PathBuf>,
     /// Time between instants, at most [s]
     #[arg(long, value_name = "S", default_value_t = 0.005, value_parser = interval)]
     pub interval: f64,

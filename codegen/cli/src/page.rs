@@ -2,6 +2,7 @@
 
 use super::arguments::Analyze;
 use super::figures::{drive_remarks, violations};
+use super::gains::{self, Proposed};
 use super::motion::lines;
 use super::search::Swept;
 use std::path::Path;
@@ -37,6 +38,7 @@ pub fn page(
     motion: &Motion,
     (found, advice): (&Analysis, &[Vec<Advice>]),
     swept: &[Swept],
+    proposed: Option<&Proposed>,
 ) -> String {
     let file = |path: &Path| path.file_name().map(|n| n.to_string_lossy().to_string()).unwrap_or_default();
     let given: f64 = found.joints.iter().map(|j| j.given).sum();
@@ -72,6 +74,9 @@ pub fn page(
     page.cards(&cards);
     if let Some(drives) = &found.drives {
         drives_section(&mut page, model, drives);
+    }
+    if let Some(proposed) = proposed {
+        gains::section(&mut page, proposed);
     }
     if let (Some(sweep), false) = (&a.sweep, swept.is_empty()) {
         sweep_section(&mut page, &sweep.path, found, swept);

@@ -4,7 +4,7 @@ use super::events::objects_at_rest;
 use super::object::SLOTS;
 use super::state::{Closed, ContactWorld, Phases, Slip, GUARDS};
 use super::{Contacts, Event};
-use crate::command::Command;
+use crate::command::{Command, Delayed};
 use crate::ode::{solve, AcceptedStep, Equations, Pace, Watch};
 use crate::plant::{Action, Plant};
 use crate::simulate::{self, Balance, Failure, Run, Settings, SAME};
@@ -77,13 +77,13 @@ pub fn simulate_from(
     let mut ends = [&simulate::pieces(command, period, settings.duration)[..], &rows].concat();
     ends.sort_by(f64::total_cmp);
     ends.dedup_by(|b, a| *b - *a <= SAME * settings.duration);
-    let mut held = None;
+    let (mut held, mut delayed) = (None, Delayed::of(command));
     let mut next_computation = 0.0;
     run.push(going.row(0.0, None))?;
     for piece in ends.windows(2) {
         let (mut t, end) = (piece[0], piece[1]);
         if let Some(period) = period.filter(|_| t >= next_computation - SAME * settings.duration) {
-            held = Some(going.action(t, &going.state, None));
+            held = Some(delayed.next(going.action(t, &going.state, None)));
             next_computation += period;
         }
         let mut count = 0;

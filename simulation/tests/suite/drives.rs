@@ -314,6 +314,8 @@ fn tracked(model: &Model<f64>, compensation: Compensation, gives_currents: bool)
         saturates: false,
         gives_currents,
         period: None,
+        feedback: None,
+        delay: 0,
     };
     let command = Command::Controller(Box::new(controller));
     let plant = Plant::new(model.clone(), 0.05).with_current_inputs(&command.current_inputs(3));

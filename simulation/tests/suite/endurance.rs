@@ -51,6 +51,8 @@ fn controlled(model: &Model<f64>, period: f64, gain: f64) -> Command {
         saturates: false,
         gives_currents: false,
         period: Some(period),
+        feedback: None,
+        delay: 0,
     }))
 }
 

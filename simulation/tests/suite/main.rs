@@ -6,4 +6,5 @@ mod contact;
 mod contact_drives;
 mod drives;
 mod endurance;
+mod gains;
 mod simulation;

@@ -131,6 +131,8 @@ fn computed_torque_with_the_right_model_leaves_the_error_of_a_linear_spring() {
         saturates: false,
         gives_currents: false,
         period: None,
+        feedback: None,
+        delay: 0,
     };
     // critically damped from an error of 0.1: e = 0.1 (1 + 10 t) exp(−10 t)
     let run = run(model, &Command::Controller(Box::new(controller)), &[-0.1, -0.6, 0.2], &SETTINGS);

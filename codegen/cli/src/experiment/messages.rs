@@ -32,6 +32,23 @@ pub fn column_unknown(column: &str, known: &[&str]) -> D {
     }
 }
 
+/// A column that is no gain.
+pub fn column_of_no_gain(column: &str, known: &[&str]) -> D {
+    D::error("column-unknown", format!("the column `{}` is no gain", cut(column)))
+        .help(format!("gains are called `K.JOINT.q.OTHER` and `K.JOINT.qd.OTHER`; joints: {}", list(known)))
+}
+
+/// Gains in a file, and beside them others, or a law that has no torques for them.
+pub fn gains_and(key: &str) -> D {
+    D::error("controller-and-torques", format!("`gains` and `{key}` in one controller"))
+        .help("gains of a file are of torques, and stand for stiffness and damping: with compensation \"none\", \"gravity\" or \"feed_forward\"")
+}
+
+/// Periods that nobody counts.
+pub fn delay_without_period() -> D {
+    D::error("missing-key", "a delay of periods, and the controller has no period").help("write `period = 1e-3`")
+}
+
 /// A column of no drive.
 pub fn column_of_no_drive(column: &str, known: &[&str]) -> D {
     let d = D::error("column-unknown", format!("the column `{}` belongs to no drive", cut(column)));

@@ -4,6 +4,7 @@
 
 pub mod contact;
 pub mod design;
+mod gains;
 pub mod messages;
 pub mod parameter;
 pub mod parquet;
@@ -17,6 +18,7 @@ use straightline_core::drive::Actuator;
 use straightline_core::model::Model;
 use straightline_simulation::command::{Command, Samples};
 use straightline_simulation::drives::Inputs;
+use straightline_simulation::gains::GainDemand;
 use straightline_simulation::motion::Motion;
 use straightline_simulation::plant::angle_beyond_sines;
 use straightline_simulation::simulate::Settings;
@@ -38,6 +40,8 @@ pub struct Experiment {
     pub settings: Settings,
     /// Speed at which Coulomb friction has reached 71 % \[rad/s or m/s\], where it is not smooth already.
     pub coulomb_speed: f64,
+    /// What is wanted of feedback gains, if anything.
+    pub gains: Option<GainDemand>,
 }
 
 /// Where files that an experiment names are read from.
@@ -105,12 +109,13 @@ fn from_samples(
             x: None,
             settings,
             coulomb_speed: COULOMB_SPEED,
+            gains: None,
         });
     }
     let last = columns.get("t")?.last().copied().unwrap_or(0.0);
     let (command, qd) = (sampled_command(columns, model, &place, diagnostics)?, vec![0.0; model.nv()]);
     let settings = Settings::lasting(last);
-    Some(Experiment { motion: None, command, q, qd, x: None, settings, coulomb_speed: COULOMB_SPEED })
+    Some(Experiment { motion: None, command, q, qd, x: None, settings, coulomb_speed: COULOMB_SPEED, gains: None })
 }
 
 /// Torques over time: per joint a column `tau.JOINT` or `JOINT`; joints without one are free.

@@ -2,7 +2,7 @@
 
 use super::messages as say;
 use super::samples::{self, Columns};
-use super::{contact, drive_inputs, names, sampled_motion, torques, zero, Experiment, ReadFile, COULOMB_SPEED};
+use super::{contact, drive_inputs, gains, names, sampled_motion, torques, zero, Experiment, ReadFile, COULOMB_SPEED};
 use straightline_codegen::description::messages::unknown_frame;
 use straightline_codegen::description::reader::{FileReader, Range64};
 use straightline_codegen::description::table::{parse, TomlTable};
@@ -43,7 +43,8 @@ pub(super) fn read(
     let document = parse(source, diagnostics)?;
     let top = TomlTable { owner: "an experiment".to_string(), table: document.get_ref(), span: 0..0 };
     let mut r = ExperimentReader { reader: FileReader::new(source, diagnostics), model, controller_model, read_file };
-    let keys = [&["motion", "controller", "torques", "inputs", "start", "simulation"][..], &contact::TABLES].concat();
+    let keys =
+        [&["motion", "controller", "torques", "inputs", "start", "simulation", "gains"][..], &contact::TABLES].concat();
     r.reader.check_keys(&top, &keys);
     let [q, qd, x] = r.table(&top, "start").map_or([None, None, None], |start| r.start(&start));
     let motion = r.table(&top, "motion").and_then(|motion| r.motion(&motion, q.as_deref()));
@@ -59,12 +60,14 @@ pub(super) fn read(
     if let Some(table) = r.table(&top, "simulation") {
         r.simulation(&table, &mut settings, &mut coulomb_speed);
     }
+    let period = command.as_ref().and_then(Command::period);
+    let gains = r.table(&top, "gains").map(|gains| r.gains(&gains, period));
     let command = command?;
     let from_motion = motion.as_ref().map(|motion| motion.at(motion.times[0]));
     let q = q.or_else(|| from_motion.as_ref().map(|m| m.0.clone())).unwrap_or_else(|| zero(model));
     let qd = qd.or_else(|| from_motion.as_ref().map(|m| m.1.clone())).unwrap_or_else(|| vec![0.0; model.nv()]);
     let x = x.map(|x| without_currents(model, &x, &command.current_inputs(model.drives.len())));
-    Some(Experiment { motion, command, q, qd, x, settings, coulomb_speed })
+    Some(Experiment { motion, command, q, qd, x, settings, coulomb_speed, gains })
 }
 
 /// The state of drives without the currents of those that an amplifier feeds: they are inputs.
@@ -80,9 +83,9 @@ fn without_currents(model: &Model<f64>, x: &[f64], are_currents: &[bool]) -> Vec
     kept
 }
 
-struct ExperimentReader<'a> {
-    reader: FileReader<'a>,
-    model: &'a Model<f64>,
+pub(super) struct ExperimentReader<'a> {
+    pub(super) reader: FileReader<'a>,
+    pub(super) model: &'a Model<f64>,
     controller_model: &'a Model<f64>,
     read_file: ReadFile<'a>,
 }
@@ -155,7 +158,7 @@ impl ExperimentReader<'_> {
     }
 
     /// A number within a range, or what stands for it.
-    fn number(&mut self, table: &TomlTable, key: &str, default: f64, (low, high): (f64, f64)) -> f64 {
+    pub(super) fn number(&mut self, table: &TomlTable, key: &str, default: f64, (low, high): (f64, f64)) -> f64 {
         let Some(found) = self.reader.real_at(table, key, Range64::Finite) else { return default };
         if !(low..=high).contains(&found.value) {
             let range = format!("between {low:e} and {high:e}");
@@ -166,7 +169,7 @@ impl ExperimentReader<'_> {
     }
 
     /// One number for all, or an array of `n`. Empty after a complaint; `None` where there is no such key.
-    fn numbers(&mut self, table: &TomlTable, key: &str, n: usize) -> Option<Vec<f64>> {
+    pub(super) fn numbers(&mut self, table: &TomlTable, key: &str, n: usize) -> Option<Vec<f64>> {
         let (value, span) = table.get(key)?;
         let what = table.what(key);
         match value {
@@ -195,7 +198,12 @@ impl ExperimentReader<'_> {
     }
 
     fn samples(&mut self, table: &TomlTable) -> Option<(Columns, Place)> {
-        let file = self.reader.string_at(table, "file")?;
+        self.samples_at(table, "file")
+    }
+
+    /// What the file of this key holds.
+    fn samples_at(&mut self, table: &TomlTable, key: &str) -> Option<(Columns, Place)> {
+        let file = self.reader.string_at(table, key)?;
         let source = match (self.read_file)(&file.value) {
             Ok(source) => source,
             Err(why) => {
@@ -355,14 +363,24 @@ impl ExperimentReader<'_> {
     }
 
     fn controller(&mut self, table: &TomlTable, motion: Option<Motion>) -> Option<Command> {
-        self.reader.check_keys(table, &["compensation", "stiffness", "damping", "saturate", "period", "amplifier"]);
+        let keys = ["compensation", "stiffness", "damping", "gains", "saturate", "period", "delay", "amplifier"];
+        self.reader.check_keys(table, &keys);
         let n = self.model.nv();
         let compensation =
             self.reader.word_at(table, "compensation", &Compensation::WORDS).map_or(Compensation::None, |w| w.value);
-        self.reader.require(table, "stiffness", "stiffness = 100.0");
-        self.reader.require(table, "damping", "damping = 20.0");
-        let stiffness = self.numbers(table, "stiffness", n)?;
-        let damping = self.numbers(table, "damping", n)?;
+        let feedback = match self.gains_of_file(table, compensation) {
+            Some(feedback) => Some(feedback?),
+            None => {
+                self.reader.require(table, "stiffness", "stiffness = 100.0");
+                self.reader.require(table, "damping", "damping = 20.0");
+                None
+            }
+        };
+        let mut of = |key: &str| match feedback {
+            Some(_) => Some(vec![0.0; n]),
+            None => self.numbers(table, key, n),
+        };
+        let (stiffness, damping) = (of("stiffness")?, of("damping")?);
         for (key, values) in [("stiffness", &stiffness), ("damping", &damping)] {
             if let Some(bad) = values.iter().find(|x| **x < 0.0) {
                 let complaint = say::not_in_range(&table.what(key), *bad, "zero or positive");
@@ -371,6 +389,10 @@ impl ExperimentReader<'_> {
         }
         let saturates = self.reader.flag_at(table, "saturate").is_some_and(|flag| flag.value);
         let period = table.has("period").then(|| self.number(table, "period", 1e-3, (1e-6, 10.0)));
+        let delay = self.delay(table);
+        if let (true, None, Some((_, span))) = (delay > 0, period, table.get("delay")) {
+            self.reader.complain(&span, say::delay_without_period());
+        }
         let words = [("voltage", false), ("current", true)];
         let gives_currents = self.reader.word_at(table, "amplifier", &words).is_some_and(|word| word.value);
         let drives = &self.controller_model.drives;
@@ -392,8 +414,34 @@ impl ExperimentReader<'_> {
             return None;
         }
         let model = self.controller_model.clone();
-        let controller =
-            Controller { model, compensation, motion, stiffness, damping, saturates, gives_currents, period };
+        let controller = Controller {
+            model,
+            compensation,
+            motion,
+            stiffness,
+            damping,
+            feedback,
+            saturates,
+            gives_currents,
+            period,
+            delay,
+        };
         Some(Command::Controller(Box::new(controller)))
+    }
+
+    /// Gains over time, where a controller has a file of them; `None` inside after a complaint.
+    fn gains_of_file(&mut self, table: &TomlTable, compensation: Compensation) -> Option<Option<Samples>> {
+        let (_, span) = table.get("gains")?;
+        if let Some(key) = ["stiffness", "damping"].into_iter().find(|key| table.has(key)) {
+            self.reader.complain(&span, say::gains_and(key));
+        }
+        if compensation == Compensation::ComputedTorque {
+            self.reader.complain(&span, say::gains_and("computed_torque"));
+        }
+        let (columns, place) = match self.samples_at(table, "gains") {
+            Some(found) => found,
+            None => return Some(None),
+        };
+        Some(gains::schedule(&columns, self.model, &place, self.reader.diagnostics))
     }
 }

@@ -620,3 +620,59 @@ fn an_analysis_says_what_would_keep_a_limit() {
     // what is friction is said, and nothing else is called so
     assert!(said.contains("friction in the joints takes ") && !said.contains("the rest is friction"), "{said}");
 }
+
+/// What `analyze` proposes follows the motion, in its own trial and when the file that it writes drives a simulation.
+#[test]
+fn gains_that_an_analysis_proposes_drive_a_simulation() {
+    let here = scratch("gains");
+    let (robot, motion) = (format!("{ROBOTS}/descriptions/ur5.urdf"), format!("{ROBOTS}/experiments/ur5_gains.toml"));
+    let (gains, html) = (here.join("gains.csv").display().to_string(), here.join("gains.html").display().to_string());
+    let options = ["--angle-tolerance", "1e-11"];
+    let said = succeeds(
+        &[&["analyze", &robot, "--motion", &motion, "--gains", &gains, "--html", &html][..], &options].concat(),
+    );
+    assert!(said.contains("a delay of one period") && !said.contains("unstable"), "{said}");
+    // errors: greatest and rms, of torques alone, of gains per joint, of LQR
+    let errors = said.split("torques alone: most").nth(1).unwrap();
+    for joint in ["shoulder_lift_joint", "elbow_joint", "wrist_3_joint"] {
+        let line = errors.lines().find(|line| line.starts_with(joint)).unwrap();
+        let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        let [alone, per_joint, lqr] = [1, 3, 5].map(|k| numbers[k]);
+        assert!(per_joint < 0.5 * alone && lqr < 0.5 * alone, "{line}");
+    }
+    let page = fs::read_to_string(&html).unwrap();
+    assert!(page.contains("Feedback gains") && page.contains("error, LQR"));
+    let text = fs::read_to_string(&motion).unwrap();
+    let follow = |controller: &str| {
+        let head = text.split("[gains]").next().unwrap();
+        let start = "[start]\nq = [0.05, -1.2, 1.4, -0.2, 1.2, 0.0]\n[simulation]\nduration = 1.5\n";
+        let input = write(&here, "follow.toml", &format!("{head}\n{start}[controller]\n{controller}"));
+        let output = here.join("follow.json").display().to_string();
+        let run = [&["simulate", &robot, "--input", &input, "--output", &output][..], &options].concat();
+        succeeds(&run);
+        let columns: serde_json::Value = serde_json::from_str(&fs::read_to_string(&output).unwrap()).unwrap();
+        columns["error.shoulder_pan_joint"].as_array().unwrap().last().unwrap().as_f64().unwrap().abs()
+    };
+    let law = "compensation = \"feed_forward\"\nperiod = 2e-3\ndelay = 1\n";
+    assert!(follow(&format!("{law}gains = \"gains.csv\"\n")) < 1e-5);
+    // the controller that is printed
+    let pasted = said.split("[controller]\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    assert!(follow(pasted) < 1e-5);
+
+    let complaint = |controller: &str| {
+        let head = text.split("[gains]").next().unwrap();
+        let input = write(&here, "wrong.toml", &format!("{head}\n[controller]\n{controller}"));
+        fails(&[&["simulate", &robot, "--input", &input][..], &options].concat())
+    };
+    let both = complaint("gains = \"gains.csv\"\nstiffness = 3.0\nperiod = 1e-3\n");
+    assert!(both.contains("controller-and-torques") && both.contains("`gains` and `stiffness`"), "{both}");
+    let late = complaint("stiffness = 3.0\ndamping = 1.0\ndelay = 2\n");
+    assert!(late.contains("no period") && late.contains("wrong.toml:"), "{late}");
+    let half = complaint("stiffness = 3.0\ndamping = 1.0\nperiod = 1e-3\ndelay = 1.5\n");
+    assert!(half.contains("whole number of periods"), "{half}");
+    let other = write(&here, "other.csv", "t,K.elbow_joint.q.elbow\n0,1\n1,1\n");
+    assert!(complaint(&format!("gains = {other:?}\nperiod = 1e-3\n")).contains("is no gain"));
+    let gains = write(&here, "none.toml", &text.replace("bandwidth = 4.0", "bandwidth = -4.0"));
+    let wrong = fails(&[&["analyze", &robot, "--motion", &gains][..], &options].concat());
+    assert!(wrong.contains("bandwidth") && wrong.contains("-4.0"), "{wrong}");
+}

@@ -1,0 +1,4 @@
+//! The tests of the package: one binary.
+
+mod closed_loop;
+mod sweep;
