@@ -82,13 +82,8 @@ pub fn checked(
         let made = (sines::with_sines(graph, function, &robot.model, options), method);
         equivalence::of_function(robot, frames, function, options, optimisations, &made.0).map(|()| made)
     })?;
-<<<<<<< HEAD
-    let schedule = schedule(&graph, options.limits, options.registers());
-    Ok(TracedProgram { function, graph, schedule, method, plainer, entries: Vec::new() })
-=======
     let schedule = schedule(&graph, options.limits, options.schedule_machine().as_ref());
-    Ok(TracedProgram { function, graph, schedule, method, plainer })
->>>>>>> w-machines
+    Ok(TracedProgram { function, graph, schedule, method, plainer, entries: Vec::new() })
 }
 
 /// The operations of one function of a robot, with these optimisations only.

@@ -17,11 +17,8 @@ mod contact_derivatives;
 mod derivative_bounds;
 mod effects;
 mod elastic_inverse;
-<<<<<<< HEAD
 mod entries;
-=======
 mod estimates;
->>>>>>> w-machines
 mod expansion;
 mod figures;
 mod fixed;
