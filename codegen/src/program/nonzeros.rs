@@ -117,7 +117,7 @@ impl TracedProgram {
             WrittenEntries::Nonzeros => {
                 self.entries = nonzeros(self.function, &self.graph, true);
                 self.graph = super::passed("nonzeros", self.function.name(), packed(&self.graph, &self.entries));
-                self.schedule = schedule(&self.graph, options.limits, options.registers());
+                self.schedule = schedule(&self.graph, options.limits, options.schedule_machine().as_ref());
             }
         }
     }
