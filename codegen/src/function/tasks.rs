@@ -73,7 +73,7 @@ impl RobotFunction for OperationalSpaceDynamics {
             let null_space = task.null_space(&inverse);
             blocks[0].extend(spread(
                 rows,
-                &task.inertia.iter().map(|row| spread_one(rows, row)).collect::<Vec<_>>(),
+                &task.inertia().iter().map(|row| spread_one(rows, row)).collect::<Vec<_>>(),
                 6,
             ));
             blocks[1].extend(spread_one(rows, &task.force(&velocity, &bias)));

@@ -66,7 +66,7 @@ fn functions() -> String {
     let mut page = "# Functions\n\nPrinted from the table of functions (`Function::spec`) by the test `guide::` of the compiler.\n\n\
 Arguments stand in this order: inputs, then results, each an array by reference. NQ, NV, NX and NU count configuration coordinates, velocity\n\
 coordinates, states and inputs of drives; `frames` counts those that are asked for (otherwise the tips). `part` is what a scene can ask of a result\n\
-alone. Scenes add further arguments (gravity, run-time parameters) and leave arguments out.\n"
+alone, of six rows also a list of them. Scenes add further arguments (gravity, run-time parameters) and leave arguments out.\n"
         .to_string();
     let families = [
         (Family::Robot, "Of every robot"),

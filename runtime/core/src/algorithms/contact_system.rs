@@ -45,6 +45,7 @@ pub(super) struct ContactSystem<T> {
 }
 
 /// L U of a small matrix, no exchange of rows; for a symmetric one U = D Lᵀ.
+#[derive(Clone, Debug)]
 pub(super) struct Solver<T> {
     lower: Vec<Vec<T>>,
     upper: Vec<Vec<T>>,

@@ -76,15 +76,21 @@ impl<'a, T: Real> TaskRows<'a, T> {
 #[doc(alias("Khatib"))]
 pub struct OperationalSpace<'a, T> {
     rows: TaskRows<'a, T>,
-    /// Λ \[kg, kg·m, kg·m²\], by rows.
-    pub inertia: Vec<Vec<T>>,
+    /// J H⁻¹ Jᵀ + λ², factored.
+    factor: Solver<T>,
 }
 
 impl<'a, T: Real> OperationalSpace<'a, T> {
     /// With the damping λ \[1/√kg; of angular rows 1/(√kg·m)\], or zero.
     pub fn new(rows: TaskRows<'a, T>, damping: T) -> Self {
-        let inertia = rows.damped(damping).inverse();
-        OperationalSpace { rows, inertia }
+        let factor = rows.damped(damping);
+        OperationalSpace { rows, factor }
+    }
+
+    /// Λ \[kg, kg·m, kg·m²\], by rows.
+    pub fn inertia(&self) -> Vec<Vec<T>> {
+        T::section("inertia of the task", None);
+        self.factor.inverse()
     }
 
     /// Λ (J H⁻¹ `generalized` − `bias`): the forces on the task that stand for generalized ones, less those for an acceleration.
@@ -92,10 +98,11 @@ impl<'a, T: Real> OperationalSpace<'a, T> {
         T::section("force on the task", None);
         let response = self.rows.response_to(generalized);
         let free: Vec<T> = response.into_iter().zip(bias).map(|(x, bias)| x - *bias).collect();
-        self.inertia.iter().map(|row| dot(row, &free)).collect()
+        self.factor.solve(&free)
     }
 
-    /// J̄, nv rows of as many numbers as the task has.
+    /// J̄, nv rows of as many numbers as the task has. By substitution: where rows depend on each other and are damped, what is large of Λ would cancel in a
+    /// product with it.
     #[doc(alias("dynamically consistent inverse"))]
     pub fn inverse(&self) -> Vec<Vec<T>> {
         T::section("consistent inverse", None);
@@ -103,7 +110,7 @@ impl<'a, T: Real> OperationalSpace<'a, T> {
         let response: Vec<Vec<T>> = self.rows.halves.iter().map(|y| self.rows.factor.finish(y.clone())).collect();
         let nv = response.first().map_or(0, Vec::len);
         let column = |i: usize| -> Vec<T> { response.iter().map(|row| row[i]).collect() };
-        (0..nv).map(|i| self.inertia.iter().map(|row| dot(row, &column(i))).collect()).collect()
+        (0..nv).map(|i| self.factor.solve(&column(i))).collect()
     }
 
     /// N = 1 − J̄ J, nv × nv, from J̄.
