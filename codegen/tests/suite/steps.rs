@@ -1,5 +1,6 @@
 //! Displacements and steps of time: every function beside the second author, derivatives of programs in dual numbers, and the order of the methods.
 
+use crate::data::{inputs, numbers, reference_file};
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
 use straightline_codegen::model::{self, ModelOptions};
@@ -224,5 +225,105 @@ fn a_program_integrates_as_the_runtime_does() {
             assert!((*found - expected).to_f64().abs() < 1e-28, "{size}: {found:?}, {expected:?}");
         }
         assert_eq!(found.len(), model.nq());
+    }
+}
+
+/// Operations of a robot file's program.
+fn operations(file: &str, floating: bool, function: Function) -> usize {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../").to_string() + file;
+    let text = std::fs::read_to_string(path).expect("a robot file");
+    let source = Source::new(if file.ends_with("toml") { "robot.toml" } else { "robot.urdf" }, text);
+    let options = options(floating);
+    let model = model::load(&source, &options.model).0.expect("a robot");
+    program(&Robot::new(model), &[], function, &options).graph.counts().flops()
+}
+
+#[test]
+#[ignore = "prints what tests of counts have on record"]
+fn operations_of_steps_and_displacements() {
+    for function in DISPLACEMENTS {
+        let [on_the_ground, free] = [("ur5", false), ("hyq", true)]
+            .map(|(robot, floating)| operations(&format!("robots/descriptions/{robot}.urdf"), floating, function));
+        println!("{}: {on_the_ground} of a UR5, {free} of HyQ", function.name());
+    }
+    for function in STEPS {
+        for robot in [
+            "robots/descriptions/ur5",
+            "robots/descriptions/puma560",
+            "generated_tests/count_robots/iiwa7",
+            "robots/descriptions/panda",
+        ] {
+            println!("{robot} {}: {}", function.name(), operations(&format!("{robot}.urdf"), false, function));
+        }
+    }
+}
+
+/// Beside values with 25 digits, in double-double and in f64: errors over the greatest entry of a block.
+fn hold_data(robot: &str, floating: bool) {
+    let file = std::fs::read_to_string(reference_file(&format!("derivatives/{robot}.json"))).expect("the data");
+    let file: serde_json::Value = serde_json::from_str(&file).expect("JSON");
+    let text = std::fs::read_to_string(reference_file(&format!("robots/{robot}.urdf"))).expect("a robot");
+    let mut options = options(floating);
+    // in the data angles count as they are written
+    options.model.angle_tolerance = 0.0;
+    let model = model::load(&Source::new("robot.urdf", text), &options.model).0.expect("a robot");
+    let graph = program(&Robot::new(model.clone()), &[], Function::StepDerivatives, &options).graph;
+    let mut worst = [0.0f64; 2];
+    for state in file["states"].as_array().expect("a list").iter().filter(|s| s["kind"] != "gravity_tilted") {
+        let length: f64 = state["step_derivatives"]["dt"].as_str().and_then(|text| text.parse().ok()).expect("a number");
+        let mut given: Vec<Vec<Dd>> = ["q", "qd", "tau"].map(|name| inputs(&state[name])).to_vec();
+        if floating {
+            model.bodies[0].joint.kind.normalise(&mut given[0][..7]);
+        }
+        given.push(vec![Dd::from(length)]);
+        let given = given.concat();
+        let short: Vec<f64> = given.iter().map(|x| x.to_f64()).collect();
+        let found: [Vec<Dd>; 2] =
+            [evaluate(&graph, &given), evaluate(&graph, &short).into_iter().map(Dd::from).collect()];
+        let mut first = 0;
+        for block in ["q_next", "qd_next", "A", "B"] {
+            let expected = numbers(&state["step_derivatives"][block]);
+            let greatest = expected.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
+            for (found, worst) in found.iter().zip(&mut worst) {
+                for (found, expected) in found[first..].iter().zip(&expected) {
+                    *worst = worst.max((*found - *expected).to_f64().abs() / greatest);
+                }
+            }
+            first += expected.len();
+        }
+        assert_eq!(first, found[0].len());
+    }
+    println!("{robot}: {:.1e} in double-double, {:.1e} in f64", worst[0], worst[1]);
+    // f64 loses what the inertia's factor costs: Pinocchio 5.4e-13 of A of HyQ
+    assert!(worst[0] < 1e-19 && worst[1] < 1e-12, "{robot}: {worst:?}");
+}
+
+#[test]
+fn steps_and_their_derivatives_are_those_of_the_data() {
+    hold_data("planar2r", false);
+    hold_data("ur5", false);
+}
+
+#[test]
+#[ignore = "slow proof: a program of twenty thousand operations"]
+fn slow_proof_that_steps_of_a_floating_robot_are_those_of_the_data() {
+    hold_data("solo12", true);
+}
+
+/// What a factor that multiplies, or adds the same, would lose of small displacements.
+#[test]
+fn small_differences_keep_their_digits_in_f64() {
+    let (model, graph) = traced(ARM, true, Function::Difference);
+    let mut random = Random(12);
+    for size in [1e-13, 1e-9, 1e-5, 0.1, 1.5] {
+        let [q, ..] = state(&model, &mut random);
+        let v: Vec<Dd> = (0..model.nv()).map(|_| Dd::from(random.symmetric(size))).collect();
+        let short: Vec<f64> = [&q[..], &integrate(&model, &q, &v)].concat().iter().map(|x| x.to_f64()).collect();
+        let exact = evaluate(&graph, &short.iter().map(|x| Dd::from(*x)).collect::<Vec<_>>());
+        let greatest = exact.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
+        for (found, exact) in evaluate(&graph, &short).into_iter().zip(exact) {
+            let off = (Dd::from(found) - exact).to_f64().abs();
+            assert!(off <= 12.0 * f64::EPSILON * greatest, "{size}: {found}, {exact:?}");
+        }
     }
 }
