@@ -759,38 +759,45 @@ fn derivatives_on_a_plane_are_those_of_the_data() {
     }
 }
 
-/// Operations on record, of a table under the hand of an arm and of a quadruped on all feet and on two.
+/// Operations of motion and of impact, by mode.
+fn operations(file: &str, floating_base: bool, contacts: &str) -> Vec<usize> {
+    let scene = format!(
+        "[outputs]\nfunctions = []\ncontact = [\"forward_dynamics_derivatives\", \"impact_derivatives\"]\n{contacts}"
+    );
+    let mut diagnostics = Diagnostics::new();
+    let read = scene_file::read(&Source::new("scene.toml", scene), &mut diagnostics).expect("a scene");
+    let model = ModelOptions { floating_base, ..ModelOptions::default() };
+    let options = read.into_options(Options { model, ..Options::default() });
+    let generated = compile(&source(file), &options).unwrap_or_else(|d| panic!("{}", d.render()));
+    let found: Vec<usize> = generated.report.contact.iter().map(|c| c.counts.flops()).collect();
+    println!("{file:<12} {found:?}");
+    found
+}
+
+/// Of a hand on a table.
 #[test]
-fn derivatives_of_contact_modes_take_what_is_on_record() {
+fn derivatives_on_a_table_take_what_is_on_record() {
     let table = |frame: &str| {
         contact("table", frame, "object = { origin = [0.5, 0.1, 0.2], z = [0.0, 0.0, 1.0] }\nconstrained = [\"pz\"]")
     };
-    let names = ["FL", "FR", "HL", "HR"];
-    let ground = "object = { origin = [0.0, 0.0, 0.0], z = [0.0, 0.0, 1.0] }\nconstrained = [\"px\", \"py\", \"pz\"]";
-    let feet: String = names.iter().map(|name| contact(name, &format!("{name}_FOOT"), ground)).collect();
-    let standing = format!(
-        "{feet}[[mode]]\nname = \"standing\"\ncontacts = {names:?}\n[[mode]]\nname = \"trot\"\ncontacts = [\"FL\", \"HR\"]\n"
-    );
-    for (file, floating_base, scene, record) in [
-        ("ur5.urdf", false, table("tool0"), RECORD_UR5),
-        ("panda.urdf", false, table("panda_hand_tcp"), RECORD_PANDA),
-        ("solo12.urdf", true, standing, RECORD_SOLO12),
-    ] {
-        let scene = format!(
-            "[outputs]\nfunctions = []\ncontact = [\"forward_dynamics_derivatives\", \"impact_derivatives\"]\n{scene}"
-        );
-        let mut diagnostics = Diagnostics::new();
-        let read = scene_file::read(&Source::new("scene.toml", scene), &mut diagnostics).expect("a scene");
-        let model = ModelOptions { floating_base, ..ModelOptions::default() };
-        let options = read.into_options(Options { model, ..Options::default() });
-        let generated = compile(&source(file), &options).unwrap_or_else(|d| panic!("{}", d.render()));
-        let found: Vec<usize> = generated.report.contact.iter().map(|c| c.counts.flops()).collect();
-        println!("{file:<12} {found:?}");
-        assert_eq!(found, record, "{file}: another count than on record");
-    }
+    assert_eq!(operations("ur5.urdf", false, &table("tool0")), [2592, 1338]);
+    assert_eq!(operations("panda.urdf", false, &table("panda_hand_tcp")), [5789, 2846]);
 }
 
-/// Of motion and of impact, by mode.
-const RECORD_UR5: &[usize] = &[2592, 1338];
-const RECORD_PANDA: &[usize] = &[5789, 2846];
-const RECORD_SOLO12: &[usize] = &[73739, 45666, 37959, 20010];
+/// Of a quadruped on all feet, and on two.
+#[test]
+#[ignore = "slow proof: programs of some ten thousand operations are searched"]
+fn slow_proof_that_derivatives_on_feet_take_what_is_on_record() {
+    let ground = "object = { origin = [0.0, 0.0, 0.0], z = [0.0, 0.0, 1.0] }\nconstrained = [\"px\", \"py\", \"pz\"]";
+    let standing = |names: [&str; 4], foot: &dyn Fn(&str) -> String| {
+        let feet: String = names.iter().map(|name| contact(name, &foot(name), ground)).collect();
+        let [first, .., last] = names;
+        format!(
+            "{feet}[[mode]]\nname = \"standing\"\ncontacts = {names:?}\n[[mode]]\nname = \"trot\"\ncontacts = [{first:?}, {last:?}]\n"
+        )
+    };
+    let solo = standing(["FL", "FR", "HL", "HR"], &|name| format!("{name}_FOOT"));
+    assert_eq!(operations("solo12.urdf", true, &solo), [73739, 45666, 37959, 20010]);
+    let hyq = standing(["lf", "rf", "lh", "rh"], &|name| format!("{name}_foot"));
+    assert_eq!(operations("hyq.urdf", true, &hyq), [76745, 47091, 40929, 21399]);
+}

@@ -45,14 +45,11 @@ impl<'a, T: Real> TaskRows<'a, T> {
     fn damped(&self, damping: T) -> Solver<T> {
         T::section("inverse inertia of the task", None);
         let (m, square) = (self.jacobian.len(), damping * damping);
-        let mut matrix = vec![vec![T::zero(); m]; m];
-        for i in 0..m {
-            for j in 0..=i {
-                let entry = dot(&self.scaled[i], &self.halves[j]);
-                let entry = if i == j { entry + square } else { entry };
-                (matrix[i][j], matrix[j][i]) = (entry, entry);
-            }
-        }
+        let entry = |i: usize, j: usize| {
+            let entry = dot(&self.scaled[i.max(j)], &self.halves[i.min(j)]);
+            if i == j { entry + square } else { entry }
+        };
+        let matrix = (0..m).map(|i| (0..m).map(|j| entry(i, j)).collect()).collect();
         Solver::new(matrix, true, None).0
     }
 
