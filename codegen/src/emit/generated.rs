@@ -223,10 +223,7 @@ pub(crate) fn generate(
     let mut items = Vec::new();
     let mut functions = BTreeMap::new();
     let mut written = AllWritten::default();
-    let entries: BTreeMap<Function, Vec<NonzeroEntries>> = match options.entries {
-        WrittenEntries::Nonzeros => programs.iter().map(|(p, ..)| (p.function, p.entries.clone())).collect(),
-        WrittenEntries::All | WrittenEntries::Patterns => BTreeMap::new(),
-    };
+    let entries = packed_entries(&programs, options);
     for (program, waterfall, errors) in programs {
         let item = item(&robot, &program, (options, lowering), &mut warnings, &mut written.functions)?;
         let figures = FunctionReport::new(&program, options.scalar, item.text.lines().count());
@@ -288,6 +285,17 @@ pub(crate) fn generate(
         programs: written,
     };
     Ok(Generated { text: rust::file(&generated), ..generated })
+}
+
+/// Of functions that put out some entries of their matrices alone: which.
+fn packed_entries<X, Y>(
+    programs: &[(TracedProgram, X, Y)],
+    options: &Options,
+) -> BTreeMap<Function, Vec<NonzeroEntries>> {
+    match options.entries {
+        WrittenEntries::Nonzeros => programs.iter().map(|(p, ..)| (p.function, p.entries.clone())).collect(),
+        WrittenEntries::All | WrittenEntries::Patterns => BTreeMap::new(),
+    }
 }
 
 /// Where the file comes from.
