@@ -15,7 +15,6 @@
 use super::contact_system::Solver;
 use super::factor::Ltdl;
 use crate::real::Real;
-use alloc::vec;
 use alloc::vec::Vec;
 
 /// Rows of a Jacobian with what they feel of H⁻¹. J H⁻¹ Jᵀ is made of L⁻ᵀ Jᵀ, as that of a contact.
@@ -47,7 +46,11 @@ impl<'a, T: Real> TaskRows<'a, T> {
         let (m, square) = (self.jacobian.len(), damping * damping);
         let entry = |i: usize, j: usize| {
             let entry = dot(&self.scaled[i.max(j)], &self.halves[i.min(j)]);
-            if i == j { entry + square } else { entry }
+            if i == j {
+                entry + square
+            } else {
+                entry
+            }
         };
         let matrix = (0..m).map(|i| (0..m).map(|j| entry(i, j)).collect()).collect();
         Solver::new(matrix, true, None).0
