@@ -265,7 +265,9 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
     let second = SecondReading::new(source, &model, &options);
     let second = second.unwrap_or_else(|why| panic!("what the compiler takes the second author refuses: {why}"));
     let of_bodies = |f: &Function| f.spec().family != Family::Drives;
-    let mut functions: Vec<Function> = Function::known().filter(of_bodies).collect();
+    // that is four times the derivatives of forward dynamics, which are judged, in one program
+    let is_repeated = |f: &Function| *f == Function::StepDerivativesRk4;
+    let mut functions: Vec<Function> = Function::known().filter(|f| of_bodies(f) && !is_repeated(f)).collect();
     if !singular_joints(&model, Inertia::OfLinks).is_empty() {
         functions.retain(|f| !f.spec().solves);
     }

@@ -270,7 +270,8 @@ fn hold_data(robot: &str, floating: bool) {
     let graph = program(&Robot::new(model.clone()), &[], Function::StepDerivatives, &options).graph;
     let mut worst = [0.0f64; 2];
     for state in file["states"].as_array().expect("a list").iter().filter(|s| s["kind"] != "gravity_tilted") {
-        let length: f64 = state["step_derivatives"]["dt"].as_str().and_then(|text| text.parse().ok()).expect("a number");
+        let length: f64 =
+            state["step_derivatives"]["dt"].as_str().and_then(|text| text.parse().ok()).expect("a number");
         let mut given: Vec<Vec<Dd>> = ["q", "qd", "tau"].map(|name| inputs(&state[name])).to_vec();
         if floating {
             model.bodies[0].joint.kind.normalise(&mut given[0][..7]);
