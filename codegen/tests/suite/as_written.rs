@@ -276,7 +276,9 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
         let of_scene = f.is_of_scene_parameters() || f.spec().inputs.contains(&Quantity::LinkParameters);
         !f.spec().family.is_of_drives() && !of_scene
     };
-    let mut functions: Vec<Function> = Function::known().filter(of_bodies).collect();
+    // that is four times the derivatives of forward dynamics, which are judged, in one program
+    let is_repeated = |f: &Function| *f == Function::StepDerivativesRk4;
+    let mut functions: Vec<Function> = Function::known().filter(|f| of_bodies(f) && !is_repeated(f)).collect();
     if !singular_joints(&model, Inertia::OfLinks).is_empty() {
         functions.retain(|f| !f.spec().solves && f.spec().divisor != Divisor::MassOfEach);
     }

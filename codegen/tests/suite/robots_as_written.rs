@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use straightline_codegen::compile::compile;
 use straightline_codegen::emit::Generated;
 use straightline_codegen::expr::{evaluate, Port};
-use straightline_codegen::function::{Family, Spec};
+use straightline_codegen::function::{Family, Quantity, Spec};
 use straightline_codegen::options::Options;
 use straightline_codegen::program::program;
 use straightline_codegen::{Function, Robot, Scalar, Source};
@@ -92,12 +92,20 @@ fn robots_that_once_lost_digits_keep_them() {
         match judge(&file, &wanted) {
             Outcome::Refused(why) => panic!("{name}: {why}"),
             Outcome::Judged(failures, refused) => {
-                let of_motion = Function::known()
-                    .filter(|f| f.spec().family.is_of_blocks() && f.spec().solves && !f.is_of_scene_parameters())
-                    .count();
+                let is_of_motion = |f: &Function| {
+                    let Spec { family, solves, .. } = f.spec();
+                    family.is_of_blocks() && *solves && !family.is_of_drives() && !f.is_of_scene_parameters() && *f != Function::StepDerivativesRk4
+                };
+                let of_motion = Function::known().filter(is_of_motion).count();
+                // a step may hide what accelerations lose behind velocities that it hardly changes
+                let is_step = |f: &Function| is_of_motion(f) && f.spec().inputs.contains(&Quantity::TimeStep);
+                let steps = Function::known().filter(is_step).count();
                 // 5.2 kg under a slide of 3.6e20 kg: the base has no acceleration with a digit, in f64 or f32
-                let without_digits = if name == "floating_slide_that_hides_a_loss.toml" { 2 + of_motion } else { 0 };
-                assert_eq!(refused, without_digits, "{name}");
+                let without_digits = match name == "floating_slide_that_hides_a_loss.toml" {
+                    true => 2 + of_motion - steps..=2 + of_motion,
+                    false => 0..=0,
+                };
+                assert!(without_digits.contains(&refused), "{name}: {refused}, not {without_digits:?}");
                 let words: Vec<String> = failures.iter().map(in_words).collect();
                 assert!(words.is_empty(), "{name}: {}", words.join("; "));
             }
