@@ -242,10 +242,10 @@ impl SumTable {
     pub(super) fn share(&mut self) {
         let found = self.uses();
         let mut pairs = Pairs::default();
-        for v in found.1.iter().copied() {
-            if let SignedValue::Sum(_) = self.values[v] {
-                pairs.insert(v, &self.terms(v).collect::<Vec<_>>());
-            }
+        let is_sum = |v: &usize| matches!(self.values[*v], SignedValue::Sum(_));
+        let mut inserted: Vec<usize> = found.1.iter().copied().filter(is_sum).collect();
+        for v in &inserted {
+            pairs.insert(*v, &self.terms(*v).collect::<Vec<_>>());
         }
         while let Some((best, sums)) = pairs.most_frequent() {
             let [a, b] = best.terms();
@@ -269,8 +269,13 @@ impl SumTable {
                     }
                 }
                 if terms.len() == 1 {
-                    // the very pair once more
+                    // the very pair once more: sums of it have another term from now on, and other pairs
+                    let is_sum = |sum: &usize| matches!(self.values[*sum], SignedValue::Sum(_));
+                    let has_it = |sum: &usize| is_sum(sum) && self.terms(*sum).any(|t| t.value() == v);
+                    let users: Vec<usize> = inserted.iter().copied().filter(|sum| *sum != v && has_it(sum)).collect();
+                    users.iter().for_each(|sum| pairs.remove(*sum, &self.terms(*sum).collect::<Vec<_>>()));
                     self.set(v, SignedValue::Same(terms[0]));
+                    users.iter().for_each(|sum| pairs.insert(*sum, &self.terms(*sum).collect::<Vec<_>>()));
                 } else {
                     pairs.insert(v, &terms);
                     self.set(v, SignedValue::Sum(terms));
@@ -278,6 +283,7 @@ impl SumTable {
             }
             if exact.is_none() {
                 pairs.insert(shared.value(), &[a, b]);
+                inserted.push(shared.value());
             }
         }
     }
