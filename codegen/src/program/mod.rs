@@ -19,11 +19,12 @@ mod sines;
 pub mod staged;
 pub mod written;
 
+use crate::choices::WrittenEntries;
 use crate::equations::bind::is_optional;
 use crate::equations::forward_method::MethodChoice;
 use crate::equations::traced::{candidate, traced};
 use crate::equations::Robot;
-use crate::function::{Family, Form, Function};
+use crate::function::{Family, Form, Function, Output};
 use crate::model::states::samples;
 use crate::options::optimisations::FOLDING;
 use crate::options::{Optimisations, Options};
@@ -106,7 +107,10 @@ fn optimised_with(
     options: &Options,
     optimisations: Optimisations,
 ) -> (Graph, Option<MethodChoice>) {
-    if optimisations.limbs {
+    // packed matrices follow no loop over limbs
+    let is_packed =
+        options.entries == WrittenEntries::Nonzeros && function.spec().outputs.iter().any(Output::is_by_columns);
+    if optimisations.limbs && !is_packed {
         if let Some(graph) = limbs::program(robot, frames, function, options, optimisations) {
             return (graph, None);
         }

@@ -116,6 +116,10 @@ impl TracedProgram {
             WrittenEntries::Patterns => self.entries = nonzeros(self.function, &self.graph, false),
             WrittenEntries::Nonzeros => {
                 self.entries = nonzeros(self.function, &self.graph, true);
+                // what has no matrices stays as it is, with its loops over limbs
+                if self.entries.is_empty() {
+                    return;
+                }
                 self.graph = super::passed("nonzeros", self.function.name(), packed(&self.graph, &self.entries));
                 self.schedule = schedule(&self.graph, options.limits, options.schedule_machine().as_ref());
             }

@@ -206,9 +206,7 @@ fn torques_change_no_faster_than_their_lipschitz_constants() {
 fn derivatives_of_forward_dynamics_have_bounds_over_a_box() {
     let mut failures = Vec::new();
     for function in [Function::ForwardDynamicsDerivativesAtMotion, Function::ForwardDynamicsDerivatives] {
-        for (file, in_f32) in
-            [("planar2r.urdf", true), ("chapter_stanford.toml", true), ("puma560.urdf", true), ("ur5.urdf", true)]
-        {
+        for (file, in_f32) in [("planar2r.urdf", true), ("ur5.urdf", true)] {
             for scalar in [Scalar::F64, Scalar::F32] {
                 let case = case(file, function, scalar, false);
                 let start = std::time::Instant::now();

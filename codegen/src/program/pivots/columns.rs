@@ -178,12 +178,20 @@ impl ColumnBounds {
     }
 }
 
-/// Whether the results of a program are those of the columns.
+/// Whether the results of a program are those of the columns. A column that vanishes is compared with its neighbours: here it is rounding noise.
 fn agree(graph: &Graph, of_nodes: &[Dd], columns: &[ColumnAt], results: &[(usize, SolvedFor)]) -> bool {
+    let quantity = |of: SolvedFor| match of {
+        SolvedFor::Acceleration => None,
+        SolvedFor::Slope(by, _) => Some(by),
+    };
+    let greatest = |of: SolvedFor| {
+        let alike = columns.iter().filter(|column| quantity(column.of) == quantity(of));
+        alike.flat_map(|column| &column.x).map(|x| x.to_f64().abs()).fold(0.0, f64::max)
+    };
     graph.results.iter().zip(results).all(|(node, (k, of))| {
-        columns.iter().find(|column| column.of == *of).is_some_and(|column| {
-            let greatest = column.x.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
-            (of_nodes[node.index()] - column.x[*k]).to_f64().abs() <= EQUAL * greatest
-        })
+        columns
+            .iter()
+            .find(|column| column.of == *of)
+            .is_some_and(|column| (of_nodes[node.index()] - column.x[*k]).to_f64().abs() <= EQUAL * greatest(*of))
     })
 }
