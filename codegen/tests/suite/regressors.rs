@@ -12,9 +12,11 @@ use straightline_codegen::program::checked;
 use straightline_codegen::verify::reference_input::centre_of_mass_tree;
 use straightline_codegen::verify::{verify, Verification};
 use straightline_codegen::{compile, description, scene, Function};
-use straightline_core::base_parameters::BaseParameterKind;
+use straightline_core::base_parameters::{BaseParameterKind, PER_BODY};
+use straightline_core::model::Load;
 use straightline_core::random::Random;
 use straightline_core::reference::{self, CentreOfMassTree};
+use straightline_core::spatial::Transform;
 use straightline_core::{Dd, Real};
 
 /// Beside what double-double loses.
@@ -97,6 +99,21 @@ impl Robots {
     fn run(&self, function: Function, inputs: &[&[Dd]]) -> Vec<Dd> {
         let program = checked(&self.robot, &[], function, &self.options).unwrap_or_else(|wrong| panic!("{wrong}"));
         evaluate(&program.graph, &inputs.concat())
+    }
+
+    /// Parameters in the data's frame of a link, about its own: in the data, links in the chapter's notation have their origins in their joints.
+    fn of_link(&self, rank: usize, x: Vec<Dd>) -> [Dd; PER_BODY] {
+        let mut own: [Dd; PER_BODY] = x.try_into().expect("ten numbers");
+        if self.name.starts_with("chapter_") {
+            let body =
+                self.robot.model.bodies.iter().find(|body| body.joint.iv == rank).expect("joints of one coordinate");
+            let translation = body.link_frame.inverse().translation;
+            let load = Load::from_array(own);
+            let load = Load { second_moment: load.second_moment.inertia_to_second_moment(), ..load };
+            let load = load.seen_from(&Transform { translation, ..Transform::identity() });
+            own = Load { second_moment: load.second_moment.second_moment_to_inertia(), ..load }.to_array();
+        }
+        own
     }
 
     /// The second author's robot with these parameters of its links.
@@ -362,7 +379,8 @@ fn changes_of_links_change_forces_as_in_the_data() {
             let in_f64 = |x: &[Dd]| x.iter().map(|x| x.to_f64()).collect::<Vec<f64>>();
             let y: Vec<f64> = evaluate(&y_of, &in_f64(&inputs.concat()));
             for case in state["torque_regressor"].as_array().expect("cases") {
-                let change: Vec<Dd> = case["dpi"].as_array().expect("links").iter().flat_map(&list).collect();
+                let change = case["dpi"].as_array().expect("links").iter().map(&list);
+                let change: Vec<Dd> = change.enumerate().flat_map(|(k, x)| robot.of_link(k, x)).collect();
                 let beta: Vec<Dd> = evaluate(&map, &change);
                 let exact: Vec<Dd> = y.iter().copied().map(Dd::from).collect();
                 let (found, expected) = (times(&exact, &beta), list(&case["dtau"]));
@@ -388,7 +406,8 @@ fn verified(file: &str, scene: &str) -> Verification {
     verify(&source, &generated, &options, (4, 1), || ()).unwrap_or_else(|why| panic!("{why}"))
 }
 
-const OTHERS: &str = "\"torque_regressor_entries\", \"gravity_regressor\", \"momentum_regressor\", \"energy_regressor\", \
+const OTHERS: &str =
+    "\"torque_regressor_entries\", \"gravity_regressor\", \"momentum_regressor\", \"energy_regressor\", \
                       \"base_wrench_regressor\", \"base_parameters\", \"support_parameters\"";
 
 /// Also with joints locked, rows selected, gravity an input, and in f32.
