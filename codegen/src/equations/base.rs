@@ -287,12 +287,7 @@ impl BaseSearch<'_> {
     }
 
     /// The same with the rows in which they stand: where the regressor is not zero at some state.
-    fn with_rows(
-        &self,
-        mut found: Vec<BaseParameter>,
-        regressor: &dyn Fn(&Model<Dd>, [&[Dd]; 3]) -> Vec<Dd>,
-        rows: usize,
-    ) -> Vec<BaseParameter> {
+    fn with_rows(&self, mut found: Vec<BaseParameter>, regressor: OfMotion<'_>, rows: usize) -> Vec<BaseParameter> {
         const TRIED: usize = 3;
         found.iter_mut().for_each(|parameter| parameter.rows = (0..rows).collect());
         let columns = found.len();
@@ -312,6 +307,9 @@ impl BaseSearch<'_> {
         found
     }
 }
+
+/// What a robot's regressor is at q, q̇, q̈.
+type OfMotion<'a> = &'a dyn Fn(&Model<Dd>, [&[Dd]; 3]) -> Vec<Dd>;
 
 /// Whether T or V depends on it.
 fn has_energy(kind: JointParameter) -> bool {
@@ -338,8 +336,8 @@ fn dependence(columns: &[[Vec<Dd>; 2]]) -> Dependence {
         for _ in 0..2 {
             for (direction, made_of) in &basis {
                 let along = dot(&left, direction);
-                left.iter_mut().zip(direction).for_each(|(x, d)| *x = *x - along * *d);
-                shares.iter_mut().zip(made_of).for_each(|(share, part)| *share = *share + along * *part);
+                left.iter_mut().zip(direction).for_each(|(x, d)| *x -= along * *d);
+                shares.iter_mut().zip(made_of).for_each(|(share, part)| *share += along * *part);
             }
         }
         if greatest(&left) > NOTHING {

@@ -14,7 +14,7 @@ const PER_VELOCITY: &[Extent] = &[Velocities, Extent::BaseParameters];
 const PER_SCENE_PARAMETER: &[Extent] = &[Velocities, Extent::SceneParameters];
 
 /// What all regressors have in common.
-const REGRESSOR: Spec = Spec { form: Form::Regressor, judged: Judged::ByScale, ..Spec::DERIVED };
+const REGRESSOR: Spec = Spec { form: Form::Regressor, ..Spec::DERIVED };
 
 impl<T: Real> Forms<'_, T> {
     /// Y of the bodies, in this gravity.

@@ -191,14 +191,22 @@ fn displacements_take_what_is_on_record() {
     assert_eq!(found, [[6, 6, 0, 0, 0], [216, 257, 259, 331, 355]]);
 }
 
-/// Columns and operations of the regressor of inverse dynamics, and of gravity's and momentum's; of the first at most.
+/// Operations of the regressors of inverse dynamics and of gravity, in base parameters, beside what was to be reached (research record of 2026-11-22).
+fn hold_regressors(of: &CountsOf, most: usize, records: [usize; 2]) {
+    let found = [Function::TorqueRegressor, Function::GravityRegressor].map(|function| count(of, function, &[]));
+    println!("{:<40} {found:?} of {most}", of.file);
+    assert!(found[0] <= most, "{}: {} operations, {most} at most", of.file, found[0]);
+    assert_eq!(found, records, "{}: another count than on record", of.file);
+}
+
 #[test]
-fn regressors_in_base_parameters_take_few_operations() {
-    use Function::{GravityRegressor, MomentumRegressor, TorqueRegressor};
-    let hyq =
-        CountsOf { floating: true, ..of("../robots/descriptions/hyq.urdf", counts(0, 0, None), counts(0, 0, None)) };
-    for (of, most) in [(&ARMS[0], 855), (&ARMS[3], 1147), (&hyq, 3475)] {
-        let found = [TorqueRegressor, GravityRegressor, MomentumRegressor].map(|function| count(of, function, &[]));
-        println!("{:<40} {found:?} of {most}", of.file);
-    }
+fn regressors_of_arms_take_few_operations() {
+    hold_regressors(&ARMS[0], 855, [525, 66]);
+    hold_regressors(&ARMS[3], 1147, [1057, 180]);
+}
+
+#[test]
+#[ignore = "slow proof: programs of some ten thousand operations are searched"]
+fn slow_proof_that_regressors_of_legged_robots_take_few_operations() {
+    hold_regressors(&LARGE[2], 3475, [3252, 546]);
 }
