@@ -12,14 +12,14 @@
 
 class Ur5 : public crocoddyl::DifferentialActionModelAbstract {
  public:
-  CROCODDYL_DERIVED_CAST(crocoddyl::DifferentialActionModelBase, Ur5)
   typedef crocoddyl::DifferentialActionDataAbstract Data;
   Ur5()
       : crocoddyl::DifferentialActionModelAbstract(
             std::make_shared<crocoddyl::StateVector>(2 * UR5_NV), UR5_NV, 0) {}
 
-  template <typename Scalar>
-  std::shared_ptr<crocoddyl::DifferentialActionModelBase> cast() const { return std::make_shared<Ur5>(); }
+  // copies for solvers in double; the exported functions have no other numbers
+  std::shared_ptr<crocoddyl::DifferentialActionModelBase> cloneAsDouble() const override { return std::make_shared<Ur5>(); }
+  std::shared_ptr<crocoddyl::DifferentialActionModelBase> cloneAsFloat() const override { return nullptr; }
 
   void calc(const std::shared_ptr<Data>& data, const Eigen::Ref<const Eigen::VectorXd>& x,
             const Eigen::Ref<const Eigen::VectorXd>& u) override {
