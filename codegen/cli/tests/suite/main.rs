@@ -12,6 +12,7 @@ mod fuzz;
 mod in_c;
 #[path = "../../../../generated_tests/src/made.rs"]
 mod made;
+mod optimal_control;
 mod options;
 #[cfg(feature = "parquet")]
 mod parquet;
