@@ -45,6 +45,7 @@
 //! | tau of a motion | [`inverse_dynamics`], [`bias_force`], [`gravity_force`], [`velocity_force`] |
 //! | reactions in the joints | [`joint_wrenches`] |
 //! | H(q) | [`mass_matrix`] |
+//! | what a free base makes of gravity and of its own velocity | [`FallingBase`] |
 //! | motion under a tau | [`forward_dynamics_aba`], [`forward_dynamics_ltdl`] |
 //! | energy | [`kinetic_energy`], [`potential_energy`] |
 //! | motion under the inputs of drives | [`driven_motion`], [`complete_model`](fn@complete_model), [`state_space`](fn@state_space) |
@@ -70,6 +71,7 @@ mod effects;
 mod energy;
 mod environment;
 mod factor;
+mod falling_base;
 mod frame_derivatives;
 mod functional;
 mod impact;
@@ -109,6 +111,7 @@ pub use effects::{passive_force, rotor_inertias};
 pub use energy::{kinetic_energy, potential_energy};
 pub use environment::{Environment, EnvironmentMotion, SpringDamper};
 pub use factor::{forward_dynamics_ltdl, Ltdl};
+pub use falling_base::FallingBase;
 pub use frame_derivatives::{frame_derivatives, FrameDerivativeBlocks};
 pub use functional::{
     constrained_coordinates, functional_coordinates, reduced_relative_motion, relative_motion, FunctionalCoordinates,
