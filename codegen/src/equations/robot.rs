@@ -1,7 +1,7 @@
 //! A robot in the forms that are traced.
 
 use crate::equations::reduce::{reduce, FreeTerms};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use straightline_core::model::Model;
 use straightline_core::reduced::ReducedModel;
 use straightline_core::spatial::Transform;
@@ -37,18 +37,23 @@ impl Robot {
     }
 }
 
-/// What was found for a robot, by function and scene: searched once, used by every function that shares it.
+/// What was found for a robot, by function and scene: searched once, used by every function that shares it, on whatever thread.
 #[derive(Clone, Debug, Default)]
-pub struct Found(Arc<Mutex<Vec<(String, FreeTerms)>>>);
+pub struct Found(Arc<Mutex<Vec<(String, Choice)>>>);
+
+type Choice = Arc<OnceLock<FreeTerms>>;
 
 impl Found {
     pub(crate) fn or_search(&self, key: String, search: impl FnOnce() -> FreeTerms) -> FreeTerms {
-        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, choice)) = known().iter().find(|(k, _)| *k == key) {
-            return choice.clone();
-        }
-        let choice = search();
-        known().push((key, choice.clone()));
-        choice
+        let choice = {
+            let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let place = known.iter().position(|(k, _)| *k == key).unwrap_or_else(|| {
+                known.push((key, Arc::default()));
+                known.len() - 1
+            });
+            known[place].1.clone()
+        };
+        // who comes while it is searched waits for it
+        choice.get_or_init(search).clone()
     }
 }
