@@ -39,9 +39,10 @@ impl Robot {
 
 /// What was found for a robot, by function and scene: searched once, used by every function that shares it, on whatever thread.
 #[derive(Clone, Debug, Default)]
-pub struct Found(Arc<Mutex<Vec<(String, Choice)>>>);
+pub struct Found(Arc<Mutex<Vec<(String, FoundForm)>>>);
 
-type Choice = Arc<OnceLock<FreeTerms>>;
+/// Empty while whoever came first searches.
+type FoundForm = Arc<OnceLock<FreeTerms>>;
 
 impl Found {
     pub(crate) fn or_search(&self, key: String, search: impl FnOnce() -> FreeTerms) -> FreeTerms {
