@@ -10,17 +10,23 @@ import sys
 GENERATED = ["casadi", "casadi_fast", "casadi_cse", "casadi_clang", "cppadcg"]
 OURS = ["straightline", "straightline_fma", "straightline_avx2", "straightline_portable"]
 FUNCTIONS = {"id": "inverse dynamics", "crba": "mass matrix", "aba": "forward dynamics",
-             "fkjac": "forward kinematics + Jacobian"}
+             "fkjac": "forward kinematics + Jacobian", "id_deriv": "derivatives of inverse dynamics",
+             "fd_deriv": "derivatives of forward dynamics"}
+DERIVATIVES = ("id_deriv", "fd_deriv")
 ARMS = ["ur5", "puma560", "panda", "iiwa"]
 # what is aimed at: time relative to the best generated C, and to Pinocchio by clang
 AIMS = {"id": {"arm": (0.50, 0.165), "hyq": (0.55, 0.22), "talos": (0.60, 0.35)},
         "crba": {"arm": (0.55, 0.20), "hyq": (0.65, 0.31), "talos": (0.70, 0.45)},
         "aba": {"arm": (0.60, 0.165), "hyq": (0.40, 0.23), "talos": (0.50, 0.32)},
-        "fkjac": {"arm": (0.80, 0.31), "hyq": (0.80, None), "talos": (0.80, None)}}
+        "fkjac": {"arm": (0.80, 0.31), "hyq": (0.80, None), "talos": (0.80, None)},
+        "id_deriv": {"ur5": (1 / 6, None), "panda": (1 / 4.5, None), "hyq": (1 / 3, None), "talos": (1 / 3, None)},
+        "fd_deriv": {"ur5": (1 / 5, None), "panda": (1 / 3, None), "hyq": (1 / 2, None), "talos": (1 / 2, None)}}
 LATENCY_AIM = 0.65  # inverse dynamics of arms, each call waiting for the last
 # states per second relative to the best generated C; f32: twice f64
 BATCH_AIMS = {"straightline_fma": {"arm": 8.0, "hyq": 6.0}, "straightline_avx2": {"arm": 4.5, "hyq": 3.5}}
-BATCH_FUNCTIONS = {"id": "inverse_dynamics", "aba": "forward_dynamics"}
+BATCH_DERIVATIVES_AIM = 15.0  # by AVX-512, fused
+BATCH_FUNCTIONS = {"id": "inverse_dynamics", "aba": "forward_dynamics", "id_deriv": "inverse_dynamics_derivatives",
+                   "fd_deriv": "forward_dynamics_derivatives"}
 
 
 def rows(path):
@@ -33,7 +39,15 @@ def kind(robot):
 
 
 def aims(function, robot):
-    return AIMS.get(function, {}).get(kind(robot), (None, None))
+    of = AIMS.get(function, {})
+    return of.get(robot, of.get(kind(robot), (None, None)))
+
+
+def batch_aim(run, function, robot, name):
+    """Times the states per second of the best generated C."""
+    if function in DERIVATIVES:
+        return BATCH_DERIVATIVES_AIM if name == "straightline_fma" and "fma_avx512_gflops" in run.machine else None
+    return BATCH_AIMS.get(name, {}).get(kind(robot))
 
 
 class Run:
@@ -94,7 +108,7 @@ def comparison(cells, ours="straightline"):
 def verdict(value, aim):
     if aim is None:
         return ""
-    return f"{aim:g} {'holds' if value <= aim else '**missed**'}"
+    return f"{aim:.3g} {'holds' if value <= aim else '**missed**'}"
 
 
 def comparisons(out, table, title, aim_of):
@@ -103,6 +117,9 @@ def comparisons(out, table, title, aim_of):
     out.append("|---" * 10 + "|")
     for (robot, function), cells in table.items():
         found = comparison(cells)
+        if function in FUNCTIONS and found is None and cells.get("straightline"):
+            mine = cells["straightline"]
+            out.append(f"| {FUNCTIONS[function]} | {robot} | {mine[0]:.1f} | not built | | | | {mine[1]:.3f} | | {mine[4]:.0e} |")
         if function not in FUNCTIONS or found is None:
             continue
         ratio, rival, to_reference, spread = found
@@ -125,27 +142,28 @@ def all_contenders(out, table, title):
 def batches(out, run):
     if not run.batch:
         return
-    peak = float(run.machine.get("fma_avx512_gflops", 0)) or float(run.machine.get("fma_avx2_gflops", 0))
+    widest = float(run.machine.get("fma_avx512_gflops", 0))
+    peak = widest or float(run.machine.get("fma_avx2_gflops", 0))
+    by_widest = f"{widest:.0f} by AVX-512" if widest else "which has no AVX-512"
     out.append("\n## Batches, one core: ns per state\n")
     out.append("States per second relative to the best generated C called in a loop. `straightline_fma` fuses and uses the widest instructions of the "
                "machine, `straightline_avx2` fuses and has 256 bits at most; `loop` is the plain function. Peak of this core, measured: "
-               f"{float(run.machine.get('fma_avx2_gflops', 0)):.0f} Gflop/s by AVX2, {peak:.0f} by AVX-512. Share of it: operations of the function, without those "
+               f"{float(run.machine.get('fma_avx2_gflops', 0)):.0f} Gflop/s by AVX2, {by_widest}. Share of it: operations of the function, without those "
                "inside sines and cosines, over what the peak would do in that time.\n")
     out.append("| function | robot | ours | ns | best generated C, ns | times as many states per second | aim | share of peak |")
     out.append("|---" * 8 + "|")
     for (robot, function), cells in run.batch.items():
         generated = [cells[(n, "loop")][0] for n in GENERATED if (n, "loop") in cells]
-        if not generated:
-            continue
         for (name, mode), (nanoseconds, _) in cells.items():
             if name not in OURS or (mode == "loop" and name != "straightline"):
                 continue
-            gain = min(generated) / nanoseconds
-            aim = BATCH_AIMS.get(name, {}).get(kind(robot)) if mode == "soa" else None
-            said = "" if aim is None else f"{aim:g} {'holds' if gain >= aim else '**missed**'}"
+            gain = min(generated) / nanoseconds if generated else None
+            aim = batch_aim(run, function, robot, name) if mode == "soa" else None
+            said = "" if aim is None or gain is None else f"{aim:g} {'holds' if gain >= aim else '**missed**'}"
+            beside = f"{min(generated):.1f} | {gain:.2f}" if generated else "not built |"
             operations = run.operations(robot, function) if mode == "soa" else None
             share = f"{100 * operations[0] / nanoseconds / peak:.0f} %" if operations and peak else ""
-            out.append(f"| {FUNCTIONS.get(function, function)} | {robot} | {name}, {mode} | {nanoseconds:.1f} | {min(generated):.1f} | {gain:.2f} | {said} | {share} |")
+            out.append(f"| {FUNCTIONS.get(function, function)} | {robot} | {name}, {mode} | {nanoseconds:.1f} | {beside} | {said} | {share} |")
     if not run.single:
         return
     out.append("\n## Batches in f32\n")
@@ -157,7 +175,7 @@ def batches(out, run):
         cells = run.batch.get((robot, function), {})
         generated = [cells[(n, "loop")][0] for n in GENERATED if (n, "loop") in cells]
         gain = min(generated) / single if generated else None
-        aim = BATCH_AIMS.get(f"straightline_{name}", {}).get(kind(robot))
+        aim = batch_aim(run, function, robot, f"straightline_{name}")
         said = "" if aim is None or gain is None else f"{2 * aim:g} {'holds' if gain >= 2 * aim else '**missed**'}"
         out.append(f"| {FUNCTIONS[function]} | {robot} | {'AVX2' if name == 'avx2' else 'widest'} | {double:.1f} | {single:.1f} | {double / single:.2f} "
                    f"| {f'{gain:.1f}' if gain else ''} | {said} |")
@@ -177,9 +195,10 @@ def picture(run, path):
              ("best generated C (CasADi, CppADCodeGen)", "#e09f3e", lambda cells: best(cells, GENERATED)),
              ("Pinocchio (C++)", "#5b7db1", lambda cells: "pin"),
              ("MuJoCo", "#9a9a9a", lambda cells: "mujoco")]
+    shown = [row for row in shown if any(row[2](cells) in cells for cells in run.time.values())]
     longest = 16  # longer bars are cut
     functions, robots = run.functions(), run.robots()
-    figure, axes = pyplot.subplots(1, len(functions), figsize=(3.6 * len(functions), 0.95 * len(robots) + 1.6), sharey=True,
+    figure, axes = pyplot.subplots(1, len(functions), figsize=(max(3.6 * len(functions), 8.4), 0.95 * len(robots) + 1.6), sharey=True,
                                    squeeze=False)
     for axis, function in zip(axes[0], functions):
         for i, robot in enumerate(robots):
@@ -215,14 +234,18 @@ def main():
     commit = subprocess.run(["git", "-C", here, "rev-parse", "--short", "HEAD"], capture_output=True, text=True).stdout.strip()
     rustc = subprocess.run(["rustc", "--version"], capture_output=True, text=True).stdout.strip()
     name = os.path.basename(record)
-    out = ["# Beside other systems", "",
-           f"`generated_tests/peers/run --harness DIR` at {commit}; {run.machine.get('cpu', '')}, {run.machine.get('clock_ghz', '?')} GHz while measuring; "
+    derived = any(function in DERIVATIVES for function in run.functions())
+    subject = [""] if not derived else [
+        "", "Derivatives of inverse dynamics are ∂τ/∂q and ∂τ/∂q̇; Straightline and Pinocchio make H with them, generated C does not. Those of forward "
+        "dynamics are ∂q̈/∂q, ∂q̈/∂q̇ and H⁻¹, by all. Of batches H and H⁻¹ are made, too; what generated C keeps by structure is not scattered.", ""]
+    out = ["# Derivatives beside other systems" if derived else "# Beside other systems", "",
+           f"`generated_tests/peers/run --harness DIR{' --derivatives' if derived else ''}` at {commit}; {run.machine.get('cpu', '')}, {run.machine.get('clock_ghz', '?')} GHz while measuring; "
            f"{rustc}; generated C by {run.machine.get('gcc', 'gcc')}, Pinocchio by {run.machine.get('pincxx', 'clang')}.", "",
            "One process, one pinned core, 4096 states, another one at each call; thread CPU time, medians over rounds, each contender measured "
            "back to back with Pinocchio. Every output of every contender is compared with Pinocchio's before it is timed: the last column, relative to the "
            "largest entry. `straightline` is built with `-C target-cpu=native`, `straightline_portable` without; neither fuses a*b + c, and both give the same bits. "
            f"`straightline_fma` is compiled with `--fma`. Load averages of the machine (two cores) at the end: {run.load or 'not known'}.",
-           "", f"![time per call]({name}.svg)"]
+           *subject, f"![time per call]({name}.svg)"]
     comparisons(out, run.time, "Calls that may overlap", aims)
     comparisons(out, run.latency, "Latency: each call waits for the last",
                 lambda function, robot: (LATENCY_AIM if function == "id" and kind(robot) == "arm" else None, None))

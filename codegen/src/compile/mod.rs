@@ -2,6 +2,7 @@
 
 mod figures;
 mod prepare;
+mod programs;
 
 pub use prepare::examine;
 
@@ -20,7 +21,7 @@ use crate::program::fixed::fixed_functions;
 use crate::program::mixed::mix_precisions;
 use crate::program::staged::figures;
 use crate::program::written::WrittenFunction;
-use crate::program::{checked, range, TracedProgram};
+use crate::program::{range, TracedProgram};
 use crate::readback::c99::CReader;
 use crate::report::budget::{self, Measures};
 use crate::report::certificates::certificates;
@@ -90,8 +91,8 @@ fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) ->
     let hash = hash(source.text(), &resolved);
     let robot = Robot::new(model).knowing_base_parameters(&resolved.functions, &resolved.scene);
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
-    let programs = resolved.functions.iter().filter(|f| !is_empty(f));
-    let programs: Result<Vec<TracedProgram>, _> = programs.map(|f| checked(&robot, &frames, *f, &resolved)).collect();
+    let functions: Vec<Function> = resolved.functions.iter().copied().filter(|f| !is_empty(f)).collect();
+    let programs = programs::programs(&robot, &frames, &functions, &resolved);
     let mut programs = programs.map_err(|wrong| only(no_form(&wrong, &robot.model, options.scalar, &description)))?;
     let beyond = |program: &str, why: &str, diagnostics: &mut Diagnostics| {
         let complaint = scene::messages::program_beyond_scalar(program, options.scalar.name(), why);

@@ -4,7 +4,7 @@ use crate::equations::base;
 use crate::equations::reduce::{reduce, FreeTerms};
 use crate::function::Function;
 use crate::scene::Scene;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use straightline_core::model::Model;
 use straightline_core::reduced::ReducedModel;
 use straightline_core::spatial::Transform;
@@ -52,18 +52,24 @@ impl Robot {
     }
 }
 
-/// What was found for a robot, by function and scene: searched once, used by every function that shares it.
+/// What was found for a robot, by function and scene: searched once, used by every function that shares it, on whatever thread.
 #[derive(Clone, Debug, Default)]
-pub struct Found(Arc<Mutex<Vec<(String, FreeTerms)>>>);
+pub struct Found(Arc<Mutex<Vec<(String, FoundForm)>>>);
+
+/// Empty while whoever came first searches.
+type FoundForm = Arc<OnceLock<FreeTerms>>;
 
 impl Found {
     pub(crate) fn or_search(&self, key: String, search: impl FnOnce() -> FreeTerms) -> FreeTerms {
-        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, choice)) = known().iter().find(|(k, _)| *k == key) {
-            return choice.clone();
-        }
-        let choice = search();
-        known().push((key, choice.clone()));
-        choice
+        let choice = {
+            let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let place = known.iter().position(|(k, _)| *k == key).unwrap_or_else(|| {
+                known.push((key, Arc::default()));
+                known.len() - 1
+            });
+            known[place].1.clone()
+        };
+        // who comes while it is searched waits for it
+        choice.get_or_init(search).clone()
     }
 }

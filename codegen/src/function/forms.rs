@@ -108,6 +108,15 @@ impl<'a, T: Real> Forms<'a, T> {
         self.with_limbs(|l| alg::reduced_inverse_dynamics_with_limbs(&weightless, motion, l.wrench))
     }
 
+    /// The same robot without gravity, frames and limbs in lanes.
+    pub(super) fn weightless<R>(&self, run: impl FnOnce(&Forms<'_, T>) -> R) -> R {
+        let model = Model { gravity: Vec3::zero(), ..self.model.clone() };
+        let weightless = |form: &ReducedModel<T>| ReducedModel { gravity: Vec3::zero(), ..form.clone() };
+        let reduced = self.reduced.map(|forms| forms.map(weightless));
+        let reduced = reduced.as_ref().map(|[torques, composite]| [torques, composite]);
+        run(&Forms { model: &model, reduced, frames: &[], method: self.method, limbs: None })
+    }
+
     /// H(q), by rows.
     pub fn mass_matrix(&self, q: &[T]) -> Vec<T> {
         let Some([_, composite]) = self.reduced else { return alg::mass_matrix(self.model, q) };

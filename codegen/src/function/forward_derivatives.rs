@@ -1,5 +1,6 @@
 //! Derivatives of forward dynamics. q̈ obeys H q̈ + h = τ, so that its derivatives are those of inverse dynamics at q̈, solved for:
-//! ∂q̈/∂x = −H⁻¹ ∂τ/∂x, and none of them goes through the solution.
+//! ∂q̈/∂x = −H⁻¹ ∂τ/∂x, and none of them goes through the solution. Of a free base all is computed in free fall ([`FallingBase`]), where nine columns need
+//! no solution.
 
 use super::derivatives::{moving, weighed_slopes, with_rates, SQUARE};
 use super::dynamics::ForwardDynamics;
@@ -7,6 +8,7 @@ use super::solution::{by_rows, Solution};
 use super::spec::Extent::Velocities;
 use super::spec::{Divisor, Form, Judged, Output, RobotFunction, Spec};
 use super::{Forms, Quantity};
+use straightline_core::algorithms::FallingBase;
 use straightline_core::{Dual, Real};
 
 const BY_POSITION: Output = Output::new(
@@ -44,9 +46,15 @@ impl RobotFunction for ForwardDynamicsDerivatives {
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        let (solution, qdd) = Solution::with_acceleration(forms, inputs);
-        let derivatives = solution.derivatives([&inputs[0], &inputs[1], &qdd]);
-        [qdd, derivatives].concat()
+        let of = |forms: &Forms<'_, T>, inputs: &[Vec<T>], base: Option<&FallingBase<T>>| {
+            let (solution, qdd) = Solution::with_acceleration(forms, inputs);
+            let derivatives = solution.derivatives([&inputs[0], &inputs[1], &qdd], base);
+            let qdd = base.map_or(qdd.clone(), |base| base.in_world(&qdd));
+            [qdd, derivatives].concat()
+        };
+        let Some(base) = FallingBase::of(forms.model, &inputs[0], &inputs[1]) else { return of(forms, inputs, None) };
+        let inputs = [inputs[0].clone(), base.at_rest(&inputs[1]), inputs[2].clone()];
+        forms.weightless(|forms| of(forms, &inputs, Some(&base)))
     }
 
     fn residual<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>], found: &[T]) -> Vec<T> {
@@ -69,7 +77,13 @@ impl RobotFunction for ForwardDynamicsDerivativesAtMotion {
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        Solution::new(forms, &inputs[0]).derivatives([&inputs[0], &inputs[1], &inputs[2]])
+        let (q, qd, qdd) = (&inputs[0], &inputs[1], &inputs[2]);
+        match FallingBase::of(forms.model, q, qd) {
+            None => Solution::new(forms, q).derivatives([q, qd, qdd], None),
+            Some(base) => forms.weightless(|forms| {
+                Solution::new(forms, q).derivatives([q, &base.at_rest(qd), &base.falling(qdd)], Some(&base))
+            }),
+        }
     }
 
     fn residual<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>], found: &[T]) -> Vec<T> {
@@ -224,14 +238,21 @@ impl<T: Real> Solution<'_, '_, T> {
         self.of(&left)
     }
 
-    /// ∂q̈/∂q, ∂q̈/∂q̇ and H⁻¹ of a motion, by rows.
-    pub(super) fn derivatives(&self, motion: [&[T]; 3]) -> Vec<T> {
+    /// ∂q̈/∂q, ∂q̈/∂q̇ and H⁻¹ of a motion, by rows; of a free base the motion is that in free fall.
+    pub(super) fn derivatives(&self, motion: [&[T]; 3], base: Option<&FallingBase<T>>) -> Vec<T> {
         let nv = motion[1].len();
-        let of_torques = self.forms.inverse_dynamics_derivatives(motion);
+        let mut of_torques = self.forms.inverse_dynamics_derivatives(motion);
+        if let Some(base) = base {
+            base.leave_out(&mut of_torques);
+        }
         let solved = |slopes: Vec<T>| {
             let column = |k: usize| (0..nv).map(|i| -slopes[i * nv + k]).collect::<Vec<T>>();
             by_rows(&(0..nv).map(|k| self.of(&column(k))).collect::<Vec<_>>())
         };
-        [solved(of_torques.dtau_dq), solved(of_torques.dtau_dqd), self.inverse()].concat()
+        let (mut by_position, mut by_velocity) = (solved(of_torques.dtau_dq), solved(of_torques.dtau_dqd));
+        if let Some(base) = base {
+            base.complete(&mut by_position, &mut by_velocity);
+        }
+        [by_position, by_velocity, self.inverse()].concat()
     }
 }

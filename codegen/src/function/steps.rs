@@ -96,7 +96,7 @@ impl RobotFunction for StepDerivatives {
         let (nv, length) = (inputs[1].len(), inputs[3][0]);
         let (solution, qdd) = Solution::with_acceleration(forms, inputs);
         let next = euler(forms, inputs, &qdd);
-        let slopes = solution.derivatives([&inputs[0], &inputs[1], &qdd]);
+        let slopes = solution.derivatives([&inputs[0], &inputs[1], &qdd], None);
         let mut by_all =
             side_by_side(slopes.chunks((nv * nv).max(1)), nv).into_iter().map(|x| x * length).collect::<Vec<T>>();
         add_unit(&mut by_all, nv, 1);
@@ -129,7 +129,7 @@ impl RobotFunction for StepDerivativesRk4 {
             unit
         };
         // slopes of u and of q̇, and how they move
-        let (mut slopes, mut moves): (Vec<[Vec<T>; 2]>, Vec<[Vec<T>; 2]>) = Default::default();
+        let (mut slopes, mut moves) = (Vec::<[Vec<T>; 2]>::new(), Vec::<[Vec<T>; 2]>::new());
         for part in parts(length) {
             let before = slopes.last().zip(moves.last());
             let rates = before.map_or_else(|| qd.clone(), |(k, _)| sum(qd, &scaled(&k[1], part)));
@@ -146,7 +146,7 @@ impl RobotFunction for StepDerivativesRk4 {
             };
             let state = [at, rates, inputs[2].clone()];
             let (solution, qdd) = Solution::with_acceleration(forms, &state);
-            let of_acceleration = solution.derivatives([&state[0], &state[1], &qdd]);
+            let of_acceleration = solution.derivatives([&state[0], &state[1], &qdd], None);
             let by_force = unit(2);
             let parts = of_acceleration.chunks((nv * nv).max(1)).zip([&by_q, &by_rates, &by_force]);
             let moved = parts.map(|(matrix, by)| product(matrix, by, nv)).reduce(|a, b| sum(&a, &b));

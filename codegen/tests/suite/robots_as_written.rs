@@ -94,7 +94,11 @@ fn robots_that_once_lost_digits_keep_them() {
             Outcome::Judged(failures, refused) => {
                 let is_of_motion = |f: &Function| {
                     let Spec { family, solves, .. } = f.spec();
-                    family.is_of_blocks() && *solves && !family.is_of_drives() && !f.is_of_scene_parameters() && *f != Function::StepDerivativesRk4
+                    family.is_of_blocks()
+                        && *solves
+                        && !family.is_of_drives()
+                        && !f.is_of_scene_parameters()
+                        && *f != Function::StepDerivativesRk4
                 };
                 let of_motion = Function::known().filter(is_of_motion).count();
                 // a step may hide what accelerations lose behind velocities that it hardly changes

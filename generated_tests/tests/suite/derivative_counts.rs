@@ -45,11 +45,11 @@ const LARGE: [CountsOf; 4] = [
     of("count_robots/general_6r.urdf", counts(3127, 3109, None), counts(4715, 4559, None)),
     CountsOf {
         floating: true,
-        ..of("../robots/descriptions/solo12.urdf", counts(4030, 3940, None), counts(19400, 18190, None))
+        ..of("../robots/descriptions/solo12.urdf", counts(4030, 3940, None), counts(19400, 15461, None))
     },
     CountsOf {
         floating: true,
-        ..of("../robots/descriptions/hyq.urdf", counts(6450, 6422, Some(17080)), counts(22200, 21043, Some(37698)))
+        ..of("../robots/descriptions/hyq.urdf", counts(6450, 6422, Some(17080)), counts(22200, 18268, Some(37698)))
     },
     CountsOf {
         file: "../robots/descriptions/simple_humanoid.urdf",
@@ -80,8 +80,17 @@ fn count(of: &CountsOf, function: Function, results: &[&str]) -> usize {
 /// Products beside inverse dynamics: along a direction, backwards, and of second order.
 #[test]
 fn products_take_two_and_a_half_times_inverse_dynamics_and_those_of_second_order_six_times() {
-    let robots = [("ur5", false), ("puma560", false), ("panda", false), ("solo12", true), ("hyq", true)];
-    for (name, floating_base) in robots {
+    hold_products(&[("ur5", false), ("puma560", false), ("panda", false), ("solo12", true), ("hyq", true)]);
+}
+
+#[test]
+#[ignore = "slow proof: programs of some ten thousand operations are searched"]
+fn slow_proof_that_products_of_a_humanoid_take_as_many_times_inverse_dynamics() {
+    hold_products(&[("simple_humanoid", true)]);
+}
+
+fn hold_products(robots: &[(&str, bool)]) {
+    for (name, floating_base) in robots.iter().copied() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../robots/descriptions/{name}.urdf"));
         let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
         let model = ModelOptions { floating_base, ..ModelOptions::default() };

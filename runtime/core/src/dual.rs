@@ -90,6 +90,25 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
         (angle.chain(sin, cos), angle.chain(cos, -sin))
     }
 
+    fn turning(self) -> Option<Self> {
+        Some(Dual { value: self.value.turning().unwrap_or_else(T::zero), ..self })
+    }
+
+    /// With (X, Y) = R (x, y): dX = (R d(x, y))₁ − Y dα, dY = (R d(x, y))₂ + X dα.
+    fn turned_about([x, y]: [Self; 2], (sin, cos): (Self, Self), turning: Option<Self>) -> [Self; 2] {
+        let Some(turning) = turning else { return [x * cos - y * sin, y * cos + x * sin] };
+        let turned = |x: T, y: T| T::turned_about([x, y], (sin.value, cos.value), Some(turning.value));
+        let [x_turned, y_turned] = turned(x.value, y.value);
+        let changes: [[T; 2]; N] = core::array::from_fn(|k| {
+            let [dx, dy] = turned(x.derivatives[k], y.derivatives[k]);
+            [dx - y_turned * turning.derivatives[k], dy + x_turned * turning.derivatives[k]]
+        });
+        [
+            Dual { value: x_turned, derivatives: changes.map(|change| change[0]) },
+            Dual { value: y_turned, derivatives: changes.map(|change| change[1]) },
+        ]
+    }
+
     /// At zero the slope is infinite.
     fn sqrt(self) -> Self {
         let root = self.value.sqrt();

@@ -73,6 +73,21 @@ pub trait Real:
         (sines, cosines)
     }
 
+    /// Of a scalar that knows how numbers change what a [turn](Real::turned_about) by this angle takes of it: how the angle changes, its value being
+    /// zero. Nothing of others.
+    #[inline(always)]
+    fn turning(self) -> Option<Self> {
+        None
+    }
+
+    /// (x cos − y sin, y cos + x sin), and how that changes with the angle if `turning` is its [sum](Real::turning): by a quarter turn of the result,
+    /// d(R v) = R dv + dα × R v, where products with dsin = cos dα and dcos = −sin dα would take four operations more.
+    #[must_use]
+    #[inline(always)]
+    fn turned_about([x, y]: [Self; 2], (sin, cos): (Self, Self), _turning: Option<Self>) -> [Self; 2] {
+        [x * cos - y * sin, y * cos + x * sin]
+    }
+
     /// Square root; NaN below zero.
     fn sqrt(self) -> Self;
 

@@ -20,8 +20,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::cell::RefCell;
 
-/// How a number was made: up to two numbers before it, with the slopes by them.
-type RecordedStep<T> = [Option<(usize, T)>; 2];
+/// How a number was made: up to three numbers before it, with the slopes by them.
+type RecordedStep<T> = [Option<(usize, T)>; 3];
 
 /// What was computed, in order.
 #[derive(Debug, Default)]
@@ -51,7 +51,7 @@ impl<T: Real> Recording<T> {
 
     /// A number that derivatives are taken by.
     pub fn variable(&self, value: T) -> Recorded<'_, T> {
-        self.made(value, [None; 2])
+        self.made(value, [None; 3])
     }
 
     fn made(&self, value: T, step: RecordedStep<T>) -> Recorded<'_, T> {
@@ -96,19 +96,24 @@ impl<'t, T: Real> Recorded<'t, T> {
     /// f of one number.
     fn chain(self, value: T, slope: T) -> Self {
         match self.place {
-            Some((recording, place)) => recording.made(value, [Some((place, slope)), None]),
+            Some((recording, place)) => recording.made(value, [Some((place, slope)), None, None]),
             None => Recorded::fixed(value),
         }
     }
 
     /// f of two numbers.
     fn zip(self, b: Self, value: T, slopes: [T; 2]) -> Self {
-        let [own, other] = [self.place, b.place];
-        match own.or(other) {
-            Some((recording, _)) => {
-                let step = [own.map(|(_, place)| (place, slopes[0])), other.map(|(_, place)| (place, slopes[1]))];
-                recording.made(value, step)
-            }
+        Recorded::of(value, [(self, slopes[0]), (b, slopes[1])])
+    }
+
+    /// f of some numbers, with its slopes by them.
+    fn of<const N: usize>(value: T, made_of: [(Self, T); N]) -> Self {
+        let mut step = [None; 3];
+        for (before, (number, slope)) in step.iter_mut().zip(&made_of) {
+            *before = number.place.map(|(_, place)| (place, *slope));
+        }
+        match made_of.iter().find_map(|(number, _)| number.place) {
+            Some((recording, _)) => recording.made(value, step),
             None => Recorded::fixed(value),
         }
     }
@@ -143,6 +148,21 @@ impl<T: Real> Real for Recorded<'_, T> {
         // for its derivatives
         let sum = angles[1..].iter().fold(angles[0], |sum, angle| sum.zip(*angle, sum.value, [T::one(), T::one()]));
         (sum.chain(sin, cos), sum.chain(cos, -sin))
+    }
+
+    fn turning(self) -> Option<Self> {
+        Some(Recorded { value: self.value.turning().unwrap_or_else(T::zero), ..self })
+    }
+
+    /// With (X, Y) = R (x, y) the slopes by the angle are −Y and X.
+    fn turned_about([x, y]: [Self; 2], (sin, cos): (Self, Self), turning: Option<Self>) -> [Self; 2] {
+        let Some(turning) = turning else { return [x * cos - y * sin, y * cos + x * sin] };
+        let (s, c) = (sin.value, cos.value);
+        let [x_turned, y_turned] = T::turned_about([x.value, y.value], (s, c), Some(turning.value));
+        [
+            Recorded::of(x_turned, [(x, c), (y, -s), (turning, -y_turned)]),
+            Recorded::of(y_turned, [(y, c), (x, s), (turning, x_turned)]),
+        ]
     }
 
     /// At zero the slope is infinite.

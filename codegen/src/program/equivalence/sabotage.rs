@@ -20,6 +20,11 @@ pub fn with_form<R>(broken: impl FnMut(Robot) -> Robot + 'static, work: impl FnO
     done
 }
 
+/// Whether anything is broken on this thread.
+pub fn is_on() -> bool {
+    BREAK.with_borrow(Option::is_some) || FORM.with_borrow(Option::is_some)
+}
+
 pub fn formed(robot: Robot) -> Robot {
     FORM.with_borrow_mut(|b| match b {
         Some(broken) => broken(robot),

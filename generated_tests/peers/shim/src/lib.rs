@@ -49,7 +49,7 @@ type Number = f64;
 type Number = f32;
 
 /// The functions that the harness calls.
-#[cfg(not(feature = "single"))]
+#[cfg(not(any(feature = "single", feature = "derivatives")))]
 mod calls {
     use super::*;
     use core::slice::{from_raw_parts, from_raw_parts_mut};
@@ -101,12 +101,72 @@ mod calls {
     batch!(rbd_aba_batch_aos, forward_dynamics_batch_aos);
 }
 
+/// The derivatives that the harness calls. H and its inverse stay here: of the latter it takes a look.
+#[cfg(all(feature = "derivatives", not(feature = "single")))]
+mod derivative_calls {
+    use super::*;
+    use core::slice::{from_raw_parts, from_raw_parts_mut};
+    use std::cell::{RefCell, UnsafeCell};
+
+    type Q = [f64; NQ];
+    type V = [f64; NV];
+    type Square = [V; NV];
+
+    thread_local! {
+        static SQUARE: UnsafeCell<Square> = const { UnsafeCell::new([[0.0; NV]; NV]) };
+        static SQUARES: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
+    }
+
+    #[no_mangle]
+    pub unsafe extern "C" fn rbd_id_deriv(q: &Q, v: &V, a: &V, by_q: &mut Square, by_v: &mut Square) {
+        SQUARE.with(|h| dynamics::inverse_dynamics_derivatives(q, v, a, by_q, by_v, unsafe { &mut *h.get() }));
+    }
+
+    #[no_mangle]
+    pub unsafe extern "C" fn rbd_fd_deriv(q: &Q, v: &V, tau: &V, by_q: &mut Square, by_v: &mut Square) {
+        SQUARE.with(|h| dynamics::forward_dynamics_derivatives(q, v, tau, by_q, by_v, unsafe { &mut *h.get() }));
+    }
+
+    /// H⁻¹ of the last call; all else is where the arguments say.
+    #[no_mangle]
+    pub extern "C" fn peer_result(function: c_int, result: c_int) -> *const f64 {
+        match (function, result) {
+            (6, 2) => SQUARE.with(|h| h.get().cast_const().cast()),
+            _ => core::ptr::null(),
+        }
+    }
+
+    macro_rules! batch {
+        ($name:ident, $function:ident) => {
+            #[no_mangle]
+            pub unsafe extern "C" fn $name(n: c_long, q: *const f64, v: *const f64, x: *const f64, y: *mut f64) {
+                let n = n as usize;
+                let (q, v, x) = (from_raw_parts(q, n * NQ), from_raw_parts(v, n * NV), from_raw_parts(x, n * NV));
+                let (by_q, by_v) = from_raw_parts_mut(y, 2 * n * NV * NV).split_at_mut(n * NV * NV);
+                SQUARES.with_borrow_mut(|h| {
+                    h.resize(n * NV * NV, 0.0);
+                    dynamics::$function(n, q, v, x, by_q, by_v, h).expect("the slices hold n states");
+                });
+            }
+        };
+    }
+    batch!(rbd_id_deriv_batch_soa, inverse_dynamics_derivatives_batch_soa);
+    batch!(rbd_fd_deriv_batch_soa, forward_dynamics_derivatives_batch_soa);
+}
+
 /// Random states, structure of arrays, and room for results.
 pub struct Batch {
     states: usize,
     inputs: [&'static mut [Number]; 3],
-    results: &'static mut [Number],
+    results: [&'static mut [Number]; RESULTS],
 }
+
+/// Blocks of results, and numbers of each.
+#[cfg(not(feature = "derivatives"))]
+const RESULTS: usize = 1;
+#[cfg(feature = "derivatives")]
+const RESULTS: usize = 3;
+const LENGTH: usize = if RESULTS == 1 { NV } else { NV * NV };
 
 /// Numbers that begin where a line of a cache does, as those of the harness do; they are never freed.
 fn aligned(numbers: impl ExactSizeIterator<Item = Number>) -> &'static mut [Number] {
@@ -132,18 +192,28 @@ pub extern "C" fn batch_of(states: c_long) -> *mut Batch {
         aligned((0..states * width).map(|_| next()))
     };
     let inputs = [random(NQ), random(NV), random(NV)];
-    let results = aligned((0..states * NV).map(|_| 0.0));
+    let results = [(); RESULTS].map(|()| aligned((0..states * LENGTH).map(|_| 0.0)));
     Box::into_raw(Box::new(Batch { states, inputs, results }))
 }
 
-/// Inverse dynamics (0) or forward dynamics (1) of the batch; its first result.
+/// Inverse dynamics (0) or forward dynamics (1) of the batch, or their derivatives; its first result.
 #[no_mangle]
 pub unsafe extern "C" fn batch_run(batch: &mut Batch, function: c_int) -> f64 {
     let Batch { states, inputs: [q, v, x], results } = batch;
-    match function {
-        0 => dynamics::inverse_dynamics_batch_soa(*states, q, v, x, results),
-        _ => dynamics::forward_dynamics_batch_soa(*states, q, v, x, results),
-    }
-    .expect("the slices hold so many states");
-    results[0] as f64
+    #[cfg(not(feature = "derivatives"))]
+    let [first] = results;
+    #[cfg(not(feature = "derivatives"))]
+    let done = match function {
+        0 => dynamics::inverse_dynamics_batch_soa(*states, q, v, x, first),
+        _ => dynamics::forward_dynamics_batch_soa(*states, q, v, x, first),
+    };
+    #[cfg(feature = "derivatives")]
+    let [first, by_v, h] = results;
+    #[cfg(feature = "derivatives")]
+    let done = match function {
+        0 => dynamics::inverse_dynamics_derivatives_batch_soa(*states, q, v, x, first, by_v, h),
+        _ => dynamics::forward_dynamics_derivatives_batch_soa(*states, q, v, x, first, by_v, h),
+    };
+    done.expect("the slices hold so many states");
+    first[0] as f64
 }

@@ -48,6 +48,7 @@
 //! | tau of a motion | [`inverse_dynamics`], [`bias_force`], [`gravity_force`], [`velocity_force`] |
 //! | reactions in the joints | [`joint_wrenches`] |
 //! | H(q) | [`mass_matrix`] |
+//! | what a free base makes of gravity and of its own velocity | [`FallingBase`] |
 //! | motion under a tau | [`forward_dynamics_aba`], [`forward_dynamics_ltdl`] |
 //! | q ⊕ v, its inverse and their derivatives | [`integrate`], [`difference`], [`integrate_maps`], [`difference_maps`] |
 //! | energy | [`kinetic_energy`], [`potential_energy`] |
@@ -80,6 +81,7 @@ mod effects;
 mod energy;
 mod environment;
 mod factor;
+mod falling_base;
 mod frame_derivatives;
 mod functional;
 mod impact;
@@ -128,6 +130,7 @@ pub use effects::{passive_force, rotor_inertias};
 pub use energy::{kinetic_energy, potential_energy};
 pub use environment::{Environment, EnvironmentMotion, SpringDamper};
 pub use factor::{forward_dynamics_ltdl, Ltdl};
+pub use falling_base::FallingBase;
 pub use frame_derivatives::{frame_derivatives, FrameDerivativeBlocks};
 pub use functional::{
     constrained_coordinates, functional_coordinates, reduced_relative_motion, relative_motion, FunctionalCoordinates,

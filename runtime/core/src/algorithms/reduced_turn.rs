@@ -17,6 +17,8 @@ use alloc::vec::Vec;
 pub(super) struct Turn<T> {
     /// Sine and cosine of the angle from the base axes to the body's own; none for joints that do not turn so.
     pub angle: Option<(T, T)>,
+    /// How that angle changes, for scalars that ask.
+    turning: Option<T>,
     /// Whether the base axes are those of the parent, which is described in them too.
     pub continues: bool,
     /// The terms of the angle besides constant offsets, and sine and cosine of those, where angles are added.
@@ -53,13 +55,16 @@ impl<T: Real> Turn<T> {
                             None => own,
                         }
                     });
-                    Turn { angle: Some(angle), continues: continued.is_some(), sum, free: None }
+                    let before = continued.and_then(|p| turns[p].turning);
+                    let terms = [Some(q[body.iq]), body.phase].into_iter().flatten().filter_map(T::turning);
+                    let turning = before.into_iter().chain(terms).reduce(|sum, term| sum + term);
+                    Turn { angle: Some(angle), turning, continues: continued.is_some(), sum, free: None }
                 }
-                ReducedJoint::Slide => Turn { angle: None, continues: false, sum: none(), free: None },
+                ReducedJoint::Slide => Turn { angle: None, turning: None, continues: false, sum: none(), free: None },
                 ReducedJoint::Free => {
                     let k = body.iq + 3;
                     let rotation = quaternion_to_rotation([q[k], q[k + 1], q[k + 2], q[k + 3]]);
-                    Turn { angle: None, continues: false, sum: none(), free: Some(rotation) }
+                    Turn { angle: None, turning: None, continues: false, sum: none(), free: Some(rotation) }
                 }
             };
             turns.push(turn);
@@ -87,13 +92,13 @@ impl<T: Real> Turn<T> {
 
     /// From the base axes to the body's own.
     pub fn base_to_own(&self, v: Vec3<T>) -> Vec3<T> {
-        self.angle.map_or(v, |(s, c)| v.turned(-s, c))
+        self.angle.map_or(v, |(s, c)| v.turned_about((-s, c), self.turning.map(|x| -x)))
     }
 
     /// From the axes in which the body is described to the base axes.
     pub fn described_to_base(&self, body: &ReducedBody<T>, v: Vec3<T>) -> Vec3<T> {
         match self.angle {
-            Some((s, c)) if !body.stays => v.turned(s, c),
+            Some(angle) if !body.stays => v.turned_about(angle, self.turning),
             _ => v,
         }
     }
@@ -116,7 +121,7 @@ impl<T: Real> Turn<T> {
     /// A constant vector of the body, in the axes in which it is described.
     pub fn own_to_described(&self, body: &ReducedBody<T>, v: Vec3<T>) -> Vec3<T> {
         match self.angle {
-            Some((s, c)) if body.stays => v.turned(s, c),
+            Some(angle) if body.stays => v.turned_about(angle, self.turning),
             _ => v,
         }
     }

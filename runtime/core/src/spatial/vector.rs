@@ -61,6 +61,13 @@ impl<T: Real> Vec3<T> {
         Vec3::new(self.x * cos - self.y * sin, self.y * cos + self.x * sin, self.z)
     }
 
+    /// The same where the angle is known to [change](Real::turned_about).
+    #[must_use]
+    pub fn turned_about(self, angle: (T, T), turning: Option<T>) -> Self {
+        let [x, y] = T::turned_about([self.x, self.y], angle, turning);
+        Vec3::new(x, y, self.z)
+    }
+
     /// The components as an array.
     pub fn to_array(self) -> [T; 3] {
         [self.x, self.y, self.z]

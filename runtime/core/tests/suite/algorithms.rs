@@ -593,6 +593,48 @@ fn losses(case: &Case) -> Vec<Dd> {
     forces
 }
 
+/// How forces change at these rates of q, q̇ and q̈, exactly.
+fn force_rates(model: &Model<Dd>, motion: [&[Dd]; 3], rates: [&[Dd]; 3]) -> Vec<Dd> {
+    let along =
+        |k: usize| motion[k].iter().zip(rates[k]).map(|(&value, &rate)| Dual { value, rate }).collect::<Vec<Rate>>();
+    inverse_dynamics(&model.cast(), &along(0), &along(1), &along(2)).into_iter().map(|force| force.rate).collect()
+}
+
+#[test]
+fn a_free_base_feels_neither_gravity_nor_its_own_velocity() {
+    let mut free = 0;
+    for case in cases().map(with_effects) {
+        let (m, q, qd, qdd, nv) = (&case.model, &case.q, &case.qd, &case.qdd, case.nv());
+        let Some(base) = FallingBase::of(m, q, qd) else { continue };
+        free += 1;
+        let (weightless, at_rest, falling) = (case.without_gravity(), base.at_rest(qd), base.falling(qdd));
+        case.agree(&inverse_dynamics(&weightless, q, &at_rest, &falling), &case.inverse_dynamics(), DD);
+        case.agree(&base.in_world(&falling), qdd, DD);
+
+        // ∂τ/∂x is −H ∂q̈/∂x, and what is left to be solved for
+        let (mut by_position, mut by_velocity) = (vec![Dd::ZERO; nv * nv], vec![Dd::ZERO; nv * nv]);
+        base.complete(&mut by_position, &mut by_velocity);
+        let h = mass_matrix(m, q);
+        let less = |a: &[Dd], b: &[Dd]| a.iter().zip(b).map(|(a, b)| *a - *b).collect::<Vec<Dd>>();
+        let (still, root) = (vec![Dd::ZERO; nv], m.bodies.iter().find(|body| body.parent.is_none()).unwrap());
+        for k in root.joint.iv..root.joint.iv + 6 {
+            let along = unit(nv, k);
+            let column = |matrix: &[Dd]| (0..nv).map(|i| matrix[i * nv + k]).collect::<Vec<Dd>>();
+            let pose = m.configuration_rate(q, &along);
+            let of_position = force_rates(m, [q, qd, qdd], [&pose, &still, &still]);
+            case.agree(&of_position, &less(&still, &product(&h, &column(&by_position))), DD);
+            let (fixed, motion) = (vec![Dd::ZERO; q.len()], [&q[..], &at_rest, &falling]);
+            let left = match k < root.joint.iv + 3 {
+                true => still.clone(),
+                false => force_rates(&weightless, motion, [&fixed, &along, &still]),
+            };
+            let of_velocity = force_rates(m, [q, qd, qdd], [&fixed, &along, &still]);
+            case.agree(&of_velocity, &less(&left, &product(&h, &column(&by_velocity))), DD);
+        }
+    }
+    assert!(free > 2, "{free} of the robots have one root that floats");
+}
+
 #[test]
 fn forward_dynamics_undoes_inverse_dynamics_with_rotors_friction_and_springs() {
     for case in cases().map(with_effects) {

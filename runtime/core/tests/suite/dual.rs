@@ -1,5 +1,6 @@
 //! Dual numbers against closed forms.
 
+use straightline_core::reverse::{Recorded, Recording};
 use straightline_core::{Dd, Dual, Real};
 
 type D = Dual<f64, 2>;
@@ -54,4 +55,39 @@ fn sums_of_far_angles_keep_value_and_derivatives() {
     assert_eq!((sin, cos), (D { value: s, derivatives: [c, c] }, D { value: c, derivatives: [-s, -s] }));
     let ([sin], [cos]) = D::sin_cos_lanes_of_pairs([D::sum_of_angles(&angles[..1])]);
     assert_eq!((sin, cos), angles[0].sin_cos());
+}
+
+/// By the rate of its angle a turn changes as by the slopes of sine and cosine: forwards, backwards, and once more.
+#[test]
+fn a_turn_changes_by_a_quarter_turn_of_its_result() {
+    /// Both components of a turn by the sum of two angles, one of them the other way.
+    fn turned<T: Real>([x, y, a, b]: [T; 4], knows: bool) -> [T; 2] {
+        let turning =
+            knows.then(|| [a, -b].into_iter().filter_map(T::turning).reduce(|sum, term| sum + term)).flatten();
+        T::turned_about([x, y], Real::sin_cos_of_sum(&[a, -b]), turning)
+    }
+    fn agree(found: &[f64], expected: &[f64]) {
+        assert!(found.iter().zip(expected).all(|(f, e)| close(*f, *e)), "{found:?} is not {expected:?}");
+    }
+    let at = [0.7, -1.9, 0.4, 2.3];
+    let forwards = |knows: bool| {
+        let numbers: [Dual<f64, 4>; 4] = std::array::from_fn(|k| Dual::variable(at[k], k));
+        turned(numbers, knows).map(|x| [&[x.value][..], &x.derivatives].concat()).concat()
+    };
+    agree(&forwards(true), &forwards(false));
+    fn backwards<T: Real>(at: [T; 4], knows: bool) -> [T; 4] {
+        let recording = Recording::new();
+        let numbers: [Recorded<'_, T>; 4] = at.map(|x| recording.variable(x));
+        let [x, y] = turned(numbers, knows);
+        let slopes = recording.gradient(&[(x, T::constant(Dd::from(1.5))), (y, T::constant(Dd::from(-0.25)))]);
+        numbers.map(|x| slopes.by(x))
+    }
+    agree(&backwards(at, true), &backwards(at, false));
+    let second = |knows: bool| {
+        let numbers: [Dual<f64, 4>; 4] = std::array::from_fn(|k| Dual::variable(at[k], k));
+        backwards(numbers, knows).map(|slope| slope.derivatives).concat()
+    };
+    agree(&second(true), &second(false));
+    // one number alone knows nothing
+    assert_eq!(turned(at, true), turned(at, false));
 }

@@ -7,6 +7,7 @@ mod dd;
 mod dual;
 mod integrate;
 mod measure;
+mod reduced_rates;
 mod reference;
 mod short_sines;
 mod support;
