@@ -114,7 +114,7 @@ impl<'a, T: Real> Forms<'a, T> {
         let weightless = |form: &ReducedModel<T>| ReducedModel { gravity: Vec3::zero(), ..form.clone() };
         let reduced = self.reduced.map(|forms| forms.map(weightless));
         let reduced = reduced.as_ref().map(|[torques, composite]| [torques, composite]);
-        run(&Forms { model: &model, reduced, frames: &[], method: self.method, limbs: None })
+        run(&Forms { model: &model, reduced, frames: &[], rows: self.rows, method: self.method, limbs: None })
     }
 
     /// H(q), by rows.
