@@ -13,6 +13,8 @@
 //! `cargo run --release -p straightline-reaching-example` prints how long a sweep takes and draws the motion.
 #![no_std]
 #![forbid(unsafe_code)]
+// indices are those of the equations, several matrices at a time
+#![allow(clippy::needless_range_loop)]
 
 pub mod arm;
 pub mod box_program;

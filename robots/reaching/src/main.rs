@@ -81,7 +81,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let until = EXAMPLE.goals.get(k + 1).map_or(EXAMPLE.duration, |next| next.from);
         let mine = samples.iter().filter(|s| (goal.from..until).contains(&s.time));
         let there = mine.clone().find(|s| way(s) < 0.01).map_or(f64::NAN, |s| s.time - goal.from);
-        let last = mine.last().map_or(f64::NAN, way);
+        let mut mine = mine;
+        let last = mine.next_back().map_or(f64::NAN, way);
         println!("goal {}: within 1 cm after {there:.2} s, {:.2} mm away in the end", k + 1, last * 1e3);
     }
     let clear = samples.iter().map(|s| s.clearance).fold(f64::INFINITY, f64::min);

@@ -7,7 +7,7 @@ use nalgebra::{Complex, DMatrix};
 
 /// A loop: x⁺ = Φ x + Γ u, u = −K x of so many periods before.
 #[derive(Clone, Copy)]
-pub(super) struct Loop<'a> {
+pub(super) struct SampledLoop<'a> {
     pub phi: &'a DMatrix<f64>,
     pub gamma: &'a DMatrix<f64>,
     pub gains: &'a DMatrix<f64>,
@@ -39,7 +39,7 @@ impl Margins {
 /// Frequencies at which a loop is looked at, from a hundred-thousandth of the sampling frequency to half of it.
 const FREQUENCIES: usize = 500;
 
-impl Loop<'_> {
+impl SampledLoop<'_> {
     /// The greatest modulus of the closed loop's eigenvalues, by squaring: below one it is stable.
     pub fn spectral_radius(&self) -> f64 {
         let (nx, nu, d) = (self.phi.nrows(), self.gamma.ncols(), self.delay);
@@ -156,13 +156,13 @@ mod tests {
         let [phi, gamma, gains] = joints();
         let mut falls = 0;
         for delay in [0, 1, 3] {
-            let closed = Loop { phi: &phi, gamma: &gamma, gains: &gains, delay };
+            let closed = SampledLoop { phi: &phi, gamma: &gamma, gains: &gains, delay };
             assert!(closed.spectral_radius() < 1.0, "{delay}: {}", closed.spectral_radius());
             for (j, margins) in closed.margins().into_iter().enumerate() {
                 let radius = |factor: f64| {
                     let mut gains = gains.clone();
                     gains.row_mut(j).iter_mut().for_each(|k| *k *= factor);
-                    Loop { gains: &gains, ..closed }.spectral_radius()
+                    SampledLoop { gains: &gains, ..closed }.spectral_radius()
                 };
                 let (low, high) = margins.gain;
                 assert!(high > 1.05 && high < 1e3, "{delay} {j}: {high}");
@@ -180,7 +180,7 @@ mod tests {
     #[test]
     fn the_spectral_radius_is_the_greatest_modulus_of_the_eigenvalues() {
         let [phi, gamma, gains] = joints();
-        let closed = Loop { phi: &phi, gamma: &gamma, gains: &gains, delay: 0 };
+        let closed = SampledLoop { phi: &phi, gamma: &gamma, gains: &gains, delay: 0 };
         let eigenvalues = (&phi - &gamma * &gains).complex_eigenvalues();
         let greatest = eigenvalues.iter().map(|x| x.norm()).fold(0.0, f64::max);
         let found = closed.spectral_radius();

@@ -21,7 +21,7 @@ use crate::plant::Plant;
 use crate::simulate::{simulate, Settings};
 use crate::table::DataTable;
 use linear::without_dry_friction;
-use margins::Loop;
+use margins::SampledLoop;
 use nalgebra::{DMatrix, DVector};
 use straightline_core::model::Model;
 use straightline_core::spatial::SpatialInertia;
@@ -187,7 +187,7 @@ fn judged(plants: &[(f64, Sampled)], delay: usize, gains: impl Fn(f64) -> DMatri
     let (mut worst, mut margins) = (0.0f64, vec![Some(Margins::INFINITE); joints]);
     for (t, (phi, gamma)) in plants {
         let gains = gains(*t);
-        let closed = Loop { phi, gamma, gains: &gains, delay };
+        let closed = SampledLoop { phi, gamma, gains: &gains, delay };
         let radius = closed.spectral_radius();
         worst = worst.max(radius);
         let found = if radius < 1.0 { closed.margins() } else { Vec::new() };
