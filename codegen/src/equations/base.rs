@@ -20,9 +20,6 @@ use straightline_core::random::Random;
 use straightline_core::spatial::{Transform, Vec3};
 use straightline_core::Dd;
 
-/// A regressor at a state, row by row.
-type RegressorOf = dyn Fn(&Model<Dd>, [&[Dd]; 3]) -> Vec<Dd>;
-
 /// Of the states that energies are sampled at.
 const SEED: u64 = 0xbb67_ae85_84ca_a73b;
 /// So many states: two rows each for at most thirteen columns.

@@ -3,7 +3,7 @@
 use super::driven_physics::{distance, random_drive, source, wide};
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::Function::{DrivenForwardDynamics, DrivenForwardDynamicsDerivatives};
-use straightline_core::{Dd, Real};
+use straightline_core::Dd;
 use straightline_generated_tests::drives::{blocks, Driven};
 use straightline_generated_tests::random::Random;
 

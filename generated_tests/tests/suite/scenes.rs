@@ -2,6 +2,7 @@
 
 use straightline_codegen::equations::Robot as Loaded;
 use straightline_codegen::expr::{evaluate, Grade};
+use straightline_codegen::function::SelectedRows;
 use straightline_codegen::model;
 use straightline_codegen::options::Options;
 use straightline_codegen::program::TracedProgram;
@@ -122,6 +123,7 @@ fn selected_results_are_those_of_the_full_program() {
                     ResultPart::Whole => true,
                     ResultPart::Diagonal => f == MassMatrix,
                     ResultPart::Linear | ResultPart::Angular => f.is_per_frame() || f == JointWrenches,
+                    ResultPart::Rows(_) => matches!(f, Jacobian | FrameVelocity),
                 };
                 Selection {
                     joints: if by_joint { vec![last.clone()] } else { Vec::new() },
@@ -132,7 +134,8 @@ fn selected_results_are_those_of_the_full_program() {
             Scene { outputs: Function::all().map(|f| (f, selection(f))).collect(), ..Scene::default() }
         }
     };
-    for part in [ResultPart::Whole, ResultPart::Linear, ResultPart::Angular, ResultPart::Diagonal] {
+    let rows = ResultPart::Rows(SelectedRows::of([0, 5]));
+    for part in [ResultPart::Whole, ResultPart::Linear, ResultPart::Angular, ResultPart::Diagonal, rows] {
         scene_is_full_program(&format!("selected, {part:?}"), selected(part), |_, _| {});
     }
 }

@@ -66,7 +66,7 @@ fn module(robot: &str, generated: &Generated) -> String {
     for function in FUNCTIONS {
         let name = function.name();
         let list = |of: &dyn Fn(String, &str, bool) -> String| -> String {
-            let ports = [(function.inputs(model), false), (function.outputs(model, 0), true)];
+            let ports = [(function.inputs(model, 0), false), (function.outputs(model, 0), true)];
             let all = ports.iter().flat_map(|(ports, is_output)| ports.iter().map(move |port| (port, *is_output)));
             let one = |(port, is_output): (&straightline_codegen::expr::Port, bool)| {
                 let array = port.shape.iter().rev().fold("f32".to_string(), |inner, n| format!("[{inner}; {n}]"));

@@ -33,7 +33,14 @@ fn robot<T: Real>(joints: usize) -> Model<T> {
         }
     };
     let bodies = (0..=joints).map(body).collect();
-    Model { name: "free".into(), bodies, gravity: Vec3::zero(), frames: vec![], drives: vec![], base_parameters: Default::default() }
+    Model {
+        name: "free".into(),
+        bodies,
+        gravity: Vec3::zero(),
+        frames: vec![],
+        drives: vec![],
+        base_parameters: Default::default(),
+    }
 }
 
 fn tree(joints: usize) -> CentreOfMassTree<Dd> {
