@@ -92,7 +92,7 @@ impl Robots {
 
     /// Any parameters of the links, such as no bodies may have.
     fn parameters(&mut self) -> Vec<Dd> {
-        let n = Quantity::LinkParameters.len(&self.robot.model);
+        let n = Quantity::LinkParameters.len(&self.robot.model, 0);
         // masses are divided by
         (0..n).map(|k| Dd::from(self.random.symmetric(1.0) + if k % 10 == 0 { 2.0 } else { 0.0 })).collect()
     }

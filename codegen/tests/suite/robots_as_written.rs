@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use straightline_codegen::compile::compile;
 use straightline_codegen::emit::Generated;
 use straightline_codegen::expr::{evaluate, Port};
-use straightline_codegen::function::{Family, Quantity, Spec};
+use straightline_codegen::function::{Quantity, Spec};
 use straightline_codegen::options::Options;
 use straightline_codegen::program::program;
 use straightline_codegen::{Function, Robot, Scalar, Source};
