@@ -9,10 +9,10 @@ use std::sync::Mutex;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
-use straightline_codegen::function::Divisor;
 use straightline_codegen::function::Quantity::{
     self, Acceleration, Configuration, Force, SecondConfiguration, TimeStep, Velocity,
 };
+use straightline_codegen::function::{Divisor, Family};
 use straightline_codegen::model::singular::{singular_joints, Inertia};
 use straightline_codegen::model::{self, ModelOptions};
 use straightline_codegen::options::{Optimisations, Options};
@@ -274,7 +274,9 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
     // without a scene no body is an input, and what forces are of the links' parameters is a law, which `regressors::` asks
     let of_bodies = |f: &Function| {
         let of_scene = f.is_of_scene_parameters() || f.spec().inputs.contains(&Quantity::LinkParameters);
-        !f.spec().family.is_of_drives() && !of_scene
+        // nor is anything asked of no frames
+        let of_no_frames = frames.is_empty() && f.spec().family == Family::Tasks;
+        !f.spec().family.is_of_drives() && !of_scene && !of_no_frames
     };
     // that is four times the derivatives of forward dynamics, which are judged, in one program
     let is_repeated = |f: &Function| *f == Function::StepDerivativesRk4;

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use straightline_codegen::compile::compile;
 use straightline_codegen::emit::Generated;
 use straightline_codegen::expr::{evaluate, Port};
-use straightline_codegen::function::{Quantity, Spec};
+use straightline_codegen::function::{Family, Quantity, Spec};
 use straightline_codegen::options::Options;
 use straightline_codegen::program::program;
 use straightline_codegen::{Function, Robot, Scalar, Source};
@@ -94,9 +94,8 @@ fn robots_that_once_lost_digits_keep_them() {
             Outcome::Judged(failures, refused) => {
                 let is_of_motion = |f: &Function| {
                     let Spec { family, solves, .. } = f.spec();
-                    family.is_of_blocks()
+                    *family == Family::Derivatives
                         && *solves
-                        && !family.is_of_drives()
                         && !f.is_of_scene_parameters()
                         && *f != Function::StepDerivativesRk4
                 };
