@@ -103,7 +103,7 @@ impl Case {
         let q = state.get_mut("q").expect("it is there");
         if self.robot.model.floats() {
             let length = q[3..7].iter().fold(Dd::ZERO, |sum, x| sum + *x * *x).sqrt();
-            q[3..7].iter_mut().for_each(|x| *x = *x / length);
+            q[3..7].iter_mut().for_each(|x| *x /= length);
         }
         state
     }
