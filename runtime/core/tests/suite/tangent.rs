@@ -154,8 +154,27 @@ fn pose(random: &mut Random) -> Vec<f64> {
     position.into_iter().chain(quaternion.into_iter().map(|x| x / length)).collect()
 }
 
-const ANGLES: [f64; 19] =
-    [0.0, 1e-160, 1e-30, 1e-12, 1e-8, 1e-4, 1e-2, 0.1, 0.5, 1.0, 1.5, 1.99, 2.0, 2.01, 2.5, 3.0, 3.141, 4.0, 20.0];
+const ANGLES: [f64; 19] = [
+    0.0,
+    1e-160,
+    1e-30,
+    1e-12,
+    1e-8,
+    1e-4,
+    1e-2,
+    0.1,
+    0.5,
+    1.0,
+    1.5,
+    1.99,
+    2.0,
+    2.01,
+    2.5,
+    3.0,
+    std::f64::consts::PI - 1e-3,
+    4.0,
+    20.0,
+];
 
 fn wide(x: &[f64]) -> Vec<Dd> {
     x.iter().map(|x| Dd::from(*x)).collect()
