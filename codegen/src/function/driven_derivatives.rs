@@ -6,6 +6,7 @@
 
 use super::derivatives::{along, with_rates, SQUARE};
 use super::drives::with_links;
+use super::solution::by_rows;
 use super::spec::Extent::{DriveStates, Drives, Velocities};
 use super::spec::{Divisor, Family, Form, Output, RobotFunction, Spec};
 use super::{Extent, Forms, Quantity};
@@ -74,16 +75,11 @@ impl RobotFunction for DrivenForwardDynamicsDerivatives {
                 slopes(at, (0..nv).map(|i| of_links.map_or(T::zero(), |rows| rows[i * n + k])).collect())
             };
             let (of_qdd, of_xd): (Vec<_>, Vec<_>) = (0..n).map(|k| column(k).into()).unzip();
-            [by_rows(nv, &of_qdd), by_rows(motion.xd.len(), &of_xd)]
+            [by_rows(&of_qdd), by_rows(&of_xd)]
         };
         let blocks =
             [block(0, Some(&of_links.dtau_dq)), block(1, Some(&of_links.dtau_dqd)), block(2, None), block(3, None)];
         let of = |k: usize| blocks.iter().flat_map(move |block| block[k].iter().copied());
         [motion.qdd.clone(), motion.xd.clone(), of(0).collect(), of(1).collect()].concat()
     }
-}
-
-/// A matrix of so many rows by rows, from its columns.
-fn by_rows<T: Copy>(rows: usize, columns: &[Vec<T>]) -> Vec<T> {
-    (0..rows).flat_map(|i| columns.iter().map(move |column| column[i])).collect()
 }

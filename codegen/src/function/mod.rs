@@ -33,6 +33,7 @@ pub(crate) use drives::may_be_articulated;
 pub use forms::{Forms, ForwardDynamicsMethod, LimbSums};
 pub use quantity::Quantity;
 pub use rows::SelectedRows;
+pub(crate) use solution::by_rows;
 pub use spec::{Divisor, Extent, Family, Form, InLanes, Judged, Output, Parts, RobotFunction, SlopeOf, Spec};
 
 use straightline_core::model::{Frame, Model};

@@ -54,7 +54,8 @@ pub(super) fn net_force<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec
     inputs[2].iter().zip(bias).map(|(tau, h)| *tau - h).collect()
 }
 
-/// A square matrix by rows, from its columns.
-pub(super) fn by_rows<T: Copy>(columns: &[Vec<T>]) -> Vec<T> {
-    (0..columns.len()).flat_map(|i| columns.iter().map(move |column| column[i])).collect()
+/// A matrix by rows, from its columns.
+pub(crate) fn by_rows<T: Copy>(columns: &[Vec<T>]) -> Vec<T> {
+    let rows = columns.first().map_or(0, Vec::len);
+    (0..rows).flat_map(|i| columns.iter().map(move |column| column[i])).collect()
 }

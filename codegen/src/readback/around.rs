@@ -9,6 +9,7 @@ use crate::emit::Generated;
 use crate::function::{base_parameter_lists, BaseParameterList, Function};
 use crate::identifier::string_literals;
 use crate::options::stable::fnv_1a;
+use crate::report::FunctionReport;
 use rustc_hash::FxHashMap;
 use straightline_core::model::Limits;
 use straightline_graph::expr::Port;
@@ -168,40 +169,44 @@ impl Around<'_, '_, '_> {
             let name = format!("{prefix}_PARAMETERS");
             self.numbers(&name, scalar, &[values.len()], values, &|found, x| found == scalar.rounded(x))?;
         }
-        for (function, figures) in &generated.report.functions {
-            let name = format!("{}_COST", function.to_uppercase());
-            let cost = format!(
-                "pub const {name}: Cost = Cost {{ mul: {}, add: {}, fma: {}, div: {}, sin_cos: {}, max_live: {} }};",
-                figures.mul, figures.add, figures.fma, figures.div, figures.sincos, figures.max_live
+        generated.report.functions.iter().try_for_each(|(function, figures)| self.figures(function, figures))
+    }
+
+    /// What a function takes, where its entries are, and how wrong it may be.
+    fn figures(&mut self, function: &str, figures: &FunctionReport) -> BlockReading<()> {
+        let root = self.root;
+        let name = format!("{}_COST", function.to_uppercase());
+        let cost = format!(
+            "pub const {name}: Cost = Cost {{ mul: {}, add: {}, fma: {}, div: {}, sin_cos: {}, max_live: {} }};",
+            figures.mul, figures.add, figures.fma, figures.div, figures.sincos, figures.max_live
+        );
+        self.is(root, Sort::Constant, &name, &cost)?;
+        if let (Some(machine), true) = (&figures.machine, self.generated.rustc.is_some()) {
+            let name = format!("{}_FIGURES", function.to_uppercase());
+            let known = |figure: Result<u32, &str>| figure.map_or("None".to_string(), |n| format!("Some({n})"));
+            let value = format!(
+                "pub const {name}: Figures = Figures {{ instructions: {}, flash_bytes: {}, shared_flash_bytes: {}, stack_bytes: {}, model_cycles: {} }};",
+                known(machine.instructions), machine.flash_bytes, machine.shared_flash_bytes, known(machine.stack_bytes), known(machine.model_cycles)
             );
-            self.is(root, Sort::Constant, &name, &cost)?;
-            if let (Some(machine), true) = (&figures.machine, generated.rustc.is_some()) {
-                let name = format!("{}_FIGURES", function.to_uppercase());
-                let known = |figure: Result<u32, &str>| figure.map_or("None".to_string(), |n| format!("Some({n})"));
-                let value = format!(
-                    "pub const {name}: Figures = Figures {{ instructions: {}, flash_bytes: {}, shared_flash_bytes: {}, stack_bytes: {}, model_cycles: {} }};",
-                    known(machine.instructions), machine.flash_bytes, machine.shared_flash_bytes, known(machine.stack_bytes), known(machine.model_cycles)
-                );
-                self.is(root, Sort::Constant, &name, &value)?;
+            self.is(root, Sort::Constant, &name, &value)?;
+        }
+        for of in &figures.entries {
+            let name = format!("{}_{}", function.to_uppercase(), of.output.to_uppercase());
+            for (what, numbers) in [("ROW_STARTS", &of.row_starts), ("COLUMNS", &of.columns)] {
+                let name = format!("{name}_{what}");
+                let text = format!("pub const {name}: [usize; {}] = {numbers:?};", numbers.len());
+                self.is(root, Sort::Constant, &name, &text)?;
             }
-            for of in &figures.entries {
-                let name = format!("{}_{}", function.to_uppercase(), of.output.to_uppercase());
-                for (what, numbers) in [("ROW_STARTS", &of.row_starts), ("COLUMNS", &of.columns)] {
-                    let name = format!("{name}_{what}");
-                    let text = format!("pub const {name}: [usize; {}] = {numbers:?};", numbers.len());
-                    self.is(root, Sort::Constant, &name, &text)?;
-                }
-            }
-            if let Some(errors) = &figures.errors {
-                for output in &errors.outputs {
-                    let name = errors.constant_name(function, output);
-                    self.numbers(&name, Scalar::F64, &output.shape, &output.bounds, &is_rounded_up)?;
-                    if let Some(slopes) = output.slopes.as_ref().filter(|slopes| slopes.refused.is_none()) {
-                        let [of_entries, of_norm] = output.lipschitz_names(function);
-                        self.numbers(&of_entries, Scalar::F64, &output.shape, &slopes.entries, &is_rounded_up)?;
-                        if let Some(norm) = slopes.norm {
-                            self.numbers(&of_norm, Scalar::F64, &[], &[norm], &is_rounded_up)?;
-                        }
+        }
+        if let Some(errors) = &figures.errors {
+            for output in &errors.outputs {
+                let name = errors.constant_name(function, output);
+                self.numbers(&name, Scalar::F64, &output.shape, &output.bounds, &is_rounded_up)?;
+                if let Some(slopes) = output.slopes.as_ref().filter(|slopes| slopes.refused.is_none()) {
+                    let [of_entries, of_norm] = output.lipschitz_names(function);
+                    self.numbers(&of_entries, Scalar::F64, &output.shape, &slopes.entries, &is_rounded_up)?;
+                    if let Some(norm) = slopes.norm {
+                        self.numbers(&of_norm, Scalar::F64, &[], &[norm], &is_rounded_up)?;
                     }
                 }
             }

@@ -4,7 +4,7 @@
 //! Nothing is compiled by rustc: programs are run operation by operation in their own arithmetic. More robots, or others:
 //! `ROBOTS=500 SEED=7 STYLES=exported,digits4 cargo test --release -p straightline-codegen --test suite robots_as_written:: -- --ignored --nocapture`
 
-use crate::as_written::{by_steps, in_words, judge, judge_all, survey, Case, File, Outcome, State};
+use crate::as_written::{by_steps, in_words, is_of_part, judge, judge_all, survey, Case, File, Outcome, State};
 use crate::standalone::Folder;
 use crate::written::{Random, Shape, Style};
 use std::collections::BTreeMap;
@@ -71,9 +71,9 @@ fn robots_of_every_style_keep_their_digits() {
     all_keep_their_digits(any_shape(&Style::all(), 84, 3, 3));
 }
 
-/// The files of `tests/files/as_written`, each the least robot that once lost digits, or a whole one that did.
-#[test]
-fn robots_that_once_lost_digits_keep_them() {
+/// Judges the files of `tests/files/as_written`, each the least robot that once lost digits, or a whole one that did: of derivatives those that a
+/// file, by its place, is to be judged by.
+fn files_keep_their_digits(is_due: impl Fn(usize, Function) -> bool) {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/files/as_written");
     let mut files: Vec<PathBuf> =
         std::fs::read_dir(&folder).expect("the folder is there").map(|entry| entry.expect("an entry").path()).collect();
@@ -87,7 +87,7 @@ fn robots_that_once_lost_digits_keep_them() {
         let of_motion = [Scalar::F64, Scalar::F32][k & 1];
         let wanted = |scalar, function: Function| {
             let Spec { family, solves, .. } = function.spec();
-            !family.is_of_blocks() || !solves || scalar == of_motion
+            !family.is_of_blocks() || (is_due(k, function) && (!solves || scalar == of_motion))
         };
         match judge(&file, &wanted) {
             Outcome::Refused(why) => panic!("{name}: {why}"),
@@ -98,6 +98,7 @@ fn robots_that_once_lost_digits_keep_them() {
                         && *solves
                         && !f.is_of_scene_parameters()
                         && *f != Function::StepDerivativesRk4
+                        && is_due(k, *f)
                 };
                 let of_motion = Function::known().filter(is_of_motion).count();
                 // a step may hide what accelerations lose behind velocities that it hardly changes
@@ -114,6 +115,18 @@ fn robots_that_once_lost_digits_keep_them() {
             }
         }
     }
+}
+
+/// By all functions of forces and motions, and an eighth of the derivatives each.
+#[test]
+fn robots_that_once_lost_digits_keep_them() {
+    files_keep_their_digits(|place, function| is_of_part(function, place, 8));
+}
+
+#[test]
+#[ignore = "takes a quarter of an hour: all functions, derivatives too"]
+fn robots_that_once_lost_digits_keep_those_of_every_function() {
+    files_keep_their_digits(|_, _| true);
 }
 
 /// What each optimisation does to the digits of `FILE=…`, a robot file: of all functions, or of `FUNCTION=…`.

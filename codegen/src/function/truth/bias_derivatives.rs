@@ -3,7 +3,8 @@
 use super::super::bias_derivatives::{BiasDerivatives, CoriolisMatrix, CoriolisTransposeForce, GravityDerivative};
 use super::super::dynamics::{BiasForce, GravityForce};
 use super::derivatives::{moving, slopes, unit};
-use super::{by_rows, list, Chapter, Truth};
+use super::{list, Chapter, Truth};
+use crate::function::by_rows;
 use nalgebra::{DMatrix, DVector, Matrix3};
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference::{self, CentreOfMassFrame};

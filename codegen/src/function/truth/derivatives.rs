@@ -5,7 +5,8 @@ use super::super::derivatives::{
 };
 use super::super::dynamics::{InverseDynamics, MassMatrix};
 use super::super::Quantity;
-use super::{by_rows, Chapter, Truth};
+use super::{Chapter, Truth};
+use crate::function::by_rows;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference::{self, CentreOfMassTree, ReferenceJoint, ReferenceReal};
 use straightline_core::{Dd, Dual, Real};

@@ -7,7 +7,8 @@ use super::super::forward_derivatives::{
 };
 use super::super::Quantity;
 use super::derivatives::{moving, slopes, unit, weighed_slopes, Direction};
-use super::{by_rows, solved, Chapter, Truth};
+use super::{solved, Chapter, Truth};
+use crate::function::by_rows;
 use nalgebra::{DMatrix, DVector};
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference;

@@ -278,12 +278,6 @@ fn solved(
     DVector::from_fn(n, |i, _| Magnitude::new(x[i]).of_size(sizes[i]))
 }
 
-/// A matrix by rows, from its columns.
-fn by_rows(columns: &[Vec<Magnitude>]) -> Vec<Magnitude> {
-    let rows = columns.first().map_or(0, Vec::len);
-    (0..rows).flat_map(|i| columns.iter().map(move |column| column[i])).collect()
-}
-
 /// A matrix column by column, or a vector.
 fn list<T: nalgebra::Scalar + Copy, R: nalgebra::Dim, C: nalgebra::Dim, S: nalgebra::RawStorage<T, R, C>>(
     matrix: &nalgebra::Matrix<T, R, C, S>,

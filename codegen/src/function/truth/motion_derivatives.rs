@@ -5,7 +5,8 @@ use super::super::motion_derivatives::{
     SubtreeCentresOfMass,
 };
 use super::derivatives::{moving, unit};
-use super::{by_rows, list, Chapter, Truth};
+use super::{list, Chapter, Truth};
+use crate::function::by_rows;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference::{self, CentreOfMassTree, ReferenceReal};
 use straightline_core::{Dual, Real};

@@ -8,7 +8,8 @@ use super::super::regressors::{
     SupportParameters, TorqueRegressor, TorqueRegressorEntries,
 };
 use super::forward_derivatives::MovingJoints;
-use super::{by_rows, Chapter, Truth};
+use super::{Chapter, Truth};
+use crate::function::by_rows;
 use nalgebra::{DVector, Matrix3, Vector3};
 use std::collections::BTreeMap;
 use straightline_core::base_parameters::{BaseParameter, BaseParameterKind, JointParameter, PER_BODY};

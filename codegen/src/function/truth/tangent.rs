@@ -6,7 +6,8 @@
 use super::super::tangent::{Difference, DifferenceDerivatives, Integrate, IntegrateDerivatives, IntegrateTransport};
 use super::super::Quantity;
 use super::derivatives::configuration_rates;
-use super::{by_rows, Chapter, Truth};
+use super::{Chapter, Truth};
+use crate::function::by_rows;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference::{self, CentreOfMassTree, ReferenceJoint};
 use straightline_core::{Dd, Dual};

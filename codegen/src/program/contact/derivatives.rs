@@ -6,7 +6,7 @@
 
 use super::equations::{contacts, environment, supports, together, Added, CommonEquations, Footing};
 use crate::equations::bind::BoundRobot;
-use crate::function::{along, ForwardDynamicsMethod, Function, SelectedRows};
+use crate::function::{along, by_rows, ForwardDynamicsMethod, Function, SelectedRows};
 use straightline_core::algorithms::{
     ContactFactors, ContactSweep, FunctionalCoordinates, HeldWrenches, MovedContact, Moving, Struck, Support,
 };
@@ -62,12 +62,6 @@ fn fixed<T: Real>(list: &[T]) -> Vec<Dual<T, 1>> {
 
 fn dot<T: Real>(a: &[T], b: &[T]) -> T {
     a.iter().zip(b).fold(T::zero(), |sum, (x, y)| sum + *x * *y)
-}
-
-/// A matrix by rows, from its columns.
-fn by_rows<T: Copy>(columns: &[Vec<T>]) -> Vec<T> {
-    let rows = columns.first().map_or(0, Vec::len);
-    (0..rows).flat_map(|i| columns.iter().map(move |column| column[i])).collect()
 }
 
 impl<T: Real> CommonEquations<'_, T> {
