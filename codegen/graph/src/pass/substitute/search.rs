@@ -13,6 +13,10 @@ use straightline_core::Dd;
 /// together, and the time stays linear. Inputs, constants, sines and cosines are always there.
 pub(super) const WINDOW: usize = 80;
 
+/// Values and pairs that are looked at, per value of the program. A robot's functions take some hundred; where joints share an axis, what should be
+/// zero is noise that anything fits.
+const LOOKED_AT: usize = 2000;
+
 /// How much greater than the terms of what it replaces a term may be.
 const GREATER: f64 = 4.0;
 
@@ -128,7 +132,11 @@ impl<'g> EqualitySearch<'g> {
         let sums: Vec<usize> = self.numbers.iter().copied().filter(|v| self.is_formed(*v)).collect();
         let candidates: Vec<usize> = sums.iter().copied().filter(|v| self.freed(*v, &[]) > 1).collect();
         let pairs = self.pairs(&candidates);
+        let mut looked_at = 0;
         for &v in &sums {
+            if looked_at > LOOKED_AT * self.graph.ops.len() {
+                break;
+            }
             let target = &self.values[v];
             let mut add =
                 |gain: usize, becomes: Becomes| moves.push(GraphChange { gain, pair: None, becomes: vec![becomes] });
@@ -162,6 +170,7 @@ impl<'g> EqualitySearch<'g> {
                     }
                     let rest = self.rest(v, x, way);
                     for y in self.found(rest).filter(|y| self.may_form(*y, v, &later)) {
+                        looked_at += 1;
                         let Some((form, negative)) = self.form(v, way, own, &self.values[y]) else { continue };
                         let gain = self.freed(v, &[x, y]) - 1;
                         if gain > 0 {
@@ -169,6 +178,7 @@ impl<'g> EqualitySearch<'g> {
                         }
                     }
                     for pair @ (y, z, _) in pairs.find(rest) {
+                        looked_at += 1;
                         if !(self.may_form(y, v, &later) && self.may_form(z, v, &later)) {
                             continue;
                         }
