@@ -13,8 +13,8 @@ use straightline_core::Dd;
 /// together, and the time stays linear. Inputs, constants, sines and cosines are always there.
 pub(super) const WINDOW: usize = 80;
 
-/// Values and pairs that are looked at, per value of the program. A robot's functions take some hundred; where joints share an axis, what should be
-/// zero is noise that anything fits.
+/// Values and pairs that are looked at, per value of the program. Most programs take some hundred; where values that should be zero are noise,
+/// anything fits.
 const LOOKED_AT: usize = 2000;
 
 /// How much greater than the terms of what it replaces a term may be.
@@ -127,7 +127,7 @@ impl<'g> EqualitySearch<'g> {
     /// All moves that save an operation, the best first; of those, the first.
     pub(super) fn moves(&self) -> Vec<GraphChange> {
         let mut moves = Vec::new();
-        let mut by_pair: BTreeMap<NewPair, BTreeMap<usize, (usize, Becomes)>> = BTreeMap::new();
+        let mut by_pair: BTreeMap<NewPair, FormedByPair> = BTreeMap::new();
         let mut later = vec![false; self.graph.ops.len()];
         let sums: Vec<usize> = self.numbers.iter().copied().filter(|v| self.is_formed(*v)).collect();
         let candidates: Vec<usize> = sums.iter().copied().filter(|v| self.freed(*v, &[]) > 1).collect();
@@ -196,13 +196,7 @@ impl<'g> EqualitySearch<'g> {
                 }
             }
         }
-        for (pair, of) in by_pair {
-            let gain: usize = of.values().map(|(gain, _)| gain).sum();
-            if gain > 1 {
-                let becomes = of.into_values().map(|(_, becomes)| becomes).collect();
-                moves.push(GraphChange { gain: gain - 1, pair: Some(pair), becomes });
-            }
-        }
+        moves.extend(by_pair.into_iter().filter_map(|(pair, of)| GraphChange::by_pair(pair, of)));
         moves.retain(|m| m.gain > 0);
         // stable: of equal gains the first
         moves.sort_by_key(|m| std::cmp::Reverse(m.gain));
@@ -287,6 +281,18 @@ impl<'g> EqualitySearch<'g> {
             }
         }
         freed
+    }
+}
+
+/// What values become by a pair, and how many operations each of them frees, by value.
+type FormedByPair = BTreeMap<usize, (usize, Becomes)>;
+
+impl GraphChange {
+    /// All that a new pair serves, less the operation that it takes; none if that does not pay.
+    fn by_pair(pair: NewPair, of: FormedByPair) -> Option<GraphChange> {
+        let gain: usize = of.values().map(|(gain, _)| gain).sum();
+        let becomes = of.into_values().map(|(_, becomes)| becomes).collect();
+        (gain > 1).then(|| GraphChange { gain: gain - 1, pair: Some(pair), becomes })
     }
 }
 
