@@ -13,10 +13,6 @@ use straightline_core::Dd;
 /// together, and the time stays linear. Inputs, constants, sines and cosines are always there.
 pub(super) const WINDOW: usize = 80;
 
-/// Values and pairs that are looked at, per value of the program. Most programs take some hundred; where values that should be zero are noise,
-/// anything fits.
-const LOOKED_AT: usize = 2000;
-
 /// How much greater than the terms of what it replaces a term may be.
 const GREATER: f64 = 4.0;
 
@@ -127,16 +123,12 @@ impl<'g> EqualitySearch<'g> {
     /// All moves that save an operation, the best first; of those, the first.
     pub(super) fn moves(&self) -> Vec<GraphChange> {
         let mut moves = Vec::new();
-        let mut by_pair: BTreeMap<NewPair, FormedByPair> = BTreeMap::new();
+        let mut by_pair: BTreeMap<NewPair, BTreeMap<usize, (usize, Becomes)>> = BTreeMap::new();
         let mut later = vec![false; self.graph.ops.len()];
         let sums: Vec<usize> = self.numbers.iter().copied().filter(|v| self.is_formed(*v)).collect();
         let candidates: Vec<usize> = sums.iter().copied().filter(|v| self.freed(*v, &[]) > 1).collect();
         let pairs = self.pairs(&candidates);
-        let mut looked_at = 0;
         for &v in &sums {
-            if looked_at > LOOKED_AT * self.graph.ops.len() {
-                break;
-            }
             let target = &self.values[v];
             let mut add =
                 |gain: usize, becomes: Becomes| moves.push(GraphChange { gain, pair: None, becomes: vec![becomes] });
@@ -170,7 +162,6 @@ impl<'g> EqualitySearch<'g> {
                     }
                     let rest = self.rest(v, x, way);
                     for y in self.found(rest).filter(|y| self.may_form(*y, v, &later)) {
-                        looked_at += 1;
                         let Some((form, negative)) = self.form(v, way, own, &self.values[y]) else { continue };
                         let gain = self.freed(v, &[x, y]) - 1;
                         if gain > 0 {
@@ -178,7 +169,6 @@ impl<'g> EqualitySearch<'g> {
                         }
                     }
                     for pair @ (y, z, _) in pairs.find(rest) {
-                        looked_at += 1;
                         if !(self.may_form(y, v, &later) && self.may_form(z, v, &later)) {
                             continue;
                         }
@@ -196,7 +186,13 @@ impl<'g> EqualitySearch<'g> {
                 }
             }
         }
-        moves.extend(by_pair.into_iter().filter_map(|(pair, of)| GraphChange::by_pair(pair, of)));
+        for (pair, of) in by_pair {
+            let gain: usize = of.values().map(|(gain, _)| gain).sum();
+            if gain > 1 {
+                let becomes = of.into_values().map(|(_, becomes)| becomes).collect();
+                moves.push(GraphChange { gain: gain - 1, pair: Some(pair), becomes });
+            }
+        }
         moves.retain(|m| m.gain > 0);
         // stable: of equal gains the first
         moves.sort_by_key(|m| std::cmp::Reverse(m.gain));
@@ -281,18 +277,6 @@ impl<'g> EqualitySearch<'g> {
             }
         }
         freed
-    }
-}
-
-/// What values become by a pair, and how many operations each of them frees, by value.
-type FormedByPair = BTreeMap<usize, (usize, Becomes)>;
-
-impl GraphChange {
-    /// All that a new pair serves, less the operation that it takes; none if that does not pay.
-    fn by_pair(pair: NewPair, of: FormedByPair) -> Option<GraphChange> {
-        let gain: usize = of.values().map(|(gain, _)| gain).sum();
-        let becomes = of.into_values().map(|(_, becomes)| becomes).collect();
-        (gain > 1).then(|| GraphChange { gain: gain - 1, pair: Some(pair), becomes })
     }
 }
 
