@@ -22,20 +22,26 @@ const FUNCTIONS: [Function; 9] = [
     Function::InverseDynamicsDerivatives,
 ];
 
+/// That compiler, if it has the machine; says so where it has not.
+fn compiler() -> Option<RustCompiler> {
+    let machine = TargetMachine::CORTEX_M4F;
+    let text = "#![no_std]\npub fn nothing() {}\n";
+    let found = RustCompiler::find(None).ok().filter(|rustc| rustc.version.starts_with(COMPILER));
+    let found = found.filter(|rustc| machine_code(rustc, text, machine, Memory::Flash).is_ok());
+    if found.is_none() {
+        eprintln!("skipped: no {COMPILER}with the target {}", machine.row().triple);
+    }
+    found
+}
+
 /// Relative errors of instructions, bytes of flash and cycles of every function \[%\].
 fn errors(name: &str, floats: bool, memory: Memory) -> Option<Vec<[f64; 3]>> {
-    let rustc = RustCompiler::find(None).ok().filter(|rustc| rustc.version.starts_with(COMPILER));
-    let machine = TargetMachine::CORTEX_M4F;
-    let has_target = |rustc| machine_code(rustc, "#![no_std]\npub fn nothing() {}\n", machine, Memory::Flash).is_ok();
-    if !rustc.as_ref().is_some_and(has_target) {
-        eprintln!("skipped: no {COMPILER}with the target {}", machine.row().triple);
-        return None;
-    }
+    compiler()?;
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions").join(name);
     let robot = Source::new(name, std::fs::read_to_string(path).expect("the robot is there"));
     let mut options = Options {
         scalar: Scalar::F32,
-        target: Some(machine),
+        target: Some(TargetMachine::CORTEX_M4F),
         memory,
         figures: true,
         functions: FUNCTIONS.to_vec(),
@@ -97,4 +103,19 @@ fn arms_from_flash_are_estimated_before_rustc() {
 fn slow_proof_other_robots_and_code_without_delay_are_estimated_before_rustc() {
     holds(&OTHERS, Memory::Flash, [[1.5, 3.0], [2.5, 8.0], [1.5, 4.0]]);
     holds(&ARMS, Memory::Tcm, [[1.5, 4.5], [1.5, 4.5], [3.5, 6.0]]);
+}
+
+#[test]
+fn a_pair_of_sine_and_cosine_takes_41_instructions_and_48_in_place_without_multiply_accumulate() {
+    let Some(rustc) = compiler() else { return };
+    let kernel = straightline_core::sources::SHORT_SINES.replace("#[inline]", "#[no_mangle]");
+    let text = format!("#![no_std]\n{}", kernel.replace("//!", "//"));
+    let instructions = |memory: Memory| {
+        let code = machine_code(&rustc, &text, TargetMachine::CORTEX_M4F, memory).unwrap_or_else(|e| panic!("{e}"));
+        let figures = code.figures(&["sin_cos_f32".to_string()], TargetMachine::CORTEX_M4F, memory);
+        figures.expect("it is there")[0].instructions
+    };
+    assert_eq!(instructions(Memory::Flash), Ok(41));
+    // in place it has no frame: push, mov, pop
+    assert_eq!(instructions(Memory::Tcm), Ok(48 + 3));
 }

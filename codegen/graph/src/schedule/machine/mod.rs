@@ -1,7 +1,7 @@
 //! What a program takes on a machine of which LLVM's ways are known, before any compiler is run: instructions, bytes, cycles.
 //!
 //! [`estimate`] makes the instructions of an order ([`lowering`]), gives them registers as LLVM does ([`allocation`]), and counts. Orders are chosen by
-//! it; `codegen/tests/suite/figures.rs` compares it with rustc's objects.
+//! it; `codegen/tests/suite/estimates.rs` compares it with rustc's objects.
 
 mod allocation;
 mod lowering;

@@ -116,6 +116,14 @@ impl LiveRange {
     }
 }
 
+/// A range in a register.
+#[derive(Clone, Copy, Debug)]
+struct HeldRange {
+    start: u32,
+    end: u32,
+    number: usize,
+}
+
 /// A copy between ranges of one value, or one of the program.
 #[derive(Clone, Copy, Debug)]
 struct RegisterCopy {
@@ -151,8 +159,8 @@ pub(super) struct RegisterAllocation {
     /// From the first store to the last load of a value.
     in_memory: BTreeMap<usize, (u32, u32)>,
     broken_hints: Vec<usize>,
-    /// Of every register its ranges by where they start.
-    held: Vec<BTreeMap<u32, usize>>,
+    /// Of every register its ranges, in order.
+    held: Vec<Vec<HeldRange>>,
     /// Of every register where something else is in it, in order: from, to.
     fixed: Vec<Vec<(u32, u32)>>,
     calls: Vec<u32>,
@@ -195,7 +203,7 @@ impl RegisterAllocation {
             is_stored: BTreeSet::new(),
             in_memory: BTreeMap::new(),
             broken_hints: Vec::new(),
-            held: vec![BTreeMap::new(); registers as usize],
+            held: vec![Vec::new(); registers as usize],
             fixed: vec![Vec::new(); registers as usize],
             calls: Vec::new(),
             queue: BinaryHeap::new(),
@@ -352,8 +360,9 @@ impl RegisterAllocation {
     /// The ranges in a register that live while another does.
     fn rivals(&self, register: u8, start: u32, end: u32) -> impl Iterator<Item = usize> + '_ {
         let held = &self.held[register as usize];
-        let before = held.range(..=start).next_back().map(|(_, k)| *k).filter(|k| self.ranges[*k].end > start);
-        before.into_iter().chain(held.range(start + 1..end.max(start + 1)).map(|(_, k)| *k))
+        let behind = held.partition_point(|range| range.start <= start);
+        let first = behind - usize::from(behind > 0 && held[behind - 1].end > start);
+        held[first..].iter().take_while(move |range| range.start < end.max(start + 1)).map(|range| range.number)
     }
 
     fn free(&self, k: usize) -> Option<u8> {
@@ -363,8 +372,10 @@ impl RegisterAllocation {
     }
 
     fn assign(&mut self, k: usize, register: u8) {
-        let start = self.ranges[k].start();
-        self.held[register as usize].insert(start, k);
+        let (start, end) = (self.ranges[k].start(), self.ranges[k].end);
+        let held = &mut self.held[register as usize];
+        let place = held.partition_point(|range| range.start < start);
+        held.insert(place, HeldRange { start, end, number: k });
         self.ranges[k].register = Some(register);
     }
 
@@ -422,8 +433,7 @@ impl RegisterAllocation {
 
     fn free_register(&mut self, k: usize) {
         if let Some(register) = self.ranges[k].register.take() {
-            let start = self.ranges[k].start();
-            self.held[register as usize].remove(&start);
+            self.held[register as usize].retain(|range| range.number != k);
         }
     }
 
