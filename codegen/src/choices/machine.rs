@@ -4,6 +4,7 @@
 //! Bits stay equal on all machines for one set of options.
 
 use super::Choice;
+use straightline_graph::schedule::{CycleModel, ScheduleMachine};
 
 /// What is known of a machine.
 pub struct MachineRow {
@@ -21,6 +22,8 @@ pub struct MachineRow {
     pub for_flash: &'static [&'static str],
     /// How many numbers of single precision its registers hold; none without a floating-point unit.
     pub registers: Option<usize>,
+    /// The memories for which rustc makes one instruction of a product and a sum, which rounds both.
+    pub accumulates: &'static [Memory],
     /// Whether it computes one angle at a time, so that short sines pay.
     pub is_scalar: bool,
     /// How its machine code is read; none: it is not.
@@ -40,25 +43,6 @@ pub enum InstructionSet {
     RiscV,
     /// Arm's of 64-bit processors.
     Arm64,
-}
-
-/// Cycles per instruction. It is a model: instructions wait for nothing but themselves.
-///
-/// Integers take one cycle, a load or store of n words 1 + n.
-#[derive(Clone, Copy, Debug)]
-pub struct CycleModel {
-    /// Of an operation of the floating-point unit.
-    pub float: f64,
-    /// Of a multiply-accumulate.
-    pub multiply_accumulate: f64,
-    /// Of a division.
-    pub division: f64,
-    /// Of a square root.
-    pub square_root: f64,
-    /// More of a jump that is taken, a call, a return.
-    pub taken: f64,
-    /// Bytes that flash gives in a cycle, to code that is not in its cache.
-    pub flash_bytes_per_cycle: f64,
 }
 
 /// Cortex-M4 Technical Reference Manual (Arm 100166), tables 3-1 and 7-1; of the 1 to 3 cycles that filling the pipeline takes, 2. Flash as in an
@@ -121,6 +105,7 @@ machines! {
         for_order: &[],
         for_flash: &[],
         registers: None,
+        accumulates: &[],
         is_scalar: true,
         code: Some(InstructionSet::Thumb),
         library: OF_CORTEX_M0PLUS,
@@ -135,6 +120,7 @@ machines! {
         for_order: &[],
         for_flash: &[],
         registers: None,
+        accumulates: &[],
         is_scalar: true,
         code: Some(InstructionSet::Thumb),
         library: NOT_MEASURED,
@@ -149,6 +135,7 @@ machines! {
         for_order: KEPT_ORDER,
         for_flash: MULTIPLY_ACCUMULATE,
         registers: Some(32),
+        accumulates: &[Memory::Flash],
         is_scalar: true,
         code: Some(InstructionSet::Thumb),
         library: OF_CORTEX_M4F,
@@ -163,6 +150,7 @@ machines! {
         for_order: &[],
         for_flash: &[],
         registers: Some(32),
+        accumulates: &[Memory::Flash, Memory::Tcm],
         is_scalar: true,
         code: Some(InstructionSet::Thumb),
         library: NOT_MEASURED,
@@ -177,6 +165,7 @@ machines! {
         for_order: &[],
         for_flash: MULTIPLY_ACCUMULATE,
         registers: Some(32),
+        accumulates: &[Memory::Flash],
         is_scalar: true,
         code: Some(InstructionSet::Thumb),
         library: NOT_MEASURED,
@@ -191,6 +180,7 @@ machines! {
         for_order: &[],
         for_flash: &[],
         registers: None,
+        accumulates: &[],
         is_scalar: true,
         code: Some(InstructionSet::RiscV),
         library: OF_RV32IMAC,
@@ -205,6 +195,7 @@ machines! {
         for_order: &[],
         for_flash: &[],
         registers: Some(32),
+        accumulates: &[],
         is_scalar: true,
         code: Some(InstructionSet::RiscV),
         library: OF_RV32IMAFC,
@@ -219,6 +210,7 @@ machines! {
         for_order: &[],
         for_flash: &[],
         registers: Some(32),
+        accumulates: &[],
         is_scalar: false,
         code: Some(InstructionSet::Arm64),
         library: NOT_MEASURED,
@@ -233,6 +225,7 @@ machines! {
         for_order: &[],
         for_flash: &[],
         registers: Some(16),
+        accumulates: &[],
         is_scalar: false,
         code: None,
         library: NOT_MEASURED,
@@ -248,6 +241,16 @@ impl TargetMachine {
     /// What is known of it.
     pub fn row(self) -> &'static MachineRow {
         self.0
+    }
+
+    /// What an order of operations is chosen for, where its registers hold numbers.
+    pub fn for_schedules(self, memory: Memory) -> Option<ScheduleMachine> {
+        self.0.registers.map(|registers| ScheduleMachine {
+            registers,
+            accumulates: self.0.accumulates.contains(&memory),
+            is_in_flash: memory == Memory::Flash,
+            cycles: self.0.cycles,
+        })
     }
 
     /// What rustc is told beside `--target`.

@@ -227,7 +227,9 @@ pub(crate) fn generate(
     for (program, waterfall, errors) in programs {
         let item = item(&robot, &program, (options, lowering), &mut warnings, &mut written.functions)?;
         let figures = FunctionReport::new(&program, options.scalar, item.text.lines().count());
-        functions.insert(program.function.name(), FunctionReport { waterfall, errors, ..figures });
+        let is_compared = options.target.is_some_and(|machine| machine.row().cycles.is_some());
+        let estimate = figures.estimate.filter(|_| is_compared);
+        functions.insert(program.function.name(), FunctionReport { waterfall, errors, estimate, ..figures });
         items.push(item);
         written.functions.push(WrittenFunction::asked_for(program.function.name(), program.graph, options));
     }

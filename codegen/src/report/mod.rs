@@ -15,6 +15,7 @@ use budget::Measures;
 use errors::ErrorReport;
 use std::collections::BTreeMap;
 use straightline_graph::expr::Counts;
+use straightline_graph::schedule::ProgramEstimate;
 use straightline_graph::Scalar;
 use waterfall::Waterfall;
 
@@ -48,6 +49,9 @@ pub struct FunctionReport {
     pub stack_bytes: usize,
     /// Bytes of machine code, estimated for x86-64.
     pub code_bytes: usize,
+    /// What it takes on its machine by a model, before rustc: where sines are short ones, and the model was compared with that machine's code.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub estimate: Option<ProgramEstimate>,
     /// What it takes on its machine, where that is asked for.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub machine: Option<MachineFigures>,
@@ -104,6 +108,7 @@ impl FunctionReport {
             lines,
             stack_bytes,
             code_bytes,
+            estimate: program.schedule.estimate,
             machine: None,
             method: program.method,
             errors: None,
