@@ -4,6 +4,7 @@
 //! Bits stay equal on all machines for one set of options.
 
 use super::Choice;
+use straightline_graph::schedule::{CycleModel, ScheduleMachine};
 
 /// What is known of a machine.
 pub struct MachineRow {
@@ -19,8 +20,12 @@ pub struct MachineRow {
     pub for_order: &'static [&'static str],
     /// What rustc is told besides where code runs from flash: fewer instructions, of which each takes longer.
     pub for_flash: &'static [&'static str],
+    /// What GCC is told in the text, so that it keeps the order.
+    pub for_order_in_c: &'static [&'static str],
     /// How many numbers of single precision its registers hold; none without a floating-point unit.
     pub registers: Option<usize>,
+    /// The memories for which rustc makes one instruction of a product and a sum, which rounds both.
+    pub accumulates: &'static [Memory],
     /// Whether it computes one angle at a time, so that short sines pay.
     pub is_scalar: bool,
     /// How its machine code is read; none: it is not.
@@ -40,25 +45,6 @@ pub enum InstructionSet {
     RiscV,
     /// Arm's of 64-bit processors.
     Arm64,
-}
-
-/// Cycles per instruction. It is a model: instructions wait for nothing but themselves.
-///
-/// Integers take one cycle, a load or store of n words 1 + n.
-#[derive(Clone, Copy, Debug)]
-pub struct CycleModel {
-    /// Of an operation of the floating-point unit.
-    pub float: f64,
-    /// Of a multiply-accumulate.
-    pub multiply_accumulate: f64,
-    /// Of a division.
-    pub division: f64,
-    /// Of a square root.
-    pub square_root: f64,
-    /// More of a jump that is taken, a call, a return.
-    pub taken: f64,
-    /// Bytes that flash gives in a cycle, to code that is not in its cache.
-    pub flash_bytes_per_cycle: f64,
 }
 
 /// Cortex-M4 Technical Reference Manual (Arm 100166), tables 3-1 and 7-1; of the 1 to 3 cycles that filling the pipeline takes, 2. Flash as in an
@@ -98,6 +84,9 @@ const MULTIPLY_ACCUMULATE: &[&str] = &["-C target-feature=-slowfpvmlx"];
 /// The scheduler of LLVM moves operations for their latencies, and values into memory; the order of the text is made for the registers.
 const KEPT_ORDER: &[&str] = &["-C llvm-args=-enable-misched=false"];
 
+/// The same of GCC, which has a scheduler before its registers on Arm.
+const KEPT_ORDER_IN_C: &[&str] = &["no-schedule-insns"];
+
 /// Machines, with the constants that stand for them.
 macro_rules! machines {
     ($($(#[$about:meta])* $NAME:ident { $($row:tt)* })+) => {
@@ -119,8 +108,10 @@ machines! {
         triple: "thumbv6m-none-eabi",
         cpu: "cortex-m0plus",
         for_order: &[],
+        for_order_in_c: &[],
         for_flash: &[],
         registers: None,
+        accumulates: &[],
         is_scalar: true,
         code: Some(InstructionSet::Thumb),
         library: OF_CORTEX_M0PLUS,
@@ -133,8 +124,10 @@ machines! {
         triple: "thumbv7m-none-eabi",
         cpu: "cortex-m3",
         for_order: &[],
+        for_order_in_c: &[],
         for_flash: &[],
         registers: None,
+        accumulates: &[],
         is_scalar: true,
         code: Some(InstructionSet::Thumb),
         library: NOT_MEASURED,
@@ -147,8 +140,10 @@ machines! {
         triple: "thumbv7em-none-eabihf",
         cpu: "cortex-m4",
         for_order: KEPT_ORDER,
+        for_order_in_c: KEPT_ORDER_IN_C,
         for_flash: MULTIPLY_ACCUMULATE,
         registers: Some(32),
+        accumulates: &[Memory::Flash],
         is_scalar: true,
         code: Some(InstructionSet::Thumb),
         library: OF_CORTEX_M4F,
@@ -161,8 +156,10 @@ machines! {
         triple: "thumbv7em-none-eabihf",
         cpu: "cortex-m7",
         for_order: &[],
+        for_order_in_c: &[],
         for_flash: &[],
         registers: Some(32),
+        accumulates: &[Memory::Flash, Memory::Tcm],
         is_scalar: true,
         code: Some(InstructionSet::Thumb),
         library: NOT_MEASURED,
@@ -175,8 +172,10 @@ machines! {
         triple: "thumbv8m.main-none-eabihf",
         cpu: "cortex-m33",
         for_order: &[],
+        for_order_in_c: &[],
         for_flash: MULTIPLY_ACCUMULATE,
         registers: Some(32),
+        accumulates: &[Memory::Flash],
         is_scalar: true,
         code: Some(InstructionSet::Thumb),
         library: NOT_MEASURED,
@@ -189,8 +188,10 @@ machines! {
         triple: "riscv32imac-unknown-none-elf",
         cpu: "generic-rv32",
         for_order: &[],
+        for_order_in_c: &[],
         for_flash: &[],
         registers: None,
+        accumulates: &[],
         is_scalar: true,
         code: Some(InstructionSet::RiscV),
         library: OF_RV32IMAC,
@@ -202,9 +203,11 @@ machines! {
         doc: "RISC-V of 32 bits with a floating-point unit of single precision",
         triple: "riscv32imafc-unknown-none-elf",
         cpu: "generic-rv32",
-        for_order: &[],
+        for_order: KEPT_ORDER,
+        for_order_in_c: &[],
         for_flash: &[],
         registers: Some(32),
+        accumulates: &[],
         is_scalar: true,
         code: Some(InstructionSet::RiscV),
         library: OF_RV32IMAFC,
@@ -217,8 +220,10 @@ machines! {
         triple: "aarch64-unknown-none",
         cpu: "generic",
         for_order: &[],
+        for_order_in_c: &[],
         for_flash: &[],
         registers: Some(32),
+        accumulates: &[],
         is_scalar: false,
         code: Some(InstructionSet::Arm64),
         library: NOT_MEASURED,
@@ -231,8 +236,10 @@ machines! {
         triple: "x86_64-unknown-linux-gnu",
         cpu: "x86-64-v3",
         for_order: &[],
+        for_order_in_c: &[],
         for_flash: &[],
         registers: Some(16),
+        accumulates: &[],
         is_scalar: false,
         code: None,
         library: NOT_MEASURED,
@@ -248,6 +255,16 @@ impl TargetMachine {
     /// What is known of it.
     pub fn row(self) -> &'static MachineRow {
         self.0
+    }
+
+    /// What an order of operations is chosen for, where its registers hold numbers.
+    pub fn for_schedules(self, memory: Memory) -> Option<ScheduleMachine> {
+        self.0.registers.map(|registers| ScheduleMachine {
+            registers,
+            accumulates: self.0.accumulates.contains(&memory),
+            is_in_flash: memory == Memory::Flash,
+            cycles: self.0.cycles,
+        })
     }
 
     /// What rustc is told beside `--target`.

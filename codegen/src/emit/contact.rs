@@ -47,7 +47,8 @@ pub(super) fn contact(robot: &Robot, options: &Options, lowering: Lowering<'_>) 
                 counts.sqrt,
                 counts.sin_cos
             );
-            let (name, schedule) = (function.name(), schedule(&graph, options.limits, options.registers()));
+            let (name, schedule) =
+                (function.name(), schedule(&graph, options.limits, options.schedule_machine().as_ref()));
             let mut of_state = None;
             if wants_companions(options) {
                 let by_residual = function.spec().judged == Judged::ByResidual;

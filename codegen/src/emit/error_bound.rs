@@ -51,7 +51,8 @@ pub(super) fn error_bound(
     }
     let lowering = Lowering { style: Style::plain(scalar), target, title: &|_| String::new() };
     let name = format!("{name}_error_bound");
-    let routine = lowering.routine(&bound, &schedule(&bound, options.limits, options.registers()), &name, &doc);
+    let routine =
+        lowering.routine(&bound, &schedule(&bound, options.limits, options.schedule_machine().as_ref()), &name, &doc);
     written.push(WrittenFunction::plain(&name, bound, scalar));
     Ok(routine)
 }

@@ -226,7 +226,7 @@ pub(crate) fn generate(
     let entries = packed_entries(&programs, options);
     for (program, waterfall, errors) in programs {
         let item = item(&robot, &program, (options, lowering), &mut warnings, &mut written.functions)?;
-        let figures = FunctionReport::new(&program, options.scalar, item.text.lines().count());
+        let figures = FunctionReport::new(&program, options, item.text.lines().count());
         functions.insert(program.function.name(), FunctionReport { waterfall, errors, ..figures });
         items.push(item);
         written.functions.push(WrittenFunction::asked_for(program.function.name(), program.graph, options));

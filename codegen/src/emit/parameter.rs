@@ -33,8 +33,9 @@ pub(super) fn parameter_types(
             Some(_) => "The numbers of the drive that the equations use.",
         };
         let private = format!("{input}_parameters");
-        let constructor =
-            lowering.routine(&graph, &schedule(&graph, options.limits, options.registers()), &private, doc).private();
+        let constructor = lowering
+            .routine(&graph, &schedule(&graph, options.limits, options.schedule_machine().as_ref()), &private, doc)
+            .private();
         let program = WrittenFunction::plain(&private, graph, options.scalar);
         let of = match drive {
             None => ParameterOf::Body(p.frame().unwrap_or_default().to_string()),

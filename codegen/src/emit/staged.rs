@@ -30,7 +30,9 @@ pub(super) fn staged(
         }
     }
     let private = |graph: &Graph, name: &str, doc: &str| {
-        lowering.routine(graph, &schedule(graph, options.limits, options.registers()), name, doc).private()
+        lowering
+            .routine(graph, &schedule(graph, options.limits, options.schedule_machine().as_ref()), name, doc)
+            .private()
     };
     let storing = programs.stages.iter().take(programs.stages.len() - 1).zip(&programs.staged.stages);
     let values = storing.map(|(stage, graph)| {

@@ -21,7 +21,7 @@ use crate::scene::{Budget, Scene};
 use std::ffi::OsString;
 use straightline_graph::certify::Effort;
 use straightline_graph::expr::{Grade, RuleSet};
-use straightline_graph::schedule::ScheduleLimits;
+use straightline_graph::schedule::{ScheduleLimits, ScheduleMachine};
 use straightline_graph::Scalar;
 
 /// Fields with the names that they have in the text that hashes are made of, and their defaults; behind `..` what is not of the output.
@@ -142,9 +142,9 @@ impl Options {
         self.target.is_some_and(|machine| machine.row().code.is_some())
     }
 
-    /// How many numbers the registers of the machine hold, if it is known.
-    pub fn registers(&self) -> Option<usize> {
-        self.target.and_then(|machine| machine.row().registers)
+    /// What orders of operations are chosen for, if the machine is known and has registers for numbers.
+    pub fn schedule_machine(&self) -> Option<ScheduleMachine> {
+        self.target.and_then(|machine| machine.for_schedules(self.memory))
     }
 
     /// The optimisations that these options allow.

@@ -83,7 +83,7 @@ pub fn checked(
         let made = (sines::with_sines(graph, function, &robot.model, options), method);
         equivalence::of_function(robot, frames, function, options, optimisations, &made.0).map(|()| made)
     })?;
-    let schedule = schedule(&graph, options.limits, options.registers());
+    let schedule = schedule(&graph, options.limits, options.schedule_machine().as_ref());
     Ok(TracedProgram { function, graph, schedule, method, plainer, entries: Vec::new() })
 }
 

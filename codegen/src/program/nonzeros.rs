@@ -121,7 +121,7 @@ impl TracedProgram {
                     return;
                 }
                 self.graph = super::passed("nonzeros", self.function.name(), packed(&self.graph, &self.entries));
-                self.schedule = schedule(&self.graph, options.limits, options.registers());
+                self.schedule = schedule(&self.graph, options.limits, options.schedule_machine().as_ref());
             }
         }
     }

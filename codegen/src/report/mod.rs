@@ -8,6 +8,7 @@ pub mod waterfall;
 use crate::equations::forward_method::MethodChoice;
 use crate::function::Function;
 use crate::machine_code::MachineFigures;
+use crate::options::Options;
 use crate::program::nonzeros::NonzeroEntries;
 use crate::program::staged::StagedReport;
 use crate::program::TracedProgram;
@@ -15,7 +16,7 @@ use budget::Measures;
 use errors::ErrorReport;
 use std::collections::BTreeMap;
 use straightline_graph::expr::Counts;
-use straightline_graph::Scalar;
+use straightline_graph::schedule::ProgramEstimate;
 use waterfall::Waterfall;
 
 /// Figures of one generated function.
@@ -48,6 +49,9 @@ pub struct FunctionReport {
     pub stack_bytes: usize,
     /// Bytes of machine code, estimated for x86-64.
     pub code_bytes: usize,
+    /// What it takes on its machine by a model, before rustc: where sines are short ones, and the model was compared with that machine's code.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub estimate: Option<ProgramEstimate>,
     /// What it takes on its machine, where that is asked for.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub machine: Option<MachineFigures>,
@@ -87,7 +91,9 @@ impl ContactReport {
 
 impl FunctionReport {
     /// From a program and its number of lines.
-    pub fn new(program: &TracedProgram, scalar: Scalar, lines: usize) -> Self {
+    pub fn new(program: &TracedProgram, options: &Options, lines: usize) -> Self {
+        let scalar = options.scalar;
+        let is_compared = options.target.is_some_and(|machine| machine.row().cycles.is_some());
         let Counts { mul, add, fma, div, sqrt, tail, sin_cos } = program.graph.counts();
         let Measures { stack_bytes, code_bytes, live, .. } = Measures::of(program, scalar);
         FunctionReport {
@@ -104,6 +110,7 @@ impl FunctionReport {
             lines,
             stack_bytes,
             code_bytes,
+            estimate: program.schedule.estimate.filter(|_| is_compared),
             machine: None,
             method: program.method,
             errors: None,

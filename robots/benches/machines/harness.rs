@@ -70,6 +70,30 @@ mod harness {
         };
     }
 
+    macro_rules! run_derivatives {
+        ($robot:ident) => {
+            #[inline(never)]
+            pub fn $robot() {
+                use super::$robot as robot;
+                let (mut numbers, mut hash) = (Numbers(7), [0x811c_9dc5u32; 4]);
+                for state in 0..STATES {
+                    let (mut q, mut qd, mut qdd) = ([0.0; robot::NQ], [0.0; robot::NV], [0.0; robot::NV]);
+                    next_state(&mut numbers, state, [&mut q, &mut qd, &mut qdd]);
+                    let (mut tau, mut blocks) = ([0.5; robot::NV], [[[0.5; robot::NV]; robot::NV]; 3]);
+                    let [k, d, h] = &mut blocks;
+                    black_box::<fn(&_, &_, &_, &mut _, &mut _, &mut _, &mut _)>(robot::inverse_dynamics_derivatives)(
+                        &q, &qd, &qdd, k, d, h, &mut tau,
+                    );
+                    for (hash, block) in hash.iter_mut().zip(&blocks) {
+                        *hash = block.iter().fold(*hash, |hash, row| hashed(hash, row));
+                    }
+                    hash[3] = hashed(hash[3], &tau);
+                }
+                hash.iter().for_each(|hash| super::startup::say(stringify!($robot), *hash));
+            }
+        };
+    }
+
     /// Inverse dynamics beside a function in C of the same inputs and results: how far they are apart, in parts of the greatest torque.
     macro_rules! compare {
         ($robot:ident, $other:ident) => {

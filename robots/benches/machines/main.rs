@@ -8,6 +8,7 @@
 //! `robots/firmware/toolchain`; without it the bench says so and succeeds.
 
 mod c99;
+mod derivatives;
 mod fixed;
 mod looped;
 mod rolled;
@@ -124,6 +125,9 @@ fn measured(bench: &Bench) -> ExitCode {
         differ = true;
     }
     found.extend(of_c99.into_iter().map(|(name, figures)| (format!("cortex-m4f\tflash\t{name}"), figures)));
+    let (agree, of_derivatives) = bench.derivatives(CORTEX_M4F_BOARD, &plugin);
+    differ |= !agree;
+    found.extend(of_derivatives);
     let (of_fixed, agree) = bench.fixed(&plugin);
     differ |= !agree;
     found.extend(of_fixed);

@@ -41,17 +41,32 @@ pub fn sin_cos_of_sum_f32([x, tail]: [f32; 2]) -> (f32, f32) {
 }
 
 /// The sum of some angles, rounded, and what the rounding lost: TwoSum (Knuth 1969) one after the other.
+///
+/// Three are written out: beside a loop, even one of which nothing is left, a compiler puts calls into another order.
 #[inline(always)]
 #[must_use]
 pub fn sum_of_angles_f32<const N: usize>(angles: [f32; N]) -> [f32; 2] {
-    let (mut sum, mut tail) = (angles[0], 0.0);
-    for angle in &angles[1..] {
-        let next = sum + angle;
-        let added = next - sum;
-        tail += (sum - (next - added)) + (angle - added);
-        sum = next;
+    let [Some(first), Some(second)] = [angles.first(), angles.get(1)] else {
+        return [angles.first().map_or(0.0, |angle| *angle), 0.0];
+    };
+    // what is lost is never −0, so that the sum of it and +0 would have the same bits
+    let [sum, tail] = two_sum(*first, *second);
+    let Some(third) = angles.get(2) else { return [sum, tail] };
+    let [mut sum, lost] = two_sum(sum, *third);
+    let mut tail = tail + lost;
+    for angle in angles.iter().skip(3) {
+        let [next, lost] = two_sum(sum, *angle);
+        (sum, tail) = (next, tail + lost);
     }
     [sum, tail]
+}
+
+/// The rounded sum, and what the rounding lost.
+#[inline(always)]
+fn two_sum(sum: f32, angle: f32) -> [f32; 2] {
+    let next = sum + angle;
+    let added = next - sum;
+    [next, (sum - (next - added)) + (angle - added)]
 }
 
 /// 16 bits of π/2.

@@ -7,7 +7,10 @@
 
 mod annealing;
 mod few_alive;
-mod spills;
+mod machine;
+mod steps;
+
+pub use machine::{estimate, CycleModel, ProgramEstimate, ScheduleMachine};
 
 use crate::expr::{Graph, NodeId, Op, Sines};
 
@@ -51,6 +54,8 @@ pub struct Schedule {
     pub slots: usize,
     /// Most values alive at once, inputs and constants not counted.
     pub max_live: usize,
+    /// What it takes on the machine that the order is for, by the model that chose the order, where one did.
+    pub estimate: Option<ProgramEstimate>,
 }
 
 fn is_value(op: Op) -> bool {
@@ -65,19 +70,19 @@ fn weight(op: Op) -> usize {
 }
 
 /// Orders and cuts a graph. Operations keep the order in which the algorithm wrote them, unless many values would go through
-/// memory; so do programs that are cut. How many numbers the registers hold is told where the machine is known; the order is then
-/// searched for them, where angles are computed one at a time.
-pub fn schedule(graph: &Graph, limits: ScheduleLimits, registers: Option<usize>) -> Schedule {
+/// memory; so do programs that are cut. Where the machine is known, the order is searched for its registers, if angles are computed one at a time.
+pub fn schedule(graph: &Graph, limits: ScheduleLimits, machine: Option<&ScheduleMachine>) -> Schedule {
     let mut order: Vec<NodeId> = graph.ids().filter(|id| is_value(graph.op(*id))).collect();
-    let mut keeps_order = false;
+    let (mut keeps_order, mut made_for) = (false, None);
     let limits = if graph.alike.is_empty() { limits } else { ScheduleLimits { operations: usize::MAX } };
     if graph.alike.is_empty() && order.iter().map(|id| weight(graph.op(*id))).sum::<usize>() <= limits.operations {
-        order = few_alive::improved(graph, order, registers);
+        order = few_alive::improved(graph, order, machine.map(|machine| machine.registers));
         // calls of several angles stay together
-        let registers = registers.filter(|_| graph.sines == Sines::Short);
-        if let Some(better) = registers.and_then(|registers| annealing::annealed(graph, &order, registers)) {
+        let machine = machine.filter(|_| graph.sines == Sines::Short);
+        if let Some(better) = machine.and_then(|machine| annealing::annealed(graph, &order, machine)) {
             (order, keeps_order) = (better, true);
         }
+        made_for = machine.map(|machine| estimate(graph, &order, machine));
     }
     let position = {
         let mut position = vec![usize::MAX; graph.ops.len()];
@@ -122,7 +127,7 @@ pub fn schedule(graph: &Graph, limits: ScheduleLimits, registers: Option<usize>)
         parts[part].results.push(k);
     }
     let slots = assign_slots(graph, &order, &position, &last_use, &part_of, &mut parts);
-    Schedule { parts, slots, max_live }
+    Schedule { parts, slots, max_live, estimate: made_for }
 }
 
 /// Positions before which a new part begins.

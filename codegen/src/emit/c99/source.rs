@@ -82,6 +82,16 @@ impl Interface<'_> {
         )
     }
 
+    /// What tells GCC to leave operations in an order that is made for the registers of a machine.
+    fn kept_order(&self) -> String {
+        let told = self.generated.target.map_or(&[][..], |machine| machine.row().for_order_in_c);
+        if told.is_empty() {
+            return String::new();
+        }
+        let told: Vec<String> = told.iter().map(|option| c_string(option)).collect();
+        format!("\n#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC optimize({})\n#endif\n", told.join(", "))
+    }
+
     /// The source.
     pub(super) fn source(&self) -> String {
         let prefix = self.prefix;
@@ -97,6 +107,7 @@ impl Interface<'_> {
         if functions.contains("double") {
             out.push_str(GUARD_OF_DOUBLE);
         }
+        out.push_str(&self.kept_order());
         let part = part_storage(prefix);
         if functions.contains(&part) {
             let _ = write!(

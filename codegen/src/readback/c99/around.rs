@@ -108,6 +108,12 @@ impl<'g> CAround<'g> {
         if source[end..].contains("double") {
             these(&mut at, &OF_DOUBLE)?;
         }
+        // GCC may be told to leave operations where they stand, which changes none
+        const KEPT_ORDER: [&str; 3] =
+            ["#if defined(__GNUC__) && !defined(__clang__)", "#pragma GCC optimize(\"no-schedule-insns\")", "#endif"];
+        if lines.get(at).is_some_and(|(_, line)| *line == KEPT_ORDER[0]) {
+            these(&mut at, &KEPT_ORDER)?;
+        }
         let part = format!("{}_PART", self.upper);
         if source[end..].contains(&part) {
             let attribute = format!("#define {part} static __attribute__((noinline))");

@@ -90,3 +90,39 @@ fn special_angles_and_what_is_no_angle() {
         assert!(sin_cos_f32(x).0.is_nan() && sin_cos_f32(x).1.is_nan(), "{x}");
     }
 }
+
+#[test]
+fn sums_of_angles_have_the_bits_of_a_loop_that_begins_with_nothing_lost() {
+    fn of_loop<const N: usize>(angles: [f32; N]) -> [f32; 2] {
+        let (mut sum, mut tail) = (angles[0], 0.0);
+        for angle in &angles[1..] {
+            let next = sum + angle;
+            let added = next - sum;
+            tail += (sum - (next - added)) + (angle - added);
+            sum = next;
+        }
+        [sum, tail]
+    }
+    fn agree<const N: usize>(angles: [f32; N]) {
+        let [own, other] = [sum_of_angles_f32(angles), of_loop(angles)].map(|sum| sum.map(f32::to_bits));
+        assert_eq!(own, other, "{angles:?}");
+    }
+    let mut random = Random(9);
+    for _ in 0..20_000 {
+        // zeros of both signs among them, and what cancels
+        let mut angle = || match random.uniform(0.0, 6.0) as u32 {
+            0 => 0.0f32,
+            1 => -0.0,
+            2 => 1.5,
+            3 => -1.5,
+            _ => random.uniform(-9.0, 9.0) as f32,
+        };
+        let angles: [f32; 5] = std::array::from_fn(|_| angle());
+        let [a, b, c, d, _] = angles;
+        agree([a]);
+        agree([a, b]);
+        agree([a, b, c]);
+        agree([a, b, c, d]);
+        agree(angles);
+    }
+}

@@ -1,16 +1,13 @@
-//! What a program takes on a machine of few registers beside its operations: loads, stores and copies of an order.
+//! A program as steps that may change places: what is computed or loaded in one go.
 //!
-//! The model is what LLVM makes of straight-line text whose order it keeps:
-//!
-//! * a product of single use is computed with the sum that takes it, in the register of the other term, which is copied before if it is
-//!   needed again;
-//! * a constant is loaded where it is needed, and again if its register was taken;
-//! * an input is loaded once, where it is first needed; of an array the first four that are needed are loaded together. From then on it is
-//!   a value like any other;
-//! * a value that leaves the registers is stored once and loaded again where it is needed (which ones leave: Belady 1966, constants
-//!   rather than others); a call leaves half of the registers.
+//! * A product of single use is computed with the sum that takes it, whether the machine has an instruction for both or two: beside its sum it waits in
+//!   no register, and a search over fewer steps finds more.
+//! * An input is loaded once, where it is first needed; of an array the first four that are needed are loaded together. From then on it is a value
+//!   like any other.
+//! * A constant is loaded where it is needed, and again if its register was taken: it is no value that waits.
 
-use crate::expr::{Binary, Graph, NodeId, Op};
+use super::machine::hosts;
+use crate::expr::{Graph, NodeId, Op};
 
 /// How many neighbours of an array are loaded together.
 const TOGETHER: usize = 4;
@@ -28,8 +25,6 @@ pub(super) struct MachineStep {
     pub makes: Vec<usize>,
     /// Whether it is a call.
     pub is_call: bool,
-    /// The value whose register the result takes.
-    accumulator: Option<usize>,
 }
 
 /// A program as steps that may change places.
@@ -48,7 +43,7 @@ pub(super) struct Steps {
 
 impl Steps {
     pub fn new(graph: &Graph, written: &[NodeId]) -> Steps {
-        let host = hosts(graph, written);
+        let host = hosts(graph, written, true);
         let mut made = Steps {
             steps: Vec::new(),
             users: vec![Vec::new(); graph.ops.len()],
@@ -155,33 +150,11 @@ impl Steps {
     pub fn nodes(&self, order: &[usize]) -> Vec<NodeId> {
         order.iter().flat_map(|step| self.steps[*step].nodes.iter().copied()).collect()
     }
-
-    /// Loads, stores and copies that an order takes with so many registers, results not counted.
-    pub fn traffic(&self, order: &[usize], registers: usize) -> usize {
-        HeldValues::new(self, order, registers).run(order)
-    }
-}
-
-/// Of every product of single use the sum that takes it in: of two products of a sum the last one.
-fn hosts(graph: &Graph, written: &[NodeId]) -> Vec<Option<NodeId>> {
-    let uses = graph.uses();
-    let mut host = vec![None; graph.ops.len()];
-    for id in written {
-        if let Op::Binary(Binary::Add | Binary::Sub, a, b) = graph.op(*id) {
-            let is_taken =
-                |term: &NodeId| uses[term.index()] == 1 && matches!(graph.op(*term), Op::Binary(Binary::Mul, ..));
-            if let Some(product) = [b, a].into_iter().find(is_taken) {
-                host[product.index()] = Some(*id);
-            }
-        }
-    }
-    host
 }
 
 /// The step that an operation ends.
 fn step(graph: &Graph, id: NodeId, host: &[Option<NodeId>]) -> MachineStep {
     let mut step = MachineStep { is_call: matches!(graph.op(id), Op::SinCos(_)), ..MachineStep::default() };
-    let mut accumulator = None;
     for a in graph.op(id).operands() {
         if host[a.index()] == Some(id) {
             step.nodes.push(a);
@@ -191,11 +164,9 @@ fn step(graph: &Graph, id: NodeId, host: &[Option<NodeId>]) -> MachineStep {
             let kept = graph.angle_terms(a).into_iter().filter(|term| !matches!(graph.op(*term), Op::Input(_)));
             step.reads.extend(kept.map(NodeId::index));
         } else {
-            accumulator = Some(a.index()).filter(|_| !matches!(graph.op(a), Op::Constant(_)));
             step.reads.push(a.index());
         }
     }
-    step.accumulator = accumulator.filter(|_| !step.nodes.is_empty());
     step.nodes.push(id);
     if !step.is_call {
         step.makes.push(id.index());
@@ -203,90 +174,6 @@ fn step(graph: &Graph, id: NodeId, host: &[Option<NodeId>]) -> MachineStep {
     step.reads.sort_unstable();
     step.reads.dedup();
     step
-}
-
-/// Registers while a program runs.
-struct HeldValues<'a> {
-    of: &'a Steps,
-    most: usize,
-    /// Of every node the positions where it is needed, the next one last.
-    uses: Vec<Vec<usize>>,
-    /// The nodes that are in registers.
-    held: Vec<usize>,
-    is_held: Vec<bool>,
-    is_stored: Vec<bool>,
-    traffic: usize,
-}
-
-impl<'a> HeldValues<'a> {
-    fn new(of: &'a Steps, order: &[usize], most: usize) -> HeldValues<'a> {
-        let mut position = vec![0; order.len()];
-        order.iter().enumerate().for_each(|(p, step)| position[*step] = p);
-        let mut uses = of.users.clone();
-        for of_node in &mut uses {
-            of_node.iter_mut().for_each(|user| *user = position[*user]);
-            of_node.sort_unstable_by_key(|p| std::cmp::Reverse(*p));
-        }
-        let (is_held, is_stored) = (vec![false; uses.len()], vec![false; uses.len()]);
-        HeldValues { of, most, uses, held: Vec::new(), is_held, is_stored, traffic: 0 }
-    }
-
-    fn run(mut self, order: &[usize]) -> usize {
-        for (p, k) in order.iter().enumerate() {
-            let step = &self.of.steps[*k];
-            for a in &step.reads {
-                if !self.is_held[*a] {
-                    self.traffic += 1;
-                    if !step.is_call {
-                        self.hold(*a, p, &step.reads);
-                    }
-                }
-            }
-            for a in &step.reads {
-                self.uses[*a].pop();
-            }
-            if step.nodes.is_empty() {
-                self.traffic += step.makes.len();
-            }
-            self.traffic += usize::from(step.accumulator.is_some_and(|a| !self.uses[a].is_empty()));
-            let (uses, is_held) = (&self.uses, &mut self.is_held);
-            self.held.retain(|a| {
-                is_held[*a] = !uses[*a].is_empty();
-                is_held[*a]
-            });
-            while step.is_call && self.held.len() > kept_by_calls(self.most) {
-                self.leave(p, &[]);
-            }
-            for node in &step.makes {
-                self.hold(*node, p, &[]);
-            }
-        }
-        self.traffic
-    }
-
-    fn hold(&mut self, node: usize, p: usize, needed: &[usize]) {
-        while self.held.len() >= self.most {
-            self.leave(p, needed);
-        }
-        self.held.push(node);
-        self.is_held[node] = true;
-    }
-
-    /// Frees the register that is needed last; one that takes no store is free where it is needed half as far ahead.
-    fn leave(&mut self, p: usize, needed: &[usize]) {
-        let far = |k: &usize| {
-            let node = self.held[*k];
-            let ahead = self.uses[node].last().expect("a value that is held is needed") - p;
-            let is_free = self.of.is_constant[node] || self.is_stored[node];
-            (if is_free { 2 * ahead } else { ahead }, is_free)
-        };
-        let last = (0..self.held.len()).filter(|k| !needed.contains(&self.held[*k])).max_by_key(far);
-        let node = self.held.swap_remove(last.expect("there are more registers than operands"));
-        self.is_held[node] = false;
-        if !self.of.is_constant[node] && !std::mem::replace(&mut self.is_stored[node], true) {
-            self.traffic += 1;
-        }
-    }
 }
 
 /// How many of so many registers a call leaves as they are.
