@@ -172,7 +172,7 @@ mod tests {
         crate::expr::verify(&after).expect("a pass keeps what graphs promise");
         let x = [0.7, -1.3, 2.9, 0.4].map(Dd::from);
         let [a, b] = [&before, &after].map(|graph| crate::expr::evaluate(graph, &x));
-        assert!(a.iter().zip(&b).all(|(a, b)| (*a - *b).abs().hi() < 1e-28 * a.abs().hi()), "{a:?} {b:?}");
+        assert!(a.iter().zip(&b).all(|(a, b)| (*a - *b).abs().hi() <= 1e-28 * a.abs().hi()), "{a:?} {b:?}");
         [before, after]
     }
 
@@ -249,5 +249,21 @@ mod tests {
         assert!(search.keeps(product, PairForm::Difference, &times(2.0), &times(1.0)));
         assert!(!search.keeps(product, PairForm::Difference, &times(1001.0), &times(1000.0)));
         assert!(search.keeps(product, PairForm::Product, &times(1000.0), &times(0.001)));
+    }
+
+    /// (x + y)² − x² − 2 x y − y² is zero, and 0 · z the product of it and any other value.
+    #[test]
+    fn what_is_zero_everywhere_is_part_of_nothing() {
+        let [graph, _] = programs(|b, [x, y, z, w]| {
+            let [xx, yy, xy] = [(x, x), (y, y), (x, y)].map(|(u, v)| b.add(Op::mul(u, v)));
+            let sum = b.add(Op::add(x, y));
+            let square = b.add(Op::mul(sum, sum));
+            let rest = [xx, xy, xy, yy].into_iter().fold(square, |rest, term| b.add(Op::sub(rest, term)));
+            [z, w].map(|factor| b.add(Op::mul(rest, factor))).to_vec()
+        });
+        let search = EqualitySearch::new(&graph);
+        let is_zero = |i: usize| search.values[i].iter().all(|v| *v == Dd::ZERO);
+        assert!((0..graph.ops.len()).any(is_zero));
+        assert!(!search.numbers.iter().any(|i| is_zero(*i)));
     }
 }

@@ -44,10 +44,11 @@ impl<'g> EqualitySearch<'g> {
             graph.op(id).operands().for_each(|a| uses[a.index()] += 1);
         }
         graph.results.iter().for_each(|r| uses[r.index()] += 1);
+        let values = values(graph);
+        // what is zero everywhere is part of anything, in as many ways as there are other values
         let is_number = |i: &usize| match graph.ops[*i] {
             Op::Unary(Unary::Neg, _) | Op::SinCos(_) | Op::AngleSum(..) => false,
-            Op::Constant(c) => live[*i] && c.value() != Dd::ZERO,
-            _ => live[*i],
+            _ => live[*i] && values[*i].iter().any(|v| *v != Dd::ZERO),
         };
         let numbers: Vec<usize> = (0..n).filter(is_number).collect();
         let is_free = |op: &Op| matches!(op, Op::Input(_) | Op::Constant(_) | Op::Sin(_) | Op::Cos(_));
@@ -64,7 +65,6 @@ impl<'g> EqualitySearch<'g> {
                 quotients[i * words + k / 64] |= 1 << (k % 64);
             }
         }
-        let values = values(graph);
         let mut singles: FxHashMap<u64, Vec<u32>> = FxHashMap::default();
         for i in &numbers {
             singles.entry(key(values[*i][0].hi())).or_default().push(*i as u32);
