@@ -12,7 +12,7 @@
 //! the inputs, sines and cosines; roots and signs count as inputs of their own. Two that agree to 1e-28 at four random states are one,
 //! as long as no result of the program sees what they differ by: what is below all digits of a value need not be below those of a result.
 //! That finds what follows from distributive laws, from s² + c² = 1 and from constants that fit, however many steps it takes, and
-//! nothing that holds for unit quaternions alone.
+//! nothing that holds for unit quaternions alone. First of all, what is zero there is zero.
 //!
 //! No sum may have greater terms than the operations that it replaces: that is where digits would go. Whether the program
 //! as a whole keeps them, the caller asks (`rounding.rs`).
@@ -24,6 +24,7 @@ mod net;
 mod pairs;
 mod search;
 mod values;
+mod zeros;
 
 use super::{count_sums, dead_code, sums};
 use crate::expr::{Binary, Counts, Graph};
@@ -31,6 +32,7 @@ use net::Net;
 use search::EqualitySearch;
 use straightline_core::Dd;
 use values::{is_atom, values, AtPoints, POINTS};
+use zeros::{without, zeros};
 
 /// Two values that agree so well are equal; double-double has 1e-31, of the greatest term. Less well agree those of programs whose constants
 /// differ by 1e20: a term that is missed there may be all that another state has.
@@ -47,7 +49,7 @@ const WORK: usize = 700_000;
 /// together again. A graph of more than so many values stays as it is: of some thousand it takes some tenths of a second.
 pub fn substitute(graph: &Graph, largest: usize, keeps: &dyn Fn(&Graph) -> bool) -> Graph {
     graph.expect_plain("substitute");
-    let mut graph = graph.clone();
+    let mut graph = without_zeros(graph, keeps).unwrap_or_else(|| graph.clone());
     if graph.ops.len() > largest {
         return graph;
     }
@@ -58,15 +60,25 @@ pub fn substitute(graph: &Graph, largest: usize, keeps: &dyn Fn(&Graph) -> bool)
     graph
 }
 
+/// The graph without the operations that make zeros, if there are any.
+fn without_zeros(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
+    let zero = zeros(graph, &values(graph));
+    let less = dead_code(&sums(&without(graph, &zero)?));
+    let is_zero: Vec<bool> = graph.results.iter().map(|r| zero[r.index()]).collect();
+    (is_unchanged(&results(graph), &less, &is_zero) && keeps(&less)).then_some(less)
+}
+
 /// One round: all moves that are there, the most gainful first, each taken if it still pays.
 fn round(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
     let mut net = Net { ops: graph.ops.clone(), notes: graph.notes.clone() };
     let mut best = count_sums(graph);
     let mut taken = None;
     let before = results(graph);
+    let search = EqualitySearch::new(graph);
+    let is_zero: Vec<bool> = graph.results.iter().map(|r| search.zero[r.index()]).collect();
     let mut live = net.live(graph);
     let mut work = 0;
-    for found in EqualitySearch::new(graph).moves() {
+    for found in search.moves() {
         // moves taken before may have left no use of it
         if work > WORK || !found.becomes.iter().any(|b| live[b.value]) {
             continue;
@@ -76,7 +88,7 @@ fn round(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
         work += ordered.ops.len();
         let counts = count_sums(&ordered);
         let fewer = price(counts) < price(best) && counts.flops() <= best.flops() && counts.fma <= best.fma;
-        if fewer && is_unchanged(&before, &ordered) && keeps(&ordered) {
+        if fewer && is_unchanged(&before, &ordered, &is_zero) && keeps(&ordered) {
             (net, best, taken) = (tried, counts, Some(ordered));
             live = net.live(graph);
         }
@@ -93,12 +105,12 @@ fn results(graph: &Graph) -> Option<Vec<AtPoints>> {
     })
 }
 
-/// Whether another program has the same results.
-fn is_unchanged(before: &Option<Vec<AtPoints>>, graph: &Graph) -> bool {
+/// Whether another program has the same results, but for those that are zero.
+fn is_unchanged(before: &Option<Vec<AtPoints>>, graph: &Graph, is_zero: &[bool]) -> bool {
     let Some(before) = before else { return true };
     let same =
-        |(a, b): (&AtPoints, &AtPoints)| (0..POINTS).all(|k| (a[k] - b[k]).abs().hi() <= UNCHANGED * a[k].abs().hi());
-    results(graph).is_some_and(|after| before.iter().zip(&after).all(same))
+        |a: &AtPoints, b: &AtPoints| (0..POINTS).all(|k| (a[k] - b[k]).abs().hi() <= UNCHANGED * a[k].abs().hi());
+    results(graph).is_some_and(|after| (0..before.len()).all(|i| is_zero[i] || same(&before[i], &after[i])))
 }
 
 /// Operations and instructions with fused multiply-add, as either may be what a machine does.
@@ -251,19 +263,31 @@ mod tests {
         assert!(search.keeps(product, PairForm::Product, &times(1000.0), &times(0.001)));
     }
 
-    /// (x + y)² − x² − 2 x y − y² is zero, and 0 · z the product of it and any other value.
+    /// ((x + y)² − x² − 2 x y − y²) z + w = w.
     #[test]
-    fn what_is_zero_everywhere_is_part_of_nothing() {
-        let [graph, _] = programs(|b, [x, y, z, w]| {
+    fn what_is_zero_everywhere_is_not_computed() {
+        let programs = programs(|b, [x, y, z, w]| {
             let [xx, yy, xy] = [(x, x), (y, y), (x, y)].map(|(u, v)| b.add(Op::mul(u, v)));
             let sum = b.add(Op::add(x, y));
             let square = b.add(Op::mul(sum, sum));
             let rest = [xx, xy, xy, yy].into_iter().fold(square, |rest, term| b.add(Op::sub(rest, term)));
-            [z, w].map(|factor| b.add(Op::mul(rest, factor))).to_vec()
+            let product = b.add(Op::mul(rest, z));
+            vec![b.add(Op::add(product, w)), b.add(Op::sub(product, w)), rest]
         });
-        let search = EqualitySearch::new(&graph);
-        let is_zero = |i: usize| search.values[i].iter().all(|v| *v == Dd::ZERO);
-        assert!((0..graph.ops.len()).any(is_zero));
-        assert!(!search.numbers.iter().any(|i| is_zero(*i)));
+        assert_eq!(flops(&programs), [12, 0]);
+    }
+
+    /// y / ((x + y) z − x z − y z): infinite or no number, before and after.
+    #[test]
+    fn nothing_is_divided_by_a_zero_that_was_found() {
+        let mut b = GraphBuilder::new(RuleSet::all(), vec![Port::new("x", &[3])]);
+        let [x, y, z] = [0, 1, 2].map(|k| b.insert(Op::Input(k)));
+        let sum = b.add(Op::add(x, y));
+        let [left, xz, yz] = [sum, x, y].map(|v| b.add(Op::mul(v, z)));
+        let rest = [xz, yz].into_iter().fold(left, |rest, term| b.add(Op::sub(rest, term)));
+        let result = b.add(Op::div(y, rest));
+        let before = b.finish(vec![Port::new("z", &[1])], vec![result]);
+        let after = substitute(&before, 3000, &|_| true);
+        assert_eq!(after.counts().flops(), before.counts().flops());
     }
 }

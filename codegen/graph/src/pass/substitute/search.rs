@@ -2,6 +2,7 @@
 
 use super::pairs::{is_one_lost, key, keys, Filter, PairTable};
 use super::values::{is_atom, values, AtPoints, POINTS};
+use super::zeros::zeros;
 use super::{Becomes, GraphChange, NewPair, Operand, PairForm, EQUAL};
 use crate::expr::op::OpKind;
 use crate::expr::{Binary, Graph, NodeId, Op, Unary};
@@ -23,6 +24,8 @@ const WAYS: [PairForm; 3] = [PairForm::Difference, PairForm::Sum, PairForm::Prod
 pub(super) struct EqualitySearch<'g> {
     pub(super) graph: &'g Graph,
     pub(super) values: Vec<AtPoints>,
+    /// Which of them are zero whatever the inputs.
+    pub(super) zero: Vec<bool>,
     pub(super) uses: Vec<u32>,
     /// What may be an operand, in the order of the graph.
     pub(super) numbers: Vec<usize>,
@@ -45,10 +48,11 @@ impl<'g> EqualitySearch<'g> {
         }
         graph.results.iter().for_each(|r| uses[r.index()] += 1);
         let values = values(graph);
+        let zero = zeros(graph, &values);
         // what is zero everywhere is part of anything, in as many ways as there are other values
         let is_number = |i: &usize| match graph.ops[*i] {
             Op::Unary(Unary::Neg, _) | Op::SinCos(_) | Op::AngleSum(..) => false,
-            _ => live[*i] && values[*i].iter().any(|v| *v != Dd::ZERO),
+            _ => live[*i] && !zero[*i],
         };
         let numbers: Vec<usize> = (0..n).filter(is_number).collect();
         let is_free = |op: &Op| matches!(op, Op::Input(_) | Op::Constant(_) | Op::Sin(_) | Op::Cos(_));
@@ -71,7 +75,7 @@ impl<'g> EqualitySearch<'g> {
         }
         let mut known = Filter::new(64 * singles.len());
         singles.keys().for_each(|key| known.insert(*key));
-        EqualitySearch { graph, values, uses, numbers, free, quotients, words, known, singles }
+        EqualitySearch { graph, values, zero, uses, numbers, free, quotients, words, known, singles }
     }
 
     /// What v − x, v + x or v / x is at the first point, to be found.
