@@ -5,6 +5,7 @@ use crate::gait::Gait;
 use crate::ground::Robot;
 use crate::quadruped::{plant, Feet, Mode, State, Torques, FEET, JOINTS, NV, STANDING, TORQUE};
 use crate::sweep::{Law, Sweep};
+use crate::task::Weights;
 use straightline::control::{Outcome, TorqueLimits};
 
 /// Between torques \[s\].
@@ -40,6 +41,8 @@ pub enum Feedback {
 pub struct Scenario<'a> {
     /// The gait.
     pub gait: Gait,
+    /// What counts how much.
+    pub weights: Weights,
     /// What holds the robot to it.
     pub feedback: Feedback,
     /// Mass of the load \[kg\].
@@ -57,6 +60,7 @@ pub struct Scenario<'a> {
 /// The scene of the example: 0.3 kg unknown, a trot ahead, a push to the side, and a stop.
 pub const EXAMPLE: Scenario<'static> = Scenario {
     gait: Gait { first: 60, swings: 16, speed: [0.25, 0.0] },
+    weights: Weights::DEFAULT,
     feedback: Feedback::Gains,
     load: 0.3,
     at: [0.05, -0.03, 0.06],
@@ -117,7 +121,7 @@ pub fn run(
     let load = plant::Load::new(scenario.load, scenario.at, [0.0; 6])?;
     let start = State { q: STANDING, qd: [0.0; NV] };
     let mut robot = Robot::new(start, scenario.friction, load);
-    let mut controller = Controller::new(scenario.gait, &start);
+    let mut controller = Controller::new(scenario.gait, scenario.weights, &start);
     let h = PERIOD / f64::from(SUBSTEPS);
     for k in 0..(scenario.duration / PERIOD) as i64 {
         let time = k as f64 * PERIOD;

@@ -10,8 +10,8 @@ use crate::sweep::{Factor, Law, Solver, Sweep, NODES};
 use crate::task::{Task, Weights};
 use straightline::control::{Outcome, TorqueLimits};
 
-/// Part of what a node does not explain that the wrench takes over: a tenth of a second to follow.
-const FOLLOWS: f64 = 0.1;
+/// Part of what a node does not explain that the wrench takes over: a quarter of a second to follow.
+const FOLLOWS: f64 = 0.04;
 /// The wrench is at most this much \[N, N·m\].
 const WRENCH: [f64; 6] = [15.0, 15.0, 15.0, 2.0, 2.0, 2.0];
 /// Sweeps before the first step, from rest.
@@ -30,6 +30,8 @@ struct Foreseen {
 pub struct Controller {
     /// The gait that it follows.
     pub gait: Gait,
+    /// What counts how much.
+    pub weights: Weights,
     /// The node that is now.
     pub node: i64,
     /// A force on the trunk and a moment about its origin, in its axes \[N, N·m\], that nobody told the model about.
@@ -47,11 +49,12 @@ pub struct Controller {
 
 impl Controller {
     /// Of a robot that stands at rest; node 0 is now.
-    pub fn new(gait: Gait, measured: &State) -> Self {
+    pub fn new(gait: Gait, weights: Weights, measured: &State) -> Self {
         let solver = Solver::at_rest(measured, &holding(Mode::Four, &STANDING));
         let (law, places) = (solver.law(), feet(&measured.q));
         let mut out = Controller {
             gait,
+            weights,
             node: 0,
             wrench: [0.0; 6],
             law,
@@ -77,7 +80,7 @@ impl Controller {
     /// What is wanted at the nodes from this one on.
     fn tasks(&self, measured: &State) -> [Task; NODES + 1] {
         core::array::from_fn(|k| {
-            Task::at(&self.gait, self.node + k as i64, self.node, measured, &self.places, Weights::DEFAULT)
+            Task::at(&self.gait, self.node + k as i64, self.node, measured, &self.places, self.weights)
         })
     }
 

@@ -14,7 +14,9 @@ pub const HALF: i64 = 20;
 /// By how much a foot is lifted \[m\].
 const LIFT: f64 = 0.04;
 /// By how much below the ground its way ends \[m\]: it comes down before it is believed to stand.
-const PRESS: f64 = 0.002;
+const PRESS: f64 = 0.0005;
+/// The part of a swing after which a foot is above where it lands: what comes down early must not be dragged.
+const THERE: f64 = 0.8;
 /// Seconds of speed that a foothold goes after: √(z/g) for a trunk at the height z, a pendulum's.
 const CAPTURE: f64 = 0.15;
 /// The trunk speeds up and slows down for so many nodes.
@@ -112,11 +114,15 @@ pub const PLACES: Feet = {
 
 /// Where a foot is on its way from a place to another.
 pub fn on_its_way(from: &[f64; 3], to: &[f64; 3], part: f64) -> [f64; 3] {
-    let [_, along] = ramp(part);
+    let [_, along] = ramp(part / THERE);
     let up = 64.0 * part * part * part * (1.0 - part) * (1.0 - part) * (1.0 - part);
-    [
-        from[0] + along * (to[0] - from[0]),
-        from[1] + along * (to[1] - from[1]),
-        from[2] + along * (to[2] - from[2]) + LIFT * up - PRESS * along,
-    ]
+    let [_, down] = ramp(part);
+    core::array::from_fn(|i| {
+        let way = from[i] + along * (to[i] - from[i]);
+        if i < 2 {
+            way
+        } else {
+            way + LIFT * up - PRESS * down
+        }
+    })
 }

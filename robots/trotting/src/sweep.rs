@@ -11,7 +11,7 @@
 
 use crate::gait::STEP;
 use crate::quadruped::{after, difference, Difference, Slopes, State, Torques, Velocity, JOINTS, NV, NX};
-use crate::task::{Quadratic, Task};
+use crate::task::Task;
 
 /// Nodes with torques; one more has none.
 pub const NODES: usize = 32;
