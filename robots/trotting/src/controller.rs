@@ -13,7 +13,7 @@ use straightline::control::{Outcome, TorqueLimits};
 /// Part of what a node does not explain that the wrench takes over: a quarter of a second to follow.
 const FOLLOWS: f64 = 0.04;
 /// The wrench is at most this much \[N, N·m\].
-const WRENCH: [f64; 6] = [15.0, 15.0, 15.0, 2.0, 2.0, 2.0];
+const WRENCH: [f64; 6] = [5.0, 5.0, 8.0, 1.0, 1.0, 1.0];
 /// Sweeps before the first step, from rest.
 const FIRST_SWEEPS: u32 = 20;
 
