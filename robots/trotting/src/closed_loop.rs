@@ -5,8 +5,9 @@ use crate::gait::Gait;
 use crate::ground::Robot;
 use crate::quadruped::{plant, Feet, Mode, State, Torques, FEET, JOINTS, NV, STANDING, TORQUE};
 use crate::sweep::{Law, Sweep};
-use crate::task::Weights;
+use crate::task::{within_cone, Weights, FRICTION, LEAST};
 use straightline::control::{Outcome, TorqueLimits};
+use straightline::Real;
 
 /// Between torques \[s\].
 pub const PERIOD: f64 = 1e-3;
@@ -31,6 +32,8 @@ pub struct Push {
 pub enum Feedback {
     /// The gains of the recursion, and a sweep from the measured state at every node.
     Gains,
+    /// The same motion from the measured state at every node, and its torques alone until the next.
+    Torques,
     /// Springs \[N·m/rad\] and dampers \[N·m·s/rad\] of the joints about the motion that the model makes, with its torques: the same
     /// motion and the same torques where nothing disturbs, without a measured trunk.
     Joints(f64, f64),
@@ -97,6 +100,85 @@ pub struct Sample {
     pub wrench: [f64; 6],
 }
 
+/// What a run was like.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Summary {
+    /// Its last millisecond \[s\]: early if the robot fell.
+    pub end: f64,
+    /// The trunk off its way, ahead, to the left and up, in the end \[m\].
+    pub last: [f64; 3],
+    /// The most of each.
+    pub most: [f64; 3],
+    /// The most that the trunk leant: sine of the angle.
+    pub lean: f64,
+    /// The greatest torque \[N·m\].
+    pub torque: f64,
+    /// Milliseconds in which torques would have been beyond their limits.
+    pub saturated: u32,
+    /// Milliseconds of feet that stand, each with more than [`LEAST`].
+    pub standing: u32,
+    /// Those in which the force is outside the cone that the controller counts on.
+    pub outside: u32,
+    /// Those in which the foot slips.
+    pub slipping: u32,
+    /// The most that a foot slips from one swing to the next \[m\].
+    pub slip: f64,
+    squares: [f64; 3],
+    samples: u32,
+    before: [f64; FEET],
+    stance: [f64; FEET],
+}
+
+impl Summary {
+    /// One millisecond more.
+    pub fn add(&mut self, sample: &Sample) {
+        let off: [f64; 3] = core::array::from_fn(|i| sample.state.q[i] - sample.wanted[i]);
+        (self.end, self.last) = (sample.time, off);
+        self.samples += 1;
+        for i in 0..3 {
+            self.most[i] = self.most[i].max(off[i].abs());
+            self.squares[i] += off[i] * off[i];
+        }
+        self.lean = self.lean.max(sample.lean);
+        self.torque = sample.torques.iter().fold(self.torque, |most, tau| most.max(tau.abs()));
+        self.saturated += u32::from(sample.outcome != Outcome::Within);
+        for foot in 0..FEET {
+            let slipped = sample.slipped[foot] - self.before[foot];
+            self.before[foot] = sample.slipped[foot];
+            if !sample.mode.stands(foot) {
+                self.stance[foot] = 0.0;
+            } else if sample.forces[foot][2] > LEAST {
+                self.standing += 1;
+                self.outside += u32::from(within_cone(&sample.forces[foot], FRICTION) < 0.0);
+                // what is less is rounding
+                self.slipping += u32::from(slipped > 1e-9);
+                self.stance[foot] += slipped;
+                self.slip = self.slip.max(self.stance[foot]);
+            }
+        }
+    }
+
+    /// The root of the mean of squares: the trunk off its way, ahead, to the left and up \[m\].
+    pub fn off(&self) -> [f64; 3] {
+        self.squares.map(|sum| Real::sqrt(sum / f64::from(self.samples.max(1))))
+    }
+
+    /// Whether the robot fell before the time was over \[s\].
+    pub fn fell(&self, duration: f64) -> bool {
+        self.end < duration - 2.0 * PERIOD
+    }
+}
+
+/// A run, with a sweep at every node.
+///
+/// # Errors
+/// As [`run`].
+pub fn summary(scenario: &Scenario) -> Result<Summary, plant::Unphysical> {
+    let mut out = Summary::default();
+    run(scenario, |controller, state| controller.sweep(state), |sample| out.add(sample))?;
+    Ok(out)
+}
+
 /// Torques \[N·m\] of springs and dampers about the motion of a law.
 fn by_joints(law: &Law, part: f64, measured: &State, stiffness: f64, damping: f64) -> (Torques, Outcome) {
     let between = |of: &dyn Fn(&State) -> f64| of(&law.states[0]) + part * (of(&law.states[1]) - of(&law.states[0]));
@@ -128,12 +210,17 @@ pub fn run(
         let measured = robot.state;
         if k % TICKS == 0 {
             // without a measured trunk the motion follows from itself
-            let known = if scenario.feedback == Feedback::Gains { measured } else { controller.next_state() };
+            let is_blind = matches!(scenario.feedback, Feedback::Joints(..));
+            let known = if is_blind { controller.foreseen_state() } else { measured };
             sweep(&mut controller, &known);
         }
         let part = (k % TICKS) as f64 / TICKS as f64;
         let (torques, outcome) = match scenario.feedback {
             Feedback::Gains => controller.torques(part, &measured),
+            Feedback::Torques => {
+                let foreseen = controller.law.states[0];
+                controller.torques(0.0, &foreseen)
+            }
             Feedback::Joints(stiffness, damping) => by_joints(&controller.law, part, &measured, stiffness, damping),
         };
         let push = scenario.pushes.iter().find(|push| push.from <= time && time < push.until);

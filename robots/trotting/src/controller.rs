@@ -73,7 +73,7 @@ impl Controller {
     }
 
     /// The state that the motion has at this node, as it was foreseen.
-    pub fn next_state(&self) -> State {
+    pub fn foreseen_state(&self) -> State {
         self.next.states[0]
     }
 
