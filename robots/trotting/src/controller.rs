@@ -5,7 +5,9 @@
 
 use crate::dot;
 use crate::gait::{Gait, STEP};
-use crate::quadruped::{after, feet, holding, Feet, Mode, Slopes, State, Torques, Velocity, FEET, JOINTS, STANDING, TORQUE};
+use crate::quadruped::{
+    after, feet, holding, Feet, Mode, Slopes, State, Torques, Velocity, FEET, JOINTS, STANDING, TORQUE,
+};
 use crate::sweep::{Factor, Law, Solver, Sweep, NODES};
 use crate::task::{Task, Weights};
 use straightline::control::{Outcome, TorqueLimits};
@@ -85,9 +87,16 @@ impl Controller {
     }
 
     /// At a node, to be called once per [`STEP`]: the law of the sweep before acts from now on, and the one for the next node is found.
-    /// `None` if it could not be: then the law stays.
+    /// `None` if it could not be, as what is measured is no number, or the motion from there: then the law stays.
     pub fn sweep(&mut self, measured: &State) -> Option<Sweep> {
         self.law = self.next;
+        // of NaN and of infinities the product with zero is NaN
+        if !measured.q.iter().chain(&measured.qd).all(|x| x * 0.0 == 0.0) {
+            (self.foreseen, self.sum) = (None, ([0.0; JOINTS], 0));
+            self.solver.shift();
+            self.node += 1;
+            return None;
+        }
         self.explain(measured);
         let mode = self.gait.mode(self.node);
         let now = feet(&measured.q);
@@ -101,9 +110,12 @@ impl Controller {
         let start = after(measured, &slopes.qdd, STEP);
         self.solver.shift();
         self.node += 1;
-        let sweep = self.solver.sweep(&self.tasks(&start), &start, &self.wrench)?;
-        self.next = self.solver.law();
-        Some(sweep)
+        let sweep = self.solver.sweep(&self.tasks(&start), &start, &self.wrench);
+        match sweep {
+            Some(_) => self.next = self.solver.law(),
+            None => self.solver = Solver::at_rest(measured, &holding(Mode::Four, &STANDING)),
+        }
+        sweep
     }
 
     /// The torques \[N·m\] of this instant, within [`TORQUE`]: a part of the way from the node to the next.

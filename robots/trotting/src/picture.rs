@@ -11,7 +11,7 @@ const SCALE: f64 = 600.0;
 /// Where the view has the origin of the world [px].
 const ORIGIN: (f64, f64) = (220.0, 215.0);
 /// Between pictures of the trunk \[ms\].
-const EVERY: usize = 400;
+const EVERY: usize = 1600;
 const COLOURS: [&str; 4] = ["#1f5fa8", "#d95f02", "#1b8a5a", "#8e44ad"];
 const FOOT_NAMES: [&str; FEET] = ["front left", "front right", "hind left", "hind right"];
 
@@ -37,10 +37,10 @@ fn view(samples: &[Sample]) -> String {
             2.0 * 0.1946 * SCALE
         );
     }
-    let trunk: Vec<(f64, f64)> = samples.iter().step_by(5).map(|s| at(&s.state.q)).collect();
+    let trunk: Vec<(f64, f64)> = samples.iter().step_by(10).map(|s| at(&s.state.q)).collect();
     out += &line(&trunk, "#222", 1.5);
     for foot in 0..FEET {
-        let path: Vec<(f64, f64)> = samples.iter().step_by(4).map(|s| at(&feet(&s.state.q)[foot])).collect();
+        let path: Vec<(f64, f64)> = samples.iter().step_by(8).map(|s| at(&feet(&s.state.q)[foot])).collect();
         out += &line(&path, COLOURS[foot], 1.2);
     }
     out
@@ -86,7 +86,7 @@ impl Chart<'_> {
             let path: Vec<(f64, f64)> = values
                 .iter()
                 .enumerate()
-                .step_by((values.len() / 1500).max(1))
+                .step_by((values.len() / 1000).max(1))
                 .map(|(i, v)| (left + i as f64 / last as f64 * (right - left), y(*v)))
                 .collect();
             out += &line(&path, COLOURS[k % 4], 1.1);

@@ -107,7 +107,18 @@ impl Slopes {
         let pair = match mode {
             Mode::Four => {
                 solo12::contact::four::forward_dynamics_derivatives(
-                    q, qd, tau, qdd, force, dqdd_dq, dqdd_dqd, dqdd_dtau, dforce_dq, dforce_dqd, dforce_dtau, &mut [0.0],
+                    q,
+                    qd,
+                    tau,
+                    qdd,
+                    force,
+                    dqdd_dq,
+                    dqdd_dqd,
+                    dqdd_dtau,
+                    dforce_dq,
+                    dforce_dqd,
+                    dforce_dtau,
+                    &mut [0.0],
                 );
                 return out;
             }
@@ -115,9 +126,7 @@ impl Slopes {
             Mode::RisingDiagonal => solo12::contact::rising_diagonal::forward_dynamics_derivatives,
         };
         let (mut f, [mut by_q, mut by_qd, mut by_tau]) = ([0.0; 6], [[[0.0; NV]; 6]; 3]);
-        pair(
-            q, qd, tau, qdd, &mut f, dqdd_dq, dqdd_dqd, dqdd_dtau, &mut by_q, &mut by_qd, &mut by_tau, &mut [0.0],
-        );
+        pair(q, qd, tau, qdd, &mut f, dqdd_dq, dqdd_dqd, dqdd_dtau, &mut by_q, &mut by_qd, &mut by_tau, &mut [0.0]);
         let standing = (0..FEET).filter(|foot| mode.stands(*foot));
         for (row, to) in standing.flat_map(|foot| 3 * foot..3 * foot + 3).enumerate() {
             (force[to], dforce_dq[to], dforce_dqd[to], dforce_dtau[to]) = (f[row], by_q[row], by_qd[row], by_tau[row]);

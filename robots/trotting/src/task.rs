@@ -1,12 +1,12 @@
 //! What is wanted, as a sum of squares: the trunk on its way and level, the feet in the air on theirs, joints and speeds moderate, torques near
 //! those that hold the robot up, forces of the ground within their cones.
 
+use crate::dot;
 use crate::gait::{on_its_way, Gait};
 use crate::quadruped::{
     axes, feet, feet_slopes, holding, in_trunk, Difference, Feet, Mode, Slopes, State, Torques, Velocity, FEET, JOINTS,
     NV, NX, STANDING, TORQUE,
 };
-use crate::dot;
 use straightline::Real;
 
 /// Weights of squares; costs are per second.
