@@ -156,8 +156,8 @@ impl Solver {
     }
 }
 
-/// δx⁺ = A δx + B δu about a node, after which the trunk moves with q̇⁺.
-fn linear(qd: &Velocity, slopes: &Slopes) -> ([Difference; NX], [Torques; NX]) {
+/// A and B of δx⁺ = A δx + B δu about a node, after which the trunk moves with q̇⁺.
+pub fn linear(qd: &Velocity, slopes: &Slopes) -> ([Difference; NX], [Torques; NX]) {
     let (mut a, mut b) = ([[0.0; NX]; NX], [[0.0; JOINTS]; NX]);
     for i in 0..NV {
         for j in 0..NV {
@@ -255,83 +255,5 @@ impl<const N: usize> Factor<N> {
             }
             b[i].iter_mut().for_each(|x| *x *= self.0[i][i]);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::quadruped::{Mode, STANDING};
-    use straightline::integrate::Step;
-
-    /// x ⊕ δ, to second order.
-    fn moved(state: &State, by: &Difference) -> State {
-        let mut out = *state;
-        let (dq, dqd) = by.split_at(NV);
-        let dq: Velocity = core::array::from_fn(|i| dq[i]);
-        let displacement = Step::of(1.0).displacement(&state.q, &dq, 1.0);
-        out.q.iter_mut().zip(displacement).for_each(|(q, d)| *q += d);
-        out.qd.iter_mut().zip(dqd).for_each(|(qd, d)| *qd += d);
-        out
-    }
-
-    /// A trunk that is turned about all axes, and everything moves.
-    fn state() -> State {
-        let mut q = STANDING;
-        q[3..7].copy_from_slice(&[0.1, -0.2, 0.3, (1.0f64 - 0.14).sqrt()]);
-        for i in 0..JOINTS {
-            q[7 + i] += 0.1 * (1.7 * i as f64 + 0.4).sin();
-        }
-        State { q, qd: core::array::from_fn(|i| 0.6 * (2.3 * i as f64 + 0.9).cos()) }
-    }
-
-    /// A and B against central differences of a whole step. What A leaves out is of the second order in the way of a step, h² |q̇|², of the pose alone, and the part h |q̇| of what
-    /// B has there.
-    #[test]
-    fn a_step_is_linear_as_a_and_b_say() {
-        let (state, h) = (state(), 1e-6);
-        let tau: Velocity = core::array::from_fn(|i| if i < 6 { 0.0 } else { 0.8 * (1.1 * i as f64).sin() });
-        for mode in [Mode::Four, Mode::FallingDiagonal, Mode::RisingDiagonal] {
-            let step = |state: &State, tau: &Velocity| after(state, &Slopes::of(mode, state, tau).qdd, STEP);
-            let slopes = Slopes::of(mode, &state, &tau);
-            let next = step(&state, &tau);
-            let (a, b) = linear(&next.qd, &slopes);
-            for j in 0..NX {
-                let ends = [h, -h].map(|d| {
-                    let by = core::array::from_fn(|i| if i == j { d } else { 0.0 });
-                    difference(&step(&moved(&state, &by), &tau), &next)
-                });
-                for i in 0..NX {
-                    let slope = (ends[0][i] - ends[1][i]) / (2.0 * h);
-                    let allowed = 5e-4 + 1e-6 * slope.abs();
-                    assert!((a[i][j] - slope).abs() < allowed, "{mode:?} A[{i}][{j}]: {} {slope}", a[i][j]);
-                }
-            }
-            for j in 0..JOINTS {
-                let ends = [h, -h].map(|d| {
-                    let mut tau = tau;
-                    tau[6 + j] += d;
-                    difference(&step(&state, &tau), &next)
-                });
-                let slopes: Difference = core::array::from_fn(|i| (ends[0][i] - ends[1][i]) / (2.0 * h));
-                let most = slopes[..6].iter().fold(0.0f64, |most, slope| most.max(slope.abs()));
-                for i in 0..NX {
-                    let allowed = if i < 6 { 0.02 * most } else { 1e-6 * (1.0 + slopes[i].abs()) };
-                    assert!((b[i][j] - slopes[i]).abs() < allowed, "{mode:?} B[{i}][{j}]: {} {}", b[i][j], slopes[i]);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn a_factor_solves_and_knows_what_is_not_positive() {
-        let matrix = [[4.0, 1.0, -0.5], [1.0, 3.0, 0.2], [-0.5, 0.2, 1.0]];
-        let mut b = [[1.0], [-2.0], [0.5]];
-        Factor::new(&matrix).unwrap().solve(&mut b);
-        for (row, right) in matrix.iter().zip([1.0, -2.0, 0.5]) {
-            let left: f64 = row.iter().zip(b).map(|(a, [x])| a * x).sum();
-            assert!((left - right).abs() < 1e-14, "{left} {right}");
-        }
-        assert!(Factor::new(&[[1.0, 2.0], [2.0, 1.0]]).is_none() && Factor::new(&[[f64::NAN]]).is_none());
     }
 }

@@ -10,7 +10,7 @@ use straightline_trotting_example::task::{Task, Weights};
 const MODES: [Mode; 3] = [Mode::Four, Mode::FallingDiagonal, Mode::RisingDiagonal];
 
 /// A trunk that is turned about all axes; everything moves.
-fn state() -> State {
+pub fn state() -> State {
     let mut q = STANDING;
     q[3..7].copy_from_slice(&[0.1, -0.2, 0.3, (1.0f64 - 0.14).sqrt()]);
     for i in 0..JOINTS {
@@ -24,7 +24,7 @@ fn tau() -> Velocity {
 }
 
 /// The state with its k-th entry moved by d, of the pose in the trunk's axes.
-fn moved(state: &State, k: usize, d: f64) -> State {
+pub fn moved(state: &State, k: usize, d: f64) -> State {
     let mut out = *state;
     if k < NV {
         let unit: Velocity = core::array::from_fn(|i| if i == k { d } else { 0.0 });
