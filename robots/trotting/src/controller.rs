@@ -5,9 +5,7 @@
 
 use crate::dot;
 use crate::gait::{Gait, STEP};
-use crate::quadruped::{
-    after, feet, holding, Feet, Mode, Slopes, State, Torques, Velocity, FEET, JOINTS, STANDING, TORQUE,
-};
+use crate::quadruped::{after, feet, Feet, Slopes, State, Torques, Velocity, FEET, JOINTS, TORQUE};
 use crate::sweep::{Factor, Law, Solver, Sweep, NODES};
 use crate::task::{Task, Weights};
 use straightline::control::{Outcome, TorqueLimits};
@@ -52,8 +50,10 @@ pub struct Controller {
 impl Controller {
     /// Of a robot that stands at rest; node 0 is now.
     pub fn new(gait: Gait, weights: Weights, measured: &State) -> Self {
-        let solver = Solver::at_rest(measured, &holding(Mode::Four, &STANDING));
-        let (law, places) = (solver.law(), feet(&measured.q));
+        let places = feet(&measured.q);
+        let tasks = tasks(&gait, 0, measured, &places, weights);
+        let solver = Solver::at_rest(measured, &tasks);
+        let law = solver.law();
         let mut out = Controller {
             gait,
             weights,
@@ -66,7 +66,6 @@ impl Controller {
             foreseen: None,
             sum: ([0.0; JOINTS], 0),
         };
-        let tasks = out.tasks(measured);
         for _ in 0..FIRST_SWEEPS {
             out.solver.sweep(&tasks, measured, &out.wrench);
         }
@@ -77,13 +76,6 @@ impl Controller {
     /// The state that the motion has at this node, as it was foreseen.
     pub fn foreseen_state(&self) -> State {
         self.next.states[0]
-    }
-
-    /// What is wanted at the nodes from this one on.
-    fn tasks(&self, measured: &State) -> [Task; NODES + 1] {
-        core::array::from_fn(|k| {
-            Task::at(&self.gait, self.node + k as i64, self.node, measured, &self.places, self.weights)
-        })
     }
 
     /// At a node, to be called once per [`STEP`]: the law of the sweep before acts from now on, and the one for the next node is found.
@@ -110,10 +102,11 @@ impl Controller {
         let start = after(measured, &slopes.qdd, STEP);
         self.solver.shift();
         self.node += 1;
-        let sweep = self.solver.sweep(&self.tasks(&start), &start, &self.wrench);
+        let tasks = tasks(&self.gait, self.node, &start, &self.places, self.weights);
+        let sweep = self.solver.sweep(&tasks, &start, &self.wrench);
         match sweep {
             Some(_) => self.next = self.solver.law(),
-            None => self.solver = Solver::at_rest(measured, &holding(Mode::Four, &STANDING)),
+            None => self.solver = Solver::at_rest(&start, &tasks),
         }
         sweep
     }
@@ -148,4 +141,9 @@ impl Controller {
             self.wrench[i] = (self.wrench[i] + FOLLOWS * off[i][0]).clamp(-WRENCH[i], WRENCH[i]);
         }
     }
+}
+
+/// What is wanted at the nodes from this one on.
+fn tasks(gait: &Gait, node: i64, measured: &State, places: &Feet, weights: Weights) -> [Task; NODES + 1] {
+    core::array::from_fn(|k| Task::at(gait, node + k as i64, node, measured, places, weights))
 }

@@ -6,8 +6,9 @@
 //!
 //! q̇⁺ = q̇ + h q̈(q, q̇, u + d),  q⁺ = q ⊕ h q̇⁺.
 //!
-//! Differences are δx = (δq, δq̇) with the trunk's in its own axes, so that δq⁺ = T δq + h δq̇⁺, where T is the identity but for what the trunk
-//! moves on meanwhile: 1 − h (ω× 0; v× ω×)ᵀ of the pair (place, turn).
+//! Differences are δx = (δq, δq̇) with the trunk's in its own axes, so that δq⁺ = T δq + h δq̇⁺. T is the identity but for the rows
+//! of the trunk, which moves on with v and turns with ω meanwhile: of its place 1 − h ω× by the place and −h v× by the turn, of its turn
+//! 1 − h ω× by that.
 
 use crate::gait::STEP;
 use crate::quadruped::{after, difference, Difference, Slopes, State, Torques, Velocity, JOINTS, NV, NX};
@@ -62,11 +63,11 @@ pub struct Solver {
 }
 
 impl Solver {
-    /// At rest in a configuration, under these torques.
-    pub fn at_rest(state: &State, hold: &Torques) -> Solver {
+    /// At rest in a configuration, under torques that nearly hold the robot in the mode of each node.
+    pub fn at_rest(state: &State, tasks: &[Task; NODES + 1]) -> Solver {
         Solver {
             states: [*state; NODES + 1],
-            torques: [*hold; NODES],
+            torques: core::array::from_fn(|k| tasks[k].hold),
             steps: [[0.0; JOINTS]; NODES],
             gains: [[[0.0; NX]; JOINTS]; NODES],
             slopes: [Slopes::ZERO; NODES],

@@ -1,11 +1,12 @@
 //! One sweep: its linear models and its factor.
 
 use crate::slopes::{moved, state};
-use straightline_trotting_example::gait::STEP;
+use straightline_trotting_example::gait::{Gait, PLACES, STEP};
 use straightline_trotting_example::quadruped::{
-    after, difference, Difference, Mode, Slopes, State, Velocity, JOINTS, NX,
+    after, difference, Difference, Mode, Slopes, State, Torques, Velocity, JOINTS, NV, NX, STANDING,
 };
-use straightline_trotting_example::sweep::{linear, Factor};
+use straightline_trotting_example::sweep::{linear, Factor, Solver, NODES};
+use straightline_trotting_example::task::{Task, Weights};
 
 /// A and B against central differences of a whole step. What A leaves out is of the second order in the way of a step, h² |q̇|², of the pose
 /// alone, and the part h |q̇| of what B has there.
@@ -52,4 +53,42 @@ fn a_factor_solves_and_knows_what_is_not_positive() {
         assert!((left - right).abs() < 1e-14, "{left} {right}");
     }
     assert!(Factor::new(&[[1.0, 2.0], [2.0, 1.0]]).is_none() && Factor::new(&[[f64::NAN]]).is_none());
+}
+
+/// From a robot that is off its way, through a swing and a landing: sweeps settle, and where they have, no torque lowers the cost.
+#[test]
+fn sweeps_settle_where_no_torque_lowers_the_cost() {
+    let gait = Gait { first: 4, swings: 4, speed: [0.2, 0.0] };
+    let mut start = State { q: STANDING, qd: [0.0; NV] };
+    (start.q[1], start.q[2], start.qd[0], start.qd[4]) = (0.01, start.q[2] - 0.005, 0.1, -0.2);
+    let wrench = [0.3, -0.5, -2.0, 0.05, 0.1, 0.02];
+    let tasks: [Task; NODES + 1] =
+        core::array::from_fn(|k| Task::at(&gait, k as i64, 0, &start, &PLACES, Weights::DEFAULT));
+    let mut solver = Solver::at_rest(&start, &tasks);
+    let first = solver.sweep(&tasks, &start, &wrench).unwrap();
+    let mut last = first;
+    for _ in 0..60 {
+        last = solver.sweep(&tasks, &start, &wrench).unwrap();
+    }
+    assert!(last.cost < 0.5 * first.cost && last.fall < 1e-9 * last.cost, "{first:?} {last:?}");
+    let cost = |torques: &[Torques; NODES]| {
+        let (mut state, mut cost) = (start, 0.0);
+        for (task, u) in tasks.iter().zip(torques) {
+            let tau = core::array::from_fn(|i| if i < 6 { wrench[i] } else { u[i - 6] });
+            let slopes = Slopes::of(task.mode, &state, &tau);
+            cost += task.cost(&state, Some((u, &slopes)), STEP);
+            state = after(&state, &slopes.qdd, STEP);
+        }
+        cost + tasks[NODES].cost(&state, None, Weights::DEFAULT.last)
+    };
+    let least = cost(&solver.torques);
+    assert!((least - last.cost).abs() < 1e-12 * least, "{least} {last:?}");
+    for (k, i) in [(0, 2), (3, 0), (8, 5), (15, 7), (22, 10), (31, 3)] {
+        let [less, more] = [-0.01, 0.01].map(|d| {
+            let mut torques = solver.torques;
+            torques[k][i] += d;
+            cost(&torques)
+        });
+        assert!(less > least && more > least, "{k} {i}: {less} {least} {more}");
+    }
 }
