@@ -13,7 +13,7 @@ use std::path::Path;
 use std::time::Instant;
 use straightline_trotting_example::closed_loop::{run, summary, Feedback, Push, Scenario, Summary, EXAMPLE};
 use straightline_trotting_example::controller::Controller;
-use straightline_trotting_example::gait::STEP;
+use straightline_trotting_example::gait::{Gait, STEP};
 use straightline_trotting_example::quadruped::{holding, Mode, Slopes, State, NV, STANDING, TORQUE};
 use straightline_trotting_example::sweep::NODES;
 use straightline_trotting_example::task::{Weights, FRICTION};
@@ -77,6 +77,7 @@ fn compare() -> Result<(), Box<dyn Error>> {
         ("the same without costs of cones", Scenario { pushes: &firm, weights: no_cones, ..EXAMPLE }),
         ("gains, pushed with 20 N", Scenario { pushes: &hard, ..EXAMPLE }),
         ("gains, pushed with 30 N", Scenario { pushes: &harder, ..EXAMPLE }),
+        ("gains, at 0.5 m/s", Scenario { gait: Gait { speed: [0.5, 0.0], ..EXAMPLE.gait }, ..EXAMPLE }),
         ("springs, 6 N·m/rad, with 30 N", Scenario { pushes: &harder, ..by(Feedback::Joints(6.0, 0.2)) }),
     ];
     for (name, scenario) in &rows {
