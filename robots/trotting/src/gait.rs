@@ -74,7 +74,7 @@ impl Gait {
     }
 
     /// Where a foot lands that lifts with the trunk in such a state: its corner of the trunk half a swing later, and as much farther as the
-    /// trunk is away from its way, and as [`CAPTURE`] makes of its speed.
+    /// trunk is away from its way, and as a pendulum of its height goes on by its speed.
     pub fn foothold(&self, foot: usize, lands: i64, node: i64, measured: &State) -> [f64; 3] {
         let (ahead, _) = self.trunk(lands + HALF / 2);
         let (wanted, speed) = self.trunk(node);

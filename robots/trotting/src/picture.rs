@@ -12,7 +12,7 @@ const SCALE: f64 = 600.0;
 const ORIGIN: (f64, f64) = (220.0, 215.0);
 /// Between pictures of the trunk \[ms\].
 const EVERY: usize = 1600;
-const COLOURS: [&str; 4] = ["#1f5fa8", "#d95f02", "#1b8a5a", "#8e44ad"];
+const COLOURS: [&str; FEET] = ["#1f5fa8", "#d95f02", "#1b8a5a", "#8e44ad"];
 const FOOT_NAMES: [&str; FEET] = ["front left", "front right", "hind left", "hind right"];
 
 fn line(path: &[(f64, f64)], colour: &str, width: f64) -> String {
@@ -39,9 +39,9 @@ fn view(samples: &[Sample]) -> String {
     }
     let trunk: Vec<(f64, f64)> = samples.iter().step_by(10).map(|s| at(&s.state.q)).collect();
     out += &line(&trunk, "#222", 1.5);
-    for foot in 0..FEET {
+    for (foot, colour) in COLOURS.iter().enumerate() {
         let path: Vec<(f64, f64)> = samples.iter().step_by(8).map(|s| at(&feet(&s.state.q)[foot])).collect();
-        out += &line(&path, COLOURS[foot], 1.2);
+        out += &line(&path, colour, 1.2);
     }
     out
 }
