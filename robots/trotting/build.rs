@@ -4,9 +4,8 @@ use straightline_codegen::fronts::builder::Error;
 use straightline_codegen::Builder;
 
 fn main() -> Result<(), Error> {
-    let solo12 = |scene: &str| Builder::new("../descriptions/solo12.urdf").floating_base(true).scene_file(scene);
+    let solo12 = |scene: &str| Builder::new("../descriptions/solo12.urdf").scene_file(scene);
     solo12("../scenes/quadruped_trot.toml").module("solo12").build()?;
-    // a simulated robot may take a quarter more operations, and saves the minute in which they are sought
-    solo12("../scenes/quadruped_plant.toml").module("plant").option("rules", "exact").build()?;
+    solo12("../scenes/quadruped_plant.toml").module("plant").build()?;
     Ok(())
 }
