@@ -27,7 +27,7 @@ mod values;
 mod zeros;
 
 use super::{count_sums, dead_code, sums};
-use crate::expr::{Binary, Counts, Graph};
+use crate::expr::{Binary, Counts, Graph, NodeId};
 use net::Net;
 use search::EqualitySearch;
 use straightline_core::Dd;
@@ -62,10 +62,10 @@ pub fn substitute(graph: &Graph, largest: usize, keeps: &dyn Fn(&Graph) -> bool)
 
 /// The graph without the operations that make zeros, if there are any.
 fn without_zeros(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
-    let zero = zeros(graph, &values(graph));
+    let values = values(graph);
+    let zero = zeros(graph, &values);
     let less = dead_code(&sums(&without(graph, &zero)?));
-    let is_zero: Vec<bool> = graph.results.iter().map(|r| zero[r.index()]).collect();
-    (is_unchanged(&results(graph), &less, &is_zero) && keeps(&less)).then_some(less)
+    (ExpectedResults::of(graph, &values, &zero).are_those_of(&less) && keeps(&less)).then_some(less)
 }
 
 /// One round: all moves that are there, the most gainful first, each taken if it still pays.
@@ -73,9 +73,8 @@ fn round(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
     let mut net = Net { ops: graph.ops.clone(), notes: graph.notes.clone() };
     let mut best = count_sums(graph);
     let mut taken = None;
-    let before = results(graph);
     let search = EqualitySearch::new(graph);
-    let is_zero: Vec<bool> = graph.results.iter().map(|r| search.zero[r.index()]).collect();
+    let expected = ExpectedResults::of(graph, &search.values, &search.zero);
     let mut live = net.live(graph);
     let mut work = 0;
     for found in search.moves() {
@@ -88,7 +87,7 @@ fn round(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
         work += ordered.ops.len();
         let counts = count_sums(&ordered);
         let fewer = price(counts) < price(best) && counts.flops() <= best.flops() && counts.fma <= best.fma;
-        if fewer && is_unchanged(&before, &ordered, &is_zero) && keeps(&ordered) {
+        if fewer && expected.are_those_of(&ordered) && keeps(&ordered) {
             (net, best, taken) = (tried, counts, Some(ordered));
             live = net.live(graph);
         }
@@ -96,21 +95,26 @@ fn round(graph: &Graph, keeps: &dyn Fn(&Graph) -> bool) -> Option<Graph> {
     taken
 }
 
-/// The results at the random states; none where roots and signs stand for inputs, whose order is that of the graph.
-fn results(graph: &Graph) -> Option<Vec<AtPoints>> {
-    let has_atoms = graph.ops.iter().any(is_atom);
-    (!has_atoms).then(|| {
-        let values = values(graph);
-        graph.results.iter().map(|r| values[r.index()]).collect()
-    })
-}
+/// The results at the random states, but for those that are zero; none where roots and signs stand for inputs, whose order is that of the graph.
+struct ExpectedResults(Option<Vec<Option<AtPoints>>>);
 
-/// Whether another program has the same results, but for those that are zero.
-fn is_unchanged(before: &Option<Vec<AtPoints>>, graph: &Graph, is_zero: &[bool]) -> bool {
-    let Some(before) = before else { return true };
-    let same =
-        |a: &AtPoints, b: &AtPoints| (0..POINTS).all(|k| (a[k] - b[k]).abs().hi() <= UNCHANGED * a[k].abs().hi());
-    results(graph).is_some_and(|after| (0..before.len()).all(|i| is_zero[i] || same(&before[i], &after[i])))
+impl ExpectedResults {
+    /// Of a graph with these values, of which some are zero.
+    fn of(graph: &Graph, values: &[AtPoints], zero: &[bool]) -> ExpectedResults {
+        let known = |r: &NodeId| (!zero[r.index()]).then_some(values[r.index()]);
+        ExpectedResults((!graph.ops.iter().any(is_atom)).then(|| graph.results.iter().map(known).collect()))
+    }
+
+    /// Whether another program has them.
+    fn are_those_of(&self, graph: &Graph) -> bool {
+        let ExpectedResults(Some(expected)) = self else { return true };
+        let values = values(graph);
+        let same = |(before, r): (&Option<AtPoints>, &NodeId)| {
+            let after = &values[r.index()];
+            before.is_none_or(|a| (0..POINTS).all(|k| (a[k] - after[k]).abs().hi() <= UNCHANGED * a[k].abs().hi()))
+        };
+        !graph.ops.iter().any(is_atom) && expected.iter().zip(&graph.results).all(same)
+    }
 }
 
 /// Operations and instructions with fused multiply-add, as either may be what a machine does.
