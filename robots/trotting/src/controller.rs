@@ -5,7 +5,7 @@
 
 use crate::dot;
 use crate::gait::{Gait, STEP};
-use crate::quadruped::{after, feet, Feet, Slopes, State, Torques, Velocity, FEET, JOINTS, TORQUE};
+use crate::quadruped::{after, feet, generalized_forces, Feet, Slopes, State, Torques, Velocity, FEET, JOINTS, TORQUE};
 use crate::sweep::{Factor, Law, Solver, Sweep, NODES};
 use crate::task::{Task, Weights};
 use straightline::control::{Outcome, TorqueLimits};
@@ -96,7 +96,7 @@ impl Controller {
             self.places[foot] = now[foot];
         }
         let torques = self.law.at(0.0, measured);
-        let tau: Velocity = core::array::from_fn(|i| if i < 6 { self.wrench[i] } else { torques[i - 6] });
+        let tau = generalized_forces(&self.wrench, &torques);
         let slopes = Slopes::of(mode, measured, &tau);
         self.foreseen = Some(Foreseen { qd: measured.qd, tau, slopes });
         let start = after(measured, &slopes.qdd, STEP);

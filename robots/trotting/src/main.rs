@@ -14,7 +14,9 @@ use std::time::Instant;
 use straightline_trotting_example::closed_loop::{run, summary, Feedback, Push, Scenario, Summary, EXAMPLE};
 use straightline_trotting_example::controller::Controller;
 use straightline_trotting_example::gait::{Gait, STEP};
-use straightline_trotting_example::quadruped::{holding, Mode, Slopes, State, NV, STANDING, TORQUE};
+use straightline_trotting_example::quadruped::{
+    generalized_forces, holding, Mode, Slopes, State, NV, STANDING, TORQUE,
+};
 use straightline_trotting_example::sweep::NODES;
 use straightline_trotting_example::task::{Weights, FRICTION};
 
@@ -28,8 +30,7 @@ fn quantile(sorted: &[f64], part: f64) -> f64 {
 
 /// The least time of a call \[µs\].
 fn time_of(mode: Mode) -> f64 {
-    let hold = holding(mode, &STANDING);
-    let tau = core::array::from_fn(|i| if i < 6 { 0.0 } else { hold[i - 6] });
+    let tau = generalized_forces(&[0.0; 6], &holding(mode, &STANDING));
     let state = State { q: STANDING, qd: [0.0; NV] };
     let once = |_| {
         let began = Instant::now();

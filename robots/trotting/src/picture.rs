@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 use straightline_trotting_example::closed_loop::{Sample, EXAMPLE};
+use straightline_trotting_example::gait::PLACES;
 use straightline_trotting_example::quadruped::{feet, FEET, TORQUE};
 
 /// Size of the picture [px].
@@ -32,9 +33,9 @@ fn view(samples: &[Sample]) -> String {
         let _ = writeln!(
             out,
             "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"12\" class=\"trunk\" transform=\"rotate({tilt:.2} {x:.1} {y:.1})\"/>",
-            x - 0.1946 * SCALE,
+            x - PLACES[0][0] * SCALE,
             y - 6.0,
-            2.0 * 0.1946 * SCALE
+            2.0 * PLACES[0][0] * SCALE
         );
     }
     let trunk: Vec<(f64, f64)> = samples.iter().step_by(10).map(|s| at(&s.state.q)).collect();

@@ -173,6 +173,11 @@ pub fn difference(a: &State, b: &State) -> Difference {
     })
 }
 
+/// τ of a wrench on the trunk in its axes \[N, N·m\] and torques of the joints \[N·m\].
+pub fn generalized_forces(wrench: &[f64; 6], torques: &Torques) -> Velocity {
+    core::array::from_fn(|i| if i < 6 { wrench[i] } else { torques[i - 6] })
+}
+
 /// Where the feet are \[m\].
 pub fn feet(q: &[f64; NQ]) -> Feet {
     let mut places = [[0.0; 3]; FEET];

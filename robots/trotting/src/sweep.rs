@@ -11,7 +11,9 @@
 //! 1 − h ω× by that.
 
 use crate::gait::STEP;
-use crate::quadruped::{after, difference, Difference, Slopes, State, Torques, Velocity, JOINTS, NV, NX};
+use crate::quadruped::{
+    after, difference, generalized_forces, Difference, Slopes, State, Torques, Velocity, JOINTS, NV, NX,
+};
 use crate::task::Task;
 
 /// Nodes with torques; one more has none.
@@ -107,8 +109,7 @@ impl Solver {
                 self.torques[k][i] += self.steps[k][i] + crate::dot(&self.gains[k][i], &off);
             }
             let u = &self.torques[k];
-            let tau: Velocity = core::array::from_fn(|i| if i < 6 { wrench[i] } else { u[i - 6] });
-            self.slopes[k] = Slopes::of(tasks[k].mode, &state, &tau);
+            self.slopes[k] = Slopes::of(tasks[k].mode, &state, &generalized_forces(wrench, u));
             cost += tasks[k].cost(&state, Some((u, &self.slopes[k])), STEP);
             self.states[k] = state;
             state = after(&state, &self.slopes[k].qdd, STEP);

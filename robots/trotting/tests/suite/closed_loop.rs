@@ -4,7 +4,9 @@ use straightline::control::Outcome;
 use straightline_trotting_example::closed_loop::{run, summary, Feedback, Push, Sample, Scenario, EXAMPLE};
 use straightline_trotting_example::controller::Controller;
 use straightline_trotting_example::gait::STEP;
-use straightline_trotting_example::quadruped::{after, Mode, Slopes, State, JOINTS, NV, STANDING, TORQUE};
+use straightline_trotting_example::quadruped::{
+    after, generalized_forces, Mode, Slopes, State, JOINTS, NV, STANDING, TORQUE,
+};
 use straightline_trotting_example::task::Weights;
 
 /// A load, pushes, ground that gives way: the trunk stays on its way, and comes back to it.
@@ -78,7 +80,7 @@ fn the_wrench_is_found_whatever_torques_acted() {
     let ([torques, others], wrench) =
         ([&standing, &lower].map(|state| controller.torques(0.0, state).0), [0.5, -0.3, -2.0, 0.1, 0.2, -0.05]);
     assert!((0..JOINTS).any(|i| (torques[i] - others[i]).abs() > 0.1), "{torques:?} {others:?}");
-    let tau = core::array::from_fn(|i| if i < 6 { wrench[i] } else { 0.5 * (torques[i - 6] + others[i - 6]) });
+    let tau = generalized_forces(&wrench, &core::array::from_fn(|i| 0.5 * (torques[i] + others[i])));
     let next = after(&standing, &Slopes::of(Mode::Four, &standing, &tau).qdd, STEP);
     controller.sweep(&next).unwrap();
     for i in 0..6 {

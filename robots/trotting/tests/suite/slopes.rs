@@ -3,7 +3,7 @@
 use straightline::integrate::Step;
 use straightline_trotting_example::gait::Gait;
 use straightline_trotting_example::quadruped::{
-    feet, Mode, Slopes, State, Torques, Velocity, FEET, JOINTS, NV, NX, STANDING,
+    feet, generalized_forces, holding, Mode, Slopes, State, Torques, Velocity, FEET, JOINTS, NV, NX, STANDING,
 };
 use straightline_trotting_example::task::{Task, Weights};
 
@@ -79,8 +79,8 @@ fn all_blocks_are_the_slopes_of_motion_and_forces() {
 #[test]
 fn feet_that_stand_carry_the_robot() {
     for mode in MODES {
-        let hold = straightline_trotting_example::quadruped::holding(mode, &STANDING);
-        let tau = core::array::from_fn(|i| if i < 6 { 0.0 } else { hold[i - 6] });
+        let hold = holding(mode, &STANDING);
+        let tau = generalized_forces(&[0.0; 6], &hold);
         let found = Slopes::of(mode, &State { q: STANDING, qd: [0.0; NV] }, &tau);
         let up: f64 = (0..FEET).map(|foot| found.force[3 * foot + 2]).sum();
         // 2.5 kg; legs that hang move a little
@@ -102,8 +102,7 @@ fn the_gradient_is_that_of_the_cost() {
         let task = Task::at(&gait, node, node, &state, &feet(&state.q), Weights::DEFAULT);
         assert_eq!(task.mode, mode);
         let cost = |state: &State, u: &Torques| {
-            let tau = core::array::from_fn(|i| if i < 6 { 0.0 } else { u[i - 6] });
-            let slopes = Slopes::of(mode, state, &tau);
+            let slopes = Slopes::of(mode, state, &generalized_forces(&[0.0; 6], u));
             (task.cost(state, Some((u, &slopes)), 1.3), task.quadratic(state, Some((u, &slopes)), 1.3))
         };
         let (value, found) = cost(&state, &u);
@@ -122,8 +121,7 @@ fn the_gradient_is_that_of_the_cost() {
             assert!((by - slope).abs() < left_out + 1e-5 * (value + slope.abs()), "{mode:?} {k}: {by} {slope}");
         }
         let tame = Task { weights: Weights { cone: 0.0, limit: 0.0, feet: 0.0, ..Weights::DEFAULT }, ..task };
-        let tau = core::array::from_fn(|i| if i < 6 { 0.0 } else { u[i - 6] });
-        let slopes = Slopes::of(mode, &state, &tau);
+        let slopes = Slopes::of(mode, &state, &generalized_forces(&[0.0; 6], &u));
         assert!(task.cost(&state, Some((&u, &slopes)), 1.3) > 1.5 * tame.cost(&state, Some((&u, &slopes)), 1.3));
     }
 }

@@ -3,7 +3,7 @@
 use crate::slopes::{moved, state};
 use straightline_trotting_example::gait::{Gait, PLACES, STEP};
 use straightline_trotting_example::quadruped::{
-    after, difference, Difference, Mode, Slopes, State, Torques, Velocity, JOINTS, NV, NX, STANDING,
+    after, difference, generalized_forces, Difference, Mode, Slopes, State, Torques, Velocity, JOINTS, NV, NX, STANDING,
 };
 use straightline_trotting_example::sweep::{linear, Factor, Solver, NODES};
 use straightline_trotting_example::task::{Task, Weights};
@@ -74,8 +74,7 @@ fn sweeps_settle_where_no_torque_lowers_the_cost() {
     let cost = |torques: &[Torques; NODES]| {
         let (mut state, mut cost) = (start, 0.0);
         for (task, u) in tasks.iter().zip(torques) {
-            let tau = core::array::from_fn(|i| if i < 6 { wrench[i] } else { u[i - 6] });
-            let slopes = Slopes::of(task.mode, &state, &tau);
+            let slopes = Slopes::of(task.mode, &state, &generalized_forces(&wrench, u));
             cost += task.cost(&state, Some((u, &slopes)), STEP);
             state = after(&state, &slopes.qdd, STEP);
         }
