@@ -7,21 +7,13 @@
 mod picture;
 
 use std::error::Error;
-use std::path::Path;
 use std::time::Instant;
+use straightline_example_charts::{write, SweepTimes};
 use straightline_reaching_example::arm::{HAND, TORQUE};
 use straightline_reaching_example::closed_loop::{converged, run, Sample, EXAMPLE, PERIOD};
 use straightline_reaching_example::ilqr::{Solver, NODES, STEP};
 use straightline_reaching_example::task::{State, Task, Weights};
 use straightline_reaching_example::NV;
-
-/// Every sweep is made so often on copies, and the least time is taken: what else a machine does is none of it.
-const REPEATS: usize = 5;
-
-/// The number that this part of all is not above.
-fn quantile(sorted: &[f64], part: f64) -> f64 {
-    sorted[((sorted.len() - 1) as f64 * part).round() as usize]
-}
 
 /// From the hand to its goal \[m\].
 fn way(sample: &Sample) -> f64 {
@@ -43,32 +35,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         solver.motion.cost,
         took / f64::from(count) * 1e6
     );
-    let (mut samples, mut times) = (Vec::new(), Vec::new());
-    let sweep = |solver: &mut Solver, task: &Task, x: &State| {
-        let runs = [(); REPEATS].map(|()| {
-            let mut copy = solver.clone();
-            let began = Instant::now();
-            let sweep = copy.sweep(task, x);
-            (began.elapsed().as_secs_f64() * 1e6, sweep, copy)
-        });
-        times.push(runs.iter().map(|run| run.0).fold(f64::INFINITY, f64::min));
-        let [(_, sweep, copy), ..] = runs;
-        *solver = copy;
-        sweep
-    };
+    let (mut samples, mut times) = (Vec::new(), SweepTimes::<5>(Vec::new()));
+    let sweep = |solver: &mut Solver, task: &Task, x: &State| times.of(solver, |copy| copy.sweep(task, x));
     run(&EXAMPLE, sweep, |sample| samples.push(*sample)).map_err(|why| why.to_string())?;
 
-    let mut sorted = times.clone();
-    sorted.sort_by(f64::total_cmp);
-    let mean = times.iter().sum::<f64>() / times.len() as f64;
     println!("closed loop, a sweep every {:.0} ms for {} s:", PERIOD * 1e3, EXAMPLE.duration);
-    println!(
-        "time per sweep [µs], the least of {REPEATS}: median {:.0}, 99 % within {:.0}, longest {:.0}; {:.0} sweeps per second on one core",
-        quantile(&sorted, 0.5),
-        quantile(&sorted, 0.99),
-        quantile(&sorted, 1.0),
-        1e6 / mean
-    );
+    println!("time per sweep [µs], {times}");
     let trials: u32 = samples.iter().map(|s| s.sweep.trials).sum();
     let idle = samples.iter().filter(|s| s.sweep.part == 0.0).count();
     let held = samples.iter().filter(|s| s.sweep.at_limits > 0).count();
@@ -92,11 +64,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         clear * 1e3,
         100.0 * samples.iter().map(part).fold(0.0, f64::max)
     );
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/panda_reaching.svg");
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder)?;
-    }
-    std::fs::write(&path, picture::svg(&samples, &times))?;
-    println!("\ndrawn: target/panda_reaching.svg");
+    write("panda_reaching.svg", &picture::svg(&samples, &times.0))?;
     Ok(())
 }

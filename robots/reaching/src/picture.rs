@@ -1,6 +1,7 @@
 //! The picture: the arm from above and from the side, and what happens over time.
 
 use std::fmt::Write;
+use straightline_example_charts::{line, Axis, Chart};
 use straightline_reaching_example::arm::{Points, HAND, RADII, TORQUE};
 use straightline_reaching_example::closed_loop::{Sample, EXAMPLE};
 
@@ -81,72 +82,6 @@ fn colour(time: f64) -> &'static str {
     COLOURS[k % 3]
 }
 
-fn line(path: &[(f64, f64)], colour: &str, width: f64) -> String {
-    let points: String = path.iter().map(|(x, y)| format!("{x:.1},{y:.1} ")).collect();
-    format!("<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"/>\n", points.trim_end())
-}
-
-/// A chart over time: its title, its lines with names, and where its axis ends.
-struct Chart<'a> {
-    title: &'a str,
-    lines: Vec<(&'a str, Vec<f64>)>,
-    range: (f64, f64),
-    marks: &'a [f64],
-}
-
-impl Chart<'_> {
-    fn draw(&self, times: &[f64], top: f64) -> String {
-        let (left, right, height) = (90.0, SIZE.0 - 40.0, 120.0);
-        let (low, high) = self.range;
-        let end = EXAMPLE.duration;
-        let x = |t: f64| left + t / end * (right - left);
-        let y = |v: f64| top + 24.0 + height * (1.0 - (v.clamp(low, high) - low) / (high - low));
-        let mut out = format!("<text x=\"40\" y=\"{}\" class=\"title\">{}</text>\n", top + 12.0, self.title);
-        for mark in self.marks {
-            let at = y(*mark);
-            let _ = writeln!(out, "<path d=\"M{left} {at:.1}H{right}\" class=\"grid\"/>");
-            let _ = writeln!(out, "<text x=\"{}\" y=\"{:.1}\" class=\"small end\">{mark}</text>", left - 6.0, at + 4.0);
-        }
-        for second in 0..=end as u32 {
-            let at = x(f64::from(second));
-            let bottom = top + 24.0 + height;
-            let _ =
-                writeln!(out, "<text x=\"{at:.1}\" y=\"{}\" class=\"small middle\">{second} s</text>", bottom + 15.0);
-        }
-        for goal in EXAMPLE.goals {
-            let at = x(goal.from);
-            let _ = writeln!(out, "<path d=\"M{at:.1} {}v{height}\" class=\"grid\"/>", top + 24.0);
-        }
-        for push in EXAMPLE.pushes {
-            let (from, until) = (x(push.from), x(push.until));
-            let _ = writeln!(
-                out,
-                "<rect x=\"{from:.1}\" y=\"{}\" width=\"{:.1}\" height=\"{height}\" class=\"push\"/>",
-                top + 24.0,
-                until - from
-            );
-        }
-        for (k, (name, values)) in self.lines.iter().enumerate() {
-            let step = values.len().div_ceil(1500);
-            // the greatest of each piece, so that no peak is left out
-            let path: Vec<(f64, f64)> = times
-                .chunks(step)
-                .zip(values.chunks(step))
-                .map(|(t, v)| (x(t[0]), y(v.iter().copied().fold(f64::NEG_INFINITY, f64::max))))
-                .collect();
-            out += &line(&path, COLOURS[k % 3], 1.2);
-            let at = right - 160.0 * (self.lines.len() - k) as f64 + 10.0;
-            let _ = writeln!(
-                out,
-                "<text x=\"{at}\" y=\"{}\" class=\"small\" fill=\"{}\">{name}</text>",
-                top + 12.0,
-                COLOURS[k % 3]
-            );
-        }
-        out
-    }
-}
-
 /// The picture of a run, and of the time of its sweeps [µs].
 pub fn svg(samples: &[Sample], sweeps: &[f64]) -> String {
     let (width, height) = SIZE;
@@ -162,7 +97,13 @@ pub fn svg(samples: &[Sample], sweeps: &[f64]) -> String {
     let times: Vec<f64> = samples.iter().map(|s| s.time).collect();
     let away = |s: &Sample| (0..3).map(|i| (s.points[HAND][i] - s.goal[i]).powi(2)).sum::<f64>().sqrt();
     let part = |s: &Sample| s.tau.iter().zip(TORQUE).map(|(tau, most)| tau.abs() / most).fold(0.0, f64::max);
-    let of = |value: &dyn Fn(&Sample) -> f64| samples.iter().map(value).collect::<Vec<f64>>();
+    // the greatest of each piece, so that no peak is left out
+    let peaks = |values: &[f64]| -> Vec<(f64, f64)> {
+        let step = values.len().div_ceil(1500);
+        let greatest = |v: &[f64]| v.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        times.chunks(step).zip(values.chunks(step)).map(|(t, v)| (t[0], greatest(v))).collect()
+    };
+    let of = |value: &dyn Fn(&Sample) -> f64| peaks(&samples.iter().map(value).collect::<Vec<f64>>());
     let charts = [
         Chart {
             title: "hand to goal, arm to the nearest sphere [m]",
@@ -178,13 +119,21 @@ pub fn svg(samples: &[Sample], sweeps: &[f64]) -> String {
         },
         Chart {
             title: "time per sweep [µs], the greatest of each 4 ms: the period is 1000",
-            lines: vec![("time", sweeps.to_vec())],
+            lines: vec![("time", peaks(sweeps))],
             range: (0.0, 1000.0),
             marks: &[0.0, 250.0, 500.0, 750.0, 1000.0],
         },
     ];
+    let axis = Axis {
+        width,
+        end: EXAMPLE.duration,
+        colours: &COLOURS,
+        names_apart: 160.0,
+        instants: &EXAMPLE.goals.iter().map(|goal| goal.from).collect::<Vec<_>>(),
+        shaded: &EXAMPLE.pushes.iter().map(|push| (push.from, push.until)).collect::<Vec<_>>(),
+    };
     for (k, chart) in charts.iter().enumerate() {
-        out += &chart.draw(&times, 590.0 + 180.0 * k as f64);
+        out += &chart.draw(&axis, 590.0 + 180.0 * k as f64);
     }
     out + "</svg>\n"
 }

@@ -9,8 +9,8 @@ mod picture;
 
 use std::error::Error;
 use std::hint::black_box;
-use std::path::Path;
 use std::time::Instant;
+use straightline_example_charts::{write, SweepTimes};
 use straightline_trotting_example::closed_loop::{run, summary, Feedback, Push, Scenario, Summary, EXAMPLE};
 use straightline_trotting_example::controller::Controller;
 use straightline_trotting_example::gait::{Gait, STEP};
@@ -19,14 +19,6 @@ use straightline_trotting_example::quadruped::{
 };
 use straightline_trotting_example::sweep::NODES;
 use straightline_trotting_example::task::{Weights, FRICTION};
-
-/// Every sweep is made so often on copies, and the least time is taken: what else a machine does is none of it.
-const REPEATS: usize = 3;
-
-/// The number that this part of all is not above.
-fn quantile(sorted: &[f64], part: f64) -> f64 {
-    sorted[((sorted.len() - 1) as f64 * part).round() as usize]
-}
 
 /// The least time of a call \[µs\].
 fn time_of(mode: Mode) -> f64 {
@@ -98,42 +90,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         time_of(Mode::Four),
         time_of(Mode::FallingDiagonal)
     );
-    let (mut samples, mut times) = (Vec::new(), Vec::new());
-    let sweep = |controller: &mut Controller, state: &State| {
-        let runs = [(); REPEATS].map(|()| {
-            let mut copy = controller.clone();
-            let began = Instant::now();
-            let sweep = copy.sweep(state);
-            (began.elapsed().as_secs_f64() * 1e6, sweep, copy)
-        });
-        times.push(runs.iter().map(|run| run.0).fold(f64::INFINITY, f64::min));
-        let [(_, sweep, copy), ..] = runs;
-        *controller = copy;
-        sweep
-    };
+    let (mut samples, mut times) = (Vec::new(), SweepTimes::<3>(Vec::new()));
+    let sweep = |controller: &mut Controller, state: &State| times.of(controller, |copy| copy.sweep(state));
     run(&EXAMPLE, sweep, |sample| samples.push(*sample)).map_err(|why| why.to_string())?;
-    let mut sorted = times.clone();
-    sorted.sort_by(f64::total_cmp);
-    println!(
-        "time per sweep of {NODES} nodes [µs], the least of {REPEATS}: median {:.0}, 99 % within {:.0}, longest {:.0}; {:.0} sweeps per second on \
-         one core, {:.0} are asked for",
-        quantile(&sorted, 0.5),
-        quantile(&sorted, 0.99),
-        quantile(&sorted, 1.0),
-        1e6 * times.len() as f64 / times.iter().sum::<f64>(),
-        1.0 / STEP
-    );
+    println!("time per sweep of {NODES} nodes [µs], {times}, {:.0} are asked for", 1.0 / STEP);
     compare()?;
 
     let mut blind = Vec::new();
     let springs = Scenario { feedback: Feedback::Joints(6.0, 0.2), ..EXAMPLE };
     run(&springs, |controller, state| controller.sweep(state), |sample| blind.push(*sample))
         .map_err(|why| why.to_string())?;
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/solo12_trotting.svg");
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder)?;
-    }
-    std::fs::write(&path, picture::svg(&samples, &blind, &times))?;
-    println!("\ndrawn: target/solo12_trotting.svg");
+    write("solo12_trotting.svg", &picture::svg(&samples, &blind, &times.0))?;
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! The picture: the ways of trunk and feet from the side, and what happens over time.
 
 use std::fmt::Write;
+use straightline_example_charts::{line, Axis, Chart};
 use straightline_trotting_example::closed_loop::{Sample, EXAMPLE};
 use straightline_trotting_example::gait::PLACES;
 use straightline_trotting_example::quadruped::{feet, FEET, TORQUE};
@@ -15,11 +16,6 @@ const ORIGIN: (f64, f64) = (220.0, 215.0);
 const EVERY: usize = 1600;
 const COLOURS: [&str; FEET] = ["#1f5fa8", "#d95f02", "#1b8a5a", "#8e44ad"];
 const FOOT_NAMES: [&str; FEET] = ["front left", "front right", "hind left", "hind right"];
-
-fn line(path: &[(f64, f64)], colour: &str, width: f64) -> String {
-    let points: String = path.iter().map(|(x, y)| format!("{x:.1},{y:.1} ")).collect();
-    format!("<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"/>\n", points.trim_end())
-}
 
 /// From the side: x right, z up.
 fn view(samples: &[Sample]) -> String {
@@ -47,62 +43,6 @@ fn view(samples: &[Sample]) -> String {
     out
 }
 
-/// A chart over time: its title, its lines with names, and where its axis ends.
-struct Chart<'a> {
-    title: &'a str,
-    lines: Vec<(&'a str, Vec<f64>)>,
-    range: (f64, f64),
-    marks: &'a [f64],
-}
-
-impl Chart<'_> {
-    fn draw(&self, top: f64) -> String {
-        let (left, right, height) = (90.0, SIZE.0 - 40.0, 120.0);
-        let (low, high) = self.range;
-        let end = EXAMPLE.duration;
-        let y = |v: f64| top + 24.0 + height * (1.0 - (v.clamp(low, high) - low) / (high - low));
-        let mut out = format!("<text x=\"40\" y=\"{}\" class=\"title\">{}</text>\n", top + 12.0, self.title);
-        for push in EXAMPLE.pushes {
-            let [from, until] = [push.from, push.until].map(|t| left + t / end * (right - left));
-            let _ = writeln!(
-                out,
-                "<rect x=\"{from:.1}\" y=\"{}\" width=\"{:.1}\" height=\"{height}\" class=\"push\"/>",
-                top + 24.0,
-                until - from
-            );
-        }
-        for mark in self.marks {
-            let at = y(*mark);
-            let _ = writeln!(out, "<path d=\"M{left} {at:.1}H{right}\" class=\"grid\"/>");
-            let _ = writeln!(out, "<text x=\"{}\" y=\"{:.1}\" class=\"small end\">{mark}</text>", left - 6.0, at + 4.0);
-        }
-        for second in 0..=end as u32 {
-            let at = left + f64::from(second) / end * (right - left);
-            let bottom = top + 24.0 + height;
-            let _ =
-                writeln!(out, "<text x=\"{at:.1}\" y=\"{}\" class=\"small middle\">{second} s</text>", bottom + 15.0);
-        }
-        for (k, (name, values)) in self.lines.iter().enumerate() {
-            let last = values.len().max(2) - 1;
-            let path: Vec<(f64, f64)> = values
-                .iter()
-                .enumerate()
-                .step_by((values.len() / 1000).max(1))
-                .map(|(i, v)| (left + i as f64 / last as f64 * (right - left), y(*v)))
-                .collect();
-            out += &line(&path, COLOURS[k % 4], 1.1);
-            let at = right - 130.0 * (self.lines.len() - k) as f64 + 10.0;
-            let _ = writeln!(
-                out,
-                "<text x=\"{at}\" y=\"{}\" class=\"small\" fill=\"{}\">{name}</text>",
-                top + 12.0,
-                COLOURS[k % 4]
-            );
-        }
-        out
-    }
-}
-
 /// The picture of a run by gains, of the same with springs of the joints, and of the time of sweeps [µs].
 pub fn svg(samples: &[Sample], springs: &[Sample], sweeps: &[f64]) -> String {
     let (width, height) = SIZE;
@@ -113,8 +53,14 @@ pub fn svg(samples: &[Sample], springs: &[Sample], sweeps: &[f64]) -> String {
          .push{{fill:#b82e45;fill-opacity:0.25}}</style>\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
     );
     out += &view(samples);
-    fn of(samples: &[Sample], value: impl Fn(&Sample) -> f64) -> Vec<f64> {
-        samples.iter().map(value).collect()
+    /// A thousand of these values at most, from the beginning to the end of the scene.
+    fn over_time(values: &[f64]) -> Vec<(f64, f64)> {
+        let last = values.len().max(2) - 1;
+        let at = |(i, v): (usize, &f64)| (i as f64 / last as f64 * EXAMPLE.duration, *v);
+        values.iter().enumerate().step_by((values.len() / 1000).max(1)).map(at).collect()
+    }
+    fn of(samples: &[Sample], value: impl Fn(&Sample) -> f64) -> Vec<(f64, f64)> {
+        over_time(&samples.iter().map(value).collect::<Vec<f64>>())
     }
     let off = |i: usize| move |s: &Sample| 1e3 * (s.state.q[i] - s.wanted[i]);
     let part = |s: &Sample| s.torques.iter().fold(0.0f64, |most, tau| most.max(tau.abs())) / TORQUE;
@@ -159,13 +105,21 @@ pub fn svg(samples: &[Sample], springs: &[Sample], sweeps: &[f64]) -> String {
         },
         Chart {
             title: "time per sweep [ms]: one every 10 ms",
-            lines: vec![("time", sweeps.iter().map(|t| 1e-3 * t).collect())],
+            lines: vec![("time", over_time(&sweeps.iter().map(|t| 1e-3 * t).collect::<Vec<f64>>()))],
             range: (0.0, 10.0),
             marks: &[0.0, 5.0, 10.0],
         },
     ];
+    let axis = Axis {
+        width,
+        end: EXAMPLE.duration,
+        colours: &COLOURS,
+        names_apart: 130.0,
+        instants: &[],
+        shaded: &EXAMPLE.pushes.iter().map(|push| (push.from, push.until)).collect::<Vec<_>>(),
+    };
     for (k, chart) in charts.iter().enumerate() {
-        out += &chart.draw(245.0 + 178.0 * k as f64);
+        out += &chart.draw(&axis, 245.0 + 178.0 * k as f64);
     }
     out + "</svg>\n"
 }
