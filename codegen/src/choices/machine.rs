@@ -28,6 +28,8 @@ pub struct MachineRow {
     pub accumulates: &'static [Memory],
     /// Whether it computes one angle at a time, so that short sines pay.
     pub is_scalar: bool,
+    /// The memories from which a call has the short sines of two angles, as four numbers come back in registers.
+    pub sines_by_two: &'static [Memory],
     /// How its machine code is read; none: it is not.
     pub code: Option<InstructionSet>,
     /// Instructions that functions of the compiler's library take for a number, on average; none are known of a library that is not here.
@@ -113,6 +115,7 @@ machines! {
         registers: None,
         accumulates: &[],
         is_scalar: true,
+        sines_by_two: &[],
         code: Some(InstructionSet::Thumb),
         library: OF_CORTEX_M0PLUS,
         cycles: None,
@@ -129,6 +132,7 @@ machines! {
         registers: None,
         accumulates: &[],
         is_scalar: true,
+        sines_by_two: &[],
         code: Some(InstructionSet::Thumb),
         library: NOT_MEASURED,
         cycles: None,
@@ -145,6 +149,7 @@ machines! {
         registers: Some(32),
         accumulates: &[Memory::Flash],
         is_scalar: true,
+        sines_by_two: &[Memory::Flash],
         code: Some(InstructionSet::Thumb),
         library: OF_CORTEX_M4F,
         cycles: Some(CYCLES_OF_CORTEX_M4),
@@ -161,6 +166,7 @@ machines! {
         registers: Some(32),
         accumulates: &[Memory::Flash, Memory::Tcm],
         is_scalar: true,
+        sines_by_two: &[Memory::Flash],
         code: Some(InstructionSet::Thumb),
         library: NOT_MEASURED,
         cycles: None,
@@ -177,6 +183,7 @@ machines! {
         registers: Some(32),
         accumulates: &[Memory::Flash],
         is_scalar: true,
+        sines_by_two: &[Memory::Flash],
         code: Some(InstructionSet::Thumb),
         library: NOT_MEASURED,
         cycles: None,
@@ -193,6 +200,7 @@ machines! {
         registers: None,
         accumulates: &[],
         is_scalar: true,
+        sines_by_two: &[],
         code: Some(InstructionSet::RiscV),
         library: OF_RV32IMAC,
         cycles: None,
@@ -209,6 +217,7 @@ machines! {
         registers: Some(32),
         accumulates: &[],
         is_scalar: true,
+        sines_by_two: &[],
         code: Some(InstructionSet::RiscV),
         library: OF_RV32IMAFC,
         cycles: None,
@@ -225,6 +234,7 @@ machines! {
         registers: Some(32),
         accumulates: &[],
         is_scalar: false,
+        sines_by_two: &[],
         code: Some(InstructionSet::Arm64),
         library: NOT_MEASURED,
         cycles: None,
@@ -241,6 +251,7 @@ machines! {
         registers: Some(16),
         accumulates: &[],
         is_scalar: false,
+        sines_by_two: &[],
         code: None,
         library: NOT_MEASURED,
         cycles: None,
@@ -263,6 +274,7 @@ impl TargetMachine {
             registers,
             accumulates: self.0.accumulates.contains(&memory),
             is_in_flash: memory == Memory::Flash,
+            sines_by_two: self.0.sines_by_two.contains(&memory),
             cycles: self.0.cycles,
         })
     }

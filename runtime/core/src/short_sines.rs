@@ -40,6 +40,42 @@ pub fn sin_cos_of_sum_f32([x, tail]: [f32; 2]) -> (f32, f32) {
     kernel((x - k * P0) - (k * P1 - tail), quadrant)
 }
 
+/// The same of two angles by one call, which loads its constants once: sines and cosines, the bits of [`sin_cos_f32`].
+#[inline(always)]
+#[must_use]
+pub fn sin_cos_lanes_f32([x, y]: [f32; 2]) -> ([f32; 2], [f32; 2]) {
+    let Halves([sin_x, cos_x, sin_y, cos_y]) = of_two(x, y);
+    ([sin_x, sin_y], [cos_x, cos_y])
+}
+
+/// The same of two sums by one call, the bits of [`sin_cos_of_sum_f32`].
+#[inline(always)]
+#[must_use]
+pub fn sin_cos_lanes_of_sums_f32([[x, of_x], [y, of_y]]: [[f32; 2]; 2]) -> ([f32; 2], [f32; 2]) {
+    let Halves([sin_x, cos_x, sin_y, cos_y]) = of_two_sums(x, of_x, y, of_y);
+    ([sin_x, sin_y], [cos_x, cos_y])
+}
+
+/// Sine and cosine of the first angle, then of the second: Arm's calling convention of C has four numbers in registers, Rust's two.
+#[repr(C)]
+struct Halves([f32; 4]);
+
+#[inline]
+extern "C" fn of_two(x: f32, y: f32) -> Halves {
+    let [(k, of_x), (l, of_y)] = [quarter_turns(x), quarter_turns(y)];
+    let (sin_x, cos_x) = kernel((x - k * P0) - k * P1, of_x);
+    let (sin_y, cos_y) = kernel((y - l * P0) - l * P1, of_y);
+    Halves([sin_x, cos_x, sin_y, cos_y])
+}
+
+#[inline]
+extern "C" fn of_two_sums(x: f32, tail_of_x: f32, y: f32, tail_of_y: f32) -> Halves {
+    let [(k, of_x), (l, of_y)] = [quarter_turns(x), quarter_turns(y)];
+    let (sin_x, cos_x) = kernel((x - k * P0) - (k * P1 - tail_of_x), of_x);
+    let (sin_y, cos_y) = kernel((y - l * P0) - (l * P1 - tail_of_y), of_y);
+    Halves([sin_x, cos_x, sin_y, cos_y])
+}
+
 /// The sum of some angles, rounded, and what the rounding lost: TwoSum (Knuth 1969) one after the other.
 ///
 /// Three are written out: beside a loop, even one of which nothing is left, a compiler puts calls into another order.

@@ -27,13 +27,21 @@ const MOMENTS: usize = 3;
 /// The order of which the model of the machine says that it costs least, if that is less than this one does.
 pub(super) fn annealed(graph: &Graph, order: &[NodeId], machine: &ScheduleMachine) -> Option<Vec<NodeId>> {
     let judged = |order: &[NodeId]| estimate(graph, order, machine);
-    let written = judged(order);
-    if written.waiting == 0 {
-        return None;
-    }
-    let steps = Steps::new(graph, order);
+    let steps = Steps::new(graph, order, machine.sines_by_two);
     let start = steps.order(order);
+    // text that keeps no order has a call per angle
+    let written = estimate(graph, order, &ScheduleMachine { sines_by_two: false, ..*machine });
     let mut best = (OrderCost::of(&written, machine), None);
+    if machine.sines_by_two {
+        let together = steps.nodes(&start);
+        let cost = OrderCost::of(&judged(&together), machine);
+        if cost < best.0 {
+            best = (cost, Some(together));
+        }
+    }
+    if best.1.as_deref().map_or(written, judged).waiting == 0 {
+        return best.1;
+    }
     let judged_behind = STRETCHES.0 - (JUDGED / steps.steps.len()).clamp(1, STRETCHES.1);
     let moves = (MOVES.0 * steps.steps.len()).min(MOVES.1);
     for seed in 0..(SEARCHES.1 / moves.max(1)).clamp(1, SEARCHES.0) {
@@ -215,10 +223,11 @@ fn alive(steps: &Steps, order: &[usize]) -> Vec<isize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::expr::{GraphBuilder, Op, Port, RuleSet};
+    use crate::expr::{GraphBuilder, Op, Port, RuleSet, Sines};
+    use crate::schedule::{calls_of_two, schedule, ScheduleLimits};
 
     fn machine(registers: usize) -> ScheduleMachine {
-        ScheduleMachine { registers, accumulates: true, is_in_flash: true, cycles: None }
+        ScheduleMachine { registers, accumulates: true, is_in_flash: true, sines_by_two: false, cycles: None }
     }
 
     /// Sums x₀ xₖ + s of neighbours, all made before the first is needed, each twice.
@@ -264,10 +273,33 @@ mod tests {
         assert!(annealed(&graph, &written, &machine(10)).is_some(), "and does not where they hold less");
     }
 
+    /// Angles whose sines are needed one after the other stand together where a call takes two of them.
+    #[test]
+    fn calls_of_sines_are_joined_by_twos_where_the_machine_has_such_a_call() {
+        let mut b = GraphBuilder::new(RuleSet::all(), vec![Port::new("x", &[5])]);
+        let x: Vec<NodeId> = (0..5).map(|k| b.insert(Op::Input(k))).collect();
+        let mut sum = x[0];
+        for angle in &x {
+            let pair = b.insert(Op::SinCos(*angle));
+            let [sine, cosine] = [Op::Sin(pair), Op::Cos(pair)].map(|half| b.insert(half));
+            let product = b.insert(Op::mul(sum, sine));
+            sum = b.insert(Op::add(product, cosine));
+        }
+        let graph = Graph { sines: Sines::Short, ..b.finish(vec![Port::new("y", &[1])], vec![sum]) };
+        let calls = |machine: &ScheduleMachine| {
+            let made = schedule(&graph, ScheduleLimits::default(), Some(machine));
+            let part = &made.parts[0];
+            let by_two = calls_of_two(&graph, &part.nodes).into_iter().filter(|takes_next| *takes_next).count();
+            (part.sines_by_two, by_two)
+        };
+        assert_eq!(calls(&machine(32)), (false, 0));
+        assert_eq!(calls(&ScheduleMachine { sines_by_two: true, ..machine(32) }), (true, 2));
+    }
+
     #[test]
     fn what_a_move_changes_is_what_counting_again_finds() {
         let (graph, written) = waiting(40);
-        let steps = Steps::new(&graph, &written);
+        let steps = Steps::new(&graph, &written, false);
         let mut search = OrderSearch::new(&steps, steps.order(&written), 8, 0);
         let start = search.alive.clone();
         for k in 0..2000 {

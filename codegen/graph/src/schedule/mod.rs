@@ -11,6 +11,7 @@ mod machine;
 mod steps;
 
 pub use machine::{estimate, CycleModel, ProgramEstimate, ScheduleMachine};
+pub use steps::calls_of_two;
 
 use crate::expr::{Graph, NodeId, Op, Sines};
 
@@ -43,6 +44,8 @@ pub struct ProgramPart {
     pub results: Vec<usize>,
     /// Whether text keeps each operation where it stands here, as the order is made for the registers of a machine.
     pub keeps_order: bool,
+    /// Whether sines that stand together come from one call, two of them: [`calls_of_two`].
+    pub sines_by_two: bool,
 }
 
 /// A program in its final order.
@@ -73,7 +76,7 @@ fn weight(op: Op) -> usize {
 /// memory; so do programs that are cut. Where the machine is known, the order is searched for its registers, if angles are computed one at a time.
 pub fn schedule(graph: &Graph, limits: ScheduleLimits, machine: Option<&ScheduleMachine>) -> Schedule {
     let mut order: Vec<NodeId> = graph.ids().filter(|id| is_value(graph.op(*id))).collect();
-    let (mut keeps_order, mut made_for) = (false, None);
+    let (mut keeps_order, mut sines_by_two, mut made_for) = (false, false, None);
     let limits = if graph.alike.is_empty() { limits } else { ScheduleLimits { operations: usize::MAX } };
     if graph.alike.is_empty() && order.iter().map(|id| weight(graph.op(*id))).sum::<usize>() <= limits.operations {
         order = few_alive::improved(graph, order, machine.map(|machine| machine.registers));
@@ -82,7 +85,8 @@ pub fn schedule(graph: &Graph, limits: ScheduleLimits, machine: Option<&Schedule
         if let Some(better) = machine.and_then(|machine| annealing::annealed(graph, &order, machine)) {
             (order, keeps_order) = (better, true);
         }
-        made_for = machine.map(|machine| estimate(graph, &order, machine));
+        sines_by_two = keeps_order && machine.is_some_and(|machine| machine.sines_by_two);
+        made_for = machine.map(|machine| estimate(graph, &order, &ScheduleMachine { sines_by_two, ..*machine }));
     }
     let position = {
         let mut position = vec![usize::MAX; graph.ops.len()];
@@ -117,7 +121,7 @@ pub fn schedule(graph: &Graph, limits: ScheduleLimits, machine: Option<&Schedule
 
     let cuts = cuts(graph, &order, &live_after, limits);
     let part_of = |p: usize| cuts.partition_point(|c| *c <= p);
-    let mut parts = vec![ProgramPart { keeps_order, ..ProgramPart::default() }; cuts.len() + 1];
+    let mut parts = vec![ProgramPart { keeps_order, sines_by_two, ..ProgramPart::default() }; cuts.len() + 1];
     for (p, id) in order.iter().enumerate() {
         parts[part_of(p)].nodes.push(*id);
     }

@@ -2,6 +2,7 @@
 //!
 //! * A product of single use is computed with the sum that takes it, whether the machine has an instruction for both or two: beside its sum it waits in
 //!   no register, and a search over fewer steps finds more.
+//! * Angles have their sines by one call, two of them, where the machine has such a call.
 //! * An input is loaded once, where it is first needed; of an array the first four that are needed are loaded together. From then on it is a value
 //!   like any other.
 //! * A constant is loaded where it is needed, and again if its register was taken: it is no value that waits.
@@ -42,7 +43,7 @@ pub(super) struct Steps {
 }
 
 impl Steps {
-    pub fn new(graph: &Graph, written: &[NodeId]) -> Steps {
+    pub fn new(graph: &Graph, written: &[NodeId], sines_by_two: bool) -> Steps {
         let host = hosts(graph, written, true);
         let mut made = Steps {
             steps: Vec::new(),
@@ -52,6 +53,8 @@ impl Steps {
             is_constant: graph.ops.iter().map(|op| matches!(op, Op::Constant(_))).collect(),
             step_of: vec![usize::MAX; graph.ops.len()],
         };
+        // a call that has room for a second angle
+        let mut alone: Option<usize> = None;
         for id in written.iter().filter(|id| host[id.index()].is_none()) {
             match graph.op(*id) {
                 // a half belongs to its pair, which stands before it
@@ -61,6 +64,16 @@ impl Steps {
                     made.steps[step].makes.push(id.index());
                     made.step_of[id.index()] = step;
                 }
+                Op::SinCos(angle) if sines_by_two && is_given(graph, angle) => match alone.take() {
+                    Some(call) => {
+                        made.steps[call].nodes.push(*id);
+                        made.step_of[id.index()] = call;
+                    }
+                    None => {
+                        alone = Some(made.steps.len());
+                        made.push(step(graph, *id, &host));
+                    }
+                },
                 _ => made.push(step(graph, *id, &host)),
             }
         }
@@ -150,6 +163,28 @@ impl Steps {
     pub fn nodes(&self, order: &[usize]) -> Vec<NodeId> {
         order.iter().flat_map(|step| self.steps[*step].nodes.iter().copied()).collect()
     }
+}
+
+/// Whether an angle is a sum of inputs, which are there wherever it is needed.
+fn is_given(graph: &Graph, angle: NodeId) -> bool {
+    graph.angle_terms(angle).into_iter().all(|term| matches!(graph.op(term), Op::Input(_)))
+}
+
+/// Which calls of sines take the angle of the next one along, in this order: of calls that stand together, the first, the third, …
+pub fn calls_of_two(graph: &Graph, order: &[NodeId]) -> Vec<bool> {
+    let mut takes_next = vec![false; graph.ops.len()];
+    let mut last: Option<NodeId> = None;
+    for id in order {
+        match graph.op(*id) {
+            Op::Sin(_) | Op::Cos(_) => {}
+            Op::SinCos(_) => match last.take() {
+                Some(first) => takes_next[first.index()] = true,
+                None => last = Some(*id),
+            },
+            _ => last = None,
+        }
+    }
+    takes_next
 }
 
 /// The step that an operation ends.

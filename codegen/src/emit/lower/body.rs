@@ -170,7 +170,11 @@ impl<'a> Statements<'a> {
                 Op::SinCos(_) if self.paired[id.index()] => {}
                 Op::SinCos(_) => {
                     let section_of = |n: &NodeId| self.graph.notes[n.index()].section;
-                    let count = nodes[k..].iter().take_while(|n| section_of(n) == here).count();
+                    let is_half = |n: &NodeId| matches!(self.graph.op(*n), Op::SinCos(_) | Op::Sin(_) | Op::Cos(_));
+                    let count = match plan.part.keeps_order {
+                        true => nodes[k..].iter().take_while(|n| is_half(n)).count(),
+                        false => nodes[k..].iter().take_while(|n| section_of(n) == here).count(),
+                    };
                     self.sin_cos(&nodes[k..k + count], plan);
                 }
                 _ if plan.absorbed[id.index()] => {}
@@ -311,7 +315,11 @@ impl<'a> Statements<'a> {
         // the loop around the body has the lanes; a call fills the widest vectors there are, more at once would not stay in registers
         let style = self.scope.style;
         let kernel = self.graph.sines;
-        let most = if style.lanes || kernel == Sines::Short { 1 } else { 64 / style.scalar.bytes() };
+        let most = match kernel {
+            Sines::Short if plan.part.sines_by_two => 2,
+            Sines::Precise if !style.lanes => 64 / style.scalar.bytes(),
+            _ => 1,
+        };
         for ((angles, sines), cosines) in angles.chunks(most).zip(sines.chunks(most)).zip(cosines.chunks(most)) {
             let (sines, cosines, angles) = (sines.to_vec(), cosines.to_vec(), angles.to_vec());
             self.statements.push(Statement::SinCos { kernel, sines, cosines, angles });

@@ -85,12 +85,8 @@ impl Target for Rust {
             Statement::Keep { slot, value } => {
                 line(format!("{} = {};", expression(&Expression::Slot(*slot)), expression(value)))
             }
-            Statement::SinCos { kernel: Sines::Precise, sines, cosines, angles } => {
-                indented(self.sin_cos([sines, cosines], angles, scope), level)
-            }
-            Statement::SinCos { kernel: Sines::Short, sines, cosines, angles } => {
-                let pairs = sines.iter().zip(cosines).zip(angles);
-                pairs.map(|((sin, cos), angle)| line(self.short_sines([sin, cos], angle, scope))).collect()
+            Statement::SinCos { kernel, sines, cosines, angles } => {
+                indented(self.sin_cos(*kernel, [sines, cosines], angles, scope), level)
             }
             Statement::Array { name, values, is_constant } => {
                 let (word, number) = (if *is_constant { "static" } else { "let" }, number_type(style));
@@ -143,21 +139,24 @@ impl Rust {
         format!("{indent}for {index} in {turns} {{\n{body}{indent}}}\n")
     }
 
-    /// Sine and cosine of an angle by the kernel of short ones.
-    fn short_sines(&self, halves: [&Option<String>; 2], angle: &[Expression], scope: Scope<'_>) -> String {
-        let [sin, cos] = halves.map(|name| name.as_deref().unwrap_or("_"));
-        let (module, scalar) = (SHORT_SINES, scope.style.scalar.name());
-        let terms = angle.iter().map(|e| self.expression(e, scope)).collect::<Vec<_>>().join(", ");
-        let call = match angle {
-            [_] => format!("sin_cos_{scalar}({terms})"),
-            _ => format!("sin_cos_of_sum_{scalar}({module}::sum_of_angles_{scalar}([{terms}]))"),
-        };
-        format!("let ({sin}, {cos}) = {module}::{call};")
-    }
-
     /// Sines and cosines of some angles by one call of the kernel.
-    fn sin_cos(&self, halves: [&[Option<String>]; 2], angles: &[Vec<Expression>], scope: Scope<'_>) -> String {
+    fn sin_cos(
+        &self,
+        kernel: Sines,
+        halves: [&[Option<String>]; 2],
+        angles: &[Vec<Expression>],
+        scope: Scope<'_>,
+    ) -> String {
         let style = scope.style;
+        let short = |function: &str| format!("{SHORT_SINES}::{function}_{}", style.scalar.name());
+        let path = |function: &str| match kernel {
+            Sines::Short => short(function),
+            Sines::Precise => sin_cos_path(function, style),
+        };
+        let path_of_sum = match kernel {
+            Sines::Short => short("sum_of_angles"),
+            Sines::Precise => kernel_path("sum_of_angles", style),
+        };
         let expression = |e: &Expression| self.expression(e, scope);
         // a sum goes through with what its rounding lost
         let sums = angles.iter().any(|terms| terms.len() > 1);
@@ -169,7 +168,7 @@ impl Rust {
                 let terms = terms.iter().map(expression).collect::<Vec<_>>().join(", ");
                 match style.generic {
                     true => format!("T::sum_of_angles(&[{terms}])"),
-                    false => format!("{}([{terms}])", kernel_path("sum_of_angles", style)),
+                    false => format!("{path_of_sum}([{terms}])"),
                 }
             }
         };
@@ -184,11 +183,11 @@ impl Rust {
         };
         let [sines, cosines] = halves.map(names);
         match (sines.as_slice(), cosines.as_slice(), arguments.as_slice()) {
-            ([s], [c], [angle]) => format!("    let ({s}, {c}) = {}({angle});\n", sin_cos_path(single, style)),
+            ([s], [c], [angle]) => format!("    let ({s}, {c}) = {}({angle});\n", path(single)),
             _ => [
                 wrapped("    let ([", &sines, "],"),
                 wrapped("        [", &cosines, "]) ="),
-                wrapped(&format!("        {}([", sin_cos_path(several, style)), &arguments, "]);"),
+                wrapped(&format!("        {}([", path(several)), &arguments, "]);"),
             ]
             .concat(),
         }

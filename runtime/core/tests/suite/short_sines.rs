@@ -1,7 +1,10 @@
 //! Short sines and cosines: truth × arguments × bound. The truth is `std`'s f64.
 
 use crate::measure::Random;
-use straightline_core::short_sines::{sin_cos_f32, sin_cos_of_sum_f32, sum_of_angles_f32, DOMAIN_F32, ERROR_F32};
+use straightline_core::short_sines::{
+    sin_cos_f32, sin_cos_lanes_f32, sin_cos_lanes_of_sums_f32, sin_cos_of_sum_f32, sum_of_angles_f32, DOMAIN_F32,
+    ERROR_F32,
+};
 use straightline_core::Real;
 
 /// Further than this from zero no y comes out of the reduction: π/4, and 256 quarter turns off by half an ulp of 256.
@@ -124,5 +127,20 @@ fn sums_of_angles_have_the_bits_of_a_loop_that_begins_with_nothing_lost() {
         agree([a, b, c]);
         agree([a, b, c, d]);
         agree(angles);
+    }
+}
+
+#[test]
+fn two_angles_by_one_call_have_the_bits_of_each_alone() {
+    let bits = |x: (f32, f32)| (x.0.to_bits(), x.1.to_bits());
+    let apart = |([a, b], [c, d]): ([f32; 2], [f32; 2])| [bits((a, c)), bits((b, d))];
+    let mut random = Random(11);
+    for _ in 0..20_000 {
+        let [x, y, z] = std::array::from_fn(|_| random.uniform(-130.0, 130.0) as f32);
+        assert_eq!(apart(sin_cos_lanes_f32([x, y])), [x, y].map(|x| bits(sin_cos_f32(x))), "{x} {y}");
+        let sums = [sum_of_angles_f32([x, y]), sum_of_angles_f32([x, y, z])];
+        assert_eq!(apart(sin_cos_lanes_of_sums_f32(sums)), sums.map(|x| bits(sin_cos_of_sum_f32(x))), "{x} {y} {z}");
+        // an angle that is no sum lost nothing
+        assert_eq!(apart(sin_cos_lanes_of_sums_f32([[x, 0.0], sums[1]]))[0], bits(sin_cos_f32(x)), "{x}");
     }
 }

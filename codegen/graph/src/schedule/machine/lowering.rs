@@ -9,6 +9,7 @@
 use super::allocation::{CodeLine, LineKind};
 use super::ScheduleMachine;
 use crate::expr::{Binary, Graph, NodeId, Op, Unary};
+use crate::schedule::calls_of_two;
 use std::collections::BTreeMap;
 
 /// What an instruction costs, apart from loads and stores of the allocator.
@@ -29,10 +30,23 @@ pub(super) enum LineClass {
     /// A constant, which an instruction holds or which is loaded.
     Held,
     Loaded,
-    /// A call of a kernel, of one angle or of a sum.
-    Call(bool),
+    /// A call of a kernel.
+    Call(Kernel),
     /// Copies, which may fall away.
     Copy,
+}
+
+/// Kernels of sines: of one angle or two, of which one is a sum or none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kernel {
+    One,
+    Sum,
+    Two,
+    TwoSums,
+}
+
+impl Kernel {
+    pub const ALL: [Kernel; 4] = [Kernel::One, Kernel::Sum, Kernel::Two, Kernel::TwoSums];
 }
 
 /// Instructions of a program, with ranges for its values.
@@ -64,6 +78,8 @@ pub(super) fn lowered(graph: &Graph, order: &[NodeId], machine: &ScheduleMachine
         left: graph.uses(),
         host: super::hosts(graph, order, machine.accumulates),
         results: Vec::new(),
+        takes_next: if machine.sines_by_two { calls_of_two(graph, order) } else { vec![false; graph.ops.len()] },
+        waiting: None,
     };
     selection.results = graph.results.iter().enumerate().map(|(k, id)| (*id, k)).collect();
     selection.results.sort_unstable();
@@ -97,6 +113,9 @@ struct InstructionSelection<'a> {
     /// Of every product of single use the sum that takes it in.
     host: Vec<Option<NodeId>>,
     results: Vec<(NodeId, usize)>,
+    /// Which calls of sines take the next angle along, and the pair that waits for the next.
+    takes_next: Vec<bool>,
+    waiting: Option<NodeId>,
 }
 
 impl InstructionSelection<'_> {
@@ -167,7 +186,14 @@ impl InstructionSelection<'_> {
         }
         let range = match self.graph.op(id) {
             Op::Input(_) | Op::Constant(_) | Op::AngleSum(..) | Op::Sin(_) | Op::Cos(_) => return,
-            Op::SinCos(angle) => return self.sines(id, angle),
+            Op::SinCos(_) if self.takes_next[id.index()] => {
+                self.waiting = Some(id);
+                return;
+            }
+            Op::SinCos(_) => {
+                let first = self.waiting.take();
+                return self.sines(&first.into_iter().chain([id]).collect::<Vec<_>>());
+            }
             Op::Unary(Unary::Neg, a) => {
                 let range = self.operands(&[a])[0];
                 // a sign before a product or a sum is part of it
@@ -262,29 +288,22 @@ impl InstructionSelection<'_> {
         (next, Some(own))
     }
 
-    fn sines(&mut self, pair: NodeId, angle: NodeId) {
-        let terms = self.graph.angle_terms(angle);
-        terms.iter().for_each(|term| self.left[term.index()] = self.left[term.index()].saturating_sub(1));
-        let (angle, tail) = self.angle(&terms);
-        let halves = [Op::Sin(pair), Op::Cos(pair)].map(|half| {
-            let ids = (pair.0 + 1..pair.0 + 3).map(NodeId);
-            let mut ids = ids.filter(|id| self.graph.ops.get(id.index()) == Some(&half));
-            ids.find(|id| self.left[id.index()] > 0)
-        });
+    /// The sines of a pair, or of two by one call.
+    fn sines(&mut self, pairs: &[NodeId]) {
+        let mut angles = Vec::new();
+        for pair in pairs {
+            let Op::SinCos(angle) = self.graph.op(*pair) else { unreachable!("it is a pair") };
+            let terms = self.graph.angle_terms(angle);
+            terms.iter().for_each(|term| self.left[term.index()] = self.left[term.index()].saturating_sub(1));
+            angles.push(self.angle(&terms));
+        }
+        let halves: Vec<Option<NodeId>> = pairs
+            .iter()
+            .flat_map(|pair| [Op::Sin(*pair), Op::Cos(*pair)].map(|half| self.needed_half(*pair, half)))
+            .collect();
         let answers = match self.machine.is_in_flash {
-            false => self.kernel(angle, tail),
-            true => {
-                for (n, range) in [Some(angle), tail].into_iter().flatten().enumerate() {
-                    let kind = LineKind::Argument(n as u8);
-                    self.line(LineClass::Copy, CodeLine { reads: vec![range], writes: None, kind });
-                }
-                let kind = LineKind::Call(1 + u8::from(tail.is_some()));
-                self.line(LineClass::Call(tail.is_some()), CodeLine { kind, ..CodeLine::default() });
-                [0, 1].map(|n| {
-                    halves[n as usize]
-                        .map_or(usize::MAX, |_| self.push(LineClass::Copy, Vec::new(), LineKind::Answer(n)))
-                })
-            }
+            false => angles.into_iter().flat_map(|(angle, tail)| self.kernel(angle, tail)).collect(),
+            true => self.call(&angles, &halves),
         };
         for (half, range) in halves.into_iter().zip(answers) {
             if let Some(half) = half {
@@ -295,6 +314,39 @@ impl InstructionSelection<'_> {
                 own.into_iter().for_each(|k| self.store(range, k));
             }
         }
+    }
+
+    fn needed_half(&self, pair: NodeId, half: Op) -> Option<NodeId> {
+        let mut ids = (pair.0 + 1..pair.0 + 3).map(NodeId).filter(|id| self.graph.ops.get(id.index()) == Some(&half));
+        ids.find(|id| self.left[id.index()] > 0)
+    }
+
+    /// A call of the kernel of these angles, each with what its rounding lost: the ranges of the halves that are needed.
+    fn call(&mut self, angles: &[(usize, Option<usize>)], halves: &[Option<NodeId>]) -> Vec<usize> {
+        let has_sum = angles.iter().any(|(_, tail)| tail.is_some());
+        let kernel = match (angles.len(), has_sum) {
+            (1, false) => Kernel::One,
+            (1, true) => Kernel::Sum,
+            (_, false) => Kernel::Two,
+            (_, true) => Kernel::TwoSums,
+        };
+        let mut arguments = Vec::new();
+        for (angle, tail) in angles {
+            arguments.push(*angle);
+            if has_sum {
+                arguments.push(tail.unwrap_or_else(|| self.constant(0.0)));
+            }
+        }
+        for (n, range) in arguments.iter().enumerate() {
+            let kind = LineKind::Argument(n as u8);
+            self.line(LineClass::Copy, CodeLine { reads: vec![*range], writes: None, kind });
+        }
+        let kind = LineKind::Call(arguments.len() as u8);
+        self.line(LineClass::Call(kernel), CodeLine { kind, ..CodeLine::default() });
+        let answer = |(n, half): (usize, &Option<NodeId>)| {
+            half.map_or(usize::MAX, |_| self.push(LineClass::Copy, Vec::new(), LineKind::Answer(n as u8)))
+        };
+        halves.iter().enumerate().map(answer).collect()
     }
 
     /// a + b c, by one instruction or two, in the register of a that nobody needs any more.

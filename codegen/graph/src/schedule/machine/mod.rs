@@ -8,7 +8,7 @@ mod lowering;
 
 use crate::expr::{Binary, Graph, NodeId, Op};
 use allocation::{AllocatedCode, RegisterAllocation};
-use lowering::{lowered, LineClass, LoweredCode};
+use lowering::{lowered, Kernel, LineClass, LoweredCode};
 use std::collections::BTreeSet;
 
 /// What a schedule has to know of a machine.
@@ -20,6 +20,8 @@ pub struct ScheduleMachine {
     pub accumulates: bool,
     /// Whether code runs from flash: then sines are called, and fetching takes time; otherwise they stand in place.
     pub is_in_flash: bool,
+    /// Whether angles that stand together, two of them, have their sines by one call.
+    pub sines_by_two: bool,
     /// A model of its cycles; none where its manual gives no times of instructions.
     pub cycles: Option<CycleModel>,
 }
@@ -61,9 +63,10 @@ pub struct ProgramEstimate {
     pub cycles: usize,
 }
 
-/// Instructions of a call of the kernel of an angle, and of a sum: its own, multiply-accumulates among them, words that it loads and stores, and
+/// Instructions of a call of each [`Kernel`]: its own, multiply-accumulates among them, words that it loads and stores, and
 /// bytes with its constants.
-const KERNELS: [[usize; 4]; 2] = [[41, 10, 15, 196], [42, 9, 15, 200]];
+const KERNELS: [[usize; 4]; Kernel::ALL.len()] =
+    [[41, 10, 15, 196], [42, 9, 15, 200], [74, 20, 19, 340], [76, 18, 19, 348]];
 /// Bytes of stack of a kernel.
 const STACK_OF_KERNEL: usize = 8;
 /// Zeros that a function of the compiler's library fills in if there are more together, and the instructions of its call and in it on average (of
@@ -102,7 +105,8 @@ fn counted(graph: &Graph, code: &LoweredCode, found: &AllocatedCode, machine: &S
     let (divisions, roots) = (count(&|class| class == LineClass::Division), count(&|class| class == LineClass::Root));
     let integers = count(&|class| class == LineClass::Integer);
     let elements = count(&|class| matches!(class, LineClass::Load(..) | LineClass::Store(..)));
-    let calls = [false, true].map(|of_sum| count(&|class| class == LineClass::Call(of_sum)));
+    let calls = Kernel::ALL.map(|kernel| count(&|class| class == LineClass::Call(kernel)));
+    let all_calls: usize = calls.iter().sum();
     let held = count(&|class| class == LineClass::Held).min(found.constants);
     let loaded = found.constants - held;
     let frame = StackFrame::of(graph, code, found);
@@ -112,12 +116,12 @@ fn counted(graph: &Graph, code: &LoweredCode, found: &AllocatedCode, machine: &S
     let zeros = zeros + usize::from(zeros > 0) + ZEROS.1 * filled;
     let memory = elements + loaded + found.reloads + found.stores;
     let wide = floats + accumulates + divisions + roots + held + memory;
-    let inner = wide + zeros + integers + calls[0] + calls[1] + frame.moves;
-    let mut bytes = 4 * (wide + zeros + calls[0] + calls[1]) + 2 * (integers + frame.moves) + frame.bytes;
+    let inner = wide + zeros + integers + all_calls + frame.moves;
+    let mut bytes = 4 * (wide + zeros + all_calls) + 2 * (integers + frame.moves) + frame.bytes;
     let jumps = bytes / REACH;
     bytes += 4 * jumps + 4 * constants_of(code, bytes / (jumps + 1));
-    let of_kernels = |column: usize| (0..2).map(|k| calls[k] * KERNELS[k][column]).sum::<usize>();
-    let has_calls = calls[0] + calls[1] > 0;
+    let of_kernels = |column: usize| calls.iter().zip(&KERNELS).map(|(calls, row)| calls * row[column]).sum::<usize>();
+    let has_calls = all_calls > 0;
     let instructions = inner + frame.instructions + jumps + of_kernels(0) + ZEROS.2 * filled;
     let transfers = memory + frame.transfers;
     let cycles = machine.cycles.map_or(instructions as f64, |model| {
@@ -127,7 +131,7 @@ fn counted(graph: &Graph, code: &LoweredCode, found: &AllocatedCode, machine: &S
             + divisions as f64 * (model.division - 1.0)
             + roots as f64 * (model.square_root - 1.0)
             + (memory + of_kernels(2) + 2 * frame.words) as f64
-            + (2 * (calls[0] + calls[1]) + 1 + jumps) as f64 * model.taken;
+            + (2 * all_calls + 1 + jumps) as f64 * model.taken;
         match machine.is_in_flash {
             true => all.max((bytes + of_kernels(3)) as f64 / model.flash_bytes_per_cycle),
             false => all,
@@ -216,8 +220,13 @@ mod tests {
     use crate::expr::{GraphBuilder, Port, RuleSet, Sines};
     use straightline_core::Dd;
 
-    const FLASH: ScheduleMachine =
-        ScheduleMachine { registers: 32, accumulates: true, is_in_flash: true, cycles: Some(CYCLES) };
+    const FLASH: ScheduleMachine = ScheduleMachine {
+        registers: 32,
+        accumulates: true,
+        is_in_flash: true,
+        sines_by_two: false,
+        cycles: Some(CYCLES),
+    };
     const CYCLES: CycleModel = CycleModel {
         float: 1.0,
         multiply_accumulate: 3.0,
@@ -343,6 +352,24 @@ mod tests {
         // the kernel is counted as often as it is called
         let alone = ScheduleMachine { is_in_flash: false, ..FLASH };
         assert!(estimated(&graph(8), alone).flash_bytes > few.flash_bytes + 100);
+    }
+
+    #[test]
+    fn sines_that_stand_together_come_by_one_call_of_two() {
+        let (mut b, x) = inputs(3);
+        let mut results = Vec::new();
+        for k in 0..3 {
+            let pair = b.insert(Op::SinCos(x[k]));
+            results.extend([Op::Sin(pair), Op::Cos(pair)].map(|half| b.insert(half)));
+        }
+        let graph = finished(b, results);
+        let by_two = ScheduleMachine { sines_by_two: true, ..FLASH };
+        let [alone, together] = [FLASH, by_two].map(|machine| estimated(&graph, machine));
+        // a call less, and the kernel of two in place of two kernels
+        assert!(
+            together.instructions < alone.instructions + KERNELS[2][0] - 2 * KERNELS[0][0],
+            "{together:?} {alone:?}"
+        );
     }
 
     #[test]

@@ -225,7 +225,7 @@ impl RegisterAllocation {
 
     /// What the lines read and write, and where calls and copies stand.
     fn read(&mut self, lines: &[CodeLine]) {
-        let mut arguments = [0; 2];
+        let mut arguments = [0; 4];
         let mut answers = 0;
         for (k, line) in lines.iter().enumerate() {
             let at = APART * (k as u32 + 1);
