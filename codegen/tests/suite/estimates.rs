@@ -106,16 +106,18 @@ fn slow_proof_other_robots_and_code_without_delay_are_estimated_before_rustc() {
 }
 
 #[test]
-fn a_pair_of_sine_and_cosine_takes_41_instructions_and_48_in_place_without_multiply_accumulate() {
+fn a_pair_of_sine_and_cosine_takes_41_instructions_and_48_in_place_without_multiply_accumulate_and_two_take_74() {
     let Some(rustc) = compiler() else { return };
     let kernel = straightline_core::sources::SHORT_SINES.replace("#[inline]", "#[no_mangle]");
     let text = format!("#![no_std]\n{}", kernel.replace("//!", "//"));
-    let instructions = |memory: Memory| {
+    let instructions = |function: &str, memory: Memory| {
         let code = machine_code(&rustc, &text, TargetMachine::CORTEX_M4F, memory).unwrap_or_else(|e| panic!("{e}"));
-        let figures = code.figures(&["sin_cos_f32".to_string()], TargetMachine::CORTEX_M4F, memory);
+        let figures = code.figures(&[function.to_string()], TargetMachine::CORTEX_M4F, memory);
         figures.expect("it is there")[0].instructions
     };
-    assert_eq!(instructions(Memory::Flash), Ok(41));
+    assert_eq!(instructions("sin_cos_f32", Memory::Flash), Ok(41));
     // in place it has no frame: push, mov, pop
-    assert_eq!(instructions(Memory::Tcm), Ok(48 + 3));
+    assert_eq!(instructions("sin_cos_f32", Memory::Tcm), Ok(48 + 3));
+    assert_eq!(instructions("of_two", Memory::Flash), Ok(74));
+    assert_eq!(instructions("of_two_sums", Memory::Flash), Ok(77));
 }

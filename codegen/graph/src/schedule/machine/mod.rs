@@ -66,7 +66,7 @@ pub struct ProgramEstimate {
 /// Instructions of a call of each [`Kernel`]: its own, multiply-accumulates among them, words that it loads and stores, and
 /// bytes with its constants.
 const KERNELS: [[usize; 4]; Kernel::ALL.len()] =
-    [[41, 10, 15, 196], [42, 9, 15, 200], [74, 20, 19, 340], [76, 18, 19, 348]];
+    [[41, 10, 15, 196], [42, 9, 15, 200], [74, 20, 15, 324], [77, 20, 15, 336]];
 /// Bytes of stack of a kernel.
 const STACK_OF_KERNEL: usize = 8;
 /// Zeros that a function of the compiler's library fills in if there are more together, and the instructions of its call and in it on average (of
