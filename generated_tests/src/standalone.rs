@@ -1,6 +1,7 @@
 //! Generated code as a program of its own, compiled by rustc when it is needed: for what must not run inside the tests, such
 //! as other instruction sets, other modes of the processor, and timing without anything else in the binary.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -29,9 +30,17 @@ impl Folder {
     /// # Errors
     /// What rustc says.
     pub fn build(&self, name: &str, source: &str, flags: &[&str]) -> Result<PathBuf, String> {
+        let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+        self.build_by(&rustc, name, source, flags)
+    }
+
+    /// The same by this compiler.
+    ///
+    /// # Errors
+    /// What rustc says.
+    pub fn build_by(&self, rustc: &OsStr, name: &str, source: &str, flags: &[&str]) -> Result<PathBuf, String> {
         let (text, program) = (self.file(&format!("{name}.rs")), self.file(name));
         std::fs::write(&text, source).map_err(|e| format!("{}: {e}", text.display()))?;
-        let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
         let output = Command::new(rustc)
             .args(["--edition", "2021", "-C", "opt-level=3", "-C", "codegen-units=1"])
             .args(flags)

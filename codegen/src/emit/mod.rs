@@ -37,12 +37,14 @@ pub struct Style {
     pub fused_by_caller: bool,
     /// Whether the function takes any `T: straightline::Real` in place of `scalar`.
     pub generic: bool,
+    /// Whether it is for a machine that stores one number after the other.
+    pub one_by_one: bool,
 }
 
 impl Style {
     /// One state.
     pub fn plain(scalar: Scalar) -> Self {
-        Style { scalar, lanes: false, fused: false, fused_by_caller: false, generic: false }
+        Style { scalar, lanes: false, fused: false, fused_by_caller: false, generic: false, one_by_one: false }
     }
 
     /// With a·b + c as one operation, or without.
@@ -58,6 +60,11 @@ impl Style {
     /// In any scalar; in it nothing is fused.
     pub fn generic(self) -> Self {
         Style { generic: true, fused: false, ..self }
+    }
+
+    /// For a machine that stores one number after the other, or not.
+    pub fn one_by_one(self, one_by_one: bool) -> Self {
+        Style { one_by_one, ..self }
     }
 
     /// `N` states at once.

@@ -1,11 +1,12 @@
 //! Generated text where there is `core` and nothing else: no call that the compiler's runtime would have to answer, and a·b + c in one
 //! rounding by whoever has it.
 //!
-//! With `STRAIGHTLINE_THUMB=DIR` the object for a Cortex-M4 is looked at: DIR holds `rustc` and a `sysroot` with `core` for
-//! thumbv7em-none-eabihf. Without it, the text alone is.
+//! Where `robots/firmware/toolchain` was run, objects for microcontrollers are looked at; elsewhere the text alone is.
 
+use crate::cross;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use straightline_codegen::choices::{Memory, TargetMachine};
 use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::emit::fused;
@@ -62,36 +63,85 @@ fn wanted(object: &Path) -> Option<String> {
     let output = Command::new("nm").arg("-u").arg(object).output().ok()?;
     // how an error of a parameter prints is `core`'s, and called only by who prints it
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    Some(text.lines().filter(|line| !line.contains("4core3fmt")).collect())
+    Some(text.lines().filter(|line| !line.contains("4core3fmt")).map(|line| format!("{line} ")).collect())
+}
+
+/// What the object of a text for a machine wants from elsewhere.
+fn wants(rustc: &Path, text: &str, machine: TargetMachine, memory: Memory, level: &str) -> Option<String> {
+    let (file, object) = (scratch().join("thumb.rs"), scratch().join("thumb.o"));
+    // functions that are small would not be in the object
+    let text = text.replace("pub fn ", "#[inline(never)]\npub fn ");
+    std::fs::write(&file, format!("#![no_std]\n#![allow(warnings)]\n{text}")).expect("a file");
+    let mut rustc = Command::new(rustc);
+    rustc.args(["--edition=2021", "--crate-type=rlib", "--crate-name=arm", "--target", machine.row().triple]);
+    rustc.args(["-Cpanic=abort", "-Ccodegen-units=1", "-Cembed-bitcode=no", "--cap-lints=allow"]);
+    for flag in machine.flags(memory) {
+        rustc.args(flag.split(' '));
+    }
+    rustc.arg(format!("-Copt-level={level}")).arg(format!("--emit=obj={}", object.display())).arg(&file);
+    let built = rustc.output().expect("the compiler runs");
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    let wanted = wanted(&object);
+    if wanted.is_none() {
+        eprintln!("skipped: there is no nm");
+    }
+    wanted
 }
 
 #[test]
 fn an_object_for_a_cortex_m4_calls_nothing() {
-    let Some(directory) = std::env::var_os("STRAIGHTLINE_THUMB").map(PathBuf::from) else {
-        eprintln!("skipped: STRAIGHTLINE_THUMB names no compiler for thumbv7em-none-eabihf");
-        return;
-    };
+    let Some(rustc) = cross::program("rustc") else { return };
+    let of = |text: &str, level: &str| wants(&rustc, text, TargetMachine::CORTEX_M4F, Memory::Flash, level);
     for (k, text) in texts().into_iter().enumerate() {
-        let (file, object) = (scratch().join("thumb.rs"), scratch().join("thumb.o"));
-        // functions that are small would not be in the object
-        let text = text.replace("pub fn ", "#[inline(never)]\npub fn ");
-        std::fs::write(&file, format!("#![no_std]\n#![allow(warnings)]\n{text}")).expect("a file");
         for level in ["2", "3"] {
-            let built = Command::new(directory.join("rustc"))
-                .arg(format!("--sysroot={}", directory.join("sysroot").display()))
-                .args(["--edition=2021", "--crate-type=rlib", "--crate-name=arm", "--target=thumbv7em-none-eabihf"])
-                .args(["-Cpanic=abort", "-Ccodegen-units=1", "-Cembed-bitcode=no", "-Ctarget-cpu=cortex-m4"])
-                .arg(format!("-Copt-level={level}"))
-                .arg(format!("--emit=obj={}", object.display()))
-                .arg(&file)
-                .output()
-                .expect("the compiler runs");
-            assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
-            let Some(wanted) = wanted(&object) else {
-                eprintln!("skipped: there is no nm");
-                return;
-            };
+            let Some(wanted) = of(&text, level) else { return };
             assert_eq!(wanted, "", "text {k}, opt-level {level}");
+        }
+    }
+    // an array of zeros is seen
+    let fills = "pub fn fills(x: &mut [f32; 40], y: f32) { *x = [0.0; 40]; x[7] = y; }";
+    assert!(of(fills, "3").is_some_and(|wanted| wanted.contains("__aeabi_memclr4")));
+}
+
+/// Fails where an object of these functions calls what is not its own, but for arithmetic where there is no unit for it.
+fn calls_nothing(robot: &str, (machine, memory): (TargetMachine, Memory), functions: &[Function]) {
+    let Some(rustc) = cross::program("rustc") else { return };
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions").join(robot);
+    let source = Source::new(robot, std::fs::read_to_string(path).expect("the robot is there"));
+    let base = Options { scalar: Scalar::F32, target: Some(machine), memory, ..Options::default() };
+    let mut options = Options { functions: functions.to_vec(), ..base };
+    options.model.floating_base = robot == "hyq.urdf" || robot == "solo12.urdf";
+    options.model.angle_tolerance = 1e-10;
+    let text = compile(&source, &options).unwrap_or_else(|errors| panic!("{errors}")).text;
+    let Some(wanted) = wants(&rustc, &text, machine, memory, "3") else { return };
+    let others = wanted.split_whitespace().filter(|word| *word != "U");
+    let others: Vec<&str> = others.filter(|name| machine.row().registers.is_some() || name.contains("mem")).collect();
+    assert_eq!(others, [""; 0], "{robot} for {machine:?}, {memory:?}");
+}
+
+/// Robots with many zeros among their results, too.
+#[test]
+fn objects_of_robots_for_microcontrollers_call_nothing() {
+    let functions = [Function::InverseDynamics, Function::MassMatrix, Function::Jacobian, Function::ForwardDynamics];
+    for robot in ["ur5.urdf", "solo12.urdf"] {
+        for machine in [TargetMachine::CORTEX_M4F, TargetMachine::CORTEX_M0PLUS] {
+            calls_nothing(robot, (machine, Memory::Flash), &functions);
+        }
+    }
+}
+
+/// Every function that a file has without being asked, and derivatives.
+#[test]
+#[ignore = "slow proof: orders of long functions are searched for many machines"]
+fn slow_proof_objects_of_all_functions_for_all_microcontrollers_call_nothing() {
+    let further = [Function::MassMatrixAndGravityForce, Function::InverseDynamicsDerivatives];
+    let functions: Vec<Function> = Options::default().functions.into_iter().chain(further).collect();
+    for robot in ["panda.urdf", "hyq.urdf", "solo12.urdf"] {
+        calls_nothing(robot, (TargetMachine::CORTEX_M4F, Memory::Flash), &functions);
+        for machine in
+            [TargetMachine::CORTEX_M33, TargetMachine::CORTEX_M7, TargetMachine::RV32IMAFC, TargetMachine::RV32IMAC]
+        {
+            calls_nothing(robot, (machine, Memory::Flash), &Options::default().functions);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Packages in C99 as C compilers see them: the bits of the programs, at every level of optimisation; no warning, no library, no violation of
 //! the rules that they claim. Truth is the interpreter, over the machine's own f32 and f64.
 
+use crate::cross;
 use crate::standalone::Folder;
 use crate::written::{Shape, Style, Written};
 use std::fmt::Write;
@@ -45,11 +46,15 @@ const COMPILATIONS: [(&str, &[&str]); 3] = [("gcc", &["-O0"]), ("gcc", &["-O3"])
 const FURTHER_COMPILATIONS: [(&str, &[&str]); 3] = [("gcc", &["-O2"]), ("clang", &["-O0"]), ("clang", &["-O3"])];
 
 fn is_there(program: &str) -> bool {
-    let found = Command::new(program).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
+    let found = cross::command(program).is_some();
     if !found {
         eprintln!("skipped: {program} is not there");
     }
     found
+}
+
+fn command(program: &str) -> Command {
+    cross::command(program).unwrap_or_else(|| panic!("{program} is not there"))
 }
 
 /// What a command says on its way to a failure, if it fails.
@@ -118,7 +123,7 @@ impl Package {
     fn object(&self, compiler: &str, flags: &[&str]) -> PathBuf {
         let object = self.folder.file(&format!("{compiler}{}.o", flags.concat()));
         let strict = if flags.iter().any(|flag| flag.starts_with("-std")) { &STRICT[1..] } else { &STRICT[..] };
-        succeeds(Command::new(compiler).args(strict).args(flags).arg("-c").arg(&self.source).arg("-o").arg(&object));
+        succeeds(command(compiler).args(strict).args(flags).arg("-c").arg(&self.source).arg("-o").arg(&object));
         object
     }
 
@@ -130,7 +135,7 @@ impl Package {
         let programs = self.programs();
         let (main, program) = (self.folder.file("main.c"), object.with_extension("out"));
         std::fs::write(&main, caller(&self.source, &programs, states)).expect("it can be written");
-        succeeds(Command::new(compiler).args(["-std=c99", "-O1"]).arg(&main).arg(&object).arg("-o").arg(&program));
+        succeeds(command(compiler).args(["-std=c99", "-O1"]).arg(&main).arg(&object).arg("-o").arg(&program));
         let (given, truth) = numbers(&programs, states);
         let (input, output) = (self.folder.file("given"), self.folder.file("computed"));
         std::fs::write(&input, given).expect("it can be written");
@@ -409,7 +414,7 @@ fn contracted_and_rearranged_compilations_have_the_same_bits_or_are_refused() {
                 // has no such mode; and what is left of -ffast-math no macro says
                 continue;
             }
-            let mut command = Command::new(compiler);
+            let mut command = command(compiler);
             let refusal = complaint(command.args(*flags).arg("-fsyntax-only").arg(&package.source));
             assert!(refusal.is_some_and(|what| what.contains("#error")), "{compiler} {flags:?}");
         }
@@ -422,7 +427,7 @@ fn contracted_and_rearranged_compilations_have_the_same_bits_or_are_refused() {
         for (flag, code) in [("-ffp-contract=off", 0), ("-ffp-contract=fast", 1)] {
             let program = package.folder.file("check");
             let flags = ["-O2", "-mfma", flag, "-o"];
-            succeeds(Command::new(compiler).args(flags).args([&program, &main, &package.source]));
+            succeeds(command(compiler).args(flags).args([&program, &main, &package.source]));
             assert_eq!(Command::new(&program).status().expect("it runs").code(), Some(code), "{flag}");
         }
     }
@@ -493,7 +498,7 @@ int main() {{
         let (object, program) = (package.object(c, &["-O2"]), package.folder.file("cpp"));
         for standard in ["-std=c++11", "-std=c++17", "-std=c++20"] {
             let strict = [standard, "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror"];
-            succeeds(Command::new(cpp).args(strict).arg(&main).arg(&object).arg("-o").arg(&program));
+            succeeds(command(cpp).args(strict).arg(&main).arg(&object).arg("-o").arg(&program));
             assert_eq!(Command::new(&program).status().expect("it runs").code(), Some(0), "{cpp} {standard}");
         }
         // an array of another length is no argument
@@ -502,7 +507,7 @@ int main() {{
                      std::array<double, 3> g; robot_dynamics::gravity_force(q, w, w, g); }\n";
         let wrong = package.folder.file("short.cpp");
         std::fs::write(&wrong, short).expect("it can be written");
-        assert!(complaint(Command::new(cpp).args(["-std=c++11", "-fsyntax-only"]).arg(&wrong)).is_some());
+        assert!(complaint(command(cpp).args(["-std=c++11", "-fsyntax-only"]).arg(&wrong)).is_some());
     }
 }
 
@@ -532,7 +537,7 @@ fn constructors_compute_their_programs() {
         std::fs::write(&main, text).expect("it can be written");
         for compiler in ["gcc", "clang"].into_iter().filter(|compiler| is_there(compiler)) {
             let (object, program) = (package.object(compiler, &["-O2"]), package.folder.file("made"));
-            succeeds(Command::new(compiler).arg("-std=c99").arg(&main).arg(&object).arg("-o").arg(&program));
+            succeeds(command(compiler).arg("-std=c99").arg(&main).arg(&object).arg("-o").arg(&program));
             assert_eq!(Command::new(&program).status().expect("it runs").code(), Some(0), "{compiler}");
         }
     }
@@ -683,7 +688,7 @@ fn the_kernel_in_c_has_the_bits_of_that_in_rust() {
             std::fs::write(&source, text).expect("it can be written");
             // all of the kernel is more than is used
             let unused = ["-Wno-unused-function", "-Wno-unknown-pragmas", "-o"];
-            succeeds(Command::new(compiler).args(["-std=c99"]).args(flags).args(unused).args([&program, &source]));
+            succeeds(command(compiler).args(["-std=c99"]).args(flags).args(unused).args([&program, &source]));
             let output = Command::new(&program).output().expect("it runs");
             String::from_utf8_lossy(&output.stdout).trim().parse::<u64>().expect("a checksum")
         };
@@ -737,15 +742,13 @@ fn names_from_robot_files_cannot_become_c() {
         .expect("it can be written");
         for compiler in ["gcc", "clang"].into_iter().filter(|compiler| is_there(compiler)) {
             let (object, program) = (package.object(compiler, &["-O1"]), package.folder.file("names"));
-            succeeds(Command::new(compiler).args(STRICT).args(["-o"]).args([&program, &main, &object]));
+            succeeds(command(compiler).args(STRICT).args(["-o"]).args([&program, &main, &object]));
             assert_eq!(Command::new(&program).status().expect("it runs").code(), Some(0), "{name:?}");
         }
         if is_there("g++") {
             let header = package.folder.file("header.cpp");
             std::fs::write(&header, format!("#include \"{library}.hpp\"\n")).expect("it can be written");
-            succeeds(
-                Command::new("g++").args(["-std=c++11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only"]).arg(&header),
-            );
+            succeeds(command("g++").args(["-std=c++11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only"]).arg(&header));
         }
     }
 }
@@ -776,6 +779,37 @@ fn what_c99_cannot_have_is_refused_with_a_remedy() {
     assert_eq!(refusal(&C_ABI, Options { fma: true, ..base() }), None);
 }
 
+/// The source by Clang for microcontrollers: no warning, and where there is a unit for floating point no call.
+#[test]
+fn clang_compiles_packages_for_microcontrollers() {
+    if !is_there("clang") {
+        return;
+    }
+    let options = Options { limits: ScheduleLimits { operations: 200 }, ..in_scalar(Scalar::F32) };
+    let package = Package::new("c99-targets", &Source::new("arm.toml", ARM), &options);
+    for (target, has_unit) in [
+        (&["--target=thumbv7em-none-eabihf", "-mcpu=cortex-m4"][..], true),
+        (&["--target=thumbv8m.main-none-eabihf", "-mcpu=cortex-m33"], true),
+        (&["--target=riscv32-none-elf", "-march=rv32imafc", "-mabi=ilp32f"], true),
+        (&["--target=aarch64-none-elf"], true),
+        (&["--target=thumbv6m-none-eabi", "-mcpu=cortex-m0plus"], false),
+        (&["--target=riscv32-none-elf", "-march=rv32imac", "-mabi=ilp32"], false),
+    ] {
+        for level in ["-O1", "-O3"] {
+            let flags: Vec<&str> = target.iter().copied().chain(["-ffreestanding", level]).collect();
+            let object = package.object("clang", &flags);
+            let undefined = Command::new("nm").arg("-u").arg(&object).output().expect("nm runs");
+            let undefined = String::from_utf8_lossy(&undefined.stdout).into_owned();
+            // arithmetic by software, where there is no unit
+            let is_arithmetic = |name: &str| name.starts_with("__") && !name.contains("mem");
+            let names: Vec<&str> = undefined.lines().map(|line| line.trim_start_matches(" U ").trim()).collect();
+            let own = names.iter().map(|name| name.trim_start_matches("U "));
+            let others: Vec<&str> = own.filter(|name| has_unit || !is_arithmetic(name)).collect();
+            assert_eq!(others, [""; 0], "{flags:?}");
+        }
+    }
+}
+
 /// Rules that the documentation of a package says are not kept; 2.5 and `unusedFunction` are about what is for others.
 const DEVIATIONS: [&str; 2] = ["misra-c2012-19.2", "misra-c2012-2.5"];
 
@@ -795,7 +829,7 @@ fn violations(source: &Path) -> Vec<String> {
         "UINT32_C(x)=x##U",
         "NULL=((void*)0)",
     ];
-    let output = Command::new("cppcheck")
+    let output = command("cppcheck")
         .args([
             "--addon=misra",
             "--enable=all",

@@ -1,5 +1,6 @@
 //! Figures of machine code: beside counts of an emulator, in every front's text, as budgets; and decoders on instructions written by hand.
 
+use crate::cross;
 use std::collections::BTreeMap;
 use std::path::Path;
 use straightline_codegen::choices::machine::InstructionSet;
@@ -31,7 +32,7 @@ fn arm() -> Source {
 /// Whether rustc has `core` for a machine; says so where it has not.
 fn has(machine: TargetMachine) -> bool {
     let triple = machine.row().triple;
-    let found = RustCompiler::find(None)
+    let found = RustCompiler::find(Some(&cross::rustc()))
         .and_then(|rustc| machine_code(&rustc, "#![no_std]\npub fn nothing() {}\n", machine, Memory::Flash));
     match found {
         Ok(_) => true,
@@ -49,6 +50,7 @@ fn on(machine: TargetMachine) -> Options {
         target: Some(machine),
         figures: true,
         functions: FUNCTIONS.to_vec(),
+        rustc: Some(cross::rustc()),
         ..Options::default()
     }
 }
@@ -94,7 +96,7 @@ const DEVIATIONS: [(TargetMachine, Memory, f64); 5] = [
 ];
 
 fn agrees_with_the_emulator(name: &str, tolerance: f64, floats: bool) {
-    let rustc = match RustCompiler::find(None) {
+    let rustc = match RustCompiler::find(Some(&cross::rustc())) {
         Ok(rustc) if rustc.version.starts_with("rustc 1.95.0 ") => rustc,
         other => return eprintln!("skipped: the record is of rustc 1.95.0, this is {other:?}"),
     };
@@ -231,6 +233,8 @@ fn macros_and_build_scripts_have_the_same_constants() {
     if !has(TargetMachine::CORTEX_M4F) {
         return;
     }
+    // these take what the environment names
+    std::env::set_var("RUSTC", cross::rustc());
     let here = std::env::temp_dir().join(format!("straightline-fronts-of-figures-{}", std::process::id()));
     std::fs::create_dir_all(&here).expect("a folder");
     std::fs::write(here.join("arm.toml"), ARM).expect("a file");
@@ -325,7 +329,7 @@ fn without_rustc_or_its_target_there_is_a_remedy_and_no_folder_is_left() {
     assert!(text.contains("`true` cannot be run: `--version` says"), "{text}");
     let error = ObjectError::NoTarget("thumbv7em-none-eabihf");
     assert_eq!(error.remedy(), "rustup target add thumbv7em-none-eabihf");
-    let Ok(rustc) = RustCompiler::find(None) else { return eprintln!("skipped: there is no rustc") };
+    let Ok(rustc) = RustCompiler::find(Some(&cross::rustc())) else { return eprintln!("skipped: there is no rustc") };
     let wrong = machine_code(&rustc, "no Rust", TargetMachine::X86_64_V3, Memory::Flash);
     assert!(matches!(wrong, Err(ObjectError::Refused(_) | ObjectError::NoTarget(_))), "{wrong:?}");
     let own = format!("straightline-figures-{}-", std::process::id());
@@ -340,7 +344,7 @@ fn without_rustc_or_its_target_there_is_a_remedy_and_no_folder_is_left() {
 fn what_is_no_object_is_refused() {
     assert!(ObjectCode::read(b"", None).is_err());
     assert!(ObjectCode::read(b"\x7fELF and nothing else", Some(InstructionSet::Thumb)).is_err());
-    let rustc = RustCompiler::find(None);
+    let rustc = RustCompiler::find(Some(&cross::rustc()));
     let Ok(rustc) = rustc else { return eprintln!("skipped: there is no rustc") };
     if has(TargetMachine::X86_64_V3) {
         let text = "#![no_std]\n#[no_mangle]\npub fn twice(x: u32) -> u32 { 2 * x }\n";
@@ -355,7 +359,7 @@ fn what_is_no_object_is_refused() {
 
 #[test]
 fn a_loop_has_no_number_of_instructions_and_a_branch_counts_its_longer_side() {
-    let Ok(rustc) = RustCompiler::find(None) else { return eprintln!("skipped: there is no rustc") };
+    let Ok(rustc) = RustCompiler::find(Some(&cross::rustc())) else { return eprintln!("skipped: there is no rustc") };
     let of = |machine: TargetMachine, text: &str| {
         let text = format!("#![no_std]\n#[no_mangle]\n{text}");
         let code = machine_code(&rustc, &text, machine, Memory::Flash).unwrap_or_else(|e| panic!("{e}"));

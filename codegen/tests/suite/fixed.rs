@@ -1,6 +1,7 @@
 //! Functions in fixed point: found errors beside certified ones, compiled text beside the interpreter, and programs broken on purpose.
 
 use super::readback::random_robot;
+use crate::cross;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -197,7 +198,7 @@ fn scratch() -> PathBuf {
 }
 
 fn rustc() -> Command {
-    Command::new(std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string()))
+    Command::new(cross::rustc())
 }
 
 /// Compiled text gives the interpreter's bits, with overflow checks on.

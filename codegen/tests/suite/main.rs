@@ -14,6 +14,7 @@ mod companions;
 mod contact;
 mod contact_compiled;
 mod contact_derivatives;
+mod cross;
 mod derivative_bounds;
 mod effects;
 mod elastic_inverse;

@@ -1,5 +1,6 @@
 //! Identical limbs as turns of one loop: the bits of lanes, the second author's physics, and objects for microcontrollers that call nothing.
 
+use crate::cross;
 use crate::limbs::{agrees, crab, hand, limbs_on, link, options, robot, stool, table, Differ, Numbers, FORCES};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -269,24 +270,11 @@ fn compiled_loops_have_the_bits_of_lanes() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// A program of the toolchain for microcontrollers that `robots/firmware/toolchain` makes, where it is there.
-fn cross(name: &str) -> Option<PathBuf> {
-    let default = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/cross");
-    let folder = std::env::var_os("STRAIGHTLINE_CROSS").map_or(default, PathBuf::from);
-    match folder.join("complete").exists() {
-        true => Some(std::fs::canonicalize(folder).expect("it is there").join(name)),
-        false => {
-            eprintln!("skipped: there is no toolchain for microcontrollers in {}", folder.display());
-            None
-        }
-    }
-}
-
 /// Neither a panic nor `memset` is asked for, and no loop is written out: calls stand as often as in the text.
 #[test]
 fn objects_for_microcontrollers_call_nothing_and_keep_their_loops() {
     let (Some(rustc), Some(nm), Some(objdump)) =
-        (cross("rustc"), cross("arm-none-eabi-nm"), cross("arm-none-eabi-objdump"))
+        (cross::program("rustc"), cross::program("arm-none-eabi-nm"), cross::program("arm-none-eabi-objdump"))
     else {
         return;
     };

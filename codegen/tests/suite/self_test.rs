@@ -1,5 +1,6 @@
 //! The self-test of generated text: compiled as others compile it, it passes; where a number is another one, it names the function.
 
+use crate::cross;
 use crate::standalone::{run, Folder};
 use std::fmt::Write;
 use std::path::Path;
@@ -246,7 +247,7 @@ fn an_object_for_a_cortex_m4_needs_nothing() {
         for level in ["-Copt-level=z", "-Copt-level=s", "-Copt-level=3"] {
             let source = format!("#![no_std]\n#![allow(warnings)]\n{}", generated.text);
             let flags = ["--crate-type=rlib", "--target=thumbv7em-none-eabihf", "--emit=obj", "-Cpanic=abort", level];
-            let object = match folder.build(name, &source, &flags) {
+            let object = match folder.build_by(&cross::rustc(), name, &source, &flags) {
                 Ok(object) => object,
                 Err(error) if error.contains("can't find crate for `core`") => {
                     eprintln!(

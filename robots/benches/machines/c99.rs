@@ -8,6 +8,9 @@ use straightline_codegen::choices::{Memory, TargetMachine};
 use straightline_codegen::emit::c99::C99_SOURCE;
 use straightline_codegen::Generated;
 
+/// The compilers of C, whose figures are those of the first, and what each is told of the target.
+pub(super) const C_COMPILERS: [(&str, &[&str]); 2] =
+    [("arm-none-eabi-gcc", &[]), ("clang", &["--target=thumbv7em-none-eabihf"])];
 /// The processor's own; the source itself keeps products and sums apart.
 const FLAGS: [&str; 9] = [
     "-std=c99",
@@ -23,13 +26,18 @@ const FLAGS: [&str; 9] = [
 
 impl Bench<'_> {
     /// What the functions of the packages say, and their figures by their names.
-    pub(super) fn c99(&self, emulator: Emulator, plugin: &std::path::Path) -> (String, Vec<(String, Figures)>) {
+    pub(super) fn c99(
+        &self,
+        compiler: (&str, &[&str]),
+        emulator: Emulator,
+        plugin: &std::path::Path,
+    ) -> (String, Vec<(String, Figures)>) {
         let (machine, memory) = (TargetMachine::CORTEX_M4F, Memory::Flash);
         let mut text = "#![no_std]\n#![no_main]\n#![allow(warnings)]\n".to_string();
         let (mut runs, mut objects, mut functions) = (String::new(), Vec::new(), Vec::new());
         for (robot, ..) in ROBOTS {
             let generated = self.compiled(robot, machine, memory);
-            objects.push(self.object_of_c99(robot, &generated));
+            objects.push(self.object_of_c99(compiler, robot, &generated));
             text.push_str(&module(robot, &generated));
             writeln!(runs, "    run! {{ {robot} }}").expect("a string takes text");
             functions
@@ -46,14 +54,14 @@ impl Bench<'_> {
         (output, figures.collect())
     }
 
-    fn object_of_c99(&self, robot: &str, generated: &Generated) -> PathBuf {
+    fn object_of_c99(&self, (name, target): (&str, &[&str]), robot: &str, generated: &Generated) -> PathBuf {
         for (name, text) in (C99_SOURCE.files)(generated, robot) {
             std::fs::write(self.folder.join(name), text).expect("a file can be written");
         }
         let [source, object] = ["c", "o"].map(|ending| self.folder.join(format!("{robot}_dynamics.{ending}")));
-        let mut compiler = Command::new(self.cross.join("arm-none-eabi-gcc"));
-        let output =
-            compiler.args(FLAGS).args(["-c", "-o"]).args([&object, &source]).output().expect("a C compiler runs");
+        let mut compiler = Command::new(self.cross.join(name));
+        compiler.args(target).args(FLAGS).args(["-c", "-o"]).args([&object, &source]);
+        let output = compiler.output().expect("a C compiler runs");
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         object
     }

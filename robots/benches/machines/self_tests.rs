@@ -9,7 +9,9 @@ use straightline_codegen::options::Options;
 const EVALUATIONS: u32 = 10_000;
 
 /// The machines that are emulated besides.
-const FURTHER: [(TargetMachine, Memory, Emulator); 2] = [
+const FURTHER: [(TargetMachine, Memory, Emulator); 4] = [
+    (TargetMachine::CORTEX_M3, Memory::Flash, Emulator { name: "mps2-m3", ..CORTEX_M4F_BOARD }),
+    (TargetMachine::CORTEX_M33, Memory::Flash, Emulator { name: "mps2-m33", layout: Some("mps2-m33.x") }),
     (TargetMachine::CORTEX_M7, Memory::Tcm, Emulator { name: "mps2-m7", ..CORTEX_M4F_BOARD }),
     (TargetMachine::AARCH64, Memory::Flash, Emulator { name: "aarch64", layout: None }),
 ];
@@ -24,6 +26,13 @@ impl Bench<'_> {
             // one text for all machines: that of the first
             let source = self.self_test(robot, MACHINES[0].0, MACHINES[0].1);
             let expected = self.on_the_host(&source);
+            if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+                let of_v3 = self.on_the_host_by(&source, &["-Ctarget-cpu=x86-64-v3", "-Copt-level=3"]);
+                if of_v3 != expected {
+                    println!("self-test of {robot} on x86-64-v3:\n{of_v3}\non the host:\n{expected}");
+                    agree = false;
+                }
+            }
             hashes += expected.lines().count();
             if expected.is_empty() || expected.lines().any(|line| line.starts_with("fails")) {
                 println!("the self-test of {robot} fails on the host:\n{expected}");
@@ -41,7 +50,10 @@ impl Bench<'_> {
                 }
             }
         }
-        println!("{hashes} hashes of {EVALUATIONS} evaluations on {} machines and the host", machines().count());
+        println!(
+            "{hashes} hashes of {EVALUATIONS} evaluations on {} machines and the host, for which x86-64-v3, too",
+            machines().count()
+        );
         agree
     }
 

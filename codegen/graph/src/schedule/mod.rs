@@ -61,6 +61,14 @@ pub struct Schedule {
     pub estimate: Option<ProgramEstimate>,
 }
 
+/// How many zeros among the results follow each of the others, where zeros stand apart: a pair of them is stored at once.
+pub fn zeros_together(zeros: usize, others: usize) -> usize {
+    if others == 0 {
+        return zeros;
+    }
+    zeros.div_ceil(others).next_multiple_of(2)
+}
+
 fn is_value(op: Op) -> bool {
     !matches!(op, Op::Input(_) | Op::Constant(_) | Op::AngleSum(..))
 }

@@ -34,7 +34,9 @@ pub(super) const GUARDS: &str = r#"
 #error "every operation must be rounded to its own type: on x86 compile with -msse2 -mfpmath=sse"
 #endif
 #if defined(__clang__)
+#if defined(__x86_64__) || defined(__i386__)
 #pragma float_control(precise, on)
+#endif
 #pragma STDC FP_CONTRACT OFF
 #pragma clang attribute push(__attribute__((no_builtin)), apply_to = function)
 #elif defined(__GNUC__)

@@ -1,7 +1,7 @@
 //! The statements of one part of a program.
 
 use super::fused::{fusions, Fused};
-use super::{first_read, nodes_of, port_of, read_inputs, Lowering, Names};
+use super::{first_read, nodes_of, port_of, read_inputs, zeros, Lowering, Names};
 use crate::emit::module::{Expression, Statement, Stride};
 use crate::emit::target::{Scope, Target};
 use straightline_graph::expr::{Graph, NodeId, Op, Precision, Sines, Unary};
@@ -100,7 +100,10 @@ fn statements(graph: &Graph, part: &ProgramPart, scope: Scope<'_>, lowering: &Lo
         }
     }
     out.append(&mut b.statements);
-    out
+    match scope.style.one_by_one && !scope.style.lanes {
+        true => zeros::spread(out),
+        false => out,
+    }
 }
 
 /// In a part that keeps its order, the values that something else stands behind, before their one user.

@@ -8,6 +8,7 @@ pub mod fused;
 mod limbs;
 mod names;
 mod rolled;
+mod zeros;
 
 pub use names::Names;
 

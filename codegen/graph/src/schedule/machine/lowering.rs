@@ -9,7 +9,7 @@
 use super::allocation::{CodeLine, LineKind};
 use super::ScheduleMachine;
 use crate::expr::{Binary, Graph, NodeId, Op, Unary};
-use crate::schedule::calls_of_two;
+use crate::schedule::{calls_of_two, zeros_together};
 use std::collections::BTreeMap;
 
 /// What an instruction costs, apart from loads and stores of the allocator.
@@ -95,7 +95,9 @@ pub(super) fn lowered(graph: &Graph, order: &[NodeId], machine: &ScheduleMachine
             selection.store(value, k);
         }
     }
-    selection.code.zeros = zeros.chunk_by(|a, b| a + 1 == *b).map(<[usize]>::len).collect();
+    let together = zeros_together(zeros.len(), selection.results.len() - zeros.len());
+    let runs = zeros.chunk_by(|a, b| a + 1 == *b).flat_map(|run| run.chunks(together.max(1)));
+    selection.code.zeros = runs.map(<[usize]>::len).collect();
     neighbours_together(selection.code)
 }
 
