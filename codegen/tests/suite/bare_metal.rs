@@ -6,6 +6,7 @@
 use crate::cross;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use straightline_codegen::choices::{Memory, TargetMachine};
 use straightline_codegen::compile::compile;
 use straightline_codegen::diagnostic::{Diagnostics, Source};
@@ -66,9 +67,13 @@ fn wanted(object: &Path) -> Option<String> {
     Some(text.lines().filter(|line| !line.contains("4core3fmt")).map(|line| format!("{line} ")).collect())
 }
 
+/// Of tests that run at once each has files of its own.
+static OBJECTS: AtomicUsize = AtomicUsize::new(0);
+
 /// What the object of a text for a machine wants from elsewhere.
 fn wants(rustc: &Path, text: &str, machine: TargetMachine, memory: Memory, level: &str) -> Option<String> {
-    let (file, object) = (scratch().join("thumb.rs"), scratch().join("thumb.o"));
+    let name = format!("object{}", OBJECTS.fetch_add(1, Ordering::Relaxed));
+    let (file, object) = (scratch().join(format!("{name}.rs")), scratch().join(format!("{name}.o")));
     // functions that are small would not be in the object
     let text = text.replace("pub fn ", "#[inline(never)]\npub fn ");
     std::fs::write(&file, format!("#![no_std]\n#![allow(warnings)]\n{text}")).expect("a file");

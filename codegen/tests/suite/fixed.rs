@@ -107,10 +107,12 @@ fn no_state_of_random_robots_overflows_or_goes_beyond_its_bound() {
     }
 }
 
-/// The Panda's torques with 1e-7 of full scale certified, and a tenth of a thousandth without long products.
+/// The Panda's torques with 1e-7 of full scale certified, and also a tenth of a thousandth without long products.
 #[test]
 fn the_torques_of_an_arm_are_certified_to_1e_minus_7_of_full_scale() {
-    for (products, error) in [(FixedProducts::Wide, 1e-7), (FixedProducts::Halves, 1e-4)] {
+    for (products, error) in
+        [(FixedProducts::Wide, 1e-7), (FixedProducts::Halves, 1e-4), (FixedProducts::Halves, 1e-7)]
+    {
         let generated = generated(&file("panda.urdf"), &options(&[Function::InverseDynamics], products, error));
         let [made] = &generated.fixed[..] else { panic!("one function") };
         assert!(made.program.worst() <= error);
@@ -272,5 +274,35 @@ fn objects_for_small_machines_call_nothing() {
             Ok(symbols) => assert_eq!(String::from_utf8_lossy(&symbols.stdout).trim(), "", "{target}"),
             Err(_) => eprintln!("skipped: no `nm`"),
         }
+    }
+}
+
+/// Products of which the upper half is kept are one instruction where a machine has instructions for signals, with the sum behind it too.
+#[test]
+fn machines_with_instructions_for_signals_use_them() {
+    let (Some(rustc), Some(objdump)) = (cross::program("rustc"), cross::program("arm-none-eabi-objdump")) else {
+        return;
+    };
+    let functions = [Function::InverseDynamics];
+    let generated = generated(&file("puma560.urdf"), &options(&functions, FixedProducts::Wide, 1e-6));
+    let module = generated.text.find("pub mod fixed {").expect("there is a module");
+    let text = format!("#![no_std]\n{}", &generated.text[module..]);
+    for (target, cpu, wanted) in [
+        ("thumbv7em-none-eabihf", "cortex-m4", ["smmul", "smmla"]),
+        ("thumbv8m.main-none-eabihf", "cortex-m33", ["smmul", "smmla"]),
+        ("thumbv7m-none-eabi", "cortex-m3", ["smull", "smull"]),
+    ] {
+        let (source, object) = (scratch().join(format!("{cpu}.rs")), scratch().join(format!("{cpu}.o")));
+        std::fs::write(&source, &text).expect("a file");
+        let mut rustc = Command::new(&rustc);
+        rustc.args(["--edition", "2021", "--crate-type", "lib", "--target", target, "-C", "opt-level=3"]);
+        rustc.args(["-C", "panic=abort", "--cap-lints=allow", "--emit", "obj", "-C"]).arg(format!("target-cpu={cpu}"));
+        let built = rustc.arg("-o").args([&object, &source]).output().expect("rustc runs");
+        assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+        let listing = Command::new(&objdump).arg("-d").arg(&object).output().expect("objdump runs");
+        let listing = String::from_utf8_lossy(&listing.stdout).into_owned();
+        let count = |name: &str| listing.lines().filter(|line| line.contains(&format!("\t{name}"))).count();
+        println!("{cpu}: {}", wanted.map(|name| format!("{} {name}", count(name))).join(", "));
+        assert!(wanted.iter().all(|name| count(name) > 30), "{cpu}");
     }
 }

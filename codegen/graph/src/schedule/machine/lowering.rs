@@ -7,6 +7,7 @@
 //! * Sines are calls, with arguments and results in the first registers, or stand in place.
 
 use super::allocation::{CodeLine, LineKind};
+use super::kernels::Kernel;
 use super::ScheduleMachine;
 use crate::expr::{Binary, Graph, NodeId, Op, Unary};
 use crate::schedule::{calls_of_two, zeros_together};
@@ -34,19 +35,6 @@ pub(super) enum LineClass {
     Call(Kernel),
     /// Copies, which may fall away.
     Copy,
-}
-
-/// Kernels of sines: of one angle or two, of which one is a sum or none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kernel {
-    One,
-    Sum,
-    Two,
-    TwoSums,
-}
-
-impl Kernel {
-    pub const ALL: [Kernel; 4] = [Kernel::One, Kernel::Sum, Kernel::Two, Kernel::TwoSums];
 }
 
 /// Instructions of a program, with ranges for its values.
@@ -326,12 +314,7 @@ impl InstructionSelection<'_> {
     /// A call of the kernel of these angles, each with what its rounding lost: the ranges of the halves that are needed.
     fn call(&mut self, angles: &[(usize, Option<usize>)], halves: &[Option<NodeId>]) -> Vec<usize> {
         let has_sum = angles.iter().any(|(_, tail)| tail.is_some());
-        let kernel = match (angles.len(), has_sum) {
-            (1, false) => Kernel::One,
-            (1, true) => Kernel::Sum,
-            (_, false) => Kernel::Two,
-            (_, true) => Kernel::TwoSums,
-        };
+        let kernel = Kernel::of(angles.len(), has_sum);
         let mut arguments = Vec::new();
         for (angle, tail) in angles {
             arguments.push(*angle);

@@ -4,11 +4,13 @@
 //! it; `codegen/tests/suite/estimates.rs` compares it with rustc's objects.
 
 mod allocation;
+mod kernels;
 mod lowering;
 
 use crate::expr::{Binary, Graph, NodeId, Op};
 use allocation::{AllocatedCode, RegisterAllocation};
-use lowering::{lowered, Kernel, LineClass, LoweredCode};
+use kernels::{Kernel, STACK_OF_KERNEL};
+use lowering::{lowered, LineClass, LoweredCode};
 use std::collections::BTreeSet;
 
 /// What a schedule has to know of a machine.
@@ -63,12 +65,6 @@ pub struct ProgramEstimate {
     pub cycles: usize,
 }
 
-/// Instructions of a call of each [`Kernel`]: its own, multiply-accumulates among them, words that it loads and stores, and
-/// bytes with its constants.
-const KERNELS: [[usize; 4]; Kernel::ALL.len()] =
-    [[41, 10, 15, 196], [42, 9, 15, 200], [74, 20, 15, 324], [77, 20, 15, 336]];
-/// Bytes of stack of a kernel.
-const STACK_OF_KERNEL: usize = 8;
 /// Zeros that a function of the compiler's library fills in if there are more together, and the instructions of its call and in it on average (of
 /// arrays of 36 to 48 bytes).
 const ZEROS: (usize, usize, usize) = (8, 4, 37);
@@ -122,7 +118,9 @@ fn counted(graph: &Graph, code: &LoweredCode, found: &AllocatedCode, machine: &S
     let mut bytes = 4 * (wide + zeros + all_calls) + 2 * (integers + frame.moves) + frame.bytes;
     let jumps = bytes / REACH;
     bytes += 4 * jumps + 4 * constants_of(code, bytes / (jumps + 1));
-    let of_kernels = |column: usize| calls.iter().zip(&KERNELS).map(|(calls, row)| calls * row[column]).sum::<usize>();
+    let of_kernels = |column: usize| {
+        calls.iter().zip(Kernel::ALL).map(|(calls, kernel)| calls * kernel.figures()[column]).sum::<usize>()
+    };
     let has_calls = all_calls > 0;
     let instructions = inner + frame.instructions + jumps + of_kernels(0) + ZEROS.2 * filled;
     let transfers = memory + frame.transfers;
@@ -384,7 +382,7 @@ mod tests {
         let [alone, together] = [FLASH, by_two].map(|machine| estimated(&graph, machine));
         // a call less, and the kernel of two in place of two kernels
         assert!(
-            together.instructions < alone.instructions + KERNELS[2][0] - 2 * KERNELS[0][0],
+            together.instructions < alone.instructions + Kernel::Two.figures()[0] - 2 * Kernel::One.figures()[0],
             "{together:?} {alone:?}"
         );
     }
