@@ -182,6 +182,12 @@ functions! {
     /// Velocities and accelerations of the frames: their derivatives, and J̇.
     #[doc(alias("Jdot", "linearisation"))]
     motion_derivatives::FrameDerivatives,
+    /// The same of the twists of the frames, along their own axes.
+    #[doc(alias("LOCAL", "body Jacobian"))]
+    motion_derivatives::FrameDerivativesInOwnAxes,
+    /// The same of the twists of the frames, at the world's origin.
+    #[doc(alias("WORLD", "spatial Jacobian"))]
+    motion_derivatives::FrameDerivativesAtWorldOrigin,
     /// The Jacobian of the centre of mass.
     #[doc(alias("COM Jacobian"))]
     motion_derivatives::CentreOfMassJacobian,

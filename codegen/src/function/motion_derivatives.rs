@@ -4,6 +4,7 @@ use super::spec::Extent::{Frames, Joints, Of, Velocities};
 use super::spec::{Divisor, Form, Output, RobotFunction, Spec};
 use super::{Extent, Forms, Quantity};
 use straightline_core::algorithms as alg;
+use straightline_core::model::Frame;
 use straightline_core::Real;
 
 const PER_FRAME: &[Extent] = &[Frames, Of(6), Velocities];
@@ -15,6 +16,22 @@ const MAP: Output = Output::new(
 coordinate",
 );
 
+const MOTION: &[Quantity] = &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration];
+
+/// The blocks of a function of frames, whose first says which six rows they have.
+const fn frame_outputs(dv_dq: &'static str) -> [Output; 5] {
+    [
+        Output::new("dv_dq", PER_FRAME, dv_dq).slope("v", Quantity::Configuration),
+        Output::new("da_dq", PER_FRAME, "per frame: the same of ∂a/∂q at constant q̇ and q̈ \\[1/s²; m/s²\\]")
+            .slope("a", Quantity::Configuration),
+        Output::new("da_dqd", PER_FRAME, "per frame: the same of ∂a/∂q̇ = ∂v/∂q + J̇ \\[1/s; m/s\\]")
+            .slope("a", Quantity::Velocity),
+        Output::new("j", PER_FRAME, "per frame: the same of J = ∂v/∂q̇ = ∂a/∂q̈ \\[1; m\\]")
+            .slope("v", Quantity::Velocity),
+        Output::new("j_dot", PER_FRAME, "per frame: the same of J̇ along the motion \\[1/s; m/s\\]"),
+    ]
+}
+
 pub struct FrameDerivatives;
 
 impl RobotFunction for FrameDerivatives {
@@ -22,41 +39,82 @@ impl RobotFunction for FrameDerivatives {
         name: "frame_derivatives",
         summary: "Derivatives of the velocities and accelerations of the frames, with their Jacobians J and J̇.",
         aliases: &["getFrameAccelerationDerivatives", "computeJointJacobiansTimeVariation", "Jdot"],
-        inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration],
-        outputs: &[
-            Output::new(
-                "dv_dq",
-                PER_FRAME,
-                "per frame: 6 rows (3 linear of the origin, which moves along, 3 angular; world axes) of ∂v/∂q \\[1/s; of the origin by a turn m/s\\]; \
+        inputs: MOTION,
+        outputs: &frame_outputs(
+            "per frame: 6 rows (3 linear of the origin, which moves along, 3 angular; world axes) of ∂v/∂q \\[1/s; of the origin by a turn m/s\\]; \
 of a floating base by increments of its pose in its own axes",
-            )
-            .slope("v", Quantity::Configuration),
-            Output::new("da_dq", PER_FRAME, "per frame: the same of ∂a/∂q at constant q̇ and q̈ \\[1/s²; m/s²\\]")
-                .slope("a", Quantity::Configuration),
-            Output::new("da_dqd", PER_FRAME, "per frame: the same of ∂a/∂q̇ = ∂v/∂q + J̇ \\[1/s; m/s\\]")
-                .slope("a", Quantity::Velocity),
-            Output::new("j", PER_FRAME, "per frame: the same of J = ∂v/∂q̇ = ∂a/∂q̈ \\[1; m\\]")
-                .slope("v", Quantity::Velocity),
-            Output::new("j_dot", PER_FRAME, "per frame: the same of J̇ along the motion \\[1/s; m/s\\]"),
-        ],
+        ),
         form: Form::Plain,
         ..Spec::DERIVED
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        let motion = [&inputs[0][..], &inputs[1], &inputs[2]];
-        let all: Vec<_> = forms.frames.iter().map(|f| alg::frame_derivatives(forms.model, motion, f)).collect();
-        let block =
-            |of: fn(&alg::FrameDerivativeBlocks<T>) -> &Vec<T>| all.iter().flat_map(of).copied().collect::<Vec<T>>();
-        [
-            block(|of| &of.dv_dq),
-            block(|of| &of.da_dq),
-            block(|of| &of.da_dqd),
-            block(|of| &of.jacobian),
-            block(|of| &of.jacobian_rate),
-        ]
-        .concat()
+        of_frames(forms, |frame| alg::frame_derivatives(forms.model, motion(inputs), frame))
     }
+}
+
+pub struct FrameDerivativesInOwnAxes;
+
+impl RobotFunction for FrameDerivativesInOwnAxes {
+    const SPEC: Spec = Spec {
+        name: "frame_derivatives_in_own_axes",
+        summary: "Derivatives of the twists of the frames along their own axes and of the rates of these numbers, with J and J̇.",
+        aliases: &["LOCAL", "body twist", "body Jacobian", "getFrameAccelerationDerivatives", "Jdot"],
+        inputs: MOTION,
+        outputs: &frame_outputs(
+            "per frame: 6 rows (3 linear of the origin, 3 angular; the frame's own axes, which move along) of ∂v/∂q \\[1/s; of the origin by a turn m/s\\]; \
+of a floating base by increments of its pose in its own axes",
+        ),
+        form: Form::Plain,
+        ..Spec::DERIVED
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        of_frames(forms, |frame| alg::frame_derivatives_in_own_axes(forms.model, motion(inputs), frame))
+    }
+}
+
+pub struct FrameDerivativesAtWorldOrigin;
+
+impl RobotFunction for FrameDerivativesAtWorldOrigin {
+    const SPEC: Spec = Spec {
+        name: "frame_derivatives_at_world_origin",
+        summary: "Derivatives of the twists of the frames at the world's origin and of the rates of these numbers, with J and J̇.",
+        aliases: &["WORLD", "spatial twist", "spatial Jacobian", "getFrameAccelerationDerivatives", "Jdot"],
+        inputs: MOTION,
+        outputs: &frame_outputs(
+            "per frame: 6 rows (3 linear of what moves with it through the world's origin, 3 angular; world axes) of ∂v/∂q \\[1/s; of points by a turn m/s\\]; \
+of a floating base by increments of its pose in its own axes",
+        ),
+        form: Form::Plain,
+        ..Spec::DERIVED
+    };
+
+    fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        of_frames(forms, |frame| alg::frame_derivatives_at_world_origin(forms.model, motion(inputs), frame))
+    }
+}
+
+fn motion<T>(inputs: &[Vec<T>]) -> [&[T]; 3] {
+    [&inputs[0], &inputs[1], &inputs[2]]
+}
+
+/// Blocks of all frames, one block after the other.
+fn of_frames<T: Real>(
+    forms: &Forms<'_, T>,
+    derivatives: impl Fn(&Frame<T>) -> alg::FrameDerivativeBlocks<T>,
+) -> Vec<T> {
+    let all: Vec<_> = forms.frames.iter().map(|frame| derivatives(frame)).collect();
+    let block =
+        |of: fn(&alg::FrameDerivativeBlocks<T>) -> &Vec<T>| all.iter().flat_map(of).copied().collect::<Vec<T>>();
+    [
+        block(|of| &of.dv_dq),
+        block(|of| &of.da_dq),
+        block(|of| &of.da_dqd),
+        block(|of| &of.jacobian),
+        block(|of| &of.jacobian_rate),
+    ]
+    .concat()
 }
 
 pub struct CentreOfMassJacobian;

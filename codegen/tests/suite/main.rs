@@ -26,6 +26,7 @@ mod fixed;
 mod flexible;
 mod forward_dynamics;
 mod forward_dynamics_bounds;
+mod frame_conventions;
 mod guide;
 mod layers;
 mod limbs;

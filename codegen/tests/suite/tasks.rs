@@ -16,11 +16,11 @@ use straightline_core::{Dd, Real};
 const IDENTITY: f64 = 1e-20;
 
 /// A robot of which programs are asked.
-struct Asked {
-    robot: Robot,
+pub(super) struct Asked {
+    pub(super) robot: Robot,
     options: Options,
     frame: Vec<String>,
-    name: String,
+    pub(super) name: String,
 }
 
 impl Asked {
@@ -37,11 +37,11 @@ impl Asked {
         Asked { robot: Robot::new(loaded), options, frame: vec![frame.to_string()], name }
     }
 
-    fn nv(&self) -> usize {
+    pub(super) fn nv(&self) -> usize {
         self.robot.model.nv()
     }
 
-    fn graph(&self, function: Function) -> Graph {
+    pub(super) fn graph(&self, function: Function) -> Graph {
         program(&self.robot, &self.frame, function, &self.options).graph
     }
 
@@ -54,7 +54,7 @@ impl Asked {
     }
 
     /// Anywhere within the limits, without those within ±2; a base somewhere.
-    fn configuration(&self, random: &mut Random) -> Vec<f64> {
+    pub(super) fn configuration(&self, random: &mut Random) -> Vec<f64> {
         let mut q = vec![0.0; self.robot.model.nq()];
         for joint in self.robot.model.bodies.iter().map(|b| &b.joint) {
             let own = &mut q[joint.iq..joint.iq + joint.kind.nq()];
@@ -68,14 +68,14 @@ impl Asked {
 }
 
 /// A program at these inputs, one after the other as it has them.
-fn run<T: Real>(graph: &Graph, inputs: &[&[f64]]) -> Vec<T> {
+pub(super) fn run<T: Real>(graph: &Graph, inputs: &[&[f64]]) -> Vec<T> {
     let lengths: Vec<usize> = graph.inputs.iter().map(|port| port.len()).collect();
     assert_eq!(lengths, inputs.iter().map(|x| x.len()).collect::<Vec<_>>());
     evaluate(graph, &inputs.concat().into_iter().map(|x| T::constant(Dd::from(x))).collect::<Vec<_>>())
 }
 
 /// The blocks of its results, by rows; of one frame.
-fn blocks<T: Real>(graph: &Graph, results: &[T]) -> Vec<Vec<T>> {
+pub(super) fn blocks<T: Real>(graph: &Graph, results: &[T]) -> Vec<Vec<T>> {
     let mut rest = results;
     let of_port = |len: usize| {
         let (own, others) = rest.split_at(len);
@@ -85,11 +85,11 @@ fn blocks<T: Real>(graph: &Graph, results: &[T]) -> Vec<Vec<T>> {
     graph.outputs.iter().map(|port| port.len()).map(of_port).collect()
 }
 
-fn matrix(rows: usize, x: &[Dd]) -> DMatrix<Dd> {
+pub(super) fn matrix(rows: usize, x: &[Dd]) -> DMatrix<Dd> {
     DMatrix::from_row_slice(rows, x.len() / rows, x)
 }
 
-fn vector(x: &[Dd]) -> DVector<Dd> {
+pub(super) fn vector(x: &[Dd]) -> DVector<Dd> {
     DVector::from_column_slice(x)
 }
 
@@ -105,7 +105,7 @@ fn is_positive(mut a: DMatrix<Dd>) -> bool {
 }
 
 #[track_caller]
-fn hold(what: &str, found: &DMatrix<Dd>, expected: &DMatrix<Dd>) {
+pub(super) fn hold(what: &str, found: &DMatrix<Dd>, expected: &DMatrix<Dd>) {
     let greatest = expected.iter().map(|x| x.to_f64().abs()).fold(1.0, f64::max);
     for (found, expected) in found.iter().zip(expected.iter()) {
         let off = (*found - *expected).to_f64().abs();
@@ -113,7 +113,7 @@ fn hold(what: &str, found: &DMatrix<Dd>, expected: &DMatrix<Dd>) {
     }
 }
 
-fn robots() -> Vec<Asked> {
+pub(super) fn robots() -> Vec<Asked> {
     vec![
         Asked::of_file("ur5.urdf", "tool0", false),
         Asked::of_file("panda.urdf", "panda_hand_tcp", false),

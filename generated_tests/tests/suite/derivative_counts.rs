@@ -165,6 +165,16 @@ fn derivatives_of_frames_and_of_centroidal_momentum_take_what_is_on_record() {
     hold_records(functions, records);
 }
 
+/// The same of a frame's twist, along its own axes and at the world's origin.
+#[test]
+fn derivatives_of_twists_of_frames_take_what_is_on_record() {
+    use Function::{FrameDerivativesAtWorldOrigin, FrameDerivativesInOwnAxes};
+    hold_records(
+        [FrameDerivativesInOwnAxes, FrameDerivativesAtWorldOrigin],
+        [[874, 606], [571, 627], [921, 918], [959, 928]],
+    );
+}
+
 /// What is asked of a frame, and what each joint carries.
 #[test]
 fn tasks_and_subtrees_take_what_is_on_record() {

@@ -18,6 +18,7 @@ mod driven_physics;
 mod driven_robots;
 mod drives;
 mod exact_rules;
+mod frame_conventions;
 mod fused;
 mod generic;
 mod golden;

@@ -33,7 +33,7 @@ fn redirected(graph: &Graph, i: usize, other: NodeId) -> Graph {
 }
 
 /// All faults that may sit in node `i`.
-fn faults(graph: &Graph, i: usize) -> Vec<(&'static str, Graph)> {
+pub(super) fn faults(graph: &Graph, i: usize) -> Vec<(&'static str, Graph)> {
     match graph.ops[i] {
         Op::Input(_) | Op::SinCos(_) => vec![],
         Op::Constant(c) => {

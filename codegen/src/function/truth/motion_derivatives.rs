@@ -2,11 +2,12 @@
 
 use super::super::motion_derivatives::{
     CentreOfMassJacobian, CentroidalDerivatives, CentroidalMap, CentroidalMapRate, FrameDerivatives,
-    SubtreeCentresOfMass,
+    FrameDerivativesAtWorldOrigin, FrameDerivativesInOwnAxes, SubtreeCentresOfMass,
 };
 use super::derivatives::{moving, unit};
 use super::{list, Chapter, Truth};
 use crate::function::by_rows;
+use nalgebra::Vector3;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference::{self, CentreOfMassTree, ReferenceReal};
 use straightline_core::{Dual, Real};
@@ -35,6 +36,76 @@ impl Truth for FrameDerivatives {
         ];
         Some(blocks.concat())
     }
+}
+
+impl Truth for FrameDerivativesInOwnAxes {
+    /// Of Rᵀ v and Rᵀ ω.
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        twist_slopes::<AlongOwnAxes>(at)
+    }
+}
+
+impl Truth for FrameDerivativesAtWorldOrigin {
+    /// Of v − ω × p and ω.
+    fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        twist_slopes::<AtWorldOrigin>(at)
+    }
+}
+
+/// Six numbers by which the motion of a frame is told, of its pose and the velocity of its origin.
+trait Twist {
+    fn numbers<T: ReferenceReal>(pose: &reference::FramePose<T>, linear: Vector3<T>, angular: Vector3<T>) -> Vec<T>;
+}
+
+struct AlongOwnAxes;
+
+impl Twist for AlongOwnAxes {
+    fn numbers<T: ReferenceReal>(pose: &reference::FramePose<T>, linear: Vector3<T>, angular: Vector3<T>) -> Vec<T> {
+        let axes = pose.rotation.transpose();
+        [list(&(axes * linear)), list(&(axes * angular))].concat()
+    }
+}
+
+struct AtWorldOrigin;
+
+impl Twist for AtWorldOrigin {
+    fn numbers<T: ReferenceReal>(pose: &reference::FramePose<T>, linear: Vector3<T>, angular: Vector3<T>) -> Vec<T> {
+        [list(&(linear - angular.cross(&pose.position))), list(&angular)].concat()
+    }
+}
+
+/// The twist of a frame.
+fn twist<W: Twist, T: ReferenceReal>(tree: &CentreOfMassTree<T>, frame: &str, q: &[T], qd: &[T]) -> Vec<T> {
+    let frame = tree.frame(frame).expect("frames are those of the tree");
+    let velocity = reference::frame_velocity(tree, frame, q, qd);
+    let [linear, angular] = [0, 3].map(|row| velocity.fixed_rows::<3>(row).into_owned());
+    W::numbers(&reference::frame_pose(tree, frame, q), linear, angular)
+}
+
+/// Derivatives of the twist, and of what it changes by along the motion: no acceleration is asked of the second author.
+fn twist_slopes<W: Twist>(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+    let nv = at.qd().len();
+    let once = at.tree.map(Moving::fixed);
+    let twice = once.map(Dual::<Moving, 1>::fixed);
+    let rate = |[q, qd, qdd]: &[Vec<Moving>; 3], frame: &str| {
+        let [q, qd, _] = moving(&once, [q, qd, qdd], &[qd.clone(), qdd.clone(), qdd.clone()]);
+        twist::<W, _>(&twice, frame, &q, &qd).into_iter().map(|x| x.derivatives[0]).collect::<Vec<_>>()
+    };
+    let (along, [q, _]) = at.along_motion();
+    let column = |frame: &str, k: usize| twist::<W, _>(&at.tree, frame, at.q(), &unit::<Magnitude>(nv, 1, k)[1]);
+    let column_rate = |frame: &str, k: usize| {
+        let numbers = twist::<W, _>(&along, frame, &q, &unit::<Moving>(nv, 1, k)[1]);
+        numbers.into_iter().map(|x| x.derivatives[0]).collect::<Vec<_>>()
+    };
+    let columns = |of: &dyn Fn(usize) -> Vec<Magnitude>| by_rows(&(0..nv).map(of).collect::<Vec<_>>());
+    let blocks = [
+        at.per_frame(|f| slopes(at, 0, |[q, qd, _]| twist::<W, _>(&once, &f.name, q, qd)))?,
+        at.per_frame(|f| slopes(at, 0, |motion| rate(motion, &f.name)))?,
+        at.per_frame(|f| slopes(at, 1, |motion| rate(motion, &f.name)))?,
+        at.per_frame(|f| columns(&|k| column(&f.name, k)))?,
+        at.per_frame(|f| columns(&|k| column_rate(&f.name, k)))?,
+    ];
+    Some(blocks.concat())
 }
 
 impl Truth for CentreOfMassJacobian {

@@ -19,7 +19,8 @@ use crate::spatial::{MotionVector, Vec3};
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Derivatives of the motion of a frame: each 6 × nv, row-major, rows 0-2 linear, 3-5 angular, in world axes. The frame's origin moves along.
+/// Derivatives of the motion of a frame: each 6 × nv, row-major, rows 0-2 linear, 3-5 angular. The point and the axes are those of the function that
+/// gives them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameDerivativeBlocks<T> {
     /// ∂v/∂q; of a floating base by increments of its pose in its own axes.
@@ -34,7 +35,16 @@ pub struct FrameDerivativeBlocks<T> {
     pub jacobian_rate: Vec<T>,
 }
 
-/// The derivatives of [`frame_velocity`](super::frame_velocity) and [`frame_acceleration`](super::frame_acceleration).
+impl<T: Real> FrameDerivativeBlocks<T> {
+    /// Of a frame that stands still.
+    pub(super) fn zero(nv: usize) -> Self {
+        let none = || vec![T::zero(); 6 * nv];
+        FrameDerivativeBlocks { dv_dq: none(), da_dq: none(), da_dqd: none(), jacobian: none(), jacobian_rate: none() }
+    }
+}
+
+/// The derivatives of [`frame_velocity`](super::frame_velocity) and [`frame_acceleration`](super::frame_acceleration): in world axes, of the frame's
+/// origin, which moves along.
 #[doc(alias("getFrameAccelerationDerivatives", "Jdot"))]
 pub fn frame_derivatives<T: Real>(
     model: &Model<T>,
@@ -42,9 +52,7 @@ pub fn frame_derivatives<T: Real>(
     frame: &Frame<T>,
 ) -> FrameDerivativeBlocks<T> {
     let nv = model.nv();
-    let none = || vec![T::zero(); 6 * nv];
-    let mut all =
-        FrameDerivativeBlocks { dv_dq: none(), da_dq: none(), da_dqd: none(), jacobian: none(), jacobian_rate: none() };
+    let mut all = FrameDerivativeBlocks::zero(nv);
     let poses = world_poses(model, q);
     let path = path_to(model, frame.body);
     let spins = spins_along(model, &poses, &path, [q, qd, qdd]);

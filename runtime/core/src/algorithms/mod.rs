@@ -42,7 +42,7 @@
 //! |---|---|
 //! | pose, velocity, acceleration of a frame | [`forward_kinematics`], [`frame_velocity`], [`frame_acceleration`] |
 //! | Jacobian and J̇q̇ | [`jacobian`](fn@jacobian), [`jacobian_bias`] |
-//! | derivatives of the motion of a frame, J̇ | [`frame_derivatives`](fn@frame_derivatives) |
+//! | derivatives of the motion of a frame, J̇ | [`frame_derivatives`](fn@frame_derivatives), [`frame_derivatives_in_own_axes`], [`frame_derivatives_at_world_origin`] |
 //! | Jᵀ f and its derivative | [`jacobian_hessian_product`] |
 //! | dynamics of a task, inverse kinematics | [`OperationalSpace`], [`inverse_kinematics_step`] |
 //! | tau of a motion | [`inverse_dynamics`], [`bias_force`], [`gravity_force`], [`velocity_force`] |
@@ -83,6 +83,7 @@ mod environment;
 mod factor;
 mod falling_base;
 mod frame_derivatives;
+mod frame_twist_derivatives;
 mod functional;
 mod impact;
 mod inverse_kinematics;
@@ -132,6 +133,7 @@ pub use environment::{Environment, EnvironmentMotion, SpringDamper};
 pub use factor::{forward_dynamics_ltdl, Ltdl};
 pub use falling_base::FallingBase;
 pub use frame_derivatives::{frame_derivatives, FrameDerivativeBlocks};
+pub use frame_twist_derivatives::{frame_derivatives_at_world_origin, frame_derivatives_in_own_axes};
 pub use functional::{
     constrained_coordinates, functional_coordinates, reduced_relative_motion, relative_motion, FunctionalCoordinates,
     RelativeMotion,

@@ -112,6 +112,17 @@ impl<T: Real> JointPose<T> {
         }
     }
 
+    /// The rotation of the parent in the axes that `r_child` turns the child's into: r_child Rᵀ.
+    #[cfg(feature = "alloc")]
+    pub fn rotation_before(&self, r_child: &Mat3<T>) -> Mat3<T> {
+        let turned_back = match self.turn {
+            // (E R_z)ᵀ = R_zᵀ Eᵀ
+            Some((s, c)) => turn_columns(r_child, -s, c),
+            None => *r_child,
+        };
+        turned_back * self.placement.transpose()
+    }
+
     /// Angular velocity and velocity of the origin that the parent's motion alone gives the child, in child axes.
     pub fn motion_to_child(&self, parent: &MotionVector<T>) -> MotionVector<T> {
         let angular = self.to_child(parent.angular);

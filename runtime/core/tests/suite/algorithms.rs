@@ -784,6 +784,132 @@ fn acceleration_is_the_jacobian_times_qdd_plus_its_bias() {
     }
 }
 
+/// Where the six numbers of a frame's motion are taken.
+#[derive(Clone, Copy, Debug)]
+enum Convention {
+    /// Of its origin, along its own axes.
+    OwnAxes,
+    /// Of what moves with it through the world's origin, along the world's axes.
+    WorldOrigin,
+}
+
+/// A motion of a frame's origin, linear and angular part, as the six numbers of a convention.
+fn in_convention<T: Real>(convention: Convention, pose: &Transform<T>, linear: Vec3<T>, angular: Vec3<T>) -> Vec<T> {
+    let [linear, angular] = match convention {
+        Convention::OwnAxes => [linear, angular].map(|v| pose.rotation.transpose_mul(v)),
+        Convention::WorldOrigin => [linear - angular.cross(pose.translation), angular],
+    };
+    [linear.to_array(), angular.to_array()].concat()
+}
+
+/// The twist of a frame, by its pose and the velocity of its origin.
+fn twist<T: Real>(convention: Convention, model: &Model<T>, [q, qd]: [&[T]; 2], frame: &Frame<T>) -> Vec<T> {
+    let velocity = frame_velocity(model, q, qd, frame);
+    in_convention(convention, &forward_kinematics(model, q, &[frame])[0], velocity.linear, velocity.angular)
+}
+
+/// The rates of these six numbers: spatial acceleration, by the classical one of the origin.
+fn twist_rate<T: Real>(convention: Convention, model: &Model<T>, [q, qd, qdd]: [&[T]; 3], frame: &Frame<T>) -> Vec<T> {
+    let (v, a) = (frame_velocity(model, q, qd, frame), frame_acceleration(model, q, qd, qdd, frame));
+    let spatial = a.linear - v.angular.cross(v.linear);
+    in_convention(convention, &forward_kinematics(model, q, &[frame])[0], spatial, a.angular)
+}
+
+type FrameDerivativesOf = fn(&Model<Dd>, [&[Dd]; 3], &Frame<Dd>) -> FrameDerivativeBlocks<Dd>;
+
+const CONVENTIONS: [(Convention, FrameDerivativesOf); 2] = [
+    (Convention::OwnAxes, frame_derivatives_in_own_axes::<Dd>),
+    (Convention::WorldOrigin, frame_derivatives_at_world_origin::<Dd>),
+];
+
+/// Matrix by rows, from its columns.
+fn by_rows(columns: &[Vec<Dd>]) -> Vec<Dd> {
+    (0..columns[0].len()).flat_map(|row| columns.iter().map(move |column| column[row])).collect()
+}
+
+fn rates_of(x: Vec<Rate>) -> Vec<Dd> {
+    x.into_iter().map(|x| x.rate).collect()
+}
+
+#[test]
+fn derivatives_of_twists_are_rates_of_their_numbers() {
+    for case in cases() {
+        let model: Model<Rate> = case.model.cast();
+        let held = |x: &[Dd]| x.iter().map(|&value| Rate { value, rate: Dd::ZERO }).collect::<Vec<_>>();
+        for ((convention, derivatives), (frame, moving)) in
+            CONVENTIONS.into_iter().flat_map(|of| case.model.frames.iter().zip(&model.frames).map(move |f| (of, f)))
+        {
+            let found = derivatives(&case.model, [&case.q, &case.qd, &case.qdd], frame);
+            let columns = |of: &dyn Fn(&Case, Vec<Dd>) -> Vec<Dd>| {
+                by_rows(&(0..case.nv()).map(|k| of(&case, unit(case.nv(), k))).collect::<Vec<_>>())
+            };
+            // q as it moves with these velocities
+            let along = |qd: &[Dd]| {
+                let of = Case {
+                    seed: case.seed,
+                    model: case.model.clone(),
+                    q: case.q.clone(),
+                    qd: qd.to_vec(),
+                    qdd: case.qdd.clone(),
+                };
+                of.moving().1
+            };
+            let with = |x: &[Dd], rates: &[Dd]| {
+                x.iter().zip(rates).map(|(&value, &rate)| Rate { value, rate }).collect::<Vec<_>>()
+            };
+            let [qd, qdd] = [&case.qd, &case.qdd].map(|x| held(x));
+            let dv_dq = columns(&|_, e| rates_of(twist(convention, &model, [&along(&e), &qd], moving)));
+            case.agree(&found.dv_dq, &dv_dq, DD);
+            let da_dq = columns(&|_, e| rates_of(twist_rate(convention, &model, [&along(&e), &qd, &qdd], moving)));
+            case.agree(&found.da_dq, &da_dq, DD);
+            let q = held(&case.q);
+            let da_dqd =
+                columns(&|case, e| rates_of(twist_rate(convention, &model, [&q, &with(&case.qd, &e), &qdd], moving)));
+            case.agree(&found.da_dqd, &da_dqd, DD);
+            let j = columns(&|case, e| twist(convention, &case.model, [&case.q, &e], frame));
+            case.agree(&found.jacobian, &j, DD);
+            let j_dot = columns(&|case, e| rates_of(twist(convention, &model, [&along(&case.qd), &held(&e)], moving)));
+            case.agree(&found.jacobian_rate, &j_dot, DD);
+        }
+    }
+}
+
+/// a = J q̈ + J̇ q̇, where a is the rate of the six numbers J q̇ along the motion.
+#[test]
+fn the_rate_of_a_twist_is_the_jacobian_times_qdd_plus_its_rate_times_qd() {
+    for case in cases() {
+        let (model, q, qd) = case.moving();
+        for (convention, derivatives) in CONVENTIONS {
+            for (moving, frame) in model.frames.iter().zip(&case.model.frames) {
+                let found = derivatives(&case.model, [&case.q, &case.qd, &case.qdd], frame);
+                let a = sum(&product(&found.jacobian, &case.qdd), &product(&found.jacobian_rate, &case.qd));
+                case.agree(&a, &rates_of(twist(convention, &model, [&q, &qd], moving)), DD);
+            }
+        }
+    }
+}
+
+/// The last joint moves its own frame always in the same way as seen from there, the first one as seen from the world.
+#[test]
+fn the_column_of_the_last_joint_stands_still_in_its_own_axes_and_that_of_the_first_in_the_world() {
+    for case in cases() {
+        let motion = [&case.q[..], &case.qd, &case.qdd];
+        for frame in &case.model.frames {
+            let path: Vec<usize> = std::iter::successors(frame.body, |&b| case.model.bodies[b].parent).collect();
+            let joint = |at: Option<&usize>| &case.model.bodies[*at.expect("a frame on a body")].joint;
+            let (last, first) = (joint(path.first()), joint(path.last()));
+            for ((_, derivatives), joint) in CONVENTIONS.into_iter().zip([last, first]) {
+                if !joint.kind.is_single() {
+                    continue;
+                }
+                let found = derivatives(&case.model, motion, frame).jacobian_rate;
+                let column: Vec<Dd> = found.chunks(case.nv()).map(|row| row[joint.iv]).collect();
+                assert_eq!(column, [Dd::ZERO; 6], "seed {}", case.seed);
+            }
+        }
+    }
+}
+
 #[test]
 fn a_frame_on_the_world_stands_still() {
     let case = Case::new(3);
@@ -791,6 +917,10 @@ fn a_frame_on_the_world_stands_still() {
     assert_eq!(forward_kinematics(&case.model, &case.q, &[&frame])[0], frame.placement);
     assert_eq!(jacobian(&case.model, &case.q, &frame), vec![Dd::ZERO; 6 * case.nv()]);
     assert_eq!(frame_velocity(&case.model, &case.q, &case.qd, &frame).linear, Vec3::zero());
+    for (_, derivatives) in CONVENTIONS {
+        let found = derivatives(&case.model, [&case.q, &case.qd, &case.qdd], &frame);
+        assert_eq!(found.da_dqd, vec![Dd::ZERO; 6 * case.nv()]);
+    }
 }
 
 // ------------------------------------------------------------------------------------------------- what may not matter
