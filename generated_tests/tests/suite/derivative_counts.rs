@@ -80,18 +80,29 @@ fn count(of: &CountsOf, function: Function, results: &[&str]) -> usize {
 /// Products beside inverse dynamics: along a direction, backwards, and of second order.
 #[test]
 fn products_take_two_and_a_half_times_inverse_dynamics_and_those_of_second_order_six_times() {
-    hold_products(&[("ur5", false), ("puma560", false), ("panda", false), ("solo12", true), ("hyq", true)]);
+    hold_products(&[
+        ("planar2r.urdf", false),
+        ("ur5.urdf", false),
+        ("puma560.urdf", false),
+        ("panda.urdf", false),
+        ("chapter_6r.toml", false),
+        ("chapter_stanford.toml", false),
+        ("chapter_cylindrical.toml", false),
+        ("chapter_oblique.toml", false),
+        ("solo12.urdf", true),
+        ("hyq.urdf", true),
+    ]);
 }
 
 #[test]
 #[ignore = "slow proof: programs of some ten thousand operations are searched"]
 fn slow_proof_that_products_of_a_humanoid_take_as_many_times_inverse_dynamics() {
-    hold_products(&[("simple_humanoid", true)]);
+    hold_products(&[("simple_humanoid.urdf", true)]);
 }
 
 fn hold_products(robots: &[(&str, bool)]) {
     for (name, floating_base) in robots.iter().copied() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../robots/descriptions/{name}.urdf"));
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../robots/descriptions/{name}"));
         let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
         let model = ModelOptions { floating_base, ..ModelOptions::default() };
         let robot = programs::load(&Source::new(name, text), &model);

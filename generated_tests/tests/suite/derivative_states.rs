@@ -145,6 +145,13 @@ fn hold_coriolis_matrix<T: Real + Into<Dd>>(options: impl Fn(&DerivativeRobot) -
                 let error = block.error(own);
                 assert!(error <= most, "{} in {}: {error:e}", block.name, state.id);
             }
+            // Ḣ = C + Cᵀ: Ḣ − 2 C is skew
+            let greatest = c.iter().chain(h_dot).fold(0.0f64, |most, x| most.max((*x).into().to_f64().abs()));
+            for (i, rate) in h_dot.iter().enumerate() {
+                let transposed = c[i % qd.len() * qd.len() + i / qd.len()];
+                let left: Dd = (*rate - c[i] - transposed).into();
+                assert!(left.to_f64().abs() <= most * greatest, "Ḣ − C − Cᵀ in {}: {}", state.id, left.to_f64());
+            }
         }
     }
 }
