@@ -373,8 +373,8 @@ mod tests {
     fn sines_that_stand_together_come_by_one_call_of_two() {
         let (mut b, x) = inputs(3);
         let mut results = Vec::new();
-        for k in 0..3 {
-            let pair = b.insert(Op::SinCos(x[k]));
+        for angle in x {
+            let pair = b.insert(Op::SinCos(angle));
             results.extend([Op::Sin(pair), Op::Cos(pair)].map(|half| b.insert(half)));
         }
         let graph = finished(b, results);
