@@ -137,8 +137,8 @@ fn objects_of_robots_for_microcontrollers_call_nothing() {
 
 /// Every function that a file has without being asked, and derivatives.
 #[test]
-#[ignore = "slow proof: orders of long functions are searched for many machines"]
-fn slow_proof_objects_of_all_functions_for_all_microcontrollers_call_nothing() {
+#[ignore = "minutes: orders of long functions are searched for many machines"]
+fn objects_of_all_functions_for_all_microcontrollers_call_nothing() {
     let further = [Function::MassMatrixAndGravityForce, Function::InverseDynamicsDerivatives];
     let functions: Vec<Function> = Options::default().functions.into_iter().chain(further).collect();
     for robot in ["panda.urdf", "hyq.urdf", "solo12.urdf"] {
