@@ -16,7 +16,12 @@ const MAP: Output = Output::new(
 coordinate",
 );
 
-const MOTION: &[Quantity] = &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration];
+/// What functions of frames share.
+const OF_FRAMES: Spec = Spec {
+    inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration],
+    form: Form::Plain,
+    ..Spec::DERIVED
+};
 
 /// The blocks of a function of frames, whose first says which six rows they have.
 const fn frame_outputs(dv_dq: &'static str) -> [Output; 5] {
@@ -39,13 +44,11 @@ impl RobotFunction for FrameDerivatives {
         name: "frame_derivatives",
         summary: "Derivatives of the velocities and accelerations of the frames, with their Jacobians J and J̇.",
         aliases: &["getFrameAccelerationDerivatives", "computeJointJacobiansTimeVariation", "Jdot"],
-        inputs: MOTION,
         outputs: &frame_outputs(
             "per frame: 6 rows (3 linear of the origin, which moves along, 3 angular; world axes) of ∂v/∂q \\[1/s; of the origin by a turn m/s\\]; \
 of a floating base by increments of its pose in its own axes",
         ),
-        form: Form::Plain,
-        ..Spec::DERIVED
+        ..OF_FRAMES
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
@@ -60,13 +63,11 @@ impl RobotFunction for FrameDerivativesInOwnAxes {
         name: "frame_derivatives_in_own_axes",
         summary: "Derivatives of the twists of the frames along their own axes and of the rates of these numbers, with J and J̇.",
         aliases: &["LOCAL", "body twist", "body Jacobian", "getFrameAccelerationDerivatives", "Jdot"],
-        inputs: MOTION,
         outputs: &frame_outputs(
             "per frame: 6 rows (3 linear of the origin, 3 angular; the frame's own axes, which move along) of ∂v/∂q \\[1/s; of the origin by a turn m/s\\]; \
 of a floating base by increments of its pose in its own axes",
         ),
-        form: Form::Plain,
-        ..Spec::DERIVED
+        ..OF_FRAMES
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
@@ -81,13 +82,11 @@ impl RobotFunction for FrameDerivativesAtWorldOrigin {
         name: "frame_derivatives_at_world_origin",
         summary: "Derivatives of the twists of the frames at the world's origin and of the rates of these numbers, with J and J̇.",
         aliases: &["WORLD", "spatial twist", "spatial Jacobian", "getFrameAccelerationDerivatives", "Jdot"],
-        inputs: MOTION,
         outputs: &frame_outputs(
             "per frame: 6 rows (3 linear of what moves with it through the world's origin, 3 angular; world axes) of ∂v/∂q \\[1/s; of points by a turn m/s\\]; \
 of a floating base by increments of its pose in its own axes",
         ),
-        form: Form::Plain,
-        ..Spec::DERIVED
+        ..OF_FRAMES
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {

@@ -4,6 +4,7 @@
 //! Where `robots/firmware/toolchain` was run, objects for microcontrollers are looked at; elsewhere the text alone is.
 
 use crate::cross;
+use crate::standalone::Folder;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -59,58 +60,57 @@ fn plain_functions_fill_no_arrays_with_zeros() {
     assert!(of_lanes.trim_end().ends_with('}') && of_lanes.contains("if $lanes == 1 {"), "one angle after the other");
 }
 
-/// The symbols that an object wants from elsewhere.
-fn wanted(object: &Path) -> Option<String> {
-    let output = Command::new("nm").arg("-u").arg(object).output().ok()?;
-    // how an error of a parameter prints is `core`'s, and called only by who prints it
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    Some(text.lines().filter(|line| !line.contains("4core3fmt")).map(|line| format!("{line} ")).collect())
-}
-
-/// Of tests that run at once each has files of its own.
-static OBJECTS: AtomicUsize = AtomicUsize::new(0);
-
-/// What the object of a text for a machine wants from elsewhere.
-fn wants(rustc: &Path, text: &str, machine: TargetMachine, memory: Memory, level: &str) -> Option<String> {
-    let name = format!("object{}", OBJECTS.fetch_add(1, Ordering::Relaxed));
-    let (file, object) = (scratch().join(format!("{name}.rs")), scratch().join(format!("{name}.o")));
+/// What the object of a text for a machine wants from elsewhere; none where there is no `nm`.
+fn wanted(text: &str, machine: TargetMachine, memory: Memory, level: &str) -> Option<Vec<String>> {
+    static OBJECTS: AtomicUsize = AtomicUsize::new(0);
+    let folder = Folder::new(&format!("bare-metal-{}", OBJECTS.fetch_add(1, Ordering::Relaxed)));
     // functions that are small would not be in the object
     let text = text.replace("pub fn ", "#[inline(never)]\npub fn ");
-    std::fs::write(&file, format!("#![no_std]\n#![allow(warnings)]\n{text}")).expect("a file");
-    let mut rustc = Command::new(rustc);
-    rustc.args(["--edition=2021", "--crate-type=rlib", "--crate-name=arm", "--target", machine.row().triple]);
-    rustc.args(["-Cpanic=abort", "-Ccodegen-units=1", "-Cembed-bitcode=no", "--cap-lints=allow"]);
-    for flag in machine.flags(memory) {
-        rustc.args(flag.split(' '));
-    }
-    rustc.arg(format!("-Copt-level={level}")).arg(format!("--emit=obj={}", object.display())).arg(&file);
-    let built = rustc.output().expect("the compiler runs");
-    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
-    let wanted = wanted(&object);
-    if wanted.is_none() {
+    let given = machine.flags(memory);
+    let flags = [
+        "--crate-type=rlib",
+        "--emit=obj",
+        "-Cpanic=abort",
+        "-Cembed-bitcode=no",
+        "--target",
+        machine.row().triple,
+        level,
+    ];
+    let flags: Vec<&str> = flags.into_iter().chain(given.iter().flat_map(|flag| flag.split(' '))).collect();
+    let source = format!("#![no_std]\n#![allow(warnings)]\n{text}");
+    let object = folder.build_by(&cross::rustc(), "arm", &source, &flags).unwrap_or_else(|error| panic!("{error}"));
+    let Ok(output) = Command::new("nm").arg("-u").arg(object).output() else {
         eprintln!("skipped: there is no nm");
-    }
-    wanted
+        return None;
+    };
+    // how an error of a parameter prints is `core`'s, and called only by who prints it
+    let lines = String::from_utf8_lossy(&output.stdout).into_owned();
+    let names = lines.lines().filter_map(|line| line.split_whitespace().last());
+    Some(names.filter(|name| !name.contains("4core3fmt")).map(str::to_string).collect())
 }
 
 #[test]
 fn an_object_for_a_cortex_m4_calls_nothing() {
-    let Some(rustc) = cross::program("rustc") else { return };
-    let of = |text: &str, level: &str| wants(&rustc, text, TargetMachine::CORTEX_M4F, Memory::Flash, level);
+    if cross::program("rustc").is_none() {
+        return;
+    }
+    let of = |text: &str, level: &str| wanted(text, TargetMachine::CORTEX_M4F, Memory::Flash, level);
     for (k, text) in texts().into_iter().enumerate() {
-        for level in ["2", "3"] {
+        for level in ["-Copt-level=2", "-Copt-level=3"] {
             let Some(wanted) = of(&text, level) else { return };
-            assert_eq!(wanted, "", "text {k}, opt-level {level}");
+            assert_eq!(wanted, [""; 0], "text {k}, {level}");
         }
     }
     // an array of zeros is seen
     let fills = "pub fn fills(x: &mut [f32; 40], y: f32) { *x = [0.0; 40]; x[7] = y; }";
-    assert!(of(fills, "3").is_some_and(|wanted| wanted.contains("__aeabi_memclr4")));
+    assert_eq!(of(fills, "-Copt-level=3"), Some(vec!["__aeabi_memclr4".to_string()]));
 }
 
 /// Fails where an object of these functions calls what is not its own, but for arithmetic where there is no unit for it.
 fn calls_nothing(robot: &str, (machine, memory): (TargetMachine, Memory), functions: &[Function]) {
-    let Some(rustc) = cross::program("rustc") else { return };
+    if cross::program("rustc").is_none() {
+        return;
+    }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/descriptions").join(robot);
     let source = Source::new(robot, std::fs::read_to_string(path).expect("the robot is there"));
     let base = Options { scalar: Scalar::F32, target: Some(machine), memory, ..Options::default() };
@@ -118,9 +118,9 @@ fn calls_nothing(robot: &str, (machine, memory): (TargetMachine, Memory), functi
     options.model.floating_base = robot == "hyq.urdf" || robot == "solo12.urdf";
     options.model.angle_tolerance = 1e-10;
     let text = compile(&source, &options).unwrap_or_else(|errors| panic!("{errors}")).text;
-    let Some(wanted) = wants(&rustc, &text, machine, memory, "3") else { return };
-    let others = wanted.split_whitespace().filter(|word| *word != "U");
-    let others: Vec<&str> = others.filter(|name| machine.row().registers.is_some() || name.contains("mem")).collect();
+    let Some(wanted) = wanted(&text, machine, memory, "-Copt-level=3") else { return };
+    let is_counted = |name: &&String| machine.row().registers.is_some() || name.contains("mem");
+    let others: Vec<&String> = wanted.iter().filter(is_counted).collect();
     assert_eq!(others, [""; 0], "{robot} for {machine:?}, {memory:?}");
 }
 

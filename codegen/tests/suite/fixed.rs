@@ -2,6 +2,7 @@
 
 use super::readback::random_robot;
 use crate::cross;
+use crate::standalone::Folder;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -199,10 +200,6 @@ fn scratch() -> PathBuf {
     folder
 }
 
-fn rustc() -> Command {
-    Command::new(cross::rustc())
-}
-
 /// Compiled text gives the interpreter's bits, with overflow checks on.
 #[test]
 fn compiled_text_has_the_bits_of_the_interpreter() {
@@ -235,7 +232,7 @@ fn compiled_text_has_the_bits_of_the_interpreter() {
         let name = format!("bits_{products:?}");
         let (file, program) = (scratch().join(format!("{name}.rs")), scratch().join(&name));
         std::fs::write(&file, source).expect("the program can be written");
-        let built = rustc()
+        let built = Command::new(cross::rustc())
             .args(["--edition", "2021", "-C", "opt-level=1", "-C", "overflow-checks=on", "-A", "warnings", "-o"])
             .args([&program, &file])
             .output()
@@ -246,30 +243,36 @@ fn compiled_text_has_the_bits_of_the_interpreter() {
     }
 }
 
-/// The module alone, where there is `core` and nothing else: no call that is not its own, so no panic either.
+/// The object of the module alone, where there is `core` and nothing else.
+///
+/// # Errors
+/// What rustc says.
+fn object_of_module(folder: &Folder, generated: &Generated, target: &str, cpu: &str) -> Result<PathBuf, String> {
+    let module = generated.text.find("pub mod fixed {").expect("there is a module");
+    let source = format!("#![no_std]\n#![forbid(unsafe_code)]\n{}", &generated.text[module..]);
+    let cpu = format!("-Ctarget-cpu={cpu}");
+    let flags = ["--crate-type=lib", "--emit=obj", "-Cpanic=abort", "--cap-lints=allow", "--target", target, &cpu];
+    folder.build_by(&cross::rustc(), target, &source, &flags)
+}
+
+/// No call that is not its own, so no panic either.
 #[test]
 fn objects_for_small_machines_call_nothing() {
-    for (products, target) in [
-        (FixedProducts::Halves, "thumbv6m-none-eabi"),
-        (FixedProducts::Wide, "thumbv7m-none-eabi"),
-        (FixedProducts::Wide, "riscv32imac-unknown-none-elf"),
+    let folder = Folder::new("fixed-objects");
+    for (products, target, cpu) in [
+        (FixedProducts::Halves, "thumbv6m-none-eabi", "cortex-m0plus"),
+        (FixedProducts::Wide, "thumbv7m-none-eabi", "cortex-m3"),
+        (FixedProducts::Wide, "riscv32imac-unknown-none-elf", "generic-rv32"),
     ] {
         let generated = generated(&file("planar_2r.toml"), &options(&[Function::InverseDynamics], products, 1e-5));
-        let module = generated.text.find("pub mod fixed {").expect("there is a module");
-        let (source, object) = (scratch().join(format!("{target}.rs")), scratch().join(format!("{target}.o")));
-        let text = format!("#![no_std]\n#![forbid(unsafe_code)]\n{}", &generated.text[module..]);
-        std::fs::write(&source, text).expect("a file");
-        let built = rustc()
-            .args(["--edition", "2021", "--crate-type", "lib", "--target", target, "-C", "opt-level=3"])
-            .args(["-C", "panic=abort", "--emit", "obj", "-o"])
-            .args([&object, &source])
-            .output()
-            .expect("rustc runs");
-        if !built.status.success() && String::from_utf8_lossy(&built.stderr).contains("can't find crate for `core`") {
-            eprintln!("skipped: no `core` for {target}");
-            continue;
-        }
-        assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+        let object = match object_of_module(&folder, &generated, target, cpu) {
+            Ok(object) => object,
+            Err(error) if error.contains("can't find crate for `core`") => {
+                eprintln!("skipped: no `core` for {target}");
+                continue;
+            }
+            Err(error) => panic!("{error}"),
+        };
         match Command::new("nm").arg("-u").arg(&object).output() {
             Ok(symbols) => assert_eq!(String::from_utf8_lossy(&symbols.stdout).trim(), "", "{target}"),
             Err(_) => eprintln!("skipped: no `nm`"),
@@ -280,25 +283,16 @@ fn objects_for_small_machines_call_nothing() {
 /// Products of which the upper half is kept are one instruction where a machine has instructions for signals, with the sum behind it too.
 #[test]
 fn machines_with_instructions_for_signals_use_them() {
-    let (Some(rustc), Some(objdump)) = (cross::program("rustc"), cross::program("arm-none-eabi-objdump")) else {
-        return;
-    };
+    let Some(objdump) = cross::program("arm-none-eabi-objdump") else { return };
+    let folder = Folder::new("fixed-signals");
     let functions = [Function::InverseDynamics];
     let generated = generated(&file("puma560.urdf"), &options(&functions, FixedProducts::Wide, 1e-6));
-    let module = generated.text.find("pub mod fixed {").expect("there is a module");
-    let text = format!("#![no_std]\n{}", &generated.text[module..]);
     for (target, cpu, wanted) in [
         ("thumbv7em-none-eabihf", "cortex-m4", ["smmul", "smmla"]),
         ("thumbv8m.main-none-eabihf", "cortex-m33", ["smmul", "smmla"]),
         ("thumbv7m-none-eabi", "cortex-m3", ["smull", "smull"]),
     ] {
-        let (source, object) = (scratch().join(format!("{cpu}.rs")), scratch().join(format!("{cpu}.o")));
-        std::fs::write(&source, &text).expect("a file");
-        let mut rustc = Command::new(&rustc);
-        rustc.args(["--edition", "2021", "--crate-type", "lib", "--target", target, "-C", "opt-level=3"]);
-        rustc.args(["-C", "panic=abort", "--cap-lints=allow", "--emit", "obj", "-C"]).arg(format!("target-cpu={cpu}"));
-        let built = rustc.arg("-o").args([&object, &source]).output().expect("rustc runs");
-        assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+        let object = object_of_module(&folder, &generated, target, cpu).unwrap_or_else(|error| panic!("{error}"));
         let listing = Command::new(&objdump).arg("-d").arg(&object).output().expect("objdump runs");
         let listing = String::from_utf8_lossy(&listing.stdout).into_owned();
         let count = |name: &str| listing.lines().filter(|line| line.contains(&format!("\t{name}"))).count();

@@ -14,7 +14,6 @@ mod companions;
 mod contact;
 mod contact_compiled;
 mod contact_derivatives;
-mod cross;
 mod derivative_bounds;
 mod effects;
 mod elastic_inverse;
@@ -66,6 +65,9 @@ mod words;
 
 #[path = "../../../runtime/core/tests/suite/support/compare.rs"]
 mod compare;
+#[path = "../../../robots/firmware/tests/suite/cross.rs"]
+#[allow(dead_code)] // other packages use the rest
+mod cross;
 #[path = "../../../runtime/core/tests/suite/support/data.rs"]
 mod data;
 #[path = "../../../runtime/core/tests/suite/support/robots.rs"]

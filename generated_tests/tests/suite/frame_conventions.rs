@@ -3,7 +3,7 @@
 //! The data have the velocity and the classical acceleration of a frame's origin in world axes. What the other conventions are of them follows by the
 //! rule of products, written down here for every column: the axes R turn with w, the origin p moves with l, where (l, w) is the column of J.
 
-use super::mutants::faults;
+use super::mutants::{faults, is_changed};
 use straightline_codegen::expr;
 use straightline_codegen::options::Options;
 use straightline_codegen::scene::Gravity;
@@ -220,8 +220,7 @@ fn a_wrong_sign_in_the_motion_of_a_frame_is_found() {
                 let (mut changes, mut caught) = (false, false);
                 for (x, expected, right) in &states {
                     let found = expr::evaluate(&mutant, x);
-                    let size = right.iter().fold(0.0, |m: f64, v| m.max(v.to_f64().abs()));
-                    changes |= !found.iter().zip(right).all(|(a, b)| (*a - *b).abs().to_f64() <= 1e-21 * size);
+                    changes |= is_changed(right, &found);
                     caught |= errors(expected, &found).iter().any(|error| *error > BOUND_DD);
                 }
                 all += usize::from(changes);

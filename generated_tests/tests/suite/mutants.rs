@@ -104,13 +104,14 @@ impl Sieve {
 
 /// Whether the mutant gives anything else than the program, in random states.
 fn changes_a_value(program: &TracedProgram, mutant: &Graph, states: &[Vec<Dd>]) -> bool {
-    states.iter().any(|x| {
-        let (a, b) = (expr::evaluate(&program.graph, x), expr::evaluate(mutant, x));
-        let size = a.iter().fold(0.0, |m: f64, v| m.max(v.to_f64().abs()));
-        // less than this, such as 1e-9 of the cosine 6e-17 of an almost right angle, is beyond the data's 25 digits;
-        // what is no number is a change
-        !a.iter().zip(&b).all(|(a, b)| (*a - *b).abs().to_f64() <= 1e-21 * size)
-    })
+    states.iter().any(|x| is_changed(&expr::evaluate(&program.graph, x), &expr::evaluate(mutant, x)))
+}
+
+/// Whether results are others: less than this, such as 1e-9 of the cosine 6e-17 of an almost right angle, is beyond the data's 25 digits;
+/// what is no number is a change.
+pub fn is_changed(right: &[Dd], found: &[Dd]) -> bool {
+    let size = right.iter().fold(0.0, |m: f64, v| m.max(v.to_f64().abs()));
+    !right.iter().zip(found).all(|(a, b)| (*a - *b).abs().to_f64() <= 1e-21 * size)
 }
 
 fn every_fault_is_caught(robot: &str, function: Function) {

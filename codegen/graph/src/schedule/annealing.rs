@@ -30,16 +30,16 @@ pub(super) fn annealed(graph: &Graph, order: &[NodeId], machine: &ScheduleMachin
     let steps = Steps::new(graph, order, machine.sines_by_two);
     let start = steps.order(order);
     // text that keeps no order has a call per angle
-    let written = estimate(graph, order, &ScheduleMachine { sines_by_two: false, ..*machine });
-    let mut best = (OrderCost::of(&written, machine), None);
+    let mut first = estimate(graph, order, &ScheduleMachine { sines_by_two: false, ..*machine });
+    let mut best = (OrderCost::of(&first, machine), None);
     if machine.sines_by_two {
         let together = steps.nodes(&start);
-        let cost = OrderCost::of(&judged(&together), machine);
-        if cost < best.0 {
-            best = (cost, Some(together));
+        let found = judged(&together);
+        if OrderCost::of(&found, machine) < best.0 {
+            (first, best) = (found, (OrderCost::of(&found, machine), Some(together)));
         }
     }
-    if best.1.as_deref().map_or(written, judged).waiting == 0 {
+    if first.waiting == 0 {
         return best.1;
     }
     let judged_behind = STRETCHES.0 - (JUDGED / steps.steps.len()).clamp(1, STRETCHES.1);

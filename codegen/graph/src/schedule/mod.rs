@@ -11,7 +11,7 @@ mod machine;
 mod steps;
 
 pub use machine::{estimate, CycleModel, ProgramEstimate, ScheduleMachine};
-pub use steps::calls_of_two;
+use steps::calls_of_two;
 
 use crate::expr::{Graph, NodeId, Op, Sines};
 
@@ -44,7 +44,7 @@ pub struct ProgramPart {
     pub results: Vec<usize>,
     /// Whether text keeps each operation where it stands here, as the order is made for the registers of a machine.
     pub keeps_order: bool,
-    /// Whether sines that stand together come from one call, two of them: [`calls_of_two`].
+    /// Whether sines that stand together come from one call, two of them: the first and the second, the third and the fourth, …
     pub sines_by_two: bool,
 }
 

@@ -171,7 +171,7 @@ fn is_given(graph: &Graph, angle: NodeId) -> bool {
 }
 
 /// Which calls of sines take the angle of the next one along, in this order: of calls that stand together, the first, the third, …
-pub fn calls_of_two(graph: &Graph, order: &[NodeId]) -> Vec<bool> {
+pub(super) fn calls_of_two(graph: &Graph, order: &[NodeId]) -> Vec<bool> {
     let mut takes_next = vec![false; graph.ops.len()];
     let mut last: Option<NodeId> = None;
     for id in order {

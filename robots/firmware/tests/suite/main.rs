@@ -2,6 +2,7 @@
 //! A file is chosen by its name: `cargo test -p straightline-firmware-example --test suite no_panic::`.
 
 mod closed_loop;
+#[allow(dead_code)] // other packages use the rest
 mod cross;
 mod device;
 mod frameworks;

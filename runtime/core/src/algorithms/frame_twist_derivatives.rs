@@ -33,19 +33,12 @@ pub fn frame_derivatives_in_own_axes<T: Real>(
 ) -> FrameDerivativeBlocks<T> {
     let path = path_to(model, frame.body);
     let joints = joints_along(model, motion, &path, columns_at_frame(model, motion[0], frame, &path));
-    let (mut all, mut behind) = (FrameDerivativeBlocks::zero(model.nv()), TwistAndRate::zero());
-    for joint in joints.iter().rev() {
-        T::section("frame derivatives", Some(joint.body));
-        let from_before = behind.with(joint);
-        for (k, (s, carried)) in joint.columns.iter().zip(&joint.carried).enumerate() {
-            let turned = cross(carried, &from_before.twist);
-            let by_acceleration = sum(&cross(&joint.before.rate, s), &turned);
-            let rate = cross(s, &behind.twist);
-            set_column(&mut all, (joint.iv + k, model.nv()), [s, carried, &by_acceleration, &rate]);
-        }
-        behind = from_before;
-    }
-    all
+    by_columns(model, &joints, |joint, k, [behind, from_before]| {
+        let (s, carried) = (&joint.columns[k], joint.carried[k]);
+        let turned = cross(&carried, &from_before.twist);
+        let by_acceleration = sum(&cross(&joint.before.rate, s), &turned);
+        [carried, by_acceleration, cross(s, &behind.twist)]
+    })
 }
 
 /// Derivatives of the velocity of what moves with the frame through the world's origin and of its angular velocity, in world axes, and of the rates
@@ -58,39 +51,40 @@ pub fn frame_derivatives_at_world_origin<T: Real>(
 ) -> FrameDerivativeBlocks<T> {
     let path = path_to(model, frame.body);
     let joints = joints_along(model, motion, &path, columns_at_origin(model, motion[0], &path));
+    by_columns(model, &joints, |joint, k, [behind, from_before]| {
+        let (s, carried) = (&joint.columns[k], joint.carried[k]);
+        let is_single = joint.columns.len() == 1;
+        let against = if is_single { behind } else { from_before };
+        let by_velocity = cross(s, &against.twist);
+        let by_acceleration = sum(&cross(s, &against.rate), &cross(&carried, &against.twist));
+        let rate = if is_single { carried } else { cross(&joint.before.with(joint).twist, s) };
+        [by_velocity, by_acceleration, rate]
+    })
+}
+
+/// The blocks of what is said of each column: ∂v/∂q, ∂a/∂q and J̇, from its joint and the motion of the frame against the bodies behind and
+/// before it.
+fn by_columns<T: Real>(
+    model: &Model<T>,
+    joints: &[PathJoint<'_, T>],
+    derivatives: impl Fn(&PathJoint<'_, T>, usize, [&TwistAndRate<T>; 2]) -> [MotionVector<T>; 3],
+) -> FrameDerivativeBlocks<T> {
     let (mut all, mut behind) = (FrameDerivativeBlocks::zero(model.nv()), TwistAndRate::zero());
     for joint in joints.iter().rev() {
         T::section("frame derivatives", Some(joint.body));
         let from_before = behind.with(joint);
-        let against = match joint.columns.len() {
-            1 => &behind,
-            _ => &from_before,
-        };
-        for (k, (s, carried)) in joint.columns.iter().zip(&joint.carried).enumerate() {
-            let by_velocity = cross(s, &against.twist);
-            let by_acceleration = sum(&cross(s, &against.rate), &cross(carried, &against.twist));
-            let rate = match joint.columns.len() {
-                1 => *carried,
-                _ => cross(&joint.before.with(joint).twist, s),
-            };
-            set_column(&mut all, (joint.iv + k, model.nv()), [s, &by_velocity, &by_acceleration, &rate]);
+        for (k, column) in joint.columns.iter().enumerate() {
+            let [by_velocity, by_acceleration, rate] = derivatives(joint, k, [&behind, &from_before]);
+            let place = (joint.iv + k, model.nv());
+            set(&mut all.jacobian, place, column);
+            set(&mut all.dv_dq, place, &by_velocity);
+            set(&mut all.da_dq, place, &by_acceleration);
+            set(&mut all.jacobian_rate, place, &rate);
+            set(&mut all.da_dqd, place, &sum(&by_velocity, &rate));
         }
         behind = from_before;
     }
     all
-}
-
-/// Column `k`: J, ∂v/∂q, ∂a/∂q, J̇, and ∂a/∂q̇ = ∂v/∂q + J̇.
-fn set_column<T: Real>(
-    all: &mut FrameDerivativeBlocks<T>,
-    place: (usize, usize),
-    [column, by_velocity, by_acceleration, rate]: [&MotionVector<T>; 4],
-) {
-    set(&mut all.jacobian, place, column);
-    set(&mut all.dv_dq, place, by_velocity);
-    set(&mut all.da_dq, place, by_acceleration);
-    set(&mut all.jacobian_rate, place, rate);
-    set(&mut all.da_dqd, place, &sum(by_velocity, rate));
 }
 
 /// A twist and its rate.
