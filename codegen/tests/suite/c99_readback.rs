@@ -224,6 +224,31 @@ fn slow_proof_that_no_package_with_a_word_changed_is_let_through() {
     assert!(count > 15_000, "{count} changes are too few");
 }
 
+#[test]
+fn arrays_longer_than_what_is_put_there_are_refused() {
+    let mut count = 0;
+    for (name, generated) in kinds() {
+        let files = (C99_SOURCE.files)(&generated, "robot");
+        let mut reader = CReader::new(&generated, "robot");
+        let c = files.iter().position(|(file, _)| file.ends_with(".c")).expect("it is there");
+        for line in files[c].1.lines() {
+            let words: Vec<&str> = line.trim().trim_end_matches("];").split([' ', '[']).collect();
+            let (&[type_word @ ("double" | "float"), array, length], true) = (&words[..], line.ends_with("];")) else {
+                continue;
+            };
+            let length: usize = length.parse().expect("a length");
+            let mut others = files.clone();
+            let longer = format!("{type_word} {array}[{}];", length + 1);
+            others[c].1 = others[c].1.replacen(line.trim(), &longer, 1);
+            let mismatch = reader.check(&others).expect_err(&longer);
+            let what = &mismatch.what;
+            assert!(what.contains("never put there") || what.contains("another type"), "{name}, {longer}: {mismatch}");
+            count += 1;
+        }
+    }
+    assert!(count > 8, "{count} arrays are too few");
+}
+
 /// Changes that compilers would not see, or that mean something else in C than they seem to.
 #[test]
 fn what_c_takes_otherwise_is_refused() {

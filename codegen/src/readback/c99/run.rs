@@ -170,7 +170,13 @@ impl<'a, 't> CRun<'a, 't> {
         while !self.takes("}") {
             self.statement(&mut names)?;
         }
-        names.iter().for_each(|name| _ = self.locals.remove(name));
+        for name in names {
+            if let Some(CThing::Array(array, _)) = self.locals.remove(name) {
+                if self.numbers(array).any(|(value, _)| value == TextValue::NONE) {
+                    return self.stop(&format!("a number of `{name}` is never put there"));
+                }
+            }
+        }
         Ok(())
     }
 
