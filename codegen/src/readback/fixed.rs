@@ -8,7 +8,7 @@ use crate::program::fixed::FixedFunction;
 use crate::report::errors::four_digits;
 use rustc_hash::FxHashMap;
 use straightline_graph::expr::Port;
-use straightline_graph::fixed::{Product, WordOp, WordProgram};
+use straightline_graph::fixed::{WordOp, WordProgram};
 
 type FixedReading<X> = Result<X, ReadingStop>;
 
@@ -59,8 +59,9 @@ impl FixedValues {
                 WordOp::Add(..) => self.operation("wrapping_add", &operands, 0, false),
                 WordOp::Sub(..) => self.operation("wrapping_sub", &operands, 0, false),
                 WordOp::Neg(_) => self.operation("wrapping_neg", &operands, 0, false),
-                WordOp::Mul(product @ Product::Long(by), ..) => self.operation(product.name(), &operands, by, false),
-                WordOp::Mul(product, ..) => self.operation(product.name(), &operands, 0, false),
+                WordOp::Mul(product, ..) => {
+                    self.operation(product.name(), &operands, product.own_shift().unwrap_or(0), false)
+                }
                 WordOp::Left(_, by) => self.operation("<<", &operands, by, false),
                 WordOp::Right(_, by) => self.operation(">>", &operands, by, false),
                 WordOp::SinCos(_, by, turns) => self.operation(program.sines.sine_name(), &operands, by, turns),
@@ -193,7 +194,7 @@ impl FixedReader<'_, '_> {
         locals: &FxHashMap<String, usize>,
     ) -> FixedReading<usize> {
         const SUMS: [(&str, usize); 3] = [("wrapping_add", 2), ("wrapping_sub", 2), ("wrapping_neg", 1)];
-        const PRODUCTS: [&str; 7] = ["wide", "exact", "full", "half", "short", "uneven", "long"];
+        const PRODUCTS: [&str; 8] = ["wide", "exact", "full", "half", "short", "uneven", "long", "long_exact"];
         const SINES: [&str; 3] = ["sin_cos_wide", "sin_cos_exact", "sin_cos_full"];
         let (path, at) = (self.items.text_of(self.at), self.at);
         if !matches!(path, "i32" | "words") {
@@ -236,7 +237,7 @@ impl FixedReader<'_, '_> {
             }
             operands.push(self.operand(inputs, values, locals)?);
         }
-        if name == "long" {
+        if matches!(name, "long" | "long_exact") {
             self.is(",")?;
             by = self.items.integer(&mut self.at)? as u32;
         }

@@ -111,8 +111,7 @@ fn no_state_of_random_robots_overflows_or_goes_beyond_its_bound() {
 /// The Panda's torques with 1e-7 of full scale certified, and also a tenth of a thousandth without long products.
 #[test]
 fn the_torques_of_an_arm_are_certified_to_1e_minus_7_of_full_scale() {
-    for (products, error) in
-        [(FixedProducts::Wide, 1e-7), (FixedProducts::Halves, 1e-4), (FixedProducts::Halves, 1.1e-7)]
+    for (products, error) in [(FixedProducts::Wide, 1e-7), (FixedProducts::Halves, 1e-4), (FixedProducts::Halves, 1e-7)]
     {
         let generated = generated(&file("panda.urdf"), &options(&[Function::InverseDynamics], products, error));
         let [made] = &generated.fixed[..] else { panic!("one function") };
@@ -252,7 +251,8 @@ fn object_of_module(folder: &Folder, generated: &Generated, target: &str, cpu: &
     let source = format!("#![no_std]\n#![forbid(unsafe_code)]\n{}", &generated.text[module..]);
     let cpu = format!("-Ctarget-cpu={cpu}");
     let flags = ["--crate-type=lib", "--emit=obj", "-Cpanic=abort", "--cap-lints=allow", "--target", target, &cpu];
-    folder.build_by(&cross::rustc(), target, &source, &flags)
+    // the crate's name
+    folder.build_by(&cross::rustc(), &target.replace('.', "_"), &source, &flags)
 }
 
 /// No call that is not its own, so no panic either.

@@ -7,7 +7,7 @@
 //! # Products
 //! Of two words with the points f and g a product has the point f + g − 32. [`wide`] is the high half of the product of 64 bits, which is one
 //! instruction where there is one (`mulh`, `smull`); [`long`] keeps lower bits, for a few more. The others are made of products of halves for machines that multiply 32 bits to 32
-//! bits only: [`exact`], which is the same number, [`full`] without the product of both lower halves, [`half`] without the lower half of its second operand, [`short`] without that of both, [`uneven`] of 24 bits and 8. All of them are rounded
+//! bits only: [`exact`] and [`long_exact`], which are the same numbers, [`full`] without the product of both lower halves, [`half`] without the lower half of its second operand, [`short`] without that of both, [`uneven`] of 24 bits and 8. All of them are rounded
 //! down. In units of the last place: [`wide`] and [`exact`] lose less than 1, [`full`] less than 3.
 //!
 //! # Sine and cosine
@@ -18,8 +18,8 @@
 //!    polynomials are off by 0.04 and 0.2 units of 2^-31. Each product lands at the point of what it is added to.
 //! 3. **Quadrant** by masks: an odd n exchanges the two, the second bits of n and of n + 1 give the signs.
 //!
-//! Results have the point 31 and lie within ±(1 − 2^-31). Errors: [`WIDE_ERROR`], with exact products, too, and [`FULL_ERROR`] for |r| ≤ [`REDUCED`], found on all
-//! words there, and [`TURN_ERROR`] per quarter turn of reduction.
+//! Results have the point 31 and lie within ±(1 − 2^-31). Errors: [`WIDE_ERROR`], [`EXACT_ERROR`] and [`FULL_ERROR`] for |r| ≤ [`REDUCED`], found on
+//! all words there, and [`TURN_ERROR`] per quarter turn of reduction.
 
 /// The high half of a product.
 #[inline(always)]
@@ -45,6 +45,13 @@ pub const fn exact(a: i32, b: i32) -> i32 {
     let middle = (a >> 16).wrapping_mul(b_low).wrapping_add(low as i32);
     let further = a_low.wrapping_mul(b >> 16).wrapping_add(middle & 0xffff);
     (a >> 16).wrapping_mul(b >> 16).wrapping_add(middle >> 16).wrapping_add(further >> 16)
+}
+
+/// [`long`] by products of halves, 1 to 31 bits to the right: the same bits. Its lower bits are those of the product of 32 bits.
+#[inline(always)]
+#[must_use]
+pub const fn long_exact(a: i32, b: i32, by: u32) -> i32 {
+    exact(a, b) << (32 - by) | (a.wrapping_mul(b) as u32 >> by) as i32
 }
 
 /// [`wide`] by products of halves, without the product of the lower ones: at most 2 less.
@@ -78,8 +85,11 @@ pub const fn uneven(a: i32, b: i32) -> i32 {
 /// Kernels answer for |r| up to here, in 2^-31: π/4 + 2^-7.
 pub const REDUCED: i32 = 1_703_406_929;
 
-/// Greatest error of the kernels with [`wide`] or [`exact`], in units of 2^-31.
+/// Greatest error of the kernels with [`wide`], in units of 2^-31.
 pub const WIDE_ERROR: f64 = 2.8;
+
+/// Greatest error of the kernels with [`exact`], but for coefficients, in units of 2^-31.
+pub const EXACT_ERROR: f64 = 2.9;
 
 /// Greatest error of the kernels with [`full`], in units of 2^-31.
 pub const FULL_ERROR: f64 = 7.1;
@@ -87,7 +97,7 @@ pub const FULL_ERROR: f64 = 7.1;
 /// What a quarter turn of reduction adds to them: 0.27 of π/2·2^31, rounded up.
 pub const TURN_ERROR: f64 = 0.28;
 
-/// The products of a kernel.
+/// The products of a kernel, those of coefficients aside.
 #[derive(Clone, Copy)]
 enum Products {
     Wide,
@@ -107,15 +117,24 @@ const fn kernel(r: i32, by: Products) -> (i32, i32) {
             }
         };
     }
+    // a coefficient is multiplied by z twice more, or by z and r: what it is off by shrinks to a tenth
+    macro_rules! inner {
+        ($a:expr, $b:expr) => {
+            match by {
+                Products::Wide => wide($a, $b),
+                Products::Exact | Products::Full => full($a, $b),
+            }
+        };
+    }
     // points: z 30, twice that 31; S 36, 35, 34, 33 and z·S 32; D 35, 34, 33 and z·D 32
     let z = times!(r, r);
     let z2 = z << 1;
-    let s = times!(z2, 187_218).wrapping_sub(6_816_986);
-    let s = times!(z2, s).wrapping_add(143_165_550);
-    let s = times!(z2, s).wrapping_sub(1_431_655_764);
+    let s = inner!(z2, 187_218).wrapping_sub(6_816_986);
+    let s = inner!(z2, s).wrapping_add(143_165_550);
+    let s = inner!(z2, s).wrapping_sub(1_431_655_764);
     let sin = r.wrapping_add(times!(r, times!(z2, s)));
-    let d = times!(z2, 838_953).wrapping_sub(23_857_927);
-    let d = times!(z2, d).wrapping_add(357_913_719);
+    let d = inner!(z2, 838_953).wrapping_sub(23_857_927);
+    let d = inner!(z2, d).wrapping_add(357_913_719);
     // 1 less what keeps the cosine of words next to zero below 1: a square by halves may be −2
     let one = if matches!(by, Products::Full) { i32::MAX - 2 } else { i32::MAX };
     let cos = one.wrapping_sub(z).wrapping_add(times!(z2, times!(z2, d)));
@@ -147,7 +166,7 @@ pub const fn sin_cos_wide<const BITS: u32, const TURNS: bool>(angle: i32) -> (i3
     turned::<BITS, TURNS>(angle, Products::Wide)
 }
 
-/// [`sin_cos_wide`] whose products are [`exact`]: the same bits, by one function for all angles with this point, as it is long.
+/// [`sin_cos_wide`] whose products are [`exact`], those of coefficients [`full`]: one function for all angles with this point, as it is long.
 #[inline(never)]
 #[must_use]
 pub const fn sin_cos_exact<const BITS: u32, const TURNS: bool>(angle: i32) -> (i32, i32) {

@@ -3,7 +3,7 @@
 use super::words::Product;
 use crate::certify::Interval;
 use crate::expr::{Binary, Constant, Graph, NodeId, Op, Unary};
-use straightline_core::fixed::{FULL_ERROR, REDUCED, TURN_ERROR, WIDE_ERROR};
+use straightline_core::fixed::{EXACT_ERROR, FULL_ERROR, REDUCED, TURN_ERROR, WIDE_ERROR};
 use straightline_core::Dd;
 
 /// Points beyond these serve nobody.
@@ -61,13 +61,23 @@ impl WordMachine {
             Product::Wide => 1.0,
             Product::Long(_) => 5.0,
             Product::Exact => 17.0,
+            Product::LongExact(_) => 22.0,
             Product::Full => 12.0,
             Product::Half => 7.0,
             Product::Short | Product::Uneven => 3.0,
         }
     }
 
-    /// The products that it has.
+    /// The product that is shifted by so many bits.
+    fn long(self, by: u32) -> Product {
+        if self.wide {
+            Product::Long(by)
+        } else {
+            Product::LongExact(by)
+        }
+    }
+
+    /// The products that it has, long ones aside.
     fn products(self) -> &'static [Product] {
         match self.wide {
             true => &[Product::Wide],
@@ -78,7 +88,11 @@ impl WordMachine {
     /// The error of a sine or cosine of an angle that turns at most so far \[rad\], and whether it has to be reduced.
     pub fn sine(self, angle: Interval) -> (f64, bool) {
         let reduced = f64::from(REDUCED - 2) * unit(31);
-        let kernel = if self.sines == Product::Full { FULL_ERROR } else { WIDE_ERROR };
+        let kernel = match self.sines {
+            Product::Full => FULL_ERROR,
+            Product::Exact => EXACT_ERROR,
+            _ => WIDE_ERROR,
+        };
         if angle.mag() <= reduced - 2f64.powi(-14) {
             return (kernel * unit(31), false);
         }
@@ -204,7 +218,7 @@ impl Known<'_> {
         }
         let magnitude = self.magnitude[a.index()];
         let room = self.natural[a.index()] - point;
-        let long = if self.machine.wide { self.scaled_long(c, a, bits, point) } else { None };
+        let long = self.scaled_long(c, a, bits, point);
         // the fewest bits to the left with which the constant is a word
         let Some(left) = (0..=room.clamp(0, 31)).find(|left| word(c.value(), bits + 32 - point - left).is_some())
         else {
@@ -255,9 +269,10 @@ impl Known<'_> {
         let at = natural(c.value().to_f64().abs());
         let by = u32::try_from(point + at - bits).ok().filter(|by| (1..32).contains(by))?;
         let (word, off) = word(c.value(), at)?;
+        let long = self.machine.long(by);
         Some(Priced {
-            way: WordWay::Product(Product::Long(by), [Aligned::Node(a, 0), Aligned::Constant(word)], 0),
-            cost: self.machine.product(Product::Long(by)),
+            way: WordWay::Product(long, [Aligned::Node(a, 0), Aligned::Constant(word)], 0),
+            cost: self.machine.product(long),
             error: unit(bits) + off * self.magnitude[a.index()],
         })
     }
@@ -266,10 +281,10 @@ impl Known<'_> {
     fn product(&self, [a, b]: [NodeId; 2], bits: i32, points: &[i32], weight: f64) -> Option<Priced> {
         let [pa, pb] = [a, b].map(|id| points[id.index()]);
         let beyond = pa + pb - 32 - bits;
-        let long = u32::try_from(pa + pb - bits).ok().filter(|by| self.machine.wide && (1..32).contains(by));
-        let long = long.map(|by| Priced {
-            way: WordWay::Product(Product::Long(by), [Aligned::Node(a, 0), Aligned::Node(b, 0)], 0),
-            cost: self.machine.product(Product::Long(by)),
+        let long = u32::try_from(pa + pb - bits).ok().filter(|by| (1..32).contains(by));
+        let long = long.map(|by| self.machine.long(by)).map(|long| Priced {
+            way: WordWay::Product(long, [Aligned::Node(a, 0), Aligned::Node(b, 0)], 0),
+            cost: self.machine.product(long),
             error: unit(bits),
         });
         let room = |id: NodeId, point: i32| (self.natural[id.index()] - point).max(0);

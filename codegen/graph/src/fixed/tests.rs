@@ -4,7 +4,7 @@ use super::words::{Product, WordOp, WordProgram};
 use super::{fixed, FixedDemand, NoFixedForm};
 use crate::certify::Interval;
 use crate::expr::{evaluate, Constant, Graph, GraphBuilder, NodeId, Op, Port, RuleSet};
-use straightline_core::fixed::{FULL_ERROR, REDUCED, TURN_ERROR, WIDE_ERROR};
+use straightline_core::fixed::{EXACT_ERROR, FULL_ERROR, REDUCED, TURN_ERROR, WIDE_ERROR};
 use straightline_core::random::Random;
 use straightline_core::Dd;
 
@@ -39,17 +39,19 @@ fn products_lose_what_is_said_of_them() {
 }
 
 #[test]
-fn an_exact_product_of_halves_is_the_wide_one() {
+fn exact_products_of_halves_are_the_wide_ones() {
     let mut random = Random(6);
     for _ in 0..1_000_000 {
         let (a, b) = (word(&mut random), word(&mut random));
         assert_eq!(Product::Exact.value(a, b), Product::Wide.value(a, b), "{a} {b}");
+        let by = 1 + random.below(31) as u32;
+        assert_eq!(Product::LongExact(by).value(a, b), Product::Long(by).value(a, b), "{a} {b} by {by}");
     }
 }
 
 /// The products of sines, with their bounds.
 const SINES: [(Product, f64); 3] =
-    [(Product::Wide, WIDE_ERROR), (Product::Exact, WIDE_ERROR), (Product::Full, FULL_ERROR)];
+    [(Product::Wide, WIDE_ERROR), (Product::Exact, EXACT_ERROR), (Product::Full, FULL_ERROR)];
 
 /// The greatest error of sines and cosines of these words, less what reduction may add, in units of 2^-31.
 fn worst_sine(sines: Product, bits: u32, turns: bool, angles: impl Iterator<Item = i32>) -> f64 {

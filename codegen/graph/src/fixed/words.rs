@@ -15,7 +15,7 @@ impl WordId {
     }
 }
 
-/// How a product of two words is computed. All are the high half of the product, rounded down: see `straightline_core::fixed`.
+/// How a product of two words is computed. All but the long ones are its high half, rounded down: see `straightline_core::fixed`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Product {
     /// In one instruction, where the machine has it.
@@ -25,6 +25,8 @@ pub enum Product {
     Long(u32),
     /// From four products of halves.
     Exact,
+    /// The same, shifted to the right by so many bits, 1 to 31.
+    LongExact(u32),
     /// From three products of halves.
     Full,
     /// Without the lower half of the second word.
@@ -42,6 +44,7 @@ impl Product {
             Product::Wide => "wide",
             Product::Long(_) => "long",
             Product::Exact => "exact",
+            Product::LongExact(_) => "long_exact",
             Product::Full => "full",
             Product::Half => "half",
             Product::Short => "short",
@@ -55,6 +58,7 @@ impl Product {
             Product::Wide => kernel::wide(a, b),
             Product::Long(by) => kernel::long(a, b, by),
             Product::Exact => kernel::exact(a, b),
+            Product::LongExact(by) => kernel::long_exact(a, b, by),
             Product::Full => kernel::full(a, b),
             Product::Half => kernel::half(a, b),
             Product::Short => kernel::short(a, b),
@@ -71,16 +75,22 @@ impl Product {
             Product::Wide => "sin_cos_wide",
             Product::Exact => "sin_cos_exact",
             Product::Full => "sin_cos_full",
-            Product::Long(_) | Product::Half | Product::Short | Product::Uneven => {
-                unreachable!("sines have whole products")
-            }
+            _ => unreachable!("sines have whole products of no own shift"),
+        }
+    }
+
+    /// By how many bits it is shifted, if it says so itself.
+    pub fn own_shift(self) -> Option<u32> {
+        match self {
+            Product::Long(by) | Product::LongExact(by) => Some(by),
+            _ => None,
         }
     }
 
     /// By how many units of its last place it is below the product of the words, at most, but for bits that it leaves out.
     pub fn loss(self) -> f64 {
         match self {
-            Product::Wide | Product::Long(_) | Product::Exact => 1.0,
+            Product::Wide | Product::Long(_) | Product::Exact | Product::LongExact(_) => 1.0,
             // two shifts, and the product of the lower halves
             Product::Full => 3.0,
             Product::Half => 1.0,
@@ -92,7 +102,7 @@ impl Product {
     /// How many of the lowest bits of its first and of its second word it leaves out.
     pub fn leaves_out(self) -> [u32; 2] {
         match self {
-            Product::Wide | Product::Long(_) | Product::Exact | Product::Full => [0, 0],
+            Product::Wide | Product::Long(_) | Product::Exact | Product::LongExact(_) | Product::Full => [0, 0],
             Product::Half => [0, 16],
             Product::Short => [16, 16],
             Product::Uneven => [8, 24],
@@ -239,8 +249,10 @@ impl WordProgram {
                 WordOp::Add(a, b) => long(a) + long(b),
                 WordOp::Sub(a, b) => long(a) - long(b),
                 WordOp::Neg(a) => -long(a),
-                WordOp::Mul(Product::Long(by), a, b) => (long(a) * long(b)) >> by,
-                WordOp::Mul(product, a, b) => i64::from(product.value(v(a), v(b))),
+                WordOp::Mul(product, a, b) => match product.own_shift() {
+                    Some(by) => (long(a) * long(b)) >> by,
+                    None => i64::from(product.value(v(a), v(b))),
+                },
                 WordOp::Left(a, k) => long(a) << k,
                 WordOp::Right(a, k) => long(a) >> k,
                 WordOp::SinCos(a, bits, turns) => {

@@ -7,7 +7,7 @@ use crate::report::errors::four_digits;
 use std::fmt::Write;
 use straightline_graph::element;
 use straightline_graph::expr::Port;
-use straightline_graph::fixed::{Product, WordId, WordOp};
+use straightline_graph::fixed::{WordId, WordOp};
 
 /// The source of products and sines.
 const WORDS: &str = straightline_core::sources::FIXED;
@@ -143,8 +143,10 @@ fn function(made: &FixedFunction) -> String {
             WordOp::Add(a, b) => format!("i32::wrapping_add({}, {})", v(a), v(b)),
             WordOp::Sub(a, b) => format!("i32::wrapping_sub({}, {})", v(a), v(b)),
             WordOp::Neg(a) => format!("i32::wrapping_neg({})", v(a)),
-            WordOp::Mul(Product::Long(by), a, b) => format!("words::long({}, {}, {by})", v(a), v(b)),
-            WordOp::Mul(product, a, b) => format!("words::{}({}, {})", product.name(), v(a), v(b)),
+            WordOp::Mul(product, a, b) => {
+                let by = product.own_shift().map(|by| format!(", {by}")).unwrap_or_default();
+                format!("words::{}({}, {}{by})", product.name(), v(a), v(b))
+            }
             WordOp::Left(a, k) => format!("{} << {k}", v(a)),
             WordOp::Right(a, k) => format!("{} >> {k}", v(a)),
         };
