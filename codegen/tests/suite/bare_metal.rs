@@ -136,11 +136,21 @@ fn objects_of_robots_for_microcontrollers_call_nothing() {
 }
 
 /// Every function that a file has without being asked, and derivatives.
-#[test]
-#[ignore = "minutes: orders of long functions are searched for many machines"]
-fn objects_of_all_functions_for_all_microcontrollers_call_nothing() {
+fn all_functions() -> Vec<Function> {
     let further = [Function::MassMatrixAndGravityForce, Function::InverseDynamicsDerivatives];
-    let functions: Vec<Function> = Options::default().functions.into_iter().chain(further).collect();
+    Options::default().functions.into_iter().chain(further).collect()
+}
+
+#[test]
+#[ignore = "slow proof: orders of long functions are searched"]
+fn slow_proof_that_objects_of_all_functions_of_a_quadruped_call_nothing() {
+    calls_nothing("solo12.urdf", (TargetMachine::CORTEX_M4F, Memory::Flash), &all_functions());
+}
+
+#[test]
+#[ignore = "five minutes: orders of long functions are searched for many machines"]
+fn objects_of_all_functions_for_all_microcontrollers_call_nothing() {
+    let functions = all_functions();
     for robot in ["panda.urdf", "hyq.urdf", "solo12.urdf"] {
         calls_nothing(robot, (TargetMachine::CORTEX_M4F, Memory::Flash), &functions);
         for machine in

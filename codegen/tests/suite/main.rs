@@ -56,6 +56,7 @@ mod scope;
 mod self_test;
 mod staged;
 mod steps;
+mod stores;
 mod sums;
 mod tasks;
 mod truth;

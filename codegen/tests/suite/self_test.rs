@@ -157,6 +157,21 @@ fn other_scalars_have_a_test_of_their_own() {
     assert!(passes[0].starts_with("Ok(())"), "{passes:?}");
 }
 
+/// Ranges that states are drawn in, and a hash per function: what a device keeps, code aside.
+#[test]
+fn data_of_all_functions_are_a_few_hundred_bytes() {
+    for (name, most) in [("panda.urdf", 240), ("solo12.urdf", 480), ("simple_humanoid.urdf", 800)] {
+        let mut options = tested(&Options::default().functions, Scalar::F32);
+        options.model.floating_base = name != "panda.urdf";
+        let generated = generated(&robot(name), &options);
+        let test = generated.programs.self_test.as_ref().expect("it was asked for");
+        let ranges: usize = test.ranges.iter().map(|ranges| 8 * ranges.pairs.len()).sum();
+        let bytes = 8 * test.functions.len() + ranges;
+        println!("{name}: {} functions, {bytes} B", test.functions.len());
+        assert!(test.functions.len() > 10 && bytes <= most, "{name}: {bytes} B");
+    }
+}
+
 /// All numbers of results at the states are numbers, in their ranges, and differ from state to state.
 #[test]
 fn what_is_compared_are_numbers_within_the_ranges_of_the_inputs() {
