@@ -139,7 +139,7 @@ fn lanes(out: &Path, folder: &Path) {
             robot(
                 "panda.urdf",
                 Options {
-                    functions: vec![InverseDynamics],
+                    functions: vec![InverseDynamics, Function::InverseDynamicsDerivatives],
                     scalar: Scalar::F32,
                     lanes: Some(Lanes::Standalone),
                     ..Options::default()
@@ -168,7 +168,7 @@ fn lanes(out: &Path, folder: &Path) {
         ..Options::default()
     };
     let generic = Options {
-        functions: vec![InverseDynamics, Function::GravityForce, MassMatrix],
+        functions: vec![InverseDynamics, Function::GravityForce, MassMatrix, Function::InverseDynamicsVjp],
         limits: ScheduleLimits { operations: 250 },
         lanes: Some(Lanes::Runtime),
         generic: true,

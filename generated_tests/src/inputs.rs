@@ -7,9 +7,16 @@ use straightline_core::Dd;
 
 /// Random inputs of a function, in the order of its ports; quaternions have length one.
 pub fn random(random: &mut Random, model: &Model<Dd>, function: Function) -> Vec<Vec<f64>> {
+    random_with_frames(random, model, function, 0)
+}
+
+/// The same of a function that has so many frames.
+pub fn random_with_frames(random: &mut Random, model: &Model<Dd>, function: Function, frames: usize) -> Vec<Vec<f64>> {
     let of_port = |quantity: Quantity| match quantity {
         quantity if quantity.is_configuration() => configuration(random, model),
-        quantity => random.list(quantity.len(model, 0), 2.0),
+        // so short that no base turns far
+        Quantity::TimeStep => vec![random.between(0.0, 0.02)],
+        quantity => random.list(quantity.len(model, frames), 2.0),
     };
     function.quantities(model).into_iter().map(of_port).collect()
 }

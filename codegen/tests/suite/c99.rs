@@ -259,6 +259,26 @@ fn random_robots_have_the_bits_of_their_programs() {
     }
 }
 
+/// Derivatives, products with them, regressors and tasks, which are made for who names them.
+#[test]
+fn derivatives_and_regressors_have_the_bits_of_their_programs() {
+    let functions = vec![
+        Function::InverseDynamicsDerivatives,
+        Function::InverseDynamicsVjp,
+        Function::InverseDynamicsHvp,
+        Function::ForwardDynamicsDerivatives,
+        Function::CentroidalDerivatives,
+        Function::InverseKinematicsStep,
+        Function::StepDerivatives,
+        Function::TorqueRegressor,
+    ];
+    for scalar in [Scalar::F64, Scalar::F32] {
+        let options = Options { functions: functions.clone(), ..in_scalar(scalar) };
+        Package::new(&format!("c99-derivatives-{}", scalar.name()), &Source::new("arm.toml", ARM), &options)
+            .is_right(100);
+    }
+}
+
 /// Robots of any shape and style with all functions: `cargo test --release -p straightline-codegen --test suite c99:: -- --ignored`.
 #[test]
 #[ignore = "slow proof: compiles 40 robots with all functions six times"]

@@ -687,7 +687,7 @@ fn hold_differences(case: &Case, functions: &[Difference]) {
 /// Of the greatest entry of a block with 25 digits.
 const DATA: f64 = 1e-22;
 /// What f64 may lose of a block: where a plane is known to 16 digits, and H is solved for.
-const DATA_F64: f64 = 1e-12;
+const DATA_F64: f64 = 5e-14;
 
 /// The data's planes, at all of their states.
 #[test]

@@ -168,6 +168,51 @@ fn derivatives_of_inverse_dynamics_have_bounds_that_say_something_and_no_search_
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
+/// What is made of derivatives, and regressors, which are polynomials in sines as torques are: bounds that no search exceeds, and of which a part
+/// is found.
+#[test]
+fn products_regressors_and_centroidal_maps_have_bounds() {
+    use Function::{
+        BiasDerivatives, CentreOfMassJacobian, CentroidalDerivatives, CentroidalMapRate, CoriolisMatrix,
+        CoriolisTransposeForce, EnergyRegressor, GravityDerivative, InverseDynamicsHvp, InverseDynamicsJvp,
+        InverseDynamicsVjp, MomentumRegressor, TorqueRegressor,
+    };
+    let mut failures = Vec::new();
+    for function in [
+        InverseDynamicsJvp,
+        InverseDynamicsVjp,
+        InverseDynamicsHvp,
+        GravityDerivative,
+        BiasDerivatives,
+        CoriolisMatrix,
+        CoriolisTransposeForce,
+        CentreOfMassJacobian,
+        CentroidalMapRate,
+        CentroidalDerivatives,
+        TorqueRegressor,
+        MomentumRegressor,
+        EnergyRegressor,
+    ] {
+        for scalar in [Scalar::F32, Scalar::F64] {
+            let case = case("ur5.urdf", function, scalar, false);
+            let Some(certificate) = case.certificate(scalar) else {
+                failures.push(format!("{} has none", function.name()));
+                continue;
+            };
+            let found = case.search(scalar, &certificate.errors, 1_000, &mut failures);
+            let (bounds, found) = (case.greatest(&certificate.errors), case.greatest(&found));
+            println!("{}, {}: at most {}; found {}", function.name(), scalar.name(), words(&bounds), words(&found));
+            for (bound, found) in bounds.iter().zip(found) {
+                // a block of ones and zeros is exact
+                if *bound > 1000.0 * found {
+                    failures.push(format!("{}, {scalar:?}: {bound:e}, found {found:e}", function.name()));
+                }
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
 /// No derivative in the box is above its bound, and cut boxes bring bounds near the greatest that is found.
 #[test]
 fn torques_change_no_faster_than_their_lipschitz_constants() {

@@ -417,7 +417,7 @@ fn hold_data(robots: &[(&'static str, bool)]) {
             }
         }
         println!("{name:<20} {worst:.1e} of the greatest change of forces");
-        assert!(worst < 4e-15, "{name}: {worst:e}");
+        assert!(worst < 1e-15, "{name}: {worst:e}");
     }
 }
 

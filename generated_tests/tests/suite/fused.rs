@@ -17,7 +17,12 @@ use straightline_generated_tests::reference::Robot;
 #[test]
 fn every_sum_that_counts_as_fused_is_fused() {
     for robot in ["planar2r", "chapter_oblique", "panda", "solo12"].map(Robot::load).iter() {
-        let functions = vec![Function::InverseDynamics, Function::MassMatrix, Function::ForwardDynamics];
+        let functions = vec![
+            Function::InverseDynamics,
+            Function::MassMatrix,
+            Function::ForwardDynamics,
+            Function::InverseDynamicsDerivatives,
+        ];
         let options = Options { functions, fma: true, ..programs::options(robot) };
         let source = programs::source(robot);
         let generated = compile(&source, &options).unwrap_or_else(|d| panic!("{}", d.render()));

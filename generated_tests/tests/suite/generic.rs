@@ -5,7 +5,7 @@ use straightline_codegen::options::Options;
 use straightline_codegen::program::TracedProgram;
 use straightline_codegen::Function;
 use straightline_core::Dd;
-use straightline_generated_tests::bounds::{GRAVITY_SYMMETRY, MOTION_DERIVATIVE, TORQUE_DERIVATIVE};
+use straightline_generated_tests::bounds::{GRAVITY_SYMMETRY, IDENTITY, MOTION_DERIVATIVE, TORQUE_DERIVATIVE};
 use straightline_generated_tests::compiled;
 use straightline_generated_tests::compiled::generic_panda as panda;
 use straightline_generated_tests::compiled::generic_ur5 as ur5;
@@ -213,6 +213,32 @@ fn the_derivative_of_torques_by_accelerations_is_the_mass_matrix() {
         for (tau, row) in tau.iter().zip(h) {
             for (d, h) in tau.derivatives.iter().zip(row) {
                 assert!(TORQUE_DERIVATIVE.allows((d - h).abs()), "{d} {h}");
+            }
+        }
+    }
+}
+
+/// How ∂τᵀ λ changes along a direction: dual numbers through one function, against the product that is a function of its own.
+#[test]
+fn duals_through_a_product_with_derivatives_are_second_derivatives() {
+    let (loaded, program) = program_of("panda", Function::InverseDynamicsHvp);
+    let mut random = Random(53);
+    for _ in 0..10 {
+        let x = inputs::random(&mut random, &loaded.model, Function::InverseDynamicsHvp);
+        let along = |k: usize| -> [Dual<f64, 1>; 7] {
+            let pair = |j: usize| Dual { value: x[k][j], derivatives: [x[k + 3][j]] };
+            std::array::from_fn(pair)
+        };
+        let multiplier: [Dual<f64, 1>; 7] = std::array::from_fn(|j| Dual::fixed(x[6][j]));
+        let mut products = [[Dual::<f64, 1>::zero(); 7]; 3];
+        let [of_q, of_qd, of_qdd] = &mut products;
+        panda::inverse_dynamics_vjp(&along(0), &along(1), &along(2), &multiplier, of_q, of_qd, of_qdd);
+        let expected = programs::run::<f64>(&program, &x);
+        for (found, expected) in products.iter().zip(expected.chunks(7)) {
+            let greatest = expected.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            assert!(greatest > 0.1, "{expected:?}");
+            for (found, expected) in found.iter().zip(expected) {
+                assert!(IDENTITY.allows((found.derivatives[0] - expected).abs() / greatest), "{found:?} {expected}");
             }
         }
     }

@@ -148,6 +148,45 @@ fn panda_inverse_dynamics() -> Subject<f32> {
     }
 }
 
+/// One output of the derivatives of torques, the others aside.
+macro_rules! panda_derivatives {
+    ($name:literal, $kept:literal, $width:literal) => {
+        Subject::<f32> {
+            name: $name,
+            inputs: vec![7, 7, 7],
+            output: $width,
+            one: |x, y| {
+                let (mut k, mut d, mut h, mut tau) = ([[0.0; 7]; 7], [[0.0; 7]; 7], [[0.0; 7]; 7], [0.0; 7]);
+                let [q, qd, qdd] = [0, 1, 2].map(|k| x[k].as_slice().try_into().expect("a number per joint"));
+                panda::inverse_dynamics_derivatives(q, qd, qdd, &mut k, &mut d, &mut h, &mut tau);
+                y.copy_from_slice([k.as_flattened(), d.as_flattened(), h.as_flattened(), &tau][$kept]);
+            },
+            soa: vec![batch_of_derivatives!(panda::inverse_dynamics_derivatives_batch_soa, $kept)],
+            aos: vec![batch_of_derivatives!(panda::inverse_dynamics_derivatives_batch_aos, $kept)],
+        }
+    };
+}
+
+macro_rules! batch_of_derivatives {
+    ($run:path, $kept:literal) => {
+        |n, x, y| {
+            let mut all = [49, 49, 49, 7].map(|width| vec![7.25; n * width]);
+            let [k, d, h, tau] = &mut all;
+            $run(n, &x[0], &x[1], &x[2], k, d, h, tau).map_err(|wrong| wrong.to_string())?;
+            y.copy_from_slice(&all[$kept]);
+            Ok(())
+        }
+    };
+}
+
+#[test]
+fn a_batch_of_derivatives_gives_every_state_the_bits_that_it_gets_alone() {
+    panda_derivatives!("∂τ/∂q", 0, 49).agrees();
+    panda_derivatives!("∂τ/∂q̇", 1, 49).agrees();
+    panda_derivatives!("H beside derivatives", 2, 49).agrees();
+    panda_derivatives!("τ beside derivatives", 3, 7).agrees();
+}
+
 #[test]
 fn a_batch_gives_every_state_the_bits_that_it_gets_alone() {
     solo12_inverse_dynamics().agrees();

@@ -33,7 +33,7 @@ fn redirected(graph: &Graph, i: usize, other: NodeId) -> Graph {
 }
 
 /// All faults that may sit in node `i`.
-pub(super) fn faults(graph: &Graph, i: usize) -> Vec<(&'static str, Graph)> {
+fn faults(graph: &Graph, i: usize) -> Vec<(&'static str, Graph)> {
     match graph.ops[i] {
         Op::Input(_) | Op::SinCos(_) => vec![],
         Op::Constant(c) => {
@@ -109,9 +109,35 @@ fn changes_a_value(program: &TracedProgram, mutant: &Graph, states: &[Vec<Dd>]) 
 
 /// Whether results are others: less than this, such as 1e-9 of the cosine 6e-17 of an almost right angle, is beyond the data's 25 digits;
 /// what is no number is a change.
-pub fn is_changed(right: &[Dd], found: &[Dd]) -> bool {
+fn is_changed(right: &[Dd], found: &[Dd]) -> bool {
     let size = right.iter().fold(0.0, |m: f64, v| m.max(v.to_f64().abs()));
     !right.iter().zip(found).all(|(a, b)| (*a - *b).abs().to_f64() <= 1e-21 * size)
+}
+
+/// How many faults of single nodes change a result in these states, and which of them are not caught in any: `catches` has the number of the
+/// state and the results there.
+pub fn escaping(graph: &Graph, states: &[Vec<Dd>], catches: impl Fn(usize, &[Dd]) -> bool) -> (usize, Vec<String>) {
+    let right: Vec<Vec<Dd>> = states.iter().map(|x| expr::evaluate(graph, x)).collect();
+    assert!(right.iter().enumerate().all(|(k, found)| !catches(k, found)), "the program is right");
+    let (mut all, mut escaped) = (0, Vec::new());
+    for i in 0..graph.ops.len() {
+        for (fault, mutant) in faults(graph, i) {
+            let (mut changes, mut caught) = (false, false);
+            for (k, (x, right)) in states.iter().zip(&right).enumerate() {
+                let found = expr::evaluate(&mutant, x);
+                changes |= is_changed(right, &found);
+                caught = changes && catches(k, &found);
+                if caught {
+                    break;
+                }
+            }
+            all += usize::from(changes);
+            if changes && !caught {
+                escaped.push(format!("{fault} in node {i} ({:?})", graph.ops[i]));
+            }
+        }
+    }
+    (all, escaped)
 }
 
 fn every_fault_is_caught(robot: &str, function: Function) {
