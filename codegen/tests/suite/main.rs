@@ -34,6 +34,7 @@ mod machines;
 mod malformed;
 mod messages;
 mod mixed;
+mod modes;
 mod mutants;
 mod names;
 mod options;
