@@ -153,6 +153,14 @@ fn hold_records<const N: usize>(functions: [Function; N], records: [[usize; N]; 
     assert_eq!(found, records);
 }
 
+/// Of forward dynamics: along a direction, backwards, and of second order.
+#[test]
+fn products_with_derivatives_of_forward_dynamics_take_what_is_on_record() {
+    use Function::{ForwardDynamicsHvp, ForwardDynamicsJvp, ForwardDynamicsVjp};
+    let records = [[746, 728, 1799], [990, 965, 2267], [1487, 1454, 3188], [2099, 2067, 4573]];
+    hold_records([ForwardDynamicsJvp, ForwardDynamicsVjp, ForwardDynamicsHvp], records);
+}
+
 /// Operations on record of what is at rest, without accelerations, or by velocities alone.
 #[test]
 fn derivatives_of_gravity_and_bias_forces_and_coriolis_matrices_take_what_is_on_record() {
