@@ -70,6 +70,15 @@ fn faults(graph: &Graph, i: usize) -> Vec<(&'static str, Graph)> {
     }
 }
 
+/// The graph with every fault of every node, each with what was done where.
+fn mutants(graph: &Graph) -> impl Iterator<Item = (String, Graph)> + '_ {
+    let of_node = move |(i, op): (usize, &Op)| {
+        let at = format!("in node {i} ({op:?})");
+        faults(graph, i).into_iter().map(move |(fault, mutant)| (format!("{fault} {at}"), mutant))
+    };
+    graph.ops.iter().enumerate().flat_map(of_node)
+}
+
 /// The states of the data, as a sieve for one function.
 struct Sieve {
     states: Vec<(Vec<Dd>, Vec<f64>, Expected)>,
@@ -120,21 +129,19 @@ pub fn escaping(graph: &Graph, states: &[Vec<Dd>], catches: impl Fn(usize, &[Dd]
     let right: Vec<Vec<Dd>> = states.iter().map(|x| expr::evaluate(graph, x)).collect();
     assert!(right.iter().enumerate().all(|(k, found)| !catches(k, found)), "the program is right");
     let (mut all, mut escaped) = (0, Vec::new());
-    for i in 0..graph.ops.len() {
-        for (fault, mutant) in faults(graph, i) {
-            let (mut changes, mut caught) = (false, false);
-            for (k, (x, right)) in states.iter().zip(&right).enumerate() {
-                let found = expr::evaluate(&mutant, x);
-                changes |= is_changed(right, &found);
-                caught = changes && catches(k, &found);
-                if caught {
-                    break;
-                }
+    for (fault, mutant) in mutants(graph) {
+        let (mut changes, mut caught) = (false, false);
+        for (k, (x, right)) in states.iter().zip(&right).enumerate() {
+            let found = expr::evaluate(&mutant, x);
+            changes |= is_changed(right, &found);
+            caught = changes && catches(k, &found);
+            if caught {
+                break;
             }
-            all += usize::from(changes);
-            if changes && !caught {
-                escaped.push(format!("{fault} in node {i} ({:?})", graph.ops[i]));
-            }
+        }
+        all += usize::from(changes);
+        if changes && !caught {
+            escaped.push(fault);
         }
     }
     (all, escaped)
@@ -154,16 +161,11 @@ fn every_fault_is_caught(robot: &str, function: Function) {
 
     let (mut all, mut caught_in_f64) = (0, 0);
     let mut escaped = Vec::new();
-    for i in 0..program.graph.ops.len() {
-        for (fault, mutant) in faults(&program.graph, i) {
-            if !changes_a_value(&program, &mutant, &states) {
-                continue;
-            }
-            all += 1;
-            caught_in_f64 += usize::from(sieve.rounding_catches(&mutant));
-            if !sieve.equations_catch(&mutant) {
-                escaped.push(format!("{fault} in node {i} ({:?})", program.graph.ops[i]));
-            }
+    for (fault, mutant) in mutants(&program.graph).filter(|(_, mutant)| changes_a_value(&program, mutant, &states)) {
+        all += 1;
+        caught_in_f64 += usize::from(sieve.rounding_catches(&mutant));
+        if !sieve.equations_catch(&mutant) {
+            escaped.push(fault);
         }
     }
     println!(
