@@ -204,7 +204,10 @@ impl Case {
     }
 
     fn all() -> Vec<Case> {
-        use Function::{ForwardDynamics, GravityForce, InverseDynamics, MassMatrix};
+        use Function::{
+            ForwardDynamics, ForwardDynamicsDerivatives, GravityForce, InverseDynamics, InverseDynamicsDerivatives,
+            MassMatrix,
+        };
         let of = |functions: &[Function]| Options { functions: functions.to_vec(), ..Options::default() };
         let companions = |o: Options| Options { certify: Some(Effort { companions: true, ..Effort::default() }), ..o };
         let with_tip = OBLIQUE.replace("</robot>", WITH_A_TIP);
@@ -222,6 +225,13 @@ impl Case {
                 OBLIQUE,
                 "",
                 Options { scalar: Scalar::F32, ..of(&[InverseDynamics, ForwardDynamics]) },
+                &[&OF_FUNCTIONS],
+            ),
+            Case::new(
+                "derivatives",
+                OBLIQUE,
+                "",
+                of(&[InverseDynamicsDerivatives, ForwardDynamicsDerivatives]),
                 &[&OF_FUNCTIONS],
             ),
             // what parameters add is not known: sums stay in the order that they are in
