@@ -5,7 +5,6 @@ use super::error_bound::error_bound;
 use super::module::{Item, ModeModule};
 use super::Lowering;
 use crate::equations::Robot;
-use crate::function::Judged;
 use crate::options::Options;
 use crate::program::companion::{bound, wants_companions};
 use crate::program::contact::{programs, Mode, ModeProgram};
@@ -51,10 +50,9 @@ pub(super) fn contact(robot: &Robot, options: &Options, lowering: Lowering<'_>) 
                 (function.name(), schedule(&graph, options.limits, options.schedule_machine().as_ref()));
             let mut of_state = None;
             if wants_companions(options) {
-                let by_residual = function.spec().judged == Judged::ByResidual;
                 let (bound, plainer) = bound(robot, options, mode, function, &graph)?;
                 out.plainer.extend(plainer);
-                let names = (name, by_residual);
+                let names = (name, function.spec().judged);
                 of_state = Some(error_bound(bound, names, &graph, (options, lowering.target), &mut functions));
             }
             out.reports.push(ContactReport::new(&mode.identifier, name, counts));

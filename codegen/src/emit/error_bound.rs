@@ -3,8 +3,9 @@
 use crate::emit::module::StateCertificate;
 use crate::emit::target::Target;
 use crate::emit::{Lowering, Style};
+use crate::function::Judged;
 use crate::options::Options;
-use crate::program::companion::StateBound;
+use crate::program::companion::{is_by_equations, StateBound};
 use crate::program::written::WrittenFunction;
 use crate::report::errors::{ErrorReport, OutputErrors};
 use std::fmt::Write;
@@ -17,25 +18,30 @@ const OF_STATE: &str = "Inputs below the normal numbers are to be given as zero 
 /// The function `…_error_bound`, or why there is none.
 pub(super) fn error_bound(
     bound: StateBound,
-    (name, by_residual): (&str, bool),
+    (name, judged): (&str, Judged),
     graph: &Graph,
     (options, target): (&Options, &dyn Target),
     written: &mut Vec<WrittenFunction>,
 ) -> StateCertificate {
     let scalar = graph.widest(options.scalar);
     let bound = bound.map_err(|why| format!("No `{name}_error_bound`: {why}."))?;
-    let mut doc = match by_residual {
-        false => format!(
+    let solved = match judged {
+        _ if !is_by_equations(&bound) => None,
+        Judged::ByColumns => Some("derivatives of accelerations, and accelerations themselves,"),
+        _ => Some("accelerations and reactions,"),
+    };
+    let mut doc = match solved {
+        None => format!(
             "How far the results of [`{name}`] can be from the exact values by rounding, at these inputs: certified for this state, \
              whatever the ranges of the inputs. NaN where nothing is certified: a divisor that may vanish, or a sign that may be wrong."
         ),
-        true => format!(
-            "How far accelerations and reactions, from [`{name}`] or wherever else, can be from the exact ones at these inputs: \
+        Some(solved) => format!(
+            "How far {solved} from [`{name}`] or wherever else, can be from the exact ones at these inputs: \
              certified by what they leave of the equations.\n\n`smallest_eigenvalue`: what the smallest eigenvalue of the mass matrix is \
              at least. Where rounding is too coarse for a proof, the results that depend on it are NaN: ask `is_nan()` before use."
         ),
     };
-    if by_residual && bound.outputs.iter().any(|p| p.name == "smallest_contact_eigenvalue") {
+    if bound.outputs.iter().any(|p| p.name == "smallest_contact_eigenvalue") {
         doc.push_str(
             " `smallest_contact_eigenvalue` is that of the inverse mass J H⁻¹ Jᵀ that reactions feel (where objects give way or contacts \
              slide with friction, the smallest singular value of the matrix of reactions); redundant contacts have no proof.",

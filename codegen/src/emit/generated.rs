@@ -10,7 +10,7 @@ use super::{rust, Lowering, Routine, Style};
 use crate::choices::{Lanes, Memory, TargetMachine, WrittenEntries};
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::equations::Robot;
-use crate::function::{Function, Judged};
+use crate::function::Function;
 use crate::identifier::file_name;
 use crate::machine_code::MachineFigures;
 use crate::options::Options;
@@ -167,8 +167,13 @@ fn item(
             false => (Err(ROUNDED), None),
         };
         plainer.iter().for_each(|p| warnings.push(p.warning(&robot.model)));
-        let names = (function.name(), function.spec().judged == Judged::ByResidual);
-        of_state = Some(error_bound(bound, names, graph, (options, lowering.target), written));
+        of_state = Some(error_bound(
+            bound,
+            (function.name(), function.spec().judged),
+            graph,
+            (options, lowering.target),
+            written,
+        ));
     }
     let named = (*function, function.name(), &doc[..]);
     Ok(Item::new(named, (graph, schedule), of_state, (options, lowering)))

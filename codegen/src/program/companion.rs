@@ -3,9 +3,11 @@
 use crate::equations::Robot;
 use crate::function::{ContactFunction, Function, Judged};
 use crate::options::Options;
+use crate::program::columns::SolvedColumns;
 use crate::program::contact::{checked_system, Mode};
 use crate::program::equivalence::{self, Disagreement, Plainer};
 use crate::program::passed;
+use straightline_graph::certify::columns::column_bound;
 use straightline_graph::certify::companion::{state_bound, Bits};
 use straightline_graph::certify::residual::acceleration_bound;
 use straightline_graph::expr::Graph;
@@ -55,10 +57,25 @@ pub(crate) fn checked_companion(
 ) -> Result<(StateBound, Option<Plainer>), Disagreement> {
     match function.spec().judged {
         Judged::ByResidual => of_accelerations(robot, options, &Mode::alone(), function.name(), graph),
-        Judged::ByScale | Judged::ByInertias | Judged::ByDerivatives | Judged::ByColumns => {
+        Judged::ByColumns => match SolvedColumns::of(robot, function, options) {
+            Some(columns) => match of_columns(robot, options, (function, &columns), graph)? {
+                (Err(_), _) => of_errors(robot, options, function.name(), graph, bits(options)),
+                made => Ok(made),
+            },
+            None => of_errors(robot, options, function.name(), graph, bits(options)),
+        },
+        Judged::ByScale | Judged::ByInertias | Judged::ByDerivatives => {
             of_errors(robot, options, function.name(), graph, bits(options))
         }
     }
+}
+
+/// The output of bounds that are made of equations which results solve.
+const EIGENVALUE: &str = "smallest_eigenvalue";
+
+/// Whether a bound takes the results themselves, and judges them by the equations that they solve.
+pub(crate) fn is_by_equations(bound: &Graph) -> bool {
+    bound.outputs.iter().any(|port| port.name == EIGENVALUE)
 }
 
 /// The program that bounds the errors of a contact function at the state at hand, and whether the equations that it is made of are plainer
@@ -109,6 +126,20 @@ fn of_accelerations(
     bound
         .iter()
         .try_for_each(|bound| equivalence::of_acceleration_bound(robot, options, name, (graph, bound), &system))?;
+    Ok((bound, plainer))
+}
+
+/// The program that bounds errors of derivatives of accelerations by what each column leaves of the equations that it solves.
+fn of_columns(
+    robot: &Robot,
+    options: &Options,
+    (function, columns): (Function, &SolvedColumns),
+    graph: &Graph,
+) -> Result<(StateBound, Option<Plainer>), Disagreement> {
+    let name = function.name();
+    let (system, plainer) = columns.checked_system(robot, function, options)?;
+    let bound = column_bound(&system, options.scalar).map(|bound| finished_bound(name, bound));
+    bound.iter().try_for_each(|bound| equivalence::of_column_bound(robot, options, name, (graph, bound), &system))?;
     Ok((bound, plainer))
 }
 

@@ -12,6 +12,7 @@
 //! is generated, too, and the program may lose eight times what the plain equations lose.
 
 mod bounds;
+mod columns;
 mod contact;
 mod disagreement;
 mod losses;
@@ -38,6 +39,7 @@ use straightline_graph::pass::cut::Staged;
 use straightline_graph::{element_of, EveryScalar};
 
 pub(crate) use bounds::{of_acceleration_bound, of_bound};
+pub(crate) use columns::{of_column_bound, of_column_system};
 pub(crate) use contact::{of_contact, of_system};
 pub use disagreement::{Disagreement, Plainer};
 use losses::Losses;

@@ -1,6 +1,7 @@
 //! From equations to operations in order: the form with the fewest, its passes, and the checks of both.
 
 pub mod choose;
+mod columns;
 pub mod companion;
 pub mod contact;
 pub mod demand_inertia;

@@ -1,5 +1,6 @@
 //! Bounds at the state at hand against true errors, and accelerations checked by their residual, on many robots in both formats.
 
+use straightline_codegen::certify::companion::{state_bound, Bits};
 use straightline_codegen::certify::{certify, search, Effort, Interval};
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
@@ -179,4 +180,66 @@ fn accelerations_lie_within_what_their_residual_proves() {
             }
         }
     }
+}
+
+/// The greatest of each output.
+fn greatest(graph: &Graph, of_results: &[f64]) -> Vec<f64> {
+    let mut first = 0;
+    let of = graph.outputs.iter().map(|port| {
+        let own = &of_results[first..first + port.len()];
+        first += port.len();
+        // NaN stays
+        own.iter().fold(0.0f64, |most, x| if *x > most || x.is_nan() { *x } else { most })
+    });
+    of.collect()
+}
+
+/// Derivatives of accelerations are judged column by column, as they are found, and wrong by a little. On the Panda that says ten times more than
+/// what its program may lose on its way.
+#[test]
+fn derivatives_of_accelerations_lie_within_what_their_columns_leave() {
+    for (function, file) in [
+        (Function::ForwardDynamicsDerivatives, "panda.urdf"),
+        (Function::ForwardDynamicsDerivatives, "chapter_stanford.toml"),
+        (Function::ForwardDynamicsDerivativesAtMotion, "ur5.urdf"),
+    ] {
+        for scalar in BOTH {
+            let case = case(file, false, function, scalar, 1.0);
+            let running = state_bound(&case.graph, scalar, Bits::Plain).expect("the program is short");
+            let mut tighter: Vec<f64> = Vec::new();
+            for state in states(&case.ranges, scalar, 8) {
+                let exact: Vec<Dd> = state.iter().map(|x| Dd::from(*x)).collect();
+                let exact = evaluate::<Dd>(&case.graph, &exact);
+                let found = search::computed_at(&case.graph, scalar, &state);
+                for wrong in [0.0, 1e-3, 0.1] {
+                    let by = |k: usize| wrong * [1.0, -0.5, 0.7][k % 3];
+                    let candidate = found.iter().enumerate().map(|(k, x)| scalar.nearest(Dd::from(x + by(k))));
+                    let candidate: Vec<f64> = candidate.collect();
+                    let bounds = at(&case.bound, scalar, &[state.clone(), candidate.clone()].concat());
+                    for (k, (x, exact)) in candidate.iter().zip(&exact).enumerate() {
+                        let error = (Dd::from(*x) - *exact).to_f64().abs();
+                        assert!(error <= bounds[k], "{file}, {scalar:?}, {k}: {error:e} > {:e}", bounds[k]);
+                    }
+                    if wrong == 0.0 {
+                        let [ours, others] = [&bounds, &at(&running, scalar, &state)].map(|b| greatest(&case.graph, b));
+                        tighter.push(others[others.len() - 3] / ours[others.len() - 3]);
+                    }
+                }
+            }
+            tighter.sort_unstable_by(f64::total_cmp);
+            println!("{file}, {}, {}: {tighter:.1?} times", function.name(), scalar.name());
+            let least = if file == "panda.urdf" { 8.0 } else { 0.5 };
+            assert!(tighter[tighter.len() / 2] >= least, "{file}: {tighter:?}");
+        }
+    }
+}
+
+/// A scene that wants parts of columns, or no accelerations, has bounds of what the program loses on its way, as has a robot whose equations are long.
+#[test]
+fn derivatives_in_parts_have_bounds_of_another_kind() {
+    let is_by_columns = |case: &Case| case.bound.outputs.iter().any(|port| port.name == "smallest_eigenvalue");
+    let function = Function::ForwardDynamicsDerivatives;
+    assert!(is_by_columns(&case("planar2r.urdf", false, function, Scalar::F64, 1.0)));
+    assert!(!is_by_columns(&case("solo12.urdf", true, function, Scalar::F64, 1.0)));
+    assert!(!is_by_columns(&case("planar2r.urdf", false, Function::ForwardDynamicsJvp, Scalar::F64, 1.0)));
 }

@@ -2,7 +2,7 @@
 //!
 //! `cargo test -p straightline-codegen --test suite derivative_bounds:: -- --nocapture` prints what the guide says of them.
 
-use straightline_codegen::certify::slopes::{greatest_singular_value, magnitudes};
+use straightline_codegen::certify::slopes::{greatest_singular_value, known_magnitudes, magnitudes};
 use straightline_codegen::certify::{certify_with, search, Certificate, Effort, Interval, KnownSystem};
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::equations::Robot;
@@ -278,6 +278,35 @@ fn derivatives_of_forward_dynamics_have_bounds_over_a_box() {
                     words(&case.greatest(&certificate.magnitudes)),
                     words(&case.greatest(&steepest)),
                 );
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// What mechanics knows of exact derivatives bounds them on robots of which rounding errors add up to more than they are.
+#[test]
+fn accelerations_change_no_faster_than_their_lipschitz_constants() {
+    let mut failures = Vec::new();
+    for (file, most) in [("ur5.urdf", [5e3, 2e3, 68.0]), ("panda.urdf", [2e5, 1.6e4, 480.0])] {
+        let case = case(file, Function::ForwardDynamicsDerivativesAtMotion, Scalar::F64, false);
+        let certificate = case.certificate(Scalar::F64).expect("pivots stay off zero");
+        let known = known_magnitudes(&case.graph, &case.known);
+        let bounds: Vec<f64> = certificate.magnitudes.iter().zip(&known).map(|(a, b)| a.min(*b)).collect();
+        let (found, norms) = case.steepest(4_000);
+        let beyond = found.iter().zip(&bounds).filter(|(found, bound)| found > bound);
+        failures.extend(beyond.map(|(found, bound)| format!("{file}: {found:e} > {bound:e}")));
+        let (of_bounds, of_found) = (case.greatest(&bounds), case.greatest(&found));
+        println!("{file}: ∂q̈/∂q, ∂q̈/∂q̇, H⁻¹ at most {}; found {}", words(&of_bounds), words(&of_found));
+        let mut first = 0;
+        for ((port, norm), most) in case.graph.outputs.iter().zip(norms).zip(most) {
+            let own = first..first + port.len();
+            first = own.end;
+            let bound = greatest_singular_value(&bounds[own.clone()], port.shape[1]);
+            println!("{file}, {}: norm {norm:.3e}, at most {bound:.3e}", port.name);
+            let entry = bounds[own].iter().fold(0.0, |most: f64, x| most.max(*x));
+            if norm > bound || entry > most {
+                failures.push(format!("{file}, {}: {norm:e} {bound:e} {entry:e}", port.name));
             }
         }
     }

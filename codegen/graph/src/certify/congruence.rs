@@ -20,6 +20,8 @@ pub(super) struct Congruence {
     /// At least a, and at most 1 − a.
     pub contraction: NodeId,
     pub left: NodeId,
+    /// |W D⁻¹ Wᵀ| as computed, once it was asked for.
+    direct: Option<Sparse>,
 }
 
 /// γ of so many roundings.
@@ -43,7 +45,8 @@ impl Congruence {
                 p.insert(Op::div(one, root))
             })
             .collect();
-        let mut this = Congruence { lower, inverse, d, units, shift: Vec::new(), contraction: one, left: one };
+        let mut this =
+            Congruence { lower, inverse, d, units, shift: Vec::new(), contraction: one, left: one, direct: None };
         let x = this.up(p, &this.inverse, &this.units);
         let x = p.all_settled(&x);
         let y = this.up(p, &this.lower, &x);
@@ -126,12 +129,12 @@ impl Congruence {
         p.scaled(1.0 - 4.0 * p.format.u, least)
     }
 
-    /// |W D⁻¹ Wᵀ| r for r ≥ 0, by that matrix as computed.
-    pub fn direct(&self, p: &mut Running, r: &[NodeId]) -> Vec<NodeId> {
+    /// |W D⁻¹ Wᵀ| below its diagonal and on it, as computed.
+    fn sizes(&self, p: &mut Running) -> Sparse {
         let n = self.d.len();
         let one = p.constant(1.0);
         let entry = |i: usize, k: usize| if i == k { Some(one) } else { self.inverse[i][k] };
-        let mut products: Vec<Vec<(NodeId, NodeId)>> = vec![Vec::new(); n];
+        let mut sizes: Sparse = vec![vec![None; n]; n];
         for i in 0..n {
             for j in 0..=i {
                 let terms: Vec<NodeId> = (0..n)
@@ -142,13 +145,23 @@ impl Congruence {
                     })
                     .collect();
                 let Some(sum) = terms.into_iter().reduce(|a, b| p.insert(Op::add(a, b))) else { continue };
-                let size = p.absolute(sum);
-                products[i].push((size, r[j]));
-                if i != j {
-                    products[j].push((size, r[i]));
-                }
+                sizes[i][j] = Some(p.absolute(sum));
             }
         }
+        sizes
+    }
+
+    /// |W D⁻¹ Wᵀ| r for r ≥ 0, by that matrix as computed.
+    pub fn direct(&mut self, p: &mut Running, r: &[NodeId]) -> Vec<NodeId> {
+        let n = self.d.len();
+        let sizes = match self.direct.take() {
+            Some(sizes) => sizes,
+            None => self.sizes(p),
+        };
+        let entry = |i: usize, j: usize| sizes[i.max(j)][i.min(j)];
+        let products = (0..n).map(|i| (0..n).filter_map(|j| Some((entry(i, j)?, r[j]))).collect());
+        let products: Vec<Vec<(NodeId, NodeId)>> = products.collect();
+        self.direct = Some(sizes);
         // what the matrix is off by
         let rounding = self.down(p, &self.inverse, r);
         let rounding: Vec<NodeId> = (0..n).map(|k| p.over(rounding[k], self.d[k])).collect();
@@ -165,6 +178,21 @@ impl Congruence {
                 p.insert(Op::add(sum, off))
             })
             .collect()
+    }
+
+    /// What δ is at most, of H δ = r with |r| at most so large: `driven` is |W|ᵀ |r|, and `bounds` what δ is but for B.
+    pub fn with_shift(&self, p: &mut Running, bounds: &[NodeId], driven: &[NodeId]) -> Vec<NodeId> {
+        let driven = p.all_settled(driven);
+        let shifted = self.shifted(p, &driven);
+        let sums: Vec<NodeId> = bounds.iter().zip(shifted).map(|(a, b)| p.insert(Op::add(*a, b))).collect();
+        p.all_settled(&sums)
+    }
+
+    /// The same of r alone.
+    pub fn solution(&mut self, p: &mut Running, r: &[NodeId]) -> Vec<NodeId> {
+        let bounds = self.direct(p, r);
+        let driven = self.down(p, &self.inverse, r);
+        self.with_shift(p, &bounds, &driven)
     }
 
     /// |W| D⁻¹ |B| |z| for (D + B) z = b, of |b|.

@@ -43,11 +43,12 @@
 //! dynamics intervals alone know little: what mechanics knows of pivots, of what is left of H and of accelerations is given, as [`KnownSystem`]. It holds for
 //! exact values and adjoints; those of the perturbed program are off by what errors add up to, found as in 3. Where that reaches a pivot,
 //! as in f32 on long arms with light tips, there is no bound for a box. There, and for the state at hand, generated programs bound the
-//! error: [`companion`], [`residual`]. A bound also proves that no value overflows and none is NaN. Coulomb friction takes the sign of a
+//! error: [`companion`], [`residual`], [`columns`]. A bound also proves that no value overflows and none is NaN. Coulomb friction takes the sign of a
 //! speed as it is given: where subnormal numbers are read as zero, so is the sign of a subnormal speed.
 
 pub mod analysis;
 mod cancel;
+pub mod columns;
 pub mod companion;
 mod congruence;
 pub mod format;

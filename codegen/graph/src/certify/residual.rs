@@ -50,7 +50,7 @@ use crate::expr::{Graph, NodeId, Op, Port};
 use crate::number::Scalar;
 
 /// Longer programs are not written: rustc would take minutes.
-const MOST_OPERATIONS: usize = 150_000;
+pub(super) const MOST_OPERATIONS: usize = 150_000;
 
 /// The outputs of a system, in order: what is left of the equations of motion and of those of the contact; H; J; the rows in which reactions
 /// act; m of yielding rows.
@@ -80,7 +80,7 @@ pub(super) fn bound_of(mut p: Running, system: &Graph, yielding: &[bool]) -> Res
     let [residual, missing, h, j, applied, mass] = &parts[..] else { unreachable!("a system has six outputs") };
     let rows = |x: &[Tracked]| -> Vec<Vec<Tracked>> { x.chunks(n).map(<[Tracked]>::to_vec).collect() };
 
-    let congruence = Congruence::new(&mut p, h, n).ok_or("a diagonal entry of the mass matrix is zero")?;
+    let mut congruence = Congruence::new(&mut p, h, n).ok_or("a diagonal entry of the mass matrix is zero")?;
     let eigenvalue = congruence.smallest_eigenvalue(&mut p);
     let mut outputs = vec![Port::new(&format!("qdd{OF_ERROR}"), &[n])];
     let known: Vec<Tracked> = match p.is_broken(BrokenProof::Residual) {
@@ -110,10 +110,7 @@ pub(super) fn bound_of(mut p: Running, system: &Graph, yielding: &[bool]) -> Res
     } else {
         outputs.push(Port::new("smallest_eigenvalue", &[1]));
     }
-    let driven = p.all_settled(&driven);
-    let shifted = congruence.shifted(&mut p, &driven);
-    let accelerations: Vec<NodeId> = (0..n).map(|i| p.insert(Op::add(bounds[i], shifted[i]))).collect();
-    let accelerations = p.all_settled(&accelerations);
+    let accelerations = congruence.with_shift(&mut p, &bounds, &driven);
     if p.operations() > MOST_OPERATIONS {
         return Err(TOO_LONG);
     }

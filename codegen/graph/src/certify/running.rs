@@ -44,6 +44,8 @@ pub(super) enum BrokenProof {
     Jacobian,
     /// Errors of reactions do not accelerate anything.
     Reactions,
+    /// Accelerations that are found count as exact in the equations of their derivatives.
+    Accelerations,
     /// A divisor counts as exact.
     Divisor,
 }

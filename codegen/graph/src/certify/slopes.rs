@@ -6,7 +6,7 @@
 
 use super::interval::{add_up, mul_up};
 use super::{subdivision, Effort, ErrorAnalysis, FloatFormat, Interval, KnownSystem, NoCertificate};
-use crate::expr::Graph;
+use crate::expr::{Graph, NodeId, Op};
 use crate::number::Scalar;
 
 /// Steps towards the greatest singular value: whatever they find, the bound holds.
@@ -29,6 +29,18 @@ pub fn magnitudes(
     let of_nodes = subdivision::magnitudes(&mut analysis, inputs, effort)?;
     let of = |r| of_nodes.iter().find(|(node, _)| *node == r).expect("every result is a node with a bound").1;
     Ok(graph.results.iter().map(|r| of(*r)).collect())
+}
+
+/// What each exact result can be at most by what is known of it, and where nothing is, any number.
+pub fn known_magnitudes(graph: &Graph, known: &KnownSystem) -> Vec<f64> {
+    let of = |result: &NodeId| match graph.op(*result) {
+        Op::Constant(c) => c.value().hi().abs().next_up(),
+        _ => {
+            let facts = known.values.iter().filter(|(node, _)| node == result);
+            facts.map(|(_, range)| range.mag()).fold(f64::INFINITY, f64::min)
+        }
+    };
+    graph.results.iter().map(of).collect()
 }
 
 /// At least the greatest singular value of every matrix whose entries, row by row, are at most these in size.

@@ -20,13 +20,13 @@ use straightline_graph::rounding::backwards;
 use straightline_graph::{element_of, Scalar};
 
 /// What is known of a bound to first order it may fall below by so much.
-const FIRST_ORDER: f64 = 0.99;
+pub(super) const FIRST_ORDER: f64 = 0.99;
 /// Forces are off by so much of the greatest, to either side: by far more than rounding, by less than the forces.
 const OFF: [f64; 2] = [-1.0 / 1048576.0, 1.0 / 1024.0];
 /// Accelerations and reactions are off in any direction by such parts of the greatest.
-const ANYWHERE: [f64; 4] = [FAR, 1e-2, 1e-5, FAR];
+pub(super) const ANYWHERE: [f64; 4] = [FAR, 1e-2, 1e-5, FAR];
 /// From there on bounds are great: by this part a solution is far from what is found.
-const FAR: f64 = 0.3;
+pub(super) const FAR: f64 = 0.3;
 /// The greatest bound of what is found is such a part of it at most, or so many ulps, where a format is short.
 const SMALL: f64 = 1.0 / 1024.0;
 const LOST: f64 = 1048576.0;
@@ -72,32 +72,32 @@ pub(crate) fn of_acceleration_bound(
 ) -> Result<(), Disagreement> {
     let mut states = States::new(robot, options);
     for _ in 0..STATES {
-        let state = short(states.next(&graph.inputs), options.scalar);
-        let exact = solution(graph, evaluate(graph, &inputs(graph, &state)));
+        let at = AccelerationBound::new((name, options.scalar), (graph, bound), states.next(&graph.inputs));
         // where a scene wants some accelerations alone there is nothing to ask about
-        let is_there = |p: &Port| state.contains_key(&p.name) || exact.get(&p.name).is_some_and(|x| x.len() == p.len());
+        let is_whole = |p: &Port| at.exact.get(&p.name).is_some_and(|x| x.len() == p.len());
+        let is_there = |p: &Port| at.state.contains_key(&p.name) || is_whole(p);
         if !bound.inputs.iter().all(is_there) {
             return Ok(());
         }
-        let found = computed_at(graph, options.scalar, &as_f64(&inputs(graph, &state)));
-        let found = solution(graph, found.into_iter().map(Dd::from).collect());
-        let at = AccelerationBound { name, graph, bound, scalar: options.scalar, state, exact, found };
         let of_found = at.asked(&at.found)?;
         for part in ANYWHERE {
-            let of_other = at.asked(&off_by(part, &at.found, &mut states.random))?;
+            let of_other = at.asked(&at.off_by(part, &mut states.random))?;
             if part >= FAR {
                 of_found.iter().try_for_each(|(port, bounds)| at.is_small((port, bounds), &of_other[port]))?;
             }
         }
         let Some(columns) = at.of_forces()? else { continue };
         at.is_provable(system, &of_found, &columns)?;
-        at.is_definite(&of_found, &columns)?;
+        if let [port] = &graph.outputs[..] {
+            let inverse: Vec<&[f64]> = columns.iter().map(|column| &column[&port.name][..]).collect();
+            at.is_definite(of_found.get("smallest_eigenvalue").map(|x| x[0]), &inverse)?;
+        }
     }
     Ok(())
 }
 
-/// A bound of accelerations and reactions at a state.
-struct AccelerationBound<'a> {
+/// A bound of accelerations and reactions, or of derivatives of accelerations, at a state.
+pub(super) struct AccelerationBound<'a> {
     name: &'a str,
     graph: &'a Graph,
     bound: &'a Graph,
@@ -105,15 +105,29 @@ struct AccelerationBound<'a> {
     state: PortState,
     exact: PortState,
     /// In the function's own scalar.
-    found: PortState,
+    pub found: PortState,
 }
 
 /// By ports: what results change by per change of a force.
 type Column = BTreeMap<String, Vec<f64>>;
 
-impl AccelerationBound<'_> {
+impl<'a> AccelerationBound<'a> {
+    /// At a state in its scalar.
+    pub fn new(
+        (name, scalar): (&'a str, Scalar),
+        (graph, bound): (&'a Graph, &'a Graph),
+        state: PortState,
+    ) -> AccelerationBound<'a> {
+        let state = short(state, scalar);
+        let given = inputs(graph, &state);
+        let exact = solution(graph, evaluate(graph, &given));
+        let found = computed_at(graph, scalar, &as_f64(&given));
+        let found = solution(graph, found.into_iter().map(Dd::from).collect());
+        AccelerationBound { name, graph, bound, scalar, state, exact, found }
+    }
+
     /// What it says of a solution, which is right.
-    fn asked(&self, solution: &PortState) -> Result<BTreeMap<String, Vec<f64>>, Disagreement> {
+    pub fn asked(&self, solution: &PortState) -> Result<BTreeMap<String, Vec<f64>>, Disagreement> {
         let given = self.given(solution);
         let bounds = computed_at(self.bound, self.scalar, &as_f64(&inputs(self.bound, &given)));
         let bounds = by_port(&self.bound.outputs, bounds);
@@ -127,17 +141,17 @@ impl AccelerationBound<'_> {
     }
 
     /// The inputs of what judges a solution.
-    fn given(&self, solution: &PortState) -> PortState {
+    pub fn given(&self, solution: &PortState) -> PortState {
         self.state.clone().into_iter().chain(short(solution.clone(), self.scalar)).collect()
     }
 
-    fn of<'b>(&self, bounds: &'b BTreeMap<String, Vec<f64>>, port: &Port) -> Option<&'b Vec<f64>> {
+    pub fn of<'b>(&self, bounds: &'b BTreeMap<String, Vec<f64>>, port: &Port) -> Option<&'b Vec<f64>> {
         bounds.get(&format!("{}{OF_ERROR}", port.name))
     }
 
     /// Whether bounds of what is found are far below both what it is and what bounds it far from there: one that takes a wrong part for what
     /// is left of the equations is great where nothing is left, and too small where the two are nearly the same.
-    fn is_small(&self, (port, bounds): (&String, &[f64]), of_other: &[f64]) -> Result<(), Disagreement> {
+    pub fn is_small(&self, (port, bounds): (&String, &[f64]), of_other: &[f64]) -> Result<(), Disagreement> {
         let Some(found) = port.strip_suffix(OF_ERROR).and_then(|port| self.found.get(port)) else { return Ok(()) };
         let greatest = |x: &mut dyn Iterator<Item = f64>| x.fold(0.0, f64::max);
         let size = greatest(&mut found.iter().map(|x| x.hi().abs())).max(greatest(&mut of_other.iter().copied()));
@@ -196,15 +210,11 @@ impl AccelerationBound<'_> {
         Ok(())
     }
 
-    /// Whether the smallest eigenvalue of the mass matrix, which is known without contact, is at least what it says.
-    fn is_definite(&self, of_found: &BTreeMap<String, Vec<f64>>, columns: &[Column]) -> Result<(), Disagreement> {
-        let [port] = &self.graph.outputs[..] else { return Ok(()) };
-        let inverse: Vec<&[f64]> = columns.iter().map(|column| &column[&port.name][..]).collect();
+    /// Whether the smallest eigenvalue of the mass matrix, which is known where its inverse is, is at least what it says.
+    pub fn is_definite(&self, smallest: Option<f64>, inverse: &[&[f64]]) -> Result<(), Disagreement> {
         let is_square = inverse.iter().all(|column| column.len() == inverse.len());
-        let Some(smallest) = of_found.get("smallest_eigenvalue").map(|x| x[0]).filter(|_| is_square) else {
-            return Ok(());
-        };
-        let most = 1.0 / greatest_eigenvalue(&inverse);
+        let Some(smallest) = smallest.filter(|_| is_square) else { return Ok(()) };
+        let most = 1.0 / greatest_eigenvalue(inverse);
         match smallest > most {
             true => {
                 let result = "the smallest eigenvalue of the mass matrix".to_string();
@@ -213,15 +223,15 @@ impl AccelerationBound<'_> {
             false => Ok(()),
         }
     }
-}
 
-/// All numbers off by up to a part of the greatest of their port.
-fn off_by(part: f64, solution: &PortState, random: &mut Random) -> PortState {
-    let off = |x: &Vec<Dd>, random: &mut Random| {
-        let most = x.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
-        x.iter().map(|x| *x + Dd::from(part * most * random.symmetric(1.0))).collect()
-    };
-    solution.iter().map(|(name, x)| (name.clone(), off(x, random))).collect()
+    /// All numbers that are found off by up to a part of the greatest of their port.
+    pub fn off_by(&self, part: f64, random: &mut Random) -> PortState {
+        let off = |x: &Vec<Dd>, random: &mut Random| {
+            let most = x.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
+            x.iter().map(|x| *x + Dd::from(part * most * random.symmetric(1.0))).collect()
+        };
+        self.found.iter().map(|(name, x)| (name.clone(), off(x, random))).collect()
+    }
 }
 
 /// Of a symmetric matrix, from below.
@@ -242,7 +252,7 @@ fn greatest_eigenvalue(columns: &[&[f64]]) -> f64 {
 }
 
 /// An error of a result against its bound; a bound that is no number promises nothing.
-fn holds(name: &str, (outputs, k): (&[Port], usize), off: f64, most: f64) -> Result<(), Disagreement> {
+pub(super) fn holds(name: &str, (outputs, k): (&[Port], usize), off: f64, most: f64) -> Result<(), Disagreement> {
     match off > most {
         true => Err(disagreement(name, format!("the error of {}", element_of(outputs, k)), off / most)),
         false => Ok(()),
@@ -258,7 +268,7 @@ fn short(state: PortState, scalar: Scalar) -> PortState {
     state.into_iter().map(|(n, x)| (n, x.into_iter().map(number).collect())).collect()
 }
 
-fn as_f64(numbers: &[Dd]) -> Vec<f64> {
+pub(super) fn as_f64(numbers: &[Dd]) -> Vec<f64> {
     numbers.iter().map(|x| x.to_f64()).collect()
 }
 
@@ -273,7 +283,7 @@ fn solution(graph: &Graph, results: Vec<Dd>) -> PortState {
 }
 
 /// The least that can be proven of each result's error at these inputs without knowing how values happen to be rounded, to first order.
-fn least_provable(graph: &Graph, scalar: Scalar, given: &[f64]) -> Vec<f64> {
+pub(super) fn least_provable(graph: &Graph, scalar: Scalar, given: &[f64]) -> Vec<f64> {
     let is_number = |id: &NodeId| !matches!(graph.op(*id), Op::SinCos(_) | Op::AngleSum(..));
     let numbers: Vec<NodeId> = graph.ids().filter(is_number).collect();
     let mut values = vec![0.0; graph.ops.len()];

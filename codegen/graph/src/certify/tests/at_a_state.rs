@@ -1,5 +1,6 @@
 //! Bounds at the state at hand: they hold, and without one of their parts they do not.
 
+use super::super::columns::{self, ColumnSystem, MASS_MATRIX};
 use super::super::companion;
 use super::super::residual::{bound_of, OUTPUTS};
 use super::super::running::{BrokenProof, Running};
@@ -61,6 +62,73 @@ fn one_coordinate() -> Graph {
     let (missing, zero) = (b.add(Op::neg(sdd)), b.constant(Dd::ZERO));
     let outputs = OUTPUTS.iter().map(|name| Port::new(name, if *name == "h" { &[1, 1] } else { &[1] })).collect();
     b.finish(outputs, vec![residual, missing, h, j, j, zero])
+}
+
+/// Of one coordinate: H = x₀ x₁ − x₂ x₃, H q̈ = x₈, and H x + (x₄ x₅ − x₆ x₇) q̈ = 0.
+fn one_column() -> ColumnSystem {
+    let ports = vec![Port::new("x", &[9]), Port::new("qdd", &[1]), Port::new("dqdd_dq", &[1, 1])];
+    let mut b = GraphBuilder::new(RuleSet::all(), ports);
+    let x: Vec<NodeId> = (0..11).map(|k| b.insert(Op::Input(k))).collect();
+    let mut difference = |k: usize| {
+        let (p, q) = (b.add(Op::mul(x[k], x[k + 1])), b.add(Op::mul(x[k + 2], x[k + 3])));
+        b.add(Op::sub(p, q))
+    };
+    let (h, k) = (difference(0), difference(4));
+    let (inertia, slope, driven) = (b.add(Op::mul(h, x[9])), b.add(Op::mul(h, x[10])), b.add(Op::mul(k, x[9])));
+    let (of_acceleration, of_slope) = (b.add(Op::sub(inertia, x[8])), b.add(Op::add(slope, driven)));
+    let outputs = vec![Port::new("qdd", &[1]), Port::new("dqdd_dq", &[1, 1]), Port::new(MASS_MATRIX, &[1, 1])];
+    let graph = b.finish(outputs, vec![of_acceleration, of_slope, h]);
+    ColumnSystem { graph, columns: vec![vec![0], vec![1]], finds_accelerations: true }
+}
+
+/// Whether a bound of q̈ or of its derivative lies below an error, at states where H is a difference of nearly equal numbers.
+fn is_violated_by_columns(broken: Option<BrokenProof>) -> bool {
+    let system = one_column();
+    let mut p = Running::new(system.graph.inputs.clone(), FloatFormat::of(Scalar::F32));
+    p.broken = broken;
+    let bound = columns::bound_of(p, &system).expect("the program is short");
+    let mut random = straightline_core::random::Random(1);
+    let single = |x: f64| f64::from(x as f32);
+    let (mut violated, mut proven) = (false, 0);
+    for k in 0..3000 {
+        let near = 0.1f64.powi(k % 5);
+        let mut pair = || {
+            let [a, b, c] = [0; 3].map(|_| single(1.0 + random.unit()));
+            [a, b, c, single(a * b / c * (1.0 - near * random.unit()))]
+        };
+        let state = [&pair()[..], &pair()[..], &[single(random.unit())]].concat();
+        let of = |qdd: Dd, slope: Dd| {
+            let exact: Vec<Dd> = state.iter().map(|x| Dd::from(*x)).chain([qdd, slope]).collect();
+            crate::expr::evaluate::<Dd>(&system.graph, &exact)
+        };
+        let h = of(Dd::ZERO, Dd::ZERO)[2];
+        if h.to_f64() <= 0.0 {
+            continue;
+        }
+        let qdd = -of(Dd::ZERO, Dd::ZERO)[0] / h;
+        let slope = -of(qdd, Dd::ZERO)[1] / h;
+        let wrong = Dd::from([0.0, 0.5][k as usize / 5 % 2]);
+        // the derivative that belongs to a wrong acceleration, or is wrong by itself
+        let candidate = match k as usize / 10 % 2 {
+            0 => [qdd + wrong, -of(qdd + wrong, Dd::ZERO)[1] / h],
+            _ => [qdd, slope + wrong],
+        };
+        let candidate = candidate.map(|x| single(x.to_f64()));
+        let bounds = computed_at(&bound, Scalar::F32, &[&state[..], &candidate].concat());
+        let errors = [qdd, slope].into_iter().zip(candidate).map(|(t, c)| (t - Dd::from(c)).to_f64().abs());
+        violated |= errors.zip(&bounds).any(|(e, bound)| e > *bound);
+        proven += usize::from(bounds.iter().all(|b| !b.is_nan()));
+    }
+    assert!(proven > 1000, "{proven}");
+    violated
+}
+
+#[test]
+fn bounds_of_columns_hold_and_without_one_of_their_parts_do_not() {
+    assert!(!is_violated_by_columns(None));
+    for broken in [BrokenProof::Residual, BrokenProof::Accelerations] {
+        assert!(is_violated_by_columns(Some(broken)), "{broken:?}");
+    }
 }
 
 /// Whether a bound of q̈ or F lies below an error, at states where H and J are differences of nearly equal numbers.
