@@ -9,7 +9,7 @@ use straightline_core::model::{Coulomb, JointEffects, Model};
 use straightline_core::Dd;
 
 /// Two oblique joints and a slide; every joint has other effects.
-const ARM: &str = r#"
+pub(super) const ARM: &str = r#"
 [robot]
 name = "arm"
 

@@ -40,6 +40,7 @@ mod names;
 mod options;
 mod outlining;
 mod paired_constants;
+mod parameter_derivatives;
 mod ranges;
 mod readback;
 mod reduced_forms;
