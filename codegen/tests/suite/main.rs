@@ -24,6 +24,7 @@ mod expansion;
 mod figures;
 mod fixed;
 mod flexible;
+mod flexible_derivatives;
 mod forward_dynamics;
 mod forward_dynamics_bounds;
 mod frame_conventions;
