@@ -5,6 +5,7 @@ mod acceleration_bounds;
 mod as_written;
 mod bare_metal;
 mod base_parameter_names;
+mod budgets;
 mod builder;
 mod c99;
 mod c99_readback;
