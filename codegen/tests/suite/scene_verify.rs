@@ -3,6 +3,7 @@
 //! Scenes of one kind share the functions among them: each has every sixth, and the next scene the next sixth. Every function of every
 //! scene is a slow proof.
 
+use super::effects::ARM;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use straightline_codegen::diagnostic::{Diagnostics, Source};
 use straightline_codegen::options::scene_file;
@@ -24,22 +25,27 @@ impl Tried {
         Tried::Sixth(AtomicUsize::new(0))
     }
 
-    fn functions(&self) -> Vec<Function> {
+    fn of(&self, functions: impl Iterator<Item = Function>) -> Vec<Function> {
         match self {
-            Tried::All => Function::all().collect(),
-            Tried::Sixth(scene) => Function::all().skip(scene.fetch_add(1, Ordering::Relaxed) % 6).step_by(6).collect(),
+            Tried::All => functions.collect(),
+            Tried::Sixth(scene) => functions.skip(scene.fetch_add(1, Ordering::Relaxed) % 6).step_by(6).collect(),
         }
     }
 }
 
 #[track_caller]
 fn agrees(tried: &Tried, robot: &str, text: &str) {
+    agree(tried.of(Function::all()), robot, text, 20);
+}
+
+#[track_caller]
+fn agree(functions: Vec<Function>, robot: &str, text: &str, states: u32) {
     let (source, mut diagnostics) = (Source::new("robot.toml", robot), Diagnostics::new());
     let file = scene_file::read(&Source::new("scene.toml", text), &mut diagnostics);
-    let plain = Options { functions: tried.functions(), ..Options::default() };
+    let plain = Options { functions, ..Options::default() };
     let options = file.unwrap_or_else(|| panic!("{diagnostics}")).into_options(plain);
     let generated = compile(&source, &options).unwrap_or_else(|errors| panic!("{text}\n{errors}"));
-    let verification = verify(&source, &generated, &options, (20, 7), || ()).expect("the reference reads the file");
+    let verification = verify(&source, &generated, &options, (states, 7), || ()).expect("the reference reads the file");
     assert_eq!(verification.functions.len(), generated.items.len());
     for (name, worst) in &verification.functions {
         assert!(worst.error < bound(options.scalar) / 8.0, "{text}\n{name}: {worst:?}");
@@ -113,6 +119,36 @@ fn a_chain_in_the_chapters_notation(tried: &Tried) {
     agrees(tried, CHAIN, &format!("{payload}\n[hold]\njoints = {{ turn = 0.3 }}"));
 }
 
+/// What is made when it is named, each for one of the first scenes.
+const DERIVATIVES: [Function; 6] = [
+    Function::ForwardDynamicsVjp,
+    Function::InverseDynamicsDerivatives,
+    Function::InverseDynamicsVjp,
+    Function::ForwardDynamicsDerivatives,
+    Function::InverseDynamicsJvp,
+    Function::ForwardDynamicsJvp,
+];
+
+/// With friction, springs and rotors: as they are, in other forms, and with joints held, loads carried and inertias as inputs.
+fn derivatives(tried: &Tried) {
+    let agrees = |robot: &str, text: &str| agree(tried.of(DERIVATIVES.into_iter()), robot, text, 6);
+    let tool = "[[parameter]]\nkind = \"payload\"\nname = \"tool\"\nframe = \"rod\"\n";
+    let link = "[[parameter]]\nkind = \"link\"\nlink = \"fore\"\n";
+    let loads = LOADS.replace("camera", "rod").replace("eye", "fore");
+    agrees(ARM, "[effects]\ncoulomb = \"smooth\"\ncoulomb_speed = 0.3\n");
+    agrees(ARM, &format!("{loads}\n[hold]\njoints = {{ elbow = 0.4 }}\ngravity = \"input\""));
+    agrees(ARM, &format!("{tool}{link}\n[hold]\njoints = {{ slide = 0.2 }}"));
+    agrees(ARM, &format!("{link}\n[hold]\njoints = {{ shoulder = -0.4 }}"));
+    agrees(ARM, &format!("{loads}{tool}\n[effects]\nsprings = false\n[numbers]\nscalar = \"f32\""));
+    agrees(CHAIN, "[effects]\ndamping = false\n[hold]\ngravity = [1.0, 2.0, -3.0]");
+    // those take long
+    if matches!(tried, Tried::All) {
+        agrees(ARM, "[zero]\nqd = true\n[hold]\njoints = { elbow = -0.6 }");
+        let held = "[hold]\nbase = \"floating\"\njoints = { shoulder = -0.4, slide = 0.1, grip = 0.05 }";
+        agrees(BRANCHED, &format!("{link}\n{held}"));
+    }
+}
+
 macro_rules! kinds {
     ($($kind:ident),*) => {$(
         mod $kind {
@@ -130,4 +166,12 @@ macro_rules! kinds {
     )*};
 }
 
-kinds!(held, known_to_be_zero, effects, payloads_and_parameters, selected, a_chain_in_the_chapters_notation);
+kinds!(
+    held,
+    known_to_be_zero,
+    effects,
+    payloads_and_parameters,
+    selected,
+    a_chain_in_the_chapters_notation,
+    derivatives
+);
