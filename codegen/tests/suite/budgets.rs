@@ -32,7 +32,7 @@ fn budget(function: Function, limits: &[(&str, usize)]) -> String {
 
 /// The codes of its complaints, and their text.
 fn complaints(function: Function, scene: &str) -> (Vec<&'static str>, String) {
-    let errors = compiled(function, scene).expect_err("something is exceeded");
+    let Err(errors) = compiled(function, scene) else { panic!("{} exceeds nothing:\n{scene}", function.name()) };
     (errors.iter().map(|error| error.code).collect(), errors.render())
 }
 
