@@ -1,6 +1,6 @@
 //! What identical limbs as lanes of one body take, against each by itself.
 //!
-//! `cargo run -p straightline-generated-tests --example limbs`; recorded in `record/2026-11-21-limbs.md`.
+//! `cargo run -p straightline-generated-tests --example limbs [FUNCTION…]`; recorded in `record/2026-11-21-limbs.md`.
 //!
 //! The functions as they are generated with `limbs = "apart"` and `limbs = "lanes"`, in one program that first checks that their
 //! results agree, then times calls warm and cold; bytes of machine code by `nm -S`.
@@ -57,6 +57,52 @@ fn generated(text: &str, function: Function, limbs: LimbForm, fma: bool) -> Gene
     compile(&Source::new("robot.urdf", text.to_string()), &options).unwrap_or_else(|d| panic!("{}", d.render()))
 }
 
+/// A function, and what the program has to write of it.
+struct Case {
+    function: Function,
+    call: &'static str,
+    inputs: &'static str,
+    state: &'static str,
+    output: &'static str,
+    zero: &'static str,
+    /// All results of `y`.
+    flat: &'static str,
+}
+
+const MOTION: &str = "([f64; apart::NQ], [f64; apart::NV], [f64; apart::NV])";
+const OF_MOTION: &str =
+    "(std::array::from_fn(|_| next()), std::array::from_fn(|_| next()), std::array::from_fn(|_| next()))";
+
+const CASES: [Case; 3] = [
+    Case {
+        function: Function::InverseDynamics,
+        call: "(&x.0, &x.1, &x.2, y)",
+        inputs: MOTION,
+        state: OF_MOTION,
+        output: "[f64; apart::NV]",
+        zero: "[0.0; apart::NV]",
+        flat: "y.to_vec()",
+    },
+    Case {
+        function: Function::GravityForce,
+        call: "(x, y)",
+        inputs: "[f64; apart::NQ]",
+        state: "std::array::from_fn(|_| next())",
+        output: "[f64; apart::NV]",
+        zero: "[0.0; apart::NV]",
+        flat: "y.to_vec()",
+    },
+    Case {
+        function: Function::InverseDynamicsDerivatives,
+        call: "(&x.0, &x.1, &x.2, &mut y.0, &mut y.1, &mut y.2, &mut y.3)",
+        inputs: MOTION,
+        state: OF_MOTION,
+        output: "([[f64; apart::NV]; apart::NV], [[f64; apart::NV]; apart::NV], [[f64; apart::NV]; apart::NV], [f64; apart::NV])",
+        zero: "([[0.0; apart::NV]; apart::NV], [[0.0; apart::NV]; apart::NV], [[0.0; apart::NV]; apart::NV], [0.0; apart::NV])",
+        flat: "[y.0.as_flattened(), y.1.as_flattened(), y.2.as_flattened(), &y.3].concat()",
+    },
+];
+
 const PROGRAM: &str = r#"
 use std::{hint::black_box, time::Instant};
 
@@ -80,10 +126,11 @@ fn main() {
         (seed >> 40) as f64 / 8388608.0 - 1.0
     };
     let states: Vec<Inputs> = (0..STATES).map(|_| STATE).collect();
-    let (mut y, mut z) = ([0.0; apart::NV], [0.0; apart::NV]);
+    let (mut y, mut z): (Output, Output) = (ZERO, ZERO);
     for x in &states {
         limbs_apart(x, &mut y);
         limbs_lanes(x, &mut z);
+        let [y, z] = [&y, &z].map(|y| FLAT);
         let scale = y.iter().fold(0.0f64, |m, t| m.max(t.abs()));
         assert!(y.iter().zip(&z).all(|(a, b)| (a - b).abs() < 1e-12 * scale), "{y:?} {z:?}");
     }
@@ -134,19 +181,15 @@ fn main() {
         "| robot, function | instructions | mul, add | in lanes | ns | in lanes | cold | in lanes | bytes | in lanes |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
+    let wanted: Vec<String> = std::env::args().skip(1).collect();
     let of_files = ROBOTS
         .map(|(file, name)| (std::fs::read_to_string(files.join(file)).expect("the file is there"), name.to_string()));
     let walkers = [3, 5, 6].map(|legs| (walker(legs), format!("{legs} legs")));
     for (text, name) in of_files.into_iter().chain(walkers) {
-        for (function, call, inputs, state) in [
-            (
-                Function::InverseDynamics,
-                "(&x.0, &x.1, &x.2, y)",
-                "([f64; apart::NQ], [f64; apart::NV], [f64; apart::NV])",
-                "(std::array::from_fn(|_| next()), std::array::from_fn(|_| next()), std::array::from_fn(|_| next()))",
-            ),
-            (Function::GravityForce, "(x, y)", "[f64; apart::NQ]", "std::array::from_fn(|_| next())"),
-        ] {
+        for Case { function, call, inputs, state, output, zero, flat } in CASES {
+            if !(wanted.is_empty() || wanted.iter().any(|name| *name == function.name())) {
+                continue;
+            }
             for (instructions, fma, flags) in [
                 ("any x86-64", false, vec![]),
                 ("AVX2", true, vec!["-Ctarget-cpu=x86-64-v3"]),
@@ -156,12 +199,14 @@ fn main() {
                 let both = [LimbForm::Apart, LimbForm::Lanes].map(|limbs| generated(&text, function, limbs, fma));
                 let source = format!(
                     "#![allow(warnings)]\nmod apart {{\n{}\n}}\nmod lanes {{\n{}\n}}\ntype Inputs = {inputs};\n\
-                     type Output = [f64; apart::NV];\n{}",
+                     type Output = {output};\n{}",
                     both[0].text,
                     both[1].text,
                     PROGRAM
                         .replace("CALL", &format!("{}{call}", function.name()))
                         .replace("STATE)", &format!("{state})"))
+                        .replace("ZERO", zero)
+                        .replace("FLAT", flat)
                 );
                 let program = folder.build("limbs", &source, &flags).unwrap_or_else(|e| panic!("{e}"));
                 let printed = run(&program, &[]).unwrap_or_else(|e| panic!("{e}"));

@@ -1,7 +1,7 @@
 //! Derivatives of inverse dynamics: matrices, and products with directions and multipliers.
 
 use super::spec::Extent::Velocities;
-use super::spec::{Form, Output, RobotFunction, Spec};
+use super::spec::{Form, InLanes, Output, RobotFunction, Spec};
 use super::{Forms, Quantity};
 use straightline_core::algorithms::{self as alg, DerivativeBlocks};
 use straightline_core::model::Model;
@@ -34,6 +34,7 @@ impl RobotFunction for InverseDynamicsDerivatives {
                 .slope_with_friction("τ", Quantity::Acceleration),
             Output::new("tau", &[Velocities], "generalized forces \\[N·m or N\\]"),
         ],
+        in_lanes: InLanes::WhereFaster,
         ..Spec::DERIVED
     };
 
@@ -170,7 +171,8 @@ impl<T: Real> Forms<'_, T> {
     /// τ = H q̈ + h and its derivatives.
     pub fn inverse_dynamics_derivatives(&self, motion: [&[T]; 3]) -> DerivativeBlocks<T> {
         let Some([torques, _]) = self.reduced else { return by_directions(self.model, motion) };
-        let rigid = alg::reduced_inverse_dynamics_derivatives(torques, motion);
+        let rigid =
+            self.with_limbs(|l| alg::reduced_inverse_dynamics_derivatives_with_limbs(torques, motion, l.subtree));
         let mut all = DerivativeBlocks {
             mass_matrix: self.with_rotors(rigid.mass_matrix),
             tau: self.with_effects(rigid.tau, motion),

@@ -37,12 +37,15 @@ pub struct Forms<'a, T> {
 }
 
 /// What the bodies that stand for several limbs each pass on to those that carry them, all limbs together: see
-/// [`alg::reduced_inverse_dynamics_with_limbs`] and [`alg::reduced_gravity_force_with_limbs`].
+/// [`alg::reduced_inverse_dynamics_with_limbs`], [`alg::reduced_gravity_force_with_limbs`] and
+/// [`alg::reduced_inverse_dynamics_derivatives_with_limbs`].
 pub struct LimbSums<'a, T> {
     /// Force and moment.
     pub wrench: &'a mut alg::LimbWrenches<'a, T>,
     /// First moment and mass.
     pub first_moment: &'a mut alg::LimbMoments<'a, T>,
+    /// Moments of points and of their velocities, and the wrench.
+    pub subtree: &'a mut alg::LimbSubtrees<'a, T>,
 }
 
 impl<'a, T: Real> Forms<'a, T> {
@@ -51,10 +54,12 @@ impl<'a, T: Real> Forms<'a, T> {
         Forms { model, reduced: None, frames, rows: SelectedRows::ALL, method, limbs: None }
     }
 
-    fn with_limbs<R>(&self, f: impl FnOnce(&mut LimbSums<'_, T>) -> R) -> R {
+    pub(super) fn with_limbs<R>(&self, f: impl FnOnce(&mut LimbSums<'_, T>) -> R) -> R {
         match &self.limbs {
             Some(limbs) => f(&mut limbs.borrow_mut()),
-            None => f(&mut LimbSums { wrench: &mut |_, _| None, first_moment: &mut |_, _| None }),
+            None => {
+                f(&mut LimbSums { wrench: &mut |_, _| None, first_moment: &mut |_, _| None, subtree: &mut |_, _| None })
+            }
         }
     }
 

@@ -205,7 +205,7 @@ pub enum Form {
     Motion,
 }
 
-/// Whether identical limbs can be lanes of one body: they add a wrench on the body that carries them, and forces on their own joints.
+/// Whether identical limbs can be lanes of one body: what they add to the body that carries them are sums, and between two limbs is nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InLanes {
     /// They cannot.

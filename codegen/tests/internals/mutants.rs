@@ -12,7 +12,7 @@ use crate::function::{ContactFunction, Function};
 use crate::model::{load, ModelOptions};
 use crate::options::optimisations::FOLDING;
 use crate::options::Options;
-use crate::program::companion::{bound, checked_companion, wants_companions};
+use crate::program::companion::{bound, checked_companion, is_by_equations, wants_companions};
 use crate::program::contact::{self, Mode};
 use crate::program::input_box::input_box;
 use crate::program::mixed::mix_precisions;
@@ -217,7 +217,8 @@ impl Case {
         let drawing = format!("[outputs]\nfunctions = [\"gravity_force\"]\ncontact = [\"constrained_coordinates\", \"forward_dynamics\", \"inverse_dynamics\", \"projection\"]\n{PEN}");
         let rubbing = format!("[outputs]\nfunctions = [\"gravity_force\"]\ncontact = [\"forward_dynamics_derivatives\", \"impact_derivatives\"]\n{RUBBING}");
         let sliding = format!("[outputs]\nfunctions = [\"gravity_force\"]\ncontact = [\"forward_dynamics\"]\n{TABLE}");
-        let limbs = Options { limbs: LimbForm::Lanes, ..of(&[InverseDynamics, GravityForce]) };
+        let legs = [InverseDynamics, GravityForce, InverseDynamicsDerivatives];
+        let limbs = Options { limbs: LimbForm::Lanes, ..of(&legs) };
         vec![
             Case::new("functions", OBLIQUE, "", of(&[InverseDynamics, MassMatrix, ForwardDynamics]), &[&OF_FUNCTIONS]),
             Case::new(
@@ -266,6 +267,13 @@ impl Case {
                 OBLIQUE,
                 "",
                 companions(of(&[InverseDynamics, MassMatrix, ForwardDynamics])),
+                &[&OF_FUNCTIONS, &OF_SYSTEM, &OF_BOUND],
+            ),
+            Case::new(
+                "bounds of derivatives",
+                OBLIQUE,
+                "",
+                companions(of(&[ForwardDynamicsDerivatives])),
                 &[&OF_FUNCTIONS, &OF_SYSTEM, &OF_BOUND],
             ),
             Case::new(
@@ -421,8 +429,7 @@ fn exceeded(options: &Options, graph: &Graph, bound: &Graph, states: &mut States
         |graph: &Graph, state: &PortState| inputs(graph, state).iter().map(|x| x.to_f64()).collect::<Vec<f64>>();
     let exact = evaluate(graph, &inputs(graph, &state));
     let found = computed_at(graph, options.scalar, &short(graph, &state));
-    let by_residual = bound.inputs.iter().any(|p| p.name == "qdd") && !graph.inputs.iter().any(|p| p.name == "qdd");
-    for off in if by_residual { vec![0.0, 1e-9, 1e-3, 0.1] } else { vec![0.0] } {
+    for off in if is_by_equations(bound) { vec![0.0, 1e-9, 1e-3, 0.1] } else { vec![0.0] } {
         let found: Vec<f64> =
             found.iter().map(|x| single(Dd::from(x * (1.0 + off * states.random.symmetric(1.0)))).to_f64()).collect();
         let mut first = 0;

@@ -1,6 +1,6 @@
 //! A template written out: plain operations, once per limb, and which of them are alike.
 
-use super::template::{coordinates, LaneValue, Template};
+use super::template::{LaneValue, Template};
 use crate::function::Function;
 use crate::scene::Scene;
 use rustc_hash::FxHashMap;
@@ -86,10 +86,11 @@ pub(super) fn written_out(
     for id in graph.ids().filter(|id| places[id.index()] == NodePlace::Behind) {
         writer.once(id);
     }
-    let of = coordinates(model, &template.bodies);
-    let result = |k: &usize| {
-        let (coordinate, limb) = of[*k];
-        writer.of_limb(graph.results[coordinate], limb)
+    let is_between_limbs = |k: &usize| template.places[*k].is_none();
+    let zero = wanted.iter().any(is_between_limbs).then(|| writer.zero());
+    let result = |k: &usize| match template.places[*k] {
+        Some((result, limb)) => writer.of_limb(graph.results[result], limb),
+        None => zero.expect("it was written"),
     };
     let results = wanted.iter().map(result).collect();
     Graph { results, ..writer.out }
@@ -154,6 +155,11 @@ impl ExpansionWriter<'_> {
         self.out.ops.push(op);
         self.out.notes.push(Note { name, section: place });
         id
+    }
+
+    fn zero(&mut self) -> NodeId {
+        let section = Section { phase: "between limbs", index: None };
+        self.push_in(section, Op::Constant(Constant::new(Dd::ZERO)), None)
     }
 
     /// Node `id` of the template as limb `limb` has it.

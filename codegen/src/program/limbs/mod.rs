@@ -3,7 +3,7 @@
 //! Limbs of one kind hang on the same body and have the same joints in the same order. They take the same operations on other
 //! numbers, and what they add to the rest of the robot is one wrench on the body that carries them. So one limb is traced for all
 //! of them (`template.rs`): where their numbers differ it has inputs, a number per limb, and where the wrench reaches the body stands
-//! an input for the sum. What comes out is optimised like any program. Then it is written out, once per limb
+//! an input for the sum. Derivatives add the moments of points and of their velocities to the wrench; their entries between two limbs are zero. What comes out is optimised like any program. Then it is written out, once per limb
 //! (`expand.rs`), into one program of plain operations, so that bounds of errors, counts and tests see what
 //! is executed, with a note which of them are the same for all limbs ([`Alike`](straightline_graph::expr::Alike)): those become a loop over
 //! limbs, which compilers turn into vector instructions.
@@ -74,7 +74,7 @@ pub(crate) fn program(
     let rules = || apart.rules(options.scalar);
     let mut template = template::template(&chosen, function, &options.scene, &limbs, rules());
     let wanted = options.scene.select(function, &chosen.model, 0).0;
-    template.keep(&chosen.model, &wanted);
+    template.keep(&wanted);
     template.graph = check("limbs: dead code", dead_code(&check("limbs: traced", template.graph)));
     template = constants::folded(template, rules());
     if optimisations.sums {
@@ -82,7 +82,7 @@ pub(crate) fn program(
         // a sum of products with one factor in common is a product with a sum, which may be one of constants
         template = constants::folded(template, rules());
     }
-    template.drop_unread(&chosen.model, &wanted);
+    template.drop_unread(&wanted);
     let folded = check("limbs: folded constants", template.graph.clone());
     let is_rolled = options.limbs == LimbForm::Rolled;
     let graph = expand::written_out(&folded, &template, &chosen.model, &options.scene, (function, is_rolled));

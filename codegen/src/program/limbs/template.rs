@@ -6,9 +6,11 @@ use crate::function::{Forms, ForwardDynamicsMethod, Function, LimbSums};
 use crate::model::limbs::Limbs;
 use crate::scene::Scene;
 use std::cell::RefCell;
+use std::collections::BTreeSet;
+use straightline_core::algorithms::Subtree;
 use straightline_core::model::{Body, BodyId, Coulomb, JointEffects, Model};
 use straightline_core::reduced::{ReducedBody, ReducedModel};
-use straightline_core::spatial::{ForceVector, Mat3, Sym3, Vec3};
+use straightline_core::spatial::{Composite, ForceVector, Mat3, Sym3, Vec3};
 use straightline_core::{Dd, Real};
 use straightline_graph::expr::{Graph, Op, Port, RuleSet};
 use straightline_graph::trace::{trace_all, Expr};
@@ -17,6 +19,8 @@ use straightline_graph::trace::{trace_all, Expr};
 const SAME: f64 = 1e-28;
 /// At most so many numbers of a body differ from limb to limb; what constants are folded to takes more.
 const NUMBERS: usize = 64;
+/// So many numbers a limb passes on at most: a wrench, its first and second moments, and the moments of its velocities.
+const SUMS: usize = 27;
 
 /// A value that differs from limb to limb.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +37,11 @@ pub(super) struct Template {
     pub graph: Graph,
     /// Of each body of the template the bodies that it stands for, and the kind of limb, where it is a limb's.
     pub bodies: Vec<(Option<usize>, Vec<BodyId>)>,
+    /// Of each result of the function the result of the template that stands for it, and which limb's it is; none of entries between limbs, which
+    /// are zero.
+    pub places: Vec<Option<(usize, usize)>>,
+    /// Results of the template that stand for such of the function: the first ones.
+    pub own_results: usize,
     /// The first body of each limb, kind by kind.
     pub first_bodies: Vec<Vec<BodyId>>,
     /// First input of `sums`, and of each of them which result all limbs of a kind add up to it.
@@ -68,17 +77,14 @@ impl Template {
         }
     }
 
-    /// Forces that nobody wants go. `wanted`: velocity coordinates of the robot.
-    pub fn keep(&mut self, model: &Model<Dd>, wanted: &[usize]) {
-        let of = coordinates(model, &self.bodies);
-        let kept: Vec<usize> = wanted.iter().map(|k| of[*k].0).collect();
-        let own = of.iter().map(|(coordinate, _)| coordinate + 1).max().unwrap_or(0);
-        self.drop_results((0..own).filter(|k| !kept.contains(k)).collect(), kept.first().copied());
+    /// Results that nobody wants go. `wanted`: results of the function.
+    pub fn keep(&mut self, wanted: &[usize]) {
+        let kept: BTreeSet<usize> = wanted.iter().filter_map(|k| Some(self.places[*k]?.0)).collect();
+        self.drop_results((0..self.own_results).filter(|k| !kept.contains(k)).collect(), kept.first().copied());
     }
 
     /// Sums, and values of limbs, that no result needs go, and what only they need.
-    pub fn drop_unread(&mut self, model: &Model<Dd>, wanted: &[usize]) {
-        let of = coordinates(model, &self.bodies);
+    pub fn drop_unread(&mut self, wanted: &[usize]) {
         let live = self.graph.live();
         let mut read = vec![false; self.first_lane + self.lanes.len()];
         for id in self.graph.ids().filter(|id| live[id.index()]) {
@@ -94,7 +100,7 @@ impl Template {
             LaneValue::Results(results) => results.clone(),
         });
         let results = of_lanes.chain(dropped.iter().map(|s| s.result)).collect();
-        self.drop_results(results, wanted.first().map(|k| of[*k].0));
+        self.drop_results(results, wanted.iter().find_map(|k| Some(self.places[*k]?.0)));
     }
 
     /// In the place of results that go stands one that is there anyway.
@@ -146,16 +152,16 @@ pub(super) fn template(robot: &Robot, function: Function, scene: &Scene, limbs: 
     let bodies = bodies(&robot.model, limbs);
     let own = scene.ports(function, &robot.model, &[]);
     let first_sum: usize = own.iter().map(Port::len).sum();
-    let first_lane = first_sum + 6 * limbs.len();
+    let first_lane = first_sum + SUMS * limbs.len();
     let most = NUMBERS * bodies.iter().filter(|(kind, _)| kind.is_some()).count();
-    let more = [Port::new("sums", &[6 * limbs.len()]), Port::new("lanes", &[most])];
+    let more = [Port::new("sums", &[SUMS * limbs.len()]), Port::new("lanes", &[most])];
     let (mut sums, mut lanes) = (Vec::new(), Vec::new());
     let graph = trace_all(rules, own.iter().cloned().chain(more).collect(), |inputs| {
         let (own, more) = inputs.split_at(own.len());
         let bound = scene.bind(function, robot, own);
         let mut table = LimbValues { inputs: &more[1], values: Vec::new() };
         let folded = TemplateRobot::new(&bound, &bodies, &mut table);
-        let (mut results, passed_on) = folded.forces(function, &bound, &bodies, limbs, &more[0]);
+        let (mut results, passed_on) = folded.results(function, &bound, &bodies, limbs, &more[0]);
         for (kind, input, value) in passed_on {
             sums.push(Sum { kind, input, result: results.len() });
             results.push(value);
@@ -172,7 +178,8 @@ pub(super) fn template(robot: &Robot, function: Function, scene: &Scene, limbs: 
         results
     });
     let first_bodies = limbs.iter().map(|l| l.bodies.iter().map(|b| b[0]).collect()).collect();
-    Template { graph, bodies, first_bodies, first_sum, sums, first_lane, lanes }
+    let (places, own_results) = places(function, &robot.model, &bodies);
+    Template { graph, bodies, places, own_results, first_bodies, first_sum, sums, first_lane, lanes }
 }
 
 /// The bodies of the template in the order of the robot's: those of no limb, and the first limb's of every kind.
@@ -249,9 +256,9 @@ impl TemplateRobot {
         folded
     }
 
-    /// The forces over the joints of the template, and what limbs pass on: kind, input of `sums`, value.
+    /// The results over the joints of the template, and what limbs pass on: kind, input of `sums`, value.
     #[allow(clippy::type_complexity)]
-    fn forces(
+    fn results(
         &self,
         function: Function,
         bound: &BoundRobot<Expr>,
@@ -262,18 +269,25 @@ impl TemplateRobot {
         let passed_on = std::cell::RefCell::new(Vec::new());
         // the first body of a limb that something carries
         let kind_of = |i: BodyId| bodies[i].0.filter(|kind| limbs[*kind].bodies[0][0] == bodies[i].1[0]);
+        let total = |kind: usize, place: usize, x: Expr| {
+            // what is zero for every limb needs no sum
+            if x.as_constant() == Some(Dd::ZERO) {
+                return x;
+            }
+            let input = SUMS * kind + place;
+            passed_on.borrow_mut().push((kind, input, x));
+            sums[input]
+        };
+        let numbers = |kind: usize, first: usize, numbers: &[Expr]| -> Vec<Expr> {
+            numbers.iter().enumerate().map(|(k, x)| total(kind, first + k, *x)).collect()
+        };
         let vector = |kind: usize, first: usize, v: Vec3<Expr>| {
-            let mut k = 6 * kind + first;
-            v.map(|x| {
-                let input = k;
-                k += 1;
-                // what is zero for every limb needs no sum
-                if x.as_constant() == Some(Dd::ZERO) {
-                    return x;
-                }
-                passed_on.borrow_mut().push((kind, input, x));
-                sums[input]
-            })
+            let all = numbers(kind, first, &v.to_array());
+            Vec3::new(all[0], all[1], all[2])
+        };
+        let mass = |kind: usize| {
+            let masses = limbs[kind].bodies.iter().flatten().map(|b| bound.reduced.bodies[*b].mass);
+            masses.reduce(|sum, m| sum + m).expect("a limb has bodies")
         };
         let mut wrench = |i: BodyId, wrench: &dyn Fn() -> ForceVector<Expr>| {
             let (kind, own) = (kind_of(i)?, wrench());
@@ -281,13 +295,40 @@ impl TemplateRobot {
         };
         let mut first_moment = |i: BodyId, first_moment: &dyn Fn() -> Vec3<Expr>| {
             let kind = kind_of(i)?;
-            let masses = limbs[kind].bodies.iter().flatten().map(|b| bound.reduced.bodies[*b].mass);
-            let mass = masses.reduce(|sum, m| sum + m).expect("a limb has bodies");
-            Some((vector(kind, 0, first_moment()), mass))
+            Some((vector(kind, 0, first_moment()), mass(kind)))
+        };
+        let mut subtree = |i: BodyId, subtree: &dyn Fn() -> Subtree<Expr>| {
+            let (kind, own) = (kind_of(i)?, subtree());
+            let s = own.composite.second_moment;
+            let [xx, xy, xz, yy, yz, zz]: [Expr; 6] =
+                numbers(kind, 9, &[s.xx, s.xy, s.xz, s.yy, s.yz, s.zz]).try_into().expect("as many as were given");
+            let mut row = 15;
+            let spread = own.spread.rows.map(|of_row| {
+                let all = numbers(kind, row, &of_row);
+                row += 3;
+                [all[0], all[1], all[2]]
+            });
+            Some(Subtree {
+                wrench: ForceVector {
+                    moment: vector(kind, 0, own.wrench.moment),
+                    force: vector(kind, 3, own.wrench.force),
+                },
+                composite: Composite {
+                    mass: mass(kind),
+                    first_moment: vector(kind, 6, own.composite.first_moment),
+                    second_moment: Sym3 { xx, xy, xz, yy, yz, zz },
+                },
+                spread: Mat3 { rows: spread },
+                drift: vector(kind, 24, own.drift),
+            })
         };
         let forms = Forms {
             reduced: Some([&self.reduced, &self.reduced]),
-            limbs: Some(RefCell::new(LimbSums { wrench: &mut wrench, first_moment: &mut first_moment })),
+            limbs: Some(RefCell::new(LimbSums {
+                wrench: &mut wrench,
+                first_moment: &mut first_moment,
+                subtree: &mut subtree,
+            })),
             ..Forms::plain(&self.model, &[], ForwardDynamicsMethod::default())
         };
         (function.evaluate_on(&forms, &self.arguments), passed_on.take())
@@ -361,18 +402,57 @@ fn merged_effects(of: &[&JointEffects<Expr>], value: &mut dyn FnMut(&[Expr]) -> 
     }
 }
 
-/// Of each velocity coordinate of the robot the coordinate of the template that stands for it, and which limb's it is.
-pub(super) fn coordinates(model: &Model<Dd>, bodies: &[(Option<usize>, Vec<BodyId>)]) -> Vec<(usize, usize)> {
-    let mut coordinates = vec![(0, 0); model.nv()];
+/// What stands for a velocity coordinate of the robot.
+#[derive(Clone, Copy)]
+struct CoordinatePlace {
+    /// A coordinate of the template.
+    coordinate: usize,
+    /// The kind of limb and which limb it is, where it is a limb's.
+    limb: Option<(usize, usize)>,
+}
+
+/// Of each velocity coordinate of the robot what stands for it, and how many the template has.
+fn coordinates(model: &Model<Dd>, bodies: &[(Option<usize>, Vec<BodyId>)]) -> (Vec<CoordinatePlace>, usize) {
+    let mut coordinates = vec![CoordinatePlace { coordinate: 0, limb: None }; model.nv()];
     let mut next = 0;
-    for (_, of) in bodies {
-        let kind = model.bodies[of[0]].joint.kind;
+    for (kind, of) in bodies {
+        let nv = model.bodies[of[0]].joint.kind.nv();
         for (limb, body) in of.iter().enumerate() {
-            for k in 0..kind.nv() {
-                coordinates[model.bodies[*body].joint.iv + k] = (next + k, limb);
+            for k in 0..nv {
+                let place = CoordinatePlace { coordinate: next + k, limb: kind.map(|kind| (kind, limb)) };
+                coordinates[model.bodies[*body].joint.iv + k] = place;
             }
         }
-        next += kind.nv();
+        next += nv;
     }
-    coordinates
+    (coordinates, next)
+}
+
+/// Of each result of a function, lists and matrices over velocity coordinates, the result of the template that stands for it with its limb,
+/// and how many such results the template has. What belongs to two limbs is zero.
+fn places(
+    function: Function,
+    model: &Model<Dd>,
+    bodies: &[(Option<usize>, Vec<BodyId>)],
+) -> (Vec<Option<(usize, usize)>>, usize) {
+    let (of, count) = coordinates(model, bodies);
+    let limb = |place: CoordinatePlace| place.limb.map_or(0, |(_, limb)| limb);
+    let (mut places, mut first) = (Vec::new(), 0);
+    for block in function.outputs(model, 0) {
+        match block.shape[..] {
+            [_] => places.extend(of.iter().map(|place| Some((first + place.coordinate, limb(*place))))),
+            _ => {
+                let entry = |row: CoordinatePlace, column: CoordinatePlace| match (row.limb, column.limb) {
+                    (Some(a), Some(b)) if a != b => None,
+                    _ => {
+                        let own = if row.limb.is_some() { limb(row) } else { limb(column) };
+                        Some((first + row.coordinate * count + column.coordinate, own))
+                    }
+                };
+                places.extend(of.iter().flat_map(|row| of.iter().map(|column| entry(*row, *column))));
+            }
+        }
+        first += if block.shape.len() == 1 { count } else { count * count };
+    }
+    (places, first)
 }

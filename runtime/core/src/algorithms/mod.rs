@@ -145,7 +145,10 @@ pub use jacobian_hessian::{jacobian_hessian_product, ForceOnFrame};
 pub use kinematics::{forward_kinematics, frame_acceleration, frame_velocity};
 pub use momentum::{momentum, CentroidalMomentum};
 pub use operational_space::{OperationalSpace, TaskRows};
-pub use reduced_derivatives::{reduced_inverse_dynamics_derivatives, DerivativeBlocks};
+pub use reduced_derivatives::{
+    reduced_inverse_dynamics_derivatives, reduced_inverse_dynamics_derivatives_with_limbs, DerivativeBlocks,
+    LimbSubtrees, Subtree,
+};
 pub use reduced_dynamics::{reduced_inverse_dynamics, reduced_inverse_dynamics_with_limbs, LimbWrenches};
 pub use reduced_gravity::{reduced_gravity_force, reduced_gravity_force_with_limbs, LimbMoments};
 pub use reduced_mass_matrix::reduced_mass_matrix;

@@ -31,7 +31,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use column::Column;
 use field::Fields;
-use subtree::Subtree;
+pub use subtree::Subtree;
 
 /// Inverse dynamics with its derivatives; matrices nv × nv, row-major, a row per torque.
 #[derive(Clone, Debug, PartialEq)]
@@ -108,13 +108,26 @@ impl<T: Real> MotionSweep<'_, T> {
 /// The derivatives, without rotors, friction and springs: of [`inverse_dynamics`](super::inverse_dynamics) of the full robot.
 pub fn reduced_inverse_dynamics_derivatives<T: Real>(
     model: &ReducedModel<T>,
+    motion: [&[T]; 3],
+) -> DerivativeBlocks<T> {
+    reduced_inverse_dynamics_derivatives_with_limbs(model, motion, &mut |_, _| None)
+}
+
+/// `of_all(i, subtree)`: what all limbs for which body `i` stands are to their parent, about its origin in the axes in which it is described, where
+/// `subtree()` is what body `i` is; `None`: body `i` stands for itself.
+pub type LimbSubtrees<'a, T> = dyn FnMut(BodyId, &dyn Fn() -> Subtree<T>) -> Option<Subtree<T>> + 'a;
+
+/// The same of a robot on which some bodies stand for several limbs each: of a limb's coordinates with itself and with those that carry it.
+pub fn reduced_inverse_dynamics_derivatives_with_limbs<T: Real>(
+    model: &ReducedModel<T>,
     [q, qd, qdd]: [&[T]; 3],
+    of_all: &mut LimbSubtrees<'_, T>,
 ) -> DerivativeBlocks<T> {
     let (turns, links) = motions(model, q, qd, qdd);
     let sweep = MotionSweep { model, turns, links, q, qd };
     let nv = model.nv();
     let mut all = DerivativeBlocks::zero(nv);
-    let subtrees = Subtree::all(&sweep, &mut all.tau);
+    let subtrees = Subtree::all(&sweep, &mut all.tau, of_all);
     let mut fields = Fields::new(&sweep);
     for i in (0..model.bodies.len()).rev() {
         let body = sweep.body(i);

@@ -9,7 +9,7 @@ mod matrix;
 mod rigid;
 mod vector;
 
-pub(crate) use composite::Composite;
+pub use composite::Composite;
 pub use matrix::{Mat3, Sym3};
 pub(crate) use rigid::symmetric_product;
 pub use rigid::{ForceVector, MotionVector, SpatialInertia, Transform};

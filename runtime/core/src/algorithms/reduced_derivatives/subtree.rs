@@ -2,7 +2,7 @@
 
 use super::super::reduced_dynamics::along_joint;
 use super::super::reduced_mass_matrix::{of_body, rotated};
-use super::MotionSweep;
+use super::{LimbSubtrees, MotionSweep};
 use crate::model::BodyId;
 use crate::real::Real;
 use crate::reduced::ReducedJoint;
@@ -10,8 +10,9 @@ use crate::spatial::{Composite, ForceVector, Mat3, Vec3};
 use alloc::vec::Vec;
 
 /// In the axes in which the body is described.
-#[derive(Clone)]
-pub(super) struct Subtree<T> {
+#[derive(Clone, Debug)]
+pub struct Subtree<T> {
+    /// As one rigid body.
     pub composite: Composite<T>,
     /// ∫ r° rᵀ dm, r° the velocity relative to the body.
     pub spread: Mat3<T>,
@@ -23,7 +24,7 @@ pub(super) struct Subtree<T> {
 
 impl<T: Real> Subtree<T> {
     /// Of all bodies; torques on the way.
-    pub fn all(sweep: &MotionSweep<'_, T>, tau: &mut [T]) -> Vec<Self> {
+    pub(super) fn all(sweep: &MotionSweep<'_, T>, tau: &mut [T], of_all: &mut LimbSubtrees<'_, T>) -> Vec<Self> {
         let own = |i: BodyId| Subtree::own(sweep, i);
         let mut all: Vec<Self> = (0..sweep.model.bodies.len()).map(own).collect();
         for i in (0..all.len()).rev() {
@@ -31,7 +32,8 @@ impl<T: Real> Subtree<T> {
             let body = sweep.body(i);
             along_joint(sweep.model, body, &all[i].wrench, &mut |k, x| tau[k] = x);
             let Some(parent) = body.parent else { continue };
-            let carried = all[i].to_parent(sweep, i);
+            let passed_on = || all[i].to_parent(sweep, i);
+            let carried = of_all(i, &passed_on).unwrap_or_else(passed_on);
             let onto = &mut all[parent];
             onto.composite = onto.composite.plus(&carried.composite).named(parent);
             onto.spread = onto.spread + carried.spread;
