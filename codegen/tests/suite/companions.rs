@@ -9,8 +9,8 @@ use straightline_codegen::options::{Optimisations, Options};
 use straightline_codegen::program::companion::companion;
 use straightline_codegen::program::input_box::input_box;
 use straightline_codegen::program::optimised;
-use straightline_codegen::scene::{InputRange as Range, JointRanges, Scene};
-use straightline_codegen::{Function, Scalar, Source};
+use straightline_codegen::scene::{Gravity, InputRange as Range, JointRanges, Scene};
+use straightline_codegen::{compile, Function, Scalar, Source};
 use straightline_core::Dd;
 
 const BOTH: [Scalar; 2] = [Scalar::F32, Scalar::F64];
@@ -242,4 +242,23 @@ fn derivatives_in_parts_have_bounds_of_another_kind() {
     assert!(is_by_columns(&case("planar2r.urdf", false, function, Scalar::F64, 1.0)));
     assert!(!is_by_columns(&case("solo12.urdf", true, function, Scalar::F64, 1.0)));
     assert!(!is_by_columns(&case("planar2r.urdf", false, Function::ForwardDynamicsJvp, Scalar::F64, 1.0)));
+}
+
+/// Of one joint ∂q̈/∂q̇ is zero, and without gravity ∂q̈/∂q, too: a bound has nothing to be small against.
+#[test]
+fn columns_that_are_zero_have_bounds() {
+    let robot = "<robot name=\"one\"><link name=\"base\"/><link name=\"arm\"><inertial><origin xyz=\"0.1 0 0\"/><mass value=\"1.5\"/>\
+                 <inertia ixx=\"0.01\" iyy=\"0.01\" izz=\"0.02\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>\
+                 <joint name=\"turn\" type=\"continuous\"><parent link=\"base\"/><child link=\"arm\"/><axis xyz=\"0 1 0\"/></joint></robot>";
+    for (scalar, gravity) in BOTH.into_iter().flat_map(|scalar| [(scalar, true), (scalar, false)]) {
+        let functions = vec![Function::ForwardDynamicsDerivatives];
+        let certify = Some(Effort { companions: true, ..Effort::default() });
+        let mut options = Options { scalar, functions, certify, ..Options::default() };
+        if !gravity {
+            options.scene.gravity = Gravity::Constant([0.0; 3]);
+        }
+        let source = Source::new("one.urdf", robot);
+        let generated = compile(&source, &options).unwrap_or_else(|errors| panic!("{errors}"));
+        assert!(generated.text.contains("fn forward_dynamics_derivatives_error_bound("));
+    }
 }

@@ -224,10 +224,13 @@ impl<'a> AccelerationBound<'a> {
         }
     }
 
-    /// All numbers that are found off by up to a part of the greatest of their port.
+    /// All numbers that are found off by up to a part of the greatest of their port, or of all where a port is zero.
     pub fn off_by(&self, part: f64, random: &mut Random) -> PortState {
+        let greatest = |x: &[Dd]| x.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
+        let of_all = self.found.values().map(|x| greatest(x)).fold(0.0, f64::max);
         let off = |x: &Vec<Dd>, random: &mut Random| {
-            let most = x.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
+            let own = greatest(x);
+            let most = if own > 0.0 { own } else { of_all };
             x.iter().map(|x| *x + Dd::from(part * most * random.symmetric(1.0))).collect()
         };
         self.found.iter().map(|(name, x)| (name.clone(), off(x, random))).collect()
