@@ -6,7 +6,7 @@
 //! ([`residual`](super::residual), without contact). Where q̈ is a result, too, it is a column of its own, of b = τ − h, and H q̈ + h − τ bounds
 //! how far it is off. The other columns are then followed with q̈ that uncertain: their r is that at the exact q̈, which b belongs to.
 //!
-//! Bounds of what a program loses on its way multiply along a chain of joints; these grow with the condition of H once.
+//! Bounds of what a program loses on its way multiply along a chain; these grow with the condition of H once.
 
 use super::companion::OF_ERROR;
 use super::congruence::Congruence;
