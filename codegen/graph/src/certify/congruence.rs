@@ -129,26 +129,19 @@ impl Congruence {
         p.scaled(1.0 - 4.0 * p.format.u, least)
     }
 
-    /// |W D⁻¹ Wᵀ| below its diagonal and on it, as computed.
-    fn sizes(&self, p: &mut Running) -> Sparse {
-        let n = self.d.len();
+    /// An entry of |W D⁻¹ Wᵀ|, as computed.
+    fn size(&self, p: &mut Running, i: usize, j: usize) -> Option<NodeId> {
         let one = p.constant(1.0);
         let entry = |i: usize, k: usize| if i == k { Some(one) } else { self.inverse[i][k] };
-        let mut sizes: Sparse = vec![vec![None; n]; n];
-        for i in 0..n {
-            for j in 0..=i {
-                let terms: Vec<NodeId> = (0..n)
-                    .filter_map(|k| {
-                        let (a, b) = (entry(i, k)?, entry(j, k)?);
-                        let scaled = p.insert(Op::div(b, self.d[k]));
-                        Some(if a == one { scaled } else { p.insert(Op::mul(a, scaled)) })
-                    })
-                    .collect();
-                let Some(sum) = terms.into_iter().reduce(|a, b| p.insert(Op::add(a, b))) else { continue };
-                sizes[i][j] = Some(p.absolute(sum));
-            }
-        }
-        sizes
+        let terms: Vec<NodeId> = (0..self.d.len())
+            .filter_map(|k| {
+                let (a, b) = (entry(i, k)?, entry(j, k)?);
+                let scaled = p.insert(Op::div(b, self.d[k]));
+                Some(if a == one { scaled } else { p.insert(Op::mul(a, scaled)) })
+            })
+            .collect();
+        let sum = terms.into_iter().reduce(|a, b| p.insert(Op::add(a, b)))?;
+        Some(p.absolute(sum))
     }
 
     /// |W D⁻¹ Wᵀ| r for r ≥ 0, by that matrix as computed.
@@ -156,7 +149,7 @@ impl Congruence {
         let n = self.d.len();
         let sizes = match self.direct.take() {
             Some(sizes) => sizes,
-            None => self.sizes(p),
+            None => (0..n).map(|i| (0..=i).map(|j| self.size(p, i, j)).collect()).collect(),
         };
         let entry = |i: usize, j: usize| sizes[i.max(j)][i.min(j)];
         let products = (0..n).map(|i| (0..n).filter_map(|j| Some((entry(i, j)?, r[j]))).collect());
