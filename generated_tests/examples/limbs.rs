@@ -165,13 +165,16 @@ fn main() {
 }
 "#;
 
-/// Bytes of machine code of a function of a program.
-fn code_bytes(program: &std::path::Path, function: &str) -> usize {
+/// Bytes of machine code of the functions of a module of a program, and of the one that calls them.
+fn code_bytes(program: &std::path::Path, module: &str) -> usize {
     let output = std::process::Command::new("nm").arg("-S").arg(program).output().expect("binutils are there");
     let text = String::from_utf8_lossy(&output.stdout).to_string();
-    let line = text.lines().find(|l| l.ends_with(&format!(" {function}"))).expect("the function is not inlined");
-    let size = line.split_whitespace().nth(1).expect("address, size, kind, name");
-    usize::from_str_radix(size, 16).expect("a size in hexadecimal digits")
+    let is_own = |name: &str| name == format!("limbs_{module}") || name.contains(&format!("{}{module}", module.len()));
+    let size = |line: &str| -> Option<usize> {
+        let [_, size, _, name] = line.split_whitespace().collect::<Vec<_>>().try_into().ok()?;
+        is_own(name).then(|| usize::from_str_radix(size, 16).expect("a size in hexadecimal digits"))
+    };
+    text.lines().filter_map(size).sum()
 }
 
 fn main() {
@@ -212,7 +215,7 @@ fn main() {
                 let printed = run(&program, &[]).unwrap_or_else(|e| panic!("{e}"));
                 let [apart, lanes, cold, cold_lanes] =
                     printed.split_whitespace().collect::<Vec<_>>().try_into().expect("four figures");
-                let [bytes, bytes_lanes] = ["limbs_apart", "limbs_lanes"].map(|f| code_bytes(&program, f));
+                let [bytes, bytes_lanes] = ["apart", "lanes"].map(|module| code_bytes(&program, module));
                 let [counts, counts_lanes] = both.each_ref().map(|g| {
                     let report = g.report.function(function).expect("it was generated");
                     format!("{}, {}", report.mul, report.add)

@@ -22,7 +22,7 @@ use straightline_graph::{element_of, Scalar};
 /// What is known of a bound to first order it may fall below by so much.
 pub(super) const FIRST_ORDER: f64 = 0.99;
 /// Forces are off by so much of the greatest, to either side: by far more than rounding, by less than the forces.
-const OFF: [f64; 2] = [-1.0 / 1048576.0, 1.0 / 1024.0];
+pub(super) const OFF: [f64; 2] = [-1.0 / 1048576.0, 1.0 / 1024.0];
 /// Accelerations and reactions are off in any direction by such parts of the greatest.
 pub(super) const ANYWHERE: [f64; 4] = [FAR, 1e-2, 1e-5, FAR];
 /// From there on bounds are great: by this part a solution is far from what is found.
@@ -99,11 +99,11 @@ pub(crate) fn of_acceleration_bound(
 /// A bound of accelerations and reactions, or of derivatives of accelerations, at a state.
 pub(super) struct AccelerationBound<'a> {
     name: &'a str,
-    graph: &'a Graph,
+    pub graph: &'a Graph,
     bound: &'a Graph,
     scalar: Scalar,
     state: PortState,
-    exact: PortState,
+    pub exact: PortState,
     /// In the function's own scalar.
     pub found: PortState,
 }
@@ -276,7 +276,7 @@ pub(super) fn as_f64(numbers: &[Dd]) -> Vec<f64> {
 }
 
 /// The results of a program by the ports that they belong to.
-fn by_port<T>(ports: &[Port], results: Vec<T>) -> BTreeMap<String, Vec<T>> {
+pub(super) fn by_port<T>(ports: &[Port], results: Vec<T>) -> BTreeMap<String, Vec<T>> {
     let mut results = results.into_iter();
     ports.iter().map(|port| (port.name.clone(), results.by_ref().take(port.len()).collect())).collect()
 }

@@ -1,7 +1,7 @@
 //! Equations that derivatives of accelerations are judged by, and bounds that are made of them.
 
-use super::bounds::{as_f64, holds, least_provable, AccelerationBound, ANYWHERE, FAR, FIRST_ORDER};
-use super::{agreeing, compare, difference, inputs, of_ports, with_sizes, Disagreement, States, STATES};
+use super::bounds::{as_f64, by_port, holds, least_provable, AccelerationBound, ANYWHERE, FAR, FIRST_ORDER, OFF};
+use super::{agreeing, compare, difference, inputs, of_ports, with_sizes, Disagreement, PortState, States, STATES};
 use crate::equations::reduce::longest_lever;
 use crate::equations::Robot;
 use crate::function::{Forms, ForwardDynamicsMethod, Function};
@@ -71,7 +71,15 @@ pub(crate) fn of_column_bound(
         let all = evaluate(&system.graph, &given);
         let factor = Ltdl::factor(&robot.model, &all[all.len() - nv * nv..]);
         let unit = |k: usize| (0..nv).map(|i| if i == k { Dd::ONE } else { Dd::ZERO }).collect::<Vec<Dd>>();
-        let inverse: Vec<Vec<f64>> = (0..nv).map(|k| as_f64(&factor.solve(&unit(k)))).collect();
+        let inverse: Vec<Vec<Dd>> = (0..nv).map(|k| factor.solve(&unit(k))).collect();
+        for (equation, off) in (0..nv).flat_map(|k| OFF.map(|off| (k, off))) {
+            for is_own in [true, false] {
+                let is_asked = |k: usize| (system.finds_accelerations && k == 0) == is_own;
+                let columns = (0..system.columns.len()).filter(|k| is_asked(*k));
+                at.asked(&one_equation_off(&at, system, columns, (&inverse, equation, off)))?;
+            }
+        }
+        let inverse: Vec<Vec<f64>> = inverse.iter().map(|row| as_f64(row)).collect();
         let bounds: Vec<f64> =
             graph.outputs.iter().flat_map(|port| at.of(&of_found, port).cloned()).flatten().collect();
         for column in &system.columns {
@@ -84,4 +92,26 @@ pub(crate) fn of_column_bound(
         at.is_definite(of_found.get("smallest_eigenvalue").map(|x| x[0]), &inverse)?;
     }
     Ok(())
+}
+
+/// The exact results with one equation of each of these columns off, by what moves the column by such a part of itself: what bounds it is hardly
+/// greater than what it is off by.
+fn one_equation_off(
+    at: &AccelerationBound<'_>,
+    system: &ColumnSystem,
+    columns: impl Iterator<Item = usize>,
+    (inverse, equation, off): (&[Vec<Dd>], usize, f64),
+) -> PortState {
+    let ports = &at.graph.outputs;
+    let mut all: Vec<Dd> = ports.iter().flat_map(|port| at.exact[&port.name].iter().copied()).collect();
+    let greatest = |x: &mut dyn Iterator<Item = Dd>| x.map(|x| x.hi().abs()).fold(0.0, f64::max);
+    let of_all = greatest(&mut all.iter().copied());
+    for k in columns {
+        let (column, moved) = (&system.columns[k], &inverse[(equation + k) % inverse.len()]);
+        let own = greatest(&mut column.iter().map(|k| all[*k]));
+        let size = if own > 0.0 { own } else { of_all };
+        let by = Dd::from(off * size / greatest(&mut moved.iter().copied()));
+        column.iter().zip(moved).for_each(|(k, x)| all[*k] += *x * by);
+    }
+    by_port(ports, all)
 }
