@@ -17,7 +17,7 @@ use straightline_graph::trace::trace;
 pub(crate) struct SolvedColumns {
     /// Of each, its place among all results of the function.
     wanted: Vec<usize>,
-    outputs: Vec<Port>,
+    pub outputs: Vec<Port>,
     columns: Vec<Vec<usize>>,
     finds_accelerations: bool,
     /// How many results the function has.

@@ -57,7 +57,8 @@ pub(crate) fn checked_companion(
 ) -> Result<(StateBound, Option<Plainer>), Disagreement> {
     match function.spec().judged {
         Judged::ByResidual => of_accelerations(robot, options, &Mode::alone(), function.name(), graph),
-        Judged::ByColumns => match SolvedColumns::of(robot, function, options) {
+        // packed results are no columns
+        Judged::ByColumns => match SolvedColumns::of(robot, function, options).filter(|c| c.outputs == graph.outputs) {
             Some(columns) => match of_columns(robot, options, (function, &columns), graph)? {
                 (Err(_), _) => of_errors(robot, options, function.name(), graph, bits(options)),
                 made => Ok(made),

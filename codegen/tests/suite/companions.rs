@@ -2,6 +2,7 @@
 
 use straightline_codegen::certify::companion::{state_bound, Bits};
 use straightline_codegen::certify::{certify, search, Effort, Interval};
+use straightline_codegen::choices::WrittenEntries;
 use straightline_codegen::equations::Robot;
 use straightline_codegen::expr::{evaluate, Graph};
 use straightline_codegen::model::{self, ModelOptions};
@@ -250,10 +251,13 @@ fn columns_that_are_zero_have_bounds() {
     let robot = "<robot name=\"one\"><link name=\"base\"/><link name=\"arm\"><inertial><origin xyz=\"0.1 0 0\"/><mass value=\"1.5\"/>\
                  <inertia ixx=\"0.01\" iyy=\"0.01\" izz=\"0.02\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>\
                  <joint name=\"turn\" type=\"continuous\"><parent link=\"base\"/><child link=\"arm\"/><axis xyz=\"0 1 0\"/></joint></robot>";
-    for (scalar, gravity) in BOTH.into_iter().flat_map(|scalar| [(scalar, true), (scalar, false)]) {
+    let of = |scalar| [true, false].map(|gravity| (scalar, gravity, WrittenEntries::All));
+    // packed, without the zeros
+    let packed = [(Scalar::F64, true, WrittenEntries::Nonzeros)];
+    for (scalar, gravity, entries) in BOTH.into_iter().flat_map(of).chain(packed) {
         let functions = vec![Function::ForwardDynamicsDerivatives];
         let certify = Some(Effort { companions: true, ..Effort::default() });
-        let mut options = Options { scalar, functions, certify, ..Options::default() };
+        let mut options = Options { scalar, functions, certify, entries, ..Options::default() };
         if !gravity {
             options.scene.gravity = Gravity::Constant([0.0; 3]);
         }
