@@ -5,12 +5,11 @@ use crate::equations::Robot;
 use crate::function::{Forms, ForwardDynamicsMethod, Function, Quantity, SelectedRows};
 use crate::options::{Optimisations, Options};
 use crate::program::equivalence::{self, Disagreement, Plainer};
-use crate::program::passed;
+use crate::program::{simplified, OF_SYSTEM};
 use std::collections::BTreeMap;
 use straightline_core::Real;
 use straightline_graph::certify::columns::{ColumnSystem, MASS_MATRIX};
 use straightline_graph::expr::Port;
-use straightline_graph::pass::{dead_code, sums, unread_inputs};
 use straightline_graph::trace::trace;
 
 /// The results of a function that a scene wants, as columns that are solved for.
@@ -99,14 +98,8 @@ impl SolvedColumns {
             self.left(function, &forms, &bound, &found.concat())
         });
         let is_velocity = |port: &Port| Quantity::of(port) == Some(Quantity::Velocity);
-        let check = |pass, graph| passed(pass, "the equations of derivatives", graph);
-        let graph = check("system: dead code", dead_code(&check("system: traced", traced)));
-        let graph = unread_inputs(graph, |port| is_optional(port) || is_velocity(port));
-        let graph = check("system: unread inputs", graph);
-        let graph = match optimisations.sums {
-            true => check("system: dead code", dead_code(&check("system: sums", sums(&graph)))),
-            false => graph,
-        };
+        let unused = |port: &Port| is_optional(port) || is_velocity(port);
+        let graph = simplified(("the equations of derivatives", OF_SYSTEM), traced, unused, optimisations);
         ColumnSystem { graph, columns: self.columns.clone(), finds_accelerations: self.finds_accelerations }
     }
 

@@ -32,7 +32,7 @@ use crate::options::{Optimisations, Options};
 use crate::program::choose::price;
 use crate::program::equivalence::{Disagreement, Plainer};
 use crate::program::nonzeros::NonzeroEntries;
-use straightline_graph::expr::{verify, Graph};
+use straightline_graph::expr::{verify, Graph, Port};
 use straightline_graph::pass::{dead_code, order, substitute, sums, unread_inputs};
 use straightline_graph::schedule::{schedule, Schedule};
 
@@ -156,6 +156,26 @@ fn optimised_with(
         }
     }
     (graph, choice)
+}
+
+/// What [`simplified`] calls its passes of equations that results are judged by.
+pub(crate) const OF_SYSTEM: [&str; 4] =
+    ["system: traced", "system: dead code", "system: unread inputs", "system: sums"];
+
+/// Equations as they were traced without what no result needs, without inputs that are not read and need not be, and with fewer sums.
+pub(crate) fn simplified(
+    (program, [as_traced, dead, unread, fewer]): (&str, [&'static str; 4]),
+    traced: Graph,
+    unused: impl Fn(&Port) -> bool,
+    optimisations: Optimisations,
+) -> Graph {
+    let check = |pass, graph| passed(pass, program, graph);
+    let graph = check(dead, dead_code(&check(as_traced, traced)));
+    let graph = check(unread, unread_inputs(graph, unused));
+    match optimisations.sums {
+        true => check(dead, dead_code(&check(fewer, sums(&graph)))),
+        false => graph,
+    }
 }
 
 /// What a pass made, if it kept what graphs promise.

@@ -16,7 +16,7 @@ use crate::identifier::module_name;
 use crate::options::{FormChoices, Optimisations, Options};
 use crate::program::choose::choose;
 use crate::program::equivalence::{self, Disagreement, Plainer};
-use crate::program::passed;
+use crate::program::{simplified, OF_SYSTEM};
 use crate::scene::contact::{ContactItem, EnvironmentKind, LoopItem, ModeItem, SurfaceItem};
 use crate::scene::Scene;
 use equations::{Added, EquationForm, FormsOfContacts};
@@ -25,7 +25,6 @@ use straightline_core::model::Model;
 use straightline_core::{Dd, Dual, Real};
 use straightline_graph::certify::residual::OUTPUTS;
 use straightline_graph::expr::{Graph, Port};
-use straightline_graph::pass::{dead_code, sums, unread_inputs};
 use straightline_graph::trace::{trace, Expr};
 use straightline_graph::Scalar;
 
@@ -244,7 +243,6 @@ pub(crate) fn optimised(
     function: ContactFunction,
     optimisations: Optimisations,
 ) -> Graph {
-    let check = |pass, graph| passed(pass, function.name(), graph);
     let chosen = chosen(robot, options, function.spec().form, optimisations);
     let robot = chosen.as_ref().unwrap_or(robot);
     let base = function.spec().base;
@@ -268,12 +266,8 @@ pub(crate) fn optimised(
         let may_rest = matches!(Quantity::of(port), Some(Velocity | DriveState | DriveInput));
         is_optional(port) || may_rest || names.contains(&port.name)
     };
-    let graph = check("contact: dead code", dead_code(&check("contact: traced", traced)));
-    let graph = check("contact: unread inputs", unread_inputs(graph, unused));
-    match optimisations.sums {
-        true => check("contact: dead code", dead_code(&check("contact: sums", sums(&graph)))),
-        false => graph,
-    }
+    let passes = ["contact: traced", "contact: dead code", "contact: unread inputs", "contact: sums"];
+    simplified((function.name(), passes), traced, unused, optimisations)
 }
 
 /// The robot in the form that takes a function the fewest operations, of those in which contacts can be described.
@@ -321,14 +315,7 @@ pub fn system(robot: &Robot, options: &Options, mode: &Mode, optimisations: Opti
     yielding.resize(m, false);
     let is_velocity = |port: &Port| Quantity::of(port) == Some(Quantity::Velocity);
     let unused = |port: &Port| is_optional(port) || is_velocity(port) || names.contains(&port.name);
-    let check = |pass, graph| passed(pass, "the equations of motion", graph);
-    let graph = check("system: dead code", dead_code(&check("system: traced", traced)));
-    let graph = check("system: unread inputs", unread_inputs(graph, unused));
-    let graph = match optimisations.sums {
-        true => check("system: dead code", dead_code(&check("system: sums", sums(&graph)))),
-        false => graph,
-    };
-    (graph, yielding)
+    (simplified(("the equations of motion", OF_SYSTEM), traced, unused, optimisations), yielding)
 }
 
 /// A system with its flags of rows that yield.

@@ -24,9 +24,9 @@ pub(super) const FIRST_ORDER: f64 = 0.99;
 /// Forces are off by so much of the greatest, to either side: by far more than rounding, by less than the forces.
 pub(super) const OFF: [f64; 2] = [-1.0 / 1048576.0, 1.0 / 1024.0];
 /// Accelerations and reactions are off in any direction by such parts of the greatest.
-pub(super) const ANYWHERE: [f64; 4] = [FAR, 1e-2, 1e-5, FAR];
+const ANYWHERE: [f64; 4] = [FAR, 1e-2, 1e-5, FAR];
 /// From there on bounds are great: by this part a solution is far from what is found.
-pub(super) const FAR: f64 = 0.3;
+const FAR: f64 = 0.3;
 /// The greatest bound of what is found is such a part of it at most, or so many ulps, where a format is short.
 const SMALL: f64 = 1.0 / 1024.0;
 const LOST: f64 = 1048576.0;
@@ -79,13 +79,7 @@ pub(crate) fn of_acceleration_bound(
         if !bound.inputs.iter().all(is_there) {
             return Ok(());
         }
-        let of_found = at.asked(&at.found)?;
-        for part in ANYWHERE {
-            let of_other = at.asked(&at.off_by(part, &mut states.random))?;
-            if part >= FAR {
-                of_found.iter().try_for_each(|(port, bounds)| at.is_small((port, bounds), &of_other[port]))?;
-            }
-        }
+        let of_found = at.of_found(&mut states.random)?;
         let Some(columns) = at.of_forces()? else { continue };
         at.is_provable(system, &of_found, &columns)?;
         if let [port] = &graph.outputs[..] {
@@ -126,6 +120,18 @@ impl<'a> AccelerationBound<'a> {
         AccelerationBound { name, graph, bound, scalar, state, exact, found }
     }
 
+    /// What it says of what is found: right, and far below what it says of solutions that are off in any direction, which is right, too.
+    pub fn of_found(&self, random: &mut Random) -> Result<BTreeMap<String, Vec<f64>>, Disagreement> {
+        let of_found = self.asked(&self.found)?;
+        for part in ANYWHERE {
+            let of_other = self.asked(&self.off_by(part, random))?;
+            if part >= FAR {
+                of_found.iter().try_for_each(|(port, bounds)| self.is_small((port, bounds), &of_other[port]))?;
+            }
+        }
+        Ok(of_found)
+    }
+
     /// What it says of a solution, which is right.
     pub fn asked(&self, solution: &PortState) -> Result<BTreeMap<String, Vec<f64>>, Disagreement> {
         let given = self.given(solution);
@@ -151,7 +157,7 @@ impl<'a> AccelerationBound<'a> {
 
     /// Whether bounds of what is found are far below both what it is and what bounds it far from there: one that takes a wrong part for what
     /// is left of the equations is great where nothing is left, and too small where the two are nearly the same.
-    pub fn is_small(&self, (port, bounds): (&String, &[f64]), of_other: &[f64]) -> Result<(), Disagreement> {
+    fn is_small(&self, (port, bounds): (&String, &[f64]), of_other: &[f64]) -> Result<(), Disagreement> {
         let Some(found) = port.strip_suffix(OF_ERROR).and_then(|port| self.found.get(port)) else { return Ok(()) };
         let greatest = |x: &mut dyn Iterator<Item = f64>| x.fold(0.0, f64::max);
         let size = greatest(&mut found.iter().map(|x| x.hi().abs())).max(greatest(&mut of_other.iter().copied()));
@@ -225,7 +231,7 @@ impl<'a> AccelerationBound<'a> {
     }
 
     /// All numbers that are found off by up to a part of the greatest of their port, or of all where a port is zero.
-    pub fn off_by(&self, part: f64, random: &mut Random) -> PortState {
+    fn off_by(&self, part: f64, random: &mut Random) -> PortState {
         let greatest = |x: &[Dd]| x.iter().map(|x| x.hi().abs()).fold(0.0, f64::max);
         let of_all = self.found.values().map(|x| greatest(x)).fold(0.0, f64::max);
         let off = |x: &Vec<Dd>, random: &mut Random| {
