@@ -97,6 +97,18 @@ impl LimbForm {
     }
 }
 
+/// How columns of matrices are computed that a function solves for, all by the same operations.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ColumnForm {
+    /// As lanes of loops where that takes hardly more operations, and no machine is named whose registers the order of operations is made for.
+    #[default]
+    Auto,
+    /// Each by itself.
+    Apart,
+    /// As lanes of loops wherever four are alike: least code.
+    Lanes,
+}
+
 /// The functions over lanes and batches beside the plain ones: where the drivers of the batches come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Lanes {
@@ -183,6 +195,11 @@ choices! {
         "lanes" Lanes "as lanes of one body: least code, and least time where there are four",
         "auto" Auto "as lanes where that is measured to be faster, otherwise apart",
         "rolled" Rolled "one loop over them with a row of constants each: least code on microcontrollers",
+    }
+    ColumnForm "form of columns that are alike" {
+        "auto" Auto "as lanes of one loop where that takes hardly more operations",
+        "apart" Apart "each by itself",
+        "lanes" Lanes "as lanes of one loop wherever four are alike: least code",
     }
     Lanes "home of the batches" {
         "standalone" Standalone "core alone; the vector instructions that the crate is compiled for",

@@ -1,17 +1,22 @@
-//! What identical limbs as lanes of one body take, against each by itself.
+//! What identical limbs as lanes of one body take, and columns that are solved for as lanes of one loop, against each by itself.
 //!
-//! `cargo run -p straightline-generated-tests --example limbs [FUNCTION…]`; recorded in `record/2026-11-21-limbs.md`.
+//! `cargo run -p straightline-generated-tests --example limbs [FUNCTION…]`; recorded in `record/2026-11-21-limbs.md` and, of columns, in
+//! `record/2026-11-26-columns.md`.
 //!
-//! The functions as they are generated with `limbs = "apart"` and `limbs = "lanes"`, in one program that first checks that their
+//! The functions as they are generated with `limbs` or `columns = "apart"` and `"lanes"`, in one program that first checks that their
 //! results agree, then times calls warm and cold; bytes of machine code by `nm -S`.
 
-use straightline_codegen::choices::LimbForm;
+use straightline_codegen::choices::{ColumnForm, LimbForm};
 use straightline_codegen::model::ModelOptions;
 use straightline_codegen::{compile, Function, Generated, Options, Source};
 use straightline_generated_tests::standalone::{run, Folder};
 
-const ROBOTS: [(&str, &str); 3] =
-    [("hyq.urdf", "HyQ"), ("solo12.urdf", "Solo12"), ("simple_humanoid.urdf", "simple humanoid")];
+const ROBOTS: [(&str, &str); 4] = [
+    ("panda.urdf", "Panda"),
+    ("hyq.urdf", "HyQ"),
+    ("solo12.urdf", "Solo12"),
+    ("simple_humanoid.urdf", "simple humanoid"),
+];
 
 /// A body with so many legs of three joints, left and right ones mirrored.
 fn walker(legs: usize) -> String {
@@ -46,11 +51,17 @@ fn walker(legs: usize) -> String {
     text + "</robot>"
 }
 
-fn generated(text: &str, function: Function, limbs: LimbForm, fma: bool) -> Generated {
+fn generated(text: &str, case: &Case, in_lanes: bool, fma: bool) -> Generated {
+    let (limbs, columns) = match (in_lanes, case.is_of_columns) {
+        (true, true) => (LimbForm::Apart, ColumnForm::Lanes),
+        (true, false) => (LimbForm::Lanes, ColumnForm::Apart),
+        (false, _) => (LimbForm::Apart, ColumnForm::Apart),
+    };
     let options = Options {
-        functions: vec![function],
-        model: ModelOptions { floating_base: true, ..ModelOptions::default() },
+        functions: vec![case.function],
+        model: ModelOptions { floating_base: !text.contains("name=\"panda\""), ..ModelOptions::default() },
         limbs,
+        columns,
         fma,
         ..Options::default()
     };
@@ -60,6 +71,8 @@ fn generated(text: &str, function: Function, limbs: LimbForm, fma: bool) -> Gene
 /// A function, and what the program has to write of it.
 struct Case {
     function: Function,
+    /// Whether its columns are lanes, not limbs.
+    is_of_columns: bool,
     call: &'static str,
     inputs: &'static str,
     state: &'static str,
@@ -73,9 +86,16 @@ const MOTION: &str = "([f64; apart::NQ], [f64; apart::NV], [f64; apart::NV])";
 const OF_MOTION: &str =
     "(std::array::from_fn(|_| next()), std::array::from_fn(|_| next()), std::array::from_fn(|_| next()))";
 
-const CASES: [Case; 3] = [
+/// Three matrices and a list.
+const SQUARES: &str =
+    "([[f64; apart::NV]; apart::NV], [[f64; apart::NV]; apart::NV], [[f64; apart::NV]; apart::NV], [f64; apart::NV])";
+const NO_SQUARES: &str =
+    "([[0.0; apart::NV]; apart::NV], [[0.0; apart::NV]; apart::NV], [[0.0; apart::NV]; apart::NV], [0.0; apart::NV])";
+
+const CASES: [Case; 4] = [
     Case {
         function: Function::InverseDynamics,
+        is_of_columns: false,
         call: "(&x.0, &x.1, &x.2, y)",
         inputs: MOTION,
         state: OF_MOTION,
@@ -85,6 +105,7 @@ const CASES: [Case; 3] = [
     },
     Case {
         function: Function::GravityForce,
+        is_of_columns: false,
         call: "(x, y)",
         inputs: "[f64; apart::NQ]",
         state: "std::array::from_fn(|_| next())",
@@ -94,11 +115,22 @@ const CASES: [Case; 3] = [
     },
     Case {
         function: Function::InverseDynamicsDerivatives,
+        is_of_columns: false,
         call: "(&x.0, &x.1, &x.2, &mut y.0, &mut y.1, &mut y.2, &mut y.3)",
         inputs: MOTION,
         state: OF_MOTION,
-        output: "([[f64; apart::NV]; apart::NV], [[f64; apart::NV]; apart::NV], [[f64; apart::NV]; apart::NV], [f64; apart::NV])",
-        zero: "([[0.0; apart::NV]; apart::NV], [[0.0; apart::NV]; apart::NV], [[0.0; apart::NV]; apart::NV], [0.0; apart::NV])",
+        output: SQUARES,
+        zero: NO_SQUARES,
+        flat: "[y.0.as_flattened(), y.1.as_flattened(), y.2.as_flattened(), &y.3].concat()",
+    },
+    Case {
+        function: Function::ForwardDynamicsDerivatives,
+        is_of_columns: true,
+        call: "(&x.0, &x.1, &x.2, &mut y.3, &mut y.0, &mut y.1, &mut y.2)",
+        inputs: MOTION,
+        state: OF_MOTION,
+        output: SQUARES,
+        zero: NO_SQUARES,
         flat: "[y.0.as_flattened(), y.1.as_flattened(), y.2.as_flattened(), &y.3].concat()",
     },
 ];
@@ -189,8 +221,11 @@ fn main() {
         .map(|(file, name)| (std::fs::read_to_string(files.join(file)).expect("the file is there"), name.to_string()));
     let walkers = [3, 5, 6].map(|legs| (walker(legs), format!("{legs} legs")));
     for (text, name) in of_files.into_iter().chain(walkers) {
-        for Case { function, call, inputs, state, output, zero, flat } in CASES {
-            if !(wanted.is_empty() || wanted.iter().any(|name| *name == function.name())) {
+        for case in CASES {
+            let Case { function, call, inputs, state, output, zero, flat, .. } = case;
+            // an arm has no limbs that are alike
+            let is_of_robot = case.is_of_columns || name != "Panda";
+            if !is_of_robot || !(wanted.is_empty() || wanted.iter().any(|name| *name == function.name())) {
                 continue;
             }
             for (instructions, fma, flags) in [
@@ -199,7 +234,7 @@ fn main() {
                 ("this machine's", false, vec!["-Ctarget-cpu=native"]),
                 ("this machine's, fused", true, vec!["-Ctarget-cpu=native"]),
             ] {
-                let both = [LimbForm::Apart, LimbForm::Lanes].map(|limbs| generated(&text, function, limbs, fma));
+                let both = [false, true].map(|in_lanes| generated(&text, &case, in_lanes, fma));
                 let source = format!(
                     "#![allow(warnings)]\nmod apart {{\n{}\n}}\nmod lanes {{\n{}\n}}\ntype Inputs = {inputs};\n\
                      type Output = {output};\n{}",

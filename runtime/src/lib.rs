@@ -38,6 +38,7 @@
 //! | `rules = "exact"`: Which rewrite rules may be used: `"all"`, `"exact"` | `"all"` |
 //! | `forward_dynamics = "articulated-body"`: How forward dynamics is computed: `"cheaper"`, `"articulated-body"`, `"factorisation"` | `"cheaper"` |
 //! | `limbs = "auto"`: How identical limbs are computed: `"apart"`, `"lanes"`, `"auto"`, `"rolled"` | `"apart"` |
+//! | `columns = "apart"`: How columns that a function solves for are computed: `"auto"`, `"apart"`, `"lanes"` | `"auto"` |
 //! | `entries = "nonzeros"`: Which entries of matrices functions write, and whether constants beside them say which can be non-zero: `"all"`, `"patterns"`, `"nonzeros"` | `"all"` |
 //! | `target = "cortex-m4f"`: The machine that code is made for: short sines in f32 where it computes one angle at a time, and an order for its registers: `"cortex-m0plus"`, `"cortex-m3"`, `"cortex-m4f"`, `"cortex-m7"`, `"cortex-m33"`, `"rv32imac"`, `"rv32imafc"`, `"aarch64"`, `"x86-64-v3"` | any machine |
 //! | `memory = "tcm"`: The memory that code runs from on the machine of `target`: `"flash"`, `"tcm"` | `"flash"` |

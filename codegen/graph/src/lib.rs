@@ -9,6 +9,7 @@ mod number;
 pub mod certify;
 pub mod expr;
 pub mod fixed;
+pub mod lanes;
 pub mod pass;
 pub mod rounding;
 pub mod schedule;

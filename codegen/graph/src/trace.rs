@@ -38,7 +38,7 @@ pub fn trace_all(rules: RuleSet, inputs: Vec<Port>, algorithm: impl FnOnce(&[Vec
     builder.finish(vec![Port::new("results", &[results.len()])], results)
 }
 
-fn written(
+pub(crate) fn written(
     rules: RuleSet,
     inputs: Vec<Port>,
     algorithm: impl FnOnce(&[Vec<Expr>]) -> Vec<Expr>,

@@ -10,12 +10,19 @@ pub(crate) mod traced;
 pub use robot::Robot;
 
 use crate::equations::forward_method::MethodChoice;
-use crate::function::{may_be_articulated, Family, ForwardDynamicsMethod, Function};
+use crate::function::{may_be_articulated, AlikeColumns, Family, Forms, ForwardDynamicsMethod, Function};
 use crate::scene::Scene;
 use straightline_core::model::Frame;
 use straightline_graph::expr::{Graph, RuleSet};
+use straightline_graph::lanes::{self, LaneTemplate, Tracer};
 use straightline_graph::trace::{trace, Expr};
 use straightline_graph::Scalar;
+
+impl AlikeColumns<Expr> for Tracer {
+    fn of(&self, columns: &[Vec<Expr>], one: &dyn Fn(&[Expr]) -> Vec<Expr>) -> Vec<Vec<Expr>> {
+        self.columns(columns, one)
+    }
+}
 
 impl Function {
     /// All its results over expressions, in a scene; inside a trace. `reduced`: by the reduced robot, where it serves.
@@ -28,10 +35,45 @@ impl Function {
         scene: &Scene,
         inputs: &[Vec<Expr>],
     ) -> Vec<Expr> {
+        self.equations_with(robot, frames, method, reduced, scene, inputs, None)
+    }
+
+    /// The same, where columns that are alike are computed by what is given.
+    #[allow(clippy::too_many_arguments)]
+    fn equations_with(
+        self,
+        robot: &Robot,
+        frames: &[String],
+        method: ForwardDynamicsMethod,
+        reduced: bool,
+        scene: &Scene,
+        inputs: &[Vec<Expr>],
+        columns: Option<&dyn AlikeColumns<Expr>>,
+    ) -> Vec<Expr> {
         let bound = scene.bind(self, robot, inputs);
         let frame = |name: &String| bound.model.frame(name).expect("frames were checked against the model");
         let frames: Vec<&Frame<Expr>> = frames.iter().map(frame).collect();
-        self.evaluate_on(&bound.forms(reduced, &frames, scene.rows_of(self), method), &bound.arguments)
+        let forms = Forms { columns, ..bound.forms(reduced, &frames, scene.rows_of(self), method) };
+        self.evaluate_on(&forms, &bound.arguments)
+    }
+
+    /// Its equations by this method of forward dynamics, with columns that are computed alike as lanes of loops; `None` if there are none.
+    pub(crate) fn trace_in_lanes(
+        self,
+        robot: &Robot,
+        frames: &[String],
+        method: ForwardDynamicsMethod,
+        rules: RuleSet,
+        reduced: bool,
+        scene: &Scene,
+    ) -> Option<LaneTemplate> {
+        let ports = scene.ports(self, &robot.model, frames);
+        let frames = scene.frames_of(self, frames);
+        let (wanted, outputs) = scene.select(self, &robot.model, frames.len());
+        lanes::traced(rules, ports, outputs, |inputs, tracer| {
+            let results = self.equations_with(robot, frames, method, reduced, scene, inputs, Some(tracer));
+            wanted.iter().map(|k| results[*k]).collect()
+        })
     }
 
     /// Its equations for a robot in a scene, and for [`ForwardDynamicsMethod::Cheaper`] which form of forward dynamics that

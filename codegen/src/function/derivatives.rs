@@ -34,7 +34,7 @@ impl RobotFunction for InverseDynamicsDerivatives {
                 .slope_with_friction("τ", Quantity::Acceleration),
             Output::new("tau", &[Velocities], "generalized forces \\[N·m or N\\]"),
         ],
-        in_lanes: InLanes::WhereFaster,
+        in_lanes: InLanes::WhereFaster(2),
         ..Spec::DERIVED
     };
 
@@ -165,7 +165,8 @@ impl<T: Real> Forms<'_, T> {
         let model = self.model.map(f);
         let reduced = self.reduced.map(|forms| forms.map(|form| form.map(f)));
         let reduced = reduced.as_ref().map(|[torques, composite]| [torques, composite]);
-        run(&Forms { model: &model, reduced, frames: &[], rows: self.rows, method: self.method, limbs: None })
+        let (rows, method) = (self.rows, self.method);
+        run(&Forms { model: &model, reduced, frames: &[], rows, method, limbs: None, columns: None })
     }
 
     /// τ = H q̈ + h and its derivatives.

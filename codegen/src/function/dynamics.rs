@@ -24,7 +24,7 @@ impl RobotFunction for InverseDynamics {
         inputs: &[Quantity::Configuration, Quantity::Velocity, Quantity::Acceleration],
         outputs: &[Output::new("tau", &[Velocities], "generalized forces \\[N·m or N\\]")],
         form: Form::InverseDynamics,
-        in_lanes: InLanes::WhereFaster,
+        in_lanes: InLanes::WhereFaster(3),
         ..Spec::DEFAULT
     };
 
@@ -62,7 +62,7 @@ impl RobotFunction for BiasForce {
         inputs: &[Quantity::Configuration, Quantity::Velocity],
         outputs: &[Output::new("h", &[Velocities], "generalized forces \\[N·m or N\\]")],
         form: Form::BiasForce,
-        in_lanes: InLanes::WhereFaster,
+        in_lanes: InLanes::WhereFaster(3),
         ..Spec::DEFAULT
     };
 
@@ -81,7 +81,7 @@ impl RobotFunction for VelocityForce {
         inputs: &[Quantity::Configuration, Quantity::Velocity],
         outputs: &[Output::new("c", &[Velocities], "generalized forces \\[N·m or N\\]")],
         form: Form::BiasForce,
-        in_lanes: InLanes::WhereFaster,
+        in_lanes: InLanes::WhereFaster(3),
         ..Spec::DEFAULT
     };
 

@@ -34,6 +34,14 @@ pub struct Forms<'a, T> {
     pub method: ForwardDynamicsMethod,
     /// Limbs in lanes, of the reduced robot.
     pub limbs: Option<RefCell<LimbSums<'a, T>>>,
+    /// What computes columns that are alike, if they are to be lanes.
+    pub columns: Option<&'a dyn AlikeColumns<T>>,
+}
+
+/// Computes columns that are alike: it knows of them what one of them does not.
+pub trait AlikeColumns<T> {
+    /// `one` of each of these columns.
+    fn of(&self, columns: &[Vec<T>], one: &dyn Fn(&[T]) -> Vec<T>) -> Vec<Vec<T>>;
 }
 
 /// What the bodies that stand for several limbs each pass on to those that carry them, all limbs together: see
@@ -51,7 +59,7 @@ pub struct LimbSums<'a, T> {
 impl<'a, T: Real> Forms<'a, T> {
     /// By the model alone.
     pub fn plain(model: &'a Model<T>, frames: &'a [&'a Frame<T>], method: ForwardDynamicsMethod) -> Self {
-        Forms { model, reduced: None, frames, rows: SelectedRows::ALL, method, limbs: None }
+        Forms { model, reduced: None, frames, rows: SelectedRows::ALL, method, limbs: None, columns: None }
     }
 
     pub(super) fn with_limbs<R>(&self, f: impl FnOnce(&mut LimbSums<'_, T>) -> R) -> R {
@@ -60,6 +68,14 @@ impl<'a, T: Real> Forms<'a, T> {
             None => {
                 f(&mut LimbSums { wrench: &mut |_, _| None, first_moment: &mut |_, _| None, subtree: &mut |_, _| None })
             }
+        }
+    }
+
+    /// `one` of each of these columns, which are computed alike.
+    pub(super) fn columns(&self, columns: &[Vec<T>], one: &dyn Fn(&[T]) -> Vec<T>) -> Vec<Vec<T>> {
+        match self.columns {
+            Some(alike) => alike.of(columns, one),
+            None => columns.iter().map(|column| one(column)).collect(),
         }
     }
 
@@ -119,7 +135,8 @@ impl<'a, T: Real> Forms<'a, T> {
         let weightless = |form: &ReducedModel<T>| ReducedModel { gravity: Vec3::zero(), ..form.clone() };
         let reduced = self.reduced.map(|forms| forms.map(weightless));
         let reduced = reduced.as_ref().map(|[torques, composite]| [torques, composite]);
-        run(&Forms { model: &model, reduced, frames: &[], rows: self.rows, method: self.method, limbs: None })
+        let (rows, method, columns) = (self.rows, self.method, self.columns);
+        run(&Forms { model: &model, reduced, frames: &[], rows, method, limbs: None, columns })
     }
 
     /// H(q), by rows.

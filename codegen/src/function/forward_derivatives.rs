@@ -245,11 +245,11 @@ impl<T: Real> Solution<'_, '_, T> {
         if let Some(base) = base {
             base.leave_out(&mut of_torques);
         }
-        let solved = |slopes: Vec<T>| {
-            let column = |k: usize| (0..nv).map(|i| -slopes[i * nv + k]).collect::<Vec<T>>();
-            by_rows(&(0..nv).map(|k| self.of(&column(k))).collect::<Vec<_>>())
-        };
-        let (mut by_position, mut by_velocity) = (solved(of_torques.dtau_dq), solved(of_torques.dtau_dqd));
+        let column = |slopes: &[T], k: usize| (0..nv).map(|i| -slopes[i * nv + k]).collect::<Vec<T>>();
+        let columns = [&of_torques.dtau_dq, &of_torques.dtau_dqd].map(|slopes| (0..nv).map(|k| column(slopes, k)));
+        let solved = self.of_all(&columns.into_iter().flatten().collect::<Vec<_>>());
+        let (by_position, by_velocity) = solved.split_at(nv);
+        let (mut by_position, mut by_velocity) = (by_rows(by_position), by_rows(by_velocity));
         if let Some(base) = base {
             base.complete(&mut by_position, &mut by_velocity);
         }

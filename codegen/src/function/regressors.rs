@@ -248,9 +248,9 @@ impl RobotFunction for ParameterDerivatives {
         let columns = forms.model.base_parameters.of_scene.len();
         let solution = Solution::new(forms, &inputs[0]);
         let mut by_motion = by_force.clone();
-        for k in 0..columns {
-            let right: Vec<T> = (0..nv).map(|i| -by_force[i * columns + k]).collect();
-            solution.of(&right).into_iter().enumerate().for_each(|(i, x)| by_motion[i * columns + k] = x);
+        let right = |k: usize| (0..nv).map(|i| -by_force[i * columns + k]).collect::<Vec<T>>();
+        for (k, column) in solution.of_all(&(0..columns).map(right).collect::<Vec<_>>()).into_iter().enumerate() {
+            column.into_iter().enumerate().for_each(|(i, x)| by_motion[i * columns + k] = x);
         }
         [by_force, by_motion].concat()
     }

@@ -28,6 +28,11 @@ impl<'a, 'b, T: Real> Solution<'a, 'b, T> {
         }
     }
 
+    /// x of each of these b.
+    pub(super) fn of_all(&self, right: &[Vec<T>]) -> Vec<Vec<T>> {
+        self.forms.columns(right, &|right| self.of(right))
+    }
+
     /// H⁻¹ by rows.
     pub(super) fn inverse(&self) -> Vec<T> {
         let nv = self.forms.model.nv();
@@ -35,7 +40,7 @@ impl<'a, 'b, T: Real> Solution<'a, 'b, T> {
             Some(factor) => factor.inverse(),
             None => {
                 let unit = |k: usize| (0..nv).map(|i| if i == k { T::one() } else { T::zero() }).collect::<Vec<T>>();
-                by_rows(&(0..nv).map(|k| self.of(&unit(k))).collect::<Vec<_>>())
+                by_rows(&self.of_all(&(0..nv).map(unit).collect::<Vec<_>>()))
             }
         }
     }

@@ -212,8 +212,8 @@ pub enum InLanes {
     Never,
     /// They can, and take as long either way (`generated_tests/record/2026-11-21-limbs.md`).
     WhereAsked,
-    /// They can, and are faster where there are enough of them.
-    WhereFaster,
+    /// They can, and are faster where a body carries so many of them.
+    WhereFaster(usize),
 }
 
 /// What a function divides by.

@@ -11,6 +11,7 @@ use straightline_core::model::{Joint, Model};
 use straightline_core::random::Random;
 use straightline_core::Dd;
 use straightline_graph::expr::{Graph, Port};
+use straightline_graph::lanes::LaneTemplate;
 
 /// Of the numbers that states are made of.
 pub(crate) const SEED: u64 = 0x9e37_79b9_7f4a_7c15;
@@ -164,4 +165,11 @@ pub fn samples(model: &Model<Dd>, graph: &Graph) -> Option<Vec<Vec<f64>>> {
     let at = |fast| states(model, &graph.inputs, SAMPLES, fast);
     let (slow, fast) = at(false).zip(at(true))?;
     Some(slow.iter().chain(&fast).map(|x| straightline_graph::expr::values(graph, x)).collect())
+}
+
+/// The same of a template of lanes, lane after lane.
+pub(crate) fn lane_samples(model: &Model<Dd>, template: &LaneTemplate) -> Option<Vec<Vec<f64>>> {
+    let at = |fast| states(model, template.inputs(), SAMPLES, fast);
+    let (slow, fast) = at(false).zip(at(true))?;
+    Some(slow.iter().chain(&fast).enumerate().map(|(lane, x)| template.values(x, lane)).collect())
 }

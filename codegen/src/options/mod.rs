@@ -12,7 +12,7 @@ pub use optimisations::{FormChoices, Optimisations};
 pub use scene_file::SceneFile;
 pub use value::{GivenOptions, OptionValue};
 
-use crate::choices::{FixedProducts, Lanes, LimbForm, Memory, TargetMachine, WrittenEntries};
+use crate::choices::{ColumnForm, FixedProducts, Lanes, LimbForm, Memory, TargetMachine, WrittenEntries};
 use crate::description;
 use crate::description::drives::WrittenDrive;
 use crate::diagnostic::{Diagnostics, Reporting, Source};
@@ -71,6 +71,8 @@ options! {
     forward_dynamics "forward_dynamics": ForwardDynamicsMethod = ForwardDynamicsMethod::default(),
     /// How identical limbs are computed.
     limbs "limbs": LimbForm = LimbForm::default(),
+    /// How columns that a function solves for are computed.
+    columns "columns": ColumnForm = ColumnForm::default(),
     /// Which entries of matrices are written.
     entries "entries": WrittenEntries = WrittenEntries::default(),
     /// The machine that code is made for; none: any.
@@ -162,6 +164,7 @@ impl Options {
             angle_sums: algebraic,
             cheaper,
             limbs: algebraic && self.limbs != LimbForm::Apart,
+            columns: algebraic && self.columns != ColumnForm::Apart,
             substitutes: algebraic,
         }
     }

@@ -26,6 +26,8 @@ pub struct Optimisations {
     pub cheaper: bool,
     /// Identical limbs as lanes of one body, where the options have them so: [`limbs`](crate::program::limbs).
     pub limbs: bool,
+    /// Columns that are solved for alike as lanes of one loop, where the options have them so.
+    pub columns: bool,
     /// Values of the mass matrix, and of forward dynamics, formed of others that are there anyway: [`substitute`](straightline_graph::pass::substitute()).
     pub substitutes: bool,
 }
@@ -74,6 +76,7 @@ impl Optimisations {
         step("angles of parallel joints added", self.chosen && self.angle_sums, |o| o.angle_sums = true);
         step("the cheaper form of forward dynamics", self.cheaper, |o| o.cheaper = true);
         step("identical limbs as lanes of one body", self.limbs, |o| o.limbs = true);
+        step("columns that are solved for as lanes", self.columns, |o| o.columns = true);
         step("values formed of others that are there", self.substitutes, |o| o.substitutes = true);
         steps
     }

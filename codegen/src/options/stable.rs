@@ -129,7 +129,8 @@ fields! {
     Effort : { "boxes": boxes, "time": time, "state": companions, }
     Optimisations : {
         "folding": folding, "algebraic": algebraic, "reduced": reduced, "sums": sums, "chosen": chosen, "forms": forms,
-        "angle_sums": angle_sums, "cheaper": cheaper, "limbs": limbs, "substitutes": substitutes,
+        "angle_sums": angle_sums, "cheaper": cheaper, "limbs": limbs, "columns": columns,
+        "substitutes": substitutes,
     }
     FormChoices : {
         "stays": stays, "origins": origins, "tips": tips, "parameters": parameters, "rotations": rotations,

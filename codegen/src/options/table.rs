@@ -6,7 +6,7 @@
 
 use super::value::{OptionValue, Vocabulary};
 use super::Options;
-use crate::choices::{FixedProducts, Fusion, Lanes, LimbForm, Memory, TargetMachine, WrittenEntries};
+use crate::choices::{ColumnForm, FixedProducts, Fusion, Lanes, LimbForm, Memory, TargetMachine, WrittenEntries};
 use crate::diagnostic::Level;
 use crate::function::{ForwardDynamicsMethod, Function};
 use crate::scene::MaxError;
@@ -175,6 +175,9 @@ pub static TABLE: &[OptionRow] = &[
     OptionRow { name: "limbs", kind: Word(Vocabulary::of::<LimbForm>(), None), default: "apart", metavar: "FORM",
         doc: "How identical limbs are computed",
         also: "outputs", example: &["auto"], hash: &["limbs"], set: |options, value| options.limbs = value.choice(), ..OF },
+    OptionRow { name: "columns", kind: Word(Vocabulary::of::<ColumnForm>(), None), default: "auto", metavar: "FORM",
+        doc: "How columns that a function solves for are computed",
+        also: "outputs", example: &["apart"], hash: &["columns"], set: |options, value| options.columns = value.choice(), ..OF },
     OptionRow { name: "entries", kind: Word(Vocabulary::of::<WrittenEntries>(), None), default: "all", metavar: "ENTRIES",
         doc: "Which entries of matrices functions write, and whether constants beside them say which can be non-zero",
         also: "outputs", example: &["nonzeros"], hash: &["entries"], set: |options, value| options.entries = value.choice(), ..OF },

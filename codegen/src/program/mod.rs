@@ -7,6 +7,7 @@ pub mod contact;
 pub mod demand_inertia;
 pub mod equivalence;
 pub mod fixed;
+mod in_lanes;
 pub mod input_box;
 pub mod limbs;
 pub mod mixed;
@@ -118,8 +119,15 @@ fn optimised_with(
     }
     let optimisations = Optimisations { limbs: false, ..optimisations };
     let check = |pass, graph| passed(pass, function.name(), graph);
+    let optimisations = Optimisations { columns: optimisations.columns && !is_packed, ..optimisations };
     let finished = |robot: &Robot, options: &Options, optimisations: Optimisations| {
         let (traced, choice) = traced(robot, frames, function, options, optimisations);
+        let method = choice.map_or(options.forward_dynamics, |choice| choice.method());
+        let by_method = Options { forward_dynamics: method, ..options.clone() };
+        let in_lanes = in_lanes::program(robot, frames, function, &by_method, optimisations);
+        if let Some(in_lanes) = in_lanes.as_ref().filter(|_| in_lanes::is_taken_unseen(&traced, options)) {
+            return (in_lanes.clone(), choice);
+        }
         let graph = check("dead code", dead_code(&check("traced", traced)));
         let graph = check("unread inputs", unread_inputs(graph, is_optional));
         let graph = match optimisations.sums {
@@ -131,6 +139,9 @@ fn optimised_with(
             true => check("substitute", substitute(&graph, largest, &choose::keeps_digits_of(&robot.model, &graph))),
             false => graph,
         };
+        if let Some(in_lanes) = in_lanes.filter(|in_lanes| in_lanes::pays(in_lanes, &graph)) {
+            return (in_lanes, choice);
+        }
         // fused products want another order
         let ordered = optimisations.sums && !options.fma && !function.spec().keeps_order;
         let graph = match ordered.then(|| samples(&robot.model, &graph)).flatten() {

@@ -17,6 +17,7 @@ impl Optimisations {
             }
         };
         step("identical limbs as lanes of one body", |o| o.limbs = false);
+        step("columns that are solved for as lanes", |o| o.columns = false);
         step("values formed of others that are there", |o| o.substitutes = false);
         step("sums with all their terms at once", |o| o.sums = false);
         step("forms of the reduced robot", |o| {

@@ -102,7 +102,7 @@ pub fn known(
     let scene = Scene { outputs: BTreeMap::new(), by_columns: false, ..options.scene.clone() };
     let options = &Options { scene, ..options.clone() };
     let all = options.optimisations();
-    let plain = Optimisations { chosen: false, limbs: false, substitutes: false, ..all };
+    let plain = Optimisations { chosen: false, limbs: false, columns: false, substitutes: false, ..all };
     let of = |function| optimised(robot, &[], function, options, plain);
     let (mass_matrix, torques) = (of(Function::MassMatrix), of(Function::InverseDynamics));
     let slopes = (function.spec().judged == Judged::ByColumns).then(|| of(Function::InverseDynamicsDerivatives));

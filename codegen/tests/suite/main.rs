@@ -12,6 +12,7 @@ mod c99_readback;
 mod certificates;
 mod certificates_of_robots;
 mod chain;
+mod columns;
 mod companions;
 mod contact;
 mod contact_compiled;

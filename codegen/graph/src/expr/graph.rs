@@ -227,16 +227,35 @@ impl Precision {
     }
 }
 
-/// Operations that are the same for several limbs: a loop over them can write each row once.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+/// Operations that are the same for several lanes: a loop over them can write each row once.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Alike {
-    /// The first part of each limb, as sections count them.
-    pub limbs: Vec<usize>,
-    /// One operation for all limbs: of every limb its node, which has the same kind of operation. Rows stand behind those that they
+    /// What the lanes are.
+    pub lanes: LoopLanes,
+    /// One operation for all lanes: of every lane its node, which has the same kind of operation. Rows stand behind those that they
     /// use, and all of them behind one another.
     pub rows: Vec<Vec<NodeId>>,
-    /// Whether the loop is for one limb after the other, not for vectors of them: it leaves nothing behind but what is used there.
+    /// Whether the loop is for one lane after the other, not for vectors of them: it leaves nothing behind but what is used there.
     pub is_rolled: bool,
+}
+
+/// What the lanes of a loop are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LoopLanes {
+    /// Identical limbs: the first part of each, as sections count them.
+    Limbs(Vec<usize>),
+    /// So many columns of matrices.
+    Columns(usize),
+}
+
+impl LoopLanes {
+    /// How many.
+    pub fn count(&self) -> usize {
+        match self {
+            LoopLanes::Limbs(limbs) => limbs.len(),
+            LoopLanes::Columns(count) => *count,
+        }
+    }
 }
 
 /// A program of scalar operations.
@@ -348,7 +367,7 @@ impl Graph {
     /// If the program has [`Graph::formats`] or [`Graph::alike`].
     pub(crate) fn expect_plain(&self, pass: &str) {
         assert!(self.formats.is_empty(), "`{pass}` would lose the formats of values: mix precisions after it");
-        assert!(self.alike.is_empty(), "`{pass}` would lose the loops over limbs: write limbs out after it");
+        assert!(self.alike.is_empty(), "`{pass}` would lose the loops over lanes: write lanes out after it");
         assert!(self.sines == Sines::Precise, "`{pass}` would lose the kernel of sines: choose it after it");
     }
 

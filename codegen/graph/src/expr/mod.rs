@@ -11,13 +11,17 @@ mod interpret;
 pub mod op;
 pub mod port_text;
 pub mod rules;
+mod short_loops;
 mod verify;
 
 pub use builder::GraphBuilder;
 pub use gradient::gradient;
-pub use graph::{Alike, Constant, Counts, Graph, NodeId, Note, Op, Port, Precision, Section, Sines, DIVISION, TAIL};
+pub use graph::{
+    Alike, Constant, Counts, Graph, LoopLanes, NodeId, Note, Op, Port, Precision, Section, Sines, DIVISION, TAIL,
+};
 pub(crate) use interpret::of_rounded_sum;
 pub use interpret::{evaluate, evaluate_by, values, values_by};
 pub use op::{Binary, Unary};
 pub use rules::{Folding, Grade, Rule, RuleSet};
+pub use short_loops::with_short_loops;
 pub use verify::verify;

@@ -43,11 +43,11 @@ pub fn verify(graph: &Graph) -> Result<(), String> {
             return Err(format!("node {i} lies in a section that does not exist"));
         }
     }
-    for (row, limbs) in graph.alike.iter().flat_map(|alike| alike.rows.iter().map(|row| (row, alike.limbs.len()))) {
+    for (row, lanes) in graph.alike.iter().flat_map(|alike| alike.rows.iter().map(|row| (row, alike.lanes.count()))) {
         let op = |id: &NodeId| graph.ops.get(id.index()).copied();
         let is_alike = |id: &NodeId| op(id).zip(op(&row[0])).is_some_and(|(a, b)| a.is_alike(b));
-        if row.len() != limbs || !row.iter().all(is_alike) {
-            return Err(format!("the row {row:?} is not the same operation for {limbs} limbs"));
+        if row.len() != lanes || !row.iter().all(is_alike) {
+            return Err(format!("the row {row:?} is not the same operation for {lanes} lanes"));
         }
     }
     if graph.sines == Sines::Short && !graph.formats.is_empty() {

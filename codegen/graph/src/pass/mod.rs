@@ -18,7 +18,7 @@ pub use unread_inputs::unread_inputs;
 
 #[cfg(test)]
 mod tests {
-    use crate::expr::{gradient, Alike, Graph, GraphBuilder, Op, Port, Precision, RuleSet, Sines};
+    use crate::expr::{gradient, Alike, Graph, GraphBuilder, LoopLanes, Op, Port, Precision, RuleSet, Sines};
     use crate::number::Scalar;
     use std::panic::catch_unwind;
 
@@ -41,7 +41,7 @@ mod tests {
         let plain = b.finish(vec![Port::new("y", &[1])], vec![square]);
         let mixed = Graph { formats: vec![Precision::of(Scalar::F32); 2], ..plain.clone() };
         let looped = Graph {
-            alike: vec![Alike { limbs: vec![0], rows: vec![vec![square]], is_rolled: false }],
+            alike: vec![Alike { lanes: LoopLanes::Limbs(vec![0]), rows: vec![vec![square]], is_rolled: false }],
             ..plain.clone()
         };
         let short = Graph { sines: Sines::Short, ..plain.clone() };

@@ -4,6 +4,7 @@ use super::fused::{fusions, Fused};
 use super::{first_read, nodes_of, port_of, read_inputs, zeros, Lowering, Names};
 use crate::emit::module::{Expression, Statement, Stride};
 use crate::emit::target::{Scope, Target};
+use rustc_hash::FxHashMap;
 use straightline_graph::expr::{Graph, NodeId, Op, Precision, Sines, Unary};
 use straightline_graph::schedule::ProgramPart;
 use straightline_graph::Scalar;
@@ -44,6 +45,10 @@ pub(super) struct Plan<'a> {
     pub stays: Vec<bool>,
     /// Of a loop over limbs where its values go, by their nodes, in the order of those.
     pub left: Vec<(NodeId, Left)>,
+    /// Which values go into arrays for loops over columns as soon as they are there, and to which places.
+    pub gathered: FxHashMap<NodeId, Vec<(String, usize)>>,
+    /// These arrays, by what they hold.
+    pub arrays: FxHashMap<Vec<NodeId>, String>,
 }
 
 /// Where a value of a loop over limbs goes.
@@ -87,7 +92,17 @@ fn statements(graph: &Graph, part: &ProgramPart, scope: Scope<'_>, lowering: &Lo
         out.push(Statement::Load(named));
     }
     let stays = keep_their_places(graph, part, &uses);
-    let mut plan = Plan { part, uses, results_of, crosses, absorbed, stays, left: Vec::new() };
+    let mut plan = Plan {
+        part,
+        uses,
+        results_of,
+        crosses,
+        absorbed,
+        stays,
+        left: Vec::new(),
+        gathered: FxHashMap::default(),
+        arrays: FxHashMap::default(),
+    };
     if scope.style.lanes || graph.alike.is_empty() {
         b.run(&part.nodes, &plan, lowering, &mut out);
     } else {
@@ -225,12 +240,21 @@ impl<'a> Statements<'a> {
             let (slot, value) = (plan.part.stores[i].1, self.operand(id));
             self.statements.push(Statement::Keep { slot, value });
         }
+        self.gather(id, plan);
         if let Ok(i) = plan.left.binary_search_by_key(&id, |(n, _)| *n) {
             let value = self.operand(id);
             self.statements.push(match plan.left[i].1.clone() {
                 Left::InArray(array, index) => Statement::Put { array, index, value },
                 Left::PutOut(port, at) => Statement::StoreOfLimb { port, at, value },
             });
+        }
+    }
+
+    /// Puts a value where loops over columns take it from.
+    pub fn gather(&mut self, id: NodeId, plan: &Plan<'_>) {
+        for (array, place) in plan.gathered.get(&id).into_iter().flatten() {
+            let value = self.operand(id);
+            self.statements.push(Statement::Put { array: array.clone(), index: place.to_string(), value });
         }
     }
 

@@ -1,4 +1,4 @@
-//! What is alike for several limbs as a loop over them.
+//! What is alike for several limbs, or columns, as a loop over them.
 //!
 //! ```text
 //! static C1: [f64; 4] = [0.0875, -0.0875, 0.0875, -0.0875];
@@ -11,14 +11,15 @@
 //! ```
 //!
 //! What differs from limb to limb is an array over limbs, what does not a local from before the loop. LLVM's loop vectoriser makes
-//! vector instructions of the body, as of functions over lanes. Rolled loops (`rolled.rs`) have a row of constants per limb instead.
+//! vector instructions of the body, as of functions over lanes. Rolled loops (`rolled.rs`) have a row of constants per limb instead. Of columns the
+//! arrays stand at the beginning, and each number goes there as soon as it is computed.
 
 use super::body::{Left, Plan, Statements};
 use super::rolled::{is_short, Table};
 use super::Lowering;
 use crate::emit::module::{Expression, Index, Statement};
-use rustc_hash::FxHashMap;
-use straightline_graph::expr::{Alike, Graph, NodeId, Op, Section};
+use rustc_hash::{FxHashMap, FxHashSet};
+use straightline_graph::expr::{Alike, Graph, LoopLanes, NodeId, Op, Section};
 use straightline_graph::schedule::ProgramPart;
 
 impl Statements<'_> {
@@ -34,11 +35,14 @@ impl Statements<'_> {
                 used_across[a.index()] = true;
             }
         }
+        let stores = plan.part.stores.iter().filter(|(id, _)| stretch[id.index()].is_some());
+        stores.for_each(|(id, _)| used_across[id.index()] = true);
         let is_operand = used_across.clone();
         plan.results_of.iter().for_each(|(id, _)| used_across[id.index()] |= stretch[id.index()].is_some());
         for id in nodes.iter().filter(|id| stretch[id.index()].is_none()) {
             plan.crosses[id.index()] |= used_across[id.index()];
         }
+        self.gather_columns(plan, &used_across, out);
         let mut done = 0;
         while done < nodes.len() {
             let here = stretch[nodes[done].index()];
@@ -51,6 +55,34 @@ impl Statements<'_> {
         }
     }
 
+    /// Makes room for what loops over columns take: each number goes there as soon as it is computed, so that it waits in no register.
+    fn gather_columns(&mut self, plan: &mut Plan<'_>, used_across: &[bool], out: &mut Vec<Statement>) {
+        let filler = self.filler(plan.part);
+        let here: FxHashSet<NodeId> = plan.part.nodes.iter().copied().collect();
+        for alike in self.graph.alike.iter().filter(|alike| here.contains(&alike.rows[0][0])) {
+            let LoopLanes::Columns(columns) = alike.lanes else { continue };
+            for (_, of_columns) in Loop::new(self.graph, alike, used_across).outside {
+                let are_constants = of_columns.iter().all(|id| matches!(self.graph.op(*id), Op::Constant(_)));
+                if of_columns.len() < 2 || are_constants || plan.arrays.contains_key(&of_columns) {
+                    continue;
+                }
+                let name = self.names.numbered("x");
+                let count = padded(columns);
+                out.push(Statement::Room { name: name.clone(), filler: filler.clone(), count });
+                // columns that nobody reads are the last one again
+                let last = of_columns.last().into_iter().cycle();
+                for (column, id) in of_columns.iter().chain(last).take(count).enumerate() {
+                    plan.gathered.entry(*id).or_default().push((name.clone(), column));
+                    if self.graph.op(*id).is_leaf() || self.values[id.index()].is_some() {
+                        let value = self.operand(*id);
+                        out.push(Statement::Put { array: name.clone(), index: column.to_string(), value });
+                    }
+                }
+                plan.arrays.insert(of_columns, name);
+            }
+        }
+    }
+
     fn limb_loop(
         &mut self,
         alike: &Alike,
@@ -59,16 +91,30 @@ impl Statements<'_> {
         lowering: &Lowering<'_>,
         out: &mut Vec<Statement>,
     ) {
-        let limbs = alike.limbs.len();
-        // an odd limb is a lane of its own beside one that nobody reads: half a vector would take longer
-        let count = if limbs > 2 && !alike.is_rolled { limbs.next_multiple_of(2) } else { limbs };
-        let index = self.names.free("limb");
-        let title = |body: &usize| (lowering.title)(Section { phase: "limb", index: Some(*body) });
-        out.extend(alike.limbs.iter().map(|body| Statement::Comment(title(body))));
+        let lanes = alike.lanes.count();
+        // an odd lane stands beside one that nobody reads, a pair beside two: half a vector would take longer, and a loop of two turns is
+        // written out
+        let (index, count) = match &alike.lanes {
+            LoopLanes::Limbs(limbs) => {
+                let title = |body: &usize| (lowering.title)(Section { phase: "limb", index: Some(*body) });
+                out.extend(limbs.iter().map(|body| Statement::Comment(title(body))));
+                let count = match lanes {
+                    _ if alike.is_rolled => lanes,
+                    2 => 4,
+                    _ => lanes.next_multiple_of(2),
+                };
+                ("limb", count)
+            }
+            LoopLanes::Columns(columns) => {
+                out.push(Statement::Comment(format!("{columns} columns")));
+                ("column", padded(*columns))
+            }
+        };
+        let index = self.names.free(index);
         let Loop { graph, part, outside, results } = Loop::new(self.graph, alike, used_across);
 
         let turns = Turns { index, count, is_rolled: alike.is_rolled };
-        let values = self.taken_by_limbs(&outside, &turns, out);
+        let values = self.taken_by_limbs(&outside, &turns, plan, out);
         let (left, names) = self.left_behind(&results, &turns, plan, is_operand, out);
 
         let own = std::mem::take(&mut self.names);
@@ -92,6 +138,8 @@ impl Statements<'_> {
             absorbed,
             stays: vec![false; graph.ops.len()],
             left,
+            gathered: FxHashMap::default(),
+            arrays: FxHashMap::default(),
         };
         let mut body = Vec::new();
         inner.run(&part.nodes, &plan_of_loop, lowering, &mut body);
@@ -102,6 +150,11 @@ impl Statements<'_> {
         for ((_, row), name) in results.iter().zip(names).filter_map(|(result, name)| Some((result, name?))) {
             for (limb, id) in row.iter().enumerate() {
                 self.values[id.index()] = Some(Expression::Element(name.clone(), Index::Number(limb)));
+                self.gather(*id, plan);
+                if let Ok(i) = plan.part.stores.binary_search_by_key(id, |(s, _)| *s) {
+                    let (slot, value) = (plan.part.stores[i].1, self.operand(*id));
+                    self.statements.push(Statement::Keep { slot, value });
+                }
                 let first = plan.results_of.partition_point(|(r, _)| r < id);
                 for (_, k) in plan.results_of[first..].iter().take_while(|(r, _)| r == id) {
                     self.store_result(*id, *k);
@@ -116,6 +169,7 @@ impl Statements<'_> {
         &mut self,
         outside: &[(NodeId, Vec<NodeId>)],
         turns: &Turns,
+        plan: &Plan<'_>,
         out: &mut Vec<Statement>,
     ) -> Vec<(NodeId, Expression)> {
         let table = turns.is_rolled.then(|| Table::new(self, outside));
@@ -126,7 +180,10 @@ impl Statements<'_> {
                 (Some(value), _) => value,
                 (None, [same]) => self.operand(*same),
                 (None, of_limbs) => {
-                    let array = self.array_over_limbs(of_limbs, turns.count, out);
+                    let array = match plan.arrays.get(of_limbs).cloned().or_else(|| self.array_of_loop(of_limbs)) {
+                        Some(array) => array,
+                        None => self.array_over_limbs(of_limbs, turns.count, out),
+                    };
                     Expression::Element(array, Index::Loop(turns.index.clone()))
                 }
             };
@@ -166,6 +223,13 @@ impl Statements<'_> {
         (left, names)
     }
 
+    /// The array in which a loop before this one left these values, one after the other.
+    fn array_of_loop(&self, of_limbs: &[NodeId]) -> Option<String> {
+        let Some(Expression::Element(array, Index::Number(0))) = &self.values[of_limbs[0].index()] else { return None };
+        let is_next = |(limb, id): (usize, &NodeId)| matches!(&self.values[id.index()], Some(Expression::Element(other, Index::Number(k))) if other == array && *k == limb);
+        of_limbs.iter().enumerate().all(is_next).then(|| array.clone())
+    }
+
     /// The array of what limbs take from outside, one after the other; its name.
     fn array_over_limbs(&mut self, of_limbs: &[NodeId], count: usize, out: &mut Vec<Statement>) -> String {
         let last = of_limbs.last().into_iter().cycle();
@@ -180,6 +244,11 @@ impl Statements<'_> {
         out.push(Statement::Array { name: name.clone(), values, is_constant });
         name
     }
+}
+
+/// How many turns a loop over so many columns takes, so that nothing but vectors of four is left.
+fn padded(columns: usize) -> usize {
+    columns.next_multiple_of(4)
 }
 
 /// How a loop over limbs turns.

@@ -6,7 +6,7 @@ use crate::scene::Scene;
 use rustc_hash::FxHashMap;
 use straightline_core::model::Model;
 use straightline_core::Dd;
-use straightline_graph::expr::{Alike, Constant, Graph, NodeId, Note, Op, Port, Section};
+use straightline_graph::expr::{Alike, Constant, Graph, LoopLanes, NodeId, Note, Op, Port, Section};
 
 /// Where a node of the template is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,7 +80,8 @@ pub(super) fn written_out(
             }
         }
         if !rows.is_empty() {
-            writer.out.alike.push(Alike { limbs: template.first_bodies[kind].clone(), rows, is_rolled });
+            let lanes = LoopLanes::Limbs(template.first_bodies[kind].clone());
+            writer.out.alike.push(Alike { lanes, rows, is_rolled });
         }
     }
     for id in graph.ids().filter(|id| places[id.index()] == NodePlace::Behind) {

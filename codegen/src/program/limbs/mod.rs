@@ -25,27 +25,25 @@ use crate::options::{Optimisations, Options};
 use crate::program::choose::choose;
 use crate::program::passed;
 use straightline_core::model::Model;
-use straightline_graph::expr::Graph;
+use straightline_graph::expr::{with_short_loops, Graph};
 use straightline_graph::pass::{dead_code, sums, unread_inputs};
 
-/// Pairs take longer in lanes than apart: legs and arms of a humanoid 1.1 to 1.3 times as long. Three or more take 0.5 to 0.8 times
-/// as long with AVX, and no longer without.
-const LANES_PAY: usize = 3;
 /// Limbs of one joint have too few operations to make up for what goes into lanes and comes out of them.
 const JOINTS_PAY: usize = 2;
 
 impl LimbForm {
-    /// Which limbs of a robot are lanes in a function. [`LimbForm::Auto`]: where a body carries three or more of at least two
-    /// joints, except for gravity forces, which have few operations and take as long either way
+    /// Which limbs of a robot are lanes in a function. [`LimbForm::Auto`]: where a body carries enough of at least two joints: three, of derivatives
+    /// two; except for gravity forces, which have few operations and take as long either way
     /// (`generated_tests/record/2026-11-21-limbs.md`).
     pub fn of<T>(self, model: &Model<T>, function: Function) -> Vec<Limbs> {
         let in_lanes = function.spec().in_lanes;
         let mut found = if in_lanes == InLanes::Never { Vec::new() } else { limbs(model) };
-        match self {
-            LimbForm::Apart => found.clear(),
-            LimbForm::Lanes | LimbForm::Rolled => {}
-            LimbForm::Auto if in_lanes == InLanes::WhereAsked => found.clear(),
-            LimbForm::Auto => found.retain(|l| l.bodies.len() >= LANES_PAY && l.bodies[0].len() >= JOINTS_PAY),
+        match (self, in_lanes) {
+            (LimbForm::Lanes | LimbForm::Rolled, _) => {}
+            (LimbForm::Auto, InLanes::WhereFaster(fewest)) => {
+                found.retain(|l| l.bodies.len() >= fewest && l.bodies[0].len() >= JOINTS_PAY);
+            }
+            (LimbForm::Apart | LimbForm::Auto, _) => found.clear(),
         }
         found
     }
@@ -86,5 +84,6 @@ pub(crate) fn program(
     let folded = check("limbs: folded constants", template.graph.clone());
     let is_rolled = options.limbs == LimbForm::Rolled;
     let graph = expand::written_out(&folded, &template, &chosen.model, &options.scene, (function, is_rolled));
-    Some(check("limbs: unread inputs", unread_inputs(check("limbs: written out", graph), is_optional)))
+    let graph = unread_inputs(check("limbs: written out", with_short_loops(graph)), is_optional);
+    Some(check("limbs: unread inputs", graph))
 }
