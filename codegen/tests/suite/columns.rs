@@ -1,11 +1,9 @@
 //! Columns that functions solve for as lanes of loops: what they compute, when they are taken, and the bits that rustc makes.
 
-use crate::limbs::{hand, limbs_on, link, robot, stool, Differ, Numbers};
+use crate::limbs::{assert_bits, hand, limbs_on, link, robot, stool, Differ, Numbers};
 use std::path::Path;
-use std::process::Command;
 use straightline_codegen::choices::{ColumnForm, Lanes, TargetMachine, WrittenEntries};
 use straightline_codegen::compile::compile;
-use straightline_codegen::emit::fused;
 use straightline_codegen::expr::{evaluate, LoopLanes};
 use straightline_codegen::function::ForwardDynamicsMethod;
 use straightline_codegen::model::{load, ModelOptions};
@@ -13,7 +11,7 @@ use straightline_codegen::options::Options;
 use straightline_codegen::program::{program, TracedProgram};
 use straightline_codegen::verify::{bound, verify};
 use straightline_codegen::{Function, Grade, Robot, Scalar, Source};
-use straightline_core::{trig, Dd};
+use straightline_core::Dd;
 
 const SOLVING: [Function; 4] = [
     Function::ForwardDynamicsDerivatives,
@@ -184,35 +182,7 @@ fn compiled_lanes_have_the_bits_of_their_program() {
         let states: Vec<Vec<f64>> = (0..4).map(|_| (0..inputs).map(|_| 2.0 * n.next()).collect()).collect();
         let text = compile(&source, &options).unwrap_or_else(|errors| panic!("{errors}")).text;
         assert!(text.contains("for column in "), "{name} is written as a loop");
-        let (file, binary) = (folder.join(format!("{name}.rs")), folder.join(name));
-        std::fs::write(&file, caller(&text, function, &states, &program, options.scalar.name())).expect("a file");
-        let mut rustc = Command::new(std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string()));
-        rustc.args(["--edition", "2021", "-C", "opt-level=3", "-A", "warnings", "-o"]).args([&binary, &file]);
-        if options.fma {
-            rustc.args(["-C", "target-feature=+avx2,+fma"]);
-        }
-        let built = rustc.output().expect("rustc runs");
-        assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
-        let output = Command::new(&binary).output().expect("the program runs");
-        assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
-        let printed = String::from_utf8(output.stdout).expect("text");
-        assert_eq!(printed.lines().count(), states.len());
-        for (state, line) in states.iter().zip(printed.lines()) {
-            let compiled: Vec<f64> = line.split_whitespace().map(|x| x.parse().expect("a number")).collect();
-            let expected: Vec<f64> = match (options.scalar, options.fma) {
-                (Scalar::F64, false) => evaluate(&program.graph, state),
-                (Scalar::F64, true) => {
-                    let sin_cos = |x| trig::sin_cos_of_sum_fused_f64(x, f64::mul_add);
-                    fused::evaluate((&program.graph, &program.schedule), state, f64::mul_add, sin_cos)
-                }
-                (Scalar::F32, _) => {
-                    let state: Vec<f32> = state.iter().map(|x| *x as f32).collect();
-                    // printed with as many digits as tell f32 apart
-                    let wide = |x: f32| format!("{x:e}").parse().expect("a number");
-                    evaluate::<f32>(&program.graph, &state).into_iter().map(wide).collect()
-                }
-            };
-            assert_eq!(compiled, expected, "{name} at {state:?}");
-        }
+        let main = caller(&text, function, &states, &program, options.scalar.name());
+        assert_bits(&folder, (name, main), &program, &options, &states);
     }
 }

@@ -271,6 +271,46 @@ fn slow_proof_that_scenes_may_tell_limbs_apart() {
     }
 }
 
+/// Every bit of what a program prints, a line per state, is that of these operations. `main`: the program in Rust, with its name.
+pub fn assert_bits(
+    folder: &Path,
+    (name, main): (&str, String),
+    program: &TracedProgram,
+    options: &Options,
+    states: &[Vec<f64>],
+) {
+    let (file, binary) = (folder.join(format!("{name}.rs")), folder.join(name));
+    std::fs::write(&file, main).expect("the program can be written");
+    let mut rustc = Command::new(std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string()));
+    rustc.args(["--edition", "2021", "-C", "opt-level=3", "-A", "warnings", "-o"]).args([&binary, &file]);
+    if options.fma {
+        rustc.args(["-C", "target-feature=+avx2,+fma"]);
+    }
+    let built = rustc.output().expect("rustc runs");
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    let output = Command::new(&binary).output().expect("the program runs");
+    assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+    let printed = String::from_utf8(output.stdout).expect("text");
+    assert_eq!(printed.lines().count(), states.len(), "{name}");
+    for (state, line) in states.iter().zip(printed.lines()) {
+        let compiled: Vec<f64> = line.split_whitespace().map(|x| x.parse().expect("a number")).collect();
+        let expected: Vec<f64> = match (options.scalar, options.fma) {
+            (Scalar::F64, false) => evaluate(&program.graph, state),
+            (Scalar::F64, true) => {
+                let sin_cos = |x| trig::sin_cos_of_sum_fused_f64(x, f64::mul_add);
+                fused::evaluate((&program.graph, &program.schedule), state, f64::mul_add, sin_cos)
+            }
+            (Scalar::F32, _) => {
+                let state: Vec<f32> = state.iter().map(|x| *x as f32).collect();
+                // printed with as many digits as tell f32 apart
+                let wide = |x: f32| format!("{x:e}").parse().expect("a number");
+                evaluate::<f32>(&program.graph, &state).into_iter().map(wide).collect()
+            }
+        };
+        assert_eq!(compiled, expected, "{name} at {state:?}");
+    }
+}
+
 /// Every bit of what rustc makes of the loops is that of the program, of one state and of states in lanes.
 #[test]
 fn compiled_lanes_have_the_bits_of_their_program() {
@@ -307,35 +347,7 @@ fn compiled_lanes_have_the_bits_of_their_program() {
             nq + nv,
             nq + nv
         );
-        let (file, binary) = (folder.join(format!("{name}.rs")), folder.join(name));
-        std::fs::write(&file, main).expect("the program can be written");
-        let mut rustc = Command::new(std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string()));
-        rustc.args(["--edition", "2021", "-C", "opt-level=3", "-A", "warnings", "-o"]).args([&binary, &file]);
-        if options.fma {
-            rustc.args(["-C", "target-feature=+avx2,+fma"]);
-        }
-        let built = rustc.output().expect("rustc runs");
-        assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
-        let output = Command::new(&binary).output().expect("the program runs");
-        assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
-        let printed = String::from_utf8(output.stdout).expect("text");
-        for (state, line) in states.iter().zip(printed.lines()) {
-            let compiled: Vec<f64> = line.split_whitespace().map(|x| x.parse().expect("a number")).collect();
-            let expected: Vec<f64> = match (options.scalar, options.fma) {
-                (Scalar::F64, false) => evaluate(&program.graph, state),
-                (Scalar::F64, true) => {
-                    let sin_cos = |x| trig::sin_cos_of_sum_fused_f64(x, f64::mul_add);
-                    fused::evaluate((&program.graph, &program.schedule), state, f64::mul_add, sin_cos)
-                }
-                (Scalar::F32, _) => {
-                    let state: Vec<f32> = state.iter().map(|x| *x as f32).collect();
-                    // printed with as many digits as tell f32 apart
-                    let wide = |x: f32| format!("{x:e}").parse().expect("a number");
-                    evaluate::<f32>(&program.graph, &state).into_iter().map(wide).collect()
-                }
-            };
-            assert_eq!(compiled, expected, "{name} at {state:?}");
-        }
+        assert_bits(&folder, (name, main), &program, &options, &states);
     }
 }
 
