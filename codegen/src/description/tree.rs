@@ -31,6 +31,8 @@ pub struct Description {
     pub links: Vec<WrittenLink>,
     /// The joints, in the file's order.
     pub joints: Vec<WrittenJoint>,
+    /// Joints whose coordinates follow those of others.
+    pub couplings: Vec<WrittenCoupling>,
     /// Further named frames.
     pub frames: Vec<NamedFrame>,
     /// A link or a joint could not be read, so that the tree has holes that were complained of already.
@@ -53,6 +55,7 @@ impl Description {
             base: None,
             links: Vec::new(),
             joints: Vec::new(),
+            couplings: Vec::new(),
             frames: Vec::new(),
             has_holes: false,
             drives: Vec::new(),
@@ -366,6 +369,19 @@ pub struct JointDrive {
     pub spring_stiffness: Option<Noted<f64>>,
     /// Spring: coordinate without force \[rad or m\].
     pub spring_rest: Option<Noted<f64>>,
+}
+
+/// A joint whose coordinate follows that of another: q = a q_source + b.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WrittenCoupling {
+    /// The joint that follows.
+    pub joint: Noted<String>,
+    /// The joint that it follows, which may follow another one itself.
+    pub source: Noted<String>,
+    /// a \[1, m/rad or rad/m\]; 1 where the file says nothing.
+    pub ratio: Noted<f64>,
+    /// b \[rad or m\]; 0 where the file says nothing.
+    pub offset: Noted<f64>,
 }
 
 /// A named frame on a link.
