@@ -174,6 +174,7 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
         name: description.name.value.clone(),
         bodies: assembly.bodies,
         gravity: vector(gravity),
+        couplings: vec![],
         frames: assembly.frames,
         drives: Vec::new(),
         base_parameters: Default::default(),

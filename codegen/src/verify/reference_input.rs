@@ -232,6 +232,7 @@ fn add_links(
             joint: *kind,
             iq: 0,
             iv: 0,
+            shared: None,
             mass: *mass,
             inertia: *inertia,
             e,

@@ -62,7 +62,7 @@ fn rotation<T: ReferenceReal>(q: &Vector4<T>) -> Matrix3<T> {
 /// The configuration that a displacement v of the tangent at q leads to; of a free link v is a body twist, (linear, angular).
 pub fn displaced<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], v: &[T]) -> Vec<T> {
     let mut to = q.to_vec();
-    for link in &tree.links {
+    for link in tree.own() {
         if link.joint != ReferenceJoint::Free {
             to[link.iq] = q[link.iq] + v[link.iv];
             continue;
@@ -85,7 +85,7 @@ pub fn displaced<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], v: &[T])
 /// The shortest displacement of the tangent at q that leads to q₁.
 pub fn displacement<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], q1: &[T]) -> Vec<T> {
     let mut v = alloc::vec![<T as Real>::zero(); tree.nv()];
-    for link in &tree.links {
+    for link in tree.own() {
         if link.joint != ReferenceJoint::Free {
             v[link.iv] = q1[link.iq] - q[link.iq];
             continue;
@@ -141,7 +141,7 @@ fn rotation_vector<T: ReferenceReal>(turn: &Vector4<T>) -> Vector3<T> {
 /// How a configuration changes, as an increment of the tangent there: of a free link that of its pose in its own axes.
 pub fn increment<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], rate: &[T]) -> Vec<T> {
     let mut v = alloc::vec![<T as Real>::zero(); tree.nv()];
-    for link in &tree.links {
+    for link in tree.own() {
         if link.joint != ReferenceJoint::Free {
             v[link.iv] = rate[link.iq];
             continue;

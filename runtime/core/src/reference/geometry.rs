@@ -118,7 +118,7 @@ pub fn geometry<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T]) -> Vec<Li
                     Some(p) => (links[p].rotation, links[p].centre_of_mass),
                     None => (Matrix3::identity(), Vector3::zeros()),
                 };
-                one_joint(link, (q[link.iq], s), &parent_rotation, &parent_centre_of_mass)
+                one_joint(link, (link.own_coordinate(q), s), &parent_rotation, &parent_centre_of_mass)
             }
             None => free(link, &q[link.iq..link.iq + 7]),
         };
