@@ -10,9 +10,13 @@
 //! Joints that are left to choose stand first in the vectors of the tree, so that q is where y begins, and G is the identity above the ratios of the
 //! others. Without couplings y is q, and nothing is copied.
 
-use crate::model::{BodyId, Joint, Model};
+use crate::base_parameters::BaseParameter;
+use crate::model::{Body, BodyId, Joint, Model};
 use crate::real::Real;
+use crate::dd::Dd;
 use alloc::borrow::Cow;
+use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
 
 /// A joint of one coordinate that follows another one, which is no follower itself: q = `ratio` q_source + `offset`.
@@ -35,6 +39,24 @@ impl<T: Copy> Coupling<T> {
     }
 }
 
+impl Coupling<Dd> {
+    /// As a formula of the coordinate that it follows: `2 q[3] + 0.5`.
+    pub fn in_words(&self, model: &Model<Dd>) -> String {
+        let (ratio, offset) = (self.ratio.to_f64(), self.offset.to_f64());
+        let source = model.bodies[self.source].joint.iq;
+        let product = match ratio {
+            1.0 => format!("q[{source}]"),
+            -1.0 => format!("-q[{source}]"),
+            _ => format!("{ratio:?} q[{source}]"),
+        };
+        match offset {
+            0.0 => product,
+            _ if offset < 0.0 => format!("{product} - {:?}", -offset),
+            _ => format!("{product} + {offset:?}"),
+        }
+    }
+}
+
 impl<T> Model<T> {
     /// Number of configuration coordinates of the tree, those of joints that follow included.
     pub fn tree_nq(&self) -> usize {
@@ -52,13 +74,32 @@ impl<T> Model<T> {
     }
 
     /// The joints whose coordinates are left to choose, body by body.
-    pub fn free_joints(&self) -> impl Iterator<Item = &Joint> + '_ {
+    pub fn free_joints(&self) -> impl Iterator<Item = &Joint> + Clone + '_ {
         self.free_bodies().map(|b| &self.bodies[b].joint)
     }
 
+    /// All joints in the order of the coordinates of the tree: those that are left to choose, then those that follow.
+    pub fn tree_joints(&self) -> Vec<&Joint> {
+        let mut joints: Vec<&Joint> = self.bodies.iter().map(|body| &body.joint).collect();
+        joints.sort_by_key(|joint| joint.iv);
+        joints
+    }
+
+    /// The joints that follow others with their couplings, in the order of the coordinates of the tree.
+    pub fn followers(&self) -> Vec<(&Joint, &Coupling<T>)> {
+        let mut all: Vec<_> = self.couplings.iter().map(|c| (&self.bodies[c.body].joint, c)).collect();
+        all.sort_by_key(|(joint, _)| joint.iv);
+        all
+    }
+
     /// The bodies whose joints are left to choose.
-    pub fn free_bodies(&self) -> impl Iterator<Item = BodyId> + '_ {
+    pub fn free_bodies(&self) -> impl Iterator<Item = BodyId> + Clone + '_ {
         (0..self.bodies.len()).filter(|b| self.coupling_of(*b).is_none())
+    }
+
+    /// The bodies with joints that are left to choose.
+    pub fn freely_jointed(&self) -> impl Iterator<Item = &Body<T>> + Clone + '_ {
+        self.free_bodies().map(|b| &self.bodies[b])
     }
 
     /// Index into q̇ of what moves the joint of a body of one coordinate, and how fast it moves per unit of that.
@@ -74,6 +115,23 @@ impl<T> Model<T> {
 }
 
 impl<T: Real> Model<T> {
+    /// Base parameters with the rows of the tree in which they stand, from those of the coordinates that are left to choose.
+    pub fn of_tree<'a>(&self, parameters: &'a [BaseParameter]) -> Cow<'a, [BaseParameter]> {
+        if self.couplings.is_empty() {
+            return Cow::Borrowed(parameters);
+        }
+        let mut moved_by: Vec<(usize, usize)> = Vec::new();
+        for (b, body) in self.bodies.iter().enumerate() {
+            let free = self.moved_by(b).0;
+            moved_by.extend((0..body.joint.kind.nv()).map(|k| (body.joint.iv + k, free + k)));
+        }
+        let of = |parameter: &BaseParameter| {
+            let rows = moved_by.iter().filter(|(_, free)| parameter.rows.contains(free)).map(|(row, _)| *row);
+            BaseParameter { rows: rows.collect(), ..parameter.clone() }
+        };
+        Cow::Owned(parameters.iter().map(of).collect())
+    }
+
     /// y: the configuration of the tree.
     pub fn tree_positions<'a>(&self, q: &'a [T]) -> Cow<'a, [T]> {
         self.extended(q, self.tree_nq(), |coupling| {

@@ -61,7 +61,7 @@ pub fn inertial_regressor<T: Real>(
     gravity: Vec3<T>,
 ) -> Vec<T> {
     let [q, qd, qdd] = &model.tree_motion(motion);
-    let motion: [&[T]; 3] = [q, qd, qdd];
+    let (motion, columns): ([&[T]; 3], _) = ([q, qd, qdd], &*model.of_tree(columns));
     let (poses, motions) = motions(model, motion, gravity);
     let mut y = vec![T::zero(); model.tree_nv() * columns.len()];
     for (k, parameter, unit) in units::<T>(columns) {
