@@ -40,6 +40,7 @@ fn special_case(code: &str) -> Option<(Source, ModelOptions)> {
         }
         "joint-order-unknown" => Some((file(code)?, order(&["elbow", "shoulder", "sholder"]))),
         "joint-order-twice" => Some((file(code)?, order(&["elbow", "shoulder", "elbow"]))),
+        "joint-order-follower" => Some((file(code)?, order(&["shoulder", "elbow"]))),
         "joint-order-missing" => Some((file(code)?, order(&["elbow"]))),
         "floating-by-option" => Some((file(code)?, ModelOptions { floating_base: true, ..options })),
         "support-rigid" | "support-floats" => {
