@@ -41,7 +41,7 @@ fn canonical(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Model<Dd> {
         .links
         .iter()
         .map(|link| match link.joint {
-            ReferenceJoint::Free => (Matrix3::identity(), -link.r),
+            ReferenceJoint::Free | ReferenceJoint::Ball => (Matrix3::identity(), -link.r),
             ReferenceJoint::Revolute | ReferenceJoint::Linear => (canonical_axes(random, &link.e), -link.r),
         })
         .collect();
@@ -50,6 +50,7 @@ fn canonical(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Model<Dd> {
             ReferenceJoint::Revolute => JointKind::Revolute,
             ReferenceJoint::Linear => JointKind::Prismatic,
             ReferenceJoint::Free => JointKind::Floating,
+            ReferenceJoint::Ball => JointKind::Spherical,
         };
         let placement = if link.joint == ReferenceJoint::Free {
             Transform::identity()
@@ -128,11 +129,11 @@ fn shuffle_coordinates(random: &mut Random, tree: &mut CentreOfMassTree<Dd>) {
 }
 
 /// `count` random robots of a kind, up to `links` links.
-fn compare_robots(branched: bool, floating: bool, count: u64, links: usize) {
+fn compare_robots([branched, floating, balls]: [bool; 3], count: u64, links: usize) {
     let mut disagreement = Disagreement::default();
     for seed in 0..count {
         let mut random = Random(seed);
-        let kind = RobotKind { links: 1 + random.below(links), branched, floating };
+        let kind = RobotKind { links: 1 + random.below(links), branched, floating, balls };
         let mut tree = random_robot(&mut random, kind);
         if random.below(3) == 0 {
             shuffle_coordinates(&mut random, &mut tree);
@@ -145,22 +146,29 @@ fn compare_robots(branched: bool, floating: bool, count: u64, links: usize) {
 
 #[test]
 fn both_authors_agree_on_chains() {
-    compare_robots(false, false, 100, 9);
+    compare_robots([false, false, false], 100, 9);
 }
 
 #[test]
 fn both_authors_agree_on_trees() {
-    compare_robots(true, false, 100, 14);
+    compare_robots([true, false, false], 100, 14);
 }
 
 #[test]
 fn both_authors_agree_on_floating_chains() {
-    compare_robots(false, true, 60, 8);
+    compare_robots([false, true, false], 60, 8);
 }
 
 #[test]
 fn both_authors_agree_on_floating_trees() {
-    compare_robots(true, true, 60, 14);
+    compare_robots([true, true, false], 60, 14);
+}
+
+#[test]
+fn both_authors_agree_on_robots_with_ball_joints() {
+    compare_robots([false, false, true], 60, 8);
+    compare_robots([true, false, true], 60, 12);
+    compare_robots([true, true, true], 60, 12);
 }
 
 /// Numbers as people and exporters write them: few digits, dust, masses of 1e-6 kg, ratios of 1e20, millimetres for metres.
