@@ -93,6 +93,10 @@ fn held(body: &Body<Dd>, scene: &Scene) -> Option<Held> {
         return (scene.base == Base::Fixed).then(Transform::identity);
     }
     let (_, q) = scene.locked.iter().find(|(name, _)| *name == body.joint.name)?;
+    // one number does not hold others, and is complained of
+    if !body.joint.kind.is_single() {
+        return Some(Transform::identity());
+    }
     Some(match body.joint.kind.turns() {
         false => body.joint.kind.motion(&[Dd::from(*q)]),
         true => {
