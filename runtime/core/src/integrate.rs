@@ -357,7 +357,7 @@ mod tests {
             Uneven { kind: JointKind::Spherical, first }
         }
         const BALLS: &[Uneven] = &[ball(1), ball(6)];
-        let mut q = [0.0; 11];
+        let mut q = [0.0f64; 11];
         q[1..5].fill(0.5);
         q[9] = 1.0;
         let qd = [1.0, 0.0, 0.0, 2.0, 3.0, 4.0, 0.0, 0.0, 5.0];

@@ -13,7 +13,7 @@ mod toml;
 
 use self::messages as say;
 use self::samples::Columns;
-use straightline_codegen::diagnostic::{Diagnostics, Place, Source};
+use straightline_codegen::diagnostic::{Diagnostic, Diagnostics, Place, Source};
 use straightline_core::drive::Actuator;
 use straightline_core::model::Model;
 use straightline_simulation::command::{Command, Samples};

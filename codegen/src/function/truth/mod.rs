@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use std::collections::BTreeMap;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::model::Model;
-use straightline_core::reference::{CentreOfMassFrame, CentreOfMassTree, ExtendedPosition, ReferenceJoint};
+use straightline_core::reference::{CentreOfMassFrame, CentreOfMassTree, ExtendedPosition};
 use straightline_core::{Dd, Dual, Real};
 
 mod bias_derivatives;
