@@ -258,7 +258,7 @@ pub fn not_supported_yet(owner: &str, what: &str, why: &str, help: &str) -> D {
 
 /// What is of one coordinate, of a joint that has several.
 pub fn several_coordinates(joint: &str, kind: &str, what: &str) -> D {
-    D::error("several-coordinates", format!("{kind} joint `{joint}` has a {what}"))
+    D::error("several-coordinates", format!("{kind} joint `{joint}` has {what}"))
         .detail("that belongs to one coordinate, and the joint has several")
         .help("leave it out, or write the joint as three revolute joints, with links without inertia in between")
 }

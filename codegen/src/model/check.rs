@@ -225,18 +225,18 @@ fn of_one_coordinate(joint: &WrittenJoint, diagnostics: &mut Diagnostics) {
     }
     let WrittenJoint { limits, drive, .. } = joint;
     let given = [
-        ("lower limit", &limits.lower),
-        ("upper limit", &limits.upper),
-        ("velocity limit", &limits.velocity),
-        ("effort limit", &limits.effort),
+        ("a lower limit", &limits.lower),
+        ("an upper limit", &limits.upper),
+        ("a velocity limit", &limits.velocity),
+        ("an effort limit", &limits.effort),
     ];
     // as good as not written
     let acting = [
         ("damping", &drive.damping),
         ("friction", &drive.friction),
-        ("rotor inertia", &drive.rotor_inertia),
-        ("armature", &drive.armature),
-        ("spring", &drive.spring_stiffness),
+        ("a rotor inertia", &drive.rotor_inertia),
+        ("an armature", &drive.armature),
+        ("a spring", &drive.spring_stiffness),
     ];
     let acting = acting.into_iter().filter(|(_, value)| value.as_ref().is_some_and(|value| value.value != 0.0));
     for (what, value) in given.into_iter().chain(acting) {

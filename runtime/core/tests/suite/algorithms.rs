@@ -921,6 +921,68 @@ fn the_column_of_the_last_joint_stands_still_in_its_own_axes_and_that_of_the_fir
     }
 }
 
+/// q as it moves with coordinate k alone, and everything else at rest.
+fn moved_along(case: &Case, k: usize) -> (Model<Rate>, Vec<Rate>) {
+    let (model, q, _) = Case { qd: unit(case.nv(), k), ..Case::new(case.seed) }.moving();
+    (model, q)
+}
+
+/// Momentum about the centre of mass, linear before angular.
+fn momentum_numbers<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
+    let all = momentum(model, q, qd);
+    [all.linear.to_array(), all.angular.to_array()].concat()
+}
+
+/// ∂h/∂q by increments of every joint; ḣ is taken along the motion of a robot whose configuration is moved.
+#[test]
+fn derivatives_of_momentum_are_rates_of_its_numbers() {
+    for case in cases() {
+        let held = |x: &[Dd]| x.iter().map(|&value| Rate { value, rate: Dd::ZERO }).collect::<Vec<_>>();
+        let found = centroidal_dynamics_derivatives(&case.model, [&case.q, &case.qd, &case.qdd]);
+        let (qd, qdd) = (held(&case.qd), held(&case.qdd));
+        let column = |k: usize| {
+            let (model, q) = moved_along(&case, k);
+            rates_of(momentum_numbers(&model, &q, &qd))
+        };
+        case.agree(&found.dh_dq, &by_rows(&(0..case.nv()).map(column).collect::<Vec<_>>()), DD);
+        // A q̈ + Ȧ q̇ at the moved configuration
+        let column = |k: usize| {
+            let (model, q) = moved_along(&case, k);
+            let all = centroidal_derivatives(&model, &q, &qd);
+            let row = |(a, b): (&[Rate], &[Rate])| {
+                let sum = |row: &[Rate], x: &[Rate]| {
+                    row.iter().zip(x).fold(Rate::zero(), |sum, (a, x)| sum + *a * *x)
+                };
+                sum(a, &qdd) + sum(b, &qd)
+            };
+            rates_of(all.map.chunks(case.nv()).zip(all.rate.chunks(case.nv())).map(row).collect())
+        };
+        case.agree(&found.dhdot_dq, &by_rows(&(0..case.nv()).map(column).collect::<Vec<_>>()), DD);
+    }
+}
+
+/// Jᵀ f of a force and a moment that are held in the world.
+#[test]
+fn the_derivative_of_a_held_force_is_the_rate_of_its_torques() {
+    for case in cases() {
+        let mut random = Random(case.seed ^ 0xf0);
+        let (force, moment) = (random.vector(), random.vector());
+        for frame in &case.model.frames {
+            let [_, slopes] =
+                jacobian_hessian_product(&case.model, &case.q, &[ForceOnFrame { frame, force, moment }]);
+            let column = |k: usize| {
+                let (model, q) = moved_along(&case, k);
+                let moving = model.frame(&frame.name).expect("the same frames");
+                let fixed = |x: Vec3<Dd>| x.map(|value| Rate { value, rate: Dd::ZERO });
+                let loaded = ForceOnFrame { frame: moving, force: fixed(force), moment: fixed(moment) };
+                let [torques, _] = jacobian_hessian_product(&model, &q, &[loaded]);
+                rates_of(torques)
+            };
+            case.agree(&slopes, &by_rows(&(0..case.nv()).map(column).collect::<Vec<_>>()), DD);
+        }
+    }
+}
+
 #[test]
 fn a_frame_on_the_world_stands_still() {
     let case = Case::new(3);
