@@ -23,7 +23,7 @@ pub fn random_with_frames(random: &mut Random, model: &Model<Dd>, function: Func
 
 fn configuration(random: &mut Random, model: &Model<Dd>) -> Vec<f64> {
     let mut q = random.list(model.nq(), 3.0);
-    for joint in model.bodies.iter().map(|body| &body.joint) {
+    for joint in model.free_joints() {
         let Some(first) = joint.kind.row().quaternion else { continue };
         let quaternion = &mut q[joint.iq + first..][..4];
         let norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();

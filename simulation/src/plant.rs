@@ -87,7 +87,7 @@ impl Plant {
     pub(crate) fn quantity(&self, i: usize) -> String {
         let (nq, nv) = (self.model.nq(), self.model.nv());
         let joint = |of: &dyn Fn(&Joint) -> std::ops::Range<usize>| {
-            let found = self.model.bodies.iter().map(|b| &b.joint).find(|j| of(j).contains(&i));
+            let found = self.model.free_joints().find(|j| of(j).contains(&i));
             found.map_or(String::new(), |j| format!("joint `{}`", j.name))
         };
         if i < nq {
@@ -231,7 +231,7 @@ impl Plant {
     /// dq/dt: q̇ of joints; of a floating base R v and ½ quaternion ∘ ω, of a ball joint the latter.
     pub(crate) fn configuration_rate(&self, q: &[f64], qd: &[f64]) -> Vec<f64> {
         let mut rate = vec![0.0; self.model.nq()];
-        for joint in self.model.bodies.iter().map(|b| &b.joint) {
+        for joint in self.model.free_joints() {
             let own = &mut rate[joint.iq..joint.iq + joint.kind.nq()];
             joint.kind.configuration_rate(joint.coordinates(q), joint.rates(qd), own);
         }
@@ -247,7 +247,7 @@ impl Plant {
 
 /// The first joint whose angle \[rad\] is beyond those whose sine has digits, and that angle.
 pub fn angle_beyond_sines<'a>(model: &'a Model<f64>, q: &[f64]) -> Option<(&'a str, f64)> {
-    let turning = model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.turns());
+    let turning = model.free_joints().filter(|j| j.kind.turns());
     let mut angles = turning.map(|j| (j.name.as_str(), q[j.iq]));
     angles.find(|(_, q)| q.is_nan() || q.abs() > DOMAIN_F64)
 }
@@ -263,13 +263,14 @@ pub(crate) fn joint_friction(model: &Model<f64>, qd: &[f64]) -> f64 {
         };
         e.damping * v * v + coulomb
     };
-    joints.map(|b| loss((qd[b.joint.iv], &b.effects))).sum()
+    let rates = model.tree_rates(qd);
+    joints.map(|b| loss((rates[b.joint.iv], &b.effects))).sum()
 }
 
 /// q with quaternions of length one.
 fn unit_quaternions(model: &Model<f64>, q: &[f64]) -> Vec<f64> {
     let mut q = q.to_vec();
-    for joint in model.bodies.iter().map(|b| &b.joint) {
+    for joint in model.free_joints() {
         joint.kind.normalise(&mut q[joint.iq..joint.iq + joint.kind.nq()]);
     }
     q

@@ -457,7 +457,7 @@ pub(crate) fn distance(plant: &Plant, y: &[f64]) -> f64 {
 
 /// Of every joint that has limits: how far it is from the nearer one, its name, and that limit.
 fn distances<'a>(plant: &'a Plant, y: &'a [f64]) -> impl Iterator<Item = (f64, &'a str, f64)> {
-    let joints = plant.model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single());
+    let joints = plant.model.free_joints().filter(|j| j.kind.is_single());
     joints.map(|joint| {
         let (q, Limits { lower, upper, .. }) = (y[joint.iq], joint.limits);
         let (limit, distance) = if q - lower < upper - q { (lower, q - lower) } else { (upper, upper - q) };

@@ -51,7 +51,7 @@ pub fn proposed(
         false => (name, Err("nothing to follow with, as the loop is not stable".to_string())),
     });
     let unit = |j: &JointGains| {
-        let joint = model.bodies.iter().map(|b| &b.joint).find(|joint| joint.iv == j.index);
+        let joint = model.free_joints().find(|joint| joint.iv == j.index);
         joint.map_or("", |joint| joint.kind.units()[0])
     };
     let units = gains.joints.iter().map(unit).collect();

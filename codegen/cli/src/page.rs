@@ -64,7 +64,7 @@ pub fn page(
     page.heading("Joints", "Force and moment are what the joint carries, at most.");
     let head = ["joint", "peak", "at", "rms", "speed", "power", "given", "taken", "force", "moment"];
     page.table(&head, &joint_rows(found));
-    let joint = |name: &str| model.bodies.iter().map(|b| &b.joint).find(|joint| joint.name == name);
+    let joint = |name: &str| model.free_joints().find(|joint| joint.name == name);
     let cards: Vec<(String, Vec<String>)> = found
         .joints
         .iter()

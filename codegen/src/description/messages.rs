@@ -36,6 +36,12 @@ pub const CODES: &[&str] = &[
     "written-twice",
     "not-symmetric",
     "not-supported-yet",
+    "coupling-joint",
+    "coupling-ratio-zero",
+    "coupled-twice",
+    "coupling-cycle",
+    "elastic-follower",
+    "joint-order-follower",
     "floating-joint",
     "several-coordinates",
     "negative-effect",
@@ -261,6 +267,46 @@ pub fn several_coordinates(joint: &str, kind: &str, what: &str) -> D {
     D::error("several-coordinates", format!("{kind} joint `{joint}` has {what}"))
         .detail("that belongs to one coordinate, and the joint has several")
         .help("leave it out, or write the joint as three revolute joints, with links without inertia in between")
+}
+
+/// A coupling of a joint that is not there, does not move, or has several coordinates.
+pub fn coupling_joint<'a>(follower: &str, joint: &str, joints: impl IntoIterator<Item = &'a str>) -> D {
+    let what = format!("coupling of joint `{}`: no joint with one coordinate is named `{}`", cut(follower), cut(joint));
+    let d = D::error("coupling-joint", what);
+    match did_you_mean(joint, joints) {
+        Some(hint) => d.help(hint),
+        None => d.help("name a joint that turns or slides"),
+    }
+}
+
+/// A coupling that lets nothing move.
+pub fn coupling_ratio_zero(joint: &str) -> D {
+    D::error("coupling-ratio-zero", format!("joint `{}` follows another one with the ratio 0", cut(joint)))
+        .help("a joint that stands still is a fixed one: write it so")
+}
+
+/// A joint that follows two others.
+pub fn coupled_twice(joint: &str, first: &str, second: &str) -> D {
+    let what = format!("joint `{}` follows both `{}` and `{}`", cut(joint), cut(first), cut(second));
+    D::error("coupled-twice", what).help("keep one of the couplings")
+}
+
+/// Joints that follow each other in a circle.
+pub fn coupling_cycle(joints: &[&str]) -> D {
+    D::error("coupling-cycle", format!("joints follow each other in a circle: {}", list(joints)))
+        .help("leave one of them without a coupling: its coordinate moves the others")
+}
+
+/// An elastic drive of a joint whose coordinate is shifted against the one that it follows.
+pub fn elastic_follower(drive: &str, joint: &str) -> D {
+    let what = format!("{drive}: joint `{}` follows another one with an offset, and the transmission is elastic", cut(joint));
+    D::error("elastic-follower", what).help("let the drive turn the joint that is followed, with the product of the ratios")
+}
+
+/// A joint order with a joint that has no coordinate.
+pub fn joint_order_follower(name: &str) -> D {
+    D::error("joint-order-follower", format!("joint order: `{}` follows another joint and has no coordinate", cut(name)))
+        .help("leave it out")
 }
 
 /// A floating joint.

@@ -69,7 +69,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
         reader.complain(&(0..0), messages::unknown_format());
         return None;
     }
-    reader.check_keys(&top, &["robot", "link", "joint", "frame", "drive"]);
+    reader.check_keys(&top, &["robot", "link", "joint", "coupling", "frame", "drive"]);
     let mut description = Description::new(&FORMAT, Noted::assumed("robot".to_string()));
     reader.require(&top, "robot", "[robot]\\nname = \"...\"");
     if let Some(robot) = reader.table_at(&top, "robot", "[robot]") {
@@ -92,6 +92,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     for table in reader.tables_at(&top, "frame") {
         description.frames.extend(read_frame(&mut reader, table));
     }
+    description.couplings = reader.couplings_at(&top);
     description.drives = reader.drives_at(&top);
     description.ignored = reader.into_ignored();
     Some(description)
@@ -148,13 +149,12 @@ fn read_joint(reader: &mut FileReader, mut table: TomlTable) -> Option<WrittenJo
     let axis = axis.unwrap_or_else(|| reader.value([0.0, 0.0, 1.0], &table.span));
     let limits = reader.limits_at(&table, "limits");
     let drive = reader.drive_at(&table);
-    for (key, why) in [
-        ("transmission", "it would couple coordinates of drives and joints"),
-        ("mimic", "its coordinate would follow that of another joint"),
+    for (key, why, help) in [
+        ("transmission", "it would couple coordinates of drives and joints", "remove `transmission`"),
+        ("mimic", "whom a joint follows is said beside the joints", "write it as a table `[[coupling]]` with `joint`, `follows`, `ratio` and `offset`"),
     ] {
         if let Some((_, span)) = table.get(key) {
-            let help = format!("remove `{key}`");
-            reader.complain(&span, messages::not_supported_yet(&table.owner, key, why, &help));
+            reader.complain(&span, messages::not_supported_yet(&table.owner, key, why, help));
         }
     }
     // a kind that was complained of stands for the one with an axis and no limits, so that the axis is judged in the same run

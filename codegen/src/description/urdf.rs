@@ -7,7 +7,7 @@
 use super::reader::{FileReader, Range64};
 use super::{
     messages, Angle, AngleUnit, Description, FileFormat, JointDrive, JointLimits, JointType, Noted, Placement,
-    Rotation, WrittenInertial, WrittenJoint, WrittenLink, WrittenPose,
+    Rotation, WrittenCoupling, WrittenInertial, WrittenJoint, WrittenLink, WrittenPose,
 };
 use crate::diagnostic::wording::closest;
 use crate::diagnostic::{Diagnostics, Source};
@@ -96,7 +96,10 @@ fn read_document(mut reader: FileReader, document: &Document) -> Option<Descript
     for node in children(root) {
         match local_name(root, node) {
             Some("link") => description.add_link(read_link(&mut reader, node)),
-            Some("joint") => description.add_joint(read_joint(&mut reader, node)),
+            Some("joint") => {
+                let joint = read_joint(&mut reader, node, &mut description.couplings);
+                description.add_joint(joint);
+            }
             _ => skip(&mut reader, "the robot", node, &["link", "joint"]),
         }
     }
@@ -321,7 +324,11 @@ fn read_inertia(reader: &mut FileReader, owner: &str, node: Node) -> Option<Note
     Some(reader.value(Sym3 { xx: xx?, xy: xy?, xz: xz?, yy: yy?, yz: yz?, zz: zz? }, &tag(node)))
 }
 
-fn read_joint(reader: &mut FileReader, node: Node) -> Option<WrittenJoint> {
+fn read_joint(
+    reader: &mut FileReader,
+    node: Node,
+    couplings: &mut Vec<WrittenCoupling>,
+) -> Option<WrittenJoint> {
     let name = name_of(reader, "joint", node, "name", "<joint name=\"...\" type=\"revolute\">");
     let owner = name.as_ref().map_or("a joint".to_string(), |n| format!("joint `{}`", n.value));
     let kind = required(reader, &owner, node, "type", "<joint name=\"...\" type=\"revolute\">")
@@ -363,16 +370,25 @@ fn read_joint(reader: &mut FileReader, node: Node) -> Option<WrittenJoint> {
         drive.damping = read("damping");
         drive.friction = read("friction");
     }
-    if let Some(element) = mimic.filter(|_| moves) {
-        let follows = match element.attribute("joint") {
-            Some(joint) => format!("its coordinate would follow that of joint `{joint}`"),
-            None => "its coordinate would follow that of another joint".to_string(),
-        };
-        let help = "make the joint fixed, or remove `<mimic>` to give it a coordinate of its own";
-        reader.complain(&tag(element), messages::not_supported_yet(&owner, "mimic", &follows, help));
+    if let (Some(element), Some(name)) = (mimic.filter(|_| moves), &name) {
+        couplings.extend(read_mimic(reader, &owner, name, element));
     }
     let placement = Placement::Frames { origin, axis };
     Some(WrittenJoint { name: name?, kind: kind?, parent: parent?, child: child?, placement, limits, drive })
+}
+
+/// Whose coordinate a joint follows, and how: q = multiplier q_joint + offset.
+fn read_mimic(reader: &mut FileReader, owner: &str, joint: &Noted<String>, node: Node) -> Option<WrittenCoupling> {
+    let owner = format!("mimic of {owner}");
+    check_attributes(reader, &owner, node, &["joint", "multiplier", "offset"]);
+    let source = required(reader, &owner, node, "joint", "<mimic joint=\"...\"/>");
+    let source = source.and_then(|source| reader.name("joint", source.value(), &source.range_value()));
+    let mut read = |name: &str, default: f64| match node.attribute_node(name) {
+        Some(attribute) => number(reader, &format!("{name} of {owner}"), attribute, Range64::Finite),
+        None => Some(reader.value(default, &tag(node))),
+    };
+    let (ratio, offset) = (read("multiplier", 1.0), read("offset", 0.0));
+    Some(WrittenCoupling { joint: joint.clone(), source: source?, ratio: ratio?, offset: offset? })
 }
 
 fn read_kind(reader: &mut FileReader, owner: &str, attribute: Attribute) -> Option<Noted<JointType>> {

@@ -36,7 +36,10 @@ const KEPT_FIRST: [usize; PER_BODY] = [4, 7, 5, 6, 8, 1, 2, 3, 9, 0];
 /// The base parameters of a robot whose reduced frames have these poses in its canonical ones, and what its scene makes inputs.
 pub(crate) fn find(model: &Model<Dd>, frames: &[Transform<Dd>], scene: &Scene) -> BaseParameterSets {
     let joint_parameters = model.base_parameters.joint_parameters.clone();
-    let search = BaseSearch { model, frames, states: states(model, scene.gravity == Gravity::Input), joint_parameters };
+    // whose joints all have coordinates of their own, in motions of those that follow others
+    let tree = Model { couplings: Vec::new(), ..model.clone() };
+    let states = states(model, scene.gravity == Gravity::Input);
+    let search = BaseSearch { model: &tree, coupled: model, frames, states, joint_parameters };
     let of_forces = search.grouped(&search.by_energies(), &search.joint_parameters);
     let of_support = search.grouped(&search.by_support(), &[]);
     BaseParameterSets {
@@ -55,9 +58,11 @@ fn of_scene(model: &Model<Dd>, scene: &Scene) -> Vec<BaseParameter> {
         else {
             continue;
         };
-        let path = std::iter::successors(Some(body), |b| model.bodies[*b].parent).map(|b| &model.bodies[b].joint);
-        let mut rows: Vec<usize> = path.flat_map(|joint| joint.iv..joint.iv + joint.kind.nv()).collect();
+        let path = std::iter::successors(Some(body), |b| model.bodies[*b].parent);
+        let of_joint = |b: BodyId| (0..model.bodies[b].joint.kind.nv()).map(move |k| model.moved_by(b).0 + k);
+        let mut rows: Vec<usize> = path.flat_map(of_joint).collect();
         rows.sort_unstable();
+        rows.dedup();
         found.extend(link_units().iter().enumerate().map(|(entry, unit)| {
             let kind = BaseParameterKind::Inertia { entry, unit: unit.seen_from(&frame.placement) };
             BaseParameter { body, kind, rows: rows.clone(), terms: Vec::new() }
@@ -69,6 +74,8 @@ fn of_scene(model: &Model<Dd>, scene: &Scene) -> Vec<BaseParameter> {
 /// A motion under gravity.
 struct SampledMotion {
     motion: [Vec<Dd>; 3],
+    /// That of all joints of the tree.
+    of_tree: [Vec<Dd>; 3],
     gravity: Vec3<Dd>,
 }
 
@@ -76,7 +83,7 @@ fn states(model: &Model<Dd>, any_gravity: bool) -> Vec<SampledMotion> {
     let (lever, mut random) = (longest_lever(model), Random(SEED));
     let mut state = || {
         let mut motion = [model.nq(), model.nv(), model.nv()].map(|n| vec![Dd::ZERO; n]);
-        for joint in model.bodies.iter().map(|body| &body.joint) {
+        for joint in model.free_joints() {
             let unit = if joint.kind.slides() { lever } else { 1.0 };
             let mut put =
                 |to: &mut [Dd], bound: f64| to.iter_mut().for_each(|x| *x = Dd::from(random.symmetric(bound)));
@@ -89,7 +96,8 @@ fn states(model: &Model<Dd>, any_gravity: bool) -> Vec<SampledMotion> {
             true => Vec3::from([0; 3].map(|_| Dd::from(random.symmetric(10.0)))),
             false => model.gravity,
         };
-        SampledMotion { motion, gravity }
+        let of_tree = model.tree_motion(motion.each_ref().map(|x| &x[..])).map(|x| x.into_owned());
+        SampledMotion { motion, of_tree, gravity }
     };
     (0..STATES).map(|_| state()).collect()
 }
@@ -101,7 +109,10 @@ struct Dependence {
 }
 
 struct BaseSearch<'a> {
+    /// The tree.
     model: &'a Model<Dd>,
+    /// The robot, whose joints may follow others.
+    coupled: &'a Model<Dd>,
     frames: &'a [Transform<Dd>],
     states: Vec<SampledMotion>,
     joint_parameters: Vec<JointParameter>,
@@ -112,7 +123,7 @@ impl BaseSearch<'_> {
     fn by_energies(&self) -> Vec<Dependence> {
         let lever = Dd::from(longest_lever(self.model));
         let mut columns: Vec<Vec<[Vec<Dd>; 2]>> = vec![Vec::new(); self.model.bodies.len()];
-        for SampledMotion { motion: [q, qd, _], gravity } in &self.states {
+        for SampledMotion { of_tree: [q, qd, _], gravity, .. } in &self.states {
             let model = Model { gravity: *gravity, ..self.model.clone() };
             // rows of V beside those of T
             let weight = gravity.to_array().into_iter().map(Dd::abs).fold(Dd::ZERO, |sum, x| sum + x);
@@ -138,7 +149,7 @@ impl BaseSearch<'_> {
     fn by_support(&self) -> Vec<Dependence> {
         let units: Vec<Vec<BaseParameter>> = (0..self.model.bodies.len()).map(|b| self.units(b)).collect();
         let mut columns: Vec<Vec<[Vec<Dd>; 2]>> = vec![vec![Default::default(); PER_BODY]; units.len()];
-        for SampledMotion { motion, gravity } in &self.states[..SUPPORT_STATES] {
+        for SampledMotion { of_tree: motion, gravity, .. } in &self.states[..SUPPORT_STATES] {
             let model = Model { gravity: *gravity, ..self.model.clone() };
             let wrenches = |motion: &[Vec<Dd>; 3], columns: &[BaseParameter]| {
                 let of = alg::support_wrenches(&model, motion.each_ref().map(|x| &x[..]), columns);
@@ -294,8 +305,8 @@ impl BaseSearch<'_> {
         let mut greatest = vec![0.0_f64; rows * columns];
         let base =
             BaseParameterSets { of_forces: found.clone(), of_support: found.clone(), ..BaseParameterSets::default() };
-        for SampledMotion { motion, gravity } in &self.states[..TRIED] {
-            let model = Model { gravity: *gravity, base_parameters: base.clone(), ..self.model.clone() };
+        for SampledMotion { motion, gravity, .. } in &self.states[..TRIED] {
+            let model = Model { gravity: *gravity, base_parameters: base.clone(), ..self.coupled.clone() };
             let y = regressor(&model, motion.each_ref().map(|x| &x[..]));
             greatest.iter_mut().zip(&y).for_each(|(greatest, y)| *greatest = greatest.max(y.to_f64().abs()));
         }

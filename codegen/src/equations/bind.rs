@@ -69,7 +69,7 @@ impl Scene {
                 false => given.next().expect("a port per input").clone(),
             };
             if quantity.rate().is_some() {
-                for joint in robot.model.bodies.iter().map(|b| &b.joint) {
+                for joint in robot.model.free_joints() {
                     if self.zero.joints_at_rest.contains(&joint.name) {
                         values[joint.iv..joint.iv + joint.kind.nv()].fill(T::zero());
                     }
@@ -182,7 +182,7 @@ impl Scene {
 impl Selection {
     /// The wanted joints, in the order of their coordinates.
     fn joints(&self, model: &Model<Dd>) -> Vec<usize> {
-        let joints = model.joints();
+        let joints = model.tree_joints();
         let is_wanted = |i: &usize| self.joints.is_empty() || self.joints.contains(&joints[*i].name);
         (0..joints.len()).filter(is_wanted).collect()
     }
@@ -211,7 +211,7 @@ impl Selection {
 
     /// The joints in the order in which they are named.
     fn named<'a>(&'a self, model: &'a Model<Dd>) -> impl Iterator<Item = &'a Joint> {
-        let joint = |name: &String| model.bodies.iter().map(|b| &b.joint).find(|j| j.name == *name);
+        let joint = |name: &String| model.free_joints().find(|j| j.name == *name);
         self.joints.iter().filter_map(joint)
     }
 }

@@ -54,7 +54,7 @@ pub fn base_parameter_lists(model: &Model<Dd>, functions: &[Function]) -> Vec<Ba
 /// The sum that a parameter is, its own body's terms first, the greatest factors before others.
 fn name(model: &Model<Dd>, parameter: &BaseParameter) -> String {
     let own = &model.bodies[parameter.body].joint;
-    let rank = model.joints().iter().position(|joint| joint.iv == own.iv).unwrap_or(0);
+    let rank = model.tree_joints().iter().position(|joint| joint.iv == own.iv).unwrap_or(0);
     let mut terms: Vec<(bool, f64, String)> = parameter
         .terms
         .iter()
@@ -99,7 +99,7 @@ fn symbol(model: &Model<Dd>, place: usize) -> (usize, &'static str) {
     if place < links {
         return (place / PER_BODY, SYMBOLS[place % PER_BODY]);
     }
-    let joints = model.joints();
+    let joints = model.tree_joints();
     let single: Vec<usize> = (0..joints.len()).filter(|k| joints[*k].kind.is_single()).collect();
     let (kind, joint) = ((place - links) / single.len(), (place - links) % single.len());
     (single[joint], model.base_parameters.joint_parameters[kind].symbol())

@@ -38,7 +38,7 @@ impl RobotFunction for GravityDerivative {
             let entry = |k: usize| columns[k % nv][k / nv].derivatives[0];
             return [(0..nv * nv).map(entry).collect(), alg::gravity_force(model, q)].concat();
         };
-        let mut all = alg::reduced_inverse_dynamics_derivatives(torques, [q, &rest, &rest]);
+        let mut all = forms.rigid_derivatives(torques, [q, &rest, &rest]);
         // the Hessian of potential energy
         if rates_are_of_coordinates(torques) {
             for (i, j) in (0..nv).flat_map(|i| (0..i).map(move |j| (i, j))) {
@@ -100,7 +100,7 @@ impl RobotFunction for CoriolisMatrix {
         let c = match forms.reduced.map(|[torques, _]| torques).filter(|form| rates_are_of_coordinates(form)) {
             Some(torques) => {
                 let half: Vec<T> = qd.iter().map(|rate| *rate * T::constant(straightline_core::Dd::HALF)).collect();
-                alg::reduced_inverse_dynamics_derivatives(torques, [q, &half, &forms.rest()]).dtau_dqd
+                forms.rigid_derivatives(torques, [q, &half, &forms.rest()]).dtau_dqd
             }
             None => alg::coriolis_matrix(forms.model, q, qd),
         };

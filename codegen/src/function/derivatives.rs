@@ -172,8 +172,7 @@ impl<T: Real> Forms<'_, T> {
     /// τ = H q̈ + h and its derivatives.
     pub fn inverse_dynamics_derivatives(&self, motion: [&[T]; 3]) -> DerivativeBlocks<T> {
         let Some([torques, _]) = self.reduced else { return by_directions(self.model, motion) };
-        let rigid =
-            self.with_limbs(|l| alg::reduced_inverse_dynamics_derivatives_with_limbs(torques, motion, l.subtree));
+        let rigid = self.rigid_derivatives(torques, motion);
         let mut all = DerivativeBlocks {
             mass_matrix: self.with_rotors(rigid.mass_matrix),
             tau: self.with_effects(rigid.tau, motion),
@@ -190,11 +189,24 @@ impl<T: Real> Forms<'_, T> {
 }
 
 impl<T: Real> Forms<'_, T> {
+    /// Of the bodies by a reduced robot, which is a tree whose joints all have coordinates of their own.
+    pub(super) fn rigid_derivatives(&self, torques: &ReducedModel<T>, motion: [&[T]; 3]) -> DerivativeBlocks<T> {
+        let (model, [q, qd, qdd]) = (self.model, &self.model.tree_motion(motion));
+        let motion: [&[T]; 3] = [q, qd, qdd];
+        let all = self.with_limbs(|l| alg::reduced_inverse_dynamics_derivatives_with_limbs(torques, motion, l.subtree));
+        DerivativeBlocks {
+            tau: model.free_forces(all.tau),
+            mass_matrix: model.free_symmetric(all.mass_matrix),
+            dtau_dq: model.free_square(all.dtau_dq),
+            dtau_dqd: model.free_square(all.dtau_dqd),
+        }
+    }
+
     /// ∂(H x)/∂q of an x that is held, by rows: what inverse dynamics does at rest, without gravity.
     pub(crate) fn inertial_slopes(&self, q: &[T], x: &[T]) -> Vec<T> {
         if let Some([torques, _]) = self.reduced {
             let weightless = ReducedModel { gravity: Vec3::zero(), ..torques.clone() };
-            return alg::reduced_inverse_dynamics_derivatives(&weightless, [q, &self.rest(), x]).dtau_dq;
+            return self.rigid_derivatives(&weightless, [q, &self.rest(), x]).dtau_dq;
         }
         let nv = self.model.nv();
         let wide = self.model.map(Dual::<T, 1>::fixed);
@@ -249,7 +261,7 @@ fn along_tangent<T: Real>(model: &Model<T>, q: &[T], by_q: &[T]) -> Vec<T> {
 /// The configuration as it moves with velocity coordinate `k` alone.
 pub(crate) fn along<T: Real>(model: &Model<T>, q: &[T], k: usize) -> Vec<Dual<T, 1>> {
     let mut moving: Vec<Dual<T, 1>> = q.iter().map(|x| Dual::fixed(*x)).collect();
-    for joint in model.bodies.iter().map(|body| &body.joint) {
+    for joint in model.free_joints() {
         let (places, coordinates) = (joint.iq..joint.iq + joint.kind.nq(), joint.iv..joint.iv + joint.kind.nv());
         if !coordinates.contains(&k) {
             continue;

@@ -82,8 +82,14 @@ impl<'a, T: Real> Forms<'a, T> {
     /// τ = H q̈ + h.
     pub fn inverse_dynamics(&self, q: &[T], qd: &[T], qdd: &[T]) -> Vec<T> {
         let Some([torques, _]) = self.reduced else { return alg::inverse_dynamics(self.model, q, qd, qdd) };
-        let rigid = self.with_limbs(|l| alg::reduced_inverse_dynamics_with_limbs(torques, [q, qd, qdd], l.wrench));
-        self.with_effects(rigid, [q, qd, qdd])
+        self.with_effects(self.rigid_forces(torques, [q, qd, qdd]), [q, qd, qdd])
+    }
+
+    /// Forces of the bodies by a reduced robot, which is a tree whose joints all have coordinates of their own.
+    fn rigid_forces(&self, torques: &ReducedModel<T>, motion: [&[T]; 3]) -> Vec<T> {
+        let [q, qd, qdd] = &self.model.tree_motion(motion);
+        let of_tree = self.with_limbs(|l| alg::reduced_inverse_dynamics_with_limbs(torques, [q, qd, qdd], l.wrench));
+        self.model.free_forces(of_tree)
     }
 
     /// Forces of the bodies with those that rotors, friction and springs of the joints take.
@@ -106,7 +112,9 @@ impl<'a, T: Real> Forms<'a, T> {
     pub fn gravity_force(&self, q: &[T]) -> Vec<T> {
         match self.reduced {
             Some([torques, _]) => {
-                self.with_limbs(|l| alg::reduced_gravity_force_with_limbs(torques, q, l.first_moment))
+                let q = &*self.model.tree_positions(q);
+                let of_tree = self.with_limbs(|l| alg::reduced_gravity_force_with_limbs(torques, q, l.first_moment));
+                self.model.free_forces(of_tree)
             }
             None => alg::gravity_force(self.model, q),
         }
@@ -115,8 +123,7 @@ impl<'a, T: Real> Forms<'a, T> {
     /// h(q, q̇).
     pub fn bias_force(&self, q: &[T], qd: &[T]) -> Vec<T> {
         let Some([torques, _]) = self.reduced else { return alg::bias_force(self.model, q, qd) };
-        let motion = [q, qd, &self.rest()];
-        let rigid = self.with_limbs(|l| alg::reduced_inverse_dynamics_with_limbs(torques, motion, l.wrench));
+        let rigid = self.rigid_forces(torques, [q, qd, &self.rest()]);
         let passive = alg::passive_force(self.model, q, qd);
         rigid.into_iter().zip(passive).map(|(f, p)| f + p).collect()
     }
@@ -125,8 +132,7 @@ impl<'a, T: Real> Forms<'a, T> {
     pub fn velocity_force(&self, q: &[T], qd: &[T]) -> Vec<T> {
         let Some([torques, _]) = self.reduced else { return alg::velocity_force(self.model, q, qd) };
         let weightless = ReducedModel { gravity: Vec3::zero(), ..torques.clone() };
-        let motion = [q, qd, &self.rest()];
-        self.with_limbs(|l| alg::reduced_inverse_dynamics_with_limbs(&weightless, motion, l.wrench))
+        self.rigid_forces(&weightless, [q, qd, &self.rest()])
     }
 
     /// The same robot without gravity, frames and limbs in lanes.
@@ -142,7 +148,8 @@ impl<'a, T: Real> Forms<'a, T> {
     /// H(q), by rows.
     pub fn mass_matrix(&self, q: &[T]) -> Vec<T> {
         let Some([_, composite]) = self.reduced else { return alg::mass_matrix(self.model, q) };
-        self.with_rotors(alg::reduced_mass_matrix(composite, q))
+        let of_tree = alg::reduced_mass_matrix(composite, &self.model.tree_positions(q));
+        self.with_rotors(self.model.free_symmetric(of_tree))
     }
 
     /// q̇ = 0 or q̈ = 0.

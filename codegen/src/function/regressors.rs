@@ -22,7 +22,9 @@ impl<T: Real> Forms<'_, T> {
         match self.reduced {
             Some([reduced, _]) => {
                 let reduced = ReducedModel { gravity, ..reduced.clone() };
-                alg::reduced_inertial_regressor(&reduced, &self.model.base_parameters.of_forces, motion)
+                let (model, [q, qd, qdd]) = (self.model, &self.model.tree_motion(motion));
+                let columns = model.of_tree(&model.base_parameters.of_forces);
+                model.free_rows(alg::reduced_inertial_regressor(&reduced, &columns, [q, qd, qdd]), columns.len())
             }
             None => alg::inertial_regressor(self.model, &self.model.base_parameters.of_forces, motion, gravity),
         }

@@ -15,6 +15,8 @@ pub(super) struct Solution<'a, 'b, T> {
 impl<'a, 'b, T: Real> Solution<'a, 'b, T> {
     pub(super) fn new(forms: &'a Forms<'b, T>, q: &'a [T]) -> Self {
         let factor = match forms.method {
+            // what follows another joint is no body that is free at its own
+            _ if !forms.model.couplings.is_empty() => Some(alg::Ltdl::factor(forms.model, &forms.mass_matrix(q))),
             ForwardDynamicsMethod::Factorisation => Some(alg::Ltdl::factor(forms.model, &forms.mass_matrix(q))),
             _ => None,
         };

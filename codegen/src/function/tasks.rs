@@ -131,7 +131,7 @@ impl RobotFunction for InverseKinematicsStep {
 fn slope_of_holding_torques<T: Real>(forms: &Forms<'_, T>, q: &[T]) -> Vec<T> {
     let (rest, nv) = (forms.rest(), forms.model.nv());
     let weights = torque_weights(
-        forms.model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single()).map(|j| (j.iv, j.limits)),
+        forms.model.free_joints().filter(|j| j.kind.is_single()).map(|j| (j.iv, j.limits)),
         nv,
     );
     let torques = forms.inverse_dynamics(q, &rest, &rest);
@@ -157,7 +157,7 @@ fn torque_weights(joints: impl Iterator<Item = (usize, Limits)> + Clone, nv: usi
 /// How far each coordinate may step, of joints with one coordinate and limits.
 fn step_limits<T: Real>(forms: &Forms<'_, T>, q: &[T]) -> Vec<Option<StepLimits<T>>> {
     let mut all = vec![None; forms.model.nv()];
-    for joint in forms.model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single()) {
+    for joint in forms.model.free_joints().filter(|j| j.kind.is_single()) {
         let Limits { lower, upper, .. } = joint.limits;
         let to = |limit: f64| limit.is_finite().then(|| T::constant(Dd::from(limit)) - q[joint.iq]);
         let limits = StepLimits { lower: to(lower), upper: to(upper) };

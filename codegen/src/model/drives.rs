@@ -60,6 +60,15 @@ fn build(drive: &WrittenDrive, model: &Model<Dd>, diagnostics: &mut Diagnostics)
         .map(|(joint, ratio)| body(&owner, joint, model, diagnostics).map(|b| (b, Dd::from(*ratio))))
         .collect();
     let joints: Option<Vec<(BodyId, Dd)>> = joints.into_iter().collect();
+    let is_elastic = drive.stages.iter().any(|s| s.stiffness.is_some());
+    for (body, _) in joints.iter().flatten().filter(|_| is_elastic) {
+        if model.coupling_of(*body).is_some_and(|coupling| coupling.offset != Dd::ZERO) {
+            let joint = &model.bodies[*body].joint.name;
+            diagnostics.push(messages::elastic_follower(&owner, joint).at(&drive.name.place));
+            return None;
+        }
+    }
+    let joints = joints.map(|joints| on_free_joints(&joints, model, |x| x));
     let rotor = match &drive.rotor {
         None => None,
         Some((link, axis, inertia)) => {
@@ -89,13 +98,32 @@ fn build(drive: &WrittenDrive, model: &Model<Dd>, diagnostics: &mut Diagnostics)
         rotor,
         rating: rating(&drive.rating),
     };
-    let is_elastic = drive.stages.iter().any(|s| s.stiffness.is_some());
     if let (true, Actuator::Linear(LinearActuator { position: None, .. })) = (is_elastic, &built.actuator) {
         let example = "position = [1, 0, 0]";
         diagnostics.push(messages::missing_key(&owner, "position", example).at(&drive.name.place));
         return None;
     }
     fold_stages(drive, &mut built, diagnostics).then_some(built)
+}
+
+/// Ratios to joints, those that follow others as ratios to the joints that they follow.
+fn on_free_joints<T: Real>(
+    joints: &[(BodyId, T)],
+    model: &Model<Dd>,
+    number: impl Fn(Dd) -> T,
+) -> Vec<(BodyId, T)> {
+    let mut found: Vec<(BodyId, T)> = Vec::new();
+    for (body, n) in joints {
+        let (body, n) = match model.coupling_of(*body) {
+            Some(coupling) => (coupling.source, *n * number(coupling.ratio)),
+            None => (*body, *n),
+        };
+        match found.iter_mut().find(|(known, _)| *known == body) {
+            Some((_, sum)) => *sum = *sum + n,
+            None => found.push((body, n)),
+        }
+    }
+    found
 }
 
 fn rating(written: &WrittenRating) -> Rating<Dd> {
@@ -287,10 +315,10 @@ pub(crate) fn derived<T: Real>(
     (built, model): (&Drive<Dd>, &Model<Dd>),
 ) -> Drive<T> {
     let (folded, built) = (folded(drive, form), built.map(T::constant));
-    let ratio = |body: BodyId| {
-        let joint = &model.bodies[body].joint.name;
-        drive.joints.iter().find(|(name, _)| name.value == *joint).map(|(_, n)| *n * folded.ratio)
-    };
+    let body_of = |name: &str| model.bodies.iter().position(|body| body.joint.name == name);
+    let known = drive.joints.iter().filter_map(|(name, n)| Some((body_of(&name.value)?, *n * folded.ratio)));
+    let known = on_free_joints(&known.collect::<Vec<_>>(), model, T::constant);
+    let ratio = |body: BodyId| known.iter().find(|(joint, _)| *joint == body).map(|(_, n)| *n);
     let joints: Vec<(BodyId, T)> = built.joints.iter().map(|(body, n)| (*body, ratio(*body).unwrap_or(*n))).collect();
     let less = built.joints[0].1 / joints[0].1;
     let actuator = match &drive.actuator {

@@ -15,7 +15,8 @@ pub struct Limbs {
 /// All identical limbs of a robot, those nearest to the base where some carry others; none of a robot without a reduced form.
 pub fn limbs<T>(model: &Model<T>) -> Vec<Limbs> {
     let mut found = Vec::new();
-    if model.bodies.iter().any(|body| ReducedJoint::of(body.joint.kind).is_none()) {
+    let is_reduced = model.bodies.iter().all(|body| ReducedJoint::of(body.joint.kind).is_some());
+    if !is_reduced || !model.couplings.is_empty() {
         return found;
     }
     let mut carriers = vec![None];

@@ -32,6 +32,7 @@ pub(crate) mod angle;
 mod bodies;
 mod centres_of_mass;
 mod check;
+mod couplings;
 pub(crate) mod drives;
 mod flexible;
 pub(crate) mod geometry;
@@ -42,10 +43,11 @@ pub mod states;
 
 use self::flexible::Carrier;
 use crate::description::flexible::{BaseSupport, Flexible};
-use crate::description::{self, messages, Angle, Description, Noted, Rotation, WrittenPose};
+use crate::description::{self, messages, Angle, Description, Noted, Rotation, WrittenCoupling, WrittenPose};
 use crate::diagnostic::{Diagnostics, Place, Source};
 use geometry::{compose, vector};
 use std::collections::{BTreeMap, HashMap};
+use straightline_core::coupling::Coupling;
 use straightline_core::model::{Body, BodyId, Frame, Model};
 use straightline_core::spatial::Transform;
 use straightline_core::Dd;
@@ -74,6 +76,10 @@ pub struct ModelOptions {
     pub support: Option<BaseSupport>,
     /// All links and the support are rigid, whatever file and options say.
     pub rigid_links: bool,
+    /// Joints that follow others, beside those of the file.
+    pub couplings: Vec<WrittenCoupling>,
+    /// Every joint has a coordinate of its own, whatever file and options say.
+    pub uncoupled: bool,
 }
 
 impl Default for ModelOptions {
@@ -87,6 +93,8 @@ impl Default for ModelOptions {
             flexible: Vec::new(),
             support: None,
             rigid_links: false,
+            couplings: Vec::new(),
+            uncoupled: false,
         }
     }
 }
@@ -164,7 +172,8 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
     }
     check::motion(&assembly, description, diagnostics);
     add_frames(&mut assembly, options, tolerance, diagnostics);
-    order_joints(&mut assembly.bodies, options, diagnostics);
+    let couplings = couplings::resolve(description, options, &assembly.bodies, diagnostics);
+    order_joints(&mut assembly.bodies, &couplings, options, diagnostics);
     if let Some(gravity) = description.gravity.as_ref().filter(|g| options.gravity.is_none() && !is_gravity(&g.value)) {
         let value = format!("{:?}", gravity.value);
         diagnostics.push(messages::gravity_out_of_range(&value, GRAVITY).at(&gravity.place));
@@ -174,6 +183,7 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
         name: description.name.value.clone(),
         bodies: assembly.bodies,
         gravity: vector(gravity),
+        couplings,
         frames: assembly.frames,
         drives: Vec::new(),
         base_parameters: Default::default(),
@@ -309,15 +319,21 @@ fn add_frames(assembly: &mut Assembly, options: &ModelOptions, tolerance: f64, d
     }
 }
 
-/// Gives every joint its place in the coordinate vectors.
-fn order_joints(bodies: &mut [Body<Dd>], options: &ModelOptions, diagnostics: &mut Diagnostics) {
+/// Gives every joint its place in the coordinate vectors, those that follow others behind those that are left to choose.
+fn order_joints(
+    bodies: &mut [Body<Dd>],
+    couplings: &[Coupling<Dd>],
+    options: &ModelOptions,
+    diagnostics: &mut Diagnostics,
+) {
     let mut order: Vec<BodyId> = Vec::new();
+    let follows = |id: &BodyId| couplings.iter().any(|coupling| coupling.body == *id);
     match &options.joint_order {
-        None => order.extend(0..bodies.len()),
+        None => order.extend((0..bodies.len()).filter(|id| !follows(id))),
         Some(names) => {
             let index: HashMap<&str, BodyId> =
                 bodies.iter().enumerate().map(|(id, b)| (b.joint.name.as_str(), id)).collect();
-            let mut seen = vec![false; bodies.len()];
+            let mut seen: Vec<bool> = (0..bodies.len()).map(|id| follows(&id)).collect();
             let root = bodies.iter().position(|b| b.joint.kind.is_base());
             if let Some(root) = root.filter(|&r| !names.contains(&bodies[r].joint.name)) {
                 seen[root] = true;
@@ -329,6 +345,7 @@ fn order_joints(bodies: &mut [Body<Dd>], options: &ModelOptions, diagnostics: &m
                         let known = bodies.iter().map(|b| b.joint.name.as_str());
                         diagnostics.push(messages::joint_order_unknown(name, known));
                     }
+                    Some(&id) if follows(&id) => diagnostics.push(messages::joint_order_follower(name)),
                     Some(&id) if seen[id] => diagnostics.push(messages::joint_order_twice(name)),
                     Some(&id) => {
                         seen[id] = true;
@@ -343,6 +360,7 @@ fn order_joints(bodies: &mut [Body<Dd>], options: &ModelOptions, diagnostics: &m
             }
         }
     }
+    order.extend((0..bodies.len()).filter(follows));
     let (mut iq, mut iv) = (0, 0);
     for id in order {
         let joint = &mut bodies[id].joint;

@@ -67,7 +67,7 @@ pub(crate) fn weakest_joint(model: &Model<Dd>) -> Option<(BodyId, f64)> {
 fn each_feels_its_own_link(model: &Model<Dd>, inertia: Inertia) -> bool {
     let has_more =
         inertia == Inertia::WithDrives && !model.drives.is_empty() || model.bodies.iter().any(|b| b.load.is_some());
-    if has_more {
+    if has_more || !model.couplings.is_empty() {
         return false;
     }
     // H itself is at most the natural inertia and the rotor; what is near the bound is left to elimination
@@ -93,7 +93,7 @@ fn each_feels_its_own_link(model: &Model<Dd>, inertia: Inertia) -> bool {
 fn generic_configuration(model: &Model<Dd>, seed: usize) -> Vec<Dd> {
     let mut q: Vec<Dd> =
         (0..model.nq()).map(|i| Dd::from(4.0 * ((i * 3 + seed) as f64 * GOLDEN).fract() - 2.0)).collect();
-    for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_base()) {
+    for joint in model.free_joints().filter(|j| j.kind.is_base()) {
         let neutral = joint.kind.row().neutral;
         q[joint.iq..].iter_mut().zip(neutral).for_each(|(q, neutral)| *q = Dd::from(*neutral));
     }
@@ -118,8 +118,10 @@ fn natural_inertias(model: &Model<Dd>, q: &[Dd]) -> Vec<f64> {
             let joint = &bodies[carrier].joint;
             let arm = centre - poses[carrier].translation;
             let moment = mass * arm.dot(arm).to_f64() + own;
-            for (scale, measure) in scales[joint.iv..].iter_mut().zip(joint.kind.row().measures) {
-                *scale += if *measure == Measure::Length { mass } else { moment };
+            let (first, ratio) = model.moved_by(carrier);
+            let square = ratio.map_or(1.0, |ratio| ratio.to_f64() * ratio.to_f64());
+            for (scale, measure) in scales[first..].iter_mut().zip(joint.kind.row().measures) {
+                *scale += square * if *measure == Measure::Length { mass } else { moment };
             }
         }
     }
@@ -155,10 +157,12 @@ fn eliminate(model: &Model<Dd>, inertia: Inertia, q: &[Dd], tell: &mut dyn FnMut
         let pivot = pivot.to_f64().abs();
         pivot <= VANISHED * sizes[k] || pivot <= DUST * of_robot[usize::from(is_linear[k])]
     };
-    // the coordinates of a body and of all that carry it, those of the body itself last; drives may couple branches
+    // the coordinates of a body and of all that carry it, those of the body itself last; drives and joints that follow may couple branches
+    let joins_branches = with_drives || !model.couplings.is_empty();
+    let is_free = |b: &BodyId| model.coupling_of(*b).is_none();
     let chain = |body: BodyId| {
-        let bodies: Vec<BodyId> = match with_drives {
-            true => (0..=body).rev().collect(),
+        let bodies: Vec<BodyId> = match joins_branches {
+            true => (0..=body).rev().filter(is_free).collect(),
             false => std::iter::successors(Some(body), |&b| model.bodies[b].parent).collect(),
         };
         let coordinates = bodies.iter().flat_map(|b| {
@@ -170,7 +174,7 @@ fn eliminate(model: &Model<Dd>, inertia: Inertia, q: &[Dd], tell: &mut dyn FnMut
         coordinates
     };
     let mut found = Vec::new();
-    for body in (0..model.bodies.len()).rev() {
+    for body in (0..model.bodies.len()).rev().filter(is_free) {
         let mut rows = chain(body);
         for _ in 0..model.bodies[body].joint.kind.nv() {
             let k = rows.pop().expect("a body's chain has its own coordinates");
@@ -200,7 +204,7 @@ fn eliminate(model: &Model<Dd>, inertia: Inertia, q: &[Dd], tell: &mut dyn FnMut
 /// Which coordinates are lengths.
 fn linear_coordinates(model: &Model<Dd>) -> Vec<bool> {
     let mut linear = vec![false; model.nv()];
-    for joint in model.bodies.iter().map(|b| &b.joint) {
+    for joint in model.free_joints() {
         let measures = joint.kind.row().measures;
         linear[joint.iv..].iter_mut().zip(measures).for_each(|(l, measure)| *l = *measure == Measure::Length);
     }

@@ -57,7 +57,7 @@ pub(crate) fn of_port(model: &Model<Dd>, port: &Port, fast: bool, random: &mut R
     let mut x = values(model, port, Kind::Anywhere, random);
     match Quantity::of(port) {
         Some(Quantity::Velocity) if fast && port.len() == model.nv() => {
-            for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single()) {
+            for joint in model.free_joints().filter(|j| j.kind.is_single()) {
                 x[joint.iv] *= within(joint.limits.velocity, FAST);
             }
         }
@@ -93,7 +93,7 @@ pub(crate) fn values(model: &Model<Dd>, port: &Port, kind: Kind, random: &mut Ra
 
 fn configuration(model: &Model<Dd>, kind: Kind, random: &mut Random) -> Vec<f64> {
     let mut q = vec![0.0; model.nq()];
-    for joint in model.bodies.iter().map(|b| &b.joint) {
+    for joint in model.free_joints() {
         if let Some(first) = joint.kind.row().quaternion {
             let quaternion: Vec<f64> = (0..4).map(|_| random.symmetric(1.0)).collect();
             let norm = quaternion.iter().map(|x| x * x).sum::<f64>();

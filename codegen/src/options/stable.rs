@@ -7,6 +7,7 @@
 use crate::choices::Choice;
 use crate::description::drives::{TransmissionStage, WrittenActuator, WrittenDrive, WrittenRating, WrittenThermal};
 use crate::description::flexible::{BaseSupport, Bending, Flexible, WrittenSpring};
+use crate::description::WrittenCoupling;
 use crate::description::Noted;
 use crate::function::ContactFunction;
 use crate::model::{FrameOption, ModelOptions};
@@ -124,6 +125,7 @@ fields! {
     ModelOptions = {
         "floating_base": floating_base, "joint_order": joint_order, "angle_tolerance": angle_tolerance,
         "gravity": gravity, "frames": frames, "flexible": flexible, "support": support, "rigid_links": rigid_links,
+        "coupling": couplings, "uncoupled": uncoupled,
     }
     FrameOption : { "name": name, "link": link, "xyz": xyz, "rpy": rpy, }
     Effort : { "boxes": boxes, "time": time, "state": companions, }
@@ -138,7 +140,7 @@ fields! {
     }
     Scene = {
         "outputs": outputs, "by_columns": by_columns, "gravity": gravity, "base": base, "locked": locked,
-        "payload": payloads, "drive": drives, "flexible": flexible, "support": support, "zero": zero,
+        "payload": payloads, "drive": drives, "coupling": couplings, "flexible": flexible, "support": support, "zero": zero,
         "effects": effects, "parameter": parameters, "contacts": contacts, "staged": staged, "budget": budgets,
         "ranges": ranges, "regressor": regressor, .. places
     }
@@ -148,7 +150,7 @@ fields! {
     Effects = {
         "rotor_inertia": rotor_inertia, "damping": damping, "coulomb": coulomb, "springs": springs,
         "transmission_losses": transmission_losses, "elastic_transmissions": elastic_transmissions,
-        "elastic_links": elastic_links,
+        "elastic_links": elastic_links, "couplings": couplings,
     }
     Budget = {
         "max_flops": max_flops, "max_sincos": max_sincos, "max_live": max_live, "max_stack_bytes": max_stack_bytes,
@@ -181,6 +183,7 @@ fields! {
         "winding_housing": winding_housing, "housing_ambient": housing_ambient, "winding_time": winding_time,
         "housing_time": housing_time, "ambient": ambient, "limit": limit,
     }
+    WrittenCoupling : { "joint": joint, "follows": source, "ratio": ratio, "offset": offset, }
     Flexible : {
         "link": link, "from": from, "to": to, "segments": segments, "bending": bending, "torsion": torsion,
         "damping": damping,

@@ -26,7 +26,7 @@ pub fn input_box<T>(inputs: &[Port], scene: &Scene, model: &Model<T>) -> Result<
         let mut ranges = scene.input_ranges(port, model);
         let quantity = Quantity::of(port).ok_or(NoCertificate::Unlimited)?;
         if quantity.is_configuration() {
-            for joint in model.bodies.iter().map(|b| &b.joint) {
+            for joint in model.free_joints() {
                 let own = ranges[joint.iq..].iter_mut().zip(joint.kind.measures());
                 own.for_each(|(r, measure)| limit(r, default_range(measure)));
             }

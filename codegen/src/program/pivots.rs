@@ -112,7 +112,8 @@ const MOST_JOINTS: usize = 12;
 /// Whether something is known of this program: all joints turn or slide, no inertia is an input, and results are accelerations of a few
 /// joints, or their derivatives.
 pub fn is_arm(model: &Model<Dd>, function: Function, graph: &Graph) -> bool {
-    let turns_or_slides = model.bodies.iter().all(|b| b.joint.kind.elementary().is_some());
+    let is_elementary = model.bodies.iter().all(|b| b.joint.kind.elementary().is_some());
+    let turns_or_slides = is_elementary && model.couplings.is_empty();
     let is_known = |port: &Port| {
         use Quantity::{Acceleration, Configuration, Force, Gravity, Velocity};
         matches!(Quantity::of(port), Some(Configuration | Velocity | Acceleration | Force | Gravity))

@@ -188,7 +188,7 @@ fn drawn(
         Err(_) => vec![pair([-BOUND, BOUND])],
     };
     let is_configuration = Quantity::of(port).is_some_and(Quantity::is_configuration);
-    let joints = model.bodies.iter().map(|body| &body.joint).filter(|_| is_configuration);
+    let joints = model.free_joints().filter(|_| is_configuration);
     let quaternions = joints.filter_map(|joint| Some(joint.iq + joint.kind.row().quaternion?)).collect();
     if pairs.iter().all(|pair| *pair == pairs[0]) {
         pairs.truncate(1);

@@ -11,7 +11,9 @@ use crate::identifier::string_literals;
 use crate::options::stable::fnv_1a;
 use crate::report::FunctionReport;
 use rustc_hash::FxHashMap;
+use straightline_core::coupling::Coupling;
 use straightline_core::model::Limits;
+use straightline_core::Dd;
 use straightline_graph::expr::Port;
 use straightline_graph::Scalar;
 
@@ -129,6 +131,12 @@ impl Around<'_, '_, '_> {
             ("JOINT_NAMES", names(joints.iter().map(|j| &j.name).collect())),
             ("FRAME_NAMES", names(generated.frames.iter().collect())),
         ];
+        let followers = model.followers();
+        if !followers.is_empty() {
+            let sources: Vec<usize> = followers.iter().map(|(_, c)| model.bodies[c.source].joint.iq).collect();
+            plain.push(("FOLLOWER_NAMES", names(followers.iter().map(|(joint, _)| &joint.name).collect())));
+            plain.push(("FOLLOWED", format!("[usize; {}] = {sources:?}", sources.len())));
+        }
         if !drives.is_empty() {
             let states: Vec<usize> = drives.iter().map(straightline_core::drive::Drive::states).collect();
             plain.push(("NU", format!("usize = {}", drives.len())));
@@ -154,13 +162,18 @@ impl Around<'_, '_, '_> {
         }
         let single: Vec<&Limits> = joints.iter().filter(|j| j.kind.is_single()).map(|j| &j.limits).collect();
         let of = |number: fn(&Limits) -> f64| single.iter().map(|l| number(l)).collect::<Vec<f64>>();
+        let scalar = self.scalar();
+        let lines: [fn(&Coupling<Dd>) -> Dd; 2] = [|c| c.ratio, |c| c.offset];
+        for (name, of) in ["FOLLOWER_RATIOS", "FOLLOWER_OFFSETS"].into_iter().zip(lines).filter(|_| !followers.is_empty()) {
+            let values: Vec<f64> = followers.iter().map(|(_, c)| of(c).to_f64()).collect();
+            self.numbers(name, scalar, &[values.len()], &values, &|found, x| found == scalar.rounded(x))?;
+        }
         let limits = [
             ("LOWER_LIMITS", of(|l| l.lower)),
             ("UPPER_LIMITS", of(|l| l.upper)),
             ("VELOCITY_LIMITS", of(|l| l.velocity)),
             ("EFFORT_LIMITS", of(|l| l.effort)),
         ];
-        let scalar = self.scalar();
         for (name, values) in limits {
             let of_scalar = |x: f64| scalar.rounded(x);
             self.numbers(name, scalar, &[values.len()], &values, &|found, x| found == of_scalar(x))?;

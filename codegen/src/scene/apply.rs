@@ -11,6 +11,7 @@ use crate::model::merge::{merge, Part};
 use crate::model::{angle, drives};
 use straightline_core::algorithms::composing_pays;
 use straightline_core::base_parameters::JointParameter;
+use straightline_core::coupling::Coupling;
 use straightline_core::drive::{Drive, Rotor};
 use straightline_core::model::{self, Body, BodyId, Frame, JointEffects, Model};
 use straightline_core::spatial::{SpatialInertia, Sym3, Transform, Vec3};
@@ -26,7 +27,7 @@ pub fn apply(model: Model<Dd>, scene: &Scene, diagnostics: &mut Diagnostics) -> 
         Some(source) => diagnostics.add_source(source),
         None => check::alone(scene, diagnostics),
     }
-    let held: Vec<Option<Held>> = model.bodies.iter().map(|body| held(body, scene)).collect();
+    let held: Vec<Option<Held>> = (0..model.bodies.len()).map(|body| held(&model, body, scene)).collect();
     check::against(&model, scene, &held.iter().map(Option::is_some).collect::<Vec<_>>(), diagnostics);
     if diagnostics.has_errors() {
         return None;
@@ -88,11 +89,17 @@ fn without_parameters(mut model: Model<Dd>, scene: &Scene) -> Model<Dd> {
 type Held = Transform<Dd>;
 
 /// How a scene holds a body against its parent; `None` if its joint moves.
-fn held(body: &Body<Dd>, scene: &Scene) -> Option<Held> {
+fn held(model: &Model<Dd>, id: BodyId, scene: &Scene) -> Option<Held> {
+    let body = &model.bodies[id];
     if body.joint.kind.is_base() {
         return (scene.base == Base::Fixed).then(Transform::identity);
     }
-    let (_, q) = scene.locked.iter().find(|(name, _)| *name == body.joint.name)?;
+    let coupling = model.coupling_of(id);
+    let joint = &model.bodies[coupling.map_or(id, |coupling| coupling.source)].joint;
+    let (_, q) = scene.locked.iter().find(|(name, _)| *name == joint.name)?;
+    if let Some(coupling) = coupling {
+        return Some(body.joint.kind.motion(&[coupling.ratio * Dd::from(*q) + coupling.offset]));
+    }
     // one number does not hold others, and is complained of
     if !body.joint.kind.is_single() {
         return Some(Transform::identity());
@@ -143,6 +150,11 @@ fn lock(model: Model<Dd>, held: &[Option<Held>]) -> Model<Dd> {
         }
     }
     renumber(&mut bodies);
+    let moved_coupling = |coupling: &Coupling<Dd>| {
+        let [body, source] = [coupling.body, coupling.source].map(|b| carriers[b].0.filter(|_| held[b].is_none()));
+        Some(Coupling { body: body?, source: source?, ..*coupling })
+    };
+    let couplings = model.couplings.iter().filter_map(moved_coupling).collect();
     let frames = model.frames.into_iter().map(|frame| match frame.body {
         Some(old) => {
             let (body, x_carrier_body) = &carriers[old];
@@ -152,7 +164,7 @@ fn lock(model: Model<Dd>, held: &[Option<Held>]) -> Model<Dd> {
     });
     let carried = |body: BodyId| carriers[body];
     let drives = model.drives.into_iter().filter_map(|drive| moved(drive, held, &carried));
-    Model { frames: frames.collect(), drives: drives.collect(), bodies, ..model }
+    Model { frames: frames.collect(), drives: drives.collect(), bodies, couplings, ..model }
 }
 
 /// A drive on the joints that are left; `None` if there is none. `carried` gives the new body that an old one is part of, and

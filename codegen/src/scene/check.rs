@@ -167,8 +167,12 @@ fn ranges_alone(scene: &Scene, diagnostics: &mut Diagnostics) {
 /// What is wrong with a scene for a robot; `held` says which of its bodies do not move against their parents.
 pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnostics: &mut Diagnostics) {
     let places = &scene.places;
-    let joint_names = || model.bodies.iter().map(|b| b.joint.name.as_str());
-    let find = |name: &str| model.bodies.iter().position(|b| b.joint.name == name);
+    let joint_names = || model.free_joints().map(|joint| joint.name.as_str());
+    let find = |name: &str| model.free_bodies().find(|b| model.bodies[*b].joint.name == name);
+    let unknown = |owner: &str, name: &str| match model.followers().iter().find(|(joint, _)| joint.name == name) {
+        Some((_, coupling)) => say::following_joint(owner, name, &model.bodies[coupling.source].joint.name),
+        None => say::unknown_joint(owner, name, joint_names()),
+    };
     // joints that must have a coordinate
     let mut wanted: Vec<(String, String, &str)> = Vec::new();
     for (function, selection) in &scene.outputs {
@@ -188,7 +192,7 @@ pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnosti
     }
     for (owner, path, joint) in wanted {
         match find(joint) {
-            None => places.complain(&path, say::unknown_joint(&owner, joint, joint_names()), diagnostics),
+            None => places.complain(&path, unknown(&owner, joint), diagnostics),
             Some(body) if held[body] => {
                 places.complain(&path, say::locked_joint_wanted(&owner, joint), diagnostics);
             }
@@ -198,7 +202,7 @@ pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnosti
     for (joint, value) in &scene.locked {
         let path = format!("hold.joints.{joint}");
         let Some(body) = find(joint) else {
-            places.complain(&path, say::unknown_joint("locked joints", joint, joint_names()), diagnostics);
+            places.complain(&path, unknown("locked joints", joint), diagnostics);
             continue;
         };
         let (kind, limits) = (model.bodies[body].joint.kind, model.bodies[body].joint.limits);

@@ -7,6 +7,7 @@ use crate::diagnostic::Diagnostic;
 /// The codes of all messages of this table.
 pub const CODES: &[&str] = &[
     "unknown-joint",
+    "following-joint",
     "unknown-scene-frame",
     "unknown-moving-link",
     "not-a-selection",
@@ -92,6 +93,12 @@ fn hinted<'a>(d: D, word: &str, known: impl IntoIterator<Item = &'a str>) -> D {
 pub fn unknown_joint<'a>(owner: &str, joint: &str, joints: impl IntoIterator<Item = &'a str>) -> D {
     let d = D::error("unknown-joint", format!("{owner}: no moving joint is named `{}`", cut(joint)));
     hinted(d, joint, joints)
+}
+
+/// A joint that has no coordinate, as it follows another one.
+pub fn following_joint(owner: &str, joint: &str, source: &str) -> D {
+    D::error("following-joint", format!("{owner}: joint `{}` follows `{}`", cut(joint), cut(source)))
+        .help("name the joint that it follows, whose coordinate moves both")
 }
 
 /// A frame that is not there.

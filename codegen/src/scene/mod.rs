@@ -22,6 +22,7 @@ pub use ranges::{ranges_in_words, InputRange, JointRanges, Ranges};
 
 use crate::description::drives::WrittenDrive;
 use crate::description::flexible::{BaseSupport, Flexible};
+use crate::description::WrittenCoupling;
 use crate::diagnostic::Diagnostic;
 use crate::function::{Function, SelectedRows};
 use crate::model::ModelOptions;
@@ -47,6 +48,8 @@ pub struct Scene {
     pub payloads: Vec<Payload>,
     /// What drives the joints, beside the robot file's own drives.
     pub drives: Vec<WrittenDrive>,
+    /// Joints that follow others, beside those of the robot file.
+    pub couplings: Vec<WrittenCoupling>,
     /// Links that bend, in place of what the robot file says of them.
     pub flexible: Vec<Flexible>,
     /// Springs and dampers below the root link.
@@ -84,11 +87,14 @@ impl Scene {
         let floats = matches!(self.base, Base::Floating | Base::Moving);
         // of options that hold them already as they are
         let own = if options.flexible == self.flexible { &[] } else { &self.flexible[..] };
+        let own_couplings = if options.couplings == self.couplings { &[] } else { &self.couplings[..] };
         ModelOptions {
             floating_base: options.floating_base || floats,
             flexible: [&options.flexible[..], own].concat(),
             support: self.support.clone().or_else(|| options.support.clone()),
             rigid_links: options.rigid_links || !self.effects.elastic_links,
+            couplings: [&options.couplings[..], own_couplings].concat(),
+            uncoupled: options.uncoupled || !self.effects.couplings,
             ..options.clone()
         }
     }
@@ -117,7 +123,7 @@ impl Scene {
     pub fn resolved<T>(&self, model: &Model<T>) -> Scene {
         let mut scene = self.clone();
         if self.base == Base::Moving {
-            let joints = model.bodies.iter().map(|b| &b.joint).filter(|j| !j.kind.is_base());
+            let joints = model.free_joints().filter(|j| !j.kind.is_base());
             let joints: Vec<String> = joints.map(|j| j.name.clone()).collect();
             for function in Function::all().filter(|f| f.is_torque()) {
                 let selection = scene.outputs.entry(function).or_default();
@@ -254,6 +260,8 @@ pub struct Effects {
     pub elastic_transmissions: bool,
     /// Flexible links and an elastic support; without them links and base are rigid.
     pub elastic_links: bool,
+    /// Joints that follow others; without them every joint has a coordinate of its own.
+    pub couplings: bool,
 }
 
 impl Default for Effects {
@@ -266,6 +274,7 @@ impl Default for Effects {
             transmission_losses: true,
             elastic_transmissions: true,
             elastic_links: true,
+            couplings: true,
         }
     }
 }

@@ -103,7 +103,7 @@ impl Scene {
         let over_joints = self.ranges.over_joints();
         let found = over_joints.into_iter().find(|(over_joints, _)| Some(*over_joints) == quantity);
         let Some((quantity, ranges)) = found else { return all };
-        for joint in model.bodies.iter().map(|b| &b.joint) {
+        for joint in model.free_joints() {
             let rests = matches!(quantity, Velocity | Acceleration) && self.zero.joints_at_rest.contains(&joint.name);
             let range = if rests { InputRange::ZERO } else { range(quantity, ranges, joint) };
             let (first, count) = match quantity {

@@ -238,7 +238,7 @@ fn set_zeros(scene: &Scene, model: &Model<Dd>, inputs: &mut InputState<f64>) {
         if is_zero {
             rates.fill(0.0);
         }
-        for joint in model.bodies.iter().map(|b| &b.joint) {
+        for joint in model.free_joints() {
             if scene.zero.joints_at_rest.contains(&joint.name) {
                 rates[joint.iv..joint.iv + joint.kind.nv()].fill(0.0);
             }

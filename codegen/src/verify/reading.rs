@@ -10,7 +10,7 @@ use crate::function::{Function, Quantity};
 use crate::model::ModelOptions;
 use crate::options::Options;
 use std::collections::BTreeMap;
-use straightline_core::model::Model;
+use straightline_core::model::{Joint, Model};
 use straightline_core::reference::CentreOfMassTree;
 use straightline_core::Dd;
 
@@ -28,19 +28,33 @@ pub(super) fn second_reading(
 ) -> Result<(CentreOfMassTree<Dd>, Vec<Effect>), String> {
     let description = description::read(source, &mut Diagnostics::new()).ok_or("the file holds no robot")?;
     let mut tree = centre_of_mass_tree(&description, &options.model)?;
+    let mut renumbered = BTreeMap::new();
     for link in &mut tree.links {
         let body = model.bodies.iter().find(|body| body.name == link.name);
         let joint = &body.ok_or_else(|| format!("the model has no body `{}`", link.name))?.joint;
-        (link.iq, link.iv) = (joint.iq, joint.iv);
+        renumbered.extend(link.shared.is_none().then_some((link.iv, (joint.iq, joint.iv))));
+        if let Some(shared) = &mut link.shared {
+            shared.rank = joint.iv - model.nv();
+        }
     }
-    let joints = model.bodies.iter().map(|body| &body.joint).filter(|joint| joint.kind.is_single());
+    for link in &mut tree.links {
+        (link.iq, link.iv) = *renumbered.get(&link.iv).ok_or_else(|| format!("`{}` follows nothing", link.name))?;
+    }
     let elastic = elastic_springs(&description, &options.model);
-    let effects = joints.map(|joint| {
+    let effect = |joint: &Joint| {
         let own = elastic.iter().find(|(name, _)| *name == joint.name);
-        let effect = own.map_or_else(|| written(&description, &joint.name), |own| own.1);
-        Effect { iq: joint.iq, iv: joint.iv, ..effect }
+        own.map_or_else(|| written(&description, &joint.name), |own| own.1)
+    };
+    let own = model.free_joints().filter(|joint| joint.kind.is_single());
+    let own = own.map(|joint| Effect { iq: joint.iq, iv: joint.iv, ..effect(joint) });
+    let following = model.bodies.iter().filter_map(|body| {
+        let link = tree.links.iter().find(|link| link.name == body.name)?;
+        let shared = link.shared?;
+        let effect = effect(&body.joint).on_source([shared.ratio, shared.offset]);
+        Some(Effect { iq: link.iq, iv: link.iv, ..effect })
     });
-    Ok((tree, effects.collect()))
+    let effects = own.chain(following).collect();
+    Ok((tree, effects))
 }
 
 /// A joint to which nothing is added.
@@ -55,6 +69,7 @@ const NONE: Effect = Effect {
     rest: Dd::ZERO,
     range: [None; 2],
     effort: None,
+    ratio: Dd::ONE,
 };
 
 /// What the file says of a joint.

@@ -9,7 +9,7 @@
 //! q = 0, so A⁰ is given as a matrix, or vectors as in the chapter, which are taken as written.
 
 use crate::description::{
-    Angle, AngleUnit, BaseKind, Description, JointVectors, Noted, Placement, Rotation, WrittenInertial, WrittenJoint,
+    Angle, AngleUnit, BaseKind, Description, JointVectors, Noted, Placement, Rotation, WrittenCoupling, WrittenInertial, WrittenJoint,
     WrittenPose,
 };
 use crate::diagnostic::Place;
@@ -17,7 +17,7 @@ use crate::model::{FrameOption, ModelOptions};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 use straightline_core::reference::{
-    unit, CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint,
+    unit, CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint, SharedCoordinate,
 };
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
@@ -60,6 +60,7 @@ pub fn centre_of_mass_tree(description: &Description, options: &ModelOptions) ->
     let stated = description.base.as_ref().is_some_and(|base| base.value == BaseKind::Floating);
     let floating = options.floating_base || stated;
     let joint_names = add_links(&mut tree, description, floating, (options, &Elastic::of(description, options)))?;
+    share_coordinates(&mut tree, &joint_names, (description, options))?;
     number_coordinates(&mut tree, &joint_names, options);
     Ok(tree)
 }
@@ -70,10 +71,49 @@ fn turned(rpy: &[f64; 3], options: &ModelOptions) -> Matrix3<Dd> {
     rotation(&Rotation { rpy: [angle(0), angle(1), angle(2)] }, options)
 }
 
+/// Lets joints that follow others share the coordinates of those that follow none; until the coordinates are numbered their `iv` is the link of that joint.
+fn share_coordinates(
+    tree: &mut CentreOfMassTree<Dd>,
+    joint_names: &[String],
+    (description, options): (&Description, &ModelOptions),
+) -> Result<(), String> {
+    let couplings: Vec<&WrittenCoupling> = match options.uncoupled {
+        true => Vec::new(),
+        false => description.couplings.iter().chain(&options.couplings).collect(),
+    };
+    // a joint's coordinate as a sum of that of a link and a number
+    let resolved = |joint: &str| -> Result<(usize, [Dd; 2]), String> {
+        let mut name: &str = joint;
+        let mut line = [Dd::ONE, Dd::ZERO];
+        for _ in 0..=couplings.len() {
+            let Some(coupling) = couplings.iter().find(|coupling| coupling.joint.value == name) else {
+                let link = joint_names.iter().position(|joint| joint == name);
+                return Ok((link.ok_or_else(|| format!("there is no joint `{name}`"))?, line));
+            };
+            let [a, b] = [coupling.ratio.value, coupling.offset.value].map(Dd::from);
+            line = [line[0] * a, line[0] * b + line[1]];
+            name = &coupling.source.value;
+        }
+        Err(format!("joint `{name}` follows itself"))
+    };
+    for (rank, coupling) in couplings.iter().enumerate() {
+        let follower = resolved_link(joint_names, &coupling.joint.value)?;
+        let (source, [ratio, offset]) = resolved(&coupling.joint.value)?;
+        let link = &mut tree.links[follower];
+        (link.iv, link.shared) = (source, Some(SharedCoordinate { ratio, offset, rank }));
+    }
+    Ok(())
+}
+
+fn resolved_link(joint_names: &[String], joint: &str) -> Result<usize, String> {
+    joint_names.iter().position(|name| name == joint).ok_or_else(|| format!("there is no joint `{joint}`"))
+}
+
 /// The joints' places in q and q̇: in the order that is asked for, or else in that of the links. A floating root that
 /// the order does not name comes first.
 fn number_coordinates(tree: &mut CentreOfMassTree<Dd>, joint_names: &[String], options: &ModelOptions) {
-    let mut order: Vec<usize> = (0..tree.links.len()).collect();
+    let is_own = |link: &usize| tree.links[*link].shared.is_none();
+    let mut order: Vec<usize> = (0..tree.links.len()).filter(is_own).collect();
     if let Some(names) = &options.joint_order {
         order.sort_by_key(|&link| names.iter().position(|name| *name == joint_names[link]));
     }
@@ -83,6 +123,10 @@ fn number_coordinates(tree: &mut CentreOfMassTree<Dd>, joint_names: &[String], o
         (link.iq, link.iv) = (iq, iv);
         iq += link.joint.nq();
         iv += link.joint.nv();
+    }
+    let places: Vec<(usize, usize)> = tree.links.iter().map(|link| (link.iq, link.iv)).collect();
+    for link in tree.links.iter_mut().filter(|link| link.shared.is_some()) {
+        (link.iq, link.iv) = places[link.iv];
     }
 }
 
@@ -232,6 +276,7 @@ fn add_links(
             joint: *kind,
             iq: 0,
             iv: 0,
+            shared: None,
             mass: *mass,
             inertia: *inertia,
             e,

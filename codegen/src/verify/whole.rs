@@ -43,21 +43,19 @@ pub(super) struct Coordinates {
 
 impl Coordinates {
     pub fn new(scene: &Scene, model: &Model<Dd>, whole: &Model<Dd>) -> Result<Coordinates, String> {
-        let in_order = |model: &Model<Dd>| {
-            let mut joints: Vec<_> = model.bodies.iter().map(|body| body.joint.clone()).collect();
-            joints.sort_by_key(|joint| joint.iv);
-            joints
-        };
-        let (all, mut held) = (in_order(whole), vec![0.0; whole.nq()]);
+        let (all, mut held) = (whole.tree_joints(), vec![0.0; whole.nq()]);
         let (mut q, mut v, mut joints) = (Vec::new(), Vec::new(), Vec::new());
-        for joint in in_order(model) {
+        for joint in model.tree_joints() {
             let rank = all.iter().position(|j| j.name == joint.name);
             let rank = rank.ok_or_else(|| format!("the whole robot has no joint `{}`", joint.name))?;
             joints.push(rank);
+            if joint.iv >= model.nv() {
+                continue; // it follows another one
+            }
             q.extend(all[rank].iq..all[rank].iq + joint.kind.nq());
             v.extend(all[rank].iv..all[rank].iv + joint.kind.nv());
         }
-        for joint in &all {
+        for joint in whole.joints() {
             let neutral = joint.kind.row().neutral;
             held[joint.iq..joint.iq + neutral.len()].copy_from_slice(neutral);
             if let Some((_, value)) = scene.locked.iter().find(|(name, _)| *name == joint.name) {
@@ -148,7 +146,7 @@ pub(super) fn hold(
     let is_locked = |name: &str| scene.locked.iter().any(|(joint, _)| joint == name);
     let stands = |mut body: Option<usize>| {
         while let Some(id) = body {
-            let joint = &model.bodies[id].joint;
+            let joint = &model.bodies[model.coupling_of(id).map_or(id, |coupling| coupling.source)].joint;
             let is_held = is_locked(&joint.name) || joint.kind.is_base() && scene.base == Base::Fixed;
             if !is_held {
                 return false;
@@ -187,7 +185,7 @@ pub(super) fn hold(
         effect.friction = wanted(effect.friction, scene.effects.coulomb != CoulombForm::Off);
         effect.stiffness = wanted(effect.stiffness, scene.effects.springs);
         effect.smooth = match scene.effects.coulomb {
-            CoulombForm::Smooth(speed) => Some(Dd::from(speed)),
+            CoulombForm::Smooth(speed) => Some(Dd::from(speed) / effect.ratio),
             CoulombForm::Off | CoulombForm::Sign => None,
         };
     }

@@ -116,7 +116,7 @@ impl State {
         let (near, fast) = (kind & 1 == 0, kind & 2 != 0);
         let mut state: [Vec<f64>; 4] = [vec![0.0; model.nq()], vec![0.0; nv], vec![0.0; nv], vec![0.0; nv]];
         let mut quaternion = None;
-        for joint in model.bodies.iter().map(|b| &b.joint) {
+        for joint in model.free_joints() {
             match joint.kind {
                 JointKind::Floating => {
                     quaternion = Some(joint.iq + 3);

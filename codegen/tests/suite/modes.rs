@@ -147,7 +147,7 @@ fn structure_is_cheapest(files: &[&str]) {
             let mut random = Random(7);
             let count = ways[0].1.inputs.iter().map(Port::len).sum();
             let mut inputs: Vec<Dd> = (0..count).map(|_| Dd::from(random.symmetric(1.0))).collect();
-            for joint in robot.model.bodies.iter().map(|body| &body.joint) {
+            for joint in robot.model.free_joints() {
                 joint.kind.normalise(&mut inputs[joint.iq..joint.iq + joint.kind.nq()]);
             }
             let [found, others @ ..] = ways.each_ref().map(|(_, graph)| evaluate::<Dd>(graph, &inputs));

@@ -153,7 +153,7 @@ impl Case {
         let model = &self.robot.model;
         let mut motion = [model.nq(), model.nv(), model.nv()]
             .map(|n| (0..n).map(|_| Dd::from(random.symmetric(2.0))).collect::<Vec<Dd>>());
-        for joint in model.bodies.iter().map(|body| &body.joint) {
+        for joint in model.free_joints() {
             joint.kind.normalise(&mut motion[0][joint.iq..joint.iq + joint.kind.nq()]);
         }
         motion

@@ -84,7 +84,7 @@ impl Robots {
         let mut state = [model.nq(), model.nv(), model.nv()]
             .map(|n| (0..n).map(|_| Dd::from(self.random.symmetric(2.0))).collect());
         let state: &mut [Vec<Dd>; 3] = &mut state;
-        for joint in model.bodies.iter().map(|body| &body.joint) {
+        for joint in model.free_joints() {
             joint.kind.normalise(&mut state[0][joint.iq..joint.iq + joint.kind.nq()]);
         }
         state.clone()
@@ -399,7 +399,7 @@ fn hold_data(robots: &[(&'static str, bool)]) {
                 continue;
             }
             let mut inputs = ["q", "qd", "qdd"].map(|key| list(&state[key]));
-            for joint in robot.robot.model.bodies.iter().map(|body| &body.joint) {
+            for joint in robot.robot.model.free_joints() {
                 joint.kind.normalise(&mut inputs[0][joint.iq..joint.iq + joint.kind.nq()]);
             }
             let in_f64 = |x: &[Dd]| x.iter().map(|x| x.to_f64()).collect::<Vec<f64>>();

@@ -70,7 +70,7 @@ fn states(whole: &Model<Dd>, moving: &Model<Dd>, held: &[(&str, f64)]) -> States
     let [q, qd, qdd] = [0, 100, 200].map(|k| (0..moving.nv()).map(|i| number(k + i)).collect::<Vec<_>>());
     let mut all = [(); 3].map(|()| vec![Dd::ZERO; whole.nv()]);
     let mut index = vec![0; moving.nv()];
-    for j in moving.bodies.iter().map(|b| &b.joint) {
+    for j in moving.free_joints() {
         let in_whole = joint(whole, &j.name);
         index[j.iv] = in_whole.iv;
         all[0][in_whole.iq] = q[j.iq];
@@ -88,7 +88,7 @@ fn a_locked_robot_is_the_whole_one_held(held: &[(&str, f64)]) {
     let model = applied(&whole, &locked(held));
     assert_eq!(model.nv(), whole.nv() - held.len());
     let names: Vec<&str> = ORDER.into_iter().filter(|name| !held.iter().any(|(h, _)| h == name)).collect();
-    let mut in_order: Vec<&Joint> = model.bodies.iter().map(|b| &b.joint).collect();
+    let mut in_order: Vec<&Joint> = model.free_joints().collect();
     in_order.sort_by_key(|j| j.iv);
     assert_eq!(in_order.iter().map(|j| j.name.as_str()).collect::<Vec<_>>(), names, "the order of the others is kept");
 

@@ -134,7 +134,7 @@ fn traced(text: &str, floating: bool, function: Function) -> (Model<Dd>, Graph) 
 fn state(model: &Model<Dd>, random: &mut Random) -> [Vec<Dd>; 3] {
     let mut any = |n: usize, size: f64| -> Vec<Dd> { (0..n).map(|_| Dd::from(random.symmetric(size))).collect() };
     let mut q = any(model.nq(), 1.0);
-    for joint in model.bodies.iter().map(|body| &body.joint) {
+    for joint in model.free_joints() {
         joint.kind.normalise(&mut q[joint.iq..joint.iq + joint.kind.nq()]);
     }
     [q, any(model.nv(), 1.0), any(model.nv(), 3.0)]

@@ -56,7 +56,7 @@ impl Asked {
     /// Anywhere within the limits, without those within ±2; a base somewhere.
     pub(super) fn configuration(&self, random: &mut Random) -> Vec<f64> {
         let mut q = vec![0.0; self.robot.model.nq()];
-        for joint in self.robot.model.bodies.iter().map(|b| &b.joint) {
+        for joint in self.robot.model.free_joints() {
             let own = &mut q[joint.iq..joint.iq + joint.kind.nq()];
             match joint.kind.is_single() {
                 true => own[0] = random.between(joint.limits.lower.max(-2.0), joint.limits.upper.min(2.0)),
@@ -305,7 +305,7 @@ fn iterate(asked: &Asked, [step, pose]: [&Graph; 2], target: &[f64], mut q: Vec<
         let damping = 0.2 * size.min(1.0);
         let dq = run::<f64>(step, &[&q, &e, &[1.0; 6], &[damping.max(1e-5)], &[gain]]);
         q.iter_mut().zip(&dq).for_each(|(q, dq)| *q += dq);
-        for joint in asked.robot.model.bodies.iter().map(|b| &b.joint) {
+        for joint in asked.robot.model.free_joints() {
             let (x, limits) = (q[joint.iq], joint.limits);
             let within = limits.lower - 1e-14 <= x && x <= limits.upper + 1e-14;
             assert!(within, "{}: {} is at {x}, beyond {limits:?}", asked.name, joint.name);

@@ -231,7 +231,7 @@ impl Case {
 
 fn ranges(model: &Model<Dd>, port: &str, len: usize) -> Vec<(f64, f64)> {
     let mut ranges = vec![(-1.0, 1.0); len];
-    for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single()) {
+    for joint in model.free_joints().filter(|j| j.kind.is_single()) {
         let or = |limit: f64, other: f64| if limit.is_finite() { limit } else { other };
         let speed = or(joint.limits.velocity, VELOCITY).min(FASTEST);
         match port {

@@ -63,7 +63,7 @@ fn agree_with_differences(robot: &str, seed: u64, floating_base: bool) {
         source = Source::new(source.path(), text);
     }
     let plain = Driven::new(&source, &options, "").robot;
-    let mut joints: Vec<_> = plain.model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.nv() == 1).collect();
+    let mut joints: Vec<_> = plain.model.free_joints().filter(|j| j.kind.nv() == 1).collect();
     joints.sort_by_key(|j| j.iv);
     let joints: Vec<String> = joints.iter().map(|j| j.name.clone()).collect();
     let drives: Vec<_> =

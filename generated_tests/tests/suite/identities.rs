@@ -70,7 +70,7 @@ impl State {
     /// q after a short time t of moving with `rate`, to first order at least.
     fn moved(&self, rate: &[f64], t: f64) -> Vec<Dd> {
         let mut q: Vec<Dd> = self.q.iter().map(|x| Dd::from(*x)).collect();
-        for joint in self.loaded.model.bodies.iter().map(|b| &b.joint) {
+        for joint in self.loaded.model.free_joints() {
             let v = |k: usize| Dd::from(rate[joint.iv + k]) * Dd::from(t);
             let i = joint.iq;
             if joint.kind.is_single() {

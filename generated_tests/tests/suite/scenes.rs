@@ -93,12 +93,12 @@ fn without_velocities_or_accelerations_a_scene_is_the_program_at_zero() {
 #[test]
 fn joints_at_rest_are_the_program_with_their_rates_at_zero() {
     let resting = |loaded: &Loaded| -> Vec<usize> {
-        let turning = loaded.model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind.is_single());
+        let turning = loaded.model.free_joints().filter(|j| j.kind.is_single());
         turning.step_by(2).map(|j| j.iv).collect()
     };
     let scene = |loaded: &Loaded| {
         let at_rest = resting(loaded);
-        let joints = loaded.model.bodies.iter().map(|b| &b.joint);
+        let joints = loaded.model.free_joints();
         let joints_at_rest = joints.filter(|j| at_rest.contains(&j.iv)).map(|j| j.name.clone()).collect();
         Scene { zero: Zero { joints_at_rest, ..Zero::default() }, ..Scene::default() }
     };

@@ -19,6 +19,8 @@ pub mod contact;
 pub mod control;
 pub mod dd;
 #[cfg(feature = "alloc")]
+#[cfg(feature = "alloc")]
+pub mod coupling;
 pub mod drive;
 pub mod dual;
 pub mod fixed;

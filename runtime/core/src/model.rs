@@ -6,6 +6,7 @@
 //! [`Body::link_frame`]. A floating base keeps the root link's own frame.
 
 use crate::base_parameters::BaseParameterSets;
+use crate::coupling::Coupling;
 use crate::dd::Dd;
 use crate::drive::Drive;
 pub use crate::joint::JointKind;
@@ -221,6 +222,8 @@ pub struct Model<T> {
     pub name: String,
     /// The moving bodies; a parent stands before its children.
     pub bodies: Vec<Body<T>>,
+    /// Joints whose coordinates follow those of others.
+    pub couplings: Vec<Coupling<T>>,
     /// Acceleration due to gravity in the world \[m/s²\].
     pub gravity: Vec3<T>,
     /// All frames of the robot: one per link of the file, and what was added.
@@ -232,29 +235,29 @@ pub struct Model<T> {
 }
 
 impl<T: Real> Model<T> {
-    /// Number of configuration coordinates.
+    /// Number of configuration coordinates; joints that follow others have none.
     pub fn nq(&self) -> usize {
-        self.bodies.iter().map(|b| b.joint.kind.nq()).sum()
+        self.tree_nq() - self.couplings.len()
     }
 
-    /// Number of velocity coordinates.
+    /// Number of velocity coordinates; joints that follow others have none.
     pub fn nv(&self) -> usize {
-        self.bodies.iter().map(|b| b.joint.kind.nv()).sum()
+        self.tree_nv() - self.couplings.len()
     }
 
     /// dq/dt at these velocities: q̇ itself of most joints, of a floating base R v and ½ q ∘ ω.
     pub fn configuration_rate(&self, q: &[T], qd: &[T]) -> Vec<T> {
         let mut rates = vec![T::zero(); q.len()];
-        for joint in self.bodies.iter().map(|body| &body.joint) {
+        for joint in self.free_joints() {
             let own = &mut rates[joint.iq..joint.iq + joint.kind.nq()];
             joint.kind.configuration_rate(joint.coordinates(q), joint.rates(qd), own);
         }
         rates
     }
 
-    /// The joints in the order of their coordinates.
+    /// The joints that have coordinates of their own, in the order of these.
     pub fn joints(&self) -> Vec<&Joint> {
-        let mut joints: Vec<&Joint> = self.bodies.iter().map(|b| &b.joint).collect();
+        let mut joints: Vec<&Joint> = self.free_joints().collect();
         joints.sort_by_key(|joint| joint.iv);
         joints
     }
@@ -288,6 +291,7 @@ impl<T: Real> Model<T> {
                     load: b.load.map(|l| l.map(&mut f)),
                 })
                 .collect(),
+            couplings: self.couplings.iter().map(|c| c.map(&mut f)).collect(),
             gravity: self.gravity.map(&mut f),
             frames: self
                 .frames

@@ -44,6 +44,7 @@ fn block() -> Model<f64> {
             body(JointKind::Prismatic, Some(0), 1, turned(z, y, -x), MASS),
         ],
         gravity: Vec3::new(0.0, 0.0, -G),
+        couplings: vec![],
         frames: vec![Frame { name: "sole".into(), body: Some(1), placement: Transform::identity() }],
         drives: vec![],
         base_parameters: Default::default(),

@@ -79,7 +79,7 @@ fn names(model: &Model<f64>) -> Vec<&str> {
 /// Zero, or the nearest that the joints' ranges allow; a base at the origin.
 fn zero(model: &Model<f64>) -> Vec<f64> {
     let mut q = vec![0.0; model.nq()];
-    for joint in model.bodies.iter().map(|b| &b.joint) {
+    for joint in model.free_joints() {
         for (q, neutral) in q[joint.iq..].iter_mut().zip(joint.kind.row().neutral) {
             *q = neutral.max(joint.limits.lower).min(joint.limits.upper);
         }

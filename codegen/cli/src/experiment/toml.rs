@@ -26,7 +26,7 @@ const TRAPEZOIDAL: usize = 2;
 /// Numbers per driven joint with zeros for those that are passive; `None` if there are none, or not as many numbers.
 fn with_passive(model: &Model<f64>, numbers: &[f64]) -> Option<Vec<f64>> {
     let mut is_passive = vec![false; model.nv()];
-    model.bodies.iter().for_each(|b| is_passive[b.joint.iv] = b.is_passive());
+    model.freely_jointed().for_each(|b| is_passive[b.joint.iv] = b.is_passive());
     let driven = is_passive.iter().filter(|passive| !**passive).count();
     let mut rest = numbers.iter();
     (driven < model.nv() && numbers.len() == driven && !model.floats())

@@ -133,7 +133,7 @@ fn header(out: &mut String, generated: &Generated, whole: &Model<Dd>, options: &
 /// The section of the tree, and the width of the drawing.
 fn kinematics(whole: &Model<Dd>, scene: &Scene, model: &Model<Dd>) -> (String, f64) {
     let locked = |i: usize| {
-        let joint = &whole.bodies[i].joint;
+        let joint = &whole.bodies[whole.coupling_of(i).map_or(i, |coupling| coupling.source)].joint;
         (joint.kind.is_base() && scene.base == Base::Fixed) || scene.locked.iter().any(|(name, _)| *name == joint.name)
     };
     // what stands in the coordinates is told by the robot of the scene

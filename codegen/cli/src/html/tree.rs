@@ -108,10 +108,11 @@ fn y(row: usize) -> f64 {
 pub(super) fn tree(model: &Model<Dd>, held: &dyn Fn(usize) -> bool, notes: &dyn Fn(usize) -> String) -> (String, f64) {
     let words = |i: usize| {
         let body = &model.bodies[i];
-        let coordinates = match (held(i), body.joint.kind.nq()) {
-            (true, _) => String::new(),
-            (false, 1) => format!(" · q[{}]", body.joint.iq),
-            (false, more) => format!(" · q[{}..{}]", body.joint.iq, body.joint.iq + more),
+        let coordinates = match (held(i), model.coupling_of(i), body.joint.kind.nq()) {
+            (true, ..) => String::new(),
+            (false, Some(coupling), _) => format!(" · {}", coupling.in_words(model)),
+            (false, None, 1) => format!(" · q[{}]", body.joint.iq),
+            (false, None, more) => format!(" · q[{}..{}]", body.joint.iq, body.joint.iq + more),
         };
         (cut(&body.joint.name), format!("{}{coordinates}{}", cut(&body.name), notes(i)))
     };

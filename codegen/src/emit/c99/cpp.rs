@@ -20,7 +20,7 @@ impl Interface<'_> {
         for (name, count, doc) in [
             ("nq", model.nq(), "Number of configuration coordinates."),
             ("nv", model.nv(), "Number of velocity coordinates."),
-            ("joint_count", model.bodies.len(), "Number of joints."),
+            ("joint_count", model.joints().len(), "Number of joints."),
             ("frame_count", self.generated.frames.len(), "Number of frames."),
         ] {
             let _ = writeln!(out, "// {doc}\nconstexpr std::size_t {name} = {count};");

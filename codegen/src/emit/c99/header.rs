@@ -42,6 +42,10 @@ impl Interface<'_> {
             };
             let _ = writeln!(out, " *   {:>3} {:>3}  {}, {kind}", joint.iq, joint.iv, c_comment(&joint.name));
         }
+        for (joint, coupling) in model.followers() {
+            let (name, follows) = (c_comment(&joint.name), coupling.in_words(model));
+            let _ = writeln!(out, " *             {name}, {}: {}", joint.kind.row().name, c_comment(&follows));
+        }
         let of_robot: Vec<_> = self.generated.items.iter().map(|item| item.function).collect();
         let lists = base_parameter_lists(model, &of_robot);
         for list in &lists {
@@ -82,7 +86,7 @@ int {prefix}_frame_count(void);
 const char *{prefix}_joint_name(int i);
 const char *{prefix}_frame_name(int i);
 "#,
-            joints = model.bodies.len(),
+            joints = model.joints().len(),
             frames = self.generated.frames.len(),
             counts = lists
                 .iter()

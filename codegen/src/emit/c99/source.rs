@@ -132,7 +132,7 @@ impl Interface<'_> {
         for (name, count) in [
             ("nq", g.model.nq()),
             ("nv", g.model.nv()),
-            ("joint_count", g.model.bodies.len()),
+            ("joint_count", g.model.joints().len()),
             ("frame_count", g.frames.len()),
         ] {
             let _ = write!(out, "int {prefix}_{name}(void)\n{{\n    return {count};\n}}\n\n");

@@ -8,8 +8,10 @@ use crate::identifier::{comment, string_literals};
 use crate::report::errors::{four_digits, ErrorReport, OutputErrors};
 use crate::report::FunctionReport;
 use std::fmt::Write;
+use straightline_core::coupling::Coupling;
 use straightline_core::drive::Drive;
-use straightline_core::model::Limits;
+use straightline_core::model::{Limits, Model};
+use straightline_core::Dd;
 use straightline_graph::Scalar;
 
 /// A constant.
@@ -86,6 +88,7 @@ pub(super) fn of_robot(generated: &Generated) -> Vec<AssociatedConstant> {
             "Frames of the functions that answer per frame.",
         ),
     ];
+    constants.extend(of_followers(model, *scalar));
     let list = |f: &dyn Fn(&Limits) -> f64| {
         let numbers: Vec<String> = single.iter().map(|j| number(f(&j.limits), *scalar)).collect();
         format!("[{}]", numbers.join(", "))
@@ -122,6 +125,39 @@ pub(super) fn of_robot(generated: &Generated) -> Vec<AssociatedConstant> {
     }
     constants.extend(of_base_parameters(generated));
     constants
+}
+
+/// Of joints that follow others: names, whose coordinates they follow, and how.
+fn of_followers(model: &Model<Dd>, scalar: Scalar) -> Vec<AssociatedConstant> {
+    let followers = model.followers();
+    let n = followers.len();
+    if n == 0 {
+        return Vec::new();
+    }
+    let names = string_literals(&mut followers.iter().map(|(joint, _)| joint.name.as_str()));
+    let sources: Vec<usize> = followers.iter().map(|(_, c)| model.bodies[c.source].joint.iq).collect();
+    let numbers = |of: &dyn Fn(&Coupling<Dd>) -> Dd| {
+        let all: Vec<String> = followers.iter().map(|(_, c)| number(of(c).to_f64(), scalar)).collect();
+        format!("[{}]", all.join(", "))
+    };
+    let list = || ConstantType::Numbers(scalar, vec![n]);
+    vec![
+        AssociatedConstant::new(
+            "FOLLOWER_NAMES",
+            ConstantType::Names(n),
+            format!("[{names}]"),
+            "Joints that follow others and have no coordinates: each stands at its ratio times the q that it follows, plus its offset. Results \
+             per joint have them behind those of [`JOINT_NAMES`].",
+        ),
+        AssociatedConstant::new("FOLLOWED", ConstantType::Sizes(n), format!("{sources:?}"), "Indices of the q that they follow."),
+        AssociatedConstant::new(
+            "FOLLOWER_RATIOS",
+            list(),
+            numbers(&|c| c.ratio),
+            "Their ratios \\[1, m/rad or rad/m\\].",
+        ),
+        AssociatedConstant::new("FOLLOWER_OFFSETS", list(), numbers(&|c| c.offset), "Their offsets \\[rad or m\\]."),
+    ]
 }
 
 /// How many base parameters there are, their names and values, and where they stand in the regressor.

@@ -11,6 +11,8 @@ use crate::report::waterfall::signed;
 use crate::report::Report;
 use std::borrow::Cow;
 use std::fmt::Write;
+use straightline_core::model::Model;
+use straightline_core::Dd;
 
 /// The kernel's source, pasted as it is: generated code depends on `core` alone.
 const TRIG: &str = straightline_core::sources::TRIG;
@@ -217,11 +219,11 @@ pub(super) fn header(generated: &Generated) -> String {
         let parent = b.parent.map_or("world".to_string(), |p| format!("body {}", p + 1));
         let _ = writeln!(
             out,
-            "//   body {:<3} {} on {parent} by {kind} joint {}, qd[{}]",
+            "//   body {:<3} {} on {parent} by {kind} joint {}, {}",
             i + 1,
             comment(&b.name),
             comment(&b.joint.name),
-            b.joint.iv
+            moved_by(model, i)
         );
     }
     let _ = writeln!(out, "//");
@@ -277,5 +279,13 @@ fn skipped(out: &mut String, report: &Report) {
             };
             let _ = writeln!(out, "//     {:>6}  {}{pairs}", signed(saving.operations), comment(&saving.what));
         }
+    }
+}
+
+/// What moves the joint of a body: a coordinate of its own, or that of another joint.
+fn moved_by(model: &Model<Dd>, body: usize) -> String {
+    match model.coupling_of(body) {
+        Some(coupling) => format!("that follows {}", coupling.in_words(model)),
+        None => format!("qd[{}]", model.bodies[body].joint.iv),
     }
 }

@@ -34,9 +34,13 @@ impl __Stub for __Why<0> {
 /// Lengths of arrays.
 const LENGTHS: [&str; 6] = ["NQ", "NV", "NU", "NX", "BASE_PARAMETER_COUNT", "SUPPORT_PARAMETER_COUNT"];
 /// Further constants of a robot.
-const CONSTANTS: [&str; 16] = [
+const CONSTANTS: [&str; 20] = [
     "JOINT_NAMES",
     "FRAME_NAMES",
+    "FOLLOWER_NAMES",
+    "FOLLOWED",
+    "FOLLOWER_RATIOS",
+    "FOLLOWER_OFFSETS",
     "LOWER_LIMITS",
     "UPPER_LIMITS",
     "VELOCITY_LIMITS",

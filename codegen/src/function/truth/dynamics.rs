@@ -67,8 +67,7 @@ impl Truth for JointWrenches {
     /// In the order of the velocity coordinates.
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         let wrenches = reference::joint_wrenches(&at.tree, at.q(), at.qd(), at.qdd());
-        let mut order: Vec<usize> = (0..wrenches.len()).collect();
-        order.sort_by_key(|link| at.tree.links[*link].iv);
+        let order = at.tree.by_coordinates();
         Some(order.into_iter().flat_map(|link| wrenches[link]).collect())
     }
 }

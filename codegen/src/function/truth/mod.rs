@@ -55,6 +55,8 @@ pub struct Effect {
     pub range: [Option<Dd>; 2],
     /// The greatest force \[N·m or N\] of its drive, where that is limited.
     pub effort: Option<Dd>,
+    /// How fast the joint moves per unit of its coordinate: 1 but of one that follows another.
+    pub ratio: Dd,
 }
 
 /// A robot in the second author's terms, at a state.
@@ -207,6 +209,23 @@ impl<'a> Chapter<'a> {
 }
 
 impl Effect {
+    /// The same of a joint at a q + b, on the coordinate q of the joint that it follows: forces do there what they do at the joint.
+    #[must_use]
+    pub fn on_source(self, [a, b]: [Dd; 2]) -> Effect {
+        let square = a * a;
+        Effect {
+            inertia: square * self.inertia,
+            damping: square * self.damping,
+            friction: a.abs() * self.friction,
+            stiffness: square * self.stiffness,
+            rest: (self.rest - b) / a,
+            range: [None; 2],
+            effort: None,
+            ratio: a.abs(),
+            ..self
+        }
+    }
+
     /// What friction and spring take.
     fn passive<T: Real>(&self, q: T, qd: T) -> T {
         let [damping, friction, stiffness, rest] =

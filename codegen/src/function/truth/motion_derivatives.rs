@@ -118,8 +118,7 @@ impl Truth for CentreOfMassJacobian {
 impl Truth for SubtreeCentresOfMass {
     /// Σ m r / Σ m of the links behind each joint.
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
-        let mut order: Vec<usize> = (0..at.tree.links.len()).collect();
-        order.sort_by_key(|link| at.tree.links[*link].iv);
+        let order = at.tree.by_coordinates();
         let mass = |joint: usize| behind(&at.tree, joint).fold(Magnitude::zero(), |sum, k| sum + at.tree.links[k].mass);
         let moving = at.tree.map(Moving::fixed);
         let centres: Vec<_> = order.iter().flat_map(|joint| centre(&at.tree, *joint, at.q())).collect();

@@ -237,7 +237,8 @@ fn of_body(at: &Chapter<'_>, body: BodyId, of_point: OfPoint<'_>) -> Option<Vec<
 fn joint_motion(at: &Chapter<'_>, body: BodyId) -> Option<[Magnitude; 3]> {
     let link = at.tree.frame(&at.robot?.bodies[body].name)?.link?;
     let link = &at.tree.links[link];
-    Some([at.q()[link.iq], at.qd()[link.iv], at.qdd()[link.iv]])
+    let [q, qd, qdd] = [at.q()[link.iq], at.qd()[link.iv], at.qdd()[link.iv]];
+    Some(link.shared.map_or([q, qd, qdd], |shared| [shared.ratio * q + shared.offset, shared.ratio * qd, shared.ratio * qdd]))
 }
 
 /// By rows, with what joints of these kinds add.
@@ -261,7 +262,8 @@ fn with_joints(at: &Chapter<'_>, mut columns: Vec<Vec<Magnitude>>, kinds: &[Join
             (JointParameter::Stiffness, _) => q - Magnitude::new(body.effects.spring_rest),
         };
         if kinds.contains(&kind) {
-            column[at.tree.links[link].iv] = force;
+            let link = &at.tree.links[link];
+            column[link.iv] = link.shared.map_or(force, |shared| shared.ratio * force);
         }
     }
     Some(by_rows(&columns))

@@ -77,7 +77,7 @@ fn euler(at: &Chapter<'_>, qdd: &[Magnitude]) -> [Vec<Magnitude>; 2] {
 
 /// The state after a step, of the joints that move.
 fn next(at: &Chapter<'_>, system: &MovingJoints<'_, '_>, [q, qd]: [Vec<Magnitude>; 2]) -> Vec<Magnitude> {
-    let mut links: Vec<_> = at.tree.links.iter().filter(|link| system.moving.contains(&link.iv)).collect();
+    let mut links: Vec<_> = at.tree.own().filter(|link| system.moving.contains(&link.iv)).collect();
     links.sort_by_key(|link| link.iq);
     let own = links.iter().flat_map(|link| &q[link.iq..link.iq + link.joint.nq()]).copied();
     own.chain(system.of_moving(&qd)).collect()

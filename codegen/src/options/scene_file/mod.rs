@@ -12,7 +12,7 @@ use crate::function::Function;
 use crate::scene::{check, Base, Scene, SceneContacts};
 
 /// Those of the tables of which there may be several: `[[payload]]`.
-pub const LISTS: &[&str] = &["contact", "loop", "mode", "payload", "parameter", "drive", "flexible"];
+pub const LISTS: &[&str] = &["contact", "loop", "mode", "payload", "parameter", "drive", "coupling", "flexible"];
 
 /// What a scene file says: the scene, and options of the compiler.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -110,6 +110,7 @@ impl<'a> SceneReader<'a> {
             self.parameter(table);
         }
         self.file.scene.drives = self.reader.drives_at(top);
+        self.file.scene.couplings = self.reader.couplings_at(top);
         self.file.scene.flexible = self.reader.flexible_links_at(top);
         self.file.scene.support = self.reader.support_at(top);
         self.contacts(top);
@@ -271,12 +272,12 @@ impl<'a> SceneReader<'a> {
         let own = ["rotor_inertia", "damping", "coulomb", "coulomb_speed", "springs"];
         self.reader.check_keys(
             table,
-            &[&own[..], &["transmission_losses", "elastic_transmissions", "elastic_links"]].concat(),
+            &[&own[..], &["transmission_losses", "elastic_transmissions", "elastic_links", "couplings"]].concat(),
         );
         let mut flag = |key: &str| self.reader.flag_at(table, key).is_none_or(|flag| flag.value);
         let (rotor_inertia, damping, springs) = (flag("rotor_inertia"), flag("damping"), flag("springs"));
         let (transmission_losses, elastic_transmissions) = (flag("transmission_losses"), flag("elastic_transmissions"));
-        let elastic_links = flag("elastic_links");
+        let (elastic_links, couplings) = (flag("elastic_links"), flag("couplings"));
         let form = self.reader.word_at(table, "coulomb", &COULOMB);
         let speed = self.reader.real_at(table, "coulomb_speed", Range64::Finite);
         let coulomb = match (form.as_ref().map(|f| f.value).unwrap_or_default(), &speed) {
@@ -303,6 +304,7 @@ impl<'a> SceneReader<'a> {
             transmission_losses,
             elastic_transmissions,
             elastic_links,
+            couplings,
         };
     }
 

@@ -87,7 +87,7 @@ impl<T: Real> CommonEquations<'_, T> {
             jumps: Vec::new(),
             slopes: Vec::new(),
         };
-        let mut held = HeldWrenches::none(self.nv());
+        let mut held = HeldWrenches::none(model);
         for t in &self.traced {
             let m = t.footing.constrained.len();
             let force = found.force[first..first + m].to_vec();

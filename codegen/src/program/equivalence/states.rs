@@ -78,7 +78,7 @@ impl<'a> States<'a> {
         let names = plain.into_iter().map(|port| port.name);
         state.extend(names.zip(values).map(|(name, x)| (name, x.into_iter().map(short).collect())));
         // of length one in double-double, too
-        for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| !j.kind.is_single()) {
+        for joint in model.free_joints().filter(|j| !j.kind.is_single()) {
             for name in Quantity::of_positions().map(Quantity::name) {
                 let Some(q) = state.get_mut(&name) else { continue };
                 let own = &mut q[joint.iq..joint.iq + joint.kind.nq()];

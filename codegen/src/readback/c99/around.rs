@@ -146,7 +146,7 @@ impl<'g> CAround<'g> {
         let sizes = [
             ("nq", g.model.nq()),
             ("nv", g.model.nv()),
-            ("joint_count", g.model.bodies.len()),
+            ("joint_count", g.model.joints().len()),
             ("frame_count", g.frames.len()),
         ];
         for (name, n) in sizes {
@@ -292,7 +292,7 @@ impl<'g> CAround<'g> {
              #define {u}_FRAME_COUNT {} {counts} #ifdef __cplusplus extern \"C\" {{ #endif",
             g.model.nq(),
             g.model.nv(),
-            g.model.bodies.len(),
+            g.model.joints().len(),
             g.frames.len()
         );
         header.these(&mut at, &head)?;
@@ -357,7 +357,7 @@ impl<'g> CAround<'g> {
              constexpr std::size_t frame_count = {}; inline int arithmetic_check() noexcept {{ return {p}_arithmetic_check(); }}",
             g.model.nq(),
             g.model.nv(),
-            g.model.bodies.len(),
+            g.model.joints().len(),
             g.frames.len()
         );
         text.these(&mut at, &head)?;

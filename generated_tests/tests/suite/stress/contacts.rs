@@ -42,6 +42,7 @@ fn robot(bodies: Vec<Body<f64>>, frames: Vec<(usize, Transform<f64>)>, gravity: 
         name: "robot".into(),
         bodies,
         gravity,
+        couplings: vec![],
         frames: frames.into_iter().enumerate().map(frame).collect(),
         drives: vec![],
         base_parameters: Default::default(),

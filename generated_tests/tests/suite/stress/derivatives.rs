@@ -42,7 +42,7 @@ fn state(judged: &Judged, function: Function, place: Place, random: &mut Random)
         Place::Limits => {}
         Place::Singular => x[..n].iter_mut().for_each(|q| *q = random.between(-1e-8, 1e-8)),
         Place::Far => {
-            let turning = judged.model().bodies.iter().map(|b| &b.joint).filter(|j| j.kind == JointKind::Revolute);
+            let turning = judged.model().free_joints().filter(|j| j.kind == JointKind::Revolute);
             turning.for_each(|joint| x[joint.iq] = random.between(-1e6, 1e6));
             x[n..2 * n].iter_mut().for_each(|qd| *qd = random.between(-1e3, 1e3));
         }

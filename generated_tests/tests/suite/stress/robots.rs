@@ -81,7 +81,7 @@ pub fn ranges(model: &Model<Dd>, function: Function) -> Ranges {
     let mut ranges = Vec::new();
     for port in function.inputs(model, 0) {
         let mut group = vec![(0.0, 0.0); port.len()];
-        for joint in model.bodies.iter().map(|b| &b.joint) {
+        for joint in model.free_joints() {
             let or = |limit: f64, other: f64| if limit.is_finite() { limit } else { other };
             let (first, size) = match port.name.as_str() {
                 "q" => (joint.iq, joint.kind.nq()),

@@ -5,6 +5,8 @@
 //! 6 × 6 in blocks of the acceleration (ε, a) of the joint frame's origin: n = J ε + H a,  f = Hᵀ ε + M a.
 
 use super::composite_of;
+use super::crba::mass_matrix;
+use super::factor::Ltdl;
 use super::rnea::bias_force;
 use crate::joint::{ArticulatedInertia, FreeJoint, JointPose};
 use crate::model::Model;
@@ -22,12 +24,15 @@ pub fn forward_dynamics_aba<T: Real>(model: &Model<T>, q: &[T], qd: &[T], tau: &
     solve_articulated(model, q, &drive)
 }
 
-/// x with H(q) x = `drive`, without forming H.
+/// x with H(q) x = `drive`, without forming H; where joints follow others H is formed, as a force on one moves the other.
 ///
 /// Divides by what each joint feels of the mass beyond it, with the joints beyond free: positive as long as every joint
 /// moves some mass or inertia; a joint that moves none has no forward dynamics, and what comes out is not finite.
 #[doc(alias("ABA"))]
 pub fn solve_articulated<T: Real>(model: &Model<T>, q: &[T], drive: &[T]) -> Vec<T> {
+    if !model.couplings.is_empty() {
+        return Ltdl::factor(model, &mass_matrix(model, q)).solve(drive);
+    }
     let poses = JointPose::all(&model.bodies, q);
     let mut inertias: Vec<ArticulatedInertia<T>> =
         model.bodies.iter().map(|body| ArticulatedInertia::of_body(&composite_of(body))).collect();

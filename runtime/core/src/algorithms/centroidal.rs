@@ -32,7 +32,8 @@ use alloc::vec::Vec;
 /// ∂(centre of mass)/∂q = ∂(its velocity)/∂q̇, 3 × nv, row-major, in world axes, \[m/rad, m/m\]; of a floating base by its velocities in its own axes.
 #[doc(alias("jacobianCenterOfMass", "COM Jacobian"))]
 pub fn centre_of_mass_jacobian<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
-    let (nv, poses) = (model.nv(), JointPose::all(&model.bodies, q));
+    let (q, nv) = (&*model.tree_positions(q), model.tree_nv());
+    let poses = JointPose::all(&model.bodies, q);
     let (composites, world) = (composites(model, &poses), world_poses(model, q));
     let (mass, _) = first_moments_in_world(model, &poses);
     let per_mass = T::one() / mass;
@@ -46,13 +47,14 @@ pub fn centre_of_mass_jacobian<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
             column.to_array().into_iter().enumerate().for_each(|(row, x)| rows[row * nv + joint.iv + k] = x);
         }
     }
-    rows
+    model.free_columns(rows)
 }
 
 /// A with h = A q̇, 6 × nv, row-major: rows 0-2 linear momentum \[kg·m/s\], 3-5 angular momentum about the centre of mass \[kg·m²/s\], world axes.
 #[doc(alias("computeCentroidalMap", "ccrba", "CMM"))]
 pub fn centroidal_map<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
-    let (nv, poses) = (model.nv(), JointPose::all(&model.bodies, q));
+    let (q, nv) = (&*model.tree_positions(q), model.tree_nv());
+    let poses = JointPose::all(&model.bodies, q);
     let (composites, world) = (composites(model, &poses), world_poses(model, q));
     let levers = levers_from_centre(model, &poses, &world);
     let mut rows = vec![T::zero(); 6 * nv];
@@ -66,7 +68,7 @@ pub fn centroidal_map<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
             set(&mut rows, (joint.iv + k, nv), &MotionVector { angular, linear });
         }
     }
-    rows
+    model.free_columns(rows)
 }
 
 /// The centroidal map along a motion, each 6 × nv, row-major, rows 0-2 linear, 3-5 angular about the centre of mass, in world axes.
@@ -83,7 +85,8 @@ pub struct CentroidalBlocks<T> {
 /// A, Ȧ and ∂h/∂q at (q, q̇).
 #[doc(alias("computeCentroidalMapTimeVariation", "dccrba"))]
 pub fn centroidal_derivatives<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> CentroidalBlocks<T> {
-    let nv = model.nv();
+    let six = momentum_of(model, q, qd);
+    let (q, qd, nv) = (&*model.tree_positions(q), &*model.tree_rates(qd), model.tree_nv());
     let motion = CoriolisSweep::new(model, q, qd);
     let (spreads, world) = (motion.spreads(model), world_poses(model, q));
     let levers = levers_from_centre(model, &motion.poses, &world);
@@ -107,10 +110,10 @@ pub fn centroidal_derivatives<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> C
             set(&mut all.by_position, place, &MotionVector { angular: of_rate - convected, linear: rate });
         }
     }
-    let map = all.map.clone();
-    subtract_brackets(model, qd, &map, &mut all.by_position);
-    turn_with_floating_bases(model, &world, &momentum_of(model, q, qd), &mut all.by_position);
-    all
+    subtract_brackets(model, qd, &all.map, &mut all.by_position);
+    turn_with_floating_bases(model, &world, &six, &mut all.by_position);
+    let [map, rate, by_position] = [all.map, all.rate, all.by_position].map(|rows| model.free_columns(rows));
+    CentroidalBlocks { map, rate, by_position }
 }
 
 /// Centroidal momentum h and its rate ḣ along a motion, each linear, then angular about the centre of mass, in world axes, without gravity, and their
@@ -148,7 +151,7 @@ pub fn centroidal_dynamics_derivatives<T: Real>(
     let momentum_rate = rate_of_momentum([&all.map, &all.rate].map(|rows| values(rows)), qd, qdd);
     let mut dhdot_dq = rates(&all.by_position);
     subtract_brackets(model, qd, &values(&all.by_position), &mut dhdot_dq);
-    turn_with_floating_bases(model, &world_poses(model, q), &momentum_rate, &mut dhdot_dq);
+    turn_with_floating_bases(model, &world_poses(model, &model.tree_positions(q)), &momentum_rate, &mut dhdot_dq);
     CentroidalDynamicsBlocks {
         momentum: momentum_of(model, q, qd),
         momentum_rate,
@@ -176,8 +179,8 @@ fn momentum_of<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
 
 /// Of the columns of joints whose increments do not commute with their rates, Σ c_i times the columns `of`.
 fn subtract_brackets<T: Real>(model: &Model<T>, qd: &[T], of: &[T], rows: &mut [T]) {
-    let nv = model.nv();
-    for joint in model.bodies.iter().map(|body| &body.joint) {
+    let nv = rows.len() / 6;
+    for joint in model.free_joints() {
         for k in 0..joint.kind.nv() {
             let Some(bracket) = joint.kind.mechanics().bracket(k, joint.rates(qd)) else { continue };
             for (row, of) in rows.chunks_mut(nv).zip(of.chunks(nv)) {
@@ -196,7 +199,7 @@ fn turn_with_floating_bases<T: Real>(model: &Model<T>, world: &[WorldPose<T>], s
         for k in 0..joint.kind.nv() {
             let w = pose.rotation * joint.kind.mechanics().column(k, &[]).angular;
             let column = MotionVector { angular: w.cross(angular), linear: w.cross(linear) };
-            set(rows, (joint.iv + k, model.nv()), &column);
+            set(rows, (joint.iv + k, rows.len() / 6), &column);
         }
     }
 }

@@ -2,7 +2,7 @@
 //! Ĵᵀ F that given reactions make.
 //!
 //! The robot comes in by the frame that touches, and by the object where the robot carries it: ∂v/∂q, ∂a/∂q, ∂a/∂q̇ and J of
-//! [`frame_derivatives`] say how they move, in closed form. From there to the coordinates it is a short way of dual numbers, over surfaces of any form. Reactions
+//! [`frame_derivatives`](fn@super::frame_derivatives) say how they move, in closed form. From there to the coordinates it is a short way of dual numbers, over surfaces of any form. Reactions
 //! are a wrench (f, m) on the frame, and the opposite one on the object; with columns (l, w) of J
 //!
 //! ```text
@@ -13,7 +13,7 @@
 //! and Jᵀ ∂W/∂q_k of a wrench that is not held in the world: of curved surfaces, axes, friction, and loops.
 
 use super::constraint::friction_tilt;
-use super::frame_derivatives::{frame_derivatives, FrameDerivativeBlocks};
+use super::frame_derivatives::{tree_frame_derivatives, FrameDerivativeBlocks};
 use super::functional::{between, FunctionalCoordinates, InWorld, PlaceOnSurface, RelativeMotion};
 use super::kinematics::{forward_kinematics, frame_acceleration, frame_velocity, path_to};
 use crate::contact::{Contact, Object};
@@ -58,27 +58,36 @@ struct SweptFrame<T> {
     blocks: FrameDerivativeBlocks<T>,
     /// The velocity coordinates that move it.
     path: Vec<usize>,
+    /// The Jacobian by all coordinates of the tree, and those that move the frame.
+    of_tree: (Vec<T>, Vec<usize>),
 }
 
 impl<T: Real> SweptFrame<T> {
     fn new(model: &Model<T>, frame: &Frame<T>, [q, qd, qdd]: [&[T]; 3]) -> Self {
-        let joints = path_to(model, frame.body).into_iter().map(|b| &model.bodies[b].joint);
+        let bodies = path_to(model, frame.body);
+        let coordinates = |first: usize, b: usize| first..first + model.bodies[b].joint.kind.nv();
+        let mut path: Vec<usize> = Vec::new();
+        for k in bodies.iter().flat_map(|b| coordinates(model.moved_by(*b).0, *b)) {
+            if !path.contains(&k) {
+                path.push(k);
+            }
+        }
+        let tree_path = bodies.iter().flat_map(|b| coordinates(model.bodies[*b].joint.iv, *b)).collect();
+        let [y, yd, ydd] = &model.tree_motion([q, qd, qdd]);
+        let blocks = tree_frame_derivatives(model, [y, yd, ydd], frame);
         SweptFrame {
             pose: forward_kinematics(model, q, &[frame])[0],
             velocity: frame_velocity(model, q, qd, frame),
             acceleration: frame_acceleration(model, q, qd, qdd, frame),
-            blocks: frame_derivatives(model, [q, qd, qdd], frame),
-            path: joints.flat_map(|joint| joint.iv..joint.iv + joint.kind.nv()).collect(),
+            of_tree: (blocks.jacobian.clone(), tree_path),
+            blocks: blocks.of_free_joints(model),
+            path,
         }
-    }
-
-    fn nv(&self) -> usize {
-        self.blocks.jacobian.len() / 6
     }
 
     /// A column of six rows.
     fn column(&self, rows: &[T], k: usize) -> MotionVector<T> {
-        let entry = |row: usize| rows[row * self.nv() + k];
+        let entry = |row: usize| rows[row * (rows.len() / 6) + k];
         MotionVector {
             linear: Vec3::new(entry(0), entry(1), entry(2)),
             angular: Vec3::new(entry(3), entry(4), entry(5)),
@@ -214,9 +223,9 @@ pub struct HeldWrenches<T> {
 }
 
 impl<T: Real> HeldWrenches<T> {
-    /// None, of a robot with so many velocity coordinates.
-    pub fn none(nv: usize) -> Self {
-        let none = || vec![Vec3::zero(); nv];
+    /// None.
+    pub fn none(model: &Model<T>) -> Self {
+        let none = || vec![Vec3::zero(); model.tree_nv()];
         HeldWrenches { turns: none(), carried: none(), shifted: none() }
     }
 
@@ -226,8 +235,9 @@ impl<T: Real> HeldWrenches<T> {
         for (frame, wrench) in frames.into_iter().zip(&at_rest.wrenches) {
             let Some(frame) = frame else { continue };
             let (force, moment) = (wrench.force.map(|x| x.value), wrench.moment.map(|x| x.value));
-            for &i in &frame.path {
-                let column = frame.column(&frame.blocks.jacobian, i);
+            let (jacobian, path) = &frame.of_tree;
+            for &i in path {
+                let column = frame.column(jacobian, i);
                 let shifted = column.linear.cross(force);
                 self.turns[i] = column.angular;
                 self.carried[i] = self.carried[i] + (shifted + column.angular.cross(moment));
@@ -252,6 +262,6 @@ impl<T: Real> HeldWrenches<T> {
                 }
             }
         }
-        slopes
+        model.free_square(slopes)
     }
 }

@@ -27,7 +27,7 @@ use alloc::vec::Vec;
 /// C(q, q̇), nv × nv, row-major, \[N·m·s/rad, N·s/m as the coordinates have it\], without damping.
 #[doc(alias("Coriolis", "Christoffel", "computeCoriolisMatrix"))]
 pub fn coriolis_matrix<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
-    let nv = model.nv();
+    let (q, qd, nv) = (&*model.tree_positions(q), &*model.tree_rates(qd), model.tree_nv());
     let motion = CoriolisSweep::new(model, q, qd);
     let spreads = motion.spreads(model);
     let mut c = vec![T::zero(); nv * nv];
@@ -56,7 +56,7 @@ pub fn coriolis_matrix<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
             }
         }
     }
-    c
+    model.free_square(c)
 }
 
 /// Cᵀ q̇ = Ḣ q̇ − C q̇, \[N·m or N\]: what observers of momentum need. The same of every C with Ḣ = C + Cᵀ.
@@ -65,8 +65,9 @@ pub fn coriolis_matrix<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
 /// the second sum belongs to a rigid motion is h × (v × ω).
 #[doc(alias("momentum observer", "collision detection"))]
 pub fn coriolis_transpose_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
+    let (q, qd) = (&*model.tree_positions(q), &*model.tree_rates(qd));
     let motion = CoriolisSweep::new(model, q, qd);
-    let mut forces = vec![T::zero(); model.nv()];
+    let mut forces = vec![T::zero(); model.tree_nv()];
     for (b, body) in model.bodies.iter().enumerate() {
         T::section("momentum", Some(b));
         let (composite, relative) = (&motion.composites[b], &motion.relative[b]);
@@ -82,7 +83,7 @@ pub fn coriolis_transpose_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) ->
             forces[joint.iv + k] = joint.kind.mechanics().along(k, joint.coordinates(q), &across);
         }
     }
-    forces
+    model.free_forces(forces)
 }
 
 /// The rate of a twist that is constant in axes that turn like this.

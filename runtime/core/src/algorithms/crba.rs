@@ -19,8 +19,9 @@ use core::cell::OnceCell;
 #[doc(alias = "joint space inertia matrix")]
 #[doc(alias("CRBA", "inertia matrix"))]
 pub fn mass_matrix<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
+    let q = &*model.tree_positions(q);
     let poses = JointPose::all(&model.bodies, q);
-    let nv = model.nv();
+    let nv = model.tree_nv();
     let mut h = vec![T::zero(); nv * nv];
     let mut set = |i: usize, j: usize, value: T| {
         h[i * nv + j] = value;
@@ -59,7 +60,7 @@ pub fn mass_matrix<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
             }
         }
     }
-    h
+    model.free_symmetric(h)
 }
 
 /// The inertia on a joint's own coordinate, rotor included.

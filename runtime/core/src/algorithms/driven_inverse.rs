@@ -119,7 +119,7 @@ fn positions<T: Real, const N: usize>(
     qd: &[Taylor<T, N>],
 ) -> Vec<Taylor<T, N>> {
     let mut series: Vec<Taylor<T, N>> = q.iter().map(|q| Taylor::truncated(terms, [*q])).collect();
-    for joint in model.bodies.iter().map(|b| &b.joint) {
+    for joint in model.free_joints() {
         let own = joint.iq..joint.iq + joint.kind.nq();
         for k in 1..terms {
             let per = T::constant(Dd::ONE / Dd::from(k as f64));

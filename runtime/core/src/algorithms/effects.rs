@@ -10,7 +10,8 @@ use alloc::vec::Vec;
 
 /// Generalized forces \[N·m or N\] that friction and springs take: d q̇ + f(q̇) + k (q − q₀).
 pub fn passive_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
-    let mut forces = vec![T::zero(); model.nv()];
+    let (q, qd) = (&*model.tree_positions(q), &*model.tree_rates(qd));
+    let mut forces = vec![T::zero(); model.tree_nv()];
     for (i, body) in model.bodies.iter().enumerate().filter(|(_, b)| b.joint.kind.is_single()) {
         T::section("friction and springs", Some(i));
         let (q, qd, e) = (q[body.joint.iq], qd[body.joint.iv], &body.effects);
@@ -18,7 +19,7 @@ pub fn passive_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
         let friction = friction_force(e, qd);
         forces[body.joint.iv] = (friction + spring).named("passive", i, "");
     }
-    forces
+    model.free_forces(forces)
 }
 
 /// d q̇ + f(q̇) \[N·m or N\] of a joint.
@@ -35,13 +36,17 @@ fn coulomb_force<T: Real>(effects: &JointEffects<T>, qd: T) -> T {
     }
 }
 
-/// Inertia that joints add to the diagonal of H, by velocity coordinate \[kg·m² or kg\].
+/// Inertia that joints add to the diagonal of H, by velocity coordinate \[kg·m² or kg\]: of a joint that follows another one to that of the other.
 pub fn rotor_inertias<T: Real>(model: &Model<T>) -> Vec<T> {
-    let mut inertias = vec![T::zero(); model.nv()];
-    for body in model.bodies.iter().filter(|b| b.joint.kind.is_single()) {
-        inertias[body.joint.iv] = body.effects.rotor_inertia.unwrap_or_else(T::zero);
+    let mut inertias = vec![T::zero(); model.tree_nv()];
+    for (b, body) in model.bodies.iter().enumerate().filter(|(_, b)| b.joint.kind.is_single()) {
+        let inertia = body.effects.rotor_inertia.unwrap_or_else(T::zero);
+        inertias[body.joint.iv] = match model.coupling_of(b) {
+            Some(coupling) => coupling.ratio * inertia,
+            None => inertia,
+        };
     }
-    inertias
+    model.free_forces(inertias)
 }
 
 /// ½ Σ I q̇² \[J\] of the rotors.
@@ -52,6 +57,7 @@ pub fn rotor_energy<T: Real>(model: &Model<T>, qd: &[T]) -> T {
 
 /// ½ Σ k (q − q₀)² \[J\] of the springs.
 pub fn spring_energy<T: Real>(model: &Model<T>, q: &[T]) -> T {
+    let q = &*model.tree_positions(q);
     let joints = model.bodies.iter().filter(|b| b.joint.kind.is_single());
     let squares = joints.map(|b| {
         let stretch = q[b.joint.iq] - b.effects.spring_rest;

@@ -11,8 +11,9 @@ use crate::real::Real;
 /// T = ½ Σ (m v_c² + ω · J_c ω) + ½ Σ I q̇² \[J\], each body about its centre of mass, so that every term is a square; the
 /// second sum is over the rotors.
 pub fn kinetic_energy<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> T {
-    let poses = JointPose::all(&model.bodies, q);
-    let velocities = body_velocities(model, &poses, [q, qd]);
+    let (y, yd) = (&*model.tree_positions(q), &*model.tree_rates(qd));
+    let poses = JointPose::all(&model.bodies, y);
+    let velocities = body_velocities(model, &poses, [y, yd]);
     let mut twice = T::zero();
     for (i, (body, velocity)) in model.bodies.iter().zip(&velocities).enumerate() {
         T::section("energy", Some(i));
@@ -32,7 +33,7 @@ pub fn kinetic_energy<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> T {
 
 /// V = −Σ m g · p_c + ½ Σ k (q − q₀)² \[J\] over the moving bodies, p_c from the world's origin, and over the springs.
 pub fn potential_energy<T: Real>(model: &Model<T>, q: &[T]) -> T {
-    let poses = JointPose::all(&model.bodies, q);
+    let poses = JointPose::all(&model.bodies, &model.tree_positions(q));
     let (mass, first_moment) = first_moments_in_world(model, &poses);
     -model.gravity.dot(first_moment + anchor(&poses).scale(mass)) + spring_energy(model, q)
 }

@@ -7,6 +7,7 @@ use super::crba::mass_matrix;
 use super::rnea::bias_force;
 use crate::model::{BodyId, Model};
 use crate::real::Real;
+use alloc::collections::BTreeSet;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -157,7 +158,7 @@ pub fn forward_dynamics_ltdl<T: Real>(model: &Model<T>, q: &[T], qd: &[T], tau: 
     Ltdl::factor(model, &mass_matrix(model, q)).solve(&drive)
 }
 
-/// The velocity coordinates from the base outwards (Featherstone 2008, section 6.4: the expanded parent array).
+/// The velocity coordinates in the order of their bodies (Featherstone 2008, section 6.4: the expanded parent array).
 struct Branches {
     /// Index into qd.
     coordinates: Vec<usize>,
@@ -167,21 +168,36 @@ struct Branches {
     parents: Vec<Option<usize>>,
 }
 
-/// A floating base is a chain of six.
+/// The elimination tree of H: a row's parent is the nearest row towards the base that it is coupled with, by a body that both move or by rows
+/// eliminated before. A floating base is a chain of six, and of a tree the parents are those of the bodies; joints that follow others join branches.
 fn branches<T: Real>(model: &Model<T>) -> Branches {
     let mut list = Branches { coordinates: Vec::new(), bodies: Vec::new(), parents: Vec::new() };
-    let mut last_of_body: Vec<Option<usize>> = Vec::new();
-    for (b, body) in model.bodies.iter().enumerate() {
-        let mut parent = body.parent.and_then(|p| last_of_body[p]);
-        for k in 0..body.joint.kind.nv() {
-            list.coordinates.push(body.joint.iv + k);
-            list.bodies.push(b);
-            list.parents.push(parent);
-            parent = Some(list.coordinates.len() - 1);
-        }
-        last_of_body.push(parent);
+    let mut rows = vec![0..0; model.bodies.len()];
+    for b in model.free_bodies() {
+        let (joint, first) = (&model.bodies[b].joint, list.bodies.len());
+        list.coordinates.extend(joint.iv..joint.iv + joint.kind.nv());
+        list.bodies.extend((0..joint.kind.nv()).map(|_| b));
+        rows[b] = first..list.bodies.len();
     }
-    list
+    let mut towards_base: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); list.bodies.len()];
+    let mut movers: Vec<BTreeSet<usize>> = Vec::with_capacity(rows.len());
+    for (b, body) in model.bodies.iter().enumerate() {
+        let mut own = body.parent.map_or(BTreeSet::new(), |parent| movers[parent].clone());
+        own.extend(rows[model.coupling_of(b).map_or(b, |coupling| coupling.source)].clone());
+        for &row in &own {
+            towards_base[row].extend(own.range(..row));
+        }
+        movers.push(own);
+    }
+    let mut parents = vec![None; towards_base.len()];
+    for row in (0..parents.len()).rev() {
+        let mut others = core::mem::take(&mut towards_base[row]);
+        parents[row] = others.pop_last();
+        if let Some(parent) = parents[row] {
+            towards_base[parent].extend(others);
+        }
+    }
+    Branches { parents, ..list }
 }
 
 /// The rows on the way from `row` to the base, without `row`.

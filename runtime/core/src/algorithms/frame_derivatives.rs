@@ -41,6 +41,14 @@ impl<T: Real> FrameDerivativeBlocks<T> {
         let none = || vec![T::zero(); 6 * nv];
         FrameDerivativeBlocks { dv_dq: none(), da_dq: none(), da_dqd: none(), jacobian: none(), jacobian_rate: none() }
     }
+
+    /// By the coordinates that are left to choose, from those of the tree.
+    pub(super) fn of_free_joints(self, model: &Model<T>) -> Self {
+        let FrameDerivativeBlocks { dv_dq, da_dq, da_dqd, jacobian, jacobian_rate } = self;
+        let blocks = [dv_dq, da_dq, da_dqd, jacobian, jacobian_rate];
+        let [dv_dq, da_dq, da_dqd, jacobian, jacobian_rate] = blocks.map(|rows| model.free_columns(rows));
+        FrameDerivativeBlocks { dv_dq, da_dq, da_dqd, jacobian, jacobian_rate }
+    }
 }
 
 /// The derivatives of [`frame_velocity`](super::frame_velocity) and [`frame_acceleration`](super::frame_acceleration): in world axes, of the frame's
@@ -51,7 +59,17 @@ pub fn frame_derivatives<T: Real>(
     [q, qd, qdd]: [&[T]; 3],
     frame: &Frame<T>,
 ) -> FrameDerivativeBlocks<T> {
-    let nv = model.nv();
+    let [q, qd, qdd] = &model.tree_motion([q, qd, qdd]);
+    tree_frame_derivatives(model, [q, qd, qdd], frame).of_free_joints(model)
+}
+
+/// The same by all velocity coordinates of the tree, at a motion of the tree.
+pub(super) fn tree_frame_derivatives<T: Real>(
+    model: &Model<T>,
+    [q, qd, qdd]: [&[T]; 3],
+    frame: &Frame<T>,
+) -> FrameDerivativeBlocks<T> {
+    let nv = model.tree_nv();
     let mut all = FrameDerivativeBlocks::zero(nv);
     let poses = world_poses(model, q);
     let path = path_to(model, frame.body);

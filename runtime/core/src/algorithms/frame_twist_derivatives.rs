@@ -31,6 +31,8 @@ pub fn frame_derivatives_in_own_axes<T: Real>(
     motion: [&[T]; 3],
     frame: &Frame<T>,
 ) -> FrameDerivativeBlocks<T> {
+    let [q, qd, qdd] = &model.tree_motion(motion);
+    let motion: [&[T]; 3] = [q, qd, qdd];
     let path = path_to(model, frame.body);
     let joints = joints_along(model, motion, &path, columns_at_frame(model, motion[0], frame, &path));
     by_columns(model, &joints, |joint, k, [behind, from_before]| {
@@ -49,6 +51,8 @@ pub fn frame_derivatives_at_world_origin<T: Real>(
     motion: [&[T]; 3],
     frame: &Frame<T>,
 ) -> FrameDerivativeBlocks<T> {
+    let [q, qd, qdd] = &model.tree_motion(motion);
+    let motion: [&[T]; 3] = [q, qd, qdd];
     let path = path_to(model, frame.body);
     let joints = joints_along(model, motion, &path, columns_at_origin(model, motion[0], &path));
     by_columns(model, &joints, |joint, k, [behind, from_before]| {
@@ -69,13 +73,13 @@ fn by_columns<T: Real>(
     joints: &[PathJoint<'_, T>],
     derivatives: impl Fn(&PathJoint<'_, T>, usize, [&TwistAndRate<T>; 2]) -> [MotionVector<T>; 3],
 ) -> FrameDerivativeBlocks<T> {
-    let (mut all, mut behind) = (FrameDerivativeBlocks::zero(model.nv()), TwistAndRate::zero());
+    let (mut all, mut behind) = (FrameDerivativeBlocks::zero(model.tree_nv()), TwistAndRate::zero());
     for joint in joints.iter().rev() {
         T::section("frame derivatives", Some(joint.body));
         let from_before = behind.with(joint);
         for (k, column) in joint.columns.iter().enumerate() {
             let [by_velocity, by_acceleration, rate] = derivatives(joint, k, [&behind, &from_before]);
-            let place = (joint.iv + k, model.nv());
+            let place = (joint.iv + k, model.tree_nv());
             set(&mut all.jacobian, place, column);
             set(&mut all.dv_dq, place, &by_velocity);
             set(&mut all.da_dq, place, &by_acceleration);
@@ -84,7 +88,7 @@ fn by_columns<T: Real>(
         }
         behind = from_before;
     }
-    all
+    all.of_free_joints(model)
 }
 
 /// A twist and its rate.

@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 /// 6 × nv, row-major: rows 0-2 the velocity of the frame's origin, rows 3-5 its angular velocity, in world axes, per unit
 /// of each velocity coordinate. Columns of joints that do not move the frame are structural zeros.
 pub fn jacobian<T: Real>(model: &Model<T>, q: &[T], frame: &Frame<T>) -> Vec<T> {
-    let nv = model.nv();
+    let (q, nv) = (&*model.tree_positions(q), model.tree_nv());
     let mut rows = vec![T::zero(); 6 * nv];
     let mut set_column = |iv: usize, linear: Vec3<T>, angular: Vec3<T>| {
         let column = linear.to_array().into_iter().chain(angular.to_array());
@@ -31,7 +31,7 @@ pub fn jacobian<T: Real>(model: &Model<T>, q: &[T], frame: &Frame<T>) -> Vec<T> 
         }
         lever = lever + pose.lever;
     }
-    rows
+    model.free_columns(rows)
 }
 
 /// J̇q̇: angular \[rad/s²\] and classical linear acceleration \[m/s²\] of the frame for q̈ = 0, in world axes.

@@ -44,7 +44,7 @@ struct LoadedColumn<T> {
 /// increments of its pose in its own axes.
 #[doc(alias("kinematic Hessian", "geometric stiffness", "getJointKinematicHessian"))]
 pub fn jacobian_hessian_product<T: Real>(model: &Model<T>, q: &[T], forces: &[ForceOnFrame<'_, T>]) -> [Vec<T>; 2] {
-    let nv = model.nv();
+    let (q, nv) = (&*model.tree_positions(q), model.tree_nv());
     let none = LoadedColumn { angular: Vec3::zero(), of_forces: Vec3::zero(), of_moments: Vec3::zero() };
     let (mut columns, mut jt_f) = (vec![none; nv], vec![T::zero(); nv]);
     let poses = world_poses(model, q);
@@ -85,7 +85,7 @@ pub fn jacobian_hessian_product<T: Real>(model: &Model<T>, q: &[T], forces: &[Fo
             }
         }
     }
-    [jt_f, hessian]
+    [model.free_forces(jt_f), model.free_square(hessian)]
 }
 
 /// The coordinates of the joints that carry that of body `b`.

@@ -12,7 +12,7 @@ use alloc::vec::Vec;
 /// Poses in the world of the frames asked for \[m\]: columns of the rotation are the frame's axes.
 #[doc(alias("FK"))]
 pub fn forward_kinematics<T: Real>(model: &Model<T>, q: &[T], frames: &[&Frame<T>]) -> Vec<Transform<T>> {
-    let poses = world_poses(model, q);
+    let poses = world_poses(model, &model.tree_positions(q));
     let pose = |frame: &&Frame<T>| match frame.body {
         None => frame.placement,
         Some(b) => {
@@ -28,6 +28,7 @@ pub fn forward_kinematics<T: Real>(model: &Model<T>, q: &[T], frames: &[&Frame<T
 
 /// Angular velocity of a frame \[rad/s\] and velocity of its origin \[m/s\], in world axes.
 pub fn frame_velocity<T: Real>(model: &Model<T>, q: &[T], qd: &[T], frame: &Frame<T>) -> MotionVector<T> {
+    let (q, qd) = (&*model.tree_positions(q), &*model.tree_rates(qd));
     let poses = world_poses(model, q);
     let (mut omega, mut v) = (Vec3::zero(), Vec3::zero());
     for b in path_to(model, frame.body) {
@@ -52,6 +53,7 @@ pub fn frame_acceleration<T: Real>(
     qdd: &[T],
     frame: &Frame<T>,
 ) -> MotionVector<T> {
+    let [q, qd, qdd] = &model.tree_motion([q, qd, qdd]);
     let poses = world_poses(model, q);
     let (mut omega, mut alpha, mut a) = (Vec3::zero(), Vec3::zero(), Vec3::zero());
     for b in path_to(model, frame.body) {
@@ -81,7 +83,7 @@ pub(super) struct WorldPose<T> {
     pub lever: Vec3<T>,
 }
 
-/// World poses of all bodies.
+/// World poses of all bodies, from the configuration of the tree.
 pub(super) fn world_poses<T: Real>(model: &Model<T>, q: &[T]) -> Vec<WorldPose<T>> {
     let joints = JointPose::all(&model.bodies, q);
     let mut poses: Vec<WorldPose<T>> = Vec::with_capacity(model.bodies.len());

@@ -28,6 +28,7 @@
 //!         load: None,
 //!     }],
 //!     gravity: Vec3::new(0.0, 0.0, -10.0),
+//!     couplings: vec![],
 //!     frames: vec![],
 //!     drives: vec![],
 //!     base_parameters: Default::default(),

@@ -41,12 +41,14 @@ pub fn momentum_regressor<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T
 /// The columns of what joints add on their own coordinates, of these kinds.
 pub fn put_joint_columns<T: Real>(model: &Model<T>, [q, qd, qdd]: [&[T]; 3], kinds: &[JointParameter], y: &mut [T]) {
     let columns = &model.base_parameters.of_forces;
+    let [q, qd, qdd] = &model.tree_motion([q, qd, qdd]);
     for (k, parameter) in columns.iter().enumerate() {
         let BaseParameterKind::Joint(kind) = parameter.kind else { continue };
         let Body { joint, effects, .. } = &model.bodies[parameter.body];
         if kinds.contains(&kind) {
-            let motion = [q[joint.iq], qd[joint.iv], qdd[joint.iv]];
-            y[joint.iv * columns.len() + k] = kind.force(effects, motion);
+            let force = kind.force(effects, [q[joint.iq], qd[joint.iv], qdd[joint.iv]]);
+            let (row, ratio) = model.moved_by(parameter.body);
+            y[row * columns.len() + k] = ratio.map_or(force, |ratio| ratio * force);
         }
     }
 }
@@ -58,8 +60,10 @@ pub fn inertial_regressor<T: Real>(
     motion: [&[T]; 3],
     gravity: Vec3<T>,
 ) -> Vec<T> {
+    let [q, qd, qdd] = &model.tree_motion(motion);
+    let (motion, columns): ([&[T]; 3], _) = ([q, qd, qdd], &*model.of_tree(columns));
     let (poses, motions) = motions(model, motion, gravity);
-    let mut y = vec![T::zero(); model.nv() * columns.len()];
+    let mut y = vec![T::zero(); model.tree_nv() * columns.len()];
     for (k, parameter, unit) in units::<T>(columns) {
         T::section("regressor", Some(parameter.body));
         let mut wrench = motions[parameter.body].wrench_of(&unit);
@@ -71,7 +75,7 @@ pub fn inertial_regressor<T: Real>(
             wrench = poses[b].wrench_to_parent(&wrench);
         }
     }
-    y
+    model.free_rows(y, columns.len())
 }
 
 /// Y with Y β = the wrench on the robot's support, force \[N\] and moment \[N·m\] about the world's origin in its axes, that the moving bodies take; of a
@@ -93,7 +97,8 @@ pub fn support_wrenches<T: Real>(
     motion: [&[T]; 3],
     columns: &[BaseParameter],
 ) -> Vec<ForceVector<T>> {
-    let (poses, motions) = motions(model, motion, model.gravity);
+    let [q, qd, qdd] = &model.tree_motion(motion);
+    let (poses, motions) = motions(model, [q, qd, qdd], model.gravity);
     let of = |(_, parameter, unit): (usize, &BaseParameter, Load<T>)| {
         T::section("regressor", Some(parameter.body));
         let mut wrench = motions[parameter.body].wrench_of(&unit);
@@ -111,6 +116,7 @@ pub fn energy_regressor<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> 
     let columns = &model.base_parameters.of_forces;
     let energies = unit_energies(model, q, qd, false);
     let half = T::constant(Dd::HALF);
+    let (q, qd) = (&*model.tree_positions(q), &*model.tree_rates(qd));
     let mut y = vec![T::zero(); 2 * columns.len()];
     for (k, parameter, unit) in units::<T>(columns) {
         let own = unit.to_array().into_iter().zip(energies[parameter.body]);
@@ -133,7 +139,7 @@ pub fn energy_regressor<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> 
 /// T = ½ m v² + (v × ω) · m c + ½ ∫ (ω × r)² dm,  V = −g · (m p + R m c).
 pub fn unit_energies<T: Real>(model: &Model<T>, q: &[T], qd: &[T], welded: bool) -> Vec<[[T; 2]; PER_BODY]> {
     let (half, zero) = (T::constant(Dd::HALF), T::zero());
-    let placed = placed_motions(model, q, qd, welded);
+    let placed = placed_motions(model, &model.tree_positions(q), &model.tree_rates(qd), welded);
     let of = |PlacedMotion { pose, twist }: &PlacedMotion<T>| {
         let g = pose.rotation.transpose_mul(model.gravity);
         let (v, w) = (twist.linear, twist.angular);

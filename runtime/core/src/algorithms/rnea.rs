@@ -50,13 +50,15 @@ pub fn velocity_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
 }
 
 fn rigid_body_forces<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T], gravity: Vec3<T>) -> Vec<T> {
+    let [q, qd, qdd] = &model.tree_motion([q, qd, qdd]);
     generalized_forces(model, q, &transmitted_wrenches(model, q, qd, qdd, gravity))
 }
 
 /// The wrench that each joint, its drive included, exerts on its child: force \[N\] and moment \[N·m\] about the origin of
 /// the canonical joint frame (fixed to the child), in the axes of the child's link frame. One per joint, in the order of
-/// the velocity coordinates; for a floating base tau itself, as a wrench.
+/// the velocity coordinates, those that follow others last; for a floating base tau itself, as a wrench.
 pub fn joint_wrenches<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T]) -> Vec<ForceVector<T>> {
+    let [q, qd, qdd] = &model.tree_motion([q, qd, qdd]);
     let wrenches = transmitted_wrenches(model, q, qd, qdd, model.gravity);
     let mut order: Vec<usize> = (0..model.bodies.len()).collect();
     order.sort_by_key(|&i| model.bodies[i].joint.iv);
@@ -73,14 +75,14 @@ pub fn joint_wrenches<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T]) -
 
 /// The component of each joint's wrench along the joint: the generalized forces, by velocity coordinate   (20.50)
 fn generalized_forces<T: Real>(model: &Model<T>, q: &[T], wrenches: &[ForceVector<T>]) -> Vec<T> {
-    let mut tau = vec![T::zero(); model.nv()];
+    let mut tau = vec![T::zero(); model.tree_nv()];
     for (body, w) in model.bodies.iter().zip(wrenches) {
         let (joint, mechanics) = (&body.joint, body.joint.kind.mechanics());
         for k in 0..joint.kind.nv() {
             tau[joint.iv + k] = mechanics.along(k, joint.coordinates(q), w);
         }
     }
-    tau
+    model.free_forces(tau)
 }
 
 /// How one body moves, in its own axes.

@@ -32,7 +32,8 @@ pub struct CarriedMass<T> {
 /// What each joint carries, in the order of the velocity coordinates. Divides by its mass, which is positive where every joint moves some.
 #[doc(alias("jacobianSubtreeCenterOfMass", "subtree_com"))]
 pub fn subtrees<T: Real>(model: &Model<T>, q: &[T]) -> Vec<CarriedMass<T>> {
-    let (nv, poses) = (model.nv(), JointPose::all(&model.bodies, q));
+    let (q, nv) = (&*model.tree_positions(q), model.tree_nv());
+    let poses = JointPose::all(&model.bodies, q);
     let (composites, world) = (composites(model, &poses), world_poses(model, q));
     // the momentum of all behind a coordinate, per unit of its velocity
     let mut momenta = vec![Vec3::zero(); nv];
@@ -71,7 +72,7 @@ pub fn subtrees<T: Real>(model: &Model<T>, q: &[T]) -> Vec<CarriedMass<T>> {
             }
             lever = lever + pose.lever;
         }
-        CarriedMass { mass, centre, jacobian }
+        CarriedMass { mass, centre, jacobian: model.free_columns(jacobian) }
     };
     order.into_iter().map(subtree).collect()
 }

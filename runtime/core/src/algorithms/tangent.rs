@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 fn joints<T>(model: &Model<T>) -> impl Iterator<Item = &Joint> {
-    model.bodies.iter().map(|body| &body.joint)
+    model.free_joints()
 }
 
 /// q ⊕ v. Quaternions are taken as of length one, whatever their length but zero, and come out so.

@@ -75,7 +75,7 @@ fn turn_between<T: ReferenceReal>(own: &Vector4<T>, other: &Vector4<T>) -> Vecto
 /// The configuration that a displacement v of the tangent at q leads to; of a free link v is a body twist, (linear, angular).
 pub fn displaced<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], v: &[T]) -> Vec<T> {
     let mut to = q.to_vec();
-    for link in &tree.links {
+    for link in tree.own() {
         if link.joint == ReferenceJoint::Ball {
             let turned = turned_by(&Vector3::from_column_slice(&v[link.iv..link.iv + 3]));
             let own = normalised(&q[link.iq..link.iq + 4]);
@@ -103,7 +103,7 @@ pub fn displaced<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], v: &[T])
 /// The shortest displacement of the tangent at q that leads to q₁.
 pub fn displacement<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], q1: &[T]) -> Vec<T> {
     let mut v = alloc::vec![<T as Real>::zero(); tree.nv()];
-    for link in &tree.links {
+    for link in tree.own() {
         if link.joint == ReferenceJoint::Ball {
             let [own, other] = [q, q1].map(|q| normalised(&q[link.iq..link.iq + 4]));
             v[link.iv..link.iv + 3].copy_from_slice(turn_between(&own, &other).as_slice());
@@ -162,7 +162,7 @@ fn rotation_vector<T: ReferenceReal>(turn: &Vector4<T>) -> Vector3<T> {
 /// How a configuration changes, as an increment of the tangent there: of a free link that of its pose in its own axes, of a ball joint its turn, likewise.
 pub fn increment<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], rate: &[T]) -> Vec<T> {
     let mut v = alloc::vec![<T as Real>::zero(); tree.nv()];
-    for link in &tree.links {
+    for link in tree.own() {
         let Some(first) = link.joint.quaternion() else {
             v[link.iv] = rate[link.iq];
             continue;

@@ -100,9 +100,9 @@ fn joint_load<T: ReferenceReal>(
         // M_{Sj} = −Σ_k (M_{kI} + r_k^{(j)} × (G_k + F_{kI}))                                                  (20.48)
         moment += applied_couple(tree, k, &position[k], &motion[k]) + lever(tree, position, j, k).cross(&applied);
     }
-    let joint = tree.links[j].joint;
-    let (reaction_force, reaction_moment) = match joint.shares::<T>() {
-        None if joint == ReferenceJoint::Ball => (force, Vector3::zeros()),
+    let link = &tree.links[j];
+    let (reaction_force, reaction_moment) = match link.shares() {
+        None if link.joint == ReferenceJoint::Ball => (force, Vector3::zeros()),
         None => (Vector3::zeros(), Vector3::zeros()),
         Some([turns, s]) => {
             let e = &position[j].e;
@@ -148,7 +148,7 @@ pub fn dalembert_inverse_dynamics<T: ReferenceReal>(
     let mut tau = DVector::zeros(tree.nv());
     for (j, link) in tree.links.iter().enumerate() {
         let e = &position[j].e;
-        match link.joint.shares::<T>() {
+        match link.shares() {
             Some([turns, s]) => {
                 for k in carried(tree, j) {
                     let LinkGeometry { rotation, .. } = &position[k];
@@ -233,7 +233,7 @@ pub fn equations_of_motion<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T]
         for k in carried(tree, j) {
             let LinkTerms { force_matrix, force, couple_matrix, couple } = &terms[k];
             let lever = skew(&lever(tree, &position, j, k));
-            match link.joint.shares::<T>() {
+            match link.shares() {
                 Some([turns, s]) => {
                     // H'_j = Σ_k e_jᵀ m_k Ξ^k,    h'_j = Σ_k e_jᵀ m_k (Δ^k − g)                                 (20.54)
                     // H''_j = Σ_k e_jᵀ (A_k J̃_k A_k⁻¹ Λ^k + r̲_k^{(j)} m_k Ξ^k)
@@ -323,7 +323,7 @@ pub fn natural_scale<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: 
             let force = norm(&applied_force(tree, k, &motion[k]));
             let moment =
                 norm(&lever(tree, &position, j, k)) * force + norm(&applied_couple(tree, k, &position[k], &motion[k]));
-            match link.joint.shares::<T>() {
+            match link.shares() {
                 Some([turns, s]) => scale[link.iv] += force * norm_of(s) + moment * norm_of(turns),
                 None => {
                     for i in 0..3 {

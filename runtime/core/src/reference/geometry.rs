@@ -117,7 +117,7 @@ pub fn geometry<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T]) -> Vec<Li
             None => (Matrix3::identity(), Vector3::zeros()),
         };
         let here = match (link.joint, link.joint.shares()) {
-            (_, Some([_, s])) => one_joint(link, (q[link.iq], s), &parent_rotation, &parent_centre_of_mass),
+            (_, Some([_, s])) => one_joint(link, (link.own_coordinate(q), s), &parent_rotation, &parent_centre_of_mass),
             (ReferenceJoint::Ball, _) => {
                 ball(link, &q[link.iq..link.iq + 4], &parent_rotation, &parent_centre_of_mass)
             }

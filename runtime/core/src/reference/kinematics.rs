@@ -39,7 +39,7 @@ pub fn motion<T: ReferenceReal>(
     let mut links: Vec<LinkMotion<T>> = Vec::with_capacity(tree.links.len());
     for (link, position) in tree.links.iter().zip(geometry) {
         let parent = link.parent.map_or_else(LinkMotion::rest, |p| links[p].clone());
-        let here = match (link.joint, link.joint.shares()) {
+        let here = match (link.joint, link.shares()) {
             (_, Some(shares)) => one_joint(shares, position, &parent, qd[link.iv], qdd[link.iv]),
             (ReferenceJoint::Ball, _) => ball(position, &parent, &qd[link.iv..link.iv + 3], &qdd[link.iv..link.iv + 3]),
             _ => free(position, &qd[link.iv..link.iv + 6], &qdd[link.iv..link.iv + 6]),
@@ -139,7 +139,7 @@ pub fn linear_forms<T: ReferenceReal>(
     let mut links: Vec<LinearForms<T>> = Vec::with_capacity(tree.links.len());
     for (link, position) in tree.links.iter().zip(geometry) {
         let parent = link.parent.map_or_else(|| base_forms(n), |p| links[p].clone());
-        let here = match (link.joint, link.joint.shares()) {
+        let here = match (link.joint, link.shares()) {
             (_, Some(shares)) => one_joint_forms(shares, position, &parent, link.iv, qd[link.iv]),
             (ReferenceJoint::Ball, _) => ball_forms(position, &parent, link.iv, &qd[link.iv..link.iv + 3]),
             _ => free_forms(position, parent, link.iv, &qd[link.iv..link.iv + 6]),
@@ -177,19 +177,19 @@ fn one_joint_forms<T: ReferenceReal>(
     // λ_k^j = λ_k^{j−1}, k = 1, …, j−1
     // λ_j^j = (1 − s_j) e_j                                                                                    (20.40)
     let mut lambda = lambda_parent.clone();
-    lambda.set_column(j, &(e * turns));
+    // of a coordinate that joints before share, to what they make
+    lambda.set_column(j, &(lambda_parent.column(j) + e * turns));
     // γ^j = γ^{j−1} + q̇_j (ω_j × e_j) (1 − s_j)                                                                 (20.41)
     let gamma = gamma_parent + omega.cross(e) * (qd * turns);
     // ξ_k^j = ξ_k^{j−1} − λ_k^{j−1} × r_{j−1,j} + λ_k^j × r'_{j,j}, k = 1, …, j−1
     // ξ_j^j = e_j s_j + λ_j^j × r'_{j,j}                                                                       (20.42)
     let mut xi = xi_parent.clone();
-    for k in (0..xi.ncols()).filter(|&k| k != j) {
+    for k in 0..xi.ncols() {
         let lambda_k = lambda.column(k).into_owned();
         let lambda_k_parent = lambda_parent.column(k).into_owned();
         let xi_k = xi_parent.column(k) - lambda_k_parent.cross(r_parent) + lambda_k.cross(r_dash);
-        xi.set_column(k, &xi_k);
+        xi.set_column(k, &if k == j { xi_k + e * s } else { xi_k });
     }
-    xi.set_column(j, &(e * s + lambda.column(j).into_owned().cross(r_dash)));
     // δ^j = δ^{j−1} − γ^{j−1} × r_{j−1,j} + γ^j × r'_{j,j} − ω_{j−1} × (ω_{j−1} × r_{j−1,j})
     //     + ω_j × (ω_j × r'_{j,j}) + 2 ω_j × e_j s_j q̇_j                                                        (20.43)
     let delta = delta_parent - gamma_parent.cross(r_parent) + gamma.cross(r_dash)

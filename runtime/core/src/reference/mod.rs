@@ -19,7 +19,7 @@
 //!
 //! ```
 //! use nalgebra::{Matrix3, Vector3};
-//! use straightline_core::reference::{inverse_dynamics, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint};
+//! use straightline_core::reference::{inverse_dynamics, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint, SharedCoordinate};
 //!
 //! // a pendulum about the world's z axis: 2 kg, its centre of mass 0.5 m from the joint
 //! let link = CentreOfMassLink {
@@ -28,6 +28,7 @@
 //!     joint: ReferenceJoint::Revolute,
 //!     iq: 0,
 //!     iv: 0,
+//!     shared: None,
 //!     mass: 2.0,
 //!     inertia: Matrix3::from_diagonal(&Vector3::new(0.0, 0.1, 0.1)),
 //!     e: Vector3::z(),
@@ -71,4 +72,4 @@ pub use geometry::{extended_joint, geometry, quaternion_rotation, rodrigues, ske
 pub use kinematics::{linear_forms, motion, LinearForms, LinkMotion};
 pub use scalar::ReferenceReal;
 pub use solve::solve_symmetric;
-pub use tree::{CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint};
+pub use tree::{CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint, SharedCoordinate};

@@ -94,6 +94,17 @@ pub enum ExtendedPosition<T> {
     Matrix(Matrix3<T>),
 }
 
+/// What a joint has that shares the coordinate of another one (not in the chapter): its own is `ratio` q + `offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SharedCoordinate<T> {
+    /// How much it turns or slides per unit of the coordinate.
+    pub ratio: T,
+    /// Where it is at coordinate zero \[rad or m\].
+    pub offset: T,
+    /// Its place among the joints that share coordinates of others.
+    pub rank: usize,
+}
+
 /// A link, described from its centre of mass, with the joint that carries it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CentreOfMassLink<T> {
@@ -108,6 +119,8 @@ pub struct CentreOfMassLink<T> {
     pub iq: usize,
     /// First index into q̇, q̈ and τ.
     pub iv: usize,
+    /// Of a joint that has no coordinate of its own: `iq` and `iv` are those of the joint whose it shares.
+    pub shared: Option<SharedCoordinate<T>>,
     /// m_j \[kg\].
     pub mass: T,
     /// J̃_j: tensor of inertia about the centre of mass, link axes \[kg·m²\]; (20.15).
@@ -136,6 +149,7 @@ impl<T: ReferenceReal> CentreOfMassLink<T> {
             joint: ReferenceJoint::Free,
             iq: 0,
             iv: 0,
+            shared: None,
             mass,
             inertia,
             e: Vector3::zeros(),
@@ -148,6 +162,17 @@ impl<T: ReferenceReal> CentreOfMassLink<T> {
 }
 
 impl<T: ReferenceReal> CentreOfMassLink<T> {
+    /// How much it turns and slides per unit of the coordinate that moves it: [`ReferenceJoint::shares`], times the ratio of one that it shares.
+    pub(super) fn shares(&self) -> Option<[T; 2]> {
+        let shares = self.joint.shares::<T>()?;
+        Some(self.shared.map_or(shares, |shared| shares.map(|share| share * shared.ratio)))
+    }
+
+    /// Its own coordinate, of a joint that has one.
+    pub(super) fn own_coordinate(&self, q: &[T]) -> T {
+        self.shared.map_or(q[self.iq], |shared| shared.ratio * q[self.iq] + shared.offset)
+    }
+
     fn map<U: ReferenceReal>(&self, f: impl Fn(T) -> U + Copy) -> CentreOfMassLink<U> {
         CentreOfMassLink {
             name: self.name.clone(),
@@ -155,6 +180,7 @@ impl<T: ReferenceReal> CentreOfMassLink<T> {
             joint: self.joint,
             iq: self.iq,
             iv: self.iv,
+            shared: self.shared.map(|s| SharedCoordinate { ratio: f(s.ratio), offset: f(s.offset), rank: s.rank }),
             mass: f(self.mass),
             inertia: self.inertia.map(f),
             e: self.e.map(f),
@@ -214,12 +240,27 @@ pub struct CentreOfMassTree<T> {
 impl<T: ReferenceReal> CentreOfMassTree<T> {
     /// Number of position coordinates.
     pub fn nq(&self) -> usize {
-        self.links.iter().map(|link| link.joint.nq()).sum()
+        self.own().map(|link| link.joint.nq()).sum()
     }
 
     /// Number of velocity coordinates, n of the chapter.
     pub fn nv(&self) -> usize {
-        self.links.iter().map(|link| link.joint.nv()).sum()
+        self.own().map(|link| link.joint.nv()).sum()
+    }
+
+    /// The links whose joints have coordinates of their own.
+    pub fn own(&self) -> impl Iterator<Item = &CentreOfMassLink<T>> {
+        self.links.iter().filter(|link| link.shared.is_none())
+    }
+
+    /// The links in the order of the coordinates of their joints, those that share others' last.
+    pub fn by_coordinates(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.links.len()).collect();
+        order.sort_by_key(|link| {
+            let link = &self.links[*link];
+            link.shared.map_or((0, link.iv), |shared| (1, shared.rank))
+        });
+        order
     }
 
     /// Gives the joints their places in q and q̇ in the order of the links.

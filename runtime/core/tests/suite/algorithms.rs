@@ -208,6 +208,7 @@ fn random_robot(seed: u64) -> Model<Dd> {
         write_down(&mut bodies, &mut frames, seed, random);
     }
     Model {
+        couplings: vec![],
         name: format!("robot{seed}"),
         bodies,
         gravity: random.vector().scale(Dd::from(9.81)),
@@ -1121,6 +1122,7 @@ fn a_pendulum_swings_as_in_the_textbook() {
         name: "pendulum".into(),
         bodies: vec![body],
         gravity,
+        couplings: vec![],
         frames: vec![],
         drives: vec![],
         base_parameters: Default::default(),

@@ -6,10 +6,11 @@ use crate::support::robots::{random_position, random_robot, written_robots, Rand
 use crate::support::written::Style;
 use nalgebra::{Matrix3, Vector3};
 use straightline_core::algorithms;
+use straightline_core::coupling::Coupling;
 use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion, Surface};
 use straightline_core::model::{self, Body, Frame, JointKind, Limits, Model};
 use straightline_core::reference::{
-    self, unit, CentreOfMassTree, Component, ContactFrames, ExtendedPosition, ReferenceJoint,
+    self, unit, CentreOfMassTree, Component, ContactFrames, ExtendedPosition, ReferenceJoint, SharedCoordinate,
 };
 use straightline_core::spatial::{Mat3, MotionVector, SpatialInertia, Sym3, Transform, Vec3};
 use straightline_core::Dd;
@@ -52,6 +53,8 @@ fn canonical(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Model<Dd> {
             ReferenceJoint::Free => JointKind::Floating,
             ReferenceJoint::Ball => JointKind::Spherical,
         };
+        let own = (link.iq, link.iv);
+        let (iq, iv) = link.shared.map_or(own, |shared| (tree.nq() + shared.rank, tree.nv() + shared.rank));
         let placement = if link.joint == ReferenceJoint::Free {
             Transform::identity()
         } else {
@@ -64,7 +67,7 @@ fn canonical(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Model<Dd> {
         Body {
             name: link.name.clone(),
             parent: link.parent,
-            joint: model::Joint { name: link.name.clone(), kind, iq: link.iq, iv: link.iv, limits: Limits::default() },
+            joint: model::Joint { name: link.name.clone(), kind, iq, iv, limits: Limits::default() },
             dense: algorithms::composing_pays(link.parent, &placement.rotation),
             effects: model::JointEffects::none(),
             load: None,
@@ -88,10 +91,16 @@ fn canonical(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Model<Dd> {
             },
         }
     };
+    let coupling = |(body, link): (usize, &reference::CentreOfMassLink<Dd>)| {
+        let reference::SharedCoordinate { ratio, offset, .. } = link.shared?;
+        let source = tree.links.iter().position(|other| other.shared.is_none() && other.iv == link.iv)?;
+        Some(Coupling { body, source, ratio, offset })
+    };
     Model {
         name: tree.name.clone(),
         bodies: bodies.collect(),
         gravity: vec3(&tree.gravity),
+        couplings: tree.links.iter().enumerate().filter_map(coupling).collect(),
         frames: tree.frames.iter().map(frame).collect(),
         drives: vec![],
         base_parameters: Default::default(),
@@ -125,6 +134,34 @@ fn shuffle_coordinates(random: &mut Random, tree: &mut CentreOfMassTree<Dd>) {
         (tree.links[j].iq, tree.links[j].iv) = (iq, iv);
         iq += tree.links[j].joint.nq();
         iv += tree.links[j].joint.nv();
+    }
+}
+
+/// Some joints of one coordinate share those of others, before or behind them or on another branch, and the rest are numbered anew.
+fn couple(random: &mut Random, tree: &mut CentreOfMassTree<Dd>) {
+    let joints: Vec<usize> = (0..tree.links.len()).filter(|j| tree.links[*j].joint.nv() == 1).collect();
+    let mut sources: Vec<usize> = joints.iter().copied().filter(|_| random.below(2) == 0).collect();
+    if sources.is_empty() {
+        sources.extend(joints.first());
+    }
+    let mut rank = 0;
+    for j in joints.into_iter().filter(|j| !sources.contains(j)).collect::<Vec<_>>() {
+        let source = sources[random.below(sources.len())];
+        let [ratio, offset] = [2.0, 1.0].map(|size| random.list(1, size)[0]);
+        tree.links[j].shared = Some(SharedCoordinate { ratio, offset, rank });
+        tree.links[j].iv = source;
+        rank += 1;
+    }
+    let (mut iq, mut iv) = (0, 0);
+    let mut places = vec![(0, 0); tree.links.len()];
+    for (j, link) in tree.links.iter().enumerate().filter(|(_, link)| link.shared.is_none()) {
+        places[j] = (iq, iv);
+        iq += link.joint.nq();
+        iv += link.joint.nv();
+    }
+    for (j, link) in tree.links.iter_mut().enumerate() {
+        let source = if link.shared.is_some() { link.iv } else { j };
+        (link.iq, link.iv) = places[source];
     }
 }
 
@@ -169,6 +206,24 @@ fn both_authors_agree_on_robots_with_ball_joints() {
     compare_robots([false, false, true], 60, 8);
     compare_robots([true, false, true], 60, 12);
     compare_robots([true, true, true], 60, 12);
+}
+
+#[test]
+fn both_authors_agree_where_joints_follow_others() {
+    let mut disagreement = Disagreement::default();
+    let mut coupled = 0;
+    for seed in 0..120 {
+        let mut random = Random(seed);
+        let kind = RobotKind { links: 2 + random.below(10), branched: seed % 2 == 0, floating: seed % 5 == 0, balls: seed % 4 == 3 };
+        let mut tree = random_robot(&mut random, kind);
+        couple(&mut random, &mut tree);
+        let model = canonical(&mut random, &tree);
+        coupled += model.couplings.len();
+        assert_eq!((model.nv(), model.tree_nv()), (tree.nv(), tree.nv() + model.couplings.len()));
+        compare_authors(&mut disagreement, &format!("{kind:?}, seed {seed}"), &tree, &model, &mut random);
+    }
+    assert!(coupled > 200, "{coupled} joints follow others");
+    disagreement.judge();
 }
 
 /// Numbers as people and exporters write them: few digits, dust, masses of 1e-6 kg, ratios of 1e20, millimetres for metres.

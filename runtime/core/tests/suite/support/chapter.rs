@@ -40,6 +40,7 @@ pub fn chapter_robot(text: &str) -> CentreOfMassTree<Dd> {
             },
             iq: j,
             iv: j,
+            shared: None,
             mass: number(&link["mass"]),
             inertia: inertia(&link["J"]),
             e: unit(&vector(&link["e"])),

@@ -134,8 +134,7 @@ pub fn compare_authors(
     }
 
     // one wrench per joint, in the order of the velocity coordinates
-    let mut order: Vec<usize> = (0..tree.links.len()).collect();
-    order.sort_by_key(|&j| tree.links[j].iv);
+    let order = tree.by_coordinates();
     let wrenches = reference::joint_wrenches(tree, &q, &qd, &qdd);
     let expected: Vec<Dd> = order.iter().flat_map(|&j| wrenches[j]).collect();
     let computed: Vec<Dd> = algorithms::joint_wrenches(model, &q, &qd, &qdd)

@@ -84,6 +84,7 @@ pub fn robot(text: &str) -> Model<Dd> {
         gravity: Vec3::zero(),
         frames: vec![],
         drives: vec![],
+        couplings: vec![],
         base_parameters: Default::default(),
     };
     let (mut iq, mut iv) = (0, 0);

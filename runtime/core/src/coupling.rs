@@ -1,0 +1,212 @@
+//! Joints whose coordinates follow those of others: q = a q_source + b, as of the fingers of a gripper.
+//!
+//! A robot with couplings is its tree, moved by fewer coordinates. With the coordinates y of all joints of the tree and those q that are left to choose,
+//! y = G q + b, the principle of virtual power gives everything that belongs to q:
+//!
+//! ```text
+//! τ = Gᵀ τ_tree      H = Gᵀ H_tree G      J = J_tree G      ẏ = G q̇      ÿ = G q̈
+//! ```
+//!
+//! Joints that are left to choose stand first in the vectors of the tree, so that q is where y begins, and G is the identity above the ratios of the
+//! others. Without couplings y is q, and nothing is copied.
+
+use crate::base_parameters::BaseParameter;
+use crate::model::{Body, BodyId, Joint, Model};
+use crate::real::Real;
+use crate::dd::Dd;
+use alloc::borrow::Cow;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+/// A joint of one coordinate that follows another one, which is no follower itself: q = `ratio` q_source + `offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coupling<T> {
+    /// The body whose joint follows. In the vectors of the tree its coordinate stands behind those that are left to choose.
+    pub body: BodyId,
+    /// The body whose joint it follows.
+    pub source: BodyId,
+    /// a \[1, m/rad or rad/m\].
+    pub ratio: T,
+    /// b \[rad or m\].
+    pub offset: T,
+}
+
+impl<T: Copy> Coupling<T> {
+    /// Its numbers through `f`.
+    pub fn map<U>(&self, mut f: impl FnMut(T) -> U) -> Coupling<U> {
+        Coupling { body: self.body, source: self.source, ratio: f(self.ratio), offset: f(self.offset) }
+    }
+}
+
+impl Coupling<Dd> {
+    /// As a formula of the coordinate that it follows: `2 q[3] + 0.5`.
+    pub fn in_words(&self, model: &Model<Dd>) -> String {
+        let (ratio, offset) = (self.ratio.to_f64(), self.offset.to_f64());
+        let source = model.bodies[self.source].joint.iq;
+        let product = match ratio {
+            1.0 => format!("q[{source}]"),
+            -1.0 => format!("-q[{source}]"),
+            _ => format!("{ratio:?} q[{source}]"),
+        };
+        match offset {
+            0.0 => product,
+            _ if offset < 0.0 => format!("{product} - {:?}", -offset),
+            _ => format!("{product} + {offset:?}"),
+        }
+    }
+}
+
+impl<T> Model<T> {
+    /// Number of configuration coordinates of the tree, those of joints that follow included.
+    pub fn tree_nq(&self) -> usize {
+        self.bodies.iter().map(|b| b.joint.kind.nq()).sum()
+    }
+
+    /// Number of velocity coordinates of the tree, those of joints that follow included.
+    pub fn tree_nv(&self) -> usize {
+        self.bodies.iter().map(|b| b.joint.kind.nv()).sum()
+    }
+
+    /// The coupling that a body's joint follows.
+    pub fn coupling_of(&self, body: BodyId) -> Option<&Coupling<T>> {
+        self.couplings.iter().find(|coupling| coupling.body == body)
+    }
+
+    /// The joints whose coordinates are left to choose, body by body.
+    pub fn free_joints(&self) -> impl Iterator<Item = &Joint> + Clone + '_ {
+        self.free_bodies().map(|b| &self.bodies[b].joint)
+    }
+
+    /// All joints in the order of the coordinates of the tree: those that are left to choose, then those that follow.
+    pub fn tree_joints(&self) -> Vec<&Joint> {
+        let mut joints: Vec<&Joint> = self.bodies.iter().map(|body| &body.joint).collect();
+        joints.sort_by_key(|joint| joint.iv);
+        joints
+    }
+
+    /// The joints that follow others with their couplings, in the order of the coordinates of the tree.
+    pub fn followers(&self) -> Vec<(&Joint, &Coupling<T>)> {
+        let mut all: Vec<_> = self.couplings.iter().map(|c| (&self.bodies[c.body].joint, c)).collect();
+        all.sort_by_key(|(joint, _)| joint.iv);
+        all
+    }
+
+    /// The bodies whose joints are left to choose.
+    pub fn free_bodies(&self) -> impl Iterator<Item = BodyId> + Clone + '_ {
+        (0..self.bodies.len()).filter(|b| self.coupling_of(*b).is_none())
+    }
+
+    /// The bodies with joints that are left to choose.
+    pub fn freely_jointed(&self) -> impl Iterator<Item = &Body<T>> + Clone + '_ {
+        self.free_bodies().map(|b| &self.bodies[b])
+    }
+
+    /// Index into q̇ of what moves the joint of a body of one coordinate, and how fast it moves per unit of that.
+    pub fn moved_by(&self, body: BodyId) -> (usize, Option<T>)
+    where
+        T: Copy,
+    {
+        match self.coupling_of(body) {
+            Some(coupling) => (self.bodies[coupling.source].joint.iv, Some(coupling.ratio)),
+            None => (self.bodies[body].joint.iv, None),
+        }
+    }
+}
+
+impl<T: Real> Model<T> {
+    /// Base parameters with the rows of the tree in which they stand, from those of the coordinates that are left to choose.
+    pub fn of_tree<'a>(&self, parameters: &'a [BaseParameter]) -> Cow<'a, [BaseParameter]> {
+        if self.couplings.is_empty() {
+            return Cow::Borrowed(parameters);
+        }
+        let mut moved_by: Vec<(usize, usize)> = Vec::new();
+        for (b, body) in self.bodies.iter().enumerate() {
+            let free = self.moved_by(b).0;
+            moved_by.extend((0..body.joint.kind.nv()).map(|k| (body.joint.iv + k, free + k)));
+        }
+        let of = |parameter: &BaseParameter| {
+            let rows = moved_by.iter().filter(|(_, free)| parameter.rows.contains(free)).map(|(row, _)| *row);
+            BaseParameter { rows: rows.collect(), ..parameter.clone() }
+        };
+        Cow::Owned(parameters.iter().map(of).collect())
+    }
+
+    /// y: the configuration of the tree.
+    pub fn tree_positions<'a>(&self, q: &'a [T]) -> Cow<'a, [T]> {
+        self.extended(q, self.tree_nq(), |coupling| {
+            let [own, source] = [coupling.body, coupling.source].map(|b| self.bodies[b].joint.iq);
+            (own, coupling.ratio * q[source] + coupling.offset)
+        })
+    }
+
+    /// G q̇: velocities, accelerations or displacements of the tree.
+    pub fn tree_rates<'a>(&self, rates: &'a [T]) -> Cow<'a, [T]> {
+        self.extended(rates, self.tree_nv(), |coupling| {
+            let [own, source] = [coupling.body, coupling.source].map(|b| self.bodies[b].joint.iv);
+            (own, coupling.ratio * rates[source])
+        })
+    }
+
+    /// q, q̇ and q̈ of the tree.
+    pub fn tree_motion<'a>(&self, [q, qd, qdd]: [&'a [T]; 3]) -> [Cow<'a, [T]>; 3] {
+        [self.tree_positions(q), self.tree_rates(qd), self.tree_rates(qdd)]
+    }
+
+    fn extended<'a>(&self, x: &'a [T], len: usize, of: impl Fn(&Coupling<T>) -> (usize, T)) -> Cow<'a, [T]> {
+        if self.couplings.is_empty() {
+            return Cow::Borrowed(x);
+        }
+        debug_assert_eq!(x.len() + self.couplings.len(), len, "coordinates that are left to choose");
+        let mut all = x.to_vec();
+        all.resize(len, T::zero());
+        for coupling in &self.couplings {
+            let (place, value) = of(coupling);
+            all[place] = value;
+        }
+        Cow::Owned(all)
+    }
+
+    /// Gᵀ f: what forces of the tree, or rows of such, do along the coordinates that are left to choose; `width` numbers to a row.
+    pub fn free_rows(&self, mut rows: Vec<T>, width: usize) -> Vec<T> {
+        for coupling in &self.couplings {
+            let [own, source] = [coupling.body, coupling.source].map(|b| self.bodies[b].joint.iv);
+            for k in 0..width {
+                let (at, from) = (source * width + k, own * width + k);
+                rows[at] = rows[at] + coupling.ratio * rows[from];
+            }
+        }
+        if !self.couplings.is_empty() {
+            rows.truncate(self.nv() * width);
+        }
+        rows
+    }
+
+    /// Gᵀ f of generalized forces of the tree.
+    pub fn free_forces(&self, forces: Vec<T>) -> Vec<T> {
+        self.free_rows(forces, 1)
+    }
+
+    /// J G of a matrix with a column per velocity coordinate of the tree, by rows.
+    pub fn free_columns(&self, matrix: Vec<T>) -> Vec<T> {
+        if self.couplings.is_empty() {
+            return matrix;
+        }
+        let of_row = |row: &[T]| self.free_forces(row.to_vec());
+        matrix.chunks(self.tree_nv()).flat_map(of_row).collect()
+    }
+
+    /// Gᵀ H G of a matrix over the velocity coordinates of the tree, by rows.
+    pub fn free_square(&self, matrix: Vec<T>) -> Vec<T> {
+        self.free_rows(self.free_columns(matrix), self.nv())
+    }
+
+    /// Gᵀ H G of a symmetric matrix, which stays symmetric to the bit.
+    pub fn free_symmetric(&self, matrix: Vec<T>) -> Vec<T> {
+        let (nv, mut h) = (self.nv(), self.free_square(matrix));
+        if !self.couplings.is_empty() {
+            (0..nv).for_each(|i| (0..i).for_each(|j| h[i * nv + j] = h[j * nv + i]));
+        }
+        h
+    }
+}
