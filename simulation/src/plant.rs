@@ -91,10 +91,10 @@ impl Plant {
             found.map_or(String::new(), |j| format!("joint `{}`", j.name))
         };
         if i < nq {
-            return format!("the position of {}", joint(&|j| j.iq..j.iq + if floats(j) { 7 } else { 1 }));
+            return format!("the position of {}", joint(&|j| j.iq..j.iq + j.kind.nq()));
         }
         if i < nq + nv {
-            return format!("the velocity of {}", joint(&|j| nq + j.iv..nq + j.iv + if floats(j) { 6 } else { 1 }));
+            return format!("the velocity of {}", joint(&|j| nq + j.iv..nq + j.iv + j.kind.nv()));
         }
         let mut rest = i - nq - nv;
         for drive in &self.model.drives {
@@ -228,7 +228,7 @@ impl Plant {
         rate[after + 1] = self.losses(qd);
     }
 
-    /// dq/dt: q̇ of joints; of a floating base R v and ½ quaternion ∘ ω.
+    /// dq/dt: q̇ of joints; of a floating base R v and ½ quaternion ∘ ω, of a ball joint the latter.
     pub(crate) fn configuration_rate(&self, q: &[f64], qd: &[f64]) -> Vec<f64> {
         let mut rate = vec![0.0; self.model.nq()];
         for joint in self.model.free_joints() {
@@ -265,10 +265,6 @@ pub(crate) fn joint_friction(model: &Model<f64>, qd: &[f64]) -> f64 {
     };
     let rates = model.tree_rates(qd);
     joints.map(|b| loss((rates[b.joint.iv], &b.effects))).sum()
-}
-
-fn floats(joint: &Joint) -> bool {
-    joint.kind.is_base()
 }
 
 /// q with quaternions of length one.

@@ -43,6 +43,7 @@ pub const CODES: &[&str] = &[
     "elastic-follower",
     "joint-order-follower",
     "floating-joint",
+    "several-coordinates",
     "negative-effect",
     "gear-ratio-zero",
     "gear-ratio-alone",
@@ -259,6 +260,13 @@ pub fn not_symmetric(owner: &str, row: usize, column: usize, a: f64, b: f64) -> 
 /// Something that changes the dynamics and is not part of the equations.
 pub fn not_supported_yet(owner: &str, what: &str, why: &str, help: &str) -> D {
     D::error("not-supported-yet", format!("{owner}: `{what}` is not supported yet")).detail(why).help(help)
+}
+
+/// What is of one coordinate, of a joint that has several.
+pub fn several_coordinates(joint: &str, kind: &str, what: &str) -> D {
+    D::error("several-coordinates", format!("{kind} joint `{joint}` has {what}"))
+        .detail("that belongs to one coordinate, and the joint has several")
+        .help("leave it out, or write the joint as three revolute joints, with links without inertia in between")
 }
 
 /// A coupling of a joint that is not there, does not move, or has several coordinates.

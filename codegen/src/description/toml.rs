@@ -139,8 +139,7 @@ fn read_joint(reader: &mut FileReader, mut table: TomlTable) -> Option<WrittenJo
         }
         None => WrittenPose::identity(reader.place(&table.span)),
     };
-    let moves = kind.as_ref().is_some_and(|k| k.value.between_links().is_some());
-    if moves {
+    if kind.as_ref().is_some_and(|k| k.value.has_axis()) {
         reader.require(&table, "axis", "axis = \"z\"");
     }
     let axis = match table.get("axis") {

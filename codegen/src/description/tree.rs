@@ -266,6 +266,11 @@ impl JointType {
         self.kind.and_then(|kind| kind.row().number)
     }
 
+    /// Whether it moves along or about an axis that the file gives.
+    pub fn has_axis(self) -> bool {
+        self.between_links().is_some_and(|kind| kind.row().has_axis)
+    }
+
     /// Whether it would let a link move freely, which no joint between links does.
     pub fn is_free(self) -> bool {
         self.kind.is_some_and(|kind| kind.is_base())
@@ -303,7 +308,8 @@ pub enum Placement {
     Frames {
         /// Pose of the joint frame, which is the child's link frame at q = 0, in the parent's link frame.
         origin: WrittenPose,
-        /// Axis in the joint frame, as long as it is written; \[1, 0, 0\] where a URDF says nothing.
+        /// Axis in the joint frame, as long as it is written; \[1, 0, 0\] where a URDF says nothing. Nothing reads that of a joint that
+        /// [has none](JointType::has_axis).
         axis: Noted<[f64; 3]>,
     },
     /// By vectors between the joint S_j and the origins C of the link frames, as in the chapter; of joints that move.

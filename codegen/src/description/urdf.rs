@@ -398,9 +398,9 @@ fn read_kind(reader: &mut FileReader, owner: &str, attribute: Attribute) -> Opti
         word if words.iter().any(|(known, _)| *known == word) => {
             words.into_iter().find(|(known, _)| *known == word).map(|(_, kind)| kind)?
         }
-        kind @ ("planar" | "spherical" | "ball") => {
+        kind @ "planar" => {
             let help = "write its motions as single joints, with links without inertia in between";
-            let why = "a joint has one coordinate";
+            let why = "no joint has these coordinates";
             reader.complain(&span, messages::not_supported_yet(owner, kind, why, help));
             return None;
         }

@@ -33,9 +33,9 @@ impl Seat {
             Placement::Vectors(vectors) => return centres_of_mass::seat(vectors, joint, tolerance, diagnostics),
             Placement::Frames { origin, axis } => (origin, axis),
         };
-        let rotation = match joint.kind.value.between_links() {
-            Some(_) => canonical_rotation(unit(vector(axis.value))?),
-            None => Mat3::identity(),
+        let rotation = match joint.kind.value.has_axis() {
+            true => canonical_rotation(unit(vector(axis.value))?),
+            false => Mat3::identity(),
         };
         Some(Seat {
             in_parent: transform(origin, tolerance),

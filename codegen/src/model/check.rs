@@ -205,6 +205,7 @@ pub(super) fn joint(joint: &WrittenJoint, format: &FileFormat, diagnostics: &mut
         return;
     }
     match &joint.placement {
+        Placement::Frames { .. } if !joint.kind.value.has_axis() => {}
         Placement::Frames { axis, .. } => axis_length(&format!("axis of joint `{name}`"), axis, diagnostics),
         Placement::Vectors(JointVectors { e_parent, e, .. }) => {
             axis_length(&format!("`e_next` of link `{}`", joint.parent.value), e_parent, diagnostics);
@@ -213,6 +214,37 @@ pub(super) fn joint(joint: &WrittenJoint, format: &FileFormat, diagnostics: &mut
     }
     limits(&joint.name, joint.kind.value, &joint.limits, format, diagnostics);
     drive(&joint.name, &joint.drive, diagnostics);
+    of_one_coordinate(joint, diagnostics);
+}
+
+/// What only a joint of one coordinate has: limits, friction, a rotor and a spring. Of others nothing reads it.
+fn of_one_coordinate(joint: &WrittenJoint, diagnostics: &mut Diagnostics) {
+    let kind = joint.kind.value;
+    if kind.between_links().is_none_or(|kind| kind.is_single()) {
+        return;
+    }
+    let WrittenJoint { limits, drive, .. } = joint;
+    let given = [
+        ("a lower limit", &limits.lower),
+        ("an upper limit", &limits.upper),
+        ("a velocity limit", &limits.velocity),
+        ("an effort limit", &limits.effort),
+    ];
+    // as good as not written
+    let acting = [
+        ("damping", &drive.damping),
+        ("friction", &drive.friction),
+        ("a rotor inertia", &drive.rotor_inertia),
+        ("an armature", &drive.armature),
+        ("a spring", &drive.spring_stiffness),
+    ];
+    let acting = acting.into_iter().filter(|(_, value)| value.as_ref().is_some_and(|value| value.value != 0.0));
+    for (what, value) in given.into_iter().chain(acting) {
+        if let Some(value) = value {
+            let complaint = messages::several_coordinates(&joint.name.value, kind.word, what);
+            diagnostics.push(complaint.at(&value.place));
+        }
+    }
 }
 
 /// What the drive of a joint that moves adds.

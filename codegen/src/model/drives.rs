@@ -145,7 +145,11 @@ fn rating(written: &WrittenRating) -> Rating<Dd> {
 fn body(owner: &str, joint: &Noted<String>, model: &Model<Dd>, diagnostics: &mut Diagnostics) -> Option<BodyId> {
     let is_it = |name: &str, kind: JointKind| name == joint.value && kind.is_single();
     let found = model.bodies.iter().position(|b| is_it(&b.joint.name, b.joint.kind));
-    if found.is_none() {
+    let several = model.bodies.iter().map(|b| &b.joint).find(|j| j.name == joint.value && !j.kind.is_single());
+    if let Some(other) = several.filter(|other| !other.kind.is_base()) {
+        let complaint = messages::several_coordinates(&joint.value, other.kind.row().name, &format!("a drive ({owner})"));
+        diagnostics.push(complaint.at(&joint.place));
+    } else if found.is_none() {
         let moving = model.bodies.iter().filter(|b| b.joint.kind.is_single());
         let names = moving.map(|b| b.joint.name.as_str());
         diagnostics.push(messages::drive_joint(owner, &joint.value, names).at(&joint.place));

@@ -100,6 +100,10 @@ fn held(model: &Model<Dd>, id: BodyId, scene: &Scene) -> Option<Held> {
     if let Some(coupling) = coupling {
         return Some(body.joint.kind.motion(&[coupling.ratio * Dd::from(*q) + coupling.offset]));
     }
+    // one number does not hold others, and is complained of
+    if !body.joint.kind.is_single() {
+        return Some(Transform::identity());
+    }
     Some(match body.joint.kind.turns() {
         false => body.joint.kind.motion(&[Dd::from(*q)]),
         true => {

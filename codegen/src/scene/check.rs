@@ -208,6 +208,8 @@ pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnosti
         let (kind, limits) = (model.bodies[body].joint.kind, model.bodies[body].joint.limits);
         if kind.is_base() {
             places.complain(&path, say::base_locked(joint), diagnostics);
+        } else if !kind.is_single() {
+            places.complain(&path, say::several_locked(joint, kind.row().name), diagnostics);
         } else if *value < limits.lower || *value > limits.upper {
             let complaint = say::locked_beyond_limits(joint, *value, limits.lower, limits.upper);
             places.complain(&path, complaint, diagnostics);

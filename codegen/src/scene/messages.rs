@@ -16,6 +16,7 @@ pub const CODES: &[&str] = &[
     "locked-joint-wanted",
     "locked-twice",
     "base-locked",
+    "several-locked",
     "locked-beyond-limits",
     "nothing-left",
     "not-in-range",
@@ -164,6 +165,12 @@ pub fn locked_twice(joint: &str) -> D {
 pub fn base_locked(joint: &str) -> D {
     D::error("base-locked", format!("joint `{joint}` is the floating base: one number does not hold it"))
         .help("write `base = \"fixed\"` in [hold]: the root link is the world then")
+}
+
+/// A lock on a joint that has several coordinates.
+pub fn several_locked(joint: &str, kind: &str) -> D {
+    D::error("several-locked", format!("joint `{joint}` is {kind}: one number does not hold it"))
+        .help("make it a fixed joint of the robot file, whose `origin` has the rotation")
 }
 
 /// A value that the joint cannot reach.

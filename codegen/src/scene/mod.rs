@@ -123,7 +123,7 @@ impl Scene {
     pub fn resolved<T>(&self, model: &Model<T>) -> Scene {
         let mut scene = self.clone();
         if self.base == Base::Moving {
-            let joints = model.free_joints().filter(|j| j.kind.is_single());
+            let joints = model.free_joints().filter(|j| !j.kind.is_base());
             let joints: Vec<String> = joints.map(|j| j.name.clone()).collect();
             for function in Function::all().filter(|f| f.is_torque()) {
                 let selection = scene.outputs.entry(function).or_default();

@@ -53,7 +53,7 @@ pub enum JointRanges {
 }
 
 /// The values that inputs can have. For a floating base the range of q is that of its position \[m\] (quaternions are unit
-/// quaternions), and that of q̇, q̈ and τ holds for all six of its coordinates.
+/// quaternions), and that of q̇, q̈ and τ holds for all six of its coordinates, or for all three of a ball joint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ranges {
     /// Configuration \[rad or m\].
@@ -125,6 +125,10 @@ pub fn ranges_in_words(scene: &Scene, model: &Model<Dd>) -> Vec<String> {
     let mut lines = Vec::new();
     for (quantity, ranges) in said {
         for joint in model.joints() {
+            // a quaternion is in no range but its own
+            if quantity == Configuration && joint.kind.measures().next().is_none() {
+                continue;
+            }
             let at = if quantity == Configuration { joint.iq } else { joint.iv };
             let words = in_words(range(quantity, ranges, joint), unit(quantity, joint.kind));
             lines.push(format!("{}[{at}] {}: {words}", quantity.name(), joint.name));

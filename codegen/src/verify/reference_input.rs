@@ -255,7 +255,7 @@ fn add_links(
             continue;
         };
         joint_names.push(name.clone());
-        let e = unit(axis);
+        let e = if *kind == ReferenceJoint::Ball { Vector3::zeros() } else { unit(axis) };
         let (e_parent, r, extended) = match vectors {
             None => (place.rotation * e, *centre, ExtendedPosition::Matrix(place.rotation)),
             // the place is that of S_j, in the axes of the link below
@@ -309,7 +309,7 @@ fn floating_root_joint(description: &Description) -> String {
 
 fn reference_joint(joint: &WrittenJoint) -> Result<ReferenceJoint, String> {
     ReferenceJoint::of_word(joint.kind.value.word, joint.kind.value.number)
-        .ok_or_else(|| format!("joint `{}` has not one degree of freedom", joint.name.value))
+        .ok_or_else(|| format!("joint `{}` is of no kind that the reference knows", joint.name.value))
 }
 
 /// The link that no joint moves.

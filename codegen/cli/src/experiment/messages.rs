@@ -148,6 +148,12 @@ pub fn base_floats(what: &str) -> D {
         .help("write `base = \"fixed\"` in [hold] of the scene")
 }
 
+/// A motion of a joint that has several coordinates.
+pub fn several_moving(what: &str, joint: &str, kind: &str) -> D {
+    D::error("several-moving", format!("{what} takes joints of one coordinate, and joint `{}` is {kind}", cut(joint)))
+        .help("make it a fixed joint of the robot file, or simulate torques")
+}
+
 /// A joint without the limits that a trapezoid takes.
 pub fn no_limit(joint: &str, key: &str) -> D {
     D::error("no-limit", format!("joint `{}`: its greatest {key} is not known", cut(joint)))

@@ -13,7 +13,7 @@ mod toml;
 
 use self::messages as say;
 use self::samples::Columns;
-use straightline_codegen::diagnostic::{Diagnostics, Place, Source};
+use straightline_codegen::diagnostic::{Diagnostic, Diagnostics, Place, Source};
 use straightline_core::drive::Actuator;
 use straightline_core::model::Model;
 use straightline_simulation::command::{Command, Samples};
@@ -186,6 +186,15 @@ fn drive_inputs(columns: &Columns, model: &Model<f64>, place: &Place, diagnostic
     Some(Inputs { samples: Samples { times, rows }, are_currents })
 }
 
+/// Why no motion is given by a number per joint; `None` of robots whose joints all have one.
+fn unmovable(model: &Model<f64>, what: &str) -> Option<Diagnostic> {
+    if model.floats() {
+        return Some(say::base_floats(what));
+    }
+    let other = model.bodies.iter().map(|body| &body.joint).find(|joint| !joint.kind.is_single())?;
+    Some(say::several_moving(what, &other.name, other.kind.row().name))
+}
+
 /// A motion from samples: per joint a column `q.JOINT` or `JOINT`; where all have `qd.` and `qdd.` as well, these count.
 fn sampled_motion(
     columns: &Columns,
@@ -193,8 +202,8 @@ fn sampled_motion(
     place: &Place,
     diagnostics: &mut Diagnostics,
 ) -> Option<Motion> {
-    if model.floats() {
-        diagnostics.push(say::base_floats("a motion").at(place));
+    if let Some(complaint) = unmovable(model, "a motion") {
+        diagnostics.push(complaint.at(place));
         return None;
     }
     let times = columns.get("t")?;

@@ -253,8 +253,8 @@ impl ExperimentReader<'_> {
     fn motion(&mut self, table: &TomlTable, start: Option<&[f64]>) -> Option<Motion> {
         let keys = ["kind", "file", "frame", "keep_orientation", "speed", "acceleration", "point"];
         self.reader.check_keys(table, &keys);
-        if self.model.floats() {
-            self.reader.complain(&table.span, say::base_floats("a motion"));
+        if let Some(complaint) = super::unmovable(self.model, "a motion") {
+            self.reader.complain(&table.span, complaint);
             return None;
         }
         self.reader.require(table, "kind", "kind = \"quintic\"");

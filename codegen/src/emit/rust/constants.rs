@@ -93,7 +93,11 @@ pub(super) fn of_robot(generated: &Generated) -> Vec<AssociatedConstant> {
         let numbers: Vec<String> = single.iter().map(|j| number(f(&j.limits), *scalar)).collect();
         format!("[{}]", numbers.join(", "))
     };
-    let floating = if single.len() < joints.len() { " (the floating base is left out)" } else { "" };
+    let floating = match joints.iter().filter(|j| !j.kind.is_single()).all(|j| j.kind.is_base()) {
+        true if single.len() == joints.len() => "",
+        true => " (the floating base is left out)",
+        false => " (joints of several coordinates are left out)",
+    };
     for (name, doc, values) in [
         ("LOWER_LIMITS", "Least coordinate of every joint \\[rad or m\\]", list(&|l| l.lower)),
         ("UPPER_LIMITS", "Greatest coordinate of every joint \\[rad or m\\]", list(&|l| l.upper)),

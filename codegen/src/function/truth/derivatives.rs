@@ -107,28 +107,33 @@ pub(super) fn moving<T: ReferenceReal>(
     [along(motion[0], &rates), along(motion[1], &direction[1]), along(motion[2], &direction[2])]
 }
 
-/// dq/dt at these velocities. The position of a free link moves by R v, its attitude by ½ (u, w) (ω, 0).
+/// dq/dt at these velocities. The position of a free link moves by R v, its attitude, as that of a ball joint, by ½ (u, w) (ω, 0).
 pub(super) fn configuration_rates<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> Vec<T> {
     let mut rates = vec![<T as Real>::zero(); q.len()];
     let half = T::constant(Dd::HALF);
     for link in &tree.links {
-        if link.joint != ReferenceJoint::Free {
+        let Some(first) = link.joint.quaternion() else {
             rates[link.iq] = qd[link.iv];
             continue;
-        }
-        let [x, y, z, w] = [3, 4, 5, 6].map(|k| q[link.iq + k]);
-        let [vx, vy, vz, ox, oy, oz] = [0, 1, 2, 3, 4, 5].map(|k| qd[link.iv + k]);
+        };
+        let [x, y, z, w] = [0, 1, 2, 3].map(|k| q[link.iq + first + k]);
+        let [ox, oy, oz] = [0, 1, 2].map(|k| qd[link.iv + first + k]);
         let one = <T as Real>::one();
+        if link.joint == ReferenceJoint::Free {
+            let [vx, vy, vz] = [0, 1, 2].map(|k| qd[link.iv + k]);
+            rates[link.iq..link.iq + 3].copy_from_slice(&[
+                (one - (y * y + z * z) / half) * vx + (x * y - z * w) / half * vy + (x * z + y * w) / half * vz,
+                (x * y + z * w) / half * vx + (one - (x * x + z * z) / half) * vy + (y * z - x * w) / half * vz,
+                (x * z - y * w) / half * vx + (y * z + x * w) / half * vy + (one - (x * x + y * y) / half) * vz,
+            ]);
+        }
         let own = [
-            (one - (y * y + z * z) / half) * vx + (x * y - z * w) / half * vy + (x * z + y * w) / half * vz,
-            (x * y + z * w) / half * vx + (one - (x * x + z * z) / half) * vy + (y * z - x * w) / half * vz,
-            (x * z - y * w) / half * vx + (y * z + x * w) / half * vy + (one - (x * x + y * y) / half) * vz,
             (w * ox + y * oz - z * oy) * half,
             (w * oy + z * ox - x * oz) * half,
             (w * oz + x * oy - y * ox) * half,
             -(x * ox + y * oy + z * oz) * half,
         ];
-        rates[link.iq..link.iq + 7].copy_from_slice(&own);
+        rates[link.iq + first..link.iq + first + 4].copy_from_slice(&own);
     }
     rates
 }

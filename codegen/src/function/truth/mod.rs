@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use std::collections::BTreeMap;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::model::Model;
-use straightline_core::reference::{CentreOfMassFrame, CentreOfMassTree, ExtendedPosition, ReferenceJoint};
+use straightline_core::reference::{CentreOfMassFrame, CentreOfMassTree, ExtendedPosition};
 use straightline_core::{Dd, Dual, Real};
 
 mod bias_derivatives;
@@ -92,16 +92,17 @@ impl<'a> Chapter<'a> {
         for task in [Quantity::Wrench, Quantity::PoseError] {
             sized.entry(task).and_modify(|x| x.chunks_mut(3).for_each(of_length));
         }
-        // the coordinates of a free link are parts of vectors, its attitude one of a rotation
-        for link in tree.links.iter().filter(|link| link.joint == ReferenceJoint::Free) {
+        // the coordinates of a free link and of a ball joint are parts of vectors, the attitude one of a rotation
+        for (link, first) in tree.links.iter().filter_map(|link| Some((link, link.joint.quaternion()?))) {
             for (quantity, x) in &mut sized {
                 match quantity {
                     quantity if quantity.is_configuration() => {
-                        of_length(&mut x[link.iq..link.iq + 3]);
-                        x[link.iq + 3..link.iq + 7].iter_mut().for_each(|x| *x = x.of_size(1.0));
+                        let (position, attitude) = x[link.iq..link.iq + first + 4].split_at_mut(first);
+                        position.chunks_mut(3).for_each(of_length);
+                        attitude.iter_mut().for_each(|x| *x = x.of_size(1.0));
                     }
                     quantity if quantity.axes() == [Extent::Velocities] => {
-                        x[link.iv..link.iv + 6].chunks_mut(3).for_each(of_length);
+                        x[link.iv..link.iv + link.joint.nv()].chunks_mut(3).for_each(of_length);
                     }
                     _ => {}
                 }

@@ -79,8 +79,7 @@ fn euler(at: &Chapter<'_>, qdd: &[Magnitude]) -> [Vec<Magnitude>; 2] {
 fn next(at: &Chapter<'_>, system: &MovingJoints<'_, '_>, [q, qd]: [Vec<Magnitude>; 2]) -> Vec<Magnitude> {
     let mut links: Vec<_> = at.tree.own().filter(|link| system.moving.contains(&link.iv)).collect();
     links.sort_by_key(|link| link.iq);
-    let count = |joint| if joint == ReferenceJoint::Free { 7 } else { 1 };
-    let own = links.iter().flat_map(|link| &q[link.iq..link.iq + count(link.joint)]).copied();
+    let own = links.iter().flat_map(|link| &q[link.iq..link.iq + link.joint.nq()]).copied();
     own.chain(system.of_moving(&qd)).collect()
 }
 
@@ -163,16 +162,22 @@ fn acceleration(at: &Chapter<'_>, direction: &Direction<Magnitude>, u: &[Moved],
     with_rates(&qdd, &rate)
 }
 
-/// u̇ = q̇ + ½ ad_u q̇ + 1/12 ad_u ad_u q̇ of a free link, q̇ of others; ad of (ρ, w) makes (w × v + ρ × ω, w × ω) of (v, ω).
+/// u̇ = q̇ + ½ ad_u q̇ + 1/12 ad_u ad_u q̇ of a free link and of a ball joint, q̇ of others; ad of (ρ, w) makes (w × v + ρ × ω, w × ω) of (v, ω).
 fn displacement_rate<T: ReferenceReal>(tree: &CentreOfMassTree<Magnitude>, u: &[T], rates: &[T]) -> Vec<T> {
     let mut all = rates.to_vec();
+    let [half, twelfth] = [Dd::HALF, Dd::ONE / Dd::from(12.0)].map(T::constant);
+    for link in tree.links.iter().filter(|link| link.joint == ReferenceJoint::Ball) {
+        let [w, own] = [u, rates].map(|x| Vector3::from_column_slice(&x[link.iv..link.iv + 3]));
+        let once = w.cross(&own);
+        let rate = own + once * half + w.cross(&once) * twelfth;
+        all[link.iv..link.iv + 3].copy_from_slice(rate.as_slice());
+    }
     for link in tree.links.iter().filter(|link| link.joint == ReferenceJoint::Free) {
         let parts = |x: &[T]| [0, 3].map(|k| Vector3::from_column_slice(&x[link.iv + k..link.iv + k + 3]));
         let ([rho, w], own) = (parts(u), parts(rates));
         let ad = |[v, omega]: [Vector3<T>; 2]| [w.cross(&v) + rho.cross(&omega), w.cross(&omega)];
         let once = ad(own);
         let twice = ad(once);
-        let [half, twelfth] = [Dd::HALF, Dd::ONE / Dd::from(12.0)].map(T::constant);
         for k in 0..2 {
             let rate = own[k] + once[k] * half + twice[k] * twelfth;
             all[link.iv + 3 * k..link.iv + 3 * k + 3].copy_from_slice(rate.as_slice());

@@ -68,6 +68,11 @@ pub(super) fn displaced(at: &Chapter<'_>, q: &[Magnitude], v: &[Magnitude]) -> V
     let to = reference::displaced(&values_of(at), &values(q), &values(v));
     let mut sized: Vec<Magnitude> = to.into_iter().map(Magnitude::new).collect();
     for link in &at.tree.links {
+        if link.joint == ReferenceJoint::Ball {
+            let turn = 1f64.hypot(length(&v[link.iv..link.iv + 3]));
+            sized[link.iq..link.iq + 4].iter_mut().for_each(|x| *x = x.of_size(turn));
+            continue;
+        }
         if link.joint != ReferenceJoint::Free {
             sized[link.iq] = q[link.iq] + v[link.iv];
             continue;
@@ -86,6 +91,10 @@ fn displacement(at: &Chapter<'_>) -> Vec<Magnitude> {
     let v = reference::displacement(&values_of(at), &values(q), &values(q1));
     let mut sized: Vec<Magnitude> = v.into_iter().map(Magnitude::new).collect();
     for link in &at.tree.links {
+        if link.joint == ReferenceJoint::Ball {
+            sized[link.iv..link.iv + 3].iter_mut().for_each(|x| *x = x.of_size(std::f64::consts::PI));
+            continue;
+        }
         if link.joint != ReferenceJoint::Free {
             sized[link.iv] = q1[link.iq] - q[link.iq];
             continue;
@@ -117,10 +126,17 @@ pub(super) fn displaced_maps(at: &Chapter<'_>, q: &[Magnitude], v: &[Magnitude])
 }
 
 /// A map of the tangent along a displacement, with the scale of its parts: of a free link one where turns are carried to turns and lengths to lengths, the
-/// length of the way where turns are carried to lengths, more where the way turns more.
+/// length of the way where turns are carried to lengths, more where the way turns more; of a ball joint as of turns.
 fn sized_map(at: &Chapter<'_>, v: &[Magnitude], map: &[Dd]) -> Vec<Magnitude> {
     let nv = v.len();
     let mut sized: Vec<Magnitude> = map.iter().map(|x| Magnitude::new(*x)).collect();
+    for link in at.tree.links.iter().filter(|link| link.joint == ReferenceJoint::Ball) {
+        let turn = 1f64.hypot(length(&v[link.iv..link.iv + 3]));
+        for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+            let entry = &mut sized[(link.iv + i) * nv + link.iv + j];
+            *entry = entry.of_size(turn);
+        }
+    }
     for link in at.tree.links.iter().filter(|link| link.joint == ReferenceJoint::Free) {
         let [linear, angular] = [0, 3].map(|k| length(&v[link.iv + k..link.iv + k + 3]));
         let turn = 1f64.hypot(angular);

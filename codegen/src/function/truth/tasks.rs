@@ -7,7 +7,7 @@ use super::forward_derivatives::MovingJoints;
 use super::{solved, Chapter, Effect, Truth};
 use nalgebra::{DMatrix, DVector};
 use straightline_core::magnitude::Magnitude;
-use straightline_core::reference::{self, CentreOfMassFrame, ReferenceJoint};
+use straightline_core::reference::{self, CentreOfMassFrame};
 use straightline_core::{Dd, Real};
 
 impl Truth for OperationalSpaceDynamics {
@@ -128,7 +128,7 @@ fn descent(at: &Chapter<'_>, joints: &MovingJoints<'_, '_>) -> DVector<Magnitude
     let efforts: Vec<&Effect> =
         at.effects.iter().filter(|effect| moves(effect.iv) && effect.effort.is_some()).collect();
     let mut weighed = rest.clone();
-    for link in at.tree.links.iter().filter(|link| link.joint != ReferenceJoint::Free && moves(link.iv)) {
+    for link in at.tree.links.iter().filter(|link| link.joint.nv() == 1 && moves(link.iv)) {
         let own = efforts.iter().find(|effect| effect.iv == link.iv).and_then(|effect| effect.effort);
         let weight = match own {
             Some(effort) => Dd::ONE / (effort * effort),

@@ -10,6 +10,9 @@
 //! ∂h/∂q_j = ( w × h_v,  w × h_ω )                                    for a coordinate of a floating base that turns the whole robot at w
 //! ```
 //!
+//! An increment of a ball joint in the body's axes does not commute with its own rates: with [q̇, e_j] = Σ c_i e_i, ∂ṙ/∂q_j = ẏ_j − Σ c_i y_i, so that
+//! Σ c_i A_i leaves ∂h/∂q_j, and Σ c_i ∂h/∂q_i the rate of ∂h/∂q_j.
+//!
 //! over the bodies behind joint j. Positions and velocities are those against the first root's joint: where the robot stands in the world and how fast
 //! it moves as a whole is never added.
 
@@ -107,6 +110,7 @@ pub fn centroidal_derivatives<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> C
             set(&mut all.by_position, place, &MotionVector { angular: of_rate - convected, linear: rate });
         }
     }
+    subtract_brackets(model, qd, &all.map, &mut all.by_position);
     turn_with_floating_bases(model, &world, &six, &mut all.by_position);
     let [map, rate, by_position] = [all.map, all.rate, all.by_position].map(|rows| model.free_columns(rows));
     CentroidalBlocks { map, rate, by_position }
@@ -130,8 +134,8 @@ pub struct CentroidalDynamicsBlocks<T> {
     pub map: Vec<T>,
 }
 
-/// Rates of joints commute with increments of each other and of a floating base: ∂ḣ/∂q_j is the rate of ∂h/∂q_j along the motion, in dual numbers. Of a
-/// coordinate of a floating base it is what turns with it, w × ḣ.
+/// Rates of joints commute with increments of each other and of a floating base: ∂ḣ/∂q_j is the rate of ∂h/∂q_j along the motion, in dual numbers, less
+/// Σ c_i ∂h/∂q_i of a ball joint. Of a coordinate of a floating base it is what turns with it, w × ḣ.
 #[doc(alias("computeCentroidalDynamicsBlocks"))]
 pub fn centroidal_dynamics_derivatives<T: Real>(
     model: &Model<T>,
@@ -146,6 +150,7 @@ pub fn centroidal_dynamics_derivatives<T: Real>(
     let rates = |rows: &[Dual<T, 1>]| rows.iter().map(|x| x.derivatives[0]).collect::<Vec<T>>();
     let momentum_rate = rate_of_momentum([&all.map, &all.rate].map(|rows| values(rows)), qd, qdd);
     let mut dhdot_dq = rates(&all.by_position);
+    subtract_brackets(model, qd, &values(&all.by_position), &mut dhdot_dq);
     turn_with_floating_bases(model, &world_poses(model, &model.tree_positions(q)), &momentum_rate, &mut dhdot_dq);
     CentroidalDynamicsBlocks {
         momentum: momentum_of(model, q, qd),
@@ -172,10 +177,24 @@ fn momentum_of<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
     [all.linear, all.angular].into_iter().flat_map(Vec3::to_array).collect()
 }
 
+/// Of the columns of joints whose increments do not commute with their rates, Σ c_i times the columns `of`.
+fn subtract_brackets<T: Real>(model: &Model<T>, qd: &[T], of: &[T], rows: &mut [T]) {
+    let nv = rows.len() / 6;
+    for joint in model.free_joints() {
+        for k in 0..joint.kind.nv() {
+            let Some(bracket) = joint.kind.mechanics().bracket(k, joint.rates(qd)) else { continue };
+            for (row, of) in rows.chunks_mut(nv).zip(of.chunks(nv)) {
+                let entry = &mut row[joint.iv + k];
+                *entry = bracket.iter().zip(joint.rates(of)).fold(*entry, |rest, (c, x)| rest - *c * *x);
+            }
+        }
+    }
+}
+
 /// The columns of the coordinates of floating bases: all that they carry turns, with it these six numbers.
 fn turn_with_floating_bases<T: Real>(model: &Model<T>, world: &[WorldPose<T>], six: &[T], rows: &mut [T]) {
     let [linear, angular] = [0, 3].map(|k| Vec3::new(six[k], six[k + 1], six[k + 2]));
-    for (body, pose) in model.bodies.iter().zip(world).filter(|(body, _)| body.joint.kind.nv() > 1) {
+    for (body, pose) in model.bodies.iter().zip(world).filter(|(body, _)| body.joint.kind.is_base()) {
         let joint = &body.joint;
         for k in 0..joint.kind.nv() {
             let w = pose.rotation * joint.kind.mechanics().column(k, &[]).angular;

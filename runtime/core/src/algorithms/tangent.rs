@@ -1,7 +1,7 @@
 //! Displacements of a configuration along its tangent, and how tangents are carried along them.
 //!
-//! q ⊕ v adds v to the coordinates of most joints; a floating base it moves by the exponential of the body twist v = (linear, angular), M exp v, through any angle.
-//! `difference` is the inverse, through at most half a turn. Derivatives by q are by increments of the tangent (a base: of its
+//! q ⊕ v adds v to the coordinates of most joints; a floating base it moves by the exponential of the body twist v = (linear, angular), M exp v, through any angle,
+//! and a ball joint it turns, R exp v. `difference` is the inverse, through at most half a turn. Derivatives by q are by increments of the tangent (a base: of its
 //! pose in its own axes), and so are those of configurations.
 
 use crate::joint::TwistMap;
@@ -10,6 +10,7 @@ use crate::spatial::Vec3;
 use crate::Real;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 fn joints<T>(model: &Model<T>) -> impl Iterator<Item = &Joint> {
     model.free_joints()
@@ -25,7 +26,7 @@ pub fn integrate<T: Real>(model: &Model<T>, q: &[T], v: &[T]) -> Vec<T> {
     to
 }
 
-/// v of q ⊕ v = q₁, the shortest one: a base turns by at most π. Quaternions q and −q are the same.
+/// v of q ⊕ v = q₁, the shortest one: a base or a ball joint turns by at most π. Quaternions q and −q are the same.
 pub fn difference<T: Real>(model: &Model<T>, q: &[T], q1: &[T]) -> Vec<T> {
     let mut v = vec![T::zero(); model.nv()];
     for joint in joints(model) {
@@ -39,19 +40,32 @@ pub fn difference<T: Real>(model: &Model<T>, q: &[T], q1: &[T]) -> Vec<T> {
 #[derive(Clone, Debug)]
 pub struct TangentMap<T> {
     others: T,
-    twists: Vec<(usize, TwistMap<T>)>,
+    /// Of joints with others: the places of their rates, which are a twist, linear before angular, or a turn alone.
+    twists: Vec<(Range<usize>, TwistMap<T>)>,
 }
 
 impl<T: Real> TangentMap<T> {
     /// The products with the columns of a matrix by rows, `columns` of them; of a vector with one.
     pub fn times(&self, matrix: &[T], columns: usize) -> Vec<T> {
         let mut product: Vec<T> = matrix.iter().map(|x| self.others * *x).collect();
-        for (first, map) in &self.twists {
+        for (rates, map) in &self.twists {
             for k in 0..columns {
-                let entry = |i: usize| matrix[(first + i) * columns + k];
-                let [linear, angular] = map.apply([0, 3].map(|i| Vec3::new(entry(i), entry(i + 1), entry(i + 2))));
-                let moved = linear.to_array().into_iter().chain(angular.to_array());
-                moved.enumerate().for_each(|(i, x)| product[(first + i) * columns + k] = x);
+                let vector = |first: usize| {
+                    let [x, y, z] = [0, 1, 2].map(|i| matrix[(first + i) * columns + k]);
+                    Vec3::new(x, y, z)
+                };
+                let mut put = |first: usize, moved: Vec3<T>| {
+                    let moved = moved.to_array().into_iter().enumerate();
+                    moved.for_each(|(i, x)| product[(first + i) * columns + k] = x);
+                };
+                let (first, after) = (rates.start, rates.end - 3);
+                if first == after {
+                    put(first, map.apply_to_turn(vector(first)));
+                } else {
+                    let [linear, angular] = map.apply([vector(first), vector(after)]);
+                    put(first, linear);
+                    put(after, angular);
+                }
             }
         }
         product
@@ -70,21 +84,22 @@ fn maps<T: Real>(
     others: [T; 2],
     of_joint: impl Fn(&Joint) -> Option<[TwistMap<T>; 2]>,
 ) -> [TangentMap<T>; 2] {
-    let own = |k: usize| joints(model).filter_map(|joint| Some((joint.iv, of_joint(joint)?[k]))).collect();
+    let places = |joint: &Joint| joint.iv..joint.iv + joint.kind.nv();
+    let own = |k: usize| joints(model).filter_map(|joint| Some((places(joint), of_joint(joint)?[k]))).collect();
     [0, 1].map(|k| TangentMap { others: others[k], twists: own(k) })
 }
 
-/// How q ⊕ v moves, in its own tangent, with q and with v: Ad(exp(−v)) and J_r(v) of a base, 1 of other joints.
+/// How q ⊕ v moves, in its own tangent, with q and with v: Ad(exp(−v)) and J_r(v) of a base or a ball joint, 1 of other joints.
 pub fn integrate_maps<T: Real>(model: &Model<T>, v: &[T]) -> [TangentMap<T>; 2] {
     maps(model, [T::one(); 2], |joint| joint.kind.mechanics().integrate_maps(joint.rates(v)))
 }
 
-/// How v of q ⊕ v = q₁ moves with q and with q₁: −J_r⁻¹(−v) and J_r⁻¹(v) of a base, ∓ 1 of other joints.
+/// How v of q ⊕ v = q₁ moves with q and with q₁: −J_r⁻¹(−v) and J_r⁻¹(v) of a base or a ball joint, ∓ 1 of other joints.
 pub fn difference_maps<T: Real>(model: &Model<T>, v: &[T]) -> [TangentMap<T>; 2] {
     maps(model, [-T::one(), T::one()], |joint| joint.kind.mechanics().difference_maps(joint.rates(v)))
 }
 
-/// u̇ where q ⊕ u, q held, moves with q̇: J_r⁻¹(u) q̇ of a base up to the square of ad, of which the next term is ad⁴/720.
+/// u̇ where q ⊕ u, q held, moves with q̇: J_r⁻¹(u) q̇ of a base or a ball joint up to the square of ad, of which the next term is ad⁴/720.
 pub fn displacement_rate<T: Real>(model: &Model<T>, u: &[T], qd: &[T]) -> Vec<T> {
     displacement_rate_maps(model, u, qd)[0].times(qd, 1)
 }

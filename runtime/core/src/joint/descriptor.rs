@@ -13,6 +13,8 @@ pub struct Descriptor {
     pub words: &'static [Word],
     /// Key of a robot file for the number that a joint of the kind has of its own, such as a pitch.
     pub number: Option<&'static str>,
+    /// Whether robot files give it an axis, which is z of its frame; the frame of other joints is the one of the file.
+    pub has_axis: bool,
     /// What the joint does: "turns".
     pub verb: &'static str,
     /// What each velocity coordinate measures; as many as the joint has velocity coordinates.

@@ -237,6 +237,11 @@ impl<T: Real> TwistMap<T> {
         [self.same * linear + self.coupling * angular, self.same * angular]
     }
 
+    /// Of a turn alone, about the origin.
+    pub(crate) fn apply_to_turn(&self, angular: Vec3<T>) -> Vec3<T> {
+        self.same * angular
+    }
+
     /// How exp of a twist, in its own axes, moves with the pose before it, Ad(exp(−v)), and with the twist, J_r(v).
     pub(super) fn of_exponential(v: [Vec3<T>; 2]) -> [Self; 2] {
         let [c1, c2, c3] = FreeTurn::new(v[1]).coefficients();

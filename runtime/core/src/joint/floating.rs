@@ -13,6 +13,7 @@ pub(super) const ROW: Descriptor = Descriptor {
     name: "floating",
     words: &[Word { text: "floating", has_range: false, dialects: Dialect::FRAMES }],
     number: None,
+    has_axis: false,
     verb: "moves freely",
     measures: &[Length, Length, Length, Angle, Angle, Angle],
     neutral: &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],

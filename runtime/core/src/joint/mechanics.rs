@@ -25,6 +25,12 @@ pub(crate) trait Mechanics<T: Real> {
         None
     }
 
+    /// [S q̇, S_k], in the joint's coordinates: what the rate along q̇ and the derivative by an increment of coordinate k, taken in the other order,
+    /// differ by. `None` where they commute, and of a floating base, with which all turns.
+    fn bracket(&self, _k: usize, _qd: &[T]) -> Option<[T; 3]> {
+        None
+    }
+
     /// The pose in the parent's frame, from the placement of the joint.
     fn pose(&self, _body: usize, placement: &Transform<T>, _dense: bool, q: &[T]) -> JointPose<T> {
         JointPose::moved(placement, &self.motion(q))

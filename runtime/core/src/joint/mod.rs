@@ -37,4 +37,8 @@ joints! {
     /// axes; qdd the componentwise derivative of qd; tau the force and the moment about that origin, in root-link axes.
     /// It has no parent, and q says all about its pose: its placement and link frame are the identity.
     floating::Floating,
+    /// Turns about any axis. q = (x, y, z, w): unit quaternion of the child link's axes in those of the joint; qd: angular velocity against the
+    /// parent, in child-link axes; qdd the componentwise derivative of qd; tau the moment on the child, in child-link axes.
+    #[doc(alias = "ball")]
+    spherical::Spherical,
 }

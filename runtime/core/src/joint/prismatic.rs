@@ -10,6 +10,7 @@ pub(super) const ROW: Descriptor = Descriptor {
     name: "prismatic",
     words: &[Word::ranged("linear", &[Dialect::CentresOfMass]), Word::ranged("prismatic", Dialect::ALL)],
     number: None,
+    has_axis: true,
     verb: "slides",
     measures: &[Measure::Length],
     neutral: &[0.0],

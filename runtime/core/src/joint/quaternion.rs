@@ -1,4 +1,4 @@
-//! Unit quaternions (x, y, z, w): the orientation of a floating base.
+//! Unit quaternions (x, y, z, w): the orientation of a floating base, or of what a ball joint carries.
 
 use crate::dd::Dd;
 use crate::real::Real;

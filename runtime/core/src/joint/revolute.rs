@@ -13,6 +13,7 @@ pub(super) const ROW: Descriptor = Descriptor {
         Word { text: "continuous", has_range: false, dialects: Dialect::FRAMES },
     ],
     number: None,
+    has_axis: true,
     verb: "turns",
     measures: &[Measure::Angle],
     neutral: &[0.0],

@@ -1,5 +1,5 @@
 //! Displacements of a configuration along its tangent (not in the chapter): those of most joints are added; a free link moves by the exponential of a
-//! body twist, here of 4 × 4 matrices, by halving, the power series and squaring.
+//! body twist, here of 4 × 4 matrices, by halving, the power series and squaring; a ball joint by its turn.
 
 use super::scalar::ReferenceReal;
 use super::tree::{CentreOfMassTree, ReferenceJoint};
@@ -59,10 +59,29 @@ fn rotation<T: ReferenceReal>(q: &Vector4<T>) -> Matrix3<T> {
     Matrix3::from_columns(&[pure(0), pure(1), pure(2)])
 }
 
+/// The unit quaternion of a rotation vector.
+fn turned_by<T: ReferenceReal>(angular: &Vector3<T>) -> Vector4<T> {
+    let half = angular * T::constant(Dd::HALF);
+    exponential(&product_matrix(&half.push(<T as Real>::zero()))).column(3).into_owned()
+}
+
+/// The rotation vector, at most π long, of the turn from one unit quaternion to another, either of which may have the other sign.
+fn turn_between<T: ReferenceReal>(own: &Vector4<T>, other: &Vector4<T>) -> Vector3<T> {
+    let turn = product_matrix(&conjugate(own)) * other;
+    let sign = if turn.w.sign() == -<T as Real>::one() { -<T as Real>::one() } else { <T as Real>::one() };
+    rotation_vector(&(turn * sign))
+}
+
 /// The configuration that a displacement v of the tangent at q leads to; of a free link v is a body twist, (linear, angular).
 pub fn displaced<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], v: &[T]) -> Vec<T> {
     let mut to = q.to_vec();
     for link in tree.own() {
+        if link.joint == ReferenceJoint::Ball {
+            let turned = turned_by(&Vector3::from_column_slice(&v[link.iv..link.iv + 3]));
+            let own = normalised(&q[link.iq..link.iq + 4]);
+            to[link.iq..link.iq + 4].copy_from_slice((product_matrix(&own) * turned).as_slice());
+            continue;
+        }
         if link.joint != ReferenceJoint::Free {
             to[link.iq] = q[link.iq] + v[link.iv];
             continue;
@@ -72,8 +91,7 @@ pub fn displaced<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], v: &[T])
         twist.fixed_view_mut::<3, 3>(0, 0).copy_from(&of_vector(&angular));
         twist.fixed_view_mut::<3, 1>(0, 3).copy_from(&linear);
         let moved = exponential(&twist).fixed_view::<3, 1>(0, 3).into_owned();
-        let half = angular * T::constant(Dd::HALF);
-        let turned = exponential(&product_matrix(&half.push(<T as Real>::zero()))).column(3).into_owned();
+        let turned = turned_by(&angular);
         let own = normalised(&q[link.iq + 3..link.iq + 7]);
         let position = Vector3::from_column_slice(&q[link.iq..link.iq + 3]) + rotation(&own) * moved;
         to[link.iq..link.iq + 3].copy_from_slice(position.as_slice());
@@ -86,14 +104,17 @@ pub fn displaced<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], v: &[T])
 pub fn displacement<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], q1: &[T]) -> Vec<T> {
     let mut v = alloc::vec![<T as Real>::zero(); tree.nv()];
     for link in tree.own() {
+        if link.joint == ReferenceJoint::Ball {
+            let [own, other] = [q, q1].map(|q| normalised(&q[link.iq..link.iq + 4]));
+            v[link.iv..link.iv + 3].copy_from_slice(turn_between(&own, &other).as_slice());
+            continue;
+        }
         if link.joint != ReferenceJoint::Free {
             v[link.iv] = q1[link.iq] - q[link.iq];
             continue;
         }
         let [own, other] = [q, q1].map(|q| normalised(&q[link.iq + 3..link.iq + 7]));
-        let turn = product_matrix(&conjugate(&own)) * other;
-        let sign = if turn.w.sign() == -<T as Real>::one() { -<T as Real>::one() } else { <T as Real>::one() };
-        let angular = rotation_vector(&(turn * sign));
+        let angular = turn_between(&own, &other);
         let [from, to] = [q, q1].map(|q| Vector3::from_column_slice(&q[link.iq..link.iq + 3]));
         let moved = rotation(&own).transpose() * (to - from);
         // V ρ = moved, with V column by column from the exponentials of unit twists
@@ -138,19 +159,23 @@ fn rotation_vector<T: ReferenceReal>(turn: &Vector4<T>) -> Vector3<T> {
     part * (two * angle / sine)
 }
 
-/// How a configuration changes, as an increment of the tangent there: of a free link that of its pose in its own axes.
+/// How a configuration changes, as an increment of the tangent there: of a free link that of its pose in its own axes, of a ball joint its turn, likewise.
 pub fn increment<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], rate: &[T]) -> Vec<T> {
     let mut v = alloc::vec![<T as Real>::zero(); tree.nv()];
     for link in tree.own() {
-        if link.joint != ReferenceJoint::Free {
+        let Some(first) = link.joint.quaternion() else {
             v[link.iv] = rate[link.iq];
             continue;
+        };
+        let quaternion = link.iq + first..link.iq + first + 4;
+        let own = normalised(&q[quaternion.clone()]);
+        let turned = product_matrix(&conjugate(&own)) * Vector4::from_column_slice(&rate[quaternion]);
+        if link.joint == ReferenceJoint::Free {
+            let moved = rotation(&own).transpose() * Vector3::from_column_slice(&rate[link.iq..link.iq + 3]);
+            v[link.iv..link.iv + 3].copy_from_slice(moved.as_slice());
         }
-        let own = normalised(&q[link.iq + 3..link.iq + 7]);
-        let moved = rotation(&own).transpose() * Vector3::from_column_slice(&rate[link.iq..link.iq + 3]);
-        let turned = product_matrix(&conjugate(&own)) * Vector4::from_column_slice(&rate[link.iq + 3..link.iq + 7]);
-        v[link.iv..link.iv + 3].copy_from_slice(moved.as_slice());
-        v[link.iv + 3..link.iv + 6].copy_from_slice((turned.xyz() * T::constant(Dd::from(2.0))).as_slice());
+        v[link.iv + first..link.iv + first + 3]
+            .copy_from_slice((turned.xyz() * T::constant(Dd::from(2.0))).as_slice());
     }
     v
 }

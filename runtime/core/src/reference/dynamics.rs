@@ -4,8 +4,8 @@
 //! frame unless a tilde says otherwise. A sum over k = j … n is here a sum over the links k that joint j carries.
 
 use super::{
-    geometry, linear_forms, motion, skew, solve_symmetric, CentreOfMassTree, LinearForms, LinkGeometry, LinkMotion,
-    ReferenceReal,
+    geometry, linear_forms, motion, skew, solve_symmetric, CentreOfMassLink, CentreOfMassTree, LinearForms, LinkGeometry, LinkMotion,
+    ReferenceJoint, ReferenceReal,
 };
 use crate::dd::Dd;
 use alloc::vec;
@@ -22,10 +22,10 @@ pub struct JointLoad<T> {
     /// M_S: total moment, drive included \[N·m\]; (20.48).
     #[doc(alias = "M_S")]
     pub moment: Vector3<T>,
-    /// F_R: reaction force, without the drive \[N\]; (20.19). Of a free link, that everything drives, null.
+    /// F_R: reaction force, without the drive \[N\]; (20.19). Of a free link, that everything drives, null; of a ball joint the whole force.
     #[doc(alias = "F_R")]
     pub reaction_force: Vector3<T>,
-    /// M_R: reaction moment, without the drive \[N·m\]; (20.19). Of a free link null.
+    /// M_R: reaction moment, without the drive \[N·m\]; (20.19). Of a free link and of a ball joint null.
     #[doc(alias = "M_R")]
     pub reaction_moment: Vector3<T>,
 }
@@ -41,6 +41,11 @@ fn lever<T: ReferenceReal>(tree: &CentreOfMassTree<T>, position: &[LinkGeometry<
         next = p;
     }
     sum
+}
+
+/// The first of the three places of the angular velocity of a free link or a ball joint.
+fn first_turn<T>(link: &CentreOfMassLink<T>) -> usize {
+    link.iv + link.joint.nv() - 3
 }
 
 /// The links that joint j carries.
@@ -95,7 +100,9 @@ fn joint_load<T: ReferenceReal>(
         // M_{Sj} = −Σ_k (M_{kI} + r_k^{(j)} × (G_k + F_{kI}))                                                  (20.48)
         moment += applied_couple(tree, k, &position[k], &motion[k]) + lever(tree, position, j, k).cross(&applied);
     }
-    let (reaction_force, reaction_moment) = match tree.links[j].shares() {
+    let link = &tree.links[j];
+    let (reaction_force, reaction_moment) = match link.shares() {
+        None if link.joint == ReferenceJoint::Ball => (force, Vector3::zeros()),
         None => (Vector3::zeros(), Vector3::zeros()),
         Some([turns, s]) => {
             let e = &position[j].e;
@@ -160,11 +167,13 @@ pub fn dalembert_inverse_dynamics<T: ReferenceReal>(
                 }
             }
             None => {
-                // τ = (F̃_S, M̃_S), all six components
+                // τ = (F̃_S, M̃_S), all six components; of a ball joint the last three
                 let load = joint_load(tree, &position, &motion, j);
                 let rotation = position[j].rotation.transpose();
-                tau.fixed_rows_mut::<3>(link.iv).copy_from(&(rotation * load.force));
-                tau.fixed_rows_mut::<3>(link.iv + 3).copy_from(&(rotation * load.moment));
+                if link.joint == ReferenceJoint::Free {
+                    tau.fixed_rows_mut::<3>(link.iv).copy_from(&(rotation * load.force));
+                }
+                tau.fixed_rows_mut::<3>(first_turn(link)).copy_from(&(rotation * load.moment));
             }
         }
     }
@@ -236,15 +245,17 @@ pub fn equations_of_motion<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T]
                     bias_force[link.iv] += s * e.dot(force) + turns * e.dot(&(couple + lever * force));
                 }
                 None => {
-                    // the columns of A_j instead of e_j: first as in (20.54), then as in (20.58)
+                    // the columns of A_j instead of e_j: of a free link first as in (20.54), then, as of a ball joint, as in (20.58)
                     let axes = position[j].rotation.transpose();
-                    let mut rows = mass_matrix.fixed_rows_mut::<3>(link.iv);
-                    rows += axes * force_matrix;
-                    let mut rows = mass_matrix.fixed_rows_mut::<3>(link.iv + 3);
+                    if link.joint == ReferenceJoint::Free {
+                        let mut rows = mass_matrix.fixed_rows_mut::<3>(link.iv);
+                        rows += axes * force_matrix;
+                        let mut rows = bias_force.fixed_rows_mut::<3>(link.iv);
+                        rows += axes * force;
+                    }
+                    let mut rows = mass_matrix.fixed_rows_mut::<3>(first_turn(link));
                     rows += axes * (couple_matrix + lever * force_matrix);
-                    let mut rows = bias_force.fixed_rows_mut::<3>(link.iv);
-                    rows += axes * force;
-                    let mut rows = bias_force.fixed_rows_mut::<3>(link.iv + 3);
+                    let mut rows = bias_force.fixed_rows_mut::<3>(first_turn(link));
                     rows += axes * (couple + lever * force);
                 }
             }
@@ -316,8 +327,10 @@ pub fn natural_scale<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: 
                 Some([turns, s]) => scale[link.iv] += force * norm_of(s) + moment * norm_of(turns),
                 None => {
                     for i in 0..3 {
-                        scale[link.iv + i] += force;
-                        scale[link.iv + 3 + i] += moment;
+                        if link.joint == ReferenceJoint::Free {
+                            scale[link.iv + i] += force;
+                        }
+                        scale[first_turn(link) + i] += moment;
                     }
                 }
             }

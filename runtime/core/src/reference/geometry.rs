@@ -15,7 +15,7 @@ pub struct LinkGeometry<T> {
     pub rotation: Matrix3<T>,
     /// r_{c,j}: the centre of mass \[m\]; (20.25).
     pub centre_of_mass: Vector3<T>,
-    /// e_j: the joint axis. Null for a free link.
+    /// e_j: the joint axis. Null for a free link and a ball joint.
     pub e: Vector3<T>,
     /// r_{j,j}: from the joint (S''_j) to the centre of mass \[m\].
     pub r: Vector3<T>,
@@ -112,15 +112,16 @@ pub fn geometry<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T]) -> Vec<Li
     assert_eq!(q.len(), tree.nq(), "one value per position coordinate");
     let mut links: Vec<LinkGeometry<T>> = Vec::with_capacity(tree.links.len());
     for link in &tree.links {
-        let here = match link.joint.shares() {
-            Some([_, s]) => {
-                let (parent_rotation, parent_centre_of_mass) = match link.parent {
-                    Some(p) => (links[p].rotation, links[p].centre_of_mass),
-                    None => (Matrix3::identity(), Vector3::zeros()),
-                };
-                one_joint(link, (link.own_coordinate(q), s), &parent_rotation, &parent_centre_of_mass)
+        let (parent_rotation, parent_centre_of_mass) = match link.parent {
+            Some(p) => (links[p].rotation, links[p].centre_of_mass),
+            None => (Matrix3::identity(), Vector3::zeros()),
+        };
+        let here = match (link.joint, link.joint.shares()) {
+            (_, Some([_, s])) => one_joint(link, (link.own_coordinate(q), s), &parent_rotation, &parent_centre_of_mass),
+            (ReferenceJoint::Ball, _) => {
+                ball(link, &q[link.iq..link.iq + 4], &parent_rotation, &parent_centre_of_mass)
             }
-            None => free(link, &q[link.iq..link.iq + 7]),
+            _ => free(link, &q[link.iq..link.iq + 7]),
         };
         links.push(here);
     }
@@ -144,6 +145,20 @@ fn one_joint<T: ReferenceReal>(
     // r_{c,j} = r_{c,j−1} − r_{j−1,j} + r'_{j,j}                                                                (20.25)
     let centre_of_mass = parent_centre_of_mass - r_parent + r_dash;
     LinkGeometry { rotation, centre_of_mass, e, r, r_dash, r_parent }
+}
+
+fn ball<T: ReferenceReal>(
+    link: &CentreOfMassLink<T>,
+    q: &[T],
+    parent_rotation: &Matrix3<T>,
+    parent_centre_of_mass: &Vector3<T>,
+) -> LinkGeometry<T> {
+    let ExtendedPosition::Matrix(extended) = &link.extended else { panic!("a ball joint has no axis to extend along") };
+    let rotation = parent_rotation * extended * quaternion_rotation([q[0], q[1], q[2], q[3]]);
+    let (r, r_parent) = (rotation * link.r, parent_rotation * link.r_parent);
+    // r_{c,j} = r_{c,j−1} − r_{j−1,j} + r_{j,j}, as (20.25) with s_j = 0
+    let centre_of_mass = parent_centre_of_mass - r_parent + r;
+    LinkGeometry { rotation, centre_of_mass, e: Vector3::zeros(), r, r_dash: r, r_parent }
 }
 
 fn free<T: ReferenceReal>(link: &CentreOfMassLink<T>, q: &[T]) -> LinkGeometry<T> {

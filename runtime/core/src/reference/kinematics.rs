@@ -2,7 +2,7 @@
 //!
 //! Section 20.2.1, equations (20.23)–(20.43). All vectors are in the external frame.
 
-use super::{skew, CentreOfMassTree, LinkGeometry, ReferenceReal};
+use super::{skew, CentreOfMassTree, LinkGeometry, ReferenceJoint, ReferenceReal};
 use alloc::vec::Vec;
 use nalgebra::{Matrix3xX, Vector3};
 
@@ -39,9 +39,10 @@ pub fn motion<T: ReferenceReal>(
     let mut links: Vec<LinkMotion<T>> = Vec::with_capacity(tree.links.len());
     for (link, position) in tree.links.iter().zip(geometry) {
         let parent = link.parent.map_or_else(LinkMotion::rest, |p| links[p].clone());
-        let here = match link.shares() {
-            Some(shares) => one_joint(shares, position, &parent, qd[link.iv], qdd[link.iv]),
-            None => free(position, &qd[link.iv..link.iv + 6], &qdd[link.iv..link.iv + 6]),
+        let here = match (link.joint, link.shares()) {
+            (_, Some(shares)) => one_joint(shares, position, &parent, qd[link.iv], qdd[link.iv]),
+            (ReferenceJoint::Ball, _) => ball(position, &parent, &qd[link.iv..link.iv + 3], &qdd[link.iv..link.iv + 3]),
+            _ => free(position, &qd[link.iv..link.iv + 6], &qdd[link.iv..link.iv + 6]),
         };
         links.push(here);
     }
@@ -72,6 +73,27 @@ fn one_joint<T: ReferenceReal>(
         + epsilon.cross(r_dash)
         + omega.cross(&omega.cross(r_dash))
         + (e * qdd + omega.cross(e) * (two * qd)) * s;
+    LinkMotion { omega, epsilon, v, w }
+}
+
+/// As of three revolute joints in one point, along the link's own axes: all at once, e_j q̇_j is A_j times the relative angular velocity.
+fn ball<T: ReferenceReal>(
+    position: &LinkGeometry<T>,
+    parent: &LinkMotion<T>,
+    qd: &[T],
+    qdd: &[T],
+) -> LinkMotion<T> {
+    let LinkGeometry { rotation, r, r_parent, .. } = position;
+    let LinkMotion { omega: omega_parent, epsilon: epsilon_parent, v: v_parent, w: w_parent } = parent;
+    let own = rotation * Vector3::from_column_slice(qd);
+    // ω_j = ω_{j−1} + A_j ω̃,    ε_j = ε_{j−1} + A_j dω̃/dt + ω_j × A_j ω̃
+    let omega = omega_parent + own;
+    let epsilon = epsilon_parent + rotation * Vector3::from_column_slice(qdd) + omega.cross(&own);
+    // (20.26) and (20.27) with s_j = 0
+    let v = v_parent - omega_parent.cross(r_parent) + omega.cross(r);
+    let w = w_parent - epsilon_parent.cross(r_parent) - omega_parent.cross(&omega_parent.cross(r_parent))
+        + epsilon.cross(r)
+        + omega.cross(&omega.cross(r));
     LinkMotion { omega, epsilon, v, w }
 }
 
@@ -117,9 +139,10 @@ pub fn linear_forms<T: ReferenceReal>(
     let mut links: Vec<LinearForms<T>> = Vec::with_capacity(tree.links.len());
     for (link, position) in tree.links.iter().zip(geometry) {
         let parent = link.parent.map_or_else(|| base_forms(n), |p| links[p].clone());
-        let here = match link.shares() {
-            Some(shares) => one_joint_forms(shares, position, &parent, link.iv, qd[link.iv]),
-            None => free_forms(position, parent, link.iv, &qd[link.iv..link.iv + 6]),
+        let here = match (link.joint, link.shares()) {
+            (_, Some(shares)) => one_joint_forms(shares, position, &parent, link.iv, qd[link.iv]),
+            (ReferenceJoint::Ball, _) => ball_forms(position, &parent, link.iv, &qd[link.iv..link.iv + 3]),
+            _ => free_forms(position, parent, link.iv, &qd[link.iv..link.iv + 6]),
         };
         links.push(here);
     }
@@ -173,6 +196,29 @@ fn one_joint_forms<T: ReferenceReal>(
         - omega_parent.cross(&omega_parent.cross(r_parent))
         + omega.cross(&omega.cross(r_dash))
         + omega.cross(e) * (two * s * qd);
+    LinearForms { lambda, gamma, xi, delta, omega }
+}
+
+fn ball_forms<T: ReferenceReal>(
+    position: &LinkGeometry<T>,
+    parent: &LinearForms<T>,
+    iv: usize,
+    qd: &[T],
+) -> LinearForms<T> {
+    let LinkGeometry { rotation, r, r_parent, .. } = position;
+    let own = rotation * Vector3::from_column_slice(qd);
+    let omega = parent.omega + own;
+    // Λ^j: that of the parent, and A_j in its own columns
+    let mut lambda = parent.lambda.clone();
+    lambda.fixed_view_mut::<3, 3>(0, iv).copy_from(rotation);
+    // γ^j = γ^{j−1} + ω_j × A_j ω̃
+    let gamma = parent.gamma + omega.cross(&own);
+    // Ξ^j = Ξ^{j−1} + r̲_{j−1,j} Λ^{j−1} − r̲_{j,j} Λ^j
+    let xi = &parent.xi + skew(r_parent) * &parent.lambda - skew(r) * &lambda;
+    // (20.43) with s_j = 0
+    let delta = parent.delta - parent.gamma.cross(r_parent) + gamma.cross(r)
+        - parent.omega.cross(&parent.omega.cross(r_parent))
+        + omega.cross(&omega.cross(r));
     LinearForms { lambda, gamma, xi, delta, omega }
 }
 

@@ -22,44 +22,57 @@ pub enum ReferenceJoint {
     /// quaternion (x, y, z, qx, qy, qz, qw) of the link's axes; six velocities (v, ω) of the root point and of the link,
     /// in the link's axes; τ = (F, M) about the root point in the link's axes.
     Free,
+    /// Turns about any axis through S_j (not in the chapter). Four coordinates: unit quaternion (x, y, z, w) of the link's axes against those of the
+    /// joint, which the extended position turns into the parent's; three velocities, ω of the link against its parent in the link's axes; τ = M likewise.
+    Ball,
 }
 
 impl ReferenceJoint {
-    /// The joint that robot files mean by a word, with the number that goes with it; `None`: it has not one degree of freedom.
+    /// The joint that robot files mean by a word, with the number that goes with it; `None`: none that stands between links.
     pub fn of_word(word: &str, _number: Option<f64>) -> Option<ReferenceJoint> {
         match word {
             "revolute" | "continuous" => Some(ReferenceJoint::Revolute),
             "prismatic" | "linear" => Some(ReferenceJoint::Linear),
+            "spherical" | "ball" => Some(ReferenceJoint::Ball),
             _ => None,
         }
     }
 
     /// (1 − s_j, s_j) with the indicator s_j of (20.6), 0 for a revolute joint, 1 for a linear one: how much a joint turns and how much it
-    /// slides per unit of its coordinate. A free link has none.
+    /// slides per unit of its coordinate. A free link and a ball joint have none.
     #[doc(alias = "s_j")]
     pub fn shares<T: ReferenceReal>(self) -> Option<[T; 2]> {
         match self {
             ReferenceJoint::Revolute => Some([nalgebra::one(), nalgebra::zero()]),
             ReferenceJoint::Linear => Some([nalgebra::zero(), nalgebra::one()]),
-            ReferenceJoint::Free => None,
+            ReferenceJoint::Free | ReferenceJoint::Ball => None,
         }
     }
 
     /// Number of position coordinates.
     pub const fn nq(self) -> usize {
-        if matches!(self, ReferenceJoint::Free) {
-            7
-        } else {
-            1
+        match self {
+            ReferenceJoint::Revolute | ReferenceJoint::Linear => 1,
+            ReferenceJoint::Ball => 4,
+            ReferenceJoint::Free => 7,
         }
     }
 
     /// Number of velocity coordinates.
     pub const fn nv(self) -> usize {
-        if matches!(self, ReferenceJoint::Free) {
-            6
-        } else {
-            1
+        match self {
+            ReferenceJoint::Revolute | ReferenceJoint::Linear => 1,
+            ReferenceJoint::Ball => 3,
+            ReferenceJoint::Free => 6,
+        }
+    }
+
+    /// Where among its coordinates a unit quaternion (x, y, z, w) begins.
+    pub const fn quaternion(self) -> Option<usize> {
+        match self {
+            ReferenceJoint::Revolute | ReferenceJoint::Linear => None,
+            ReferenceJoint::Ball => Some(0),
+            ReferenceJoint::Free => Some(3),
         }
     }
 }
@@ -112,7 +125,7 @@ pub struct CentreOfMassLink<T> {
     pub mass: T,
     /// J̃_j: tensor of inertia about the centre of mass, link axes \[kg·m²\]; (20.15).
     pub inertia: Matrix3<T>,
-    /// ẽ_j: unit vector of the joint axis in frame j; (20.2).
+    /// ẽ_j: unit vector of the joint axis in frame j; (20.2). Null for a ball joint.
     pub e: Vector3<T>,
     /// e_j in the parent's frame, a unit vector; (20.5).
     pub e_parent: Vector3<T>,

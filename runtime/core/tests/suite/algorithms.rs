@@ -153,7 +153,7 @@ fn shuffled(random: &mut Random, n: usize) -> Vec<usize> {
     order
 }
 
-/// A tree of 2 to 9 joints, on a floating base if the seed is odd.
+/// A tree of 2 to 9 joints, on a floating base if the seed is odd; those after the written ones have ball joints.
 fn random_robot(seed: u64) -> Model<Dd> {
     let random = &mut Random(seed);
     let count = 2 + random.below(8);
@@ -161,6 +161,7 @@ fn random_robot(seed: u64) -> Model<Dd> {
     for i in 0..count {
         let kind = match (i, seed % 2, random.below(3)) {
             (0, 1, _) => JointKind::Floating,
+            _ if seed > WRITTEN && (i + seed as usize) % 3 != 0 => JointKind::Spherical,
             (_, _, 0) => JointKind::Prismatic,
             _ => JointKind::Revolute,
         };
@@ -203,7 +204,7 @@ fn random_robot(seed: u64) -> Model<Dd> {
     }
     let mut frames = vec![Frame { name: "tip".into(), body: Some(count - 1), placement: random.pose() }];
     frames.push(Frame { name: "side".into(), body: Some(random.below(count)), placement: random.pose() });
-    if seed > OBLIQUE {
+    if (OBLIQUE + 1..=WRITTEN).contains(&seed) {
         write_down(&mut bodies, &mut frames, seed, random);
     }
     Model {
@@ -219,6 +220,9 @@ fn random_robot(seed: u64) -> Model<Dd> {
 
 /// So many robots have sixteen random digits, those after them numbers as people and exporters write them.
 const OBLIQUE: u64 = 24;
+
+/// So many robots have joints of one coordinate behind the base.
+const WRITTEN: u64 = OBLIQUE + 10;
 
 /// Few digits, dust beside right angles that are cut anywhere, links of 1e-6 kg, masses in ratios of 1e8, millimetres: by the seed.
 fn write_down(bodies: &mut [Body<Dd>], frames: &mut [Frame<Dd>], seed: u64, random: &mut Random) {
@@ -275,8 +279,10 @@ impl Case {
         let model = random_robot(seed);
         let random = &mut Random(!seed);
         let mut q: Vec<Dd> = random.numbers(model.nq()).iter().map(|&x| x + x + x).collect();
-        for joint in model.bodies.iter().map(|b| &b.joint).filter(|j| j.kind == JointKind::Floating) {
-            q[joint.iq + 3..joint.iq + 7].copy_from_slice(&random.quaternion());
+        for joint in model.bodies.iter().map(|b| &b.joint) {
+            if let Some(first) = joint.kind.row().quaternion {
+                q[joint.iq + first..joint.iq + first + 4].copy_from_slice(&random.quaternion());
+            }
         }
         let (qd, qdd) = (random.numbers(model.nv()), random.numbers(model.nv()));
         Case { seed, model, q, qd, qdd }
@@ -286,26 +292,28 @@ impl Case {
         self.model.nv()
     }
 
-    /// dq/dt and d²q/dt²: not q̇ and q̈ where the base floats.
+    /// dq/dt and d²q/dt²: not q̇ and q̈ of a floating base and of ball joints.
     fn configuration_rates(&self) -> (Vec<Dd>, Vec<Dd>) {
         let (mut rate, mut second) = (vec![Dd::ZERO; self.q.len()], vec![Dd::ZERO; self.q.len()]);
         let at = |x: &[Dd], i: usize| Vec3::new(x[i], x[i + 1], x[i + 2]);
         for body in &self.model.bodies {
             let Joint { kind, iq, iv, .. } = body.joint;
-            if kind != JointKind::Floating {
+            let Some(first) = kind.row().quaternion else {
                 (rate[iq], second[iq]) = (self.qd[iv], self.qdd[iv]);
                 continue;
+            };
+            let quat: [Dd; 4] = self.q[iq + first..iq + first + 4].try_into().unwrap();
+            let w = at(&self.qd, iv + first);
+            if kind == JointKind::Floating {
+                let (r, v) = (rotation_of(quat), at(&self.qd, iv));
+                rate[iq..iq + 3].copy_from_slice(&(r * v).to_array());
+                second[iq..iq + 3].copy_from_slice(&(r * (at(&self.qdd, iv) + w.cross(v))).to_array());
             }
-            let quat: [Dd; 4] = self.q[iq + 3..iq + 7].try_into().unwrap();
-            let r = rotation_of(quat);
-            let (v, w) = (at(&self.qd, iv), at(&self.qd, iv + 3));
-            rate[iq..iq + 3].copy_from_slice(&(r * v).to_array());
-            second[iq..iq + 3].copy_from_slice(&(r * (at(&self.qdd, iv) + w.cross(v))).to_array());
             // d/dt quat = ½ quat ⊗ ω
             let quat_rate = half_product(quat, w);
-            rate[iq + 3..iq + 7].copy_from_slice(&quat_rate);
-            let (a, b) = (half_product(quat_rate, w), half_product(quat, at(&self.qdd, iv + 3)));
-            (0..4).for_each(|k| second[iq + 3 + k] = a[k] + b[k]);
+            rate[iq + first..iq + first + 4].copy_from_slice(&quat_rate);
+            let (a, b) = (half_product(quat_rate, w), half_product(quat, at(&self.qdd, iv + first)));
+            (0..4).for_each(|k| second[iq + first + k] = a[k] + b[k]);
         }
         (rate, second)
     }
@@ -351,7 +359,7 @@ fn half_product([x, y, z, w]: [Dd; 4], omega: Vec3<Dd>) -> [Dd; 4] {
 }
 
 fn cases() -> impl Iterator<Item = Case> {
-    (1..=OBLIQUE + 10).map(Case::new)
+    (1..=WRITTEN + 12).map(Case::new)
 }
 
 fn product(h: &[Dd], x: &[Dd]) -> Vec<Dd> {
@@ -468,7 +476,10 @@ fn the_wrench_of_a_joint_does_its_torque_along_the_axis() {
                     let both = [w.force.to_array(), w.moment.to_array()].concat();
                     case.agree(&both, &tau[iv..iv + 6], DD);
                 }
-                (None, false) => {}
+                (None, false) => {
+                    let moment = body.link_frame.rotation * w.moment;
+                    case.agree(&moment.to_array(), &tau[iv..iv + 3], DD);
+                }
             }
         }
     }
@@ -556,7 +567,7 @@ fn momentum_grows_by_the_wrench_on_the_roots() {
 /// The case with an effect of every kind, and none, on its joints.
 fn with_effects(mut case: Case) -> Case {
     let random = &mut Random(case.seed ^ 0x5eed);
-    for body in case.model.bodies.iter_mut().filter(|b| b.joint.kind != JointKind::Floating) {
+    for body in case.model.bodies.iter_mut().filter(|b| b.joint.kind.is_single()) {
         let mut size = || random.symmetric().abs() + Dd::from(0.25);
         body.effects = JointEffects {
             rotor_inertia: Some(size()),
@@ -581,7 +592,7 @@ fn with_effects(mut case: Case) -> Case {
 /// Force of the dampers and of Coulomb friction on a coordinate, as the handbook writes it.
 fn losses(case: &Case) -> Vec<Dd> {
     let mut forces = vec![Dd::ZERO; case.nv()];
-    for body in case.model.bodies.iter().filter(|b| b.joint.kind != JointKind::Floating) {
+    for body in case.model.bodies.iter().filter(|b| b.joint.kind.is_single()) {
         let qd = case.qd[body.joint.iv];
         let magnitude = qd.abs();
         let dry = match body.effects.coulomb {
@@ -685,7 +696,7 @@ fn smooth_coulomb_friction_becomes_the_sign_as_its_speed_vanishes() {
     for case in cases().map(with_effects) {
         let with_coulomb = |coulomb: fn(Dd) -> Coulomb<Dd>| {
             let mut model = case.model.clone();
-            for body in model.bodies.iter_mut().filter(|b| b.joint.kind != JointKind::Floating) {
+            for body in model.bodies.iter_mut().filter(|b| b.joint.kind.is_single()) {
                 body.effects.coulomb = coulomb(Dd::from(0.7));
             }
             bias_force(&model, &case.q, &case.qd)
@@ -702,7 +713,7 @@ fn friction_is_zero_at_rest() {
     for case in cases().map(with_effects) {
         let at_rest = vec![Dd::ZERO; case.nv()];
         let springs = passive_force(&case.model, &case.q, &at_rest);
-        for body in case.model.bodies.iter().filter(|b| b.joint.kind != JointKind::Floating) {
+        for body in case.model.bodies.iter().filter(|b| b.joint.kind.is_single()) {
             let spring = body.effects.stiffness * (case.q[body.joint.iq] - body.effects.spring_rest);
             assert_eq!(springs[body.joint.iv], spring, "seed {}", case.seed);
         }
@@ -907,6 +918,68 @@ fn the_column_of_the_last_joint_stands_still_in_its_own_axes_and_that_of_the_fir
                 let column: Vec<Dd> = found.chunks(case.nv()).map(|row| row[joint.iv]).collect();
                 assert_eq!(column, [Dd::ZERO; 6], "seed {}", case.seed);
             }
+        }
+    }
+}
+
+/// q as it moves with coordinate k alone, and everything else at rest.
+fn moved_along(case: &Case, k: usize) -> (Model<Rate>, Vec<Rate>) {
+    let (model, q, _) = Case { qd: unit(case.nv(), k), ..Case::new(case.seed) }.moving();
+    (model, q)
+}
+
+/// Momentum about the centre of mass, linear before angular.
+fn momentum_numbers<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
+    let all = momentum(model, q, qd);
+    [all.linear.to_array(), all.angular.to_array()].concat()
+}
+
+/// ∂h/∂q by increments of every joint; ḣ is taken along the motion of a robot whose configuration is moved.
+#[test]
+fn derivatives_of_momentum_are_rates_of_its_numbers() {
+    for case in cases() {
+        let held = |x: &[Dd]| x.iter().map(|&value| Rate { value, rate: Dd::ZERO }).collect::<Vec<_>>();
+        let found = centroidal_dynamics_derivatives(&case.model, [&case.q, &case.qd, &case.qdd]);
+        let (qd, qdd) = (held(&case.qd), held(&case.qdd));
+        let column = |k: usize| {
+            let (model, q) = moved_along(&case, k);
+            rates_of(momentum_numbers(&model, &q, &qd))
+        };
+        case.agree(&found.dh_dq, &by_rows(&(0..case.nv()).map(column).collect::<Vec<_>>()), DD);
+        // A q̈ + Ȧ q̇ at the moved configuration
+        let column = |k: usize| {
+            let (model, q) = moved_along(&case, k);
+            let all = centroidal_derivatives(&model, &q, &qd);
+            let row = |(a, b): (&[Rate], &[Rate])| {
+                let sum = |row: &[Rate], x: &[Rate]| {
+                    row.iter().zip(x).fold(Rate::zero(), |sum, (a, x)| sum + *a * *x)
+                };
+                sum(a, &qdd) + sum(b, &qd)
+            };
+            rates_of(all.map.chunks(case.nv()).zip(all.rate.chunks(case.nv())).map(row).collect())
+        };
+        case.agree(&found.dhdot_dq, &by_rows(&(0..case.nv()).map(column).collect::<Vec<_>>()), DD);
+    }
+}
+
+/// Jᵀ f of a force and a moment that are held in the world.
+#[test]
+fn the_derivative_of_a_held_force_is_the_rate_of_its_torques() {
+    for case in cases() {
+        let mut random = Random(case.seed ^ 0xf0);
+        let (force, moment) = (random.vector(), random.vector());
+        for frame in &case.model.frames {
+            let [_, slopes] =
+                jacobian_hessian_product(&case.model, &case.q, &[ForceOnFrame { frame, force, moment }]);
+            let column = |k: usize| {
+                let (model, q) = moved_along(&case, k);
+                let moving = model.frame(&frame.name).expect("the same frames");
+                let fixed = |x: Vec3<Dd>| x.map(|value| Rate { value, rate: Dd::ZERO });
+                let loaded = ForceOnFrame { frame: moving, force: fixed(force), moment: fixed(moment) };
+                let [torques, _] = jacobian_hessian_product(&model, &q, &[loaded]);
+                rates_of(torques)
+            };
+            case.agree(&slopes, &by_rows(&(0..case.nv()).map(column).collect::<Vec<_>>()), DD);
         }
     }
 }

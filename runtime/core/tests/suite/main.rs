@@ -2,6 +2,7 @@
 //! A file is chosen by its name: `cargo test -p straightline-core --test suite trig::`.
 
 mod algorithms;
+mod balls;
 mod contact;
 mod dd;
 mod dual;

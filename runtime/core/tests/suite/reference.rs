@@ -313,7 +313,7 @@ fn random_states() -> impl Iterator<Item = (CentreOfMassTree<Dd>, [Vec<Dd>; 3])>
     let oblique = (0..40).map(move |seed| {
         let (branched, floating) = kinds[seed % 4];
         let mut random = Random(seed as u64);
-        let kind = RobotKind { links: 2 + random.below(7), branched, floating };
+        let kind = RobotKind { links: 2 + random.below(7), branched, floating, balls: seed % 4 == 3 };
         let mut tree = random_robot(&mut random, kind);
         tree.name = format!("{kind:?}, seed {seed}");
         let q = random_position(&mut random, &tree);
@@ -337,7 +337,7 @@ fn assert_close(what: &str, tree: &CentreOfMassTree<Dd>, a: &[Dd], b: &[Dd], tol
     assert!(worst <= tolerance, "{what}: {worst:e} of the scale, {}", tree.name);
 }
 
-/// q after a short time at constant q̇ (first order, exact for one-degree-of-freedom joints).
+/// q after a short time at constant q̇ (first order, exact for joints of one coordinate).
 fn advanced(tree: &CentreOfMassTree<Dd>, q: &[Dd], qd: &[Dd], time: Dd) -> Vec<Dd> {
     let mut q = q.to_vec();
     for link in &tree.links {
@@ -355,6 +355,13 @@ fn advanced(tree: &CentreOfMassTree<Dd>, q: &[Dd], qd: &[Dd], time: Dd) -> Vec<D
                 q[i + 3 + k] = q[i + 3 + k] + ud[k] * time;
             }
             q[i + 6] = w + wd * time;
+        } else if link.joint == ReferenceJoint::Ball {
+            let omega = Vector3::new(qd[link.iv], qd[link.iv + 1], qd[link.iv + 2]);
+            let i = link.iq;
+            let (u, w) = (Vector3::new(q[i], q[i + 1], q[i + 2]), q[i + 3]);
+            let ud = (omega * w + u.cross(&omega)) * Dd::HALF;
+            (0..3).for_each(|k| q[i + k] = q[i + k] + ud[k] * time);
+            q[i + 3] = w - u.dot(&omega) * Dd::HALF * time;
         } else {
             q[link.iq] = q[link.iq] + qd[link.iv] * time;
         }
@@ -441,6 +448,7 @@ fn every_link_is_in_equilibrium() {
                     let work = slides * loads[j].reaction_force.dot(e) + turns * loads[j].reaction_moment.dot(e);
                     assert!(work.abs().hi() < 1e-28 * (slides.abs().hi() * forces + turns.abs().hi() * moments));
                 }
+                None if link.joint == ReferenceJoint::Ball => assert_eq!(loads[j].reaction_moment, Vector3::zeros()),
                 None => assert_eq!(loads[j].reaction_force, Vector3::zeros()),
             }
         }
@@ -601,7 +609,7 @@ fn planar_arm_has_its_closed_form() {
 #[test]
 fn free_body_obeys_newton_and_euler_in_its_own_axes() {
     let mut random = Random(7);
-    let mut tree = random_robot(&mut random, RobotKind { links: 1, branched: false, floating: true });
+    let mut tree = random_robot(&mut random, RobotKind { links: 1, branched: false, floating: true, balls: false });
     tree.links[0].r = Vector3::zeros();
     let (mass, inertia) = (tree.links[0].mass, tree.links[0].inertia);
     let q = random_position(&mut random, &tree);
@@ -622,7 +630,7 @@ fn free_body_obeys_newton_and_euler_in_its_own_axes() {
 #[test]
 fn the_point_where_a_free_body_is_taken_hold_of_does_not_matter() {
     let mut random = Random(8);
-    let tree = random_robot(&mut random, RobotKind { links: 5, branched: true, floating: true });
+    let tree = random_robot(&mut random, RobotKind { links: 5, branched: true, floating: true, balls: true });
     let q = random_position(&mut random, &tree);
     let (qd, qdd) = (random.list(tree.nv(), 2.0), random.list(tree.nv(), 2.0));
     // the same robot with its root point in another place p of the root link

@@ -332,6 +332,82 @@ fn the_way_back_is_the_way_there_and_carrying_tangents_composes() {
     }
 }
 
+/// A turning joint between two ball joints, on the world, by both authors.
+fn robot_with_balls<T: Real>() -> Model<T> {
+    let mut model = robot::<T>(2);
+    for (body, (kind, iq, iv)) in model.bodies.iter_mut().zip([
+        (JointKind::Spherical, 0, 0),
+        (JointKind::Revolute, 4, 3),
+        (JointKind::Spherical, 5, 4),
+    ]) {
+        body.joint = Joint { kind, iq, iv, ..body.joint.clone() };
+    }
+    model
+}
+
+fn tree_with_balls() -> CentreOfMassTree<Dd> {
+    let mut tree = tree(2);
+    let turning = tree.links[1].clone();
+    tree.links[0] = CentreOfMassLink { parent: None, ..turning.clone() };
+    for link in [0, 2] {
+        tree.links[link].joint = ReferenceJoint::Ball;
+    }
+    tree.number_coordinates();
+    tree
+}
+
+/// A configuration of that robot, and a displacement whose turns are through about this angle.
+fn turned_balls(random: &mut Random, angle: f64) -> [Vec<Dd>; 2] {
+    let [a, b] = [0; 2].map(|_| pose(random)[3..].to_vec());
+    let [u, v] = [0; 2].map(|_| twist(random, angle)[3..].to_vec());
+    let mut q = wide(&[a, vec![0.4], b].concat());
+    let model = robot_with_balls::<Dd>();
+    for joint in model.bodies.iter().map(|body| &body.joint) {
+        joint.kind.normalise(&mut q[joint.iq..joint.iq + joint.kind.nq()]);
+    }
+    [q, wide(&[u, vec![-1.3], v].concat())]
+}
+
+/// As of a floating base, whose angles they are; forth and back, from either quaternion of a pose, and derivatives by dual numbers.
+#[test]
+fn both_authors_displace_ball_joints_alike() {
+    let (model, tree, mut random) = (robot_with_balls::<Dd>(), tree_with_balls(), Random(14));
+    let dual = tree.map(Dual::<Dd, 1>::fixed);
+    for angle in ANGLES.into_iter().filter(|angle| *angle > 1e-20) {
+        let [q, v] = turned_balls(&mut random, angle);
+        let (to, other) = (integrate(&model, &q, &v), reference::displaced(&tree, &q, &v));
+        assert!(error(&to, &other) < 1e-27, "at {angle}: {to:?}, {other:?}");
+        let opposite: Vec<Dd> = to.iter().enumerate().map(|(k, x)| if k < 4 { -*x } else { *x }).collect();
+        for to in [&to, &opposite] {
+            let (back, other) = (difference(&model, &q, to), reference::displacement(&tree, &q, to));
+            assert!(error(&back, &other) < 1e-27, "back from {angle}: {back:?}, {other:?}");
+        }
+        let moved = |x: &[Dd], direction: &[Dd]| seeded(x, &model.configuration_rate(x, direction));
+        let increment = |to: &[Dual<Dd, 1>]| {
+            let [value, rate] = split(to);
+            reference::increment(&tree, &value, &rate)
+        };
+        let held = |x: &[Dd]| seeded(x, &vec![Dd::ZERO; x.len()]);
+        let expected = [
+            by_columns(7, |unit| increment(&reference::displaced(&dual, &moved(&q, unit), &held(&v)))),
+            by_columns(7, |unit| increment(&reference::displaced(&dual, &held(&q), &seeded(&v, unit)))),
+        ];
+        for (found, expected) in integrate_maps(&model, &v).iter().zip(&expected) {
+            assert!(error(&found.matrix(7), expected) < 1e-26, "at {angle}");
+        }
+        if angle < std::f64::consts::PI {
+            let back = |q: &[Dual<Dd, 1>], to: &[Dual<Dd, 1>]| split(&reference::displacement(&dual, q, to))[1].clone();
+            let expected = [
+                by_columns(7, |unit| back(&moved(&q, unit), &held(&to))),
+                by_columns(7, |unit| back(&held(&q), &moved(&to, unit))),
+            ];
+            for (found, expected) in difference_maps(&model, &v).iter().zip(&expected) {
+                assert!(error(&found.matrix(7), expected) < 1e-26, "back at {angle}");
+            }
+        }
+    }
+}
+
 /// J_r⁻¹(u) q̇, of which ad⁴/720 is left out, and its derivatives by dual numbers.
 #[test]
 fn rates_of_displacements_are_those_of_the_logarithm_to_the_fourth_power() {

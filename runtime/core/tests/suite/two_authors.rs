@@ -42,7 +42,7 @@ fn canonical(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Model<Dd> {
         .links
         .iter()
         .map(|link| match link.joint {
-            ReferenceJoint::Free => (Matrix3::identity(), -link.r),
+            ReferenceJoint::Free | ReferenceJoint::Ball => (Matrix3::identity(), -link.r),
             ReferenceJoint::Revolute | ReferenceJoint::Linear => (canonical_axes(random, &link.e), -link.r),
         })
         .collect();
@@ -51,6 +51,7 @@ fn canonical(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Model<Dd> {
             ReferenceJoint::Revolute => JointKind::Revolute,
             ReferenceJoint::Linear => JointKind::Prismatic,
             ReferenceJoint::Free => JointKind::Floating,
+            ReferenceJoint::Ball => JointKind::Spherical,
         };
         let own = (link.iq, link.iv);
         let (iq, iv) = link.shared.map_or(own, |shared| (tree.nq() + shared.rank, tree.nv() + shared.rank));
@@ -138,7 +139,7 @@ fn shuffle_coordinates(random: &mut Random, tree: &mut CentreOfMassTree<Dd>) {
 
 /// Some joints of one coordinate share those of others, before or behind them or on another branch, and the rest are numbered anew.
 fn couple(random: &mut Random, tree: &mut CentreOfMassTree<Dd>) {
-    let joints: Vec<usize> = (0..tree.links.len()).filter(|j| tree.links[*j].joint != ReferenceJoint::Free).collect();
+    let joints: Vec<usize> = (0..tree.links.len()).filter(|j| tree.links[*j].joint.nv() == 1).collect();
     let mut sources: Vec<usize> = joints.iter().copied().filter(|_| random.below(2) == 0).collect();
     if sources.is_empty() {
         sources.extend(joints.first());
@@ -165,11 +166,11 @@ fn couple(random: &mut Random, tree: &mut CentreOfMassTree<Dd>) {
 }
 
 /// `count` random robots of a kind, up to `links` links.
-fn compare_robots(branched: bool, floating: bool, count: u64, links: usize) {
+fn compare_robots([branched, floating, balls]: [bool; 3], count: u64, links: usize) {
     let mut disagreement = Disagreement::default();
     for seed in 0..count {
         let mut random = Random(seed);
-        let kind = RobotKind { links: 1 + random.below(links), branched, floating };
+        let kind = RobotKind { links: 1 + random.below(links), branched, floating, balls };
         let mut tree = random_robot(&mut random, kind);
         if random.below(3) == 0 {
             shuffle_coordinates(&mut random, &mut tree);
@@ -182,22 +183,29 @@ fn compare_robots(branched: bool, floating: bool, count: u64, links: usize) {
 
 #[test]
 fn both_authors_agree_on_chains() {
-    compare_robots(false, false, 100, 9);
+    compare_robots([false, false, false], 100, 9);
 }
 
 #[test]
 fn both_authors_agree_on_trees() {
-    compare_robots(true, false, 100, 14);
+    compare_robots([true, false, false], 100, 14);
 }
 
 #[test]
 fn both_authors_agree_on_floating_chains() {
-    compare_robots(false, true, 60, 8);
+    compare_robots([false, true, false], 60, 8);
 }
 
 #[test]
 fn both_authors_agree_on_floating_trees() {
-    compare_robots(true, true, 60, 14);
+    compare_robots([true, true, false], 60, 14);
+}
+
+#[test]
+fn both_authors_agree_on_robots_with_ball_joints() {
+    compare_robots([false, false, true], 60, 8);
+    compare_robots([true, false, true], 60, 12);
+    compare_robots([true, true, true], 60, 12);
 }
 
 #[test]
@@ -206,7 +214,7 @@ fn both_authors_agree_where_joints_follow_others() {
     let mut coupled = 0;
     for seed in 0..120 {
         let mut random = Random(seed);
-        let kind = RobotKind { links: 2 + random.below(10), branched: seed % 2 == 0, floating: seed % 5 == 0 };
+        let kind = RobotKind { links: 2 + random.below(10), branched: seed % 2 == 0, floating: seed % 5 == 0, balls: seed % 4 == 3 };
         let mut tree = random_robot(&mut random, kind);
         couple(&mut random, &mut tree);
         let model = canonical(&mut random, &tree);

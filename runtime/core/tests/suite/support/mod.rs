@@ -3,6 +3,7 @@
 pub mod chapter;
 pub mod compare;
 pub mod data;
+pub mod mjcf;
 pub mod robots;
 
 #[path = "../../../../../generated_tests/src/roll_pitch_yaw.rs"]

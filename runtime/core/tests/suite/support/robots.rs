@@ -80,6 +80,8 @@ pub struct RobotKind {
     pub branched: bool,
     /// The first link floats.
     pub floating: bool,
+    /// Half of its joints are ball joints.
+    pub balls: bool,
 }
 
 /// A robot with oblique axes, full tensors, revolute and linear joints, the zero of each joint either by the chapter's
@@ -135,6 +137,26 @@ pub fn random_robot(random: &mut Random, kind: RobotKind) -> CentreOfMassTree<Dd
             }
         };
         let joint = if random.below(3) == 0 { ReferenceJoint::Linear } else { ReferenceJoint::Revolute };
+        if kind.balls && random.below(2) == 0 {
+            let extended = ExtendedPosition::Matrix(random.rotation());
+            let (joint, e) = (ReferenceJoint::Ball, Vector3::zeros());
+            links.push(CentreOfMassLink {
+                name,
+                parent,
+                joint,
+                iq: 0,
+                iv: 0,
+                shared: None,
+                mass,
+                inertia,
+                e,
+                e_parent: e,
+                r,
+                r_parent,
+                extended,
+            });
+            continue;
+        }
         links.push(CentreOfMassLink {
             name,
             parent,
@@ -163,11 +185,11 @@ pub fn random_robot(random: &mut Random, kind: RobotKind) -> CentreOfMassTree<Dd
     tree
 }
 
-/// Coordinates of the robot, the quaternion of a floating root normalised.
+/// Coordinates of the robot, quaternions normalised.
 pub fn random_position(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Vec<Dd> {
     let mut q = random.list(tree.nq(), 3.0);
-    for link in tree.links.iter().filter(|link| link.joint == ReferenceJoint::Free) {
-        let i = link.iq + 3;
+    for (link, first) in tree.links.iter().filter_map(|link| Some((link, link.joint.quaternion()?))) {
+        let i = link.iq + first;
         let norm = q[i..i + 4].iter().fold(Dd::ZERO, |sum, &x| sum + x * x).sqrt();
         q[i..i + 4].iter_mut().for_each(|x| *x /= norm);
     }
