@@ -18,6 +18,8 @@ pub const CODES: &[&str] = &[
     "toml-syntax",
     "too-complex",
     "not-a-robot",
+    "include-failed",
+    "geom-size",
     "xacro-left",
     "missing-element",
     "missing-attribute",
@@ -132,9 +134,26 @@ pub fn not_a_robot(root: &str) -> D {
     let d = D::error("not-a-robot", format!("the root element is `<{}>`, not `<robot>`", cut(root)));
     match root {
         "sdf" => d.help("SDF is not read; export the robot as URDF"),
-        "mujoco" => d.help("MJCF is not read; export the robot as URDF"),
         _ => d.help("a URDF begins with `<robot name=\"...\">`"),
     }
+}
+
+/// XML that an MJCF file includes, and no MJCF.
+pub fn not_mjcf(root: &str) -> D {
+    D::error("not-a-robot", format!("the root element is `<{}>`, not `<mujoco>`", cut(root)))
+        .help("an MJCF file begins with `<mujoco>`, one that is included also with `<mujocoinclude>`")
+}
+
+/// A file that is included and cannot be.
+pub fn include_failed(path: &str, why: &str) -> D {
+    D::error("include-failed", format!("`{}` cannot be included: {why}", cut(path)))
+        .help("file names count from the folder of the file that is read")
+}
+
+/// A geom without a proper size.
+pub fn geom_size(owner: &str, why: &str) -> D {
+    D::error("geom-size", format!("the size of {owner}: {why}"))
+        .help("the inertia of its body is made of it; write `<inertial>` there, or `mass=\"0\"` to leave the geom out")
 }
 
 /// Xacro that was not expanded.

@@ -8,11 +8,13 @@ mod chapter;
 pub mod drives;
 pub mod flexible;
 pub mod messages;
+mod mjcf;
 pub mod reader;
 pub mod table;
 mod toml;
 mod tree;
 mod urdf;
+mod xml;
 
 pub use tree::*;
 
@@ -22,7 +24,7 @@ use std::fmt;
 use straightline_core::joint::Dialect;
 
 /// The formats of robot files. A text is of the first that recognises it, or else of the first that has the extension of its name.
-pub static FORMATS: &[&FileFormat] = &[&urdf::FORMAT, &toml::FORMAT, &chapter::FORMAT];
+pub static FORMATS: &[&FileFormat] = &[&mjcf::FORMAT, &urdf::FORMAT, &toml::FORMAT, &chapter::FORMAT];
 
 /// A format of robot files.
 #[derive(Debug)]

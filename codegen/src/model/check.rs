@@ -3,7 +3,7 @@
 use super::geometry::principal_moments;
 use super::{angle, doubtful_angles, Assembly, ModelOptions, MOST_LINKS};
 use crate::description::{
-    messages, Description, FileFormat, JointDrive, JointLimits, JointType, JointVectors, Noted, Placement, WrittenJoint,
+    messages, AnchoredJoint, Description, FileFormat, JointDrive, JointLimits, JointType, JointVectors, Noted, Placement, WrittenJoint,
 };
 use crate::diagnostic::{Diagnostics, Place};
 use crate::model::singular::{singular_joints, Inertia};
@@ -205,7 +205,7 @@ pub(super) fn joint(joint: &WrittenJoint, format: &FileFormat, diagnostics: &mut
         return;
     }
     match &joint.placement {
-        Placement::Frames { axis, .. } => axis_length(&format!("axis of joint `{name}`"), axis, diagnostics),
+        Placement::Frames { axis, .. } | Placement::Anchored(AnchoredJoint { axis, .. }) => axis_length(&format!("axis of joint `{name}`"), axis, diagnostics),
         Placement::Vectors(JointVectors { e_parent, e, .. }) => {
             axis_length(&format!("`e_next` of link `{}`", joint.parent.value), e_parent, diagnostics);
             axis_length(&format!("`e` of link `{}`", joint.child.value), e, diagnostics);

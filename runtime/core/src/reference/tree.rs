@@ -28,8 +28,8 @@ impl ReferenceJoint {
     /// The joint that robot files mean by a word, with the number that goes with it; `None`: it has not one degree of freedom.
     pub fn of_word(word: &str, _number: Option<f64>) -> Option<ReferenceJoint> {
         match word {
-            "revolute" | "continuous" => Some(ReferenceJoint::Revolute),
-            "prismatic" | "linear" => Some(ReferenceJoint::Linear),
+            "revolute" | "continuous" | "hinge" => Some(ReferenceJoint::Revolute),
+            "prismatic" | "linear" | "slide" => Some(ReferenceJoint::Linear),
             _ => None,
         }
     }
