@@ -20,6 +20,7 @@ pub const CODES: &[&str] = &[
     "not-a-robot",
     "include-failed",
     "geom-size",
+    "mesh-failed",
     "xacro-left",
     "missing-element",
     "missing-attribute",
@@ -148,6 +149,12 @@ pub fn not_mjcf(root: &str) -> D {
 pub fn include_failed(path: &str, why: &str) -> D {
     D::error("include-failed", format!("`{}` cannot be included: {why}", cut(path)))
         .help("file names count from the folder of the file that is read")
+}
+
+/// A mesh of which no inertia can be made.
+pub fn mesh_failed(path: &str, why: &str) -> D {
+    D::error("mesh-failed", format!("no inertia can be made of the mesh `{}`: {why}", cut(path)))
+        .help("write `<inertial>` in the body, or `mass=\"0\"` in the geom to leave it out")
 }
 
 /// A geom without a proper size.

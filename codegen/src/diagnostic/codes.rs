@@ -104,6 +104,7 @@ pub const ALL: &[Code] = &[
     code("locked-joint-wanted", Error, "A coordinate of a joint that has none in this scene."),
     code("locked-twice", Error, "A joint with two values."),
     code("loop-on-one-body", Error, "A loop between parts of one body."),
+    code("mesh-failed", Error, "A mesh of which an inertia should be made, and cannot."),
     code("missing-attribute", Error, "An attribute that must be there."),
     code("missing-element", Error, "An element that must be there."),
     code("missing-key", Error, "A key that must be there."),

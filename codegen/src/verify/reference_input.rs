@@ -106,8 +106,7 @@ fn rotation(rotation: &Rotation, options: &ModelOptions) -> Matrix3<Dd> {
 fn one_turn(turn: &Turn, options: &ModelOptions) -> Matrix3<Dd> {
     // R v = (q₀² − q·q) v + 2 q (q·v) + 2 q₀ q × v
     let by_quaternion = |w: Dd, q: Vector3<Dd>| {
-        Matrix3::identity() * (w * w - q.dot(&q))
-            + (q * q.transpose() + skew(&q) * w) * Dd::from(2.0)
+        Matrix3::identity() * (w * w - q.dot(&q)) + (q * q.transpose() + skew(&q) * w) * Dd::from(2.0)
     };
     match turn {
         Turn::About { axis, angle } => about(&unit(&vector(&axis.value)), radians(angle, options)),

@@ -135,7 +135,9 @@ impl<'s> Mjcf<'s> {
         if forms.is_empty() {
             forms = FORMS.iter().filter(|name| given.attribute(name).is_some()).copied().collect();
         }
-        if let ([first, second, ..], Some(attribute)) = (&forms[..], forms.get(1).and_then(|name| given.attribute(name))) {
+        if let ([first, second, ..], Some(attribute)) =
+            (&forms[..], forms.get(1).and_then(|name| given.attribute(name)))
+        {
             self.complain(attribute, messages::written_twice(owner, first, second));
         }
         let turns = forms.first().and_then(|form| {
@@ -151,7 +153,8 @@ impl<'s> Mjcf<'s> {
         Rotation::Turns(turns.unwrap_or_default())
     }
 
-    fn turns(&mut self, form: &str, numbers: &[f64], attribute: &'s Attribute, owner: &str) -> Vec<Turn> {
+    /// The turns that the numbers of a form mean.
+    pub fn turns(&mut self, form: &str, numbers: &[f64], attribute: &'s Attribute, owner: &str) -> Vec<Turn> {
         let place = self.place(attribute);
         let first = [0, 1, 2].map(|i| numbers[i]);
         let what = format!("{form} of {owner}");
@@ -172,7 +175,9 @@ impl<'s> Mjcf<'s> {
             }
             "xyaxes" => {
                 let second = [3, 4, 5].map(|i| numbers[i]);
-                if !self.has_direction(&first, &what, attribute) || !self.has_direction(&cross(first, second), &what, attribute) {
+                if !self.has_direction(&first, &what, attribute)
+                    || !self.has_direction(&cross(first, second), &what, attribute)
+                {
                     return Vec::new();
                 }
                 vec![Turn::Axes(Noted::new([first, second], place))]
@@ -187,7 +192,8 @@ impl<'s> Mjcf<'s> {
                 let mut turns = Vec::new();
                 for (axis, value) in self.settings.euler.into_iter().zip(first) {
                     let unit = ['x', 'y', 'z'].map(|own| f64::from(u8::from(own == axis.to_ascii_lowercase())));
-                    let turn = Turn::About { axis: Noted::new(unit, place.clone()), angle: self.angle(value, attribute) };
+                    let turn =
+                        Turn::About { axis: Noted::new(unit, place.clone()), angle: self.angle(value, attribute) };
                     // about an axis that turns: after those before it; about one that stands: before them
                     let at = if axis.is_ascii_lowercase() { turns.len() } else { 0 };
                     turns.insert(at, turn);

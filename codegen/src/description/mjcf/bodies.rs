@@ -133,8 +133,10 @@ impl<'s> Mjcf<'s> {
             if base.is_some_and(|base| !std::ptr::eq(base, element)) {
                 if let Some(total) = self.settings.total_mass.clone() {
                     let help = "remove `settotalmass`, or the bodies that do not move";
-                    let why = "the mass of bodies that do not move would count, and beside a free body they are left out";
-                    let complaint = crate::description::messages::not_supported_yet("the compiler", "settotalmass", why, help);
+                    let why =
+                        "the mass of bodies that do not move would count, and beside a free body they are left out";
+                    let complaint =
+                        crate::description::messages::not_supported_yet("the compiler", "settotalmass", why, help);
                     self.reader.diagnostics.push(complaint.at(&total.place));
                     self.settings.total_mass = None;
                 }
@@ -154,8 +156,20 @@ impl<'s> Mjcf<'s> {
     /// Reads a body; the bodies in it.
     fn read_body(&mut self, body: Open<'s>, is_base: bool, moving: usize) -> Vec<Open<'s>> {
         const KNOWN: &[&str] = &[
-            "axisangle", "childclass", "euler", "fuse", "gravcomp", "mocap", "name", "pos", "quat", "simple", "sleep",
-            "user", "xyaxes", "zaxis",
+            "axisangle",
+            "childclass",
+            "euler",
+            "fuse",
+            "gravcomp",
+            "mocap",
+            "name",
+            "pos",
+            "quat",
+            "simple",
+            "sleep",
+            "user",
+            "xyaxes",
+            "zaxis",
         ];
         let Open { element, class, parent } = body;
         let name = self.name_of(element, &format!("{}_body", parent.value));
@@ -277,7 +291,8 @@ impl<'s> Mjcf<'s> {
                 self.ignore_as("site with `fromto`", element);
                 continue;
             }
-            let is_taken = self.robot.links.iter().any(|link| link.name.value == name.value) || self.is_body(&name.value);
+            let is_taken =
+                self.robot.links.iter().any(|link| link.name.value == name.value) || self.is_body(&name.value);
             let own = if is_taken { self.made_up(&format!("{}_site", name.value)) } else { name.value.clone() };
             let name = Noted::new(own, self.place(name));
             let pose = self.pose(&given, &owner);
@@ -312,7 +327,8 @@ impl<'s> Mjcf<'s> {
     fn free_joint(&self, body: &'s Element) -> Option<&'s Element> {
         let mut open = self.files.children(body);
         while let Some(element) = open.pop() {
-            let is_free = element.name == "joint" && element.attribute("type").is_some_and(|t| t.value.trim() == "free");
+            let is_free =
+                element.name == "joint" && element.attribute("type").is_some_and(|t| t.value.trim() == "free");
             if is_free || element.name == "freejoint" {
                 return Some(element);
             }

@@ -53,8 +53,19 @@ impl<'s> Given<'s> {
 /// The kind that shares its defaults with an element: all actuators do.
 fn kind_of(name: &str) -> Option<&'static str> {
     const ACTUATORS: &[&str] = &[
-        "general", "motor", "position", "velocity", "intvelocity", "orientation", "pid", "damper", "cylinder", "muscle",
-        "adhesion", "dcmotor", "plugin",
+        "general",
+        "motor",
+        "position",
+        "velocity",
+        "intvelocity",
+        "orientation",
+        "pid",
+        "damper",
+        "cylinder",
+        "muscle",
+        "adhesion",
+        "dcmotor",
+        "plugin",
     ];
     match name {
         name if ACTUATORS.contains(&name) => Some("actuator"),
@@ -66,7 +77,8 @@ impl<'s> Mjcf<'s> {
     /// Reads the sections of defaults.
     pub fn read_classes(&mut self, sections: &[&'s Element]) {
         self.classes.all.push(Class { name: "main".to_string(), parent: None, elements: Vec::new() });
-        let mut open: Vec<(&'s Element, Option<usize>)> = sections.iter().rev().map(|section| (*section, None)).collect();
+        let mut open: Vec<(&'s Element, Option<usize>)> =
+            sections.iter().rev().map(|section| (*section, None)).collect();
         while let Some((element, parent)) = open.pop() {
             let class = match (parent, element.attribute("class")) {
                 (None, _) => 0, // whatever the outermost is called, it is the same
@@ -76,7 +88,11 @@ impl<'s> Mjcf<'s> {
                     continue;
                 }
                 (Some(parent), Some(name)) => {
-                    self.classes.all.push(Class { name: name.value.clone(), parent: Some(parent), elements: Vec::new() });
+                    self.classes.all.push(Class {
+                        name: name.value.clone(),
+                        parent: Some(parent),
+                        elements: Vec::new(),
+                    });
                     self.classes.all.len() - 1
                 }
             };

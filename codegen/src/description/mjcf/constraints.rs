@@ -4,8 +4,8 @@ use super::classes::Given;
 use super::files::Element;
 use super::Mjcf;
 use crate::description::{messages, Noted, Placement, Reference, WrittenCoupling};
-use crate::model::angle_in_radians;
 use crate::model::angle::ROUNDING;
+use crate::model::angle_in_radians;
 use straightline_core::Dd;
 
 impl<'s> Mjcf<'s> {
@@ -45,7 +45,13 @@ impl<'s> Mjcf<'s> {
                 coefficients[..numbers.len().min(2)].copy_from_slice(&numbers[..numbers.len().min(2)]);
                 if numbers.iter().skip(2).any(|x| *x != 0.0) {
                     let help = "write the straight line that is nearest, as in `polycoef=\"0 1 0 0 0\"`";
-                    self.refuse_attribute(element, "polycoef", owner, "one coordinate would follow another on a curve", help);
+                    self.refuse_attribute(
+                        element,
+                        "polycoef",
+                        owner,
+                        "one coordinate would follow another on a curve",
+                        help,
+                    );
                 }
             }
         }

@@ -2,9 +2,9 @@
 //!
 //! A file is named relative to the folder of the one that is read, or else of the one that includes it, and is included once.
 
+use crate::description::messages;
 use crate::description::reader::{FileReader, LARGEST_FILE};
 use crate::description::xml::{self, Span};
-use crate::description::messages;
 use crate::diagnostic::{Diagnostics, Source};
 use roxmltree::Document;
 use std::collections::HashMap;

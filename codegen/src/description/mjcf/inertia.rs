@@ -65,7 +65,8 @@ impl<'s> Mjcf<'s> {
         let has = |name| given.attribute(name).is_some();
         let place = given.attribute("fullinertia").or(given.attribute("diaginertia"));
         let place = place.map_or_else(|| self.tag(element), |attribute| self.place(attribute));
-        let second = ["diaginertia", "quat", "axisangle", "xyaxes", "zaxis", "euler"].into_iter().find(|name| has(name));
+        let second =
+            ["diaginertia", "quat", "axisangle", "xyaxes", "zaxis", "euler"].into_iter().find(|name| has(name));
         if let (true, Some(second)) = (has("fullinertia"), second) {
             self.complain_at(element, messages::written_twice(&owner, "fullinertia", second));
         }
@@ -89,10 +90,42 @@ impl<'s> Mjcf<'s> {
     /// Mass and inertia of a geom in its body; none if it has no mass, or after a complaint.
     fn read_geom(&mut self, given: &Given<'s>, around: &Transform<Dd>) -> Option<Part> {
         const KNOWN: &[&str] = &[
-            "adhesion", "axisangle", "castshadow", "class", "conaffinity", "condim", "contype", "density", "euler",
-            "fitscale", "fluidcoef", "fluidshape", "friction", "fromto", "gap", "group", "hfield", "margin", "mass",
-            "material", "mesh", "name", "pos", "priority", "quat", "rgba", "shellinertia", "size", "solimp", "solmix",
-            "solref", "surfacevel", "type", "user", "xyaxes", "zaxis",
+            "adhesion",
+            "axisangle",
+            "castshadow",
+            "class",
+            "conaffinity",
+            "condim",
+            "contype",
+            "density",
+            "euler",
+            "fitscale",
+            "fluidcoef",
+            "fluidshape",
+            "friction",
+            "fromto",
+            "gap",
+            "group",
+            "hfield",
+            "margin",
+            "mass",
+            "material",
+            "mesh",
+            "name",
+            "pos",
+            "priority",
+            "quat",
+            "rgba",
+            "shellinertia",
+            "size",
+            "solimp",
+            "solmix",
+            "solref",
+            "surfacevel",
+            "type",
+            "user",
+            "xyaxes",
+            "zaxis",
         ];
         let element = given.element;
         let owner = match element.attribute("name") {
@@ -100,8 +133,7 @@ impl<'s> Mjcf<'s> {
             None => "a geom".to_string(),
         };
         self.check_attributes(element, &owner, KNOWN);
-        const TYPES: &[&str] =
-            &["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"];
+        const TYPES: &[&str] = &["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"];
         let word = match given.attribute("type") {
             None => "sphere",
             Some(_) => self.word(given, "type", TYPES)?,
@@ -117,20 +149,30 @@ impl<'s> Mjcf<'s> {
             self.refuse(element, &owner, "its mass would be on the surface", help);
             return None;
         }
-        if let Some(mesh) = given.attribute("mesh") {
-            let help = "write `<inertial>` in the body, or give the geom `mass=\"0\"`";
-            let why = format!("the inertia of its body would be made of the mesh `{}`", mesh.value);
-            self.refuse(element, &owner, &why, help);
-            return None;
-        }
-        let solid = Solid::of_word(word)?;
-        let (size, pose) = self.size_and_pose(given, solid, &owner)?;
-        let (volume, per_mass) = solid.of_size(size);
-        let mass = mass.map_or_else(|| Dd::from(density) * volume, |mass| Dd::from(mass.value));
-        let [xx, yy, zz] = per_mass.map(|x| x * mass);
-        let o = Dd::ZERO;
-        let tensor = Sym3 { xx, xy: o, xz: o, yy, yz: o, zz };
-        Some(Part::placed(mass, Vec3::zero(), tensor, &compose(around, &pose)))
+        let (solid, pose) = match (Solid::of_word(word), given.attribute("mesh")) {
+            (Some(_), Some(mesh)) => {
+                let help = "write `type=\"mesh\"`, or the size of the geom in place of the mesh";
+                let complaint = messages::not_supported_yet(&owner, "mesh", "the geom would be fitted to it", help);
+                self.complain(mesh, complaint);
+                return None;
+            }
+            (Some(solid), None) => {
+                let (size, pose) = self.size_and_pose(given, solid, &owner)?;
+                let (volume, [xx, yy, zz]) = solid.of_size(size);
+                let o = Dd::ZERO;
+                let inertia_com = Sym3 { xx, xy: o, xz: o, yy, yz: o, zz }.map(|x| x * volume);
+                (Part { mass: volume, com: Vec3::zero(), inertia_com }, pose)
+            }
+            (None, _) => {
+                let solid = self.read_mesh(given, &owner)?;
+                (solid, transform(&self.pose(given, &owner), angle::ROUNDING))
+            }
+        };
+        // volumes so far
+        let density = mass.map_or_else(|| Dd::from(density), |mass| Dd::from(mass.value) / solid.mass);
+        let Part { mass, com, inertia_com } = solid;
+        let pose = compose(around, &pose);
+        Some(Part::placed(mass * density, com, inertia_com.map(|x| x * density), &pose))
     }
 
     /// Size and pose of a geom, by `size` and `pos` or by `fromto`.

@@ -7,8 +7,8 @@ use super::classes::Given;
 use super::files::Element;
 use super::Mjcf;
 use crate::description::{
-    AnchoredJoint, JointDrive, JointLimits, JointType, Noted, Placement, Reference, WrittenJoint, WrittenLink,
-    WrittenPose,
+    messages, AnchoredJoint, JointDrive, JointLimits, JointType, Noted, Placement, Reference, WrittenJoint,
+    WrittenLink, WrittenPose,
 };
 use straightline_core::joint::Dialect;
 
@@ -17,13 +17,7 @@ const EFFECTS: &[&str] = &["stiffness", "damping", "frictionloss", "armature", "
 
 impl<'s> Mjcf<'s> {
     /// The joints of a body between links, after complaints about others.
-    pub fn joints_in(
-        &mut self,
-        contents: &Contents<'s>,
-        owner: &str,
-        is_base: bool,
-        moving: usize,
-    ) -> Vec<Given<'s>> {
+    pub fn joints_in(&mut self, contents: &Contents<'s>, owner: &str, is_base: bool, moving: usize) -> Vec<Given<'s>> {
         let mut joints = Vec::new();
         let all = contents.of("joint").into_iter().chain(contents.of("freejoint"));
         let written: Vec<(&'s Element, usize, bool)> =
@@ -116,9 +110,31 @@ impl<'s> Mjcf<'s> {
         origin: WrittenPose,
     ) -> Option<WrittenJoint> {
         const KNOWN: &[&str] = &[
-            "actuatorfrclimited", "actuatorfrcrange", "actuatorgravcomp", "armature", "axis", "class", "damping",
-            "frictionloss", "group", "limited", "margin", "name", "pos", "range", "ref", "solimpfriction", "solimplimit",
-            "solreffriction", "solreflimit", "springdamper", "springref", "springyield", "stiffness", "type", "user",
+            "actuatorfrclimited",
+            "actuatorfrcrange",
+            "actuatorgravcomp",
+            "armature",
+            "axis",
+            "class",
+            "damping",
+            "frictionloss",
+            "group",
+            "limited",
+            "margin",
+            "name",
+            "pos",
+            "range",
+            "ref",
+            "solimpfriction",
+            "solimplimit",
+            "solreffriction",
+            "solreflimit",
+            "springdamper",
+            "springref",
+            "springyield",
+            "stiffness",
+            "type",
+            "user",
         ];
         let owner = format!("joint `{}`", name.value);
         self.check_attributes(given.element, &owner, KNOWN);
@@ -160,9 +176,10 @@ impl<'s> Mjcf<'s> {
         let kind = known.into_iter().find(|(text, kind)| *text == word && !kind.is_free()).map(|(_, kind)| kind);
         if kind.is_none() {
             let help = "write three hinges in one body, or remove it: the body is then fixed";
-            self.refuse_attribute(given.element, "type", owner, "a joint has one coordinate", help);
-            if given.element.attribute("type").is_none() {
-                self.refuse(given.element, owner, "a joint has one coordinate", help);
+            let complaint = messages::not_supported_yet(owner, word, "a joint has one coordinate", help);
+            match given.attribute("type") {
+                Some(attribute) => self.complain(attribute, complaint),
+                None => self.complain_at(given.element, complaint),
             }
         }
         kind
@@ -210,7 +227,8 @@ impl<'s> Mjcf<'s> {
             damping: self.first_number(given, "damping", owner),
             friction: self.number(given, "frictionloss", owner),
             armature: self.number(given, "armature", owner),
-            spring_rest: rest.map(|rest| Noted::new(if turns { self.radians(rest.value) } else { rest.value }, rest.place)),
+            spring_rest: rest
+                .map(|rest| Noted::new(if turns { self.radians(rest.value) } else { rest.value }, rest.place)),
             spring_stiffness: stiffness,
             ..JointDrive::default()
         }

@@ -18,6 +18,7 @@ mod files;
 mod geoms;
 mod inertia;
 mod joints;
+mod mesh;
 mod settings;
 
 use super::reader::FileReader;
@@ -121,7 +122,11 @@ impl<'s> Mjcf<'s> {
                 "extension" | "visual" | "statistic" | "size" | "contact" | "sensor" | "keyframe" | "custom" => {
                     self.ignore(section);
                 }
-                _ => self.skip(section, "the robot", &["worldbody", "compiler", "default", "equality", "actuator", "tendon"]),
+                _ => self.skip(
+                    section,
+                    "the robot",
+                    &["worldbody", "compiler", "default", "equality", "actuator", "tendon"],
+                ),
             }
         }
     }

@@ -59,10 +59,32 @@ impl<'s> Mjcf<'s> {
 
     fn read_compiler(&mut self, element: &'s Element) {
         const KNOWN: &[&str] = &[
-            "alignfree", "angle", "assetdir", "autolimits", "balanceinertia", "boundinertia", "boundmass", "conflict",
-            "convexhull", "coordinate", "discardvisual", "eulerseq", "exactmeshinertia", "fitaabb", "fusestatic",
-            "inertiafromgeom", "inertiagrouprange", "meshdir", "passthrough", "savecanonical", "savecompiled",
-            "saveinertial", "settotalmass", "strippath", "texturedir", "usethread",
+            "alignfree",
+            "angle",
+            "assetdir",
+            "autolimits",
+            "balanceinertia",
+            "boundinertia",
+            "boundmass",
+            "conflict",
+            "convexhull",
+            "coordinate",
+            "discardvisual",
+            "eulerseq",
+            "exactmeshinertia",
+            "fitaabb",
+            "fusestatic",
+            "inertiafromgeom",
+            "inertiagrouprange",
+            "meshdir",
+            "passthrough",
+            "savecanonical",
+            "savecompiled",
+            "saveinertial",
+            "settotalmass",
+            "strippath",
+            "texturedir",
+            "usethread",
         ];
         self.check_attributes(element, "the compiler", KNOWN);
         let given = Given::alone(element);
@@ -77,7 +99,8 @@ impl<'s> Mjcf<'s> {
             let axes: Vec<char> = attribute.value.trim().chars().collect();
             match axes[..] {
                 [a, b, c] if axes.iter().all(|axis| "xyzXYZ".contains(*axis)) => self.settings.euler = [a, b, c],
-                _ => self.complain(attribute, messages::unknown_word("eulerseq", &attribute.value, &["xyz", "XYZ", "zyx"])),
+                _ => self
+                    .complain(attribute, messages::unknown_word("eulerseq", &attribute.value, &["xyz", "XYZ", "zyx"])),
             }
         }
         if let Some(autolimits) = self.flag(&given, "autolimits") {
@@ -104,7 +127,13 @@ impl<'s> Mjcf<'s> {
         }
         if self.flag(&given, "alignfree") == Some(true) {
             let help = "remove it: coordinates are then those of the body frame as it is written";
-            self.refuse_attribute(element, "alignfree", "the compiler", "the frame of a free body would be another one", help);
+            self.refuse_attribute(
+                element,
+                "alignfree",
+                "the compiler",
+                "the frame of a free body would be another one",
+                help,
+            );
         }
         if let Some(strips) = self.flag(&given, "strippath") {
             self.settings.strips_paths = strips;
