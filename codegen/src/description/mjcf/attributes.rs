@@ -65,11 +65,12 @@ impl<'s> Mjcf<'s> {
         }
     }
 
-    /// Complains of attributes that an element does not have.
-    pub fn check_attributes(&mut self, element: &Element, owner: &str, known: &[&str]) {
+    /// Complains of attributes that an element does not have; `known`: those that it has, with spaces between.
+    pub fn check_attributes(&mut self, element: &Element, owner: &str, known: &str) {
+        let known: Vec<&str> = known.split_whitespace().collect();
         for attribute in element.attributes.iter().filter(|a| !known.contains(&a.name.as_str())) {
             let place = self.files.sources[attribute.file].place(attribute.name_span.clone());
-            let complaint = messages::unknown_attribute(owner, &element.name, &attribute.name, known);
+            let complaint = messages::unknown_attribute(owner, &element.name, &attribute.name, &known);
             self.reader.diagnostics.push(complaint.at(&place));
         }
     }

@@ -4,7 +4,7 @@
 
 use super::classes::Given;
 use super::files::Element;
-use super::Mjcf;
+use super::{vocabulary, Mjcf};
 use crate::description::{
     BaseKind, JointDrive, JointLimits, JointType, NamedFrame, Noted, Placement, Rotation, WrittenJoint, WrittenLink,
     WrittenPose,
@@ -155,26 +155,10 @@ impl<'s> Mjcf<'s> {
 
     /// Reads a body; the bodies in it.
     fn read_body(&mut self, body: Open<'s>, is_base: bool, moving: usize) -> Vec<Open<'s>> {
-        const KNOWN: &[&str] = &[
-            "axisangle",
-            "childclass",
-            "euler",
-            "fuse",
-            "gravcomp",
-            "mocap",
-            "name",
-            "pos",
-            "quat",
-            "simple",
-            "sleep",
-            "user",
-            "xyaxes",
-            "zaxis",
-        ];
         let Open { element, class, parent } = body;
         let name = self.name_of(element, &format!("{}_body", parent.value));
         let owner = format!("body `{}`", name.value);
-        self.check_attributes(element, &owner, KNOWN);
+        self.check_attributes(element, &owner, vocabulary::BODY);
         let given = Given::alone(element);
         let help = "remove it: gravity then acts on the body";
         self.refuse_number(&given, "gravcomp", &owner, "a force would hold the body up", help);
@@ -189,7 +173,7 @@ impl<'s> Mjcf<'s> {
         if is_base {
             // the pose of a free body is its coordinate
         } else {
-            self.add_joints(&name, parent, pose, joints);
+            self.add_joints((&name, element), parent, pose, joints);
         }
         let inertial = self.read_inertia(element, &contents, &owner);
         self.robot.links.push(WrittenLink { name, inertial, is_carrier: false });
@@ -226,8 +210,7 @@ impl<'s> Mjcf<'s> {
                 contents.all.push(Content { element, class, frame });
                 continue;
             }
-            const KNOWN: &[&str] = &["axisangle", "childclass", "euler", "name", "pos", "quat", "xyaxes", "zaxis"];
-            self.check_attributes(element, "a frame", KNOWN);
+            self.check_attributes(element, "a frame", vocabulary::FRAME);
             let pose = self.pose(&Given::alone(element), "a frame");
             let class = element.attribute("childclass").and_then(|class| self.class(class)).unwrap_or(class);
             contents.frames.push(Frame { element, pose, around: frame, link: None });
@@ -253,7 +236,7 @@ impl<'s> Mjcf<'s> {
                 let is_named = element.attribute("name").is_some();
                 let name = self.name_of(element, &format!("{}_frame", contents.link.value));
                 self.robot.links.push(WrittenLink { name: name.clone(), inertial: None, is_carrier: !is_named });
-                self.add_fixed(&name, link, pose);
+                self.add_fixed(&name, link, pose, element);
                 contents.frames[frame].link = Some(name.clone());
                 link = name;
             }
@@ -262,10 +245,16 @@ impl<'s> Mjcf<'s> {
     }
 
     /// Adds a fixed joint.
-    pub fn add_fixed(&mut self, child: &Noted<String>, parent: Noted<String>, origin: WrittenPose) {
+    pub fn add_fixed(
+        &mut self,
+        child: &Noted<String>,
+        parent: Noted<String>,
+        origin: WrittenPose,
+        element: &'s Element,
+    ) {
         let place = child.place.clone();
         let name = Noted::new(self.made_up(&format!("{}_fixed", child.value)), place.clone());
-        self.robot.joints.push(WrittenJoint {
+        let joint = WrittenJoint {
             name,
             kind: Noted::new(JointType::FIXED, place.clone()),
             parent,
@@ -273,7 +262,8 @@ impl<'s> Mjcf<'s> {
             placement: Placement::Frames { origin, axis: Noted::new([0.0, 0.0, 1.0], place) },
             limits: JointLimits::default(),
             drive: JointDrive::default(),
-        });
+        };
+        self.add_joint(joint, element);
     }
 
     /// Adds the sites of a body as frames.

@@ -19,6 +19,8 @@ pub(super) struct Element {
     pub name: String,
     /// The file that it stands in.
     pub file: usize,
+    /// Its index among all.
+    pub index: usize,
     /// The start of its tag.
     pub tag: Span,
     /// Its attributes.
@@ -88,6 +90,19 @@ impl Files {
             }
         }
         children
+    }
+
+    /// Where elements stand in the file and those that it includes, as one text.
+    pub fn ranks(&self) -> Vec<usize> {
+        let mut ranks = vec![0; self.elements.len()];
+        let mut open = vec![self.root()];
+        let mut rank = 0;
+        while let Some(element) = open.pop() {
+            ranks[element.index] = rank;
+            rank += 1;
+            open.extend(self.children(element).into_iter().rev());
+        }
+        ranks
     }
 
     /// Adds the elements of a file; the index of its root.
@@ -183,6 +198,7 @@ fn add_elements(elements: &mut Vec<Element>, file: usize, document: &Document) -
         elements.push(Element {
             name: node.tag_name().name().to_string(),
             file,
+            index: own,
             tag: xml::tag(node),
             attributes: attributes.collect(),
             children: Vec::new(),

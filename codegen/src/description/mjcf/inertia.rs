@@ -4,7 +4,7 @@ use super::bodies::Contents;
 use super::classes::Given;
 use super::files::Element;
 use super::geoms::Solid;
-use super::Mjcf;
+use super::{vocabulary, Mjcf};
 use crate::description::{messages, Noted, Rotation, WrittenInertial};
 use crate::diagnostic::Place;
 use crate::model::geometry::{compose, point, snap_tensor, vector};
@@ -48,10 +48,8 @@ impl<'s> Mjcf<'s> {
 
     /// An inertia as it is written.
     fn read_inertial(&mut self, element: &'s Element, owner: &str) -> Option<WrittenInertial> {
-        const KNOWN: &[&str] =
-            &["axisangle", "diaginertia", "euler", "fullinertia", "mass", "pos", "quat", "xyaxes", "zaxis"];
         let owner = format!("the inertial of {owner}");
-        self.check_attributes(element, &owner, KNOWN);
+        self.check_attributes(element, &owner, vocabulary::INERTIAL);
         let given = Given::alone(element);
         for (name, example) in [("pos", "pos=\"0 0 0\""), ("mass", "mass=\"1\"")] {
             if given.attribute(name).is_none() {
@@ -89,50 +87,12 @@ impl<'s> Mjcf<'s> {
 
     /// Mass and inertia of a geom in its body; none if it has no mass, or after a complaint.
     fn read_geom(&mut self, given: &Given<'s>, around: &Transform<Dd>) -> Option<Part> {
-        const KNOWN: &[&str] = &[
-            "adhesion",
-            "axisangle",
-            "castshadow",
-            "class",
-            "conaffinity",
-            "condim",
-            "contype",
-            "density",
-            "euler",
-            "fitscale",
-            "fluidcoef",
-            "fluidshape",
-            "friction",
-            "fromto",
-            "gap",
-            "group",
-            "hfield",
-            "margin",
-            "mass",
-            "material",
-            "mesh",
-            "name",
-            "pos",
-            "priority",
-            "quat",
-            "rgba",
-            "shellinertia",
-            "size",
-            "solimp",
-            "solmix",
-            "solref",
-            "surfacevel",
-            "type",
-            "user",
-            "xyaxes",
-            "zaxis",
-        ];
         let element = given.element;
         let owner = match element.attribute("name") {
             Some(name) => format!("geom `{}`", name.value),
             None => "a geom".to_string(),
         };
-        self.check_attributes(element, &owner, KNOWN);
+        self.check_attributes(element, &owner, vocabulary::GEOM);
         const TYPES: &[&str] = &["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"];
         let word = match given.attribute("type") {
             None => "sphere",
@@ -145,8 +105,11 @@ impl<'s> Mjcf<'s> {
             return None;
         }
         if self.flag(given, "shellinertia") == Some(true) {
-            let help = "write `<inertial>` in the body, or remove it: the geom is then solid";
-            self.refuse(element, &owner, "its mass would be on the surface", help);
+            if let Some(attribute) = given.attribute("shellinertia") {
+                let help = "write `<inertial>` in the body, or remove it: the geom is then solid";
+                let why = "the mass of the geom would be on its surface";
+                self.complain(attribute, messages::not_supported_yet(&owner, "shellinertia", why, help));
+            }
             return None;
         }
         let (solid, pose) = match (Solid::of_word(word), given.attribute("mesh")) {

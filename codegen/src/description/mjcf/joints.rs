@@ -5,7 +5,7 @@
 use super::bodies::Contents;
 use super::classes::Given;
 use super::files::Element;
-use super::Mjcf;
+use super::{vocabulary, Mjcf};
 use crate::description::{
     messages, AnchoredJoint, JointDrive, JointLimits, JointType, Noted, Placement, Reference, WrittenJoint,
     WrittenLink, WrittenPose,
@@ -68,13 +68,13 @@ impl<'s> Mjcf<'s> {
     /// Adds the joints of a body, with a link without mass between each and the next.
     pub fn add_joints(
         &mut self,
-        body: &Noted<String>,
+        (body, element): (&Noted<String>, &'s Element),
         parent: Noted<String>,
         pose: WrittenPose,
         joints: Vec<Given<'s>>,
     ) {
         if joints.is_empty() {
-            self.add_fixed(body, parent, pose);
+            self.add_fixed(body, parent, pose, element);
             return;
         }
         let (mut parent, mut origin) = (parent, pose);
@@ -90,10 +90,10 @@ impl<'s> Mjcf<'s> {
             };
             let next = WrittenPose::identity(name.place.clone());
             match self.read_joint(&given, name, parent.clone(), child.clone(), origin.clone()) {
-                Some(joint) => self.robot.joints.push(joint),
+                Some(joint) => self.add_joint(joint, given.element),
                 None => {
                     self.robot.has_holes = true;
-                    self.add_fixed(&child, parent, origin);
+                    self.add_fixed(&child, parent, origin, given.element);
                 }
             }
             (parent, origin) = (child, next);
@@ -109,35 +109,8 @@ impl<'s> Mjcf<'s> {
         child: Noted<String>,
         origin: WrittenPose,
     ) -> Option<WrittenJoint> {
-        const KNOWN: &[&str] = &[
-            "actuatorfrclimited",
-            "actuatorfrcrange",
-            "actuatorgravcomp",
-            "armature",
-            "axis",
-            "class",
-            "damping",
-            "frictionloss",
-            "group",
-            "limited",
-            "margin",
-            "name",
-            "pos",
-            "range",
-            "ref",
-            "solimpfriction",
-            "solimplimit",
-            "solreffriction",
-            "solreflimit",
-            "springdamper",
-            "springref",
-            "springyield",
-            "stiffness",
-            "type",
-            "user",
-        ];
         let owner = format!("joint `{}`", name.value);
-        self.check_attributes(given.element, &owner, KNOWN);
+        self.check_attributes(given.element, &owner, vocabulary::JOINT);
         let kind = self.kind(given, &owner)?;
         let anchor = self.vector(given, "pos", &owner, [0.0; 3]);
         let is_single = kind.kind.is_some_and(|kind| kind.is_single());

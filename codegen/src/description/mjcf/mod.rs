@@ -20,9 +20,10 @@ mod inertia;
 mod joints;
 mod mesh;
 mod settings;
+mod vocabulary;
 
 use super::reader::FileReader;
-use super::{Description, FileFormat, Noted};
+use super::{Description, FileFormat, Noted, WrittenJoint};
 use crate::diagnostic::{Diagnostics, Place, Source};
 use classes::Classes;
 use files::{Element, Files};
@@ -67,6 +68,8 @@ struct Mjcf<'s> {
     /// Names of links, joints and frames, written or made up.
     names: HashSet<String>,
     robot: Description,
+    /// Of each joint of it, the element that says it.
+    joints: Vec<&'s Element>,
 }
 
 fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
@@ -84,6 +87,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
         classes: Classes::default(),
         names: HashSet::new(),
         robot: Description::new(&FORMAT, name),
+        joints: Vec::new(),
     };
     mjcf.collect_names();
     mjcf.read_sections(root);
@@ -103,6 +107,7 @@ impl<'s> Mjcf<'s> {
         self.read_settings(&of("compiler"), &of("option"));
         self.read_classes(&of("default"));
         self.read_world(&of("worldbody"));
+        self.order_joints();
         self.scale_masses();
         self.read_constraints(&of("equality"), &of("tendon"));
         self.read_actuators(&of("actuator"));
@@ -129,6 +134,21 @@ impl<'s> Mjcf<'s> {
                 ),
             }
         }
+    }
+
+    /// Adds a joint that an element says.
+    fn add_joint(&mut self, joint: WrittenJoint, element: &'s Element) {
+        self.robot.joints.push(joint);
+        self.joints.push(element);
+    }
+
+    /// Brings the joints in the order of the file: those of frames were made when they were needed.
+    fn order_joints(&mut self) {
+        let ranks = self.files.ranks();
+        let joints = std::mem::take(&mut self.robot.joints);
+        let mut ranked: Vec<_> = joints.into_iter().zip(&self.joints).collect();
+        ranked.sort_by_key(|(_, element)| ranks[element.index]);
+        self.robot.joints = ranked.into_iter().map(|(joint, _)| joint).collect();
     }
 
     /// Remembers the names that the file gives, so that no made-up name is one of them.

@@ -2,7 +2,7 @@
 
 use super::classes::Given;
 use super::files::Element;
-use super::Mjcf;
+use super::{vocabulary, Mjcf};
 use crate::description::{messages, AngleUnit, Noted};
 
 /// What a file says for all of it.
@@ -58,35 +58,7 @@ impl<'s> Mjcf<'s> {
     }
 
     fn read_compiler(&mut self, element: &'s Element) {
-        const KNOWN: &[&str] = &[
-            "alignfree",
-            "angle",
-            "assetdir",
-            "autolimits",
-            "balanceinertia",
-            "boundinertia",
-            "boundmass",
-            "conflict",
-            "convexhull",
-            "coordinate",
-            "discardvisual",
-            "eulerseq",
-            "exactmeshinertia",
-            "fitaabb",
-            "fusestatic",
-            "inertiafromgeom",
-            "inertiagrouprange",
-            "meshdir",
-            "passthrough",
-            "savecanonical",
-            "savecompiled",
-            "saveinertial",
-            "settotalmass",
-            "strippath",
-            "texturedir",
-            "usethread",
-        ];
-        self.check_attributes(element, "the compiler", KNOWN);
+        self.check_attributes(element, "the compiler", vocabulary::COMPILER);
         let given = Given::alone(element);
         if let Some(word) = self.word(&given, "angle", &["degree", "radian"]) {
             self.settings.angle = if word == "degree" { AngleUnit::Degree } else { AngleUnit::Radian };
