@@ -150,7 +150,7 @@ impl Files {
         };
         match read {
             Err(why) => {
-                diagnostics.push(messages::include_failed(&shown, &why).at(&place));
+                diagnostics.push(messages::include_failed(&name, &why).at(&place));
                 None
             }
             Ok(bytes) => {

@@ -52,14 +52,14 @@ impl<'s> Mjcf<'s> {
         let mut faces = match read {
             Ok(faces) => faces,
             Err(why) => {
-                self.complain(file, messages::mesh_failed(&path.to_string_lossy(), &why));
+                self.complain(file, messages::mesh_failed(&file.value, &why));
                 return None;
             }
         };
         self.place_mesh(&mesh, &who, &mut faces);
         let part = solid(&faces, mode == "exact");
         if part.is_none() {
-            self.complain(file, messages::mesh_failed(&path.to_string_lossy(), "it encloses no volume"));
+            self.complain(file, messages::mesh_failed(&file.value, "it encloses no volume"));
         }
         part
     }
