@@ -99,14 +99,18 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     if tables.is_empty() {
         reader.diagnostics.push(messages::no_links(&robot.name.value).at(&robot.name.place));
     }
-    robot.links.push(WrittenLink { name: below.clone(), inertial: None });
+    robot.links.push(WrittenLink { name: below.clone(), inertial: None, is_carrier: false });
     let count = tables.len();
     for (j, (mut table, name)) in (1..).zip(tables.into_iter().zip(names)) {
         let joint_name = name_or_number(reader, &table, "joint_name", "joint", j);
         table.owner = format!("link `{}`", name.value);
         reader.check_keys(&table, LINK);
         robot.flexible.extend(reader.flexible_at(&table, Some(&name)));
-        robot.links.push(WrittenLink { inertial: read_inertial(reader, &table), name: name.clone() });
+        robot.links.push(WrittenLink {
+            inertial: read_inertial(reader, &table),
+            name: name.clone(),
+            is_carrier: false,
+        });
         let joint = read_joint(reader, &table, joint_name, end, [below, name.clone()]);
         robot.add_joint(joint);
         end = read_end(reader, &table, j == count);

@@ -18,6 +18,9 @@ pub const CODES: &[&str] = &[
     "toml-syntax",
     "too-complex",
     "not-a-robot",
+    "include-failed",
+    "geom-size",
+    "mesh-failed",
     "xacro-left",
     "missing-element",
     "missing-attribute",
@@ -99,7 +102,7 @@ type D = Diagnostic;
 
 /// Bytes that are not UTF-8.
 pub fn not_utf8() -> D {
-    D::error("not-utf8", "the file is not UTF-8 text").help("save the file as UTF-8; is it TOML or URDF at all?")
+    D::error("not-utf8", "the file is not UTF-8 text").help("save the file as UTF-8; is it TOML, URDF or MJCF at all?")
 }
 
 /// A file larger than the readers take.
@@ -139,9 +142,32 @@ pub fn not_a_robot(root: &str) -> D {
     let d = D::error("not-a-robot", format!("the root element is `<{}>`, not `<robot>`", cut(root)));
     match root {
         "sdf" => d.help("SDF is not read; export the robot as URDF"),
-        "mujoco" => d.help("MJCF is not read; export the robot as URDF"),
         _ => d.help("a URDF begins with `<robot name=\"...\">`"),
     }
+}
+
+/// XML that an MJCF file includes, and no MJCF.
+pub fn not_mjcf(root: &str) -> D {
+    D::error("not-a-robot", format!("the root element is `<{}>`, not `<mujoco>`", cut(root)))
+        .help("an MJCF file begins with `<mujoco>`, one that is included also with `<mujocoinclude>`")
+}
+
+/// A file that is included and cannot be.
+pub fn include_failed(path: &str, why: &str) -> D {
+    D::error("include-failed", format!("`{}` cannot be included: {why}", cut(path)))
+        .help("file names count from the folder of the file that is read")
+}
+
+/// A mesh of which no inertia can be made.
+pub fn mesh_failed(path: &str, why: &str) -> D {
+    D::error("mesh-failed", format!("no inertia can be made of the mesh `{}`: {why}", cut(path)))
+        .help("write `<inertial>` in the body, or `mass=\"0\"` in the geom to leave it out")
+}
+
+/// A geom without a proper size.
+pub fn geom_size(owner: &str, why: &str) -> D {
+    D::error("geom-size", format!("the size of {owner}: {why}"))
+        .help("the inertia of its body is made of it; write `<inertial>` there, or `mass=\"0\"` to leave the geom out")
 }
 
 /// Xacro that was not expanded.

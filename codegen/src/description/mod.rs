@@ -9,11 +9,13 @@ mod couplings;
 pub mod drives;
 pub mod flexible;
 pub mod messages;
+mod mjcf;
 pub mod reader;
 pub mod table;
 mod toml;
 mod tree;
 mod urdf;
+mod xml;
 
 pub use tree::*;
 
@@ -23,7 +25,7 @@ use std::fmt;
 use straightline_core::joint::Dialect;
 
 /// The formats of robot files. A text is of the first that recognises it, or else of the first that has the extension of its name.
-pub static FORMATS: &[&FileFormat] = &[&urdf::FORMAT, &toml::FORMAT, &chapter::FORMAT];
+pub static FORMATS: &[&FileFormat] = &[&mjcf::FORMAT, &urdf::FORMAT, &toml::FORMAT, &chapter::FORMAT];
 
 /// A format of robot files.
 #[derive(Debug)]

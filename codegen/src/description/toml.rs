@@ -112,7 +112,7 @@ fn read_link(reader: &mut FileReader, mut table: TomlTable, flexible: &mut Vec<F
     flexible.extend(reader.flexible_at(&table, name.as_ref()));
     let has_inertial = LINK[1..LINK.len() - 1].iter().any(|key| table.has(key));
     let inertial = if has_inertial { reader.inertial_at(&table) } else { None };
-    Some(WrittenLink { name: name?, inertial })
+    Some(WrittenLink { name: name?, inertial, is_carrier: false })
 }
 
 fn read_joint(reader: &mut FileReader, mut table: TomlTable) -> Option<WrittenJoint> {

@@ -86,6 +86,12 @@ impl Description {
                 Placement::Frames { origin, .. } => {
                     all.extend(origin.rotation.angles(format!("the origin of joint `{}`", name.value)));
                 }
+                Placement::Anchored(AnchoredJoint { origin, reference, .. }) => {
+                    all.extend(origin.rotation.angles(format!("the origin of joint `{}`", name.value)));
+                    if let Some(Reference::Angle(angle)) = reference {
+                        all.push((format!("ref of joint `{}`", name.value), angle));
+                    }
+                }
                 Placement::Vectors(vectors) => {
                     all.extend(vectors.alpha.iter().map(|alpha| (format!("alpha of joint `{}`", name.value), alpha)));
                 }
@@ -134,6 +140,8 @@ pub struct WrittenLink {
     pub name: Noted<String>,
     /// Mass, centre of mass and inertia, where the file gives them.
     pub inertial: Option<WrittenInertial>,
+    /// It only carries joints, in a file that gives a body several, and is no frame that users see.
+    pub is_carrier: bool,
 }
 
 /// Mass, centre of mass and inertia of a link.
@@ -182,21 +190,52 @@ impl Angle {
     }
 }
 
-/// A rotation as written: roll, pitch and yaw, R = Rz(yaw) Ry(pitch) Rx(roll).
+/// A rotation as written.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rotation {
-    /// Roll (about x), pitch (about y), yaw (about z).
-    pub rpy: [Angle; 3],
+pub enum Rotation {
+    /// Roll (about x), pitch (about y), yaw (about z): R = Rz(yaw) Ry(pitch) Rx(roll).
+    RollPitchYaw([Angle; 3]),
+    /// Turns, each in the axes that those before it lead to: the product of their matrices in this order.
+    Turns(Vec<Turn>),
+}
+
+/// A turn as written, from one set of axes to the next. Vectors have a direction and any length.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Turn {
+    /// By an angle about an axis.
+    About {
+        /// The axis.
+        axis: Noted<[f64; 3]>,
+        /// The angle.
+        angle: Angle,
+    },
+    /// By a quaternion w, x, y, z.
+    Quaternion(Noted<[f64; 4]>),
+    /// To an x axis, and a y axis of which the part across x counts.
+    Axes(Noted<[[f64; 3]; 2]>),
+    /// Brings z to this direction on the shortest way; to −z about x.
+    ZTo(Noted<[f64; 3]>),
 }
 
 impl Rotation {
     /// No rotation, where the file says nothing.
     pub fn identity(place: Place) -> Rotation {
-        Rotation { rpy: [Angle::zero(place.clone()), Angle::zero(place.clone()), Angle::zero(place)] }
+        Rotation::RollPitchYaw([Angle::zero(place.clone()), Angle::zero(place.clone()), Angle::zero(place)])
     }
 
-    fn angles(&self, of: String) -> impl Iterator<Item = (String, &Angle)> {
-        ["roll", "pitch", "yaw"].into_iter().map(move |name| format!("{name} of {of}")).zip(&self.rpy)
+    fn angles(&self, of: String) -> Vec<(String, &Angle)> {
+        match self {
+            Rotation::RollPitchYaw(rpy) => {
+                ["roll", "pitch", "yaw"].into_iter().map(|name| format!("{name} of {of}")).zip(rpy).collect()
+            }
+            Rotation::Turns(turns) => {
+                let angle = |turn| match turn {
+                    &Turn::About { ref angle, .. } => Some((format!("an angle of {of}"), angle)),
+                    _ => None,
+                };
+                turns.iter().filter_map(angle).collect()
+            }
+        }
     }
 }
 
@@ -314,6 +353,30 @@ pub enum Placement {
     },
     /// By vectors between the joint S_j and the origins C of the link frames, as in the chapter; of joints that move.
     Vectors(JointVectors),
+    /// By frames of links, with the joint anywhere in them, as in MJCF; of joints that move.
+    Anchored(AnchoredJoint),
+}
+
+/// A joint that stands somewhere in the child's link frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AnchoredJoint {
+    /// Pose of the child's link frame in the parent's where the coordinate is `reference`.
+    pub origin: WrittenPose,
+    /// The joint in the child's link frame \[m\].
+    pub anchor: Noted<[f64; 3]>,
+    /// Axis in the child's link frame, as long as it is written.
+    pub axis: Noted<[f64; 3]>,
+    /// The coordinate that the file's pose has; 0 where it says nothing.
+    pub reference: Option<Reference>,
+}
+
+/// A coordinate of a joint that turns or slides.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reference {
+    /// Of one that turns.
+    Angle(Angle),
+    /// Of one that slides \[m\].
+    Length(Noted<f64>),
 }
 
 /// Axis and place of joint j in the frames of its links, j−1 and j. All vectors are as written.
@@ -341,6 +404,7 @@ impl Placement {
         match self {
             Placement::Frames { origin, .. } => vec![("origin", &origin.xyz)],
             Placement::Vectors(JointVectors { r_parent, r, .. }) => vec![("r_next", r_parent), ("r", r)],
+            Placement::Anchored(AnchoredJoint { origin, anchor, .. }) => vec![("pos", &origin.xyz), ("pos", anchor)],
         }
     }
 }

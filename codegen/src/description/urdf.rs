@@ -1,36 +1,19 @@
 //! URDF, as found in the wild: <http://wiki.ros.org/urdf/XML>.
 //!
 //! Read are links with their inertials and joints with origin, axis, limits and dynamics, in any order. What shows the
-//! robot or serves a simulator is skipped and listed. Rather than refuse what other readers accept, comments may hold
-//! `--`, the XML declaration may come late, and prefixes need no declaration.
+//! robot or serves a simulator is skipped and listed.
 
 use super::reader::{FileReader, Range64};
+use super::xml::{self, children, tag, Span};
 use super::{
     messages, Angle, AngleUnit, Description, FileFormat, JointDrive, JointLimits, JointType, Noted, Placement,
     Rotation, WrittenCoupling, WrittenInertial, WrittenJoint, WrittenLink, WrittenPose,
 };
 use crate::diagnostic::wording::closest;
 use crate::diagnostic::{Diagnostics, Source};
-use roxmltree::{Attribute, Document, Node, ParsingOptions};
-use std::borrow::Cow;
-use std::ops::Range;
+use roxmltree::{Attribute, Document, Node};
 use straightline_core::joint::Dialect;
 use straightline_core::spatial::Sym3;
-
-mod text;
-
-use text::{complain_of_xml, join_prefix, tolerant_text};
-
-/// Nodes of an XML file.
-const MOST_NODES: usize = 4_000_000;
-/// Attributes of an element: the XML parser compares each with all before it.
-const MOST_ATTRIBUTES: usize = 1000;
-/// Declarations of namespaces: the XML parser keeps those in force with every element that adds one.
-const MOST_NAMESPACES: usize = 1000;
-/// Prefixes that are used without a declaration.
-const MOST_PREFIXES: usize = 16;
-
-type Span = Range<usize>;
 
 pub(super) const FORMAT: FileFormat = FileFormat {
     name: "URDF",
@@ -43,33 +26,7 @@ pub(super) const FORMAT: FileFormat = FileFormat {
 };
 
 fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
-    let mut reader = FileReader::new(source, diagnostics);
-    let mut text = tolerant_text(&mut reader)?;
-    for _ in 0..=MOST_PREFIXES {
-        let options = ParsingOptions { nodes_limit: MOST_NODES as u32, ..ParsingOptions::default() };
-        let error = match Document::parse_with_options(&text, options) {
-            Ok(document) => return read_document(reader, &document),
-            Err(error) => error,
-        };
-        match &error {
-            roxmltree::Error::UnknownNamespace(prefix, _) if prefix != "xacro" => {
-                let joined = join_prefix(&text, prefix);
-                text = Cow::Owned(joined);
-            }
-            _ => {
-                complain_of_xml(&mut reader, &error);
-                return None;
-            }
-        }
-    }
-    reader.complain(&(0..0), messages::too_complex("undeclared prefixes", MOST_PREFIXES));
-    None
-}
-
-/// The start of an element's tag: `<name`.
-fn tag(node: Node) -> Span {
-    let start = node.range().start;
-    start..start + 1 + node.tag_name().name().len()
+    xml::parse(FileReader::new(source, diagnostics), read_document)
 }
 
 fn read_document(mut reader: FileReader, document: &Document) -> Option<Description> {
@@ -105,10 +62,6 @@ fn read_document(mut reader: FileReader, document: &Document) -> Option<Descript
     }
     description.ignored = reader.into_ignored();
     Some(description)
-}
-
-fn children<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
-    node.children().filter(Node::is_element)
 }
 
 /// The element's name, if it is of the same namespace as `owner`.
@@ -207,28 +160,9 @@ fn number(reader: &mut FileReader, what: &str, attribute: Attribute, range: Rang
 
 /// Three numbers, each with its text and span.
 fn triple<'a>(reader: &mut FileReader, what: &str, attribute: Attribute<'a, '_>) -> Option<[(f64, &'a str, Span); 3]> {
-    let text = attribute.value();
-    let whole = attribute.range_value();
-    let is_raw = reader.source.text().get(whole.clone()) == Some(text);
-    let words: Vec<&str> = text.split_ascii_whitespace().collect();
-    let complaint = if text.contains("${") || text.contains("$(") {
-        Some(messages::xacro_left(text, 0))
-    } else if text.contains(',') {
-        Some(messages::not_a_number(what, text))
-    } else {
-        (words.len() != 3).then(|| messages::wrong_count(what, "three numbers", words.len()))
-    };
-    if let Some(complaint) = complaint {
-        reader.complain(&whole, complaint);
-        return None;
-    }
-    let mut numbers = Vec::with_capacity(3);
-    for word in words {
-        let offset = word.as_ptr() as usize - text.as_ptr() as usize;
-        let span = if is_raw { whole.start + offset..whole.start + offset + word.len() } else { whole.clone() };
-        numbers.push(reader.number(what, word, &span, Range64::Finite).map(|x| (x, word, span)));
-    }
-    let mut numbers = numbers.into_iter().flatten();
+    let text = (attribute.value(), attribute.range_value());
+    let numbers = xml::numbers(reader, what, text, (3..=3, "three numbers"))?;
+    let mut numbers = numbers.into_iter();
     Some([numbers.next()?, numbers.next()?, numbers.next()?])
 }
 
@@ -249,14 +183,12 @@ fn read_pose(reader: &mut FileReader, owner: &str, node: Option<Node>, default: 
     }
     if let Some(attribute) = node.attribute_node("rpy") {
         if let Some(rpy) = triple(reader, &format!("{owner}, rpy"), attribute) {
-            pose.rotation = Rotation {
-                rpy: rpy.map(|(value, text, span)| Angle {
-                    value,
-                    unit: AngleUnit::Radian,
-                    text: text.to_string(),
-                    place: reader.place(&span),
-                }),
-            };
+            pose.rotation = Rotation::RollPitchYaw(rpy.map(|(value, text, span)| Angle {
+                value,
+                unit: AngleUnit::Radian,
+                text: text.to_string(),
+                place: reader.place(&span),
+            }));
         }
     }
     pose
@@ -266,7 +198,7 @@ fn read_link(reader: &mut FileReader, node: Node) -> Option<WrittenLink> {
     let name = name_of(reader, "link", node, "name", "<link name=\"...\">");
     let owner = name.as_ref().map_or("a link".to_string(), |n| format!("link `{}`", n.value));
     let inertial = inertial_of(reader, &owner, node).and_then(|inertial| read_inertial(reader, &owner, inertial));
-    Some(WrittenLink { name: name?, inertial })
+    Some(WrittenLink { name: name?, inertial, is_carrier: false })
 }
 
 /// The `<inertial>` of a link; what only shows the link is skipped.

@@ -3,9 +3,9 @@
 //! An angle in radians is a rounded number: `1.5707963267948966` is π/2 up to 6e-17, `1.5707` up to 1e-4. Within the
 //! tolerance (by default [`ROUNDING`]) of a multiple of π/4 or π/6 it is taken as that; otherwise literally.
 
-use super::geometry::snap_rotation;
-use crate::description::{Angle, AngleUnit, Rotation};
-use straightline_core::spatial::Mat3;
+use super::geometry::{about, snap_rotation, unit, vector};
+use crate::description::{Angle, AngleUnit, Rotation, Turn};
+use straightline_core::spatial::{Mat3, Vec3};
 use straightline_core::Dd;
 
 /// The default tolerance \[rad\]: what the nearest f64 of a few turns can be off.
@@ -118,9 +118,63 @@ pub(super) fn name_of_twelfths(m: i64) -> String {
     format!("{sign}{times}π{over}")
 }
 
+/// The matrix of a rotation as written.
+pub(crate) fn rotation(rotation: &Rotation, tolerance: f64) -> Mat3<Dd> {
+    match rotation {
+        Rotation::RollPitchYaw(rpy) => roll_pitch_yaw(rpy, tolerance),
+        Rotation::Turns(turns) => {
+            turns.iter().fold(Mat3::identity(), |product, turn| snap_rotation(product * turned(turn, tolerance)))
+        }
+    }
+}
+
+/// The matrix of one turn. A vector without a direction, of which readers complain, turns nothing.
+fn turned(turn: &Turn, tolerance: f64) -> Mat3<Dd> {
+    let matrix = match turn {
+        Turn::About { axis, angle } => unit(vector(axis.value)).map(|e| about(e, read(angle, tolerance).sin_cos)),
+        Turn::Quaternion(q) => quaternion(q.value),
+        Turn::Axes(axes) => {
+            let [x, y] = axes.value.map(vector);
+            unit(x).and_then(|x| {
+                let z = unit(x.cross(y))?;
+                Some(Mat3::from_columns(x, z.cross(x), z))
+            })
+        }
+        Turn::ZTo(direction) => unit(vector(direction.value)).map(z_to),
+    };
+    snap_rotation(matrix.unwrap_or_else(Mat3::identity))
+}
+
+/// R of a quaternion of any length: no root is taken, so that entries which are 0 or ±1 come out as that.
+fn quaternion(q: [f64; 4]) -> Option<Mat3<Dd>> {
+    let greatest = q.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    if greatest < 1e-100 {
+        return None;
+    }
+    let [w, x, y, z] = q.map(|x| Dd::from(x) / Dd::from(greatest));
+    let square = w * w + x * x + y * y + z * z; // between 1 and 4
+    let twice = |a: Dd| (a + a) / square;
+    let row = |own: Dd, a: Dd, b: Dd| (w * w + own * own - a * a - b * b) / square;
+    Some(Mat3 {
+        rows: [
+            [row(x, y, z), twice(x * y - w * z), twice(x * z + w * y)],
+            [twice(x * y + w * z), row(y, x, z), twice(y * z - w * x)],
+            [twice(x * z - w * y), twice(y * z + w * x), row(z, x, y)],
+        ],
+    })
+}
+
+/// The shortest turn that brings z to the unit vector e; to −z the one about x.
+pub(crate) fn z_to(e: Vec3<Dd>) -> Mat3<Dd> {
+    let across = Vec3::unit_z().cross(e);
+    let sin = across.dot(across).sqrt();
+    let axis = unit(across).unwrap_or_else(|| Vec3::new(Dd::ONE, Dd::ZERO, Dd::ZERO));
+    about(axis, (sin, e.z))
+}
+
 /// R = Rz(yaw) Ry(pitch) Rx(roll).
-pub(super) fn rotation(rotation: &Rotation, tolerance: f64) -> Mat3<Dd> {
-    let [(sr, cr), (sp, cp), (sy, cy)] = [0, 1, 2].map(|i| read(&rotation.rpy[i], tolerance).sin_cos);
+fn roll_pitch_yaw(rpy: &[Angle; 3], tolerance: f64) -> Mat3<Dd> {
+    let [(sr, cr), (sp, cp), (sy, cy)] = [0, 1, 2].map(|i| read(&rpy[i], tolerance).sin_cos);
     snap_rotation(Mat3 {
         rows: [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],

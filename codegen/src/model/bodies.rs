@@ -5,7 +5,9 @@ use super::geometry::{canonical_rotation, compose, point, snap_tensor, turned, u
 use super::merge::{merge, Part};
 use super::{angle, centres_of_mass, check, transform, Assembly, ModelOptions};
 use crate::description::flexible::Flexible;
-use crate::description::{messages, BaseKind, Description, Placement, WrittenInertial, WrittenJoint};
+use crate::description::{
+    messages, AnchoredJoint, BaseKind, Description, Placement, Reference, WrittenInertial, WrittenJoint,
+};
 use crate::diagnostic::{Diagnostics, Place};
 use std::collections::BTreeMap;
 use straightline_core::algorithms::composing_pays;
@@ -32,6 +34,7 @@ impl Seat {
         let (origin, axis) = match &joint.placement {
             Placement::Vectors(vectors) => return centres_of_mass::seat(vectors, joint, tolerance, diagnostics),
             Placement::Frames { origin, axis } => (origin, axis),
+            Placement::Anchored(anchored) => return Seat::anchored(anchored, tolerance),
         };
         let rotation = match joint.kind.value.has_axis() {
             true => canonical_rotation(unit(vector(axis.value))?),
@@ -42,6 +45,28 @@ impl Seat {
             canonical: turned(rotation),
             link_frame: turned(rotation.transpose()),
             in_link: Vec3::zero(),
+        })
+    }
+
+    /// A joint anywhere in the child's link frame: T = T_origin T_anchor M(q − reference) T_anchor⁻¹.
+    fn anchored(joint: &AnchoredJoint, tolerance: f64) -> Option<Seat> {
+        let AnchoredJoint { origin, anchor, axis, reference } = joint;
+        let moved = |translation| Transform { rotation: Mat3::identity(), translation };
+        let anchor = vector(anchor.value);
+        let rotation = canonical_rotation(unit(vector(axis.value))?);
+        let back = match reference {
+            None => Transform::identity(),
+            Some(Reference::Angle(angle)) => {
+                let (sin, cos) = angle::read(angle, tolerance).sin_cos;
+                turned(Mat3::about_z(-sin, cos))
+            }
+            Some(Reference::Length(length)) => moved(Vec3::unit_z().scale(-Dd::from(length.value))),
+        };
+        Some(Seat {
+            in_parent: compose(&transform(origin, tolerance), &moved(anchor)),
+            canonical: turned(rotation),
+            link_frame: compose(&compose(&back, &turned(rotation.transpose())), &moved(anchor.map(|x| Dd::ZERO - x))),
+            in_link: anchor,
         })
     }
 }
@@ -208,6 +233,9 @@ impl Growing<'_> {
         for (link, carrier) in description.links.iter().zip(self.carriers) {
             let (body, placement) = carrier.first();
             links.insert(link.name.value.clone(), carrier);
+            if link.is_carrier {
+                continue;
+            }
             frames.push(Frame { name: link.name.value.clone(), body, placement });
         }
         let mut carried = Vec::new();

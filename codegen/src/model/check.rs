@@ -3,7 +3,8 @@
 use super::geometry::principal_moments;
 use super::{angle, doubtful_angles, Assembly, ModelOptions, MOST_LINKS};
 use crate::description::{
-    messages, Description, FileFormat, JointDrive, JointLimits, JointType, JointVectors, Noted, Placement, WrittenJoint,
+    messages, AnchoredJoint, Description, FileFormat, JointDrive, JointLimits, JointType, JointVectors, Noted,
+    Placement, WrittenJoint,
 };
 use crate::diagnostic::{Diagnostics, Place};
 use crate::model::singular::{singular_joints, Inertia};
@@ -182,13 +183,19 @@ pub(super) fn inertial(link: &str, mass: &Noted<f64>, inertia: &Noted<Sym3<f64>>
     }
 }
 
-/// The length of an axis.
-pub(super) fn axis_length(what: &str, axis: &Noted<[f64; 3]>, diagnostics: &mut Diagnostics) {
+/// The greatest component of an axis; `None` after the complaint that there is none.
+fn axis_greatest(what: &str, axis: &Noted<[f64; 3]>, diagnostics: &mut Diagnostics) -> Option<f64> {
     let greatest = axis.value.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     if greatest < 1e-100 {
         diagnostics.push(messages::zero_axis(what).at(&axis.place));
-        return;
+        return None;
     }
+    Some(greatest)
+}
+
+/// The length of an axis.
+pub(super) fn axis_length(what: &str, axis: &Noted<[f64; 3]>, diagnostics: &mut Diagnostics) {
+    let Some(greatest) = axis_greatest(what, axis, diagnostics) else { return };
     let length = axis.value.iter().map(|x| (x / greatest).powi(2)).sum::<f64>().sqrt() * greatest;
     if (length - 1.0).abs() > AXIS_DIGITS {
         diagnostics.push(messages::axis_length(what, length).at(&axis.place));
@@ -205,7 +212,11 @@ pub(super) fn joint(joint: &WrittenJoint, format: &FileFormat, diagnostics: &mut
         return;
     }
     match &joint.placement {
-        Placement::Frames { .. } if !joint.kind.value.has_axis() => {}
+        _ if !joint.kind.value.has_axis() => {}
+        // a file of this kind has axes of any length
+        Placement::Anchored(AnchoredJoint { axis, .. }) => {
+            axis_greatest(&format!("axis of joint `{name}`"), axis, diagnostics);
+        }
         Placement::Frames { axis, .. } => axis_length(&format!("axis of joint `{name}`"), axis, diagnostics),
         Placement::Vectors(JointVectors { e_parent, e, .. }) => {
             axis_length(&format!("`e_next` of link `{}`", joint.parent.value), e_parent, diagnostics);

@@ -254,7 +254,7 @@ pub fn angle_in_radians(angle: &Angle, tolerance: f64) -> Dd {
 }
 
 /// A pose in numbers.
-fn transform(pose: &WrittenPose, tolerance: f64) -> Transform<Dd> {
+pub(crate) fn transform(pose: &WrittenPose, tolerance: f64) -> Transform<Dd> {
     Transform { rotation: angle::rotation(&pose.rotation, tolerance), translation: vector(pose.xyz.value) }
 }
 
@@ -312,7 +312,7 @@ fn add_frames(assembly: &mut Assembly, options: &ModelOptions, tolerance: f64, d
         };
         let zero = Angle::zero(Place::none());
         let rpy = option.rpy.map(|value| Angle { value, ..zero.clone() });
-        let pose = WrittenPose { xyz: Noted::assumed(option.xyz), rotation: Rotation { rpy } };
+        let pose = WrittenPose { xyz: Noted::assumed(option.xyz), rotation: Rotation::RollPitchYaw(rpy) };
         let (body, x_body_link) = carrier.at(vector(option.xyz));
         let placement = compose(&x_body_link, &transform(&pose, tolerance));
         assembly.frames.push(Frame { name: option.name.clone(), body, placement });

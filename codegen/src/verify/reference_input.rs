@@ -9,8 +9,8 @@
 //! q = 0, so A⁰ is given as a matrix, or vectors as in the chapter, which are taken as written.
 
 use crate::description::{
-    Angle, AngleUnit, BaseKind, Description, JointVectors, Noted, Placement, Rotation, WrittenCoupling, WrittenInertial, WrittenJoint,
-    WrittenPose,
+    AnchoredJoint, Angle, AngleUnit, BaseKind, Description, JointVectors, Noted, Placement, Reference, Rotation, Turn, WrittenCoupling,
+    WrittenInertial, WrittenJoint, WrittenPose,
 };
 use crate::diagnostic::Place;
 use crate::model::{FrameOption, ModelOptions};
@@ -68,7 +68,7 @@ pub fn centre_of_mass_tree(description: &Description, options: &ModelOptions) ->
 /// The rotation by roll, pitch and yaw \[rad\] of an option.
 fn turned(rpy: &[f64; 3], options: &ModelOptions) -> Matrix3<Dd> {
     let angle = |i: usize| Angle { value: rpy[i], ..Angle::zero(Place::none()) };
-    rotation(&Rotation { rpy: [angle(0), angle(1), angle(2)] }, options)
+    rotation(&Rotation::RollPitchYaw([angle(0), angle(1), angle(2)]), options)
 }
 
 /// Lets joints that follow others share the coordinates of those that follow none; until the coordinates are numbered their `iv` is the link of that joint.
@@ -138,9 +138,61 @@ fn tensor(s: &Sym3<f64>) -> Matrix3<Dd> {
     Matrix3::new(s.xx, s.xy, s.xz, s.xy, s.yy, s.yz, s.xz, s.yz, s.zz).map(Dd::from)
 }
 
-/// R = Rz(yaw) Ry(pitch) Rx(roll).
+/// The matrix of a rotation as written.
 fn rotation(rotation: &Rotation, options: &ModelOptions) -> Matrix3<Dd> {
-    let [roll, pitch, yaw] = [0, 1, 2].map(|i| radians(&rotation.rpy[i], options).sin_cos());
+    match rotation {
+        Rotation::RollPitchYaw(rpy) => roll_pitch_yaw(rpy, options),
+        Rotation::Turns(turns) => turns.iter().fold(Matrix3::identity(), |r, turn| r * one_turn(turn, options)),
+    }
+}
+
+/// The matrix of one turn of several, by the formulas with vectors of length one.
+fn one_turn(turn: &Turn, options: &ModelOptions) -> Matrix3<Dd> {
+    // R v = (q₀² − q·q) v + 2 q (q·v) + 2 q₀ q × v
+    let by_quaternion = |w: Dd, q: Vector3<Dd>| {
+        Matrix3::identity() * (w * w - q.dot(&q)) + (q * q.transpose() + skew(&q) * w) * Dd::from(2.0)
+    };
+    match turn {
+        Turn::About { axis, angle } => about(&unit(&vector(&axis.value)), radians(angle, options)),
+        Turn::Quaternion(q) => {
+            let [w, x, y, z] = q.value.map(Dd::from);
+            let length = (w * w + x * x + y * y + z * z).sqrt();
+            by_quaternion(w / length, Vector3::new(x, y, z).map(|x| x / length))
+        }
+        Turn::Axes(axes) => {
+            let [x, y] = axes.value.map(|axis| vector(&axis));
+            let x = unit(&x);
+            let y = unit(&(y - x * x.dot(&y)));
+            Matrix3::from_columns(&[x, y, x.cross(&y)])
+        }
+        Turn::ZTo(direction) => {
+            let v = unit(&vector(&direction.value));
+            if v.x == Dd::ZERO && v.y == Dd::ZERO {
+                return Matrix3::from_diagonal(&Vector3::new(Dd::ONE, v.z, v.z));
+            }
+            // the quaternion of half the angle is along 1 + z·v, z × v
+            let (w, q) = (Dd::ONE + v.z, Vector3::new(-v.y, v.x, Dd::ZERO));
+            let length = (w * w + q.dot(&q)).sqrt();
+            by_quaternion(w / length, q.map(|x| x / length))
+        }
+    }
+}
+
+/// The matrix of v ×.
+fn skew(v: &Vector3<Dd>) -> Matrix3<Dd> {
+    Matrix3::new(Dd::ZERO, -v.z, v.y, v.z, Dd::ZERO, -v.x, -v.y, v.x, Dd::ZERO)
+}
+
+/// The rotation about a unit vector: 1 + sin e× + (1 − cos) e× e×.
+fn about(e: &Vector3<Dd>, angle: Dd) -> Matrix3<Dd> {
+    let (sin, cos) = angle.sin_cos();
+    let e = skew(e);
+    Matrix3::identity() + e * sin + e * e * (Dd::ONE - cos)
+}
+
+/// R = Rz(yaw) Ry(pitch) Rx(roll).
+fn roll_pitch_yaw(rpy: &[Angle; 3], options: &ModelOptions) -> Matrix3<Dd> {
+    let [roll, pitch, yaw] = [0, 1, 2].map(|i| radians(&rpy[i], options).sin_cos());
     let (o, l) = (Dd::ZERO, Dd::ONE);
     let (s, c) = roll;
     let rx = Matrix3::new(l, o, o, o, c, -s, o, s, c);
@@ -349,6 +401,10 @@ fn rigid_groups(
                 let above = places.get(joint.parent.value.as_str()).ok_or("a joint hangs on nothing")?;
                 let (at, axis, vectors) = match &joint.placement {
                     Placement::Frames { origin, axis } => (Placed::read(origin, options), axis, None),
+                    Placement::Anchored(AnchoredJoint { origin, anchor, axis, .. }) => {
+                        let there = Placed { rotation: Matrix3::identity(), position: vector(&anchor.value) };
+                        (Placed::read(origin, options).then(&there), axis, None)
+                    }
                     Placement::Vectors(given) => {
                         // S_j = C_{j−1} − r_{j−1,j}
                         let position = -vector(&given.r_parent.value);
@@ -370,14 +426,16 @@ fn rigid_groups(
                         }),
                         parts: Vec::new(),
                     });
-                    (groups.len() - 1, Placed::here())
+                    (groups.len() - 1, link_in_joint(joint, options))
                 } else {
                     (parent, place)
                 }
             }
         };
-        frames.push((name.to_string(), group, place));
         let link = &description.links[*links.get(name).ok_or_else(|| format!("there is no link `{name}`"))?];
+        if !link.is_carrier {
+            frames.push((name.to_string(), group, place));
+        }
         let inertial = link.inertial.as_ref();
         let segments = match elastic.links.iter().find(|flexible| flexible.link.value == name) {
             None => {
@@ -402,6 +460,24 @@ fn rigid_groups(
     }
     frames.extend(named_frames(description, options, places)?);
     Ok((groups, frames))
+}
+
+/// Where the link frame is in the joint frame at q = 0.
+fn link_in_joint(joint: &WrittenJoint, options: &ModelOptions) -> Placed {
+    let Placement::Anchored(AnchoredJoint { anchor, axis, reference, .. }) = &joint.placement else {
+        return Placed::here();
+    };
+    let (e, back) = (unit(&vector(&axis.value)), -vector(&anchor.value));
+    match reference {
+        None => Placed { rotation: Matrix3::identity(), position: back },
+        Some(Reference::Length(length)) => {
+            Placed { rotation: Matrix3::identity(), position: back - e * Dd::from(length.value) }
+        }
+        Some(Reference::Angle(angle)) => {
+            let rotation = about(&e, -radians(angle, options));
+            Placed { rotation, position: rotation * back }
+        }
+    }
 }
 
 /// Frames that the file or the caller names.

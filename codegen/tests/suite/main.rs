@@ -38,6 +38,8 @@ mod machines;
 mod malformed;
 mod messages;
 mod mixed;
+mod mjcf;
+mod mjcf_messages;
 mod modes;
 mod mutants;
 mod names;

@@ -240,7 +240,7 @@ fn compare_file(
     compare_source(disagreement, robot, &Source::new(robot, text), options, random);
 }
 
-fn compare_source(
+pub(crate) fn compare_source(
     disagreement: &mut Disagreement,
     robot: &str,
     source: &Source,

@@ -102,7 +102,7 @@ impl FileReader<'_> {
         let Some((key, unit)) = self.angle_key(table, stem) else { return none };
         let Some((value, span)) = table.get(&key) else { return none };
         match self.triple(&table.what(&key), value, &span) {
-            Some(angles) => Rotation { rpy: angles.map(|(value, span)| self.angle(value, unit, &span)) },
+            Some(angles) => Rotation::RollPitchYaw(angles.map(|(value, span)| self.angle(value, unit, &span))),
             None => none,
         }
     }

@@ -86,13 +86,15 @@ pub enum Dialect {
     JointFrames,
     /// TOML with centres of mass, the chapter's.
     CentresOfMass,
+    /// MJCF.
+    Mjcf,
 }
 
 impl Dialect {
     /// Files that describe joints by frames.
     pub const FRAMES: &'static [Dialect] = &[Dialect::Urdf, Dialect::JointFrames];
-    /// All files.
-    pub const ALL: &'static [Dialect] = &[Dialect::Urdf, Dialect::JointFrames, Dialect::CentresOfMass];
+    /// Files that call joints by the words of mechanics: all but MJCF, which has words of its own.
+    pub const NAMED: &'static [Dialect] = &[Dialect::Urdf, Dialect::JointFrames, Dialect::CentresOfMass];
 }
 
 impl JointKind {

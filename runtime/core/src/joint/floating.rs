@@ -11,7 +11,10 @@ use Measure::{Angle, Length};
 
 pub(super) const ROW: Descriptor = Descriptor {
     name: "floating",
-    words: &[Word { text: "floating", has_range: false, dialects: Dialect::FRAMES }],
+    words: &[
+        Word { text: "floating", has_range: false, dialects: Dialect::FRAMES },
+        Word { text: "free", has_range: false, dialects: &[Dialect::Mjcf] },
+    ],
     number: None,
     has_axis: false,
     verb: "moves freely",

@@ -8,7 +8,11 @@ use crate::spatial::{symmetric_product, Composite, ForceVector, Mat3, MotionVect
 
 pub(super) const ROW: Descriptor = Descriptor {
     name: "prismatic",
-    words: &[Word::ranged("linear", &[Dialect::CentresOfMass]), Word::ranged("prismatic", Dialect::ALL)],
+    words: &[
+        Word::ranged("linear", &[Dialect::CentresOfMass]),
+        Word::ranged("prismatic", Dialect::NAMED),
+        Word::ranged("slide", &[Dialect::Mjcf]),
+    ],
     number: None,
     has_axis: true,
     verb: "slides",

@@ -9,8 +9,9 @@ use crate::spatial::{symmetric_product, Composite, ForceVector, Mat3, MotionVect
 pub(super) const ROW: Descriptor = Descriptor {
     name: "revolute",
     words: &[
-        Word::ranged("revolute", Dialect::ALL),
+        Word::ranged("revolute", Dialect::NAMED),
         Word { text: "continuous", has_range: false, dialects: Dialect::FRAMES },
+        Word::ranged("hinge", &[Dialect::Mjcf]),
     ],
     number: None,
     has_axis: true,

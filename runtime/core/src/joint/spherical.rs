@@ -13,7 +13,11 @@ pub(super) const ROW: Descriptor = Descriptor {
     name: "spherical",
     words: &[
         Word { text: "spherical", has_range: false, dialects: Dialect::FRAMES },
-        Word { text: "ball", has_range: false, dialects: Dialect::FRAMES },
+        Word {
+            text: "ball",
+            has_range: false,
+            dialects: &[Dialect::Urdf, Dialect::JointFrames, Dialect::Mjcf],
+        },
     ],
     number: None,
     has_axis: false,

@@ -31,8 +31,8 @@ impl ReferenceJoint {
     /// The joint that robot files mean by a word, with the number that goes with it; `None`: none that stands between links.
     pub fn of_word(word: &str, _number: Option<f64>) -> Option<ReferenceJoint> {
         match word {
-            "revolute" | "continuous" => Some(ReferenceJoint::Revolute),
-            "prismatic" | "linear" => Some(ReferenceJoint::Linear),
+            "revolute" | "continuous" | "hinge" => Some(ReferenceJoint::Revolute),
+            "prismatic" | "linear" | "slide" => Some(ReferenceJoint::Linear),
             "spherical" | "ball" => Some(ReferenceJoint::Ball),
             _ => None,
         }

@@ -1,11 +1,94 @@
-//! The text of a URDF file before it is parsed: what is forgiven, and what is said where it is no XML.
+//! XML of robot files: what is forgiven before it is parsed, what is said where it is none, and numbers in attributes.
+//!
+//! Rather than refuse what other readers accept, comments may hold `--`, the XML declaration may come late, and prefixes need no
+//! declaration.
 
-use super::{Span, MOST_ATTRIBUTES, MOST_NAMESPACES, MOST_NODES};
-use crate::description::messages;
-use crate::description::reader::FileReader;
+use super::messages;
+use super::reader::{FileReader, Range64};
+use roxmltree::{Document, Node, ParsingOptions};
 use std::borrow::Cow;
+use std::ops::Range;
 
-pub(super) fn complain_of_xml(reader: &mut FileReader, error: &roxmltree::Error) {
+/// Nodes of an XML file.
+const MOST_NODES: usize = 4_000_000;
+/// Attributes of an element: the XML parser compares each with all before it.
+const MOST_ATTRIBUTES: usize = 1000;
+/// Declarations of namespaces: the XML parser keeps those in force with every element that adds one.
+const MOST_NAMESPACES: usize = 1000;
+/// Prefixes that are used without a declaration.
+const MOST_PREFIXES: usize = 16;
+
+/// Bytes of a file.
+pub(super) type Span = Range<usize>;
+
+/// Parses the file of a reader and does the rest; `None` after a complaint that it is no XML.
+pub(super) fn parse<'a, T>(
+    mut reader: FileReader<'a>,
+    rest: impl FnOnce(FileReader<'a>, &Document) -> Option<T>,
+) -> Option<T> {
+    let mut text = tolerant_text(&mut reader)?;
+    for _ in 0..=MOST_PREFIXES {
+        let options = ParsingOptions { nodes_limit: MOST_NODES as u32, ..ParsingOptions::default() };
+        let error = match Document::parse_with_options(&text, options) {
+            Ok(document) => return rest(reader, &document),
+            Err(error) => error,
+        };
+        match &error {
+            roxmltree::Error::UnknownNamespace(prefix, _) if prefix != "xacro" => {
+                let joined = join_prefix(&text, prefix);
+                text = Cow::Owned(joined);
+            }
+            _ => {
+                complain_of_xml(&mut reader, &error);
+                return None;
+            }
+        }
+    }
+    reader.complain(&(0..0), messages::too_complex("undeclared prefixes", MOST_PREFIXES));
+    None
+}
+
+/// The start of an element's tag: `<name`.
+pub(super) fn tag(node: Node) -> Span {
+    let start = node.range().start;
+    start..start + 1 + node.tag_name().name().len()
+}
+
+/// The elements in an element.
+pub(super) fn children<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
+    node.children().filter(Node::is_element)
+}
+
+/// The numbers that the text of an attribute holds, each with its text and span; as many as `counts`, in words `expected`.
+pub(super) fn numbers<'a>(
+    reader: &mut FileReader,
+    what: &str,
+    (text, whole): (&'a str, Span),
+    (counts, expected): (std::ops::RangeInclusive<usize>, &str),
+) -> Option<Vec<(f64, &'a str, Span)>> {
+    let is_raw = reader.source.text().get(whole.clone()) == Some(text);
+    let words: Vec<&str> = text.split_ascii_whitespace().collect();
+    let complaint = if text.contains("${") || text.contains("$(") {
+        Some(messages::xacro_left(text, 0))
+    } else if text.contains(',') {
+        Some(messages::not_a_number(what, text))
+    } else {
+        (!counts.contains(&words.len())).then(|| messages::wrong_count(what, expected, words.len()))
+    };
+    if let Some(complaint) = complaint {
+        reader.complain(&whole, complaint);
+        return None;
+    }
+    let mut numbers = Vec::with_capacity(words.len());
+    for word in words {
+        let offset = word.as_ptr() as usize - text.as_ptr() as usize;
+        let span = if is_raw { whole.start + offset..whole.start + offset + word.len() } else { whole.clone() };
+        numbers.push(reader.number(what, word, &span, Range64::Finite).map(|x| (x, word, span)));
+    }
+    numbers.into_iter().collect()
+}
+
+fn complain_of_xml(reader: &mut FileReader, error: &roxmltree::Error) {
     use roxmltree::Error;
     let text = reader.source.text();
     let at = match error {
@@ -42,7 +125,7 @@ pub(super) fn complain_of_xml(reader: &mut FileReader, error: &roxmltree::Error)
 }
 
 /// The text with comments blanked and a late XML declaration blanked, byte for byte as long; `None` after a complaint.
-pub(super) fn tolerant_text<'a>(reader: &mut FileReader<'a>) -> Option<Cow<'a, str>> {
+fn tolerant_text<'a>(reader: &mut FileReader<'a>) -> Option<Cow<'a, str>> {
     let source = reader.source;
     let text = source.text();
     if text.matches("xmlns").take(MOST_NAMESPACES + 1).count() > MOST_NAMESPACES {
@@ -122,7 +205,7 @@ fn blank(text: &str, out: &mut Vec<u8>, range: Span) {
 }
 
 /// `prefix:name` becomes `prefix_name` in names of elements and attributes.
-pub(super) fn join_prefix(text: &str, prefix: &str) -> String {
+fn join_prefix(text: &str, prefix: &str) -> String {
     let needle = format!("{prefix}:");
     let mut out = String::with_capacity(text.len());
     let mut last = 0;

@@ -1,0 +1,331 @@
+//! Bodies: from the world outwards, each with what stands in it.
+//!
+//! A body is a link. The frames around bodies and sites are links without mass on fixed joints, so that no pose is computed here.
+
+use super::classes::Given;
+use super::files::Element;
+use super::{vocabulary, Mjcf};
+use crate::description::{
+    BaseKind, JointDrive, JointLimits, JointType, NamedFrame, Noted, Placement, Rotation, WrittenJoint, WrittenLink,
+    WrittenPose,
+};
+use crate::model::geometry::compose;
+use crate::model::{angle, transform};
+use straightline_core::spatial::Transform;
+use straightline_core::Dd;
+
+/// What stands in a body.
+pub(super) struct Content<'s> {
+    /// The element.
+    pub element: &'s Element,
+    /// The class of what names none.
+    pub class: usize,
+    /// The frame around it.
+    frame: Option<usize>,
+}
+
+/// A `<frame>`.
+struct Frame<'s> {
+    element: &'s Element,
+    pose: WrittenPose,
+    around: Option<usize>,
+    /// The link that stands for it, once it is needed.
+    link: Option<Noted<String>>,
+}
+
+/// What stands in a body, in the order of the file, and the frames around it.
+pub(super) struct Contents<'s> {
+    all: Vec<Content<'s>>,
+    frames: Vec<Frame<'s>>,
+    /// The link of the body.
+    link: Noted<String>,
+}
+
+impl<'s> Contents<'s> {
+    /// The elements of a name.
+    pub fn of(&self, name: &str) -> Vec<&Content<'s>> {
+        self.all.iter().filter(|content| content.element.name == name).collect()
+    }
+
+    /// The pose of what stands in an element, in the body.
+    pub fn pose_around(&self, content: &Content) -> Transform<Dd> {
+        let mut pose = Transform::identity();
+        let mut next = content.frame;
+        while let Some(frame) = next {
+            let frame = &self.frames[frame];
+            pose = compose(&transform(&frame.pose, angle::ROUNDING), &pose);
+            next = frame.around;
+        }
+        pose
+    }
+
+    /// Whether an element stands in a frame that is not the body's.
+    pub fn is_displaced(&self, content: &Content) -> bool {
+        let mut next = content.frame;
+        while let Some(frame) = next {
+            let frame = &self.frames[frame];
+            if !is_identity(&frame.pose) {
+                return true;
+            }
+            next = frame.around;
+        }
+        false
+    }
+}
+
+fn is_identity(pose: &WrittenPose) -> bool {
+    pose.xyz.value == [0.0; 3] && pose.rotation == Rotation::Turns(Vec::new())
+}
+
+/// A body that is still to be read.
+struct Open<'s> {
+    element: &'s Element,
+    class: usize,
+    /// The link that carries it.
+    parent: Noted<String>,
+}
+
+impl<'s> Mjcf<'s> {
+    /// Reads the bodies of the world.
+    pub fn read_world(&mut self, sections: &[&'s Element]) {
+        let Some(first) = sections.first() else { return };
+        let place = self.tag(first);
+        let world = Noted::new(self.made_up("world"), place.clone());
+        let mut contents = Contents { all: Vec::new(), frames: Vec::new(), link: world.clone() };
+        for section in sections {
+            self.add_contents(section, 0, &mut contents);
+        }
+        let moving: Vec<&'s Element> =
+            contents.of("body").iter().map(|body| body.element).filter(|body| self.has(body, &[])).collect();
+        let free = moving.iter().filter(|body| self.has(body, &["free"])).count();
+        let base = if free == 1 && moving.len() == 1 { moving.first().copied() } else { None };
+        match base {
+            Some(base) => {
+                let place = self.free_joint(base).map_or_else(|| self.tag(base), |joint| self.tag(joint));
+                self.robot.base = Some(Noted::new(BaseKind::Floating, place));
+            }
+            None => {
+                self.robot.base = Some(Noted::new(BaseKind::Fixed, place));
+                self.robot.links.push(WrittenLink { name: world, inertial: None, is_carrier: false });
+            }
+        }
+        if base.is_none() {
+            self.add_sites(&mut contents);
+        } else {
+            contents.of("site").iter().for_each(|site| self.ignore_as("site of the world", site.element));
+        }
+        contents.of("geom").iter().for_each(|geom| self.ignore_as("geom of the world", geom.element));
+        self.refuse_others(&contents, "the world", &["joint", "freejoint", "inertial"]);
+        let mut open = self.bodies_in(&mut contents, base);
+        while let Some(body) = open.pop() {
+            let is_base = base.is_some_and(|base| std::ptr::eq(base, body.element));
+            let inner = self.read_body(body, is_base, moving.len());
+            open.extend(inner);
+        }
+    }
+
+    /// The bodies in a body, the first one last; of the world only `base` if there is one.
+    fn bodies_in(&mut self, contents: &mut Contents<'s>, base: Option<&'s Element>) -> Vec<Open<'s>> {
+        let bodies: Vec<(&'s Element, usize, Option<usize>)> =
+            contents.of("body").iter().map(|body| (body.element, body.class, body.frame)).collect();
+        let mut open = Vec::new();
+        for (element, class, frame) in bodies {
+            if base.is_some_and(|base| !std::ptr::eq(base, element)) {
+                if let Some(total) = self.settings.total_mass.clone() {
+                    let help = "remove `settotalmass`, or the bodies that do not move";
+                    let why =
+                        "the mass of bodies that do not move would count, and beside a free body they are left out";
+                    let complaint =
+                        crate::description::messages::not_supported_yet("the compiler", "settotalmass", why, help);
+                    self.reader.diagnostics.push(complaint.at(&total.place));
+                    self.settings.total_mass = None;
+                }
+                self.ignore_as("body that does not move", element);
+                continue;
+            }
+            let parent = match base {
+                Some(_) => contents.link.clone(),
+                None => self.link_of_frame(contents, frame),
+            };
+            open.push(Open { element, class, parent });
+        }
+        open.reverse();
+        open
+    }
+
+    /// Reads a body; the bodies in it.
+    fn read_body(&mut self, body: Open<'s>, is_base: bool, moving: usize) -> Vec<Open<'s>> {
+        let Open { element, class, parent } = body;
+        let name = self.name_of(element, &format!("{}_body", parent.value));
+        let owner = format!("body `{}`", name.value);
+        self.check_attributes(element, &owner, vocabulary::BODY);
+        let given = Given::alone(element);
+        let help = "remove it: gravity then acts on the body";
+        self.refuse_number(&given, "gravcomp", &owner, "a force would hold the body up", help);
+        if self.flag(&given, "mocap") == Some(true) {
+            self.ignore_as("mocap", element);
+        }
+        let class = element.attribute("childclass").and_then(|class| self.class(class)).unwrap_or(class);
+        let pose = self.pose(&given, &owner);
+        let mut contents = Contents { all: Vec::new(), frames: Vec::new(), link: name.clone() };
+        self.add_contents(element, class, &mut contents);
+        let joints = self.joints_in(&contents, &owner, is_base, moving);
+        if is_base {
+            // the pose of a free body is its coordinate
+        } else {
+            self.add_joints((&name, element), parent, pose, joints);
+        }
+        let inertial = self.read_inertia(element, &contents, &owner);
+        self.robot.links.push(WrittenLink { name, inertial, is_carrier: false });
+        self.add_sites(&mut contents);
+        self.refuse_others(&contents, &owner, &[]);
+        self.bodies_in(&mut contents, None)
+    }
+
+    /// Refuses or skips what is read nowhere.
+    fn refuse_others(&mut self, contents: &Contents<'s>, owner: &str, not_here: &[&str]) {
+        for Content { element, .. } in &contents.all {
+            match element.name.as_str() {
+                name if not_here.contains(&name) => self.refuse(element, owner, "the world does not move", "remove it"),
+                "body" | "joint" | "freejoint" | "inertial" | "geom" | "site" => {}
+                "camera" | "light" => self.ignore(element),
+                "replicate" | "composite" | "flexcomp" | "attach" => {
+                    let help = "load the model with MuJoCo and save it: the saved file has the bodies themselves";
+                    self.refuse(element, owner, "bodies would be made of it", help);
+                }
+                "plugin" => self.refuse(element, owner, "it could act on the body", "remove it"),
+                _ => self.skip(element, owner, &["body", "joint", "freejoint", "inertial", "geom", "site", "frame"]),
+            }
+        }
+    }
+
+    /// Adds what stands in an element, that in frames as if they were not there.
+    fn add_contents(&mut self, element: &'s Element, class: usize, contents: &mut Contents<'s>) {
+        let mut open: Vec<(&'s Element, usize, Option<usize>)> = Vec::new();
+        let files = self.files;
+        let within = |element, class, frame| files.children(element).into_iter().rev().map(move |e| (e, class, frame));
+        open.extend(within(element, class, None));
+        while let Some((element, class, frame)) = open.pop() {
+            if element.name != "frame" {
+                contents.all.push(Content { element, class, frame });
+                continue;
+            }
+            self.check_attributes(element, "a frame", vocabulary::FRAME);
+            let pose = self.pose(&Given::alone(element), "a frame");
+            let class = element.attribute("childclass").and_then(|class| self.class(class)).unwrap_or(class);
+            contents.frames.push(Frame { element, pose, around: frame, link: None });
+            open.extend(within(element, class, Some(contents.frames.len() - 1)));
+        }
+    }
+
+    /// The link that stands for a frame in a body, which it makes if there is none yet.
+    fn link_of_frame(&mut self, contents: &mut Contents<'s>, frame: Option<usize>) -> Noted<String> {
+        let mut chain = Vec::new();
+        let mut next = frame;
+        while let Some(frame) = next {
+            chain.push(frame);
+            next = contents.frames[frame].around;
+        }
+        let mut link = contents.link.clone();
+        for frame in chain.into_iter().rev() {
+            let Frame { element, pose, link: own, .. } = &contents.frames[frame];
+            if let Some(own) = own {
+                link = own.clone();
+            } else if !is_identity(pose) {
+                let (element, pose) = (*element, pose.clone());
+                let is_named = element.attribute("name").is_some();
+                let name = self.name_of(element, &format!("{}_frame", contents.link.value));
+                self.robot.links.push(WrittenLink { name: name.clone(), inertial: None, is_carrier: !is_named });
+                self.add_fixed(&name, link, pose, element);
+                contents.frames[frame].link = Some(name.clone());
+                link = name;
+            }
+        }
+        link
+    }
+
+    /// Adds a fixed joint.
+    pub fn add_fixed(
+        &mut self,
+        child: &Noted<String>,
+        parent: Noted<String>,
+        origin: WrittenPose,
+        element: &'s Element,
+    ) {
+        let place = child.place.clone();
+        let name = Noted::new(self.made_up(&format!("{}_fixed", child.value)), place.clone());
+        let joint = WrittenJoint {
+            name,
+            kind: Noted::new(JointType::FIXED, place.clone()),
+            parent,
+            child: child.clone(),
+            placement: Placement::Frames { origin, axis: Noted::new([0.0, 0.0, 1.0], place) },
+            limits: JointLimits::default(),
+            drive: JointDrive::default(),
+        };
+        self.add_joint(joint, element);
+    }
+
+    /// Adds the sites of a body as frames.
+    fn add_sites(&mut self, contents: &mut Contents<'s>) {
+        let sites: Vec<(&'s Element, usize, Option<usize>)> =
+            contents.of("site").iter().map(|site| (site.element, site.class, site.frame)).collect();
+        for (element, class, frame) in sites {
+            let Some(name) = element.attribute("name").filter(|name| !name.value.trim().is_empty()) else {
+                self.ignore_as("site without a name", element);
+                continue;
+            };
+            let given = self.given(element, "site", class);
+            let owner = format!("site `{}`", name.value);
+            if given.attribute("fromto").is_some() {
+                self.ignore_as("site with `fromto`", element);
+                continue;
+            }
+            let is_taken =
+                self.robot.links.iter().any(|link| link.name.value == name.value) || self.is_body(&name.value);
+            let own = if is_taken { self.made_up(&format!("{}_site", name.value)) } else { name.value.clone() };
+            let name = Noted::new(own, self.place(name));
+            let pose = self.pose(&given, &owner);
+            let link = self.link_of_frame(contents, frame);
+            self.robot.frames.push(NamedFrame { name, link, pose });
+        }
+    }
+
+    /// Whether a body or a frame has the name.
+    fn is_body(&self, name: &str) -> bool {
+        let is = |e: &Element| ["body", "frame"].contains(&e.name.as_str());
+        let mut all = self.files.elements.iter().filter(|e| is(e));
+        all.any(|e| e.attribute("name").is_some_and(|own| own.value == name))
+    }
+
+    /// Whether a body or one in it has a joint; with `["free"]`: whether it has a free one itself.
+    fn has(&self, body: &'s Element, what: &[&str]) -> bool {
+        if what == ["free"] {
+            return self.free_joint(body).is_some();
+        }
+        let mut open = vec![body];
+        while let Some(element) = open.pop() {
+            if ["joint", "freejoint"].contains(&element.name.as_str()) {
+                return true;
+            }
+            open.extend(self.files.children(element));
+        }
+        false
+    }
+
+    /// The free joint of a body.
+    fn free_joint(&self, body: &'s Element) -> Option<&'s Element> {
+        let mut open = self.files.children(body);
+        while let Some(element) = open.pop() {
+            let is_free =
+                element.name == "joint" && element.attribute("type").is_some_and(|t| t.value.trim() == "free");
+            if is_free || element.name == "freejoint" {
+                return Some(element);
+            }
+            if element.name == "frame" {
+                open.extend(self.files.children(element));
+            }
+        }
+        None
+    }
+}

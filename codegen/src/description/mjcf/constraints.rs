@@ -1,0 +1,162 @@
+//! Equalities and tendons: joints whose coordinates follow others; what else would bind the motion is refused.
+
+use super::classes::Given;
+use super::files::{Attribute, Element};
+use super::{vocabulary, Mjcf};
+use crate::description::{messages, Noted, Placement, Reference, WrittenCoupling};
+use crate::model::angle::ROUNDING;
+use crate::model::angle_in_radians;
+use straightline_core::Dd;
+
+impl<'s> Mjcf<'s> {
+    /// Reads the sections of equalities and tendons.
+    pub fn read_constraints(&mut self, equalities: &[&'s Element], tendons: &[&'s Element]) {
+        let within = |sections: &[&'s Element]| -> Vec<&'s Element> {
+            sections.iter().flat_map(|section| self.files.children(section)).collect()
+        };
+        let (equalities, tendons) = (within(equalities), within(tendons));
+        for element in equalities {
+            self.read_equality(element, &tendons);
+        }
+        for element in tendons {
+            self.read_tendon(element);
+        }
+    }
+
+    fn read_equality(&mut self, element: &'s Element, tendons: &[&'s Element]) {
+        let given = self.given(element, "equality", 0);
+        if self.flag(&given, "active") == Some(false) {
+            self.ignore_as("equality that is not active", element);
+            return;
+        }
+        let help = "remove it, or write `active=\"false\"`";
+        match element.name.as_str() {
+            "joint" => self.read_coupling(&given),
+            "tendon" => self.read_tendon_equality(&given, tendons),
+            "connect" | "weld" => self.refuse(element, "the equality", "it closes a loop of bodies", help),
+            _ => self.refuse(element, "the equality", "it binds the motion", help),
+        }
+    }
+
+    /// q₁ − ref₁ = a₀ + a₁ (q₂ − ref₂).
+    fn read_coupling(&mut self, given: &Given<'s>) {
+        let element = given.element;
+        let owner = "the equality of joints";
+        self.check_attributes(element, owner, vocabulary::EQUALITY);
+        let [a0, a1] = self.line(given, owner);
+        let joint = self.joint_named(element, "joint1", owner);
+        if given.attribute("joint2").is_none() {
+            let help = "remove the joint, which fixes it: the pose of its body says where";
+            self.refuse(element, owner, "without `joint2` it holds `joint1` where it is", help);
+            return;
+        }
+        let source = self.joint_named(element, "joint2", owner);
+        let (Some((joint, own)), Some((source, other))) = (joint, source) else { return };
+        let place = given.attribute("polycoef").map_or_else(|| self.tag(element), |polycoef| self.place(polycoef));
+        let offset = own + Dd::from(a0) - Dd::from(a1) * other;
+        self.robot.couplings.push(WrittenCoupling {
+            joint,
+            source,
+            ratio: Noted::new(a1, place.clone()),
+            offset: Noted::new(offset.to_f64(), place),
+        });
+    }
+
+    /// a₀ and a₁ of `polycoef`, or a complaint that there is more.
+    fn line(&mut self, given: &Given<'s>, owner: &str) -> [f64; 2] {
+        let mut line = [0.0, 1.0];
+        let Some(attribute) = given.attribute("polycoef") else { return line };
+        let Some(numbers) = self.numbers(&format!("polycoef of {owner}"), attribute, 1, 5) else { return line };
+        line.iter_mut().zip(&numbers).for_each(|(own, number)| *own = *number);
+        if numbers.iter().skip(2).any(|x| *x != 0.0) {
+            let help = "write the straight line that is nearest, as in `polycoef=\"0 1 0 0 0\"`";
+            let why = "one coordinate would follow another on a curve";
+            self.complain(attribute, messages::not_supported_yet(owner, "polycoef", why, help));
+        }
+        line
+    }
+
+    /// A fixed tendon of two joints that keeps its length: c₁ (q₁ − ref₁) + c₂ (q₂ − ref₂) = a₀; the first joint follows.
+    fn read_tendon_equality(&mut self, given: &Given<'s>, tendons: &[&'s Element]) {
+        let (element, owner) = (given.element, "the equality of tendons");
+        let [a0, _] = self.line(given, owner);
+        let named = |name: &Attribute| {
+            let is_named = |tendon: &&&'s Element| tendon.attribute("name").is_some_and(|own| own.value == name.value);
+            tendons.iter().find(is_named).copied()
+        };
+        let tendon = element.attribute("tendon1").and_then(named);
+        let joints = match tendon {
+            Some(tendon) if tendon.name == "fixed" && element.attribute("tendon2").is_none() => {
+                self.files.children(tendon)
+            }
+            _ => Vec::new(),
+        };
+        let &[first, second] = &joints[..] else {
+            let help = "write `equality/joint` in its place, or `active=\"false\"`";
+            self.refuse(element, owner, "only one fixed tendon of two joints can keep its length", help);
+            return;
+        };
+        let mut end = |joint: &'s Element| {
+            let coefficient = self.number(&Given::alone(joint), "coef", owner)?;
+            Some((self.joint_named(joint, "joint", owner)?, coefficient))
+        };
+        let (first, second) = (end(first), end(second));
+        let (Some(((joint, own), c1)), Some(((source, other), c2))) = (first, second) else { return };
+        if c1.value == 0.0 {
+            let help = "leave the joint out of the tendon";
+            self.refuse(element, owner, "the coefficient of its first joint is zero", help);
+            return;
+        }
+        let ratio = -Dd::from(c2.value) / Dd::from(c1.value);
+        let offset = own + Dd::from(a0) / Dd::from(c1.value) - ratio * other;
+        self.robot.couplings.push(WrittenCoupling {
+            joint,
+            source,
+            ratio: Noted::new(ratio.to_f64(), c2.place),
+            offset: Noted::new(offset.to_f64(), self.tag(element)),
+        });
+    }
+
+    /// The joint that an attribute names, with its coordinate in the pose of the file.
+    fn joint_named(&mut self, element: &'s Element, name: &str, owner: &str) -> Option<(Noted<String>, Dd)> {
+        let Some(attribute) = element.attribute(name) else {
+            self.complain_at(element, messages::missing_attribute(owner, name, &format!("{name}=\"...\"")));
+            return None;
+        };
+        let joint = self.robot.joint(&attribute.value);
+        let is_single = |kind: straightline_core::joint::JointKind| kind.is_single();
+        match joint {
+            Some(joint) if joint.kind.value.kind.is_some_and(is_single) => {
+                let zero = match &joint.placement {
+                    Placement::Anchored(anchored) => match &anchored.reference {
+                        Some(Reference::Angle(angle)) => angle_in_radians(angle, ROUNDING),
+                        Some(Reference::Length(length)) => Dd::from(length.value),
+                        None => Dd::ZERO,
+                    },
+                    _ => Dd::ZERO,
+                };
+                Some((Noted::new(attribute.value.clone(), self.place(attribute)), zero))
+            }
+            _ => {
+                let all = self.robot.joints.iter().filter(|joint| joint.kind.value.kind.is_some_and(is_single));
+                let names: Vec<String> = all.map(|joint| joint.name.value.clone()).collect();
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
+                self.complain(attribute, messages::drive_joint(owner, &attribute.value, names));
+                None
+            }
+        }
+    }
+
+    fn read_tendon(&mut self, element: &'s Element) {
+        let given = self.given(element, "tendon", 0);
+        let owner = match element.attribute("name") {
+            Some(name) => format!("tendon `{}`", name.value),
+            None => "a tendon".to_string(),
+        };
+        for name in ["stiffness", "damping", "frictionloss", "armature", "springyield"] {
+            let help = "remove it; springs, dampers and friction act on joints";
+            self.refuse_number(&given, name, &owner, "it would act on several joints", help);
+        }
+        self.ignore_as(&format!("{} tendon", element.name), element);
+    }
+}

@@ -1,0 +1,187 @@
+//! MJCF, the XML of MuJoCo: <https://mujoco.readthedocs.io/en/stable/XMLreference.html>.
+//!
+//! Read is what makes the equations of a tree of bodies: `compiler`, `option gravity`, `default`, `include`, bodies with their joints,
+//! inertials, sites and frames, inertias from geoms, couplings by `equality/joint`, and greatest forces of actuators. What changes the
+//! dynamics and is not read is an error; the rest is skipped and listed.
+//!
+//! A body with several joints becomes as many links, all but the last without mass ([`WrittenLink::is_carrier`]). Numbers count as the
+//! nearest f64; inertias that are made of geoms are computed in double-double and rounded once.
+//!
+//! [`WrittenLink::is_carrier`]: super::WrittenLink::is_carrier
+
+mod actuators;
+mod attributes;
+mod bodies;
+mod classes;
+mod constraints;
+mod files;
+mod geoms;
+mod inertia;
+mod joints;
+mod mesh;
+mod settings;
+mod vocabulary;
+
+use super::reader::FileReader;
+use super::{Description, FileFormat, Noted, WrittenJoint};
+use crate::diagnostic::{Diagnostics, Place, Source};
+use classes::Classes;
+use files::{Element, Files};
+use settings::Settings;
+use std::collections::HashSet;
+use straightline_core::joint::Dialect;
+
+pub(super) const FORMAT: FileFormat = FileFormat {
+    name: "MJCF",
+    extensions: &["mjcf"],
+    signs: "XML whose root element is `<mujoco>`",
+    sniff: is_mjcf,
+    dialect: Dialect::Mjcf,
+    limits: "write `range=\"...\"`, or `limited=\"false\"`",
+    read,
+};
+
+/// Whether the first element of a text is `mujoco` or `mujocoinclude`.
+fn is_mjcf(text: &str) -> bool {
+    let mut rest = text.trim_start();
+    loop {
+        let end = match rest {
+            _ if rest.starts_with("<?") => "?>",
+            _ if rest.starts_with("<!--") => "-->",
+            _ if rest.starts_with("<!") => ">",
+            _ => break,
+        };
+        let Some(at) = rest.find(end) else { return false };
+        rest = rest[at + end.len()..].trim_start();
+    }
+    let name = rest.strip_prefix('<').unwrap_or("");
+    let end = name.find(|c: char| !c.is_ascii_alphanumeric()).unwrap_or(name.len());
+    ["mujoco", "mujocoinclude"].contains(&&name[..end])
+}
+
+/// A file that is being read, with what it includes.
+struct Mjcf<'s> {
+    reader: FileReader<'s>,
+    files: &'s Files,
+    settings: Settings<'s>,
+    classes: Classes<'s>,
+    /// Names of links, joints and frames, written or made up.
+    names: HashSet<String>,
+    robot: Description,
+    /// Of each joint of it, the element that says it.
+    joints: Vec<&'s Element>,
+}
+
+fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
+    let files = Files::load(source, diagnostics)?;
+    let reader = FileReader::new(&files.sources[0], diagnostics);
+    let root = files.root();
+    let name = match root.attribute("model") {
+        Some(model) if !model.value.trim().is_empty() => reader.value(model.value.clone(), &model.span),
+        _ => reader.value("robot".to_string(), &root.tag),
+    };
+    let mut mjcf = Mjcf {
+        reader,
+        files: &files,
+        settings: Settings::default(),
+        classes: Classes::default(),
+        names: HashSet::new(),
+        robot: Description::new(&FORMAT, name),
+        joints: Vec::new(),
+    };
+    mjcf.collect_names();
+    mjcf.read_sections(root);
+    let mut robot = mjcf.robot;
+    robot.ignored = mjcf.reader.into_ignored();
+    Some(robot)
+}
+
+impl<'s> Mjcf<'s> {
+    /// Reads the sections, those first that say how others are meant.
+    fn read_sections(&mut self, root: &'s Element) {
+        let sections = self.files.children(root);
+        let of = |name: &'static str| {
+            let sections: Vec<&'s Element> = sections.iter().copied().filter(|e| e.name == name).collect();
+            sections
+        };
+        self.read_settings(&of("compiler"), &of("option"));
+        self.read_classes(&of("default"));
+        self.read_world(&of("worldbody"));
+        self.order_joints();
+        self.scale_masses();
+        self.read_constraints(&of("equality"), &of("tendon"));
+        self.read_actuators(&of("actuator"));
+        for section in sections {
+            match section.name.as_str() {
+                "compiler" | "option" | "default" | "worldbody" | "equality" | "tendon" | "actuator" => {}
+                "deformable" => {
+                    for element in self.files.children(section).into_iter().filter(|e| e.name == "flex") {
+                        self.refuse(element, "the robot", "it deforms", "remove it: bodies are rigid");
+                    }
+                }
+                "asset" => {
+                    for element in self.files.children(section).into_iter().filter(|e| e.name != "mesh") {
+                        self.ignore(element);
+                    }
+                }
+                "extension" | "visual" | "statistic" | "size" | "contact" | "sensor" | "keyframe" | "custom" => {
+                    self.ignore(section);
+                }
+                _ => self.skip(
+                    section,
+                    "the robot",
+                    &["worldbody", "compiler", "default", "equality", "actuator", "tendon"],
+                ),
+            }
+        }
+    }
+
+    /// Adds a joint that an element says.
+    fn add_joint(&mut self, joint: WrittenJoint, element: &'s Element) {
+        self.robot.joints.push(joint);
+        self.joints.push(element);
+    }
+
+    /// Brings the joints in the order of the file: those of frames were made when they were needed.
+    fn order_joints(&mut self) {
+        let ranks = self.files.ranks();
+        let joints = std::mem::take(&mut self.robot.joints);
+        let mut ranked: Vec<_> = joints.into_iter().zip(&self.joints).collect();
+        ranked.sort_by_key(|(_, element)| ranks[element.index]);
+        self.robot.joints = ranked.into_iter().map(|(joint, _)| joint).collect();
+    }
+
+    /// Remembers the names that the file gives, so that no made-up name is one of them.
+    fn collect_names(&mut self) {
+        for element in &self.files.elements {
+            if ["body", "joint", "freejoint", "site", "frame"].contains(&element.name.as_str()) {
+                self.names.extend(element.attribute("name").map(|name| name.value.clone()));
+            }
+        }
+    }
+
+    /// `name`, or with a number after it where that is taken; it is taken then.
+    fn made_up(&mut self, name: &str) -> String {
+        let mut own = name.to_string();
+        let mut number = 2;
+        while self.names.contains(&own) {
+            own = format!("{name}_{number}");
+            number += 1;
+        }
+        self.names.insert(own.clone());
+        own
+    }
+
+    /// The name of an element, or else a made-up one.
+    fn name_of(&mut self, element: &'s Element, otherwise: &str) -> Noted<String> {
+        match element.attribute("name").filter(|name| !name.value.trim().is_empty()) {
+            Some(name) => Noted::new(name.value.clone(), self.place(name)),
+            None => Noted::new(self.made_up(otherwise), self.tag(element)),
+        }
+    }
+
+    /// Where an element begins.
+    fn tag(&self, element: &Element) -> Place {
+        self.files.sources[element.file].place(element.tag.clone())
+    }
+}

@@ -1,0 +1,154 @@
+//! What MJCF says and the equations do not have: refused with its line, or listed. Whatever the text, nothing panics.
+
+use crate::robots::Random;
+use straightline_codegen::description;
+use straightline_codegen::diagnostic::{Diagnostics, Severity, Source};
+use straightline_codegen::model::{load, ModelOptions};
+
+/// A robot of which nothing is said.
+const PLAIN: &str = "<mujoco>
+<worldbody>
+<body name=\"a\"><joint name=\"j\"/><joint name=\"k\" axis=\"1 0 0\"/><geom size=\"0.1\" pos=\"0 0 1\"/></body>
+</worldbody>
+</mujoco>
+";
+
+fn said(text: &str) -> Diagnostics {
+    let (model, diagnostics) = load(&Source::new("robot.xml", text), &ModelOptions::default());
+    assert_eq!(model.is_none(), diagnostics.has_errors(), "{diagnostics}\n{text}");
+    diagnostics
+}
+
+#[test]
+fn nothing_is_said_of_a_plain_robot() {
+    assert!(said(PLAIN).is_empty(), "{}", said(PLAIN));
+}
+
+/// Each row: what stands in place of what, and the one error that is said, with its line.
+#[test]
+fn what_changes_the_dynamics_and_is_not_read_is_an_error() {
+    let joint = "<joint name=\"j\"/>";
+    let geom = "<geom size=\"0.1\" pos=\"0 0 1\"/>";
+    let world = "</worldbody>";
+    for (old, new, code, line) in [
+        (joint, "<joint name=\"j\" type=\"universal\"/>", "unknown-word", 3),
+        (joint, "<joint name=\"j\" axis=\"0 0 0\"/>", "zero-axis", 3),
+        (joint, "<joint name=\"j\" class=\"legs\"/>", "unknown-word", 3),
+        (joint, "<joint name=\"j\" damping=\"1 2\"/>", "not-supported-yet", 3),
+        (joint, "<joint name=\"j\" springdamper=\"0.1 1\"/>", "not-supported-yet", 3),
+        (joint, "<joint name=\"j\" armature=\"-1\"/>", "negative-effect", 3),
+        (joint, "<joint name=\"j\" pos=\"1 2\"/>", "wrong-count", 3),
+        (joint, "<joint name=\"k\"/>", "duplicate-name", 3),
+        (joint, "<joint name=\"j\"/><freejoint/>", "not-supported-yet", 3),
+        (joint, "<frame pos=\"0 0 1\"><joint name=\"j\"/></frame>", "not-supported-yet", 3),
+        (joint, "<joint name=\"j\"/><composite/>", "not-supported-yet", 3),
+        (joint, "<joint name=\"j\"/><plugin plugin=\"p\"/>", "not-supported-yet", 3),
+        (joint, "<joint name=\"j\"/><inertial pos=\"0 0 0\" diaginertia=\"1 1 1\"/>", "missing-attribute", 3),
+        (joint, "<joint name=\"j\"/><body quat=\"0 0 0 0\"/>", "zero-axis", 3),
+        (joint, "<joint name=\"j\"/><body gravcomp=\"1\"/>", "not-supported-yet", 3),
+        (joint, "<joint name=\"j\"/><body euler=\"1 2 3\" quat=\"1 0 0 0\"/>", "written-twice", 3),
+        (geom, "<geom type=\"capsule\" size=\"0.1\"/>", "geom-size", 3),
+        (geom, "<geom type=\"capsule\" size=\"0.1\" fromto=\"1 2 3 1 2 3\"/>", "geom-size", 3),
+        (geom, "<geom type=\"mesh\" mesh=\"hull\"/>", "unknown-word", 3),
+        (geom, "<geom type=\"mesh\"/>", "missing-attribute", 3),
+        (geom, "<geom size=\"1\" shellinertia=\"true\"/>", "not-supported-yet", 3),
+        (world, "<body><freejoint/><geom size=\"1\"/></body></worldbody>", "not-supported-yet", 4),
+        (world, "</worldbody><option density=\"1.2\"/>", "not-supported-yet", 4),
+        (world, "</worldbody><option><flag spring=\"disable\"/></option>", "not-supported-yet", 4),
+        (world, "</worldbody><compiler coordinate=\"global\"/>", "not-supported-yet", 4),
+        (world, "</worldbody><compiler eulerseq=\"xyw\"/>", "unknown-word", 4),
+        (world, "</worldbody><include/>", "missing-attribute", 4),
+        (world, "</worldbody><include file=\"no such file.xml\"/>", "include-failed", 4),
+        (world, "</worldbody><equality><weld body1=\"a\"/></equality>", "not-supported-yet", 4),
+        (world, "</worldbody><equality><joint joint1=\"j\"/></equality>", "not-supported-yet", 4),
+        (world, "</worldbody><equality><joint joint1=\"j\" joint2=\"l\"/></equality>", "drive-joint", 4),
+        (
+            world,
+            "</worldbody><equality><joint joint1=\"j\" joint2=\"k\" polycoef=\"0 1 2 0 0\"/></equality>",
+            "not-supported-yet",
+            4,
+        ),
+        (world, "</worldbody><tendon><fixed stiffness=\"1\"/></tendon>", "not-supported-yet", 4),
+        (world, "</worldbody><actuator><motor joint=\"j\" armature=\"1\"/></actuator>", "not-supported-yet", 4),
+        (world, "</worldbody><deformable><flex/></deformable>", "not-supported-yet", 4),
+    ] {
+        let diagnostics = said(&PLAIN.replace(old, new));
+        let errors: Vec<(&str, usize)> = diagnostics
+            .iter()
+            .filter(|d| d.severity == Severity::Error)
+            .map(|d| (d.code, d.place.as_ref().map_or(0, |place| place.line)))
+            .collect();
+        assert_eq!(errors, [(code, line)], "{new}\n{diagnostics}");
+    }
+}
+
+#[test]
+fn what_the_dynamics_do_not_need_is_listed() {
+    let text = PLAIN.replace(
+        "</worldbody>",
+        "<light/><camera/><camera/></worldbody><sensor><gyro/></sensor><contact/><keyframe/><visual/><tendon><spatial/></tendon>
+         <actuator><adhesion body=\"a\"/></actuator>",
+    );
+    let mut diagnostics = Diagnostics::new();
+    let description = description::read(&Source::new("robot.xml", text), &mut diagnostics).expect("it is read");
+    assert!(diagnostics.is_empty(), "{diagnostics}");
+    let ignored: Vec<(&str, usize)> = description.ignored.iter().map(|i| (i.what.as_str(), i.count)).collect();
+    let expected =
+        ["light", "camera", "spatial tendon", "actuator adhesion", "sensor", "contact", "keyframe", "visual"];
+    assert_eq!(ignored, expected.map(|what| (what, if what == "camera" { 2 } else { 1 })));
+}
+
+#[test]
+fn a_file_that_includes_itself_is_refused() {
+    let folder = std::env::temp_dir().join(format!("straightline-mjcf-{}-cycle", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("there is room for a test");
+    let path = folder.join("robot.xml");
+    let text = PLAIN.replace("</worldbody>", "</worldbody><include file=\"robot.xml\"/>");
+    std::fs::write(&path, &text).expect("it can be written");
+    let (model, diagnostics) = load(&Source::new(&path.to_string_lossy(), text), &ModelOptions::default());
+    assert!(model.is_none());
+    assert_eq!(diagnostics.iter().map(|d| d.code).collect::<Vec<_>>(), ["include-failed"], "{diagnostics}");
+    std::fs::remove_dir_all(&folder).expect("it was made here");
+}
+
+/// Text of most that is read.
+const RICH: &str = "<?xml version=\"1.0\"?><!-- a robot --><mujoco model=\"r\"><compiler eulerseq=\"zXy\" settotalmass=\"3\" boundinertia=\"1\"/>
+<option gravity=\"0 0 -9\"><flag gravity=\"enable\"/></option><default><joint damping=\"1\"/><default class=\"c\"><geom mass=\"1\"/></default></default>
+<asset><mesh name=\"m\" file=\"m.stl\"/></asset><worldbody><body childclass=\"c\" pos=\"1 2 3\" euler=\"1 2 3\"><joint name=\"j\" range=\"-1 1\" ref=\"3\"/>
+<joint type=\"slide\" axis=\"1 2 3\" name=\"k\"/><frame zaxis=\"1 2 3\"><geom type=\"box\" size=\"1 2 3\"/><body axisangle=\"1 2 3 4\"><joint/>
+<inertial pos=\"0 0 0\" mass=\"1\" fullinertia=\"1 1 1 0 0 0\"/><site name=\"s\" xyaxes=\"1 0 0 0 1 0\"/></body></frame><geom size=\".1\" fromto=\"0 0 0 1 1 1\"
+type=\"capsule\"/></body></worldbody><tendon><fixed name=\"t\"><joint joint=\"j\" coef=\"1\"/><joint joint=\"k\" coef=\"2\"/></fixed></tendon>
+<equality><joint joint1=\"j\" joint2=\"k\" polycoef=\"0 1\"/><tendon tendon1=\"t\"/></equality><actuator><motor joint=\"j\" ctrlrange=\"-1 1\"/></actuator></mujoco>";
+
+#[test]
+fn spoilt_texts_do_not_panic() {
+    assert!(!said(RICH).has_errors(), "{}", said(RICH));
+    let odd = [
+        "nan", "-1", "0", "1e308", "1e-308", "inf", "\"", "true", "ball", "free", "", "body", "frame", "include", "é",
+        "<", "/>",
+    ];
+    for seed in 1..600 {
+        let mut random = Random(seed);
+        let mut tokens: Vec<&str> = RICH.split_inclusive(|c: char| !c.is_alphanumeric()).collect();
+        for _ in 0..=random.below(3) {
+            let (a, b) = (random.below(tokens.len()), random.below(tokens.len()));
+            match random.below(4) {
+                0 => tokens.swap(a, b),
+                1 => tokens[a] = odd[random.below(odd.len())],
+                2 => tokens.insert(a, tokens[b]),
+                _ => drop(tokens.remove(a)),
+            }
+        }
+        let text = tokens.concat();
+        println!("seed {seed}");
+        let _ = said(&text).render();
+    }
+}
+
+#[test]
+fn deep_bodies_and_frames_are_read_without_recursion() {
+    let depth = 3000;
+    let bodies = format!("{}{}", "<body><geom size=\"1\"/>".repeat(depth), "</body>".repeat(depth));
+    let frames = format!("{}{}", "<frame pos=\"0 0 1\">".repeat(depth), "</frame>".repeat(depth));
+    let _ = said(&PLAIN.replace("</worldbody>", &format!("{bodies}{frames}</worldbody>")));
+}
