@@ -31,6 +31,20 @@ const ROBOTS: [(&str, &str, bool, &[&str]); 11] = [
     ("simple_humanoid", "simple_humanoid.urdf", true, &["r_ankle", "l_ankle", "r_wrist", "l_wrist"]),
 ];
 
+/// The robots of `reference/joints`, which are compiled once each.
+const JOINTS: [(&str, &str, bool, &[&str]); 10] = [
+    ("mimic_gripper", "mimic_gripper.urdf", false, &["finger_right"]),
+    ("mimic_chain", "mimic_chain.urdf", false, &["f_link"]),
+    ("mimic_screw", "mimic_screw.urdf", false, &["tool_link", "screw_link"]),
+    ("mimic_tree", "mimic_tree.urdf", false, &["l_wrist_link", "r_wrist_link"]),
+    ("mimic_float", "mimic_float.urdf", true, &["l_ankle_link", "r_ankle_link"]),
+    ("ball_pendulum", "ball_pendulum.xml", false, &["bob"]),
+    ("ball_chain", "ball_chain.xml", false, &["e", "b"]),
+    ("ball_float", "ball_float.xml", true, &["l_shin", "r_shin"]),
+    ("multi_planar", "multi_planar.xml", false, &["cyl"]),
+    ("multi_arm", "multi_arm.xml", false, &["c", "d"]),
+];
+
 /// Robots that are compiled under the exact rules too, and in single precision.
 const EXACT: [&str; 4] = ["chapter_stanford", "chapter_oblique", "panda", "solo12"];
 const SINGLE: [&str; 4] = ["planar2r", "chapter_oblique", "panda", "solo12"];
@@ -105,6 +119,36 @@ fn main() {
         std::fs::write(out.join(format!("contact_planar2r_{name}.rs")), text).expect("OUT_DIR can be written");
     }
     lanes(&out, &folder);
+    joints(&out);
+}
+
+/// All functions of the robots of `reference/joints`, in a file of their own.
+fn joints(out: &Path) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("reference/joints/robots");
+    let (mut modules, mut table) = (String::new(), String::new());
+    for (robot, file, floating, frames) in JOINTS {
+        let path = folder.join(file);
+        println!("cargo:rerun-if-changed={}", path.display());
+        let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        let options = Options {
+            frames: frames.iter().map(|f| f.to_string()).collect(),
+            model: ModelOptions { floating_base: floating, ..ModelOptions::default() },
+            ..Options::default()
+        };
+        let generated = compile(&Source::new(file, text), &options).unwrap_or_else(|d| panic!("{}", d.render()));
+        std::fs::write(out.join(format!("{robot}.rs")), &generated.text).expect("OUT_DIR can be written");
+        let _ = writeln!(
+            modules,
+            "/// `{file}`.\n#[allow(clippy::all)]\npub mod {robot} {{\n    include!(concat!(env!(\"OUT_DIR\"), \"/{robot}.rs\"));\n}}",
+        );
+        let calls = calls_of(robot, &generated, &Function::all().collect::<Vec<_>>());
+        let _ = writeln!(
+            table,
+            "    Compiled {{\n        robot: {robot:?},\n        exact: false,\n        functions: &[\n{calls}        ],\n    }},"
+        );
+    }
+    let table = format!("/// Robots with other joints.\npub const JOINTS: &[Compiled<f64>] = &[\n{table}];\n");
+    std::fs::write(out.join("joints.rs"), modules + &table).expect("OUT_DIR can be written");
 }
 
 /// Functions over lanes and batches for `tests/suite/lanes.rs`: in one part and in several, with every shape of output, with a

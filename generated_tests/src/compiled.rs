@@ -73,6 +73,7 @@ flatten_scalar!(f32);
 flatten_scalar!(f64);
 
 include!(concat!(env!("OUT_DIR"), "/compiled.rs"));
+include!(concat!(env!("OUT_DIR"), "/joints.rs"));
 
 macro_rules! modules {
     ($($(#[$doc:meta])* $name:ident;)*) => {$(

@@ -1,4 +1,5 @@
-//! The reference data of `reference/`: eleven robots, 40 states each, values with 25 digits.
+//! The reference data of `reference/`: eleven robots, 40 states each, values with 25 digits; and of `reference/joints/`: ten robots whose joints follow others, are balls,
+//! or stand several in a body.
 //!
 //! How an error is judged: `scaled = |computed − expected| / scale`, the worst over the components of an output.
 //!
@@ -36,6 +37,20 @@ pub const ROBOTS: [&str; 11] = [
     "simple_humanoid",
 ];
 
+/// The robots of `reference/joints/`, each with its file.
+pub const JOINTS: [(&str, &str); 10] = [
+    ("mimic_gripper", "urdf"),
+    ("mimic_chain", "urdf"),
+    ("mimic_screw", "urdf"),
+    ("mimic_tree", "urdf"),
+    ("mimic_float", "urdf"),
+    ("ball_pendulum", "xml"),
+    ("ball_chain", "xml"),
+    ("ball_float", "xml"),
+    ("multi_planar", "xml"),
+    ("multi_arm", "xml"),
+];
+
 /// A robot with its states.
 #[derive(Debug)]
 pub struct Robot {
@@ -55,6 +70,8 @@ pub struct Robot {
     pub states: Vec<State>,
     largest_potential_energy: f64,
     baseline: Value,
+    /// What the baseline calls functions and parts of their results.
+    key: fn(Function) -> &'static [&'static str],
 }
 
 /// A state with all that is expected in it.
@@ -131,54 +148,64 @@ fn largest(values: &[Dd]) -> f64 {
 }
 
 impl Robot {
-    /// The robot of that name with all its states.
+    /// The robot of that name of [`ROBOTS`] with all its states.
     pub fn load(name: &str) -> Robot {
-        let file = json(&folder().join("states").join(format!("{name}.json")));
-        let list = json(&folder().join("robots.json"));
+        let baseline = json(&folder().join("baseline_pinocchio.json"));
+        Robot::of_folder((&folder(), description(name)), name, &baseline, by_pinocchio)
+    }
+
+    /// The robot of that name of [`JOINTS`] with all its states.
+    pub fn with_joints(name: &str) -> Robot {
+        let folder = folder().join("joints");
+        let (_, extension) = JOINTS.iter().find(|robot| robot.0 == name).expect("a robot of the list");
+        let file = folder.join("robots").join(format!("{name}.{extension}"));
+        Robot::of_folder((&folder, file), name, &json(&folder.join("baseline_float.json")), by_plain_evaluation)
+    }
+
+    fn of_folder(
+        (folder, description): (&Path, PathBuf),
+        name: &str,
+        baseline: &Value,
+        key: fn(Function) -> &'static [&'static str],
+    ) -> Robot {
+        let file = json(&folder.join("states").join(format!("{name}.json")));
+        let list = json(&folder.join("robots.json"));
         let entry = list.as_array().expect("a list").iter().find(|r| r["name"] == name).expect("a robot of the list");
-        let baseline = json(&folder().join("baseline_pinocchio.json"))["robots"][name].clone();
-        let states: Vec<State> = file["states"].as_array().expect("a list").iter().map(State::new).collect();
+        let joints = file["joints"].as_array().expect("a list");
+        // joints that follow others come last
+        let follows = |k: &usize| joints[*k].get("mimic").is_some();
+        let mut order: Vec<usize> = (0..joints.len()).collect();
+        order.sort_by_key(follows);
+        let states: Vec<State> =
+            file["states"].as_array().expect("a list").iter().map(|state| State::new(state, &order)).collect();
         let potential_energy = |s: &State| largest(&numbers(&s.data["V"]));
         Robot {
+            key,
+            baseline: baseline["robots"][name].clone(),
             name: name.to_string(),
-            file: description(name),
+            file: description,
             floating: entry["floating"].as_bool().expect("true or false"),
             frames: strings(&entry["frames"]),
-            joints: file["joints"]
-                .as_array()
-                .expect("a list")
+            joints: joints
                 .iter()
+                .filter(|joint| joint.get("mimic").is_none())
                 .map(|j| j["name"].as_str().expect("a name").to_string())
                 .collect(),
             nv: states[0].qd.len(),
             largest_potential_energy: states.iter().map(potential_energy).fold(0.0, f64::max),
             states,
-            baseline,
         }
     }
 
-    /// The largest scaled error that a function may have: 20 times that of Pinocchio 4.1 on the same states, or 1e-14,
-    /// whichever is larger.
+    /// The largest scaled error that a function may have: 20 times that of Pinocchio 4.1 on the same states, of [`JOINTS`] 20 times that of a plain
+    /// evaluation in f64, or 1e-14, whichever is larger.
     pub fn bound(&self, function: Function) -> f64 {
         if let members @ [_, ..] = function.spec().members {
             return members.iter().map(|member| self.bound(*member)).fold(0.0, f64::max);
         }
-        let key = match function {
-            Function::InverseDynamics => "id",
-            Function::BiasForce => "nle",
-            Function::GravityForce => "gravity",
-            Function::VelocityForce => "coriolis",
-            Function::MassMatrix => "crba",
-            Function::ForwardDynamics => "aba",
-            Function::JointWrenches => "wrench",
-            Function::ForwardKinematics => "fk",
-            Function::Jacobian => "jacobian",
-            Function::JacobianBias | Function::FrameVelocity | Function::FrameAcceleration => "jdqd",
-            // sums over the bodies; of others the data hold nothing
-            _ => "energy",
-        };
-        let pinocchio = self.baseline[key]["scaled"].as_f64().expect("the baseline has every robot and function");
-        (20.0 * pinocchio).max(bounds::FUNCTION.most)
+        let error = |key: &&str| self.baseline[*key]["scaled"].as_f64().expect("the baseline has every robot and function");
+        let baseline = (self.key)(function).iter().map(error).fold(0.0, f64::max);
+        (20.0 * baseline).max(bounds::FUNCTION.most)
     }
 
     /// What a function gives in a state; `None` for what the data do not hold.
@@ -271,8 +298,51 @@ impl Robot {
     }
 }
 
+/// What the baseline of [`ROBOTS`] calls a function.
+fn by_pinocchio(function: Function) -> &'static [&'static str] {
+    match function {
+        Function::InverseDynamics => &["id"],
+        Function::BiasForce => &["nle"],
+        Function::GravityForce => &["gravity"],
+        Function::VelocityForce => &["coriolis"],
+        Function::MassMatrix => &["crba"],
+        Function::ForwardDynamics => &["aba"],
+        Function::JointWrenches => &["wrench"],
+        Function::ForwardKinematics => &["fk"],
+        Function::Jacobian => &["jacobian"],
+        Function::JacobianBias | Function::FrameVelocity | Function::FrameAcceleration => &["jdqd"],
+        // sums over the bodies; of others the data hold nothing
+        _ => &["energy"],
+    }
+}
+
+/// What the baseline of [`JOINTS`] calls it.
+fn by_plain_evaluation(function: Function) -> &'static [&'static str] {
+    match function {
+        Function::JointWrenches => &["wrench"],
+        Function::ForwardKinematics => &["frame_position", "frame_rotation"],
+        Function::Jacobian => &["frame_jacobian"],
+        Function::JacobianBias | Function::FrameVelocity | Function::FrameAcceleration => {
+            &["frame_jdqd", "frame_jacobian"]
+        }
+        Function::InverseDynamics => &["inverse_dynamics"],
+        Function::BiasForce => &["bias_force"],
+        Function::GravityForce => &["gravity_force"],
+        Function::VelocityForce => &["velocity_force"],
+        Function::MassMatrix => &["mass_matrix"],
+        Function::ForwardDynamics => &["forward_dynamics"],
+        _ => &["energy"],
+    }
+}
+
 impl State {
-    fn new(data: &Value) -> State {
+    /// From its data, which has wrenches in another order of the joints.
+    fn new(data: &Value, order: &[usize]) -> State {
+        let mut data = data.clone();
+        if let Some(wrenches) = data.get("wrench").and_then(Value::as_array).cloned() {
+            data["wrench"] = order.iter().map(|k| wrenches[*k].clone()).collect();
+        }
+        let data = &data;
         let text = |key: &str| data[key].as_str().expect("a string").to_string();
         let three = |v: Vec<f64>| <[f64; 3]>::try_from(v).expect("three components");
         State {

@@ -23,6 +23,7 @@ mod fused;
 mod generic;
 mod golden;
 mod identities;
+mod joint_states;
 mod lanes;
 mod limbs;
 mod mutants;

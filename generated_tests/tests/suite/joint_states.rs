@@ -1,0 +1,91 @@
+//! Robots whose joints follow others, are balls, or stand several in a body, against values with 25 digits.
+
+use straightline_codegen::Function;
+use straightline_core::Dd;
+use straightline_generated_tests::bounds::DATA;
+use straightline_generated_tests::compiled;
+use straightline_generated_tests::programs::{self, cast};
+use straightline_generated_tests::reference::{Robot, State, JOINTS};
+
+/// Functions whose results depend on gravity.
+fn feels_gravity(function: Function) -> bool {
+    use Function::*;
+    matches!(function, InverseDynamics | BiasForce | GravityForce | ForwardDynamics | JointWrenches | Energy)
+}
+
+/// Judges what `results` gives of every function in the states with the robot's own gravity; a line for each function, and how many states there were.
+fn judge(
+    robot: &Robot,
+    bound: impl Fn(Function) -> f64,
+    results: impl Fn(Function, &State) -> Vec<Dd>,
+) -> (usize, String) {
+    let (mut checked, mut failures) = (0, String::new());
+    for function in Function::all() {
+        let (mut worst, mut at) = (0.0, "");
+        for state in robot.states.iter().filter(|s| s.gravity.is_none() || !feels_gravity(function)) {
+            let Some(expected) = robot.expected(state, function) else { continue };
+            checked += 1;
+            let (error, _) = expected.worst(&results(function, state));
+            if error > worst {
+                (worst, at) = (error, &state.id);
+            }
+        }
+        let bound = bound(function);
+        println!("{:<14} {:<20} {worst:9.1e} {bound:9.1e} {:8.3}  {at}", robot.name, function.name(), worst / bound);
+        if worst > bound {
+            failures += &format!("{} of {}: {worst:.1e} > {bound:.1e} in {at}\n", function.name(), robot.name);
+        }
+    }
+    (checked, failures)
+}
+
+#[test]
+fn compiled_functions_of_other_joints_give_the_reference_values() {
+    let (mut checked, mut failures) = (0, String::new());
+    for (name, _) in JOINTS {
+        let robot = Robot::with_joints(name);
+        let compiled = compiled::JOINTS.iter().find(|c| c.robot == name).expect("every robot is compiled");
+        let of_compiled = |function: Function, state: &State| {
+            let results = compiled.call(function, &state.inputs(function));
+            results.into_iter().map(Dd::from).collect()
+        };
+        let (states, wrong) = judge(&robot, |function| robot.bound(function), of_compiled);
+        (checked, failures) = (checked + states, failures + &wrong);
+    }
+    assert!(failures.is_empty(), "{failures}");
+    assert!(checked > 1500, "{checked} results");
+}
+
+/// The inputs in double-double; quaternions have length one in all digits, as in the data.
+fn exact(quaternions: &[usize], inputs: &[Vec<f64>]) -> Vec<Vec<Dd>> {
+    let mut wide = cast::<Dd>(inputs);
+    for first in quaternions {
+        let quaternion = &mut wide[0][*first..first + 4];
+        let norm = quaternion.iter().fold(Dd::ZERO, |sum, x| sum + *x * *x).sqrt();
+        quaternion.iter_mut().for_each(|x| *x /= norm);
+    }
+    wide
+}
+
+/// Rounding left aside, angles as they are written.
+#[test]
+fn equations_of_other_joints_have_all_digits_of_the_reference_values() {
+    let mut failures = String::new();
+    for (name, _) in JOINTS {
+        let robot = Robot::with_joints(name);
+        let mut options = programs::options(&robot);
+        options.model.angle_tolerance = 0.0;
+        let loaded = programs::load(&programs::source(&robot), &options.model);
+        let quaternions: Vec<usize> = loaded
+            .model
+            .free_joints()
+            .filter_map(|joint| Some(joint.iq + joint.kind.row().quaternion?))
+            .collect();
+        let of_program = |function: Function, state: &State| {
+            let program = programs::of_robot(&robot, function, &options);
+            programs::run::<Dd>(&program, &exact(&quaternions, &state.inputs(function)))
+        };
+        failures += &judge(&robot, |_| DATA.most, of_program).1;
+    }
+    assert!(failures.is_empty(), "{failures}");
+}
