@@ -47,6 +47,7 @@ pub const CODES: &[&str] = &[
     "joint-order-follower",
     "floating-joint",
     "several-coordinates",
+    "oblique-plane",
     "negative-effect",
     "gear-ratio-zero",
     "gear-ratio-alone",
@@ -292,7 +293,14 @@ pub fn not_supported_yet(owner: &str, what: &str, why: &str, help: &str) -> D {
 pub fn several_coordinates(joint: &str, kind: &str, what: &str) -> D {
     D::error("several-coordinates", format!("{kind} joint `{joint}` has {what}"))
         .detail("that belongs to one coordinate, and the joint has several")
-        .help("leave it out, or write the joint as three revolute joints, with links without inertia in between")
+        .help("leave it out, or write the joint as single joints, with links without inertia in between")
+}
+
+/// A joint across an axis that is none of its frame.
+pub fn oblique_plane(owner: &str, kind: &str) -> D {
+    D::error("oblique-plane", format!("{owner}: the axis of a {kind} joint is x, y or z of its frame, or against one"))
+        .detail("the directions across it would be those that rounding makes")
+        .help("turn the joint frame, and give the axis in it")
 }
 
 /// A coupling of a joint that is not there, does not move, or has several coordinates.

@@ -5,6 +5,7 @@
 //! needs the whole robot (tree, inertias, angles) by `crate::model`.
 
 mod chapter;
+pub mod composite;
 mod couplings;
 pub mod drives;
 pub mod flexible;

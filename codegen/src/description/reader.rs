@@ -1,6 +1,6 @@
 //! What the readers share: places, complaints, numbers.
 
-use super::{messages, Ignored, Noted};
+use super::{messages, Ignored, Noted, Placement, WrittenJoint};
 use crate::diagnostic::{Diagnostic, Diagnostics, Place, Source};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -112,5 +112,19 @@ impl<'a> FileReader<'a> {
         } else {
             Some(self.value(text.to_string(), span))
         }
+    }
+
+    /// A joint after complaints about what a composite one cannot have: what would belong to several coordinates, and an oblique axis.
+    pub fn judged_composite(&mut self, joint: WrittenJoint) -> WrittenJoint {
+        let Some(composite) = joint.kind.value.composite else { return joint };
+        let (word, owner) = (composite.of.word, format!("joint `{}`", joint.name.value));
+        for (what, value) in joint.of_one_coordinate().into_iter().filter(|_| !composite.of.has_pitch) {
+            let complaint = messages::several_coordinates(&joint.name.value, word, what);
+            self.diagnostics.push(complaint.at(&value.place));
+        }
+        if let (false, Placement::Frames { axis, .. }) = (joint.has_fit_axis(), &joint.placement) {
+            self.diagnostics.push(messages::oblique_plane(&owner, word).at(&axis.place));
+        }
+        joint
     }
 }

@@ -1,6 +1,7 @@
 //! TOML with joint frames; the schema is in `SCHEMA.md`.
 
 use super::flexible::Flexible;
+use super::composite::{Composite, WrittenComposite};
 use super::reader::{FileReader, Range64};
 use super::table::{self, TomlTable};
 use super::{
@@ -119,8 +120,11 @@ fn read_joint(reader: &mut FileReader, mut table: TomlTable) -> Option<WrittenJo
     let name = named(reader, &mut table, "joint");
     let words = JointType::words(FORMAT.dialect);
     let is_written = |word: &str| matches!(table.get("kind"), Some((DeValue::String(text), _)) if text == word);
-    let number = words.iter().find(|(word, _)| is_written(word)).and_then(|(_, t)| t.number_key());
-    reader.check_keys(&table, &[JOINT, number.as_slice()].concat());
+    let written = words.iter().find(|(word, _)| is_written(word)).map(|(_, t)| *t);
+    let number = written.and_then(|t| t.number_key());
+    let composite = written.and_then(|t| t.composite).map(|composite| composite.of);
+    let of_composite = composite.map_or(&[][..], composite_keys);
+    reader.check_keys(&table, &[JOINT, number.as_slice(), of_composite].concat());
     reader.require(&table, "kind", "kind = \"revolute\"");
     let mut kind = reader.word_at(&table, "kind", &words);
     if let (Some(kind), Some(key)) = (&mut kind, number) {
@@ -147,6 +151,9 @@ fn read_joint(reader: &mut FileReader, mut table: TomlTable) -> Option<WrittenJo
         _ => reader.vector_at(&table, "axis"),
     };
     let axis = axis.unwrap_or_else(|| reader.value([0.0, 0.0, 1.0], &table.span));
+    if let (Some(kind), Some(composite)) = (&mut kind, composite) {
+        kind.value.composite = Some(read_composite(reader, &table, composite));
+    }
     let limits = reader.limits_at(&table, "limits");
     let drive = reader.drive_at(&table);
     for (key, why, help) in [
@@ -160,7 +167,42 @@ fn read_joint(reader: &mut FileReader, mut table: TomlTable) -> Option<WrittenJo
     // a kind that was complained of stands for the one with an axis and no limits, so that the axis is judged in the same run
     let kind = kind.unwrap_or_else(|| Noted::new(JointType::turning(false), axis.place.clone()));
     let placement = Placement::Frames { origin, axis };
-    Some(WrittenJoint { name: name?, kind, parent: parent?, child: child?, placement, limits, drive })
+    let joint = WrittenJoint { name: name?, kind, parent: parent?, child: child?, placement, limits, drive };
+    Some(reader.judged_composite(joint))
+}
+
+fn composite_keys(composite: &'static Composite) -> &'static [&'static str] {
+    match (composite.has_second_axis, composite.has_pitch) {
+        (true, _) => &["axis2"],
+        (_, true) => &["pitch", "lead"],
+        _ => &[],
+    }
+}
+
+/// What a composite joint has beside others.
+fn read_composite(reader: &mut FileReader, table: &TomlTable, of: &'static Composite) -> WrittenComposite {
+    let mut read = WrittenComposite { of, second_axis: [0.0, 0.0, 1.0], pitch: 1.0 };
+    if of.has_second_axis {
+        reader.require(table, "axis2", "axis2 = \"y\"");
+        let axis = match table.get("axis2") {
+            Some((DeValue::String(_), _)) => reader.word_at(table, "axis2", &AXES),
+            _ => reader.vector_at(table, "axis2"),
+        };
+        read.second_axis = axis.map_or(read.second_axis, |axis| axis.value);
+    }
+    if of.has_pitch {
+        let [pitch, lead] = ["pitch", "lead"].map(|key| reader.real_at(table, key, Range64::Finite));
+        match (pitch, lead) {
+            (Some(_), Some(lead)) => {
+                reader.diagnostics.push(messages::written_twice(&table.owner, "pitch", "lead").at(&lead.place));
+            }
+            (Some(pitch), None) => read.pitch = pitch.value,
+            (None, Some(lead)) => read.pitch = lead.value / std::f64::consts::TAU,
+            (None, None) if !table.has("pitch") && !table.has("lead") => reader.require(table, "pitch", "pitch = 0.0008"),
+            (None, None) => {}
+        }
+    }
+    read
 }
 
 fn read_frame(reader: &mut FileReader, mut table: TomlTable) -> Option<NamedFrame> {

@@ -2,6 +2,7 @@
 //!
 //! The one thing that formats say in different ways is where a joint stands ([`Placement`]).
 
+use super::composite::{Composite, WrittenComposite, COMPOSITES};
 use super::{drives, flexible, FileFormat, Noted};
 use crate::diagnostic::Place;
 use straightline_core::joint::{self, Dialect, JointKind, Measure};
@@ -118,7 +119,11 @@ impl Description {
     /// Adds what could be read of a joint.
     pub(crate) fn add_joint(&mut self, joint: Option<WrittenJoint>) {
         self.has_holes |= joint.is_none();
-        self.joints.extend(joint);
+        if let Some((joints, links, couplings)) = joint.map(WrittenJoint::expanded) {
+            self.joints.extend(joints);
+            self.links.extend(links);
+            self.couplings.extend(couplings);
+        }
     }
 }
 
@@ -266,11 +271,13 @@ pub struct JointType {
     pub has_range: bool,
     /// The number that its kind has of its own, such as a pitch.
     pub number: Option<f64>,
+    /// A joint that is read as several.
+    pub composite: Option<WrittenComposite>,
 }
 
 impl JointType {
     /// A joint that does not move.
-    pub const FIXED: JointType = JointType { word: "fixed", kind: None, has_range: false, number: None };
+    pub const FIXED: JointType = JointType { word: "fixed", kind: None, has_range: false, number: None, composite: None };
 
     /// All words of a dialect: joints between links, then `fixed` where files have such joints, then free bases.
     pub fn words(dialect: Dialect) -> Vec<(&'static str, JointType)> {
@@ -279,11 +286,13 @@ impl JointType {
                 word: word.text,
                 kind: Some(kind),
                 has_range: word.has_range,
-                number: None,
+                ..JointType::FIXED
             })
         };
         let has_fixed = Dialect::FRAMES.contains(&dialect);
-        let between_links = words().filter(|t| !t.is_free()).chain(has_fixed.then_some(JointType::FIXED));
+        let composites = COMPOSITES.iter().filter(|composite| composite.dialects.contains(&dialect));
+        let single = words().filter(|t| !t.is_free());
+        let between_links = single.chain(composites.map(Composite::joint_type)).chain(has_fixed.then_some(JointType::FIXED));
         between_links.chain(words().filter(|t| t.is_free())).map(|t| (t.word, t)).collect()
     }
 
@@ -292,7 +301,14 @@ impl JointType {
         let kind = Measure::Angle.joint();
         let word =
             kind.row().words.iter().find(|word| word.has_range == has_range).expect("there is a word for either");
-        JointType { word: word.text, kind: Some(kind), has_range, number: None }
+        JointType { word: word.text, kind: Some(kind), has_range, ..JointType::FIXED }
+    }
+
+    /// A joint that turns or slides without limits.
+    pub fn free_along(measure: Measure) -> JointType {
+        let kind = measure.joint();
+        let word = kind.row().words.iter().find(|word| !word.has_range).unwrap_or(&kind.row().words[0]);
+        JointType { word: word.text, kind: Some(kind), ..JointType::FIXED }
     }
 
     /// The same with the number that its kind has of its own.
@@ -307,7 +323,8 @@ impl JointType {
 
     /// Whether it moves along or about an axis that the file gives.
     pub fn has_axis(self) -> bool {
-        self.between_links().is_some_and(|kind| kind.row().has_axis)
+        let has_axis = |kind: JointKind| kind.row().has_axis;
+        self.composite.map_or(self.between_links().is_some_and(has_axis), |composite| composite.of.has_axis)
     }
 
     /// Whether it would let a link move freely, which no joint between links does.
@@ -338,6 +355,28 @@ pub struct WrittenJoint {
     pub limits: JointLimits,
     /// What its drive adds.
     pub drive: JointDrive,
+}
+
+impl WrittenJoint {
+    /// What belongs to a single coordinate: limits, friction, a rotor and a spring, as far as they are written; zeros add nothing.
+    pub(crate) fn of_one_coordinate(&self) -> Vec<(&'static str, &Noted<f64>)> {
+        let WrittenJoint { limits, drive, .. } = self;
+        let given = [
+            ("a lower limit", &limits.lower),
+            ("an upper limit", &limits.upper),
+            ("a velocity limit", &limits.velocity),
+            ("an effort limit", &limits.effort),
+        ];
+        let acting = [
+            ("damping", &drive.damping),
+            ("friction", &drive.friction),
+            ("a rotor inertia", &drive.rotor_inertia),
+            ("an armature", &drive.armature),
+            ("a spring", &drive.spring_stiffness),
+        ];
+        let acting = acting.into_iter().filter(|(_, value)| value.as_ref().is_some_and(|value| value.value != 0.0));
+        given.into_iter().chain(acting).filter_map(|(what, value)| Some((what, value.as_ref()?))).collect()
+    }
 }
 
 /// How a file says where a joint stands.

@@ -306,7 +306,8 @@ fn read_joint(
         couplings.extend(read_mimic(reader, &owner, name, element));
     }
     let placement = Placement::Frames { origin, axis };
-    Some(WrittenJoint { name: name?, kind: kind?, parent: parent?, child: child?, placement, limits, drive })
+    let joint = WrittenJoint { name: name?, kind: kind?, parent: parent?, child: child?, placement, limits, drive };
+    Some(reader.judged_composite(joint))
 }
 
 /// Whose coordinate a joint follows, and how: q = multiplier q_joint + offset.
@@ -329,12 +330,6 @@ fn read_kind(reader: &mut FileReader, owner: &str, attribute: Attribute) -> Opti
     let kind = match attribute.value().trim() {
         word if words.iter().any(|(known, _)| *known == word) => {
             words.into_iter().find(|(known, _)| *known == word).map(|(_, kind)| kind)?
-        }
-        kind @ "planar" => {
-            let help = "write its motions as single joints, with links without inertia in between";
-            let why = "no joint has these coordinates";
-            reader.complain(&span, messages::not_supported_yet(owner, kind, why, help));
-            return None;
         }
         word => {
             let known: Vec<&str> = words.iter().filter(|(_, t)| !t.is_free()).map(|(known, _)| *known).collect();

@@ -154,6 +154,7 @@ pub const ALL: &[Code] = &[
     code("nothing-slides", Error, "Friction without a surface to slide on."),
     code("nothing-yields", Error, "An environment without a distance."),
     code("number-beyond-scalar", Error, "A number of the robot that the scalar type cannot hold."),
+    code("oblique-plane", Error, "A planar joint whose axis is none of its frame."),
     code("one-per-joint", Error, "A list of another length than that of the joints."),
     code("other-drives", Error, "A controller that knows other drives."),
     code("out-of-range", Error, "A finite number beyond anything a robot has."),

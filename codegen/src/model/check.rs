@@ -234,27 +234,9 @@ fn of_one_coordinate(joint: &WrittenJoint, diagnostics: &mut Diagnostics) {
     if kind.between_links().is_none_or(|kind| kind.is_single()) {
         return;
     }
-    let WrittenJoint { limits, drive, .. } = joint;
-    let given = [
-        ("a lower limit", &limits.lower),
-        ("an upper limit", &limits.upper),
-        ("a velocity limit", &limits.velocity),
-        ("an effort limit", &limits.effort),
-    ];
-    // as good as not written
-    let acting = [
-        ("damping", &drive.damping),
-        ("friction", &drive.friction),
-        ("a rotor inertia", &drive.rotor_inertia),
-        ("an armature", &drive.armature),
-        ("a spring", &drive.spring_stiffness),
-    ];
-    let acting = acting.into_iter().filter(|(_, value)| value.as_ref().is_some_and(|value| value.value != 0.0));
-    for (what, value) in given.into_iter().chain(acting) {
-        if let Some(value) = value {
-            let complaint = messages::several_coordinates(&joint.name.value, kind.word, what);
-            diagnostics.push(complaint.at(&value.place));
-        }
+    for (what, value) in joint.of_one_coordinate() {
+        let complaint = messages::several_coordinates(&joint.name.value, kind.word, what);
+        diagnostics.push(complaint.at(&value.place));
     }
 }
 

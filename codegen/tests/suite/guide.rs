@@ -5,6 +5,7 @@
 use crate::options::compare_table;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use straightline_codegen::description::composite::COMPOSITES;
 use straightline_codegen::description::{self, FileFormat, FORMATS};
 use straightline_codegen::function::{Extent, Family, Parts, Spec};
 use straightline_codegen::scene;
@@ -145,6 +146,17 @@ fn joints() -> String {
     }
     for kind in KINDS.iter().filter(|kind| !kind.row().coordinates.is_empty()) {
         let _ = write!(page, "\nOf `{}`:\n\n```text\n{}\n```\n", kind.row().name, kind.row().coordinates.trim_end());
+    }
+    page += "\nJoints that are read as several, with links without mass in between (`description::composite`):\n\n\
+| kind | does | joints | words in |\n|---|---|---|---|\n";
+    for composite in COMPOSITES {
+        let parts = composite.parts.iter().map(|part| match part.suffix {
+            "" => format!("`NAME` \\[{}\\]", part.measure.units()[0]),
+            suffix => format!("`NAME_{suffix}` \\[{}\\]", part.measure.units()[0]),
+        });
+        let files = FORMATS.iter().filter(|format| composite.dialects.contains(&format.dialect)).map(|format| format.name);
+        let (parts, files) = (parts.collect::<Vec<_>>().join(", "), files.collect::<Vec<_>>().join(", "));
+        let _ = writeln!(page, "| {} | {} | {parts} | {files} |", composite.word, composite.summary);
     }
     page += "\nA word with limits (`revolute`, `prismatic`) has a range that the file gives; fixed joints are merged away and have no row. A floating base is an\n\
 option of the front or a key of the robot file, no joint between bodies: a joint of that word is an error that says so.\n";

@@ -14,6 +14,7 @@ mod certificates_of_robots;
 mod chain;
 mod columns;
 mod companions;
+mod composites;
 mod contact;
 mod contact_compiled;
 mod contact_derivatives;
