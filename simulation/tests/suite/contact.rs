@@ -66,6 +66,7 @@ fn pendulum(links: usize) -> Model<f64> {
     let end = Transform { rotation: Mat3::identity(), translation: Vec3::new(1.0, 0.0, 0.0) };
     let frames = vec![Frame { name: "end".into(), body: Some(links - 1), placement: end }];
     Model {
+        couplings: vec![],
         name: "pendulum".into(),
         bodies,
         gravity: Vec3::new(0.0, 0.0, -G),
