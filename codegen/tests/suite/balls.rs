@@ -33,7 +33,12 @@ fn robot(name: &str, text: &str) -> Robot {
 }
 
 /// What is expected of a function, and against what errors are judged; the name of its baseline.
-fn expected(function: Function, state: &Value, frames: &[String], most_potential: f64) -> Vec<(&'static str, Vec<Dd>, Vec<f64>)> {
+fn expected(
+    function: Function,
+    state: &Value,
+    frames: &[String],
+    most_potential: f64,
+) -> Vec<(&'static str, Vec<Dd>, Vec<f64>)> {
     let scaled = |name, field: &str, of: &str| {
         let scale = numbers(&state["scale"][of]).iter().map(|x| x.to_f64()).collect();
         vec![(name, numbers(&state[field]), scale)]
@@ -104,7 +109,8 @@ fn programs_of_robots_with_balls_lose_a_few_roundings_beside_the_data() {
         let states = || file["states"].as_array().expect("a list").iter();
         let most_potential = states().map(|state| numbers(&state["V"])[0].to_f64().abs()).fold(0.0, f64::max);
         for function in FUNCTIONS {
-            let program = checked(&robot, &frames, function, &Options::default()).unwrap_or_else(|wrong| panic!("{wrong}"));
+            let program =
+                checked(&robot, &frames, function, &Options::default()).unwrap_or_else(|wrong| panic!("{wrong}"));
             assert!(program.plainer.is_none(), "{} of {name} is in a plainer form", function.name());
             // in the gravity of the file
             for state in states().filter(|state| state["gravity"].is_null()) {

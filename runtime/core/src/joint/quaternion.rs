@@ -106,7 +106,11 @@ mod tests {
             let length = q.iter().fold(Dd::ZERO, |sum, x| sum + *x * *x).sqrt();
             let q = q.map(|x| x / length);
             let found = rotation_to_quaternion(&quaternion_to_rotation(q));
-            let sign = if found.iter().zip(&q).fold(Dd::ZERO, |sum, (a, b)| sum + *a * *b).hi() < 0.0 { -Dd::ONE } else { Dd::ONE };
+            let sign = if found.iter().zip(&q).fold(Dd::ZERO, |sum, (a, b)| sum + *a * *b).hi() < 0.0 {
+                -Dd::ONE
+            } else {
+                Dd::ONE
+            };
             for (found, x) in found.iter().zip(&q) {
                 assert!((*found * sign - *x).abs().hi() < 1e-30, "{found:?} for {q:?}");
             }
