@@ -107,11 +107,7 @@ fn build(drive: &WrittenDrive, model: &Model<Dd>, diagnostics: &mut Diagnostics)
 }
 
 /// Ratios to joints, those that follow others as ratios to the joints that they follow.
-fn on_free_joints<T: Real>(
-    joints: &[(BodyId, T)],
-    model: &Model<Dd>,
-    number: impl Fn(Dd) -> T,
-) -> Vec<(BodyId, T)> {
+fn on_free_joints<T: Real>(joints: &[(BodyId, T)], model: &Model<Dd>, number: impl Fn(Dd) -> T) -> Vec<(BodyId, T)> {
     let mut found: Vec<(BodyId, T)> = Vec::new();
     for (body, n) in joints {
         let (body, n) = match model.coupling_of(*body) {
@@ -147,7 +143,8 @@ fn body(owner: &str, joint: &Noted<String>, model: &Model<Dd>, diagnostics: &mut
     let found = model.bodies.iter().position(|b| is_it(&b.joint.name, b.joint.kind));
     let several = model.bodies.iter().map(|b| &b.joint).find(|j| j.name == joint.value && !j.kind.is_single());
     if let Some(other) = several.filter(|other| !other.kind.is_base()) {
-        let complaint = messages::several_coordinates(&joint.value, other.kind.row().name, &format!("a drive ({owner})"));
+        let complaint =
+            messages::several_coordinates(&joint.value, other.kind.row().name, &format!("a drive ({owner})"));
         diagnostics.push(complaint.at(&joint.place));
     } else if found.is_none() {
         let moving = model.bodies.iter().filter(|b| b.joint.kind.is_single());

@@ -3,6 +3,7 @@
 
 mod acceleration_bounds;
 mod as_written;
+mod balls;
 mod bare_metal;
 mod base_parameter_names;
 mod budgets;

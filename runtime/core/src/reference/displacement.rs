@@ -174,8 +174,7 @@ pub fn increment<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], rate: &[
             let moved = rotation(&own).transpose() * Vector3::from_column_slice(&rate[link.iq..link.iq + 3]);
             v[link.iv..link.iv + 3].copy_from_slice(moved.as_slice());
         }
-        v[link.iv + first..link.iv + first + 3]
-            .copy_from_slice((turned.xyz() * T::constant(Dd::from(2.0))).as_slice());
+        v[link.iv + first..link.iv + first + 3].copy_from_slice((turned.xyz() * T::constant(Dd::from(2.0))).as_slice());
     }
     v
 }

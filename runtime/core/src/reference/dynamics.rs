@@ -4,8 +4,8 @@
 //! frame unless a tilde says otherwise. A sum over k = j … n is here a sum over the links k that joint j carries.
 
 use super::{
-    geometry, linear_forms, motion, skew, solve_symmetric, CentreOfMassLink, CentreOfMassTree, LinearForms, LinkGeometry, LinkMotion,
-    ReferenceJoint, ReferenceReal,
+    geometry, linear_forms, motion, skew, solve_symmetric, CentreOfMassLink, CentreOfMassTree, LinearForms,
+    LinkGeometry, LinkMotion, ReferenceJoint, ReferenceReal,
 };
 use crate::dd::Dd;
 use alloc::vec;

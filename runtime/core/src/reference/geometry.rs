@@ -118,9 +118,7 @@ pub fn geometry<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T]) -> Vec<Li
         };
         let here = match (link.joint, link.joint.shares()) {
             (_, Some([_, s])) => one_joint(link, (link.own_coordinate(q), s), &parent_rotation, &parent_centre_of_mass),
-            (ReferenceJoint::Ball, _) => {
-                ball(link, &q[link.iq..link.iq + 4], &parent_rotation, &parent_centre_of_mass)
-            }
+            (ReferenceJoint::Ball, _) => ball(link, &q[link.iq..link.iq + 4], &parent_rotation, &parent_centre_of_mass),
             _ => free(link, &q[link.iq..link.iq + 7]),
         };
         links.push(here);

@@ -77,12 +77,7 @@ fn one_joint<T: ReferenceReal>(
 }
 
 /// As of three revolute joints in one point, along the link's own axes: all at once, e_j q̇_j is A_j times the relative angular velocity.
-fn ball<T: ReferenceReal>(
-    position: &LinkGeometry<T>,
-    parent: &LinkMotion<T>,
-    qd: &[T],
-    qdd: &[T],
-) -> LinkMotion<T> {
+fn ball<T: ReferenceReal>(position: &LinkGeometry<T>, parent: &LinkMotion<T>, qd: &[T], qdd: &[T]) -> LinkMotion<T> {
     let LinkGeometry { rotation, r, r_parent, .. } = position;
     let LinkMotion { omega: omega_parent, epsilon: epsilon_parent, v: v_parent, w: w_parent } = parent;
     let own = rotation * Vector3::from_column_slice(qd);

@@ -951,9 +951,7 @@ fn derivatives_of_momentum_are_rates_of_its_numbers() {
             let (model, q) = moved_along(&case, k);
             let all = centroidal_derivatives(&model, &q, &qd);
             let row = |(a, b): (&[Rate], &[Rate])| {
-                let sum = |row: &[Rate], x: &[Rate]| {
-                    row.iter().zip(x).fold(Rate::zero(), |sum, (a, x)| sum + *a * *x)
-                };
+                let sum = |row: &[Rate], x: &[Rate]| row.iter().zip(x).fold(Rate::zero(), |sum, (a, x)| sum + *a * *x);
                 sum(a, &qdd) + sum(b, &qd)
             };
             rates_of(all.map.chunks(case.nv()).zip(all.rate.chunks(case.nv())).map(row).collect())
@@ -969,8 +967,7 @@ fn the_derivative_of_a_held_force_is_the_rate_of_its_torques() {
         let mut random = Random(case.seed ^ 0xf0);
         let (force, moment) = (random.vector(), random.vector());
         for frame in &case.model.frames {
-            let [_, slopes] =
-                jacobian_hessian_product(&case.model, &case.q, &[ForceOnFrame { frame, force, moment }]);
+            let [_, slopes] = jacobian_hessian_product(&case.model, &case.q, &[ForceOnFrame { frame, force, moment }]);
             let column = |k: usize| {
                 let (model, q) = moved_along(&case, k);
                 let moving = model.frame(&frame.name).expect("the same frames");

@@ -37,8 +37,7 @@ fn derivatives<T: Real>(model: &Model<T>, [q, qd, qdd]: [&[T]; 3]) -> [Vec<T>; 2
         let mut unit = none(qd);
         unit[k] = T::one();
         let fixed = with(qdd, &none(qdd));
-        let by_q =
-            inverse_dynamics(&wide, &with(q, &model.configuration_rate(q, &unit)), &with(qd, &none(qd)), &fixed);
+        let by_q = inverse_dynamics(&wide, &with(q, &model.configuration_rate(q, &unit)), &with(qd, &none(qd)), &fixed);
         let by_qd = inverse_dynamics(&wide, &with(q, &none(q)), &with(qd, &unit), &fixed);
         for i in 0..nv {
             (all[0][i * nv + k], all[1][i * nv + k]) = (by_q[i].derivatives[0], by_qd[i].derivatives[0]);

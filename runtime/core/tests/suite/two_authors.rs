@@ -6,8 +6,8 @@ use crate::support::robots::{random_position, random_robot, written_robots, Rand
 use crate::support::written::Style;
 use nalgebra::{Matrix3, Vector3};
 use straightline_core::algorithms;
-use straightline_core::coupling::Coupling;
 use straightline_core::contact::{Contact, Coordinate, Object, ObjectMotion, Surface};
+use straightline_core::coupling::Coupling;
 use straightline_core::model::{self, Body, Frame, JointKind, Limits, Model};
 use straightline_core::reference::{
     self, unit, CentreOfMassTree, Component, ContactFrames, ExtendedPosition, ReferenceJoint, SharedCoordinate,
@@ -214,7 +214,12 @@ fn both_authors_agree_where_joints_follow_others() {
     let mut coupled = 0;
     for seed in 0..120 {
         let mut random = Random(seed);
-        let kind = RobotKind { links: 2 + random.below(10), branched: seed % 2 == 0, floating: seed % 5 == 0, balls: seed % 4 == 3 };
+        let kind = RobotKind {
+            links: 2 + random.below(10),
+            branched: seed % 2 == 0,
+            floating: seed % 5 == 0,
+            balls: seed % 4 == 3,
+        };
         let mut tree = random_robot(&mut random, kind);
         couple(&mut random, &mut tree);
         let model = canonical(&mut random, &tree);

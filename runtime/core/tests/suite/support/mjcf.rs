@@ -149,7 +149,11 @@ pub fn robot(text: &str) -> Model<Dd> {
                 let (r, p) = (body.link_frame.rotation, body.link_frame.translation);
                 body.inertia = SpatialInertia::new(mass, r * tag.vector("pos") + p, tensor.rotated(&r));
             }
-            _ => assert!(tag.is_closed || tag.name.starts_with('/') || tag.name == "worldbody", "{} is unknown", tag.name),
+            _ => assert!(
+                tag.is_closed || tag.name.starts_with('/') || tag.name == "worldbody",
+                "{} is unknown",
+                tag.name
+            ),
         }
     }
     model
