@@ -48,7 +48,7 @@ impl Seat {
         })
     }
 
-    /// A joint anywhere in the child's link frame: T = T_origin T_anchor M(q − reference) T_anchor⁻¹.
+    /// A joint anywhere in the child's link frame: T = T_origin T_anchor M(−reference) M(q) T_anchor⁻¹.
     fn anchored(joint: &AnchoredJoint, tolerance: f64) -> Option<Seat> {
         let AnchoredJoint { origin, anchor, axis, reference } = joint;
         let moved = |translation| Transform { rotation: Mat3::identity(), translation };
@@ -64,8 +64,8 @@ impl Seat {
         };
         Some(Seat {
             in_parent: compose(&transform(origin, tolerance), &moved(anchor)),
-            canonical: turned(rotation),
-            link_frame: compose(&compose(&back, &turned(rotation.transpose())), &moved(anchor.map(|x| Dd::ZERO - x))),
+            canonical: compose(&turned(rotation), &back),
+            link_frame: compose(&turned(rotation.transpose()), &moved(anchor.map(|x| Dd::ZERO - x))),
             in_link: anchor,
         })
     }

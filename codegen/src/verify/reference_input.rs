@@ -356,10 +356,7 @@ fn rigid_groups(
                 let above = places.get(joint.parent.value.as_str()).ok_or("a joint hangs on nothing")?;
                 let (at, axis, vectors) = match &joint.placement {
                     Placement::Frames { origin, axis } => (Placed::read(origin, options), axis, None),
-                    Placement::Anchored(AnchoredJoint { origin, anchor, axis, .. }) => {
-                        let there = Placed { rotation: Matrix3::identity(), position: vector(&anchor.value) };
-                        (Placed::read(origin, options).then(&there), axis, None)
-                    }
+                    Placement::Anchored(given) => (anchored(given, options), &given.axis, None),
                     Placement::Vectors(given) => {
                         // S_j = C_{j−1} − r_{j−1,j}
                         let position = -vector(&given.r_parent.value);
@@ -381,7 +378,7 @@ fn rigid_groups(
                         }),
                         parts: Vec::new(),
                     });
-                    (groups.len() - 1, link_in_joint(joint, options))
+                    (groups.len() - 1, link_in_joint(joint))
                 } else {
                     (parent, place)
                 }
@@ -417,21 +414,26 @@ fn rigid_groups(
     Ok((groups, frames))
 }
 
-/// Where the link frame is in the joint frame at q = 0.
-fn link_in_joint(joint: &WrittenJoint, options: &ModelOptions) -> Placed {
-    let Placement::Anchored(AnchoredJoint { anchor, axis, reference, .. }) = &joint.placement else {
-        return Placed::here();
+/// Where an anchored joint is at q = 0: with the axes of its link, which the coordinate of the file's pose has turned or shifted back.
+fn anchored(joint: &AnchoredJoint, options: &ModelOptions) -> Placed {
+    let AnchoredJoint { origin, anchor, axis, reference } = joint;
+    let e = unit(&vector(&axis.value));
+    let back = match reference {
+        None => Placed::here(),
+        Some(Reference::Angle(angle)) => Placed { rotation: about(&e, -radians(angle, options)), ..Placed::here() },
+        Some(Reference::Length(length)) => Placed { position: -e * Dd::from(length.value), ..Placed::here() },
     };
-    let (e, back) = (unit(&vector(&axis.value)), -vector(&anchor.value));
-    match reference {
-        None => Placed { rotation: Matrix3::identity(), position: back },
-        Some(Reference::Length(length)) => {
-            Placed { rotation: Matrix3::identity(), position: back - e * Dd::from(length.value) }
+    let there = Placed { position: vector(&anchor.value), ..Placed::here() };
+    Placed::read(origin, options).then(&there).then(&back)
+}
+
+/// Where the link frame is in the joint frame.
+fn link_in_joint(joint: &WrittenJoint) -> Placed {
+    match &joint.placement {
+        Placement::Anchored(AnchoredJoint { anchor, .. }) => {
+            Placed { position: -vector(&anchor.value), ..Placed::here() }
         }
-        Some(Reference::Angle(angle)) => {
-            let rotation = about(&e, -radians(angle, options));
-            Placed { rotation, position: rotation * back }
-        }
+        _ => Placed::here(),
     }
 }
 
