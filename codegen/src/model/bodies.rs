@@ -6,7 +6,7 @@ use super::merge::{merge, Part};
 use super::{angle, centres_of_mass, check, transform, Assembly, ModelOptions};
 use crate::description::flexible::Flexible;
 use crate::description::{
-    messages, AnchoredJoint, BaseKind, Description, Placement, Reference, WrittenInertial, WrittenJoint,
+    messages, AnchoredJoint, BaseKind, Description, Placement, PoseCoordinate, WrittenInertial, WrittenJoint,
 };
 use crate::diagnostic::{Diagnostics, Place};
 use std::collections::BTreeMap;
@@ -56,11 +56,11 @@ impl Seat {
         let rotation = canonical_rotation(unit(vector(axis.value))?);
         let back = match reference {
             None => Transform::identity(),
-            Some(Reference::Angle(angle)) => {
+            Some(PoseCoordinate::Angle(angle)) => {
                 let (sin, cos) = angle::read(angle, tolerance).sin_cos;
                 turned(Mat3::about_z(-sin, cos))
             }
-            Some(Reference::Length(length)) => moved(Vec3::unit_z().scale(-Dd::from(length.value))),
+            Some(PoseCoordinate::Length(length)) => moved(Vec3::unit_z().scale(-Dd::from(length.value))),
         };
         Some(Seat {
             in_parent: compose(&transform(origin, tolerance), &moved(anchor)),
