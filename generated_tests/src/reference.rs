@@ -203,7 +203,8 @@ impl Robot {
         if let members @ [_, ..] = function.spec().members {
             return members.iter().map(|member| self.bound(*member)).fold(0.0, f64::max);
         }
-        let error = |key: &&str| self.baseline[*key]["scaled"].as_f64().expect("the baseline has every robot and function");
+        let error =
+            |key: &&str| self.baseline[*key]["scaled"].as_f64().expect("the baseline has every robot and function");
         let baseline = (self.key)(function).iter().map(error).fold(0.0, f64::max);
         (20.0 * baseline).max(bounds::FUNCTION.most)
     }

@@ -93,24 +93,19 @@ pub static COMPOSITES: &[Composite] = &[
         word: "universal",
         summary: "turns about `axis`, and then about `axis2`, which turns with it",
         has_second_axis: true,
-        parts: &[
-            part("1", Measure::Angle, Direction::Axis),
-            part("2", Measure::Angle, Direction::SecondAxis),
-        ],
+        parts: &[part("1", Measure::Angle, Direction::Axis), part("2", Measure::Angle, Direction::SecondAxis)],
         ..PLAIN
     },
     Composite {
         word: "cylindrical",
         summary: "slides along the axis and turns about it, each by itself",
-        parts: &[
-            part("slide", Measure::Length, Direction::Axis),
-            part("turn", Measure::Angle, Direction::Axis),
-        ],
+        parts: &[part("slide", Measure::Length, Direction::Axis), part("turn", Measure::Angle, Direction::Axis)],
         ..PLAIN
     },
     Composite {
         word: "helical",
-        summary: "turns about the axis and slides along it by the pitch, a joint that follows: one coordinate \\[rad\\]",
+        summary:
+            "turns about the axis and slides along it by the pitch, a joint that follows: one coordinate \\[rad\\]",
         has_pitch: true,
         parts: &[part("", Measure::Angle, Direction::Axis), part("slide", Measure::Length, Direction::Axis)],
         ..PLAIN

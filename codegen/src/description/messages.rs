@@ -333,14 +333,19 @@ pub fn coupling_cycle(joints: &[&str]) -> D {
 
 /// An elastic drive of a joint whose coordinate is shifted against the one that it follows.
 pub fn elastic_follower(drive: &str, joint: &str) -> D {
-    let what = format!("{drive}: joint `{}` follows another one with an offset, and the transmission is elastic", cut(joint));
-    D::error("elastic-follower", what).help("let the drive turn the joint that is followed, with the product of the ratios")
+    let what =
+        format!("{drive}: joint `{}` follows another one with an offset, and the transmission is elastic", cut(joint));
+    D::error("elastic-follower", what)
+        .help("let the drive turn the joint that is followed, with the product of the ratios")
 }
 
 /// A joint order with a joint that has no coordinate.
 pub fn joint_order_follower(name: &str) -> D {
-    D::error("joint-order-follower", format!("joint order: `{}` follows another joint and has no coordinate", cut(name)))
-        .help("leave it out")
+    D::error(
+        "joint-order-follower",
+        format!("joint order: `{}` follows another joint and has no coordinate", cut(name)),
+    )
+    .help("leave it out")
 }
 
 /// A floating joint.

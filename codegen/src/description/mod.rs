@@ -1,14 +1,17 @@
 //! Robot files: the table of their formats, and what is read of them, every value with its place.
 //!
-//! Whatever the format, it ends in links, joints and frames ([`Description`]). Nothing is computed here: angles stay in the unit they are
-//! written in, axes keep their length. What can be judged value by value (a number that is none, an unknown key) is judged by the readers; what
+//! Whatever the format, it ends in links, joints and frames ([`Description`]). Nothing is computed here but inertias of solids, where a
+//! file has bodies made of them: angles stay in the unit they are written in, axes keep their length. What can be judged value by value (a number that is none, an unknown key) is judged by the readers; what
 //! needs the whole robot (tree, inertias, angles) by `crate::model`.
 
+pub(crate) mod angle;
 mod chapter;
 pub mod composite;
 mod couplings;
 pub mod drives;
 pub mod flexible;
+pub(crate) mod geometry;
+pub(crate) mod merge;
 pub mod messages;
 mod mjcf;
 pub mod reader;

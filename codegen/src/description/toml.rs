@@ -1,7 +1,7 @@
 //! TOML with joint frames; the schema is in `SCHEMA.md`.
 
-use super::flexible::Flexible;
 use super::composite::{Composite, WrittenComposite};
+use super::flexible::Flexible;
 use super::reader::{FileReader, Range64};
 use super::table::{self, TomlTable};
 use super::{
@@ -158,7 +158,11 @@ fn read_joint(reader: &mut FileReader, mut table: TomlTable) -> Option<WrittenJo
     let drive = reader.drive_at(&table);
     for (key, why, help) in [
         ("transmission", "it would couple coordinates of drives and joints", "remove `transmission`"),
-        ("mimic", "whom a joint follows is said beside the joints", "write it as a table `[[coupling]]` with `joint`, `follows`, `ratio` and `offset`"),
+        (
+            "mimic",
+            "whom a joint follows is said beside the joints",
+            "write it as a table `[[coupling]]` with `joint`, `follows`, `ratio` and `offset`",
+        ),
     ] {
         if let Some((_, span)) = table.get(key) {
             reader.complain(&span, messages::not_supported_yet(&table.owner, key, why, help));
@@ -198,7 +202,9 @@ fn read_composite(reader: &mut FileReader, table: &TomlTable, of: &'static Compo
             }
             (Some(pitch), None) => read.pitch = pitch.value,
             (None, Some(lead)) => read.pitch = lead.value / std::f64::consts::TAU,
-            (None, None) if !table.has("pitch") && !table.has("lead") => reader.require(table, "pitch", "pitch = 0.0008"),
+            (None, None) if !table.has("pitch") && !table.has("lead") => {
+                reader.require(table, "pitch", "pitch = 0.0008")
+            }
             (None, None) => {}
         }
     }

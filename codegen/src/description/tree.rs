@@ -89,7 +89,7 @@ impl Description {
                 }
                 Placement::Anchored(AnchoredJoint { origin, reference, .. }) => {
                     all.extend(origin.rotation.angles(format!("the origin of joint `{}`", name.value)));
-                    if let Some(Reference::Angle(angle)) = reference {
+                    if let Some(PoseCoordinate::Angle(angle)) = reference {
                         all.push((format!("ref of joint `{}`", name.value), angle));
                     }
                 }
@@ -201,12 +201,12 @@ pub enum Rotation {
     /// Roll (about x), pitch (about y), yaw (about z): R = Rz(yaw) Ry(pitch) Rx(roll).
     RollPitchYaw([Angle; 3]),
     /// Turns, each in the axes that those before it lead to: the product of their matrices in this order.
-    Turns(Vec<Turn>),
+    Turns(Vec<WrittenTurn>),
 }
 
 /// A turn as written, from one set of axes to the next. Vectors have a direction and any length.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Turn {
+pub enum WrittenTurn {
     /// By an angle about an axis.
     About {
         /// The axis.
@@ -235,7 +235,7 @@ impl Rotation {
             }
             Rotation::Turns(turns) => {
                 let angle = |turn| match turn {
-                    &Turn::About { ref angle, .. } => Some((format!("an angle of {of}"), angle)),
+                    &WrittenTurn::About { ref angle, .. } => Some((format!("an angle of {of}"), angle)),
                     _ => None,
                 };
                 turns.iter().filter_map(angle).collect()
@@ -277,7 +277,8 @@ pub struct JointType {
 
 impl JointType {
     /// A joint that does not move.
-    pub const FIXED: JointType = JointType { word: "fixed", kind: None, has_range: false, number: None, composite: None };
+    pub const FIXED: JointType =
+        JointType { word: "fixed", kind: None, has_range: false, number: None, composite: None };
 
     /// All words of a dialect: joints between links, then `fixed` where files have such joints, then free bases.
     pub fn words(dialect: Dialect) -> Vec<(&'static str, JointType)> {
@@ -292,7 +293,8 @@ impl JointType {
         let has_fixed = Dialect::FRAMES.contains(&dialect);
         let composites = COMPOSITES.iter().filter(|composite| composite.dialects.contains(&dialect));
         let single = words().filter(|t| !t.is_free());
-        let between_links = single.chain(composites.map(Composite::joint_type)).chain(has_fixed.then_some(JointType::FIXED));
+        let between_links =
+            single.chain(composites.map(Composite::joint_type)).chain(has_fixed.then_some(JointType::FIXED));
         between_links.chain(words().filter(|t| t.is_free())).map(|t| (t.word, t)).collect()
     }
 
@@ -406,12 +408,12 @@ pub struct AnchoredJoint {
     /// Axis in the child's link frame, as long as it is written.
     pub axis: Noted<[f64; 3]>,
     /// The coordinate that the file's pose has; 0 where it says nothing.
-    pub reference: Option<Reference>,
+    pub reference: Option<PoseCoordinate>,
 }
 
 /// A coordinate of a joint that turns or slides.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Reference {
+pub enum PoseCoordinate {
     /// Of one that turns.
     Angle(Angle),
     /// Of one that slides \[m\].

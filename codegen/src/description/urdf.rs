@@ -256,11 +256,7 @@ fn read_inertia(reader: &mut FileReader, owner: &str, node: Node) -> Option<Note
     Some(reader.value(Sym3 { xx: xx?, xy: xy?, xz: xz?, yy: yy?, yz: yz?, zz: zz? }, &tag(node)))
 }
 
-fn read_joint(
-    reader: &mut FileReader,
-    node: Node,
-    couplings: &mut Vec<WrittenCoupling>,
-) -> Option<WrittenJoint> {
+fn read_joint(reader: &mut FileReader, node: Node, couplings: &mut Vec<WrittenCoupling>) -> Option<WrittenJoint> {
     let name = name_of(reader, "joint", node, "name", "<joint name=\"...\" type=\"revolute\">");
     let owner = name.as_ref().map_or("a joint".to_string(), |n| format!("joint `{}`", n.value));
     let kind = required(reader, &owner, node, "type", "<joint name=\"...\" type=\"revolute\">")

@@ -130,10 +130,8 @@ impl RobotFunction for InverseKinematicsStep {
 /// limits of its drives (section 20.5.1). A joint without a limit counts with its torque \[N·m or N\] where none has one, otherwise not; nor does a base.
 fn slope_of_holding_torques<T: Real>(forms: &Forms<'_, T>, q: &[T]) -> Vec<T> {
     let (rest, nv) = (forms.rest(), forms.model.nv());
-    let weights = torque_weights(
-        forms.model.free_joints().filter(|j| j.kind.is_single()).map(|j| (j.iv, j.limits)),
-        nv,
-    );
+    let weights =
+        torque_weights(forms.model.free_joints().filter(|j| j.kind.is_single()).map(|j| (j.iv, j.limits)), nv);
     let torques = forms.inverse_dynamics(q, &rest, &rest);
     let weighed: Vec<T> = torques.into_iter().zip(weights).map(|(tau, w)| tau * T::constant(w)).collect();
     weighed_slopes(forms, [q, &rest, &rest], &weighed).into_iter().take(nv).collect()

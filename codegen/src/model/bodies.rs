@@ -6,7 +6,7 @@ use super::merge::{merge, Part};
 use super::{angle, centres_of_mass, check, transform, Assembly, ModelOptions};
 use crate::description::flexible::Flexible;
 use crate::description::{
-    messages, AnchoredJoint, BaseKind, Description, Placement, Reference, WrittenInertial, WrittenJoint,
+    messages, AnchoredJoint, BaseKind, Description, Placement, PoseCoordinate, WrittenInertial, WrittenJoint,
 };
 use crate::diagnostic::{Diagnostics, Place};
 use std::collections::BTreeMap;
@@ -48,7 +48,7 @@ impl Seat {
         })
     }
 
-    /// A joint anywhere in the child's link frame: T = T_origin T_anchor M(q − reference) T_anchor⁻¹.
+    /// A joint anywhere in the child's link frame: T = T_origin T_anchor M(−reference) M(q) T_anchor⁻¹.
     fn anchored(joint: &AnchoredJoint, tolerance: f64) -> Option<Seat> {
         let AnchoredJoint { origin, anchor, axis, reference } = joint;
         let moved = |translation| Transform { rotation: Mat3::identity(), translation };
@@ -56,16 +56,16 @@ impl Seat {
         let rotation = canonical_rotation(unit(vector(axis.value))?);
         let back = match reference {
             None => Transform::identity(),
-            Some(Reference::Angle(angle)) => {
+            Some(PoseCoordinate::Angle(angle)) => {
                 let (sin, cos) = angle::read(angle, tolerance).sin_cos;
                 turned(Mat3::about_z(-sin, cos))
             }
-            Some(Reference::Length(length)) => moved(Vec3::unit_z().scale(-Dd::from(length.value))),
+            Some(PoseCoordinate::Length(length)) => moved(Vec3::unit_z().scale(-Dd::from(length.value))),
         };
         Some(Seat {
             in_parent: compose(&transform(origin, tolerance), &moved(anchor)),
-            canonical: turned(rotation),
-            link_frame: compose(&compose(&back, &turned(rotation.transpose())), &moved(anchor.map(|x| Dd::ZERO - x))),
+            canonical: compose(&turned(rotation), &back),
+            link_frame: compose(&turned(rotation.transpose()), &moved(anchor.map(|x| Dd::ZERO - x))),
             in_link: anchor,
         })
     }

@@ -28,28 +28,26 @@
 //! assert_eq!(model.unwrap().bodies[0].joint.name, "pivot");
 //! ```
 
-pub(crate) mod angle;
 mod bodies;
 mod centres_of_mass;
 mod check;
 mod couplings;
 pub(crate) mod drives;
 mod flexible;
-pub(crate) mod geometry;
 pub mod limbs;
-pub(crate) mod merge;
 pub mod singular;
 pub mod states;
 
 use self::flexible::Carrier;
 use crate::description::flexible::{BaseSupport, Flexible};
 use crate::description::{self, messages, Angle, Description, Noted, Rotation, WrittenCoupling, WrittenPose};
+pub(crate) use crate::description::{angle, geometry, merge};
 use crate::diagnostic::{Diagnostics, Place, Source};
+use angle::transform;
 use geometry::{compose, vector};
 use std::collections::{BTreeMap, HashMap};
 use straightline_core::coupling::Coupling;
 use straightline_core::model::{Body, BodyId, Frame, Model};
-use straightline_core::spatial::Transform;
 use straightline_core::Dd;
 
 /// Links of a robot that is compiled.
@@ -247,15 +245,7 @@ pub fn tolerance_that_mends(angles: &[DoubtfulAngle]) -> f64 {
 
 /// What an angle of a file is taken as \[rad\].
 pub fn angle_in_radians(angle: &Angle, tolerance: f64) -> Dd {
-    match angle::read(angle, tolerance).special {
-        Some(m) => Dd::PI * Dd::from(m as f64) / Dd::from(12.0),
-        None => angle::radians(angle),
-    }
-}
-
-/// A pose in numbers.
-pub(crate) fn transform(pose: &WrittenPose, tolerance: f64) -> Transform<Dd> {
-    Transform { rotation: angle::rotation(&pose.rotation, tolerance), translation: vector(pose.xyz.value) }
+    angle::in_radians(angle, tolerance)
 }
 
 /// Bodies and frames before joints are ordered.

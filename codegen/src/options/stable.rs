@@ -7,8 +7,8 @@
 use crate::choices::Choice;
 use crate::description::drives::{TransmissionStage, WrittenActuator, WrittenDrive, WrittenRating, WrittenThermal};
 use crate::description::flexible::{BaseSupport, Bending, Flexible, WrittenSpring};
-use crate::description::WrittenCoupling;
 use crate::description::Noted;
+use crate::description::WrittenCoupling;
 use crate::function::ContactFunction;
 use crate::model::{FrameOption, ModelOptions};
 use crate::options::{FormChoices, Optimisations};

@@ -164,7 +164,9 @@ impl Around<'_, '_, '_> {
         let of = |number: fn(&Limits) -> f64| single.iter().map(|l| number(l)).collect::<Vec<f64>>();
         let scalar = self.scalar();
         let lines: [fn(&Coupling<Dd>) -> Dd; 2] = [|c| c.ratio, |c| c.offset];
-        for (name, of) in ["FOLLOWER_RATIOS", "FOLLOWER_OFFSETS"].into_iter().zip(lines).filter(|_| !followers.is_empty()) {
+        for (name, of) in
+            ["FOLLOWER_RATIOS", "FOLLOWER_OFFSETS"].into_iter().zip(lines).filter(|_| !followers.is_empty())
+        {
             let values: Vec<f64> = followers.iter().map(|(_, c)| of(c).to_f64()).collect();
             self.numbers(name, scalar, &[values.len()], &values, &|found, x| found == scalar.rounded(x))?;
         }

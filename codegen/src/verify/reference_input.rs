@@ -9,8 +9,8 @@
 //! q = 0, so A⁰ is given as a matrix, or vectors as in the chapter, which are taken as written.
 
 use crate::description::{
-    AnchoredJoint, Angle, AngleUnit, BaseKind, Description, JointVectors, Noted, Placement, Reference, Rotation, Turn, WrittenCoupling,
-    WrittenInertial, WrittenJoint, WrittenPose,
+    AnchoredJoint, Angle, AngleUnit, BaseKind, Description, JointVectors, Noted, Placement, PoseCoordinate, Rotation,
+    WrittenCoupling, WrittenInertial, WrittenJoint, WrittenPose, WrittenTurn,
 };
 use crate::diagnostic::Place;
 use crate::model::{FrameOption, ModelOptions};
@@ -147,25 +147,25 @@ fn rotation(rotation: &Rotation, options: &ModelOptions) -> Matrix3<Dd> {
 }
 
 /// The matrix of one turn of several, by the formulas with vectors of length one.
-fn one_turn(turn: &Turn, options: &ModelOptions) -> Matrix3<Dd> {
+fn one_turn(turn: &WrittenTurn, options: &ModelOptions) -> Matrix3<Dd> {
     // R v = (q₀² − q·q) v + 2 q (q·v) + 2 q₀ q × v
     let by_quaternion = |w: Dd, q: Vector3<Dd>| {
         Matrix3::identity() * (w * w - q.dot(&q)) + (q * q.transpose() + skew(&q) * w) * Dd::from(2.0)
     };
     match turn {
-        Turn::About { axis, angle } => about(&unit(&vector(&axis.value)), radians(angle, options)),
-        Turn::Quaternion(q) => {
+        WrittenTurn::About { axis, angle } => about(&unit(&vector(&axis.value)), radians(angle, options)),
+        WrittenTurn::Quaternion(q) => {
             let [w, x, y, z] = q.value.map(Dd::from);
             let length = (w * w + x * x + y * y + z * z).sqrt();
             by_quaternion(w / length, Vector3::new(x, y, z).map(|x| x / length))
         }
-        Turn::Axes(axes) => {
+        WrittenTurn::Axes(axes) => {
             let [x, y] = axes.value.map(|axis| vector(&axis));
             let x = unit(&x);
             let y = unit(&(y - x * x.dot(&y)));
             Matrix3::from_columns(&[x, y, x.cross(&y)])
         }
-        Turn::ZTo(direction) => {
+        WrittenTurn::ZTo(direction) => {
             let v = unit(&vector(&direction.value));
             if v.x == Dd::ZERO && v.y == Dd::ZERO {
                 return Matrix3::from_diagonal(&Vector3::new(Dd::ONE, v.z, v.z));
@@ -399,18 +399,7 @@ fn rigid_groups(
             Some(i) => {
                 let joint: &WrittenJoint = &description.joints[i];
                 let above = places.get(joint.parent.value.as_str()).ok_or("a joint hangs on nothing")?;
-                let (at, axis, vectors) = match &joint.placement {
-                    Placement::Frames { origin, axis } => (Placed::read(origin, options), axis, None),
-                    Placement::Anchored(AnchoredJoint { origin, anchor, axis, .. }) => {
-                        let there = Placed { rotation: Matrix3::identity(), position: vector(&anchor.value) };
-                        (Placed::read(origin, options).then(&there), axis, None)
-                    }
-                    Placement::Vectors(given) => {
-                        // S_j = C_{j−1} − r_{j−1,j}
-                        let position = -vector(&given.r_parent.value);
-                        (Placed { rotation: Matrix3::identity(), position }, &given.e, Some(given.clone()))
-                    }
-                };
+                let (at, axis, vectors) = seat(joint, options);
                 let (parent, parent_place) = above.at(&at.position);
                 let place = parent_place.then(&at);
                 if joint.kind.value.kind.is_some() {
@@ -426,7 +415,7 @@ fn rigid_groups(
                         }),
                         parts: Vec::new(),
                     });
-                    (groups.len() - 1, link_in_joint(joint, options))
+                    (groups.len() - 1, link_in_joint(joint))
                 } else {
                     (parent, place)
                 }
@@ -462,21 +451,41 @@ fn rigid_groups(
     Ok((groups, frames))
 }
 
-/// Where the link frame is in the joint frame at q = 0.
-fn link_in_joint(joint: &WrittenJoint, options: &ModelOptions) -> Placed {
-    let Placement::Anchored(AnchoredJoint { anchor, axis, reference, .. }) = &joint.placement else {
-        return Placed::here();
+/// Where a joint is, its axis there, and its vectors where it is given by them.
+fn seat<'a>(joint: &'a WrittenJoint, options: &ModelOptions) -> (Placed, &'a Noted<[f64; 3]>, Option<JointVectors>) {
+    match &joint.placement {
+        Placement::Frames { origin, axis } => (Placed::read(origin, options), axis, None),
+        Placement::Anchored(given) => (anchored(given, options), &given.axis, None),
+        Placement::Vectors(given) => {
+            // S_j = C_{j−1} − r_{j−1,j}
+            let position = -vector(&given.r_parent.value);
+            (Placed { rotation: Matrix3::identity(), position }, &given.e, Some(given.clone()))
+        }
+    }
+}
+
+/// Where an anchored joint is at q = 0: with the axes of its link, which the coordinate of the file's pose has turned or shifted back.
+fn anchored(joint: &AnchoredJoint, options: &ModelOptions) -> Placed {
+    let AnchoredJoint { origin, anchor, axis, reference } = joint;
+    let e = unit(&vector(&axis.value));
+    let back = match reference {
+        None => Placed::here(),
+        Some(PoseCoordinate::Angle(angle)) => {
+            Placed { rotation: about(&e, -radians(angle, options)), ..Placed::here() }
+        }
+        Some(PoseCoordinate::Length(length)) => Placed { position: -e * Dd::from(length.value), ..Placed::here() },
     };
-    let (e, back) = (unit(&vector(&axis.value)), -vector(&anchor.value));
-    match reference {
-        None => Placed { rotation: Matrix3::identity(), position: back },
-        Some(Reference::Length(length)) => {
-            Placed { rotation: Matrix3::identity(), position: back - e * Dd::from(length.value) }
+    let there = Placed { position: vector(&anchor.value), ..Placed::here() };
+    Placed::read(origin, options).then(&there).then(&back)
+}
+
+/// Where the link frame is in the joint frame.
+fn link_in_joint(joint: &WrittenJoint) -> Placed {
+    match &joint.placement {
+        Placement::Anchored(AnchoredJoint { anchor, .. }) => {
+            Placed { position: -vector(&anchor.value), ..Placed::here() }
         }
-        Some(Reference::Angle(angle)) => {
-            let rotation = about(&e, -radians(angle, options));
-            Placed { rotation, position: rotation * back }
-        }
+        _ => Placed::here(),
     }
 }
 

@@ -43,7 +43,7 @@ fn expected(
         let scale = numbers(&state["scale"][of]).iter().map(|x| x.to_f64()).collect();
         vec![(name, numbers(&state[field]), scale)]
     };
-    let whole = |name, values: Vec<Dd>| {
+    let whole = |name: &'static str, values: Vec<Dd>| {
         let size = values.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
         (name, values.clone(), vec![size; values.len()])
     };

@@ -54,12 +54,53 @@ fn a_composite_joint_is_the_single_joints_that_it_stands_for() {
     let origin = "origin = { xyz = [0.3, -0.1, 0.5], rpy_deg = [20, -35, 50] }\n";
     let coupling = "[[coupling]]\njoint = \"base_slide\"\nfollows = \"base\"\nratio = 0.004\n";
     let cases = [
-        ("planar", "axis = \"z\"\n", chain(&[("base_x", "prismatic", "\"x\""), ("base_y", "prismatic", "\"y\""), ("base_theta", "continuous", "\"z\"")], origin)),
-        ("planar", "axis = \"-x\"\n", chain(&[("base_x", "prismatic", "\"z\""), ("base_y", "prismatic", "\"y\""), ("base_theta", "continuous", "\"-x\"")], origin)),
-        ("translation", "", chain(&[("base_x", "prismatic", "\"x\""), ("base_y", "prismatic", "\"y\""), ("base_z", "prismatic", "\"z\"")], origin)),
-        ("universal", "axis = \"x\"\naxis2 = [0, 1, 0.2]\n", chain(&[("base_1", "continuous", "\"x\""), ("base_2", "continuous", "[0, 1, 0.2]")], origin)),
-        ("cylindrical", "axis = [1, 2, 2]\n", chain(&[("base_slide", "prismatic", "[1, 2, 2]"), ("base_turn", "continuous", "[1, 2, 2]")], origin)),
-        ("helical", "axis = \"y\"\npitch = 0.004\n", chain(&[("base", "continuous", "\"y\""), ("base_slide", "prismatic", "\"y\"")], origin) + coupling),
+        (
+            "planar",
+            "axis = \"z\"\n",
+            chain(
+                &[
+                    ("base_x", "prismatic", "\"x\""),
+                    ("base_y", "prismatic", "\"y\""),
+                    ("base_theta", "continuous", "\"z\""),
+                ],
+                origin,
+            ),
+        ),
+        (
+            "planar",
+            "axis = \"-x\"\n",
+            chain(
+                &[
+                    ("base_x", "prismatic", "\"z\""),
+                    ("base_y", "prismatic", "\"y\""),
+                    ("base_theta", "continuous", "\"-x\""),
+                ],
+                origin,
+            ),
+        ),
+        (
+            "translation",
+            "",
+            chain(
+                &[("base_x", "prismatic", "\"x\""), ("base_y", "prismatic", "\"y\""), ("base_z", "prismatic", "\"z\"")],
+                origin,
+            ),
+        ),
+        (
+            "universal",
+            "axis = \"x\"\naxis2 = [0, 1, 0.2]\n",
+            chain(&[("base_1", "continuous", "\"x\""), ("base_2", "continuous", "[0, 1, 0.2]")], origin),
+        ),
+        (
+            "cylindrical",
+            "axis = [1, 2, 2]\n",
+            chain(&[("base_slide", "prismatic", "[1, 2, 2]"), ("base_turn", "continuous", "[1, 2, 2]")], origin),
+        ),
+        (
+            "helical",
+            "axis = \"y\"\npitch = 0.004\n",
+            chain(&[("base", "continuous", "\"y\""), ("base_slide", "prismatic", "\"y\"")], origin) + coupling,
+        ),
     ];
     let mut seen = Vec::new();
     for (kind, further, single) in cases {

@@ -154,7 +154,8 @@ fn joints() -> String {
             "" => format!("`NAME` \\[{}\\]", part.measure.units()[0]),
             suffix => format!("`NAME_{suffix}` \\[{}\\]", part.measure.units()[0]),
         });
-        let files = FORMATS.iter().filter(|format| composite.dialects.contains(&format.dialect)).map(|format| format.name);
+        let files =
+            FORMATS.iter().filter(|format| composite.dialects.contains(&format.dialect)).map(|format| format.name);
         let (parts, files) = (parts.collect::<Vec<_>>().join(", "), files.collect::<Vec<_>>().join(", "));
         let _ = writeln!(page, "| {} | {} | {parts} | {files} |", composite.word, composite.summary);
     }

@@ -76,11 +76,8 @@ fn equations_of_other_joints_have_all_digits_of_the_reference_values() {
         let mut options = programs::options(&robot);
         options.model.angle_tolerance = 0.0;
         let loaded = programs::load(&programs::source(&robot), &options.model);
-        let quaternions: Vec<usize> = loaded
-            .model
-            .free_joints()
-            .filter_map(|joint| Some(joint.iq + joint.kind.row().quaternion?))
-            .collect();
+        let quaternions: Vec<usize> =
+            loaded.model.free_joints().filter_map(|joint| Some(joint.iq + joint.kind.row().quaternion?)).collect();
         let of_program = |function: Function, state: &State| {
             let program = programs::of_robot(&robot, function, &options);
             programs::run::<Dd>(&program, &exact(&quaternions, &state.inputs(function)))

@@ -11,9 +11,9 @@
 //! others. Without couplings y is q, and nothing is copied.
 
 use crate::base_parameters::BaseParameter;
+use crate::dd::Dd;
 use crate::model::{Body, BodyId, Joint, Model};
 use crate::real::Real;
-use crate::dd::Dd;
 use alloc::borrow::Cow;
 use alloc::format;
 use alloc::string::String;

@@ -17,10 +17,10 @@ pub mod batch;
 #[cfg(feature = "alloc")]
 pub mod contact;
 pub mod control;
-pub mod dd;
 #[cfg(feature = "alloc")]
 #[cfg(feature = "alloc")]
 pub mod coupling;
+pub mod dd;
 pub mod drive;
 pub mod dual;
 pub mod fixed;

@@ -1,6 +1,6 @@
 //! Actuators: the greatest force of each joint. Their commands and gains are no part of the equations.
 
-use super::classes::Given;
+use super::classes::Defaulted;
 use super::files::{Attribute, Element};
 use super::Mjcf;
 use crate::description::Noted;
@@ -53,7 +53,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// The greatest force before the gear: that of its range, or that of the greatest command.
-    fn greatest_force(&mut self, given: &Given<'s>, owner: &str) -> Option<f64> {
+    fn greatest_force(&mut self, given: &Defaulted<'s>, owner: &str) -> Option<f64> {
         let mut greatest = |word: &str, range: &str| {
             let is_limited = self.is_limited(given, word, range);
             let [lower, upper] = self.some_numbers::<2>(given, range, owner).filter(|_| is_limited)?;
@@ -76,7 +76,7 @@ impl<'s> Mjcf<'s> {
         }
     }
 
-    fn first_of(&mut self, given: &Given<'s>, name: &str, owner: &str) -> Option<f64> {
+    fn first_of(&mut self, given: &Defaulted<'s>, name: &str, owner: &str) -> Option<f64> {
         let attribute = given.attribute(name)?;
         let numbers = self.numbers(&format!("{name} of {owner}"), attribute, 1, usize::MAX)?;
         numbers.first().copied()

@@ -1,9 +1,9 @@
 //! Words, numbers and poses of attributes, and complaints about them.
 
-use super::classes::Given;
+use super::classes::Defaulted;
 use super::files::{Attribute, Element};
 use super::Mjcf;
-use crate::description::{messages, xml, Angle, AngleUnit, Noted, Rotation, Turn, WrittenPose};
+use crate::description::{angle, messages, xml, Angle, AngleUnit, Noted, Rotation, WrittenPose, WrittenTurn};
 use crate::diagnostic::wording::closest;
 use crate::diagnostic::{Diagnostic, Place};
 
@@ -38,7 +38,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// Refuses an attribute that changes the dynamics, unless all its numbers are zero.
-    pub fn refuse_number(&mut self, given: &Given<'s>, name: &str, owner: &str, why: &str, help: &str) {
+    pub fn refuse_number(&mut self, given: &Defaulted<'s>, name: &str, owner: &str, why: &str, help: &str) {
         let Some(attribute) = given.attribute(name) else { return };
         let numbers = self.numbers(&format!("{name} of {owner}"), attribute, 0, usize::MAX);
         if numbers.is_some_and(|numbers| numbers.iter().any(|x| *x != 0.0)) {
@@ -76,7 +76,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// A word of an attribute, or a complaint that it is none of `known`.
-    pub fn word(&mut self, given: &Given<'s>, name: &str, known: &[&'static str]) -> Option<&'static str> {
+    pub fn word(&mut self, given: &Defaulted<'s>, name: &str, known: &[&'static str]) -> Option<&'static str> {
         let attribute = given.attribute(name)?;
         let found = known.iter().copied().find(|word| *word == attribute.value.trim());
         if found.is_none() {
@@ -87,7 +87,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// `true` or `false`.
-    pub fn flag(&mut self, given: &Given<'s>, name: &str) -> Option<bool> {
+    pub fn flag(&mut self, given: &Defaulted<'s>, name: &str) -> Option<bool> {
         self.word(given, name, &["true", "false"]).map(|word| word == "true")
     }
 
@@ -105,31 +105,31 @@ impl<'s> Mjcf<'s> {
     }
 
     /// So many numbers of an attribute.
-    pub fn some_numbers<const N: usize>(&mut self, given: &Given<'s>, name: &str, owner: &str) -> Option<[f64; N]> {
+    pub fn some_numbers<const N: usize>(&mut self, given: &Defaulted<'s>, name: &str, owner: &str) -> Option<[f64; N]> {
         let attribute = given.attribute(name)?;
         let numbers = self.numbers(&format!("{name} of {owner}"), attribute, N, N)?;
         numbers.try_into().ok()
     }
 
     /// One number with its place.
-    pub fn number(&mut self, given: &Given<'s>, name: &str, owner: &str) -> Option<Noted<f64>> {
+    pub fn number(&mut self, given: &Defaulted<'s>, name: &str, owner: &str) -> Option<Noted<f64>> {
         let [x] = self.some_numbers(given, name, owner)?;
         Some(Noted::new(x, self.place(given.attribute(name)?)))
     }
 
     /// Three numbers with their place, or those that stand for an attribute that is left out.
-    pub fn vector(&mut self, given: &Given<'s>, name: &str, owner: &str, otherwise: [f64; 3]) -> Noted<[f64; 3]> {
+    pub fn vector(&mut self, given: &Defaulted<'s>, name: &str, owner: &str, otherwise: [f64; 3]) -> Noted<[f64; 3]> {
         let place = given.attribute(name).map_or_else(|| self.tag(given.element), |attribute| self.place(attribute));
         Noted::new(self.some_numbers(given, name, owner).unwrap_or(otherwise), place)
     }
 
     /// `pos` and an orientation in any of its forms.
-    pub fn pose(&mut self, given: &Given<'s>, owner: &str) -> WrittenPose {
+    pub fn pose(&mut self, given: &Defaulted<'s>, owner: &str) -> WrittenPose {
         WrittenPose { xyz: self.vector(given, "pos", owner, [0.0; 3]), rotation: self.orientation(given, owner) }
     }
 
     /// An orientation in any of its forms.
-    fn orientation(&mut self, given: &Given<'s>, owner: &str) -> Rotation {
+    fn orientation(&mut self, given: &Defaulted<'s>, owner: &str) -> Rotation {
         const FORMS: [&str; 5] = ["quat", "axisangle", "xyaxes", "zaxis", "euler"];
         let is_own = |name: &&&str| given.element.attribute(name).is_some();
         let mut forms: Vec<&str> = FORMS.iter().filter(is_own).copied().collect();
@@ -155,7 +155,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// The turns that the numbers of a form mean.
-    pub fn turns(&mut self, form: &str, numbers: &[f64], attribute: &'s Attribute, owner: &str) -> Vec<Turn> {
+    pub fn turns(&mut self, form: &str, numbers: &[f64], attribute: &'s Attribute, owner: &str) -> Vec<WrittenTurn> {
         let place = self.place(attribute);
         let first = [0, 1, 2].map(|i| numbers[i]);
         let what = format!("{form} of {owner}");
@@ -165,14 +165,14 @@ impl<'s> Mjcf<'s> {
                 if !self.has_direction(&q, &what, attribute) {
                     return Vec::new();
                 }
-                vec![Turn::Quaternion(Noted::new(q, place))]
+                vec![WrittenTurn::Quaternion(Noted::new(q, place))]
             }
             "axisangle" => {
                 if !self.has_direction(&first, &what, attribute) {
                     return Vec::new();
                 }
                 let angle = self.angle(numbers[3], attribute);
-                vec![Turn::About { axis: Noted::new(first, place), angle }]
+                vec![WrittenTurn::About { axis: Noted::new(first, place), angle }]
             }
             "xyaxes" => {
                 let second = [3, 4, 5].map(|i| numbers[i]);
@@ -181,20 +181,22 @@ impl<'s> Mjcf<'s> {
                 {
                     return Vec::new();
                 }
-                vec![Turn::Axes(Noted::new([first, second], place))]
+                vec![WrittenTurn::Axes(Noted::new([first, second], place))]
             }
             "zaxis" => {
                 if !self.has_direction(&first, &what, attribute) {
                     return Vec::new();
                 }
-                vec![Turn::ZTo(Noted::new(first, place))]
+                vec![WrittenTurn::ZTo(Noted::new(first, place))]
             }
             _ => {
                 let mut turns = Vec::new();
                 for (axis, value) in self.settings.euler.into_iter().zip(first) {
                     let unit = ['x', 'y', 'z'].map(|own| f64::from(u8::from(own == axis.to_ascii_lowercase())));
-                    let turn =
-                        Turn::About { axis: Noted::new(unit, place.clone()), angle: self.angle(value, attribute) };
+                    let turn = WrittenTurn::About {
+                        axis: Noted::new(unit, place.clone()),
+                        angle: self.angle(value, attribute),
+                    };
                     // about an axis that turns: after those before it; about one that stands: before them
                     let at = if axis.is_ascii_lowercase() { turns.len() } else { 0 };
                     turns.insert(at, turn);
@@ -223,7 +225,7 @@ impl<'s> Mjcf<'s> {
         match self.settings.angle {
             AngleUnit::Degree if value.is_finite() => {
                 let angle = Angle { value, unit: AngleUnit::Degree, text: String::new(), place: Place::none() };
-                crate::model::angle_in_radians(&angle, 0.0).to_f64()
+                angle::in_radians(&angle, 0.0).to_f64()
             }
             _ => value,
         }

@@ -2,15 +2,15 @@
 //!
 //! A body is a link. The frames around bodies and sites are links without mass on fixed joints, so that no pose is computed here.
 
-use super::classes::Given;
+use super::classes::Defaulted;
 use super::files::Element;
 use super::{vocabulary, Mjcf};
+use crate::description::angle::{self, transform};
+use crate::description::geometry::compose;
 use crate::description::{
     BaseKind, JointDrive, JointLimits, JointType, NamedFrame, Noted, Placement, Rotation, WrittenJoint, WrittenLink,
     WrittenPose,
 };
-use crate::model::geometry::compose;
-use crate::model::{angle, transform};
 use straightline_core::spatial::Transform;
 use straightline_core::Dd;
 
@@ -25,7 +25,7 @@ pub(super) struct Content<'s> {
 }
 
 /// A `<frame>`.
-struct Frame<'s> {
+struct FrameAround<'s> {
     element: &'s Element,
     pose: WrittenPose,
     around: Option<usize>,
@@ -36,7 +36,7 @@ struct Frame<'s> {
 /// What stands in a body, in the order of the file, and the frames around it.
 pub(super) struct Contents<'s> {
     all: Vec<Content<'s>>,
-    frames: Vec<Frame<'s>>,
+    frames: Vec<FrameAround<'s>>,
     /// The link of the body.
     link: Noted<String>,
 }
@@ -159,7 +159,7 @@ impl<'s> Mjcf<'s> {
         let name = self.name_of(element, &format!("{}_body", parent.value));
         let owner = format!("body `{}`", name.value);
         self.check_attributes(element, &owner, vocabulary::BODY);
-        let given = Given::alone(element);
+        let given = Defaulted::alone(element);
         let help = "remove it: gravity then acts on the body";
         self.refuse_number(&given, "gravcomp", &owner, "a force would hold the body up", help);
         if self.flag(&given, "mocap") == Some(true) {
@@ -211,9 +211,9 @@ impl<'s> Mjcf<'s> {
                 continue;
             }
             self.check_attributes(element, "a frame", vocabulary::FRAME);
-            let pose = self.pose(&Given::alone(element), "a frame");
+            let pose = self.pose(&Defaulted::alone(element), "a frame");
             let class = element.attribute("childclass").and_then(|class| self.class(class)).unwrap_or(class);
-            contents.frames.push(Frame { element, pose, around: frame, link: None });
+            contents.frames.push(FrameAround { element, pose, around: frame, link: None });
             open.extend(within(element, class, Some(contents.frames.len() - 1)));
         }
     }
@@ -228,7 +228,7 @@ impl<'s> Mjcf<'s> {
         }
         let mut link = contents.link.clone();
         for frame in chain.into_iter().rev() {
-            let Frame { element, pose, link: own, .. } = &contents.frames[frame];
+            let FrameAround { element, pose, link: own, .. } = &contents.frames[frame];
             if let Some(own) = own {
                 link = own.clone();
             } else if !is_identity(pose) {

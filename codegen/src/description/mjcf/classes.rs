@@ -9,7 +9,7 @@ use crate::description::messages;
 
 /// The classes of a file.
 #[derive(Default)]
-pub(super) struct Classes<'s> {
+pub(super) struct DefaultClasses<'s> {
     all: Vec<Class<'s>>,
 }
 
@@ -23,16 +23,16 @@ struct Class<'s> {
 
 /// An element with the defaults that are behind it, the nearest first.
 #[derive(Clone)]
-pub(super) struct Given<'s> {
+pub(super) struct Defaulted<'s> {
     /// The element.
     pub element: &'s Element,
     defaults: Vec<&'s Element>,
 }
 
-impl<'s> Given<'s> {
+impl<'s> Defaulted<'s> {
     /// An element without defaults.
-    pub fn alone(element: &'s Element) -> Given<'s> {
-        Given { element, defaults: Vec::new() }
+    pub fn alone(element: &'s Element) -> Defaulted<'s> {
+        Defaulted { element, defaults: Vec::new() }
     }
 
     /// The attribute of a name, of the element or by default.
@@ -123,7 +123,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// An element with its defaults; `around`: the class of what it stands in.
-    pub fn given(&mut self, element: &'s Element, kind: &str, around: usize) -> Given<'s> {
+    pub fn given(&mut self, element: &'s Element, kind: &str, around: usize) -> Defaulted<'s> {
         let own = element.attribute("class").and_then(|attribute| self.class(attribute));
         let mut defaults = Vec::new();
         let mut next = Some(own.unwrap_or(around));
@@ -131,6 +131,6 @@ impl<'s> Mjcf<'s> {
             defaults.extend(class.elements.iter().filter(|(of, _)| *of == kind).map(|(_, element)| *element));
             next = class.parent;
         }
-        Given { element, defaults }
+        Defaulted { element, defaults }
     }
 }

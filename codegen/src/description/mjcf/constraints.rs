@@ -1,11 +1,10 @@
 //! Equalities and tendons: joints whose coordinates follow others; what else would bind the motion is refused.
 
-use super::classes::Given;
+use super::classes::Defaulted;
 use super::files::{Attribute, Element};
 use super::{vocabulary, Mjcf};
-use crate::description::{messages, Noted, Placement, Reference, WrittenCoupling};
-use crate::model::angle::ROUNDING;
-use crate::model::angle_in_radians;
+use crate::description::angle::{self, ROUNDING};
+use crate::description::{messages, Noted, Placement, PoseCoordinate, WrittenCoupling};
 use straightline_core::Dd;
 
 impl<'s> Mjcf<'s> {
@@ -39,7 +38,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// q₁ − ref₁ = a₀ + a₁ (q₂ − ref₂).
-    fn read_coupling(&mut self, given: &Given<'s>) {
+    fn read_coupling(&mut self, given: &Defaulted<'s>) {
         let element = given.element;
         let owner = "the equality of joints";
         self.check_attributes(element, owner, vocabulary::EQUALITY);
@@ -63,7 +62,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// a₀ and a₁ of `polycoef`, or a complaint that there is more.
-    fn line(&mut self, given: &Given<'s>, owner: &str) -> [f64; 2] {
+    fn line(&mut self, given: &Defaulted<'s>, owner: &str) -> [f64; 2] {
         let mut line = [0.0, 1.0];
         let Some(attribute) = given.attribute("polycoef") else { return line };
         let Some(numbers) = self.numbers(&format!("polycoef of {owner}"), attribute, 1, 5) else { return line };
@@ -77,7 +76,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// A fixed tendon of two joints that keeps its length: c₁ (q₁ − ref₁) + c₂ (q₂ − ref₂) = a₀; the first joint follows.
-    fn read_tendon_equality(&mut self, given: &Given<'s>, tendons: &[&'s Element]) {
+    fn read_tendon_equality(&mut self, given: &Defaulted<'s>, tendons: &[&'s Element]) {
         let (element, owner) = (given.element, "the equality of tendons");
         let [a0, _] = self.line(given, owner);
         let named = |name: &Attribute| {
@@ -97,7 +96,7 @@ impl<'s> Mjcf<'s> {
             return;
         };
         let mut end = |joint: &'s Element| {
-            let coefficient = self.number(&Given::alone(joint), "coef", owner)?;
+            let coefficient = self.number(&Defaulted::alone(joint), "coef", owner)?;
             Some((self.joint_named(joint, "joint", owner)?, coefficient))
         };
         let (first, second) = (end(first), end(second));
@@ -129,8 +128,8 @@ impl<'s> Mjcf<'s> {
             Some(joint) if joint.kind.value.kind.is_some_and(is_single) => {
                 let zero = match &joint.placement {
                     Placement::Anchored(anchored) => match &anchored.reference {
-                        Some(Reference::Angle(angle)) => angle_in_radians(angle, ROUNDING),
-                        Some(Reference::Length(length)) => Dd::from(length.value),
+                        Some(PoseCoordinate::Angle(angle)) => angle::in_radians(angle, ROUNDING),
+                        Some(PoseCoordinate::Length(length)) => Dd::from(length.value),
                         None => Dd::ZERO,
                     },
                     _ => Dd::ZERO,

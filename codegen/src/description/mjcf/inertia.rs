@@ -1,15 +1,15 @@
 //! Mass, centre of mass and inertia of a body: as written, or made of its geoms.
 
 use super::bodies::Contents;
-use super::classes::Given;
+use super::classes::Defaulted;
 use super::files::Element;
 use super::geoms::Solid;
 use super::{vocabulary, Mjcf};
+use crate::description::angle::{self, transform};
+use crate::description::geometry::{compose, point, snap_tensor, vector};
+use crate::description::merge::{merge, Part};
 use crate::description::{messages, Noted, Rotation, WrittenInertial};
 use crate::diagnostic::Place;
-use crate::model::geometry::{compose, point, snap_tensor, vector};
-use crate::model::merge::{merge, Part};
-use crate::model::{angle, transform};
 use straightline_core::spatial::{Sym3, Transform, Vec3};
 use straightline_core::Dd;
 
@@ -50,7 +50,7 @@ impl<'s> Mjcf<'s> {
     fn read_inertial(&mut self, element: &'s Element, owner: &str) -> Option<WrittenInertial> {
         let owner = format!("the inertial of {owner}");
         self.check_attributes(element, &owner, vocabulary::INERTIAL);
-        let given = Given::alone(element);
+        let given = Defaulted::alone(element);
         for (name, example) in [("pos", "pos=\"0 0 0\""), ("mass", "mass=\"1\"")] {
             if given.attribute(name).is_none() {
                 self.complain_at(element, messages::missing_attribute(&owner, name, example));
@@ -79,14 +79,14 @@ impl<'s> Mjcf<'s> {
     }
 
     /// Whether a geom is of a group that inertias are made of.
-    fn is_in_group(&mut self, given: &Given<'s>) -> bool {
+    fn is_in_group(&mut self, given: &Defaulted<'s>) -> bool {
         let group = self.number(given, "group", "a geom").map_or(0.0, |group| group.value);
         let [first, last] = self.settings.groups;
         (first..=last).contains(&group)
     }
 
     /// Mass and inertia of a geom in its body; none if it has no mass, or after a complaint.
-    fn read_geom(&mut self, given: &Given<'s>, around: &Transform<Dd>) -> Option<Part> {
+    fn read_geom(&mut self, given: &Defaulted<'s>, around: &Transform<Dd>) -> Option<Part> {
         let element = given.element;
         let owner = match element.attribute("name") {
             Some(name) => format!("geom `{}`", name.value),
@@ -139,7 +139,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// Size and pose of a geom, by `size` and `pos` or by `fromto`.
-    fn size_and_pose(&mut self, given: &Given<'s>, solid: Solid, owner: &str) -> Option<([Dd; 3], Transform<Dd>)> {
+    fn size_and_pose(&mut self, given: &Defaulted<'s>, solid: Solid, owner: &str) -> Option<([Dd; 3], Transform<Dd>)> {
         let mut size = [0.0; 3];
         let mut count = 0;
         for attribute in given.layers_of("size").into_iter().rev() {

@@ -3,11 +3,11 @@
 //! With the joint k at p_k in the body: T = T_body A_1 … A_n, A_k = Trans(p_k) M_k(q_k − ref_k) Trans(−p_k).
 
 use super::bodies::Contents;
-use super::classes::Given;
+use super::classes::Defaulted;
 use super::files::Element;
 use super::{vocabulary, Mjcf};
 use crate::description::{
-    messages, AnchoredJoint, JointDrive, JointLimits, JointType, Noted, Placement, Reference, WrittenJoint,
+    messages, AnchoredJoint, JointDrive, JointLimits, JointType, Noted, Placement, PoseCoordinate, WrittenJoint,
     WrittenLink, WrittenPose,
 };
 use straightline_core::joint::Dialect;
@@ -17,7 +17,13 @@ const EFFECTS: &[&str] = &["stiffness", "damping", "frictionloss", "armature", "
 
 impl<'s> Mjcf<'s> {
     /// The joints of a body between links, after complaints about others.
-    pub fn joints_in(&mut self, contents: &Contents<'s>, owner: &str, is_base: bool, moving: usize) -> Vec<Given<'s>> {
+    pub fn joints_in(
+        &mut self,
+        contents: &Contents<'s>,
+        owner: &str,
+        is_base: bool,
+        moving: usize,
+    ) -> Vec<Defaulted<'s>> {
         let mut joints = Vec::new();
         let all = contents.of("joint").into_iter().chain(contents.of("freejoint"));
         let written: Vec<(&'s Element, usize, bool)> =
@@ -29,7 +35,7 @@ impl<'s> Mjcf<'s> {
                 self.refuse(element, owner, "its position and axis would be those in a frame", help);
             }
             let given = match element.name.as_str() {
-                "freejoint" => Given::alone(element),
+                "freejoint" => Defaulted::alone(element),
                 _ => self.given(element, "joint", class),
             };
             let is_free =
@@ -53,7 +59,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// What a free joint says beside that.
-    fn read_free(&mut self, given: &Given<'s>, owner: &str) {
+    fn read_free(&mut self, given: &Defaulted<'s>, owner: &str) {
         let owner = format!("the free joint of {owner}");
         for name in EFFECTS {
             let help = "remove it, or write `<freejoint/>`, which takes no defaults";
@@ -71,7 +77,7 @@ impl<'s> Mjcf<'s> {
         (body, element): (&Noted<String>, &'s Element),
         parent: Noted<String>,
         pose: WrittenPose,
-        joints: Vec<Given<'s>>,
+        joints: Vec<Defaulted<'s>>,
     ) {
         if joints.is_empty() {
             self.add_fixed(body, parent, pose, element);
@@ -103,7 +109,7 @@ impl<'s> Mjcf<'s> {
     /// A joint that is not free.
     fn read_joint(
         &mut self,
-        given: &Given<'s>,
+        given: &Defaulted<'s>,
         name: Noted<String>,
         parent: Noted<String>,
         child: Noted<String>,
@@ -128,8 +134,8 @@ impl<'s> Mjcf<'s> {
         let turns = kind.kind.is_some_and(|kind| kind.turns());
         let axis = self.vector(given, "axis", &owner, [0.0, 0.0, 1.0]);
         let reference = self.number(given, "ref", &owner).filter(|x| x.value != 0.0).map(|x| match turns {
-            true => Reference::Angle(self.angle(x.value, given.attribute("ref").expect("it was read"))),
-            false => Reference::Length(x),
+            true => PoseCoordinate::Angle(self.angle(x.value, given.attribute("ref").expect("it was read"))),
+            false => PoseCoordinate::Length(x),
         });
         let (has_range, limits) = self.limits(given, &owner, turns);
         let drive = self.drive(given, &owner, turns);
@@ -140,7 +146,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// How a joint moves: the table of joints has the words.
-    fn kind(&mut self, given: &Given<'s>, owner: &str) -> Option<JointType> {
+    fn kind(&mut self, given: &Defaulted<'s>, owner: &str) -> Option<JointType> {
         let known: Vec<(&'static str, JointType)> = JointType::words(Dialect::Mjcf);
         let word = match given.attribute("type") {
             None => "hinge",
@@ -159,7 +165,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// Whether the coordinate has a range, and the ranges.
-    fn limits(&mut self, given: &Given<'s>, owner: &str, turns: bool) -> (bool, JointLimits) {
+    fn limits(&mut self, given: &Defaulted<'s>, owner: &str, turns: bool) -> (bool, JointLimits) {
         let mut limits = JointLimits::default();
         let has_range = self.is_limited(given, "limited", "range");
         if let (true, Some(attribute)) = (has_range, given.attribute("range")) {
@@ -180,7 +186,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// Whether a range holds: because it is said so, or by itself.
-    pub fn is_limited(&mut self, given: &Given<'s>, word: &str, range: &str) -> bool {
+    pub fn is_limited(&mut self, given: &Defaulted<'s>, word: &str, range: &str) -> bool {
         match self.word(given, word, &["true", "false", "auto"]) {
             Some("true") => true,
             Some("false") => false,
@@ -188,7 +194,7 @@ impl<'s> Mjcf<'s> {
         }
     }
 
-    fn drive(&mut self, given: &Given<'s>, owner: &str, turns: bool) -> JointDrive {
+    fn drive(&mut self, given: &Defaulted<'s>, owner: &str, turns: bool) -> JointDrive {
         let help = "write `stiffness` and `damping` in its place";
         self.refuse_number(given, "springdamper", owner, "stiffness and damping would follow from the masses", help);
         let help = "remove it: springs are linear";
@@ -208,7 +214,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// The first of several numbers, where those after it are zero.
-    fn first_number(&mut self, given: &Given<'s>, name: &str, owner: &str) -> Option<Noted<f64>> {
+    fn first_number(&mut self, given: &Defaulted<'s>, name: &str, owner: &str) -> Option<Noted<f64>> {
         let attribute = given.attribute(name)?;
         let numbers = self.numbers(&format!("{name} of {owner}"), attribute, 1, 8)?;
         if numbers[1..].iter().any(|x| *x != 0.0) {

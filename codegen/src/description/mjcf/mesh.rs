@@ -4,13 +4,13 @@
 //! ∫ r rᵀ dm = V/20 (a aᵀ + b bᵀ + c cᵀ + s sᵀ), s = a + b + c, at density 1. With `inertia="exact"` volumes have their sign. MuJoCo's default
 //! `legacy` takes their magnitudes, about the centroid of the surface for the centre of mass, about that for mass and inertia: more than there is where a mesh is not convex. Both are followed.
 
-use super::classes::Given;
+use super::classes::Defaulted;
 use super::files::{read_file, Element};
 use super::Mjcf;
+use crate::description::angle;
+use crate::description::geometry::vector;
+use crate::description::merge::Part;
 use crate::description::{messages, Rotation};
-use crate::model::angle;
-use crate::model::geometry::vector;
-use crate::model::merge::Part;
 use std::path::{Path, PathBuf};
 use straightline_core::spatial::{Mat3, Sym3, Vec3};
 use straightline_core::Dd;
@@ -23,7 +23,7 @@ const LEAST_VOLUME: f64 = 1e-60;
 
 impl<'s> Mjcf<'s> {
     /// Volume, centre of mass and inertia at density 1 of a mesh; `None` after a complaint.
-    pub fn read_mesh(&mut self, geom: &Given<'s>, owner: &str) -> Option<Part> {
+    pub fn read_mesh(&mut self, geom: &Defaulted<'s>, owner: &str) -> Option<Part> {
         let Some(name) = geom.attribute("mesh") else {
             self.complain_at(geom.element, messages::missing_attribute(owner, "mesh", "mesh=\"...\""));
             return None;
@@ -95,7 +95,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// Moves a mesh as its reference pose says, and scales it.
-    fn place_mesh(&mut self, mesh: &Given<'s>, owner: &str, faces: &mut [Triangle]) {
+    fn place_mesh(&mut self, mesh: &Defaulted<'s>, owner: &str, faces: &mut [Triangle]) {
         let position = vector(self.some_numbers(mesh, "refpos", owner).unwrap_or([0.0; 3]));
         let turn = self.reference_turn(mesh, owner);
         let scale = vector(self.some_numbers(mesh, "scale", owner).unwrap_or([1.0; 3]));
@@ -105,7 +105,7 @@ impl<'s> Mjcf<'s> {
         }
     }
 
-    fn reference_turn(&mut self, mesh: &Given<'s>, owner: &str) -> Mat3<Dd> {
+    fn reference_turn(&mut self, mesh: &Defaulted<'s>, owner: &str) -> Mat3<Dd> {
         let attribute = mesh.attribute("refquat");
         let numbers = self.some_numbers::<4>(mesh, "refquat", owner);
         match (attribute, numbers) {

@@ -25,9 +25,9 @@ mod vocabulary;
 use super::reader::FileReader;
 use super::{Description, FileFormat, Noted, WrittenJoint};
 use crate::diagnostic::{Diagnostics, Place, Source};
-use classes::Classes;
+use classes::DefaultClasses;
 use files::{Element, Files};
-use settings::Settings;
+use settings::CompilerSettings;
 use std::collections::HashSet;
 use straightline_core::joint::Dialect;
 
@@ -63,8 +63,8 @@ fn is_mjcf(text: &str) -> bool {
 struct Mjcf<'s> {
     reader: FileReader<'s>,
     files: &'s Files,
-    settings: Settings<'s>,
-    classes: Classes<'s>,
+    settings: CompilerSettings<'s>,
+    classes: DefaultClasses<'s>,
     /// Names of links, joints and frames, written or made up.
     names: HashSet<String>,
     robot: Description,
@@ -83,8 +83,8 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     let mut mjcf = Mjcf {
         reader,
         files: &files,
-        settings: Settings::default(),
-        classes: Classes::default(),
+        settings: CompilerSettings::default(),
+        classes: DefaultClasses::default(),
         names: HashSet::new(),
         robot: Description::new(&FORMAT, name),
         joints: Vec::new(),

@@ -1,12 +1,12 @@
 //! What `compiler` and `option` say.
 
-use super::classes::Given;
+use super::classes::Defaulted;
 use super::files::Element;
 use super::{vocabulary, Mjcf};
 use crate::description::{messages, AngleUnit, Noted};
 
 /// What a file says for all of it.
-pub(super) struct Settings<'s> {
+pub(super) struct CompilerSettings<'s> {
     /// The unit of angles.
     pub angle: AngleUnit,
     /// Axes of Euler angles: `x` of the turning axes, `X` of those that stand.
@@ -29,9 +29,9 @@ pub(super) struct Settings<'s> {
     pub strips_paths: bool,
 }
 
-impl Default for Settings<'_> {
+impl Default for CompilerSettings<'_> {
     fn default() -> Self {
-        Settings {
+        CompilerSettings {
             angle: AngleUnit::Degree,
             euler: ['x', 'y', 'z'],
             autolimits: true,
@@ -59,7 +59,7 @@ impl<'s> Mjcf<'s> {
 
     fn read_compiler(&mut self, element: &'s Element) {
         self.check_attributes(element, "the compiler", vocabulary::COMPILER);
-        let given = Given::alone(element);
+        let given = Defaulted::alone(element);
         if let Some(word) = self.word(&given, "angle", &["degree", "radian"]) {
             self.settings.angle = if word == "degree" { AngleUnit::Degree } else { AngleUnit::Radian };
         }
@@ -115,7 +115,7 @@ impl<'s> Mjcf<'s> {
     }
 
     fn read_option(&mut self, element: &'s Element) {
-        let given = Given::alone(element);
+        let given = Defaulted::alone(element);
         if let (Some(gravity), Some(attribute)) =
             (self.some_numbers(&given, "gravity", "the option"), element.attribute("gravity"))
         {
@@ -126,7 +126,7 @@ impl<'s> Mjcf<'s> {
             self.refuse_number(&given, name, "the option", "drag and lift of a medium would act on bodies", help);
         }
         for flags in self.files.children(element).into_iter().filter(|e| e.name == "flag") {
-            let flag = Given::alone(flags);
+            let flag = Defaulted::alone(flags);
             if let Some("disable") = self.word(&flag, "gravity", &["enable", "disable"]) {
                 let place = self.tag(flags);
                 self.robot.gravity = Some(Noted::new([0.0; 3], place));

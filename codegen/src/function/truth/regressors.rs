@@ -238,7 +238,10 @@ fn joint_motion(at: &Chapter<'_>, body: BodyId) -> Option<[Magnitude; 3]> {
     let link = at.tree.frame(&at.robot?.bodies[body].name)?.link?;
     let link = &at.tree.links[link];
     let [q, qd, qdd] = [at.q()[link.iq], at.qd()[link.iv], at.qdd()[link.iv]];
-    Some(link.shared.map_or([q, qd, qdd], |shared| [shared.ratio * q + shared.offset, shared.ratio * qd, shared.ratio * qdd]))
+    Some(
+        link.shared
+            .map_or([q, qd, qdd], |shared| [shared.ratio * q + shared.offset, shared.ratio * qd, shared.ratio * qdd]),
+    )
 }
 
 /// By rows, with what joints of these kinds add.

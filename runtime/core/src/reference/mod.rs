@@ -72,4 +72,6 @@ pub use geometry::{extended_joint, geometry, quaternion_rotation, rodrigues, ske
 pub use kinematics::{linear_forms, motion, LinearForms, LinkMotion};
 pub use scalar::ReferenceReal;
 pub use solve::solve_symmetric;
-pub use tree::{CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint, SharedCoordinate};
+pub use tree::{
+    CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint, SharedCoordinate,
+};

@@ -4,8 +4,8 @@
 //! tolerance (by default [`ROUNDING`]) of a multiple of π/4 or π/6 it is taken as that; otherwise literally.
 
 use super::geometry::{about, snap_rotation, unit, vector};
-use crate::description::{Angle, AngleUnit, Rotation, Turn};
-use straightline_core::spatial::{Mat3, Vec3};
+use crate::description::{Angle, AngleUnit, Rotation, WrittenPose, WrittenTurn};
+use straightline_core::spatial::{Mat3, Transform, Vec3};
 use straightline_core::Dd;
 
 /// The default tolerance \[rad\]: what the nearest f64 of a few turns can be off.
@@ -53,7 +53,7 @@ fn twelfths(angle: &Angle) -> Option<i64> {
 }
 
 /// The angle in radians.
-pub(super) fn radians(angle: &Angle) -> Dd {
+pub(crate) fn radians(angle: &Angle) -> Dd {
     let x = Dd::from(angle.value);
     match angle.unit {
         AngleUnit::Radian => x,
@@ -103,7 +103,7 @@ fn sin_cos_of_twelfths(m: i64) -> (Dd, Dd) {
 }
 
 /// `m π/12` in words: `π/2`, `-3π/4`.
-pub(super) fn name_of_twelfths(m: i64) -> String {
+pub(crate) fn name_of_twelfths(m: i64) -> String {
     if m == 0 {
         return "0".to_string();
     }
@@ -118,6 +118,19 @@ pub(super) fn name_of_twelfths(m: i64) -> String {
     format!("{sign}{times}π{over}")
 }
 
+/// What an angle is taken as \[rad\].
+pub(crate) fn in_radians(angle: &Angle, tolerance: f64) -> Dd {
+    match read(angle, tolerance).special {
+        Some(m) => Dd::PI * Dd::from(m as f64) / Dd::from(12.0),
+        None => radians(angle),
+    }
+}
+
+/// A pose in numbers.
+pub(crate) fn transform(pose: &WrittenPose, tolerance: f64) -> Transform<Dd> {
+    Transform { rotation: rotation(&pose.rotation, tolerance), translation: vector(pose.xyz.value) }
+}
+
 /// The matrix of a rotation as written.
 pub(crate) fn rotation(rotation: &Rotation, tolerance: f64) -> Mat3<Dd> {
     match rotation {
@@ -129,18 +142,20 @@ pub(crate) fn rotation(rotation: &Rotation, tolerance: f64) -> Mat3<Dd> {
 }
 
 /// The matrix of one turn. A vector without a direction, of which readers complain, turns nothing.
-fn turned(turn: &Turn, tolerance: f64) -> Mat3<Dd> {
+fn turned(turn: &WrittenTurn, tolerance: f64) -> Mat3<Dd> {
     let matrix = match turn {
-        Turn::About { axis, angle } => unit(vector(axis.value)).map(|e| about(e, read(angle, tolerance).sin_cos)),
-        Turn::Quaternion(q) => quaternion(q.value),
-        Turn::Axes(axes) => {
+        WrittenTurn::About { axis, angle } => {
+            unit(vector(axis.value)).map(|e| about(e, read(angle, tolerance).sin_cos))
+        }
+        WrittenTurn::Quaternion(q) => quaternion(q.value),
+        WrittenTurn::Axes(axes) => {
             let [x, y] = axes.value.map(vector);
             unit(x).and_then(|x| {
                 let z = unit(x.cross(y))?;
                 Some(Mat3::from_columns(x, z.cross(x), z))
             })
         }
-        Turn::ZTo(direction) => unit(vector(direction.value)).map(z_to),
+        WrittenTurn::ZTo(direction) => unit(vector(direction.value)).map(z_to),
     };
     snap_rotation(matrix.unwrap_or_else(Mat3::identity))
 }
