@@ -147,7 +147,7 @@ fn spoilt_texts_do_not_panic() {
 
 #[test]
 fn deep_bodies_and_frames_are_read_without_recursion() {
-    let depth = 3000;
+    let depth = 20_000;
     let bodies = format!("{}{}", "<body><geom size=\"1\"/>".repeat(depth), "</body>".repeat(depth));
     let frames = format!("{}{}", "<frame pos=\"0 0 1\">".repeat(depth), "</frame>".repeat(depth));
     let _ = said(&PLAIN.replace("</worldbody>", &format!("{bodies}{frames}</worldbody>")));
