@@ -83,6 +83,13 @@ fn what_changes_the_dynamics_and_is_not_read_is_an_error() {
 }
 
 #[test]
+fn a_default_that_is_wrong_is_complained_of_once() {
+    let text = PLAIN.replace("<worldbody>", "<default><joint damping=\"high\"/></default><worldbody>");
+    let diagnostics = said(&text);
+    assert_eq!(diagnostics.iter().map(|d| d.code).collect::<Vec<_>>(), ["not-a-number"], "{diagnostics}");
+}
+
+#[test]
 fn what_the_dynamics_do_not_need_is_listed() {
     let text = PLAIN.replace(
         "</worldbody>",

@@ -139,7 +139,7 @@ impl<'s> Mjcf<'s> {
                         "the mass of bodies that do not move would count, and beside a free body they are left out";
                     let complaint =
                         crate::description::messages::not_supported_yet("the compiler", "settotalmass", why, help);
-                    self.reader.diagnostics.push(complaint.at(&total.place));
+                    self.reader.say(&total.place, complaint);
                     self.settings.total_mass = None;
                 }
                 self.ignore_as("body that does not move", element);

@@ -78,7 +78,9 @@ struct Mjcf<'s> {
 
 fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     let files = Files::load(source, diagnostics)?;
-    let reader = FileReader::new(&files.sources[0], diagnostics);
+    let mut reader = FileReader::new(&files.sources[0], diagnostics);
+    // a default counts for many elements
+    reader.said = Some(HashSet::new());
     let root = files.root();
     let name = match root.attribute("model") {
         Some(model) if !model.value.trim().is_empty() => reader.value(model.value.clone(), &model.span),
