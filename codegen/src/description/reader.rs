@@ -2,7 +2,7 @@
 
 use super::{messages, Ignored, Noted, Placement, WrittenJoint};
 use crate::diagnostic::{Diagnostic, Diagnostics, Place, Source};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 /// The largest file that is read \[bytes\].
@@ -16,6 +16,8 @@ pub struct FileReader<'a> {
     pub source: &'a Source,
     /// What is said about it.
     pub diagnostics: &'a mut Diagnostics,
+    /// Places with what was said of them, where one place counts for many elements and is complained of once.
+    pub said: Option<HashSet<(Place, &'static str)>>,
     ignored: Vec<Ignored>,
     ignored_index: HashMap<String, usize>,
     /// Numbers of the drive that is being read, as far as equations have them.
@@ -37,6 +39,7 @@ impl<'a> FileReader<'a> {
         FileReader {
             source,
             diagnostics,
+            said: None,
             ignored: Vec::new(),
             ignored_index: HashMap::new(),
             drive_numbers: Vec::new(),
@@ -51,7 +54,15 @@ impl<'a> FileReader<'a> {
     /// Says something about bytes of the file.
     pub fn complain(&mut self, span: &Range<usize>, diagnostic: Diagnostic) {
         let place = self.place(span);
-        self.diagnostics.push(diagnostic.at(&place));
+        self.say(&place, diagnostic);
+    }
+
+    /// Says something about a place.
+    pub fn say(&mut self, place: &Place, diagnostic: Diagnostic) {
+        let is_new = self.said.as_mut().is_none_or(|said| said.insert((place.clone(), diagnostic.code)));
+        if is_new {
+            self.diagnostics.push(diagnostic.at(place));
+        }
     }
 
     /// A value with the bytes that say it.

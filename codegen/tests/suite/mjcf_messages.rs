@@ -83,6 +83,13 @@ fn what_changes_the_dynamics_and_is_not_read_is_an_error() {
 }
 
 #[test]
+fn a_default_that_is_wrong_is_complained_of_once() {
+    let text = PLAIN.replace("<worldbody>", "<default><joint damping=\"high\"/></default><worldbody>");
+    let diagnostics = said(&text);
+    assert_eq!(diagnostics.iter().map(|d| d.code).collect::<Vec<_>>(), ["not-a-number"], "{diagnostics}");
+}
+
+#[test]
 fn what_the_dynamics_do_not_need_is_listed() {
     let text = PLAIN.replace(
         "</worldbody>",
@@ -147,7 +154,7 @@ fn spoilt_texts_do_not_panic() {
 
 #[test]
 fn deep_bodies_and_frames_are_read_without_recursion() {
-    let depth = 3000;
+    let depth = 20_000;
     let bodies = format!("{}{}", "<body><geom size=\"1\"/>".repeat(depth), "</body>".repeat(depth));
     let frames = format!("{}{}", "<frame pos=\"0 0 1\">".repeat(depth), "</frame>".repeat(depth));
     let _ = said(&PLAIN.replace("</worldbody>", &format!("{bodies}{frames}</worldbody>")));

@@ -16,13 +16,13 @@ impl<'s> Mjcf<'s> {
     /// Says something about an attribute.
     pub fn complain(&mut self, attribute: &Attribute, diagnostic: Diagnostic) {
         let place = self.place(attribute);
-        self.reader.diagnostics.push(diagnostic.at(&place));
+        self.reader.say(&place, diagnostic);
     }
 
     /// Says something about an element.
     pub fn complain_at(&mut self, element: &Element, diagnostic: Diagnostic) {
         let place = self.tag(element);
-        self.reader.diagnostics.push(diagnostic.at(&place));
+        self.reader.say(&place, diagnostic);
     }
 
     /// Refuses an element that changes the dynamics.
@@ -71,7 +71,7 @@ impl<'s> Mjcf<'s> {
         for attribute in element.attributes.iter().filter(|a| !known.contains(&a.name.as_str())) {
             let place = self.files.sources[attribute.file].place(attribute.name_span.clone());
             let complaint = messages::unknown_attribute(owner, &element.name, &attribute.name, &known);
-            self.reader.diagnostics.push(complaint.at(&place));
+            self.reader.say(&place, complaint);
         }
     }
 

@@ -83,6 +83,8 @@ struct Open<'s> {
     class: usize,
     /// The link that carries it.
     parent: Noted<String>,
+    /// The next name around it that the file gives: made-up names are made of it, so that they do not grow with the depth.
+    around: String,
 }
 
 impl<'s> Mjcf<'s> {
@@ -116,7 +118,7 @@ impl<'s> Mjcf<'s> {
         }
         contents.of("geom").iter().for_each(|geom| self.ignore_as("geom of the world", geom.element));
         self.refuse_others(&contents, "the world", &["joint", "freejoint", "inertial"]);
-        let mut open = self.bodies_in(&mut contents, base);
+        let mut open = self.bodies_in(&mut contents, base, "world");
         while let Some(body) = open.pop() {
             let is_base = base.is_some_and(|base| std::ptr::eq(base, body.element));
             let inner = self.read_body(body, is_base, moving.len());
@@ -125,7 +127,7 @@ impl<'s> Mjcf<'s> {
     }
 
     /// The bodies in a body, the first one last; of the world only `base` if there is one.
-    fn bodies_in(&mut self, contents: &mut Contents<'s>, base: Option<&'s Element>) -> Vec<Open<'s>> {
+    fn bodies_in(&mut self, contents: &mut Contents<'s>, base: Option<&'s Element>, around: &str) -> Vec<Open<'s>> {
         let bodies: Vec<(&'s Element, usize, Option<usize>)> =
             contents.of("body").iter().map(|body| (body.element, body.class, body.frame)).collect();
         let mut open = Vec::new();
@@ -137,7 +139,7 @@ impl<'s> Mjcf<'s> {
                         "the mass of bodies that do not move would count, and beside a free body they are left out";
                     let complaint =
                         crate::description::messages::not_supported_yet("the compiler", "settotalmass", why, help);
-                    self.reader.diagnostics.push(complaint.at(&total.place));
+                    self.reader.say(&total.place, complaint);
                     self.settings.total_mass = None;
                 }
                 self.ignore_as("body that does not move", element);
@@ -147,7 +149,7 @@ impl<'s> Mjcf<'s> {
                 Some(_) => contents.link.clone(),
                 None => self.link_of_frame(contents, frame),
             };
-            open.push(Open { element, class, parent });
+            open.push(Open { element, class, parent, around: around.to_string() });
         }
         open.reverse();
         open
@@ -155,8 +157,9 @@ impl<'s> Mjcf<'s> {
 
     /// Reads a body; the bodies in it.
     fn read_body(&mut self, body: Open<'s>, is_base: bool, moving: usize) -> Vec<Open<'s>> {
-        let Open { element, class, parent } = body;
-        let name = self.name_of(element, &format!("{}_body", parent.value));
+        let Open { element, class, parent, around } = body;
+        let name = self.name_of(element, &format!("{around}_body"));
+        let around = if element.attribute("name").is_some() { name.value.clone() } else { around };
         let owner = format!("body `{}`", name.value);
         self.check_attributes(element, &owner, vocabulary::BODY);
         let given = Defaulted::alone(element);
@@ -179,7 +182,7 @@ impl<'s> Mjcf<'s> {
         self.robot.links.push(WrittenLink { name, inertial, is_carrier: false });
         self.add_sites(&mut contents);
         self.refuse_others(&contents, &owner, &[]);
-        self.bodies_in(&mut contents, None)
+        self.bodies_in(&mut contents, None, &around)
     }
 
     /// Refuses or skips what is read nowhere.
@@ -281,21 +284,13 @@ impl<'s> Mjcf<'s> {
                 self.ignore_as("site with `fromto`", element);
                 continue;
             }
-            let is_taken =
-                self.robot.links.iter().any(|link| link.name.value == name.value) || self.is_body(&name.value);
+            let is_taken = self.links.contains(&name.value);
             let own = if is_taken { self.made_up(&format!("{}_site", name.value)) } else { name.value.clone() };
             let name = Noted::new(own, self.place(name));
             let pose = self.pose(&given, &owner);
             let link = self.link_of_frame(contents, frame);
             self.robot.frames.push(NamedFrame { name, link, pose });
         }
-    }
-
-    /// Whether a body or a frame has the name.
-    fn is_body(&self, name: &str) -> bool {
-        let is = |e: &Element| ["body", "frame"].contains(&e.name.as_str());
-        let mut all = self.files.elements.iter().filter(|e| is(e));
-        all.any(|e| e.attribute("name").is_some_and(|own| own.value == name))
     }
 
     /// Whether a body or one in it has a joint; with `["free"]`: whether it has a free one itself.

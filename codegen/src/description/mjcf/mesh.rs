@@ -1,8 +1,9 @@
 //! Meshes: volume, centre of mass and inertia of what triangles enclose, from STL (binary or text) and OBJ files.
 //!
 //! A triangle a, b, c and the origin span a tetrahedron of the volume V = a·(b × c)/6, whose ∫ r dm = V (a + b + c)/4 and
-//! ∫ r rᵀ dm = V/20 (a aᵀ + b bᵀ + c cᵀ + s sᵀ), s = a + b + c, at density 1. With `inertia="exact"` volumes have their sign. MuJoCo's default
-//! `legacy` takes their magnitudes, about the centroid of the surface for the centre of mass, about that for mass and inertia: more than there is where a mesh is not convex. Both are followed.
+//! ∫ r rᵀ dm = V/20 (a aᵀ + b bᵀ + c cᵀ + s sᵀ), s = a + b + c, at density 1. With `inertia="exact"` volumes have
+//! their sign. MuJoCo's default `legacy` takes their magnitudes, about the centroid of the surface for the centre of mass,
+//! about that for mass and inertia: more than there is where a mesh is not convex. Both are followed.
 
 use super::classes::Defaulted;
 use super::files::{read_file, Element};

@@ -28,7 +28,7 @@ use crate::diagnostic::{Diagnostics, Place, Source};
 use classes::DefaultClasses;
 use files::{Element, Files};
 use settings::CompilerSettings;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use straightline_core::joint::Dialect;
 
 pub(super) const FORMAT: FileFormat = FileFormat {
@@ -67,6 +67,10 @@ struct Mjcf<'s> {
     classes: DefaultClasses<'s>,
     /// Names of links, joints and frames, written or made up.
     names: HashSet<String>,
+    /// Names of bodies and frames.
+    links: HashSet<String>,
+    /// How many names were made of one.
+    made: HashMap<String, usize>,
     robot: Description,
     /// Of each joint of it, the element that says it.
     joints: Vec<&'s Element>,
@@ -74,7 +78,9 @@ struct Mjcf<'s> {
 
 fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     let files = Files::load(source, diagnostics)?;
-    let reader = FileReader::new(&files.sources[0], diagnostics);
+    let mut reader = FileReader::new(&files.sources[0], diagnostics);
+    // a default counts for many elements
+    reader.said = Some(HashSet::new());
     let root = files.root();
     let name = match root.attribute("model") {
         Some(model) if !model.value.trim().is_empty() => reader.value(model.value.clone(), &model.span),
@@ -86,6 +92,8 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
         settings: CompilerSettings::default(),
         classes: DefaultClasses::default(),
         names: HashSet::new(),
+        links: HashSet::new(),
+        made: HashMap::new(),
         robot: Description::new(&FORMAT, name),
         joints: Vec::new(),
     };
@@ -154,6 +162,9 @@ impl<'s> Mjcf<'s> {
     /// Remembers the names that the file gives, so that no made-up name is one of them.
     fn collect_names(&mut self) {
         for element in &self.files.elements {
+            if ["body", "frame"].contains(&element.name.as_str()) {
+                self.links.extend(element.attribute("name").map(|name| name.value.clone()));
+            }
             if ["body", "joint", "freejoint", "site", "frame"].contains(&element.name.as_str()) {
                 self.names.extend(element.attribute("name").map(|name| name.value.clone()));
             }
@@ -162,14 +173,14 @@ impl<'s> Mjcf<'s> {
 
     /// `name`, or with a number after it where that is taken; it is taken then.
     fn made_up(&mut self, name: &str) -> String {
-        let mut own = name.to_string();
-        let mut number = 2;
-        while self.names.contains(&own) {
-            own = format!("{name}_{number}");
-            number += 1;
+        let made = self.made.entry(name.to_string()).or_insert(0);
+        loop {
+            *made += 1;
+            let own = if *made == 1 { name.to_string() } else { format!("{name}_{made}") };
+            if self.names.insert(own.clone()) {
+                return own;
+            }
         }
-        self.names.insert(own.clone());
-        own
     }
 
     /// The name of an element, or else a made-up one.
