@@ -167,10 +167,6 @@ impl Real for Expr {
         })
     }
 
-    fn known(self) -> Option<Dd> {
-        self.as_constant()
-    }
-
     fn sqrt(self) -> Self {
         Expr(with(|g| g.add(Op::sqrt(self.0))))
     }

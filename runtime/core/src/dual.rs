@@ -110,11 +110,6 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
     }
 
     /// At zero the slope is infinite.
-    fn known(self) -> Option<Dd> {
-        let is_fixed = self.derivatives.iter().all(|x| x.known() == Some(Dd::ZERO));
-        self.value.known().filter(|_| is_fixed)
-    }
-
     fn sqrt(self) -> Self {
         let root = self.value.sqrt();
         self.chain(root, T::one() / (root + root))

@@ -88,12 +88,6 @@ pub trait Real:
         [x * cos - y * sin, y * cos + x * sin]
     }
 
-    /// The value of a constant, of a scalar that writes equations down and knows it by now; nothing of numbers.
-    #[inline(always)]
-    fn known(self) -> Option<Dd> {
-        None
-    }
-
     /// Square root; NaN below zero.
     fn sqrt(self) -> Self;
 

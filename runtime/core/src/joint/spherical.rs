@@ -3,8 +3,8 @@
 use super::articulated::{ArticulatedInertia, FreeJoint};
 use super::exponential::{exponential, logarithm};
 use super::mechanics::WorldMotion;
-use super::quaternion::{product, quaternion_to_rotation, rotation_to_quaternion, scaled_quaternion_to_rotation};
-use super::{Descriptor, Dialect, JointPose, Measure, Mechanics, TwistMap, Word};
+use super::quaternion::{product, quaternion_to_rotation};
+use super::{Descriptor, Dialect, Measure, Mechanics, TwistMap, Word};
 use crate::dd::Dd;
 use crate::real::Real;
 use crate::spatial::{symmetric_product, Composite, ForceVector, Mat3, MotionVector, Sym3, Transform, Vec3};
@@ -48,33 +48,9 @@ fn turn<T: Real>(v: &[T]) -> [Vec3<T>; 2] {
     [Vec3::zero(), vector(v)]
 }
 
-/// The quaternion of a rotation that is known; none of a signed permutation, with which nothing is multiplied.
-fn known_quaternion<T: Real>(rotation: &Mat3<T>) -> Option<[Dd; 4]> {
-    let mut known = Mat3 { rows: [[Dd::ZERO; 3]; 3] };
-    for (known, row) in known.rows.iter_mut().flatten().zip(rotation.rows.iter().flatten()) {
-        *known = row.known()?;
-    }
-    let is_free = |x: &Dd| *x == Dd::ZERO || x.abs() == Dd::ONE;
-    (!known.rows.iter().flatten().all(is_free)).then(|| rotation_to_quaternion(&known))
-}
-
 impl<T: Real> Mechanics<T> for Spherical {
     fn motion(&self, q: &[T]) -> Transform<T> {
         Transform { rotation: quaternion_to_rotation(quaternion(q)), translation: Vec3::zero() }
-    }
-
-    /// Where E is known and no signed permutation, E R(q) = R(e ∘ q) takes 28 operations instead of 45, and with √2 e for e three less.
-    fn pose(&self, _: usize, placement: &Transform<T>, _: bool, q: &[T]) -> JointPose<T> {
-        match known_quaternion(&placement.rotation) {
-            Some(e) => {
-                let root = Dd::from(2.0).sqrt();
-                let turned = product(&e.map(|x| T::constant(x * root)), &quaternion(q));
-                let rotation = scaled_quaternion_to_rotation(turned);
-                let placement = Transform { rotation: Mat3::identity(), translation: placement.translation };
-                JointPose::moved(&placement, &Transform { rotation, translation: Vec3::zero() })
-            }
-            None => JointPose::moved(placement, &self.motion(q)),
-        }
     }
 
     fn column(&self, k: usize, _: &[T]) -> MotionVector<T> {
