@@ -10,7 +10,7 @@ use straightline_core::joint::{Dialect, Measure};
 
 /// A kind of joint that is read as several.
 #[derive(Debug, PartialEq)]
-pub struct Composite {
+pub struct CompositeKind {
     /// The word for it.
     pub word: &'static str,
     /// The files that have the word.
@@ -24,23 +24,23 @@ pub struct Composite {
     /// Whether the second joint follows the first one, by a pitch.
     pub has_pitch: bool,
     /// The single joints, the outermost first.
-    pub parts: &'static [Part],
+    pub parts: &'static [CompositePart],
 }
 
 /// One of the single joints.
 #[derive(Debug, PartialEq)]
-pub struct Part {
+pub struct CompositePart {
     /// What stands behind the joint's name, after an underscore; nothing: the name itself.
     pub suffix: &'static str,
     /// Whether it turns or slides.
     pub measure: Measure,
     /// Along what.
-    pub along: Direction,
+    pub along: PartAxis,
 }
 
 /// The axis of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Direction {
+pub enum PartAxis {
     /// That of the joint.
     Axis,
     /// The second one.
@@ -51,11 +51,11 @@ pub enum Direction {
     Frame(usize),
 }
 
-const fn part(suffix: &'static str, measure: Measure, along: Direction) -> Part {
-    Part { suffix, measure, along }
+const fn part(suffix: &'static str, measure: Measure, along: PartAxis) -> CompositePart {
+    CompositePart { suffix, measure, along }
 }
 
-const PLAIN: Composite = Composite {
+const PLAIN: CompositeKind = CompositeKind {
     word: "",
     dialects: &[Dialect::JointFrames],
     summary: "",
@@ -66,48 +66,48 @@ const PLAIN: Composite = Composite {
 };
 
 /// All of them.
-pub static COMPOSITES: &[Composite] = &[
-    Composite {
+pub static COMPOSITES: &[CompositeKind] = &[
+    CompositeKind {
         word: "planar",
         dialects: Dialect::FRAMES,
         summary: "slides along two directions across the axis and turns about it; x, y and the axis are right-handed",
         parts: &[
-            part("x", Measure::Length, Direction::Across(0)),
-            part("y", Measure::Length, Direction::Across(1)),
-            part("theta", Measure::Angle, Direction::Axis),
+            part("x", Measure::Length, PartAxis::Across(0)),
+            part("y", Measure::Length, PartAxis::Across(1)),
+            part("theta", Measure::Angle, PartAxis::Axis),
         ],
         ..PLAIN
     },
-    Composite {
+    CompositeKind {
         word: "translation",
         summary: "slides along x, y and z of the joint frame, which is fixed to the parent",
         has_axis: false,
         parts: &[
-            part("x", Measure::Length, Direction::Frame(0)),
-            part("y", Measure::Length, Direction::Frame(1)),
-            part("z", Measure::Length, Direction::Frame(2)),
+            part("x", Measure::Length, PartAxis::Frame(0)),
+            part("y", Measure::Length, PartAxis::Frame(1)),
+            part("z", Measure::Length, PartAxis::Frame(2)),
         ],
         ..PLAIN
     },
-    Composite {
+    CompositeKind {
         word: "universal",
         summary: "turns about `axis`, and then about `axis2`, which turns with it",
         has_second_axis: true,
-        parts: &[part("1", Measure::Angle, Direction::Axis), part("2", Measure::Angle, Direction::SecondAxis)],
+        parts: &[part("1", Measure::Angle, PartAxis::Axis), part("2", Measure::Angle, PartAxis::SecondAxis)],
         ..PLAIN
     },
-    Composite {
+    CompositeKind {
         word: "cylindrical",
         summary: "slides along the axis and turns about it, each by itself",
-        parts: &[part("slide", Measure::Length, Direction::Axis), part("turn", Measure::Angle, Direction::Axis)],
+        parts: &[part("slide", Measure::Length, PartAxis::Axis), part("turn", Measure::Angle, PartAxis::Axis)],
         ..PLAIN
     },
-    Composite {
+    CompositeKind {
         word: "helical",
         summary:
             "turns about the axis and slides along it by the pitch, a joint that follows: one coordinate \\[rad\\]",
         has_pitch: true,
-        parts: &[part("", Measure::Angle, Direction::Axis), part("slide", Measure::Length, Direction::Axis)],
+        parts: &[part("", Measure::Angle, PartAxis::Axis), part("slide", Measure::Length, PartAxis::Axis)],
         ..PLAIN
     },
 ];
@@ -116,14 +116,14 @@ pub static COMPOSITES: &[Composite] = &[
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WrittenComposite {
     /// Which it is.
-    pub of: &'static Composite,
+    pub of: &'static CompositeKind,
     /// The second axis, where it has one.
     pub second_axis: [f64; 3],
     /// The pitch \[m/rad\], where it has one.
     pub pitch: f64,
 }
 
-impl Composite {
+impl CompositeKind {
     /// As a type of joints of which nothing further is read.
     pub fn joint_type(&'static self) -> JointType {
         let composite = Some(WrittenComposite { of: self, second_axis: [0.0; 3], pitch: 0.0 });
@@ -144,7 +144,7 @@ impl WrittenJoint {
     /// Whether the axis of a composite joint is one that it can have.
     pub(super) fn has_fit_axis(&self) -> bool {
         let Some(composite) = self.kind.value.composite else { return true };
-        let needs_frame = composite.of.parts.iter().any(|part| matches!(part.along, Direction::Across(_)));
+        let needs_frame = composite.of.parts.iter().any(|part| matches!(part.along, PartAxis::Across(_)));
         !needs_frame || matches!(&self.placement, Placement::Frames { axis, .. } if across(axis.value).is_some())
     }
 
@@ -162,12 +162,12 @@ impl WrittenJoint {
         let last = composite.of.parts.len() - 1;
         let carrier = |k: usize| Noted::new(format!("{}_carrier{}", self.name.value, k + 1), place.clone());
         let links = (0..last).map(|k| WrittenLink { name: carrier(k), inertial: None, is_carrier: true }).collect();
-        let joint = |(k, part): (usize, &'static Part)| {
+        let joint = |(k, part): (usize, &'static CompositePart)| {
             let direction = match part.along {
-                Direction::Axis => axis.value,
-                Direction::SecondAxis => composite.second_axis,
-                Direction::Across(side) => sides[side],
-                Direction::Frame(i) => std::array::from_fn(|k| if k == i { 1.0 } else { 0.0 }),
+                PartAxis::Axis => axis.value,
+                PartAxis::SecondAxis => composite.second_axis,
+                PartAxis::Across(side) => sides[side],
+                PartAxis::Frame(i) => std::array::from_fn(|k| if k == i { 1.0 } else { 0.0 }),
             };
             let axis = Noted::new(direction, axis.place.clone());
             let origin = if k == 0 { origin.clone() } else { WrittenPose::identity(place.clone()) };

@@ -19,9 +19,11 @@ pub mod table;
 mod toml;
 mod tree;
 mod urdf;
+mod written_pose;
 mod xml;
 
 pub use tree::*;
+pub use written_pose::*;
 
 use crate::diagnostic::wording::one_of;
 use crate::diagnostic::{Diagnostics, Place, Source};

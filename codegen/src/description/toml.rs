@@ -1,6 +1,6 @@
 //! TOML with joint frames; the schema is in `SCHEMA.md`.
 
-use super::composite::{Composite, WrittenComposite};
+use super::composite::{CompositeKind, WrittenComposite};
 use super::flexible::Flexible;
 use super::reader::{FileReader, Range64};
 use super::table::{self, TomlTable};
@@ -175,7 +175,7 @@ fn read_joint(reader: &mut FileReader, mut table: TomlTable) -> Option<WrittenJo
     Some(reader.judged_composite(joint))
 }
 
-fn composite_keys(composite: &'static Composite) -> &'static [&'static str] {
+fn composite_keys(composite: &'static CompositeKind) -> &'static [&'static str] {
     match (composite.has_second_axis, composite.has_pitch) {
         (true, _) => &["axis2"],
         (_, true) => &["pitch", "lead"],
@@ -184,7 +184,7 @@ fn composite_keys(composite: &'static Composite) -> &'static [&'static str] {
 }
 
 /// What a composite joint has beside others.
-fn read_composite(reader: &mut FileReader, table: &TomlTable, of: &'static Composite) -> WrittenComposite {
+fn read_composite(reader: &mut FileReader, table: &TomlTable, of: &'static CompositeKind) -> WrittenComposite {
     let mut read = WrittenComposite { of, second_axis: [0.0, 0.0, 1.0], pitch: 1.0 };
     if of.has_second_axis {
         reader.require(table, "axis2", "axis2 = \"y\"");

@@ -10,21 +10,23 @@
 
 use crate::description::{
     AnchoredJoint, Angle, AngleUnit, BaseKind, Description, JointVectors, Noted, Placement, PoseCoordinate, Rotation,
-    WrittenCoupling, WrittenInertial, WrittenJoint, WrittenPose, WrittenTurn,
+    WrittenInertial, WrittenJoint, WrittenPose, WrittenTurn,
 };
 use crate::diagnostic::Place;
 use crate::model::{FrameOption, ModelOptions};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 use straightline_core::reference::{
-    unit, CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint, SharedCoordinate,
+    unit, CentreOfMassFrame, CentreOfMassLink, CentreOfMassTree, ExtendedPosition, ReferenceJoint,
 };
 use straightline_core::spatial::Sym3;
 use straightline_core::Dd;
 
 mod elastic;
+mod shared;
 
 use elastic::{bend, stand, Elastic, Segments};
+use shared::share_coordinates;
 
 /// An angle of the file in radians; within the tolerance, a multiple of π/4 or π/6.
 fn radians(angle: &Angle, options: &ModelOptions) -> Dd {
@@ -69,44 +71,6 @@ pub fn centre_of_mass_tree(description: &Description, options: &ModelOptions) ->
 fn turned(rpy: &[f64; 3], options: &ModelOptions) -> Matrix3<Dd> {
     let angle = |i: usize| Angle { value: rpy[i], ..Angle::zero(Place::none()) };
     rotation(&Rotation::RollPitchYaw([angle(0), angle(1), angle(2)]), options)
-}
-
-/// Lets joints that follow others share the coordinates of those that follow none; until the coordinates are numbered their `iv` is the link of that joint.
-fn share_coordinates(
-    tree: &mut CentreOfMassTree<Dd>,
-    joint_names: &[String],
-    (description, options): (&Description, &ModelOptions),
-) -> Result<(), String> {
-    let couplings: Vec<&WrittenCoupling> = match options.uncoupled {
-        true => Vec::new(),
-        false => description.couplings.iter().chain(&options.couplings).collect(),
-    };
-    // a joint's coordinate as a sum of that of a link and a number
-    let resolved = |joint: &str| -> Result<(usize, [Dd; 2]), String> {
-        let mut name: &str = joint;
-        let mut line = [Dd::ONE, Dd::ZERO];
-        for _ in 0..=couplings.len() {
-            let Some(coupling) = couplings.iter().find(|coupling| coupling.joint.value == name) else {
-                let link = joint_names.iter().position(|joint| joint == name);
-                return Ok((link.ok_or_else(|| format!("there is no joint `{name}`"))?, line));
-            };
-            let [a, b] = [coupling.ratio.value, coupling.offset.value].map(Dd::from);
-            line = [line[0] * a, line[0] * b + line[1]];
-            name = &coupling.source.value;
-        }
-        Err(format!("joint `{name}` follows itself"))
-    };
-    for (rank, coupling) in couplings.iter().enumerate() {
-        let follower = resolved_link(joint_names, &coupling.joint.value)?;
-        let (source, [ratio, offset]) = resolved(&coupling.joint.value)?;
-        let link = &mut tree.links[follower];
-        (link.iv, link.shared) = (source, Some(SharedCoordinate { ratio, offset, rank }));
-    }
-    Ok(())
-}
-
-fn resolved_link(joint_names: &[String], joint: &str) -> Result<usize, String> {
-    joint_names.iter().position(|name| name == joint).ok_or_else(|| format!("there is no joint `{joint}`"))
 }
 
 /// The joints' places in q and q̇: in the order that is asked for, or else in that of the links. A floating root that

@@ -5,6 +5,8 @@ use super::interface::{CParameter, Exported, Interface, LAYOUTS};
 use crate::emit::doc::relinked;
 use crate::function::base_parameter_lists;
 use std::fmt::Write;
+use straightline_core::model::Model;
+use straightline_core::Dd;
 use straightline_graph::expr::Port;
 
 /// What the header says of batches.
@@ -21,6 +23,22 @@ fn join(numbers: &[usize]) -> String {
     lines.collect::<Vec<_>>().join(",\n    ")
 }
 
+/// The joints as lines of a comment.
+fn joints_in_words(out: &mut String, model: &Model<Dd>) {
+    for joint in model.joints() {
+        let row = joint.kind.row();
+        let kind = match joint.kind.is_single() {
+            true => format!("{} [{}]", row.name, joint.kind.units()[0]),
+            false => format!("{}: {}", row.name, row.coordinates.replace('\n', "\n *       ")),
+        };
+        let _ = writeln!(out, " *   {:>3} {:>3}  {}, {kind}", joint.iq, joint.iv, c_comment(&joint.name));
+    }
+    for (joint, coupling) in model.followers() {
+        let (name, follows) = (c_comment(&joint.name), coupling.in_words(model));
+        let _ = writeln!(out, " *             {name}, {}: {}", joint.kind.row().name, c_comment(&follows));
+    }
+}
+
 impl Interface<'_> {
     /// The C header of these functions, with further declarations before them.
     pub fn header(&self, functions: &[Exported], further: &str) -> String {
@@ -34,18 +52,7 @@ impl Interface<'_> {
             robot = c_comment(&model.name),
             provenance = self.provenance(),
         );
-        for joint in model.joints() {
-            let row = joint.kind.row();
-            let kind = match joint.kind.is_single() {
-                true => format!("{} [{}]", row.name, joint.kind.units()[0]),
-                false => format!("{}: {}", row.name, row.coordinates.replace('\n', "\n *       ")),
-            };
-            let _ = writeln!(out, " *   {:>3} {:>3}  {}, {kind}", joint.iq, joint.iv, c_comment(&joint.name));
-        }
-        for (joint, coupling) in model.followers() {
-            let (name, follows) = (c_comment(&joint.name), coupling.in_words(model));
-            let _ = writeln!(out, " *             {name}, {}: {}", joint.kind.row().name, c_comment(&follows));
-        }
+        joints_in_words(&mut out, model);
         let of_robot: Vec<_> = self.generated.items.iter().map(|item| item.function).collect();
         let lists = base_parameter_lists(model, &of_robot);
         for list in &lists {

@@ -85,7 +85,7 @@ pub struct CentroidalBlocks<T> {
 /// A, Ȧ and ∂h/∂q at (q, q̇).
 #[doc(alias("computeCentroidalMapTimeVariation", "dccrba"))]
 pub fn centroidal_derivatives<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> CentroidalBlocks<T> {
-    let six = momentum_of(model, q, qd);
+    let of_robot = (q, qd);
     let (q, qd, nv) = (&*model.tree_positions(q), &*model.tree_rates(qd), model.tree_nv());
     let motion = CoriolisSweep::new(model, q, qd);
     let (spreads, world) = (motion.spreads(model), world_poses(model, q));
@@ -111,6 +111,7 @@ pub fn centroidal_derivatives<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> C
         }
     }
     subtract_brackets(model, qd, &all.map, &mut all.by_position);
+    let six = momentum_of(model, of_robot.0, of_robot.1);
     turn_with_floating_bases(model, &world, &six, &mut all.by_position);
     let [map, rate, by_position] = [all.map, all.rate, all.by_position].map(|rows| model.free_columns(rows));
     CentroidalBlocks { map, rate, by_position }
