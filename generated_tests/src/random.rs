@@ -351,6 +351,7 @@ impl RandomRobot {
                 joint: if link.motion == Motion::Prismatic { ReferenceJoint::Linear } else { ReferenceJoint::Revolute },
                 iq: 0,
                 iv: 0,
+                shared: None,
                 mass: lump.mass,
                 inertia,
                 e,

@@ -329,7 +329,8 @@ impl<'a> Statements<'a> {
         let (pairs, angles): (Vec<NodeId>, Vec<Vec<Expression>>) = block
             .iter()
             .filter_map(|id| match self.graph.op(*id) {
-                Op::SinCos(a) if self.is_written(a) => Some((*id, terms_of(a))),
+                // those that a call before has are written
+                Op::SinCos(a) if self.is_written(a) && !self.paired[id.index()] => Some((*id, terms_of(a))),
                 _ => None,
             })
             .unzip();
