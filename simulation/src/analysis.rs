@@ -186,7 +186,9 @@ pub fn analyze_by(
         let tau = equations.torques(&q, &qd, &qdd);
         let power: Vec<f64> = tau.iter().zip(&qd).map(|(tau, qd)| tau * qd).collect();
         table.rows.push([&[t], &q[..], &qd, &qdd, &tau, &power].concat());
+        // joints that follow others come last, and are no joints of the table
         let carried = equations.wrenches(&q, &qd, &qdd);
+        let carried = &carried[..joints.len()];
         let forces = carried.iter().flat_map(|w| w[..3].to_vec());
         let moments = carried.iter().flat_map(|w| w[3..].to_vec());
         wrenches.rows.push(std::iter::once(t).chain(forces).chain(moments).collect());

@@ -93,7 +93,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     for table in reader.tables_at(&top, "frame") {
         description.frames.extend(read_frame(&mut reader, table));
     }
-    description.couplings = reader.couplings_at(&top);
+    description.couplings.extend(reader.couplings_at(&top));
     description.drives = reader.drives_at(&top);
     description.ignored = reader.into_ignored();
     Some(description)

@@ -273,7 +273,7 @@ fn read_joint(reader: &mut FileReader, node: Node, couplings: &mut Vec<WrittenCo
     };
     let (parent, child) = (end(parent, "parent"), end(child, "child"));
     let origin = read_pose(reader, &format!("{owner}, origin"), origin, node);
-    let moves = kind.as_ref().is_none_or(|k| k.value.kind.is_some());
+    let moves = kind.as_ref().is_none_or(|k| k.value.kind.is_some() || k.value.composite.is_some());
     if let Some(axis) = axis.filter(|_| moves) {
         check_attributes(reader, &owner, axis, &["xyz"]);
     }
@@ -299,7 +299,13 @@ fn read_joint(reader: &mut FileReader, node: Node, couplings: &mut Vec<WrittenCo
         drive.friction = read("friction");
     }
     if let (Some(element), Some(name)) = (mimic.filter(|_| moves), &name) {
-        couplings.extend(read_mimic(reader, &owner, name, element));
+        match kind.as_ref().and_then(|kind| kind.value.composite) {
+            Some(composite) => {
+                let complaint = messages::several_coordinates(&name.value, composite.of.word, "a mimic");
+                reader.complain(&tag(element), complaint);
+            }
+            None => couplings.extend(read_mimic(reader, &owner, name, element)),
+        }
     }
     let placement = Placement::Frames { origin, axis };
     let joint = WrittenJoint { name: name?, kind: kind?, parent: parent?, child: child?, placement, limits, drive };

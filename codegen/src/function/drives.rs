@@ -231,7 +231,9 @@ pub(super) fn with_links<T: Real, R>(
     solve: impl FnOnce(DrivenState<'_, T>, &[T], &Links<'_, T>) -> R,
 ) -> R {
     let [q, qd, x, u] = inputs else { panic!("functions that solve take q, qd, x, u") };
-    let is_articulated = forms.method != ForwardDynamicsMethod::Factorisation && may_be_articulated(forms.model);
+    let is_articulated = forms.method != ForwardDynamicsMethod::Factorisation
+        && may_be_articulated(forms.model)
+        && forms.model.couplings.is_empty();
     let h = if is_articulated { Vec::new() } else { forms.mass_matrix(q) };
     let links = if is_articulated { Links::Articulated } else { Links::MassMatrix(&h) };
     solve((q, qd, x, u), &forms.bias_force(q, qd), &links)

@@ -32,6 +32,11 @@ pub fn of_robot(description: &Description, scene: &Scene, scalar: Scalar, diagno
     for number in description.drives.iter().chain(&scene.drives).flat_map(|drive| &drive.written.0) {
         complain(&number.value.place, number.what.clone(), number.value.value, number.is_needed);
     }
+    for coupling in description.couplings.iter().chain(&scene.couplings) {
+        let name = &coupling.joint.value;
+        complain(&coupling.ratio.place, format!("ratio of joint `{name}`"), coupling.ratio.value, true);
+        complain(&coupling.offset.place, format!("offset of joint `{name}`"), coupling.offset.value, false);
+    }
     of_scene(scene, scalar, diagnostics);
 }
 

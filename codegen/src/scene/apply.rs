@@ -97,19 +97,20 @@ fn held(model: &Model<Dd>, id: BodyId, scene: &Scene) -> Option<Held> {
     let coupling = model.coupling_of(id);
     let joint = &model.bodies[coupling.map_or(id, |coupling| coupling.source)].joint;
     let (_, q) = scene.locked.iter().find(|(name, _)| *name == joint.name)?;
-    if let Some(coupling) = coupling {
-        return Some(body.joint.kind.motion(&[coupling.ratio * Dd::from(*q) + coupling.offset]));
-    }
+    let q = coupling.map_or(Dd::from(*q), |coupling| coupling.ratio * Dd::from(*q) + coupling.offset);
     // one number does not hold others, and is complained of
     if !body.joint.kind.is_single() {
         return Some(Transform::identity());
     }
     Some(match body.joint.kind.turns() {
-        false => body.joint.kind.motion(&[Dd::from(*q)]),
+        false => body.joint.kind.motion(&[q]),
         true => {
             // as in robot files: 1.5707963267948966 is a right angle
-            let q = Angle { value: *q, unit: AngleUnit::Radian, text: String::new(), place: Place::none() };
-            turned(about(Vec3::unit_z(), angle::read(&q, angle::ROUNDING).sin_cos))
+            let angle = Angle { value: q.to_f64(), unit: AngleUnit::Radian, text: String::new(), place: Place::none() };
+            match (angle::read(&angle, angle::ROUNDING), coupling) {
+                (read, Some(_)) if read.special.is_none() => body.joint.kind.motion(&[q]),
+                (read, _) => turned(about(Vec3::unit_z(), read.sin_cos)),
+            }
         }
     })
 }

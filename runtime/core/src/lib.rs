@@ -18,9 +18,9 @@ pub mod batch;
 pub mod contact;
 pub mod control;
 #[cfg(feature = "alloc")]
-#[cfg(feature = "alloc")]
 pub mod coupling;
 pub mod dd;
+#[cfg(feature = "alloc")]
 pub mod drive;
 pub mod dual;
 pub mod fixed;

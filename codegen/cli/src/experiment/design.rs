@@ -62,7 +62,7 @@ impl Design {
         let torques = trace(RuleSet::all(), ports(), vec![Port::new("tau", &[n])], |given| {
             inverse_dynamics(&with_inputs(&model, &changes, &given[3]), &given[0], &given[1], &given[2])
         });
-        let wrenches = trace(RuleSet::all(), ports(), vec![Port::new("w", &[n, 6])], |given| {
+        let wrenches = trace(RuleSet::all(), ports(), vec![Port::new("w", &[model.bodies.len(), 6])], |given| {
             let model = with_inputs(&model, &changes, &given[3]);
             let found = joint_wrenches(&model, &given[0], &given[1], &given[2]);
             found.iter().flat_map(|w| [w.force.to_array(), w.moment.to_array()].concat()).collect()

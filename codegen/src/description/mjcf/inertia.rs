@@ -43,6 +43,9 @@ impl<'s> Mjcf<'s> {
         } else {
             Some(of_parts(&parts, self.tag(body)))
         };
+        // bounds are those of every body, also of one without mass
+        let is_bounded = self.settings.bounds.iter().any(|bound| *bound > 0.0);
+        let inertial = inertial.or_else(|| is_bounded.then(|| of_parts(&[], self.tag(body))));
         inertial.map(|inertial| self.corrected(inertial))
     }
 

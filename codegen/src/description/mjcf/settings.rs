@@ -131,6 +131,16 @@ impl<'s> Mjcf<'s> {
                 let place = self.tag(flags);
                 self.robot.gravity = Some(Noted::new([0.0; 3], place));
             }
+            for (name, what) in [
+                ("equality", "couplings would not act"),
+                ("frictionloss", "friction would not act"),
+                ("constraint", "couplings and friction would not act"),
+            ] {
+                if let Some("disable") = self.word(&flag, name, &["enable", "disable"]) {
+                    let help = "remove the flag, and what it switches off where that is not meant";
+                    self.refuse_attribute(flags, name, "the option", what, help);
+                }
+            }
             for name in ["passive", "spring", "damper"] {
                 if let Some("disable") = self.word(&flag, name, &["enable", "disable"]) {
                     let help = "remove the flag, and stiffness and damping where they are not meant";

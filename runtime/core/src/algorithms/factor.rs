@@ -171,6 +171,31 @@ struct Branches {
 /// The elimination tree of H: a row's parent is the nearest row towards the base that it is coupled with, by a body that both move or by rows
 /// eliminated before. A floating base is a chain of six, and of a tree the parents are those of the bodies; joints that follow others join branches.
 fn branches<T: Real>(model: &Model<T>) -> Branches {
+    match model.couplings.is_empty() {
+        true => branches_of_tree(model),
+        false => branches_of_couplings(model),
+    }
+}
+
+/// Of a robot whose joints all have coordinates of their own: the bodies' own branches.
+fn branches_of_tree<T: Real>(model: &Model<T>) -> Branches {
+    let mut list = Branches { coordinates: Vec::new(), bodies: Vec::new(), parents: Vec::new() };
+    let mut last_of_body: Vec<Option<usize>> = Vec::new();
+    for (b, body) in model.bodies.iter().enumerate() {
+        let mut parent = body.parent.and_then(|p| last_of_body[p]);
+        for k in 0..body.joint.kind.nv() {
+            list.coordinates.push(body.joint.iv + k);
+            list.bodies.push(b);
+            list.parents.push(parent);
+            parent = Some(list.coordinates.len() - 1);
+        }
+        last_of_body.push(parent);
+    }
+    list
+}
+
+/// Of a robot whose joints follow others.
+fn branches_of_couplings<T: Real>(model: &Model<T>) -> Branches {
     let mut list = Branches { coordinates: Vec::new(), bodies: Vec::new(), parents: Vec::new() };
     let mut rows = vec![0..0; model.bodies.len()];
     for b in model.free_bodies() {
@@ -184,8 +209,9 @@ fn branches<T: Real>(model: &Model<T>) -> Branches {
     for (b, body) in model.bodies.iter().enumerate() {
         let mut own = body.parent.map_or(BTreeSet::new(), |parent| movers[parent].clone());
         own.extend(rows[model.coupling_of(b).map_or(b, |coupling| coupling.source)].clone());
-        for &row in &own {
-            towards_base[row].extend(own.range(..row));
+        // of rows that are joined in pairs the elimination joins the others
+        for (lower, upper) in own.iter().zip(own.iter().skip(1)) {
+            towards_base[*upper].insert(*lower);
         }
         movers.push(own);
     }
