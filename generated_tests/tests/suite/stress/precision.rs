@@ -80,6 +80,10 @@ fn scales(tree: &CentreOfMassTree<f64>, q: &[f64], qd: &[f64], qdd: &[f64]) -> V
                 a += norm(&rates[..3]) + omega * norm(v);
                 e += norm(&rates[3..]);
             }
+            ReferenceJoint::Ball => {
+                let own = link.iv..link.iv + 3;
+                e += norm(&qdd[own.clone()]) + norm(&qd[own]) * parent_omega;
+            }
         }
         a += turning(omega, e) * norm(places[k].r_dash.as_slice());
         terms.push([a, e]);
@@ -96,7 +100,7 @@ fn scales(tree: &CentreOfMassTree<f64>, q: &[f64], qd: &[f64], qdd: &[f64]) -> V
             let moment = lever * force + couple;
             let of_coordinate = |i: usize| match joint.joint {
                 ReferenceJoint::Linear => force,
-                ReferenceJoint::Revolute => moment,
+                ReferenceJoint::Revolute | ReferenceJoint::Ball => moment,
                 ReferenceJoint::Free => [force, moment][i / 3],
             };
             (0..joint.joint.nv()).for_each(|i| scale[joint.iv + i] += of_coordinate(i));
