@@ -64,7 +64,7 @@ fn what_changes_the_dynamics_and_is_not_read_is_an_error() {
         (world, "</worldbody><equality><joint joint1=\"j\" joint2=\"l\"/></equality>", "drive-joint", 4),
         (
             world,
-            "</worldbody><equality><joint joint1=\"j\" joint2=\"k\" polycoef=\"0 1 2 0 0\"/></equality>",
+            "</worldbody><equality><joint joint1=\"l\" joint2=\"k\" polycoef=\"0 1 2 0 0\"/></equality>",
             "not-supported-yet",
             4,
         ),
@@ -122,10 +122,10 @@ fn a_file_that_includes_itself_is_refused() {
 const RICH: &str = "<?xml version=\"1.0\"?><!-- a robot --><mujoco model=\"r\"><compiler eulerseq=\"zXy\" settotalmass=\"3\" boundinertia=\"1\"/>
 <option gravity=\"0 0 -9\"><flag gravity=\"enable\"/></option><default><joint damping=\"1\"/><default class=\"c\"><geom mass=\"1\"/></default></default>
 <asset><mesh name=\"m\" file=\"m.stl\"/></asset><worldbody><body childclass=\"c\" pos=\"1 2 3\" euler=\"1 2 3\"><joint name=\"j\" range=\"-1 1\" ref=\"3\"/>
-<joint type=\"slide\" axis=\"1 2 3\" name=\"k\"/><frame zaxis=\"1 2 3\"><geom type=\"box\" size=\"1 2 3\"/><body axisangle=\"1 2 3 4\"><joint/>
+<joint type=\"slide\" axis=\"1 2 3\" name=\"k\"/><frame zaxis=\"1 2 3\"><geom type=\"box\" size=\"1 2 3\"/><body axisangle=\"1 2 3 4\"><joint name=\"l\"/>
 <inertial pos=\"0 0 0\" mass=\"1\" fullinertia=\"1 1 1 0 0 0\"/><site name=\"s\" xyaxes=\"1 0 0 0 1 0\"/></body></frame><geom size=\".1\" fromto=\"0 0 0 1 1 1\"
 type=\"capsule\"/></body></worldbody><tendon><fixed name=\"t\"><joint joint=\"j\" coef=\"1\"/><joint joint=\"k\" coef=\"2\"/></fixed></tendon>
-<equality><joint joint1=\"j\" joint2=\"k\" polycoef=\"0 1\"/><tendon tendon1=\"t\"/></equality><actuator><motor joint=\"j\" ctrlrange=\"-1 1\"/></actuator></mujoco>";
+<equality><joint joint1=\"l\" joint2=\"k\" polycoef=\"0 1\"/><tendon tendon1=\"t\"/></equality><actuator><motor joint=\"j\" ctrlrange=\"-1 1\"/></actuator></mujoco>";
 
 #[test]
 fn spoilt_texts_do_not_panic() {
