@@ -38,6 +38,7 @@ impl Angle {
 
 /// A rotation as written.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant)] // most poses have angles, and no robot so many poses that their room counts
 pub enum Rotation {
     /// Roll (about x), pitch (about y), yaw (about z): R = Rz(yaw) Ry(pitch) Rx(roll).
     RollPitchYaw([Angle; 3]),
@@ -72,14 +73,16 @@ impl Rotation {
     pub(super) fn angles(&self, of: String) -> Vec<(String, &Angle)> {
         match self {
             Rotation::RollPitchYaw(rpy) => {
-                ["roll", "pitch", "yaw"].into_iter().map(|name| format!("{name} of {of}")).zip(rpy).collect()
+                ["roll", "pitch", "yaw"].into_iter().map(|name| format!("{name} of {of}")).zip(rpy.iter()).collect()
             }
             Rotation::Turns(turns) => {
-                let angle = |turn| match turn {
-                    &WrittenTurn::About { ref angle, .. } => Some((format!("an angle of {of}"), angle)),
-                    _ => None,
-                };
-                turns.iter().filter_map(angle).collect()
+                let mut angles = Vec::new();
+                for turn in turns {
+                    if let WrittenTurn::About { angle, .. } = turn {
+                        angles.push((format!("an angle of {of}"), angle));
+                    }
+                }
+                angles
             }
         }
     }

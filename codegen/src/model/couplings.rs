@@ -47,8 +47,8 @@ pub(super) fn resolve(
         let mut path = vec![body];
         while let Some((next, coupling)) = written.get(&source).filter(|_| !path.contains(&source)) {
             // a (a' q + b') + b
-            offset = ratio * Dd::from(coupling.offset.value) + offset;
-            ratio = ratio * Dd::from(coupling.ratio.value);
+            let [a, b] = [coupling.ratio.value, coupling.offset.value].map(Dd::from);
+            (ratio, offset) = (ratio * a, ratio * b + offset);
             path.push(source);
             source = *next;
         }

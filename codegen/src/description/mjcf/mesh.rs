@@ -120,6 +120,7 @@ impl<'s> Mjcf<'s> {
 }
 
 /// Volume, centre and inertia about it of what triangles enclose; `None` if that is nothing.
+#[allow(clippy::assign_op_pattern)] // without the feature `reference` of core there is no `+=`
 fn solid(faces: &[Triangle], is_exact: bool) -> Option<Part> {
     let volume_of = |[a, b, c]: Triangle| {
         let six = a.dot(b.cross(c));
@@ -163,6 +164,7 @@ fn solid(faces: &[Triangle], is_exact: bool) -> Option<Part> {
 }
 
 /// The centroid of a surface.
+#[allow(clippy::assign_op_pattern)] // likewise
 fn centroid(faces: &[Triangle]) -> Option<Vec3<Dd>> {
     let (mut area, mut moment) = (Dd::ZERO, Vec3::zero());
     for [a, b, c] in faces {

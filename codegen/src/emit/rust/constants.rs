@@ -134,7 +134,7 @@ fn of_followers(model: &Model<Dd>, scalar: Scalar) -> Vec<AssociatedConstant> {
     if n == 0 {
         return Vec::new();
     }
-    let names = string_literals(&mut followers.iter().map(|(joint, _)| joint.name.as_str()));
+    let names = string_literals(followers.iter().map(|(joint, _)| joint.name.as_str()));
     let sources: Vec<usize> = followers.iter().map(|(_, c)| model.bodies[c.source].joint.iq).collect();
     let numbers = |of: &dyn Fn(&Coupling<Dd>) -> Dd| {
         let all: Vec<String> = followers.iter().map(|(_, c)| number(of(c).to_f64(), scalar)).collect();
