@@ -161,7 +161,7 @@ fn random_robot(seed: u64) -> Model<Dd> {
     for i in 0..count {
         let kind = match (i, seed % 2, random.below(3)) {
             (0, 1, _) => JointKind::Floating,
-            _ if seed > WRITTEN && (i + seed as usize) % 3 != 0 => JointKind::Spherical,
+            _ if seed > WRITTEN && !(i + seed as usize).is_multiple_of(3) => JointKind::Spherical,
             (_, _, 0) => JointKind::Prismatic,
             _ => JointKind::Revolute,
         };

@@ -144,13 +144,12 @@ fn couple(random: &mut Random, tree: &mut CentreOfMassTree<Dd>) {
     if sources.is_empty() {
         sources.extend(joints.first());
     }
-    let mut rank = 0;
-    for j in joints.into_iter().filter(|j| !sources.contains(j)).collect::<Vec<_>>() {
+    let followers: Vec<usize> = joints.into_iter().filter(|j| !sources.contains(j)).collect();
+    for (rank, j) in followers.into_iter().enumerate() {
         let source = sources[random.below(sources.len())];
         let [ratio, offset] = [2.0, 1.0].map(|size| random.list(1, size)[0]);
         tree.links[j].shared = Some(SharedCoordinate { ratio, offset, rank });
         tree.links[j].iv = source;
-        rank += 1;
     }
     let (mut iq, mut iv) = (0, 0);
     let mut places = vec![(0, 0); tree.links.len()];
