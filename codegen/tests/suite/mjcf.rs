@@ -33,7 +33,7 @@ fn robot(settings: &str, world: &str) -> String {
 fn state(model: &Model<Dd>, shift: f64) -> [Vec<Dd>; 3] {
     let own = |n: usize, phase: f64| (0..n).map(|i| Dd::from((1.3 * i as f64 + phase).sin())).collect::<Vec<_>>();
     let mut q = own(model.nq(), 0.4);
-    q.iter_mut().for_each(|q| *q = *q + Dd::from(shift));
+    q.iter_mut().for_each(|q| *q += Dd::from(shift));
     model.bodies.iter().for_each(|b| b.joint.kind.normalise(&mut q[b.joint.iq..b.joint.iq + b.joint.kind.nq()]));
     [q, own(model.nv(), 1.1), own(model.nv(), 2.3)]
 }
@@ -153,8 +153,7 @@ fn frames_move_what_stands_in_them() {
     let nested = robot("", &format!("<body name=\"a\"><joint/>{bodies}{inner}{geom}</body></body></body>"));
     let (framed, nested) = (model_of("robot.xml", &framed), model_of("robot.xml", &nested));
     same(&framed, &nested, 1e-15);
-    let tip =
-        |model: &Model<Dd>| model.frames.iter().find(|f| f.name == "tip").expect("it is a site").placement.clone();
+    let tip = |model: &Model<Dd>| model.frames.iter().find(|f| f.name == "tip").expect("it is a site").placement;
     assert_eq!(tip(&framed), tip(&nested));
 }
 
