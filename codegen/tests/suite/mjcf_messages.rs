@@ -64,7 +64,7 @@ fn what_changes_the_dynamics_and_is_not_read_is_an_error() {
         (world, "</worldbody><equality><joint joint1=\"j\" joint2=\"l\"/></equality>", "drive-joint", 4),
         (
             world,
-            "</worldbody><equality><joint joint1=\"l\" joint2=\"k\" polycoef=\"0 1 2 0 0\"/></equality>",
+            "</worldbody><equality><joint joint1=\"j\" joint2=\"k\" polycoef=\"0 1 2 0 0\"/></equality>",
             "not-supported-yet",
             4,
         ),
