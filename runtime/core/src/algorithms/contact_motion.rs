@@ -73,12 +73,15 @@ impl<T: Real> SweptFrame<T> {
             }
         }
         let tree_path = bodies.iter().flat_map(|b| coordinates(model.bodies[*b].joint.iv, *b)).collect();
+        let pose = forward_kinematics(model, q, &[frame])[0];
+        let velocity = frame_velocity(model, q, qd, frame);
+        let acceleration = frame_acceleration(model, q, qd, qdd, frame);
         let [y, yd, ydd] = &model.tree_motion([q, qd, qdd]);
         let blocks = tree_frame_derivatives(model, [y, yd, ydd], frame);
         SweptFrame {
-            pose: forward_kinematics(model, q, &[frame])[0],
-            velocity: frame_velocity(model, q, qd, frame),
-            acceleration: frame_acceleration(model, q, qd, qdd, frame),
+            pose,
+            velocity,
+            acceleration,
             of_tree: (blocks.jacobian.clone(), tree_path),
             blocks: blocks.of_free_joints(model),
             path,
