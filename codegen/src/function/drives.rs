@@ -2,7 +2,7 @@
 
 use super::spec::Extent::{DriveStates, Drives, Of, Velocities};
 use super::spec::{Divisor, Family, Form, Output, RobotFunction, Spec};
-use super::{Forms, ForwardDynamicsMethod, Quantity};
+use super::{Forms, Quantity};
 use straightline_core::algorithms as alg;
 use straightline_core::algorithms::{Links, MOST_DERIVATIVES};
 use straightline_core::model::Model;
@@ -231,9 +231,7 @@ pub(super) fn with_links<T: Real, R>(
     solve: impl FnOnce(DrivenState<'_, T>, &[T], &Links<'_, T>) -> R,
 ) -> R {
     let [q, qd, x, u] = inputs else { panic!("functions that solve take q, qd, x, u") };
-    let is_articulated = forms.method != ForwardDynamicsMethod::Factorisation
-        && may_be_articulated(forms.model)
-        && forms.model.couplings.is_empty();
+    let is_articulated = !forms.factorises() && may_be_articulated(forms.model);
     let h = if is_articulated { Vec::new() } else { forms.mass_matrix(q) };
     let links = if is_articulated { Links::Articulated } else { Links::MassMatrix(&h) };
     solve((q, qd, x, u), &forms.bias_force(q, qd), &links)

@@ -152,6 +152,11 @@ impl<'a, T: Real> Forms<'a, T> {
         self.with_rotors(self.model.free_symmetric(of_tree))
     }
 
+    /// Whether accelerations are solved for by the factor of H: what follows another joint is no body that is free at its own.
+    pub(super) fn factorises(&self) -> bool {
+        self.method == ForwardDynamicsMethod::Factorisation || !self.model.couplings.is_empty()
+    }
+
     /// q̇ = 0 or q̈ = 0.
     pub fn rest(&self) -> Vec<T> {
         vec![T::zero(); self.model.nv()]

@@ -1,6 +1,6 @@
 //! What solves H x = b for any b, by the method that was chosen: forward dynamics and its derivatives.
 
-use super::{Forms, ForwardDynamicsMethod};
+use super::Forms;
 use straightline_core::algorithms as alg;
 use straightline_core::Real;
 
@@ -14,12 +14,7 @@ pub(super) struct Solution<'a, 'b, T> {
 
 impl<'a, 'b, T: Real> Solution<'a, 'b, T> {
     pub(super) fn new(forms: &'a Forms<'b, T>, q: &'a [T]) -> Self {
-        let factor = match forms.method {
-            // what follows another joint is no body that is free at its own
-            _ if !forms.model.couplings.is_empty() => Some(alg::Ltdl::factor(forms.model, &forms.mass_matrix(q))),
-            ForwardDynamicsMethod::Factorisation => Some(alg::Ltdl::factor(forms.model, &forms.mass_matrix(q))),
-            _ => None,
-        };
+        let factor = forms.factorises().then(|| alg::Ltdl::factor(forms.model, &forms.mass_matrix(q)));
         Solution { forms, q, factor }
     }
 

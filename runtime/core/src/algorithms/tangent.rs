@@ -12,14 +12,10 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-fn joints<T>(model: &Model<T>) -> impl Iterator<Item = &Joint> {
-    model.free_joints()
-}
-
 /// q ⊕ v. Quaternions are taken as of length one, whatever their length but zero, and come out so.
 pub fn integrate<T: Real>(model: &Model<T>, q: &[T], v: &[T]) -> Vec<T> {
     let mut to = vec![T::zero(); q.len()];
-    for joint in joints(model) {
+    for joint in model.free_joints() {
         let own = &mut to[joint.iq..joint.iq + joint.kind.nq()];
         joint.kind.mechanics().integrate(joint.coordinates(q), joint.rates(v), own);
     }
@@ -29,7 +25,7 @@ pub fn integrate<T: Real>(model: &Model<T>, q: &[T], v: &[T]) -> Vec<T> {
 /// v of q ⊕ v = q₁, the shortest one: a base or a ball joint turns by at most π. Quaternions q and −q are the same.
 pub fn difference<T: Real>(model: &Model<T>, q: &[T], q1: &[T]) -> Vec<T> {
     let mut v = vec![T::zero(); model.nv()];
-    for joint in joints(model) {
+    for joint in model.free_joints() {
         let own = &mut v[joint.iv..joint.iv + joint.kind.nv()];
         joint.kind.mechanics().difference(joint.coordinates(q), joint.coordinates(q1), own);
     }
@@ -85,7 +81,7 @@ fn maps<T: Real>(
     of_joint: impl Fn(&Joint) -> Option<[TwistMap<T>; 2]>,
 ) -> [TangentMap<T>; 2] {
     let places = |joint: &Joint| joint.iv..joint.iv + joint.kind.nv();
-    let own = |k: usize| joints(model).filter_map(|joint| Some((places(joint), of_joint(joint)?[k]))).collect();
+    let own = |k: usize| model.free_joints().filter_map(|joint| Some((places(joint), of_joint(joint)?[k]))).collect();
     [0, 1].map(|k| TangentMap { others: others[k], twists: own(k) })
 }
 
