@@ -264,6 +264,13 @@ impl Robot {
                 }
                 Some(expected)
             }
+            // of some states
+            Function::InverseDynamicsDerivatives => {
+                let mut expected = Expected { values: vec![], scales: vec![] };
+                expected.append_uniform(numbers(field("dtau_dq")?));
+                expected.append_uniform(numbers(field("dtau_dqd")?));
+                Some(expected)
+            }
             Function::ForwardKinematics => per_frame(&["p", "R"]),
             Function::Jacobian => per_frame(&["J"]),
             Function::JacobianBias => per_frame(&["Jdqd"]),

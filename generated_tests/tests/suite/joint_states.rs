@@ -56,6 +56,27 @@ fn compiled_functions_of_other_joints_give_the_reference_values() {
     assert!(checked > 1500, "{checked} results");
 }
 
+/// ∂τ/∂q and ∂τ/∂q̇, each of the scale of its greatest entry: of balls by increments R exp(dθ). Far angles of followers lose digits in y = ratio · q, as in τ.
+#[test]
+fn derivatives_of_other_joints_are_those_of_the_data() {
+    let mut checked = 0;
+    for (name, _) in JOINTS {
+        let (robot, function) = (Robot::with_joints(name), Function::InverseDynamicsDerivatives);
+        let program = programs::of_robot(&robot, function, &programs::options(&robot));
+        for state in robot.states.iter().filter(|state| state.gravity.is_none()) {
+            let Some(expected) = robot.expected(state, function) else { continue };
+            // behind them H and τ
+            let results: Vec<f64> = programs::run(&program, &state.inputs(function));
+            let (error, component) = expected.worst(&results[..expected.values.len()]);
+            let is_far = state.kind.starts_with("far_angle");
+            let most = if is_far { robot.bound(Function::InverseDynamics) } else { 1e-14 };
+            assert!(error <= most, "{}, component {component}: {error:.1e}", state.id);
+            checked += 1;
+        }
+    }
+    assert!(checked >= 30, "{checked} states");
+}
+
 /// The inputs in double-double; quaternions have length one in all digits, as in the data.
 fn exact(quaternions: &[usize], inputs: &[Vec<f64>]) -> Vec<Vec<Dd>> {
     let mut wide = cast::<Dd>(inputs);

@@ -137,26 +137,13 @@ pub fn random_robot(random: &mut Random, kind: RobotKind) -> CentreOfMassTree<Dd
             }
         };
         let joint = if random.below(3) == 0 { ReferenceJoint::Linear } else { ReferenceJoint::Revolute };
-        if kind.balls && random.below(2) == 0 {
-            let extended = ExtendedPosition::Matrix(random.rotation());
-            let (joint, e) = (ReferenceJoint::Ball, Vector3::zeros());
-            links.push(CentreOfMassLink {
-                name,
-                parent,
-                joint,
-                iq: 0,
-                iv: 0,
-                shared: None,
-                mass,
-                inertia,
-                e,
-                e_parent: e,
-                r,
-                r_parent,
-                extended,
-            });
-            continue;
-        }
+        let (joint, e, e_parent, extended) = match kind.balls && random.below(2) == 0 {
+            true => {
+                let extended = ExtendedPosition::Matrix(random.rotation());
+                (ReferenceJoint::Ball, Vector3::zeros(), Vector3::zeros(), extended)
+            }
+            false => (joint, e, e_parent, extended),
+        };
         links.push(CentreOfMassLink {
             name,
             parent,
