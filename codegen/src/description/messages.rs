@@ -331,6 +331,42 @@ pub fn coupling_cycle(joints: &[&str]) -> D {
         .help("leave one of them without a coupling: its coordinate moves the others")
 }
 
+/// A loop whose points belong to one body.
+pub fn loop_within_body(name: &str) -> D {
+    D::error("loop-within-body", format!("loop `{}`: both points belong to the same body", cut(name)))
+        .help("name points of bodies that move against each other")
+}
+
+/// A loop that cannot be closed.
+pub fn loop_open(name: &str, gap: f64) -> D {
+    D::error("loop-open", format!("loop `{}` is closed in no pose that was found", cut(name)))
+        .detail(format!("its points come no nearer than {} m", six_digits(gap)))
+        .help("check the points, and the pose in which the file shows the robot: the search begins there")
+}
+
+/// A joint that is not on the loop that determines it.
+pub fn loop_joint<'a>(name: &str, joint: &str, joints: impl IntoIterator<Item = &'a str>) -> D {
+    let d = D::error("loop-joint", format!("loop `{}`: no joint named `{}` is on it", cut(name), cut(joint)));
+    match did_you_mean(joint, joints) {
+        Some(hint) => d.help(hint),
+        None => d.help("name joints between the points that have coordinates of their own"),
+    }
+}
+
+/// A joint that no loop is left to determine.
+pub fn loop_joint_determined(joint: &str) -> D {
+    let what = format!("the loops leave joint `{}` where it is once the joints before it are known", cut(joint));
+    D::error("loop-joint-determined", what).help("leave it out of `determines`, or name another joint in its place")
+}
+
+/// Loops whose equations depend on each other.
+pub fn loops_depend(names: &[&str], equations: usize, determined: usize) -> D {
+    let what = format!("loops have {equations} equations, and determine {determined} coordinates: {}", list(names));
+    D::error("loops-depend", what)
+        .detail("some equations follow from others, or hold in single poses alone")
+        .help("join the bodies at fewer points, or by joints that leave them more freedom")
+}
+
 /// An elastic drive of a joint whose coordinate is shifted against the one that it follows.
 pub fn elastic_follower(drive: &str, joint: &str) -> D {
     let what =

@@ -11,6 +11,7 @@ mod couplings;
 pub mod drives;
 pub mod flexible;
 pub(crate) mod geometry;
+mod loops;
 pub(crate) mod merge;
 pub mod messages;
 mod mjcf;

@@ -70,7 +70,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
         reader.complain(&(0..0), messages::unknown_format());
         return None;
     }
-    reader.check_keys(&top, &["robot", "link", "joint", "coupling", "frame", "drive"]);
+    reader.check_keys(&top, &["robot", "link", "joint", "coupling", "loop", "frame", "drive"]);
     let mut description = Description::new(&FORMAT, Noted::assumed("robot".to_string()));
     reader.require(&top, "robot", "[robot]\\nname = \"...\"");
     if let Some(robot) = reader.table_at(&top, "robot", "[robot]") {
@@ -94,6 +94,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
         description.frames.extend(read_frame(&mut reader, table));
     }
     description.couplings.extend(reader.couplings_at(&top));
+    description.loops = reader.loops_at(&top);
     description.drives = reader.drives_at(&top);
     description.ignored = reader.into_ignored();
     Some(description)

@@ -34,6 +34,10 @@ pub struct Description {
     pub joints: Vec<WrittenJoint>,
     /// Joints whose coordinates follow those of others.
     pub couplings: Vec<WrittenCoupling>,
+    /// Where bodies close loops.
+    pub loops: Vec<WrittenLoop>,
+    /// Joints that something drives, where the file says so beside its drives: loops determine others first.
+    pub actuated: Vec<String>,
     /// Further named frames.
     pub frames: Vec<NamedFrame>,
     /// A link or a joint could not be read, so that the tree has holes that were complained of already.
@@ -57,6 +61,8 @@ impl Description {
             links: Vec::new(),
             joints: Vec::new(),
             couplings: Vec::new(),
+            loops: Vec::new(),
+            actuated: Vec::new(),
             frames: Vec::new(),
             has_holes: false,
             drives: Vec::new(),
@@ -108,6 +114,14 @@ impl Description {
     pub(crate) fn place_of(&self, joint: &str, link: &str) -> Option<&Place> {
         let of_link = || self.link(link).map(|link| &link.name.place);
         self.joint(joint).map(|joint| &joint.name.place).or_else(of_link)
+    }
+
+    /// The coordinate that a joint has in the pose of the file.
+    pub(crate) fn reference_of(&self, joint: &str) -> Option<&PoseCoordinate> {
+        match &self.joint(joint)?.placement {
+            Placement::Anchored(anchored) => anchored.reference.as_ref(),
+            _ => None,
+        }
     }
 
     /// Adds what could be read of a link.
@@ -395,6 +409,31 @@ pub struct WrittenCoupling {
     pub ratio: Noted<f64>,
     /// b \[rad or m\]; 0 where the file says nothing.
     pub offset: Noted<f64>,
+}
+
+/// Two points of links that coincide.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WrittenLoop {
+    /// What messages and reports call it.
+    pub name: Noted<String>,
+    /// The points.
+    pub points: LoopPoints,
+    /// The joints that it determines; none: those that do it best.
+    pub determines: Vec<Noted<String>>,
+}
+
+/// How a file says where a loop closes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LoopPoints {
+    /// The origins of two frames, named ones or those of links.
+    Frames([Noted<String>; 2]),
+    /// A point of the first link \[m\], and what is there of the second one in the pose of the file.
+    Anchor {
+        /// The links; `None`: the world.
+        links: [Option<Noted<String>>; 2],
+        /// The point in the frame of the first one.
+        point: Noted<[f64; 3]>,
+    },
 }
 
 /// A named frame on a link.

@@ -15,6 +15,7 @@ use straightline_core::algorithms as alg;
 use straightline_core::base_parameters::{
     BaseParameter, BaseParameterKind, BaseParameterSets, JointParameter, PER_BODY,
 };
+use straightline_core::closure::Closure;
 use straightline_core::model::{BodyId, Load, Model};
 use straightline_core::random::Random;
 use straightline_core::spatial::{Transform, Vec3};
@@ -37,7 +38,7 @@ const KEPT_FIRST: [usize; PER_BODY] = [4, 7, 5, 6, 8, 1, 2, 3, 9, 0];
 pub(crate) fn find(model: &Model<Dd>, frames: &[Transform<Dd>], scene: &Scene) -> BaseParameterSets {
     let joint_parameters = model.base_parameters.joint_parameters.clone();
     // whose joints all have coordinates of their own, in motions of those that follow others
-    let tree = Model { couplings: Vec::new(), ..model.clone() };
+    let tree = Model { couplings: Vec::new(), closure: Closure::default(), ..model.clone() };
     let states = states(model, scene.gravity == Gravity::Input);
     let search = BaseSearch { model: &tree, coupled: model, frames, states, joint_parameters };
     let of_forces = search.grouped(&search.by_energies(), &search.joint_parameters);

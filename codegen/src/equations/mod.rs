@@ -100,7 +100,7 @@ impl Function {
             })
         };
         let has_two_forms = self.spec().solves
-            && robot.model.couplings.is_empty()
+            && robot.model.is_tree()
             && match self.spec().family {
                 Family::Drives | Family::DriveDerivatives => may_be_articulated(&robot.model),
                 // rows of Jacobians need the factor

@@ -174,7 +174,7 @@ impl<T: Real> Forms<'_, T> {
         let Some([torques, _]) = self.reduced else { return by_directions(self.model, motion) };
         let rigid = self.rigid_derivatives(torques, motion);
         let mut all = DerivativeBlocks {
-            mass_matrix: self.with_rotors(rigid.mass_matrix),
+            mass_matrix: self.with_rotors(motion[0], rigid.mass_matrix),
             tau: self.with_effects(rigid.tau, motion),
             ..rigid
         };
@@ -195,10 +195,10 @@ impl<T: Real> Forms<'_, T> {
         let motion: [&[T]; 3] = [q, qd, qdd];
         let all = self.with_limbs(|l| alg::reduced_inverse_dynamics_derivatives_with_limbs(torques, motion, l.subtree));
         DerivativeBlocks {
-            tau: model.free_forces(all.tau),
-            mass_matrix: model.free_symmetric(all.mass_matrix),
-            dtau_dq: model.free_square(all.dtau_dq),
-            dtau_dqd: model.free_square(all.dtau_dqd),
+            tau: model.free_forces(q, all.tau),
+            mass_matrix: model.free_symmetric(q, all.mass_matrix),
+            dtau_dq: model.free_square(q, all.dtau_dq),
+            dtau_dqd: model.free_square(q, all.dtau_dqd),
         }
     }
 

@@ -89,22 +89,19 @@ impl<'a, T: Real> Forms<'a, T> {
     fn rigid_forces(&self, torques: &ReducedModel<T>, motion: [&[T]; 3]) -> Vec<T> {
         let [q, qd, qdd] = &self.model.tree_motion(motion);
         let of_tree = self.with_limbs(|l| alg::reduced_inverse_dynamics_with_limbs(torques, [q, qd, qdd], l.wrench));
-        self.model.free_forces(of_tree)
+        self.model.free_forces(q, of_tree)
     }
 
     /// Forces of the bodies with those that rotors, friction and springs of the joints take.
     pub(super) fn with_effects(&self, rigid: Vec<T>, [q, qd, qdd]: [&[T]; 3]) -> Vec<T> {
         let passive = alg::passive_force(self.model, q, qd);
-        let rotors = alg::rotor_inertias(self.model).into_iter().zip(qdd).map(|(i, qdd)| i * *qdd);
+        let rotors = alg::rotor_forces(self.model, [q, qd, qdd]).into_iter();
         rigid.into_iter().zip(rotors.zip(passive)).map(|(f, (r, p))| f + (r + p)).collect()
     }
 
     /// The mass matrix of the bodies with the inertia of the joints' rotors.
-    pub(super) fn with_rotors(&self, mut h: Vec<T>) -> Vec<T> {
-        let nv = self.model.nv();
-        for (i, rotor) in alg::rotor_inertias(self.model).into_iter().enumerate() {
-            h[i * nv + i] = h[i * nv + i] + rotor;
-        }
+    pub(super) fn with_rotors(&self, q: &[T], mut h: Vec<T>) -> Vec<T> {
+        alg::add_rotors(self.model, q, &mut h);
         h
     }
 
@@ -114,7 +111,7 @@ impl<'a, T: Real> Forms<'a, T> {
             Some([torques, _]) => {
                 let q = &*self.model.tree_positions(q);
                 let of_tree = self.with_limbs(|l| alg::reduced_gravity_force_with_limbs(torques, q, l.first_moment));
-                self.model.free_forces(of_tree)
+                self.model.free_forces(q, of_tree)
             }
             None => alg::gravity_force(self.model, q),
         }
@@ -124,6 +121,9 @@ impl<'a, T: Real> Forms<'a, T> {
     pub fn bias_force(&self, q: &[T], qd: &[T]) -> Vec<T> {
         let Some([torques, _]) = self.reduced else { return alg::bias_force(self.model, q, qd) };
         let rigid = self.rigid_forces(torques, [q, qd, &self.rest()]);
+        if !self.model.closure.is_empty() {
+            return self.with_effects(rigid, [q, qd, &self.rest()]);
+        }
         let passive = alg::passive_force(self.model, q, qd);
         rigid.into_iter().zip(passive).map(|(f, p)| f + p).collect()
     }
@@ -132,7 +132,8 @@ impl<'a, T: Real> Forms<'a, T> {
     pub fn velocity_force(&self, q: &[T], qd: &[T]) -> Vec<T> {
         let Some([torques, _]) = self.reduced else { return alg::velocity_force(self.model, q, qd) };
         let weightless = ReducedModel { gravity: Vec3::zero(), ..torques.clone() };
-        self.rigid_forces(&weightless, [q, qd, &self.rest()])
+        let rigid = self.rigid_forces(&weightless, [q, qd, &self.rest()]);
+        alg::with_rotors_of_loops(self.model, [q, qd], rigid)
     }
 
     /// The same robot without gravity, frames and limbs in lanes.
@@ -148,13 +149,14 @@ impl<'a, T: Real> Forms<'a, T> {
     /// H(q), by rows.
     pub fn mass_matrix(&self, q: &[T]) -> Vec<T> {
         let Some([_, composite]) = self.reduced else { return alg::mass_matrix(self.model, q) };
-        let of_tree = alg::reduced_mass_matrix(composite, &self.model.tree_positions(q));
-        self.with_rotors(self.model.free_symmetric(of_tree))
+        let y = &*self.model.tree_positions(q);
+        let of_tree = alg::reduced_mass_matrix(composite, y);
+        self.with_rotors(q, self.model.free_symmetric(y, of_tree))
     }
 
-    /// Whether accelerations are solved for by the factor of H: what follows another joint is no body that is free at its own.
+    /// Whether accelerations are solved for by the factor of H: what follows another joint or from a loop is no body that is free at its own.
     pub(super) fn factorises(&self) -> bool {
-        self.method == ForwardDynamicsMethod::Factorisation || !self.model.couplings.is_empty()
+        self.method == ForwardDynamicsMethod::Factorisation || !self.model.is_tree()
     }
 
     /// q̇ = 0 or q̈ = 0.

@@ -24,7 +24,7 @@ impl<T: Real> Forms<'_, T> {
                 let reduced = ReducedModel { gravity, ..reduced.clone() };
                 let (model, [q, qd, qdd]) = (self.model, &self.model.tree_motion(motion));
                 let columns = model.of_tree(&model.base_parameters.of_forces);
-                model.free_rows(alg::reduced_inertial_regressor(&reduced, &columns, [q, qd, qdd]), columns.len())
+                model.free_rows(q, alg::reduced_inertial_regressor(&reduced, &columns, [q, qd, qdd]), columns.len())
             }
             None => alg::inertial_regressor(self.model, &self.model.base_parameters.of_forces, motion, gravity),
         }

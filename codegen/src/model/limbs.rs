@@ -16,7 +16,7 @@ pub struct Limbs {
 pub fn limbs<T>(model: &Model<T>) -> Vec<Limbs> {
     let mut found = Vec::new();
     let is_reduced = model.bodies.iter().all(|body| ReducedJoint::of(body.joint.kind).is_some());
-    if !is_reduced || !model.couplings.is_empty() {
+    if !is_reduced || !model.is_tree() {
         return found;
     }
     let mut carriers = vec![None];

@@ -35,6 +35,7 @@ mod couplings;
 pub(crate) mod drives;
 mod flexible;
 pub mod limbs;
+mod loops;
 pub mod singular;
 pub mod states;
 
@@ -46,8 +47,9 @@ use crate::diagnostic::{Diagnostics, Place, Source};
 use angle::transform;
 use geometry::{compose, vector};
 use std::collections::{BTreeMap, HashMap};
+use straightline_core::closure::Closure;
 use straightline_core::coupling::Coupling;
-use straightline_core::model::{Body, BodyId, Frame, Model};
+use straightline_core::model::{Body, BodyId, Frame, Joint, Model};
 use straightline_core::Dd;
 
 /// Links of a robot that is compiled.
@@ -78,6 +80,8 @@ pub struct ModelOptions {
     pub couplings: Vec<WrittenCoupling>,
     /// Every joint has a coordinate of its own, whatever file and options say.
     pub uncoupled: bool,
+    /// The robot is the tree that is left where its loops are cut.
+    pub open_loops: bool,
 }
 
 impl Default for ModelOptions {
@@ -93,6 +97,7 @@ impl Default for ModelOptions {
             rigid_links: false,
             couplings: Vec::new(),
             uncoupled: false,
+            open_loops: false,
         }
     }
 }
@@ -171,21 +176,26 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
     check::motion(&assembly, description, diagnostics);
     add_frames(&mut assembly, options, tolerance, diagnostics);
     let couplings = couplings::resolve(description, options, &assembly.bodies, diagnostics);
-    order_joints(&mut assembly.bodies, &couplings, options, diagnostics);
+    order_joints(&mut assembly.bodies, &couplings, &[], options, diagnostics);
     if let Some(gravity) = description.gravity.as_ref().filter(|g| options.gravity.is_none() && !is_gravity(&g.value)) {
         let value = format!("{:?}", gravity.value);
         diagnostics.push(messages::gravity_out_of_range(&value, GRAVITY).at(&gravity.place));
     }
     let gravity = options.gravity.or(description.gravity.as_ref().map(|g| g.value)).unwrap_or([0.0, 0.0, -9.81]);
+    let bodies = std::mem::take(&mut assembly.bodies);
     let mut model = Model {
         name: description.name.value.clone(),
-        bodies: assembly.bodies,
+        bodies,
         gravity: vector(gravity),
         couplings,
-        frames: assembly.frames,
+        closure: Closure::default(),
+        frames: std::mem::take(&mut assembly.frames),
         drives: Vec::new(),
         base_parameters: Default::default(),
     };
+    if !diagnostics.has_errors() {
+        close(&mut model, description, options, &assembly, diagnostics);
+    }
     if !diagnostics.has_errors() {
         check::singular(&model, &assembly.joint_places, diagnostics);
     }
@@ -309,10 +319,34 @@ fn add_frames(assembly: &mut Assembly, options: &ModelOptions, tolerance: f64, d
     }
 }
 
-/// Gives every joint its place in the coordinate vectors, those that follow others behind those that are left to choose.
+/// Closes the loops of a tree: the joints that they determine stand behind the independent ones from here on.
+fn close(
+    model: &mut Model<Dd>,
+    description: &Description,
+    options: &ModelOptions,
+    assembly: &Assembly,
+    diagnostics: &mut Diagnostics,
+) {
+    let closure = loops::resolve(description, options, assembly, model, diagnostics);
+    if closure.is_empty() {
+        return;
+    }
+    let dependents: Vec<BodyId> = closure.dependents().collect();
+    let mut home = vec![Dd::ZERO; closure.home.len()];
+    let before: Vec<Joint> = model.bodies.iter().map(|body| body.joint.clone()).collect();
+    order_joints(&mut model.bodies, &model.couplings, &dependents, options, diagnostics);
+    for (body, before) in model.free_bodies().zip(model.free_bodies().map(|b| &before[b])) {
+        let after = model.bodies[body].joint.iq;
+        home[after..after + before.kind.nq()].copy_from_slice(before.coordinates(&closure.home));
+    }
+    model.closure = Closure { home, ..closure };
+}
+
+/// Gives every joint its place in the coordinate vectors: those that loops determine behind the independent ones, and then those that follow others.
 fn order_joints(
     bodies: &mut [Body<Dd>],
     couplings: &[Coupling<Dd>],
+    dependents: &[BodyId],
     options: &ModelOptions,
     diagnostics: &mut Diagnostics,
 ) {
@@ -350,6 +384,7 @@ fn order_joints(
             }
         }
     }
+    order.sort_by_key(|id| dependents.contains(id));
     order.extend((0..bodies.len()).filter(follows));
     let (mut iq, mut iv) = (0, 0);
     for id in order {

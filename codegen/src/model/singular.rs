@@ -67,7 +67,7 @@ pub(crate) fn weakest_joint(model: &Model<Dd>) -> Option<(BodyId, f64)> {
 fn each_feels_its_own_link(model: &Model<Dd>, inertia: Inertia) -> bool {
     let has_more =
         inertia == Inertia::WithDrives && !model.drives.is_empty() || model.bodies.iter().any(|b| b.load.is_some());
-    if has_more || !model.couplings.is_empty() {
+    if has_more || !model.is_tree() {
         return false;
     }
     // H itself is at most the natural inertia and the rotor; what is near the bound is left to elimination
@@ -108,6 +108,7 @@ fn natural_inertias(model: &Model<Dd>, q: &[Dd]) -> Vec<f64> {
     let frames: Vec<Frame<Dd>> = (0..bodies.len()).map(frame).collect();
     let poses = forward_kinematics(model, q, &frames.iter().collect::<Vec<_>>());
     let mut scales = vec![0.0; model.nv()];
+    let of_loops = model.embedding(&model.tree_positions(q));
     for (b, body) in bodies.iter().enumerate() {
         let inertia = &body.inertia;
         let mass = inertia.mass.to_f64().abs();
@@ -120,8 +121,15 @@ fn natural_inertias(model: &Model<Dd>, q: &[Dd]) -> Vec<f64> {
             let moment = mass * arm.dot(arm).to_f64() + own;
             let (first, ratio) = model.moved_by(carrier);
             let square = ratio.map_or(1.0, |ratio| ratio.to_f64() * ratio.to_f64());
-            for (scale, measure) in scales[first..].iter_mut().zip(joint.kind.row().measures) {
-                *scale += square * if *measure == Measure::Length { mass } else { moment };
+            for (k, measure) in joint.kind.row().measures.iter().enumerate() {
+                let own = square * if *measure == Measure::Length { mass } else { moment };
+                match (first + k).checked_sub(model.nv()) {
+                    None => scales[first + k] += own,
+                    Some(dependent) => {
+                        let ratios = of_loops[dependent].iter().map(|x| x.to_f64());
+                        scales.iter_mut().zip(ratios).for_each(|(scale, ratio)| *scale += own * ratio * ratio);
+                    }
+                }
             }
         }
     }
@@ -157,9 +165,9 @@ fn eliminate(model: &Model<Dd>, inertia: Inertia, q: &[Dd], tell: &mut dyn FnMut
         let pivot = pivot.to_f64().abs();
         pivot <= VANISHED * sizes[k] || pivot <= DUST * of_robot[usize::from(is_linear[k])]
     };
-    // the coordinates of a body and of all that carry it, those of the body itself last; drives and joints that follow may couple branches
-    let joins_branches = with_drives || !model.couplings.is_empty();
-    let is_free = |b: &BodyId| model.coupling_of(*b).is_none();
+    // the coordinates of a body and of all that carry it, those of the body itself last; drives, loops and joints that follow may couple branches
+    let joins_branches = with_drives || !model.is_tree();
+    let is_free = |b: &BodyId| model.coupling_of(*b).is_none() && !model.is_dependent(*b);
     let chain = |body: BodyId| {
         let bodies: Vec<BodyId> = match joins_branches {
             true => (0..=body).rev().filter(is_free).collect(),
@@ -204,7 +212,7 @@ fn eliminate(model: &Model<Dd>, inertia: Inertia, q: &[Dd], tell: &mut dyn FnMut
 /// Which coordinates are lengths.
 fn linear_coordinates(model: &Model<Dd>) -> Vec<bool> {
     let mut linear = vec![false; model.nv()];
-    for joint in model.free_joints() {
+    for joint in model.independent_joints() {
         let measures = joint.kind.row().measures;
         linear[joint.iv..].iter_mut().zip(measures).for_each(|(l, measure)| *l = *measure == Measure::Length);
     }

@@ -125,7 +125,7 @@ fields! {
     ModelOptions = {
         "floating_base": floating_base, "joint_order": joint_order, "angle_tolerance": angle_tolerance,
         "gravity": gravity, "frames": frames, "flexible": flexible, "support": support, "rigid_links": rigid_links,
-        "coupling": couplings, "uncoupled": uncoupled,
+        "coupling": couplings, "uncoupled": uncoupled, "open_loops": open_loops,
     }
     FrameOption : { "name": name, "link": link, "xyz": xyz, "rpy": rpy, }
     Effort : { "boxes": boxes, "time": time, "state": companions, }

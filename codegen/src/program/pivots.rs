@@ -113,7 +113,7 @@ const MOST_JOINTS: usize = 12;
 /// joints, or their derivatives.
 pub fn is_arm(model: &Model<Dd>, function: Function, graph: &Graph) -> bool {
     let is_elementary = model.bodies.iter().all(|b| b.joint.kind.elementary().is_some());
-    let turns_or_slides = is_elementary && model.couplings.is_empty();
+    let turns_or_slides = is_elementary && model.is_tree();
     let is_known = |port: &Port| {
         use Quantity::{Acceleration, Configuration, Force, Gravity, Velocity};
         matches!(Quantity::of(port), Some(Configuration | Velocity | Acceleration | Force | Gravity))

@@ -68,12 +68,17 @@ impl<T> Model<T> {
         self.bodies.iter().map(|b| b.joint.kind.nv()).sum()
     }
 
+    /// Whether every joint moves by coordinates of its own.
+    pub fn is_tree(&self) -> bool {
+        self.couplings.is_empty() && self.closure.is_empty()
+    }
+
     /// The coupling that a body's joint follows.
     pub fn coupling_of(&self, body: BodyId) -> Option<&Coupling<T>> {
         self.couplings.iter().find(|coupling| coupling.body == body)
     }
 
-    /// The joints whose coordinates are left to choose, body by body.
+    /// The joints that have coordinates in q, body by body: all but those that follow others.
     pub fn free_joints(&self) -> impl Iterator<Item = &Joint> + Clone + '_ {
         self.free_bodies().map(|b| &self.bodies[b].joint)
     }
@@ -92,12 +97,27 @@ impl<T> Model<T> {
         all
     }
 
-    /// The bodies whose joints are left to choose.
+    /// The bodies whose joints have coordinates in q.
     pub fn free_bodies(&self) -> impl Iterator<Item = BodyId> + Clone + '_ {
         (0..self.bodies.len()).filter(|b| self.coupling_of(*b).is_none())
     }
 
-    /// The bodies with joints that are left to choose.
+    /// The bodies whose joints have entries in q̇: those of joints in q that no loop determines.
+    pub fn independent_bodies(&self) -> impl Iterator<Item = BodyId> + Clone + '_ {
+        self.free_bodies().filter(|b| !self.is_dependent(*b))
+    }
+
+    /// The joints that have entries in q̇, body by body.
+    pub fn independent_joints(&self) -> impl Iterator<Item = &Joint> + Clone + '_ {
+        self.independent_bodies().map(|b| &self.bodies[b].joint)
+    }
+
+    /// Whether loops determine the joint of a body.
+    pub fn is_dependent(&self, body: BodyId) -> bool {
+        self.closure.dependents().any(|b| b == body)
+    }
+
+    /// The bodies with joints that have coordinates in q.
     pub fn freely_jointed(&self) -> impl Iterator<Item = &Body<T>> + Clone + '_ {
         self.free_bodies().map(|b| &self.bodies[b])
     }
@@ -134,41 +154,55 @@ impl<T: Real> Model<T> {
 
     /// y: the configuration of the tree.
     pub fn tree_positions<'a>(&self, q: &'a [T]) -> Cow<'a, [T]> {
-        self.extended(q, self.tree_nq(), |coupling| {
+        self.extended(Cow::Borrowed(q), self.tree_nq(), |coupling, q| {
             let [own, source] = [coupling.body, coupling.source].map(|b| self.bodies[b].joint.iq);
             (own, coupling.ratio * q[source] + coupling.offset)
         })
     }
 
-    /// G q̇: velocities, accelerations or displacements of the tree.
-    pub fn tree_rates<'a>(&self, rates: &'a [T]) -> Cow<'a, [T]> {
-        self.extended(rates, self.tree_nv(), |coupling| {
-            let [own, source] = [coupling.body, coupling.source].map(|b| self.bodies[b].joint.iv);
-            (own, coupling.ratio * rates[source])
-        })
+    /// G q̇: velocities or displacements of the tree, which stands at y.
+    pub fn tree_rates<'a>(&self, y: &[T], rates: &'a [T]) -> Cow<'a, [T]> {
+        self.with_followers(self.open_rates(y, rates))
     }
 
     /// q, q̇ and q̈ of the tree.
     pub fn tree_motion<'a>(&self, [q, qd, qdd]: [&'a [T]; 3]) -> [Cow<'a, [T]>; 3] {
-        [self.tree_positions(q), self.tree_rates(qd), self.tree_rates(qdd)]
+        let y = self.tree_positions(q);
+        let yd = self.tree_rates(&y, qd);
+        let mut open = self.open_rates(&y, qdd);
+        for (k, bias) in self.embedding_bias(&y, &yd).into_iter().enumerate() {
+            let own = &mut open.to_mut()[self.nv() + k];
+            *own = *own + bias;
+        }
+        let ydd = self.with_followers(open);
+        [y, yd, ydd]
     }
 
-    fn extended<'a>(&self, x: &'a [T], len: usize, of: impl Fn(&Coupling<T>) -> (usize, T)) -> Cow<'a, [T]> {
+    /// Rates with those of joints that follow others.
+    fn with_followers<'a>(&self, rates: Cow<'a, [T]>) -> Cow<'a, [T]> {
+        let of = |coupling: &Coupling<T>, rates: &[T]| {
+            let [own, source] = [coupling.body, coupling.source].map(|b| self.bodies[b].joint.iv);
+            (own, coupling.ratio * rates[source])
+        };
+        self.extended(rates, self.tree_nv(), of)
+    }
+
+    fn extended<'a>(&self, x: Cow<'a, [T]>, len: usize, of: impl Fn(&Coupling<T>, &[T]) -> (usize, T)) -> Cow<'a, [T]> {
         if self.couplings.is_empty() {
-            return Cow::Borrowed(x);
+            return x;
         }
-        debug_assert_eq!(x.len() + self.couplings.len(), len, "coordinates that are left to choose");
-        let mut all = x.to_vec();
+        debug_assert_eq!(x.len() + self.couplings.len(), len, "coordinates but those of followers");
+        let mut all = x.into_owned();
         all.resize(len, T::zero());
         for coupling in &self.couplings {
-            let (place, value) = of(coupling);
+            let (place, value) = of(coupling, &all);
             all[place] = value;
         }
         Cow::Owned(all)
     }
 
-    /// Gᵀ f: what forces of the tree, or rows of such, do along the coordinates that are left to choose; `width` numbers to a row.
-    pub fn free_rows(&self, mut rows: Vec<T>, width: usize) -> Vec<T> {
+    /// Gᵀ f: what forces of the tree, which stands at y, or rows of such, do along the independent velocities; `width` numbers to a row.
+    pub fn free_rows(&self, y: &[T], mut rows: Vec<T>, width: usize) -> Vec<T> {
         for coupling in &self.couplings {
             let [own, source] = [coupling.body, coupling.source].map(|b| self.bodies[b].joint.iv);
             for k in 0..width {
@@ -177,34 +211,37 @@ impl<T: Real> Model<T> {
             }
         }
         if !self.couplings.is_empty() {
-            rows.truncate(self.nv() * width);
+            rows.truncate(self.open_nv() * width);
         }
-        rows
+        match self.closure.is_empty() {
+            true => rows,
+            false => self.independent_rows(y, rows, width),
+        }
     }
 
     /// Gᵀ f of generalized forces of the tree.
-    pub fn free_forces(&self, forces: Vec<T>) -> Vec<T> {
-        self.free_rows(forces, 1)
+    pub fn free_forces(&self, y: &[T], forces: Vec<T>) -> Vec<T> {
+        self.free_rows(y, forces, 1)
     }
 
     /// J G of a matrix with a column per velocity coordinate of the tree, by rows.
-    pub fn free_columns(&self, matrix: Vec<T>) -> Vec<T> {
-        if self.couplings.is_empty() {
+    pub fn free_columns(&self, y: &[T], matrix: Vec<T>) -> Vec<T> {
+        if self.is_tree() {
             return matrix;
         }
-        let of_row = |row: &[T]| self.free_forces(row.to_vec());
+        let of_row = |row: &[T]| self.free_forces(y, row.to_vec());
         matrix.chunks(self.tree_nv()).flat_map(of_row).collect()
     }
 
     /// Gᵀ H G of a matrix over the velocity coordinates of the tree, by rows.
-    pub fn free_square(&self, matrix: Vec<T>) -> Vec<T> {
-        self.free_rows(self.free_columns(matrix), self.nv())
+    pub fn free_square(&self, y: &[T], matrix: Vec<T>) -> Vec<T> {
+        self.free_rows(y, self.free_columns(y, matrix), self.nv())
     }
 
     /// Gᵀ H G of a symmetric matrix, which stays symmetric to the bit.
-    pub fn free_symmetric(&self, matrix: Vec<T>) -> Vec<T> {
-        let (nv, mut h) = (self.nv(), self.free_square(matrix));
-        if !self.couplings.is_empty() {
+    pub fn free_symmetric(&self, y: &[T], matrix: Vec<T>) -> Vec<T> {
+        let (nv, mut h) = (self.nv(), self.free_square(y, matrix));
+        if !self.is_tree() {
             (0..nv).for_each(|i| (0..i).for_each(|j| h[i * nv + j] = h[j * nv + i]));
         }
         h

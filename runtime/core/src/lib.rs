@@ -15,6 +15,8 @@ pub mod algorithms;
 pub mod base_parameters;
 pub mod batch;
 #[cfg(feature = "alloc")]
+pub mod closure;
+#[cfg(feature = "alloc")]
 pub mod contact;
 pub mod control;
 #[cfg(feature = "alloc")]

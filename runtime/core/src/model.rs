@@ -6,6 +6,7 @@
 //! [`Body::link_frame`]. A floating base keeps the root link's own frame.
 
 use crate::base_parameters::BaseParameterSets;
+use crate::closure::Closure;
 use crate::coupling::Coupling;
 use crate::dd::Dd;
 use crate::drive::Drive;
@@ -224,6 +225,8 @@ pub struct Model<T> {
     pub bodies: Vec<Body<T>>,
     /// Joints whose coordinates follow those of others.
     pub couplings: Vec<Coupling<T>>,
+    /// What closes its loops.
+    pub closure: Closure<T>,
     /// Acceleration due to gravity in the world \[m/s²\].
     pub gravity: Vec3<T>,
     /// All frames of the robot: one per link of the file, and what was added.
@@ -240,22 +243,24 @@ impl<T: Real> Model<T> {
         self.tree_nq() - self.couplings.len()
     }
 
-    /// Number of velocity coordinates; joints that follow others have none.
+    /// Number of velocity coordinates; joints that follow others or from loops have none.
     pub fn nv(&self) -> usize {
-        self.tree_nv() - self.couplings.len()
+        let dependent: usize = self.closure.dependents().map(|b| self.bodies[b].joint.kind.nv()).sum();
+        self.tree_nv() - self.couplings.len() - dependent
     }
 
     /// dq/dt at these velocities: q̇ itself of most joints, of a floating base R v and ½ q ∘ ω.
     pub fn configuration_rate(&self, q: &[T], qd: &[T]) -> Vec<T> {
         let mut rates = vec![T::zero(); q.len()];
+        let qd = self.open_rates(&self.tree_positions(q), qd);
         for joint in self.free_joints() {
             let own = &mut rates[joint.iq..joint.iq + joint.kind.nq()];
-            joint.kind.configuration_rate(joint.coordinates(q), joint.rates(qd), own);
+            joint.kind.configuration_rate(joint.coordinates(q), joint.rates(&qd), own);
         }
         rates
     }
 
-    /// The joints that have coordinates of their own, in the order of these.
+    /// The joints that have coordinates in q, in the order of these: those that loops determine last.
     pub fn joints(&self) -> Vec<&Joint> {
         let mut joints: Vec<&Joint> = self.free_joints().collect();
         joints.sort_by_key(|joint| joint.iv);
@@ -292,6 +297,7 @@ impl<T: Real> Model<T> {
                 })
                 .collect(),
             couplings: self.couplings.iter().map(|c| c.map(&mut f)).collect(),
+            closure: self.closure.map(&mut f),
             gravity: self.gravity.map(&mut f),
             frames: self
                 .frames

@@ -45,6 +45,7 @@ fn block() -> Model<f64> {
         ],
         gravity: Vec3::new(0.0, 0.0, -G),
         couplings: vec![],
+        closure: Default::default(),
         frames: vec![Frame { name: "sole".into(), body: Some(1), placement: Transform::identity() }],
         drives: vec![],
         base_parameters: Default::default(),
@@ -67,6 +68,7 @@ fn pendulum(links: usize) -> Model<f64> {
     let frames = vec![Frame { name: "end".into(), body: Some(links - 1), placement: end }];
     Model {
         couplings: vec![],
+        closure: Default::default(),
         name: "pendulum".into(),
         bodies,
         gravity: Vec3::new(0.0, 0.0, -G),

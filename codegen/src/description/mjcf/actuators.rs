@@ -42,6 +42,7 @@ impl<'s> Mjcf<'s> {
             self.ignore_as(&format!("actuator {}", element.name), element);
             return;
         };
+        self.robot.actuated.push(joint.value.clone());
         let force = self.greatest_force(&given, &owner);
         if force.is_none() {
             self.ignore_as(&format!("actuator {}", element.name), element);

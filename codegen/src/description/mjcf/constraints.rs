@@ -4,7 +4,7 @@ use super::classes::Defaulted;
 use super::files::{Attribute, Element};
 use super::{vocabulary, Mjcf};
 use crate::description::angle::{self, ROUNDING};
-use crate::description::{messages, Noted, Placement, PoseCoordinate, WrittenCoupling};
+use crate::description::{messages, LoopPoints, Noted, PoseCoordinate, WrittenCoupling, WrittenLoop};
 use straightline_core::Dd;
 
 impl<'s> Mjcf<'s> {
@@ -32,9 +32,36 @@ impl<'s> Mjcf<'s> {
         match element.name.as_str() {
             "joint" => self.read_coupling(&given),
             "tendon" => self.read_tendon_equality(&given, tendons),
-            "connect" | "weld" => self.refuse(element, "the equality", "it closes a loop of bodies", help),
+            "connect" => {
+                let own = self.read_loop(&given);
+                self.robot.loops.extend(own);
+            }
+            "weld" => self.refuse(element, "the equality", "it holds two bodies together in all directions", help),
             _ => self.refuse(element, "the equality", "it binds the motion", help),
         }
+    }
+
+    /// Two sites that coincide, or a point of the first body and what is there of the second one in the pose of the file.
+    fn read_loop(&mut self, given: &Defaulted<'s>) -> Option<WrittenLoop> {
+        let (element, owner) = (given.element, "the connection");
+        self.check_attributes(element, owner, vocabulary::CONNECT);
+        let name = self.name_of(element, "connection");
+        let named = |own: &Self, attribute: &Attribute| Noted::new(attribute.value.clone(), own.place(attribute));
+        let points = match (element.attribute("site1"), element.attribute("site2")) {
+            (Some(one), Some(other)) => LoopPoints::Frames([named(self, one), named(self, other)]),
+            _ => {
+                for (name, example) in [("body1", "body1=\"...\""), ("anchor", "anchor=\"0 0 0\"")] {
+                    if given.attribute(name).is_none() {
+                        self.complain_at(element, messages::missing_attribute(owner, name, example));
+                        return None;
+                    }
+                }
+                let bodies = ["body1", "body2"].map(|name| element.attribute(name));
+                let links = bodies.map(|body| body.filter(|body| body.value != "world").map(|body| named(self, body)));
+                LoopPoints::Anchor { links, point: self.vector(given, "anchor", owner, [0.0; 3]) }
+            }
+        };
+        Some(WrittenLoop { name, points, determines: Vec::new() })
     }
 
     /// q₁ − ref₁ = a₀ + a₁ (q₂ − ref₂).
@@ -126,13 +153,10 @@ impl<'s> Mjcf<'s> {
         let is_single = |kind: straightline_core::joint::JointKind| kind.is_single();
         match joint {
             Some(joint) if joint.kind.value.kind.is_some_and(is_single) => {
-                let zero = match &joint.placement {
-                    Placement::Anchored(anchored) => match &anchored.reference {
-                        Some(PoseCoordinate::Angle(angle)) => angle::in_radians(angle, ROUNDING),
-                        Some(PoseCoordinate::Length(length)) => Dd::from(length.value),
-                        None => Dd::ZERO,
-                    },
-                    _ => Dd::ZERO,
+                let zero = match self.robot.reference_of(&joint.name.value) {
+                    Some(PoseCoordinate::Angle(angle)) => angle::in_radians(angle, ROUNDING),
+                    Some(PoseCoordinate::Length(length)) => Dd::from(length.value),
+                    None => Dd::ZERO,
                 };
                 Some((Noted::new(attribute.value.clone(), self.place(attribute)), zero))
             }

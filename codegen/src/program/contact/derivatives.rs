@@ -112,7 +112,7 @@ impl<T: Real> CommonEquations<'_, T> {
             swept.forces.push(force);
             swept.at_rest.push(at_rest);
         }
-        swept.slopes = held.slopes(model);
+        swept.slopes = held.slopes(model, &model.tree_positions(self.q()));
         swept
     }
 

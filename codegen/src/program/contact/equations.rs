@@ -389,12 +389,7 @@ pub(super) fn contacts<'a, T: Real>(
             Some((body, robot.reduced_frames[body].inverse().compose(&f.placement).map(T::constant)))
         });
         let by_reduced = placed
-            .filter(|_| {
-                form.reduced
-                    && form.is_carried
-                    && bound.reduced.serves(&bound.model)
-                    && bound.model.couplings.is_empty()
-            })
+            .filter(|_| form.reduced && form.is_carried && bound.reduced.serves(&bound.model) && bound.model.is_tree())
             .and_then(|placed| alg::reduced_relative_motion(&bound.reduced, &contact, placed, q, qd));
         let mut motion = by_reduced.unwrap_or_else(|| alg::relative_motion(&bound.model, &contact, q, qd));
         if let Some(g) = form.falls {

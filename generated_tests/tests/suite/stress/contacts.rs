@@ -43,6 +43,7 @@ fn robot(bodies: Vec<Body<f64>>, frames: Vec<(usize, Transform<f64>)>, gravity: 
         bodies,
         gravity,
         couplings: vec![],
+        closure: Default::default(),
         frames: frames.into_iter().enumerate().map(frame).collect(),
         drives: vec![],
         base_parameters: Default::default(),

@@ -30,7 +30,7 @@ pub fn forward_dynamics_aba<T: Real>(model: &Model<T>, q: &[T], qd: &[T], tau: &
 /// moves some mass or inertia; a joint that moves none has no forward dynamics, and what comes out is not finite.
 #[doc(alias("ABA"))]
 pub fn solve_articulated<T: Real>(model: &Model<T>, q: &[T], drive: &[T]) -> Vec<T> {
-    if !model.couplings.is_empty() {
+    if !model.is_tree() {
         return Ltdl::factor(model, &mass_matrix(model, q)).solve(drive);
     }
     let poses = JointPose::all(&model.bodies, q);

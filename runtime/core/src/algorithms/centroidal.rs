@@ -47,7 +47,7 @@ pub fn centre_of_mass_jacobian<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
             column.to_array().into_iter().enumerate().for_each(|(row, x)| rows[row * nv + joint.iv + k] = x);
         }
     }
-    model.free_columns(rows)
+    model.free_columns(q, rows)
 }
 
 /// A with h = A q̇, 6 × nv, row-major: rows 0-2 linear momentum \[kg·m/s\], 3-5 angular momentum about the centre of mass \[kg·m²/s\], world axes.
@@ -68,7 +68,7 @@ pub fn centroidal_map<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
             set(&mut rows, (joint.iv + k, nv), &MotionVector { angular, linear });
         }
     }
-    model.free_columns(rows)
+    model.free_columns(q, rows)
 }
 
 /// The centroidal map along a motion, each 6 × nv, row-major, rows 0-2 linear, 3-5 angular about the centre of mass, in world axes.
@@ -86,7 +86,8 @@ pub struct CentroidalBlocks<T> {
 #[doc(alias("computeCentroidalMapTimeVariation", "dccrba"))]
 pub fn centroidal_derivatives<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> CentroidalBlocks<T> {
     let of_robot = (q, qd);
-    let (q, qd, nv) = (&*model.tree_positions(q), &*model.tree_rates(qd), model.tree_nv());
+    let (q, nv) = (&*model.tree_positions(q), model.tree_nv());
+    let qd = &*model.tree_rates(q, qd);
     let motion = CoriolisSweep::new(model, q, qd);
     let (spreads, world) = (motion.spreads(model), world_poses(model, q));
     let levers = levers_from_centre(model, &motion.poses, &world);
@@ -113,7 +114,7 @@ pub fn centroidal_derivatives<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> C
     subtract_brackets(model, qd, &all.map, &mut all.by_position);
     let six = momentum_of(model, of_robot.0, of_robot.1);
     turn_with_floating_bases(model, &world, &six, &mut all.by_position);
-    let [map, rate, by_position] = [all.map, all.rate, all.by_position].map(|rows| model.free_columns(rows));
+    let [map, rate, by_position] = [all.map, all.rate, all.by_position].map(|rows| model.free_columns(q, rows));
     CentroidalBlocks { map, rate, by_position }
 }
 

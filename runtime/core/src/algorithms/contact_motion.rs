@@ -83,7 +83,7 @@ impl<T: Real> SweptFrame<T> {
             velocity,
             acceleration,
             of_tree: (blocks.jacobian.clone(), tree_path),
-            blocks: blocks.of_free_joints(model),
+            blocks: blocks.of_free_joints(model, y),
             path,
         }
     }
@@ -250,7 +250,7 @@ impl<T: Real> HeldWrenches<T> {
     }
 
     /// ∂(Jᵀ W)/∂q, nv × nv, row-major.
-    pub fn slopes(&self, model: &Model<T>) -> Vec<T> {
+    pub fn slopes(&self, model: &Model<T>, y: &[T]) -> Vec<T> {
         let nv = self.turns.len();
         let mut slopes = vec![T::zero(); nv * nv];
         for (outer, body) in model.bodies.iter().enumerate() {
@@ -265,6 +265,6 @@ impl<T: Real> HeldWrenches<T> {
                 }
             }
         }
-        model.free_square(slopes)
+        model.free_square(y, slopes)
     }
 }

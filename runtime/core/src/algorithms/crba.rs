@@ -60,7 +60,7 @@ pub fn mass_matrix<T: Real>(model: &Model<T>, q: &[T]) -> Vec<T> {
             }
         }
     }
-    model.free_symmetric(h)
+    model.free_symmetric(q, h)
 }
 
 /// The inertia on a joint's own coordinate, rotor included.

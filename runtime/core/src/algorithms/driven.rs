@@ -693,7 +693,7 @@ pub fn drive_power<T: Real>(
     }
     let [electrical, joule, friction, gears, dampers, conversion] = powers;
     let moving = model.bodies.iter().filter(|body: &&Body<T>| body.joint.kind.is_single());
-    let rates = &*model.tree_rates(qd);
+    let rates = &*model.tree_rates(&model.tree_positions(q), qd);
     let of_joint =
         |body: &Body<T>| super::effects::friction_force(&body.effects, rates[body.joint.iv]) * rates[body.joint.iv];
     [electrical, joule, friction, gears, dampers, sum(moving.map(of_joint)), conversion]

@@ -11,7 +11,8 @@ use crate::real::Real;
 /// T = ½ Σ (m v_c² + ω · J_c ω) + ½ Σ I q̇² \[J\], each body about its centre of mass, so that every term is a square; the
 /// second sum is over the rotors.
 pub fn kinetic_energy<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> T {
-    let (y, yd) = (&*model.tree_positions(q), &*model.tree_rates(qd));
+    let y = &*model.tree_positions(q);
+    let yd = &*model.tree_rates(y, qd);
     let poses = JointPose::all(&model.bodies, y);
     let velocities = body_velocities(model, &poses, [y, yd]);
     let mut twice = T::zero();
@@ -28,7 +29,7 @@ pub fn kinetic_energy<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> T {
             twice = twice + v.dot(v) * load.mass + mixed + mixed + w.dot(j * w);
         }
     }
-    twice * T::constant(Dd::HALF) + rotor_energy(model, qd)
+    twice * T::constant(Dd::HALF) + rotor_energy(model, q, qd)
 }
 
 /// V = −Σ m g · p_c + ½ Σ k (q − q₀)² \[J\] over the moving bodies, p_c from the world's origin, and over the springs.

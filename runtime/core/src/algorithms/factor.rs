@@ -169,11 +169,11 @@ struct Branches {
 }
 
 /// The elimination tree of H: a row's parent is the nearest row towards the base that it is coupled with, by a body that both move or by rows
-/// eliminated before. A floating base is a chain of six, and of a tree the parents are those of the bodies; joints that follow others join branches.
+/// eliminated before. A floating base is a chain of six, and of a tree the parents are those of the bodies; joints that follow others, or from loops, join branches.
 fn branches<T: Real>(model: &Model<T>) -> Branches {
-    match model.couplings.is_empty() {
+    match model.is_tree() {
         true => branches_of_tree(model),
-        false => branches_of_couplings(model),
+        false => joined_branches(model),
     }
 }
 
@@ -194,11 +194,11 @@ fn branches_of_tree<T: Real>(model: &Model<T>) -> Branches {
     list
 }
 
-/// Of a robot whose joints follow others.
-fn branches_of_couplings<T: Real>(model: &Model<T>) -> Branches {
+/// Of a robot whose joints follow others, or from loops.
+fn joined_branches<T: Real>(model: &Model<T>) -> Branches {
     let mut list = Branches { coordinates: Vec::new(), bodies: Vec::new(), parents: Vec::new() };
     let mut rows = vec![0..0; model.bodies.len()];
-    for b in model.free_bodies() {
+    for b in model.independent_bodies() {
         let (joint, first) = (&model.bodies[b].joint, list.bodies.len());
         list.coordinates.extend(joint.iv..joint.iv + joint.kind.nv());
         list.bodies.extend((0..joint.kind.nv()).map(|_| b));
@@ -208,7 +208,7 @@ fn branches_of_couplings<T: Real>(model: &Model<T>) -> Branches {
     let mut movers: Vec<BTreeSet<usize>> = Vec::with_capacity(rows.len());
     for (b, body) in model.bodies.iter().enumerate() {
         let mut own = body.parent.map_or(BTreeSet::new(), |parent| movers[parent].clone());
-        own.extend(rows[model.coupling_of(b).map_or(b, |coupling| coupling.source)].clone());
+        own.extend(model.movers(b).into_iter().flat_map(|mover| rows[mover].clone()));
         // of rows that are joined in pairs the elimination joins the others
         for (lower, upper) in own.iter().zip(own.iter().skip(1)) {
             towards_base[*upper].insert(*lower);

@@ -42,11 +42,11 @@ impl<T: Real> FrameDerivativeBlocks<T> {
         FrameDerivativeBlocks { dv_dq: none(), da_dq: none(), da_dqd: none(), jacobian: none(), jacobian_rate: none() }
     }
 
-    /// By the coordinates that are left to choose, from those of the tree.
-    pub(super) fn of_free_joints(self, model: &Model<T>) -> Self {
+    /// By the independent velocities, from those of the tree, which stands at y.
+    pub(super) fn of_free_joints(self, model: &Model<T>, y: &[T]) -> Self {
         let FrameDerivativeBlocks { dv_dq, da_dq, da_dqd, jacobian, jacobian_rate } = self;
         let blocks = [dv_dq, da_dq, da_dqd, jacobian, jacobian_rate];
-        let [dv_dq, da_dq, da_dqd, jacobian, jacobian_rate] = blocks.map(|rows| model.free_columns(rows));
+        let [dv_dq, da_dq, da_dqd, jacobian, jacobian_rate] = blocks.map(|rows| model.free_columns(y, rows));
         FrameDerivativeBlocks { dv_dq, da_dq, da_dqd, jacobian, jacobian_rate }
     }
 }
@@ -60,7 +60,7 @@ pub fn frame_derivatives<T: Real>(
     frame: &Frame<T>,
 ) -> FrameDerivativeBlocks<T> {
     let [q, qd, qdd] = &model.tree_motion([q, qd, qdd]);
-    tree_frame_derivatives(model, [q, qd, qdd], frame).of_free_joints(model)
+    tree_frame_derivatives(model, [q, qd, qdd], frame).of_free_joints(model, q)
 }
 
 /// The same by all velocity coordinates of the tree, at a motion of the tree.

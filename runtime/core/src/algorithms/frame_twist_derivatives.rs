@@ -41,6 +41,7 @@ pub fn frame_derivatives_in_own_axes<T: Real>(
         let by_acceleration = sum(&cross(&joint.before.rate, s), &turned);
         [carried, by_acceleration, cross(s, &behind.twist)]
     })
+    .of_free_joints(model, q)
 }
 
 /// Derivatives of the velocity of what moves with the frame through the world's origin and of its angular velocity, in world axes, and of the rates
@@ -64,9 +65,10 @@ pub fn frame_derivatives_at_world_origin<T: Real>(
         let rate = if is_single { carried } else { cross(&joint.before.with(joint).twist, s) };
         [by_velocity, by_acceleration, rate]
     })
+    .of_free_joints(model, q)
 }
 
-/// The blocks of what is said of each column: ∂v/∂q, ∂a/∂q and J̇, from its joint and the motion of the frame against the bodies behind and
+/// The blocks, over all velocities of the tree, of what is said of each column: ∂v/∂q, ∂a/∂q and J̇, from its joint and the motion of the frame against the bodies behind and
 /// before it.
 fn by_columns<T: Real>(
     model: &Model<T>,
@@ -88,7 +90,7 @@ fn by_columns<T: Real>(
         }
         behind = from_before;
     }
-    all.of_free_joints(model)
+    all
 }
 
 /// A twist and its rate.

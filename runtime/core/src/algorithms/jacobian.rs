@@ -31,7 +31,7 @@ pub fn jacobian<T: Real>(model: &Model<T>, q: &[T], frame: &Frame<T>) -> Vec<T> 
         }
         lever = lever + pose.lever;
     }
-    model.free_columns(rows)
+    model.free_columns(q, rows)
 }
 
 /// J̇q̇: angular \[rad/s²\] and classical linear acceleration \[m/s²\] of the frame for q̈ = 0, in world axes.

@@ -85,7 +85,7 @@ pub fn jacobian_hessian_product<T: Real>(model: &Model<T>, q: &[T], forces: &[Fo
             }
         }
     }
-    [model.free_forces(jt_f), model.free_square(hessian)]
+    [model.free_forces(q, jt_f), model.free_square(q, hessian)]
 }
 
 /// The coordinates of the joints that carry that of body `b`.

@@ -28,7 +28,8 @@ pub fn forward_kinematics<T: Real>(model: &Model<T>, q: &[T], frames: &[&Frame<T
 
 /// Angular velocity of a frame \[rad/s\] and velocity of its origin \[m/s\], in world axes.
 pub fn frame_velocity<T: Real>(model: &Model<T>, q: &[T], qd: &[T], frame: &Frame<T>) -> MotionVector<T> {
-    let (q, qd) = (&*model.tree_positions(q), &*model.tree_rates(qd));
+    let q = &*model.tree_positions(q);
+    let qd = &*model.tree_rates(q, qd);
     let poses = world_poses(model, q);
     let (mut omega, mut v) = (Vec3::zero(), Vec3::zero());
     for b in path_to(model, frame.body) {

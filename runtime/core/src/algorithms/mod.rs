@@ -29,6 +29,7 @@
 //!     }],
 //!     gravity: Vec3::new(0.0, 0.0, -10.0),
 //!     couplings: vec![],
+//!     closure: Default::default(),
 //!     frames: vec![],
 //!     drives: vec![],
 //!     base_parameters: Default::default(),
@@ -128,7 +129,7 @@ pub use driven_contact::{drive_inertia, driven_contact_motion, driven_factor, dr
 pub use driven_inverse::{
     drive_demands, driven_inverse, inverse_orders, reads_states, Demand, InverseOrders, MOST_DERIVATIVES,
 };
-pub use effects::{passive_force, rotor_inertias};
+pub use effects::{add_rotors, passive_force, rotor_forces, rotor_inertias, with_rotors_of_loops};
 pub use energy::{kinetic_energy, potential_energy};
 pub use environment::{Environment, EnvironmentMotion, SpringDamper};
 pub use factor::{forward_dynamics_ltdl, Ltdl};

@@ -30,7 +30,8 @@ pub struct CentroidalMomentum<T> {
 /// positive for a robot.
 #[doc(alias("COM", "centroidal momentum", "center of mass"))]
 pub fn momentum<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> CentroidalMomentum<T> {
-    let (q, qd) = (&*model.tree_positions(q), &*model.tree_rates(qd));
+    let q = &*model.tree_positions(q);
+    let qd = &*model.tree_rates(q, qd);
     let poses = JointPose::all(&model.bodies, q);
     let velocities = body_velocities(model, &poses, [q, qd]);
     let anchor = anchor(&poses);

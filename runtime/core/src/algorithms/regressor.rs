@@ -75,7 +75,7 @@ pub fn inertial_regressor<T: Real>(
             wrench = poses[b].wrench_to_parent(&wrench);
         }
     }
-    model.free_rows(y, columns.len())
+    model.free_rows(motion[0], y, columns.len())
 }
 
 /// Y with Y β = the wrench on the robot's support, force \[N\] and moment \[N·m\] about the world's origin in its axes, that the moving bodies take; of a
@@ -116,7 +116,8 @@ pub fn energy_regressor<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> 
     let columns = &model.base_parameters.of_forces;
     let energies = unit_energies(model, q, qd, false);
     let half = T::constant(Dd::HALF);
-    let (q, qd) = (&*model.tree_positions(q), &*model.tree_rates(qd));
+    let q = &*model.tree_positions(q);
+    let qd = &*model.tree_rates(q, qd);
     let mut y = vec![T::zero(); 2 * columns.len()];
     for (k, parameter, unit) in units::<T>(columns) {
         let own = unit.to_array().into_iter().zip(energies[parameter.body]);
@@ -139,7 +140,8 @@ pub fn energy_regressor<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> 
 /// T = ½ m v² + (v × ω) · m c + ½ ∫ (ω × r)² dm,  V = −g · (m p + R m c).
 pub fn unit_energies<T: Real>(model: &Model<T>, q: &[T], qd: &[T], welded: bool) -> Vec<[[T; 2]; PER_BODY]> {
     let (half, zero) = (T::constant(Dd::HALF), T::zero());
-    let placed = placed_motions(model, &model.tree_positions(q), &model.tree_rates(qd), welded);
+    let q = &*model.tree_positions(q);
+    let placed = placed_motions(model, q, &model.tree_rates(q, qd), welded);
     let of = |PlacedMotion { pose, twist }: &PlacedMotion<T>| {
         let g = pose.rotation.transpose_mul(model.gravity);
         let (v, w) = (twist.linear, twist.angular);

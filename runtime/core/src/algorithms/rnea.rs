@@ -9,7 +9,7 @@
 //! - Inertia is taken about the centre of mass. About the joint's origin there are large terms that cancel: on the wrist of
 //!   a PUMA 560 they cost two digits.
 
-use super::effects::{passive_force, rotor_inertias};
+use super::effects::{passive_force, rotor_forces, with_rotors_of_loops};
 use crate::joint::JointPose;
 use crate::model::{Body, Load, Model};
 use crate::real::Real;
@@ -24,8 +24,8 @@ use alloc::vec::Vec;
 #[doc(alias("RNEA", "Newton-Euler"))]
 pub fn inverse_dynamics<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T]) -> Vec<T> {
     let rigid = rigid_body_forces(model, q, qd, qdd, model.gravity);
-    let effects = passive_force(model, q, qd).into_iter().zip(rotor_inertias(model)).zip(qdd);
-    rigid.into_iter().zip(effects).map(|(f, ((passive, rotor), qdd))| f + (rotor * *qdd + passive)).collect()
+    let effects = passive_force(model, q, qd).into_iter().zip(rotor_forces(model, [q, qd, qdd]));
+    rigid.into_iter().zip(effects).map(|(f, (passive, rotor))| f + (rotor + passive)).collect()
 }
 
 /// Generalized forces \[N·m or N\] that hold the robot at rest against gravity: g(q) = ∂V/∂q. For a floating base the
@@ -46,7 +46,8 @@ pub fn bias_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
 #[doc(alias("Coriolis", "centrifugal"))]
 pub fn velocity_force<T: Real>(model: &Model<T>, q: &[T], qd: &[T]) -> Vec<T> {
     let no_acceleration = vec![T::zero(); model.nv()];
-    rigid_body_forces(model, q, qd, &no_acceleration, Vec3::zero())
+    let rigid = rigid_body_forces(model, q, qd, &no_acceleration, Vec3::zero());
+    with_rotors_of_loops(model, [q, qd], rigid)
 }
 
 fn rigid_body_forces<T: Real>(model: &Model<T>, q: &[T], qd: &[T], qdd: &[T], gravity: Vec3<T>) -> Vec<T> {
@@ -82,7 +83,7 @@ fn generalized_forces<T: Real>(model: &Model<T>, q: &[T], wrenches: &[ForceVecto
             tau[joint.iv + k] = mechanics.along(k, joint.coordinates(q), w);
         }
     }
-    model.free_forces(tau)
+    model.free_forces(q, tau)
 }
 
 /// How one body moves, in its own axes.

@@ -72,7 +72,7 @@ pub fn subtrees<T: Real>(model: &Model<T>, q: &[T]) -> Vec<CarriedMass<T>> {
             }
             lever = lever + pose.lever;
         }
-        CarriedMass { mass, centre, jacobian: model.free_columns(jacobian) }
+        CarriedMass { mass, centre, jacobian: model.free_columns(q, jacobian) }
     };
     order.into_iter().map(subtree).collect()
 }

@@ -12,8 +12,20 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// q ⊕ v. Quaternions are taken as of length one, whatever their length but zero, and come out so.
+/// q ⊕ v. Quaternions are taken as of length one, whatever their length but zero, and come out so. Joints that loops determine go along G v, and from
+/// there in [`STEPS_ALONG_LOOPS`] steps of Newton's to where the loops close.
 pub fn integrate<T: Real>(model: &Model<T>, q: &[T], v: &[T]) -> Vec<T> {
+    let to = open_integrate(model, q, &model.open_rates(&model.tree_positions(q), v));
+    match model.closure.is_empty() {
+        true => to,
+        false => model.close_loops(&to, STEPS_ALONG_LOOPS).0,
+    }
+}
+
+/// How often loops are closed by Newton's method where a displacement has led: each step squares what is left, which is of the square of the displacement.
+pub const STEPS_ALONG_LOOPS: usize = 2;
+
+fn open_integrate<T: Real>(model: &Model<T>, q: &[T], v: &[T]) -> Vec<T> {
     let mut to = vec![T::zero(); q.len()];
     for joint in model.free_joints() {
         let own = &mut to[joint.iq..joint.iq + joint.kind.nq()];
@@ -25,7 +37,7 @@ pub fn integrate<T: Real>(model: &Model<T>, q: &[T], v: &[T]) -> Vec<T> {
 /// v of q ⊕ v = q₁, the shortest one: a base or a ball joint turns by at most π. Quaternions q and −q are the same.
 pub fn difference<T: Real>(model: &Model<T>, q: &[T], q1: &[T]) -> Vec<T> {
     let mut v = vec![T::zero(); model.nv()];
-    for joint in model.free_joints() {
+    for joint in model.independent_joints() {
         let own = &mut v[joint.iv..joint.iv + joint.kind.nv()];
         joint.kind.mechanics().difference(joint.coordinates(q), joint.coordinates(q1), own);
     }

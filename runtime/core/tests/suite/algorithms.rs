@@ -209,6 +209,7 @@ fn random_robot(seed: u64) -> Model<Dd> {
     }
     Model {
         couplings: vec![],
+        closure: Default::default(),
         name: format!("robot{seed}"),
         bodies,
         gravity: random.vector().scale(Dd::from(9.81)),
@@ -1120,6 +1121,7 @@ fn a_pendulum_swings_as_in_the_textbook() {
         bodies: vec![body],
         gravity,
         couplings: vec![],
+        closure: Default::default(),
         frames: vec![],
         drives: vec![],
         base_parameters: Default::default(),

@@ -38,6 +38,7 @@ fn robot<T: Real>(joints: usize) -> Model<T> {
         bodies,
         gravity: Vec3::zero(),
         couplings: vec![],
+        closure: Default::default(),
         frames: vec![],
         drives: vec![],
         base_parameters: Default::default(),

@@ -85,6 +85,7 @@ pub fn robot(text: &str) -> Model<Dd> {
         frames: vec![],
         drives: vec![],
         couplings: vec![],
+        closure: Default::default(),
         base_parameters: Default::default(),
     };
     let (mut iq, mut iv) = (0, 0);
