@@ -60,7 +60,7 @@ pub(super) fn prepare(source: &Source, options: &Options) -> Result<Prepared, Di
         false => "options.functions".to_string(),
     };
     for (function, model) in functions.iter().filter_map(|f| Some((f, of_frames?))).filter(|(f, m)| !f.is_of(*m)) {
-        let complaint = scene::messages::function_not_of_robot(function.name(), model.drives.is_empty());
+        let complaint = scene::messages::function_not_of_robot(function.name(), function.lacking(model));
         options.scene.places.complain(&path_of(function), complaint, &mut diagnostics);
     }
     let loads = of_frames.is_some_and(|m| options.scene.parameters.iter().any(|p| p.is_load() && p.is_of(m)));

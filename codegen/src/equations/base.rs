@@ -89,8 +89,13 @@ fn states(model: &Model<Dd>, any_gravity: bool) -> Vec<SampledMotion> {
             let mut put =
                 |to: &mut [Dd], bound: f64| to.iter_mut().for_each(|x| *x = Dd::from(random.symmetric(bound)));
             put(&mut motion[0][joint.iq..joint.iq + joint.kind.nq()], 3.0 * unit);
+            if joint.iv >= model.nv() {
+                continue; // loops determine it
+            }
             put(&mut motion[1][joint.iv..joint.iv + joint.kind.nv()], unit);
             put(&mut motion[2][joint.iv..joint.iv + joint.kind.nv()], unit);
+        }
+        for joint in model.free_joints() {
             joint.kind.normalise(&mut motion[0][joint.iq..joint.iq + joint.kind.nq()]);
         }
         let gravity = match any_gravity {

@@ -69,7 +69,7 @@ impl Scene {
                 false => given.next().expect("a port per input").clone(),
             };
             if quantity.rate().is_some() {
-                for joint in robot.model.free_joints() {
+                for joint in robot.model.independent_joints() {
                     if self.zero.joints_at_rest.contains(&joint.name) {
                         values[joint.iv..joint.iv + joint.kind.nv()].fill(T::zero());
                     }
@@ -211,7 +211,7 @@ impl Selection {
 
     /// The joints in the order in which they are named.
     fn named<'a>(&'a self, model: &'a Model<Dd>) -> impl Iterator<Item = &'a Joint> {
-        let joint = |name: &String| model.free_joints().find(|j| j.name == *name);
+        let joint = |name: &String| model.independent_joints().find(|j| j.name == *name);
         self.joints.iter().filter_map(joint)
     }
 }

@@ -105,7 +105,7 @@ impl Function {
                 Family::Drives | Family::DriveDerivatives => may_be_articulated(&robot.model),
                 // rows of Jacobians need the factor
                 Family::Tasks => false,
-                Family::Robot | Family::Combination | Family::Derivatives => true,
+                Family::Robot | Family::Combination | Family::Derivatives | Family::Loops => true,
             };
         match method {
             ForwardDynamicsMethod::Cheaper if has_two_forms => {

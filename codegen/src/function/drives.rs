@@ -53,7 +53,7 @@ impl RobotFunction for DrivenInverseDynamics {
 
     /// And every robot's drives have an inverse that takes so few derivatives.
     fn is_of<T: Real>(model: &Model<T>) -> bool {
-        !model.drives.is_empty() && alg::inverse_orders(&model.drives).is_some()
+        model.closure.is_empty() && !model.drives.is_empty() && alg::inverse_orders(&model.drives).is_some()
     }
 
     /// Derivatives that the motion must have, and the state where it is read.

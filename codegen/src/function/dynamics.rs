@@ -25,6 +25,7 @@ impl RobotFunction for InverseDynamics {
         outputs: &[Output::new("tau", &[Velocities], "generalized forces \\[N·m or N\\]")],
         form: Form::InverseDynamics,
         in_lanes: InLanes::WhereFaster(3),
+        on_loops: true,
         ..Spec::DEFAULT
     };
 
@@ -44,6 +45,7 @@ impl RobotFunction for GravityForce {
         outputs: &[GRAVITY_FORCE],
         form: Form::BiasForce,
         in_lanes: InLanes::WhereAsked,
+        on_loops: true,
         ..Spec::DEFAULT
     };
 
@@ -63,6 +65,7 @@ impl RobotFunction for BiasForce {
         outputs: &[Output::new("h", &[Velocities], "generalized forces \\[N·m or N\\]")],
         form: Form::BiasForce,
         in_lanes: InLanes::WhereFaster(3),
+        on_loops: true,
         ..Spec::DEFAULT
     };
 
@@ -82,6 +85,7 @@ impl RobotFunction for VelocityForce {
         outputs: &[Output::new("c", &[Velocities], "generalized forces \\[N·m or N\\]")],
         form: Form::BiasForce,
         in_lanes: InLanes::WhereFaster(3),
+        on_loops: true,
         ..Spec::DEFAULT
     };
 
@@ -102,6 +106,7 @@ impl RobotFunction for MassMatrix {
         form: Form::MassMatrix,
         substituted_up_to: 3000,
         judged: Judged::ByInertias,
+        on_loops: true,
         ..Spec::DEFAULT
     };
 
@@ -124,6 +129,7 @@ impl RobotFunction for MassMatrixAndGravityForce {
         form: Form::Both,
         substituted_up_to: 3000,
         judged: Judged::ByInertias,
+        on_loops: true,
         ..Spec::DEFAULT
     };
 
@@ -147,6 +153,7 @@ impl RobotFunction for ForwardDynamics {
         keeps_order: true,
         divisor: Divisor::Inertia,
         judged: Judged::ByResidual,
+        on_loops: true,
         ..Spec::DEFAULT
     };
 

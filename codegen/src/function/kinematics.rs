@@ -32,6 +32,7 @@ impl RobotFunction for ForwardKinematics {
         aliases: &["FK", "direct kinematics"],
         inputs: &[Quantity::Configuration],
         outputs: &[POSES],
+        on_loops: true,
         ..Spec::DEFAULT
     };
 
@@ -54,6 +55,7 @@ impl RobotFunction for FrameVelocity {
             "per frame: velocity of the origin \\[m/s\\] (3), angular velocity \\[rad/s\\] (3), world axes",
         )
         .of_parts(Parts::LinearAngular)],
+        on_loops: true,
         ..Spec::DEFAULT
     };
 
@@ -76,6 +78,7 @@ impl RobotFunction for FrameAcceleration {
             "per frame: acceleration of the origin \\[m/s²\\] (3), angular acceleration \\[rad/s²\\] (3), world axes",
         )
         .of_parts(Parts::LinearAngular)],
+        on_loops: true,
         ..Spec::DEFAULT
     };
 
@@ -94,6 +97,7 @@ impl RobotFunction for Jacobian {
         aliases: &["geometric Jacobian"],
         inputs: &[Quantity::Configuration],
         outputs: &[JACOBIANS],
+        on_loops: true,
         ..Spec::DEFAULT
     };
 
@@ -116,6 +120,7 @@ impl RobotFunction for JacobianBias {
             "per frame: linear \\[m/s²\\] (3), angular \\[rad/s²\\] (3), world axes",
         )
         .of_parts(Parts::LinearAngular)],
+        on_loops: true,
         ..Spec::DEFAULT
     };
 
@@ -136,6 +141,7 @@ impl RobotFunction for KinematicsAndJacobian {
         outputs: &[POSES, JACOBIANS],
         family: Family::Combination,
         members: &[Function::ForwardKinematics, Function::Jacobian],
+        on_loops: true,
         ..Spec::DEFAULT
     };
 

@@ -13,6 +13,7 @@ mod forms;
 mod forward_derivatives;
 mod frame_forces;
 mod kinematics;
+mod loops;
 mod motion_derivatives;
 mod quantity;
 mod regressors;
@@ -36,6 +37,7 @@ pub use rows::SelectedRows;
 pub(crate) use solution::by_rows;
 pub use spec::{Divisor, Extent, Family, Form, InLanes, Judged, Output, Parts, RobotFunction, SlopeOf, Spec};
 
+use crate::scene::messages::Lacking;
 use straightline_core::model::{Frame, Model};
 use straightline_core::Real;
 use straightline_graph::expr::Port;
@@ -91,7 +93,7 @@ macro_rules! functions {
             #[cfg(feature = "verify")]
             pub fn truth(self, at: &truth::Chapter<'_>) -> Option<Vec<straightline_core::magnitude::Magnitude>> {
                 match self {
-                    $(Function::$name => <$file::$name as truth::Truth>::truth(at),)*
+                    $(Function::$name => <$file::$name as truth::Truth>::truth_of(at),)*
                 }
             }
         }
@@ -273,6 +275,14 @@ functions! {
     /// The motion that inputs of the drives make, with its derivatives.
     #[doc(alias("linearisation"))]
     driven_derivatives::DrivenForwardDynamicsDerivatives,
+    /// The dependent coordinates of closed loops.
+    #[doc(alias("constraint projection", "loop closure"))]
+    loops::CloseLoops,
+    /// How they move with the independent ones.
+    #[doc(alias("constraint embedding"))]
+    loops::LoopJacobian,
+    /// Their velocities and accelerations.
+    loops::LoopMotion,
 }
 
 impl Function {
@@ -284,6 +294,16 @@ impl Function {
     /// All that there are, also those of robots and scenes with more than rigid bodies.
     pub fn known() -> impl Iterator<Item = Function> {
         Function::LIST.iter().copied()
+    }
+
+    /// What a robot lacks that does not have it.
+    pub(crate) fn lacking<T: Real>(self, model: &Model<T>) -> Lacking {
+        match self.spec().family {
+            Family::Loops => Lacking::Loops,
+            _ if !model.closure.is_empty() => Lacking::FormOnLoops,
+            _ if model.drives.is_empty() => Lacking::Drives,
+            _ => Lacking::FittingDrives,
+        }
     }
 
     /// All that a robot has. Combinations are made for whoever names them.

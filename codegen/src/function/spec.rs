@@ -24,6 +24,10 @@ pub enum Extent {
     DriveStates,
     /// Drives.
     Drives,
+    /// Velocity coordinates that closed loops determine.
+    Dependents,
+    /// Equations of closed loops.
+    LoopEquations,
     /// Base parameters: what generalized forces tell apart.
     BaseParameters,
     /// What the wrench on the support tells apart.
@@ -49,6 +53,8 @@ impl Extent {
             Extent::Frames => frames,
             Extent::DriveStates => drive_states(model),
             Extent::Drives => model.drives.len(),
+            Extent::Dependents => model.open_nv() - model.nv(),
+            Extent::LoopEquations => model.closure.loops.iter().map(|of| of.directions.len()).sum(),
             Extent::BaseParameters => model.base_parameters.of_forces.len(),
             Extent::SupportParameters => model.base_parameters.of_support.len(),
             Extent::RegressorEntries => model.base_parameters.of_forces.iter().map(|p| p.rows.len()).sum(),
@@ -162,6 +168,8 @@ pub enum Family {
     Drives,
     /// Those with drives, but it is made for who names it only: derivatives of their functions.
     DriveDerivatives,
+    /// Those with closed loops.
+    Loops,
 }
 
 impl Family {
@@ -169,7 +177,7 @@ impl Family {
     pub fn is_by_name(self) -> bool {
         match self {
             Family::Combination | Family::Derivatives | Family::Tasks | Family::DriveDerivatives => true,
-            Family::Robot | Family::Drives => false,
+            Family::Robot | Family::Drives | Family::Loops => false,
         }
     }
 
@@ -300,6 +308,8 @@ pub struct Spec {
     pub divisor: Divisor,
     /// What its errors are compared with.
     pub judged: Judged,
+    /// Whether robots with closed loops have it, too.
+    pub on_loops: bool,
 }
 
 impl Spec {
@@ -320,6 +330,7 @@ impl Spec {
         keeps_order: false,
         divisor: Divisor::Nothing,
         judged: Judged::ByScale,
+        on_loops: false,
     };
 
     /// What derivatives of forces are, to be completed.
@@ -339,7 +350,11 @@ pub trait RobotFunction {
 
     /// Whether a robot has what it is about.
     fn is_of<T: Real>(model: &Model<T>) -> bool {
-        !Self::SPEC.family.is_of_drives() || !model.drives.is_empty()
+        let fits_loops = match model.closure.is_empty() {
+            true => Self::SPEC.family != Family::Loops,
+            false => Self::SPEC.on_loops,
+        };
+        fits_loops && (!Self::SPEC.family.is_of_drives() || !model.drives.is_empty())
     }
 
     /// What a robot's takes beside [`Spec::inputs`].

@@ -16,6 +16,7 @@ impl RobotFunction for Energy {
         aliases: &["kinetic energy", "potential energy"],
         inputs: &[Quantity::Configuration, Quantity::Velocity],
         outputs: &[Output::new("tv", &[Of(2)], "kinetic energy T, potential energy V = −Σ m g·p \\[J\\]")],
+        on_loops: true,
         ..Spec::DEFAULT
     };
 
@@ -35,6 +36,7 @@ impl RobotFunction for CentreOfMass {
         inputs: &[Quantity::Configuration],
         outputs: &[Output::new("p", &[Of(3)], "its position in the world \\[m\\]")],
         divisor: Divisor::Mass,
+        on_loops: true,
         ..Spec::DEFAULT
     };
 
@@ -57,6 +59,7 @@ impl RobotFunction for Momentum {
             "linear \\[kg·m/s\\] (3), angular about the centre of mass \\[kg·m²/s\\] (3), world axes",
         )],
         divisor: Divisor::Mass,
+        on_loops: true,
         ..Spec::DEFAULT
     };
 

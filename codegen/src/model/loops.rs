@@ -125,15 +125,10 @@ fn pose(model: &Model<Dd>, q: &[Dd], body: Option<BodyId>) -> Transform<Dd> {
     alg::forward_kinematics(model, q, &[&frame])[0]
 }
 
-/// The body where the paths to the points part.
-fn parting(model: &Model<Dd>, bodies: &[BodyId]) -> Option<BodyId> {
-    bodies.first().and_then(|b| model.bodies[*b].parent)
-}
-
 /// Three directions, or the two of a plane to which all joints on the way are bound.
 fn directions(of: &Loop<Dd>, model: &Model<Dd>, zero: &[Dd]) -> Vec<Vec3<Dd>> {
     let bodies = model.bodies_of_loop(of);
-    let base = pose(model, zero, parting(model, &bodies));
+    let base = pose(model, zero, model.parting(of));
     let axis = |b: BodyId| base.rotation.transpose_mul(pose(model, zero, Some(b)).rotation.column(2));
     let unit = |k: usize| Vec3::from([0, 1, 2].map(|i| if i == k { Dd::ONE } else { Dd::ZERO }));
     let all = vec![unit(0), unit(1), unit(2)];

@@ -57,7 +57,7 @@ pub(crate) fn of_port(model: &Model<Dd>, port: &Port, fast: bool, random: &mut R
     let mut x = values(model, port, Kind::Anywhere, random);
     match Quantity::of(port) {
         Some(Quantity::Velocity) if fast && port.len() == model.nv() => {
-            for joint in model.free_joints().filter(|j| j.kind.is_single()) {
+            for joint in model.independent_joints().filter(|j| j.kind.is_single()) {
                 x[joint.iv] *= within(joint.limits.velocity, FAST);
             }
         }
@@ -115,7 +115,15 @@ fn configuration(model: &Model<Dd>, kind: Kind, random: &mut Random) -> Vec<f64>
             .clamp(lower.min(upper), upper.max(lower));
         }
     }
-    q
+    assembled(model, q)
+}
+
+/// The configuration nearest to these independent coordinates that the robot's own assembly reaches.
+pub(crate) fn assembled(model: &Model<Dd>, q: Vec<f64>) -> Vec<f64> {
+    match model.closure.is_empty() {
+        true => q,
+        false => model.cast::<f64>().assembled(&q),
+    }
 }
 
 /// Mass, centre of mass and inertia about it of a body that may be.

@@ -150,7 +150,7 @@ fields! {
     Effects = {
         "rotor_inertia": rotor_inertia, "damping": damping, "coulomb": coulomb, "springs": springs,
         "transmission_losses": transmission_losses, "elastic_transmissions": elastic_transmissions,
-        "elastic_links": elastic_links, "couplings": couplings,
+        "elastic_links": elastic_links, "couplings": couplings, "loops": loops,
     }
     Budget = {
         "max_flops": max_flops, "max_sincos": max_sincos, "max_live": max_live, "max_stack_bytes": max_stack_bytes,

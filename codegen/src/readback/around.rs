@@ -131,6 +131,9 @@ impl Around<'_, '_, '_> {
             ("JOINT_NAMES", names(joints.iter().map(|j| &j.name).collect())),
             ("FRAME_NAMES", names(generated.frames.iter().collect())),
         ];
+        if !model.closure.is_empty() {
+            plain.push(("DEPENDENT_NAMES", names(model.dependent_joints().map(|joint| &joint.name).collect())));
+        }
         let followers = model.followers();
         if !followers.is_empty() {
             let sources: Vec<usize> = followers.iter().map(|(_, c)| model.bodies[c.source].joint.iq).collect();

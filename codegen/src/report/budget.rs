@@ -299,7 +299,9 @@ fn candidates(whole: &Model<Dd>, function: Function, options: &Options) -> Vec<(
         let rest = scene.outputs.values().flat_map(|s| &s.joints).chain(&scene.zero.joints_at_rest);
         !scene.locked.iter().any(|(locked, _)| locked == name) && !rest.into_iter().any(|n| n == name)
     };
-    for joint in whole.free_joints().filter(|j| j.kind.is_single() && is_free(&j.name)) {
+    // a joint of a loop cannot be held while the loop moves
+    let lockable = whole.independent_joints().filter(|j| whole.closure.is_empty() && j.kind.is_single());
+    for joint in lockable.filter(|j| is_free(&j.name)) {
         let locked = scene.locked.iter().cloned().chain([(joint.name.clone(), 0.0)]).collect();
         candidates.push((format!("joint {} locked", joint.name), Scene { locked, ..scene.clone() }));
     }

@@ -6,11 +6,12 @@
 use super::{check, Base, CoulombForm, Effects, Gravity, Parameter, Scene};
 use crate::description::{Angle, AngleUnit};
 use crate::diagnostic::{Diagnostics, Place};
-use crate::model::geometry::{about, compose, turned, vector};
+use crate::model::geometry::{about, compose, point, turned, vector};
 use crate::model::merge::{merge, Part};
 use crate::model::{angle, drives};
 use straightline_core::algorithms::composing_pays;
 use straightline_core::base_parameters::JointParameter;
+use straightline_core::closure::LoopEnd;
 use straightline_core::coupling::Coupling;
 use straightline_core::drive::{Drive, Rotor};
 use straightline_core::model::{self, Body, BodyId, Frame, JointEffects, Model};
@@ -121,6 +122,11 @@ fn lock(model: Model<Dd>, held: &[Option<Held>]) -> Model<Dd> {
     if held.iter().all(Option::is_none) {
         return model;
     }
+    let partings: Vec<Option<BodyId>> = model.closure.loops.iter().map(|of| model.parting(of)).collect();
+    let home_of: Vec<Vec<Dd>> = match model.closure.is_empty() {
+        true => Vec::new(),
+        false => model.bodies.iter().map(|body| body.joint.coordinates(&model.closure.home).to_vec()).collect(),
+    };
     // for every old body, the new one that it is part of, and its pose there
     let mut carriers: Vec<(Option<BodyId>, Transform<Dd>)> = Vec::new();
     let mut parts: Vec<Vec<Part>> = Vec::new();
@@ -156,6 +162,27 @@ fn lock(model: Model<Dd>, held: &[Option<Held>]) -> Model<Dd> {
         Some(Coupling { body: body?, source: source?, ..*coupling })
     };
     let couplings = model.couplings.iter().filter_map(moved_coupling).collect();
+    let at = |body: Option<BodyId>| body.map_or((None, Transform::identity()), |body| carriers[body]);
+    let mut closure = model.closure;
+    for (own, parting) in closure.loops.iter_mut().zip(partings) {
+        for end in &mut own.ends {
+            let (body, x_carrier_body) = at(end.body);
+            *end = LoopEnd { body, point: point(&x_carrier_body, end.point) };
+        }
+        let turned = at(parting).1.rotation;
+        own.directions.iter_mut().for_each(|direction| *direction = turned * *direction);
+    }
+    for body in closure.groups.iter_mut().flat_map(|group| &mut group.dependents) {
+        *body = carriers[*body].0.expect("joints that loops determine are not locked");
+    }
+    if !closure.is_empty() {
+        let mut home = vec![Dd::ZERO; bodies.iter().map(|body| body.joint.kind.nq()).sum()];
+        for old in (0..held.len()).filter(|old| held[*old].is_none()) {
+            let joint = &bodies[carriers[old].0.expect("it moves")].joint;
+            home[joint.iq..joint.iq + joint.kind.nq()].copy_from_slice(&home_of[old]);
+        }
+        closure.home = home;
+    }
     let frames = model.frames.into_iter().map(|frame| match frame.body {
         Some(old) => {
             let (body, x_carrier_body) = &carriers[old];
@@ -165,7 +192,7 @@ fn lock(model: Model<Dd>, held: &[Option<Held>]) -> Model<Dd> {
     });
     let carried = |body: BodyId| carriers[body];
     let drives = model.drives.into_iter().filter_map(|drive| moved(drive, held, &carried));
-    Model { frames: frames.collect(), drives: drives.collect(), bodies, couplings, ..model }
+    Model { frames: frames.collect(), drives: drives.collect(), bodies, couplings, closure, ..model }
 }
 
 /// A drive on the joints that are left; `None` if there is none. `carried` gives the new body that an old one is part of, and

@@ -191,7 +191,11 @@ pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnosti
         }
     }
     for (owner, path, joint) in wanted {
+        let is_velocity = !path.starts_with("numbers.ranges.q.");
         match find(joint) {
+            Some(body) if is_velocity && model.is_dependent(body) => {
+                places.complain(&path, say::determined_joint(&owner, joint), diagnostics);
+            }
             None => places.complain(&path, unknown(&owner, joint), diagnostics),
             Some(body) if held[body] => {
                 places.complain(&path, say::locked_joint_wanted(&owner, joint), diagnostics);
@@ -206,7 +210,9 @@ pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnosti
             continue;
         };
         let (kind, limits) = (model.bodies[body].joint.kind, model.bodies[body].joint.limits);
-        if kind.is_base() {
+        if model.closure.loops.iter().any(|of| model.bodies_of_loop(of).contains(&body)) {
+            places.complain(&path, say::not_on_loops(&format!("the lock of joint `{joint}`")), diagnostics);
+        } else if kind.is_base() {
             places.complain(&path, say::base_locked(joint), diagnostics);
         } else if !kind.is_single() {
             places.complain(&path, say::several_locked(joint, kind.row().name), diagnostics);
@@ -219,6 +225,9 @@ pub(super) fn against(model: &Model<Dd>, scene: &Scene, held: &[bool], diagnosti
         places.complain("hold.joints", say::nothing_left(&model.name), diagnostics);
     }
     frames(model, scene, held, diagnostics);
+    if !model.closure.is_empty() && !scene.contacts.is_empty() {
+        places.complain("contact", say::not_on_loops("contacts and loops of a scene"), diagnostics);
+    }
     check_contact::against(model, scene, held, diagnostics);
 }
 

@@ -8,6 +8,8 @@ use crate::diagnostic::Diagnostic;
 pub const CODES: &[&str] = &[
     "unknown-joint",
     "following-joint",
+    "not-on-loops",
+    "determined-joint",
     "unknown-scene-frame",
     "unknown-moving-link",
     "not-a-selection",
@@ -644,15 +646,48 @@ pub fn regressor_unused(functions: &[&str]) -> D {
         .help("name one, as in `functions = [\"torque_regressor\"]` under `[outputs]`, or leave `[regressor]` out")
 }
 
+/// Why a robot does not have a function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lacking {
+    /// It is about loops that the robot does not have.
+    Loops,
+    /// It has no form for robots with loops.
+    FormOnLoops,
+    /// It is about drives that the robot does not have.
+    Drives,
+    /// Its drives are others.
+    FittingDrives,
+}
+
 /// A function about something that the robot does not have.
-pub fn function_not_of_robot(function: &str, has_no_drives: bool) -> D {
+pub fn function_not_of_robot(function: &str, lacking: Lacking) -> D {
     let d = D::error("function-not-of-robot", format!("this robot has no function `{function}`"));
-    match has_no_drives {
-        true => d.detail("no drive is given for any of its joints").help("write `[[drive]]` tables, see SCHEMA.md"),
-        false => d
+    match lacking {
+        Lacking::Loops => {
+            d.detail("none of its loops is closed").help("write `[[loop]]` tables in the robot file, see SCHEMA.md")
+        }
+        Lacking::FormOnLoops => d
+            .detail("the function has no form yet for robots with closed loops")
+            .help("leave it out, or ask for the tree that is left where loops are cut: `[effects] loops = false`"),
+        Lacking::Drives => {
+            d.detail("no drive is given for any of its joints").help("write `[[drive]]` tables, see SCHEMA.md")
+        }
+        Lacking::FittingDrives => d
             .detail(
                 "its drives do not fit its joints one to one, or a motion would be differentiated more than 33 times",
             )
             .help("leave the function out, or give every driven joint a drive of its own"),
     }
+}
+
+/// Something of a scene that robots with closed loops do not take.
+pub fn not_on_loops(what: &str) -> D {
+    D::error("not-on-loops", format!("{what}: not supported yet for a robot with closed loops"))
+        .help("leave it out, or ask for the tree that is left where loops are cut: `[effects] loops = false`")
+}
+
+/// A joint that loops determine, where one with a velocity of its own is meant.
+pub fn determined_joint(owner: &str, joint: &str) -> D {
+    D::error("determined-joint", format!("{owner}: the loops determine joint `{}`", cut(joint)))
+        .help("name an independent joint of the loop; `determines` of `[[loop]]` chooses which are")
 }

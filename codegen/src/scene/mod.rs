@@ -95,6 +95,7 @@ impl Scene {
             rigid_links: options.rigid_links || !self.effects.elastic_links,
             couplings: [&options.couplings[..], own_couplings].concat(),
             uncoupled: options.uncoupled || !self.effects.couplings,
+            open_loops: options.open_loops || !self.effects.loops,
             ..options.clone()
         }
     }
@@ -123,7 +124,7 @@ impl Scene {
     pub fn resolved<T>(&self, model: &Model<T>) -> Scene {
         let mut scene = self.clone();
         if self.base == Base::Moving {
-            let joints = model.free_joints().filter(|j| !j.kind.is_base());
+            let joints = model.independent_joints().filter(|j| !j.kind.is_base());
             let joints: Vec<String> = joints.map(|j| j.name.clone()).collect();
             for function in Function::all().filter(|f| f.is_torque()) {
                 let selection = scene.outputs.entry(function).or_default();
@@ -262,6 +263,8 @@ pub struct Effects {
     pub elastic_links: bool,
     /// Joints that follow others; without them every joint has a coordinate of its own.
     pub couplings: bool,
+    /// Closed loops; without them the robot is the tree that is left where they are cut.
+    pub loops: bool,
 }
 
 impl Default for Effects {
@@ -275,6 +278,7 @@ impl Default for Effects {
             elastic_transmissions: true,
             elastic_links: true,
             couplings: true,
+            loops: true,
         }
     }
 }

@@ -103,7 +103,7 @@ impl Scene {
         let over_joints = self.ranges.over_joints();
         let found = over_joints.into_iter().find(|(over_joints, _)| Some(*over_joints) == quantity);
         let Some((quantity, ranges)) = found else { return all };
-        for joint in model.free_joints() {
+        for joint in joints_of(quantity, model) {
             let rests = matches!(quantity, Velocity | Acceleration) && self.zero.joints_at_rest.contains(&joint.name);
             let range = if rests { InputRange::ZERO } else { range(quantity, ranges, joint) };
             let (first, count) = match quantity {
@@ -119,12 +119,19 @@ impl Scene {
     }
 }
 
+/// The joints with entries in a quantity over joints: loops determine some of q.
+fn joints_of<T>(quantity: Quantity, model: &Model<T>) -> impl Iterator<Item = &Joint> {
+    model.free_joints().filter(move |joint| quantity.is_configuration() || joint.iv < model.independent_nv())
+}
+
 /// The ranges of a scene in words, a line per joint and input; nothing where it says none.
 pub fn ranges_in_words(scene: &Scene, model: &Model<Dd>) -> Vec<String> {
     let said = scene.ranges.over_joints().into_iter().filter(|(_, ranges)| **ranges != JointRanges::Limits);
     let mut lines = Vec::new();
     for (quantity, ranges) in said {
-        for joint in model.joints() {
+        let mut joints: Vec<&Joint> = joints_of(quantity, model).collect();
+        joints.sort_by_key(|joint| joint.iv);
+        for joint in joints {
             // a quaternion is in no range but its own
             if quantity == Configuration && joint.kind.measures().next().is_none() {
                 continue;

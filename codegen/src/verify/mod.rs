@@ -10,7 +10,7 @@
 use crate::diagnostic::Source;
 use crate::emit::{fused, Generated};
 use crate::equations::Robot;
-use crate::function::truth::{Chapter, Effect};
+use crate::function::truth::{Chapter, ClosedLoops, Effect};
 use crate::function::{Function, Quantity};
 use crate::model;
 use crate::model::states::{drives::of_drives, of_port, InputState};
@@ -26,6 +26,7 @@ use straightline_graph::expr::{evaluate, Graph, Port};
 use straightline_graph::schedule::Schedule;
 use straightline_graph::{element_of, Scalar};
 
+mod loops;
 mod reading;
 pub mod reference_input;
 mod whole;
@@ -141,6 +142,7 @@ struct Case<'a> {
     coordinates: Coordinates,
     tree: CentreOfMassTree<Dd>,
     effects: Vec<Effect>,
+    loops: Option<ClosedLoops>,
     parameters: Vec<(Parameter, Graph)>,
 }
 
@@ -163,11 +165,11 @@ impl<'a> Case<'a> {
         let scene = &options.scene;
         let whole = model::load(source, &options.model).0.ok_or("the file holds no robot")?;
         let coordinates = Coordinates::new(scene, model, &whole)?;
-        let (mut tree, mut effects) = second_reading(source, &whole, options)?;
+        let (mut tree, mut effects, loops) = second_reading(source, &whole, options)?;
         whole::hold(scene, &whole, &mut tree, &mut effects)?;
         let robot = Robot::new(model.clone());
         let parameters = whole::parameter_programs(&robot, options);
-        Ok(Case { model, frames, options, robot, coordinates, tree, effects, parameters })
+        Ok(Case { model, frames, options, robot, coordinates, tree, effects, loops, parameters })
     }
 
     /// What is asked of frames by the functions that are asked for.
@@ -206,7 +208,8 @@ impl<'a> Case<'a> {
         }
         whole::random_inputs(scene, &self.parameters, options.scalar, (&mut inputs, &mut tree), random)?;
         let chapter = Chapter::new(&tree, &self.effects, self.coordinates.expand(&inputs));
-        Ok(At { inputs, model, chapter: chapter.with_moving(&self.coordinates.v) })
+        let chapter = chapter.with_moving(&self.coordinates.v).with_loops(self.loops.as_ref());
+        Ok(At { inputs, model, chapter })
     }
 }
 
@@ -238,7 +241,7 @@ fn set_zeros(scene: &Scene, model: &Model<Dd>, inputs: &mut InputState<f64>) {
         if is_zero {
             rates.fill(0.0);
         }
-        for joint in model.free_joints() {
+        for joint in model.independent_joints() {
             if scene.zero.joints_at_rest.contains(&joint.name) {
                 rates[joint.iv..joint.iv + joint.kind.nv()].fill(0.0);
             }

@@ -1,11 +1,12 @@
 //! The second author's reading of a robot file: links from their centres of mass, and what joints add to them.
 
+use super::loops::closed_loops;
 use super::reference_input::centre_of_mass_tree;
 use crate::description::flexible::{BaseSupport, Bending};
 use crate::description::{self, Description, Noted};
 use crate::diagnostic::{Diagnostics, Source};
 use crate::equations::Robot;
-use crate::function::truth::{Chapter, Effect};
+use crate::function::truth::{Chapter, ClosedLoops, Effect};
 use crate::function::{Function, Quantity};
 use crate::model::ModelOptions;
 use crate::options::Options;
@@ -25,7 +26,7 @@ pub(super) fn second_reading(
     source: &Source,
     model: &Model<Dd>,
     options: &Options,
-) -> Result<(CentreOfMassTree<Dd>, Vec<Effect>), String> {
+) -> Result<(CentreOfMassTree<Dd>, Vec<Effect>, Option<ClosedLoops>), String> {
     let description = description::read(source, &mut Diagnostics::new()).ok_or("the file holds no robot")?;
     let mut tree = centre_of_mass_tree(&description, &options.model)?;
     let mut renumbered = BTreeMap::new();
@@ -34,7 +35,7 @@ pub(super) fn second_reading(
         let joint = &body.ok_or_else(|| format!("the model has no body `{}`", link.name))?.joint;
         renumbered.extend(link.shared.is_none().then_some((link.iv, (joint.iq, joint.iv))));
         if let Some(shared) = &mut link.shared {
-            shared.rank = joint.iv - model.nv();
+            shared.rank = joint.iv - model.open_nv();
         }
     }
     for link in &mut tree.links {
@@ -54,7 +55,8 @@ pub(super) fn second_reading(
         Some(Effect { iq: link.iq, iv: link.iv, ..effect })
     });
     let effects = own.chain(following).collect();
-    Ok((tree, effects))
+    let loops = closed_loops(&description, &options.model, &tree, model)?;
+    Ok((tree, effects, loops))
 }
 
 /// A joint to which nothing is added.
@@ -138,6 +140,7 @@ pub struct SecondReading {
     model: Model<Dd>,
     tree: CentreOfMassTree<Dd>,
     effects: Vec<Effect>,
+    loops: Option<ClosedLoops>,
 }
 
 impl SecondReading {
@@ -146,9 +149,9 @@ impl SecondReading {
     /// # Errors
     /// The reference does not understand the file.
     pub fn new(source: &Source, model: &Model<Dd>, options: &Options) -> Result<SecondReading, String> {
-        let (tree, effects) = second_reading(source, model, options)?;
+        let (tree, effects, loops) = second_reading(source, model, options)?;
         let robot = Robot::new(model.clone()).knowing_base_parameters(&[Function::TorqueRegressor], &options.scene);
-        Ok(SecondReading { model: robot.model, tree, effects })
+        Ok(SecondReading { model: robot.model, tree, effects, loops })
     }
 
     /// The results of a function and their natural scales at a state; rates, forces and directions that are not given are zero.
@@ -162,7 +165,7 @@ impl SecondReading {
         state: BTreeMap<Quantity, Vec<Dd>>,
     ) -> Result<(Vec<Dd>, Vec<f64>), String> {
         let chapter = Chapter::new(&self.tree, &self.effects, state).with_frames(frames)?;
-        let chapter = chapter.with_base_parameters(&self.model);
+        let chapter = chapter.with_base_parameters(&self.model).with_loops(self.loops.as_ref());
         let results = function.truth(&chapter).ok_or("the reference has no formulation of it")?;
         let scales = function.scales(&results);
         Ok((results.iter().map(|x| x.value).collect(), scales))

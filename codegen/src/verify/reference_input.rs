@@ -29,7 +29,7 @@ use elastic::{bend, stand, Elastic, Segments};
 use shared::share_coordinates;
 
 /// An angle of the file in radians; within the tolerance, a multiple of π/4 or π/6.
-fn radians(angle: &Angle, options: &ModelOptions) -> Dd {
+pub(super) fn radians(angle: &Angle, options: &ModelOptions) -> Dd {
     let value = Dd::from(angle.value);
     let literal = match angle.unit {
         AngleUnit::Radian => value,

@@ -38,7 +38,7 @@ pub(super) struct Coordinates {
     /// Number of its joints.
     all_joints: usize,
     /// How many there are of what does not depend on which joints move.
-    others: [(Extent, usize); 5],
+    others: [(Extent, usize); 7],
 }
 
 impl Coordinates {
@@ -49,10 +49,13 @@ impl Coordinates {
             let rank = all.iter().position(|j| j.name == joint.name);
             let rank = rank.ok_or_else(|| format!("the whole robot has no joint `{}`", joint.name))?;
             joints.push(rank);
-            if joint.iv >= model.nv() {
+            if joint.iv >= model.open_nv() {
                 continue; // it follows another one
             }
             q.extend(all[rank].iq..all[rank].iq + joint.kind.nq());
+            if joint.iv >= model.nv() {
+                continue; // loops determine it
+            }
             v.extend(all[rank].iv..all[rank].iv + joint.kind.nv());
         }
         for joint in whole.joints() {
@@ -68,6 +71,8 @@ impl Coordinates {
             Extent::RegressorEntries,
             Extent::LinkParameters,
             Extent::SceneParameters,
+            Extent::Dependents,
+            Extent::LoopEquations,
         ];
         let others = of_base.map(|extent| (extent, extent.len(model, 0)));
         Ok(Coordinates { q, v, joints, held, nv: whole.nv(), all_joints: all.len(), others })

@@ -169,6 +169,11 @@ impl<T: Real> Model<T> {
         Mechanism::new(self, of).bodies
     }
 
+    /// The body where the paths to the points of a loop part; `None`: the world.
+    pub fn parting(&self, of: &Loop<T>) -> Option<BodyId> {
+        self.bodies_of_loop(of).first().and_then(|b| self.bodies[*b].parent)
+    }
+
     /// The bodies with independent joints that move the joint of a body: its own, the one that it follows, or those that its loops hang on.
     pub fn movers(&self, body: BodyId) -> BTreeSet<BodyId> {
         if let Some(coupling) = self.coupling_of(body) {
@@ -327,6 +332,42 @@ impl<T: Real> Model<T> {
         let y = self.tree_positions(&q).into_owned();
         let gaps = self.closure.loops.iter().flat_map(|of| self.gap(of, &y)).collect();
         (q, gaps)
+    }
+}
+
+/// Into so many displacements the way from home to a configuration is cut.
+const ASSEMBLY_STEPS: usize = 32;
+/// So far \[rad or m\] a dependent joint goes in one of them, and so near loops come \[m\], or the way ends there: a singular pose is near.
+const LONGEST_STEP: f64 = 0.4;
+const CLOSED: f64 = 1e-9;
+
+impl Model<f64> {
+    /// The configuration that is reached from [home](Closure::home) on the way to these independent coordinates: theirs, or the last one before loops can no
+    /// longer be closed.
+    pub fn assembled(&self, q: &[f64]) -> Vec<f64> {
+        let mut at = self.closure.home.clone();
+        // a base stands anywhere
+        for joint in self.independent_joints().filter(|joint| joint.kind.is_base()) {
+            let own = joint.iq..joint.iq + joint.kind.nq();
+            at[own.clone()].copy_from_slice(&q[own]);
+        }
+        let way = crate::algorithms::difference(self, &at, q);
+        let step: Vec<f64> = way.iter().map(|x| x / ASSEMBLY_STEPS as f64).collect();
+        for _ in 0..ASSEMBLY_STEPS {
+            let next = crate::algorithms::integrate(self, &at, &step);
+            let y = self.tree_positions(&next);
+            let is_closed = self.closure.loops.iter().flat_map(|of| self.gap(of, &y)).all(|gap| gap.abs() < CLOSED);
+            let goes_far = |body: BodyId| {
+                let joint = &self.bodies[body].joint;
+                let ends = joint.coordinates(&next).iter().zip(joint.coordinates(&at));
+                ends.into_iter().any(|(to, from)| (to - from).abs() >= LONGEST_STEP)
+            };
+            if !is_closed || next.iter().any(|x| !x.is_finite()) || self.closure.dependents().any(goes_far) {
+                break;
+            }
+            at = next;
+        }
+        at
     }
 }
 

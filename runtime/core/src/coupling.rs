@@ -112,6 +112,17 @@ impl<T> Model<T> {
         self.independent_bodies().map(|b| &self.bodies[b].joint)
     }
 
+    /// The joints that loops determine, in the order of their coordinates.
+    pub fn dependent_joints(&self) -> impl Iterator<Item = &Joint> + '_ {
+        let first = self.independent_nv();
+        self.tree_joints().into_iter().filter(move |joint| joint.iv >= first).take(self.closure.dependents().count())
+    }
+
+    /// Number of entries of q̇.
+    pub fn independent_nv(&self) -> usize {
+        self.independent_joints().map(|joint| joint.kind.nv()).sum()
+    }
+
     /// Whether loops determine the joint of a body.
     pub fn is_dependent(&self, body: BodyId) -> bool {
         self.closure.dependents().any(|b| b == body)

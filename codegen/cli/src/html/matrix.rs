@@ -63,7 +63,7 @@ fn coordinates(model: &Model<Dd>) -> Vec<String> {
         };
         (0..joint.kind.nv()).map(name).collect()
     };
-    model.joints().into_iter().flat_map(of_joint).collect()
+    model.joints().into_iter().filter(|joint| joint.iv < model.nv()).flat_map(of_joint).collect()
 }
 
 /// On how many coordinates each entry of a program depends; `None` for an entry that is always zero.

@@ -31,7 +31,11 @@ fn joints_in_words(out: &mut String, model: &Model<Dd>) {
             true => format!("{} [{}]", row.name, joint.kind.units()[0]),
             false => format!("{}: {}", row.name, row.coordinates.replace('\n', "\n *       ")),
         };
-        let _ = writeln!(out, " *   {:>3} {:>3}  {}, {kind}", joint.iq, joint.iv, c_comment(&joint.name));
+        let (velocity, loops) = match joint.iv < model.nv() {
+            true => (joint.iv.to_string(), ""),
+            false => (String::new(), ", which loops determine"),
+        };
+        let _ = writeln!(out, " *   {:>3} {velocity:>3}  {}, {kind}{loops}", joint.iq, c_comment(&joint.name));
     }
     for (joint, coupling) in model.followers() {
         let (name, follows) = (c_comment(&joint.name), coupling.in_words(model));

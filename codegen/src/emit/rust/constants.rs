@@ -88,6 +88,7 @@ pub(super) fn of_robot(generated: &Generated) -> Vec<AssociatedConstant> {
             "Frames of the functions that answer per frame.",
         ),
     ];
+    constants.extend(of_loops(model));
     constants.extend(of_followers(model, *scalar));
     let list = |f: &dyn Fn(&Limits) -> f64| {
         let numbers: Vec<String> = single.iter().map(|j| number(f(&j.limits), *scalar)).collect();
@@ -125,6 +126,16 @@ pub(super) fn of_robot(generated: &Generated) -> Vec<AssociatedConstant> {
     }
     constants.extend(of_base_parameters(generated));
     constants
+}
+
+/// Of closed loops: the joints that they determine.
+fn of_loops(model: &Model<Dd>) -> Option<AssociatedConstant> {
+    let names: Vec<&str> = model.dependent_joints().map(|joint| joint.name.as_str()).collect();
+    let doc =
+        "Joints that loops determine: the last of [`JOINT_NAMES`], with coordinates in q and without velocities in qd.";
+    let literals = format!("[{}]", string_literals(names.iter().copied()));
+    let kind = ConstantType::Names(names.len());
+    (!names.is_empty()).then(|| AssociatedConstant::new("DEPENDENT_NAMES", kind, literals, doc))
 }
 
 /// Of joints that follow others: names, whose coordinates they follow, and how.

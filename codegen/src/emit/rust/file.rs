@@ -286,6 +286,7 @@ fn skipped(out: &mut String, report: &Report) {
 fn moved_by(model: &Model<Dd>, body: usize) -> String {
     match model.coupling_of(body) {
         Some(coupling) => format!("that follows {}", coupling.in_words(model)),
+        None if model.is_dependent(body) => format!("q[{}] that loops determine", model.bodies[body].joint.iq),
         None => format!("qd[{}]", model.bodies[body].joint.iv),
     }
 }

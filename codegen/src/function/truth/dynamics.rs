@@ -5,8 +5,9 @@ use super::super::dynamics::{
     VelocityForce,
 };
 use super::super::Quantity;
-use super::{list, solved, Chapter, Truth};
-use nalgebra::DVector;
+use super::closed::forces;
+use super::{list, solved, Chapter, ClosedMotion, Truth};
+use nalgebra::{DMatrix, DVector};
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference;
 
@@ -18,11 +19,19 @@ impl Truth for InverseDynamics {
         }
         Some(list(&forces))
     }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        forces::<Self>(at)
+    }
 }
 
 impl Truth for GravityForce {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         Some(list(&reference::gravity_force(&at.tree, at.q())))
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        forces::<Self>(at)
     }
 }
 
@@ -30,11 +39,22 @@ impl Truth for BiasForce {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         Some(list(&at.with_passive(reference::bias_force(&at.tree, at.q(), at.qd()))))
     }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        at.forces(InverseDynamics::truth(&at.unaccelerated))
+    }
 }
 
 impl Truth for VelocityForce {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         Some(list(&reference::velocity_force(&at.tree, at.q(), at.qd())))
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        // C ẋ + H γ
+        let of_tree = DVector::from_vec(Self::truth(&at.tree)?);
+        let bias = DVector::from_column_slice(at.unaccelerated.qdd());
+        at.forces(Some(list(&(of_tree + of_tree_inertia(&at.tree) * bias))))
     }
 }
 
@@ -42,11 +62,19 @@ impl Truth for MassMatrix {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         Some(list(&at.with_rotors(reference::mass_matrix(&at.tree, at.q())).transpose()))
     }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        Some(list(&at.square(of_tree_inertia(&at.tree)).transpose()))
+    }
 }
 
 impl Truth for MassMatrixAndGravityForce {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         Some([MassMatrix::truth(at)?, GravityForce::truth(at)?].concat())
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        Some([MassMatrix::truth_on_loops(at)?, GravityForce::truth_on_loops(at)?].concat())
     }
 }
 
@@ -61,6 +89,13 @@ impl Truth for ForwardDynamics {
         let (h, net) = (h.select_rows(moving).select_columns(moving), net.select_rows(moving));
         Some(list(&solved(&h, &net, reference::solve_symmetric)))
     }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        let h = at.square(of_tree_inertia(&at.tree));
+        let bias = DVector::from_vec(BiasForce::truth_on_loops(at)?);
+        let net = DVector::from_column_slice(at.tree.get(Quantity::Force)) - bias;
+        Some(list(&solved(&h, &net, reference::solve_symmetric)))
+    }
 }
 
 impl Truth for JointWrenches {
@@ -70,4 +105,9 @@ impl Truth for JointWrenches {
         let order = at.tree.by_coordinates();
         Some(order.into_iter().flat_map(|link| wrenches[link]).collect())
     }
+}
+
+/// H of the tree, rotors included.
+fn of_tree_inertia(tree: &Chapter<'_>) -> DMatrix<Magnitude> {
+    tree.with_rotors(reference::mass_matrix(&tree.tree, tree.q()))
 }

@@ -12,6 +12,7 @@ use straightline_core::reference::{CentreOfMassFrame, CentreOfMassTree, Extended
 use straightline_core::{Dd, Dual, Real};
 
 mod bias_derivatives;
+mod closed;
 mod derivatives;
 mod drives;
 mod dynamics;
@@ -19,6 +20,7 @@ mod effect;
 mod forward_derivatives;
 mod frame_forces;
 mod kinematics;
+mod loops;
 mod motion_derivatives;
 mod regressors;
 mod steps;
@@ -26,6 +28,7 @@ mod tangent;
 mod tasks;
 mod whole;
 
+pub use closed::{ClosedLoops, ClosedMotion};
 pub use effect::Effect;
 
 /// What a function should give.
@@ -33,6 +36,19 @@ pub trait Truth: RobotFunction {
     /// Its results, one block after the other; `None` where the reference has no formulation of it, or none for these drives: tests of their own
     /// hold such functions to laws of physics.
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>>;
+
+    /// The same of a robot with closed loops.
+    fn truth_on_loops(_: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        None
+    }
+
+    /// The same of any robot.
+    fn truth_of(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        match at.loops {
+            Some(loops) => Self::truth_on_loops(&ClosedMotion::new(at, loops)),
+            None => Self::truth(at),
+        }
+    }
 }
 
 /// A robot in the second author's terms, at a state.
@@ -50,6 +66,8 @@ pub struct Chapter<'a> {
     drives: Option<&'a Model<Dd>>,
     /// The robot whose base parameters are meant.
     robot: Option<&'a Model<Dd>>,
+    /// Where loops are closed.
+    loops: Option<&'a ClosedLoops>,
     state: BTreeMap<Quantity, Vec<Magnitude>>,
 }
 
@@ -78,14 +96,25 @@ impl<'a> Chapter<'a> {
                         attitude.iter_mut().for_each(|x| *x = x.of_size(1.0));
                     }
                     quantity if quantity.axes() == [Extent::Velocities] => {
-                        x[link.iv..link.iv + link.joint.nv()].chunks_mut(3).for_each(of_length);
+                        let own = x.get_mut(link.iv..link.iv + link.joint.nv());
+                        own.into_iter().flat_map(|own| own.chunks_mut(3)).for_each(of_length);
                     }
                     _ => {}
                 }
             }
         }
         let rows = SelectedRows::ALL;
-        Chapter { tree, frames: Vec::new(), rows, effects, moving: None, drives: None, robot: None, state: sized }
+        Chapter {
+            tree,
+            frames: Vec::new(),
+            rows,
+            effects,
+            moving: None,
+            drives: None,
+            robot: None,
+            loops: None,
+            state: sized,
+        }
     }
 
     /// The same with these frames asked for.
@@ -123,6 +152,16 @@ impl<'a> Chapter<'a> {
     #[must_use]
     pub fn with_drives(self, model: &'a Model<Dd>) -> Self {
         Chapter { drives: Some(model), ..self }
+    }
+
+    /// The same with these loops closed.
+    #[must_use]
+    pub fn with_loops(mut self, loops: Option<&'a ClosedLoops>) -> Self {
+        for rate in Quantity::of_velocities() {
+            let given = self.state.get_mut(&rate);
+            given.into_iter().for_each(|x| x.truncate(loops.map_or(usize::MAX, |loops| loops.independent)));
+        }
+        Chapter { loops, ..self }
     }
 
     /// The same with the base parameters of a model, whose bodies are links of the tree, by their names.

@@ -1,7 +1,7 @@
 //! The robot as a whole, by the second author.
 
 use super::super::whole::{CentreOfMass, Energy, Momentum};
-use super::{list, Chapter, Truth};
+use super::{list, Chapter, ClosedMotion, Truth};
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference;
 use straightline_core::{Dd, Real};
@@ -19,11 +19,19 @@ impl Truth for Energy {
         }
         Some(vec![kinetic, potential])
     }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        Self::truth(&at.tree)
+    }
 }
 
 impl Truth for CentreOfMass {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         Some(list(&reference::centre_of_mass(&at.tree, at.q())))
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        Self::truth(&at.tree)
     }
 }
 
@@ -31,5 +39,9 @@ impl Truth for Momentum {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         let momentum = reference::momentum(&at.tree, at.q(), at.qd());
         Some([list(&momentum.linear), list(&momentum.angular_about_centre_of_mass)].concat())
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        Self::truth(&at.tree)
     }
 }

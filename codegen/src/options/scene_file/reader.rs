@@ -272,12 +272,13 @@ impl<'a> SceneReader<'a> {
         let own = ["rotor_inertia", "damping", "coulomb", "coulomb_speed", "springs"];
         self.reader.check_keys(
             table,
-            &[&own[..], &["transmission_losses", "elastic_transmissions", "elastic_links", "couplings"]].concat(),
+            &[&own[..], &["transmission_losses", "elastic_transmissions", "elastic_links", "couplings", "loops"]]
+                .concat(),
         );
         let mut flag = |key: &str| self.reader.flag_at(table, key).is_none_or(|flag| flag.value);
         let (rotor_inertia, damping, springs) = (flag("rotor_inertia"), flag("damping"), flag("springs"));
         let (transmission_losses, elastic_transmissions) = (flag("transmission_losses"), flag("elastic_transmissions"));
-        let (elastic_links, couplings) = (flag("elastic_links"), flag("couplings"));
+        let (elastic_links, couplings, loops) = (flag("elastic_links"), flag("couplings"), flag("loops"));
         let form = self.reader.word_at(table, "coulomb", &COULOMB);
         let speed = self.reader.real_at(table, "coulomb_speed", Range64::Finite);
         let coulomb = match (form.as_ref().map(|f| f.value).unwrap_or_default(), &speed) {
@@ -305,6 +306,7 @@ impl<'a> SceneReader<'a> {
             elastic_transmissions,
             elastic_links,
             couplings,
+            loops,
         };
     }
 

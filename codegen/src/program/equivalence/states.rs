@@ -3,7 +3,7 @@
 use super::{plainly_constructed, PortState};
 use crate::equations::Robot;
 use crate::function::Quantity;
-use crate::model::states::{body, of_port, settle};
+use crate::model::states::{assembled, body, of_port, settle};
 use crate::options::Options;
 use crate::scene::free_drive::FreeDrive;
 use std::f64::consts::PI;
@@ -15,6 +15,9 @@ use straightline_graph::expr::Port;
 const NEAR: f64 = 1e-3;
 /// Where random numbers begin: another place than where states for choices come from.
 const SEED: u64 = 0x6a09_e667_f3bc_c908;
+
+/// From what short numbers leave open, to nothing in double-double.
+const CLOSING_STEPS: usize = 4;
 
 /// Random states that the inputs allow, the same everywhere: every other one is fast.
 pub(super) struct States<'a> {
@@ -88,6 +91,11 @@ impl<'a> States<'a> {
                 joint.kind.normalise(own);
             }
         }
+        // loops close in double-double
+        for name in Quantity::of_positions().map(Quantity::name).filter(|_| !model.closure.is_empty()) {
+            let Some(q) = state.get_mut(&name) else { continue };
+            *q = model.close_loops(q, CLOSING_STEPS).0;
+        }
         state
     }
 
@@ -112,9 +120,10 @@ impl<'a> States<'a> {
         }
         let values = of_port(&self.robot.model, port, fast, &mut self.random);
         match Quantity::of(port) {
-            Some(quantity) if quantity.is_configuration() || quantity == Quantity::Velocity => {
-                place.of(quantity, values, &mut self.random)
+            Some(quantity) if quantity.is_configuration() => {
+                assembled(&self.robot.model, place.of(quantity, values, &mut self.random))
             }
+            Some(Quantity::Velocity) => place.of(Quantity::Velocity, values, &mut self.random),
             _ => values,
         }
     }

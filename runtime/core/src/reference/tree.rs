@@ -200,7 +200,8 @@ impl<T: ReferenceReal> CentreOfMassLink<T> {
 }
 
 impl<T: ReferenceReal> CentreOfMassFrame<T> {
-    fn map<U: ReferenceReal>(&self, f: impl Fn(T) -> U + Copy) -> CentreOfMassFrame<U> {
+    /// The same frame over another scalar.
+    pub fn map<U: ReferenceReal>(&self, f: impl Fn(T) -> U + Copy) -> CentreOfMassFrame<U> {
         CentreOfMassFrame {
             name: self.name.clone(),
             link: self.link,

@@ -1,0 +1,38 @@
+//! What closed loops determine, by the second author.
+
+use super::super::loops::{CloseLoops, LoopJacobian, LoopMotion};
+use super::{Chapter, ClosedMotion, Truth};
+use straightline_core::magnitude::Magnitude;
+use straightline_core::Dd;
+
+impl Truth for CloseLoops {
+    fn truth(_: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        None
+    }
+
+    /// A closed configuration stays as it is.
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        let closed = Magnitude::new(Dd::ZERO).of_size(at.reach());
+        Some(at.tree.q().iter().copied().chain((0..at.equations).map(|_| closed)).collect())
+    }
+}
+
+impl Truth for LoopJacobian {
+    fn truth(_: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        None
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        Some(at.dependent_rows())
+    }
+}
+
+impl Truth for LoopMotion {
+    fn truth(_: &Chapter<'_>) -> Option<Vec<Magnitude>> {
+        None
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        Some([at.tree.qd(), at.tree.qdd()].map(|rates| &rates[at.independent()..]).concat())
+    }
+}
