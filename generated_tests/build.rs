@@ -32,7 +32,7 @@ const ROBOTS: [(&str, &str, bool, &[&str]); 11] = [
 ];
 
 /// The robots of `reference/joints`, which are compiled once each.
-const JOINTS: [(&str, &str, bool, &[&str]); 10] = [
+const JOINTS: [(&str, &str, bool, &[&str]); 15] = [
     ("mimic_gripper", "mimic_gripper.urdf", false, &["finger_right"]),
     ("mimic_chain", "mimic_chain.urdf", false, &["f_link"]),
     ("mimic_screw", "mimic_screw.urdf", false, &["tool_link", "screw_link"]),
@@ -43,6 +43,11 @@ const JOINTS: [(&str, &str, bool, &[&str]); 10] = [
     ("ball_float", "ball_float.xml", true, &["l_shin", "r_shin"]),
     ("multi_planar", "multi_planar.xml", false, &["cyl"]),
     ("multi_arm", "multi_arm.xml", false, &["c", "d"]),
+    ("loop_fourbar", "loop_fourbar.xml", false, &["coupler"]),
+    ("loop_palletiser", "loop_palletiser.xml", false, &["forearm", "tri"]),
+    ("loop_ankle", "loop_ankle.xml", false, &["foot"]),
+    ("loop_ankle_float", "loop_ankle_float.xml", true, &["foot", "rod_l"]),
+    ("loop_leg", "loop_leg.xml", false, &["foot", "tarsus"]),
 ];
 
 /// Robots that are compiled under the exact rules too, and in single precision.
@@ -141,7 +146,7 @@ fn joints(out: &Path) {
             modules,
             "/// `{file}`.\n#[allow(clippy::all)]\npub mod {robot} {{\n    include!(concat!(env!(\"OUT_DIR\"), \"/{robot}.rs\"));\n}}",
         );
-        let calls = calls_of(robot, &generated, &Function::all().collect::<Vec<_>>());
+        let calls = calls_of(robot, &generated, &Function::of(&generated.model).collect::<Vec<_>>());
         let _ = writeln!(
             table,
             "    Compiled {{\n        robot: {robot:?},\n        exact: false,\n        functions: &[\n{calls}        ],\n    }},"

@@ -1,5 +1,5 @@
-//! The reference data of `reference/`: eleven robots, 40 states each, values with 25 digits; and of `reference/joints/`: ten robots whose joints follow others, are balls,
-//! or stand several in a body.
+//! The reference data of `reference/`: eleven robots, 40 states each, values with 25 digits; and of `reference/joints/`: fifteen robots whose joints follow others, are balls,
+//! stand several in a body, or close loops.
 //!
 //! How an error is judged: `scaled = |computed − expected| / scale`, the worst over the components of an output.
 //!
@@ -11,6 +11,8 @@
 //! | V | the largest \|V\| of the robot's states: V itself passes through zero |
 //! | wrench | the largest of the six numbers of that joint |
 //! | p, R, J, Jdqd | the largest component of that quantity of that frame |
+//! | q of closed loops, rates of dependent joints, G | the largest component |
+//! | gaps of closed loops | 1 m |
 //! | velocity and acceleration of a frame | Σ \|J\| \|q̇\|; Σ \|J\| \|q̈\| plus that of Jdqd |
 
 use crate::bounds;
@@ -38,7 +40,7 @@ pub const ROBOTS: [&str; 11] = [
 ];
 
 /// The robots of `reference/joints/`, each with its file.
-pub const JOINTS: [(&str, &str); 10] = [
+pub const JOINTS: [(&str, &str); 15] = [
     ("mimic_gripper", "urdf"),
     ("mimic_chain", "urdf"),
     ("mimic_screw", "urdf"),
@@ -49,6 +51,11 @@ pub const JOINTS: [(&str, &str); 10] = [
     ("ball_float", "xml"),
     ("multi_planar", "xml"),
     ("multi_arm", "xml"),
+    ("loop_fourbar", "xml"),
+    ("loop_palletiser", "xml"),
+    ("loop_ankle", "xml"),
+    ("loop_ankle_float", "xml"),
+    ("loop_leg", "xml"),
 ];
 
 /// A robot with its states.
@@ -81,8 +88,10 @@ pub struct State {
     pub id: String,
     /// Such as `random` or `at_limits_mixed`.
     pub kind: String,
-    /// Configuration.
+    /// Configuration; of closed loops, rounded from 25 digits.
     pub q: Vec<f64>,
+    /// Of closed loops: a configuration near it, with the same independent coordinates.
+    pub start: Option<Vec<f64>>,
     /// Velocities.
     pub qd: Vec<f64>,
     /// Accelerations.
@@ -172,12 +181,18 @@ impl Robot {
         let list = json(&folder.join("robots.json"));
         let entry = list.as_array().expect("a list").iter().find(|r| r["name"] == name).expect("a robot of the list");
         let joints = file["joints"].as_array().expect("a list");
-        // joints that follow others come last
-        let follows = |k: &usize| joints[*k].get("mimic").is_some();
+        let independent = file.get("independent").filter(|names| !names.is_null()).map(strings);
+        let name_of = |k: usize| joints[k]["name"].as_str().expect("a name");
+        // joints that loops determine come behind the others, and those that follow others last
+        let is_dependent = |k: usize| independent.as_ref().is_some_and(|all| !all.iter().any(|own| own == name_of(k)));
+        let follows = |k: usize| joints[k].get("mimic").is_some();
         let mut order: Vec<usize> = (0..joints.len()).collect();
-        order.sort_by_key(follows);
-        let states: Vec<State> =
-            file["states"].as_array().expect("a list").iter().map(|state| State::new(state, &order)).collect();
+        order.sort_by_key(|k| (follows(*k), is_dependent(*k)));
+        let state = |state: &Value| match independent {
+            Some(_) => State::new(&on_loops(state, joints, &order), &order),
+            None => State::new(state, &order),
+        };
+        let states: Vec<State> = file["states"].as_array().expect("a list").iter().map(state).collect();
         let potential_energy = |s: &State| largest(&numbers(&s.data["V"]));
         Robot {
             key,
@@ -271,6 +286,26 @@ impl Robot {
                 expected.append_uniform(numbers(field("dtau_dqd")?));
                 Some(expected)
             }
+            Function::CloseLoops => {
+                let mut expected = Expected { values: vec![], scales: vec![] };
+                expected.append_uniform(numbers(field("q_closed")?));
+                // three equations of a loop, or two of a plane one
+                let gaps = numbers(field("gaps")?);
+                expected.scales.extend(gaps.iter().map(|_| 1.0));
+                expected.values.extend(gaps);
+                Some(expected)
+            }
+            Function::LoopJacobian => {
+                let mut expected = Expected { values: vec![], scales: vec![] };
+                expected.append_uniform(numbers(field("G_dependent")?));
+                Some(expected)
+            }
+            Function::LoopMotion => {
+                let mut expected = Expected { values: vec![], scales: vec![] };
+                expected.append_uniform(numbers(field("qd_dependent")?));
+                expected.append_uniform(numbers(field("qdd_dependent")?));
+                Some(expected)
+            }
             Function::ForwardKinematics => per_frame(&["p", "R"]),
             Function::Jacobian => per_frame(&["J"]),
             Function::JacobianBias => per_frame(&["Jdqd"]),
@@ -339,8 +374,44 @@ fn by_plain_evaluation(function: Function) -> &'static [&'static str] {
         Function::VelocityForce => &["velocity_force"],
         Function::MassMatrix => &["mass_matrix"],
         Function::ForwardDynamics => &["forward_dynamics"],
+        Function::CloseLoops => &["close_loops"],
+        Function::LoopJacobian => &["close_qd"],
+        Function::LoopMotion => &["close_qd", "close_qdd"],
         _ => &["energy"],
     }
+}
+
+/// A state of a robot with closed loops under the names of others, over its independent joints, with configurations in the order of the joints that is given.
+fn on_loops(state: &Value, joints: &[Value], order: &[usize]) -> Value {
+    let mut data = state.clone();
+    for name in ["tau", "h", "g", "C", "fd_qdd", "fd_tau", "H", "qd", "qdd"] {
+        data[name] = state[format!("{name}_a")].clone();
+    }
+    for name in ["tau", "h", "g", "C", "fd"] {
+        data["scale"][name] = state["scale"][format!("{name}_a")].clone();
+    }
+    let number = |joint: usize, key: &str| joints[joint][key].as_u64().expect("an index") as usize;
+    let part = |list: &Value, joint: usize, [first, count]: [&str; 2]| {
+        let first = number(joint, first);
+        list.as_array().expect("a list")[first..first + number(joint, count)].to_vec()
+    };
+    let of_all = |list: &Value| Value::from(order.iter().flat_map(|k| part(list, *k, ["iq", "nq"])).collect::<Vec<_>>());
+    for name in ["q", "q_start"] {
+        data[name] = of_all(&state[name]);
+    }
+    data["q_closed"] = data["q"].clone();
+    let independent = state["qd_a"].as_array().expect("a list").len();
+    let of_dependent = |list: &Value| {
+        let all = order.iter().flat_map(|k| part(list, *k, ["iv", "nv"]));
+        Value::from(all.skip(independent).collect::<Vec<_>>())
+    };
+    data["qd_dependent"] = of_dependent(&state["qd"]);
+    data["qdd_dependent"] = of_dependent(&state["qdd"]);
+    data["G_dependent"] = of_dependent(&state["G"]);
+    // as many equations as joints that they determine
+    let closed = Value::from("0");
+    data["gaps"] = data["qd_dependent"].as_array().expect("a list").iter().map(|_| closed.clone()).collect();
+    data
 }
 
 impl State {
@@ -357,6 +428,7 @@ impl State {
             id: text("id"),
             kind: text("kind"),
             q: inputs(&data["q"]),
+            start: data.get("q_start").map(inputs),
             qd: inputs(&data["qd"]),
             qdd: inputs(&data["qdd"]),
             fd_tau: inputs(&data["fd_tau"]),
@@ -368,6 +440,9 @@ impl State {
     /// The inputs of a function, in the order of its ports.
     pub fn inputs(&self, function: Function) -> Vec<Vec<f64>> {
         let of = |quantity: &Quantity| match quantity {
+            Quantity::Configuration if function == Function::CloseLoops => {
+                self.start.clone().expect("its robot has loops")
+            }
             Quantity::Configuration => self.q.clone(),
             Quantity::Velocity => self.qd.clone(),
             Quantity::Acceleration => self.qdd.clone(),

@@ -12,6 +12,7 @@ use straightline_codegen::scene::Scene;
 use straightline_codegen::{compile, Function, Options};
 
 const ARM: &str = include_str!("../files/arm.toml");
+const FOURBAR: &str = include_str!("../files/fourbar.toml");
 
 /// Files of several complaints that stand in other tables, too: one that is no scene, types, and keys.
 const OTHERS: [&str; 3] = ["keys", "types", "syntax"];
@@ -50,6 +51,7 @@ fn said_of(code: &str) -> Diagnostics {
         _ => {}
     }
     let robot = match code {
+        "not-on-loops" | "determined-joint" => FOURBAR.to_string(),
         "several-locked" => ARM.replace("\"continuous\"", "\"spherical\""),
         _ => ARM.to_string(),
     };
