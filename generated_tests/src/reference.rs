@@ -395,7 +395,8 @@ fn on_loops(state: &Value, joints: &[Value], order: &[usize]) -> Value {
         let first = number(joint, first);
         list.as_array().expect("a list")[first..first + number(joint, count)].to_vec()
     };
-    let of_all = |list: &Value| Value::from(order.iter().flat_map(|k| part(list, *k, ["iq", "nq"])).collect::<Vec<_>>());
+    let of_all =
+        |list: &Value| Value::from(order.iter().flat_map(|k| part(list, *k, ["iq", "nq"])).collect::<Vec<_>>());
     for name in ["q", "q_start"] {
         data[name] = of_all(&state[name]);
     }

@@ -54,6 +54,8 @@ fn axis(extent: Extent) -> String {
         Extent::Frames => "frames".to_string(),
         Extent::DriveStates => "NX".to_string(),
         Extent::Drives => "NU".to_string(),
+        Extent::Dependents => "dependent".to_string(),
+        Extent::LoopEquations => "equations".to_string(),
         Extent::Of(n) => n.to_string(),
     }
 }
@@ -71,6 +73,7 @@ alone, of six rows also a list of them. Scenes add further arguments (gravity, r
         .to_string();
     let families = [
         (Family::Robot, "Of every robot"),
+        (Family::Loops, "Of robots with closed loops"),
         (Family::Combination, "Combinations, made for who names them"),
         (Family::Derivatives, "Derivatives, made for who names them"),
         (Family::Tasks, "Tasks of frames, made for who names them"),

@@ -36,6 +36,7 @@ mod guide;
 mod layers;
 mod lets;
 mod limbs;
+mod loops;
 mod machines;
 mod malformed;
 mod messages;
