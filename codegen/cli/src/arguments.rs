@@ -6,6 +6,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use straightline_codegen::convert::written_formats;
 use straightline_codegen::description::names_of_formats;
 use straightline_codegen::emit::package::PACKAGES;
 use straightline_codegen::identifier::is_prefix;
@@ -69,6 +70,19 @@ Examples:
 
 {EXIT_CODES}"))]
     Check(CheckArguments),
+    /// Write a robot file in another format
+    #[command(after_help = format!("\
+The format follows from the name of OUT, or from --to. Before anything is written the text is read back and compared with the robot:
+joints and their order, limits, effects, couplings, frames, masses and poses. What the other format has no place for is listed; where the
+robot would move in another way that is an error, and with --lossy a warning (codegen/CONVERT.md).
+
+Examples:
+  straightline convert panda.urdf panda.xml
+  straightline convert solo12.urdf solo12.toml --floating-base
+  straightline convert scene.xml robot.urdf --lossy
+
+{EXIT_CODES}"))]
+    Convert(ConvertArguments),
     /// Compare the generated program with an independent formulation of the dynamics, on random states
     #[command(after_help = format!("\
 Runs the program as it is compiled, operation by operation in the scalar's arithmetic, and the dynamics of the
@@ -150,8 +164,16 @@ impl CliCommand {
             CliCommand::Simulate(a) => return a.model(),
             CliCommand::Analyze(a) => return a.model(),
             CliCommand::Export(a) => &a.model,
-            CliCommand::Functions(_) | CliCommand::Explain(_) => return None,
+            CliCommand::Convert(_) | CliCommand::Functions(_) | CliCommand::Explain(_) => return None,
         })
+    }
+
+    /// Whether warnings and progress are left out.
+    pub fn is_quiet(&self) -> bool {
+        match self {
+            CliCommand::Convert(a) => a.quiet,
+            other => other.model().is_some_and(ModelArgs::is_quiet),
+        }
     }
 
     /// What it does, in a word.
@@ -160,6 +182,7 @@ impl CliCommand {
             CliCommand::Generate(_) => "generating",
             CliCommand::Report(_) => "reporting",
             CliCommand::Check(_) => "checking",
+            CliCommand::Convert(_) => "converting",
             CliCommand::Verify(_) => "verifying",
             CliCommand::Simulate(_) => "simulating",
             CliCommand::Analyze(_) => "analysing",
@@ -227,6 +250,27 @@ pub struct CheckArguments {
 }
 
 #[derive(Debug, Args)]
+pub struct ConvertArguments {
+    #[arg(value_name = "IN", help = robot_file())]
+    pub robot: PathBuf,
+    /// Where to write
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// The format [default: that of OUT by its name]
+    #[arg(long, value_name = "FORMAT", value_parser = formats())]
+    pub to: Option<String>,
+    /// Leave out what the format has no place for, with a warning, also where the robot then moves in another way
+    #[arg(long)]
+    pub lossy: bool,
+    /// The root link moves freely in the world
+    #[arg(long)]
+    pub floating_base: bool,
+    /// Say errors alone
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+#[derive(Debug, Args)]
 pub struct Verify {
     #[arg(help = robot_file())]
     pub robot: PathBuf,
@@ -270,6 +314,11 @@ pub struct Export {
     pub program: ProgramArgs,
     #[command(flatten)]
     pub model: ModelArgs,
+}
+
+/// The formats that are written.
+fn formats() -> impl TypedValueParser<Value = String> {
+    possible(written_formats().map(|(format, writer)| (writer.word, format.name)).collect())
 }
 
 /// The kinds of packages.
