@@ -72,6 +72,10 @@ fn of_bodies(a: &Body<Dd>, b: &Body<Dd>, longest: f64) -> Option<&'static str> {
     let effects_but_rotors = |body: &Body<Dd>| {
         let mut effects = body.effects.clone();
         effects.rotor_inertia = effects.rotor_inertia.map(|_| Dd::ONE);
+        // no spring is slack anywhere
+        if effects.stiffness == Dd::ZERO {
+            effects.spring_rest = Dd::ZERO;
+        }
         effects
     };
     let rotor = |body: &Body<Dd>| body.effects.rotor_inertia.unwrap_or(Dd::ZERO);

@@ -4,7 +4,7 @@
 //! stands at the frame of the link that it moves needs a link there: `LINK_at_joint`, without mass, on which the link itself is fixed, so that
 //! masses and frames keep their numbers.
 
-use crate::description::write::{quaternion, JointForm};
+use crate::description::write::{quaternion, FormatWriter, JointForm};
 use crate::description::{
     AnchoredJoint, Description, JointDrive, JointLimits, JointType, Noted, Placement, Rotation, WrittenJoint,
     WrittenLink, WrittenPose, WrittenTurn,
@@ -20,15 +20,47 @@ use straightline_core::Dd;
 /// A longer or shorter axis is written with length 1.
 const AXIS_DIGITS: f64 = 1e-9;
 
-/// The same robot with its joints in that form; frames are links where joints stand at frames and links are all that a format has.
-pub fn formed(robot: &Description, form: JointForm) -> Option<Description> {
-    let mut robot = robot.clone();
-    for joint in &mut robot.joints {
+/// The same robot with its joints as a format has them, and its frames; `None`: a joint stands nowhere.
+pub fn formed(robot: &Description, writer: &FormatWriter) -> Option<Description> {
+    let mut formed = robot.clone();
+    for joint in &mut formed.joints {
         joint.placement = anywhere(joint)?;
     }
-    match form {
-        JointForm::Anywhere => Some(robot),
-        JointForm::AtFrames => Some(at_frames(robot)),
+    let mut names = FreeNames::of(robot);
+    if writer.joints == JointForm::AtFrames {
+        at_frames(&mut formed, &mut names);
+    }
+    if writer.frames_are_links {
+        for frame in std::mem::take(&mut formed.frames) {
+            let own = names.joint(format!("{}_fixed", frame.name.value));
+            formed.links.push(WrittenLink { name: frame.name.clone(), inertial: None, is_carrier: false });
+            formed.joints.push(fixed_joint(own, frame.link, frame.name, frame.pose));
+        }
+    }
+    Some(formed)
+}
+
+/// Names that are taken.
+struct FreeNames {
+    links: HashSet<String>,
+    joints: HashSet<String>,
+}
+
+impl FreeNames {
+    fn of(robot: &Description) -> FreeNames {
+        let links = robot.links.iter().map(|link| &link.name).chain(robot.frames.iter().map(|frame| &frame.name));
+        FreeNames {
+            links: links.map(|name| name.value.clone()).collect(),
+            joints: robot.joints.iter().map(|joint| joint.name.value.clone()).collect(),
+        }
+    }
+
+    fn link(&mut self, name: String) -> String {
+        free_name(name, &mut self.links)
+    }
+
+    fn joint(&mut self, name: String) -> String {
+        free_name(name, &mut self.joints)
     }
 }
 
@@ -60,11 +92,8 @@ fn written(pose: &Transform<Dd>) -> WrittenPose {
     WrittenPose { xyz: Noted::assumed(pose.translation.to_array().map(Dd::to_f64)), rotation: Rotation::Turns(turns) }
 }
 
-/// The robot with its joints at frames of links.
-fn at_frames(mut robot: Description) -> Description {
-    let links = robot.links.iter().map(|link| &link.name).chain(robot.frames.iter().map(|frame| &frame.name));
-    let mut links: HashSet<String> = links.map(|name| name.value.clone()).collect();
-    let mut names: HashSet<String> = robot.joints.iter().map(|joint| joint.name.value.clone()).collect();
+/// Brings joints to frames of links.
+fn at_frames(robot: &mut Description, names: &mut FreeNames) {
     let mut joints = Vec::new();
     for mut joint in std::mem::take(&mut robot.joints) {
         let Placement::Anchored(AnchoredJoint { mut origin, anchor, axis, .. }) = joint.placement else {
@@ -78,9 +107,9 @@ fn at_frames(mut robot: Description) -> Description {
             let at_joint = Transform { rotation: Mat3::identity(), translation: vector(anchor) };
             let moved = compose(&transform(&origin, ROUNDING), &at_joint);
             origin.xyz = Noted::assumed(moved.translation.to_array().map(Dd::to_f64));
-            let link = Noted::assumed(free_name(format!("{}_at_joint", joint.child.value), &mut links));
+            let link = Noted::assumed(names.link(format!("{}_at_joint", joint.child.value)));
             robot.links.push(WrittenLink { name: link.clone(), inertial: None, is_carrier: false });
-            let own = free_name(format!("{}_fixed", joint.child.value), &mut names);
+            let own = names.joint(format!("{}_fixed", joint.child.value));
             let child = std::mem::replace(&mut joint.child, link.clone());
             let back = WrittenPose { xyz: Noted::assumed(anchor.map(|x| 0.0 - x)), ..WrittenPose::identity(Place::none()) };
             fixed = Some(fixed_joint(own, link, child, back));
@@ -90,7 +119,6 @@ fn at_frames(mut robot: Description) -> Description {
         joints.extend(fixed);
     }
     robot.joints = joints;
-    robot
 }
 
 /// A joint that does not move.

@@ -106,7 +106,7 @@ fn lose(loss: &Loss, format: &FileFormat, lossy: bool, robot: &mut Description, 
 
 /// The text of a robot, and in what it differs when it is read again.
 fn text_of(robot: &Description, format: &FileFormat, writer: &FormatWriter) -> (String, Option<String>) {
-    let formed = match forms::formed(robot, writer.joints) {
+    let formed = match forms::formed(robot, writer) {
         Some(formed) => formed,
         None => return (String::new(), Some("a joint stands nowhere".to_string())),
     };

@@ -43,7 +43,11 @@ pub static SPRINGS: Loss = Loss {
     weight: Dynamics,
     then: "their forces are left out",
     find: |robot| of_joints(robot, |joint| first([&joint.drive.spring_stiffness].into_iter().filter(|k| acts(k)))),
-    remove: |robot| robot.joints.iter_mut().for_each(|joint| joint.drive.spring_stiffness = None),
+    remove: |robot| {
+        for drive in robot.joints.iter_mut().map(|joint| &mut joint.drive) {
+            (drive.spring_stiffness, drive.spring_rest) = (None, None);
+        }
+    },
 };
 
 /// Rotors with their gears, and armatures.
@@ -151,11 +155,13 @@ pub static BODIES_WITHOUT_MASS: Loss = Loss {
     then: "they are written, but MuJoCo itself refuses them",
     find: |robot| {
         let massive = with_mass(robot);
-        let carriers: HashSet<&str> =
-            robot.links.iter().filter(|link| link.is_carrier).map(|link| link.name.value.as_str()).collect();
-        let moved = robot.joints.iter().filter(|joint| joint.kind.value.between_links().is_some());
-        let is_bare = |name: &str| !massive.contains(name) && !carriers.contains(name);
-        moved.map(|joint| &joint.child).filter(|child| is_bare(&child.value)).map(of_link).collect()
+        let moving = robot.joints.iter().filter(|joint| joint.kind.value.between_links().is_some());
+        let moved: HashSet<&str> = moving.map(|joint| joint.child.value.as_str()).collect();
+        let is_bare = |link: &&WrittenLink| {
+            let name = link.name.value.as_str();
+            moved.contains(name) && !massive.contains(name) && !link.is_carrier
+        };
+        robot.links.iter().filter(is_bare).map(|link| of_link(&link.name)).collect()
     },
     remove: |_| (),
 };

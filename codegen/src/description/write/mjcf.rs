@@ -21,6 +21,7 @@ pub static WRITER: FormatWriter = FormatWriter {
     word: "mjcf",
     extensions: &["xml", "mjcf"],
     joints: JointForm::Anywhere,
+    frames_are_links: false,
     losses: &[
         &losses::DRIVES,
         &losses::FLEXIBLE_LINKS,

@@ -25,6 +25,8 @@ pub struct FormatWriter {
     pub extensions: &'static [&'static str],
     /// How joints stand in it.
     pub joints: JointForm,
+    /// Whether links are all the frames that it has.
+    pub frames_are_links: bool,
     /// What it has no place for, or says in another way.
     pub losses: &'static [&'static Loss],
     /// Whether a robot that floats is read as that only if the reader is told.

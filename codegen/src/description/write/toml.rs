@@ -16,6 +16,7 @@ pub static WRITER: FormatWriter = FormatWriter {
     word: "toml",
     extensions: &["toml"],
     joints: JointForm::AtFrames,
+    frames_are_links: false,
     losses: &[&losses::CARRIERS, &losses::JOINTS_BESIDE_FRAMES, &losses::SKIPPED],
     floats_by_option: false,
     text,

@@ -12,6 +12,7 @@ pub static WRITER: FormatWriter = FormatWriter {
     word: "urdf",
     extensions: &["urdf"],
     joints: JointForm::AtFrames,
+    frames_are_links: true,
     losses: &[
         &losses::SPRINGS,
         &losses::ROTORS,
