@@ -28,6 +28,7 @@ Exit codes:
 #[command(name = "straightline", version, max_term_width = 110, after_help = format!("\
 Examples:
   straightline check panda.urdf
+  straightline convert panda.urdf panda.xml
   straightline generate panda.urdf -o src/panda.rs
   straightline report panda.urdf
   straightline verify panda.urdf

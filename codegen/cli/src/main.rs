@@ -25,7 +25,8 @@ mod print;
 mod search;
 
 use arguments::{
-    CheckArguments, CliCommand, CommandLine, ConvertArguments, Export, Generate, ModelArgs, ProgramArgs, ReportArguments, Verify,
+    CheckArguments, CliCommand, CommandLine, ConvertArguments, Export, Generate, ModelArgs, ProgramArgs,
+    ReportArguments, Verify,
 };
 use files::read;
 use std::io;

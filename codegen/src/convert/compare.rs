@@ -49,7 +49,8 @@ pub fn of_models(wanted: &Model<Dd>, found: &Model<Dd>) -> Option<String> {
     let frames = wanted.frames.iter().map(|frame| magnitude(&frame.placement));
     let longest = lengths.chain(frames).fold(0.0, f64::max);
     let bodies = wanted.bodies.iter().zip(&found.bodies);
-    let bodies = bodies.filter_map(|(a, b)| of_bodies(a, b, longest).map(|what| format!("joint `{}`: {what}", a.joint.name)));
+    let bodies =
+        bodies.filter_map(|(a, b)| of_bodies(a, b, longest).map(|what| format!("joint `{}`: {what}", a.joint.name)));
     let frames = wanted.frames.iter().filter_map(|frame| of_frames(frame, &found.frames, longest));
     let couplings = (wanted.couplings != found.couplings).then(|| "couplings are others".to_string());
     let drives = (wanted.drives != found.drives).then(|| "drives are others".to_string());
@@ -70,7 +71,7 @@ fn of_bodies(a: &Body<Dd>, b: &Body<Dd>, longest: f64) -> Option<&'static str> {
         [j.xx, j.yy, j.zz, j.xy, j.xz, j.yz]
     };
     let effects_but_rotors = |body: &Body<Dd>| {
-        let mut effects = body.effects.clone();
+        let mut effects = body.effects;
         effects.rotor_inertia = effects.rotor_inertia.map(|_| Dd::ONE);
         // no spring is slack anywhere
         if effects.stiffness == Dd::ZERO {

@@ -111,7 +111,8 @@ fn at_frames(robot: &mut Description, names: &mut FreeNames) {
             robot.links.push(WrittenLink { name: link.clone(), inertial: None, is_carrier: false });
             let own = names.joint(format!("{}_fixed", joint.child.value));
             let child = std::mem::replace(&mut joint.child, link.clone());
-            let back = WrittenPose { xyz: Noted::assumed(anchor.map(|x| 0.0 - x)), ..WrittenPose::identity(Place::none()) };
+            let back =
+                WrittenPose { xyz: Noted::assumed(anchor.map(|x| 0.0 - x)), ..WrittenPose::identity(Place::none()) };
             fixed = Some(fixed_joint(own, link, child, back));
         }
         joint.placement = Placement::Frames { origin, axis };

@@ -27,7 +27,8 @@ pub fn left_out(format: &str, loss: &Loss, found: &[(String, Place)]) -> D {
 
 /// What is said in another way.
 pub fn said_otherwise(format: &str, loss: &Loss, found: &[(String, Place)]) -> D {
-    D::note("said-otherwise", format!("{format} has no word for {}; {}", loss.what, loss.then)).detail(of_whom(found))
+    D::note("said-otherwise", format!("written otherwise in {format}: {}; {}", loss.what, loss.then))
+        .detail(of_whom(found))
 }
 
 /// A text that did not come out as it was meant.

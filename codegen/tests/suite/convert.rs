@@ -2,8 +2,10 @@
 
 use crate::robots::Random;
 use crate::two_readings::{chapter_toml, joint_frame_toml, random_robot, urdf};
+use crate::written::{Shape, Style, Written};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use straightline_codegen::convert::compare::of_models;
 use straightline_codegen::convert::{convert, messages::CODES, written_formats, ConvertOptions};
 use straightline_codegen::description::write::FormatWriter;
 use straightline_codegen::description::{FileFormat, FORMATS};
@@ -123,7 +125,8 @@ fn random_robots_of_every_notation_are_the_same_in_every_format() {
         let mut random = Random(seed);
         let (links, floating_base) = (2 + random.below(9), random.below(3) == 0);
         let robot = random_robot(&mut random, links, floating_base);
-        let gravity = |text: String| text.lines().filter(|line| !line.starts_with("gravity")).collect::<Vec<_>>().join("\n");
+        let gravity =
+            |text: String| text.lines().filter(|line| !line.starts_with("gravity")).collect::<Vec<_>>().join("\n");
         let texts = [
             ("robot.urdf", urdf(&mut random, &robot)),
             ("robot.toml", gravity(joint_frame_toml(&mut random, &robot, floating_base))),
@@ -135,6 +138,18 @@ fn random_robots_of_every_notation_are_the_same_in_every_format() {
             let options = ConvertOptions { floating_base, ..ConvertOptions::default() };
             there_and_back(&format!("{name}, seed {seed}"), &Source::new(name, text), options);
         }
+    }
+}
+
+/// Few digits, right angles cut anywhere, dust, masses and units of every size.
+#[test]
+fn robots_as_people_write_them_are_the_same_in_every_format() {
+    for (k, style) in Style::all().into_iter().enumerate() {
+        let seed = 300 + k as u64;
+        let robot = Written::new(style, Shape::any(&mut crate::written::Random(seed), 6), seed);
+        let options = ConvertOptions { floating_base: robot.floating, lossy: false };
+        let source = Source::new(robot.file_name(), robot.text());
+        there_and_back(&format!("{}, seed {seed}", style.name()), &source, options);
     }
 }
 
@@ -158,7 +173,11 @@ fn random_mjcf(random: &mut Random, bodies: usize) -> String {
             let place = format!("pos=\"{}\" axis=\"{}\"", triple(0.2), triple(2.0));
             text += &format!("<joint name=\"j{k}_{j}\" type=\"{kind}\" {place} {effects} {reference}/>");
         }
-        text += &format!("<inertial pos=\"{}\" mass=\"1.5\" diaginertia=\"0.1 0.2 0.25\" quat=\"1 {}\"/>", triple(0.1), triple(1.0));
+        text += &format!(
+            "<inertial pos=\"{}\" mass=\"1.5\" diaginertia=\"0.1 0.2 0.25\" quat=\"1 {}\"/>",
+            triple(0.1),
+            triple(1.0)
+        );
         text += &format!("<frame pos=\"{}\"><site name=\"s{k}\" quat=\"0.5 {}\"/>", triple(0.3), triple(1.0));
         if k % 2 == 0 {
             text += "</frame>";
@@ -184,40 +203,163 @@ fn arm(joint: &str, link: &str, top: &str) -> String {
 fn what_a_format_cannot_say_is_listed_and_nothing_else() {
     let second = "[[link]]\nname = \"fore\"\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n";
     let fixed = "[[joint]]\nname = \"weld\"\nkind = \"fixed\"\nparent = \"upper\"\nchild = \"fore\"\n";
-    let elbow = "[[joint]]\nname = \"elbow\"\nkind = \"continuous\"\nparent = \"upper\"\nchild = \"fore\"\naxis = \"x\"\n";
+    let elbow =
+        "[[joint]]\nname = \"elbow\"\nkind = \"continuous\"\nparent = \"upper\"\nchild = \"fore\"\naxis = \"x\"\n";
     let coupling = "[[coupling]]\njoint = \"elbow\"\nfollows = \"shoulder\"\n";
     let motor = "motor = { torque_constant = 0.05, resistance = 1.2, rotor_inertia = 1e-5 }";
     let beside = "<mujoco><worldbody><body name=\"a\"><joint name=\"j\" pos=\"0 0 1\"/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/></body></worldbody></mujoco>";
-    let several = beside.replace("<joint name=\"j\" pos=\"0 0 1\"/>", "<joint name=\"i\"/><joint name=\"j\" axis=\"1 0 0\"/>");
+    let several =
+        beside.replace("<joint name=\"j\" pos=\"0 0 1\"/>", "<joint name=\"i\"/><joint name=\"j\" axis=\"1 0 0\"/>");
     let shown = "<robot name=\"arm\"><link name=\"base\"/><link name=\"upper\"><visual/><inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial></link>\
                  <joint name=\"j\" type=\"continuous\"><parent link=\"base\"/><child link=\"upper\"/></joint></robot>";
     let rows: Vec<(&str, &str, String, &str, &str)> = vec![
         ("springs", "urdf", arm("spring = { stiffness = 3.0 }", "", ""), "joint `shoulder` (line 17)", "not-in-format"),
-        ("rotors, gears and armatures", "urdf", arm("armature = 0.1", "", ""), "joint `shoulder` (line 17)", "not-in-format"),
-        ("rotors, gears and armatures", "urdf", arm("rotor_inertia = 0.1\ngear_ratio = 9", "", ""), "joint `shoulder` (line 17)", "not-in-format"),
-        ("the direction or size of gravity", "urdf", arm("", "", "").replace("\n[[link]]\nname = \"base\"", "\ngravity = [0, 0, -1.62]\n[[link]]\nname = \"base\""), "[0.0, 0.0, -1.62] (line 3)", "not-in-format"),
-        ("drives", "urdf", arm("", "", &format!("[[drive]]\njoint = \"shoulder\"\n{motor}")), "drive `shoulder` (line 19)", "not-in-format"),
-        ("drives", "mjcf", arm("", "", &format!("[[drive]]\njoint = \"shoulder\"\n{motor}")), "drive `shoulder` (line 19)", "not-in-format"),
-        ("links that bend", "urdf", arm("", "flexible = { to = [0, 0, 0.5], bending = 9.0 }", ""), "link `upper` (line 10)", "not-in-format"),
-        ("links that bend", "mjcf", arm("", "flexible = { to = [0, 0, 0.5], bending = 9.0 }", ""), "link `upper` (line 10)", "not-in-format"),
-        ("ball joints", "urdf", arm("", "", "").replace("continuous", "ball"), "joint `shoulder` (line 12)", "left-out"),
-        ("floating bases", "urdf", arm("", "", "").replace("name = \"arm\"", "name = \"arm\"\nbase = \"floating\"").replace("name = \"base\"\n", "name = \"base\"\nmass = 1.0\ninertia = [1, 1, 1]\n"), "robot `arm` (line 3)", "said-otherwise"),
+        (
+            "rotors, gears and armatures",
+            "urdf",
+            arm("armature = 0.1", "", ""),
+            "joint `shoulder` (line 17)",
+            "not-in-format",
+        ),
+        (
+            "rotors, gears and armatures",
+            "urdf",
+            arm("rotor_inertia = 0.1\ngear_ratio = 9", "", ""),
+            "joint `shoulder` (line 17)",
+            "not-in-format",
+        ),
+        (
+            "the direction or size of gravity",
+            "urdf",
+            arm("", "", "")
+                .replace("\n[[link]]\nname = \"base\"", "\ngravity = [0, 0, -1.62]\n[[link]]\nname = \"base\""),
+            "[0.0, 0.0, -1.62] (line 3)",
+            "not-in-format",
+        ),
+        (
+            "drives",
+            "urdf",
+            arm("", "", &format!("[[drive]]\njoint = \"shoulder\"\n{motor}")),
+            "drive `shoulder` (line 19)",
+            "not-in-format",
+        ),
+        (
+            "drives",
+            "mjcf",
+            arm("", "", &format!("[[drive]]\njoint = \"shoulder\"\n{motor}")),
+            "drive `shoulder` (line 19)",
+            "not-in-format",
+        ),
+        (
+            "links that bend",
+            "urdf",
+            arm("", "flexible = { to = [0, 0, 0.5], bending = 9.0 }", ""),
+            "link `upper` (line 10)",
+            "not-in-format",
+        ),
+        (
+            "links that bend",
+            "mjcf",
+            arm("", "flexible = { to = [0, 0, 0.5], bending = 9.0 }", ""),
+            "link `upper` (line 10)",
+            "not-in-format",
+        ),
+        (
+            "ball joints",
+            "urdf",
+            arm("", "", "").replace("continuous", "ball"),
+            "joint `shoulder` (line 12)",
+            "left-out",
+        ),
+        (
+            "floating bases",
+            "urdf",
+            arm("", "", "")
+                .replace("name = \"arm\"", "name = \"arm\"\nbase = \"floating\"")
+                .replace("name = \"base\"\n", "name = \"base\"\nmass = 1.0\ninertia = [1, 1, 1]\n"),
+            "robot `arm` (line 3)",
+            "said-otherwise",
+        ),
         ("bodies with several joints", "urdf", several.clone(), "link `i_carrier` (line 1)", "said-otherwise"),
         ("bodies with several joints", "toml", several, "link `i_carrier` (line 1)", "said-otherwise"),
         ("joints beside the frames of their links", "urdf", beside.to_string(), "joint `j` (line 1)", "said-otherwise"),
         ("joints beside the frames of their links", "toml", beside.to_string(), "joint `j` (line 1)", "said-otherwise"),
-        ("frames", "urdf", arm("", "", "[[frame]]\nname = \"tool\"\nlink = \"upper\""), "frame `tool` (line 19)", "said-otherwise"),
+        (
+            "frames",
+            "urdf",
+            arm("", "", "[[frame]]\nname = \"tool\"\nlink = \"upper\""),
+            "frame `tool` (line 19)",
+            "said-otherwise",
+        ),
         ("things that the dynamics do not need", "urdf", shown.to_string(), "visual (line 1)", "said-otherwise"),
         ("things that the dynamics do not need", "mjcf", shown.to_string(), "visual (line 1)", "said-otherwise"),
         ("things that the dynamics do not need", "toml", shown.to_string(), "visual (line 1)", "said-otherwise"),
-        ("velocity limits", "mjcf", arm("limits = { velocity = 3.0 }", "", ""), "joint `shoulder` (line 17)", "left-out"),
-        ("ranges with one end", "mjcf", arm("limits = { lower = -1.0 }", "", "").replace("continuous", "revolute"), "joint `shoulder` (line 12)", "left-out"),
-        ("effort limits of zero", "mjcf", arm("limits = { effort = 0.0 }", "", ""), "joint `shoulder` (line 17)", "left-out"),
-        ("moving bodies without mass", "mjcf", arm("", "", &format!("{second}{elbow}")).replace("mass = 2.0\ncom = [0.1, 0.0, 0.2]\ninertia = [0.1, 0.2, 0.15]", ""), "link `upper` (line 6)", "left-out"),
-        ("rotors and gears", "mjcf", arm("rotor_inertia = 0.1\ngear_ratio = 9", "", ""), "joint `shoulder` (line 17)", "said-otherwise"),
-        ("the mass of the world", "mjcf", arm("", "", "").replace("name = \"base\"\n", "name = \"world\"\nmass = 1.0\ninertia = [1, 1, 1]\n").replace("parent = \"base\"", "parent = \"world\""), "link `world` (line 5)", "said-otherwise"),
-        ("names of fixed joints", "mjcf", arm("", "", &format!("{second}{fixed}")), "joint `weld` (line 23)", "said-otherwise"),
-        ("couplings", "mjcf", arm("", "", &format!("{second}{elbow}{coupling}")), "joint `elbow` (line 29)", "said-otherwise"),
+        (
+            "velocity limits",
+            "mjcf",
+            arm("limits = { velocity = 3.0 }", "", ""),
+            "joint `shoulder` (line 17)",
+            "left-out",
+        ),
+        (
+            "ranges with one end",
+            "mjcf",
+            arm("limits = { lower = -1.0 }", "", "").replace("continuous", "revolute"),
+            "joint `shoulder` (line 12)",
+            "left-out",
+        ),
+        (
+            "effort limits of zero",
+            "mjcf",
+            arm("limits = { effort = 0.0 }", "", ""),
+            "joint `shoulder` (line 17)",
+            "left-out",
+        ),
+        (
+            "moving bodies without mass",
+            "mjcf",
+            arm("", "", &format!("{second}{elbow}"))
+                .replace("mass = 2.0\ncom = [0.1, 0.0, 0.2]\ninertia = [0.1, 0.2, 0.15]", ""),
+            "link `upper` (line 6)",
+            "left-out",
+        ),
+        (
+            "inertias that no body has",
+            "mjcf",
+            arm("", "", "").replace("0.2, 0.15]", "0.2, 0.4]"),
+            "link `upper` (line 9)",
+            "left-out",
+        ),
+        (
+            "rotors and gears",
+            "mjcf",
+            arm("rotor_inertia = 0.1\ngear_ratio = 9", "", ""),
+            "joint `shoulder` (line 17)",
+            "said-otherwise",
+        ),
+        (
+            "the mass of the world",
+            "mjcf",
+            arm("", "", "")
+                .replace("name = \"base\"\n", "name = \"world\"\nmass = 1.0\ninertia = [1, 1, 1]\n")
+                .replace("parent = \"base\"", "parent = \"world\""),
+            "link `world` (line 5)",
+            "said-otherwise",
+        ),
+        (
+            "names of fixed joints",
+            "mjcf",
+            arm("", "", &format!("{second}{fixed}")),
+            "joint `weld` (line 23)",
+            "said-otherwise",
+        ),
+        (
+            "couplings",
+            "mjcf",
+            arm("", "", &format!("{second}{elbow}{coupling}")),
+            "joint `elbow` (line 29)",
+            "said-otherwise",
+        ),
     ];
     let mut seen: BTreeSet<(&str, &str)> = BTreeSet::new();
     for (what, word, text, whom, code) in &rows {
@@ -230,7 +372,8 @@ fn what_a_format_cannot_say_is_listed_and_nothing_else() {
         assert!(complaint.title.contains(what), "{what}, {word}: {said}");
         assert_eq!(text.is_none(), complaint.severity == Severity::Error, "{what}, {word}");
         // what is refused can be left out
-        let (text, said) = converted(&source, target(word), ConvertOptions { lossy: true, ..ConvertOptions::default() });
+        let (text, said) =
+            converted(&source, target(word), ConvertOptions { lossy: true, ..ConvertOptions::default() });
         assert!(text.is_some(), "{what}, {word}: {said}");
         seen.insert((what, word));
     }
@@ -271,6 +414,79 @@ fn names_come_back_whatever_they_are() {
             assert!(text.is_some(), "{}: {said}", to.1.word);
         }
     }
-    let (text, said) = converted(&Source::new("arm.toml", arm("", "", "").replace("upper", "\\u0001")), target("urdf"), ConvertOptions::default());
+    let (text, said) = converted(
+        &Source::new("arm.toml", arm("", "", "").replace("upper", "\\u0001")),
+        target("urdf"),
+        ConvertOptions::default(),
+    );
     assert!(text.is_none() && said.iter().any(|d| d.code == "not-as-read"), "{said}");
+}
+
+/// `convert_messages/CODE.*` is the smallest file that causes the message CODE in the format that stands here, `CODE.txt` all that is said of it.
+/// `UPDATE_EXPECTED=1 cargo test -p straightline-codegen --test suite convert::` rewrites the texts; read the difference.
+#[test]
+fn every_message_has_its_exact_text() {
+    let folder = package().join("tests/convert_messages");
+    let chapter = FORMATS.iter().find(|format| format.write.is_none()).expect("there is a format that is read alone");
+    for code in CODES {
+        let format = match *code {
+            "not-written" => chapter,
+            "not-in-format" | "not-as-read" => target("urdf").0,
+            _ => target("mjcf").0,
+        };
+        let ends = ["toml", "urdf"].map(|end| format!("{code}.{end}"));
+        let name = ends.iter().find(|name| folder.join(name).exists()).unwrap_or_else(|| panic!("no file for {code}"));
+        let source = Source::new(name, std::fs::read_to_string(folder.join(name)).expect("it is a text"));
+        let mut said = Diagnostics::new();
+        let text = convert(&source, format, ConvertOptions::default(), &mut said);
+        assert_eq!(text.is_none(), said.has_errors(), "{code}: {said}");
+        assert!(said.iter().any(|d| d.code == *code), "{code}: not said, but\n{said}");
+        let path = folder.join(format!("{code}.txt"));
+        if std::env::var_os("UPDATE_EXPECTED").is_some() {
+            std::fs::write(&path, said.render()).expect("the folder of messages can be written");
+        }
+        assert_eq!(std::fs::read_to_string(&path).unwrap_or_default(), said.render(), "{code}");
+    }
+}
+
+/// What is written is compared with what was meant: a robot that differs in one number, one name or one place is told.
+#[test]
+fn the_comparison_finds_what_differs() {
+    let robot = arm(
+        "origin = { xyz = [0.1, 0.2, 0.3], rpy = [0.1, 0.2, 0.3] }\nlimits = { velocity = 3.0, effort = 2.0 }\ndamping = 0.1\nfriction = 0.2\narmature = 0.3\n\
+         spring = { stiffness = 5.0, rest = 0.5 }",
+        "",
+        "[[link]]\nname = \"fore\"\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n[[joint]]\nname = \"elbow\"\nkind = \"continuous\"\nparent = \"upper\"\n\
+         child = \"fore\"\naxis = \"x\"\n[[coupling]]\njoint = \"elbow\"\nfollows = \"shoulder\"\nratio = 2.0\n[[frame]]\nname = \"tool\"\nlink = \"fore\"\nxyz = [0.1, 0, 0]",
+    );
+    let model = |text: &str| model_of(&Source::new("arm.toml", text), false);
+    let wanted = model(&robot);
+    assert_eq!(of_models(&wanted, &wanted), None);
+    for (old, new, part) in [
+        ("name = \"arm\"", "name = \"leg\"", "is called `leg`"),
+        ("[[link]]\nname = \"base\"", "gravity = [0, 0, -9.810001]\n[[link]]\nname = \"base\"", "gravity"),
+        ("mass = 2.0", "mass = 2.00000000000002", "the mass"),
+        ("com = [0.1, 0.0, 0.2]", "com = [0.1, 1e-14, 0.2]", "the centre of mass"),
+        ("[0.1, 0.2, 0.15]", "[0.1, 0.2, 0.15000000000001]", "the inertia"),
+        ("xyz = [0.1, 0.2, 0.3]", "xyz = [0.1, 0.20000000000001, 0.3]", "stands elsewhere"),
+        ("rpy = [0.1, 0.2, 0.3]", "rpy = [0.1, 0.20000000000001, 0.3]", "stands elsewhere"),
+        ("name = \"shoulder\"", "name = \"shouldr\"", "name, kind"),
+        ("velocity = 3.0", "velocity = 3.0000000000000004", "limits"),
+        ("damping = 0.1", "damping = 0.10000000000000002", "friction or spring"),
+        ("friction = 0.2", "friction = 0.20000000000000004", "friction or spring"),
+        ("armature = 0.3", "armature = 0.300000000000003", "rotor"),
+        ("rest = 0.5", "rest = 0.5000000000000001", "friction or spring"),
+        ("ratio = 2.0", "ratio = 2.0000000000000004", "couplings"),
+        ("name = \"tool\"", "name = \"tol\"", "no frame `tool`"),
+        ("xyz = [0.1, 0, 0]", "xyz = [0.1, 1e-14, 0]", "frame `tool`"),
+        ("kind = \"continuous\"\nparent = \"upper\"", "kind = \"prismatic\"\nparent = \"upper\"", "name, kind"),
+    ] {
+        assert_eq!(robot.matches(old).count(), 1, "{old}");
+        let text = robot.replace(old, new).replace(
+            "follows = \"shoulder\"",
+            if new.contains("shouldr") { "follows = \"shouldr\"" } else { "follows = \"shoulder\"" },
+        );
+        let difference = of_models(&wanted, &model(&text));
+        assert!(difference.as_ref().is_some_and(|difference| difference.contains(part)), "{old}: {difference:?}");
+    }
 }

@@ -2,12 +2,16 @@
 //!
 //! A row finds what a robot has of it, and takes it away, so that what is left is what the written file is compared with.
 
+use crate::description::geometry::principal_moments;
 use crate::description::{
-    AnchoredJoint, BaseKind, Description, JointVectors, Noted, Placement, WrittenJoint, WrittenLink,
+    AnchoredJoint, BaseKind, Description, JointVectors, Noted, Placement, WrittenInertial, WrittenJoint, WrittenLink,
 };
 use crate::diagnostic::Place;
 use std::collections::{HashMap, HashSet};
 use straightline_core::Dd;
+
+/// So much more than the sum of the others a principal moment is by rounding.
+const SLACK: f64 = 1.0 + 1e-12;
 
 /// Something that is lost, or said in another way.
 #[derive(Debug)]
@@ -35,6 +39,17 @@ pub enum LossWeight {
     Form,
 }
 
+impl LossWeight {
+    /// The code of the complaint that says it.
+    pub fn code(self) -> &'static str {
+        match self {
+            Dynamics => "not-in-format",
+            Data => "left-out",
+            Form => "said-otherwise",
+        }
+    }
+}
+
 use LossWeight::{Data, Dynamics, Form};
 
 /// Springs of joints.
@@ -55,7 +70,9 @@ pub static ROTORS: Loss = Loss {
     what: "rotors, gears and armatures",
     weight: Dynamics,
     then: "their inertia is left out",
-    find: |robot| of_joints(robot, |j| first([&j.drive.rotor_inertia, &j.drive.armature].into_iter().filter(|x| acts(x)))),
+    find: |robot| {
+        of_joints(robot, |j| first([&j.drive.rotor_inertia, &j.drive.armature].into_iter().filter(|x| acts(x))))
+    },
     remove: |robot| {
         for drive in robot.joints.iter_mut().map(|joint| &mut joint.drive) {
             (drive.rotor_inertia, drive.gear_ratio, drive.armature) = (None, None, None);
@@ -166,6 +183,25 @@ pub static BODIES_WITHOUT_MASS: Loss = Loss {
     remove: |_| (),
 };
 
+/// Tensors that belong to no body.
+pub static INERTIAS_OF_NO_BODY: Loss = Loss {
+    what: "inertias that no body has",
+    weight: Data,
+    then: "they are written, but MuJoCo itself refuses them unless `balanceinertia` or `boundinertia` changes them",
+    find: |robot| {
+        let is_of_none = |inertial: &&WrittenInertial| {
+            let [least, middle, greatest] = principal_moments(inertial.inertia.value);
+            inertial.mass.value > 0.0 && (least <= 0.0 || greatest > (least + middle) * SLACK)
+        };
+        let of = |link: &WrittenLink| {
+            let place = link.inertial.as_ref().filter(is_of_none)?.inertia.place.clone();
+            Some((of_link(&link.name).0, place))
+        };
+        robot.links.iter().filter_map(of).collect()
+    },
+    remove: |_| (),
+};
+
 /// The mass of the world.
 pub static MASS_OF_THE_WORLD: Loss = Loss {
     what: "the mass of the world",
@@ -271,7 +307,8 @@ pub static SKIPPED: Loss = Loss {
     weight: Form,
     then: "they are left out",
     find: |robot| {
-        let counted = |what: &str, count: usize| if count == 1 { what.to_string() } else { format!("{what} ({count})") };
+        let counted =
+            |what: &str, count: usize| if count == 1 { what.to_string() } else { format!("{what} ({count})") };
         robot.ignored.iter().map(|skipped| (counted(&skipped.what, skipped.count), skipped.place.clone())).collect()
     },
     remove: |robot| robot.ignored.clear(),
@@ -332,9 +369,8 @@ impl Placement {
     pub fn is_beside_frame(&self) -> bool {
         match self {
             Placement::Frames { .. } => false,
-            Placement::Vectors(JointVectors { r: arm, .. }) | Placement::Anchored(AnchoredJoint { anchor: arm, .. }) => {
-                arm.value != [0.0; 3]
-            }
+            Placement::Vectors(JointVectors { r: arm, .. })
+            | Placement::Anchored(AnchoredJoint { anchor: arm, .. }) => arm.value != [0.0; 3],
         }
     }
 }

@@ -7,8 +7,8 @@ use super::rotations::{self, Said};
 use super::{attribute, losses, number, numbers, word_of, FormatWriter, JointForm};
 use crate::description::angle::{self, ROUNDING};
 use crate::description::{
-    AnchoredJoint, BaseKind, Description, NamedFrame, Placement, Rotation, WrittenInertial, WrittenJoint,
-    WrittenLink, WrittenPose,
+    AnchoredJoint, BaseKind, Description, NamedFrame, Placement, Rotation, WrittenInertial, WrittenJoint, WrittenLink,
+    WrittenPose,
 };
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -21,6 +21,7 @@ pub static WRITER: FormatWriter = FormatWriter {
     word: "mjcf",
     extensions: &["xml", "mjcf"],
     joints: JointForm::Anywhere,
+    rotations: "roll, pitch and yaw in radians (`eulerseq=\"XYZ\"`) where IN has angles, quaternions otherwise",
     frames_are_links: false,
     losses: &[
         &losses::DRIVES,
@@ -29,6 +30,7 @@ pub static WRITER: FormatWriter = FormatWriter {
         &losses::ONE_SIDED_RANGES,
         &losses::ZERO_EFFORTS,
         &losses::BODIES_WITHOUT_MASS,
+        &losses::INERTIAS_OF_NO_BODY,
         &losses::ROTORS_AS_ARMATURES,
         &losses::MASS_OF_THE_WORLD,
         &losses::NAMES_OF_FIXED_JOINTS,
@@ -74,8 +76,7 @@ enum Step<'a> {
 
 impl<'a> Bodies<'a> {
     fn of(robot: &'a Description) -> Bodies<'a> {
-        let mut bodies =
-            Bodies { robot, links: HashMap::new(), joints: HashMap::new(), frames: HashMap::new() };
+        let mut bodies = Bodies { robot, links: HashMap::new(), joints: HashMap::new(), frames: HashMap::new() };
         for link in &robot.links {
             bodies.links.insert(&link.name.value, link);
         }

@@ -3,8 +3,8 @@
 //! A writer takes a [`Description`] whose joints all stand as its format says it ([`JointForm`]), and that has nothing left which the format
 //! cannot say ([`losses`]). Numbers are the shortest that read back to the same f64.
 
-pub mod losses;
 mod drives;
+pub mod losses;
 pub(super) mod mjcf;
 mod rotations;
 pub(super) mod toml;
@@ -25,6 +25,8 @@ pub struct FormatWriter {
     pub extensions: &'static [&'static str],
     /// How joints stand in it.
     pub joints: JointForm,
+    /// How it says rotations, for who reads about it.
+    pub rotations: &'static str,
     /// Whether links are all the frames that it has.
     pub frames_are_links: bool,
     /// What it has no place for, or says in another way.

@@ -119,7 +119,8 @@ mod tests {
     /// By angles and by a quaternion, also where roll and yaw turn about one axis, or nearly.
     #[test]
     fn rotations_come_back() {
-        let some = [0.0, 1e-9, 0.3, -1.1, FRAC_PI_2, FRAC_PI_2 - 1e-9, FRAC_PI_2 - 3e-16, -FRAC_PI_2, FRAC_PI_3, 2.9, PI];
+        let some =
+            [0.0, 1e-9, 0.3, -1.1, FRAC_PI_2, FRAC_PI_2 - 1e-9, FRAC_PI_2 - 3e-16, -FRAC_PI_2, FRAC_PI_3, 2.9, PI];
         for roll in some {
             for pitch in some {
                 for yaw in some {

@@ -16,6 +16,7 @@ pub static WRITER: FormatWriter = FormatWriter {
     word: "toml",
     extensions: &["toml"],
     joints: JointForm::AtFrames,
+    rotations: "roll, pitch and yaw: in the unit of IN, or degrees if all are multiples of 30° or 45°, or radians",
     frames_are_links: false,
     losses: &[&losses::CARRIERS, &losses::JOINTS_BESIDE_FRAMES, &losses::SKIPPED],
     floats_by_option: false,
@@ -181,7 +182,8 @@ fn of_flexible(flexible: &Flexible) -> String {
         Bending::None => {}
         Bending::Round(stiffness) => entries.push(format!("bending = {}", number(stiffness.value))),
         Bending::About(axes) => {
-            let about: Vec<String> = ["x", "y", "z"].into_iter().zip(axes).filter_map(|(key, x)| entry(key, x)).collect();
+            let about: Vec<String> =
+                ["x", "y", "z"].into_iter().zip(axes).filter_map(|(key, x)| entry(key, x)).collect();
             entries.push(format!("bending = {{ {} }}", about.join(", ")));
         }
     }

@@ -12,6 +12,7 @@ pub static WRITER: FormatWriter = FormatWriter {
     word: "urdf",
     extensions: &["urdf"],
     joints: JointForm::AtFrames,
+    rotations: "roll, pitch and yaw in radians",
     frames_are_links: true,
     losses: &[
         &losses::SPRINGS,
@@ -37,7 +38,11 @@ fn text(robot: &Description) -> String {
         match &link.inertial {
             None => _ = writeln!(out, "  <link{name}/>"),
             Some(inertial) => {
-                _ = writeln!(out, "  <link{name}>\n    <inertial>\n{}    </inertial>\n  </link>", of_inertial(inertial));
+                _ = writeln!(
+                    out,
+                    "  <link{name}>\n    <inertial>\n{}    </inertial>\n  </link>",
+                    of_inertial(inertial)
+                );
             }
         }
     }
