@@ -1,12 +1,12 @@
 //! The command line, and what it says in the library's terms.
 
+use crate::convert::ConvertArguments;
 use crate::given::{possible, Given};
 use clap::builder::TypedValueParser;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use straightline_codegen::convert::written_formats;
 use straightline_codegen::description::names_of_formats;
 use straightline_codegen::emit::package::PACKAGES;
 use straightline_codegen::identifier::is_prefix;
@@ -16,7 +16,7 @@ use straightline_codegen::Function;
 
 pub use crate::motion::{Analyze, Simulate};
 
-const EXIT_CODES: &str = "\
+pub const EXIT_CODES: &str = "\
 Exit codes:
   0  done
   1  the robot file is wrong, or a check failed
@@ -72,17 +72,7 @@ Examples:
 {EXIT_CODES}"))]
     Check(CheckArguments),
     /// Write a robot file in another format
-    #[command(after_help = format!("\
-The format follows from the name of OUT, or from --to. Before anything is written the text is read back and compared with the robot:
-joints and their order, limits, effects, couplings, frames, masses and poses. What the other format has no place for is listed; where the
-robot would move in another way that is an error, and with --lossy a warning (codegen/CONVERT.md).
-
-Examples:
-  straightline convert panda.urdf panda.xml
-  straightline convert solo12.urdf solo12.toml --floating-base
-  straightline convert scene.xml robot.urdf --lossy
-
-{EXIT_CODES}"))]
+    #[command(after_help = crate::convert::help())]
     Convert(ConvertArguments),
     /// Compare the generated program with an independent formulation of the dynamics, on random states
     #[command(after_help = format!("\
@@ -251,27 +241,6 @@ pub struct CheckArguments {
 }
 
 #[derive(Debug, Args)]
-pub struct ConvertArguments {
-    #[arg(value_name = "IN", help = robot_file())]
-    pub robot: PathBuf,
-    /// Where to write
-    #[arg(value_name = "OUT")]
-    pub output: PathBuf,
-    /// The format [default: that of OUT by its name]
-    #[arg(long, value_name = "FORMAT", value_parser = formats())]
-    pub to: Option<String>,
-    /// Leave out what the format has no place for, with a warning, also where the robot then moves in another way
-    #[arg(long)]
-    pub lossy: bool,
-    /// The root link moves freely in the world
-    #[arg(long)]
-    pub floating_base: bool,
-    /// Say errors alone
-    #[arg(short, long)]
-    pub quiet: bool,
-}
-
-#[derive(Debug, Args)]
 pub struct Verify {
     #[arg(help = robot_file())]
     pub robot: PathBuf,
@@ -315,11 +284,6 @@ pub struct Export {
     pub program: ProgramArgs,
     #[command(flatten)]
     pub model: ModelArgs,
-}
-
-/// The formats that are written.
-fn formats() -> impl TypedValueParser<Value = String> {
-    possible(written_formats().map(|(format, writer)| (writer.word, format.name)).collect())
 }
 
 /// The kinds of packages.

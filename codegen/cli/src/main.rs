@@ -6,6 +6,7 @@
 mod arguments;
 #[cfg(feature = "simulation")]
 mod contact;
+mod convert;
 #[cfg(feature = "simulation")]
 mod figures;
 #[cfg_attr(not(feature = "simulation"), allow(dead_code))]
@@ -25,8 +26,7 @@ mod print;
 mod search;
 
 use arguments::{
-    CheckArguments, CliCommand, CommandLine, ConvertArguments, Export, Generate, ModelArgs, ProgramArgs,
-    ReportArguments, Verify,
+    CheckArguments, CliCommand, CommandLine, Export, Generate, ModelArgs, ProgramArgs, ReportArguments, Verify,
 };
 use files::read;
 use std::io;
@@ -34,9 +34,6 @@ use std::path::Path;
 use std::process::ExitCode;
 use straightline_cli::html;
 use straightline_codegen::compile::{checked_package, compile, explain};
-use straightline_codegen::convert::{convert, format_of_path, format_of_word, written_formats, ConvertOptions};
-use straightline_codegen::description::write::FormatWriter;
-use straightline_codegen::diagnostic::wording::one_of;
 use straightline_codegen::diagnostic::{self, codes, Diagnostics, Severity, Source};
 use straightline_codegen::emit::c99::C99_SOURCE;
 use straightline_codegen::emit::package::PACKAGES;
@@ -69,7 +66,7 @@ fn main() -> ExitCode {
         CliCommand::Generate(a) => generate(&a),
         CliCommand::Report(a) => report(&a),
         CliCommand::Check(a) => check(&a),
-        CliCommand::Convert(a) => convert_file(&a),
+        CliCommand::Convert(a) => convert::convert_file(&a),
         CliCommand::Verify(a) => verify(&a),
         CliCommand::Export(a) => export(&a),
         CliCommand::Simulate(a) => motion::simulate(&a),
@@ -187,25 +184,6 @@ fn check(a: &CheckArguments) -> Result<(), CommandFailure> {
         true => Err(CommandFailure::Input),
         false => Ok(()),
     }
-}
-
-fn convert_file(a: &ConvertArguments) -> Result<(), CommandFailure> {
-    let source = read(&a.robot)?;
-    let output = a.output.display().to_string();
-    let format = a.to.as_deref().map_or_else(|| format_of_path(&output), format_of_word);
-    let Some(format) = format else {
-        let named = |(_, writer): (_, &FormatWriter)| writer.extensions.iter().map(|end| format!("`.{end}`"));
-        let ends: Vec<String> = written_formats().flat_map(named).collect();
-        let help = format!("let it end in {}, or give `--to`", one_of(&ends));
-        return Err(print::failure_with(format!("{output}: the name says no format"), &[help]));
-    };
-    let mut said = Diagnostics::new();
-    let options = ConvertOptions { floating_base: a.floating_base, lossy: a.lossy };
-    let text = convert(&source, format, options, &mut said);
-    model::finish(&mut said);
-    print::diagnostics(&said, Severity::Note);
-    let Some(text) = text else { return Err(CommandFailure::Input) };
-    files::write(&a.output, &text)
 }
 
 fn verify(a: &Verify) -> Result<(), CommandFailure> {

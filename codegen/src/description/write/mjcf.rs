@@ -69,7 +69,7 @@ struct Bodies<'a> {
 }
 
 /// What is still to be written: a body with the joints that move it, the outermost first, or the end of an element.
-enum Step<'a> {
+enum BodyStep<'a> {
     Body(&'a WrittenLink, Vec<&'a WrittenJoint>),
     End(&'static str),
 }
@@ -99,16 +99,16 @@ impl<'a> Bodies<'a> {
                 self.add_sites(root, 2, &mut out);
                 open.extend(self.on(root));
             }
-            false => open.push(Step::Body(root, Vec::new())),
+            false => open.push(BodyStep::Body(root, Vec::new())),
         }
         let mut depth = 2;
         while let Some(step) = open.pop() {
             match step {
-                Step::End(element) => {
+                BodyStep::End(element) => {
                     depth -= 1;
                     _ = writeln!(out, "{}</{element}>", indent(depth));
                 }
-                Step::Body(link, joints) => {
+                BodyStep::Body(link, joints) => {
                     let element = element_of(link, &joints);
                     let pose = joints.first().map_or(String::new(), |joint| pose(origin_of(joint)));
                     let name = match element {
@@ -125,7 +125,7 @@ impl<'a> Bodies<'a> {
                         _ = writeln!(out, "{}<inertial{}/>", indent(depth), of_inertial(inertial));
                     }
                     self.add_sites(link, depth, &mut out);
-                    open.push(Step::End(element));
+                    open.push(BodyStep::End(element));
                     open.extend(self.on(link));
                 }
             }
@@ -134,7 +134,7 @@ impl<'a> Bodies<'a> {
     }
 
     /// The bodies on a link, the first one last. Links in between that only carry joints are left out.
-    fn on(&self, link: &'a WrittenLink) -> Vec<Step<'a>> {
+    fn on(&self, link: &'a WrittenLink) -> Vec<BodyStep<'a>> {
         let mut steps = Vec::new();
         for &first in self.joints.get(link.name.value.as_str()).into_iter().flatten().rev() {
             let mut joints = vec![first];
@@ -144,7 +144,7 @@ impl<'a> Bodies<'a> {
                 last = next;
             }
             if let Some(child) = self.links.get(last.child.value.as_str()) {
-                steps.push(Step::Body(child, joints));
+                steps.push(BodyStep::Body(child, joints));
             }
         }
         steps
