@@ -5,7 +5,7 @@ use crate::given::possible;
 use crate::{files, print, CommandFailure};
 use clap::builder::TypedValueParser;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use straightline_codegen::convert::{convert, format_of_path, format_of_word, written_formats, ConvertOptions};
 use straightline_codegen::description::write::FormatWriter;
 use straightline_codegen::diagnostic::wording::one_of;
@@ -72,5 +72,7 @@ pub fn convert_file(a: &ConvertArguments) -> Result<(), CommandFailure> {
     model::finish(&mut said);
     print::diagnostics(&said, Severity::Note);
     let Some(text) = text else { return Err(CommandFailure::Input) };
+    // what the file includes was read, too
+    said.sources().for_each(|source| files::note(Path::new(source.path())));
     files::write(&a.output, &text)
 }

@@ -1,7 +1,7 @@
 //! Whether a text that was written is the robot that was to be written.
 
 use crate::description::write::FormatWriter;
-use crate::description::{self, BaseKind, Description, FileFormat};
+use crate::description::{self, Description, FileFormat};
 use crate::diagnostic::{Diagnostics, Severity, Source};
 use crate::model::{self, ModelOptions};
 use straightline_core::model::{Body, Frame, Model};
@@ -20,8 +20,7 @@ pub fn difference(robot: &Description, text: &str, format: &FileFormat, writer: 
     if let Some(read) = read.as_ref().filter(|read| read.format != format) {
         return Some(format!("it is read as {}", read.format.name));
     }
-    let floats = robot.base.as_ref().is_some_and(|base| base.value == BaseKind::Floating);
-    let options = ModelOptions { floating_base: floats && writer.floats_by_option, ..ModelOptions::default() };
+    let options = ModelOptions { floating_base: robot.floats() && writer.floats_by_option, ..ModelOptions::default() };
     let model = read.as_ref().and_then(|read| model::build(read, &options, &mut said));
     let (Some(read), Some(model)) = (read, model) else {
         let error = said.iter().find(|complaint| complaint.severity == Severity::Error);

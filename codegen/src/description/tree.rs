@@ -71,6 +71,11 @@ impl Description {
         self.links.iter().find(|link| link.name.value == name)
     }
 
+    /// Whether the file says that the base floats.
+    pub fn floats(&self) -> bool {
+        self.base.as_ref().is_some_and(|base| base.value == BaseKind::Floating)
+    }
+
     /// The link that no joint moves, the first of several.
     pub fn root(&self) -> Option<&WrittenLink> {
         let moved: HashSet<&str> = self.joints.iter().map(|joint| joint.child.value.as_str()).collect();

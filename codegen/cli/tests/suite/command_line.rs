@@ -286,6 +286,14 @@ fn convert_writes_the_same_robot_or_nothing() {
     assert_eq!(straightline(&["convert", ARM, &path("arm.txt"), "--to", "mjcf", "-q"]).code, 0);
     assert_eq!(straightline(&["convert", ARM, &path("arm.txt"), "--to", "sdif"]).code, 2);
     assert_eq!(straightline(&["convert", "nowhere.urdf", &path("arm.xml")]).code, 3);
+    // what a file includes is read, too
+    let (whole, part) = (path("whole.xml"), path("part.xml"));
+    let body = "<body><joint/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/></body>";
+    fs::write(&whole, "<mujoco><worldbody><include file=\"part.xml\"/></worldbody></mujoco>").unwrap();
+    fs::write(&part, format!("<mujocoinclude>{body}</mujocoinclude>")).unwrap();
+    let over = straightline(&["convert", &whole, &part]);
+    assert!(over.code == 3 && over.err.contains("this is the input"), "{}", over.err);
+    assert!(fs::read_to_string(&part).unwrap().starts_with("<mujocoinclude>"));
 }
 
 #[test]

@@ -173,7 +173,8 @@ pub static BODIES_WITHOUT_MASS: Loss = Loss {
     find: |robot| {
         let massive = with_mass(robot);
         let moving = robot.joints.iter().filter(|joint| joint.kind.value.between_links().is_some());
-        let moved: HashSet<&str> = moving.map(|joint| joint.child.value.as_str()).collect();
+        let mut moved: HashSet<&str> = moving.map(|joint| joint.child.value.as_str()).collect();
+        moved.extend(robot.root().filter(|_| robot.floats()).map(|root| root.name.value.as_str()));
         let is_bare = |link: &&WrittenLink| {
             let name = link.name.value.as_str();
             moved.contains(name) && !massive.contains(name) && !link.is_carrier
@@ -345,8 +346,7 @@ fn is_one_sided(joint: &WrittenJoint) -> bool {
 
 /// The root of a robot that stands on the ground, where it is the world itself.
 fn world_of(robot: &Description) -> Option<&WrittenLink> {
-    let floats = robot.base.as_ref().is_some_and(|base| base.value == BaseKind::Floating);
-    robot.root().filter(|root| !floats && root.name.value == "world")
+    robot.root().filter(|root| !robot.floats() && root.name.value == "world")
 }
 
 /// The links that have mass, or on which something is fixed that has.

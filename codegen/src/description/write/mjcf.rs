@@ -7,7 +7,7 @@ use super::rotations::{self, Said};
 use super::{attribute, losses, number, numbers, word_of, FormatWriter, JointForm};
 use crate::description::angle::{self, ROUNDING};
 use crate::description::{
-    AnchoredJoint, BaseKind, Description, NamedFrame, Placement, Rotation, WrittenInertial, WrittenJoint, WrittenLink,
+    AnchoredJoint, Description, NamedFrame, Placement, Rotation, WrittenInertial, WrittenJoint, WrittenLink,
     WrittenPose,
 };
 use std::collections::HashMap;
@@ -92,7 +92,7 @@ impl<'a> Bodies<'a> {
     fn text(&self) -> String {
         let mut out = "  <worldbody>\n".to_string();
         let Some(root) = self.robot.root() else { return out + "  </worldbody>\n" };
-        let floats = self.robot.base.as_ref().is_some_and(|base| base.value == BaseKind::Floating);
+        let floats = self.robot.floats();
         let mut open = Vec::new();
         match root.name.value == "world" && !floats {
             true => {
