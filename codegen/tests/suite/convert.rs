@@ -490,3 +490,35 @@ fn the_comparison_finds_what_differs() {
         assert!(difference.as_ref().is_some_and(|difference| difference.contains(part)), "{old}: {difference:?}");
     }
 }
+
+/// All keys of drives and of flexible links, as far as one robot can have them.
+#[test]
+fn drives_and_links_that_bend_come_back() {
+    let elbow = "[[link]]\nname = \"fore\"\nmass = 1.0\ncom = [0.2, 0, 0]\ninertia = [0.01, 0.1, 0.1]\n\
+                 flexible = { from = [0.01, 0, 0], to = [0.5, 0, 0], segments = 2, bending = { y = 40.0, z = 30.0 }, torsion = 7.0, damping = 0.001 }\n\
+                 [[joint]]\nname = \"elbow\"\nkind = \"continuous\"\nparent = \"upper\"\nchild = \"fore\"\naxis = \"x\"\n";
+    let motor = "torque_constant = 0.05, emf_constant = 0.06, resistance = 1.2, inductance = 5e-4, rotor_inertia = 1e-5, friction = 2e-5";
+    let thermal = "{ winding_housing = 2.0, housing_ambient = 3.0, winding_time = 20.0, housing_time = 900.0, ambient = 20.0, limit = 120.0 }";
+    let first = format!(
+        "[[drive]]\njoint = \"shoulder\"\nratio = -100.0\nmotor = {{ {motor}, thermal = {thermal} }}\nefficiency = {{ forward = 0.8, backward = 0.65 }}\n\
+         limits = {{ input = 24.0, current = 6.0, continuous_current = 3.0, speed = 500.0 }}\n"
+    );
+    let stages = "[{ ratio = 2.5, stiffness = 90.0, damping = 0.01, input_inertia = 2e-6, output_inertia = 8e-6, efficiency = 0.9 }, { ratio = 100.0, input_inertia = 1e-5 }]";
+    let second = format!(
+        "[[drive]]\nname = \"both\"\njoints = {{ elbow = 50.0, shoulder = 20.0 }}\nmotor = {{ torque_constant = 0.05, resistance = 1.2, rotor_inertia = 1e-5 }}\n\
+         stages = {stages}\nrotor = {{ link = \"upper\", axis = [0.0, 0.6, 0.8], inertia = 2e-5 }}\n"
+    );
+    let third = "[[drive]]\nname = \"hydraulic\"\njoint = \"elbow\"\nactuator = { C = [[0, 1], [0, -2]], f = [0, -10], d = [0, 5], T = [0, 1], position = [1, 0] }\n";
+    for drives in [vec![first.as_str()], vec![&second], vec![third], vec![&first, third]] {
+        let source = Source::new("arm.toml", arm("", "", &format!("{elbow}{}", drives.concat())));
+        let (text, said) = converted(&source, target("toml"), ConvertOptions::default());
+        let text = text.unwrap_or_else(|| panic!("{said}\n{}", source.text()));
+        assert_eq!(model_of(&source, false).drives, model_of(&text, false).drives);
+        assert!(!said.iter().any(|d| CODES.contains(&d.code)), "{said}");
+    }
+    for bends in ["{ to = [0, 0, 0.5], bending = 120.0 }", "{ to = [0.1, 0, 0.5], torsion = 9.0, segments = 3 }"] {
+        let source = Source::new("arm.toml", arm("", &format!("flexible = {bends}"), ""));
+        let (text, said) = converted(&source, target("toml"), ConvertOptions::default());
+        assert!(text.is_some(), "{said}");
+    }
+}
