@@ -19,6 +19,7 @@ pub mod table;
 mod toml;
 mod tree;
 mod urdf;
+pub mod write;
 mod written_pose;
 mod xml;
 
@@ -50,6 +51,8 @@ pub struct FileFormat {
     pub limits: &'static str,
     /// Reads a file. Complaints go to the diagnostics; `None` if nothing of the robot could be read.
     pub read: fn(&Source, &mut Diagnostics) -> Option<Description>,
+    /// Writes a file; `None`: robots are not written in this format.
+    pub write: Option<&'static write::FormatWriter>,
 }
 
 impl PartialEq for FileFormat {

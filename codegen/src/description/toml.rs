@@ -43,7 +43,7 @@ const JOINT: &[&str] = &[
 ];
 const POSE: &[&str] = &["xyz", "rpy", "rpy_rad", "rpy_deg", "rpy_quarter_turns", "rpy_turns"];
 const FRAME: &[&str] = &["name", "link", "xyz", "rpy", "rpy_rad", "rpy_deg", "rpy_quarter_turns", "rpy_turns"];
-const AXES: [(&str, [f64; 3]); 6] = [
+pub(super) const AXES: [(&str, [f64; 3]); 6] = [
     ("x", [1.0, 0.0, 0.0]),
     ("y", [0.0, 1.0, 0.0]),
     ("z", [0.0, 0.0, 1.0]),
@@ -60,6 +60,7 @@ pub(super) const FORMAT: FileFormat = FileFormat {
     dialect: Dialect::JointFrames,
     limits: "write `limits = { lower = ..., upper = ... }`, or kind `continuous`",
     read,
+    write: Some(&super::write::toml::WRITER),
 };
 
 fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {

@@ -5,6 +5,7 @@
 use super::composite::{CompositeKind, WrittenComposite, COMPOSITES};
 use super::{drives, flexible, Angle, FileFormat, Noted, Rotation, WrittenPose};
 use crate::diagnostic::Place;
+use std::collections::HashSet;
 use straightline_core::joint::{self, Dialect, JointKind, Measure};
 use straightline_core::spatial::Sym3;
 
@@ -68,6 +69,17 @@ impl Description {
     /// The link of a name.
     pub fn link(&self, name: &str) -> Option<&WrittenLink> {
         self.links.iter().find(|link| link.name.value == name)
+    }
+
+    /// Whether the file says that the base floats.
+    pub fn floats(&self) -> bool {
+        self.base.as_ref().is_some_and(|base| base.value == BaseKind::Floating)
+    }
+
+    /// The link that no joint moves, the first of several.
+    pub fn root(&self) -> Option<&WrittenLink> {
+        let moved: HashSet<&str> = self.joints.iter().map(|joint| joint.child.value.as_str()).collect();
+        self.links.iter().find(|link| !moved.contains(link.name.value.as_str()))
     }
 
     /// The joint of a name.

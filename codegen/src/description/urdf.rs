@@ -23,6 +23,7 @@ pub(super) const FORMAT: FileFormat = FileFormat {
     dialect: Dialect::Urdf,
     limits: "write `<limit lower=\"...\" upper=\"...\" velocity=\"...\" effort=\"...\"/>`, or type `continuous`",
     read,
+    write: Some(&super::write::urdf::WRITER),
 };
 
 fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {

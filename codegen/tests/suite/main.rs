@@ -19,6 +19,7 @@ mod composites;
 mod contact;
 mod contact_compiled;
 mod contact_derivatives;
+mod convert;
 mod derivative_bounds;
 mod effects;
 mod elastic_inverse;

@@ -39,6 +39,7 @@ pub(super) const FORMAT: FileFormat = FileFormat {
     dialect: Dialect::Mjcf,
     limits: "write `range=\"...\"`, or `limited=\"false\"`",
     read,
+    write: Some(&super::write::mjcf::WRITER),
 };
 
 /// Whether the first element of a text is `mujoco` or `mujocoinclude`.
