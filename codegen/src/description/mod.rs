@@ -8,6 +8,7 @@ pub(crate) mod angle;
 mod chapter;
 pub mod composite;
 mod couplings;
+mod dh;
 pub mod drives;
 pub mod flexible;
 pub(crate) mod geometry;

@@ -244,6 +244,11 @@ struct Printer<'a> {
 }
 
 impl Printer<'_> {
+    /// The model that a joint stands in: one that sees both of its links.
+    fn model_of_joint(&self, k: usize) -> usize {
+        self.model(k + 1).min(self.model(self.robot.joints[k].parent))
+    }
+
     /// The model that a link stands in.
     fn model(&self, link: usize) -> usize {
         usize::from(link >= self.inner)
@@ -265,7 +270,7 @@ impl Printer<'_> {
         let candidates = [
             is_there.then(|| self.seen(model, self.model(link), format!("l{link}"))).flatten().map(|name| (name, self.robot.links[link].frame)),
             (is_there && link > 0)
-                .then(|| self.seen(model, self.model(link), format!("j{}", link - 1)))
+                .then(|| self.seen(model, self.model_of_joint(link - 1), format!("j{}", link - 1)))
                 .flatten()
                 .map(|name| (name, self.robot.joints[link - 1].frame)),
             Some(("__model__".to_string(), self.models[model])),
@@ -327,7 +332,7 @@ impl Printer<'_> {
     fn joint(&mut self, k: usize) -> String {
         let robot = self.robot;
         let joint = &robot.joints[k];
-        let (child, model) = (k + 1, self.model(k + 1).min(self.model(joint.parent)));
+        let (child, model) = (k + 1, self.model_of_joint(k));
         let (kind, further) = match joint.kind {
             "thread" => ("screw", "<thread_pitch>8</thread_pitch>"),
             "screw" => ("screw", "<thread_pitch>-3</thread_pitch><screw_thread_pitch>0.25</screw_thread_pitch>"),
@@ -360,7 +365,7 @@ impl Printer<'_> {
         );
         let mimic = match robot.follows {
             Some([ratio, offset, reference]) if child == robot.joints.len() => {
-                let leader = self.seen(model, self.model(1).min(self.model(0)), "j0".to_string()).expect("it stands outside");
+                let leader = self.seen(model, self.model_of_joint(0), "j0".to_string()).expect("it stands outside");
                 format!(
                     "<mimic joint='{leader}'><multiplier>{ratio:?}</multiplier><offset>{offset:?}</offset><reference>{reference:?}</reference></mimic>"
                 )
@@ -392,9 +397,8 @@ impl Printer<'_> {
             texts[self.model(k)].push(link);
         }
         for k in 0..n - 1 {
-            let model = self.model(k + 1).min(self.model(self.robot.joints[k].parent));
             let joint = self.joint(k);
-            texts[model].push(joint);
+            texts[self.model_of_joint(k)].push(joint);
         }
         for (frame, &(pose, link)) in self.robot.frames.iter().enumerate() {
             let on = self.seen(0, self.model(link), format!("l{link}")).expect("an outer model sees all");
