@@ -254,7 +254,7 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
         for start in 0..next.len() {
             let mut path = Vec::new();
             let mut at = start;
-            while !is_known[at] && next[at] != at {
+            while !is_known[at] && !self.is_carrying(at) {
                 is_known[at] = true;
                 path.push(at);
                 at = next[at];
@@ -272,6 +272,12 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
             self.frames[at].body = body;
             path.into_iter().for_each(|frame| self.frames[frame].body = body);
         }
+    }
+
+    /// Whether a frame is a link or the world, which are attached to nothing.
+    fn is_carrying(&self, frame: usize) -> bool {
+        let SdfFrame { kind, is_static, .. } = self.frames[frame];
+        frame == WORLD || (kind == FrameKind::Link && !is_static)
     }
 
     /// What a frame is attached to; itself if it is a link or the world.

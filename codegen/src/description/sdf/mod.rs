@@ -79,6 +79,8 @@ fn read_document(mut reader: FileReader, document: &Document) -> Option<Descript
         return None;
     }
     let version = version(&mut reader, root)?;
+    // several frames can ask for one name
+    reader.said = Some(HashSet::new());
     let name = reader.value("robot".to_string(), &tag(root));
     let mut sdf = Sdf {
         reader,
