@@ -511,3 +511,140 @@ fn random_robots_are_those_that_their_poses_make() {
         }
     }
 }
+
+// --- what the specification says, in single robots ---
+
+const INERTIAL: &str = "<inertial><pose>0.1 -0.2 0.3 0 0 0</pose><mass>2.5</mass><inertia><ixx>0.3</ixx><ixy>0.01</ixy><ixz>-0.02</ixz>
+    <iyy>0.4</iyy><iyz>0.03</iyz><izz>0.5</izz></inertia></inertial>";
+
+fn link(name: &str, pose: &str) -> String {
+    format!("<link name='{name}'>{pose}{INERTIAL}</link>")
+}
+
+fn joint(name: &str, kind: &str, [parent, child]: [&str; 2], further: &str) -> String {
+    format!("<joint name='{name}' type='{kind}'><parent>{parent}</parent><child>{child}</child>{further}</joint>")
+}
+
+fn axis(attribute: &str, xyz: &str, further: &str) -> String {
+    format!("<axis><xyz{attribute}>{xyz}</xyz>{further}</axis>")
+}
+
+fn sdf(version: &str, model: &str) -> String {
+    format!("<sdf version='{version}'><model name='robot'>{model}</model></sdf>")
+}
+
+fn described(text: &str) -> Description {
+    let mut diagnostics = Diagnostics::new();
+    let description = description::read(&Source::new("robot.sdf", text), &mut diagnostics);
+    assert!(!diagnostics.has_errors(), "{diagnostics}\n{text}");
+    description.expect("a text without errors is read")
+}
+
+fn read(text: &str) -> Model<Dd> {
+    model_of("robot.sdf", text, &ModelOptions::default())
+}
+
+#[test]
+fn joints_of_links_that_stand_at_their_joints_need_no_links_between() {
+    let pose = "<pose relative_to='a'>0 0 1 0.5 0 0</pose>";
+    let model = link("a", "") + &link("b", pose) + &joint("j", "revolute", ["a", "b"], &axis("", "1 0 0", "<limit><lower>-1</lower></limit>"));
+    let description = described(&sdf("1.9", &model));
+    assert_eq!(description.links.len(), 2);
+    let only = description.joint("j").expect("it is read");
+    assert!(only.kind.value.has_range && only.limits.upper.is_none());
+    assert_eq!(description.base.map(|base| base.value), Some(description::BaseKind::Floating));
+}
+
+#[test]
+fn what_moves_with_the_world_stands_on_it() {
+    let arm = link("arm", "<pose>0 0 1 0 0 0</pose>");
+    let turn = |parent: &str, pose: &str| joint("turn", "continuous", [parent, "arm"], &(pose.to_string() + &axis("", "0 1 0", "")));
+    let pose = "<pose>1 2 3 0.3 0.2 0.1</pose>";
+    let whole = |models: String| format!("<sdf version='1.10'><world name='w'>{models}</world></sdf>");
+    let alone = format!("<model name='robot'>{pose}{arm}{}</model>", turn("world", ""));
+    // a table that does not move, on which the arm stands, and a link that a joint fixes to the world
+    let table = format!("<static>1</static>{}", link("top", "<pose>5 5 5 0 0 0</pose>"));
+    let on_table = format!("<model name='robot'>{pose}<model name='table'>{table}</model>{arm}{}</model>", turn("table::top", ""));
+    let welded = format!(
+        "<model name='robot'>{pose}{}{arm}{}{}</model>",
+        link("top", ""),
+        joint("weld", "fixed", ["world", "top"], ""),
+        turn("top", "")
+    );
+    let from_world = format!(
+        "<model name='robot'>{pose}{arm}</model>{}",
+        joint("turn", "continuous", ["world", "robot::arm"], &axis("", "0 1 0", ""))
+    );
+    let plain = read(&whole(alone));
+    assert_eq!(plain.gravity.to_array().map(|x| x.to_f64()), [0.0, 0.0, -9.8]);
+    for other in [on_table, welded, from_world] {
+        let other = read(&whole(other));
+        same(&plain, &other, 1e-30, "on the world");
+        let [a, b] = [&plain, &other].map(|model| model.frame("arm").expect("it is a link").clone());
+        let q = [Dd::from(0.7)];
+        assert_eq!(forward_kinematics(&plain, &q, &[&a]), forward_kinematics(&other, &q, &[&b]));
+    }
+}
+
+#[test]
+fn up_to_1_6_axes_can_be_those_of_the_model() {
+    let links = link("a", "") + &link("b", "<pose>0 0 1 0.5 0.25 0.125</pose>");
+    let robot = |version: &str, attribute: &str, flag: &str| {
+        let axis = axis(attribute, "0.6 0 0.8", flag);
+        read(&sdf(version, &(links.clone() + &joint("j", "revolute", ["a", "b"], &axis))))
+    };
+    let old = robot("1.6", "", "<use_parent_model_frame>true</use_parent_model_frame>");
+    same(&robot("1.8", " expressed_in='__model__'", ""), &old, 1e-30, "in the model's axes");
+    let in_joint = robot("1.6", "", "<use_parent_model_frame>false</use_parent_model_frame>");
+    same(&robot("1.8", "", ""), &in_joint, 1e-30, "in the joint's axes");
+    // where a name is that of a link and of a joint, it means the link
+    let both = links.clone() + &joint("b", "revolute", ["a", "b"], &axis("", "0.6 0 0.8", ""));
+    same(&robot("1.8", "", ""), &read(&sdf("1.6", &both)), 1e-30, "a joint with the name of its link");
+}
+
+#[test]
+fn a_screw_advances_along_its_axis_as_it_turns() {
+    let screw = |pitch: &str| {
+        let axis = pitch.to_string() + &axis("", "0 0 2", "");
+        let model = link("a", "") + &joint("j", "screw", ["world", "a"], &axis);
+        let model = read(&sdf("1.11", &model));
+        let tip = forward_kinematics(&model, &[Dd::from(TAU)], &[model.frame("a").expect("it is a link")]);
+        tip[0].translation.z.to_f64()
+    };
+    // a right-handed thread, a quarter of a metre a turn; a left-handed one, a radian a metre
+    assert_eq!(screw("<screw_thread_pitch>0.25</screw_thread_pitch>"), 0.25);
+    assert!((screw("<thread_pitch>1</thread_pitch>") + TAU).abs() < 1e-15);
+}
+
+#[test]
+fn a_gear_couples_the_two_joints_between_its_links() {
+    let model = ["ground", "motor", "arm"].map(|name| link(name, "")).concat()
+        + &joint("motor", "revolute", ["ground", "motor"], &axis("", "0 1 0", "")).replace("name='motor'", "name='in'")
+        + &joint("out", "continuous", ["ground", "arm"], &axis("", "0 -1 0", ""));
+    let gear = |axis: &str| {
+        let between = "<gearbox_reference_body>ground</gearbox_reference_body><gearbox_ratio>0.04</gearbox_ratio>";
+        joint("gear", "gearbox", ["motor", "arm"], &(between.to_string() + axis))
+    };
+    let of = |axes: &str| described(&sdf("1.6", &(model.clone() + &gear(axes)))).couplings.iter().map(|c| (c.joint.value.clone(), c.source.value.clone(), c.ratio.value)).collect::<Vec<_>>();
+    let along = axis("", "0 1 0", "") + &axis("", "0 1 0", "").replace("axis>", "axis2>");
+    // θ₂ = −0.04 θ₁, and the second joint turns the other way round
+    assert_eq!(of(&along), [("out".to_string(), "in".to_string(), 0.04)]);
+    let against = axis("", "0 1 0", "") + &axis("", "0 -1 0", "").replace("axis>", "axis2>");
+    assert_eq!(of(&against), [("out".to_string(), "in".to_string(), -0.04)]);
+    let across = axis("", "0 1 0", "") + &axis("", "1 0 0", "").replace("axis>", "axis2>");
+    let (none, diagnostics) = load(&Source::new("robot.sdf", sdf("1.6", &(model.clone() + &gear(&across)))), &ModelOptions::default());
+    assert!(none.is_none());
+    assert_eq!(diagnostics.iter().map(|d| d.code).collect::<Vec<_>>(), ["not-supported-yet"], "{diagnostics}");
+}
+
+#[test]
+fn limits_without_end_are_none() {
+    let limit = |limit: &str| {
+        let model = link("a", "") + &joint("j", "revolute", ["world", "a"], &axis("", "0 0 1", &format!("<limit>{limit}</limit>")));
+        let limits = read(&sdf("1.9", &model)).bodies[0].joint.limits;
+        [limits.lower, limits.upper, limits.velocity, limits.effort]
+    };
+    let inf = f64::INFINITY;
+    assert_eq!(limit("<lower>-1e16</lower><upper>1e+16</upper><effort>-1</effort><velocity>-1</velocity>"), [-inf, inf, inf, inf]);
+    assert_eq!(limit("<lower>-inf</lower><upper>2</upper><effort>3</effort><velocity>4</velocity>"), [-inf, 2.0, 4.0, 3.0]);
+}
