@@ -108,7 +108,8 @@ type D = Diagnostic;
 
 /// Bytes that are not UTF-8.
 pub fn not_utf8() -> D {
-    D::error("not-utf8", "the file is not UTF-8 text").help("save the file as UTF-8; is it TOML, URDF, SDF or MJCF at all?")
+    D::error("not-utf8", "the file is not UTF-8 text")
+        .help("save the file as UTF-8; is it TOML, URDF, SDF or MJCF at all?")
 }
 
 /// A file larger than the readers take.

@@ -30,7 +30,8 @@ struct Row {
 }
 
 fn rows(random: &mut Random) -> Vec<Row> {
-    let row = |random: &mut Random| Row { slides: random.below(3) == 0, numbers: [0; 4].map(|_| random.number().to_f64()) };
+    let row =
+        |random: &mut Random| Row { slides: random.below(3) == 0, numbers: [0; 4].map(|_| random.number().to_f64()) };
     (0..5).map(|_| row(random)).collect()
 }
 
@@ -74,7 +75,11 @@ fn frames_stand_where_the_matrices_of_the_rows_lead() {
                 for (i, row) in pose.iter().take(3).enumerate() {
                     let entries = [found.rotation.rows[i].as_slice(), &[found.translation.to_array()[i]]].concat();
                     for (x, y) in entries.iter().zip(row) {
-                        assert!((x.to_f64() - y).abs() < 1e-14, "seed {seed}, {convention}, link {k}: {} and {y}", x.to_f64());
+                        assert!(
+                            (x.to_f64() - y).abs() < 1e-14,
+                            "seed {seed}, {convention}, link {k}: {} and {y}",
+                            x.to_f64()
+                        );
                     }
                 }
             }
@@ -123,14 +128,7 @@ fn masses_are_those_of_links_in_their_frames() {
 #[test]
 fn the_puma_reaches_where_its_closed_form_says() {
     let (a2, a3, d3, d4) = (0.4318, 0.0203, 0.1245, 0.4318);
-    let rows = [
-        (0.0, 0, 0.0),
-        (0.0, -1, 0.0),
-        (a2, 0, d3),
-        (a3, -1, d4),
-        (0.0, 1, 0.0),
-        (0.0, -1, 0.0),
-    ];
+    let rows = [(0.0, 0, 0.0), (0.0, -1, 0.0), (a2, 0, d3), (a3, -1, d4), (0.0, 1, 0.0), (0.0, -1, 0.0)];
     let mut text = "[robot]\nname = \"puma\"\ndh = \"modified\"\n".to_string();
     for (a, alpha, d) in rows {
         text += &format!("[[dh]]\nkind = \"continuous\"\na = {a:?}\nalpha_quarter_turns = {alpha}\nd = {d:?}\nmass = 1\ninertia = [1, 1, 1]\n");
@@ -146,7 +144,9 @@ fn the_puma_reaches_where_its_closed_form_says() {
         assert!((found.to_f64() - expected).abs() < 1e-15, "{} and {expected}", found.to_f64());
     }
     // right angles are exact: a turn that is none costs nothing
-    let zeros = |body: usize| model.bodies[body].placement.rotation.rows.as_flattened().iter().filter(|x| **x == Dd::ZERO).count();
+    let zeros = |body: usize| {
+        model.bodies[body].placement.rotation.rows.as_flattened().iter().filter(|x| **x == Dd::ZERO).count()
+    };
     assert_eq!((0..6).map(zeros).collect::<Vec<_>>(), [6; 6]);
 }
 

@@ -138,7 +138,12 @@ impl Robot {
         let link = |random: &mut Random| {
             let [a, b, c] = [0; 3].map(|_| 0.05 + number(random, 1.0).abs());
             let moments = [b + c, a + c, a + b];
-            Link { frame: Pose::random(random), mass: 0.5 + number(random, 1.0).abs(), centre: Pose::random(random), moments }
+            Link {
+                frame: Pose::random(random),
+                mass: 0.5 + number(random, 1.0).abs(),
+                centre: Pose::random(random),
+                moments,
+            }
         };
         let joint = |random: &mut Random, child: usize| Joint {
             kind: KINDS[random.below(KINDS.len())],
@@ -219,12 +224,20 @@ impl Robot {
         }
         for (k, (pose, link)) in self.frames.iter().enumerate() {
             let pose = pose.within(own(*link));
-            let _ = writeln!(text, "[[frame]]\nname = \"f{k}\"\nlink = \"l{link}\"\nxyz = {:?}\nrpy = {:?}", pose.p, pose.rpy());
+            let _ = writeln!(
+                text,
+                "[[frame]]\nname = \"f{k}\"\nlink = \"l{link}\"\nxyz = {:?}\nrpy = {:?}",
+                pose.p,
+                pose.rpy()
+            );
         }
         if let Some([ratio, offset, reference]) = self.follows {
             let offset = offset - ratio * reference;
             let (last, first) = (self.joints.len() - 1, 0);
-            let _ = write!(text, "[[coupling]]\njoint = \"j{last}\"\nfollows = \"j{first}\"\nratio = {ratio:?}\noffset = {offset:?}\n");
+            let _ = write!(
+                text,
+                "[[coupling]]\njoint = \"j{last}\"\nfollows = \"j{first}\"\nratio = {ratio:?}\noffset = {offset:?}\n"
+            );
         }
         text
     }
@@ -268,7 +281,10 @@ impl Printer<'_> {
         let link = self.random.below(before.max(1));
         let is_there = before > 0 && (link > 0 || self.robot.is_floating);
         let candidates = [
-            is_there.then(|| self.seen(model, self.model(link), format!("l{link}"))).flatten().map(|name| (name, self.robot.links[link].frame)),
+            is_there
+                .then(|| self.seen(model, self.model(link), format!("l{link}")))
+                .flatten()
+                .map(|name| (name, self.robot.links[link].frame)),
             (is_there && link > 0)
                 .then(|| self.seen(model, self.model_of_joint(link - 1), format!("j{}", link - 1)))
                 .flatten()
@@ -315,10 +331,19 @@ impl Printer<'_> {
     }
 
     /// A direction in the axes of any frame.
-    fn axis(&mut self, name: &str, joint: &Joint, direction: [f64; 3], (model, k): (usize, usize), further: &str) -> String {
+    fn axis(
+        &mut self,
+        name: &str,
+        joint: &Joint,
+        direction: [f64; 3],
+        (model, k): (usize, usize),
+        further: &str,
+    ) -> String {
         let in_world = turned(joint.frame.r, direction);
         let (attribute, frame, flag) = match self.random.below(2) {
-            0 if self.is_old => (String::new(), self.models[model], "<use_parent_model_frame>1</use_parent_model_frame>"),
+            0 if self.is_old => {
+                (String::new(), self.models[model], "<use_parent_model_frame>1</use_parent_model_frame>")
+            }
             0 => {
                 let (name, frame) = self.reference(model, k + 2);
                 (format!(" expressed_in=\"{name}\""), frame, "")
@@ -338,9 +363,8 @@ impl Printer<'_> {
             "screw" => ("screw", "<thread_pitch>-3</thread_pitch><screw_thread_pitch>0.25</screw_thread_pitch>"),
             kind => (kind, ""),
         };
-        let mut ends = [joint.parent, child].map(|link| {
-            self.seen(model, self.model(link), format!("l{link}")).expect("an outer model sees all")
-        });
+        let mut ends = [joint.parent, child]
+            .map(|link| self.seen(model, self.model(link), format!("l{link}")).expect("an outer model sees all"));
         if joint.parent == 0 && !robot.is_floating {
             ends[0] = "world".to_string();
         }
@@ -355,7 +379,9 @@ impl Printer<'_> {
                 }
             }
         }
-        let reference = (is_renamed || self.is_said()).then(|| self.reference(model, child + 1)).filter(|(name, _)| !name.ends_with(&format!("j{k}")));
+        let reference = (is_renamed || self.is_said())
+            .then(|| self.reference(model, child + 1))
+            .filter(|(name, _)| !name.ends_with(&format!("j{k}")));
         let reference = reference.or_else(|| is_renamed.then(|| ("__model__".to_string(), self.models[model])));
         let pose = self.pose(joint.frame, reference, robot.links[child].frame);
         let [damping, friction, stiffness, rest] = joint.dynamics;
@@ -483,12 +509,20 @@ fn same(a: &Model<Dd>, b: &Model<Dd>, bound: f64, what: &str) {
 /// The joints of a model in the order of its coordinates, by the names that a file of the same robot gives them.
 fn order(model: &Model<Dd>, robot: &Robot, inner: usize) -> Vec<String> {
     let followers: Vec<usize> = model.couplings.iter().map(|coupling| coupling.body).collect();
-    let free = model.bodies.iter().enumerate().filter(|(id, body)| !followers.contains(id) && body.joint.name.starts_with('j'));
+    let free = model
+        .bodies
+        .iter()
+        .enumerate()
+        .filter(|(id, body)| !followers.contains(id) && body.joint.name.starts_with('j'));
     let mut bodies: Vec<_> = free.map(|(_, body)| body).collect();
     bodies.sort_by_key(|body| body.joint.iv);
     let named = |name: &String| {
         let k: usize = name[1..].split('_').next().and_then(|k| k.parse().ok()).expect("names are j and a number");
-        if robot.joints[k].parent >= inner { format!("limb::{name}") } else { name.clone() }
+        if robot.joints[k].parent >= inner {
+            format!("limb::{name}")
+        } else {
+            name.clone()
+        }
     };
     bodies.iter().map(|body| named(&body.joint.name)).collect()
 }
@@ -514,7 +548,8 @@ fn random_robots_are_those_that_their_poses_make() {
 
 // --- what the specification says, in single robots ---
 
-const INERTIAL: &str = "<inertial><pose>0.1 -0.2 0.3 0 0 0</pose><mass>2.5</mass><inertia><ixx>0.3</ixx><ixy>0.01</ixy><ixz>-0.02</ixz>
+const INERTIAL: &str =
+    "<inertial><pose>0.1 -0.2 0.3 0 0 0</pose><mass>2.5</mass><inertia><ixx>0.3</ixx><ixy>0.01</ixy><ixz>-0.02</ixz>
     <iyy>0.4</iyy><iyz>0.03</iyz><izz>0.5</izz></inertia></inertial>";
 
 fn link(name: &str, pose: &str) -> String {
@@ -547,7 +582,9 @@ fn read(text: &str) -> Model<Dd> {
 #[test]
 fn joints_of_links_that_stand_at_their_joints_need_no_links_between() {
     let pose = "<pose relative_to='a'>0 0 1 0.5 0 0</pose>";
-    let model = link("a", "") + &link("b", pose) + &joint("j", "revolute", ["a", "b"], &axis("", "1 0 0", "<limit><lower>-1</lower></limit>"));
+    let model = link("a", "")
+        + &link("b", pose)
+        + &joint("j", "revolute", ["a", "b"], &axis("", "1 0 0", "<limit><lower>-1</lower></limit>"));
     let description = described(&sdf("1.9", &model));
     assert_eq!(description.links.len(), 2);
     let only = description.joint("j").expect("it is read");
@@ -558,13 +595,16 @@ fn joints_of_links_that_stand_at_their_joints_need_no_links_between() {
 #[test]
 fn what_moves_with_the_world_stands_on_it() {
     let arm = link("arm", "<pose>0 0 1 0 0 0</pose>");
-    let turn = |parent: &str, pose: &str| joint("turn", "continuous", [parent, "arm"], &(pose.to_string() + &axis("", "0 1 0", "")));
+    let turn = |parent: &str, pose: &str| {
+        joint("turn", "continuous", [parent, "arm"], &(pose.to_string() + &axis("", "0 1 0", "")))
+    };
     let pose = "<pose>1 2 3 0.3 0.2 0.1</pose>";
     let whole = |models: String| format!("<sdf version='1.10'><world name='w'>{models}</world></sdf>");
     let alone = format!("<model name='robot'>{pose}{arm}{}</model>", turn("world", ""));
     // a table that does not move, on which the arm stands, and a link that a joint fixes to the world
     let table = format!("<static>1</static>{}", link("top", "<pose>5 5 5 0 0 0</pose>"));
-    let on_table = format!("<model name='robot'>{pose}<model name='table'>{table}</model>{arm}{}</model>", turn("table::top", ""));
+    let on_table =
+        format!("<model name='robot'>{pose}<model name='table'>{table}</model>{arm}{}</model>", turn("table::top", ""));
     let welded = format!(
         "<model name='robot'>{pose}{}{arm}{}{}</model>",
         link("top", ""),
@@ -625,14 +665,21 @@ fn a_gear_couples_the_two_joints_between_its_links() {
         let between = "<gearbox_reference_body>ground</gearbox_reference_body><gearbox_ratio>0.04</gearbox_ratio>";
         joint("gear", "gearbox", ["motor", "arm"], &(between.to_string() + axis))
     };
-    let of = |axes: &str| described(&sdf("1.6", &(model.clone() + &gear(axes)))).couplings.iter().map(|c| (c.joint.value.clone(), c.source.value.clone(), c.ratio.value)).collect::<Vec<_>>();
+    let of = |axes: &str| {
+        described(&sdf("1.6", &(model.clone() + &gear(axes))))
+            .couplings
+            .iter()
+            .map(|c| (c.joint.value.clone(), c.source.value.clone(), c.ratio.value))
+            .collect::<Vec<_>>()
+    };
     let along = axis("", "0 1 0", "") + &axis("", "0 1 0", "").replace("axis>", "axis2>");
     // θ₂ = −0.04 θ₁, and the second joint turns the other way round
     assert_eq!(of(&along), [("out".to_string(), "in".to_string(), 0.04)]);
     let against = axis("", "0 1 0", "") + &axis("", "0 -1 0", "").replace("axis>", "axis2>");
     assert_eq!(of(&against), [("out".to_string(), "in".to_string(), -0.04)]);
     let across = axis("", "0 1 0", "") + &axis("", "1 0 0", "").replace("axis>", "axis2>");
-    let (none, diagnostics) = load(&Source::new("robot.sdf", sdf("1.6", &(model.clone() + &gear(&across)))), &ModelOptions::default());
+    let (none, diagnostics) =
+        load(&Source::new("robot.sdf", sdf("1.6", &(model.clone() + &gear(&across)))), &ModelOptions::default());
     assert!(none.is_none());
     assert_eq!(diagnostics.iter().map(|d| d.code).collect::<Vec<_>>(), ["not-supported-yet"], "{diagnostics}");
 }
@@ -640,11 +687,18 @@ fn a_gear_couples_the_two_joints_between_its_links() {
 #[test]
 fn limits_without_end_are_none() {
     let limit = |limit: &str| {
-        let model = link("a", "") + &joint("j", "revolute", ["world", "a"], &axis("", "0 0 1", &format!("<limit>{limit}</limit>")));
+        let model = link("a", "")
+            + &joint("j", "revolute", ["world", "a"], &axis("", "0 0 1", &format!("<limit>{limit}</limit>")));
         let limits = read(&sdf("1.9", &model)).bodies[0].joint.limits;
         [limits.lower, limits.upper, limits.velocity, limits.effort]
     };
     let inf = f64::INFINITY;
-    assert_eq!(limit("<lower>-1e16</lower><upper>1e+16</upper><effort>-1</effort><velocity>-1</velocity>"), [-inf, inf, inf, inf]);
-    assert_eq!(limit("<lower>-inf</lower><upper>2</upper><effort>3</effort><velocity>4</velocity>"), [-inf, 2.0, 4.0, 3.0]);
+    assert_eq!(
+        limit("<lower>-1e16</lower><upper>1e+16</upper><effort>-1</effort><velocity>-1</velocity>"),
+        [-inf, inf, inf, inf]
+    );
+    assert_eq!(
+        limit("<lower>-inf</lower><upper>2</upper><effort>3</effort><velocity>4</velocity>"),
+        [-inf, 2.0, 4.0, 3.0]
+    );
 }

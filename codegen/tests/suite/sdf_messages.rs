@@ -128,7 +128,8 @@ fn an_inertia_that_is_left_out_is_that_of_the_format_with_a_warning() {
         let text = PLAIN.replacen(old, new, 1);
         assert_eq!(said(&text).iter().map(|d| d.code).collect::<Vec<_>>(), ["default-inertial"], "{text}");
         let read = |text: &str| load(&Source::new("robot.sdf", text), &ModelOptions::default()).0.expect("it is read");
-        let inertias = [PLAIN, &text].map(|text| read(text).bodies.iter().map(|body| format!("{:?}", body.inertia)).collect::<Vec<_>>());
+        let inertias = [PLAIN, &text]
+            .map(|text| read(text).bodies.iter().map(|body| format!("{:?}", body.inertia)).collect::<Vec<_>>());
         assert_eq!(inertias[0], inertias[1], "{text}");
     }
 }
@@ -166,8 +167,27 @@ const RICH: &str = "<?xml version='1.0'?><!-- a robot --><sdf version='1.11'><wo
 fn spoilt_texts_do_not_panic() {
     assert!(!said(RICH).has_errors(), "{}", said(RICH));
     let odd = [
-        "nan", "-1", "0", "1e308", "1e-308", "inf", "\"", "true", "ball", "world", "", "model", "frame", "__model__",
-        "a", "n::b", "é", "<", "/>", "gearbox", "1.6",
+        "nan",
+        "-1",
+        "0",
+        "1e308",
+        "1e-308",
+        "inf",
+        "\"",
+        "true",
+        "ball",
+        "world",
+        "",
+        "model",
+        "frame",
+        "__model__",
+        "a",
+        "n::b",
+        "é",
+        "<",
+        "/>",
+        "gearbox",
+        "1.6",
     ];
     for seed in 1..800 {
         let mut random = Random(seed);
@@ -193,7 +213,10 @@ fn no_number_is_read_without_meaning() {
     let model = |text: &str| load(&Source::new("robot.sdf", text), &ModelOptions::default());
     let printed = |text: &str| {
         let (model, diagnostics) = model(text);
-        (model.map(|m| format!("{:?} {:?} {:?} {:?}", m.bodies, m.frames, m.gravity, m.couplings)), diagnostics.is_empty())
+        (
+            model.map(|m| format!("{:?} {:?} {:?} {:?}", m.bodies, m.frames, m.gravity, m.couplings)),
+            diagnostics.is_empty(),
+        )
     };
     let (plain, _) = printed(RICH);
     let body = RICH.find("<world").expect("it has a world");
@@ -221,7 +244,9 @@ fn no_number_is_read_without_meaning() {
 fn deep_models_and_long_chains_of_frames_end_soon() {
     let (depth, long) = (20_000, 30_000);
     let models = format!("{}{}", "<model name=\"n\">".repeat(depth), "</model>".repeat(depth));
-    let frames: String = (1..long).map(|k| format!("<frame name=\"g{k}\"><pose relative_to=\"g{}\">1 0 0 0 0 0</pose></frame>", k - 1)).collect();
+    let frames: String = (1..long)
+        .map(|k| format!("<frame name=\"g{k}\"><pose relative_to=\"g{}\">1 0 0 0 0 0</pose></frame>", k - 1))
+        .collect();
     for more in [models, format!("<frame name=\"g0\"/>{frames}")] {
         let start = std::time::Instant::now();
         let diagnostics = said(&PLAIN.replace("</model>", &format!("{more}</model>")));

@@ -87,9 +87,8 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
         }
         let of = format!("the inertial of {owner}");
         let (pose_element, pose) = self.pose_in(element, &of);
-        let named = pose_element.and_then(|pose| {
-            self.attribute(pose, "relative_to").or_else(|| self.attribute(pose, "frame"))
-        });
+        let named =
+            pose_element.and_then(|pose| self.attribute(pose, "relative_to").or_else(|| self.attribute(pose, "frame")));
         if let Some((_, span)) = named {
             let help = "give the pose in the link's own frame, and remove the attribute";
             let why = "the pose of an inertial counts in the frame of its link";

@@ -163,7 +163,8 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
 
     /// Finds the one model that moves.
     fn choose_model(&mut self, around: Node<'d, 'i>) -> Option<()> {
-        let top: Vec<usize> = self.scopes[0].frames.iter().copied().filter(|frame| self.frames[*frame].is_model()).collect();
+        let top: Vec<usize> =
+            self.scopes[0].frames.iter().copied().filter(|frame| self.frames[*frame].is_model()).collect();
         let moving: Vec<usize> = top.iter().copied().filter(|model| !self.frames[*model].is_static).collect();
         match moving[..] {
             [model] => {
