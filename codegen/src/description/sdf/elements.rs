@@ -38,11 +38,9 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
     /// Skips an element; one that looks like one of `known` gets a warning.
     pub fn skip(&mut self, owner: &str, element: Node<'d, 'i>, known: &[&str]) {
         let name = element.tag_name().name();
-        let near = || closest(name, known.iter().copied()).filter(|known| known.len() > 3);
-        match (HARMLESS.contains(&name) || element.tag_name().namespace().is_some())
-            .then_some(None)
-            .unwrap_or_else(near)
-        {
+        let is_known = HARMLESS.contains(&name) || element.tag_name().namespace().is_some();
+        let near = closest(name, known.iter().copied()).filter(|known| known.len() > 3 && !is_known);
+        match near {
             Some(near) => self.complain(&tag(element), messages::misspelt_element(owner, name, near)),
             None => self.reader.ignore(name, &tag(element)),
         }

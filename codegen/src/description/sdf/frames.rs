@@ -202,16 +202,16 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
 
     /// Gives frames their names in the robot: those of the models around them, but for the robot itself, before their own.
     pub fn name_frames(&mut self) {
-        let mut before: Vec<String> = vec![String::new(); self.scopes.len()];
         // a scope stands behind the one around it
         for scope in 0..self.scopes.len() {
-            let frame = self.scopes[scope].frame;
-            if frame != WORLD && frame != self.model {
-                before[scope] = format!("{}::", self.frames[frame].name.value);
-            }
+            let around = self.scopes[scope].frame;
+            let before = match around == WORLD || around == self.model {
+                true => String::new(),
+                false => format!("{}::", self.frames[around].name.value),
+            };
             for frame in self.scopes[scope].frames.clone() {
                 let own = &mut self.frames[frame].name.value;
-                own.insert_str(0, &before[scope]);
+                own.insert_str(0, &before);
                 self.names.insert(own.clone());
             }
         }
