@@ -36,12 +36,6 @@ fn turned(m: Matrix, v: [f64; 3]) -> [f64; 3] {
 impl Pose {
     const WORLD: Pose = Pose { p: [0.0; 3], r: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
 
-    /// T_ac of T_ab and T_bc.
-    fn then(self, next: Pose) -> Pose {
-        let moved = turned(self.r, next.p);
-        Pose { p: [0, 1, 2].map(|i| self.p[i] + moved[i]), r: times(self.r, next.r) }
-    }
-
     /// This frame in another one, both given in the world.
     fn within(self, other: Pose) -> Pose {
         let back = transpose(other.r);
