@@ -8,6 +8,7 @@ pub(crate) mod angle;
 mod chapter;
 pub mod composite;
 mod couplings;
+mod dh;
 pub mod drives;
 pub mod flexible;
 pub(crate) mod geometry;
@@ -15,6 +16,7 @@ pub(crate) mod merge;
 pub mod messages;
 mod mjcf;
 pub mod reader;
+mod sdf;
 pub mod table;
 mod toml;
 mod tree;
@@ -32,7 +34,7 @@ use std::fmt;
 use straightline_core::joint::Dialect;
 
 /// The formats of robot files. A text is of the first that recognises it, or else of the first that has the extension of its name.
-pub static FORMATS: &[&FileFormat] = &[&mjcf::FORMAT, &urdf::FORMAT, &toml::FORMAT, &chapter::FORMAT];
+pub static FORMATS: &[&FileFormat] = &[&mjcf::FORMAT, &sdf::FORMAT, &urdf::FORMAT, &toml::FORMAT, &chapter::FORMAT];
 
 /// A format of robot files.
 #[derive(Debug)]

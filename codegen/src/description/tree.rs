@@ -87,7 +87,7 @@ impl Description {
         self.joints.iter().find(|joint| joint.name.value == name)
     }
 
-    /// Every angle, and what it is called.
+    /// Every angle that is written, once, and what it is called.
     pub fn angles(&self) -> Vec<(String, &Angle)> {
         let mut all = Vec::new();
         for link in &self.links {
@@ -113,6 +113,7 @@ impl Description {
         for frame in &self.frames {
             all.extend(frame.pose.rotation.angles(format!("frame `{}`", frame.name.value)));
         }
+        all.retain(|(_, angle)| !angle.text.is_empty());
         all
     }
 
@@ -204,7 +205,7 @@ impl JointType {
                 ..JointType::FIXED
             })
         };
-        let has_fixed = Dialect::FRAMES.contains(&dialect);
+        let has_fixed = Dialect::WITH_FIXED.contains(&dialect);
         let composites = COMPOSITES.iter().filter(|composite| composite.dialects.contains(&dialect));
         let single = words().filter(|t| !t.is_free());
         let between_links =

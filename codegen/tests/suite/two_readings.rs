@@ -307,6 +307,16 @@ fn both_readings_of_random_joint_frame_toml_agree() {
 }
 
 #[test]
+fn both_readings_of_frames_in_frames_agree() {
+    let mut disagreement = Disagreement::default();
+    for (name, text) in [("arm.sdf", include_str!("../files/arm.sdf")), ("dh.toml", include_str!("../files/dh.toml"))] {
+        let options = ModelOptions { uncoupled: true, ..ModelOptions::default() };
+        compare_source(&mut disagreement, name, &Source::new(name, text), &options, &mut Random(3));
+    }
+    disagreement.judge();
+}
+
+#[test]
 fn both_readings_of_random_centre_of_mass_toml_agree() {
     let mut disagreement = Disagreement::default();
     for seed in 0..60 {
