@@ -34,6 +34,7 @@ pub(super) const FORMAT: FileFormat = FileFormat {
     dialect: Dialect::Sdf,
     limits: "write `<limit>` with `<lower>` and `<upper>`",
     read,
+    write: None,
 };
 
 /// The versions 1.N that are read.
