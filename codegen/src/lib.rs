@@ -8,6 +8,7 @@ extern crate straightline_graph;
 
 pub mod choices;
 pub mod compile;
+pub mod convert;
 pub mod description;
 pub mod diagnostic;
 pub mod emit;

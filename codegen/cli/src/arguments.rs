@@ -1,5 +1,6 @@
 //! The command line, and what it says in the library's terms.
 
+use crate::convert::ConvertArguments;
 use crate::given::{possible, Given};
 use clap::builder::TypedValueParser;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -15,7 +16,7 @@ use straightline_codegen::Function;
 
 pub use crate::motion::{Analyze, Simulate};
 
-const EXIT_CODES: &str = "\
+pub const EXIT_CODES: &str = "\
 Exit codes:
   0  done
   1  the robot file is wrong, or a check failed
@@ -27,6 +28,7 @@ Exit codes:
 #[command(name = "straightline", version, max_term_width = 110, after_help = format!("\
 Examples:
   straightline check panda.urdf
+  straightline convert panda.urdf panda.xml
   straightline generate panda.urdf -o src/panda.rs
   straightline report panda.urdf
   straightline verify panda.urdf
@@ -69,6 +71,9 @@ Examples:
 
 {EXIT_CODES}"))]
     Check(CheckArguments),
+    /// Write a robot file in another format
+    #[command(after_help = crate::convert::help())]
+    Convert(ConvertArguments),
     /// Compare the generated program with an independent formulation of the dynamics, on random states
     #[command(after_help = format!("\
 Runs the program as it is compiled, operation by operation in the scalar's arithmetic, and the dynamics of the
@@ -150,8 +155,16 @@ impl CliCommand {
             CliCommand::Simulate(a) => return a.model(),
             CliCommand::Analyze(a) => return a.model(),
             CliCommand::Export(a) => &a.model,
-            CliCommand::Functions(_) | CliCommand::Explain(_) => return None,
+            CliCommand::Convert(_) | CliCommand::Functions(_) | CliCommand::Explain(_) => return None,
         })
+    }
+
+    /// Whether warnings and progress are left out.
+    pub fn is_quiet(&self) -> bool {
+        match self {
+            CliCommand::Convert(a) => a.quiet,
+            other => other.model().is_some_and(ModelArgs::is_quiet),
+        }
     }
 
     /// What it does, in a word.
@@ -160,6 +173,7 @@ impl CliCommand {
             CliCommand::Generate(_) => "generating",
             CliCommand::Report(_) => "reporting",
             CliCommand::Check(_) => "checking",
+            CliCommand::Convert(_) => "converting",
             CliCommand::Verify(_) => "verifying",
             CliCommand::Simulate(_) => "simulating",
             CliCommand::Analyze(_) => "analysing",

@@ -6,6 +6,7 @@
 mod arguments;
 #[cfg(feature = "simulation")]
 mod contact;
+mod convert;
 #[cfg(feature = "simulation")]
 mod figures;
 #[cfg_attr(not(feature = "simulation"), allow(dead_code))]
@@ -59,12 +60,13 @@ fn main() -> ExitCode {
     let command = CommandLine::read(std::env::args_os().collect())
         .unwrap_or_else(|complaints| arguments::exit(complaints))
         .command;
-    print::be_quiet(command.model().is_some_and(ModelArgs::is_quiet));
+    print::be_quiet(command.is_quiet());
     print::watch(command.doing());
     let done = match command {
         CliCommand::Generate(a) => generate(&a),
         CliCommand::Report(a) => report(&a),
         CliCommand::Check(a) => check(&a),
+        CliCommand::Convert(a) => convert::convert_file(&a),
         CliCommand::Verify(a) => verify(&a),
         CliCommand::Export(a) => export(&a),
         CliCommand::Simulate(a) => motion::simulate(&a),

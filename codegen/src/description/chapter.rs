@@ -47,6 +47,7 @@ pub(super) const FORMAT: FileFormat = FileFormat {
     dialect: Dialect::CentresOfMass,
     limits: "write `limits = [lower, upper]`",
     read,
+    write: None,
 };
 
 fn is_chain(top: &TomlTable) -> bool {

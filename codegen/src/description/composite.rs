@@ -91,7 +91,16 @@ pub static COMPOSITES: &[CompositeKind] = &[
     },
     CompositeKind {
         word: "universal",
+        dialects: &[Dialect::JointFrames, Dialect::Sdf],
         summary: "turns about `axis`, and then about `axis2`, which turns with it",
+        has_second_axis: true,
+        parts: &[part("1", Measure::Angle, PartAxis::Axis), part("2", Measure::Angle, PartAxis::SecondAxis)],
+        ..PLAIN
+    },
+    CompositeKind {
+        word: "revolute2",
+        dialects: &[Dialect::Sdf],
+        summary: "the same",
         has_second_axis: true,
         parts: &[part("1", Measure::Angle, PartAxis::Axis), part("2", Measure::Angle, PartAxis::SecondAxis)],
         ..PLAIN
@@ -106,6 +115,14 @@ pub static COMPOSITES: &[CompositeKind] = &[
         word: "helical",
         summary:
             "turns about the axis and slides along it by the pitch, a joint that follows: one coordinate \\[rad\\]",
+        has_pitch: true,
+        parts: &[part("", Measure::Angle, PartAxis::Axis), part("slide", Measure::Length, PartAxis::Axis)],
+        ..PLAIN
+    },
+    CompositeKind {
+        word: "screw",
+        dialects: &[Dialect::Sdf],
+        summary: "the same",
         has_pitch: true,
         parts: &[part("", Measure::Angle, PartAxis::Axis), part("slide", Measure::Length, PartAxis::Axis)],
         ..PLAIN

@@ -18,6 +18,11 @@ pub const CODES: &[&str] = &[
     "toml-syntax",
     "too-complex",
     "not-a-robot",
+    "sdf-version",
+    "several-models",
+    "frame-unknown",
+    "frame-cycle",
+    "default-inertial",
     "include-failed",
     "geom-size",
     "mesh-failed",
@@ -108,7 +113,8 @@ type D = Diagnostic;
 
 /// Bytes that are not UTF-8.
 pub fn not_utf8() -> D {
-    D::error("not-utf8", "the file is not UTF-8 text").help("save the file as UTF-8; is it TOML, URDF or MJCF at all?")
+    D::error("not-utf8", "the file is not UTF-8 text")
+        .help("save the file as UTF-8; is it TOML, URDF, SDF or MJCF at all?")
 }
 
 /// A file larger than the readers take.
@@ -145,11 +151,57 @@ pub fn too_complex(what: &str, limit: usize) -> D {
 
 /// XML, but not of a robot.
 pub fn not_a_robot(root: &str) -> D {
-    let d = D::error("not-a-robot", format!("the root element is `<{}>`, not `<robot>`", cut(root)));
-    match root {
-        "sdf" => d.help("SDF is not read; export the robot as URDF"),
-        _ => d.help("a URDF begins with `<robot name=\"...\">`"),
+    D::error("not-a-robot", format!("the root element is `<{}>`, not `<robot>`", cut(root)))
+        .help("a URDF begins with `<robot name=\"...\">`")
+}
+
+/// XML in a file that is called SDF, and no SDF.
+pub fn not_sdf(root: &str) -> D {
+    D::error("not-a-robot", format!("the root element is `<{}>`, not `<sdf>`", cut(root)))
+        .help("an SDF file begins with `<sdf version=\"1.9\">`")
+}
+
+/// A version of SDF whose elements may mean something else.
+pub fn sdf_version(version: &str, is_older: bool) -> D {
+    let d = D::error("sdf-version", format!("SDF `{}` is not read: 1.6 to 1.12 are", cut(version)));
+    match is_older {
+        true => d.help("`gz sdf -p FILE` prints the file in the version that it has itself"),
+        false => d.help("write the version whose elements the file has, as in `<sdf version=\"1.9\">`"),
     }
+}
+
+/// Models that move, each of which would be a robot.
+pub fn several_models(models: &[&str]) -> D {
+    D::error("several-models", format!("the file has {} models that move: {}", models.len(), list(models)))
+        .detail("one of them is the robot, and what joins it to others is not said")
+        .help("leave the others out, write `<static>true</static>` in them, or write all as models in one model")
+}
+
+/// A frame that a file of frames does not have.
+pub fn frame_unknown<'a>(owner: &str, frame: &str, within: &str, frames: impl IntoIterator<Item = &'a str>) -> D {
+    let d = D::error("frame-unknown", format!("{owner}: {within} has no frame `{}`", cut(frame)));
+    match did_you_mean(frame, frames) {
+        Some(hint) => d.help(hint),
+        None => d.help("name a link, joint, frame or model of it; `a::b` is b in the model a"),
+    }
+}
+
+/// Frames that stand in each other.
+pub fn frame_cycle(frame: &str, what: &str) -> D {
+    D::error("frame-cycle", format!("frame `{}` {what}", cut(frame)))
+        .help("let one of them be given in a frame that does not depend on it")
+}
+
+/// A link that has the inertia that its format gives to all that say none.
+pub fn default_inertial(owner: &str, missing: &str) -> D {
+    let what = match missing {
+        "mass" => "a mass of 1 kg",
+        "inertia" => "moments of 1 kg·m²",
+        _ => "a mass of 1 kg and moments of 1 kg·m²",
+    };
+    D::warning("default-inertial", format!("{owner} has no `<{missing}>`"))
+        .detail(format!("taken as SDF has it: {what}"))
+        .help("write what it has; a link without mass has `<mass>0</mass>` and moments of 0")
 }
 
 /// XML that an MJCF file includes, and no MJCF.
@@ -180,7 +232,7 @@ pub fn geom_size(owner: &str, why: &str) -> D {
 pub fn xacro_left(what: &str, more: usize) -> D {
     let d = D::error("xacro-left", format!("xacro is not expanded: `{}`", cut(what)));
     let d = if more > 0 { d.detail(format!("and {more} more of the kind")) } else { d };
-    d.help("run `xacro FILE.xacro > FILE.urdf` first and read its output")
+    d.help("run `xacro FILE.xacro -o FILE.urdf` first and read what it writes")
 }
 
 /// An element that must be there.

@@ -8,6 +8,7 @@ pub(crate) mod angle;
 mod chapter;
 pub mod composite;
 mod couplings;
+mod dh;
 pub mod drives;
 pub mod flexible;
 pub(crate) mod geometry;
@@ -16,10 +17,12 @@ pub(crate) mod merge;
 pub mod messages;
 mod mjcf;
 pub mod reader;
+mod sdf;
 pub mod table;
 mod toml;
 mod tree;
 mod urdf;
+pub mod write;
 mod written_pose;
 mod xml;
 
@@ -32,7 +35,7 @@ use std::fmt;
 use straightline_core::joint::Dialect;
 
 /// The formats of robot files. A text is of the first that recognises it, or else of the first that has the extension of its name.
-pub static FORMATS: &[&FileFormat] = &[&mjcf::FORMAT, &urdf::FORMAT, &toml::FORMAT, &chapter::FORMAT];
+pub static FORMATS: &[&FileFormat] = &[&mjcf::FORMAT, &sdf::FORMAT, &urdf::FORMAT, &toml::FORMAT, &chapter::FORMAT];
 
 /// A format of robot files.
 #[derive(Debug)]
@@ -51,6 +54,8 @@ pub struct FileFormat {
     pub limits: &'static str,
     /// Reads a file. Complaints go to the diagnostics; `None` if nothing of the robot could be read.
     pub read: fn(&Source, &mut Diagnostics) -> Option<Description>,
+    /// Writes a file; `None`: robots are not written in this format.
+    pub write: Option<&'static write::FormatWriter>,
 }
 
 impl PartialEq for FileFormat {

@@ -1,6 +1,7 @@
 //! TOML with joint frames; the schema is in `SCHEMA.md`.
 
 use super::composite::{CompositeKind, WrittenComposite};
+use super::dh::CONVENTIONS;
 use super::flexible::Flexible;
 use super::reader::{FileReader, Range64};
 use super::table::{self, TomlTable};
@@ -43,7 +44,7 @@ const JOINT: &[&str] = &[
 ];
 const POSE: &[&str] = &["xyz", "rpy", "rpy_rad", "rpy_deg", "rpy_quarter_turns", "rpy_turns"];
 const FRAME: &[&str] = &["name", "link", "xyz", "rpy", "rpy_rad", "rpy_deg", "rpy_quarter_turns", "rpy_turns"];
-const AXES: [(&str, [f64; 3]); 6] = [
+pub(super) const AXES: [(&str, [f64; 3]); 6] = [
     ("x", [1.0, 0.0, 0.0]),
     ("y", [0.0, 1.0, 0.0]),
     ("z", [0.0, 0.0, 1.0]),
@@ -55,26 +56,28 @@ const AXES: [(&str, [f64; 3]); 6] = [
 pub(super) const FORMAT: FileFormat = FileFormat {
     name: "TOML with joint frames",
     extensions: &["toml"],
-    signs: "has `[robot]` or `[[joint]]`",
-    sniff: |text| table::holds(text, |top| top.has("robot") || top.has("joint")),
+    signs: "has `[robot]`, `[[joint]]` or `[[dh]]`",
+    sniff: |text| table::holds(text, |top| ["robot", "joint", "dh"].iter().any(|key| top.has(key))),
     dialect: Dialect::JointFrames,
     limits: "write `limits = { lower = ..., upper = ... }`, or kind `continuous`",
     read,
+    write: Some(&super::write::toml::WRITER),
 };
 
 fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     let document = table::parse(source, diagnostics)?;
     let top = TomlTable::of_document(&document);
     let mut reader = FileReader::new(source, diagnostics);
-    if !["robot", "link", "joint"].iter().any(|key| top.has(key)) {
+    if !["robot", "link", "joint", "dh"].iter().any(|key| top.has(key)) {
         reader.complain(&(0..0), messages::unknown_format());
         return None;
     }
-    reader.check_keys(&top, &["robot", "link", "joint", "coupling", "loop", "frame", "drive"]);
+    reader.check_keys(&top, &["robot", "link", "joint", "dh", "coupling", "loop", "frame", "drive"]);
     let mut description = Description::new(&FORMAT, Noted::assumed("robot".to_string()));
+    let mut convention = None;
     reader.require(&top, "robot", "[robot]\\nname = \"...\"");
     if let Some(robot) = reader.table_at(&top, "robot", "[robot]") {
-        reader.check_keys(&robot, &["name", "gravity", "base"]);
+        reader.check_keys(&robot, &["name", "gravity", "base", "dh"]);
         reader.require(&robot, "name", "name = \"...\"");
         if let Some(name) = reader.name_at(&robot, "name", "robot") {
             description.name = name;
@@ -82,6 +85,10 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
         description.gravity = reader.vector_at(&robot, "gravity");
         description.base =
             reader.word_at(&robot, "base", &[("fixed", BaseKind::Fixed), ("floating", BaseKind::Floating)]);
+        if top.has("dh") {
+            reader.require(&robot, "dh", "dh = \"standard\" or dh = \"modified\"");
+        }
+        convention = reader.word_at(&robot, "dh", &CONVENTIONS).map(|word| word.value);
     }
     for table in reader.tables_at(&top, "link") {
         let link = read_link(&mut reader, table, &mut description.flexible);
@@ -90,6 +97,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     for table in reader.tables_at(&top, "joint") {
         description.add_joint(read_joint(&mut reader, table));
     }
+    reader.dh_rows_at(&top, convention, &mut description);
     for table in reader.tables_at(&top, "frame") {
         description.frames.extend(read_frame(&mut reader, table));
     }

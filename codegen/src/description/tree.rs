@@ -5,6 +5,7 @@
 use super::composite::{CompositeKind, WrittenComposite, COMPOSITES};
 use super::{drives, flexible, Angle, FileFormat, Noted, Rotation, WrittenPose};
 use crate::diagnostic::Place;
+use std::collections::HashSet;
 use straightline_core::joint::{self, Dialect, JointKind, Measure};
 use straightline_core::spatial::Sym3;
 
@@ -76,12 +77,23 @@ impl Description {
         self.links.iter().find(|link| link.name.value == name)
     }
 
+    /// Whether the file says that the base floats.
+    pub fn floats(&self) -> bool {
+        self.base.as_ref().is_some_and(|base| base.value == BaseKind::Floating)
+    }
+
+    /// The link that no joint moves, the first of several.
+    pub fn root(&self) -> Option<&WrittenLink> {
+        let moved: HashSet<&str> = self.joints.iter().map(|joint| joint.child.value.as_str()).collect();
+        self.links.iter().find(|link| !moved.contains(link.name.value.as_str()))
+    }
+
     /// The joint of a name.
     pub fn joint(&self, name: &str) -> Option<&WrittenJoint> {
         self.joints.iter().find(|joint| joint.name.value == name)
     }
 
-    /// Every angle, and what it is called.
+    /// Every angle that is written, once, and what it is called.
     pub fn angles(&self) -> Vec<(String, &Angle)> {
         let mut all = Vec::new();
         for link in &self.links {
@@ -107,6 +119,7 @@ impl Description {
         for frame in &self.frames {
             all.extend(frame.pose.rotation.angles(format!("frame `{}`", frame.name.value)));
         }
+        all.retain(|(_, angle)| !angle.text.is_empty());
         all
     }
 
@@ -206,7 +219,7 @@ impl JointType {
                 ..JointType::FIXED
             })
         };
-        let has_fixed = Dialect::FRAMES.contains(&dialect);
+        let has_fixed = Dialect::WITH_FIXED.contains(&dialect);
         let composites = COMPOSITES.iter().filter(|composite| composite.dialects.contains(&dialect));
         let single = words().filter(|t| !t.is_free());
         let between_links =

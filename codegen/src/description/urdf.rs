@@ -23,6 +23,7 @@ pub(super) const FORMAT: FileFormat = FileFormat {
     dialect: Dialect::Urdf,
     limits: "write `<limit lower=\"...\" upper=\"...\" velocity=\"...\" effort=\"...\"/>`, or type `continuous`",
     read,
+    write: Some(&super::write::urdf::WRITER),
 };
 
 fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
@@ -35,12 +36,7 @@ fn read_document(mut reader: FileReader, document: &Document) -> Option<Descript
         reader.complain(&tag(root), messages::not_a_robot(root.tag_name().name()));
         return None;
     }
-    let is_xacro = |n: &Node| n.is_element() && n.tag_name().namespace().is_some_and(|uri| uri.contains("xacro"));
-    let mut xacro = root.descendants().filter(is_xacro);
-    if let Some(first) = xacro.next() {
-        let name = format!("xacro:{}", first.tag_name().name());
-        let start = first.range().start;
-        reader.complain(&(start..start + 1 + name.len()), messages::xacro_left(&name, xacro.count()));
+    if xml::has_xacro(&mut reader, root) {
         return None;
     }
     let name = match root.attribute("name") {

@@ -48,6 +48,35 @@ pub(super) fn parse<'a, T>(
     None
 }
 
+/// The name of the first element of a text; nothing if it has none.
+pub(super) fn root_name(text: &str) -> &str {
+    let mut rest = text.trim_start();
+    loop {
+        let end = match rest {
+            _ if rest.starts_with("<?") => "?>",
+            _ if rest.starts_with("<!--") => "-->",
+            _ if rest.starts_with("<!") => ">",
+            _ => break,
+        };
+        let Some(at) = rest.find(end) else { return "" };
+        rest = rest[at + end.len()..].trim_start();
+    }
+    let name = rest.strip_prefix('<').unwrap_or("");
+    let end = name.find(|c: char| !c.is_ascii_alphanumeric()).unwrap_or(name.len());
+    &name[..end]
+}
+
+/// Whether elements of xacro are left, of which it complains then.
+pub(super) fn has_xacro(reader: &mut FileReader, root: Node) -> bool {
+    let is_xacro = |n: &Node| n.is_element() && n.tag_name().namespace().is_some_and(|uri| uri.contains("xacro"));
+    let mut xacro = root.descendants().filter(is_xacro);
+    let Some(first) = xacro.next() else { return false };
+    let name = format!("xacro:{}", first.tag_name().name());
+    let start = first.range().start;
+    reader.complain(&(start..start + 1 + name.len()), messages::xacro_left(&name, xacro.count()));
+    true
+}
+
 /// The start of an element's tag: `<name`.
 pub(super) fn tag(node: Node) -> Span {
     let start = node.range().start;

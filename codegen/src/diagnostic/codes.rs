@@ -60,6 +60,7 @@ pub const ALL: &[Code] = &[
     code("coupling-ratio-zero", Error, "A coupling with the ratio zero."),
     code("current-without-motor", Error, "A current for an actuator that is no motor."),
     code("cycle", Error, "Links that carry each other."),
+    code("default-inertial", Warning, "A link that has the inertia that its format gives to all that say none."),
     code("drive-coupling", Error, "Drives whose ratios are dependent."),
     code("drive-given-twice", Error, "Two parameters for one drive."),
     code("drive-joint", Error, "A drive of a joint that is not there, or does not move."),
@@ -91,6 +92,8 @@ pub const ALL: &[Code] = &[
     code("floating-by-option", Warning, "A floating base by option, a fixed one by file."),
     code("floating-joint", Error, "A floating joint."),
     code("following-joint", Error, "A joint that is asked for, and follows another one."),
+    code("frame-cycle", Error, "Frames that stand in each other."),
+    code("frame-unknown", Error, "A frame that a file of frames does not have."),
     code("function-not-of-robot", Error, "A function about something that the robot does not have."),
     code("function-not-of-scene", Error, "A function about bodies that are inputs, in a scene without one."),
     code("gear-ratio-alone", Warning, "A gear without a rotor."),
@@ -108,6 +111,7 @@ pub const ALL: &[Code] = &[
     code("joint-order-twice", Error, "A joint order with a name that stands twice."),
     code("joint-order-unknown", Error, "A joint order with a name that no joint has."),
     code("left-open", Error, "What a scene leaves to the caller, and an experiment must say."),
+    code("left-out", Warning, "Something of a robot that another format has no place for, and that was left out."),
     code("level-of-error", Error, "A level for a complaint that is an error whatever is said."),
     code("level-of-firm", Error, "A level that silences what is always said."),
     code("limbs-exact", Error, "Identical limbs as lanes where rules keep every bit."),
@@ -150,12 +154,15 @@ pub const ALL: &[Code] = &[
     code("not-a-number", Error, "Text where a number is wanted."),
     code("not-a-robot", Error, "XML, but not of a robot."),
     code("not-a-selection", Error, "Joints or frames of a function whose results are not by joints or frames."),
+    code("not-as-read", Error, "A converted file that is not read as the same robot."),
     code("not-finite", Error, "NaN, or a number beyond f64."),
+    code("not-in-format", Error, "Something that changes the motion of a robot, for which another format has no place."),
     code("not-in-range", Error, "A number out of its range."),
     code("not-samples", Error, "A file that is no table of numbers."),
     code("not-supported-yet", Error, "Something that changes the dynamics and is not part of the equations."),
     code("not-symmetric", Error, "An inertia matrix that is not symmetric."),
     code("not-utf8", Error, "Bytes that are not UTF-8."),
+    code("not-written", Error, "A format in which no robot is written."),
     code("nothing-left", Error, "A robot that does not move any more."),
     code("nothing-moves", Error, "A robot that does not move."),
     code("nothing-slides", Error, "Friction without a surface to slide on."),
@@ -177,11 +184,14 @@ pub const ALL: &[Code] = &[
     code("regressor-unused", Error, "Columns of regressors where no regressor is made."),
     code("repeated-element", Error, "An element that may be there once."),
     code("said-by-the-scene", Error, "What a scene says, and an experiment may not."),
+    code("said-otherwise", Note, "Something of a robot that another format says in another way."),
     code("said-twice", Error, "What the scene and an option beside it both say."),
     code("scalar-twice", Error, "A scalar type that is asked for twice."),
+    code("sdf-version", Error, "A version of SDF whose elements may mean something else."),
     code("self-test-fused", Error, "A self-test of functions whose bits differ from machine to machine."),
     code("several-coordinates", Error, "What is of one coordinate, of a joint that has several."),
     code("several-locked", Error, "A lock on a joint that has several coordinates."),
+    code("several-models", Error, "Models that move, each of which would be a robot."),
     code("several-moving", Error, "A motion of a joint that has several coordinates."),
     code("shaft-without-inertia", Error, "A shaft between two springs that has no inertia."),
     code("singular-joint", Warning, "A joint that feels no inertia."),
@@ -239,7 +249,7 @@ mod tests {
     /// Every `D::error("code", …)` of the tables of messages, with its severity.
     fn said() -> Vec<(String, Severity)> {
         let mut found = Vec::new();
-        for table in ["src/description", "src/scene", "src/diagnostic", "cli/src/experiment"] {
+        for table in ["src/description", "src/convert", "src/scene", "src/diagnostic", "cli/src/experiment"] {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("{table}/messages.rs"));
             let text = std::fs::read_to_string(path).expect("the table is there");
             for (call, severity) in [("D::error(", Error), ("D::warning(", Warning), ("D::note(", Note)] {

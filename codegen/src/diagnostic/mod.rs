@@ -219,6 +219,11 @@ impl Diagnostics {
         }
     }
 
+    /// The sources that are known.
+    pub fn sources(&self) -> impl Iterator<Item = &Source> {
+        self.sources.iter()
+    }
+
     /// The source of that path.
     pub fn source(&self, path: &str) -> Option<&Source> {
         self.sources.iter().find(|s| s.path() == path)

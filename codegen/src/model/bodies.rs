@@ -30,7 +30,7 @@ pub(super) struct Seat {
 
 impl Seat {
     /// As the file says it; `None` after a complaint.
-    fn of(joint: &WrittenJoint, tolerance: f64, diagnostics: &mut Diagnostics) -> Option<Seat> {
+    pub fn of(joint: &WrittenJoint, tolerance: f64, diagnostics: &mut Diagnostics) -> Option<Seat> {
         let (origin, axis) = match &joint.placement {
             Placement::Vectors(vectors) => return centres_of_mass::seat(vectors, joint, tolerance, diagnostics),
             Placement::Frames { origin, axis } => (origin, axis),

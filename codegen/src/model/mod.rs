@@ -50,6 +50,7 @@ use std::collections::{BTreeMap, HashMap};
 use straightline_core::closure::Closure;
 use straightline_core::coupling::Coupling;
 use straightline_core::model::{Body, BodyId, Frame, Joint, Model};
+use straightline_core::spatial::Transform;
 use straightline_core::Dd;
 
 /// Links of a robot that is compiled.
@@ -201,6 +202,16 @@ pub fn build(description: &Description, options: &ModelOptions, diagnostics: &mu
     }
     drives::add(&description.drives, &mut model, diagnostics);
     (!diagnostics.has_errors()).then_some(model)
+}
+
+/// The pose of the child's link frame in the parent's where the joint's coordinate is zero; `None` after a complaint.
+pub(crate) fn pose_at_zero(
+    joint: &description::WrittenJoint,
+    tolerance: f64,
+    diagnostics: &mut Diagnostics,
+) -> Option<Transform<Dd>> {
+    let seat = bodies::Seat::of(joint, tolerance, diagnostics)?;
+    Some(compose(&compose(&seat.in_parent, &seat.canonical), &seat.link_frame))
 }
 
 /// Whether no joint of what gives way has the name of another one.

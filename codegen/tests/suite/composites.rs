@@ -4,6 +4,7 @@ use straightline_codegen::description::composite::COMPOSITES;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::model::{load, ModelOptions};
 use straightline_core::algorithms::{forward_kinematics, inverse_dynamics, mass_matrix};
+use straightline_core::joint::Dialect;
 use straightline_core::model::Model;
 use straightline_core::Dd;
 
@@ -119,7 +120,9 @@ fn a_composite_joint_is_the_single_joints_that_it_stands_for() {
         let pose = |model: &Model<Dd>| forward_kinematics(model, &q, &[model.frame("cart").expect("the link")]);
         assert_eq!(pose(&composite), pose(&written), "{kind}");
     }
-    assert!(COMPOSITES.iter().all(|composite| seen.contains(&composite.word)), "every composite is tried");
+    // those that SDF alone has are tried by robots in that format
+    let mut all = COMPOSITES.iter().filter(|composite| composite.dialects.contains(&Dialect::JointFrames));
+    assert!(all.all(|composite| seen.contains(&composite.word)), "every composite is tried");
 }
 
 #[test]

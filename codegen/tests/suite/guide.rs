@@ -5,7 +5,10 @@
 use crate::options::compare_table;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use straightline_codegen::convert::{self, written_formats};
 use straightline_codegen::description::composite::COMPOSITES;
+use straightline_codegen::description::write::losses::Loss;
+use straightline_codegen::description::write::FormatWriter;
 use straightline_codegen::description::{self, FileFormat, FORMATS};
 use straightline_codegen::function::{Extent, Family, Parts, Spec};
 use straightline_codegen::scene;
@@ -183,13 +186,14 @@ fn message(folder: &Path, code: &str) -> String {
 }
 
 fn messages() -> String {
-    let mut page = "# Every message\n\nEach message of robot files and scenes with the smallest file that causes it and all that is said of it. `straightline explain CODE` says what a code stands\n\
+    let mut page = "# Every message\n\nEach message of robot files, scenes and conversions with the smallest file that causes it and all that is said of it. `straightline explain CODE` says what a code stands\n\
 for. Printed from the files of the tests of messages by the test `guide::` of the compiler; some messages take an option beside the file, which the text then\n\
 names.\n"
         .to_string();
     let tables = [
         ("Robot files", "tests/messages", description::messages::CODES),
         ("Scenes, for `codegen/tests/files/arm.toml`", "tests/scene_messages", scene::messages::CODES),
+        ("Conversions", "tests/convert_messages", convert::messages::CODES),
     ];
     for (title, folder, codes) in tables {
         let _ = write!(page, "\n## {title}\n");
@@ -218,6 +222,24 @@ fn formats_are_those_of_the_table() {
     };
     let rows: Vec<String> = FORMATS.iter().map(row).collect();
     compare_table("codegen/SCHEMA.md", "", "| format | recognised by | or else by the name |", &rows);
+}
+
+#[test]
+fn conversions_are_those_of_the_tables() {
+    let ends = |ends: &[&str]| ends.iter().map(|end| format!("`.{end}`")).collect::<Vec<_>>().join(", ");
+    let format = |format: &FileFormat, writer: &FormatWriter| {
+        format!("| {} | `{}` | {} | {} |", format.name, writer.word, ends(writer.extensions), writer.rotations)
+    };
+    let rows: Vec<String> = written_formats().map(|(row, writer)| format(row, writer)).collect();
+    compare_table("codegen/CONVERT.md", "", "| format | `--to` | by the name | rotations |", &rows);
+    let loss = |format: &FileFormat, loss: &Loss| {
+        format!("| {} | {} | `{}` | {} |", format.name, loss.what, loss.weight.code(), loss.then)
+    };
+    let of = |(format, writer): (&'static FileFormat, &FormatWriter)| {
+        writer.losses.iter().map(|row| loss(format, row)).collect::<Vec<_>>()
+    };
+    let rows: Vec<String> = written_formats().flat_map(of).collect();
+    compare_table("codegen/CONVERT.md", "", "| format | has no place or word for | code | what becomes of it |", &rows);
 }
 
 #[test]

@@ -8,13 +8,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The ground first.
-const ROOMS: [&str; 18] = [
+const ROOMS: [&str; 19] = [
     "function",
     "identifier",
     "output",
     "diagnostic",
     "description",
     "model",
+    "convert",
     "choices",
     "machine_code",
     "scene",

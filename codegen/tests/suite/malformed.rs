@@ -17,6 +17,8 @@ const FILES: &[(&str, &str)] = &[
     ("arm.urdf", include_str!("../files/awkward.urdf")),
     ("arm.toml", include_str!("../files/arm.toml")),
     ("chain.toml", include_str!("../files/chain.toml")),
+    ("arm.sdf", include_str!("../files/arm.sdf")),
+    ("dh.toml", include_str!("../files/dh.toml")),
 ];
 
 /// Marsaglia's xorshift.
@@ -146,6 +148,7 @@ fn deep_nesting() {
         ("i.toml", wrap("[a]\n[[a.b]]\n", "")),
         ("j.toml", format!("{}\"a\" = 1", wrap("\"a\" . ", ""))),
         ("k.toml", format!("{}'a' = 1", wrap("'#'.\"'\" . ", ""))),
+        ("m.sdf", format!("<sdf version=\"1.9\">{}</sdf>", wrap("<model name=\"m\">", "</model>"))),
         ("l.urdf", format!("<robot name=\"r\">{}", wrap("<a xmlns:x=\"y\">", ""))),
     ];
     for (path, text) in bad {

@@ -11,6 +11,8 @@ use straightline_core::Dd;
 const AWKWARD: &str = include_str!("../files/awkward.urdf");
 const ARM: &str = include_str!("../files/arm.toml");
 const CHAIN: &str = include_str!("../files/chain.toml");
+const SDF: &str = include_str!("../files/arm.sdf");
+const DH: &str = include_str!("../files/dh.toml");
 
 fn model_of(path: &str, text: &str, options: &ModelOptions) -> (Model<Dd>, Diagnostics) {
     let (model, diagnostics) = load(&Source::new(path, text), options);
@@ -126,6 +128,8 @@ fn formats_are_told_apart_by_their_text() {
         ("a.toml", ARM, "TOML with joint frames"),
         ("a", ARM, "TOML with joint frames"),
         ("a.toml", CHAIN, "TOML with centres of mass"),
+        ("a.xml", SDF, "SDF"),
+        ("a", DH, "TOML with joint frames"),
     ] {
         let description = description::read(&Source::new(path, text), &mut Diagnostics::new()).expect("it can be read");
         assert_eq!(description.format.name, format, "{path}");

@@ -15,7 +15,7 @@ use straightline_codegen::verify::reference_input::centre_of_mass_tree;
 use straightline_core::model::JointEffects;
 
 /// A joint of a random robot in joint frames; joint j moves link j + 1.
-struct RandomJoint {
+pub(crate) struct RandomJoint {
     kind: &'static str,
     parent: usize,
     xyz: [f64; 3],
@@ -23,7 +23,7 @@ struct RandomJoint {
     axis: [f64; 3],
 }
 
-struct RandomLink {
+pub(crate) struct RandomLink {
     mass: f64,
     com: [f64; 3],
     rpy: [f64; 3],
@@ -31,7 +31,7 @@ struct RandomLink {
     inertia: [f64; 6],
 }
 
-struct RandomRobot {
+pub(crate) struct RandomRobot {
     /// `None`: the file gives no inertia.
     links: Vec<Option<RandomLink>>,
     joints: Vec<RandomJoint>,
@@ -71,7 +71,7 @@ fn random_link(random: &mut Random) -> RandomLink {
     }
 }
 
-fn random_robot(random: &mut Random, links: usize, floating: bool) -> RandomRobot {
+pub(crate) fn random_robot(random: &mut Random, links: usize, floating: bool) -> RandomRobot {
     let mut robot = RandomRobot { links: Vec::new(), joints: Vec::new() };
     // the root of a fixed robot is the world: often without inertia
     robot.links.push((floating || random.below(2) == 0).then(|| random_link(random)));
@@ -95,7 +95,7 @@ fn words(v: &[f64; 3]) -> String {
     format!("{:?} {:?} {:?}", v[0], v[1], v[2])
 }
 
-fn urdf(random: &mut Random, robot: &RandomRobot) -> String {
+pub(crate) fn urdf(random: &mut Random, robot: &RandomRobot) -> String {
     let mut elements = Vec::new();
     for (j, link) in robot.links.iter().enumerate() {
         let inertial = link.as_ref().map_or_else(String::new, |link| {
@@ -140,7 +140,7 @@ fn toml_angles(random: &mut Random, stem: &str, rpy: &[f64; 3]) -> String {
     format!("{stem}{unit} = {values:?}")
 }
 
-fn joint_frame_toml(random: &mut Random, robot: &RandomRobot, floating: bool) -> String {
+pub(crate) fn joint_frame_toml(random: &mut Random, robot: &RandomRobot, floating: bool) -> String {
     let base = if floating { "base = \"floating\"\n" } else { "" };
     let mut text = format!("[robot]\nname = \"random\"\ngravity = {:?}\n{base}", triple(random, 9.0));
     for (j, link) in robot.links.iter().enumerate() {
@@ -178,7 +178,7 @@ fn upper_end(random: &mut Random) -> String {
     }
 }
 
-fn chapter_toml(random: &mut Random, links: usize) -> String {
+pub(crate) fn chapter_toml(random: &mut Random, links: usize) -> String {
     let mut text = format!("name = \"random\"\ngravity = {:?}\n[base]\n{}", triple(random, 9.0), upper_end(random));
     for j in 0..links {
         let RandomLink { mass, com: r, inertia: [xx, yy, zz, xy, xz, yz], .. } = random_link(random);
@@ -302,6 +302,16 @@ fn both_readings_of_random_joint_frame_toml_agree() {
         let options = random_options(&mut random, moving_joints(&robot), false);
         let text = joint_frame_toml(&mut random, &robot, floating);
         compare_file(&mut disagreement, &format!("toml, seed {seed}"), text, &options, &mut random);
+    }
+    disagreement.judge();
+}
+
+#[test]
+fn both_readings_of_frames_in_frames_agree() {
+    let mut disagreement = Disagreement::default();
+    for (name, text) in [("arm.sdf", include_str!("../files/arm.sdf")), ("dh.toml", include_str!("../files/dh.toml"))] {
+        let options = ModelOptions { uncoupled: true, ..ModelOptions::default() };
+        compare_source(&mut disagreement, name, &Source::new(name, text), &options, &mut Random(3));
     }
     disagreement.judge();
 }

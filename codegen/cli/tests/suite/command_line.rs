@@ -133,7 +133,9 @@ fn usage_ends_with_2_and_files_with_3() {
 
 #[test]
 fn help_shows_examples_and_exit_codes() {
-    for arguments in [&["--help"][..], &["generate", "--help"], &["export", "--help"], &["verify", "--help"]] {
+    for arguments in
+        [&["--help"][..], &["generate", "--help"], &["export", "--help"], &["convert", "--help"], &["verify", "--help"]]
+    {
         let run = straightline(arguments);
         assert_eq!(run.code, 0);
         assert!(run.out.contains("Examples:") && run.out.contains("Exit codes:"), "{}", run.out);
@@ -239,6 +241,7 @@ fn no_command_writes_over_what_it_reads() {
         vec!["generate", robot.to_str().unwrap(), "-o", robot.to_str().unwrap()],
         vec!["generate", robot.to_str().unwrap(), "-o", inside.to_str().unwrap()],
         vec!["report", robot.to_str().unwrap(), "--html", robot.to_str().unwrap()],
+        vec!["convert", robot.to_str().unwrap(), robot.to_str().unwrap()],
         vec!["generate", robot.to_str().unwrap(), "--scene", scene.to_str().unwrap(), "-o", scene.to_str().unwrap()],
     ];
     let link = directory.join("link.rs");
@@ -254,6 +257,43 @@ fn no_command_writes_over_what_it_reads() {
         assert_eq!(fs::read_to_string(&robot).unwrap(), text, "{command:?}");
         assert_eq!(fs::read_to_string(&scene).unwrap(), "[zero]\nqd = true\n", "{command:?}");
     }
+}
+
+#[test]
+fn convert_writes_the_same_robot_or_nothing() {
+    let directory = scratch("convert");
+    let path = |name: &str| directory.join(name).to_str().unwrap().to_string();
+    let [mjcf, urdf, back] = ["arm.xml", "arm.urdf", "back.toml"].map(path);
+    assert_eq!(straightline(&["convert", ARM, &mjcf, "-q"]).code, 0);
+    assert_eq!(straightline(&["convert", &mjcf, &urdf, "-q", "--lossy"]).code, 0);
+    assert_eq!(straightline(&["convert", &urdf, &back, "-q"]).code, 0);
+    for robot in [&mjcf, &urdf, &back] {
+        assert_eq!(straightline(&["check", robot]).code, 0, "{robot}");
+    }
+    // refused, with the list of what is lost: nothing is written
+    let spring = path("spring.toml");
+    fs::write(&spring, fs::read_to_string(ARM).unwrap().replacen("axis =", "spring = { stiffness = 2.0 }\naxis =", 1))
+        .unwrap();
+    let refused = straightline(&["convert", &spring, &path("spring.urdf")]);
+    assert_eq!((refused.code, refused.out.as_str()), (1, ""));
+    assert!(refused.err.contains("error[not-in-format]: URDF has no place for springs"), "{}", refused.err);
+    assert!(!names(&directory).contains(&"spring.urdf".to_string()));
+    assert_eq!(straightline(&["convert", &spring, &path("spring.urdf"), "--lossy"]).code, 0);
+    // no format, and one that is said
+    let nameless = straightline(&["convert", ARM, &path("arm.txt")]);
+    assert_eq!(nameless.code, 1);
+    assert!(nameless.err.contains("the name says no format") && nameless.err.contains("`.mjcf`"), "{}", nameless.err);
+    assert_eq!(straightline(&["convert", ARM, &path("arm.txt"), "--to", "mjcf", "-q"]).code, 0);
+    assert_eq!(straightline(&["convert", ARM, &path("arm.txt"), "--to", "sdif"]).code, 2);
+    assert_eq!(straightline(&["convert", "nowhere.urdf", &path("arm.xml")]).code, 3);
+    // what a file includes is read, too
+    let (whole, part) = (path("whole.xml"), path("part.xml"));
+    let body = "<body><joint/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/></body>";
+    fs::write(&whole, "<mujoco><worldbody><include file=\"part.xml\"/></worldbody></mujoco>").unwrap();
+    fs::write(&part, format!("<mujocoinclude>{body}</mujocoinclude>")).unwrap();
+    let over = straightline(&["convert", &whole, &part]);
+    assert!(over.code == 3 && over.err.contains("this is the input"), "{}", over.err);
+    assert!(fs::read_to_string(&part).unwrap().starts_with("<mujocoinclude>"));
 }
 
 #[test]

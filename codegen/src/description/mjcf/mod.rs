@@ -23,7 +23,7 @@ mod settings;
 mod vocabulary;
 
 use super::reader::FileReader;
-use super::{Description, FileFormat, Noted, WrittenJoint};
+use super::{xml, Description, FileFormat, Noted, WrittenJoint};
 use crate::diagnostic::{Diagnostics, Place, Source};
 use classes::DefaultClasses;
 use files::{Element, Files};
@@ -35,29 +35,12 @@ pub(super) const FORMAT: FileFormat = FileFormat {
     name: "MJCF",
     extensions: &["mjcf"],
     signs: "XML whose root element is `<mujoco>`",
-    sniff: is_mjcf,
+    sniff: |text| ["mujoco", "mujocoinclude"].contains(&xml::root_name(text)),
     dialect: Dialect::Mjcf,
     limits: "write `range=\"...\"`, or `limited=\"false\"`",
     read,
+    write: Some(&super::write::mjcf::WRITER),
 };
-
-/// Whether the first element of a text is `mujoco` or `mujocoinclude`.
-fn is_mjcf(text: &str) -> bool {
-    let mut rest = text.trim_start();
-    loop {
-        let end = match rest {
-            _ if rest.starts_with("<?") => "?>",
-            _ if rest.starts_with("<!--") => "-->",
-            _ if rest.starts_with("<!") => ">",
-            _ => break,
-        };
-        let Some(at) = rest.find(end) else { return false };
-        rest = rest[at + end.len()..].trim_start();
-    }
-    let name = rest.strip_prefix('<').unwrap_or("");
-    let end = name.find(|c: char| !c.is_ascii_alphanumeric()).unwrap_or(name.len());
-    ["mujoco", "mujocoinclude"].contains(&&name[..end])
-}
 
 /// A file that is being read, with what it includes.
 struct Mjcf<'s> {

@@ -88,13 +88,17 @@ pub enum Dialect {
     CentresOfMass,
     /// MJCF.
     Mjcf,
+    /// SDF.
+    Sdf,
 }
 
 impl Dialect {
     /// Files that describe joints by frames.
     pub const FRAMES: &'static [Dialect] = &[Dialect::Urdf, Dialect::JointFrames];
     /// Files that call joints by the words of mechanics: all but MJCF, which has words of its own.
-    pub const NAMED: &'static [Dialect] = &[Dialect::Urdf, Dialect::JointFrames, Dialect::CentresOfMass];
+    pub const NAMED: &'static [Dialect] = &[Dialect::Urdf, Dialect::JointFrames, Dialect::CentresOfMass, Dialect::Sdf];
+    /// Files that have joints which do not move.
+    pub const WITH_FIXED: &'static [Dialect] = &[Dialect::Urdf, Dialect::JointFrames, Dialect::Sdf];
 }
 
 impl JointKind {

@@ -10,7 +10,7 @@ pub(super) const ROW: Descriptor = Descriptor {
     name: "revolute",
     words: &[
         Word::ranged("revolute", Dialect::NAMED),
-        Word { text: "continuous", has_range: false, dialects: Dialect::FRAMES },
+        Word { text: "continuous", has_range: false, dialects: Dialect::WITH_FIXED },
         Word::ranged("hinge", &[Dialect::Mjcf]),
     ],
     number: None,

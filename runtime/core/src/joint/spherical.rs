@@ -16,7 +16,7 @@ pub(super) const ROW: Descriptor = Descriptor {
         Word {
             text: "ball",
             has_range: false,
-            dialects: &[Dialect::Urdf, Dialect::JointFrames, Dialect::Mjcf],
+            dialects: &[Dialect::Urdf, Dialect::JointFrames, Dialect::Mjcf, Dialect::Sdf],
         },
     ],
     number: None,

@@ -1,0 +1,152 @@
+//! Where joints stand, as another format has it.
+//!
+//! A joint that stands anywhere in the frame of its link has the pose of that frame in the parent's at q = 0, its own place and its axis. One that
+//! stands at the frame of the link that it moves needs a link there: `LINK_at_joint`, without mass, on which the link itself is fixed, so that
+//! masses and frames keep their numbers.
+
+use crate::description::write::{quaternion, FormatWriter, JointForm};
+use crate::description::{
+    AnchoredJoint, Description, JointDrive, JointLimits, JointType, Noted, Placement, Rotation, WrittenJoint,
+    WrittenLink, WrittenPose, WrittenTurn,
+};
+use crate::diagnostic::{Diagnostics, Place};
+use crate::model::angle::{transform, ROUNDING};
+use crate::model::geometry::{compose, unit, vector};
+use crate::model::pose_at_zero;
+use std::collections::HashSet;
+use straightline_core::spatial::{Mat3, Transform};
+use straightline_core::Dd;
+
+/// A longer or shorter axis is written with length 1.
+const AXIS_DIGITS: f64 = 1e-9;
+
+/// The same robot with its joints as a format has them, and its frames; `None`: a joint stands nowhere.
+pub fn formed(robot: &Description, writer: &FormatWriter) -> Option<Description> {
+    let mut formed = robot.clone();
+    for joint in &mut formed.joints {
+        joint.placement = anywhere(joint)?;
+    }
+    let mut names = FreeNames::of(robot);
+    if writer.joints == JointForm::AtFrames {
+        at_frames(&mut formed, &mut names);
+    }
+    if writer.frames_are_links {
+        for frame in std::mem::take(&mut formed.frames) {
+            let own = names.joint(format!("{}_fixed", frame.name.value));
+            formed.links.push(WrittenLink { name: frame.name.clone(), inertial: None, is_carrier: false });
+            formed.joints.push(fixed_joint(own, frame.link, frame.name, frame.pose));
+        }
+    }
+    Some(formed)
+}
+
+/// Names that are taken.
+struct FreeNames {
+    links: HashSet<String>,
+    joints: HashSet<String>,
+}
+
+impl FreeNames {
+    fn of(robot: &Description) -> FreeNames {
+        let links = robot.links.iter().map(|link| &link.name).chain(robot.frames.iter().map(|frame| &frame.name));
+        FreeNames {
+            links: links.map(|name| name.value.clone()).collect(),
+            joints: robot.joints.iter().map(|joint| joint.name.value.clone()).collect(),
+        }
+    }
+
+    fn link(&mut self, name: String) -> String {
+        free_name(name, &mut self.links)
+    }
+
+    fn joint(&mut self, name: String) -> String {
+        free_name(name, &mut self.joints)
+    }
+}
+
+/// A joint by the frames of its links, with the joint anywhere in them; a fixed one by frames alone.
+fn anywhere(joint: &WrittenJoint) -> Option<Placement> {
+    let (anchor, axis) = match &joint.placement {
+        Placement::Frames { .. } if joint.kind.value.between_links().is_none() => return Some(joint.placement.clone()),
+        Placement::Frames { origin, axis } => {
+            let anchor = Noted::assumed([0.0; 3]);
+            let axis = if joint.kind.value.has_axis() { axis.clone() } else { Noted::assumed([0.0, 0.0, 1.0]) };
+            let origin = origin.clone();
+            return Some(Placement::Anchored(AnchoredJoint { origin, anchor, axis, reference: None }));
+        }
+        Placement::Anchored(AnchoredJoint { reference: None, .. }) => return Some(joint.placement.clone()),
+        Placement::Anchored(AnchoredJoint { anchor, axis, .. }) => (anchor.value, axis.value),
+        Placement::Vectors(vectors) => (vectors.r.value.map(|x| 0.0 - x), vectors.e.value),
+    };
+    let pose = pose_at_zero(joint, ROUNDING, &mut Diagnostics::new())?;
+    let [anchor, axis] = [anchor, axis].map(Noted::assumed);
+    Some(Placement::Anchored(AnchoredJoint { origin: written(&pose), anchor, axis, reference: None }))
+}
+
+/// A pose rounded to f64, its rotation as a quaternion.
+fn written(pose: &Transform<Dd>) -> WrittenPose {
+    let turns = match pose.rotation == Mat3::identity() {
+        true => Vec::new(),
+        false => vec![WrittenTurn::Quaternion(Noted::assumed(quaternion(&pose.rotation)))],
+    };
+    WrittenPose { xyz: Noted::assumed(pose.translation.to_array().map(Dd::to_f64)), rotation: Rotation::Turns(turns) }
+}
+
+/// Brings joints to frames of links.
+fn at_frames(robot: &mut Description, names: &mut FreeNames) {
+    let mut joints = Vec::new();
+    for mut joint in std::mem::take(&mut robot.joints) {
+        let Placement::Anchored(AnchoredJoint { mut origin, anchor, axis, .. }) = joint.placement else {
+            joints.push(joint);
+            continue;
+        };
+        let axis = Noted::assumed(of_length_one(axis.value));
+        let anchor = anchor.value;
+        let mut fixed = None;
+        if anchor != [0.0; 3] {
+            let at_joint = Transform { rotation: Mat3::identity(), translation: vector(anchor) };
+            let moved = compose(&transform(&origin, ROUNDING), &at_joint);
+            origin.xyz = Noted::assumed(moved.translation.to_array().map(Dd::to_f64));
+            let link = Noted::assumed(names.link(format!("{}_at_joint", joint.child.value)));
+            robot.links.push(WrittenLink { name: link.clone(), inertial: None, is_carrier: false });
+            let own = names.joint(format!("{}_fixed", joint.child.value));
+            let child = std::mem::replace(&mut joint.child, link.clone());
+            let back =
+                WrittenPose { xyz: Noted::assumed(anchor.map(|x| 0.0 - x)), ..WrittenPose::identity(Place::none()) };
+            fixed = Some(fixed_joint(own, link, child, back));
+        }
+        joint.placement = Placement::Frames { origin, axis };
+        joints.push(joint);
+        joints.extend(fixed);
+    }
+    robot.joints = joints;
+}
+
+/// A joint that does not move.
+fn fixed_joint(name: String, parent: Noted<String>, child: Noted<String>, origin: WrittenPose) -> WrittenJoint {
+    WrittenJoint {
+        name: Noted::assumed(name),
+        kind: Noted::assumed(JointType::FIXED),
+        parent,
+        child,
+        placement: Placement::Frames { origin, axis: Noted::assumed([0.0, 0.0, 1.0]) },
+        limits: JointLimits::default(),
+        drive: JointDrive::default(),
+    }
+}
+
+/// The axis as it is where it is that long, as it is written with so many digits.
+fn of_length_one(axis: [f64; 3]) -> [f64; 3] {
+    let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
+    match unit(vector(axis)) {
+        Some(unit) if (length - 1.0).abs() > AXIS_DIGITS => unit.to_array().map(Dd::to_f64),
+        _ => axis,
+    }
+}
+
+/// A name that is not taken yet, with a number after it if need be.
+fn free_name(name: String, taken: &mut HashSet<String>) -> String {
+    let numbered = (2..).map(|n| format!("{name}_{n}"));
+    let free = std::iter::once(name.clone()).chain(numbered).find(|own| taken.insert(own.clone()));
+    free.unwrap_or(name)
+}

@@ -1,0 +1,85 @@
+//! Robot files as text: what writes a format, and what several of them need.
+//!
+//! A writer takes a [`Description`] whose joints all stand as its format says it ([`JointForm`]), and that has nothing left which the format
+//! cannot say ([`losses`]). Numbers are the shortest that read back to the same f64.
+
+mod drives;
+pub mod losses;
+pub(super) mod mjcf;
+mod rotations;
+pub(super) mod toml;
+pub(super) mod urdf;
+
+use super::{Description, JointType};
+use losses::Loss;
+pub(crate) use rotations::quaternion;
+use std::fmt::Write;
+use straightline_core::joint::{Dialect, JointKind};
+
+/// What writes files of a format.
+#[derive(Debug)]
+pub struct FormatWriter {
+    /// The word for the format on the command line.
+    pub word: &'static str,
+    /// How names of files end that are to be of this format.
+    pub extensions: &'static [&'static str],
+    /// How joints stand in it.
+    pub joints: JointForm,
+    /// How it says rotations, for who reads about it.
+    pub rotations: &'static str,
+    /// Whether links are all the frames that it has.
+    pub frames_are_links: bool,
+    /// What it has no place for, or says in another way.
+    pub losses: &'static [&'static Loss],
+    /// Whether a robot that floats is read as that only if the reader is told.
+    pub floats_by_option: bool,
+    /// The text of a robot.
+    pub text: fn(&Description) -> String,
+}
+
+/// Where joints stand in a format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointForm {
+    /// At the frame of the link that they move.
+    AtFrames,
+    /// Anywhere in it.
+    Anywhere,
+}
+
+/// The words of a joint in a format: that with a range if it has one, or else that without; `None`: it has none.
+fn word_of(kind: Option<JointKind>, is_ranged: bool, dialect: Dialect) -> Option<&'static str> {
+    let words = JointType::words(dialect);
+    let all = || words.iter().filter(|(_, t)| t.kind == kind && t.composite.is_none());
+    let fit = all().find(|(_, t)| t.has_range == is_ranged).or_else(|| all().next());
+    fit.map(|(word, _)| *word)
+}
+
+/// Numbers with spaces between them.
+fn numbers(all: &[f64]) -> String {
+    all.iter().map(|x| number(*x)).collect::<Vec<_>>().join(" ")
+}
+
+/// The shortest number that reads back as that; whole ones without a point, zero without a sign.
+fn number(x: f64) -> String {
+    match x {
+        0.0 => "0".to_string(),
+        _ if x.fract() == 0.0 && x.abs() < 1e15 => format!("{x:.0}"),
+        _ => format!("{x:?}"),
+    }
+}
+
+/// An attribute of XML with a space before it.
+fn attribute(name: &str, value: &str) -> String {
+    let mut text = format!(" {name}=\"");
+    for c in value.chars() {
+        match c {
+            '&' => text += "&amp;",
+            '<' => text += "&lt;",
+            '>' => text += "&gt;",
+            '"' => text += "&quot;",
+            '\t' | '\n' | '\r' => _ = write!(text, "&#{};", u32::from(c)),
+            _ => text.push(c),
+        }
+    }
+    text + "\""
+}

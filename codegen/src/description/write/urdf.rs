@@ -1,0 +1,128 @@
+//! URDF: links with their inertials, then joints. Frames are links without mass on fixed joints.
+
+use super::{attribute, losses, number, numbers, rotations, word_of, FormatWriter, JointForm};
+use crate::description::{
+    Description, JointLimits, JointType, Noted, Placement, Rotation, WrittenInertial, WrittenJoint, WrittenPose,
+};
+use std::fmt::Write;
+use straightline_core::joint::Dialect;
+
+/// Writes a URDF.
+pub static WRITER: FormatWriter = FormatWriter {
+    word: "urdf",
+    extensions: &["urdf"],
+    joints: JointForm::AtFrames,
+    rotations: "roll, pitch and yaw in radians",
+    frames_are_links: true,
+    losses: &[
+        &losses::SPRINGS,
+        &losses::ROTORS,
+        &losses::GRAVITY,
+        &losses::DRIVES,
+        &losses::FLEXIBLE_LINKS,
+        &losses::BALL_JOINTS,
+        &losses::FLOATING_BASE,
+        &losses::CARRIERS,
+        &losses::JOINTS_BESIDE_FRAMES,
+        &losses::NAMED_FRAMES,
+        &losses::SKIPPED,
+    ],
+    floats_by_option: true,
+    text,
+};
+
+fn text(robot: &Description) -> String {
+    let mut out = format!("<?xml version=\"1.0\"?>\n<robot{}>\n", attribute("name", &robot.name.value));
+    for link in &robot.links {
+        let name = attribute("name", &link.name.value);
+        match &link.inertial {
+            None => _ = writeln!(out, "  <link{name}/>"),
+            Some(inertial) => {
+                _ = writeln!(
+                    out,
+                    "  <link{name}>\n    <inertial>\n{}    </inertial>\n  </link>",
+                    of_inertial(inertial)
+                );
+            }
+        }
+    }
+    for joint in &robot.joints {
+        out += &of_joint(joint, robot);
+    }
+    out + "</robot>\n"
+}
+
+/// An origin, or nothing where frames coincide.
+fn origin(xyz: &[f64; 3], rotation: &Rotation, indent: &str) -> String {
+    let rpy = rotations::roll_pitch_yaw(rotation);
+    if *xyz == [0.0; 3] && rpy == [0.0; 3] {
+        return String::new();
+    }
+    let (xyz, rpy) = (attribute("xyz", &numbers(xyz)), attribute("rpy", &numbers(&rpy)));
+    format!("{indent}<origin{xyz}{rpy}/>\n")
+}
+
+fn of_inertial(inertial: &WrittenInertial) -> String {
+    let j = &inertial.inertia.value;
+    let mut out = origin(&inertial.com.value, &inertial.rotation, "      ");
+    _ = writeln!(out, "      <mass{}/>", attribute("value", &number(inertial.mass.value)));
+    out += "      <inertia";
+    for (name, entry) in [("ixx", j.xx), ("ixy", j.xy), ("ixz", j.xz), ("iyy", j.yy), ("iyz", j.yz), ("izz", j.zz)] {
+        out += &attribute(name, &number(entry));
+    }
+    out + "/>\n"
+}
+
+fn of_joint(joint: &WrittenJoint, robot: &Description) -> String {
+    let Placement::Frames { origin: WrittenPose { xyz, rotation }, axis } = &joint.placement else {
+        unreachable!("joints stand at the frames of links");
+    };
+    let kind = joint.kind.value;
+    let limits = &joint.limits;
+    let is_ranged = kind.has_range && (limits.lower.is_some() || limits.upper.is_some());
+    let word = word_of(kind.between_links(), is_ranged, Dialect::Urdf).unwrap_or(kind.word);
+    let mut out = format!("  <joint{}{}>\n", attribute("name", &joint.name.value), attribute("type", word));
+    _ = writeln!(out, "    <parent{}/>", attribute("link", &joint.parent.value));
+    _ = writeln!(out, "    <child{}/>", attribute("link", &joint.child.value));
+    out += &origin(&xyz.value, rotation, "    ");
+    if kind.has_axis() {
+        _ = writeln!(out, "    <axis{}/>", attribute("xyz", &numbers(&axis.value)));
+    }
+    out += &of_limits(limits, is_ranged, word);
+    let effects = [("damping", &joint.drive.damping), ("friction", &joint.drive.friction)];
+    out += &element("dynamics", &effects.map(|(name, value)| (name, value.as_ref().map(|value| value.value))));
+    for coupling in robot.couplings.iter().filter(|coupling| coupling.joint.value == joint.name.value) {
+        let (ratio, offset) = (number(coupling.ratio.value), number(coupling.offset.value));
+        let numbers = attribute("multiplier", &ratio) + &attribute("offset", &offset);
+        _ = writeln!(out, "    <mimic{}{numbers}/>", attribute("joint", &coupling.source.value));
+    }
+    out + "  </joint>\n"
+}
+
+/// Both ends of a range, of which one may be infinite: a limit that is left out is 0 in this format. Joints that slide always have a range.
+fn of_limits(limits: &JointLimits, is_ranged: bool, word: &str) -> String {
+    let needs_range = JointType::words(Dialect::Urdf).iter().any(|(known, t)| *known == word && t.has_range);
+    let value = |limit: &Option<Noted<f64>>| limit.as_ref().map(|limit| limit.value);
+    let end = |limit: &Option<Noted<f64>>, otherwise: f64| {
+        needs_range.then(|| value(limit).filter(|_| is_ranged).unwrap_or(otherwise))
+    };
+    element(
+        "limit",
+        &[
+            ("lower", end(&limits.lower, f64::NEG_INFINITY)),
+            ("upper", end(&limits.upper, f64::INFINITY)),
+            ("effort", value(&limits.effort)),
+            ("velocity", value(&limits.velocity)),
+        ],
+    )
+}
+
+/// An element with the attributes that have a number; nothing where none has.
+fn element(name: &str, attributes: &[(&str, Option<f64>)]) -> String {
+    let given = attributes.iter().filter_map(|(name, value)| Some(attribute(name, &number((*value)?))));
+    let given: String = given.collect();
+    match given.is_empty() {
+        true => given,
+        false => format!("    <{name}{given}/>\n"),
+    }
+}
