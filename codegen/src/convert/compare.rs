@@ -4,6 +4,8 @@ use crate::description::write::FormatWriter;
 use crate::description::{self, Description, FileFormat};
 use crate::diagnostic::{Diagnostics, Severity, Source};
 use crate::model::{self, ModelOptions};
+use std::collections::HashSet;
+use straightline_core::closure::Loop;
 use straightline_core::model::{Body, Frame, Model};
 use straightline_core::spatial::{SpatialInertia, Transform};
 use straightline_core::Dd;
@@ -54,8 +56,20 @@ pub fn of_models(wanted: &Model<Dd>, found: &Model<Dd>) -> Option<String> {
         bodies.filter_map(|(a, b)| of_bodies(a, b, longest).map(|what| format!("joint `{}`: {what}", a.joint.name)));
     let frames = wanted.frames.iter().filter_map(|frame| of_frames(frame, &found.frames, longest));
     let couplings = (wanted.couplings != found.couplings).then(|| "couplings are others".to_string());
+    let loops = (!are_loops(wanted, found, longest)).then(|| "loops are others".to_string());
     let drives = (wanted.drives != found.drives).then(|| "drives are others".to_string());
-    bodies.chain(frames).chain(couplings).chain(drives).next()
+    bodies.chain(frames).chain(couplings).chain(loops).chain(drives).next()
+}
+
+/// Whether the same points coincide, and determine the same joints.
+fn are_loops(wanted: &Model<Dd>, found: &Model<Dd>, longest: f64) -> bool {
+    let (a, b) = (&wanted.closure, &found.closure);
+    let bodies = |model: &Model<Dd>| model.closure.dependents().collect::<HashSet<_>>();
+    let ends = |(a, b): (&Loop<Dd>, &Loop<Dd>)| {
+        let mut ends = a.ends.iter().zip(&b.ends);
+        ends.all(|(a, b)| a.body == b.body && all_near(&a.point.to_array(), &b.point.to_array(), longest))
+    };
+    a.loops.len() == b.loops.len() && bodies(wanted) == bodies(found) && a.loops.iter().zip(&b.loops).all(ends)
 }
 
 fn magnitude(pose: &Transform<Dd>) -> f64 {

@@ -41,13 +41,13 @@ pub fn formed(robot: &Description, writer: &FormatWriter) -> Option<Description>
 }
 
 /// Names that are taken.
-struct FreeNames {
+pub(super) struct FreeNames {
     links: HashSet<String>,
     joints: HashSet<String>,
 }
 
 impl FreeNames {
-    fn of(robot: &Description) -> FreeNames {
+    pub(super) fn of(robot: &Description) -> FreeNames {
         let links = robot.links.iter().map(|link| &link.name).chain(robot.frames.iter().map(|frame| &frame.name));
         FreeNames {
             links: links.map(|name| name.value.clone()).collect(),
@@ -55,7 +55,8 @@ impl FreeNames {
         }
     }
 
-    fn link(&mut self, name: String) -> String {
+    /// A name like that of a link or a frame.
+    pub(super) fn link(&mut self, name: String) -> String {
         free_name(name, &mut self.links)
     }
 

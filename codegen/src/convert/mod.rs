@@ -11,6 +11,7 @@
 
 pub mod compare;
 pub mod forms;
+mod loops;
 pub mod messages;
 
 use crate::description::write::losses::{Loss, LossWeight};
@@ -67,7 +68,8 @@ pub fn convert(
     let mut robot = description::read(source, diagnostics)?;
     // what is wrong with the robot is said before what the format cannot say
     let model_options = ModelOptions { floating_base: options.floating_base, ..ModelOptions::default() };
-    model::build(&robot, &model_options, diagnostics)?;
+    let model = model::build(&robot, &model_options, diagnostics)?;
+    loops::by_frames(&mut robot, &model);
     if options.floating_base {
         robot.base = Some(Noted::assumed(BaseKind::Floating));
     }

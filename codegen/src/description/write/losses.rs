@@ -246,6 +246,24 @@ pub static SOFT_COUPLINGS: Loss = Loss {
     remove: |_| (),
 };
 
+/// Loops, which another program may hold only about.
+pub static SOFT_LOOPS: Loss = Loss {
+    what: "closed loops",
+    weight: Form,
+    then: "`equality/connect` is written, exact here and a soft constraint in MuJoCo itself, and motors at the independent joints",
+    find: loops,
+    remove: |_| (),
+};
+
+/// Loops.
+pub static LOOPS: Loss = Loss {
+    what: "closed loops",
+    weight: Dynamics,
+    then: "the robot is the tree that is left where they are cut",
+    find: loops,
+    remove: |robot| robot.loops.clear(),
+};
+
 /// Ball joints.
 pub static BALL_JOINTS: Loss = Loss {
     what: "ball joints",
@@ -314,6 +332,10 @@ pub static SKIPPED: Loss = Loss {
     },
     remove: |robot| robot.ignored.clear(),
 };
+
+fn loops(robot: &Description) -> Vec<(String, Place)> {
+    robot.loops.iter().map(|own| (format!("loop `{}`", own.name.value), own.name.place.clone())).collect()
+}
 
 /// Joints of which something stands somewhere.
 fn of_joints(robot: &Description, find: impl Fn(&WrittenJoint) -> Option<Place>) -> Vec<(String, Place)> {

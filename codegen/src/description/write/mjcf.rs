@@ -7,7 +7,7 @@ use super::rotations::{self, Said};
 use super::{attribute, losses, number, numbers, word_of, FormatWriter, JointForm};
 use crate::description::angle::{self, ROUNDING};
 use crate::description::{
-    AnchoredJoint, Description, NamedFrame, Placement, Rotation, WrittenInertial, WrittenJoint, WrittenLink,
+    AnchoredJoint, Description, LoopPoints, NamedFrame, Placement, Rotation, WrittenInertial, WrittenJoint, WrittenLink,
     WrittenPose,
 };
 use std::collections::HashMap;
@@ -35,6 +35,7 @@ pub static WRITER: FormatWriter = FormatWriter {
         &losses::MASS_OF_THE_WORLD,
         &losses::NAMES_OF_FIXED_JOINTS,
         &losses::SOFT_COUPLINGS,
+        &losses::SOFT_LOOPS,
         &losses::SKIPPED,
     ],
     floats_by_option: false,
@@ -48,16 +49,35 @@ fn text(robot: &Description) -> String {
         _ = writeln!(out, "  <option{}/>", attribute("gravity", &numbers(&gravity.value)));
     }
     out += &Bodies::of(robot).text();
-    if !robot.couplings.is_empty() {
+    if !robot.couplings.is_empty() || !robot.loops.is_empty() {
         out += "  <equality>\n";
         for coupling in &robot.couplings {
             let ends = attribute("joint1", &coupling.joint.value) + &attribute("joint2", &coupling.source.value);
             let line = numbers(&[coupling.offset.value, coupling.ratio.value, 0.0, 0.0, 0.0]);
             _ = writeln!(out, "    <joint{ends}{}/>", attribute("polycoef", &line));
         }
+        for own in &robot.loops {
+            let LoopPoints::Frames([one, other]) = &own.points else { unreachable!("loops are closed at frames") };
+            let sites = attribute("site1", &one.value) + &attribute("site2", &other.value);
+            _ = writeln!(out, "    <connect{}{sites}/>", attribute("name", &own.name.value));
+        }
         out += "  </equality>\n";
     }
+    if !robot.loops.is_empty() {
+        out += &motors(robot);
+    }
     out + "</mujoco>\n"
+}
+
+/// A motor at each joint that no loop determines: those without become dependent first.
+fn motors(robot: &Description) -> String {
+    let determined = |name: &str| robot.loops.iter().flat_map(|own| &own.determines).any(|own| own.value == name);
+    let single = |joint: &&WrittenJoint| joint.kind.value.between_links().is_some_and(|kind| kind.is_single());
+    let mut out = "  <actuator>\n".to_string();
+    for joint in robot.joints.iter().filter(single).filter(|joint| !determined(&joint.name.value)) {
+        _ = writeln!(out, "    <motor{}/>", attribute("joint", &joint.name.value));
+    }
+    out + "  </actuator>\n"
 }
 
 /// What stands on each link.

@@ -48,6 +48,14 @@ fn text(robot: &Description) -> String {
         _ = writeln!(out, "\n[[coupling]]\njoint = {joint}\nfollows = {source}");
         _ = writeln!(out, "ratio = {}\noffset = {}", number(coupling.ratio.value), number(coupling.offset.value));
     }
+    for own in &robot.loops {
+        let LoopPoints::Frames(ends) = &own.points else { unreachable!("loops are closed at frames") };
+        let [one, other] = ends.each_ref().map(|end| string(&end.value));
+        let determines: Vec<String> = own.determines.iter().map(|joint| string(&joint.value)).collect();
+        let name = string(&own.name.value);
+        _ = writeln!(out, "\n[[loop]]\nname = {name}\nframe = {one}\nwith = {other}");
+        _ = writeln!(out, "determines = [{}]", determines.join(", "));
+    }
     for frame in &robot.frames {
         let (name, link) = (string(&frame.name.value), string(&frame.link.value));
         _ = writeln!(out, "\n[[frame]]\nname = {name}\nlink = {link}");

@@ -19,6 +19,7 @@ pub static WRITER: FormatWriter = FormatWriter {
         &losses::ROTORS,
         &losses::GRAVITY,
         &losses::DRIVES,
+        &losses::LOOPS,
         &losses::FLEXIBLE_LINKS,
         &losses::BALL_JOINTS,
         &losses::FLOATING_BASE,
