@@ -7,8 +7,8 @@ use super::rotations::{self, Said};
 use super::{attribute, losses, number, numbers, word_of, FormatWriter, JointForm};
 use crate::description::angle::{self, ROUNDING};
 use crate::description::{
-    AnchoredJoint, Description, LoopPoints, NamedFrame, Placement, Rotation, WrittenInertial, WrittenJoint, WrittenLink,
-    WrittenPose,
+    AnchoredJoint, Description, LoopPoints, NamedFrame, Placement, Rotation, WrittenInertial, WrittenJoint,
+    WrittenLink, WrittenPose,
 };
 use std::collections::HashMap;
 use std::fmt::Write;

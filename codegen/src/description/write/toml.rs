@@ -5,8 +5,8 @@ use super::{losses, number, rotations, word_of, FormatWriter, JointForm};
 use crate::description::angle::{self, ROUNDING};
 use crate::description::flexible::{Bending, Flexible};
 use crate::description::{
-    AngleUnit, BaseKind, Description, JointDrive, Noted, Placement, Rotation, WrittenInertial, WrittenJoint,
-    WrittenPose,
+    AngleUnit, BaseKind, Description, JointDrive, LoopPoints, Noted, Placement, Rotation, WrittenInertial,
+    WrittenJoint, WrittenPose,
 };
 use std::fmt::Write;
 use straightline_core::joint::Dialect;
