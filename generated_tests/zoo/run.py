@@ -25,6 +25,7 @@ PACKAGES = {
         "openarm-mujoco==2.3.0",
         "synriard==1.2.4",
     ],
+    "sdf": ["example-robot-data==6.0.0"],
 }
 # for a file
 SECONDS = 120
@@ -45,8 +46,8 @@ def unpacked(package: str, work: pathlib.Path) -> pathlib.Path:
 
 def is_robot(path: pathlib.Path, kind: str) -> bool:
     """Whether a file is a robot of this kind; parts of MJCF that others include are none."""
-    if kind == "urdf":
-        return path.suffix == ".urdf"
+    if kind in ("urdf", "sdf"):
+        return path.suffix == f".{kind}"
     if path.suffix not in (".xml", ".mjcf"):
         return False
     text = path.read_text(errors="replace")

@@ -4,16 +4,15 @@
 //! stands at the frame of the link that it moves needs a link there: `LINK_at_joint`, without mass, on which the link itself is fixed, so that
 //! masses and frames keep their numbers.
 
+use crate::description::reader::FreeNames;
 use crate::description::write::{quaternion, FormatWriter, JointForm};
 use crate::description::{
-    AnchoredJoint, Description, JointDrive, JointLimits, JointType, Noted, Placement, Rotation, WrittenJoint,
-    WrittenLink, WrittenPose, WrittenTurn,
+    AnchoredJoint, Description, Noted, Placement, Rotation, WrittenJoint, WrittenLink, WrittenPose, WrittenTurn,
 };
 use crate::diagnostic::{Diagnostics, Place};
 use crate::model::angle::{transform, ROUNDING};
 use crate::model::geometry::{compose, unit, vector};
 use crate::model::pose_at_zero;
-use std::collections::HashSet;
 use straightline_core::spatial::{Mat3, Transform};
 use straightline_core::Dd;
 
@@ -26,42 +25,33 @@ pub fn formed(robot: &Description, writer: &FormatWriter) -> Option<Description>
     for joint in &mut formed.joints {
         joint.placement = anywhere(joint)?;
     }
-    let mut names = FreeNames::of(robot);
+    let mut names = RobotNames::of(robot);
     if writer.joints == JointForm::AtFrames {
         at_frames(&mut formed, &mut names);
     }
     if writer.frames_are_links {
         for frame in std::mem::take(&mut formed.frames) {
-            let own = names.joint(format!("{}_fixed", frame.name.value));
+            let own = names.joints.made_up(&format!("{}_fixed", frame.name.value));
             formed.links.push(WrittenLink { name: frame.name.clone(), inertial: None, is_carrier: false });
-            formed.joints.push(fixed_joint(own, frame.link, frame.name, frame.pose));
+            formed.joints.push(WrittenJoint::fixed(Noted::assumed(own), frame.link, frame.name, frame.pose));
         }
     }
     Some(formed)
 }
 
-/// Names that are taken.
-pub(super) struct FreeNames {
-    links: HashSet<String>,
-    joints: HashSet<String>,
+/// Names of links and frames, and of joints.
+pub(super) struct RobotNames {
+    pub(super) links: FreeNames,
+    joints: FreeNames,
 }
 
-impl FreeNames {
-    pub(super) fn of(robot: &Description) -> FreeNames {
+impl RobotNames {
+    pub(super) fn of(robot: &Description) -> RobotNames {
+        let mut names = RobotNames { links: FreeNames::default(), joints: FreeNames::default() };
         let links = robot.links.iter().map(|link| &link.name).chain(robot.frames.iter().map(|frame| &frame.name));
-        FreeNames {
-            links: links.map(|name| name.value.clone()).collect(),
-            joints: robot.joints.iter().map(|joint| joint.name.value.clone()).collect(),
-        }
-    }
-
-    /// A name like that of a link or a frame.
-    pub(super) fn link(&mut self, name: String) -> String {
-        free_name(name, &mut self.links)
-    }
-
-    fn joint(&mut self, name: String) -> String {
-        free_name(name, &mut self.joints)
+        names.links.take(links.map(|name| name.value.clone()));
+        names.joints.take(robot.joints.iter().map(|joint| joint.name.value.clone()));
+        names
     }
 }
 
@@ -94,7 +84,7 @@ fn written(pose: &Transform<Dd>) -> WrittenPose {
 }
 
 /// Brings joints to frames of links.
-fn at_frames(robot: &mut Description, names: &mut FreeNames) {
+fn at_frames(robot: &mut Description, names: &mut RobotNames) {
     let mut joints = Vec::new();
     for mut joint in std::mem::take(&mut robot.joints) {
         let Placement::Anchored(AnchoredJoint { mut origin, anchor, axis, .. }) = joint.placement else {
@@ -108,32 +98,19 @@ fn at_frames(robot: &mut Description, names: &mut FreeNames) {
             let at_joint = Transform { rotation: Mat3::identity(), translation: vector(anchor) };
             let moved = compose(&transform(&origin, ROUNDING), &at_joint);
             origin.xyz = Noted::assumed(moved.translation.to_array().map(Dd::to_f64));
-            let link = Noted::assumed(names.link(format!("{}_at_joint", joint.child.value)));
+            let link = Noted::assumed(names.links.made_up(&format!("{}_at_joint", joint.child.value)));
             robot.links.push(WrittenLink { name: link.clone(), inertial: None, is_carrier: false });
-            let own = names.joint(format!("{}_fixed", joint.child.value));
+            let own = names.joints.made_up(&format!("{}_fixed", joint.child.value));
             let child = std::mem::replace(&mut joint.child, link.clone());
             let back =
                 WrittenPose { xyz: Noted::assumed(anchor.map(|x| 0.0 - x)), ..WrittenPose::identity(Place::none()) };
-            fixed = Some(fixed_joint(own, link, child, back));
+            fixed = Some(WrittenJoint::fixed(Noted::assumed(own), link, child, back));
         }
         joint.placement = Placement::Frames { origin, axis };
         joints.push(joint);
         joints.extend(fixed);
     }
     robot.joints = joints;
-}
-
-/// A joint that does not move.
-fn fixed_joint(name: String, parent: Noted<String>, child: Noted<String>, origin: WrittenPose) -> WrittenJoint {
-    WrittenJoint {
-        name: Noted::assumed(name),
-        kind: Noted::assumed(JointType::FIXED),
-        parent,
-        child,
-        placement: Placement::Frames { origin, axis: Noted::assumed([0.0, 0.0, 1.0]) },
-        limits: JointLimits::default(),
-        drive: JointDrive::default(),
-    }
 }
 
 /// The axis as it is where it is that long, as it is written with so many digits.
@@ -143,11 +120,4 @@ fn of_length_one(axis: [f64; 3]) -> [f64; 3] {
         Some(unit) if (length - 1.0).abs() > AXIS_DIGITS => unit.to_array().map(Dd::to_f64),
         _ => axis,
     }
-}
-
-/// A name that is not taken yet, with a number after it if need be.
-fn free_name(name: String, taken: &mut HashSet<String>) -> String {
-    let numbered = (2..).map(|n| format!("{name}_{n}"));
-    let free = std::iter::once(name.clone()).chain(numbered).find(|own| taken.insert(own.clone()));
-    free.unwrap_or(name)
 }

@@ -1,6 +1,6 @@
 //! Closed loops as every format can say them: by frames, with the joints that they determine.
 
-use super::forms::FreeNames;
+use super::forms::RobotNames;
 use crate::description::{Description, LoopPoints, NamedFrame, Noted, Rotation, WrittenLoop, WrittenPose};
 use crate::model::geometry::point;
 use straightline_core::closure::LoopEnd;
@@ -9,7 +9,7 @@ use straightline_core::Dd;
 
 /// The same loops of a robot whose model that is: two frames each, and joints by name.
 pub fn by_frames(robot: &mut Description, model: &Model<Dd>) {
-    let mut names = FreeNames::of(robot);
+    let mut names = RobotNames::of(robot);
     let mut left: Vec<BodyId> = model.closure.dependents().collect();
     let mut spelled = Vec::new();
     for (written, closed) in robot.loops.iter().zip(&model.closure.loops) {
@@ -21,7 +21,7 @@ pub fn by_frames(robot: &mut Description, model: &Model<Dd>) {
             LoopPoints::Frames(frames) => frames.clone(),
             LoopPoints::Anchor { .. } => {
                 let name = &written.name.value;
-                let made = ["1", "2"].map(|end| Noted::assumed(names.link(format!("{name}_{end}"))));
+                let made = ["1", "2"].map(|end| Noted::assumed(names.links.made_up(&format!("{name}_{end}"))));
                 for (name, end) in made.iter().zip(&closed.ends) {
                     spelled.push(at(name.clone(), end, robot, model));
                 }

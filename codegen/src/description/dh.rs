@@ -4,7 +4,7 @@
 //! 1986): T = Rot(x, α) Trans(x, a) Rot(z, θ) Trans(z, d), the joint along z of the link's own frame. The coordinate adds to θ or d.
 
 use super::reader::{FileReader, Range64};
-use super::table::TomlTable;
+use super::table::{TomlTable, DRIVE_KEYS, INERTIAL_KEYS};
 use super::{
     Angle, Description, JointDrive, JointLimits, JointType, Noted, Placement, Rotation, WrittenInertial, WrittenJoint,
     WrittenLink, WrittenPose,
@@ -30,17 +30,6 @@ const ROW: &[&str] = &[
     "theta_turns",
     "limits",
 ];
-const INERTIAL: &[&str] = &[
-    "mass",
-    "com",
-    "inertia",
-    "inertia_rpy",
-    "inertia_rpy_rad",
-    "inertia_rpy_deg",
-    "inertia_rpy_quarter_turns",
-    "inertia_rpy_turns",
-];
-const DRIVE: &[&str] = &["damping", "friction", "rotor_inertia", "gear_ratio", "armature", "spring"];
 
 /// Which frame of a link its row places.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,12 +99,12 @@ impl FileReader<'_> {
     }
 
     fn dh_row(&mut self, table: &TomlTable, joint: Noted<String>, link: Noted<String>) -> Option<DhRow> {
-        self.check_keys(table, &[ROW, INERTIAL, DRIVE].concat());
+        self.check_keys(table, &[ROW, INERTIAL_KEYS, DRIVE_KEYS].concat());
         self.require(table, "kind", "kind = \"revolute\"");
         let is_row = |kind: &JointType| kind.kind.is_some_and(|kind| kind.is_single());
         let words = JointType::words(Dialect::JointFrames).into_iter().filter(|(_, kind)| is_row(kind));
         let kind = self.word_at(table, "kind", &words.collect::<Vec<_>>());
-        let has_inertial = INERTIAL.iter().any(|key| table.has(key));
+        let has_inertial = INERTIAL_KEYS.iter().any(|key| table.has(key));
         let inertial = if has_inertial { self.inertial_at(table) } else { None };
         let limits = self.limits_at(table, "limits");
         let drive = self.drive_at(table);
@@ -152,14 +141,9 @@ fn add(row: DhRow, parent: Noted<String>, convention: DhConvention, robot: &mut 
         limits,
         drive,
     };
-    let offset = |parent: Noted<String>, child: Noted<String>| WrittenJoint {
-        name: Noted::new(format!("{}_offset", name.value), place.clone()),
-        kind: Noted::new(JointType::FIXED, place.clone()),
-        parent,
-        child,
-        placement: Placement::Frames { origin: about_x, axis: axis.clone() },
-        limits: JointLimits::default(),
-        drive: JointDrive::default(),
+    let offset = |parent: Noted<String>, child: Noted<String>| {
+        let own = Noted::new(format!("{}_offset", name.value), place.clone());
+        WrittenJoint::fixed(own, parent, child, about_x)
     };
     robot.joints.extend(match convention {
         DhConvention::Standard => [moving(parent, carrier.clone()), offset(carrier.clone(), link.clone())],

@@ -33,6 +33,33 @@ pub enum Range64 {
     Limit,
 }
 
+/// Names that are taken, and names that are made up beside them.
+#[derive(Default)]
+pub struct FreeNames {
+    taken: HashSet<String>,
+    /// How many names were made of one.
+    made: HashMap<String, usize>,
+}
+
+impl FreeNames {
+    /// Nobody else gets these.
+    pub fn take(&mut self, names: impl IntoIterator<Item = String>) {
+        self.taken.extend(names);
+    }
+
+    /// `name`, or with a number after it where that is taken; it is taken then.
+    pub fn made_up(&mut self, name: &str) -> String {
+        let made = self.made.entry(name.to_string()).or_insert(0);
+        loop {
+            *made += 1;
+            let own = if *made == 1 { name.to_string() } else { format!("{name}_{made}") };
+            if self.taken.insert(own.clone()) {
+                return own;
+            }
+        }
+    }
+}
+
 impl<'a> FileReader<'a> {
     /// Nothing is read yet.
     pub fn new(source: &'a Source, diagnostics: &'a mut Diagnostics) -> FileReader<'a> {

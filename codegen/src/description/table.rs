@@ -2,6 +2,8 @@
 
 mod elements;
 
+pub use elements::{DRIVE_KEYS, INERTIAL_KEYS};
+
 use super::reader::{FileReader, Range64};
 use super::{messages, Noted};
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};

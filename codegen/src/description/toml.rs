@@ -4,7 +4,7 @@ use super::composite::{CompositeKind, WrittenComposite};
 use super::dh::CONVENTIONS;
 use super::flexible::Flexible;
 use super::reader::{FileReader, Range64};
-use super::table::{self, TomlTable};
+use super::table::{self, TomlTable, DRIVE_KEYS, INERTIAL_KEYS};
 use super::{
     messages, BaseKind, Description, FileFormat, JointType, NamedFrame, Noted, Placement, WrittenJoint, WrittenLink,
     WrittenPose,
@@ -13,35 +13,8 @@ use crate::diagnostic::{Diagnostics, Source};
 use straightline_core::joint::Dialect;
 use toml::de::DeValue;
 
-const LINK: &[&str] = &[
-    "name",
-    "mass",
-    "com",
-    "inertia",
-    "inertia_rpy",
-    "inertia_rpy_rad",
-    "inertia_rpy_deg",
-    "inertia_rpy_quarter_turns",
-    "inertia_rpy_turns",
-    "flexible",
-];
-const JOINT: &[&str] = &[
-    "name",
-    "kind",
-    "parent",
-    "child",
-    "origin",
-    "axis",
-    "limits",
-    "damping",
-    "friction",
-    "rotor_inertia",
-    "gear_ratio",
-    "armature",
-    "spring",
-    "transmission",
-    "mimic",
-];
+const JOINT: [&[&str]; 3] =
+    [&["name", "kind", "parent", "child", "origin", "axis", "limits"], DRIVE_KEYS, &["transmission", "mimic"]];
 const POSE: &[&str] = &["xyz", "rpy", "rpy_rad", "rpy_deg", "rpy_quarter_turns", "rpy_turns"];
 const FRAME: &[&str] = &["name", "link", "xyz", "rpy", "rpy_rad", "rpy_deg", "rpy_quarter_turns", "rpy_turns"];
 pub(super) const AXES: [(&str, [f64; 3]); 6] = [
@@ -118,9 +91,9 @@ fn named(reader: &mut FileReader, table: &mut TomlTable, what: &str) -> Option<N
 
 fn read_link(reader: &mut FileReader, mut table: TomlTable, flexible: &mut Vec<Flexible>) -> Option<WrittenLink> {
     let name = named(reader, &mut table, "link");
-    reader.check_keys(&table, LINK);
+    reader.check_keys(&table, &[&["name"], INERTIAL_KEYS, &["flexible"]].concat());
     flexible.extend(reader.flexible_at(&table, name.as_ref()));
-    let has_inertial = LINK[1..LINK.len() - 1].iter().any(|key| table.has(key));
+    let has_inertial = INERTIAL_KEYS.iter().any(|key| table.has(key));
     let inertial = if has_inertial { reader.inertial_at(&table) } else { None };
     Some(WrittenLink { name: name?, inertial, is_carrier: false })
 }
@@ -133,7 +106,7 @@ fn read_joint(reader: &mut FileReader, mut table: TomlTable) -> Option<WrittenJo
     let number = written.and_then(|t| t.number_key());
     let composite = written.and_then(|t| t.composite).map(|composite| composite.of);
     let of_composite = composite.map_or(&[][..], composite_keys);
-    reader.check_keys(&table, &[JOINT, number.as_slice(), of_composite].concat());
+    reader.check_keys(&table, &[&JOINT.concat(), number.as_slice(), of_composite].concat());
     reader.require(&table, "kind", "kind = \"revolute\"");
     let mut kind = reader.word_at(&table, "kind", &words);
     if let (Some(kind), Some(key)) = (&mut kind, number) {

@@ -289,6 +289,25 @@ pub struct WrittenJoint {
 }
 
 impl WrittenJoint {
+    /// One that does not move and adds nothing.
+    pub(crate) fn fixed(
+        name: Noted<String>,
+        parent: Noted<String>,
+        child: Noted<String>,
+        origin: WrittenPose,
+    ) -> WrittenJoint {
+        let place = name.place.clone();
+        WrittenJoint {
+            name,
+            kind: Noted::new(JointType::FIXED, place.clone()),
+            parent,
+            child,
+            placement: Placement::Frames { origin, axis: Noted::new([0.0, 0.0, 1.0], place) },
+            limits: JointLimits::default(),
+            drive: JointDrive::default(),
+        }
+    }
+
     /// What belongs to a single coordinate: limits, friction, a rotor and a spring, as far as they are written; zeros add nothing.
     pub(crate) fn of_one_coordinate(&self) -> Vec<(&'static str, &Noted<f64>)> {
         let WrittenJoint { limits, drive, .. } = self;

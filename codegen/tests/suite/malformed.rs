@@ -46,6 +46,22 @@ fn check(path: &str, bytes: Vec<u8>, limit: Duration, what: &str) {
     assert!(start.elapsed() < limit, "{what}: {:?}", start.elapsed());
 }
 
+/// A text with one to four of its tokens moved, doubled, left out, or in their place odd ones.
+pub(crate) fn spoilt(text: &str, odd: &[&str], seed: u64) -> String {
+    let mut random = Random(seed);
+    let mut tokens: Vec<&str> = text.split_inclusive(|c: char| !c.is_alphanumeric()).collect();
+    for _ in 0..=random.below(3) {
+        let (a, b) = (random.below(tokens.len()), random.below(tokens.len()));
+        match random.below(4) {
+            0 => tokens.swap(a, b),
+            1 => tokens[a] = odd[random.below(odd.len())],
+            2 => tokens.insert(a, tokens[b]),
+            _ => drop(tokens.remove(a)),
+        }
+    }
+    tokens.concat()
+}
+
 #[test]
 fn the_files_themselves_load() {
     for (path, text) in FILES {

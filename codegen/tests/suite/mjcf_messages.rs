@@ -1,6 +1,6 @@
 //! What MJCF says and the equations do not have: refused with its line, or listed. Whatever the text, nothing panics.
 
-use crate::robots::Random;
+use crate::malformed::spoilt;
 use straightline_codegen::description;
 use straightline_codegen::diagnostic::{Diagnostics, Severity, Source};
 use straightline_codegen::model::{load, ModelOptions};
@@ -135,20 +135,8 @@ fn spoilt_texts_do_not_panic() {
         "<", "/>",
     ];
     for seed in 1..600 {
-        let mut random = Random(seed);
-        let mut tokens: Vec<&str> = RICH.split_inclusive(|c: char| !c.is_alphanumeric()).collect();
-        for _ in 0..=random.below(3) {
-            let (a, b) = (random.below(tokens.len()), random.below(tokens.len()));
-            match random.below(4) {
-                0 => tokens.swap(a, b),
-                1 => tokens[a] = odd[random.below(odd.len())],
-                2 => tokens.insert(a, tokens[b]),
-                _ => drop(tokens.remove(a)),
-            }
-        }
-        let text = tokens.concat();
         println!("seed {seed}");
-        let _ = said(&text).render();
+        let _ = said(&spoilt(RICH, &odd, seed)).render();
     }
 }
 

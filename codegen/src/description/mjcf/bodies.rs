@@ -7,10 +7,7 @@ use super::files::Element;
 use super::{vocabulary, Mjcf};
 use crate::description::angle::{self, transform};
 use crate::description::geometry::compose;
-use crate::description::{
-    BaseKind, JointDrive, JointLimits, JointType, NamedFrame, Noted, Placement, Rotation, WrittenJoint, WrittenLink,
-    WrittenPose,
-};
+use crate::description::{BaseKind, NamedFrame, Noted, Rotation, WrittenJoint, WrittenLink, WrittenPose};
 use straightline_core::spatial::Transform;
 use straightline_core::Dd;
 
@@ -92,7 +89,7 @@ impl<'s> Mjcf<'s> {
     pub fn read_world(&mut self, sections: &[&'s Element]) {
         let Some(first) = sections.first() else { return };
         let place = self.tag(first);
-        let world = Noted::new(self.made_up("world"), place.clone());
+        let world = Noted::new(self.names.made_up("world"), place.clone());
         let mut contents = Contents { all: Vec::new(), frames: Vec::new(), link: world.clone() };
         for section in sections {
             self.add_contents(section, 0, &mut contents);
@@ -255,18 +252,8 @@ impl<'s> Mjcf<'s> {
         origin: WrittenPose,
         element: &'s Element,
     ) {
-        let place = child.place.clone();
-        let name = Noted::new(self.made_up(&format!("{}_fixed", child.value)), place.clone());
-        let joint = WrittenJoint {
-            name,
-            kind: Noted::new(JointType::FIXED, place.clone()),
-            parent,
-            child: child.clone(),
-            placement: Placement::Frames { origin, axis: Noted::new([0.0, 0.0, 1.0], place) },
-            limits: JointLimits::default(),
-            drive: JointDrive::default(),
-        };
-        self.add_joint(joint, element);
+        let name = Noted::new(self.names.made_up(&format!("{}_fixed", child.value)), child.place.clone());
+        self.add_joint(WrittenJoint::fixed(name, parent, child.clone(), origin), element);
     }
 
     /// Adds the sites of a body as frames.
@@ -285,7 +272,7 @@ impl<'s> Mjcf<'s> {
                 continue;
             }
             let is_taken = self.links.contains(&name.value);
-            let own = if is_taken { self.made_up(&format!("{}_site", name.value)) } else { name.value.clone() };
+            let own = if is_taken { self.names.made_up(&format!("{}_site", name.value)) } else { name.value.clone() };
             let name = Noted::new(own, self.place(name));
             let pose = self.pose(&given, &owner);
             let link = self.link_of_frame(contents, frame);

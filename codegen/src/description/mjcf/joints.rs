@@ -90,7 +90,7 @@ impl<'s> Mjcf<'s> {
             let child = if k == last {
                 body.clone()
             } else {
-                let link = Noted::new(self.made_up(&format!("{}_carrier", name.value)), name.place.clone());
+                let link = Noted::new(self.names.made_up(&format!("{}_carrier", name.value)), name.place.clone());
                 self.robot.links.push(WrittenLink { name: link.clone(), inertial: None, is_carrier: true });
                 link
             };

@@ -22,13 +22,13 @@ mod mesh;
 mod settings;
 mod vocabulary;
 
-use super::reader::FileReader;
+use super::reader::{FileReader, FreeNames};
 use super::{xml, Description, FileFormat, Noted, WrittenJoint};
 use crate::diagnostic::{Diagnostics, Place, Source};
 use classes::DefaultClasses;
 use files::{Element, Files};
 use settings::CompilerSettings;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use straightline_core::joint::Dialect;
 
 pub(super) const FORMAT: FileFormat = FileFormat {
@@ -49,11 +49,9 @@ struct Mjcf<'s> {
     settings: CompilerSettings<'s>,
     classes: DefaultClasses<'s>,
     /// Names of links, joints and frames, written or made up.
-    names: HashSet<String>,
+    names: FreeNames,
     /// Names of bodies and frames.
     links: HashSet<String>,
-    /// How many names were made of one.
-    made: HashMap<String, usize>,
     robot: Description,
     /// Of each joint of it, the element that says it.
     joints: Vec<&'s Element>,
@@ -74,9 +72,8 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
         files: &files,
         settings: CompilerSettings::default(),
         classes: DefaultClasses::default(),
-        names: HashSet::new(),
+        names: FreeNames::default(),
         links: HashSet::new(),
-        made: HashMap::new(),
         robot: Description::new(&FORMAT, name),
         joints: Vec::new(),
     };
@@ -149,19 +146,7 @@ impl<'s> Mjcf<'s> {
                 self.links.extend(element.attribute("name").map(|name| name.value.clone()));
             }
             if ["body", "joint", "freejoint", "site", "frame"].contains(&element.name.as_str()) {
-                self.names.extend(element.attribute("name").map(|name| name.value.clone()));
-            }
-        }
-    }
-
-    /// `name`, or with a number after it where that is taken; it is taken then.
-    fn made_up(&mut self, name: &str) -> String {
-        let made = self.made.entry(name.to_string()).or_insert(0);
-        loop {
-            *made += 1;
-            let own = if *made == 1 { name.to_string() } else { format!("{name}_{made}") };
-            if self.names.insert(own.clone()) {
-                return own;
+                self.names.take(element.attribute("name").map(|name| name.value.clone()));
             }
         }
     }
@@ -170,7 +155,7 @@ impl<'s> Mjcf<'s> {
     fn name_of(&mut self, element: &'s Element, otherwise: &str) -> Noted<String> {
         match element.attribute("name").filter(|name| !name.value.trim().is_empty()) {
             Some(name) => Noted::new(name.value.clone(), self.place(name)),
-            None => Noted::new(self.made_up(otherwise), self.tag(element)),
+            None => Noted::new(self.names.made_up(otherwise), self.tag(element)),
         }
     }
 

@@ -2,10 +2,7 @@
 
 use super::poses::{is_identity, turns, PoseStep};
 use super::Sdf;
-use crate::description::{
-    Angle, JointDrive, JointLimits, JointType, Noted, Placement, Rotation, WrittenJoint, WrittenLink, WrittenPose,
-    WrittenTurn,
-};
+use crate::description::{Angle, Noted, Rotation, WrittenJoint, WrittenLink, WrittenPose, WrittenTurn};
 
 /// Adds a pose to those before it: a turn alone joins the turn before it.
 pub(super) fn push(poses: &mut Vec<WrittenPose>, pose: WrittenPose) {
@@ -56,26 +53,16 @@ impl Sdf<'_, '_, '_> {
 
     /// Adds a link without mass.
     pub fn add_carrier(&mut self, of: &Noted<String>) -> Noted<String> {
-        let name = Noted::new(self.made_up(&format!("{}_carrier", of.value)), of.place.clone());
+        let name = Noted::new(self.names.made_up(&format!("{}_carrier", of.value)), of.place.clone());
         self.robot.links.push(WrittenLink { name: name.clone(), inertial: None, is_carrier: true });
         name
     }
 
     /// Adds a fixed joint that the file does not have.
     pub fn add_fixed(&mut self, parent: Noted<String>, child: Noted<String>, pose: WrittenPose) {
-        let place = child.place.clone();
-        let name = Noted::new(self.made_up(&format!("{}_fixed", child.value)), place.clone());
+        let name = Noted::new(self.names.made_up(&format!("{}_fixed", child.value)), child.place.clone());
         let origin = self.said_once(pose);
-        let joint = WrittenJoint {
-            name,
-            kind: Noted::new(JointType::FIXED, place.clone()),
-            parent,
-            child,
-            placement: Placement::Frames { origin, axis: Noted::new([0.0, 0.0, 1.0], place) },
-            limits: JointLimits::default(),
-            drive: JointDrive::default(),
-        };
-        self.robot.joints.push(joint);
+        self.robot.joints.push(WrittenJoint::fixed(name, parent, child, origin));
     }
 
     /// The pose, with no text for angles that another pose has: they are one angle of the file.

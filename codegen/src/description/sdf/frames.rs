@@ -212,7 +212,7 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
             for frame in self.scopes[scope].frames.clone() {
                 let own = &mut self.frames[frame].name.value;
                 own.insert_str(0, &before);
-                self.names.insert(own.clone());
+                self.names.take([own.clone()]);
             }
         }
     }

@@ -9,9 +9,7 @@ use super::Sdf;
 use crate::description::composite::{CompositeKind, PartAxis};
 use crate::description::reader::Range64;
 use crate::description::xml::{children, tag};
-use crate::description::{
-    messages, JointDrive, JointLimits, JointType, Noted, Placement, WrittenCoupling, WrittenJoint, WrittenLink,
-};
+use crate::description::{messages, JointType, Noted, Placement, WrittenCoupling, WrittenJoint, WrittenLink};
 use roxmltree::Node;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -166,7 +164,7 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
     pub fn add_joints(&mut self, joints: Vec<SdfJoint<'d, 'i>>) -> bool {
         let has_world = joints.iter().any(|joint| joint.kind.is_some() && joint.bodies[0] == WORLD);
         let place = self.frames[self.model].name.place.clone();
-        let world = Noted::new(self.made_up("world"), place);
+        let world = Noted::new(self.names.made_up("world"), place);
         if has_world {
             self.robot.links.insert(0, WrittenLink { name: world.clone(), inertial: None, is_carrier: false });
         }
@@ -209,16 +207,9 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
         let [parent, child] = joint.bodies;
         let pieces = self.pieces(parent, child);
         let (link, origin) = self.add_chain(self.frames[parent].name.clone(), pieces, &joint.name);
-        let axis = Noted::new([0.0, 0.0, 1.0], joint.name.place.clone());
-        self.robot.joints.push(WrittenJoint {
-            name: joint.name.clone(),
-            kind: kind.clone(),
-            parent: link,
-            child: self.frames[child].name.clone(),
-            placement: Placement::Frames { origin, axis },
-            limits: JointLimits::default(),
-            drive: JointDrive::default(),
-        });
+        let child = self.frames[child].name.clone();
+        let fixed = WrittenJoint::fixed(joint.name.clone(), link, child, origin);
+        self.robot.joints.push(WrittenJoint { kind: kind.clone(), ..fixed });
     }
 
     /// Adds a joint that moves, part after part: to the axes of a part, the part, and at last to the frame of the child.

@@ -7,6 +7,10 @@ use crate::description::{messages, Noted, WrittenInertial, WrittenLink};
 use roxmltree::Node;
 use straightline_core::spatial::Sym3;
 
+/// What the format says of links that do not say it \[kg, kg·m²\].
+const DEFAULT_MASS: f64 = 1.0;
+const DEFAULT_INERTIA: Sym3<f64> = Sym3 { xx: 1.0, xy: 0.0, xz: 0.0, yy: 1.0, yz: 0.0, zz: 1.0 };
+
 impl<'d, 'i> Sdf<'_, 'd, 'i> {
     /// The frames of a kind that move with the robot or stand beside it in its file, in the order of the file.
     pub fn frames_of(&self, kind: FrameKind) -> Vec<usize> {
@@ -51,15 +55,14 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
                 Some(inertial) => self.read_inertial(inertial, &owner),
                 None => {
                     self.complain(&tag(element), messages::default_inertial(&owner, "inertial"));
-                    let (mass, inertia) = (1.0, Sym3 { xx: 1.0, xy: 0.0, xz: 0.0, yy: 1.0, yz: 0.0, zz: 1.0 });
                     let pose = self.pose_in(element, &owner).1;
                     let place = pose.xyz.place;
                     let rotation = crate::description::Rotation::identity(place.clone());
                     Some(WrittenInertial {
-                        mass: Noted::new(mass, place.clone()),
+                        mass: Noted::new(DEFAULT_MASS, place.clone()),
                         com: Noted::new([0.0; 3], place.clone()),
                         rotation,
-                        inertia: Noted::new(inertia, place),
+                        inertia: Noted::new(DEFAULT_INERTIA, place),
                     })
                 }
             };
@@ -98,15 +101,14 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
             Some(mass) => self.number_in(Some(mass), owner),
             None => {
                 self.complain(&tag(element), messages::default_inertial(owner, "mass"));
-                Some(self.reader.value(1.0, &tag(element)))
+                Some(self.reader.value(DEFAULT_MASS, &tag(element)))
             }
         };
         let inertia = match inertia {
             Some(inertia) => self.read_inertia(inertia, owner),
             None => {
                 self.complain(&tag(element), messages::default_inertial(owner, "inertia"));
-                let unit = Sym3 { xx: 1.0, xy: 0.0, xz: 0.0, yy: 1.0, yz: 0.0, zz: 1.0 };
-                Some(self.reader.value(unit, &tag(element)))
+                Some(self.reader.value(DEFAULT_INERTIA, &tag(element)))
             }
         };
         Some(WrittenInertial { mass: mass?, com: pose.xyz, rotation: pose.rotation, inertia: inertia? })

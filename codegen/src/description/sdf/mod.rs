@@ -17,13 +17,13 @@ mod joints;
 mod links;
 mod poses;
 
-use super::reader::FileReader;
+use super::reader::{FileReader, FreeNames};
 use super::xml::{self, children, tag, Span};
 use super::{messages, BaseKind, Description, FileFormat, Noted};
 use crate::diagnostic::{Diagnostics, Source};
 use frames::{SdfFrame, SdfScope, WORLD};
 use roxmltree::{Document, Node};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use straightline_core::joint::Dialect;
 
 pub(super) const FORMAT: FileFormat = FileFormat {
@@ -55,9 +55,7 @@ struct Sdf<'s, 'd, 'i> {
     model: usize,
     robot: Description,
     /// Names of links, joints and frames, written or made up.
-    names: HashSet<String>,
-    /// How many names were made of one.
-    made: HashMap<String, usize>,
+    names: FreeNames,
     /// Where angles stand that a pose of the robot has already.
     angles: HashSet<usize>,
     /// Steps between frames that were made so far.
@@ -90,8 +88,7 @@ fn read_document(mut reader: FileReader, document: &Document) -> Option<Descript
         scopes: Vec::new(),
         model: WORLD,
         robot: Description::new(&FORMAT, name),
-        names: HashSet::new(),
-        made: HashMap::new(),
+        names: FreeNames::default(),
         angles: HashSet::new(),
         steps: 0,
         turning: Vec::new(),
@@ -203,18 +200,6 @@ impl<'d, 'i> Sdf<'_, 'd, 'i> {
                 let complaint = messages::several_models(&names);
                 self.reader.complain(&tag(self.frames[second].element), complaint);
                 None
-            }
-        }
-    }
-
-    /// `name`, or with a number after it where that is taken; it is taken then.
-    fn made_up(&mut self, name: &str) -> String {
-        let made = self.made.entry(name.to_string()).or_insert(0);
-        loop {
-            *made += 1;
-            let own = if *made == 1 { name.to_string() } else { format!("{name}_{made}") };
-            if self.names.insert(own.clone()) {
-                return own;
             }
         }
     }

@@ -9,6 +9,20 @@ use straightline_core::spatial::Sym3;
 use toml::de::DeValue;
 use toml::Spanned;
 
+/// Keys of what [`FileReader::inertial_at`] reads.
+pub const INERTIAL_KEYS: &[&str] = &[
+    "mass",
+    "com",
+    "inertia",
+    "inertia_rpy",
+    "inertia_rpy_rad",
+    "inertia_rpy_deg",
+    "inertia_rpy_quarter_turns",
+    "inertia_rpy_turns",
+];
+/// Keys of what [`FileReader::drive_at`] reads.
+pub const DRIVE_KEYS: &[&str] = &["damping", "friction", "rotor_inertia", "gear_ratio", "armature", "spring"];
+
 impl FileReader<'_> {
     /// An inertia tensor: a table `{ xx, yy, zz, xy, xz, yz }`, three principal moments, or a 3×3 matrix.
     pub fn tensor_at(&mut self, table: &TomlTable, key: &str) -> Option<Noted<Sym3<f64>>> {
