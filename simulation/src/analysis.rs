@@ -209,7 +209,7 @@ pub fn analyze_by(
     };
     let energy_change = energy(motion.duration()) - energy(motion.times[0]);
     let times: Vec<f64> = table.rows.iter().map(|row| row[0]).collect();
-    let friction = integral(&times, |k| joint_friction(model, &table.rows[k][1 + n..=2 * n]));
+    let friction = integral(&times, |k| joint_friction(model, &table.rows[k][1..=n], &table.rows[k][1 + n..=2 * n]));
     let found = Analysis { table, wrenches, joints: figures, violations, drives, energy_change, friction };
     found.check()?;
     Ok(found)

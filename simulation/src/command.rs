@@ -185,7 +185,7 @@ impl Controller {
             Compensation::ComputedTorque => inverse_dynamics(&self.model, q, qd, &added(rdd)),
         };
         if self.saturates {
-            for joint in self.model.free_joints() {
+            for joint in self.model.independent_joints() {
                 let most = joint.limits.effort;
                 tau[joint.iv] = tau[joint.iv].clamp(-most, most);
             }
@@ -211,7 +211,7 @@ impl Controller {
     }
 
     fn leave_passive(&self, forces: &mut [f64]) {
-        self.model.freely_jointed().filter(|b| b.is_passive()).for_each(|b| forces[b.joint.iv] = 0.0);
+        self.model.independently_jointed().filter(|b| b.is_passive()).for_each(|b| forces[b.joint.iv] = 0.0);
     }
 
     /// Inputs of the drives \[V or A\] at time `t` \[s\] and state (q, q̇, x): the inverse of robot and drives, dampers of elastic stages

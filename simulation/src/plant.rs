@@ -106,12 +106,25 @@ impl Plant {
         "an energy".to_string()
     }
 
-    /// What is wrong with a state, if anything: angles beyond those whose sine has digits.
+    /// What is wrong with a state, if anything: angles beyond those whose sine has digits, loops that do not close.
     pub(crate) fn objection(&self, state: &[f64]) -> Option<String> {
-        angle_beyond_sines(&self.model, state).map(|(joint, q)| {
+        let far = angle_beyond_sines(&self.model, state).map(|(joint, q)| {
             format!(
                 "joint `{joint}` is at {q} rad: beyond {DOMAIN_F64} rad, two million turns, a sine has no digits left"
             )
+        });
+        far.or_else(|| self.open_loop(state))
+    }
+
+    /// A loop whose points do not meet near the state, in words.
+    fn open_loop(&self, state: &[f64]) -> Option<String> {
+        let model = &self.model;
+        let y = model.tree_positions(&configuration(model, &state[..model.nq()])).into_owned();
+        model.closure.loops.iter().find_map(|of| {
+            let apart = model.gap(of, &y).iter().map(|gap| gap * gap).sum::<f64>().sqrt();
+            // NaN, too
+            let closes = apart < CLOSED;
+            (!closes).then(|| format!("loop `{}` cannot be closed: its points are {apart:.3e} m apart", of.name))
         })
     }
 
@@ -172,7 +185,7 @@ impl Plant {
     /// The motion of robot and drives, and what goes on in these.
     pub fn driven(&self, state: &[f64], action: &Action) -> DrivenMotion<f64> {
         let (q, qd, ..) = self.split(state);
-        let (q, x) = (unit_quaternions(&self.model, q), self.x(state));
+        let (q, x) = (configuration(&self.model, q), self.x(state));
         let u = self.inputs(qd, x, &action.u);
         let bias: Vec<f64> = bias_force(&self.model, &q, qd).iter().zip(&action.tau).map(|(h, tau)| h - tau).collect();
         let h = mass_matrix(&self.model, &q);
@@ -202,15 +215,15 @@ impl Plant {
     }
 
     /// Power that friction turns into heat \[W\]: Σ (d q̇ + f(q̇)) q̇.
-    pub fn losses(&self, qd: &[f64]) -> f64 {
-        joint_friction(&self.model, qd)
+    pub fn losses(&self, q: &[f64], qd: &[f64]) -> f64 {
+        joint_friction(&self.model, q, qd)
     }
 
     /// The time derivative of the state.
     pub fn rate(&self, state: &[f64], action: &Action, rate: &mut [f64]) {
         let (nq, nv) = (self.model.nq(), self.model.nv());
         let (q, qd, ..) = self.split(state);
-        let q = unit_quaternions(&self.model, q);
+        let q = configuration(&self.model, q);
         rate[..nq].copy_from_slice(&self.configuration_rate(&q, qd));
         let after = nq + nv + self.drive_states();
         if self.is_driven() {
@@ -225,23 +238,24 @@ impl Plant {
             rate[nq..nq + nv].copy_from_slice(&forward_dynamics_aba(&self.model, &q, qd, &action.tau));
         }
         rate[after] = action.tau.iter().zip(qd).map(|(tau, qd)| tau * qd).sum();
-        rate[after + 1] = self.losses(qd);
+        rate[after + 1] = self.losses(&q, qd);
     }
 
     /// dq/dt: q̇ of joints; of a floating base R v and ½ quaternion ∘ ω, of a ball joint the latter.
     pub(crate) fn configuration_rate(&self, q: &[f64], qd: &[f64]) -> Vec<f64> {
         let mut rate = vec![0.0; self.model.nq()];
+        let qd = self.model.tree_rates(&self.model.tree_positions(q), qd);
         for joint in self.model.free_joints() {
             let own = &mut rate[joint.iq..joint.iq + joint.kind.nq()];
-            joint.kind.configuration_rate(joint.coordinates(q), joint.rates(qd), own);
+            joint.kind.configuration_rate(joint.coordinates(q), joint.rates(&qd), own);
         }
         rate
     }
 
-    /// The state with quaternions of length one.
+    /// The state with quaternions of length one and loops that are closed.
     pub fn normalised(&self, state: &[f64]) -> Vec<f64> {
         let nq = self.model.nq();
-        [&unit_quaternions(&self.model, &state[..nq]), &state[nq..]].concat()
+        [&configuration(&self.model, &state[..nq]), &state[nq..]].concat()
     }
 }
 
@@ -253,7 +267,7 @@ pub fn angle_beyond_sines<'a>(model: &'a Model<f64>, q: &[f64]) -> Option<(&'a s
 }
 
 /// Power that friction in the joints turns into heat \[W\]: Σ (d q̇ + f(q̇)) q̇.
-pub(crate) fn joint_friction(model: &Model<f64>, qd: &[f64]) -> f64 {
+pub(crate) fn joint_friction(model: &Model<f64>, q: &[f64], qd: &[f64]) -> f64 {
     let joints = model.bodies.iter().filter(|b| b.joint.kind.is_single());
     let loss = |(v, e): (f64, &JointEffects<f64>)| {
         let coulomb = match e.coulomb {
@@ -263,15 +277,23 @@ pub(crate) fn joint_friction(model: &Model<f64>, qd: &[f64]) -> f64 {
         };
         e.damping * v * v + coulomb
     };
-    let rates = model.tree_rates(qd);
+    let rates = model.tree_rates(&model.tree_positions(q), qd);
     joints.map(|b| loss((rates[b.joint.iv], &b.effects))).sum()
 }
 
-/// q with quaternions of length one.
-fn unit_quaternions(model: &Model<f64>, q: &[f64]) -> Vec<f64> {
+/// How often loops are closed: what a step of integration leaves open is small, and each time squares it.
+const CLOSINGS: usize = 2;
+/// What is left of it where a loop is closed \[m\].
+const CLOSED: f64 = 1e-9;
+
+/// q with quaternions of length one and loops that are closed.
+fn configuration(model: &Model<f64>, q: &[f64]) -> Vec<f64> {
     let mut q = q.to_vec();
     for joint in model.free_joints() {
         joint.kind.normalise(&mut q[joint.iq..joint.iq + joint.kind.nq()]);
     }
-    q
+    match model.closure.is_empty() {
+        true => q,
+        false => model.close_loops(&q, CLOSINGS).0,
+    }
 }

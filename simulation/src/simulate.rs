@@ -321,7 +321,9 @@ pub(crate) fn names(plant: &Plant, command: &Command) -> Vec<String> {
             true => vec![format!("{prefix}.{}", joint.name)],
             false => entries(joint.kind.row()).iter().map(|c| format!("{prefix}.{}.{c}", joint.name)).collect(),
         };
-        joints.iter().flat_map(of).collect()
+        // what loops determine has no velocity of its own
+        let own = joints.iter().filter(|joint| prefix == "q" || joint.iv < plant.model.nv());
+        own.flat_map(of).collect()
     };
     let mut names = vec!["t".to_string()];
     names.extend(named("q", |row| row.entries[0]));

@@ -158,7 +158,7 @@ impl<'a> Search<'a> {
             let help = ["drives are tables [[drive]] of the robot file or of a scene: --scene"];
             return Err(print::failure_with(text, &help));
         }
-        let mut bodies: Vec<_> = model.freely_jointed().collect();
+        let mut bodies: Vec<_> = model.independently_jointed().collect();
         bodies.sort_by_key(|b| b.joint.iv);
         let effort = |b: &&Body<f64>| if b.is_passive() { f64::INFINITY } else { b.joint.limits.effort };
         let efforts = bodies.iter().map(effort).collect();

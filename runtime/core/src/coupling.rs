@@ -128,9 +128,9 @@ impl<T> Model<T> {
         self.closure.dependents().any(|b| b == body)
     }
 
-    /// The bodies with joints that have coordinates in q.
-    pub fn freely_jointed(&self) -> impl Iterator<Item = &Body<T>> + Clone + '_ {
-        self.free_bodies().map(|b| &self.bodies[b])
+    /// The bodies with joints that have entries in q̇.
+    pub fn independently_jointed(&self) -> impl Iterator<Item = &Body<T>> + Clone + '_ {
+        self.independent_bodies().map(|b| &self.bodies[b])
     }
 
     /// Index into q̇ of what moves the joint of a body of one coordinate, and how fast it moves per unit of that.

@@ -354,7 +354,7 @@ impl<'a> ContactWorld<'a> {
         rate[self.velocities()].copy_from_slice(&moved.qdd);
         let given: f64 = action.tau.iter().zip(qd).map(|(tau, qd)| tau * qd).sum();
         rate[work] = given + self.power_of_objects(state, &seen, &moved.rows, &moved.force);
-        rate[work + 1] = self.plant.losses(qd) + self.heat(state, &seen, &moved, phases);
+        rate[work + 1] = self.plant.losses(q, qd) + self.heat(state, &seen, &moved, phases);
         if let Some(drives) = &moved.drives {
             rate[self.drive_states()].copy_from_slice(&drives.xd);
             let energies = &mut rate[work + 2..self.plant.states()];

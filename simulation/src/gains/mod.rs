@@ -121,7 +121,7 @@ pub fn propose(model: &Model<f64>, motion: &Motion, demand: &GainDemand) -> Resu
             .with_help("leave the drives out: gains of voltages and currents follow from those of torques"));
     }
     let model = &without_dry_friction(model);
-    let driven: Vec<usize> = model.freely_jointed().filter(|b| !b.is_passive()).map(|b| b.joint.iv).collect();
+    let driven: Vec<usize> = model.independently_jointed().filter(|b| !b.is_passive()).map(|b| b.joint.iv).collect();
     let (first, last) = (motion.times[0], motion.duration());
     let steps = ((last - first) / demand.period).ceil();
     if !(steps.is_finite() && steps <= MOST_STEPS as f64) {

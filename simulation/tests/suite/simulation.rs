@@ -153,7 +153,7 @@ fn drives_give_what_becomes_energy_and_heat() {
     let found = analyze(&model, &motion, 1e-3).expect("it can be analysed");
     let plant = Plant::new(model, 1e-3);
     let times: Vec<f64> = found.table.rows.iter().map(|r| r[0]).collect();
-    let loss = |t: f64| plant.losses(&motion.at(t).1);
+    let loss = |t: f64| plant.losses(&motion.at(t).0, &motion.at(t).1);
     let losses: f64 = times.windows(2).map(|t| 0.5 * (t[1] - t[0]) * (loss(t[0]) + loss(t[1]))).sum();
     let given: f64 = found.joints.iter().map(|j| j.given - j.taken).sum();
     // trapezoidal rule: h² / 12 of the change of the power's slope

@@ -66,7 +66,7 @@ impl ExperimentReader<'_> {
     /// Numbers above zero, one per joint; of passive joints, which nobody weighs, one where there is none.
     fn positive(&mut self, table: &TomlTable, key: &str) -> Option<Vec<f64>> {
         let mut numbers = self.numbers(table, key, self.model.nv()).filter(|all| !all.is_empty())?;
-        for body in self.model.freely_jointed().filter(|b| b.is_passive()) {
+        for body in self.model.independently_jointed().filter(|b| b.is_passive()) {
             let own = &mut numbers[body.joint.iv];
             *own = if *own == 0.0 { 1.0 } else { *own };
         }

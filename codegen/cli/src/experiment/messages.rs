@@ -154,6 +154,15 @@ pub fn several_moving(what: &str, joint: &str, kind: &str) -> D {
         .help("make it a fixed joint of the robot file, or simulate torques")
 }
 
+/// A motion of a joint that loops determine.
+pub fn determined_moving(what: &str, joint: &str) -> D {
+    D::error(
+        "determined-moving",
+        format!("{what} takes joints that move by themselves, and loops determine joint `{}`", cut(joint)),
+    )
+    .help("simulate torques, or open the loops: `loops = false` in [effects] of the scene")
+}
+
 /// A joint without the limits that a trapezoid takes.
 pub fn no_limit(joint: &str, key: &str) -> D {
     D::error("no-limit", format!("joint `{}`: its greatest {key} is not known", cut(joint)))

@@ -76,8 +76,16 @@ fn names(model: &Model<f64>) -> Vec<&str> {
     model.joints().iter().map(|j| j.name.as_str()).collect()
 }
 
-/// Zero, or the nearest that the joints' ranges allow; a base at the origin.
+/// The names of the joints that have velocities, in their order.
+fn moving(model: &Model<f64>) -> Vec<&str> {
+    model.joints().iter().filter(|j| j.iv < model.nv()).map(|j| j.name.as_str()).collect()
+}
+
+/// Zero, or the nearest that the joints' ranges allow; a base at the origin. Of a robot with loops the configuration in which the compiler closed them.
 fn zero(model: &Model<f64>) -> Vec<f64> {
+    if !model.closure.is_empty() {
+        return model.closure.home.clone();
+    }
     let mut q = vec![0.0; model.nq()];
     for joint in model.free_joints() {
         for (q, neutral) in q[joint.iq..].iter_mut().zip(joint.kind.row().neutral) {
@@ -122,10 +130,10 @@ fn from_samples(
 fn torques(columns: &Columns, model: &Model<f64>, place: &Place, diagnostics: &mut Diagnostics) -> Option<Samples> {
     let times = columns.get("t")?.to_vec();
     let mut rows = vec![vec![0.0; model.nv()]; times.len()];
-    let known = names(model);
+    let known = moving(model);
     for (name, column) in columns.columns.iter().filter(|(name, _)| name != "t") {
         let joint = name.strip_prefix("tau.").unwrap_or(name);
-        let Some(joint) = model.joints().into_iter().find(|j| j.name == joint && j.kind.is_single()) else {
+        let Some(joint) = model.independent_joints().find(|j| j.name == joint && j.kind.is_single()) else {
             diagnostics.push(say::column_unknown(name, &known).at(place));
             continue;
         };
@@ -190,6 +198,9 @@ fn drive_inputs(columns: &Columns, model: &Model<f64>, place: &Place, diagnostic
 fn unmovable(model: &Model<f64>, what: &str) -> Option<Diagnostic> {
     if model.floats() {
         return Some(say::base_floats(what));
+    }
+    if let Some(joint) = model.dependent_joints().next() {
+        return Some(say::determined_moving(what, &joint.name));
     }
     let other = model.bodies.iter().map(|body| &body.joint).find(|joint| !joint.kind.is_single())?;
     Some(say::several_moving(what, &other.name, other.kind.row().name))

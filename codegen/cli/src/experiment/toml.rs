@@ -2,7 +2,9 @@
 
 use super::messages as say;
 use super::samples::{self, Columns};
-use super::{contact, drive_inputs, gains, names, sampled_motion, torques, zero, Experiment, ReadFile, COULOMB_SPEED};
+use super::{
+    contact, drive_inputs, gains, moving, names, sampled_motion, torques, zero, Experiment, ReadFile, COULOMB_SPEED,
+};
 use straightline_codegen::description::messages::unknown_frame;
 use straightline_codegen::description::reader::{FileReader, Range64};
 use straightline_codegen::description::table::{parse, TomlTable};
@@ -20,13 +22,15 @@ use toml::de::DeValue;
 
 /// Samples of a path in the world \[s\].
 const PATH_INTERVAL: f64 = 0.01;
+/// How often loops are closed by Newton's method from where the file has them.
+const CLOSINGS: usize = 16;
 /// The kind of motion that says by itself when it is where.
 const TRAPEZOIDAL: usize = 2;
 
 /// Numbers per driven joint with zeros for those that are passive; `None` if there are none, or not as many numbers.
 fn with_passive(model: &Model<f64>, numbers: &[f64]) -> Option<Vec<f64>> {
     let mut is_passive = vec![false; model.nv()];
-    model.freely_jointed().for_each(|b| is_passive[b.joint.iv] = b.is_passive());
+    model.independently_jointed().for_each(|b| is_passive[b.joint.iv] = b.is_passive());
     let driven = is_passive.iter().filter(|passive| !**passive).count();
     let mut rest = numbers.iter();
     (driven < model.nv() && numbers.len() == driven && !model.floats())
@@ -100,6 +104,7 @@ impl ExperimentReader<'_> {
         self.reader.check_keys(start, &["q", "qd", "x"]);
         let given = |numbers: &Vec<f64>| !numbers.is_empty();
         let q = self.numbers(start, "q", self.model.nq()).filter(given);
+        let q = q.map(|q| self.model.close_loops(&q, CLOSINGS).0);
         q.iter().for_each(|q| self.angles(start, q));
         let qd = self.numbers(start, "qd", self.model.nv()).filter(given);
         [q, qd, self.drive_state(start)]
@@ -180,7 +185,7 @@ impl ExperimentReader<'_> {
                     return Some(all);
                 }
                 if found != n {
-                    let names = names(self.model);
+                    let names = if key == "q" { names(self.model) } else { moving(self.model) };
                     self.reader.complain(&span, say::one_per_joint(&what, found, &names));
                     return Some(Vec::new());
                 }
