@@ -11,7 +11,9 @@
 //! | V | the largest \|V\| of the robot's states: V itself passes through zero |
 //! | wrench | the largest of the six numbers of that joint |
 //! | p, R, J, Jdqd | the largest component of that quantity of that frame |
-//! | q of closed loops, rates of dependent joints, G | the largest component |
+//! | rates of dependent joints, G | the largest component |
+//! | accelerations of dependent joints | the largest component, or the square of the largest rate |
+//! | q of closed loops | the largest component, or 1 |
 //! | gaps of closed loops | 1 m |
 //! | velocity and acceleration of a frame | Σ \|J\| \|q̇\|; Σ \|J\| \|q̈\| plus that of Jdqd |
 
@@ -288,7 +290,7 @@ impl Robot {
             }
             Function::CloseLoops => {
                 let mut expected = Expected { values: vec![], scales: vec![] };
-                expected.append_uniform(numbers(field("q_closed")?));
+                expected.append_over(numbers(field("q_closed")?), 1.0);
                 // three equations of a loop, or two of a plane one
                 let gaps = numbers(field("gaps")?);
                 expected.scales.extend(gaps.iter().map(|_| 1.0));
@@ -302,8 +304,11 @@ impl Robot {
             }
             Function::LoopMotion => {
                 let mut expected = Expected { values: vec![], scales: vec![] };
-                expected.append_uniform(numbers(field("qd_dependent")?));
-                expected.append_uniform(numbers(field("qdd_dependent")?));
+                let rates = numbers(field("qd_dependent")?);
+                // where a sum of products of velocities is zero, its terms are not
+                let products = largest(&rates) * largest(&rates);
+                expected.append_uniform(rates);
+                expected.append_over(numbers(field("qdd_dependent")?), products);
                 Some(expected)
             }
             Function::ForwardKinematics => per_frame(&["p", "R"]),
@@ -482,7 +487,12 @@ impl Expected {
 
     /// Components that share the largest of them as their scale.
     pub fn append_uniform(&mut self, values: Vec<Dd>) {
-        let scale = largest(&values);
+        self.append_over(values, 0.0);
+    }
+
+    /// The same, with a scale that is no smaller than that.
+    pub fn append_over(&mut self, values: Vec<Dd>, least: f64) {
+        let scale = largest(&values).max(least);
         self.scales.extend(values.iter().map(|_| scale));
         self.values.extend(values);
     }

@@ -5,7 +5,7 @@ use crate::description::{self, Description, FileFormat};
 use crate::diagnostic::{Diagnostics, Severity, Source};
 use crate::model::{self, ModelOptions};
 use std::collections::HashSet;
-use straightline_core::closure::Loop;
+use straightline_core::closure::ClosedLoop;
 use straightline_core::model::{Body, Frame, Model};
 use straightline_core::spatial::{SpatialInertia, Transform};
 use straightline_core::Dd;
@@ -65,7 +65,7 @@ pub fn of_models(wanted: &Model<Dd>, found: &Model<Dd>) -> Option<String> {
 fn are_loops(wanted: &Model<Dd>, found: &Model<Dd>, longest: f64) -> bool {
     let (a, b) = (&wanted.closure, &found.closure);
     let bodies = |model: &Model<Dd>| model.closure.dependents().collect::<HashSet<_>>();
-    let ends = |(a, b): (&Loop<Dd>, &Loop<Dd>)| {
+    let ends = |(a, b): (&ClosedLoop<Dd>, &ClosedLoop<Dd>)| {
         let mut ends = a.ends.iter().zip(&b.ends);
         ends.all(|(a, b)| a.body == b.body && all_near(&a.point.to_array(), &b.point.to_array(), longest))
     };

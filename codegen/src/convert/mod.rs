@@ -69,7 +69,6 @@ pub fn convert(
     // what is wrong with the robot is said before what the format cannot say
     let model_options = ModelOptions { floating_base: options.floating_base, ..ModelOptions::default() };
     let model = model::build(&robot, &model_options, diagnostics)?;
-    loops::by_frames(&mut robot, &model);
     if options.floating_base {
         robot.base = Some(Noted::assumed(BaseKind::Floating));
     }
@@ -80,6 +79,7 @@ pub fn convert(
     for loss in writer.losses {
         lose(loss, format, options.lossy, &mut robot, diagnostics);
     }
+    loops::by_frames(&mut robot, &model);
     if diagnostics.has_errors() {
         return None;
     }

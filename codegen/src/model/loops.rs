@@ -9,7 +9,7 @@ use crate::description::angle::{self, ROUNDING};
 use crate::description::{messages, Description, LoopPoints, Noted, PoseCoordinate, WrittenLoop};
 use crate::diagnostic::Diagnostics;
 use straightline_core::algorithms as alg;
-use straightline_core::closure::{Closure, Loop, LoopEnd, LoopGroup};
+use straightline_core::closure::{ClosedLoop, Closure, LoopEnd, LoopGroup};
 use straightline_core::model::{Body, BodyId, Frame, Model};
 use straightline_core::random::Random;
 use straightline_core::spatial::{Transform, Vec3};
@@ -47,14 +47,14 @@ pub(super) fn resolve(
             diagnostics.push(messages::loop_within_body(&own.name.value).at(&own.name.place));
             continue;
         }
-        let closed = Loop { name: own.name.value.clone(), ends, directions: Vec::new() };
+        let closed = ClosedLoop { name: own.name.value.clone(), ends, directions: Vec::new() };
         let directions = directions(&closed, model, &zero);
-        loops.push(Loop { directions, ..closed });
+        loops.push(ClosedLoop { directions, ..closed });
     }
     if loops.len() < written.len() || loops.is_empty() || diagnostics.has_errors() {
         return Closure::default();
     }
-    let equations = Equations::new(model.cast(), &loops, &zero);
+    let equations = LoopEquations::new(model.cast(), &loops, &zero);
     if equations.configurations.is_empty() {
         for (own, gap) in written.iter().zip(&equations.least) {
             diagnostics.push(messages::loop_open(&own.name.value, *gap).at(&own.name.place));
@@ -126,7 +126,7 @@ fn pose(model: &Model<Dd>, q: &[Dd], body: Option<BodyId>) -> Transform<Dd> {
 }
 
 /// Three directions, or the two of a plane to which all joints on the way are bound.
-fn directions(of: &Loop<Dd>, model: &Model<Dd>, zero: &[Dd]) -> Vec<Vec3<Dd>> {
+fn directions(of: &ClosedLoop<Dd>, model: &Model<Dd>, zero: &[Dd]) -> Vec<Vec3<Dd>> {
     let bodies = model.bodies_of_loop(of);
     let base = pose(model, zero, model.parting(of));
     let axis = |b: BodyId| base.rotation.transpose_mul(pose(model, zero, Some(b)).rotation.column(2));
@@ -162,21 +162,21 @@ fn length(v: Vec3<Dd>) -> f64 {
 }
 
 /// The equations of all loops in numbers.
-struct Equations {
+struct LoopEquations {
     model: Model<f64>,
-    loops: Vec<Loop<f64>>,
+    loops: Vec<ClosedLoop<f64>>,
     /// Where all loops are closed; the first is nearest to the pose of the file.
     configurations: Vec<Vec<f64>>,
     /// How near the points of each loop came \[m\].
     least: Vec<f64>,
 }
 
-impl Equations {
-    fn new(model: Model<f64>, loops: &[Loop<Dd>], zero: &[Dd]) -> Equations {
+impl LoopEquations {
+    fn new(model: Model<f64>, loops: &[ClosedLoop<Dd>], zero: &[Dd]) -> LoopEquations {
         let zero: Vec<f64> = zero.iter().map(|x| x.to_f64()).collect();
         let closure = Closure { loops: loops.to_vec(), groups: Vec::new(), home: Vec::new() };
         let loops = closure.map(|x| x.to_f64()).loops;
-        let mut all = Equations { model, loops, configurations: Vec::new(), least: Vec::new() };
+        let mut all = LoopEquations { model, loops, configurations: Vec::new(), least: Vec::new() };
         let mut random = Random(0x10_09);
         for pose in 0..POSES {
             let start = if pose == 0 { zero.clone() } else { all.near(&zero, &mut random) };
@@ -245,7 +245,7 @@ impl Equations {
             q = alg::integrate(&self.model, &q, &v);
         }
         let y = self.model.tree_positions(&q).into_owned();
-        let apart = |l: &Loop<f64>| self.model.gap(l, &y).iter().map(|x| x * x).sum::<f64>().sqrt();
+        let apart = |l: &ClosedLoop<f64>| self.model.gap(l, &y).iter().map(|x| x * x).sum::<f64>().sqrt();
         let gaps = self.loops.iter().map(apart).collect();
         (q, gaps)
     }
@@ -285,7 +285,7 @@ fn eliminated(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
 fn dependents(
     description: &Description,
     written: &[&WrittenLoop],
-    equations: &Equations,
+    equations: &LoopEquations,
     model: &Model<Dd>,
     diagnostics: &mut Diagnostics,
 ) -> Option<Vec<BodyId>> {
@@ -293,7 +293,7 @@ fn dependents(
         (asked(written, equations, model, diagnostics)?, candidates(description, equations, model));
     order.retain(|b| !asked.iter().any(|(_, own)| own == b));
     let rows: usize = equations.loops.iter().map(|l| l.directions.len()).sum();
-    let mut chosen = Choice { bases: equations.columns().into_iter().map(|all| (all, Vec::new())).collect() };
+    let mut chosen = DependentChoice { bases: equations.columns().into_iter().map(|all| (all, Vec::new())).collect() };
     let mut found: Vec<BodyId> = Vec::new();
     for (name, b) in &asked {
         if !chosen.takes(&model.bodies[*b], WELL_LEFT[1], true) {
@@ -322,7 +322,7 @@ fn dependents(
 /// The joints that the file says are determined.
 fn asked<'a>(
     written: &[&'a WrittenLoop],
-    equations: &Equations,
+    equations: &LoopEquations,
     model: &Model<Dd>,
     diagnostics: &mut Diagnostics,
 ) -> Option<Vec<(&'a Noted<String>, BodyId)>> {
@@ -345,7 +345,7 @@ fn asked<'a>(
 }
 
 /// The bodies with joints on loops in the order in which they become dependent.
-fn candidates(description: &Description, equations: &Equations, model: &Model<Dd>) -> Vec<BodyId> {
+fn candidates(description: &Description, equations: &LoopEquations, model: &Model<Dd>) -> Vec<BodyId> {
     let source = |b: BodyId| model.coupling_of(b).map_or(b, |coupling| coupling.source);
     let mut all: Vec<BodyId> =
         equations.loops.iter().flat_map(|l| equations.model.bodies_of_loop(l)).map(source).collect();
@@ -363,11 +363,11 @@ fn candidates(description: &Description, equations: &Equations, model: &Model<Dd
 }
 
 /// In each closed configuration the columns of all coordinates, and an orthonormal basis of those that were taken.
-struct Choice {
+struct DependentChoice {
     bases: Vec<(Vec<Vec<f64>>, Vec<Vec<f64>>)>,
 }
 
-impl Choice {
+impl DependentChoice {
     /// Takes the columns of a joint if those that were taken leave so much of them: in every configuration, or `anywhere`.
     fn takes(&mut self, body: &Body<Dd>, least: f64, anywhere: bool) -> bool {
         let own = body.joint.iv..body.joint.iv + body.joint.kind.nv();
@@ -415,7 +415,7 @@ fn extend(basis: &mut Vec<Vec<f64>>, column: &[f64], least: f64) -> bool {
 }
 
 /// Loops that are solved together, each group for the joints that no group before it has determined: the smallest ones first.
-fn groups(loops: &[Loop<Dd>], dependents: &[BodyId], model: &Model<Dd>) -> Vec<LoopGroup> {
+fn groups(loops: &[ClosedLoop<Dd>], dependents: &[BodyId], model: &Model<Dd>) -> Vec<LoopGroup> {
     let source = |b: BodyId| model.coupling_of(b).map_or(b, |coupling| coupling.source);
     let on_loop: Vec<Vec<BodyId>> = loops
         .iter()

@@ -17,6 +17,8 @@ use straightline_core::Dd;
 
 type Target = (&'static FileFormat, &'static FormatWriter);
 
+const FOURBAR: &str = include_str!("../files/fourbar.toml");
+
 fn package() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
@@ -212,6 +214,18 @@ fn what_a_format_cannot_say_is_listed_and_nothing_else() {
         beside.replace("<joint name=\"j\" pos=\"0 0 1\"/>", "<joint name=\"i\"/><joint name=\"j\" axis=\"1 0 0\"/>");
     let shown = "<robot name=\"arm\"><link name=\"base\"/><link name=\"upper\"><visual/><inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial></link>\
                  <joint name=\"j\" type=\"continuous\"><parent link=\"base\"/><child link=\"upper\"/></joint></robot>";
+    let swinging = |name: &str, pos: &str, within: &str| {
+        format!(
+            "<body name=\"{name}\" pos=\"{pos}\"><joint name=\"{name}\" axis=\"0 1 0\"/>\
+             <inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>{within}</body>"
+        )
+    };
+    let pinned = format!(
+        "<mujoco><worldbody>{}{}</worldbody>\
+         <equality><connect name=\"pin\" body1=\"b\" body2=\"c\" anchor=\"1 0 0\"/></equality></mujoco>",
+        swinging("a", "0 0 0", &swinging("b", "0 0 1", "")),
+        swinging("c", "1 0 0", "")
+    );
     let rows: Vec<(&str, &str, String, &str, &str)> = vec![
         ("springs", "urdf", arm("spring = { stiffness = 3.0 }", "", ""), "joint `shoulder` (line 17)", "not-in-format"),
         (
@@ -360,6 +374,8 @@ fn what_a_format_cannot_say_is_listed_and_nothing_else() {
             "joint `elbow` (line 29)",
             "said-otherwise",
         ),
+        ("closed loops", "mjcf", FOURBAR.to_string(), "loop `pin` (line 69)", "said-otherwise"),
+        ("closed loops", "urdf", pinned, "loop `pin` (line 1)", "not-in-format"),
     ];
     let mut seen: BTreeSet<(&str, &str)> = BTreeSet::new();
     for (what, word, text, whom, code) in &rows {

@@ -33,7 +33,7 @@ pub struct LoopEnd<T> {
 
 /// Two points that coincide.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Loop<T> {
+pub struct ClosedLoop<T> {
     /// What messages and reports call it.
     pub name: String,
     /// The points, of different bodies.
@@ -42,10 +42,10 @@ pub struct Loop<T> {
     pub directions: Vec<Vec3<T>>,
 }
 
-impl<T: Copy> Loop<T> {
-    fn map<U: Copy>(&self, f: &mut impl FnMut(T) -> U) -> Loop<U> {
+impl<T: Copy> ClosedLoop<T> {
+    fn map<U: Copy>(&self, f: &mut impl FnMut(T) -> U) -> ClosedLoop<U> {
         let mut vector = |v: Vec3<T>| Vec3::new(f(v.x), f(v.y), f(v.z));
-        Loop {
+        ClosedLoop {
             name: self.name.clone(),
             ends: self.ends.map(|end| LoopEnd { body: end.body, point: vector(end.point) }),
             directions: self.directions.iter().map(|d| vector(*d)).collect(),
@@ -66,7 +66,7 @@ pub struct LoopGroup {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Closure<T> {
     /// The loops.
-    pub loops: Vec<Loop<T>>,
+    pub loops: Vec<ClosedLoop<T>>,
     /// Which joints follow from which loops; what a group needs of other dependent joints stands in groups before it.
     pub groups: Vec<LoopGroup>,
     /// A configuration in which all loops are closed: assemblies that can be reached from there are this robot.
@@ -111,7 +111,7 @@ struct Mechanism<T> {
 }
 
 impl<T: Real> Mechanism<T> {
-    fn new(whole: &Model<T>, of: &Loop<T>) -> Self {
+    fn new(whole: &Model<T>, of: &ClosedLoop<T>) -> Self {
         let [mut one, mut other] = of.ends.map(|end| whole.path_to(end.body));
         let common = one.iter().zip(&other).take_while(|(a, b)| a == b).count();
         let bodies: Vec<BodyId> = one.drain(common..).chain(other.drain(common..)).collect();
@@ -165,12 +165,12 @@ impl<T: Real> Model<T> {
     }
 
     /// The bodies between the ends of a loop, without the one where the paths part.
-    pub fn bodies_of_loop(&self, of: &Loop<T>) -> Vec<BodyId> {
+    pub fn bodies_of_loop(&self, of: &ClosedLoop<T>) -> Vec<BodyId> {
         Mechanism::new(self, of).bodies
     }
 
     /// The body where the paths to the points of a loop part; `None`: the world.
-    pub fn parting(&self, of: &Loop<T>) -> Option<BodyId> {
+    pub fn parting(&self, of: &ClosedLoop<T>) -> Option<BodyId> {
         self.bodies_of_loop(of).first().and_then(|b| self.bodies[*b].parent)
     }
 
@@ -189,7 +189,7 @@ impl<T: Real> Model<T> {
     }
 
     /// How far the points of a loop are apart along its directions \[m\], from the configuration of the tree.
-    pub fn gap(&self, of: &Loop<T>, y: &[T]) -> Vec<T> {
+    pub fn gap(&self, of: &ClosedLoop<T>, y: &[T]) -> Vec<T> {
         let alone = Mechanism::new(self, of);
         let frames = alone.ends.each_ref();
         let at = forward_kinematics(&alone.model, &alone.coordinates(self, y), &frames);
@@ -198,7 +198,7 @@ impl<T: Real> Model<T> {
     }
 
     /// How fast they part, by rows over the velocities that are not followers'.
-    pub fn gap_rows(&self, of: &Loop<T>, y: &[T]) -> Vec<Vec<T>> {
+    pub fn gap_rows(&self, of: &ClosedLoop<T>, y: &[T]) -> Vec<Vec<T>> {
         let alone = Mechanism::new(self, of);
         let own = alone.coordinates(self, y);
         let [one, other] = alone.ends.each_ref().map(|end| jacobian(&alone.model, &own, end));
@@ -223,7 +223,7 @@ impl<T: Real> Model<T> {
     }
 
     /// How their parting accelerates where no joint does: J̇ ẋ \[m/s²\].
-    fn gap_drift(&self, of: &Loop<T>, y: &[T], rates: &[T]) -> Vec<T> {
+    fn gap_drift(&self, of: &ClosedLoop<T>, y: &[T], rates: &[T]) -> Vec<T> {
         let alone = Mechanism::new(self, of);
         let (q, qd) = (alone.coordinates(self, y), alone.rates(self, rates));
         let rest = vec![T::zero(); qd.len()];

@@ -676,3 +676,31 @@ fn gains_that_an_analysis_proposes_drive_a_simulation() {
     let wrong = fails(&[&["analyze", &robot, "--motion", &gains][..], &options].concat());
     assert!(wrong.contains("bandwidth") && wrong.contains("-4.0"), "{wrong}");
 }
+
+/// A four-bar swings with its energy, its pins together; no motion is given to joints that loops determine.
+#[test]
+fn robots_with_closed_loops_swing_with_their_energy() {
+    let here = scratch("closed");
+    let text =
+        include_str!("../../../tests/files/fourbar.toml").replace("damping = 0.02", "").replace("friction = 0.01", "");
+    let robot = write(&here, "fourbar.toml", &text);
+    let start = "[start]\nq = [0.4, -0.5, 0.05]\nqd = [3.0]\n[simulation]\nduration = 3.0\ntolerance = 1e-12\n";
+    let (start, csv) = (write(&here, "start.toml", start), here.join("swing.csv"));
+    succeeds(&["simulate", &robot, "--input", &start, "--output", &csv.display().to_string()]);
+    let rows = fs::read_to_string(&csv).unwrap();
+    assert!(rows.starts_with("t,q.crank,q.coupler,q.rocker,qd.crank,tau.crank,energy,"), "{rows}");
+    let rows: Vec<Vec<f64>> =
+        rows.lines().skip(1).map(|row| row.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+    let about_y = |angle: f64, [x, z]: [f64; 2]| [x * angle.cos() + z * angle.sin(), z * angle.cos() - x * angle.sin()];
+    for row in &rows {
+        assert!((row[6] - rows[0][6]).abs() < 1e-9, "{row:?}");
+        let coupler = about_y(row[1] + row[2], [0.36, 0.27]);
+        let [at_coupler, rocker] = [about_y(row[1], [0.09, 0.12]), about_y(row[3], [-0.05, 0.39])];
+        let apart = |k: usize, pivot: f64| at_coupler[k] + coupler[k] - pivot - rocker[k];
+        assert!(apart(0, 0.5).abs() < 1e-9 && apart(1, 0.0).abs() < 1e-9, "{row:?}");
+    }
+    assert!(rows.iter().any(|row| row[1] > 1.0), "it swings");
+    let motion = write(&here, "motion.csv", "t,crank,coupler,rocker\n0,0,0,0\n0.5,0,0,0\n1,0,0,0\n");
+    let said = fails(&["analyze", &robot, "--motion", &motion]);
+    assert!(said.contains("error[determined-moving]") && said.contains("joint `coupler`"), "{said}");
+}

@@ -101,6 +101,7 @@ fn canonical(random: &mut Random, tree: &CentreOfMassTree<Dd>) -> Model<Dd> {
         bodies: bodies.collect(),
         gravity: vec3(&tree.gravity),
         couplings: tree.links.iter().enumerate().filter_map(coupling).collect(),
+        closure: Default::default(),
         frames: tree.frames.iter().map(frame).collect(),
         drives: vec![],
         base_parameters: Default::default(),
