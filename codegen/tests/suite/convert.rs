@@ -327,6 +327,13 @@ fn what_a_format_cannot_say_is_listed_and_nothing_else() {
         (
             "inertias that no body has",
             "sdf",
+            arm("", "", &format!("[[link]]\nname = \"fore\"\nmass = 0.0\ninertia = [0, 0.35, 0]\n{fixed}")),
+            "link `fore` (line 21)",
+            "left-out",
+        ),
+        (
+            "inertias that no body has",
+            "sdf",
             arm("", "", "").replace("0.2, 0.15]", "0.2, 0.4]"),
             "link `upper` (line 9)",
             "left-out",

@@ -190,7 +190,7 @@ pub static INERTIAS_OF_NO_BODY: Loss = Loss {
     what: "inertias that no body has",
     weight: Data,
     then: "they are written, but MuJoCo itself refuses them unless `balanceinertia` or `boundinertia` changes them",
-    find: |robot| inertias(robot, |[least, middle, greatest]| least <= 0.0 || greatest > (least + middle) * SLACK),
+    find: |robot| inertias(robot, |mass, [least, _, _], is_out| mass > 0.0 && (least <= 0.0 || is_out)),
     remove: |_| (),
 };
 
@@ -199,7 +199,7 @@ pub static INERTIAS_OUT_OF_BOUNDS: Loss = Loss {
     what: "inertias that no body has",
     weight: Data,
     then: "they are written, but `libsdformat` calls them invalid",
-    find: |robot| inertias(robot, |[least, middle, greatest]| least < 0.0 || greatest > (least + middle) * SLACK),
+    find: |robot| inertias(robot, |_, [least, _, _], is_out| least < 0.0 || is_out),
     remove: |_| (),
 };
 
@@ -400,9 +400,12 @@ fn bodies_without_mass(robot: &Description) -> Vec<(String, Place)> {
     robot.links.iter().filter(is_bare).map(|link| of_link(&link.name)).collect()
 }
 
-/// Tensors of links with mass, by what is wrong with their principal moments.
-fn inertias(robot: &Description, is_of_none: impl Fn([f64; 3]) -> bool) -> Vec<(String, Place)> {
-    let is_of_none = |own: &&WrittenInertial| own.mass.value > 0.0 && is_of_none(principal_moments(own.inertia.value));
+/// Tensors of links, by the mass, the principal moments, and whether the greatest one is more than the sum of the others.
+fn inertias(robot: &Description, is_of_none: impl Fn(f64, [f64; 3], bool) -> bool) -> Vec<(String, Place)> {
+    let is_of_none = |own: &&WrittenInertial| {
+        let moments = principal_moments(own.inertia.value);
+        is_of_none(own.mass.value, moments, moments[2] > (moments[0] + moments[1]) * SLACK)
+    };
     let of = |link: &WrittenLink| {
         let place = link.inertial.as_ref().filter(is_of_none)?.inertia.place.clone();
         Some((of_link(&link.name).0, place))
