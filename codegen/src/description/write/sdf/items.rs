@@ -36,7 +36,7 @@ pub fn carriers(robot: &Description) -> Vec<&WrittenLink> {
 pub enum ModelItem<'a> {
     Link(&'a WrittenLink, PosedOn<'a>),
     Frame(&'a str, PosedOn<'a>),
-    Joint(JointElement<'a>),
+    Joint(Box<JointElement<'a>>),
 }
 
 /// Where something stands: on a link or frame that is written, or in the world, by poses one after the other.
@@ -233,7 +233,7 @@ impl<'a> ModelTree<'a> {
         let pose = place_in_child(anchor, &behind);
         let parent = carrier.on;
         items.push(ModelItem::Link(link, carrier.then(origin.into_iter().chain(behind))));
-        items.push(ModelItem::Joint(JointElement { name, word, parent, child, pose, parts, pitch }));
+        items.push(ModelItem::Joint(Box::new(JointElement { name, word, parent, child, pose, parts, pitch })));
         Some((link, PosedOn::at(child)))
     }
 
@@ -313,9 +313,9 @@ fn place_in_child(anchor: [f64; 3], behind: &[&WrittenPose]) -> WrittenPose {
 }
 
 impl<'a> JointElement<'a> {
-    fn fixed(name: String, parent: Option<&'a str>, child: &'a str) -> JointElement<'a> {
+    fn fixed(name: String, parent: Option<&'a str>, child: &'a str) -> Box<JointElement<'a>> {
         let pose = WrittenPose::identity(Place::none());
-        JointElement { name, word: "fixed", parent, child, pose, parts: Vec::new(), pitch: None }
+        Box::new(JointElement { name, word: "fixed", parent, child, pose, parts: Vec::new(), pitch: None })
     }
 }
 

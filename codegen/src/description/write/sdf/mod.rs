@@ -68,7 +68,8 @@ fn text(robot: &Description) -> String {
     out.open(&format!("model{}", attribute("name", &robot.name.value)));
     let mut leaders = HashMap::new();
     for item in &items {
-        if let ModelItem::Joint(JointElement { name, parts, .. }) = item {
+        if let ModelItem::Joint(joint) = item {
+            let JointElement { name, parts, .. } = &**joint;
             leaders.extend(parts.iter().enumerate().map(|(k, part)| (&*part.name.value, (&**name, AXES[k]))));
         }
     }
