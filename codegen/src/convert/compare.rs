@@ -6,6 +6,7 @@ use crate::diagnostic::{Diagnostics, Severity, Source};
 use crate::model::{self, ModelOptions};
 use std::collections::HashSet;
 use straightline_core::closure::ClosedLoop;
+use straightline_core::coupling::Coupling;
 use straightline_core::model::{Body, Frame, Model};
 use straightline_core::spatial::{SpatialInertia, Transform};
 use straightline_core::Dd;
@@ -55,10 +56,18 @@ pub fn of_models(wanted: &Model<Dd>, found: &Model<Dd>) -> Option<String> {
     let bodies =
         bodies.filter_map(|(a, b)| of_bodies(a, b, longest).map(|what| format!("joint `{}`: {what}", a.joint.name)));
     let frames = wanted.frames.iter().filter_map(|frame| of_frames(frame, &found.frames, longest));
-    let couplings = (wanted.couplings != found.couplings).then(|| "couplings are others".to_string());
+    let couplings =
+        (of_bodies_in_order(wanted) != of_bodies_in_order(found)).then(|| "couplings are others".to_string());
     let loops = (!are_loops(wanted, found, longest)).then(|| "loops are others".to_string());
     let drives = (wanted.drives != found.drives).then(|| "drives are others".to_string());
     bodies.chain(frames).chain(couplings).chain(loops).chain(drives).next()
+}
+
+/// Couplings in the order of the joints that follow, whatever that of the files is.
+fn of_bodies_in_order(model: &Model<Dd>) -> Vec<Coupling<Dd>> {
+    let mut couplings = model.couplings.clone();
+    couplings.sort_by_key(|coupling| coupling.body);
+    couplings
 }
 
 /// Whether the same points coincide, and determine the same joints.
@@ -95,13 +104,16 @@ fn of_bodies(a: &Body<Dd>, b: &Body<Dd>, longest: f64) -> Option<&'static str> {
         effects
     };
     let rotor = |body: &Body<Dd>| body.effects.rotor_inertia.unwrap_or(Dd::ZERO);
+    // what has no mass has it nowhere
+    let has_no_mass = a.inertia.mass == Dd::ZERO && b.inertia.mass == Dd::ZERO;
+    let coms = [a, b].map(|body| body.inertia.com.to_array());
     let greatest = inertia(&a.inertia).iter().fold(0.0, |most: f64, x| most.max(x.abs().to_f64()));
     let checks = [
         (a.joint == b.joint, "name, kind, coordinates or limits are others"),
         (a.parent == b.parent, "another link carries it"),
         (are_near(&a.placement, &b.placement, longest), "it stands elsewhere"),
         (is_near(a.inertia.mass, b.inertia.mass, a.inertia.mass.to_f64()), "the mass is another one"),
-        (all_near(&a.inertia.com.to_array(), &b.inertia.com.to_array(), longest), "the centre of mass is another one"),
+        (has_no_mass || all_near(&coms[0], &coms[1], longest), "the centre of mass is another one"),
         (all_near(&inertia(&a.inertia), &inertia(&b.inertia), greatest), "the inertia is another one"),
         (effects_but_rotors(a) == effects_but_rotors(b), "friction or spring are others"),
         (is_near(rotor(a), rotor(b), rotor(a).to_f64()), "the rotor's inertia is another one"),

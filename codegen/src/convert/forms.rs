@@ -5,19 +5,14 @@
 //! masses and frames keep their numbers.
 
 use crate::description::reader::FreeNames;
-use crate::description::write::{quaternion, FormatWriter, JointForm};
-use crate::description::{
-    AnchoredJoint, Description, Noted, Placement, Rotation, WrittenJoint, WrittenLink, WrittenPose, WrittenTurn,
-};
+use crate::description::write::{of_length_one, pose_of, FormatWriter, JointForm};
+use crate::description::{AnchoredJoint, Description, Noted, Placement, WrittenJoint, WrittenLink, WrittenPose};
 use crate::diagnostic::{Diagnostics, Place};
 use crate::model::angle::{transform, ROUNDING};
-use crate::model::geometry::{compose, unit, vector};
+use crate::model::geometry::{compose, vector};
 use crate::model::pose_at_zero;
 use straightline_core::spatial::{Mat3, Transform};
 use straightline_core::Dd;
-
-/// A longer or shorter axis is written with length 1.
-const AXIS_DIGITS: f64 = 1e-9;
 
 /// The same robot with its joints as a format has them, and its frames; `None`: a joint stands nowhere.
 pub fn formed(robot: &Description, writer: &FormatWriter) -> Option<Description> {
@@ -71,16 +66,7 @@ fn anywhere(joint: &WrittenJoint) -> Option<Placement> {
     };
     let pose = pose_at_zero(joint, ROUNDING, &mut Diagnostics::new())?;
     let [anchor, axis] = [anchor, axis].map(Noted::assumed);
-    Some(Placement::Anchored(AnchoredJoint { origin: written(&pose), anchor, axis, reference: None }))
-}
-
-/// A pose rounded to f64, its rotation as a quaternion.
-fn written(pose: &Transform<Dd>) -> WrittenPose {
-    let turns = match pose.rotation == Mat3::identity() {
-        true => Vec::new(),
-        false => vec![WrittenTurn::Quaternion(Noted::assumed(quaternion(&pose.rotation)))],
-    };
-    WrittenPose { xyz: Noted::assumed(pose.translation.to_array().map(Dd::to_f64)), rotation: Rotation::Turns(turns) }
+    Some(Placement::Anchored(AnchoredJoint { origin: pose_of(&pose), anchor, axis, reference: None }))
 }
 
 /// Brings joints to frames of links.
@@ -111,13 +97,4 @@ fn at_frames(robot: &mut Description, names: &mut RobotNames) {
         joints.extend(fixed);
     }
     robot.joints = joints;
-}
-
-/// The axis as it is where it is that long, as it is written with so many digits.
-fn of_length_one(axis: [f64; 3]) -> [f64; 3] {
-    let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
-    match unit(vector(axis)) {
-        Some(unit) if (length - 1.0).abs() > AXIS_DIGITS => unit.to_array().map(Dd::to_f64),
-        _ => axis,
-    }
 }

@@ -88,6 +88,11 @@ impl Description {
         self.links.iter().find(|link| !moved.contains(link.name.value.as_str()))
     }
 
+    /// The root of a robot that stands on the ground, where it is the world itself.
+    pub(crate) fn ground(&self) -> Option<&WrittenLink> {
+        self.root().filter(|root| !self.floats() && root.name.value == "world")
+    }
+
     /// The joint of a name.
     pub fn joint(&self, name: &str) -> Option<&WrittenJoint> {
         self.joints.iter().find(|joint| joint.name.value == name)

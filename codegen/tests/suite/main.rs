@@ -20,6 +20,7 @@ mod contact;
 mod contact_compiled;
 mod contact_derivatives;
 mod convert;
+mod convert_sdf;
 mod derivative_bounds;
 mod dh;
 mod effects;

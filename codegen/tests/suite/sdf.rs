@@ -454,6 +454,12 @@ fn printed(robot: &Robot, random: &mut Random) -> (String, usize) {
     (Printer { random, robot, models, inner, is_old }.print(), inner)
 }
 
+/// A random robot as SDF.
+pub fn random_sdf(random: &mut Random) -> String {
+    let robot = Robot::random(random);
+    printed(&robot, random).0
+}
+
 fn model_of(name: &str, text: &str, options: &ModelOptions) -> Model<Dd> {
     let (model, diagnostics) = load(&Source::new(name, text), options);
     model.unwrap_or_else(|| panic!("{diagnostics}\n{text}"))

@@ -7,7 +7,7 @@ use crate::description::{messages, JointDrive, JointLimits, Noted};
 use roxmltree::Node;
 
 /// From here on a limit is none.
-const NO_LIMIT: f64 = 1e16;
+pub(in crate::description) const NO_LIMIT: f64 = 1e16;
 
 /// An axis as it is written.
 pub(super) struct SdfAxis<'d, 'i> {

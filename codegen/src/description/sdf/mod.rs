@@ -17,6 +17,8 @@ mod joints;
 mod links;
 mod poses;
 
+pub(super) use axes::NO_LIMIT;
+
 use super::reader::{FileReader, FreeNames};
 use super::xml::{self, children, tag, Span};
 use super::{messages, BaseKind, Description, FileFormat, Noted};
@@ -34,7 +36,7 @@ pub(super) const FORMAT: FileFormat = FileFormat {
     dialect: Dialect::Sdf,
     limits: "write `<limit>` with `<lower>` and `<upper>`",
     read,
-    write: None,
+    write: Some(&super::write::sdf::WRITER),
 };
 
 /// The versions 1.N that are read.

@@ -2,9 +2,11 @@
 //!
 //! A row finds what a robot has of it, and takes it away, so that what is left is what the written file is compared with.
 
+use super::sdf::{self, names};
 use crate::description::geometry::principal_moments;
 use crate::description::{
-    AnchoredJoint, BaseKind, Description, JointVectors, Noted, Placement, WrittenInertial, WrittenJoint, WrittenLink,
+    AnchoredJoint, BaseKind, Description, JointLimits, JointVectors, Noted, Placement, WrittenInertial, WrittenJoint,
+    WrittenLink,
 };
 use crate::diagnostic::Place;
 use std::collections::{HashMap, HashSet};
@@ -165,41 +167,94 @@ pub static ZERO_EFFORTS: Loss = Loss {
     },
 };
 
-/// Bodies that move and have no mass.
+/// Bodies that move and have no mass, in MJCF.
 pub static BODIES_WITHOUT_MASS: Loss = Loss {
     what: "moving bodies without mass",
     weight: Data,
     then: "they are written, but MuJoCo itself refuses them",
-    find: |robot| {
-        let massive = with_mass(robot);
-        let moving = robot.joints.iter().filter(|joint| joint.kind.value.between_links().is_some());
-        let mut moved: HashSet<&str> = moving.map(|joint| joint.child.value.as_str()).collect();
-        moved.extend(robot.root().filter(|_| robot.floats()).map(|root| root.name.value.as_str()));
-        let is_bare = |link: &&WrittenLink| {
-            let name = link.name.value.as_str();
-            moved.contains(name) && !massive.contains(name) && !link.is_carrier
-        };
-        robot.links.iter().filter(is_bare).map(|link| of_link(&link.name)).collect()
-    },
+    find: bodies_without_mass,
     remove: |_| (),
 };
 
-/// Tensors that belong to no body.
+/// Bodies that move and have no mass, in SDF.
+pub static BODIES_OF_MASS_ZERO: Loss = Loss {
+    what: "moving bodies without mass",
+    weight: Data,
+    then: "they are written with mass 0, which engines of Gazebo may refuse",
+    find: bodies_without_mass,
+    remove: |_| (),
+};
+
+/// Tensors that belong to no body, in MJCF.
 pub static INERTIAS_OF_NO_BODY: Loss = Loss {
     what: "inertias that no body has",
     weight: Data,
     then: "they are written, but MuJoCo itself refuses them unless `balanceinertia` or `boundinertia` changes them",
+    find: |robot| inertias(robot, |mass, [least, _, _], is_out| mass > 0.0 && (least <= 0.0 || is_out)),
+    remove: |_| (),
+};
+
+/// Tensors that belong to no body, in SDF, which has rods and points.
+pub static INERTIAS_OUT_OF_BOUNDS: Loss = Loss {
+    what: "inertias that no body has",
+    weight: Data,
+    then: "they are written, but `libsdformat` calls them invalid",
+    find: |robot| inertias(robot, |_, [least, _, _], is_out| least < 0.0 || is_out),
+    remove: |_| (),
+};
+
+/// Limits that SDF takes for none.
+pub static ENDLESS_LIMITS: Loss = Loss {
+    what: "limits from 10¹⁶ on",
+    weight: Data,
+    then: "there they mean that there is none",
     find: |robot| {
-        let is_of_none = |inertial: &&WrittenInertial| {
-            let [least, middle, greatest] = principal_moments(inertial.inertia.value);
-            inertial.mass.value > 0.0 && (least <= 0.0 || greatest > (least + middle) * SLACK)
-        };
-        let of = |link: &WrittenLink| {
-            let place = link.inertial.as_ref().filter(is_of_none)?.inertia.place.clone();
-            Some((of_link(&link.name).0, place))
-        };
-        robot.links.iter().filter_map(of).collect()
+        let far = |x: &&Option<Noted<f64>>| x.as_ref().is_some_and(|x| x.value.is_finite() && !sdf::is_limit(x.value));
+        of_joints(robot, |joint| {
+            let JointLimits { lower, upper, velocity, effort } = &joint.limits;
+            first([lower, upper, velocity, effort].into_iter().filter(far))
+        })
     },
+    remove: |robot| {
+        for limits in robot.joints.iter_mut().map(|joint| &mut joint.limits) {
+            let JointLimits { lower, upper, velocity, effort } = limits;
+            let ends =
+                [(lower, -f64::INFINITY), (upper, f64::INFINITY), (velocity, f64::INFINITY), (effort, f64::INFINITY)];
+            for (limit, endless) in ends {
+                limit.iter_mut().filter(|limit| !sdf::is_limit(limit.value)).for_each(|limit| limit.value = endless);
+            }
+        }
+    },
+};
+
+/// Names that SDF cannot have.
+pub static UNFIT_NAMES: Loss = Loss {
+    what: "names that are words of SDF, hold `::` or belong to a joint and a link",
+    weight: Data,
+    then: "`_` is written for `::`, and `_robot`, `_link`, `_frame` or `_joint` behind the others",
+    find: |robot| {
+        let named = |unfit: names::UnfitName| (format!("{} `{}`", unfit.of, unfit.name.value), unfit.name.place);
+        names::unfit(robot).into_iter().map(named).collect()
+    },
+    remove: names::replace_unfit,
+};
+
+/// Links without mass that SDF has as frames.
+pub static LINKS_AS_FRAMES: Loss = Loss {
+    what: "links without mass on fixed joints",
+    weight: Form,
+    then: "frames are written, without a joint",
+    find: |robot| sdf::links_as_frames(robot).into_iter().map(|link| of_link(&link.name)).collect(),
+    remove: |_| (),
+};
+
+/// Links that only carry joints, where a format has some bodies with several.
+pub static CARRIERS_OF_OTHERS: Loss = Loss {
+    what: "bodies with several joints",
+    weight: Form,
+    then:
+        "but for `universal` and `screw` a link with mass 0 is written between each joint and the next, and is a frame",
+    find: |robot| sdf::carriers(robot).into_iter().map(|link| of_link(&link.name)).collect(),
     remove: |_| (),
 };
 
@@ -209,11 +264,11 @@ pub static MASS_OF_THE_WORLD: Loss = Loss {
     weight: Form,
     then: "it is left out, as it moves nothing",
     find: |robot| {
-        let inertial = world_of(robot).and_then(|link| Some((link, link.inertial.as_ref()?)));
+        let inertial = robot.ground().and_then(|link| Some((link, link.inertial.as_ref()?)));
         inertial.map(|(link, inertial)| (of_link(&link.name).0, inertial.mass.place.clone())).into_iter().collect()
     },
     remove: |robot| {
-        let world = world_of(robot).map(|link| link.name.value.clone());
+        let world = robot.ground().map(|link| link.name.value.clone());
         let links = robot.links.iter_mut().filter(|link| Some(&link.name.value) == world.as_ref());
         links.for_each(|link| link.inertial = None);
     },
@@ -333,6 +388,31 @@ pub static SKIPPED: Loss = Loss {
     remove: |robot| robot.ignored.clear(),
 };
 
+fn bodies_without_mass(robot: &Description) -> Vec<(String, Place)> {
+    let massive = with_mass(robot);
+    let moving = robot.joints.iter().filter(|joint| joint.kind.value.between_links().is_some());
+    let mut moved: HashSet<&str> = moving.map(|joint| joint.child.value.as_str()).collect();
+    moved.extend(robot.root().filter(|_| robot.floats()).map(|root| root.name.value.as_str()));
+    let is_bare = |link: &&WrittenLink| {
+        let name = link.name.value.as_str();
+        moved.contains(name) && !massive.contains(name) && !link.is_carrier
+    };
+    robot.links.iter().filter(is_bare).map(|link| of_link(&link.name)).collect()
+}
+
+/// Tensors of links, by the mass, the principal moments, and whether the greatest one is more than the sum of the others.
+fn inertias(robot: &Description, is_of_none: impl Fn(f64, [f64; 3], bool) -> bool) -> Vec<(String, Place)> {
+    let is_of_none = |own: &&WrittenInertial| {
+        let moments = principal_moments(own.inertia.value);
+        is_of_none(own.mass.value, moments, moments[2] > (moments[0] + moments[1]) * SLACK)
+    };
+    let of = |link: &WrittenLink| {
+        let place = link.inertial.as_ref().filter(is_of_none)?.inertia.place.clone();
+        Some((of_link(&link.name).0, place))
+    };
+    robot.links.iter().filter_map(of).collect()
+}
+
 fn loops(robot: &Description) -> Vec<(String, Place)> {
     robot.loops.iter().map(|own| (format!("loop `{}`", own.name.value), own.name.place.clone())).collect()
 }
@@ -364,11 +444,6 @@ fn acts(value: &Option<Noted<f64>>) -> bool {
 fn is_one_sided(joint: &WrittenJoint) -> bool {
     let is_end = |limit: &Option<Noted<f64>>| limit.as_ref().is_some_and(|limit| limit.value.is_finite());
     joint.kind.value.has_range && is_end(&joint.limits.lower) != is_end(&joint.limits.upper)
-}
-
-/// The root of a robot that stands on the ground, where it is the world itself.
-fn world_of(robot: &Description) -> Option<&WrittenLink> {
-    robot.root().filter(|root| !robot.floats() && root.name.value == "world")
 }
 
 /// The links that have mass, or on which something is fixed that has.

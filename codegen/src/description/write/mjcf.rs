@@ -4,13 +4,12 @@
 //! as it was.
 
 use super::rotations::{self, Said};
-use super::{attribute, losses, number, numbers, word_of, FormatWriter, JointForm};
+use super::{attribute, losses, number, numbers, word_of, FormatWriter, JointForm, OnLinks};
 use crate::description::angle::{self, ROUNDING};
 use crate::description::{
-    AnchoredJoint, Description, LoopPoints, NamedFrame, Placement, Rotation, WrittenInertial, WrittenJoint,
-    WrittenLink, WrittenPose,
+    AnchoredJoint, Description, LoopPoints, Placement, Rotation, WrittenInertial, WrittenJoint, WrittenLink,
+    WrittenPose,
 };
-use std::collections::HashMap;
 use std::fmt::Write;
 use straightline_core::joint::Dialect;
 use straightline_core::spatial::Sym3;
@@ -48,7 +47,7 @@ fn text(robot: &Description) -> String {
     if let Some(gravity) = &robot.gravity {
         _ = writeln!(out, "  <option{}/>", attribute("gravity", &numbers(&gravity.value)));
     }
-    out += &Bodies::of(robot).text();
+    out += &Bodies(OnLinks::of(robot)).text();
     if !robot.couplings.is_empty() || !robot.loops.is_empty() {
         out += "  <equality>\n";
         for coupling in &robot.couplings {
@@ -80,41 +79,22 @@ fn motors(robot: &Description) -> String {
     out + "  </actuator>\n"
 }
 
-/// What stands on each link.
-struct Bodies<'a> {
-    robot: &'a Description,
-    links: HashMap<&'a str, &'a WrittenLink>,
-    joints: HashMap<&'a str, Vec<&'a WrittenJoint>>,
-    frames: HashMap<&'a str, Vec<&'a NamedFrame>>,
-}
-
 /// What is still to be written: a body with the joints that move it, the outermost first, or the end of an element.
 enum BodyStep<'a> {
     Body(&'a WrittenLink, Vec<&'a WrittenJoint>),
     End(&'static str),
 }
 
-impl<'a> Bodies<'a> {
-    fn of(robot: &'a Description) -> Bodies<'a> {
-        let mut bodies = Bodies { robot, links: HashMap::new(), joints: HashMap::new(), frames: HashMap::new() };
-        for link in &robot.links {
-            bodies.links.insert(&link.name.value, link);
-        }
-        for joint in &robot.joints {
-            bodies.joints.entry(&joint.parent.value).or_default().push(joint);
-        }
-        for frame in &robot.frames {
-            bodies.frames.entry(&frame.link.value).or_default().push(frame);
-        }
-        bodies
-    }
+/// Bodies in bodies.
+struct Bodies<'a>(OnLinks<'a>);
 
+impl<'a> Bodies<'a> {
     fn text(&self) -> String {
         let mut out = "  <worldbody>\n".to_string();
-        let Some(root) = self.robot.root() else { return out + "  </worldbody>\n" };
-        let floats = self.robot.floats();
+        let Some(root) = self.0.robot.root() else { return out + "  </worldbody>\n" };
+        let floats = self.0.robot.floats();
         let mut open = Vec::new();
-        match root.name.value == "world" && !floats {
+        match self.0.robot.ground().is_some() {
             true => {
                 self.add_sites(root, 2, &mut out);
                 open.extend(self.on(root));
@@ -156,14 +136,14 @@ impl<'a> Bodies<'a> {
     /// The bodies on a link, the first one last. Links in between that only carry joints are left out.
     fn on(&self, link: &'a WrittenLink) -> Vec<BodyStep<'a>> {
         let mut steps = Vec::new();
-        for &first in self.joints.get(link.name.value.as_str()).into_iter().flatten().rev() {
+        for &first in self.0.joints(link).iter().rev() {
             let mut joints = vec![first];
             let mut last = first;
             while let Some(next) = self.further_joint(last) {
                 joints.push(next);
                 last = next;
             }
-            if let Some(child) = self.links.get(last.child.value.as_str()) {
+            if let Some(child) = self.0.link(&last.child.value) {
                 steps.push(BodyStep::Body(child, joints));
             }
         }
@@ -172,16 +152,15 @@ impl<'a> Bodies<'a> {
 
     /// The joint that stands in the same body as one before it.
     fn further_joint(&self, joint: &WrittenJoint) -> Option<&'a WrittenJoint> {
-        let carrier = self.links.get(joint.child.value.as_str()).filter(|link| link.is_carrier)?;
-        let is_bare = carrier.inertial.is_none() && !self.frames.contains_key(carrier.name.value.as_str());
-        let [next] = self.joints.get(carrier.name.value.as_str())?[..] else { return None };
+        let carrier = self.0.link(&joint.child.value).filter(|link| self.0.is_bare(link))?;
+        let [next] = *self.0.joints(carrier) else { return None };
         let moves = |joint: &WrittenJoint| joint.kind.value.between_links().is_some();
         let is_there = pose(origin_of(next)).is_empty();
-        (is_bare && is_there && moves(joint) && moves(next)).then_some(next)
+        (is_there && moves(joint) && moves(next)).then_some(next)
     }
 
     fn add_sites(&self, link: &WrittenLink, depth: usize, out: &mut String) {
-        for frame in self.frames.get(link.name.value.as_str()).into_iter().flatten() {
+        for frame in self.0.frames(link) {
             let name = attribute("name", &frame.name.value);
             _ = writeln!(out, "{}<site{name}{}/>", indent(depth), pose(&frame.pose));
         }

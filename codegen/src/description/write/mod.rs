@@ -7,12 +7,14 @@ mod drives;
 pub mod losses;
 pub(super) mod mjcf;
 mod rotations;
+pub(super) mod sdf;
 pub(super) mod toml;
 pub(super) mod urdf;
 
-use super::{Description, JointType};
+use super::{Description, JointType, NamedFrame, WrittenJoint, WrittenLink};
 use losses::Loss;
-pub(crate) use rotations::quaternion;
+pub(crate) use rotations::{of_length_one, pose_of};
+use std::collections::HashMap;
 use std::fmt::Write;
 use straightline_core::joint::{Dialect, JointKind};
 
@@ -46,6 +48,50 @@ pub enum JointForm {
     Anywhere,
 }
 
+/// A robot with what stands on each of its links.
+struct OnLinks<'a> {
+    robot: &'a Description,
+    links: HashMap<&'a str, &'a WrittenLink>,
+    joints: HashMap<&'a str, Vec<&'a WrittenJoint>>,
+    frames: HashMap<&'a str, Vec<&'a NamedFrame>>,
+}
+
+impl<'a> OnLinks<'a> {
+    fn of(robot: &'a Description) -> OnLinks<'a> {
+        let mut on = OnLinks { robot, links: HashMap::new(), joints: HashMap::new(), frames: HashMap::new() };
+        for link in &robot.links {
+            on.links.insert(&link.name.value, link);
+        }
+        for joint in &robot.joints {
+            on.joints.entry(&joint.parent.value).or_default().push(joint);
+        }
+        for frame in &robot.frames {
+            on.frames.entry(&frame.link.value).or_default().push(frame);
+        }
+        on
+    }
+
+    /// The link of a name.
+    fn link(&self, name: &str) -> Option<&'a WrittenLink> {
+        self.links.get(name).copied()
+    }
+
+    /// The joints that a link carries, in the order of the file.
+    fn joints(&self, link: &WrittenLink) -> &[&'a WrittenJoint] {
+        self.joints.get(link.name.value.as_str()).map_or(&[], Vec::as_slice)
+    }
+
+    /// The frames on a link that are only that.
+    fn frames(&self, link: &WrittenLink) -> &[&'a NamedFrame] {
+        self.frames.get(link.name.value.as_str()).map_or(&[], Vec::as_slice)
+    }
+
+    /// Whether a link only carries joints: nothing else is there.
+    fn is_bare(&self, link: &WrittenLink) -> bool {
+        link.is_carrier && link.inertial.is_none() && self.frames(link).is_empty()
+    }
+}
+
 /// The words of a joint in a format: that with a range if it has one, or else that without; `None`: it has none.
 fn word_of(kind: Option<JointKind>, is_ranged: bool, dialect: Dialect) -> Option<&'static str> {
     let words = JointType::words(dialect);
@@ -70,7 +116,12 @@ fn number(x: f64) -> String {
 
 /// An attribute of XML with a space before it.
 fn attribute(name: &str, value: &str) -> String {
-    let mut text = format!(" {name}=\"");
+    format!(" {name}=\"{}\"", escaped(value))
+}
+
+/// A text as XML has it.
+fn escaped(value: &str) -> String {
+    let mut text = String::new();
     for c in value.chars() {
         match c {
             '&' => text += "&amp;",
@@ -81,5 +132,5 @@ fn attribute(name: &str, value: &str) -> String {
             _ => text.push(c),
         }
     }
-    text + "\""
+    text
 }

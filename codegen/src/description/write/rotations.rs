@@ -4,10 +4,16 @@
 //! angle that reads as a multiple of π/4 or π/6 is written as the f64 that is nearest to it, and a quaternion of right angles in whole numbers.
 
 use crate::description::angle::{self, ROUNDING};
-use crate::description::{Angle, AngleUnit, Rotation, WrittenTurn};
+use crate::description::geometry::{unit, vector};
+use crate::description::{Angle, AngleUnit, Noted, Rotation, WrittenPose, WrittenTurn};
 use crate::diagnostic::Place;
-use straightline_core::spatial::Mat3;
+use straightline_core::spatial::{Mat3, Transform};
 use straightline_core::Dd;
+
+/// A longer or shorter axis is written with length 1.
+const AXIS_DIGITS: f64 = 1e-9;
+/// Numbers that are rounded to f64 make a length as near to 1.
+const QUATERNION_DIGITS: f64 = 4e-16;
 
 /// A rotation as a file can say it.
 pub enum Said {
@@ -101,10 +107,39 @@ pub fn quaternion(r: &Mat3<Dd>) -> [f64; 4] {
     })
 }
 
+/// A pose rounded to f64, its rotation as a quaternion.
+pub fn pose_of(pose: &Transform<Dd>) -> WrittenPose {
+    let turns = match pose.rotation == Mat3::identity() {
+        true => Vec::new(),
+        false => vec![WrittenTurn::Quaternion(Noted::assumed(quaternion(&pose.rotation)))],
+    };
+    WrittenPose { xyz: Noted::assumed(pose.translation.to_array().map(Dd::to_f64)), rotation: Rotation::Turns(turns) }
+}
+
+/// The axis as it is where it is that long, as it is written with so many digits.
+pub fn of_length_one(axis: [f64; 3]) -> [f64; 3] {
+    let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
+    match unit(vector(axis)) {
+        Some(unit) if (length - 1.0).abs() > AXIS_DIGITS => unit.to_array().map(Dd::to_f64),
+        _ => axis,
+    }
+}
+
+/// The quaternion with length 1, of which only one that has it to the last digits keeps its numbers.
+pub fn unit_quaternion(q: [f64; 4]) -> [f64; 4] {
+    let greatest = q.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    // scaled first, so that no square leaves f64's range; files with the null quaternion are refused
+    let scaled = q.map(|x| Dd::from(x) / Dd::from(greatest));
+    let length = scaled.iter().fold(Dd::ZERO, |sum, x| sum + *x * *x).sqrt();
+    match ((length * Dd::from(greatest)).to_f64() - 1.0).abs() > QUATERNION_DIGITS {
+        true => scaled.map(|x| (x / length).to_f64()),
+        false => q,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::Noted;
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
     fn rotation_of(rpy: [f64; 3]) -> Rotation {
@@ -128,7 +163,11 @@ mod tests {
                     let by_angles = angle::rotation(&rotation_of(angles(&before)), ROUNDING);
                     let turn = WrittenTurn::Quaternion(Noted::assumed(quaternion(&before)));
                     let by_quaternion = angle::rotation(&Rotation::Turns(vec![turn]), ROUNDING);
-                    for after in [by_angles, by_quaternion] {
+                    let q = unit_quaternion(quaternion(&before));
+                    assert!((q.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-15, "{q:?}");
+                    let turn = WrittenTurn::Quaternion(Noted::assumed(q));
+                    let by_unit = angle::rotation(&Rotation::Turns(vec![turn]), ROUNDING);
+                    for after in [by_angles, by_quaternion, by_unit] {
                         let off = farthest(&before, &after);
                         assert!(off < 1.2e-15, "{roll:?} {pitch:?} {yaw:?}: {off:e}");
                     }
@@ -145,8 +184,10 @@ mod tests {
             let q = quaternion(&before);
             assert!(q.iter().all(|x| [0.0, 1.0].contains(&x.abs())), "{rpy:?}: {q:?}");
             assert_eq!(before, angle::rotation(&rotation_of(angles(&before)), ROUNDING), "{rpy:?}");
-            let turn = WrittenTurn::Quaternion(Noted::assumed(q));
-            assert_eq!(before, angle::rotation(&Rotation::Turns(vec![turn]), ROUNDING), "{rpy:?}");
+            for q in [q, unit_quaternion(q)] {
+                let turn = WrittenTurn::Quaternion(Noted::assumed(q));
+                assert_eq!(before, angle::rotation(&Rotation::Turns(vec![turn]), ROUNDING), "{rpy:?}");
+            }
         }
     }
 }
