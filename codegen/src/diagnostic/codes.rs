@@ -61,6 +61,7 @@ pub const ALL: &[Code] = &[
     code("current-without-motor", Error, "A current for an actuator that is no motor."),
     code("cycle", Error, "Links that carry each other."),
     code("default-inertial", Warning, "A link that has the inertia that its format gives to all that say none."),
+    code("determined-moving", Error, "A motion of a joint that loops determine."),
     code("drive-coupling", Error, "Drives whose ratios are dependent."),
     code("drive-given-twice", Error, "Two parameters for one drive."),
     code("drive-joint", Error, "A drive of a joint that is not there, or does not move."),

@@ -35,9 +35,8 @@ pub use forms::{AlikeColumns, Forms, ForwardDynamicsMethod, LimbSums};
 pub use quantity::Quantity;
 pub use rows::SelectedRows;
 pub(crate) use solution::by_rows;
-pub use spec::{Divisor, Extent, Family, Form, InLanes, Judged, Output, Parts, RobotFunction, SlopeOf, Spec};
+pub use spec::{Divisor, Extent, Family, Form, InLanes, Judged, Lacking, Output, Parts, RobotFunction, SlopeOf, Spec};
 
-use crate::scene::messages::Lacking;
 use straightline_core::model::{Frame, Model};
 use straightline_core::Real;
 use straightline_graph::expr::Port;

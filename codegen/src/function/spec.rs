@@ -370,3 +370,16 @@ pub trait RobotFunction {
         Vec::new()
     }
 }
+
+/// Why a robot does not have a function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lacking {
+    /// It is about loops that the robot does not have.
+    Loops,
+    /// It has no form for robots with loops.
+    FormOnLoops,
+    /// It is about drives that the robot does not have.
+    Drives,
+    /// Its drives are others.
+    FittingDrives,
+}

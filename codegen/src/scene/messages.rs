@@ -3,6 +3,7 @@
 
 use crate::diagnostic::wording::{cut, did_you_mean, list, six_digits};
 use crate::diagnostic::Diagnostic;
+use crate::function::Lacking;
 
 /// The codes of all messages of this table.
 pub const CODES: &[&str] = &[
@@ -644,19 +645,6 @@ pub fn regressor_unused(functions: &[&str]) -> D {
     D::error("regressor-unused", "no function has these columns")
         .detail(format!("they belong to {}, which are made where they are named", list(functions)))
         .help("name one, as in `functions = [\"torque_regressor\"]` under `[outputs]`, or leave `[regressor]` out")
-}
-
-/// Why a robot does not have a function.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lacking {
-    /// It is about loops that the robot does not have.
-    Loops,
-    /// It has no form for robots with loops.
-    FormOnLoops,
-    /// It is about drives that the robot does not have.
-    Drives,
-    /// Its drives are others.
-    FittingDrives,
 }
 
 /// A function about something that the robot does not have.
