@@ -293,7 +293,9 @@ fn dependents(
         (asked(written, equations, model, diagnostics)?, candidates(description, equations, model));
     order.retain(|b| !asked.iter().any(|(_, own)| own == b));
     let rows: usize = equations.loops.iter().map(|l| l.directions.len()).sum();
-    let mut chosen = DependentChoice { bases: equations.columns().into_iter().map(|all| (all, Vec::new())).collect() };
+    let mut chosen = DependentChoice {
+        bases: equations.columns().into_iter().map(|columns| TakenColumns { columns, basis: Vec::new() }).collect(),
+    };
     let mut found: Vec<BodyId> = Vec::new();
     for (name, b) in &asked {
         if !chosen.takes(&model.bodies[*b], WELL_LEFT[1], true) {
@@ -364,7 +366,12 @@ fn candidates(description: &Description, equations: &LoopEquations, model: &Mode
 
 /// In each closed configuration the columns of all coordinates, and an orthonormal basis of those that were taken.
 struct DependentChoice {
-    bases: Vec<(Vec<Vec<f64>>, Vec<Vec<f64>>)>,
+    bases: Vec<TakenColumns>,
+}
+
+struct TakenColumns {
+    columns: Vec<Vec<f64>>,
+    basis: Vec<Vec<f64>>,
 }
 
 impl DependentChoice {
@@ -374,7 +381,7 @@ impl DependentChoice {
         let grown: Vec<Option<Vec<Vec<f64>>>> = self
             .bases
             .iter()
-            .map(|(columns, basis)| {
+            .map(|TakenColumns { columns, basis }| {
                 let mut basis = basis.clone();
                 own.clone().all(|k| extend(&mut basis, &columns[k], least)).then_some(basis)
             })
@@ -383,7 +390,7 @@ impl DependentChoice {
         if if anywhere { taken == 0 } else { taken < grown.len() } {
             return false;
         }
-        for ((columns, basis), grown) in self.bases.iter_mut().zip(grown) {
+        for (TakenColumns { columns, basis }, grown) in self.bases.iter_mut().zip(grown) {
             match grown {
                 Some(grown) => *basis = grown,
                 // singular there: nothing further is known of it

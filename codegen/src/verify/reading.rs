@@ -21,12 +21,15 @@ pub(super) fn motion() -> impl Iterator<Item = Quantity> {
     [Quantity::Configuration].into_iter().chain(Quantity::of_velocities()).chain(others)
 }
 
+/// A robot, what its joints add to it, and its loops.
+type RobotInReference = (CentreOfMassTree<Dd>, Vec<Effect>, Option<ClosedLoops>);
+
 /// The robot in the reference's terms, its coordinates numbered as the model's, and what joints add to it.
 pub(super) fn second_reading(
     source: &Source,
     model: &Model<Dd>,
     options: &Options,
-) -> Result<(CentreOfMassTree<Dd>, Vec<Effect>, Option<ClosedLoops>), String> {
+) -> Result<RobotInReference, String> {
     let description = description::read(source, &mut Diagnostics::new()).ok_or("the file holds no robot")?;
     let mut tree = centre_of_mass_tree(&description, &options.model)?;
     let mut renumbered = BTreeMap::new();

@@ -108,9 +108,11 @@ fn equations_of_other_joints_have_all_digits_of_the_reference_values() {
         let of_program = |function: Function, state: &State| {
             let program = programs::of_robot(&robot, function, &options);
             let mut inputs = exact(&quaternions, &state.inputs(function));
-            if function != Function::CloseLoops {
+            match function {
+                // a base stays where it is, its quaternion as it is written
+                Function::CloseLoops => inputs = cast::<Dd>(&state.inputs(function)),
                 // what was rounded is closed again
-                inputs[0] = loaded.model.close_loops(&inputs[0], 3).0;
+                _ => inputs[0] = loaded.model.close_loops(&inputs[0], 3).0,
             }
             let results = programs::run::<Dd>(&program, &inputs);
             if function != Function::CloseLoops {
