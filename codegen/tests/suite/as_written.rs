@@ -284,7 +284,7 @@ pub fn judge(file: &File, wanted: &dyn Fn(Scalar, Function) -> bool) -> Outcome 
         let of_scene = f.is_of_scene_parameters() || f.spec().inputs.contains(&Quantity::LinkParameters);
         // nor is anything asked of no frames
         let of_no_frames = frames.is_empty() && f.spec().family == Family::Tasks;
-        !f.spec().family.is_of_drives() && !of_scene && !of_no_frames
+        f.is_of(&model) && !f.spec().family.is_of_drives() && !of_scene && !of_no_frames
     };
     // that is four times the derivatives of forward dynamics, which are judged, in one program
     let is_repeated = |f: &Function| *f == Function::StepDerivativesRk4;
