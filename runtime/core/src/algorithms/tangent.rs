@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 /// q ⊕ v. Quaternions are taken as of length one, whatever their length but zero, and come out so. Joints that loops determine go along G v, and from
-/// there in [`STEPS_ALONG_LOOPS`] steps of Newton's to where the loops close.
+/// there in two steps of Newton's to where the loops close.
 pub fn integrate<T: Real>(model: &Model<T>, q: &[T], v: &[T]) -> Vec<T> {
     let to = open_integrate(model, q, &model.open_rates(&model.tree_positions(q), v));
     match model.closure.is_empty() {
@@ -23,7 +23,7 @@ pub fn integrate<T: Real>(model: &Model<T>, q: &[T], v: &[T]) -> Vec<T> {
 }
 
 /// How often loops are closed by Newton's method where a displacement has led: each step squares what is left, which is of the square of the displacement.
-pub const STEPS_ALONG_LOOPS: usize = 2;
+const STEPS_ALONG_LOOPS: usize = 2;
 
 fn open_integrate<T: Real>(model: &Model<T>, q: &[T], v: &[T]) -> Vec<T> {
     let mut to = vec![T::zero(); q.len()];
