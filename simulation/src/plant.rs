@@ -119,6 +119,9 @@ impl Plant {
     /// A loop whose points do not meet near the state, in words.
     fn open_loop(&self, state: &[f64]) -> Option<String> {
         let model = &self.model;
+        if model.closure.is_empty() {
+            return None;
+        }
         let y = model.tree_positions(&configuration(model, &state[..model.nq()])).into_owned();
         model.closure.loops.iter().find_map(|of| {
             let apart = model.gap(of, &y).iter().map(|gap| gap * gap).sum::<f64>().sqrt();
