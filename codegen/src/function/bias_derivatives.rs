@@ -12,6 +12,7 @@ pub struct GravityDerivative;
 
 impl RobotFunction for GravityDerivative {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "gravity_derivative",
         summary: "Gravity forces g(q) with their derivative ∂g/∂q: the stiffness that gravity gives the joints.",
         aliases: &["computeGeneralizedGravityDerivatives", "gravity Hessian", "gravitational stiffness"],
@@ -53,6 +54,7 @@ pub struct BiasDerivatives;
 
 impl RobotFunction for BiasDerivatives {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "bias_derivatives",
         summary: "Bias forces h(q, q̇) with their derivatives ∂h/∂q and ∂h/∂q̇.",
         aliases: &["derivatives of nonlinear effects"],
@@ -81,6 +83,7 @@ pub struct CoriolisMatrix;
 
 impl RobotFunction for CoriolisMatrix {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "coriolis_matrix",
         summary: "The Coriolis matrix C(q, q̇) with Ḣ = C + Cᵀ, of Christoffel's symbols, and Ḣ.",
         aliases: &["computeCoriolisMatrix", "Christoffel symbols", "rate of the mass matrix"],
@@ -96,14 +99,17 @@ impl RobotFunction for CoriolisMatrix {
     /// Where velocities are rates of coordinates C = ½ ∂h/∂q̇, which is linear in q̇: ∂h/∂q̇ at half of it.
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
         let (q, qd) = (&inputs[0], &inputs[1]);
-        let nv = qd.len();
-        let c = match forms.reduced.map(|[torques, _]| torques).filter(|form| rates_are_of_coordinates(form)) {
-            Some(torques) => {
-                let half: Vec<T> = qd.iter().map(|rate| *rate * T::constant(straightline_core::Dd::HALF)).collect();
-                forms.rigid_derivatives(torques, [q, &half, &forms.rest()]).dtau_dqd
+        let (nv, rest) = (qd.len(), forms.rest());
+        let of_loops = forms.closed([q, qd, &rest]).map(|closed| closed.coriolis_matrix());
+        let c = of_loops.unwrap_or_else(|| {
+            match forms.reduced.map(|[torques, _]| torques).filter(|form| rates_are_of_coordinates(form)) {
+                Some(torques) => {
+                    let half: Vec<T> = qd.iter().map(|rate| *rate * T::constant(straightline_core::Dd::HALF)).collect();
+                    forms.rigid_derivatives(torques, [q, &half, &rest]).dtau_dqd
+                }
+                None => alg::coriolis_matrix(forms.model, q, qd),
             }
-            None => alg::coriolis_matrix(forms.model, q, qd),
-        };
+        });
         // one triangle, so that both are the same to the bit
         let rate = |i: usize, j: usize| c[i * nv + j] + c[j * nv + i];
         let h_dot = (0..nv * nv).map(|k| rate((k / nv).max(k % nv), (k / nv).min(k % nv))).collect();
@@ -115,6 +121,7 @@ pub struct CoriolisTransposeForce;
 
 impl RobotFunction for CoriolisTransposeForce {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "coriolis_transpose_force",
         summary: "Cᵀ(q, q̇) q̇ = Ḣ q̇ − C q̇: what an observer of generalized momentum integrates.",
         aliases: &["momentum observer", "collision detection", "disturbance observer"],
@@ -125,7 +132,10 @@ impl RobotFunction for CoriolisTransposeForce {
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        alg::coriolis_transpose_force(forms.model, &inputs[0], &inputs[1])
+        match forms.closed([&inputs[0], &inputs[1], &forms.rest()]) {
+            Some(closed) => closed.coriolis_transpose_force(),
+            None => alg::coriolis_transpose_force(forms.model, &inputs[0], &inputs[1]),
+        }
     }
 }
 

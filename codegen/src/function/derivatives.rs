@@ -1,5 +1,6 @@
 //! Derivatives of inverse dynamics: matrices, and products with directions and multipliers.
 
+use super::closed_derivatives::{add, ClosedSlopes};
 use super::spec::Extent::Velocities;
 use super::spec::{Form, InLanes, Output, RobotFunction, Spec};
 use super::{Forms, Quantity};
@@ -16,6 +17,7 @@ pub struct InverseDynamicsDerivatives;
 
 impl RobotFunction for InverseDynamicsDerivatives {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "inverse_dynamics_derivatives",
         summary: "Inverse dynamics τ with its derivatives ∂τ/∂q, ∂τ/∂q̇ and H = ∂τ/∂q̈.",
         aliases: &["RNEA derivatives", "computeRNEADerivatives", "linearised inverse dynamics"],
@@ -48,6 +50,7 @@ pub struct InverseDynamicsJvp;
 
 impl RobotFunction for InverseDynamicsJvp {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "inverse_dynamics_jvp",
         summary: "The derivative of inverse dynamics along a direction: ∂τ/∂q u + ∂τ/∂q̇ w + H a.",
         aliases: &["JVP", "directional derivative", "tangent"],
@@ -77,6 +80,7 @@ pub struct InverseDynamicsVjp;
 
 impl RobotFunction for InverseDynamicsVjp {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "inverse_dynamics_vjp",
         summary: "Multipliers times the derivatives of inverse dynamics: (∂τ/∂q)ᵀ λ, (∂τ/∂q̇)ᵀ λ and H λ.",
         aliases: &["VJP", "adjoint", "gradient of torques", "backpropagation"],
@@ -103,6 +107,7 @@ pub struct InverseDynamicsHvp;
 
 impl RobotFunction for InverseDynamicsHvp {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "inverse_dynamics_hvp",
         summary: "How multipliers times the derivatives of inverse dynamics change along a direction: the Hessian of λ·τ times it.",
         aliases: &["HVP", "Hessian-vector product", "second-order derivatives"],
@@ -143,6 +148,11 @@ pub(super) fn moving<T: Real>(model: &Model<T>, inputs: &[Vec<T>]) -> [Vec<Dual<
     [with_rates(&inputs[0], &rates), with_rates(&inputs[1], &inputs[4]), with_rates(&inputs[2], &inputs[5])]
 }
 
+/// Coordinate `k` alone.
+pub(super) fn unit<T: Real>(nv: usize, k: usize) -> Vec<T> {
+    (0..nv).map(|i| if i == k { T::one() } else { T::zero() }).collect()
+}
+
 /// Numbers that move at these rates.
 pub(super) fn with_rates<T: Real>(x: &[T], rates: &[T]) -> Vec<Dual<T, 1>> {
     x.iter().zip(rates).map(|(x, rate)| Dual { value: *x, derivatives: [*rate] }).collect()
@@ -179,6 +189,12 @@ impl<T: Real> Forms<'_, T> {
             ..rigid
         };
         let nv = self.model.nv();
+        if !self.model.closure.is_empty() {
+            let effects = ClosedSlopes::new(self.model, motion).effects();
+            add(&mut all.dtau_dq, &effects.by_configuration);
+            add(&mut all.dtau_dqd, &effects.by_velocity);
+            return all;
+        }
         let [by_q, by_qd] = passive_slopes(self.model, motion[0], motion[1]);
         for (i, (by_q, by_qd)) in by_q.into_iter().zip(by_qd).enumerate() {
             all.dtau_dq[i * nv + i] = all.dtau_dq[i * nv + i] + by_q;
@@ -192,8 +208,12 @@ impl<T: Real> Forms<'_, T> {
     /// Of the bodies by a reduced robot, which is a tree whose joints all have coordinates of their own.
     pub(super) fn rigid_derivatives(&self, torques: &ReducedModel<T>, motion: [&[T]; 3]) -> DerivativeBlocks<T> {
         let (model, [q, qd, qdd]) = (self.model, &self.model.tree_motion(motion));
-        let motion: [&[T]; 3] = [q, qd, qdd];
-        let all = self.with_limbs(|l| alg::reduced_inverse_dynamics_derivatives_with_limbs(torques, motion, l.subtree));
+        let of_tree: [&[T]; 3] = [q, qd, qdd];
+        let all =
+            self.with_limbs(|l| alg::reduced_inverse_dynamics_derivatives_with_limbs(torques, of_tree, l.subtree));
+        if !model.closure.is_empty() {
+            return ClosedSlopes::new(model, motion).of_forces(q, all);
+        }
         DerivativeBlocks {
             tau: model.free_forces(q, all.tau),
             mass_matrix: model.free_symmetric(q, all.mass_matrix),
@@ -260,6 +280,9 @@ fn along_tangent<T: Real>(model: &Model<T>, q: &[T], by_q: &[T]) -> Vec<T> {
 
 /// The configuration as it moves with velocity coordinate `k` alone.
 pub(crate) fn along<T: Real>(model: &Model<T>, q: &[T], k: usize) -> Vec<Dual<T, 1>> {
+    if !model.closure.is_empty() {
+        return with_rates(q, &model.configuration_rate(q, &unit(model.nv(), k)));
+    }
     let mut moving: Vec<Dual<T, 1>> = q.iter().map(|x| Dual::fixed(*x)).collect();
     for joint in model.free_joints() {
         let (places, coordinates) = (joint.iq..joint.iq + joint.kind.nq(), joint.iv..joint.iv + joint.kind.nv());

@@ -32,6 +32,7 @@ pub struct ForwardDynamicsDerivatives;
 
 impl RobotFunction for ForwardDynamicsDerivatives {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "forward_dynamics_derivatives",
         summary: "Forward dynamics q̈ with its derivatives ∂q̈/∂q, ∂q̈/∂q̇ and H⁻¹ = ∂q̈/∂τ.",
         aliases: &["ABA derivatives", "computeABADerivatives", "linearised forward dynamics", "computeMinverse"],
@@ -68,6 +69,7 @@ pub struct ForwardDynamicsDerivativesAtMotion;
 
 impl RobotFunction for ForwardDynamicsDerivativesAtMotion {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "forward_dynamics_derivatives_at_motion",
         summary: "Derivatives ∂q̈/∂q, ∂q̈/∂q̇ and H⁻¹ = ∂q̈/∂τ of forward dynamics where q̈ is known.",
         aliases: &["derivatives from accelerations"],
@@ -95,6 +97,7 @@ pub struct ForwardDynamicsJvp;
 
 impl RobotFunction for ForwardDynamicsJvp {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "forward_dynamics_jvp",
         summary: "The derivative of forward dynamics along a direction: ∂q̈/∂q u + ∂q̈/∂q̇ w + H⁻¹ t.",
         aliases: &["JVP", "directional derivative", "tangent"],
@@ -127,6 +130,7 @@ pub struct ForwardDynamicsVjp;
 
 impl RobotFunction for ForwardDynamicsVjp {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "forward_dynamics_vjp",
         summary: "Multipliers times the derivatives of forward dynamics: (∂q̈/∂q)ᵀ λ, (∂q̈/∂q̇)ᵀ λ and H⁻¹ λ.",
         aliases: &["VJP", "adjoint", "gradient of accelerations", "backpropagation"],
@@ -158,6 +162,7 @@ pub struct ForwardDynamicsHvp;
 
 impl RobotFunction for ForwardDynamicsHvp {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "forward_dynamics_hvp",
         summary: "How multipliers times the derivatives of forward dynamics change along a direction: the Hessian of λ·q̈ times it.",
         aliases: &["HVP", "Hessian-vector product", "second-order derivatives"],

@@ -12,6 +12,7 @@ pub struct JacobianHessianProduct;
 
 impl RobotFunction for JacobianHessianProduct {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "jacobian_hessian_product",
         summary: "Generalized forces Jᵀ f of forces on the frames, and their derivative by q at held f.",
         aliases: &["kinematic Hessian", "geometric stiffness", "getJointKinematicHessian", "derivative of contact forces"],
@@ -34,6 +35,9 @@ symmetric there",
         let loaded = forms.frames.iter().zip(inputs[1].chunks(6));
         let forces: Vec<ForceOnFrame<'_, T>> =
             loaded.map(|(frame, f)| ForceOnFrame { frame, force: vector(f), moment: vector(&f[3..]) }).collect();
-        alg::jacobian_hessian_product(forms.model, &inputs[0], &forces).concat()
+        let [jt_f, slopes] = alg::jacobian_hessian_product(forms.model, &inputs[0], &forces);
+        let rest = forms.rest();
+        let of_loops = forms.closed([&inputs[0], &rest, &rest]).map(|closed| closed.of_frame_forces(&forces));
+        [jt_f, of_loops.unwrap_or(slopes)].concat()
     }
 }

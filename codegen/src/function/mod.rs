@@ -4,6 +4,7 @@
 mod aliases;
 mod base_parameters;
 mod bias_derivatives;
+mod closed_derivatives;
 mod contact;
 mod derivatives;
 mod driven_derivatives;

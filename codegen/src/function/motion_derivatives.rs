@@ -1,5 +1,6 @@
 //! Derivatives of the motion of frames, and of the robot as a whole: centre of mass and centroidal momentum.
 
+use super::closed_derivatives::{AtOrigin, AtWorldOrigin, InOwnAxes};
 use super::spec::Extent::{Frames, Joints, Of, Velocities};
 use super::spec::{Divisor, Form, Output, RobotFunction, Spec};
 use super::{Extent, Forms, Quantity};
@@ -41,6 +42,7 @@ pub struct FrameDerivatives;
 
 impl RobotFunction for FrameDerivatives {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "frame_derivatives",
         summary: "Derivatives of the velocities and accelerations of the frames, with their Jacobians J and J̇.",
         aliases: &["getFrameAccelerationDerivatives", "computeJointJacobiansTimeVariation", "Jdot"],
@@ -52,7 +54,10 @@ of a floating base by increments of its pose in its own axes",
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        of_frames(forms, |frame| alg::frame_derivatives(forms.model, motion(inputs), frame))
+        of_frames(forms, |frame| match forms.closed(motion(inputs)) {
+            Some(closed) => closed.of_frame::<AtOrigin>(frame),
+            None => alg::frame_derivatives(forms.model, motion(inputs), frame),
+        })
     }
 }
 
@@ -60,6 +65,7 @@ pub struct FrameDerivativesInOwnAxes;
 
 impl RobotFunction for FrameDerivativesInOwnAxes {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "frame_derivatives_in_own_axes",
         summary: "Derivatives of the twists of the frames along their own axes and of the rates of these numbers, with J and J̇.",
         aliases: &["LOCAL", "body twist", "body Jacobian", "getFrameAccelerationDerivatives", "Jdot"],
@@ -71,7 +77,10 @@ of a floating base by increments of its pose in its own axes",
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        of_frames(forms, |frame| alg::frame_derivatives_in_own_axes(forms.model, motion(inputs), frame))
+        of_frames(forms, |frame| match forms.closed(motion(inputs)) {
+            Some(closed) => closed.of_frame::<InOwnAxes>(frame),
+            None => alg::frame_derivatives_in_own_axes(forms.model, motion(inputs), frame),
+        })
     }
 }
 
@@ -79,6 +88,7 @@ pub struct FrameDerivativesAtWorldOrigin;
 
 impl RobotFunction for FrameDerivativesAtWorldOrigin {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "frame_derivatives_at_world_origin",
         summary: "Derivatives of the twists of the frames at the world's origin and of the rates of these numbers, with J and J̇.",
         aliases: &["WORLD", "spatial twist", "spatial Jacobian", "getFrameAccelerationDerivatives", "Jdot"],
@@ -90,7 +100,10 @@ of a floating base by increments of its pose in its own axes",
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        of_frames(forms, |frame| alg::frame_derivatives_at_world_origin(forms.model, motion(inputs), frame))
+        of_frames(forms, |frame| match forms.closed(motion(inputs)) {
+            Some(closed) => closed.of_frame::<AtWorldOrigin>(frame),
+            None => alg::frame_derivatives_at_world_origin(forms.model, motion(inputs), frame),
+        })
     }
 }
 
@@ -120,6 +133,7 @@ pub struct CentreOfMassJacobian;
 
 impl RobotFunction for CentreOfMassJacobian {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "centre_of_mass_jacobian",
         summary: "The Jacobian of the centre of mass of the moving bodies.",
         aliases: &["COM Jacobian", "jacobianCenterOfMass", "center of mass"],
@@ -143,6 +157,7 @@ pub struct SubtreeCentresOfMass;
 
 impl RobotFunction for SubtreeCentresOfMass {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "subtree_centres_of_mass",
         summary: "What each joint carries, its link included: masses, centres of mass and their Jacobians.",
         aliases: &["subtree COM", "jacobianSubtreeCenterOfMass", "center of mass", "subtree_com"],
@@ -174,6 +189,7 @@ pub struct CentroidalMap;
 
 impl RobotFunction for CentroidalMap {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "centroidal_map",
         summary: "The centroidal momentum map A(q): h = A q̇ is the momentum about the centre of mass.",
         aliases: &["centroidal momentum matrix", "CMM", "computeCentroidalMap", "ccrba"],
@@ -193,6 +209,7 @@ pub struct CentroidalMapRate;
 
 impl RobotFunction for CentroidalMapRate {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "centroidal_map_rate",
         summary: "The centroidal momentum map A(q) and its rate Ȧ(q, q̇): ḣ = A q̈ + Ȧ q̇.",
         aliases: &["centroidal momentum matrix", "computeCentroidalMapTimeVariation", "dccrba"],
@@ -204,6 +221,9 @@ impl RobotFunction for CentroidalMapRate {
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
+        if let Some(closed) = forms.closed([&inputs[0], &inputs[1], &forms.rest()]) {
+            return [alg::centroidal_map(forms.model, &inputs[0]), closed.centroidal_map_rate()].concat();
+        }
         let all = alg::centroidal_derivatives(forms.model, &inputs[0], &inputs[1]);
         [all.map, all.rate].concat()
     }
@@ -213,6 +233,7 @@ pub struct CentroidalDerivatives;
 
 impl RobotFunction for CentroidalDerivatives {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "centroidal_derivatives",
         summary: "Centroidal momentum h and its rate ḣ with their derivatives by q, q̇ and q̈.",
         aliases: &["computeCentroidalDynamicsDerivatives", "centroidal dynamics"],
@@ -238,7 +259,10 @@ impl RobotFunction for CentroidalDerivatives {
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        let all = alg::centroidal_dynamics_derivatives(forms.model, [&inputs[0], &inputs[1], &inputs[2]]);
+        let all = match forms.closed(motion(inputs)) {
+            Some(closed) => closed.centroidal(),
+            None => alg::centroidal_dynamics_derivatives(forms.model, motion(inputs)),
+        };
         [all.momentum, all.momentum_rate, all.dh_dq, all.dhdot_dq, all.dhdot_dqd, all.map].concat()
     }
 }

@@ -23,6 +23,7 @@ pub struct OperationalSpaceDynamics;
 
 impl RobotFunction for OperationalSpaceDynamics {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "operational_space_dynamics",
         summary: "The dynamics of each frame: F = Λ ẍ + μ + p, with the dynamically consistent inverse of its Jacobian J.",
         aliases: &["operational space", "task space inertia", "Khatib", "dynamically consistent inverse", "null space"],
@@ -89,6 +90,7 @@ pub struct InverseKinematicsStep;
 
 impl RobotFunction for InverseKinematicsStep {
     const SPEC: Spec = Spec {
+        on_loops: true,
         name: "inverse_kinematics_step",
         summary: "A step of inverse kinematics: damped least squares of the least kinetic energy within the limits of the joints.",
         aliases: &["IK", "damped least squares", "Levenberg-Marquardt", "differential inverse kinematics"],
@@ -131,7 +133,7 @@ impl RobotFunction for InverseKinematicsStep {
 fn slope_of_holding_torques<T: Real>(forms: &Forms<'_, T>, q: &[T]) -> Vec<T> {
     let (rest, nv) = (forms.rest(), forms.model.nv());
     let weights =
-        torque_weights(forms.model.free_joints().filter(|j| j.kind.is_single()).map(|j| (j.iv, j.limits)), nv);
+        torque_weights(forms.model.independent_joints().filter(|j| j.kind.is_single()).map(|j| (j.iv, j.limits)), nv);
     let torques = forms.inverse_dynamics(q, &rest, &rest);
     let weighed: Vec<T> = torques.into_iter().zip(weights).map(|(tau, w)| tau * T::constant(w)).collect();
     weighed_slopes(forms, [q, &rest, &rest], &weighed).into_iter().take(nv).collect()
@@ -155,7 +157,7 @@ fn torque_weights(joints: impl Iterator<Item = (usize, Limits)> + Clone, nv: usi
 /// How far each coordinate may step, of joints with one coordinate and limits.
 fn step_limits<T: Real>(forms: &Forms<'_, T>, q: &[T]) -> Vec<Option<StepLimits<T>>> {
     let mut all = vec![None; forms.model.nv()];
-    for joint in forms.model.free_joints().filter(|j| j.kind.is_single()) {
+    for joint in forms.model.independent_joints().filter(|j| j.kind.is_single()) {
         let Limits { lower, upper, .. } = joint.limits;
         let to = |limit: f64| limit.is_finite().then(|| T::constant(Dd::from(limit)) - q[joint.iq]);
         let limits = StepLimits { lower: to(lower), upper: to(upper) };

@@ -216,6 +216,13 @@ pub struct Frame<T> {
     pub placement: Transform<T>,
 }
 
+impl<T: Real> Frame<T> {
+    /// Its numbers through `f`.
+    pub fn map<U: Real>(&self, f: impl FnMut(T) -> U) -> Frame<U> {
+        Frame { name: self.name.clone(), body: self.body, placement: self.placement.map(f) }
+    }
+}
+
 /// A robot: bodies in topological order (parents first), gravity, named frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model<T> {
@@ -299,11 +306,7 @@ impl<T: Real> Model<T> {
             couplings: self.couplings.iter().map(|c| c.map(&mut f)).collect(),
             closure: self.closure.map(&mut f),
             gravity: self.gravity.map(&mut f),
-            frames: self
-                .frames
-                .iter()
-                .map(|x| Frame { name: x.name.clone(), body: x.body, placement: x.placement.map(&mut f) })
-                .collect(),
+            frames: self.frames.iter().map(|x| x.map(&mut f)).collect(),
             drives: self.drives.iter().map(|d| d.map(&mut f)).collect(),
             base_parameters: self.base_parameters.clone(),
         }

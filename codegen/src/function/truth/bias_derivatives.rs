@@ -1,9 +1,10 @@
 //! Derivatives of gravity and bias forces and the Coriolis matrix, by the second author in dual numbers.
 
 use super::super::bias_derivatives::{BiasDerivatives, CoriolisMatrix, CoriolisTransposeForce, GravityDerivative};
-use super::super::dynamics::{BiasForce, GravityForce};
+use super::super::dynamics::{BiasForce, GravityForce, VelocityForce};
+use super::closed::of_robot;
 use super::derivatives::{moving, slopes, unit};
-use super::{list, Chapter, Truth};
+use super::{list, Chapter, ClosedMotion, Truth};
 use crate::function::by_rows;
 use nalgebra::{DMatrix, DVector, Matrix3};
 use straightline_core::magnitude::Magnitude;
@@ -15,16 +16,21 @@ impl Truth for GravityDerivative {
         let nv = at.qd().len();
         let tree = at.tree.map(Dual::<Magnitude, 1>::fixed);
         let column = |k: usize| {
-            let [q, ..] = moving(&at.tree, [at.q(), at.qd(), at.qdd()], &unit(nv, 0, k));
-            list(&reference::gravity_force(&tree, &q).map(|force| force.derivatives[0]))
+            let [q, ..] = moving(at, &at.tree, [at.q(), at.qd(), at.qdd()], &unit(nv, 0, k));
+            let forces = at.along_independent(&tree, &q, reference::gravity_force(&tree, &q));
+            list(&forces.map(|force| force.derivatives[0]))
         };
         let columns: Vec<_> = (0..nv).map(column).collect();
-        let (mut slopes, forces) = (by_rows(&columns), GravityForce::truth(at)?);
+        let (mut slopes, forces) = (by_rows(&columns), GravityForce::truth_of(at)?);
         // a force that does not depend on a coordinate, but goes through turns by it, has the rounding of the force
         for (row, force) in slopes.chunks_mut(nv).zip(&forces) {
             row.iter_mut().filter(|x| x.size == 0.0).for_each(|x| *x = x.of_size(force.size));
         }
         Some([slopes, forces].concat())
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -36,7 +42,11 @@ impl Truth for BiasDerivatives {
             let column = |k| slopes(at, &at.tree, [at.q(), at.qd(), &held], &unit(nv, block, k));
             by_rows(&(0..nv).map(column).collect::<Vec<_>>())
         };
-        Some([block(0), block(1), BiasForce::truth(at)?].concat())
+        Some([block(0), block(1), BiasForce::truth_of(at)?].concat())
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -53,7 +63,7 @@ impl Truth for CoriolisMatrix {
                 position: nalgebra::Vector3::from_element(Dual::fixed(Magnitude::zero())),
                 rotation: Matrix3::identity(),
             };
-            let jacobian = reference::frame_jacobian(&tree, &centre, &q);
+            let jacobian = at.jacobian_on(&tree, &centre, &q);
             let [now, rate] = [jacobian.map(|x| x.value), jacobian.map(|x| x.derivatives[0])]
                 .map(|j| (j.rows(0, 3).into_owned(), j.rows(3, 3).into_owned()));
             let rotation = reference::frame_pose(&tree, &centre, &q).rotation.map(|x| x.value);
@@ -68,19 +78,40 @@ impl Truth for CoriolisMatrix {
                 now.0.transpose() * &rate.0 * link.mass + now.1.transpose() * (theta * &rate.1 + turning * &now.1);
             c += own;
         }
+        // rotors of dependent joints, whose speeds are not in proportion to one coordinate
+        if let Some(loops) = at.loops {
+            let map = loops.map_at(&tree, &q);
+            let [now, rate] = [map.map(|x| x.value), map.map(|x| x.derivatives[0])];
+            for effect in at.effects {
+                c += now.row(effect.iv).transpose() * rate.row(effect.iv) * Magnitude::new(effect.inertia);
+            }
+        }
         let h_dot = mass_matrix_rate(at);
         Some([list(&c.transpose()), list(&h_dot)].concat())
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
 impl Truth for CoriolisTransposeForce {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         let qd = DVector::from_column_slice(at.qd());
-        Some(list(&(mass_matrix_rate(at) * qd - reference::velocity_force(&at.tree, at.q(), at.qd()))))
+        Some(list(&(mass_matrix_rate(at) * qd - DVector::from_vec(VelocityForce::truth_of(at)?))))
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
 fn mass_matrix_rate(at: &Chapter<'_>) -> DMatrix<Magnitude> {
     let (tree, [q, _]) = at.along_motion();
-    reference::mass_matrix(&tree, &q).map(|x| x.derivatives[0])
+    // rotors move with dependent joints, too
+    let mut of_tree = reference::mass_matrix(&tree, &q);
+    for effect in at.effects.iter().filter(|_| at.loops.is_some()) {
+        of_tree[(effect.iv, effect.iv)] += Dual::constant(effect.inertia);
+    }
+    at.over_independent(&tree, &q, of_tree).map(|x| x.derivatives[0])
 }

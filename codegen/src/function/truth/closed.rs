@@ -8,8 +8,8 @@ use super::{list, Chapter, Truth};
 use crate::function::Quantity;
 use nalgebra::{DMatrix, DVector};
 use straightline_core::magnitude::Magnitude;
-use straightline_core::reference::{self, CentreOfMassFrame};
-use straightline_core::{Dd, Real};
+use straightline_core::reference::{self, CentreOfMassFrame, CentreOfMassTree, ReferenceReal};
+use straightline_core::{Dd, Dual, Real};
 
 /// Frames of the tree whose origins coincide, and how many velocity coordinates are independent.
 #[derive(Clone, Debug)]
@@ -22,8 +22,76 @@ pub struct ClosedLoops {
     pub equations: usize,
 }
 
+/// The motion of the tree that keeps loops closed, of a motion of the independent coordinates.
+pub(super) struct TreeMotion<T> {
+    /// ∂ẋ/∂q̇.
+    pub map: DMatrix<T>,
+    /// ẋ.
+    pub rates: Vec<T>,
+    /// ẍ.
+    pub accelerations: Vec<T>,
+    /// ẍ without accelerations of the independent coordinates.
+    pub bias: Vec<T>,
+}
+
+impl<T: ClosingReal> TreeMotion<T> {
+    pub fn new(tree: &CentreOfMassTree<T>, loops: &ClosedLoops, [q, qd, qdd]: [&[T]; 3]) -> TreeMotion<T> {
+        let (ends, n, all) = (loops.ends_over(), loops.independent, tree.nv());
+        let zero = <T as Real>::zero();
+        let (map, closing) = loops.independent_motion(tree, &ends, q);
+        let moved = |rates: &[T]| &map * DVector::from_column_slice(rates);
+        let rates = moved(qd);
+        let still = vec![zero; all];
+        let mut drift = DVector::from_element(3 * ends.len(), zero);
+        for (k, [one, other]) in ends.iter().enumerate() {
+            let [one, other] =
+                [one, other].map(|end| reference::frame_acceleration(tree, end, q, rates.as_slice(), &still));
+            drift.rows_mut(3 * k, 3).copy_from(&(one.rows(0, 3) - other.rows(0, 3)));
+        }
+        let mut bias = DVector::from_element(all, zero);
+        bias.rows_mut(n, all - n).copy_from(&closing.solved(&drift));
+        let accelerations = moved(qdd) + &bias;
+        TreeMotion { rates: list(&rates), accelerations: list(&accelerations), bias: list(&bias), map }
+    }
+}
+
+impl ClosedLoops {
+    /// ∂ẋ/∂q̇.
+    pub(super) fn map_at<T: ClosingReal>(&self, tree: &CentreOfMassTree<T>, q: &[T]) -> DMatrix<T> {
+        self.independent_motion(tree, &self.ends_over(), q).0
+    }
+
+    fn ends_over<T: ClosingReal>(&self) -> Vec<[CentreOfMassFrame<T>; 2]> {
+        self.ends.iter().map(|ends| ends.each_ref().map(|end| end.map(T::constant))).collect()
+    }
+
+    /// ∂ẋ/∂q̇, and what solves for dependent rates.
+    fn independent_motion<T: ClosingReal>(
+        &self,
+        tree: &CentreOfMassTree<T>,
+        ends: &[[CentreOfMassFrame<T>; 2]],
+        q: &[T],
+    ) -> (DMatrix<T>, Closing<T>) {
+        let (n, all) = (self.independent, tree.nv());
+        let mut rows = DMatrix::from_element(3 * ends.len(), all, <T as Real>::zero());
+        for (k, [one, other]) in ends.iter().enumerate() {
+            let [one, other] = [one, other].map(|end| reference::frame_jacobian(tree, end, q));
+            rows.rows_mut(3 * k, 3).copy_from(&(other.rows(0, 3) - one.rows(0, 3)));
+        }
+        let closing = Closing::new(rows.columns(n, all - n).into_owned());
+        let mut map = DMatrix::from_fn(all, n, |i, j| T::constant(if i == j { Dd::ONE } else { Dd::ZERO }));
+        for j in 0..n {
+            let opposite = rows.column(j).map(|x| -x);
+            map.view_mut((n, j), (all - n, 1)).copy_from(&closing.solved(&opposite));
+        }
+        (map, closing)
+    }
+}
+
 /// The tree of a robot with loops at a motion that keeps them closed.
 pub struct ClosedMotion<'a> {
+    /// The robot at the motion of its independent coordinates.
+    pub robot: Chapter<'a>,
     /// The tree, moving.
     pub tree: Chapter<'a>,
     /// The same without accelerations of the independent coordinates.
@@ -36,41 +104,17 @@ pub struct ClosedMotion<'a> {
 
 impl<'a> ClosedMotion<'a> {
     pub(super) fn new(at: &Chapter<'a>, loops: &ClosedLoops) -> ClosedMotion<'a> {
-        let (tree, q) = (&at.tree, at.q());
-        let ends: Vec<[CentreOfMassFrame<Magnitude>; 2]> =
-            loops.ends.iter().map(|ends| ends.each_ref().map(|end| end.map(Magnitude::new))).collect();
-        let (n, all) = (loops.independent, tree.nv());
-        let mut rows = DMatrix::from_element(3 * ends.len(), all, Magnitude::zero());
-        for (k, [one, other]) in ends.iter().enumerate() {
-            let [one, other] = [one, other].map(|end| reference::frame_jacobian(tree, end, q));
-            rows.rows_mut(3 * k, 3).copy_from(&(other.rows(0, 3) - one.rows(0, 3)));
-        }
-        let closing = Closing::new(rows.columns(n, all - n).into_owned());
-        let mut map = DMatrix::from_fn(all, n, |i, j| Magnitude::new(if i == j { Dd::ONE } else { Dd::ZERO }));
-        for j in 0..n {
-            let opposite = rows.column(j).map(|x| -x);
-            map.view_mut((n, j), (all - n, 1)).copy_from(&closing.solved(&opposite));
-        }
-        let moved = |rates: &[Magnitude]| &map * DVector::from_column_slice(rates);
-        let rates = moved(at.qd());
-        let still = vec![Magnitude::zero(); all];
-        let mut drift = DVector::from_element(3 * ends.len(), Magnitude::zero());
-        for (k, [one, other]) in ends.iter().enumerate() {
-            let [one, other] =
-                [one, other].map(|end| reference::frame_acceleration(tree, end, q, rates.as_slice(), &still));
-            drift.rows_mut(3 * k, 3).copy_from(&(one.rows(0, 3) - other.rows(0, 3)));
-        }
-        let mut bias = DVector::from_element(all, Magnitude::zero());
-        bias.rows_mut(n, all - n).copy_from(&closing.solved(&drift));
-        let accelerations = moved(at.qdd()) + &bias;
-        let with = |accelerations: DVector<Magnitude>| {
+        let TreeMotion { map, rates, accelerations, bias } =
+            TreeMotion::new(&at.tree, loops, [at.q(), at.qd(), at.qdd()]);
+        let with = |accelerations: Vec<Magnitude>| {
             let mut tree = at.clone();
             tree.loops = None;
-            tree.state.insert(Quantity::Velocity, list(&rates));
-            tree.state.insert(Quantity::Acceleration, list(&accelerations));
+            tree.state.insert(Quantity::Velocity, rates.clone());
+            tree.state.insert(Quantity::Acceleration, accelerations);
             tree
         };
-        ClosedMotion { tree: with(accelerations), unaccelerated: with(bias), map, equations: loops.equations }
+        let (tree, unaccelerated) = (with(accelerations), with(bias));
+        ClosedMotion { robot: at.clone(), tree, unaccelerated, map, equations: loops.equations }
     }
 
     /// Number of independent velocities.
@@ -107,16 +151,57 @@ impl<'a> ClosedMotion<'a> {
     }
 }
 
+/// Numbers of the second author that equations of loops can be solved in: those that know their size, and duals of such.
+pub(super) trait ClosingReal: ReferenceReal {
+    /// What it is.
+    fn number(&self) -> Dd;
+
+    /// x of J x = b by (Jᵀ J)⁻¹ Jᵀ.
+    fn closing(rows: &DMatrix<Self>, inverse: &DMatrix<Dd>, b: &DVector<Self>) -> DVector<Self>;
+}
+
+impl ClosingReal for Magnitude {
+    fn number(&self) -> Dd {
+        self.value
+    }
+
+    /// It moves by the inverse times δb − δJ x.
+    fn closing(rows: &DMatrix<Self>, inverse: &DMatrix<Dd>, b: &DVector<Self>) -> DVector<Self> {
+        let x = inverse * b.map(|x| x.value);
+        let moved = |i: usize| {
+            let by_rows = (0..x.len()).map(|j| rows[(i, j)].size * x[j].to_f64());
+            by_rows.chain([b[i].size]).fold(0.0, f64::hypot)
+        };
+        let moved: Vec<f64> = (0..b.len()).map(moved).collect();
+        let size = |i: usize| (0..b.len()).map(|k| inverse[(i, k)].to_f64() * moved[k]).fold(0.0, f64::hypot);
+        DVector::from_fn(x.len(), |i, _| Magnitude::new(x[i]).of_size(size(i)))
+    }
+}
+
+impl<T: ClosingReal> ClosingReal for Dual<T, 1> {
+    fn number(&self) -> Dd {
+        self.value.number()
+    }
+
+    /// J x' = b' − J' x.
+    fn closing(rows: &DMatrix<Self>, inverse: &DMatrix<Dd>, b: &DVector<Self>) -> DVector<Self> {
+        let (now, rate) = (rows.map(|x| x.value), rows.map(|x| x.derivatives[0]));
+        let x = T::closing(&now, inverse, &b.map(|x| x.value));
+        let rates = T::closing(&now, inverse, &(b.map(|x| x.derivatives[0]) - rate * &x));
+        x.zip_map(&rates, |value, rate| Dual { value, derivatives: [rate] })
+    }
+}
+
 /// Equations for dependent rates, more than there are rates and none against another.
-struct Closing {
-    rows: DMatrix<Magnitude>,
+struct Closing<T> {
+    rows: DMatrix<T>,
     /// (Jᵀ J)⁻¹ Jᵀ.
     inverse: DMatrix<Dd>,
 }
 
-impl Closing {
-    fn new(rows: DMatrix<Magnitude>) -> Closing {
-        let value = rows.map(|x| x.value);
+impl<T: ClosingReal> Closing<T> {
+    fn new(rows: DMatrix<T>) -> Closing<T> {
+        let value = rows.map(|x| x.number());
         let normal = value.transpose() * &value;
         let mut inverse = value.transpose();
         for mut column in inverse.column_iter_mut() {
@@ -126,20 +211,17 @@ impl Closing {
         Closing { rows, inverse }
     }
 
-    /// x of J x = b. It moves by the inverse times δb − δJ x.
-    fn solved(&self, b: &DVector<Magnitude>) -> DVector<Magnitude> {
-        let x = &self.inverse * b.map(|x| x.value);
-        let moved = |i: usize| {
-            let by_rows = (0..x.len()).map(|j| self.rows[(i, j)].size * x[j].to_f64());
-            by_rows.chain([b[i].size]).fold(0.0, f64::hypot)
-        };
-        let moved: Vec<f64> = (0..b.len()).map(moved).collect();
-        let size = |i: usize| (0..b.len()).map(|k| self.inverse[(i, k)].to_f64() * moved[k]).fold(0.0, f64::hypot);
-        DVector::from_fn(x.len(), |i, _| Magnitude::new(x[i]).of_size(size(i)))
+    fn solved(&self, b: &DVector<T>) -> DVector<T> {
+        T::closing(&self.rows, &self.inverse, b)
     }
 }
 
 /// Truths of the tree where it moves, forces among them projected.
 pub(super) fn forces<F: Truth>(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
     at.forces(F::truth(&at.tree))
+}
+
+/// Truths that know loops by themselves: derivatives along the independent coordinates.
+pub(super) fn of_robot<F: Truth>(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+    F::truth(&at.robot)
 }

@@ -5,10 +5,11 @@ use super::super::derivatives::{
 };
 use super::super::dynamics::{InverseDynamics, MassMatrix};
 use super::super::Quantity;
-use super::{Chapter, Truth};
+use super::closed::{of_robot, ClosingReal};
+use super::{Chapter, ClosedMotion, Truth};
 use crate::function::by_rows;
 use straightline_core::magnitude::Magnitude;
-use straightline_core::reference::{self, CentreOfMassTree, ReferenceJoint, ReferenceReal};
+use straightline_core::reference::{CentreOfMassTree, ReferenceJoint, ReferenceReal};
 use straightline_core::{Dd, Dual, Real};
 
 /// A direction in which q, q̇ and q̈ move: of q along its tangent.
@@ -21,7 +22,11 @@ impl Truth for InverseDynamicsDerivatives {
             let column = |k: usize| slopes(at, &at.tree, motion(at), &unit(nv, block, k));
             by_rows(&(0..nv).map(column).collect::<Vec<_>>())
         });
-        Some([by_q, by_qd, MassMatrix::truth(at)?, InverseDynamics::truth(at)?].concat())
+        Some([by_q, by_qd, MassMatrix::truth_of(at)?, InverseDynamics::truth_of(at)?].concat())
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -29,11 +34,19 @@ impl Truth for InverseDynamicsJvp {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         Some(slopes(at, &at.tree, motion(at), &direction(at)))
     }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
+    }
 }
 
 impl Truth for InverseDynamicsVjp {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         Some(weighed_slopes(at, &at.tree, motion(at), at.get(Quantity::Multiplier)))
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -41,10 +54,14 @@ impl Truth for InverseDynamicsHvp {
     /// The gradient at a state that moves along the direction.
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         let tree = at.tree.map(Dual::<Magnitude, 1>::fixed);
-        let moving = moving(&at.tree, motion(at), &direction(at));
+        let moving = moving(at, &at.tree, motion(at), &direction(at));
         let multiplier: Vec<_> = at.get(Quantity::Multiplier).iter().map(|x| Dual::fixed(*x)).collect();
         let slopes = weighed_slopes(at, &tree, moving.each_ref().map(|x| &x[..]), &multiplier);
         Some(slopes.into_iter().map(|slope| slope.derivatives[0]).collect())
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -65,7 +82,7 @@ pub(super) fn unit<T: Real>(nv: usize, block: usize, k: usize) -> Direction<T> {
 }
 
 /// The derivatives of Σ λ τ by every coordinate of q, q̇ and q̈, one direction after the other.
-pub(super) fn weighed_slopes<T: ReferenceReal>(
+pub(super) fn weighed_slopes<T: ClosingReal>(
     at: &Chapter<'_>,
     tree: &CentreOfMassTree<T>,
     motion: [&[T]; 3],
@@ -80,28 +97,25 @@ pub(super) fn weighed_slopes<T: ReferenceReal>(
 }
 
 /// How forces change along a direction.
-pub(super) fn slopes<T: ReferenceReal>(
+pub(super) fn slopes<T: ClosingReal>(
     at: &Chapter<'_>,
     tree: &CentreOfMassTree<T>,
     motion: [&[T]; 3],
     direction: &Direction<T>,
 ) -> Vec<T> {
-    let [q, qd, qdd] = moving(tree, motion, direction);
-    let mut forces = reference::inverse_dynamics(&tree.map(Dual::fixed), &q, &qd, &qdd);
-    for effect in at.effects {
-        forces[effect.iv] += effect.passive(q[effect.iq], qd[effect.iv]);
-        forces[effect.iv] += Dual::constant(effect.inertia) * qdd[effect.iv];
-    }
+    let motion = moving(at, tree, motion, direction);
+    let forces = at.forces_on(&tree.map(Dual::fixed), motion.each_ref().map(|x| &x[..]));
     forces.iter().map(|force| force.derivatives[0]).collect()
 }
 
 /// A motion as it moves along a direction.
-pub(super) fn moving<T: ReferenceReal>(
+pub(super) fn moving<T: ClosingReal>(
+    at: &Chapter<'_>,
     tree: &CentreOfMassTree<T>,
     motion: [&[T]; 3],
     direction: &Direction<T>,
 ) -> [Vec<Dual<T, 1>>; 3] {
-    let rates = configuration_rates(tree, motion[0], &direction[0]);
+    let rates = configuration_rates(tree, motion[0], &at.rates_on_tree(tree, motion[0], &direction[0]));
     let along =
         |x: &[T], rates: &[T]| x.iter().zip(rates).map(|(x, rate)| Dual { value: *x, derivatives: [*rate] }).collect();
     [along(motion[0], &rates), along(motion[1], &direction[1]), along(motion[2], &direction[2])]

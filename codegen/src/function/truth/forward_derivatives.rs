@@ -6,8 +6,9 @@ use super::super::forward_derivatives::{
     ForwardDynamicsVjp,
 };
 use super::super::Quantity;
+use super::closed::of_robot;
 use super::derivatives::{moving, slopes, unit, weighed_slopes, Direction};
-use super::{solved, Chapter, Truth};
+use super::{solved, Chapter, ClosedMotion, Truth};
 use crate::function::by_rows;
 use nalgebra::{DMatrix, DVector};
 use straightline_core::magnitude::Magnitude;
@@ -17,13 +18,21 @@ use straightline_core::{Dd, Dual, Real};
 impl Truth for ForwardDynamicsDerivatives {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         let system = MovingJoints::new(at);
-        Some([ForwardDynamics::truth(at)?, system.derivatives(&system.acceleration(at))].concat())
+        Some([ForwardDynamics::truth_of(at)?, system.derivatives(&system.acceleration(at))].concat())
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
 impl Truth for ForwardDynamicsDerivativesAtMotion {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         Some(MovingJoints::new(at).derivatives(at.qdd()))
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -32,6 +41,10 @@ impl Truth for ForwardDynamicsJvp {
         let system = MovingJoints::new(at);
         let rates = system.acceleration_rate(&system.acceleration(at));
         Some(system.of_moving(&rates))
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -42,6 +55,10 @@ impl Truth for ForwardDynamicsVjp {
         let slopes = weighed_slopes(at, &at.tree, [at.q(), at.qd(), &qdd], &by_force);
         Some(system.gradient(&slopes.into_iter().map(|slope| -slope).collect::<Vec<_>>(), &by_force))
     }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
+    }
 }
 
 impl Truth for ForwardDynamicsHvp {
@@ -51,7 +68,7 @@ impl Truth for ForwardDynamicsHvp {
         let (qdd, by_force) = (system.acceleration(at), system.solved(at.get(Quantity::Multiplier)));
         let rates = system.acceleration_rate(&qdd);
         let tree = at.tree.map(Dual::<Magnitude, 1>::fixed);
-        let motion = moving(&at.tree, [at.q(), at.qd(), &qdd], &system.direction(rates));
+        let motion = moving(at, &at.tree, [at.q(), at.qd(), &qdd], &system.direction(rates));
         let change = |rate: &[Magnitude]| -> Vec<Magnitude> {
             let multiplier = by_force.iter().zip(rate).map(|(x, rate)| Dual { value: *x, derivatives: [*rate] });
             let multiplier: Vec<_> = multiplier.collect();
@@ -61,6 +78,10 @@ impl Truth for ForwardDynamicsHvp {
         let nv = qdd.len();
         let rate = system.solved(&change(&vec![Magnitude::zero(); nv])[2 * nv..]);
         Some(system.gradient(&change(&rate), &rate))
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -82,7 +103,7 @@ impl<'a, 'b> MovingJoints<'a, 'b> {
     pub fn at(at: &'a Chapter<'b>, q: &[Magnitude]) -> Self {
         let all: Vec<usize> = (0..at.qd().len()).collect();
         let moving = at.moving.unwrap_or(&all).to_vec();
-        let h = at.with_rotors(reference::mass_matrix(&at.tree, q));
+        let h = at.inertia_at(q);
         let h = h.select_rows(&moving).select_columns(&moving);
         MovingJoints { at, moving, h }
     }
@@ -117,10 +138,7 @@ impl<'a, 'b> MovingJoints<'a, 'b> {
     /// Of another motion, under the forces of the state.
     pub(super) fn acceleration_of(&self, q: &[Magnitude], qd: &[Magnitude]) -> Vec<Magnitude> {
         let at = self.at;
-        let mut bias = reference::bias_force(&at.tree, q, qd);
-        for effect in at.effects {
-            bias[effect.iv] += effect.passive(q[effect.iq], qd[effect.iv]);
-        }
+        let bias = at.forces_on(&at.tree, [q, qd, &vec![Magnitude::zero(); qd.len()]]);
         let net: Vec<Magnitude> = at.get(Quantity::Force).iter().zip(bias.iter()).map(|(tau, h)| *tau - *h).collect();
         self.solved(&net)
     }

@@ -2,11 +2,12 @@
 
 use super::super::frame_forces::JacobianHessianProduct;
 use super::super::Quantity;
+use super::closed::{of_robot, ClosingReal};
 use super::motion_derivatives::slopes;
-use super::{list, Chapter, Truth};
+use super::{list, Chapter, ClosedMotion, Truth};
 use nalgebra::DVector;
 use straightline_core::magnitude::Magnitude;
-use straightline_core::reference::{self, CentreOfMassTree, ReferenceReal};
+use straightline_core::reference::CentreOfMassTree;
 use straightline_core::Dual;
 
 impl Truth for JacobianHessianProduct {
@@ -15,10 +16,14 @@ impl Truth for JacobianHessianProduct {
         let slopes = slopes(at, 0, |[q, ..]| generalized(at, &moving, q, Dual::fixed));
         Some([generalized(at, &at.tree, at.q(), |x| x), slopes].concat())
     }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
+    }
 }
 
 /// Σ Jᵀ f.
-fn generalized<T: ReferenceReal>(
+fn generalized<T: ClosingReal>(
     at: &Chapter<'_>,
     tree: &CentreOfMassTree<T>,
     q: &[T],
@@ -28,7 +33,7 @@ fn generalized<T: ReferenceReal>(
     for (frame, f) in at.frames.iter().zip(at.get(Quantity::Wrench).chunks(6)) {
         let frame = tree.frame(&frame.name).expect("frames are those of the tree");
         let f = DVector::from_iterator(6, f.iter().map(|x| number(*x)));
-        sum += reference::frame_jacobian(tree, frame, q).transpose() * f;
+        sum += at.jacobian_on(tree, frame, q).transpose() * f;
     }
     list(&sum)
 }

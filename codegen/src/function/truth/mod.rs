@@ -4,11 +4,11 @@
 //! the value in double-double and, beside it, how large the terms were that it is made of. So no natural scale is written down by hand.
 
 use super::{Extent, Quantity, RobotFunction, SelectedRows};
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, Vector3};
 use std::collections::BTreeMap;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::model::Model;
-use straightline_core::reference::{CentreOfMassFrame, CentreOfMassTree, ExtendedPosition};
+use straightline_core::reference::{self, CentreOfMassFrame, CentreOfMassTree, ExtendedPosition};
 use straightline_core::{Dd, Dual, Real};
 
 mod bias_derivatives;
@@ -29,6 +29,7 @@ mod tasks;
 mod whole;
 
 pub use closed::{ClosedLoops, ClosedMotion};
+use closed::{ClosingReal, TreeMotion};
 pub use effect::Effect;
 
 /// What a function should give.
@@ -191,8 +192,71 @@ impl<'a> Chapter<'a> {
     fn along_motion(&self) -> (CentreOfMassTree<Dual<Magnitude, 1>>, [Vec<Dual<Magnitude, 1>>; 2]) {
         let held = vec![Magnitude::zero(); self.qdd().len()];
         let direction = [self.qd().to_vec(), self.qdd().to_vec(), held];
-        let [q, qd, _] = derivatives::moving(&self.tree, [self.q(), self.qd(), self.qdd()], &direction);
+        let [q, qd, _] = derivatives::moving(self, &self.tree, [self.q(), self.qd(), self.qdd()], &direction);
         (self.tree.map(Dual::fixed), [q, qd])
+    }
+
+    /// Generalized forces of a motion, with what joints add to the rigid bodies; where loops are closed along the independent coordinates.
+    fn forces_on<T: ClosingReal>(&self, tree: &CentreOfMassTree<T>, motion: [&[T]; 3]) -> Vec<T> {
+        let [q, qd, qdd] = self.on_tree(tree, motion);
+        let mut forces = reference::inverse_dynamics(tree, &q, &qd, &qdd);
+        for effect in self.effects {
+            forces[effect.iv] += effect.passive(q[effect.iq], qd[effect.iv]);
+            forces[effect.iv] += T::constant(effect.inertia) * qdd[effect.iv];
+        }
+        list(&self.along_independent(tree, &q, forces))
+    }
+
+    /// A motion of the independent coordinates as one of the tree.
+    fn on_tree<T: ClosingReal>(&self, tree: &CentreOfMassTree<T>, motion: [&[T]; 3]) -> [Vec<T>; 3] {
+        let of_tree = self.loops.map(|loops| TreeMotion::new(tree, loops, motion));
+        of_tree.map_or_else(
+            || motion.map(<[T]>::to_vec),
+            |of_tree| [motion[0].to_vec(), of_tree.rates, of_tree.accelerations],
+        )
+    }
+
+    /// Velocities of the tree.
+    fn rates_on_tree<T: ClosingReal>(&self, tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> Vec<T> {
+        self.loops.map_or_else(|| qd.to_vec(), |loops| list(&(loops.map_at(tree, q) * DVector::from_column_slice(qd))))
+    }
+
+    /// What forces of the tree do along the independent coordinates.
+    fn along_independent<T: ClosingReal>(&self, tree: &CentreOfMassTree<T>, q: &[T], forces: DVector<T>) -> DVector<T> {
+        match self.loops {
+            None => forces,
+            Some(loops) => loops.map_at(tree, q).transpose() * forces,
+        }
+    }
+
+    /// The Jacobian of a frame of the tree, by the independent velocities.
+    fn jacobian_on<T: ClosingReal>(
+        &self,
+        tree: &CentreOfMassTree<T>,
+        frame: &CentreOfMassFrame<T>,
+        q: &[T],
+    ) -> OMatrix<T, Const<6>, Dyn> {
+        let of_tree = reference::frame_jacobian(tree, frame, q);
+        match self.loops {
+            None => of_tree,
+            Some(loops) => of_tree * loops.map_at(tree, q),
+        }
+    }
+
+    /// A symmetric matrix over the velocities of the tree, over the independent ones.
+    fn over_independent<T: ClosingReal>(&self, tree: &CentreOfMassTree<T>, q: &[T], square: DMatrix<T>) -> DMatrix<T> {
+        match self.loops {
+            None => square,
+            Some(loops) => {
+                let map = loops.map_at(tree, q);
+                map.transpose() * square * map
+            }
+        }
+    }
+
+    /// H at another configuration, rotors included.
+    fn inertia_at(&self, q: &[Magnitude]) -> DMatrix<Magnitude> {
+        self.over_independent(&self.tree, q, self.with_rotors(reference::mass_matrix(&self.tree, q)))
     }
 
     /// What `f` gives for each of the frames.
@@ -208,12 +272,14 @@ impl<'a> Chapter<'a> {
         forces
     }
 
-    /// Forces of the bodies at rest with what springs of the joints take.
-    fn with_passive_at_rest(&self, mut forces: DVector<Magnitude>) -> DVector<Magnitude> {
+    /// What friction and springs of the joints take, along the independent coordinates.
+    fn passive(&self, qd: &[Magnitude]) -> DVector<Magnitude> {
+        let rates = self.rates_on_tree(&self.tree, self.q(), qd);
+        let mut forces = DVector::from_element(rates.len(), Magnitude::zero());
         for effect in self.effects {
-            forces[effect.iv] += effect.passive(self.q()[effect.iq], Magnitude::zero());
+            forces[effect.iv] += effect.passive(self.q()[effect.iq], rates[effect.iv]);
         }
-        forces
+        self.along_independent(&self.tree, self.q(), forces)
     }
 
     /// The same matrix with the inertia of the joints' rotors on its diagonal.

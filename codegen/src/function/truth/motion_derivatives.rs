@@ -4,8 +4,9 @@ use super::super::motion_derivatives::{
     CentreOfMassJacobian, CentroidalDerivatives, CentroidalMap, CentroidalMapRate, FrameDerivatives,
     FrameDerivativesAtWorldOrigin, FrameDerivativesInOwnAxes, SubtreeCentresOfMass,
 };
+use super::closed::{of_robot, ClosingReal};
 use super::derivatives::{moving, unit};
-use super::{list, Chapter, Truth};
+use super::{list, Chapter, ClosedMotion, Truth};
 use crate::function::by_rows;
 use nalgebra::Vector3;
 use straightline_core::magnitude::Magnitude;
@@ -21,20 +22,27 @@ impl Truth for FrameDerivatives {
         let block = |of: &dyn Fn(&reference::CentreOfMassFrame<Moving>) -> Vec<Magnitude>| {
             at.per_frame(|frame| of(&moved(&frame.name)))
         };
-        let velocity = |[q, qd, _]: &[Vec<Moving>; 3], frame: &_| list(&reference::frame_velocity(&tree, frame, q, qd));
-        let acceleration =
-            |[q, qd, qdd]: &[Vec<Moving>; 3], frame: &_| list(&reference::frame_acceleration(&tree, frame, q, qd, qdd));
+        let velocity = |[q, qd, _]: &[Vec<Moving>; 3], frame: &_| {
+            list(&reference::frame_velocity(&tree, frame, q, &at.rates_on_tree(&tree, q, qd)))
+        };
+        let acceleration = |motion: &[Vec<Moving>; 3], frame: &_| {
+            let [q, qd, qdd] = at.on_tree(&tree, motion.each_ref().map(|x| &x[..]));
+            list(&reference::frame_acceleration(&tree, frame, &q, &qd, &qdd))
+        };
         let (along, [q, _]) = at.along_motion();
-        let rate =
-            |frame: &_| list(&reference::frame_jacobian(&along, frame, &q).map(|x| x.derivatives[0]).transpose());
+        let rate = |frame: &_| list(&at.jacobian_on(&along, frame, &q).map(|x| x.derivatives[0]).transpose());
         let blocks = [
             block(&|frame| slopes(at, 0, |motion| velocity(motion, frame)))?,
             block(&|frame| slopes(at, 0, |motion| acceleration(motion, frame)))?,
             block(&|frame| slopes(at, 1, |motion| acceleration(motion, frame)))?,
-            at.per_frame(|frame| list(&reference::frame_jacobian(&at.tree, frame, at.q()).transpose()))?,
+            at.per_frame(|frame| list(&at.jacobian_on(&at.tree, frame, at.q()).transpose()))?,
             block(&|frame| rate(frame))?,
         ];
         Some(blocks.concat())
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -43,12 +51,20 @@ impl Truth for FrameDerivativesInOwnAxes {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         twist_slopes::<AlongOwnAxes>(at)
     }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
+    }
 }
 
 impl Truth for FrameDerivativesAtWorldOrigin {
     /// Of v − ω × p and ω.
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         twist_slopes::<AtWorldOrigin>(at)
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -75,9 +91,15 @@ impl Twist for AtWorldOrigin {
 }
 
 /// The twist of a frame.
-fn twist<W: Twist, T: ReferenceReal>(tree: &CentreOfMassTree<T>, frame: &str, q: &[T], qd: &[T]) -> Vec<T> {
+fn twist<W: Twist, T: ClosingReal>(
+    at: &Chapter<'_>,
+    tree: &CentreOfMassTree<T>,
+    frame: &str,
+    q: &[T],
+    qd: &[T],
+) -> Vec<T> {
     let frame = tree.frame(frame).expect("frames are those of the tree");
-    let velocity = reference::frame_velocity(tree, frame, q, qd);
+    let velocity = reference::frame_velocity(tree, frame, q, &at.rates_on_tree(tree, q, qd));
     let [linear, angular] = [0, 3].map(|row| velocity.fixed_rows::<3>(row).into_owned());
     W::numbers(&reference::frame_pose(tree, frame, q), linear, angular)
 }
@@ -88,18 +110,18 @@ fn twist_slopes<W: Twist>(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
     let once = at.tree.map(Moving::fixed);
     let twice = once.map(Dual::<Moving, 1>::fixed);
     let rate = |[q, qd, qdd]: &[Vec<Moving>; 3], frame: &str| {
-        let [q, qd, _] = moving(&once, [q, qd, qdd], &[qd.clone(), qdd.clone(), qdd.clone()]);
-        twist::<W, _>(&twice, frame, &q, &qd).into_iter().map(|x| x.derivatives[0]).collect::<Vec<_>>()
+        let [q, qd, _] = moving(at, &once, [q, qd, qdd], &[qd.clone(), qdd.clone(), qdd.clone()]);
+        twist::<W, _>(at, &twice, frame, &q, &qd).into_iter().map(|x| x.derivatives[0]).collect::<Vec<_>>()
     };
     let (along, [q, _]) = at.along_motion();
-    let column = |frame: &str, k: usize| twist::<W, _>(&at.tree, frame, at.q(), &unit::<Magnitude>(nv, 1, k)[1]);
+    let column = |frame: &str, k: usize| twist::<W, _>(at, &at.tree, frame, at.q(), &unit::<Magnitude>(nv, 1, k)[1]);
     let column_rate = |frame: &str, k: usize| {
-        let numbers = twist::<W, _>(&along, frame, &q, &unit::<Moving>(nv, 1, k)[1]);
+        let numbers = twist::<W, _>(at, &along, frame, &q, &unit::<Moving>(nv, 1, k)[1]);
         numbers.into_iter().map(|x| x.derivatives[0]).collect::<Vec<_>>()
     };
     let columns = |of: &dyn Fn(usize) -> Vec<Magnitude>| by_rows(&(0..nv).map(of).collect::<Vec<_>>());
     let blocks = [
-        at.per_frame(|f| slopes(at, 0, |[q, qd, _]| twist::<W, _>(&once, &f.name, q, qd)))?,
+        at.per_frame(|f| slopes(at, 0, |[q, qd, _]| twist::<W, _>(at, &once, &f.name, q, qd)))?,
         at.per_frame(|f| slopes(at, 0, |motion| rate(motion, &f.name)))?,
         at.per_frame(|f| slopes(at, 1, |motion| rate(motion, &f.name)))?,
         at.per_frame(|f| columns(&|k| column(&f.name, k)))?,
@@ -113,6 +135,10 @@ impl Truth for CentreOfMassJacobian {
         let tree = at.tree.map(Moving::fixed);
         Some(slopes(at, 0, |[q, ..]| list(&reference::centre_of_mass(&tree, q))))
     }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
+    }
 }
 
 impl Truth for SubtreeCentresOfMass {
@@ -124,6 +150,10 @@ impl Truth for SubtreeCentresOfMass {
         let centres: Vec<_> = order.iter().flat_map(|joint| centre(&at.tree, *joint, at.q())).collect();
         let jacobians = order.iter().flat_map(|joint| slopes(at, 0, |[q, ..]| centre(&moving, *joint, q)));
         Some(order.iter().map(|joint| mass(*joint)).chain(centres).chain(jacobians).collect())
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -147,8 +177,12 @@ impl Truth for CentroidalMap {
     /// Column by column the momentum of a unit velocity.
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         let nv = at.qd().len();
-        let column = |k: usize| momentum(&at.tree, at.q(), &unit::<Magnitude>(nv, 1, k)[1]);
+        let column = |k: usize| momentum(at, &at.tree, at.q(), &unit::<Magnitude>(nv, 1, k)[1]);
         Some(by_rows(&(0..nv).map(column).collect::<Vec<_>>()))
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -157,10 +191,14 @@ impl Truth for CentroidalMapRate {
         let nv = at.qd().len();
         let (tree, [q, _]) = at.along_motion();
         let column = |k: usize| {
-            let rates = momentum(&tree, &q, &unit::<Moving>(nv, 1, k)[1]).into_iter();
+            let rates = momentum(at, &tree, &q, &unit::<Moving>(nv, 1, k)[1]).into_iter();
             rates.map(|x| x.derivatives[0]).collect::<Vec<_>>()
         };
         Some([CentroidalMap::truth(at)?, by_rows(&(0..nv).map(column).collect::<Vec<_>>())].concat())
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -169,23 +207,27 @@ impl Truth for CentroidalDerivatives {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         let (tree, [q, qd]) = at.along_motion();
         let (h, h_dot): (Vec<_>, Vec<_>) =
-            momentum(&tree, &q, &qd).into_iter().map(|x| (x.value, x.derivatives[0])).unzip();
+            momentum(at, &tree, &q, &qd).into_iter().map(|x| (x.value, x.derivatives[0])).unzip();
         let once = at.tree.map(Moving::fixed);
-        let dh_dq = slopes(at, 0, |[q, qd, _]| momentum(&once, q, qd));
+        let dh_dq = slopes(at, 0, |[q, qd, _]| momentum(at, &once, q, qd));
         let twice = tree.map(Dual::<Moving, 1>::fixed);
         let rate = |[q, qd, qdd]: &[Vec<Moving>; 3]| {
             let motion = [&q[..], qd, qdd];
-            let [q, qd, _] = moving(&once, motion, &[qd.clone(), qdd.clone(), qdd.clone()]);
-            momentum(&twice, &q, &qd).into_iter().map(|x| x.derivatives[0]).collect::<Vec<_>>()
+            let [q, qd, _] = moving(at, &once, motion, &[qd.clone(), qdd.clone(), qdd.clone()]);
+            momentum(at, &twice, &q, &qd).into_iter().map(|x| x.derivatives[0]).collect::<Vec<_>>()
         };
         let [by_q, by_qd] = [0, 1].map(|block| slopes(at, block, rate));
         Some([h, h_dot, dh_dq, by_q, by_qd, CentroidalMap::truth(at)?].concat())
     }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
+    }
 }
 
 /// Linear momentum and angular momentum about the centre of mass.
-fn momentum<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> Vec<T> {
-    let momentum = reference::momentum(tree, q, qd);
+fn momentum<T: ClosingReal>(at: &Chapter<'_>, tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> Vec<T> {
+    let momentum = reference::momentum(tree, q, &at.rates_on_tree(tree, q, qd));
     let parts = [momentum.linear, momentum.angular_about_centre_of_mass];
     parts.iter().flat_map(|part| part.iter().copied()).collect()
 }
@@ -194,7 +236,7 @@ fn momentum<T: ReferenceReal>(tree: &CentreOfMassTree<T>, q: &[T], qd: &[T]) -> 
 pub(super) fn slopes(at: &Chapter<'_>, block: usize, f: impl Fn(&[Vec<Moving>; 3]) -> Vec<Moving>) -> Vec<Magnitude> {
     let nv = at.qd().len();
     let column = |k: usize| {
-        let motion = moving(&at.tree, [at.q(), at.qd(), at.qdd()], &unit(nv, block, k));
+        let motion = moving(at, &at.tree, [at.q(), at.qd(), at.qdd()], &unit(nv, block, k));
         f(&motion).into_iter().map(|x| x.derivatives[0]).collect::<Vec<_>>()
     };
     by_rows(&(0..nv).map(column).collect::<Vec<_>>())

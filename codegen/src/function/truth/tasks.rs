@@ -1,10 +1,13 @@
 //! Tasks of frames, by the second author: dense matrices of the chapter, and least squares in their primal form.
 
+use super::super::dynamics::{GravityForce, VelocityForce};
+use super::super::kinematics::JacobianBias;
 use super::super::tasks::{InverseKinematicsStep, OperationalSpaceDynamics};
 use super::super::Quantity;
+use super::closed::of_robot;
 use super::derivatives::weighed_slopes;
 use super::forward_derivatives::MovingJoints;
-use super::{solved, Chapter, Effect, Truth};
+use super::{solved, Chapter, ClosedMotion, Effect, Truth};
 use nalgebra::{DMatrix, DVector};
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference::{self, CentreOfMassFrame};
@@ -13,10 +16,11 @@ use straightline_core::{Dd, Real};
 impl Truth for OperationalSpaceDynamics {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         let joints = MovingJoints::new(at);
-        let velocity = at.with_passive(reference::velocity_force(&at.tree, at.q(), at.qd()));
-        let gravity = reference::gravity_force(&at.tree, at.q());
+        let velocity = DVector::from_vec(VelocityForce::truth_of(at)?) + at.passive(at.qd());
+        let gravity = DVector::from_vec(GravityForce::truth_of(at)?);
+        let biases = JacobianBias::truth_of(at)?;
         let mut blocks: [Vec<Magnitude>; 5] = Default::default();
-        for frame in &at.frames {
+        for (frame, bias) in at.frames.iter().zip(biases.chunks(6)) {
             let (jacobian, rows) = rows_of(at, frame, &joints.moving);
             let (m, n) = jacobian.shape();
             // H⁻¹ Jᵀ
@@ -28,7 +32,6 @@ impl Truth for OperationalSpaceDynamics {
             let times_inertia = |x: DVector<Magnitude>| solved(&feels, &x, reference::solve_symmetric);
             let unit = |k: usize| DVector::from_fn(m, |i, _| if i == k { Magnitude::one() } else { Magnitude::zero() });
             let inertia: Vec<_> = (0..m).map(|k| times_inertia(unit(k))).collect();
-            let bias = reference::frame_jacobian_bias(&at.tree, frame, at.q(), at.qd());
             let force = |forces: &DVector<Magnitude>, bias: &dyn Fn(usize) -> Magnitude| {
                 let own = forces.select_rows(&joints.moving);
                 times_inertia(DVector::from_fn(m, |k, _| response[k].dot(&own) - bias(rows[k])))
@@ -53,6 +56,10 @@ impl Truth for OperationalSpaceDynamics {
             }
         }
         Some(blocks.concat())
+    }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
     }
 }
 
@@ -87,6 +94,10 @@ impl Truth for InverseKinematicsStep {
         }
         Some(step)
     }
+
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        of_robot::<Self>(at)
+    }
 }
 
 /// The rows of a frame's Jacobian that are asked for, of the joints that move, and their places among six.
@@ -96,7 +107,7 @@ fn rows_of(
     moving: &[usize],
 ) -> (DMatrix<Magnitude>, Vec<usize>) {
     let rows: Vec<usize> = at.rows.places().collect();
-    let whole = reference::frame_jacobian(&at.tree, frame, at.q());
+    let whole = at.jacobian_on(&at.tree, frame, at.q());
     (DMatrix::from_fn(rows.len(), moving.len(), |i, j| whole[(rows[i], moving[j])]), rows)
 }
 
@@ -122,8 +133,7 @@ fn least_squares(
 /// Down the slope of ½ Σ (τ/τ_max)² of the torques that hold the robot still, in the metric of H.
 fn descent(at: &Chapter<'_>, joints: &MovingJoints<'_, '_>) -> DVector<Magnitude> {
     let rest = vec![Magnitude::zero(); at.qd().len()];
-    let mut torques = reference::gravity_force(&at.tree, at.q());
-    torques = at.with_passive_at_rest(torques);
+    let torques = at.forces_on(&at.tree, [at.q(), &rest, &rest]);
     let moves = |iv: usize| joints.moving.contains(&iv);
     let efforts: Vec<&Effect> =
         at.effects.iter().filter(|effect| moves(effect.iv) && effect.effort.is_some()).collect();

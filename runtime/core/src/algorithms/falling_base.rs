@@ -30,8 +30,11 @@ pub struct FallingBase<T> {
 }
 
 impl<T: Real> FallingBase<T> {
-    /// At q, q̇; `None` of a robot that stands on something.
+    /// At q, q̇; `None` of a robot that stands on something, or that loops may tie to it.
     pub fn of(model: &Model<T>, q: &[T], qd: &[T]) -> Option<Self> {
+        if !model.closure.is_empty() {
+            return None;
+        }
         let mut roots = model.bodies.iter().filter(|body| body.parent.is_none()).map(|body| &body.joint);
         let joint = roots.next().filter(|joint| joint.kind.is_base() && roots.next().is_none())?;
         let (pose, rates) = (joint.coordinates(q), joint.rates(qd));
