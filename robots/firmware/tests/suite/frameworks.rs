@@ -5,8 +5,8 @@ use std::path::Path;
 use std::process::Command;
 
 #[test]
-#[ignore = "slow proof: embassy, RTIC and the compiler of dynamics are built"]
-fn slow_proof_sketches_for_frameworks_are_linked() {
+#[ignore = "minutes: embassy, RTIC and the compiler of dynamics are built"]
+fn sketches_for_frameworks_are_linked() {
     let Some(nm) = cross::program("arm-none-eabi-nm") else { return };
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let target = here.join("../../target/frameworks");
