@@ -16,7 +16,7 @@ use straightline_core::spatial::{MotionVector, Transform, Vec3};
 use straightline_core::{Dual, Real};
 
 /// Matrices by rows, with a column per increment of q and per velocity.
-pub(super) struct Slopes<T> {
+pub(super) struct EffectSlopes<T> {
     pub by_configuration: Vec<T>,
     pub by_velocity: Vec<T>,
 }
@@ -80,13 +80,13 @@ impl<'a, T: Real> ClosedSlopes<'a, T> {
     }
 
     /// Of what rotors, friction and springs of the joints take.
-    pub fn effects(&self) -> Slopes<T> {
+    pub fn effects(&self) -> EffectSlopes<T> {
         let forces = |model: &Model<Dual<T, 1>>, [q, qd, qdd]: &Moving<T>| {
             let passive = alg::passive_force(model, q, qd);
             let rotors = alg::rotor_forces(model, [q, qd, qdd]);
             passive.into_iter().zip(rotors).map(|(p, r)| p + r).collect()
         };
-        Slopes { by_configuration: self.by_configuration(forces), by_velocity: self.by_velocity(forces) }
+        EffectSlopes { by_configuration: self.by_configuration(forces), by_velocity: self.by_velocity(forces) }
     }
 
     /// Of the forces of the bodies, from those of the tree, which stands at y.
@@ -215,27 +215,27 @@ pub(super) trait TwistNumbers {
 }
 
 /// World axes, of the frame's origin.
-pub(super) struct AtOrigin;
+pub(super) struct NumbersAtOrigin;
 
-impl TwistNumbers for AtOrigin {
+impl TwistNumbers for NumbersAtOrigin {
     fn of<T: Real>(_: &Transform<T>, velocity: &MotionVector<T>) -> [Vec3<T>; 2] {
         [velocity.linear, velocity.angular]
     }
 }
 
 /// The frame's own axes.
-pub(super) struct InOwnAxes;
+pub(super) struct NumbersInOwnAxes;
 
-impl TwistNumbers for InOwnAxes {
+impl TwistNumbers for NumbersInOwnAxes {
     fn of<T: Real>(pose: &Transform<T>, velocity: &MotionVector<T>) -> [Vec3<T>; 2] {
         [velocity.linear, velocity.angular].map(|v| pose.rotation.transpose_mul(v))
     }
 }
 
 /// World axes, of what moves with the frame through the world's origin.
-pub(super) struct AtWorldOrigin;
+pub(super) struct NumbersAtWorldOrigin;
 
-impl TwistNumbers for AtWorldOrigin {
+impl TwistNumbers for NumbersAtWorldOrigin {
     fn of<T: Real>(pose: &Transform<T>, velocity: &MotionVector<T>) -> [Vec3<T>; 2] {
         [velocity.linear - velocity.angular.cross(pose.translation), velocity.angular]
     }

@@ -1,6 +1,6 @@
 //! Derivatives of the motion of frames, and of the robot as a whole: centre of mass and centroidal momentum.
 
-use super::closed_derivatives::{AtOrigin, AtWorldOrigin, InOwnAxes};
+use super::closed_derivatives::{NumbersAtOrigin, NumbersAtWorldOrigin, NumbersInOwnAxes};
 use super::spec::Extent::{Frames, Joints, Of, Velocities};
 use super::spec::{Divisor, Form, Output, RobotFunction, Spec};
 use super::{Extent, Forms, Quantity};
@@ -55,7 +55,7 @@ of a floating base by increments of its pose in its own axes",
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
         of_frames(forms, |frame| match forms.closed(motion(inputs)) {
-            Some(closed) => closed.of_frame::<AtOrigin>(frame),
+            Some(closed) => closed.of_frame::<NumbersAtOrigin>(frame),
             None => alg::frame_derivatives(forms.model, motion(inputs), frame),
         })
     }
@@ -78,7 +78,7 @@ of a floating base by increments of its pose in its own axes",
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
         of_frames(forms, |frame| match forms.closed(motion(inputs)) {
-            Some(closed) => closed.of_frame::<InOwnAxes>(frame),
+            Some(closed) => closed.of_frame::<NumbersInOwnAxes>(frame),
             None => alg::frame_derivatives_in_own_axes(forms.model, motion(inputs), frame),
         })
     }
@@ -101,7 +101,7 @@ of a floating base by increments of its pose in its own axes",
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
         of_frames(forms, |frame| match forms.closed(motion(inputs)) {
-            Some(closed) => closed.of_frame::<AtWorldOrigin>(frame),
+            Some(closed) => closed.of_frame::<NumbersAtWorldOrigin>(frame),
             None => alg::frame_derivatives_at_world_origin(forms.model, motion(inputs), frame),
         })
     }
