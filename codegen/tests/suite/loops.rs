@@ -50,8 +50,8 @@ fn functions_of_a_four_bar_are_the_second_authors() {
 
 #[test]
 #[ignore = "slow proof: derivatives and tasks"]
-fn slow_proof_that_derivatives_of_a_palletiser_are_the_second_authors() {
-    verified(&source("loop_palletiser"), is_by_name);
+fn slow_proof_that_derivatives_of_a_four_bar_are_the_second_authors() {
+    verified(&source("loop_fourbar"), is_by_name);
 }
 
 #[test]
