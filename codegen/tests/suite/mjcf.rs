@@ -316,6 +316,79 @@ fn files_are_included_where_they_are_named() {
 }
 
 /// The box of the half lengths 0.1, 0.2, 0.3 about (1, 2, 3).
+/// Two arms of one file, of other units and classes than the file that attaches them, one of them a part of the model.
+#[test]
+fn models_are_attached_where_they_are_named() {
+    let here = folder("attached");
+    let arm = "<mujoco model=\"arm\"><compiler angle=\"radian\" autolimits=\"false\"/>
+        <default><joint damping=\"0.3\"/><default class=\"heavy\"><geom density=\"2000\"/></default></default>
+        <worldbody><geom size=\"1\"/><body name=\"upper\" euler=\"0.1 0.2 0.3\"><joint name=\"shoulder\" axis=\"0 1 0\"/>
+        <geom class=\"heavy\" size=\"0.1\" pos=\"0.1 0 0\"/><site name=\"elbow\" pos=\"0.3 0 0\"/><body name=\"fore\" pos=\"0.3 0 0\">
+        <joint name=\"bend\" axis=\"0 0 1\"/><geom size=\"0.05\" pos=\"0.1 0.1 0\"/></body></body></worldbody>
+        <equality><joint joint1=\"bend\" joint2=\"shoulder\" polycoef=\"0 2 0 0 0\"/></equality>
+        <actuator><motor joint=\"shoulder\" ctrlrange=\"-3 3\" ctrllimited=\"true\"/></actuator></mujoco>";
+    std::fs::write(here.join("arm.xml"), arm).expect("it can be written");
+    let text = "<mujoco model=\"robot\"><default><joint damping=\"9\"/><default class=\"heavy\"><geom density=\"1\"/></default></default>
+        <asset><model name=\"arm\" file=\"arm.xml\"/></asset>
+        <worldbody><body name=\"torso\"><joint name=\"yaw\" axis=\"0 0 1\"/><geom size=\"0.2\" pos=\"0.1 0 0\"/>
+        <frame pos=\"0 0.2 0\" euler=\"90 0 0\"><attach model=\"arm\" body=\"upper\" prefix=\"left_\"/></frame>
+        <frame pos=\"0 -0.2 0\"><attach model=\"arm\" prefix=\"right_\"/></frame></body></worldbody></mujoco>";
+    let path = here.join("robot.xml");
+    let attached = model_of(&path.to_string_lossy(), text);
+    // the same in one file; the ball of the world of the right arm is a part of the torso
+    let body = |prefix: &str| {
+        format!(
+            "<body name=\"{prefix}upper\" euler=\"0.1 0.2 0.3\"><joint name=\"{prefix}shoulder\" axis=\"0 1 0\" damping=\"0.3\"/>
+            <geom density=\"2000\" size=\"0.1\" pos=\"0.1 0 0\"/><site name=\"{prefix}elbow\" pos=\"0.3 0 0\"/>
+            <body name=\"{prefix}fore\" pos=\"0.3 0 0\"><joint name=\"{prefix}bend\" axis=\"0 0 1\" damping=\"0.3\"/>
+            <geom size=\"0.05\" pos=\"0.1 0.1 0\"/></body></body>"
+        )
+    };
+    let coupling =
+        |prefix: &str| format!("<joint joint1=\"{prefix}bend\" joint2=\"{prefix}shoulder\" polycoef=\"0 2 0 0 0\"/>");
+    let plain = format!(
+        "<mujoco model=\"robot\"><compiler angle=\"radian\"/><worldbody><body name=\"torso\">
+        <joint name=\"yaw\" axis=\"0 0 1\" damping=\"9\"/><geom size=\"0.2\" pos=\"0.1 0 0\"/><geom size=\"1\" pos=\"0 -0.2 0\"/>
+        <frame pos=\"0 0.2 0\" euler=\"{half_pi} 0 0\">{left}</frame><frame pos=\"0 -0.2 0\">{right}</frame></body></worldbody>
+        <equality>{}{}</equality></mujoco>",
+        coupling("left_"),
+        coupling("right_"),
+        half_pi = PI / 2.0,
+        left = body("left_"),
+        right = body("right_"),
+    );
+    let plain = model_of("plain.xml", &plain);
+    let names = |model: &Model<Dd>| model.joints().iter().map(|joint| joint.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&attached), ["yaw", "left_shoulder", "right_shoulder"]);
+    assert_eq!(names(&attached), names(&plain));
+    same(&attached, &plain, 1e-15);
+    let effort =
+        |name: &str| attached.joints().iter().find(|joint| joint.name == name).expect("it is there").limits.effort;
+    assert_eq!([effort("left_shoulder"), effort("right_shoulder")], [3.0, 3.0]);
+    assert!(attached.frame("left_elbow").is_some() && attached.frame("right_elbow").is_some());
+    std::fs::remove_dir_all(&here).expect("it was made here");
+}
+
+/// A ball that lies beside a robot is no part of it; two balls are no robot.
+#[test]
+fn what_moves_freely_beside_a_robot_is_left_out() {
+    let arm = format!("<body name=\"arm\"><joint name=\"j\" axis=\"0 1 0\"/>{INERTIAL}</body>");
+    let ball = "<body name=\"ball\"><freejoint/><geom size=\"0.1\"/></body>";
+    same(
+        &model_of("a.xml", &robot("", &format!("{ball}{arm}{ball}").replacen("ball", "other", 1))),
+        &model_of("b.xml", &robot("", &arm)),
+        0.0,
+    );
+    // beside a robot that floats, too
+    let walker = format!("<body name=\"walker\"><freejoint/>{INERTIAL}{arm}</body>");
+    same(&model_of("a.xml", &robot("", &format!("{walker}{ball}"))), &model_of("b.xml", &robot("", &walker)), 0.0);
+    let (model, diagnostics) = load(
+        &Source::new("c.xml", robot("", &format!("{ball}{}", ball.replace("ball", "other")))),
+        &ModelOptions::default(),
+    );
+    assert!(model.is_none() && diagnostics.iter().all(|d| d.code == "not-supported-yet"), "{diagnostics}");
+}
+
 fn faces() -> ([[f64; 3]; 8], [[usize; 3]; 12]) {
     let sign = |i: usize, bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
     let corners = std::array::from_fn(|i| [1.0 + 0.1 * sign(i, 0), 2.0 + 0.2 * sign(i, 1), 3.0 + 0.3 * sign(i, 2)]);

@@ -52,9 +52,28 @@ fn what_changes_the_dynamics_and_is_not_read_is_an_error() {
         (geom, "<geom type=\"mesh\" mesh=\"hull\"/>", "unknown-word", 3),
         (geom, "<geom type=\"mesh\"/>", "missing-attribute", 3),
         (geom, "<geom size=\"1\" shellinertia=\"true\"/>", "not-supported-yet", 3),
-        (world, "<body><freejoint/><geom size=\"1\"/></body></worldbody>", "not-supported-yet", 4),
+        (
+            world,
+            "<body><freejoint/><geom size=\"1\"/><body><joint name=\"m\"/><geom size=\"1\"/></body></body></worldbody>",
+            "not-supported-yet",
+            4,
+        ),
+        (world, "<attach prefix=\"left_\"/></worldbody>", "missing-attribute", 4),
+        (world, "<attach model=\"arm\"/></worldbody>", "unknown-word", 4),
+        (world, "<attach model=\"m\"/></worldbody><asset><model name=\"m\"/></asset>", "missing-attribute", 4),
+        (
+            world,
+            "<attach model=\"m\"/></worldbody><asset><model name=\"m\" file=\"no such file.xml\"/></asset>",
+            "include-failed",
+            4,
+        ),
         (world, "</worldbody><option density=\"1.2\"/>", "not-supported-yet", 4),
-        (world, "</worldbody><option><flag spring=\"disable\"/></option>", "not-supported-yet", 4),
+        (
+            world,
+            "</worldbody><default><joint stiffness=\"1\"/></default><option><flag spring=\"disable\"/></option>",
+            "not-supported-yet",
+            4,
+        ),
         (world, "</worldbody><compiler coordinate=\"global\"/>", "not-supported-yet", 4),
         (world, "</worldbody><compiler eulerseq=\"xyw\"/>", "unknown-word", 4),
         (world, "</worldbody><include/>", "missing-attribute", 4),
@@ -103,6 +122,30 @@ fn what_the_dynamics_do_not_need_is_listed() {
     let expected =
         ["light", "camera", "spatial tendon", "actuator adhesion", "sensor", "contact", "keyframe", "visual"];
     assert_eq!(ignored, expected.map(|what| (what, if what == "camera" { 2 } else { 1 })));
+}
+
+#[test]
+fn a_model_that_attaches_itself_is_refused() {
+    let folder = std::env::temp_dir().join(format!("straightline-mjcf-{}-attached", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("there is room for a test");
+    let path = folder.join("robot.xml");
+    let attach =
+        "<attach model=\"self\" prefix=\"a_\"/></worldbody><asset><model name=\"self\" file=\"robot.xml\"/></asset>";
+    let text = PLAIN.replace("</worldbody>", attach);
+    std::fs::write(&path, &text).expect("it can be written");
+    let (model, diagnostics) = load(&Source::new(&path.to_string_lossy(), text), &ModelOptions::default());
+    assert!(model.is_none());
+    assert_eq!(diagnostics.iter().map(|d| d.code).collect::<Vec<_>>(), ["include-failed"], "{diagnostics}");
+    std::fs::remove_dir_all(&folder).expect("it was made here");
+}
+
+/// What a flag switches off and the file does not have is not missed.
+#[test]
+fn flags_that_change_nothing_are_read() {
+    for flag in ["constraint", "equality", "frictionloss", "passive", "spring", "damper"] {
+        let option = format!("</worldbody><option><flag {flag}=\"disable\"/></option>");
+        assert!(said(&PLAIN.replace("</worldbody>", &option)).is_empty(), "{flag}");
+    }
 }
 
 #[test]

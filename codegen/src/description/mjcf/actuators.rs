@@ -11,9 +11,9 @@ type Efforts<'s> = BTreeMap<usize, (Option<f64>, &'s Attribute)>;
 
 impl<'s> Mjcf<'s> {
     /// Reads the sections of actuators.
-    pub fn read_actuators(&mut self, sections: &[&'s Element]) {
+    pub fn read_actuators(&mut self) {
         let mut efforts: Efforts<'s> = BTreeMap::new();
-        for element in sections.iter().flat_map(|section| self.files.children(section)) {
+        for element in self.within("actuator") {
             self.read_actuator(element, &mut efforts);
         }
         for (joint, (effort, attribute)) in efforts {
@@ -27,7 +27,7 @@ impl<'s> Mjcf<'s> {
     }
 
     fn read_actuator(&mut self, element: &'s Element, efforts: &mut Efforts<'s>) {
-        let given = self.given(element, "actuator", 0);
+        let given = self.given_outermost(element, "actuator");
         let owner = match element.attribute("name") {
             Some(name) => format!("actuator `{}`", name.value),
             None => "an actuator".to_string(),

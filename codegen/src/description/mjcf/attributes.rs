@@ -191,7 +191,7 @@ impl<'s> Mjcf<'s> {
             }
             _ => {
                 let mut turns = Vec::new();
-                for (axis, value) in self.settings.euler.into_iter().zip(first) {
+                for (axis, value) in self.settings[attribute.scope].euler.into_iter().zip(first) {
                     let unit = ['x', 'y', 'z'].map(|own| f64::from(u8::from(own == axis.to_ascii_lowercase())));
                     let turn = WrittenTurn::About {
                         axis: Noted::new(unit, place.clone()),
@@ -217,12 +217,13 @@ impl<'s> Mjcf<'s> {
 
     /// An angle in the unit of the file.
     pub fn angle(&self, value: f64, attribute: &Attribute) -> Angle {
-        Angle { value, unit: self.settings.angle, text: format!("{value:?}"), place: self.place(attribute) }
+        let unit = self.settings[attribute.scope].angle;
+        Angle { value, unit, text: format!("{value:?}"), place: self.place(attribute) }
     }
 
     /// An angle of the file in radians, rounded once.
-    pub fn radians(&self, value: f64) -> f64 {
-        match self.settings.angle {
+    pub fn radians(&self, value: f64, attribute: &Attribute) -> f64 {
+        match self.settings[attribute.scope].angle {
             AngleUnit::Degree if value.is_finite() => {
                 let angle = Angle { value, unit: AngleUnit::Degree, text: String::new(), place: Place::none() };
                 angle::in_radians(&angle, 0.0).to_f64()

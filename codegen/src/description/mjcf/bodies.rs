@@ -86,17 +86,26 @@ struct Open<'s> {
 
 impl<'s> Mjcf<'s> {
     /// Reads the bodies of the world.
-    pub fn read_world(&mut self, sections: &[&'s Element]) {
+    pub fn read_world(&mut self) {
+        let sections = self.files.sections(0, "worldbody");
         let Some(first) = sections.first() else { return };
         let place = self.tag(first);
         let world = Noted::new(self.names.made_up("world"), place.clone());
         let mut contents = Contents { all: Vec::new(), frames: Vec::new(), link: world.clone() };
-        for section in sections {
-            self.add_contents(section, 0, &mut contents);
+        for section in &sections {
+            self.add_contents(section, self.classes.outermost[0], &mut contents);
         }
-        let moving: Vec<&'s Element> =
-            contents.of("body").iter().map(|body| body.element).filter(|body| self.has(body, &[])).collect();
-        let free = moving.iter().filter(|body| self.has(body, &["free"])).count();
+        let moving: Vec<&'s Element> = contents
+            .of("body")
+            .iter()
+            .map(|body| body.element)
+            .filter(|body| !self.joints_within(body).is_empty())
+            .collect();
+        // what moves freely beside a robot has nothing to do with its dynamics
+        let (objects, robots): (Vec<&'s Element>, Vec<&'s Element>) =
+            moving.iter().partition(|body| self.free_joint(body).is_some() && self.joints_within(body).len() == 1);
+        let (objects, moving) = if robots.is_empty() { (Vec::new(), moving) } else { (objects, robots) };
+        let free = moving.iter().filter(|body| self.free_joint(body).is_some()).count();
         let base = if free == 1 && moving.len() == 1 { moving.first().copied() } else { None };
         match base {
             Some(base) => {
@@ -115,7 +124,7 @@ impl<'s> Mjcf<'s> {
         }
         contents.of("geom").iter().for_each(|geom| self.ignore_as("geom of the world", geom.element));
         self.refuse_others(&contents, "the world", &["joint", "freejoint", "inertial"]);
-        let mut open = self.bodies_in(&mut contents, base, "world");
+        let mut open = self.bodies_of_world(&mut contents, base, &objects);
         while let Some(body) = open.pop() {
             let is_base = base.is_some_and(|base| std::ptr::eq(base, body.element));
             let inner = self.read_body(body, is_base, moving.len());
@@ -123,29 +132,62 @@ impl<'s> Mjcf<'s> {
         }
     }
 
-    /// The bodies in a body, the first one last; of the world only `base` if there is one.
-    fn bodies_in(&mut self, contents: &mut Contents<'s>, base: Option<&'s Element>, around: &str) -> Vec<Open<'s>> {
+    /// The bodies of the world that are read, the first one last: only `base` if there is one, and no objects.
+    fn bodies_of_world(
+        &mut self,
+        contents: &mut Contents<'s>,
+        base: Option<&'s Element>,
+        objects: &[&'s Element],
+    ) -> Vec<Open<'s>> {
+        let mut left_out: Vec<(&'s Element, &str)> = Vec::new();
+        contents.all.retain(|content| {
+            let element = content.element;
+            let why = match base {
+                _ if element.name != "body" => None,
+                _ if objects.iter().any(|object| std::ptr::eq(*object, element)) => {
+                    Some("body that moves freely beside the robot")
+                }
+                Some(base) if !std::ptr::eq(base, element) => Some("body that does not move"),
+                _ => None,
+            };
+            left_out.extend(why.map(|why| (element, why)));
+            why.is_none()
+        });
+        for (element, why) in left_out {
+            if let Some(total) = self.settings[0].total_mass.take() {
+                let help = "remove `settotalmass`, or the bodies that are not of the robot";
+                let complaint = crate::description::messages::not_supported_yet(
+                    "the compiler",
+                    "settotalmass",
+                    "the mass of bodies would count that are left out",
+                    help,
+                );
+                self.reader.say(&total.place, complaint);
+            }
+            self.ignore_as(why, element);
+        }
+        match base {
+            Some(_) => self.bodies_at(contents, "world", |_, contents, _| contents.link.clone()),
+            None => self.bodies_in(contents, "world"),
+        }
+    }
+
+    /// The bodies in a body, the first one last.
+    fn bodies_in(&mut self, contents: &mut Contents<'s>, around: &str) -> Vec<Open<'s>> {
+        self.bodies_at(contents, around, Self::link_of_frame)
+    }
+
+    fn bodies_at(
+        &mut self,
+        contents: &mut Contents<'s>,
+        around: &str,
+        parent: impl Fn(&mut Self, &mut Contents<'s>, Option<usize>) -> Noted<String>,
+    ) -> Vec<Open<'s>> {
         let bodies: Vec<(&'s Element, usize, Option<usize>)> =
             contents.of("body").iter().map(|body| (body.element, body.class, body.frame)).collect();
         let mut open = Vec::new();
         for (element, class, frame) in bodies {
-            if base.is_some_and(|base| !std::ptr::eq(base, element)) {
-                if let Some(total) = self.settings.total_mass.clone() {
-                    let help = "remove `settotalmass`, or the bodies that do not move";
-                    let why =
-                        "the mass of bodies that do not move would count, and beside a free body they are left out";
-                    let complaint =
-                        crate::description::messages::not_supported_yet("the compiler", "settotalmass", why, help);
-                    self.reader.say(&total.place, complaint);
-                    self.settings.total_mass = None;
-                }
-                self.ignore_as("body that does not move", element);
-                continue;
-            }
-            let parent = match base {
-                Some(_) => contents.link.clone(),
-                None => self.link_of_frame(contents, frame),
-            };
+            let parent = parent(self, contents, frame);
             open.push(Open { element, class, parent, around: around.to_string() });
         }
         open.reverse();
@@ -179,7 +221,7 @@ impl<'s> Mjcf<'s> {
         self.robot.links.push(WrittenLink { name, inertial, is_carrier: false });
         self.add_sites(&mut contents);
         self.refuse_others(&contents, &owner, &[]);
-        self.bodies_in(&mut contents, None, &around)
+        self.bodies_in(&mut contents, &around)
     }
 
     /// Refuses or skips what is read nowhere.
@@ -189,7 +231,7 @@ impl<'s> Mjcf<'s> {
                 name if not_here.contains(&name) => self.refuse(element, owner, "the world does not move", "remove it"),
                 "body" | "joint" | "freejoint" | "inertial" | "geom" | "site" => {}
                 "camera" | "light" => self.ignore(element),
-                "replicate" | "composite" | "flexcomp" | "attach" => {
+                "replicate" | "composite" | "flexcomp" => {
                     let help = "load the model with MuJoCo and save it: the saved file has the bodies themselves";
                     self.refuse(element, owner, "bodies would be made of it", help);
                 }
@@ -206,6 +248,16 @@ impl<'s> Mjcf<'s> {
         let within = |element, class, frame| files.children(element).into_iter().rev().map(move |e| (e, class, frame));
         open.extend(within(element, class, None));
         while let Some((element, class, frame)) = open.pop() {
+            if element.name == "attach" {
+                self.check_attributes(element, "an attachment", vocabulary::ATTACH);
+                match files.attached(element) {
+                    Some(others) => {
+                        open.extend(others.into_iter().rev().map(|e| (e, self.classes.outermost[e.scope], frame)));
+                    }
+                    None => self.complain_of_attached(element),
+                }
+                continue;
+            }
             if element.name != "frame" {
                 contents.all.push(Content { element, class, frame });
                 continue;
@@ -216,6 +268,12 @@ impl<'s> Mjcf<'s> {
             contents.frames.push(FrameAround { element, pose, around: frame, link: None });
             open.extend(within(element, class, Some(contents.frames.len() - 1)));
         }
+    }
+
+    /// A body that is to be attached, and is not there; other mistakes have been told where the model was to be read.
+    fn complain_of_attached(&mut self, element: &'s Element) {
+        let Some(body) = element.attribute("body").filter(|_| self.files.is_attached(element)) else { return };
+        self.complain(body, crate::description::messages::unknown_word("body of <attach>", &body.value, &[]));
     }
 
     /// The link that stands for a frame in a body, which it makes if there is none yet.
@@ -280,19 +338,18 @@ impl<'s> Mjcf<'s> {
         }
     }
 
-    /// Whether a body or one in it has a joint; with `["free"]`: whether it has a free one itself.
-    fn has(&self, body: &'s Element, what: &[&str]) -> bool {
-        if what == ["free"] {
-            return self.free_joint(body).is_some();
-        }
+    /// The joints of a body and of those in it.
+    fn joints_within(&self, body: &'s Element) -> Vec<&'s Element> {
         let mut open = vec![body];
+        let mut joints = Vec::new();
         while let Some(element) = open.pop() {
             if ["joint", "freejoint"].contains(&element.name.as_str()) {
-                return true;
+                joints.push(element);
             }
             open.extend(self.files.children(element));
+            open.extend(self.files.attached(element).into_iter().flatten());
         }
-        false
+        joints
     }
 
     /// The free joint of a body.

@@ -11,11 +11,15 @@ use crate::description::messages;
 #[derive(Default)]
 pub(super) struct DefaultClasses<'s> {
     all: Vec<Class<'s>>,
+    /// The outermost class of each model.
+    pub outermost: Vec<usize>,
 }
 
 /// A class.
 struct Class<'s> {
     name: String,
+    /// The model that it is of.
+    scope: usize,
     parent: Option<usize>,
     /// Kinds of elements with what they have.
     elements: Vec<(&'static str, &'s Element)>,
@@ -75,13 +79,22 @@ fn kind_of(name: &str) -> Option<&'static str> {
 
 impl<'s> Mjcf<'s> {
     /// Reads the sections of defaults.
-    pub fn read_classes(&mut self, sections: &[&'s Element]) {
-        self.classes.all.push(Class { name: "main".to_string(), parent: None, elements: Vec::new() });
+    pub fn read_classes(&mut self) {
+        for scope in 0..self.files.scopes.len() {
+            self.read_classes_of(scope);
+        }
+    }
+
+    fn read_classes_of(&mut self, scope: usize) {
+        let sections = self.files.sections(scope, "default");
+        let outermost = self.classes.all.len();
+        self.classes.outermost.push(outermost);
+        self.classes.all.push(Class { name: "main".to_string(), scope, parent: None, elements: Vec::new() });
         let mut open: Vec<(&'s Element, Option<usize>)> =
             sections.iter().rev().map(|section| (*section, None)).collect();
         while let Some((element, parent)) = open.pop() {
             let class = match (parent, element.attribute("class")) {
-                (None, _) => 0, // whatever the outermost is called, it is the same
+                (None, _) => outermost, // whatever the outermost is called, it is the same
                 (Some(_), None) => {
                     let example = "<default class=\"...\">";
                     self.complain_at(element, messages::missing_attribute("<default>", "class", example));
@@ -90,6 +103,7 @@ impl<'s> Mjcf<'s> {
                 (Some(parent), Some(name)) => {
                     self.classes.all.push(Class {
                         name: name.value.clone(),
+                        scope,
                         parent: Some(parent),
                         elements: Vec::new(),
                     });
@@ -97,7 +111,7 @@ impl<'s> Mjcf<'s> {
                 }
             };
             if let (None, Some(name)) = (parent, element.attribute("class")) {
-                self.classes.all[0].name = name.value.clone();
+                self.classes.all[outermost].name = name.value.clone();
             }
             for child in self.files.children(element) {
                 match (child.name.as_str(), kind_of(&child.name)) {
@@ -113,13 +127,22 @@ impl<'s> Mjcf<'s> {
     /// The class that an attribute names, or a complaint.
     pub fn class(&mut self, attribute: &'s Attribute) -> Option<usize> {
         let name = attribute.value.as_str();
-        let found = self.classes.all.iter().position(|class| class.name == name).or((name == "main").then_some(0));
+        let scope = attribute.scope;
+        let is_named = |class: &Class| class.scope == scope && class.name == name;
+        let main = (name == "main").then(|| self.classes.outermost[scope]);
+        let found = self.classes.all.iter().position(is_named).or(main);
         if found.is_none() {
-            let names: Vec<String> = self.classes.all.iter().map(|class| class.name.clone()).collect();
+            let of_scope = self.classes.all.iter().filter(|class| class.scope == scope);
+            let names: Vec<String> = of_scope.map(|class| class.name.clone()).collect();
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
             self.complain(attribute, messages::unknown_word("class", name, &names));
         }
         found
+    }
+
+    /// An element with its defaults, that stands in nothing with a class.
+    pub fn given_outermost(&mut self, element: &'s Element, kind: &str) -> Defaulted<'s> {
+        self.given(element, kind, self.classes.outermost[element.scope])
     }
 
     /// An element with its defaults; `around`: the class of what it stands in.

@@ -9,11 +9,8 @@ use straightline_core::Dd;
 
 impl<'s> Mjcf<'s> {
     /// Reads the sections of equalities and tendons.
-    pub fn read_constraints(&mut self, equalities: &[&'s Element], tendons: &[&'s Element]) {
-        let within = |sections: &[&'s Element]| -> Vec<&'s Element> {
-            sections.iter().flat_map(|section| self.files.children(section)).collect()
-        };
-        let (equalities, tendons) = (within(equalities), within(tendons));
+    pub fn read_constraints(&mut self) {
+        let [equalities, tendons] = ["equality", "tendon"].map(|name| self.within(name));
         for element in equalities {
             self.read_equality(element, &tendons);
         }
@@ -23,7 +20,7 @@ impl<'s> Mjcf<'s> {
     }
 
     fn read_equality(&mut self, element: &'s Element, tendons: &[&'s Element]) {
-        let given = self.given(element, "equality", 0);
+        let given = self.given_outermost(element, "equality");
         if self.flag(&given, "active") == Some(false) {
             self.ignore_as("equality that is not active", element);
             return;
@@ -171,7 +168,7 @@ impl<'s> Mjcf<'s> {
     }
 
     fn read_tendon(&mut self, element: &'s Element) {
-        let given = self.given(element, "tendon", 0);
+        let given = self.given_outermost(element, "tendon");
         let owner = match element.attribute("name") {
             Some(name) => format!("tendon `{}`", name.value),
             None => "a tendon".to_string(),

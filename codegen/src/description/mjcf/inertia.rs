@@ -4,6 +4,7 @@ use super::bodies::Contents;
 use super::classes::Defaulted;
 use super::files::Element;
 use super::geoms::Solid;
+use super::settings::CompilerSettings;
 use super::{vocabulary, Mjcf};
 use crate::description::angle::{self, transform};
 use crate::description::geometry::{compose, point, snap_tensor, vector};
@@ -29,7 +30,7 @@ impl<'s> Mjcf<'s> {
         if let Some(displaced) = written.first().filter(|inertial| contents.is_displaced(inertial)) {
             self.refuse(displaced.element, owner, "it would stand in a frame", "write it outside of `<frame>`");
         }
-        let by_geoms = self.settings.inertia_from_geoms.unwrap_or(written.is_empty());
+        let by_geoms = self.settings[body.scope].inertia_from_geoms.unwrap_or(written.is_empty());
         let mut parts = Vec::new();
         for geom in contents.of("geom") {
             let given = self.given(geom.element, "geom", geom.class);
@@ -44,9 +45,9 @@ impl<'s> Mjcf<'s> {
             Some(of_parts(&parts, self.tag(body)))
         };
         // bounds are those of every body, also of one without mass
-        let is_bounded = self.settings.bounds.iter().any(|bound| *bound > 0.0);
+        let is_bounded = self.settings[body.scope].bounds.iter().any(|bound| *bound > 0.0);
         let inertial = inertial.or_else(|| is_bounded.then(|| of_parts(&[], self.tag(body))));
-        inertial.map(|inertial| self.corrected(inertial))
+        inertial.map(|inertial| self.settings[body.scope].corrected(inertial))
     }
 
     /// An inertia as it is written.
@@ -84,7 +85,7 @@ impl<'s> Mjcf<'s> {
     /// Whether a geom is of a group that inertias are made of.
     fn is_in_group(&mut self, given: &Defaulted<'s>) -> bool {
         let group = self.number(given, "group", "a geom").map_or(0.0, |group| group.value);
-        let [first, last] = self.settings.groups;
+        let [first, last] = self.settings[given.element.scope].groups;
         (first..=last).contains(&group)
     }
 
@@ -194,18 +195,36 @@ impl<'s> Mjcf<'s> {
         Some((size, pose))
     }
 
+    /// Brings the mass of all bodies to what the compiler says.
+    pub fn scale_masses(&mut self) {
+        let Some(total) = &self.settings[0].total_mass else { return };
+        let inertials = || self.robot.links.iter().filter_map(|link| link.inertial.as_ref());
+        let mass = inertials().fold(Dd::ZERO, |sum, inertial| sum + Dd::from(inertial.mass.value));
+        if mass.to_f64() <= 0.0 {
+            return;
+        }
+        let factor = Dd::from(total.value) / mass;
+        let scaled = |x: f64| (Dd::from(x) * factor).to_f64();
+        for inertial in self.robot.links.iter_mut().filter_map(|link| link.inertial.as_mut()) {
+            inertial.mass.value = scaled(inertial.mass.value);
+            inertial.inertia.value = inertial.inertia.value.map(scaled);
+        }
+    }
+}
+
+impl CompilerSettings<'_> {
     /// The inertia after what the compiler says of all of them.
     fn corrected(&self, mut inertial: WrittenInertial) -> WrittenInertial {
-        let [least_mass, least_moment] = self.settings.bounds;
+        let [least_mass, least_moment] = self.bounds;
         inertial.mass.value = inertial.mass.value.max(least_mass);
-        if least_moment <= 0.0 && !self.settings.balance {
+        if least_moment <= 0.0 && !self.balance {
             return inertial;
         }
         let (mut moments, axes) = principal_axes(inertial.inertia.value);
         let is_bounded = moments.iter().any(|moment| *moment < least_moment);
         moments = moments.map(|moment| moment.max(least_moment));
         let [a, b, c] = moments;
-        let is_balanced = self.settings.balance && (a + b < c || b + c < a || c + a < b);
+        let is_balanced = self.balance && (a + b < c || b + c < a || c + a < b);
         if is_balanced {
             moments = [(a + b + c) / 3.0; 3];
         }
@@ -220,22 +239,6 @@ impl<'s> Mjcf<'s> {
             inertial.inertia.value = Sym3 { xx, xy, xz, yy, yz, zz };
         }
         inertial
-    }
-
-    /// Brings the mass of all bodies to what the compiler says.
-    pub fn scale_masses(&mut self) {
-        let Some(total) = &self.settings.total_mass else { return };
-        let inertials = || self.robot.links.iter().filter_map(|link| link.inertial.as_ref());
-        let mass = inertials().fold(Dd::ZERO, |sum, inertial| sum + Dd::from(inertial.mass.value));
-        if mass.to_f64() <= 0.0 {
-            return;
-        }
-        let factor = Dd::from(total.value) / mass;
-        let scaled = |x: f64| (Dd::from(x) * factor).to_f64();
-        for inertial in self.robot.links.iter_mut().filter_map(|link| link.inertial.as_mut()) {
-            inertial.mass.value = scaled(inertial.mass.value);
-            inertial.inertia.value = inertial.inertia.value.map(scaled);
-        }
     }
 }
 

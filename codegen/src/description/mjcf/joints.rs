@@ -171,7 +171,7 @@ impl<'s> Mjcf<'s> {
         if let (true, Some(attribute)) = (has_range, given.attribute("range")) {
             if let Some([lower, upper]) = self.some_numbers::<2>(given, "range", owner) {
                 let place = self.place(attribute);
-                let limit = |x: f64| Noted::new(if turns { self.radians(x) } else { x }, place.clone());
+                let limit = |x: f64| Noted::new(if turns { self.radians(x, attribute) } else { x }, place.clone());
                 (limits.lower, limits.upper) = (Some(limit(lower)), Some(limit(upper)));
             }
         }
@@ -190,7 +190,7 @@ impl<'s> Mjcf<'s> {
         match self.word(given, word, &["true", "false", "auto"]) {
             Some("true") => true,
             Some("false") => false,
-            _ => self.settings.autolimits && given.attribute(range).is_some(),
+            _ => self.settings[given.element.scope].autolimits && given.attribute(range).is_some(),
         }
     }
 
@@ -206,8 +206,9 @@ impl<'s> Mjcf<'s> {
             damping: self.first_number(given, "damping", owner),
             friction: self.number(given, "frictionloss", owner),
             armature: self.number(given, "armature", owner),
-            spring_rest: rest
-                .map(|rest| Noted::new(if turns { self.radians(rest.value) } else { rest.value }, rest.place)),
+            spring_rest: rest.zip(given.attribute("springref")).map(|(rest, attribute)| {
+                Noted::new(if turns { self.radians(rest.value, attribute) } else { rest.value }, rest.place)
+            }),
             spring_stiffness: stiffness,
             ..JointDrive::default()
         }

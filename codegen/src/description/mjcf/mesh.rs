@@ -6,7 +6,7 @@
 //! about that for mass and inertia: more than there is where a mesh is not convex. Both are followed.
 
 use super::classes::Defaulted;
-use super::files::{read_file, Element};
+use super::files::{read_file, Attribute, Element};
 use super::Mjcf;
 use crate::description::angle;
 use crate::description::geometry::vector;
@@ -29,13 +29,13 @@ impl<'s> Mjcf<'s> {
             self.complain_at(geom.element, messages::missing_attribute(owner, "mesh", "mesh=\"...\""));
             return None;
         };
-        let Some(element) = self.mesh_named(&name.value) else {
-            let names: Vec<String> = self.meshes().into_iter().map(|(name, _)| name).collect();
+        let Some(element) = self.mesh_named(name) else {
+            let names: Vec<String> = self.meshes(name.scope).into_iter().map(|(name, _)| name).collect();
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
             self.complain(name, messages::unknown_word(&format!("mesh of {owner}"), &name.value, &names));
             return None;
         };
-        let mesh = self.given(element, "mesh", 0);
+        let mesh = self.given_outermost(element, "mesh");
         let who = format!("mesh `{}`", name.value);
         let help = "write `<inertial>` in the body, or give the geom `mass=\"0\"`";
         let modes = &["exact", "legacy", "convex", "shell"];
@@ -48,7 +48,7 @@ impl<'s> Mjcf<'s> {
             self.refuse(element, &who, "it is made of no file", help);
             return None;
         };
-        let path = self.mesh_path(&file.value);
+        let path = self.mesh_path(file);
         let read = read_file(&path).and_then(|bytes| triangles(&path, &bytes));
         let mut faces = match read {
             Ok(faces) => faces,
@@ -65,11 +65,14 @@ impl<'s> Mjcf<'s> {
         part
     }
 
-    /// The meshes of the file with their names: that which is given, or that of the file without its end.
-    fn meshes(&self) -> Vec<(String, &'s Element)> {
+    /// The meshes of a model with their names: that which is given, or that of the file without its end.
+    fn meshes(&self, scope: usize) -> Vec<(String, &'s Element)> {
         let files = self.files;
-        let assets = files.children(files.root()).into_iter().filter(|section| section.name == "asset");
-        let meshes = assets.flat_map(|section| files.children(section)).filter(|element| element.name == "mesh");
+        let meshes = files
+            .sections(scope, "asset")
+            .into_iter()
+            .flat_map(|section| files.children(section))
+            .filter(|element| element.name == "mesh");
         let stem =
             |file: &str| Path::new(file).file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
         let name = |element: &Element| match (element.attribute("name"), element.attribute("file")) {
@@ -80,19 +83,21 @@ impl<'s> Mjcf<'s> {
         meshes.map(|element| (name(element), element)).collect()
     }
 
-    fn mesh_named(&self, name: &str) -> Option<&'s Element> {
-        self.meshes().into_iter().find(|(own, _)| own == name).map(|(_, element)| element)
+    fn mesh_named(&self, name: &Attribute) -> Option<&'s Element> {
+        self.meshes(name.scope).into_iter().find(|(own, _)| *own == name.value).map(|(_, element)| element)
     }
 
-    /// Where a file of a mesh is: in the folder of meshes, relative to that of the file that is read.
-    fn mesh_path(&self, file: &str) -> PathBuf {
-        let file = file.trim().replace('\\', "/");
-        let file = match (self.settings.strips_paths, file.rsplit_once('/')) {
+    /// Where a file of a mesh is: in the folder of meshes, relative to that of the file that is read or attached.
+    fn mesh_path(&self, named: &Attribute) -> PathBuf {
+        let settings = &self.settings[named.scope];
+        let file = named.value.trim().replace('\\', "/");
+        let file = match (settings.strips_paths, file.rsplit_once('/')) {
             (true, Some((_, name))) => name.to_string(),
             _ => file,
         };
-        let folder = Path::new(self.files.sources[0].path()).parent().map_or_else(PathBuf::new, Path::to_path_buf);
-        folder.join(self.settings.mesh_folder.unwrap_or("").replace('\\', "/")).join(file)
+        let root = self.files.root(named.scope).file;
+        let folder = Path::new(self.files.sources[root].path()).parent().map_or_else(PathBuf::new, Path::to_path_buf);
+        folder.join(settings.mesh_folder.unwrap_or("").replace('\\', "/")).join(file)
     }
 
     /// Moves a mesh as its reference pose says, and scales it.

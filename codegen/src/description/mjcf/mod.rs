@@ -1,6 +1,6 @@
 //! MJCF, the XML of MuJoCo: <https://mujoco.readthedocs.io/en/stable/XMLreference.html>.
 //!
-//! Read is what makes the equations of a tree of bodies: `compiler`, `option gravity`, `default`, `include`, bodies with their joints,
+//! Read is what makes the equations of a tree of bodies: `compiler`, `option gravity`, `default`, `include`, `attach`, bodies with their joints,
 //! inertials, sites and frames, inertias from geoms, couplings by `equality/joint`, and greatest forces of actuators. What changes the
 //! dynamics and is not read is an error; the rest is skipped and listed.
 //!
@@ -46,7 +46,8 @@ pub(super) const FORMAT: FileFormat = FileFormat {
 struct Mjcf<'s> {
     reader: FileReader<'s>,
     files: &'s Files,
-    settings: CompilerSettings<'s>,
+    /// Of each model.
+    settings: Vec<CompilerSettings<'s>>,
     classes: DefaultClasses<'s>,
     /// Names of links, joints and frames, written or made up.
     names: FreeNames,
@@ -62,7 +63,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     let mut reader = FileReader::new(&files.sources[0], diagnostics);
     // a default counts for many elements
     reader.said = Some(HashSet::new());
-    let root = files.root();
+    let root = files.root(0);
     let name = match root.attribute("model") {
         Some(model) if !model.value.trim().is_empty() => reader.value(model.value.clone(), &model.span),
         _ => reader.value("robot".to_string(), &root.tag),
@@ -70,7 +71,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
     let mut mjcf = Mjcf {
         reader,
         files: &files,
-        settings: CompilerSettings::default(),
+        settings: Vec::new(),
         classes: DefaultClasses::default(),
         names: FreeNames::default(),
         links: HashSet::new(),
@@ -78,7 +79,7 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
         joints: Vec::new(),
     };
     mjcf.collect_names();
-    mjcf.read_sections(root);
+    mjcf.read_sections();
     let mut robot = mjcf.robot;
     robot.ignored = mjcf.reader.into_ignored();
     Some(robot)
@@ -86,40 +87,48 @@ fn read(source: &Source, diagnostics: &mut Diagnostics) -> Option<Description> {
 
 impl<'s> Mjcf<'s> {
     /// Reads the sections, those first that say how others are meant.
-    fn read_sections(&mut self, root: &'s Element) {
-        let sections = self.files.children(root);
-        let of = |name: &'static str| {
-            let sections: Vec<&'s Element> = sections.iter().copied().filter(|e| e.name == name).collect();
-            sections
-        };
-        self.read_settings(&of("compiler"), &of("option"));
-        self.read_classes(&of("default"));
-        self.read_world(&of("worldbody"));
+    fn read_sections(&mut self) {
+        self.read_settings();
+        self.read_classes();
+        self.read_world();
         self.order_joints();
         self.scale_masses();
-        self.read_constraints(&of("equality"), &of("tendon"));
-        self.read_actuators(&of("actuator"));
-        for section in sections {
-            match section.name.as_str() {
-                "compiler" | "option" | "default" | "worldbody" | "equality" | "tendon" | "actuator" => {}
-                "deformable" => {
-                    for element in self.files.children(section).into_iter().filter(|e| e.name == "flex") {
-                        self.refuse(element, "the robot", "it deforms", "remove it: bodies are rigid");
-                    }
+        self.read_constraints();
+        self.read_actuators();
+        for scope in 0..self.files.scopes.len() {
+            for section in self.files.children(self.files.root(scope)) {
+                self.skip_section(section);
+            }
+        }
+    }
+
+    /// What stands in the sections of a name, of all models.
+    fn within(&self, name: &str) -> Vec<&'s Element> {
+        let files = self.files;
+        let sections = (0..files.scopes.len()).flat_map(|scope| files.sections(scope, name));
+        sections.flat_map(|section| files.children(section)).collect()
+    }
+
+    /// Lists a section that is not read, or what is not in one that is.
+    fn skip_section(&mut self, section: &'s Element) {
+        match section.name.as_str() {
+            "compiler" | "option" | "default" | "worldbody" | "equality" | "tendon" | "actuator" => {}
+            "deformable" => {
+                for element in self.files.children(section).into_iter().filter(|e| e.name == "flex") {
+                    self.refuse(element, "the robot", "it deforms", "remove it: bodies are rigid");
                 }
-                "asset" => {
-                    for element in self.files.children(section).into_iter().filter(|e| e.name != "mesh") {
-                        self.ignore(element);
-                    }
+            }
+            "asset" => {
+                let others = self.files.children(section).into_iter();
+                for element in others.filter(|e| !["mesh", "model"].contains(&e.name.as_str())) {
+                    self.ignore(element);
                 }
-                "extension" | "visual" | "statistic" | "size" | "contact" | "sensor" | "keyframe" | "custom" => {
-                    self.ignore(section);
-                }
-                _ => self.skip(
-                    section,
-                    "the robot",
-                    &["worldbody", "compiler", "default", "equality", "actuator", "tendon"],
-                ),
+            }
+            "extension" | "visual" | "statistic" | "size" | "contact" | "sensor" | "keyframe" | "custom" => {
+                self.ignore(section);
+            }
+            _ => {
+                self.skip(section, "the robot", &["worldbody", "compiler", "default", "equality", "actuator", "tendon"])
             }
         }
     }

@@ -48,20 +48,35 @@ impl Default for CompilerSettings<'_> {
 
 impl<'s> Mjcf<'s> {
     /// Reads these sections.
-    pub fn read_settings(&mut self, compilers: &[&'s Element], options: &[&'s Element]) {
-        for element in compilers {
-            self.read_compiler(element);
+    pub fn read_settings(&mut self) {
+        let files = self.files;
+        for scope in 0..files.scopes.len() {
+            self.settings.push(CompilerSettings::default());
+            files.sections(scope, "compiler").into_iter().for_each(|element| self.read_compiler(element));
         }
-        for element in options {
-            self.read_option(element);
+        files.sections(0, "option").into_iter().for_each(|element| self.read_option(element));
+        for scope in 1..files.scopes.len() {
+            files.sections(scope, "option").into_iter().for_each(|element| self.read_option_of_attached(element));
         }
+    }
+
+    /// What bodies move in is what the file says that attaches them.
+    fn read_option_of_attached(&mut self, element: &'s Element) {
+        let gravity = self.robot.gravity.as_ref().map_or([0.0, 0.0, -9.81], |gravity| gravity.value);
+        let own = self.some_numbers::<3>(&Defaulted::alone(element), "gravity", "the option");
+        if own.is_some_and(|own| own != gravity) {
+            let (why, help) =
+                ("the gravity of the file that attaches the model acts", "write the same gravity in both");
+            self.refuse_attribute(element, "gravity", "the option of an attached model", why, help);
+        }
+        self.ignore_as("option of an attached model", element);
     }
 
     fn read_compiler(&mut self, element: &'s Element) {
         self.check_attributes(element, "the compiler", vocabulary::COMPILER);
         let given = Defaulted::alone(element);
         if let Some(word) = self.word(&given, "angle", &["degree", "radian"]) {
-            self.settings.angle = if word == "degree" { AngleUnit::Degree } else { AngleUnit::Radian };
+            self.settings[element.scope].angle = if word == "degree" { AngleUnit::Degree } else { AngleUnit::Radian };
         }
         if let Some("global") = self.word(&given, "coordinate", &["local", "global"]) {
             let help = "save the model with local coordinates first";
@@ -70,32 +85,34 @@ impl<'s> Mjcf<'s> {
         if let Some(attribute) = element.attribute("eulerseq") {
             let axes: Vec<char> = attribute.value.trim().chars().collect();
             match axes[..] {
-                [a, b, c] if axes.iter().all(|axis| "xyzXYZ".contains(*axis)) => self.settings.euler = [a, b, c],
+                [a, b, c] if axes.iter().all(|axis| "xyzXYZ".contains(*axis)) => {
+                    self.settings[element.scope].euler = [a, b, c]
+                }
                 _ => self
                     .complain(attribute, messages::unknown_word("eulerseq", &attribute.value, &["xyz", "XYZ", "zyx"])),
             }
         }
         if let Some(autolimits) = self.flag(&given, "autolimits") {
-            self.settings.autolimits = autolimits;
+            self.settings[element.scope].autolimits = autolimits;
         }
         if let Some(word) = self.word(&given, "inertiafromgeom", &["false", "true", "auto"]) {
-            self.settings.inertia_from_geoms = if word == "auto" { None } else { Some(word == "true") };
+            self.settings[element.scope].inertia_from_geoms = if word == "auto" { None } else { Some(word == "true") };
         }
         if let Some([a, b]) = self.some_numbers(&given, "inertiagrouprange", "the compiler") {
-            self.settings.groups = [a, b];
+            self.settings[element.scope].groups = [a, b];
         }
         for (i, name) in ["boundmass", "boundinertia"].into_iter().enumerate() {
             if let Some([bound]) = self.some_numbers(&given, name, "the compiler") {
-                self.settings.bounds[i] = bound;
+                self.settings[element.scope].bounds[i] = bound;
             }
         }
         if let Some(balance) = self.flag(&given, "balanceinertia") {
-            self.settings.balance = balance;
+            self.settings[element.scope].balance = balance;
         }
         if let (Some([mass]), Some(attribute)) =
             (self.some_numbers(&given, "settotalmass", "the compiler"), element.attribute("settotalmass"))
         {
-            self.settings.total_mass = (mass > 0.0).then(|| Noted::new(mass, self.place(attribute)));
+            self.settings[element.scope].total_mass = (mass > 0.0).then(|| Noted::new(mass, self.place(attribute)));
         }
         if self.flag(&given, "alignfree") == Some(true) {
             let help = "remove it: coordinates are then those of the body frame as it is written";
@@ -108,10 +125,11 @@ impl<'s> Mjcf<'s> {
             );
         }
         if let Some(strips) = self.flag(&given, "strippath") {
-            self.settings.strips_paths = strips;
+            self.settings[element.scope].strips_paths = strips;
         }
         let folder = element.attribute("meshdir").or(element.attribute("assetdir"));
-        self.settings.mesh_folder = folder.map(|folder| folder.value.as_str()).or(self.settings.mesh_folder);
+        self.settings[element.scope].mesh_folder =
+            folder.map(|folder| folder.value.as_str()).or(self.settings[element.scope].mesh_folder);
     }
 
     fn read_option(&mut self, element: &'s Element) {
@@ -131,22 +149,29 @@ impl<'s> Mjcf<'s> {
                 let place = self.tag(flags);
                 self.robot.gravity = Some(Noted::new([0.0; 3], place));
             }
-            for (name, what) in [
-                ("equality", "couplings would not act"),
-                ("frictionloss", "friction would not act"),
-                ("constraint", "couplings and friction would not act"),
+            let couplings =
+                self.files.elements.iter().any(|e| e.name == "equality" && !self.files.children(e).is_empty());
+            let (friction, stiffness, damping) =
+                (self.is_said("frictionloss"), self.is_said("stiffness"), self.is_said("damping"));
+            for (name, what, would) in [
+                ("equality", "couplings would not act", couplings),
+                ("frictionloss", "friction would not act", friction),
+                ("constraint", "couplings and friction would not act", couplings || friction),
+                ("passive", "springs and dampers would not act", stiffness || damping),
+                ("spring", "springs would not act", stiffness),
+                ("damper", "dampers would not act", damping),
             ] {
-                if let Some("disable") = self.word(&flag, name, &["enable", "disable"]) {
+                if self.word(&flag, name, &["enable", "disable"]) == Some("disable") && would {
                     let help = "remove the flag, and what it switches off where that is not meant";
                     self.refuse_attribute(flags, name, "the option", what, help);
                 }
             }
-            for name in ["passive", "spring", "damper"] {
-                if let Some("disable") = self.word(&flag, name, &["enable", "disable"]) {
-                    let help = "remove the flag, and stiffness and damping where they are not meant";
-                    self.refuse_attribute(flags, name, "the option", "springs and dampers would not act", help);
-                }
-            }
         }
+    }
+
+    /// Whether an element has something else than zeros of a name.
+    fn is_said(&self, name: &str) -> bool {
+        let numbers = |value: &str| value.split_whitespace().any(|x| x.parse() != Ok(0.0));
+        self.files.elements.iter().any(|e| e.attribute(name).is_some_and(|attribute| numbers(&attribute.value)))
     }
 }

@@ -26,3 +26,5 @@ pub(super) const COMPILER: &str =
 pub(super) const EQUALITY: &str = "active class joint1 joint2 name polycoef solimp solref";
 /// Of a connection of two bodies.
 pub(super) const CONNECT: &str = "active anchor body1 body2 class name site1 site2 solimp solref";
+/// Of what attaches another model.
+pub(super) const ATTACH: &str = "body model prefix";
