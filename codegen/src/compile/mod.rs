@@ -7,6 +7,7 @@ mod programs;
 pub use prepare::examine;
 
 use crate::description::{messages, Description};
+use crate::diagnostic::fnv_1a;
 use crate::diagnostic::{Diagnostic, Diagnostics, Source};
 use crate::emit::c99::C99_SOURCE;
 use crate::emit::generated::generate;
@@ -14,7 +15,6 @@ use crate::emit::package::PackageKind;
 use crate::emit::Generated;
 use crate::equations::Robot;
 use crate::function::Function;
-use crate::options::stable::fnv_1a;
 use crate::options::Options;
 use crate::program::equivalence::Disagreement;
 use crate::program::fixed::fixed_functions;
@@ -88,7 +88,7 @@ fn compile_and_explain(source: &Source, options: &Options, explained: bool) -> R
 
 fn compile_in_one_scalar(source: &Source, options: &Options, explained: bool) -> Result<Generated, Diagnostics> {
     let Prepared { description, whole, model, frames, options, resolved, mut diagnostics } = prepare(source, options)?;
-    let hash = hash(source.text(), &resolved);
+    let hash = hash(source.text(), &diagnostics, &resolved);
     let robot = Robot::new(model).knowing_base_parameters(&resolved.functions, &resolved.scene);
     let is_empty = |f: &Function| f.is_per_frame() && resolved.scene.frames_of(*f, &frames).is_empty();
     let functions: Vec<Function> = resolved.functions.iter().copied().filter(|f| !is_empty(f)).collect();
@@ -168,7 +168,8 @@ fn only(error: Diagnostic) -> Diagnostics {
     all
 }
 
-/// Over everything that the output depends on.
-fn hash(text: &str, options: &Options) -> u64 {
-    fnv_1a([text, "\0", crate::VERSION, "\0", &options.hashed()].concat().bytes())
+/// Over everything that the output depends on: the robot file and those that it names, and the options.
+fn hash(text: &str, said: &Diagnostics, options: &Options) -> u64 {
+    let sums: String = said.named_files().map(|(_, sum)| format!("{sum:016x}\0")).collect();
+    fnv_1a([text, "\0", &sums, crate::VERSION, "\0", &options.hashed()].concat().bytes())
 }

@@ -11,11 +11,12 @@ mod source;
 pub mod wording;
 
 pub use levels::{Front, Level, Levels, Reporting};
-pub use source::{Place, Source};
+pub use source::{fnv_1a, Place, Source};
 
 use annotate_snippets::renderer::DecorStyle;
 use annotate_snippets::{AnnotationKind, Group, Level as Shown, Origin, Renderer, Snippet};
 use std::fmt;
+use std::path::{Path, PathBuf};
 
 /// A longer line is not shown with its complaint.
 const LONGEST_LINE_SHOWN: usize = 400;
@@ -190,6 +191,8 @@ impl Diagnostic {
 pub struct Diagnostics {
     list: Vec<Diagnostic>,
     sources: Vec<Source>,
+    /// Files that the one that is read names, with sums of their bytes.
+    named_files: Vec<(PathBuf, u64)>,
     /// How often each code was pushed, in the order of their first complaints.
     counts: Vec<(&'static str, usize)>,
     reporting: Reporting,
@@ -217,6 +220,18 @@ impl Diagnostics {
         if self.source(source.path()).is_none() {
             self.sources.push(source.clone());
         }
+    }
+
+    /// Remembers a file that the one that is read names, such as one that it includes or a mesh: the result depends on it.
+    pub fn note_file(&mut self, file: &Path, bytes: &[u8]) {
+        if !self.named_files.iter().any(|(known, _)| known == file) {
+            self.named_files.push((file.to_path_buf(), fnv_1a(bytes.iter().copied())));
+        }
+    }
+
+    /// The files that the one that was read names, with sums of their bytes.
+    pub fn named_files(&self) -> impl Iterator<Item = (&Path, u64)> {
+        self.named_files.iter().map(|(file, sum)| (file.as_path(), *sum))
     }
 
     /// The sources that are known.
@@ -248,6 +263,11 @@ impl Diagnostics {
     pub fn extend(&mut self, other: Diagnostics) {
         for source in &other.sources {
             self.add_source(source);
+        }
+        for (file, sum) in other.named_files {
+            if !self.named_files.iter().any(|(known, _)| *known == file) {
+                self.named_files.push((file, sum));
+            }
         }
         for diagnostic in other.list {
             self.push(diagnostic);

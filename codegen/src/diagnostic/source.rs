@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::ops::Range;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Distance of the marks from which columns are counted \[bytes\].
@@ -22,6 +23,8 @@ pub struct Source {
 #[derive(Debug)]
 struct SourceInner {
     path: Arc<str>,
+    /// Where it was read, if not at `path`.
+    file: Option<PathBuf>,
     text: String,
     invalid_utf8: Option<usize>,
     line_starts: Vec<usize>,
@@ -50,6 +53,13 @@ impl Source {
         }
     }
 
+    /// As [`Source::from_bytes`], of a file that complaints name by another path: what it names itself is looked for beside the file.
+    pub fn of_file(path: &str, bytes: impl Into<Vec<u8>>, file: &Path) -> Source {
+        let Source { inner } = Source::from_bytes(path, bytes);
+        let inner = Arc::into_inner(inner).expect("nobody else has it yet");
+        Source { inner: Arc::new(SourceInner { file: Some(file.to_path_buf()), ..inner }) }
+    }
+
     fn build(path: &str, text: String, invalid_utf8: Option<usize>) -> Source {
         let bytes = text.as_bytes();
         let mut line_starts = vec![0];
@@ -69,12 +79,19 @@ impl Source {
         if bytes.len().is_multiple_of(MARK) {
             marks.push(characters);
         }
-        Source { inner: Arc::new(SourceInner { path: path.into(), text, invalid_utf8, line_starts, marks }) }
+        Source {
+            inner: Arc::new(SourceInner { path: path.into(), file: None, text, invalid_utf8, line_starts, marks }),
+        }
     }
 
     /// The path under which complaints name it.
     pub fn path(&self) -> &str {
         &self.inner.path
+    }
+
+    /// Where it was read.
+    pub fn file(&self) -> &Path {
+        self.inner.file.as_deref().unwrap_or_else(|| Path::new(self.path()))
     }
 
     /// The text, without a byte order mark.
@@ -148,4 +165,11 @@ impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:{}:{}", self.file, self.line, self.column)
     }
+}
+
+/// A hash of bytes that is the same in every version and on every machine: FNV-1a.
+pub fn fnv_1a(bytes: impl IntoIterator<Item = u8>) -> u64 {
+    bytes
+        .into_iter()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }

@@ -162,7 +162,7 @@ impl Builder {
     ) -> Result<Generated, Error> {
         let read = |file: &Path, shown: &Path| {
             let bytes = std::fs::read(file).map_err(|e| Error::Read(file.to_path_buf(), e))?;
-            Ok(Source::from_bytes(&shown.display().to_string(), bytes))
+            Ok(Source::of_file(&shown.display().to_string(), bytes, file))
         };
         let source = read(robot, &self.robot)?;
         let file = match (scene, &self.scene_file) {
@@ -172,7 +172,11 @@ impl Builder {
         let reporting = Reporting { front: Front::Builder, ..Reporting::default() };
         let mut options = file.with(&self.settings, Options { reporting, ..Options::default() });
         options.scene.places.keep_further(self.wrong.iter().cloned());
-        let generated = compile(&source, &options).map_err(|diagnostics| {
+        let compiled = compile(&source, &options);
+        let said = compiled.as_ref().map_or_else(|diagnostics| diagnostics, |generated| &generated.warnings);
+        let further: Vec<PathBuf> = said.named_files().map(|(file, _)| file.to_path_buf()).collect();
+        messages.cargo.extend(further.iter().map(|file| format!("cargo::rerun-if-changed={}", file.display())));
+        let generated = compiled.map_err(|diagnostics| {
             messages.tell(&diagnostics);
             let of_robot = diagnostics.iter().any(|d| d.place.as_ref().is_none_or(|p| *p.file == *source.path()));
             let path = self.scene_file.as_ref().filter(|_| !of_robot).unwrap_or(&self.robot).clone();
@@ -185,7 +189,8 @@ impl Builder {
             return Err(Error::Module(module));
         }
         let file = out_dir.join(format!("{module}.rs"));
-        write_file_apart(&file, &generated.text, [robot].into_iter().chain(scene)).map_err(Error::Write)?;
+        let inputs = [robot].into_iter().chain(scene).chain(further.iter().map(PathBuf::as_path));
+        write_file_apart(&file, &generated.text, inputs).map_err(Error::Write)?;
         Ok(generated)
     }
 }

@@ -50,7 +50,7 @@ pub fn expand(robot: &str, scene: Option<&SceneOf>, directories: &[&Path], own: 
     let mut files = Vec::new();
     let opened = open(robot, scene, directories, &mut files);
     let text = scene_text(scene, &opened);
-    match opened.map_err(|(refusal, _)| refusal).and_then(|opened| compiled(&opened, own)) {
+    match opened.map_err(|(refusal, _)| refusal).and_then(|opened| compiled(&opened, own, &mut files)) {
         Ok((warnings, generated, associated)) => {
             Expansion { files, result: Ok((generated, associated)), warnings, scene: text }
         }
@@ -72,7 +72,8 @@ pub fn examine(
         Err((refusal, _)) => Some(refusal),
         Ok(opened) => {
             let found = compile::examine(&opened.robot, &opened.options(own));
-            found.has_errors().then(|| refusal(&found, opened.robot.path(), opened.within()))
+            files.extend(found.named_files().filter_map(|(file, _)| file.canonicalize().ok()));
+            found.has_errors().then(|| refusal(&found, &opened))
         }
     };
     (files, refusal, text)
@@ -130,16 +131,24 @@ fn scene_text(scene: Option<&SceneOf>, opened: &Result<Opened, (Refusal, Option<
 }
 
 /// Warnings, dynamics and associated items, or what is wrong.
-fn compiled(opened: &Opened, own: &GivenOptions) -> Result<(String, Generated, String), Refusal> {
+fn compiled(
+    opened: &Opened,
+    own: &GivenOptions,
+    files: &mut Vec<PathBuf>,
+) -> Result<(String, Generated, String), Refusal> {
     let (robot, options) = (&opened.robot, opened.options(own));
-    let generated = compile::compile(robot, &options)
-        .map_err(|diagnostics| refusal(&diagnostics, robot.path(), opened.within()))?;
+    let compiled = compile::compile(robot, &options);
+    let said = compiled.as_ref().map_or_else(|diagnostics| diagnostics, |generated| &generated.warnings);
+    files.extend(said.named_files().filter_map(|(file, _)| file.canonicalize().ok()));
+    let generated = compiled.map_err(|diagnostics| refusal(&diagnostics, opened))?;
     let associated = associated_items(&generated, &options.scene);
     Ok((generated.warnings.at_least(Severity::Warning).render(), generated, associated))
 }
 
-/// What is wrong with the robot file of that path and its scene, which stands `within` the macro or in another file.
-fn refusal(diagnostics: &Diagnostics, robot: &str, within: Option<&str>) -> Refusal {
+/// What is wrong with the robot file and its scene, which stands in the macro or in another file.
+fn refusal(diagnostics: &Diagnostics, opened: &Opened) -> Refusal {
+    let within = opened.within();
+    let scene = opened.scene.as_ref().map(Source::path);
     let file = |d: &Diagnostic| d.place.as_ref().map(|place| place.file.clone());
     let is_within = |d: &Diagnostic| within.is_some() && file(d).as_deref() == within;
     let errors = || diagnostics.iter().filter(|d| d.severity == Severity::Error);
@@ -147,7 +156,7 @@ fn refusal(diagnostics: &Diagnostics, robot: &str, within: Option<&str>) -> Refu
     if errors().all(is_within) && !of_scene.is_empty() {
         return Refusal { message: String::new(), of_scene };
     }
-    let is_of_scene = |d: &Diagnostic| file(d).is_some_and(|file| *file != *robot);
+    let is_of_scene = |d: &Diagnostic| file(d).is_some_and(|file| scene == Some(&*file));
     let what = if errors().all(is_of_scene) && diagnostics.has_errors() { "scene" } else { "robot file" };
     let rest = diagnostics.at_least(Severity::Warning).without(is_within);
     Refusal { message: format!("the {what} is wrong\n{}", rest.render().trim_end()), of_scene }
@@ -163,6 +172,7 @@ fn found(what: &str, name: &str, directories: &[&Path], files: &mut Vec<PathBuf>
         return Err(message);
     };
     let bytes = std::fs::read(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+    let source = Source::of_file(name, bytes, &file);
     files.push(file);
-    Ok(Source::from_bytes(name, bytes))
+    Ok(source)
 }

@@ -28,13 +28,6 @@ use straightline_core::contact::Coordinate;
 use straightline_graph::certify::Effort;
 use straightline_graph::schedule::ScheduleLimits;
 
-/// A hash of bytes that is the same in every version and on every machine: FNV-1a.
-pub fn fnv_1a(bytes: impl IntoIterator<Item = u8>) -> u64 {
-    bytes
-        .into_iter()
-        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
-}
-
 /// What has such a text.
 pub(crate) trait Stable {
     /// Appends it.

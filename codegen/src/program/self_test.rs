@@ -6,9 +6,9 @@
 
 use super::input_box::input_box;
 use super::written::{AllWritten, WrittenFunction, WrittenParameter};
+use crate::diagnostic::fnv_1a;
 use crate::function::Quantity;
 use crate::model::states::BODY;
-use crate::options::stable::fnv_1a;
 use crate::scene::Scene;
 use straightline_core::model::Model;
 use straightline_core::Dd;

@@ -54,6 +54,39 @@ fn errors_reach_cargo_in_one_line_each_and_people_with_the_source_line() {
     assert!(!here.join("pen.rs").exists());
 }
 
+/// The corners of a tetrahedron.
+const HULL: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+#[test]
+fn cargo_knows_the_files_that_a_robot_file_names() {
+    let here = scratch("named", PENDULUM);
+    let file = |name: &str, text: &str| fs::write(here.join(name), text).unwrap();
+    file("hull.obj", HULL);
+    file("rod.xml", "<mujocoinclude><geom type=\"mesh\" mesh=\"hull\" density=\"7\"/></mujocoinclude>");
+    file("hand.xml", "<mujoco><worldbody><body name=\"hand\"><joint name=\"wrist\"/><geom size=\"0.1\" pos=\"1 0 0\"/></body></worldbody></mujoco>");
+    file(
+        "arm.xml",
+        "<mujoco><asset><mesh name=\"hull\" file=\"hull.obj\"/><model name=\"hand\" file=\"hand.xml\"/></asset><worldbody><body name=\"rod\">\
+         <joint name=\"pivot\" axis=\"0 1 0\"/><include file=\"rod.xml\"/><attach model=\"hand\" prefix=\"left_\"/></body></worldbody></mujoco>",
+    );
+    let run = || Builder::new("arm.xml").functions([Function::GravityForce]).run(&here, &here);
+    let first = run();
+    let mut watched: Vec<String> =
+        first.cargo.iter().filter(|line| line.starts_with("cargo::rerun")).cloned().collect();
+    watched.sort();
+    let names = ["arm.xml", "hand.xml", "hull.obj", "rod.xml"];
+    assert_eq!(watched, names.map(|name| format!("cargo::rerun-if-changed={}", here.join(name).display())));
+    // each of them makes the text another one
+    let text = first.result.unwrap().text;
+    for (name, old, new) in [("hull.obj", "0 0 1", "0 0 2"), ("rod.xml", "7", "8"), ("hand.xml", "0.1", "0.2")] {
+        let before = fs::read_to_string(here.join(name)).unwrap();
+        file(name, &before.replacen(old, new, 1));
+        assert_ne!(run().result.unwrap().text, text, "{name}");
+        file(name, &before);
+    }
+    assert_eq!(run().result.unwrap().text, text);
+}
+
 #[test]
 fn a_scene_file_says_what_is_wanted_and_is_an_input_of_the_build() {
     let here = scratch("scene", PENDULUM);

@@ -46,6 +46,28 @@ fn the_first_directory_that_has_the_file_counts() {
     assert!(items.contains("#[doc(alias(\"CRBA\", "), "{items}");
 }
 
+/// A robot file includes what stands beside it, wherever the compiler of Rust runs.
+#[test]
+fn files_that_a_robot_file_names_stand_beside_it_and_are_known() {
+    let here = scratch("included", CART);
+    let part =
+        "<mujocoinclude><body name=\"a\"><joint name=\"j\"/><geom size=\"0.1\" pos=\"1 0 0\"/></body></mujocoinclude>";
+    std::fs::write(here.join("part.xml"), part).unwrap();
+    std::fs::write(here.join("arm.xml"), "<mujoco><worldbody><include file=\"part.xml\"/></worldbody></mujoco>")
+        .unwrap();
+    let own = || expand("arm.xml", None, &[&here], &GivenOptions::default());
+    let expansion = own();
+    assert_eq!(expansion.files, [here.join("arm.xml"), here.join("part.xml")]);
+    assert!(expansion.result.is_ok());
+    // what is wrong there is wrong with the robot, and named as the robot file is
+    std::fs::write(here.join("part.xml"), part.replace("0.1", "0,1")).unwrap();
+    let expansion = own();
+    assert_eq!(expansion.files, [here.join("arm.xml"), here.join("part.xml")]);
+    let message = expansion.result.unwrap_err().message;
+    assert!(message.starts_with("the robot file is wrong\n"), "{message}");
+    assert!(message.contains("--> part.xml:1:"), "{message}");
+}
+
 #[test]
 fn frames_are_constants_and_pose_asks_for_poses_of_all_frames() {
     let here = scratch("frames", CART);

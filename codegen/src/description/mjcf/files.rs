@@ -209,16 +209,16 @@ impl Files {
             diagnostics.push(messages::missing_attribute("<include>", "file", example).at(&place));
             return None;
         }
-        let (path, name, place) = self.path_in(element)?;
+        let named = self.path_in(element)?;
         let is_of_scope = |file: usize| self.elements.iter().any(|own| own.file == file && own.scope == scope);
         let problem = if self.sources.len() > MOST_FILES {
             Some(format!("no robot includes more than {MOST_FILES} files"))
-        } else if self.known(&path).is_some_and(is_of_scope) {
+        } else if self.known(&named.file).is_some_and(is_of_scope) {
             Some("it is included already, or includes itself".to_string())
         } else {
             None
         };
-        let file = self.source((&path, &name, &place), problem, diagnostics)?;
+        let file = self.source(&named, problem, diagnostics)?;
         self.add(file, scope, diagnostics)
     }
 
@@ -242,7 +242,7 @@ impl Files {
             diagnostics.push(messages::unknown_word("model of <attach>", &named.value, &names).at(&place));
             return None;
         };
-        let Some((path, name, place)) = self.path_in(model.index) else {
+        let Some(of_model) = self.path_in(model.index) else {
             let place = self.sources[model.file].place(model.tag.clone());
             let example = "<model name=\"arm\" file=\"arm.xml\"/>";
             diagnostics.push(messages::missing_attribute("<model>", "file", example).at(&place));
@@ -252,7 +252,7 @@ impl Files {
         let prefix = format!("{}{own_prefix}", self.scopes[own.scope].prefix);
         let problem = (self.scopes.len() > MOST_FILES)
             .then(|| format!("no robot attaches more than {MOST_FILES} models: does one attach itself?"));
-        let file = self.source((&path, &name, &place), problem, diagnostics)?;
+        let file = self.source(&of_model, problem, diagnostics)?;
         self.scopes.push(Scope { root: 0, prefix });
         let scope = self.scopes.len() - 1;
         match self.add(file, scope, diagnostics) {
@@ -267,22 +267,25 @@ impl Files {
         }
     }
 
-    /// Where the file is that an element names, how it names it, and where that stands.
-    fn path_in(&self, element: usize) -> Option<(PathBuf, String, Place)> {
+    /// The file that an element names.
+    fn path_in(&self, element: usize) -> Option<NamedFile> {
         let own = &self.elements[element];
         let named = own.attribute("file")?;
         let place = self.sources[own.file].place(named.span.clone());
-        let folder =
-            |file: usize| Path::new(self.sources[file].path()).parent().map_or_else(PathBuf::new, Path::to_path_buf);
         let name = named.value.trim().replace('\\', "/");
-        let candidates = [folder(self.root(own.scope).file).join(&name), folder(own.file).join(&name)];
-        let path = candidates.iter().find(|path| path.is_file()).unwrap_or(&candidates[0]).clone();
-        Some((path, name, place))
+        let beside = |file: usize| {
+            let source = &self.sources[file];
+            let [file, shown] = [source.file(), Path::new(source.path())].map(|own| own.with_file_name(&name));
+            NamedFile { file, shown, name: name.clone(), place: place.clone() }
+        };
+        let candidates = [beside(self.root(own.scope).file), beside(own.file)];
+        let found = candidates.iter().find(|candidate| candidate.file.is_file()).unwrap_or(&candidates[0]);
+        Some(found.clone())
     }
 
     /// The source that was read from a file.
     fn known(&self, path: &Path) -> Option<usize> {
-        let same = |source: &Source| match (std::fs::canonicalize(source.path()), std::fs::canonicalize(path)) {
+        let same = |source: &Source| match (std::fs::canonicalize(source.file()), std::fs::canonicalize(path)) {
             (Ok(a), Ok(b)) => a == b,
             _ => false,
         };
@@ -290,22 +293,19 @@ impl Files {
     }
 
     /// The source of a file, which is read unless it was, or has a problem.
-    fn source(
-        &mut self,
-        (path, name, place): (&Path, &str, &Place),
-        problem: Option<String>,
-        diagnostics: &mut Diagnostics,
-    ) -> Option<usize> {
-        if let (None, Some(known)) = (&problem, self.known(path)) {
+    fn source(&mut self, named: &NamedFile, problem: Option<String>, diagnostics: &mut Diagnostics) -> Option<usize> {
+        let NamedFile { file, shown, name, place } = named;
+        if let (None, Some(known)) = (&problem, self.known(file)) {
             return Some(known);
         }
-        match problem.map_or_else(|| read_file(path), Err) {
+        match problem.map_or_else(|| read_file(file), Err) {
             Err(why) => {
                 diagnostics.push(messages::include_failed(name, &why).at(place));
                 None
             }
             Ok(bytes) => {
-                let source = Source::from_bytes(&path.to_string_lossy(), bytes);
+                diagnostics.note_file(file, &bytes);
+                let source = Source::of_file(&shown.to_string_lossy(), bytes, file);
                 diagnostics.add_source(&source);
                 self.sources.push(source);
                 let file = self.sources.len() - 1;
@@ -317,6 +317,19 @@ impl Files {
             }
         }
     }
+}
+
+/// A file that an element names.
+#[derive(Clone)]
+struct NamedFile {
+    /// Where it is.
+    file: PathBuf,
+    /// By which path complaints name it.
+    shown: PathBuf,
+    /// How the element names it.
+    name: String,
+    /// Where it does.
+    place: Place,
 }
 
 /// The bytes of a file, or why there are none.

@@ -49,7 +49,9 @@ impl<'s> Mjcf<'s> {
             return None;
         };
         let path = self.mesh_path(file);
-        let read = read_file(&path).and_then(|bytes| triangles(&path, &bytes));
+        let bytes = read_file(&path);
+        bytes.iter().for_each(|bytes| self.reader.diagnostics.note_file(&path, bytes));
+        let read = bytes.and_then(|bytes| triangles(&path, &bytes));
         let mut faces = match read {
             Ok(faces) => faces,
             Err(why) => {
@@ -96,7 +98,7 @@ impl<'s> Mjcf<'s> {
             _ => file,
         };
         let root = self.files.root(named.scope).file;
-        let folder = Path::new(self.files.sources[root].path()).parent().map_or_else(PathBuf::new, Path::to_path_buf);
+        let folder = self.files.sources[root].file().parent().map_or_else(PathBuf::new, Path::to_path_buf);
         folder.join(settings.mesh_folder.unwrap_or("").replace('\\', "/")).join(file)
     }
 

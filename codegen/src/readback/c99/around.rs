@@ -2,9 +2,9 @@
 
 use super::tokens::CText;
 use super::{c_name, c_scalar, defined, CFunction, CStorage};
+use crate::diagnostic::fnv_1a;
 use crate::emit::c99::KERNEL;
 use crate::emit::Generated;
-use crate::options::stable::fnv_1a;
 use crate::program::written::{DriveNumbers, WrittenParameter};
 use crate::readback::values::TextFormat;
 use crate::readback::ReadingStop;
