@@ -34,7 +34,7 @@ fn state(model: &Model<Dd>, shift: f64) -> [Vec<Dd>; 3] {
     let own = |n: usize, phase: f64| (0..n).map(|i| Dd::from((1.3 * i as f64 + phase).sin())).collect::<Vec<_>>();
     let mut q = own(model.nq(), 0.4);
     q.iter_mut().for_each(|q| *q += Dd::from(shift));
-    model.bodies.iter().for_each(|b| b.joint.kind.normalise(&mut q[b.joint.iq..b.joint.iq + b.joint.kind.nq()]));
+    model.free_joints().for_each(|joint| joint.kind.normalise(&mut q[joint.iq..joint.iq + joint.kind.nq()]));
     [q, own(model.nv(), 1.1), own(model.nv(), 2.3)]
 }
 

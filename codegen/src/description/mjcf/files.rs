@@ -80,7 +80,7 @@ impl Element {
 
 /// A model: that which is read, or one that is attached.
 #[derive(Clone)]
-pub(super) struct Scope {
+pub(super) struct ModelScope {
     root: usize,
     /// What stands before its names.
     pub prefix: String,
@@ -93,13 +93,13 @@ pub(super) struct Files {
     /// All elements; the first one is the root of the first file.
     pub elements: Vec<Element>,
     /// The models; the first one is that which is read.
-    pub scopes: Vec<Scope>,
+    pub scopes: Vec<ModelScope>,
 }
 
 impl Files {
     /// Reads a file and what it includes and attaches; `None` if it is no MJCF.
     pub fn load(source: &Source, diagnostics: &mut Diagnostics) -> Option<Files> {
-        let scopes = vec![Scope { root: 0, prefix: String::new() }];
+        let scopes = vec![ModelScope { root: 0, prefix: String::new() }];
         let mut files = Files { sources: vec![source.clone()], elements: Vec::new(), scopes };
         files.add(0, 0, diagnostics)?;
         // models are named in files that may be included
@@ -253,7 +253,7 @@ impl Files {
         let problem = (self.scopes.len() > MOST_FILES)
             .then(|| format!("no robot attaches more than {MOST_FILES} models: does one attach itself?"));
         let file = self.source(&of_model, problem, diagnostics)?;
-        self.scopes.push(Scope { root: 0, prefix });
+        self.scopes.push(ModelScope { root: 0, prefix });
         let scope = self.scopes.len() - 1;
         match self.add(file, scope, diagnostics) {
             Some(root) => {

@@ -172,6 +172,7 @@ impl<'s> Mjcf<'s> {
     /// Whether an element has something else than zeros of a name.
     fn is_said(&self, name: &str) -> bool {
         let numbers = |value: &str| value.split_whitespace().any(|x| x.parse() != Ok(0.0));
-        self.files.elements.iter().any(|e| e.attribute(name).is_some_and(|attribute| numbers(&attribute.value)))
+        let mut elements = self.files.elements.iter().filter(|e| e.name != "flag");
+        elements.any(|e| e.attribute(name).is_some_and(|attribute| numbers(&attribute.value)))
     }
 }
