@@ -323,7 +323,8 @@ pub fn wrong_type(what: &str, expected: &str, found: &str) -> D {
 /// A word that is none of those that are known.
 pub fn unknown_word(what: &str, word: &str, known: &[&str]) -> D {
     let d = D::error("unknown-word", format!("{what}: `{}` is unknown", cut(word)));
-    let known_words = format!("known: {}", known.join(", "));
+    let known_words =
+        if known.is_empty() { "there is none".to_string() } else { format!("known: {}", known.join(", ")) };
     match did_you_mean(word, known.iter().copied()) {
         Some(hint) => d.detail(known_words).help(hint),
         None => d.help(known_words),

@@ -190,12 +190,18 @@ impl Diagnostic {
 #[derive(Clone, Debug, Default)]
 pub struct Diagnostics {
     list: Vec<Diagnostic>,
-    sources: Vec<Source>,
-    /// Files that the one that is read names, with sums of their bytes.
-    named_files: Vec<(PathBuf, u64)>,
+    read: Box<FilesRead>,
     /// How often each code was pushed, in the order of their first complaints.
     counts: Vec<(&'static str, usize)>,
     reporting: Reporting,
+}
+
+/// What was read.
+#[derive(Clone, Debug, Default)]
+struct FilesRead {
+    sources: Vec<Source>,
+    /// Files that the one that is read names, with sums of their bytes.
+    named: Vec<(PathBuf, u64)>,
 }
 
 impl Diagnostics {
@@ -218,30 +224,30 @@ impl Diagnostics {
     /// Makes a source known, so that its lines can be shown.
     pub fn add_source(&mut self, source: &Source) {
         if self.source(source.path()).is_none() {
-            self.sources.push(source.clone());
+            self.read.sources.push(source.clone());
         }
     }
 
     /// Remembers a file that the one that is read names, such as one that it includes or a mesh: the result depends on it.
     pub fn note_file(&mut self, file: &Path, bytes: &[u8]) {
-        if !self.named_files.iter().any(|(known, _)| known == file) {
-            self.named_files.push((file.to_path_buf(), fnv_1a(bytes.iter().copied())));
+        if !self.read.named.iter().any(|(known, _)| known == file) {
+            self.read.named.push((file.to_path_buf(), fnv_1a(bytes.iter().copied())));
         }
     }
 
     /// The files that the one that was read names, with sums of their bytes.
     pub fn named_files(&self) -> impl Iterator<Item = (&Path, u64)> {
-        self.named_files.iter().map(|(file, sum)| (file.as_path(), *sum))
+        self.read.named.iter().map(|(file, sum)| (file.as_path(), *sum))
     }
 
     /// The sources that are known.
     pub fn sources(&self) -> impl Iterator<Item = &Source> {
-        self.sources.iter()
+        self.read.sources.iter()
     }
 
     /// The source of that path.
     pub fn source(&self, path: &str) -> Option<&Source> {
-        self.sources.iter().find(|s| s.path() == path)
+        self.read.sources.iter().find(|s| s.path() == path)
     }
 
     /// Adds a complaint. Of one code, [`Diagnostics::SHOWN_PER_CODE`] are kept and the others counted.
@@ -261,12 +267,12 @@ impl Diagnostics {
 
     /// Adds all of `other`.
     pub fn extend(&mut self, other: Diagnostics) {
-        for source in &other.sources {
+        for source in &other.read.sources {
             self.add_source(source);
         }
-        for (file, sum) in other.named_files {
-            if !self.named_files.iter().any(|(known, _)| *known == file) {
-                self.named_files.push((file, sum));
+        for (file, sum) in other.read.named {
+            if !self.read.named.iter().any(|(known, _)| *known == file) {
+                self.read.named.push((file, sum));
             }
         }
         for diagnostic in other.list {

@@ -136,6 +136,13 @@ fn a_model_that_attaches_itself_is_refused() {
     let (model, diagnostics) = load(&Source::new(&path.to_string_lossy(), text), &ModelOptions::default());
     assert!(model.is_none());
     assert_eq!(diagnostics.iter().map(|d| d.code).collect::<Vec<_>>(), ["include-failed"], "{diagnostics}");
+    // a body that is not there
+    std::fs::write(folder.join("arm.xml"), PLAIN).expect("it can be written");
+    let attach = "<attach model=\"arm\" prefix=\"l_\" body=\"b\"/></worldbody><asset><model name=\"arm\" file=\"arm.xml\"/></asset>";
+    let text = PLAIN.replace("</worldbody>", attach);
+    let (_, diagnostics) = load(&Source::new(&path.to_string_lossy(), text), &ModelOptions::default());
+    let said = diagnostics.to_string();
+    assert!(said.contains("body of <attach>: `b` is unknown") && said.contains("known: a"), "{said}");
     std::fs::remove_dir_all(&folder).expect("it was made here");
 }
 

@@ -272,8 +272,11 @@ impl<'s> Mjcf<'s> {
 
     /// A body that is to be attached, and is not there; other mistakes have been told where the model was to be read.
     fn complain_of_attached(&mut self, element: &'s Element) {
-        let Some(body) = element.attribute("body").filter(|_| self.files.is_attached(element)) else { return };
-        self.complain(body, crate::description::messages::unknown_word("body of <attach>", &body.value, &[]));
+        let (Some(body), Some(known)) = (element.attribute("body"), self.files.attached_bodies(element)) else {
+            return;
+        };
+        let known: Vec<&str> = known.iter().map(String::as_str).collect();
+        self.complain(body, crate::description::messages::unknown_word("body of <attach>", &body.value, &known));
     }
 
     /// The link that stands for a frame in a body, which it makes if there is none yet.

@@ -149,9 +149,12 @@ impl Files {
         None
     }
 
-    /// Whether the model of `attach` was read.
-    pub fn is_attached(&self, element: &Element) -> bool {
-        element.attached.is_some()
+    /// The names of the bodies of the model of `attach`, as its file has them.
+    pub fn attached_bodies(&self, element: &Element) -> Option<Vec<String>> {
+        let scope = element.attached?;
+        let bodies = self.elements.iter().filter(|own| own.scope == scope && own.name == "body");
+        let names = bodies.filter_map(|body| body.attribute("name"));
+        Some(names.map(|name| self.without_prefix(name).to_string()).collect())
     }
 
     fn without_prefix<'a>(&self, attribute: &'a Attribute) -> &'a str {
