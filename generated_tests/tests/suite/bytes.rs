@@ -6,9 +6,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 use straightline_codegen::compile::compile;
+use straightline_codegen::diagnostic::fnv_1a;
 use straightline_codegen::diagnostic::Source;
 use straightline_codegen::options::scene_file;
-use straightline_codegen::diagnostic::fnv_1a;
 use straightline_codegen::options::Options;
 
 /// By how a scene's file begins: the robot that it is of.
