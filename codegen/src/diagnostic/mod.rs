@@ -204,6 +204,14 @@ struct FilesRead {
     named: Vec<(PathBuf, u64)>,
 }
 
+impl FilesRead {
+    fn note(&mut self, file: &Path, sum: impl FnOnce() -> u64) {
+        if !self.named.iter().any(|(known, _)| known == file) {
+            self.named.push((file.to_path_buf(), sum()));
+        }
+    }
+}
+
 impl Diagnostics {
     /// Of complaints with the same code, so many are kept.
     pub const SHOWN_PER_CODE: usize = 100;
@@ -230,9 +238,7 @@ impl Diagnostics {
 
     /// Remembers a file that the one that is read names, such as one that it includes or a mesh: the result depends on it.
     pub fn note_file(&mut self, file: &Path, bytes: &[u8]) {
-        if !self.read.named.iter().any(|(known, _)| known == file) {
-            self.read.named.push((file.to_path_buf(), fnv_1a(bytes.iter().copied())));
-        }
+        self.read.note(file, || fnv_1a(bytes.iter().copied()));
     }
 
     /// The files that the one that was read names, with sums of their bytes.
@@ -271,9 +277,7 @@ impl Diagnostics {
             self.add_source(source);
         }
         for (file, sum) in other.read.named {
-            if !self.read.named.iter().any(|(known, _)| *known == file) {
-                self.read.named.push((file, sum));
-            }
+            self.read.note(&file, || sum);
         }
         for diagnostic in other.list {
             self.push(diagnostic);

@@ -7,6 +7,7 @@
 //! ```
 
 use super::derivatives::{along, unit, with_rates};
+use super::steps::sum;
 use super::Forms;
 use crate::function::by_rows;
 use straightline_core::algorithms::{self as alg, DerivativeBlocks, ForceOnFrame};
@@ -262,10 +263,6 @@ impl<T: Real> Forms<'_, T> {
 /// Adds numbers.
 pub(super) fn add<T: Real>(to: &mut [T], x: &[T]) {
     to.iter_mut().zip(x).for_each(|(to, x)| *to = *to + *x);
-}
-
-fn sum<T: Real>(a: &[T], b: &[T]) -> Vec<T> {
-    a.iter().zip(b).map(|(a, b)| *a + *b).collect()
 }
 
 /// A matrix by rows times a vector.

@@ -224,7 +224,7 @@ fn product<T: Real>(matrix: &[T], by: &[T], nv: usize) -> Vec<T> {
     (0..nv).flat_map(|i| (0..3 * nv).map(move |k| (i, k))).map(|(i, k)| entry(i, k)).collect()
 }
 
-fn sum<T: Real>(a: &[T], b: &[T]) -> Vec<T> {
+pub(super) fn sum<T: Real>(a: &[T], b: &[T]) -> Vec<T> {
     a.iter().zip(b).map(|(a, b)| *a + *b).collect()
 }
 

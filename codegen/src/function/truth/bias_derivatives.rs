@@ -2,9 +2,8 @@
 
 use super::super::bias_derivatives::{BiasDerivatives, CoriolisMatrix, CoriolisTransposeForce, GravityDerivative};
 use super::super::dynamics::{BiasForce, GravityForce, VelocityForce};
-use super::closed::of_robot;
 use super::derivatives::{moving, slopes, unit};
-use super::{list, Chapter, ClosedMotion, Truth};
+use super::{list, Chapter, Truth};
 use crate::function::by_rows;
 use nalgebra::{DMatrix, DVector, Matrix3};
 use straightline_core::magnitude::Magnitude;
@@ -28,10 +27,6 @@ impl Truth for GravityDerivative {
         }
         Some([slopes, forces].concat())
     }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
-    }
 }
 
 impl Truth for BiasDerivatives {
@@ -43,10 +38,6 @@ impl Truth for BiasDerivatives {
             by_rows(&(0..nv).map(column).collect::<Vec<_>>())
         };
         Some([block(0), block(1), BiasForce::truth_of(at)?].concat())
-    }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
     }
 }
 
@@ -89,20 +80,12 @@ impl Truth for CoriolisMatrix {
         let h_dot = mass_matrix_rate(at);
         Some([list(&c.transpose()), list(&h_dot)].concat())
     }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
-    }
 }
 
 impl Truth for CoriolisTransposeForce {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         let qd = DVector::from_column_slice(at.qd());
         Some(list(&(mass_matrix_rate(at) * qd - DVector::from_vec(VelocityForce::truth_of(at)?))))
-    }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
     }
 }
 

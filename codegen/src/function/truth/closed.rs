@@ -220,8 +220,3 @@ impl<T: ClosingReal> Closing<T> {
 pub(super) fn forces<F: Truth>(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
     at.forces(F::truth(&at.tree))
 }
-
-/// Truths that know loops by themselves: derivatives along the independent coordinates.
-pub(super) fn of_robot<F: Truth>(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-    F::truth(&at.robot)
-}

@@ -5,8 +5,8 @@ use super::super::derivatives::{
 };
 use super::super::dynamics::{InverseDynamics, MassMatrix};
 use super::super::Quantity;
-use super::closed::{of_robot, ClosingReal};
-use super::{Chapter, ClosedMotion, Truth};
+use super::closed::ClosingReal;
+use super::{Chapter, Truth};
 use crate::function::by_rows;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference::{CentreOfMassTree, ReferenceJoint, ReferenceReal};
@@ -24,29 +24,17 @@ impl Truth for InverseDynamicsDerivatives {
         });
         Some([by_q, by_qd, MassMatrix::truth_of(at)?, InverseDynamics::truth_of(at)?].concat())
     }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
-    }
 }
 
 impl Truth for InverseDynamicsJvp {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         Some(slopes(at, &at.tree, motion(at), &direction(at)))
     }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
-    }
 }
 
 impl Truth for InverseDynamicsVjp {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         Some(weighed_slopes(at, &at.tree, motion(at), at.get(Quantity::Multiplier)))
-    }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
     }
 }
 
@@ -58,10 +46,6 @@ impl Truth for InverseDynamicsHvp {
         let multiplier: Vec<_> = at.get(Quantity::Multiplier).iter().map(|x| Dual::fixed(*x)).collect();
         let slopes = weighed_slopes(at, &tree, moving.each_ref().map(|x| &x[..]), &multiplier);
         Some(slopes.into_iter().map(|slope| slope.derivatives[0]).collect())
-    }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
     }
 }
 

@@ -6,9 +6,8 @@ use super::super::forward_derivatives::{
     ForwardDynamicsVjp,
 };
 use super::super::Quantity;
-use super::closed::of_robot;
 use super::derivatives::{moving, slopes, unit, weighed_slopes, Direction};
-use super::{solved, Chapter, ClosedMotion, Truth};
+use super::{solved, Chapter, Truth};
 use crate::function::by_rows;
 use nalgebra::{DMatrix, DVector};
 use straightline_core::magnitude::Magnitude;
@@ -20,19 +19,11 @@ impl Truth for ForwardDynamicsDerivatives {
         let system = MovingJoints::new(at);
         Some([ForwardDynamics::truth_of(at)?, system.derivatives(&system.acceleration(at))].concat())
     }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
-    }
 }
 
 impl Truth for ForwardDynamicsDerivativesAtMotion {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         Some(MovingJoints::new(at).derivatives(at.qdd()))
-    }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
     }
 }
 
@@ -42,10 +33,6 @@ impl Truth for ForwardDynamicsJvp {
         let rates = system.acceleration_rate(&system.acceleration(at));
         Some(system.of_moving(&rates))
     }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
-    }
 }
 
 impl Truth for ForwardDynamicsVjp {
@@ -54,10 +41,6 @@ impl Truth for ForwardDynamicsVjp {
         let (qdd, by_force) = (system.acceleration(at), system.solved(at.get(Quantity::Multiplier)));
         let slopes = weighed_slopes(at, &at.tree, [at.q(), at.qd(), &qdd], &by_force);
         Some(system.gradient(&slopes.into_iter().map(|slope| -slope).collect::<Vec<_>>(), &by_force))
-    }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
     }
 }
 
@@ -78,10 +61,6 @@ impl Truth for ForwardDynamicsHvp {
         let nv = qdd.len();
         let rate = system.solved(&change(&vec![Magnitude::zero(); nv])[2 * nv..]);
         Some(system.gradient(&change(&rate), &rate))
-    }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
     }
 }
 

@@ -2,9 +2,9 @@
 
 use super::super::frame_forces::JacobianHessianProduct;
 use super::super::Quantity;
-use super::closed::{of_robot, ClosingReal};
+use super::closed::ClosingReal;
 use super::motion_derivatives::slopes;
-use super::{list, Chapter, ClosedMotion, Truth};
+use super::{list, Chapter, Truth};
 use nalgebra::DVector;
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference::CentreOfMassTree;
@@ -15,10 +15,6 @@ impl Truth for JacobianHessianProduct {
         let moving = at.tree.map(Dual::<Magnitude, 1>::fixed);
         let slopes = slopes(at, 0, |[q, ..]| generalized(at, &moving, q, Dual::fixed));
         Some([generalized(at, &at.tree, at.q(), |x| x), slopes].concat())
-    }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
     }
 }
 

@@ -38,9 +38,9 @@ pub trait Truth: RobotFunction {
     /// hold such functions to laws of physics.
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>>;
 
-    /// The same of a robot with closed loops.
-    fn truth_on_loops(_: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        None
+    /// The same of a robot with closed loops; of functions whose truth knows loops by itself, as derivatives along the independent coordinates do, the same.
+    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
+        Self::truth(&at.robot)
     }
 
     /// The same of any robot.

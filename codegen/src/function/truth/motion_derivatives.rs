@@ -4,9 +4,9 @@ use super::super::motion_derivatives::{
     CentreOfMassJacobian, CentroidalDerivatives, CentroidalMap, CentroidalMapRate, FrameDerivatives,
     FrameDerivativesAtWorldOrigin, FrameDerivativesInOwnAxes, SubtreeCentresOfMass,
 };
-use super::closed::{of_robot, ClosingReal};
+use super::closed::ClosingReal;
 use super::derivatives::{moving, unit};
-use super::{list, Chapter, ClosedMotion, Truth};
+use super::{list, Chapter, Truth};
 use crate::function::by_rows;
 use nalgebra::Vector3;
 use straightline_core::magnitude::Magnitude;
@@ -40,10 +40,6 @@ impl Truth for FrameDerivatives {
         ];
         Some(blocks.concat())
     }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
-    }
 }
 
 impl Truth for FrameDerivativesInOwnAxes {
@@ -51,20 +47,12 @@ impl Truth for FrameDerivativesInOwnAxes {
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         twist_slopes::<AlongOwnAxes>(at)
     }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
-    }
 }
 
 impl Truth for FrameDerivativesAtWorldOrigin {
     /// Of v − ω × p and ω.
     fn truth(at: &Chapter<'_>) -> Option<Vec<Magnitude>> {
         twist_slopes::<AtWorldOrigin>(at)
-    }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
     }
 }
 
@@ -135,10 +123,6 @@ impl Truth for CentreOfMassJacobian {
         let tree = at.tree.map(Moving::fixed);
         Some(slopes(at, 0, |[q, ..]| list(&reference::centre_of_mass(&tree, q))))
     }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
-    }
 }
 
 impl Truth for SubtreeCentresOfMass {
@@ -150,10 +134,6 @@ impl Truth for SubtreeCentresOfMass {
         let centres: Vec<_> = order.iter().flat_map(|joint| centre(&at.tree, *joint, at.q())).collect();
         let jacobians = order.iter().flat_map(|joint| slopes(at, 0, |[q, ..]| centre(&moving, *joint, q)));
         Some(order.iter().map(|joint| mass(*joint)).chain(centres).chain(jacobians).collect())
-    }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
     }
 }
 
@@ -180,10 +160,6 @@ impl Truth for CentroidalMap {
         let column = |k: usize| momentum(at, &at.tree, at.q(), &unit::<Magnitude>(nv, 1, k)[1]);
         Some(by_rows(&(0..nv).map(column).collect::<Vec<_>>()))
     }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
-    }
 }
 
 impl Truth for CentroidalMapRate {
@@ -195,10 +171,6 @@ impl Truth for CentroidalMapRate {
             rates.map(|x| x.derivatives[0]).collect::<Vec<_>>()
         };
         Some([CentroidalMap::truth(at)?, by_rows(&(0..nv).map(column).collect::<Vec<_>>())].concat())
-    }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
     }
 }
 
@@ -218,10 +190,6 @@ impl Truth for CentroidalDerivatives {
         };
         let [by_q, by_qd] = [0, 1].map(|block| slopes(at, block, rate));
         Some([h, h_dot, dh_dq, by_q, by_qd, CentroidalMap::truth(at)?].concat())
-    }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
     }
 }
 

@@ -4,10 +4,9 @@ use super::super::dynamics::{GravityForce, VelocityForce};
 use super::super::kinematics::JacobianBias;
 use super::super::tasks::{InverseKinematicsStep, OperationalSpaceDynamics};
 use super::super::Quantity;
-use super::closed::of_robot;
 use super::derivatives::weighed_slopes;
 use super::forward_derivatives::MovingJoints;
-use super::{solved, Chapter, ClosedMotion, Effect, Truth};
+use super::{solved, Chapter, Effect, Truth};
 use nalgebra::{DMatrix, DVector};
 use straightline_core::magnitude::Magnitude;
 use straightline_core::reference::{self, CentreOfMassFrame};
@@ -57,10 +56,6 @@ impl Truth for OperationalSpaceDynamics {
         }
         Some(blocks.concat())
     }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
-    }
 }
 
 impl Truth for InverseKinematicsStep {
@@ -93,10 +88,6 @@ impl Truth for InverseKinematicsStep {
             }
         }
         Some(step)
-    }
-
-    fn truth_on_loops(at: &ClosedMotion<'_>) -> Option<Vec<Magnitude>> {
-        of_robot::<Self>(at)
     }
 }
 
