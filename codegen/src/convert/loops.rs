@@ -32,6 +32,7 @@ pub fn by_frames(robot: &mut Description, model: &Model<Dd>) {
             name: written.name.clone(),
             points: LoopPoints::Frames(frames),
             determines: own.iter().map(joint).collect(),
+            assembly: written.assembly.clone(),
         }));
     }
     robot.loops.clear();

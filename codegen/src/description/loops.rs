@@ -4,7 +4,27 @@ use super::reader::FileReader;
 use super::table::TomlTable;
 use super::{LoopPoints, WrittenLoop};
 
-const LOOP: &[&str] = &["name", "frame", "with", "determines"];
+const LOOP: &[&str] = &["name", "frame", "with", "determines", "assembly"];
+
+/// One of the two assemblies of a loop that closes in closed form.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WrittenAssembly {
+    /// The one that is nearest to the pose of the file.
+    Drawn,
+    /// The other one.
+    Mirrored,
+}
+
+impl WrittenAssembly {
+    /// How files say it.
+    pub const WORDS: [(&'static str, WrittenAssembly); 2] =
+        [("drawn", WrittenAssembly::Drawn), ("mirrored", WrittenAssembly::Mirrored)];
+
+    /// Its word.
+    pub fn word(self) -> &'static str {
+        Self::WORDS.iter().find(|(_, own)| *own == self).expect("every assembly has a word").0
+    }
+}
 
 impl FileReader<'_> {
     /// Frames whose origins coincide.
@@ -26,6 +46,7 @@ impl FileReader<'_> {
         };
         let (one, other) = (end("frame"), end("with"));
         let determines = self.names_at(&table, "determines", "joint");
-        Some(WrittenLoop { name: name?, points: LoopPoints::Frames([one?, other?]), determines })
+        let assembly = self.word_at(&table, "assembly", &WrittenAssembly::WORDS);
+        Some(WrittenLoop { name: name?, points: LoopPoints::Frames([one?, other?]), determines, assembly })
     }
 }

@@ -48,6 +48,7 @@ pub const CODES: &[&str] = &[
     "loop-open",
     "loop-joint",
     "loop-joint-determined",
+    "loop-assembly",
     "loops-depend",
     "coupling-joint",
     "coupling-ratio-zero",
@@ -415,6 +416,14 @@ pub fn loop_joint<'a>(name: &str, joint: &str, joints: impl IntoIterator<Item = 
 pub fn loop_joint_determined(joint: &str) -> D {
     let what = format!("the loops leave joint `{}` where it is once the joints before it are known", cut(joint));
     D::error("loop-joint-determined", what).help("leave it out of `determines`, or name another joint in its place")
+}
+
+/// An assembly of a loop that has no closed form.
+pub fn loop_assembly(name: &str) -> D {
+    let what = format!("loop `{}` closes in steps of Newton's method, from wherever its joints stand", cut(name));
+    D::error("loop-assembly", what)
+        .detail("loops have two assemblies by name where they determine one joint and a hinge, or two hinges whose axes meet")
+        .help("leave `assembly` out, or let `determines` name such joints")
 }
 
 /// Loops whose equations depend on each other.

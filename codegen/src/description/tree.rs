@@ -3,6 +3,7 @@
 //! The one thing that formats say in different ways is where a joint stands ([`Placement`]).
 
 use super::composite::{CompositeKind, WrittenComposite, COMPOSITES};
+use super::loops::WrittenAssembly;
 use super::{drives, flexible, Angle, FileFormat, Noted, Rotation, WrittenPose};
 use crate::diagnostic::Place;
 use std::collections::HashSet;
@@ -457,6 +458,8 @@ pub struct WrittenLoop {
     pub points: LoopPoints,
     /// The joints that it determines; none: those that do it best.
     pub determines: Vec<Noted<String>>,
+    /// The assembly in which it closes; `None`: the one in which its joints stand.
+    pub assembly: Option<Noted<WrittenAssembly>>,
 }
 
 /// How a file says where a loop closes.

@@ -53,6 +53,7 @@ pub const ALL: &[Code] = &[
     code("loop-open", Error, "A loop that cannot be closed."),
     code("loop-joint", Error, "A joint that is not on the loop that is to determine it."),
     code("loop-joint-determined", Error, "A joint that is to be determined by loops which leave it no freedom to follow them."),
+    code("loop-assembly", Error, "An assembly by name of a loop that closes in steps."),
     code("loops-depend", Error, "Loops whose equations depend on each other."),
     code("not-on-loops", Error, "Something of a scene that robots with closed loops do not take."),
     code("determined-joint", Error, "A joint that loops determine, where one with a velocity of its own is meant."),

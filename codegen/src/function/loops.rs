@@ -5,7 +5,8 @@ use super::spec::{Family, Output, RobotFunction, Spec};
 use super::{Forms, Quantity};
 use straightline_core::Real;
 
-/// So many steps of Newton's method close loops: from 0.1 rad away the fourth leaves rounding, and the fifth is for those that begin further away.
+/// So many steps of Newton's method close loops without a closed form: from 0.1 rad away the fourth leaves rounding, and the fifth is for those that begin
+/// further away.
 const NEWTON_STEPS: usize = 5;
 
 const OF_LOOPS: Spec = Spec { family: Family::Loops, on_loops: true, ..Spec::DEFAULT };
@@ -15,7 +16,7 @@ pub struct CloseLoops;
 impl RobotFunction for CloseLoops {
     const SPEC: Spec = Spec {
         name: "close_loops",
-        summary: "Closes the loops: moves the dependent joints of q from where they are, in five steps of Newton's method, and says how far the loops stay open.",
+        summary: "Closes the loops: moves the dependent joints of q in the assembly in which they stand, in closed form or in five steps of Newton's method, and says how far the loops stay open.",
         aliases: &["loop closure", "constraint projection", "assembly"],
         inputs: &[Quantity::Configuration],
         outputs: &[
@@ -26,7 +27,7 @@ impl RobotFunction for CloseLoops {
     };
 
     fn evaluate<T: Real>(forms: &Forms<'_, T>, inputs: &[Vec<T>]) -> Vec<T> {
-        let (q, gap) = forms.model.close_loops(&inputs[0], NEWTON_STEPS);
+        let (q, gap) = forms.model.assemble_loops(&inputs[0], NEWTON_STEPS);
         [q, gap].concat()
     }
 }

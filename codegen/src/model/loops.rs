@@ -3,6 +3,7 @@
 //! Joints that loops determine are chosen by the rank of the equations' columns in closed configurations, which Newton's method finds from poses within the
 //! joints' ranges: those that nothing drives first, and of those the last of the file.
 
+use super::dyads::dyad_of;
 use super::geometry::{point, snap_vector, vector};
 use super::{Assembly, ModelOptions};
 use crate::description::angle::{self, ROUNDING};
@@ -449,7 +450,11 @@ fn groups(loops: &[ClosedLoop<Dd>], dependents: &[BodyId], model: &Model<Dd>) ->
         own.sort_by_key(|b| (times(b), *b));
         left.retain(|l| !set.contains(l));
         known.extend(&own);
-        found.push(LoopGroup { loops: set, dependents: own });
+        let dyad = match set[..] {
+            [only] => dyad_of(model, &loops[only], &own),
+            _ => None,
+        };
+        found.push(LoopGroup { loops: set, dependents: own, dyad });
     }
     found
 }

@@ -33,6 +33,7 @@ mod centres_of_mass;
 mod check;
 mod couplings;
 pub(crate) mod drives;
+mod dyads;
 mod flexible;
 pub mod limbs;
 mod loops;
@@ -351,6 +352,7 @@ fn close(
         home[after..after + before.kind.nq()].copy_from_slice(before.coordinates(&closure.home));
     }
     model.closure = Closure { home, ..closure };
+    dyads::keep_assemblies(model, description, diagnostics);
 }
 
 /// Gives every joint its place in the coordinate vectors: those that loops determine behind the independent ones, and then those that follow others.

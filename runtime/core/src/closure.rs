@@ -12,6 +12,11 @@
 //! (constraint embedding; Featherstone 2008, section 8.11). e and its derivatives are taken in the axes of the body where both paths to the points part, so
 //! what moves the loop as a whole is not in them. Loops are solved one group after the other, each for as many coordinates as it has equations.
 
+mod dyad;
+mod plane;
+
+pub use dyad::{Dyad, DyadWay};
+
 use crate::algorithms::{forward_kinematics, frame_acceleration, jacobian};
 use crate::model::{Body, BodyId, Frame, Joint, Model};
 use crate::real::Real;
@@ -21,6 +26,7 @@ use alloc::collections::BTreeSet;
 use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
+use plane::PlaneLoop;
 
 /// A point of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +66,8 @@ pub struct LoopGroup {
     pub loops: Vec<usize>,
     /// The bodies whose joints these loops determine. Those that fewest loops contain stand first.
     pub dependents: Vec<BodyId>,
+    /// How its loop, then the only one, closes in closed form.
+    pub dyad: Option<Dyad>,
 }
 
 /// What closes a robot's loops.
@@ -238,6 +246,21 @@ impl<T: Real> Model<T> {
         joints.flat_map(|joint| joint.iv..joint.iv + joint.kind.nv()).collect()
     }
 
+    /// The loop of a group that is one loop of hinges in a plane.
+    fn plane_loop(&self, group: &LoopGroup, y: &[T]) -> Option<(usize, PlaneLoop<T>)> {
+        let [l] = group.loops[..] else { return None };
+        Some((l, PlaneLoop::new(self, &self.closure.loops[l], y)?))
+    }
+
+    /// −J̇ ẋ of a loop's equations, a number to a row.
+    fn drift_of(&self, of: &ClosedLoop<T>, y: &[T], yd: &[T]) -> Vec<Vec<T>> {
+        let drift = match PlaneLoop::new(self, of, y) {
+            Some(plane) => plane.drift(yd),
+            None => self.gap_drift(of, y, yd).into_iter().map(|x| -x).collect(),
+        };
+        drift.into_iter().map(|x| vec![x]).collect()
+    }
+
     /// Solves the groups one after the other for the dependent part of some vectors over the velocities, of which the independent part is given: rows times
     /// vector is what `right` says. Vectors stand by rows, one number of each to a row.
     fn solved(&self, y: &[T], mut known: Vec<Vec<T>>, right: impl Fn(usize) -> Vec<Vec<T>>) -> Vec<Vec<T>> {
@@ -245,6 +268,10 @@ impl<T: Real> Model<T> {
         known.resize(self.open_nv(), vec![T::zero(); width]);
         for group in &self.closure.groups {
             let unknown = self.coordinates_of(group);
+            if let Some((l, plane)) = self.plane_loop(group, y) {
+                plane.solve(&unknown, &mut known, right(l));
+                continue;
+            }
             let (mut square, mut sides) = (Vec::new(), Vec::new());
             for &l in &group.loops {
                 T::section("loop", None);
@@ -288,7 +315,7 @@ impl<T: Real> Model<T> {
         if self.closure.is_empty() {
             return Vec::new();
         }
-        let right = |l: usize| self.gap_drift(&self.closure.loops[l], y, yd).into_iter().map(|x| vec![-x]).collect();
+        let right = |l: usize| self.drift_of(&self.closure.loops[l], y, yd);
         let all = self.solved(y, vec![vec![T::zero()]; self.nv()], right);
         all.into_iter().skip(self.nv()).map(|row| row[0]).collect()
     }
@@ -312,26 +339,33 @@ impl<T: Real> Model<T> {
     pub fn close_loops(&self, q: &[T], steps: usize) -> (Vec<T>, Vec<T>) {
         let mut q = q.to_vec();
         for group in &self.closure.groups {
-            for _ in 0..steps {
-                let y = self.tree_positions(&q).into_owned();
-                let unknown = self.coordinates_of(group);
-                let loops = || group.loops.iter().map(|l| &self.closure.loops[*l]);
-                let square = loops().flat_map(|of| self.gap_rows(of, &y));
-                let square = square.map(|row| unknown.iter().map(|k| row[*k]).collect()).collect();
-                let gaps = loops().flat_map(|of| self.gap(of, &y)).map(|gap| vec![-gap]).collect();
-                let step: Vec<T> = solve(square, gaps).into_iter().map(|row| row[0]).collect();
-                let mut first = 0;
-                for joint in group.dependents.iter().map(|b| &self.bodies[*b].joint) {
-                    let (from, to) = (joint.iq, joint.iq + joint.kind.nq());
-                    let (own, after) = (q[from..to].to_vec(), first + joint.kind.nv());
-                    joint.kind.mechanics().integrate(&own, &step[first..after], &mut q[from..to]);
-                    first = after;
-                }
-            }
+            (0..steps).for_each(|_| self.step_loops(group, &mut q));
         }
-        let y = self.tree_positions(&q).into_owned();
-        let gaps = self.closure.loops.iter().flat_map(|of| self.gap(of, &y)).collect();
+        let gaps = self.gaps(&q);
         (q, gaps)
+    }
+
+    fn gaps(&self, q: &[T]) -> Vec<T> {
+        let y = self.tree_positions(q);
+        self.closure.loops.iter().flat_map(|of| self.gap(of, &y)).collect()
+    }
+
+    /// One step of Newton's method for the loops of a group.
+    fn step_loops(&self, group: &LoopGroup, q: &mut [T]) {
+        let y = self.tree_positions(q).into_owned();
+        let unknown = self.coordinates_of(group);
+        let loops = || group.loops.iter().map(|l| &self.closure.loops[*l]);
+        let square = loops().flat_map(|of| self.gap_rows(of, &y));
+        let square = square.map(|row| unknown.iter().map(|k| row[*k]).collect()).collect();
+        let gaps = loops().flat_map(|of| self.gap(of, &y)).map(|gap| vec![-gap]).collect();
+        let step: Vec<T> = solve(square, gaps).into_iter().map(|row| row[0]).collect();
+        let mut first = 0;
+        for joint in group.dependents.iter().map(|b| &self.bodies[*b].joint) {
+            let (from, to) = (joint.iq, joint.iq + joint.kind.nq());
+            let (own, after) = (q[from..to].to_vec(), first + joint.kind.nv());
+            joint.kind.mechanics().integrate(&own, &step[first..after], &mut q[from..to]);
+            first = after;
+        }
     }
 }
 

@@ -55,6 +55,9 @@ fn text(robot: &Description) -> String {
         let name = string(&own.name.value);
         _ = writeln!(out, "\n[[loop]]\nname = {name}\nframe = {one}\nwith = {other}");
         _ = writeln!(out, "determines = [{}]", determines.join(", "));
+        if let Some(assembly) = &own.assembly {
+            _ = writeln!(out, "assembly = {}", string(assembly.value.word()));
+        }
     }
     for frame in &robot.frames {
         let (name, link) = (string(&frame.name.value), string(&frame.link.value));
