@@ -37,6 +37,9 @@ use straightline_graph::expr::{verify, Graph, Port};
 use straightline_graph::pass::{dead_code, order, substitute, sums, unread_inputs};
 use straightline_graph::schedule::{schedule, Schedule};
 
+/// Values of the greatest program of a robot with closed loops in which values are formed of others, whatever the function.
+const SUBSTITUTED_ON_LOOPS: usize = 600;
+
 /// A program between tracing and text.
 #[derive(Clone, Debug)]
 pub struct TracedProgram {
@@ -134,7 +137,9 @@ fn optimised_with(
             true => check("dead code", dead_code(&check("sums", sums(&graph)))),
             false => graph,
         };
-        let largest = function.spec().substituted_up_to;
+        // what loops determine is formed of few values in many ways
+        let of_loops = if robot.model.closure.is_empty() { 0 } else { SUBSTITUTED_ON_LOOPS };
+        let largest = function.spec().substituted_up_to.max(of_loops);
         let graph = match optimisations.substitutes && largest > 0 {
             true => check("substitute", substitute(&graph, largest, &choose::keeps_digits_of(&robot.model, &graph))),
             false => graph,
