@@ -59,6 +59,7 @@ mod reduced_forms;
 mod reference_input;
 mod regressors;
 mod robot_files;
+mod regressors_of_followers;
 mod robots_as_written;
 mod rolled;
 mod rules;
