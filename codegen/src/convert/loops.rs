@@ -32,6 +32,8 @@ pub fn by_frames(robot: &mut Description, model: &Model<Dd>) {
             name: written.name.clone(),
             points: LoopPoints::Frames(frames),
             determines: own.iter().map(joint).collect(),
+            // in its plane a hinge is what its points are
+            hinge: None,
         }));
     }
     robot.loops.clear();

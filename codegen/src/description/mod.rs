@@ -26,6 +26,7 @@ pub mod write;
 mod written_pose;
 mod xml;
 
+pub use loops::{LoopPoints, WrittenLoop};
 pub use tree::*;
 pub use written_pose::*;
 

@@ -3,6 +3,7 @@
 //! The one thing that formats say in different ways is where a joint stands ([`Placement`]).
 
 use super::composite::{CompositeKind, WrittenComposite, COMPOSITES};
+use super::loops::WrittenLoop;
 use super::{drives, flexible, Angle, FileFormat, Noted, Rotation, WrittenPose};
 use crate::diagnostic::Place;
 use std::collections::HashSet;
@@ -446,31 +447,6 @@ pub struct WrittenCoupling {
     pub ratio: Noted<f64>,
     /// b \[rad or m\]; 0 where the file says nothing.
     pub offset: Noted<f64>,
-}
-
-/// Two points of links that coincide.
-#[derive(Clone, Debug, PartialEq)]
-pub struct WrittenLoop {
-    /// What messages and reports call it.
-    pub name: Noted<String>,
-    /// The points.
-    pub points: LoopPoints,
-    /// The joints that it determines; none: those that do it best.
-    pub determines: Vec<Noted<String>>,
-}
-
-/// How a file says where a loop closes.
-#[derive(Clone, Debug, PartialEq)]
-pub enum LoopPoints {
-    /// The origins of two frames, named ones or those of links.
-    Frames([Noted<String>; 2]),
-    /// A point of the first link \[m\], and what is there of the second one in the pose of the file.
-    Anchor {
-        /// The links; `None`: the world.
-        links: [Option<Noted<String>>; 2],
-        /// The point in the frame of the first one.
-        point: Noted<[f64; 3]>,
-    },
 }
 
 /// A named frame on a link.

@@ -49,6 +49,8 @@ pub const ALL: &[Code] = &[
     code("coulomb-speed-missing", Error, "Smooth friction without a width."),
     code("coupled-twice", Error, "A joint that follows two others."),
     code("coupling-cycle", Error, "Joints that follow each other in a circle."),
+    code("damped-base-stands", Error, "A damping of a base that does not move."),
+    code("hinge-out-of-plane", Error, "A hinge that closes a loop which does not move in a plane."),
     code("loop-within-body", Error, "A loop whose points belong to one body."),
     code("loop-open", Error, "A loop that cannot be closed."),
     code("loop-joint", Error, "A joint that is not on the loop that is to determine it."),

@@ -70,6 +70,7 @@ mod scenes_as_written;
 mod scope;
 mod sdf;
 mod sdf_messages;
+mod sdf_loops;
 mod self_test;
 mod staged;
 mod steps;

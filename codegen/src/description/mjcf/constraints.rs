@@ -58,7 +58,7 @@ impl<'s> Mjcf<'s> {
                 LoopPoints::Anchor { links, point: self.vector(given, "anchor", owner, [0.0; 3]) }
             }
         };
-        Some(WrittenLoop { name, points, determines: Vec::new() })
+        Some(WrittenLoop { name, points, determines: Vec::new(), hinge: None })
     }
 
     /// q₁ − ref₁ = a₀ + a₁ (q₂ − ref₂).
