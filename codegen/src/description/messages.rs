@@ -60,6 +60,8 @@ pub const CODES: &[&str] = &[
     "several-coordinates",
     "oblique-plane",
     "negative-effect",
+    "damped-base-stands",
+    "no-oscillation",
     "gear-ratio-zero",
     "gear-ratio-alone",
     "no-links",
@@ -457,8 +459,6 @@ pub fn negative_effect(joint: &str, what: &str, value: f64) -> D {
         .help("write its magnitude: tau = I qdd + d qd + f sign(qd) + k (q - rest)")
 }
 
-/// A gear that stands still.
-pub fn gear_ratio_zero(joint: &str) -> D {
 /// Friction of a base that would drive it.
 pub fn negative_base_damping(value: f64) -> D {
     D::error("negative-effect", format!("the damping of the base is negative: {value:?}"))
@@ -498,6 +498,8 @@ pub fn no_spring_of_oscillation(joint: &str, [stiffness, damping]: [f64; 2]) -> 
         .help("give what it moves mass and inertia, or write `stiffness` and `damping` in its place")
 }
 
+/// A gear that stands still.
+pub fn gear_ratio_zero(joint: &str) -> D {
     D::error("gear-ratio-zero", format!("the gear ratio of joint `{joint}` is zero"))
         .help("write rotor speed over joint speed, such as 100.0")
 }

@@ -30,6 +30,8 @@ pub struct Description {
     pub gravity: Option<Noted<[f64; 3]>>,
     /// The base, where the file states it.
     pub base: Option<Noted<BaseKind>>,
+    /// Viscous friction on each velocity of a base that floats \[N·s/m of the root link's origin, N·m·s/rad of its turn\].
+    pub base_damping: Option<Noted<f64>>,
     /// The links, in the file's order.
     pub links: Vec<WrittenLink>,
     /// The joints, in the file's order.
@@ -60,6 +62,7 @@ impl Description {
             name,
             gravity: None,
             base: None,
+            base_damping: None,
             links: Vec::new(),
             joints: Vec::new(),
             couplings: Vec::new(),
@@ -143,7 +146,7 @@ impl Description {
         }
     }
 
-    /// Adds what could be read of a link.
+    /// Adds a link.
     pub(crate) fn add_link(&mut self, link: Option<WrittenLink>) {
         self.has_holes |= link.is_none();
         self.links.extend(link);
@@ -314,7 +317,7 @@ impl WrittenJoint {
         }
     }
 
-    /// What belongs to a single coordinate: limits, friction, a rotor and a spring, as far as they are written; zeros add nothing.
+    /// What belongs to a single coordinate, as far as it is written; zeros add nothing.
     pub(crate) fn of_one_coordinate(&self) -> Vec<(&'static str, &Noted<f64>)> {
         let WrittenJoint { limits, drive, .. } = self;
         let given = [
@@ -434,6 +437,19 @@ pub struct JointDrive {
     pub spring_stiffness: Option<Noted<f64>>,
     /// Spring: coordinate without force \[rad or m\].
     pub spring_rest: Option<Noted<f64>>,
+    /// What spring and damper are made of, in place of their numbers.
+    pub oscillation: Option<WrittenOscillation>,
+}
+
+/// How a joint is to swing on its spring and damper in the pose of the file while all others are free: both are made of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WrittenOscillation {
+    /// T \[s\], positive.
+    pub time_constant: f64,
+    /// ζ, positive.
+    pub damping_ratio: f64,
+    /// Its place.
+    pub place: Place,
 }
 
 /// A joint whose coordinate follows that of another: q = a q_source + b.
